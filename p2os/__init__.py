@@ -1,0 +1,1 @@
+"""The P2OS protocol: wire, commands, packets, connection, client and virtual robot."""

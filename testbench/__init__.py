@@ -1,0 +1,1 @@
+"""The composition root: wires, run loop, scenarios, recordings and reports."""
