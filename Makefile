@@ -1,0 +1,54 @@
+# The whole ceremony: `make demo` shows the bench at work, `make test` proves it.
+# Both set up what they need in .venv first.
+
+PYTHON ?= python3.11
+ifeq (, $(shell command -v $(PYTHON) 2>/dev/null))
+PYTHON := python3
+endif
+VENV   := .venv
+BIN    := $(VENV)/bin
+STAMP  := $(VENV)/.set-up
+JOBS   ?= 2
+
+.PHONY: setup demo test lint type unit bench soak clean firmware
+
+setup: $(STAMP)
+
+# PyBullet has no wheels beyond Python 3.11: elsewhere the extra installs NumPy
+# alone, and everything but the `bullet` body works.
+$(STAMP): pyproject.toml constraints.txt
+	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || \
+	    { echo "make: Python 3.11 or newer is needed (hint: make PYTHON=/path/to/python3.11)"; exit 2; }
+	@test -x $(BIN)/python || $(PYTHON) -m venv $(VENV) || \
+	    { rm -rf $(VENV); echo "make: cannot create a virtual environment (hint: apt-get install python3-venv)"; exit 2; }
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt -e '.[all,dev]'
+	@touch $@
+
+demo: setup
+	$(BIN)/p2os demo
+
+test: lint type unit
+
+lint: setup
+	$(BIN)/ruff check .
+	$(BIN)/ruff format --check .
+
+type: setup
+	$(BIN)/mypy
+
+unit: setup
+	$(BIN)/pytest -n $(JOBS) -m 'not soak and not hardware' --cov --cov-report=term --cov-report=json:.coverage.json
+	$(BIN)/python tools/check_coverage.py .coverage.json
+
+bench: setup
+	$(BIN)/python tools/bench_speed.py
+
+soak: setup
+	$(BIN)/pytest -n $(JOBS) -m 'soak' --no-cov
+
+# Rebuilds the example firmware (needs gcc-arm-none-eabi); `make test` compares.
+firmware: setup
+	$(BIN)/python testbench/firmware/build.py
+
+clean:
+	rm -rf $(VENV) build dist *.egg-info .pytest_cache .mypy_cache .ruff_cache .hypothesis .coverage .coverage.* runs

@@ -1,0 +1,56 @@
+"""Judge a coverage report: the protocol core is covered whole, the rest to 90 %.
+
+Usage: python tools/check_coverage.py COVERAGE.json
+"""
+
+import json
+import sys
+from pathlib import Path
+
+#: Modules whose every branch is tested: a fault in them reaches every user.
+CORE = (
+    "p2os/commands.py",
+    "p2os/connection.py",
+    "p2os/errors.py",
+    "p2os/odometry.py",
+    "p2os/packets.py",
+    "p2os/parameters.py",
+    "p2os/profiles.py",
+    "p2os/sip.py",
+    "p2os/state.py",
+    "p2os/timing.py",
+    "p2os/units.py",
+    "p2os/wire/",
+)
+CORE_PERCENT = 100.0
+REST_PERCENT = 90.0
+
+
+def percent(files: dict[str, dict[str, dict[str, float]]], names: list[str]) -> float:
+    """Return statements and branches covered, in per cent of those there are."""
+    summaries = [files[name]["summary"] for name in names]
+    there_are = sum(s["num_statements"] + s.get("num_branches", 0) for s in summaries)
+    covered = sum(s["covered_lines"] + s.get("covered_branches", 0) for s in summaries)
+    return 100.0 * covered / there_are if there_are else 100.0
+
+
+def main(path: str) -> int:
+    """Print the verdict for each group; return 1 where one falls short."""
+    files = json.loads(Path(path).read_text(encoding="utf-8"))["files"]
+    core = [name for name in files if name.startswith(CORE)]
+    failed = [name for name in core if percent(files, [name]) < CORE_PERCENT]
+    for name in failed:
+        lines = files[name]["missing_lines"]
+        print(f"coverage: {name} at {percent(files, [name]):.1f} %, {CORE_PERCENT:.0f} % wanted; lines {lines}")
+    for package in ("p2os", "bluepill_sim", "adapter_sim", "testbench"):
+        names = [name for name in files if name.startswith(f"{package}/")]
+        figure = percent(files, names)
+        print(f"coverage: {package} {figure:.1f} % of {len(names)} files")
+        if figure < REST_PERCENT:
+            print(f"coverage: {package} falls short of {REST_PERCENT:.0f} %")
+            failed.append(package)
+    return 1 if failed else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1]))
