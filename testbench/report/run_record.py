@@ -1,0 +1,183 @@
+"""A recorded run, read back from its `trace.jsonl`.
+
+The trace is the single source: every picture and table of a report is made
+from it, so a run that was cut short (Ctrl-C, kill -9, a full disk) still has a
+report up to its last complete line.
+
+Invariant: reading never fails on a trace that ends early; it fails with
+`TraceError` on a folder that holds no trace at all.
+"""
+
+import json
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import cast
+
+from p2os.errors import FileError
+
+#: A parsed JSON object.
+Json = dict[str, object]
+
+TRACE_NAME = "trace.jsonl"
+
+
+class TraceError(FileError):
+    """The folder holds no readable trace."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PoseSample:
+    """Where the robot was and how it moved.
+
+    Integers as in the trace: nanoseconds, micrometres, microradians and
+    micrometres a second; wheel angles are counted from the start.
+    """
+
+    t: int
+    x: int
+    y: int
+    z: int
+    heading: int
+    pitch: int
+    left: int
+    right: int
+    left_angle: int
+    right_angle: int
+    collisions: int
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Event:
+    """A line of the state log: who noted what, with what detail."""
+
+    t: int
+    who: str
+    what: str
+    detail: str
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class WireChunk:
+    """Bytes that finished arriving at `t`: `c2r` from client to robot, `r2c` back."""
+
+    t: int
+    direction: str
+    data: bytes
+
+
+@dataclass(slots=True, kw_only=True)
+class RunRecord:
+    """All that a trace says, sorted by kind, each list in order of time."""
+
+    meta: Json = field(default_factory=dict)
+    end: Json = field(default_factory=dict)
+    poses: list[PoseSample] = field(default_factory=list)
+    #: Net name → edges as (ns, level).
+    pins: dict[str, list[tuple[int, int]]] = field(default_factory=dict)
+    sonar: list[tuple[int, list[int]]] = field(default_factory=list)
+    usart: list[tuple[int, bytes]] = field(default_factory=list)
+    wire: list[WireChunk] = field(default_factory=list)
+    events: list[Event] = field(default_factory=list)
+    obstacles: list[Json] = field(default_factory=list)
+    last_ns: int = 0
+    #: True where the trace has no end line, or its last line was cut.
+    is_cut: bool = True
+
+    @property
+    def usart_text(self) -> str:
+        """All that the firmware printed, undecodable bytes replaced."""
+        return b"".join(data for _, data in self.usart).decode("utf-8", "replace")
+
+    def usart_lines(self) -> list[tuple[int, str]]:
+        """Return (ns of its last character, text) for each printed line."""
+        lines, pending = [], b""
+        for t, data in self.usart:
+            pending += data
+            *whole, pending = pending.split(b"\n")
+            lines += [(t, line.decode("utf-8", "replace").rstrip("\r")) for line in whole]
+        if pending:
+            lines.append((self.usart[-1][0], pending.decode("utf-8", "replace")))
+        return lines
+
+
+def read_run(folder: Path) -> RunRecord:
+    """Read a run folder's trace.
+
+    Raises:
+        TraceError: The folder or its trace is missing, or its first line is no trace.
+    """
+    path = folder / TRACE_NAME
+    if not path.is_file():
+        raise TraceError(f"{folder} holds no {TRACE_NAME}", hint="give the folder that `p2os run --out DIR` wrote")
+    record = RunRecord()
+    for entry in _entries(path):
+        _file(record, entry)
+    if not record.meta:
+        raise TraceError(f"{path} does not start with a trace's meta line", hint="was it made by `p2os run`?")
+    return record
+
+
+def _entries(path: Path) -> Iterator[Json]:
+    """Yield each complete line; stop quietly at the first that is cut or no object."""
+    with path.open(encoding="utf-8", errors="replace") as lines:
+        for line in lines:
+            if not line.endswith("\n"):
+                return
+            try:
+                entry = json.loads(line)
+            except json.JSONDecodeError:
+                return
+            if not isinstance(entry, dict):
+                return
+            yield entry
+
+
+def _file(record: RunRecord, entry: Json) -> None:
+    """Put one entry where it belongs; kinds that a later version adds are passed over."""
+    kind = entry.get("k")
+    if kind == "meta":
+        record.meta = entry
+        return
+    if kind == "end":
+        record.end = entry
+        record.is_cut = False
+        return
+    t = _integer(entry, "t")
+    record.last_ns = max(record.last_ns, t)
+    if kind == "pose":
+        record.poses.append(_pose(t, entry))
+    elif kind == "pin":
+        record.pins.setdefault(str(entry["net"]), []).append((t, _integer(entry, "v")))
+    elif kind == "sonar":
+        record.sonar.append((t, [int(value) for value in cast("list[int]", entry["mm"])]))
+    elif kind == "usart":
+        record.usart.append((t, bytes.fromhex(str(entry["hex"]))))
+    elif kind == "wire":
+        record.wire.append(WireChunk(t=t, direction=str(entry["dir"]), data=bytes.fromhex(str(entry["hex"]))))
+    elif kind == "event":
+        detail = str(entry.get("detail", ""))
+        record.events.append(Event(t=t, who=str(entry["who"]), what=str(entry["what"]), detail=detail))
+    elif kind == "obstacle":
+        record.obstacles.append(entry)
+
+
+def _integer(entry: Json, key: str) -> int:
+    value = entry.get(key, 0)
+    return int(value) if isinstance(value, (int, float)) else 0
+
+
+def _pose(t: int, entry: Json) -> PoseSample:
+    return PoseSample(
+        t=t,
+        x=_integer(entry, "x"),
+        y=_integer(entry, "y"),
+        z=_integer(entry, "z"),
+        heading=_integer(entry, "h"),
+        pitch=_integer(entry, "p"),
+        left=_integer(entry, "l"),
+        right=_integer(entry, "r"),
+        left_angle=_integer(entry, "la"),
+        right_angle=_integer(entry, "ra"),
+        collisions=_integer(entry, "c"),
+    )

@@ -1,0 +1,50 @@
+"""The figures of a run that a person reads first.
+
+They come from the trace's end line where the run came to its end, and from the
+samples themselves where it was cut.
+"""
+
+import math
+from itertools import pairwise
+
+from p2os.timing import NS_PER_S
+from testbench.report.run_record import RunRecord
+
+#: Side of the cells that a run's coverage is counted in, metres.
+CELL_M = 0.5
+
+
+def verdict(record: RunRecord) -> str:
+    """Return `passed`, `failed`, or `cut at … s` for a run without an end."""
+    if record.is_cut:
+        return f"cut at {record.last_ns / NS_PER_S:.1f} s"
+    return "passed" if record.end.get("passed") else "failed"
+
+
+def distance_m(record: RunRecord) -> float:
+    """Return the length of the path over ground, metres."""
+    return sum(math.hypot(b.x - a.x, b.y - a.y) for a, b in pairwise(record.poses)) / 1e6
+
+
+def cells_entered(record: RunRecord) -> int:
+    """Return how many different cells of 0.5 m the robot's centre was in."""
+    side = CELL_M * 1e6
+    return len({(math.floor(pose.x / side), math.floor(pose.y / side)) for pose in record.poses})
+
+
+def figures(record: RunRecord) -> list[tuple[str, str]]:
+    """Return (name, value with unit) for each figure of the summary table."""
+    rows = [
+        ("virtual time", f"{record.last_ns / NS_PER_S:.1f} s"),
+        ("distance", f"{distance_m(record):.2f} m"),
+        ("cells of 0.5 m entered", f"{cells_entered(record)}"),
+        ("collisions", f"{record.poses[-1].collisions if record.poses else 0}"),
+    ]
+    clearance = record.end.get("min_clearance_m")
+    if isinstance(clearance, (int, float)):
+        rows.append(("least clearance", f"{clearance:.3f} m"))
+    rows.append(("packets on the wire", f"{len(record.wire)}"))
+    factor = record.end.get("real_time_factor")
+    if isinstance(factor, (int, float)):
+        rows.append(("speed", f"{factor:.1f} × real time"))
+    return rows
