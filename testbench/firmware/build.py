@@ -21,6 +21,7 @@ BOARD_SOURCES = ("startup.c", "board.c", "pins.c", "tick.c", "uart.c")
 PROGRAMS = {
     "motors": ("motors.c",),
     "sensors": ("sensors.c",),
+    "encoders": ("encoders.c", "odometer.c"),
 }
 MACHINE_FLAGS = ("-mcpu=cortex-m3", "-mthumb")
 COMPILE_FLAGS = (
