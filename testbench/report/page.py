@@ -105,7 +105,9 @@ def _robot(robot: Json) -> Json:
 def _lead(meta: Json) -> str:
     """Return the sentence under the title: what was run, on what, in what."""
     world = cast("Json", meta.get("world") or {})
-    path = {"direct": "wired straight to the body", "adapter": "through adapter and P2OS"}.get(str(meta.get("mode")), "")
+    path = {"direct": "wired straight to the body", "adapter": "through adapter and P2OS"}.get(
+        str(meta.get("mode")), ""
+    )
     parts = [
         f"firmware {meta.get('firmware', '?')}",
         f"world {world.get('name', '?')}",

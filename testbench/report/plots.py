@@ -132,5 +132,3 @@ def _pins_figure(record: RunRecord) -> Figure:
     axes.set(xlabel="time, s", xlim=(0, max(end, 1e-6)), title="pins")
     axes.grid(axis="x", alpha=0.3)
     return figure
-
-

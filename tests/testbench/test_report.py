@@ -45,8 +45,15 @@ def entries() -> list[dict[str, object]]:
         {"t": 80, "k": "obstacle", "op": "move", "name": "post", "x": 2, "y": 2},
         {"t": 81, "k": "obstacle", "op": "remove", "name": "north"},
         {**pose, "t": 1_000_000_000, "x": 1_000_000, "h": 100, "c": 1},
-        {"k": "end", "passed": True, "goals_met": ["covers 1 m"], "failures": [], "trace_sha256": "ab", "min_clearance_m": 0.3},
-    ]  # fmt: skip
+        {
+            "k": "end",
+            "passed": True,
+            "goals_met": ["1 m"],
+            "failures": [],
+            "trace_sha256": "ab",
+            "min_clearance_m": 0.3,
+        },
+    ]
 
 
 @pytest.fixture

@@ -1,0 +1,59 @@
+"""The examples of the documentation run, as they stand there.
+
+Every fenced block of `python` is executed and every line `$ p2os …` of a
+`console` block must end with exit code 0, all blocks of one page in one folder.
+A block that cannot run here says why in the line before it:
+`<!-- not run: the reason -->`.
+"""
+
+import os
+import re
+import shlex
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parent.parent
+BLOCK = re.compile(r"(?P<before>[^\n]*)\n```(?P<language>python|console)\n(?P<text>.*?)```", re.DOTALL)
+LIMIT_S = 240
+
+
+def pages() -> list[Path]:
+    """Return the README and every page of docs/."""
+    return [ROOT / "README.md", *sorted((ROOT / "docs").rglob("*.md"))]
+
+
+def commands(page: Path) -> list[list[str]]:
+    """Return the argument lists that a page's blocks amount to."""
+    found = []
+    for block in BLOCK.finditer(page.read_text(encoding="utf-8")):
+        if block["before"].startswith("<!-- not run:"):
+            continue
+        if block["language"] == "python":
+            found.append([sys.executable, "-c", block["text"]])
+        else:
+            lines = [line[2:] for line in block["text"].splitlines() if line.startswith("$ ")]
+            found += [
+                [str(Path(sys.executable).parent / "p2os"), *shlex.split(line)[1:]]
+                for line in lines
+                if line.startswith("p2os ")
+            ]
+    return found
+
+
+@pytest.mark.parametrize("page", [page for page in pages() if commands(page)], ids=lambda page: page.name)
+def test_the_examples_of_a_page_run(page: Path, tmp_path: Path) -> None:
+    environment = {**os.environ, "NO_COLOR": "1", "TERM": "dumb"}
+    for command in commands(page):
+        done = subprocess.run(
+            command, cwd=tmp_path, capture_output=True, text=True, timeout=LIMIT_S, env=environment, check=False
+        )
+        assert done.returncode == 0, f"{page.name}: {command}\n{done.stdout}\n{done.stderr}"
+
+
+def test_links_between_pages_lead_somewhere() -> None:
+    for page in pages():
+        for target in re.findall(r"\]\(([^)#:]+)(?:#[^)]*)?\)", page.read_text(encoding="utf-8")):
+            assert (page.parent / target).exists(), f"{page.name} points to {target}"
