@@ -1,0 +1,73 @@
+"""What the rest of the project needs of a byte line, and how a line is lost.
+
+A transport moves bytes and keeps no time: reads never block, writes are queued
+by the operating system. It knows nothing of frames.
+"""
+
+from typing import Protocol
+
+from p2os.errors import TransportError
+
+#: The most bytes that one `read` returns, so that a flood cannot starve its caller.
+READ_BYTES = 4096
+
+
+class HungUpError(TransportError):
+    """The far side has gone; nothing more will come."""
+
+
+class Transport(Protocol):
+    """An open byte line to one peer."""
+
+    description: str
+
+    def read(self) -> bytes:
+        """Return what has arrived, at most 4096 bytes, without waiting; empty when nothing has.
+
+        Raises:
+            HungUpError: the far side has gone and all its bytes were read.
+            TransportError: the line failed.
+        """
+        ...
+
+    def write(self, data: bytes) -> None:
+        """Send all of `data`, in order; bytes that the line cannot take yet are kept and sent first next time.
+
+        Raises:
+            HungUpError: the far side has gone.
+            TransportError: the line failed, or its reader has fallen too far behind.
+        """
+        ...
+
+    def fileno(self) -> int:
+        """Return the descriptor that `select` finds readable when `read` has something to say."""
+        ...
+
+    def set_baud(self, baud: int) -> None:
+        """Change the line's speed in bit/s; no effect where there is no such thing."""
+        ...
+
+    def close(self) -> None:
+        """Give the line back; closing twice is harmless."""
+        ...
+
+
+class Listener(Protocol):
+    """A place where one peer at a time can reach us."""
+
+    #: The URL or path that a client opens.
+    description: str
+    #: Seconds after which `accept` is worth asking again, or None when `fileno` tells.
+    poll_s: float | None
+
+    def accept(self) -> Transport | None:
+        """Return the line to a peer that has come, or None, without waiting."""
+        ...
+
+    def fileno(self) -> int | None:
+        """Return the descriptor that `select` finds readable when a peer has come, or None when only polling tells."""
+        ...
+
+    def close(self) -> None:
+        """Stop listening; closing twice is harmless."""
+        ...

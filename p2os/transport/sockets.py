@@ -1,0 +1,127 @@
+"""TCP lines: connecting, listening, and the byte line over any connected socket.
+
+Nagle's algorithm is off: a frame must not wait for its answer.
+"""
+
+import socket
+import sys
+
+from p2os.errors import TransportError
+from p2os.transport.ports import READ_BYTES, HungUpError, Transport
+from p2os.transport.url import TcpUrl
+
+#: chosen: a robot on the same network answers within milliseconds.
+CONNECT_TIMEOUT_S = 3.0
+#: chosen: a minute of SIPs; a client that is further behind will never catch up.
+BACKLOG_BYTES = 65_536
+
+
+class SocketTransport:
+    """A byte line over a connected stream socket."""
+
+    def __init__(self, connection: socket.socket, description: str) -> None:
+        self.description = description
+        self._socket = connection
+        self._unsent = b""
+        connection.setblocking(False)
+        if connection.family != getattr(socket, "AF_UNIX", None):
+            connection.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+
+    def read(self) -> bytes:
+        """Return what has arrived without waiting."""
+        try:
+            data = self._socket.recv(READ_BYTES)
+        except (BlockingIOError, InterruptedError):
+            return b""
+        except OSError as error:
+            raise self._lost(error) from error
+        if not data:
+            raise HungUpError(f"{self.description} closed the connection")
+        return data
+
+    def write(self, data: bytes) -> None:
+        """Send all of `data`, keeping for later what the socket does not take."""
+        self._unsent += data
+        try:
+            while self._unsent:
+                self._unsent = self._unsent[self._socket.send(self._unsent) :]
+        except (BlockingIOError, InterruptedError):
+            if len(self._unsent) > BACKLOG_BYTES:
+                raise TransportError(f"{self.description} has stopped reading") from None
+        except OSError as error:
+            raise self._lost(error) from error
+
+    def fileno(self) -> int:
+        """Return the socket's descriptor."""
+        return self._socket.fileno()
+
+    def set_baud(self, baud: int) -> None:
+        """Do nothing: a socket has no line speed."""
+
+    def close(self) -> None:
+        """Close the socket."""
+        self._socket.close()
+
+    def _lost(self, error: OSError) -> HungUpError:
+        return HungUpError(f"{self.description} was lost: {_reason(error)}")
+
+
+class TcpListener:
+    """A listening TCP port that serves one client at a time."""
+
+    poll_s: float | None = None
+
+    def __init__(self, url: TcpUrl) -> None:
+        self._socket = _listening_socket(url)
+        self.description = str(TcpUrl(host=url.host, port=self._socket.getsockname()[1]))
+
+    def accept(self) -> Transport | None:
+        """Return the line to a client that has come, or None."""
+        try:
+            connection, address = self._socket.accept()
+        except OSError:  # none waiting, or it has gone again: both are no client
+            return None
+        return SocketTransport(connection, str(TcpUrl(host=address[0], port=address[1])))
+
+    def fileno(self) -> int | None:
+        """Return the listening descriptor."""
+        return self._socket.fileno()
+
+    def close(self) -> None:
+        """Give the port back."""
+        self._socket.close()
+
+
+def connect_tcp(url: TcpUrl) -> Transport:
+    """Return a line to a listening TCP port.
+
+    Raises:
+        TransportError: nobody answers there.
+    """
+    try:
+        connection = socket.create_connection((url.host, url.port), timeout=CONNECT_TIMEOUT_S)
+    except OSError as error:
+        raise TransportError(
+            f"cannot connect to {url}: {_reason(error)}", hint=f"is a robot served there? (p2os serve --port {url})"
+        ) from error
+    return SocketTransport(connection, str(url))
+
+
+def _listening_socket(url: TcpUrl) -> socket.socket:
+    family = socket.AF_INET6 if ":" in url.host else socket.AF_INET
+    listening = socket.socket(family, socket.SOCK_STREAM)
+    try:
+        if sys.platform != "win32":  # there, the option lets two programs share a port
+            listening.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        listening.bind((url.host, url.port))
+        listening.listen()
+        listening.setblocking(False)
+    except OSError as error:
+        listening.close()
+        hint = "another program listens there; choose another port, or tcp:127.0.0.1:0 for any free one"
+        raise TransportError(f"cannot listen on {url}: {_reason(error)}", hint=hint) from error
+    return listening
+
+
+def _reason(error: OSError) -> str:
+    return (error.strerror or str(error)).lower()

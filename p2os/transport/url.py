@@ -1,0 +1,120 @@
+"""The text that names a line: `serial:PATH[?baud=N]`, `tcp:HOST:PORT`, `pty:[PATH]`, `loop:NAME`.
+
+Reading a URL opens nothing and needs no operating system: `serial:COM3` is read
+everywhere (it is untried on Windows).
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from p2os.errors import UsageError
+
+#: The rate at which a Pioneer 2 listens unless told otherwise (Pioneer 2 manual, HOST serial port).
+DEFAULT_BAUD = 9600
+#: The port on which simulated Pioneers have always listened; ARIA tries it first.
+DEFAULT_TCP_PORT = 8101
+LOOPBACK = "127.0.0.1"
+
+_HINT = "use serial:/dev/ttyUSB0?baud=9600, serial:COM3, tcp:127.0.0.1:8101 or pty:"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SerialUrl:
+    """A serial port by the operating system's name for it."""
+
+    path: str
+    baud: int = DEFAULT_BAUD
+
+    def __str__(self) -> str:
+        return f"serial:{self.path}?baud={self.baud}"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class TcpUrl:
+    """A TCP host and port; port 0 lets the system choose when listening."""
+
+    host: str = LOOPBACK
+    port: int = DEFAULT_TCP_PORT
+
+    def __str__(self) -> str:
+        host = f"[{self.host}]" if ":" in self.host else self.host
+        return f"tcp:{host}:{self.port}"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PtyUrl:
+    """A pseudo-terminal; the path is empty to make a new one."""
+
+    path: str = ""
+
+    def __str__(self) -> str:
+        return f"pty:{self.path}"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class LoopUrl:
+    """A named line inside this process."""
+
+    name: str
+
+    def __str__(self) -> str:
+        return f"loop:{self.name}"
+
+
+PortUrl = SerialUrl | TcpUrl | PtyUrl | LoopUrl
+
+
+def parse_url(text: str) -> PortUrl:
+    """Return what a URL names.
+
+    Raises:
+        UsageError: the text is no URL of the four kinds; the hint shows those that are.
+    """
+    scheme, colon, rest = text.partition(":")
+    reader = _READERS.get(scheme) if colon else None
+    if reader is None:
+        path = text.startswith("/") or text.upper().startswith("COM")
+        hint = f"did you mean serial:{text}?" if path else _HINT
+        raise UsageError(f"{text!r} is not a port URL", hint=hint)
+    return reader(text, rest)
+
+
+def _serial(text: str, rest: str) -> SerialUrl:
+    path, question, query = rest.partition("?")
+    if not path:
+        raise UsageError(f"{text!r} names no serial port", hint="p2os ports")
+    if not question:
+        return SerialUrl(path=path)
+    key, _, value = query.partition("=")
+    if key != "baud":
+        raise UsageError(f"{text!r} has an unknown option {key!r}", hint=f"serial:{path}?baud=9600")
+    return SerialUrl(path=path, baud=_number(text, "baud", value, 1, 4_000_000))
+
+
+def _tcp(text: str, rest: str) -> TcpUrl:
+    host, colon, port = rest.rpartition(":") if not rest.endswith("]") else (rest, "", "")
+    if not colon:
+        host, port = rest, ""
+    host = host.removeprefix("[").removesuffix("]") or LOOPBACK
+    if not port:
+        return TcpUrl(host=host)
+    return TcpUrl(host=host, port=_number(text, "port", port, 0, 65_535))
+
+
+def _pty(_text: str, rest: str) -> PtyUrl:
+    return PtyUrl(path=rest)
+
+
+def _loop(text: str, rest: str) -> LoopUrl:
+    if not rest:
+        raise UsageError(f"{text!r} has no name", hint="loop:robot")
+    return LoopUrl(name=rest)
+
+
+def _number(text: str, what: str, value: str, lowest: int, highest: int) -> int:
+    if not (value.isascii() and value.isdigit()) or not lowest <= int(value) <= highest:
+        raise UsageError(f"{text!r}: {what} {value!r} is not a whole number from {lowest} to {highest}", hint=_HINT)
+    return int(value)
+
+
+_READERS: dict[str, Callable[[str, str], PortUrl]] = {"serial": _serial, "tcp": _tcp, "pty": _pty, "loop": _loop}
