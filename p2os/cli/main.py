@@ -1,0 +1,168 @@
+"""The command line: finds its verbs, runs one, and tells a person what went wrong.
+
+Verbs are modules with `register(app)`, found by the entry points of the group
+`p2os.verbs`, so that packages above this one add theirs without being imported
+here. A verb whose module cannot be imported is still listed, with what it lacks.
+
+Results go to stdout, all else to stderr. An error is one line and one hint.
+Exit codes: 0 done, 1 the operation failed, 2 wrong usage, 130 interrupted.
+"""
+
+import os
+import sys
+import traceback
+from collections.abc import Iterable, Sequence
+from importlib.metadata import EntryPoint, entry_points, version
+from typing import Annotated
+
+import typer
+
+import p2os
+from p2os.errors import MissingDependencyError
+
+GROUP = "p2os.verbs"
+EXIT_FAILED = 1
+EXIT_USAGE = 2
+EXIT_INTERRUPTED = 130
+
+EPILOG = """Examples:
+
+\b
+  p2os demo                             watch a BluePill program drive a Pioneer
+  p2os run dodge --world arena          run one scenario and write a report
+  p2os serve                            be a Pioneer on tcp:127.0.0.1:8101
+  p2os info tcp:127.0.0.1:8101          ask a robot who it is
+  p2os ports                            list the serial ports
+  p2os doctor                           tell what is installed and what is missing
+
+With --trace anywhere, an error shows where in the program it arose.
+"""
+
+#: What to say when a module of a verb needs a package that is not there: package to extra.
+_EXTRAS = {
+    "unicorn": "sim",
+    "elftools": "sim",
+    "intelhex": "sim",
+    "matplotlib": "sim",
+    "pybullet": "bullet",
+    "numpy": "bullet",
+}
+
+
+def main(arguments: Sequence[str] | None = None) -> None:
+    """Run the command line and end the process with its exit code."""
+    words = list(sys.argv[1:] if arguments is None else arguments)
+    trace = "--trace" in words
+    sys.exit(run([word for word in words if word != "--trace"], trace=trace))
+
+
+def run(words: list[str], *, trace: bool = False) -> int:
+    """Run the command line and return its exit code.
+
+    Args:
+        words: what follows `p2os`.
+        trace: show where in the program an error arose.
+    """
+    try:
+        command = typer.main.get_command(make_app(words))
+        result = command.main(words or ["--help"], prog_name="p2os", standalone_mode=False)
+    except (KeyboardInterrupt, typer.Abort):
+        return EXIT_INTERRUPTED
+    except BrokenPipeError:  # the reader of our stdout has left, e.g. `p2os ports | head -1`
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return EXIT_FAILED
+    except Exception as error:  # noqa: BLE001 - the one place where every error becomes a line
+        return report(error, words, trace=trace)
+    return result if isinstance(result, int) else 0
+
+
+def report(error: Exception, words: Sequence[str], *, trace: bool = False) -> int:
+    """Tell a person on stderr what went wrong and what to try, and return the exit code.
+
+    Our own errors, those of the emulator and those of the option parser carry
+    `exit_code`, and a `hint` or a way to get help; anything else is a bug.
+    """
+    if trace:
+        traceback.print_exception(error)
+    code = getattr(error, "exit_code", None)
+    if not isinstance(code, int):
+        _say(f"p2os: this is a bug: {type(error).__name__}: {_one_line(str(error))}")
+        _say("hint: run it again with --trace and report what it says")
+        return EXIT_FAILED
+    format_message = getattr(error, "format_message", None)
+    if callable(format_message):  # the option parser's
+        _say(f"p2os: {_one_line(format_message()).removesuffix('.')}")
+        verb = next((word for word in words if not word.startswith("-")), "")
+        known = verb in {entry.name for entry in verbs()}
+        _say(f"hint: p2os {verb} --help" if known else "hint: p2os --help")
+        return code
+    _say(f"p2os: {_one_line(str(error))}")
+    hint = getattr(error, "hint", None)
+    if hint:
+        _say(f"hint: {_one_line(hint)}")
+    return code
+
+
+def verbs() -> list[EntryPoint]:
+    """Return every verb that an installed package offers, by name."""
+    return sorted(entry_points(group=GROUP), key=lambda entry: entry.name)
+
+
+def make_app(words: Sequence[str] = ()) -> typer.Typer:
+    """Return the application with the verb that `words` name, or with all when they name none."""
+    app = typer.Typer(
+        help=(p2os.__doc__ or "").strip(), epilog=EPILOG, rich_markup_mode=None, add_completion=False,
+        pretty_exceptions_enable=False, context_settings={"help_option_names": ["-h", "--help"]},
+    )  # fmt: skip
+    app.callback()(_options)
+    found = verbs()
+    first = next((word for word in words if not word.startswith("-")), None)
+    wanted = [entry for entry in found if entry.name == first] or found
+    add_verbs(app, wanted)
+    return app
+
+
+def add_verbs(app: typer.Typer, entries: Iterable[EntryPoint]) -> None:
+    """Register each verb, or in its place a command that says what it lacks."""
+    for entry in entries:
+        try:
+            module = entry.load()
+        except ImportError as error:
+            _add_missing(app, entry.name, error)
+        else:
+            module.register(app)
+
+
+def _add_missing(app: typer.Typer, name: str, error: ImportError) -> None:
+    lacking = error.name or str(error)
+    extra = _EXTRAS.get(lacking.split(".", maxsplit=1)[0])
+    hint = f"pip install 'p2os[{extra}]'" if extra else "p2os doctor"
+
+    @app.command(
+        name, help=f"(missing: needs {lacking}; {hint})",
+        context_settings={"allow_extra_args": True, "ignore_unknown_options": True},
+    )  # fmt: skip
+    def missing() -> None:
+        raise MissingDependencyError(f"`p2os {name}` needs {lacking}", hint=hint) from error
+
+
+def _print_version(wanted: bool) -> None:
+    if wanted:
+        typer.echo(version("p2os"))
+        raise typer.Exit
+
+
+def _options(
+    version: Annotated[  # noqa: ARG001 - its callback has acted on it
+        bool, typer.Option("--version", help="Print the version and end.", is_eager=True, callback=_print_version)
+    ] = False,
+) -> None:
+    """Take the options that stand before the verb."""
+
+
+def _one_line(text: str) -> str:
+    return " ".join(text.split())
+
+
+def _say(line: str) -> None:
+    sys.stderr.write(f"{line}\n")
