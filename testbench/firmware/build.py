@@ -16,12 +16,13 @@ HERE = Path(__file__).resolve().parent
 COMPILER = "arm-none-eabi-gcc"
 #: First line of `arm-none-eabi-gcc --version` for the compiler of the committed ELFs.
 COMPILER_VERSION = "arm-none-eabi-gcc (15:12.2.rel1-1) 12.2.1 20221205"
-BOARD_SOURCES = ("startup.c", "board.c", "pins.c", "tick.c", "uart.c")
+BOARD_SOURCES = ("startup.c", "memory.c", "board.c", "pins.c", "tick.c", "uart.c")
 #: Program name to its own sources.
 PROGRAMS = {
     "motors": ("motors.c",),
     "sensors": ("sensors.c",),
     "encoders": ("encoders.c", "odometer.c"),
+    "dodge": ("dodge.c", "dodge_fsm.c", "odometer.c"),
 }
 MACHINE_FLAGS = ("-mcpu=cortex-m3", "-mthumb")
 COMPILE_FLAGS = (
@@ -41,6 +42,7 @@ COMPILE_FLAGS = (
     "-ffunction-sections",
     "-fdata-sections",
     "-fno-common",
+    "-fno-tree-loop-distribute-patterns",  # memset is not to become a call of itself
 )
 LINK_FLAGS = (
     *MACHINE_FLAGS,
