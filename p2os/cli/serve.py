@@ -3,18 +3,17 @@
 import json
 import signal
 import sys
-from pathlib import Path
 from types import FrameType
 from typing import Annotated
 
 import typer
 
 from p2os.errors import UsageError
-from p2os.parameters import RobotParameters, known_robots, load_parameters
+from p2os.parameters import load_parameters
 from p2os.pioneer.body import make_body
 from p2os.pioneer.controller import ControllerSettings, Pioneer, SonarPerSip
 from p2os.pioneer.host import Host
-from p2os.pioneer.world import known_worlds, load_world
+from p2os.pioneer.world import load_world
 from p2os.timing import NS_PER_S, Nanos
 from p2os.transport import listen_url
 

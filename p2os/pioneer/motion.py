@@ -29,6 +29,7 @@ from enum import Enum
 from p2os.timing import Nanos
 
 NM_PER_MM = 1_000_000
+NM_PER_M = 1_000_000_000
 UDEG_PER_DEG = 1_000_000
 UDEG_PER_TURN = 360 * UDEG_PER_DEG
 #: nm/s of wheel speed change in one step of 1 ns at 1 mm/s²: 10⁶ nm/mm ÷ 10⁹ ns/s.
@@ -217,7 +218,7 @@ class Motion:
         if self.mode is Mode.WHEELS:
             first.approach(0 if self.is_held else first.set_speed, faster, slower)
             second.approach(0 if self.is_held else second.set_speed, faster, slower)
-            self._wheels = (first.speed * 1e-9, second.speed * 1e-9)
+            self._wheels = (first.speed / NM_PER_M, second.speed / NM_PER_M)
             return self._wheels
         turn_faster, turn_slower = self._per_step(limits.rot_accel_deg_s2), self._per_step(limits.rot_decel_deg_s2)
         if first.goal is not None:
@@ -232,7 +233,7 @@ class Motion:
         first.approach(0 if self.is_held else first.set_speed, faster, slower)
         second.approach(0 if self.is_held else second.set_speed, turn_faster, turn_slower)
         rim = second.speed * self._rim_nm_per_udeg
-        self._wheels = ((first.speed - rim) * 1e-9, (first.speed + rim) * 1e-9)
+        self._wheels = ((first.speed - rim) / NM_PER_M, (first.speed + rim) / NM_PER_M)
         return self._wheels
 
     # Saving -----------------------------------------------------------------------

@@ -1,0 +1,197 @@
+"""What each client command does to the robot: one small function a command, and the table of them.
+
+Commands that are not in the table are unknown to this robot: they are counted
+and ignored, as a real one ignores them. A command that needs a number and comes
+without one is malformed and has no effect either.
+
+Source: the command tables of the Pioneer 2 and Pioneer 2/3 H8 manuals; `docs`
+says what each firmware does.
+"""
+
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+
+from p2os.commands import Command, CommandNumber
+
+from p2os.pioneer.motion import NM_PER_MM, UDEG_PER_DEG, Motion, MotionLimits
+from p2os.pioneer.odometry_counts import DeadReckoning
+from p2os.pioneer.sonar_schedule import SonarSchedule
+from p2os.timing import Nanos
+
+
+@dataclass(slots=True, kw_only=True)
+class Works:
+    """The parts of a robot that commands act on."""
+
+    motion: Motion
+    reckoning: DeadReckoning
+    sonar: SonarSchedule
+    vel2_divisor: int
+    motors_enabled: bool = False
+    #: Someone has asked for the configuration, and the answer has not been sent.
+    config_wanted: bool = False
+
+    @property
+    def heading_udeg(self) -> int:
+        """Return how far the robot has turned since the start, in micro-degrees."""
+        return round(math.degrees(self.reckoning.turned_rad) * UDEG_PER_DEG)
+
+    @property
+    def travel_nm(self) -> int:
+        """Return how far the robot has driven along its path since the start, in nanometres."""
+        return round(self.reckoning.travel_mm * NM_PER_MM)
+
+    def disable_motors(self) -> None:
+        """Take the power from the wheels and forget every set speed."""
+        self.motors_enabled = False
+        self.motion.stop_now()
+
+
+#: Acts on the works and returns whether it did: False when the motors are off or an argument is missing.
+Handler = Callable[[Works, Command, Nanos], bool]
+
+
+def apply(works: Works, command: Command, now: Nanos) -> str | None:
+    """Let a command act, and return None or why it had no effect."""
+    handler = HANDLERS.get(command.number)
+    if handler is None:
+        return "unknown"
+    if command.number in MOTION_COMMANDS and not works.motors_enabled:
+        return "motors are off"
+    return None if handler(works, command, now) else "malformed"
+
+
+def signed16(command: Command) -> int | None:
+    """Return a command's number as the robot reads it, or None when it has none.
+
+    A positive argument from 32768 up is a negative number that a client has
+    packed itself: no robot is told to drive at 32 m/s.
+    """
+    value = command.argument
+    if not isinstance(value, int):
+        return None
+    return value - 0x10000 if 0x8000 <= value <= 0xFFFF else value
+
+
+def _number(act: Callable[[Works, int], None]) -> Handler:
+    """Return a handler of a command whose argument is one number."""
+
+    def handler(works: Works, command: Command, _now: Nanos) -> bool:
+        value = signed16(command)
+        if value is None:
+            return False
+        act(works, value)
+        return True
+
+    return handler
+
+
+def _plain(act: Callable[[Works], None]) -> Handler:
+    """Return a handler of a command whose argument, if any, does not matter."""
+
+    def handler(works: Works, _command: Command, _now: Nanos) -> bool:
+        act(works)
+        return True
+
+    return handler
+
+
+def _nothing(_works: Works) -> None:
+    """Feed the watchdog, which any packet does."""
+
+
+def _enable(works: Works, value: int) -> None:
+    if value:
+        works.motors_enabled = True
+    else:
+        works.disable_motors()
+
+
+def _vel2(works: Works, command: Command, _now: Nanos) -> bool:
+    """Set both wheels: the first byte on the wire is the right one (H8 manual, command 32)."""
+    if not isinstance(command.argument, int):
+        return False
+    right, left = command.signed_bytes
+    works.motion.set_wheels(left * works.vel2_divisor, right * works.vel2_divisor)
+    return True
+
+
+def _head(works: Works, degrees: int) -> None:
+    zero = round(math.degrees(works.reckoning.zero_rad) * UDEG_PER_DEG)
+    works.motion.turn_to(zero + degrees * UDEG_PER_DEG)
+
+
+def _dhead(works: Works, degrees: int) -> None:
+    works.motion.turn_to(works.heading_udeg + degrees * UDEG_PER_DEG)
+
+
+def _dchead(works: Works, degrees: int) -> None:
+    goal = works.motion.heading_goal_udeg
+    works.motion.turn_to((works.heading_udeg if goal is None else goal) + degrees * UDEG_PER_DEG)
+
+
+def _move(works: Works, mm: int) -> None:
+    works.motion.move_to(works.travel_nm + mm * NM_PER_MM)
+
+
+def _limit(change: Callable[[MotionLimits, int], MotionLimits]) -> Handler:
+    """Return a handler that changes the limits of the motion."""
+
+    def act(works: Works, value: int) -> None:
+        works.motion.limits = change(works.motion.limits, value)
+
+    return _number(act)
+
+
+def _sonar(works: Works, command: Command, now: Nanos) -> bool:
+    value = signed16(command)
+    if value is None:
+        return False
+    works.sonar.switch(on=value != 0, now=now)
+    return True
+
+
+def _polling(works: Works, command: Command, now: Nanos) -> bool:
+    """Set the firing order; on the wire sonar are numbered from 1."""
+    if not isinstance(command.argument, bytes):
+        return False
+    works.sonar.poll([number - 1 for number in command.argument], now)
+    return True
+
+
+def _config(works: Works) -> None:
+    works.config_wanted = True
+
+
+HANDLERS: Mapping[int, Handler] = {
+    CommandNumber.PULSE: _plain(_nothing),
+    CommandNumber.POLLING: _polling,
+    CommandNumber.ENABLE: _number(_enable),
+    CommandNumber.SETA: _limit(MotionLimits.with_acceleration),
+    CommandNumber.SETV: _limit(MotionLimits.with_max_velocity),
+    CommandNumber.SETO: _plain(lambda works: works.reckoning.set_origin()),
+    CommandNumber.MOVE: _number(_move),
+    CommandNumber.ROTATE: _number(lambda works, value: works.motion.set_rotation(value)),
+    CommandNumber.SETRV: _limit(MotionLimits.with_max_rotation),
+    CommandNumber.VEL: _number(lambda works, value: works.motion.set_velocity(value)),
+    CommandNumber.HEAD: _number(_head),
+    CommandNumber.DHEAD: _number(_dhead),
+    CommandNumber.CONFIG: _plain(_config),
+    CommandNumber.RVEL: _number(lambda works, value: works.motion.set_rotation(value)),
+    CommandNumber.DCHEAD: _number(_dchead),
+    CommandNumber.SETRA: _limit(MotionLimits.with_rotational_acceleration),
+    CommandNumber.SONAR: _sonar,
+    CommandNumber.STOP: _plain(lambda works: works.motion.stop()),
+    CommandNumber.VEL2: _vel2,
+    CommandNumber.E_STOP: _plain(lambda works: works.motion.stop_now()),
+    CommandNumber.QSTOP: _plain(lambda works: works.motion.stop_now()),
+}
+
+#: What has no effect while the motors are off, so that enabling them never moves the robot.
+MOTION_COMMANDS = frozenset(
+    {
+        CommandNumber.MOVE, CommandNumber.ROTATE, CommandNumber.VEL, CommandNumber.HEAD, CommandNumber.DHEAD,
+        CommandNumber.RVEL, CommandNumber.DCHEAD, CommandNumber.VEL2,
+    }
+)  # fmt: skip

@@ -1,0 +1,124 @@
+"""Which sonar fires when, and the readings that wait for the next packet.
+
+A Pioneer 2 fires its ring in turn and each packet carries only what is new: two
+readings a cycle on a P2-DX (the SIP captured from one carries two). The real
+order of firing is settable (POLLING); the default here is the ring's.
+
+Pings stand a half and a whole cycle after the last packet; a bank that reports
+every sonar in every packet takes all readings at the end of the cycle.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from p2os.timing import Nanos
+
+#: What a Pioneer 2 says when no echo came, in counts: 8,576 mm at 0.268 mm a count (a P2-DX's captured SIP).
+NO_ECHO_COUNTS = 32_000
+#: The packet has 16 bits for a range.
+LARGEST_COUNTS = 0xFFFF
+
+
+@dataclass(frozen=True, slots=True)
+class Ping:
+    """When to fire, and which sonar (0-based)."""
+
+    at: Nanos
+    numbers: tuple[int, ...]
+
+
+class SonarSchedule:
+    """The firing order of a robot's sonar."""
+
+    def __init__(self, fitted: int, *, pings_per_cycle: int | None, cycle_ns: Nanos) -> None:
+        """Start with every fitted sonar on, in ring order.
+
+        Args:
+            fitted: how many sonar the robot has, numbered from 0.
+            pings_per_cycle: readings a packet, or None for all of them.
+            cycle_ns: time between packets.
+        """
+        self._fitted = fitted
+        self._pings_per_cycle = pings_per_cycle
+        self._cycle_ns = cycle_ns
+        self.order: tuple[int, ...] = tuple(range(fitted))
+        self.is_on = True
+        self._next_index = 0
+        self._cycle_start: Nanos = 0
+        self._pings_done = 0
+        self._readings: list[tuple[int, int]] = []
+
+    def start_cycle(self, now: Nanos) -> None:
+        """Begin the cycle that ends with the packet at `now` + the cycle's length."""
+        self._cycle_start = now
+        self._pings_done = 0
+
+    def switch(self, *, on: bool, now: Nanos) -> None:
+        """Turn the bank on or off (SONAR); pings of this cycle that have passed stay silent."""
+        if on and not self.is_on:
+            self._skip_passed(now)
+        self.is_on = on
+
+    def poll(self, numbers: Sequence[int], now: Nanos) -> None:
+        """Fire these sonar in this order (POLLING); those that are not fitted do not fire, none at all is silence.
+
+        Args:
+            numbers: 0-based, repeats allowed.
+            now: pings of this cycle that have passed stay silent.
+        """
+        if not self.order:
+            self._skip_passed(now)
+        self.order = tuple(number for number in numbers if 0 <= number < self._fitted)
+        self._next_index = 0
+
+    def next_ping(self) -> Ping | None:
+        """Return the next ping of this cycle, or None when there is none left."""
+        if not self.is_on or not self.order or self._pings_done >= self._per_cycle:
+            return None
+        at = self._ping_time(self._pings_done)
+        if self._pings_per_cycle is None:
+            return Ping(at, self.order)
+        return Ping(at, (self.order[self._next_index % len(self.order)],))
+
+    def take_ping(self, raw_ranges: Sequence[tuple[int, int]]) -> None:
+        """Keep the readings of the ping that `next_ping` told, as (number, counts)."""
+        self._readings += raw_ranges
+        self._pings_done += 1
+        self._next_index = (self._next_index + len(raw_ranges)) % len(self.order)
+
+    def take_readings(self) -> tuple[tuple[int, int], ...]:
+        """Return the readings since the last packet, oldest first, and forget them."""
+        readings = tuple(self._readings) if self.is_on else ()
+        self._readings.clear()
+        return readings
+
+    def snapshot(self) -> tuple[object, ...]:
+        """Return all that decides the future."""
+        return (
+            self.order, self.is_on, self._next_index, self._cycle_start, self._pings_done, tuple(self._readings),
+        )  # fmt: skip
+
+    def restore(self, snapshot: tuple[object, ...]) -> None:
+        """Put back what `snapshot` returned."""
+        (
+            self.order, self.is_on, self._next_index, self._cycle_start, self._pings_done, readings,
+        ) = snapshot  # type: ignore[assignment]  # our own snapshot, field by field  # fmt: skip
+        self._readings = list(readings)  # type: ignore[call-overload]  # our own snapshot
+
+    @property
+    def _per_cycle(self) -> int:
+        return self._pings_per_cycle or 1
+
+    def _ping_time(self, index: int) -> Nanos:
+        return self._cycle_start + (index + 1) * self._cycle_ns // self._per_cycle
+
+    def _skip_passed(self, now: Nanos) -> None:
+        while self._pings_done < self._per_cycle and self._ping_time(self._pings_done) <= now:
+            self._pings_done += 1
+
+
+def raw_range(range_m: float, *, longest_m: float, range_um_per_count: int, no_echo_counts: int) -> int:
+    """Return a range in the packet's counts; at or beyond the longest, what the robot says for no echo."""
+    if range_m >= longest_m:
+        return no_echo_counts
+    return min(round(range_m * 1_000_000 / range_um_per_count), LARGEST_COUNTS)
