@@ -1,0 +1,145 @@
+"""The one run loop: the chip leads, everything else follows to each deadline.
+
+Theory of operation. The leader (the emulated BluePill) runs to the earliest
+deadline of the others. It may stop short at an edge on a watched net, and late
+by one basic block. Then the followers are brought, in their fixed order, to
+every deadline that the leader has passed, one after the other, and to the
+moment of every watched edge: nets keep their history, so that a follower at
+time t reads the levels of t.
+
+Followers are never brought to the border of a slice: the slice limit only says
+how often the leader gives control back (for pacing, progress and Ctrl-C). So
+the result does not depend on it.
+
+Invariant: when `run_until(end)` returns, every deadline before or at the time
+reached has been acted on by all, in order of time.
+"""
+
+from collections.abc import Callable, Mapping, Sequence
+from typing import Protocol, cast
+
+from p2os.errors import P2osError
+from p2os.timing import NS_PER_MS, Nanos, Reached
+
+#: chosen: the pacer's grain; small enough for a live view, large enough to cost nothing.
+DEFAULT_SLICE_NS: Nanos = 1 * NS_PER_MS
+#: How often followers may wake each other at one and the same instant before it is called a fault.
+MOST_ROUNDS = 16
+#: Later than any deadline.
+NEVER: Nanos = 1 << 62
+
+
+class Leader(Protocol):
+    """What leads: it executes a program and may overrun a limit by one basic block."""
+
+    now_ns: int
+
+    def advance_to(self, limit_ns: int) -> object:
+        """Run to `limit_ns`; returns something with `now` and a `reason` whose `name` is that of `Reason`."""
+        ...
+
+
+class Follower(Protocol):
+    """A part that is brought to deadlines."""
+
+    def next_deadline(self) -> Nanos | None:
+        """Return when this part next wants to act, or None for never."""
+        ...
+
+    def advance_to(self, limit: Nanos) -> Reached:
+        """Act on everything due up to and including `limit`."""
+        ...
+
+
+class StuckError(P2osError):
+    """Parts kept waking each other without time passing; any such case is a bug here."""
+
+
+class RunLoop:
+    """Brings a leader and its followers forward together."""
+
+    def __init__(
+        self,
+        leader: Leader,
+        followers: Sequence[Follower],
+        *,
+        slice_ns: Nanos = DEFAULT_SLICE_NS,
+        on_slice: Callable[[Nanos], None] | None = None,
+    ) -> None:
+        self.leader = leader
+        self.followers = tuple(followers)
+        self.slice_ns = slice_ns
+        #: Called with the leader's time after each slice; may raise to end the run.
+        self.on_slice = on_slice
+        #: The last instant that all followers were brought to.
+        self.now: Nanos = 0
+        #: The leader stands still for good.
+        self.is_halted = False
+        self._edges: list[Nanos] = []
+        self._rounds = 0
+
+    def note_edge(self, at: Nanos) -> None:
+        """Have the followers brought to `at` as well: a watched net has changed there."""
+        if not self._edges or self._edges[-1] != at:
+            self._edges.append(at)
+
+    def run_until(self, end: Nanos) -> None:
+        """Run to `end` in nanoseconds, or until the leader halts for good.
+
+        Raises:
+            StuckError: Two parts wake each other for ever.
+        """
+        leader, followers = self.leader, self.followers
+        while True:
+            due = self._next_due()
+            passed = leader.now_ns
+            if due <= min(passed, end):
+                self._follow(due)
+                continue
+            if passed >= end or self.is_halted:
+                return
+            limit = min(due, end, passed + self.slice_ns)
+            reached = leader.advance_to(limit)
+            if _is_halt(reached):
+                self.is_halted = True
+            if self.on_slice is not None:
+                self.on_slice(leader.now_ns)
+
+    def finish(self, end: Nanos) -> None:
+        """Bring the followers to `end` itself, so that their state is that of the end of the run."""
+        self._follow(min(end, max(self.leader.now_ns, self.now)))
+
+    def snapshot(self) -> dict[str, object]:
+        """Return the loop's own state; the parts are saved by whoever built them."""
+        return {"now": self.now, "halted": self.is_halted, "edges": tuple(self._edges)}
+
+    def restore(self, snapshot: Mapping[str, object]) -> None:
+        """Put back what `snapshot` returned."""
+        self.now = cast("int", snapshot["now"])
+        self.is_halted = bool(snapshot["halted"])
+        self._edges = list(cast("tuple[int, ...]", snapshot["edges"]))
+
+    def _next_due(self) -> Nanos:
+        due = self._edges[0] if self._edges else NEVER
+        for follower in self.followers:
+            deadline = follower.next_deadline()
+            if deadline is not None and deadline < due:
+                due = deadline
+        return due
+
+    def _follow(self, due: Nanos) -> None:
+        """Bring every follower to `due`."""
+        self._rounds = self._rounds + 1 if due <= self.now else 0
+        if self._rounds > MOST_ROUNDS:
+            late = [type(part).__name__ for part in self.followers if (part.next_deadline() or NEVER) <= due]
+            raise StuckError(f"time stands still at {due} ns: {', '.join(late)} stay due")
+        self.now = max(self.now, due)
+        while self._edges and self._edges[0] <= due:
+            self._edges.pop(0)
+        for follower in self.followers:
+            follower.advance_to(self.now)
+
+
+def _is_halt(reached: object) -> bool:
+    """Tell whether a leader stands still for good; the chip has its own twin of `Reason`."""
+    return str(getattr(getattr(reached, "reason", None), "name", "")) == "HALT"

@@ -1,0 +1,92 @@
+"""One direction of a serial line, with the time that its characters take.
+
+A message is delivered whole when its last character has arrived; messages queue
+behind what is still going out. The time of each character is arithmetic, so a
+line between two busy moments costs nothing.
+
+Not modelled: levels, framing errors and noise (a later issue's fault injector
+stands between two lines).
+
+Invariant: arrivals are computed from the start of a busy stretch and the number
+of characters in it, never by adding rounded times.
+"""
+
+from collections import deque
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import cast
+
+from p2os.errors import LocalProtocolError
+from p2os.timing import NS_PER_S, Nanos, Reached
+
+#: Start bit, eight data bits, stop bit: 8N1.
+BITS_PER_CHARACTER = 10
+#: What P2OS speaks at power-on, bit/s.
+P2OS_BAUD = 9600
+
+
+@dataclass(frozen=True, slots=True)
+class Arrival:
+    """Bytes whose last character has arrived at `at`."""
+
+    at: Nanos
+    data: bytes
+
+
+class SerialLine:
+    """Carries messages one way at a fixed speed in bit/s."""
+
+    def __init__(self, baud: int = P2OS_BAUD) -> None:
+        if baud <= 0:
+            raise LocalProtocolError(f"a serial line needs a positive speed, got {baud} bit/s")
+        self.baud = baud
+        self._busy_since: Nanos = 0
+        self._characters = 0
+        self._under_way: deque[Arrival] = deque()
+        self._arrived: list[Arrival] = []
+
+    @property
+    def free_at(self) -> Nanos:
+        """Return when the last character sent so far has arrived."""
+        return self._busy_since + -(-self._characters * BITS_PER_CHARACTER * NS_PER_S // self.baud)
+
+    def send(self, data: bytes, now: Nanos) -> None:
+        """Send bytes as one message, behind what is still going out."""
+        if not data:
+            return
+        if now >= self.free_at:
+            self._busy_since, self._characters = now, 0
+        self._characters += len(data)
+        self._under_way.append(Arrival(self.free_at, bytes(data)))
+
+    def take_arrived(self) -> list[Arrival]:
+        """Return the messages that have arrived, oldest first, and forget them."""
+        arrived, self._arrived = self._arrived, []
+        return arrived
+
+    def next_deadline(self) -> Nanos | None:
+        """Return when the next message will have arrived."""
+        return self._under_way[0].at if self._under_way else None
+
+    def advance_to(self, limit: Nanos) -> Reached:
+        """Deliver what has arrived by `limit`."""
+        while self._under_way and self._under_way[0].at <= limit:
+            self._arrived.append(self._under_way.popleft())
+        return Reached(limit)
+
+    def snapshot(self) -> dict[str, object]:
+        """Return the bytes in flight and when they arrive."""
+        return {
+            "busy_since": self._busy_since,
+            "characters": self._characters,
+            "under_way": tuple((item.at, item.data) for item in self._under_way),
+            "arrived": tuple((item.at, item.data) for item in self._arrived),
+        }
+
+    def restore(self, snapshot: object) -> None:
+        """Put back what `snapshot` returned."""
+        state = cast("Mapping[str, object]", snapshot)
+        self._busy_since = cast("int", state["busy_since"])
+        self._characters = cast("int", state["characters"])
+        self._under_way = deque(Arrival(at, data) for at, data in cast("tuple[tuple[int, bytes], ...]", state["under_way"]))
+        self._arrived = [Arrival(at, data) for at, data in cast("tuple[tuple[int, bytes], ...]", state["arrived"])]
