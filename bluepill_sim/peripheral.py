@@ -1,0 +1,171 @@
+"""The base of every peripheral: a table of registers, executed.
+
+This is not a bus: whether a peripheral's clock is on, bit-band, and addresses
+outside the peripherals are the business of `bus.py`. A peripheral declares
+`REGISTERS`, names in `STATE` its plain attributes beyond the registers, and
+writes methods for what a read or write *causes*.
+
+A peripheral that acts by itself keeps the time of its next action in
+`due_ns`; accesses catch up to that time first, so that a register never reads
+older than the instruction that asks.
+
+Access width: RM0008 section 3.1: an APB bridge turns a byte or halfword write
+into a word by duplicating the data; AHB peripherals have byte lanes.
+Invariant: `words[offset // 4]` of a register without `on_read` is what reads return.
+"""
+
+from array import array
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import ClassVar, TypeAlias, cast
+
+from bluepill_sim.ports import ChipPorts
+from bluepill_sim.register import WORD, Register
+
+#: A peripheral's registers and its `STATE` attributes, in declared order.
+PeripheralSnapshot: TypeAlias = tuple[tuple[int, ...], tuple[object, ...]]
+
+
+@dataclass(frozen=True, slots=True)
+class ClockBit:
+    """The bit of an RCC enable register that clocks a peripheral; the reset bit has the same place."""
+
+    #: "AHBENR", "APB1ENR" or "APB2ENR".
+    register: str
+    bit: int
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Place:
+    """Where one peripheral sits in the chip: a row of the chip's page."""
+
+    name: str
+    base: int
+    #: None: always clocked.
+    clock: ClockBit | None = None
+    #: Interrupt lines, in the order that the peripheral's class says.
+    irqs: tuple[int, ...] = ()
+    size: int = 0x400
+
+
+class Peripheral:
+    """A block of registers at an address of the chip."""
+
+    REGISTERS: ClassVar[tuple[Register, ...]] = ()
+    #: Names of the attributes beyond the registers that decide the future: plain, immutable values.
+    STATE: ClassVar[tuple[str, ...]] = ()
+    #: Whether narrow writes touch only their bytes (AHB) or are duplicated over the word (APB).
+    HAS_BYTE_LANES: ClassVar[bool] = False
+
+    def __init__(self, chip: ChipPorts, place: Place) -> None:
+        self.chip = chip
+        self.place = place
+        self.name = place.name
+        self.base = place.base
+        #: When this peripheral next acts by itself, in ns; None for never.
+        self.due_ns: int | None = None
+        #: The stored words of the whole block, indexed by offset // 4; the object stays the same for ever.
+        self.words = array("I", bytes(place.size))
+        count = place.size // 4
+        self._registers: list[Register | None] = [None] * count
+        self._read_hooks: list[Callable[[], int] | None] = [None] * count
+        self._write_hooks: list[Callable[[int, int], None] | None] = [None] * count
+        for register in self.REGISTERS:
+            index = register.offset // 4
+            self._registers[index] = register
+            if register.on_read is not None:
+                self._read_hooks[index] = cast("Callable[[], int]", getattr(self, register.on_read))
+            if register.on_write is not None:
+                self._write_hooks[index] = cast("Callable[[int, int], None]", getattr(self, register.on_write))
+            self.words[index] = register.reset
+
+    def read(self, offset: int, size: int) -> int:
+        """Return what the bus reads.
+
+        Args:
+            offset: Byte offset from the base, aligned to `size`.
+            size: 1, 2 or 4 bytes.
+        """
+        if self.due_ns is not None and self.chip.now_ns >= self.due_ns:
+            self.advance_to(self.chip.now_ns)
+        index = offset >> 2
+        hook = self._read_hooks[index]
+        if hook is None:
+            word = self.words[index]
+            if self._registers[index] is None:
+                self._warn_no_register(offset, "read")
+        else:
+            word = hook()
+        if size == 4:
+            return word
+        return (word >> ((offset & 3) * 8)) & ((1 << (size * 8)) - 1)
+
+    def write(self, offset: int, size: int, value: int) -> None:
+        """Take what the bus writes; arguments as of `read`."""
+        if self.due_ns is not None and self.chip.now_ns >= self.due_ns:
+            self.advance_to(self.chip.now_ns)
+        index = offset >> 2
+        register = self._registers[index]
+        if register is None:
+            self._warn_no_register(offset, "write")
+            return
+        previous = self.words[index]
+        written = value if size == 4 else self._narrow(register, offset, size, value)
+        self.words[index] = register.stored_after(previous, written)
+        hook = self._write_hooks[index]
+        if hook is not None:
+            hook(written, previous)
+
+    def reset(self) -> None:
+        """Go back to the state after a system reset."""
+        self.due_ns = None
+        for register in self.REGISTERS:
+            self.words[register.offset // 4] = register.reset
+        self.on_reset()
+
+    def on_reset(self) -> None:
+        """Put back what is not a register; called by `reset` after the registers."""
+
+    def next_deadline(self) -> int | None:
+        """Return when this peripheral next acts by itself, in ns, or None for never."""
+        return self.due_ns
+
+    def advance_to(self, now_ns: int) -> None:
+        """Act on everything due up to and including `now_ns`, in order of its time."""
+
+    def clock_changed(self) -> None:
+        """Learn that the frequencies in `chip.clocks` have changed just now."""
+
+    def snapshot(self) -> PeripheralSnapshot:
+        """Return all that decides this peripheral's future, as plain values."""
+        return tuple(self.words), (self.due_ns, *(getattr(self, name) for name in self.STATE))
+
+    def restore(self, snapshot: PeripheralSnapshot) -> None:
+        """Put back what `snapshot` returned; tells nobody."""
+        words, (due_ns, *state) = snapshot
+        self.words[:] = array("I", words)
+        self.due_ns = cast("int | None", due_ns)
+        for name, value in zip(self.STATE, state, strict=True):
+            setattr(self, name, value)
+
+    def _narrow(self, register: Register, offset: int, size: int, value: int) -> int:
+        """Return the word that the peripheral sees when the CPU writes 1 or 2 bytes."""
+        shift = (offset & 3) * 8
+        mask = (1 << (size * 8)) - 1
+        previous = self.words[register.offset // 4]
+        in_lanes = register.widen(previous, (value & mask) << shift, mask << shift)
+        if self.HAS_BYTE_LANES:
+            return in_lanes
+        duplicated = (value & mask) * (0x0101_0101 if size == 1 else 0x0001_0001) & WORD
+        if register.stored_after(previous, duplicated) != register.stored_after(previous, in_lanes):
+            self.chip.warn(
+                f"{self.name}_{register.name}: a {size * 8}-bit write is duplicated over the word by the APB bridge",
+                once=f"{self.name}_{register.name}:narrow",
+            )
+        return duplicated
+
+    def _warn_no_register(self, offset: int, what: str) -> None:
+        self.chip.warn(
+            f"{self.name}+{offset:#04x}: {what} of an address without a register",
+            once=f"{self.name}+{offset & ~3:#04x}",
+        )
