@@ -158,5 +158,3 @@ class ConfigPacket:
             name: values[name].decode("latin-1") if kind is _TEXT else values[name] for name, kind in FIELDS[:sent]
         }
         return cls(**{"robot_class": "", **known}, fields_sent=sent)
-
-

@@ -40,7 +40,7 @@ class Identity:
     def from_frame(cls, frame: Frame) -> "Identity":
         """Read the strings; those that are missing are empty."""
         strings = [text.decode("latin-1") for text in frame.data.split(b"\0")]
-        name, robot_class, subclass = (strings + ["", "", ""])[:3]
+        name, robot_class, subclass = [*strings, "", "", ""][:3]
         return cls(name, robot_class, subclass)
 
 

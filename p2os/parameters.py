@@ -228,9 +228,10 @@ def _value(source: str, section: str, table: Table, key: str, kind: type, least:
         raise ParametersError(f"{source}: {name} = {value!r} is no {kind.__name__}")
     if kind is str:
         return value
-    if key != "caster_x_m" and not (value > 0 if least is None else value >= least):
+    number = cast("float", value)
+    if key != "caster_x_m" and not (number > 0 if least is None else number >= least):
         raise ParametersError(f"{source}: {name} = {value!r} must be positive")
-    return kind(value)
+    return kind(number)
 
 
 def _poses(source: str, rows: object) -> tuple[SonarPose, ...]:

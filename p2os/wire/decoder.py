@@ -15,6 +15,7 @@ Invariant: the buffer never holds more than one frame (207 bytes) between calls.
 
 from collections import deque
 from dataclasses import dataclass, replace
+from typing import cast
 
 from p2os.timing import NS_PER_MS, Nanos, Reached
 from p2os.wire.checksum import checksum
@@ -190,7 +191,8 @@ class Decoder:
 
     def restore(self, snapshot: object) -> None:
         """Put back what `snapshot` returned."""
-        buffer, noise, items, self._last_byte_ns, self._rescanned, stats = snapshot  # type: ignore[misc]  # our own tuple
+        saved = cast("tuple[bytes, bytes, tuple[Item, ...], Nanos, int, DecoderStats]", snapshot)
+        buffer, noise, items, self._last_byte_ns, self._rescanned, stats = saved
         self._buffer, self._noise = bytearray(buffer), bytearray(noise)
         self._items = deque(items)
         self.stats = replace(stats)
