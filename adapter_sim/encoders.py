@@ -1,0 +1,192 @@
+"""Wheel travel out of the robot's odometry, and absolute codes out of travel.
+
+The wire carries x and y (15 bits, counts of DistConvFactor) and a heading (4096
+counts a turn). Between two packets the robot moved along a chord; its signed
+projection on the mean heading, lengthened to the arc, is the forward step. The
+wheels' travels follow: forward ∓ heading × track / 2.
+
+What keeps the errors from adding up:
+- The heading part is taken from the whole unwrapped heading, never summed, so
+  its error stays one count for ever (0.27 mm at the rim for the 2-DX).
+- The forward part is summed in counts × 2^30, an exact integer: no remainder is
+  ever dropped. The rounding of x and y to counts enters each chord twice with
+  opposite signs; what is left is a count × the angle turned meanwhile, that is
+  at most about 0.6 mm for each radian turned, and in practice a random walk.
+- Chord to arc: × (1 + Δh² / 24). Without it a robot that always circles would
+  lose 0.1 % of its way.
+
+A step too long for any wheel (after SETO, or a robot that was reset) is no
+travel: it becomes the new reference and is counted.
+
+All shifts are floor shifts of signed integers of 64 bits or less.
+"""
+
+import math
+from dataclasses import dataclass
+from typing import TypeAlias
+
+from adapter_sim.codec import divide_half_away, encoder_count
+from p2os.odometry import Unwrapper
+from p2os.parameters import RobotParameters
+from p2os.timing import Nanos
+
+#: x and y on the wire.
+POSITION_MODULUS = 1 << 15
+#: Headings on the wire: counts a turn.
+HEADING_MODULUS = 1 << 12
+#: The mean of two headings needs half a count.
+HALF_COUNTS = 2 * HEADING_MODULUS
+_QUARTER = HALF_COUNTS // 4
+#: One, in the fixed point of the sine table.
+ONE_BITS = 30
+#: (2π/4096)² / 24 in 2^-40: the arc's excess over its chord for one squared count of turn.
+_ARC_BITS = 40
+_ARC_E40 = 107_802
+#: Beyond a quarter of a turn between two packets the arc is anybody's guess.
+_MOST_TURN = HEADING_MODULUS // 4
+#: π in 1e-9, for the wheel's circumference and the heading's rim travel.
+PI_E9 = 3_141_592_654
+
+#: sin of a quarter turn in half counts, × 2^30, rounded; a test shows that no entry is near a tie.
+_SINE = tuple(round(math.sin(math.pi * k / (2 * _QUARTER)) * (1 << ONE_BITS)) for k in range(_QUARTER + 1))
+
+
+def sine(half_counts: int) -> int:
+    """Return the sine × 2^30 of an angle in 8192nds of a turn."""
+    quadrant, within = divmod(half_counts % HALF_COUNTS, _QUARTER)
+    if quadrant & 1:
+        within = _QUARTER - within
+    value = _SINE[within]
+    return -value if quadrant & 2 else value
+
+
+def forward_step(dx: int, dy: int, heading_before: int, heading_after: int) -> int:
+    """Return the signed length of a step along its mean heading, in counts × 2^30.
+
+    Args:
+        dx: Step in x, in counts.
+        dy: Step in y, in counts.
+        heading_before: Unwrapped heading in counts before the step.
+        heading_after: The same after it.
+    """
+    mean = heading_before + heading_after
+    chord = dx * sine(mean + _QUARTER) + dy * sine(mean)
+    turn = heading_after - heading_before
+    if abs(turn) > _MOST_TURN:
+        return chord
+    return chord + ((chord >> 20) * (turn * turn * _ARC_E40) >> (_ARC_BITS - 20))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class EncoderGeometry:
+    """The lengths that the encoders need, in integers."""
+
+    distance_nm_per_count: int
+    track_mm: int
+    wheel_diameter_um: int
+    #: Longest believable step between two packets.
+    longest_step_um: int
+
+    @classmethod
+    def of(cls, parameters: RobotParameters, longest_gap_ns: Nanos) -> "EncoderGeometry":
+        """Return a robot's lengths; a step may be as long as its top speed makes in the longest gap."""
+        return cls(
+            distance_nm_per_count=parameters.distance_nm_per_count,
+            track_mm=parameters.track_mm,
+            wheel_diameter_um=round(parameters.body.wheel_diameter_m * 10**6),
+            # mm/s × ns are 1e-9 mm, that is 1e-6 µm.
+            longest_step_um=parameters.max_velocity_mm_s * longest_gap_ns // 10**6,
+        )
+
+    @property
+    def circumference_nm(self) -> int:
+        """Return the way of one turn of a wheel."""
+        return divide_half_away(self.wheel_diameter_um * PI_E9, 10**6)
+
+
+#: One counter of the odometry: total and last value.
+_Counter: TypeAlias = tuple[int, int | None]
+#: Odometry, heading and forward sums, offsets in nm, jumps.
+EncoderSnapshot: TypeAlias = tuple[tuple[_Counter, _Counter, _Counter, int | None], int, int, tuple[int, int], int]
+
+
+class Encoders:
+    """Both wheels' travel since the reference was taken."""
+
+    def __init__(self, geometry: EncoderGeometry, width: int) -> None:
+        self.geometry = geometry
+        self.width = width
+        self._per_turn_nm = geometry.circumference_nm
+        self._longest_counts = geometry.longest_step_um * 1_000 // geometry.distance_nm_per_count
+        self._rim_per_turn_nm = divide_half_away(geometry.track_mm * PI_E9, 1_000)
+        self._x = Unwrapper(POSITION_MODULUS)
+        self._y = Unwrapper(POSITION_MODULUS)
+        self._turn = Unwrapper(HEADING_MODULUS)
+        #: Heading of the last packet as on the wire, None before the first.
+        self._raw_heading: int | None = None
+        #: Turn and way since the reference, in heading counts and in counts × 2^30.
+        self._heading = 0
+        self._forward = 0
+        #: Travel at which the counts of this session began, (left, right) in nm.
+        self._offset_nm = (0, 0)
+        #: Steps that no wheel can have made.
+        self.jumps = 0
+
+    @property
+    def travel_nm(self) -> tuple[int, int]:
+        """Return how far the left and the right rim have rolled, + forward."""
+        whole, part = self._forward >> ONE_BITS, self._forward & ((1 << ONE_BITS) - 1)
+        per_count = self.geometry.distance_nm_per_count
+        forward_nm = whole * per_count + (part * per_count >> ONE_BITS)
+        # One turn of the robot rolls each rim by π × track; whole turns apart, so that 64 bits last for ever.
+        turns, counts = self._heading // HEADING_MODULUS, self._heading % HEADING_MODULUS
+        rim_nm = turns * self._rim_per_turn_nm + divide_half_away(counts * self._rim_per_turn_nm, HEADING_MODULUS)
+        return self._offset_nm[0] + forward_nm - rim_nm, self._offset_nm[1] + forward_nm + rim_nm
+
+    @property
+    def counts(self) -> tuple[int, int]:
+        """Return the encoder steps of both wheels, by floor, unwrapped."""
+        left_nm, right_nm = self.travel_nm
+        return (
+            encoder_count(left_nm, self._per_turn_nm, self.width),
+            encoder_count(right_nm, self._per_turn_nm, self.width),
+        )
+
+    def begin(self, counts: tuple[int, int] = (0, 0)) -> None:
+        """Start anew at these counts; the next packet is the reference."""
+        for counter in (self._x, self._y, self._turn):
+            counter.forget()
+        self._raw_heading = None
+        self._heading = 0
+        self._forward = 0
+        steps = 1 << self.width
+        # The lower border of a count, rounded up, so that floor gives the same count again.
+        self._offset_nm = (
+            -(-counts[0] * self._per_turn_nm // steps),
+            -(-counts[1] * self._per_turn_nm // steps),
+        )
+
+    def take(self, raw_x: int, raw_y: int, raw_heading: int) -> bool:
+        """Add the odometry of a packet; tell whether it could be believed as a step."""
+        dx, dy, turn = self._x.update(raw_x), self._y.update(raw_y), self._turn.update(raw_heading)
+        before, self._raw_heading = self._raw_heading, raw_heading % HEADING_MODULUS
+        if before is None:
+            return True
+        if max(abs(dx), abs(dy)) > self._longest_counts:
+            self.jumps += 1
+            return False
+        self._forward += forward_step(dx, dy, before, before + turn)
+        self._heading += turn
+        return True
+
+    def snapshot(self) -> EncoderSnapshot:
+        """Return all of it as plain values."""
+        odometry = (self._x.snapshot(), self._y.snapshot(), self._turn.snapshot(), self._raw_heading)
+        return odometry, self._heading, self._forward, self._offset_nm, self.jumps
+
+    def restore(self, snapshot: EncoderSnapshot) -> None:
+        """Put back what `snapshot` returned."""
+        (x, y, turn, self._raw_heading), self._heading, self._forward, self._offset_nm, self.jumps = snapshot
+        self._x.restore(x)
+        self._y.restore(y)
+        self._turn.restore(turn)

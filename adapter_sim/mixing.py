@@ -1,0 +1,89 @@
+"""Motor values to VEL and RVEL, in integers.
+
+With `MotorMeaning.WHEELS` the two values are rim speeds of a differential
+drive: v = (left + right) / 2, ω = (right − left) / track. VEL takes whole mm/s
+and RVEL whole deg/s; both are rounded half away from zero, so a command and its
+mirror image stay mirror images. The rounding of RVEL is worth up to
+half a degree a second: 1.6 mm/s at each rim with a track of 357 mm.
+
+Where a speed is over its limit both are scaled by the same factor (towards
+zero), so that the robot keeps its path and only takes longer.
+"""
+
+from dataclasses import dataclass
+
+from adapter_sim.codec import divide_half_away
+from adapter_sim.settings import AdapterSettings, MotorMeaning
+
+#: 180/π, in 1e-9.
+DEG_PER_RAD_E9 = 57_295_779_513
+
+
+@dataclass(frozen=True, slots=True)
+class Speeds:
+    """What is commanded: forward mm/s and deg/s to the left."""
+
+    forward_mm_s: int
+    turn_deg_s: int
+
+
+#: Standing still.
+STILL = Speeds(0, 0)
+
+
+class Mixer:
+    """Turns a pair of motor values into speeds; it has no state.
+
+    Args:
+        settings: Meaning and step sizes.
+        track_mm: Distance between the wheels, from the robot file.
+        max_velocity_mm_s: The robot's own limit; the settings may lower it.
+        max_rotation_deg_s: Likewise.
+    """
+
+    def __init__(
+        self, settings: AdapterSettings, *, track_mm: int, max_velocity_mm_s: int, max_rotation_deg_s: int
+    ) -> None:
+        self.track_mm = track_mm
+        self.max_velocity_mm_s = _lower(max_velocity_mm_s, settings.max_velocity_mm_s)
+        self.max_rotation_deg_s = _lower(max_rotation_deg_s, settings.max_rotation_deg_s)
+        self._meaning = settings.motor_meaning
+        self._step_um_per_s = settings.step_um_per_s
+        self._angular_step_urad_per_s = settings.angular_step_urad_per_s
+
+    def mix(self, motor1: int, motor2: int) -> Speeds:
+        """Return the speeds that a pair of signed motor values asks for."""
+        if self._meaning is MotorMeaning.WHEELS:
+            forward = divide_half_away((motor1 + motor2) * self._step_um_per_s, 2_000)
+            # µm/s over µm of track are rad/s; 1e-9 of DEG_PER_RAD_E9 and 1e3 of mm.
+            turn = divide_half_away(
+                (motor2 - motor1) * self._step_um_per_s * DEG_PER_RAD_E9, self.track_mm * 1_000 * 10**9
+            )
+        else:
+            forward = divide_half_away(motor1 * self._step_um_per_s, 1_000)
+            turn = divide_half_away(motor2 * self._angular_step_urad_per_s * DEG_PER_RAD_E9, 10**15)
+        return self._limited(forward, turn)
+
+    def wheels_mm_s(self, speeds: Speeds) -> tuple[int, int]:
+        """Return the rim speeds (left, right) that commanded speeds mean, in whole mm/s."""
+        rim = divide_half_away(speeds.turn_deg_s * self.track_mm * 10**9, 2 * DEG_PER_RAD_E9)
+        return speeds.forward_mm_s - rim, speeds.forward_mm_s + rim
+
+    def _limited(self, forward: int, turn: int) -> Speeds:
+        if abs(forward) > self.max_velocity_mm_s:
+            turn = _scaled(turn, self.max_velocity_mm_s, abs(forward))
+            forward = _scaled(forward, self.max_velocity_mm_s, abs(forward))
+        if abs(turn) > self.max_rotation_deg_s:
+            forward = _scaled(forward, self.max_rotation_deg_s, abs(turn))
+            turn = _scaled(turn, self.max_rotation_deg_s, abs(turn))
+        return Speeds(forward, turn)
+
+
+def _lower(robot: int, wanted: int | None) -> int:
+    return robot if wanted is None else min(robot, wanted)
+
+
+def _scaled(value: int, numerator: int, denominator: int) -> int:
+    """Return value × numerator / denominator, towards zero."""
+    magnitude = abs(value) * numerator // denominator
+    return magnitude if value >= 0 else -magnitude

@@ -1,0 +1,382 @@
+"""The pin-out, read from pinout.toml and checked.
+
+Not here: which pins of an ESP32 can do what (pin_rules.py).
+
+Invariant: a `Pinout` that exists names every wire once, gives every pin of the
+BluePill to one wire only, and has for each value all bits from 0 to width − 1.
+"""
+
+import re
+import tomllib
+from collections.abc import Mapping
+from dataclasses import dataclass
+from enum import StrEnum
+from importlib import resources
+from pathlib import Path
+from typing import TypeVar
+
+from p2os.errors import FileError
+
+
+class PinoutError(FileError):
+    """A pin-out file is missing or contradicts itself."""
+
+
+class Direction(StrEnum):
+    """Who drives a wire."""
+
+    #: The adapter drives, the BluePill reads.
+    TO_BLUEPILL = "to_bluepill"
+    #: The BluePill drives, the adapter reads.
+    TO_ADAPTER = "to_adapter"
+
+
+class Role(StrEnum):
+    """What a wire is for."""
+
+    #: High: an obstacle nearer than the threshold.
+    DISTANCE = "distance"
+    #: One bit of a wheel's absolute position.
+    ENCODER = "encoder"
+    #: One bit of a motor's command.
+    MOTOR = "motor"
+    #: High: the BluePill wants the robot.
+    CONNECT = "connect"
+    #: High: the adapter is held in reset.
+    RESET = "reset"
+
+
+class Pull(StrEnum):
+    """The resistor on the adapter's side of a wire."""
+
+    UP = "up"
+    DOWN = "down"
+    NONE = "none"
+
+
+class Safe(StrEnum):
+    """What an output shows while the adapter knows nothing."""
+
+    LOW = "low"
+    HIGH = "high"
+    #: The last level stays.
+    HOLD = "hold"
+
+
+class Status(StrEnum):
+    """Whether a revision of the board can work."""
+
+    USABLE = "usable"
+    FAULTY = "faulty"
+    PROPOSED = "proposed"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Wire:
+    """One of the wires between BluePill and adapter."""
+
+    name: str
+    role: Role
+    direction: Direction
+    #: Pin of the BluePill, for example "PA4".
+    bluepill: str
+    pull: Pull
+    #: Level while nobody drives.
+    idle: bool
+    safe: Safe
+    #: (revision, pin of the ESP32 or None for not connected), one for each revision.
+    esp32: tuple[tuple[str, str | None], ...]
+    #: Multi-bit value that the wire belongs to, and its weight as a power of two.
+    value: str | None = None
+    bit: int | None = None
+    #: Number of the distance sensor, from 1.
+    number: int | None = None
+
+    def esp32_pin(self, revision: str) -> str | None:
+        """Return the ESP32's pin in a revision, None where nothing is connected."""
+        return dict(self.esp32)[revision]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Value:
+    """A number carried by several wires."""
+
+    name: str
+    role: Role
+    side: str
+    width: int
+    #: Names of its wires, least significant first.
+    wires: tuple[str, ...]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Revision:
+    """A version of the adapter board."""
+
+    name: str
+    status: Status
+    note: str
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Auxiliary:
+    """A pin of the ESP32 that reaches no BluePill pin."""
+
+    name: str
+    direction: str
+    esp32: tuple[tuple[str, str], ...]
+    #: Wire whose pin it uses too, before that becomes an output.
+    shares: str | None = None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Pinout:
+    """The whole table."""
+
+    wires: tuple[Wire, ...]
+    values: tuple[Value, ...]
+    revisions: tuple[Revision, ...]
+    auxiliaries: tuple[Auxiliary, ...]
+    default_revision: str
+
+    def wire(self, name: str) -> Wire:
+        """Return a wire by its name; KeyError where there is none."""
+        return {wire.name: wire for wire in self.wires}[name]
+
+    def value(self, name: str) -> Value:
+        """Return a value by its name; KeyError where there is none."""
+        return {value.name: value for value in self.values}[name]
+
+    def with_role(self, role: Role) -> tuple[Wire, ...]:
+        """Return the wires of a role, in the order of the table."""
+        return tuple(wire for wire in self.wires if wire.role is role)
+
+
+def load_pinout(path: str | Path | None = None) -> Pinout:
+    """Read and check a pin-out file.
+
+    Args:
+        path: A TOML file; None takes the shipped one.
+
+    Raises:
+        PinoutError: The file is missing, is no TOML or contradicts itself.
+    """
+    where = "pinout.toml" if path is None else str(path)
+    try:
+        if path is None:
+            text = resources.files("adapter_sim").joinpath("pinout.toml").read_text(encoding="utf-8")
+        else:
+            text = Path(path).read_text(encoding="utf-8")
+    except (OSError, UnicodeDecodeError) as error:
+        raise PinoutError(f"cannot read pin-out {where}: {error}") from error
+    return parse_pinout(text, where)
+
+
+def parse_pinout(text: str, where: str = "pinout") -> Pinout:
+    """Check the text of a pin-out file; `where` names it in messages."""
+    try:
+        table = tomllib.loads(text)
+    except tomllib.TOMLDecodeError as error:
+        raise PinoutError(f"{where}: {error}") from error
+    top = _Row(where, table)
+    if top.integer("schema") != SCHEMA:
+        raise PinoutError(f"{where}: schema is {table['schema']}, expected {SCHEMA}")
+    default = top.text("default_revision")
+    revisions = tuple(_revision(row) for row in top.rows("revision"))
+    names = [revision.name for revision in revisions]
+    wires = tuple(_wire(row, names) for row in top.rows("wire"))
+    values = tuple(_value(row, wires) for row in top.rows("value"))
+    auxiliaries = tuple(_auxiliary(row, names, wires) for row in top.rows("auxiliary", optional=True))
+    top.finish()
+    _refuse_twins(where, "revision", names)
+    _refuse_twins(where, "wire", [wire.name for wire in wires])
+    _refuse_twins(where, "BluePill pin", [wire.bluepill for wire in wires])
+    _refuse_twins(where, "value", [value.name for value in values])
+    _refuse_twins(where, "auxiliary", [auxiliary.name for auxiliary in auxiliaries])
+    if default not in names:
+        raise PinoutError(f"{where}: default_revision {default!r} is none of {', '.join(names)}")
+    _check_roles(where, wires, values)
+    return Pinout(
+        wires=wires, values=values, revisions=revisions, auxiliaries=auxiliaries, default_revision=default
+    )  # fmt: skip
+
+
+#: Version of the file format.
+SCHEMA = 1
+#: The chip has ports A to E; the BluePill brings out A to C.
+_BLUEPILL_PIN = re.compile(r"P[A-C]([0-9]|1[0-5])")
+_ESP32_PIN = re.compile(r"IO([0-9]|[12][0-9]|3[0-9])|EN|HC595\.Q[A-H]")
+#: Who drives the wires of a role.
+_DRIVEN = {
+    Role.DISTANCE: Direction.TO_BLUEPILL,
+    Role.ENCODER: Direction.TO_BLUEPILL,
+    Role.MOTOR: Direction.TO_ADAPTER,
+    Role.CONNECT: Direction.TO_ADAPTER,
+    Role.RESET: Direction.TO_ADAPTER,
+}
+#: Values that the adapter cannot do without, with their roles and sides.
+_NEEDED_VALUES = {
+    "encoder1": (Role.ENCODER, "left"),
+    "encoder2": (Role.ENCODER, "right"),
+    "motor1": (Role.MOTOR, "left"),
+    "motor2": (Role.MOTOR, "right"),
+}
+
+_Kind = TypeVar("_Kind", bound=StrEnum)
+
+
+class _Row:
+    """A table of the file, of which every key must be asked for."""
+
+    def __init__(self, where: str, table: Mapping[str, object]) -> None:
+        self.where = where
+        self._table = table
+        self._asked: set[str] = set()
+
+    def get(self, key: str) -> object:
+        self._asked.add(key)
+        return self._table.get(key)
+
+    def text(self, key: str) -> str:
+        value = self.get(key)
+        if not isinstance(value, str):
+            raise self.fault(key, value, "a text")
+        return value
+
+    def integer(self, key: str) -> int:
+        value = self.get(key)
+        if not isinstance(value, int) or isinstance(value, bool):
+            raise self.fault(key, value, "an integer")
+        return value
+
+    def choice(self, key: str, kind: type[_Kind]) -> _Kind:
+        value = self.get(key)
+        try:
+            return kind(str(value))
+        except ValueError:
+            raise self.fault(key, value, "one of " + ", ".join(kind)) from None
+
+    def rows(self, key: str, *, optional: bool = False) -> list["_Row"]:
+        value = self.get(key)
+        if value is None and optional:
+            return []
+        if not isinstance(value, list) or not value or not all(isinstance(row, dict) for row in value):
+            raise self.fault(key, value, f"one [[{key}]] or more")
+        return [_Row(f"{self.where}: {key} {row.get('name', index)!r}", row) for index, row in enumerate(value)]
+
+    def pins(self, key: str, revisions: list[str]) -> dict[str, str]:
+        value = self.get(key)
+        if not isinstance(value, dict):
+            raise self.fault(key, value, "a table of revision = pin")
+        for revision, pin in value.items():
+            if revision not in revisions:
+                raise PinoutError(f"{self.where}: {key} names the unknown revision {revision!r}")
+            if not isinstance(pin, str) or not (pin == "NC" or _ESP32_PIN.fullmatch(pin)):
+                raise self.fault(f"{key}.{revision}", pin, "IO0..IO39, EN, HC595.QA..QH or NC")
+        return value
+
+    def fault(self, key: str, value: object, expected: str) -> PinoutError:
+        if value is None:
+            return PinoutError(f"{self.where}: key {key!r} is missing (expected {expected})")
+        return PinoutError(f"{self.where}: {key} = {value!r}, expected {expected}")
+
+    def finish(self) -> None:
+        unknown = sorted(set(self._table) - self._asked)
+        if unknown:
+            raise PinoutError(
+                f"{self.where}: unknown key {unknown[0]!r}", hint="known keys: " + ", ".join(sorted(self._asked))
+            )
+
+
+def _revision(row: _Row) -> Revision:
+    result = Revision(name=row.text("name"), status=row.choice("status", Status), note=row.text("note"))
+    row.finish()
+    return result
+
+
+def _wire(row: _Row, revisions: list[str]) -> Wire:
+    name, role = row.text("name"), row.choice("role", Role)
+    pins = row.pins("esp32", revisions)
+    missing = [revision for revision in revisions if revision not in pins]
+    if missing:
+        raise PinoutError(f"{row.where}: esp32 has no pin for revision {missing[0]!r}", hint='write "NC" for none')
+    bluepill = row.text("bluepill")
+    if not _BLUEPILL_PIN.fullmatch(bluepill):
+        raise row.fault("bluepill", bluepill, "PA0..PC15")
+    pull, idle = row.choice("pull", Pull), row.integer("idle")
+    if idle not in {0, 1} or (pull is not Pull.NONE and bool(idle) != (pull is Pull.UP)):
+        raise PinoutError(f"{row.where}: idle = {idle} contradicts pull = {pull.value!r}")
+    direction = row.choice("direction", Direction)
+    if direction is not _DRIVEN[role]:
+        raise PinoutError(f"{row.where}: direction = {direction.value!r}, but a {role.value} wire is {_DRIVEN[role]}")
+    safe = row.get("safe")
+    if safe not in (0, 1, "hold") or isinstance(safe, bool):
+        raise row.fault("safe", safe, '0, 1 or "hold"')
+    of_value = role in {Role.ENCODER, Role.MOTOR}
+    result = Wire(
+        name=name,
+        role=role,
+        direction=direction,
+        bluepill=bluepill,
+        pull=pull,
+        idle=bool(idle),
+        safe=Safe.HOLD if safe == "hold" else Safe.HIGH if safe else Safe.LOW,
+        esp32=tuple((revision, None if pins[revision] == "NC" else pins[revision]) for revision in revisions),
+        value=row.text("value") if of_value else None,
+        bit=row.integer("bit") if of_value else None,
+        number=row.integer("number") if role is Role.DISTANCE else None,
+    )
+    row.finish()
+    return result
+
+
+def _value(row: _Row, wires: tuple[Wire, ...]) -> Value:
+    name, role, width = row.text("name"), row.choice("role", Role), row.integer("width")
+    own = sorted((wire for wire in wires if wire.value == name), key=lambda wire: wire.bit or 0)
+    bits = [wire.bit for wire in own]
+    if width < 1 or bits != list(range(width)):
+        raise PinoutError(f"{row.where}: width = {width}, but its wires have the bits {bits}")
+    odd = [wire.name for wire in own if wire.role is not role]
+    if odd:
+        raise PinoutError(f"{row.where}: role = {role.value!r}, but its wire {odd[0]} has another")
+    result = Value(name=name, role=role, side=row.text("side"), width=width, wires=tuple(wire.name for wire in own))
+    row.finish()
+    return result
+
+
+def _auxiliary(row: _Row, revisions: list[str], wires: tuple[Wire, ...]) -> Auxiliary:
+    name, direction = row.text("name"), row.text("direction")
+    if direction not in {"in", "out"}:
+        raise row.fault("direction", direction, "in or out")
+    shares = row.get("shares")
+    if shares is not None and shares not in {wire.name for wire in wires}:
+        raise row.fault("shares", shares, "the name of a wire")
+    pins = row.pins("esp32", revisions)
+    row.finish()
+    return Auxiliary(
+        name=name, direction=direction, esp32=tuple(pins.items()), shares=None if shares is None else str(shares)
+    )
+
+
+def _refuse_twins(where: str, what: str, names: list[str]) -> None:
+    seen: set[str] = set()
+    for name in names:
+        if name in seen:
+            raise PinoutError(f"{where}: {what} {name!r} stands twice")
+        seen.add(name)
+
+
+def _check_roles(where: str, wires: tuple[Wire, ...], values: tuple[Value, ...]) -> None:
+    for role in (Role.CONNECT, Role.RESET):
+        count = sum(wire.role is role for wire in wires)
+        if count != 1:
+            raise PinoutError(f"{where}: {count} wires have the role {role.value!r}, expected 1")
+    numbers = [wire.number for wire in wires if wire.role is Role.DISTANCE]
+    if numbers != list(range(1, len(numbers) + 1)):
+        raise PinoutError(f"{where}: distance wires are numbered {numbers}, expected 1, 2, 3 ... in order")
+    found = {value.name: (value.role, value.side) for value in values}
+    if found != _NEEDED_VALUES:
+        raise PinoutError(f"{where}: values are {sorted(found)}, expected {sorted(_NEEDED_VALUES)} with their sides")
+    stray = [wire.name for wire in wires if wire.value is not None and wire.value not in found]
+    if stray:
+        raise PinoutError(f"{where}: wire {stray[0]!r} belongs to no [[value]]")

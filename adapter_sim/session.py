@@ -1,0 +1,153 @@
+"""A P2OS session as the adapter needs it: connect, talk, and stop the robot first.
+
+Around `p2os.connection.Connection`, which synchronises and keeps the watchdog
+fed. Added here: the stop sequence before each SYNC0 and before each CLOSE, SIPs
+handed on, everything else folded into "opened" and "ended, because".
+
+Any packet revives the last speed of a robot that its watchdog has stopped, and
+the adapter cannot know what a robot was doing before. So STOP, VEL 0 and RVEL 0
+stand before every SYNC0, the repeated ones included: a cable that is plugged in
+between two tries must not set the robot off.
+
+Invariant: what `take_output` returns begins, after `abandon`, with STOP.
+"""
+
+from dataclasses import dataclass
+from typing import TypeAlias, cast
+
+from adapter_sim.settings import AdapterSettings
+from p2os.commands import Command, CommandNumber, rvel, stop, vel
+from p2os.connection import (
+    ConnectFailed,
+    Connection,
+    ConnectionLost,
+    ConnectionSettings,
+    ConnectionState,
+    ConnectionStats,
+    Opened,
+    Role,
+    SipReceived,
+    Synchronised,
+)
+from p2os.sip import StandardSip
+from p2os.timing import Nanos
+
+
+@dataclass(frozen=True, slots=True)
+class SessionOpened:
+    """OPEN was sent to a robot that has said who it is."""
+
+    robot: str
+
+
+@dataclass(frozen=True, slots=True)
+class SessionEnded:
+    """The session was lost, or could not be opened."""
+
+    reason: str
+
+
+SessionEvent: TypeAlias = StandardSip | SessionOpened | SessionEnded
+
+#: Brings a robot to a stand and keeps it there when a later packet revives it.
+_STOPS = tuple(command.to_frame().to_bytes() for command in (stop(), vel(0), rvel(0)))
+_CLOSE = Command(CommandNumber.CLOSE).to_frame().to_bytes()
+#: The same bytes are PULSE once the session is open.
+_SYNC0 = Command(CommandNumber.PULSE).to_frame().to_bytes()
+
+
+class Session:
+    """One robot's session after another."""
+
+    def __init__(self, settings: AdapterSettings) -> None:
+        self._settings = ConnectionSettings(
+            pulse_ns=settings.pulse_ns, liveness_ns=settings.liveness_ns, first_packet_ns=settings.first_sip_ns
+        )
+        self._connection = Connection(Role.CLIENT, settings=self._settings)
+        self._output: list[bytes] = []
+        self._robot = ""
+
+    @property
+    def stats(self) -> ConnectionStats:
+        """Return the counters since the last reset."""
+        return self._connection.stats
+
+    def connect(self, now: Nanos) -> None:
+        """Begin to open a session."""
+        self._connection.connect(now)
+        self._collect()
+
+    def send(self, command: Command, now: Nanos) -> None:
+        """Send a command of the open session."""
+        self._connection.send(command, now)
+        self._collect()
+
+    def abandon(self, now: Nanos) -> None:
+        """Stop the robot and close it, open or not; what was not taken yet is never sent."""
+        self.drop(now)
+        self._output = [*_STOPS, _CLOSE]
+
+    def drop(self, now: Nanos) -> None:
+        """End the session without a word."""
+        self._connection.disconnect(now)
+        self._connection.take_output()
+        while self._connection.next_event() is not None:
+            pass
+        self._output = []
+
+    def forget(self) -> None:
+        """Know nothing, as after a reset."""
+        self._connection = Connection(Role.CLIENT, settings=self._settings)
+        self._output = []
+        self._robot = ""
+
+    def receive(self, data: bytes, now: Nanos) -> None:
+        """Take bytes of the robot."""
+        self._connection.receive(data, now)
+        self._collect()
+
+    def take_events(self) -> list[SessionEvent]:
+        """Return what happened, in order."""
+        events: list[SessionEvent] = []
+        while (event := self._connection.next_event()) is not None:
+            if isinstance(event, SipReceived):
+                events.append(event.sip)
+            elif isinstance(event, Synchronised):
+                robot = event.identity
+                self._robot = " ".join(part for part in (robot.robot_class, robot.subclass, robot.name) if part)
+            elif isinstance(event, Opened):
+                events.append(SessionOpened(self._robot))
+            elif isinstance(event, ConnectionLost | ConnectFailed):
+                events.append(SessionEnded(event.reason))
+        return events
+
+    def take_output(self) -> list[bytes]:
+        """Return the frames to send, one item each, and forget them."""
+        output, self._output = self._output, []
+        return output
+
+    def next_deadline(self) -> Nanos | None:
+        """Return when the connection wants to act."""
+        return self._connection.next_deadline()
+
+    def advance_to(self, now: Nanos) -> None:
+        """Bring the connection to `now`."""
+        self._connection.advance_to(now)
+        self._collect()
+
+    def snapshot(self) -> tuple[object, tuple[bytes, ...], str]:
+        """Return all that decides the future."""
+        return self._connection.snapshot(), tuple(self._output), self._robot
+
+    def restore(self, snapshot: object) -> None:
+        """Put back what `snapshot` returned."""
+        connection, output, self._robot = cast("tuple[object, tuple[bytes, ...], str]", snapshot)
+        self._connection.restore(connection)
+        self._output = list(output)
+
+    def _collect(self) -> None:
+        is_syncing = self._connection.state is ConnectionState.SYNC0
+        for frame in self._connection.take_output():
+            if is_syncing and frame == _SYNC0:
+                self._output += _STOPS
+            self._output.append(frame)
