@@ -13,7 +13,6 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 from p2os.commands import Command, CommandNumber
-
 from p2os.pioneer.motion import NM_PER_MM, UDEG_PER_DEG, Motion, MotionLimits
 from p2os.pioneer.odometry_counts import DeadReckoning
 from p2os.pioneer.sonar_schedule import SonarSchedule

@@ -25,7 +25,9 @@ so a ramp is exact for every step that is a whole number of microseconds.
 import math
 from dataclasses import dataclass, replace
 from enum import Enum
+from typing import cast
 
+from p2os.parameters import RobotParameters
 from p2os.timing import Nanos
 
 NM_PER_MM = 1_000_000
@@ -64,6 +66,21 @@ class MotionLimits:
     decel_mm_s2: int
     rot_accel_deg_s2: int
     rot_decel_deg_s2: int
+
+    @classmethod
+    def of(cls, parameters: RobotParameters) -> "MotionLimits":
+        """Return the limits with which a robot starts."""
+        start = parameters.motion
+        return cls(
+            top_velocity_mm_s=parameters.max_velocity_mm_s,
+            top_rotation_deg_s=parameters.max_rotation_deg_s,
+            max_velocity_mm_s=start.max_velocity_mm_s,
+            max_rotation_deg_s=start.max_rotation_deg_s,
+            accel_mm_s2=start.accel_mm_s2,
+            decel_mm_s2=start.decel_mm_s2,
+            rot_accel_deg_s2=start.rot_accel_deg_s2,
+            rot_decel_deg_s2=start.rot_decel_deg_s2,
+        )
 
     def with_max_velocity(self, mm_s: int) -> "MotionLimits":
         """Return these limits after SETV, which cannot exceed the robot's top."""
@@ -114,6 +131,16 @@ class _Axis:
             self.speed = min(speed + faster, target) if target > 0 else max(speed - faster, target)
         else:
             self.speed = max(speed - slower, target) if speed > 0 else min(speed + slower, target)
+
+
+@dataclass(frozen=True, slots=True)
+class _Snapshot:
+    limits: MotionLimits
+    mode: Mode
+    is_held: bool
+    first: _Axis
+    second: _Axis
+    wheels: tuple[float, float]
 
 
 class Motion:
@@ -238,24 +265,18 @@ class Motion:
 
     # Saving -----------------------------------------------------------------------
 
-    def snapshot(self) -> dict[str, object]:
-        """Return all that decides the future, as plain values."""
-        axes = tuple((axis.set_speed, axis.speed, axis.goal) for axis in (self._first, self._second))
-        return {
-            "limits": self.limits,
-            "mode": self.mode,
-            "is_held": self.is_held,
-            "axes": axes,
-            "wheels": self._wheels,
-        }
+    def snapshot(self) -> object:
+        """Return all that decides the future, as a plain value."""
+        return _Snapshot(
+            self.limits, self.mode, self.is_held, replace(self._first), replace(self._second), self._wheels
+        )
 
-    def restore(self, snapshot: dict[str, object]) -> None:
+    def restore(self, snapshot: object) -> None:
         """Put back what `snapshot` returned."""
-        for name in ("limits", "mode", "is_held"):
-            setattr(self, name, snapshot[name])
-        first, second = snapshot["axes"]  # type: ignore[misc]  # our own snapshot: a pair of axes
-        self._first, self._second = _Axis(*first), _Axis(*second)
-        self._wheels = snapshot["wheels"]  # type: ignore[assignment]  # our own snapshot: a pair of floats
+        saved = cast("_Snapshot", snapshot)
+        self.limits, self.mode, self.is_held = saved.limits, saved.mode, saved.is_held
+        self._first, self._second = replace(saved.first), replace(saved.second)
+        self._wheels = saved.wheels
 
     # Helpers ----------------------------------------------------------------------
 

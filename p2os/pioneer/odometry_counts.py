@@ -8,7 +8,8 @@ Invariant: `turned_rad` and `travel_mm` never jump; SETO moves only the origin.
 """
 
 import math
-from dataclasses import astuple, dataclass
+from dataclasses import dataclass
+from typing import cast
 
 #: The packet carries 15 bits of position (Pioneer 2/3 manuals, standard SIP).
 POSITION_MODULUS = 1 << 15
@@ -16,7 +17,7 @@ NM_PER_MM = 1_000_000
 
 
 @dataclass(frozen=True, slots=True)
-class ReckoningSnapshot:
+class _Snapshot:
     """All that a `DeadReckoning` remembers."""
 
     x_mm: float
@@ -85,17 +86,18 @@ class DeadReckoning:
             round(self.y_mm * NM_PER_MM / distance_nm_per_count) % POSITION_MODULUS,
         )
 
-    def snapshot(self) -> ReckoningSnapshot:
+    def snapshot(self) -> object:
         """Return all that decides the future."""
-        return ReckoningSnapshot(
+        return _Snapshot(
             self.x_mm, self.y_mm, self.turned_rad, self.travel_mm, self._zero_rad, self._left_rad, self._right_rad
         )
 
-    def restore(self, snapshot: ReckoningSnapshot) -> None:
+    def restore(self, snapshot: object) -> None:
         """Put back what `snapshot` returned."""
-        (
-            self.x_mm, self.y_mm, self.turned_rad, self.travel_mm, self._zero_rad, self._left_rad, self._right_rad,
-        ) = astuple(snapshot)  # fmt: skip
+        saved = cast("_Snapshot", snapshot)
+        self.x_mm, self.y_mm, self._zero_rad = saved.x_mm, saved.y_mm, saved.zero_rad
+        self.turned_rad, self.travel_mm = saved.turned_rad, saved.travel_mm
+        self.begin(saved.left_rad, saved.right_rad)
 
 
 def raw_angle(angle_rad: float) -> int:

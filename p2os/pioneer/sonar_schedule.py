@@ -10,7 +10,10 @@ every sonar in every packet takes all readings at the end of the cycle.
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import cast
 
+from p2os.parameters import RobotParameters
+from p2os.profiles import Profile
 from p2os.timing import Nanos
 
 #: What a Pioneer 2 says when no echo came, in counts: 8,576 mm at 0.268 mm a count (a P2-DX's captured SIP).
@@ -25,6 +28,16 @@ class Ping:
 
     at: Nanos
     numbers: tuple[int, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class _Snapshot:
+    order: tuple[int, ...]
+    is_on: bool
+    next_index: int
+    cycle_start: Nanos
+    pings_done: int
+    readings: tuple[tuple[int, int], ...]
 
 
 class SonarSchedule:
@@ -92,18 +105,19 @@ class SonarSchedule:
         self._readings.clear()
         return readings
 
-    def snapshot(self) -> tuple[object, ...]:
+    def snapshot(self) -> object:
         """Return all that decides the future."""
-        return (
-            self.order, self.is_on, self._next_index, self._cycle_start, self._pings_done, tuple(self._readings),
-        )  # fmt: skip
+        return _Snapshot(
+            self.order, self.is_on, self._next_index, self._cycle_start, self._pings_done, tuple(self._readings)
+        )
 
-    def restore(self, snapshot: tuple[object, ...]) -> None:
+    def restore(self, snapshot: object) -> None:
         """Put back what `snapshot` returned."""
-        (
-            self.order, self.is_on, self._next_index, self._cycle_start, self._pings_done, readings,
-        ) = snapshot  # type: ignore[assignment]  # our own snapshot, field by field  # fmt: skip
-        self._readings = list(readings)  # type: ignore[call-overload]  # our own snapshot
+        saved = cast("_Snapshot", snapshot)
+        self.order, self.is_on = saved.order, saved.is_on
+        self._next_index, self._pings_done = saved.next_index, saved.pings_done
+        self._cycle_start = saved.cycle_start
+        self._readings = list(saved.readings)
 
     @property
     def _per_cycle(self) -> int:
@@ -117,8 +131,14 @@ class SonarSchedule:
             self._pings_done += 1
 
 
-def raw_range(range_m: float, *, longest_m: float, range_um_per_count: int, no_echo_counts: int) -> int:
-    """Return a range in the packet's counts; at or beyond the longest, what the robot says for no echo."""
-    if range_m >= longest_m:
-        return no_echo_counts
-    return min(round(range_m * 1_000_000 / range_um_per_count), LARGEST_COUNTS)
+def raw_range(range_m: float, parameters: RobotParameters, profile: Profile) -> int:
+    """Return a range in the packet's counts.
+
+    Nearer than the shortest range reads as the shortest. Without an echo a P2OS
+    robot says `NO_ECHO_COUNTS` (captured), later firmware its longest range (assumed).
+    """
+    if range_m >= parameters.sonar_range_m:
+        if profile is Profile.P2OS:
+            return NO_ECHO_COUNTS
+        range_m = parameters.sonar_range_m
+    return min(round(max(range_m, parameters.sonar_min_range_m) * 1e6 / parameters.range_um_per_count), LARGEST_COUNTS)

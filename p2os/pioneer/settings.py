@@ -1,0 +1,51 @@
+"""What the real robot keeps in FLASH, and how this one is asked to behave."""
+
+from dataclasses import dataclass
+from enum import Enum
+
+from p2os.errors import UsageError
+from p2os.profiles import Profile
+from p2os.timing import NS_PER_MS, NS_PER_S, Nanos
+
+#: The CONFIGpac has one byte for the cycle.
+LONGEST_SIP_PERIOD_MS = 255
+
+
+class SonarPerSip(Enum):
+    """How many sonar readings a standard packet carries."""
+
+    #: Two new readings a cycle in ring order, as a Pioneer 2 sends them.
+    TWO = "two"
+    #: Every fitted sonar in every packet.
+    ALL = "all"
+
+    @property
+    def pings_per_cycle(self) -> int | None:
+        """Return the readings a packet, or None for all."""
+        return 2 if self is SonarPerSip.TWO else None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ControllerSettings:
+    """The settings of a virtual robot's firmware.
+
+    Raises:
+        UsageError: a value cannot be sent in the robot's packets.
+    """
+
+    #: Says the answer to SYNC2; ARIA takes "MobileSim" for its own simulator, so any other name will do.
+    name: str = "Virtual"
+    serial: str = "VIRTUAL"
+    profile: Profile = Profile.P2OS
+    sip_period_ns: Nanos = 100 * NS_PER_MS
+    watchdog_ns: Nanos = 2 * NS_PER_S
+    sonar_per_sip: SonarPerSip = SonarPerSip.TWO
+    #: A charged lead-acid battery; it does not run down.
+    battery_decivolts: int = 126
+
+    def __post_init__(self) -> None:
+        period_ms = self.sip_period_ns / NS_PER_MS
+        if not 1 <= period_ms <= LONGEST_SIP_PERIOD_MS:
+            raise UsageError(f"a packet every {period_ms:g} ms is not between 1 and {LONGEST_SIP_PERIOD_MS} ms")
+        if not 0 <= self.battery_decivolts <= 0xFF:
+            raise UsageError(f"a battery of {self.battery_decivolts / 10:g} V does not fit the packet (0 to 25.5 V)")
