@@ -15,16 +15,17 @@
  * Up to 0.6 s pass from an obstacle to the wheels (sonar two in 100 ms, the line,
  * sampling): 0.11 m at full speed, and 0.06 m of braking.
  *
- *            nothing, or the same on both sides: CRUISE
- *            +-30 or +-50 worse on one side: VEER away from it, on an arc
- *            +-10: TURN on the spot, away from the heavier side
- *   CRUISE   +-10 with both sides shut, and straight ground behind: BACK_OUT, then a long TURN
- *   TURN     keeps its side until +-10 and +-30 are clear. A turn soon after
- *            another keeps the other's side (a corner would swing the robot to
- *            and fro); the third of these is a long one. After a full circle
- *            without a way out, +-10 clear is enough.
- *   BACK_OUT ends with the ground that was driven straight and is sure to be free,
- *            by the encoders, less a margin for the line's delay.
+ *   CRUISE   straight on while nothing, or as much on both sides, is at +-30 and +-50
+ *   VEER     an arc away from the side that is worse at +-30 or +-50
+ *   TURN     on the spot, when +-10 sees something: away from the heavier side, until
+ *            +-10 and +-30 are clear or +-30 shows two sides of a gap with +-10 clear
+ *   BACK_OUT instead of a TURN where both sides are shut too and straight ground lies
+ *            behind: as far as the encoders prove it free, then a long TURN
+ *
+ * Against going in circles. A turn soon after another keeps the other's side (a
+ * corner would swing the robot to and fro), and the third of these is a long one.
+ * Every BOLD_EVERY-th turn ends with +-10 clear, and every CONTRARY_EVERY-th goes
+ * to the heavier side: two walls would throw the robot to and fro between them.
  *
  * A sensor counts as soon as it sees, and until it has been clear for
  * RELEASE_TICKS: a threshold grazed does not make the wheels chatter.
@@ -45,9 +46,12 @@
 #define FUTILE_TURNS 3     /* chosen */
 #define LONG_TWIST 14      /* 145 degrees */
 #define FULL_TWIST 35      /* 360 degrees */
+#define BOLD_EVERY 2       /* chosen, as the next: by the ground covered in simulated rooms */
+#define CONTRARY_EVERY 5
 #define BACK_LEAST_WAY 6   /* 0.19 m: less is not worth it */
 #define BACK_MOST_WAY 10   /* 0.32 m: enough to turn freely */
 #define BACK_MARGIN_WAY 4  /* 0.13 m: two steps of the encoders, then line and brakes from SLOW */
+#define STATE_MOST_TICKS 1200 /* 12 s, a full circle and a third: encoders that stand still must hold no state for ever */
 #define STRAIGHT_TICKS 60  /* by then the arc before has died away on the line and in the ramp */
 
 enum sensor {
@@ -116,23 +120,28 @@ static void begin_turn(struct dodge *dodge, int32_t twist, int least_twist)
     dodge->least_twist = least_twist;
 }
 
-static void turn_away(struct dodge *dodge, int32_t way, int32_t twist)
+/* +1 (left) or -1 (right), away from the heavier side; as before where both weigh the same. */
+static int lighter_side(const struct dodge *dodge)
 {
     int left = left_weight(dodge->seen), right = left_weight(mirror(dodge->seen));
-    if (way - dodge->turn_way < SOON_WAY) {
-        dodge->futile_turns++;
-    } else {
+    return left > right ? -1 : right > left ? +1 : dodge->turn_side;
+}
+
+static void turn_away(struct dodge *dodge, int32_t way, int32_t twist)
+{
+    int least_twist = 0;
+    dodge->turns++;
+    if (way - dodge->turn_way >= SOON_WAY) {
         dodge->futile_turns = 0;
-        if (left != right) {
-            dodge->turn_side = left > right ? -1 : +1;
+        dodge->turn_side = lighter_side(dodge);
+        if (dodge->turns % CONTRARY_EVERY == 0) {
+            dodge->turn_side = -dodge->turn_side;
         }
-    }
-    if (dodge->futile_turns >= FUTILE_TURNS) {
+    } else if (++dodge->futile_turns >= FUTILE_TURNS) {
         dodge->futile_turns = 0;
-        begin_turn(dodge, twist, LONG_TWIST);
-    } else {
-        begin_turn(dodge, twist, 0);
+        least_twist = LONG_TWIST;
     }
+    begin_turn(dodge, twist, least_twist);
 }
 
 /* Way that the hull can go back straight over ground it has just covered. */
@@ -155,11 +164,24 @@ static void drive_on(struct dodge *dodge, int32_t way, int32_t twist)
     }
 }
 
+static bool is_overdue(const struct dodge *dodge)
+{
+    return dodge->state_ticks >= STATE_MOST_TICKS;
+}
+
+/* The cone ahead is free: of everything, or of what forbids passing between two things. */
+static bool is_way_out(const struct dodge *dodge, int32_t turned)
+{
+    bool is_gap = dodge->seen & LEFT_30 && dodge->seen & RIGHT_30;
+    bool is_bold = dodge->turns % BOLD_EVERY == 0 || turned >= FULL_TWIST || is_overdue(dodge);
+    return !(dodge->seen & (is_gap || is_bold ? FRONT : AHEAD));
+}
+
 static void turn_on(struct dodge *dodge, int32_t way, int32_t twist)
 {
     int32_t turned = (twist - dodge->turn_twist) * dodge->turn_side;
-    bool is_clear = !(dodge->seen & (turned < FULL_TWIST ? AHEAD : FRONT));
-    if (is_clear && turned >= dodge->least_twist) {
+    bool is_far_enough = turned >= dodge->least_twist || is_overdue(dodge);
+    if (is_far_enough && is_way_out(dodge, turned)) {
         dodge->turn_way = way;
         drive_on(dodge, way, twist);
     }
@@ -167,11 +189,8 @@ static void turn_on(struct dodge *dodge, int32_t way, int32_t twist)
 
 static void back_on(struct dodge *dodge, int32_t way, int32_t twist)
 {
-    if (way <= dodge->back_way) {
-        int left = left_weight(dodge->seen), right = left_weight(mirror(dodge->seen));
-        if (left != right) {
-            dodge->turn_side = left > right ? -1 : +1;
-        }
+    if (way <= dodge->back_way || is_overdue(dodge)) {
+        dodge->turn_side = lighter_side(dodge);
         begin_turn(dodge, twist, LONG_TWIST);
     }
 }
@@ -214,6 +233,7 @@ void dodge_start(struct dodge *dodge)
 struct dodge_command dodge_tick(struct dodge *dodge, uint8_t sensors, int32_t left_steps, int32_t right_steps)
 {
     int32_t way = left_steps + right_steps, twist = right_steps - left_steps;
+    enum dodge_state before = dodge->state;
     update_seen(dodge, sensors);
     switch (dodge->state) {
     case DODGE_TURN_LEFT:
@@ -227,6 +247,7 @@ struct dodge_command dodge_tick(struct dodge *dodge, uint8_t sensors, int32_t le
         drive_on(dodge, way, twist);
         break;
     }
+    dodge->state_ticks = dodge->state == before ? dodge->state_ticks + 1 : 0;
     note_ground(dodge, way);
     return command(dodge);
 }

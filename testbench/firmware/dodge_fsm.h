@@ -28,8 +28,10 @@ struct dodge {
     enum dodge_state state;
     uint8_t seen;                         /* the sensors as the machine takes them, bit 0 = leftmost */
     uint8_t unseen_ticks[DODGE_SENSORS];  /* how long each has been clear again */
+    uint32_t state_ticks;                 /* in this state */
     int turn_side;                        /* of this or the last turn: +1 left, -1 right */
     int least_twist;                      /* what this turn takes at least */
+    unsigned turns;                       /* begun so far */
     int futile_turns;                     /* turns in a row with hardly any way between them */
     int straight_ticks;                   /* how long both wheels have had one forward code */
     int32_t turn_twist;                   /* twist at which the turn began */
