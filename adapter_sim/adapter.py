@@ -11,6 +11,7 @@ sample, loss, belief, distances, encoders, speeds, stops. A change of rst is see
 at the end of a slice, where the bench's watched nets put it, and at each sample.
 """
 
+from dataclasses import replace
 from typing import Any, cast
 
 from adapter_sim.belief import Belief
@@ -25,7 +26,7 @@ from adapter_sim.pinout import Pinout, Role
 from adapter_sim.ports import EventCallback, PinBank
 from adapter_sim.session import Session, SessionOpened
 from adapter_sim.settings import AdapterSettings, EncoderAtOpen
-from adapter_sim.states import AWAKE_STATES, OPEN_STATES, STOPPING_STATES, AdapterState, AdapterStatus
+from adapter_sim.states import AWAKE_STATES, NEVER, OPEN_STATES, STOPPING_STATES, AdapterState, AdapterStatus, Agenda
 from p2os.commands import enable, rvel, set_origin, sonar, vel
 from p2os.parameters import RobotParameters
 from p2os.sip import StandardSip
@@ -35,8 +36,6 @@ from p2os.timing import NS_PER_MS, NS_PER_S, Nanos, Reached
 _ENABLES = 2
 #: A robot heard from so recently is still streaming: one SIP period.
 _ECHO_NS: Nanos = 100 * NS_PER_MS
-#: Later than any deadline.
-_NEVER: Nanos = 1 << 62
 
 
 class Adapter:
@@ -65,6 +64,7 @@ class Adapter:
         self.parameters = parameters
         self.settings = settings = settings or AdapterSettings()
         self.on_event = on_event
+        self._sample_period_ns = settings.sample_period_ns
         self.mixer = Mixer(
             settings,
             track_mm=parameters.track_mm,
@@ -95,7 +95,7 @@ class Adapter:
         self._clear()
         self._state = AdapterState.BOOTING
         self._reason = "power"
-        self._boot_at = now + settings.boot_ns
+        self._agenda.boot_at = now + settings.boot_ns
         self._replan()
 
     @property
@@ -115,7 +115,7 @@ class Adapter:
             ranges_um=self.distances.ranges_um,
             counts=self.encoders.counts,
             counts_shown=(self._walks[0].shown, self._walks[1].shown),
-            sips=self._sips,
+            sips=self._agenda.sips,
             odometry_jumps=self.encoders.jumps,
         )
 
@@ -123,7 +123,7 @@ class Adapter:
         """Take bytes that the line has delivered at `now`; what was due earlier is done first."""
         self._run(now - 1)
         if self._state in AWAKE_STATES:
-            self._now = self._heard_at = now
+            self._now = self._agenda.heard_at = now
             self.session.receive(data, now)
             self._take_session_events(now)
             self._replan()
@@ -138,21 +138,19 @@ class Adapter:
 
     def advance_to(self, limit: Nanos) -> Reached:
         """Act on everything due up to and including `limit`, then look at rst."""
-        self._run(limit)
-        self._now = max(self._now, limit)
-        if self.inputs.is_reset(limit) != (self._state is AdapterState.RESET):
-            self._turn_reset(limit)
-            self._replan()
+        looked_at = self._run(limit)
+        if looked_at != limit:
+            self._now = max(self._now, limit)
+            if self.inputs.is_reset(limit) != (self._state is AdapterState.RESET):
+                self._turn_reset(limit)
+                self._replan()
         return Reached(limit)
 
     def snapshot(self) -> dict[str, object]:
         """Return all that decides the future, as plain values."""
         return {
-            "adapter": (
-                self._state.value, self._reason, self._now, self._boot_at, self._next_sample,
-                self._retry_at, self._sip_deadline, self._settle_at, self._stops_left, self._stop_at, self._sonar_at,
-                self._enables_left, self._stalled, self._sips, self._heard_at, self._closed_in_peace,
-            ),
+            "adapter": (self._state.value, self._reason, self._now, self._next_sample),
+            "agenda": replace(self._agenda),
             "inputs": self.inputs.snapshot(),
             "belief": self._belief.snapshot(),
             "pacer": self._pacer.snapshot(),
@@ -166,12 +164,9 @@ class Adapter:
     def restore(self, snapshot: object) -> None:
         """Put back what `snapshot` returned."""
         parts = cast("dict[str, Any]", snapshot)
-        (
-            state, self._reason, self._now, self._boot_at, self._next_sample,
-            self._retry_at, self._sip_deadline, self._settle_at, self._stops_left, self._stop_at, self._sonar_at,
-            self._enables_left, self._stalled, self._sips, self._heard_at, self._closed_in_peace,
-        ) = parts["adapter"]  # fmt: skip
+        state, self._reason, self._now, self._next_sample = parts["adapter"]
         self._state = AdapterState(state)
+        self._agenda = replace(parts["agenda"])
         self.inputs.restore(parts["inputs"])
         self._belief.restore(parts["belief"])
         self._pacer.restore(parts["pacer"])
@@ -185,15 +180,19 @@ class Adapter:
 
     # Time ------------------------------------------------------------------------------------------------
 
-    def _run(self, limit: Nanos) -> None:
+    def _run(self, limit: Nanos) -> Nanos | None:
+        """Act on all that is due; return the last instant at which the pins were looked at, None for none."""
+        now = None
         while self._deadline <= limit:
             now = self._deadline
             if now < self._other and self.inputs.is_quiet(now):
-                self._next_sample = now + self.settings.sample_period_ns
+                self._now = now
+                self._next_sample = now + self._sample_period_ns
                 self._deadline = min(self._next_sample, self._other)
             else:
                 self._act(now)
                 self._replan()
+        return now
 
     def _act(self, now: Nanos) -> None:
         """Do all that is due at `now`, in the fixed order."""
@@ -201,10 +200,10 @@ class Adapter:
         if self.inputs.is_reset(now) != (self._state is AdapterState.RESET):
             self._turn_reset(now)
         if self._state is AdapterState.RESET:
-            self._next_sample = now + self.settings.sample_period_ns
+            self._next_sample = now + self._sample_period_ns
             return
         if self._state is AdapterState.BOOTING:
-            if now < self._boot_at:
+            if now < self._agenda.boot_at:
                 return
             self._boot(now)
         self._work(now)
@@ -215,27 +214,27 @@ class Adapter:
         self._take_session_events(now)
         if now >= self._next_sample:
             self._sample(now)
-            self._next_sample = now + self.settings.sample_period_ns
+            self._next_sample = now + self._sample_period_ns
         if self._state in OPEN_STATES:
             self._run_open(now)
-        if self._state in STOPPING_STATES and self._stops_left and now >= self._stop_at:
+        if self._state in STOPPING_STATES and self._agenda.stops_left and now >= self._agenda.stop_at:
             self._repeat_stop(now)
-        if self._state is AdapterState.CLOSING and now >= self._retry_at:
+        if self._state is AdapterState.CLOSING and now >= self._agenda.retry_at:
             self._enter(AdapterState.IDLE, now, "idle", "closed")
         if self._state is AdapterState.IDLE and self.inputs.wants_robot:
             self._begin_session(now, "p2dx_con is high")
-        if self._state is AdapterState.CONNECTING and now >= self._retry_at:
+        if self._state is AdapterState.CONNECTING and now >= self._agenda.retry_at:
             self._begin_session(now, "trying again")
 
     def _repeat_stop(self, now: Nanos) -> None:
         """Say the stop sequence again: nobody has confirmed it; a robot closed in peace shows it by its silence."""
-        self._stops_left -= 1
-        self._stop_at = now + self.settings.stop_repeat_ns
-        if not self._closed_in_peace or now - self._heard_at < _ECHO_NS:
+        self._agenda.stops_left -= 1
+        self._agenda.stop_at = now + self.settings.stop_repeat_ns
+        if not self._agenda.closed_in_peace or now - self._agenda.heard_at < _ECHO_NS:
             self.session.abandon(now)
 
     def _run_open(self, now: Nanos) -> None:
-        if now >= self._sip_deadline:
+        if now >= self._agenda.sip_deadline:
             self._lose(now, "lost", "no SIP in time")
             return
         if self._state is AdapterState.DRIVING and now >= self._belief.ends_at:
@@ -245,10 +244,10 @@ class Adapter:
         if expires_at is not None and now >= expires_at:
             self.distances.expire(now)
             self.outputs.show_distances(self.distances.levels, now)
-        if now >= self._sonar_at:
+        if now >= self._agenda.sonar_at:
             # No reading for as long as one lives: SONAR 1 was lost, or somebody switched them off.
             self.session.send(sonar(on=True), now)
-            self._sonar_at = now + self.settings.distance_stale_ns
+            self._agenda.sonar_at = now + self.settings.distance_stale_ns
         self._walk(now)
         if self._state is AdapterState.DRIVING and now >= self._pacer.due_at(now):
             self._send_pair(now)
@@ -257,34 +256,31 @@ class Adapter:
         """Find the next deadline; `_other` is the earliest that is no sample."""
         state = self._state
         if state is AdapterState.BOOTING:
-            self._other = self._deadline = self._boot_at
+            self._other = self._deadline = self._agenda.boot_at
             return
         if state is AdapterState.RESET:
-            self._other, self._deadline = _NEVER, self._next_sample
+            self._other, self._deadline = NEVER, self._next_sample
             return
         times = [self.session.next_deadline()]
         if state in OPEN_STATES:
-            times += [self._sip_deadline, self._sonar_at, self.distances.expires_at]
+            times += [self._agenda.sip_deadline, self._agenda.sonar_at, self.distances.expires_at]
             counts = self.encoders.counts
             times += [walk.due_at(target, self._now) for walk, target in zip(self._walks, counts, strict=True)]
         if state is AdapterState.DRIVING:
             times += [self._belief.ends_at, self._pacer.due_at(self._now)]
-        if state in STOPPING_STATES and self._stops_left:
-            times.append(self._stop_at)
+        if state in STOPPING_STATES and self._agenda.stops_left:
+            times.append(self._agenda.stop_at)
         if state in {AdapterState.CLOSING, AdapterState.CONNECTING}:
-            times.append(self._retry_at)
-        self._other = min((time for time in times if time is not None), default=_NEVER)
+            times.append(self._agenda.retry_at)
+        self._other = min((time for time in times if time is not None), default=NEVER)
         self._deadline = min(self._next_sample, self._other)
 
     # Transitions -----------------------------------------------------------------------------------------
 
     def _clear(self) -> None:
         """Forget everything, as a reset does."""
-        self._boot_at = self._next_sample = 0
-        self._retry_at = self._sip_deadline = self._settle_at = self._stop_at = self._sonar_at = _NEVER
-        self._stops_left = self._enables_left = self._sips = self._heard_at = 0
-        self._closed_in_peace = False
-        self._stalled = (False, False)
+        self._agenda = Agenda()
+        self._next_sample = self._now
         self.inputs.reset()
         self._belief.begin(self._now)
         self._pacer.begin(STILL)
@@ -299,12 +295,12 @@ class Adapter:
         """Follow the reset wire, which stands otherwise than the state says."""
         self._now = now
         if self._state is AdapterState.RESET:
-            self._boot_at = now + self.settings.boot_ns
+            self._agenda.boot_at = now + self.settings.boot_ns
             self._enter(AdapterState.BOOTING, now, "booting", "rst is low")
             return
         self._clear()
         self.outputs.release(now)
-        self._next_sample = now + self.settings.sample_period_ns
+        self._next_sample = now + self._sample_period_ns
         self._enter(AdapterState.RESET, now, "reset", "rst is high")
 
     def _boot(self, now: Nanos) -> None:
@@ -314,8 +310,8 @@ class Adapter:
         self._enter(AdapterState.IDLE, now, "booted", "waits for p2dx_con")
 
     def _begin_session(self, now: Nanos, why: str) -> None:
-        self._stops_left = 0
-        self._retry_at = _NEVER
+        self._agenda.stops_left = 0
+        self._agenda.retry_at = NEVER
         self.session.connect(now)
         self._enter(AdapterState.CONNECTING, now, "connecting", why)
 
@@ -328,7 +324,7 @@ class Adapter:
                     self._open(now, event.robot)
             elif self._state is AdapterState.CONNECTING:
                 self.session.drop(now)
-                self._retry_at = now + self.settings.retry_ns
+                self._agenda.retry_at = now + self.settings.retry_ns
                 self._tell(
                     now, "no connection", f"{event.reason}; tries again in {self.settings.retry_ns / NS_PER_S:.1f} s"
                 )
@@ -339,9 +335,9 @@ class Adapter:
         settings = self.settings
         self.session.send(set_origin(), now)
         self.session.send(sonar(on=True), now)
-        self._sip_deadline = now + settings.first_sip_ns
-        self._settle_at = now + settings.settle_ns
-        self._sonar_at = now + settings.distance_stale_ns
+        self._agenda.sip_deadline = now + settings.first_sip_ns
+        self._agenda.settle_at = now + settings.settle_ns
+        self._agenda.sonar_at = now + settings.distance_stale_ns
         self.distances.forget()
         if settings.encoder_at_open is EncoderAtOpen.ZERO:
             for walk in self._walks:
@@ -354,15 +350,15 @@ class Adapter:
     def _take_sip(self, sip: StandardSip, now: Nanos) -> None:
         if self._state not in OPEN_STATES:
             return
-        self._sips += 1
-        self._sip_deadline = now + self.settings.liveness_ns
+        self._agenda.sips += 1
+        self._agenda.sip_deadline = now + self.settings.liveness_ns
         for reading in sip.sonar:
             self.distances.take(reading.number, reading.raw_range * self.parameters.range_um_per_count, now)
         if sip.sonar:
-            self._sonar_at = now + self.settings.distance_stale_ns
+            self._agenda.sonar_at = now + self.settings.distance_stale_ns
             self.outputs.show_distances(self.distances.levels, now)
         if self._state is AdapterState.SETTLING:
-            if (sip.raw_x, sip.raw_y, sip.raw_heading) != (0, 0, 0) and now < self._settle_at:
+            if (sip.raw_x, sip.raw_y, sip.raw_heading) != (0, 0, 0) and now < self._agenda.settle_at:
                 return
             self._drive(now)
         if not self.encoders.take(sip.raw_x, sip.raw_y, sip.raw_heading * self._heading_scale):
@@ -375,33 +371,33 @@ class Adapter:
             stalled=any(stalled),
             now=now,
         )
-        if stalled != self._stalled:
-            self._stalled = stalled
+        if stalled != self._agenda.stalled:
+            self._agenda.stalled = stalled
             self._tell(now, "stall", f"left {int(stalled[0])}, right {int(stalled[1])}")
         self._walk(now)
 
     def _drive(self, now: Nanos) -> None:
-        self._enables_left = _ENABLES
+        self._agenda.enables_left = _ENABLES
         self._pacer.begin(self.mixer.mix(*self.inputs.motors))
         self._belief.begin(now)
         self._enter(AdapterState.DRIVING, now, "driving", "odometry is taken, motors enabled")
 
     def _lose(self, now: Nanos, what: str, why: str) -> None:
         self._halt(now)
-        self._closed_in_peace = False
+        self._agenda.closed_in_peace = False
         self._enter(AdapterState.LOST, now, what, f"{why}; stopped until p2dx_con is given anew")
 
     def _disconnect(self, now: Nanos) -> None:
         self._halt(now)
-        self._closed_in_peace = True
-        self._retry_at = now + self.settings.stop_repeat_ns
+        self._agenda.closed_in_peace = True
+        self._agenda.retry_at = now + self.settings.stop_repeat_ns
         self._enter(AdapterState.CLOSING, now, "disconnected", "p2dx_con is low")
 
     def _halt(self, now: Nanos) -> None:
         """Stop and close the robot, and show what is known: nothing."""
         self.session.abandon(now)
-        self._stops_left = self.settings.stop_repeats
-        self._stop_at = now + self.settings.stop_repeat_ns
+        self._agenda.stops_left = self.settings.stop_repeats
+        self._agenda.stop_at = now + self.settings.stop_repeat_ns
         self.distances.forget()
         self._pacer.begin(STILL)
         self.outputs.show_safe(now)
@@ -436,8 +432,8 @@ class Adapter:
 
     def _send_pair(self, now: Nanos) -> None:
         before, speeds = self._pacer.sent, self._pacer.take(now)
-        if self._enables_left:
-            self._enables_left -= 1
+        if self._agenda.enables_left:
+            self._agenda.enables_left -= 1
             self.session.send(enable(on=True), now)
         self.session.send(vel(speeds.forward_mm_s), now)
         self.session.send(rvel(speeds.turn_deg_s), now)

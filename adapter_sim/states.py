@@ -40,6 +40,7 @@ from dataclasses import dataclass
 from enum import StrEnum
 
 from adapter_sim.mixing import Speeds
+from p2os.timing import Nanos
 
 
 class AdapterState(StrEnum):
@@ -84,3 +85,36 @@ class AdapterStatus:
     #: SIPs taken and odometry jumps since the boot.
     sips: int
     odometry_jumps: int
+
+
+#: Later than any deadline.
+NEVER: Nanos = 1 << 62
+
+
+@dataclass(slots=True, kw_only=True)
+class Agenda:
+    """What the adapter has set out to do, and when; a reset wipes it."""
+
+    #: End of the boot.
+    boot_at: Nanos = NEVER
+    #: Next try to connect, or end of CLOSING.
+    retry_at: Nanos = NEVER
+    #: The session is lost unless a SIP comes before.
+    sip_deadline: Nanos = NEVER
+    #: From here on the odometry is taken as it is.
+    settle_at: Nanos = NEVER
+    #: SONAR 1 is said again unless a reading comes before.
+    sonar_at: Nanos = NEVER
+    #: Next repetition of the stop sequence, and how many are left.
+    stop_at: Nanos = NEVER
+    stops_left: int = 0
+    #: Whether the session ended on the wish of p2dx_con.
+    closed_in_peace: bool = False
+    #: When bytes of the robot came last.
+    heard_at: Nanos = 0
+    #: Pairs before which ENABLE 1 is still to be said.
+    enables_left: int = 0
+    #: Stall flags of the last SIP.
+    stalled: tuple[bool, bool] = (False, False)
+    #: SIPs taken.
+    sips: int = 0
