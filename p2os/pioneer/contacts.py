@@ -1,0 +1,36 @@
+"""Count collisions: one rule for every body.
+
+A collision is a new contact of the hull with anything but the floor; contacts
+that follow each other within 0.2 s are one.
+"""
+
+#: Steps of 1 ms without contact after which a contact is a new one (chosen: longer than a bounce).
+APART_STEPS = 200
+
+
+class ContactCounter:
+    """Turn a stream of touching/not touching into a count."""
+
+    __slots__ = ("_apart", "collisions", "touching")
+
+    def __init__(self) -> None:
+        self.collisions = 0
+        self.touching = False
+        self._apart = APART_STEPS
+
+    def update(self, touching: bool, steps: int = 1) -> None:
+        """Take what was seen over the last `steps` steps."""
+        if touching:
+            self.collisions += self._apart >= APART_STEPS
+            self._apart = 0
+        else:
+            self._apart = min(APART_STEPS, self._apart + steps)
+        self.touching = touching
+
+    def snapshot(self) -> tuple[int, bool, int]:
+        """Return all that decides the future."""
+        return self.collisions, self.touching, self._apart
+
+    def restore(self, snapshot: tuple[int, bool, int]) -> None:
+        """Put back what `snapshot` returned."""
+        self.collisions, self.touching, self._apart = snapshot

@@ -1,0 +1,192 @@
+"""The exact body: a plan view without mass, without any dependency.
+
+Within a step both rims keep their set-points and the path is the exact arc.
+Slopes are flat to it; walls and echoes are those at the height of the hull and
+of the sonar ring. A step that would bring the hull into a thing does not happen:
+the wheels stall until the set-points lead away.
+
+It serves as the oracle for the other bodies, and where PyBullet is not to be had.
+"""
+
+import math
+from collections.abc import Sequence
+
+from p2os.parameters import RobotParameters
+from p2os.pioneer.body import STEP_NS, BodyState
+from p2os.pioneer.contacts import ContactCounter
+from p2os.pioneer.geometry import Footprint
+from p2os.pioneer.plan import Plan
+from p2os.pioneer.scenery import Obstacle, Pose, World
+from p2os.pioneer.sonar import cones, reading
+from p2os.timing import NS_PER_S, Nanos
+
+#: Below this turn in one step the arc is a straight line to double precision, rad.
+STRAIGHT_RAD = 1e-9
+#: Farther than this nothing is measured exactly, m: it only bounds how soon the next look is due.
+LOOK_AHEAD_M = 2.0
+_DT_S = STEP_NS / NS_PER_S
+
+
+class KinematicBody:
+    """A differential drive on a plan."""
+
+    name = "kinematic"
+    dt_ns: Nanos = STEP_NS
+
+    def __init__(self, world: World, parameters: RobotParameters) -> None:
+        self._world = world
+        self._parameters = parameters
+        self._cones = cones(parameters)
+        self._track_m = parameters.track_mm / 1000
+        self._radius_m = parameters.body.wheel_diameter_m / 2
+        body = parameters.body
+        #: How far any point of the hull moves when the robot turns by 1 rad.
+        self._hull_reach = math.hypot(max(body.hull_front_m, body.hull_rear_m), body.hull_width_m / 2)
+        self.reset(world.start, 0)
+
+    @property
+    def note(self) -> str | None:
+        """Say that slopes are flat where the world has some."""
+        return "the kinematic body is a plan view: slopes are flat to it" if self._world.has_slopes else None
+
+    @property
+    def state(self) -> BodyState:
+        """The state after the last step."""
+        return BodyState(
+            x_m=self._x,
+            y_m=self._y,
+            heading_rad=math.remainder(self._heading, 2 * math.pi),
+            left_angle_rad=self._left_angle,
+            right_angle_rad=self._right_angle,
+            left_speed_mps=self._left,
+            right_speed_mps=self._right,
+            forward_mps=(self._left + self._right) / 2,
+            turn_radps=(self._right - self._left) / self._track_m,
+            stalled_left=self._stalled and self._asked[0] != 0.0,
+            stalled_right=self._stalled and self._asked[1] != 0.0,
+            collisions=self._contacts.collisions,
+            in_contact=self._contacts.touching,
+        )
+
+    def reset(self, pose: Pose, seed: int) -> BodyState:
+        """Stand still at a pose in the world as it was made; nothing here is random."""
+        del seed
+        self._plan = Plan(self._world.obstacles, self._parameters.body)
+        self._x, self._y, self._heading = pose.x_m, pose.y_m, pose.heading_rad
+        self._left_angle = self._right_angle = self._left = self._right = 0.0
+        self._asked = (0.0, 0.0)
+        self._stalled = False
+        self._contacts = ContactCounter()
+        self._changed()
+        return self.state
+
+    def step(self, left_mps: float, right_mps: float) -> BodyState:
+        """Move on by one step along the exact arc, or stall."""
+        self._asked = (left_mps, right_mps)
+        if left_mps == 0.0 and right_mps == 0.0:
+            self._left = self._right = 0.0
+            self._stalled = False
+            self._contacts.update(touching=self._free_m == 0.0)
+            return self.state
+        forward, turn = (left_mps + right_mps) / 2 * _DT_S, (right_mps - left_mps) / self._track_m * _DT_S
+        x, y, heading = self._moved(forward, turn)
+        blocked = self._is_blocked(x, y, heading, abs(forward) + abs(turn) * self._hull_reach)
+        self._stalled = blocked
+        self._contacts.update(touching=blocked or self._free_m == 0.0)
+        if blocked:
+            self._left = self._right = 0.0
+            return self.state
+        self._x, self._y, self._heading = x, y, heading
+        self._left, self._right = left_mps, right_mps
+        self._left_angle += left_mps * _DT_S / self._radius_m
+        self._right_angle += right_mps * _DT_S / self._radius_m
+        return self.state
+
+    def _moved(self, forward: float, turn: float) -> tuple[float, float, float]:
+        """Return the pose after an arc of this length and turn."""
+        heading = self._heading
+        if abs(turn) < STRAIGHT_RAD:
+            return self._x + forward * math.cos(heading), self._y + forward * math.sin(heading), heading + turn
+        radius, after = forward / turn, heading + turn
+        x = self._x + radius * (math.sin(after) - math.sin(heading))
+        y = self._y - radius * (math.cos(after) - math.cos(heading))
+        return x, y, after
+
+    def _is_blocked(self, x: float, y: float, heading: float, travel: float) -> bool:
+        """Tell whether the pose is inside a thing, and keep the bound on what is free around the hull.
+
+        A robot that is inside one already (because it was put there) may move.
+        """
+        if self._free_m > travel:
+            self._free_m -= travel
+            return False
+        free = self._plan.clearance(x, y, heading, no_more_than=LOOK_AHEAD_M)
+        if free == 0.0 and self._free_m > 0.0:
+            return True
+        self._free_m = free
+        return False
+
+    def _changed(self) -> None:
+        """Prepare for a plan that is another one now."""
+        height = self._parameters.sonar_height_m
+        self._echoing = [Footprint(item) for item in self._plan.obstacles if item.stands_in(height, height)]
+        #: No thing is nearer to the hull than this; 0 only where the hull is inside one.
+        self._free_m = self._plan.clearance(self._x, self._y, self._heading, no_more_than=LOOK_AHEAD_M)
+
+    def ranges(self, numbers: Sequence[int]) -> list[float]:
+        """Return the nearest echo of each cone, metres."""
+        return [self._range(number) for number in numbers]
+
+    def _range(self, number: int) -> float:
+        cone, c, s = self._cones[number], math.cos(self._heading), math.sin(self._heading)
+        x, y = self._x + cone.x_m * c - cone.y_m * s, self._y + cone.x_m * s + cone.y_m * c
+        longest = self._parameters.sonar_range_m
+        near = [thing for thing in self._echoing if math.hypot(thing.x - x, thing.y - y) - thing.reach < longest]
+        nearest = longest
+        for offset in cone.headings_rad:
+            dx, dy = math.cos(self._heading + offset), math.sin(self._heading + offset)
+            for thing in near:
+                nearest = min(nearest, thing.hit(x, y, dx, dy))
+        return reading(nearest, self._parameters)
+
+    def clearance(self) -> float:
+        """Return the distance from the hull to the nearest thing that it could touch, metres."""
+        return self._plan.clearance(self._x, self._y, self._heading)
+
+    def place(self, obstacle: Obstacle) -> None:
+        """Put an obstacle with a new name into the world."""
+        self._plan.place(obstacle)
+        self._changed()
+
+    def move(self, name: str, x_m: float, y_m: float, heading_rad: float) -> None:
+        """Put an obstacle somewhere else."""
+        self._plan.move(name, x_m, y_m, heading_rad)
+        self._changed()
+
+    def remove(self, name: str) -> None:
+        """Take an obstacle out of the world."""
+        self._plan.remove(name)
+        self._changed()
+
+    def snapshot(self) -> object:
+        """Return all that decides the future."""
+        return {
+            "pose": (self._x, self._y, self._heading),
+            "wheels": (self._left_angle, self._right_angle, self._left, self._right),
+            "asked": self._asked,
+            "stalled": self._stalled,
+            "free_m": self._free_m,
+            "contacts": self._contacts.snapshot(),
+            "obstacles": self._plan.obstacles,
+        }
+
+    def restore(self, snapshot: object) -> None:
+        """Put back what `snapshot` returned."""
+        assert isinstance(snapshot, dict)  # noqa: S101  # our own value
+        self._plan = Plan(snapshot["obstacles"], self._parameters.body)
+        self._x, self._y, self._heading = snapshot["pose"]
+        self._left_angle, self._right_angle, self._left, self._right = snapshot["wheels"]
+        self._asked, self._stalled = snapshot["asked"], snapshot["stalled"]
+        self._contacts.restore(snapshot["contacts"])
+        self._changed()
+        self._free_m = snapshot["free_m"]

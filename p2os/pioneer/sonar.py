@@ -1,0 +1,42 @@
+"""The sonar ring as rays: one geometry for every body.
+
+Each sonar is a fan of rays over the opening angle of the robot file, in the
+plane of the ring; the nearest echo of the fan is the reading. Not modelled here:
+specular loss, crosstalk, noise.
+"""
+
+import math
+from dataclasses import dataclass
+
+from p2os.parameters import RobotParameters
+
+#: Rays a cone, evenly over the opening angle, both edges included.
+RAYS_PER_CONE = 9
+
+
+@dataclass(frozen=True, slots=True)
+class Cone:
+    """One sonar: where it sits in the robot frame, and the headings of its rays."""
+
+    x_m: float
+    y_m: float
+    headings_rad: tuple[float, ...]
+
+
+def cones(parameters: RobotParameters) -> tuple[Cone, ...]:
+    """Return the cone of each fitted sonar, number 0 first."""
+    half = math.radians(parameters.sonar_cone_deg) / 2
+    fan = [half * (2 * ray / (RAYS_PER_CONE - 1) - 1) for ray in range(RAYS_PER_CONE)]
+    return tuple(
+        Cone(
+            pose.x_mm / 1000,
+            pose.y_mm / 1000,
+            tuple(math.radians(pose.heading_deg) + offset for offset in fan),
+        )
+        for pose in parameters.sonar[: parameters.sonar_fitted]
+    )
+
+
+def reading(nearest_m: float, parameters: RobotParameters) -> float:
+    """Return what a sonar says of its nearest echo: no less than its least range, no more than its longest."""
+    return min(max(nearest_m, parameters.sonar_min_range_m), parameters.sonar_range_m)
