@@ -89,6 +89,8 @@ class Pin:
         self.input = False
         #: Whether a change of `output` ends the CPU's slice.
         self.is_watched = False
+        #: Called at every change of `input`, in the order of subscription (GPIO's IDR, EXTI).
+        self.listeners: list[Callable[[Pin], None]] = []
         self._outside: bool | None = None
         self._mode = PinMode.FLOATING
         self._output_bit = False
@@ -251,7 +253,8 @@ class Pin:
         seen = self._input()
         if seen is not self.input:
             self.input = seen
-            self._bank.input_changed(self)
+            for listener in self.listeners:
+                listener(self)
 
     def _input(self) -> bool:
         return self.level and self._mode is not PinMode.ANALOG and self._holder is None
@@ -276,8 +279,6 @@ class PinBank:
         self._by_name = {pin.name: pin for pins in self._pins.values() for pin in pins}
         #: Called with (pin name, drive, time in ns) at every change of the chip's own drive.
         self.on_output: Callable[[str, PinDrive, int], None] | None = None
-        #: Called at every change of a digital input, in the order of subscription (GPIO's IDR, EXTI).
-        self.input_listeners: list[Callable[[Pin], None]] = []
         #: Called when AFIO has changed `remaps` or `exti_ports`.
         self.route_listeners: list[Callable[[], None]] = []
         #: AFIO_MAPR by function, such as {"USART1": 1}; a function that is missing is not remapped.
@@ -312,11 +313,6 @@ class PinBank:
             self.on_output(pin.name, pin.output, self._ports.now_ns)
         if pin.is_watched:
             self._ports.request_stop()
-
-    def input_changed(self, pin: Pin) -> None:
-        """Pass on a change of a pin's digital input (called by the pin)."""
-        for listener in self.input_listeners:
-            listener(pin)
 
     def snapshot(self) -> tuple[tuple[PinSnapshot, ...], tuple[tuple[str, int], ...], tuple[str, ...]]:
         """Return all that decides the pins' future, as plain values."""

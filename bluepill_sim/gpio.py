@@ -1,0 +1,144 @@
+"""GPIOA to GPIOE: port configuration, data registers, the lock.
+
+Modelled: all modes of CRL/CRH, pulls by ODR, open drain, atomic set/reset,
+the key sequence of LCKR. Not modelled: output speed, the two APB2 clocks of
+the input synchroniser. IDR is kept up to date by the pins, so that reading it is plain.
+
+Source: RM0008 sections 9.1 and 9.2.
+Invariant: bit n of the stored IDR is `pins[n].input`.
+"""
+
+from bluepill_sim.peripheral import Peripheral, Place
+from bluepill_sim.pins import Pin, PinMode
+from bluepill_sim.ports import ChipPorts
+from bluepill_sim.register import Register, bits
+
+CRL, CRH, IDR, ODR, BSRR, BRR, LCKR = range(7)
+
+_PORT = bits((15, 0))
+_LCKK = 1 << 16
+#: CNF = 01, MODE = 00 for each pin: floating input.
+_CR_RESET = 0x4444_4444
+#: CNF[1:0] MODE[1:0] of a pin after reset.
+_FLOATING_NIBBLE = 0x4
+#: LCKK of the three writes that begin the lock sequence; a read completes it (RM0008 9.2.7).
+_LOCK_WRITES = (_LCKK, 0, _LCKK)
+
+_INPUT_MODES = (PinMode.ANALOG, PinMode.FLOATING, PinMode.PULLED, PinMode.FLOATING)
+_OUTPUT_MODES = (PinMode.PUSH_PULL, PinMode.OPEN_DRAIN, PinMode.ALTERNATE_PUSH_PULL, PinMode.ALTERNATE_OPEN_DRAIN)
+#: Mode by CNF[1:0] MODE[1:0] (RM0008 table 20); CNF = 11, MODE = 00 is reserved and taken as floating.
+PIN_MODES = tuple((_OUTPUT_MODES if nibble & 3 else _INPUT_MODES)[nibble >> 2] for nibble in range(16))
+
+
+class Gpio(Peripheral):
+    """One general-purpose I/O port; the last letter of its name is the port's."""
+
+    STATE = ("_lock_step", "_lock_wanted", "_locked")
+    REGISTERS = (
+        Register(name="CRL", offset=0x00, reset=_CR_RESET, on_write="_write_crl"),
+        Register(name="CRH", offset=0x04, reset=_CR_RESET, on_write="_write_crh"),
+        Register(name="IDR", offset=0x08, readable=_PORT, writable=0),
+        Register(name="ODR", offset=0x0C, readable=_PORT, writable=_PORT, on_write="_write_odr"),
+        Register(name="BSRR", offset=0x10, readable=0, on_write="_write_bsrr"),
+        Register(name="BRR", offset=0x14, readable=0, writable=_PORT, on_write="_write_brr"),
+        Register(
+            name="LCKR", offset=0x18, readable=_LCKK | _PORT, writable=0, on_read="_read_lckr", on_write="_write_lckr"
+        ),
+    )
+
+    def __init__(self, chip: ChipPorts, place: Place) -> None:
+        super().__init__(chip, place)
+        self._pins = chip.pins.port(place.name[-1])
+        #: Writes of the lock sequence seen so far, and the pins that they named.
+        self._lock_step = 0
+        self._lock_wanted = 0
+        #: Pins whose configuration is frozen until reset.
+        self._locked = 0
+        for pin in self._pins:
+            pin.listeners.append(self._input_changed)
+            self._input_changed(pin)
+
+    def on_reset(self) -> None:
+        """Make every pin a floating input and undo the lock."""
+        self._lock_step = self._lock_wanted = self._locked = 0
+        for pin in self._pins:
+            pin.configure(PinMode.FLOATING, output_bit=False)
+            self._input_changed(pin)
+
+    def _input_changed(self, pin: Pin) -> None:
+        bit = 1 << pin.number
+        if pin.input:
+            self.words[IDR] |= bit
+        else:
+            self.words[IDR] &= ~bit
+
+    def _write_crl(self, _written: int, previous: int) -> None:
+        self._configure(CRL, 0, previous)
+
+    def _write_crh(self, _written: int, previous: int) -> None:
+        self._configure(CRH, 8, previous)
+
+    def _configure(self, register: int, first: int, previous: int) -> None:
+        """Bring the eight pins from `first` on into the modes that `register` now asks for."""
+        changed = self.words[register] ^ previous
+        for position in range(8):
+            nibble_mask = 0xF << (4 * position)
+            if not changed & nibble_mask:
+                continue
+            number = first + position
+            if self._locked >> number & 1:
+                self.words[register] ^= changed & nibble_mask
+                self.chip.warn(f"P{self.name[-1]}{number}: configured while locked: ignored", once=f"{self.name}:lock")
+                continue
+            nibble = self.words[register] >> (4 * position) & 0xF
+            pin = self._pins[number]
+            if pin.holder is not None and nibble != _FLOATING_NIBBLE:
+                self.chip.warn(
+                    f"{pin.name} belongs to {pin.holder}: its GPIO configuration has no effect until it is released",
+                    once=f"{pin.name}:held",
+                )
+            pin.configure(PIN_MODES[nibble], bool(self.words[ODR] >> number & 1))
+
+    def _write_odr(self, _written: int, previous: int) -> None:
+        self._output(self.words[ODR], previous)
+
+    def _write_bsrr(self, written: int, _previous: int) -> None:
+        previous = self.words[ODR]
+        # A set wins over a reset of the same bit (RM0008 9.2.5).
+        self._output(previous & ~(written >> 16) | written & _PORT, previous)
+
+    def _write_brr(self, written: int, _previous: int) -> None:
+        previous = self.words[ODR]
+        self._output(previous & ~(written & _PORT), previous)
+
+    def _output(self, bits_now: int, previous: int) -> None:
+        self.words[ODR] = bits_now
+        changed = bits_now ^ previous
+        while changed:
+            lowest = changed & -changed
+            changed ^= lowest
+            self._pins[lowest.bit_length() - 1].set_output_bit(bool(bits_now & lowest))
+
+    def _write_lckr(self, written: int, _previous: int) -> None:
+        if self._locked or self.words[LCKR] & _LCKK:
+            return
+        self.words[LCKR] = pins = written & _PORT
+        expected = _LOCK_WRITES[self._lock_step] if self._lock_step < len(_LOCK_WRITES) else None
+        goes_on = written & _LCKK == expected and (self._lock_step == 0 or pins == self._lock_wanted)
+        if goes_on:
+            self._lock_step += 1
+            self._lock_wanted = pins
+        elif written & _LCKK:
+            # Not the write that was due, but one that can begin a new sequence.
+            self._lock_step, self._lock_wanted = 1, pins
+        else:
+            self._lock_step = 0
+
+    def _read_lckr(self) -> int:
+        """Return LCKR; the read after the three writes reads LCKK as 0 and closes the lock."""
+        word = self.words[LCKR]
+        if self._lock_step == len(_LOCK_WRITES):
+            self._lock_step = 0
+            self._locked = self._lock_wanted
+            self.words[LCKR] |= _LCKK
+        return word

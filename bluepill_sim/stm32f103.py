@@ -1,0 +1,247 @@
+"""The STM32F103C8T6 on one page: memory map, peripherals, interrupts, clock gates, pins.
+
+Source: RM0008 sections 3.1 (memory map), 7.3 (enable registers) and 10.1.2
+(vector table), data sheet DS5319 tables 3 and 5 (LQFP48).
+Invariant: every modelled peripheral stands in `PERIPHERALS`; what is only
+named stands in `BASES`, so that a warning can say what was touched.
+"""
+
+from bisect import bisect_right
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import TypeAlias, cast
+
+from bluepill_sim.afio import Afio
+from bluepill_sim.exti import Exti
+from bluepill_sim.flash import Flash
+from bluepill_sim.gpio import Gpio
+from bluepill_sim.peripheral import ClockBit, Peripheral, PeripheralSnapshot, Place
+from bluepill_sim.pins import PinBank, PinPorts
+from bluepill_sim.ports import ChipPorts
+from bluepill_sim.rcc import Rcc, ResetCause
+from bluepill_sim.usart import Usart
+
+FLASH_BASE = 0x0800_0000
+#: The C8 is sold with 64 KiB and carries 128 KiB; programs that use the upper half run on most boards.
+FLASH_BYTES = 64 * 1024
+FLASH_BYTES_FITTED = 128 * 1024
+SRAM_BASE = 0x2000_0000
+SRAM_BYTES = 20 * 1024
+#: Boot loader ROM and option bytes.
+SYSTEM_MEMORY_BASE, SYSTEM_MEMORY_BYTES = 0x1FFF_F000, 2 * 1024
+OPTION_BYTES_BASE, OPTION_BYTES_BYTES = 0x1FFF_F800, 16
+#: Unique id (12 bytes) and flash size in KiB (2 bytes): in system memory, after the boot loader.
+FLASH_SIZE_REGISTER, UNIQUE_ID_REGISTER = 0x1FFF_F7E0, 0x1FFF_F7E8
+PERIPHERAL_BASE, PERIPHERAL_END = 0x4000_0000, 0x4002_3400
+#: Bit-band regions: (first aliased address, first alias, bytes aliased) (RM0008 3.3.2).
+BIT_BANDS = ((SRAM_BASE, 0x2200_0000, 0x10_0000), (PERIPHERAL_BASE, 0x4200_0000, 0x10_0000))
+#: Interrupt lines of a medium-density part: 0 to 42.
+IRQ_COUNT = 43
+#: Pins with a leg on LQFP48; PB2 is BOOT1, PD0/PD1 the crystal.
+BONDED_PINS = frozenset(
+    [f"PA{n}" for n in range(16)] + [f"PB{n}" for n in range(16)] + ["PC13", "PC14", "PC15", "PD0", "PD1"]
+)
+
+#: Name of each bit of the enable registers, which is also the bit of the reset registers.
+_GATES = {
+    "AHBENR": {0: "DMA1", 6: "CRC"},
+    "APB2ENR": {
+        0: "AFIO",
+        2: "GPIOA",
+        3: "GPIOB",
+        4: "GPIOC",
+        5: "GPIOD",
+        6: "GPIOE",
+        9: "ADC1",
+        10: "ADC2",
+        11: "TIM1",
+        12: "SPI1",
+        14: "USART1",
+    },
+    "APB1ENR": {
+        0: "TIM2",
+        1: "TIM3",
+        2: "TIM4",
+        11: "WWDG",
+        14: "SPI2",
+        17: "USART2",
+        18: "USART3",
+        21: "I2C1",
+        22: "I2C2",
+        23: "USB",
+        25: "CAN",
+        27: "BKP",
+        28: "PWR",
+    },
+}
+#: Enable bit by peripheral, modelled or not; who is missing is always clocked.
+CLOCK_GATES = {name: ClockBit(register, bit) for register, names in _GATES.items() for bit, name in names.items()}
+
+#: Base of every peripheral of the F103 family, for warnings by name (RM0008 table 3).
+BASES = {
+    "TIM2": 0x4000_0000,
+    "TIM3": 0x4000_0400,
+    "TIM4": 0x4000_0800,
+    "TIM5": 0x4000_0C00,
+    "TIM6": 0x4000_1000,
+    "TIM7": 0x4000_1400,
+    "TIM12": 0x4000_1800,
+    "TIM13": 0x4000_1C00,
+    "TIM14": 0x4000_2000,
+    "RTC": 0x4000_2800,
+    "WWDG": 0x4000_2C00,
+    "IWDG": 0x4000_3000,
+    "SPI2": 0x4000_3800,
+    "SPI3": 0x4000_3C00,
+    "USART2": 0x4000_4400,
+    "USART3": 0x4000_4800,
+    "UART4": 0x4000_4C00,
+    "UART5": 0x4000_5000,
+    "I2C1": 0x4000_5400,
+    "I2C2": 0x4000_5800,
+    "USB": 0x4000_5C00,
+    "USB/CAN SRAM": 0x4000_6000,
+    "CAN": 0x4000_6400,
+    "BKP": 0x4000_6C00,
+    "PWR": 0x4000_7000,
+    "DAC": 0x4000_7400,
+    "AFIO": 0x4001_0000,
+    "EXTI": 0x4001_0400,
+    "GPIOA": 0x4001_0800,
+    "GPIOB": 0x4001_0C00,
+    "GPIOC": 0x4001_1000,
+    "GPIOD": 0x4001_1400,
+    "GPIOE": 0x4001_1800,
+    "GPIOF": 0x4001_1C00,
+    "GPIOG": 0x4001_2000,
+    "ADC1": 0x4001_2400,
+    "ADC2": 0x4001_2800,
+    "TIM1": 0x4001_2C00,
+    "SPI1": 0x4001_3000,
+    "TIM8": 0x4001_3400,
+    "USART1": 0x4001_3800,
+    "ADC3": 0x4001_3C00,
+    "TIM9": 0x4001_4C00,
+    "TIM10": 0x4001_5000,
+    "TIM11": 0x4001_5400,
+    "SDIO": 0x4001_8000,
+    "DMA1": 0x4002_0000,
+    "DMA2": 0x4002_0400,
+    "RCC": 0x4002_1000,
+    "FLASH": 0x4002_2000,
+    "CRC": 0x4002_3000,
+    "ETH": 0x4002_8000,
+    "USB OTG": 0x5000_0000,
+    "FSMC": 0xA000_0000,
+    "DBGMCU": 0xE004_2000,
+}
+_NAMES = sorted((base, name) for name, base in BASES.items())
+#: The blocks that are larger than 1 KiB.
+_LARGE_BYTES = {"ETH": 0x2000, "USB OTG": 0x4_0000, "FSMC": 0x1000}
+
+_Maker: TypeAlias = Callable[[ChipPorts, Place], Peripheral]
+
+
+def _make_rcc(chip: ChipPorts, place: Place) -> Rcc:
+    return Rcc(chip, place, gates=CLOCK_GATES)
+
+
+#: The modelled peripherals, in the order in which they are made, reset and advanced: class, name, IRQs.
+PERIPHERALS: tuple[tuple[_Maker, str, tuple[int, ...]], ...] = (
+    (_make_rcc, "RCC", (5,)),
+    (Flash, "FLASH", (4,)),
+    (Afio, "AFIO", ()),
+    (Gpio, "GPIOA", ()),
+    (Gpio, "GPIOB", ()),
+    (Gpio, "GPIOC", ()),
+    (Gpio, "GPIOD", ()),
+    (Gpio, "GPIOE", ()),
+    (Exti, "EXTI", (6, 7, 8, 9, 10, 23, 40, 1, 41, 42)),
+    (Usart, "USART1", (37,)),
+    (Usart, "USART2", (38,)),
+    (Usart, "USART3", (39,)),
+)
+
+
+@dataclass(frozen=True, slots=True)
+class ChipParts:
+    """The peripherals of one chip."""
+
+    #: All of them by name, in the order of `PERIPHERALS`.
+    by_name: dict[str, Peripheral]
+
+    @property
+    def rcc(self) -> Rcc:
+        """Reset and clock control."""
+        return cast("Rcc", self.by_name["RCC"])
+
+    @property
+    def flash(self) -> Flash:
+        """Flash memory interface."""
+        return cast("Flash", self.by_name["FLASH"])
+
+    @property
+    def exti(self) -> Exti:
+        """External interrupt/event controller."""
+        return cast("Exti", self.by_name["EXTI"])
+
+    def usart(self, number: int) -> Usart:
+        """USART 1, 2 or 3."""
+        return cast("Usart", self.by_name[f"USART{number}"])
+
+    def reset(self, cause: ResetCause) -> None:
+        """Reset every peripheral."""
+        for part in self.by_name.values():
+            if part is not self.rcc:
+                part.reset()
+        self.rcc.reset(cause)
+
+    def clock_changed(self) -> None:
+        """Tell every peripheral that the frequencies have changed."""
+        for part in self.by_name.values():
+            part.clock_changed()
+
+    def next_deadline(self) -> int | None:
+        """Return when the first of them next acts by itself, in ns, or None for never."""
+        return min((part.due_ns for part in self.by_name.values() if part.due_ns is not None), default=None)
+
+    def advance_to(self, now_ns: int) -> None:
+        """Act on everything due up to and including `now_ns`, in order of time, then of `PERIPHERALS`."""
+        while True:
+            due_ns = self.next_deadline()
+            if due_ns is None or due_ns > now_ns:
+                return
+            for part in self.by_name.values():
+                if part.due_ns == due_ns:
+                    part.advance_to(due_ns)
+
+    def snapshot(self) -> dict[str, PeripheralSnapshot]:
+        """Return all that decides their future, as plain values."""
+        return {name: part.snapshot() for name, part in self.by_name.items()}
+
+    def restore(self, snapshot: dict[str, PeripheralSnapshot]) -> None:
+        """Put back what `snapshot` returned; tells nobody."""
+        for name, part in self.by_name.items():
+            part.restore(snapshot[name])
+
+
+def make_pins(chip: PinPorts) -> PinBank:
+    """Return the pins of the chip in its 48-pin package."""
+    return PinBank(chip, BONDED_PINS)
+
+
+def make_parts(chip: ChipPorts) -> ChipParts:
+    """Return the peripherals of one chip, in their state after power-on; `chip.pins` and `chip.clocks` come first."""
+    by_name: dict[str, Peripheral] = {}
+    for make, name, irqs in PERIPHERALS:
+        by_name[name] = make(chip, Place(name=name, base=BASES[name], clock=CLOCK_GATES.get(name), irqs=irqs))
+    return ChipParts(by_name)
+
+
+def name_at(address: int) -> str | None:
+    """Return which peripheral of the family an address belongs to, modelled or not; None: of none."""
+    index = bisect_right(_NAMES, (address, "\U0010ffff")) - 1
+    if index < 0:
+        return None
+    base, name = _NAMES[index]
+    return name if address - base < _LARGE_BYTES.get(name, 0x400) else None
