@@ -57,7 +57,7 @@ class Body(Protocol):
         """Live one step with these rim-speed set-points."""
         ...
 
-    def ranges(self, sonar_numbers: Sequence[int]) -> Sequence[float]:
+    def ranges(self, numbers: Sequence[int]) -> Sequence[float]:
         """Return the range that each sonar hears now, in metres; the longest range where there is no echo."""
         ...
 

@@ -1,0 +1,137 @@
+"""A body without physics and a robot on it, for the tests of the controller and its host."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, replace
+
+import pytest
+
+from p2os.commands import Command, CommandNumber
+from p2os.parameters import RobotParameters, load_parameters
+from p2os.pioneer.controller import ControllerSettings, Pioneer
+from p2os.profiles import Profile
+from p2os.sip import SIP_KINDS, StandardSip
+from p2os.timing import NS_PER_MS
+from p2os.wire import Decoder, Frame
+
+
+@dataclass(frozen=True)
+class WheelAngles:
+    left_angle_rad: float = 0.0
+    right_angle_rad: float = 0.0
+    left_speed_mps: float = 0.0
+    right_speed_mps: float = 0.0
+    stalled_left: bool = False
+    stalled_right: bool = False
+
+
+@dataclass
+class PerfectBody:
+    """Wheels that do what they are told, and sonar that read what the test says."""
+
+    dt_ns: int = NS_PER_MS
+    radius_m: float = 0.0825
+    state: WheelAngles = field(default_factory=WheelAngles)
+    range_m: dict[int, float] = field(default_factory=dict)
+    steps: int = 0
+    asked: list[tuple[int, ...]] = field(default_factory=list)
+
+    def step(self, left_mps: float, right_mps: float) -> WheelAngles:
+        self.steps += 1
+        turn = self.dt_ns / 1e9 / self.radius_m
+        self.state = replace(
+            self.state, left_angle_rad=self.state.left_angle_rad + left_mps * turn,
+            right_angle_rad=self.state.right_angle_rad + right_mps * turn,
+            left_speed_mps=left_mps, right_speed_mps=right_mps,
+        )  # fmt: skip
+        return self.state
+
+    def stall(self, *, left: bool, right: bool) -> None:
+        self.state = replace(self.state, stalled_left=left, stalled_right=right)
+
+    def ranges(self, numbers: Sequence[int]) -> list[float]:
+        self.asked.append(tuple(numbers))
+        return [self.range_m.get(number, 5.0) for number in numbers]
+
+    def snapshot(self) -> object:
+        return self.state, self.steps, dict(self.range_m)
+
+    def restore(self, snapshot: object) -> None:
+        self.state, self.steps, self.range_m = snapshot  # type: ignore[misc]
+
+
+class Robot:
+    """A virtual robot and a client that speaks in frames."""
+
+    def __init__(self, parameters: RobotParameters, settings: ControllerSettings) -> None:
+        self.body = PerfectBody()
+        self.events: list[tuple[int, str, str]] = []
+        self.pioneer = Pioneer(
+            parameters=parameters, body=self.body, settings=settings,
+            on_event=lambda now, what, detail: self.events.append((now, what, detail)),
+        )  # fmt: skip
+        self.now = 0
+        self._decoder = Decoder()
+
+    def say(self, number: int, argument: int | bytes | None = None) -> None:
+        self.send(Command(number, argument).to_frame().to_bytes())
+
+    def send(self, data: bytes) -> None:
+        self.pioneer.receive(data, self.now)
+
+    def run(self, milliseconds: float) -> None:
+        self.now += round(milliseconds * NS_PER_MS)
+        self.pioneer.advance_to(self.now)
+
+    def frames(self) -> list[Frame]:
+        """Return what the robot has said since the last call; every byte must be a frame."""
+        frames = []
+        for data in self.pioneer.take_output():
+            self._decoder.receive(data, self.now)
+            while (item := self._decoder.next_item()) is not None:
+                assert isinstance(item, Frame)
+                frames.append(item)
+        return frames
+
+    def sips(self) -> list[StandardSip]:
+        profile = self.pioneer.settings.profile
+        return [StandardSip.from_frame(frame, profile) for frame in self.frames() if frame.kind in SIP_KINDS]
+
+    def sip(self) -> StandardSip:
+        """Run to the next packet and return it."""
+        self.frames()
+        due = self.pioneer.next_deadline()
+        assert due is not None
+        self.now = due
+        self.pioneer.advance_to(due)
+        (packet,) = self.sips()
+        return packet
+
+    def open(self, *, motors: bool = True) -> "Robot":
+        for number in (0, 1, 2):
+            self.say(number)
+        self.say(CommandNumber.OPEN)
+        if motors:
+            self.say(CommandNumber.ENABLE, 1)
+        self.frames()
+        return self
+
+    def told(self) -> list[str]:
+        return [what for _, what, _ in self.events]
+
+
+@pytest.fixture
+def make_robot() -> Callable[..., Robot]:
+    def make(*, model: str = "p2dx", parameters: RobotParameters | None = None, **settings: object) -> Robot:
+        return Robot(parameters or load_parameters(model), ControllerSettings(**settings))  # type: ignore[arg-type]
+
+    return make
+
+
+@pytest.fixture
+def robot(make_robot: Callable[..., Robot]) -> Robot:
+    return make_robot()
+
+
+@pytest.fixture(params=list(Profile), ids=lambda profile: profile.value)
+def profile(request: pytest.FixtureRequest) -> Profile:
+    return request.param
