@@ -2,10 +2,11 @@
 
 Theory of operation. The leader (the emulated BluePill) runs to the earliest
 deadline of the others. It may stop short at an edge on a watched net, and late
-by one basic block. Then the followers are brought, in their fixed order, to
-every deadline that the leader has passed, one after the other, and to the
-moment of every watched edge: nets keep their history, so that a follower at
-time t reads the levels of t.
+by one basic block. Then every deadline that the leader has passed is acted on,
+in order of time: those who are due are brought there, in their fixed order. At
+the moment of an edge on a watched net all are. Nets keep their history, so that
+a follower at time t reads the levels of t. A follower that needs another one
+brought up to date first (the recorder, the body) says so itself.
 
 Followers are never brought to the border of a slice: the slice limit only says
 how often the leader gives control back (for pacing, progress and Ctrl-C). So
@@ -107,7 +108,8 @@ class RunLoop:
 
     def finish(self, end: Nanos) -> None:
         """Bring the followers to `end` itself, so that their state is that of the end of the run."""
-        self._follow(min(end, max(self.leader.now_ns, self.now)))
+        for follower in self.followers:
+            follower.advance_to(min(end, max(self.leader.now_ns, self.now)))
 
     def snapshot(self) -> dict[str, object]:
         """Return the loop's own state; the parts are saved by whoever built them."""
@@ -134,10 +136,13 @@ class RunLoop:
             late = [type(part).__name__ for part in self.followers if (part.next_deadline() or NEVER) <= due]
             raise StuckError(f"time stands still at {due} ns: {', '.join(late)} stay due")
         self.now = max(self.now, due)
+        has_edge = bool(self._edges) and self._edges[0] <= due
         while self._edges and self._edges[0] <= due:
             self._edges.pop(0)
         for follower in self.followers:
-            follower.advance_to(self.now)
+            deadline = follower.next_deadline()
+            if has_edge or (deadline is not None and deadline <= due):
+                follower.advance_to(self.now)
 
 
 def _is_halt(reached: object) -> bool:

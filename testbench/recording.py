@@ -51,10 +51,14 @@ class Recorder:
         sample_ns: Nanos = SAMPLE_NS,
     ) -> None:
         self.trace = trace
+        #: Brings the body to an instant before it is looked at; whoever owns the body sets it.
+        self.bring_to: Callable[[Nanos], None] = lambda _at: None
         self.min_clearance_m: float | None = None
         self.distance_m = 0.0
         #: The state at the last sample; None before the first.
         self.last_state: BodyState | None = None
+        #: What the firmware printed last.
+        self.last_line = ""
         self._harness = harness
         self._body = body
         self._sample_ns = sample_ns
@@ -110,6 +114,7 @@ class Recorder:
     def advance_to(self, limit: Nanos) -> Reached:
         """Sample the pose where due, and write what nobody can precede any more."""
         if self._next_sample <= limit:
+            self.bring_to(limit)
             self._sample(limit)
             self._next_sample = limit + self._sample_ns - limit % self._sample_ns
             self._pass(limit - 1)
@@ -154,6 +159,7 @@ class Recorder:
 
     def _tell_text(self, at: Nanos | None = None) -> None:
         self.trace.add("usart", self._text_at if at is None else at, {"hex": self._text.hex()})
+        self.last_line = self._text.decode("utf-8", "replace").strip()
         self._text = b""
 
     def _sample(self, at: Nanos) -> None:

@@ -70,9 +70,9 @@ class Net:
         self.idle = idle
         self._drives: dict[str, list[tuple[Nanos, Drive]]] = {}
         self._watchers: list[Watcher] = []
-        #: The level after every drive known so far, and the time of the last of them.
+        #: The time of the last drive known so far, and the level after it.
         self._last_level = idle
-        self._last_edge: Nanos = 0
+        self.last_edge: Nanos = 0
         #: Level and fighting owners at the end of what `edges_until` has returned.
         self._told_until: Nanos = -1
         self._told_level = idle
@@ -96,8 +96,8 @@ class Net:
             if last_at == now:
                 history.pop()
         history.append((now, new))
-        self._last_edge = max(self._last_edge, now)
-        self._last_level = self._resolve(self._last_edge)
+        self.last_edge = max(self.last_edge, now)
+        self._last_level = self._resolve(self.last_edge)
         for watcher in self._watchers:
             watcher(self, owner, now)
 
@@ -107,11 +107,12 @@ class Net:
 
     def level(self, at: Nanos) -> bool:
         """Return the level at the instant `at`, an edge at `at` included."""
-        return self._last_level if at >= self._last_edge else self._resolve(at)
+        return self._last_level if at >= self.last_edge else self._resolve(at)
 
-    def level_without(self, owner: str, at: Nanos) -> bool | None:
-        """Return what everybody but `owner` puts on the wire; None where nobody holds it."""
-        return _resolved([_at(history, at) for name, history in self._drives.items() if name != owner])
+    def level_without(self, owner: str, at: Nanos) -> tuple[bool | None, bool]:
+        """Return what everybody but `owner` puts on the wire, None where nobody holds it, and whether it is hard."""
+        others = [_at(history, at) for name, history in self._drives.items() if name != owner]
+        return _resolved(others), any(map(_is_hard, others))
 
     def drive_of(self, owner: str, at: Nanos) -> Drive:
         """Return what `owner` does to the wire at the instant `at`."""
@@ -173,8 +174,8 @@ class Net:
         }
         self._told_until, self._told_level, self._told_fight = cast("tuple[int, bool, tuple[str, ...]]", snapshot["told"])
         self._contentions = [Contention(at, self.name, owners) for at, owners in contentions]
-        self._last_edge = max((history[-1][0] for history in self._drives.values() if history), default=0)
-        self._last_level = self._resolve(self._last_edge)
+        self.last_edge = max((history[-1][0] for history in self._drives.values() if history), default=0)
+        self._last_level = self._resolve(self.last_edge)
 
     def _resolve(self, at: Nanos) -> bool:
         level = _resolved([_at(history, at) for history in self._drives.values()])

@@ -1,0 +1,220 @@
+"""The composition root: builds the chip, the wires, the robot and the loop for a scenario.
+
+    mode A, direct     chip ─ nets ─ motors, encoders, sensors ─ body
+    mode B, adapter    chip ─ nets ─ adapter ─ lines at 9600 8N1 ─ controller ─ body
+
+Mode C (a real or remote robot) is built by `testbench.remote`, on the same
+parts. The order of the followers is fixed: who drives pins first, the script
+second, the recorder last.
+
+Invariant: a bench that was restored from a snapshot goes on as the one that the
+snapshot was taken of.
+"""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Protocol, cast
+
+from adapter_sim.adapter import Adapter
+from adapter_sim.pinout import Pinout, Pull, Role, load_pinout
+from bluepill_sim.board import BluePill
+from p2os.errors import P2osError
+from p2os.pioneer.body import RobotBody, make_body
+from p2os.pioneer.controller import Pioneer
+from p2os.pioneer.world import World
+from p2os.pioneer.world_file import load_world
+from p2os.timing import Nanos, Reached
+from testbench.chip_pins import ChipPins
+from testbench.direct import DirectRobot, DistanceSensors, JointMotor, WheelEncoder
+from testbench.loop import DEFAULT_SLICE_NS, Follower, Leader, RunLoop
+from testbench.recording import Recorder
+from testbench.scenario import Scenario
+from testbench.script import Script
+from testbench.seats import Seat
+from testbench.serial_line import SerialLine
+from testbench.sip_ranges import SipRanges
+from testbench.trace import TraceWriter
+from testbench.wires import Harness, Net, OwnedPins, Strength
+
+#: Owner of the resistors on the wires.
+RESISTORS = "board"
+
+
+class Saved(Protocol):
+    """A part that can be saved."""
+
+    def snapshot(self) -> object:
+        """Return all that decides this part's future."""
+        ...
+
+    def restore(self, snapshot: object) -> None:
+        """Put back what `snapshot` returned."""
+        ...
+
+
+class RobotSide(Follower, Saved, Protocol):
+    """What stands at the far end of the wires and owns the body."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class BenchParts:
+    """The parts of a bench, for those who want to look at one."""
+
+    chip: BluePill
+    harness: Harness
+    body: RobotBody
+    world: World
+    adapter: Adapter | None = None
+    pioneer: Pioneer | None = None
+
+
+class Bench:
+    """A run in virtual time.
+
+    Args:
+        scenario: What to run.
+        trace: Where the recording goes; None records in memory.
+        slice_ns: How often the loop gives control back; without effect on the result.
+        on_slice: Called after each slice with the time reached; may raise to end the run.
+    """
+
+    def __init__(
+        self,
+        scenario: Scenario,
+        *,
+        trace: TraceWriter | None = None,
+        slice_ns: Nanos = DEFAULT_SLICE_NS,
+        on_slice: Callable[[Nanos], None] | None = None,
+    ) -> None:
+        self.scenario = scenario
+        self.trace = trace or TraceWriter()
+        pinout = load_pinout()
+        world = load_world(scenario.world, seed=scenario.seed)
+        body = make_body(scenario.body, world, scenario.parameters)
+        body.reset(scenario.start or world.start, scenario.seed)
+        chip = BluePill(scenario.firmware)
+        harness = make_harness(pinout)
+        self.recorder = Recorder(self.trace, harness, body=body)
+        self._robots: list[RobotSide] = []
+        self._ranges: SipRanges | None = None
+        self.parts = self._build(pinout, world, body, chip, harness)
+        self.script = Script(
+            scenario.changes, body, scenario.parameters,
+            bring_to=self._bring_robot_to, on_change=self.recorder.obstacle,
+        )  # fmt: skip
+        self.recorder.bring_to = self._bring_robot_to
+        self.loop = RunLoop(
+            cast("Leader", chip), (*self._robots, self.script, self.recorder), slice_ns=slice_ns, on_slice=on_slice
+        )
+        pins = ChipPins(chip, harness, {wire.name: wire.bluepill for wire in pinout.wires}, on_watched=self.loop.note_edge)
+        for wire in pinout.with_role(Role.RESET):
+            pins.watch(wire.name)
+        chip.usart1.on_transmit = lambda byte, at: self.recorder.usart(bytes([byte]), at)
+        chip.on_warning = lambda text: self.recorder.event("chip", chip.now_ns, "warning", text)
+        self.recorder.start()
+
+    @property
+    def now(self) -> Nanos:
+        """Return the time that the chip has come to."""
+        return self.parts.chip.now_ns
+
+    def run_until(self, end: Nanos) -> None:
+        """Run to `end`, or until the firmware stands still for good (`loop.is_halted`)."""
+        self.loop.run_until(end)
+
+    def finish(self) -> Nanos:
+        """Bring everything to the end of the run and write the rest of the trace; return the end's time."""
+        end = min(self.now, self.scenario.duration_ns)
+        self.loop.finish(end)
+        self.recorder.finish(end)
+        return end
+
+    def snapshot(self) -> dict[str, object]:
+        """Return all that decides the rest of the run, as a value that can be pickled."""
+        return {
+            "chip": self.parts.chip.snapshot(),
+            "harness": self.parts.harness.snapshot(),
+            "robots": [robot.snapshot() for robot in self._robots],
+            "ranges": None if self._ranges is None else self._ranges.snapshot(),
+            "script": self.script.snapshot(),
+            "recorder": self.recorder.snapshot(),
+            "loop": self.loop.snapshot(),
+        }
+
+    def restore(self, snapshot: Mapping[str, object]) -> None:
+        """Put back what `snapshot` returned; the scenario must be the same."""
+        self.parts.chip.restore(snapshot["chip"])
+        self.parts.harness.restore(cast("Mapping[str, Mapping[str, object]]", snapshot["harness"]))
+        for robot, state in zip(self._robots, cast("Sequence[object]", snapshot["robots"]), strict=True):
+            robot.restore(state)
+        if self._ranges is not None:
+            self._ranges.restore(cast("Sequence[float]", snapshot["ranges"]))
+        self.script.restore(snapshot["script"])
+        self.recorder.restore(snapshot["recorder"])
+        self.loop.restore(cast("Mapping[str, object]", snapshot["loop"]))
+
+    def _bring_robot_to(self, at: Nanos) -> None:
+        for robot in self._robots:
+            robot.advance_to(at)
+
+    def _build(self, pinout: Pinout, world: World, body: RobotBody, chip: BluePill, harness: Harness) -> BenchParts:
+        if self.scenario.mode == "direct":
+            self._robots.append(self._direct_robot(pinout, body, harness))
+            return BenchParts(chip=chip, harness=harness, body=body, world=world)
+        adapter, pioneer = self._adapter_and_pioneer(pinout, body, harness)
+        return BenchParts(chip=chip, harness=harness, body=body, world=world, adapter=adapter, pioneer=pioneer)
+
+    def _direct_robot(self, pinout: Pinout, body: RobotBody, harness: Harness) -> DirectRobot:
+        settings = self.scenario.direct
+
+        def nets(value: str) -> list[Net]:
+            return [harness[name] for name in pinout.value(value).wires]
+
+        def motor(value: str) -> JointMotor:
+            return JointMotor(
+                nets(value), step_um_per_s=settings.step_um_per_s, ramp_um_per_s2=settings.ramp_um_per_s2,
+                dt_ns=body.dt_ns, bit_order=settings.bit_order,
+            )  # fmt: skip
+
+        wires = pinout.with_role(Role.DISTANCE)
+        sensors = DistanceSensors(
+            [harness[wire.name] for wire in wires],
+            threshold_um=self.scenario.threshold_um, period_ns=settings.sensor_period_ns,
+        )  # fmt: skip
+        sensors.on_sample = self.recorder.sonar
+        return DirectRobot(
+            body, left=motor("motor1"), right=motor("motor2"),
+            encoders=(WheelEncoder(nets("encoder1")), WheelEncoder(nets("encoder2"))),
+            sensors=sensors, sonar_numbers=range(len(wires)), encoder_period_ns=settings.encoder_period_ns,
+        )  # fmt: skip
+
+    def _adapter_and_pioneer(self, pinout: Pinout, body: RobotBody, harness: Harness) -> tuple[Adapter, Pioneer]:
+        recorder, parameters = self.recorder, self.scenario.parameters
+        to_robot, to_client = SerialLine(), SerialLine()
+        adapter = Adapter(
+            pins=OwnedPins(harness, "adapter"), pinout=pinout, parameters=parameters, settings=self.scenario.adapter
+        )
+        adapter.on_event = recorder.listener("adapter")
+        pioneer = Pioneer(parameters=parameters, body=body, settings=self.scenario.controller)
+        pioneer.on_event = recorder.listener("pioneer")
+        ranges = self._ranges = SipRanges(parameters, pioneer.profile, on_ranges=recorder.sonar)
+
+        def arrives_at_client(data: bytes, at: Nanos) -> None:
+            recorder.wire("r2c", data, at)
+            ranges.take(data, at)
+
+        self._robots.append(Seat(adapter, incoming=to_client, outgoing=to_robot, on_arrival=arrives_at_client))
+        self._robots.append(
+            Seat(pioneer, incoming=to_robot, outgoing=to_client, on_arrival=lambda data, at: recorder.wire("c2r", data, at))
+        )
+        return adapter, pioneer
+
+
+def make_harness(pinout: Pinout) -> Harness:
+    """Return the wires of a pin-out, with the resistors that hang on them."""
+    harness = Harness(Net(wire.name, idle=wire.idle) for wire in pinout.wires)
+    for wire in pinout.wires:
+        if wire.pull is not Pull.NONE:
+            harness[wire.name].drive(RESISTORS, wire.pull is Pull.UP, Strength.PULL, 0)
+    return harness

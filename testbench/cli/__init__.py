@@ -1,0 +1,1 @@
+"""The bench's verbs of `p2os`: thin skins on functions that scripts can call."""

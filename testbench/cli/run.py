@@ -1,0 +1,127 @@
+"""`p2os run`: one firmware, one scenario, one run folder with its report."""
+
+import json
+from pathlib import Path
+from typing import Annotated
+
+import typer
+from typer.core import TyperCommand
+
+from p2os.errors import UsageError
+from testbench.cli.folders import next_folder
+from testbench.cli.progress import RunDisplay
+from testbench.cli.table import print_result
+from testbench.run import RunResult, run_scenario
+from testbench.scenario import load_scenario
+
+EXIT_INTERRUPTED = 130
+
+HELP = """Run a scenario: the firmware boots on an emulated BluePill and its pins drive a robot.
+
+SCENARIO is one of those that ship (motors, sensors, encoders, dodge) or a TOML
+file. What the options leave open is as the scenario says. The run folder holds
+the trace, the pins as VCD and for PulseView, and report.html.
+
+Exit code: 0 all goals were met, 1 one was missed or the run failed, 2 wrong
+usage or file, 130 interrupted (the run folder is complete up to there).
+
+\b
+Examples:
+  p2os run dodge                                    120 s among obstacles, through adapter and P2OS
+  p2os run dodge --mode direct --body kinematic     pins straight to the body, plan view
+  p2os run motors --firmware build/mine.elf         your program, judged by that scenario
+  p2os run dodge --world arena --seed 7 --json      one JSON object for a script
+  p2os run dodge --realtime                         at the speed of the clock
+  p2os run dodge --port serial:/dev/ttyUSB0         drive a real Pioneer; asks first
+"""
+
+
+class RealtimeCommand(TyperCommand):
+    """Lets `--realtime` stand without its number, which then is 1."""
+
+    def parse_args(self, ctx: typer.Context, args: list[str]) -> list[str]:  # type: ignore[override] # typer's own class
+        """Insert the number where it is missing."""
+        filled = []
+        for place, word in enumerate(args):
+            filled.append(word)
+            following = args[place + 1] if place + 1 < len(args) else ""
+            if word == "--realtime" and not _is_number(following):
+                filled.append("1")
+        return super().parse_args(ctx, filled)
+
+
+def register(app: typer.Typer) -> None:
+    """Add the verb."""
+    app.command("run", help=HELP, cls=RealtimeCommand)(run)
+
+
+def run(
+    scenario: Annotated[str, typer.Argument(help="Name or TOML file.", metavar="SCENARIO")],
+    firmware: Annotated[Path | None, typer.Option(help="ELF, HEX or BIN in place of the scenario's.")] = None,
+    mode: Annotated[str | None, typer.Option(help="direct or adapter.")] = None,
+    port: Annotated[str | None, typer.Option(help="Drive the robot at this URL, in real time.", metavar="URL")] = None,
+    body: Annotated[str | None, typer.Option(help="kinematic or bullet.")] = None,
+    world: Annotated[str | None, typer.Option(help="World, or a TOML file.")] = None,
+    seed: Annotated[int | None, typer.Option(help="Seed of everything random.", min=0)] = None,
+    duration: Annotated[float | None, typer.Option(help="Seconds of virtual time.", metavar="S")] = None,
+    realtime: Annotated[
+        float | None, typer.Option(help="Keep pace with the clock, SPEED times as fast.", metavar="[SPEED]")
+    ] = None,
+    out: Annotated[Path | None, typer.Option(help="Run folder; default runs/SCENARIO-NNN.", metavar="DIR")] = None,
+    json_output: Annotated[bool, typer.Option("--json", help="Print one JSON object.")] = False,
+    yes: Annotated[bool, typer.Option("--yes", help="With --port: do not ask before the first motion.")] = False,
+    max_speed: Annotated[
+        int | None, typer.Option(help="With --port: cap of the forward speed, mm/s.", metavar="MM_S", min=1)
+    ] = None,
+) -> None:
+    """Run a scenario."""
+    if realtime is not None and realtime <= 0:
+        raise UsageError(f"--realtime {realtime:g} cannot be", hint="a speed is above 0; 1 is real time")
+    wanted = load_scenario(scenario)
+    if port is not None:
+        refuse_beside_port(mode=mode, body=body, world=world, seed=seed, realtime=realtime)
+    elif yes or max_speed is not None:
+        raise UsageError(f"{'--yes' if yes else '--max-speed'} goes with --port only")
+    wanted = wanted.with_options(
+        firmware=firmware, mode=mode, body=body, world=world, seed=seed, duration_s=duration
+    )  # fmt: skip
+    folder = out or next_folder(wanted.name)
+    with RunDisplay() as display:
+        result = run_scenario(wanted, folder, speed=realtime, on_progress=display.update)
+    end_with(result, json_output=json_output)
+
+
+def end_with(result: RunResult, *, json_output: bool) -> None:
+    """Print a result and end the command with its exit code."""
+    if json_output:
+        typer.echo(json.dumps(result.outcome, sort_keys=True))
+    else:
+        print_result(result)
+    if result.was_interrupted:
+        raise typer.Exit(EXIT_INTERRUPTED)
+    if not result.passed:
+        raise typer.Exit(1)
+
+
+def refuse_beside_port(**options: object) -> None:
+    """Refuse what has no meaning when the robot is real.
+
+    Raises:
+        UsageError: One of the options is given (`mode` only where it is not adapter).
+    """
+    if options.get("mode") == "adapter":
+        options.pop("mode")
+    for name, value in options.items():
+        if value is not None:
+            raise UsageError(
+                f"--{name} cannot stand beside --port: the robot at the port has its own",
+                hint="leave one of the two out",
+            )
+
+
+def _is_number(word: str) -> bool:
+    try:
+        float(word)
+    except ValueError:
+        return False
+    return True

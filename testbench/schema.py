@@ -1,0 +1,131 @@
+"""Checks a TOML table against a list of keys, and says in one line what is wrong.
+
+A message names the file, the place in it and the key; an unknown key comes with
+the nearest key that exists. Units stand in the key (`threshold_m`), so a value
+is a bare number: `"60 cm"` is refused with the unit that is wanted.
+"""
+
+import difflib
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+from p2os.errors import ScenarioError
+
+#: A parsed TOML table.
+Table = Mapping[str, object]
+
+Kind = Literal["text", "number", "whole", "flag", "table", "tables", "list"]
+
+_MEANING = {
+    "text": "a text in quotes",
+    "number": "a number",
+    "whole": "a whole number",
+    "flag": "true or false",
+    "table": "a table",
+    "tables": "an array of tables",
+    "list": "a list",
+}
+
+_UNITS = {
+    "_m": "metres", "_mm": "millimetres", "_mm_s": "mm/s", "_mm_s2": "mm/s²", "_deg": "degrees", "_deg_s": "deg/s",
+    "_s": "seconds", "_ms": "milliseconds",
+}  # fmt: skip
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Key:
+    """One key that a table may have.
+
+    `least` and `most` are inclusive; `above` is not.
+    """
+
+    name: str
+    kind: Kind
+    required: bool = False
+    least: float | None = None
+    above: float | None = None
+    most: float | None = None
+    choices: tuple[str, ...] = ()
+
+
+def check_table(table: Table, keys: Sequence[Key], where: str) -> None:
+    """Check a table.
+
+    Args:
+        table: What was read.
+        keys: What may stand in it.
+        where: File and place, for the message: `dodge.toml: [direct]`.
+
+    Raises:
+        ScenarioError: A key is unknown, missing or has a value of the wrong kind or range.
+    """
+    known = {key.name: key for key in keys}
+    for name in table:
+        if name not in known:
+            raise ScenarioError(f"{where}: unknown key {name!r}", hint=nearest(name, known))
+    for key in keys:
+        if key.name in table:
+            _check_value(table[key.name], key, where)
+        elif key.required:
+            raise ScenarioError(f"{where}: key {key.name!r} is missing", hint=_wanted(key))
+
+
+def nearest(word: str, known: Mapping[str, object] | Sequence[str]) -> str:
+    """Return a hint: the nearest of the known words, or all of them."""
+    close = difflib.get_close_matches(word, list(known), n=1, cutoff=0.5)
+    return f"did you mean {close[0]!r}?" if close else f"known are {', '.join(sorted(known))}"
+
+
+def _check_value(value: object, key: Key, where: str) -> None:
+    if not _fits(value, key):
+        raise ScenarioError(f"{where}: {key.name} = {_shown(value)} is not {_wanted(key)}", hint=_hint(value, key))
+    if key.choices and value not in key.choices:
+        hint = nearest(str(value), key.choices)
+        raise ScenarioError(f"{where}: {key.name} = {_shown(value)} is none of {', '.join(key.choices)}", hint=hint)
+    if isinstance(value, (int, float)) and not isinstance(value, bool):
+        low = key.least is not None and value < key.least or key.above is not None and value <= key.above
+        if low or key.most is not None and value > key.most or value != value:  # noqa: PLR0124 - not a number
+            raise ScenarioError(f"{where}: {key.name} = {value} is out of range", hint=f"it is {_wanted(key)}")
+
+
+def _fits(value: object, key: Key) -> bool:
+    if key.kind == "text":
+        return isinstance(value, str)
+    if key.kind == "flag":
+        return isinstance(value, bool)
+    if key.kind == "table":
+        return isinstance(value, Mapping)
+    if key.kind == "list":
+        return isinstance(value, list)
+    if key.kind == "tables":
+        return isinstance(value, list) and all(isinstance(item, Mapping) for item in value)
+    if isinstance(value, bool):
+        return False
+    return isinstance(value, int) or key.kind == "number" and isinstance(value, float)
+
+
+def _wanted(key: Key) -> str:
+    meaning = _MEANING[key.kind]
+    unit = max((suffix for suffix in _UNITS if key.name.endswith(suffix)), key=len, default="")
+    if unit and key.kind in {"number", "whole"}:
+        meaning += f" of {_UNITS[unit]}"
+    if key.above is not None:
+        meaning += f" above {key.above:g}"
+    if key.least is not None:
+        meaning += f", at least {key.least:g}"
+    if key.most is not None:
+        meaning += f", at most {key.most:g}"
+    if key.choices:
+        meaning = "one of " + ", ".join(key.choices)
+    return meaning
+
+
+def _hint(value: object, key: Key) -> str | None:
+    if isinstance(value, str) and key.kind in {"number", "whole"}:
+        return "the unit stands in the key; write the bare number"
+    return None
+
+
+def _shown(value: object) -> str:
+    return f'"{value}"' if isinstance(value, str) else str(value)

@@ -1,0 +1,142 @@
+"""The `[[obstacle]]` tables of a scenario file: timed changes of the world.
+
+    [[obstacle]]                       [[obstacle]]
+    at_s = 10.0                        at_s = 4.0
+    op = "place"                       name = "post"
+    name = "crate"                     shape = "cylinder"
+    shape = "box"                      radius_m = 0.02
+    x_m = 1.0                          height_m = 0.5
+    y_m = 0.5                          before_sonar = 3
+    length_m = 0.4                     distance_m = 0.45
+    width_m = 0.3                      hold_s = 1.0
+    height_m = 0.5
+
+With `before_sonar` the place is relative to the robot; with `hold_s` the thing
+is kept there for so long and then taken away.
+"""
+
+import math
+from typing import cast
+
+from p2os.errors import ScenarioError
+from p2os.parameters import RobotParameters
+from p2os.pioneer.world import Obstacle
+from p2os.timing import NS_PER_S, Nanos
+from testbench.schema import Key, Table, check_table
+from testbench.script import FOLLOW_NS, BeforeSonar, Change, Op
+
+_KEYS = (
+    Key(name="at_s", kind="number", required=True, least=0),
+    Key(name="op", kind="text", choices=tuple(op.value for op in Op)),
+    Key(name="name", kind="text", required=True),
+    Key(name="shape", kind="text", choices=("box", "cylinder")),
+    Key(name="x_m", kind="number"),
+    Key(name="y_m", kind="number"),
+    Key(name="heading_deg", kind="number"),
+    Key(name="length_m", kind="number", above=0),
+    Key(name="width_m", kind="number", above=0),
+    Key(name="height_m", kind="number", above=0),
+    Key(name="radius_m", kind="number", above=0),
+    Key(name="before_sonar", kind="whole", least=1),
+    Key(name="distance_m", kind="number", above=0),
+    Key(name="hold_s", kind="number", above=0),
+)
+_SIZES = {"box": ("length_m", "width_m", "height_m"), "cylinder": ("radius_m", "height_m")}
+
+
+def load_changes(tables: list[Table], parameters: RobotParameters, where: str) -> tuple[Change, ...]:
+    """Return the changes that a scenario's `[[obstacle]]` tables ask for, in order of time.
+
+    Raises:
+        ScenarioError: A table breaks the schema, or asks for what cannot be.
+    """
+    changes: list[Change] = []
+    for number, table in enumerate(tables, start=1):
+        place = f"{where}: [[obstacle]] {number}"
+        check_table(table, _KEYS, place)
+        changes += _changes(table, parameters, place)
+    changes.sort(key=lambda change: change.at)
+    _check_names(changes, where)
+    return tuple(changes)
+
+
+def _changes(table: Table, parameters: RobotParameters, where: str) -> list[Change]:
+    at = _nanos(table, "at_s")
+    op = Op(str(table.get("op", "place")))
+    name = str(table["name"])
+    before = _before(table, parameters, where)
+    if op is Op.REMOVE:
+        return [Change(at=at, op=op, name=name)]
+    if before is None:
+        _need(table, ("x_m", "y_m"), where)
+    x_m, y_m = _number(table, "x_m"), _number(table, "y_m")
+    heading_rad = math.radians(_number(table, "heading_deg"))
+    first = Change(
+        at=at,
+        op=op,
+        name=name,
+        x_m=x_m,
+        y_m=y_m,
+        heading_rad=heading_rad,
+        obstacle=_obstacle(table, where) if op is Op.PLACE else None,
+        before=before,
+    )
+    if "hold_s" not in table:
+        return [first]
+    if before is None or op is not Op.PLACE:
+        raise ScenarioError(f"{where}: hold_s without before_sonar", hint="only a thing placed before a sonar is held")
+    end = at + _nanos(table, "hold_s")
+    moves = [
+        Change(at=moment, op=Op.MOVE, name=name, before=before) for moment in range(at + FOLLOW_NS, end, FOLLOW_NS)
+    ]
+    return [first, *moves, Change(at=end, op=Op.REMOVE, name=name)]
+
+
+def _before(table: Table, parameters: RobotParameters, where: str) -> BeforeSonar | None:
+    if "before_sonar" not in table:
+        return None
+    number = cast("int", table["before_sonar"])
+    if number > parameters.sonar_fitted:
+        raise ScenarioError(f"{where}: before_sonar = {number}, the robot has {parameters.sonar_fitted}")
+    _need(table, ("distance_m",), where)
+    return BeforeSonar(number=number, distance_m=_number(table, "distance_m"))
+
+
+def _obstacle(table: Table, where: str) -> Obstacle:
+    shape = str(table.get("shape", "box"))
+    sizes = _SIZES[shape]
+    _need(table, sizes, where)
+    strange = next((key for key in ("length_m", "width_m", "radius_m") if key in table and key not in sizes), None)
+    if strange is not None:
+        raise ScenarioError(f"{where}: a {shape} has no {strange}", hint=f"it has {', '.join(sizes)}")
+    return Obstacle(name=str(table["name"]), x_m=0.0, y_m=0.0, **{key: _number(table, key) for key in sizes})
+
+
+def _check_names(changes: list[Change], where: str) -> None:
+    """Refuse a thing that is placed twice, or moved while it is not there."""
+    placed: set[str] = set()
+    for change in changes:
+        if change.op is Op.PLACE and change.name in placed:
+            raise ScenarioError(f"{where}: {change.name!r} is placed at {_at(change)} while it is there")
+        if change.op is Op.PLACE:
+            placed.add(change.name)
+        elif change.op is Op.REMOVE:
+            placed.discard(change.name)
+
+
+def _need(table: Table, keys: tuple[str, ...], where: str) -> None:
+    for key in keys:
+        if key not in table:
+            raise ScenarioError(f"{where}: key {key!r} is missing", hint=f"it needs {', '.join(keys)}")
+
+
+def _number(table: Table, key: str) -> float:
+    return float(cast("float", table.get(key, 0.0)))
+
+
+def _nanos(table: Table, key: str) -> Nanos:
+    return round(_number(table, key) * NS_PER_S)
+
+
+def _at(change: Change) -> str:
+    return f"{change.at / NS_PER_S:g} s"
