@@ -220,7 +220,8 @@ static void note_ground(struct dodge *dodge, int32_t way)
 {
     if (dodge->state != DODGE_CRUISE) {
         dodge->straight_ticks = 0;
-    } else if (++dodge->straight_ticks <= STRAIGHT_TICKS) {
+    } else if (dodge->straight_ticks <= STRAIGHT_TICKS) {
+        dodge->straight_ticks++;
         dodge->ground_way = way;
     }
 }
