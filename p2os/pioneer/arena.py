@@ -26,7 +26,7 @@ TRIES = 400
 
 def arena(seed: int, start: Pose) -> list[Obstacle]:
     """Return the walls and things of the arena with this seed."""
-    chance = random.Random(seed)  # noqa: S311  # repeatable on purpose
+    chance = random.Random(seed)
     while True:
         things = _layout(chance, start)
         if len(things) >= LEAST_OBSTACLES:

@@ -85,7 +85,7 @@ class RobotBody(Protocol):
         ...
 
     def clearance(self) -> float:
-        """Return the plan-view distance from the hull to the nearest thing that could touch it, metres; 0 in contact."""
+        """Return the plan-view distance from the hull to the nearest thing it could touch, metres; 0 in contact."""
         ...
 
     def place(self, obstacle: Obstacle) -> None:

@@ -77,6 +77,8 @@ class KinematicBody:
         self._asked = (0.0, 0.0)
         self._stalled = False
         self._contacts = ContactCounter()
+        #: No thing is nearer to the hull than this; 0 only where the hull is inside one.
+        self._free_m = 0.0
         self._changed()
         return self.state
 
@@ -130,7 +132,6 @@ class KinematicBody:
         """Prepare for a plan that is another one now."""
         height = self._parameters.sonar_height_m
         self._echoing = [Footprint(item) for item in self._plan.obstacles if item.stands_in(height, height)]
-        #: No thing is nearer to the hull than this; 0 only where the hull is inside one.
         self._free_m = self._plan.clearance(self._x, self._y, self._heading, no_more_than=LOOK_AHEAD_M)
 
     def ranges(self, numbers: Sequence[int]) -> list[float]:

@@ -66,7 +66,9 @@ class Plan:
         """Return the distance from the hull at a pose to the nearest thing that it could touch.
 
         Args:
-            x_m, y_m, heading_rad: Where the middle of the axle is.
+            x_m: Where the middle of the axle is.
+            y_m: The same.
+            heading_rad: Where it looks.
             no_more_than: Things farther than this need not be measured; the answer is then at most this.
         """
         hull = placed(self._hull, x_m, y_m, heading_rad)

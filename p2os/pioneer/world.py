@@ -86,8 +86,7 @@ def parse_world(text: str, source: str, seed: int = 0) -> World:
         rows = table.get(section, [])
         if not isinstance(rows, list) or not all(isinstance(row, dict) for row in rows):
             raise WorldError(f"{source}: {section} must be written as [[{section}]]")
-        for row in rows:
-            obstacles.append(read_obstacle(source, section, row, keys))
+        obstacles += [read_obstacle(source, section, row, keys) for row in rows]
     if "arena" in table:
         obstacles += arena(seed, start)
     extent = _numbers(source, "extent_m", table.get("extent_m"), 4)

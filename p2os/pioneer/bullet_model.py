@@ -1,0 +1,133 @@
+"""Robot, floors and obstacles as PyBullet bodies, made from parameters and plans.
+
+Shapes are made by calls, not from a URDF file: nothing is written to disk and
+nothing is cached. Collision groups keep wheels off walls (see `bullet`).
+"""
+
+import math
+
+import pybullet
+
+from p2os.parameters import RobotParameters
+from p2os.pioneer.scenery import Kind, Obstacle, Pose, World
+
+#: Links of the robot.
+LEFT, RIGHT, CASTER = 0, 1, 2
+OBSTACLE_GROUP, FLOOR_GROUP, WHEEL_GROUP, HULL_GROUP = 16, 2, 4, 8
+#: The group that Bullet gives its rays.
+RAY_GROUP = 1
+FLOOR_THICKNESS_M = 0.5
+#: The floor reaches farther than the world's extent by this.
+FLOOR_MARGIN_M = 1.0
+#: Coulomb friction of rubber on a hard floor (chosen); Bullet multiplies both sides.
+WHEEL_FRICTION, FLOOR_FRICTION = 0.8, 1.0
+#: Of the hull against a wall (chosen).
+HULL_FRICTION, OBSTACLE_FRICTION = 0.3, 1.0
+CASTER_MASS_KG = 0.2
+
+Vector = tuple[float, float, float]
+LEVEL = (0.0, 0.0, 0.0, 1.0)
+
+
+def add_floor(world: World, client: int) -> int:
+    """Make the level floor under a world, its top at height 0; return its number."""
+    x0, y0, x1, y1 = world.extent
+    half = ((x1 - x0) / 2 + FLOOR_MARGIN_M, (y1 - y0) / 2 + FLOOR_MARGIN_M, FLOOR_THICKNESS_M / 2)
+    place = ((x0 + x1) / 2, (y0 + y1) / 2, -FLOOR_THICKNESS_M / 2)
+    return _static_box(half, place, LEVEL, FLOOR_GROUP, client)
+
+
+def add_obstacle(item: Obstacle, client: int) -> int:
+    """Make an obstacle, a raised floor or a ramp; return its number."""
+    group = FLOOR_GROUP if item.kind.is_driven_on else OBSTACLE_GROUP
+    if item.kind is Kind.RAMP:
+        return _ramp(item, client)
+    place = (item.x_m, item.y_m, item.base_m + item.height_m / 2)
+    turn = pybullet.getQuaternionFromEuler((0.0, 0.0, item.heading_rad))
+    if not item.is_cylinder:
+        return _static_box((item.length_m / 2, item.width_m / 2, item.height_m / 2), place, turn, group, client)
+    shape = pybullet.createCollisionShape(
+        pybullet.GEOM_CYLINDER, radius=item.radius_m, height=item.height_m, physicsClientId=client
+    )
+    return _static(shape, place, turn, group, client)
+
+
+def _ramp(item: Obstacle, client: int) -> int:
+    """Make a box whose upper face rises from one end of the footprint to the other."""
+    slope = math.atan2(item.height_m, item.length_m)
+    half = (math.hypot(item.length_m, item.height_m) / 2, item.width_m / 2, FLOOR_THICKNESS_M / 2)
+    # From the middle of the upper face down along its normal.
+    back, down = math.sin(slope) * FLOOR_THICKNESS_M / 2, math.cos(slope) * FLOOR_THICKNESS_M / 2
+    place = (
+        item.x_m + back * math.cos(item.heading_rad),
+        item.y_m + back * math.sin(item.heading_rad),
+        item.base_m + item.height_m / 2 - down,
+    )
+    turn = pybullet.getQuaternionFromEuler((0.0, -slope, item.heading_rad))
+    return _static_box(half, place, turn, FLOOR_GROUP, client)
+
+
+def _static_box(half: Vector, place: Vector, turn: tuple[float, ...], group: int, client: int) -> int:
+    shape = pybullet.createCollisionShape(pybullet.GEOM_BOX, halfExtents=half, physicsClientId=client)
+    return _static(shape, place, turn, group, client)
+
+
+def _static(shape: int, place: Vector, turn: tuple[float, ...], group: int, client: int) -> int:
+    number = pybullet.createMultiBody(
+        baseMass=0, baseCollisionShapeIndex=shape, basePosition=place, baseOrientation=turn, physicsClientId=client
+    )
+    friction = FLOOR_FRICTION if group == FLOOR_GROUP else OBSTACLE_FRICTION
+    pybullet.changeDynamics(number, -1, lateralFriction=friction, physicsClientId=client)
+    pybullet.setCollisionFilterGroupMask(number, -1, group, RAY_GROUP | WHEEL_GROUP | HULL_GROUP, physicsClientId=client)
+    return int(number)
+
+
+def add_robot(parameters: RobotParameters, pose: Pose, client: int) -> tuple[int, Vector]:
+    """Make the robot at a pose; return its number and its centre of mass in the robot frame.
+
+    The base's frame is the hull's centre, so that the engine's poses need one
+    known offset and no inertial frame.
+    """
+    body = parameters.body
+    radius, track = body.wheel_diameter_m / 2, parameters.track_mm / 1000
+    length, width = body.hull_front_m + body.hull_rear_m, body.hull_width_m
+    height = body.hull_height_m - body.ground_clearance_m
+    centre = ((body.hull_front_m - body.hull_rear_m) / 2, 0.0, body.ground_clearance_m + height / 2)
+    hull = pybullet.createCollisionShape(
+        pybullet.GEOM_BOX, halfExtents=(length / 2, width / 2, height / 2), physicsClientId=client
+    )
+    wheel = pybullet.createCollisionShape(pybullet.GEOM_SPHERE, radius=radius, physicsClientId=client)
+    caster = pybullet.createCollisionShape(pybullet.GEOM_SPHERE, radius=body.caster_radius_m, physicsClientId=client)
+    places = [
+        (-centre[0], track / 2, radius - centre[2]),
+        (-centre[0], -track / 2, radius - centre[2]),
+        (body.caster_x_m - centre[0], 0.0, body.caster_radius_m - centre[2]),
+    ]
+    c, s = math.cos(pose.heading_rad), math.sin(pose.heading_rad)
+    robot = pybullet.createMultiBody(
+        baseMass=body.mass_kg - 2 * body.wheel_mass_kg - CASTER_MASS_KG,
+        baseCollisionShapeIndex=hull,
+        basePosition=(pose.x_m + centre[0] * c, pose.y_m + centre[0] * s, pose.z_m + centre[2]),
+        baseOrientation=pybullet.getQuaternionFromEuler((0.0, 0.0, pose.heading_rad)),
+        linkMasses=[body.wheel_mass_kg, body.wheel_mass_kg, CASTER_MASS_KG],
+        linkCollisionShapeIndices=[wheel, wheel, caster],
+        linkVisualShapeIndices=[-1, -1, -1],
+        linkPositions=places,
+        linkOrientations=[LEVEL] * 3,
+        linkInertialFramePositions=[(0.0, 0.0, 0.0)] * 3,
+        linkInertialFrameOrientations=[LEVEL] * 3,
+        linkParentIndices=[0, 0, 0],
+        linkJointTypes=[pybullet.JOINT_REVOLUTE, pybullet.JOINT_REVOLUTE, pybullet.JOINT_FIXED],
+        linkJointAxis=[(0.0, 1.0, 0.0)] * 3,
+        physicsClientId=client,
+    )
+    frictions = {-1: HULL_FRICTION, LEFT: WHEEL_FRICTION, RIGHT: WHEEL_FRICTION, CASTER: 0.0}
+    for link, friction in frictions.items():
+        pybullet.changeDynamics(
+            robot, link, lateralFriction=friction, linearDamping=0.0, angularDamping=0.0, jointDamping=0.0,
+            physicsClientId=client,
+        )  # fmt: skip
+        group = HULL_GROUP if link < 0 else WHEEL_GROUP
+        mask = OBSTACLE_GROUP | FLOOR_GROUP if link < 0 else FLOOR_GROUP
+        pybullet.setCollisionFilterGroupMask(robot, link, group, mask, physicsClientId=client)
+    return int(robot), centre
