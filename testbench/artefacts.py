@@ -1,12 +1,12 @@
 """Makes everything in a run folder that is not the trace itself, from the trace.
 
-    trace.jsonl    the single source, written while the run goes on
-    summary.json   figures and verdict
-    pins.vcd       all wires, exact to the nanosecond
-    pins.sr        all wires, sampled, for PulseView
-    wire.jsonl     P2OS bytes, one message a line
-    usart.txt      what the firmware printed
-    report.html    the report, and PNG plots beside it
+trace.jsonl    the single source, written while the run goes on
+summary.json   figures and verdict
+pins.vcd       all wires, exact to the nanosecond
+pins.sr        all wires, sampled, for PulseView
+wire.jsonl     P2OS bytes, one message a line
+usart.txt      what the firmware printed
+report.html    the report, and PNG plots beside it
 """
 
 import json

@@ -16,18 +16,18 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Protocol, cast
 
+
 from adapter_sim.adapter import Adapter
 from adapter_sim.pinout import Pinout, Pull, Role, load_pinout
-from bluepill_sim.board import BluePill
-from p2os.errors import P2osError
 from p2os.pioneer.body import RobotBody, make_body
 from p2os.pioneer.controller import Pioneer
-from p2os.pioneer.world import World
-from p2os.pioneer.world_file import load_world
-from p2os.timing import Nanos, Reached
+from p2os.pioneer.scenery import World
+from p2os.pioneer.world import load_world
+from p2os.timing import Nanos
 from testbench.chip_pins import ChipPins
 from testbench.direct import DirectRobot, DistanceSensors, JointMotor, WheelEncoder
-from testbench.loop import DEFAULT_SLICE_NS, Follower, Leader, RunLoop
+from testbench.loop import DEFAULT_SLICE_NS, Follower, RunLoop
+from testbench.ports import Chip
 from testbench.recording import Recorder
 from testbench.scenario import Scenario
 from testbench.script import Script
@@ -61,7 +61,7 @@ class RobotSide(Follower, Saved, Protocol):
 class BenchParts:
     """The parts of a bench, for those who want to look at one."""
 
-    chip: BluePill
+    chip: Chip
     harness: Harness
     body: RobotBody
     world: World
@@ -75,6 +75,7 @@ class Bench:
     Args:
         scenario: What to run.
         trace: Where the recording goes; None records in memory.
+        chip: Runs the firmware; None boots the scenario's on an emulated BluePill.
         slice_ns: How often the loop gives control back; without effect on the result.
         on_slice: Called after each slice with the time reached; may raise to end the run.
     """
@@ -84,6 +85,7 @@ class Bench:
         scenario: Scenario,
         *,
         trace: TraceWriter | None = None,
+        chip: Chip | None = None,
         slice_ns: Nanos = DEFAULT_SLICE_NS,
         on_slice: Callable[[Nanos], None] | None = None,
     ) -> None:
@@ -93,7 +95,7 @@ class Bench:
         world = load_world(scenario.world, seed=scenario.seed)
         body = make_body(scenario.body, world, scenario.parameters)
         body.reset(scenario.start or world.start, scenario.seed)
-        chip = BluePill(scenario.firmware)
+        chip = chip or boot(scenario.firmware)
         harness = make_harness(pinout)
         self.recorder = Recorder(self.trace, harness, body=body)
         self._robots: list[RobotSide] = []
@@ -104,10 +106,10 @@ class Bench:
             bring_to=self._bring_robot_to, on_change=self.recorder.obstacle,
         )  # fmt: skip
         self.recorder.bring_to = self._bring_robot_to
-        self.loop = RunLoop(
-            cast("Leader", chip), (*self._robots, self.script, self.recorder), slice_ns=slice_ns, on_slice=on_slice
+        self.loop = RunLoop(chip, (*self._robots, self.script, self.recorder), slice_ns=slice_ns, on_slice=on_slice)
+        pins = ChipPins(
+            chip, harness, {wire.name: wire.bluepill for wire in pinout.wires}, on_watched=self.loop.note_edge
         )
-        pins = ChipPins(chip, harness, {wire.name: wire.bluepill for wire in pinout.wires}, on_watched=self.loop.note_edge)
         for wire in pinout.with_role(Role.RESET):
             pins.watch(wire.name)
         chip.usart1.on_transmit = lambda byte, at: self.recorder.usart(bytes([byte]), at)
@@ -158,7 +160,7 @@ class Bench:
         for robot in self._robots:
             robot.advance_to(at)
 
-    def _build(self, pinout: Pinout, world: World, body: RobotBody, chip: BluePill, harness: Harness) -> BenchParts:
+    def _build(self, pinout: Pinout, world: World, body: RobotBody, chip: Chip, harness: Harness) -> BenchParts:
         if self.scenario.mode == "direct":
             self._robots.append(self._direct_robot(pinout, body, harness))
             return BenchParts(chip=chip, harness=harness, body=body, world=world)
@@ -198,7 +200,7 @@ class Bench:
         adapter.on_event = recorder.listener("adapter")
         pioneer = Pioneer(parameters=parameters, body=body, settings=self.scenario.controller)
         pioneer.on_event = recorder.listener("pioneer")
-        ranges = self._ranges = SipRanges(parameters, pioneer.profile, on_ranges=recorder.sonar)
+        ranges = self._ranges = SipRanges(parameters, pioneer.settings.profile, on_ranges=recorder.sonar)
 
         def arrives_at_client(data: bytes, at: Nanos) -> None:
             recorder.wire("r2c", data, at)
@@ -206,9 +208,25 @@ class Bench:
 
         self._robots.append(Seat(adapter, incoming=to_client, outgoing=to_robot, on_arrival=arrives_at_client))
         self._robots.append(
-            Seat(pioneer, incoming=to_robot, outgoing=to_client, on_arrival=lambda data, at: recorder.wire("c2r", data, at))
+            Seat(
+                pioneer,
+                incoming=to_robot,
+                outgoing=to_client,
+                on_arrival=lambda data, at: recorder.wire("c2r", data, at),
+            )
         )
         return adapter, pioneer
+
+
+def boot(firmware: Path) -> Chip:
+    """Return an emulated BluePill with a firmware, at its reset.
+
+    Raises:
+        MissingDependencyError: The emulator's engine is not installed.
+    """
+    from bluepill_sim.board import BluePill
+
+    return BluePill(firmware)
 
 
 def make_harness(pinout: Pinout) -> Harness:

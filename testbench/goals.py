@@ -218,7 +218,9 @@ KINDS: Mapping[str, _Kind] = {
         _motor_sequence,
     ),
     "usart_contains": _Kind(
-        (Key(name="text", kind="text", required=True),), lambda arguments: f"prints {arguments['text']!r}", _usart_contains
+        (Key(name="text", kind="text", required=True),),
+        lambda arguments: f"prints {arguments['text']!r}",
+        _usart_contains,
     ),
     "usart_lacks": _Kind(
         (Key(name="text", kind="text", required=True),),
@@ -254,4 +256,3 @@ def _seconds(at: Nanos) -> str:
 
 def _place(pose: PoseSample) -> str:
     return f"x {pose.x / 1e6:.2f} m, y {pose.y / 1e6:.2f} m"
-

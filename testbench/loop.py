@@ -33,7 +33,10 @@ NEVER: Nanos = 1 << 62
 class Leader(Protocol):
     """What leads: it executes a program and may overrun a limit by one basic block."""
 
-    now_ns: int
+    @property
+    def now_ns(self) -> int:
+        """The time reached."""
+        ...
 
     def advance_to(self, limit_ns: int) -> object:
         """Run to `limit_ns`; returns something with `now` and a `reason` whose `name` is that of `Reason`."""
@@ -90,21 +93,14 @@ class RunLoop:
         Raises:
             StuckError: Two parts wake each other for ever.
         """
-        leader, followers = self.leader, self.followers
         while True:
             due = self._next_due()
-            passed = leader.now_ns
-            if due <= min(passed, end):
+            if due <= min(self.leader.now_ns, end):
                 self._follow(due)
-                continue
-            if passed >= end or self.is_halted:
+            elif self.leader.now_ns >= end or self.is_halted:
                 return
-            limit = min(due, end, passed + self.slice_ns)
-            reached = leader.advance_to(limit)
-            if _is_halt(reached):
-                self.is_halted = True
-            if self.on_slice is not None:
-                self.on_slice(leader.now_ns)
+            else:
+                self._lead(min(due, end))
 
     def finish(self, end: Nanos) -> None:
         """Bring the followers to `end` itself, so that their state is that of the end of the run."""
@@ -120,6 +116,16 @@ class RunLoop:
         self.now = cast("int", snapshot["now"])
         self.is_halted = bool(snapshot["halted"])
         self._edges = list(cast("tuple[int, ...]", snapshot["edges"]))
+
+    def _lead(self, limit: Nanos) -> None:
+        """Let the leader run to `limit`, slice by slice; stop at an edge on a watched net and at its end."""
+        leader, slice_ns, on_slice = self.leader, self.slice_ns, self.on_slice
+        while leader.now_ns < limit and not self._edges and not self.is_halted:
+            reached = leader.advance_to(min(limit, leader.now_ns + slice_ns))
+            if _is_halt(reached):
+                self.is_halted = True
+            if on_slice is not None:
+                on_slice(leader.now_ns)
 
     def _next_due(self) -> Nanos:
         due = self._edges[0] if self._edges else NEVER

@@ -25,7 +25,10 @@ MICRO = 1_000_000
 class Observed(Protocol):
     """What the recorder wants to know of a body."""
 
-    state: BodyState
+    @property
+    def state(self) -> BodyState:
+        """Where it is and how it moves."""
+        ...
 
     def clearance(self) -> float:
         """Return metres between the hull and the nearest thing in the plan view."""
@@ -188,7 +191,9 @@ class Recorder:
             for at, level in net.edges_until(limit):
                 self.trace.add("pin", at, {"net": net.name, "v": int(level)})
             for fight in net.take_contentions():
-                self.event("bench", fight.at, "contention", f"{net.name} is driven hard by {' and '.join(fight.owners)}")
+                self.event(
+                    "bench", fight.at, "contention", f"{net.name} is driven hard by {' and '.join(fight.owners)}"
+                )
             if net.forget_before(limit):
                 self._changed[net.name] = None
 

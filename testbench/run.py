@@ -15,7 +15,7 @@ from importlib.metadata import version
 from pathlib import Path
 
 from p2os.errors import UsageError
-from p2os.pioneer.world import World
+from p2os.pioneer.scenery import World
 from p2os.timing import NS_PER_MS, NS_PER_S, Nanos
 from testbench.artefacts import Artefacts, make_artefacts
 from testbench.bench import Bench
@@ -107,9 +107,7 @@ def run_scenario(
         end = bench.finish()
         wall_s = (clock() - began) / NS_PER_S
         artefacts = _close(bench, trace, folder, end, wall_s, pacer, was_interrupted=was_interrupted)
-    return RunResult(
-        folder=folder, outcome=artefacts.outcome, report=artefacts.report, was_interrupted=was_interrupted
-    )
+    return RunResult(folder=folder, outcome=artefacts.outcome, report=artefacts.report, was_interrupted=was_interrupted)
 
 
 def prepare_folder(folder: Path) -> None:
@@ -232,7 +230,9 @@ def notes(bench: Bench, end: Nanos, pacer: Pacer | None) -> list[str]:
     result += chip.warnings
     quiet_since = max(chip.activity.last_pin_ns, chip.activity.last_usart_ns, chip.activity.last_wfi_ns)
     if chip.fault is None and end - quiet_since >= QUIET_NS:
-        result.append(f"no pin, USART or WFI was seen since {quiet_since / NS_PER_S:.3f} s; the program is at {chip.where()}")
+        result.append(
+            f"no pin, USART or WFI was seen since {quiet_since / NS_PER_S:.3f} s; the program is at {chip.where()}"
+        )
     if pacer is not None and pacer.worst_lag_ns > PACED_SLICE_NS:
         result.append(f"the run lagged behind the wall clock by up to {pacer.worst_lag_ns / NS_PER_MS:.0f} ms")
     return result

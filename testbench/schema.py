@@ -27,6 +27,15 @@ _MEANING = {
     "list": "a list",
 }
 
+_TYPES: Mapping[Kind, tuple[type, ...]] = {
+    "text": (str,),
+    "number": (int, float),
+    "whole": (int,),
+    "flag": (bool,),
+    "table": (dict,),
+    "list": (list,),
+}
+
 _UNITS = {
     "_m": "metres", "_mm": "millimetres", "_mm_s": "mm/s", "_mm_s2": "mm/s²", "_deg": "degrees", "_deg_s": "deg/s",
     "_s": "seconds", "_ms": "milliseconds",
@@ -84,25 +93,17 @@ def _check_value(value: object, key: Key, where: str) -> None:
         hint = nearest(str(value), key.choices)
         raise ScenarioError(f"{where}: {key.name} = {_shown(value)} is none of {', '.join(key.choices)}", hint=hint)
     if isinstance(value, (int, float)) and not isinstance(value, bool):
-        low = key.least is not None and value < key.least or key.above is not None and value <= key.above
-        if low or key.most is not None and value > key.most or value != value:  # noqa: PLR0124 - not a number
+        low = (key.least is not None and value < key.least) or (key.above is not None and value <= key.above)
+        if low or (key.most is not None and value > key.most) or value != value:  # noqa: PLR0124 - not a number
             raise ScenarioError(f"{where}: {key.name} = {value} is out of range", hint=f"it is {_wanted(key)}")
 
 
 def _fits(value: object, key: Key) -> bool:
-    if key.kind == "text":
-        return isinstance(value, str)
-    if key.kind == "flag":
-        return isinstance(value, bool)
-    if key.kind == "table":
-        return isinstance(value, Mapping)
-    if key.kind == "list":
-        return isinstance(value, list)
     if key.kind == "tables":
         return isinstance(value, list) and all(isinstance(item, Mapping) for item in value)
     if isinstance(value, bool):
-        return False
-    return isinstance(value, int) or key.kind == "number" and isinstance(value, float)
+        return key.kind == "flag"
+    return isinstance(value, _TYPES[key.kind])
 
 
 def _wanted(key: Key) -> str:

@@ -17,7 +17,7 @@ from typing import cast
 
 from p2os.parameters import RobotParameters
 from p2os.pioneer.body import RobotBody
-from p2os.pioneer.world import Obstacle
+from p2os.pioneer.scenery import Obstacle
 from p2os.timing import NS_PER_MS, Nanos, Reached
 
 #: chosen: the robot moves 10 mm at most in between.

@@ -20,7 +20,7 @@ from typing import cast
 
 from p2os.errors import ScenarioError
 from p2os.parameters import RobotParameters
-from p2os.pioneer.world import Obstacle
+from p2os.pioneer.scenery import Obstacle
 from p2os.timing import NS_PER_S, Nanos
 from testbench.schema import Key, Table, check_table
 from testbench.script import FOLLOW_NS, BeforeSonar, Change, Op
@@ -109,7 +109,15 @@ def _obstacle(table: Table, where: str) -> Obstacle:
     strange = next((key for key in ("length_m", "width_m", "radius_m") if key in table and key not in sizes), None)
     if strange is not None:
         raise ScenarioError(f"{where}: a {shape} has no {strange}", hint=f"it has {', '.join(sizes)}")
-    return Obstacle(name=str(table["name"]), x_m=0.0, y_m=0.0, **{key: _number(table, key) for key in sizes})
+    return Obstacle(
+        name=str(table["name"]),
+        x_m=0.0,
+        y_m=0.0,
+        length_m=_number(table, "length_m"),
+        width_m=_number(table, "width_m"),
+        radius_m=_number(table, "radius_m"),
+        height_m=_number(table, "height_m"),
+    )
 
 
 def _check_names(changes: list[Change], where: str) -> None:

@@ -88,5 +88,7 @@ class SerialLine:
         state = cast("Mapping[str, object]", snapshot)
         self._busy_since = cast("int", state["busy_since"])
         self._characters = cast("int", state["characters"])
-        self._under_way = deque(Arrival(at, data) for at, data in cast("tuple[tuple[int, bytes], ...]", state["under_way"]))
+        self._under_way = deque(
+            Arrival(at, data) for at, data in cast("tuple[tuple[int, bytes], ...]", state["under_way"])
+        )
         self._arrived = [Arrival(at, data) for at, data in cast("tuple[tuple[int, bytes], ...]", state["arrived"])]

@@ -90,7 +90,9 @@ class Net:
         if history:
             last_at, last = history[-1]
             if now < last_at:
-                raise LocalProtocolError(f"{owner} drives {self.name} at {now} ns after having driven it at {last_at} ns")
+                raise LocalProtocolError(
+                    f"{owner} drives {self.name} at {now} ns after having driven it at {last_at} ns"
+                )
             if last == new:
                 return
             if last_at == now:
@@ -103,7 +105,7 @@ class Net:
 
     def release(self, owner: str, now: Nanos) -> None:
         """Let the wire go from `now` on."""
-        self.drive(owner, False, Strength.FLOATING, now)  # noqa: FBT003 - the level of a released wire means nothing
+        self.drive(owner, False, Strength.FLOATING, now)
 
     def level(self, at: Nanos) -> bool:
         """Return the level at the instant `at`, an edge at `at` included."""
@@ -172,7 +174,9 @@ class Net:
             owner: [(at, Drive(level, Strength(strength))) for at, level, strength in history]
             for owner, history in drives
         }
-        self._told_until, self._told_level, self._told_fight = cast("tuple[int, bool, tuple[str, ...]]", snapshot["told"])
+        self._told_until, self._told_level, self._told_fight = cast(
+            "tuple[int, bool, tuple[str, ...]]", snapshot["told"]
+        )
         self._contentions = [Contention(at, self.name, owners) for at, owners in contentions]
         self.last_edge = max((history[-1][0] for history in self._drives.values() if history), default=0)
         self._last_level = self._resolve(self.last_edge)

@@ -9,6 +9,7 @@ import signal
 import sys
 import time
 from types import FrameType, TracebackType
+from typing import Self
 
 from rich.console import Console
 from rich.progress import BarColumn, Progress, ProgressColumn, Task, TextColumn
@@ -44,7 +45,7 @@ class RunDisplay:
         self._task = self._bar.add_task("run", total=None, time="", doing="")
         self._old_handler: object = None
 
-    def __enter__(self) -> "RunDisplay":
+    def __enter__(self) -> Self:
         self._old_handler = signal.signal(signal.SIGINT, self._interrupt)
         self._bar.start()
         return self

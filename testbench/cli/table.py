@@ -29,9 +29,9 @@ def print_result(result: RunResult, console: Console | None = None) -> None:
 
 def rows(outcome: Mapping[str, object]) -> list[tuple[str, str]]:
     """Return the table's rows: name, and value with its unit."""
+    what = f"{outcome['scenario']} in {outcome['world']}, mode {outcome['mode']}, body {outcome['body']}"
     found = [
-        ("scenario", f"{outcome['scenario']} in {outcome['world']}, mode {outcome['mode']}, body {outcome['body']}, "
-         f"seed {outcome['seed']}"),
+        ("scenario", f"{what}, seed {outcome['seed']}"),
         ("virtual time", _with_unit(outcome["virtual_s"], ".1f", "s")),
         ("speed", _with_unit(outcome["real_time_factor"], ".1f", "× real time")),
         ("distance", _with_unit(outcome["distance_m"], ".2f", "m")),
