@@ -10,7 +10,7 @@ Invariant: the same calls after the same `reset` give the same states, bit for b
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Protocol
+from typing import NamedTuple, Protocol
 
 from p2os.errors import MissingDependencyError, UsageError
 from p2os.parameters import RobotParameters
@@ -49,6 +49,27 @@ class BodyState:
     in_contact: bool = False
 
 
+class WheelAngles(Protocol):
+    """What a step tells at once; a `BodyState` is one too."""
+
+    @property
+    def left_angle_rad(self) -> float:
+        """Rotation of the left wheel since the reset."""
+        ...
+
+    @property
+    def right_angle_rad(self) -> float:
+        """Rotation of the right wheel since the reset."""
+        ...
+
+
+class Turned(NamedTuple):
+    """Wheel angles alone, for a body that reads the rest of its state only when asked."""
+
+    left_angle_rad: float
+    right_angle_rad: float
+
+
 class RobotBody(Protocol):
     """A robot as a physical thing in a world."""
 
@@ -76,8 +97,8 @@ class RobotBody(Protocol):
         """Stand still at a pose, wheels at angle 0, collisions at 0."""
         ...
 
-    def step(self, left_mps: float, right_mps: float) -> BodyState:
-        """Move on by `dt_ns` with these rim-speed set-points."""
+    def step(self, left_mps: float, right_mps: float) -> WheelAngles:
+        """Move on by `dt_ns` with these rim-speed set-points; `state` has the rest."""
         ...
 
     def ranges(self, numbers: Sequence[int]) -> list[float]:

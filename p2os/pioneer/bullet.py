@@ -17,8 +17,8 @@ from typing import Any, cast
 import pybullet
 
 from p2os.parameters import RobotParameters
-from p2os.pioneer.body import STEP_NS, BodyState
-from p2os.pioneer.bullet_model import OBSTACLE_GROUP, FLOOR_GROUP, LEFT, RIGHT, add_floor, add_obstacle, add_robot
+from p2os.pioneer.body import STEP_NS, BodyState, Turned
+from p2os.pioneer.bullet_model import FLOOR_GROUP, LEFT, OBSTACLE_GROUP, RIGHT, add_floor, add_obstacle, add_robot
 from p2os.pioneer.contacts import ContactCounter
 from p2os.pioneer.plan import Plan
 from p2os.pioneer.scenery import Obstacle, Pose, World
@@ -50,6 +50,7 @@ class BulletBody:
         self._radius_m = parameters.body.wheel_diameter_m / 2
         #: The engine takes its client as a keyword of every call.
         self._client = pybullet.connect(pybullet.DIRECT)
+        self._state: BodyState | None = None
         self.reset(world.start, 0)
 
     def __del__(self) -> None:
@@ -59,7 +60,9 @@ class BulletBody:
 
     @property
     def state(self) -> BodyState:
-        """The state after the last step."""
+        """The state after the last step, read from the engine when it is asked for."""
+        if self._state is None:
+            self._state = self._read()
         return self._state
 
     def reset(self, pose: Pose, seed: int) -> BodyState:
@@ -72,8 +75,9 @@ class BulletBody:
         self._zero = (joints[0][0], joints[1][0])
         self._contacts = ContactCounter()
         self._stalling = [0, 0]
-        self._read()
-        return self._state
+        self._joints = joints
+        self._state = None
+        return self.state
 
     def _build(self, obstacles: Sequence[Obstacle], pose: Pose) -> None:
         """Make the engine's world anew."""
@@ -92,15 +96,18 @@ class BulletBody:
         self._targets = (0.0, 0.0)
         self._command()
 
-    def step(self, left_mps: float, right_mps: float) -> BodyState:
+    def step(self, left_mps: float, right_mps: float) -> Turned:
         """Move on by one step with these rim-speed set-points."""
         if (left_mps, right_mps) != self._targets:
             self._targets = (left_mps, right_mps)
             self._command()
         pybullet.stepSimulation(physicsClientId=self._client)
         self._contacts.update(touching=self._is_touching())
-        self._read()
-        return self._state
+        left, right = self._joints = pybullet.getJointStates(self._robot, WHEELS, physicsClientId=self._client)
+        self._stall(0, left)
+        self._stall(1, right)
+        self._state = None
+        return Turned(left[0] - self._zero[0], right[0] - self._zero[1])
 
     def _command(self) -> None:
         """Give the motors their targets; the engine does not save them with its state."""
@@ -115,22 +122,19 @@ class BulletBody:
         points = pybullet.getContactPoints(bodyA=self._robot, linkIndexA=-1, physicsClientId=self._client)
         return any(point[8] <= TOUCH_M and point[2] not in self._floors for point in points)
 
-    def _read(self) -> None:
-        """Take the engine's state into ours."""
+    def _read(self) -> BodyState:
+        """Return the engine's state as ours, and keep the robot's frame for the rays."""
         client = self._client
-        left, right = pybullet.getJointStates(self._robot, WHEELS, physicsClientId=client)
+        left, right = self._joints
         place, turn = pybullet.getBasePositionAndOrientation(self._robot, physicsClientId=client)
         linear, angular = pybullet.getBaseVelocity(self._robot, physicsClientId=client)
         self._matrix = pybullet.getMatrixFromQuaternion(turn)
         m, (cx, _, cz) = self._matrix, self._centre
         heading = math.atan2(m[3], m[0])
-        turn_radps = angular[2]
         # The engine's point is the hull's centre of mass: take the axle's middle, on the floor.
         x, y, z = (place[row] - m[3 * row] * cx - m[3 * row + 2] * cz for row in range(3))
         self._origin = (x, y, z)
-        self._stall(0, left)
-        self._stall(1, right)
-        self._state = BodyState(
+        return BodyState(
             x_m=x,
             y_m=y,
             z_m=z,
@@ -141,7 +145,7 @@ class BulletBody:
             left_speed_mps=left[1] * self._radius_m,
             right_speed_mps=right[1] * self._radius_m,
             forward_mps=linear[0] * math.cos(heading) + linear[1] * math.sin(heading),
-            turn_radps=turn_radps,
+            turn_radps=angular[2],
             stalled_left=self._stalling[0] >= STALL_STEPS,
             stalled_right=self._stalling[1] >= STALL_STEPS,
             collisions=self._contacts.collisions,
@@ -156,7 +160,7 @@ class BulletBody:
 
     def ranges(self, numbers: Sequence[int]) -> list[float]:
         """Return the nearest echo of each cone, metres; the rays tilt with the body."""
-        longest = self._parameters.sonar_range_m
+        _, longest = self.state, self._parameters.sonar_range_m
         starts: list[tuple[float, ...]] = []
         ends: list[tuple[float, ...]] = []
         for number in numbers:
@@ -187,7 +191,8 @@ class BulletBody:
 
     def clearance(self) -> float:
         """Return the plan-view distance from the hull to the nearest thing that it could touch, metres."""
-        return self._plan.clearance(self._state.x_m, self._state.y_m, self._state.heading_rad)
+        state = self.state
+        return self._plan.clearance(state.x_m, state.y_m, state.heading_rad)
 
     def place(self, obstacle: Obstacle) -> None:
         """Put an obstacle with a new name into the world."""
@@ -222,7 +227,7 @@ class BulletBody:
             "zero": self._zero,
             "contacts": self._contacts.snapshot(),
             "stalling": tuple(self._stalling),
-            "state": self._state,
+            "state": self.state,
         }
 
     def restore(self, snapshot: object) -> None:
@@ -238,6 +243,6 @@ class BulletBody:
         self._zero = saved["zero"]
         self._contacts.restore(saved["contacts"])
         self._stalling = list(saved["stalling"])
+        self._joints = pybullet.getJointStates(self._robot, WHEELS, physicsClientId=self._client)
         self._read()
-        self._stalling = list(saved["stalling"])
         self._state = saved["state"]

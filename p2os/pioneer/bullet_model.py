@@ -78,7 +78,9 @@ def _static(shape: int, place: Vector, turn: tuple[float, ...], group: int, clie
     )
     friction = FLOOR_FRICTION if group == FLOOR_GROUP else OBSTACLE_FRICTION
     pybullet.changeDynamics(number, -1, lateralFriction=friction, physicsClientId=client)
-    pybullet.setCollisionFilterGroupMask(number, -1, group, RAY_GROUP | WHEEL_GROUP | HULL_GROUP, physicsClientId=client)
+    pybullet.setCollisionFilterGroupMask(
+        number, -1, group, RAY_GROUP | WHEEL_GROUP | HULL_GROUP, physicsClientId=client
+    )
     return int(number)
 
 

@@ -12,7 +12,7 @@ import math
 from collections.abc import Sequence
 
 from p2os.parameters import RobotParameters
-from p2os.pioneer.body import STEP_NS, BodyState
+from p2os.pioneer.body import STEP_NS, BodyState, Turned
 from p2os.pioneer.contacts import ContactCounter
 from p2os.pioneer.geometry import Footprint
 from p2os.pioneer.plan import Plan
@@ -82,14 +82,14 @@ class KinematicBody:
         self._changed()
         return self.state
 
-    def step(self, left_mps: float, right_mps: float) -> BodyState:
+    def step(self, left_mps: float, right_mps: float) -> Turned:
         """Move on by one step along the exact arc, or stall."""
         self._asked = (left_mps, right_mps)
         if left_mps == 0.0 and right_mps == 0.0:
             self._left = self._right = 0.0
             self._stalled = False
             self._contacts.update(touching=self._free_m == 0.0)
-            return self.state
+            return Turned(self._left_angle, self._right_angle)
         forward, turn = (left_mps + right_mps) / 2 * _DT_S, (right_mps - left_mps) / self._track_m * _DT_S
         x, y, heading = self._moved(forward, turn)
         blocked = self._is_blocked(x, y, heading, abs(forward) + abs(turn) * self._hull_reach)
@@ -97,12 +97,12 @@ class KinematicBody:
         self._contacts.update(touching=blocked or self._free_m == 0.0)
         if blocked:
             self._left = self._right = 0.0
-            return self.state
+            return Turned(self._left_angle, self._right_angle)
         self._x, self._y, self._heading = x, y, heading
         self._left, self._right = left_mps, right_mps
         self._left_angle += left_mps * _DT_S / self._radius_m
         self._right_angle += right_mps * _DT_S / self._radius_m
-        return self.state
+        return Turned(self._left_angle, self._right_angle)
 
     def _moved(self, forward: float, turn: float) -> tuple[float, float, float]:
         """Return the pose after an arc of this length and turn."""
