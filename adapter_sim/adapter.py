@@ -204,6 +204,7 @@ class Adapter:
             return
         if self._state is AdapterState.BOOTING:
             if now < self._agenda.boot_at:
+                self._next_sample = now + self._sample_period_ns
                 return
             self._boot(now)
         self._work(now)
@@ -255,11 +256,9 @@ class Adapter:
     def _replan(self) -> None:
         """Find the next deadline; `_other` is the earliest that is no sample."""
         state = self._state
-        if state is AdapterState.BOOTING:
-            self._other = self._deadline = self._agenda.boot_at
-            return
-        if state is AdapterState.RESET:
-            self._other, self._deadline = NEVER, self._next_sample
+        if state not in AWAKE_STATES:
+            # Only rst is looked at; `_other` keeps these instants off the fast path.
+            self._other = self._deadline = min(self._agenda.boot_at, self._next_sample)
             return
         times = [self.session.next_deadline()]
         if state in OPEN_STATES:

@@ -12,6 +12,7 @@ from p2os.packets import Identity
 from p2os.parameters import load_parameters
 from p2os.sip import SonarReading, StandardSip
 from p2os.timing import NS_PER_MS, Nanos
+from p2os.wire import Frame
 
 PARAMETERS = load_parameters("p2dx")
 PINOUT = load_pinout()
@@ -86,6 +87,9 @@ class FakeRobot:
             self.turn = command.integer or 0
         elif command.name == "SETO":
             self.sip = replace(self.sip, raw_x=0, raw_y=0, raw_heading=0)
+
+    def take_output(self) -> list[bytes]:
+        return self.connection.take_output()
 
     def next_deadline(self) -> Nanos | None:
         return self.next_sip if self.connection.is_open else None
@@ -165,12 +169,8 @@ class Rig:
             for data in self.to_robot.take(now):
                 self.robot.receive(data, now)
             self.robot.advance_to(now)
-            output = (
-                self.robot.connection.take_output() if isinstance(self.robot, FakeRobot) else self.robot.take_output()
-            )
-            self.to_adapter.send(output, now)
-            deadline = self.adapter.next_deadline()
-            if now >= until and (deadline is None or deadline > until):
+            self.to_adapter.send(self.robot.take_output(), now)
+            if now >= until and not any((at := part.next_deadline()) is not None and at <= until for part in parts):
                 return
 
     def ms(self, span_ms: float) -> None:
@@ -186,8 +186,6 @@ class Rig:
 
     def sent(self, since: Nanos = 0) -> list[tuple[Nanos, str, object]]:
         """Return what the adapter sent from an instant on, as (time, name, argument)."""
-        from p2os.wire import Frame
-
         commands = [(at, Command.from_frame(Frame.from_bytes(data))) for at, data in self.to_robot.log if at >= since]
         return [(at, command.name, command.argument) for at, command in commands]
 

@@ -1,0 +1,295 @@
+"""What the adapter does with a robot behind a line of 9600 baud."""
+
+import pickle
+from dataclasses import replace
+from itertools import pairwise
+
+import pytest
+
+from adapter_sim import Adapter, AdapterSettings, EncoderAtOpen
+from p2os.sip import SonarReading, StandardSip
+from tests.adapter_sim.conftest import MS, PARAMETERS, PINOUT, FakePins, FakeRobot, Rig
+
+
+def names(rig: Rig, since: int = 0) -> list[str]:
+    return [name for _, name, _ in rig.sent(since)]
+
+
+def test_connecting_stops_syncs_opens_and_enables_in_order(driving: Rig) -> None:
+    assert names(driving)[:12] == [
+        "STOP", "VEL", "RVEL", "PULSE", "OPEN", "CLOSE",  # PULSE, OPEN, CLOSE are SYNC0, 1, 2 here
+        "OPEN", "SETO", "SONAR", "ENABLE", "VEL", "RVEL",
+    ]  # fmt: skip
+    assert [what for _, what, _ in driving.events] == ["booted", "connecting", "connected", "driving"]
+    assert driving.events[2][2] == "Pioneer p2dx Fake"
+
+
+def test_every_sync0_has_the_stop_before_it_while_nobody_answers() -> None:
+    rig = Rig()
+    rig.to_robot.cut = True
+    rig.pins.set("p2dx_con", True, 0)
+    rig.ms(8_000)
+    sent = names(rig)
+    assert sent.count("PULSE") >= 7
+    assert sent == ["STOP", "VEL", "RVEL", "PULSE"] * sent.count("PULSE")
+    assert any(what == "no connection" for _, what, _ in rig.events)
+    rig.to_robot.cut = False
+    rig.ms(3_000)
+    assert rig.adapter.state == "driving"
+
+
+def test_a_streaming_robot_is_stopped_and_closed_before_it_is_synced() -> None:
+    first = Rig()
+    first.connect()
+    first.pins.motors(3, 3, first.now)
+    first.ms(300)
+    second = Rig(robot=first.robot)
+    second.now = 0
+    first.robot.next_sip = 100 * MS
+    first.robot.connection = FakeRobot().connection
+    second.robot.connection.receive(b"", 0)
+    second.pins.set("p2dx_con", True, 0)
+    second.ms(1_000)
+    assert second.robot.forward == 0
+
+
+def test_p2dx_con_low_stops_and_closes_within_50_ms(driving: Rig) -> None:
+    driving.pins.motors(3, 3, driving.now)
+    driving.ms(300)
+    fell = driving.now
+    driving.pins.set("p2dx_con", False, fell)
+    driving.ms(600)
+    stop_at = next(at for at, name, _ in driving.sent(fell) if name == "STOP")
+    # 2 ms to the first low sample and 10 ms of debounce; then a pair on the line and the STOP itself.
+    assert stop_at <= fell + 12 * MS
+    assert driving.robot.commands[-1][1].name == "RVEL"
+    assert driving.robot.forward == 0
+    assert not driving.robot.connection.is_open
+    assert driving.adapter.state == "idle"
+    # The robot fell silent, so the stop sequence was not said again.
+    assert names(driving, fell).count("CLOSE") == 1
+
+
+def test_a_close_that_gets_lost_is_said_again(driving: Rig) -> None:
+    driving.to_robot.cut = True
+    driving.pins.set("p2dx_con", False, driving.now)
+    driving.ms(150)
+    driving.to_robot.cut = False
+    driving.ms(200)
+    assert not driving.robot.connection.is_open
+
+
+def test_p2dx_con_again_connects_again(driving: Rig) -> None:
+    driving.pins.set("p2dx_con", False, driving.now)
+    driving.ms(20)
+    driving.pins.set("p2dx_con", True, driving.now)
+    driving.ms(1_500)
+    assert driving.adapter.state == "driving"
+
+
+def test_after_a_loss_nothing_moves_until_p2dx_con_is_given_anew(driving: Rig) -> None:
+    driving.pins.motors(3, 3, driving.now)
+    driving.to_adapter.cut = True
+    driving.ms(600)
+    assert driving.adapter.state == "lost"
+    driving.to_adapter.cut = False
+    lost_at = driving.events[-1][0]
+    driving.ms(5_000)
+    assert set(names(driving, lost_at)) == {"STOP", "VEL", "RVEL", "CLOSE"}
+    assert names(driving, lost_at).count("STOP") == 1 + 3
+    assert driving.robot.forward == 0
+    driving.pins.set("p2dx_con", False, driving.now)
+    driving.ms(20)
+    assert driving.adapter.state == "idle"
+    driving.pins.set("p2dx_con", True, driving.now)
+    driving.ms(1_500)
+    assert driving.adapter.state == "driving"
+    assert driving.robot.forward == 188
+
+
+def test_a_reset_notice_of_the_robot_is_a_loss(driving: Rig) -> None:
+    driving.adapter.receive(bytes.fromhex("fafb03ff00ff"), driving.now)
+    assert driving.adapter.state == "lost"
+    assert "reset" in driving.adapter.status.reason
+
+
+def test_other_packets_do_not_stand_in_for_a_sip(driving: Rig) -> None:
+    driving.robot.sends = False
+    for _ in range(8):
+        driving.adapter.receive(bytes.fromhex("fafb06b090000 1b091".replace(" ", "")), driving.now)
+        driving.ms(50)
+    assert driving.adapter.state == "lost"
+    assert "no SIP in time" in driving.adapter.status.reason
+
+
+def test_distances_follow_the_sonar_at_the_threshold(driving: Rig) -> None:
+    # 600 000 µm / 268 µm = 2238.8 counts: 2238 is nearer, 2239 is not.
+    driving.robot.sip = replace(
+        driving.robot.sip,
+        sonar=(*(SonarReading(number, 2238 + number % 2) for number in range(8)), SonarReading(12, 0)),
+    )
+    driving.ms(150)
+    assert driving.pins.distances() == "10101010"
+    assert driving.adapter.status.ranges_um[:2] == (2238 * 268, 2239 * 268)
+
+
+def test_encoders_follow_the_wheels_one_code_at_a_time(driving: Rig) -> None:
+    codes = []
+    for step in range(1, 12):
+        driving.robot.sip = replace(driving.robot.sip, raw_x=step * 100)
+        for _ in range(50):
+            driving.ms(2)
+            codes.append(driving.pins.code("encoder1"))
+    jumps = {(after - before) % 8 for before, after in pairwise(codes)}
+    assert jumps == {0, 1}
+    # 1100 counts of 0.84 mm are 14.26 steps of 64.8 mm.
+    assert driving.adapter.status.counts == (14, 14)
+    assert codes[-1] == 14 % 8
+
+
+@pytest.mark.parametrize(("at_open", "code"), [(EncoderAtOpen.ZERO, 0), (EncoderAtOpen.CONTINUE, 3)])
+def test_encoders_hold_while_lost_and_begin_as_set(at_open: EncoderAtOpen, code: int) -> None:
+    rig = Rig(AdapterSettings(threshold_um=600_000, encoder_at_open=at_open))
+    rig.connect()
+    rig.robot.sip = replace(rig.robot.sip, raw_x=-380 & 0x7FFF)  # −4.93 steps: count −5, code 3
+    rig.ms(400)
+    assert rig.pins.code("encoder2") == 3
+    rig.pins.set("p2dx_con", False, rig.now)
+    rig.ms(300)
+    assert rig.pins.code("encoder2") == 3
+    rig.pins.set("p2dx_con", True, rig.now)
+    rig.ms(1_500)
+    assert rig.adapter.state == "driving"
+    assert rig.pins.code("encoder2") == code
+
+
+def test_a_robot_that_ignores_seto_is_driven_from_where_it_is() -> None:
+    rig = Rig()
+    rig.robot._obey = lambda _: None
+    rig.robot.obeys = False
+    rig.robot.sip = replace(rig.robot.sip, raw_x=777, raw_heading=55)
+    rig.pins.set("p2dx_con", True, 0)
+    rig.ms(700)
+    assert rig.adapter.state == "settling"
+    rig.ms(500)
+    assert rig.adapter.state == "driving"
+    assert rig.adapter.status.counts == (0, 0)
+
+
+def test_an_odometry_jump_is_told_and_is_no_travel(driving: Rig) -> None:
+    driving.robot.sip = replace(driving.robot.sip, raw_x=9_000)
+    driving.ms(150)
+    assert driving.events[-1][1] == "odometry jumped"
+    assert driving.adapter.status.counts == (0, 0)
+    assert driving.adapter.status.odometry_jumps == 1
+
+
+def test_a_stalled_robot_is_believed_and_told(driving: Rig) -> None:
+    driving.robot.obeys = False
+    driving.robot.sip = replace(driving.robot.sip, stall_left=True)
+    driving.pins.motors(3, 3, driving.now)
+    driving.ms(3_000)
+    assert driving.adapter.state == "driving"
+    assert ("stall", "left 1, right 0") in [event[1:] for event in driving.events]
+
+
+def test_bit_zero_of_the_flags_is_not_a_motor_flag(driving: Rig) -> None:
+    driving.robot.sip = replace(driving.robot.sip, raw_flags=0)
+    driving.pins.motors(2, 2, driving.now)
+    driving.ms(1_500)
+    assert driving.adapter.state == "driving"
+
+
+def test_rst_wipes_everything_and_releases_the_outputs(driving: Rig) -> None:
+    driving.robot.sip = replace(driving.robot.sip, raw_x=200)
+    driving.ms(200)
+    driving.pins.set("rst", True, driving.now)
+    driving.ms(1)
+    assert driving.adapter.state == "reset"
+    assert set(driving.pins.outputs.values()) == {None}
+    since = driving.now
+    driving.ms(1_000)
+    assert driving.sent(since) == []
+    driving.pins.set("rst", False, driving.now)
+    driving.ms(1_600)
+    # p2dx_con is high still: the first frame of the new life is STOP.
+    assert names(driving, since)[:4] == ["STOP", "VEL", "RVEL", "PULSE"]
+    assert driving.adapter.state == "driving"
+    assert driving.pins.code("encoder1") == 0
+
+
+def test_rst_while_booting_begins_the_boot_anew(rig: Rig) -> None:
+    rig.ms(200)
+    rig.pins.set("rst", True, rig.now)
+    rig.ms(4)
+    rig.pins.set("rst", False, rig.now)
+    rig.ms(298)
+    assert rig.adapter.state == "booting"
+    rig.ms(4)
+    assert rig.adapter.state == "idle"
+
+
+def test_bytes_are_not_heard_before_the_boot_is_over(rig: Rig) -> None:
+    rig.adapter.receive(StandardSip().to_frame(FakeRobot().connection.settings.profile).to_bytes(), 0)
+    assert rig.adapter.session.stats.frames_received == 0
+
+
+def test_p2dx_con_low_while_connecting_gives_up(rig: Rig) -> None:
+    rig.to_robot.cut = True
+    rig.pins.set("p2dx_con", True, 0)
+    rig.ms(500)
+    assert rig.adapter.state == "connecting"
+    rig.pins.set("p2dx_con", False, rig.now)
+    rig.ms(15)
+    assert rig.adapter.state == "closing"
+
+
+def test_rejected_frames_are_counted(driving: Rig) -> None:
+    driving.adapter.receive(bytes.fromhex("fafb060b3bc800d300"), driving.now)
+    assert driving.adapter.session.stats.wire.bad_checksums == 1
+
+
+def test_linear_and_angular_reach_the_wire() -> None:
+    rig = Rig(AdapterSettings(threshold_um=600_000, motor_meaning="linear_angular", bit_order="comm1_msb"))
+    rig.connect()
+    rig.pins.set("motor1_comm3", True, rig.now)  # weighs 1 here: 62.5 mm/s, rounded away from zero
+    rig.pins.set("motor2_comm2", True, rig.now)  # weighs 2: 0.85 rad/s
+    rig.ms(200)
+    assert rig.adapter.status.motors == (1, 2)
+    assert (rig.robot.forward, rig.robot.turn) == (63, 49)
+
+
+def test_a_default_adapter_takes_half_the_sonar_range() -> None:
+    adapter = Adapter(pins=FakePins(), pinout=PINOUT, parameters=PARAMETERS)
+    assert adapter.distances.threshold_um == 2_500_000
+
+
+@pytest.mark.parametrize("at_ms", [100, 317, 325, 400, 600, 700, 1_011, 1_205, 1_500, 1_900])
+def test_a_snapshot_taken_anywhere_continues_alike(at_ms: int) -> None:
+    def script(rig: Rig) -> None:
+        rig.pins.set("p2dx_con", True, 310 * MS)
+        for at, left, right in ((900, 2, 2), (1_003, -4, 3), (1_009, 0, 0), (1_013, 1, 1)):
+            rig.pins.motors(left, right, at * MS)
+        rig.pins.set("p2dx_con", False, 1_400 * MS)
+        rig.pins.set("rst", True, 1_800 * MS)
+
+    whole = Rig()
+    script(whole)
+    whole.run(at_ms * MS)
+    saved = pickle.dumps(whole.adapter.snapshot())
+    copy = Rig(robot=whole.robot)
+    script(copy)
+    copy.adapter.restore(pickle.loads(saved))  # noqa: S301  # our own bytes
+    assert copy.adapter.snapshot() == whole.adapter.snapshot()
+    copy.now, copy.to_robot, copy.to_adapter = whole.now, whole.to_robot, whole.to_adapter
+    rest = pickle.dumps((whole.robot.connection.snapshot(), whole.robot.next_sip))
+    whole_log = list(whole.to_robot.log)
+    copy.run(2_000 * MS)
+    first = (copy.to_robot.log[len(whole_log) :], copy.events, copy.adapter.snapshot())
+    # The same stretch again, from the same saved state, must be the same.
+    again = Rig()
+    script(again)
+    again.adapter.restore(pickle.loads(saved))  # noqa: S301  # our own bytes
+    assert pickle.dumps(again.adapter.snapshot()) == saved or again.adapter.snapshot() == pickle.loads(saved)  # noqa: S301
+    assert rest
+    assert first[2]["adapter"][0] in {"reset", "idle", "booting", "connecting"}

@@ -1,0 +1,170 @@
+"""The pin-out file: what it says, and what it refuses."""
+
+from pathlib import Path
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from adapter_sim import PinoutError, load_pinout, parse_pinout
+from adapter_sim.pin_rules import faults_of, require_usable
+from adapter_sim.pinout import Direction, Pull, Role, Safe
+
+TEXT = (Path(__file__).parents[2] / "adapter_sim" / "pinout.toml").read_text(encoding="utf-8")
+PINOUT = load_pinout()
+
+#: The BluePill's side, which binaries rely on.
+FIXED = {
+    "DD1": "PA4", "DD2": "PA5", "DD3": "PA6", "DD4": "PA7", "DD5": "PB0", "DD6": "PB1", "DD7": "PB10", "DD8": "PB11",
+    "encoder1_s1": "PB4", "encoder1_s2": "PB3", "encoder1_s3": "PB15",
+    "encoder2_s1": "PC13", "encoder2_s2": "PC14", "encoder2_s3": "PC15",
+    "motor1_comm1": "PB7", "motor1_comm2": "PB6", "motor1_comm3": "PB5",
+    "motor2_comm1": "PA1", "motor2_comm2": "PA2", "motor2_comm3": "PA3",
+    "p2dx_con": "PB12", "rst": "PB13",
+}  # fmt: skip
+
+
+def test_the_22_wires_end_at_the_pins_that_binaries_rely_on() -> None:
+    assert {wire.name: wire.bluepill for wire in PINOUT.wires} == FIXED
+
+
+def test_the_third_wire_of_a_value_weighs_most() -> None:
+    for name in ("encoder1", "encoder2", "motor1", "motor2"):
+        value = PINOUT.value(name)
+        assert (value.width, value.wires[-1][-1]) == (3, "3")
+
+
+def test_levels_are_safe_by_role() -> None:
+    safe = {Role.DISTANCE: Safe.HIGH, Role.ENCODER: Safe.HOLD}
+    for wire in PINOUT.wires:
+        assert wire.safe is safe.get(wire.role, Safe.LOW)
+        assert wire.idle is (wire.pull is Pull.UP)
+        assert wire.direction is (Direction.TO_BLUEPILL if wire.role in safe else Direction.TO_ADAPTER)
+
+
+def test_rev_b_is_the_default_and_breaks_no_rule() -> None:
+    assert PINOUT.default_revision == "rev-b"
+    assert faults_of(PINOUT, "rev-b") == []
+    require_usable(PINOUT, "rev-b")
+    require_usable(PINOUT, "rev-c")
+    assert PINOUT.wire("motor1_comm3").esp32_pin("rev-b") == "IO34"
+
+
+@pytest.mark.parametrize(
+    ("revision", "fault"),
+    [
+        ("thesis-table3", "DD1: IO10 carries the module's flash"),
+        ("thesis-table3", "DD8: IO36 is an input only, but must be driven"),
+        ("thesis-table3", "encoder2_s1: no pin of the ESP32"),
+        ("thesis-table3", "motor2_comm2: IO25 is DD4 already"),
+        ("thesis-table3", "motor1_comm3: IO0 is a boot strap, but the BluePill drives it"),
+        ("thesis-board", "motor1_comm2: IO12 is a boot strap, but the BluePill drives it"),
+        ("thesis-board", "motor wires: not all in IO32..IO39, so no one read samples them at one instant"),
+    ],
+)
+def test_the_thesis_revisions_are_refused_with_reasons(revision: str, fault: str) -> None:
+    assert fault in faults_of(PINOUT, revision)
+    with pytest.raises(PinoutError, match=f"{revision}.*cannot work"):
+        require_usable(PINOUT, revision)
+
+
+def test_an_unknown_revision_is_refused_by_name() -> None:
+    with pytest.raises(PinoutError, match="'rev-z' is unknown"):
+        require_usable(PINOUT, "rev-z")
+
+
+def test_an_auxiliary_pin_that_a_wire_has_already_is_a_fault() -> None:
+    text = TEXT.replace('rev-b = "IO0", rev-c', 'rev-b = "IO23", rev-c')
+    assert faults_of(parse_pinout(text), "rev-b") == ["mode_button: IO23 is DD1 already"]
+
+
+def test_a_revision_called_faulty_is_refused_even_where_no_rule_sees_why() -> None:
+    text = TEXT.replace('name = "rev-b"\nstatus = "usable"', 'name = "rev-b"\nstatus = "faulty"')
+    with pytest.raises(PinoutError, match="atomic sample"):
+        require_usable(parse_pinout(text), "rev-b")
+
+
+def four_bits() -> str:
+    """Return the pin-out with a fourth wire for each motor."""
+    text = TEXT.replace('role = "motor"\nside = "left"\nwidth = 3', 'role = "motor"\nside = "left"\nwidth = 4')
+    text = text.replace('role = "motor"\nside = "right"\nwidth = 3', 'role = "motor"\nside = "right"\nwidth = 4')
+    for value, pin in (("motor1", "PB8"), ("motor2", "PB9")):
+        text += (
+            f'\n[[wire]]\nname = "{value}_comm4"\nrole = "motor"\nvalue = "{value}"\nbit = 3\n'
+            f'direction = "to_adapter"\nbluepill = "{pin}"\npull = "down"\nidle = 0\nsafe = 0\n'
+            'esp32 = { thesis-table3 = "NC", thesis-board = "IO18", rev-b = "NC", rev-c = "NC" }\n'
+        )
+    return text
+
+
+def test_a_fourth_motor_bit_is_one_more_wire_and_one_larger_number() -> None:
+    pinout = parse_pinout(four_bits())
+    assert pinout.value("motor1").width == 4
+    assert pinout.value("motor2").wires[3] == "motor2_comm4"
+
+
+BROKEN = [
+    ('name = "DD2"', 'name = "DD1"', "wire 'DD1' stands twice"),
+    ('bluepill = "PA5"', 'bluepill = "PA4"', "BluePill pin 'PA4' stands twice"),
+    ('bluepill = "PA5"', 'bluepill = "PD5"', "bluepill = 'PD5', expected PA0..PC15"),
+    ('pull = "up"\nidle = 1', 'pull = "up"\nidle = 0', "idle = 0 contradicts pull = 'up'"),
+    ('role = "connect"', 'role = "conect"', "role = 'conect', expected one of distance, encoder"),
+    ('role = "connect"', 'role = "reset"', "0 wires have the role 'connect', expected 1"),
+    ("number = 8", "number = 9", "expected 1, 2, 3"),
+    ('value = "motor1"\nbit = 1', 'value = "motor1"\nbit = 2', "its wires have the bits [0, 2, 2]"),
+    ('value = "motor1"\nbit = 1', 'value = "motor3"\nbit = 1', "width = 3, but its wires have the bits [0, 2]"),
+    ("safe = 1", "safe = 2", "safe = 2, expected 0, 1"),
+    ("safe = 1", "safe = true", "safe = True, expected 0, 1"),
+    ('safe = "hold"', "", "key 'safe' is missing"),
+    ("schema = 1", "schema = 2", "schema is 2, expected 1"),
+    ("schema = 1", "schema = true", "schema = True, expected an integer"),
+    ('default_revision = "rev-b"', 'default_revision = "rev-x"', "default_revision 'rev-x' is none of"),
+    ('default_revision = "rev-b"', "default_revision = 3", "default_revision = 3, expected a text"),
+    ('name = "DD2"', 'name = "DD2"\ncolour = "red"', "wire 'DD2': unknown key 'colour'"),
+    ("schema = 1", "schema = 1\ncolour = 1", "unknown key 'colour'"),
+    ('rev-b = "IO23"', 'rev-b = "IO40"', "esp32.rev-b = 'IO40', expected IO0..IO39"),
+    ('rev-b = "IO23"', 'rev-x = "IO23"', "esp32 names the unknown revision 'rev-x'"),
+    (', rev-c = "HC595.QA"', "", "esp32 has no pin for revision 'rev-c'"),
+    ('number = 1\ndirection = "to_bluepill"', 'number = 1\ndirection = "to_adapter"', "a distance wire is to_bluepill"),
+    ('name = "encoder1"\nrole = "encoder"\nside = "left"', 'name = "encoder1"\nrole = "encoder"\nside = "right"',
+     "expected ['encoder1', 'encoder2', 'motor1', 'motor2'] with their sides"),
+    ('name = "encoder1"\nrole = "encoder"\nside', 'name = "encoder1"\nrole = "motor"\nside', "wire encoder1_s1 has"),
+    ('name = "encoder1"\nrole', 'name = "encoder2"\nrole', "value 'encoder2' stands twice"),
+    ('shares = "DD7"', 'shares = "DD9"', "shares = 'DD9', expected the name of a wire"),
+    ('name = "p2os_rx"\ndirection = "in"', 'name = "p2os_rx"\ndirection = "up"', "'up', expected in or out"),
+    ('esp32 = { thesis-table3 = "IO16"', 'esp32 = 3 # { thesis-table3 = "IO16"', "esp32 = 3, expected a table"),
+    ("[[revision]]", "[[revisions]]", "key 'revision' is missing (expected one [[revision]] or more)"),
+    ("schema = 1", "schema = ", "pinout: Invalid value"),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("good", "bad", "message"), BROKEN)
+def test_a_broken_file_is_refused_with_the_place_and_the_reason(good: str, bad: str, message: str) -> None:
+    assert good in TEXT
+    count = -1 if good == "[[revision]]" else 1
+    with pytest.raises(PinoutError) as refusal:
+        parse_pinout(TEXT.replace(good, bad, count))
+    assert message in str(refusal.value)
+
+
+def test_a_value_left_out_is_missed_at_its_wires(tmp_path: Path) -> None:
+    start = TEXT.index('[[value]]\nname = "motor2"')
+    end = TEXT.index("# Pins of the ESP32 that reach")
+    file = tmp_path / "mine.toml"
+    file.write_text(TEXT[:start] + TEXT[end:], encoding="utf-8")
+    with pytest.raises(PinoutError, match=r"mine\.toml: values are \['encoder1', 'encoder2', 'motor1'\]"):
+        load_pinout(file)
+
+
+def test_a_missing_file_is_one_error(tmp_path: Path) -> None:
+    with pytest.raises(PinoutError, match="cannot read pin-out"):
+        load_pinout(tmp_path / "none.toml")
+
+
+@given(st.integers(0, len(TEXT) - 1), st.integers(1, 40))
+def test_a_file_cut_anywhere_loads_or_is_refused_but_never_crashes(start: int, length: int) -> None:
+    try:
+        pinout = parse_pinout(TEXT[:start] + TEXT[start + length :])
+    except PinoutError:
+        return
+    assert len({wire.bluepill for wire in pinout.wires}) == len(pinout.wires)
