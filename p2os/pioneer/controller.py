@@ -79,6 +79,7 @@ class _Snapshot:
     body_now: Nanos
     sip_due: Nanos | None
     ignored: int
+    complaints: tuple[str, ...]
     connection: object
     output: tuple[bytes, ...]
     motion: object
@@ -105,6 +106,7 @@ class Pioneer:
         self._body_now: Nanos = 0
         self._sip_due: Nanos | None = None
         self._ignored = 0
+        self._complaints: tuple[str, ...] = ()
         self._connection = self._new_connection()
         self._output: list[bytes] = []
         self._works = Works(
@@ -178,6 +180,7 @@ class Pioneer:
             body_now=self._body_now,
             sip_due=self._sip_due,
             ignored=self._ignored,
+            complaints=self._complaints,
             connection=self._connection.snapshot(),
             output=tuple(self._output),
             motion=works.motion.snapshot(),
@@ -193,6 +196,7 @@ class Pioneer:
         self._body_now = saved.body_now
         self._sip_due = saved.sip_due
         self._ignored = saved.ignored
+        self._complaints = saved.complaints
         self._connection.restore(saved.connection)
         self._output = list(saved.output)
         works.motion.restore(saved.motion)
@@ -293,6 +297,7 @@ class Pioneer:
         works.motion.release()
         works.motion.limits = MotionLimits.of(self.parameters)
         works.sonar = self._new_sonar()
+        self._complaints = ()
         was_open, self._sip_due = self._sip_due is not None, None
         if was_open:
             self._tell(now, "closed", detail)
@@ -302,12 +307,16 @@ class Pioneer:
         refusal = apply(works, command, now)
         if refusal is not None:
             self._ignored += 1
-            self._tell(now, "command ignored", f"{command.name}: {refusal}")
+            complaint = f"{command.name}: {refusal}"
+            if complaint not in self._complaints:  # a client may repeat itself ten times a second
+                self._complaints += (complaint,)
+                self._tell(now, "command ignored", complaint)
         if works.motors_enabled is not had_power:
             self._tell(now, "motors", "on" if works.motors_enabled else "off")
         if works.config_wanted:
             works.config_wanted = False
-            self._connection.send(configuration(self.parameters, self.settings, works.motion.limits), now)
+            if self._connection.is_open:  # else the client has asked and closed in one breath
+                self._connection.send(configuration(self.parameters, self.settings, works.motion.limits), now)
 
     # What the robot says ---------------------------------------------------------------
 

@@ -1,7 +1,9 @@
 """A body without physics and a robot on it, for the tests of the controller and its host."""
 
+import json
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
+from pathlib import Path
 
 import pytest
 
@@ -62,8 +64,8 @@ class PerfectBody:
 class Robot:
     """A virtual robot and a client that speaks in frames."""
 
-    def __init__(self, parameters: RobotParameters, settings: ControllerSettings) -> None:
-        self.body = PerfectBody()
+    def __init__(self, parameters: RobotParameters, settings: ControllerSettings, dt_ns: int = NS_PER_MS) -> None:
+        self.body = PerfectBody(dt_ns=dt_ns)
         self.events: list[tuple[int, str, str]] = []
         self.pioneer = Pioneer(
             parameters=parameters, body=self.body, settings=settings,
@@ -119,10 +121,13 @@ class Robot:
         return [what for _, what, _ in self.events]
 
 
-@pytest.fixture
+@pytest.fixture(scope="session")
 def make_robot() -> Callable[..., Robot]:
-    def make(*, model: str = "p2dx", parameters: RobotParameters | None = None, **settings: object) -> Robot:
-        return Robot(parameters or load_parameters(model), ControllerSettings(**settings))  # type: ignore[arg-type]
+    def make(
+        *, model: str = "p2dx", parameters: RobotParameters | None = None, dt_ns: int = NS_PER_MS, **settings: object
+    ) -> Robot:
+        chosen = ControllerSettings(**settings)  # type: ignore[arg-type]  # a test says what it means
+        return Robot(parameters or load_parameters(model), chosen, dt_ns)
 
     return make
 
@@ -135,3 +140,22 @@ def robot(make_robot: Callable[..., Robot]) -> Robot:
 @pytest.fixture(params=list(Profile), ids=lambda profile: profile.value)
 def profile(request: pytest.FixtureRequest) -> Profile:
     return request.param
+
+
+def client_side(name: str) -> list[tuple[float, bytes]]:
+    """Return what the client of a captured conversation sent: (seconds, bytes)."""
+    path = Path(__file__).resolve().parent.parent / "golden" / "captures" / f"{name}.jsonl"
+    rows = [json.loads(line) for line in path.read_text(encoding="utf-8").splitlines()]
+    return [(row["t"], bytes.fromhex(row["hex"])) for row in rows if row["dir"] == "c2s"]
+
+
+@pytest.fixture
+def aria() -> list[tuple[float, bytes]]:
+    """AriaCoda's demo: 34 s of driving and turning."""
+    return client_side("aria_p2de")
+
+
+@pytest.fixture
+def player() -> list[tuple[float, bytes]]:
+    """player's p2os driver: 9 s, commands without arguments, a lone type byte, VEL2."""
+    return client_side("player_p2de")
