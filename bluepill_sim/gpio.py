@@ -21,8 +21,6 @@ _LCKK = 1 << 16
 _CR_RESET = 0x4444_4444
 #: CNF[1:0] MODE[1:0] of a pin after reset.
 _FLOATING_NIBBLE = 0x4
-#: LCKK of the three writes that begin the lock sequence; a read completes it (RM0008 9.2.7).
-_LOCK_WRITES = (_LCKK, 0, _LCKK)
 
 _INPUT_MODES = (PinMode.ANALOG, PinMode.FLOATING, PinMode.PULLED, PinMode.FLOATING)
 _OUTPUT_MODES = (PinMode.PUSH_PULL, PinMode.OPEN_DRAIN, PinMode.ALTERNATE_PUSH_PULL, PinMode.ALTERNATE_OPEN_DRAIN)
@@ -33,7 +31,7 @@ PIN_MODES = tuple((_OUTPUT_MODES if nibble & 3 else _INPUT_MODES)[nibble >> 2] f
 class Gpio(Peripheral):
     """One general-purpose I/O port; the last letter of its name is the port's."""
 
-    STATE = ("_lock_step", "_lock_wanted", "_locked")
+    STATE = ("_lock_writes", "_locked")
     REGISTERS = (
         Register(name="CRL", offset=0x00, reset=_CR_RESET, on_write="_write_crl"),
         Register(name="CRH", offset=0x04, reset=_CR_RESET, on_write="_write_crh"),
@@ -49,9 +47,8 @@ class Gpio(Peripheral):
     def __init__(self, chip: ChipPorts, place: Place) -> None:
         super().__init__(chip, place)
         self._pins = chip.pins.port(place.name[-1])
-        #: Writes of the lock sequence seen so far, and the pins that they named.
-        self._lock_step = 0
-        self._lock_wanted = 0
+        #: The last three writes to LCKR.
+        self._lock_writes: tuple[int, ...] = ()
         #: Pins whose configuration is frozen until reset.
         self._locked = 0
         for pin in self._pins:
@@ -60,7 +57,8 @@ class Gpio(Peripheral):
 
     def on_reset(self) -> None:
         """Make every pin a floating input and undo the lock."""
-        self._lock_step = self._lock_wanted = self._locked = 0
+        self._lock_writes = ()
+        self._locked = 0
         for pin in self._pins:
             pin.configure(PinMode.FLOATING, output_bit=False)
             self._input_changed(pin)
@@ -120,25 +118,16 @@ class Gpio(Peripheral):
             self._pins[lowest.bit_length() - 1].set_output_bit(bool(bits_now & lowest))
 
     def _write_lckr(self, written: int, _previous: int) -> None:
-        if self._locked or self.words[LCKR] & _LCKK:
-            return
-        self.words[LCKR] = pins = written & _PORT
-        expected = _LOCK_WRITES[self._lock_step] if self._lock_step < len(_LOCK_WRITES) else None
-        goes_on = written & _LCKK == expected and (self._lock_step == 0 or pins == self._lock_wanted)
-        if goes_on:
-            self._lock_step += 1
-            self._lock_wanted = pins
-        elif written & _LCKK:
-            # Not the write that was due, but one that can begin a new sequence.
-            self._lock_step, self._lock_wanted = 1, pins
-        else:
-            self._lock_step = 0
+        if not self.words[LCKR] & _LCKK:
+            self.words[LCKR] = written & _PORT
+            self._lock_writes = (*self._lock_writes, written & (_LCKK | _PORT))[-3:]
 
     def _read_lckr(self) -> int:
-        """Return LCKR; the read after the three writes reads LCKK as 0 and closes the lock."""
+        """Return LCKR; a read after the three writes reads LCKK as 0 and closes the lock."""
         word = self.words[LCKR]
-        if self._lock_step == len(_LOCK_WRITES):
-            self._lock_step = 0
-            self._locked = self._lock_wanted
+        pins = word & _PORT
+        # The same pins three times, with LCKK = 1, 0, 1 (RM0008 9.2.7).
+        if self._lock_writes == (_LCKK | pins, pins, _LCKK | pins) and not word & _LCKK:
+            self._locked = pins
             self.words[LCKR] |= _LCKK
         return word

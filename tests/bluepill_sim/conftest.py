@@ -1,0 +1,112 @@
+"""A chip without a CPU: the ports that peripherals need, and the whole set of parts on them."""
+
+from collections.abc import Callable
+
+import pytest
+from hypothesis import settings
+
+from bluepill_sim.clocks import Clocks
+from bluepill_sim.stm32f103 import ChipParts, make_parts, make_pins
+
+settings.register_profile("quick", max_examples=60, deadline=None)
+settings.load_profile("quick")
+
+
+class FakeChip:
+    """`ChipPorts` with a clock that the test moves, and a record of all that it is told."""
+
+    def __init__(self) -> None:
+        self.now_ns = 0
+        self.clocks = Clocks()
+        self.pins = make_pins(self)
+        self.irqs: dict[int, bool] = {}
+        self.pulses: list[int] = []
+        self.signals: list[str] = []
+        self.warnings: dict[str, str] = {}
+        self.resets: list[str] = []
+        self.stops = 0
+        self.deadline_changes = 0
+        self.clock_changes = 0
+        self._parts: ChipParts | None = None
+        self._parts = make_parts(self)
+
+    @property
+    def parts(self) -> ChipParts:
+        assert self._parts is not None
+        return self._parts
+
+    def set_irq(self, irq: int, level: bool) -> None:
+        self.irqs[irq] = level
+
+    def pulse_irq(self, irq: int) -> None:
+        self.pulses.append(irq)
+
+    def clock_changed(self) -> None:
+        self.clock_changes += 1
+        if self._parts is not None:
+            self._parts.clock_changed()
+
+    def request_stop(self) -> None:
+        self.stops += 1
+
+    def deadline_changed(self) -> None:
+        self.deadline_changes += 1
+
+    def reset_peripheral(self, name: str) -> None:
+        self.resets.append(name)
+        part = self.parts.by_name.get(name)
+        if part is not None:
+            part.reset()
+
+    def signal(self, name: str) -> None:
+        self.signals.append(name)
+
+    def warn(self, message: str, *, once: str) -> None:
+        self.warnings.setdefault(once, message)
+
+    # For the tests.
+
+    def advance(self, to_ns: int) -> None:
+        """Run to a point in time, stopping at each deadline as the real chip does."""
+        while True:
+            due_ns = self.parts.next_deadline()
+            if due_ns is None or due_ns > to_ns:
+                break
+            assert due_ns >= self.now_ns
+            self.now_ns = due_ns
+            self.parts.advance_to(due_ns)
+        self.now_ns = to_ns
+
+    def write(self, register: str, value: int, size: int = 4, byte: int = 0) -> None:
+        """Write "GPIOA.ODR" or, with `byte`, a part of it."""
+        name, _, field = register.partition(".")
+        part = self.parts.by_name[name]
+        offset = next(r.offset for r in part.REGISTERS if r.name == field)
+        part.write(offset + byte, size, value)
+
+    def read(self, register: str, size: int = 4, byte: int = 0) -> int:
+        name, _, field = register.partition(".")
+        part = self.parts.by_name[name]
+        offset = next(r.offset for r in part.REGISTERS if r.name == field)
+        return part.read(offset + byte, size)
+
+    def run_at_72_mhz(self) -> None:
+        """Do what every program does: HSE, PLL times 9, two wait states, PCLK1 halved."""
+        self.write("FLASH.ACR", 0x12)
+        self.write("RCC.CR", self.read("RCC.CR") | 1 << 16)
+        self.advance(self.now_ns + 2_000_000)
+        self.write("RCC.CFGR", 1 << 16 | 7 << 18 | 4 << 8)
+        self.write("RCC.CR", self.read("RCC.CR") | 1 << 24)
+        self.advance(self.now_ns + 200_000)
+        self.write("RCC.CFGR", self.read("RCC.CFGR") | 2)
+
+
+@pytest.fixture
+def fake_chip() -> FakeChip:
+    return FakeChip()
+
+
+@pytest.fixture(scope="session")
+def make_fake_chip() -> Callable[[], FakeChip]:
+    """For hypothesis, which makes many."""
+    return FakeChip
