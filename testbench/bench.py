@@ -16,7 +16,6 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Protocol, cast
 
-
 from adapter_sim.adapter import Adapter
 from adapter_sim.pinout import Pinout, Pull, Role, load_pinout
 from p2os.pioneer.body import RobotBody, make_body
@@ -115,6 +114,16 @@ class Bench:
         chip.usart1.on_transmit = lambda byte, at: self.recorder.usart(bytes([byte]), at)
         chip.on_warning = lambda text: self.recorder.event("chip", chip.now_ns, "warning", text)
         self.recorder.start()
+
+    @property
+    def chip(self) -> Chip:
+        """Return the chip."""
+        return self.parts.chip
+
+    @property
+    def note(self) -> str | None:
+        """Return what a reader of the result has to know of the body."""
+        return self.parts.body.note
 
     @property
     def now(self) -> Nanos:

@@ -10,10 +10,13 @@ import time
 from collections.abc import Callable
 
 from p2os.errors import LocalProtocolError
-from p2os.timing import NS_PER_S, Nanos
+from p2os.timing import NS_PER_MS, NS_PER_S, Nanos
 
 #: A clock that never goes back, in nanoseconds.
 Clock = Callable[[], Nanos]
+
+#: chosen: the grain of pacing, fine enough for a line of 9600 bit/s.
+PACED_SLICE_NS: Nanos = 2 * NS_PER_MS
 
 wall_clock: Clock = time.monotonic_ns
 

@@ -1,4 +1,4 @@
-"""Runs a scenario into a run folder: the function behind `p2os run`.
+"""Runs a scenario into a run folder: the functions behind `p2os run`.
 
 The trace is written while the run goes on; when the run ends, however it ends,
 the goals are judged from it and everything else in the folder is made from it.
@@ -7,28 +7,25 @@ Invariant: whatever raises in between, the trace is closed and readable.
 """
 
 import contextlib
-import hashlib
-import math
 from collections.abc import Callable
 from dataclasses import dataclass
-from importlib.metadata import version
 from pathlib import Path
 
-from p2os.errors import UsageError
-from p2os.pioneer.scenery import World
+from p2os.errors import P2osError
 from p2os.timing import NS_PER_MS, NS_PER_S, Nanos
-from testbench.artefacts import Artefacts, make_artefacts
+from p2os.transport import Transport
+from testbench.artefacts import make_artefacts
 from testbench.bench import Bench
 from testbench.goals import judge
-from testbench.outcome import SUMMARY_NAME
-from testbench.pacer import Clock, Pacer, wall_clock
+from testbench.pacer import PACED_SLICE_NS, Clock, Pacer, wall_clock
+from testbench.remote import RemoteBench
 from testbench.report.run_record import Json, read_run
+from testbench.run_folder import meta_of, prepare_folder
 from testbench.scenario import Scenario
 from testbench.trace import TRACE_NAME, TraceWriter
 
 #: chosen: without pacing, control comes back often enough for progress and Ctrl-C.
 UNPACED_SLICE_NS: Nanos = 10 * NS_PER_MS
-PACED_SLICE_NS: Nanos = 2 * NS_PER_MS
 #: Nothing seen of the firmware for so long at the end of a run is worth a word: it spins, or has died quietly.
 QUIET_NS: Nanos = 1 * NS_PER_S
 
@@ -41,6 +38,9 @@ class Progress:
     duration_ns: Nanos
     #: What the robot is doing, in a few words.
     doing: str
+
+
+ProgressListener = Callable[[Progress], None]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -65,10 +65,10 @@ def run_scenario(
     *,
     slice_ns: Nanos | None = None,
     speed: float | None = None,
-    on_progress: Callable[[Progress], None] | None = None,
+    on_progress: ProgressListener | None = None,
     clock: Clock = wall_clock,
 ) -> RunResult:
-    """Run a scenario and make its run folder.
+    """Run a scenario in virtual time and make its run folder.
 
     Args:
         scenario: What to run.
@@ -83,156 +83,116 @@ def run_scenario(
     """
     prepare_folder(folder)
     pacer = None if speed is None else Pacer(speed=speed, clock=clock)
-    bench: Bench | None = None
+    with contextlib.closing(TraceWriter(folder / TRACE_NAME)) as trace:
+        bench = Bench(scenario, trace=trace, slice_ns=slice_ns or (PACED_SLICE_NS if pacer else UNPACED_SLICE_NS))
 
-    def after_slice(now: Nanos) -> None:
-        if pacer is not None:
-            pacer.keep_pace(now)
-        if on_progress is not None and bench is not None:
-            on_progress(Progress(now=now, duration_ns=scenario.duration_ns, doing=doing(bench)))
+        def after_slice(now: Nanos) -> None:
+            if pacer is not None:
+                pacer.keep_pace(now)
+            if on_progress is not None:
+                on_progress(Progress(now=now, duration_ns=scenario.duration_ns, doing=doing(bench)))
 
-    trace = TraceWriter(folder / TRACE_NAME)
-    with contextlib.closing(trace):
-        bench = Bench(
-            scenario,
-            trace=trace,
-            slice_ns=slice_ns or (UNPACED_SLICE_NS if pacer is None else PACED_SLICE_NS),
-            on_slice=after_slice,
-        )
-        trace.meta(meta_of(scenario, bench.parts.world, bench.parts.body.note))
-        began = clock()
-        if pacer is not None:
-            pacer.start(0)
-        was_interrupted = _run_to_end(bench, scenario.duration_ns)
-        end = bench.finish()
-        wall_s = (clock() - began) / NS_PER_S
-        artefacts = _close(bench, trace, folder, end, wall_s, pacer, was_interrupted=was_interrupted)
-    return RunResult(folder=folder, outcome=artefacts.outcome, report=artefacts.report, was_interrupted=was_interrupted)
+        bench.loop.on_slice = after_slice
+        trace.meta(meta_of(scenario, bench.parts.world, bench.note))
+        return _record(bench, trace, folder, pacer, clock)
 
 
-def prepare_folder(folder: Path) -> None:
-    """Make a run folder, or clear one of an earlier run.
+def run_at_port(
+    scenario: Scenario,
+    folder: Path,
+    transport: Transport,
+    *,
+    on_progress: ProgressListener | None = None,
+    clock: Clock = wall_clock,
+) -> RunResult:
+    """Drive the robot at a transport in real time (mode C), stop it, and make the run folder.
+
+    The transport is closed in any case. A lost line, lag and Ctrl-C are failures of the run.
 
     Raises:
-        UsageError: The folder holds something else.
+        P2osError: A file cannot be read, or a part is not installed.
     """
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise UsageError(f"cannot make the run folder {folder}: {error.strerror}") from error
-    if any(folder.iterdir()) and not (folder / TRACE_NAME).is_file():
-        raise UsageError(f"{folder} holds something that is no run", hint="--out takes a new or an empty folder")
-    for name in (TRACE_NAME, SUMMARY_NAME, "report.html", "pins.vcd", "pins.sr", "wire.jsonl", "usart.txt"):
-        (folder / name).unlink(missing_ok=True)
+    pacer = Pacer(clock=clock)
+    with contextlib.ExitStack() as stack:
+        stack.callback(transport.close)
+        prepare_folder(folder)
+        trace = stack.enter_context(contextlib.closing(TraceWriter(folder / TRACE_NAME)))
+        bench = RemoteBench(scenario, transport, pacer, trace=trace)
+
+        def after_slice(now: Nanos) -> None:
+            if on_progress is not None:
+                on_progress(Progress(now=now, duration_ns=scenario.duration_ns, doing=doing(bench)))
+
+        bench.on_slice = after_slice
+        trace.meta(meta_of(scenario, None, bench.note))
+        return _record(bench, trace, folder, pacer, clock)
 
 
-def meta_of(scenario: Scenario, world: World, note: str | None) -> Json:
-    """Return the trace's first line: what was run, where, with what robot."""
-    parameters = scenario.parameters
-    start = scenario.start or world.start
-    return {
-        "version": version("p2os"),
-        "scenario": scenario.name,
-        "description": scenario.description,
-        "text": scenario.text,
-        "firmware": scenario.firmware.name,
-        "firmware_sha256": hashlib.sha256(scenario.firmware.read_bytes()).hexdigest(),
-        "mode": scenario.mode,
-        "body": scenario.body,
-        "seed": scenario.seed,
-        "duration_s": scenario.duration_ns / NS_PER_S,
-        "threshold_m": scenario.threshold_m,
-        "step_mps": (scenario.direct if scenario.mode == "direct" else scenario.adapter).step_um_per_s / 1e6,
-        "note": note,
-        "start": {"x": start.x_m, "y": start.y_m, "heading": start.heading_rad},
-        "world": world.to_plain(),
-        "robot": {
-            "name": scenario.robot,
-            "front_m": parameters.body.hull_front_m,
-            "rear_m": parameters.body.hull_rear_m,
-            "width_m": parameters.body.hull_width_m,
-            "track_m": parameters.track_mm / 1000,
-            "wheel_diameter_m": parameters.body.wheel_diameter_m,
-            "sonar": [
-                [sonar.x_mm / 1000, sonar.y_mm / 1000, math.radians(sonar.heading_deg)]
-                for sonar in parameters.sonar[: parameters.sonar_fitted]
-            ],
-            "sonar_cone_rad": math.radians(parameters.sonar_cone_deg),
-            "sonar_range_m": parameters.sonar_range_m,
-        },
-    }
-
-
-def doing(bench: Bench) -> str:
+def doing(bench: Bench | RemoteBench) -> str:
     """Return what the robot is doing, in a few words."""
     state, text = bench.recorder.last_state, bench.recorder.last_line
     wheels = "" if state is None else f"{state.left_speed_mps * 1000:+.0f} / {state.right_speed_mps * 1000:+.0f} mm/s"
     return f"{wheels}  {text}".strip()
 
 
-def _run_to_end(bench: Bench, end: Nanos) -> bool:
-    """Run; return whether Ctrl-C ended it."""
+def _record(
+    bench: Bench | RemoteBench, trace: TraceWriter, folder: Path, pacer: Pacer | None, clock: Clock
+) -> RunResult:
+    """Run to the end, judge the goals, write the trace's last line, and make the rest of the folder."""
+    failures: list[str] = []
+    was_interrupted = False
+    began = clock()
+    if pacer is not None:
+        pacer.start(0)
     try:
-        bench.run_until(end)
+        bench.run_until(bench.scenario.duration_ns)
     except KeyboardInterrupt:
-        return True
-    return False
-
-
-def _close(
-    bench: Bench,
-    trace: TraceWriter,
-    folder: Path,
-    end: Nanos,
-    wall_s: float,
-    pacer: Pacer | None,
-    *,
-    was_interrupted: bool,
-) -> Artefacts:
-    """Judge the goals, write the trace's last line, and make the rest of the folder."""
-    recorder = bench.recorder
-    met, failures = judge(read_run(folder), bench.scenario.goals)
-    fault = fault_text(bench)
-    if fault is not None:
-        failures.insert(0, fault)
-    if was_interrupted:
-        failures.insert(0, f"interrupted at {end / NS_PER_S:.3f} s")
-    virtual_s = end / NS_PER_S
+        was_interrupted = True
+        failures.append("interrupted by Ctrl-C")
+    except P2osError as error:
+        failures.append(str(error))
+    end = bench.finish()
+    wall_s = (clock() - began) / NS_PER_S
+    if bench.chip.fault is not None:
+        failures.append(f"firmware fault: {bench.chip.fault}")
+    record = read_run(folder)
+    met, missed = judge(record, bench.scenario.goals)
     trace.end(
-        {
-            "virtual_s": virtual_s,
-            "wall_s": round(wall_s, 3),
-            "real_time_factor": round(virtual_s / wall_s, 2) if wall_s > 0 else None,
-            "distance_m": round(recorder.distance_m, 6),
-            "collisions": None if recorder.last_state is None else recorder.last_state.collisions,
-            "min_clearance_m": None if recorder.min_clearance_m is None else round(recorder.min_clearance_m, 6),
+        _figures(bench, end, wall_s)
+        | {
             "trace_sha256": trace.sha256,
-            "passed": not failures,
-            "failures": failures,
+            "passed": not failures and not missed,
+            "failures": failures + missed,
             "goals_met": met,
             "notes": notes(bench, end, pacer),
             "worst_lag_ms": None if pacer is None else round(pacer.worst_lag_ns / NS_PER_MS, 1),
         }
     )
-    return make_artefacts(folder)
+    made = make_artefacts(folder)
+    return RunResult(folder=folder, outcome=made.outcome, report=made.report, was_interrupted=was_interrupted)
 
 
-def fault_text(bench: Bench) -> str | None:
-    """Return what made the firmware stand still, or None."""
-    fault = bench.parts.chip.fault
-    return None if fault is None else f"firmware fault: {fault}"
+def _figures(bench: Bench | RemoteBench, end: Nanos, wall_s: float) -> Json:
+    recorder, virtual_s = bench.recorder, end / NS_PER_S
+    clearance = recorder.min_clearance_m
+    return {
+        "virtual_s": virtual_s,
+        "wall_s": round(wall_s, 3),
+        "real_time_factor": round(virtual_s / wall_s, 2) if wall_s > 0 else None,
+        "distance_m": round(recorder.distance_m, 6),
+        "collisions": None if recorder.last_state is None else recorder.last_state.collisions,
+        "min_clearance_m": None if clearance is None else round(clearance, 6),
+    }
 
 
-def notes(bench: Bench, end: Nanos, pacer: Pacer | None) -> list[str]:
+def notes(bench: Bench | RemoteBench, end: Nanos, pacer: Pacer | None) -> list[str]:
     """Return what a reader of the result should know besides the verdict."""
-    chip = bench.parts.chip
-    result = [note for note in (bench.parts.body.note,) if note]
+    chip = bench.chip
+    result = [note for note in (bench.note,) if note]
     result += chip.warnings
-    quiet_since = max(chip.activity.last_pin_ns, chip.activity.last_usart_ns, chip.activity.last_wfi_ns)
-    if chip.fault is None and end - quiet_since >= QUIET_NS:
-        result.append(
-            f"no pin, USART or WFI was seen since {quiet_since / NS_PER_S:.3f} s; the program is at {chip.where()}"
-        )
+    seen = max(chip.activity.last_pin_ns, chip.activity.last_usart_ns, chip.activity.last_wfi_ns)
+    if chip.fault is None and end - seen >= QUIET_NS:
+        result.append(f"no pin, USART or WFI was seen since {seen / NS_PER_S:.3f} s; the program is at {chip.where()}")
     if pacer is not None and pacer.worst_lag_ns > PACED_SLICE_NS:
         result.append(f"the run lagged behind the wall clock by up to {pacer.worst_lag_ns / NS_PER_MS:.0f} ms")
     return result

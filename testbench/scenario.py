@@ -16,14 +16,12 @@ from importlib.resources import as_file, files
 from pathlib import Path
 from typing import cast
 
-from p2os.pioneer.world import known_worlds
-
 from adapter_sim.codec import BitOrder
 from adapter_sim.settings import AdapterSettings
 from p2os.errors import ScenarioError, UsageError
 from p2os.parameters import RobotParameters, load_parameters
 from p2os.pioneer.controller import ControllerSettings, SonarPerSip
-from p2os.pioneer.world import Pose
+from p2os.pioneer.world import Pose, known_worlds
 from p2os.timing import NS_PER_MS, NS_PER_S, Nanos
 from testbench.direct.robot import DirectSettings
 from testbench.goals import Goal, load_goal

@@ -36,6 +36,10 @@ class SipRanges:
             sip = StandardSip.from_frame(frame, self._profile)
         except RemoteProtocolError:
             return
+        self.take_sip(sip, now)
+
+    def take_sip(self, sip: StandardSip, now: Nanos) -> None:
+        """Take the readings of a standard packet."""
         for reading in sip.sonar:
             if reading.number < len(self._ranges_m):
                 metres = reading.raw_range * self._parameters.range_um_per_count / UM_PER_M

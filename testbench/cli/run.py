@@ -1,18 +1,21 @@
 """`p2os run`: one firmware, one scenario, one run folder with its report."""
 
 import json
+from dataclasses import replace
 from pathlib import Path
 from typing import Annotated
 
 import typer
 from typer.core import TyperCommand
 
-from p2os.errors import UsageError
+from p2os.errors import RunFailedError, UsageError
+from p2os.transport import open_url
 from testbench.cli.folders import next_folder
 from testbench.cli.progress import RunDisplay
 from testbench.cli.table import print_result
-from testbench.run import RunResult, run_scenario
-from testbench.scenario import load_scenario
+from testbench.remote import CAUTIOUS_ROTATION_DEG_S, CAUTIOUS_VELOCITY_MM_S
+from testbench.run import RunResult, run_at_port, run_scenario
+from testbench.scenario import Scenario, load_scenario
 
 EXIT_INTERRUPTED = 130
 
@@ -86,9 +89,58 @@ def run(
         firmware=firmware, mode=mode, body=body, world=world, seed=seed, duration_s=duration
     )  # fmt: skip
     folder = out or next_folder(wanted.name)
+    if port is not None:
+        result = drive_port(wanted, folder, port, yes=yes, max_speed=max_speed)
+        end_with(replace(result, was_interrupted=False), json_output=json_output)
+        return
     with RunDisplay() as display:
         result = run_scenario(wanted, folder, speed=realtime, on_progress=display.update)
     end_with(result, json_output=json_output)
+
+
+def drive_port(scenario: Scenario, folder: Path, url: str, *, yes: bool, max_speed: int | None) -> RunResult:
+    """Drive the robot at a URL after asking a person.
+
+    Raises:
+        TransportError: The port cannot be opened.
+        RunFailedError: The person said no.
+    """
+    scenario = capped(scenario, max_speed)
+    transport = open_url(url)
+    try:
+        if not yes:
+            ask(scenario, url)
+        with RunDisplay() as display:
+            return run_at_port(scenario, folder, transport, on_progress=display.update)
+    finally:
+        transport.close()
+
+
+def capped(scenario: Scenario, max_speed: int | None) -> Scenario:
+    """Return the scenario with the caps of an untried program, where neither it nor the command line says otherwise."""
+    adapter = scenario.adapter
+    velocity = max_speed or adapter.max_velocity_mm_s or CAUTIOUS_VELOCITY_MM_S
+    rotation = adapter.max_rotation_deg_s or CAUTIOUS_ROTATION_DEG_S
+    return replace(scenario, adapter=replace(adapter, max_velocity_mm_s=velocity, max_rotation_deg_s=rotation))
+
+
+def ask(scenario: Scenario, url: str) -> None:
+    """Ask whether the robot may move.
+
+    Raises:
+        RunFailedError: The answer is no, or nobody is there to answer.
+    """
+    adapter = scenario.adapter
+    question = (
+        f"{scenario.firmware.name} will move the robot at {url}, at most {adapter.max_velocity_mm_s} mm/s and "
+        f"{adapter.max_rotation_deg_s} deg/s. Is it free to move?"
+    )
+    try:
+        agreed = typer.confirm(question, err=True)
+    except typer.Abort:
+        agreed = False
+    if not agreed:
+        raise RunFailedError("nothing was sent to the robot: nobody said yes", hint="--yes says it beforehand")
 
 
 def end_with(result: RunResult, *, json_output: bool) -> None:
