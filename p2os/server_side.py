@@ -63,7 +63,7 @@ class ServerSide:
                 self._line.events.append(Closed())
             case Reply.COMMAND:
                 self._command(frame)
-            case None:
+            case _:
                 self._line.stats.frames_ignored += 1
 
     def next_deadline(self) -> Nanos | None:

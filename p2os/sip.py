@@ -7,6 +7,7 @@ them into SI.
 Invariant: `StandardSip.from_frame(sip.to_frame(profile), profile) == sip`.
 """
 
+import struct
 from dataclasses import dataclass
 
 from construct import Array, ConstructError, Int8ul, Int16sl, Int16ul, Struct, this
@@ -158,7 +159,7 @@ class StandardSip:
                 value.to_bytes(size, "little", signed=signed)
                 for value, (_, size, signed) in zip(self.tail, TAIL, strict=False)
             ]
-        except (ConstructError, OverflowError) as error:
+        except (ConstructError, OverflowError, struct.error) as error:
             raise LocalProtocolError(f"a value does not fit the SIP: {error}") from error
         return Frame(bytes((self.kind,)) + body + b"".join(tail) + self.rest)
 
