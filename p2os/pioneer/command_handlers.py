@@ -57,7 +57,8 @@ def apply(works: Works, command: Command, now: Nanos) -> str | None:
     if handler is None:
         return "unknown"
     if command.number in MOTION_COMMANDS and not works.motors_enabled:
-        return "motors are off"
+        is_to_stand = command.number in SPEED_COMMANDS and command.argument == 0
+        return None if is_to_stand else "motors are off"
     return None if handler(works, command, now) else "malformed"
 
 
@@ -187,10 +188,8 @@ HANDLERS: Mapping[int, Handler] = {
     CommandNumber.QSTOP: _plain(lambda works: works.motion.stop_now()),
 }
 
+SPEED_COMMANDS = frozenset({CommandNumber.ROTATE, CommandNumber.VEL, CommandNumber.RVEL, CommandNumber.VEL2})
 #: What has no effect while the motors are off, so that enabling them never moves the robot.
-MOTION_COMMANDS = frozenset(
-    {
-        CommandNumber.MOVE, CommandNumber.ROTATE, CommandNumber.VEL, CommandNumber.HEAD, CommandNumber.DHEAD,
-        CommandNumber.RVEL, CommandNumber.DCHEAD, CommandNumber.VEL2,
-    }
-)  # fmt: skip
+MOTION_COMMANDS = SPEED_COMMANDS | {
+    CommandNumber.MOVE, CommandNumber.HEAD, CommandNumber.DHEAD, CommandNumber.DCHEAD,
+}  # fmt: skip

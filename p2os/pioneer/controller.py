@@ -236,8 +236,8 @@ class Pioneer:
                 left, right = motion.wheels_mps
             else:
                 left, right = motion.step(works.travel_nm, works.heading_udeg)
-            state = body.step(left, right)
-            reckoning.advance(state.left_angle_rad, state.right_angle_rad)
+            wheels = body.step(left, right)
+            reckoning.advance(wheels.left_angle_rad, wheels.right_angle_rad)
             self._body_now += dt_ns
 
     def _new_connection(self) -> Connection:

@@ -6,8 +6,8 @@ from typing import Protocol
 from p2os.timing import Nanos
 
 
-class WheelState(Protocol):
-    """What the robot's own sensors know of its body; the pose is not among it."""
+class WheelAngles(Protocol):
+    """What the encoders say after a step."""
 
     @property
     def left_angle_rad(self) -> float:
@@ -18,6 +18,10 @@ class WheelState(Protocol):
     def right_angle_rad(self) -> float:
         """Turned by the right wheel since the body was reset, forward positive."""
         ...
+
+
+class WheelState(WheelAngles, Protocol):
+    """What the robot's own sensors know of its body; the pose is not among it."""
 
     @property
     def left_speed_mps(self) -> float:
@@ -53,7 +57,7 @@ class Body(Protocol):
         """What the sensors know now."""
         ...
 
-    def step(self, left_mps: float, right_mps: float) -> WheelState:
+    def step(self, left_mps: float, right_mps: float) -> WheelAngles:
         """Live one step with these rim-speed set-points."""
         ...
 

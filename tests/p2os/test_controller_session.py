@@ -62,6 +62,12 @@ def test_motors_are_off_on_a_new_connection_and_motion_is_refused(robot: Any) ->
     assert robot.body.state.left_speed_mps == 0
     assert robot.pioneer.state.ignored_commands == 1
     assert ("command ignored", "VEL: motors are off") in [event[1:] for event in robot.events]
+    for number in (C.VEL, C.RVEL, C.VEL2, C.ROTATE):
+        robot.say(number, 0)
+    assert robot.pioneer.state.ignored_commands == 1, "being told to stand is not refused"
+    for number in (C.HEAD, C.MOVE):
+        robot.say(number, 0)
+    assert robot.pioneer.state.ignored_commands == 3
 
 
 def test_enabling_the_motors_never_moves_the_robot(robot: Any) -> None:

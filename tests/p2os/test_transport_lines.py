@@ -144,7 +144,7 @@ def test_nobody_has_come_until_somebody_has() -> None:
 
 def test_a_tcp_port_that_is_taken_is_an_error_with_a_hint() -> None:
     first = listen_url("tcp:127.0.0.1:0")
-    with pytest.raises(TransportError, match="cannot listen on tcp:127.0.0.1:.*in use") as caught:
+    with pytest.raises(TransportError, match=r"cannot listen on tcp:127\.0\.0\.1:.*in use") as caught:
         listen_url(first.description)
     assert "another port" in str(caught.value.hint)
     first.close()
@@ -166,9 +166,13 @@ def test_a_host_without_address_is_an_error() -> None:
 def test_a_client_that_stops_reading_is_an_error_before_memory_runs_out() -> None:
     near, far = socket.socketpair()
     transport = SocketTransport(near, "loop:test")
-    with pytest.raises(TransportError, match="stopped reading"):
+
+    def flood() -> None:
         for _ in range(1000):
             transport.write(bytes(BACKLOG_BYTES))
+
+    with pytest.raises(TransportError, match="stopped reading"):
+        flood()
     far.close()
     with pytest.raises(HungUpError):
         transport.write(b"x")
@@ -337,10 +341,14 @@ def test_a_serial_port_that_vanishes_is_a_hang_up() -> None:
     listener = listen_url("pty:")
     port = open_url(f"serial:{listener.description.removeprefix('pty:')}?baud=38400")
     listener.close()
-    with pytest.raises(HungUpError, match="vanished"):
+
+    def use() -> None:
         for _ in range(100):
             port.read()
             port.write(b"x")
+
+    with pytest.raises(HungUpError, match="vanished"):
+        use()
     port.close()
 
 
@@ -373,7 +381,7 @@ def test_a_serial_port_nobody_took_is_given_back() -> None:
 class StuckPort:
     """A pyserial port that takes nothing and has no descriptor."""
 
-    def write(self, data: bytes) -> None:
+    def write(self, _data: bytes) -> None:
         raise serial.SerialTimeoutException
 
 

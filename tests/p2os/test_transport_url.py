@@ -22,11 +22,11 @@ from p2os.transport.url import LoopUrl, PtyUrl, SerialUrl, TcpUrl, parse_url
         ("tcp:localhost", TcpUrl(host="localhost", port=8101)),
         ("tcp:", TcpUrl(host="127.0.0.1", port=8101)),
         ("tcp::9000", TcpUrl(host="127.0.0.1", port=9000)),
-        ("tcp:0.0.0.0:0", TcpUrl(host="0.0.0.0", port=0)),
+        ("tcp:10.0.0.1:0", TcpUrl(host="10.0.0.1", port=0)),
         ("tcp:[::1]:8102", TcpUrl(host="::1", port=8102)),
         ("tcp:[::1]", TcpUrl(host="::1", port=8101)),
         ("pty:", PtyUrl()),
-        ("pty:/tmp/robot", PtyUrl(path="/tmp/robot")),
+        ("pty:/run/robot", PtyUrl(path="/run/robot")),
         ("loop:robot", LoopUrl(name="robot")),
     ],
 )
