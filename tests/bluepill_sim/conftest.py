@@ -3,13 +3,9 @@
 from collections.abc import Callable
 
 import pytest
-from hypothesis import settings
 
 from bluepill_sim.clocks import Clocks
 from bluepill_sim.stm32f103 import ChipParts, make_parts, make_pins
-
-settings.register_profile("quick", max_examples=60, deadline=None)
-settings.load_profile("quick")
 
 
 class FakeChip:

@@ -4,8 +4,10 @@ from collections.abc import Callable
 from typing import Any
 
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
+
+QUICK = settings(max_examples=40, deadline=None)
 
 IRQ_OF_LINE = {0: 6, 1: 7, 2: 8, 3: 9, 4: 10, 5: 23, 9: 23, 10: 40, 12: 40, 15: 40}
 
@@ -114,6 +116,7 @@ def test_inner_lines_have_their_own_interrupts(fake_chip: Any, line: int, irq: i
     assert not fake_chip.irqs[irq]
 
 
+@QUICK
 @given(
     levels=st.lists(st.tuples(st.integers(0, 15), st.booleans()), max_size=30),
     rising=st.integers(0, 0xFFFF),

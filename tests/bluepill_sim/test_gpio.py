@@ -4,12 +4,14 @@ from collections.abc import Callable
 from typing import Any
 
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, invariant, rule, run_state_machine_as_test
 
 from bluepill_sim.gpio import PIN_MODES
 from bluepill_sim.pins import PinDrive, PinMode
+
+QUICK = settings(max_examples=40, deadline=None)
 
 LCKK = 1 << 16
 WORDS = st.integers(0, 0xFFFF_FFFF)
@@ -34,10 +36,9 @@ def test_configuration_bits_choose_the_mode(nibble: int, mode: PinMode) -> None:
     assert PIN_MODES[nibble] is mode
 
 
+@QUICK
 @given(crl=WORDS, crh=WORDS, odr=HALFWORDS)
-def test_each_pin_takes_the_mode_of_its_nibble(
-    make_fake_chip: Callable[[], Any], crl: int, crh: int, odr: int
-) -> None:
+def test_each_pin_takes_the_mode_of_its_nibble(make_fake_chip: Callable[[], Any], crl: int, crh: int, odr: int) -> None:
     chip = make_fake_chip()
     chip.write("GPIOC.ODR", odr)
     chip.write("GPIOC.CRL", crl)
@@ -51,10 +52,9 @@ def test_each_pin_takes_the_mode_of_its_nibble(
             assert pin.output is (PinDrive.HIGH if odr >> pin.number & 1 else PinDrive.LOW)
 
 
+@QUICK
 @given(start=HALFWORDS, word=WORDS)
-def test_bsrr_sets_and_resets_at_once_and_a_set_wins(
-    make_fake_chip: Callable[[], Any], start: int, word: int
-) -> None:
+def test_bsrr_sets_and_resets_at_once_and_a_set_wins(make_fake_chip: Callable[[], Any], start: int, word: int) -> None:
     chip = make_fake_chip()
     chip.write("GPIOB.ODR", start)
     chip.write("GPIOB.BSRR", word)
@@ -62,6 +62,7 @@ def test_bsrr_sets_and_resets_at_once_and_a_set_wins(
     assert chip.read("GPIOB.BSRR") == 0
 
 
+@QUICK
 @given(start=HALFWORDS, word=WORDS)
 def test_brr_resets_by_its_low_half_only(make_fake_chip: Callable[[], Any], start: int, word: int) -> None:
     chip = make_fake_chip()
@@ -180,4 +181,4 @@ class LockMachine(RuleBasedStateMachine):
 
 
 def test_the_lock_agrees_with_its_sentence_for_any_history(make_fake_chip: Callable[[], Any]) -> None:
-    run_state_machine_as_test(lambda: LockMachine(make_fake_chip()))
+    run_state_machine_as_test(lambda: LockMachine(make_fake_chip()), settings=QUICK)

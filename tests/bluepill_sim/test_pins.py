@@ -1,13 +1,16 @@
 """Pins: who drives the wire, what it reads, and who is told when."""
 
+import itertools
 from collections.abc import Callable
 from typing import Any
 
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from bluepill_sim.pins import Pin, PinBank, PinDrive, PinMode
+
+QUICK = settings(max_examples=40, deadline=None)
 
 MODES = list(PinMode)
 
@@ -208,6 +211,7 @@ def act(pin: Pin, what: str, value: Any) -> None:
     methods[what]()
 
 
+@QUICK
 @given(actions=ACTIONS)
 def test_output_and_level_follow_from_the_state_alone(actions: Any) -> None:
     bank = PinBank(Ports(), frozenset({"PA0"}))
@@ -222,5 +226,5 @@ def test_output_and_level_follow_from_the_state_alone(actions: Any) -> None:
     assert (copy.output, copy.level, copy.input) == (pin.output, pin.level, pin.input)
     copy._update()
     assert (copy.output, copy.level, copy.input) == (pin.output, pin.level, pin.input)
-    assert all(a is not b for a, b in zip(told, told[1:], strict=False))
+    assert all(a is not b for a, b in itertools.pairwise(told))
     assert (told[-1] if told else PinDrive.NONE) is pin.output

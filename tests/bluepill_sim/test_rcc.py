@@ -4,12 +4,14 @@ from collections.abc import Callable
 from typing import Any
 
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from bluepill_sim.clocks import Clocks, illegal_settings
 from bluepill_sim.rcc import OSCILLATORS, Rcc, ResetCause
 from bluepill_sim.stm32f103 import BASES, CLOCK_GATES, Place
+
+QUICK = settings(max_examples=40, deadline=None)
 
 HSEON, HSERDY, HSEBYP, PLLON, PLLRDY = 1 << 16, 1 << 17, 1 << 18, 1 << 24, 1 << 25
 HSE_NS, PLL_NS = 2_000_000, 200_000
@@ -86,6 +88,7 @@ def test_every_pll_factor_and_source_gives_its_frequency(
     assert ("clock:pclk1" in fake_chip.warnings) is (expected_hz > 36_000_000)
 
 
+@QUICK
 @given(hpre=st.integers(0, 15), ppre1=st.integers(0, 7), ppre2=st.integers(0, 7))
 def test_the_dividers_make_the_buses(make_fake_chip: Callable[[], Any], hpre: int, ppre1: int, ppre2: int) -> None:
     chip = make_fake_chip()

@@ -5,16 +5,17 @@ from collections.abc import Callable
 from typing import Any
 
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from bluepill_sim.peripheral import Peripheral, Place
 from bluepill_sim.register import WORD, Register, bits
+from bluepill_sim.stm32f103 import PERIPHERALS
+
+QUICK = settings(max_examples=40, deadline=None)
 
 WORDS = st.integers(0, WORD)
-NAMES = (
-    "RCC FLASH AFIO GPIOA GPIOB GPIOC GPIOD GPIOE EXTI USART1 USART2 USART3".split()  # every modelled peripheral
-)
+NAMES = [name for _, name, _ in PERIPHERALS]
 
 
 @st.composite
@@ -49,6 +50,7 @@ def bit_after(register: Register, bit: int, previous: int, written: int) -> int:
     return before
 
 
+@QUICK
 @given(register=declarations(), previous=WORDS, written=WORDS)
 def test_each_bit_follows_its_kind(register: Register, previous: int, written: int) -> None:
     previous &= register.readable
@@ -56,6 +58,7 @@ def test_each_bit_follows_its_kind(register: Register, previous: int, written: i
     assert [after >> n & 1 for n in range(32)] == [bit_after(register, n, previous, written) for n in range(32)]
 
 
+@QUICK
 @given(register=declarations(), previous=WORDS, value=WORDS, lanes=st.sampled_from([0xFF, 0xFF00, 0xFFFF_0000, WORD]))
 def test_a_write_of_some_lanes_leaves_the_other_lanes_alone(
     register: Register, previous: int, value: int, lanes: int
@@ -190,6 +193,7 @@ def access_at_random(chip: Any, name: str, accesses: list[tuple[int, int, int, i
 
 
 @pytest.mark.parametrize("name", NAMES)
+@QUICK
 @given(accesses=ACCESSES)
 def test_no_write_leaves_a_bit_that_does_not_read(make_fake_chip: Callable[[], Any], name: str, accesses: Any) -> None:
     chip = make_fake_chip()
@@ -204,6 +208,7 @@ def test_no_write_leaves_a_bit_that_does_not_read(make_fake_chip: Callable[[], A
 
 
 @pytest.mark.parametrize("name", NAMES)
+@QUICK
 @given(value=WORDS)
 def test_a_plain_register_stores_exactly_its_mask(make_fake_chip: Callable[[], Any], name: str, value: int) -> None:
     part = make_fake_chip().parts.by_name[name]
@@ -215,6 +220,7 @@ def test_a_plain_register_stores_exactly_its_mask(make_fake_chip: Callable[[], A
 
 
 @pytest.mark.parametrize("name", NAMES)
+@QUICK
 @given(accesses=ACCESSES)
 def test_reset_brings_back_every_reset_value(make_fake_chip: Callable[[], Any], name: str, accesses: Any) -> None:
     chip = make_fake_chip()
@@ -228,6 +234,7 @@ def test_reset_brings_back_every_reset_value(make_fake_chip: Callable[[], Any], 
 
 
 @pytest.mark.parametrize("name", NAMES)
+@QUICK
 @given(before=ACCESSES, after=ACCESSES)
 def test_a_restored_peripheral_goes_on_identically(
     make_fake_chip: Callable[[], Any], name: str, before: Any, after: Any

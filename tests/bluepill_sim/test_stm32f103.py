@@ -1,0 +1,97 @@
+"""The chip's page: it agrees with itself and with the manual's numbers."""
+
+from typing import Any
+
+import pytest
+
+from bluepill_sim.rcc import ResetCause
+from bluepill_sim.stm32f103 import (
+    BASES,
+    BONDED_PINS,
+    CLOCK_GATES,
+    IRQ_COUNT,
+    PERIPHERAL_BASE,
+    PERIPHERAL_END,
+    PERIPHERALS,
+    name_at,
+)
+
+
+def test_blocks_do_not_overlap_and_lie_on_kilobytes() -> None:
+    bases = sorted(BASES.values())
+    assert len(set(bases)) == len(bases)
+    assert all(base % 0x400 == 0 for base in bases)
+
+
+def test_modelled_peripherals_lie_in_the_peripheral_region() -> None:
+    for _, name, irqs in PERIPHERALS:
+        assert PERIPHERAL_BASE <= BASES[name] < PERIPHERAL_END, name
+        assert all(irq < IRQ_COUNT for irq in irqs), name
+
+
+def test_no_two_peripherals_share_an_interrupt() -> None:
+    irqs = [irq for _, _, numbers in PERIPHERALS for irq in numbers]
+    assert len(set(irqs)) == len(irqs)
+
+
+def test_every_gate_has_its_own_bit() -> None:
+    gates = list(CLOCK_GATES.values())
+    assert len(set(gates)) == len(gates)
+    assert set(CLOCK_GATES) <= set(BASES)
+
+
+@pytest.mark.parametrize(
+    ("address", "name"),
+    [
+        (0x4001_0C0C, "GPIOB"),
+        (0x4002_13FF, "RCC"),
+        (0x4002_1400, None),
+        (0x4001_2C24, "TIM1"),
+        (0x3FFF_FFFF, None),
+        (0xE004_2000, "DBGMCU"),
+        (0x5000_1000, "USB OTG"),
+    ],
+)
+def test_an_address_has_a_name(address: int, name: str | None) -> None:
+    assert name_at(address) == name
+
+
+def test_the_package_has_37_io_pins() -> None:
+    assert len(BONDED_PINS) == 37
+
+
+def test_parts_stand_at_their_places(fake_chip: Any) -> None:
+    parts = fake_chip.parts
+    assert list(parts.by_name) == [name for _, name, _ in PERIPHERALS]
+    assert parts.by_name["GPIOC"].base == 0x4001_1000
+    assert parts.by_name["USART1"].place.clock == CLOCK_GATES["USART1"]
+    assert (parts.rcc.name, parts.flash.name, parts.exti.name) == ("RCC", "FLASH", "EXTI")
+    assert parts.usart(3).name == "USART3"
+
+
+def test_deadlines_are_met_in_order_of_time(fake_chip: Any) -> None:
+    fake_chip.write("RCC.CSR", 1)
+    fake_chip.write("GPIOA.CRH", 0x4444_44B4)
+    fake_chip.write("USART1.BRR", 69)
+    fake_chip.write("USART1.CR1", 0x2008)
+    assert fake_chip.parts.next_deadline() == 85_000
+    fake_chip.now_ns = 10**6
+    fake_chip.parts.advance_to(10**6)
+    assert fake_chip.parts.next_deadline() is None
+    assert fake_chip.read("RCC.CSR") & 2
+
+
+def test_everything_is_as_new_after_a_power_reset(make_fake_chip: Any) -> None:
+    chip, fresh = make_fake_chip(), make_fake_chip()
+    chip.run_at_72_mhz()
+    chip.write("AFIO.MAPR", 2 << 24 | 1 << 2)
+    chip.write("GPIOB.CRL", 0x1111_1111)
+    chip.write("EXTI.IMR", 0xFFFF)
+    chip.write("USART1.BRR", 69)
+    chip.write("USART1.CR1", 0x200C)
+    chip.parts.reset(ResetCause.POWER)
+    fresh.parts.reset(ResetCause.POWER)
+    assert chip.parts.snapshot() == fresh.parts.snapshot()
+    assert chip.pins.snapshot() == fresh.pins.snapshot()
+    assert chip.clocks == fresh.clocks
+    assert not any(chip.irqs.values())
