@@ -17,7 +17,8 @@ LEAST_OBSTACLES, MOST_OBSTACLES = 16, 18
 #: Widths of the things.
 NARROWEST_M, WIDEST_M = 0.08, 0.60
 #: Free width between any two things, and from a thing to a wall.
-GAP_M = 0.90
+#: 0.9 m and 2 mm to spare, so that no rounding eats into it.
+GAP_M = 0.902
 #: Free radius about the start.
 START_FREE_M = 1.0
 #: Tries to place one thing before the whole layout is begun anew.

@@ -18,7 +18,17 @@ import pybullet
 
 from p2os.parameters import RobotParameters
 from p2os.pioneer.body import STEP_NS, BodyState, Turned
-from p2os.pioneer.bullet_model import FLOOR_GROUP, LEFT, OBSTACLE_GROUP, RIGHT, add_floor, add_obstacle, add_robot
+from p2os.pioneer.bullet_model import (
+    FLOOR_GROUP,
+    LEFT,
+    OBSTACLE_GROUP,
+    RIGHT,
+    add_floor,
+    add_obstacle,
+    add_robot,
+    move_obstacle,
+    park_obstacle,
+)
 from p2os.pioneer.contacts import ContactCounter
 from p2os.pioneer.plan import Plan
 from p2os.pioneer.scenery import Obstacle, Pose, World
@@ -68,7 +78,7 @@ class BulletBody:
     def reset(self, pose: Pose, seed: int) -> BodyState:
         """Stand still at a pose in the world as it was made; nothing here is random."""
         del seed
-        self._build(self._world.obstacles, pose)
+        self._build([(item, True) for item in self._world.obstacles], pose)
         for _ in range(SETTLE_STEPS):
             pybullet.stepSimulation(physicsClientId=self._client)
         joints = pybullet.getJointStates(self._robot, WHEELS, physicsClientId=self._client)
@@ -79,8 +89,12 @@ class BulletBody:
         self._state = None
         return self.state
 
-    def _build(self, obstacles: Sequence[Obstacle], pose: Pose) -> None:
-        """Make the engine's world anew."""
+    def _build(self, made: Sequence[tuple[Obstacle, bool]], pose: Pose) -> None:
+        """Make the engine's world anew.
+
+        The engine finds bodies again by their order, so each keeps its place from
+        its making on: a thing that was taken out is parked, not removed.
+        """
         client = self._client
         pybullet.resetSimulation(physicsClientId=client)
         pybullet.setPhysicsEngineParameter(
@@ -88,11 +102,15 @@ class BulletBody:
             physicsClientId=client,
         )  # fmt: skip
         pybullet.setGravity(0, 0, -9.81, physicsClientId=client)
-        floor = add_floor(self._world, client)
-        self._plan = Plan(obstacles, self._parameters.body)
-        self._ids = {item.name: add_obstacle(item, client) for item in obstacles}
-        self._floors = {floor, *(self._ids[item.name] for item in obstacles if item.kind.is_driven_on)}
+        self._floors = {add_floor(self._world, client)}
         self._robot, self._centre = add_robot(self._parameters, pose, client)
+        self._plan = Plan((), self._parameters.body)
+        #: Every obstacle ever made, by the engine's number, and whether it stands in the world.
+        self._made: dict[int, tuple[Obstacle, bool]] = {}
+        for obstacle, stands in made:
+            self.place(obstacle)
+            if not stands:
+                self.remove(obstacle.name)
         self._targets = (0.0, 0.0)
         self._command()
 
@@ -197,22 +215,27 @@ class BulletBody:
     def place(self, obstacle: Obstacle) -> None:
         """Put an obstacle with a new name into the world."""
         self._plan.place(obstacle)
-        self._ids[obstacle.name] = add_obstacle(obstacle, self._client)
+        number = add_obstacle(obstacle, self._client)
+        self._made[number] = (obstacle, True)
         if obstacle.kind.is_driven_on:
-            self._floors.add(self._ids[obstacle.name])
+            self._floors.add(number)
 
     def move(self, name: str, x_m: float, y_m: float, heading_rad: float) -> None:
-        """Put an obstacle somewhere else: it is taken out and placed anew, last of all."""
+        """Put an obstacle somewhere else."""
         moved = self._plan.move(name, x_m, y_m, heading_rad)
-        self.remove(name)
-        self.place(moved)
+        number = self._number(name)
+        self._made[number] = (moved, True)
+        move_obstacle(number, moved, self._client)
 
     def remove(self, name: str) -> None:
         """Take an obstacle out of the world."""
         self._plan.remove(name)
-        number = self._ids.pop(name)
-        self._floors.discard(number)
-        pybullet.removeBody(number, physicsClientId=self._client)
+        number = self._number(name)
+        self._made[number] = (self._made[number][0], False)
+        park_obstacle(number, self._client)
+
+    def _number(self, name: str) -> int:
+        return next(number for number, (item, stands) in self._made.items() if stands and item.name == name)
 
     def snapshot(self) -> object:
         """Return all that decides the future, as plain values and the engine's own file."""
@@ -222,7 +245,7 @@ class BulletBody:
             engine = path.read_bytes()
         return {
             "engine": engine,
-            "obstacles": self._plan.obstacles,
+            "made": tuple(self._made.values()),
             "targets": self._targets,
             "zero": self._zero,
             "contacts": self._contacts.snapshot(),
@@ -233,7 +256,7 @@ class BulletBody:
     def restore(self, snapshot: object) -> None:
         """Put back what `snapshot` returned, in this body or in a new one."""
         saved = cast("dict[str, Any]", snapshot)
-        self._build(saved["obstacles"], self._world.start)
+        self._build(saved["made"], self._world.start)
         with tempfile.TemporaryDirectory() as folder:
             path = Path(folder) / "state.bullet"
             path.write_bytes(saved["engine"])

@@ -24,6 +24,8 @@ WHEEL_FRICTION, FLOOR_FRICTION = 0.8, 1.0
 #: Of the hull against a wall (chosen).
 HULL_FRICTION, OBSTACLE_FRICTION = 0.3, 1.0
 CASTER_MASS_KG = 0.2
+#: Height at which things that were taken out are kept.
+PARKED_M = -100.0
 
 Vector = tuple[float, float, float]
 LEVEL = (0.0, 0.0, 0.0, 1.0)
@@ -40,10 +42,10 @@ def add_floor(world: World, client: int) -> int:
 def add_obstacle(item: Obstacle, client: int) -> int:
     """Make an obstacle, a raised floor or a ramp; return its number."""
     group = FLOOR_GROUP if item.kind.is_driven_on else OBSTACLE_GROUP
+    place, turn = _pose(item)
     if item.kind is Kind.RAMP:
-        return _ramp(item, client)
-    place = (item.x_m, item.y_m, item.base_m + item.height_m / 2)
-    turn = pybullet.getQuaternionFromEuler((0.0, 0.0, item.heading_rad))
+        length = math.hypot(item.length_m, item.height_m)
+        return _static_box((length / 2, item.width_m / 2, FLOOR_THICKNESS_M / 2), place, turn, group, client)
     if not item.is_cylinder:
         return _static_box((item.length_m / 2, item.width_m / 2, item.height_m / 2), place, turn, group, client)
     shape = pybullet.createCollisionShape(
@@ -52,10 +54,23 @@ def add_obstacle(item: Obstacle, client: int) -> int:
     return _static(shape, place, turn, group, client)
 
 
-def _ramp(item: Obstacle, client: int) -> int:
-    """Make a box whose upper face rises from one end of the footprint to the other."""
+def move_obstacle(number: int, item: Obstacle, client: int) -> None:
+    """Put an obstacle where it stands now."""
+    place, turn = _pose(item)
+    pybullet.resetBasePositionAndOrientation(number, place, turn, physicsClientId=client)
+
+
+def park_obstacle(number: int, client: int) -> None:
+    """Put an obstacle where nothing meets it."""
+    pybullet.resetBasePositionAndOrientation(number, (0.0, 0.0, PARKED_M), LEVEL, physicsClientId=client)
+
+
+def _pose(item: Obstacle) -> tuple[Vector, tuple[float, ...]]:
+    """Return the middle and the turn of an obstacle's box; of a ramp, the box under its upper face."""
+    if item.kind is not Kind.RAMP:
+        turn = pybullet.getQuaternionFromEuler((0.0, 0.0, item.heading_rad))
+        return (item.x_m, item.y_m, item.base_m + item.height_m / 2), turn
     slope = math.atan2(item.height_m, item.length_m)
-    half = (math.hypot(item.length_m, item.height_m) / 2, item.width_m / 2, FLOOR_THICKNESS_M / 2)
     # From the middle of the upper face down along its normal.
     back, down = math.sin(slope) * FLOOR_THICKNESS_M / 2, math.cos(slope) * FLOOR_THICKNESS_M / 2
     place = (
@@ -63,8 +78,7 @@ def _ramp(item: Obstacle, client: int) -> int:
         item.y_m + back * math.sin(item.heading_rad),
         item.base_m + item.height_m / 2 - down,
     )
-    turn = pybullet.getQuaternionFromEuler((0.0, -slope, item.heading_rad))
-    return _static_box(half, place, turn, FLOOR_GROUP, client)
+    return place, pybullet.getQuaternionFromEuler((0.0, -slope, item.heading_rad))
 
 
 def _static_box(half: Vector, place: Vector, turn: tuple[float, ...], group: int, client: int) -> int:

@@ -134,12 +134,14 @@ def test_a_sip_survives_the_wire(sip: StandardSip, profile: Profile) -> None:
     assert StandardSip.from_frame(sip.to_frame(profile), profile) == sip
 
 
+def integers_of(size: int, *, signed: bool) -> st.SearchStrategy[int]:
+    span = 1 << 8 * size
+    return st.integers(-span // 2, span // 2 - 1) if signed else st.integers(0, span - 1)
+
+
 @given(sips, st.integers(0, len(TAIL)), st.binary(max_size=5), st.data())
 def test_a_tail_of_any_length_survives(sip: StandardSip, fields: int, rest: bytes, data: st.DataObject) -> None:
-    tail = tuple(
-        data.draw(st.integers(-(1 << 8 * size - 1), (1 << 8 * size - 1) - 1) if signed else st.integers(0, (1 << 8 * size) - 1))
-        for _, size, signed in TAIL[:fields]
-    )  # fmt: skip
+    tail = tuple(data.draw(integers_of(size, signed=signed)) for _, size, signed in TAIL[:fields])
     whole = dataclasses.replace(sip, tail=tail, rest=rest if fields == len(TAIL) else b"")
     assert StandardSip.from_frame(whole.to_frame(Profile.ARCOS), Profile.ARCOS) == whole
 
