@@ -1,0 +1,277 @@
+"""The BluePill: a board with an STM32F103C8 that runs one firmware.
+
+This is the package's face. It loads the image, hands out pins and serial
+ports, and tells of faults and warnings. The board itself: 8 MHz crystal,
+32 kHz crystal, an LED on PC13 with its resistor to 3.3 V, BOOT1 (PB2) pulled low.
+
+Invariant: results do not depend on how the caller cuts time into slices.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+from bluepill_sim.chip import Chip
+from bluepill_sim.cpu import GENERAL, Register
+from bluepill_sim.errors import UnmodelledError
+from bluepill_sim.faults import FAULT_ROWS, FaultKind, FaultReport
+from bluepill_sim.image import Image, load_image
+from bluepill_sim.memory import Memory
+from bluepill_sim.pins import Pin, PinDrive
+from bluepill_sim.rcc import ResetCause
+from bluepill_sim.stm32f103 import FLASH_BASE
+from bluepill_sim.timing import Nanos, Reached
+from bluepill_sim.usart import Usart
+
+
+@dataclass(slots=True)
+class Activity:
+    """When the firmware was last seen alive, in ns; 0 before the first time."""
+
+    #: The last change of what the chip puts on any pin.
+    last_pin_ns: Nanos = 0
+    #: The end of the last character sent on any USART.
+    last_usart_ns: Nanos = 0
+    #: The last time the core went to sleep.
+    last_wfi_ns: Nanos = 0
+
+
+@dataclass(frozen=True, slots=True)
+class BoardSnapshot:
+    """All that decides a board's future."""
+
+    chip: tuple[object, ...]
+    fault: FaultReport | None
+    activity: tuple[Nanos, Nanos, Nanos]
+    warned: tuple[tuple[str, str], ...]
+
+
+class BluePill:
+    """An emulated BluePill.
+
+    >>> board = BluePill("firmware.elf")                # doctest: +SKIP
+    >>> board.usart1.on_transmit = lambda byte, at_ns: print(chr(byte), end="")  # doctest: +SKIP
+    >>> board.advance_to(1_000_000_000)                 # doctest: +SKIP
+
+    Raises:
+        ImageError: the firmware is missing, damaged, or not for this chip.
+        MissingDependencyError: unicorn, pyelftools or intelhex is not installed.
+    """
+
+    def __init__(self, image: Image | str | Path, *, strict: bool = False) -> None:
+        """Load a firmware and stand at its reset.
+
+        Args:
+            image: an image, or the path of an ELF, HEX or BIN file.
+            strict: whether the first warning ends the run with an `UnmodelledError`.
+        """
+        self.image = image if isinstance(image, Image) else load_image(image)
+        self._strict = strict
+        self._warned: dict[str, str] = {}
+        self._vector_offset = self.image.vector_table - FLASH_BASE
+        #: Called with each new warning.
+        self.on_warning: Callable[[str], None] | None = None
+        #: Called with (pin, drive, ns) at every change of what the chip itself puts on a pin.
+        self.on_pin: Callable[[str, PinDrive, Nanos], None] | None = None
+        #: The first fault that the firmware did not handle; None while there is none.
+        self.fault: FaultReport | None = None
+        memory = Memory()
+        for address, data in self.image.segments:
+            memory.load_flash(address - FLASH_BASE, data)
+        self._chip: Chip | None = None
+        self._chip = chip = Chip(memory, self.image.vector_table, self._warn, self._fault)
+        self._activity = Activity()
+        self._usarts = tuple(SerialPort(chip.parts.usart(n), self._activity) for n in (1, 2, 3))
+        chip.pins.on_output = self._pin_changed
+        chip.pins["PC13"].board_pull = PinDrive.PULL_UP
+        chip.pins["PB2"].board_pull = PinDrive.PULL_DOWN
+
+    # Time.
+
+    @property
+    def now_ns(self) -> Nanos:
+        """The time reached."""
+        return self._live.now_ns
+
+    @property
+    def hclk_hz(self) -> int:
+        """The core's frequency."""
+        return self._live.clocks.hclk_hz
+
+    @property
+    def cycle(self) -> int:
+        """Core cycles since power-on."""
+        return self._live.engine.cycle
+
+    def next_deadline(self) -> Nanos | None:
+        """Return when a peripheral next acts by itself; None for never. The core may act at any time."""
+        return self._live.next_deadline()
+
+    def advance_to(self, limit_ns: Nanos) -> Reached:
+        """Run to the first block border at or after a time.
+
+        Returns:
+            DEADLINE there; EDGE earlier, at the end of the block that changed a
+            watched pin; HALT once the core is locked up, with time at the limit.
+
+        Raises:
+            UnmodelledError: in strict mode, something was warned of.
+        """
+        return self._live.advance_to(limit_ns)
+
+    def reset(self) -> None:
+        """Press the reset button: time and the outside of the pins stay as they are."""
+        self._live.reset(ResetCause.PIN)
+        self.fault = None
+
+    # What is on the board.
+
+    def pin(self, name: str) -> Pin:
+        """Return a pin.
+
+        Args:
+            name: such as "PA4".
+
+        Raises:
+            KeyError: the chip has no such pin.
+        """
+        return self._live.pins[name]
+
+    @property
+    def usart1(self) -> "SerialPort":
+        """USART1: TX on PA9, RX on PA10."""
+        return self._usarts[0]
+
+    @property
+    def usart2(self) -> "SerialPort":
+        """USART2: TX on PA2, RX on PA3."""
+        return self._usarts[1]
+
+    @property
+    def usart3(self) -> "SerialPort":
+        """USART3: TX on PB10, RX on PB11."""
+        return self._usarts[2]
+
+    # What the firmware is up to.
+
+    @property
+    def warnings(self) -> list[str]:
+        """Every warning so far, oldest first."""
+        return list(self._warned.values())
+
+    @property
+    def activity(self) -> Activity:
+        """When the firmware was last seen alive."""
+        slept = self._live.processor.last_sleep_cycle
+        if slept is not None:
+            self._activity.last_wfi_ns = self._live.ns_of(slept)
+        return self._activity
+
+    @property
+    def is_asleep(self) -> bool:
+        """Whether the core is waiting in WFI or WFE."""
+        return self._live.processor.is_asleep
+
+    @property
+    def pc(self) -> int:
+        """The address of the next instruction."""
+        return self._live.engine.pc
+
+    def where(self) -> str:
+        """Return where the program is: "symbol+0x12 (0x08000123)"."""
+        return self.image.symbols.where(self.pc)
+
+    def register(self, name: str) -> int:
+        """Return a register by its name, such as "R0", "SP" or "XPSR"."""
+        return self._live.engine.registers[Register[name.upper()]]
+
+    def read_memory(self, address: int, size: int) -> bytes | None:
+        """Return bytes of flash or SRAM; None where there is no memory."""
+        return self._live.memory.read(address, size)
+
+    def snapshot(self) -> BoardSnapshot:
+        """Return all that decides the board's future; it can be pickled."""
+        activity = self.activity
+        return BoardSnapshot(
+            self._live.snapshot(),
+            self.fault,
+            (activity.last_pin_ns, activity.last_usart_ns, activity.last_wfi_ns),
+            tuple(self._warned.items()),
+        )
+
+    def restore(self, snapshot: object) -> None:
+        """Put back what `snapshot` returned; tells nobody.
+
+        Raises:
+            TypeError: it is not a board's snapshot.
+        """
+        if not isinstance(snapshot, BoardSnapshot):
+            raise TypeError(f"not a BluePill's snapshot: {type(snapshot).__name__}")
+        self._live.restore(snapshot.chip)
+        self.fault = snapshot.fault
+        self._activity.last_pin_ns, self._activity.last_usart_ns, self._activity.last_wfi_ns = snapshot.activity
+        self._warned = dict(snapshot.warned)
+
+    # What the chip tells.
+
+    @property
+    def _live(self) -> Chip:
+        if self._chip is None:
+            raise RuntimeError("the chip is still being made")
+        return self._chip
+
+    def _pin_changed(self, name: str, drive: PinDrive, at_ns: Nanos) -> None:
+        self._activity.last_pin_ns = at_ns
+        if self.on_pin is not None:
+            self.on_pin(name, drive, at_ns)
+
+    def _warn(self, message: str, once: str, pc: int) -> None:
+        if once in self._warned:
+            return
+        text = f"{message} at {self.image.symbols.where(pc)}"
+        self._warned[once] = text
+        if self._strict:
+            raise UnmodelledError(text, hint="run without --strict to go on after warnings")
+        if self.on_warning is not None:
+            self.on_warning(text)
+
+    def _fault(self, kind: FaultKind, pc: int, address: int | None, is_lockup: bool) -> None:
+        if self.fault is not None:
+            self.fault = replace(self.fault, is_lockup=self.fault.is_lockup or is_lockup)
+            return
+        if self._chip is None:
+            raise RuntimeError("the chip is still being made")
+        values = self._chip.engine.registers
+        names = [*GENERAL[:15], Register.XPSR]
+        registers = [(register.name, values[register]) for register in names]
+        registers.insert(15, ("PC", pc))
+        self.fault = FaultReport(
+            kind=kind,
+            exception=FAULT_ROWS[kind].exception,
+            pc=pc,
+            where=self.image.symbols.where(pc),
+            address=address,
+            registers=tuple(registers),
+            at_ns=self._chip.now_ns,
+            is_lockup=is_lockup,
+        )
+
+
+class SerialPort:
+    """A USART of the board, seen from outside."""
+
+    def __init__(self, usart: Usart, activity: Activity) -> None:
+        self._usart = usart
+        self._activity = activity
+        #: Called with (word, ns) at the end of each stop bit that goes out.
+        self.on_transmit: Callable[[int, Nanos], None] | None = None
+        usart.on_transmit = self._transmitted
+
+    def receive(self, data: bytes) -> None:
+        """Send characters to the RX pin, at the speed of the line."""
+        self._usart.receive(data)
+
+    def _transmitted(self, word: int, at_ns: Nanos) -> None:
+        self._activity.last_usart_ns = at_ns
+        if self.on_transmit is not None:
+            self.on_transmit(word, at_ns)

@@ -1,0 +1,312 @@
+"""The whole chip: core, memories, bus and peripherals, brought forward together.
+
+Theory of operation. At each block border: peripherals and SysTick act on what
+is due, a requested reset is done, then the core goes on to the earliest of the
+limit and the next deadline. A peripheral that moves a deadline or an interrupt
+line inside an access ends the core's slice at the border of the running block,
+so that what happens never depends on where the caller's slices end.
+
+This is not the board: pins are handed out and images are loaded by `board.py`.
+
+Invariant: time never goes back; `now_ns` inside a peripheral's access is the
+time of the accessing instruction.
+"""
+
+from collections.abc import Callable
+
+from bluepill_sim.block_cost import NO_BLOCK, Block, measure_block
+from bluepill_sim.bus import PERIPHERAL_BYTES, PeripheralBus, SramBitBand
+from bluepill_sim.clocks import Clocks
+from bluepill_sim.cpu import Engine, Register
+from bluepill_sim.cycle_clock import CycleClock
+from bluepill_sim.memory import Memory
+from bluepill_sim.processor import FaultListener, Processor
+from bluepill_sim.rcc import ResetCause
+from bluepill_sim.stm32f103 import (
+    FLASH_BASE,
+    FLASH_BYTES_FITTED,
+    PERIPHERAL_BASE,
+    SRAM_BASE,
+    SRAM_BYTES,
+    make_parts,
+    make_pins,
+)
+from bluepill_sim.system_control import PPB_BASE, PPB_BYTES, SystemControl
+from bluepill_sim.timing import Nanos, Reached, Reason
+
+#: Bit-band alias regions (RM0008 3.3.2) and how many alias bytes there are for each byte.
+SRAM_ALIAS, PERIPHERAL_ALIAS = 0x2200_0000, 0x4200_0000
+_ALIAS_BYTES = 32
+
+#: Takes a message, its key, and the address of the instruction that caused it.
+WarningListener = Callable[[str, str, int], None]
+
+
+class Chip:
+    """An STM32F103 with its flash filled by the caller; `ChipPorts` for its peripherals."""
+
+    def __init__(self, memory: Memory, vector_table: int, on_warning: WarningListener, on_fault: FaultListener) -> None:
+        """Make the chip, in the state after power-on.
+
+        Args:
+            memory: its memories.
+            vector_table: where the program's vectors are.
+            on_warning: told of each warning.
+            on_fault: told of each HardFault and lockup.
+        """
+        self.memory = memory
+        self._vector_table = vector_table
+        self._on_warning = on_warning
+        self.clocks = Clocks()
+        self._clock = CycleClock(self.clocks.hclk_hz)
+        #: Time of the event that a peripheral is acting on, while it does.
+        self._event_ns: Nanos | None = None
+        self._stop_requested = False
+        self._reset_requested = False
+        self._next_due: Nanos | None = None
+        self._deadlines_moved = True
+        self._flash_access = self.clocks.flash_wait_states, self.clocks.flash_prefetch
+        self._flash_repairs: list[tuple[int, bytes]] = []
+        #: Whether the peripherals exist: making them already calls back.
+        self._is_complete = False
+        self.engine = Engine(self._measure)
+        self.processor = Processor(self.engine, memory)
+        self.processor.on_fault = on_fault
+        self.pins = make_pins(self)
+        self.parts = make_parts(self)
+        self._is_complete = True
+        self.parts.flash.memory = _FlashArray(memory, self._flash_repairs)
+        self.system = SystemControl(self.processor, self)
+        self._map()
+        self.reset(ResetCause.POWER)
+
+    # Time.
+
+    @property
+    def now_ns(self) -> Nanos:
+        """The exact time of the accessing instruction or event inside a peripheral, else the time reached."""
+        if self._event_ns is not None:
+            return self._event_ns
+        if self.engine.block is NO_BLOCK:
+            return self._clock.ns_of(self.engine.cycle)
+        return self._clock.ns_of(self.engine.access_cycle)
+
+    @property
+    def access_cycle(self) -> int:
+        """The time of the accessing instruction, in cycles."""
+        return self.engine.access_cycle
+
+    def ns_of(self, cycle: int) -> Nanos:
+        """Return when a cycle of the present frequency began."""
+        return self._clock.ns_of(cycle)
+
+    def next_deadline(self) -> Nanos | None:
+        """Return when a peripheral or SysTick next acts by itself; the core itself may act at any time."""
+        due = self._next_peripheral_due()
+        tick = self.processor.systick.next_cycle
+        if tick is None:
+            return due
+        tick_ns = self._clock.ns_of(tick)
+        return tick_ns if due is None else min(due, tick_ns)
+
+    def advance_to(self, limit_ns: Nanos) -> Reached:
+        """Run to the first block border at or after a time, or to what stops the chip before."""
+        processor, engine, clock = self.processor, self.engine, self._clock
+        while True:
+            self._act()
+            now = clock.ns_of(engine.cycle)
+            if self._stop_requested:
+                self._stop_requested = False
+                return Reached(now, Reason.EDGE)
+            if processor.is_locked_up:
+                engine.cycle = max(engine.cycle, clock.cycle_at(limit_ns))
+                return Reached(clock.ns_of(engine.cycle), Reason.HALT)
+            if now >= limit_ns:
+                return Reached(now, Reason.DEADLINE)
+            processor.run(self._stop_cycle(limit_ns))
+
+    def reset(self, cause: ResetCause) -> None:
+        """Reset core and peripherals; time goes on."""
+        self._reset_requested = False
+        self.parts.reset(cause)
+        self.system.reset()
+        self.processor.reset(self._vector_table)
+        self._deadlines_moved = True
+
+    # What the peripherals ask for.
+
+    def set_irq(self, irq: int, level: bool) -> None:
+        """Set the level of an interrupt line."""
+        self.processor.nvic.set_level(irq, level)
+        if level:
+            self.processor.pending_changed()
+
+    def pulse_irq(self, irq: int) -> None:
+        """Make an interrupt pending once."""
+        self.processor.pend(16 + irq)
+
+    def clock_changed(self) -> None:
+        """Go on at the frequency and the wait states now in `clocks`."""
+        clocks = self.clocks
+        self._clock.set_frequency(clocks.hclk_hz, self.engine.access_cycle)
+        access = clocks.flash_wait_states, clocks.flash_prefetch
+        if access != self._flash_access:
+            self._flash_access = access
+            self.engine.forget_costs()
+        if self._is_complete:
+            self.parts.clock_changed()
+        self.deadline_changed()
+
+    def request_stop(self) -> None:
+        """End the slice at the border of the running block."""
+        self._stop_requested = True
+        self.processor.stop_at_border()
+
+    def deadline_changed(self) -> None:
+        """Look at the deadlines again at the border of the running block."""
+        self._deadlines_moved = True
+        self.processor.stop_at_border()
+
+    def reset_peripheral(self, name: str) -> None:
+        """Reset one peripheral."""
+        part = self.parts.by_name.get(name)
+        if part is not None:
+            part.reset()
+            self.deadline_changed()
+
+    def request_reset(self) -> None:
+        """Reset the chip at the border of the running block (SYSRESETREQ)."""
+        self._reset_requested = True
+        self.processor.stop_at_border()
+
+    def signal(self, name: str) -> None:
+        """Set the event register."""
+        if name == "event":
+            self.processor.send_event()
+
+    def warn(self, message: str, *, once: str) -> None:
+        """Pass on a warning."""
+        pc = self.engine.pc if self.engine.block is NO_BLOCK else self.engine.registers[Register.PC]
+        self._on_warning(message, once, pc)
+
+    # Snapshots.
+
+    def snapshot(self) -> tuple[object, ...]:
+        """Return all that decides the chip's future, as plain values."""
+        return (
+            self.memory.snapshot(),
+            self.processor.snapshot(),
+            self.system.snapshot(),
+            self.parts.snapshot(),
+            self.pins.snapshot(),
+            self.clocks.snapshot(),
+            self._clock.snapshot(),
+            (self._stop_requested, self._reset_requested),
+        )
+
+    def restore(self, snapshot: tuple[object, ...]) -> None:
+        """Put back what `snapshot` returned."""
+        memory, processor, system, parts, pins, clocks, clock, requests = snapshot
+        if self.memory.restore(memory):  # type: ignore[arg-type]  # a snapshot is opaque to its keeper
+            self.engine.drop_code(FLASH_BASE, FLASH_BYTES_FITTED)
+            self.engine.drop_code(0, FLASH_BYTES_FITTED)
+        self.processor.restore(processor)  # type: ignore[arg-type]  # as above
+        self.system.restore(system)  # type: ignore[arg-type]  # as above
+        self.pins.restore(pins)  # type: ignore[arg-type]  # as above
+        self.parts.restore(parts)  # type: ignore[arg-type]  # as above
+        self.clocks.restore(clocks)  # type: ignore[arg-type]  # as above
+        self._clock.restore(clock)  # type: ignore[arg-type]  # as above
+        self._stop_requested, self._reset_requested = requests  # type: ignore[misc]  # as above
+        self._flash_access = self.clocks.flash_wait_states, self.clocks.flash_prefetch
+        self.engine.forget_costs()
+        self._flash_repairs.clear()
+        self._deadlines_moved = True
+
+    # Plumbing.
+
+    def _act(self) -> None:
+        """At a border: do what was left for it, and what is due."""
+        if self._flash_repairs:
+            self._repair_flash()
+        if self._reset_requested:
+            self.reset(ResetCause.SOFTWARE)
+        cycle = self.engine.cycle
+        self.processor.systick.advance_to(cycle)
+        now = self._clock.ns_of(cycle)
+        while (due := self._next_peripheral_due()) is not None and due <= now:
+            self._event_ns = due
+            self._deadlines_moved = True
+            try:
+                self.parts.advance_to(due)
+            finally:
+                self._event_ns = None
+
+    def _next_peripheral_due(self) -> Nanos | None:
+        if self._deadlines_moved:
+            self._deadlines_moved = False
+            self._next_due = self.parts.next_deadline()
+        return self._next_due
+
+    def _stop_cycle(self, limit_ns: Nanos) -> int:
+        """Return the cycle of the earliest of the limit and the deadlines."""
+        due = self._next_peripheral_due()
+        stop = self._clock.cycle_at(limit_ns if due is None else min(due, limit_ns))
+        tick = self.processor.systick.next_cycle
+        return stop if tick is None else min(stop, tick)
+
+    def _measure(self, address: int, size: int) -> Block:
+        """Return the costs of a block at the present flash settings."""
+        code = self.memory.read(address, size)
+        is_sram = SRAM_BASE <= address < SRAM_BASE + SRAM_BYTES
+        wait_states, has_prefetch = (0, True) if is_sram else self._flash_access
+        return measure_block(code or b"", address, wait_states, has_prefetch=has_prefetch)
+
+    def _map(self) -> None:
+        """Give the engine its memories and its I/O regions."""
+        engine = self.engine
+        for region in self.memory.regions:
+            engine.map_memory(region.base, region.buffer, is_writable=region.is_writable)
+        bus = PeripheralBus(self.parts.by_name, self.parts.rcc, self)
+        engine.map_io(PERIPHERAL_BASE, PERIPHERAL_BYTES, bus.read, bus.write)
+        engine.map_io(PERIPHERAL_ALIAS, PERIPHERAL_BYTES * _ALIAS_BYTES, bus.read_bit, bus.write_bit)
+        bits = SramBitBand(self.memory.sram)
+        engine.map_io(SRAM_ALIAS, SRAM_BYTES * _ALIAS_BYTES, bits.read_bit, bits.write_bit)
+        engine.map_io(PPB_BASE, PPB_BYTES, self.system.read, self.system.write)
+        engine.on_read_only_write = self._write_flash
+
+    def _write_flash(self, address: int, size: int, value: int) -> bool:
+        """Take a write of the core to the flash array: its controller decides; False: no flash is there."""
+        offset = address - FLASH_BASE if address >= FLASH_BASE else address
+        if not 0 <= offset <= FLASH_BYTES_FITTED - size:
+            return False
+        self.parts.flash.program(offset, size, value)
+        # The engine stores the value whatever the controller says: put back what should be there.
+        self._flash_repairs.append((offset, self.memory.read_flash(offset, size)))
+        self.processor.stop_at_border()
+        return True
+
+    def _repair_flash(self) -> None:
+        for offset, data in self._flash_repairs:
+            self.memory.load_flash(offset, data)
+            self.engine.drop_code(FLASH_BASE + offset, len(data))
+            self.engine.drop_code(offset, len(data))
+        self._flash_repairs.clear()
+
+
+class _FlashArray:
+    """The flash array, as its controller sees it; changes become code at the next border."""
+
+    def __init__(self, memory: Memory, repairs: list[tuple[int, bytes]]) -> None:
+        self._memory = memory
+        self._repairs = repairs
+
+    @property
+    def size(self) -> int:
+        return len(self._memory.flash)
+
+    def read(self, offset: int, size: int) -> bytes:
+        return self._memory.read_flash(offset, size)
+
+    def write(self, offset: int, data: bytes) -> None:
+        self._memory.load_flash(offset, data)
+        self._repairs.append((offset, data))
