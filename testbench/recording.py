@@ -68,7 +68,6 @@ class Recorder:
         self._next_sample: Nanos = 0
         self._changed: dict[str, None] = {}
         self._text = b""
-        self._text_at: Nanos = 0
         self._sonar_mm: list[int] | None = None
         for net in harness:
             net.watch(self._note_change)
@@ -83,9 +82,8 @@ class Recorder:
         """Take characters that the chip has sent, their last one complete at `at`."""
         for byte in data:
             self._text += bytes([byte])
-            self._text_at = at
             if byte == ord("\n") or len(self._text) >= LONGEST_TEXT:
-                self._tell_text()
+                self._tell_text(at)
 
     def wire(self, direction: str, data: bytes, at: Nanos) -> None:
         """Take bytes that have arrived: `c2r` client to robot, `r2c` back."""
@@ -125,8 +123,8 @@ class Recorder:
 
     def finish(self, end: Nanos) -> None:
         """Write everything up to `end`, a last pose and an unfinished line of text."""
-        if self._text and self._text_at <= end:
-            self._tell_text(max(self._text_at, 0))
+        if self._text:
+            self._tell_text(end)
         if self._next_sample - self._sample_ns < end:
             self._sample(end)
         self._pass(end)
@@ -140,7 +138,7 @@ class Recorder:
             "last_state": self.last_state,
             "next_sample": self._next_sample,
             "changed": tuple(self._changed),
-            "text": (self._text, self._text_at),
+            "text": self._text,
             "sonar_mm": None if self._sonar_mm is None else tuple(self._sonar_mm),
         }
 
@@ -153,15 +151,15 @@ class Recorder:
         self.last_state = cast("BodyState | None", state["last_state"])
         self._next_sample = cast("int", state["next_sample"])
         self._changed = dict.fromkeys(cast("tuple[str, ...]", state["changed"]))
-        self._text, self._text_at = cast("tuple[bytes, int]", state["text"])
+        self._text = cast("bytes", state["text"])
         sonar = cast("tuple[int, ...] | None", state["sonar_mm"])
         self._sonar_mm = None if sonar is None else list(sonar)
 
     def _note_change(self, net: Net, _owner: str, _at: Nanos) -> None:
         self._changed[net.name] = None
 
-    def _tell_text(self, at: Nanos | None = None) -> None:
-        self.trace.add("usart", self._text_at if at is None else at, {"hex": self._text.hex()})
+    def _tell_text(self, at: Nanos) -> None:
+        self.trace.add("usart", at, {"hex": self._text.hex()})
         self.last_line = self._text.decode("utf-8", "replace").strip()
         self._text = b""
 
