@@ -38,6 +38,7 @@ class Exti(Peripheral):
         super().__init__(chip, place)
         #: Level of each line, by bit.
         self._levels = 0
+        self._ports = chip.pins.exti_ports
         for pin in chip.pins:
             pin.listeners.append(self._input_changed)
         chip.pins.route_listeners.append(self._route_changed)
@@ -58,7 +59,7 @@ class Exti(Peripheral):
             self._request(bit)
 
     def _input_changed(self, pin: Pin) -> None:
-        if self.chip.pins.exti_ports[pin.number] == pin.port:
+        if self._ports[pin.number] == pin.port:
             self.set_line(pin.number, pin.input)
 
     def _route_changed(self) -> None:

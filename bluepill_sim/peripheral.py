@@ -68,11 +68,19 @@ class Peripheral:
         self.words = array("I", bytes(place.size))
         count = place.size // 4
         self._registers: list[Register | None] = [None] * count
+        #: For each word what `Register.stored_after` is made of: kept, taken, cleared by 1, cleared by 0.
+        self._masks = [(0, 0, 0, 0)] * count
         self._read_hooks: list[Callable[[], int] | None] = [None] * count
         self._write_hooks: list[Callable[[int, int], None] | None] = [None] * count
         for register in self.REGISTERS:
             index = register.offset // 4
             self._registers[index] = register
+            self._masks[index] = (
+                register.readable & ~register.writable,
+                register.readable & register.writable,
+                register.write_one_to_clear,
+                register.write_zero_to_clear,
+            )
             if register.on_read is not None:
                 self._read_hooks[index] = cast("Callable[[], int]", getattr(self, register.on_read))
             if register.on_write is not None:
@@ -111,7 +119,8 @@ class Peripheral:
             return
         previous = self.words[index]
         written = value if size == 4 else self._narrow(register, offset, size, value)
-        self.words[index] = register.stored_after(previous, written)
+        kept, taken, one, zero = self._masks[index]
+        self.words[index] = previous & kept & ~(written & one) & (written | ~zero) | written & taken
         hook = self._write_hooks[index]
         if hook is not None:
             hook(written, previous)

@@ -11,7 +11,7 @@ change of `output` is told to `PinBank.on_output` once, with its exact time.
 
 from collections.abc import Callable, Iterator
 from enum import Enum
-from typing import Protocol, TypeAlias
+from typing import Protocol, Self, TypeAlias
 
 #: Level of the outside driver, mode, ODR bit, holder (owner, drive), connections, watched.
 PinSnapshot: TypeAlias = tuple[
@@ -22,38 +22,58 @@ PinSnapshot: TypeAlias = tuple[
 class PinDrive(Enum):
     """What the chip itself puts on a wire."""
 
+    #: The level that it makes when nobody stronger drives; None: none.
+    level: bool | None
+    #: Whether it is stronger than any pull.
+    is_strong: bool
+
+    def __new__(cls, label: str, level: bool | None, is_strong: bool) -> Self:
+        """Make a member whose value is its label."""
+        member = object.__new__(cls)
+        member._value_ = label
+        member.level, member.is_strong = level, is_strong
+        return member
+
     #: Nothing: the chip listens, or has the pin in analog mode.
-    NONE = "none"
+    NONE = "none", None, False
     #: Strong 0.
-    LOW = "low"
+    LOW = "low", False, True
     #: Strong 1.
-    HIGH = "high"
+    HIGH = "high", True, True
     #: Weak 1 (about 40 kΩ).
-    PULL_UP = "pull-up"
+    PULL_UP = "pull-up", True, False
     #: Weak 0 (about 40 kΩ).
-    PULL_DOWN = "pull-down"
+    PULL_DOWN = "pull-down", False, False
 
 
 class PinMode(Enum):
     """What GPIOx_CRL/CRH make of a pin."""
 
+    #: What the chip drives for a 0 and for a 1: the ODR bit, or the level of the alternate function.
+    drives: tuple[PinDrive, PinDrive]
+
+    def __new__(cls, label: str, low: PinDrive, high: PinDrive) -> Self:
+        """Make a member whose value is its label."""
+        member = object.__new__(cls)
+        member._value_ = label
+        member.drives = (low, high)
+        return member
+
     #: Schmitt trigger off: reads 0.
-    ANALOG = "analog"
-    FLOATING = "floating input"
+    ANALOG = "analog", PinDrive.NONE, PinDrive.NONE
+    FLOATING = "floating input", PinDrive.NONE, PinDrive.NONE
     #: Input with the pull that the ODR bit chooses.
-    PULLED = "pulled input"
-    PUSH_PULL = "output"
-    OPEN_DRAIN = "open-drain output"
-    ALTERNATE_PUSH_PULL = "alternate function"
-    ALTERNATE_OPEN_DRAIN = "open-drain alternate function"
+    PULLED = "pulled input", PinDrive.PULL_DOWN, PinDrive.PULL_UP
+    PUSH_PULL = "output", PinDrive.LOW, PinDrive.HIGH
+    OPEN_DRAIN = "open-drain output", PinDrive.LOW, PinDrive.NONE
+    ALTERNATE_PUSH_PULL = "alternate function", PinDrive.LOW, PinDrive.HIGH
+    ALTERNATE_OPEN_DRAIN = "open-drain alternate function", PinDrive.LOW, PinDrive.NONE
 
 
-ALTERNATE_MODES = frozenset({PinMode.ALTERNATE_PUSH_PULL, PinMode.ALTERNATE_OPEN_DRAIN})
-OPEN_DRAIN_MODES = frozenset({PinMode.OPEN_DRAIN, PinMode.ALTERNATE_OPEN_DRAIN})
-INPUT_MODES = frozenset({PinMode.FLOATING, PinMode.PULLED})
-
-_WEAK_LEVELS = {PinDrive.PULL_UP: True, PinDrive.PULL_DOWN: False}
-_STRONG_LEVELS = {PinDrive.HIGH: True, PinDrive.LOW: False}
+ALTERNATE_MODES = (PinMode.ALTERNATE_PUSH_PULL, PinMode.ALTERNATE_OPEN_DRAIN)
+INPUT_MODES = (PinMode.FLOATING, PinMode.PULLED)
+_DRIVES_BY_VALUE = {drive.value: drive for drive in PinDrive}
+_MODES_BY_VALUE = {mode.value: mode for mode in PinMode}
 
 
 class PinPorts(Protocol):
@@ -96,6 +116,10 @@ class Pin:
         self._output_bit = False
         self._holder: tuple[str, PinDrive] | None = None
         self._sources: dict[str, bool] = {}
+        # What follows from the mode, the holder and the sources, kept at hand because pins change often:
+        # the drive for an ODR bit of 0 and of 1, and whether the digital input reads the wire.
+        self._drives = PinMode.FLOATING.drives
+        self._reads = True
 
     # From outside the chip.
 
@@ -128,8 +152,7 @@ class Pin:
     @property
     def is_contended(self) -> bool:
         """Whether chip and outside world drive the wire to different levels."""
-        own = _STRONG_LEVELS.get(self.output)
-        return own is not None and self._outside is not None and own is not self._outside
+        return self.output.is_strong and self._outside is not None and self.output.level is not self._outside
 
     # From inside the chip.
 
@@ -152,7 +175,7 @@ class Pin:
     def set_output_bit(self, output_bit: bool) -> None:
         """Set the ODR bit (called by GPIO)."""
         self._output_bit = output_bit
-        self._update()
+        self._put(self._drives[output_bit])
 
     def hold(self, owner: str, drive: PinDrive = PinDrive.NONE) -> None:
         """Take the pin from GPIO for a fixed function, such as the debug port."""
@@ -180,12 +203,13 @@ class Pin:
             self._mode in ALTERNATE_MODES
             and self._holder is None
             and self.is_bonded
-            and next(iter(sorted(self._sources)), None) == source
+            and min(self._sources, default=None) == source
         )
 
     def is_listening(self) -> bool:
         """Whether an alternate function can receive from this pin: an input that nobody holds."""
-        return self._holder is None and self.is_bonded and self._mode in INPUT_MODES | ALTERNATE_MODES
+        is_input = self._mode in INPUT_MODES or self._mode in ALTERNATE_MODES
+        return is_input and self._holder is None and self.is_bonded
 
     def snapshot(self) -> PinSnapshot:
         """Return all that decides this pin's future, as plain values."""
@@ -204,34 +228,34 @@ class Pin:
     def restore(self, snapshot: PinSnapshot) -> None:
         """Put back what `snapshot` returned; tells nobody."""
         self._outside, mode, self._output_bit, holder, sources, self.is_watched, output, self.level = snapshot
-        self._mode = PinMode(mode)
-        self._holder = None if holder is None else (holder[0], PinDrive(holder[1]))
+        self._mode = _MODES_BY_VALUE[mode]
+        self._holder = None if holder is None else (holder[0], _DRIVES_BY_VALUE[holder[1]])
         self._sources = dict(sources)
-        self.output = PinDrive(output)
-        self.input = self._input()
+        self.output = _DRIVES_BY_VALUE[output]
+        self._derive()
+        self.input = self.level and self._reads
 
-    def _own_drive(self) -> PinDrive:
-        """Return what the chip puts on the wire, by RM0008 table 20."""
-        if self._holder is not None:
-            return self._holder[1]
+    def _derive(self) -> None:
+        """Work out `_drives` and `_reads`, by RM0008 table 20."""
         mode = self._mode
-        if mode in ALTERNATE_MODES:
-            # Two functions on one pin are unspecified; chosen: the first by name drives. None active: nothing drives.
-            if not self._sources:
-                return PinDrive.NONE
-            bit = self._sources[min(self._sources)]
+        self._reads = mode is not PinMode.ANALOG and self._holder is None
+        if self._holder is not None:
+            self._drives = (self._holder[1],) * 2
+        elif mode not in ALTERNATE_MODES:
+            self._drives = mode.drives
+        elif self._sources:
+            # Two functions on one pin are unspecified; chosen: the first by name drives.
+            self._drives = (mode.drives[self._sources[min(self._sources)]],) * 2
         else:
-            bit = self._output_bit
-        if mode is PinMode.PULLED:
-            return PinDrive.PULL_UP if bit else PinDrive.PULL_DOWN
-        if mode is PinMode.ANALOG or mode is PinMode.FLOATING:
-            return PinDrive.NONE
-        if bit:
-            return PinDrive.NONE if mode in OPEN_DRAIN_MODES else PinDrive.HIGH
-        return PinDrive.LOW
+            # "Not specified" (RM0008 9.1.9); chosen: nothing drives.
+            self._drives = (PinDrive.NONE,) * 2
 
     def _update(self) -> None:
-        output = self._own_drive()
+        self._derive()
+        self._put(self._drives[self._output_bit])
+
+    def _put(self, output: PinDrive) -> None:
+        """Put a drive on the wire."""
         if output is not self.output:
             self.output = output
             self._bank.output_changed(self)
@@ -239,25 +263,23 @@ class Pin:
 
     def _resolve(self) -> None:
         """Bring `level` and `input` up to date and tell the listeners of a change of the input."""
-        own = _STRONG_LEVELS.get(self.output)
-        outside = self._outside
-        if own is not None:
-            # Chosen: of two strong drivers that differ the low one wins.
-            level = own if outside is None else own and outside
-        elif outside is not None:
-            level = outside
-        else:
+        output, outside = self.output, self._outside
+        if outside is None:
             # A weak pull of the chip is stronger than the board's (40 kΩ against an LED or 100 kΩ).
-            level = _WEAK_LEVELS.get(self.output, _WEAK_LEVELS.get(self.board_pull, False))
+            level = output.level
+            if level is None:
+                level = bool(self.board_pull.level)
+        elif output.is_strong:
+            # Chosen: of two strong drivers that differ the low one wins.
+            level = outside and bool(output.level)
+        else:
+            level = outside
         self.level = level
-        seen = self._input()
+        seen = level and self._reads
         if seen is not self.input:
             self.input = seen
             for listener in self.listeners:
                 listener(self)
-
-    def _input(self) -> bool:
-        return self.level and self._mode is not PinMode.ANALOG and self._holder is None
 
 
 class PinBank:
@@ -283,7 +305,7 @@ class PinBank:
         self.route_listeners: list[Callable[[], None]] = []
         #: AFIO_MAPR by function, such as {"USART1": 1}; a function that is missing is not remapped.
         self.remaps: dict[str, int] = {}
-        #: The port that feeds each EXTI line 0 to 15 (AFIO_EXTICR).
+        #: The port that feeds each EXTI line 0 to 15 (AFIO_EXTICR); the list stays the same for ever.
         self.exti_ports: list[str] = ["A"] * 16
 
     def __getitem__(self, name: str) -> Pin:
@@ -324,4 +346,4 @@ class PinBank:
         for pin, state in zip(self, pins, strict=True):
             pin.restore(state)
         self.remaps = dict(remaps)
-        self.exti_ports = list(exti_ports)
+        self.exti_ports[:] = exti_ports
