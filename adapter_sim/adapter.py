@@ -305,6 +305,7 @@ class Adapter:
     def _boot(self, now: Nanos) -> None:
         self.outputs.show_safe(now)
         self.outputs.show_encoders((0, 0), now)
+        self.session.stop_unknown()
         self._next_sample = now
         self._enter(AdapterState.IDLE, now, "booted", "waits for p2dx_con")
 

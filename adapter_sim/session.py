@@ -7,7 +7,8 @@ handed on, everything else folded into "opened" and "ended, because".
 Any packet revives the last speed of a robot that its watchdog has stopped, and
 the adapter cannot know what a robot was doing before. So STOP, VEL 0 and RVEL 0
 stand before every SYNC0, the repeated ones included: a cable that is plugged in
-between two tries must not set the robot off.
+between two tries must not set the robot off. They also go out at boot: whoever
+reset the adapter may have done so while the robot drove.
 
 Invariant: what `take_output` returns begins, after `abandon`, with STOP.
 """
@@ -63,6 +64,7 @@ class Session:
         self._settings = ConnectionSettings(
             pulse_ns=settings.pulse_ns, liveness_ns=settings.liveness_ns, first_packet_ns=settings.first_sip_ns
         )
+        self._stops_unknown = settings.stop_unknown_robot
         self._connection = Connection(Role.CLIENT, settings=self._settings)
         self._output: list[bytes] = []
         self._robot = ""
@@ -81,6 +83,11 @@ class Session:
         """Send a command of the open session."""
         self._connection.send(command, now)
         self._collect()
+
+    def stop_unknown(self) -> None:
+        """Stop a robot of which nothing is known, unless the settings say not to."""
+        if self._stops_unknown:
+            self._output += _STOPS
 
     def abandon(self, now: Nanos) -> None:
         """Stop the robot and close it, open or not; what was not taken yet is never sent."""
@@ -149,5 +156,5 @@ class Session:
         is_syncing = self._connection.state is ConnectionState.SYNC0
         for frame in self._connection.take_output():
             if is_syncing and frame == _SYNC0:
-                self._output += _STOPS
+                self.stop_unknown()
             self._output.append(frame)

@@ -85,6 +85,9 @@ class AdapterSettings:
     encoder_at_open: EncoderAtOpen = EncoderAtOpen.ZERO
     #: A code stays on the pins this long at least. # chosen: two polls of a 100 Hz program; 50 codes/s are 3.2 m/s
     encoder_dwell_ns: Nanos = 20 * NS_PER_MS
+    #: Whether a robot of unknown state is stopped too: at boot and before each SYNC0. Only for a peer that takes
+    #: its first packet for a SYNC whatever it is (AMRISim's default build) must this be off.
+    stop_unknown_robot: bool = True
     #: After a loss the stop sequence goes out once, then this many times more.
     stop_repeats: int = 3
     stop_repeat_ns: Nanos = 200 * NS_PER_MS
@@ -95,13 +98,17 @@ class AdapterSettings:
         self._coerce("encoder_at_open", EncoderAtOpen)
         for field in fields(self):
             value = getattr(self, field.name)
-            if isinstance(value, StrEnum) or value is None:
+            if isinstance(value, StrEnum) or value is None or field.name == "stop_unknown_robot":
                 continue
             if not isinstance(value, int) or isinstance(value, bool):
                 raise UsageError(f"adapter setting {field.name} must be an integer, got {value!r}")
             least = 0 if field.name in _MAY_BE_ZERO else 1
             if value < least:
                 raise UsageError(f"adapter setting {field.name} must be {least} or more, got {value}")
+        if not isinstance(self.stop_unknown_robot, bool):
+            raise UsageError(
+                f"adapter setting stop_unknown_robot must be true or false, got {self.stop_unknown_robot!r}"
+            )
         if self.sample_count % 2 == 0:
             raise UsageError(f"adapter setting sample_count must be odd for a majority, got {self.sample_count}")
         if self.refresh_ns < self.pair_spacing_ns:

@@ -26,12 +26,14 @@ its state moves only there, at its own deadlines, and when bytes arrive:
     CLOSING      RESET     ·          ·              ·             ·         ·               ·
     LOST         RESET     ·          ·              ·             IDLE      ·               ·
 
-RESET leaves to BOOTING when rst is low, CLOSING to IDLE when its time is over. From LOST the way to motion leads over
-p2dx_con low and high again, whatever the robot does meanwhile.
+RESET leaves to BOOTING when rst is low, CLOSING to IDLE when its time is over.
+From LOST the way to motion leads over p2dx_con low and high again, whatever the
+robot does meanwhile.
 
 Any packet revives the last speed of a robot that its watchdog has stopped. So
 the first frames after a loss are STOP, VEL 0, RVEL 0, and the same three stand
-before every SYNC0: the adapter cannot know what the robot was doing before.
+before every SYNC0 and go out after a boot: the adapter cannot know what the
+robot was doing before.
 
 Invariant: of the outputs, only SETTLING and DRIVING show what the robot reports.
 """

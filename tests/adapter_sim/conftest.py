@@ -139,8 +139,8 @@ class Line:
 class Rig:
     """The adapter, its pins, a line each way, and the robot, on one clock."""
 
-    def __init__(self, settings: AdapterSettings | None = None, robot: object | None = None) -> None:
-        self.now: Nanos = 0
+    def __init__(self, settings: AdapterSettings | None = None, robot: object | None = None, now: Nanos = 0) -> None:
+        self.now = now
         self.pins = FakePins()
         self.robot = robot or FakeRobot()
         self.events: list[tuple[Nanos, str, str]] = []
@@ -150,6 +150,7 @@ class Rig:
             parameters=PARAMETERS,
             settings=settings or AdapterSettings(threshold_um=600_000),
             on_event=lambda now, what, detail: self.events.append((now, what, detail)),
+            now=now,
         )
         self.to_robot, self.to_adapter = Line(), Line()
 

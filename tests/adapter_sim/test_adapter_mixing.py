@@ -84,6 +84,7 @@ def test_the_linear_and_angular_meaning_takes_motor2_as_the_turn() -> None:
         ({"sample_period_ns": 0}, "sample_period_ns must be 1 or more"),
         ({"threshold_um": -1}, "threshold_um must be 0 or more"),
         ({"threshold_um": 0.6}, "threshold_um must be an integer, got 0.6"),
+        ({"stop_unknown_robot": 1}, "stop_unknown_robot must be true or false, got 1"),
         ({"refresh_ns": True}, "refresh_ns must be an integer"),
         ({"refresh_ns": 20_000_000}, "below pair_spacing_ns"),
     ],
