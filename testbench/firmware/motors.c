@@ -8,7 +8,9 @@
 #include "tick.h"
 #include "uart.h"
 
-#define HOLD_S 3u /* longer than the slowest ramp: 437.5 mm/s of change at 300 mm/s^2 takes 1.5 s */
+/* 3 s and a tick, so that 3 s are kept between the pins' edges, which come some instructions after the tick.
+ * Longer than the slowest ramp: 437.5 mm/s of change at 300 mm/s^2 takes 1.5 s. */
+#define HOLD_TICKS (3u * TICKS_PER_S + 1u)
 
 int main(void)
 {
@@ -22,7 +24,7 @@ int main(void)
         uart_text("motors: ");
         uart_number(codes[i]);
         uart_text("\n");
-        tick_sleep(HOLD_S * TICKS_PER_S);
+        tick_sleep(HOLD_TICKS);
     }
     uart_text("motors: done\n");
     for (;;) {
