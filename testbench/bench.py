@@ -22,7 +22,7 @@ from p2os.pioneer.body import RobotBody, make_body
 from p2os.pioneer.controller import Pioneer
 from p2os.pioneer.scenery import World
 from p2os.pioneer.world import load_world
-from p2os.timing import Nanos
+from p2os.timing import NS_PER_S, Nanos
 from testbench.chip_pins import ChipPins
 from testbench.direct import DirectRobot, DistanceSensors, JointMotor, WheelEncoder
 from testbench.loop import DEFAULT_SLICE_NS, Follower, RunLoop
@@ -36,6 +36,8 @@ from testbench.sip_ranges import SipRanges
 from testbench.trace import TraceWriter
 from testbench.wires import Harness, Net, OwnedPins, Strength
 
+#: chosen: so long a run goes on after the firmware has died, to show what the robot does then.
+AFTER_FAULT_NS: Nanos = 1 * NS_PER_S
 #: Owner of the resistors on the wires.
 RESISTORS = "board"
 
@@ -90,6 +92,7 @@ class Bench:
     ) -> None:
         self.scenario = scenario
         self.trace = trace or TraceWriter()
+        self.on_slice = on_slice
         pinout = load_pinout()
         world = load_world(scenario.world, seed=scenario.seed)
         body = make_body(scenario.body, world, scenario.parameters)
@@ -105,10 +108,10 @@ class Bench:
             bring_to=self._bring_robot_to, on_change=self.recorder.obstacle,
         )  # fmt: skip
         self.recorder.bring_to = self._bring_robot_to
-        self.loop = RunLoop(chip, (*self._robots, self.script, self.recorder), slice_ns=slice_ns, on_slice=on_slice)
-        pins = ChipPins(
-            chip, harness, {wire.name: wire.bluepill for wire in pinout.wires}, on_watched=self.loop.note_edge
-        )
+        followers = (*self._robots, self.script, self.recorder)
+        self.loop = RunLoop(chip, followers, slice_ns=slice_ns, on_slice=self._after_slice)
+        pin_of = {wire.name: wire.bluepill for wire in pinout.wires}
+        pins = ChipPins(chip, harness, pin_of, on_watched=self.loop.note_edge)
         for wire in pinout.with_role(Role.RESET):
             pins.watch(wire.name)
         chip.usart1.on_transmit = lambda byte, at: self.recorder.usart(bytes([byte]), at)
@@ -126,17 +129,23 @@ class Bench:
         return self.parts.body.note
 
     @property
+    def end(self) -> Nanos:
+        """Return when the run ends, as far as is known now."""
+        fault, duration_ns = self.chip.fault, self.scenario.duration_ns
+        return duration_ns if fault is None else min(duration_ns, fault.at_ns + AFTER_FAULT_NS)
+
+    @property
     def now(self) -> Nanos:
         """Return the time that the chip has come to."""
         return self.parts.chip.now_ns
 
     def run_until(self, end: Nanos) -> None:
-        """Run to `end`, or until the firmware stands still for good (`loop.is_halted`)."""
-        self.loop.run_until(end)
+        """Run to `end`, or until shortly after the firmware has died."""
+        self.loop.run_until(min(end, self.end))
 
     def finish(self) -> Nanos:
         """Bring everything to the end of the run and write the rest of the trace; return the end's time."""
-        end = min(self.now, self.scenario.duration_ns)
+        end = min(self.now, self.end)
         self.loop.finish(end)
         self.recorder.finish(end)
         return end
@@ -164,6 +173,12 @@ class Bench:
         self.script.restore(snapshot["script"])
         self.recorder.restore(snapshot["recorder"])
         self.loop.restore(cast("Mapping[str, object]", snapshot["loop"]))
+
+    def _after_slice(self, now: Nanos) -> None:
+        if self.chip.fault is not None:
+            self.loop.end_at(self.end)
+        if self.on_slice is not None:
+            self.on_slice(now)
 
     def _bring_robot_to(self, at: Nanos) -> None:
         for robot in self._robots:

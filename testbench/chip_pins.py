@@ -10,22 +10,22 @@ Invariant: the chip's input follows `level_without(OWNER)` of its net.
 """
 
 from collections.abc import Callable, Mapping
-from enum import Enum
 from typing import Protocol
 
+from bluepill_sim.pins import PinDrive
 from p2os.timing import Nanos
 from testbench.wires import Harness, Net, Strength
 
 #: The name under which the chip drives wires.
 OWNER = "bluepill"
 
-#: The chip's own drives, by name of its `PinDrive`: level and strength on the wire.
+#: The chip's own drives: level and strength on the wire.
 DRIVES = {
-    "NONE": (False, Strength.FLOATING),
-    "LOW": (False, Strength.PUSH_PULL),
-    "HIGH": (True, Strength.PUSH_PULL),
-    "PULL_UP": (True, Strength.PULL),
-    "PULL_DOWN": (False, Strength.PULL),
+    PinDrive.NONE: (False, Strength.FLOATING),
+    PinDrive.LOW: (False, Strength.PUSH_PULL),
+    PinDrive.HIGH: (True, Strength.PUSH_PULL),
+    PinDrive.PULL_UP: (True, Strength.PULL),
+    PinDrive.PULL_DOWN: (False, Strength.PULL),
 }
 
 
@@ -44,7 +44,7 @@ class ChipPin(Protocol):
 class ChipWithPins(Protocol):
     """What the wires need of the chip."""
 
-    on_pin: Callable[[str, Enum, int], None] | None
+    on_pin: Callable[[str, PinDrive, int], None] | None
 
     def pin(self, name: str) -> ChipPin:
         """Return a pin by its name, such as "PA4"."""
@@ -83,11 +83,11 @@ class ChipPins:
         self._watched.add(net)
         self._pins[net].watch(True)
 
-    def _chip_drives(self, pin: str, drive: Enum, at: Nanos) -> None:
+    def _chip_drives(self, pin: str, drive: PinDrive, at: Nanos) -> None:
         net = self._nets.get(pin)
         if net is None:
             return
-        level, strength = DRIVES[drive.name]
+        level, strength = DRIVES[drive]
         net.drive(OWNER, level, strength, at)
         self._pass_on(net, at)
         if net.name in self._watched and self._on_watched is not None:

@@ -39,7 +39,7 @@ class Leader(Protocol):
         ...
 
     def advance_to(self, limit_ns: int) -> object:
-        """Run to `limit_ns`; returns something with `now` and a `reason` whose `name` is that of `Reason`."""
+        """Run to `limit_ns`, at most a basic block beyond; less far where a watched net changes."""
         ...
 
 
@@ -77,8 +77,7 @@ class RunLoop:
         self.on_slice = on_slice
         #: The last instant that all followers were brought to.
         self.now: Nanos = 0
-        #: The leader stands still for good.
-        self.is_halted = False
+        self._end: Nanos = 0
         self._edges: list[Nanos] = []
         self._rounds = 0
 
@@ -87,20 +86,27 @@ class RunLoop:
         if not self._edges or self._edges[-1] != at:
             self._edges.append(at)
 
+    def end_at(self, end: Nanos) -> None:
+        """End the present `run_until` earlier; what was brought beyond stays there."""
+        self._end = min(self._end, end)
+
     def run_until(self, end: Nanos) -> None:
-        """Run to `end` in nanoseconds, or until the leader halts for good.
+        """Run to `end` in nanoseconds, or to what `end_at` says in the meantime.
+
+        A leader that stands still for good lets time pass like any other.
 
         Raises:
             StuckError: Two parts wake each other for ever.
         """
+        self._end = end
         while True:
             due = self._next_due()
-            if due <= min(self.leader.now_ns, end):
+            if due <= min(self.leader.now_ns, self._end):
                 self._follow(due)
-            elif self.leader.now_ns >= end or self.is_halted:
+            elif self.leader.now_ns >= self._end:
                 return
             else:
-                self._lead(min(due, end))
+                self._lead(min(due, self._end))
 
     def finish(self, end: Nanos) -> None:
         """Bring the followers to `end` itself, so that their state is that of the end of the run."""
@@ -109,21 +115,18 @@ class RunLoop:
 
     def snapshot(self) -> dict[str, object]:
         """Return the loop's own state; the parts are saved by whoever built them."""
-        return {"now": self.now, "halted": self.is_halted, "edges": tuple(self._edges)}
+        return {"now": self.now, "edges": tuple(self._edges)}
 
     def restore(self, snapshot: Mapping[str, object]) -> None:
         """Put back what `snapshot` returned."""
         self.now = cast("int", snapshot["now"])
-        self.is_halted = bool(snapshot["halted"])
         self._edges = list(cast("tuple[int, ...]", snapshot["edges"]))
 
     def _lead(self, limit: Nanos) -> None:
-        """Let the leader run to `limit`, slice by slice; stop at an edge on a watched net and at its end."""
+        """Let the leader run to `limit`, slice by slice; stop at an edge on a watched net."""
         leader, slice_ns, on_slice = self.leader, self.slice_ns, self.on_slice
-        while leader.now_ns < limit and not self._edges and not self.is_halted:
-            reached = leader.advance_to(min(limit, leader.now_ns + slice_ns))
-            if _is_halt(reached):
-                self.is_halted = True
+        while leader.now_ns < limit and not self._edges:
+            leader.advance_to(min(limit, leader.now_ns + slice_ns))
             if on_slice is not None:
                 on_slice(leader.now_ns)
 
@@ -149,8 +152,3 @@ class RunLoop:
             deadline = follower.next_deadline()
             if has_edge or (deadline is not None and deadline <= due):
                 follower.advance_to(self.now)
-
-
-def _is_halt(reached: object) -> bool:
-    """Tell whether a leader stands still for good; the chip has its own twin of `Reason`."""
-    return str(getattr(getattr(reached, "reason", None), "name", "")) == "HALT"

@@ -4,9 +4,9 @@
 """
 
 from collections.abc import Callable, Sequence
-from enum import Enum
 from typing import Protocol
 
+from bluepill_sim.pins import PinDrive
 from testbench.chip_pins import ChipPin
 
 
@@ -25,11 +25,20 @@ class Activity(Protocol):
     last_wfi_ns: int
 
 
+class Fault(Protocol):
+    """What the firmware died of; printed, it is one line for a person."""
+
+    @property
+    def at_ns(self) -> int:
+        """When."""
+        ...
+
+
 class Chip(Protocol):
     """A chip that runs a firmware and leads the bench's time."""
 
     #: Called with (pin, its own drive, ns) at each change of what the chip puts on a wire.
-    on_pin: Callable[[str, Enum, int], None] | None
+    on_pin: Callable[[str, PinDrive, int], None] | None
     #: Called with each warning, once.
     on_warning: Callable[[str], None] | None
 
@@ -49,8 +58,8 @@ class Chip(Protocol):
         ...
 
     @property
-    def fault(self) -> object | None:
-        """What the firmware died of, as a text when printed; None while it lives."""
+    def fault(self) -> Fault | None:
+        """What the firmware died of; None while it lives."""
         ...
 
     @property
@@ -63,7 +72,7 @@ class Chip(Protocol):
         ...
 
     def advance_to(self, limit_ns: int) -> object:
-        """Run to `limit_ns`, at most a basic block beyond; returns what has `reason.name` "HALT" at the end of all."""
+        """Run to `limit_ns`, at most a basic block beyond; less far where a watched pin changes."""
         ...
 
     def where(self) -> str:

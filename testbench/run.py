@@ -92,7 +92,7 @@ def run_scenario(
             if on_progress is not None:
                 on_progress(Progress(now=now, duration_ns=scenario.duration_ns, doing=doing(bench)))
 
-        bench.loop.on_slice = after_slice
+        bench.on_slice = after_slice
         trace.meta(meta_of(scenario, bench.parts.world, bench.note))
         return _record(bench, trace, folder, pacer, clock)
 

@@ -5,15 +5,7 @@ from dataclasses import dataclass
 from enum import Enum
 from types import SimpleNamespace
 
-
-class PinDrive(Enum):
-    """As the real chip's: what it puts on a wire."""
-
-    NONE = "none"
-    LOW = "low"
-    HIGH = "high"
-    PULL_UP = "pull-up"
-    PULL_DOWN = "pull-down"
+from bluepill_sim.pins import PinDrive
 
 
 class Reason(Enum):
@@ -28,6 +20,14 @@ class Reason(Enum):
 class Reached:
     now: int
     reason: Reason
+
+
+@dataclass(frozen=True)
+class FakeFault:
+    at_ns: int
+
+    def __str__(self) -> str:
+        return f"HardFault: no such instruction at main+0x4 (0x08000104), t = {self.at_ns / 1e9:.6f} s"
 
 
 class FakePin:
@@ -59,11 +59,11 @@ class FakeChip:
     ) -> None:
         self.now_ns = 0
         self.inputs: list[tuple[int, str, bool | None]] = []
-        self.on_pin: Callable[[str, Enum, int], None] | None = None
+        self.on_pin: Callable[[str, PinDrive, int], None] | None = None
         self.on_warning: Callable[[str], None] | None = None
         self.usart1 = SimpleNamespace(on_transmit=None)
         self.warnings: list[str] = []
-        self.fault: object | None = None
+        self.fault: FakeFault | None = None
         self.activity = SimpleNamespace(last_pin_ns=0, last_usart_ns=0, last_wfi_ns=0)
         self._pins: dict[str, FakePin] = {}
         bytes_out = [(at + 87_000 * n, byte) for at, line in text for n, byte in enumerate(line)]
@@ -93,8 +93,8 @@ class FakeChip:
                     return Reached(self.now_ns, Reason.EDGE)
                 continue
             if self._halts_at is not None and border >= self._halts_at:
-                self.now_ns = self._halts_at
-                self.fault = "HardFault at main+0x4"
+                self.fault = FakeFault(self._halts_at)
+                self.now_ns = limit
                 return Reached(self.now_ns, Reason.HALT)
             self.now_ns = border
         return Reached(self.now_ns, Reason.DEADLINE)

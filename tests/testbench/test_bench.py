@@ -131,3 +131,11 @@ def test_warnings_of_the_chip_stand_in_the_log() -> None:
     assert entries(made, "event")[0] == {
         "k": "event", "t": 0, "who": "chip", "what": "warning", "detail": "TIM2 is not modelled",
     }  # fmt: skip
+
+
+@pytest.mark.parametrize("slice_ns", [100_000, MS, 10 * MS])
+def test_a_run_ends_a_second_after_the_firmware_has_died(slice_ns: int) -> None:
+    chip = FakeChip(drives((0, 0, 0), (0.2, 3, 3)), halts_at=S // 2)
+    made = finished(Bench(scenario("direct"), chip=chip, slice_ns=slice_ns))
+    assert entries(made, "pose")[-1]["t"] == S + S // 2
+    assert made.finish() == S + S // 2

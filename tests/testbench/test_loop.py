@@ -42,14 +42,19 @@ def test_an_edge_on_a_watched_net_brings_all_to_its_own_time() -> None:
     assert log == [("a", 1_234), ("a", 5_000)]
 
 
-def test_a_leader_that_stands_still_ends_the_run_where_it_stands() -> None:
+def test_a_leader_that_stands_still_lets_time_pass() -> None:
     log: list[tuple[str, int]] = []
-    loop = RunLoop(FakeChip(halts_at=450), [Ticker("a", 100, log)])
+    RunLoop(FakeChip(halts_at=450), [Ticker("a", 300, log)]).run_until(1_000)
+    assert log == [("a", 300), ("a", 600), ("a", 900)]
+
+
+@pytest.mark.parametrize("slice_ns", [10, 100, 1_000])
+def test_a_run_can_be_ended_earlier_than_it_was_to_end(slice_ns: int) -> None:
+    log: list[tuple[str, int]] = []
+    loop = RunLoop(FakeChip(block_ns=10), [Ticker("a", 300, log)], slice_ns=slice_ns)
+    loop.on_slice = lambda _now: loop.end_at(650)
     loop.run_until(10_000)
-    assert loop.is_halted
-    assert log[-1] == ("a", 400)
-    loop.finish(10_000)
-    assert log[-1] == ("a", 450)
+    assert log == [("a", 300), ("a", 600)]
 
 
 def test_the_end_itself_is_brought_to_all_by_finish() -> None:
