@@ -40,7 +40,7 @@ ALLOWED = {
 #: The skin: what may read a clock, open a port or start a thread.
 SKIN = (
     "p2os.transport", "p2os.cli", "p2os.pioneer.host", "bluepill_sim.cli", "bluepill_sim.console",
-    "testbench.cli", "testbench.pacer", "testbench.live", "testbench.report",
+    "testbench.cli", "testbench.pacer", "testbench.live", "testbench.report", "testbench.firmware.build",
 )  # fmt: skip
 
 #: Within p2os, packages above the core that the core must not import.

@@ -14,11 +14,10 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, cast
 
-import pybullet
-
 from p2os.parameters import RobotParameters
 from p2os.pioneer.body import STEP_NS, BodyState, Turned
-from p2os.pioneer.bullet_model import (
+from p2os.pioneer.bullet.engine import pybullet
+from p2os.pioneer.bullet.model import (
     FLOOR_GROUP,
     LEFT,
     OBSTACLE_GROUP,

@@ -6,9 +6,8 @@ nothing is cached. Collision groups keep wheels off walls (see `bullet`).
 
 import math
 
-import pybullet
-
 from p2os.parameters import RobotParameters
+from p2os.pioneer.bullet.engine import pybullet
 from p2os.pioneer.scenery import Kind, Obstacle, Pose, World
 
 #: Links of the robot.
