@@ -17,7 +17,7 @@ from collections.abc import Callable
 from bluepill_sim.block_cost import NO_BLOCK, Block, measure_block
 from bluepill_sim.bus import PERIPHERAL_BYTES, PeripheralBus, SramBitBand
 from bluepill_sim.clocks import Clocks
-from bluepill_sim.cpu import Engine, Register
+from bluepill_sim.cpu import Engine
 from bluepill_sim.cycle_clock import CycleClock
 from bluepill_sim.memory import Memory
 from bluepill_sim.processor import FaultListener, Processor
@@ -186,8 +186,7 @@ class Chip:
 
     def warn(self, message: str, *, once: str) -> None:
         """Pass on a warning."""
-        pc = self.engine.pc if self.engine.block is NO_BLOCK else self.engine.registers[Register.PC]
-        self._on_warning(message, once, pc)
+        self._on_warning(message, once, self.engine.access_pc)
 
     # Snapshots.
 

@@ -12,8 +12,8 @@ Invariant: an access to an address without a register reads 0 and is warned of o
 from collections.abc import Callable
 from typing import Protocol
 
-from bluepill_sim.nvic import FIRST_IRQ, MEM_MANAGE, NMI, PENDSV, SVCALL, SYSTICK
-from bluepill_sim.processor import STKALIGN, Processor
+from bluepill_sim.nvic import FIRST_IRQ, MEM_MANAGE, NMI, PENDSV, SYSTICK
+from bluepill_sim.processor import Processor
 from bluepill_sim.stm32f103 import IRQ_COUNT
 from bluepill_sim.systick import CALIBRATION
 
@@ -82,7 +82,7 @@ class SystemControl:
             0xE000E004: lambda: 1,  # ICTR: 33 to 64 lines
             0xE000E008: lambda: 0,  # ACTLR
             0xE000E010: lambda: core.systick.read_control(chip.access_cycle),
-            0xE000E014: lambda: core.systick.read_reload(),
+            0xE000E014: core.systick.read_reload,
             0xE000E018: lambda: core.systick.read_value(chip.access_cycle),
             0xE000E01C: lambda: CALIBRATION,
             0xE000ED00: lambda: CPUID,

@@ -87,7 +87,7 @@ _NARROW: tuple[tuple[int, int, Kind], ...] = (
     (0xFF87, 0x4487, Kind.BRANCH_REGISTER),  # ADD PC, Rm
     (0xFF87, 0x4687, Kind.BRANCH_REGISTER),  # MOV PC, Rm
     (0xFE00, 0x5600, Kind.LOAD),  # LDRSB register
-    (0xF800, 0x5800, Kind.LOAD),  # LDR, LDRH, LDRB, LDRSH register: see also the next line
+    (0xF800, 0x5800, Kind.LOAD),  # LDR, LDRH, LDRB, LDRSH register
     (0xF800, 0x5000, Kind.STORE_INDEXED),
     (0xF800, 0x6000, Kind.STORE),
     (0xF800, 0x7000, Kind.STORE),
@@ -177,7 +177,7 @@ def _signed(value: int, bits: int) -> int:
     return value - (1 << bits) if value >> (bits - 1) else value
 
 
-def _decode_narrow(word: int, address: int) -> Instruction:
+def _decode_narrow(word: int, address: int) -> Instruction:  # noqa: PLR0911 - one return a kind
     kind = _kind_of(word, _NARROW)
     if kind is Kind.LOAD_LITERAL:
         return Instruction(address, 2, kind, base=PC_REGISTER, target=word >> 8 & 7)
@@ -205,7 +205,7 @@ def _narrow_displacement(word: int) -> int:
     return _signed(word & 0x7FF, 11) * 2
 
 
-def _decode_wide(word: int, address: int) -> Instruction:
+def _decode_wide(word: int, address: int) -> Instruction:  # noqa: PLR0911 - one return a kind
     kind = _kind_of(word, _WIDE)
     base = word >> 16 & 15
     target = word >> 12 & 15

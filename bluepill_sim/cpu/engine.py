@@ -8,90 +8,28 @@ unless an instruction itself ends it: WFI, WFE, SVC, BKPT, exception return, or
 a fault.
 
 This is not the processor: exceptions, priorities, sleeping and the meaning of
-faults are the business of `processor.py`. What Unicorn gets wrong is put right here:
-a callback of a peripheral never stops the engine (Unicorn would run the
-access twice), it moves `stop_at`; divisions by zero and unaligned multiple
-transfers, which Unicorn lets pass, are caught by hooks on just those addresses.
+faults are the business of `processor.py`. What Unicorn gets wrong is put right
+here: an access to a peripheral never stops the engine (Unicorn would run it
+twice), it moves `stop_at`; divisions by zero and unaligned multiple transfers,
+which Unicorn lets pass, are caught by hooks on just those addresses.
 
 Invariant: between runs `cycle` is the time of the border that stands at `pc`.
 """
 
 import ctypes
 from collections.abc import Callable
-from dataclasses import dataclass
-from enum import Enum
 
 from bluepill_sim.block_cost import NO_BLOCK, Block
-from bluepill_sim.cpu import binding
-from bluepill_sim.cpu.registers import GENERAL, Register, RegisterFile
+from bluepill_sim.cpu import core
+from bluepill_sim.cpu.core import Core, ReadAccess, WriteAccess
+from bluepill_sim.cpu.halt import Halt, HaltKind
+from bluepill_sim.cpu.registers import GENERAL, Register
 from bluepill_sim.thumb import Kind
 
-#: Reads (offset, size) of an I/O region, writes (offset, size, value).
-ReadAccess = Callable[[int, int], int]
-WriteAccess = Callable[[int, int, int], None]
 #: Takes (address, size, value) written to read-only memory; False refuses it.
 WriteToReadOnly = Callable[[int, int, int], bool]
 #: Returns the costs of the block of `size` bytes at `address`.
 Measure = Callable[[int, int], Block]
-
-# Numbers of unicorn.h, 2.1.
-_ARCHITECTURE_ARM, _MODE_THUMB = 1, 16  # not MODE_MCLASS: that silently makes a Cortex-M33
-_MODEL_CORTEX_M3 = 8
-_HOOK_INTERRUPT, _HOOK_CODE, _HOOK_BLOCK, _HOOK_INVALID = 1, 4, 8, 0x4000
-_HOOK_ACCESS, _HOOK_BAD_ACCESS = 0x400 | 0x800, 0x3F0
-_ACCESS_WRITE_UNMAPPED, _ACCESS_FETCH_UNMAPPED, _ACCESS_WRITE_PROTECTED, _ACCESS_FETCH_PROTECTED = 20, 21, 22, 24
-_PROTECTION_READ, _PROTECTION_WRITE, _PROTECTION_EXECUTE = 1, 2, 4
-#: uc_ctl numbers: item | argument count << 26 | direction (write = 1) << 30.
-_CONTROL_MODEL = 7 | 1 << 26 | 1 << 30
-_CONTROL_DROP_CODE = 9 | 2 << 26 | 1 << 30
-_CONTROL_DROP_ALL_CODE = 10 | 1 << 30
-
-#: No instruction stands at an odd address, so a run never ends there.
-_NOWHERE = 0xFFFF_FFFF
-#: Chosen: a page that no STM32F103 has, executable only; holds CLREX and WFI.
-_SCRATCH = 0xF000_0000
-_SCRATCH_CODE = bytes.fromhex("bff32f8f 30bf")
-#: Branches to these addresses are exception returns in handler mode (ARMv7-M B1.5.8).
-FIRST_EXCEPTION_RETURN = 0xFFFF_FFE0
-#: Flash and SRAM lie below; peripherals above have rules of their own.
-_LAST_NORMAL_ADDRESS = 0x21FF_FFFF
-#: Later than any run.
-_NEVER = 1 << 62
-
-_T_BIT = 1 << 24
-
-
-class HaltKind(Enum):
-    """Why a run ended."""
-
-    #: At a block border, because `stop_at` was reached.
-    BORDER = "border"
-    EXCEPTION_RETURN = "exception return"
-    SUPERVISOR_CALL = "SVC"
-    BREAKPOINT = "BKPT"
-    WAIT_INTERRUPT = "WFI"
-    WAIT_EVENT = "WFE"
-    UNDEFINED = "undefined instruction"
-    NO_COPROCESSOR = "no coprocessor"
-    INVALID_STATE = "not in Thumb state"
-    READ_ERROR = "read of nothing"
-    WRITE_ERROR = "write to nothing"
-    FETCH_ERROR = "fetch from nothing"
-    EXECUTE_NEVER = "fetch from a region that must not be executed"
-    DIVIDE_BY_ZERO = "division by zero"
-    UNALIGNED = "unaligned access"
-
-
-@dataclass(frozen=True, slots=True)
-class Halt:
-    """Why and where a run ended."""
-
-    kind: HaltKind
-    #: The next instruction to run; for a fault, the one that failed.
-    pc: int
-    #: What a failed access was to.
-    address: int | None = None
-
 
 #: What Unicorn's interrupt numbers mean; 3 and 8 are told apart by the PC.
 _INTERRUPTS = {
@@ -103,6 +41,22 @@ _INTERRUPTS = {
     17: HaltKind.NO_COPROCESSOR,
 }
 
+#: Chosen: a page that no STM32F103 has, executable only; holds CLREX and WFI.
+_SCRATCH, _SCRATCH_BYTES = 0xF000_0000, 0x400
+_SCRATCH_CODE = bytes.fromhex("bff32f8f 30bf")
+_SCRATCH_BLOCK = Block(_SCRATCH, _SCRATCH + len(_SCRATCH_CODE), 0, 0, {})
+#: Branches to these addresses are exception returns in handler mode (ARMv7-M B1.5.8).
+FIRST_EXCEPTION_RETURN = 0xFFFF_FFE0
+#: Flash and SRAM lie below; peripherals above have rules of their own.
+_LAST_NORMAL_ADDRESS = 0x21FF_FFFF
+#: Later than any run.
+_NEVER = 1 << 62
+
+_T_BIT = 1 << 24
+
+#: The library's context, cycle, PC, T bit, whether exclusive accesses are used.
+EngineSnapshot = tuple[bytes, int, int, bool, bool]
+
 
 class Engine:
     """Runs instructions between block borders; see the module's text.
@@ -112,13 +66,9 @@ class Engine:
     """
 
     def __init__(self, measure: Measure) -> None:
-        self._library = library = binding.load_library()
-        handle = ctypes.c_void_p()
-        self._check(library.open(_ARCHITECTURE_ARM, _MODE_THUMB, ctypes.addressof(handle)), "open")
-        self._handle = handle.value or 0
-        self._control(_CONTROL_MODEL, ctypes.c_int(_MODEL_CORTEX_M3))
+        self._core = Core(self._fail)
         self._measure = measure
-        self.registers = RegisterFile(library, self._handle)
+        self.registers = self._core.registers
         #: Time of the present border, or of the start of the running block, in cycles.
         self.cycle = 0
         #: The run ends at the first border at or after this time; 0 ends it at the next one.
@@ -130,80 +80,59 @@ class Engine:
         self.block = NO_BLOCK
         #: Whether a block that may unmask an interrupt ends the run at its border.
         self.stops_after_mask_change = False
-        #: Whether UDIV and SDIV by zero end the run (CCR.DIV_0_TRP).
-        self.traps_division = False
         #: Called when the firmware executes SEV.
         self.on_event: Callable[[], None] | None = None
         #: Called with writes to read-only memory.
         self.on_read_only_write: WriteToReadOnly | None = None
-        self._uses_exclusive = False
-        self._traps_unaligned = False
-        self._traps_changed = False
-        self._watches_alignment = False
+        # Costs: of blocks that take no attention, of those that do, and of those whose bytes may change.
         self._table: dict[int, Block] = {}
         self._special: dict[int, Block] = {}
         self._writable_code: dict[int, tuple[bytes, Block]] = {}
+        #: First address, address after, place in the host's memory.
         self._writable: list[tuple[int, int, int]] = []
+        self._uses_exclusive = False
+        # Traps: what is wanted, hooks that exist, blocks that have them, blocks to be translated again.
+        self._traps_division = self._traps_unaligned = self._traps_changed = self._watches_alignment = False
         self._trapped: set[tuple[int, int, HaltKind]] = set()
         self._armed: set[tuple[int, tuple[tuple[int, int], ...]]] = set()
         self._stale: list[Block] = []
         self._halt: Halt | None = None
         self._failure: BaseException | None = None
-        self._keep: list[object] = []
-        self._add_hooks()
-        self._map_scratch()
+        self._core.on_block(self._enter_block)
+        self._core.on_interrupt(self._interrupted)
+        self._core.on_invalid(self._invalid)
+        self._core.on_bad_access(self._bad_access)
+        self._core.map_memory(_SCRATCH, ctypes.create_string_buffer(_SCRATCH_CODE, _SCRATCH_BYTES), "x")
 
     # Memory.
 
     def map_memory(self, address: int, buffer: "ctypes.Array[ctypes.c_char]", *, is_writable: bool) -> None:
         """Map a buffer as executable memory; it may be mapped more than once."""
-        protection = _PROTECTION_READ | _PROTECTION_EXECUTE | (_PROTECTION_WRITE if is_writable else 0)
-        size, at = len(buffer), ctypes.addressof(buffer)
-        self._check(self._library.map_pointer(self._handle, address, size, protection, at), f"map {address:#x}")
-        self._keep.append(buffer)  # Unicorn keeps no reference of its own
+        self._core.map_memory(address, buffer, "rwx" if is_writable else "rx")
         if is_writable:
-            self._writable.append((address, address + size, at))
+            self._writable.append((address, address + len(buffer), ctypes.addressof(buffer)))
 
     def map_io(self, address: int, size: int, read: ReadAccess, write: WriteAccess) -> None:
-        """Map a region whose accesses are calls; `offset` counts from `address`."""
-
-        def on_read(_uc: int, offset: int, count: int, _user: int) -> int:
-            try:
-                return read(offset, count)
-            except BaseException as error:  # noqa: BLE001 - C stands between here and the caller: run() raises it again
-                self._fail(error)
-                return 0
-
-        def on_write(_uc: int, offset: int, count: int, value: int, _user: int) -> None:
-            try:
-                write(offset, count, value)
-            except BaseException as error:  # noqa: BLE001 - as above
-                self._fail(error)
-
-        reader = self._pointer(binding.READ_CALLBACK(on_read))
-        writer = self._pointer(binding.WRITE_CALLBACK(on_write))
-        self._check(self._library.map_io(self._handle, address, size, reader, None, writer, None), f"map {address:#x}")
-        # Only a memory hook makes Unicorn bring the PC up to date before an access; this one costs nothing else.
-        self._hook(_HOOK_ACCESS, self._library.no_operation, address, address + size - 1)
+        """Map a region whose accesses are calls; their offsets count from `address`."""
+        self._core.map_io(address, size, read, write)
 
     def drop_code(self, address: int, size: int) -> None:
         """Forget what was translated and measured from bytes that have changed; not during a run."""
-        self._control(_CONTROL_DROP_CODE, ctypes.c_uint64(address), ctypes.c_uint64(address + size))
+        self._core.drop_code(address, size)
         self.forget_costs()
-
-    def set_traps(self, *, division: bool, unaligned: bool) -> None:
-        """Choose whether divisions by zero and unaligned single accesses end a run (CCR); holds from the next block."""
-        if division == self.traps_division and unaligned == self._traps_unaligned:
-            return
-        self.traps_division, self._traps_unaligned = division, unaligned
-        self._traps_changed = True
-        self.stop_at = 0
 
     def forget_costs(self) -> None:
         """Measure every block again when it is next entered."""
         self._table.clear()
         self._special.clear()
         self._writable_code.clear()
+
+    def set_traps(self, *, division: bool, unaligned: bool) -> None:
+        """Choose whether divisions by zero and unaligned single accesses end a run; holds from the next block."""
+        if division != self._traps_division or unaligned != self._traps_unaligned:
+            self._traps_division, self._traps_unaligned = division, unaligned
+            self._traps_changed = True
+            self.stop_at = 0
 
     # Running.
 
@@ -218,7 +147,7 @@ class Engine:
             self._change_traps()
         while True:
             self._halt = None
-            error = self._library.start(self._handle, self.pc | self.is_thumb, _NOWHERE, 0, 0)
+            error = self._core.start(self.pc | self.is_thumb)
             if self._failure is not None:
                 failure, self._failure = self._failure, None
                 self._settle(self.registers[Register.PC])
@@ -239,41 +168,38 @@ class Engine:
             return self.cycle
         return self.cycle + block.cycles_until(self.registers[Register.PC])
 
+    @property
+    def access_pc(self) -> int:
+        """The instruction that is accessing a peripheral; the next one between runs."""
+        return self.pc if self.block is NO_BLOCK else self.registers[Register.PC]
+
     def clear_exclusive(self) -> None:
         """Break the exclusive reservation, as an exception does; leaves `pc` alone."""
         if not self._uses_exclusive:
             return
         saved = self.cycle, self.stop_at
         self.stop_at = _NEVER
-        self._table[_SCRATCH] = self._scratch_block
-        self._library.start(self._handle, _SCRATCH | 1, _NOWHERE, 0, 0)
+        self._table[_SCRATCH] = _SCRATCH_BLOCK
+        self._core.start(_SCRATCH | 1)
         self.cycle, self.stop_at = saved
         self.block = NO_BLOCK
 
     # Snapshots.
 
-    def snapshot(self) -> tuple[bytes, int, int, bool, bool]:
-        """Return the core's state: registers as the library keeps them, cycle, PC, T bit, reservation."""
-        size = self._library.context_size(self._handle)
-        context = self._allocate_context()
-        self._check(self._library.context_save(self._handle, context), "save")
-        data = ctypes.string_at(context, size)
-        self._library.context_free(context)
-        return data, self.cycle, self.pc, self.is_thumb, self._uses_exclusive
+    def snapshot(self) -> EngineSnapshot:
+        """Return the core's state, memory left aside."""
+        return self._core.save(), self.cycle, self.pc, self.is_thumb, self._uses_exclusive
 
-    def restore(self, snapshot: tuple[bytes, int, int, bool, bool]) -> None:
+    def restore(self, snapshot: EngineSnapshot) -> None:
         """Put back what `snapshot` returned; memory is the caller's business, before this call."""
-        data, self.cycle, self.pc, self.is_thumb, self._uses_exclusive = snapshot
-        context = self._allocate_context()
-        ctypes.memmove(context, data, len(data))
-        self._check(self._library.context_restore(self._handle, context), "restore")
-        self._library.context_free(context)
+        context, self.cycle, self.pc, self.is_thumb, self._uses_exclusive = snapshot
+        self._core.load(context)
         self.block = NO_BLOCK
         if self._writable_code:
-            self._control(_CONTROL_DROP_ALL_CODE)
+            self._core.drop_all_code()
             self._writable_code.clear()
 
-    # What Unicorn calls.
+    # Entering blocks.
 
     def _enter_block(self, _uc: int, address: int, size: int, _user: int) -> None:
         """Charge the block that has ended, then end the run or go on with the block at `address`."""
@@ -326,16 +252,11 @@ class Engine:
             self._special[address] = block
         else:
             self._table[address] = block
-        if self._traps_of(block) and self._key_of(block) not in self._armed:
+        traps = self._traps_of(block)
+        if traps and (address, traps) not in self._armed:
             self._stale.append(block)
             return None
         return block
-
-    def _traps_of(self, block: Block) -> tuple[tuple[int, int], ...]:
-        return block.aligned + block.divides if self.traps_division else block.aligned
-
-    def _key_of(self, block: Block) -> tuple[int, tuple[tuple[int, int], ...]]:
-        return block.start, self._traps_of(block)
 
     def _writable_bytes(self, address: int, size: int) -> bytes | None:
         """Return the bytes of a block in writable memory; None elsewhere."""
@@ -344,60 +265,59 @@ class Engine:
                 return ctypes.string_at(at + address - first, size)
         return None
 
+    # Ending runs.
+
     def _stop_at_border(self, address: int) -> None:
         self.block = NO_BLOCK
         self.pc = address
-        self._halt = Halt(HaltKind.BORDER, address)
-        self._library.stop(self._handle)
+        self._end(HaltKind.BORDER, address)
+
+    def _end(self, kind: HaltKind, pc: int, address: int | None = None) -> None:
+        self._halt = Halt(kind, pc, address)
+        self._core.stop()
 
     def _fail(self, error: BaseException) -> None:
-        """Keep an exception until the run has ended; peripherals' accesses are not stopped half-way."""
+        """Keep an exception until the next border; an access to a peripheral is never stopped half-way."""
         self._failure = error
         self.stop_at = 0
 
-    def _interrupted(self, _uc: int, number: int, _user: int) -> None:
+    def _interrupted(self, number: int) -> None:
         pc = self.registers[Register.PC]
         kind = _INTERRUPTS.get(number, HaltKind.UNDEFINED)
         if kind is HaltKind.EXECUTE_NEVER and pc >= FIRST_EXCEPTION_RETURN:
             kind = HaltKind.EXCEPTION_RETURN
-        self._halt = Halt(kind, pc)
-        self._library.stop(self._handle)
+        self._end(kind, pc)
 
-    def _invalid(self, _uc: int, _user: int) -> bool:
+    def _invalid(self) -> bool:
         """Unicorn takes WFE and YIELD for undefined, with the PC already past them; the rest stands at the PC."""
         pc = self.registers[Register.PC]
-        if pc == self.block.end and self.block.last in (Kind.YIELD, Kind.WAIT_EVENT):
-            if self.block.last is Kind.YIELD:
-                return True
-            self._halt = Halt(HaltKind.WAIT_EVENT, pc)
+        last = self.block.last if pc == self.block.end else None
+        if last is Kind.YIELD:
+            return True
+        if last is Kind.WAIT_EVENT:
+            self._end(HaltKind.WAIT_EVENT, pc)
         else:
             is_thumb = self.registers[Register.XPSR] & _T_BIT
-            self._halt = Halt(HaltKind.UNDEFINED if is_thumb else HaltKind.INVALID_STATE, pc)
-        self._library.stop(self._handle)
+            self._end(HaltKind.UNDEFINED if is_thumb else HaltKind.INVALID_STATE, pc)
         return True
 
-    def _bad_access(self, _uc: int, access: int, address: int, size: int, value: int, _user: int) -> bool:
-        pc = self.registers[Register.PC]
-        if access == _ACCESS_WRITE_PROTECTED and self.on_read_only_write is not None:
-            try:
-                if self.on_read_only_write(address, size, value & (1 << 8 * size) - 1):
-                    return True
-            except BaseException as error:  # noqa: BLE001 - C stands between here and the caller
-                self._fail(error)
+    def _bad_access(self, access: int, address: int, size: int, value: int) -> bool:
+        is_protected = access == core.WRITE_PROTECTED
+        if is_protected and self.on_read_only_write is not None:
+            word = value & (1 << 8 * size) - 1
+            if self.on_read_only_write(address, size, word):
                 return True
-        if access in (_ACCESS_WRITE_PROTECTED, _ACCESS_WRITE_UNMAPPED):
+        if is_protected or access == core.WRITE_UNMAPPED:
             kind = HaltKind.WRITE_ERROR
-        elif access in (_ACCESS_FETCH_UNMAPPED, _ACCESS_FETCH_PROTECTED):
+        elif access in (core.FETCH_UNMAPPED, core.FETCH_PROTECTED):
             kind = HaltKind.FETCH_ERROR
         else:
             kind = HaltKind.READ_ERROR
-        self._halt = Halt(kind, pc, address)
+        self._halt = Halt(kind, self.registers[Register.PC], address)
         return False
 
-    # Plumbing.
-
     def _halt_without_reason(self, error: int) -> Halt:
-        """Tell why Unicorn came back without having called anything."""
+        """Tell why Unicorn came back without having called anything: WFI is the only way."""
         pc = self.registers[Register.PC]
         if error == 0 and self.block.last is Kind.WAIT_INTERRUPT and pc == self.block.end:
             return Halt(HaltKind.WAIT_INTERRUPT, pc)
@@ -412,89 +332,49 @@ class Engine:
         self.pc = pc
         self.is_thumb = bool(self.registers[Register.XPSR] & _T_BIT)
 
+    # Traps.
+
+    def _traps_of(self, block: Block) -> tuple[tuple[int, int], ...]:
+        return block.aligned + block.divides if self._traps_division else block.aligned
+
     def _change_traps(self) -> None:
         """Look at every block again, with the traps now chosen."""
         self._traps_changed = False
         self.forget_costs()
-        if not self._traps_unaligned or self._watches_alignment:
-            return
-        self._watches_alignment = True
+        if self._traps_unaligned and not self._watches_alignment:
+            self._watches_alignment = True
+            self._core.on_access(0, _LAST_NORMAL_ADDRESS, self._watch_alignment)
 
-        def on_access(_uc: int, _access: int, address: int, size: int, _value: int, _user: int) -> bool:
-            if self._traps_unaligned and address % size:
-                self._halt = Halt(HaltKind.UNALIGNED, self.registers[Register.PC], address)
-                self._library.stop(self._handle)
-            return True
-
-        callback = self._pointer(binding.MEMORY_CALLBACK(on_access))
-        self._hook(_HOOK_ACCESS, callback, 0, _LAST_NORMAL_ADDRESS)
-        self._control(_CONTROL_DROP_ALL_CODE)
+    def _watch_alignment(self, _access: int, address: int, size: int, _value: int) -> bool:
+        if self._traps_unaligned and address % size:
+            self._end(HaltKind.UNALIGNED, self.registers[Register.PC], address)
+        return True
 
     def _trap_stale_blocks(self) -> None:
         """Put hooks on the instructions that may trap, and have their blocks translated anew with them."""
         for block in self._stale:
-            self._armed.add(self._key_of(block))
+            self._armed.add((block.start, self._traps_of(block)))
             for address, register in block.aligned:
                 self._trap(address, register, HaltKind.UNALIGNED)
-            for address, register in block.divides if self.traps_division else ():
+            for address, register in block.divides if self._traps_division else ():
                 self._trap(address, register, HaltKind.DIVIDE_BY_ZERO)
-            self._control(_CONTROL_DROP_CODE, ctypes.c_uint64(block.start), ctypes.c_uint64(block.end))
+            self._core.drop_code(block.start, block.end - block.start)
         self._stale.clear()
 
-    def _trap(self, address: int, register: int, kind: HaltKind) -> None:
-        if (address, register, kind) in self._trapped:
+    def _trap(self, address: int, number: int, kind: HaltKind) -> None:
+        """Look at a register each time before the instruction at `address`."""
+        if (address, number, kind) in self._trapped:
             return
-        self._trapped.add((address, register, kind))
-        general = GENERAL[register]
+        self._trapped.add((address, number, kind))
+        register = GENERAL[number]
 
-        def before(_uc: int, _address: int, _size: int, _user: int) -> None:
-            value = self.registers[general]
-            if kind is HaltKind.UNALIGNED:
-                if value & 3:
-                    self._halt = Halt(kind, address, value)
-                    self._library.stop(self._handle)
-            elif not value and self.traps_division:
-                self._halt = Halt(kind, address)
-                self._library.stop(self._handle)
+        def look_at_base() -> None:
+            value = self.registers[register]
+            if value & 3:
+                self._end(kind, address, value)
 
-        self._hook(_HOOK_CODE, self._pointer(binding.BLOCK_CALLBACK(before)), address, address)
+        def look_at_divisor() -> None:
+            if self._traps_division and not self.registers[register]:
+                self._end(kind, address)
 
-    def _add_hooks(self) -> None:
-        callbacks = (
-            (_HOOK_BLOCK, binding.BLOCK_CALLBACK(self._enter_block)),
-            (_HOOK_INTERRUPT, binding.INTERRUPT_CALLBACK(self._interrupted)),
-            (_HOOK_INVALID, binding.INVALID_CALLBACK(self._invalid)),
-            (_HOOK_BAD_ACCESS, binding.MEMORY_CALLBACK(self._bad_access)),
-        )
-        for kind, callback in callbacks:
-            self._hook(kind, self._pointer(callback), 1, 0)  # first > last: everywhere
-
-    def _map_scratch(self) -> None:
-        buffer = ctypes.create_string_buffer(_SCRATCH_CODE, 0x400)
-        self._keep.append(buffer)
-        at = ctypes.addressof(buffer)
-        self._check(self._library.map_pointer(self._handle, _SCRATCH, 0x400, _PROTECTION_EXECUTE, at), "map scratch")
-        self._scratch_block = Block(_SCRATCH, _SCRATCH + len(_SCRATCH_CODE), 0, 0, {})
-
-    def _pointer(self, callback: "ctypes._FuncPointer") -> ctypes.c_void_p:
-        self._keep.append(callback)
-        return ctypes.cast(callback, ctypes.c_void_p)
-
-    def _hook(self, kind: int, callback: ctypes.c_void_p, first: int, last: int) -> None:
-        hook = ctypes.c_size_t()
-        at = ctypes.addressof(hook)
-        self._check(self._library.add_hook(self._handle, at, kind, callback, None, first, last), "hook")
-
-    def _control(self, item: int, *arguments: object) -> None:
-        number = item - (1 << 32) if item >> 31 else item
-        self._check(self._library.control(ctypes.c_void_p(self._handle), ctypes.c_int(number), *arguments), "control")
-
-    def _allocate_context(self) -> int:
-        context = ctypes.c_void_p()
-        self._check(self._library.context_alloc(self._handle, ctypes.addressof(context)), "allocate")
-        return context.value or 0
-
-    @staticmethod
-    def _check(error: int, what: str) -> None:
-        if error:
-            raise RuntimeError(f"Unicorn cannot {what}: error {error}")
+        self._core.on_instruction(address, look_at_base if kind is HaltKind.UNALIGNED else look_at_divisor)

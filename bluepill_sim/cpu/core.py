@@ -1,0 +1,200 @@
+"""One Unicorn machine: a bare Cortex-M3 with memory maps, hooks and contexts.
+
+This is the thin layer over the library: no time, no blocks, no exceptions of
+the architecture. A Python exception inside a callback cannot pass through C:
+it is handed to `on_failure` and the callback answers with a default.
+
+Source: unicorn.h and uc_priv.h of Unicorn 2.1.
+Invariant: whatever the library keeps a pointer to lives as long as this object.
+"""
+
+import ctypes
+import weakref
+from collections.abc import Callable
+from typing import TypeVar
+
+from bluepill_sim.cpu import binding
+from bluepill_sim.cpu.registers import RegisterFile
+
+# Not MODE_MCLASS: that silently makes a Cortex-M33.
+_ARCHITECTURE_ARM, _MODE_THUMB, _MODEL_CORTEX_M3 = 1, 16, 8
+_HOOK_INTERRUPT, _HOOK_CODE, _HOOK_BLOCK, _HOOK_INVALID = 1, 4, 8, 0x4000
+_HOOK_ACCESS, _HOOK_BAD_ACCESS = 0x400 | 0x800, 0x3F0
+_PROTECTION_READ, _PROTECTION_WRITE, _PROTECTION_EXECUTE = 1, 2, 4
+#: uc_ctl numbers: item | argument count << 26 | direction (write = 1) << 30.
+_CONTROL_MODEL = 7 | 1 << 26 | 1 << 30
+_CONTROL_DROP_CODE = 9 | 2 << 26 | 1 << 30
+_CONTROL_DROP_ALL_CODE = 10 | 1 << 30
+#: No instruction stands at an odd address, so a run never ends there.
+_NOWHERE = 0xFFFF_FFFF
+
+#: Kinds of bad accesses.
+WRITE_UNMAPPED, FETCH_UNMAPPED, WRITE_PROTECTED, FETCH_PROTECTED = 20, 21, 22, 24
+
+#: Reads (offset, size) of an I/O region, writes (offset, size, value).
+ReadAccess = Callable[[int, int], int]
+WriteAccess = Callable[[int, int, int], None]
+
+_Result = TypeVar("_Result")
+
+
+class Core:
+    """A bare Cortex-M3.
+
+    Raises:
+        MissingDependencyError: Unicorn is not installed.
+    """
+
+    def __init__(self, on_failure: Callable[[BaseException], None]) -> None:
+        """Make a machine without memory.
+
+        Args:
+            on_failure: told of exceptions inside callbacks.
+        """
+        self._library = library = binding.load_library()
+        self._on_failure = on_failure
+        handle = ctypes.c_void_p()
+        self._check(library.open(_ARCHITECTURE_ARM, _MODE_THUMB, ctypes.addressof(handle)), "open")
+        self._handle = handle.value or 0
+        weakref.finalize(self, library.close, self._handle)
+        self._control(_CONTROL_MODEL, ctypes.c_int(_MODEL_CORTEX_M3))
+        self._keep: list[object] = []
+        self.registers = RegisterFile(library, self._handle)
+
+    # Running.
+
+    def start(self, address: int) -> int:
+        """Run from an address (bit 0: Thumb) until something stops it; return the library's error number."""
+        return self._library.start(self._handle, address, _NOWHERE, 0, 0)
+
+    def stop(self) -> None:
+        """End the run; only from a hook, never from an access to I/O, which would be run again."""
+        self._library.stop(self._handle)
+
+    # Memory.
+
+    def map_memory(self, address: int, buffer: "ctypes.Array[ctypes.c_char]", protection: str) -> None:
+        """Map a buffer; `protection` is made of the letters r, w and x."""
+        letters = {"r": _PROTECTION_READ, "w": _PROTECTION_WRITE, "x": _PROTECTION_EXECUTE}
+        bits = sum(letters[letter] for letter in protection)
+        self._keep.append(buffer)
+        self._check(
+            self._library.map_pointer(self._handle, address, len(buffer), bits, ctypes.addressof(buffer)),
+            f"map {address:#010x}",
+        )
+
+    def map_io(self, address: int, size: int, read: ReadAccess, write: WriteAccess) -> None:
+        """Map a region whose accesses are calls; their offsets count from `address`."""
+
+        def on_read(_uc: int, offset: int, count: int, _user: int) -> int:
+            try:
+                return read(offset, count)
+            except BaseException as error:  # noqa: BLE001 - see the module's text
+                self._on_failure(error)
+                return 0
+
+        def on_write(_uc: int, offset: int, count: int, value: int, _user: int) -> None:
+            try:
+                write(offset, count, value)
+            except BaseException as error:  # noqa: BLE001 - see the module's text
+                self._on_failure(error)
+
+        reader = self._pointer(binding.READ_CALLBACK(on_read))
+        writer = self._pointer(binding.WRITE_CALLBACK(on_write))
+        self._check(
+            self._library.map_io(self._handle, address, size, reader, None, writer, None), f"map {address:#010x}"
+        )
+        # Only a memory hook makes Unicorn bring the PC up to date before an access; this one does nothing else.
+        self._hook(_HOOK_ACCESS, self._library.no_operation, address, address + size - 1)
+
+    def drop_code(self, address: int, size: int) -> None:
+        """Forget what was translated from bytes that have changed; not during a run."""
+        self._control(_CONTROL_DROP_CODE, ctypes.c_uint64(address), ctypes.c_uint64(address + size))
+
+    def drop_all_code(self) -> None:
+        """Forget every translation; not during a run."""
+        self._control(_CONTROL_DROP_ALL_CODE)
+
+    # Hooks.
+
+    def on_block(self, call: Callable[[int, int, int, int], None]) -> None:
+        """Call (uc, address, size, user) before each basic block; the callback must not raise."""
+        self._hook(_HOOK_BLOCK, self._pointer(binding.BLOCK_CALLBACK(call)), 1, 0)
+
+    def on_instruction(self, address: int, call: Callable[[], None]) -> None:
+        """Call before the instruction at an address, in blocks that are translated from now on."""
+        self._hook(
+            _HOOK_CODE, self._pointer(binding.BLOCK_CALLBACK(self._guard(lambda *_: call(), None))), address, address
+        )
+
+    def on_interrupt(self, call: Callable[[int], None]) -> None:
+        """Call (number) when the core raises an exception of Unicorn's own numbering."""
+        self._hook(_HOOK_INTERRUPT, self._pointer(binding.INTERRUPT_CALLBACK(self._guard(call, None))), 1, 0)
+
+    def on_invalid(self, call: Callable[[], bool]) -> None:
+        """Call at an instruction that Unicorn does not know; True goes on after it."""
+        self._hook(_HOOK_INVALID, self._pointer(binding.INVALID_CALLBACK(self._guard(call, True))), 1, 0)
+
+    def on_bad_access(self, call: Callable[[int, int, int, int], bool]) -> None:
+        """Call (kind, address, size, value) at an access to no memory or against its protection; True lets it pass."""
+        self._hook(_HOOK_BAD_ACCESS, self._pointer(binding.MEMORY_CALLBACK(self._guard(call, True))), 1, 0)
+
+    def on_access(self, first: int, last: int, call: Callable[[int, int, int, int], bool]) -> None:
+        """Call (kind, address, size, value) before every access in a range; slow."""
+        self._hook(_HOOK_ACCESS, self._pointer(binding.MEMORY_CALLBACK(self._guard(call, True))), first, last)
+        self.drop_all_code()
+
+    # Contexts.
+
+    def save(self) -> bytes:
+        """Return all registers, hidden ones included, as the library keeps them."""
+        context = self._allocate_context()
+        self._check(self._library.context_save(self._handle, context), "save")
+        data = ctypes.string_at(context, self._library.context_size(self._handle))
+        self._library.context_free(context)
+        return data
+
+    def load(self, data: bytes) -> None:
+        """Put back what `save` returned, in this process or another."""
+        context = self._allocate_context()
+        ctypes.memmove(context, data, len(data))
+        self._check(self._library.context_restore(self._handle, context), "restore")
+        self._library.context_free(context)
+
+    # Plumbing.
+
+    def _guard(self, call: Callable[..., _Result], default: _Result) -> Callable[..., _Result]:
+        """Return a callback for C: it drops the handle before and the user pointer after the arguments."""
+
+        def guarded(_uc: int, *arguments: int) -> _Result:
+            try:
+                return call(*arguments[:-1])
+            except BaseException as error:  # noqa: BLE001 - see the module's text
+                self._on_failure(error)
+                return default
+
+        return guarded
+
+    def _pointer(self, callback: "ctypes._FuncPointer") -> ctypes.c_void_p:
+        self._keep.append(callback)
+        return ctypes.cast(callback, ctypes.c_void_p)
+
+    def _hook(self, kind: int, callback: ctypes.c_void_p, first: int, last: int) -> None:
+        """Add a hook; first > last is everywhere."""
+        hook = ctypes.c_size_t()
+        at = ctypes.addressof(hook)
+        self._check(self._library.add_hook(self._handle, at, kind, callback, None, first, last), "hook")
+
+    def _control(self, item: int, *arguments: object) -> None:
+        number = ctypes.c_int(item - (1 << 32) if item >> 31 else item)
+        self._check(self._library.control(ctypes.c_void_p(self._handle), number, *arguments), "control")
+
+    def _allocate_context(self) -> int:
+        context = ctypes.c_void_p()
+        self._check(self._library.context_alloc(self._handle, ctypes.addressof(context)), "allocate")
+        return context.value or 0
+
+    @staticmethod
+    def _check(error: int, what: str) -> None:
+        if error:
+            raise RuntimeError(f"Unicorn cannot {what}: error {error}")
