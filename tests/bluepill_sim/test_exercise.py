@@ -1,0 +1,153 @@
+"""A compiled program meets each peripheral through the real core and bus."""
+
+import itertools
+import shutil
+import subprocess
+import time
+from pathlib import Path
+
+import pytest
+
+pytest.importorskip("unicorn")
+
+from bluepill_sim.board import BluePill
+from bluepill_sim.pins import PinDrive
+
+HERE = Path(__file__).resolve().parent / "firmware"
+COMPILER = "arm-none-eabi-gcc"
+pytestmark = pytest.mark.skipif(shutil.which(COMPILER) is None, reason=f"{COMPILER} is not installed")
+
+MS = 1_000_000
+#: 115200 baud at 72 MHz: 10 bits of 625 cycles.
+CHARACTER_NS = 10 * 625 * 1000 // 72
+EXPECTED = """\
+unclocked 00000000
+unmodelled 00000000
+clocked 44444444
+pb4-jtag 00000000
+pb4-free 00000010
+bit-band 00000080
+locked 44444444
+reset 44244444
+erased ffffffff
+programmed abcd1234
+flash-sr 00000020
+csr 0c000000
+ready
+"""
+
+
+@pytest.fixture(scope="session")
+def elf(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    path = tmp_path_factory.mktemp("exercise") / "exercise.elf"
+    flags = [
+        "-mcpu=cortex-m3",
+        "-mthumb",
+        "-std=c11",
+        "-Og",
+        "-g",
+        "-Wall",
+        "-Wextra",
+        "-Werror",
+        "-ffreestanding",
+        "-nostdlib",
+    ]
+    link = ["-Wl,--build-id=none", "-T", str(HERE / "exercise.ld"), str(HERE / "exercise.c"), "-lgcc", "-o", str(path)]
+    subprocess.run([COMPILER, *flags, *link], check=True)
+    return path
+
+
+class Session:
+    """A board that runs the program, and what came out of it."""
+
+    def __init__(self, elf: Path) -> None:
+        self.board = BluePill(elf)
+        self.board.pin("PB4").drive(True)
+        self.text = ""
+        self.times: list[int] = []
+        self.edges: list[tuple[str, PinDrive, int]] = []
+        self.board.usart1.on_transmit = self._transmit
+        self.board.on_pin = lambda name, drive, at_ns: self.edges.append((name, drive, at_ns))
+
+    def _transmit(self, word: int, at_ns: int) -> None:
+        self.text += chr(word)
+        self.times.append(at_ns)
+
+    def run(self, span_ns: int, slice_ns: int = MS) -> str:
+        """Run for a while, and return what came out."""
+        self.text, self.times = "", []
+        end_ns, end_wall = self.board.now_ns + span_ns, time.monotonic() + 20
+        while self.board.now_ns < end_ns:
+            self.board.advance_to(min(self.board.now_ns + slice_ns, end_ns))
+            assert time.monotonic() < end_wall
+        return self.text
+
+
+@pytest.fixture
+def session(elf: Path) -> Session:
+    session = Session(elf)
+    assert session.run(80 * MS) == EXPECTED
+    return session
+
+
+def test_warnings_name_what_the_program_did_wrong(session: Session) -> None:
+    beginnings = (
+        "GPIOC has no clock: RCC_APB2ENR bit 4 is 0 (read of 0x40011000) at meet_gpio+0x",
+        "TIM2 is not modelled (read of 0x40000000) at meet_gpio+0x",
+        "PC13: configured while locked: ignored at meet_gpio+0x",
+        "write to flash without FLASH_CR PG: ignored at program_flash+0x",
+    )
+    assert len(session.board.warnings) == len(beginnings)
+    for warning, beginning in zip(session.board.warnings, beginnings, strict=True):
+        assert warning.startswith(beginning)
+
+
+def test_characters_are_a_character_time_apart(session: Session) -> None:
+    session.board.usart1.receive(b"hello")
+    start_ns = session.board.now_ns
+    assert session.run(MS) == "HELLO"
+    gaps = [later - earlier for earlier, later in itertools.pairwise(session.times)]
+    assert all(abs(gap - CHARACTER_NS) < 1000 for gap in gaps)
+    # In at the end of the first character, answered by the handler at once, out one character later.
+    assert 0 < session.times[0] - start_ns - 2 * CHARACTER_NS < 2000
+
+
+@pytest.mark.parametrize(("pin", "level", "text"), [("PA0", True, "edge 0\n"), ("PB10", False, "edge 10\n")])
+def test_an_edge_wakes_the_program_within_a_microsecond(session: Session, pin: str, level: bool, text: str) -> None:
+    session.board.pin(pin).drive(not level)
+    session.run(2 * MS)
+    session.edges.clear()
+    start_ns = session.board.now_ns
+    session.board.pin(pin).drive(level)
+    assert session.run(2 * MS) == text
+    (_, high, at_ns), (_, low, later_ns) = session.edges
+    assert (high, low) == (PinDrive.HIGH, PinDrive.LOW)
+    # 12 cycles of entry and a dozen instructions at 72 MHz.
+    assert start_ns < at_ns < later_ns < start_ns + 1000
+
+
+@pytest.mark.parametrize("slice_ns", [7_000, 100_000, 10 * MS])
+def test_slices_do_not_show(elf: Path, slice_ns: int) -> None:
+    first, second = Session(elf), Session(elf)
+    first.run(20 * MS)
+    second.run(20 * MS, slice_ns)
+    assert (second.text, second.times, second.edges) == (first.text, first.times, first.edges)
+
+
+def test_a_watched_pin_ends_the_slice_at_its_edge(session: Session) -> None:
+    pin = session.board.pin("PB7")
+    pin.watch()
+    session.edges.clear()
+    session.board.pin("PA0").drive(True)
+    reached = session.board.advance_to(session.board.now_ns + MS)
+    assert reached.reason.name == "EDGE"
+    assert session.edges[0][2] <= reached.now < session.edges[0][2] + 1000
+
+
+def test_a_restored_board_goes_on_identically(session: Session) -> None:
+    session.board.usart1.receive(b"abcdef")
+    session.run(250_000)
+    state = session.board.snapshot()
+    first = (session.run(2 * MS), session.times)
+    session.board.restore(state)
+    assert (session.run(2 * MS), session.times) == first
