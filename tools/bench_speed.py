@@ -38,6 +38,7 @@ def median_seconds(work: Callable[[], object]) -> float:
 
 
 def row(name: str, figure: str, note: str = "") -> None:
+    """Print one line of the table."""
     print(f"{name:<44} {figure:>18}  {note}")
 
 
