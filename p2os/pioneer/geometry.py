@@ -21,16 +21,18 @@ INFINITY = math.inf
 class Footprint:
     """The plan of an obstacle, prepared for many questions."""
 
-    __slots__ = ("edges", "name", "polygon", "radius", "reach", "x", "y")
+    __slots__ = ("axis", "edges", "halves", "name", "polygon", "radius", "reach", "x", "y")
 
     def __init__(self, obstacle: Obstacle) -> None:
         self.name = obstacle.name
         self.x, self.y = obstacle.x_m, obstacle.y_m
         self.radius = obstacle.radius_m
         self.reach = obstacle.reach_m
+        self.axis = (math.cos(obstacle.heading_rad), math.sin(obstacle.heading_rad))
+        self.halves = (obstacle.length_m / 2, obstacle.width_m / 2)
         self.polygon: Polygon = ()
         if not obstacle.is_cylinder:
-            half_length, half_width = obstacle.length_m / 2, obstacle.width_m / 2
+            half_length, half_width = self.halves
             corners = (
                 (half_length, half_width),
                 (-half_length, half_width),
@@ -55,6 +57,15 @@ class Footprint:
             if 0.0 <= along < nearest and 0.0 <= (px * dy - py * dx) / denominator <= 1.0:
                 nearest = along
         return nearest
+
+    def distance_to_point(self, x: float, y: float) -> float:
+        """Return the distance to a point; 0 inside."""
+        dx, dy = x - self.x, y - self.y
+        if not self.polygon:
+            return max(0.0, math.hypot(dx, dy) - self.radius)
+        (c, s), (half_length, half_width) = self.axis, self.halves
+        along, across = abs(dx * c + dy * s) - half_length, abs(dy * c - dx * s) - half_width
+        return math.hypot(max(0.0, along), max(0.0, across))
 
     def distance(self, hull: Polygon) -> float:
         """Return the distance to a convex polygon; 0 where they overlap."""

@@ -76,6 +76,8 @@ class KinematicBody:
         self._left_angle = self._right_angle = self._left = self._right = 0.0
         self._asked = (0.0, 0.0)
         self._stalled = False
+        #: The last set-points, where they would have brought the hull into a thing.
+        self._blocked_at: tuple[float, float] | None = None
         self._contacts = ContactCounter()
         #: No thing is nearer to the hull than this; 0 only where the hull is inside one.
         self._free_m = 0.0
@@ -92,7 +94,11 @@ class KinematicBody:
             return Turned(self._left_angle, self._right_angle)
         forward, turn = (left_mps + right_mps) / 2 * _DT_S, (right_mps - left_mps) / self._track_m * _DT_S
         x, y, heading = self._moved(forward, turn)
-        blocked = self._is_blocked(x, y, heading, abs(forward) + abs(turn) * self._hull_reach)
+        # What was blocked stays so: neither the pose nor the plan has changed since.
+        blocked = self._asked == self._blocked_at or self._is_blocked(
+            x, y, heading, abs(forward) + abs(turn) * self._hull_reach
+        )
+        self._blocked_at = self._asked if blocked else None
         self._stalled = blocked
         self._contacts.update(touching=blocked or self._free_m == 0.0)
         if blocked:
@@ -130,6 +136,7 @@ class KinematicBody:
 
     def _changed(self) -> None:
         """Prepare for a plan that is another one now."""
+        self._blocked_at = None
         height = self._parameters.sonar_height_m
         self._echoing = [Footprint(item) for item in self._plan.obstacles if item.stands_in(height, height)]
         self._free_m = self._plan.clearance(self._x, self._y, self._heading, no_more_than=LOOK_AHEAD_M)

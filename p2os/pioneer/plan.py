@@ -8,6 +8,7 @@ import math
 from collections.abc import Iterable
 from dataclasses import replace
 from difflib import get_close_matches
+from operator import itemgetter
 
 from p2os.errors import WorldError
 from p2os.parameters import BodyParameters
@@ -73,9 +74,13 @@ class Plan:
         """
         hull = placed(self._hull, x_m, y_m, heading_rad)
         nearest = no_more_than
-        for thing in self._touchable.values():
-            if math.hypot(thing.x - x_m, thing.y - y_m) - thing.reach - self._hull_reach < nearest:
-                nearest = min(nearest, thing.distance(hull))
+        # No point of the hull is farther from the axle than its reach: the likely nearest first, then stop.
+        things = list(self._touchable.values())
+        bounds = [thing.distance_to_point(x_m, y_m) - self._hull_reach for thing in things]
+        for bound, thing in sorted(zip(bounds, things, strict=True), key=itemgetter(0)):
+            if bound >= nearest:
+                break
+            nearest = min(nearest, thing.distance(hull))
         return nearest
 
     def _find(self, name: str) -> Obstacle:

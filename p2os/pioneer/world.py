@@ -65,6 +65,8 @@ def load_world(name_or_path: str | Path, seed: int = 0) -> World:
         raise WorldError(f"no world {name!r}", hint=hint)
     try:
         return parse_world(path.read_text(encoding="utf-8"), name, seed)
+    except OSError as error:
+        raise WorldError(f"{name}: {error.strerror}") from error
     except UnicodeDecodeError as error:
         raise WorldError(f"{name}: not a text file", hint="a world is a TOML file") from error
 
@@ -88,6 +90,9 @@ def parse_world(text: str, source: str, seed: int = 0) -> World:
             raise WorldError(f"{source}: {section} must be written as [[{section}]]")
         obstacles += [read_obstacle(source, section, row, keys) for row in rows]
     if "arena" in table:
+        if not isinstance(table["arena"], dict):
+            raise WorldError(f"{source}: arena must be a table [arena]")
+        _only(source, "arena.", table["arena"], ())
         obstacles += arena(seed, start)
     extent = _numbers(source, "extent_m", table.get("extent_m"), 4)
     if extent[0] >= extent[2] or extent[1] >= extent[3]:
@@ -122,41 +127,44 @@ def read_obstacle(source: str, section: str, row: Table, keys: Mapping[str, obje
             values[key] = _numbers(source, place, value, 2)
         else:
             values[key] = _number(source, place, value)
-    return _SHAPERS[section](source, values)
+    try:
+        return _SHAPERS[section](values)
+    except WorldError as error:
+        raise WorldError(f"{source}: {section}: {error}", hint=error.hint) from error
 
 
-def _box(source: str, v: Table) -> Obstacle:
+def _box(v: Table) -> Obstacle:
     return Obstacle(
         name=v["name"], x_m=v["x_m"], y_m=v["y_m"], heading_rad=math.radians(v["heading_deg"]), length_m=v["length_m"],
         width_m=v["width_m"], height_m=v["height_m"], base_m=v["base_m"], floor_m=v["floor_m"],
-        kind=_kind(source, v["kind"]),
+        kind=_kind(v["kind"]),
     )  # fmt: skip
 
 
-def _cylinder(_source: str, v: Table) -> Obstacle:
+def _cylinder(v: Table) -> Obstacle:
     return Obstacle(
         name=v["name"], x_m=v["x_m"], y_m=v["y_m"], radius_m=v["radius_m"], height_m=v["height_m"],
         base_m=v["base_m"], floor_m=v["floor_m"],
     )  # fmt: skip
 
 
-def _wall(source: str, v: Table) -> Obstacle:
+def _wall(v: Table) -> Obstacle:
     (x0, y0), (x1, y1) = v["from_m"], v["to_m"]
     return Obstacle(
         name=v["name"], x_m=(x0 + x1) / 2, y_m=(y0 + y1) / 2, heading_rad=math.atan2(y1 - y0, x1 - x0),
         length_m=math.hypot(x1 - x0, y1 - y0) + v["thickness_m"], width_m=v["thickness_m"], height_m=v["height_m"],
-        kind=_kind(source, v["kind"]),
+        kind=_kind(v["kind"]),
     )  # fmt: skip
 
 
-def _floor(_source: str, v: Table) -> Obstacle:
+def _floor(v: Table) -> Obstacle:
     return Obstacle(
         name=v["name"], x_m=v["x_m"], y_m=v["y_m"], length_m=v["length_m"], width_m=v["width_m"], height_m=v["top_m"],
         kind=Kind.FLOOR,
     )  # fmt: skip
 
 
-def _ramp(_source: str, v: Table) -> Obstacle:
+def _ramp(v: Table) -> Obstacle:
     return Obstacle(
         name=v["name"], x_m=v["x_m"], y_m=v["y_m"], heading_rad=math.radians(v["heading_deg"]), length_m=v["length_m"],
         width_m=v["width_m"], height_m=v["rise_m"], base_m=v["base_m"], kind=Kind.RAMP,
@@ -166,11 +174,11 @@ def _ramp(_source: str, v: Table) -> Obstacle:
 _SHAPERS = {"box": _box, "cylinder": _cylinder, "wall": _wall, "floor": _floor, "ramp": _ramp}
 
 
-def _kind(source: str, text: str) -> Kind:
+def _kind(text: str) -> Kind:
     try:
         return Kind(text)
     except ValueError:
-        raise WorldError(f"{source}: kind {text!r}", hint=f"one of {', '.join(k.value for k in Kind)}") from None
+        raise WorldError(f"kind {text!r} is unknown", hint=f"one of {', '.join(k.value for k in Kind)}") from None
 
 
 def _start(source: str, row: object) -> Pose:
@@ -185,7 +193,8 @@ def _only(source: str, prefix: str, table: Table, keys: tuple[str, ...]) -> None
     for key in table:
         if key not in keys:
             close = get_close_matches(key, keys, n=1)
-            hint = f"did you mean {prefix}{close[0]}?" if close else f"known keys: {', '.join(keys)}"
+            known = f"known keys: {', '.join(keys)}" if keys else f"[{prefix[:-1]}] has no keys"
+            hint = f"did you mean {prefix}{close[0]}?" if close else known
             raise WorldError(f"{source}: unknown key {prefix}{key}", hint=hint)
 
 
