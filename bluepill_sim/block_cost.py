@@ -46,6 +46,7 @@ CYCLES = {
     Kind.WAIT_EVENT: 1,
     Kind.WAIT_INTERRUPT: 1,
     Kind.YIELD: 1,
+    Kind.IF_THEN: 1,
     Kind.SUPERVISOR_CALL: 1,
     Kind.BREAKPOINT: 1,
 }
@@ -76,6 +77,7 @@ class Block:
         "divides",
         "end",
         "has_exclusive",
+        "has_it",
         "is_self_loop",
         "last",
         "offsets",
@@ -104,6 +106,8 @@ class Block:
         self.sends_event = False
         #: Whether it takes an exclusive reservation.
         self.has_exclusive = False
+        #: Whether an IT instruction is in it.
+        self.has_it = False
         #: Whether it is a single branch to itself.
         self.is_self_loop = False
         #: Kind of its last instruction.
@@ -214,5 +218,6 @@ def _note(block: Block, instructions: list[Instruction]) -> None:
     block.changes_masks = Kind.MASK_CHANGE in kinds
     block.sends_event = Kind.SEND_EVENT in kinds
     block.has_exclusive = Kind.EXCLUSIVE in kinds
+    block.has_it = Kind.IF_THEN in kinds
     block.last = instructions[-1].kind if instructions else Kind.PLAIN
     block.is_self_loop = len(instructions) == 1 and instructions[0].destination == block.start

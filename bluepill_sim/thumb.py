@@ -54,6 +54,8 @@ class Kind(Enum):
     WAIT_EVENT = "wait-event"
     WAIT_INTERRUPT = "wait-interrupt"
     YIELD = "yield"
+    #: IT: makes the next one to four instructions conditional.
+    IF_THEN = "if-then"
     SUPERVISOR_CALL = "supervisor-call"
     BREAKPOINT = "breakpoint"
 
@@ -105,6 +107,8 @@ _NARROW: tuple[tuple[int, int, Kind], ...] = (
     (0xFFFF, 0xBF20, Kind.WAIT_EVENT),
     (0xFFFF, 0xBF30, Kind.WAIT_INTERRUPT),
     (0xFFFF, 0xBF40, Kind.SEND_EVENT),
+    (0xFF0F, 0xBF00, Kind.PLAIN),  # NOP and reserved hints
+    (0xFF00, 0xBF00, Kind.IF_THEN),
     (0xFF00, 0xBE00, Kind.BREAKPOINT),
     (0xF800, 0xC000, Kind.STORE_MULTIPLE),
     (0xF800, 0xC800, Kind.LOAD_MULTIPLE),

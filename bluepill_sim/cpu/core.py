@@ -31,9 +31,9 @@ _NOWHERE = 0xFFFF_FFFF
 #: Kinds of bad accesses.
 WRITE_UNMAPPED, FETCH_UNMAPPED, WRITE_PROTECTED, FETCH_PROTECTED = 20, 21, 22, 24
 
-#: Reads (offset, size) of an I/O region, writes (offset, size, value).
-ReadAccess = Callable[[int, int], int]
-WriteAccess = Callable[[int, int, int], None]
+#: (uc, offset, size, user) and (uc, offset, size, value, user): accesses to an I/O region.
+RawRead = Callable[[int, int, int, int], int]
+RawWrite = Callable[[int, int, int, int, int], None]
 
 _Result = TypeVar("_Result")
 
@@ -83,24 +83,14 @@ class Core:
             f"map {address:#010x}",
         )
 
-    def map_io(self, address: int, size: int, read: ReadAccess, write: WriteAccess) -> None:
-        """Map a region whose accesses are calls; their offsets count from `address`."""
+    def map_io(self, address: int, size: int, read: RawRead, write: RawWrite) -> None:
+        """Map a region whose accesses are calls, straight from C: they must not raise.
 
-        def on_read(_uc: int, offset: int, count: int, _user: int) -> int:
-            try:
-                return read(offset, count)
-            except BaseException as error:  # noqa: BLE001 - see the module's text
-                self._on_failure(error)
-                return 0
-
-        def on_write(_uc: int, offset: int, count: int, value: int, _user: int) -> None:
-            try:
-                write(offset, count, value)
-            except BaseException as error:  # noqa: BLE001 - see the module's text
-                self._on_failure(error)
-
-        reader = self._pointer(binding.READ_CALLBACK(on_read))
-        writer = self._pointer(binding.WRITE_CALLBACK(on_write))
+        Unicorn brings the PC up to date before each of them, and by that leaves
+        ITSTATE as if the IT block had been left there: see `Engine`.
+        """
+        reader = self._pointer(binding.READ_CALLBACK(read))
+        writer = self._pointer(binding.WRITE_CALLBACK(write))
         self._check(
             self._library.map_io(self._handle, address, size, reader, None, writer, None), f"map {address:#010x}"
         )

@@ -21,11 +21,14 @@ from collections.abc import Callable
 
 from bluepill_sim.block_cost import NO_BLOCK, Block
 from bluepill_sim.cpu import core
-from bluepill_sim.cpu.core import Core, ReadAccess, WriteAccess
+from bluepill_sim.cpu.core import Core
 from bluepill_sim.cpu.halt import Halt, HaltKind
 from bluepill_sim.cpu.registers import GENERAL, Register
 from bluepill_sim.thumb import Kind
 
+#: Reads (offset, size) of an I/O region, writes (offset, size, value).
+ReadAccess = Callable[[int, int], int]
+WriteAccess = Callable[[int, int, int], None]
 #: Takes (address, size, value) written to read-only memory; False refuses it.
 WriteToReadOnly = Callable[[int, int, int], bool]
 #: Returns the costs of the block of `size` bytes at `address`.
@@ -41,8 +44,8 @@ _INTERRUPTS = {
     17: HaltKind.NO_COPROCESSOR,
 }
 
-#: Chosen: a page that no STM32F103 has, executable only; holds CLREX and WFI.
-_SCRATCH, _SCRATCH_BYTES = 0xF000_0000, 0x400
+#: Chosen: a page where an STM32F103C has nothing, outside the regions that never execute; holds CLREX and WFI.
+_SCRATCH, _SCRATCH_BYTES = 0x9FFF_FC00, 0x400
 _SCRATCH_CODE = bytes.fromhex("bff32f8f 30bf")
 _SCRATCH_BLOCK = Block(_SCRATCH, _SCRATCH + len(_SCRATCH_CODE), 0, 0, {})
 #: Branches to these addresses are exception returns in handler mode (ARMv7-M B1.5.8).
@@ -53,6 +56,8 @@ _LAST_NORMAL_ADDRESS = 0x21FF_FFFF
 _NEVER = 1 << 62
 
 _T_BIT = 1 << 24
+#: ITSTATE in CPSR.
+_IT_BITS = 0x0600_FC00
 
 #: The library's context, cycle, PC, T bit, whether exclusive accesses are used.
 EngineSnapshot = tuple[bytes, int, int, bool, bool]
@@ -97,6 +102,8 @@ class Engine:
         self._armed: set[tuple[int, tuple[tuple[int, int], ...]]] = set()
         self._stale: list[Block] = []
         self._halt: Halt | None = None
+        #: Where the run started: its first block may start inside an IT block.
+        self._run_from = 0
         self._failure: BaseException | None = None
         self._core.on_block(self._enter_block)
         self._core.on_interrupt(self._interrupted)
@@ -114,7 +121,25 @@ class Engine:
 
     def map_io(self, address: int, size: int, read: ReadAccess, write: WriteAccess) -> None:
         """Map a region whose accesses are calls; their offsets count from `address`."""
-        self._core.map_io(address, size, read, write)
+
+        def on_read(_uc: int, offset: int, count: int, _user: int) -> int:
+            try:
+                if self.block.has_it or self.block.start == self._run_from:
+                    self._leave_it_block()
+                return read(offset, count)
+            except BaseException as error:  # noqa: BLE001 - C stands between here and the caller
+                self._fail(error)
+                return 0
+
+        def on_write(_uc: int, offset: int, count: int, value: int, _user: int) -> None:
+            try:
+                if self.block.has_it or self.block.start == self._run_from:
+                    self._leave_it_block()
+                write(offset, count, value)
+            except BaseException as error:  # noqa: BLE001 - C stands between here and the caller
+                self._fail(error)
+
+        self._core.map_io(address, size, on_read, on_write)
 
     def drop_code(self, address: int, size: int) -> None:
         """Forget what was translated and measured from bytes that have changed; not during a run."""
@@ -147,6 +172,7 @@ class Engine:
             self._change_traps()
         while True:
             self._halt = None
+            self._run_from = self.pc
             error = self._core.start(self.pc | self.is_thumb)
             if self._failure is not None:
                 failure, self._failure = self._failure, None
@@ -316,6 +342,17 @@ class Engine:
         self._halt = Halt(kind, self.registers[Register.PC], address)
         return False
 
+    def _leave_it_block(self) -> None:
+        """Put right what a memory hook does to ITSTATE.
+
+        To find the PC of an access Unicorn restores the state at that instruction,
+        ITSTATE included; but translated code keeps ITSTATE clear while a block runs,
+        and the next block would start in the middle of an IT block.
+        """
+        state = self.registers[Register.CPSR]
+        if state & _IT_BITS:
+            self.registers[Register.CPSR] = state & ~_IT_BITS
+
     def _halt_without_reason(self, error: int) -> Halt:
         """Tell why Unicorn came back without having called anything: WFI is the only way."""
         pc = self.registers[Register.PC]
@@ -348,6 +385,8 @@ class Engine:
     def _watch_alignment(self, _access: int, address: int, size: int, _value: int) -> bool:
         if self._traps_unaligned and address % size:
             self._end(HaltKind.UNALIGNED, self.registers[Register.PC], address)
+        elif self.block.has_it or self.block.start == self._run_from:
+            self._leave_it_block()
         return True
 
     def _trap_stale_blocks(self) -> None:
