@@ -86,8 +86,14 @@ def _static_box(half: Vector, place: Vector, turn: tuple[float, ...], group: int
 
 
 def _static(shape: int, place: Vector, turn: tuple[float, ...], group: int, client: int) -> int:
+    # Plain rigid bodies: as articulated ones, each would cost time in every step.
     number = pybullet.createMultiBody(
-        baseMass=0, baseCollisionShapeIndex=shape, basePosition=place, baseOrientation=turn, physicsClientId=client
+        baseMass=0,
+        baseCollisionShapeIndex=shape,
+        basePosition=place,
+        baseOrientation=turn,
+        useMaximalCoordinates=1,
+        physicsClientId=client,
     )
     friction = FLOOR_FRICTION if group == FLOOR_GROUP else OBSTACLE_FRICTION
     pybullet.changeDynamics(number, -1, lateralFriction=friction, physicsClientId=client)
