@@ -18,7 +18,9 @@
  *   CRUISE   straight on while nothing, or as much on both sides, is at +-30 and +-50
  *   VEER     an arc away from the side that is worse at +-30 or +-50
  *   TURN     on the spot, when +-10 sees something: away from the heavier side, until
- *            +-10 and +-30 are clear or +-30 shows two sides of a gap with +-10 clear
+ *            +-10 and +-30 are clear or +-30 shows two sides of a gap with +-10 clear;
+ *            also out of a passage that proves too narrow: things 0.9 m apart show at
+ *            +-30 on both sides for 0.10 m of way, nearer ones longer
  *   BACK_OUT instead of a TURN where both sides are shut too and straight ground lies
  *            behind: as far as the encoders prove it free, then a long TURN
  *
@@ -48,6 +50,7 @@
 #define FULL_TWIST 35      /* 360 degrees */
 #define BOLD_EVERY 2       /* chosen, as the next: by the ground covered in simulated rooms */
 #define CONTRARY_EVERY 5
+#define NARROW_WAY 4       /* 0.13 m with something at both +-30: less than 0.85 m apart, or a long passage */
 #define BACK_LEAST_WAY 6   /* 0.19 m: less is not worth it */
 #define BACK_MOST_WAY 10   /* 0.32 m: enough to turn freely */
 #define BACK_MARGIN_WAY 4  /* 0.13 m: two steps of the encoders, then line and brakes from SLOW */
@@ -113,6 +116,18 @@ static void update_seen(struct dodge *dodge, uint8_t sensors)
     }
 }
 
+/* Something near the way on both sides. */
+static bool is_shut(const struct dodge *dodge)
+{
+    return dodge->seen & LEFT_SHUT && dodge->seen & RIGHT_SHUT;
+}
+
+/* Something at +-30 degrees on both sides and nothing between. */
+static bool is_gap(const struct dodge *dodge)
+{
+    return dodge->seen & LEFT_30 && dodge->seen & RIGHT_30 && !(dodge->seen & FRONT);
+}
+
 static void begin_turn(struct dodge *dodge, int32_t twist, int least_twist)
 {
     dodge->state = dodge->turn_side > 0 ? DODGE_TURN_LEFT : DODGE_TURN_RIGHT;
@@ -127,14 +142,13 @@ static int lighter_side(const struct dodge *dodge)
     return left > right ? -1 : right > left ? +1 : dodge->turn_side;
 }
 
-static void turn_away(struct dodge *dodge, int32_t way, int32_t twist)
+static void turn_away(struct dodge *dodge, int32_t way, int32_t twist, int least_twist)
 {
-    int least_twist = 0;
     dodge->turns++;
     if (way - dodge->turn_way >= SOON_WAY) {
         dodge->futile_turns = 0;
         dodge->turn_side = lighter_side(dodge);
-        if (dodge->turns % CONTRARY_EVERY == 0) {
+        if (dodge->turns % CONTRARY_EVERY == 0 && !is_shut(dodge)) {
             dodge->turn_side = -dodge->turn_side;
         }
     } else if (++dodge->futile_turns >= FUTILE_TURNS) {
@@ -154,13 +168,14 @@ static int32_t free_way_behind(const struct dodge *dodge, int32_t way)
 static void drive_on(struct dodge *dodge, int32_t way, int32_t twist)
 {
     int left = left_danger(dodge->seen), right = left_danger(mirror(dodge->seen));
-    if (!(dodge->seen & FRONT)) {
+    bool is_narrow = dodge->gap_way >= NARROW_WAY;
+    if (!(dodge->seen & FRONT) && !is_narrow) {
         dodge->state = left > right ? DODGE_VEER_RIGHT : right > left ? DODGE_VEER_LEFT : DODGE_CRUISE;
-    } else if (dodge->seen & LEFT_SHUT && dodge->seen & RIGHT_SHUT && free_way_behind(dodge, way) >= BACK_LEAST_WAY) {
+    } else if (is_shut(dodge) && free_way_behind(dodge, way) >= BACK_LEAST_WAY) {
         dodge->back_way = way - free_way_behind(dodge, way);
         dodge->state = DODGE_BACK_OUT;
     } else {
-        turn_away(dodge, way, twist);
+        turn_away(dodge, way, twist, is_narrow ? LONG_TWIST : 0);
     }
 }
 
@@ -172,9 +187,8 @@ static bool is_overdue(const struct dodge *dodge)
 /* The cone ahead is free: of everything, or of what forbids passing between two things. */
 static bool is_way_out(const struct dodge *dodge, int32_t turned)
 {
-    bool is_gap = dodge->seen & LEFT_30 && dodge->seen & RIGHT_30;
     bool is_bold = dodge->turns % BOLD_EVERY == 0 || turned >= FULL_TWIST || is_overdue(dodge);
-    return !(dodge->seen & (is_gap || is_bold ? FRONT : AHEAD));
+    return is_gap(dodge) || !(dodge->seen & (is_bold ? FRONT : AHEAD));
 }
 
 static void turn_on(struct dodge *dodge, int32_t way, int32_t twist)
@@ -183,6 +197,7 @@ static void turn_on(struct dodge *dodge, int32_t way, int32_t twist)
     bool is_far_enough = turned >= dodge->least_twist || is_overdue(dodge);
     if (is_far_enough && is_way_out(dodge, turned)) {
         dodge->turn_way = way;
+        dodge->gap_way = 0;
         drive_on(dodge, way, twist);
     }
 }
@@ -216,6 +231,16 @@ static struct dodge_command command(const struct dodge *dodge)
     }
 }
 
+static void note_gap(struct dodge *dodge, int32_t way)
+{
+    if (!is_shut(dodge)) {
+        dodge->gap_way = 0;
+    } else if (is_gap(dodge)) {
+        dodge->gap_way += way - dodge->last_way;
+    }
+    dodge->last_way = way;
+}
+
 static void note_ground(struct dodge *dodge, int32_t way)
 {
     if (dodge->state != DODGE_CRUISE) {
@@ -236,6 +261,7 @@ struct dodge_command dodge_tick(struct dodge *dodge, uint8_t sensors, int32_t le
     int32_t way = left_steps + right_steps, twist = right_steps - left_steps;
     enum dodge_state before = dodge->state;
     update_seen(dodge, sensors);
+    note_gap(dodge, way);
     switch (dodge->state) {
     case DODGE_TURN_LEFT:
     case DODGE_TURN_RIGHT:

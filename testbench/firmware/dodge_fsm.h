@@ -36,6 +36,8 @@ struct dodge {
     int straight_ticks;                   /* how long both wheels have had one forward code */
     int32_t turn_twist;                   /* twist at which the turn began */
     int32_t turn_way;                     /* way at which the last turn ended */
+    int32_t gap_way;                      /* way driven in this passage with something close on both sides */
+    int32_t last_way;                     /* way at the tick before */
     int32_t ground_way;                   /* way at which the straight ground behind the robot begins */
     int32_t back_way;                     /* way at which backing ends */
 };
