@@ -38,8 +38,17 @@ class Leader(Protocol):
         """The time reached."""
         ...
 
-    def advance_to(self, limit_ns: int) -> object:
+    def advance_to(self, limit_ns: int) -> "LeaderReached":
         """Run to `limit_ns`, at most a basic block beyond; less far where a watched net changes."""
+        ...
+
+
+class LeaderReached(Protocol):
+    """How far a leader came."""
+
+    @property
+    def now(self) -> int:
+        """The time reached."""
         ...
 
 
@@ -99,14 +108,15 @@ class RunLoop:
             StuckError: Two parts wake each other for ever.
         """
         self._end = end
+        led = self.leader.now_ns
         while True:
             due = self._next_due()
-            if due <= min(self.leader.now_ns, self._end):
+            if due <= led and due <= self._end:
                 self._follow(due)
-            elif self.leader.now_ns >= self._end:
+            elif led >= self._end:
                 return
             else:
-                self._lead(min(due, self._end))
+                led = self._lead(led, min(due, self._end))
 
     def finish(self, end: Nanos) -> None:
         """Bring the followers to `end` itself, so that their state is that of the end of the run."""
@@ -122,13 +132,14 @@ class RunLoop:
         self.now = cast("int", snapshot["now"])
         self._edges = list(cast("tuple[int, ...]", snapshot["edges"]))
 
-    def _lead(self, limit: Nanos) -> None:
-        """Let the leader run to `limit`, slice by slice; stop at an edge on a watched net."""
+    def _lead(self, now: Nanos, limit: Nanos) -> Nanos:
+        """Let the leader run to `limit`, slice by slice; stop at an edge on a watched net. Return its time."""
         leader, slice_ns, on_slice = self.leader, self.slice_ns, self.on_slice
-        while leader.now_ns < limit and not self._edges:
-            leader.advance_to(min(limit, leader.now_ns + slice_ns))
+        while now < limit and not self._edges:
+            now = leader.advance_to(min(limit, now + slice_ns)).now
             if on_slice is not None:
-                on_slice(leader.now_ns)
+                on_slice(now)
+        return now
 
     def _next_due(self) -> Nanos:
         due = self._edges[0] if self._edges else NEVER

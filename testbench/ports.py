@@ -8,6 +8,7 @@ from typing import Protocol
 
 from bluepill_sim.pins import PinDrive
 from testbench.chip_pins import ChipPin
+from testbench.loop import LeaderReached
 
 
 class Usart(Protocol):
@@ -71,7 +72,7 @@ class Chip(Protocol):
         """Return a pin by its name, such as "PA4"."""
         ...
 
-    def advance_to(self, limit_ns: int) -> object:
+    def advance_to(self, limit_ns: int) -> LeaderReached:
         """Run to `limit_ns`, at most a basic block beyond; less far where a watched pin changes."""
         ...
 

@@ -36,8 +36,8 @@ class Progress:
 
     now: Nanos
     duration_ns: Nanos
-    #: What the robot is doing, in a few words.
-    doing: str
+    #: Returns what the robot is doing, in a few words.
+    doing: Callable[[], str]
 
 
 ProgressListener = Callable[[Progress], None]
@@ -90,7 +90,7 @@ def run_scenario(
             if pacer is not None:
                 pacer.keep_pace(now)
             if on_progress is not None:
-                on_progress(Progress(now=now, duration_ns=scenario.duration_ns, doing=doing(bench)))
+                on_progress(Progress(now=now, duration_ns=scenario.duration_ns, doing=lambda: doing(bench)))
 
         bench.on_slice = after_slice
         trace.meta(meta_of(scenario, bench.parts.world, bench.note))
@@ -121,7 +121,7 @@ def run_at_port(
 
         def after_slice(now: Nanos) -> None:
             if on_progress is not None:
-                on_progress(Progress(now=now, duration_ns=scenario.duration_ns, doing=doing(bench)))
+                on_progress(Progress(now=now, duration_ns=scenario.duration_ns, doing=lambda: doing(bench)))
 
         bench.on_slice = after_slice
         trace.meta(meta_of(scenario, None, bench.note))

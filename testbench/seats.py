@@ -64,10 +64,12 @@ class Seat:
         self._incoming = incoming
         self._outgoing = outgoing
         self._on_arrival = on_arrival
+        #: The part's own deadline, which moves only when it acts or receives.
+        self._own_deadline = part.next_deadline()
 
     def next_deadline(self) -> Nanos | None:
         """Return when the part wants to act, or when bytes will have arrived for it."""
-        own, arrival = self.part.next_deadline(), self._incoming.next_deadline()
+        own, arrival = self._own_deadline, self._incoming.next_deadline()
         if own is None or arrival is None:
             return arrival if own is None else own
         return min(own, arrival)
@@ -85,6 +87,7 @@ class Seat:
         part.advance_to(limit)
         for frame in part.take_output():
             self._outgoing.send(frame, limit)
+        self._own_deadline = part.next_deadline()
         return Reached(limit)
 
     def snapshot(self) -> dict[str, object]:
@@ -96,3 +99,4 @@ class Seat:
         state = cast("Mapping[str, object]", snapshot)
         self.part.restore(state["part"])
         self._incoming.restore(state["incoming"])
+        self._own_deadline = self.part.next_deadline()

@@ -73,7 +73,7 @@ class RunDisplay:
         end_s = progress.duration_ns / NS_PER_S
         self._bar.update(
             self._task, total=end_s, completed=progress.now / NS_PER_S,
-            time=f"{progress.now / NS_PER_S:6.1f} of {end_s:.0f} s", doing=progress.doing, refresh=True,
+            time=f"{progress.now / NS_PER_S:6.1f} of {end_s:.0f} s", doing=progress.doing(), refresh=True,
         )  # fmt: skip
 
     def _interrupt(self, _number: int, _frame: FrameType | None) -> None:

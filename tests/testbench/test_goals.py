@@ -97,7 +97,9 @@ def test_goal_sensor_named() -> None:
     run = record(obstacles=placed(1, 2), usart=text(*said), last_ns=30 * S)
     assert failure("sensor_named", run) is None
     missed = record(obstacles=placed(1, 2), usart=text(*said[:3]), last_ns=30 * S)
-    assert failure("sensor_named", missed) == "with something before sonar 2 from 20.000 s on it printed ['sensor 2 on']"
+    assert (
+        failure("sensor_named", missed) == "with something before sonar 2 from 20.000 s on it printed ['sensor 2 on']"
+    )
     other = record(obstacles=placed(1), usart=text(*said, (11.5, "sensor 7 on")), last_ns=30 * S)
     assert failure("sensor_named", other) is not None
     early = record(obstacles=placed(1), usart=text((5, "sensor 4 on"), *said[:2]), last_ns=30 * S)
@@ -115,6 +117,8 @@ def test_a_real_robot_is_not_asked_what_it_cannot_tell() -> None:
 
 def test_what_is_met_is_told_as_it_was_wanted() -> None:
     run = record(poses=[pose()], usart=text((1, "x")))
-    met, failures = judge(run, (Goal(kind="no_collision", arguments={}), Goal(kind="usart_lacks", arguments={"text": "x"})))
+    met, failures = judge(
+        run, (Goal(kind="no_collision", arguments={}), Goal(kind="usart_lacks", arguments={"text": "x"}))
+    )
     assert met == ["touches nothing"]
     assert failures == ["usart_lacks: 'x' was printed at 1.000 s"]

@@ -90,7 +90,11 @@ def test_sigrok_reads_both_files(tmp_path: Path) -> None:
     write_sigrok(run, tmp_path / "pins.sr")
     write_vcd(run, tmp_path / "pins.vcd")
     shown = subprocess.run(
-        ["sigrok-cli", "-i", str(tmp_path / "pins.sr"), "--show"], capture_output=True, text=True, check=True, timeout=60
+        ["sigrok-cli", "-i", str(tmp_path / "pins.sr"), "--show"],
+        capture_output=True,
+        text=True,
+        check=True,
+        timeout=60,
     )
     assert "motor1_comm1" in shown.stdout
     for source in (["-i", "pins.sr"], ["-i", "pins.vcd", "-I", "vcd"]):

@@ -42,7 +42,11 @@ def test_what_a_scenario_leaves_out_has_its_default(tmp_path: Path) -> None:
 
 
 def test_every_setting_arrives_where_it_belongs(tmp_path: Path) -> None:
-    scenario = read_scenario(write(tmp_path, LEAST + """
+    scenario = read_scenario(
+        write(
+            tmp_path,
+            LEAST
+            + """
         robot = "p2dx"
         threshold_m = 0.5
         start = { x_m = 1.0, y_m = -1.5, heading_deg = 180 }
@@ -59,7 +63,9 @@ def test_every_setting_arrives_where_it_belongs(tmp_path: Path) -> None:
         [controller]
         name = "Rosie"
         sonar_per_sip = "all"
-    """))
+    """,
+        )
+    )
     assert scenario.direct.step_um_per_s == 50_000
     assert scenario.direct.ramp_um_per_s2 is None
     assert (scenario.direct.sensor_period_ns, scenario.direct.encoder_period_ns) == (20_000_000, 10_000_000)
@@ -72,7 +78,9 @@ def test_every_setting_arrives_where_it_belongs(tmp_path: Path) -> None:
 
 
 def test_a_world_may_change_what_it_must(tmp_path: Path) -> None:
-    text = LEAST + """
+    text = (
+        LEAST
+        + """
         threshold_m = 0.6
         start = { x_m = -1.0, y_m = 0.0 }
         [in_world.ramp]
@@ -80,6 +88,7 @@ def test_a_world_may_change_what_it_must(tmp_path: Path) -> None:
         duration_s = 20
         start = { x_m = 0.5, y_m = 0.1 }
     """
+    )
     scenario = read_scenario(write(tmp_path, text))
     there = scenario.with_options(world="ramp")
     assert (there.threshold_m, there.adapter.threshold_um, there.duration_ns) == (0.4, 400_000, 20 * 10**9)
@@ -91,7 +100,11 @@ def test_a_world_may_change_what_it_must(tmp_path: Path) -> None:
 
 
 def test_a_thing_held_before_a_sonar_is_placed_moved_and_removed(tmp_path: Path) -> None:
-    scenario = read_scenario(write(tmp_path, LEAST + """
+    scenario = read_scenario(
+        write(
+            tmp_path,
+            LEAST
+            + """
         [[obstacle]]
         at_s = 1.0
         name = "post"
@@ -115,7 +128,9 @@ def test_a_thing_held_before_a_sonar_is_placed_moved_and_removed(tmp_path: Path)
         name = "crate"
         x_m = 1
         y_m = 1
-    """))
+    """,
+        )
+    )
     steps = [(change.at / 1e9, change.op, change.name) for change in scenario.changes]
     assert steps == [
         (0.5, Op.PLACE, "crate"), (1.0, Op.PLACE, "post"), (1.05, Op.MOVE, "post"), (1.1, Op.MOVE, "post"),

@@ -22,7 +22,9 @@ def test_a_line_has_one_spelling() -> None:
     assert canonical({"t": 1, "k": "pin", "net": "µ"}) == '{"k":"pin","net":"\\u00b5","t":1}'
 
 
-@given(st.lists(st.tuples(st.integers(0, 40), st.sampled_from(sorted(RANKS)), st.integers(0, 3)), max_size=20), st.data())
+@given(
+    st.lists(st.tuples(st.integers(0, 40), st.sampled_from(sorted(RANKS)), st.integers(0, 3)), max_size=20), st.data()
+)
 def test_when_it_is_written_changes_nothing(entries: list[tuple[int, str, int]], data: st.DataObject) -> None:
     entries = sorted(entries, key=lambda entry: entry[0])
     at_once, in_pieces = TraceWriter(), TraceWriter()
