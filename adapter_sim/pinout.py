@@ -377,6 +377,9 @@ def _check_roles(where: str, wires: tuple[Wire, ...], values: tuple[Value, ...])
     found = {value.name: (value.role, value.side) for value in values}
     if found != _NEEDED_VALUES:
         raise PinoutError(f"{where}: values are {sorted(found)}, expected {sorted(_NEEDED_VALUES)} with their sides")
+    widths = {value.width for value in values if value.role is Role.ENCODER}
+    if len(widths) != 1:
+        raise PinoutError(f"{where}: the encoders have {sorted(widths)} wires, expected as many each")
     stray = [wire.name for wire in wires if wire.value is not None and wire.value not in found]
     if stray:
         raise PinoutError(f"{where}: wire {stray[0]!r} belongs to no [[value]]")

@@ -2,10 +2,11 @@
 
 from collections.abc import Callable
 from dataclasses import replace
+from pathlib import Path
 
 import pytest
 
-from adapter_sim import Adapter, AdapterSettings, load_pinout, motor_code
+from adapter_sim import Adapter, AdapterSettings, Pinout, load_pinout, motor_code
 from p2os.commands import Command
 from p2os.connection import CommandReceived, Connection, Opened, Role
 from p2os.packets import Identity
@@ -16,9 +17,23 @@ from p2os.wire import Frame
 
 PARAMETERS = load_parameters("p2dx")
 PINOUT = load_pinout()
+PINOUT_TEXT = (Path(__file__).parents[2] / "adapter_sim" / "pinout.toml").read_text(encoding="utf-8")
 MS = NS_PER_MS
 #: 10 bits a character at 9600 baud.
 CHARACTER_NS = 10 * 10**9 // 9600
+
+
+def four_bits() -> str:
+    """Return the pin-out with a fourth wire for each motor."""
+    text = PINOUT_TEXT.replace('role = "motor"\nside = "left"\nwidth = 3', 'role = "motor"\nside = "left"\nwidth = 4')
+    text = text.replace('role = "motor"\nside = "right"\nwidth = 3', 'role = "motor"\nside = "right"\nwidth = 4')
+    for value, pin in (("motor1", "PB8"), ("motor2", "PB9")):
+        text += (
+            f'\n[[wire]]\nname = "{value}_comm4"\nrole = "motor"\nvalue = "{value}"\nbit = 3\n'
+            f'direction = "to_adapter"\nbluepill = "{pin}"\npull = "down"\nidle = 0\nsafe = 0\n'
+            'esp32 = { thesis-table3 = "NC", thesis-board = "IO18", rev-b = "NC", rev-c = "NC" }\n'
+        )
+    return text
 
 
 class FakePins:
@@ -139,14 +154,20 @@ class Line:
 class Rig:
     """The adapter, its pins, a line each way, and the robot, on one clock."""
 
-    def __init__(self, settings: AdapterSettings | None = None, robot: object | None = None, now: Nanos = 0) -> None:
+    def __init__(
+        self,
+        settings: AdapterSettings | None = None,
+        robot: object | None = None,
+        now: Nanos = 0,
+        pinout: Pinout = PINOUT,
+    ) -> None:
         self.now = now
         self.pins = FakePins()
         self.robot = robot or FakeRobot()
         self.events: list[tuple[Nanos, str, str]] = []
         self.adapter = Adapter(
             pins=self.pins,
-            pinout=PINOUT,
+            pinout=pinout,
             parameters=PARAMETERS,
             settings=settings or AdapterSettings(threshold_um=600_000),
             on_event=lambda now, what, detail: self.events.append((now, what, detail)),

@@ -7,9 +7,9 @@ from itertools import pairwise
 
 import pytest
 
-from adapter_sim import Adapter, AdapterSettings, EncoderAtOpen
+from adapter_sim import Adapter, AdapterSettings, EncoderAtOpen, parse_pinout
 from p2os.sip import SonarReading, StandardSip
-from tests.adapter_sim.conftest import MS, PARAMETERS, PINOUT, FakePins, FakeRobot, Rig
+from tests.adapter_sim.conftest import MS, PARAMETERS, PINOUT, FakePins, FakeRobot, Rig, four_bits
 
 
 def names(rig: Rig, since: int = 0) -> list[str]:
@@ -124,11 +124,42 @@ def test_a_reset_notice_of_the_robot_is_a_loss(driving: Rig) -> None:
 
 def test_other_packets_do_not_stand_in_for_a_sip(driving: Rig) -> None:
     driving.robot.sends = False
-    for _ in range(8):
-        driving.adapter.receive(bytes.fromhex("fafb06b090000 1b091".replace(" ", "")), driving.now)
-        driving.ms(50)
+    driving.ms(50)
+    lost_at = driving.adapter._agenda.sip_deadline
+    while driving.now < lost_at:
+        driving.adapter.receive(bytes.fromhex("fafb06b0900001b091"), driving.now)
+        driving.run(min(driving.now + 50 * MS, lost_at - 1))
+        assert driving.adapter.state == "driving"
+        driving.run(driving.now + 1)
     assert driving.adapter.state == "lost"
     assert "no SIP in time" in driving.adapter.status.reason
+
+
+def test_a_sip_after_the_loss_is_not_heard(driving: Rig) -> None:
+    driving.robot.obeys = False
+    driving.pins.motors(3, 3, driving.now)
+    driving.ms(1_500)
+    sips = driving.adapter.status.sips
+    driving.adapter.receive(driving.to_adapter.log[-1][1], driving.now)
+    assert (driving.adapter.state, driving.adapter.status.sips) == ("lost", sips)
+
+
+def test_four_motor_bits_command_finer_steps() -> None:
+    rig = Rig(AdapterSettings(threshold_um=600_000, step_um_per_s=31_250), pinout=parse_pinout(four_bits()))
+    rig.connect()
+    rig.pins.motors(7, -8, rig.now, width=4)
+    rig.ms(200)
+    assert rig.adapter.status.motors == (7, -8)
+    # (7 − 8) × 31.25 / 2 = −15.6 mm/s; −15 × 31.25 / 357 rad/s = −75.2 deg/s
+    assert (rig.robot.forward, rig.robot.turn) == (-16, -75)
+
+
+def test_an_adapter_without_a_listener_works_alike(driving: Rig) -> None:
+    driving.adapter.on_event = None
+    driving.pins.motors(2, 2, driving.now)
+    driving.ms(200)
+    assert driving.robot.forward == 125
+    assert driving.adapter.outputs.levels == driving.pins.outputs
 
 
 def test_distances_follow_the_sonar_at_the_threshold(driving: Rig) -> None:

@@ -9,9 +9,8 @@ from hypothesis import strategies as st
 from adapter_sim import PinoutError, load_pinout, parse_pinout
 from adapter_sim.pin_rules import faults_of, require_usable
 from adapter_sim.pinout import Direction, Pull, Role, Safe
-
-TEXT = (Path(__file__).parents[2] / "adapter_sim" / "pinout.toml").read_text(encoding="utf-8")
-PINOUT = load_pinout()
+from tests.adapter_sim.conftest import PINOUT, four_bits
+from tests.adapter_sim.conftest import PINOUT_TEXT as TEXT
 
 #: The BluePill's side, which binaries rely on.
 FIXED = {
@@ -84,23 +83,27 @@ def test_a_revision_called_faulty_is_refused_even_where_no_rule_sees_why() -> No
         require_usable(parse_pinout(text), "rev-b")
 
 
-def four_bits() -> str:
-    """Return the pin-out with a fourth wire for each motor."""
-    text = TEXT.replace('role = "motor"\nside = "left"\nwidth = 3', 'role = "motor"\nside = "left"\nwidth = 4')
-    text = text.replace('role = "motor"\nside = "right"\nwidth = 3', 'role = "motor"\nside = "right"\nwidth = 4')
-    for value, pin in (("motor1", "PB8"), ("motor2", "PB9")):
-        text += (
-            f'\n[[wire]]\nname = "{value}_comm4"\nrole = "motor"\nvalue = "{value}"\nbit = 3\n'
-            f'direction = "to_adapter"\nbluepill = "{pin}"\npull = "down"\nidle = 0\nsafe = 0\n'
-            'esp32 = { thesis-table3 = "NC", thesis-board = "IO18", rev-b = "NC", rev-c = "NC" }\n'
-        )
-    return text
-
-
 def test_a_fourth_motor_bit_is_one_more_wire_and_one_larger_number() -> None:
     pinout = parse_pinout(four_bits())
     assert pinout.value("motor1").width == 4
     assert pinout.value("motor2").wires[3] == "motor2_comm4"
+
+
+def test_a_wire_of_a_value_that_is_not_declared_is_refused() -> None:
+    with pytest.raises(PinoutError, match="wire 'motor1_comm4' belongs to no"):
+        parse_pinout(four_bits().replace('value = "motor1"\nbit = 3', 'value = "motor9"\nbit = 0').replace(
+            'side = "left"\nwidth = 4', 'side = "left"\nwidth = 3'))  # fmt: skip
+
+
+def test_encoders_of_different_widths_are_refused() -> None:
+    text = TEXT[: TEXT.index('[[wire]]\nname = "encoder1_s3"')] + TEXT[TEXT.index('[[wire]]\nname = "encoder2_s1"') :]
+    with pytest.raises(PinoutError, match=r"the encoders have \[2, 3\] wires"):
+        parse_pinout(text.replace('side = "left"\nwidth = 3', 'side = "left"\nwidth = 2', 1))
+
+
+def test_auxiliary_pins_may_be_left_out() -> None:
+    start, end = TEXT.index("# Pins of the ESP32 that reach"), TEXT.index('[[wire]]\nname = "DD1"')
+    assert parse_pinout(TEXT[:start] + TEXT[end:]).auxiliaries == ()
 
 
 BROKEN = [
