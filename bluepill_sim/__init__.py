@@ -1,1 +1,30 @@
 """An emulated STM32F103 on its BluePill board; knows nothing of robots or P2OS."""
+
+from bluepill_sim.board import Activity, BluePill, BoardSnapshot, SerialPort
+from bluepill_sim.errors import BluePillError, ImageError, MissingDependencyError, UnmodelledError
+from bluepill_sim.faults import FaultKind, FaultReport
+from bluepill_sim.image import Image, Symbol, SymbolTable, load_image
+from bluepill_sim.pins import Pin, PinDrive
+from bluepill_sim.timing import Nanos, Reached, Reason
+
+__all__ = [
+    "Activity",
+    "BluePill",
+    "BluePillError",
+    "BoardSnapshot",
+    "FaultKind",
+    "FaultReport",
+    "Image",
+    "ImageError",
+    "MissingDependencyError",
+    "Nanos",
+    "Pin",
+    "PinDrive",
+    "Reached",
+    "Reason",
+    "SerialPort",
+    "Symbol",
+    "SymbolTable",
+    "UnmodelledError",
+    "load_image",
+]

@@ -105,7 +105,7 @@ class Assembler:
             return [*value, 0x6038, 0x3704]
         return None
 
-    def data(self, name: str, args: list[str]) -> list[int] | None:
+    def data(self, name: str, args: list[str]) -> list[int] | None:  # noqa: PLR0911 - one return an encoding
         if name in {"movs", "cmp", "adds", "subs"} and args[-1].startswith("#") and len(args) == 2:
             base = {"movs": 0x2000, "cmp": 0x2800, "adds": 0x3000, "subs": 0x3800}[name]
             return [base | reg(args[0]) << 8 | self.value(args[1])]
@@ -122,7 +122,7 @@ class Assembler:
             return [0xFB00 | reg(args[1]), reg(args[3]) << 12 | reg(args[0]) << 8 | reg(args[2])]
         return None
 
-    def memory(self, name: str, args: list[str]) -> list[int] | None:
+    def memory(self, name: str, args: list[str]) -> list[int] | None:  # noqa: PLR0911 - one return an encoding
         if name in {"ldrd", "strd"}:
             rn, imm = self.place(args[2])
             return [{"ldrd": 0xE9D0, "strd": 0xE9C0}[name] | rn, reg(args[0]) << 12 | reg(args[1]) << 8 | imm // 4]
@@ -164,7 +164,8 @@ class Assembler:
             return [0xF000 | delta >> 12 & 0x7FF, 0xF800 | delta >> 1 & 0x7FF]
         if name in {"cbz", "cbnz"}:
             delta = self.value(args[1]) - self.address - 4
-            return [(0xB100 if name == "cbz" else 0xB900) | (delta >> 6 & 1) << 9 | (delta >> 1 & 31) << 3 | reg(args[0])]
+            offset = (delta >> 6 & 1) << 9 | (delta >> 1 & 31) << 3
+            return [(0xB100 if name == "cbz" else 0xB900) | offset | reg(args[0])]
         if name == "b":
             return [0xE000 | (self.value(args[0]) - self.address - 4) >> 1 & 0x7FF]
         if name[0] == "b" and name[1:] in _CONDITIONS:
@@ -210,7 +211,7 @@ class Machine:
         self.edges: list[tuple[str, str, int]] = []
         self.sent = bytearray()
         self.board.on_pin = lambda name, drive, at: self.edges.append((name, drive.value, at))
-        self.board.usart1.on_transmit = lambda word, at: self.sent.append(word)
+        self.board.usart1.on_transmit = lambda word, _at: self.sent.append(word)
 
     def label(self, name: str) -> int:
         return self.assembled.labels[name]
