@@ -27,14 +27,11 @@ FLASH_BYTES = 64 * 1024
 FLASH_BYTES_FITTED = 128 * 1024
 SRAM_BASE = 0x2000_0000
 SRAM_BYTES = 20 * 1024
-#: Boot loader ROM and option bytes.
-SYSTEM_MEMORY_BASE, SYSTEM_MEMORY_BYTES = 0x1FFF_F000, 2 * 1024
-OPTION_BYTES_BASE, OPTION_BYTES_BYTES = 0x1FFF_F800, 16
+#: Boot loader ROM; the option bytes follow it at 0x1FFFF800.
+SYSTEM_MEMORY_BASE = 0x1FFF_F000
 #: Unique id (12 bytes) and flash size in KiB (2 bytes): in system memory, after the boot loader.
 FLASH_SIZE_REGISTER, UNIQUE_ID_REGISTER = 0x1FFF_F7E0, 0x1FFF_F7E8
 PERIPHERAL_BASE, PERIPHERAL_END = 0x4000_0000, 0x4002_3400
-#: Bit-band regions: (first aliased address, first alias, bytes aliased) (RM0008 3.3.2).
-BIT_BANDS = ((SRAM_BASE, 0x2200_0000, 0x10_0000), (PERIPHERAL_BASE, 0x4200_0000, 0x10_0000))
 #: Interrupt lines of a medium-density part: 0 to 42.
 IRQ_COUNT = 43
 #: Pins with a leg on LQFP48; PB2 is BOOT1, PD0/PD1 the crystal.

@@ -2,6 +2,7 @@
 
 import io
 import os
+import select
 from collections.abc import Callable
 from pathlib import Path
 
@@ -63,14 +64,16 @@ def test_a_file_that_cannot_be_written_is_one_line(tmp_path: Path) -> None:
 
 
 def test_a_pseudo_terminal_goes_both_ways() -> None:
-    console, port = open_console("pty:"), Port()
+    console, port = PtyConsole(), Port()
     carry = connect(console, port)
     far = os.open(console.description, os.O_RDWR | os.O_NOCTTY)
     port.send(b"\x00a\n")
-    assert os.read(far, 10) == b"\x00a\n"
+    assert b"".join(os.read(far, 1) for _ in range(3)) == b"\x00a\n"
     carry()
     os.write(far, b"hi\r")
-    carry()
+    while len(port.received) < 3:  # the kernel hands it over in its own time
+        assert select.select([console._master], [], [], 5)[0]
+        carry()
     assert port.received == b"hi\r"
     os.close(far)
     console.close()
@@ -85,6 +88,12 @@ def test_a_pseudo_terminal_that_nobody_reads_drops(monkeypatch: pytest.MonkeyPat
     monkeypatch.setattr(os, "write", refuse)
     console.write(1, 0)
     assert console.dropped == 1
+    console.close()
+
+
+def test_a_pseudo_terminal_is_opened_by_name() -> None:
+    console = open_console("pty:")
+    assert isinstance(console, PtyConsole)
     console.close()
 
 

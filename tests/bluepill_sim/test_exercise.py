@@ -10,7 +10,7 @@ import pytest
 
 pytest.importorskip("unicorn")
 
-from bluepill_sim.board import BluePill
+from bluepill_sim.board import BluePill, BoardSnapshot
 from bluepill_sim.pins import PinDrive
 
 HERE = Path(__file__).resolve().parent / "firmware"
@@ -76,17 +76,25 @@ class Session:
     def run(self, span_ns: int, slice_ns: int = MS) -> str:
         """Run for a while, and return what came out."""
         self.text, self.times = "", []
-        end_ns, end_wall = self.board.now_ns + span_ns, time.monotonic() + 20
+        end_ns, end_wall = self.board.now_ns + span_ns, time.monotonic() + 60
         while self.board.now_ns < end_ns:
             self.board.advance_to(min(self.board.now_ns + slice_ns, end_ns))
             assert time.monotonic() < end_wall
         return self.text
 
 
-@pytest.fixture
-def session(elf: Path) -> Session:
+@pytest.fixture(scope="module")
+def ready(elf: Path) -> tuple[BoardSnapshot, list[str]]:
+    """The board that has printed all its lines and sleeps, and its warnings."""
     session = Session(elf)
-    assert session.run(80 * MS) == EXPECTED
+    assert session.run(50 * MS) == EXPECTED
+    return session.board.snapshot(), session.board.warnings
+
+
+@pytest.fixture
+def session(elf: Path, ready: tuple[BoardSnapshot, list[str]]) -> Session:
+    session = Session(elf)
+    session.board.restore(ready[0])
     return session
 
 
@@ -129,8 +137,8 @@ def test_an_edge_wakes_the_program_within_a_microsecond(session: Session, pin: s
 @pytest.mark.parametrize("slice_ns", [7_000, 100_000, 10 * MS])
 def test_slices_do_not_show(elf: Path, slice_ns: int) -> None:
     first, second = Session(elf), Session(elf)
-    first.run(20 * MS)
-    second.run(20 * MS, slice_ns)
+    first.run(7 * MS)
+    second.run(7 * MS, slice_ns)
     assert (second.text, second.times, second.edges) == (first.text, first.times, first.edges)
 
 
