@@ -80,6 +80,7 @@ class Block:
         "has_it",
         "is_self_loop",
         "last",
+        "late_divides",
         "offsets",
         "sends_event",
         "start",
@@ -99,6 +100,8 @@ class Block:
         self.offsets = offsets
         #: Addresses and divisor registers of its divisions.
         self.divides: tuple[tuple[int, int], ...] = ()
+        #: Those with a store before them in the block, which may be the one that switches the trap on.
+        self.late_divides: tuple[tuple[int, int], ...] = ()
         #: Addresses and base registers of its accesses that must be aligned.
         self.aligned: tuple[tuple[int, int], ...] = ()
         #: Whether it may change what may interrupt (CPS, MSR).
@@ -211,6 +214,8 @@ def _note(block: Block, instructions: list[Instruction]) -> None:
     """Write down what in the block needs the emulator's attention."""
     multiples = (Kind.LOAD_MULTIPLE, Kind.STORE_MULTIPLE, Kind.LOAD_DUAL, Kind.STORE_DUAL)
     block.divides = tuple((i.address, i.base) for i in instructions if i.kind is Kind.DIVIDE and i.base is not None)
+    stores = [i.address for i in instructions if i.kind in {Kind.STORE, Kind.STORE_INDEXED}]
+    block.late_divides = tuple(row for row in block.divides if stores and row[0] > stores[0])
     block.aligned = tuple(
         (i.address, i.base) for i in instructions if i.kind in multiples and i.base is not None and i.base < 13
     )
