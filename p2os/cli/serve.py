@@ -8,12 +8,12 @@ from typing import Annotated
 
 import typer
 
-from p2os.errors import UsageError
 from p2os.parameters import load_parameters
 from p2os.pioneer.body import make_body
 from p2os.pioneer.controller import ControllerSettings, Pioneer, SonarPerSip
 from p2os.pioneer.host import Host
 from p2os.pioneer.world import load_world
+from p2os.profiles import Profile
 from p2os.timing import NS_PER_S, Nanos
 from p2os.transport import listen_url
 
@@ -46,6 +46,9 @@ def serve(
     world: Annotated[str, typer.Option(help="World, or a TOML file.")] = "room",
     body: Annotated[str, typer.Option(help="Physics: bullet, or kinematic (plan view).")] = "bullet",
     seed: Annotated[int, typer.Option(help="Seed of a world that is scattered.")] = 0,
+    firmware: Annotated[
+        Profile, typer.Option(help="Whose packets it sends; some clients of newer robots need ARCOS.")
+    ] = Profile.P2OS,
     all_sonar: Annotated[
         bool, typer.Option("--all-sonar", help="Send every sonar in every packet, not two as a Pioneer 2 does.")
     ] = False,
@@ -54,7 +57,11 @@ def serve(
     """Serve a virtual robot until Ctrl-C."""
     sonar = SonarPerSip.ALL if all_sonar else SonarPerSip.TWO
     pioneer = make_pioneer(
-        robot=robot, world=world, body=body, seed=seed, settings=ControllerSettings(sonar_per_sip=sonar)
+        robot=robot,
+        world=world,
+        body=body,
+        seed=seed,
+        settings=ControllerSettings(profile=firmware, sonar_per_sip=sonar),
     )
     listener = listen_url(port)
     pioneer.on_event = _tell
@@ -68,7 +75,8 @@ def serve(
     note = getattr(pioneer.body, "note", None)
     if note:
         sys.stderr.write(f"note: {note}\n")
-    signal.signal(signal.SIGTERM, _end)
+    for number in (signal.SIGINT, signal.SIGTERM):  # SIGINT too: a shell starts background programs deaf to it
+        signal.signal(number, _end)
     host.run()
 
 
@@ -78,12 +86,11 @@ def make_pioneer(
     """Return a virtual robot standing at the start of a world.
 
     Raises:
-        UsageError: there is no such robot or body.
+        UsageError: there is no such body.
+        ParametersError: there is no such robot.
         WorldError: the world cannot be read.
         MissingDependencyError: the body needs a package that is not installed.
     """
-    if body not in {"bullet", "kinematic"}:
-        raise UsageError(f"there is no body {body!r}", hint="--body bullet or --body kinematic")
     parameters = load_parameters(robot)
     place = load_world(world, seed=seed)
     physical = make_body(body, place, parameters)

@@ -166,6 +166,7 @@ def _config(works: Works) -> None:
 
 HANDLERS: Mapping[int, Handler] = {
     CommandNumber.PULSE: _plain(_nothing),
+    CommandNumber.OPEN: _plain(_nothing),  # of a session that is open already
     CommandNumber.POLLING: _polling,
     CommandNumber.ENABLE: _number(_enable),
     CommandNumber.SETA: _limit(MotionLimits.with_acceleration),

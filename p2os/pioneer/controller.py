@@ -30,6 +30,7 @@ from p2os.connection import (
     CommandReceived,
     Connection,
     ConnectionSettings,
+    ConnectionStats,
     Event,
     Opened,
     Role,
@@ -136,6 +137,11 @@ class Pioneer:
             heading_rad=works.reckoning.heading_rad,
             ignored_commands=self._ignored,
         )
+
+    @property
+    def stats(self) -> ConnectionStats:
+        """Return the counters of the line since its client came: frames, noise, bad checksums."""
+        return self._connection.stats
 
     def receive(self, data: bytes, now: Nanos) -> None:
         """Take bytes that the line has delivered at `now`.
@@ -280,11 +286,9 @@ class Pioneer:
                 self._works.motion.release()
                 self._tell(now, "watchdog revived", "the last set speeds hold again")
             case _:
-                pass  # noise and bad packets are the connection's counters
+                pass  # noise is counted in `stats`
 
     def _open(self, now: Nanos) -> None:
-        if self._sip_due is not None:
-            return
         self._works.disable_motors()
         self._works.reckoning.set_origin()
         self._works.sonar.start_cycle(now)

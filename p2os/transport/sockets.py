@@ -3,6 +3,7 @@
 Nagle's algorithm is off: a frame must not wait for its answer.
 """
 
+import errno
 import socket
 import sys
 
@@ -14,6 +15,11 @@ from p2os.transport.url import TcpUrl
 CONNECT_TIMEOUT_S = 3.0
 #: chosen: a minute of SIPs; a client that is further behind will never catch up.
 BACKLOG_BYTES = 65_536
+
+_LISTEN_HINTS = {
+    errno.EADDRINUSE: "another program listens there; choose another port, or tcp:127.0.0.1:0 for any free one",
+    errno.EACCES: "choose a port above 1023",
+}
 
 
 class SocketTransport:
@@ -118,7 +124,7 @@ def _listening_socket(url: TcpUrl) -> socket.socket:
         listening.setblocking(False)
     except OSError as error:
         listening.close()
-        hint = "another program listens there; choose another port, or tcp:127.0.0.1:0 for any free one"
+        hint = _LISTEN_HINTS.get(error.errno or 0, "listen on this machine: tcp:127.0.0.1:8101")
         raise TransportError(f"cannot listen on {url}: {_reason(error)}", hint=hint) from error
     return listening
 

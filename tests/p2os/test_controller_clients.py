@@ -38,7 +38,7 @@ def replay(robot: Any, capture: Capture) -> list[tuple[int, list[int]]]:
 
 
 def test_aria_connects_drives_and_leaves(make_robot: MakeRobot, aria: Capture) -> None:
-    robot = make_robot(model="p2de")
+    robot = make_robot(model="p2de", dt_ns=10 * NS_PER_MS)
     heard = replay(robot, aria)
     kinds = [kind for _, frames in heard for kind in frames]
     assert kinds[:4] == [0, 1, 2, 0x20], "each sync and CONFIG are answered at once"
@@ -53,7 +53,7 @@ def test_aria_connects_drives_and_leaves(make_robot: MakeRobot, aria: Capture) -
 
 
 def test_player_connects_drives_and_leaves(make_robot: MakeRobot, player: Capture) -> None:
-    robot = make_robot(model="p2de")
+    robot = make_robot(model="p2de", dt_ns=10 * NS_PER_MS)
     heard = replay(robot, player)
     kinds = [kind for _, frames in heard for kind in frames]
     assert kinds[:3] == [0, 1, 2]
@@ -101,7 +101,7 @@ def test_a_client_that_asks_and_closes_in_one_breath_gets_no_answer(robot: Any) 
 
 
 @given(noise=st.lists(st.binary(max_size=40), max_size=20), gap_ms=st.integers(0, 300))
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=30, deadline=None)
 def test_noise_never_moves_raises_or_opens(make_robot: MakeRobot, noise: list[bytes], gap_ms: int) -> None:
     robot = make_robot()
     for data in noise:
@@ -198,7 +198,7 @@ class Machine(RuleBasedStateMachine):
 
     @initialize()
     def begin(self) -> None:
-        self.couple = Couple(self.make(dt_ns=10 * NS_PER_MS))
+        self.couple = Couple(self.make(dt_ns=20 * NS_PER_MS))
         self.robot = self.couple.robot
         self.silent_since = 0
 
@@ -277,4 +277,4 @@ def test_the_robot_keeps_its_safety_rules(make_robot: MakeRobot) -> None:
     class WithRobot(Machine):
         make = staticmethod(make_robot)
 
-    run_state_machine_as_test(WithRobot, settings=settings(max_examples=25, stateful_step_count=25, deadline=None))
+    run_state_machine_as_test(WithRobot, settings=settings(max_examples=15, stateful_step_count=25, deadline=None))

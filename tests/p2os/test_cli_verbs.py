@@ -1,0 +1,400 @@
+"""The verbs ports, doctor, info and serve."""
+
+import json
+import os
+import select
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from p2os.cli import doctor, info, main, ports, serve
+from p2os.cli.main import run
+from p2os.config_packet import ConfigPacket
+from p2os.errors import MissingDependencyError, RemoteProtocolError, TransportError
+from p2os.packets import Identity
+from p2os.sip import SonarReading, StandardSip
+from p2os.timing import NS_PER_MS
+from p2os.transport import HungUpError
+
+PATIENCE_S = 30.0
+COMMAND = str(Path(sys.executable).parent / "p2os")
+Capture = pytest.CaptureFixture[str]
+
+# ports ----------------------------------------------------------------------------------
+
+TWO_PORTS = [
+    {"url": "serial:/dev/ttyS0", "description": "n/a", "hardware": "n/a"},
+    {"url": "serial:/dev/ttyUSB0", "description": "USB Serial", "hardware": "USB VID:PID=1A86:7523"},
+]
+
+
+def test_ports_are_listed_as_urls(monkeypatch: pytest.MonkeyPatch, capsys: Capture) -> None:
+    monkeypatch.setattr(ports, "list_serial_ports", lambda: TWO_PORTS)
+    assert run(["ports"]) == 0
+    captured = capsys.readouterr()
+    assert captured.out == "serial:/dev/ttyS0\nserial:/dev/ttyUSB0  USB Serial, USB VID:PID=1A86:7523\n"
+    assert captured.err == "2 serial ports\n"
+
+
+def test_no_ports_is_a_result_with_a_hint(monkeypatch: pytest.MonkeyPatch, capsys: Capture) -> None:
+    monkeypatch.setattr(ports, "list_serial_ports", list)
+    assert run(["ports"]) == 0
+    captured = capsys.readouterr()
+    assert captured.out == ""
+    assert captured.err.startswith("no serial ports\nhint: ")
+    monkeypatch.setattr(ports, "list_serial_ports", lambda: TWO_PORTS[:1])
+    run(["ports"])
+    assert capsys.readouterr().err == "1 serial port\n"
+
+
+def test_ports_are_listed_for_programs(monkeypatch: pytest.MonkeyPatch, capsys: Capture) -> None:
+    monkeypatch.setattr(ports, "list_serial_ports", lambda: TWO_PORTS)
+    assert run(["ports", "--json"]) == 0
+    assert json.loads(capsys.readouterr().out) == TWO_PORTS
+
+
+# doctor ---------------------------------------------------------------------------------
+
+
+def test_doctor_tells_what_is_there(capsys: Capture) -> None:
+    assert run(["doctor"]) == 0
+    captured = capsys.readouterr()
+    assert "ok       pyserial " in captured.out
+    assert " installed, " in captured.err
+    assert run(["doctor", "--json"]) == 0
+    findings = json.loads(capsys.readouterr().out)
+    assert {"python", "unicorn", "pybullet", "arm-none-eabi-gcc"} <= {finding["name"] for finding in findings}
+
+
+def test_doctor_tells_how_to_get_what_is_missing() -> None:
+    findings = {finding.name: finding for finding in doctor.examine(find_program=lambda _name: None)}
+    compiler = findings["arm-none-eabi-gcc"]
+    assert compiler.found is None
+    assert "missing  arm-none-eabi-gcc" in doctor.line_of(compiler)
+    assert "get it: sudo apt-get install gcc-arm-none-eabi" in doctor.line_of(compiler)
+
+
+def test_doctor_knows_which_pythons_have_no_bullet() -> None:
+    findings = {finding.name: finding for finding in doctor.examine(python=(3, 13))}
+    assert "Python 3.11" in findings["pybullet"].get
+    findings = {finding.name: finding for finding in doctor.examine(python=(3, 10))}
+    assert findings["python"].found is None
+
+
+def test_doctor_fails_when_something_is_missing_that_all_verbs_need(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(doctor, "package_version", lambda name: None if name == "pyserial" else "1.0")
+    assert run(["doctor"]) == 1
+    monkeypatch.setattr(doctor, "package_version", lambda name: None if name == "unicorn" else "1.0")
+    assert run(["doctor"]) == 0
+
+
+def test_a_package_that_is_not_there_has_no_version() -> None:
+    assert doctor.package_version("no-such-package-at-all") is None
+
+
+# info -----------------------------------------------------------------------------------
+
+
+class ToRobot:
+    """A line straight into a virtual robot, with a clock that runs as fast as it is read."""
+
+    description = "loop:robot"
+
+    def __init__(self, robot: Any, *, deaf: bool = False) -> None:
+        self.robot, self.deaf = robot, deaf
+        self.now = robot.now
+        self.hangs_up_at: int | None = None
+        self._read, self._write = os.pipe()
+
+    def clock(self) -> int:
+        self.now += 5 * NS_PER_MS
+        return self.now
+
+    def read(self) -> bytes:
+        if self.hangs_up_at is not None and self.now >= self.hangs_up_at:
+            raise HungUpError("loop:robot closed the connection")
+        self.robot.pioneer.advance_to(self.now)
+        return b"".join(self.robot.pioneer.take_output())
+
+    def write(self, data: bytes) -> None:
+        if self.hangs_up_at is not None and self.now >= self.hangs_up_at:
+            raise HungUpError("loop:robot closed the connection")
+        if data and not self.deaf:
+            self.robot.now = self.now
+            self.robot.send(data)
+            os.write(self._write, b"x")  # readable at once: no wall-clock waiting in this test
+
+    def fileno(self) -> int:
+        os.write(self._write, b"x")
+        return self._read
+
+    def close(self) -> None:
+        os.close(self._read)
+        os.close(self._write)
+
+
+@pytest.fixture
+def line(robot: Any) -> Iterator[ToRobot]:
+    made = ToRobot(robot)
+    yield made
+    made.close()
+
+
+def test_a_robot_tells_who_it_is_and_is_left_closed(line: ToRobot) -> None:
+    found = info.ask(line, clock=line.clock)  # type: ignore[arg-type]
+    assert found.identity == Identity("Virtual", "Pioneer", "p2dx")
+    assert found.config is not None
+    assert found.sip.raw_battery == 126
+    assert not line.robot.pioneer.state.open
+    assert "motors" not in line.robot.told()
+
+
+def test_a_robot_still_streaming_to_somebody_is_stopped_first(line: ToRobot) -> None:
+    line.robot.open()
+    line.robot.say(11, 300)
+    line.robot.run(500)
+    line.now = line.robot.now
+    assert info.ask(line, clock=line.clock).identity.subclass == "p2dx"  # type: ignore[arg-type]
+    assert line.robot.told().count("closed") == 2
+
+
+def test_a_robot_that_knows_no_config_still_answers(line: ToRobot, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("p2os.pioneer.controller.apply", lambda *_: "unknown")
+    assert info.ask(line, clock=line.clock).config is None  # type: ignore[arg-type]
+
+
+def test_nobody_answering_is_an_error_with_a_hint(robot: Any) -> None:
+    line = ToRobot(robot, deaf=True)
+    with pytest.raises(RemoteProtocolError, match="no robot on loop:robot: no answer") as caught:
+        info.ask(line, clock=line.clock)  # type: ignore[arg-type]
+    assert "p2os serve" in str(caught.value.hint)
+    line.description = "serial:/dev/ttyUSB0?baud=9600"
+    with pytest.raises(RemoteProtocolError) as caught:
+        info.ask(line, clock=line.clock)  # type: ignore[arg-type]
+    assert "speed" in str(caught.value.hint)
+    line.close()
+
+
+def test_a_robot_that_synchronises_but_sends_nothing_is_an_error(
+    line: ToRobot, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(type(line.robot.pioneer), "_next_due", lambda _self: None)
+    with pytest.raises(RemoteProtocolError, match="no robot on loop:robot: no packet"):
+        info.ask(line, clock=line.clock)  # type: ignore[arg-type]
+
+
+def test_a_robot_that_takes_for_ever_is_an_error(line: ToRobot, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(info, "LONGEST_NS", 50 * NS_PER_MS)
+    with pytest.raises(RemoteProtocolError, match="sends no packets"):
+        info.ask(line, clock=line.clock)  # type: ignore[arg-type]
+
+
+def test_a_line_that_hangs_up_is_an_error_with_a_hint(line: ToRobot) -> None:
+    line.hangs_up_at = 50 * NS_PER_MS
+    with pytest.raises(TransportError, match="closed the connection") as caught:
+        info.ask(line, clock=line.clock)  # type: ignore[arg-type]
+    assert "another program" in str(caught.value.hint)
+
+
+@pytest.fixture
+def told(monkeypatch: pytest.MonkeyPatch) -> Callable[..., None]:
+    """Let `p2os info` find a robot that says this."""
+
+    class Closing:
+        def close(self) -> None:
+            pass
+
+    def tell(identity: Identity, sip: StandardSip, config: ConfigPacket | None) -> None:
+        monkeypatch.setattr(info, "open_url", lambda _url: Closing())
+        monkeypatch.setattr(info, "ask", lambda _transport: info.RobotInfo(identity=identity, sip=sip, config=config))
+
+    return tell
+
+
+SIP = StandardSip(
+    raw_x=32767, raw_y=1000, raw_heading=1024, raw_left_velocity=100, raw_right_velocity=-100, raw_battery=130,
+    stall_left=True, stall_right=True, sonar=(SonarReading(3, 1000),),
+)  # fmt: skip
+
+
+def test_info_is_printed_with_units(told: Callable[..., None], capsys: Capture) -> None:
+    told(Identity("", "Pioneer", "p2dx"), SIP, ConfigPacket(subclass="p2dx", watchdog=2000, fields_sent=19))
+    assert run(["info", "tcp:x"]) == 0
+    out = capsys.readouterr().out
+    for line in (
+        "name      (none)",
+        "model     p2dx (Pioneer 2-DX)",
+        "position  x -0.001 m, y 0.840 m, heading 90.0 deg",
+        "wheels    left 0.100 m/s, right -0.100 m/s",
+        "stalled   left and right",
+        "battery   13.0 V",
+        "sonar     3: 0.268 m",
+        "config    watchdog          2000 ms",
+    ):
+        assert f"{line}\n" in out
+    assert "stallval" not in out, "fields that were not sent are not shown"
+
+
+def test_info_of_an_unknown_model_says_whose_units_it_uses(told: Callable[..., None], capsys: Capture) -> None:
+    told(Identity("Box", "Pioneer", "box9000"), StandardSip(), None)
+    assert run(["info", "tcp:x"]) == 0
+    out = capsys.readouterr().out
+    assert "model     box9000 (unknown model, units of a Pioneer 2-DX)\n" in out
+    assert "sonar     off\n" in out
+    assert "stalled   none\n" in out
+    assert "config    the robot does not tell it\n" in out
+
+
+def test_info_is_printed_for_programs(told: Callable[..., None], capsys: Capture) -> None:
+    told(Identity("Wilma", "Pioneer", "p2dx"), SIP, ConfigPacket(subclass="p2dx", fields_sent=3))
+    assert run(["info", "tcp:x", "--json"]) == 0
+    plain = json.loads(capsys.readouterr().out)
+    assert plain["name"] == "Wilma"
+    assert plain["sip"]["x_m"] == -0.00084
+    assert plain["sip"]["sonar_m"] == [[3, 0.268]]
+    assert plain["config"] == {"robot_class": "Pioneer", "subclass": "p2dx", "serial": ""}
+    told(Identity("Wilma", "Pioneer", "p2dx"), SIP, None)
+    assert run(["info", "tcp:x", "--json"]) == 0
+    assert json.loads(capsys.readouterr().out)["config"] is None
+
+
+# serve ----------------------------------------------------------------------------------
+
+
+class Serving:
+    """`p2os serve` as a process of its own."""
+
+    def __init__(self, *words: str) -> None:
+        self.process = subprocess.Popen(
+            [COMMAND, "serve", "--body", "kinematic", "--json", *words], stdout=subprocess.PIPE, stderr=subprocess.PIPE,
+            text=True,
+        )  # fmt: skip
+        assert self.process.stdout is not None
+        assert select.select([self.process.stdout], [], [], PATIENCE_S)[0], "it never started"
+        self.start = json.loads(self.process.stdout.readline())
+
+    def end(self, number: int = signal.SIGINT) -> tuple[int, str]:
+        self.process.send_signal(number)
+        _, err = self.process.communicate(timeout=PATIENCE_S)
+        return self.process.returncode, err
+
+
+@pytest.fixture
+def serving(tmp_path: Path) -> Iterator[Callable[..., Serving]]:
+    started: list[Serving] = []
+
+    def begin(*words: str) -> Serving:
+        started.append(Serving(*words))
+        return started[-1]
+
+    yield begin
+    for each in started:
+        if each.process.poll() is None:
+            each.process.kill()
+            each.process.communicate(timeout=PATIENCE_S)
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_serve_says_where_it_is_serves_and_ends_cleanly(serving: Callable[..., Serving], number: int) -> None:
+    served = serving("--port", "tcp:127.0.0.1:0", "--world", "arena", "--seed", "7", "--firmware", "ARCOS")
+    assert served.start["world"] == "arena"
+    asked = subprocess.run(
+        [COMMAND, "info", served.start["url"], "--json"], capture_output=True, text=True, timeout=PATIENCE_S, check=True
+    )
+    assert json.loads(asked.stdout)["subclass"] == "p2dx"
+    code, err = served.end(number)
+    assert code == 130
+    assert "client connected: tcp:127.0.0.1:" in err
+    assert "opened" in err
+    assert "client gone" in err
+    assert "Traceback" not in err
+
+
+def test_serve_on_a_terminal_removes_its_link(serving: Callable[..., Serving], tmp_path: Path) -> None:
+    link = tmp_path / "robot"
+    served = serving("--port", f"pty:{link}", "--all-sonar")
+    assert link.is_symlink()
+    asked = subprocess.run(
+        [COMMAND, "info", f"serial:{link}", "--json"], capture_output=True, text=True, timeout=PATIENCE_S, check=True
+    )
+    assert len(json.loads(asked.stdout)["sip"]["sonar_m"]) == 8
+    assert served.end()[0] == 130
+    assert not link.is_symlink()
+
+
+def test_serve_costs_next_to_nothing_while_it_waits(serving: Callable[..., Serving]) -> None:
+    served = serving("--port", "tcp:127.0.0.1:0")
+
+    def used_s() -> float:
+        fields = Path(f"/proc/{served.process.pid}/stat").read_text().rpartition(")")[2].split()
+        return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
+
+    time.sleep(0.3)
+    before = used_s()
+    time.sleep(1.0)
+    assert used_s() - before <= 0.05
+    served.end()
+
+
+def test_serve_refuses_a_port_that_is_taken(serving: Callable[..., Serving], capsys: Capture) -> None:
+    served = serving("--port", "tcp:127.0.0.1:0")
+    assert run(["serve", "--body", "kinematic", "--port", served.start["url"]]) == 1
+    assert "another program listens there" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("words", "code", "message"),
+    [
+        (["--body", "jelly"], 2, "p2os: no body 'jelly'"),
+        (["--world", "nowhere"], 2, "p2os: no world 'nowhere'"),
+        (["--robot", "r2d2"], 2, "p2os: no robot model 'r2d2'"),
+        (["--port", "COM3", "--body", "kinematic"], 2, "p2os: 'COM3' is not a port URL"),
+        (["--port", "serial:COM3", "--body", "kinematic"], 1, "p2os: cannot open COM3: no such port"),
+        (["--port", "loop:x", "--body", "kinematic"], 2, "p2os: loop:x exists only inside one program"),
+        (["--firmware", "PSOS"], 2, "p2os: Invalid value for '--firmware'"),
+    ],
+)
+def test_serve_refuses_what_cannot_be(words: list[str], code: int, message: str, capsys: Capture) -> None:
+    assert run(["serve", *words]) == code
+    captured = capsys.readouterr()
+    assert captured.out == ""
+    lines = captured.err.splitlines()
+    assert lines[0].startswith(message)
+    assert lines[1].startswith("hint: ")
+
+
+def test_serve_without_pybullet_says_how_to_get_it(monkeypatch: pytest.MonkeyPatch, capsys: Capture) -> None:
+    def missing(*_: object) -> None:
+        raise MissingDependencyError("the bullet body needs pybullet", hint="pip install 'p2os[bullet]'")
+
+    monkeypatch.setattr(serve, "make_body", missing)
+    assert run(["serve"]) == 2
+    assert capsys.readouterr().err == "p2os: the bullet body needs pybullet\nhint: pip install 'p2os[bullet]'\n"
+
+
+def test_a_served_robot_tells_its_host_in_the_same_process(monkeypatch: pytest.MonkeyPatch, capsys: Capture) -> None:
+    class Ending:
+        def __init__(self, pioneer: Any, _listener: object, **_: object) -> None:
+            self.pioneer = pioneer
+
+        def run(self) -> None:
+            self.pioneer.on_event(1_500_000_000, "opened", "")
+            self.pioneer.on_event(1_600_000_000, "motors", "on")
+            signal.raise_signal(signal.SIGTERM)
+
+    monkeypatch.setattr(serve, "Host", Ending)
+    before = signal.getsignal(signal.SIGINT), signal.getsignal(signal.SIGTERM)
+    try:
+        assert main.run(["serve", "--body", "kinematic", "--port", "tcp:127.0.0.1:0"]) == 130
+    finally:
+        signal.signal(signal.SIGINT, before[0])
+        signal.signal(signal.SIGTERM, before[1])
+    captured = capsys.readouterr()
+    assert "p2dx in room, kinematic body; Ctrl-C ends" in captured.out
+    assert "     1.500 s  opened\n     1.600 s  motors: on\n" in captured.err
