@@ -78,6 +78,7 @@ class BluePill:
         memory = Memory()
         for address, data in self.image.segments:
             memory.load_flash(address - FLASH_BASE, data)
+        memory.seal()
         self._chip: Chip | None = None
         self._chip = chip = Chip(memory, self.image.vector_table, self._warn, self._fault)
         self._activity = Activity()
@@ -236,6 +237,10 @@ class BluePill:
             self.on_warning(text)
 
     def _fault(self, kind: FaultKind, pc: int, address: int | None, is_lockup: bool) -> None:
+        if kind is FaultKind.MASKED_SVC and not is_lockup:
+            # Some systems live on it (NuttX): its HardFault handler serves the call.
+            self._warn("SVC while its priority is masked becomes a HardFault", "masked SVC", pc)
+            return
         if self.fault is not None:
             self.fault = replace(self.fault, is_lockup=self.fault.is_lockup or is_lockup)
             return

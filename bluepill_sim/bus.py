@@ -40,7 +40,7 @@ class PeripheralBus:
         """Return what the core reads."""
         part = self._pages.get(offset >> _PAGE_SHIFT)
         if part is None or not self._rcc.is_clocked(part.name):
-            self._refuse(part, "read", offset)
+            self._refuse(part, offset, "read of")
             return 0
         return part.read(PERIPHERAL_BASE + offset - part.base, size)
 
@@ -48,7 +48,7 @@ class PeripheralBus:
         """Take what the core writes."""
         part = self._pages.get(offset >> _PAGE_SHIFT)
         if part is None or not self._rcc.is_clocked(part.name):
-            self._refuse(part, "write", offset)
+            self._refuse(part, offset, f"write of {value:#x} to")
             return
         part.write(PERIPHERAL_BASE + offset - part.base, size, value)
 
@@ -65,17 +65,17 @@ class PeripheralBus:
         word = self.read(offset >> 5 & ~3, 4)
         self.write(offset >> 5 & ~3, 4, word | bit if value & 1 else word & ~bit)
 
-    def _refuse(self, part: Peripheral | None, what: str, offset: int) -> None:
+    def _refuse(self, part: Peripheral | None, offset: int, what: str) -> None:
         """Warn of an access to nothing: it reads 0, and a write is lost."""
         address = PERIPHERAL_BASE + offset
         if part is None:
             name = name_at(address)
             text = f"{name} is not modelled" if name else "no peripheral is here"
-            self._chip.warn(f"{text} ({what} of {address:#010x})", once=f"unmodelled:{name or address & ~0x3FF:}")
+            self._chip.warn(f"{text} ({what} {address:#010x})", once=f"unmodelled:{name or address & ~0x3FF:}")
             return
         gate = CLOCK_GATES[part.name]
         self._chip.warn(
-            f"{part.name} has no clock: RCC_{gate.register} bit {gate.bit} is 0 ({what} of {address:#010x})",
+            f"{part.name} has no clock: RCC_{gate.register} bit {gate.bit} is 0 ({what} {address:#010x})",
             once=f"clock:{part.name}",
         )
 

@@ -230,7 +230,9 @@ class Chip:
         if self._reset_requested:
             self.reset(ResetCause.SOFTWARE)
         cycle = self.engine.cycle
-        self.processor.systick.advance_to(cycle)
+        systick = self.processor.systick
+        if systick.next_cycle is not None and cycle >= systick.next_cycle:
+            systick.advance_to(cycle)
         now = self._clock.ns_of(cycle)
         while (due := self._next_peripheral_due()) is not None and due <= now:
             self._event_ns = due
@@ -239,6 +241,8 @@ class Chip:
                 self.parts.advance_to(due)
             finally:
                 self._event_ns = None
+            if self._next_peripheral_due() == due:
+                raise RuntimeError(f"a peripheral does not get past its deadline of {due} ns")
 
     def _next_peripheral_due(self) -> Nanos | None:
         if self._deadlines_moved:

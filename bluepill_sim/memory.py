@@ -28,6 +28,9 @@ _SYSTEM_BYTES = 0xC00
 #: Chosen: a unique id that says what it is.
 _UNIQUE_ID = b"P2OS-BLUEPIL"
 
+#: SRAM, and the flash if it differs from the program.
+MemorySnapshot = tuple[bytes, bytes | None]
+
 _CharBuffer = ctypes.Array[ctypes.c_char]
 
 
@@ -55,6 +58,7 @@ class Memory:
         _place(system, FLASH_SIZE_REGISTER, struct.pack("<H", FLASH_BYTES // 1024))
         _place(system, UNIQUE_ID_REGISTER, _UNIQUE_ID)
         self.system = ctypes.create_string_buffer(bytes(system), _SYSTEM_BYTES)
+        self._program = self.flash.raw
         #: Where each memory appears; the flash twice.
         self.regions = (
             Region(SRAM_BASE, self.sram, is_writable=True),
@@ -92,13 +96,19 @@ class Memory:
         """Return bytes of the flash array."""
         return ctypes.string_at(ctypes.addressof(self.flash) + offset, size)
 
-    def snapshot(self) -> tuple[bytes, bytes]:
-        """Return flash and SRAM."""
-        return self.flash.raw, self.sram.raw
+    def seal(self) -> None:
+        """Take the flash as it is now for the program that snapshots need not carry."""
+        self._program = self.flash.raw
 
-    def restore(self, snapshot: tuple[bytes, bytes]) -> bool:
+    def snapshot(self) -> MemorySnapshot:
+        """Return SRAM, and the flash where it is no longer the program that was sealed."""
+        flash = self.flash.raw
+        return self.sram.raw, None if flash == self._program else flash
+
+    def restore(self, snapshot: MemorySnapshot) -> bool:
         """Put back what `snapshot` returned; return whether the flash has changed by that."""
-        flash, sram = snapshot
+        sram, changed_flash = snapshot
+        flash = changed_flash or self._program
         ctypes.memmove(self.sram, sram, len(sram))
         if flash == self.flash.raw:
             return False

@@ -90,13 +90,16 @@ class Nvic:
 
     def deliverable(self) -> int:
         """Return the pending exceptions that are enabled, as a mask over exception numbers."""
-        return self.pending & (self.enabled << FIRST_IRQ | _SYSTEM_EXCEPTIONS)
+        pending = self.pending
+        return pending and pending & (self.enabled << FIRST_IRQ | _SYSTEM_EXCEPTIONS)
 
     def first_pending(self) -> int | None:
         """Return the enabled pending exception of the highest priority; the lowest number among equals."""
         candidates = self.deliverable()
         if not candidates:
             return None
+        if not candidates & candidates - 1:
+            return candidates.bit_length() - 1
         return min(_numbers(candidates), key=lambda number: (self.priority(number), number))
 
     def priority(self, number: int) -> int:

@@ -153,9 +153,12 @@ class Processor:
         if self.sleep is not Sleep.AWAKE and not self._wakes():
             self.engine.cycle = max(self.engine.cycle, stop_at)
             return
-        if self._deliver():
-            return
-        self.engine.stops_after_mask_change = self.nvic.deliverable() != 0
+        if self.nvic.pending:
+            if self._deliver():
+                return
+            self.engine.stops_after_mask_change = self.nvic.deliverable() != 0
+        else:
+            self.engine.stops_after_mask_change = False
         halt = self.engine.run(stop_at)
         if halt.kind is not HaltKind.BORDER:
             self._act_on(halt)
@@ -372,7 +375,7 @@ class Processor:
         if not self.nvic.can_preempt(number, priority):
             self._lock_up(kind, pc, address)
             return
-        if number == HARD_FAULT and kind is not FaultKind.MASKED_SVC:
+        if number == HARD_FAULT:
             self._report(kind, pc, address, is_lockup=False)
         self._enter(number, pc)
 

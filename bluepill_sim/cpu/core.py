@@ -10,6 +10,7 @@ Invariant: whatever the library keeps a pointer to lives as long as this object.
 
 import ctypes
 import weakref
+from array import array
 from collections.abc import Callable
 from typing import TypeVar
 
@@ -28,12 +29,18 @@ _CONTROL_DROP_ALL_CODE = 10 | 1 << 30
 #: No instruction stands at an odd address, so a run never ends there.
 _NOWHERE = 0xFFFF_FFFF
 
+#: Size, mode, architecture, level, flag and two pointers come before the registers of a context (uc_priv.h).
+_CONTEXT_HEADER_BYTES = 24 + 2 * ctypes.sizeof(ctypes.c_void_p)
+
 #: Kinds of bad accesses.
 WRITE_UNMAPPED, FETCH_UNMAPPED, WRITE_PROTECTED, FETCH_PROTECTED = 20, 21, 22, 24
 
 #: (uc, offset, size, user) and (uc, offset, size, value, user): accesses to an I/O region.
 RawRead = Callable[[int, int, int, int], int]
 RawWrite = Callable[[int, int, int, int, int], None]
+
+#: (index, word) of each word of the registers that differs from a new core's.
+CoreSnapshot = tuple[tuple[int, int], ...]
 
 _Result = TypeVar("_Result")
 
@@ -56,9 +63,16 @@ class Core:
         handle = ctypes.c_void_p()
         self._check(library.open(_ARCHITECTURE_ARM, _MODE_THUMB, ctypes.addressof(handle)), "open")
         self._handle = handle.value or 0
-        weakref.finalize(self, library.close, self._handle)
         self._control(_CONTROL_MODEL, ctypes.c_int(_MODEL_CORTEX_M3))
+        context = ctypes.c_void_p()
+        self._check(library.context_alloc(self._handle, ctypes.addressof(context)), "allocate a context")
+        self._context = context.value or 0
+        #: The registers of a new core.
+        self._new = self._context_words()
         self._keep: list[object] = []
+        #: Apart from the callbacks, which refer back to this object: these must outlive the library's handle.
+        self._buffers: list[object] = []
+        weakref.finalize(self, _close, library, self._handle, self._context, self._buffers)
         self.registers = RegisterFile(library, self._handle)
 
     # Running.
@@ -77,7 +91,7 @@ class Core:
         """Map a buffer; `protection` is made of the letters r, w and x."""
         letters = {"r": _PROTECTION_READ, "w": _PROTECTION_WRITE, "x": _PROTECTION_EXECUTE}
         bits = sum(letters[letter] for letter in protection)
-        self._keep.append(buffer)
+        self._buffers.append(buffer)
         self._check(
             self._library.map_pointer(self._handle, address, len(buffer), bits, ctypes.addressof(buffer)),
             f"map {address:#010x}",
@@ -136,20 +150,28 @@ class Core:
 
     # Contexts.
 
-    def save(self) -> bytes:
-        """Return all registers, hidden ones included, as the library keeps them."""
-        context = self._allocate_context()
-        self._check(self._library.context_save(self._handle, context), "save")
-        data = ctypes.string_at(context, self._library.context_size(self._handle))
-        self._library.context_free(context)
-        return data
+    def save(self) -> CoreSnapshot:
+        """Return all registers, hidden ones included: what differs from a new core, as (index, word).
 
-    def load(self, data: bytes) -> None:
-        """Put back what `save` returned, in this process or another."""
-        context = self._allocate_context()
-        ctypes.memmove(context, data, len(data))
-        self._check(self._library.context_restore(self._handle, context), "restore")
-        self._library.context_free(context)
+        What the library calls a context holds pointers too, which must not go to
+        another machine: they never change, and so are never among the differences.
+        """
+        words = self._context_words()
+        return tuple((n, word) for n, (word, new) in enumerate(zip(words, self._new, strict=True)) if word != new)
+
+    def load(self, snapshot: CoreSnapshot) -> None:
+        """Put back what `save` returned, in this process or another with the same library."""
+        words = self._new[:]
+        for index, word in snapshot:
+            words[index] = word
+        data = words.tobytes()
+        ctypes.memmove(self._context + _CONTEXT_HEADER_BYTES, data, len(data))
+        self._check(self._library.context_restore(self._handle, self._context), "restore")
+
+    def _context_words(self) -> "array[int]":
+        self._check(self._library.context_save(self._handle, self._context), "save")
+        size = self._library.context_size(self._handle) - _CONTEXT_HEADER_BYTES
+        return array("I", ctypes.string_at(self._context + _CONTEXT_HEADER_BYTES, size))
 
     # Plumbing.
 
@@ -179,12 +201,14 @@ class Core:
         number = ctypes.c_int(item - (1 << 32) if item >> 31 else item)
         self._check(self._library.control(ctypes.c_void_p(self._handle), number, *arguments), "control")
 
-    def _allocate_context(self) -> int:
-        context = ctypes.c_void_p()
-        self._check(self._library.context_alloc(self._handle, ctypes.addressof(context)), "allocate")
-        return context.value or 0
-
     @staticmethod
     def _check(error: int, what: str) -> None:
         if error:
             raise RuntimeError(f"Unicorn cannot {what}: error {error}")
+
+
+def _close(library: binding.Library, handle: int, context: int, buffers: list[object]) -> None:
+    """Free a machine whose `Core` is gone."""
+    library.context_free(context)
+    library.close(handle)
+    buffers.clear()

@@ -21,7 +21,7 @@ from collections.abc import Callable
 
 from bluepill_sim.block_cost import NO_BLOCK, Block
 from bluepill_sim.cpu import core
-from bluepill_sim.cpu.core import Core
+from bluepill_sim.cpu.core import Core, CoreSnapshot
 from bluepill_sim.cpu.halt import Halt, HaltKind
 from bluepill_sim.cpu.registers import GENERAL, Register
 from bluepill_sim.thumb import Kind
@@ -59,8 +59,8 @@ _T_BIT = 1 << 24
 #: ITSTATE in CPSR.
 _IT_BITS = 0x0600_FC00
 
-#: The library's context, cycle, PC, T bit, whether exclusive accesses are used.
-EngineSnapshot = tuple[bytes, int, int, bool, bool]
+#: Registers, cycle, PC, T bit, whether exclusive accesses are used.
+EngineSnapshot = tuple[CoreSnapshot, int, int, bool, bool]
 
 
 class Engine:
@@ -95,6 +95,7 @@ class Engine:
         self._writable_code: dict[int, tuple[bytes, Block]] = {}
         #: First address, address after, place in the host's memory.
         self._writable: list[tuple[int, int, int]] = []
+        self._ran_writable = False
         self._uses_exclusive = False
         # Traps: what is wanted, hooks that exist, blocks that have them, blocks to be translated again.
         self._traps_division = self._traps_unaligned = self._traps_changed = self._watches_alignment = False
@@ -218,10 +219,10 @@ class Engine:
 
     def restore(self, snapshot: EngineSnapshot) -> None:
         """Put back what `snapshot` returned; memory is the caller's business, before this call."""
-        context, self.cycle, self.pc, self.is_thumb, self._uses_exclusive = snapshot
-        self._core.load(context)
+        registers, self.cycle, self.pc, self.is_thumb, self._uses_exclusive = snapshot
+        self._core.load(registers)
         self.block = NO_BLOCK
-        if self._writable_code:
+        if self._ran_writable:
             self._core.drop_all_code()
             self._writable_code.clear()
 
@@ -273,6 +274,7 @@ class Engine:
         block = self._measure(address, size)
         self._uses_exclusive |= block.has_exclusive
         if code is not None:
+            self._ran_writable = True
             self._writable_code[address] = code, block
         elif block.needs_attention:
             self._special[address] = block
@@ -372,7 +374,11 @@ class Engine:
     # Traps.
 
     def _traps_of(self, block: Block) -> tuple[tuple[int, int], ...]:
-        return block.aligned + block.divides if self._traps_division else block.aligned
+        return block.aligned + self._divides_of(block)
+
+    def _divides_of(self, block: Block) -> tuple[tuple[int, int], ...]:
+        """Return the divisions to look at: all while the trap is on, else those that may come just after its switch."""
+        return block.divides if self._traps_division else block.late_divides
 
     def _change_traps(self) -> None:
         """Look at every block again, with the traps now chosen."""
@@ -395,7 +401,7 @@ class Engine:
             self._armed.add((block.start, self._traps_of(block)))
             for address, register in block.aligned:
                 self._trap(address, register, HaltKind.UNALIGNED)
-            for address, register in block.divides if self._traps_division else ():
+            for address, register in self._divides_of(block):
                 self._trap(address, register, HaltKind.DIVIDE_BY_ZERO)
             self._core.drop_code(block.start, block.end - block.start)
         self._stale.clear()

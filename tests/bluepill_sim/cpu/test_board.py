@@ -94,6 +94,17 @@ def test_a_snapshot_keeps_programs_in_sram_and_in_flash(boot) -> None:
     assert machine.board.read_memory(0x0800_9000, 2) == b"\xff\xff"
 
 
+def test_a_snapshot_keeps_an_exclusive_reservation(boot) -> None:
+    """Taken between LDREX and STREX, at each border of the program: the store succeeds on the other board too."""
+    source = "mov32 r1, #0x20000800\nldrex r2, [r1]\nb on\non: strex r0, r2, [r1]\nlog r0\nb stop"
+    machine = boot(source)
+    for _ in range(6):
+        machine.board.advance_to(machine.board.now_ns + 1)
+        other = boot(source)
+        other.board.restore(machine.board.snapshot())
+        assert other.run(20).log == [0]
+
+
 def test_something_else_is_no_snapshot(boot) -> None:
     with pytest.raises(TypeError, match="not a BluePill's snapshot: int"):
         boot("nop").board.restore(5)

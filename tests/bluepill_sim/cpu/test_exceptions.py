@@ -106,6 +106,7 @@ def test_a_masked_svc_becomes_a_hard_fault_that_is_no_fault_of_the_firmware(run)
     )
     assert machine.log == [machine.label("after"), 2]
     assert machine.board.fault is None
+    assert len(machine.board.warnings) == 1
 
 
 def test_an_svc_masked_by_basepri_becomes_a_hard_fault(run) -> None:
@@ -288,6 +289,23 @@ pendsv: log #1
         {14: "pendsv"},
     )
     assert machine.log == [1, 2, 0]
+
+
+@pytest.mark.parametrize("pad", range(58, 68))
+def test_an_it_block_across_a_page_border_survives_stops_and_interrupts(boot, pad: int) -> None:
+    """Unicorn cuts blocks at 1 KiB, maybe inside an IT block: stop at every border, with a tick each 7 µs."""
+    source = (
+        store(0xE000E014, 55)
+        + store(0xE000E018, 0)
+        + store(0xE000E010, 7)
+        + "movs r5, #0\nmovs r6, #0\nmovs r4, #100\nb go\n"
+        + "nop\n" * (pad + 260)
+        + "go: cmp r4, #0\nitete ne\n.half 0x3501\n.half 0x3601\n.half 0x3502\n.half 0x3601\n"
+        "subs r4, #1\nbne go\nmov r0, r5\nlog r0\nmov r0, r6\nlog r0\nb stop\n"
+        "tick: movs r0, #0\ncmp r0, #0\nbx lr"
+    )
+    machine = boot(source, {15: "tick"}).run(2000, slice_us=0.001 * 125)
+    assert machine.log == [300, 0]
 
 
 def test_a_thread_on_psp_without_privilege_is_interrupted_and_goes_on(run) -> None:

@@ -124,7 +124,7 @@ def test_division_by_zero_gives_zero_while_the_trap_is_off_and_traps_once_it_is_
 
 
 def test_a_division_that_follows_the_switch_in_its_own_block_traps(boot) -> None:
-    machine = boot("movs r2, #0\n" + store(CCR, DIV_0_TRP) + "bad: sdiv r0, r1, r2\nlog r0").run(50)
+    machine = boot("movs r3, #0\n" + store(CCR, DIV_0_TRP) + "bad: sdiv r0, r1, r3\nlog r0").run(50)
     assert machine.board.fault.kind is FaultKind.DIVIDE_BY_ZERO
     assert machine.board.fault.pc == machine.label("bad")
 

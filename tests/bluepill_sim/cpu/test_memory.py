@@ -109,7 +109,7 @@ def test_a_peripheral_without_its_clock_reads_zero_and_is_named_once(run) -> Non
     machine = run(store(GPIOA_ODR, 1) + load(GPIOA_ODR) + store(RCC_APB2ENR, 4) + load(GPIOA_ODR))
     assert machine.log == [0, 0]
     (warning,) = machine.board.warnings
-    assert "GPIOA has no clock: RCC_APB2ENR bit 2 is 0 (write of 0x4001080c) at start+" in warning
+    assert "GPIOA has no clock: RCC_APB2ENR bit 2 is 0 (write of 0x1 to 0x4001080c) at start+" in warning
 
 
 def test_what_is_not_modelled_is_named_once_and_reads_zero(run) -> None:
@@ -117,7 +117,7 @@ def test_what_is_not_modelled_is_named_once_and_reads_zero(run) -> None:
     assert machine.log == [0, 0, 0]
     texts = machine.board.warnings
     assert [text.split(" at ")[0] for text in texts] == [
-        "TIM1 is not modelled (write of 0x40012c00)",
+        "TIM1 is not modelled (write of 0x1 to 0x40012c00)",
         "no peripheral is here (read of 0x40023c00)",
         "0xe0000000 of the system control space is not modelled",
         "0xe0000e00 of the system control space is not modelled",
