@@ -253,7 +253,8 @@ static void note_ground(struct dodge *dodge, int32_t way)
 
 void dodge_start(struct dodge *dodge)
 {
-    *dodge = (struct dodge){.state = DODGE_CRUISE, .turn_side = +1};
+    /* No turn has been yet: the first one is free to choose its side. */
+    *dodge = (struct dodge){.state = DODGE_CRUISE, .turn_side = +1, .turn_way = -SOON_WAY};
 }
 
 struct dodge_command dodge_tick(struct dodge *dodge, uint8_t sensors, int32_t left_steps, int32_t right_steps)

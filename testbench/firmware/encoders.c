@@ -14,15 +14,14 @@
 #include "uart.h"
 
 #define LEGS 4
-#define LEG_SPEED 2    /* chosen: 125 mm/s */
-#define CORNER_SPEED 1 /* chosen: slow, 20 degrees/s, for precision */
+#define LEG_SPEED 2              /* chosen: 125 mm/s */
+#define CORNER_SPEED 1           /* chosen: slow, 20 degrees/s, for precision */
 #define SETTLE_TICKS TICKS_PER_S /* line and ramp take 0.7 s at most from LEG_SPEED */
 
 /* Ways are in micrometres. */
-#define STEP_UM 64795            /* 165 mm x pi / 8 */
-#define LEG_UM (8 * STEP_UM)     /* one turn of the wheels */
-#define CORNER_DIFFERENCE_UM 560774 /* TRACK_MM x pi/2: what the wheels differ by over 90 degrees */
-#define SPEED_UM_PER_TICK 625    /* 62.5 mm/s a motor step */
+#define LEG_UM (8 * STEP_UM)        /* one turn of the wheels */
+#define CORNER_DIFFERENCE_UM 560774 /* a track of 357 mm x pi/2: what the wheels differ by over 90 degrees */
+#define SPEED_UM_PER_TICK 625       /* 62.5 mm/s a motor step */
 
 struct place {
     int32_t steps;  /* the step it was in at the last tick */

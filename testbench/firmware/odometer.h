@@ -5,8 +5,7 @@
 #include <stdint.h>
 
 #define STEPS_PER_TURN 8
-#define STEP_MM 64.8 /* a wheel of 165 mm rolls 518 mm a turn */
-#define TRACK_MM 357 /* between the wheels, as the robot's own controller has it */
+#define STEP_UM 64795 /* a wheel of 165 mm: x pi / 8 */
 
 struct wheel {
     int32_t steps; /* since odometer_start, forward positive */
@@ -22,7 +21,7 @@ struct odometer {
 void odometer_start(struct odometer *odometer);
 
 /* To be called each tick: a wheel may turn less than half a turn between two
- * calls (it takes 64.8 mm / 250 mm/s = 259 ms for one step at top speed). */
+ * calls (one step takes 259 ms at top speed). */
 void odometer_update(struct odometer *odometer);
 
 #endif
