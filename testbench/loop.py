@@ -89,6 +89,7 @@ class RunLoop:
         self._end: Nanos = 0
         self._edges: list[Nanos] = []
         self._rounds = 0
+        self._deadlines: list[Nanos] = []
 
     def note_edge(self, at: Nanos) -> None:
         """Have the followers brought to `at` as well: a watched net has changed there."""
@@ -142,15 +143,15 @@ class RunLoop:
         return now
 
     def _next_due(self) -> Nanos:
+        """Return the earliest deadline, and note everybody's."""
         due = self._edges[0] if self._edges else NEVER
-        for follower in self.followers:
-            deadline = follower.next_deadline()
-            if deadline is not None and deadline < due:
-                due = deadline
-        return due
+        noted = self._deadlines = [
+            NEVER if at is None else at for at in [part.next_deadline() for part in self.followers]
+        ]
+        return min(due, *noted) if noted else due
 
     def _follow(self, due: Nanos) -> None:
-        """Bring every follower to `due`."""
+        """Bring those who are due to `due`, as noted; at a watched edge everybody."""
         self._rounds = self._rounds + 1 if due <= self.now else 0
         if self._rounds > MOST_ROUNDS:
             late = [type(part).__name__ for part in self.followers if (part.next_deadline() or NEVER) <= due]
@@ -159,7 +160,6 @@ class RunLoop:
         has_edge = bool(self._edges) and self._edges[0] <= due
         while self._edges and self._edges[0] <= due:
             self._edges.pop(0)
-        for follower in self.followers:
-            deadline = follower.next_deadline()
-            if has_edge or (deadline is not None and deadline <= due):
+        for follower, deadline in zip(self.followers, self._deadlines, strict=True):
+            if has_edge or deadline <= due:
                 follower.advance_to(self.now)
