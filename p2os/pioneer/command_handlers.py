@@ -11,6 +11,7 @@ says what each firmware does.
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from enum import Enum
 
 from p2os.commands import Command, CommandNumber
 from p2os.pioneer.motion import NM_PER_MM, UDEG_PER_DEG, Motion, MotionLimits
@@ -27,7 +28,6 @@ class Works:
     reckoning: DeadReckoning
     sonar: SonarSchedule
     vel2_divisor: int
-    motors_enabled: bool = False
     #: Someone has asked for the configuration, and the answer has not been sent.
     config_wanted: bool = False
 
@@ -41,25 +41,38 @@ class Works:
         """Return how far the robot has driven along its path since the start, in nanometres."""
         return round(self.reckoning.travel_mm * NM_PER_MM)
 
-    def disable_motors(self) -> None:
-        """Take the power from the wheels and forget every set speed."""
-        self.motors_enabled = False
-        self.motion.stop_now()
+    @property
+    def motors_enabled(self) -> bool:
+        """Tell whether the wheels have power."""
+        return self.motion.is_powered
 
 
-#: Acts on the works and returns whether it did: False when the motors are off or an argument is missing.
+#: Acts on the works and returns whether it could: False when an argument is missing.
 Handler = Callable[[Works, Command, Nanos], bool]
 
 
-def apply(works: Works, command: Command, now: Nanos) -> str | None:
-    """Let a command act, and return None or why it had no effect."""
+class Effect(Enum):
+    """What has become of a command."""
+
+    #: It acts.
+    DONE = "done"
+    #: This robot does not know it; ignored.
+    UNKNOWN = "unknown"
+    #: Its number or text is missing; ignored.
+    MALFORMED = "malformed"
+    #: It is taken, and acts when the motors are on.
+    WAITS = "motors are off (ENABLE 1 turns them on)"
+
+
+def apply(works: Works, command: Command, now: Nanos) -> Effect:
+    """Let a command act."""
     handler = HANDLERS.get(command.number)
     if handler is None:
-        return "unknown"
-    if command.number in MOTION_COMMANDS and not works.motors_enabled:
-        is_to_stand = command.number in SPEED_COMMANDS and command.argument == 0
-        return None if is_to_stand else "motors are off"
-    return None if handler(works, command, now) else "malformed"
+        return Effect.UNKNOWN
+    if not handler(works, command, now):
+        return Effect.MALFORMED
+    is_to_move = command.number in MOTION_COMMANDS and command.argument != 0
+    return Effect.WAITS if is_to_move and not works.motors_enabled else Effect.DONE
 
 
 def signed16(command: Command) -> int | None:
@@ -99,13 +112,6 @@ def _plain(act: Callable[[Works], None]) -> Handler:
 
 def _nothing(_works: Works) -> None:
     """Feed the watchdog, which any packet does."""
-
-
-def _enable(works: Works, value: int) -> None:
-    if value:
-        works.motors_enabled = True
-    else:
-        works.disable_motors()
 
 
 def _vel2(works: Works, command: Command, _now: Nanos) -> bool:
@@ -168,7 +174,7 @@ HANDLERS: Mapping[int, Handler] = {
     CommandNumber.PULSE: _plain(_nothing),
     CommandNumber.OPEN: _plain(_nothing),  # of a session that is open already
     CommandNumber.POLLING: _polling,
-    CommandNumber.ENABLE: _number(_enable),
+    CommandNumber.ENABLE: _number(lambda works, value: works.motion.power(on=value != 0)),
     CommandNumber.SETA: _limit(MotionLimits.with_acceleration),
     CommandNumber.SETV: _limit(MotionLimits.with_max_velocity),
     CommandNumber.SETO: _plain(lambda works: works.reckoning.set_origin()),
@@ -189,8 +195,10 @@ HANDLERS: Mapping[int, Handler] = {
     CommandNumber.QSTOP: _plain(lambda works: works.motion.stop_now()),
 }
 
-SPEED_COMMANDS = frozenset({CommandNumber.ROTATE, CommandNumber.VEL, CommandNumber.RVEL, CommandNumber.VEL2})
-#: What has no effect while the motors are off, so that enabling them never moves the robot.
-MOTION_COMMANDS = SPEED_COMMANDS | {
-    CommandNumber.MOVE, CommandNumber.HEAD, CommandNumber.DHEAD, CommandNumber.DCHEAD,
-}  # fmt: skip
+#: What moves the robot, once its motors are on.
+MOTION_COMMANDS = frozenset(
+    {
+        CommandNumber.MOVE, CommandNumber.ROTATE, CommandNumber.VEL, CommandNumber.HEAD, CommandNumber.DHEAD,
+        CommandNumber.RVEL, CommandNumber.DCHEAD, CommandNumber.VEL2,
+    }
+)  # fmt: skip

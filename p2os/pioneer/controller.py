@@ -40,7 +40,7 @@ from p2os.connection import (
 )
 from p2os.packets import Identity
 from p2os.parameters import RobotParameters
-from p2os.pioneer.command_handlers import Works, apply
+from p2os.pioneer.command_handlers import Effect, Works, apply
 from p2os.pioneer.motion import Motion, MotionLimits
 from p2os.pioneer.odometry_counts import DeadReckoning
 from p2os.pioneer.ports import Body
@@ -53,6 +53,8 @@ __all__ = ["ControllerSettings", "ControllerState", "EventCallback", "Pioneer", 
 
 #: (now in ns, what happened in a word or two, detail).
 EventCallback = Callable[[Nanos, str, str], None]
+
+IGNORED = frozenset({Effect.UNKNOWN, Effect.MALFORMED})
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -70,7 +72,7 @@ class ControllerState:
     x_mm: float
     y_mm: float
     heading_rad: float
-    #: Commands that had no effect since the start: not understood, without their number, or with the motors off.
+    #: Commands that had no effect since the start: not known, or without their number.
     ignored_commands: int
 
 
@@ -86,7 +88,6 @@ class _Snapshot:
     motion: object
     reckoning: object
     sonar: object
-    motors_enabled: bool
 
 
 class Pioneer:
@@ -192,7 +193,6 @@ class Pioneer:
             motion=works.motion.snapshot(),
             reckoning=works.reckoning.snapshot(),
             sonar=works.sonar.snapshot(),
-            motors_enabled=works.motors_enabled,
         )
 
     def restore(self, snapshot: object) -> None:
@@ -208,7 +208,6 @@ class Pioneer:
         works.motion.restore(saved.motion)
         works.reckoning.restore(saved.reckoning)
         works.sonar.restore(saved.sonar)
-        works.motors_enabled = saved.motors_enabled
 
     # Time ----------------------------------------------------------------------------
 
@@ -289,7 +288,7 @@ class Pioneer:
                 pass  # noise is counted in `stats`
 
     def _open(self, now: Nanos) -> None:
-        self._works.disable_motors()
+        self._works.motion.power(on=False)
         self._works.reckoning.set_origin()
         self._works.sonar.start_cycle(now)
         self._sip_due = now + self.settings.sip_period_ns
@@ -297,7 +296,7 @@ class Pioneer:
 
     def _close(self, now: Nanos, detail: str) -> None:
         works = self._works
-        works.disable_motors()
+        works.motion.power(on=False)
         works.motion.release()
         works.motion.limits = MotionLimits.of(self.parameters)
         works.sonar = self._new_sonar()
@@ -308,13 +307,13 @@ class Pioneer:
 
     def _obey(self, command: Command, now: Nanos) -> None:
         works, had_power = self._works, self._works.motors_enabled
-        refusal = apply(works, command, now)
-        if refusal is not None:
+        effect = apply(works, command, now)
+        if effect in IGNORED:
             self._ignored += 1
-            complaint = f"{command.name}: {refusal}"
-            if complaint not in self._complaints:  # a client may repeat itself ten times a second
-                self._complaints += (complaint,)
-                self._tell(now, "command ignored", complaint)
+        complaint = f"{command.name}: {effect.value}"
+        if effect is not Effect.DONE and complaint not in self._complaints:  # a client may repeat itself
+            self._complaints += (complaint,)
+            self._tell(now, "command ignored" if effect in IGNORED else "command waits", complaint)
         if works.motors_enabled is not had_power:
             self._tell(now, "motors", "on" if works.motors_enabled else "off")
         if works.config_wanted:

@@ -15,6 +15,10 @@ HOLD (the watchdog) makes the axes aim at zero without forgetting what was set;
 release, and they ramp back up: "automatically accelerates back to the last set
 speed" (H8 manual p. 43).
 
+Without power the wheels stand, but set speeds are still taken: they hold from
+the moment of ENABLE, as MobileSim's do (untried on a real robot). Taking the
+power away stops the wheels at once and forgets what was set.
+
 What it is not: a servo loop. The body's motors follow the set-points as their
 torque allows; the PID gains of the real firmware are not modelled.
 
@@ -133,11 +137,12 @@ class _Axis:
             self.speed = max(speed - slower, target) if speed > 0 else min(speed + slower, target)
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class _Snapshot:
     limits: MotionLimits
     mode: Mode
     is_held: bool
+    is_powered: bool
     first: _Axis
     second: _Axis
     wheels: tuple[float, float]
@@ -150,6 +155,7 @@ class Motion:
         self.limits = limits
         self.mode = Mode.TRANSLATE_ROTATE
         self.is_held = False
+        self.is_powered = False
         self._dt_ns = dt_ns
         #: nm/s of each wheel per micro-degree/s of turning.
         self._rim_nm_per_udeg = math.pi / 180 / UDEG_PER_DEG * track_mm * NM_PER_MM / 2
@@ -192,10 +198,16 @@ class Motion:
         self._second.set(0)
 
     def stop_now(self) -> None:
-        """Set both wheels to zero at once and forget every command (E_STOP, motors off)."""
+        """Set both wheels to zero at once and forget every command (E_STOP)."""
         self._first.stop_now()
         self._second.stop_now()
         self._wheels = (0.0, 0.0)
+
+    def power(self, *, on: bool) -> None:
+        """Switch the motors (ENABLE); off stops the wheels at once and forgets every command."""
+        if not on:
+            self.stop_now()
+        self.is_powered = on
 
     def hold(self) -> None:
         """Slow down to a stand, but remember what was set."""
@@ -218,15 +230,11 @@ class Motion:
         return self._wheels
 
     @property
-    def is_idle(self) -> bool:
-        """Tell whether the wheels stand and nothing asks them to move."""
-        axes = (self._first, self._second)
-        return not any(axis.speed or (not self.is_held and (axis.set_speed or axis.goal is not None)) for axis in axes)
-
-    @property
     def is_steady(self) -> bool:
         """Tell whether the next step will change nothing, so that it need not be taken."""
         axes = (self._first, self._second)
+        if not self.is_powered:
+            return True
         if self.is_held:
             return not any(axis.speed for axis in axes)
         return all(axis.goal is None and axis.speed == axis.set_speed for axis in axes)
@@ -268,13 +276,20 @@ class Motion:
     def snapshot(self) -> object:
         """Return all that decides the future, as a plain value."""
         return _Snapshot(
-            self.limits, self.mode, self.is_held, replace(self._first), replace(self._second), self._wheels
+            limits=self.limits,
+            mode=self.mode,
+            is_held=self.is_held,
+            is_powered=self.is_powered,
+            first=replace(self._first),
+            second=replace(self._second),
+            wheels=self._wheels,
         )
 
     def restore(self, snapshot: object) -> None:
         """Put back what `snapshot` returned."""
         saved = cast("_Snapshot", snapshot)
-        self.limits, self.mode, self.is_held = saved.limits, saved.mode, saved.is_held
+        self.limits, self.mode = saved.limits, saved.mode
+        self.is_held, self.is_powered = saved.is_held, saved.is_powered
         self._first, self._second = replace(saved.first), replace(saved.second)
         self._wheels = saved.wheels
 

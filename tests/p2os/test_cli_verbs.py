@@ -18,6 +18,7 @@ from p2os.cli.main import run
 from p2os.config_packet import ConfigPacket
 from p2os.errors import MissingDependencyError, RemoteProtocolError, TransportError
 from p2os.packets import Identity
+from p2os.pioneer.command_handlers import Effect
 from p2os.sip import SonarReading, StandardSip
 from p2os.timing import NS_PER_MS
 from p2os.transport import HungUpError
@@ -165,7 +166,7 @@ def test_a_robot_still_streaming_to_somebody_is_stopped_first(line: ToRobot) -> 
 
 
 def test_a_robot_that_knows_no_config_still_answers(line: ToRobot, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("p2os.pioneer.controller.apply", lambda *_: "unknown")
+    monkeypatch.setattr("p2os.pioneer.controller.apply", lambda *_: Effect.UNKNOWN)
     assert info.ask(line, clock=line.clock).config is None  # type: ignore[arg-type]
 
 

@@ -54,37 +54,39 @@ def test_packets_flow_every_cycle_from_open(robot: Any, argument: int | None) ->
     assert robot.told() == ["synchronised", "opened"]
 
 
-def test_motors_are_off_on_a_new_connection_and_motion_is_refused(robot: Any) -> None:
+def test_motors_are_off_on_a_new_connection_and_who_drives_is_told(robot: Any) -> None:
     robot.open(motors=False)
-    robot.say(C.VEL, 200)
+    for _ in range(3):
+        robot.say(C.VEL, 200)
+    for number in (C.RVEL, C.VEL2, C.ROTATE):
+        robot.say(number, 0)
     robot.run(1000)
     assert not robot.pioneer.state.motors_enabled
     assert robot.body.state.left_speed_mps == 0
-    assert robot.pioneer.state.ignored_commands == 1
-    assert ("command ignored", "VEL: motors are off") in [event[1:] for event in robot.events]
-    for number in (C.VEL, C.RVEL, C.VEL2, C.ROTATE):
-        robot.say(number, 0)
-    assert robot.pioneer.state.ignored_commands == 1, "being told to stand is not refused"
-    for number in (C.HEAD, C.MOVE):
-        robot.say(number, 0)
-    assert robot.pioneer.state.ignored_commands == 3
+    assert robot.pioneer.state.ignored_commands == 0
+    waits = [detail for _, what, detail in robot.events if what == "command waits"]
+    assert waits == ["VEL: motors are off (ENABLE 1 turns them on)"], "once, and not for being told to stand"
 
 
-def test_enabling_the_motors_never_moves_the_robot(robot: Any) -> None:
+def test_a_speed_set_before_the_motors_are_on_holds_from_then(robot: Any) -> None:
     robot.open(motors=False)
-    robot.say(C.VEL, 200)
+    robot.say(C.VEL, 200)  # in the order in which p2os-arduino says it
     robot.say(C.ENABLE, 1)
-    robot.run(500)
-    assert robot.body.state.left_speed_mps == 0
+    robot.run(1000)
+    assert robot.body.state.left_speed_mps == 0.2
+
+
+def test_switching_the_motors_off_stops_at_once_and_forgets(robot: Any) -> None:
+    robot.open()
     robot.say(C.VEL, 200)
     robot.run(1000)
     assert robot.body.state.left_speed_mps == 0.2
     robot.say(C.ENABLE, 0)
     robot.run(1)
-    assert robot.body.state.left_speed_mps == 0, "the wheels stop at once"
+    assert robot.body.state.left_speed_mps == 0
     robot.say(C.ENABLE, 1)
     robot.run(500)
-    assert robot.body.state.left_speed_mps == 0, "and the set speed is forgotten"
+    assert robot.body.state.left_speed_mps == 0
 
 
 def test_closing_stops_the_robot_and_its_packets(robot: Any) -> None:

@@ -23,7 +23,9 @@ RIM_MPS_PER_DEG_S = 357 * 3.141592653589793 / 360_000
 
 
 def make(limits: MotionLimits = LIMITS) -> Motion:
-    return Motion(limits, track_mm=TRACK_MM, dt_ns=NS_PER_MS)
+    motion = Motion(limits, track_mm=TRACK_MM, dt_ns=NS_PER_MS)
+    motion.power(on=True)
+    return motion
 
 
 def run(motion: Motion, steps: int) -> tuple[float, float]:
@@ -50,7 +52,7 @@ def test_slowing_down_uses_the_deceleration_and_ends_at_zero() -> None:
     left, _ = run(motion, 499)
     assert abs(left - 0.0006) < 1e-12
     assert run(motion, 1) == (0.0, 0.0)
-    assert motion.is_idle
+    assert motion.is_steady
 
 
 def test_a_reversal_slows_down_first_and_then_speeds_up() -> None:
@@ -159,11 +161,22 @@ def test_a_held_robot_slows_down_and_later_resumes() -> None:
     motion.hold()
     assert run(motion, 499)[0] > 0
     assert run(motion, 1) == (0.0, 0.0)
-    assert motion.is_idle
     assert motion.is_steady
     motion.release()
-    assert not motion.is_idle
+    assert not motion.is_steady
     assert run(motion, 1000) == (0.3, 0.3)
+
+
+def test_without_power_speeds_are_set_but_the_wheels_stand() -> None:
+    motion = Motion(LIMITS, track_mm=TRACK_MM, dt_ns=NS_PER_MS)
+    motion.set_velocity(300)
+    assert run(motion, 1000) == (0.0, 0.0)
+    assert motion.is_steady
+    motion.power(on=True)
+    assert run(motion, 1000) == (0.3, 0.3)
+    motion.power(on=False)
+    motion.power(on=True)
+    assert run(motion, 1000) == (0.0, 0.0)
 
 
 def drive(motion: Motion, steps: int) -> tuple[float, float]:
@@ -181,7 +194,7 @@ def test_a_move_ends_where_it_should() -> None:
     motion.move_to(1_000_000_000)
     travel, _ = drive(motion, 8000)
     assert abs(travel - 1000) < 4
-    assert motion.is_idle
+    assert motion.is_steady
 
 
 def test_a_turn_takes_the_shorter_way_and_ends_where_it_should() -> None:
@@ -189,7 +202,7 @@ def test_a_turn_takes_the_shorter_way_and_ends_where_it_should() -> None:
     motion.turn_to(270_000_000)
     _, turn = drive(motion, 8000)
     assert abs(turn + 90) < 1
-    assert motion.is_idle
+    assert motion.is_steady
 
 
 def test_a_goal_is_forgotten_when_a_speed_is_set_and_known_until_then() -> None:
