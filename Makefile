@@ -36,9 +36,11 @@ lint: setup
 type: setup
 	$(BIN)/mypy
 
+# Coverage is counted where a test is quick; the long runs of the whole chain go without it.
 unit: setup
-	$(BIN)/pytest -n $(JOBS) -m 'not soak and not hardware' --cov --cov-report=term --cov-report=json:.coverage.json
+	$(BIN)/pytest -n $(JOBS) -m 'not slow and not soak and not hardware' --cov --cov-report=json:.coverage.json
 	$(BIN)/python tools/check_coverage.py .coverage.json
+	$(BIN)/pytest -n $(JOBS) -m 'slow and not soak and not hardware'
 
 bench: setup
 	$(BIN)/python tools/bench_speed.py

@@ -43,7 +43,7 @@ def test_when_it_is_written_changes_nothing(entries: list[tuple[int, str, int]],
 
 def test_kinds_of_one_instant_have_a_fixed_order() -> None:
     trace = TraceWriter()
-    for kind in reversed(sorted(RANKS)):
+    for kind in sorted(RANKS, reverse=True):
         trace.add(kind, 5, {})
     trace.write_until(5)
     assert [json.loads(line)["k"] for line in trace.text.splitlines()] == sorted(RANKS, key=RANKS.__getitem__)
@@ -71,7 +71,7 @@ def test_first_and_last_line_are_not_hashed(tmp_path: Path) -> None:
 
 
 def test_a_trace_that_cannot_be_written_is_one_line(tmp_path: Path) -> None:
-    with pytest.raises(FileError, match="cannot write .*No such file or directory"):
+    with pytest.raises(FileError, match=r"cannot write .*No such file or directory"):
         TraceWriter(tmp_path / "nowhere" / "trace.jsonl")
 
 
