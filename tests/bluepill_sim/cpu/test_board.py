@@ -110,8 +110,9 @@ def test_something_else_is_no_snapshot(boot) -> None:
         boot("nop").board.restore(5)
 
 
-def test_strict_mode_raises_at_the_first_warning(boot) -> None:
-    image = boot(store(0x40012C00, 1)).image
+@pytest.mark.parametrize("access", ["str", "ldr"])
+def test_strict_mode_raises_at_the_first_warning(boot, access: str) -> None:
+    image = boot(f"mov32 r1, #0x40012C00\n{access} r2, [r1, #0]").image
     board = BluePill(image, strict=True)
     with pytest.raises(UnmodelledError, match="TIM1 is not modelled") as error:
         board.advance_to(1_000_000)
@@ -168,6 +169,32 @@ def test_an_exception_in_a_listener_comes_out_of_advance_to(boot) -> None:
         machine.board.advance_to(1_000_000)
     machine.board.on_pin = None
     assert machine.board.advance_to(2_000_000).reason is Reason.DEADLINE
+
+
+def test_ctrl_c_while_blocks_run_comes_out_and_the_run_can_go_on(boot, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The signal's handler runs inside a callback from C, which would swallow the exception."""
+    whole = boot(BLINK, {15: "tick"}).run(2000)
+    machine = boot(BLINK, {15: "tick"}).run(333)
+    engine = machine.board._live.engine
+    measure = engine._measure
+
+    def interrupted(address: int, size: int) -> object:
+        raise KeyboardInterrupt
+
+    engine.forget_costs()
+    monkeypatch.setattr(engine, "_measure", interrupted)
+    with pytest.raises(KeyboardInterrupt):
+        machine.board.advance_to(2_000_000)
+    monkeypatch.setattr(engine, "_measure", measure)
+    machine.board.advance_to(2_000_000)
+    assert (machine.edges, machine.log) == (whole.edges, whole.log)
+
+
+def test_the_other_serial_ports_are_there(boot) -> None:
+    board = boot("nop").board
+    board.usart2.receive(b"x")
+    board.usart3.receive(b"x")
+    assert len(board.warnings) == 2
 
 
 def test_the_package_names_its_public_face() -> None:
