@@ -234,16 +234,19 @@ class Pioneer:
         """Step the body to its first step border at or after `limit`."""
         if self._body_now >= limit:
             return
-        works, body, dt_ns = self._works, self.body, self.body.dt_ns
-        motion, reckoning = works.motion, works.reckoning
-        while self._body_now < limit:
-            if motion.is_steady:
-                left, right = motion.wheels_mps
-            else:
-                left, right = motion.step(works.travel_nm, works.heading_udeg)
-            wheels = body.step(left, right)
-            reckoning.advance(wheels.left_angle_rad, wheels.right_angle_rad)
-            self._body_now += dt_ns
+        works, body = self._works, self.body
+        motion, step, advance = works.motion, body.step, works.reckoning.advance
+        steps = -((self._body_now - limit) // body.dt_ns)
+        self._body_now += steps * body.dt_ns
+        while steps and not motion.is_steady:
+            left, right = motion.step(works.travel_nm, works.heading_udeg) if motion.has_goal else motion.step(0, 0)
+            wheels = step(left, right)
+            advance(wheels.left_angle_rad, wheels.right_angle_rad)
+            steps -= 1
+        left, right = motion.wheels_mps  # steady until the next command
+        for _ in range(steps):
+            wheels = step(left, right)
+            advance(wheels.left_angle_rad, wheels.right_angle_rad)
 
     def _new_connection(self) -> Connection:
         identity = Identity(

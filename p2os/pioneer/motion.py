@@ -230,21 +230,26 @@ class Motion:
         return self._wheels
 
     @property
+    def has_goal(self) -> bool:
+        """Tell whether the robot drives or turns to somewhere, so that `step` needs to know where it is."""
+        return self._first.goal is not None or self._second.goal is not None
+
+    @property
     def is_steady(self) -> bool:
-        """Tell whether the next step will change nothing, so that it need not be taken."""
-        axes = (self._first, self._second)
+        """Tell whether no step will change anything until the next command."""
+        first, second = self._first, self._second
         if not self.is_powered:
             return True
         if self.is_held:
-            return not any(axis.speed for axis in axes)
-        return all(axis.goal is None and axis.speed == axis.set_speed for axis in axes)
+            return not first.speed and not second.speed
+        return first.speed == first.set_speed and second.speed == second.set_speed and not self.has_goal
 
     def step(self, travel_nm: int, heading_udeg: int) -> tuple[float, float]:
         """Ramp for one step and return the rim-speed set-points for it, left and right, in m/s.
 
         Args:
-            travel_nm: the odometer along the path, forward positive.
-            heading_udeg: the heading by odometry, any number of turns.
+            travel_nm: the odometer along the path, forward positive; read only while there is a goal.
+            heading_udeg: the heading by odometry, any number of turns; read only while there is a goal.
         """
         if self.is_steady:
             return self._wheels
