@@ -66,6 +66,8 @@ class RemoteBench:
         self.trace = trace or TraceWriter()
         self.chip = chip = chip or boot(scenario.firmware)
         self.note: str | None = "the pose is the robot's own odometry; collisions and clearance cannot be told"
+        if scenario.changes:
+            self.note += "; the scenario's obstacles are not placed"
         self._transport = transport
         self._pacer = pacer
         self.on_slice: Callable[[Nanos], None] | None = None

@@ -19,6 +19,7 @@ Invariant: the same run gives the same bytes, whatever the slices of the loop;
 what was flushed is readable after the process was killed.
 """
 
+import contextlib
 import hashlib
 import io
 import json
@@ -26,7 +27,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import IO, cast
 
-from p2os.errors import FileError, LocalProtocolError
+from p2os.errors import FileError, LocalProtocolError, RunFailedError
 from p2os.timing import NS_PER_S, Nanos
 
 TRACE_NAME = "trace.jsonl"
@@ -77,7 +78,7 @@ class TraceWriter:
     def meta(self, entry: Entry) -> None:
         """Write the first line and flush it."""
         self._file.write(json.dumps({"k": "meta", **entry}) + "\n")
-        self._file.flush()
+        self._flush()
 
     def add(self, kind: str, at: Nanos, entry: Entry) -> None:
         """Take an entry of `kind` stamped `at`.
@@ -107,17 +108,30 @@ class TraceWriter:
         second = limit // NS_PER_S
         if second != self._flushed_second:
             self._flushed_second = second
-            self._file.flush()
+            self._flush()
 
     def end(self, entry: Entry) -> None:
         """Write the last line and close the file; entries later than what was written are dropped."""
         self._file.write(json.dumps({"k": "end", **entry}) + "\n")
+        self._flush()
         self.close()
 
     def close(self) -> None:
         """Close the file without a last line, as for a run that failed."""
         if not isinstance(self._file, io.StringIO):
-            self._file.close()
+            with contextlib.suppress(OSError):  # a full disk was told of when it was first met
+                self._file.close()
+
+    def _flush(self) -> None:
+        """Hand what was written to the operating system, which keeps it when this process is killed.
+
+        Raises:
+            RunFailedError: The disk is full or gone.
+        """
+        try:
+            self._file.flush()
+        except OSError as error:
+            raise RunFailedError(f"cannot write {self.path}: {error.strerror}") from error
 
     def snapshot(self) -> dict[str, object]:
         """Return what is told and not yet written."""

@@ -12,7 +12,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from p2os.errors import FileError, LocalProtocolError
+from p2os.errors import FileError, LocalProtocolError, RunFailedError
 from testbench.trace import RANKS, TraceWriter, canonical
 
 S = 10**9
@@ -73,6 +73,14 @@ def test_first_and_last_line_are_not_hashed(tmp_path: Path) -> None:
 def test_a_trace_that_cannot_be_written_is_one_line(tmp_path: Path) -> None:
     with pytest.raises(FileError, match=r"cannot write .*No such file or directory"):
         TraceWriter(tmp_path / "nowhere" / "trace.jsonl")
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="there is no /dev/full")
+def test_a_full_disk_is_one_line() -> None:
+    trace = TraceWriter(Path("/dev/full"))
+    with pytest.raises(RunFailedError, match="cannot write /dev/full: No space left on device"):
+        trace.meta({})
+    trace.close()
 
 
 def test_a_restored_writer_goes_on_alike() -> None:
