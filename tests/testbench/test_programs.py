@@ -28,11 +28,20 @@ def run(program: str, folder: Path, **options: object) -> dict[str, object]:
 @pytest.mark.parametrize("mode", MODES)
 @pytest.mark.parametrize("program", ["motors", "sensors", "encoders", "dodge"])
 def test_a_program_reaches_its_goals(program: str, mode: str, body: str, world: str, tmp_path: Path) -> None:
-    outcome = run(program, tmp_path, mode=mode, body=body, world=world)
+    duration_s = 60.0 if program == "dodge" else None
+    outcome = run(program, tmp_path, mode=mode, body=body, world=world, duration_s=duration_s)
     assert outcome["collisions"] == 0
     names = {path.name for path in tmp_path.iterdir()}
     assert names >= {"trace.jsonl", "summary.json", "pins.vcd", "pins.sr", "wire.jsonl", "usart.txt", "report.html"}
     assert json.loads((tmp_path / "summary.json").read_text()) == outcome
+
+
+@pytest.mark.soak
+@pytest.mark.parametrize("world", WORLDS)
+@pytest.mark.parametrize("body", BODIES)
+@pytest.mark.parametrize("mode", MODES)
+def test_dodge_keeps_it_up_for_ten_minutes(mode: str, body: str, world: str, tmp_path: Path) -> None:
+    run("dodge", tmp_path, mode=mode, body=body, world=world, duration_s=600.0)
 
 
 @pytest.mark.soak
