@@ -49,7 +49,7 @@
 #define LONG_TWIST 14      /* 145 degrees */
 #define FULL_TWIST 35      /* 360 degrees */
 #define BOLD_EVERY 2       /* chosen, as the next: by the ground covered in simulated rooms */
-#define CONTRARY_EVERY 5
+#define CONTRARY_EVERY 7
 #define NARROW_WAY 4       /* 0.13 m with something at both +-30: less than 0.85 m apart, or a long passage */
 #define BACK_LEAST_WAY 6   /* 0.19 m: less is not worth it */
 #define BACK_MOST_WAY 10   /* 0.32 m: enough to turn freely */
