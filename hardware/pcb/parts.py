@@ -1,0 +1,171 @@
+"""What can be bought: one row a part, with its footprint, maker's number and the facts that the checks use.
+
+Facts marked `seen` were read in the named data sheet; `memory` means that nobody
+here had the sheet at hand: compare before ordering. Prices and stock are not kept.
+
+Invariant: every part that is bought has a manufacturer and a part number.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from types import MappingProxyType
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Part:
+    """A thing that can be placed on the board."""
+
+    key: str
+    value: str
+    #: Name in symbols.py and in footprints.py.
+    symbol: str
+    footprint: str
+    description: str
+    manufacturer: str = ""
+    mpn: str = ""
+    #: Where the facts come from.
+    source: str = ""
+    #: Data-sheet figures; the unit is in the name.
+    facts: Mapping[str, float] = field(default_factory=dict)
+    #: False for what is drawn in copper only (test points, holes): not in the bill of materials.
+    bought: bool = True
+
+    def __post_init__(self) -> None:
+        """Freeze the facts, and refuse a bought part without a number to order it by."""
+        object.__setattr__(self, "facts", MappingProxyType(dict(self.facts)))
+        if self.bought and not (self.manufacturer and self.mpn):
+            raise ValueError(f"part {self.key!r} is bought but has no manufacturer or no part number")
+
+
+def _resistor(value: str, ohm: float, mpn: str) -> Part:
+    return Part(
+        key=value, value=value, symbol="R", footprint="R_0805",
+        description=f"Resistor {value} 1 % 0.125 W", manufacturer="Yageo", mpn=mpn,
+        source="Yageo RC_L, memory", facts={"ohm": ohm, "tolerance": 0.01, "power_w": 0.125},
+    )  # fmt: skip
+
+
+PARTS: Mapping[str, Part] = MappingProxyType({
+    part.key: part
+    for part in (
+        # --- modules
+        Part(
+            key="BLUEPILL", value="BluePill", symbol="BLUEPILL", footprint="MODULE_BLUEPILL",
+            description="STM32F103C8 BluePill on two 1x20 sockets", manufacturer="generic",
+            mpn="BluePill STM32F103C8T6",
+            source="ST DS5319 I/O tables, seen; module's pin rows, memory",
+            facts={"supply_v": 5.0, "current_max_ma": 80.0, "injection_pin_ma": 5.0, "injection_total_ma": 25.0,
+                   "vil_v": 1.164, "vih_v": 1.833, "vil_ft_v": 1.166, "vih_ft_v": 1.546},
+        ),
+        Part(
+            key="ESP32", value="ESP32 D1 mini", symbol="ESP32_D1_MINI", footprint="MODULE_ESP32_D1_MINI",
+            description="ESP32 D1 mini (40 pins) on four 1x10 sockets", manufacturer="generic",
+            mpn="MH-ET LIVE MiniKit ESP32",
+            source="Espressif ESP32 data sheet and the module's silkscreen, memory",
+            facts={"supply_v": 5.0, "current_max_ma": 500.0, "rail_out_ma": 150.0, "vil_v": 0.825, "vih_v": 2.475,
+                   "en_low_v": 0.6, "en_pull_ohm": 10_000.0, "en_farad": 1e-6},
+        ),
+        # --- supply
+        Part(
+            key="BUCK", value="TSR 1-2450", symbol="REGULATOR3", footprint="SIP3_BUCK",
+            description="Step-down module 6.5-36 V to 5 V, 1 A, pin-compatible with R-78E5.0-1.0 and K7805-1000R3",
+            manufacturer="Traco Power", mpn="TSR 1-2450", source="Traco TSR 1 series sheet, seen",
+            facts={"input_min_v": 6.5, "input_max_v": 36.0, "output_v": 5.0, "accuracy": 0.02, "output_max_ma": 1000.0,
+                   "efficiency": 0.90, "step_peak_max_v": 0.2, "load_farad_max": 470e-6, "full_load_c": 60.0},
+        ),
+        Part(
+            key="LM317", value="LM317DCY", symbol="LM317", footprint="SOT223",
+            description="Adjustable linear regulator, SOT-223", manufacturer="Texas Instruments", mpn="LM317DCYR",
+            source="TI LM317 and LM317M sheets: 53 K/W on a high-K board, seen; minimum load, memory",
+            facts={"reference_v": 1.25, "reference_tolerance": 0.04, "adjust_a": 50e-6, "minimum_load_ma": 10.0,
+                   "dropout_v": 2.0, "junction_max_c": 125.0, "kelvin_per_watt": 53.0, "output_max_ma": 1500.0},
+        ),
+        Part(
+            key="PTC", value="1.1 A 24 V", symbol="FUSE", footprint="F_1812",
+            description="Resettable fuse, holds 1.1 A, trips at 2.2 A", manufacturer="Bourns",
+            mpn="MF-MSMF110/24X-2", source="Bourns MF-MSMF sheet, memory",
+            facts={"hold_a": 1.1, "trip_a": 2.2, "voltage_max_v": 24.0, "ohm_min": 0.06, "ohm_max": 0.2},
+        ),
+        Part(
+            key="SCHOTTKY", value="B340A", symbol="SCHOTTKY", footprint="D_SMA",
+            description="Schottky diode 40 V 3 A", manufacturer="Diodes Incorporated", mpn="B340A-13-F",
+            source="Diodes B340A sheet, memory", facts={"reverse_v": 40.0, "forward_v": 0.5, "current_a": 3.0},
+        ),
+        Part(
+            key="TVS12", value="SMBJ15A", symbol="TVS", footprint="D_SMB",
+            description="Transient suppressor, 15 V stand-off", manufacturer="Littelfuse", mpn="SMBJ15A",
+            source="Littelfuse SMBJ sheet, memory",
+            facts={"standoff_v": 15.0, "clamp_v": 24.4, "breakdown_min_v": 16.7},
+        ),
+        Part(
+            key="C 100u", value="100uF 35V", symbol="CP", footprint="CP_RADIAL_D8",
+            description="Electrolytic capacitor 100 uF 35 V, low impedance, 8 mm", manufacturer="Panasonic",
+            mpn="EEU-FR1V101", source="Panasonic FR sheet, memory",
+            facts={"farad": 100e-6, "voltage_v": 35.0, "esr_ohm": 0.15},
+        ),
+        Part(
+            key="C 22u", value="22uF 16V", symbol="C", footprint="C_1206",
+            description="Ceramic capacitor 22 uF 16 V X5R 1206", manufacturer="Murata", mpn="GRM31CR61C226KE15L",
+            source="Murata GRM31 sheet, memory", facts={"farad": 22e-6, "voltage_v": 16.0, "esr_ohm": 0.005},
+        ),
+        Part(
+            key="C 100n", value="100nF 50V", symbol="C", footprint="C_0805",
+            description="Ceramic capacitor 100 nF 50 V X7R 0805", manufacturer="Yageo", mpn="CC0805KRX7R9BB104",
+            source="Yageo CC sheet, memory", facts={"farad": 100e-9, "voltage_v": 50.0},
+        ),
+        # --- resistors
+        _resistor("1k", 1e3, "RC0805FR-071KL"),
+        _resistor("1k2", 1.2e3, "RC0805FR-071K2L"),
+        _resistor("680R", 680.0, "RC0805FR-07680RL"),
+        _resistor("20k", 20e3, "RC0805FR-0720KL"),
+        _resistor("4k7", 4.7e3, "RC0805FR-074K7L"),
+        _resistor("47k", 47e3, "RC0805FR-0747KL"),
+        _resistor("2k2", 2.2e3, "RC0805FR-072K2L"),
+        _resistor("120R", 120.0, "RC0805FR-07120RL"),
+        _resistor("360R", 360.0, "RC0805FR-07360RL"),
+        _resistor("200R", 200.0, "RC0805FR-07200RL"),
+        # --- logic
+        Part(
+            key="MAX3232", value="MAX3232E", symbol="MAX3232", footprint="SOIC16",
+            description="RS-232 transceiver 3-5.5 V, 15 kV ESD", manufacturer="Texas Instruments", mpn="MAX3232EIDR",
+            source="TI MAX3232 sheet SLLS410: thresholds and the 4 x 100 nF table, seen; driver swing, memory",
+            facts={"supply_min_v": 3.0, "supply_max_v": 5.5, "swing_min_v": 5.0, "swing_typ_v": 5.4, "load_ohm": 3e3,
+                   "pump_farad": 100e-9, "supply_ma": 1.0},
+        ),
+        Part(
+            key="BC817", value="BC817-40", symbol="NPN", footprint="SOT23",
+            description="NPN transistor 45 V 0.5 A", manufacturer="Nexperia", mpn="BC817-40,215",
+            source="Nexperia BC817 sheet, memory", facts={"hfe_min": 250.0, "saturation_v": 0.7, "current_ma": 500.0},
+        ),
+        Part(
+            key="HC595", value="74HC595", symbol="HC595", footprint="SOIC16",
+            description="8-bit shift register with output latch", manufacturer="Nexperia", mpn="74HC595D,118",
+            source="Nexperia 74HC595 sheet, memory", facts={"supply_min_v": 2.0, "supply_max_v": 6.0},
+        ),
+        Part(key="LED green", value="green", symbol="LED", footprint="LED_0805", description="LED green 0805",
+             manufacturer="Kingbright", mpn="KP-2012SGC", source="memory", facts={"forward_v": 2.2}),
+        Part(key="LED yellow", value="yellow", symbol="LED", footprint="LED_0805", description="LED yellow 0805",
+             manufacturer="Kingbright", mpn="KP-2012SYC", source="memory", facts={"forward_v": 2.0}),
+        Part(key="LED red", value="red", symbol="LED", footprint="LED_0805", description="LED red 0805",
+             manufacturer="Kingbright", mpn="KP-2012SRC-PRV", source="memory", facts={"forward_v": 1.85}),
+        # --- connectors
+        Part(key="TERMINAL", value="2 x 5.08", symbol="CONN2", footprint="TERMINAL_5.08",
+             description="Screw terminal 2 poles 5.08 mm", manufacturer="Phoenix Contact", mpn="1729128",
+             source="Phoenix MKDS sheet, memory"),
+        Part(key="DE9", value="DE-9 male", symbol="DE9", footprint="DE9_MALE",
+             description="DE-9 plug, right angle, board locks, 2.77 x 2.84 mm", manufacturer="TE Connectivity",
+             mpn="5747840-3", source="memory: the pins' distance to the edge differs between makers"),
+        Part(key="HEADER2", value="1x2", symbol="CONN2", footprint="HEADER_1X2",
+             description="Pin header 1x2 2.54 mm", manufacturer="Wuerth", mpn="61300211121", source="memory"),
+        Part(key="HEADER3", value="1x3", symbol="CONN3", footprint="HEADER_1X3",
+             description="Pin header 1x3 2.54 mm, with one jumper", manufacturer="Wuerth", mpn="61300311121",
+             source="memory"),
+        Part(key="HEADER24", value="2x12", symbol="CONN24", footprint="HEADER_2X12",
+             description="Pin header 2x12 2.54 mm", manufacturer="Wuerth", mpn="61302421121", source="memory"),
+        # --- copper only
+        Part(key="TP", value="TP", symbol="TESTPOINT", footprint="TESTPOINT", description="Test point 1.5 mm",
+             bought=False),
+        Part(key="HOLE", value="M3", symbol="HOLE", footprint="HOLE_M3", description="Mounting hole 3.2 mm",
+             bought=False),
+    )
+})  # fmt: skip
