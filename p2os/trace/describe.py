@@ -1,0 +1,154 @@
+"""What stands in a frame, as a name and plain values in SI units.
+
+Values are what JSON can hold: numbers, text, booleans, None, lists and objects
+of those. Names of fields end in their unit where they have one.
+"""
+
+import math
+from dataclasses import fields, is_dataclass
+from enum import Enum
+from typing import TypeAlias
+
+from p2os.commands import Command, CommandNumber
+from p2os.config_packet import FIELDS, ConfigPacket
+from p2os.packets import IDENTITY_KIND, Identity, RawPacket, read_packet
+from p2os.parameters import RobotParameters
+from p2os.profiles import Profile
+from p2os.sip import POSITION_MASK, TAIL, StandardSip
+from p2os.units import in_units
+from p2os.wire import Frame
+
+Plain: TypeAlias = "bool | int | float | str | list[Plain] | dict[str, Plain] | None"
+
+#: Packet type → the manuals' word.
+PACKET_NAMES = {
+    0x00: "SYNC0", 0x01: "SYNC1", 0x02: "IDENTITY", 0x20: "CONFIGpac", 0x30: "SIP", 0x31: "SIP", 0x32: "SIP",
+    0x33: "SIP", 0x34: "SIP", 0x60: "SIMLASER", 0x61: "SIMLASER2", 0x62: "SIMSTAT", 0x63: "SIMINFO",
+    0x66: "SIMMAPCHANGED", 0x7B: "ACCELpac", 0x7C: "TORQUEpac", 0x90: "ENCODERpac", 0x95: "HEADINGpac",
+    0x98: "GYROpac", 0x9A: "IMUpac", 0xA0: "ARMpac", 0xA1: "ARMINFOpac", 0xB0: "SERAUXpac", 0xB8: "SERAUX2pac",
+    0xC0: "TCM2pac", 0xC8: "SERAUX3pac", 0xD0: "PLAYLISTpac", 0xE0: "GRIPPERpac", 0xF0: "IOpac",
+    0xF8: "JOYSTICKpac", 0xFA: "BATTERYpac", 0xFE: "RESET", 0xFF: "RESET",
+}  # fmt: skip
+#: Commands whose integer is two bytes: names of the low and the high one, and whether they are signed.
+TWO_BYTES = {
+    CommandNumber.VEL2: ("right", "left", True),
+    CommandNumber.DIGOUT: ("low_byte", "high_byte", False),
+    CommandNumber.PTUPOS: ("pulse_width", "servo", False),
+    CommandNumber.ARM_POS: ("position", "joint", False),
+    CommandNumber.ARM_SPEED: ("speed", "joint", False),
+}
+#: A micrometre or a microradian: what is finer is an artefact of floating point.
+_DECIMALS = 6
+
+
+def packet_name(kind: int) -> str:
+    """Return the manuals' word for a packet type, or its number."""
+    return PACKET_NAMES.get(kind, f"packet 0x{kind:02X}")
+
+
+def describe_command(frame: Frame, profile: Profile) -> tuple[str, dict[str, Plain]]:
+    """Return a command's name and argument."""
+    del profile
+    command = Command.from_frame(frame)
+    argument = command.argument
+    if argument is None:
+        return command.name, {}
+    if isinstance(argument, bytes):
+        return command.name, {"argument": argument.hex(" "), "text": printable(argument)}
+    found: dict[str, Plain] = {"argument": argument}
+    try:
+        low_name, high_name, is_signed = TWO_BYTES[CommandNumber(command.number)]
+    except (KeyError, ValueError):
+        return command.name, found
+    low, high = command.signed_bytes if is_signed else command.two_bytes
+    return command.name, {**found, low_name: low, high_name: high}
+
+
+def describe_packet(frame: Frame, profile: Profile, parameters: RobotParameters) -> tuple[str, dict[str, Plain]]:
+    """Return a packet's name and fields; what cannot be read stands in `data` as hex."""
+    name = packet_name(frame.kind)
+    if frame.kind == IDENTITY_KIND and frame.data:
+        identity = Identity.from_frame(frame)
+        return name, {"name": identity.name, "class": identity.robot_class, "subclass": identity.subclass}
+    packet = read_packet(frame, profile)
+    if isinstance(packet, StandardSip):
+        return name, sip_fields(packet, profile, parameters)
+    if isinstance(packet, ConfigPacket):
+        return name, {field: plain(getattr(packet, field)) for field, _ in FIELDS[: packet.fields_sent]}
+    if isinstance(packet, RawPacket):
+        return name, {"data": packet.data.hex(" ")} if packet.data else {}
+    return name, {
+        field.name: plain(getattr(packet, field.name))
+        for field in fields(packet)
+        if field.name not in {"kind", "rest"} or getattr(packet, field.name)
+    }
+
+
+def sip_fields(sip: StandardSip, profile: Profile, parameters: RobotParameters) -> dict[str, Plain]:
+    """Return a SIP in SI units: positions either side of 0, the profile's reading of word 16."""
+    sensed = in_units(sip, parameters)
+    mm = parameters.distance_conv_mm
+    found: dict[str, Plain] = {
+        "moving": sensed.is_moving,
+        "x_m": _round(_signed(sip.raw_x) * mm / 1000),
+        "y_m": _round(_signed(sip.raw_y) * mm / 1000),
+        "heading_rad": _round(sensed.heading_rad),
+        "left_mps": _round(sensed.left_mps),
+        "right_mps": _round(sensed.right_mps),
+        "battery_v": sensed.battery_v,
+        "stall_left": sip.stall_left,
+        "stall_right": sip.stall_right,
+        "front_bumpers": sip.front_bumpers,
+        "rear_bumpers": sip.rear_bumpers,
+        "control_rad": _round(sip.raw_control * parameters.angle_conv_rad),
+        "flags" if profile.has_flags else "servo_pulse": sip.raw_flags,
+        "compass_deg": sip.raw_compass * 2,
+        "sonar_m": {str(number): _round(range_m) for number, range_m in sensed.sonar_m},
+        "gripper_state": sip.gripper_state,
+        "analog_port": sip.analog_port,
+        "analog": sip.raw_analog,
+        "digital_in": sip.digital_in,
+        "digital_out": sip.digital_out,
+    }
+    for (field, _, _), value in zip(TAIL, sip.tail, strict=False):
+        found[field.removeprefix("raw_")] = value
+    if sip.rest:
+        found["rest"] = sip.rest.hex(" ")
+    return found
+
+
+def plain(value: object) -> Plain:
+    """Return a value as JSON can hold it: bytes as hex, enumerations by name, dataclasses as objects."""
+    if isinstance(value, float):
+        return _round(value) if math.isfinite(value) else None
+    if isinstance(value, (list, tuple)):
+        return [plain(item) for item in value]
+    if isinstance(value, dict):
+        return {str(key): plain(item) for key, item in value.items()}
+    if is_dataclass(value):
+        return {field.name: plain(getattr(value, field.name)) for field in fields(value)}
+    return _plain_leaf(value)
+
+
+def _plain_leaf(value: object) -> Plain:
+    if isinstance(value, Enum):
+        return value.name
+    if value is None or isinstance(value, (bool, int)):
+        return value
+    return value.hex(" ") if isinstance(value, (bytes, bytearray)) else str(value)
+
+
+def printable(data: bytes) -> str:
+    """Return bytes as text, `.` for what cannot be shown."""
+    return "".join(chr(byte) if 32 <= byte < 127 else "." for byte in data)
+
+
+def _round(value: float) -> float:
+    rounded = round(value, _DECIMALS)
+    return rounded or 0.0  # no -0.0
+
+
+def _signed(raw: int) -> int:
+    """Return a position of 15 bits either side of the origin."""
+    half = (POSITION_MASK + 1) // 2
+    return ((raw & POSITION_MASK) + half) % (2 * half) - half

@@ -1,0 +1,172 @@
+"""The bytes of a server packet in words, after its type byte.
+
+A packet whose inside does not fit its own counts is told as plain bytes, as
+`read_packet` does.
+"""
+
+import io
+import math
+from collections.abc import Callable, Iterator, Mapping
+from typing import Any
+
+from construct import Array, Construct, Container, Renamed, Struct
+
+from p2os.config_packet import FIELDS, ConfigPacket
+from p2os.packets import IDENTITY_KIND, read_packet
+from p2os.parameters import RobotParameters
+from p2os.profiles import Profile
+from p2os.sip import HEAD, HEAD_BYTES, READING_BYTES, TAIL, StandardSip
+from p2os.trace.describe import printable
+from p2os.wire import Frame
+
+Span = tuple[bytes, str, str]
+#: Bits of the flags of AROS and ARCOS robots.
+FLAG_BITS = (
+    "motors on", "sonar array 1 on", "sonar array 2 on", "sonar array 3 on", "sonar array 4 on", "STOP button",
+    "E_stall", "far ledge", "near ledge", "joystick button", "charger power good",
+)  # fmt: skip
+#: Fields of the ARCOS tail that have a unit.
+_TAIL_MEANINGS: Mapping[str, Callable[[int], str]] = {
+    "raw_battery_x10": lambda raw: f"{raw / 10:.1f} V",
+    "charge_state": lambda raw: {-1: "unknown", 0: "not charging", 1: "bulk", 2: "overcharge", 3: "float",
+                                 4: "balance"}.get(raw, str(raw)),
+    "raw_rotation_velocity": lambda raw: f"{raw / 10:.1f} deg/s",
+    "raw_lateral_velocity": lambda raw: f"{raw} mm/s",
+    "raw_temperature": lambda raw: "no sensor" if raw == -127 else f"{raw} deg C",
+    "state_of_charge": lambda raw: f"{raw} %",
+    "controller_time_us": lambda raw: f"{raw} us",
+}  # fmt: skip
+
+
+def packet_parts(frame: Frame, profile: Profile, parameters: RobotParameters) -> Iterator[Span]:
+    """Yield (bytes, name, meaning) from the byte after the type to the last one before the checksum."""
+    data = frame.data
+    if frame.kind == IDENTITY_KIND and data:
+        yield from _strings(data, ("name", "class", "subclass"))
+        return
+    packet = read_packet(frame, profile)
+    if isinstance(packet, StandardSip):
+        yield from _sip(packet, frame, profile, parameters)
+    elif isinstance(packet, ConfigPacket):
+        yield from _config(packet, data)
+    else:
+        yield data, "data", "a packet that is not read here"
+
+
+def walk(layout: Construct, data: bytes) -> Iterator[Span]:
+    """Yield (bytes, name, value) of each leaf of a declared layout, then what follows it."""
+    stream = io.BytesIO(data)
+    yield from _walk(layout, stream, _context(), "")
+    yield stream.read(), "rest", "after the last known field"
+
+
+def _walk(layout: Construct, stream: io.BytesIO, context: Any, name: str) -> Iterator[Span]:
+    bare = layout
+    while isinstance(bare, Renamed):
+        name = bare.name or name
+        bare = bare.subcon
+    if isinstance(bare, Struct):
+        inner = _context(context)
+        for sub in bare.subcons:
+            yield from _walk(sub, stream, inner, f"{name}.{sub.name}" if name else str(sub.name))
+        context[name] = inner
+    elif isinstance(bare, Array):
+        count = bare.count(context) if callable(bare.count) else bare.count
+        for number in range(count):
+            yield from _walk(bare.subcon, stream, context, f"{name}[{number}]")
+    else:
+        start = stream.tell()
+        value = layout._parsereport(stream, context, "")  # noqa: SLF001 - construct offers no public step-wise parsing
+        context[name.rsplit(".", maxsplit=1)[-1]] = value
+        yield stream.getvalue()[start : stream.tell()], name, str(value)
+
+
+def _context(parent: Any = None) -> Any:
+    context = Container(_parsing=True, _building=False, _sizing=False, _params=Container())
+    context._ = parent
+    context._root = context if parent is None else parent._root  # noqa: SLF001 - as construct itself sets it
+    return context
+
+
+def _sip(sip: StandardSip, frame: Frame, profile: Profile, parameters: RobotParameters) -> Iterator[Span]:
+    data, meanings = frame.data, _sip_meanings(sip, profile, parameters)
+    size = HEAD_BYTES - 1 + READING_BYTES * len(sip.sonar)
+    first, second = ("gripper state", "analog port") if profile.has_gripper_first else ("analog port", "gripper state")
+    for span, name, text in walk(HEAD, data[:size]):
+        if name.startswith("sonar["):
+            place = int(name[6:].split("]")[0])
+            yield span, *_sonar(name, sip.sonar[place].raw_range, text, parameters)
+        else:
+            title, meaning = meanings.get(name, ({"first": first, "second": second}.get(name, name), text))
+            yield span, title, meaning
+    place = size
+    for (name, width, _), value in zip(TAIL, sip.tail, strict=False):
+        meaning = _TAIL_MEANINGS[name](value) if name in _TAIL_MEANINGS else f"0x{value:X}"
+        yield data[place : place + width], name.removeprefix("raw_").replace("_", " "), meaning
+        place += width
+    yield data[place:], "rest", "after the last known field"
+
+
+def _sonar(name: str, raw_range: int, value: str, parameters: RobotParameters) -> tuple[str, str]:
+    if name.endswith("number"):
+        return "sonar number", value
+    return "sonar range", f"{raw_range} counts = {raw_range * parameters.range_conv_mm / 1000:.3f} m"
+
+
+def _sip_meanings(sip: StandardSip, profile: Profile, parameters: RobotParameters) -> dict[str, tuple[str, str]]:
+    mm, speed = parameters.distance_conv_mm, parameters.velocity_conv
+    degrees = math.degrees(parameters.angle_conv_rad)
+
+    def position(raw: int) -> str:
+        masked = raw & 0x7FFF
+        note = ", bit 15 is not part of it" if masked != raw else ""
+        return f"{masked} counts of {mm:g} mm = {masked * mm / 1000:.3f} m (15 bits{note})"
+
+    def heading(raw: int) -> str:
+        return f"{raw} of {parameters.angle_counts_per_turn} a turn = {raw * degrees:.1f} deg"
+
+    flags = [text for bit, text in enumerate(FLAG_BITS) if sip.raw_flags >> bit & 1]
+    return {
+        "raw_x": ("XPOS", position(sip.raw_x)),
+        "raw_y": ("YPOS", position(sip.raw_y)),
+        "raw_heading": ("THPOS", heading(sip.raw_heading)),
+        "raw_left_velocity": ("L VEL", f"left wheel {sip.raw_left_velocity * speed:.0f} mm/s"),
+        "raw_right_velocity": ("R VEL", f"right wheel {sip.raw_right_velocity * speed:.0f} mm/s"),
+        "raw_battery": ("BATTERY", f"{sip.raw_battery / 10:.1f} V"),
+        "left": ("STALL, BUMPERS", f"left wheel {_stall(sip.stall_left)}, rear bumpers {_bits(sip.rear_bumpers)}"),
+        "right": ("STALL, BUMPERS", f"right wheel {_stall(sip.stall_right)}, front bumpers {_bits(sip.front_bumpers)}"),
+        "raw_control": ("CONTROL", f"heading set-point {heading(sip.raw_control)}"),
+        "raw_flags": ("FLAGS", ", ".join(flags) or "none set") if profile.has_flags
+        else ("PTU", f"pulse width {sip.raw_flags} of servo 1"),
+        "raw_compass": ("COMPASS", f"{sip.raw_compass * 2} deg"),
+        "count": ("SONAR COUNT", f"{len(sip.sonar)} readings follow"),
+        "raw_analog": ("ANALOG", f"{sip.raw_analog} of 255 = {sip.raw_analog / 51:.2f} V"),
+        "digital_in": ("DIGIN", _bits(sip.digital_in, 8)),
+        "digital_out": ("DIGOUT", _bits(sip.digital_out, 8)),
+    }  # fmt: skip
+
+
+def _stall(is_stalled: bool) -> str:
+    return "stalled" if is_stalled else "free"
+
+
+def _bits(value: int, width: int = 7) -> str:
+    return f"0b{value:0{width}b}"
+
+
+def _config(packet: ConfigPacket, data: bytes) -> Iterator[Span]:
+    place = 0
+    for name, kind in FIELDS[: packet.fields_sent]:
+        value = getattr(packet, name)
+        size = len(value.encode("latin-1")) + 1 if isinstance(value, str) else kind.sizeof()
+        yield data[place : place + size], name.upper(), f'"{value}"' if isinstance(value, str) else str(value)
+        place += size
+    yield data[place:], "rest", "after the last known field"
+
+
+def _strings(data: bytes, names: tuple[str, ...]) -> Iterator[Span]:
+    texts = data.split(b"\0", len(names))
+    for name, text in zip(names, texts, strict=False):
+        yield data[: len(text) + 1], name, f'"{printable(text)}"'
+        data = data[len(text) + 1 :]
+    yield data, "rest", "after the last string"
