@@ -7,6 +7,7 @@ neither the chip nor the world: it meets them at wires.
 from adapter_sim.adapter import Adapter
 from adapter_sim.codec import BitOrder, encoder_code, is_near, motor_code, motor_value
 from adapter_sim.distances import threshold_um
+from adapter_sim.gamepad import Gamepad, Master, PadReport
 from adapter_sim.mixing import Mixer, Speeds
 from adapter_sim.pinout import Pinout, PinoutError, load_pinout, parse_pinout
 from adapter_sim.ports import EventCallback, PinBank
@@ -21,8 +22,11 @@ __all__ = [
     "BitOrder",
     "EncoderAtOpen",
     "EventCallback",
+    "Gamepad",
+    "Master",
     "Mixer",
     "MotorMeaning",
+    "PadReport",
     "PinBank",
     "Pinout",
     "PinoutError",

@@ -1,41 +1,37 @@
 """The ESP32 adapter between a BluePill's pins and a Pioneer's P2OS line.
 
-It is a client of the robot, driven by pins. The states and their table stand in
-states.py; here is what happens in them.
+It is a client of the robot, driven by pins or by a game pad, never by both. The
+states and their table stand in states.py; here is what happens in them. The
+firmware in adapter_fw/core is its twin, byte for byte and edge for edge.
 
 Not modelled: the ESP32 itself (cores, Bluetooth, flash), the time that its
 program needs (a pass of its loop takes none here), analog levels.
 
 Invariant: within one instant the order is fixed: reset wire, boot, connection,
-sample, loss, belief, distances, encoders, speeds, stops. A change of rst is seen
+sample, pad, loss, belief, distances, encoders, speeds, stops. A change of rst is seen
 at the end of a slice, where the bench's watched nets put it, and at each sample.
 """
 
 from dataclasses import replace
 from typing import Any, cast
 
-from adapter_sim.belief import Belief
-from adapter_sim.codec import divide_half_away
 from adapter_sim.distances import Distances, threshold_um
-from adapter_sim.encoders import HEADING_MODULUS, EncoderGeometry, Encoders
+from adapter_sim.driver import Driver
+from adapter_sim.gamepad import Master, PadReport
 from adapter_sim.inputs import Inputs
-from adapter_sim.mixing import STILL, Mixer
-from adapter_sim.outputs import CodeWalk, Outputs
-from adapter_sim.pacing import Pacer
+from adapter_sim.masters import Masters
+from adapter_sim.outputs import Outputs
 from adapter_sim.pinout import Pinout, Role
 from adapter_sim.ports import EventCallback, PinBank
 from adapter_sim.session import Session, SessionOpened
-from adapter_sim.settings import AdapterSettings, EncoderAtOpen
+from adapter_sim.settings import AdapterSettings
 from adapter_sim.states import AWAKE_STATES, NEVER, OPEN_STATES, STOPPING_STATES, AdapterState, AdapterStatus, Agenda
-from p2os.commands import enable, rvel, set_origin, sonar, vel
+from adapter_sim.stopper import Stopper
+from adapter_sim.wheel_codes import WheelCodes
+from p2os.commands import set_origin, sonar
 from p2os.parameters import RobotParameters
 from p2os.sip import StandardSip
-from p2os.timing import NS_PER_MS, NS_PER_S, Nanos, Reached
-
-#: ENABLE 1 goes out with this many pairs: one frame may be lost. # chosen: not more, for a person may switch off
-_ENABLES = 2
-#: A robot heard from so recently is still streaming: one SIP period.
-_ECHO_NS: Nanos = 100 * NS_PER_MS
+from p2os.timing import NS_PER_S, Nanos, Reached
 
 
 class Adapter:
@@ -48,6 +44,7 @@ class Adapter:
         settings: None takes the defaults.
         on_event: Told of each transition.
         now: When power comes, in nanoseconds.
+        master: Who commands; the board reads a jumper at boot.
     """
 
     def __init__(
@@ -59,35 +56,26 @@ class Adapter:
         settings: AdapterSettings | None = None,
         on_event: EventCallback | None = None,
         now: Nanos = 0,
+        master: Master = Master.BLUEPILL,
     ) -> None:
         self.pinout = pinout
         self.parameters = parameters
         self.settings = settings = settings or AdapterSettings()
         self.on_event = on_event
         self._sample_period_ns = settings.sample_period_ns
-        self.mixer = Mixer(
-            settings,
-            track_mm=parameters.track_mm,
-            max_velocity_mm_s=min(parameters.max_velocity_mm_s, parameters.motion.max_velocity_mm_s),
-            max_rotation_deg_s=min(parameters.max_rotation_deg_s, parameters.motion.max_rotation_deg_s),
-        )
+        self._driver = Driver(settings, parameters)
         self.distances = Distances(
             len(pinout.with_role(Role.DISTANCE)),
             threshold_um=threshold_um(settings.threshold_um, parameters),
             stale_ns=settings.distance_stale_ns,
         )
-        self.encoders = Encoders(EncoderGeometry.of(parameters, settings.liveness_ns), pinout.value("encoder1").width)
+        self._codes = WheelCodes(settings, parameters, pinout.value("encoder1").width)
         self.session = Session(settings)
         self.outputs = Outputs(pins, pinout)
         self.inputs = Inputs(pins, pinout, settings)
-        self._belief = Belief(
-            patience_ns=settings.disbelief_ns,
-            tolerance_mm_s=settings.disbelief_tolerance_mm_s,
-            progress_mm_s=settings.disbelief_progress_mm_s,
-        )
-        self._pacer = Pacer(spacing_ns=settings.pair_spacing_ns, refresh_ns=settings.refresh_ns)
-        self._walks = (CodeWalk(settings.encoder_dwell_ns), CodeWalk(settings.encoder_dwell_ns))
-        self._heading_scale = HEADING_MODULUS // parameters.angle_counts_per_turn
+        self._masters = Masters(self.inputs, self._driver.mixer, settings, master)
+        self._stopper = Stopper(settings)
+        self._baud_place = 0
         self._now = now
         #: The earliest deadline, and the earliest that is no sample.
         self._deadline: Nanos = now
@@ -104,28 +92,73 @@ class Adapter:
         return self._state
 
     @property
+    def master(self) -> Master:
+        """Return who commands."""
+        return self._masters.master
+
+    @property
+    def baud(self) -> int:
+        """Return the line speed that is being tried or used; whoever owns the line follows it."""
+        return self.settings.bauds[self._baud_place]
+
+    @property
     def status(self) -> AdapterStatus:
         """Return what the adapter knows at this moment."""
         return AdapterStatus(
             state=self._state,
             reason=self._reason,
             motors=self.inputs.motors,
-            speeds=self._pacer.sent,
+            speeds=self._driver.sent,
             distances=self.distances.levels,
             ranges_um=self.distances.ranges_um,
-            counts=self.encoders.counts,
-            counts_shown=(self._walks[0].shown, self._walks[1].shown),
+            counts=self._codes.counts,
+            counts_shown=self._codes.shown,
             sips=self._agenda.sips,
-            odometry_jumps=self.encoders.jumps,
+            odometry_jumps=self._codes.encoders.jumps,
         )
 
     def receive(self, data: bytes, now: Nanos) -> None:
         """Take bytes that the line has delivered at `now`; what was due earlier is done first."""
         self._run(now - 1)
         if self._state in AWAKE_STATES:
-            self._now = self._agenda.heard_at = now
+            self._now = now
+            self._stopper.hear(now)
             self.session.receive(data, now)
             self._take_session_events(now)
+            self._replan()
+
+    def receive_pad(self, report: PadReport, now: Nanos) -> None:
+        """Take a pad's report that came at `now`; without effect on the robot while the BluePill is master."""
+        self._run(now - 1)
+        self._now = max(self._now, now)
+        has_wish_ended = self._masters.take_pad(report, now)
+        if self._state in AWAKE_STATES:
+            if has_wish_ended:
+                self._end_wish("Down was pressed", now)
+            if self._state is AdapterState.DRIVING:
+                self._driver.want(self._masters.speeds)
+        self._replan()
+
+    def set_master(self, master: Master, now: Nanos) -> None:
+        """Give the robot to another master: it is stopped and closed first, and only a new wish starts it."""
+        self._run(now - 1)
+        self._now = max(self._now, now)
+        if master is self._masters.master:
+            return
+        if self._state is AdapterState.CONNECTING or self._state in OPEN_STATES:
+            self._halt(now)
+        self._masters.switch(master)
+        self._tell(now, "master", master.value)
+        if self._state in AWAKE_STATES:
+            self._enter(AdapterState.LOST, now, "master", "waits for the new master's wish, given anew")
+        self._replan()
+
+    def shutdown(self, reason: str, now: Nanos) -> None:
+        """Stop the robot, drive every output to its safe level, and wait for the wish to end."""
+        self._run(now - 1)
+        self._now = max(self._now, now)
+        if self._state in AWAKE_STATES:
+            self._lose(now, "shutdown", reason)
             self._replan()
 
     def take_output(self) -> list[bytes]:
@@ -149,14 +182,13 @@ class Adapter:
     def snapshot(self) -> dict[str, object]:
         """Return all that decides the future, as plain values."""
         return {
-            "adapter": (self._state.value, self._reason, self._now, self._next_sample),
+            "adapter": (self._state.value, self._reason, self._now, self._next_sample, self._baud_place),
             "agenda": replace(self._agenda),
-            "inputs": self.inputs.snapshot(),
-            "belief": self._belief.snapshot(),
-            "pacer": self._pacer.snapshot(),
-            "walks": tuple(walk.snapshot() for walk in self._walks),
+            "masters": self._masters.snapshot(),
+            "stopper": self._stopper.snapshot(),
+            "driver": self._driver.snapshot(),
             "distances": self.distances.snapshot(),
-            "encoders": self.encoders.snapshot(),
+            "codes": self._codes.snapshot(),
             "outputs": self.outputs.snapshot(),
             "session": self.session.snapshot(),
         }  # fmt: skip
@@ -164,16 +196,14 @@ class Adapter:
     def restore(self, snapshot: object) -> None:
         """Put back what `snapshot` returned."""
         parts = cast("dict[str, Any]", snapshot)
-        state, self._reason, self._now, self._next_sample = parts["adapter"]
+        state, self._reason, self._now, self._next_sample, self._baud_place = parts["adapter"]
         self._state = AdapterState(state)
         self._agenda = replace(parts["agenda"])
-        self.inputs.restore(parts["inputs"])
-        self._belief.restore(parts["belief"])
-        self._pacer.restore(parts["pacer"])
-        for walk, saved in zip(self._walks, parts["walks"], strict=True):
-            walk.restore(saved)
+        self._masters.restore(parts["masters"])
+        self._stopper.restore(parts["stopper"])
+        self._driver.restore(parts["driver"])
         self.distances.restore(parts["distances"])
-        self.encoders.restore(parts["encoders"])
+        self._codes.restore(parts["codes"])
         self.outputs.restore(parts["outputs"])
         self.session.restore(parts["session"])
         self._replan()
@@ -216,30 +246,25 @@ class Adapter:
         if now >= self._next_sample:
             self._sample(now)
             self._next_sample = now + self._sample_period_ns
+        if (lost_at := self._masters.pad_lost_at) is not None and now >= lost_at:
+            self._lose_pad(now)
         if self._state in OPEN_STATES:
             self._run_open(now)
-        if self._state in STOPPING_STATES and self._agenda.stops_left and now >= self._agenda.stop_at:
-            self._repeat_stop(now)
+        if self._state in STOPPING_STATES:
+            self._stopper.repeat(self.session, now)
         if self._state is AdapterState.CLOSING and now >= self._agenda.retry_at:
             self._enter(AdapterState.IDLE, now, "idle", "closed")
-        if self._state is AdapterState.IDLE and self.inputs.wants_robot:
-            self._begin_session(now, "p2dx_con is high")
+        if self._state is AdapterState.IDLE and self._masters.wants_robot:
+            self._begin_session(now, self._masters.wish)
         if self._state is AdapterState.CONNECTING and now >= self._agenda.retry_at:
             self._begin_session(now, "trying again")
-
-    def _repeat_stop(self, now: Nanos) -> None:
-        """Say the stop sequence again: nobody has confirmed it; a robot closed in peace shows it by its silence."""
-        self._agenda.stops_left -= 1
-        self._agenda.stop_at = now + self.settings.stop_repeat_ns
-        if not self._agenda.closed_in_peace or now - self._agenda.heard_at < _ECHO_NS:
-            self.session.abandon(now)
 
     def _run_open(self, now: Nanos) -> None:
         if now >= self._agenda.sip_deadline:
             self._lose(now, "lost", "no SIP in time")
             return
-        if self._state is AdapterState.DRIVING and now >= self._belief.ends_at:
-            self._lose(now, "disbelief", self._belief.describe())
+        if self._state is AdapterState.DRIVING and now >= self._driver.belief.ends_at:
+            self._lose(now, "disbelief", self._driver.belief.describe())
             return
         expires_at = self.distances.expires_at
         if expires_at is not None and now >= expires_at:
@@ -250,7 +275,7 @@ class Adapter:
             self.session.send(sonar(on=True), now)
             self._agenda.sonar_at = now + self.settings.distance_stale_ns
         self._walk(now)
-        if self._state is AdapterState.DRIVING and now >= self._pacer.due_at(now):
+        if self._state is AdapterState.DRIVING and now >= self._driver.pair_due_at(now):
             self._send_pair(now)
 
     def _replan(self) -> None:
@@ -260,15 +285,14 @@ class Adapter:
             # Only rst is looked at; `_other` keeps these instants off the fast path.
             self._other = self._deadline = min(self._agenda.boot_at, self._next_sample)
             return
-        times = [self.session.next_deadline()]
+        times = [self.session.next_deadline(), self._masters.pad_lost_at]
         if state in OPEN_STATES:
             times += [self._agenda.sip_deadline, self._agenda.sonar_at, self.distances.expires_at]
-            counts = self.encoders.counts
-            times += [walk.due_at(target, self._now) for walk, target in zip(self._walks, counts, strict=True)]
+            times += self._codes.due_at(self._now)
         if state is AdapterState.DRIVING:
-            times += [self._belief.ends_at, self._pacer.due_at(self._now)]
-        if state in STOPPING_STATES and self._agenda.stops_left:
-            times.append(self._agenda.stop_at)
+            times += [self._driver.belief.ends_at, self._driver.pair_due_at(self._now)]
+        if state in STOPPING_STATES:
+            times.append(self._stopper.due_at)
         if state in {AdapterState.CLOSING, AdapterState.CONNECTING}:
             times.append(self._agenda.retry_at)
         self._other = min((time for time in times if time is not None), default=NEVER)
@@ -279,16 +303,14 @@ class Adapter:
     def _clear(self) -> None:
         """Forget everything, as a reset does."""
         self._agenda = Agenda()
+        self._stopper.reset()
         self._next_sample = self._now
-        self.inputs.reset()
-        self._belief.begin(self._now)
-        self._pacer.begin(STILL)
+        self._masters.reset()
+        self._driver.reset(self._now)
         self.distances.forget()
-        self.encoders.begin()
-        self.encoders.jumps = 0
-        for walk in self._walks:
-            walk.reset()
+        self._codes.reset()
         self.session.forget()
+        self._baud_place = 0
 
     def _turn_reset(self, now: Nanos) -> None:
         """Follow the reset wire, which stands otherwise than the state says."""
@@ -307,10 +329,10 @@ class Adapter:
         self.outputs.show_encoders((0, 0), now)
         self.session.stop_unknown()
         self._next_sample = now
-        self._enter(AdapterState.IDLE, now, "booted", "waits for p2dx_con")
+        self._enter(AdapterState.IDLE, now, "booted", "waits for its master's wish")
 
     def _begin_session(self, now: Nanos, why: str) -> None:
-        self._agenda.stops_left = 0
+        self._stopper.cancel()
         self._agenda.retry_at = NEVER
         self.session.connect(now)
         self._enter(AdapterState.CONNECTING, now, "connecting", why)
@@ -325,6 +347,7 @@ class Adapter:
             elif self._state is AdapterState.CONNECTING:
                 self.session.drop(now)
                 self._agenda.retry_at = now + self.settings.retry_ns
+                self._baud_place = (self._baud_place + 1) % len(self.settings.bauds)
                 self._tell(
                     now, "no connection", f"{event.reason}; tries again in {self.settings.retry_ns / NS_PER_S:.1f} s"
                 )
@@ -339,12 +362,7 @@ class Adapter:
         self._agenda.settle_at = now + settings.settle_ns
         self._agenda.sonar_at = now + settings.distance_stale_ns
         self.distances.forget()
-        if settings.encoder_at_open is EncoderAtOpen.ZERO:
-            for walk in self._walks:
-                walk.rebase(1 << self.encoders.width)
-            self.encoders.begin()
-        else:
-            self.encoders.begin((self._walks[0].shown, self._walks[1].shown))
+        self._codes.open()
         self._enter(AdapterState.SETTLING, now, "connected", robot)
 
     def _take_sip(self, sip: StandardSip, now: Nanos) -> None:
@@ -361,45 +379,41 @@ class Adapter:
             if (sip.raw_x, sip.raw_y, sip.raw_heading) != (0, 0, 0) and now < self._agenda.settle_at:
                 return
             self._drive(now)
-        if not self.encoders.take(sip.raw_x, sip.raw_y, sip.raw_heading * self._heading_scale):
+        if not self._codes.take(sip):
             self._tell(now, "odometry jumped", "the step is no travel; counts go on from here")
-        conversion = self.parameters.velocity_um_s_per_count
+        self._driver.take(sip, now)
         stalled = (sip.stall_left, sip.stall_right)
-        self._belief.take(
-            divide_half_away(sip.raw_left_velocity * conversion, 1_000),
-            divide_half_away(sip.raw_right_velocity * conversion, 1_000),
-            stalled=any(stalled),
-            now=now,
-        )
         if stalled != self._agenda.stalled:
             self._agenda.stalled = stalled
             self._tell(now, "stall", f"left {int(stalled[0])}, right {int(stalled[1])}")
         self._walk(now)
 
     def _drive(self, now: Nanos) -> None:
-        self._agenda.enables_left = _ENABLES
-        self._pacer.begin(self.mixer.mix(*self.inputs.motors))
-        self._belief.begin(now)
+        self._driver.begin(self._masters.speeds, now)
         self._enter(AdapterState.DRIVING, now, "driving", "odometry is taken, motors enabled")
 
     def _lose(self, now: Nanos, what: str, why: str) -> None:
         self._halt(now)
-        self._agenda.closed_in_peace = False
-        self._enter(AdapterState.LOST, now, what, f"{why}; stopped until p2dx_con is given anew")
+        self._masters.forget_wish()
+        self._enter(AdapterState.LOST, now, what, f"{why}; stopped until its master's wish is given anew")
 
-    def _disconnect(self, now: Nanos) -> None:
-        self._halt(now)
-        self._agenda.closed_in_peace = True
-        self._agenda.retry_at = now + self.settings.stop_repeat_ns
-        self._enter(AdapterState.CLOSING, now, "disconnected", "p2dx_con is low")
+    def _lose_pad(self, now: Nanos) -> None:
+        if self._masters.lose_pad() and (self._state is AdapterState.CONNECTING or self._state in OPEN_STATES):
+            self._lose(now, "pad lost", "no report of the pad in time")
+
+    def _end_wish(self, why: str, now: Nanos) -> None:
+        """Leave the robot, which the master no longer wants."""
+        if self._state is AdapterState.CONNECTING or self._state in OPEN_STATES:
+            self._halt(now)
+            self._stopper.end_in_peace()
+            self._agenda.retry_at = now + self.settings.stop_repeat_ns
+            self._enter(AdapterState.CLOSING, now, "disconnected", why)
 
     def _halt(self, now: Nanos) -> None:
         """Stop and close the robot, and show what is known: nothing."""
-        self.session.abandon(now)
-        self._agenda.stops_left = self.settings.stop_repeats
-        self._agenda.stop_at = now + self.settings.stop_repeat_ns
+        self._stopper.begin(self.session, now)
         self.distances.forget()
-        self._pacer.begin(STILL)
+        self._driver.stop()
         self.outputs.show_safe(now)
 
     def _enter(self, state: AdapterState, now: Nanos, what: str, why: str) -> None:
@@ -414,30 +428,18 @@ class Adapter:
     # Work ------------------------------------------------------------------------------------------------
 
     def _sample(self, now: Nanos) -> None:
-        motors_changed, connect_changed = self.inputs.sample(now)
-        if motors_changed and self._state is AdapterState.DRIVING:
-            self._pacer.wanted = self.mixer.mix(*self.inputs.motors)
-        if not connect_changed or self.inputs.wants_robot:
-            return
-        if self._state in {AdapterState.CONNECTING, *OPEN_STATES}:
-            self._disconnect(now)
-        elif self._state is AdapterState.LOST:
-            self._enter(AdapterState.IDLE, now, "idle", "p2dx_con is low; ready for a new connection")
+        have_speeds_changed, has_wish_ended = self._masters.sample(now)
+        if have_speeds_changed and self._state is AdapterState.DRIVING:
+            self._driver.want(self._masters.speeds)
+        if has_wish_ended:
+            self._end_wish("p2dx_con is low", now)
+        if self._state is AdapterState.LOST and not self._masters.wants_robot:
+            self._enter(AdapterState.IDLE, now, "idle", "ready for a new connection")
 
     def _walk(self, now: Nanos) -> None:
-        counts = self.encoders.counts
-        for walk, target in zip(self._walks, counts, strict=True):
-            walk.step(target, now)
-        self.outputs.show_encoders((self._walks[0].shown, self._walks[1].shown), now)
+        self.outputs.show_encoders(self._codes.walk(now), now)
 
     def _send_pair(self, now: Nanos) -> None:
-        before, speeds = self._pacer.sent, self._pacer.take(now)
-        if self._agenda.enables_left:
-            self._agenda.enables_left -= 1
-            self.session.send(enable(on=True), now)
-        self.session.send(vel(speeds.forward_mm_s), now)
-        self.session.send(rvel(speeds.turn_deg_s), now)
-        self._belief.expect(*self.mixer.wheels_mm_s(speeds))
-        if speeds != before:
-            left, right = self.inputs.motors
+        if self._driver.send_pair(self.session, now):
+            speeds, (left, right) = self._driver.sent, self.inputs.motors
             self._tell(now, "command", f"VEL {speeds.forward_mm_s}, RVEL {speeds.turn_deg_s} (motors {left}, {right})")

@@ -13,6 +13,7 @@ zero), so that the robot keeps its path and only takes longer.
 from dataclasses import dataclass
 
 from adapter_sim.codec import divide_half_away
+from adapter_sim.gamepad import STICK_FULL, TRIGGER_FULL
 from adapter_sim.settings import AdapterSettings, MotorMeaning
 
 #: 180/π, in 1e-9.
@@ -50,6 +51,8 @@ class Mixer:
         self._meaning = settings.motor_meaning
         self._step_um_per_s = settings.step_um_per_s
         self._angular_step_urad_per_s = settings.angular_step_urad_per_s
+        self._pad_velocity_mm_s = settings.pad_velocity_mm_s
+        self._pad_rotation_mrad_s = settings.pad_rotation_mrad_s
 
     def mix(self, motor1: int, motor2: int) -> Speeds:
         """Return the speeds that a pair of signed motor values asks for."""
@@ -63,6 +66,13 @@ class Mixer:
             forward = divide_half_away(motor1 * self._step_um_per_s, 1_000)
             turn = divide_half_away(motor2 * self._angular_step_urad_per_s * DEG_PER_RAD_E9, 10**15)
         return self._limited(forward, turn)
+
+    def steer(self, forward: int, turn: int) -> Speeds:
+        """Return the speeds of a pad's deflections: `forward` of 1023, `turn` of 511 to the left."""
+        return self._limited(
+            divide_half_away(forward * self._pad_velocity_mm_s, TRIGGER_FULL),
+            divide_half_away(turn * self._pad_rotation_mrad_s * DEG_PER_RAD_E9, STICK_FULL * 10**12),
+        )
 
     def wheels_mm_s(self, speeds: Speeds) -> tuple[int, int]:
         """Return the rim speeds (left, right) that commanded speeds mean, in whole mm/s."""

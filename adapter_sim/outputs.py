@@ -1,11 +1,7 @@
 """The adapter's output pins: distances and encoder codes, released or driven.
 
-Only changes are written. Encoder codes walk: at most one code each
-`encoder_dwell_ns`, so that a program that polls never sees a jump, not even
-when packets were lost and the wheels have turned meanwhile.
+Only changes are written.
 """
-
-from typing import TypeAlias
 
 from adapter_sim.pinout import Pinout, Role, Safe
 from adapter_sim.ports import PinBank
@@ -13,47 +9,6 @@ from p2os.timing import Nanos
 
 #: The values of both wheels, left first.
 ENCODER_VALUES = ("encoder1", "encoder2")
-
-#: Count shown, time of the last step or None.
-WalkSnapshot: TypeAlias = tuple[int, Nanos | None]
-
-
-class CodeWalk:
-    """One encoder's count on its way to a target."""
-
-    def __init__(self, dwell_ns: Nanos) -> None:
-        self._dwell_ns = dwell_ns
-        self.shown = 0
-        self._stepped_at: Nanos | None = None
-
-    def due_at(self, target: int, now: Nanos) -> Nanos | None:
-        """Return when the next step towards the target is due, None where it is reached."""
-        if self.shown == target:
-            return None
-        return now if self._stepped_at is None else max(now, self._stepped_at + self._dwell_ns)
-
-    def step(self, target: int, now: Nanos) -> None:
-        """Take a step if one is due."""
-        if self.due_at(target, now) == now:
-            self.shown += 1 if target > self.shown else -1
-            self._stepped_at = now
-
-    def rebase(self, steps: int) -> None:
-        """Name the same code by its count nearest to 0."""
-        self.shown = (self.shown + steps // 2) % steps - steps // 2
-
-    def reset(self) -> None:
-        """Stand at 0."""
-        self.shown = 0
-        self._stepped_at = None
-
-    def snapshot(self) -> WalkSnapshot:
-        """Return all of it as plain values."""
-        return self.shown, self._stepped_at
-
-    def restore(self, snapshot: WalkSnapshot) -> None:
-        """Put back what `snapshot` returned."""
-        self.shown, self._stepped_at = snapshot
 
 
 class Outputs:

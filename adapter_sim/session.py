@@ -153,8 +153,8 @@ class Session:
         self._output = list(output)
 
     def _collect(self) -> None:
-        is_syncing = self._connection.state is ConnectionState.SYNC0
+        is_open = self._connection.state is ConnectionState.OPEN
         for frame in self._connection.take_output():
-            if is_syncing and frame == _SYNC0:
+            if not is_open and frame == _SYNC0:
                 self.stop_unknown()
             self._output.append(frame)

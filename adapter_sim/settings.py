@@ -29,6 +29,10 @@ class EncoderAtOpen(StrEnum):
     CONTINUE = "continue"
 
 
+#: More line speeds than this are not searched.
+MAX_BAUDS = 8
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class AdapterSettings:
     """The adapter's settings; every one has a default that works.
@@ -92,13 +96,26 @@ class AdapterSettings:
     stop_repeats: int = 3
     stop_repeat_ns: Nanos = 200 * NS_PER_MS
 
+    #: Line speeds tried in turn while nobody answers, 1 to 8 of them.
+    bauds: tuple[int, ...] = (9_600,)
+
+    #: A game pad's full deflections (the thesis: 0.4 m/s and 1.7 rad/s; its later repository 0.5 m/s).
+    pad_velocity_mm_s: int = 400
+    pad_rotation_mrad_s: int = 1_700
+    #: Triggers below this of 1023, and sticks nearer to the middle than this of 511, count as at rest.
+    pad_trigger_dead: int = 40
+    pad_stick_dead: int = 40
+    #: A pad that was silent so long is lost. # chosen: with a pair being sent and the STOP, less than 200 ms
+    pad_loss_ns: Nanos = 150 * NS_PER_MS
+
     def __post_init__(self) -> None:
+        self._check_bauds()
         self._coerce("bit_order", BitOrder)
         self._coerce("motor_meaning", MotorMeaning)
         self._coerce("encoder_at_open", EncoderAtOpen)
         for field in fields(self):
             value = getattr(self, field.name)
-            if isinstance(value, StrEnum) or value is None or field.name == "stop_unknown_robot":
+            if isinstance(value, StrEnum) or value is None or field.name in {"stop_unknown_robot", "bauds"}:
                 continue
             if not isinstance(value, int) or isinstance(value, bool):
                 raise UsageError(f"adapter setting {field.name} must be an integer, got {value!r}")
@@ -111,11 +128,29 @@ class AdapterSettings:
             )
         if self.sample_count % 2 == 0:
             raise UsageError(f"adapter setting sample_count must be odd for a majority, got {self.sample_count}")
+        if self.pad_trigger_dead >= 1_023 or self.pad_stick_dead >= 511:
+            raise UsageError(
+                f"adapter settings pad_trigger_dead = {self.pad_trigger_dead}, pad_stick_dead = {self.pad_stick_dead} "
+                "leave nothing of the pad",
+                hint="below 1023 and below 511",
+            )
         if self.refresh_ns < self.pair_spacing_ns:
             raise UsageError(
                 f"adapter setting refresh_ns ({self.refresh_ns}) is below pair_spacing_ns ({self.pair_spacing_ns})",
                 hint="two pairs cannot be nearer to each other than pair_spacing_ns",
             )
+
+    def _check_bauds(self) -> None:
+        bauds = self.bauds
+        if (
+            not isinstance(bauds, tuple | list)
+            or not 1 <= len(bauds) <= MAX_BAUDS
+            or not all(isinstance(baud, int) and not isinstance(baud, bool) and baud > 0 for baud in bauds)
+        ):
+            raise UsageError(
+                f"adapter setting bauds is {bauds!r}", hint=f"1 to {MAX_BAUDS} line speeds such as [9600, 38400]"
+            )
+        object.__setattr__(self, "bauds", tuple(bauds))
 
     def _coerce(self, name: str, kind: type[StrEnum]) -> None:
         value = getattr(self, name)
@@ -131,6 +166,7 @@ _MAY_BE_ZERO = frozenset(
     {
         "connect_after_ns", "disconnect_after_ns", "boot_ns", "encoder_dwell_ns", "stop_repeats",
         "max_velocity_mm_s", "max_rotation_deg_s", "step_um_per_s", "angular_step_urad_per_s",
-        "threshold_um", "disbelief_tolerance_mm_s",
+        "threshold_um", "disbelief_tolerance_mm_s", "pad_velocity_mm_s", "pad_rotation_mrad_s", "pad_trigger_dead",
+        "pad_stick_dead",
     }
 )  # fmt: skip

@@ -8,14 +8,14 @@ its state moves only there, at its own deadlines, and when bytes arrive:
 
     RESET       rst is high: outputs released to their pulls, nothing runs
     BOOTING     rst fell (or power came): released still, for `boot_ns`
-    IDLE        outputs safe, waits for p2dx_con
+    IDLE        outputs safe, waits for its master's wish: p2dx_con, or the pad's Up
     CONNECTING  the P2OS connection is being made; outputs safe
     SETTLING    OPEN: SETO and SONAR 1 sent, waits for odometry zero; distances live
     DRIVING     ENABLE 1 sent; motor values become VEL and RVEL; all live
-    CLOSING     p2dx_con fell: STOP, VEL 0, RVEL 0, CLOSE sent; lasts `stop_repeat_ns`
-    LOST        no SIP, no belief, or the robot closed: the same four sent; waits for p2dx_con low
+    CLOSING     the wish ended: STOP, VEL 0, RVEL 0, CLOSE sent; lasts `stop_repeat_ns`
+    LOST        no SIP, no belief, no pad, a shutdown: the same four sent; waits for the wish to end
 
-    from         rst high  boot over  p2dx_con high  p2dx_con low  opened    odometry 0      ended or not
+    from         rst high  boot over  wish given     wish ended    opened    odometry 0      ended or not
                                                                              or settle_ns    believed
     RESET        ·         ·          ·              ·             ·         ·               ·
     BOOTING      RESET     IDLE       ·              ·             ·         ·               ·
@@ -27,8 +27,8 @@ its state moves only there, at its own deadlines, and when bytes arrive:
     LOST         RESET     ·          ·              ·             IDLE      ·               ·
 
 RESET leaves to BOOTING when rst is low, CLOSING to IDLE when its time is over.
-From LOST the way to motion leads over p2dx_con low and high again, whatever the
-robot does meanwhile.
+From LOST the way to motion leads over a new wish (p2dx_con low and high again, or
+Up), whatever the robot does meanwhile. A change of masters leads to LOST too.
 
 Any packet revives the last speed of a robot that its watchdog has stopped. So
 the first frames after a loss are STOP, VEL 0, RVEL 0, and the same three stand
@@ -107,15 +107,6 @@ class Agenda:
     settle_at: Nanos = NEVER
     #: SONAR 1 is said again unless a reading comes before.
     sonar_at: Nanos = NEVER
-    #: Next repetition of the stop sequence, and how many are left.
-    stop_at: Nanos = NEVER
-    stops_left: int = 0
-    #: Whether the session ended on the wish of p2dx_con.
-    closed_in_peace: bool = False
-    #: When bytes of the robot came last.
-    heard_at: Nanos = 0
-    #: Pairs before which ENABLE 1 is still to be said.
-    enables_left: int = 0
     #: Stall flags of the last SIP.
     stalled: tuple[bool, bool] = (False, False)
     #: SIPs taken.

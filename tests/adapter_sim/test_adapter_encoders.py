@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from adapter_sim.encoders import HALF_COUNTS, ONE_BITS, EncoderGeometry, Encoders, forward_step, sine
-from adapter_sim.outputs import CodeWalk
+from adapter_sim.wheel_codes import CodeWalk
 from p2os.parameters import load_parameters
 
 GEOMETRY = EncoderGeometry.of(load_parameters("p2dx"), 350_000_000)

@@ -174,7 +174,7 @@ class DeafRobotMachine(AdapterMachine):
     def nobody_drives_a_deaf_robot_for_long(self) -> None:
         rig = self.rig
         if rig.adapter.state == "driving":
-            assert rig.now <= rig.adapter._belief.ends_at
+            assert rig.now <= rig.adapter._driver.belief.ends_at
 
 
 class PioneerMachine(AdapterMachine):

@@ -1,0 +1,190 @@
+// The adapter between a BluePill's pins and a Pioneer's P2OS line.
+//
+// A client of the robot, driven by pins or by a game pad, never by both:
+//
+//     RESET       rst is high: outputs released to their pulls, nothing runs
+//     BOOTING     rst fell (or power came): released still, for boot_ns
+//     IDLE        outputs safe, waits for p2dx_con (or the pad's Up)
+//     CONNECTING  the P2OS connection is being made; outputs safe
+//     SETTLING    OPEN: SETO and SONAR 1 sent, waits for odometry zero; distances live
+//     DRIVING     ENABLE 1 sent; motor values become VEL and RVEL; all live
+//     CLOSING     the wish has ended: STOP, VEL 0, RVEL 0, CLOSE sent; lasts stop_repeat_ns
+//     LOST        no SIP, no belief, no pad, or a shutdown: the same four sent; waits for the wish to end
+//
+// From LOST the way to motion leads over a new wish, whatever the robot does
+// meanwhile. adapter_sim/states.py has the table of transitions; this is its twin,
+// and a test drives both with the same pins, bytes and times.
+//
+// Invariant: within one instant the order is fixed: reset wire, boot, connection,
+// sample, loss, belief, distances, encoders, speeds, stops.
+#pragma once
+
+#include <cstdint>
+
+#include "../../hal/pins.hpp"
+#include "../p2os/client.hpp"
+#include "belief.hpp"
+#include "distances.hpp"
+#include "encoders.hpp"
+#include "gamepad.hpp"
+#include "mixing.hpp"
+#include "outputs.hpp"
+#include "sampler.hpp"
+#include "settings.hpp"
+
+namespace adapter {
+
+enum class State : std::uint8_t { RESET, BOOTING, IDLE, CONNECTING, SETTLING, DRIVING, CLOSING, LOST };
+
+//: What happened; the words are those of the Python model.
+enum class What : std::uint8_t {
+  RESET, BOOTING, BOOTED, CONNECTING, CONNECTED, NO_CONNECTION, DRIVING, COMMAND, STALL, ODOMETRY_JUMPED,
+  DISCONNECTED, IDLE, LOST, DISBELIEF, PAD_LOST, MASTER, MASTER_WAITS, SHUTDOWN,
+};
+const char* text(State state);
+const char* text(What what);
+const char* text(Master master);
+
+//: What the adapter has set out to do, and when; a reset wipes it. NEVER where nothing is set out.
+struct Agenda {
+  Nanos boot_at = p2os::NEVER;
+  //: Next try to connect, or end of CLOSING.
+  Nanos retry_at = p2os::NEVER;
+  Nanos sip_deadline = p2os::NEVER;
+  //: From here on the odometry is taken as it is.
+  Nanos settle_at = p2os::NEVER;
+  //: SONAR 1 is said again unless a reading comes before.
+  Nanos sonar_at = p2os::NEVER;
+  Nanos stop_at = p2os::NEVER;
+  //: When bytes of the robot came last.
+  Nanos heard_at = 0;
+  std::int32_t stops_left = 0;
+  std::int32_t enables_left = 0;
+  std::uint32_t sips = 0;
+  //: Whether the session ended on the wish of its master.
+  bool closed_in_peace = false;
+  bool stall_left = false;
+  bool stall_right = false;
+};
+
+//: Told of each transition.
+class Observer {
+ public:
+  //: `detail` is a static string or the reason of a shutdown; the numbers depend on `what` (see adapter.cpp).
+  virtual void happened(Nanos now, What what, const char* detail, std::int32_t first, std::int32_t second) = 0;
+
+ protected:
+  ~Observer() = default;
+};
+
+class Adapter final : private p2os::ClientListener {
+ public:
+  // Power comes at `now`. The settings must be without fault (settings.hpp).
+  Adapter(const Settings& settings, const RobotNumbers& robot, const WireNumbers& wires, Nanos now);
+  // A copy goes its own way from the same state; it has to be attached. An assignment keeps what is attached.
+  Adapter(const Adapter& other);
+  Adapter& operator=(const Adapter&) = default;
+
+  // Where the wires are and who is told; they must outlive the adapter.
+  void attach(hal::PinsIn* in, hal::PinsOut* out, Observer* observer);
+
+  // Takes bytes that arrived at `now`; what was due earlier is done first.
+  void receive(p2os::Bytes data, Nanos now);
+  // Takes a pad's report that came at `now`.
+  void receive_pad(const PadReport& report, Nanos now);
+  // Gives the robot to another master: stopped and closed first, and only a new wish starts it.
+  void set_master(Master master, Nanos now);
+  // Stops the robot, drives every output to its safe level, and waits for the wish to end. `reason` is static.
+  void shutdown(const char* reason, Nanos now);
+
+  // Acts on everything due up to and including `limit`, then looks at rst.
+  void advance_to(Nanos limit);
+  Nanos next_deadline() const { return deadline_; }
+  [[nodiscard]] bool take_output(p2os::CommandFrame& frame) { return client_.take_output(frame); }
+
+  State state() const { return state_; }
+  Master master() const { return master_; }
+  const char* reason() const { return reason_; }
+  // Puts another text in the place of the reason; for one who restores a state that another process saved.
+  void set_reason(const char* reason) { reason_ = reason; }
+  std::int32_t motor(int number) const;
+  Speeds speeds() const { return pacer_.sent(); }
+  Wheels counts() const { return encoders_.counts(); }
+  Wheels counts_shown() const { return {left_walk_.shown(), right_walk_.shown()}; }
+  std::uint32_t sips() const { return agenda_.sips; }
+  std::uint32_t jumps() const { return encoders_.jumps(); }
+  std::int64_t range_um(std::int32_t number) const { return distances_.range_um(number); }
+  const Outputs& outputs() const { return outputs_; }
+  const p2os::Client& client() const { return client_; }
+  const p2os::Identity& robot() const { return identity_; }
+  // Returns the line speed that is being tried or used.
+  std::int32_t baud() const { return settings_.bauds[baud_]; }
+
+ private:
+  void session_opened(const p2os::Identity& robot, Nanos now) override;
+  void session_ended(p2os::EndReason reason, Nanos now) override;
+  void take_sip(const p2os::Sip& sip, Nanos now) override;
+  void take_packet(p2os::Bytes, Nanos) override {}
+
+  Nanos run(Nanos limit);
+  void act(Nanos now);
+  void work(Nanos now);
+  void run_open(Nanos now);
+  void repeat_stop(Nanos now);
+  void replan();
+  void clear();
+  void turn_reset(Nanos now);
+  void boot(Nanos now);
+  void begin_session(Nanos now, const char* why);
+  void drive(Nanos now);
+  void lose(What what, const char* why, Nanos now);
+  void lose_pad(Nanos now);
+  void end_of_wish(const char* why, Nanos now);
+  void halt(Nanos now);
+  void sample(Nanos now);
+  void walk(Nanos now);
+  void send_pair(Nanos now);
+  void next_baud();
+  void enter(State state, Nanos now, What what, const char* why);
+  void tell(Nanos now, What what, const char* detail, std::int32_t first = 0, std::int32_t second = 0);
+  std::uint32_t read_pins(Nanos at) { return in_ ? in_->read(at) : 0; }
+  bool is_reset_wire_high(Nanos at) { return (read_pins(at) >> reset_bit_ & 1U) != 0; }
+  bool is_awake() const { return state_ != State::RESET && state_ != State::BOOTING; }
+  bool is_open() const { return state_ == State::SETTLING || state_ == State::DRIVING; }
+  bool is_stopping() const { return state_ == State::CLOSING || state_ == State::LOST || state_ == State::IDLE; }
+  bool wants_robot() const;
+  Speeds wanted_speeds() const;
+
+  p2os::Own<hal::PinsIn> in_;
+  p2os::Own<Observer> observer_;
+
+  Settings settings_;
+  RobotNumbers robot_;
+  WireNumbers wires_;
+  std::int32_t reset_bit_;
+  std::int32_t heading_scale_;
+  Mixer mixer_;
+  Distances distances_;
+  Encoders encoders_;
+  p2os::Client client_;
+  Outputs outputs_;
+  Majority majority_;
+  Debounce connect_;
+  Gamepad pad_;
+  Belief belief_;
+  Pacer pacer_;
+  CodeWalk left_walk_;
+  CodeWalk right_walk_;
+  p2os::Identity identity_;
+
+  State state_ = State::BOOTING;
+  Master master_ = Master::BLUEPILL;
+  const char* reason_ = "power";
+  std::size_t baud_ = 0;
+  Nanos now_;
+  Nanos next_sample_;
+  Nanos deadline_;
+  Agenda agenda_;
+};
+
+}  // namespace adapter

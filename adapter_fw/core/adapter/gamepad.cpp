@@ -1,0 +1,43 @@
+#include "gamepad.hpp"
+
+namespace adapter {
+
+namespace {
+
+constexpr std::int32_t TRIGGER_FULL = 1'023, STICK_FULL = 511;
+
+// Returns a deflection with its dead zone taken out and the rest stretched to the full range.
+std::int32_t outside(std::int32_t value, std::int32_t dead, std::int32_t full) {
+  const std::int32_t size = value < 0 ? -value : value;
+  if (size <= dead) {
+    return 0;
+  }
+  const std::int32_t cut = size > full ? full : size;
+  const std::int32_t stretched = (cut - dead) * full / (full - dead);
+  return value < 0 ? -stretched : stretched;
+}
+
+}  // namespace
+
+void Gamepad::take(const PadReport& report, Nanos now) {
+  reported_at_ = now;
+  has_report_ = true;
+  if (report.down) {
+    wants_robot_ = false;
+  } else if (report.up && !was_up_) {
+    wants_robot_ = true;
+  }
+  was_up_ = report.up;
+  forward_ = outside(report.forward, trigger_dead_, TRIGGER_FULL) -
+             outside(report.backward, trigger_dead_, TRIGGER_FULL);
+  turn_ = -outside(report.turn, stick_dead_, STICK_FULL);
+}
+
+// A button that was down when the pad went must come up before it means anything.
+void Gamepad::lose() {
+  has_report_ = wants_robot_ = false;
+  was_up_ = true;
+  forward_ = turn_ = 0;
+}
+
+}  // namespace adapter

@@ -1,0 +1,91 @@
+#include "settings.hpp"
+
+#include <initializer_list>
+
+namespace adapter {
+
+namespace {
+
+//: Beyond these the 64-bit products of mixing.cpp and encoders.cpp would no longer fit.
+constexpr std::int64_t MAX_RIM_UM_PER_S = 80'000'000;
+constexpr std::int64_t MAX_LENGTH_UM = 10'000'000;
+constexpr std::int64_t MAX_SPEED_MM_S = 65'535;
+
+bool are_positive(const Settings& settings) {
+  return settings.sample_period_ns > 0 && settings.pair_spacing_ns > 0 && settings.refresh_ns > 0 &&
+         settings.pulse_ns > 0 && settings.liveness_ns > 0 && settings.first_sip_ns > 0 && settings.retry_ns > 0 &&
+         settings.disbelief_ns > 0 && settings.distance_stale_ns > 0 && settings.settle_ns > 0 &&
+         settings.stop_repeat_ns > 0 && settings.disbelief_progress_mm_s > 0 && settings.pad_loss_ns > 0;
+}
+
+bool are_not_negative(const Settings& settings) {
+  return settings.connect_after_ns >= 0 && settings.disconnect_after_ns >= 0 && settings.boot_ns >= 0 &&
+         settings.encoder_dwell_ns >= 0 && settings.stop_repeats >= 0 && settings.step_um_per_s >= 0 &&
+         settings.angular_step_urad_per_s >= 0 && settings.disbelief_tolerance_mm_s >= 0 &&
+         settings.pad_velocity_mm_s >= 0 && settings.pad_rotation_mrad_s >= 0;
+}
+
+}  // namespace
+
+const char* fault_of(const Settings& settings, const WireNumbers& wires) {
+  if (!are_positive(settings)) {
+    return "a time or a step that must be positive is not";
+  }
+  if (!are_not_negative(settings)) {
+    return "a time or a step is negative";
+  }
+  if (settings.sample_count < 1 || settings.sample_count > MAX_SAMPLE_COUNT || settings.sample_count % 2 == 0) {
+    return "sample_count must be odd, 1 to 31";
+  }
+  if (settings.refresh_ns < settings.pair_spacing_ns) {
+    return "refresh_ns is below pair_spacing_ns";
+  }
+  const std::int32_t width = wires.motor1_width > wires.motor2_width ? wires.motor1_width : wires.motor2_width;
+  const std::int64_t most = MAX_RIM_UM_PER_S >> width;
+  if (settings.step_um_per_s > most || settings.angular_step_urad_per_s > most) {
+    return "a motor step is larger than any robot's";
+  }
+  if (settings.pad_velocity_mm_s > MAX_SPEED_MM_S || settings.pad_rotation_mrad_s > MAX_SPEED_MM_S) {
+    return "a speed of the pad is larger than any robot's";
+  }
+  if (settings.pad_trigger_dead < 0 || settings.pad_trigger_dead >= 1'023 || settings.pad_stick_dead < 0 ||
+      settings.pad_stick_dead >= 511) {
+    return "a dead zone of the pad leaves nothing";
+  }
+  if (settings.bauds[0] <= 0) {
+    return "no line speed to try";
+  }
+  return nullptr;
+}
+
+const char* fault_of(const WireNumbers& wires) {
+  if (wires.distances < 0 || wires.distances > static_cast<std::int32_t>(MAX_DISTANCES)) {
+    return "more than 16 distance wires";
+  }
+  for (const std::int32_t width : {wires.motor1_width, wires.motor2_width, wires.encoder_width}) {
+    if (width < 1 || width > MAX_WIDTH) {
+      return "a value has 1 to 8 wires";
+    }
+  }
+  if (wires.distances + 2 * wires.encoder_width > 32) {
+    return "more than 32 output wires";
+  }
+  return nullptr;
+}
+
+const char* fault_of(const RobotNumbers& robot) {
+  for (const std::int64_t number :
+       {robot.distance_nm_per_count, robot.angle_counts_per_turn, robot.velocity_um_s_per_count,
+        robot.range_um_per_count, robot.track_mm, robot.wheel_diameter_um, robot.ceiling_mm_s,
+        robot.max_velocity_mm_s, robot.max_rotation_deg_s, robot.half_sonar_range_um}) {
+    if (number <= 0 || number > MAX_LENGTH_UM) {
+      return "a number of the robot is out of its range";
+    }
+  }
+  if (4'096 % robot.angle_counts_per_turn != 0) {
+    return "angle_counts_per_turn must divide 4096";
+  }
+  return nullptr;
+}
+
+}  // namespace adapter

@@ -1,0 +1,33 @@
+// The adapter's ends of the wires, as the core needs them; one of five small interfaces of the hardware.
+#pragma once
+
+#include <cstdint>
+
+#include "../core/p2os/time.hpp"
+
+namespace hal {
+
+//: The input wires, read at one instant.
+class PinsIn {
+ public:
+  //: Returns a word: motor1's wires from bit 0 on, motor2's after them, then p2dx_con, then rst.
+  //: `at` is the instant that is meant; hardware can only answer for the present.
+  virtual std::uint32_t read(p2os::Nanos at) = 0;
+
+ protected:
+  ~PinsIn() = default;
+};
+
+//: The output wires: distances from bit 0 on, then both encoders, least significant bits first.
+class PinsOut {
+ public:
+  //: Drives the wires of `mask` to their bits of `levels`, all at once.
+  virtual void drive(std::uint32_t mask, std::uint32_t levels, p2os::Nanos now) = 0;
+  //: Lets every output follow its pull.
+  virtual void release(p2os::Nanos now) = 0;
+
+ protected:
+  ~PinsOut() = default;
+};
+
+}  // namespace hal

@@ -1,0 +1,97 @@
+"""Who commands the robot: the BluePill's pins or a game pad, never both.
+
+Invariant: the other master's pins and reports are followed, so that nothing is
+stale after a change, but they move nothing.
+"""
+
+from typing import TypeAlias
+
+from adapter_sim.gamepad import Gamepad, GamepadSnapshot, Master, PadReport
+from adapter_sim.inputs import Inputs, InputSnapshot
+from adapter_sim.mixing import Mixer, Speeds
+from adapter_sim.settings import AdapterSettings
+from p2os.timing import Nanos
+
+#: Master, inputs, pad.
+MastersSnapshot: TypeAlias = tuple[str, InputSnapshot, GamepadSnapshot]
+
+
+class Masters:
+    """Both masters, and which of them is listened to.
+
+    Args:
+        inputs: The BluePill's pins.
+        mixer: Turns either's wishes into speeds.
+        settings: Dead zones and times of the pad.
+        master: Who commands at first.
+    """
+
+    def __init__(self, inputs: Inputs, mixer: Mixer, settings: AdapterSettings, master: Master) -> None:
+        self.inputs = inputs
+        self.master = master
+        self._mixer = mixer
+        self._pad = Gamepad(settings)
+
+    @property
+    def wants_robot(self) -> bool:
+        """Tell whether the master wants the robot."""
+        return self._pad.wants_robot if self.master is Master.PAD else self.inputs.wants_robot
+
+    @property
+    def speeds(self) -> Speeds:
+        """Return the speeds that the master asks for."""
+        if self.master is Master.PAD:
+            return self._mixer.steer(self._pad.forward, self._pad.turn)
+        return self._mixer.mix(*self.inputs.motors)
+
+    @property
+    def wish(self) -> str:
+        """Return how the master makes its wish known."""
+        return "Up was pressed" if self.master is Master.PAD else "p2dx_con is high"
+
+    def sample(self, now: Nanos) -> tuple[bool, bool]:
+        """Sample the pins; tell whether the speeds asked for may have changed, and whether the wish has just ended."""
+        motors_changed, connect_changed = self.inputs.sample(now)
+        is_master = self.master is Master.BLUEPILL
+        return is_master and motors_changed, is_master and connect_changed and not self.inputs.wants_robot
+
+    def take_pad(self, report: PadReport, now: Nanos) -> bool:
+        """Take a report; tell whether it ended the wish."""
+        wanted = self._pad.wants_robot
+        self._pad.take(report, now)
+        return self.master is Master.PAD and wanted and not self._pad.wants_robot
+
+    @property
+    def pad_lost_at(self) -> Nanos | None:
+        """Return when the pad as master counts as lost unless a report comes before."""
+        return self._pad.lost_at if self.master is Master.PAD else None
+
+    def lose_pad(self) -> bool:
+        """Take note that the pad is gone; tell whether it wanted the robot."""
+        wanted = self._pad.wants_robot
+        self._pad.lose()
+        return wanted
+
+    def forget_wish(self) -> None:
+        """Forget the pad's wish; p2dx_con keeps standing as it stands."""
+        self._pad.forget_wish()
+
+    def switch(self, master: Master) -> None:
+        """Listen to another master; the pad has to report anew."""
+        self.master = master
+        self._pad.lose()
+
+    def reset(self) -> None:
+        """Forget everything but who is master."""
+        self.inputs.reset()
+        self._pad.lose()
+
+    def snapshot(self) -> MastersSnapshot:
+        """Return all of it as plain values."""
+        return self.master.value, self.inputs.snapshot(), self._pad.snapshot()
+
+    def restore(self, snapshot: MastersSnapshot) -> None:
+        """Put back what `snapshot` returned."""
+        self.master = Master(snapshot[0])
+        self.inputs.restore(snapshot[1])
+        self._pad.restore(snapshot[2])
