@@ -21,7 +21,7 @@ from adapter_sim.settings import AdapterSettings
 from p2os.errors import ScenarioError, UsageError
 from p2os.parameters import RobotParameters, load_parameters
 from p2os.pioneer.controller import ControllerSettings, SonarPerSip
-from p2os.pioneer.world import Pose, known_worlds
+from p2os.pioneer.world import Pose, known_worlds, world_suffixes
 from p2os.timing import NS_PER_MS, NS_PER_S, Nanos
 from testbench.direct.robot import DirectSettings
 from testbench.goals import Goal, load_goal
@@ -202,7 +202,7 @@ def resolve_world(
     """
     if world in known_worlds():
         return world
-    if world.endswith(".toml"):
+    if Path(world).suffix.lower() in world_suffixes():
         path = folder / world
         if path.is_file():
             return str(path)

@@ -5,10 +5,17 @@ makes one from a seed.
 """
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from enum import Enum
 
 from p2os.errors import WorldError
+from p2os.pioneer.walk import Walk
+
+Vertex = tuple[float, float, float]
+Triangle = tuple[int, int, int]
+
+#: The tables of a world file, in the order in which a world keeps its obstacles.
+SECTIONS = ("box", "cylinder", "floor", "ramp")
 
 
 class Kind(Enum):
@@ -50,6 +57,10 @@ class Obstacle:
         base_m: Height of the underside above the world's zero; of a ramp, of its lower edge's surface.
         height_m: From the underside to the top; of a ramp, the rise along its heading.
         floor_m: Height of the floor around it, against which a plan view cuts.
+        fixed: Part of the building: never moved or taken out, so that a body may melt all such into one.
+        mass_kg: Of a thing that the robot can push; 0 stands fast.
+        friction: Of a thing that can be pushed, against the floor.
+        walk: How it moves by itself; it then stands at the walk's first point, whatever x_m and y_m say.
     """
 
     name: str
@@ -63,6 +74,10 @@ class Obstacle:
     height_m: float = 0.5
     floor_m: float = 0.0
     kind: Kind = Kind.OBSTACLE
+    fixed: bool = False
+    mass_kg: float = 0.0
+    friction: float = 0.5
+    walk: Walk | None = None
 
     def __post_init__(self) -> None:
         is_box = self.length_m > 0 and self.width_m > 0 and self.radius_m == 0
@@ -71,11 +86,26 @@ class Obstacle:
             raise WorldError(f"obstacle {self.name!r}: needs a length and a width, or a radius, and a height above 0")
         if not all(math.isfinite(value) for value in (self.x_m, self.y_m, self.heading_rad, self.base_m)):
             raise WorldError(f"obstacle {self.name!r}: its place must be finite")
+        if not 0 <= self.mass_kg < math.inf or not 0 <= self.friction < math.inf:
+            raise WorldError(f"obstacle {self.name!r}: mass and friction must be 0 or more")
+        if sum((self.fixed, self.mass_kg > 0, self.walk is not None, self.kind.is_driven_on)) > 1:
+            raise WorldError(
+                f"obstacle {self.name!r}: it can be only one of fixed, pushed (mass_kg), walking (path_m) or a floor"
+            )
 
     @property
     def is_cylinder(self) -> bool:
         """Whether the footprint is a circle."""
         return self.radius_m > 0
+
+    @property
+    def section(self) -> str:
+        """The table of a world file that it belongs to: box, cylinder, floor or ramp."""
+        if self.kind is Kind.RAMP:
+            return "ramp"
+        if self.is_cylinder:
+            return "cylinder"
+        return "floor" if self.kind is Kind.FLOOR and self.base_m == self.heading_rad == 0 else "box"
 
     @property
     def reach_m(self) -> float:
@@ -106,23 +136,60 @@ class Obstacle:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class Mesh:
+    """Static geometry of any shape: metres in the world, Z up.
+
+    Args:
+        name: Unique in its world.
+        vertices: x, y, z of each corner.
+        triangles: Three indices into `vertices` each; their winding is of no account.
+    """
+
+    name: str
+    vertices: tuple[Vertex, ...]
+    triangles: tuple[Triangle, ...]
+
+    def __post_init__(self) -> None:
+        if not self.triangles:
+            raise WorldError(f"mesh {self.name!r}: it has no triangles")
+        if not all(math.isfinite(value) for vertex in self.vertices for value in vertex):
+            raise WorldError(f"mesh {self.name!r}: a vertex is not finite")
+        count = len(self.vertices)
+        if not all(0 <= index < count for triangle in self.triangles for index in triangle):
+            raise WorldError(f"mesh {self.name!r}: a triangle names a vertex that is not there")
+
+    @property
+    def bounds(self) -> tuple[Vertex, Vertex]:
+        """The least and the greatest x, y, z."""
+        xs, ys, zs = zip(*self.vertices, strict=True)
+        return (min(xs), min(ys), min(zs)), (max(xs), max(ys), max(zs))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class World:
     """Where a robot can be."""
 
     name: str
-    #: Where it was read from.
-    source: str
+    #: Where it was read from; two worlds that differ only in it are equal.
+    source: str = field(compare=False)
     description: str
     start: Pose
     #: x0, y0, x1, y1 of the floor, metres.
     extent: tuple[float, float, float, float]
+    #: Kept as a file holds them: boxes, cylinders, floors, ramps, each in the order given.
     obstacles: tuple[Obstacle, ...]
+    meshes: tuple[Mesh, ...] = ()
+    #: What a reader of the file left out, one line each.
+    skipped: tuple[str, ...] = field(default=(), compare=False)
 
     def __post_init__(self) -> None:
-        names = [obstacle.name for obstacle in self.obstacles]
-        twice = sorted({name for name in names if names.count(name) > 1})
-        if twice:
-            raise WorldError(f"{self.source}: two obstacles are named {twice[0]!r}")
+        in_order = sorted(self.obstacles, key=lambda item: SECTIONS.index(item.section))
+        object.__setattr__(self, "obstacles", tuple(in_order))
+        seen: set[str] = set()
+        for name in (*(item.name for item in self.obstacles), *(item.name for item in self.meshes)):
+            if name in seen:
+                raise WorldError(f"{self.source}: two obstacles are named {name!r}")
+            seen.add(name)
 
     @property
     def has_slopes(self) -> bool:

@@ -1,0 +1,87 @@
+"""Where in a TOML text each key stands, so that an error can name its line.
+
+`tomllib` gives values without places. This reads a text that `tomllib` has
+accepted, so it need not check anything: it only tells tables, keys and the ends
+of values that run over several lines apart.
+
+Not found: keys inside inline tables, and quoted keys with dots or escapes in them; they get
+the line of what holds them.
+"""
+
+import re
+from dataclasses import dataclass, field
+
+_HEADER = re.compile(r"\s*(\[\[?)\s*([^\]]+?)\s*\]\]?\s*(?:#.*)?$")
+_KEY = re.compile(r"\s*([A-Za-z0-9_.\-\"']+)\s*=")
+#: What can begin or end inside a value: strings, comments, brackets.
+_TOKEN = re.compile(r'"""|\'\'\'|"(?:\\.|[^"\\\n])*"|\'[^\'\n]*\'|#[^\n]*|[\[\]{}]')
+#: `tomllib` ends its messages so.
+_AT = re.compile(r"^(?P<what>.*) \(at (?:line (?P<line>\d+), column \d+|end of document)\)$", re.DOTALL)
+
+
+@dataclass(slots=True)
+class TomlPlaces:
+    """The lines of a TOML text's tables and keys, counted from 1."""
+
+    #: (table, number of the table among those of its name, key or "") → line.
+    lines: dict[tuple[str, int, str], int] = field(default_factory=dict)
+
+    def line(self, table: str = "", number: int = 0, key: str = "") -> int:
+        """Return the line of a key, or of its table's header where the key is not there, or 1."""
+        lines = self.lines
+        return lines.get((table, number, key)) or lines.get((table, number, "")) or lines.get(("", 0, table)) or 1
+
+
+def find_places(text: str) -> TomlPlaces:
+    """Return the places of a text that is valid TOML."""
+    found = TomlPlaces()
+    table, number, depth, closing = "", 0, 0, ""
+    counts: dict[str, int] = {}
+    for line_number, line in enumerate(text.split("\n"), start=1):
+        rest = line
+        if not depth and not closing:
+            header = _HEADER.match(line)
+            if header is not None and "=" not in header[2]:
+                table = header[2].strip("\"'")
+                number = counts.get(table, -1) + 1 if header[1] == "[[" else 0
+                counts[table] = number
+                found.lines[table, number, ""] = line_number
+                continue
+            key = _KEY.match(line)
+            if key is None:
+                continue
+            name = key[1].strip("\"'")
+            found.lines[table, number, name] = line_number
+            found.lines.setdefault((table, number, name.split(".")[0]), line_number)
+            rest = line[key.end() :]
+        depth, closing = _after(rest, depth, closing)
+    return found
+
+
+def line_of_error(message: str, text: str) -> tuple[str, int]:
+    """Return what `tomllib` complains of, and the line."""
+    match = _AT.match(message)
+    if match is None:
+        return message, 1
+    return match["what"], int(match["line"]) if match["line"] else text.count("\n") + 1
+
+
+def _after(text: str, depth: int, closing: str) -> tuple[int, str]:
+    """Return how deep in brackets, and in which long string, a value is at the end of a line."""
+    place = 0
+    while True:
+        if closing:
+            end = text.find(closing, place)
+            if end < 0:
+                return depth, closing
+            place, closing = end + 3, ""
+        token = _TOKEN.search(text, place)
+        if token is None:
+            return depth, closing
+        place = token.end()
+        if token[0] in {'"""', "'''"}:
+            closing = token[0]
+        elif token[0] in "[{":
+            depth += 1
+        elif token[0] in "]}":
+            depth -= 1
