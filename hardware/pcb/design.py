@@ -151,7 +151,7 @@ def _serial(pinout: Pinout, variant: str) -> list[Component]:
         make("C7", "C 100n", ["RS_VP", "GND"]),
         make("C8", "C 100n", ["GND", "RS_VM"]),
         make("C9", "C 100n", ["+3V3", "GND"]),
-        make("J3", "DE9", [None, "RS_RX", "RS_TX", "RS_DTR", "GND", "RS_DSR", None, None, None], "HOST"),
+        make("J3", "DE9", _DE9_PINS, "HOST"),
         make("R62", "1k", ["ESP_TX", "TXD"]),
         make("R63", "1k", ["RXD", "ESP_RX"]),
         make("R64", "2k2", ["+3V3", "LED_TX"]),
@@ -210,3 +210,9 @@ _AUXILIARY_NETS = {
 _BLOCKS: tuple[Callable[[Pinout, str], list[Component]], ...] = (
     _modules, _signals, _test_header, _supply, _serial, _reset_and_mode, _shift_register, _test_points,
 )  # fmt: skip
+
+#: HOST plug as a DTE: pin 2 receives, 3 sends, 4 asserts DTR, 6 listens to DSR; pin 0 is the shell.
+_DE9_PINS: dict[str, str | None] = {
+    "1": None, "2": "RS_RX", "3": "RS_TX", "4": "RS_DTR", "5": "GND", "6": "RS_DSR", "7": None, "8": None, "9": None,
+    "0": "GND",
+}  # fmt: skip
