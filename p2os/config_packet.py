@@ -37,8 +37,9 @@ FIELDS = (
     ("configflags", Int32ul), ("gyrofw", Int16sl),
 )  # fmt: skip
 
-#: Field counts at which known firmware stops: P2OS and AROS before 1.6, AROS 1.6, 1.7 and 1.8, ARCOS.
-P2OS_FIELDS, AROS_1_6_FIELDS, AROS_1_7_FIELDS, AROS_1_8_FIELDS, ARCOS_FIELDS = 36, 38, 39, 42, len(FIELDS)
+#: Field counts at which known firmware stops: P2OS and AROS before 1.6, AROS 1.6, 1.7 and 1.8, AMRISim, ARCOS.
+P2OS_FIELDS, AROS_1_6_FIELDS, AROS_1_7_FIELDS, AROS_1_8_FIELDS = 36, 38, 39, 42
+AMRISIM_FIELDS, ARCOS_FIELDS = 57, len(FIELDS)
 _LAYOUT = Struct(*(name / kind for name, kind in FIELDS)).compile()
 #: More NULs than all fields need: a cut packet reads as zeros and empty strings.
 _PADDING = bytes(256)
@@ -117,7 +118,8 @@ class ConfigPacket:
     chargethreshold: int = 0
     pdbport: int = 0
     gyroratelimit: int = 0
-    hightemp: int = 0
+    #: Degrees Celsius; -128 where the robot has no such limit.
+    hightemp: int = -128
     powerbits: int = 0
     batterytype: int = 0
     soclow: int = 0
@@ -127,6 +129,8 @@ class ConfigPacket:
     gyrofw: int = 0
     #: How many fields are on the wire, counted from the first.
     fields_sent: int = P2OS_FIELDS
+    #: Bytes after the last whole field: half of one that was cut, or fields that this project does not know.
+    rest: bytes = b""
 
     def to_frame(self) -> Frame:
         """Return the frame with the first `fields_sent` fields.
@@ -141,20 +145,20 @@ class ConfigPacket:
                 data += kind.build(value.encode("latin-1") if kind is _TEXT else value)
             except (ConstructError, UnicodeEncodeError) as error:
                 raise LocalProtocolError(f"CONFIGpac: {name} = {value!r} does not fit its field") from error
-        return Frame(bytes((CONFIG_KIND,)) + data)
+        return Frame(bytes((CONFIG_KIND,)) + data + self.rest)
 
     @classmethod
     def from_frame(cls, frame: Frame) -> "ConfigPacket":
         """Read the fields that were sent; a field cut in the middle counts as not sent and reads as 0 or ""."""
         data = frame.data
         values = _LAYOUT.parse(data + _PADDING)
-        sent, place = 0, 0
+        sent, end = 0, 0
         for name, kind in FIELDS:
-            place += len(values[name]) + 1 if kind is _TEXT else kind.sizeof()
-            if place > len(data):
+            after = end + (len(values[name]) + 1 if kind is _TEXT else kind.sizeof())
+            if after > len(data):
                 break
-            sent += 1
+            sent, end = sent + 1, after
         known = {
             name: values[name].decode("latin-1") if kind is _TEXT else values[name] for name, kind in FIELDS[:sent]
         }
-        return cls(**{"robot_class": "", **known}, fields_sent=sent)
+        return cls(**{"robot_class": "", **known}, fields_sent=sent, rest=data[end:])
