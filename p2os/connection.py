@@ -37,6 +37,7 @@ from p2os.events import (
     WatchdogRevived,
 )
 from p2os.packets import Identity, ServerPacket, packet_frame
+from p2os.profiles import Profile
 from p2os.server_side import ServerSide
 from p2os.state import ConnectionState, Role
 from p2os.timing import NS_PER_S, Nanos, Reached
@@ -164,6 +165,12 @@ class Connection:
     def disconnect(self, now: Nanos) -> None:
         """Client: STOP, VEL 0, ENABLE 0 and CLOSE, in whatever state it is."""
         self._client("disconnect").disconnect(now)
+
+    def set_profile(self, profile: Profile) -> None:
+        """Read and write packets in a firmware family's layout from now on."""
+        self.settings = replace(self.settings, profile=profile)
+        if isinstance(self._side, ClientSide):
+            self._side.set_profile(profile)
 
     def next_deadline(self) -> Nanos | None:
         """Return when a timeout, a PULSE or the watchdog is due."""

@@ -30,13 +30,19 @@ class ConnectionSettings:
     pulse_ns: Nanos = 500 * NS_PER_MS
     #: From OPEN to the first packet.
     first_packet_ns: Nanos = NS_PER_S
+    #: OPEN is sent again when no packet has followed it for so long: one that was lost must not cost the session.
+    open_retry_ns: Nanos = 300 * NS_PER_MS
+    #: How often OPEN is sent; the time to the first packet bounds it too.
+    open_attempts: int = 1
     #: An open session without a sound packet for so long is lost: three cycles and a frame.
     liveness_ns: Nanos = 350 * NS_PER_MS
     profile: Profile = Profile.P2OS
+    #: Whether STOP, VEL 0 and RVEL 0 go out before each SYNC0: to a robot that is still open SYNC0 is a PULSE.
+    stop_first: bool = False
 
     def __post_init__(self) -> None:
         for name in ("sync_timeout_ns", "sync_attempts", "close_wait_ns", "open_delay_ns", "pulse_ns",
-                     "first_packet_ns", "liveness_ns"):  # fmt: skip
+                     "first_packet_ns", "open_retry_ns", "open_attempts", "liveness_ns"):  # fmt: skip
             if getattr(self, name) <= 0:
                 raise LocalProtocolError(f"{name} = {getattr(self, name)} must be positive")
 

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 from p2os.commands import Command
 from p2os.config_packet import ConfigPacket
-from p2os.packets import Identity, RawPacket
+from p2os.packets import Identity, ServerPacket
 from p2os.sip import StandardSip
 from p2os.wire import BadChecksum, BadCount, Noise, Stalled
 
@@ -51,7 +51,7 @@ class ConfigReceived:
 class PacketReceived:
     """The client took a packet of another type, or one whose inside is not sound."""
 
-    packet: RawPacket
+    packet: ServerPacket
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,0 +1,243 @@
+"""What a program can ask of a `Robot` without waiting: one list of calls for both skins.
+
+The blocking and the asyncio robot differ in how they wait, not in what they can
+do, so these calls stand here once. Each one is carried out at once on the core
+and its frames leave in order; P2OS acknowledges nothing.
+"""
+
+import math
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Iterable
+from typing import TypeVar
+
+from p2os.client.core import RobotCore
+from p2os.client.gripper import Gripper
+from p2os.client.problems import LinkLostError
+from p2os.client.snapshots import Limits, Link, Pose, RobotState
+from p2os.commands import Command, CommandNumber, sonar
+from p2os.config_packet import ConfigPacket
+from p2os.connection import ConnectionStats
+from p2os.errors import UsageError
+from p2os.packets import Identity
+from p2os.parameters import RobotParameters
+from p2os.profiles import Profile
+from p2os.timing import Nanos
+
+Result = TypeVar("Result")
+#: What a request packet's argument means: one packet, or one after the other.
+ONCE, ALWAYS, NEVER = 1, 2, 0
+#: SAY carries at most so many notes, each at most so long (Pioneer manuals, command 15).
+MOST_NOTES, LONGEST_NOTE_S, NOTE_UNIT_S = 20, 5.1, 0.02
+
+
+class RobotCalls(ABC):
+    """The calls that both robots share."""
+
+    @abstractmethod
+    def _run(self, call: Callable[[RobotCore, Nanos], Result]) -> Result:
+        """Carry a call out on the core, now."""
+
+    # What is known ------------------------------------------------------------------------
+
+    @property
+    def state(self) -> RobotState:
+        """The newest state.
+
+        Raises:
+            LinkLostError: no packet has come yet.
+        """
+        state = self._run(lambda core, _: core.state)
+        if state is None:
+            raise LinkLostError("the robot has not sent a packet yet", hint="connect first")
+        return state
+
+    @property
+    def pose(self) -> Pose:
+        """The newest pose: metres, and radians that do not wrap."""
+        return self.state.pose
+
+    @property
+    def link(self) -> Link:
+        """Where the client stands with its robot."""
+        return self._run(lambda core, _: core.link)
+
+    @property
+    def identity(self) -> Identity:
+        """Who the robot said it is.
+
+        Raises:
+            LinkLostError: it has not said so yet.
+        """
+        identity = self._run(lambda core, _: core.identity)
+        if identity is None:
+            raise LinkLostError("the robot has not said who it is yet", hint="connect first")
+        return identity
+
+    @property
+    def config(self) -> ConfigPacket | None:
+        """The robot's CONFIGpac; None where it sends none."""
+        return self._run(lambda core, _: core.config)
+
+    @property
+    def parameters(self) -> RobotParameters:
+        """The conversions and measures in use."""
+        return self._run(lambda core, _: core.parameters)
+
+    @property
+    def profile(self) -> Profile:
+        """The firmware family in use."""
+        return self._run(lambda core, _: core.profile)
+
+    @property
+    def limits(self) -> Limits:
+        """How fast the robot may go, from its CONFIGpac where it sent one."""
+        return self._run(lambda core, _: core.limits)
+
+    @property
+    def baud(self) -> int | None:
+        """The line's speed now, bit/s; None where there is no such thing."""
+        return self._run(lambda core, _: core.baud)
+
+    @property
+    def stats(self) -> ConnectionStats:
+        """Counters of the present connection: frames, noise, bad checksums, time-outs."""
+        return self._run(lambda core, _: core.stats)
+
+    # Motion -------------------------------------------------------------------------------
+
+    def set_velocity(self, forward_mps: float = 0.0, turn_radps: float = 0.0) -> None:
+        """Hold these speeds until something else is asked; cut to `limits`.
+
+        The wire carries whole mm/s and whole deg/s.
+
+        Args:
+            forward_mps: m/s, positive forward.
+            turn_radps: rad/s, positive counter-clockwise.
+
+        Raises:
+            LinkLostError: no session is open, or it was lost since the last motion call.
+            MotorsDisabledError: the motors are off and this client does not switch them on by itself.
+        """
+        self._run(lambda core, now: core.set_velocity(forward_mps, turn_radps, now))
+
+    def stop(self) -> None:
+        """Stop with the robot's own deceleration, and stay; motors keep their power."""
+        self._run(lambda core, now: core.stop(now))
+
+    def emergency_stop(self) -> None:
+        """Stop at once, without the ramp (E_STOP), and stay."""
+        self._run(lambda core, now: core.emergency_stop(now))
+
+    def enable(self, on: bool = True) -> None:
+        """Switch the motors on; with False, off."""
+        self._run(lambda core, now: core.enable(on, now))
+
+    def disable(self) -> None:
+        """Switch the motors off: the robot can be pushed by hand."""
+        self.enable(False)
+
+    def set_limits(
+        self,
+        *,
+        forward_mps: float | None = None,
+        turn_radps: float | None = None,
+        accel_mps2: float | None = None,
+        decel_mps2: float | None = None,
+        turn_accel_radps2: float | None = None,
+        turn_decel_radps2: float | None = None,
+    ) -> None:
+        """Set the robot's own limits for this session (SETV, SETRV, SETA, SETRA); None leaves one as it is."""
+        rows = (
+            (CommandNumber.SETV, forward_mps, 1000.0), (CommandNumber.SETRV, turn_radps, math.degrees(1)),
+            (CommandNumber.SETA, accel_mps2, 1000.0), (CommandNumber.SETA, decel_mps2, -1000.0),
+            (CommandNumber.SETRA, turn_accel_radps2, math.degrees(1)),
+            (CommandNumber.SETRA, turn_decel_radps2, -math.degrees(1)),
+        )  # fmt: skip
+        for number, value, factor in rows:
+            if value is None:
+                continue
+            if not (math.isfinite(value) and value > 0):
+                raise UsageError(f"a limit of {value} is not positive")
+            self.send(number, round(value * factor))
+
+    def set_pose(self, x_m: float = 0.0, y_m: float = 0.0, heading_rad: float = 0.0) -> None:
+        """Say where the robot is; states from now on count from there. The robot is not told."""
+        self._run(lambda core, _: core.set_pose(Pose(x_m, y_m, heading_rad)))
+
+    # Anything -----------------------------------------------------------------------------
+
+    def send(self, command: Command | int, argument: int | bytes | None = None) -> None:
+        """Send any command, by its number or ready made; no limit is looked at.
+
+        A command that moves the robot takes the place of what was asked before,
+        and nothing repeats it. SETO makes the pose jump: `set_pose` does not.
+
+        Raises:
+            LinkLostError: no session is open.
+            LocalProtocolError: the argument does not fit the wire.
+        """
+        ready = command if isinstance(command, Command) else Command(command, argument)
+        self._run(lambda core, now: core.send(ready, now))
+
+    # Sonar --------------------------------------------------------------------------------
+
+    def set_sonar(self, on: bool = True) -> None:
+        """Switch all sonar."""
+        self.send(sonar(on))
+
+    def set_sonar_order(self, numbers: Iterable[int]) -> None:
+        """Let sonar fire in this order, numbered from 0; repeats are allowed, an empty order is silence (POLLING)."""
+        self.send(CommandNumber.POLLING, bytes(number + 1 for number in numbers))
+
+    # Inputs and outputs -------------------------------------------------------------------
+
+    def set_digital(self, mask: int, states: int) -> None:
+        """Set those of the eight digital outputs that `mask` names (DIGOUT).
+
+        The mask travels as the high byte, as the command tables, ARIA and the simulator have it.
+        """
+        if not (0 <= mask <= 0xFF and 0 <= states <= 0xFF):
+            raise UsageError(f"outputs are eight bits: mask {mask}, states {states}")
+        word = mask << 8 | states
+        self.send(CommandNumber.DIGOUT, word if word < 0x8000 else word - 0x10000)
+
+    def select_analog(self, port: int) -> None:
+        """Show this analog port in the states (ADSEL)."""
+        self.send(CommandNumber.ADSEL, port)
+
+    def request_io(self, *, always: bool = False) -> None:
+        """Ask for an IOpac, or for one a cycle; it comes as a `PacketArrived`."""
+        self.send(CommandNumber.IOREQUEST, ALWAYS if always else ONCE)
+
+    def request_encoders(self, *, always: bool = False) -> None:
+        """Ask for an ENCODERpac, or for one a cycle; it comes as a `PacketArrived`."""
+        self.send(CommandNumber.ENCODER, ALWAYS if always else ONCE)
+
+    @property
+    def gripper(self) -> Gripper:
+        """The gripper's commands."""
+        return Gripper(self.send)
+
+    # Sounds -------------------------------------------------------------------------------
+
+    def say(self, notes: Iterable[tuple[float, int]]) -> None:
+        """Play notes on the buzzer (SAY).
+
+        Args:
+            notes: (seconds, tone): at most 20 of at most 5.1 s; tone 0 is a rest, 1 to 127 are MIDI notes.
+        """
+        pairs = list(notes)
+        if len(pairs) > MOST_NOTES:
+            raise UsageError(f"{len(pairs)} notes: SAY takes at most {MOST_NOTES}")
+        for duration_s, tone in pairs:
+            if not (0 <= duration_s <= LONGEST_NOTE_S and 0 <= tone <= 0xFF):
+                raise UsageError(f"note ({duration_s} s, {tone}): at most {LONGEST_NOTE_S} s, tones 0 to 255")
+        self.send(CommandNumber.SAY, bytes(part for s, tone in pairs for part in (round(s / NOTE_UNIT_S), tone)))
+
+    def play_sound(self, number: int) -> None:
+        """Play a stored sound (SOUND; AmigoBot)."""
+        self.send(CommandNumber.SOUND, number)
+
+    def set_buzzer(self, on: bool) -> None:
+        """Let the robot's own warnings sound, or not (SOUNDTOG)."""
+        self.send(CommandNumber.SOUNDTOG, int(on))

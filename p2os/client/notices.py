@@ -1,0 +1,133 @@
+"""What a client tells its program beside the states: past-tense facts, in order."""
+
+from dataclasses import dataclass
+
+from p2os.config_packet import ConfigPacket
+from p2os.packets import Identity, ServerPacket
+from p2os.timing import Nanos
+
+
+@dataclass(frozen=True, slots=True)
+class Connected:
+    """A session is open and its first packet is here."""
+
+    identity: Identity
+    #: Line speed; None on TCP.
+    baud: int | None
+    #: From the first SYNC0 of the successful try to the first standard packet.
+    took_ns: Nanos
+
+
+@dataclass(frozen=True, slots=True)
+class ConfigurationKnown:
+    """The robot's CONFIGpac came: limits are the robot's own from now on."""
+
+    config: ConfigPacket
+
+
+@dataclass(frozen=True, slots=True)
+class LinkLost:
+    """The session is gone; STOP and VEL 0 were the last frames out and will be the first."""
+
+    reason: str
+
+
+@dataclass(frozen=True, slots=True)
+class ReconnectPlanned:
+    """The robot will be looked for again."""
+
+    attempt: int
+    wait_ns: Nanos
+
+
+@dataclass(frozen=True, slots=True)
+class GaveUp:
+    """No session could be opened."""
+
+    reason: str
+    hint: str | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Disobeyed:
+    """For a second the wheels neither came near what was commanded nor did the robot say that they stall."""
+
+    text: str
+
+
+@dataclass(frozen=True, slots=True)
+class MotorsDisabled:
+    """The motors went off without being told; speeds and goals are forgotten."""
+
+    reason: str
+
+
+@dataclass(frozen=True, slots=True)
+class DeadmanStopped:
+    """The program made no call for so long while the robot was to move; it was stopped."""
+
+    silent_ns: Nanos
+
+
+@dataclass(frozen=True, slots=True)
+class MotionEnded:
+    """A `drive` or `turn` is over.
+
+    Args:
+        what: Such as "drive 0.500 m".
+        reached: Metres or radians, as the odometry has it.
+        problem: None when it arrived, else why not.
+    """
+
+    what: str
+    asked: float
+    reached: float
+    took_ns: Nanos
+    problem: str | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class BaudRaised:
+    """The line runs at another speed from now on."""
+
+    baud: int
+
+
+@dataclass(frozen=True, slots=True)
+class BaudKept:
+    """The robot was not heard at the higher speed; the line is back at the old one."""
+
+    baud: int
+    tried: int
+
+
+@dataclass(frozen=True, slots=True)
+class RobotUnknown:
+    """No parameters are known for this model; those of `used` are taken. Pass `model=` to choose."""
+
+    subclass: str
+    used: str
+
+
+@dataclass(frozen=True, slots=True)
+class PacketArrived:
+    """A packet that is no standard SIP."""
+
+    packet: ServerPacket
+
+
+Notice = (
+    Connected
+    | ConfigurationKnown
+    | LinkLost
+    | ReconnectPlanned
+    | GaveUp
+    | Disobeyed
+    | MotorsDisabled
+    | DeadmanStopped
+    | MotionEnded
+    | BaudRaised
+    | BaudKept
+    | RobotUnknown
+    | PacketArrived
+)

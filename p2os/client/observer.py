@@ -1,0 +1,148 @@
+"""Standard packets folded into states: SI units, one pose, the last reading of every sonar."""
+
+import math
+from dataclasses import dataclass
+
+from p2os.client.pose import PoseKeeper
+from p2os.client.snapshots import Limits, Pose, RobotState, SonarEcho
+from p2os.config_packet import AROS_1_6_FIELDS, ConfigPacket
+from p2os.parameters import RobotParameters
+from p2os.profiles import Profile
+from p2os.sip import StandardSip
+from p2os.timing import Nanos
+from p2os.units import in_units
+
+#: Flag bits of AROS and ARCOS packets (Pioneer 2/3 H8 manual, FLAGS): motors, STOP button.
+MOTORS_FLAG, STOP_BUTTON_FLAG = 1 << 0, 1 << 5
+#: Compass counts of 2 degrees; these mean that there is none (player's driver reads them so).
+COMPASS_COUNT_RAD = math.radians(2)
+NO_COMPASS = frozenset({0, 181, 255})
+#: A full byte of the analog reading is 5 V (Pioneer 2/3 manuals, standard SIP).
+ANALOG_COUNT_V = 5 / 255
+#: Bumper segments sit in bits 1 to 7 of the stall bytes.
+SEGMENTS = range(1, 8)
+
+
+@dataclass(frozen=True, slots=True)
+class Bumpers:
+    """How many segments are fitted in front and at the rear."""
+
+    front: int = 0
+    rear: int = 0
+
+
+class Observer:
+    """What is known of the robot so far."""
+
+    def __init__(self, parameters: RobotParameters) -> None:
+        self.parameters = parameters
+        self.profile = Profile.P2OS
+        self.bumpers = Bumpers()
+        self.state: RobotState | None = None
+        self._pose = PoseKeeper()
+        self._sonar: dict[int, SonarEcho] = {}
+        self._number = 0
+
+    @property
+    def robot_heading_rad(self) -> float:
+        """The robot's own heading, as HEAD means it; radians, unwrapped."""
+        return self._pose.robot_heading_rad
+
+    @property
+    def wheels_mps(self) -> tuple[float, float]:
+        """Left and right wheel in the last packet, m/s."""
+        return (0.0, 0.0) if self.state is None else (self.state.left_mps, self.state.right_mps)
+
+    def new_session(self, parameters: RobotParameters) -> None:
+        """Begin with a robot whose counters start anew."""
+        self.parameters = parameters
+        self._pose.new_session()
+        self._sonar.clear()
+
+    def place(self, pose: Pose) -> None:
+        """Say where the robot is; states from now on begin there."""
+        self._pose.place(pose)
+
+    def take(self, sip: StandardSip, now: Nanos) -> RobotState:
+        """Return the state that a packet tells."""
+        self._number += 1
+        parameters = self.parameters
+        units = in_units(sip, parameters)
+        for number, range_m in units.sonar_m:
+            self._hear(number, range_m, now)
+        has_flags = self.profile.has_flags
+        charge, temperature = sip.tail_field("state_of_charge"), sip.tail_field("raw_temperature")
+        self.state = RobotState(
+            number=self._number,
+            at_ns=now,
+            pose=self._pose.take(sip, parameters),
+            forward_mps=(units.left_mps + units.right_mps) / 2,
+            turn_radps=units.turn_radps,
+            left_mps=units.left_mps,
+            right_mps=units.right_mps,
+            is_moving=units.is_moving,
+            motors_enabled=bool(sip.raw_flags & MOTORS_FLAG) if has_flags else None,
+            battery_v=units.battery_v,
+            stall_left=units.stall_left,
+            stall_right=units.stall_right,
+            front_bumpers=_pressed(sip.front_bumpers, self.bumpers.front),
+            rear_bumpers=_pressed(sip.rear_bumpers, self.bumpers.rear),
+            sonar=tuple(self._sonar[number] for number in sorted(self._sonar)),
+            compass_rad=None if sip.raw_compass in NO_COMPASS else sip.raw_compass * COMPASS_COUNT_RAD,
+            analog_port=sip.analog_port,
+            analog_v=sip.raw_analog * ANALOG_COUNT_V,
+            digital_in=sip.digital_in,
+            digital_out=sip.digital_out,
+            stop_button=bool(sip.raw_flags & STOP_BUTTON_FLAG) if has_flags else None,
+            state_of_charge=None if charge is None else charge / 100,
+            temperature_c=None if temperature is None or temperature <= -127 else float(temperature),
+            sip=sip,
+        )
+        return self.state
+
+    def _hear(self, number: int, range_m: float, now: Nanos) -> None:
+        """Keep a reading, and where on its sonar's axis it came from."""
+        if number >= len(self.parameters.sonar):
+            return
+        place = self.parameters.sonar[number]
+        direction = math.radians(place.heading_deg)
+        self._sonar[number] = SonarEcho(
+            number=number,
+            range_m=range_m,
+            x_m=place.x_mm / 1000 + range_m * math.cos(direction),
+            y_m=place.y_mm / 1000 + range_m * math.sin(direction),
+            is_echo=range_m < self.parameters.sonar_range_m,
+            at_ns=now,
+        )
+
+
+def limits_of(parameters: RobotParameters, config: ConfigPacket | None) -> Limits:
+    """Return how fast a robot may go: its CONFIGpac's present maxima, never above what its model can.
+
+    A field of 0 is one that was not sent; the model's own default stands for it.
+    """
+    motion = parameters.motion
+
+    def value(name: str, default: int, most: int | None = None) -> float:
+        sent = (getattr(config, name) if config is not None else 0) or default
+        return float(sent if most is None else min(sent, most))
+
+    return Limits(
+        forward_mps=value("transvelmax", motion.max_velocity_mm_s, parameters.max_velocity_mm_s) / 1000,
+        turn_radps=math.radians(value("rotvelmax", motion.max_rotation_deg_s, parameters.max_rotation_deg_s)),
+        accel_mps2=value("transacc", motion.accel_mm_s2) / 1000,
+        decel_mps2=value("transdecel", motion.decel_mm_s2) / 1000,
+        turn_accel_radps2=math.radians(value("rotacc", motion.rot_accel_deg_s2)),
+        turn_decel_radps2=math.radians(value("rotdecel", motion.rot_decel_deg_s2)),
+    )
+
+
+def bumpers_of(config: ConfigPacket | None) -> Bumpers:
+    """Return the bumpers that a CONFIGpac names; robots before AROS 1.6 name none."""
+    if config is None or config.fields_sent < AROS_1_6_FIELDS:
+        return Bumpers()
+    return Bumpers(config.frontbumps, config.rearbumps)
+
+
+def _pressed(bits: int, fitted: int) -> tuple[int, ...]:
+    return tuple(segment for segment in SEGMENTS[:fitted] if bits >> (segment - 1) & 1)

@@ -1,0 +1,105 @@
+"""What a skin is to do with the line, in order and no faster than the robot can take it.
+
+AROS loses commands that come nearer than 3 to 5 ms (Pioneer 2/3 H8 manual, page
+42), so frames leave one by one. Opening, closing and changing the speed of the
+line stand in the same queue, so that a STOP is out before the line closes.
+"""
+
+from collections import deque
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+from p2os.timing import NS_PER_S, Nanos
+
+#: Bits of a byte on a serial line: start, eight, stop.
+BITS_PER_BYTE = 10
+#: chosen: for buffers of the system and of a USB adapter, on top of the bits themselves.
+DRAIN_MARGIN_NS: Nanos = 20_000_000
+
+
+@dataclass(frozen=True, slots=True)
+class OpenLine:
+    """Open the line and say how it went: `line_opened` or `line_failed`."""
+
+
+@dataclass(frozen=True, slots=True)
+class CloseLine:
+    """Let what was sent go out, then close the line."""
+
+
+@dataclass(frozen=True, slots=True)
+class SetBaud:
+    """Change the line's speed."""
+
+    baud: int
+
+
+@dataclass(frozen=True, slots=True)
+class Send:
+    """Write one frame."""
+
+    data: bytes
+
+
+Action = OpenLine | CloseLine | SetBaud | Send
+
+
+class Outbox:
+    """Actions that wait for their time."""
+
+    def __init__(self, spacing_ns: Nanos) -> None:
+        self._spacing_ns = spacing_ns
+        self._queue: deque[Action] = deque()
+        self._free_at: Nanos = 0
+        self._drained_at: Nanos = 0
+        #: Line speed for the time that bytes take; None where there is no such thing.
+        self.baud: int | None = None
+
+    @property
+    def is_empty(self) -> bool:
+        """Whether nothing waits."""
+        return not self._queue
+
+    def put(self, *actions: Action) -> None:
+        """Queue actions."""
+        self._queue.extend(actions)
+
+    def send(self, frames: Iterable[bytes]) -> None:
+        """Queue frames."""
+        self._queue.extend(Send(frame) for frame in frames)
+
+    def drop_frames(self) -> None:
+        """Forget frames that were not sent: what follows matters more."""
+        self._queue = deque(action for action in self._queue if not isinstance(action, Send))
+
+    def clear(self) -> None:
+        """Forget everything: the line has gone."""
+        self._queue.clear()
+
+    def next_deadline(self) -> Nanos | None:
+        """Return when the first action may go, or None."""
+        if not self._queue:
+            return None
+        match self._queue[0]:
+            case Send():
+                return self._free_at
+            case SetBaud():
+                return self._drained_at
+        return 0
+
+    def take(self, now: Nanos) -> Action | None:
+        """Return the next action if it is due at `now`."""
+        due = self.next_deadline()
+        if due is None or due > now:
+            return None
+        action = self._queue.popleft()
+        if isinstance(action, Send):
+            self._free_at = now + self._spacing_ns
+            if self.baud:
+                bits = len(action.data) * BITS_PER_BYTE
+                self._drained_at = max(now, self._drained_at) + bits * NS_PER_S // self.baud + DRAIN_MARGIN_NS
+        elif isinstance(action, SetBaud):
+            self.baud = action.baud
+            self._drained_at = now
+            self._free_at = now + DRAIN_MARGIN_NS // 2
+        return action

@@ -1,0 +1,239 @@
+"""The blocking `Robot`: a thread moves the bytes, the program waits where it wants to.
+
+    with Robot("tcp:127.0.0.1:8101") as robot:
+        robot.drive(0.5)
+
+All decisions are `RobotCore`'s. Here are the clock, the thread and the waiting.
+The robot is stopped and the session closed when the block is left for any
+reason, and when the program ends without leaving it.
+"""
+
+import math
+import weakref
+from collections.abc import Callable, Iterator
+from types import TracebackType
+from typing import Self
+
+from p2os.client.aux_stream import AuxStream
+from p2os.client.calls import Result, RobotCalls
+from p2os.client.core import RobotCore
+from p2os.client.engine import Engine, Opener
+from p2os.client.goals import Axis, DriveAxis, MotionResult, TurnAxis
+from p2os.client.notices import Notice
+from p2os.client.opening import core_for, motion_result, not_connected
+from p2os.client.settings import ClientSettings
+from p2os.client.snapshots import Link, RobotState
+from p2os.parameters import RobotParameters
+from p2os.timing import NS_PER_S, Nanos
+from p2os.transport import open_url
+
+
+class Robot(RobotCalls):
+    """A P2OS robot on a line.
+
+    Args:
+        url: Where it is: `serial:/dev/ttyUSB0`, `tcp:HOST:8101`, `pty:PATH`.
+        model: A model's name, a file of parameters, or the parameters; None: what the robot says.
+        auto_enable: Switch the motors on with the first motion of a session.
+        reconnect: Look for a lost robot again; nothing moves until asked.
+        deadman_s: A speed is taken back when the program has made no call for so long; None: never.
+        settings: All settings at once, in place of the three before.
+        opener: Opens the line; for lines that no URL names.
+
+    Raises:
+        UsageError: The URL is none.
+        ParametersError: There is no such model.
+    """
+
+    def __init__(
+        self,
+        url: str,
+        *,
+        model: str | RobotParameters | None = None,
+        auto_enable: bool = True,
+        reconnect: bool = True,
+        deadman_s: float | None = 2.0,
+        settings: ClientSettings | None = None,
+        opener: Opener = open_url,
+    ) -> None:
+        core, baud = core_for(
+            url, model=model, auto_enable=auto_enable, reconnect=reconnect, deadman_s=deadman_s, settings=settings
+        )
+        self.url = url
+        self._engine = Engine(core, baud, lambda: opener(url))
+        self._finalizer = weakref.finalize(self, self._engine.shut_down)
+
+    # Coming and going ---------------------------------------------------------------------
+
+    def connect(self) -> Self:
+        """Find the robot and open its session; return when its first packet and its configuration are here.
+
+        Raises:
+            ConnectError: the line cannot be opened, or no robot answers; the message says how far it came.
+        """
+        engine = self._engine
+        engine.start()
+        try:
+            with engine.changed:
+                engine.call(lambda core, now: core.connect(now))
+                engine.wait_for(lambda core: core.is_ready or core.link in {Link.FAILED, Link.CLOSED}, None)
+                if not engine.core.is_ready:
+                    raise not_connected(engine.core)  # noqa: TRY301  # closing is the same for every way out
+        except BaseException:
+            self.close()
+            raise
+        return self
+
+    def close(self) -> None:
+        """Stop the robot, end the session, give the line back; twice is harmless."""
+        self._engine.shut_down()
+
+    def __enter__(self) -> Self:
+        return self.connect()
+
+    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, _: TracebackType | None) -> None:
+        self.close()
+        self._engine.raise_failure(error)
+
+    # Waiting ------------------------------------------------------------------------------
+
+    def sleep(self, duration_s: float) -> None:
+        """Do nothing for so long, and be known to live: held speeds go on.
+
+        Raises:
+            P2osError: the client's thread failed meanwhile.
+        """
+        with self._engine.changed:
+            self._engine.wait_for(lambda _: False, duration_s)
+
+    def next_state(self, timeout_s: float = 2.0) -> RobotState:
+        """Wait for the next packet and return its state.
+
+        Raises:
+            LinkLostError: none came in time.
+        """
+        engine = self._engine
+        with engine.changed:
+            before = engine.core.state
+            engine.wait_for(lambda core: core.state is not before, timeout_s)
+            state = engine.core.state
+            if state is None or state is before:
+                raise not_connected(engine.core)
+            return state
+
+    def wait_open(self, timeout_s: float | None = None) -> None:
+        """Wait until the session is open again after a loss.
+
+        Raises:
+            LinkLostError: it is not, in time or for good.
+        """
+        engine = self._engine
+        with engine.changed:
+            engine.wait_for(lambda core: core.link in {Link.OPEN, Link.FAILED, Link.CLOSED}, timeout_s)
+            if engine.core.link is not Link.OPEN:
+                raise not_connected(engine.core)
+
+    def states(self) -> Iterator[RobotState]:
+        """Yield each new state as it comes, the newest where the program is slow; ends when the client does."""
+        engine, last = self._engine, None
+        while True:
+            with engine.changed:
+                engine.wait_for(lambda core, seen=last: core.state is not seen or _is_over(core), None)  # type: ignore[misc]  # bound now
+                state = engine.core.state
+                if state is None or state is last:
+                    return
+            last = state
+            yield state
+
+    def events(self) -> Iterator[Notice]:
+        """Yield what happens beside the states, from now on, in order; ends when the client does."""
+        engine = self._engine
+        queue = engine.subscribe()
+        try:
+            while True:
+                with engine.changed:
+                    engine.wait_for(lambda core: bool(queue) or _is_over(core), None)
+                    if not queue:
+                        return
+                    notice = queue.popleft()
+                yield notice
+        finally:
+            engine.unsubscribe(queue)
+
+    def on_state(self, callback: Callable[[RobotState], None]) -> Callable[[], None]:
+        """Call `callback` with each state, from the client's thread; return what ends that.
+
+        An exception in it stops the robot and is raised in the program's next call.
+        """
+        return self._engine.on_state(callback)
+
+    def on_event(self, callback: Callable[[Notice], None]) -> Callable[[], None]:
+        """Call `callback` with what happens beside the states; otherwise as `on_state`."""
+        return self._engine.on_event(callback)
+
+    # Motion that waits --------------------------------------------------------------------
+
+    def drive(
+        self, distance_m: float, *, speed_mps: float | None = None, timeout_s: float | None = None
+    ) -> MotionResult:
+        """Drive straight and return when the robot has arrived and stands.
+
+        Args:
+            distance_m: Metres, negative backwards.
+            speed_mps: The most for this way; None: the robot's limit.
+            timeout_s: Give up after so long; None: twice what the limits allow, and 5 s.
+
+        Raises:
+            MotionError: it stalled, stood short of its goal, or took too long; it was stopped.
+            LinkLostError: the link was lost on the way; or before, since the last motion call.
+            MotorsDisabledError: as `set_velocity`.
+        """
+        return self._reach(DriveAxis(distance_m), speed_mps, timeout_s)
+
+    def turn(
+        self, angle_rad: float, *, speed_radps: float | None = None, timeout_s: float | None = None
+    ) -> MotionResult:
+        """Turn on the spot, any number of turns, and return when the robot stands; to a degree or two.
+
+        Args:
+            angle_rad: Radians, positive counter-clockwise.
+            speed_radps: The most for this turn; None: the robot's limit.
+            timeout_s: As `drive`.
+
+        Raises:
+            MotionError, LinkLostError, MotorsDisabledError: as `drive`.
+        """
+        return self._reach(TurnAxis(angle_rad), speed_radps, timeout_s)
+
+    def turn_to(
+        self, heading_rad: float, *, speed_radps: float | None = None, timeout_s: float | None = None
+    ) -> MotionResult:
+        """Turn the shorter way to a heading of the pose's frame; otherwise as `turn`."""
+        return self.turn(
+            math.remainder(heading_rad - self.pose.heading_rad, 2 * math.pi),
+            speed_radps=speed_radps,
+            timeout_s=timeout_s,
+        )
+
+    def aux(self, port: int = 1) -> AuxStream:
+        """Return one of the robot's own serial ports, as a file of bytes."""
+        return AuxStream(self._engine, port)
+
+    def _reach(self, axis: Axis, speed: float | None, timeout_s: float | None) -> MotionResult:
+        engine = self._engine
+        limit_ns = None if timeout_s is None else round(timeout_s * NS_PER_S)
+        with engine.changed:
+            goal = engine.call(lambda core, now: core.begin_goal(axis, limit_ns, speed, now))
+            try:
+                engine.wait_for(lambda _: goal.ended is not None, None)
+            finally:
+                if goal.ended is None:
+                    engine.call(lambda core, now: core.cancel_goal(goal, now))
+            return motion_result(goal, engine.core)
+
+    def _run(self, call: Callable[[RobotCore, Nanos], Result]) -> Result:
+        return self._engine.call(call)
+
+
+def _is_over(core: RobotCore) -> bool:
+    return core.link in {Link.CLOSED, Link.FAILED}

@@ -1,0 +1,69 @@
+"""How a client behaves: its times, its limits of patience, and what it does by itself."""
+
+from dataclasses import dataclass
+
+from p2os.errors import UsageError
+from p2os.profiles import Profile
+from p2os.timing import NS_PER_MS, NS_PER_S, Nanos
+
+#: Baud rates of a Pioneer's HOST port, the likeliest first (Pioneer 3 manual, HOSTBAUD; 9600 is the default).
+BAUDS = (9600, 38400, 115200, 19200, 57600)
+#: HOSTBAUD's argument of each rate (Pioneer 3 manual, command 50).
+BAUD_CODES = {9600: 0, 19200: 1, 38400: 2, 57600: 3, 115200: 4}
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ClientSettings:
+    """The settings of a `Robot`; every time in nanoseconds.
+
+    Raises:
+        UsageError: A value is out of its range.
+    """
+
+    #: Firmware family; None: by the robot's model and its packets.
+    profile: Profile | None = None
+    #: Motors are switched on by the first motion of a session; False: only by `enable()`.
+    auto_enable: bool = True
+    #: After a loss the robot is looked for again; nothing moves until asked.
+    reconnect: bool = True
+    #: A speed is taken back when the program has made no call for so long; None: never.
+    deadman_ns: Nanos | None = 2 * NS_PER_S
+    #: A session without a sound packet for so long is lost; half of the robot's own watchdog.
+    liveness_ns: Nanos = 1 * NS_PER_S
+    #: The present speed goes out again after so long: P2OS acknowledges nothing.
+    refresh_ns: Nanos = 200 * NS_PER_MS
+    #: chosen: two frames of a speed take 19 ms at 9600 baud; nearer ones would queue up.
+    speed_spacing_ns: Nanos = 40 * NS_PER_MS
+    #: AROS loses commands that come nearer than 3 to 5 ms (Pioneer 2/3 H8 manual, page 42).
+    command_spacing_ns: Nanos = 5 * NS_PER_MS
+    #: A robot that neither approaches its command nor says that it stalls for so long is reported.
+    disbelief_ns: Nanos = 1 * NS_PER_S
+    #: First round of the search, one try a rate: robots answer within 110 ms (measured on a simulator).
+    quick_sync_ns: Nanos = 400 * NS_PER_MS
+    #: Second round, for slow lines; ARIA waits as long.
+    patient_sync_ns: Nanos = 1 * NS_PER_S
+    #: From the identity to OPEN: the manual's spacing of commands.
+    open_delay_ns: Nanos = 5 * NS_PER_MS
+    #: From the first OPEN to the first packet; OPEN is repeated meanwhile.
+    first_packet_ns: Nanos = 1 * NS_PER_S
+    #: Baud rates to look for the robot at, after the one that the line was opened with.
+    bauds: tuple[int, ...] = BAUDS
+    #: Rate to which a serial line is raised when the robot offers it (CONFIGpac autobaud 2); None: never.
+    raise_baud: int | None = 38400
+    #: From HOSTBAUD to the first packet at the new rate, before falling back.
+    raise_window_ns: Nanos = 500 * NS_PER_MS
+    #: First wait before looking for a lost robot again; doubled after each failure.
+    backoff_ns: Nanos = 250 * NS_PER_MS
+    longest_backoff_ns: Nanos = 5 * NS_PER_S
+
+    def __post_init__(self) -> None:
+        for name in ("liveness_ns", "refresh_ns", "speed_spacing_ns", "command_spacing_ns", "disbelief_ns",
+                     "quick_sync_ns", "patient_sync_ns", "open_delay_ns", "first_packet_ns", "raise_window_ns",
+                     "backoff_ns", "longest_backoff_ns"):  # fmt: skip
+            if getattr(self, name) <= 0:
+                raise UsageError(f"{name} = {getattr(self, name)} must be positive")
+        if self.deadman_ns is not None and self.deadman_ns <= 0:
+            raise UsageError(f"deadman_ns = {self.deadman_ns} must be positive, or None")
+        if self.raise_baud is not None and self.raise_baud not in BAUD_CODES:
+            rates = ", ".join(map(str, BAUD_CODES))
+            raise UsageError(f"raise_baud = {self.raise_baud} is no rate of HOSTBAUD", hint=f"one of {rates}")
