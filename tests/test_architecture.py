@@ -25,6 +25,8 @@ ALLOWED = {
     "p2os": {"construct"},
     "p2os.transport": {"construct", "serial"},
     "p2os.cli": {"construct", "typer", "rich", "click", "serial"},
+    "p2os.trace.arrow_files": {"pyarrow"},
+    "p2os.trace.mcap_files": {"mcap"},
     "p2os.pioneer": set(),
     "p2os.pioneer.bullet": {"pybullet", "numpy"},
     "p2os.pioneer.importers": {"yaml", "PIL"},

@@ -46,6 +46,8 @@ _EXTRAS = {
     "matplotlib": "sim",
     "pybullet": "bullet",
     "numpy": "bullet",
+    "pyarrow": "export",
+    "mcap": "export",
 }
 
 

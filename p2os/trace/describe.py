@@ -11,24 +11,15 @@ from typing import TypeAlias
 
 from p2os.commands import Command, CommandNumber
 from p2os.config_packet import FIELDS, ConfigPacket
-from p2os.packets import IDENTITY_KIND, Identity, RawPacket, read_packet
+from p2os.packets import READERS, Identity, RawPacket, packet_name, read_packet
 from p2os.parameters import RobotParameters
 from p2os.profiles import Profile
-from p2os.sip import POSITION_MASK, TAIL, StandardSip
+from p2os.sip import POSITION_MASK, SIP_KINDS, TAIL, StandardSip
 from p2os.units import in_units
 from p2os.wire import Frame
 
 Plain: TypeAlias = "bool | int | float | str | list[Plain] | dict[str, Plain] | None"
 
-#: Packet type → the manuals' word.
-PACKET_NAMES = {
-    0x00: "SYNC0", 0x01: "SYNC1", 0x02: "IDENTITY", 0x20: "CONFIGpac", 0x30: "SIP", 0x31: "SIP", 0x32: "SIP",
-    0x33: "SIP", 0x34: "SIP", 0x60: "SIMLASER", 0x61: "SIMLASER2", 0x62: "SIMSTAT", 0x63: "SIMINFO",
-    0x66: "SIMMAPCHANGED", 0x7B: "ACCELpac", 0x7C: "TORQUEpac", 0x90: "ENCODERpac", 0x95: "HEADINGpac",
-    0x98: "GYROpac", 0x9A: "IMUpac", 0xA0: "ARMpac", 0xA1: "ARMINFOpac", 0xB0: "SERAUXpac", 0xB8: "SERAUX2pac",
-    0xC0: "TCM2pac", 0xC8: "SERAUX3pac", 0xD0: "PLAYLISTpac", 0xE0: "GRIPPERpac", 0xF0: "IOpac",
-    0xF8: "JOYSTICKpac", 0xFA: "BATTERYpac", 0xFE: "RESET", 0xFF: "RESET",
-}  # fmt: skip
 #: Commands whose integer is two bytes: names of the low and the high one, and whether they are signed.
 TWO_BYTES = {
     CommandNumber.VEL2: ("right", "left", True),
@@ -39,11 +30,6 @@ TWO_BYTES = {
 }
 #: A micrometre or a microradian: what is finer is an artefact of floating point.
 _DECIMALS = 6
-
-
-def packet_name(kind: int) -> str:
-    """Return the manuals' word for a packet type, or its number."""
-    return PACKET_NAMES.get(kind, f"packet 0x{kind:02X}")
 
 
 def describe_command(frame: Frame, profile: Profile) -> tuple[str, dict[str, Plain]]:
@@ -67,15 +53,16 @@ def describe_command(frame: Frame, profile: Profile) -> tuple[str, dict[str, Pla
 def describe_packet(frame: Frame, profile: Profile, parameters: RobotParameters) -> tuple[str, dict[str, Plain]]:
     """Return a packet's name and fields; what cannot be read stands in `data` as hex."""
     name = packet_name(frame.kind)
-    if frame.kind == IDENTITY_KIND and frame.data:
-        identity = Identity.from_frame(frame)
-        return name, {"name": identity.name, "class": identity.robot_class, "subclass": identity.subclass}
     packet = read_packet(frame, profile)
+    if isinstance(packet, Identity):
+        return name, {"name": packet.name, "class": packet.robot_class, "subclass": packet.subclass}
     if isinstance(packet, StandardSip):
         return name, sip_fields(packet, profile, parameters)
     if isinstance(packet, ConfigPacket):
         return name, {field: plain(getattr(packet, field)) for field, _ in FIELDS[: packet.fields_sent]}
     if isinstance(packet, RawPacket):
+        if frame.kind in SIP_KINDS or frame.kind in READERS:
+            return name, {"problem": "its inside does not follow its layout", "data": packet.data.hex(" ")}
         return name, {"data": packet.data.hex(" ")} if packet.data else {}
     return name, {
         field.name: plain(getattr(packet, field.name))

@@ -10,8 +10,8 @@ Invariant: the parts of any bytes, sound or damaged, partition them.
 from collections.abc import Iterator
 from dataclasses import dataclass
 
+from p2os.packets import packet_name
 from p2os.trace.capture import Direction
-from p2os.trace.describe import packet_name
 from p2os.trace.explain_command import command_parts
 from p2os.trace.explain_packet import packet_parts
 from p2os.trace.listing import Reading, Row

@@ -9,10 +9,18 @@ import math
 from collections.abc import Callable, Iterator, Mapping
 from typing import Any
 
-from construct import Array, Construct, Container, Renamed, Struct
+from construct import Array, Construct, ConstructError, Container, Renamed, Struct
 
 from p2os.config_packet import FIELDS, ConfigPacket
-from p2os.packets import IDENTITY_KIND, read_packet
+from p2os.packets import (
+    CompassPacket,
+    Identity,
+    RawPacket,
+    SerauxPacket,
+    ServerPacket,
+    SimLaserPacket,
+    read_packet,
+)
 from p2os.parameters import RobotParameters
 from p2os.profiles import Profile
 from p2os.sip import HEAD, HEAD_BYTES, READING_BYTES, TAIL, StandardSip
@@ -25,6 +33,11 @@ FLAG_BITS = (
     "motors on", "sonar array 1 on", "sonar array 2 on", "sonar array 3 on", "sonar array 4 on", "STOP button",
     "E_stall", "far ledge", "near ledge", "joystick button", "charger power good",
 )  # fmt: skip
+#: Packets without fields of their own → what their bytes are.
+_DATA_MEANINGS: Mapping[type, str] = {
+    RawPacket: "a packet that is not read here",
+    SerauxPacket: "bytes that came in at the AUX port",
+}
 #: Fields of the ARCOS tail that have a unit.
 _TAIL_MEANINGS: Mapping[str, Callable[[int], str]] = {
     "raw_battery_x10": lambda raw: f"{raw / 10:.1f} V",
@@ -41,29 +54,45 @@ _TAIL_MEANINGS: Mapping[str, Callable[[int], str]] = {
 def packet_parts(frame: Frame, profile: Profile, parameters: RobotParameters) -> Iterator[Span]:
     """Yield (bytes, name, meaning) from the byte after the type to the last one before the checksum."""
     data = frame.data
-    if frame.kind == IDENTITY_KIND and data:
-        yield from _strings(data, ("name", "class", "subclass"))
-        return
     packet = read_packet(frame, profile)
-    if isinstance(packet, StandardSip):
+    if isinstance(packet, Identity):
+        yield from _strings(data, ("name", "class", "subclass"))
+    elif isinstance(packet, StandardSip):
         yield from _sip(packet, frame, profile, parameters)
     elif isinstance(packet, ConfigPacket):
         yield from _config(packet, data)
+    elif (layout := _layout_of(packet, frame)) is not None:
+        yield from walk(layout, data)
     else:
-        yield data, "data", "a packet that is not read here"
+        yield data, "data", _DATA_MEANINGS.get(type(packet), "nothing more")
+
+
+def _layout_of(packet: ServerPacket, frame: Frame) -> Construct | None:
+    """Return the declaration by which a packet was read, or None where it has none."""
+    if isinstance(packet, CompassPacket) and packet.raw_size is None:
+        return packet.READING
+    if isinstance(packet, SimLaserPacket) and frame.kind != packet.KINDS[0]:
+        return packet.EXTENDED_LAYOUT
+    return getattr(packet, "LAYOUT", None)
 
 
 def walk(layout: Construct, data: bytes) -> Iterator[Span]:
-    """Yield (bytes, name, value) of each leaf of a declared layout, then what follows it."""
-    stream = io.BytesIO(data)
-    yield from _walk(layout, stream, _context(), "")
-    yield stream.read(), "rest", "after the last known field"
+    """Yield (bytes, name, value) of each leaf of a declared layout, then what follows it or does not fit it."""
+    stream, told = io.BytesIO(data), 0
+    try:
+        for span in _walk(layout, stream, _context(), ""):
+            told += len(span[0])
+            yield span
+    except ConstructError:
+        yield data[told:], "bytes", "too few for the next field"
+        return
+    yield data[told:], "rest", "after the last known field"
 
 
 def _walk(layout: Construct, stream: io.BytesIO, context: Any, name: str) -> Iterator[Span]:
     bare = layout
     while isinstance(bare, Renamed):
-        name = bare.name or name
+        name = name or bare.name
         bare = bare.subcon
     if isinstance(bare, Struct):
         inner = _context(context)

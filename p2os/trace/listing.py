@@ -149,25 +149,42 @@ def rows_of(capture: Capture, reading: Reading) -> Iterator[Row]:
     yield from lister.finish(capture.duration_ns)
 
 
+class FrameCutter:
+    """Cuts chunks at frames as they come: one chunk a frame, or a run of bytes that is none.
+
+    Nothing is lost: all that comes out, joined by direction, is all that went in.
+    """
+
+    def __init__(self) -> None:
+        self._decoders: dict[Direction | None, Decoder] = {}
+        self._last: Nanos = 0
+
+    def take(self, chunk: Chunk) -> Iterator[Chunk]:
+        """Take a chunk; yield what it completes, with its time."""
+        decoder = self._decoders.setdefault(chunk.direction, Decoder())
+        self._last = chunk.at_ns
+        decoder.receive(chunk.data, self._last)
+        yield from self._cut(decoder, chunk.direction)
+
+    def finish(self) -> Iterator[Chunk]:
+        """Yield what was begun and never completed."""
+        for direction, decoder in self._decoders.items():
+            decoder.advance_to(self._last + _LONG_AFTER_NS)
+            yield from self._cut(decoder, direction)
+
+    def _cut(self, decoder: Decoder, direction: Direction | None) -> Iterator[Chunk]:
+        while (item := decoder.next_item()) is not None:
+            if isinstance(item, (Frame, Noise)):
+                data = item.data if isinstance(item, Noise) else item.to_bytes()
+                yield Chunk(at_ns=self._last, direction=direction, data=data)
+
+
 def frame_chunks(chunks: Iterable[Chunk]) -> Iterator[Chunk]:
-    """Yield the same bytes cut at frames: one chunk a frame, or a run of bytes that is none."""
-    decoders: dict[Direction | None, Decoder] = {}
-    last: Nanos = 0
+    """Yield the same bytes cut at frames."""
+    cutter = FrameCutter()
     for chunk in chunks:
-        decoder = decoders.setdefault(chunk.direction, Decoder())
-        last = chunk.at_ns
-        decoder.receive(chunk.data, last)
-        yield from _cut(decoder, chunk.direction, last)
-    for direction, decoder in decoders.items():
-        decoder.advance_to(last + _LONG_AFTER_NS)
-        yield from _cut(decoder, direction, last)
-
-
-def _cut(decoder: Decoder, direction: Direction | None, now: Nanos) -> Iterator[Chunk]:
-    while (item := decoder.next_item()) is not None:
-        if isinstance(item, (Frame, Noise)):
-            data = item.data if isinstance(item, Noise) else item.to_bytes()
-            yield Chunk(at_ns=now, direction=direction, data=data)
+        yield from cutter.take(chunk)
+    yield from cutter.finish()
 
 
 class _Stream:

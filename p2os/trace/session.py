@@ -34,6 +34,11 @@ class Session:
         self._state = _State.CLOSED
         self._closed_at: Nanos | None = None
 
+    @property
+    def is_open(self) -> bool:
+        """Whether a session is open, as far as was heard."""
+        return self._state is _State.OPEN
+
     def name_of(self, frame: Frame, direction: Direction | None, now: Nanos) -> str:
         """Take a frame; return its name if it is one of the six, else an empty string."""
         if direction is Direction.FROM_ROBOT:

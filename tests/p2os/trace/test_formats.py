@@ -29,7 +29,7 @@ from p2os.trace.pcap import PCAPNG_MAGIC
 TO, FROM = Direction.TO_ROBOT, Direction.FROM_ROBOT
 SYNC0 = bytes.fromhex("fafb03000000")
 VEL = bytes.fromhex("fafb060b3bc800d33b")
-GOLDEN = Path(__file__).resolve().parent.parent / "golden" / "captures"
+GOLDEN = Path(__file__).resolve().parent.parent.parent / "golden" / "captures"
 TALK = capture_of([(0, TO, SYNC0), (5_000_001, FROM, SYNC0), (2 * NS_PER_S, TO, VEL)])
 
 chunks = st.lists(

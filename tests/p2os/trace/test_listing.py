@@ -19,7 +19,7 @@ from p2os.trace.session import guess_direction
 from p2os.trace.text import line_of, summary_of
 from p2os.wire import Frame
 
-GOLDEN = Path(__file__).resolve().parent.parent / "golden"
+GOLDEN = Path(__file__).resolve().parent.parent.parent / "golden"
 VECTORS = json.loads((GOLDEN / "p2os_vectors.json").read_text())
 TO, FROM = Direction.TO_ROBOT, Direction.FROM_ROBOT
 P2OS = Reading(profile=Profile.P2OS, parameters=load_parameters("p2dx"))

@@ -10,7 +10,7 @@ import pytest
 from p2os.cli.main import run
 
 Capture = pytest.CaptureFixture[str]
-GOLDEN = Path(__file__).resolve().parent.parent / "golden" / "captures"
+GOLDEN = Path(__file__).resolve().parent.parent.parent / "golden" / "captures"
 VEL = "fafb060b3bc800d33b"
 
 ARIA_BEGINS = """\

@@ -1,0 +1,39 @@
+"""Tables as Apache Parquet and Arrow (Feather) files; needs the extra `export`."""
+
+from pathlib import Path
+
+from p2os.errors import MissingDependencyError
+from p2os.trace.table import Table
+
+HINT = "pip install 'p2os[export]', or export to .csv"
+
+
+def write_parquet(table: Table, path: Path) -> None:
+    """Write a table as a Parquet file.
+
+    Raises:
+        MissingDependencyError: pyarrow is not installed.
+        OSError: The file cannot be written.
+    """
+    try:
+        import pyarrow as pa
+        from pyarrow import parquet
+    except ImportError as error:
+        raise MissingDependencyError(f"{path.suffix} files need pyarrow", hint=HINT) from error
+    parquet.write_table(pa.table(dict(table.columns)), path)
+
+
+def write_arrow(table: Table, path: Path) -> None:
+    """Write a table as an Arrow IPC file (also known as Feather 2).
+
+    Raises:
+        MissingDependencyError: pyarrow is not installed.
+        OSError: The file cannot be written.
+    """
+    try:
+        import pyarrow as pa
+    except ImportError as error:
+        raise MissingDependencyError(f"{path.suffix} files need pyarrow", hint=HINT) from error
+    columns = pa.table(dict(table.columns))
+    with path.open("wb") as file, pa.ipc.new_file(file, columns.schema) as writer:
+        writer.write_table(columns)

@@ -1,0 +1,197 @@
+-- P2OS for Wireshark and tshark: Pioneer robots and their clients.
+--
+-- Takes the captures of `p2os sniff --pcap` (link type USER0: one byte of
+-- direction, then one frame) and TCP on port 8101, where simulated Pioneers
+-- listen. Copy this file into Wireshark's folder of personal Lua plug-ins, or
+-- let `p2os sniff --install-dissector` do it. MIT licence.
+
+local commands = {
+    [0] = "PULSE", [1] = "OPEN", [2] = "CLOSE", [3] = "POLLING", [4] = "ENABLE", [5] = "SETA", [6] = "SETV",
+    [7] = "SETO", [8] = "MOVE", [9] = "ROTATE", [10] = "SETRV", [11] = "VEL", [12] = "HEAD", [13] = "DHEAD",
+    [15] = "SAY", [17] = "JOYREQUEST", [18] = "CONFIG", [19] = "ENCODER", [20] = "SETRVDIR", [21] = "RVEL",
+    [22] = "DCHEAD", [23] = "SETRA", [26] = "IMUREQUEST", [28] = "SONAR", [29] = "STOP", [30] = "DIGOUT",
+    [31] = "TIMER", [32] = "VEL2", [33] = "GRIPPER", [35] = "ADSEL", [36] = "GRIPPERVAL", [37] = "GRIPREQUEST",
+    [38] = "GYROCALCW", [39] = "GYROCALCCW", [40] = "IOREQUEST", [41] = "PTUPOS", [42] = "TTY2", [43] = "GETAUX",
+    [44] = "BUMPSTALL", [45] = "TCM2", [46] = "DOCK", [47] = "JOYDRIVE", [48] = "SONARCYCLE", [49] = "MOVINGBLINK",
+    [50] = "HOSTBAUD", [51] = "AUX1BAUD", [52] = "AUX2BAUD", [53] = "AUX3BAUD", [55] = "E_STOP", [56] = "E_STALL",
+    [57] = "QSTOP", [58] = "GYRO", [59] = "LCD", [60] = "TTY4", [61] = "GETAUX3", [62] = "BATTERYINFO", [64] = "STEP",
+    [65] = "CALCOMP", [66] = "TTY3", [67] = "GETAUX2", [68] = "CHARGE", [70] = "ARM_INFO", [71] = "ARM_STATUS",
+    [72] = "ARM_INIT", [73] = "ARM_CHECK", [74] = "ARM_POWER", [75] = "ARM_HOME", [76] = "ARM_PARK", [77] = "ARM_POS",
+    [78] = "ARM_SPEED", [79] = "ARM_STOP", [80] = "ARM_AUTOPARK", [81] = "ARM_GRIPPARK", [82] = "ROTKP",
+    [83] = "ROTKV", [84] = "ROTKI", [85] = "TRANSKP", [86] = "TRANSKV", [87] = "TRANSKI", [88] = "REVCOUNT",
+    [89] = "DRIFTFACTOR", [90] = "SOUND", [91] = "PLAYLIST", [92] = "SOUNDTOG", [93] = "TICKSMM", [110] = "LATVEL",
+    [113] = "LATACCEL", [224] = "SIM_SET_POSE", [225] = "SIM_RESET", [236] = "SIM_CTRL", [237] = "SIM_STAT",
+    [239] = "SIM_EXIT", [250] = "BATTEST", [253] = "RESET", [255] = "MAINTENANCE",
+}
+local packets = {
+    [0x00] = "SYNC0", [0x01] = "SYNC1", [0x02] = "IDENTITY", [0x20] = "CONFIGpac", [0x30] = "SIP", [0x31] = "SIP",
+    [0x32] = "SIP", [0x33] = "SIP", [0x34] = "SIP", [0x60] = "SIMLASER", [0x61] = "SIMLASER2", [0x62] = "SIMSTAT",
+    [0x63] = "SIMINFO", [0x66] = "SIMMAPCHANGED", [0x7B] = "ACCELpac", [0x7C] = "TORQUEpac", [0x90] = "ENCODERpac",
+    [0x95] = "HEADINGpac", [0x98] = "GYROpac", [0x9A] = "IMUpac", [0xA0] = "ARMpac", [0xA1] = "ARMINFOpac",
+    [0xB0] = "SERAUXpac", [0xB8] = "SERAUX2pac", [0xC0] = "TCM2pac", [0xC8] = "SERAUX3pac", [0xD0] = "PLAYLISTpac",
+    [0xD3] = "MARCDEBUG", [0xD5] = "MAXLIMITS", [0xDA] = "WHEELINFO", [0xE0] = "GRIPPERpac", [0xF0] = "IOpac",
+    [0xF8] = "JOYSTICKpac", [0xFA] = "BATTERYpac", [0xFE] = "RESET", [0xFF] = "RESET",
+}
+
+local p2os = Proto("p2os", "Pioneer P2OS")
+local directions = { [0] = "client to robot", [1] = "robot to client" }
+-- Without an argument these three are the same bytes; only the whole conversation tells.
+local bare = { [0] = "SYNC0 or PULSE", [1] = "SYNC1 or OPEN", [2] = "SYNC2 or CLOSE" }
+local argument_types = { [0x3B] = "integer", [0x1B] = "negative integer", [0x2B] = "string" }
+
+local field = {
+    direction = ProtoField.uint8("p2os.direction", "Direction", base.DEC, directions),
+    count = ProtoField.uint8("p2os.count", "Byte count"),
+    command = ProtoField.uint8("p2os.command", "Command", base.DEC, commands),
+    packet = ProtoField.uint8("p2os.packet", "Packet type", base.HEX, packets),
+    argument_type = ProtoField.uint8("p2os.argument_type", "Argument type", base.HEX, argument_types),
+    argument = ProtoField.int32("p2os.argument", "Argument"),
+    text = ProtoField.string("p2os.string", "String"),
+    data = ProtoField.bytes("p2os.data", "Data"),
+    checksum = ProtoField.uint16("p2os.checksum", "Checksum", base.HEX),
+    bad = ProtoField.bool("p2os.bad", "Damaged"),
+    x = ProtoField.uint16("p2os.sip.x", "XPOS (counts)"),
+    y = ProtoField.uint16("p2os.sip.y", "YPOS (counts)"),
+    heading = ProtoField.int16("p2os.sip.heading", "THPOS (4096 a turn)"),
+    left = ProtoField.int16("p2os.sip.left", "Left wheel (mm/s)"),
+    right = ProtoField.int16("p2os.sip.right", "Right wheel (mm/s)"),
+    battery = ProtoField.uint8("p2os.sip.battery", "Battery (0.1 V)"),
+    stall_left = ProtoField.bool("p2os.sip.stall_left", "Left wheel stalled", 8, nil, 1),
+    stall_right = ProtoField.bool("p2os.sip.stall_right", "Right wheel stalled", 8, nil, 1),
+    sonar = ProtoField.string("p2os.sip.sonar", "Sonar (number: counts)"),
+}
+p2os.fields = field
+local damaged = ProtoExpert.new("p2os.damaged", "Damaged frame", expert.group.CHECKSUM, expert.severity.ERROR)
+p2os.experts = { damaged }
+
+-- Sum of big-endian pairs from the command to the last argument; an odd last byte is XORed in.
+local function checksum(buffer, first, last)
+    local sum, place = 0, first
+    while place < last do
+        sum = (sum + buffer(place, 2):uint()) % 0x10000
+        place = place + 2
+    end
+    if place == last then
+        local byte, low = buffer(place, 1):uint(), sum % 0x100
+        sum = sum - low + bit.bxor(low, byte)
+    end
+    return sum
+end
+
+local function add_sip(buffer, tree)
+    if buffer:len() < 25 then return "" end
+    tree:add_le(field.x, buffer(1, 2))
+    tree:add_le(field.y, buffer(3, 2))
+    tree:add_le(field.heading, buffer(5, 2))
+    tree:add_le(field.left, buffer(7, 2))
+    tree:add_le(field.right, buffer(9, 2))
+    tree:add(field.battery, buffer(11, 1))
+    tree:add(field.stall_left, buffer(12, 1))
+    tree:add(field.stall_right, buffer(13, 1))
+    local readings = {}
+    for number = 0, buffer(19, 1):uint() - 1 do
+        local place = 20 + 3 * number
+        if place + 3 > buffer:len() then break end
+        readings[#readings + 1] = buffer(place, 1):uint() .. ": " .. buffer(place + 1, 2):le_uint()
+    end
+    if #readings > 0 then
+        tree:add(field.sonar, buffer(20, 3 * #readings), table.concat(readings, ", "))
+    end
+    return string.format(" x %d, y %d, heading %.1f deg, wheels %d %d mm/s", buffer(1, 2):le_uint() % 0x8000,
+        buffer(3, 2):le_uint() % 0x8000, buffer(5, 2):le_int() * 360 / 4096, buffer(7, 2):le_int(), buffer(9, 2):le_int())
+end
+
+local function add_command(buffer, tree)
+    if buffer:len() < 2 then return "" end
+    local kind = buffer(1, 1):uint()
+    tree:add(field.argument_type, buffer(1, 1))
+    if (kind == 0x3B or kind == 0x1B) and buffer:len() >= 4 then
+        local value = buffer(2, 2):le_uint()
+        if kind == 0x1B then value = -value end
+        tree:add(field.argument, buffer(2, 2), value)
+        return " " .. value
+    elseif kind == 0x2B and buffer:len() >= 3 then
+        local length = math.min(buffer(2, 1):uint(), buffer:len() - 3)
+        if length > 0 then tree:add(field.text, buffer(3, length)) end
+        return " (" .. length .. " bytes)"
+    elseif buffer:len() > 2 then
+        tree:add(field.data, buffer(2))
+    end
+    return ""
+end
+
+-- One whole frame, or bytes that are none. Returns what to say in the list.
+local function dissect_frame(buffer, tree, direction)
+    local size = buffer:len()
+    local branch = tree:add(p2os, buffer())
+    branch:add(field.direction, direction):set_generated()
+    local is_frame = size >= 6 and buffer(0, 2):uint() == 0xFAFB and buffer(2, 1):uint() + 3 == size
+    if is_frame and checksum(buffer, 3, size - 3) ~= buffer(size - 2, 2):uint() then is_frame = false end
+    branch:add(field.bad, not is_frame):set_generated()
+    if not is_frame then
+        branch:add(field.data, buffer())
+        branch:add_proto_expert_info(damaged)
+        branch:append_text(", damaged")
+        return "damaged: " .. tostring(buffer(0, math.min(size, 16)):bytes())
+    end
+    branch:add(field.count, buffer(2, 1))
+    local kind, inside = buffer(3, 1):uint(), buffer(3, size - 5)
+    local name, detail
+    if direction == 1 then
+        name = packets[kind] or string.format("packet 0x%02X", kind)
+        branch:add(field.packet, buffer(3, 1))
+        if kind >= 0x30 and kind <= 0x34 then
+            detail = add_sip(inside:tvb(), branch)
+        else
+            detail = ""
+            if size > 6 then branch:add(field.data, buffer(4, size - 6)) end
+        end
+    else
+        name = (size == 6 and bare[kind]) or commands[kind] or ("command " .. kind)
+        branch:add(field.command, buffer(3, 1))
+        detail = add_command(inside:tvb(), branch)
+    end
+    branch:add(field.checksum, buffer(size - 2, 2))
+    branch:append_text(", " .. name)
+    return name .. detail
+end
+
+function p2os.dissector(buffer, pinfo, tree)
+    pinfo.cols.protocol = "P2OS"
+    local direction = buffer(0, 1):uint()
+    pinfo.cols.src = direction == 0 and "client" or "robot"
+    pinfo.cols.dst = direction == 0 and "robot" or "client"
+    pinfo.cols.info = dissect_frame(buffer(1):tvb(), tree, direction)
+end
+
+-- Over TCP the frames are found again in the stream; a frame that is not whole yet waits for more.
+local stream = Proto("p2os_tcp", "Pioneer P2OS over TCP")
+local robot_port = 8101
+
+function stream.dissector(buffer, pinfo, tree)
+    pinfo.cols.protocol = "P2OS"
+    local direction = pinfo.dst_port == robot_port and 0 or 1
+    local said, place, size = {}, 0, buffer:len()
+    while place < size do
+        local left = size - place
+        if buffer(place, 1):uint() ~= 0xFA then
+            local first = place
+            while place < size and buffer(place, 1):uint() ~= 0xFA do place = place + 1 end
+            said[#said + 1] = dissect_frame(buffer(first, place - first):tvb(), tree, direction)
+        else
+            local wanted = left < 3 and 3 or (buffer(place + 1, 1):uint() == 0xFB and buffer(place + 2, 1):uint() + 3 or 1)
+            if wanted > left then
+                pinfo.desegment_offset = place
+                pinfo.desegment_len = left < 3 and DESEGMENT_ONE_MORE_SEGMENT or wanted - left
+                break
+            end
+            said[#said + 1] = dissect_frame(buffer(place, wanted):tvb(), tree, direction)
+            place = place + wanted
+        end
+    end
+    pinfo.cols.info = table.concat(said, " | ")
+    return size
+end
+
+DissectorTable.get("wtap_encap"):add(wtap.USER0, p2os)
+DissectorTable.get("tcp.port"):add(robot_port, stream)

@@ -1,0 +1,263 @@
+"""The verbs that sit on lines: sniff, record and replay against a served robot."""
+
+import json
+import threading
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from p2os.cli import record as record_verb
+from p2os.cli import replay as replay_verb
+from p2os.cli.bridge import Bridge
+from p2os.cli.quantities import Quantity, parse_duration, parse_quantity
+from p2os.cli.record import record_session
+from p2os.cli.replay import motions_of, play
+from p2os.commands import Command, CommandNumber
+from p2os.errors import RemoteProtocolError, TransportError, UsageError
+from p2os.timing import NS_PER_S
+from p2os.trace import Chunk, Direction, capture_of, read_file, read_pcap, write_recording
+from p2os.trace.replay import Replay
+from p2os.transport import HungUpError, Loops, listen_url, open_url
+
+TO, FROM = Direction.TO_ROBOT, Direction.FROM_ROBOT
+PATIENCE_S = 60.0
+Run = Callable[..., int]
+Capture = pytest.CaptureFixture[str]
+STOP_FIRST = b"".join(
+    command.to_frame().to_bytes()
+    for command in (Command(CommandNumber.STOP), Command(CommandNumber.VEL, 0), Command(CommandNumber.CLOSE))
+)
+
+
+@pytest.fixture(autouse=True)
+def quiet_signals(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Leave the test runner's own signal handlers alone."""
+    for verb in ("record", "replay", "sniff"):
+        monkeypatch.setattr(f"p2os.cli.{verb}.end_on_signals", lambda: None)
+
+
+def test_a_robot_is_recorded_and_left_closed(served: object, run: Run, tmp_path: Path, capsys: Capture) -> None:
+    out, pcap = tmp_path / "floor.jsonl", tmp_path / "floor.pcap"
+    assert run("record", served.url, "--for", "300ms", "--out", out, "--pcap", pcap) == 0
+    captured = capsys.readouterr()
+    assert captured.out == f"{out}\n"
+    assert " SIPs in " in captured.err
+    capture = read_file(out)
+    assert capture.note == f"p2os record {served.url}"
+    assert capture.bytes_of(TO).endswith(Command(CommandNumber.CLOSE).to_frame().to_bytes())
+    for direction in (TO, FROM):
+        assert read_pcap(pcap.read_bytes()).bytes_of(direction) == capture.bytes_of(direction)
+
+
+def test_a_recorded_session_is_sniffed_while_it_is_replayed(
+    served: object, run: Run, tmp_path: Path, capsys: Capture
+) -> None:
+    sync = [Command(number).to_frame().to_bytes() for number in range(3)]
+    talk = [(0, TO, sync[0]), (1, FROM, sync[0]), (2, TO, sync[1]), (3, FROM, sync[1]), (4, TO, sync[2]),
+            (5, FROM, bytes.fromhex("fafb0802000000000200")), (6, TO, sync[1]),
+            (300_000_000, TO, Command(CommandNumber.ENABLE, 1).to_frame().to_bytes())]  # fmt: skip
+    recording, heard = tmp_path / "talk.jsonl", tmp_path / "heard.jsonl"
+    recording.write_text(write_recording(capture_of(talk)))
+    listener = listen_url("tcp:127.0.0.1:0")
+    bridge_url, chunks, told = listener.description, [], []
+    bridge = Bridge(listener, open_url(served.url), lambda: open_url(served.url),
+                    on_chunk=chunks.append, on_event=told.append)  # fmt: skip
+    thread = threading.Thread(target=lambda: bridge.run(lambda: bridge.sessions == 2))
+    thread.start()
+    assert run("replay", recording, bridge_url, "--as", "client", "--speed", "3") == 0
+    assert run("replay", recording, bridge_url, "--as", "client", "--speed", "3") == 0
+    thread.join(PATIENCE_S)
+    assert not thread.is_alive()
+    assert capsys.readouterr().err.endswith("5 frames sent\n")
+    spoken = b"".join(chunk.data for chunk in chunks if chunk.direction is TO)
+    session = b"".join(data for _, direction, data in talk if direction is TO) + STOP_FIRST
+    assert spoken == session * 2
+    assert sum(text.startswith("client gone") for text in told) == 2
+    heard.write_text(write_recording(capture_of([(chunk.at_ns, chunk.direction, chunk.data) for chunk in chunks])))
+    assert run("decode", heard, "--only", "IDENTITY,ENABLE,damaged") == 0
+    assert capsys.readouterr().out.count("IDENTITY  name Virtual") == 2
+
+
+def test_sniff_shows_and_records_one_client(served: object, run: Run, tmp_path: Path, capsys: Capture) -> None:
+    pty, out = tmp_path / "robot", tmp_path / "talk.jsonl"
+    results: list[int] = []
+    words = (
+        "sniff",
+        served.url,
+        "--listen",
+        f"pty:{pty}",
+        "--once",
+        "--json",
+        "--out",
+        out,
+        "--pcap",
+        tmp_path / "t.pcap",
+    )
+    thread = threading.Thread(target=lambda: results.append(run(*words)))
+    thread.start()
+    watchdog = threading.Event()
+    for _ in range(600):
+        if pty.is_symlink() or watchdog.wait(PATIENCE_S / 600):
+            break
+    record_session(open_url(f"pty:{pty}"), lambda _chunk: None, lasts_ns=NS_PER_S // 5)
+    thread.join(PATIENCE_S)
+    assert results == [0]
+    rows = [json.loads(line) for line in capsys.readouterr().out.splitlines()]
+    assert [row["name"] for row in rows[:6]] == ["SYNC0", "SYNC0", "SYNC1", "SYNC1", "SYNC2", "IDENTITY"]
+    assert read_file(out).bytes_of(TO) == read_file(tmp_path / "t.pcap").bytes_of(TO)
+
+
+class Line:
+    """A line that a test plays the far side of."""
+
+    description = "tcp:nowhere"
+
+    def __init__(self, *says: bytes | BaseException) -> None:
+        self.says, self.heard = list(says), b""
+        self.near, self.far = Loops(), None
+
+    def read(self) -> bytes:
+        said = self.says.pop(0) if self.says else b""
+        if isinstance(said, BaseException):
+            raise said
+        return said
+
+    def write(self, data: bytes) -> None:
+        self.heard += data
+
+    def fileno(self) -> int:
+        raise TransportError("cannot be waited for")
+
+    def close(self) -> None:
+        self.heard += b"closed"
+
+
+class Clock:
+    """A clock that runs as fast as it is read."""
+
+    def __init__(self, step_ns: int = 20_000_000) -> None:
+        self.now, self.step_ns = 0, step_ns
+
+    def __call__(self) -> int:
+        self.now += self.step_ns
+        return self.now
+
+
+@pytest.fixture
+def no_waiting(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(record_verb, "BLIND_POLL_S", 0)
+    monkeypatch.setattr(replay_verb, "BLIND_POLL_S", 0)
+
+
+@pytest.mark.usefixtures("no_waiting")
+def test_a_silent_line_is_no_robot() -> None:
+    line = Line()
+    with pytest.raises(RemoteProtocolError, match="no robot on tcp:nowhere"):
+        record_session(line, lambda _chunk: None, clock=Clock())
+    recording = capture_of([(0, TO, Command(0).to_frame().to_bytes()), (1, FROM, Command(0).to_frame().to_bytes()),
+                            (2, TO, Command(1).to_frame().to_bytes())])  # fmt: skip
+    with pytest.raises(RemoteProtocolError, match="does not give an answer to a SYNC"):
+        play(Replay(recording, TO), line, TO, clock=Clock())
+
+
+@pytest.mark.usefixtures("no_waiting")
+def test_a_replay_that_is_interrupted_or_loses_its_line_stops_the_robot() -> None:
+    sip = bytes.fromhex("fafb1b32000000000000000000007d00000000000000000000000000327d")
+    drive = capture_of(
+        [(0, TO, Command(11, 200).to_frame().to_bytes()), (NS_PER_S, TO, Command(0).to_frame().to_bytes())]
+    )
+    for error in (KeyboardInterrupt(), HungUpError("gone")):
+        line = Line(b"", sip, error)
+        with pytest.raises(type(error)):
+            play(Replay(drive, TO), line, TO, clock=Clock())
+        assert line.heard == Command(11, 200).to_frame().to_bytes() + STOP_FIRST
+    assert motions_of(drive) == 1
+
+
+def test_a_bridge_follows_a_change_of_speed_and_stops_the_robot_when_it_ends() -> None:
+    loops, told, chunks, bauds = Loops(), [], [], []
+    robot_end = loops.listen("robot")
+    bridge = Bridge(loops.listen("client"), loops.connect("robot"), lambda: loops.connect("robot"),
+                    on_chunk=chunks.append, on_event=told.append, clock=Clock())  # fmt: skip
+    robot, client = robot_end.accept(), loops.connect("client")
+    bridge.turn()
+    bridge._robot.set_baud = bauds.append
+    robot.write(bytes.fromhex("fafb1b32000000000000000000007d00000000000000000000000000327d"))
+    client.write(Command(CommandNumber.HOSTBAUD, 2).to_frame().to_bytes())
+    for _ in range(4):
+        bridge.turn()
+    assert bauds == [38400]
+    assert client.read()[:4] == b"\xfa\xfb\x1b\x32"
+    bridge.close()
+    assert robot.read().endswith(STOP_FIRST)
+    assert told[-2:] == ["the session was open: sent STOP, VEL 0 and CLOSE", "client gone: the bridge ends"]
+    assert chunks[-1].data == STOP_FIRST
+
+
+def test_a_bridge_whose_robot_is_gone_refuses_its_client() -> None:
+    loops, told = Loops(), []
+    robots = loops.listen("robot")
+    bridge = Bridge(loops.listen("client"), loops.connect("robot"), lambda: loops.connect("robot"),
+                    on_chunk=lambda _chunk: None, on_event=told.append)  # fmt: skip
+    robots.accept().close()
+    robots.close()
+    client = loops.connect("client")
+    bridge.turn()
+    assert told == ["client refused: cannot connect to loop:robot: nobody listens"]
+    with pytest.raises(HungUpError):
+        client.read()
+    bridge.close()
+
+
+@pytest.mark.parametrize(
+    ("words", "code", "said"),
+    [
+        (["record", "tcp:127.0.0.1:1"], 1, "p2os: cannot connect to tcp:127.0.0.1:1"),
+        (["record", "tcp:x", "--for", "10"], 2, "p2os: --for '10' has no unit; take s, ms, min, h"),
+        (["record", "tcp:x", "--for", "0s"], 2, "p2os: --for '0s' must be more than 0"),
+        (["sniff"], 2, "p2os: Invalid value for URL: name the robot's URL"),
+        (["sniff", "nowhere"], 2, "p2os: 'nowhere' is not a port URL"),
+        (["sniff", "tcp:127.0.0.1:1", "--for", "x"], 2, "p2os: --for 'x' is no number with a unit"),
+        (["replay", "gone.jsonl", "tcp:x"], 2, "p2os: cannot read gone.jsonl"),
+        (["replay", "FILE", "tcp:127.0.0.1:1", "--as", "client"], 1, "p2os: cannot connect"),
+        (["replay", "FILE", "serial:/dev/ttyUSB99", "--as", "client"], 2, "p2os: the recording holds 1 motion"),
+        (["replay", "FILE", "pty:"], 2, "p2os: FILE holds nothing that a robot said"),
+        (["replay", "FILE", "tcp:x", "--speed", "0"], 2, "p2os: Invalid value"),
+        (["replay", "FILE", "tcp:x", "--as", "dog"], 2, "p2os: Invalid value"),
+    ],
+)  # fmt: skip
+def test_bad_input_is_one_line_and_a_hint(
+    words: list[str], code: int, said: str, run: Run, tmp_path: Path, capsys: Capture, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    drive = capture_of([(0, TO, Command(11, 200).to_frame().to_bytes())])
+    Path("FILE").write_text(write_recording(drive))
+    assert run(*words) == code
+    captured = capsys.readouterr()
+    assert captured.err.startswith(said)
+    assert captured.err.count("\n") <= 2
+    assert captured.out == ""
+
+
+def test_a_capture_file_that_cannot_be_written_is_named(served: object, run: Run, capsys: Capture) -> None:
+    assert run("record", served.url, "--out", "/nowhere/floor.jsonl", "--for", "1s") == 2
+    assert capsys.readouterr().err == "p2os: cannot write /nowhere/floor.jsonl: no such file or directory\n"
+
+
+@pytest.mark.parametrize(
+    ("text", "quantity", "value"),
+    [("0.5m", Quantity.LENGTH, 0.5), ("-20 cm", Quantity.LENGTH, -0.2), ("180deg", Quantity.ANGLE, 3.141592653589793),
+     (".2m/s", Quantity.SPEED, 0.2), ("1e2mm/s", Quantity.SPEED, 0.1), ("+2min", Quantity.TIME, 120.0)],
+)  # fmt: skip
+def test_quantities_have_units(text: str, quantity: Quantity, value: float) -> None:
+    assert parse_quantity(text, quantity, "--x") == pytest.approx(value, rel=1e-15)
+
+
+@pytest.mark.parametrize("text", ["", "m", "5", "5km", "five m", "nan m", "1e999m", "5 5m"])
+def test_what_is_no_length_is_refused_with_an_example(text: str) -> None:
+    with pytest.raises(UsageError) as caught:
+        parse_quantity(text, Quantity.LENGTH, "--forward")
+    assert caught.value.hint == "--forward 0.5m"
+    assert parse_duration("1.5s", "--for") == 1_500_000_000
+    assert Chunk(at_ns=0, direction=TO, data=b"").data == b""
