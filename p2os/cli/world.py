@@ -9,6 +9,7 @@ from typing import Annotated
 import typer
 
 from p2os.errors import FileError, MissingDependencyError, UsageError
+from p2os.pioneer.importers import Placing, read_placed
 from p2os.pioneer.makers import KINDS, make_world
 from p2os.pioneer.scenery import World
 from p2os.pioneer.world import known_worlds, load_world
@@ -32,9 +33,14 @@ Examples:
 """
 #: Widest drawing in a terminal, in characters.
 WIDEST_COLUMNS = 100
+#: Files that may say otherwise which axis is up.
+MESH_SUFFIXES = (".obj", ".stl", ".dae")
 
 WORLD = Annotated[str, typer.Argument(help="A world that ships, or a file.", metavar="FILE|NAME")]
 SEED = Annotated[int, typer.Option(help="Seed of a world that is made from one.")]
+UP = Annotated[
+    str, typer.Option(help="Which axis is up in a mesh file: x, y or z; auto is what its format says or is used to.")
+]
 
 
 def register(app: typer.Typer) -> None:
@@ -71,9 +77,10 @@ def show(
     world: WORLD,
     out: Annotated[Path | None, typer.Option(help="Write a picture: .png or .svg.")] = None,
     seed: SEED = 0,
+    up: UP = "auto",
 ) -> None:
     """Draw a world in the terminal, or into a file."""
-    place = load_world(world, seed)
+    place = _load(world, seed, up)
     _tell_skipped(place)
     if out is None:
         columns = min(shutil.get_terminal_size((80, 24)).columns, WIDEST_COLUMNS)
@@ -93,9 +100,9 @@ def show(
     typer.echo(f"{out}: {_summary(place)}")
 
 
-def check(world: WORLD, seed: SEED = 0) -> None:
+def check(world: WORLD, seed: SEED = 0, up: UP = "auto") -> None:
     """Read a world and say what is in it; an error names its line."""
-    place = load_world(world, seed)
+    place = _load(world, seed, up)
     _tell_skipped(place)
     typer.echo(f"{place.source}: {_summary(place)}")
 
@@ -113,11 +120,22 @@ def convert(
     world: WORLD,
     out: Annotated[Path | None, typer.Option(help="The file to write; without it the text is printed.")] = None,
     seed: SEED = 0,
+    up: UP = "auto",
 ) -> None:
     """Write any readable world as a TOML file, to be changed by hand."""
-    place = load_world(world, seed)
+    place = _load(world, seed, up)
     _tell_skipped(place)
     _write(place, out)
+
+
+def _load(world: str, seed: int, up: str) -> World:
+    """Return a world; only a mesh file has an up axis to be told."""
+    if up == "auto":
+        return load_world(world, seed)
+    path = Path(world)
+    if path.suffix.lower() not in MESH_SUFFIXES:
+        raise UsageError(f"--up is for a mesh file, not for {world}", hint=f"a file with {', '.join(MESH_SUFFIXES)}")
+    return read_placed(path, Placing(up=up))
 
 
 def _write(place: World, out: Path | None) -> None:

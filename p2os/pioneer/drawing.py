@@ -24,12 +24,17 @@ class Look(Enum):
     WALKING = "#1b6ca8"
     #: A scripted path.
     PATH = "#7fb2d6"
+    #: A line or an area that programs keep out of.
+    FORBIDDEN = "#d98c8c"
+    GOAL = "#5a9367"
 
 
 #: What is drawn later covers what is drawn before.
 ORDER = tuple(Look)
 #: The height at which a mesh is cut for a picture: that of the Pioneer's sonar ring.
 CUT_M = 0.2
+#: Of the dot that is drawn for a goal.
+MARK_RADIUS_M = 0.08
 #: What begins higher is passed beneath by a Pioneer 2.
 OVERHEAD_M = 0.22
 
@@ -52,6 +57,11 @@ def shapes(world: World) -> list[Shape]:
         if item.walk is not None:
             points = item.walk.points_m
             found.append(Shape(Look.PATH, f"{item.name}'s path", points, is_open=True))
+    for mark in world.marks:
+        look = Look.FORBIDDEN if mark.kind == "forbidden" else Look.GOAL
+        is_open, radius = len(mark.points_m) > 1, 0.0 if len(mark.points_m) > 1 else MARK_RADIUS_M
+        points = (*mark.points_m, mark.points_m[0]) if len(mark.points_m) > 2 else mark.points_m
+        found.append(Shape(look, mark.name or mark.kind, points, radius, is_open=is_open))
     for mesh in world.meshes:
         found += [
             Shape(Look.THING, mesh.name, polygon) for polygon in shadow(mesh, CUT_M / 4, CUT_M) if len(polygon) > 2

@@ -14,6 +14,7 @@ from p2os.pioneer.walk import Walk
 Vertex = tuple[float, float, float]
 Triangle = tuple[int, int, int]
 
+MARK_KINDS = ("goal", "dock", "home", "forbidden")
 #: The tables of a world file, in the order in which a world keeps its obstacles.
 SECTIONS = ("box", "cylinder", "floor", "ramp")
 
@@ -166,6 +167,27 @@ class Mesh:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class Mark:
+    """A place on the plan that is no thing: drawn, and felt by nobody.
+
+    Args:
+        name: What is written beside it; need not be unique.
+        kind: `goal`, `dock`, `home`, or `forbidden` for a line or an area that programs keep out of.
+        points_m: One point, or the ends of a line, or the corners of an area.
+    """
+
+    name: str
+    kind: str
+    points_m: tuple[tuple[float, float], ...]
+
+    def __post_init__(self) -> None:
+        if self.kind not in MARK_KINDS:
+            raise WorldError(f"kind {self.kind!r} is unknown", hint=f"one of {', '.join(MARK_KINDS)}")
+        if not self.points_m or not all(math.isfinite(value) for point in self.points_m for value in point):
+            raise WorldError("a mark needs a point, or several")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class World:
     """Where a robot can be."""
 
@@ -179,6 +201,7 @@ class World:
     #: Kept as a file holds them: boxes, cylinders, floors, ramps, each in the order given.
     obstacles: tuple[Obstacle, ...]
     meshes: tuple[Mesh, ...] = ()
+    marks: tuple[Mark, ...] = ()
     #: What a reader of the file left out, one line each.
     skipped: tuple[str, ...] = field(default=(), compare=False)
 

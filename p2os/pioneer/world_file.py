@@ -14,13 +14,14 @@ from typing import Any
 
 from p2os.errors import WorldError
 from p2os.pioneer.arena import arena
-from p2os.pioneer.scenery import Kind, Mesh, Obstacle, Pose, World
+from p2os.pioneer.scenery import Kind, Mark, Mesh, Obstacle, Pose, World
 from p2os.pioneer.toml_places import TomlPlaces, find_places, line_of_error
 from p2os.pioneer.walk import Repeat, Walk
 
 Table = dict[str, Any]
 TOP_KEYS = (
-    "name", "description", "extent_m", "start", "box", "cylinder", "wall", "floor", "ramp", "mesh", "import", "arena",
+    "name", "description", "extent_m", "start", "box", "cylinder", "wall", "floor", "ramp", "mesh", "mark",
+    "import", "arena",
 )  # fmt: skip
 START_KEYS = ("x_m", "y_m", "heading_deg", "z_m")
 #: What a thing that can be pushed or walks has beside its shape.
@@ -48,13 +49,14 @@ SHAPES: Mapping[str, Mapping[str, object]] = {
         "heading_deg": 0.0, "base_m": 0.0,
     },
 }  # fmt: skip
+MARK_KEYS: Mapping[str, object] = {"name": "", "kind": "goal", "points_m": None}
 MESH_KEYS: Mapping[str, object] = {"name": None, "vertices_m": None, "triangles": None}
 IMPORT_KEYS: Mapping[str, object] = {
     "file": None, "x_m": 0.0, "y_m": 0.0, "z_m": 0.0, "heading_deg": 0.0, "scale": 1.0, "up": "auto",
 }  # fmt: skip
 _TEXTS = frozenset({"name", "kind", "file", "up", "repeat"})
 #: Keys whose value is a list of lists of so many numbers.
-_LISTS = {"path_m": 2, "vertices_m": 3, "triangles": 3}
+_LISTS = {"path_m": 2, "points_m": 2, "vertices_m": 3, "triangles": 3}
 
 
 @dataclass(frozen=True, slots=True)
@@ -112,6 +114,7 @@ def parse_world(text: str, source: str, seed: int = 0, folder: Path | None = Non
                 )
             named[obstacles[-1].name] = section.at("name")
     meshes = [_mesh(section) for section in _sections(top, "mesh")]
+    marks = [_mark(section) for section in _sections(top, "mark")]
     if "arena" in table:
         _only(Section(source, places, "arena", 0, _table(top, "arena")), ())
         obstacles += arena(seed, start)
@@ -120,6 +123,7 @@ def parse_world(text: str, source: str, seed: int = 0, folder: Path | None = Non
         brought = _imported(section, folder or Path())
         obstacles += brought.obstacles
         meshes += brought.meshes
+        marks += brought.marks
         skipped += brought.skipped
     extent = _numbers(top, "extent_m", table.get("extent_m"), 4)
     if extent[0] >= extent[2] or extent[1] >= extent[3]:
@@ -132,6 +136,7 @@ def parse_world(text: str, source: str, seed: int = 0, folder: Path | None = Non
         extent=(extent[0], extent[1], extent[2], extent[3]),
         obstacles=tuple(obstacles),
         meshes=tuple(meshes),
+        marks=tuple(marks),
         skipped=tuple(skipped),
     )
 
@@ -250,6 +255,14 @@ def _mesh(section: Section) -> Mesh:
         return Mesh(name=values["name"], vertices=values["vertices_m"], triangles=triangles)
     except WorldError as error:
         raise WorldError(f"{section.at()}: {error}") from error
+
+
+def _mark(section: Section) -> Mark:
+    values = _values(section, MARK_KEYS)
+    try:
+        return Mark(name=values["name"], kind=values["kind"], points_m=values["points_m"])
+    except WorldError as error:
+        raise WorldError(f"{section.at()}: mark: {error}", hint=error.hint) from error
 
 
 def _imported(section: Section, folder: Path) -> World:

@@ -8,7 +8,7 @@ that was made by a program, never one that was read.
 
 import math
 
-from p2os.pioneer.scenery import Kind, Mesh, Obstacle, World
+from p2os.pioneer.scenery import Kind, Mark, Mesh, Obstacle, World
 
 #: How many neighbours of a number of degrees are tried.
 TRIES = 4
@@ -27,6 +27,7 @@ def write_world(world: World) -> str:
     ]
     parts += [f"[[{item.section}]]\n{_lines(_FIELDS[item.section](item))}" for item in world.obstacles]
     parts += [f"[[mesh]]\n{_lines(_mesh(item))}" for item in world.meshes]
+    parts += [f"[[mark]]\n{_lines(_mark(item))}" for item in world.marks]
     return "\n".join(parts)
 
 
@@ -104,6 +105,10 @@ def _mesh(item: Mesh) -> Fields:
         "vertices_m": [list(vertex) for vertex in item.vertices],
         "triangles": [list(triangle) for triangle in item.triangles],
     }
+
+
+def _mark(item: Mark) -> Fields:
+    return {"name": item.name, "kind": item.kind, "points_m": [list(point) for point in item.points_m]}
 
 
 def _lines(fields: Fields) -> str:

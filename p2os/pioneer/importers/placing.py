@@ -58,6 +58,10 @@ def placed_world(world: World, placing: Placing) -> World:
         return world
     obstacles = tuple(_placed_obstacle(item, placing) for item in world.obstacles)
     meshes = tuple(replace(item, vertices=tuple(placed_points(item.vertices, placing))) for item in world.meshes)
+    marks = tuple(
+        replace(item, points_m=tuple((x, y) for x, y, _ in placed_points([(*p, 0.0) for p in item.points_m], placing)))
+        for item in world.marks
+    )
     ((x, y, z),) = placed_points([(world.start.x_m, world.start.y_m, world.start.z_m)], placing)
     x0, y0, x1, y1 = world.extent
     corners = placed_points([(x0, y0, 0.0), (x1, y0, 0.0), (x1, y1, 0.0), (x0, y1, 0.0)], placing)
@@ -66,6 +70,7 @@ def placed_world(world: World, placing: Placing) -> World:
         world,
         obstacles=obstacles,
         meshes=meshes,
+        marks=marks,
         start=Pose(x, y, world.start.heading_rad + placing.heading_rad, z),
         extent=(min(xs), min(ys), max(xs), max(ys)),
     )
