@@ -7,165 +7,47 @@ The reader is as tolerant as a real robot: OPEN, CLOSE and CONFIG may carry an
 integer, SETO may carry a lone type byte, a string may be shorter than its
 length byte says or be followed by a NUL.
 
+What each command takes and means stands in `ROWS`, one row a command.
+
 Invariant: `Command.from_frame(command.to_frame()) == command`.
 """
 
 from dataclasses import dataclass
-from enum import IntEnum
 
+from p2os.command_numbers import CommandNumber
+from p2os.command_table import BY_NUMBER, ROWS, Argument, CommandRow, TwoBytes, command_row
 from p2os.errors import LocalProtocolError
 from p2os.wire import Frame
+
+__all__ = [
+    "NEGATIVE",
+    "POSITIVE",
+    "ROWS",
+    "STRING",
+    "Argument",
+    "Command",
+    "CommandNumber",
+    "CommandRow",
+    "TwoBytes",
+    "command",
+    "command_row",
+    "enable",
+    "pulse",
+    "rvel",
+    "set_origin",
+    "sonar",
+    "stop",
+    "vel",
+    "vel2",
+]
 
 #: Argument type bytes (sfARGINT, sfARGNINT, sfARGSTR in the manuals).
 POSITIVE, NEGATIVE, STRING = 0x3B, 0x1B, 0x2B
 #: The longest string that fits a frame: 202 bytes less number, type and length.
 MAX_STRING_BYTES = 199
 MAX_MAGNITUDE = 0xFFFF
-
-
-class CommandNumber(IntEnum):
-    """Every command number that a manual or a client in use names."""
-
-    #: Reset the watchdog; the same bytes as SYNC0.
-    PULSE = 0
-    #: Start the servers and SIPs; the same bytes as SYNC1.
-    OPEN = 1
-    #: End the session; the same bytes as SYNC2.
-    CLOSE = 2
-    #: String of sonar numbers (from 1) in firing order.
-    POLLING = 3
-    #: 1 motors on, 0 off.
-    ENABLE = 4
-    #: + acceleration, - deceleration, mm/s2.
-    SETA = 5
-    #: Largest translational speed, mm/s.
-    SETV = 6
-    #: Odometry to 0, 0, 0.
-    SETO = 7
-    #: Translate, mm.
-    MOVE = 8
-    #: Rotate, deg/s, + counter-clockwise.
-    ROTATE = 9
-    #: Largest rotational speed, deg/s.
-    SETRV = 10
-    #: Translational speed, mm/s, + forward.
-    VEL = 11
-    #: Turn to an absolute heading, deg.
-    HEAD = 12
-    #: Turn relative to the present heading, deg.
-    DHEAD = 13
-    #: Up to 20 pairs of duration (20 ms) and tone.
-    SAY = 15
-    #: JOYSTICKpac: 0 stop, 1 one, 2 continuous.
-    JOYREQUEST = 17
-    #: Ask for a CONFIGpac.
-    CONFIG = 18
-    #: ENCODERpac: 0 stop, 1 one, 2 continuous.
-    ENCODER = 19
-    #: Named by ARIA only; no firmware is known to have it.
-    SETRVDIR = 20
-    #: Rotational speed, deg/s, + counter-clockwise.
-    RVEL = 21
-    #: Turn relative to the last set-point, deg.
-    DCHEAD = 22
-    #: + rotational acceleration, - deceleration, deg/s2.
-    SETRA = 23
-    #: Seekur IMU packets.
-    IMUREQUEST = 26
-    #: 1 all sonar on, 0 off.
-    SONAR = 28
-    #: Stop; motors stay enabled.
-    STOP = 29
-    #: Digital outputs: mask and states.
-    DIGOUT = 30
-    #: PSOS timer.
-    TIMER = 31
-    #: Wheel speeds: low byte right, high byte left, in Vel2Divisor mm/s.
-    VEL2 = 32
-    GRIPPER = 33
-    #: Select the analog port shown in the SIP.
-    ADSEL = 35
-    GRIPPERVAL = 36
-    GRIPREQUEST = 37
-    GYROCALCW = 38
-    GYROCALCCW = 39
-    #: IOpac: 0 stop, 1 one, 2 continuous.
-    IOREQUEST = 40
-    #: Servo port and pulse width.
-    PTUPOS = 41
-    #: Bytes to the AUX1 port.
-    TTY2 = 42
-    #: Ask for bytes from AUX1.
-    GETAUX = 43
-    #: 0 off, 1 front, 2 rear, 3 both.
-    BUMPSTALL = 44
-    #: Compass module.
-    TCM2 = 45
-    DOCK = 46
-    #: 1 lets the robot's joystick drive while connected.
-    JOYDRIVE = 47
-    #: Milliseconds a ping.
-    SONARCYCLE = 48
-    MOVINGBLINK = 49
-    #: 0 9600, 1 19200, 2 38400, 3 57600, 4 115200 baud.
-    HOSTBAUD = 50
-    AUX1BAUD = 51
-    AUX2BAUD = 52
-    AUX3BAUD = 53
-    #: Stop at once, overriding the deceleration.
-    E_STOP = 55
-    #: 1 lets the stop button cause a stall.
-    E_STALL = 56
-    QSTOP = 57
-    #: 1 GYROpacs on, 0 off.
-    GYRO = 58
-    LCD = 59
-    TTY4 = 60
-    GETAUX3 = 61
-    BATTERYINFO = 62
-    STEP = 64
-    CALCOMP = 65
-    TTY3 = 66
-    GETAUX2 = 67
-    CHARGE = 68
-    ARM_INFO = 70
-    ARM_STATUS = 71
-    ARM_INIT = 72
-    ARM_CHECK = 73
-    ARM_POWER = 74
-    ARM_HOME = 75
-    ARM_PARK = 76
-    ARM_POS = 77
-    ARM_SPEED = 78
-    ARM_STOP = 79
-    ARM_AUTOPARK = 80
-    ARM_GRIPPARK = 81
-    ROTKP = 82
-    ROTKV = 83
-    ROTKI = 84
-    TRANSKP = 85
-    TRANSKV = 86
-    TRANSKI = 87
-    REVCOUNT = 88
-    DRIFTFACTOR = 89
-    #: AmigoBot sound; P2OS manuals list PLAYLIST here.
-    SOUND = 90
-    PLAYLIST = 91
-    #: 1 buzzer on, 0 off.
-    SOUNDTOG = 92
-    TICKSMM = 93
-    #: Seekur lateral speed, mm/s.
-    LATVEL = 110
-    LATACCEL = 113
-    SIM_SET_POSE = 224
-    SIM_RESET = 225
-    SIM_CTRL = 236
-    SIM_STAT = 237
-    SIM_EXIT = 239
-    #: ARCOS: pretend a battery voltage; AROS: SHUTDOWN.
-    BATTEST = 250
-    RESET = 253
-    MAINTENANCE = 255
+#: Commands whose bytes have no length before them (simulators only).
+UNCOUNTED = frozenset(int(row.number) for row in ROWS if Argument.DATA in row.kinds)
 
 
 @dataclass(frozen=True, slots=True)
@@ -194,10 +76,13 @@ class Command:
     @property
     def name(self) -> str:
         """The manual's word for the command, or its number."""
-        try:
-            return CommandNumber(self.number).name
-        except ValueError:
-            return f"command {self.number}"
+        row = self.row
+        return f"command {self.number}" if row is None else row.name
+
+    @property
+    def row(self) -> CommandRow | None:
+        """What the command takes and means, or None where nobody names it."""
+        return BY_NUMBER.get(self.number)
 
     @property
     def integer(self) -> int | None:
@@ -228,7 +113,8 @@ class Command:
         if self.argument is None:
             return Frame(head)
         if isinstance(self.argument, bytes):
-            return Frame(head + bytes((STRING, len(self.argument))) + self.argument)
+            length = b"" if self.number in UNCOUNTED else bytes((len(self.argument),))
+            return Frame(head + bytes((STRING,)) + length + self.argument)
         sign = NEGATIVE if self.argument < 0 else POSITIVE
         return Frame(head + bytes((sign,)) + abs(self.argument).to_bytes(2, "little"))
 
@@ -243,9 +129,34 @@ class Command:
                 return cls(frame.kind)
             magnitude = int.from_bytes(data[1:3], "little")
             return cls(frame.kind, -magnitude if data[0] == NEGATIVE else magnitude)
+        if data[0] == STRING and frame.kind in UNCOUNTED:
+            return cls(frame.kind, data[1 : 1 + MAX_STRING_BYTES])
         if data[0] == STRING and len(data) > 1:
             return cls(frame.kind, data[2 : 2 + data[1]])
         return cls(frame.kind, data[:MAX_STRING_BYTES])
+
+
+def command(which: int | str, *argument: int | bytes) -> Command:
+    """Return a command by its number or name, its argument checked against the table.
+
+    Args:
+        which: 0 to 255, or a name or alias without regard to case.
+        argument: Nothing, one integer, one string of bytes, or two bytes (low, high) for a command that takes two.
+
+    Raises:
+        LocalProtocolError: There is no such command, or it does not take this.
+    """
+    row = command_row(which)
+    if len(argument) == 2:
+        low, high = argument
+        if isinstance(low, bytes) or isinstance(high, bytes):
+            raise LocalProtocolError(f"{row.name} takes {row.takes}")
+        return Command(row.number, row.word(low, high))
+    if len(argument) > 2:
+        raise LocalProtocolError(f"{row.name}: {len(argument)} arguments, it takes {row.takes}")
+    value = argument[0] if argument else None
+    row.check(value)
+    return Command(row.number, value)
 
 
 def pulse() -> Command:
