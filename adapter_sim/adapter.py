@@ -4,8 +4,7 @@ It is a client of the robot, driven by pins or by a game pad, never by both. The
 states and their table stand in states.py; here is what happens in them. The
 firmware in adapter_fw/core is its twin, byte for byte and edge for edge.
 
-Not modelled: the ESP32 itself (cores, Bluetooth, flash), the time that its
-program needs (a pass of its loop takes none here), analog levels.
+Not modelled: the ESP32 itself, the time that its program needs, analog levels.
 
 Invariant: within one instant the order is fixed: reset wire, boot, connection,
 sample, pad, loss, belief, distances, encoders, speeds, stops. A change of rst is seen
@@ -142,9 +141,9 @@ class Adapter:
     def set_master(self, master: Master, now: Nanos) -> None:
         """Give the robot to another master: it is stopped and closed first, and only a new wish starts it."""
         self._run(now - 1)
-        self._now = max(self._now, now)
         if master is self._masters.master:
             return
+        self._now = max(self._now, now)
         if self._state is AdapterState.CONNECTING or self._state in OPEN_STATES:
             self._halt(now)
         self._masters.switch(master)
@@ -215,7 +214,7 @@ class Adapter:
         now = None
         while self._deadline <= limit:
             now = self._deadline
-            if now < self._other and self.inputs.is_quiet(now):
+            if now < self._other and not self._is_restless and self.inputs.is_quiet(now):
                 self._now = now
                 self._next_sample = now + self._sample_period_ns
                 self._deadline = min(self._next_sample, self._other)
@@ -223,6 +222,12 @@ class Adapter:
                 self._act(now)
                 self._replan()
         return now
+
+    @property
+    def _is_restless(self) -> bool:
+        """Tell whether the state is left at the next sample even if the pins stand still: a pad's wish came or went."""
+        left_by_wish = {AdapterState.IDLE: True, AdapterState.LOST: False}
+        return left_by_wish.get(self._state) is self._masters.wants_robot
 
     def _act(self, now: Nanos) -> None:
         """Do all that is due at `now`, in the fixed order."""

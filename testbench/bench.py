@@ -16,13 +16,13 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Protocol, cast
 
-from adapter_sim.adapter import Adapter
 from adapter_sim.pinout import Pinout, Pull, Role, load_pinout
 from p2os.pioneer.body import RobotBody, make_body
 from p2os.pioneer.controller import Pioneer
 from p2os.pioneer.scenery import World
 from p2os.pioneer.world import load_world
 from p2os.timing import NS_PER_S, Nanos
+from testbench.adapter_choice import AnyAdapter, make_adapter
 from testbench.chip_pins import ChipPins
 from testbench.direct import DirectRobot, DistanceSensors, JointMotor, WheelEncoder
 from testbench.loop import DEFAULT_SLICE_NS, Follower, RunLoop
@@ -66,7 +66,7 @@ class BenchParts:
     harness: Harness
     body: RobotBody
     world: World
-    adapter: Adapter | None = None
+    adapter: AnyAdapter | None = None
     pioneer: Pioneer | None = None
 
 
@@ -215,12 +215,10 @@ class Bench:
             sensors=sensors, sonar_numbers=range(len(wires)), encoder_period_ns=settings.encoder_period_ns,
         )  # fmt: skip
 
-    def _adapter_and_pioneer(self, pinout: Pinout, body: RobotBody, harness: Harness) -> tuple[Adapter, Pioneer]:
+    def _adapter_and_pioneer(self, pinout: Pinout, body: RobotBody, harness: Harness) -> tuple[AnyAdapter, Pioneer]:
         recorder, parameters = self.recorder, self.scenario.parameters
         to_robot, to_client = SerialLine(), SerialLine()
-        adapter = Adapter(
-            pins=OwnedPins(harness, "adapter"), pinout=pinout, parameters=parameters, settings=self.scenario.adapter
-        )
+        adapter = make_adapter(self.scenario, OwnedPins(harness, "adapter"), pinout)
         adapter.on_event = recorder.listener("adapter")
         pioneer = Pioneer(parameters=parameters, body=body, settings=self.scenario.controller)
         pioneer.on_event = recorder.listener("pioneer")

@@ -12,7 +12,6 @@ Invariant: `close` sends the stop sequence, once, whatever happened before.
 import contextlib
 from collections.abc import Callable
 
-from adapter_sim.adapter import Adapter
 from adapter_sim.pinout import Role, load_pinout
 from adapter_sim.states import AdapterState
 from p2os.errors import RemoteProtocolError, RunFailedError, TransportError
@@ -20,6 +19,7 @@ from p2os.sip import SIP_KINDS, StandardSip
 from p2os.timing import NS_PER_MS, NS_PER_S, Nanos
 from p2os.transport import Transport
 from p2os.wire import Decoder, Frame
+from testbench.adapter_choice import make_adapter
 from testbench.bench import boot, make_harness
 from testbench.chip_pins import ChipPins
 from testbench.loop import RunLoop
@@ -72,12 +72,10 @@ class RemoteBench:
         self._pacer = pacer
         self.on_slice: Callable[[Nanos], None] | None = None
         self._is_closed = False
-        pinout, parameters = load_pinout(), scenario.parameters
+        pinout = load_pinout()
         harness = make_harness(pinout)
         self.recorder = recorder = Recorder(self.trace, harness, body=None)
-        self.adapter = Adapter(
-            pins=OwnedPins(harness, "adapter"), pinout=pinout, parameters=parameters, settings=scenario.adapter
-        )
+        self.adapter = make_adapter(scenario, OwnedPins(harness, "adapter"), pinout)
         self.adapter.on_event = recorder.listener("adapter")
         self._listener = _Listener(scenario, recorder)
         seat = PortSeat(

@@ -30,6 +30,8 @@ from testbench.script import Change
 from testbench.script_file import load_changes
 
 MODES = ("direct", "adapter")
+#: What runs in the adapter's place: the Python model, or the firmware's C++ core.
+ADAPTER_CORES = ("model", "firmware")
 BODIES = ("kinematic", "bullet")
 
 _TOP = (
@@ -63,6 +65,7 @@ _DIRECT = (
     Key(name="bit_order", kind="text", choices=tuple(BitOrder)),
 )
 _ADAPTER = (
+    Key(name="core", kind="text", choices=ADAPTER_CORES),
     Key(name="step_mm_s", kind="number", above=0),
     Key(name="bit_order", kind="text", choices=tuple(BitOrder)),
     Key(name="motor_meaning", kind="text", choices=("wheels", "linear_angular")),
@@ -104,6 +107,7 @@ class Scenario:
     start: Pose | None = None
     direct: DirectSettings = field(default_factory=DirectSettings)
     adapter: AdapterSettings = field(default_factory=AdapterSettings)
+    adapter_core: str = "model"
     controller: ControllerSettings = field(default_factory=ControllerSettings)
     changes: tuple[Change, ...] = ()
     goals: tuple[Goal, ...] = ()
@@ -120,6 +124,7 @@ class Scenario:
         *,
         firmware: Path | None = None,
         mode: str | None = None,
+        adapter_core: str | None = None,
         body: str | None = None,
         world: str | None = None,
         seed: int | None = None,
@@ -131,6 +136,7 @@ class Scenario:
             UsageError: A value cannot be.
         """
         _refuse_unknown("mode", mode, MODES)
+        _refuse_unknown("adapter", adapter_core, ADAPTER_CORES)
         _refuse_unknown("body", body, BODIES)
         if duration_s is not None and not 0 < duration_s < math.inf:
             raise UsageError(f"a run of {duration_s:g} s cannot be", hint="--duration takes seconds above 0")
@@ -141,6 +147,7 @@ class Scenario:
             moved,
             firmware=firmware or moved.firmware,
             mode=mode or moved.mode,
+            adapter_core=adapter_core or moved.adapter_core,
             body=body or moved.body,
             seed=moved.seed if seed is None else seed,
             duration_ns=moved.duration_ns if duration_s is None else round(duration_s * NS_PER_S),
@@ -241,6 +248,7 @@ def _build(table: Table, text: str, path: Path) -> Scenario:
         start=_start(table, where),
         direct=_direct(cast("Table", table.get("direct", {})), where),
         adapter=_adapter(cast("Table", table.get("adapter", {})), round(threshold_m * 1e6), where),
+        adapter_core=str(cast("Table", table.get("adapter", {})).get("core", "model")),
         controller=_controller(cast("Table", table.get("controller", {})), where),
         changes=changes,
         goals=tuple(goals),
@@ -303,7 +311,7 @@ def _direct(part: Table, where: str) -> DirectSettings:
 
 def _adapter(part: Table, threshold_um: int, where: str) -> AdapterSettings:
     check_table(part, _ADAPTER, f"{where}: [adapter]")
-    values = {name: value for name, value in part.items() if name != "step_mm_s"}
+    values = {name: value for name, value in part.items() if name not in {"step_mm_s", "core"}}
     if "step_mm_s" in part:
         values["step_um_per_s"] = round(cast("float", part["step_mm_s"]) * 1000)
     return AdapterSettings(threshold_um=threshold_um, **values)  # type: ignore[arg-type] # check_table has seen to it

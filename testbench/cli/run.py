@@ -62,6 +62,7 @@ def run(
     scenario: Annotated[str, typer.Argument(help="Name or TOML file.", metavar="SCENARIO")],
     firmware: Annotated[Path | None, typer.Option(help="ELF, HEX or BIN in place of the scenario's.")] = None,
     mode: Annotated[str | None, typer.Option(help="direct or adapter.")] = None,
+    adapter: Annotated[str | None, typer.Option(help="model or firmware: what stands in the adapter's place.")] = None,
     port: Annotated[str | None, typer.Option(help="Drive the robot at this URL, in real time.", metavar="URL")] = None,
     body: Annotated[str | None, typer.Option(help="kinematic or bullet.")] = None,
     world: Annotated[str | None, typer.Option(help="World, or a TOML file.")] = None,
@@ -86,8 +87,8 @@ def run(
     elif yes or max_speed is not None:
         raise UsageError(f"{'--yes' if yes else '--max-speed'} goes with --port only")
     wanted = wanted.with_options(
-        firmware=firmware, mode=mode, body=body, world=world, seed=seed, duration_s=duration
-    )  # fmt: skip
+        firmware=firmware, mode=mode, adapter_core=adapter, body=body, world=world, seed=seed, duration_s=duration
+    )
     folder = out or next_folder(wanted.name)
     if port is not None:
         result = drive_port(wanted, folder, port, yes=yes, max_speed=max_speed)

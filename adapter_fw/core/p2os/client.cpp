@@ -36,6 +36,8 @@ const char* text(EndReason reason) {
       return "no packet in time";
     case EndReason::CONTROLLER_RESET:
       return "the robot's controller was reset";
+    case EndReason::RESTARTED:
+      return "the robot was restarted";
   }
   return "";
 }
@@ -145,6 +147,16 @@ void Client::take_open_packet(Bytes payload, Nanos now) {
     lose(EndReason::CONTROLLER_RESET, now);
     return;
   }
+  if (kind < IDENTITY_KIND && payload.size == 1) {
+    // What a robot answers before OPEN. Echoes that were late came before the first packet.
+    if (has_heard_) {
+      lose(EndReason::RESTARTED, now);
+    } else {
+      ++stats_.frames_ignored;
+    }
+    return;
+  }
+  has_heard_ = true;
   due_ = now + settings_.liveness_ns;
   if (!is_sip_kind(kind)) {
     if (listener_) {
@@ -178,6 +190,7 @@ void Client::time_out(Nanos now) {
   } else if (state_ == ClientState::SYNCED) {
     say(CommandFrame(CommandNumber::OPEN), now);
     enter(ClientState::OPEN, now + settings_.first_packet_ns);
+    has_heard_ = false;
     if (listener_) {
       listener_->session_opened(identity_, now);
     }

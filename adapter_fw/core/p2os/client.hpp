@@ -8,7 +8,7 @@
 //     CLOSED, LOST, FAILED  --connect-->  SYNC0 --> SYNC1 --> SYNC2 --> SYNCED --> OPEN
 //     any SYNC  --a SIP comes: the robot is still open-->  RECOVERING  --200 ms-->  SYNC0
 //     any SYNC  --no answer in 1 s-->  SYNC0 again, at most sync_attempts times, then FAILED
-//     OPEN      --no packet for liveness_ns, or a reset notice-->  LOST
+//     OPEN      --no packet for liveness_ns, a reset notice, an echo of SYNC-->  LOST
 //
 // P2OS acknowledges nothing, and any packet revives the last speed of a robot that
 // its watchdog has stopped. So STOP, VEL 0 and RVEL 0 stand before every SYNC0
@@ -47,7 +47,7 @@ struct ClientSettings {
 enum class ClientState : std::uint8_t { CLOSED, SYNC0, SYNC1, SYNC2, SYNCED, OPEN, RECOVERING, LOST, FAILED };
 
 //: Why a session ended; `text` says it to a person.
-enum class EndReason : std::uint8_t { NO_ANSWER, SILENCE, CONTROLLER_RESET };
+enum class EndReason : std::uint8_t { NO_ANSWER, SILENCE, CONTROLLER_RESET, RESTARTED };
 const char* text(EndReason reason);
 
 //: What the robot said in answer to SYNC2; cut to 19 characters each, as other clients do.
@@ -150,6 +150,8 @@ class Client final : private FrameSink {
   Nanos due_ = NEVER;
   Nanos last_sent_ns_ = 0;
   std::int32_t attempts_ = 0;
+  //: Whether a packet has come since OPEN.
+  bool has_heard_ = false;
   Identity identity_;
   ClientStats stats_;
   std::array<CommandFrame, OUTPUT_FRAMES> output_{};

@@ -1,0 +1,84 @@
+"""The firmware core in the whole chain, in the model's place."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from p2os.errors import UsageError
+from p2os.timing import NS_PER_S
+from testbench.adapter_firmware import FirmwareAdapter, default_settings, is_available, setting_numbers
+from testbench.bench import Bench
+from testbench.scenario import Scenario, load_scenario
+from tests.adapter_fw.twins import PARAMETERS, PINOUT, AdapterSettings, FakePins
+
+pytestmark = pytest.mark.skipif(not is_available(), reason="the firmware core is not built: no C++17 compiler")
+
+
+def scenario(core: str, name: str = "motors", duration_s: int = 8) -> Scenario:
+    wanted = load_scenario(name).with_options(mode="adapter", body="kinematic", adapter_core=core)
+    return replace(wanted, duration_ns=duration_s * NS_PER_S)
+
+
+def finished(bench: Bench) -> str:
+    bench.run_until(bench.end)
+    bench.finish()
+    return bench.trace.sha256
+
+
+def test_a_run_with_the_firmware_equals_the_run_with_the_model() -> None:
+    assert finished(Bench(scenario("firmware"))) == finished(Bench(scenario("model")))
+
+
+@pytest.mark.slow
+def test_dodge_drives_the_same_way_with_either() -> None:
+    runs = [Bench(scenario(core, "dodge", 30)) for core in ("model", "firmware")]
+    assert finished(runs[0]) == finished(runs[1])
+
+
+def test_a_run_with_the_firmware_goes_on_from_half_way() -> None:
+    first, second = Bench(scenario("firmware")), Bench(scenario("firmware"))
+    first.run_until(5 * NS_PER_S)
+    head, saved = first.trace.text, first.snapshot()
+    finished(first)
+    second.restore(saved)
+    finished(second)
+    assert head + second.trace.text == first.trace.text
+
+
+def test_the_defaults_of_both_are_the_same() -> None:
+    model = setting_numbers(AdapterSettings(), PARAMETERS)
+    firmware = default_settings()
+    assert firmware.pop("threshold_um") == -1, "the firmware takes half of the robot's sonar range"
+    assert model.pop("threshold_um") == 2_500_000
+    assert firmware == model
+
+
+def test_numbers_that_the_firmware_cannot_hold_are_refused_in_one_line() -> None:
+    with pytest.raises(UsageError, match="refuses its numbers: sample_count must be odd, 1 to 31"):
+        FirmwareAdapter(
+            pins=FakePins(), pinout=PINOUT, parameters=PARAMETERS, settings=AdapterSettings(sample_count=33)
+        )
+
+
+def test_a_failure_of_the_far_side_comes_out_behind_the_firmware() -> None:
+    class BrokenPins(FakePins):
+        def read(self, signal: str, at: int) -> bool:
+            raise OSError(f"{signal} at {at} ns: the bank is gone")
+
+    adapter = FirmwareAdapter(pins=BrokenPins(), pinout=PINOUT, parameters=PARAMETERS)
+    with pytest.raises(OSError, match="the bank is gone"):
+        adapter.advance_to(NS_PER_S)
+
+
+def test_generated_tables_are_up_to_date() -> None:
+    import importlib.util
+
+    path = Path(__file__).parents[2] / "tools" / "generate_adapter_tables.py"
+    spec = importlib.util.spec_from_file_location("generate_adapter_tables", path)
+    assert spec is not None
+    assert spec.loader is not None
+    tables = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(tables)
+    stale = [path.name for path, text in tables.tables().items() if path.read_text(encoding="utf-8") != text]
+    assert not stale, "run tools/generate_adapter_tables.py"

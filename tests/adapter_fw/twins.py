@@ -1,0 +1,143 @@
+"""Model and firmware side by side: the same pins, bytes and times into both, everything compared."""
+
+from dataclasses import dataclass, field, replace
+
+from adapter_sim import Adapter, AdapterSettings, Pinout, load_pinout
+from adapter_sim.gamepad import Master, PadReport
+from p2os.packets import Identity
+from p2os.parameters import load_parameters
+from p2os.profiles import Profile
+from p2os.sip import SonarReading, StandardSip
+from p2os.timing import NS_PER_MS, Nanos
+from p2os.wire import Frame
+from testbench.adapter_firmware import FirmwareAdapter
+from tests.adapter_sim.conftest import FakePins
+
+PARAMETERS = load_parameters("p2dx")
+PINOUT = load_pinout()
+MS = NS_PER_MS
+#: Counters that both keep, by the firmware's name and the model's.
+WIRE_COUNTERS = ("frames", "noise_bytes", "bad_checksums", "bad_counts", "stalled", "rescued")
+
+
+@dataclass
+class Side:
+    """One of the two, with all that came out of it."""
+
+    pins: FakePins
+    adapter: Adapter | FirmwareAdapter
+    frames: list[bytes] = field(default_factory=list)
+    events: list[tuple[Nanos, str]] = field(default_factory=list)
+
+    def listen(self) -> None:
+        self.adapter.on_event = lambda now, what, _: self.events.append((now, what))
+
+    def collect(self) -> None:
+        self.frames += self.adapter.take_output()
+
+
+class Twins:
+    """Both, fed alike; a robot that is only a source of SIPs answers the model's frames."""
+
+    def __init__(self, settings: AdapterSettings | None = None, pinout: Pinout = PINOUT) -> None:
+        self.now: Nanos = 0
+        self.steps = 0
+        self.sides = []
+        for kind in (Adapter, FirmwareAdapter):
+            pins = FakePins()
+            adapter = kind(pins=pins, pinout=pinout, parameters=PARAMETERS, settings=settings)
+            self.sides.append(Side(pins, adapter))
+            self.sides[-1].listen()
+        self.sip = StandardSip(sonar=(SonarReading(0, 5_000), SonarReading(3, 1_000)))
+
+    @property
+    def model(self) -> Adapter:
+        adapter = self.sides[0].adapter
+        assert isinstance(adapter, Adapter)
+        return adapter
+
+    @property
+    def firmware(self) -> FirmwareAdapter:
+        adapter = self.sides[1].adapter
+        assert isinstance(adapter, FirmwareAdapter)
+        return adapter
+
+    def pin(self, name: str, high: bool, after: Nanos = 1) -> None:
+        for side in self.sides:
+            side.pins.set(name, high, self.now + after)
+
+    def motors(self, left: int, right: int, width: int = 3) -> None:
+        for side in self.sides:
+            side.pins.motors(left, right, self.now + 1, width)
+
+    def receive(self, data: bytes) -> None:
+        for side in self.sides:
+            side.adapter.receive(data, self.now)
+
+    def frame(self, payload: bytes) -> None:
+        self.receive(Frame(payload).to_bytes())
+
+    def pad(self, report: PadReport) -> None:
+        for side in self.sides:
+            side.adapter.receive_pad(report, self.now)
+
+    def master(self, master: Master) -> None:
+        for side in self.sides:
+            side.adapter.set_master(master, self.now)
+
+    def shutdown(self) -> None:
+        for side in self.sides:
+            side.adapter.shutdown("asked to", self.now)
+
+    def send_sip(self, **changes: object) -> None:
+        self.sip = replace(self.sip, **changes)
+        self.frame(self.sip.to_frame(Profile.P2OS).payload)
+
+    def pass_time(self, span: Nanos) -> None:
+        """Advance both, each at its own deadlines, and compare."""
+        until = self.now + span
+        while True:
+            due = self.model.next_deadline()
+            assert due == self.firmware.next_deadline()
+            self.now = min(until, due if due is not None else until)
+            for side in self.sides:
+                side.adapter.advance_to(self.now)
+            if self.now >= until:
+                break
+        self.compare()
+
+    def answer(self) -> None:
+        """Answer the last SYNC as a robot would."""
+        last = self.sides[0].frames[-1] if self.sides[0].frames else b""
+        kind = last[3] if len(last) == 6 else None
+        if kind in {0, 1}:
+            self.frame(bytes((kind,)))
+        elif kind == 2:
+            self.frame(Identity("Twin", "Pioneer", "p2dx").to_frame().payload)
+
+    def compare(self) -> None:
+        self.steps += 1
+        one, other = self.sides
+        for side in self.sides:
+            side.collect()
+        assert one.frames == other.frames, f"frames differ at {self.now} ns"
+        assert one.pins.writes == other.pins.writes, f"pins differ at {self.now} ns"
+        assert one.events == other.events
+        model, firmware = self.model, self.firmware
+        assert model.state == firmware.state
+        assert (model.master, model.baud) == (firmware.master, firmware.baud)
+        numbers, status = firmware.numbers, model.status
+        assert (numbers["motor1"], numbers["motor2"]) == status.motors
+        assert (numbers["left_count"], numbers["right_count"]) == status.counts
+        assert (numbers["left_shown"], numbers["right_shown"]) == status.counts_shown
+        assert (numbers["forward_mm_s"], numbers["turn_deg_s"]) == (
+            status.speeds.forward_mm_s,
+            status.speeds.turn_deg_s,
+        )
+        assert (numbers["sips"], numbers["jumps"]) == (status.sips, status.odometry_jumps)
+        stats = model.session.stats
+        assert [numbers[name] for name in WIRE_COUNTERS] == [getattr(stats.wire, name) for name in WIRE_COUNTERS]
+        assert numbers["malformed"] == stats.malformed
+        assert numbers["overflows"] == 0
+        for side in self.sides:
+            del side.frames[:-1], side.pins.writes[:], side.events[:]
