@@ -160,12 +160,13 @@ class Rig:
         robot: object | None = None,
         now: Nanos = 0,
         pinout: Pinout = PINOUT,
+        kind: type = Adapter,
     ) -> None:
         self.now = now
         self.pins = FakePins()
         self.robot = robot or FakeRobot()
         self.events: list[tuple[Nanos, str, str]] = []
-        self.adapter = Adapter(
+        self.adapter = kind(
             pins=self.pins,
             pinout=pinout,
             parameters=PARAMETERS,

@@ -12,7 +12,7 @@ from hypothesis import HealthCheck, settings
 from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, initialize, invariant, precondition, rule
 
-from adapter_sim import AdapterSettings
+from adapter_sim import Adapter, AdapterSettings
 from p2os.pioneer.body import make_body
 from p2os.pioneer.controller import Pioneer
 from p2os.pioneer.world import load_world
@@ -26,8 +26,10 @@ STEPS = st.integers(-4, 3)
 class WatchedRig(Rig):
     """Checks every frame that leaves the adapter, at the instant it leaves."""
 
-    def __init__(self, robot: object) -> None:
-        super().__init__(AdapterSettings(threshold_um=600_000), robot)
+    fastest = (FASTEST_MM_S, FASTEST_DEG_S)
+
+    def __init__(self, robot: object, kind: type = Adapter) -> None:
+        super().__init__(AdapterSettings(threshold_um=600_000), robot, kind=kind)
         self.last_sip = 0
         self.sips = 0
         self.checked = 0
@@ -45,7 +47,7 @@ class WatchedRig(Rig):
             self.check()
 
     def check(self) -> None:
-        sips = self.adapter._agenda.sips
+        sips = self.adapter.status.sips
         if sips != self.sips:
             self.sips, self.last_sip = sips, self.now
         for at, what, _ in self.events[self.told :]:
@@ -73,14 +75,14 @@ class WatchedRig(Rig):
         if name == "STOP":
             self.commanded = (0, 0)
         elif name == "VEL":
-            assert abs(argument) <= FASTEST_MM_S
+            assert abs(argument) <= self.fastest[0]
             if argument:
                 assert self.allowed, "moves after a loss without p2dx_con given anew"
                 assert at - self.last_sip < 350 * MS, "moves without a SIP"
             self.commanded = (argument, self.commanded[1])
             self.commanded_at = at
         elif name == "RVEL":
-            assert abs(argument) <= FASTEST_DEG_S
+            assert abs(argument) <= self.fastest[1]
             self.commanded = (self.commanded[0], argument)
             if self.adapter.state == "driving":
                 assert at - self.pair_at >= 25 * MS
@@ -90,12 +92,15 @@ class WatchedRig(Rig):
 class AdapterMachine(RuleBasedStateMachine):
     """The adapter and a server's Connection."""
 
+    #: The model, or its twin.
+    kind: type = Adapter
+
     def make_robot(self) -> object:
         return FakeRobot()
 
     @initialize()
     def power(self) -> None:
-        self.rig = WatchedRig(self.make_robot())
+        self.rig = WatchedRig(self.make_robot(), self.kind)
         self.rig.pins.set("p2dx_con", True, 0)
         self.rig.ms(900)
 
@@ -170,6 +175,7 @@ class DeafRobotMachine(AdapterMachine):
         robot.obeys = obeys
         robot.sip = replace(robot.sip, stall_left=stalls, raw_x=raw_x)
 
+    @precondition(lambda self: self.kind is Adapter)
     @invariant()
     def nobody_drives_a_deaf_robot_for_long(self) -> None:
         rig = self.rig
