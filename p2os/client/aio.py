@@ -297,7 +297,8 @@ class Robot(RobotCalls):
             self._timer = loop.call_later(min(waits), self._turn)
 
     def _tell(self) -> None:
-        news, self._core.news = self._core.news, deque()
+        news = list(self._core.news)
+        self._core.news.clear()
         for item in news:
             if isinstance(item, RobotState):
                 for on_state in tuple(self._state_callbacks):

@@ -126,7 +126,7 @@ class RobotCalls(ABC):
 
     def emergency_stop(self) -> None:
         """Stop at once, without the ramp (E_STOP), and stay."""
-        self._run(lambda core, now: core.emergency_stop(now))
+        self._run(lambda core, now: core.stop(now, at_once=True))
 
     def enable(self, on: bool = True) -> None:
         """Switch the motors on; with False, off."""

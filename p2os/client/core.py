@@ -2,50 +2,35 @@
 
 A skin carries out `take_action`, feeds `line_opened`, `line_failed`,
 `line_lost` and `receive`, calls `advance_to` at `next_deadline`, and hands on
-`take_news`. Everything else is decided here, in the time that is passed in.
+`news`. Everything else is decided here, in the time that is passed in: the
+`Session` keeps the link, the `Observer` makes states of packets, the `Mover`
+moves the robot.
 
-Theory of operation. Below, the `Session` keeps the link. Here one of three
-things moves the robot: nothing, held speeds (`SpeedKeeper`), or a goal. A new
-one takes the old one's place. A loss, the deadman, motors that go off, a stop
-and a goal's end all lead to nothing or to held zero, and only a call of the
-program leads away from there. After a loss the first motion call raises
-`LinkLostError`, even if the link is back by then: the program has to know.
+After a loss the first motion call raises `LinkLostError`, even if the link is
+back by then: the program has to know.
 
-Invariant: after a loss no command but zero speeds goes out until a motion call
+Invariant: after a loss nothing but zero speeds goes out until a motion call
 has returned without raising.
 """
 
 import math
 from collections import deque
-from collections.abc import Callable, Mapping
-from dataclasses import replace
+from collections.abc import Callable
 
 from p2os.client.goals import Axis, Goal
-from p2os.client.motors import Motors
-from p2os.client.notices import (
-    ConfigurationKnown,
-    Connected,
-    DeadmanStopped,
-    Disobeyed,
-    GaveUp,
-    LinkLost,
-    MotionEnded,
-    MotorsDisabled,
-    Notice,
-    RobotUnknown,
-)
-from p2os.client.obedience import Obedience
+from p2os.client.mover import Mover
+from p2os.client.notices import ConfigurationKnown, Connected, GaveUp, LinkLost, Notice, RobotUnknown
 from p2os.client.observer import Observer, bumpers_of, limits_of
 from p2os.client.outbox import Action
-from p2os.client.problems import LinkLostError, MotorsDisabledError
+from p2os.client.problems import LinkLostError
 from p2os.client.session import Session
 from p2os.client.settings import ClientSettings
 from p2os.client.snapshots import Limits, Link, Pose, RobotState
-from p2os.client.speeds import STILL, SpeedKeeper, Speeds
-from p2os.commands import Command, CommandNumber, enable, stop
+from p2os.client.speeds import Speeds
+from p2os.commands import Command
 from p2os.config_packet import ConfigPacket
 from p2os.connection import ConnectionStats
-from p2os.errors import LocalProtocolError, UsageError
+from p2os.errors import UsageError
 from p2os.packets import Identity
 from p2os.parameters import ParametersError, RobotParameters, load_parameters
 from p2os.profiles import Profile
@@ -54,22 +39,6 @@ from p2os.timing import Nanos, Reached
 
 #: Whose parameters stand in for a model that nobody knows.
 STAND_IN = "p2dx"
-#: What moves a robot, beside VEL and RVEL: sent raw, it takes the place of held speeds.
-MOTION_NUMBERS = frozenset(
-    {CommandNumber.MOVE, CommandNumber.ROTATE, CommandNumber.VEL, CommandNumber.HEAD, CommandNumber.DHEAD,
-     CommandNumber.RVEL, CommandNumber.DCHEAD, CommandNumber.VEL2, CommandNumber.LATVEL, CommandNumber.STOP,
-     CommandNumber.E_STOP, CommandNumber.QSTOP}
-)  # fmt: skip
-
-#: (command, is its argument positive) → the limit that it sets.
-LIMIT_NAMES: Mapping[tuple[int, bool], str] = {
-    (CommandNumber.SETV, True): "forward_mps",
-    (CommandNumber.SETRV, True): "turn_radps",
-    (CommandNumber.SETA, True): "accel_mps2",
-    (CommandNumber.SETA, False): "decel_mps2",
-    (CommandNumber.SETRA, True): "turn_accel_radps2",
-    (CommandNumber.SETRA, False): "turn_decel_radps2",
-}
 
 
 class RobotCore:
@@ -96,16 +65,11 @@ class RobotCore:
         self._load = load
         self._session = Session(settings)
         self._observer = Observer(parameters or load(STAND_IN))
-        self._speeds = SpeedKeeper(spacing_ns=settings.speed_spacing_ns, refresh_ns=settings.refresh_ns)
-        self._motors = Motors()
-        self._obedience = Obedience(settings.disbelief_ns)
-        self._goal: Goal | None = None
-        #: Puts the robot's largest speed back after a goal with its own.
-        self._speed_back: Command | None = None
+        self._mover = Mover(
+            settings, self._observer, send=self._session.send, drop=self._session.drop, tell=self.news.append
+        )
         self._now: Nanos = 0
-        self._called_at: Nanos = 0
         self._unseen_loss: str | None = None
-        self._set_limits: dict[str, float] = {}
 
     # What is known ------------------------------------------------------------------------
 
@@ -152,7 +116,7 @@ class RobotCore:
     @property
     def limits(self) -> Limits:
         """How fast the robot may go: its own limits, and those that were set in this session."""
-        return replace(limits_of(self.parameters, self.config), **self._set_limits)
+        return self._mover.limits(limits_of(self.parameters, self.config))
 
     @property
     def stats(self) -> ConnectionStats:
@@ -162,12 +126,12 @@ class RobotCore:
     @property
     def commanded(self) -> Speeds:
         """The speeds that are held; zero while nothing or a goal moves the robot."""
-        return self._speeds.wanted
+        return self._mover.commanded
 
     @property
     def goal_is_under_way(self) -> bool:
         """Whether a `drive` or a `turn` is."""
-        return self._goal is not None
+        return self._mover.has_goal
 
     @property
     def is_quiet(self) -> bool:
@@ -184,13 +148,12 @@ class RobotCore:
 
     def close(self, now: Nanos) -> None:
         """Stop the robot and leave it, whatever is under way."""
-        self._forget_motion("closed", now)
-        self._motors.new_session()
+        self._mover.lose(now)
         self._session.close(now)
 
     def touch(self, now: Nanos) -> None:
         """Note that the program lives: every call of it does."""
-        self._called_at = now
+        self._mover.touch(now)
 
     def send(self, command: Command, now: Nanos) -> None:
         """Send any command of the manual.
@@ -199,17 +162,8 @@ class RobotCore:
             LinkLostError: there is no open session.
         """
         self._require_open()
-        if command.number in MOTION_NUMBERS:
-            self._forget_motion("another command", now)
+        self._mover.note(command, now)
         self._session.send(command, now)
-        self._note_limit(command)
-
-    def _note_limit(self, command: Command) -> None:
-        value = command.integer
-        name = LIMIT_NAMES.get((command.number, value is not None and value > 0))
-        if name is not None and value:
-            is_turn = command.number in {CommandNumber.SETRV, CommandNumber.SETRA}
-            self._set_limits[name] = math.radians(abs(value)) if is_turn else abs(value) / 1000
 
     def set_velocity(self, forward_mps: float, turn_radps: float, now: Nanos) -> None:
         """Hold these speeds, cut to the limits, until something else is asked.
@@ -221,31 +175,32 @@ class RobotCore:
         """
         if not (math.isfinite(forward_mps) and math.isfinite(turn_radps)):
             raise UsageError(f"a speed of {forward_mps} m/s and {turn_radps} rad/s is no speed")
+        self.touch(now)
         limits = self.limits
         speeds = Speeds.of(_cut(forward_mps, limits.forward_mps), _cut(turn_radps, limits.turn_radps))
-        self.touch(now)
-        self._require_motion(now, moves=not speeds.are_zero)
-        self._end_goal("another speed was set", now)
-        self._hold(speeds, now)
+        if speeds.are_zero:
+            self._require_open()
+        else:
+            self._require_motion(now)
+        self._mover.set_velocity(speeds, now)
 
-    def stop(self, now: Nanos) -> None:
-        """Stop, and stay: STOP, then zero speeds held."""
-        self._require_open()
-        self._stop("stop", now)
+    def stop(self, now: Nanos, *, at_once: bool = False) -> None:
+        """Stop, and stay: STOP (`at_once`: E_STOP before it), then zero speeds held.
 
-    def emergency_stop(self, now: Nanos) -> None:
-        """Stop at once, without the ramp: E_STOP, then zero speeds held."""
+        Raises:
+            LinkLostError: there is no open session.
+        """
         self._require_open()
-        self._session.send(Command(CommandNumber.E_STOP), now)
-        self._stop("emergency stop", now)
+        self._mover.stop("stopped", now, at_once=at_once)
 
     def enable(self, on: bool, now: Nanos) -> None:
-        """Switch the motors."""
+        """Switch the motors.
+
+        Raises:
+            LinkLostError: there is no open session.
+        """
         self._require_open()
-        if not on:
-            self._forget_motion("motors off", now)
-        self._motors.ask(on=on, now=now)
-        self._session.send(enable(on), now)
+        self._mover.enable(on, now)
 
     def begin_goal(self, axis: Axis, limit_ns: Nanos | None, speed: float | None, now: Nanos) -> Goal:
         """Begin a `drive` or a `turn`; its end is a `MotionEnded`.
@@ -253,38 +208,18 @@ class RobotCore:
         Args:
             axis: What is to be done.
             limit_ns: How long it may take; None: twice what the limits allow, and some seconds.
-            speed: m/s or rad/s for this goal alone; None: the limit.
+            speed: The most for this goal, m/s or rad/s; None: the limit.
             now: Nanoseconds.
 
         Raises:
-            LinkLostError, MotorsDisabledError: as `set_velocity`.
+            LinkLostError, MotorsDisabledError, UsageError: as `set_velocity`.
         """
-        self._require_motion(now, moves=True)
-        if not math.isfinite(axis.asked):
-            raise UsageError(f"{axis.what} is no motion")
-        state = self._observer.state
-        if state is None:
-            raise LocalProtocolError("the robot has not said where it is yet", hint="wait for a state")
-        self._forget_motion("another goal", now)
-        limits = self.limits
-        if speed is not None:
-            if not (math.isfinite(speed) and speed > 0):
-                raise UsageError(f"a speed of {speed} is not positive")
-            self._session.send(axis.speed_command(_cut(speed, axis.speed_of(limits))), now)
-            self._speed_back = axis.speed_command(axis.speed_of(limits))
-            limits = axis.with_speed(limits, _cut(speed, axis.speed_of(limits)))
-        goal = self._goal = Goal(axis, limit_ns)
-        command = goal.begin(state, self._observer.robot_heading_rad, limits, now)
-        if command is not None:
-            self._session.send(command, now)
-        return goal
+        self._require_motion(now)
+        return self._mover.begin_goal(axis, limit_ns, speed, self.limits, now)
 
     def cancel_goal(self, goal: Goal, now: Nanos) -> None:
         """Stop, if this goal is still under way."""
-        if self._goal is goal:
-            self._end_goal("cancelled", now)
-            if self.link is Link.OPEN:
-                self._stop("cancelled", now)
+        self._mover.cancel_goal(goal, now)
 
     def set_pose(self, pose: Pose) -> None:
         """Say where the robot is; the robot itself is not told."""
@@ -333,36 +268,15 @@ class RobotCore:
             self._act(max(first, self._now))
 
     def _own_deadlines(self) -> list[Nanos | None]:
-        if self.link is not Link.OPEN:
-            return []
-        goal = None if self._goal is None else self._goal.next_deadline()
-        return [self._speeds.next_deadline(), self._motors.next_deadline(), goal, self._deadman_due()]
+        return self._mover.deadlines() if self.link is Link.OPEN else []
 
     def _act(self, now: Nanos) -> None:
         """Do all that is due at `now`."""
         self._now = now
         self._session.advance_to(now)
         self._collect(now)
-        if self.link is not Link.OPEN:
-            return
-        if (deadman := self._deadman_due()) is not None and now >= deadman:
-            self.news.append(DeadmanStopped(now - self._called_at))
-            self._stop("deadman", now)
-        if self._goal is not None and (late := self._goal.time_is_up(now)) is not None:
-            self._end_goal(late, now)
-            self._stop("too late", now)
-        if self._motors.take_repeat(now):
-            self._session.send(enable(True), now)
-        speeds_due = self._speeds.next_deadline()
-        if speeds_due is not None and now >= speeds_due:
-            for command in self._speeds.take(now):
-                self._session.send(command, now)
-
-    def _deadman_due(self) -> Nanos | None:
-        patience = self.settings.deadman_ns
-        if patience is None or self._speeds.wanted.are_zero:
-            return None
-        return self._called_at + patience
+        if self.link is Link.OPEN:
+            self._mover.act(now)
 
     # What the session says ----------------------------------------------------------------
 
@@ -380,8 +294,7 @@ class RobotCore:
                     self._observer.bumpers = bumpers_of(item.config)
                 case LinkLost():
                     self.problem, self._unseen_loss = item, item.reason
-                    self._forget_motion("the link was lost", now)
-                    self._motors.new_session()
+                    self._mover.lose(now)
                 case GaveUp():
                     self.problem = item
                 case _:
@@ -399,8 +312,7 @@ class RobotCore:
         self._observer.new_session(parameters)
         self._observer.profile = self.settings.profile or guess_profile(identity.subclass)
         self._session.set_profile(self._observer.profile)
-        self._motors.new_session()
-        self._set_limits.clear()  # CLOSE takes the robot back to its own
+        self._mover.new_session()
 
     def _take_sip(self, sip: StandardSip, now: Nanos) -> None:
         if self.settings.profile is None and sip.tail and self._observer.profile is not Profile.ARCOS:
@@ -410,34 +322,9 @@ class RobotCore:
             self._session.set_profile(Profile.ARCOS)
         state = self._observer.take(sip, now)
         self.news.append(state)
-        if (reason := self._motors.take(state, now)) is not None:
-            self._forget_motion("the motors went off", now)
-            self.news.append(MotorsDisabled(f"motors are disabled: {reason}"))
-        wheels = (state.left_mps, state.right_mps)
-        doubt = self._obedience.take(wheels, stalled=state.is_stalled, now=now)
-        if doubt is not None:
-            self.news.append(Disobeyed(doubt + self._advice(wheels)))
-        self._follow_goal(state, now)
+        self._mover.take(state, now)
 
-    def _advice(self, wheels: tuple[float, float]) -> str:
-        stands = max(map(abs, wheels)) == 0
-        return "; are the motors disabled (MOTORS button, STOP button)?" if stands else ""
-
-    def _follow_goal(self, state: RobotState, now: Nanos) -> None:
-        goal = self._goal
-        if goal is None:
-            return
-        command, arrived, problem = goal.take(state, now)
-        if command is not None:
-            self._session.send(command, now)
-        if arrived:
-            self._end_goal(None, now)
-            self._hold(STILL, now)
-        elif problem is not None:
-            self._end_goal(problem, now)
-            self._stop("goal failed", now)
-
-    # Motion -------------------------------------------------------------------------------
+    # What must be so ----------------------------------------------------------------------
 
     def _require_open(self) -> None:
         if self.link is Link.OPEN:
@@ -445,49 +332,13 @@ class RobotCore:
         reason = f": {self.problem.reason}" if self.problem is not None else ""
         raise LinkLostError(f"no robot is connected ({self.link.value}){reason}", hint="wait for it, or connect again")
 
-    def _require_motion(self, now: Nanos, *, moves: bool) -> None:
+    def _require_motion(self, now: Nanos) -> None:
         """Refuse to move a robot of which the program does not know enough, and switch its motors on."""
-        lost = self._unseen_loss
-        if moves or self.link is not Link.OPEN:
-            self._unseen_loss = None
+        lost, self._unseen_loss = self._unseen_loss, None
         self._require_open()
-        if lost is not None and moves:
+        if lost is not None:
             raise LinkLostError(f"the link was lost and is back: {lost}", hint="the robot stands; call again to go on")
-        if self._motors.are_on or not moves:
-            return
-        if self._motors.taken_off is not None:
-            raise MotorsDisabledError(f"motors are disabled: {self._motors.taken_off}", hint="robot.enable()")
-        if not self.settings.auto_enable:
-            raise MotorsDisabledError("motors are disabled: they are after every OPEN", hint="robot.enable()")
-        self.enable(True, now)
-
-    def _hold(self, speeds: Speeds, now: Nanos) -> None:
-        self._speeds.hold(speeds)
-        half_track = self.parameters.track_mm / 2000
-        rim = speeds.turn_radps * half_track
-        wheels = (speeds.forward_mps - rim, speeds.forward_mps + rim)
-        self._obedience.expect(wheels, self._observer.wheels_mps, now)
-
-    def _stop(self, why: str, now: Nanos) -> None:
-        self._end_goal(why, now)
-        self._session.send(stop(), now)
-        self._hold(STILL, now)
-
-    def _forget_motion(self, why: str, now: Nanos) -> None:
-        """Let nothing move the robot any more."""
-        self._end_goal(why, now)
-        self._speeds.release()
-        self._obedience.expect(None, self._observer.wheels_mps, now)
-
-    def _end_goal(self, problem: str | None, now: Nanos) -> None:
-        goal, self._goal = self._goal, None
-        if goal is not None:
-            result = goal.result(now)
-            goal.ended = MotionEnded(goal.axis.what, result.asked, result.reached, result.took_ns, problem)
-            self.news.append(goal.ended)
-            if self._speed_back is not None and self.link is Link.OPEN:
-                self._session.send(self._speed_back, now)
-            self._speed_back = None
+        self._mover.require_motors(now)
 
 
 def guess_profile(subclass: str) -> Profile:

@@ -60,7 +60,5 @@ class Motors:
             return None
         self.are_on = False
         self._left, self._due = 0, None
-        self.taken_off = (
-            "the STOP button is pressed" if state.stop_button else "somebody at the robot switched them off"
-        )
+        self.taken_off = "the STOP button is pressed" if state.stop_button else "they were switched off at the robot"
         return self.taken_off

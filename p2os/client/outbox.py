@@ -6,10 +6,11 @@ line stand in the same queue, so that a STOP is out before the line closes.
 """
 
 from collections import deque
-from collections.abc import Iterable
+from collections.abc import Container, Iterable
 from dataclasses import dataclass
 
 from p2os.timing import NS_PER_S, Nanos
+from p2os.wire.frame import PREFIX_BYTES
 
 #: Bits of a byte on a serial line: start, eight, stop.
 BITS_PER_BYTE = 10
@@ -68,9 +69,13 @@ class Outbox:
         """Queue frames."""
         self._queue.extend(Send(frame) for frame in frames)
 
-    def drop_frames(self) -> None:
-        """Forget frames that were not sent: what follows matters more."""
-        self._queue = deque(action for action in self._queue if not isinstance(action, Send))
+    def drop_frames(self, numbers: Container[int] | None = None) -> None:
+        """Forget frames that were not sent, those of some commands or all: what follows matters more."""
+        self._queue = deque(
+            action
+            for action in self._queue
+            if not (isinstance(action, Send) and (numbers is None or action.data[PREFIX_BYTES] in numbers))
+        )
 
     def clear(self) -> None:
         """Forget everything: the line has gone."""

@@ -16,6 +16,7 @@ Invariant: each try ends within `TRY_LIMIT_NS`, open or with a reason.
 """
 
 from collections import deque
+from collections.abc import Container
 from dataclasses import dataclass
 
 from p2os.client.notices import (
@@ -160,9 +161,14 @@ class Session:
         self._enter(Link.CLOSED, None)
 
     def send(self, command: Command, now: Nanos) -> None:
-        """Send a command of the open session."""
-        self._connection.send(command, now)
-        self.outbox.send(self._connection.take_output())
+        """Send a command of the open session; without one it has nowhere to go."""
+        if self._connection.is_open:
+            self._connection.send(command, now)
+            self.outbox.send(self._connection.take_output())
+
+    def drop(self, numbers: Container[int]) -> None:
+        """Forget commands that have not left: something overtakes them."""
+        self.outbox.drop_frames(numbers)
 
     @property
     def profile(self) -> Profile:

@@ -30,8 +30,8 @@ class ClientSettings:
     deadman_ns: Nanos | None = 2 * NS_PER_S
     #: A session without a sound packet for so long is lost; half of the robot's own watchdog.
     liveness_ns: Nanos = 1 * NS_PER_S
-    #: The present speed goes out again after so long: P2OS acknowledges nothing.
-    refresh_ns: Nanos = 200 * NS_PER_MS
+    #: The present speed goes out again after so long, for P2OS acknowledges nothing: 200 ms less what frames queue for.
+    refresh_ns: Nanos = 180 * NS_PER_MS
     #: chosen: two frames of a speed take 19 ms at 9600 baud; nearer ones would queue up.
     speed_spacing_ns: Nanos = 40 * NS_PER_MS
     #: AROS loses commands that come nearer than 3 to 5 ms (Pioneer 2/3 H8 manual, page 42).

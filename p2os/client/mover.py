@@ -1,0 +1,258 @@
+"""What moves the robot: nothing, held speeds, or one goal; and what takes that away again.
+
+A new motion takes the old one's place. A loss, the deadman, motors that go off,
+a stop and a goal's end lead to nothing or to held zero speeds; only a call of
+the program leads away from there.
+"""
+
+import math
+from collections.abc import Callable, Container, Mapping
+from dataclasses import replace
+
+from p2os.client.goals import Axis, Goal
+from p2os.client.motors import Motors
+from p2os.client.notices import DeadmanStopped, Disobeyed, MotionEnded, MotorsDisabled, Notice
+from p2os.client.obedience import Obedience
+from p2os.client.observer import Observer
+from p2os.client.problems import MotorsDisabledError
+from p2os.client.settings import ClientSettings
+from p2os.client.snapshots import Limits, RobotState
+from p2os.client.speeds import STILL, SpeedKeeper, Speeds
+from p2os.commands import Command, CommandNumber, enable, stop
+from p2os.errors import LocalProtocolError, UsageError
+from p2os.timing import Nanos
+
+#: What moves a robot: sent raw, it takes the place of held speeds.
+MOTION_NUMBERS = frozenset(
+    {CommandNumber.MOVE, CommandNumber.ROTATE, CommandNumber.VEL, CommandNumber.HEAD, CommandNumber.DHEAD,
+     CommandNumber.RVEL, CommandNumber.DCHEAD, CommandNumber.VEL2, CommandNumber.LATVEL, CommandNumber.STOP,
+     CommandNumber.E_STOP, CommandNumber.QSTOP}
+)  # fmt: skip
+
+#: (command, is its argument positive) → the limit that it sets.
+LIMIT_NAMES: Mapping[tuple[int, bool], str] = {
+    (CommandNumber.SETV, True): "forward_mps",
+    (CommandNumber.SETRV, True): "turn_radps",
+    (CommandNumber.SETA, True): "accel_mps2",
+    (CommandNumber.SETA, False): "decel_mps2",
+    (CommandNumber.SETRA, True): "turn_accel_radps2",
+    (CommandNumber.SETRA, False): "turn_decel_radps2",
+}
+
+
+class Mover:
+    """Keeps one robot moving as it was last asked.
+
+    Args:
+        settings: The client's.
+        observer: What is known of the robot.
+        send: Sends a command of the open session.
+        drop: Forgets those commands, by number, that have not left yet.
+        tell: Takes what the program is to know.
+    """
+
+    def __init__(
+        self,
+        settings: ClientSettings,
+        observer: Observer,
+        *,
+        send: Callable[[Command, Nanos], None],
+        drop: Callable[[Container[int]], None],
+        tell: Callable[[Notice], None],
+    ) -> None:
+        self._settings = settings
+        self._observer = observer
+        self._send = send
+        self._drop = drop
+        self._tell = tell
+        self._speeds = SpeedKeeper(spacing_ns=settings.speed_spacing_ns, refresh_ns=settings.refresh_ns)
+        self._motors = Motors()
+        self._obedience = Obedience(settings.disbelief_ns)
+        self._goal: Goal | None = None
+        #: Puts the robot's largest speed back after a goal with its own.
+        self._speed_back: Command | None = None
+        self._set_limits: dict[str, float] = {}
+        self._called_at: Nanos = 0
+
+    @property
+    def commanded(self) -> Speeds:
+        """The speeds that are held; zero while nothing or a goal moves the robot."""
+        return self._speeds.wanted
+
+    @property
+    def has_goal(self) -> bool:
+        """Whether a `drive` or a `turn` is under way."""
+        return self._goal is not None
+
+    def limits(self, own: Limits) -> Limits:
+        """Return the robot's limits, with those that were set in this session in their place."""
+        return replace(own, **self._set_limits)
+
+    def touch(self, now: Nanos) -> None:
+        """Note that the program lives."""
+        self._called_at = now
+
+    # What the program asks ----------------------------------------------------------------
+
+    def require_motors(self, now: Nanos) -> None:
+        """Switch the motors on, where the client may.
+
+        Raises:
+            MotorsDisabledError: It may not: somebody switched them off, or the settings say so.
+        """
+        if self._motors.are_on:
+            return
+        if self._motors.taken_off is not None:
+            raise MotorsDisabledError(f"motors are disabled: {self._motors.taken_off}", hint="robot.enable()")
+        if not self._settings.auto_enable:
+            raise MotorsDisabledError("motors are disabled: they are after every OPEN", hint="robot.enable()")
+        self.enable(True, now)
+
+    def enable(self, on: bool, now: Nanos) -> None:
+        """Switch the motors."""
+        if not on:
+            self._drop(MOTION_NUMBERS)
+            self.forget("motors off", now)
+        self._motors.ask(on=on, now=now)
+        self._send(enable(on), now)
+
+    def set_velocity(self, speeds: Speeds, now: Nanos) -> None:
+        """Hold these speeds."""
+        self._end_goal("another speed was set", now)
+        self._hold(speeds, now)
+
+    def stop(self, why: str, now: Nanos, *, at_once: bool = False) -> None:
+        """Stop, and hold zero speeds."""
+        self._end_goal(why, now)
+        self._drop(MOTION_NUMBERS)
+        if at_once:
+            self._send(Command(CommandNumber.E_STOP), now)
+        self._send(stop(), now)
+        self._hold(STILL, now)
+
+    def begin_goal(self, axis: Axis, limit_ns: Nanos | None, speed: float | None, limits: Limits, now: Nanos) -> Goal:
+        """Begin a goal; its end is a `MotionEnded`.
+
+        Raises:
+            UsageError: The way, angle or speed is no number, or the speed is not positive.
+            LocalProtocolError: The robot has not said where it is.
+        """
+        if not math.isfinite(axis.asked) or (speed is not None and not (math.isfinite(speed) and speed > 0)):
+            raise UsageError(f"{axis.what} at {speed} is no motion")
+        state = self._observer.state
+        if state is None:
+            raise LocalProtocolError("the robot has not said where it is yet", hint="wait for a state")
+        self._drop(MOTION_NUMBERS)
+        self.forget("another goal", now)
+        if speed is not None:
+            usual = axis.speed_of(limits)
+            limits = axis.with_speed(limits, min(speed, usual))
+            self._send(axis.speed_command(min(speed, usual)), now)
+            self._speed_back = axis.speed_command(usual)
+        goal = self._goal = Goal(axis, limit_ns)
+        command = goal.begin(state, self._observer.robot_heading_rad, limits, now)
+        if command is not None:
+            self._send(command, now)
+        return goal
+
+    def cancel_goal(self, goal: Goal, now: Nanos) -> None:
+        """Stop, if this goal is still under way."""
+        if self._goal is goal:
+            self.stop("cancelled", now)
+
+    def note(self, command: Command, now: Nanos) -> None:
+        """Take note of a command that the program sends by itself."""
+        if command.number in MOTION_NUMBERS:
+            self._drop(MOTION_NUMBERS)
+            self.forget("another command", now)
+        value = command.integer
+        name = LIMIT_NAMES.get((command.number, value is not None and value > 0))
+        if name is not None and value:
+            is_turn = command.number in {CommandNumber.SETRV, CommandNumber.SETRA}
+            self._set_limits[name] = math.radians(abs(value)) if is_turn else abs(value) / 1000
+
+    # What happens -------------------------------------------------------------------------
+
+    def new_session(self) -> None:
+        """Know that the motors are off, and the limits the robot's own."""
+        self._motors.new_session()
+        self._set_limits.clear()  # CLOSE takes the robot back to its own
+
+    def forget(self, why: str, now: Nanos) -> None:
+        """Let nothing move the robot any more, without a word to it."""
+        self._end_goal(why, now)
+        self._speeds.release()
+        self._obedience.expect(None, self._observer.wheels_mps, now)
+
+    def lose(self, now: Nanos) -> None:
+        """Take the loss of the link: nothing more can be sent."""
+        self._speed_back = None
+        self.forget("the link was lost", now)
+        self.new_session()
+
+    def take(self, state: RobotState, now: Nanos) -> None:
+        """Hold a state against what was asked."""
+        if (reason := self._motors.take(state, now)) is not None:
+            self.forget("the motors went off", now)
+            self._tell(MotorsDisabled(f"motors are disabled: {reason}"))
+        wheels = (state.left_mps, state.right_mps)
+        doubt = self._obedience.take(wheels, stalled=state.is_stalled, now=now)
+        if doubt is not None:
+            stands = max(map(abs, wheels)) == 0
+            advice = "; are the motors disabled (MOTORS button, STOP button)?" if stands else ""
+            self._tell(Disobeyed(doubt + advice))
+        self._follow_goal(state, now)
+
+    def deadlines(self) -> list[Nanos | None]:
+        """Return when speeds, ENABLE, a goal's end and the deadman are due."""
+        goal = None if self._goal is None else self._goal.next_deadline()
+        return [self._speeds.next_deadline(), self._motors.next_deadline(), goal, self._deadman_due()]
+
+    def act(self, now: Nanos) -> None:
+        """Do what is due at `now` in an open session."""
+        if (deadman := self._deadman_due()) is not None and now >= deadman:
+            self._tell(DeadmanStopped(now - self._called_at))
+            self.stop("deadman", now)
+        if self._goal is not None and (late := self._goal.time_is_up(now)) is not None:
+            self.stop(late, now)
+        if self._motors.take_repeat(now):
+            self._send(enable(True), now)
+        due = self._speeds.next_deadline()
+        if due is not None and now >= due:
+            for command in self._speeds.take(now):
+                self._send(command, now)
+
+    def _deadman_due(self) -> Nanos | None:
+        patience = self._settings.deadman_ns
+        if patience is None or self._speeds.wanted.are_zero:
+            return None
+        return self._called_at + patience
+
+    def _follow_goal(self, state: RobotState, now: Nanos) -> None:
+        if self._goal is None:
+            return
+        command, arrived, problem = self._goal.take(state, now)
+        if command is not None:
+            self._send(command, now)
+        if arrived:
+            self._end_goal(None, now)
+            self._hold(STILL, now)
+        elif problem is not None:
+            self.stop(problem, now)
+
+    def _hold(self, speeds: Speeds, now: Nanos) -> None:
+        self._speeds.hold(speeds)
+        rim = speeds.turn_radps * self._observer.parameters.track_mm / 2000
+        wheels = (speeds.forward_mps - rim, speeds.forward_mps + rim)
+        self._obedience.expect(wheels, self._observer.wheels_mps, now)
+
+    def _end_goal(self, problem: str | None, now: Nanos) -> None:
+        goal, self._goal = self._goal, None
+        if goal is None:
+            return
+        result = goal.result(now)
+        goal.ended = MotionEnded(goal.axis.what, result.asked, result.reached, result.took_ns, problem)
+        self._tell(goal.ended)
+        if self._speed_back is not None:
+            self._send(self._speed_back, now)
+            self._speed_back = None

@@ -1,0 +1,347 @@
+"""What moves the robot and what takes that away: speeds, goals, motors, deadman; in virtual time."""
+
+import math
+from itertools import pairwise
+
+import pytest
+from client_rig import MS, Link, Rig, S, new_pioneer
+
+from p2os.client.goals import DriveAxis, TurnAxis
+from p2os.client.notices import DeadmanStopped, Disobeyed, LinkLost, MotionEnded, MotorsDisabled
+from p2os.client.problems import LinkLostError, MotorsDisabledError
+from p2os.client.settings import ClientSettings
+from p2os.client.speeds import Speeds
+from p2os.commands import Command, CommandNumber, enable, rvel, stop, vel
+from p2os.errors import UsageError
+from p2os.profiles import Profile
+
+MOVE, HEAD, SETV = CommandNumber.MOVE, CommandNumber.HEAD, CommandNumber.SETV
+
+
+def of(rig: Rig, *numbers: int) -> list[tuple[int, Command]]:
+    return [(at, command) for at, command in rig.said if command.number in numbers]
+
+
+def test_a_speed_goes_out_at_once_on_change_and_every_200_ms() -> None:
+    rig = Rig().connect()
+    begun = rig.now
+    rig.core.set_velocity(0.2, 0.0, rig.now)
+    rig.living(1)
+    rig.core.set_velocity(0.3, math.radians(10), rig.now)
+    rig.living(0.5)
+    times = [(at - begun) // MS for at, command in of(rig, CommandNumber.VEL) if at >= begun]
+    assert times[0] <= 15, "ENABLE is before it, 5 ms a frame"
+    assert max(b - a for a, b in pairwise(times)) <= 200
+    assert any(1000 <= at <= 1050 for at in times)
+    assert rvel(10) in rig.commands()
+    assert rig.wheels == pytest.approx((0.2688, 0.3312), abs=0.02)
+
+
+def test_a_flood_of_changes_is_thinned_to_the_newest() -> None:
+    rig = Rig().connect()
+    rig.core.set_velocity(0.1, 0.0, rig.now)
+    rig.living(0.5)
+    before = len(rig.said)
+    for step in range(200):
+        rig.core.set_velocity(0.1 + step / 1000, 0.0, rig.now)
+        rig.run(0.001)
+    rig.run(0.1)
+    sent = [command.argument for command in rig.commands()[before:] if command.number == CommandNumber.VEL]
+    assert len(sent) <= 8
+    assert sent[-1] == 299
+
+
+def test_speeds_are_cut_to_the_limits_of_the_configuration() -> None:
+    rig = Rig().connect()
+    limits = rig.core.limits
+    assert limits.forward_mps == 0.75
+    rig.core.set_velocity(9.0, -9.0, rig.now)
+    assert rig.core.commanded == Speeds(750, -100)
+    rig.core.send(Command(SETV, 300), rig.now)
+    rig.core.send(Command(CommandNumber.SETRA, -50), rig.now)
+    assert rig.core.limits.forward_mps == 0.3
+    assert rig.core.limits.turn_decel_radps2 == pytest.approx(math.radians(50))
+    rig.core.set_velocity(9.0, 0.0, rig.now)
+    assert rig.core.commanded == Speeds(300, 0)
+
+
+@pytest.mark.parametrize("speeds", [(math.nan, 0.0), (0.0, math.inf)])
+def test_a_speed_that_is_no_number_is_refused(speeds: tuple[float, float]) -> None:
+    rig = Rig().connect()
+    with pytest.raises(UsageError, match="is no speed"):
+        rig.core.set_velocity(*speeds, rig.now)
+
+
+def test_motors_are_switched_on_by_the_first_motion_and_not_by_a_stop() -> None:
+    rig = Rig().connect()
+    rig.core.set_velocity(0.0, 0.0, rig.now)
+    rig.core.stop(rig.now)
+    rig.run(1)
+    assert enable(True) not in rig.commands()
+    rig.core.set_velocity(0.1, 0.0, rig.now)
+    rig.living(1)
+    assert rig.commands().count(enable(True)) == 3, "a P2OS robot does not say that they are on: it is told again"
+    rig.core.set_velocity(0.2, 0.0, rig.now)
+    rig.living(1)
+    assert rig.commands().count(enable(True)) == 3
+
+
+def test_without_leave_the_motors_stay_off_and_it_is_said_why() -> None:
+    rig = Rig(settings=ClientSettings(auto_enable=False)).connect()
+    with pytest.raises(MotorsDisabledError, match="motors are disabled: they are after every OPEN"):
+        rig.core.set_velocity(0.1, 0.0, rig.now)
+    rig.core.enable(True, rig.now)
+    rig.core.set_velocity(0.1, 0.0, rig.now)
+    rig.living(1)
+    assert rig.pioneer.state.motors_enabled
+
+
+def test_motors_that_somebody_switches_off_stay_off_until_asked() -> None:
+    rig = Rig(pioneer=new_pioneer("p3dx", profile=Profile.AROS)).connect()
+    assert rig.core.profile is Profile.AROS
+    rig.core.set_velocity(0.2, 0.0, rig.now)
+    rig.living(1.5)
+    assert rig.commands().count(enable(True)) == 1, "the flags say that they are on"
+    assert rig.core.state is not None
+    assert rig.core.state.motors_enabled
+    rig.pioneer._works.motion.power(on=False)
+    rig.living(0.3)
+    assert rig.notices(MotorsDisabled) == [MotorsDisabled("motors are disabled: they were switched off at the robot")]
+    before = len(rig.said)
+    rig.living(1)
+    assert vel(200) not in rig.commands()[before:]
+    with pytest.raises(MotorsDisabledError, match="switched off at the robot"):
+        rig.core.set_velocity(0.2, 0.0, rig.now)
+    rig.core.enable(True, rig.now)
+    rig.core.set_velocity(0.2, 0.0, rig.now)
+    rig.living(1.5)
+    assert rig.wheels == (0.2, 0.2)
+    rig.core.enable(False, rig.now)
+    rig.living(1.5)
+    assert rig.notices(MotorsDisabled)[1:] == [], "switched off by the program: no news"
+
+
+def test_a_program_that_makes_no_call_loses_its_speed_at_the_deadman() -> None:
+    rig = Rig().connect()
+    rig.core.set_velocity(0.3, 0.0, rig.now)
+    begun = rig.now
+    rig.run(2.5)
+    (news,) = rig.notices(DeadmanStopped)
+    assert news.silent_ns == 2 * S
+    assert stop() in rig.commands(begun + 2 * S)
+    rig.run(2)
+    assert rig.wheels == (0.0, 0.0)
+    rig.core.set_velocity(0.3, 0.0, rig.now)
+    rig.living(5)
+    assert rig.wheels == (0.3, 0.3)
+
+
+def test_the_deadman_can_be_switched_off() -> None:
+    rig = Rig(settings=ClientSettings(deadman_ns=None)).connect()
+    rig.core.set_velocity(0.3, 0.0, rig.now)
+    rig.run(3)
+    assert rig.wheels == (0.3, 0.3)
+
+
+def test_stop_is_said_and_then_held() -> None:
+    rig = Rig().connect()
+    rig.core.set_velocity(0.3, 0.1, rig.now)
+    rig.living(2)
+    before = len(rig.said)
+    rig.core.stop(rig.now)
+    rig.living(2)
+    said = rig.commands()[before:]
+    assert said[:1] == [stop()]
+    assert said.count(vel(0)) >= 9
+    assert rig.wheels == (0.0, 0.0)
+    rig.core.set_velocity(0.3, 0.0, rig.now)
+    rig.living(1.5)
+    before = len(rig.said)
+    rig.core.stop(rig.now, at_once=True)
+    rig.run(0.1)
+    assert [command.number for command in rig.commands()[before:]][:2] == [CommandNumber.E_STOP, CommandNumber.STOP]
+    assert rig.wheels == (0.0, 0.0)
+
+
+def test_a_deaf_robot_is_reported_after_a_second_and_once() -> None:
+    rig = Rig().connect()
+    rig.core.set_velocity(0.3, 0.0, rig.now)
+    rig.living(2)
+    rig.pioneer.receive = lambda _, now: rig.pioneer.advance_to(now)  # type: ignore[method-assign]
+    rig.pioneer._works.motion.set_velocity(0)
+    begun = rig.now
+    rig.living(3)
+    (doubt,) = rig.notices(Disobeyed)
+    assert "commanded 0.30 and 0.30, and no stall flag; are the motors disabled" in doubt.text
+    told = next(state.at_ns for state in rig.states if state.at_ns >= begun + S)
+    assert told - begun <= 2.3 * S
+
+
+def test_a_ramp_is_no_disobedience() -> None:
+    rig = Rig().connect()
+    for forward, turn in ((0.7, 0.0), (-0.7, 0.0), (0.0, 1.5), (0.3, -1.5), (0.0, 0.0)):
+        rig.core.set_velocity(forward, turn, rig.now)
+        rig.living(5)
+    assert rig.notices(Disobeyed) == []
+
+
+def test_a_robot_against_a_wall_says_that_it_stalls_and_is_believed() -> None:
+    rig = Rig().connect()
+    rig.core.set_velocity(0.5, 0.0, rig.now)
+    rig.living(15)
+    assert rig.core.state is not None
+    assert rig.core.state.is_stalled
+    assert rig.notices(Disobeyed) == []
+
+
+@pytest.mark.parametrize("wire", ["perfect", "byte by byte", "late", "lossy", "garbling"])
+@pytest.mark.parametrize("distance_m", [0.5, -0.4, 0.02, 0.0])
+def test_drive_arrives_over_any_wire(wire: str, distance_m: float) -> None:
+    rig = Rig(wire=wire, seed=3).connect()
+    goal = rig.core.begin_goal(DriveAxis(distance_m), None, None, rig.now)
+    rig.until(lambda: goal.ended is not None)
+    assert goal.ended is not None
+    assert goal.ended.problem is None
+    assert rig.pioneer.state.x_mm / 1000 == pytest.approx(distance_m, abs=0.016)
+    rig.run(1)
+    assert rig.wheels == (0.0, 0.0)
+
+
+@pytest.mark.parametrize("wire", ["perfect", "late", "lossy", "garbling"])
+@pytest.mark.parametrize("degrees", [90, -90, 200, -720, 3])
+def test_turn_arrives_over_any_wire_however_far(wire: str, degrees: float) -> None:
+    rig = Rig(wire=wire, seed=5).connect()
+    goal = rig.core.begin_goal(TurnAxis(math.radians(degrees)), None, None, rig.now)
+    rig.until(lambda: goal.ended is not None)
+    assert goal.ended is not None
+    assert goal.ended.problem is None
+    assert math.degrees(rig.pioneer.state.heading_rad) == pytest.approx(degrees, abs=2.1)
+
+
+def test_a_long_way_goes_in_legs_without_braking_between() -> None:
+    rig = Rig().connect()
+    rig.core.begin_goal(DriveAxis(100.0), 10 * S, None, rig.now)
+    rig.run(4)
+    assert [command.argument for _, command in of(rig, MOVE)] == [5000]
+    rig.run(4)
+    assert [command.argument for _, command in of(rig, MOVE)] == [5000, 5000]
+    axis = DriveAxis(12.0)
+    assert axis.command(12.0, standing=True) == Command(MOVE, 5000)
+    assert axis.command(9.0, standing=False) is None
+    assert axis.command(8.4, standing=False) == Command(MOVE, 5000)
+    assert axis.command(5.0, standing=False) is None
+    assert axis.command(4.8, standing=False) == Command(MOVE, 4800)
+    assert axis.command(1.0, standing=False) is None
+    assert axis.command(1.0, standing=True) == Command(MOVE, 1000)
+
+
+def test_a_goal_of_its_own_speed_puts_the_usual_one_back() -> None:
+    rig = Rig().connect()
+    goal = rig.core.begin_goal(DriveAxis(0.3), None, 0.1, rig.now)
+    rig.until(lambda: goal.ended is not None)
+    rig.run(0.2)
+    assert max(state.forward_mps for state in rig.states) <= 0.101
+    assert [command.argument for _, command in of(rig, SETV)] == [100, 750]
+    goal = rig.core.begin_goal(TurnAxis(0.5), None, 0.2, rig.now)
+    rig.until(lambda: goal.ended is not None)
+    rig.run(0.2)
+    assert [command.argument for _, command in of(rig, CommandNumber.SETRV)] == [11, 100]
+
+
+def test_a_wall_in_the_way_ends_the_goal_with_its_reason_and_a_stop() -> None:
+    rig = Rig().connect()
+    goal = rig.core.begin_goal(DriveAxis(5.0), None, None, rig.now)
+    rig.until(lambda: goal.ended is not None, within_s=30)
+    assert goal.ended is not None
+    assert goal.ended.problem == "stalled"
+    before = rig.now - 100 * MS
+    rig.run(3)
+    assert stop() in rig.commands(before)
+    assert rig.wheels == (0.0, 0.0)
+
+
+def test_a_goal_that_takes_too_long_is_given_up() -> None:
+    rig = Rig().connect()
+    goal = rig.core.begin_goal(DriveAxis(3.0), 2 * S, None, rig.now)
+    rig.until(lambda: goal.ended is not None)
+    assert goal.ended is not None
+    assert goal.ended.problem == "not there after 2.0 s"
+    rig.run(2)
+    assert rig.wheels == (0.0, 0.0)
+
+
+def test_a_robot_whose_motors_do_not_come_on_ends_the_goal() -> None:
+    rig = Rig().connect()
+    rig.pioneer._works.motion.power = lambda **_: None  # type: ignore[method-assign]
+    goal = rig.core.begin_goal(DriveAxis(1.0), None, None, rig.now)
+    rig.until(lambda: goal.ended is not None)
+    assert goal.ended is not None
+    assert goal.ended.problem == "the robot stands: are its motors off, or is the way blocked?"
+
+
+@pytest.mark.parametrize("how", ["speed", "stop", "goal", "raw", "loss", "close", "off", "cancel"])
+def test_a_goal_ends_when_something_else_takes_its_place(how: str) -> None:
+    rig = Rig().connect()
+    goal = rig.core.begin_goal(DriveAxis(1.0), None, 0.2, rig.now)
+    rig.run(1)
+    ways = {
+        "speed": lambda: rig.core.set_velocity(0.1, 0.0, rig.now),
+        "stop": lambda: rig.core.stop(rig.now),
+        "goal": lambda: rig.core.begin_goal(TurnAxis(1.0), None, None, rig.now),
+        "raw": lambda: rig.core.send(vel(0), rig.now),
+        "loss": rig.pull,
+        "close": lambda: rig.core.close(rig.now),
+        "off": lambda: rig.core.enable(False, rig.now),
+        "cancel": lambda: rig.core.cancel_goal(goal, rig.now),
+    }
+    ways[how]()
+    assert goal.ended is not None
+    assert goal.ended.problem
+    assert rig.core.goal_is_under_way is (how == "goal")
+    rig.run(1)
+    assert any(isinstance(notice, MotionEnded) for notice in rig.notices())
+    rig.core.cancel_goal(goal, rig.now)
+
+
+def test_a_goal_is_refused_where_nothing_is_known_or_nothing_is_asked() -> None:
+    rig = Rig()
+    with pytest.raises(LinkLostError, match="no robot is connected"):
+        rig.core.begin_goal(DriveAxis(1.0), None, None, rig.now)
+    rig.connect()
+    for axis, speed in ((DriveAxis(math.nan), None), (DriveAxis(1.0), -0.1), (TurnAxis(1.0), math.inf)):
+        with pytest.raises(UsageError, match="is no motion"):
+            rig.core.begin_goal(axis, None, speed, rig.now)
+
+
+def test_a_raw_motion_takes_the_place_of_a_held_speed() -> None:
+    rig = Rig().connect()
+    rig.core.set_velocity(0.2, 0.0, rig.now)
+    rig.living(1)
+    rig.core.send(Command(CommandNumber.VEL2, 10 << 8 | 10), rig.now)
+    before = len(rig.said)
+    rig.living(1)
+    assert vel(200) not in rig.commands()[before:]
+    assert rig.wheels == pytest.approx((0.2, 0.2), abs=1e-6)
+
+
+@pytest.mark.parametrize("how", ["cut", "pulled", "rebooted"])
+def test_after_a_loss_the_robot_began_to_stop_at_its_watchdog_or_earlier_and_stays(how: str) -> None:
+    rig = Rig(baud=9600).connect()
+    rig.core.set_velocity(0.3, 0.2, rig.now)
+    rig.living(2)
+    assert max(map(abs, rig.wheels)) > 0.2
+    at = rig.now
+    {"cut": lambda: setattr(rig, "is_cut", True), "pulled": rig.pull, "rebooted": rig.reboot}[how]()
+    rig.living(2.05)
+    assert rig.pioneer.state.watchdog_expired or max(map(abs, rig.wheels)) < 0.3
+    rig.living(1.5)
+    assert rig.wheels == (0.0, 0.0)
+    rig.is_cut = False
+    rig.plug()
+    rig.until(lambda: rig.core.link is Link.OPEN)
+    assert rig.notices(LinkLost)
+    rig.living(5)
+    speeds = [command.argument for said, command in rig.said
+              if said > at + 1100 * MS and command.number in {CommandNumber.VEL, CommandNumber.RVEL}]  # fmt: skip
+    assert set(speeds) <= {0}
+    assert rig.wheels == (0.0, 0.0)

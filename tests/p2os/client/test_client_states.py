@@ -1,0 +1,205 @@
+"""Packets folded into states, poses that go on, and limits and families that are told or guessed."""
+
+import math
+from dataclasses import replace
+
+import pytest
+from client_rig import Rig, new_pioneer, parameters
+from hypothesis import given
+from hypothesis import strategies as st
+
+from p2os.client.core import RobotCore, guess_profile
+from p2os.client.goals import TurnAxis
+from p2os.client.notices import PacketArrived, RobotUnknown
+from p2os.client.observer import Observer, bumpers_of, limits_of
+from p2os.client.pose import PoseKeeper
+from p2os.client.settings import ClientSettings
+from p2os.client.snapshots import Pose
+from p2os.commands import Command, CommandNumber
+from p2os.config_packet import AROS_1_6_FIELDS, ConfigPacket
+from p2os.errors import UsageError
+from p2os.packets import RawPacket
+from p2os.parameters import ParametersError, RobotParameters
+from p2os.profiles import Profile
+from p2os.sip import SonarReading, StandardSip
+
+P2DX = parameters()
+
+
+def test_a_state_is_the_packet_in_si_units() -> None:
+    observer = Observer(P2DX)
+    state = observer.take(
+        StandardSip(
+            raw_left_velocity=100, raw_right_velocity=300, raw_battery=126, stall_right=True, kind=0x33,
+            front_bumpers=0x7F, raw_compass=45, raw_analog=255, analog_port=5, digital_in=1, digital_out=2,
+            sonar=(SonarReading(3, 4000), SonarReading(0, 32000), SonarReading(200, 1)),
+        ),
+        7,
+    )  # fmt: skip
+    assert (state.forward_mps, state.left_mps, state.right_mps) == (0.2, 0.1, 0.3)
+    assert state.turn_radps == pytest.approx(0.2 / 0.357)
+    assert (state.battery_v, state.is_moving, state.is_stalled, state.stall_left) == (12.6, True, True, False)
+    assert state.front_bumpers == (), "no bumpers are fitted: floating inputs are no collision"
+    assert state.compass_rad == pytest.approx(math.pi / 2)
+    assert (state.analog_v, state.analog_port, state.digital_in, state.digital_out) == (5.0, 5, 1, 2)
+    assert state.motors_enabled is None
+    assert state.stop_button is None
+    assert [echo.number for echo in state.sonar] == [0, 3], "a sonar that the model does not have is not placed"
+    far, near = state.sonar
+    assert not far.is_echo
+    assert near.is_echo
+    assert near.range_m == pytest.approx(1.072)
+    # Sonar 3 sits at (166, 27) mm and looks 10 degrees to the left.
+    assert near.x_m == pytest.approx(0.166 + 1.072 * math.cos(math.radians(10)))
+    assert near.y_m == pytest.approx(0.027 + 1.072 * math.sin(math.radians(10)))
+    assert state.nearest() == near
+    assert state.nearest(math.radians(90), math.radians(180)) is None
+    assert state.pose.to_world(1.0, 0.0) == (1.0, 0.0)
+
+
+def test_a_sonar_keeps_its_last_reading_until_the_next() -> None:
+    observer = Observer(P2DX)
+    observer.take(StandardSip(sonar=(SonarReading(1, 1000),)), 5)
+    state = observer.take(StandardSip(sonar=(SonarReading(2, 2000),), raw_compass=181), 9)
+    assert [(echo.number, echo.at_ns) for echo in state.sonar] == [(1, 5), (2, 9)]
+    assert state.number == 2
+    assert state.compass_rad is None
+    observer.new_session(P2DX)
+    assert observer.take(StandardSip(), 10).sonar == ()
+
+
+def test_flags_and_the_tail_are_read_where_the_family_has_them() -> None:
+    observer = Observer(P2DX)
+    observer.profile = Profile.ARCOS
+    state = observer.take(StandardSip(raw_flags=0b100001, tail=(130, 0, 0, 0, 0, 25, 80)), 0)
+    assert state.motors_enabled is True
+    assert state.stop_button is True
+    assert state.state_of_charge == 0.8
+    assert state.temperature_c == 25.0
+    cold = observer.take(StandardSip(tail=(130, 0, 0, 0, 0, -127)), 0)
+    assert cold.temperature_c is None
+    assert cold.motors_enabled is False
+
+
+@pytest.mark.parametrize(("fitted", "pressed"), [(5, (1, 3)), (0, ()), (2, (1,))])
+def test_bumpers_are_those_that_are_fitted(fitted: int, pressed: tuple[int, ...]) -> None:
+    observer = Observer(P2DX)
+    observer.bumpers = bumpers_of(ConfigPacket(frontbumps=fitted, fields_sent=AROS_1_6_FIELDS))
+    assert observer.take(StandardSip(front_bumpers=0b0000101), 0).front_bumpers == pressed
+    assert bumpers_of(ConfigPacket(frontbumps=5)).front == 0
+
+
+def test_limits_are_the_configurations_below_the_models() -> None:
+    own = limits_of(P2DX, None)
+    assert (own.forward_mps, own.accel_mps2) == (0.75, 0.3)
+    told = limits_of(P2DX, ConfigPacket(transvelmax=400, rotvelmax=60, transacc=250, rotdecel=80))
+    assert (told.forward_mps, told.accel_mps2, told.decel_mps2) == (0.4, 0.25, 0.3)
+    assert told.turn_radps == pytest.approx(math.radians(60))
+    assert told.turn_decel_radps2 == pytest.approx(math.radians(80))
+    assert limits_of(P2DX, ConfigPacket(transvelmax=9999)).forward_mps == 2.2, "simulators send 9999"
+
+
+@given(steps=st.lists(st.tuples(st.integers(-16000, 16000), st.integers(-16000, 16000), st.integers(-2000, 2000))))
+def test_the_pose_follows_any_step_up_to_half_of_a_counter(steps: list[tuple[int, int, int]]) -> None:
+    keeper = PoseKeeper()
+    x = y = heading = 0
+    pose = keeper.take(StandardSip(), P2DX)
+    for dx, dy, turn in steps:
+        x, y, heading = x + dx, y + dy, heading + turn
+        raw = (heading + 2048) % 4096 - 2048
+        pose = keeper.take(StandardSip(raw_x=x & 0x7FFF, raw_y=y & 0x7FFF, raw_heading=raw), P2DX)
+    assert pose.x_m == pytest.approx(x * 0.00084)
+    assert pose.y_m == pytest.approx(y * 0.00084)
+    assert pose.heading_rad == pytest.approx(heading * 2 * math.pi / 4096)
+
+
+def test_the_heading_does_not_drift_over_ten_thousand_turns() -> None:
+    keeper = PoseKeeper()
+    for step in range(4 * 10_000 + 1):
+        pose = keeper.take(StandardSip(raw_heading=step * 1024 % 4096 - 2048), P2DX)
+    assert pose.heading_rad == pytest.approx(10_000 * 2 * math.pi, abs=1e-9)
+
+
+def test_a_pose_goes_on_over_sessions_and_places() -> None:
+    keeper = PoseKeeper()
+    keeper.take(StandardSip(), P2DX)
+    keeper.take(StandardSip(raw_x=1000, raw_heading=1024), P2DX)
+    keeper.new_session()
+    keeper.take(StandardSip(), P2DX)
+    pose = keeper.take(StandardSip(raw_x=500), P2DX)
+    # The robot stood at 0.84 m looking left; its new odometry calls that ahead.
+    assert (pose.x_m, pose.y_m) == pytest.approx((0.84, 0.42))
+    assert pose.heading_rad == pytest.approx(math.pi / 2)
+    keeper.place(Pose(10.0, 0.0, 0.0))
+    pose = keeper.take(StandardSip(raw_x=1000), P2DX)
+    assert (pose.x_m, pose.y_m) == pytest.approx((10.42, 0.0))
+    assert keeper.robot_heading_rad == 0.0
+
+
+def test_a_turn_counts_in_the_robots_own_frame_after_set_pose() -> None:
+    rig = Rig().connect()
+    rig.core.set_pose(Pose(1.0, 2.0, math.radians(45)))
+    rig.run(0.2)
+    assert rig.core.state is not None
+    assert rig.core.state.pose == Pose(1.0, 2.0, math.radians(45))
+    goal = rig.core.begin_goal(TurnAxis(math.radians(-90)), None, None, rig.now)
+    rig.until(lambda: goal.ended is not None)
+    assert Command(CommandNumber.HEAD, 270) in rig.commands()
+    assert math.degrees(rig.core.state.pose.heading_rad) == pytest.approx(-45, abs=2)
+
+
+def test_a_model_that_nobody_knows_gets_a_stand_in_and_a_word() -> None:
+    rig = Rig()
+    rig.pioneer._connection._side._identity = replace(rig.pioneer._connection._side._identity, subclass="Zorg-9")  # type: ignore[union-attr]
+    rig.connect()
+    assert rig.notices(RobotUnknown) == [RobotUnknown("Zorg-9", "p2dx")]
+    assert rig.core.parameters.subclass == "p2dx"
+
+
+def test_parameters_that_are_given_are_used_and_others_are_loaded_by_name() -> None:
+    def nothing(name: str) -> RobotParameters:
+        if name != "p2dx":
+            raise ParametersError(name)
+        return P2DX
+
+    given_core = RobotCore(ClientSettings(), parameters=replace(P2DX, track_mm=400))
+    assert given_core.parameters.track_mm == 400
+    rig = Rig(pioneer=new_pioneer("p3dx"))
+    rig.core = RobotCore(ClientSettings(), load=nothing)
+    rig.connect()
+    assert rig.notices(RobotUnknown)
+
+
+@pytest.mark.parametrize(
+    ("subclass", "profile"),
+    [("p2dx", Profile.P2OS), ("P2AT8", Profile.P2OS), ("p3dx", Profile.AROS), ("p2d8+", Profile.AROS),
+     ("perfpb", Profile.AROS), ("p3dx-sh", Profile.ARCOS), ("seekurjr", Profile.ARCOS), ("pioneer-lx", Profile.ARCOS)],
+)  # fmt: skip
+def test_the_family_is_guessed_by_the_model(subclass: str, profile: Profile) -> None:
+    assert guess_profile(subclass) is profile
+
+
+def test_a_tail_shows_the_family_whatever_the_model_is_called() -> None:
+    rig = Rig(pioneer=new_pioneer(profile=Profile.ARCOS)).connect()
+    assert rig.core.profile is Profile.ARCOS
+    assert rig.core.state is not None
+    assert rig.core.state.motors_enabled is False
+    told = Rig(settings=ClientSettings(profile=Profile.AROS), pioneer=new_pioneer(profile=Profile.ARCOS)).connect()
+    assert told.core.profile is Profile.AROS
+
+
+def test_packets_of_other_kinds_come_through() -> None:
+    rig = Rig().connect()
+    rig.pioneer._connection.send(RawPacket(0x99, b"abc"), rig.now)
+    rig.run(0.2)
+    assert rig.notices(PacketArrived) == [PacketArrived(RawPacket(0x99, b"abc"))]
+
+
+@pytest.mark.parametrize(
+    ("change", "text"),
+    [({"refresh_ns": 0}, "refresh_ns = 0 must be positive"), ({"deadman_ns": -1}, "or None"),
+     ({"raise_baud": 1200}, "no rate of HOSTBAUD")],
+)  # fmt: skip
+def test_a_setting_out_of_range_is_refused(change: dict[str, int], text: str) -> None:
+    with pytest.raises(UsageError, match=text):
+        ClientSettings(**change)  # type: ignore[arg-type]
