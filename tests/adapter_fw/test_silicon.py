@@ -1,0 +1,99 @@
+"""The core on other machines: the same life gives the same hash under sanitizers, on a Cortex-M3 and on an Xtensa."""
+
+import shutil
+import subprocess
+from importlib.util import module_from_spec, spec_from_file_location
+from pathlib import Path
+from types import ModuleType
+
+import pytest
+
+from bluepill_sim import BluePill
+
+ROOT = Path(__file__).parents[2]
+#: Seconds of life on each machine, and what the host's program is asked for.
+SPAN_S, SEED = 20, 1
+#: Budgets in bytes and cycles: measured values and some room; whoever breaks one says so in the docs.
+BUDGETS = {"cortex-m": {"flash": 26_000, "ram": 64}, "xtensa": {"flash": 33_000, "ram": 64}}
+ADAPTER_BYTES = 3_000
+LONGEST_CALL_CYCLES = 25_000
+
+
+def load_build() -> ModuleType:
+    spec = spec_from_file_location("adapter_build", ROOT / "adapter_fw" / "build.py")
+    assert spec is not None
+    assert spec.loader is not None
+    module = module_from_spec(spec)
+    import sys
+
+    sys.modules[spec.name] = module
+    spec.loader.exec_module(module)
+    return module
+
+
+BUILD = load_build()
+
+
+def built(name: str, folder: Path) -> tuple[Path, dict[str, int]]:
+    if not BUILD.is_installed(name):
+        pytest.skip(f"{BUILD.TARGETS[name].compiler} is not installed: apt-get install {BUILD.TARGETS[name].package}")
+    program = folder / f"{name}.elf"
+    return program, BUILD.build(name, program)
+
+
+def numbers(text: str) -> dict[str, int]:
+    rows = [line.split() for line in text.splitlines()]
+    assert rows[-1] == ["ok"], text
+    return {name: int(value) for name, value in (row for row in rows if len(row) == 2)}
+
+
+def run_host(program: Path, span_s: int, seed: int) -> dict[str, int]:
+    done = subprocess.run([program, str(span_s), str(seed)], capture_output=True, text=True, check=False, timeout=120)
+    assert done.returncode == 0, done.stdout + done.stderr
+    return numbers(done.stdout)
+
+
+@pytest.fixture(scope="module")
+def host(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return built("host", tmp_path_factory.mktemp("host"))[0]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", range(1, 9))
+def test_ten_minutes_of_accidents_under_sanitizers_show_no_fault(host: Path, seed: int) -> None:
+    result = run_host(host, 600, seed)
+    assert result["sessions"] > 10
+    assert result["losses"] > 5
+
+
+@pytest.mark.slow
+def test_the_cortex_m3_of_our_emulator_lives_the_same_life(host: Path, tmp_path: Path) -> None:
+    program, size = built("cortex-m", tmp_path)
+    chip, text = BluePill(program), bytearray()
+    chip.usart1.on_transmit = lambda byte, _: text.append(byte)
+    while b"ok\n" not in text and b"failed" not in text and chip.now_ns < 10 * 10**9:
+        chip.advance_to(chip.now_ns + 10**8)
+        assert chip.fault is None, chip.fault
+    result = numbers(text.decode())
+    assert {name: result[name] for name in run_host(host, SPAN_S, SEED)} == run_host(host, SPAN_S, SEED)
+    assert result["longest_call_cycles"] <= LONGEST_CALL_CYCLES
+    assert result["adapter_bytes"] <= ADAPTER_BYTES
+    assert all(size[kind] <= budget for kind, budget in BUDGETS["cortex-m"].items()), size
+
+
+@pytest.mark.slow
+def test_an_xtensa_in_qemu_lives_the_same_life(host: Path, tmp_path: Path) -> None:
+    program, size = built("xtensa", tmp_path)
+    emulator = shutil.which("qemu-system-xtensa")
+    if emulator is None:
+        pytest.skip("qemu-system-xtensa is not installed: apt-get install qemu-system-misc")
+    done = subprocess.run(
+        [emulator, "-M", "sim", "-cpu", "lx106", "-semihosting", "-nographic", "-monitor", "none", "-serial", "none",
+         "-kernel", program],
+        capture_output=True, text=True, check=False, timeout=120,
+    )  # fmt: skip
+    assert done.returncode == 0, done.stderr
+    result = numbers(done.stdout)
+    assert {name: result[name] for name in run_host(host, SPAN_S, SEED)} == run_host(host, SPAN_S, SEED)
+    assert result["adapter_bytes"] <= ADAPTER_BYTES
+    assert all(size[kind] <= budget for kind, budget in BUDGETS["xtensa"].items()), size
