@@ -14,6 +14,7 @@ from typing import NamedTuple, Protocol
 
 from p2os.errors import MissingDependencyError, UsageError
 from p2os.parameters import RobotParameters
+from p2os.pioneer.fan import Echo
 from p2os.pioneer.scenery import Obstacle, Pose, World
 from p2os.timing import NS_PER_MS, Nanos
 
@@ -103,6 +104,14 @@ class RobotBody(Protocol):
 
     def ranges(self, numbers: Sequence[int]) -> list[float]:
         """Return what these sonar read now, metres from each transducer; the robot file's range where no echo comes."""
+        ...
+
+    def echoes(self, numbers: Sequence[int]) -> list[list[Echo]]:
+        """Return what each ray of some sonar meets, for a model of the sensor: range and angle, the rightmost first."""
+        ...
+
+    def take_moved(self) -> list[Obstacle]:
+        """Return what has walked or was pushed since this was asked last, where it is now."""
         ...
 
     def clearance(self) -> float:

@@ -8,7 +8,7 @@ import math
 from collections.abc import Sequence
 from itertools import pairwise
 
-from p2os.parameters import BodyParameters
+from p2os.parameters import BodyParameters, RobotParameters
 from p2os.pioneer.scenery import Obstacle
 
 Point = tuple[float, float]
@@ -19,36 +19,72 @@ INFINITY = math.inf
 
 
 class Footprint:
-    """The plan of an obstacle, prepared for many questions."""
+    """The plan of a thing, prepared for many questions: a circle, or a convex polygon counter-clockwise.
 
-    __slots__ = ("axis", "edges", "halves", "name", "polygon", "radius", "reach", "x", "y")
+    A polygon of two points is an upright face of a mesh: it has two sides and no inside.
+    """
 
-    def __init__(self, obstacle: Obstacle) -> None:
-        self.name = obstacle.name
-        self.x, self.y = obstacle.x_m, obstacle.y_m
-        self.radius = obstacle.radius_m
-        self.reach = obstacle.reach_m
-        self.axis = (math.cos(obstacle.heading_rad), math.sin(obstacle.heading_rad))
-        self.halves = (obstacle.length_m / 2, obstacle.width_m / 2)
-        self.polygon: Polygon = ()
-        if not obstacle.is_cylinder:
-            half_length, half_width = self.halves
-            corners = (
-                (half_length, half_width),
-                (-half_length, half_width),
-                (-half_length, -half_width),
-                (half_length, -half_width),
-            )
-            self.polygon = placed(corners, obstacle.x_m, obstacle.y_m, obstacle.heading_rad)
-        self.edges = tuple(pairwise((*self.polygon, self.polygon[0]))) if self.polygon else ()
+    __slots__ = ("_box", "edges", "name", "polygon", "radius", "reach", "x", "y")
+
+    def __init__(self, obstacle: Obstacle | None, polygon: Polygon = (), name: str = "") -> None:
+        """Prepare an obstacle's footprint, or with None that of a polygon (`of_polygon`)."""
+        #: Cosine and sine of the heading, half length and half width, where it is a box.
+        self._box: tuple[float, float, float, float] | None = None
+        if obstacle is None:
+            count = len(polygon)
+            self.name, self.radius, self.polygon = name, 0.0, polygon
+            self.x, self.y = sum(x for x, _ in polygon) / count, sum(y for _, y in polygon) / count
+            self.reach = max(math.dist((self.x, self.y), point) for point in polygon)
+        else:
+            self.name, self.radius, self.reach = obstacle.name, obstacle.radius_m, obstacle.reach_m
+            self.x, self.y = obstacle.x_m, obstacle.y_m
+            self.polygon = () if obstacle.is_cylinder else self._corners(obstacle)
+        #: Start and run of each edge.
+        self.edges = tuple(
+            (ax, ay, bx - ax, by - ay) for (ax, ay), (bx, by) in pairwise((*self.polygon, *self.polygon[:1]))
+        )
+
+    @classmethod
+    def of_polygon(cls, name: str, polygon: Polygon) -> "Footprint":
+        """Return the footprint of a part of a mesh."""
+        return cls(None, polygon, name)
+
+    def _corners(self, item: Obstacle) -> Polygon:
+        half_length, half_width = item.length_m / 2, item.width_m / 2
+        self._box = (math.cos(item.heading_rad), math.sin(item.heading_rad), half_length, half_width)
+        corners = (
+            (half_length, half_width),
+            (-half_length, half_width),
+            (-half_length, -half_width),
+            (half_length, -half_width),
+        )
+        return placed(corners, item.x_m, item.y_m, item.heading_rad)
+
+    @property
+    def bounds(self) -> tuple[float, float, float, float]:
+        """Return x0, y0, x1, y1 of the rectangle around it."""
+        if not self.polygon:
+            r = self.radius
+            return self.x - r, self.y - r, self.x + r, self.y + r
+        xs, ys = [x for x, _ in self.polygon], [y for _, y in self.polygon]
+        return min(xs), min(ys), max(xs), max(ys)
+
+    def contains(self, x: float, y: float) -> bool:
+        """Tell whether a point is inside a polygon or on its edge; of a circle, and of two points, never asked."""
+        if len(self.edges) < 3:
+            return False
+        return all((x - ax) * ey - (y - ay) * ex <= 0.0 for ax, ay, ex, ey in self.edges)
+
+    def seen_from(self, x: float, y: float) -> list[tuple[float, float, float, float]]:
+        """Return the edges whose outer side looks at a point."""
+        return [edge for edge in self.edges if (x - edge[0]) * edge[3] - (y - edge[1]) * edge[2] > 0.0]
 
     def hit(self, x: float, y: float, dx: float, dy: float) -> float:
         """Return how far a ray of unit direction goes until it meets this, or infinity."""
         if not self.edges:
             return _ray_circle(x - self.x, y - self.y, dx, dy, self.radius)
         nearest = INFINITY
-        for (ax, ay), (bx, by) in self.edges:
-            ex, ey = bx - ax, by - ay
+        for ax, ay, ex, ey in self.edges:
             denominator = dx * ey - dy * ex
             if denominator == 0.0:
                 continue
@@ -58,14 +94,28 @@ class Footprint:
                 nearest = along
         return nearest
 
+    def normal_at(self, x: float, y: float) -> Point:
+        """Return the unit normal of the surface nearest to a point of the outline."""
+        if not self.edges:
+            return (x - self.x) / self.radius, (y - self.y) / self.radius
+        _, _, ex, ey = min(
+            self.edges, key=lambda edge: _point_segment(x, y, edge[0], edge[1], edge[0] + edge[2], edge[1] + edge[3])
+        )
+        length = math.hypot(ex, ey)
+        return ey / length, -ex / length
+
     def distance_to_point(self, x: float, y: float) -> float:
         """Return the distance to a point; 0 inside."""
-        dx, dy = x - self.x, y - self.y
-        if not self.polygon:
-            return max(0.0, math.hypot(dx, dy) - self.radius)
-        (c, s), (half_length, half_width) = self.axis, self.halves
-        along, across = abs(dx * c + dy * s) - half_length, abs(dy * c - dx * s) - half_width
-        return math.hypot(max(0.0, along), max(0.0, across))
+        if not self.edges:
+            return max(0.0, math.hypot(x - self.x, y - self.y) - self.radius)
+        if self._box is not None:
+            c, s, half_length, half_width = self._box
+            dx, dy = x - self.x, y - self.y
+            along, across = abs(dx * c + dy * s) - half_length, abs(dy * c - dx * s) - half_width
+            return math.hypot(max(0.0, along), max(0.0, across))
+        if self.contains(x, y):
+            return 0.0
+        return min(_point_segment(x, y, ax, ay, ax + ex, ay + ey) for ax, ay, ex, ey in self.edges)
 
     def distance(self, hull: Polygon) -> float:
         """Return the distance to a convex polygon; 0 where they overlap."""
@@ -75,11 +125,64 @@ class Footprint:
             return 0.0
         return min(_nearest(hull, self.polygon), _nearest(self.polygon, hull))
 
+    def way_out(self, hull: Polygon) -> Point:
+        """Return the shortest move that takes this out of a convex polygon that it overlaps.
+
+        The separating axes are the normals of both outlines, and for a circle
+        the line from its middle to the nearest corner.
+        """
+        axes = [(by - ay, ax - bx) for (ax, ay), (bx, by) in pairwise((*hull, hull[0]))]
+        axes += [(-ey, ex) for _, _, ex, ey in self.edges]
+        if not self.polygon:
+            corner = min(hull, key=lambda point: math.dist(point, (self.x, self.y)))
+            axes.append((self.x - corner[0], self.y - corner[1]))
+        best, move = INFINITY, (0.0, 0.0)
+        for ax, ay in axes:
+            length = math.hypot(ax, ay)
+            if length == 0.0:
+                continue
+            nx, ny = ax / length, ay / length
+            far = max(px * nx + py * ny for px, py in hull)
+            if self.polygon:
+                near = min(px * nx + py * ny for px, py in self.polygon)
+            else:
+                near = self.x * nx + self.y * ny - self.radius
+            if far - near < best:
+                best, move = far - near, ((far - near) * nx, (far - near) * ny)
+        return move
+
 
 def hull_polygon(body: BodyParameters) -> Polygon:
     """Return the hull's outline in the robot frame, counter-clockwise."""
     front, rear, half = body.hull_front_m, body.hull_rear_m, body.hull_width_m / 2
     return ((front, half), (-rear, half), (-rear, -half), (front, -half))
+
+
+def wheel_polygons(parameters: RobotParameters) -> tuple[Polygon, ...]:
+    """Return where wheels and caster meet a thing as high as the hull's underside, in the robot frame."""
+    body = parameters.body
+    high = body.ground_clearance_m
+
+    def reach(radius: float) -> float:
+        depth = min(high, radius)
+        return math.sqrt(depth * (2 * radius - depth))
+
+    half, ahead, aside = body.wheel_width_m / 2, reach(body.wheel_diameter_m / 2), parameters.track_mm / 2000
+    caster = reach(body.caster_radius_m)
+    return (
+        _rectangle(0.0, aside, ahead, half),
+        _rectangle(0.0, -aside, ahead, half),
+        _rectangle(body.caster_x_m, 0.0, caster, caster),
+    )
+
+
+def _rectangle(x: float, y: float, half_length: float, half_width: float) -> Polygon:
+    return (
+        (x + half_length, y + half_width),
+        (x - half_length, y + half_width),
+        (x - half_length, y - half_width),
+        (x + half_length, y - half_width),
+    )
 
 
 def placed(polygon: Sequence[Point], x: float, y: float, heading: float) -> Polygon:
@@ -125,6 +228,7 @@ def _point_polygon(x: float, y: float, polygon: Polygon) -> float:
 
 def _point_segment(x: float, y: float, ax: float, ay: float, bx: float, by: float) -> float:
     ex, ey = bx - ax, by - ay
-    share = ((x - ax) * ex + (y - ay) * ey) / (ex * ex + ey * ey)
+    length = ex * ex + ey * ey
+    share = ((x - ax) * ex + (y - ay) * ey) / length if length > 0.0 else 0.0
     share = min(1.0, max(0.0, share))
     return math.hypot(x - ax - share * ex, y - ay - share * ey)

@@ -2,8 +2,11 @@
 
 Within a step both rims keep their set-points and the path is the exact arc.
 Slopes are flat to it; walls and echoes are those at the height of the hull and
-of the sonar ring. A step that would bring the hull into a thing does not happen:
-the wheels stall until the set-points lead away.
+of the sonar ring; what is lower than the hull stops the wheels, unless it is a
+sill. A step that would bring the hull into a thing does not happen: the wheels
+stall until the set-points lead away. A thing that can be pushed slides out of
+the way, without turning, where it has room and its friction is less than what
+the motors can push. What walks by itself goes on through the robot.
 
 It serves as the oracle for the other bodies, and where PyBullet is not to be had.
 """
@@ -14,16 +17,22 @@ from collections.abc import Sequence
 from p2os.parameters import RobotParameters
 from p2os.pioneer.body import STEP_NS, BodyState, Turned
 from p2os.pioneer.contacts import ContactCounter
+from p2os.pioneer.fan import Direction, Echo, cast, echoes
 from p2os.pioneer.geometry import Footprint
 from p2os.pioneer.plan import Plan
 from p2os.pioneer.scenery import Obstacle, Pose, World
 from p2os.pioneer.sonar import cones, reading
+from p2os.pioneer.static_plan import StaticPlan
+from p2os.pioneer.walk import Walker
 from p2os.timing import NS_PER_S, Nanos
 
 #: Below this turn in one step the arc is a straight line to double precision, rad.
 STRAIGHT_RAD = 1e-9
 #: Farther than this nothing is measured exactly, m: it only bounds how soon the next look is due.
 LOOK_AHEAD_M = 2.0
+#: What walks is moved each 10 ms (chosen: 8 mm at a walker's pace).
+WALK_STEPS = 10
+GRAVITY_MPS2 = 9.81
 _DT_S = STEP_NS / NS_PER_S
 
 
@@ -40,6 +49,10 @@ class KinematicBody:
         self._track_m = parameters.track_mm / 1000
         self._radius_m = parameters.body.wheel_diameter_m / 2
         body = parameters.body
+        self._static = StaticPlan(world, parameters)
+        #: The greatest force of both motors together, N.
+        self._push_n = 2 * body.motor_torque_nm / self._radius_m
+        self._longest_m = parameters.sonar_range_m
         #: How far any point of the hull moves when the robot turns by 1 rad.
         self._hull_reach = math.hypot(max(body.hull_front_m, body.hull_rear_m), body.hull_width_m / 2)
         self.reset(world.start, 0)
@@ -71,7 +84,13 @@ class KinematicBody:
     def reset(self, pose: Pose, seed: int) -> BodyState:
         """Stand still at a pose in the world as it was made; nothing here is random."""
         del seed
-        self._plan = Plan(self._world.obstacles, self._parameters.body)
+        self._steps = 0
+        self._walkers: dict[str, tuple[int, Walker]] = {}
+        self._plan = Plan((), self._parameters, self._static)
+        self._moved_things: dict[str, None] = {}
+        for item in self._world.obstacles:
+            if not item.fixed:
+                self._put(item)
         self._x, self._y, self._heading = pose.x_m, pose.y_m, pose.heading_rad
         self._left_angle = self._right_angle = self._left = self._right = 0.0
         self._asked = (0.0, 0.0)
@@ -86,6 +105,9 @@ class KinematicBody:
 
     def step(self, left_mps: float, right_mps: float) -> Turned:
         """Move on by one step along the exact arc, or stall."""
+        self._steps += 1
+        if self._walkers and self._steps % WALK_STEPS == 0:
+            self._walk()
         self._asked = (left_mps, right_mps)
         if left_mps == 0.0 and right_mps == 0.0:
             self._left = self._right = 0.0
@@ -130,15 +152,44 @@ class KinematicBody:
             return False
         free = self._plan.clearance(x, y, heading, no_more_than=LOOK_AHEAD_M)
         if free == 0.0 and self._free_m > 0.0:
-            return True
+            if not self._push(x, y, heading):
+                return True
+            self._contacts.update(touching=True, steps=0)
+            free = self._plan.clearance(x, y, heading, no_more_than=LOOK_AHEAD_M)
         self._free_m = free
         return False
+
+    def _push(self, x: float, y: float, heading: float) -> bool:
+        """Push what is in the way; tell whether all of it went."""
+        names = self._plan.touched(x, y, heading)
+        things = [item for item in self._plan.obstacles if item.name in names and item.mass_kg > 0]
+        resistance_n = sum(item.mass_kg * item.friction * GRAVITY_MPS2 for item in things)
+        if len(things) < len(names) or resistance_n > self._push_n:
+            return False
+        if not all(self._plan.push(item.name, x, y, heading) for item in things):
+            return False
+        self._moved_things |= dict.fromkeys(item.name for item in things)
+        return True
+
+    def _walk(self) -> None:
+        """Put everything that walks where it is by now."""
+        for name, (since, walker) in self._walkers.items():
+            x, y, heading = walker.pose_at((self._steps - since) * _DT_S)
+            self._plan.move(name, x, y, heading)
+            self._moved_things[name] = None
+        self._changed()
+
+    def _put(self, obstacle: Obstacle) -> None:
+        """Put a thing into the plan; one that walks begins at its first point, now."""
+        self._plan.place(obstacle)
+        if obstacle.walk is not None:
+            walker = Walker(obstacle.walk)
+            self._walkers[obstacle.name] = (self._steps, walker)
+            self._plan.move(obstacle.name, *walker.pose_at(0.0))
 
     def _changed(self) -> None:
         """Prepare for a plan that is another one now."""
         self._blocked_at = None
-        height = self._parameters.sonar_height_m
-        self._echoing = [Footprint(item) for item in self._plan.obstacles if item.stands_in(height, height)]
         self._free_m = self._plan.clearance(self._x, self._y, self._heading, no_more_than=LOOK_AHEAD_M)
 
     def ranges(self, numbers: Sequence[int]) -> list[float]:
@@ -146,16 +197,26 @@ class KinematicBody:
         return [self._range(number) for number in numbers]
 
     def _range(self, number: int) -> float:
+        x, y, rays = self._fan(number)
+        return reading(min(cast(self._heard(x, y, rays), x, y, rays, self._longest_m)), self._parameters)
+
+    def echoes(self, numbers: Sequence[int]) -> list[list[Echo]]:
+        """Return what each ray of some sonar meets, with the angle at which it meets it."""
+        found = []
+        for number in numbers:
+            x, y, rays = self._fan(number)
+            found.append(echoes(self._heard(x, y, rays), x, y, rays, self._longest_m))
+        return found
+
+    def _fan(self, number: int) -> tuple[float, float, list[Direction]]:
+        """Return where a sonar is and the directions of its rays, the rightmost first."""
         cone, c, s = self._cones[number], math.cos(self._heading), math.sin(self._heading)
         x, y = self._x + cone.x_m * c - cone.y_m * s, self._y + cone.x_m * s + cone.y_m * c
-        longest = self._parameters.sonar_range_m
-        near = [thing for thing in self._echoing if math.hypot(thing.x - x, thing.y - y) - thing.reach < longest]
-        nearest = longest
-        for offset in cone.headings_rad:
-            dx, dy = math.cos(self._heading + offset), math.sin(self._heading + offset)
-            for thing in near:
-                nearest = min(nearest, thing.hit(x, y, dx, dy))
-        return reading(nearest, self._parameters)
+        return x, y, [(dx * c - dy * s, dx * s + dy * c) for dx, dy in cone.directions]
+
+    def _heard(self, x: float, y: float, rays: Sequence[Direction]) -> Sequence[Footprint]:
+        xs, ys = [x, *(x + self._longest_m * dx for dx, _ in rays)], [y, *(y + self._longest_m * dy for _, dy in rays)]
+        return self._plan.heard_within(min(xs), min(ys), max(xs), max(ys))
 
     def clearance(self) -> float:
         """Return the distance from the hull to the nearest thing that it could touch, metres."""
@@ -163,18 +224,25 @@ class KinematicBody:
 
     def place(self, obstacle: Obstacle) -> None:
         """Put an obstacle with a new name into the world."""
-        self._plan.place(obstacle)
+        self._put(obstacle)
         self._changed()
 
     def move(self, name: str, x_m: float, y_m: float, heading_rad: float) -> None:
-        """Put an obstacle somewhere else."""
+        """Put an obstacle somewhere else; one that walks stays there."""
+        self._walkers.pop(name, None)
         self._plan.move(name, x_m, y_m, heading_rad)
         self._changed()
 
     def remove(self, name: str) -> None:
         """Take an obstacle out of the world."""
         self._plan.remove(name)
+        self._walkers.pop(name, None)
         self._changed()
+
+    def take_moved(self) -> list[Obstacle]:
+        """Return what has walked or was pushed since this was asked last, where it is now."""
+        moved, self._moved_things = self._moved_things, {}
+        return [item for item in self._plan.obstacles if item.name in moved]
 
     def snapshot(self) -> object:
         """Return all that decides the future."""
@@ -186,12 +254,19 @@ class KinematicBody:
             "free_m": self._free_m,
             "contacts": self._contacts.snapshot(),
             "obstacles": self._plan.obstacles,
+            "steps": self._steps,
+            "walking": {name: since for name, (since, _) in self._walkers.items()},
+            "moved": tuple(self._moved_things),
         }
 
     def restore(self, snapshot: object) -> None:
         """Put back what `snapshot` returned."""
         assert isinstance(snapshot, dict)  # noqa: S101  # our own value
-        self._plan = Plan(snapshot["obstacles"], self._parameters.body)
+        self._plan = Plan(snapshot["obstacles"], self._parameters, self._static)
+        self._steps = snapshot["steps"]
+        self._moved_things = dict.fromkeys(snapshot["moved"])
+        walks = {item.name: item.walk for item in self._plan.obstacles if item.walk is not None}
+        self._walkers = {name: (since, Walker(walks[name])) for name, since in snapshot["walking"].items()}
         self._x, self._y, self._heading = snapshot["pose"]
         self._left_angle, self._right_angle, self._left, self._right = snapshot["wheels"]
         self._asked, self._stalled = snapshot["asked"], snapshot["stalled"]

@@ -20,21 +20,22 @@ class Cone:
 
     x_m: float
     y_m: float
+    #: The rightmost first.
     headings_rad: tuple[float, ...]
+    #: The same as unit vectors.
+    directions: tuple[tuple[float, float], ...]
 
 
 def cones(parameters: RobotParameters) -> tuple[Cone, ...]:
     """Return the cone of each fitted sonar, number 0 first."""
     half = math.radians(parameters.sonar_cone_deg) / 2
     fan = [half * (2 * ray / (RAYS_PER_CONE - 1) - 1) for ray in range(RAYS_PER_CONE)]
-    return tuple(
-        Cone(
-            pose.x_mm / 1000,
-            pose.y_mm / 1000,
-            tuple(math.radians(pose.heading_deg) + offset for offset in fan),
-        )
-        for pose in parameters.sonar[: parameters.sonar_fitted]
-    )
+    found = []
+    for pose in parameters.sonar[: parameters.sonar_fitted]:
+        headings = tuple(math.radians(pose.heading_deg) + offset for offset in fan)
+        directions = tuple((math.cos(heading), math.sin(heading)) for heading in headings)
+        found.append(Cone(pose.x_mm / 1000, pose.y_mm / 1000, headings, directions))
+    return tuple(found)
 
 
 def reading(nearest_m: float, parameters: RobotParameters) -> float:

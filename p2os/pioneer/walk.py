@@ -54,25 +54,41 @@ class Walk:
             raise WorldError("a path that loops must not name its first point again at its end")
 
     def pose_at(self, seconds: float) -> tuple[float, float, float]:
-        """Return x and y in metres and the heading of the leg in radians.
+        """Return x and y in metres and the heading of the leg in radians, so many seconds after its placing."""
+        return Walker(self).pose_at(seconds)
 
-        Args:
-            seconds: Since the thing was put there.
-        """
-        points = self._round_trip()
-        ends = tuple(accumulate(math.dist(first, second) for first, second in pairwise(points)))
-        gone = max(0.0, seconds - self.start_s) * self.speed_mps
-        gone = min(gone, ends[-1]) if self.repeat is Repeat.ONCE else gone % ends[-1]
-        leg = min(bisect_right(ends, gone), len(ends) - 1)
-        (ax, ay), (bx, by) = points[leg], points[leg + 1]
-        begin = ends[leg - 1] if leg else 0.0
-        share = (gone - begin) / (ends[leg] - begin)
-        return ax + (bx - ax) * share, ay + (by - ay) * share, math.atan2(by - ay, bx - ax)
-
-    def _round_trip(self) -> tuple[Point, ...]:
+    def round_trip(self) -> tuple[Point, ...]:
         """Return every point passed until the same begins again."""
         if self.repeat is Repeat.LOOP:
             return (*self.points_m, self.points_m[0])
         if self.repeat is Repeat.BACK_AND_FORTH:
             return (*self.points_m, *self.points_m[-2::-1])
         return self.points_m
+
+
+class Walker:
+    """A walk, prepared to be asked often."""
+
+    __slots__ = ("_ends", "_headings", "_points", "_walk")
+
+    def __init__(self, walk: Walk) -> None:
+        self._walk = walk
+        self._points = walk.round_trip()
+        legs = list(pairwise(self._points))
+        self._ends = tuple(accumulate(math.dist(first, second) for first, second in legs))
+        self._headings = tuple(math.atan2(second[1] - first[1], second[0] - first[0]) for first, second in legs)
+
+    def pose_at(self, seconds: float) -> tuple[float, float, float]:
+        """Return x and y in metres and the heading of the leg in radians.
+
+        Args:
+            seconds: Since the thing was put there.
+        """
+        walk, ends = self._walk, self._ends
+        gone = max(0.0, seconds - walk.start_s) * walk.speed_mps
+        gone = min(gone, ends[-1]) if walk.repeat is Repeat.ONCE else gone % ends[-1]
+        leg = min(bisect_right(ends, gone), len(ends) - 1)
+        (ax, ay), (bx, by) = self._points[leg], self._points[leg + 1]
+        begin = ends[leg - 1] if leg else 0.0
+        share = (gone - begin) / (ends[leg] - begin)
+        return ax + (bx - ax) * share, ay + (by - ay) * share, self._headings[leg]

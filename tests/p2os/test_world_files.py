@@ -23,7 +23,7 @@ ROOM = files("p2os.pioneer.worlds").joinpath("room.toml").read_text(encoding="ut
 def test_a_shipped_world_leaves_its_start_free(name: str) -> None:
     world = load_world(name, 3)
     start = world.start
-    assert Plan(world.obstacles, P2DX.body).clearance(start.x_m, start.y_m, start.heading_rad) > 0.5
+    assert Plan.of_world(world, P2DX).clearance(start.x_m, start.y_m, start.heading_rad) > 0.5
     x0, y0, x1, y1 = world.extent
     assert all(x0 < item.x_m < x1 and y0 < item.y_m < y1 for item in world.obstacles)
     plain = world.to_plain()
@@ -138,7 +138,7 @@ def distance_to(thing: Footprint, x: float, y: float) -> float:
     """Distance of a point by rays all round: 0 inside."""
     if not thing.polygon:
         return max(0.0, math.hypot(x - thing.x, y - thing.y) - thing.radius)
-    edges = thing.edges
+    edges = [((ax, ay), (ax + ex, ay + ey)) for ax, ay, ex, ey in thing.edges]
     if all((x - ax) * (by - ay) - (y - ay) * (bx - ax) <= 0 for (ax, ay), (bx, by) in edges):
         return 0.0
     nearest = math.inf

@@ -26,7 +26,7 @@ def test_a_made_world_loads_back_equal_and_leaves_its_start_free(kind: str) -> N
         world = make_world(kind, seed)
         assert parse_world(write_world(world), "made.toml") == world == make_world(kind, seed)
         start = world.start
-        assert Plan(world.obstacles, P2DX.body).clearance(start.x_m, start.y_m, start.heading_rad) > 0.5
+        assert Plan.of_world(world, P2DX).clearance(start.x_m, start.y_m, start.heading_rad) > 0.5
     assert make_world(kind, 0) != make_world(kind, 1)
 
 

@@ -9,10 +9,15 @@ import math
 from p2os.parameters import RobotParameters
 from p2os.pioneer.bullet.engine import pybullet
 from p2os.pioneer.scenery import Kind, Obstacle, Pose, World
+from p2os.pioneer.static_plan import Bands
 
 #: Links of the robot.
 LEFT, RIGHT, CASTER = 0, 1, 2
 OBSTACLE_GROUP, FLOOR_GROUP, WHEEL_GROUP, HULL_GROUP = 16, 2, 4, 8
+#: Things that can be pushed, and things that pass under the hull and stop wheels.
+PUSHED_GROUP, LOW_GROUP = 32, 64
+#: What a ray may meet.
+HEARD = OBSTACLE_GROUP | FLOOR_GROUP | PUSHED_GROUP | LOW_GROUP
 #: The group that Bullet gives its rays.
 RAY_GROUP = 1
 FLOOR_THICKNESS_M = 0.5
@@ -38,29 +43,71 @@ def add_floor(world: World, client: int) -> int:
     return _static_box(half, place, LEVEL, FLOOR_GROUP, client)
 
 
-def add_obstacle(item: Obstacle, client: int) -> int:
+def add_obstacle(item: Obstacle, bands: Bands, client: int) -> int:
     """Make an obstacle, a raised floor or a ramp; return its number."""
-    group = FLOOR_GROUP if item.kind.is_driven_on else OBSTACLE_GROUP
+    group = group_of(item, bands)
     place, turn = _pose(item)
+    if group == PUSHED_GROUP:
+        return _pushed(item, place, turn, client)
     if item.kind is Kind.RAMP:
         length = math.hypot(item.length_m, item.height_m)
         return _static_box((length / 2, item.width_m / 2, FLOOR_THICKNESS_M / 2), place, turn, group, client)
     if not item.is_cylinder:
         return _static_box((item.length_m / 2, item.width_m / 2, item.height_m / 2), place, turn, group, client)
-    shape = pybullet.createCollisionShape(
-        pybullet.GEOM_CYLINDER, radius=item.radius_m, height=item.height_m, physicsClientId=client
+    return make_static(_shape(item, client), place, turn, group, client)
+
+
+def group_of(item: Obstacle, bands: Bands) -> int:
+    """Return what an obstacle meets: sills and floors the wheels alone, low things too, and all else the hull."""
+    if item.kind.is_driven_on or bands.is_sill(item):
+        return FLOOR_GROUP
+    if item.mass_kg > 0:
+        return PUSHED_GROUP
+    return LOW_GROUP if bands.stops_wheels(item) else OBSTACLE_GROUP
+
+
+def _shape(item: Obstacle, client: int) -> int:
+    if item.is_cylinder:
+        return int(
+            pybullet.createCollisionShape(
+                pybullet.GEOM_CYLINDER, radius=item.radius_m, height=item.height_m, physicsClientId=client
+            )
+        )
+    half = (item.length_m / 2, item.width_m / 2, item.height_m / 2)
+    return int(pybullet.createCollisionShape(pybullet.GEOM_BOX, halfExtents=half, physicsClientId=client))
+
+
+def _pushed(item: Obstacle, place: Vector, turn: tuple[float, ...], client: int) -> int:
+    """Make a thing that can be pushed; its inertia is that of its shape."""
+    number = int(
+        pybullet.createMultiBody(
+            baseMass=item.mass_kg,
+            baseCollisionShapeIndex=_shape(item, client),
+            basePosition=place,
+            baseOrientation=turn,
+            physicsClientId=client,
+        )
     )
-    return _static(shape, place, turn, group, client)
+    pybullet.changeDynamics(
+        number, -1, lateralFriction=item.friction, linearDamping=0.0, angularDamping=0.0,
+        activationState=pybullet.ACTIVATION_STATE_DISABLE_SLEEPING, physicsClientId=client,
+    )  # fmt: skip
+    mask = RAY_GROUP | HULL_GROUP | OBSTACLE_GROUP | FLOOR_GROUP | PUSHED_GROUP
+    pybullet.setCollisionFilterGroupMask(number, -1, PUSHED_GROUP, mask, physicsClientId=client)
+    return number
 
 
 def move_obstacle(number: int, item: Obstacle, client: int) -> None:
     """Put an obstacle where it stands now."""
     place, turn = _pose(item)
     pybullet.resetBasePositionAndOrientation(number, place, turn, physicsClientId=client)
+    if item.mass_kg > 0:
+        pybullet.resetBaseVelocity(number, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0), physicsClientId=client)
 
 
 def park_obstacle(number: int, client: int) -> None:
-    """Put an obstacle where nothing meets it."""
+    """Put an obstacle where nothing meets it, and where it does not fall."""
+    pybullet.changeDynamics(number, -1, mass=0.0, physicsClientId=client)
     pybullet.resetBasePositionAndOrientation(number, (0.0, 0.0, PARKED_M), LEVEL, physicsClientId=client)
 
 
@@ -82,10 +129,11 @@ def _pose(item: Obstacle) -> tuple[Vector, tuple[float, ...]]:
 
 def _static_box(half: Vector, place: Vector, turn: tuple[float, ...], group: int, client: int) -> int:
     shape = pybullet.createCollisionShape(pybullet.GEOM_BOX, halfExtents=half, physicsClientId=client)
-    return _static(shape, place, turn, group, client)
+    return make_static(shape, place, turn, group, client)
 
 
-def _static(shape: int, place: Vector, turn: tuple[float, ...], group: int, client: int) -> int:
+def make_static(shape: int, place: Vector, turn: tuple[float, ...], group: int, client: int) -> int:
+    """Make a body that never moves by itself; return its number."""
     # Plain rigid bodies: as articulated ones, each would cost time in every step.
     number = pybullet.createMultiBody(
         baseMass=0,
@@ -98,7 +146,7 @@ def _static(shape: int, place: Vector, turn: tuple[float, ...], group: int, clie
     friction = FLOOR_FRICTION if group == FLOOR_GROUP else OBSTACLE_FRICTION
     pybullet.changeDynamics(number, -1, lateralFriction=friction, physicsClientId=client)
     pybullet.setCollisionFilterGroupMask(
-        number, -1, group, RAY_GROUP | WHEEL_GROUP | HULL_GROUP, physicsClientId=client
+        number, -1, group, RAY_GROUP | WHEEL_GROUP | HULL_GROUP | PUSHED_GROUP, physicsClientId=client
     )
     return int(number)
 
@@ -149,6 +197,6 @@ def add_robot(parameters: RobotParameters, pose: Pose, client: int) -> tuple[int
             physicsClientId=client,
         )  # fmt: skip
         group = HULL_GROUP if link < 0 else WHEEL_GROUP
-        mask = OBSTACLE_GROUP | FLOOR_GROUP if link < 0 else FLOOR_GROUP
+        mask = OBSTACLE_GROUP | FLOOR_GROUP | PUSHED_GROUP if link < 0 else FLOOR_GROUP | LOW_GROUP
         pybullet.setCollisionFilterGroupMask(robot, link, group, mask, physicsClientId=client)
     return int(robot), centre
