@@ -7,33 +7,23 @@ ports, and tells of faults and warnings. The board itself: 8 MHz crystal,
 Invariant: results do not depend on how the caller cuts time into slices.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 
 from bluepill_sim.chip import Chip
 from bluepill_sim.cpu import GENERAL, Register
+from bluepill_sim.durations import Span
 from bluepill_sim.errors import UnmodelledError
 from bluepill_sim.faults import FAULT_ROWS, FaultKind, FaultReport
 from bluepill_sim.image import Image, load_image
 from bluepill_sim.memory import Memory
 from bluepill_sim.pins import Pin, PinDrive
 from bluepill_sim.rcc import ResetCause
+from bluepill_sim.serial_port import Activity, SerialPort
 from bluepill_sim.stm32f103 import FLASH_BASE
 from bluepill_sim.timing import Nanos, Reached
-from bluepill_sim.usart import Usart
-
-
-@dataclass(slots=True)
-class Activity:
-    """When the firmware was last seen alive, in ns; 0 before the first time."""
-
-    #: The last change of what the chip puts on any pin.
-    last_pin_ns: Nanos = 0
-    #: The end of the last character sent on any USART.
-    last_usart_ns: Nanos = 0
-    #: The last time the core went to sleep.
-    last_wfi_ns: Nanos = 0
+from bluepill_sim.waiting import Condition, run_for, until, wait_for_bytes
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,14 +34,17 @@ class BoardSnapshot:
     fault: FaultReport | None
     activity: tuple[Nanos, Nanos, Nanos]
     warned: tuple[tuple[str, str], ...]
+    #: What each USART has sent and nobody has taken.
+    unread: tuple[bytes, ...]
 
 
 class BluePill:
     """An emulated BluePill.
 
     >>> board = BluePill("firmware.elf")                # doctest: +SKIP
-    >>> board.usart1.on_transmit = lambda byte, at_ns: print(chr(byte), end="")  # doctest: +SKIP
-    >>> board.advance_to(1_000_000_000)                 # doctest: +SKIP
+    >>> board.usart1.expect(b"ready", within="5 s")     # doctest: +SKIP
+    >>> board.pin("PA4").drive(1)                       # doctest: +SKIP
+    >>> board.until("pin PC13 low", timeout="100 ms")   # doctest: +SKIP
 
     Raises:
         ImageError: the firmware is missing, damaged, or not for this chip.
@@ -82,7 +75,9 @@ class BluePill:
         self._chip: Chip | None = None
         self._chip = chip = Chip(memory, self.image.vector_table, self._warn, self._fault)
         self._activity = Activity()
-        self._usarts = tuple(SerialPort(chip.parts.usart(n), self._activity) for n in (1, 2, 3))
+        #: More of the same: tools that look on.
+        self.pin_listeners: list[Callable[[str, PinDrive, Nanos], None]] = []
+        self._usarts = tuple(SerialPort(chip.parts.usart(n), self._activity, self._wait) for n in (1, 2, 3))
         chip.pins.on_output = self._pin_changed
         chip.pins["PC13"].board_pull = PinDrive.PULL_UP
         chip.pins["PB2"].board_pull = PinDrive.PULL_DOWN
@@ -120,6 +115,28 @@ class BluePill:
         """
         return self._live.advance_to(limit_ns)
 
+    def run_for(self, span: Span) -> Reached:
+        """Run for a span of virtual time, such as "10 ms" or nanoseconds; a halt ends it early."""
+        return run_for(self, span)
+
+    def until(self, condition: Condition, timeout: Span = "1 s") -> Nanos:
+        """Run until a condition holds; return when that was.
+
+        Args:
+            condition: "pin PA4 high" (low, changes), "usart1 sends TEXT", "asleep", "awake", "fault",
+                each met to the basic block; or a function of the board, looked at each millisecond.
+            timeout: the longest wait, in virtual time.
+
+        Raises:
+            WaitError: the time is over, or the core halted for good.
+            BluePillError: the words are not understood.
+        """
+        return until(self, condition, timeout)
+
+    def request_stop(self) -> None:
+        """End the running `advance_to` at the border of the running block."""
+        self._live.request_stop()
+
     def reset(self) -> None:
         """Press the reset button: time and the outside of the pins stay as they are."""
         self._live.reset(ResetCause.PIN)
@@ -139,19 +156,39 @@ class BluePill:
         return self._live.pins[name]
 
     @property
-    def usart1(self) -> "SerialPort":
+    def pins(self) -> tuple[Pin, ...]:
+        """Every pin that has a leg, in the order of the ports."""
+        return tuple(pin for pin in self._live.pins if pin.is_bonded)
+
+    @property
+    def led_is_on(self) -> bool:
+        """Whether the green LED shines: it hangs between 3.3 V and PC13, so a strong low lights it."""
+        return self.pin("PC13").output is PinDrive.LOW
+
+    @property
+    def usart1(self) -> SerialPort:
         """USART1: TX on PA9, RX on PA10."""
         return self._usarts[0]
 
     @property
-    def usart2(self) -> "SerialPort":
+    def usart2(self) -> SerialPort:
         """USART2: TX on PA2, RX on PA3."""
         return self._usarts[1]
 
     @property
-    def usart3(self) -> "SerialPort":
+    def usart3(self) -> SerialPort:
         """USART3: TX on PB10, RX on PB11."""
         return self._usarts[2]
+
+    @property
+    def serial_ports(self) -> Mapping[str, SerialPort]:
+        """The USARTs by name: "usart1" to "usart3"."""
+        return {port.name.lower(): port for port in self._usarts}
+
+    @property
+    def chip(self) -> Chip:
+        """The chip itself, for tools that look on."""
+        return self._live
 
     # What the firmware is up to.
 
@@ -198,6 +235,7 @@ class BluePill:
             self.fault,
             (activity.last_pin_ns, activity.last_usart_ns, activity.last_wfi_ns),
             tuple(self._warned.items()),
+            tuple(bytes(port.unread) for port in self._usarts),
         )
 
     def restore(self, snapshot: object) -> None:
@@ -212,6 +250,8 @@ class BluePill:
         self.fault = snapshot.fault
         self._activity.last_pin_ns, self._activity.last_usart_ns, self._activity.last_wfi_ns = snapshot.activity
         self._warned = dict(snapshot.warned)
+        for port, unread in zip(self._usarts, snapshot.unread, strict=True):
+            port.unread[:] = unread
 
     # What the chip tells.
 
@@ -225,6 +265,11 @@ class BluePill:
         self._activity.last_pin_ns = at_ns
         if self.on_pin is not None:
             self.on_pin(name, drive, at_ns)
+        for listener in self.pin_listeners:
+            listener(name, drive, at_ns)
+
+    def _wait(self, port: SerialPort, pattern: bytes, within: Span) -> None:
+        wait_for_bytes(self, port, pattern, within)
 
     def _warn(self, message: str, once: str, pc: int) -> None:
         if once in self._warned:
@@ -260,23 +305,3 @@ class BluePill:
             at_ns=self._chip.now_ns,
             is_lockup=is_lockup,
         )
-
-
-class SerialPort:
-    """A USART of the board, seen from outside."""
-
-    def __init__(self, usart: Usart, activity: Activity) -> None:
-        self._usart = usart
-        self._activity = activity
-        #: Called with (word, ns) at the end of each stop bit that goes out.
-        self.on_transmit: Callable[[int, Nanos], None] | None = None
-        usart.on_transmit = self._transmitted
-
-    def receive(self, data: bytes) -> None:
-        """Send characters to the RX pin, at the speed of the line."""
-        self._usart.receive(data)
-
-    def _transmitted(self, word: int, at_ns: Nanos) -> None:
-        self._activity.last_usart_ns = at_ns
-        if self.on_transmit is not None:
-            self.on_transmit(word, at_ns)

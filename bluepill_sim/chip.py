@@ -59,6 +59,8 @@ class Chip:
         self._on_warning = on_warning
         self.clocks = Clocks()
         self._clock = CycleClock(self.clocks.hclk_hz)
+        #: Called with (line, level, ns) at every change of an interrupt line; tools look on.
+        self.irq_listeners: list[Callable[[int, bool, Nanos], None]] = []
         #: Time of the event that a peripheral is acting on, while it does.
         self._event_ns: Nanos | None = None
         self._stop_requested = False
@@ -137,12 +139,17 @@ class Chip:
 
     def set_irq(self, irq: int, level: bool) -> None:
         """Set the level of an interrupt line."""
+        for listener in self.irq_listeners:
+            listener(irq, level, self.now_ns)
         self.processor.nvic.set_level(irq, level)
         if level:
             self.processor.pending_changed()
 
     def pulse_irq(self, irq: int) -> None:
         """Make an interrupt pending once."""
+        for listener in self.irq_listeners:
+            listener(irq, True, self.now_ns)
+            listener(irq, False, self.now_ns)
         self.processor.pend(16 + irq)
 
     def clock_changed(self) -> None:

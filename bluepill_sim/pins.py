@@ -13,9 +13,11 @@ from collections.abc import Callable, Iterator
 from enum import Enum
 from typing import Protocol, Self, TypeAlias
 
-#: Level of the outside driver, mode, ODR bit, holder (owner, drive), connections, watched.
+from bluepill_sim.electrical import RAILS, contention, overvoltage, short_circuit
+
+#: Level of the outside driver, mode, ODR bit, holder (owner, drive), connections, watched, output, level, rail.
 PinSnapshot: TypeAlias = tuple[
-    bool | None, str, bool, tuple[str, str] | None, tuple[tuple[str, bool], ...], bool, str, bool
+    bool | None, str, bool, tuple[str, str] | None, tuple[tuple[str, bool], ...], bool, str, bool, str | None
 ]
 
 
@@ -79,6 +81,10 @@ _MODES_BY_VALUE = {mode.value: mode for mode in PinMode}
 class PinPorts(Protocol):
     """What the pins need of the chip."""
 
+    def warn(self, message: str, *, once: str) -> None:
+        """Warn once for each key."""
+        ...
+
     @property
     def now_ns(self) -> int:
         """The exact time of what is happening now."""
@@ -92,13 +98,17 @@ class PinPorts(Protocol):
 class Pin:
     """One pin of one port, seen from outside (`drive`, `level`, `output`, `watch`) and from inside."""
 
-    def __init__(self, bank: "PinBank", port: str, number: int, *, is_bonded: bool) -> None:
+    def __init__(
+        self, bank: "PinBank", port: str, number: int, *, is_bonded: bool, is_five_volt_tolerant: bool = False
+    ) -> None:
         self._bank = bank
         self.port = port
         self.number = number
         self.name = f"P{port}{number}"
         #: Whether the package has a leg for it.
         self.is_bonded = is_bonded
+        #: Whether it bears 5 V as an input without a pull (DS5319 table 5, "FT").
+        self.is_five_volt_tolerant = is_five_volt_tolerant
         #: What the board hangs on the pin: PULL_UP, PULL_DOWN or NONE.
         self.board_pull = PinDrive.NONE
         #: What the chip itself puts on the wire.
@@ -112,6 +122,7 @@ class Pin:
         #: Called at every change of `input`, in the order of subscription (GPIO's IDR, EXTI).
         self.listeners: list[Callable[[Pin], None]] = []
         self._outside: bool | None = None
+        self._rail: str | None = None
         self._mode = PinMode.FLOATING
         self._output_bit = False
         self._holder: tuple[str, PinDrive] | None = None
@@ -123,17 +134,39 @@ class Pin:
 
     # From outside the chip.
 
-    def drive(self, level: bool | None) -> None:
-        """Put a level on the wire from outside; None lets go.
+    def drive(self, level: bool | int | None, *, volts: float | None = None) -> None:
+        """Put a level (False, True, or 0, 1) on the wire from outside; None lets go.
+
+        Args:
+            level: What the other end drives.
+            volts: How high a 1 is; None is 3.3 V. More than the pin bears is warned of.
 
         Raises:
             ValueError: The package has no leg for this pin.
         """
         if not self.is_bonded:
             raise ValueError(f"{self.name} is not bonded out on this package")
-        if level is not self._outside:
-            self._outside = level
+        complaint = overvoltage(self, volts) if volts is not None and level else None
+        if complaint is not None:
+            self._bank.warn(complaint, once=f"{self.name}:volts")
+        outside = None if level is None else bool(level)
+        if outside is not self._outside:
+            self._outside = outside
             self._resolve()
+
+    def short(self, rail: str | None) -> None:
+        """Tie the wire to a supply rail, as a solder bridge does; None cuts it again.
+
+        Args:
+            rail: "GND" or "3V3".
+
+        Raises:
+            ValueError: There is no such rail.
+        """
+        if rail is not None and rail not in RAILS:
+            raise ValueError(f"no such rail: {rail!r}; a wire can be shorted to {' or '.join(RAILS)}")
+        self._rail = rail
+        self._resolve()
 
     def watch(self, on: bool = True) -> None:
         """Choose whether a change of the chip's own drive ends the CPU's slice."""
@@ -147,12 +180,20 @@ class Pin:
     @property
     def is_floating(self) -> bool:
         """Whether nobody drives or pulls the wire."""
-        return self.output is PinDrive.NONE and self._outside is None and self.board_pull is PinDrive.NONE
+        is_driven = self._outside is not None or self._rail is not None
+        return self.output is PinDrive.NONE and not is_driven and self.board_pull is PinDrive.NONE
 
     @property
     def is_contended(self) -> bool:
         """Whether chip and outside world drive the wire to different levels."""
-        return self.output.is_strong and self._outside is not None and self.output.level is not self._outside
+        outside = self._outside if self._rail is None else RAILS[self._rail]
+        return self.output.is_strong and outside is not None and self.output.level is not outside
+
+    @property
+    def function(self) -> str | None:
+        """The alternate function that the wire shows, such as "USART1_TX"; None for none."""
+        source = min(self._sources, default=None)
+        return source if source is not None and self.carries(source) else None
 
     # From inside the chip.
 
@@ -223,11 +264,13 @@ class Pin:
             self.is_watched,
             self.output.value,
             self.level,
+            self._rail,
         )
 
     def restore(self, snapshot: PinSnapshot) -> None:
         """Put back what `snapshot` returned; tells nobody."""
-        self._outside, mode, self._output_bit, holder, sources, self.is_watched, output, self.level = snapshot
+        self._outside, mode, self._output_bit, holder, sources, self.is_watched, output, self.level, rail = snapshot
+        self._rail = rail
         self._mode = _MODES_BY_VALUE[mode]
         self._holder = None if holder is None else (holder[0], _DRIVES_BY_VALUE[holder[1]])
         self._sources = dict(sources)
@@ -264,7 +307,12 @@ class Pin:
     def _resolve(self) -> None:
         """Bring `level` and `input` up to date and tell the listeners of a change of the input."""
         output, outside = self.output, self._outside
-        if outside is None:
+        level: bool
+        if self._rail is not None:
+            level = RAILS[self._rail]
+            if output.is_strong and output.level is not level:
+                self._bank.warn(short_circuit(self, self._rail), once=f"{self.name}:short")
+        elif outside is None:
             # A weak pull of the chip is stronger than the board's (40 kΩ against an LED or 100 kΩ).
             level = output.level
             if level is None:
@@ -272,6 +320,8 @@ class Pin:
         elif output.is_strong:
             # Chosen: of two strong drivers that differ the low one wins.
             level = outside and bool(output.level)
+            if level is not outside or level is not output.level:
+                self._bank.warn(contention(self), once=f"{self.name}:contention")
         else:
             level = outside
         self.level = level
@@ -280,6 +330,8 @@ class Pin:
             self.input = seen
             for listener in self.listeners:
                 listener(self)
+        if self._bank.wire_listeners:
+            self._bank.wire_changed(self)
 
 
 class PinBank:
@@ -287,16 +339,21 @@ class PinBank:
 
     PORTS = "ABCDE"
 
-    def __init__(self, ports: PinPorts, bonded: frozenset[str]) -> None:
+    def __init__(
+        self, ports: PinPorts, bonded: frozenset[str], five_volt_tolerant: frozenset[str] = frozenset()
+    ) -> None:
         """Make the pins.
 
         Args:
             ports: The chip.
             bonded: Names of the pins that the package has legs for, such as "PA4".
+            five_volt_tolerant: Names of those that bear 5 V.
         """
         self._ports = ports
+        #: Called with (pin, time in ns) whenever something on a wire may have changed; tools look on.
+        self.wire_listeners: list[Callable[[Pin, int], None]] = []
         self._pins = {
-            port: tuple(Pin(self, port, n, is_bonded=f"P{port}{n}" in bonded) for n in range(16)) for port in self.PORTS
+            port: tuple(self._make(port, n, bonded, five_volt_tolerant) for n in range(16)) for port in self.PORTS
         }
         self._by_name = {pin.name: pin for pins in self._pins.values() for pin in pins}
         #: Called with (pin name, drive, time in ns) at every change of the chip's own drive.
@@ -335,6 +392,20 @@ class PinBank:
             self.on_output(pin.name, pin.output, self._ports.now_ns)
         if pin.is_watched:
             self._ports.request_stop()
+
+    def wire_changed(self, pin: Pin) -> None:
+        """Tell the tools that a pin's wire may have changed (called by the pin)."""
+        now_ns = self._ports.now_ns
+        for listener in self.wire_listeners:
+            listener(pin, now_ns)
+
+    def warn(self, message: str, *, once: str) -> None:
+        """Warn of something electrical."""
+        self._ports.warn(message, once=once)
+
+    def _make(self, port: str, number: int, bonded: frozenset[str], tolerant: frozenset[str]) -> Pin:
+        name = f"P{port}{number}"
+        return Pin(self, port, number, is_bonded=name in bonded, is_five_volt_tolerant=name in tolerant)
 
     def snapshot(self) -> tuple[tuple[PinSnapshot, ...], tuple[tuple[str, int], ...], tuple[str, ...]]:
         """Return all that decides the pins' future, as plain values."""

@@ -38,6 +38,8 @@ IRQ_COUNT = 43
 BONDED_PINS = frozenset(
     [f"PA{n}" for n in range(16)] + [f"PB{n}" for n in range(16)] + ["PC13", "PC14", "PC15", "PD0", "PD1"]
 )
+#: Pins that bear 5 V (DS5319 table 5, column "FT").
+FIVE_VOLT_PINS = frozenset([f"PA{n}" for n in range(8, 16)] + [f"PB{n}" for n in (2, 3, 4, *range(6, 16))])
 
 #: Name of each bit of the enable registers, which is also the bit of the reset registers.
 _GATES = {
@@ -224,7 +226,7 @@ class ChipParts:
 
 def make_pins(chip: PinPorts) -> PinBank:
     """Return the pins of the chip in its 48-pin package."""
-    return PinBank(chip, BONDED_PINS)
+    return PinBank(chip, BONDED_PINS, FIVE_VOLT_PINS)
 
 
 def make_parts(chip: ChipPorts) -> ChipParts:

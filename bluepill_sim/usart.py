@@ -132,6 +132,11 @@ class Usart(Peripheral):
 
     # From outside the chip.
 
+    @property
+    def bit_ns(self) -> int:
+        """How long one bit takes at the present baud rate, in ns; 0 while none is set."""
+        return self._span_ns(2)
+
     def receive(self, data: bytes) -> None:
         """Send characters to the RX pin, at the speed of the line, behind those still on their way."""
         if not self._can_receive():

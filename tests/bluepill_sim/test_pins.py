@@ -21,8 +21,14 @@ class Ports:
     now_ns = 0
     stops = 0
 
+    def __init__(self) -> None:
+        self.warnings: dict[str, str] = {}
+
     def request_stop(self) -> None:
         self.stops += 1
+
+    def warn(self, message: str, *, once: str) -> None:
+        self.warnings.setdefault(once, message)
 
 
 @pytest.fixture

@@ -1,0 +1,19 @@
+"""`p2os mcu`: the emulated BluePill by itself, for those who write firmware."""
+
+import typer
+
+from bluepill_sim.cli import info, pins, run
+
+HELP = """Run, look into and debug a BluePill program, without a robot.
+
+FIRMWARE is an ELF, HEX or BIN file for an STM32F103C8; with debug information
+in the ELF, places are told by symbol and line.
+"""
+
+
+def register(app: typer.Typer) -> None:
+    """Add the verb and what is below it."""
+    mcu = typer.Typer(help=HELP, no_args_is_help=True, rich_markup_mode=None)
+    for module in (run, info, pins):
+        module.register(mcu)
+    app.add_typer(mcu, name="mcu")

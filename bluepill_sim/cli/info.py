@@ -1,0 +1,141 @@
+"""`p2os mcu info`: what a firmware is, and what it touches that is not modelled."""
+
+import json
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from bluepill_sim.board import BluePill
+from bluepill_sim.cli.columns import print_columns
+from bluepill_sim.cli.driving import run_driven
+from bluepill_sim.durations import to_nanos
+from bluepill_sim.image import Image
+from bluepill_sim.sight.elf_file import Layout, layout, stack_top, variables_end, vectors
+from bluepill_sim.stm32f103 import FLASH_BYTES, SRAM_BYTES
+from bluepill_sim.timing import NS_PER_S
+
+HELP = """Tell what a firmware is: sections, sizes, vectors, largest symbols, stack.
+
+It is also run for a moment, to see which things it uses that are not modelled.
+
+\b
+Examples:
+  p2os mcu info mine.elf             all of it
+  p2os mcu info mine.elf --for 10s   look longer for what is not modelled
+  p2os mcu info mine.elf --json      one JSON object
+"""
+
+#: chosen: how many of the largest symbols a person wants to see.
+_SHOWN_SYMBOLS = 12
+
+
+def register(app: typer.Typer) -> None:
+    """Add the command."""
+    app.command("info", help=HELP)(info)
+
+
+def info(
+    firmware: Annotated[Path, typer.Argument(help="ELF, HEX or BIN.", metavar="FIRMWARE")],
+    span: Annotated[str, typer.Option("--for", help="How long it is run; 0s: not at all.", metavar="TIME")] = "500ms",
+    json_output: Annotated[bool, typer.Option("--json", help="Print one JSON object.")] = False,
+) -> None:
+    """Tell what a firmware is."""
+    end_ns = to_nanos(span)
+    board = BluePill(firmware)
+    run_driven(board, end_ns, ())
+    found = facts(board)
+    if json_output:
+        typer.echo(json.dumps(found, sort_keys=True))
+        return
+    _print(board, found)
+
+
+def facts(board: BluePill) -> dict[str, object]:
+    """Return everything that `info` tells, as plain values."""
+    image = board.image
+    lies = layout(image)
+    symbols = sorted((s for s in image.symbols.symbols if s.size), key=lambda s: (-s.size, s.address))
+    return {
+        "file": image.name,
+        "sha256": image.sha256,
+        "flash_bytes": lies.flash_bytes,
+        "sram_bytes": lies.sram_bytes,
+        "stack_top": stack_top(image),
+        "stack_room_bytes": stack_top(image) - variables_end(image),
+        "vector_table": image.vector_table,
+        "sections": [{"name": s.name, "address": s.address, "bytes": s.size} for s in lies.sections],
+        "vectors": [
+            {"number": v.number, "name": v.name, "target": v.target, "handler": _handler(image, v.target)}
+            for v in vectors(image)
+        ],
+        "symbols": [{"name": s.name, "address": s.address, "bytes": s.size} for s in symbols],
+        "ran_s": board.now_ns / NS_PER_S,
+        "warnings": board.warnings,
+        "fault": None if board.fault is None else str(board.fault),
+    }
+
+
+def _print(board: BluePill, found: dict[str, object]) -> None:
+    image = board.image
+    lies = layout(image)
+    typer.echo(f"{image.name}  sha256 {image.sha256[:16]}…")
+    typer.echo(f"flash  {lies.flash_bytes} of {FLASH_BYTES} bytes ({lies.flash_share:.1%})")
+    typer.echo(
+        f"SRAM   {lies.sram_bytes} of {SRAM_BYTES} bytes in variables ({lies.sram_share:.1%}); stack from "
+        f"{stack_top(image):#010x} down, room for {found['stack_room_bytes']} bytes\n"
+    )
+    _print_sections(lies)
+    _print_vectors(image)
+    sized = sorted((s for s in image.symbols.symbols if s.size), key=lambda s: (-s.size, s.address))
+    if sized:
+        rows = [(s.name, str(s.size), f"{s.address:#010x}") for s in sized[:_SHOWN_SYMBOLS]]
+        print_columns(("largest symbols", "bytes", "address"), rows, right=(1,))
+        typer.echo("")
+    ran = f"in {board.now_ns / NS_PER_S:g} s of virtual time"
+    if board.fault is not None:
+        typer.echo(f"it dies {ran}: {board.fault}")
+    for warning in board.warnings:
+        typer.echo(f"not modelled, or odd: {warning}")
+    if not board.warnings and board.fault is None:
+        typer.echo(f"nothing unmodelled was touched {ran}")
+
+
+def _print_sections(lies: Layout) -> None:
+    rows = [
+        (
+            s.name,
+            f"{s.address:#010x}",
+            str(s.size),
+            " and ".join(name for name, there in (("flash", s.in_flash), ("SRAM", s.in_sram)) if there),
+        )
+        for s in lies.sections
+    ]
+    if rows:
+        print_columns(("section", "address", "bytes", "in"), rows, right=(2,))
+        typer.echo("")
+
+
+def _print_vectors(image: Image) -> None:
+    ordinary = _default_handler(image)
+    rows = [
+        (str(v.number), v.name, f"{v.target:#010x}", _handler(image, v.target))
+        for v in vectors(image)
+        if v.target != ordinary
+    ]
+    print_columns(("exception", "", "address", "handler"), rows, right=(0,))
+    if ordinary is not None:
+        others = [v.name for v in vectors(image) if v.target == ordinary]
+        typer.echo(f"the other {len(others)} share {_handler(image, ordinary)} at {ordinary:#010x}")
+    typer.echo("")
+
+
+def _handler(image: Image, target: int) -> str:
+    return image.symbols.where(target).split("+")[0].split(" ")[0]
+
+
+def _default_handler(image: Image) -> int | None:
+    """Return the handler that most vectors share, if at least four do."""
+    targets = [vector.target for vector in vectors(image)]
+    most = max(targets, key=targets.count, default=None)
+    return most if most is not None and targets.count(most) >= 4 else None

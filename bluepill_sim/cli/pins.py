@@ -1,0 +1,107 @@
+"""`p2os mcu pins`: what every pin is, does, and has done."""
+
+import json
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from bluepill_sim.board import BluePill
+from bluepill_sim.cli.columns import print_columns
+from bluepill_sim.cli.driving import parse_changes, run_driven, say, summary, tell_fault, warn_on_stderr
+from bluepill_sim.durations import to_nanos
+from bluepill_sim.sight.probe import Probe
+from bluepill_sim.sight.sigrok import write_sigrok
+from bluepill_sim.sight.vcd import write_vcd
+from bluepill_sim.timing import NS_PER_S
+
+HELP = """Run a firmware for a while, then show each pin: mode, level, who drives it, edges.
+
+With --vcd or --sr the pins are also written as waveforms, with SysTick, the
+interrupt lines, the running exception and the USARTs' characters beside them.
+
+\b
+Examples:
+  p2os mcu pins mine.elf                                  pins in use after one second
+  p2os mcu pins mine.elf --all                            every pin that has a leg
+  p2os mcu pins mine.elf --for 5s --vcd a.vcd --sr a.sr   for GTKWave and PulseView
+  p2os mcu pins mine.elf --drive PA6=1@3.5s               with something on an input
+"""
+
+
+def register(app: typer.Typer) -> None:
+    """Add the command."""
+    app.command("pins", help=HELP)(pins)
+
+
+def pins(
+    firmware: Annotated[Path, typer.Argument(help="ELF, HEX or BIN.", metavar="FIRMWARE")],
+    span: Annotated[str, typer.Option("--for", help="Virtual time, such as 2s or 10ms.", metavar="TIME")] = "1s",
+    drive: Annotated[
+        list[str] | None, typer.Option(help="Put a level on a pin at a time; repeatable.", metavar="PIN=LEVEL@TIME")
+    ] = None,
+    vcd: Annotated[Path | None, typer.Option(help="Write a value change dump.", metavar="FILE")] = None,
+    sr: Annotated[Path | None, typer.Option(help="Write a sigrok session.", metavar="FILE")] = None,
+    every: Annotated[bool, typer.Option("--all", help="Untouched pins too.")] = False,
+    json_output: Annotated[bool, typer.Option("--json", help="Print one JSON object.")] = False,
+) -> None:
+    """Show the pins."""
+    end_ns = to_nanos(span)
+    board = BluePill(firmware)
+    changes = parse_changes(drive or [], board)
+    warn_on_stderr(board)
+    probe = Probe(board, with_signals=vcd is not None or sr is not None)
+    run_driven(board, end_ns, changes)
+    probe.finish()
+    if vcd is not None:
+        write_vcd(probe, vcd)
+    if sr is not None:
+        write_sigrok(probe, sr)
+    rows = [row for row in pin_rows(board, probe) if every or row["used"]]
+    if json_output:
+        typer.echo(json.dumps({"at_s": board.now_ns / NS_PER_S, "pins": rows}, sort_keys=True))
+    else:
+        _print(rows)
+    say(summary(board))
+    if tell_fault(board):
+        raise typer.Exit(1)
+
+
+def pin_rows(board: BluePill, probe: Probe) -> list[dict[str, object]]:
+    """Return what is to be told of each pin that has a leg."""
+    rows: list[dict[str, object]] = []
+    for pin in board.pins:
+        edges = probe.edges.get(pin.name, [])
+        is_untouched = pin.mode.value == "floating input" and pin.driven is None and not edges
+        rows.append(
+            {
+                "pin": pin.name,
+                "mode": pin.mode.value,
+                "function": pin.holder or pin.function or "",
+                "level": "floating" if pin.is_floating else "high" if pin.level else "low",
+                "chip": pin.output.value,
+                "outside": {None: "", True: "high", False: "low"}[pin.driven],
+                "edges": len(edges),
+                "last_edge_s": edges[-1][0] / NS_PER_S if edges else None,
+                "five_volt": pin.is_five_volt_tolerant,
+                "used": not is_untouched or pin.holder is not None,
+            }
+        )
+    return rows
+
+
+def _print(rows: list[dict[str, object]]) -> None:
+    headers = ("pin", "mode", "function", "level", "chip drives", "outside", "edges", "last edge", "5 V")
+    table = []
+    for row in rows:
+        last = row["last_edge_s"]
+        names = ("pin", "mode", "function", "level", "chip", "outside")
+        table.append(
+            (
+                *(str(row[name]) for name in names),
+                str(row["edges"]) if row["edges"] else "",
+                f"{last:.6f} s" if isinstance(last, float) else "",
+                "yes" if row["five_volt"] else "no",
+            )
+        )
+    print_columns(headers, table, right=(6, 7))

@@ -1,0 +1,95 @@
+"""`p2os mcu run`: boots a firmware and shows what it prints."""
+
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from bluepill_sim.board import BluePill
+from bluepill_sim.cli.driving import parse_changes, run_driven, say, summary, tell_fault, warn_on_stderr
+from bluepill_sim.console import connect, open_console
+from bluepill_sim.durations import to_nanos
+from bluepill_sim.timing import NS_PER_MS, NS_PER_S, Nanos, Reached
+
+HELP = """Boot a firmware on an emulated BluePill; what it sends on USART1 goes to stdout.
+
+Time is virtual: a program that sleeps runs much faster than real time. Exit
+code 1: the firmware died of a fault.
+
+\b
+Examples:
+  p2os mcu run mine.elf                          one second of virtual time
+  p2os mcu run mine.elf --for 2s --uart log.txt  what it prints goes to a file
+  p2os mcu run mine.elf --realtime --uart pty:   talk to it with any terminal program, until Ctrl-C
+  p2os mcu run mine.elf --drive PA6=1@500ms      something comes before a sensor
+  p2os mcu run mine.elf --until "pin PC13 low"   up to an event
+"""
+
+#: chosen: how often a running program is given to whoever types, and held back to the clock.
+SLICE_NS: Nanos = 2 * NS_PER_MS
+DEFAULT_SPAN = "1s"
+#: Without an end: until Ctrl-C.
+_FOR_EVER = "31536000s"
+
+
+def register(app: typer.Typer) -> None:
+    """Add the command."""
+    app.command("run", help=HELP)(run)
+
+
+def run(
+    firmware: Annotated[Path, typer.Argument(help="ELF, HEX or BIN.", metavar="FIRMWARE")],
+    span: Annotated[str | None, typer.Option("--for", help="Virtual time, such as 2s or 10ms.", metavar="TIME")] = None,
+    uart: Annotated[str, typer.Option(help="Where USART1 goes: - (stdout), pty:, or a file.", metavar="WHERE")] = "-",
+    realtime: Annotated[bool, typer.Option("--realtime", help="At the speed of the clock, until Ctrl-C.")] = False,
+    drive: Annotated[
+        list[str] | None, typer.Option(help="Put a level on a pin at a time; repeatable.", metavar="PIN=LEVEL@TIME")
+    ] = None,
+    until: Annotated[
+        str | None, typer.Option(help='End earlier: "pin PA4 high", "usart1 sends ready", "fault".', metavar="EVENT")
+    ] = None,
+    strict: Annotated[bool, typer.Option("--strict", help="The first warning ends the run.")] = False,
+) -> None:
+    """Boot a firmware."""
+    end_ns = to_nanos(span or (_FOR_EVER if realtime else DEFAULT_SPAN))
+    board = BluePill(firmware, strict=strict)
+    changes = parse_changes(drive or [], board)
+    warn_on_stderr(board)
+    console = open_console(uart)
+    carry = connect(console, board.usart1)
+    if uart == "pty:":
+        say(f"USART1 is at {console.description}")
+    try:
+        if until is not None:
+            run_driven(board, 0, changes)
+            board.until(until, timeout=end_ns)
+        else:
+            advance = _paced(board, carry) if realtime or uart == "pty:" else board.advance_to
+            run_driven(board, end_ns, changes, advance)
+    except KeyboardInterrupt:
+        say("interrupted")
+        raise
+    finally:
+        console.close()
+        if uart == "-" and board.usart1.unread and not board.usart1.unread.endswith(b"\n"):
+            typer.echo("")
+        say(summary(board))
+    if tell_fault(board):
+        raise typer.Exit(1)
+
+
+def _paced(board: BluePill, carry: Callable[[], None]) -> Callable[[Nanos], Reached]:
+    """Return a way to advance in short slices that keep to the wall clock, with the console served between them."""
+    start_ns = time.monotonic_ns() - board.now_ns
+
+    def advance(limit_ns: Nanos) -> Reached:
+        carry()
+        reached = board.advance_to(min(limit_ns, board.now_ns + SLICE_NS))
+        ahead_ns = start_ns + board.now_ns - time.monotonic_ns()
+        if ahead_ns > 0:
+            time.sleep(ahead_ns / NS_PER_S)
+        return reached
+
+    return advance

@@ -1,0 +1,100 @@
+"""A USART of the board, seen from outside: what it sent, and how to talk to it.
+
+Not the line itself: characters go at the speed that the USART is set to.
+Invariant: `unread` holds what was sent and no `expect` or `read` has taken yet, at most twice `KEPT_BYTES`.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Protocol
+
+from bluepill_sim.durations import Span
+from bluepill_sim.timing import Nanos
+from bluepill_sim.usart import Usart
+
+#: chosen: six seconds of a line at 115200; older ones are forgotten.
+KEPT_BYTES = 64 * 1024
+
+#: Takes (word, ns at the end of its stop bit).
+WordListener = Callable[[int, Nanos], None]
+
+
+@dataclass(slots=True)
+class Activity:
+    """When the firmware was last seen alive, in ns; 0 before the first time."""
+
+    #: The last change of what the chip puts on any pin.
+    last_pin_ns: Nanos = 0
+    #: The end of the last character sent on any USART.
+    last_usart_ns: Nanos = 0
+    #: The last time the core went to sleep.
+    last_wfi_ns: Nanos = 0
+
+
+class Waits(Protocol):
+    """Who can run the chip until a port has sent something."""
+
+    def __call__(self, port: "SerialPort", pattern: bytes, within: Span) -> None:
+        """Run until `pattern` is in `port.unread`.
+
+        Raises:
+            WaitError: it did not come in time.
+        """
+        ...
+
+
+class SerialPort:
+    """A USART of the board, seen from outside."""
+
+    def __init__(self, usart: Usart, activity: Activity, wait: Waits) -> None:
+        self._usart = usart
+        self._activity = activity
+        self._wait = wait
+        self.name = usart.name
+        #: Called with (word, ns) at the end of each stop bit that goes out.
+        self.on_transmit: WordListener | None = None
+        #: More of the same: tools that look on.
+        self.listeners: list[WordListener] = []
+        #: What was sent and not yet taken.
+        self.unread = bytearray()
+        usart.on_transmit = self._transmitted
+
+    def receive(self, data: bytes) -> None:
+        """Send characters to the RX pin, at the speed of the line."""
+        self._usart.receive(data)
+
+    def read(self) -> bytes:
+        """Return what was sent and not yet taken, and take it."""
+        data = bytes(self.unread)
+        self.unread.clear()
+        return data
+
+    def expect(self, pattern: bytes, *, within: Span = "1 s") -> bytes:
+        """Run the board until the firmware has sent `pattern`; return what it sent, up to and with it.
+
+        What was already sent and not taken counts, so that nothing is missed between two calls.
+
+        Args:
+            pattern: what to wait for, at least one byte.
+            within: the longest wait, in virtual time.
+
+        Raises:
+            WaitError: it did not come in time, or the core is locked up.
+        """
+        if pattern not in self.unread:
+            self._wait(self, pattern, within)
+        end = self.unread.index(pattern) + len(pattern)
+        taken = bytes(self.unread[:end])
+        del self.unread[:end]
+        return taken
+
+    def _transmitted(self, word: int, at_ns: Nanos) -> None:
+        self._activity.last_usart_ns = at_ns
+        unread = self.unread
+        unread.append(word & 0xFF)
+        if len(unread) > 2 * KEPT_BYTES:
+            del unread[:-KEPT_BYTES]
+        if self.on_transmit is not None:
+            self.on_transmit(word, at_ns)
+        for listener in self.listeners:
+            listener(word, at_ns)
