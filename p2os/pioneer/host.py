@@ -136,6 +136,8 @@ class Host:
         transport = self.listener.accept()
         if transport is None:
             return
+        while self._listen_to_client():  # a client that has just left makes room for this one
+            pass
         if self._client is not None:
             self._tell("client refused", f"{transport.description}: {self._client.description} is connected")
             transport.close()
@@ -143,17 +145,19 @@ class Host:
         self._client = transport
         self._tell("client connected", transport.description)
 
-    def _listen_to_client(self) -> None:
+    def _listen_to_client(self) -> bool:
+        """Take what the client says; return whether it said something."""
         if self._client is None:
-            return
+            return False
         try:
             data = self._client.read()
         except TransportError as error:
             self._drop_client(str(error))
-            return
+            return False
         if data:
             self.pioneer.receive(data, self._now)
             self._speak()
+        return bool(data)
 
     def _drop_client(self, reason: str) -> None:
         if self._client is None:

@@ -9,7 +9,7 @@ from dataclasses import fields, is_dataclass
 from enum import Enum
 from typing import TypeAlias
 
-from p2os.commands import Command, CommandNumber
+from p2os.commands import Command
 from p2os.config_packet import FIELDS, ConfigPacket
 from p2os.packets import READERS, Identity, RawPacket, packet_name, read_packet
 from p2os.parameters import RobotParameters
@@ -20,21 +20,12 @@ from p2os.wire import Frame
 
 Plain: TypeAlias = "bool | int | float | str | list[Plain] | dict[str, Plain] | None"
 
-#: Commands whose integer is two bytes: names of the low and the high one, and whether they are signed.
-TWO_BYTES = {
-    CommandNumber.VEL2: ("right", "left", True),
-    CommandNumber.DIGOUT: ("low_byte", "high_byte", False),
-    CommandNumber.PTUPOS: ("pulse_width", "servo", False),
-    CommandNumber.ARM_POS: ("position", "joint", False),
-    CommandNumber.ARM_SPEED: ("speed", "joint", False),
-}
 #: A micrometre or a microradian: what is finer is an artefact of floating point.
 _DECIMALS = 6
 
 
-def describe_command(frame: Frame, profile: Profile) -> tuple[str, dict[str, Plain]]:
+def describe_command(frame: Frame) -> tuple[str, dict[str, Plain]]:
     """Return a command's name and argument."""
-    del profile
     command = Command.from_frame(frame)
     argument = command.argument
     if argument is None:
@@ -42,12 +33,13 @@ def describe_command(frame: Frame, profile: Profile) -> tuple[str, dict[str, Pla
     if isinstance(argument, bytes):
         return command.name, {"argument": argument.hex(" "), "text": printable(argument)}
     found: dict[str, Plain] = {"argument": argument}
-    try:
-        low_name, high_name, is_signed = TWO_BYTES[CommandNumber(command.number)]
-    except (KeyError, ValueError):
-        return command.name, found
-    low, high = command.signed_bytes if is_signed else command.two_bytes
-    return command.name, {**found, low_name: low, high_name: high}
+    row = command.row
+    if row is not None and row.unit:
+        found["unit"] = row.unit
+    if row is not None and row.two_bytes is not None:
+        low, high = command.signed_bytes if row.two_bytes.is_signed else command.two_bytes
+        found |= {row.two_bytes.low: low, row.two_bytes.high: high}
+    return command.name, found
 
 
 def describe_packet(frame: Frame, profile: Profile, parameters: RobotParameters) -> tuple[str, dict[str, Plain]]:

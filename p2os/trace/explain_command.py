@@ -2,8 +2,8 @@
 
 from collections.abc import Iterator
 
-from p2os.commands import NEGATIVE, POSITIVE, STRING, Command, CommandNumber
-from p2os.trace.describe import TWO_BYTES, printable
+from p2os.commands import NEGATIVE, POSITIVE, STRING, Command
+from p2os.trace.describe import printable
 from p2os.wire import Frame
 
 Span = tuple[bytes, str, str]
@@ -16,7 +16,8 @@ _TYPES = {
 
 def command_parts(frame: Frame, name: str) -> Iterator[Span]:
     """Yield (bytes, name, meaning) from the command number to the last argument."""
-    yield frame.payload[:1], "command", f"{frame.kind}, {name}"
+    row = Command(frame.kind).row
+    yield frame.payload[:1], "command", f"{frame.kind}, {name}" + (f": {row.meaning}" if row else "")
     data = frame.data
     if not data:
         return
@@ -45,11 +46,10 @@ def _string(data: bytes) -> Iterator[Span]:
 
 
 def _integer(command: Command, data: bytes) -> Iterator[Span]:
-    value = command.integer
-    try:
-        low_name, high_name, is_signed = TWO_BYTES[CommandNumber(command.number)]
-    except (KeyError, ValueError):
-        yield data, "argument", f"{value}, low byte first"
+    value, row = command.integer, command.row
+    if row is None or row.two_bytes is None:
+        unit = f" {row.unit}" if row is not None and row.unit else ""
+        yield data, "argument", f"{value}{unit}, low byte first"
         return
-    low, high = command.signed_bytes if is_signed else command.two_bytes
-    yield data, "argument", f"{value}: {high_name} {high}, {low_name} {low}"
+    low, high = command.signed_bytes if row.two_bytes.is_signed else command.two_bytes
+    yield data, "argument", f"{value}: {row.two_bytes.high} {high}, {row.two_bytes.low} {low}"

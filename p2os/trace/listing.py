@@ -134,7 +134,7 @@ class Lister:
         if direction is Direction.FROM_ROBOT:
             name, fields = describe_packet(frame, self._reading.profile, self._reading.parameters)
         else:
-            name, fields = describe_command(frame, self._reading.profile)
+            name, fields = describe_command(frame)
         return Row(
             at_ns=now, direction=direction, data=frame.to_bytes(), kind=frame.kind, name=sync_name or name,
             fields=fields,

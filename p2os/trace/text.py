@@ -32,12 +32,14 @@ def summary_of(rows: int, damaged: int, capture_s: float) -> str:
 def _inside(row: Row) -> str:
     if "x_m" in row.fields:
         return f"  {_sip(row.fields)}"
-    if set(row.fields) == {"argument"}:
-        return f" {row.fields['argument']}"
+    if "argument" in row.fields and not set(row.fields) - {"argument", "unit"}:
+        return f" {row.fields['argument']} {row.fields.get('unit', '')}".rstrip()
     if "text" in row.fields:
         return f' "{row.fields["text"]}" ({row.fields["argument"]})'
-    shown = ", ".join(f"{name} {_value(value)}" for name, value in row.fields.items() if name != "argument")
-    return f"  {shown}" if shown else ""
+    inside = {name: value for name, value in row.fields.items() if name not in {"argument", "unit"}}
+    shown = ", ".join(f"{name} {_value(value)}" for name, value in inside.items())
+    unit = f", each x {row.fields['unit']}" if "unit" in row.fields else ""
+    return f"  {shown}{unit}" if shown else ""
 
 
 def _sip(fields: dict[str, Plain]) -> str:

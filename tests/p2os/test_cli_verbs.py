@@ -39,8 +39,13 @@ def test_ports_are_listed_as_urls(monkeypatch: pytest.MonkeyPatch, capsys: Captu
     monkeypatch.setattr(ports, "list_serial_ports", lambda: TWO_PORTS)
     assert run(["ports"]) == 0
     captured = capsys.readouterr()
-    assert captured.out == "serial:/dev/ttyS0\nserial:/dev/ttyUSB0  USB Serial, USB VID:PID=1A86:7523\n"
-    assert captured.err == "2 serial ports\n"
+    assert captured.out.splitlines() == [
+        "serial:/dev/ttyS0",
+        "                     a port of the machine itself: a robot may be on it, if it is wired at all",
+        "serial:/dev/ttyUSB0  USB Serial, USB VID:PID=1A86:7523",
+        "                     CH340 adapter, also on ESP32 boards: a robot or the adapter board may be behind it",
+    ]
+    assert captured.err == "2 serial ports\nhint: p2os scan asks them who is there\n"
 
 
 def test_no_ports_is_a_result_with_a_hint(monkeypatch: pytest.MonkeyPatch, capsys: Capture) -> None:
@@ -51,13 +56,15 @@ def test_no_ports_is_a_result_with_a_hint(monkeypatch: pytest.MonkeyPatch, capsy
     assert captured.err.startswith("no serial ports\nhint: ")
     monkeypatch.setattr(ports, "list_serial_ports", lambda: TWO_PORTS[:1])
     run(["ports"])
-    assert capsys.readouterr().err == "1 serial port\n"
+    assert capsys.readouterr().err.startswith("1 serial port\n")
 
 
 def test_ports_are_listed_for_programs(monkeypatch: pytest.MonkeyPatch, capsys: Capture) -> None:
     monkeypatch.setattr(ports, "list_serial_ports", lambda: TWO_PORTS)
     assert run(["ports", "--json"]) == 0
-    assert json.loads(capsys.readouterr().out) == TWO_PORTS
+    found = json.loads(capsys.readouterr().out)
+    assert [{name: port[name] for name in TWO_PORTS[0]} for port in found] == TWO_PORTS
+    assert all(port["guess"] for port in found)
 
 
 # doctor ---------------------------------------------------------------------------------

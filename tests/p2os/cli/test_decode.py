@@ -25,12 +25,12 @@ ARIA_BEGINS = """\
 """
 
 EXPLAINED = """\
-> VEL 200
+> VEL 200 mm/s
     0  fa fb                    header
     2  06                       count: 6 bytes follow, checksum included
-    3  0b                       command: 11, VEL
+    3  0b                       command: 11, VEL: Translational speed, + forward.
     4  3b                       argument type: integer, to be taken as it is
-    5  c8 00                    argument: 200, low byte first
+    5  c8 00                    argument: 200 mm/s, low byte first
     7  d3 3b                    checksum: 0xD33B, high byte first; right
 """
 
@@ -53,7 +53,7 @@ def test_json_is_one_object_a_packet(capsys: Capture, tmp_path: Path) -> None:
     captured = capsys.readouterr()
     assert captured.err == ""
     assert [json.loads(line) for line in captured.out.splitlines()] == [
-        {"t": 0.0, "dir": "c2r", "type": 11, "name": "VEL", "fields": {"argument": 200}, "valid": True},
+        {"t": 0.0, "dir": "c2r", "type": 11, "name": "VEL", "fields": {"argument": 200, "unit": "mm/s"}, "valid": True},
         {"t": 0.0, "dir": "r2c", "type": None, "name": "bad checksum", "valid": False,
          "fields": {"bytes": "fa fb 03 00 00 01", "problem": "checksum: 0x0000 expected, got 0x0001"}},
     ]  # fmt: skip
@@ -62,7 +62,7 @@ def test_json_is_one_object_a_packet(capsys: Capture, tmp_path: Path) -> None:
 def test_stdin_is_read(monkeypatch: pytest.MonkeyPatch, capsys: Capture) -> None:
     monkeypatch.setattr(sys, "stdin", io.TextIOWrapper(io.BytesIO(bytes.fromhex(VEL))))
     assert run(["decode", "-", "--dir", "c2r"]) == 0
-    assert capsys.readouterr().out == "> VEL 200\n"
+    assert capsys.readouterr().out == "> VEL 200 mm/s\n"
 
 
 def test_only_what_is_asked_for_is_shown(capsys: Capture) -> None:

@@ -96,7 +96,7 @@ def test_a_missing_package_is_one_line_with_the_way_to_get_it(
 def test_csv_goes_to_stdout_and_names_choose_packets(capsys: Capture) -> None:
     assert run(["export", str(GOLDEN), "-", "--only", "vel2,sonar"]) == 0
     lines = capsys.readouterr().out.splitlines()
-    assert lines[0] == "t_s,dir,type,name,valid,argument,right,left"
+    assert lines[0] == "t_s,dir,type,name,valid,argument,unit,right,left"
     assert {line.split(",")[3] for line in lines[1:]} == {"VEL2", "SONAR"}
 
 

@@ -148,7 +148,7 @@ def test_lines_name_units_and_directions() -> None:
     assert [line_of(row) for row in found] == [
         "  0.000000 s  < SIP  x 0.000 m, y 0.000 m, heading 0.0 deg, wheels 0.000 0.000 m/s, 12.5 V, stalled left",
         '  0.000002 s  > TTY2 "RS." (52 53 0d)',
-        "  0.000002 s  > VEL2  right 10, left -1",
+        "  0.000002 s  > VEL2  right 10, left -1, each x 20 mm/s",
         "  0.000003 s  < !! noise: 30 bytes outside any frame: " + "00 " * 23 + "00 … (30 bytes)",
     ]
     assert line_of(found[1], has_time=False).startswith("> TTY2")

@@ -1,0 +1,146 @@
+"""`p2os drive`: move a robot a way, an angle, or at a speed for a time, and stop it."""
+
+import json
+import math
+import sys
+from dataclasses import dataclass
+from typing import Annotated
+
+import typer
+
+from p2os.cli.quantities import Quantity, parse_duration, parse_quantity
+from p2os.cli.signals import end_on_signals
+from p2os.client import MotionResult, Robot
+from p2os.errors import UsageError
+from p2os.timing import NS_PER_S, Nanos
+
+HELP = """Move a robot, and leave it standing.
+
+A way comes before an angle; each is watched until the robot has arrived. With
+--for, speeds are held for a time. Numbers need their units. Ctrl-C, an error and
+a lost link stop the robot first.
+
+\b
+Examples:
+  p2os drive tcp:127.0.0.1:8101 --forward 0.5m              half a metre ahead
+  p2os drive URL --forward -20cm --vel 100mm/s              back, slowly
+  p2os drive URL --forward 1m --turn 90deg                  ahead, then to the left
+  p2os drive URL --vel 0.2m/s --turn-rate 15deg/s --for 3s  a bend of three seconds
+"""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Plan:
+    """What is to be done, in SI units.
+
+    Raises:
+        UsageError: The options do not go together.
+    """
+
+    forward_m: float | None = None
+    turn_rad: float | None = None
+    speed_mps: float | None = None
+    rate_radps: float | None = None
+    lasts_ns: Nanos | None = None
+
+    def __post_init__(self) -> None:
+        has_way = self.forward_m is not None or self.turn_rad is not None
+        has_speed = self.speed_mps is not None or self.rate_radps is not None
+        if not has_way and not has_speed:
+            raise UsageError("nothing to do", hint="--forward 0.5m, --turn 90deg, or --vel 0.2m/s --for 2s")
+        if has_way and self.lasts_ns is not None:
+            raise UsageError("--for goes with speeds only", hint="--vel 0.2m/s --for 2s")
+        if not has_way and self.lasts_ns is None:
+            raise UsageError("a speed without an end", hint="add --for 2s, or a way: --forward 0.5m")
+        for name, limit, is_needed in (("--vel", self.speed_mps, self.forward_m), ("--turn-rate", self.rate_radps,
+                                                                                   self.turn_rad)):  # fmt: skip
+            if has_way and limit is not None and (is_needed is None or limit <= 0):
+                what = "has nothing to limit" if is_needed is None else "must be positive: the way gives the direction"
+                raise UsageError(f"{name} {what}", hint="p2os drive --help")
+
+
+def register(app: typer.Typer) -> None:
+    """Add the verb."""
+    app.command("drive", help=HELP)(drive)
+
+
+def drive(
+    url: Annotated[str, typer.Argument(help="Where the robot is.", metavar="URL")],
+    forward: Annotated[str, typer.Option(help="How far, negative backwards.", metavar="LENGTH")] = "",
+    turn: Annotated[str, typer.Option(help="How far round, positive to the left.", metavar="ANGLE")] = "",
+    vel: Annotated[str, typer.Option(help="Speed: held with --for, else the most.", metavar="SPEED")] = "",
+    turn_rate: Annotated[str, typer.Option(help="Turning speed, likewise.", metavar="RATE")] = "",
+    duration: Annotated[str, typer.Option("--for", help="How long the speeds are held.", metavar="TIME")] = "",
+    robot: Annotated[str, typer.Option(help="Robot model or TOML file, if it is not what the robot says.")] = "",
+    json_output: Annotated[bool, typer.Option("--json", help="Print a JSON object.")] = False,
+) -> None:
+    """Move a robot."""
+    plan = Plan(
+        forward_m=parse_quantity(forward, Quantity.LENGTH, "--forward") if forward else None,
+        turn_rad=parse_quantity(turn, Quantity.ANGLE, "--turn") if turn else None,
+        speed_mps=parse_quantity(vel, Quantity.SPEED, "--vel") if vel else None,
+        rate_radps=parse_quantity(turn_rate, Quantity.TURN_RATE, "--turn-rate") if turn_rate else None,
+        lasts_ns=parse_duration(duration, "--for") if duration else None,
+    )
+    end_on_signals()
+    with Robot(url, model=robot or None, reconnect=False) as client:
+        steps = carry_out(plan, client)
+        pose = client.pose
+    if json_output:
+        end = {"x_m": round(pose.x_m, 6), "y_m": round(pose.y_m, 6), "heading_rad": round(pose.heading_rad, 6)}
+        typer.echo(json.dumps({"steps": steps, "pose": end}))
+        return
+    typer.echo(f"at x {pose.x_m:.3f} m, y {pose.y_m:.3f} m, heading {math.degrees(pose.heading_rad):.1f} deg")
+
+
+def carry_out(plan: Plan, robot: Robot) -> list[dict[str, object]]:
+    """Do what a plan says and tell stderr of each step; return the steps in SI units.
+
+    Raises:
+        MotionError, LinkLostError, MotorsDisabledError: The robot did not arrive; it was stopped.
+    """
+    steps: list[dict[str, object]] = []
+    if plan.lasts_ns is not None:
+        robot.set_velocity(plan.speed_mps or 0.0, plan.rate_radps or 0.0)
+        robot.sleep(plan.lasts_ns / NS_PER_S)
+        _check_link(robot)
+        robot.stop()
+        steps.append({"what": "hold", "forward_mps": plan.speed_mps or 0.0, "turn_radps": plan.rate_radps or 0.0,
+                      "took_s": plan.lasts_ns / NS_PER_S})  # fmt: skip
+        _wait_until_it_stands(robot)
+    if plan.forward_m is not None:
+        result = robot.drive(plan.forward_m, speed_mps=plan.speed_mps)
+        steps.append(_step("drive", "m", result))
+        sys.stderr.write(f"drove {result.reached:.3f} m of {result.asked:.3f} m in {result.took_ns / NS_PER_S:.1f} s\n")
+    if plan.turn_rad is not None:
+        result = robot.turn(plan.turn_rad, speed_radps=plan.rate_radps)
+        steps.append(_step("turn", "rad", result))
+        sys.stderr.write(
+            f"turned {math.degrees(result.reached):.1f} deg of {math.degrees(result.asked):.1f} deg "
+            f"in {result.took_ns / NS_PER_S:.1f} s\n"
+        )
+    return steps
+
+
+def _step(what: str, unit: str, result: MotionResult) -> dict[str, object]:
+    return {
+        "what": what,
+        f"asked_{unit}": round(result.asked, 6),
+        f"reached_{unit}": round(result.reached, 6),
+        "took_s": round(result.took_ns / NS_PER_S, 3),
+    }
+
+
+def _check_link(robot: Robot) -> None:
+    """Raise if the link was lost while a speed was held: a stop that nobody hears is no success."""
+    robot.next_state()
+
+
+def _wait_until_it_stands(robot: Robot) -> None:
+    """Return when two packets in a row say that the wheels stand, or after a second more than any Pioneer needs."""
+    standing = 0
+    for _ in range(50):
+        state = robot.next_state()
+        standing = standing + 1 if abs(state.left_mps) < 0.005 and abs(state.right_mps) < 0.005 else 0
+        if standing >= 2:
+            return

@@ -1,0 +1,229 @@
+"""The verbs that use a robot: drive, send, scan, monitor and bench, against a served one."""
+
+import json
+import math
+from collections.abc import Callable
+
+import pytest
+
+from p2os.cli import bench as bench_verb
+from p2os.cli.bench import Bench, lines_of, measure
+from p2os.cli.monitor import words_of
+from p2os.cli.ports import guess
+from p2os.cli.send import make_command
+from p2os.client import LinkLost, MotorsDisabled, ReconnectPlanned
+from p2os.errors import RemoteProtocolError, TransportError, UsageError
+from p2os.timing import NS_PER_MS, NS_PER_S
+
+Run = Callable[..., int]
+Capture = pytest.CaptureFixture[str]
+
+
+@pytest.fixture(autouse=True)
+def quiet_signals(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Leave the test runner's own signal handlers alone."""
+    for verb in ("bench", "drive", "monitor", "scan", "send", "teleop"):
+        monkeypatch.setattr(f"p2os.cli.{verb}.end_on_signals", lambda: None)
+
+
+def test_a_robot_drives_a_way_then_an_angle_and_stands(served: object, run: Run, capsys: Capture) -> None:
+    assert run("drive", served.url, "--forward", "10cm", "--turn", "-20deg", "--json") == 0
+    captured = capsys.readouterr()
+    done = json.loads(captured.out)
+    assert [step["what"] for step in done["steps"]] == ["drive", "turn"]
+    assert done["steps"][0]["asked_m"] == 0.1
+    assert done["pose"]["x_m"] == pytest.approx(0.1, abs=0.03)
+    assert math.degrees(done["pose"]["heading_rad"]) == pytest.approx(-20, abs=4)
+    assert captured.err.startswith("drove 0.")
+    assert "motors: on" in served.text
+
+
+def test_a_speed_is_held_for_a_time(served: object, run: Run, capsys: Capture) -> None:
+    assert run("drive", served.url, "--vel", "-100mm/s", "--for", "300ms") == 0
+    out = capsys.readouterr().out
+    assert out.startswith("at x -0.")
+    assert out.endswith("heading 0.0 deg\n")
+
+
+def test_a_command_is_sent_and_its_answer_shown(served: object, run: Run, capsys: Capture) -> None:
+    assert run("send", served.url, "sonar", "0", "--wait", "50ms") == 0
+    assert capsys.readouterr().out == "sent SONAR: fa fb 06 1c 3b 00 00 1c 3b\n"
+    assert run("send", served.url, "DHEAD", "-5", "--wait", "50ms", "--json") == 0
+    assert json.loads(capsys.readouterr().out)["sent"] == {
+        "command": "DHEAD", "number": 13, "hex": "fafb060d1b0500121b",
+    }  # fmt: skip
+
+
+def test_commands_are_listed(run: Run, capsys: Capture) -> None:
+    assert run("send", "--list", "joystick") == 0
+    captured = capsys.readouterr()
+    assert captured.out.splitlines()[0] == " 17  JOYREQUEST  integer of 0 to 2"
+    assert run("send", "--list", "--json") == 0
+    rows = {row["name"]: row for row in json.loads(capsys.readouterr().out)}
+    assert rows["VEL"]["unit"] == "mm/s"
+    assert set(rows["VEL"]["firmware"]) == {"P2OS", "AROS", "ARCOS"}
+
+
+@pytest.mark.parametrize(
+    ("name", "arguments", "sent"),
+    [
+        ("vel2", ["10", "-1"], "fafb06201bf600161b"), ("DIGOUT", ["0x09", "0x19"], "fafb061e3b0919"),
+        ("PULSE", [], "fafb03000000"), ("say", ["hex:14 3c"], "fafb070f2b02143c"), ("250", ["-7"], None),
+        ("TTY2", ["RS", "1"], "fafb092a2b0452532031"), ("199", ["hex:01"], None), ("7", [], "fafb03070007"),
+    ],
+)  # fmt: skip
+def test_commands_are_made_of_what_a_person_types(name: str, arguments: list[str], sent: str | None) -> None:
+    made = make_command(name, arguments).to_frame().to_bytes().hex()
+    assert sent is None or made.startswith(sent)
+
+
+def test_a_robot_is_found_and_identified(served: object, run: Run, capsys: Capture) -> None:
+    assert run("scan", "serial:/dev/ttyUSB99", served.url, "--json") == 0
+    captured = capsys.readouterr()
+    (found,) = json.loads(captured.out)
+    assert (found["url"], found["subclass"], found["title"], found["baud"]) == (
+        served.url,
+        "p2dx",
+        "Pioneer 2-DX",
+        None,
+    )
+    assert "serial:/dev/ttyUSB99: no (cannot open /dev/ttyUSB99: no such port)" in captured.err
+    assert run("scan", served.url) == 0
+    assert capsys.readouterr().out.startswith(f"{served.url}  Virtual: Pioneer p2dx (Pioneer 2-DX), P2OS")
+    assert "motors: on" not in served.text
+
+
+def test_states_are_printed_where_there_is_no_terminal(served: object, run: Run, capsys: Capture) -> None:
+    assert run("monitor", served.url, "--for", "150ms", "--json") == 0
+    rows = [json.loads(line) for line in capsys.readouterr().out.splitlines()]
+    assert rows[0]["x_m"] == 0
+    assert rows[0]["sonar_m"]
+    assert run("monitor", served.url, "--for", "50ms") == 0
+    captured = capsys.readouterr()
+    assert captured.out.startswith("x 0.000 m, y 0.000 m, heading 0.0 deg, 0.000 m/s, 0.0 deg/s, 12.6 V, nearest ")
+    assert captured.err.endswith(" packets\n")
+
+
+def test_what_happened_is_told_in_words() -> None:
+    assert words_of(LinkLost("no packet")) == "link lost: no packet"
+    assert words_of(ReconnectPlanned(1, 5)) == "reconnect planned"
+    assert words_of(MotorsDisabled("button")) == "motors disabled: button"
+
+
+def test_a_link_is_measured(served: object, run: Run, capsys: Capture) -> None:
+    assert run("bench", served.url, "--for", "500ms", "--json") == 0
+    measured = json.loads(capsys.readouterr().out)
+    assert measured["packets"] >= 3
+    assert measured["bad_checksums"] == 0
+    assert run("bench", served.url, "--for", "200ms") == 0
+    captured = capsys.readouterr()
+    assert [line.split()[0] for line in captured.out.splitlines()] == ["connect", "period", "round", "losses"]
+    assert captured.err.endswith("lost or damaged\n")
+
+
+def test_a_robot_that_does_not_answer_config_is_measured_without(make_robot: Callable[..., object]) -> None:
+    robot = make_robot()
+    bench, now = Bench(0), 0
+    while now < 4 * NS_PER_S:
+        now += 10 * NS_PER_MS
+        robot.pioneer.advance_to(now)
+        data = b"".join(robot.pioneer.take_output())
+        data = b"" if data[3:4] == b"\x20" else data
+        robot.pioneer.receive(bench.turn(data, now), now)
+    measured = bench.result(now)
+    assert (measured.round_trip, measured.unanswered) == (None, 3)
+    assert (measured.period.median_ms, measured.missed) == (100.0, 0)
+    assert "not measured: the robot does not answer CONFIG" in lines_of(measured)[2]
+    assert bench.next_deadline() is not None
+
+
+def test_a_line_without_a_robot_cannot_be_measured(monkeypatch: pytest.MonkeyPatch) -> None:
+    class Silent:
+        description = "tcp:nowhere"
+        heard = b""
+
+        def read(self) -> bytes:
+            return b""
+
+        def write(self, data: bytes) -> None:
+            self.heard += data
+
+        def fileno(self) -> int:
+            raise TransportError("cannot be waited for")
+
+    monkeypatch.setattr(bench_verb, "BLIND_POLL_S", 0)
+    times = iter(range(0, 10**12, 50 * NS_PER_MS))
+    with pytest.raises(RemoteProtocolError, match="no robot on tcp:nowhere"):
+        measure(Silent(), NS_PER_S, clock=lambda: next(times))
+
+
+@pytest.mark.parametrize(
+    ("words", "code", "said"),
+    [
+        (["drive", "tcp:x"], 2, "p2os: nothing to do"),
+        (["drive", "tcp:x", "--forward", "500"], 2, "p2os: --forward '500' has no unit; take m, cm, mm"),
+        (["drive", "tcp:x", "--turn", "1m"], 2, "p2os: --turn '1m' has the unit 'm'; take deg, °, rad"),
+        (["drive", "tcp:x", "--vel", "1m/s"], 2, "p2os: a speed without an end"),
+        (["drive", "tcp:x", "--forward", "1m", "--for", "1s"], 2, "p2os: --for goes with speeds only"),
+        (["drive", "tcp:x", "--forward", "1m", "--turn-rate", "1deg/s"], 2, "p2os: --turn-rate has nothing to limit"),
+        (["drive", "tcp:x", "--forward", "1m", "--vel", "-1m/s"], 2, "p2os: --vel must be positive"),
+        (["drive", "tcp:127.0.0.1:1", "--forward", "1m"], 1, "p2os: cannot connect to tcp:127.0.0.1:1"),
+        (["drive", "nowhere", "--forward", "1m"], 2, "p2os: 'nowhere' is not a port URL"),
+        (["drive", "tcp:x", "--forward", "1m", "--robot", "nobody"], 2, "p2os: "),
+        (["send"], 2, "p2os: name the robot's URL and a command"),
+        (["send", "tcp:x", "JUMP"], 2, "p2os: no command 'JUMP'"),
+        (["send", "tcp:x", "ENABLE", "7"], 2, "p2os: ENABLE: 7 is not what it takes: integer of 0 to 1"),
+        (["send", "tcp:x", "VEL", "fast"], 2, "p2os: 'fast' is no whole number"),
+        (["send", "tcp:x", "SAY", "hex:1"], 2, "p2os: 'hex:1' is no hex text"),
+        (["send", "tcp:x", "300"], 2, "p2os: command 300 does not fit a byte"),
+        (["send", "tcp:x", "30", "1", "2"], 2, "p2os: command 30: one argument at most"),
+        (["send", "--list", "zebra"], 2, "p2os: no command has 'zebra' in it"),
+        (["scan", "tcp:127.0.0.1:1"], 1, "tcp:127.0.0.1:1: no (cannot connect"),
+        (["scan", "x", "--baud", "5"], 2, "p2os: --baud 5 is no speed of a serial line"),
+        (["monitor", "tcp:127.0.0.1:1"], 1, "p2os: cannot connect"),
+        (["monitor", "tcp:x", "--for", "-1s"], 2, "p2os: --for '-1s' must be more than 0"),
+        (["bench", "tcp:127.0.0.1:1"], 1, "p2os: cannot connect"),
+        (["teleop", "tcp:x", "--vel", "0m/s"], 2, "p2os: --vel and --turn-rate must be positive"),
+        (["teleop", "tcp:x"], 2, "p2os: there is no keyboard: stdin is not a terminal"),
+    ],
+)  # fmt: skip
+def test_bad_input_is_one_line_and_a_hint(words: list[str], code: int, said: str, run: Run, capsys: Capture) -> None:
+    assert run(*words) == code
+    captured = capsys.readouterr()
+    assert captured.err.startswith(said)
+    assert "Traceback" not in captured.err
+    assert captured.out == ""
+
+
+def test_arguments_that_are_no_whole_numbers_are_refused() -> None:
+    with pytest.raises(UsageError, match="it takes"):
+        make_command("VEL", ["1", "2", "3"])
+
+
+# ports ----------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("device", "description", "hardware", "words"),
+    [
+        ("/dev/ttyUSB0", "USB Serial", "USB VID:PID=1A86:7523 LOCATION=1-1", "CH340 adapter"),
+        ("/dev/ttyACM0", "STM32", "USB VID:PID=0483:374b", "ST-LINK: a BluePill's debugger, no robot"),
+        ("/dev/ttyUSB1", "thing", "USB VID:PID=FFFF:0001", "a USB device that is not known here"),
+        ("/dev/ttyS0", "n/a", "n/a", "a port of the machine itself"),
+        ("/dev/rfcomm0", "n/a", "n/a", "Bluetooth"),
+        ("/dev/ttyUSB2", "FT232R", "USB VID:PID=0403:6001 SER=A1", "FTDI adapter: a robot may be behind it"),
+    ],
+)
+def test_ports_are_guessed_by_what_they_say_they_are(
+    device: str, description: str, hardware: str, words: str, tmp_path: object
+) -> None:
+    port = {"url": f"serial:{device}", "description": description, "hardware": hardware}
+    assert guess(port, tmp_path).startswith(words)
+
+
+@pytest.mark.parametrize(("timer", "is_told"), [("16\n", True), ("1\n", False), ("soon", False)])
+def test_a_slow_latency_timer_is_told(timer: str, is_told: bool, tmp_path: object) -> None:
+    (tmp_path / "ttyUSB0").mkdir()
+    (tmp_path / "ttyUSB0" / "latency_timer").write_text(timer)
+    port = {"url": "serial:/dev/ttyUSB0", "description": "FT232R", "hardware": "USB VID:PID=0403:6001"}
+    assert ("latency timer of 16 ms" in guess(port, tmp_path)) is is_told

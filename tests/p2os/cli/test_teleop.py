@@ -1,0 +1,141 @@
+"""Driving by keyboard: keys, the deadman, and the whole verb on a pseudo-terminal."""
+
+import os
+import pty
+import select
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+from p2os.cli.teleop_keys import FIRST_HOLD_NS, KEYS, NEXT_HOLD_NS, QUIT_KEYS, STOP_KEYS, Teleop, split_keys
+from p2os.timing import NS_PER_MS
+
+PATIENCE_S = 60.0
+
+
+def teleop() -> Teleop:
+    return Teleop(0.3, 0.8)
+
+
+def test_a_tap_drives_until_the_deadman_and_no_longer() -> None:
+    keys = teleop()
+    keys.press("up", 0)
+    assert keys.speeds == (0.3, 0.0)
+    assert keys.next_deadline() == FIRST_HOLD_NS
+    keys.advance_to(FIRST_HOLD_NS - 1)
+    assert keys.is_driving
+    keys.advance_to(FIRST_HOLD_NS)
+    assert (keys.is_driving, keys.speeds, keys.next_deadline()) == (False, (0.0, 0.0), None)
+
+
+def test_a_held_key_drives_on_and_stops_soon_after_it_is_let_go() -> None:
+    keys = teleop()
+    keys.press("w", 0)
+    last = 0
+    for last in range(660 * NS_PER_MS, 2000 * NS_PER_MS, 33 * NS_PER_MS):
+        keys.press("w", last)
+        assert keys.speeds == (0.3, 0.0)
+    keys.advance_to(last + NEXT_HOLD_NS - 1)
+    assert keys.is_driving
+    keys.advance_to(last + NEXT_HOLD_NS)
+    assert not keys.is_driving
+
+
+@pytest.mark.parametrize("key", KEYS)
+def test_each_key_has_its_direction(key: str) -> None:
+    keys = teleop()
+    keys.press(key, 5)
+    forward, turn = KEYS[key]
+    assert keys.speeds == (forward * 0.3, turn * 0.8)
+
+
+@pytest.mark.parametrize("key", [*STOP_KEYS, *QUIT_KEYS])
+def test_stopping_and_leaving_stop_at_once(key: str) -> None:
+    keys = teleop()
+    keys.press("up", 0)
+    keys.press(key, 1)
+    assert keys.speeds == (0.0, 0.0)
+    assert keys.is_over is (key in QUIT_KEYS)
+
+
+def test_plus_and_minus_change_the_speed_within_limits() -> None:
+    keys = teleop()
+    for _ in range(100):
+        keys.press("-", 0)
+    assert keys.share == 0.05
+    for _ in range(100):
+        keys.press("+", 0)
+    assert keys.share == 1.0
+    keys.press("up", 0)
+    keys.press("-", 1)
+    assert keys.speeds[0] == pytest.approx(0.3 / 1.1)
+    keys.press("?", 2)
+    assert keys.is_driving
+
+
+@pytest.mark.parametrize(
+    ("text", "keys"),
+    [
+        ("w", ["w"]), ("\x1b[A\x1b[Dq", ["up", "left", "q"]), ("\x1bOB", ["down"]), ("\x1b", ["escape"]),
+        ("\x1b[3~k", ["k"]), ("\x1b[1;5Cx", ["x"]), ("W\x03", ["w", "\x03"]), ("\x1b[", []), ("", []),
+    ],
+)  # fmt: skip
+def test_characters_become_keys(text: str, keys: list[str]) -> None:
+    assert split_keys(text) == keys
+
+
+class Terminal:
+    """`p2os teleop` on a terminal of its own."""
+
+    def __init__(self, url: str) -> None:
+        self.keyboard, inside = pty.openpty()
+        command = [str(Path(sys.executable).parent / "p2os"), "teleop", url, "--vel", "200mm/s"]
+        self.process = subprocess.Popen(command, stdin=inside, stdout=inside, stderr=inside, start_new_session=True)
+        os.close(inside)
+        self.seen = ""
+
+    def wait_for(self, words: str) -> None:
+        ends = time.monotonic() + PATIENCE_S
+        while words not in self.seen and time.monotonic() < ends:
+            if select.select([self.keyboard], [], [], 1.0)[0]:
+                try:
+                    self.seen += os.read(self.keyboard, 4096).decode("utf-8", "replace")
+                except OSError:  # the program has closed its terminal
+                    break
+        assert words in self.seen, self.seen[-500:]
+
+    def press(self, keys: str) -> None:
+        self.seen = ""
+        os.write(self.keyboard, keys.encode())
+
+    def end(self) -> int:
+        try:
+            return self.process.wait(PATIENCE_S)
+        finally:
+            self.process.kill()
+            os.close(self.keyboard)
+
+
+def test_a_person_drives_lets_go_and_leaves(served: object) -> None:
+    terminal = Terminal(served.url)
+    terminal.wait_for("stand")
+    terminal.press("\x1b[A")
+    terminal.wait_for("DRIVE +0.20 m/s")
+    terminal.wait_for("stand")
+    terminal.press("q")
+    assert terminal.end() == 0
+    assert "motors: off" in served.text
+
+
+def test_ctrl_c_stops_the_robot_first(served: object) -> None:
+    terminal = Terminal(served.url)
+    terminal.wait_for("stand")
+    terminal.press("w")
+    terminal.wait_for("x 0.02 m")
+    terminal.process.send_signal(signal.SIGINT)
+    assert terminal.end() == 130
+    assert "motors: off" in served.text
