@@ -112,8 +112,20 @@ def _board(point: tuple[float, float]) -> tuple[float, float]:
 
 
 def _setup() -> Node:
+    mask = [node("color", Text("Green")), node("thickness", 0.01)]
+    copper = [node("type", Text("copper")), node("thickness", 0.035)]
+    core = [node("type", Text("core")), node("thickness", 1.51), node("material", Text("FR4"))]
+    stackup = node(
+        "stackup",
+        node("layer", Text("F.SilkS"), node("type", Text("Top Silk Screen")), node("color", Text("White"))),
+        node("layer", Text("F.Mask"), node("type", Text("Top Solder Mask")), *mask), node("layer", Text("F.Cu"), *copper),
+        node("layer", Text("dielectric 1"), *core), node("layer", Text("B.Cu"), *copper),
+        node("layer", Text("B.Mask"), node("type", Text("Bottom Solder Mask")), *mask),
+        node("layer", Text("B.SilkS"), node("type", Text("Bottom Silk Screen")), node("color", Text("White"))),
+        node("copper_finish", Text("None")), node("dielectric_constraints", "no"),
+    )  # fmt: skip
     return node(
-        "setup", node("pad_to_mask_clearance", 0), node("allow_soldermask_bridges_in_footprints", "no"),
+        "setup", stackup, node("pad_to_mask_clearance", 0), node("allow_soldermask_bridges_in_footprints", "no"),
         node("tenting", "front", "back"), node("aux_axis_origin", ORIGIN_MM[0], ORIGIN_MM[1] + rules.BOARD_HEIGHT_MM),
         node("grid_origin", *ORIGIN_MM),
     )  # fmt: skip
@@ -122,7 +134,9 @@ def _setup() -> Node:
 def _part(design: Design, component: Component, at: Place, numbers: dict[str, int]) -> Node:
     footprint, part, ref = FOOTPRINTS[component.part.footprint], component.part, component.ref
     ident = (design.variant, ref)
-    tree = node("footprint", Text(f"{LIBRARY}:{footprint.name}"), node("layer", Text("F.Cu")), uuid_node(*ident, "part"))
+    tree = node(
+        "footprint", Text(f"{LIBRARY}:{footprint.name}"), node("layer", Text("F.Cu")), uuid_node(*ident, "part")
+    )
     tree.append(node("at", *_board((at.x_mm, at.y_mm)), *([at.angle_deg] if at.angle_deg else [])))
     tree.append(node("descr", Text(footprint.description)))
     ref_at = footprint.ref_at_mm if at.ref_mm is None else _unturn(at.ref_mm, at.angle_deg)

@@ -149,7 +149,7 @@ def _serial(pinout: Pinout, variant: str) -> list[Component]:
         make("C5", "C 100n", ["RS_C1P", "RS_C1M"]),
         make("C6", "C 100n", ["RS_C2P", "RS_C2M"]),
         make("C7", "C 100n", ["RS_VP", "GND"]),
-        make("C8", "C 100n", ["GND", "RS_VM"]),
+        make("C8", "C 100n", ["RS_VM", "GND"]),
         make("C9", "C 100n", ["+3V3", "GND"]),
         make("J3", "DE9", _DE9_PINS, "HOST"),
         make("R62", "1k", ["ESP_TX", "TXD"]),

@@ -226,6 +226,8 @@ LED_V, LED_OHM = 1.8, 510.0
 LED_MA = 1.5
 #: What LM317 on SOT-223 can carry on average in still air at 40 degrees Celsius (spice/thermal).
 LM317_LIMIT_MA, LM317_AVERAGE_MA = 250.0, 190.0
+#: The same with the battery at its charging voltage.
+LM317_CHARGING_MA = 150.0
 #: A PTC holds about 85 % of its rating at 40 degrees Celsius. memory.
 PTC_HOT = 0.85
 #: Both modules' 3.3 V regulators need about 1.1 V above their output at most. memory.

@@ -148,12 +148,12 @@ def _buck() -> Footprint:
             at_mm=(2.54 * index, 0), size_mm=(1.5, 2.5), drill_mm=1.0)
         for index in range(3)
     )  # fmt: skip
-    names = [Label(layer="F.SilkS", text=text, at_mm=(2.54 * index, 2.55), size_mm=0.8)
+    names = [Label(layer="F.SilkS", text=text, at_mm=(2.54 * index, 2.8), size_mm=0.8)
              for index, text in enumerate(("IN", "G", "OUT"))]  # fmt: skip
     return Footprint(
         name="SIP3_BUCK", description="SIP-3 step-down module 11.7 x 7.6 mm", pads=pads,
         drawings=(*rectangle("F.SilkS", -3.4, -5.7, 8.48, 2.0), *rectangle("F.Fab", -3.3, -5.6, 8.38, 2.0, 0.1), *names,
-                  *courtyard(-3.55, -5.85, 8.65, 3.1)),
+                  *courtyard(-3.55, -5.85, 8.65, 3.4)),
         ref_at_mm=(2.54, -3.6),
         boxes=(Box(center_mm=(2.54, -1.8), size_mm=(11.7, 7.6), z_mm=(0.5, 10.7), colour=BLACK),),
     )  # fmt: skip

@@ -12,7 +12,7 @@ PITCH_MM = 2.54
 BLUEPILL_ROWS_MM = 15.24
 ESP32_INNER_ROWS_MM = 22.86
 #: Free of copper on both sides, relative to pin 1 of the ESP32: left, top, right, bottom.
-ANTENNA_AREA_MM = (4.3, -13.0, 23.6, -4.5)
+ANTENNA_AREA_MM = (4.3, -13.0, 23.6, -4.0)
 
 _PCB_BLUE, _PCB_BLACK, _SOCKET, _METAL = (0.1, 0.2, 0.5), (0.1, 0.1, 0.12), (0.08, 0.08, 0.09), (0.7, 0.7, 0.72)
 #: A socket of 8.5 mm and a pin header of 2.5 mm hold a module's board at 11 mm.

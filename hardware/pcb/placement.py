@@ -29,7 +29,7 @@ class Place:
 
 #: Pin 1 of the modules.
 BLUEPILL_AT_MM = (11.0, 10.5)
-ESP32_AT_MM = (62.5, 16.0)
+ESP32_AT_MM = (62.5, 11.5)
 #: The rows of resistors: first row, distance, columns of series resistor and pull-down.
 ROW_TOP_MM, ROW_PITCH_MM, SERIES_X_MM, PULL_X_MM = 8.5, 2.75, 46.0, 52.6
 
@@ -93,7 +93,13 @@ def _header_names(design: Design) -> list[Label]:
     labels = []
     for pin, net in header.pins:
         row, column = divmod(int(pin) - 1, 2)
-        text = "GND" if net == "GND" else "RST" if net == "RST_REQ" else short_name((net or "").removesuffix("_BP").lower())
+        text = (
+            "GND"
+            if net == "GND"
+            else "RST"
+            if net == "RST_REQ"
+            else short_name((net or "").removesuffix("_BP").lower())
+        )
         x = at.x_mm + (-1.75 if column == 0 else PITCH_MM + 1.75)
         labels.append(Label(layer="F.SilkS", text=text, at_mm=(x, at.y_mm + PITCH_MM * row), size_mm=0.8,
                             justify="right" if column == 0 else "left"))  # fmt: skip
@@ -109,19 +115,19 @@ _FIXED = {
     "J1": Place(x_mm=11.0, y_mm=94.4, ref_mm=(2.54, 3.6)),
     "F1": Place(x_mm=10.5, y_mm=83.5),
     "D1": Place(x_mm=18.6, y_mm=83.5, angle_deg=180),
-    "D2": Place(x_mm=25.6, y_mm=83.0, angle_deg=90),
+    "D2": Place(x_mm=25.6, y_mm=83.0, angle_deg=90, ref_mm=(0, -4.6)),
     "C1": Place(x_mm=32.0, y_mm=80.5, angle_deg=270),
-    "C2": Place(x_mm=29.0, y_mm=87.0, angle_deg=270),
+    "C2": Place(x_mm=26.0, y_mm=76.6),
     # 5 V from a power bank
     "J2": Place(x_mm=25.0, y_mm=94.4, ref_mm=(2.54, 3.6)),
     "D3": Place(x_mm=40.5, y_mm=92.5, angle_deg=180),
-    "JP1": Place(x_mm=54.5, y_mm=82.0, ref_mm=(0, 7.3)),
-    "C4": Place(x_mm=50.0, y_mm=76.0, angle_deg=90),
+    "JP1": Place(x_mm=55.0, y_mm=82.0, ref_mm=(0, 7.4)),
+    "C4": Place(x_mm=51.0, y_mm=77.0, angle_deg=90),
     "D4": Place(x_mm=13.0, y_mm=69.0, angle_deg=0),
-    "D5": Place(x_mm=63.5, y_mm=55.0, angle_deg=0),
+    "D5": Place(x_mm=66.5, y_mm=52.0),
     "R61": Place(x_mm=43.5, y_mm=96.5),
     "D6": Place(x_mm=50.0, y_mm=96.5, angle_deg=180),
-    "C3": Place(x_mm=49.5, y_mm=86.5, angle_deg=270),
+    "C3": Place(x_mm=51.0, y_mm=88.0, angle_deg=270),
     # RS-232
     "U5": Place(x_mm=76.0, y_mm=71.0),
     "C5": Place(x_mm=69.0, y_mm=67.0, angle_deg=270),
@@ -140,39 +146,52 @@ _FIXED = {
     "Q1": Place(x_mm=58.0, y_mm=70.0),
     "R66": Place(x_mm=46.0, y_mm=69.0),
     "R67": Place(x_mm=52.6, y_mm=70.5),
-    "J5": Place(x_mm=57.2, y_mm=60.0, ref_mm=(0, 5.0)),
-    "R60": Place(x_mm=62.0, y_mm=61.0),
+    "J5": Place(x_mm=60.5, y_mm=60.0, ref_mm=(-2.9, 1.27)),
+    "R60": Place(x_mm=66.5, y_mm=62.5),
     # holes and test points
     "H1": Place(x_mm=4.0, y_mm=4.0), "H2": Place(x_mm=96.0, y_mm=4.0),
     "H3": Place(x_mm=4.0, y_mm=96.0), "H4": Place(x_mm=96.0, y_mm=96.0),
-    "TP1": Place(x_mm=37.0, y_mm=76.5), "TP2": Place(x_mm=37.0, y_mm=71.5),
-    "TP3": Place(x_mm=44.0, y_mm=88.5), "TP4": Place(x_mm=56.0, y_mm=77.0),
+    "TP1": Place(x_mm=34.0, y_mm=75.9), "TP2": Place(x_mm=37.0, y_mm=71.5),
+    "TP3": Place(x_mm=43.5, y_mm=88.6), "TP4": Place(x_mm=56.0, y_mm=77.0),
     "TP5": Place(x_mm=87.5, y_mm=76.5), "TP6": Place(x_mm=20.5, y_mm=69.0),
-    "TP7": Place(x_mm=72.0, y_mm=55.0), "TP8": Place(x_mm=63.0, y_mm=80.5),
-    "TP9": Place(x_mm=60.5, y_mm=65.5), "TP10": Place(x_mm=69.0, y_mm=80.5),
+    "TP7": Place(x_mm=74.0, y_mm=52.0), "TP8": Place(x_mm=63.0, y_mm=80.5),
+    "TP9": Place(x_mm=61.5, y_mm=66.3), "TP10": Place(x_mm=69.0, y_mm=80.5),
     "TP11": Place(x_mm=75.0, y_mm=80.5), "TP12": Place(x_mm=81.0, y_mm=80.5),
 }  # fmt: skip
 
 _VARIANTS: dict[str, dict[str, Place]] = {
     "rev-b": {"U3": Place(x_mm=40.0, y_mm=82.5)},
     "lm317": {
-        "U3": Place(x_mm=42.0, y_mm=83.0),
-        "R68": Place(x_mm=36.0, y_mm=87.5, angle_deg=90), "R69": Place(x_mm=38.6, y_mm=87.5, angle_deg=90),
-        "C11": Place(x_mm=41.6, y_mm=88.0, angle_deg=90),
-        "U4": Place(x_mm=32.5, y_mm=70.0), "R70": Place(x_mm=24.0, y_mm=72.0, angle_deg=90),
-        "R71": Place(x_mm=26.6, y_mm=72.0, angle_deg=90), "C12": Place(x_mm=40.0, y_mm=70.0, angle_deg=90),
-        "C13": Place(x_mm=24.0, y_mm=67.0),
+        "U3": Place(x_mm=43.0, y_mm=80.5),
+        "R68": Place(x_mm=38.0, y_mm=87.5, angle_deg=90, ref_mm=(0, -2.35)), "R69": Place(x_mm=40.4, y_mm=87.5, angle_deg=90, ref_mm=(0, -2.35)),
+        "C11": Place(x_mm=47.0, y_mm=87.0),
+        "U4": Place(x_mm=27.5, y_mm=70.0, ref_mm=(0, 4.4)), "C12": Place(x_mm=34.3, y_mm=69.0, angle_deg=90, ref_mm=(0, -3.1)),
+        "R70": Place(x_mm=40.5, y_mm=69.5, angle_deg=90, ref_mm=(2.5, 0)), "R71": Place(x_mm=40.5, y_mm=73.4, angle_deg=90, ref_mm=(2.5, 0)),
+        "C13": Place(x_mm=27.5, y_mm=64.5),
+        "TP3": Place(x_mm=47.0, y_mm=91.8),
     },
 }  # fmt: skip
 
 _TEXTS: list[Label] = [
     Label(layer="F.SilkS", text="BluePill to Pioneer adapter", at_mm=(25.0, 3.2), size_mm=1.4),
-    Label(layer="F.SilkS", text="+", at_mm=(11.0, 87.4), size_mm=1.5),
-    Label(layer="F.SilkS", text="-", at_mm=(16.08, 87.4), size_mm=1.5),
-    Label(layer="F.SilkS", text="12V IN", at_mm=(13.5, 76.8), size_mm=1.2),
-    Label(layer="F.SilkS", text="+", at_mm=(25.0, 88.2), size_mm=1.2),
+    Label(layer="F.SilkS", text="+12V-", at_mm=(13.54, 87.9), size_mm=1.5),
+    Label(layer="F.SilkS", text="+5V-", at_mm=(27.54, 87.9), size_mm=1.5),
+    Label(layer="F.SilkS", text="11-14.8V", at_mm=(7.0, 78.5), size_mm=0.9, justify="left"),
+    Label(layer="F.SilkS", text="12V", at_mm=(57.0, 82.0), size_mm=0.9, justify="left"),
+    Label(layer="F.SilkS", text="BANK", at_mm=(57.0, 87.08), size_mm=0.8, justify="left"),
+    Label(layer="F.SilkS", text="MODE", at_mm=(60.5, 57.4), size_mm=0.9),
+    Label(layer="F.SilkS", text="PWR", at_mm=(53.6, 96.5), size_mm=0.9),
+    Label(layer="F.SilkS", text="TX", at_mm=(96.0, 63.9), size_mm=0.9),
+    Label(layer="F.SilkS", text="RX", at_mm=(96.0, 68.9), size_mm=0.9),
+    Label(layer="F.SilkS", text="HOST (RS-232 plug, DTE)", at_mm=(76.0, 98.2), size_mm=1.0),
+    Label(layer="F.SilkS", text="LOGIC", at_mm=(36.7, 12.4), size_mm=1.0),
+    Label(layer="F.SilkS", text="3.3V only", at_mm=(36.7, 49.3), size_mm=0.8),
 ]  # fmt: skip
 _TEXTS_OF: dict[str, list[Label]] = {
     "rev-b": [Label(layer="F.SilkS", text="REV B", at_mm=(50.0, 3.2), size_mm=1.6)],
-    "lm317": [Label(layer="F.SilkS", text="REV B-LM317  max 250 mA", at_mm=(50.0, 3.2), size_mm=1.2)],
+    "rev-c": [],
+    "lm317": [
+        Label(layer="F.SilkS", text="REV B LM317", at_mm=(50.0, 3.2), size_mm=1.2),
+        Label(layer="F.SilkS", text="5V: max 250 mA", at_mm=(50.0, 5.4), size_mm=0.9),
+    ],
 }

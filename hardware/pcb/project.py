@@ -24,7 +24,8 @@ def project_text(design: Design) -> str:
                     "min_copper_edge_clearance": rules.EDGE_CLEARANCE_MM,
                     "min_hole_clearance": 0.25,
                     "min_hole_to_hole": 0.25,
-                    "min_resolved_spokes": 2,
+                    # One spoke is enough: every ground pad has its 0.8 mm track besides the pour.
+                    "min_resolved_spokes": 1,
                     "min_silk_clearance": 0.0,
                     "min_text_height": 0.8,
                     "min_text_thickness": 0.1,

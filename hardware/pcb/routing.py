@@ -48,6 +48,8 @@ class Via:
     at_mm: tuple[float, float]
     size_mm: float
     drill_mm: float
+    #: Only joins the two ground pours; pours.py keeps those that meet copper on both sides.
+    is_stitch: bool = False
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -135,7 +137,17 @@ def run_router(design: Design) -> str:
     with tempfile.TemporaryDirectory() as folder:
         program = Path(folder) / "router"
         source = HERE / "router" / "router.cpp"
-        command = [compiler, "-std=c++17", "-O2", "-ffp-contract=off", "-Wall", "-Wextra", str(source), "-o", str(program)]
+        command = [
+            compiler,
+            "-std=c++17",
+            "-O2",
+            "-ffp-contract=off",
+            "-Wall",
+            "-Wextra",
+            str(source),
+            "-o",
+            str(program),
+        ]
         built = subprocess.run(command, capture_output=True, text=True, check=False)
         if built.returncode != 0:
             raise RoutingError(f"the router does not compile:\n{built.stderr}")
@@ -168,7 +180,7 @@ def load_routes(design: Design, path: Path | None = None) -> tuple[list[Track], 
                 tracks.append(Track(net=net, layer=int(layer), start_mm=(x0, y0), end_mm=(x1, y1), width_mm=width))
             else:
                 x, y, size, drill = values
-                vias.append(Via(net=net, at_mm=(x, y), size_mm=size, drill_mm=drill))
+                vias.append(Via(net=net, at_mm=(x, y), size_mm=size, drill_mm=drill, is_stitch=kind == "S"))
         except ValueError as error:
             raise RoutingError(f"{file.name}, line {number}: {line!r} is no track and no via") from error
     return tracks, vias

@@ -184,10 +184,11 @@ def _end(page: Page, placed: PlacedPin) -> None:
         page.nodes.append(node("no_connect", node("at", *_mm(placed.x, placed.y)), page.ident("nc")))
         return
     dx, dy = _OUTWARD[placed.pin.side]
+    crowded = len(placed.component.pins) > 2 and placed.pin.side in {"left", "right"}
     stub = 2 if placed.net not in POWER_SYMBOLS or placed.pin.side in {"left", "right"} else 1
     x, y = placed.x + stub * dx, placed.y + stub * dy
     _wire(page, (placed.x, placed.y), (x, y))
-    if placed.net in POWER_SYMBOLS:
+    if placed.net in POWER_SYMBOLS and not crowded:
         _power(page, placed.net, x, y)
     else:
         _label(page, placed.net, (x, y), placed.pin.side)
@@ -217,7 +218,7 @@ def _power(page: Page, net: str, x: int, y: int) -> None:
 
 
 def _flag(page: Page, net: str, x: int) -> None:
-    y = 144
+    y = 146
     page.used.add("PWR_FLAG")
     page.count += 1
     page.nodes.append(_symbol(page, "PWR_FLAG", f"#FLG{page.count:03d}", "PWR_FLAG", (x, y), {}))
@@ -248,7 +249,9 @@ def _symbol(
         node("on_board", "yes"), node("dnp", "no"),
         node("uuid", Text(uid(page.design.variant, ref, "symbol"))),
     )  # fmt: skip
-    tree.append(property_node("Reference", ref, (x + symbol.ref_at[0], y - symbol.ref_at[1]), is_hidden=symbol.is_power))
+    tree.append(
+        property_node("Reference", ref, (x + symbol.ref_at[0], y - symbol.ref_at[1]), is_hidden=symbol.is_power)
+    )
     tree.append(property_node("Value", value, (x + symbol.value_at[0], y - symbol.value_at[1]),
                               is_hidden=name in {"PWR_FLAG", "TESTPOINT"}))  # fmt: skip
     rows = fields or {"Footprint": "", "Datasheet": "", "Description": ""}

@@ -64,7 +64,7 @@ def _signal_places() -> dict[str, tuple[int, int]]:
     places = {}
     for index in range(len(series_wires(load_pinout()))):
         column, row = divmod(index, 11)
-        x, y = 32 + 106 * column, 26 + 9 * row
+        x, y = 34 + 106 * column, 26 + 9 * row
         places[f"R{index + 1}"] = (x, y)
         places[f"R{index + 1 + PULL_OFFSET}"] = (x + 50, y)
     return places
@@ -76,7 +76,7 @@ def _test_points() -> dict[str, tuple[int, int]]:
 
 _SUPPLY = {
     "J1": (18, 26), "F1": (34, 25), "D1": (50, 25), "D2": (66, 28), "C1": (78, 28), "C2": (92, 28),
-    "J2": (18, 66), "D3": (38, 65), "JP1": (84, 68), "C4": (98, 70),
+    "J2": (18, 66), "D3": (36, 65), "JP1": (80, 68), "C4": (98, 70),
     "D4": (138, 62), "D5": (138, 72), "R61": (182, 62), "D6": (200, 62),
     # Buck and LM317 share the place: a variant has one of them.
     "U3": (138, 26), "C3": (162, 29),
@@ -84,10 +84,10 @@ _SUPPLY = {
     "U4": (38, 104), "R70": (46, 118), "R71": (70, 118), "C12": (62, 107), "C13": (88, 121),
 }  # fmt: skip
 _SERIAL = {
-    "U5": (52, 40), "C5": (18, 33), "C6": (18, 45), "C7": (86, 30), "C8": (86, 44), "C9": (100, 30), "J3": (152, 40),
+    "U5": (64, 40), "C5": (18, 40), "C6": (30, 40), "C7": (96, 40), "C8": (110, 40), "C9": (124, 40), "J3": (156, 40),
     "R62": (46, 82), "R63": (46, 90), "R64": (46, 100), "D7": (60, 100), "R65": (46, 110), "D8": (60, 110),
-    "R66": (142, 88), "R67": (142, 100), "Q1": (166, 88), "J5": (120, 126), "R60": (140, 125),
-    "U6": (190, 48), "C10": (210, 46), "R72": (30, 134), "D9": (46, 134),
+    "R66": (136, 88), "R67": (136, 100), "Q1": (152, 88), "J5": (30, 136), "R60": (48, 137),
+    "U6": (196, 44), "C10": (220, 44), "R72": (194, 90), "D9": (208, 90),
 }  # fmt: skip
 _TEST = {"J4": (44, 44), **_test_points(), **{f"H{n}": (20 + 20 * n, 118) for n in range(1, 5)}}
 _TABLES = {
@@ -105,6 +105,7 @@ _SUPPLY_FRAMES = [
           note="JP1 1-2: from 12 V; 2-3: from the power bank. One jumper only."),
     Frame(title="To the modules", left=116, top=52, right=224, bottom=88,
           note="A diode each: neither module's USB feeds the board or the other module."),
+    Frame(title="For the rule check: these nets are supplied", left=10, top=136, right=130, bottom=156),
 ]  # fmt: skip
 _BUCK_FRAMES = [
     Frame(title="12 V to 5 V, 1 A", left=116, top=12, right=224, bottom=46,
@@ -117,33 +118,33 @@ _LINEAR_FRAMES = [
           note="3.34 V; the ESP32 keeps its own 3.3 V regulator."),
 ]  # fmt: skip
 _REV_C_FRAMES = [
-    Frame(title="Distances by shift register", left=172, top=12, right=228, bottom=70),
-    Frame(title="Status LED", left=10, top=122, right=100, bottom=142),
+    Frame(title="Distances by shift register", left=174, top=12, right=228, bottom=70),
+    Frame(title="Status LED", left=174, top=74, right=228, bottom=110),
 ]
 _FRAMES = {
     "modules": [
-        Frame(title="BluePill (USB at the top)", left=6, top=20, right=108, bottom=112),
+        Frame(title="BluePill (USB at the top)", left=10, top=20, right=108, bottom=112),
         Frame(title="ESP32 D1 mini (antenna at the top)", left=114, top=20, right=224, bottom=112,
               note="GPIO6 to 11 carry the module's flash: never connected."),
     ],
     "signals": [
-        Frame(title="Series resistors and pull-downs", left=6, top=12, right=224, bottom=128,
+        Frame(title="Series resistors and pull-downs", left=10, top=12, right=224, bottom=128,
               note="_BP: the BluePill's side. 1k2 limits what an unpowered module takes; "
                    "680R at PC13 holds a low against the BluePill's LED. IO5 and IO15 are straps: no pull-down."),
     ],
     "serial": [
-        Frame(title="RS-232 at 3.3 V; DIN2 low asserts DTR", left=6, top=12, right=168, bottom=70,
+        Frame(title="RS-232 at 3.3 V; DIN2 low asserts DTR", left=10, top=12, right=170, bottom=70,
               note="Plug, wired as DTE: straight cable to the robot's HOST socket."),
-        Frame(title="UART with activity lights", left=6, top=74, right=100, bottom=118,
+        Frame(title="UART with activity lights", left=10, top=74, right=100, bottom=118,
               note="A light is on while its line is low: it flickers with data."),
-        Frame(title="Reset: PB13 high pulls EN low", left=106, top=74, right=224, bottom=110,
+        Frame(title="Reset: PB13 high pulls EN low", left=106, top=74, right=170, bottom=110,
               note="Emitter to ground. The module has its own pull-up at EN."),
-        Frame(title="Mode jumper, read at boot only", left=106, top=114, right=168, bottom=136),
+        Frame(title="Mode jumper, read at boot only", left=10, top=122, right=100, bottom=144),
     ],
     "test": [
-        Frame(title="Logic header: each wire at its receiver", left=6, top=12, right=84, bottom=70,
+        Frame(title="Logic header: each wire at its receiver", left=10, top=12, right=84, bottom=70,
               note="3.3 V signals. Drive nothing here that a module drives."),
         Frame(title="Test points", left=90, top=12, right=200, bottom=80),
-        Frame(title="Mounting holes M3", left=6, top=106, right=112, bottom=130),
+        Frame(title="Mounting holes M3", left=10, top=106, right=112, bottom=130),
     ],
 }  # fmt: skip

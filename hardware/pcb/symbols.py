@@ -46,7 +46,9 @@ class Symbol:
             yield pin.number, pin.name, pin.kind
 
 
-def _two(name: str, prefix: str, numbers: tuple[str, str], picture: list[tuple[str, tuple[tuple[float, float], ...]]]) -> Symbol:
+def _two(
+    name: str, prefix: str, numbers: tuple[str, str], picture: list[tuple[str, tuple[tuple[float, float], ...]]]
+) -> Symbol:
     """Draw a part that lies across the page, first pin at the left."""
     left, right = numbers
     pins = (Pin(number=left, name=left, kind="passive", at=(-1.5 * G, 0), side="left", length=1.27),
@@ -55,7 +57,9 @@ def _two(name: str, prefix: str, numbers: tuple[str, str], picture: list[tuple[s
                   shows_names=False)  # fmt: skip
 
 
-def _upright(name: str, prefix: str, numbers: tuple[str, str], picture: list[tuple[str, tuple[tuple[float, float], ...]]]) -> Symbol:
+def _upright(
+    name: str, prefix: str, numbers: tuple[str, str], picture: list[tuple[str, tuple[tuple[float, float], ...]]]
+) -> Symbol:
     """Draw a part that stands, first pin at the top."""
     top, bottom = numbers
     pins = (Pin(number=top, name=top, kind="passive", at=(0, 1.5 * G), side="top", length=2.54),
@@ -89,8 +93,9 @@ def _box(
                 x = G * (index - (len(entries) - 1) // 2)
                 pins.append(Pin(number=row[0], name=row[1], kind=row[2], side=side, at=(x, sign * (half_height + G))))
     body = (("rectangle", ((-half_width, half_height), (half_width, -half_height))),)
-    return Symbol(name=name, prefix=prefix, pins=tuple(pins), picture=body, ref_at=(-half_width + 2.54, half_height + 1.9),
-                  value_at=(half_width - 3.81, -half_height - 1.9))  # fmt: skip
+    value_at = (half_width - 2.54, half_height + 1.9) if half_width > 6 else (0.0, -half_height - 1.9)
+    return Symbol(name=name, prefix=prefix, pins=tuple(pins), picture=body, value_at=value_at,
+                  ref_at=(-half_width + 2.54, half_height + 1.9))  # fmt: skip
 
 
 def _power(name: str, picture: list[tuple[str, tuple[tuple[float, float], ...]]], *, is_up: bool) -> Symbol:
@@ -108,7 +113,9 @@ _BAR = ("polyline", ((1.27, 1.27), (1.27, -1.27)))
 _SCHOTTKY_BAR = ("polyline", ((0.6, 0.8), (0.6, 1.27), (1.27, 1.27), (1.27, -1.27), (1.94, -1.27), (1.94, -0.8)))
 
 
-def _module(pins: tuple[str, ...], names: Mapping[str, str], *, is_source: bool) -> dict[str, list[tuple[str, str, str] | None]]:
+def _module(
+    pins: tuple[str, ...], names: Mapping[str, str], *, is_source: bool
+) -> dict[str, list[tuple[str, str, str] | None]]:
     rows: list[tuple[str, str, str] | None] = []
     for number, pin in enumerate(pins, start=1):
         alias = f"{pin}({names[pin]})" if pin in names else pin
@@ -231,7 +238,9 @@ def _shape(kind: str, points: tuple[tuple[float, float], ...]) -> Node:
     if kind == "circle":
         (x, y), (edge, _) = points
         return node("circle", node("center", x, y), node("radius", edge - x), line, node("fill", node("type", "none")))
-    return node("polyline", node("pts", *(node("xy", *point) for point in points)), line, node("fill", node("type", "none")))
+    return node(
+        "polyline", node("pts", *(node("xy", *point) for point in points)), line, node("fill", node("type", "none"))
+    )
 
 
 def _pin(pin: Pin) -> Node:

@@ -13,7 +13,7 @@
 // Input:  grid W H edge ; classes N then (track clearance via drill) each ; nets N then (name class) each ;
 //         pads N then (net layers x0 y0 x1 y1) each, net -1 for foreign copper ;
 //         keepouts N then (x0 y0 x1 y1) each ; stitch net pitch
-// Output: T net layer x0 y0 x1 y1 width | V net x y diameter drill
+// Output: T net layer x0 y0 x1 y1 width | V net x y diameter drill | S like V: a place for a stitching via
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
@@ -308,7 +308,7 @@ struct Router {
                         if (far < distance && copper[cell] == 0 && open(kVia, net, cell) && busy[kVia][own][cell] <= (mine ? 1 : 0)) { best = cell; distance = far; }
                     }
                 if (best < 0) continue;
-                std::printf("V %s %.3f %.3f %.2f %.2f\n", nets[net].name.c_str(), best % nx * grid, best / nx * grid, cls.via, cls.drill);
+                std::printf("S %s %.3f %.3f %.2f %.2f\n", nets[net].name.c_str(), best % nx * grid, best / nx * grid, cls.via, cls.drill);
             }
     }
 

@@ -1,0 +1,101 @@
+"""`python -m hardware.pcb VERB`: builds, checks, routes, fills and simulates the board.
+
+Exit codes: 0 done, 1 something failed, 2 wrong usage.
+"""
+
+import argparse
+import sys
+import tempfile
+from functools import partial
+from pathlib import Path
+
+from hardware.pcb import build, checks, kicad, pictures
+from hardware.pcb.board import board_text
+from hardware.pcb.design import BOARD_VARIANTS
+from hardware.pcb.design import build as design_of
+from hardware.pcb.netlist import DesignError
+from hardware.pcb.pours import KicadMissingError, fill_and_stitch
+from hardware.pcb.routing import HERE, RoutingError, load_routes, run_router
+from hardware.pcb.spice.run import NgspiceMissingError, SimulationError
+
+
+def main(arguments: list[str] | None = None) -> int:
+    """Run one verb; return the exit code."""
+    parser = argparse.ArgumentParser(prog="python -m hardware.pcb", description=__doc__)
+    verbs = parser.add_subparsers(dest="verb", required=True)
+    verbs.add_parser("build", help="write every generated file (KiCad's part only where it is installed)")
+    checking = verbs.add_parser("check", help="run every check and print a table")
+    checking.add_argument("--strict", action="store_true", help="a missing tool is a failure")
+    for name, words in (("route", "route the boards anew (needs a C++ compiler)"), ("pour", "fill the ground pours anew")):
+        one = verbs.add_parser(name, help=words)
+        one.add_argument("variant", nargs="*", help=f"one of {', '.join(BOARD_VARIANTS)}; none for all")
+    verbs.add_parser("simulate", help="run every circuit simulation and renew its plots")
+    given = parser.parse_args(arguments)
+    try:
+        return _VERBS[given.verb](given)
+    except (DesignError, RoutingError, KicadMissingError, kicad.KicadFailedError, NgspiceMissingError, SimulationError) as error:
+        sys.stderr.write(f"board: {error}\n")
+        return 1
+
+
+def _build(_: argparse.Namespace) -> int:
+    written = build.write_sources()
+    print(f"{len(written)} generated files renewed")
+    if kicad.version() is None:
+        print("KiCad 9 is not installed: gerbers and pictures stay as they are (hint: tools/install_board_tools.sh)")
+        return 0
+    for variant in BOARD_VARIANTS:
+        with tempfile.TemporaryDirectory() as folder:
+            files = build.fabrication_files(variant, Path(folder) / "fabrication")
+        target = build.GENERATED / variant / f"{variant}-gerbers.zip"
+        target.write_bytes(build.archive(files))
+        print(f"{target.name}: {len(files)} files, {target.stat().st_size} bytes")
+    for path in pictures.write_all():
+        print(f"{path.name}: {path.stat().st_size} bytes")
+    return 0
+
+
+def _check(given: argparse.Namespace) -> int:
+    results = checks.run_all()
+    print(checks.table(results))
+    failed = [result for result in results if result.verdict == "FAIL" or (given.strict and result.verdict == "skipped")]
+    return 1 if failed else 0
+
+
+def _route(given: argparse.Namespace) -> int:
+    for variant in _variants(given.variant):
+        text = run_router(design_of(variant))
+        (HERE / "routes" / f"{variant}.txt").write_text(text, encoding="utf-8", newline="\n")
+        print(f"routes/{variant}.txt: {text.count(chr(10) + 'T ')} tracks, {text.count(chr(10) + 'V ')} vias")
+    return 0
+
+
+def _pour(given: argparse.Namespace) -> int:
+    for variant in _variants(given.variant):
+        design = design_of(variant)
+        tracks, vias = load_routes(design)
+        text = fill_and_stitch(partial(board_text, design, tracks), vias)
+        (HERE / "pours" / f"{variant}.txt").write_text(text, encoding="utf-8", newline="\n")
+        print(f"pours/{variant}.txt: {text.count('S ')} stitching vias, {text.count('.Cu ')} polygons")
+    return 0
+
+
+def _simulate(_: argparse.Namespace) -> int:
+    results = checks.simulations()
+    print(checks.table(results))
+    for path in pictures.write_plots():
+        print(f"{path.name}: {path.stat().st_size} bytes")
+    return 1 if any(result.verdict == "FAIL" for result in results) else 0
+
+
+def _variants(names: list[str]) -> list[str]:
+    unknown = [name for name in names if name not in BOARD_VARIANTS]
+    if unknown:
+        raise DesignError(f"variant {unknown[0]!r} has no board (one of {', '.join(BOARD_VARIANTS)})")
+    return names or list(BOARD_VARIANTS)
+
+
+_VERBS = {"build": _build, "check": _check, "route": _route, "pour": _pour, "simulate": _simulate}
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,104 @@
+"""Every generated file of the board, by path: what `make board` writes and what the checks compare.
+
+Invariant: `sources` is a pure function of design, routes and pours; it needs no KiCad.
+"""
+
+import io
+import zipfile
+from pathlib import Path
+
+from hardware.pcb import bom, kicad, project
+from hardware.pcb.board import board_text, footprint_file
+from hardware.pcb.design import BOARD_VARIANTS, VARIANTS, build
+from hardware.pcb.footprints import FOOTPRINTS
+from hardware.pcb.models import model_text
+from hardware.pcb.netlist import Design
+from hardware.pcb.parts import PARTS
+from hardware.pcb.pours import load_pours
+from hardware.pcb.routing import HERE, load_routes
+from hardware.pcb.schematic import library_text, page_text, root_text
+from hardware.pcb.schematic_pages import PAGES
+
+GENERATED = HERE / "generated"
+PICTURES = HERE.parent.parent / "docs" / "pictures" / "board"
+#: The date inside the archive: the oldest that the format knows, so that it never changes.
+_ZIP_DATE = (1980, 1, 1, 0, 0, 0)
+
+
+def sources() -> dict[str, str]:
+    """Return the text of every file that needs no KiCad, by its path below generated/.
+
+    Raises:
+        RoutingError: Routes or pours are missing or were made for another placement.
+    """
+    files = {"library/adapter.kicad_sym": library_text()}
+    bought = {part.footprint: part.bought for part in PARTS.values()}
+    for footprint in FOOTPRINTS.values():
+        files[f"library/adapter.pretty/{footprint.name}.kicad_mod"] = footprint_file(
+            footprint, is_bought=bought.get(footprint.name, True)
+        )
+        files[f"library/models/{footprint.name}.wrl"] = model_text(footprint)
+    for variant in VARIANTS:
+        for name, text in variant_sources(build(variant)).items():
+            files[f"{variant}/{name}"] = text
+    return files
+
+
+def variant_sources(design: Design) -> dict[str, str]:
+    """Return the files of one variant by name."""
+    variant = design.variant
+    files = {f"{variant}.kicad_sch": root_text(design), f"{variant}.kicad_pro": project.project_text(design)}
+    files |= {f"{variant}-{page}.kicad_sch": page_text(design, page) for page in PAGES}
+    files |= project.library_tables()
+    files[f"{variant}-bom.csv"] = bom.csv_text(design)
+    if variant in BOARD_VARIANTS:
+        tracks, vias = load_routes(design)
+        pours, stitches = load_pours(variant)
+        routed = [via for via in vias if not via.is_stitch]
+        files[f"{variant}.kicad_pcb"] = board_text(design, tracks, [*routed, *stitches], pours)
+        files[f"{variant}-placement.csv"] = bom.placement_csv(design)
+        files[f"{variant}-bom.html"] = bom.html_text(design)
+    return files
+
+
+def write_sources(folder: Path = GENERATED) -> list[str]:
+    """Write what changed; return the paths written."""
+    written = []
+    for name, text in sources().items():
+        path = folder / name
+        if not path.exists() or path.read_text(encoding="utf-8") != text:
+            path.parent.mkdir(parents=True, exist_ok=True)
+            path.write_text(text, encoding="utf-8", newline="\n")
+            written.append(name)
+    return written
+
+
+def stale_files(folder: Path = GENERATED) -> list[str]:
+    """Return the generated files that differ from what the design gives now, or are missing."""
+    return [
+        name
+        for name, text in sources().items()
+        if not (folder / name).exists() or (folder / name).read_text(encoding="utf-8") != text
+    ]
+
+
+def fabrication_files(variant: str, work: Path, folder: Path = GENERATED) -> dict[str, str]:
+    """Return gerbers and drill files of a variant by name, without their date lines; needs KiCad.
+
+    Args:
+        variant: One with a board.
+        work: A folder to write into.
+        folder: Where the generated board stands.
+    """
+    work.mkdir(parents=True, exist_ok=True)
+    kicad.fabrication(folder / variant / f"{variant}.kicad_pcb", work)
+    return {path.name: path.read_text(encoding="utf-8") for path in sorted(work.iterdir())}
+
+
+def archive(files: dict[str, str]) -> bytes:
+    """Return a zip archive that is the same for the same files."""
+    out = io.BytesIO()
+    with zipfile.ZipFile(out, "w", zipfile.ZIP_DEFLATED) as target:
+        for name in sorted(files):
+            target.writestr(zipfile.ZipInfo(name, _ZIP_DATE), files[name], zipfile.ZIP_DEFLATED, 9)
+    return out.getvalue()

@@ -1,0 +1,109 @@
+"""Pictures for docs/: the board from above and below, schematic pages, assembly drawings, plots.
+
+They need KiCad, pdftoppm (poppler-utils) and matplotlib, and are small on purpose.
+A picture is for looking at: no check compares it.
+"""
+
+import shutil
+import subprocess
+import tempfile
+from pathlib import Path
+
+from hardware.pcb import build, kicad
+from hardware.pcb.design import BOARD_VARIANTS, VARIANTS
+from hardware.pcb.schematic_pages import PAGES
+from hardware.pcb.spice.decks import Deck, decks
+from hardware.pcb.spice.run import Result, simulate
+
+_PAGE_DPI = 80
+_SIDES = {
+    "top": ("--side", "top"),
+    "bottom": ("--side", "bottom"),
+    "view": ("--rotate", "-50,0,-28", "--perspective", "--zoom", "0.9"),
+}
+
+
+def write_all() -> list[Path]:
+    """Renew every picture of every variant; return the files."""
+    files = []
+    build.PICTURES.mkdir(parents=True, exist_ok=True)
+    for variant in BOARD_VARIANTS:
+        files += board_pictures(variant)
+    for variant in VARIANTS:
+        files += schematic_pictures(variant)
+    return files
+
+
+def board_pictures(variant: str) -> list[Path]:
+    """Render a board from both sides and at an angle, and draw its assembly."""
+    board = build.GENERATED / variant / f"{variant}.kicad_pcb"
+    files = []
+    for side, arguments in _SIDES.items():
+        if variant != "rev-b" and side != "top":
+            continue
+        file = build.PICTURES / f"{variant}-{side}.png"
+        kicad.picture(board, file, *arguments, "--width", "1000", "--height", "1000", "--background", "opaque")
+        _shrink(file)
+        files.append(file)
+    drawing = build.GENERATED / variant / f"{variant}-assembly.svg"
+    kicad.assembly(board, drawing)
+    drawing.write_text(kicad.without_dates(drawing.read_text(encoding="utf-8")), encoding="utf-8", newline="\n")
+    return [*files, drawing]
+
+
+def schematic_pictures(variant: str) -> list[Path]:
+    """Draw the pages of a schematic; of the variants only the page that differs."""
+    if shutil.which("pdftoppm") is None:
+        return []
+    wanted = {"rev-b": PAGES, "lm317": ("supply",), "rev-c": ("serial", "modules")}[variant]
+    files = []
+    with tempfile.TemporaryDirectory() as folder:
+        pdf = Path(folder) / "pages.pdf"
+        kicad.schematic_pdf(build.GENERATED / variant / f"{variant}.kicad_sch", pdf)
+        for page in wanted:
+            number = str(PAGES.index(page) + 2)
+            target = build.PICTURES / f"{variant}-{page}"
+            subprocess.run(["pdftoppm", "-r", str(_PAGE_DPI), "-f", number, "-l", number, "-singlefile", "-png", str(pdf),
+                            str(target)], check=True)  # fmt: skip
+            file = target.with_suffix(".png")
+            _shrink(file)
+            files.append(file)
+    return files
+
+
+def write_plots() -> list[Path]:
+    """Simulate every deck and renew its plot."""
+    build.PICTURES.mkdir(parents=True, exist_ok=True)
+    return [_plot(simulate(deck), deck) for deck in decks()]
+
+
+def _plot(result: Result, deck: Deck) -> Path:
+    import matplotlib as mpl
+
+    mpl.use("Agg")
+    import matplotlib.pyplot as plt
+
+    figure, axes = plt.subplots(figsize=(5.6, 3.0), dpi=90, layout="constrained")
+    x = [value * deck.x_scale for value in result.columns[0]]
+    for column, (_, legend) in zip(result.columns[1:], deck.traces, strict=True):
+        axes.plot(x, column, label=legend, linewidth=1.4)
+    axes.set_title(deck.title, fontsize=9)
+    axes.set_xlabel(deck.x_label, fontsize=8)
+    axes.set_ylabel(deck.y_label, fontsize=8)
+    axes.tick_params(labelsize=8)
+    axes.grid(visible=True, alpha=0.3)
+    axes.legend(fontsize=7)
+    file = build.PICTURES / f"sim-{deck.name}.png"
+    figure.savefig(file, metadata={"Software": None})
+    plt.close(figure)
+    _shrink(file)
+    return file
+
+
+def _shrink(file: Path) -> None:
+    """Store a picture with 128 colours: a fifth of the size, and no difference to the eye."""
+    from PIL import Image
+
+    with Image.open(file) as image:
+        small = image.convert("RGB").quantize(128, dither=Image.Dither.NONE)
+    small.save(file, optimize=True)

@@ -1,0 +1,168 @@
+"""The filled shape of the ground pours: asked of KiCad, kept as data in pours/VARIANT.txt.
+
+KiCad's filler is the one part of the board that is not computed here. The result is
+committed, so that a build needs no KiCad; `make board-check` fills again and compares.
+"""
+
+import shutil
+import subprocess
+import tempfile
+from collections.abc import Callable
+from pathlib import Path
+
+from hardware.pcb import rules
+from hardware.pcb.board import ORIGIN_MM
+from hardware.pcb.routing import HERE, RoutingError, Via
+from hardware.pcb.sexp import Node, Text, children, node, number, parse, word
+
+#: Runs in the system's Python: KiCad installs its module there and nowhere else.
+_SCRIPT = (
+    "import sys, pcbnew; board = pcbnew.LoadBoard(sys.argv[1]);"
+    "pcbnew.ZONE_FILLER(board).Fill(board.Zones()); board.Save(sys.argv[2])"
+)
+_LIMIT_S = 300
+LAYERS = ("F.Cu", "B.Cu")
+
+
+class KicadMissingError(RuntimeError):
+    """KiCad 9 is not installed."""
+
+
+def kicad_python() -> str:
+    """Return the Python that has KiCad's module.
+
+    Raises:
+        KicadMissingError: None has.
+    """
+    for python in ("/usr/bin/python3", shutil.which("python3")):
+        if python and Path(python).exists():
+            done = subprocess.run([python, "-c", "import pcbnew"], capture_output=True, check=False)
+            if done.returncode == 0:
+                return python
+    raise KicadMissingError("KiCad's Python module is not installed (hint: tools/install_board_tools.sh)")
+
+
+def fill(board_text: str) -> dict[str, list[Node]]:
+    """Return the filled polygons of a board by layer, computed by KiCad.
+
+    Raises:
+        KicadMissingError: KiCad is not installed.
+        RoutingError: KiCad could not read the board.
+    """
+    with tempfile.TemporaryDirectory() as folder:
+        before, after = Path(folder) / "before.kicad_pcb", Path(folder) / "after.kicad_pcb"
+        before.write_text(board_text, encoding="utf-8")
+        command = [kicad_python(), "-c", _SCRIPT, str(before), str(after)]
+        done = subprocess.run(command, capture_output=True, text=True, timeout=_LIMIT_S, check=False)
+        if done.returncode != 0 or not after.exists():
+            raise RoutingError(f"KiCad could not fill the pours: {done.stderr.strip()[-300:]}")
+        return _polygons(after.read_text(encoding="utf-8"))
+
+
+def kept_stitches(vias: list[Via], pours: dict[str, list[Node]]) -> list[Via]:
+    """Return the stitching vias whose whole ring lies in a pour on both sides.
+
+    Args:
+        vias: Places that the router found free.
+        pours: The pours as filled without any stitching via, so that no island hangs on one.
+    """
+    shapes = {layer: [_points(polygon) for polygon in found] for layer, found in pours.items()}
+    kept = []
+    for via in vias:
+        x, y = _shift(via.at_mm)
+        ring = [(x + via.size_mm / 2 * dx, y + via.size_mm / 2 * dy) for dx, dy in _RING]
+        if all(any(all(_is_inside(point, shape) for point in ring) for shape in shapes[layer]) for layer in LAYERS):
+            kept.append(via)
+    return kept
+
+
+def pours_text(pours: dict[str, list[Node]], stitches: list[Via]) -> str:
+    """Return the text of a pours file: stitching vias, then one polygon a line, micrometres from the board's corner."""
+    lines = [f"S {round(via.at_mm[0] * 1e3)},{round(via.at_mm[1] * 1e3)}" for via in stitches]
+    for layer in LAYERS:
+        for polygon in pours.get(layer, []):
+            points = (
+                f"{round((x - ORIGIN_MM[0]) * 1e3)},{round((y - ORIGIN_MM[1]) * 1e3)}" for x, y in _points(polygon)
+            )
+            lines.append(f"{layer} " + " ".join(points))
+    return "\n".join(lines) + "\n"
+
+
+def load_pours(variant: str, path: Path | None = None) -> tuple[dict[str, list[Node]], list[Via]]:
+    """Read the committed pours of a variant and the stitching vias between them.
+
+    Raises:
+        RoutingError: The file is missing or broken.
+    """
+    file = path or HERE / "pours" / f"{variant}.txt"
+    try:
+        lines = file.read_text(encoding="utf-8").splitlines()
+    except OSError as error:
+        raise RoutingError(f"cannot read {file.name}: {error.strerror} (hint: python -m hardware.pcb pour)") from error
+    pours: dict[str, list[Node]] = {layer: [] for layer in LAYERS}
+    stitches: list[Via] = []
+    for count, line in enumerate(lines, start=1):
+        layer, *pairs = line.split()
+        try:
+            if layer == "S":
+                ((x, y),) = (pair.split(",") for pair in pairs)
+                stitches.append(stitch_at(int(x) * 1e-3, int(y) * 1e-3))
+                continue
+            points = [(int(x) * 1e-3, int(y) * 1e-3) for x, y in (pair.split(",") for pair in pairs)]
+            polygon = node("filled_polygon", node("layer", Text(layer)), node("pts"))
+            polygon[2] = node("pts", *(node("xy", *_shift(point)) for point in points))
+            pours[layer].append(polygon)
+        except (ValueError, KeyError) as error:
+            raise RoutingError(f"pours of {variant}, line {count}: no polygon of F.Cu or B.Cu") from error
+    return pours, stitches
+
+
+def stitch_at(x_mm: float, y_mm: float) -> Via:
+    """Return a stitching via at a place of the board."""
+    size, drill = rules.POWER.via_mm, rules.POWER.via_drill_mm
+    return Via(net="GND", at_mm=(round(x_mm, 3), round(y_mm, 3)), size_mm=size, drill_mm=drill, is_stitch=True)
+
+
+def _is_inside(point: tuple[float, float], shape: list[tuple[float, float]]) -> bool:
+    """Tell whether a point lies in a polygon: an odd number of its sides pass to the right."""
+    x, y = point
+    inside = False
+    for (x0, y0), (x1, y1) in zip(shape, shape[1:] + shape[:1], strict=True):
+        if (y0 > y) != (y1 > y) and x < (x1 - x0) * (y - y0) / (y1 - y0) + x0:
+            inside = not inside
+    return inside
+
+
+#: Eight points of a ring's rim, and its middle.
+_RING = ((0, 0), (1, 0), (0.7, 0.7), (0, 1), (-0.7, 0.7), (-1, 0), (-0.7, -0.7), (0, -1), (0.7, -0.7))
+
+
+def _shift(point: tuple[float, float]) -> tuple[float, float]:
+    return (round(point[0] + ORIGIN_MM[0], 3), round(point[1] + ORIGIN_MM[1], 3))
+
+
+def _polygons(text: str) -> dict[str, list[Node]]:
+    pours: dict[str, list[Node]] = {layer: [] for layer in LAYERS}
+    for zone in children(parse(text), "zone"):
+        for polygon in children(zone, "filled_polygon"):
+            layer = word(children(polygon, "layer")[0])
+            pours[layer].append(polygon)
+    return pours
+
+
+def _points(polygon: Node) -> list[tuple[float, float]]:
+    pts = children(polygon, "pts")[0]
+    return [(float(number(float(word(xy, 1)))), float(word(xy, 2))) for xy in children(pts, "xy")]
+
+
+def fill_and_stitch(board: Callable[[list[Via], dict[str, list[Node]]], str], vias: list[Via]) -> str:
+    """Fill twice, without and with stitching vias; return the text of the pours file.
+
+    Args:
+        board: Gives the board's text for a list of vias and pours.
+        vias: The router's, stitching places included.
+    """
+    routed = [via for via in vias if not via.is_stitch]
+    bare = fill(board(routed, {}))
+    stitches = kept_stitches([via for via in vias if via.is_stitch], bare)
+    return pours_text(fill(board([*routed, *stitches], {})), stitches)
