@@ -200,11 +200,12 @@ class Session:
 
     def line_lost(self, reason: str, now: Nanos) -> None:
         """Take the news that the line has gone, with all that was to be sent on it."""
-        self.outbox.clear()
         if self.link is Link.OPEN:
-            self._lose(reason, now)
-        elif self.link in {Link.OPENING, Link.SEARCHING, Link.STARTING}:
-            self._give_up_try(reason, None, now)
+            self.news.append(LinkLost(reason))
+            self._wait_or_fail(reason, None, now)
+        elif self.link in {Link.SEARCHING, Link.STARTING}:
+            self._wait_or_fail(reason, None, now)
+        self.outbox.clear()
 
     def receive(self, data: bytes, now: Nanos) -> None:
         """Take bytes of the robot."""

@@ -12,7 +12,7 @@ from functools import cache
 from random import Random
 
 from p2os.client.core import RobotCore
-from p2os.client.notices import Notice
+from p2os.client.notices import LinkLost, Notice
 from p2os.client.outbox import CloseLine, OpenLine, Send, SetBaud
 from p2os.client.settings import ClientSettings
 from p2os.client.snapshots import Link, RobotState
@@ -78,6 +78,11 @@ class Rig:
         self.line_baud: int | None = None
         self.said: list[tuple[int, Command]] = []
         self.news: list[RobotState | Notice] = []
+        #: How long each search took.
+        self.searches_ns: list[int] = []
+        self._searching_since: int | None = None
+        #: How many commands had been said at each loss.
+        self.losses: list[int] = []
         self._on_the_way: list[tuple[int, int, bool, bytes]] = []
         self._last: dict[bool, int] = {}
         self._count = 0
@@ -162,9 +167,19 @@ class Rig:
         for data in self.pioneer.take_output():
             self._carry(data, to_robot=False)
         self.core.advance_to(self.now)
+        self._collect()
         while (action := self.core.take_action(self.now)) is not None:
             self._do(action)
             self.core.advance_to(self.now)
+            self._collect()
+
+    def _collect(self) -> None:
+        if self.core.link in {Link.SEARCHING, Link.STARTING}:
+            self._searching_since = self.now if self._searching_since is None else self._searching_since
+        elif self._searching_since is not None:
+            self.searches_ns.append(self.now - self._searching_since)
+            self._searching_since = None
+        self.losses += [len(self.said) for item in self.core.news if isinstance(item, LinkLost)]
         self.news += self.core.news
         self.core.news.clear()
 
