@@ -71,8 +71,13 @@ class DecoderStats:
     stalled: int = 0
     #: Frames found among the bytes of a rejected one.
     rescued: int = 0
-    #: The bytes that were rejected last, at most 32.
+    #: The bytes that were rejected last, at most 32, whatever the reason.
     last_rejected: bytes = b""
+    #: The last offending bytes of each kind, at most 32.
+    last_noise: bytes = b""
+    last_bad_checksum: bytes = b""
+    last_bad_count: bytes = b""
+    last_stalled: bytes = b""
 
 
 class Decoder:
@@ -108,6 +113,7 @@ class Decoder:
         if self._buffer and limit >= self._last_byte_ns + GIVE_UP_NS:
             while self._buffer:
                 self.stats.stalled += 1
+                self.stats.last_stalled = bytes(self._buffer[:KEPT_BYTES])
                 self._items.append(Stalled(bytes(self._buffer)))
                 self._reject(len(self._buffer))
                 self._scan()
@@ -127,6 +133,7 @@ class Decoder:
             if not MIN_COUNT <= count <= MAX_COUNT:
                 self._flush_noise()
                 self.stats.bad_counts += 1
+                self.stats.last_bad_count = bytes(buffer[:KEPT_BYTES])
                 self._items.append(BadCount(count))
                 self._reject(PREFIX_BYTES)
                 continue
@@ -155,6 +162,7 @@ class Decoder:
             self._consume(len(data))
             return
         self.stats.bad_checksums += 1
+        self.stats.last_bad_checksum = data[:KEPT_BYTES]
         self._items.append(BadChecksum(data, expected, got))
         self._reject(len(data))
 
@@ -175,7 +183,9 @@ class Decoder:
 
     def _flush_noise(self) -> None:
         if self._noise:
-            self._items.append(Noise(bytes(self._noise)))
+            noise = bytes(self._noise)
+            self.stats.last_noise = noise[:KEPT_BYTES]
+            self._items.append(Noise(noise))
             self._noise.clear()
 
     def snapshot(self) -> object:
