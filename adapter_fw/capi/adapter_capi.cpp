@@ -4,6 +4,7 @@
 #include <new>
 
 #include "../core/adapter/adapter.hpp"
+#include "../core/adapter/fields.hpp"
 
 namespace {
 
@@ -12,39 +13,11 @@ using adapter::RobotNumbers;
 using adapter::Settings;
 using adapter::WireNumbers;
 
-//: A number of a structure: its name, and how it is read and written as 64 bits.
-template <typename Owner>
-struct Field {
-  const char* name;
-  std::int64_t (*get)(const Owner& owner);
-  void (*set)(Owner& owner, std::int64_t value);
-};
+using adapter::Field;
+using adapter::setting;
+using adapter::setting_count;
 
-#define FIELD(Owner, member)                                                                       \
-  {                                                                                                \
-    #member, [](const Owner& owner) { return static_cast<std::int64_t>(owner.member); },           \
-        [](Owner& owner, std::int64_t value) { owner.member = static_cast<decltype(owner.member)>(value); } \
-  }
-#define BAUD(place)                                                                      \
-  {                                                                                      \
-    "baud" #place, [](const Settings& owner) { return std::int64_t{owner.bauds[place]}; }, \
-        [](Settings& owner, std::int64_t value) { owner.bauds[place] = static_cast<std::int32_t>(value); } \
-  }
-
-constexpr Field<Settings> SETTINGS[] = {
-    FIELD(Settings, threshold_um), FIELD(Settings, bit_order), FIELD(Settings, motor_meaning),
-    FIELD(Settings, step_um_per_s), FIELD(Settings, angular_step_urad_per_s), FIELD(Settings, max_velocity_mm_s),
-    FIELD(Settings, max_rotation_deg_s), FIELD(Settings, sample_period_ns), FIELD(Settings, sample_count),
-    FIELD(Settings, connect_after_ns), FIELD(Settings, disconnect_after_ns), FIELD(Settings, boot_ns),
-    FIELD(Settings, pair_spacing_ns), FIELD(Settings, refresh_ns), FIELD(Settings, pulse_ns),
-    FIELD(Settings, liveness_ns), FIELD(Settings, first_sip_ns), FIELD(Settings, retry_ns),
-    FIELD(Settings, disbelief_ns), FIELD(Settings, disbelief_tolerance_mm_s),
-    FIELD(Settings, disbelief_progress_mm_s), FIELD(Settings, distance_stale_ns), FIELD(Settings, settle_ns),
-    FIELD(Settings, encoder_at_open), FIELD(Settings, encoder_dwell_ns), FIELD(Settings, stop_unknown_robot),
-    FIELD(Settings, stop_repeats), FIELD(Settings, stop_repeat_ns), FIELD(Settings, pad_velocity_mm_s),
-    FIELD(Settings, pad_rotation_mrad_s), FIELD(Settings, pad_trigger_dead), FIELD(Settings, pad_stick_dead),
-    FIELD(Settings, pad_loss_ns), BAUD(0), BAUD(1), BAUD(2), BAUD(3), BAUD(4), BAUD(5), BAUD(6), BAUD(7),
-};
+#define FIELD(Owner, member) ADAPTER_FIELD(Owner, member)
 
 constexpr Field<RobotNumbers> ROBOT[] = {
     FIELD(RobotNumbers, distance_nm_per_count), FIELD(RobotNumbers, angle_counts_per_turn),
@@ -113,7 +86,10 @@ int32_t adapter_version(void) { return ADAPTER_CAPI_VERSION; }
 
 adapter_handle* adapter_new(const int64_t* settings, const int64_t* robot, const int64_t* wires,
                             const adapter_callbacks* callbacks, int64_t now, const char** fault) {
-  const Settings set = read(SETTINGS, settings);
+  Settings set;
+  for (std::int32_t place = 0; place < setting_count(); ++place) {
+    setting(place).set(set, settings[place]);
+  }
   const RobotNumbers numbers = read(ROBOT, robot);
   const WireNumbers board = read(WIRES, wires);
   *fault = adapter::fault_of(board);
@@ -135,10 +111,12 @@ adapter_handle* adapter_new(const int64_t* settings, const int64_t* robot, const
 
 void adapter_free(adapter_handle* handle) { delete handle; }
 
-const char* adapter_setting_name(int32_t place) { return name_at(SETTINGS, place); }
+const char* adapter_setting_name(int32_t place) {
+  return place >= 0 && place < setting_count() ? setting(place).name : nullptr;
+}
 const char* adapter_robot_name(int32_t place) { return name_at(ROBOT, place); }
 const char* adapter_wire_name(int32_t place) { return name_at(WIRES, place); }
-int64_t adapter_setting_default(int32_t place) { return SETTINGS[place].get(Settings{}); }
+int64_t adapter_setting_default(int32_t place) { return setting(place).get(Settings{}); }
 
 void adapter_receive(adapter_handle* handle, const uint8_t* data, size_t size, int64_t now) {
   handle->part.receive({data, size}, now);

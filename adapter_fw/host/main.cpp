@@ -1,0 +1,188 @@
+// The adapter as a PC program: the firmware's core on any line, its wires on a Unix socket.
+//
+//   p2os-adapter --line tcp:127.0.0.1:8101 --wires /tmp/wires.sock [--robot p2dx] [--settings FILE]
+//
+// Standard input is the console (type help), events go to standard error. SIGINT and
+// SIGTERM stop and close the robot first. Exit codes: 0 ended, 1 the line is gone,
+// 2 wrong usage, 130 interrupted.
+
+#include <poll.h>
+#include <unistd.h>
+
+#include <csignal>
+#include <cstdio>
+#include <cstring>
+#include <ctime>
+#include <string>
+
+#include "../core/shell/console.hpp"
+#include "../core/shell/runner.hpp"
+#include "../generated/robots.hpp"
+#include "file_store.hpp"
+#include "line.hpp"
+#include "wires.hpp"
+
+namespace {
+
+volatile std::sig_atomic_t interrupted = 0;
+
+class MonotonicClock final : public hal::Clock {
+ public:
+  p2os::Nanos now() override {
+    timespec time{};
+    ::clock_gettime(CLOCK_MONOTONIC, &time);
+    return time.tv_sec * p2os::NS_PER_S + time.tv_nsec;
+  }
+};
+
+class Standard final : public shell::Writer {
+ public:
+  explicit Standard(std::FILE* file) : file_(file) {}
+  void write(const char* text) override {
+    std::fputs(text, file_);
+    std::fflush(file_);
+  }
+
+ private:
+  std::FILE* file_;
+};
+
+struct Options {
+  std::string line;
+  std::string wires;
+  std::string robot = "p2dx";
+  std::string settings;
+};
+
+int refuse(const std::string& what, const char* hint) {
+  std::fprintf(stderr, "p2os-adapter: %s\nhint: %s\n", what.c_str(), hint);
+  return 2;
+}
+
+bool read_options(int count, char** words, Options& options) {
+  const struct {
+    const char* name;
+    std::string* value;
+  } known[] = {{"--line", &options.line}, {"--wires", &options.wires}, {"--robot", &options.robot},
+               {"--settings", &options.settings}};
+  for (int place = 1; place < count; place += 2) {
+    std::string* value = nullptr;
+    for (const auto& option : known) {
+      value = std::strcmp(words[place], option.name) == 0 ? option.value : value;
+    }
+    if (value == nullptr || place + 1 == count) {
+      return false;
+    }
+    *value = words[place + 1];
+  }
+  return !options.line.empty();
+}
+
+const adapter::RobotNumbers* find_robot(const std::string& subclass) {
+  for (const adapter::NamedRobot& robot : adapter::ROBOTS) {
+    if (subclass == robot.subclass) {
+      return &robot.numbers;
+    }
+  }
+  return nullptr;
+}
+
+//: Says each event as it comes.
+class Teller final : public adapter::Observer {
+ public:
+  Teller(shell::EventLog& log, shell::Writer& writer) : log_(log), writer_(writer) {}
+  void happened(p2os::Nanos now, adapter::What what, const char* detail, std::int32_t first,
+                std::int32_t second) override {
+    log_.happened(now, what, detail, first, second);
+    log_.write_last(writer_);
+  }
+
+ private:
+  shell::EventLog& log_;
+  shell::Writer& writer_;
+};
+
+void wait(host::Line& line, host::Wires& wires, p2os::Nanos span) {
+  pollfd files[] = {{line.descriptor(), POLLIN, 0},
+                    {STDIN_FILENO, POLLIN, 0},
+                    {wires.listening(), POLLIN, 0},
+                    {wires.connected(), POLLIN, 0}};
+  const p2os::Nanos bounded = span < 0 ? 0 : p2os::earlier(span, 100 * p2os::NS_PER_MS);
+  timespec patience{0, static_cast<long>(bounded)};
+  ::ppoll(files, sizeof files / sizeof files[0], &patience, nullptr);
+}
+
+//: Returns how it ended: 0 for a restart, otherwise the exit code plus one.
+int run(const Options& options, host::Line& line, host::Wires& wires, host::FileStore& store) {
+  const adapter::WireNumbers numbers;
+  const char* fault = nullptr;
+  const adapter::Settings settings = shell::stored_settings(store, numbers, fault);
+  Standard out(stdout), err(stderr);
+  if (fault != nullptr) {
+    err.write("stored settings are left out: ");
+    err.write(fault);
+    err.write("\n");
+  }
+  MonotonicClock clock;
+  shell::EventLog log;
+  Teller teller(log, err);
+  adapter::Adapter part(settings, *find_robot(options.robot), numbers, clock.now());
+  part.attach(&wires, &wires, &teller);
+  shell::Console console({part, log, wires, store, out, numbers, "host"});
+  shell::Runner runner(part, clock, line, nullptr);
+  console.banner();
+  bool has_input = true;
+  while (true) {
+    wires.serve();
+    const p2os::Nanos due = runner.pass();
+    if (interrupted != 0 || console.wants_restart() || line.is_gone()) {
+      part.shutdown("the program ends", clock.now());
+      runner.pass();
+      return console.wants_restart() ? 0 : interrupted != 0 ? 131 : 2;
+    }
+    wait(line, wires, due - clock.now());
+    pollfd input{STDIN_FILENO, POLLIN, 0};
+    while (has_input && ::poll(&input, 1, 0) > 0) {
+      char character = 0;
+      has_input = ::read(STDIN_FILENO, &character, 1) == 1;
+      if (has_input) {
+        console.take(character, clock.now());
+      }
+    }
+  }
+}
+
+}  // namespace
+
+int main(int count, char** words) {
+  Options options;
+  if (!read_options(count, words, options)) {
+    return refuse("wrong usage", "p2os-adapter --line tcp:HOST:PORT|/dev/ttyUSB0 [--wires SOCKET] [--robot p2dx] [--settings FILE]");
+  }
+  if (find_robot(options.robot) == nullptr) {
+    return refuse("there is no robot " + options.robot, "a subclass such as p2dx or p3at");
+  }
+  struct sigaction action {};
+  action.sa_handler = [](int) { interrupted = 1; };
+  ::sigaction(SIGINT, &action, nullptr);
+  ::sigaction(SIGTERM, &action, nullptr);
+  std::signal(SIGPIPE, SIG_IGN);
+  host::FileStore store(options.settings);
+  host::Wires wires({});
+  if (!options.wires.empty() && !wires.listen(options.wires)) {
+    return refuse(wires.error(), "a path that does not exist yet");
+  }
+  host::Line line;
+  if (!line.open(options.line, adapter::Settings{}.bauds[0])) {
+    std::fprintf(stderr, "p2os-adapter: cannot open %s\nhint: p2os ports\n", line.error().c_str());
+    return 1;
+  }
+  int ended = 0;
+  while (ended == 0) {
+    ended = run(options, line, wires, store);
+  }
+  if (line.is_gone()) {
+    std::fputs("p2os-adapter: the line is gone\n", stderr);
+  }
+  return ended - 1;
+}

@@ -1,0 +1,99 @@
+#include "wires.hpp"
+
+#include <fcntl.h>
+#include <sys/socket.h>
+#include <sys/un.h>
+#include <unistd.h>
+
+#include <cerrno>
+#include <cstdio>
+#include <cstdlib>
+#include <cstring>
+
+namespace host {
+
+Wires::~Wires() {
+  leave();
+  if (listener_ >= 0) {
+    ::close(listener_);
+    ::unlink(path_.c_str());
+  }
+}
+
+bool Wires::listen(const std::string& path) {
+  sockaddr_un address{};
+  address.sun_family = AF_UNIX;
+  if (path.size() >= sizeof address.sun_path) {
+    error_ = path + ": a socket's path has at most 107 characters";
+    return false;
+  }
+  std::memcpy(address.sun_path, path.c_str(), path.size());
+  listener_ = ::socket(AF_UNIX, SOCK_STREAM | SOCK_NONBLOCK | SOCK_CLOEXEC, 0);
+  if (listener_ < 0 || ::bind(listener_, reinterpret_cast<const sockaddr*>(&address), sizeof address) != 0 ||
+      ::listen(listener_, 1) != 0) {
+    error_ = path + ": " + std::strerror(errno);
+    return false;
+  }
+  path_ = path;
+  return true;
+}
+
+void Wires::serve() {
+  const int caller = listener_ < 0 ? -1 : ::accept4(listener_, nullptr, nullptr, SOCK_NONBLOCK | SOCK_CLOEXEC);
+  if (caller >= 0) {
+    leave();
+    far_side_ = caller;
+    if (driven_ != 0) {
+      drive(driven_, levels_, 0);
+    }
+  }
+  char bytes[64];
+  ssize_t taken = 0;
+  while (far_side_ >= 0 && (taken = ::read(far_side_, bytes, sizeof bytes)) > 0) {
+    for (ssize_t place = 0; place < taken; ++place) {
+      take(bytes[place]);
+    }
+  }
+  if (far_side_ >= 0 && (taken == 0 || (taken < 0 && errno != EAGAIN && errno != EINTR))) {
+    leave();
+  }
+}
+
+void Wires::drive(std::uint32_t mask, std::uint32_t levels, p2os::Nanos) {
+  driven_ = mask == 0 ? 0 : driven_ | mask;
+  levels_ = mask == 0 ? 0 : (levels_ & ~mask) | (levels & mask);
+  if (far_side_ >= 0) {
+    char line[32];
+    const int size = std::snprintf(line, sizeof line, "out %x %x\n", static_cast<unsigned>(mask),
+                                   static_cast<unsigned>(levels));
+    // A far side that does not read loses edges, not the robot.
+    (void)!::send(far_side_, line, static_cast<std::size_t>(size), MSG_NOSIGNAL | MSG_DONTWAIT);
+  }
+}
+
+void Wires::take(char character) {
+  if (character != '\n') {
+    if (size_ + 1 < line_.size()) {
+      line_[size_++] = character;
+    }
+    return;
+  }
+  line_[size_] = '\0';
+  size_ = 0;
+  char* end = nullptr;
+  const unsigned long word = std::strncmp(line_.data(), "in ", 3) == 0 ? std::strtoul(line_.data() + 3, &end, 16) : 0;
+  if (end != nullptr && end != line_.data() + 3 && *end == '\0') {
+    word_ = static_cast<std::uint32_t>(word);
+  }
+}
+
+void Wires::leave() {
+  if (far_side_ >= 0) {
+    ::close(far_side_);
+    far_side_ = -1;
+    size_ = 0;
+    word_ &= ~connect_bit_;
+  }
+}
+
+}  // namespace host
