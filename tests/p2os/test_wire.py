@@ -153,7 +153,9 @@ def test_every_kind_of_damage_is_told_and_counted() -> None:
 
 def test_what_is_kept_of_the_offending_bytes_is_bounded() -> None:
     decoder = Decoder()
-    decoder.receive(bytes(500) + b"\xfa\xfb\xcc" + bytes(204) + b"\xfa\xfb\xff" + bytes(500) + b"\xfa\xfb\x50" * 9, 0)
+    decoder.receive(
+        bytes(500) + b"\xfa\xfb\xcc" + b"\x01" * 204 + b"\xfa\xfb\xff" + bytes(500) + b"\xfa\xfb\x50" * 9, 0
+    )
     decoder.advance_to(GIVE_UP_NS)
     stats = decoder.stats
     kept = (stats.last_noise, stats.last_bad_checksum, stats.last_bad_count, stats.last_stalled, stats.last_rejected)
