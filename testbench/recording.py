@@ -12,6 +12,7 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import Protocol, cast
 
 from p2os.pioneer.body import BodyState
+from p2os.pioneer.scenery import Obstacle
 from p2os.timing import NS_PER_MS, Nanos, Reached
 from testbench.trace import TraceWriter
 from testbench.wires import Harness, Net
@@ -32,6 +33,10 @@ class Observed(Protocol):
 
     def clearance(self) -> float:
         """Return metres between the hull and the nearest thing in the plan view."""
+        ...
+
+    def take_moved(self) -> Sequence[Obstacle]:
+        """Return what has walked or was pushed since this was asked last."""
         ...
 
 
@@ -174,6 +179,8 @@ class Recorder:
         if self.min_clearance_m is None or clearance < self.min_clearance_m:
             self.min_clearance_m = clearance
         self.trace.add("pose", at, pose_entry(state))
+        for item in self._body.take_moved():
+            self.obstacle("move", item.name, at, moved_entry(item))
 
     def _pass(self, limit: Nanos) -> None:
         """Write what is stamped at or before `limit`, and let the wires forget it."""
@@ -194,6 +201,11 @@ class Recorder:
                 )
             if net.forget_before(limit):
                 self._changed[net.name] = None
+
+
+def moved_entry(item: Obstacle) -> dict[str, object]:
+    """Return where a thing is, rounded to a micrometre and a microradian."""
+    return {"x": round(item.x_m, 6), "y": round(item.y_m, 6), "heading": round(item.heading_rad, 6)}
 
 
 def pose_entry(state: BodyState) -> dict[str, int]:

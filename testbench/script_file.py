@@ -11,6 +11,7 @@
     width_m = 0.3                      hold_s = 1.0
     height_m = 0.5
 
+With `path_m` the thing walks along these points from its placing on; with `mass_kg` the robot can push it.
 With `before_sonar` the place is relative to the robot; with `hold_s` the thing
 is kept there for so long and then taken away.
 """
@@ -18,9 +19,10 @@ is kept there for so long and then taken away.
 import math
 from typing import cast
 
-from p2os.errors import ScenarioError
+from p2os.errors import ScenarioError, WorldError
 from p2os.parameters import RobotParameters
 from p2os.pioneer.scenery import Obstacle
+from p2os.pioneer.walk import Repeat, Walk
 from p2os.timing import NS_PER_S, Nanos
 from testbench.schema import Key, Table, check_table
 from testbench.script import FOLLOW_NS, BeforeSonar, Change, Op
@@ -40,7 +42,14 @@ _KEYS = (
     Key(name="before_sonar", kind="whole", least=1),
     Key(name="distance_m", kind="number", above=0),
     Key(name="hold_s", kind="number", above=0),
+    Key(name="mass_kg", kind="number", least=0),
+    Key(name="friction", kind="number", least=0),
+    Key(name="path_m", kind="list"),
+    Key(name="speed_mps", kind="number", above=0),
+    Key(name="repeat", kind="text", choices=tuple(member.value for member in Repeat)),
 )
+#: Of a thing that is pushed, and of one that walks; the same as in a world file.
+DEFAULT_FRICTION, DEFAULT_SPEED_MPS = 0.5, 0.5
 _SIZES = {"box": ("length_m", "width_m", "height_m"), "cylinder": ("radius_m", "height_m")}
 
 
@@ -67,7 +76,7 @@ def _changes(table: Table, parameters: RobotParameters, where: str) -> list[Chan
     before = _before(table, parameters, where)
     if op is Op.REMOVE:
         return [Change(at=at, op=op, name=name)]
-    if before is None:
+    if before is None and "path_m" not in table:
         _need(table, ("x_m", "y_m"), where)
     x_m, y_m = _number(table, "x_m"), _number(table, "y_m")
     heading_rad = math.radians(_number(table, "heading_deg"))
@@ -109,15 +118,40 @@ def _obstacle(table: Table, where: str) -> Obstacle:
     strange = next((key for key in ("length_m", "width_m", "radius_m") if key in table and key not in sizes), None)
     if strange is not None:
         raise ScenarioError(f"{where}: a {shape} has no {strange}", hint=f"it has {', '.join(sizes)}")
-    return Obstacle(
-        name=str(table["name"]),
-        x_m=0.0,
-        y_m=0.0,
-        length_m=_number(table, "length_m"),
-        width_m=_number(table, "width_m"),
-        radius_m=_number(table, "radius_m"),
-        height_m=_number(table, "height_m"),
+    try:
+        return Obstacle(
+            name=str(table["name"]),
+            x_m=0.0,
+            y_m=0.0,
+            length_m=_number(table, "length_m"),
+            width_m=_number(table, "width_m"),
+            radius_m=_number(table, "radius_m"),
+            height_m=_number(table, "height_m"),
+            mass_kg=_number(table, "mass_kg"),
+            friction=float(cast("float", table.get("friction", DEFAULT_FRICTION))),
+            walk=_walk(table, where),
+        )
+    except WorldError as error:
+        raise ScenarioError(f"{where}: {error}") from error
+
+
+def _walk(table: Table, where: str) -> Walk | None:
+    """Return the path that a thing walks from its placing on."""
+    if "path_m" not in table:
+        return None
+    rows = cast("list[object]", table["path_m"])
+    points = [row for row in rows if isinstance(row, list) and len(row) == 2 and all(_is_number(v) for v in row)]
+    if len(points) < len(rows) or "before_sonar" in table or str(table.get("op", "place")) != Op.PLACE.value:
+        raise ScenarioError(f"{where}: path_m must be a list of [x, y], for a thing that is placed in the world")
+    return Walk(
+        points_m=tuple((float(x), float(y)) for x, y in points),
+        speed_mps=float(cast("float", table.get("speed_mps", DEFAULT_SPEED_MPS))),
+        repeat=Repeat(str(table.get("repeat", Repeat.BACK_AND_FORTH.value))),
     )
+
+
+def _is_number(value: object) -> bool:
+    return isinstance(value, (int, float)) and not isinstance(value, bool)
 
 
 def _check_names(changes: list[Change], where: str) -> None:

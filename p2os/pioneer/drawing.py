@@ -6,7 +6,7 @@ from enum import Enum
 
 from p2os.pioneer.geometry import Footprint
 from p2os.pioneer.mesh_plan import cut, shadow
-from p2os.pioneer.scenery import Kind, Obstacle, World
+from p2os.pioneer.scenery import CUT_M, Kind, Obstacle, World
 
 Point = tuple[float, float]
 
@@ -31,8 +31,6 @@ class Look(Enum):
 
 #: What is drawn later covers what is drawn before.
 ORDER = tuple(Look)
-#: The height at which a mesh is cut for a picture: that of the Pioneer's sonar ring.
-CUT_M = 0.2
 #: Of the dot that is drawn for a goal.
 MARK_RADIUS_M = 0.08
 #: What begins higher is passed beneath by a Pioneer 2.

@@ -14,6 +14,8 @@ from p2os.pioneer.walk import Walk
 Vertex = tuple[float, float, float]
 Triangle = tuple[int, int, int]
 
+#: Where a mesh is cut for a picture: at the height of the Pioneer's sonar ring; and how thick its walls are drawn, m.
+CUT_M, CUT_THICK_M = 0.2, 0.02
 MARK_KINDS = ("goal", "dock", "home", "forbidden")
 #: The tables of a world file, in the order in which a world keeps its obstacles.
 SECTIONS = ("box", "cylinder", "floor", "ramp")
@@ -220,9 +222,26 @@ class World:
         return any(obstacle.kind is Kind.RAMP for obstacle in self.obstacles)
 
     def to_plain(self) -> dict[str, object]:
-        """Return the plan as plain values, for a report."""
+        """Return the plan as plain values, for a report; a mesh as the thin walls of its cut."""
+        from p2os.pioneer.mesh_plan import cut
+
+        walls = [
+            {
+                "name": f"{mesh.name}, wall {number}",
+                "kind": Kind.WALL.value,
+                "shape": "box",
+                "x": (ax + bx) / 2,
+                "y": (ay + by) / 2,
+                "heading": math.atan2(by - ay, bx - ax),
+                "height": CUT_M,
+                "length": math.dist((ax, ay), (bx, by)) + CUT_THICK_M,
+                "width": CUT_THICK_M,
+            }
+            for mesh in self.meshes
+            for number, ((ax, ay), (bx, by)) in enumerate(cut(mesh, CUT_M), start=1)
+        ]
         return {
             "name": self.name,
             "extent": list(self.extent),
-            "obstacles": [obstacle.to_plain() for obstacle in self.obstacles],
+            "obstacles": [*(obstacle.to_plain() for obstacle in self.obstacles), *walls],
         }

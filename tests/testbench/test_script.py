@@ -4,11 +4,13 @@ import math
 
 import pytest
 
+from p2os.errors import ScenarioError
 from p2os.parameters import load_parameters
 from p2os.pioneer.body import make_body
 from p2os.pioneer.scenery import Obstacle, Pose
 from p2os.pioneer.world import load_world
 from testbench.script import BeforeSonar, Change, Op, Script
+from testbench.script_file import load_changes
 
 S = 10**9
 P2DX = load_parameters("p2dx")
@@ -73,3 +75,37 @@ def test_a_restored_script_does_nothing_twice() -> None:
     second.restore(first.snapshot())
     second.advance_to(3 * S)
     assert [name for _, name, _, _ in told] == ["post 2"]
+
+
+SIZES = ("length_m", "width_m", "height_m")
+WALKING = {"at_s": 1.0, "name": "visitor", "shape": "cylinder", "radius_m": 0.2, "height_m": 1.7}
+
+
+def test_a_placed_thing_walks_and_another_can_be_pushed() -> None:
+    parameters = load_parameters("p2dx")
+    tables = [
+        {**WALKING, "path_m": [[1, 0], [2.0, 0]], "speed_mps": 0.8, "repeat": "once"},
+        {"at_s": 2.0, "name": "box", "x_m": 1, "y_m": 1, **dict.fromkeys(SIZES, 0.3), "mass_kg": 2.0},
+    ]
+    first, second = load_changes(tables, parameters, "s.toml")
+    assert first.obstacle is not None
+    assert first.obstacle.walk is not None
+    assert first.obstacle.walk.pose_at(0.5)[0] == 1.4
+    assert second.obstacle is not None
+    assert (second.obstacle.mass_kg, second.obstacle.friction) == (2.0, 0.5)
+
+
+@pytest.mark.parametrize(
+    ("more", "said"),
+    [
+        ({"path_m": [[1, 0], [2]]}, "path_m must be"),
+        ({"path_m": [[1, 0], [True, 2]]}, "path_m must be"),
+        ({"path_m": [[1, 0]]}, "two points"),
+        ({"path_m": [[1, 0], [2, 0]], "repeat": "never"}, "none of once"),
+        ({"path_m": [[1, 0], [2, 0]], "mass_kg": 1}, "only one of"),
+        ({"path_m": [[1, 0], [2, 0]], "before_sonar": 3, "distance_m": 1}, "path_m must be"),
+    ],
+)
+def test_a_path_that_cannot_be_is_refused(more: dict[str, object], said: str) -> None:
+    with pytest.raises(ScenarioError, match=said):
+        load_changes([{**WALKING, **more}], load_parameters("p2dx"), "s.toml")

@@ -154,16 +154,22 @@ def make_static(shape: int, place: Vector, turn: tuple[float, ...], group: int, 
 def add_robot(parameters: RobotParameters, pose: Pose, client: int) -> tuple[int, Vector]:
     """Make the robot at a pose; return its number and its centre of mass in the robot frame.
 
-    The base's frame is the hull's centre, so that the engine's poses need one
-    known offset and no inertial frame.
+    The base's frame is the centre of mass, so that the engine's poses need one
+    known offset and no inertial frame. It is the hull's centre, but no higher
+    than the top of the wheels: batteries and motors lie low, and a tall robot
+    would else fall over when it brakes.
     """
     body = parameters.body
     radius, track = body.wheel_diameter_m / 2, parameters.track_mm / 1000
     length, width = body.hull_front_m + body.hull_rear_m, body.hull_width_m
     height = body.hull_height_m - body.ground_clearance_m
-    centre = ((body.hull_front_m - body.hull_rear_m) / 2, 0.0, body.ground_clearance_m + height / 2)
+    middle_m = body.ground_clearance_m + height / 2
+    centre = ((body.hull_front_m - body.hull_rear_m) / 2, 0.0, min(middle_m, body.wheel_diameter_m))
+    above: dict[str, object] = {}
+    if middle_m > centre[2]:  # named only where it is needed: with it the shape is a compound
+        above["collisionFramePosition"] = (0.0, 0.0, middle_m - centre[2])
     hull = pybullet.createCollisionShape(
-        pybullet.GEOM_BOX, halfExtents=(length / 2, width / 2, height / 2), physicsClientId=client
+        pybullet.GEOM_BOX, halfExtents=(length / 2, width / 2, height / 2), physicsClientId=client, **above
     )
     wheel = pybullet.createCollisionShape(pybullet.GEOM_SPHERE, radius=radius, physicsClientId=client)
     caster = pybullet.createCollisionShape(pybullet.GEOM_SPHERE, radius=body.caster_radius_m, physicsClientId=client)
