@@ -53,6 +53,7 @@ class Finding:
 
 
 _BASE, _SIM, _BULLET = "pip install p2os", "pip install 'p2os[sim]'", "pip install 'p2os[bullet]'"
+_EXPORT = "pip install 'p2os[export]'"
 
 NEEDS = (
     Need(name="pyserial", kind="package", feature="serial ports", get=_BASE, required=True),
@@ -65,6 +66,9 @@ NEEDS = (
     Need(name="matplotlib", kind="package", feature="plots of a run", get=_SIM),
     Need(name="pybullet", kind="package", feature="--body bullet", get=_BULLET),
     Need(name="numpy", kind="package", feature="--body bullet", get=_BULLET),
+    Need(name="pyarrow", kind="package", feature="export to Parquet and Arrow", get=_EXPORT),
+    Need(name="mcap", kind="package", feature="export to MCAP", get=_EXPORT),
+    Need(name="tshark", kind="program", feature="captures on the command line", get="sudo apt-get install tshark"),
     Need(
         name="arm-none-eabi-gcc", kind="program", feature="building BluePill programs",
         get="sudo apt-get install gcc-arm-none-eabi",

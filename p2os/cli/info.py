@@ -141,7 +141,7 @@ def _wait(connection: Connection, transport: Transport, now: Nanos) -> None:
 
 def _hint(transport: Transport) -> str:
     if transport.description.startswith("serial:"):
-        return "is the robot on, and the speed right? (serial:PORT?baud=9600; p2os ports)"
+        return "is the robot on? p2os scan tries every speed"
     return "is there a robot behind it? (p2os serve)"
 
 

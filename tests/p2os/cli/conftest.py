@@ -1,18 +1,12 @@
 """A virtual Pioneer served over TCP in the background, for the verbs that talk to a robot."""
 
-import threading
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 
 import pytest
 
 from p2os.cli import main as cli
-from p2os.cli.serve import make_pioneer
-from p2os.pioneer.host import Host
-from p2os.transport import listen_url
-
-#: Generous: the machine may be busy.
-PATIENCE_S = 60.0
+from p2os.pioneer.served import served_pioneer
 
 
 @dataclass
@@ -30,22 +24,13 @@ class Served:
 @pytest.fixture
 def served() -> Iterator[Served]:
     """A 2-DX in a room on a free TCP port."""
-    pioneer = make_pioneer(robot="p2dx", world="room", body="kinematic")
-    listener = listen_url("tcp:127.0.0.1:0")
-    served = Served(listener.description)
+    served = Served("")
 
     def tell(_now: int, what: str, detail: str) -> None:
         served.events.append(f"{what}: {detail}")
 
-    pioneer.on_event = tell
-    over = threading.Event()
-    host = Host(pioneer, listener, on_event=tell)
-    thread = threading.Thread(target=lambda: host.run(until=over.is_set))
-    thread.start()
-    yield served
-    over.set()
-    thread.join(PATIENCE_S)
-    assert not thread.is_alive()
+    with served_pioneer(on_event=tell) as served.url:
+        yield served
 
 
 @pytest.fixture
