@@ -314,9 +314,7 @@ class Pin:
                 self._bank.warn(short_circuit(self, self._rail), once=f"{self.name}:short")
         elif outside is None:
             # A weak pull of the chip is stronger than the board's (40 kΩ against an LED or 100 kΩ).
-            level = output.level
-            if level is None:
-                level = bool(self.board_pull.level)
+            level = bool(self.board_pull.level if output.level is None else output.level)
         elif output.is_strong:
             # Chosen: of two strong drivers that differ the low one wins.
             level = outside and bool(output.level)

@@ -1,5 +1,7 @@
 """P2OS bytes of a recording as a person reads them: name and meaning of each frame."""
 
+from dataclasses import fields
+
 from p2os.commands import Command
 from p2os.config_packet import ConfigPacket
 from p2os.packets import Identity, RawPacket, read_packet
@@ -56,3 +58,6 @@ def _packet(frame: Frame) -> tuple[str, str]:
             return "CONFIGpac", f"{packet.subclass}, watchdog {packet.watchdog} ms"
         case RawPacket():
             return f"packet 0x{packet.kind:02X}", f"{len(packet.data)} bytes"
+        case _:
+            values = ((part.name, getattr(packet, part.name)) for part in fields(packet))
+            return type(packet).__name__, ", ".join(f"{name} {value}" for name, value in values if value != b"")

@@ -38,6 +38,10 @@ class PadRig(WatchedRig):
         super().__init__(robot, kind)
         self.pad_at = -(10**12)
 
+    @property
+    def is_awake(self) -> bool:
+        return self.adapter.state not in {"reset", "booting"}
+
     def pad(self, **report: object) -> None:
         self.pad_at = self.now
         self.adapter.receive_pad(PadReport(**report), self.now)
@@ -45,7 +49,8 @@ class PadRig(WatchedRig):
 
     def check(self) -> None:
         super().check()
-        if self.adapter.master is Master.PAD and self.commanded != (0, 0):
+        # In reset and while it boots the adapter is no adapter: the robot's own watchdog counts then.
+        if self.is_awake and self.adapter.master is Master.PAD and self.commanded != (0, 0):
             # 150 ms, a pair being sent (18.75 ms) and the STOP (6.25 ms).
             assert self.now - self.pad_at <= 150 * MS
 
@@ -65,7 +70,7 @@ class PadMachine(AdapterMachine):
         changes = master is not self.rig.adapter.master
         self.rig.adapter.set_master(master, self.rig.now)
         self.rig.to_robot.send(self.rig.adapter.take_output(), self.rig.now)
-        if changes:
+        if changes and self.rig.is_awake:
             self.rig.check()
             assert self.rig.commanded == (0, 0), "a change of masters stops the robot at once"
 
@@ -79,7 +84,7 @@ class PadMachine(AdapterMachine):
     def release(self) -> None:
         self.rig.pad(down=True)
         self.rig.check()
-        if self.rig.adapter.master is Master.PAD:
+        if self.rig.is_awake and self.rig.adapter.master is Master.PAD:
             assert self.rig.commanded == (0, 0)
 
     @invariant()

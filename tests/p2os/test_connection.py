@@ -371,14 +371,18 @@ class Pair(RuleBasedStateMachine):
             self.exchange(near, far, loses)
 
     def exchange(self, near: Role, far: Role, loses: tuple[Role, ...]) -> None:
-        for event in events(self.ends[near]):
-            self.is_lost |= isinstance(event, ConnectionLost)
-        for data in self.ends[near].take_output():
-            if near is Role.CLIENT:
-                command = Command.from_frame(Frame.from_bytes(data))
-                if self.is_lost:
-                    assert command == stop(), "after a loss the first frame out is STOP"
-                    self.is_lost = False
+        is_lost_now = any(isinstance(event, ConnectionLost) for event in events(self.ends[near]))
+        frames = self.ends[near].take_output()
+        if near is Role.CLIENT:
+            commands = [Command.from_frame(Frame.from_bytes(data)) for data in frames]
+            if is_lost_now:
+                # What was due before the loss went out before it.
+                commands = commands[commands.index(stop()) :]
+                assert commands[1] == vel(0)
+            elif self.is_lost and commands:
+                assert commands[0] == stop(), "after a loss the first frame out is STOP"
+            self.is_lost = is_lost_now or (self.is_lost and not commands)
+        for data in frames:
             if near not in loses:
                 self.ends[far].receive(data, self.now)
 

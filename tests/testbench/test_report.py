@@ -5,8 +5,10 @@ from pathlib import Path
 
 import pytest
 
+from p2os.packets import EncoderPacket
 from testbench.report import make_report
-from testbench.report.run_record import TraceError, read_run
+from testbench.report.packets import describe
+from testbench.report.run_record import TraceError, WireChunk, read_run
 from testbench.report.signals import grouped, motor_steps
 from testbench.report.summary import cells_entered, distance_m, figures, verdict
 
@@ -116,3 +118,8 @@ def test_a_folder_without_a_trace_is_refused_with_a_hint(tmp_path: Path) -> None
     with pytest.raises(TraceError) as caught:
         make_report(tmp_path)
     assert caught.value.hint is not None
+
+
+def test_a_packet_beyond_the_standard_one_is_named_with_its_fields() -> None:
+    frame = EncoderPacket(left_counts=5, right_counts=-7).to_frame()
+    assert describe(WireChunk(0, "r2c", frame.to_bytes())) == [("EncoderPacket", "left_counts 5, right_counts -7")]
