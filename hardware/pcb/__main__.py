@@ -26,14 +26,24 @@ def main(arguments: list[str] | None = None) -> int:
     verbs.add_parser("build", help="write every generated file (KiCad's part only where it is installed)")
     checking = verbs.add_parser("check", help="run every check and print a table")
     checking.add_argument("--strict", action="store_true", help="a missing tool is a failure")
-    for name, words in (("route", "route the boards anew (needs a C++ compiler)"), ("pour", "fill the ground pours anew")):
+    for name, words in (
+        ("route", "route the boards anew (needs a C++ compiler)"),
+        ("pour", "fill the ground pours anew"),
+    ):
         one = verbs.add_parser(name, help=words)
         one.add_argument("variant", nargs="*", help=f"one of {', '.join(BOARD_VARIANTS)}; none for all")
     verbs.add_parser("simulate", help="run every circuit simulation and renew its plots")
     given = parser.parse_args(arguments)
     try:
         return _VERBS[given.verb](given)
-    except (DesignError, RoutingError, KicadMissingError, kicad.KicadFailedError, NgspiceMissingError, SimulationError) as error:
+    except (
+        DesignError,
+        RoutingError,
+        KicadMissingError,
+        kicad.KicadFailedError,
+        NgspiceMissingError,
+        SimulationError,
+    ) as error:
         sys.stderr.write(f"board: {error}\n")
         return 1
 
@@ -58,7 +68,9 @@ def _build(_: argparse.Namespace) -> int:
 def _check(given: argparse.Namespace) -> int:
     results = checks.run_all()
     print(checks.table(results))
-    failed = [result for result in results if result.verdict == "FAIL" or (given.strict and result.verdict == "skipped")]
+    failed = [
+        result for result in results if result.verdict == "FAIL" or (given.strict and result.verdict == "skipped")
+    ]
     return 1 if failed else 0
 
 

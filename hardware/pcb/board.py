@@ -38,7 +38,7 @@ def board_text(design: Design, tracks: list[Track], vias: list[Via], pours: dict
         design: A variant with a board.
         tracks: Copper of the router.
         vias: Holes of the router, stitching included.
-        pours: Filled polygons by layer ("F.Cu", "B.Cu"); empty before KiCad has filled them.
+        pours: Filled polygons by the key of their area ("GND:F.Cu"); empty before KiCad has filled them.
     """
     nets = _net_names(design)
     numbers = {name: number for number, name in enumerate(nets)}
@@ -63,7 +63,8 @@ def board_text(design: Design, tracks: list[Track], vias: list[Via], pours: dict
                       angle_deg=label.angle_deg)  # fmt: skip
         tree.append(shape_node(moved, "gr", 0, (design.variant, "text", number)))
     tree += _copper(design, tracks, vias, numbers)
-    tree += [_pour(design, layer, numbers["GND"], pours.get(layer, [])) for layer in ("F.Cu", "B.Cu")]
+    for priority, pour in enumerate(rules.pours(design.variant)):
+        tree.append(_pour(design, pour, numbers[pour.net], max(0, priority - 1), pours.get(pour.key, [])))
     tree.append(_antenna(design))
     tree.append(node("embedded_fonts", "no"))
     return render(tree) + "\n"
@@ -156,8 +157,8 @@ def _part(design: Design, component: Component, at: Place, numbers: dict[str, in
     for number, shape in enumerate(footprint.drawings):
         tree.append(shape_node(shape, "fp", at.angle_deg, (*ident, "shape", number)))
     if component.label and ref.startswith("TP"):
-        name = Label(layer="F.SilkS", text=component.label, at_mm=footprint.ref_at_mm)
-        tree.append(shape_node(name, "fp", 0, (*ident, "name")))
+        label = Label(layer="F.SilkS", text=component.label, at_mm=footprint.ref_at_mm)
+        tree.append(shape_node(label, "fp", 0, (*ident, "name")))
     for number, pad in enumerate(footprint.pads):
         net = pad_net(component, pad.number)
         pair = (numbers[net], net) if net is not None and pad.kind is not PadKind.HOLE else None
@@ -217,17 +218,18 @@ def _polygon(points: list[tuple[float, float]]) -> Node:
     return node("polygon", node("pts", *(node("xy", *_board(point)) for point in points)))
 
 
-def _pour(design: Design, layer: str, number: int, fills: list[Node]) -> Node:
-    rim = rules.EDGE_CLEARANCE_MM
-    width, height = rules.BOARD_WIDTH_MM - rim, rules.BOARD_HEIGHT_MM - rim
+def _pour(design: Design, pour: rules.Pour, number: int, priority: int, fills: list[Node]) -> Node:
+    left, top, right, bottom = pour.corners_mm
+    solid = ["yes"] if pour.is_solid else []
     return node(
-        "zone", node("net", number), node("net_name", Text("GND")), node("layer", Text(layer)),
-        uuid_node(design.variant, "pour", layer), node("name", Text(f"GND {layer}")), node("hatch", "edge", 0.5),
-        node("connect_pads", node("clearance", rules.POUR_CLEARANCE_MM)), node("min_thickness", rules.POUR_MIN_MM),
-        node("filled_areas_thickness", "no"),
+        "zone", node("net", number), node("net_name", Text(pour.net)), node("layer", Text(pour.layer)),
+        uuid_node(design.variant, "pour", pour.key), node("name", Text(f"{pour.net} {pour.layer}")),
+        node("hatch", "edge", 0.5), *([node("priority", priority)] if priority else []),
+        node("connect_pads", *solid, node("clearance", rules.POUR_CLEARANCE_MM)),
+        node("min_thickness", rules.POUR_MIN_MM), node("filled_areas_thickness", "no"),
         node("fill", "yes", node("thermal_gap", rules.THERMAL_GAP_MM),
              node("thermal_bridge_width", rules.THERMAL_SPOKE_MM)),
-        _polygon([(rim, rim), (width, rim), (width, height), (rim, height)]), *fills,
+        _polygon([(left, top), (right, top), (right, bottom), (left, bottom)]), *fills,
     )  # fmt: skip
 
 

@@ -91,19 +91,27 @@ def board_svg(design: Design) -> str:
         at = places[component.ref]
         ends = [turn(point, at) for shape in FOOTPRINTS[component.part.footprint].drawings
                 if isinstance(shape, Line) and shape.layer == "F.Fab" for point in (shape.start_mm, shape.end_mm)]  # fmt: skip
-        out.append(f'<g class="part" id="{component.ref}"><title>{component.ref} {html.escape(component.part.value)}</title>')
+        out.append(
+            f'<g class="part" id="{component.ref}"><title>{component.ref} {html.escape(component.part.value)}</title>'
+        )
         if ends:
             left, top = min(x for x, _ in ends), min(y for _, y in ends)
             right, bottom = max(x for x, _ in ends), max(y for _, y in ends)
-            out.append(f'<rect class="body" x="{left:.2f}" y="{top:.2f}" width="{right - left:.2f}" height="{bottom - top:.2f}"/>')
+            out.append(
+                f'<rect class="body" x="{left:.2f}" y="{top:.2f}" width="{right - left:.2f}" height="{bottom - top:.2f}"/>'
+            )
         for pad in (pad for pad in pads if pad.ref == component.ref):
             x0, y0, x1, y1 = pad.box_mm
             kind = "hole" if pad.pad.kind is PadKind.HOLE else "pad"
             radius = min(x1 - x0, y1 - y0) / 2 if pad.pad.kind is not PadKind.SMD else 0.1
-            out.append(f'<rect class="{kind}" x="{x0:.2f}" y="{y0:.2f}" width="{x1 - x0:.2f}" height="{y1 - y0:.2f}" rx="{radius:.2f}"/>')
+            out.append(
+                f'<rect class="{kind}" x="{x0:.2f}" y="{y0:.2f}" width="{x1 - x0:.2f}" height="{y1 - y0:.2f}" rx="{radius:.2f}"/>'
+            )
         if ends:
             size = 1.0 if right - left < 8 else 2.2
-            out.append(f'<text x="{(left + right) / 2:.2f}" y="{(top + bottom) / 2 + size / 3:.2f}" font-size="{size:g}">{component.ref}</text>')
+            out.append(
+                f'<text x="{(left + right) / 2:.2f}" y="{(top + bottom) / 2 + size / 3:.2f}" font-size="{size:g}">{component.ref}</text>'
+            )
         out.append("</g>")
     out.append("</svg>")
     return "\n".join(out)

@@ -52,19 +52,40 @@ def plain() -> list[Result]:
         found = findings(pinout, board)
         wanted = THESIS_FINDINGS.get(board.revision, 0)
         words = ", ".join(f"{count} {rule}" for rule, count in count_by_rule(found).items()) or "none"
-        results.append(_result("pin rules", board.revision, len(found) == wanted, f"{len(found)} findings ({words}), {wanted} expected"))
+        results.append(
+            _result(
+                "pin rules", board.revision, len(found) == wanted, f"{len(found)} findings ({words}), {wanted} expected"
+            )
+        )
     for variant in VARIANTS:
         design = design_of(variant)
         results.append(_listed("netlist complete", variant, netlist_faults(design), f"{len(design.nets())} nets"))
-        results.append(_listed("bill of materials", variant, bom_faults(design), f"{len(design.components)} components"))
+        results.append(
+            _listed("bill of materials", variant, bom_faults(design), f"{len(design.components)} components")
+        )
         figures = all_checks(design)
-        results.append(_listed("electrical", variant, [str(check) for check in figures if not check.is_good], f"{len(figures)} figures"))
+        results.append(
+            _listed(
+                "electrical", variant, [str(check) for check in figures if not check.is_good], f"{len(figures)} figures"
+            )
+        )
     for variant in BOARD_VARIANTS:
         design = design_of(variant)
         tracks, vias = load_routes(design)
-        results.append(_listed("copper connected", variant, copper.faults(design, tracks, vias), f"{len(tracks)} tracks, {len(vias)} vias"))
+        results.append(
+            _listed(
+                "copper connected",
+                variant,
+                copper.faults(design, tracks, vias),
+                f"{len(tracks)} tracks, {len(vias)} vias",
+            )
+        )
     stale = build.stale_files()
-    results.append(_listed("generated files", "all", [f"{name} is stale" for name in stale], f"{len(build.sources())} files up to date"))
+    results.append(
+        _listed(
+            "generated files", "all", [f"{name} is stale" for name in stale], f"{len(build.sources())} files up to date"
+        )
+    )
     return results
 
 
@@ -77,11 +98,25 @@ def with_kicad() -> list[Result]:
     results = []
     for variant in VARIANTS:
         folder = build.GENERATED / variant
-        results.append(_listed("ERC", variant, [str(one) for one in kicad.erc(folder / f"{variant}.kicad_sch")], f"0 findings (KiCad {version})"))
+        results.append(
+            _listed(
+                "ERC",
+                variant,
+                [str(one) for one in kicad.erc(folder / f"{variant}.kicad_sch")],
+                f"0 findings (KiCad {version})",
+            )
+        )
         results.append(_listed("netlist equals design", variant, netlist_differences(variant), "same nets, same pins"))
     for variant in BOARD_VARIANTS:
         board = build.GENERATED / variant / f"{variant}.kicad_pcb"
-        results.append(_listed("DRC with parity", variant, [str(one) for one in kicad.drc(board)], "0 errors, 0 warnings, 0 unconnected"))
+        results.append(
+            _listed(
+                "DRC with parity",
+                variant,
+                [str(one) for one in kicad.drc(board)],
+                "0 errors, 0 warnings, 0 unconnected",
+            )
+        )
         results.append(_pours(variant))
         results += _gerbers(variant)
     return results
@@ -121,7 +156,8 @@ def table(results: list[Result]) -> str:
     """Return the table that a person reads; the last line sums up."""
     widths = [max(len(getattr(one, name)) for one in results) for name in ("name", "subject", "verdict")]
     lines = [
-        f"{one.verdict:<{widths[2]}}  {one.name:<{widths[0]}}  {one.subject:<{widths[1]}}  {one.detail}" for one in results
+        f"{one.verdict:<{widths[2]}}  {one.name:<{widths[0]}}  {one.subject:<{widths[1]}}  {one.detail}"
+        for one in results
     ]
     counts = {verdict: sum(one.verdict == verdict for one in results) for verdict in (GOOD, BAD, SKIPPED)}
     return "\n".join([*lines, f"{counts[GOOD]} ok, {counts[BAD]} failed, {counts[SKIPPED]} skipped"])
@@ -132,7 +168,9 @@ def _pours(variant: str) -> Result:
     tracks, vias = load_routes(design)
     board: Callable[..., str] = partial(board_text, design, tracks)
     same = fill_and_stitch(board, vias) == (HERE / "pours" / f"{variant}.txt").read_text(encoding="utf-8")
-    return _result("pours up to date", variant, same, "filled again: the same" if same else "filled again: differs (make board)")
+    return _result(
+        "pours up to date", variant, same, "filled again: the same" if same else "filled again: differs (make board)"
+    )
 
 
 def _gerbers(variant: str) -> list[Result]:
@@ -144,9 +182,19 @@ def _gerbers(variant: str) -> list[Result]:
     with zipfile.ZipFile(kept) as archive:
         old = {name: archive.read(name).decode() for name in archive.namelist()}
     changed = sorted(name for name in {*files, *old} if files.get(name) != old.get(name))
-    results = [_listed("gerbers up to date", variant, [f"{name} differs" for name in changed], f"{len(files)} files, the same again")]
+    results = [
+        _listed(
+            "gerbers up to date",
+            variant,
+            [f"{name} differs" for name in changed],
+            f"{len(files)} files, the same again",
+        )
+    ]
     if not gerbers.is_installed():
-        return [*results, Result(name="gerbers re-read", subject=variant, verdict=SKIPPED, detail="gerbonara is not installed")]
+        return [
+            *results,
+            Result(name="gerbers re-read", subject=variant, verdict=SKIPPED, detail="gerbonara is not installed"),
+        ]
     design = design_of(variant)
     _, vias = load_routes(design)
     from hardware.pcb.pours import load_pours

@@ -131,7 +131,9 @@ def picture(board: Path, file: Path, *arguments: str) -> None:
     run("pcb", "render", *arguments, "-o", file, board)
 
 
-_DATED = re.compile(r"CreationDate|Created by KiCad|GenerationSoftware|DRILL file|FORMAT=.*date|^; #@! TF\.CreationDate")
+_DATED = re.compile(
+    r"CreationDate|Created by KiCad|GenerationSoftware|DRILL file|FORMAT=.*date|^; #@! TF\.CreationDate"
+)
 
 
 def _violation(entry: dict[str, object]) -> Violation:

@@ -19,7 +19,7 @@ _PAGE_DPI = 80
 _SIDES = {
     "top": ("--side", "top"),
     "bottom": ("--side", "bottom"),
-    "view": ("--rotate", "-50,0,-28", "--perspective", "--zoom", "0.9"),
+    "view": ("--rotate", "-48,0,-25", "--perspective", "--zoom", "0.62"),
 }
 
 

@@ -13,7 +13,7 @@ from pathlib import Path
 from hardware.pcb import rules
 from hardware.pcb.board import ORIGIN_MM
 from hardware.pcb.routing import HERE, RoutingError, Via
-from hardware.pcb.sexp import Node, Text, children, node, number, parse, word
+from hardware.pcb.sexp import Node, Text, child, children, node, number, parse, word
 
 #: Runs in the system's Python: KiCad installs its module there and nowhere else.
 _SCRIPT = (
@@ -43,7 +43,7 @@ def kicad_python() -> str:
 
 
 def fill(board_text: str) -> dict[str, list[Node]]:
-    """Return the filled polygons of a board by layer, computed by KiCad.
+    """Return the filled polygons of a board by area, computed by KiCad.
 
     Raises:
         KicadMissingError: KiCad is not installed.
@@ -66,7 +66,7 @@ def kept_stitches(vias: list[Via], pours: dict[str, list[Node]]) -> list[Via]:
         vias: Places that the router found free.
         pours: The pours as filled without any stitching via, so that no island hangs on one.
     """
-    shapes = {layer: [_points(polygon) for polygon in found] for layer, found in pours.items()}
+    shapes = {layer: [_points(polygon) for polygon in pours.get(f"GND:{layer}", [])] for layer in LAYERS}
     kept = []
     for via in vias:
         x, y = _shift(via.at_mm)
@@ -77,14 +77,14 @@ def kept_stitches(vias: list[Via], pours: dict[str, list[Node]]) -> list[Via]:
 
 
 def pours_text(pours: dict[str, list[Node]], stitches: list[Via]) -> str:
-    """Return the text of a pours file: stitching vias, then one polygon a line, micrometres from the board's corner."""
-    lines = [f"S {round(via.at_mm[0] * 1e3)},{round(via.at_mm[1] * 1e3)}" for via in stitches]
-    for layer in LAYERS:
-        for polygon in pours.get(layer, []):
+    """Return the text of a pours file: stitching vias, then one polygon a line, nanometres from the board's corner."""
+    lines = [f"S {round(via.at_mm[0] * 1e6)},{round(via.at_mm[1] * 1e6)}" for via in stitches]
+    for key, found in pours.items():
+        for polygon in found:
             points = (
-                f"{round((x - ORIGIN_MM[0]) * 1e3)},{round((y - ORIGIN_MM[1]) * 1e3)}" for x, y in _points(polygon)
+                f"{round((x - ORIGIN_MM[0]) * 1e6)},{round((y - ORIGIN_MM[1]) * 1e6)}" for x, y in _points(polygon)
             )
-            lines.append(f"{layer} " + " ".join(points))
+            lines.append(f"{key} " + " ".join(points))
     return "\n".join(lines) + "\n"
 
 
@@ -99,21 +99,21 @@ def load_pours(variant: str, path: Path | None = None) -> tuple[dict[str, list[N
         lines = file.read_text(encoding="utf-8").splitlines()
     except OSError as error:
         raise RoutingError(f"cannot read {file.name}: {error.strerror} (hint: python -m hardware.pcb pour)") from error
-    pours: dict[str, list[Node]] = {layer: [] for layer in LAYERS}
+    pours: dict[str, list[Node]] = {pour.key: [] for pour in rules.pours(variant)}
     stitches: list[Via] = []
     for count, line in enumerate(lines, start=1):
-        layer, *pairs = line.split()
+        key, *pairs = line.split()
         try:
-            if layer == "S":
+            if key == "S":
                 ((x, y),) = (pair.split(",") for pair in pairs)
-                stitches.append(stitch_at(int(x) * 1e-3, int(y) * 1e-3))
+                stitches.append(stitch_at(int(x) * 1e-6, int(y) * 1e-6))
                 continue
-            points = [(int(x) * 1e-3, int(y) * 1e-3) for x, y in (pair.split(",") for pair in pairs)]
-            polygon = node("filled_polygon", node("layer", Text(layer)), node("pts"))
+            points = [(int(x) * 1e-6, int(y) * 1e-6) for x, y in (pair.split(",") for pair in pairs)]
+            polygon = node("filled_polygon", node("layer", Text(key.partition(":")[2])), node("pts"))
             polygon[2] = node("pts", *(node("xy", *_shift(point)) for point in points))
-            pours[layer].append(polygon)
+            pours[key].append(polygon)
         except (ValueError, KeyError) as error:
-            raise RoutingError(f"pours of {variant}, line {count}: no polygon of F.Cu or B.Cu") from error
+            raise RoutingError(f"pours of {variant}, line {count}: no polygon of an area of this board") from error
     return pours, stitches
 
 
@@ -138,20 +138,20 @@ _RING = ((0, 0), (1, 0), (0.7, 0.7), (0, 1), (-0.7, 0.7), (-1, 0), (-0.7, -0.7),
 
 
 def _shift(point: tuple[float, float]) -> tuple[float, float]:
-    return (round(point[0] + ORIGIN_MM[0], 3), round(point[1] + ORIGIN_MM[1], 3))
+    return (round(point[0] + ORIGIN_MM[0], 6), round(point[1] + ORIGIN_MM[1], 6))
 
 
 def _polygons(text: str) -> dict[str, list[Node]]:
-    pours: dict[str, list[Node]] = {layer: [] for layer in LAYERS}
+    pours: dict[str, list[Node]] = {}
     for zone in children(parse(text), "zone"):
         for polygon in children(zone, "filled_polygon"):
-            layer = word(children(polygon, "layer")[0])
-            pours[layer].append(polygon)
+            key = f"{word(child(zone, 'net_name'))}:{word(child(polygon, 'layer'))}"
+            pours.setdefault(key, []).append(polygon)
     return pours
 
 
 def _points(polygon: Node) -> list[tuple[float, float]]:
-    pts = children(polygon, "pts")[0]
+    pts = child(polygon, "pts")
     return [(float(number(float(word(xy, 1)))), float(word(xy, 2))) for xy in children(pts, "xy")]
 
 

@@ -87,7 +87,7 @@ _SERIAL = {
     "U5": (64, 40), "C5": (18, 40), "C6": (30, 40), "C7": (96, 40), "C8": (110, 40), "C9": (124, 40), "J3": (156, 40),
     "R62": (46, 82), "R63": (46, 90), "R64": (46, 100), "D7": (60, 100), "R65": (46, 110), "D8": (60, 110),
     "R66": (136, 88), "R67": (136, 100), "Q1": (152, 88), "J5": (30, 136), "R60": (48, 137),
-    "U6": (196, 44), "C10": (220, 44), "R72": (194, 90), "D9": (208, 90),
+    "U6": (192, 44), "C10": (212, 46), "R72": (194, 90), "D9": (208, 90),
 }  # fmt: skip
 _TEST = {"J4": (44, 44), **_test_points(), **{f"H{n}": (20 + 20 * n, 118) for n in range(1, 5)}}
 _TABLES = {
@@ -118,8 +118,8 @@ _LINEAR_FRAMES = [
           note="3.34 V; the ESP32 keeps its own 3.3 V regulator."),
 ]  # fmt: skip
 _REV_C_FRAMES = [
-    Frame(title="Distances by shift register", left=174, top=12, right=228, bottom=70),
-    Frame(title="Status LED", left=174, top=74, right=228, bottom=110),
+    Frame(title="Distances by shift register", left=174, top=12, right=224, bottom=70),
+    Frame(title="Status LED", left=174, top=74, right=224, bottom=110),
 ]
 _FRAMES = {
     "modules": [

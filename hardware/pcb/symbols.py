@@ -4,14 +4,19 @@ Symbol coordinates: millimetres, y up, as KiCad keeps them. No symbol is ever tu
 on a page, so that every text stands upright. Invariant: pin ends lie on a 1.27 mm grid.
 """
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from types import MappingProxyType
+from typing import TypeAlias
 
 from hardware.pcb.modules import BLUEPILL_PINS, ESP32_PINS, ESP32_SILKSCREEN
 from hardware.pcb.sexp import Node, Text, node
 
 G = 2.54
+#: Kind of a stroke (rectangle, polyline, circle) and its points.
+Stroke: TypeAlias = tuple[str, tuple[tuple[float, float], ...]]
+#: Number, name and electrical kind of a pin; None leaves a gap.
+Row: TypeAlias = tuple[str, str, str] | None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -33,7 +38,7 @@ class Symbol:
     name: str
     prefix: str
     pins: tuple[Pin, ...]
-    picture: tuple[tuple[str, tuple[tuple[float, float], ...]], ...]
+    picture: tuple[Stroke, ...]
     #: Positions of reference and value.
     ref_at: tuple[float, float]
     value_at: tuple[float, float]
@@ -46,9 +51,7 @@ class Symbol:
             yield pin.number, pin.name, pin.kind
 
 
-def _two(
-    name: str, prefix: str, numbers: tuple[str, str], picture: list[tuple[str, tuple[tuple[float, float], ...]]]
-) -> Symbol:
+def _two(name: str, prefix: str, numbers: tuple[str, str], picture: Sequence[Stroke]) -> Symbol:
     """Draw a part that lies across the page, first pin at the left."""
     left, right = numbers
     pins = (Pin(number=left, name=left, kind="passive", at=(-1.5 * G, 0), side="left", length=1.27),
@@ -57,9 +60,7 @@ def _two(
                   shows_names=False)  # fmt: skip
 
 
-def _upright(
-    name: str, prefix: str, numbers: tuple[str, str], picture: list[tuple[str, tuple[tuple[float, float], ...]]]
-) -> Symbol:
+def _upright(name: str, prefix: str, numbers: tuple[str, str], picture: Sequence[Stroke]) -> Symbol:
     """Draw a part that stands, first pin at the top."""
     top, bottom = numbers
     pins = (Pin(number=top, name=top, kind="passive", at=(0, 1.5 * G), side="top", length=2.54),
@@ -71,7 +72,7 @@ def _upright(
 def _box(
     name: str,
     prefix: str,
-    sides: Mapping[str, list[tuple[str, str, str] | None]],
+    sides: Mapping[str, list[Row]],
     half_width: float,
 ) -> Symbol:
     """Draw a box; each side lists (number, name, kind) from top or left, None leaves a gap."""
@@ -98,7 +99,7 @@ def _box(
                   ref_at=(-half_width + 2.54, half_height + 1.9))  # fmt: skip
 
 
-def _power(name: str, picture: list[tuple[str, tuple[tuple[float, float], ...]]], *, is_up: bool) -> Symbol:
+def _power(name: str, picture: Sequence[Stroke], *, is_up: bool) -> Symbol:
     pin = Pin(number="1", name=name, kind="power_in", at=(0, 0), side="bottom" if is_up else "top", length=0)
     return Symbol(name=name, prefix="#PWR", pins=(pin,), picture=tuple(picture), ref_at=(0, 0),
                   value_at=(0, 3.3 if is_up else -3.3), shows_names=False, is_power=True)  # fmt: skip
@@ -113,10 +114,8 @@ _BAR = ("polyline", ((1.27, 1.27), (1.27, -1.27)))
 _SCHOTTKY_BAR = ("polyline", ((0.6, 0.8), (0.6, 1.27), (1.27, 1.27), (1.27, -1.27), (1.94, -1.27), (1.94, -0.8)))
 
 
-def _module(
-    pins: tuple[str, ...], names: Mapping[str, str], *, is_source: bool
-) -> dict[str, list[tuple[str, str, str] | None]]:
-    rows: list[tuple[str, str, str] | None] = []
+def _module(pins: tuple[str, ...], names: Mapping[str, str], *, is_source: bool) -> dict[str, list[Row]]:
+    rows: list[Row] = []
     for number, pin in enumerate(pins, start=1):
         alias = f"{pin}({names[pin]})" if pin in names else pin
         kind = {"5V": "power_in", "GND": "power_in", "3V3": "power_out" if is_source else "passive", "EN": "input",
@@ -125,20 +124,20 @@ def _module(
     return {"left": rows[:20], "right": rows[20:] if is_source else rows[:19:-1]}
 
 
-def _numbered(count: int) -> list[tuple[str, str, str] | None]:
+def _numbered(count: int) -> list[Row]:
     return [(str(number), str(number), "passive") for number in range(1, count + 1)]
 
 
 def _all() -> list[Symbol]:
     header = _numbered(24)
-    rs232: dict[str, list[tuple[str, str, str] | None]] = {
+    rs232: dict[str, list[Row]] = {
         "left": [("1", "C1+", "passive"), ("3", "C1-", "passive"), ("4", "C2+", "passive"), ("5", "C2-", "passive"), None,
                  ("11", "DIN1", "input"), ("12", "ROUT1", "output"), ("10", "DIN2", "input"), ("9", "ROUT2", "output")],
         "right": [("2", "V+", "passive"), ("6", "V-", "passive"), None, None, None,
                   ("14", "DOUT1", "output"), ("13", "RIN1", "input"), ("7", "DOUT2", "output"), ("8", "RIN2", "input")],
         "top": [("16", "VCC", "power_in")], "bottom": [("15", "GND", "power_in")],
     }  # fmt: skip
-    shift: dict[str, list[tuple[str, str, str] | None]] = {
+    shift: dict[str, list[Row]] = {
         "left": [("14", "DS", "input"), ("11", "SHCP", "input"), ("12", "STCP", "input"), None, ("10", "~{MR}", "input"),
                  ("13", "~{OE}", "input")],
         "right": [("15", "QA", "output"), ("1", "QB", "output"), ("2", "QC", "output"), ("3", "QD", "output"),
