@@ -47,7 +47,8 @@ def board_text(design: Design, tracks: list[Track], vias: list[Via], pours: dict
     tree.append(node("general", node("thickness", rules.BOARD_THICKNESS_MM), node("legacy_teardrops", "no")))
     tree.append(node("paper", Text("A4")))
     tree.append(node("title_block", node("title", Text(design.title)), node("rev", Text(design.variant)),
-                     node("comment", "1", Text("Generated from hardware/pcb; no board has been made yet"))))  # fmt: skip
+                     node("comment", "1",
+                          Text("Generated from hardware/pcb; no board has been made yet"))))  # fmt: skip
     layers = node("layers")
     for number, name, kind, alias in _LAYERS:
         layers.append(node(str(number), Text(name), kind, *([Text(alias)] if alias else [])))
@@ -119,7 +120,8 @@ def _setup() -> Node:
     stackup = node(
         "stackup",
         node("layer", Text("F.SilkS"), node("type", Text("Top Silk Screen")), node("color", Text("White"))),
-        node("layer", Text("F.Mask"), node("type", Text("Top Solder Mask")), *mask), node("layer", Text("F.Cu"), *copper),
+        node("layer", Text("F.Mask"), node("type", Text("Top Solder Mask")), *mask),
+        node("layer", Text("F.Cu"), *copper),
         node("layer", Text("dielectric 1"), *core), node("layer", Text("B.Cu"), *copper),
         node("layer", Text("B.Mask"), node("type", Text("Bottom Solder Mask")), *mask),
         node("layer", Text("B.SilkS"), node("type", Text("Bottom Silk Screen")), node("color", Text("White"))),
@@ -164,7 +166,8 @@ def _part(design: Design, component: Component, at: Place, numbers: dict[str, in
         pair = (numbers[net], net) if net is not None and pad.kind is not PadKind.HOLE else None
         tree.append(pad_node(pad, at.angle_deg, pair, (*ident, "pad", number), copper=part.bought))
     tree.append(node("embedded_fonts", "no"))
-    tree.append(node("model", Text(f"${{KIPRJMOD}}/../library/models/{footprint.name}.wrl"), node("offset", node("xyz", 0, 0, 0)),
+    tree.append(node("model", Text(f"${{KIPRJMOD}}/../library/models/{footprint.name}.wrl"),
+                     node("offset", node("xyz", 0, 0, 0)),
                      node("scale", node("xyz", 1, 1, 1)), node("rotate", node("xyz", 0, 0, 0))))  # fmt: skip
     return tree
 

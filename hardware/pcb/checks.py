@@ -201,7 +201,10 @@ def _gerbers(variant: str) -> list[Result]:
 
     _, stitches = load_pours(variant)
     reading = gerbers.read(old)
-    words = f"{reading.width_mm:g} x {reading.height_mm:g} mm, {reading.copper_layers} copper layers, {reading.plated} + {reading.unplated} holes"
+    words = (
+        f"{reading.width_mm:g} x {reading.height_mm:g} mm, {reading.copper_layers} copper layers, "
+        f"{reading.plated} + {reading.unplated} holes"
+    )
     found = gerbers.faults(design, [*(via for via in vias if not via.is_stitch), *stitches], reading)
     return [*results, _listed("gerbers re-read", variant, found, words)]
 

@@ -13,11 +13,10 @@ def faults(design: Design, tracks: list[Track], vias: list[Via]) -> list[str]:
     """Return nets in several pieces, tracks thinner than their class, and copper of no known net."""
     nets = design.nets()
     found = [f"track of {track.net}, which is no net" for track in tracks if track.net not in nets]
-    found += [
-        f"{track.net}: {track.width_mm:g} mm wide at {track.start_mm}, its class wants {rules.net_class(track.net).track_mm:g}"
-        for track in tracks
-        if track.width_mm < rules.net_class(track.net).track_mm
-    ]
+    for track in tracks:
+        wanted_mm = rules.net_class(track.net).track_mm
+        if track.width_mm < wanted_mm:
+            found.append(f"{track.net}: {track.width_mm:g} mm wide at {track.start_mm}, its class wants {wanted_mm:g}")
     pads = [pad for pad in placed_pads(design) if pad.net is not None]
     for net in nets:
         pieces = _pieces(
@@ -30,42 +29,55 @@ def faults(design: Design, tracks: list[Track], vias: list[Via]) -> list[str]:
     return found
 
 
-def _pieces(pads: list[PlacedPad], tracks: list[Track], vias: list[Via]) -> int:
-    """Return the number of connected groups: ends that meet on a layer, ends within pads, vias through both layers."""
-    parent: dict[object, object] = {}
+class _Groups:
+    """Things that were joined, directly or through others."""
 
-    def root(item: object) -> object:
-        parent.setdefault(item, item)
-        while parent[item] != item:
-            parent[item] = parent[parent[item]]
-            item = parent[item]
+    def __init__(self) -> None:
+        self._parent: dict[object, object] = {}
+
+    def root(self, item: object) -> object:
+        """Return the one that stands for an item's group; an unknown item is a group of its own."""
+        self._parent.setdefault(item, item)
+        while self._parent[item] != item:
+            self._parent[item] = self._parent[self._parent[item]]
+            item = self._parent[item]
         return item
 
-    def join(first: object, second: object) -> None:
-        parent[root(first)] = root(second)
+    def join(self, first: object, second: object) -> None:
+        """Make one group of two."""
+        self._parent[self.root(first)] = self.root(second)
 
-    points = set()
-    for track in tracks:
-        ends = [(track.layer, *track.start_mm), (track.layer, *track.end_mm)]
-        points |= set(ends)
-        join(*ends)
-    for via in vias:
-        ends = [(0, *via.at_mm), (1, *via.at_mm)]
-        points |= set(ends)
-        join(*ends)
+    def count(self) -> int:
+        """Return the number of groups."""
+        return len({self.root(item) for item in list(self._parent)})
+
+
+def _pieces(pads: list[PlacedPad], tracks: list[Track], vias: list[Via]) -> int:
+    """Return the number of connected groups: ends that meet on a layer, ends within pads, vias through both layers."""
+    groups = _Groups()
+    pairs = [((track.layer, *track.start_mm), (track.layer, *track.end_mm)) for track in tracks]
+    pairs += [((0, *via.at_mm), (1, *via.at_mm)) for via in vias]
+    for first, second in pairs:
+        groups.join(first, second)
+    points = {point for pair in pairs for point in pair}
     for number, pad in enumerate(pads):
-        left, top, right, bottom = pad.box_mm
         name = ("pad", pad.ref, pad.pad.number, number)
-        root(name)
-        for layer, x, y in points:
-            if pad.layers >> layer & 1 and left <= x <= right and top <= y <= bottom:
-                join(name, (layer, x, y))
+        groups.root(name)
+        for point in points:
+            if _is_in(pad, point):
+                groups.join(name, point)
     # A path that starts on a track of its own net ends inside that track, not at one of its ends.
     for layer, x, y in points:
         for track in tracks:
             if track.layer == layer and _is_on(track, x, y):
-                join((layer, x, y), (layer, *track.start_mm))
-    return len({root(item) for item in list(parent)})
+                groups.join((layer, x, y), (layer, *track.start_mm))
+    return groups.count()
+
+
+def _is_in(pad: PlacedPad, point: tuple[int, float, float]) -> bool:
+    layer, x, y = point
+    left, top, right, bottom = pad.box_mm
+    return bool(pad.layers >> layer & 1) and left <= x <= right and top <= y <= bottom
 
 
 def _is_on(track: Track, x: float, y: float) -> bool:

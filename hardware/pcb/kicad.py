@@ -117,7 +117,8 @@ def without_dates(text: str) -> str:
 
 def assembly(board: Path, file: Path) -> None:
     """Write the assembly drawing (outline, bodies, references) as SVG."""
-    run("pcb", "export", "svg", "--mode-single", "--page-size-mode", "2", "--exclude-drawing-sheet", "--black-and-white",
+    run("pcb", "export", "svg", "--mode-single", "--page-size-mode", "2", "--exclude-drawing-sheet",
+        "--black-and-white",
         "--layers", "Edge.Cuts,F.Fab,F.SilkS,F.Mask", "-o", file, board)  # fmt: skip
 
 
@@ -138,8 +139,7 @@ _DATED = re.compile(
 
 def _violation(entry: dict[str, object]) -> Violation:
     items = entry["items"]
-    assert isinstance(items, list)
-    where = "; ".join(str(item["description"]) for item in items)
+    where = "; ".join(str(item["description"]) for item in items) if isinstance(items, list) else ""
     return Violation(kind=str(entry["type"]), severity=str(entry["severity"]), text=f"{entry['description']}: {where}")
 
 

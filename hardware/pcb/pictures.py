@@ -12,7 +12,8 @@ from pathlib import Path
 from hardware.pcb import build, kicad
 from hardware.pcb.design import BOARD_VARIANTS, VARIANTS
 from hardware.pcb.schematic_pages import PAGES
-from hardware.pcb.spice.decks import Deck, decks
+from hardware.pcb.spice.deck import Deck
+from hardware.pcb.spice.decks import decks
 from hardware.pcb.spice.run import Result, simulate
 
 _PAGE_DPI = 80
@@ -63,7 +64,8 @@ def schematic_pictures(variant: str) -> list[Path]:
         for page in wanted:
             number = str(PAGES.index(page) + 2)
             target = build.PICTURES / f"{variant}-{page}"
-            subprocess.run(["pdftoppm", "-r", str(_PAGE_DPI), "-f", number, "-l", number, "-singlefile", "-png", str(pdf),
+            subprocess.run(["pdftoppm", "-r", str(_PAGE_DPI), "-f", number, "-l", number, "-singlefile", "-png",
+                            str(pdf),
                             str(target)], check=True)  # fmt: skip
             file = target.with_suffix(".png")
             _shrink(file)

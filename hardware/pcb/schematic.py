@@ -96,7 +96,8 @@ def root_text(design: Design) -> str:
             node("property", Text("Sheetfile"), Text(f"{design.variant}-{name}.kicad_sch"), node("at", x, y + 26.2, 0),
                  small),
             node("instances", node("project", Text(design.variant),
-                                   node("path", Text(f"/{uid(design.variant, 'root')}"), node("page", Text(str(number + 2)))))),
+                                   node("path", Text(f"/{uid(design.variant, 'root')}"),
+                                        node("page", Text(str(number + 2)))))),
         ))  # fmt: skip
         tree.append(_text(TITLES[name], (x + 4.0, y + 12.0), 2.0, uuid_node(design.variant, "root", name)))
     tree.append(node("sheet_instances", node("path", Text("/"), node("page", Text("1")))))

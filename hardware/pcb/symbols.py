@@ -131,14 +131,16 @@ def _numbered(count: int) -> list[Row]:
 def _all() -> list[Symbol]:
     header = _numbered(24)
     rs232: dict[str, list[Row]] = {
-        "left": [("1", "C1+", "passive"), ("3", "C1-", "passive"), ("4", "C2+", "passive"), ("5", "C2-", "passive"), None,
+        "left": [("1", "C1+", "passive"), ("3", "C1-", "passive"), ("4", "C2+", "passive"), ("5", "C2-", "passive"),
+                 None,
                  ("11", "DIN1", "input"), ("12", "ROUT1", "output"), ("10", "DIN2", "input"), ("9", "ROUT2", "output")],
         "right": [("2", "V+", "passive"), ("6", "V-", "passive"), None, None, None,
                   ("14", "DOUT1", "output"), ("13", "RIN1", "input"), ("7", "DOUT2", "output"), ("8", "RIN2", "input")],
         "top": [("16", "VCC", "power_in")], "bottom": [("15", "GND", "power_in")],
     }  # fmt: skip
     shift: dict[str, list[Row]] = {
-        "left": [("14", "DS", "input"), ("11", "SHCP", "input"), ("12", "STCP", "input"), None, ("10", "~{MR}", "input"),
+        "left": [("14", "DS", "input"), ("11", "SHCP", "input"), ("12", "STCP", "input"), None,
+                 ("10", "~{MR}", "input"),
                  ("13", "~{OE}", "input")],
         "right": [("15", "QA", "output"), ("1", "QB", "output"), ("2", "QC", "output"), ("3", "QD", "output"),
                   ("4", "QE", "output"), ("5", "QF", "output"), ("6", "QG", "output"), ("7", "QH", "output"),
@@ -155,11 +157,14 @@ def _all() -> list[Symbol]:
     )
     return [
         _two("R", "R", ("1", "2"), [("rectangle", ((-2.54, 1.0), (2.54, -1.0)))]),
-        _two("FUSE", "F", ("1", "2"), [("rectangle", ((-2.54, 1.0), (2.54, -1.0))), ("polyline", ((-2.54, 0), (2.54, 0)))]),
+        _two("FUSE", "F", ("1", "2"),
+             [("rectangle", ((-2.54, 1.0), (2.54, -1.0))), ("polyline", ((-2.54, 0), (2.54, 0)))]),
         _two("SCHOTTKY", "D", ("A", "K"), [*_DIODE, _SCHOTTKY_BAR]),
-        _two("LED", "D", ("A", "K"), [*_DIODE, _BAR, ("polyline", ((0, 1.5), (1.0, 2.6))), ("polyline", ((0.9, 1.5), (1.9, 2.6)))]),
+        _two("LED", "D", ("A", "K"),
+             [*_DIODE, _BAR, ("polyline", ((0, 1.5), (1.0, 2.6))), ("polyline", ((0.9, 1.5), (1.9, 2.6)))]),
         _upright("C", "C", ("1", "2"), _PLATES),
-        _upright("CP", "C", ("1", "2"), [*_PLATES, ("polyline", ((-1.5, 1.4), (-0.7, 1.4))), ("polyline", ((-1.1, 1.8), (-1.1, 1.0)))]),
+        _upright("CP", "C", ("1", "2"),
+                 [*_PLATES, ("polyline", ((-1.5, 1.4), (-0.7, 1.4))), ("polyline", ((-1.1, 1.8), (-1.1, 1.0)))]),
         _upright("TVS", "D", ("K", "A"), [("polyline", ((-1.27, -1.27), (1.27, -1.27), (0, 1.27), (-1.27, -1.27))),
                                           ("polyline", ((-1.7, 0.8), (-1.27, 1.27), (1.27, 1.27), (1.7, 1.74)))]),
         _box("CONN2", "J", {"right": _numbered(2)}, 2.54),
@@ -174,7 +179,8 @@ def _all() -> list[Symbol]:
         _box("DE9", "J", {"left": [*de9]}, 5.08),
         Symbol(name="NPN", prefix="Q", pins=transistor, ref_at=(5.08, 1.27), value_at=(6.35, -1.27), shows_names=False,
                picture=(("polyline", ((-2.54, 2.0), (-2.54, -2.0))), ("polyline", ((-2.54, 0.8), (0, 2.54))),
-                        ("polyline", ((-2.54, -0.8), (0, -2.54))), ("polyline", ((-1.4, -1.0), (-0.6, -2.2), (-2.0, -1.9))))),
+                        ("polyline", ((-2.54, -0.8), (0, -2.54))),
+                        ("polyline", ((-1.4, -1.0), (-0.6, -2.2), (-2.0, -1.9))))),
         Symbol(name="TESTPOINT", prefix="TP", ref_at=(4.5, 0), value_at=(4.5, -1.9), shows_names=False,
                pins=(Pin(number="1", name="1", kind="passive", at=(0, 0), side="left", length=1.27),),
                picture=(("circle", ((1.97, 0), (2.67, 0))),)),
@@ -182,7 +188,9 @@ def _all() -> list[Symbol]:
                picture=(("circle", ((0, 0), (1.6, 0))),)),
         _box("BLUEPILL", "U", _module(BLUEPILL_PINS, {}, is_source=False), 15.24),
         _box("ESP32_D1_MINI", "U", _module(ESP32_PINS, ESP32_SILKSCREEN, is_source=True), 15.24),
-        _power("GND", [("polyline", ((0, 0), (0, -1.27))), ("polyline", ((-1.27, -1.27), (1.27, -1.27), (0, -2.3), (-1.27, -1.27)))],
+        _power("GND",
+               [("polyline", ((0, 0), (0, -1.27))),
+                ("polyline", ((-1.27, -1.27), (1.27, -1.27), (0, -2.3), (-1.27, -1.27)))],
                is_up=False),
         _power("+5V", _ARROW, is_up=True), _power("+3V3", _ARROW, is_up=True), _power("+12V", _ARROW, is_up=True),
         Symbol(name="PWR_FLAG", prefix="#FLG", ref_at=(0, 0), value_at=(0, 4.2), shows_names=False, is_power=True,

@@ -10,7 +10,7 @@ import tempfile
 from dataclasses import dataclass
 from pathlib import Path
 
-from hardware.pcb.spice.decks import Deck, Limit
+from hardware.pcb.spice.deck import Deck, Limit
 
 _LIMIT_S = 120
 
@@ -57,7 +57,8 @@ def simulate(deck: Deck) -> Result:
     with tempfile.TemporaryDirectory() as folder:
         file, data = Path(folder) / "deck.cir", Path(folder) / "traces.txt"
         file.write_text(deck_text(deck, data), encoding="utf-8")
-        done = subprocess.run(["ngspice", "-b", str(file)], capture_output=True, text=True, timeout=_LIMIT_S, check=False,
+        done = subprocess.run(["ngspice", "-b", str(file)], capture_output=True, text=True, timeout=_LIMIT_S,
+                              check=False,
                               cwd=folder)  # fmt: skip
         figures = {name: float(value) for name, value in _MEASURED.findall(done.stdout)}
         missing = [limit.measure for limit in deck.limits if limit.measure not in figures]
