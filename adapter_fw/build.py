@@ -1,25 +1,34 @@
-"""Build the adapter's core for other machines: `python adapter_fw/build.py [host|cortex-m|xtensa] [--out DIR]`.
+"""Build the adapter's core for other machines: `python adapter_fw/build.py [TARGET …] [--out DIR]`.
 
-Each target is the self-test with the whole core in it. Prints how much flash and
-RAM the core alone takes. The ESP32 itself cannot be built here: its compiler is
-not in Debian; the Xtensa target has the ESP8266's core, which shares the
+    host       the self-test, with sanitizers
+    program    p2os-adapter: the adapter as a PC program on any line (host/)
+    replay     the fuzzing target with its corpus' reader, with sanitizers (fuzz/)
+    cortex-m   the self-test on an STM32F103
+    bluepill   the adapter itself on an STM32F103, its USART as the P2OS line (bluepill/)
+    xtensa     the self-test on an ESP8266's core
+
+Prints how much flash and RAM the core alone takes. The ESP32 itself cannot be
+built here: its compiler is not in Debian; the Xtensa target shares the
 instruction set but not the windowed calls.
 """
 
 import argparse
+import hashlib
+import os
 import shutil
 import subprocess
 import sys
-import tempfile
-from collections.abc import Iterable
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
 
 HERE = Path(__file__).resolve().parent
 BLUEPILL = HERE.parent / "testbench" / "firmware"
 SELFTEST = HERE / "selftest"
+#: Objects by what they were made of; deleting the folder costs a minute.
+OBJECTS = HERE / "build" / "objects"
 CORE = tuple(sorted((HERE / "core").rglob("*.cpp")))
-COMMON = (*CORE, SELFTEST / "selftest.cpp", SELFTEST / "robot.cpp", SELFTEST / "report.cpp")
+LIFE = (SELFTEST / "selftest.cpp", SELFTEST / "robot.cpp", SELFTEST / "report.cpp")
 
 #: Everywhere: no exceptions, no run-time types, no guards, nothing of a C++ library.
 CXX_FLAGS = (
@@ -27,41 +36,60 @@ CXX_FLAGS = (
     "-fno-threadsafe-statics", "-ffunction-sections", "-fdata-sections",
 )  # fmt: skip
 SANITIZERS = ("-O1", "-g", "-fsanitize=address,undefined", "-fno-sanitize-recover=all")
+CORTEX_M = ("-mcpu=cortex-m3", "-mthumb")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Target:
-    """A machine to build for."""
+    """A machine to build for, and what is built beside the core."""
 
+    output: str
     compiler: str
     package: str
     flags: tuple[str, ...]
     sources: tuple[Path, ...]
     link: tuple[str, ...] = ()
     after: tuple[str, ...] = ()
+    #: Whether the size of the core is worth saying.
+    is_small: bool = False
+
+
+def _on_host(output: str, *sources: Path) -> Target:
+    return Target(
+        output=output, compiler="g++", package="g++", flags=SANITIZERS, sources=sources, link=SANITIZERS
+    )  # fmt: skip
+
+
+def _on_cortex_m(output: str, *sources: Path) -> Target:
+    return Target(
+        output=output,
+        compiler="arm-none-eabi-g++",
+        package="gcc-arm-none-eabi libstdc++-arm-none-eabi-newlib",
+        flags=(*CORTEX_M, "-Os", "-g", "-ffreestanding"),
+        sources=(*sources, SELFTEST / "bare_memory.cpp", BLUEPILL / "startup.c"),
+        link=(*CORTEX_M, "-nostdlib", "-Wl,--gc-sections", "-T", str(BLUEPILL / "f103c8.ld")),
+        after=("-lgcc",),
+        is_small=True,
+    )
 
 
 TARGETS = {
-    "host": Target(
-        compiler="g++", package="g++", flags=SANITIZERS, sources=(SELFTEST / "host.cpp",), link=SANITIZERS
-    ),
-    "cortex-m": Target(
-        compiler="arm-none-eabi-g++",
-        package="gcc-arm-none-eabi libstdc++-arm-none-eabi-newlib",
-        flags=("-mcpu=cortex-m3", "-mthumb", "-Os", "-g", "-ffreestanding"),
-        sources=(SELFTEST / "cortex_m.cpp", SELFTEST / "bare_memory.cpp", BLUEPILL / "startup.c"),
-        link=("-mcpu=cortex-m3", "-mthumb", "-nostdlib", "-Wl,--gc-sections", "-T", str(BLUEPILL / "f103c8.ld")),
-        after=("-lgcc",),
-    ),
+    "host": _on_host("selftest-host", *LIFE, SELFTEST / "host.cpp"),
+    "program": _on_host("p2os-adapter", *sorted((HERE / "host").glob("*.cpp"))),
+    "replay": _on_host("replay", *sorted((HERE / "fuzz").glob("*.cpp"))),
+    "cortex-m": _on_cortex_m("selftest-cortex-m.elf", *LIFE, SELFTEST / "cortex_m.cpp"),
+    "bluepill": _on_cortex_m("adapter-bluepill.elf", *sorted((HERE / "bluepill").glob("*.cpp"))),
     "xtensa": Target(
+        output="selftest-xtensa.elf",
         compiler="xtensa-lx106-elf-g++",
         package="gcc-xtensa-lx106",
         flags=("-Os", "-g", "-ffreestanding", "-mlongcalls", "-mtext-section-literals",
                "-isystem", str(SELFTEST / "xtensa" / "include")),
-        sources=(SELFTEST / "xtensa" / "main.cpp", SELFTEST / "bare_memory.cpp", SELFTEST / "xtensa" / "start.S",
-                 SELFTEST / "xtensa" / "arithmetic.c"),
+        sources=(*LIFE, SELFTEST / "xtensa" / "main.cpp", SELFTEST / "bare_memory.cpp",
+                 SELFTEST / "xtensa" / "start.S", SELFTEST / "xtensa" / "arithmetic.c"),
         link=("-nostdlib", "-Wl,--gc-sections", "-T", str(SELFTEST / "xtensa" / "sim.ld")),
         after=("-lgcc",),
+        is_small=True,
     ),
 }  # fmt: skip
 
@@ -71,26 +99,43 @@ def is_installed(name: str) -> bool:
     return shutil.which(TARGETS[name].compiler) is not None
 
 
-def build(name: str, output: Path, extra: Iterable[str] = ()) -> dict[str, int]:
-    """Build a target's self-test; return the flash and RAM of the core alone, in bytes.
+def build(name: str, output: Path) -> dict[str, int]:
+    """Build a target; return the flash and RAM of the core alone, in bytes.
 
     Raises:
         subprocess.CalledProcessError: The compiler refused; its words are on stderr.
     """
     target = TARGETS[name]
-    with tempfile.TemporaryDirectory() as scratch:
-        objects = {source: _compile(target, source, Path(scratch)) for source in (*COMMON, *target.sources)}
-        _run([target.compiler, *target.link, *extra, *map(str, objects.values()), *target.after, "-o", str(output)])
-        return _size(target, [objects[source] for source in CORE])
+    objects = {source: _compile(target, source) for source in (*CORE, *target.sources)}
+    _run([target.compiler, *target.link, *map(str, objects.values()), *target.after, "-o", str(output)])
+    return _size(target, [objects[source] for source in CORE])
 
 
-def _compile(target: Target, source: Path, folder: Path) -> Path:
-    result = folder / f"{source.parent.name}_{source.stem}.o"
+def _compile(target: Target, source: Path) -> Path:
+    """Compile a source unless the same has been compiled before."""
     is_cxx = source.suffix == ".cpp"
     compiler = target.compiler if is_cxx else target.compiler.replace("g++", "gcc")
-    flags = CXX_FLAGS if is_cxx else ("-Wall",)
-    _run([compiler, *flags, *target.flags, "-c", str(source), "-o", str(result)])
+    command = [compiler, *(CXX_FLAGS if is_cxx else ("-Wall",)), *target.flags, "-c", str(source)]
+    made_of = hashlib.sha256("\0".join([_version(compiler), _headers(), *command]).encode() + source.read_bytes())
+    result = OBJECTS / f"{source.stem}-{made_of.hexdigest()[:24]}.o"
+    if not result.exists():
+        OBJECTS.mkdir(parents=True, exist_ok=True)
+        beside = result.with_suffix(f".{os.getpid()}")
+        _run([*command, "-o", str(beside)])
+        beside.replace(result)
     return result
+
+
+@cache
+def _version(compiler: str) -> str:
+    return subprocess.run([compiler, "--version"], capture_output=True, text=True, check=True).stdout
+
+
+@cache
+def _headers() -> str:
+    """Return what all headers together hash to: any of them may be included by any source."""
+    headers = sorted(path for path in HERE.rglob("*") if path.suffix == ".hpp" or path.parent.name == "include")
+    return hashlib.sha256(b"".join(path.read_bytes() for path in headers)).hexdigest()
 
 
 def _size(target: Target, objects: list[Path]) -> dict[str, int]:
@@ -107,7 +152,9 @@ def _run(command: list[str]) -> None:
 
 def main() -> int:
     """Build what is asked for, and say its size."""
-    parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )  # fmt: skip
     parser.add_argument("targets", nargs="*", help=f"of {', '.join(TARGETS)}; default: all that can be built here")
     parser.add_argument("--out", type=Path, default=HERE / "build", help="folder for the programs")
     words = parser.parse_args()
@@ -117,12 +164,13 @@ def main() -> int:
         return 2
     words.out.mkdir(parents=True, exist_ok=True)
     for name in words.targets or TARGETS:
+        target = TARGETS[name]
         if not is_installed(name):
-            print(f"{name}: {TARGETS[name].compiler} is not installed (apt-get install {TARGETS[name].package})")
+            print(f"{name}: {target.compiler} is not installed (apt-get install {target.package})")
             continue
-        size = build(name, words.out / f"selftest-{name}.elf")
+        size = build(name, words.out / target.output)
         words_of_size = f"core {size['flash']} bytes of flash, {size['ram']} bytes of RAM beside the adapter itself"
-        print(f"{name}: {'with sanitizers' if name == 'host' else words_of_size}")
+        print(f"{name}: {words.out / target.output}, {words_of_size if target.is_small else 'with sanitizers'}")
     return 0
 
 

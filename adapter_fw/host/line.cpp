@@ -51,7 +51,9 @@ bool Line::open(const std::string& address, std::int32_t baud) {
     }
     return open_tcp(address.substr(4, colon - 4), address.substr(colon + 1));
   }
-  descriptor_ = ::open(address.c_str(), O_RDWR | O_NOCTTY | O_NONBLOCK | O_CLOEXEC);
+  // As p2os names them; a baud of the address would be in the way of the search for the robot's.
+  const std::size_t scheme = address.rfind("serial:", 0) == 0 ? 7 : address.rfind("pty:", 0) == 0 ? 4 : 0;
+  descriptor_ = ::open(address.c_str() + scheme, O_RDWR | O_NOCTTY | O_NONBLOCK | O_CLOEXEC);
   if (descriptor_ < 0) {
     return fail(address);
   }

@@ -1,10 +1,10 @@
 // The adapter as a PC program: the firmware's core on any line, its wires on a Unix socket.
 //
-//   p2os-adapter --line tcp:127.0.0.1:8101 --wires /tmp/wires.sock [--robot p2dx] [--settings FILE]
+//   p2os-adapter --line tcp:127.0.0.1:8101 [--wires /tmp/wires.sock] [--robot p2dx] [--settings FILE]
 //
-// Standard input is the console (type help), events go to standard error. SIGINT and
-// SIGTERM stop and close the robot first. Exit codes: 0 ended, 1 the line is gone,
-// 2 wrong usage, 130 interrupted.
+// Standard input is the console (type help), events go to standard error with the
+// milliseconds since the start. SIGINT and SIGTERM stop and close the robot first.
+// Exit codes: 1 the line is gone or cannot be opened, 2 wrong usage, 130 interrupted.
 
 #include <poll.h>
 #include <unistd.h>
@@ -24,15 +24,22 @@
 
 namespace {
 
+constexpr int RESTART = -1, INTERRUPTED = 130;
+
 volatile std::sig_atomic_t interrupted = 0;
 
 class MonotonicClock final : public hal::Clock {
  public:
-  p2os::Nanos now() override {
+  p2os::Nanos now() override { return read() - start_; }
+
+ private:
+  static p2os::Nanos read() {
     timespec time{};
     ::clock_gettime(CLOCK_MONOTONIC, &time);
     return time.tv_sec * p2os::NS_PER_S + time.tv_nsec;
   }
+
+  p2os::Nanos start_ = read();
 };
 
 class Standard final : public shell::Writer {
@@ -102,9 +109,10 @@ class Teller final : public adapter::Observer {
   shell::Writer& writer_;
 };
 
-void wait(host::Line& line, host::Wires& wires, p2os::Nanos span) {
+//: Sleeps until something has come or `span` is over; a negative descriptor is left out.
+void wait(const host::Line& line, const host::Wires& wires, int input, p2os::Nanos span) {
   pollfd files[] = {{line.descriptor(), POLLIN, 0},
-                    {STDIN_FILENO, POLLIN, 0},
+                    {input, POLLIN, 0},
                     {wires.listening(), POLLIN, 0},
                     {wires.connected(), POLLIN, 0}};
   const p2os::Nanos bounded = span < 0 ? 0 : p2os::earlier(span, 100 * p2os::NS_PER_MS);
@@ -112,8 +120,9 @@ void wait(host::Line& line, host::Wires& wires, p2os::Nanos span) {
   ::ppoll(files, sizeof files / sizeof files[0], &patience, nullptr);
 }
 
-//: Returns how it ended: 0 for a restart, otherwise the exit code plus one.
-int run(const Options& options, host::Line& line, host::Wires& wires, host::FileStore& store) {
+//: Returns the exit code, or RESTART.
+int run(const Options& options, host::Line& line, host::Wires& wires, host::FileStore& store,
+        MonotonicClock& clock) {
   const adapter::WireNumbers numbers;
   const char* fault = nullptr;
   const adapter::Settings settings = shell::stored_settings(store, numbers, fault);
@@ -123,30 +132,30 @@ int run(const Options& options, host::Line& line, host::Wires& wires, host::File
     err.write(fault);
     err.write("\n");
   }
-  MonotonicClock clock;
   shell::EventLog log;
   Teller teller(log, err);
   adapter::Adapter part(settings, *find_robot(options.robot), numbers, clock.now());
   part.attach(&wires, &wires, &teller);
   shell::Console console({part, log, wires, store, out, numbers, "host"});
-  shell::Runner runner(part, clock, line, nullptr);
+  shell::Runner runner(part, clock, line, &wires);
+  wires.release(clock.now());
   console.banner();
-  bool has_input = true;
+  int input = STDIN_FILENO;
   while (true) {
     wires.serve();
     const p2os::Nanos due = runner.pass();
     if (interrupted != 0 || console.wants_restart() || line.is_gone()) {
       part.shutdown("the program ends", clock.now());
       runner.pass();
-      return console.wants_restart() ? 0 : interrupted != 0 ? 131 : 2;
+      return line.is_gone() ? 1 : interrupted != 0 ? INTERRUPTED : RESTART;
     }
-    wait(line, wires, due - clock.now());
-    pollfd input{STDIN_FILENO, POLLIN, 0};
-    while (has_input && ::poll(&input, 1, 0) > 0) {
-      char character = 0;
-      has_input = ::read(STDIN_FILENO, &character, 1) == 1;
-      if (has_input) {
+    wait(line, wires, input, due - clock.now());
+    char character = 0;
+    for (pollfd file{input, POLLIN, 0}; ::poll(&file, 1, 0) > 0; file.fd = input) {
+      if (::read(input, &character, 1) == 1) {
         console.take(character, clock.now());
+      } else {
+        input = -1;  // a console that has ended leaves the adapter running
       }
     }
   }
@@ -157,7 +166,8 @@ int run(const Options& options, host::Line& line, host::Wires& wires, host::File
 int main(int count, char** words) {
   Options options;
   if (!read_options(count, words, options)) {
-    return refuse("wrong usage", "p2os-adapter --line tcp:HOST:PORT|/dev/ttyUSB0 [--wires SOCKET] [--robot p2dx] [--settings FILE]");
+    return refuse("wrong usage",
+                  "p2os-adapter --line tcp:HOST:PORT|/dev/ttyUSB0 [--wires SOCKET] [--robot p2dx] [--settings FILE]");
   }
   if (find_robot(options.robot) == nullptr) {
     return refuse("there is no robot " + options.robot, "a subclass such as p2dx or p3at");
@@ -177,12 +187,14 @@ int main(int count, char** words) {
     std::fprintf(stderr, "p2os-adapter: cannot open %s\nhint: p2os ports\n", line.error().c_str());
     return 1;
   }
-  int ended = 0;
-  while (ended == 0) {
-    ended = run(options, line, wires, store);
+  MonotonicClock clock;
+  int ended = RESTART;
+  while (ended == RESTART) {
+    ended = run(options, line, wires, store, clock);
   }
   if (line.is_gone()) {
-    std::fputs("p2os-adapter: the line is gone\n", stderr);
+    std::fprintf(stderr, "p2os-adapter: the line %s is gone\nhint: is the robot on, and its cable in?\n",
+                 options.line.c_str());
   }
-  return ended - 1;
+  return ended;
 }

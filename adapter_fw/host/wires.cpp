@@ -80,11 +80,26 @@ void Wires::take(char character) {
   }
   line_[size_] = '\0';
   size_ = 0;
-  char* end = nullptr;
-  const unsigned long word = std::strncmp(line_.data(), "in ", 3) == 0 ? std::strtoul(line_.data() + 3, &end, 16) : 0;
-  if (end != nullptr && end != line_.data() + 3 && *end == '\0') {
-    word_ = static_cast<std::uint32_t>(word);
+  take_line();
+}
+
+// A line that is neither of the two is left out.
+void Wires::take_line() {
+  unsigned word = 0;
+  int up = 0, down = 0, forward = 0, backward = 0, turn = 0, end = -1;
+  if (std::sscanf(line_.data(), "in %x%n", &word, &end) == 1 && line_[static_cast<std::size_t>(end)] == '\0') {
+    word_ = word;
+  } else if (std::sscanf(line_.data(), "pad %d %d %d %d %d", &up, &down, &forward, &backward, &turn) == 5) {
+    report_ = {up != 0, down != 0, forward, backward, turn};
+    has_report_ = true;
   }
+}
+
+bool Wires::take(adapter::PadReport& report) {
+  const bool is_new = has_report_;
+  report = report_;
+  has_report_ = false;
+  return is_new;
 }
 
 void Wires::leave() {

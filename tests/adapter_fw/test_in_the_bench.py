@@ -1,7 +1,6 @@
 """The firmware core in the whole chain, in the model's place."""
 
 from dataclasses import replace
-from pathlib import Path
 
 import pytest
 
@@ -10,6 +9,7 @@ from p2os.timing import NS_PER_S
 from testbench.adapter_firmware import FirmwareAdapter, default_settings, is_available, setting_numbers
 from testbench.bench import Bench
 from testbench.scenario import Scenario, load_scenario
+from tests.adapter_fw.builds import load_script
 from tests.adapter_fw.twins import PARAMETERS, PINOUT, AdapterSettings, FakePins
 
 pytestmark = pytest.mark.skipif(not is_available(), reason="the firmware core is not built: no C++17 compiler")
@@ -72,13 +72,6 @@ def test_a_failure_of_the_far_side_comes_out_behind_the_firmware() -> None:
 
 
 def test_generated_tables_are_up_to_date() -> None:
-    import importlib.util
-
-    path = Path(__file__).parents[2] / "tools" / "generate_adapter_tables.py"
-    spec = importlib.util.spec_from_file_location("generate_adapter_tables", path)
-    assert spec is not None
-    assert spec.loader is not None
-    tables = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(tables)
+    tables = load_script("tools/generate_adapter_tables.py")
     stale = [path.name for path, text in tables.tables().items() if path.read_text(encoding="utf-8") != text]
     assert not stale, "run tools/generate_adapter_tables.py"

@@ -8,13 +8,14 @@ constexpr std::int32_t TRIGGER_FULL = 1'023, STICK_FULL = 511;
 
 // Returns a deflection with its dead zone taken out and the rest stretched to the full range.
 std::int32_t outside(std::int32_t value, std::int32_t dead, std::int32_t full) {
-  const std::int32_t size = value < 0 ? -value : value;
+  // Cut first: a report may hold any number, and the most negative one has no magnitude.
+  const std::int32_t cut = value > full ? full : value < -full ? -full : value;
+  const std::int32_t size = cut < 0 ? -cut : cut;
   if (size <= dead) {
     return 0;
   }
-  const std::int32_t cut = size > full ? full : size;
-  const std::int32_t stretched = (cut - dead) * full / (full - dead);
-  return value < 0 ? -stretched : stretched;
+  const std::int32_t stretched = (size - dead) * full / (full - dead);
+  return cut < 0 ? -stretched : stretched;
 }
 
 }  // namespace

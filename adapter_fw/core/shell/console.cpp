@@ -78,8 +78,7 @@ void Console::run(char* line, p2os::Nanos now) {
   } else if (is("set", 3)) {
     set(given.words[1], given.words[2]);
   } else if (is("reset", 2)) {
-    parts_.store.forget(given.words[1]);
-    writer.write("ok, in force after restart\n");
+    reset(given.words[1]);
   } else if (is("master", 2) && (is_same(given.words[1], "bluepill") || is_same(given.words[1], "pad"))) {
     parts_.adapter.set_master(
         is_same(given.words[1], "pad") ? adapter::Master::PAD : adapter::Master::BLUEPILL, now);
@@ -179,6 +178,16 @@ void Console::set(const char* name, const char* value) {
   } else if (!parts_.store.save(adapter::setting(place).name, wanted)) {
     parts_.writer.write("error: it could not be stored\n");
   } else {
+    parts_.writer.write("ok, in force after restart\n");
+  }
+}
+
+void Console::reset(const char* name) {
+  const std::int32_t place = adapter::find_setting(name);
+  if (place < 0) {
+    parts_.writer.write("error: no such setting; get lists them\n");
+  } else {
+    parts_.store.forget(adapter::setting(place).name);
     parts_.writer.write("ok, in force after restart\n");
   }
 }

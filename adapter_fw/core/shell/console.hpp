@@ -69,6 +69,7 @@ class Console {
   void pins(p2os::Nanos now);
   void get(const char* name);
   void set(const char* name, const char* value);
+  void reset(const char* name);
   void number(const char* name, std::int64_t value);
   void show(std::int32_t place, const adapter::Settings& settings);
 
