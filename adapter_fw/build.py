@@ -76,7 +76,7 @@ def _on_cortex_m(output: str, *sources: Path) -> Target:
 TARGETS = {
     "host": _on_host("selftest-host", *LIFE, SELFTEST / "host.cpp"),
     "program": _on_host("p2os-adapter", *sorted((HERE / "host").glob("*.cpp"))),
-    "replay": _on_host("replay", *sorted((HERE / "fuzz").glob("*.cpp"))),
+    "replay": _on_host("replay", *sorted((HERE / "fuzz").glob("*.cpp")), SELFTEST / "robot.cpp"),
     "cortex-m": _on_cortex_m("selftest-cortex-m.elf", *LIFE, SELFTEST / "cortex_m.cpp"),
     "bluepill": _on_cortex_m("adapter-bluepill.elf", *sorted((HERE / "bluepill").glob("*.cpp"))),
     "xtensa": Target(
@@ -168,7 +168,11 @@ def main() -> int:
         if not is_installed(name):
             print(f"{name}: {target.compiler} is not installed (apt-get install {target.package})")
             continue
-        size = build(name, words.out / target.output)
+        try:
+            size = build(name, words.out / target.output)
+        except subprocess.CalledProcessError:
+            print(f"build: {name}: the compiler's words stand above", file=sys.stderr)
+            return 1
         words_of_size = f"core {size['flash']} bytes of flash, {size['ram']} bytes of RAM beside the adapter itself"
         print(f"{name}: {words.out / target.output}, {words_of_size if target.is_small else 'with sanitizers'}")
     return 0

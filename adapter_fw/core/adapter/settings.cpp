@@ -10,6 +10,10 @@ namespace {
 constexpr std::int64_t MAX_RIM_UM_PER_S = 80'000'000;
 constexpr std::int64_t MAX_LENGTH_UM = 10'000'000;
 constexpr std::int64_t MAX_SPEED_MM_S = 65'535;
+//: chosen: far beyond any use; times a robot's ceiling it is still exact.
+constexpr Nanos MAX_TIME_NS = 3'600 * NS_PER_S;
+//: chosen: what comes round more often than this would fill the line, or the loop, with itself.
+constexpr Nanos MIN_SAMPLE_NS = NS_PER_MS / 10, MIN_SPACING_NS = 1 * NS_PER_MS, MIN_ROUND_NS = 10 * NS_PER_MS;
 
 bool are_positive(const Settings& settings) {
   return settings.sample_period_ns > 0 && settings.pair_spacing_ns > 0 && settings.refresh_ns > 0 &&
@@ -25,6 +29,30 @@ bool are_not_negative(const Settings& settings) {
          settings.pad_velocity_mm_s >= 0 && settings.pad_rotation_mrad_s >= 0;
 }
 
+bool are_choices(const Settings& settings) {
+  return settings.bit_order <= BitOrder::COMM1_MSB && settings.motor_meaning <= MotorMeaning::LINEAR_ANGULAR &&
+         settings.encoder_at_open <= EncoderAtOpen::CONTINUE;
+}
+
+bool leave_time(const Settings& settings) {
+  return settings.sample_period_ns >= MIN_SAMPLE_NS && settings.pair_spacing_ns >= MIN_SPACING_NS &&
+         settings.refresh_ns >= MIN_ROUND_NS && settings.pulse_ns >= MIN_ROUND_NS &&
+         settings.distance_stale_ns >= MIN_ROUND_NS && settings.stop_repeat_ns >= MIN_ROUND_NS;
+}
+
+bool are_bounded(const Settings& settings) {
+  for (const Nanos time :
+       {settings.sample_period_ns, settings.connect_after_ns, settings.disconnect_after_ns, settings.boot_ns,
+        settings.pair_spacing_ns, settings.refresh_ns, settings.pulse_ns, settings.liveness_ns, settings.first_sip_ns,
+        settings.retry_ns, settings.disbelief_ns, settings.distance_stale_ns, settings.settle_ns,
+        settings.encoder_dwell_ns, settings.stop_repeat_ns, settings.pad_loss_ns}) {
+    if (time > MAX_TIME_NS) {
+      return false;
+    }
+  }
+  return settings.disbelief_tolerance_mm_s <= MAX_SPEED_MM_S && settings.disbelief_progress_mm_s <= MAX_SPEED_MM_S;
+}
+
 }  // namespace
 
 const char* fault_of(const Settings& settings, const WireNumbers& wires) {
@@ -33,6 +61,15 @@ const char* fault_of(const Settings& settings, const WireNumbers& wires) {
   }
   if (!are_not_negative(settings)) {
     return "a time or a step is negative";
+  }
+  if (!are_choices(settings)) {
+    return "a choice that does not exist";
+  }
+  if (!are_bounded(settings)) {
+    return "a time is longer than an hour, or a speed faster than P2OS can say";
+  }
+  if (!leave_time(settings)) {
+    return "a time that comes round is too short: the least is 10 ms, 1 ms between pairs, 0.1 ms between samples";
   }
   if (settings.sample_count < 1 || settings.sample_count > MAX_SAMPLE_COUNT || settings.sample_count % 2 == 0) {
     return "sample_count must be odd, 1 to 31";

@@ -1,0 +1,112 @@
+"""A second BluePill in the adapter's place: the emulated chip runs the core, its USART is the P2OS line.
+
+    first chip ─ nets ─ second chip ─ USART1 at 9600 ─ controller ─ body
+
+The second chip follows the first: it is brought forward in steps of a
+millisecond at most, sees the first one's pins as they stand at the begin of
+each step, and what it drives carries the time of the instruction that did it.
+"""
+
+from pathlib import Path
+
+from adapter_sim.pinout import Pinout, Role
+from adapter_sim.states import AdapterState
+from bluepill_sim import BluePill
+from bluepill_sim.pins import PinDrive
+from p2os.pioneer.controller import Pioneer
+from p2os.timing import NS_PER_MS, Nanos, Reached
+from testbench.bench import Bench
+from testbench.sip_ranges import SipRanges
+from testbench.wires import OwnedPins
+
+#: A quarter of what the adapter samples with.
+STEP_NS: Nanos = NS_PER_MS // 2
+#: Of adapter_fw/bluepill/hardware.hpp, in the order of the input word and of the output word.
+INPUTS = ("PB8", "PB9", "PB10", "PB11", "PB12", "PB13", "PB14", "PB15")
+OUTPUTS = (*(f"PA{number}" for number in range(8)), "PB0", "PB1", "PB3", "PB4", "PB5", "PB6")
+#: Of bluepill/main.cpp: each four bytes.
+REPORT = ("passes", "longest_pass_cycles", "sips", "state", "losses", "rejected", "events")
+
+
+class SecondBluePill:
+    """The chip that runs the core, as a part of the bench, with its line to the controller."""
+
+    def __init__(self, elf: Path, pins: OwnedPins, pinout: Pinout, pioneer: Pioneer) -> None:
+        self.chip = BluePill(elf, strict=True)
+        self.pioneer = pioneer
+        #: Every byte that has left, with the end of its stop bit.
+        self.sent: list[tuple[Nanos, int]] = []
+        self.on_packet = lambda data, at: None
+        self._pins = pins
+        self._on_the_line: list[tuple[Nanos, int]] = []
+        self._step_at: Nanos = 0
+        names = [name for value in ("motor1", "motor2") for name in pinout.value(value).wires]
+        names += [pinout.with_role(role)[0].name for role in (Role.CONNECT, Role.RESET)]
+        self._inputs = list(zip(names, map(self.chip.pin, INPUTS), strict=True))
+        outputs = [wire.name for wire in pinout.with_role(Role.DISTANCE)]
+        outputs += [name for value in ("encoder1", "encoder2") for name in pinout.value(value).wires]
+        self._outputs = dict(zip(OUTPUTS, outputs, strict=True))
+        self.chip.on_pin = self._drives
+        self.chip.usart1.on_transmit = self._sends
+
+    @property
+    def report(self) -> dict[str, int]:
+        """Return what the program tells a debugger."""
+        address = self.chip.image.symbols.address_of("adapter_report")
+        data = self.chip.read_memory(address, 4 * len(REPORT))
+        assert data is not None
+        return {
+            name: int.from_bytes(data[4 * place : 4 * place + 4], "little") for place, name in enumerate(REPORT)
+        }  # fmt: skip
+
+    @property
+    def state(self) -> AdapterState:
+        return list(AdapterState)[self.report["state"]]
+
+    def next_deadline(self) -> Nanos:
+        own = self.pioneer.next_deadline()
+        return self._step_at if own is None else min(own, self._step_at)
+
+    def advance_to(self, limit: Nanos) -> Reached:
+        for name, pin in self._inputs:
+            pin.drive(self._pins.read(name, limit))
+        if self.chip.now_ns < limit:
+            self.chip.advance_to(limit)
+        while self._on_the_line and self._on_the_line[0][0] <= limit:
+            at, byte = self._on_the_line.pop(0)
+            self.pioneer.receive(bytes([byte]), at)
+        self.pioneer.advance_to(limit)
+        for frame in self.pioneer.take_output():
+            self.on_packet(frame, limit)
+            self.chip.usart1.receive(frame)
+        self._step_at = limit + STEP_NS
+        return Reached(limit)
+
+    def _drives(self, pin: str, drive: PinDrive, at: Nanos) -> None:
+        if pin in self._outputs:
+            self._pins.write(self._outputs[pin], drive.level if drive.is_strong else None, at)
+
+    def _sends(self, byte: int, at: Nanos) -> None:
+        self.sent.append((at, byte))
+        self._on_the_line.append((at, byte))
+
+
+class SecondBluePillBench(Bench):
+    """A bench whose adapter is a second BluePill."""
+
+    elf: Path
+
+    def _adapter_and_pioneer(self, pinout: Pinout, body: object, harness: object) -> tuple[object, Pioneer]:
+        recorder, parameters = self.recorder, self.scenario.parameters
+        pioneer = Pioneer(parameters=parameters, body=body, settings=self.scenario.controller)
+        pioneer.on_event = recorder.listener("pioneer")
+        ranges = self._ranges = SipRanges(parameters, pioneer.settings.profile, on_ranges=recorder.sonar)
+        self.second = SecondBluePill(self.elf, OwnedPins(harness, "adapter"), pinout, pioneer)
+
+        def comes_back(frame: bytes, at: Nanos) -> None:
+            recorder.wire("r2c", frame, at)
+            ranges.take(frame, at)
+
+        self.second.on_packet = comes_back
+        self._robots.append(self.second)
+        return self.second, pioneer

@@ -1,0 +1,93 @@
+"""A second, emulated BluePill runs the adapter core and drives a virtual Pioneer for the first one."""
+
+from dataclasses import replace
+from itertools import groupby
+from pathlib import Path
+
+import pytest
+
+from p2os.commands import Command
+from p2os.timing import NS_PER_MS, NS_PER_S
+from p2os.wire import Decoder, Frame
+from testbench.bench import Bench
+from testbench.scenario import Scenario, load_scenario
+from tests.adapter_fw.builds import built
+from tests.adapter_fw.second_bluepill import SecondBluePillBench
+
+#: A quarter of the sample period of 2 ms at 72 MHz; measured: 13 275.
+LONGEST_PASS_CYCLES = 36_000
+
+
+def scenario(name: str, duration_s: float) -> Scenario:
+    wanted = load_scenario(name).with_options(mode="adapter", body="kinematic")
+    return replace(wanted, duration_ns=int(duration_s * NS_PER_S))
+
+
+def speeds(data: bytes) -> list[tuple[str, object]]:
+    """Return each speed that differs from the one before it, by the names of the commands."""
+    decoder, said = Decoder(), []
+    decoder.receive(data, 0)
+    while (item := decoder.next_item()) is not None:
+        assert isinstance(item, Frame), "the line is clean"
+        said.append(Command.from_frame(item))
+    pairs = [[(command.name, command.argument) for command in said if command.name == name] for name in ("VEL", "RVEL")]
+    return [value for pair in pairs for value, _ in groupby(pair)]
+
+
+def finished(bench: Bench) -> Bench:
+    bench.run_until(bench.end)
+    bench.finish()
+    return bench
+
+
+def run_second(elf: Path, wanted: Scenario) -> SecondBluePillBench:
+    bench = type("Bench", (SecondBluePillBench,), {"elf": elf})(wanted)
+    finished(bench)
+    report = bench.second.report
+    assert bench.second.chip.fault is None
+    assert (report["losses"], report["rejected"]) == (0, 0)
+    assert report["longest_pass_cycles"] <= LONGEST_PASS_CYCLES
+    return bench
+
+
+def model_bytes(wanted: Scenario) -> bytes:
+    bench, sent = Bench(wanted), []
+    take = bench.parts.adapter.take_output
+    bench.parts.adapter.take_output = lambda: [sent.append(frame) or frame for frame in take()]
+    finished(bench)
+    return b"".join(sent)
+
+
+def test_the_core_on_a_second_bluepill_drives_the_robot(tmp_path: Path) -> None:
+    bench = run_second(built("bluepill", tmp_path)[0], scenario("dodge", 3.9))
+    assert bench.second.state == "driving"
+    assert bench.second.report["sips"] >= 32
+    sent = speeds(bytes(byte for _, byte in bench.second.sent))
+    assert max(value for name, value in sent if name == "VEL") > 100
+    assert bench.parts.body.state.forward_mps > 0.1
+
+
+def test_its_bytes_leave_at_9600_baud_without_a_gap_in_a_frame(tmp_path: Path) -> None:
+    bench = run_second(built("bluepill", tmp_path)[0], scenario("motors", 0.45))
+    sent = bench.second.sent
+    first = [at for at, _ in sent[:6]]
+    assert bytes(byte for _, byte in sent[:6]) == bytes.fromhex("FA FB 03 1D 00 1D"), "STOP comes first"
+    spans = {later - earlier for earlier, later in zip(first, first[1:], strict=False)}
+    assert all(abs(span - 10 * NS_PER_S / 9600) < 1_000 for span in spans)
+    assert first[0] > 300 * NS_PER_MS, "nothing leaves before the boot is over"
+
+
+@pytest.mark.slow
+def test_motors_through_either_adapter_are_the_same_speeds(tmp_path: Path) -> None:
+    wanted = scenario("motors", 9.7)
+    bench = run_second(built("bluepill", tmp_path)[0], wanted)
+    assert speeds(bytes(byte for _, byte in bench.second.sent)) == speeds(model_bytes(wanted))
+
+
+@pytest.mark.slow
+def test_dodge_roams_among_obstacles_without_touching_one(tmp_path: Path) -> None:
+    bench = run_second(built("bluepill", tmp_path)[0], scenario("dodge", 10))
+    sent = speeds(bytes(byte for _, byte in bench.second.sent))
+    assert max(value for name, value in sent if name == "VEL") > 100
+    assert len({value for name, value in sent if name == "RVEL"}) > 1, "it turns"
+    assert bench.parts.body.state.collisions == 0
