@@ -42,84 +42,10 @@ from p2os.packets import (
 )
 from p2os.profiles import Profile
 from p2os.wire import Frame
+from tests.p2os.packet_strategies import ANY, u8
 
 GOLDEN = Path(__file__).parent.parent / "golden"
 VECTORS = {vector["name"]: vector for vector in json.loads((GOLDEN / "p2os_vectors.json").read_text(encoding="utf-8"))}
-
-u8, u16, u32 = st.integers(0, 0xFF), st.integers(0, 0xFFFF), st.integers(0, 2**32 - 1)
-s8, s16, s32 = st.integers(-0x80, 0x7F), st.integers(-0x8000, 0x7FFF), st.integers(-(2**31), 2**31 - 1)
-rest = st.binary(max_size=4)
-text = st.binary(max_size=8).map(lambda raw: raw.replace(b"\0", b"x"))
-
-
-def several(item: st.SearchStrategy, most: int) -> st.SearchStrategy[tuple]:
-    return st.lists(item, max_size=most).map(tuple)
-
-
-def batteries() -> st.SearchStrategy[BatteryPacket]:
-    return u8.map(lambda size: size % 7).flatmap(
-        lambda size: st.builds(
-            BatteryPacket, batteries=several(st.tuples(*[u8] * size), 6), row_bytes=st.just(size), rest=rest
-        )
-    )
-
-
-def extended_lasers() -> st.SearchStrategy[SimLaserPacket]:
-    rows = st.lists(st.tuples(u16, u8, u16), max_size=20)
-    return rows.flatmap(
-        lambda found: st.builds(
-            SimLaserPacket, is_extended=st.just(True), total=u16, first=u16, laser=u8, flags=u8, rest=rest,
-            ranges_mm=st.just(tuple(row[0] for row in found)), reflectances=st.just(tuple(row[1] for row in found)),
-            flags_of_readings=st.just(tuple(row[2] for row in found)),
-        )
-    )  # fmt: skip
-
-
-#: One strategy a kind of packet: every field over its whole range.
-ANY: dict[str, st.SearchStrategy] = {
-    "encoder": st.builds(EncoderPacket, left_counts=s32, right_counts=s32, rest=rest),
-    "gyro": st.builds(
-        GyroPacket, readings=several(st.builds(GyroReading, raw_rate=u16, raw_temperature=u8), 20), rest=rest
-    ),
-    "compass": st.builds(
-        CompassPacket, raw_compass=u16, raw_pitch=s16, raw_roll=s16, raw_x=s16, raw_y=s16, raw_z=s16,
-        raw_temperature=s16, error_bits=u16, h_score=u8, v_score=u8, raw_m_score=u16, raw_size=u8, rest=rest,
-    ),
-    "compass without size": st.builds(CompassPacket, raw_compass=u16, raw_pitch=s16, raw_size=st.none()),
-    "io": st.builds(
-        IoPacket, digital_in=several(u8, 6), digital_out=several(u8, 6), raw_analog=several(u16, 12), rest=rest
-    ),
-    "seraux": st.builds(SerauxPacket, port=st.integers(1, 3), data=st.binary(max_size=201)),
-    "gripper": st.builds(GripperPacket, gripper_type=u8, state=u8, grasp_time=u8, rest=rest),
-    "joystick": st.builds(
-        JoystickPacket, button1=u8, button2=u8, raw_x=u16, raw_y=u16, raw_throttle=u16, rest=rest
-    ),
-    "playlist": st.builds(
-        PlaylistPacket, rest=rest,
-        sound=st.builds(Sound, number=u8, toggle=u8, raw_name=st.binary(min_size=16, max_size=16), offset=u32,
-                        length=u32),
-    ),
-    "no sounds": st.just(PlaylistPacket()),
-    "arm": st.builds(ArmPacket, status=u8, moving=u8, positions=st.tuples(*[u8] * 6), rest=rest),
-    "arm info": st.builds(ArmInfoPacket, raw_version=text, joints=several(st.builds(
-        ArmJoint, speed=u8, home=u8, least=u8, centre=u8, most=u8, ticks_per_90=u8), 8), rest=rest),
-    "battery": batteries(),
-    "reset": st.builds(ResetNotice, kind=st.sampled_from((0xFE, 0xFF)), data=rest),
-    "simstat": st.builds(
-        SimstatPacket, raw_name=text, raw_version=text, flags=u32, wanted_interval_ms=u16, real_interval_ms=u16,
-        last_interval_ms=u16, x_mm=s32, y_mm=s32, z_mm=s32, heading_deg=s32, raw_latitude=s32, raw_longitude=s32,
-        altitude_cm=s32, raw_precision=s32, raw_error_x=s32, raw_error_y=s32, raw_error_heading=s32, rest=rest,
-    ),
-    "siminfo": st.builds(
-        SiminfoPacket, raw_name=text, raw_version=text, flags=u32, rest=rest,
-        devices=several(st.builds(SimDevice, raw_name=text, raw_type=text, number=u8, status=u32), 4),
-    ),
-    "laser": st.builds(
-        SimLaserPacket, raw_pose=st.tuples(s16, s16, s16), total=u16, first=u16, ranges_mm=several(u16, 60), rest=rest
-    ),
-    "extended laser": extended_lasers(),
-    "map changed": st.builds(MapChangedPacket, by_user=u8, status=s8, raw_name=text, rest=rest),
-}  # fmt: skip
 
 
 @pytest.mark.parametrize("name", ANY)

@@ -1,0 +1,226 @@
+"""Print how fast captures become columns: packets a second, and as a ratio to a C++ framer with checksum.
+
+The stream is one of mixed packet types and lengths, 1 % of its frames damaged,
+every field over its whole range. Before anything is timed, a part of it is
+decoded both ways and compared row by row, and the C++ framer's count of frames is
+compared with ours. Usage: python tools/bench_columns.py [--quick] [--json]
+"""
+
+import json
+import random
+import shutil
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Callable, Iterator
+from itertools import zip_longest
+from pathlib import Path
+
+from p2os.columns import decode
+from p2os.columns.objects import rows_by_objects
+from p2os.config_packet import ConfigPacket
+from p2os.packets import (
+    BatteryPacket,
+    CompassPacket,
+    EncoderPacket,
+    GripperPacket,
+    GyroPacket,
+    GyroReading,
+    IoPacket,
+    JoystickPacket,
+    RawPacket,
+    SerauxPacket,
+    ServerPacket,
+    SonarReading,
+    StandardSip,
+    packet_frame,
+    read_packet,
+)
+from p2os.profiles import Profile
+from p2os.wire import Decoder, Frame
+
+SEED = 20
+PROFILE = Profile.AROS
+RUNS = 3 if "--quick" in sys.argv else 9
+PACKETS = 50_000 if "--quick" in sys.argv else 400_000
+DAMAGED_SHARE = 0.01
+
+FRAMER = r"""
+// Frames and checksums of a stream in memory, re-scanning what it rejects; prints frames and seconds.
+#include <chrono>
+#include <cstdint>
+#include <cstdio>
+#include <cstdlib>
+#include <vector>
+
+static uint64_t scan(const uint8_t *data, size_t size, uint64_t &payload_bytes) {
+    uint64_t frames = 0;
+    size_t at = 0;
+    while (at + 6 <= size) {
+        if (data[at] != 0xFA || data[at + 1] != 0xFB) { ++at; continue; }
+        const size_t count = data[at + 2];
+        if (count < 3 || count > 204 || at + 3 + count > size) { ++at; continue; }
+        const uint8_t *payload = data + at + 3;
+        const size_t length = count - 2;
+        uint32_t sum = 0;
+        size_t i = 0;
+        for (; i + 1 < length; i += 2) sum += payload[i] << 8 | payload[i + 1];
+        sum &= 0xFFFF;
+        if (i < length) sum ^= payload[i];
+        if (sum == static_cast<uint32_t>(payload[length] << 8 | payload[length + 1])) {
+            ++frames;
+            payload_bytes += length;
+            at += 3 + count;
+        } else {
+            ++at;
+        }
+    }
+    return frames;
+}
+
+int main(int, char **arguments) {
+    std::vector<uint8_t> data;
+    std::FILE *file = std::fopen(arguments[1], "rb");
+    if (!file) return 1;
+    uint8_t block[65536];
+    for (size_t got; (got = std::fread(block, 1, sizeof block, file)) > 0;) data.insert(data.end(), block, block + got);
+    std::fclose(file);
+    for (int run = std::atoi(arguments[2]); run > 0; --run) {
+        uint64_t bytes = 0;
+        const auto begin = std::chrono::steady_clock::now();
+        const uint64_t frames = scan(data.data(), data.size(), bytes);
+        const std::chrono::duration<double> seconds = std::chrono::steady_clock::now() - begin;
+        std::printf("%llu %llu %.9f\n", (unsigned long long)frames, (unsigned long long)bytes, seconds.count());
+    }
+}
+"""
+
+
+def packets(rng: random.Random) -> Callable[[], ServerPacket]:
+    """Return what makes the next packet of the mix: as of a robot with every optional packet switched on."""
+
+    def sip() -> ServerPacket:
+        count = rng.choice((0, 2, 2, 2, 2, 4, 8, 16))
+        tail = rng.choice((0, 0, 0, 7, 9))
+        fields = (rng.getrandbits(16), rng.randrange(-1, 5), rng.randrange(-3000, 3000), rng.getrandbits(16),
+                  rng.randrange(-900, 900), rng.randrange(-127, 100), rng.randrange(101), rng.getrandbits(32),
+                  rng.getrandbits(32))  # fmt: skip
+        return StandardSip(
+            kind=rng.choice((0x32, 0x33)), raw_x=rng.getrandbits(15), raw_y=rng.getrandbits(15),
+            raw_heading=rng.randrange(-2048, 2048), raw_left_velocity=rng.randrange(-2200, 2200),
+            raw_right_velocity=rng.randrange(-2200, 2200), raw_battery=rng.randrange(100, 145),
+            stall_left=rng.random() < 0.1, rear_bumpers=rng.getrandbits(7), front_bumpers=rng.getrandbits(7),
+            raw_control=rng.randrange(-2048, 2048), raw_flags=rng.getrandbits(11), raw_compass=rng.getrandbits(8),
+            sonar=tuple(SonarReading(number, rng.randrange(32001)) for number in range(count)),
+            analog_port=5, gripper_state=rng.getrandbits(8), raw_analog=rng.getrandbits(8),
+            digital_in=rng.getrandbits(8), digital_out=rng.getrandbits(8), tail=fields[:tail],
+        )  # fmt: skip
+
+    makers: list[Callable[[], ServerPacket]] = [
+        *[sip] * 12,
+        *[lambda: EncoderPacket(left_counts=rng.randrange(-(2**31), 2**31), right_counts=rng.randrange(2**31))] * 2,
+        lambda: IoPacket(digital_in=tuple(rng.randbytes(4)), digital_out=tuple(rng.randbytes(1)),
+                         raw_analog=tuple(rng.randrange(1024) for _ in range(9))),
+        lambda: GyroPacket(readings=tuple(GyroReading(raw_rate=rng.randrange(1024), raw_temperature=60)
+                                          for _ in range(rng.randrange(1, 5)))),
+        lambda: SerauxPacket(port=rng.randrange(1, 4), data=rng.randbytes(rng.randrange(1, 24))),
+        lambda: GripperPacket(gripper_type=2, state=rng.getrandbits(8), grasp_time=rng.getrandbits(8)),
+        lambda: JoystickPacket(button1=rng.getrandbits(1), raw_x=rng.randrange(1024), raw_throttle=rng.randrange(1024)),
+        lambda: CompassPacket(raw_compass=rng.randrange(3600), raw_pitch=rng.randrange(-300, 300)),
+        lambda: RawPacket(0x7B, rng.randbytes(rng.randrange(12))),
+        lambda: BatteryPacket(batteries=tuple(tuple(rng.randbytes(5)) for _ in range(2))),
+    ]  # fmt: skip
+    rare = ConfigPacket(subclass="p2dx", name="Wilma", fields_sent=66)
+
+    def draw() -> ServerPacket:
+        return rare if rng.random() < 0.001 else rng.choice(makers)()
+
+    return draw
+
+
+def stream(count: int, rng: random.Random) -> bytes:
+    """Return so many frames, 1 % of them damaged by a wrong, a missing or a doubled byte."""
+    draw = packets(rng)
+    pool = [packet_frame(draw(), PROFILE).to_bytes() for _ in range(min(count, 20_000))]
+    parts = []
+    for _ in range(count):
+        data = rng.choice(pool)
+        if rng.random() < DAMAGED_SHARE:
+            place = rng.randrange(len(data))
+            hit = rng.choice((b"", bytes((data[place] ^ 1 << rng.randrange(8),)), data[place : place + 1] * 2))
+            data = data[:place] + hit + data[place + 1 :]
+        parts.append(data)
+    return b"".join(parts)
+
+
+def packets_as_objects(data: bytes) -> Iterator[ServerPacket]:
+    """Yield every packet as an object, as a program that listens to a robot gets it."""
+    decoder = Decoder()
+    decoder.receive(data, 0)
+    while (item := decoder.next_item()) is not None:
+        if isinstance(item, Frame):
+            yield read_packet(item, PROFILE)
+
+
+def best_seconds(work: Callable[[], object]) -> float:
+    """Return the shortest wall time of several runs: what others on the machine disturb least."""
+    times = []
+    for _ in range(RUNS):
+        begin = time.perf_counter()
+        work()
+        times.append(time.perf_counter() - begin)
+    return min(times)
+
+
+def framer(data: bytes) -> tuple[int, float] | None:
+    """Return how many frames the C++ framer finds and its seconds, or None without a compiler."""
+    compiler = shutil.which("g++") or shutil.which("c++")
+    if compiler is None:
+        return None
+    with tempfile.TemporaryDirectory() as folder:
+        place = Path(folder)
+        (place / "framer.cpp").write_text(FRAMER, encoding="utf-8")
+        (place / "stream.bin").write_bytes(data)
+        program = str(place / "framer")
+        subprocess.run([compiler, "-O2", "-std=c++17", "-o", program, str(place / "framer.cpp")], check=True)
+        done = subprocess.run([program, str(place / "stream.bin"), str(RUNS)], check=True, capture_output=True)
+    rows = [line.split() for line in done.stdout.decode("ascii").splitlines()]
+    return int(rows[0][0]), min(float(row[2]) for row in rows)
+
+
+def main() -> None:
+    """Compare, measure, print."""
+    rng = random.Random(SEED)
+    data = stream(PACKETS, rng)
+    part = data[: min(len(data), 400_000)]
+    for number, (ours, theirs) in enumerate(zip_longest(decode(part, PROFILE).rows(), rows_by_objects(part, PROFILE))):
+        if ours != theirs:
+            sys.exit(f"packet {number}: the columns say {ours}, the objects {theirs}")
+    count = len(decode(data, PROFILE))
+    columns = count / best_seconds(lambda: decode(data, PROFILE))
+    begin = time.perf_counter()
+    objects = sum(1 for _ in packets_as_objects(part)) / (time.perf_counter() - begin)
+    figures = {
+        "bytes": len(data), "packets": count, "bytes_a_packet": round(len(data) / count, 1),
+        "columns_packets_a_second": round(columns), "objects_packets_a_second": round(objects),
+    }  # fmt: skip
+    compiled = framer(data)
+    if compiled is not None:
+        if compiled[0] != count:
+            sys.exit(f"the C++ framer finds {compiled[0]} frames, the columns {count}")
+        framed = count / compiled[1]
+        figures |= {"framer_packets_a_second": round(framed), "columns_to_framer": round(columns / framed, 3)}
+    if "--json" in sys.argv:
+        print(json.dumps(figures))
+        return
+    print(f"{count} packets of {len(data) / count:.1f} bytes on average, 1 % damaged; rows equal to the objects'")
+    print(f"{'columns, every field':<44} {columns / 1e6:>10.2f} M packets/s")
+    print(f"{'objects, every field':<44} {objects / 1e6:>10.3f} M packets/s")
+    if compiled is not None:
+        print(f"{'C++ framer and checksum, no field':<44} {framed / 1e6:>10.2f} M packets/s")
+        print(f"{'columns to C++ framer':<44} {columns / framed:>10.3f}")
+
+
+if __name__ == "__main__":
+    main()
