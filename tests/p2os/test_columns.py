@@ -29,7 +29,7 @@ from p2os.profiles import Profile  # noqa: E402
 from p2os.sip import SIP_KINDS  # noqa: E402
 from p2os.timing import NS_PER_MS, Nanos  # noqa: E402
 from p2os.wire import Decoder, DecoderStats, Frame  # noqa: E402
-from tests.p2os.packet_strategies import PACKETS  # noqa: E402
+from tests.p2os.packet_strategies import ANY, PACKETS  # noqa: E402
 
 GOLDEN = Path(__file__).parent.parent / "golden"
 GIVE_UP_NS = 250 * NS_PER_MS
@@ -89,6 +89,15 @@ streams = st.lists(st.one_of(frames, frames, damaged, odd, nested, headers, st.b
 @settings(suppress_health_check=[HealthCheck.too_slow], deadline=None)
 def test_any_stream_gives_the_rows_of_the_objects(data: bytes, profile: Profile) -> None:
     same(data, profile)
+
+
+@pytest.mark.parametrize("name", ANY)
+@given(data=st.data())
+@settings(max_examples=15)
+def test_each_kind_gives_the_rows_of_its_objects(name: str, data: st.DataObject) -> None:
+    packets = data.draw(st.lists(ANY[name], min_size=1, max_size=3))
+    columns = same(b"".join(packet_frame(packet, Profile.P2OS).to_bytes() for packet in packets))
+    assert "raw" not in columns.tables
 
 
 @given(streams, st.integers(1, 40))
