@@ -79,6 +79,7 @@ class Block:
         "has_exclusive",
         "has_it",
         "is_self_loop",
+        "it_states",
         "last",
         "late_divides",
         "offsets",
@@ -111,6 +112,8 @@ class Block:
         self.has_exclusive = False
         #: Whether an IT instruction is in it.
         self.has_it = False
+        #: ITSTATE of its instructions that stand under an IT of the same block, by address.
+        self.it_states: dict[int, int] = {}
         #: Whether it is a single branch to itself.
         self.is_self_loop = False
         #: Kind of its last instruction.
@@ -121,6 +124,25 @@ class Block:
         if address == self.end:
             return self.straight
         return self.offsets.get(address, self.taken)
+
+    def it_state_at(self, address: int, initial: int = 0) -> int:
+        """Return ITSTATE before the instruction at `address`, if the block begins with `initial`."""
+        state = initial
+        for at in self.offsets:
+            if at >= address or not state:
+                break
+            state = _advance(state)
+        return state or self.it_states.get(address, 0)
+
+    def rest(self, address: int) -> "Block":
+        """Return what is left of it when the core stands before the instruction at `address`."""
+        done = self.cycles_until(address)
+        offsets = {at: cycles - done for at, cycles in self.offsets.items() if at >= address}
+        block = Block(address, self.end, self.straight - done, self.taken - done, offsets)
+        block.it_states = self.it_states
+        block.has_it = True  # at least it may begin inside an IT block
+        block.last = self.last
+        return block
 
     @property
     def needs_attention(self) -> bool:
@@ -224,5 +246,24 @@ def _note(block: Block, instructions: list[Instruction]) -> None:
     block.sends_event = Kind.SEND_EVENT in kinds
     block.has_exclusive = Kind.EXCLUSIVE in kinds
     block.has_it = Kind.IF_THEN in kinds
+    if block.has_it:
+        block.it_states = _it_states(instructions)
     block.last = instructions[-1].kind if instructions else Kind.PLAIN
     block.is_self_loop = len(instructions) == 1 and instructions[0].destination == block.start
+
+
+def _it_states(instructions: list[Instruction]) -> dict[int, int]:
+    """Return ITSTATE before each instruction that stands under an IT (ARM B1.4.2, ITAdvance)."""
+    states = {}
+    state = 0
+    for instruction in instructions:
+        if state:
+            states[instruction.address] = state
+            state = _advance(state)
+        if instruction.kind is Kind.IF_THEN:
+            state = instruction.it_state
+    return states
+
+
+def _advance(it_state: int) -> int:
+    return it_state & 0xE0 | it_state << 1 & 0x1F if it_state & 7 else 0

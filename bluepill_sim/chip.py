@@ -17,7 +17,7 @@ from collections.abc import Callable
 from bluepill_sim.block_cost import NO_BLOCK, Block, measure_block
 from bluepill_sim.bus import PERIPHERAL_BYTES, PeripheralBus, SramBitBand
 from bluepill_sim.clocks import Clocks
-from bluepill_sim.cpu import Engine
+from bluepill_sim.cpu import BlockRecorder, Engine
 from bluepill_sim.cycle_clock import CycleClock
 from bluepill_sim.memory import Memory
 from bluepill_sim.processor import FaultListener, Processor
@@ -113,9 +113,37 @@ class Chip:
 
     def advance_to(self, limit_ns: Nanos) -> Reached:
         """Run to the first block border at or after a time, or to what stops the chip before."""
+        return self._advance(limit_ns, self.processor.run)
+
+    def step(self, limit_ns: Nanos) -> Reached:
+        """Run one instruction, or the entry of the exception that comes before it: HALT with a STEP.
+
+        A core that sleeps first goes on to what wakes it; DEADLINE where that comes after `limit_ns`.
+        """
+        return self._advance(limit_ns, self.processor.step)
+
+    def record_blocks(self, capacity: int, on_full: Callable[[BlockRecorder], None] | None = None) -> BlockRecorder:
+        """Record each block, exception entry and exception return from now on; `stop_recording` ends it.
+
+        Args:
+            capacity: how many rows are kept for `drain`.
+            on_full: called when that many wait, to drain them; without it the oldest are lost.
+
+        Raises:
+            ValueError: the capacity is below 1.
+        """
+        self.engine.recorder = recorder = BlockRecorder(capacity, on_full)
+        return recorder
+
+    def stop_recording(self) -> None:
+        """Record no more."""
+        self.engine.recorder = None
+
+    def _advance(self, limit_ns: Nanos, go_on: Callable[[int], None]) -> Reached:
         processor, engine, clock = self.processor, self.engine, self._clock
         while True:
-            self._act()
+            if not engine.is_inside_block:
+                self._act()
             now = clock.ns_of(engine.cycle)
             if self._stop_requested:
                 self._stop_requested = False
@@ -125,7 +153,10 @@ class Chip:
                 return Reached(clock.ns_of(engine.cycle), Reason.HALT)
             if now >= limit_ns:
                 return Reached(now, Reason.DEADLINE)
-            processor.run(self._stop_cycle(limit_ns))
+            go_on(self._stop_cycle(limit_ns))
+            if processor.halt is not None:
+                halt, processor.halt = processor.halt, None
+                return Reached(clock.ns_of(engine.cycle), Reason.HALT, halt)
 
     def reset(self, cause: ResetCause) -> None:
         """Reset core and peripherals; time goes on."""

@@ -20,7 +20,7 @@ import struct
 from collections.abc import Callable
 from enum import Enum
 
-from bluepill_sim.cpu import Engine, Halt, HaltKind, Register
+from bluepill_sim.cpu import DEBUG_HALTS, EXCEPTION_RETURN, Engine, Halt, HaltKind, Register, it_state_of
 from bluepill_sim.faults import FAULT_ROWS, HFSR_FORCED, FaultKind
 from bluepill_sim.memory import Memory
 from bluepill_sim.nvic import BUS_FAULT, HARD_FAULT, NMI, SVCALL, SYSTICK, Nvic
@@ -67,7 +67,7 @@ _FAULT_OF_HALT = {
     HaltKind.EXECUTE_NEVER: FaultKind.EXECUTE_NEVER,
     HaltKind.DIVIDE_BY_ZERO: FaultKind.DIVIDE_BY_ZERO,
     HaltKind.UNALIGNED: FaultKind.UNALIGNED,
-    HaltKind.BREAKPOINT: FaultKind.BREAKPOINT,
+    HaltKind.BKPT: FaultKind.BREAKPOINT,
 }
 
 #: Told of each HardFault taken and each lockup: (kind, PC, address, whether it is a lockup).
@@ -88,6 +88,10 @@ class Processor:
         #: When the core last went to sleep, in cycles; None before the first time.
         self.last_sleep_cycle: int | None = None
         self.on_fault: FaultListener | None = None
+        #: Why a debugger's halt ended the last run; None where none did.
+        self.halt: Halt | None = None
+        #: Whether BKPT halts for a debugger; without one it is a fault.
+        self.halts_on_bkpt = False
         # Registers of the system control block, as plain words.
         self.vector_table = 0
         self.scr = 0
@@ -153,7 +157,7 @@ class Processor:
         if self.sleep is not Sleep.AWAKE and not self._wakes():
             self.engine.cycle = max(self.engine.cycle, stop_at)
             return
-        if self.nvic.pending:
+        if self.nvic.pending and not self.engine.is_inside_block:
             if self._deliver():
                 return
             self.engine.stops_after_mask_change = self.nvic.deliverable() != 0
@@ -162,6 +166,22 @@ class Processor:
         halt = self.engine.run(stop_at)
         if halt.kind is not HaltKind.BORDER:
             self._act_on(halt)
+
+    def step(self, stop_at: int) -> None:
+        """Run one instruction, or enter the exception that comes before it; `halt` says that it is done.
+
+        A core that sleeps goes on to `stop_at`, or wakes.
+        """
+        if self.sleep is not Sleep.AWAKE and not self._wakes():
+            self.engine.cycle = max(self.engine.cycle, stop_at)
+            return
+        if self.nvic.pending and not self.engine.is_inside_block and self._deliver():
+            self.halt = Halt(HaltKind.STEP, self.engine.pc)
+            return
+        self.engine.stops_after_mask_change = self.nvic.deliverable() != 0
+        self._act_on(self.engine.step(stop_at))
+        if self.halt is None:
+            self.halt = Halt(HaltKind.STEP, self.engine.pc)
 
     def stop_at_border(self) -> None:
         """End the running slice at the next block border."""
@@ -237,6 +257,9 @@ class Processor:
 
     def _act_on(self, halt: Halt) -> None:
         kind = halt.kind
+        if kind in DEBUG_HALTS or (kind is HaltKind.BKPT and self.halts_on_bkpt):
+            self.halt = halt
+            return
         if kind is HaltKind.EXCEPTION_RETURN:
             self._leave(halt.pc)
         elif kind is HaltKind.WAIT_INTERRUPT:
@@ -250,6 +273,8 @@ class Processor:
                 self._fault(FaultKind.MASKED_SVC, halt.pc)
         else:
             self._fault(_FAULT_OF_HALT[kind], halt.pc, halt.address)
+        if halt.watched is not None:
+            self.halt = Halt(HaltKind.WATCHPOINT, self.engine.pc, halt.watched)
 
     def _enter(self, number: int, return_address: int) -> None:
         """Stack, and start the handler of an exception."""
@@ -267,6 +292,7 @@ class Processor:
             number = self._stacking_failed(number, return_address, frame_at)
             if not number:
                 return
+        self._record(return_address, number)
         self._start_handler(number, frame_at, exc_return | 1, cpsr)
         self.engine.cycle += ENTRY_CYCLES
 
@@ -324,6 +350,8 @@ class Processor:
         control, cpsr, psp, msp = self._return_read.read()
         following = self.nvic.first_pending()
         if following is not None and self.nvic.can_preempt(following, self.execution_priority()):
+            self._record(exc_return | 1, EXCEPTION_RETURN)
+            self._record(exc_return | 1, following)
             self._start_handler(following, msp, exc_return | 1, cpsr)
             self.engine.cycle += TAIL_CHAIN_CYCLES
             return
@@ -348,14 +376,18 @@ class Processor:
         flags = cpsr & ~kept | xpsr & kept | _CPSR_T
         last_control = control & _NPRIV | stack_select
         self._return_write.write((0, number, stack_select, sp, r0, r1, r2, r3, r12, lr, last_control, flags))
-        self.engine.pc = pc & ~1
-        self.engine.is_thumb = bool(xpsr & _T_BIT)
+        self.engine.jump(pc & ~1 | bool(xpsr & _T_BIT))
+        self.engine.it_state = it_state_of(xpsr)
+        self._record(self.engine.pc, EXCEPTION_RETURN)
         if to_thread and self.scr & SLEEPONEXIT:
             self._fall_asleep(Sleep.INTERRUPT)
 
     def _jump(self, target: int) -> None:
-        self.engine.pc = target & ~1
-        self.engine.is_thumb = bool(target & 1)
+        self.engine.jump(target)
+
+    def _record(self, address: int, kind: int) -> None:
+        if self.engine.recorder is not None:
+            self.engine.recorder.put(self.cycle, address, kind)
 
     # Faults.
 

@@ -80,6 +80,8 @@ class Instruction:
     target: int | None = None
     #: Target address of a direct branch.
     destination: int | None = None
+    #: What an IT makes of ITSTATE.
+    it_state: int = 0
 
 
 #: (mask, value, kind) of 16-bit encodings.
@@ -198,6 +200,8 @@ def _decode_narrow(word: int, address: int) -> Instruction:  # noqa: PLR0911 - o
         return Instruction(address, 2, kind, count=(word & 0xFF).bit_count(), base=word >> 8 & 7)
     if kind is Kind.BRANCH:
         return Instruction(address, 2, kind, destination=address + 4 + _narrow_displacement(word))
+    if kind is Kind.IF_THEN:
+        return Instruction(address, 2, kind, it_state=word & 0xFF)
     return Instruction(address, 2, kind)
 
 

@@ -11,6 +11,8 @@ from dataclasses import dataclass
 from enum import Enum
 from typing import TypeAlias
 
+from bluepill_sim.cpu.halt import Halt
+
 #: A point in virtual time, or a span of it, in nanoseconds.
 Nanos: TypeAlias = int
 
@@ -26,7 +28,7 @@ class Reason(Enum):
     DEADLINE = "deadline"
     #: A watched pin changed.
     EDGE = "edge"
-    #: The firmware is locked up, or a debugger stands the chip still.
+    #: The firmware is locked up, or a debugger stands the chip still: `Reached.halt` tells which.
     HALT = "halt"
     #: The outcome of the run is decided; the chip itself never says so.
     VERDICT = "verdict"
@@ -38,3 +40,5 @@ class Reached:
 
     now: Nanos
     reason: Reason = Reason.DEADLINE
+    #: What a debugger asked for: BREAKPOINT, WATCHPOINT, STEP or BKPT; None for all else.
+    halt: Halt | None = None

@@ -32,6 +32,8 @@ _NOWHERE = 0xFFFF_FFFF
 #: Size, mode, architecture, level, flag and two pointers come before the registers of a context (uc_priv.h).
 _CONTEXT_HEADER_BYTES = 24 + 2 * ctypes.sizeof(ctypes.c_void_p)
 
+#: Kind of a good access that is not a write.
+READ_ACCESS = 16
 #: Kinds of bad accesses.
 WRITE_UNMAPPED, FETCH_UNMAPPED, WRITE_PROTECTED, FETCH_PROTECTED = 20, 21, 22, 24
 
@@ -121,15 +123,13 @@ class Core:
 
     # Hooks.
 
-    def on_block(self, call: Callable[[int, int, int, int], None]) -> None:
-        """Call (uc, address, size, user) before each basic block; the callback must not raise."""
-        self._hook(_HOOK_BLOCK, self._pointer(binding.BLOCK_CALLBACK(call)), 1, 0)
+    def on_block(self, call: Callable[[int, int, int, int], None]) -> int:
+        """Call (uc, address, size, user) before each basic block; the callback must not raise; return the hook."""
+        return self._hook(_HOOK_BLOCK, self._pointer(binding.BLOCK_CALLBACK(call)), 1, 0)
 
     def on_instruction(self, address: int, call: Callable[[], None]) -> None:
         """Call before the instruction at an address, in blocks that are translated from now on."""
-        self._hook(
-            _HOOK_CODE, self._pointer(binding.BLOCK_CALLBACK(self._guard(lambda *_: call(), None))), address, address
-        )
+        self.hook_instructions(self.instruction_callback(lambda _address: call()), address, address)
 
     def on_interrupt(self, call: Callable[[int], None]) -> None:
         """Call (number) when the core raises an exception of Unicorn's own numbering."""
@@ -145,8 +145,30 @@ class Core:
 
     def on_access(self, first: int, last: int, call: Callable[[int, int, int, int], bool]) -> None:
         """Call (kind, address, size, value) before every access in a range; slow."""
-        self._hook(_HOOK_ACCESS, self._pointer(binding.MEMORY_CALLBACK(self._guard(call, True))), first, last)
+        self.hook_accesses(self.access_callback(call), first, last)
         self.drop_all_code()
+
+    # Hooks that come and go. Code that is already translated does not have them: `drop_code`.
+
+    def instruction_callback(self, call: Callable[[int], None]) -> ctypes.c_void_p:
+        """Return what `hook_instructions` takes for a function of an instruction's address."""
+        return self._pointer(binding.BLOCK_CALLBACK(self._guard(lambda address, _size: call(address), None)))
+
+    def access_callback(self, call: Callable[[int, int, int, int], bool]) -> ctypes.c_void_p:
+        """Return what `hook_accesses` takes for a function of (kind, address, size, value)."""
+        return self._pointer(binding.MEMORY_CALLBACK(self._guard(call, True)))
+
+    def hook_instructions(self, callback: ctypes.c_void_p, first: int, last: int) -> int:
+        """Call before each instruction in a range, everywhere if first > last; return the hook."""
+        return self._hook(_HOOK_CODE, callback, first, last)
+
+    def hook_accesses(self, callback: ctypes.c_void_p, first: int, last: int) -> int:
+        """Call before each access that begins in a range; return the hook."""
+        return self._hook(_HOOK_ACCESS, callback, first, last)
+
+    def remove_hook(self, hook: int) -> None:
+        """Take a hook away; not during a run."""
+        self._check(self._library.delete_hook(self._handle, hook), "remove a hook")
 
     # Contexts.
 
@@ -191,11 +213,12 @@ class Core:
         self._keep.append(callback)
         return ctypes.cast(callback, ctypes.c_void_p)
 
-    def _hook(self, kind: int, callback: ctypes.c_void_p, first: int, last: int) -> None:
+    def _hook(self, kind: int, callback: ctypes.c_void_p, first: int, last: int) -> int:
         """Add a hook; first > last is everywhere."""
         hook = ctypes.c_size_t()
         at = ctypes.addressof(hook)
         self._check(self._library.add_hook(self._handle, at, kind, callback, None, first, last), "hook")
+        return hook.value
 
     def _control(self, item: int, *arguments: object) -> None:
         number = ctypes.c_int(item - (1 << 32) if item >> 31 else item)

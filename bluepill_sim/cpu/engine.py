@@ -11,19 +11,37 @@ This is not the processor: exceptions, priorities, sleeping and the meaning of
 faults are the business of `processor.py`. What Unicorn gets wrong is put right
 here: an access to a peripheral never stops the engine (Unicorn would run it
 twice), it moves `stop_at`; divisions by zero and unaligned multiple transfers,
-which Unicorn lets pass, are caught by hooks on just those addresses.
+which Unicorn lets pass, are caught by hooks on just those addresses; a hook
+that ends a run has what ran after it undone, since Unicorn goes on to the end
+of an IT block (`stop_before`).
 
-Invariant: between runs `cycle` is the time of the border that stands at `pc`.
+A debugger's halts (`breakpoints`, `watchpoints`, `step`) stand inside a block.
+The rest of that block keeps the cycles and the end of the run that it had, so
+that a run with halts is the same as one without.
+
+For whoever makes another engine: what `processor.py`, `chip.py` and
+`board.py` use is what has no underscore here, and nothing else.
+
+Invariant: between runs `cycle` is the time of the border that stands at `pc`,
+or of the instruction there where `is_inside_block`.
 """
 
 import ctypes
 from collections.abc import Callable
+from dataclasses import replace
 
-from bluepill_sim.block_cost import NO_BLOCK, Block
-from bluepill_sim.cpu import core
+from bluepill_sim.block_cost import NO_BLOCK
+from bluepill_sim.cpu import core, endings
+from bluepill_sim.cpu.block_table import BlockTable, Measure
 from bluepill_sim.cpu.core import Core, CoreSnapshot
-from bluepill_sim.cpu.halt import Halt, HaltKind
-from bluepill_sim.cpu.registers import GENERAL, Register
+from bluepill_sim.cpu.debug_unit import DebugUnit, Watchpoint
+from bluepill_sim.cpu.frozen import IT_BITS, Frozen, copy_of, it_state_of
+from bluepill_sim.cpu.halt import DEBUG_HALTS, Halt, HaltKind
+from bluepill_sim.cpu.recorder import BLOCK, BlockRecorder
+from bluepill_sim.cpu.registers import Register
+from bluepill_sim.cpu.rest import RestOfBlock, RestSnapshot
+from bluepill_sim.cpu.scratch import Scratch
+from bluepill_sim.cpu.traps import Traps
 from bluepill_sim.thumb import Kind
 
 #: Reads (offset, size) of an I/O region, writes (offset, size, value).
@@ -31,36 +49,13 @@ ReadAccess = Callable[[int, int], int]
 WriteAccess = Callable[[int, int, int], None]
 #: Takes (address, size, value) written to read-only memory; False refuses it.
 WriteToReadOnly = Callable[[int, int, int], bool]
-#: Returns the costs of the block of `size` bytes at `address`.
-Measure = Callable[[int, int], Block]
 
-#: What Unicorn's interrupt numbers mean; 3 and 8 are told apart by the PC.
-_INTERRUPTS = {
-    2: HaltKind.SUPERVISOR_CALL,
-    3: HaltKind.EXECUTE_NEVER,
-    4: HaltKind.UNALIGNED,
-    7: HaltKind.BREAKPOINT,
-    8: HaltKind.EXECUTE_NEVER,
-    17: HaltKind.NO_COPROCESSOR,
-}
-
-#: Chosen: a page where an STM32F103C has nothing, outside the regions that never execute; holds CLREX and WFI.
-_SCRATCH, _SCRATCH_BYTES = 0x9FFF_FC00, 0x400
-_SCRATCH_CODE = bytes.fromhex("bff32f8f 30bf")
-_SCRATCH_BLOCK = Block(_SCRATCH, _SCRATCH + len(_SCRATCH_CODE), 0, 0, {})
-#: Branches to these addresses are exception returns in handler mode (ARMv7-M B1.5.8).
-FIRST_EXCEPTION_RETURN = 0xFFFF_FFE0
-#: Flash and SRAM lie below; peripherals above have rules of their own.
-_LAST_NORMAL_ADDRESS = 0x21FF_FFFF
 #: Later than any run.
 _NEVER = 1 << 62
 
 _T_BIT = 1 << 24
-#: ITSTATE in CPSR.
-_IT_BITS = 0x0600_FC00
-
-#: Registers, cycle, PC, T bit, whether exclusive accesses are used.
-EngineSnapshot = tuple[CoreSnapshot, int, int, bool, bool]
+#: Registers, cycle, PC, T bit, whether exclusive accesses are used, the rest of a block.
+EngineSnapshot = tuple[CoreSnapshot, int, int, bool, bool, RestSnapshot | None]
 
 
 class Engine:
@@ -72,7 +67,6 @@ class Engine:
 
     def __init__(self, measure: Measure) -> None:
         self._core = Core(self._fail)
-        self._measure = measure
         self.registers = self._core.registers
         #: Time of the present border, or of the start of the running block, in cycles.
         self.cycle = 0
@@ -89,28 +83,31 @@ class Engine:
         self.on_event: Callable[[], None] | None = None
         #: Called with writes to read-only memory.
         self.on_read_only_write: WriteToReadOnly | None = None
-        # Costs: of blocks that take no attention, of those that do, and of those whose bytes may change.
-        self._table: dict[int, Block] = {}
-        self._special: dict[int, Block] = {}
-        self._writable_code: dict[int, tuple[bytes, Block]] = {}
-        #: First address, address after, place in the host's memory.
-        self._writable: list[tuple[int, int, int]] = []
-        self._ran_writable = False
-        self._uses_exclusive = False
-        # Traps: what is wanted, hooks that exist, blocks that have them, blocks to be translated again.
-        self._traps_division = self._traps_unaligned = self._traps_changed = self._watches_alignment = False
-        self._trapped: set[tuple[int, int, HaltKind]] = set()
-        self._armed: set[tuple[int, tuple[tuple[int, int], ...]]] = set()
-        self._stale: list[Block] = []
+        self._blocks = BlockTable(measure)
+        self._table = self._blocks.plain
         self._halt: Halt | None = None
         #: Where the run started: its first block may start inside an IT block.
         self._run_from = 0
         self._failure: BaseException | None = None
-        self._core.on_block(self._enter_block)
+        #: ITSTATE at the start of the next run.
+        self.it_state = 0
+        self._frozen: Frozen | None = None
+        self._rest = RestOfBlock()
+        self._is_stepping = False
+        #: The branch to itself that the recorder knows of.
+        self._spins_at: int | None = None
+        self._recorder: BlockRecorder | None = None
+        self._traps = Traps(self._core, self.stop_before, self._leave_it_block)
+        self._debug = DebugUnit(self._core, self.stop_before)
+        #: Addresses that a run halts before; change it between runs as you like.
+        self.breakpoints: set[int] = self._debug.breakpoints
+        #: Accesses that a run halts after; likewise.
+        self.watchpoints: set[Watchpoint] = self._debug.watchpoints
+        self._block_hook = self._core.on_block(self._enter_block)
         self._core.on_interrupt(self._interrupted)
         self._core.on_invalid(self._invalid)
         self._core.on_bad_access(self._bad_access)
-        self._core.map_memory(_SCRATCH, ctypes.create_string_buffer(_SCRATCH_CODE, _SCRATCH_BYTES), "x")
+        self._scratch = Scratch(self._core, self._table)
 
     # Memory.
 
@@ -118,15 +115,15 @@ class Engine:
         """Map a buffer as executable memory; it may be mapped more than once."""
         self._core.map_memory(address, buffer, "rwx" if is_writable else "rx")
         if is_writable:
-            self._writable.append((address, address + len(buffer), ctypes.addressof(buffer)))
+            self._blocks.writable.append((address, address + len(buffer), ctypes.addressof(buffer)))
 
     def map_io(self, address: int, size: int, read: ReadAccess, write: WriteAccess) -> None:
         """Map a region whose accesses are calls; their offsets count from `address`."""
 
         def on_read(_uc: int, offset: int, count: int, _user: int) -> int:
             try:
-                if self.block.has_it or self.block.start == self._run_from:
-                    self._leave_it_block()
+                if (self.block.has_it or self.block.start == self._run_from) and self._leave_it_block():
+                    return 0
                 return read(offset, count)
             except BaseException as error:  # noqa: BLE001 - C stands between here and the caller
                 self._fail(error)
@@ -134,8 +131,8 @@ class Engine:
 
         def on_write(_uc: int, offset: int, count: int, value: int, _user: int) -> None:
             try:
-                if self.block.has_it or self.block.start == self._run_from:
-                    self._leave_it_block()
+                if (self.block.has_it or self.block.start == self._run_from) and self._leave_it_block():
+                    return
                 write(offset, count, value)
             except BaseException as error:  # noqa: BLE001 - C stands between here and the caller
                 self._fail(error)
@@ -149,15 +146,11 @@ class Engine:
 
     def forget_costs(self) -> None:
         """Measure every block again when it is next entered."""
-        self._table.clear()
-        self._special.clear()
-        self._writable_code.clear()
+        self._blocks.forget()
 
     def set_traps(self, *, division: bool, unaligned: bool) -> None:
         """Choose whether divisions by zero and unaligned single accesses end a run; holds from the next block."""
-        if division != self._traps_division or unaligned != self._traps_unaligned:
-            self._traps_division, self._traps_unaligned = division, unaligned
-            self._traps_changed = True
+        if self._traps.choose(division=division, unaligned=unaligned):
             self.stop_at = 0
 
     # Running.
@@ -168,24 +161,86 @@ class Engine:
         Raises:
             Exception: whatever a peripheral's callback raised.
         """
+        halt = self._run(stop_at)
+        return halt if halt.kind is not HaltKind.WATCHPOINT else self._step_over_access(halt, stop_at)
+
+    def step(self, stop_at: int) -> Halt:
+        """Run one instruction: a STEP, or whatever else ends it; what an IT block skips is stepped over."""
+        hook = self._debug.begin_step(self.pc)
+        self._is_stepping = True
+        try:
+            halt = self._run(stop_at)
+        finally:
+            self._is_stepping = False
+            self._debug.end_step(hook)
+        if halt.kind is HaltKind.WATCHPOINT:
+            return self._step_over_access(halt, stop_at)
+        return Halt(HaltKind.STEP, halt.pc) if halt.kind is HaltKind.BORDER else halt
+
+    def jump(self, target: int) -> None:
+        """Go on at an address, with its bit 0 as the T bit; leaves any block that the core stands inside of."""
+        self.pc = target & ~1
+        self.is_thumb = bool(target & 1)
+        self._rest.block = None
+
+    @property
+    def is_inside_block(self) -> bool:
+        """Whether a debugger halted the core inside a block: no border, so nothing may interrupt here."""
+        return self._rest.is_at(self.pc)
+
+    @property
+    def recorder(self) -> BlockRecorder | None:
+        """Who is told of each block; None for nobody. Set it between runs; the processor tells it of exceptions."""
+        return self._recorder
+
+    @recorder.setter
+    def recorder(self, recorder: BlockRecorder | None) -> None:
+        self._recorder = recorder
+        self._core.remove_hook(self._block_hook)
+        self._block_hook = self._core.on_block(self._enter_block if recorder is None else self._record_block)
+        self._core.drop_all_code()
+
+    def _run(self, stop_at: int) -> Halt:
         self.stop_at = stop_at
-        if self._traps_changed:
-            self._change_traps()
+        debug, traps = self._debug, self._traps
+        if (debug.breakpoints or debug.watchpoints or debug.has_hooks) and not debug.is_armed:
+            debug.arm()
+        if traps.have_changed:
+            traps.begin()
+            self.forget_costs()
+        if self._rest.block is not None:
+            self._resume(stop_at)
         while True:
             self._halt = None
             self._run_from = self.pc
             error = self._core.start(self.pc | self.is_thumb)
+            self._rest.resumed = None
             if self._failure is not None:
                 failure, self._failure = self._failure, None
+                self._frozen = None
                 self._settle(self.registers[Register.PC])
                 raise failure
-            if not self._stale:
+            if not traps.stale:
                 break
             self._settle(self.pc)
-            self._trap_stale_blocks()
+            traps.arm()
+        if self._frozen is not None:
+            return self._thaw(self._frozen)
+        self.it_state = 0
         halt = self._halt or self._halt_without_reason(error)
         self._settle(halt.pc)
         return halt
+
+    def _step_over_access(self, halt: Halt, stop_at: int) -> Halt:
+        """Let the instruction make the watched access that it was stopped before."""
+        self._debug.is_blind = True
+        try:
+            after = self.step(stop_at)
+        finally:
+            self._debug.is_blind = False
+        if after.kind is HaltKind.STEP:
+            return Halt(HaltKind.WATCHPOINT, after.pc, halt.address)
+        return replace(after, watched=halt.address)
 
     @property
     def access_cycle(self) -> int:
@@ -202,29 +257,31 @@ class Engine:
 
     def clear_exclusive(self) -> None:
         """Break the exclusive reservation, as an exception does; leaves `pc` alone."""
-        if not self._uses_exclusive:
+        if not self._blocks.uses_exclusive:
             return
-        saved = self.cycle, self.stop_at
-        self.stop_at = _NEVER
-        self._table[_SCRATCH] = _SCRATCH_BLOCK
-        self._core.start(_SCRATCH | 1)
-        self.cycle, self.stop_at = saved
+        saved = self.cycle, self.stop_at, self._recorder
+        self.stop_at, self._recorder = _NEVER, None
+        self._scratch.clear_exclusive()
+        self.cycle, self.stop_at, self._recorder = saved
         self.block = NO_BLOCK
 
     # Snapshots.
 
     def snapshot(self) -> EngineSnapshot:
         """Return the core's state, memory left aside."""
-        return self._core.save(), self.cycle, self.pc, self.is_thumb, self._uses_exclusive
+        rest = self._rest.snapshot()
+        return self._core.save(), self.cycle, self.pc, self.is_thumb, self._blocks.uses_exclusive, rest
 
     def restore(self, snapshot: EngineSnapshot) -> None:
         """Put back what `snapshot` returned; memory is the caller's business, before this call."""
-        registers, self.cycle, self.pc, self.is_thumb, self._uses_exclusive = snapshot
+        registers, self.cycle, self.pc, self.is_thumb, self._blocks.uses_exclusive, rest = snapshot
         self._core.load(registers)
+        self.it_state = it_state_of(self.registers[Register.CPSR])
         self.block = NO_BLOCK
-        if self._ran_writable:
+        self._rest.restore(rest)
+        if self._blocks.ran_writable:
             self._core.drop_all_code()
-            self._writable_code.clear()
+            self._blocks.forget()
 
     # Entering blocks.
 
@@ -246,13 +303,33 @@ class Engine:
             self._fail(error)
             self._stop_at_border(address)
 
+    def _record_block(self, uc: int, address: int, size: int, user: int) -> None:
+        """Enter a block, and tell of it: not of the rest of one, and of a branch to itself once."""
+        before = self.block
+        self._enter_block(uc, address, size, user)
+        block = self.block
+        if block is NO_BLOCK or block is self._rest.resumed or self._frozen is not None or self._recorder is None:
+            return
+        if block.is_self_loop and self._spins_at == address and (before is block or self._run_from == address):
+            return
+        self._spins_at = address if block.is_self_loop else None
+        try:
+            self._recorder.put(self.cycle, address, BLOCK)
+        except BaseException as error:  # noqa: BLE001 - C stands between here and the caller
+            self._fail(error)
+
     def _enter_special(self, address: int, size: int) -> None:
         """Enter a block that is new, stands in writable memory, or needs attention."""
-        block = self._special.get(address) or self._block_at(address, size)
-        if block is None:
+        if self._rest.block is not None:
+            rest, self.stop_at = self._rest.enter(self._table, address, size)
+            if rest is not None:
+                self.block = rest
+                return
+        block = self._blocks.at(address, size)
+        if self._traps.needs_hooks(block):
             self._stop_at_border(address)
             return
-        if block.is_self_loop and block is self.block:
+        if block.is_self_loop and block is self.block and not self._is_stepping:
             # It has gone round once: nothing but an interrupt ends it, so go round until the time is up.
             rounds = max(0, -((self.cycle - self.stop_at) // block.taken))
             self.cycle += rounds * block.taken
@@ -264,34 +341,14 @@ class Engine:
         if block.sends_event and self.on_event is not None:
             self.on_event()
 
-    def _block_at(self, address: int, size: int) -> Block | None:
-        """Return the block at `address`; None where it has to be translated again with traps in it."""
-        code = self._writable_bytes(address, size)
-        if code is not None:
-            known = self._writable_code.get(address)
-            if known is not None and known[0] == code:
-                return known[1]
-        block = self._measure(address, size)
-        self._uses_exclusive |= block.has_exclusive
-        if code is not None:
-            self._ran_writable = True
-            self._writable_code[address] = code, block
-        elif block.needs_attention:
-            self._special[address] = block
-        else:
-            self._table[address] = block
-        traps = self._traps_of(block)
-        if traps and (address, traps) not in self._armed:
-            self._stale.append(block)
-            return None
-        return block
-
-    def _writable_bytes(self, address: int, size: int) -> bytes | None:
-        """Return the bytes of a block in writable memory; None elsewhere."""
-        for first, end, at in self._writable:
-            if first <= address < end:
-                return ctypes.string_at(at + address - first, size)
-        return None
+    def _resume(self, stop_at: int) -> None:
+        """Get ready to go on inside a block."""
+        if not self.is_inside_block:
+            self._rest.block = None
+            return
+        self._debug.passes = self.pc
+        self._rest.resume(self._table, stop_at)
+        self.stop_at = _NEVER  # this is no border
 
     # Ending runs.
 
@@ -311,49 +368,66 @@ class Engine:
 
     def _interrupted(self, number: int) -> None:
         pc = self.registers[Register.PC]
-        kind = _INTERRUPTS.get(number, HaltKind.UNDEFINED)
-        if kind is HaltKind.EXECUTE_NEVER and pc >= FIRST_EXCEPTION_RETURN:
-            kind = HaltKind.EXCEPTION_RETURN
-        self._end(kind, pc)
+        self._end(endings.kind_of_interrupt(number, pc), pc)
 
     def _invalid(self) -> bool:
-        """Unicorn takes WFE and YIELD for undefined, with the PC already past them; the rest stands at the PC."""
         pc = self.registers[Register.PC]
-        last = self.block.last if pc == self.block.end else None
-        if last is Kind.YIELD:
-            return True
-        if last is Kind.WAIT_EVENT:
-            self._end(HaltKind.WAIT_EVENT, pc)
-        else:
-            is_thumb = self.registers[Register.XPSR] & _T_BIT
-            self._end(HaltKind.UNDEFINED if is_thumb else HaltKind.INVALID_STATE, pc)
+        kind = endings.kind_of_invalid(self.block, pc, is_thumb=bool(self.registers[Register.XPSR] & _T_BIT))
+        if kind is not None:
+            self._end(kind, pc)
         return True
 
     def _bad_access(self, access: int, address: int, size: int, value: int) -> bool:
-        is_protected = access == core.WRITE_PROTECTED
-        if is_protected and self.on_read_only_write is not None:
+        if self._frozen is not None:
+            return False
+        if access == core.WRITE_PROTECTED and self.on_read_only_write is not None:
             word = value & (1 << 8 * size) - 1
             if self.on_read_only_write(address, size, word):
                 return True
-        if is_protected or access == core.WRITE_UNMAPPED:
-            kind = HaltKind.WRITE_ERROR
-        elif access in (core.FETCH_UNMAPPED, core.FETCH_PROTECTED):
-            kind = HaltKind.FETCH_ERROR
-        else:
-            kind = HaltKind.READ_ERROR
-        self._halt = Halt(kind, self.registers[Register.PC], address)
+        self._halt = Halt(endings.kind_of_bad_access(access), self.registers[Register.PC], address)
         return False
 
-    def _leave_it_block(self) -> None:
-        """Put right what a memory hook does to ITSTATE.
+    def stop_before(self, kind: HaltKind, pc: int, address: int | None = None) -> None:
+        """End the run before the instruction at `pc`, from a hook of it; what runs after that is undone."""
+        if self._frozen is not None:
+            return
+        begins_in_it = self.it_state if self.block.start == self._run_from else 0
+        self._frozen = Frozen(
+            Halt(kind, pc, address),
+            self.block,
+            self.cycle,
+            self.stop_at,
+            self.block.it_state_at(pc, begins_in_it),
+            self._core.save(),
+            copy_of(self._blocks.writable),
+        )
+        self._run_from = self.block.start  # so that accesses to peripherals look, and are not made
+        self.stop_at = 0
+        self._core.stop()
+
+    def _thaw(self, frozen: Frozen) -> Halt:
+        """Put the state back that a hook froze."""
+        self._frozen = None
+        frozen.put_back(self._core, self._blocks.writable)
+        self.block, self.cycle = frozen.block, frozen.cycle
+        self.stop_at, self.it_state = frozen.stop_at, frozen.it_state
+        halt = frozen.halt
+        if halt.kind in DEBUG_HALTS:
+            self._rest.keep(frozen.block, halt.pc, frozen.stop_at)
+        self._settle(halt.pc)
+        return halt
+
+    def _leave_it_block(self) -> bool:
+        """Put right what a memory hook does to ITSTATE; return whether the run has ended and access is to be denied.
 
         To find the PC of an access Unicorn restores the state at that instruction,
         ITSTATE included; but translated code keeps ITSTATE clear while a block runs,
         and the next block would start in the middle of an IT block.
         """
         state = self.registers[Register.CPSR]
-        if state & _IT_BITS:
-            self.registers[Register.CPSR] = state & ~_IT_BITS
+        if state & IT_BITS:
+            self.registers[Register.CPSR] = state & ~IT_BITS
+        return self._frozen is not None
 
     def _halt_without_reason(self, error: int) -> Halt:
         """Tell why Unicorn came back without having called anything: WFI is the only way."""
@@ -366,60 +440,7 @@ class Engine:
         """Charge what of the running block has been run when the core stands at `pc`."""
         block, self.block = self.block, NO_BLOCK
         if block is not NO_BLOCK:
-            is_return = pc >= FIRST_EXCEPTION_RETURN  # the refill is part of the exception's exit
+            is_return = pc >= endings.FIRST_EXCEPTION_RETURN  # the refill is part of the exception's exit
             self.cycle += block.straight if is_return else block.cycles_until(pc)
         self.pc = pc
         self.is_thumb = bool(self.registers[Register.XPSR] & _T_BIT)
-
-    # Traps.
-
-    def _traps_of(self, block: Block) -> tuple[tuple[int, int], ...]:
-        return block.aligned + self._divides_of(block)
-
-    def _divides_of(self, block: Block) -> tuple[tuple[int, int], ...]:
-        """Return the divisions to look at: all while the trap is on, else those that may come just after its switch."""
-        return block.divides if self._traps_division else block.late_divides
-
-    def _change_traps(self) -> None:
-        """Look at every block again, with the traps now chosen."""
-        self._traps_changed = False
-        self.forget_costs()
-        if self._traps_unaligned and not self._watches_alignment:
-            self._watches_alignment = True
-            self._core.on_access(0, _LAST_NORMAL_ADDRESS, self._watch_alignment)
-
-    def _watch_alignment(self, _access: int, address: int, size: int, _value: int) -> bool:
-        if self._traps_unaligned and address % size:
-            self._end(HaltKind.UNALIGNED, self.registers[Register.PC], address)
-        elif self.block.has_it or self.block.start == self._run_from:
-            self._leave_it_block()
-        return True
-
-    def _trap_stale_blocks(self) -> None:
-        """Put hooks on the instructions that may trap, and have their blocks translated anew with them."""
-        for block in self._stale:
-            self._armed.add((block.start, self._traps_of(block)))
-            for address, register in block.aligned:
-                self._trap(address, register, HaltKind.UNALIGNED)
-            for address, register in self._divides_of(block):
-                self._trap(address, register, HaltKind.DIVIDE_BY_ZERO)
-            self._core.drop_code(block.start, block.end - block.start)
-        self._stale.clear()
-
-    def _trap(self, address: int, number: int, kind: HaltKind) -> None:
-        """Look at a register each time before the instruction at `address`."""
-        if (address, number, kind) in self._trapped:
-            return
-        self._trapped.add((address, number, kind))
-        register = GENERAL[number]
-
-        def look_at_base() -> None:
-            value = self.registers[register]
-            if value & 3:
-                self._end(kind, address, value)
-
-        def look_at_divisor() -> None:
-            if self._traps_division and not self.registers[register]:
-                self._end(kind, address)
-
-        self._core.on_instruction(address, look_at_base if kind is HaltKind.UNALIGNED else look_at_divisor)

@@ -14,7 +14,7 @@ class HaltKind(Enum):
     BORDER = "border"
     EXCEPTION_RETURN = "exception return"
     SUPERVISOR_CALL = "SVC"
-    BREAKPOINT = "BKPT"
+    BKPT = "BKPT"
     WAIT_INTERRUPT = "WFI"
     WAIT_EVENT = "WFE"
     UNDEFINED = "undefined instruction"
@@ -26,6 +26,16 @@ class HaltKind(Enum):
     EXECUTE_NEVER = "fetch from a region that must not be executed"
     DIVIDE_BY_ZERO = "division by zero"
     UNALIGNED = "unaligned access"
+    #: A debugger's: before the instruction at a breakpoint.
+    BREAKPOINT = "breakpoint"
+    #: A debugger's: after the instruction that made a watched access, to `address`.
+    WATCHPOINT = "watchpoint"
+    #: A debugger's: after one instruction.
+    STEP = "step"
+
+
+#: Halts that only a debugger asks for; BKPT is one of them while a debugger is attached.
+DEBUG_HALTS = frozenset({HaltKind.BREAKPOINT, HaltKind.WATCHPOINT, HaltKind.STEP})
 
 
 @dataclass(frozen=True, slots=True)
@@ -35,5 +45,7 @@ class Halt:
     kind: HaltKind
     #: The next instruction to run; for a fault, the one that failed.
     pc: int
-    #: What a failed access was to.
+    #: What a failed or watched access was to.
     address: int | None = None
+    #: A watched access that the instruction made before it ended the run for a reason of its own.
+    watched: int | None = None

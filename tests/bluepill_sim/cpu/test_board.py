@@ -175,17 +175,18 @@ def test_ctrl_c_while_blocks_run_comes_out_and_the_run_can_go_on(boot, monkeypat
     """The signal's handler runs inside a callback from C, which would swallow the exception."""
     whole = boot(BLINK, {15: "tick"}).run(2000)
     machine = boot(BLINK, {15: "tick"}).run(333)
-    engine = machine.board._live.engine
-    measure = engine._measure
+    engine = machine.board.chip.engine
+    blocks = engine._blocks
+    measure = blocks._measure
 
     def interrupted(address: int, size: int) -> object:
         raise KeyboardInterrupt
 
     engine.forget_costs()
-    monkeypatch.setattr(engine, "_measure", interrupted)
+    monkeypatch.setattr(blocks, "_measure", interrupted)
     with pytest.raises(KeyboardInterrupt):
         machine.board.advance_to(2_000_000)
-    monkeypatch.setattr(engine, "_measure", measure)
+    monkeypatch.setattr(blocks, "_measure", measure)
     machine.board.advance_to(2_000_000)
     assert (machine.edges, machine.log) == (whole.edges, whole.log)
 
