@@ -6,16 +6,16 @@ Exit codes: 0 done, 1 something failed, 2 wrong usage.
 import argparse
 import sys
 import tempfile
-from functools import partial
 from pathlib import Path
 
 from hardware.pcb import build, checks, kicad, pictures
-from hardware.pcb.board import board_text
-from hardware.pcb.design import BOARD_VARIANTS
+from hardware.pcb.design import BOARD_VARIANTS, VARIANTS
 from hardware.pcb.design import build as design_of
+from hardware.pcb.kicad_checks import stitches_of
 from hardware.pcb.netlist import DesignError
-from hardware.pcb.pours import KicadMissingError, fill_and_stitch
-from hardware.pcb.routing import HERE, RoutingError, load_routes, run_router
+from hardware.pcb.pours import KicadMissingError
+from hardware.pcb.report import Verdict, table
+from hardware.pcb.routing import HERE, RoutingError, run_router
 from hardware.pcb.spice.run import NgspiceMissingError, SimulationError
 
 
@@ -28,7 +28,7 @@ def main(arguments: list[str] | None = None) -> int:
     checking.add_argument("--strict", action="store_true", help="a missing tool is a failure")
     for name, words in (
         ("route", "route the boards anew (needs a C++ compiler)"),
-        ("pour", "fill the ground pours anew"),
+        ("stitch", "choose the stitching vias anew (needs KiCad)"),
     ):
         one = verbs.add_parser(name, help=words)
         one.add_argument("variant", nargs="*", help=f"one of {', '.join(BOARD_VARIANTS)}; none for all")
@@ -54,24 +54,26 @@ def _build(_: argparse.Namespace) -> int:
     if kicad.version() is None:
         print("KiCad 9 is not installed: gerbers and pictures stay as they are (hint: tools/install_board_tools.sh)")
         return 0
-    for variant in BOARD_VARIANTS:
-        with tempfile.TemporaryDirectory() as folder:
-            files = build.fabrication_files(variant, Path(folder) / "fabrication")
-        target = build.GENERATED / variant / f"{variant}-gerbers.zip"
-        target.write_bytes(build.archive(files))
-        print(f"{target.name}: {len(files)} files, {target.stat().st_size} bytes")
-    for path in pictures.write_all():
-        print(f"{path.name}: {path.stat().st_size} bytes")
+    with tempfile.TemporaryDirectory() as folder:
+        for variant in BOARD_VARIANTS:
+            board = build.filled_project(variant, Path(folder))
+            files = build.fabrication_files(board, Path(folder) / f"{variant}-fabrication")
+            target = build.GENERATED / variant / f"{variant}-gerbers.zip"
+            target.write_bytes(build.archive(files))
+            print(f"{target.name}: {len(files)} files, {target.stat().st_size} bytes")
+            for path in pictures.board_pictures(variant, board):
+                print(f"{path.name}: {path.stat().st_size} bytes")
+    for variant in VARIANTS:
+        for path in pictures.schematic_pictures(variant):
+            print(f"{path.name}: {path.stat().st_size} bytes")
     return 0
 
 
 def _check(given: argparse.Namespace) -> int:
     results = checks.run_all()
-    print(checks.table(results))
-    failed = [
-        result for result in results if result.verdict == "FAIL" or (given.strict and result.verdict == "skipped")
-    ]
-    return 1 if failed else 0
+    print(table(results))
+    bad = {Verdict.BAD, Verdict.SKIPPED} if given.strict else {Verdict.BAD}
+    return 1 if any(result.verdict in bad for result in results) else 0
 
 
 def _route(given: argparse.Namespace) -> int:
@@ -82,22 +84,20 @@ def _route(given: argparse.Namespace) -> int:
     return 0
 
 
-def _pour(given: argparse.Namespace) -> int:
+def _stitch(given: argparse.Namespace) -> int:
     for variant in _variants(given.variant):
-        design = design_of(variant)
-        tracks, vias = load_routes(design)
-        text = fill_and_stitch(partial(board_text, design, tracks), vias)
-        (HERE / "pours" / f"{variant}.txt").write_text(text, encoding="utf-8", newline="\n")
-        print(f"pours/{variant}.txt: {text.count('S ')} stitching vias, {text.count('.Cu ')} polygons")
+        text = stitches_of(variant)
+        (HERE / "stitches" / f"{variant}.txt").write_text(text, encoding="utf-8", newline="\n")
+        print(f"stitches/{variant}.txt: {text.count(chr(10))} stitching vias")
     return 0
 
 
 def _simulate(_: argparse.Namespace) -> int:
     results = checks.simulations()
-    print(checks.table(results))
+    print(table(results))
     for path in pictures.write_plots():
         print(f"{path.name}: {path.stat().st_size} bytes")
-    return 1 if any(result.verdict == "FAIL" for result in results) else 0
+    return 1 if any(result.verdict is Verdict.BAD for result in results) else 0
 
 
 def _variants(names: list[str]) -> list[str]:
@@ -107,7 +107,7 @@ def _variants(names: list[str]) -> list[str]:
     return names or list(BOARD_VARIANTS)
 
 
-_VERBS = {"build": _build, "check": _check, "route": _route, "pour": _pour, "simulate": _simulate}
+_VERBS = {"build": _build, "check": _check, "route": _route, "stitch": _stitch, "simulate": _simulate}
 
 if __name__ == "__main__":
     sys.exit(main())

@@ -9,7 +9,7 @@ from hardware.pcb.drawing import footprint_attributes, pad_node, shape_node, str
 from hardware.pcb.footprints import FOOTPRINTS
 from hardware.pcb.ids import sheet_path, uid, uuid_node
 from hardware.pcb.netlist import Component, Design
-from hardware.pcb.placement import Place, place, silk_labels
+from hardware.pcb.placement import Place, place, silk_labels, unturn
 from hardware.pcb.routing import Track, Via, antenna_area
 from hardware.pcb.schematic_pages import page_of
 from hardware.pcb.sexp import Node, Text, node, render
@@ -142,7 +142,7 @@ def _part(design: Design, component: Component, at: Place, numbers: dict[str, in
     )
     tree.append(node("at", *_board((at.x_mm, at.y_mm)), *([at.angle_deg] if at.angle_deg else [])))
     tree.append(node("descr", Text(footprint.description)))
-    ref_at = footprint.ref_at_mm if at.ref_mm is None else _unturn(at.ref_mm, at.angle_deg)
+    ref_at = footprint.ref_at_mm if at.ref_mm is None else unturn(at.ref_mm, at.angle_deg)
     # Texts stay readable: a part turned upside down keeps its text upright.
     rows = [("Reference", ref, ref_at, "F.SilkS", ref.startswith(("H", "TP"))),
             ("Value", part.value, (0.0, 0.0), "F.Fab", True), ("Datasheet", "", (0.0, 0.0), "F.Fab", True),
@@ -170,13 +170,6 @@ def _part(design: Design, component: Component, at: Place, numbers: dict[str, in
                      node("offset", node("xyz", 0, 0, 0)),
                      node("scale", node("xyz", 1, 1, 1)), node("rotate", node("xyz", 0, 0, 0))))  # fmt: skip
     return tree
-
-
-def _unturn(offset: tuple[float, float], angle: float) -> tuple[float, float]:
-    """Return an offset in board axes as one in the axes of a turned footprint."""
-    x, y = offset
-    quarter = round(angle / 90) % 4
-    return {0: (x, y), 1: (-y, x), 2: (-x, -y), 3: (y, -x)}[quarter]
 
 
 def _outline() -> list[Node]:

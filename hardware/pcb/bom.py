@@ -12,12 +12,11 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from hardware.pcb import rules
+from hardware.pcb.assembly import STYLE, board_svg
 from hardware.pcb.footprints import FOOTPRINTS
-from hardware.pcb.netlist import Component, Design
+from hardware.pcb.netlist import Design
 from hardware.pcb.parts import Part
-from hardware.pcb.placement import Place, place
-from hardware.pcb.routing import placed_pads, turn
-from hardware.pcb.shapes import Line, PadKind
+from hardware.pcb.placement import place
 
 #: The interactive page, with @names@ where its contents go.
 _PAGE = Path(__file__).parent / "bom_page.html"
@@ -84,59 +83,12 @@ def html_text(design: Design) -> str:
         "count": str(sum(len(row.refs) for row in rows(design))),
         "lines": str(len(rows(design))),
         "board": board_svg(design),
+        "style": STYLE,
         "rows": lines,
     }
     for name, text in words.items():
         page = page.replace(f"@{name}@", text)
     return page
-
-
-def board_svg(design: Design) -> str:
-    """Return a drawing of the board's top side: outline, bodies, pads and references."""
-    width, height = rules.BOARD_WIDTH_MM, rules.BOARD_HEIGHT_MM
-    places = place(design)
-    out = [f'<svg viewBox="-2 -2 {width + 4:g} {height + 4:g}" xmlns="http://www.w3.org/2000/svg">',
-           f'<rect class="edge" width="{width:g}" height="{height:g}" rx="{rules.CORNER_MM:g}"/>']  # fmt: skip
-    pads = placed_pads(design)
-    for component in design.components:
-        body = _body_mm(component, places[component.ref])
-        out.append(
-            f'<g class="part" id="{component.ref}"><title>{component.ref} {html.escape(component.part.value)}</title>'
-        )
-        if body:
-            out.append(_rect("body", body))
-        for pad in (pad for pad in pads if pad.ref == component.ref):
-            x0, y0, x1, y1 = pad.box_mm
-            kind = "hole" if pad.pad.kind is PadKind.HOLE else "pad"
-            radius = min(x1 - x0, y1 - y0) / 2 if pad.pad.kind is not PadKind.SMD else 0.1
-            out.append(_rect(kind, pad.box_mm, f' rx="{radius:.2f}"'))
-        if body:
-            left, top, right, bottom = body
-            size = 1.0 if right - left < 8 else 2.2
-            x, y = (left + right) / 2, (top + bottom) / 2 + size / 3
-            out.append(f'<text x="{x:.2f}" y="{y:.2f}" font-size="{size:g}">{component.ref}</text>')
-        out.append("</g>")
-    out.append("</svg>")
-    return "\n".join(out)
-
-
-def _body_mm(component: Component, at: Place) -> tuple[float, float, float, float] | None:
-    """Return the box around a part's drawn body: left, top, right, bottom; None where nothing is drawn."""
-    ends = [
-        turn(point, at)
-        for shape in FOOTPRINTS[component.part.footprint].drawings
-        if isinstance(shape, Line) and shape.layer == "F.Fab"
-        for point in (shape.start_mm, shape.end_mm)
-    ]
-    if not ends:
-        return None
-    across, down = [x for x, _ in ends], [y for _, y in ends]
-    return min(across), min(down), max(across), max(down)
-
-
-def _rect(kind: str, box_mm: tuple[float, float, float, float], more: str = "") -> str:
-    x0, y0, x1, y1 = box_mm
-    return f'<rect class="{kind}" x="{x0:.2f}" y="{y0:.2f}" width="{x1 - x0:.2f}" height="{y1 - y0:.2f}"{more}/>'
 
 
 def _natural(ref: str) -> tuple[str, int]:

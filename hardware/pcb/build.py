@@ -1,21 +1,25 @@
 """Every generated file of the board, by path: what `make board` writes and what the checks compare.
 
-Invariant: `sources` is a pure function of design, routes and pours; it needs no KiCad.
+The committed board has its pours as outlines; `filled_project` makes a copy with KiCad's
+filling, from which gerbers, rule checks and pictures come.
+Invariant: `sources` is a pure function of design, routes and stitches; it needs no KiCad.
 """
 
 import io
+import shutil
 import zipfile
 from pathlib import Path
 
 from hardware.pcb import bom, kicad, project
+from hardware.pcb.assembly import assembly_svg
 from hardware.pcb.board import board_text, footprint_file
 from hardware.pcb.design import BOARD_VARIANTS, VARIANTS, build
 from hardware.pcb.footprints import FOOTPRINTS
 from hardware.pcb.models import model_text
 from hardware.pcb.netlist import Design
 from hardware.pcb.parts import PARTS
-from hardware.pcb.pours import load_pours
-from hardware.pcb.routing import HERE, load_routes
+from hardware.pcb.pours import fill, load_stitches
+from hardware.pcb.routing import HERE, Track, Via, load_routes
 from hardware.pcb.schematic import library_text, page_text, root_text
 from hardware.pcb.schematic_pages import PAGES
 
@@ -52,13 +56,34 @@ def variant_sources(design: Design) -> dict[str, str]:
     files |= project.library_tables()
     files[f"{variant}-bom.csv"] = bom.csv_text(design)
     if variant in BOARD_VARIANTS:
-        tracks, vias = load_routes(design)
-        pours, stitches = load_pours(variant)
-        routed = [via for via in vias if not via.is_stitch]
-        files[f"{variant}.kicad_pcb"] = board_text(design, tracks, [*routed, *stitches], pours)
+        files[f"{variant}.kicad_pcb"] = board_text(design, *copper_of(design), {})
         files[f"{variant}-placement.csv"] = bom.placement_csv(design)
         files[f"{variant}-bom.html"] = bom.html_text(design)
+        files[f"{variant}-assembly.svg"] = assembly_svg(design)
     return files
+
+
+def copper_of(design: Design) -> tuple[list[Track], list[Via]]:
+    """Return tracks and vias of a board: the router's, and the stitching vias that meet ground on both sides."""
+    tracks, vias = load_routes(design)
+    return tracks, [*(via for via in vias if not via.is_stitch), *load_stitches(design.variant)]
+
+
+def filled_project(variant: str, folder: Path) -> Path:
+    """Write a variant's project with filled pours below a folder; return its board.
+
+    Raises:
+        KicadMissingError: KiCad is not installed.
+    """
+    target = folder / variant
+    shutil.copytree(GENERATED / variant, target, dirs_exist_ok=True)
+    shutil.copytree(GENERATED / "library", folder / "library", dirs_exist_ok=True)
+    design = build(variant)
+    copper = copper_of(design)
+    pours = fill(board_text(design, *copper, {}))
+    board = target / f"{variant}.kicad_pcb"
+    board.write_text(board_text(design, *copper, pours), encoding="utf-8", newline="\n")
+    return board
 
 
 def write_sources(folder: Path = GENERATED) -> list[str]:
@@ -73,25 +98,24 @@ def write_sources(folder: Path = GENERATED) -> list[str]:
     return written
 
 
-def stale_files(folder: Path = GENERATED) -> list[str]:
-    """Return the generated files that differ from what the design gives now, or are missing."""
+def stale_files(files: dict[str, str], folder: Path = GENERATED) -> list[str]:
+    """Return which of these files (`sources`) are missing in a folder or differ there."""
     return [
         name
-        for name, text in sources().items()
+        for name, text in files.items()
         if not (folder / name).exists() or (folder / name).read_text(encoding="utf-8") != text
     ]
 
 
-def fabrication_files(variant: str, work: Path, folder: Path = GENERATED) -> dict[str, str]:
-    """Return gerbers and drill files of a variant by name, without their date lines; needs KiCad.
+def fabrication_files(board: Path, work: Path) -> dict[str, str]:
+    """Return gerbers and drill files of a filled board by name, without their date lines; needs KiCad.
 
     Args:
-        variant: One with a board.
+        board: What `filled_project` returned.
         work: A folder to write into.
-        folder: Where the generated board stands.
     """
     work.mkdir(parents=True, exist_ok=True)
-    kicad.fabrication(folder / variant / f"{variant}.kicad_pcb", work)
+    kicad.fabrication(board, work)
     return {path.name: path.read_text(encoding="utf-8") for path in sorted(work.iterdir())}
 
 

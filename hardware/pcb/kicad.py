@@ -115,13 +115,6 @@ def without_dates(text: str) -> str:
     return "\n".join(line for line in text.splitlines() if not _DATED.search(line)) + "\n"
 
 
-def assembly(board: Path, file: Path) -> None:
-    """Write the assembly drawing (outline, bodies, references) as SVG."""
-    run("pcb", "export", "svg", "--mode-single", "--page-size-mode", "2", "--exclude-drawing-sheet",
-        "--black-and-white",
-        "--layers", "Edge.Cuts,F.Fab,F.SilkS,F.Mask", "-o", file, board)  # fmt: skip
-
-
 def schematic_pdf(schematic: Path, file: Path) -> None:
     """Write all pages of a schematic as one PDF."""
     run("sch", "export", "pdf", "-o", file, schematic)

@@ -10,7 +10,6 @@ import tempfile
 from pathlib import Path
 
 from hardware.pcb import build, kicad
-from hardware.pcb.design import BOARD_VARIANTS, VARIANTS
 from hardware.pcb.schematic_pages import PAGES
 from hardware.pcb.spice.deck import Deck
 from hardware.pcb.spice.decks import decks
@@ -24,21 +23,10 @@ _SIDES = {
 }
 
 
-def write_all() -> list[Path]:
-    """Renew every picture of every variant; return the files."""
+def board_pictures(variant: str, board: Path) -> list[Path]:
+    """Render a filled board from both sides and at an angle; of the other variants the top alone."""
     files = []
     build.PICTURES.mkdir(parents=True, exist_ok=True)
-    for variant in BOARD_VARIANTS:
-        files += board_pictures(variant)
-    for variant in VARIANTS:
-        files += schematic_pictures(variant)
-    return files
-
-
-def board_pictures(variant: str) -> list[Path]:
-    """Render a board from both sides and at an angle, and draw its assembly."""
-    board = build.GENERATED / variant / f"{variant}.kicad_pcb"
-    files = []
     for side, arguments in _SIDES.items():
         if variant != "rev-b" and side != "top":
             continue
@@ -46,10 +34,7 @@ def board_pictures(variant: str) -> list[Path]:
         kicad.picture(board, file, *arguments, "--width", "1000", "--height", "1000", "--background", "opaque")
         _shrink(file)
         files.append(file)
-    drawing = build.GENERATED / variant / f"{variant}-assembly.svg"
-    kicad.assembly(board, drawing)
-    drawing.write_text(kicad.without_dates(drawing.read_text(encoding="utf-8")), encoding="utf-8", newline="\n")
-    return [*files, drawing]
+    return files
 
 
 def schematic_pictures(variant: str) -> list[Path]:

@@ -53,10 +53,8 @@ def row_order() -> list[str]:
     for number, pin in enumerate(BLUEPILL_PINS):
         is_left = number < 20
         heights[pin] = (number if is_left else 39 - number, is_left)
-    return sorted(
-        (wire.name for wire in series_wires(load_pinout())),
-        key=lambda name: heights[load_pinout().wire(name).bluepill],
-    )
+    wires = series_wires(load_pinout())
+    return [wire.name for wire in sorted(wires, key=lambda wire: heights[wire.bluepill])]
 
 
 def silk_labels(design: Design) -> list[Label]:
@@ -68,6 +66,13 @@ def short_name(wire: str) -> str:
     """Return the name of a wire that fits beside a pin: DD1, E1S2, M2C3, CON."""
     return wire.replace("encoder", "E").replace("motor", "M").replace("_s", "S").replace("_comm", "C").replace(
         "p2dx_con", "CON").upper()  # fmt: skip
+
+
+def unturn(offset: tuple[float, float], angle: float) -> tuple[float, float]:
+    """Return an offset in board axes as one in the axes of a turned footprint."""
+    x, y = offset
+    quarter = round(angle / 90) % 4
+    return {0: (x, y), 1: (-y, x), 2: (-x, -y), 3: (y, -x)}[quarter]
 
 
 def _rows(design: Design) -> dict[str, Place]:

@@ -1,19 +1,20 @@
-"""The filled shape of the ground pours: asked of KiCad, kept as data in pours/VARIANT.txt.
+"""The filled shape of the pours, asked of KiCad, and the stitching vias between the two grounds.
 
-KiCad's filler is the one part of the board that is not computed here. The result is
-committed, so that a build needs no KiCad; `make board-check` fills again and compares.
+KiCad's filler is the one part of the board that is not computed here. Its polygons are
+never committed (two megabytes that a build renews in seconds); which stitching places
+meet ground on both sides is, in stitches/VARIANT.txt, so that the board's file needs no
+KiCad. `make board` fills again and compares.
 """
 
 import shutil
 import subprocess
 import tempfile
-from collections.abc import Callable
 from pathlib import Path
 
 from hardware.pcb import rules
 from hardware.pcb.board import ORIGIN_MM
 from hardware.pcb.routing import HERE, RoutingError, Via
-from hardware.pcb.sexp import Node, Text, child, children, node, number, parse, word
+from hardware.pcb.sexp import Node, child, children, parse, word
 
 #: Runs in the system's Python: KiCad installs its module there and nowhere else.
 _SCRIPT = (
@@ -76,45 +77,31 @@ def kept_stitches(vias: list[Via], pours: dict[str, list[Node]]) -> list[Via]:
     return kept
 
 
-def pours_text(pours: dict[str, list[Node]], stitches: list[Via]) -> str:
-    """Return the text of a pours file: stitching vias, then one polygon a line, nanometres from the board's corner."""
-    lines = [f"S {round(via.at_mm[0] * 1e6)},{round(via.at_mm[1] * 1e6)}" for via in stitches]
-    for key, found in pours.items():
-        for polygon in found:
-            points = (
-                f"{round((x - ORIGIN_MM[0]) * 1e6)},{round((y - ORIGIN_MM[1]) * 1e6)}" for x, y in _points(polygon)
-            )
-            lines.append(f"{key} " + " ".join(points))
-    return "\n".join(lines) + "\n"
+def stitches_text(stitches: list[Via]) -> str:
+    """Return the text of a file of stitching vias: one a line, nanometres from the board's corner."""
+    return "".join(f"{round(via.at_mm[0] * 1e6)},{round(via.at_mm[1] * 1e6)}\n" for via in stitches)
 
 
-def load_pours(variant: str, path: Path | None = None) -> tuple[dict[str, list[Node]], list[Via]]:
-    """Read the committed pours of a variant and the stitching vias between them.
+def load_stitches(variant: str, path: Path | None = None) -> list[Via]:
+    """Read the committed stitching vias of a variant.
 
     Raises:
         RoutingError: The file is missing or broken.
     """
-    file = path or HERE / "pours" / f"{variant}.txt"
+    file = path or HERE / "stitches" / f"{variant}.txt"
     try:
         lines = file.read_text(encoding="utf-8").splitlines()
     except OSError as error:
-        raise RoutingError(f"cannot read {file.name}: {error.strerror} (hint: python -m hardware.pcb pour)") from error
-    pours: dict[str, list[Node]] = {pour.key: [] for pour in rules.pours(variant)}
-    stitches: list[Via] = []
+        hint = "python -m hardware.pcb stitch"
+        raise RoutingError(f"cannot read {file.name}: {error.strerror} (hint: {hint})") from error
+    stitches = []
     for count, line in enumerate(lines, start=1):
-        key, *pairs = line.split()
         try:
-            if key == "S":
-                ((x, y),) = (pair.split(",") for pair in pairs)
-                stitches.append(stitch_at(int(x) * 1e-6, int(y) * 1e-6))
-                continue
-            points = [(int(x) * 1e-6, int(y) * 1e-6) for x, y in (pair.split(",") for pair in pairs)]
-            polygon = node("filled_polygon", node("layer", Text(key.partition(":")[2])), node("pts"))
-            polygon[2] = node("pts", *(node("xy", *_shift(point)) for point in points))
-            pours[key].append(polygon)
-        except (ValueError, KeyError) as error:
-            raise RoutingError(f"pours of {variant}, line {count}: no polygon of an area of this board") from error
-    return pours, stitches
+            x, y = (int(word) for word in line.split(","))
+        except ValueError as error:
+            raise RoutingError(f"stitches of {variant}, line {count}: no place of a via") from error
+        stitches.append(stitch_at(x * 1e-6, y * 1e-6))
+    return stitches
 
 
 def stitch_at(x_mm: float, y_mm: float) -> Via:
@@ -152,17 +139,4 @@ def _polygons(text: str) -> dict[str, list[Node]]:
 
 def _points(polygon: Node) -> list[tuple[float, float]]:
     pts = child(polygon, "pts")
-    return [(float(number(float(word(xy, 1)))), float(word(xy, 2))) for xy in children(pts, "xy")]
-
-
-def fill_and_stitch(board: Callable[[list[Via], dict[str, list[Node]]], str], vias: list[Via]) -> str:
-    """Fill twice, without and with stitching vias; return the text of the pours file.
-
-    Args:
-        board: Gives the board's text for a list of vias and pours.
-        vias: The router's, stitching places included.
-    """
-    routed = [via for via in vias if not via.is_stitch]
-    bare = fill(board(routed, {}))
-    stitches = kept_stitches([via for via in vias if via.is_stitch], bare)
-    return pours_text(fill(board([*routed, *stitches], {})), stitches)
+    return [(float(word(xy, 1)), float(word(xy, 2))) for xy in children(pts, "xy")]

@@ -34,20 +34,15 @@ def node(name: str, *items: "str | float | Node") -> Node:
 
 def render(tree: Node, depth: int = 0) -> str:
     """Return the text of a list, one nested list a line where it is long."""
-    parts = [_word(item) if isinstance(item, str) else None for item in tree]
-    if all(part is not None for part in parts):
-        return "(" + " ".join(part for part in parts if part is not None) + ")"
-    flat = "(" + " ".join(_word(item) if isinstance(item, str) else render(item) for item in tree) + ")"
-    if len(flat) <= _LINE_LENGTH and "\n" not in flat:
-        return flat
-    indent = "\t" * (depth + 1)
-    out = "("
-    for index, item in enumerate(tree):
-        if isinstance(item, str):
-            out += (" " if index else "") + _word(item)
-        else:
-            out += "\n" + indent + render(item, depth + 1)
-    return out + "\n" + "\t" * depth + ")"
+    parts = [_word(item) if isinstance(item, str) else render(item, depth + 1) for item in tree]
+    is_nested = any(not isinstance(item, str) for item in tree)
+    if not is_nested or (sum(map(len, parts)) + len(parts) + 1 <= _LINE_LENGTH and not any("\n" in p for p in parts)):
+        return "(" + " ".join(parts) + ")"
+    indent = "\n" + "\t" * (depth + 1)
+    out = [parts[0]]
+    for item, part in zip(tree[1:], parts[1:], strict=True):
+        out += [" " if isinstance(item, str) else indent, part]
+    return "(" + "".join(out) + "\n" + "\t" * depth + ")"
 
 
 def parse(text: str) -> Node:
@@ -102,8 +97,9 @@ def word(tree: Node, index: int = 1) -> str:
     return item
 
 
-#: Longest list that stays on one line. chosen: what a reader's screen holds.
-_LINE_LENGTH = 110
+#: Longest list that stays on one line. chosen: a stroke, a track or a pad's properties fit, so that a change of one
+#: of them is a change of one line.
+_LINE_LENGTH = 200
 
 
 def _word(item: str) -> str:
