@@ -12,6 +12,7 @@ from p2os.events import (
     ConfigReceived,
     ConnectFailed,
     ConnectionLost,
+    FrameIgnored,
     Opened,
     PacketReceived,
     SipReceived,
@@ -83,6 +84,8 @@ class ClientSide:
         following = CLIENT_TABLE.get((self.state, frame.kind))
         if following is None or (frame.kind == SYNC2) is not bool(frame.data):
             self._line.stats.frames_ignored += 1
+            if frame.kind > SYNC2:
+                self._line.events.append(FrameIgnored(frame))
         elif following is _S.SYNCED:
             self._line.events.append(Synchronised(Identity.from_frame(frame)))
             self._enter(_S.SYNCED, now + self._settings.open_delay_ns)

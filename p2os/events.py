@@ -6,7 +6,7 @@ from p2os.commands import Command
 from p2os.config_packet import ConfigPacket
 from p2os.packets import Identity, ServerPacket
 from p2os.sip import StandardSip
-from p2os.wire import BadChecksum, BadCount, Noise, Stalled
+from p2os.wire import BadChecksum, BadCount, Frame, Noise, Stalled
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,6 +55,13 @@ class PacketReceived:
 
 
 @dataclass(frozen=True, slots=True)
+class FrameIgnored:
+    """The client took a sound frame that answers nothing it has said while synchronising."""
+
+    frame: Frame
+
+
+@dataclass(frozen=True, slots=True)
 class NoiseReceived:
     """Bytes came that are no sound frame."""
 
@@ -93,6 +100,7 @@ Event = (
     | SipReceived
     | ConfigReceived
     | PacketReceived
+    | FrameIgnored
     | NoiseReceived
     | WatchdogExpired
     | WatchdogRevived

@@ -31,8 +31,10 @@ EPILOG = """Examples:
   p2os demo                             watch a BluePill program drive a Pioneer
   p2os run dodge --world arena          run one scenario and write a report
   p2os serve                            be a Pioneer on tcp:127.0.0.1:8101
-  p2os info tcp:127.0.0.1:8101          ask a robot who it is
-  p2os ports                            list the serial ports
+  p2os scan                             find a robot, and say who it is
+  p2os monitor tcp:127.0.0.1:8101       watch it
+  p2os drive URL --forward 0.5m         move it
+  p2os decode --explain fafb03000000    what bytes mean, one by one
   p2os doctor                           tell what is installed and what is missing
 
 With --trace anywhere, an error shows where in the program it arose.

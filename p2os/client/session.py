@@ -2,9 +2,14 @@
 
 Theory of operation. `connect` asks for the line. When it is open, one
 `Connection` after the other tries the handshake, at each baud rate in turn,
-first quickly and then with patience (`search_plan`); STOP, VEL 0 and RVEL 0
-stand before each SYNC0, for a robot that is still open from an earlier session
-takes SYNC0 for a PULSE. After OPEN the first standard packet makes the link
+first quickly and then with patience (`search_plan`). A robot that is still open
+from an earlier session takes SYNC0 for a PULSE and goes on at its last speed, so
+STOP, VEL 0 and RVEL 0 stand before each SYNC0. The one exception is a line
+without a baud rate on which no session has been: it is listened to first, and
+where not a byte comes, SYNC0 goes alone. AMRISim (MobileSim's successor) takes
+any first frame for a sync, counts on from its number, and never opens; where
+STOP had to go first, its echo of STOP betrays it, and the line is opened anew.
+After OPEN the first standard packet makes the link
 open; CONFIG is asked for, and where the robot offers it the line is made
 faster. A loss sends STOP and VEL 0, closes the line, waits, and begins again.
 
@@ -31,6 +36,7 @@ from p2os.client.notices import (
     ReconnectPlanned,
 )
 from p2os.client.outbox import Action, CloseLine, OpenLine, Outbox, Send, SetBaud
+from p2os.client.search import Try, search_plan, why_not_found
 from p2os.client.settings import BAUD_CODES, ClientSettings
 from p2os.client.snapshots import Link
 from p2os.commands import Command, CommandNumber, pulse
@@ -43,6 +49,7 @@ from p2os.connection import (
     ConnectionSettings,
     ConnectionState,
     ConnectionStats,
+    FrameIgnored,
     NoiseReceived,
     Opened,
     PacketReceived,
@@ -66,24 +73,6 @@ WANTS_HIGHER_BAUD = 2
 SYNC0_BYTES = pulse().to_frame().to_bytes()
 #: chosen: one packet could have been on its way at the old rate; two in a row were not.
 PACKETS_THAT_PROVE_A_RATE = 2
-
-
-@dataclass(frozen=True, slots=True)
-class Try:
-    """One stretch of the search: a rate (None: the line has none), how long to wait, how often."""
-
-    baud: int | None
-    wait_ns: Nanos
-    attempts: int
-
-
-def search_plan(baud: int | None, bauds: tuple[int, ...], settings: ClientSettings) -> tuple[Try, ...]:
-    """Return the tries, likeliest first: quick ones at every rate, then patient ones."""
-    if baud is None:
-        return Try(None, settings.quick_sync_ns, 3), Try(None, settings.patient_sync_ns, 5)
-    others = tuple(rate for rate in bauds if rate != baud)
-    quick = (Try(baud, settings.quick_sync_ns, 2), *(Try(rate, settings.quick_sync_ns, 1) for rate in others))
-    return (*quick, *(Try(rate, settings.patient_sync_ns, 1) for rate in (baud, *others)))
 
 
 @dataclass(slots=True)
@@ -113,6 +102,14 @@ class Session:
         #: Rates at which the robot was heard last, and at which its handshake was found.
         self._good_baud: int | None = None
         self._found_baud: int | None = None
+        #: Whether a session has ever been opened: a robot may be left open and moving.
+        self._has_opened = False
+        #: Whether STOP, VEL 0 and RVEL 0 stand before each SYNC0 on this line.
+        self._stops_first = True
+        #: Whether the peer took STOP for a sync in this try.
+        self._echoes_stop = False
+        #: Until when a fresh line is listened to.
+        self._listen_due: Nanos | None = None
         self._connection = self._new_connection(settings.patient_sync_ns, 1)
         self._plan: deque[Try] = deque()
         self._due: Nanos | None = None
@@ -191,7 +188,13 @@ class Session:
         self._plan = deque(search_plan(first, tuple(dict.fromkeys(bauds)), self._settings))
         self._enter(Link.SEARCHING, now + TRY_LIMIT_NS)
         self._came_to = "silence"
-        self._next_try(now)
+        is_fresh = baud is None and not self._has_opened
+        self._stops_first = not (is_fresh or self._echoes_stop)
+        if is_fresh and not self._echoes_stop:
+            self._connection = self._new_connection(self._settings.quick_sync_ns, 1)
+            self._listen_due = now + self._settings.listen_ns
+        else:
+            self._next_try(now)
 
     def line_failed(self, reason: str, hint: str | None, now: Nanos) -> None:
         """Take the news that the line cannot be opened."""
@@ -212,6 +215,9 @@ class Session:
         if self.link in {Link.SEARCHING, Link.STARTING, Link.OPEN}:
             self._connection.receive(data, now)
             self._collect(now)
+        if self._listen_due is not None:
+            self._stops_first = True
+            self._next_try(now)
 
     def take_action(self, now: Nanos) -> Action | None:
         """Return what the skin is to do next with the line, if it is due."""
@@ -230,7 +236,7 @@ class Session:
         """Return when this wants to act; actions that wait have the outbox's own time."""
         due = [self._due]
         if self.link in {Link.SEARCHING, Link.STARTING, Link.OPEN}:
-            due += [self._connection.next_deadline(), self._config_due, self._raise_due()]
+            due += [self._connection.next_deadline(), self._config_due, self._raise_due(), self._listen_due]
         return min((at for at in due if at is not None), default=None)
 
     def advance_to(self, now: Nanos) -> None:
@@ -243,6 +249,8 @@ class Session:
                 self._open_line()
             elif self.link in {Link.SEARCHING, Link.STARTING}:
                 self._give_up_try(*self._why(), now)
+        if self._listen_due is not None and now >= self._listen_due:
+            self._next_try(now)
         if self.link is Link.OPEN:
             if self._config_due is not None and now >= self._config_due:
                 self._ask_configuration(now)
@@ -253,12 +261,14 @@ class Session:
 
     def _open_line(self) -> None:
         self._tries += 1
+        self._echoes_stop = False
         self._enter(Link.OPENING, None)
         self.outbox.clear()
         self.outbox.put(OpenLine())
 
     def _next_try(self, now: Nanos) -> None:
         """Go on with the search, or give this try up."""
+        self._listen_due = None
         if not self._plan:
             self._give_up_try(*self._why(), now)
             return
@@ -282,7 +292,7 @@ class Session:
                 open_attempts=3,
                 liveness_ns=settings.liveness_ns,
                 profile=settings.profile or Profile.P2OS,
-                stop_first=True,
+                stop_first=self._stops_first,
             ),
         )
 
@@ -299,11 +309,14 @@ class Session:
         match event:
             case NoiseReceived() if self._came_to == "silence":
                 self._came_to = "noise"
+            case FrameIgnored() if event.frame.kind == CommandNumber.STOP and self.baud is None:
+                self._begin_without_stops()
             case Synchronised():
                 self.identity = event.identity
                 self._came_to = "answers"
             case Opened():
                 self._came_to = "opened"
+                self._has_opened = self._stops_first = True
                 self.link = Link.STARTING
             case SipReceived():
                 self._take_sip(event.sip, now)
@@ -344,6 +357,16 @@ class Session:
                 self.news.append(BaudRaised(self._good_baud))
         self.news.append(sip)
 
+    def _begin_without_stops(self) -> None:
+        """Open the line anew to a peer that took STOP for a sync: it was waiting for one, so it was not open."""
+        if self._echoes_stop:
+            return
+        self._echoes_stop = True
+        self._connection = self._new_connection(self._settings.quick_sync_ns, 1)  # the old one has no more to say
+        self.outbox.drop_frames({CommandNumber.PULSE})  # VEL 0 and RVEL 0 still go
+        self.outbox.put(CloseLine(), OpenLine())
+        self._enter(Link.OPENING, None)
+
     # Losing it --------------------------------------------------------------------------
 
     def _lose(self, reason: str, now: Nanos) -> None:
@@ -371,16 +394,9 @@ class Session:
         self._enter(Link.WAITING, now + wait)
         self.news.append(ReconnectPlanned(self._tries + 1, wait))
 
-    def _why(self) -> tuple[str, str | None]:
+    def _why(self) -> tuple[str, str]:
         """Return how far a try came, and what to look at."""
-        rates = (self._line_baud, *self._settings.bauds) if self._line_baud is not None else ()
-        where = f" at {', '.join(str(rate) for rate in dict.fromkeys(rates))} baud" if rates else ""
-        return {
-            "silence": (f"no answer{where}", "is the robot on, and the cable in?"),
-            "noise": (f"only noise{where}", "is this the robot's HOST port? p2os scan tries every port and rate"),
-            "answers": (f"the robot answers{where}, but its handshake does not come to an end", "is the line bad?"),
-            "opened": ("the session was opened, but no standard packet followed", "is the line bad?"),
-        }[self._came_to]
+        return why_not_found(self._came_to, self._line_baud, self._settings.bauds)
 
     # An open session --------------------------------------------------------------------
 
@@ -424,4 +440,4 @@ class Session:
     def _enter(self, link: Link, due: Nanos | None) -> None:
         self.link, self._due = link, due
         if link is not Link.OPEN:
-            self._config_due, self._raise = None, None
+            self._config_due, self._raise, self._listen_due = None, None, None

@@ -38,6 +38,8 @@ class ClientSettings:
     command_spacing_ns: Nanos = 5 * NS_PER_MS
     #: A robot that neither approaches its command nor says that it stalls for so long is reported.
     disbelief_ns: Nanos = 1 * NS_PER_S
+    #: How long a fresh TCP line is listened to for a robot that is open already: two and a half cycles.
+    listen_ns: Nanos = 250 * NS_PER_MS
     #: First round of the search, one try a rate: robots answer within 110 ms (measured on a simulator).
     quick_sync_ns: Nanos = 400 * NS_PER_MS
     #: Second round, for slow lines; ARIA waits as long.
@@ -57,7 +59,7 @@ class ClientSettings:
     longest_backoff_ns: Nanos = 5 * NS_PER_S
 
     def __post_init__(self) -> None:
-        for name in ("liveness_ns", "refresh_ns", "speed_spacing_ns", "command_spacing_ns", "disbelief_ns",
+        for name in ("liveness_ns", "refresh_ns", "speed_spacing_ns", "command_spacing_ns", "disbelief_ns", "listen_ns",
                      "quick_sync_ns", "patient_sync_ns", "open_delay_ns", "first_packet_ns", "raise_window_ns",
                      "backoff_ns", "longest_backoff_ns"):  # fmt: skip
             if getattr(self, name) <= 0:

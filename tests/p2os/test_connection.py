@@ -21,6 +21,7 @@ from p2os.connection import (
     ConnectionSettings,
     ConnectionState,
     Event,
+    FrameIgnored,
     NoiseReceived,
     Opened,
     PacketReceived,
@@ -32,6 +33,7 @@ from p2os.connection import (
 )
 from p2os.errors import LocalProtocolError
 from p2os.packets import Identity, RawPacket
+from p2os.profiles import Profile
 from p2os.sip import StandardSip
 from p2os.timing import NS_PER_MS, NS_PER_S
 from p2os.wire import Decoder, Frame
@@ -254,6 +256,7 @@ def test_a_late_echo_is_no_news() -> None:
     feed(end, 0, Frame(b"\0"), Frame(b"\0"), Frame(b"\x02"), Frame(b"\x77"))
     assert end.state is ConnectionState.SYNC1
     assert end.stats.frames_ignored == 3
+    assert events(end) == [FrameIgnored(Frame(b"\x77"))], "a sync out of its turn is no news, a stranger is"
     feed(end, 0, Frame(b"\1"), Frame(b"\2"))
     assert end.state is ConnectionState.SYNC2
     end.advance_to(0)
@@ -321,6 +324,21 @@ def test_silence_is_a_loss_and_stop_is_the_first_frame_out() -> None:
     assert sent(end) == [stop(), vel(0), Command(CommandNumber.CLOSE)]
     end.advance_to(now + NS_PER_S + 200 * MS)
     assert sent(end) == [Command(0)]
+
+
+def test_an_echo_is_late_before_the_first_packet_and_a_restart_after_it() -> None:
+    end, now = opened_client()
+    feed(end, now, Frame(b"\1"))
+    assert end.is_open
+    assert end.stats.frames_ignored == 1
+    feed(end, now, SIP.to_frame(end.settings.profile), Frame(b"\0"))
+    assert events(end)[-1] == ConnectionLost("the robot was restarted")
+
+
+def test_both_ends_can_change_the_family_of_their_packets() -> None:
+    for end in (client(), server()):
+        end.set_profile(Profile.ARCOS)
+        assert end.settings.profile is Profile.ARCOS
 
 
 def test_a_reset_notice_while_open_is_a_loss() -> None:

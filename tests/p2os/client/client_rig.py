@@ -193,6 +193,7 @@ class Rig:
             case CloseLine():
                 self.is_open = False
                 if self.baud is None and self.is_plugged and not self.is_cut:
+                    self._deliver_last()
                     self.pioneer.hang_up(self.now)
             case SetBaud():
                 self.line_baud = action.baud
@@ -200,6 +201,13 @@ class Rig:
                 assert self.is_open, "a frame on a closed line"
                 self.said.append((self.now, Command.from_frame(Frame.from_bytes(action.data))))
                 self._carry(action.data, to_robot=True)
+
+    def _deliver_last(self) -> None:
+        """Bring what a TCP connection still carries to the robot: it comes before the end of the line."""
+        while self._on_the_way:
+            _, _, to_robot, data = heapq.heappop(self._on_the_way)
+            if to_robot:
+                self.pioneer.receive(data, self.now)
 
     def _carry(self, data: bytes, *, to_robot: bool) -> None:
         if self.is_cut or not self.is_plugged:

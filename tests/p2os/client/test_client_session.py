@@ -8,6 +8,7 @@ from p2os.client.problems import LinkLostError
 from p2os.client.settings import ClientSettings
 from p2os.commands import Command, CommandNumber, enable, rvel, stop, vel
 from p2os.timing import NS_PER_S
+from p2os.wire import Decoder, Frame
 
 STOPS = [stop(), vel(0), rvel(0)]
 CLOSE = Command(CommandNumber.CLOSE)
@@ -24,8 +25,9 @@ def test_a_session_opens_at_the_floor_of_the_protocol() -> None:
     assert rig.notices(ConfigurationKnown)
 
 
-def test_stop_goes_before_the_first_sync0_and_before_each_repeated_one() -> None:
-    rig = Rig()
+@pytest.mark.parametrize("baud", [9600, 115200])
+def test_stop_goes_before_the_first_sync0_and_before_each_repeated_one(baud: int) -> None:
+    rig = Rig(baud=baud)
     rig.is_cut = True
     rig.core.connect(0)
     rig.until(lambda: rig.core.link is Link.FAILED)
@@ -33,7 +35,103 @@ def test_stop_goes_before_the_first_sync0_and_before_each_repeated_one() -> None
     for place, command in enumerate(said):
         if command == SYNC0:
             assert said[place - 3 : place] == STOPS
-    assert said.count(SYNC0) == 8
+    assert said.count(SYNC0) == 11
+
+
+def test_a_fresh_line_without_a_rate_is_listened_to_and_then_gets_sync0_alone() -> None:
+    rig = Rig()
+    rig.is_cut = True
+    rig.core.connect(0)
+    rig.run(0.249)
+    assert rig.commands() == []
+    rig.until(lambda: rig.core.link is Link.FAILED)
+    assert set(rig.commands()) == {SYNC0}
+    assert rig.said[0] == (250 * MS, SYNC0)
+    assert rig.commands().count(SYNC0) == 8
+
+
+def test_a_byte_on_a_fresh_line_is_reason_enough_to_stop_first() -> None:
+    rig = Rig()
+    rig.core.connect(0)
+    rig.run(0.1)
+    rig.core.receive(b"\xfa", rig.now)
+    rig.run(0.02)
+    assert rig.commands()[:4] == [*STOPS, SYNC0]
+    rig.until(lambda: rig.core.is_ready)
+
+
+def test_a_robot_that_another_client_left_moving_never_hears_sync0_before_stop() -> None:
+    first = Rig().connect()
+    first.core.set_velocity(0.3, 0.0, first.now)
+    first.living(1)
+    second = Rig(pioneer=first.pioneer, now=first.now)
+    second.pioneer.hang_up = lambda _now: None  # type: ignore[method-assign]  # behind a serial-to-TCP box
+    second.connect()
+    assert second.commands()[:2] == [stop(), vel(0)]
+    second.run(3)
+    assert second.wheels == (0.0, 0.0)
+
+
+class TakesAnyFrameForASync:
+    """AMRISim's handshake: the first frame of a line is echoed and counted on from; only SYNC0 leads anywhere."""
+
+    def __init__(self) -> None:
+        self.inner = new_pioneer()
+        self.state = self.inner.state
+        self.lines = 0
+        self.decoder = Decoder()
+        self.is_stuck: bool | None = None
+        self.echo: list[bytes] = []
+
+    def receive(self, data: bytes, now: int) -> None:
+        if self.is_stuck is None:
+            self.decoder.receive(data, now)
+            first = self.decoder.next_item()
+            assert isinstance(first, Frame)
+            self.is_stuck = first.kind != 0
+            self.echo += [Frame(bytes((first.kind,))).to_bytes()] if self.is_stuck else []
+        if not self.is_stuck:
+            self.inner.receive(data, now)
+
+    def hang_up(self, now: int) -> None:
+        self.inner.hang_up(now)
+        self.lines += 1
+        self.decoder, self.is_stuck = Decoder(), None
+
+    def take_output(self) -> list[bytes]:
+        echo, self.echo = self.echo, []
+        return echo + self.inner.take_output()
+
+    def __getattr__(self, name: str) -> object:
+        return getattr(self.inner, name)
+
+
+def test_a_peer_that_takes_stop_for_a_sync_is_opened_at_first_and_after_a_loss() -> None:
+    peer = TakesAnyFrameForASync()
+    rig = Rig(pioneer=peer).connect()  # type: ignore[arg-type]
+    assert peer.lines == 0
+    lost_at = rig.now
+    rig.pull()
+    rig.plug()
+    rig.until(lambda: rig.core.is_ready, within_s=2)
+    after = [command for command in rig.commands(lost_at) if command.number != CommandNumber.CONFIG]
+    assert after[:3] == STOPS, "after a loss STOP goes first, whoever the peer may be"
+    assert after[3:] == [SYNC0, Command(1), CLOSE, Command(1)], "SYNC0, SYNC1, SYNC2 and OPEN, on a new line"
+    assert peer.lines == 2, "pulled, and opened anew when STOP was echoed"
+
+
+def test_a_peer_that_echoes_stop_for_ever_is_a_named_failure() -> None:
+    peer = TakesAnyFrameForASync()
+    rig = Rig(pioneer=peer).connect()  # type: ignore[arg-type]
+    peer.is_stuck = True
+    rig.is_cut = True
+    rig.run(1.5)
+    rig.is_cut = False
+    echo = Frame(bytes((CommandNumber.STOP,))).to_bytes()
+    peer.receive = lambda _data, _now: peer.echo.append(echo)  # type: ignore[method-assign]
+    rig.run(30)
+    assert ReconnectPlanned(3, 1000 * MS) in rig.notices(ReconnectPlanned)
+    assert rig.core.link is not Link.OPEN
 
 
 @pytest.mark.parametrize("wire", WIRES)
