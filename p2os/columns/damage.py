@@ -4,11 +4,15 @@ Invariant: equal to `p2os.wire.DecoderStats` of a decoder that was fed the same 
 """
 
 from dataclasses import dataclass
+from typing import TypeAlias
 
 import numpy as np
+import numpy.typing as npt
 
 from p2os.columns.framing import Bytes, Indexes, crosses, headers
 from p2os.wire.frame import CHECKSUM_BYTES, HEADER, MAX_COUNT, MIN_COUNT, PREFIX_BYTES
+
+Flags: TypeAlias = npt.NDArray[np.bool_]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -33,8 +37,42 @@ def damage_of(data: Bytes, starts: Indexes, ends: Indexes, pauses: Indexes | Non
         ends: Of the same.
         pauses: As `find_frames` takes them.
     """
-    quiet = np.array([*([] if pauses is None else pauses), len(data)], np.int64)
     first, last = starts - PREFIX_BYTES, ends + CHECKSUM_BYTES
+    rejected = _rejected(data, first, last, pauses)
+    stalled, illegal = rejected.stalled, rejected.illegal
+    reach = np.maximum.accumulate(np.where(stalled, rejected.limits, rejected.places + rejected.sizes))
+    before = np.searchsorted(rejected.places, first)
+    rescued = np.concatenate(([0], reach))[before] > first
+    return Damage(
+        noise_bytes=len(data) - int((last - first).sum()),
+        bad_checksums=int((~illegal & ~stalled).sum()),
+        bad_counts=int(illegal.sum()),
+        stalled=int(stalled.sum()),
+        rescued=int(rescued.sum()),
+    )
+
+
+def stalls_of(data: Bytes, starts: Indexes, ends: Indexes, pauses: Indexes | None) -> tuple[Indexes, Indexes]:
+    """Return where frames begin whose rest never came, and for each the end of what had come when it was given up."""
+    rejected = _rejected(data, starts - PREFIX_BYTES, ends + CHECKSUM_BYTES, pauses)
+    return rejected.places[rejected.stalled], rejected.limits[rejected.stalled]
+
+
+@dataclass(frozen=True, slots=True)
+class _Rejected:
+    """The headers outside all sound frames, in their order."""
+
+    places: Indexes
+    #: The end of what had come when the line fell silent.
+    limits: Indexes
+    #: Bytes that were looked at as one frame.
+    sizes: Indexes
+    illegal: Flags
+    stalled: Flags
+
+
+def _rejected(data: Bytes, first: Indexes, last: Indexes, pauses: Indexes | None) -> _Rejected:
+    quiet = np.array([*([] if pauses is None else pauses), len(data)], np.int64)
     places = _outside(_headers(data, quiet), first, last)
     limits = quiet[np.searchsorted(quiet, places, side="right")]
     counted = places + 2 < limits
@@ -42,17 +80,7 @@ def damage_of(data: Bytes, starts: Indexes, ends: Indexes, pauses: Indexes | Non
     counts[counted] = data[places[counted] + 2]
     illegal = counted & ((counts < MIN_COUNT) | (counts > MAX_COUNT))
     sizes = np.where(illegal, PREFIX_BYTES, counts + PREFIX_BYTES)
-    stalls = ~counted | (~illegal & (places + sizes > limits))
-    reach = np.maximum.accumulate(np.where(stalls, limits, places + sizes))
-    before = np.searchsorted(places, first)
-    rescued = np.concatenate(([0], reach))[before] > first
-    return Damage(
-        noise_bytes=len(data) - int((last - first).sum()),
-        bad_checksums=int((~illegal & ~stalls).sum()),
-        bad_counts=int(illegal.sum()),
-        stalled=int(stalls.sum()),
-        rescued=int(rescued.sum()),
-    )
+    return _Rejected(places, limits, sizes, illegal, ~counted | (~illegal & (places + sizes > limits)))
 
 
 def _headers(data: Bytes, quiet: Indexes) -> Indexes:
