@@ -9,12 +9,16 @@ not stacked by exceptions, so that handlers and the main program write one log.
 import re
 import signal
 import struct
+import sys
 from collections.abc import Callable, Iterator
+from pathlib import Path
 
 import pytest
 
 from bluepill_sim.board import BluePill
 from bluepill_sim.image import Image, Symbol, SymbolTable
+
+sys.path.insert(0, str(Path(__file__).parent))
 
 FLASH = 0x0800_0000
 CODE = FLASH + 0x130
