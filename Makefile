@@ -10,7 +10,7 @@ BIN    := $(VENV)/bin
 STAMP  := $(VENV)/.set-up
 JOBS   ?= 2
 
-.PHONY: setup demo test lint type unit bench soak clean firmware
+.PHONY: setup demo test lint type unit bench soak clean firmware board board-check board-tools
 
 setup: $(STAMP)
 
@@ -51,6 +51,20 @@ soak: setup
 # Rebuilds the example firmware (needs gcc-arm-none-eabi); `make test` compares.
 firmware: setup
 	$(BIN)/python testbench/firmware/build.py
+
+# The adapter board: `make board` writes every file anew from the design, then checks them; `make board-check` only
+# checks. KiCad 9 and ngspice are installed where apt and root allow it; what is missing is skipped aloud.
+board: board-tools
+	$(BIN)/python -m hardware.pcb build
+	$(BIN)/python -m hardware.pcb simulate
+	$(BIN)/python -m hardware.pcb check
+
+board-check: board-tools
+	$(BIN)/python -m hardware.pcb check
+
+board-tools: setup
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt -e '.[board]'
+	tools/install_board_tools.sh
 
 clean:
 	rm -rf $(VENV) build dist *.egg-info .pytest_cache .mypy_cache .ruff_cache .hypothesis .coverage .coverage.* runs

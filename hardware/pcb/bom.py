@@ -1,7 +1,7 @@
 """The bill of materials: rows, a CSV file and one interactive page.
 
 The page is ours: a drawing of the board beside the list; a click on a row marks its
-parts. It loads nothing from anywhere. Invariant: every bought component is in exactly one row.
+parts. It loads nothing from anywhere. Invariant: every bought component is in exactly one row, beside its accessories.
 """
 
 import csv
@@ -15,7 +15,7 @@ from hardware.pcb import rules
 from hardware.pcb.assembly import STYLE, board_svg
 from hardware.pcb.footprints import FOOTPRINTS
 from hardware.pcb.netlist import Design
-from hardware.pcb.parts import Part
+from hardware.pcb.parts import ACCESSORIES, Part
 from hardware.pcb.placement import place
 
 #: The interactive page, with @names@ where its contents go.
@@ -28,18 +28,24 @@ class Row:
 
     part: Part
     refs: tuple[str, ...]
+    quantity: int
 
 
 def rows(design: Design) -> list[Row]:
-    """Return the bill of materials, the largest quantity last, references in natural order."""
+    """Return the bill of materials, the largest quantity last, references in natural order; accessories follow."""
     groups: dict[str, list[str]] = {}
     parts: dict[str, Part] = {}
     for component in design.components:
         if component.part.bought:
             groups.setdefault(component.part.key, []).append(component.ref)
             parts[component.part.key] = component.part
-    found = [Row(part=parts[key], refs=tuple(sorted(refs, key=_natural))) for key, refs in groups.items()]
-    return sorted(found, key=lambda row: (len(row.refs), row.part.key))
+    found = [
+        Row(part=parts[key], refs=tuple(sorted(refs, key=_natural)), quantity=len(refs)) for key, refs in groups.items()
+    ]
+    found.sort(key=lambda row: (row.quantity, row.part.key))
+    return found + [
+        Row(part=part, refs=tuple(where.split()), quantity=quantity) for quantity, where, part in ACCESSORIES
+    ]
 
 
 def csv_text(design: Design) -> str:
@@ -49,7 +55,7 @@ def csv_text(design: Design) -> str:
     writer.writerow(["Quantity", "References", "Value", "Footprint", "Manufacturer", "Part number", "Description"])
     for row in rows(design):
         part = row.part
-        writer.writerow([len(row.refs), " ".join(row.refs), part.value, part.footprint, part.manufacturer, part.mpn,
+        writer.writerow([row.quantity, " ".join(row.refs), part.value, part.footprint, part.manufacturer, part.mpn,
                          part.description])  # fmt: skip
     return out.getvalue()
 
@@ -71,7 +77,8 @@ def placement_csv(design: Design) -> str:
 def html_text(design: Design) -> str:
     """Return the interactive page."""
     lines = "".join(
-        f'<tr data-refs="{" ".join(row.refs)}"><td><input type="checkbox"></td><td>{len(row.refs)}</td>'
+        f'<tr data-refs="{" ".join(row.refs)}" data-part="{html.escape(row.part.key)}">'
+        f'<td><input type="checkbox"></td><td>{row.quantity}</td>'
         f"<td>{' '.join(row.refs)}</td><td>{html.escape(row.part.value)}</td><td>{html.escape(row.part.footprint)}</td>"
         f"<td>{html.escape(row.part.manufacturer)}</td><td>{html.escape(row.part.mpn)}</td>"
         f"<td>{html.escape(row.part.description)}</td></tr>\n"
@@ -80,7 +87,7 @@ def html_text(design: Design) -> str:
     page = _PAGE.read_text(encoding="utf-8")
     words = {
         "title": html.escape(design.title),
-        "count": str(sum(len(row.refs) for row in rows(design))),
+        "count": str(sum(row.quantity for row in rows(design))),
         "lines": str(len(rows(design))),
         "board": board_svg(design),
         "style": STYLE,

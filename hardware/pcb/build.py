@@ -119,6 +119,15 @@ def fabrication_files(board: Path, work: Path) -> dict[str, str]:
     return {path.name: path.read_text(encoding="utf-8") for path in sorted(work.iterdir())}
 
 
+def fabrication_archive(variant: str, folder: Path = GENERATED) -> dict[str, str]:
+    """Return the committed fabrication files of a variant by name; none where there is no archive."""
+    file = folder / variant / f"{variant}-gerbers.zip"
+    if not file.exists():
+        return {}
+    with zipfile.ZipFile(file) as kept:
+        return {name: kept.read(name).decode() for name in kept.namelist()}
+
+
 def archive(files: dict[str, str]) -> bytes:
     """Return a zip archive that is the same for the same files."""
     out = io.BytesIO()

@@ -7,7 +7,7 @@ check that could not run says so. Invariant: no check changes a file.
 from collections import Counter
 
 from adapter_sim.pinout import load_pinout
-from hardware.pcb import build, copper, kicad_checks
+from hardware.pcb import build, copper, gerbers, kicad_checks
 from hardware.pcb.design import BOARD_VARIANTS, VARIANTS
 from hardware.pcb.design import build as design_of
 from hardware.pcb.electrical import all_checks, bom_faults, netlist_faults
@@ -44,10 +44,28 @@ def plain() -> list[Result]:
         tracks, vias = build.copper_of(design)
         words = f"{len(tracks)} tracks, {len(vias)} vias"
         results.append(listed("copper connected", variant, copper.faults(design, tracks, vias), words))
+        results.append(gerbers_reread(variant))
     sources = build.sources()
     stale = [f"{name} is stale" for name in build.stale_files(sources)]
     results.append(listed("generated files", "all", stale, f"{len(sources)} files up to date"))
     return results
+
+
+def gerbers_reread(variant: str) -> Result:
+    """Read the committed gerbers with a library that is not KiCad's, and hold them against the design."""
+    files = build.fabrication_archive(variant)
+    if not files:
+        return listed("gerbers re-read", variant, ["there is no archive (hint: make board)"], "")
+    if not gerbers.is_installed():
+        return skipped("gerbers re-read", variant, "gerbonara is not installed (hint: pip install 'p2os[board]')")
+    reading = gerbers.read(files)
+    words = (
+        f"{reading.width_mm:g} x {reading.height_mm:g} mm, {reading.copper_layers} copper layers, "
+        f"{reading.plated} + {reading.unplated} holes"
+    )
+    design = design_of(variant)
+    _, vias = build.copper_of(design)
+    return listed("gerbers re-read", variant, gerbers.faults(design, vias, reading), words)
 
 
 def pin_rules() -> list[Result]:

@@ -51,7 +51,7 @@ PARTS: Mapping[str, Part] = MappingProxyType({
         # --- modules
         Part(
             key="BLUEPILL", value="BluePill", symbol="BLUEPILL", footprint="MODULE_BLUEPILL",
-            description="STM32F103C8 BluePill on two 1x20 sockets", manufacturer="generic",
+            description="STM32F103C8 BluePill, with its pin rows soldered downwards", manufacturer="generic",
             mpn="BluePill STM32F103C8T6",
             source="ST DS5319 I/O tables, seen; module's pin rows, memory",
             facts={"supply_v": 5.0, "current_max_ma": 80.0, "injection_pin_ma": 5.0, "injection_total_ma": 25.0,
@@ -59,7 +59,7 @@ PARTS: Mapping[str, Part] = MappingProxyType({
         ),
         Part(
             key="ESP32", value="ESP32 D1 mini", symbol="ESP32_D1_MINI", footprint="MODULE_ESP32_D1_MINI",
-            description="ESP32 D1 mini (40 pins) on four 1x10 sockets", manufacturer="generic",
+            description="ESP32 D1 mini (40 pins), with its pin rows soldered downwards", manufacturer="generic",
             mpn="MH-ET LIVE MiniKit ESP32",
             source="Espressif ESP32 data sheet and the module's silkscreen, memory",
             facts={"supply_v": 5.0, "current_max_ma": 500.0, "rail_out_ma": 150.0, "vil_v": 0.825, "vih_v": 2.475,
@@ -169,3 +169,17 @@ PARTS: Mapping[str, Part] = MappingProxyType({
              bought=False),
     )
 })  # fmt: skip
+
+
+def _accessory(value: str, mpn: str, description: str) -> Part:
+    return Part(key=value, value=value, symbol="", footprint="", description=description, manufacturer="Wuerth",
+                mpn=mpn,
+                source="memory")  # fmt: skip
+
+
+#: What is bought with a board but is no component of its circuit: quantity, where it goes, the part.
+ACCESSORIES: tuple[tuple[int, str, Part], ...] = (
+    (2, "U1", _accessory("socket 1x20", "61302011821", "Socket 1x20 2.54 mm, 8.5 mm high, for the BluePill")),
+    (4, "U2", _accessory("socket 1x10", "61301011821", "Socket 1x10 2.54 mm, 8.5 mm high, for the ESP32 module")),
+    (2, "JP1 J5", _accessory("jumper", "60900213421", "Jumper 2.54 mm: one for the source, one for the mode")),
+)

@@ -15,7 +15,7 @@ from hardware.pcb.spice.deck import Deck
 from hardware.pcb.spice.decks import decks
 from hardware.pcb.spice.run import Result, simulate
 
-_PAGE_DPI = 80
+_PAGE_DPI = 110
 _SIDES = {
     "top": ("--side", "top"),
     "bottom": ("--side", "bottom"),

@@ -251,10 +251,16 @@ def _symbol(
         node("uuid", Text(uid(page.design.variant, ref, "symbol"))),
     )  # fmt: skip
     tree.append(
-        property_node("Reference", ref, (x + symbol.ref_at[0], y - symbol.ref_at[1]), is_hidden=symbol.is_power)
+        property_node(
+            "Reference",
+            ref,
+            (x + symbol.ref_at[0], y - symbol.ref_at[1]),
+            is_hidden=symbol.is_power,
+            justify=symbol.justify,
+        )
     )
     tree.append(property_node("Value", value, (x + symbol.value_at[0], y - symbol.value_at[1]),
-                              is_hidden=name in {"PWR_FLAG", "TESTPOINT"}))  # fmt: skip
+                              is_hidden=name in {"PWR_FLAG", "TESTPOINT"}, justify=symbol.justify))  # fmt: skip
     rows = fields or {"Footprint": "", "Datasheet": "", "Description": ""}
     tree += [property_node(key, text, (x, y), is_hidden=True) for key, text in rows.items()]
     tree += [

@@ -77,17 +77,17 @@ def _test_points() -> dict[str, tuple[int, int]]:
 _SUPPLY = {
     "J1": (18, 26), "F1": (34, 25), "D1": (50, 25), "D2": (66, 28), "C1": (78, 28), "C2": (92, 28),
     "J2": (18, 66), "D3": (36, 65), "JP1": (80, 68), "C4": (98, 70),
-    "D4": (138, 62), "D5": (138, 72), "R61": (182, 62), "D6": (200, 62),
+    "D4": (138, 64), "D5": (138, 74), "R61": (182, 72), "D6": (200, 72),
     # Buck and LM317 share the place: a variant has one of them.
     "U3": (138, 26), "C3": (162, 29),
-    "R68": (146, 40), "R69": (170, 40), "C11": (186, 43),
-    "U4": (38, 104), "R70": (46, 118), "R71": (70, 118), "C12": (62, 107), "C13": (88, 121),
+    "R68": (154, 40), "R69": (172, 40), "C11": (196, 32),
+    "U4": (38, 104), "R70": (56, 118), "R71": (74, 118), "C12": (62, 107), "C13": (88, 121),
 }  # fmt: skip
 _SERIAL = {
     "U5": (64, 40), "C5": (18, 40), "C6": (30, 40), "C7": (96, 40), "C8": (110, 40), "C9": (124, 40), "J3": (156, 40),
     "R62": (46, 82), "R63": (46, 90), "R64": (46, 100), "D7": (60, 100), "R65": (46, 110), "D8": (60, 110),
-    "R66": (136, 88), "R67": (136, 100), "Q1": (152, 88), "J5": (30, 136), "R60": (48, 137),
-    "U6": (192, 44), "C10": (212, 46), "R72": (194, 90), "D9": (208, 90),
+    "R66": (136, 92), "R67": (136, 104), "Q1": (152, 92), "J5": (30, 136), "R60": (48, 137),
+    "U6": (198, 36), "C10": (208, 60), "R72": (194, 90), "D9": (208, 90),
 }  # fmt: skip
 _TEST = {"J4": (44, 44), **_test_points(), **{f"H{n}": (20 + 20 * n, 118) for n in range(1, 5)}}
 _TABLES = {
@@ -119,7 +119,7 @@ _LINEAR_FRAMES = [
 ]  # fmt: skip
 _REV_C_FRAMES = [
     Frame(title="Distances by shift register", left=174, top=12, right=224, bottom=70),
-    Frame(title="Status LED", left=174, top=74, right=224, bottom=110),
+    Frame(title="Status LED", left=174, top=74, right=224, bottom=118),
 ]
 _FRAMES = {
     "modules": [
@@ -137,7 +137,7 @@ _FRAMES = {
               note="Plug, wired as DTE: straight cable to the robot's HOST socket."),
         Frame(title="UART with activity lights", left=10, top=74, right=100, bottom=118,
               note="A light is on while its line is low: it flickers with data."),
-        Frame(title="Reset: PB13 high pulls EN low", left=106, top=74, right=170, bottom=110,
+        Frame(title="Reset: PB13 high pulls EN low", left=106, top=74, right=170, bottom=118,
               note="Emitter to ground. The module has its own pull-up at EN."),
         Frame(title="Mode jumper, read at boot only", left=10, top=122, right=100, bottom=144),
     ],

@@ -44,6 +44,8 @@ class Symbol:
     value_at: tuple[float, float]
     shows_names: bool = True
     is_power: bool = False
+    #: Where reference and value stand around their positions: "center", or "left" for texts beside the symbol.
+    justify: str = "center"
 
     def rows(self) -> Iterator[tuple[str, str, str]]:
         """Yield number, name and electrical kind of each pin."""
@@ -56,8 +58,10 @@ def _two(name: str, prefix: str, numbers: tuple[str, str], picture: Sequence[Str
     left, right = numbers
     pins = (Pin(number=left, name=left, kind="passive", at=(-1.5 * G, 0), side="left", length=1.27),
             Pin(number=right, name=right, kind="passive", at=(1.5 * G, 0), side="right", length=1.27))  # fmt: skip
-    return Symbol(name=name, prefix=prefix, pins=pins, picture=tuple(picture), ref_at=(0, 2.54), value_at=(0, -2.54),
-                  shows_names=False)  # fmt: skip
+    # Above the tallest picture: a light's arrows.
+    return Symbol(name=name, prefix=prefix, pins=pins, picture=tuple(picture),
+                  ref_at=(0, 3.3 if name == "LED" else 2.54),
+                  value_at=(0, -2.54), shows_names=False)  # fmt: skip
 
 
 def _upright(name: str, prefix: str, numbers: tuple[str, str], picture: Sequence[Stroke]) -> Symbol:
@@ -65,8 +69,8 @@ def _upright(name: str, prefix: str, numbers: tuple[str, str], picture: Sequence
     top, bottom = numbers
     pins = (Pin(number=top, name=top, kind="passive", at=(0, 1.5 * G), side="top", length=2.54),
             Pin(number=bottom, name=bottom, kind="passive", at=(0, -1.5 * G), side="bottom", length=2.54))  # fmt: skip
-    return Symbol(name=name, prefix=prefix, pins=pins, picture=tuple(picture), ref_at=(3.81, 1.27),
-                  value_at=(5.08, -1.27), shows_names=False)  # fmt: skip
+    return Symbol(name=name, prefix=prefix, pins=pins, picture=tuple(picture), ref_at=(2.2, 1.1),
+                  value_at=(2.2, -1.1), shows_names=False, justify="left")  # fmt: skip
 
 
 def _box(
@@ -177,14 +181,16 @@ def _all() -> list[Symbol]:
         _box("MAX3232", "U", rs232, 10.16),
         _box("HC595", "U", shift, 7.62),
         _box("DE9", "J", {"left": [*de9]}, 5.08),
-        Symbol(name="NPN", prefix="Q", pins=transistor, ref_at=(5.08, 1.27), value_at=(6.35, -1.27), shows_names=False,
+        Symbol(name="NPN", prefix="Q", pins=transistor, ref_at=(1.6, 1.1), value_at=(1.6, -1.1), shows_names=False,
+               justify="left",
                picture=(("polyline", ((-2.54, 2.0), (-2.54, -2.0))), ("polyline", ((-2.54, 0.8), (0, 2.54))),
                         ("polyline", ((-2.54, -0.8), (0, -2.54))),
                         ("polyline", ((-1.4, -1.0), (-0.6, -2.2), (-2.0, -1.9))))),
-        Symbol(name="TESTPOINT", prefix="TP", ref_at=(4.5, 0), value_at=(4.5, -1.9), shows_names=False,
+        Symbol(name="TESTPOINT", prefix="TP", ref_at=(3.4, 0), value_at=(3.4, -1.9), shows_names=False, justify="left",
                pins=(Pin(number="1", name="1", kind="passive", at=(0, 0), side="left", length=1.27),),
                picture=(("circle", ((1.97, 0), (2.67, 0))),)),
-        Symbol(name="HOLE", prefix="H", pins=(), ref_at=(3.81, 0), value_at=(3.81, -1.9), shows_names=False,
+        Symbol(name="HOLE", prefix="H", pins=(), ref_at=(2.4, 0), value_at=(2.4, -1.9), shows_names=False,
+               justify="left",
                picture=(("circle", ((0, 0), (1.6, 0))),)),
         _box("BLUEPILL", "U", _module(BLUEPILL_PINS, {}, is_source=False), 15.24),
         _box("ESP32_D1_MINI", "U", _module(ESP32_PINS, ESP32_SILKSCREEN, is_source=True), 15.24),
@@ -222,16 +228,18 @@ def symbol_node(symbol: Symbol, name: str) -> Node:
         ("Reference", symbol.prefix, symbol.ref_at, symbol.is_power), ("Value", symbol.name, symbol.value_at, False),
         ("Footprint", "", (0.0, 0.0), True), ("Datasheet", "", (0.0, 0.0), True), ("Description", "", (0.0, 0.0), True),
     ):  # fmt: skip
-        tree.append(property_node(key, text, at, is_hidden=is_hidden))
+        tree.append(property_node(key, text, at, is_hidden=is_hidden, justify=symbol.justify))
     body = node("symbol", Text(f"{symbol.name}_0_1"), *(_shape(kind, points) for kind, points in symbol.picture))
     legs = node("symbol", Text(f"{symbol.name}_1_1"), *(_pin(pin) for pin in symbol.pins))
     tree += [body, legs, node("embedded_fonts", "no")]
     return tree
 
 
-def property_node(key: str, text: str, at: tuple[float, float], *, is_hidden: bool, size: float = 1.27) -> Node:
+def property_node(key: str, text: str, at: tuple[float, float], *, is_hidden: bool, justify: str = "center") -> Node:
     """Return a property of a symbol or sheet."""
-    effects = node("effects", node("font", node("size", size, size)))
+    effects = node("effects", node("font", node("size", 1.27, 1.27)))
+    if justify != "center":
+        effects.append(node("justify", justify))
     if is_hidden:
         effects.append(node("hide", "yes"))
     return node("property", Text(key), Text(text), node("at", *at, 0), effects)
