@@ -312,6 +312,7 @@ class Chip:
         engine.map_io(SRAM_ALIAS, SRAM_BYTES * _ALIAS_BYTES, bits.read_bit, bits.write_bit)
         engine.map_io(PPB_BASE, PPB_BYTES, self.system.read, self.system.write)
         engine.on_read_only_write = self._write_flash
+        engine.on_read_only_written = self._repair_flash
 
     def _write_flash(self, address: int, size: int, value: int) -> bool:
         """Take a write of the core to the flash array: its controller decides; False: no flash is there."""
@@ -321,7 +322,6 @@ class Chip:
         self.parts.flash.program(offset, size, value)
         # The engine stores the value whatever the controller says: put back what should be there.
         self._flash_repairs.append((offset, self.memory.read_flash(offset, size)))
-        self.processor.stop_at_border()
         return True
 
     def _repair_flash(self) -> None:

@@ -205,7 +205,11 @@ class ChipParts:
         return min((part.due_ns for part in self.by_name.values() if part.due_ns is not None), default=None)
 
     def advance_to(self, now_ns: int) -> None:
-        """Act on everything due up to and including `now_ns`, in order of time, then of `PERIPHERALS`."""
+        """Act on everything due up to and including `now_ns`, in order of time, then of `PERIPHERALS`.
+
+        Raises:
+            RuntimeError: a peripheral has not done what was due, and would be asked for ever; a bug of its model.
+        """
         while True:
             due_ns = self.next_deadline()
             if due_ns is None or due_ns > now_ns:
@@ -213,6 +217,10 @@ class ChipParts:
             for part in self.by_name.values():
                 if part.due_ns == due_ns:
                     part.advance_to(due_ns)
+                    if part.due_ns is not None and part.due_ns <= due_ns:
+                        raise RuntimeError(
+                            f"{part.place.name} is still due at {part.due_ns} ns after acting at {due_ns} ns"
+                        )
 
     def snapshot(self) -> dict[str, PeripheralSnapshot]:
         """Return all that decides their future, as plain values."""

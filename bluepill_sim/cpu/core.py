@@ -41,6 +41,12 @@ WRITE_UNMAPPED, FETCH_UNMAPPED, WRITE_PROTECTED, FETCH_PROTECTED = 20, 21, 22, 2
 RawRead = Callable[[int, int, int, int], int]
 RawWrite = Callable[[int, int, int, int, int], None]
 
+#: Reads (offset, size) of an I/O region, writes (offset, size, value).
+ReadAccess = Callable[[int, int], int]
+WriteAccess = Callable[[int, int, int], None]
+#: Takes (address, size, value) written to read-only memory; False refuses it.
+WriteToReadOnly = Callable[[int, int, int], bool]
+
 #: (index, word) of each word of the registers that differs from a new core's.
 CoreSnapshot = tuple[tuple[int, int], ...]
 

@@ -5,7 +5,7 @@ Source: unicorn.h, and target/arm of Unicorn 2.1 (EXCP_ numbers).
 
 from bluepill_sim.block_cost import Block
 from bluepill_sim.cpu import core
-from bluepill_sim.cpu.halt import HaltKind
+from bluepill_sim.cpu.halt import Halt, HaltKind
 from bluepill_sim.thumb import Kind
 
 #: Branches to these addresses are exception returns in handler mode (ARMv7-M B1.5.8).
@@ -53,3 +53,14 @@ def kind_of_invalid(block: Block, pc: int, *, is_thumb: bool) -> HaltKind | None
     if last is Kind.WAIT_EVENT:
         return HaltKind.WAIT_EVENT
     return HaltKind.UNDEFINED if is_thumb else HaltKind.INVALID_STATE
+
+
+def halt_without_reason(error: int, block: Block, pc: int) -> Halt:
+    """Tell why Unicorn came back without having called anything: WFI is the only way.
+
+    Raises:
+        RuntimeError: it was not; a bug here.
+    """
+    if error == 0 and block.last is Kind.WAIT_INTERRUPT and pc == block.end:
+        return Halt(HaltKind.WAIT_INTERRUPT, pc)
+    raise RuntimeError(f"Unicorn stopped at {pc:#010x} with error {error}")

@@ -15,13 +15,6 @@ which Unicorn lets pass, are caught by hooks on just those addresses; a hook
 that ends a run has what ran after it undone, since Unicorn goes on to the end
 of an IT block (`stop_before`).
 
-A debugger's halts (`breakpoints`, `watchpoints`, `step`) stand inside a block.
-The rest of that block keeps the cycles and the end of the run that it had, so
-that a run with halts is the same as one without.
-
-For whoever makes another engine: what `processor.py`, `chip.py` and
-`board.py` use is what has no underscore here, and nothing else.
-
 Invariant: between runs `cycle` is the time of the border that stands at `pc`,
 or of the instruction there where `is_inside_block`.
 """
@@ -33,7 +26,7 @@ from dataclasses import replace
 from bluepill_sim.block_cost import NO_BLOCK
 from bluepill_sim.cpu import core, endings
 from bluepill_sim.cpu.block_table import BlockTable, Measure
-from bluepill_sim.cpu.core import Core, CoreSnapshot
+from bluepill_sim.cpu.core import Core, CoreSnapshot, ReadAccess, WriteAccess, WriteToReadOnly
 from bluepill_sim.cpu.debug_unit import DebugUnit, Watchpoint
 from bluepill_sim.cpu.frozen import IT_BITS, Frozen, copy_of, it_state_of
 from bluepill_sim.cpu.halt import DEBUG_HALTS, Halt, HaltKind
@@ -42,13 +35,6 @@ from bluepill_sim.cpu.registers import Register
 from bluepill_sim.cpu.rest import RestOfBlock, RestSnapshot
 from bluepill_sim.cpu.scratch import Scratch
 from bluepill_sim.cpu.traps import Traps
-from bluepill_sim.thumb import Kind
-
-#: Reads (offset, size) of an I/O region, writes (offset, size, value).
-ReadAccess = Callable[[int, int], int]
-WriteAccess = Callable[[int, int, int], None]
-#: Takes (address, size, value) written to read-only memory; False refuses it.
-WriteToReadOnly = Callable[[int, int, int], bool]
 
 #: Later than any run.
 _NEVER = 1 << 62
@@ -81,8 +67,10 @@ class Engine:
         self.stops_after_mask_change = False
         #: Called when the firmware executes SEV.
         self.on_event: Callable[[], None] | None = None
-        #: Called with writes to read-only memory.
+        #: Called with writes to read-only memory, and after the instruction that made them.
         self.on_read_only_write: WriteToReadOnly | None = None
+        self.on_read_only_written: Callable[[], None] | None = None
+        self._lets_writes_through = False
         self._blocks = BlockTable(measure)
         self._table = self._blocks.plain
         self._halt: Halt | None = None
@@ -162,19 +150,19 @@ class Engine:
             Exception: whatever a peripheral's callback raised.
         """
         halt = self._run(stop_at)
+        while halt.kind is HaltKind.TAKEN_WRITE:
+            halt = self._step_over_write(stop_at)
+            if halt.kind is HaltKind.STEP:
+                halt = self._run(stop_at)
         return halt if halt.kind is not HaltKind.WATCHPOINT else self._step_over_access(halt, stop_at)
 
     def step(self, stop_at: int) -> Halt:
         """Run one instruction: a STEP, or whatever else ends it; what an IT block skips is stepped over."""
-        hook = self._debug.begin_step(self.pc)
-        self._is_stepping = True
-        try:
-            halt = self._run(stop_at)
-        finally:
-            self._is_stepping = False
-            self._debug.end_step(hook)
-        if halt.kind is HaltKind.WATCHPOINT:
-            return self._step_over_access(halt, stop_at)
+        halt = self._step(stop_at)
+        if halt.kind is HaltKind.TAKEN_WRITE:
+            halt = self._step_over_write(stop_at)
+        elif halt.kind is HaltKind.WATCHPOINT:
+            halt = self._step_over_access(halt, stop_at)
         return Halt(HaltKind.STEP, halt.pc) if halt.kind is HaltKind.BORDER else halt
 
     def jump(self, target: int) -> None:
@@ -227,9 +215,18 @@ class Engine:
         if self._frozen is not None:
             return self._thaw(self._frozen)
         self.it_state = 0
-        halt = self._halt or self._halt_without_reason(error)
+        halt = self._halt or endings.halt_without_reason(error, self.block, self.registers[Register.PC])
         self._settle(halt.pc)
         return halt
+
+    def _step(self, stop_at: int) -> Halt:
+        hook = self._debug.begin_step(self.pc)
+        self._is_stepping = True
+        try:
+            return self._run(stop_at)
+        finally:
+            self._is_stepping = False
+            self._debug.end_step(hook)
 
     def _step_over_access(self, halt: Halt, stop_at: int) -> Halt:
         """Let the instruction make the watched access that it was stopped before."""
@@ -241,6 +238,16 @@ class Engine:
         if after.kind is HaltKind.STEP:
             return Halt(HaltKind.WATCHPOINT, after.pc, halt.address)
         return replace(after, watched=halt.address)
+
+    def _step_over_write(self, stop_at: int) -> Halt:
+        """Let the instruction write to read-only memory, and have put right at once what Unicorn stores there."""
+        self._lets_writes_through = True
+        try:
+            return self._step(stop_at)
+        finally:
+            self._lets_writes_through = False
+            if self.on_read_only_written is not None:
+                self.on_read_only_written()
 
     @property
     def access_cycle(self) -> int:
@@ -381,8 +388,10 @@ class Engine:
         if self._frozen is not None:
             return False
         if access == core.WRITE_PROTECTED and self.on_read_only_write is not None:
-            word = value & (1 << 8 * size) - 1
-            if self.on_read_only_write(address, size, word):
+            if not self._lets_writes_through:
+                self.stop_before(HaltKind.TAKEN_WRITE, self.registers[Register.PC], address)
+                return False
+            if self.on_read_only_write(address, size, value & (1 << 8 * size) - 1):
                 return True
         self._halt = Halt(endings.kind_of_bad_access(access), self.registers[Register.PC], address)
         return False
@@ -412,7 +421,7 @@ class Engine:
         self.block, self.cycle = frozen.block, frozen.cycle
         self.stop_at, self.it_state = frozen.stop_at, frozen.it_state
         halt = frozen.halt
-        if halt.kind in DEBUG_HALTS:
+        if halt.kind in DEBUG_HALTS or halt.kind is HaltKind.TAKEN_WRITE:
             self._rest.keep(frozen.block, halt.pc, frozen.stop_at)
         self._settle(halt.pc)
         return halt
@@ -428,13 +437,6 @@ class Engine:
         if state & IT_BITS:
             self.registers[Register.CPSR] = state & ~IT_BITS
         return self._frozen is not None
-
-    def _halt_without_reason(self, error: int) -> Halt:
-        """Tell why Unicorn came back without having called anything: WFI is the only way."""
-        pc = self.registers[Register.PC]
-        if error == 0 and self.block.last is Kind.WAIT_INTERRUPT and pc == self.block.end:
-            return Halt(HaltKind.WAIT_INTERRUPT, pc)
-        raise RuntimeError(f"Unicorn stopped at {pc:#010x} with error {error}")
 
     def _settle(self, pc: int) -> None:
         """Charge what of the running block has been run when the core stands at `pc`."""
