@@ -7,6 +7,7 @@ millisecond at most, sees the first one's pins as they stand at the begin of
 each step, and what it drives carries the time of the instruction that did it.
 """
 
+from collections.abc import Callable
 from pathlib import Path
 
 from adapter_sim.pinout import Pinout, Role
@@ -36,7 +37,7 @@ class SecondBluePill:
         self.pioneer = pioneer
         #: Every byte that has left, with the end of its stop bit.
         self.sent: list[tuple[Nanos, int]] = []
-        self.on_packet = lambda data, at: None
+        self.on_packet: Callable[[bytes, Nanos], None] | None = None
         self._pins = pins
         self._on_the_line: list[tuple[Nanos, int]] = []
         self._step_at: Nanos = 0
@@ -77,7 +78,8 @@ class SecondBluePill:
             self.pioneer.receive(bytes([byte]), at)
         self.pioneer.advance_to(limit)
         for frame in self.pioneer.take_output():
-            self.on_packet(frame, limit)
+            if self.on_packet is not None:
+                self.on_packet(frame, limit)
             self.chip.usart1.receive(frame)
         self._step_at = limit + STEP_NS
         return Reached(limit)

@@ -1,7 +1,7 @@
 """A second, emulated BluePill runs the adapter core and drives a virtual Pioneer for the first one."""
 
 from dataclasses import replace
-from itertools import groupby
+from itertools import groupby, pairwise
 from pathlib import Path
 
 import pytest
@@ -72,7 +72,7 @@ def test_its_bytes_leave_at_9600_baud_without_a_gap_in_a_frame(tmp_path: Path) -
     sent = bench.second.sent
     first = [at for at, _ in sent[:6]]
     assert bytes(byte for _, byte in sent[:6]) == bytes.fromhex("FA FB 03 1D 00 1D"), "STOP comes first"
-    spans = {later - earlier for earlier, later in zip(first, first[1:], strict=False)}
+    spans = {later - earlier for earlier, later in pairwise(first)}
     assert all(abs(span - 10 * NS_PER_S / 9600) < 1_000 for span in spans)
     assert first[0] > 300 * NS_PER_MS, "nothing leaves before the boot is over"
 

@@ -122,4 +122,6 @@ def test_a_folder_without_a_trace_is_refused_with_a_hint(tmp_path: Path) -> None
 
 def test_a_packet_beyond_the_standard_one_is_named_with_its_fields() -> None:
     frame = EncoderPacket(left_counts=5, right_counts=-7).to_frame()
-    assert describe(WireChunk(t=0, direction="r2c", data=frame.to_bytes())) == [("EncoderPacket", "left_counts 5, right_counts -7")]
+    assert describe(WireChunk(t=0, direction="r2c", data=frame.to_bytes())) == [
+        ("EncoderPacket", "left_counts 5, right_counts -7")
+    ]
