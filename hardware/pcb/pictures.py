@@ -34,6 +34,8 @@ def board_pictures(variant: str, board: Path) -> list[Path]:
         kicad.picture(board, file, *arguments, "--width", "1000", "--height", "1000", "--background", "opaque")
         _shrink(file)
         files.append(file)
+    if variant == "rev-b":
+        files.append(_bare_picture(board))
     return files
 
 
@@ -56,6 +58,16 @@ def schematic_pictures(variant: str) -> list[Path]:
             _shrink(file)
             files.append(file)
     return files
+
+
+def _bare_picture(board: Path) -> Path:
+    """Render the board without its parts, for the names that the modules hide."""
+    bare = board.with_name("bare.kicad_pcb")
+    bare.write_text(board.read_text(encoding="utf-8").replace("/library/models/", "/no-models/"), encoding="utf-8")
+    file = build.PICTURES / "rev-b-bare.png"
+    kicad.picture(bare, file, "--side", "top", "--width", "1000", "--height", "1000", "--background", "opaque")
+    _shrink(file)
+    return file
 
 
 def write_plots() -> list[Path]:

@@ -22,6 +22,8 @@ _SCRIPT = (
     "pcbnew.ZONE_FILLER(board).Fill(board.Zones()); board.Save(sys.argv[2])"
 )
 _LIMIT_S = 300
+#: Where that Python stands: Debian's, else the first of the PATH.
+_PYTHONS = ("/usr/bin/python3", shutil.which("python3"))
 LAYERS = ("F.Cu", "B.Cu")
 
 
@@ -35,7 +37,7 @@ def kicad_python() -> str:
     Raises:
         KicadMissingError: None has.
     """
-    for python in ("/usr/bin/python3", shutil.which("python3")):
+    for python in _PYTHONS:
         if python and Path(python).exists():
             done = subprocess.run([python, "-c", "import pcbnew"], capture_output=True, check=False)
             if done.returncode == 0:

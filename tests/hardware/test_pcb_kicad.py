@@ -1,0 +1,199 @@
+"""What KiCad says of the board (where it is installed), and how we read it (everywhere)."""
+
+import json
+import zipfile
+
+import pytest
+
+from hardware.pcb import build, kicad, kicad_checks, pictures, pours
+from hardware.pcb.design import VARIANTS
+from hardware.pcb.design import build as design_of
+from hardware.pcb.footprints import FOOTPRINTS
+from hardware.pcb.pours import KicadMissingError, fill, kicad_python
+from hardware.pcb.report import Verdict
+from hardware.pcb.routing import RoutingError
+
+needs_kicad = pytest.mark.skipif(
+    kicad.version() is None,
+    reason="KiCad 9 is not installed: rule checks of the board are not run (hint: make board)",
+)
+
+
+@needs_kicad
+@pytest.mark.parametrize("variant", VARIANTS)
+def test_the_electrical_rule_check_finds_nothing(variant: str) -> None:
+    assert kicad.erc(build.GENERATED / variant / f"{variant}.kicad_sch") == []
+
+
+@needs_kicad
+@pytest.mark.parametrize("variant", VARIANTS)
+def test_the_schematic_s_netlist_is_the_design(variant: str) -> None:
+    assert kicad_checks.netlist_differences(variant) == []
+
+
+@needs_kicad
+@pytest.mark.slow
+def test_rev_b_passes_the_design_rule_check_with_parity_and_gives_the_committed_gerbers() -> None:
+    results = kicad_checks.board_checks("rev-b")
+    assert [result for result in results if result.verdict is not Verdict.GOOD] == []
+    assert len(results) == 3
+
+
+@needs_kicad
+def test_the_rule_check_sees_a_part_that_the_schematic_lacks(tmp_path) -> None:
+    source = build.GENERATED / "rev-b"
+    for file in source.iterdir():
+        if file.suffix in {".kicad_sch", ".kicad_pro"} or "table" in file.name:
+            (tmp_path / file.name).write_bytes(file.read_bytes())
+    page = (tmp_path / "rev-b-serial.kicad_sch").read_text(encoding="utf-8")
+    (tmp_path / "rev-b-serial.kicad_sch").write_text(page.replace('"RS_DTR"', '"RS_DTS"', 1), encoding="utf-8")
+    assert kicad.erc(tmp_path / "rev-b.kicad_sch")
+
+
+ERC = {"sheets": [{"violations": [{"type": "pin_not_driven", "severity": "error", "description": "Input not driven",
+                                   "items": [{"description": "U1 pin 3"}, {"description": "U2 pin 4"}]}]}]}  # fmt: skip
+
+
+def test_a_finding_is_read_with_its_severity_and_places(fake_kicad, tmp_path) -> None:
+    fake_kicad(json.dumps(ERC))
+    found = kicad.erc(tmp_path / "x.kicad_sch")
+    assert [str(one) for one in found] == ["error pin_not_driven: Input not driven: U1 pin 3; U2 pin 4"]
+
+
+def test_all_three_lists_of_the_design_rule_check_are_read(fake_kicad, tmp_path) -> None:
+    def entry(kind: str) -> dict[str, object]:
+        return {"type": kind, "severity": "warning", "description": kind, "items": []}
+
+    lists = {"violations": [entry("a")], "unconnected_items": [entry("b")], "schematic_parity": [entry("c")]}
+    fake_kicad(json.dumps(lists))
+    assert [one.kind for one in kicad.drc(tmp_path / "x.kicad_pcb")] == ["a", "b", "c"]
+
+
+def test_the_netlist_is_read_by_net(fake_kicad, tmp_path) -> None:
+    fake_kicad('(export (nets (net (code "1") (name "+5V") (node (ref "R1") (pin "2")) (node (ref "C1") (pin "1")))))')
+    assert kicad.netlist(tmp_path / "x.kicad_sch") == {"+5V": [("C1", "1"), ("R1", "2")]}
+
+
+def test_differences_of_the_netlist_are_named_on_both_sides(monkeypatch) -> None:
+    nets = {net: list(members) for net, members in design_of("rev-b").nets().items()}
+    nets["RS_DTR"].remove(("TP11", "1"))
+    nets["+5V"].append(("R99", "1"))
+    nets["unconnected-(U1-Pad3)"] = [("U1", "3")]
+    monkeypatch.setattr(kicad, "netlist", lambda _: nets)
+    assert kicad_checks.netlist_differences("rev-b") == [
+        "RS_DTR: TP11.1 is not in the schematic", "+5V: R99.1 is only in the schematic"]  # fmt: skip
+
+
+def test_fabrication_files_lose_their_dates(fake_kicad, tmp_path) -> None:
+    fake_kicad("G04 Created by KiCad (9.0.8) date 2025-01-01*\nG01*\n; #@! TF.CreationDate,2025\n")
+    files = build.fabrication_files(tmp_path / "board.kicad_pcb", tmp_path / "out")
+    assert files == {"board-F_Cu.gtl": "G01*\n", "board-PTH.drl": "G01*\n"}
+    monkeyed = kicad_checks.gerbers_up_to_date("rev-b", files)
+    assert monkeyed.verdict is Verdict.BAD
+
+
+def test_a_failing_kicad_is_quoted(fake_kicad, tmp_path) -> None:
+    fake_kicad(error="cannot load board")
+    with pytest.raises(kicad.KicadFailedError, match="pcb drc --severity-all: cannot load board"):
+        kicad.drc(tmp_path / "x.kicad_pcb")
+
+
+def test_an_older_kicad_and_none_are_missing(fake_kicad, monkeypatch, tmp_path) -> None:
+    fake_kicad(version="6.0.11")
+    with pytest.raises(KicadMissingError, match="install_board_tools"):
+        kicad.erc(tmp_path / "x.kicad_sch")
+    kicad.version.cache_clear()
+    monkeypatch.setenv("PATH", str(tmp_path))
+    assert kicad.version() is None
+    (result,) = kicad_checks.with_kicad()
+    assert result.verdict is Verdict.SKIPPED
+    assert "ERC, DRC, netlist, pours, gerbers not checked" in result.detail
+
+
+def test_the_filling_is_read_by_net_and_layer(fake_kicad) -> None:
+    polygon = '(filled_polygon (layer "F.Cu") (pts (xy 1 2) (xy 3 4) (xy 5 6)))'
+    fake_kicad(f'(kicad_pcb (zone (net 1) (net_name "GND") {polygon}) (zone (net 2) (net_name "+5V")))')
+    assert list(fill("(kicad_pcb)")) == ["GND:F.Cu"]
+
+
+def test_a_board_that_kicad_cannot_fill_and_a_python_without_kicad_are_errors(fake_kicad, monkeypatch) -> None:
+    fake_kicad(error="yes")
+    with pytest.raises(RoutingError, match="KiCad could not fill the pours"):
+        fill("(kicad_pcb)")
+    monkeypatch.setattr(pours, "_PYTHONS", ("/nonexistent/python3", None))
+    with pytest.raises(KicadMissingError, match="Python module"):
+        kicad_python()
+
+
+def test_a_filled_project_is_a_copy_with_its_library(fake_kicad, tmp_path) -> None:
+    fake_kicad('(kicad_pcb (zone (net_name "GND") (filled_polygon (layer "B.Cu") (pts (xy 1 2) (xy 3 4) (xy 5 6)))))')
+    board = build.filled_project("rev-b", tmp_path)
+    assert "filled_polygon" in board.read_text(encoding="utf-8")
+    assert (tmp_path / "library" / "adapter.kicad_sym").exists()
+    assert (tmp_path / "rev-b" / "rev-b.kicad_pro").exists()
+
+
+def test_board_checks_make_one_line_each(fake_kicad, monkeypatch) -> None:
+    monkeypatch.setattr(kicad, "drc", lambda _: [])
+    monkeypatch.setattr(kicad, "erc", lambda _: [])
+    monkeypatch.setattr(kicad, "netlist", lambda path: design_of(path.stem).nets())
+    monkeypatch.setattr(kicad_checks, "fill", lambda _: {})
+    monkeypatch.setattr(build, "fill", lambda _: {})
+    fake_kicad("G01*\n")
+    results = kicad_checks.with_kicad()
+    names = [result.name for result in results if result.subject == "lm317"]
+    assert names == ["ERC", "netlist equals design", "DRC with parity", "stitching", "gerbers up to date"]
+    verdicts = {result.name: result.verdict for result in results}
+    assert verdicts["ERC"] is Verdict.GOOD
+    assert verdicts["stitching"] is verdicts["gerbers up to date"] is Verdict.BAD
+
+
+def test_an_archive_is_read_back(tmp_path) -> None:
+    folder = tmp_path / "rev-b"
+    folder.mkdir()
+    assert build.fabrication_archive("rev-b", tmp_path) == {}
+    (folder / "rev-b-gerbers.zip").write_bytes(build.archive({"a.gbr": "one"}))
+    assert build.fabrication_archive("rev-b", tmp_path) == {"a.gbr": "one"}
+    with zipfile.ZipFile(folder / "rev-b-gerbers.zip") as kept:
+        assert kept.infolist()[0].date_time == (1980, 1, 1, 0, 0, 0)
+
+
+def test_pictures_are_rendered_and_shrunk(tmp_path, monkeypatch) -> None:
+    image = pytest.importorskip("PIL.Image", reason="Pillow is not installed")
+    monkeypatch.setattr(build, "PICTURES", tmp_path)
+    monkeypatch.setattr(kicad, "picture", lambda _, file, *__: image.new("RGB", (8, 8), "green").save(file))
+    board = tmp_path / "rev-b.kicad_pcb"
+    board.write_text("(kicad_pcb)", encoding="utf-8")
+    names = [path.name for path in pictures.board_pictures("rev-b", board)]
+    assert names == ["rev-b-top.png", "rev-b-bottom.png", "rev-b-view.png", "rev-b-bare.png"]
+    assert [path.name for path in pictures.board_pictures("lm317", board)] == ["lm317-top.png"]
+    monkeypatch.setattr(pictures.shutil, "which", lambda _: None)
+    assert pictures.schematic_pictures("rev-b") == []
+
+
+#: KiCad's own footprint for each of ours that has one, and what differs on purpose.
+TWINS = {
+    "SOIC16": "Package_SO/SOIC-16_3.9x9.9mm_P1.27mm", "SOT23": "Package_TO_SOT_SMD/SOT-23",
+    "HEADER_2X12": "Connector_PinHeader_2.54mm/PinHeader_2x12_P2.54mm_Vertical",
+    "HEADER_1X3": "Connector_PinHeader_2.54mm/PinHeader_1x03_P2.54mm_Vertical",
+    "R_0805": "Resistor_SMD/R_0805_2012Metric",
+}  # fmt: skip
+
+
+@needs_kicad
+@pytest.mark.parametrize("name", TWINS)
+def test_pads_stand_where_kicad_s_own_library_has_them(name: str) -> None:
+    from pathlib import Path
+
+    from hardware.pcb.sexp import children, parse, word
+
+    library, _, twin = TWINS[name].partition("/")
+    file = Path("/usr/share/kicad/footprints") / f"{library}.pretty" / f"{twin}.kicad_mod"
+    if not file.exists():
+        pytest.skip("KiCad's footprint library is not installed: pads are not compared")
+    theirs = {
+        word(pad): (float(word(children(pad, "at")[0])), float(word(children(pad, "at")[0], 2)))
+        for pad in children(parse(file.read_text(encoding="utf-8")), "pad")
+    }
+    for pad in FOOTPRINTS[name].pads:
+        assert pad.at_mm == pytest.approx(theirs[pad.number], abs=0.06), pad.number
