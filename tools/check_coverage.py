@@ -42,7 +42,7 @@ def main(path: str) -> int:
     for name in failed:
         lines = files[name]["missing_lines"]
         print(f"coverage: {name} at {percent(files, [name]):.1f} %, {CORE_PERCENT:.0f} % wanted; lines {lines}")
-    for package in ("p2os", "bluepill_sim", "adapter_sim", "testbench"):
+    for package in ("p2os", "bluepill_sim", "adapter_sim", "testbench", "hardware"):
         names = [name for name in files if name.startswith(f"{package}/")]
         figure = percent(files, names)
         print(f"coverage: {package} {figure:.1f} % of {len(names)} files")

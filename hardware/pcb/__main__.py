@@ -95,6 +95,8 @@ def _stitch(given: argparse.Namespace) -> int:
 def _simulate(_: argparse.Namespace) -> int:
     results = checks.simulations()
     print(table(results))
+    if all(result.verdict is Verdict.SKIPPED for result in results):
+        return 0
     for path in pictures.write_plots():
         print(f"{path.name}: {path.stat().st_size} bytes")
     return 1 if any(result.verdict is Verdict.BAD for result in results) else 0

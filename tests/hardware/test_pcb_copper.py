@@ -12,7 +12,16 @@ from hardware.pcb.footprints import FOOTPRINTS
 from hardware.pcb.netlist import DesignError, make
 from hardware.pcb.placement import Place, place, unturn
 from hardware.pcb.pours import kept_stitches, load_stitches, stitch_at, stitches_text
-from hardware.pcb.routing import RoutingError, antenna_area, load_routes, placed_pads, router_input, run_router, turn
+from hardware.pcb.routing import (
+    RoutingError,
+    antenna_area,
+    fingerprint,
+    load_routes,
+    placed_pads,
+    router_input,
+    run_router,
+    turn,
+)
 from hardware.pcb.sexp import node
 from hardware.pcb.shapes import PadKind
 
@@ -122,6 +131,31 @@ def test_the_router_finds_the_committed_result_again() -> None:
         pytest.skip("no C++ compiler: the router is not run")
     committed = (build.HERE / "routes" / "rev-b.txt").read_text(encoding="utf-8")
     assert run_router(design_of()) == committed
+
+
+COMPILER = """#!/bin/sh
+for word; do target=$word; done
+printf '#!/bin/sh\\ncat > /dev/null; echo T GND; exit %s\\n' "$ROUTER_CODE" > "$target"
+chmod +x "$target"
+exit "$COMPILER_CODE"
+"""
+
+
+@pytest.mark.parametrize(
+    ("codes", "message"), [(("0", "0"), None), (("1", "0"), "does not compile"), (("0", "1"), "found no way")]
+)
+def test_the_router_s_result_carries_the_hash_of_its_input(codes, message, tmp_path, monkeypatch) -> None:
+    compiler = tmp_path / "g++"
+    compiler.write_text(COMPILER, encoding="utf-8")
+    compiler.chmod(0o755)
+    monkeypatch.setenv("PATH", f"{tmp_path}:/usr/bin:/bin")
+    monkeypatch.setenv("COMPILER_CODE", codes[0])
+    monkeypatch.setenv("ROUTER_CODE", codes[1])
+    if message is None:
+        assert run_router(design_of()) == f"# input {fingerprint(design_of())}\nT GND\n"
+        return
+    with pytest.raises(RoutingError, match=message):
+        run_router(design_of())
 
 
 def test_without_a_compiler_the_router_says_what_to_install(monkeypatch) -> None:

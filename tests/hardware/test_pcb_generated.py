@@ -5,7 +5,7 @@ import io
 import xml.etree.ElementTree as ET
 
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from hardware.pcb import build, checks, gerbers, project
@@ -149,6 +149,7 @@ TREES = st.recursive(
 )
 
 
+@settings(max_examples=60, deadline=None)
 @given(st.lists(TREES, max_size=5))
 def test_what_is_rendered_is_read_back(items: list[object]) -> None:
     tree = ["root", *items]

@@ -134,6 +134,8 @@ def test_a_filled_project_is_a_copy_with_its_library(fake_kicad, tmp_path) -> No
 
 
 def test_board_checks_make_one_line_each(fake_kicad, monkeypatch) -> None:
+    monkeypatch.setattr(kicad_checks, "VARIANTS", ("lm317",))
+    monkeypatch.setattr(kicad_checks, "BOARD_VARIANTS", ("lm317",))
     monkeypatch.setattr(kicad, "drc", lambda _: [])
     monkeypatch.setattr(kicad, "erc", lambda _: [])
     monkeypatch.setattr(kicad, "netlist", lambda path: design_of(path.stem).nets())
@@ -167,6 +169,22 @@ def test_pictures_are_rendered_and_shrunk(tmp_path, monkeypatch) -> None:
     names = [path.name for path in pictures.board_pictures("rev-b", board)]
     assert names == ["rev-b-top.png", "rev-b-bottom.png", "rev-b-view.png", "rev-b-bare.png"]
     assert [path.name for path in pictures.board_pictures("lm317", board)] == ["lm317-top.png"]
+
+
+def test_schematic_pages_are_drawn_by_number(tmp_path, monkeypatch) -> None:
+    image = pytest.importorskip("PIL.Image", reason="Pillow is not installed")
+    pages = []
+
+    def pdftoppm(command: list[str], **_: object) -> None:
+        pages.append(command[command.index("-f") + 1])
+        image.new("RGB", (8, 8), "white").save(f"{command[-1]}.png")
+
+    monkeypatch.setattr(build, "PICTURES", tmp_path)
+    monkeypatch.setattr(kicad, "schematic_pdf", lambda *_: None)
+    monkeypatch.setattr(pictures.subprocess, "run", pdftoppm)
+    monkeypatch.setattr(pictures.shutil, "which", lambda _: "/usr/bin/pdftoppm")
+    names = [path.name for path in pictures.schematic_pictures("rev-c")]
+    assert (names, pages) == (["rev-c-serial.png", "rev-c-modules.png"], ["5", "2"])
     monkeypatch.setattr(pictures.shutil, "which", lambda _: None)
     assert pictures.schematic_pictures("rev-b") == []
 

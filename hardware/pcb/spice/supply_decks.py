@@ -41,8 +41,8 @@ Rload reg 0 25
         measures=("tran end find v(reg) at=11m", "tran top max v(reg)",
                   "tran up trig v(bat) val=6 rise=1 targ v(reg) val=4.75 rise=1"),
         limits=limits(("end", 4.9, 5.1, "V", "5 V after start"),
-                ("top", 4.9, 5.25, "V", "highest 5 V on the way"),
-                ("up", 0, 10e-3, "s", "time to 4.75 V")),
+                      ("top", 4.9, 5.25, "V", "highest 5 V on the way"),
+                      ("up", 0, 10e-3, "s", "time to 4.75 V")),
         traces=(("v(p12)", "+12V"), ("v(reg)", "5V_REG")), x_label="time, ms", y_label="V", x_scale=1e3,
         cannot_say=(
             "The module's true soft start is not in its data sheet: 2 ms is assumed, so only the absence of an "
@@ -78,8 +78,8 @@ Rload out 0 25
         measures=("tran end find v(out) at=59m", "tran top max v(out)",
                   "tran up trig v(bat) val=6 rise=1 targ v(out) val=4.75 rise=1"),
         limits=limits(("end", 4.75, 5.25, "V", "5 V after start"),
-                ("top", 4.75, 5.3, "V", "highest 5 V on the way"),
-                ("up", 0, 50e-3, "s", "time to 4.75 V (the ADJ capacitor makes it slow)")),
+                      ("top", 4.75, 5.3, "V", "highest 5 V on the way"),
+                      ("up", 0, 50e-3, "s", "time to 4.75 V (the ADJ capacitor makes it slow)")),
         traces=(("v(p12)", "+12V"), ("v(out)", "5 V"), ("v(adj)", "ADJ")), x_label="time, ms", y_label="V", x_scale=1e3,
         cannot_say="Loop stability with ceramic capacitors: the model is stable by construction.",
     )  # fmt: skip
@@ -101,8 +101,8 @@ Iload reg 0 PULSE(20m 500m 8m 1u 1u 2m 10m)
         name="step-buck", title="Load step 20 to 500 mA, rev B", circuit=circuit,
         measures=("tran low min v(reg)", "tran top max v(reg)", "tran settled find v(reg) at=9.9m"),
         limits=limits(("low", 4.75, 5.1, "V", "lowest 5 V"),
-                ("top", 4.9, 5.25, "V", "highest 5 V when the load goes"),
-                ("settled", 4.9, 5.1, "V", "5 V after 1.9 ms of load")),
+                      ("top", 4.9, 5.25, "V", "highest 5 V when the load goes"),
+                      ("settled", 4.9, 5.1, "V", "5 V after 1.9 ms of load")),
         traces=(("v(reg)", "5V_REG"),), x_label="time, ms", y_label="V", x_scale=1e3,
         cannot_say=(
             "Shape and ringing: the model's impedance is fitted to one figure of the data sheet (150 mV for half "
@@ -130,8 +130,8 @@ Iload out 0 PULSE(20m {LM317_LIMIT_MA:g}m 100m 1u 1u 2m 10m)
         name="step-lm317", title=f"Load step 20 to {LM317_LIMIT_MA:g} mA, variant lm317", circuit=circuit,
         measures=("tran low min v(out)", "tran top max v(out)", "tran settled find v(out) at=101.9m"),
         limits=limits(("low", 4.75, 5.1, "V", "lowest 5 V"),
-                ("top", 4.9, 5.25, "V", "highest 5 V when the load goes"),
-                ("settled", 4.85, 5.15, "V", "5 V after 1.9 ms of load")),
+                      ("top", 4.9, 5.25, "V", "highest 5 V when the load goes"),
+                      ("settled", 4.85, 5.15, "V", "5 V after 1.9 ms of load")),
         traces=(("v(out)", "5 V"),), x_label="time, ms", y_label="V", x_scale=1e3,
         cannot_say=(
             "Ringing and stability: the loop is not modelled; dips below a microsecond belong to the capacitors' "
@@ -161,8 +161,9 @@ Vcur cur 0 0
                   "dc thesis_1ma find v(thesis) at=1m",
                   "dc ours_end find v(ours) at=8m"),
         limits=limits(("ours_idle", 3.135, 3.465, "V", "ours without any load"),
-                ("ours_end", 3.135, 3.465, "V", "ours at 8 mA"),
-                ("thesis_1ma", 3.6, 12, "V", "the thesis's divider at 1 mA: above what a 3.3 V pin bears")),
+                      ("ours_end", 3.135, 3.465, "V", "ours at 8 mA"),
+                      ("thesis_idle", 3.6, 12, "V", "the thesis's divider without any load"),
+                      ("thesis_1ma", 3.6, 12, "V", "the thesis's divider at 1 mA: above what a 3.3 V pin bears")),
         traces=(("v(ours)", "120R / 200R (ours)"), ("v(thesis)", "3k3 / 5k1 (thesis)")),
         x_label="load, mA", y_label="V", x_scale=1e3,
         cannot_say=(
@@ -191,8 +192,8 @@ Rq q 0 1g
         name="inrush", title="Inrush when a full battery is connected (wire 0.7 uH, 0.08 ohm)", circuit=circuit,
         measures=("tran peak min i(vbat)", "tran i2t max v(q)", "tran top max v(p12)"),
         limits=limits(("peak", -60, 0, "A", "peak current (out of the battery: negative); the diode bears 80 A"),
-                ("i2t", 0, 0.5, "A2s", "energy: the fuse needs some 30 A2s to trip"),
-                ("top", 12, 24.4, "V", "highest +12V: below the suppressor's clamp")),
+                      ("i2t", 0, 0.5, "A2s", "energy: the fuse needs some 30 A2s to trip"),
+                      ("top", 12, 24.4, "V", "highest +12V: below the suppressor's clamp")),
         traces=(("-i(vbat)", "current, A"), ("v(p12)", "+12V, V")), x_label="time, us", y_label="A, V", x_scale=1e6,
         cannot_say="Contact bounce and the true battery: resistance and wire are assumed, a stiffer source gives more.",
     )  # fmt: skip
@@ -215,8 +216,8 @@ Rload p12 0 100
         name="reverse", title="Battery swept from -15 V (wrong way round) to +15 V", circuit=circuit,
         measures=("tran wrong find v(p12) at=0.02", "tran leak find i(vbat) at=0.02", "tran right find v(p12) at=2.98"),
         limits=limits(("wrong", -0.3, 0.1, "V", "+12V with -14.8 V at the input"),
-                ("leak", -1e-3, 1e-3, "A", "current that flows then"),
-                ("right", 13.8, 14.8, "V", "+12V with +14.8 V at the input")),
+                      ("leak", -1e-3, 1e-3, "A", "current that flows then"),
+                      ("right", 13.8, 14.8, "V", "+12V with +14.8 V at the input")),
         traces=(("v(bat)", "battery"), ("v(p12)", "+12V")), x_label="time, s", y_label="V",
         cannot_say="Hot leakage: a Schottky diode at 100 degrees leaks a hundred times more, still milliamperes.",
     )  # fmt: skip

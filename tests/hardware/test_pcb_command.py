@@ -1,0 +1,113 @@
+"""`python -m hardware.pcb`: what each verb says, writes and returns."""
+
+from pathlib import Path
+
+import pytest
+
+from hardware.pcb import __main__ as command
+from hardware.pcb import build, checks, kicad, pictures
+from hardware.pcb.report import Verdict, judged, skipped
+from hardware.pcb.routing import RoutingError
+
+RESULTS = [judged("ERC", "rev-b", True, "0 findings"), skipped("DRC", "rev-b", "KiCad 9 is not installed")]
+
+
+def test_check_prints_the_table_and_forgives_what_is_not_installed(capsys, monkeypatch) -> None:
+    monkeypatch.setattr(checks, "run_all", lambda: RESULTS)
+    assert command.main(["check"]) == 0
+    assert capsys.readouterr().out == (
+        "ok       ERC  rev-b  0 findings\nskipped  DRC  rev-b  KiCad 9 is not installed\n1 ok, 0 failed, 1 skipped\n"
+    )
+    assert command.main(["check", "--strict"]) == 1
+
+
+def test_check_fails_where_a_check_fails(monkeypatch) -> None:
+    monkeypatch.setattr(checks, "run_all", lambda: [judged("ERC", "rev-b", False, "1: error")])
+    assert command.main(["check"]) == 1
+
+
+def test_run_all_joins_the_three_kinds(monkeypatch) -> None:
+    monkeypatch.setattr(checks, "plain", lambda: RESULTS[:1])
+    monkeypatch.setattr(checks.kicad_checks, "with_kicad", lambda: RESULTS[1:])
+    monkeypatch.setattr(checks, "simulations", list)
+    assert checks.run_all() == RESULTS
+
+
+def test_build_without_kicad_renews_the_sources_and_says_what_stays(capsys, monkeypatch) -> None:
+    monkeypatch.setattr(build, "write_sources", lambda: ["rev-b/rev-b.kicad_pcb"])
+    monkeypatch.setattr(kicad, "version", lambda: None)
+    assert command.main(["build"]) == 0
+    out = capsys.readouterr().out
+    assert out.startswith("1 generated files renewed\nKiCad 9 is not installed: gerbers and pictures stay")
+
+
+def test_build_with_kicad_writes_the_archives_and_pictures(capsys, monkeypatch, tmp_path) -> None:
+    picture = tmp_path / "top.png"
+    picture.write_bytes(b"1234")
+    for variant in ("rev-b", "lm317"):
+        (tmp_path / variant).mkdir()
+    monkeypatch.setattr(build, "GENERATED", tmp_path)
+    monkeypatch.setattr(build, "write_sources", list)
+    monkeypatch.setattr(kicad, "version", lambda: "9.0.8")
+    monkeypatch.setattr(build, "filled_project", lambda variant, folder: Path(folder) / f"{variant}.kicad_pcb")
+    monkeypatch.setattr(build, "fabrication_files", lambda *_: {"a.gbr": "one"})
+    monkeypatch.setattr(pictures, "board_pictures", lambda *_: [picture])
+    monkeypatch.setattr(pictures, "schematic_pictures", lambda _: [picture])
+    assert command.main(["build"]) == 0
+    assert "rev-b-gerbers.zip: 1 files" in capsys.readouterr().out
+    assert (tmp_path / "lm317" / "lm317-gerbers.zip").read_bytes() == build.archive({"a.gbr": "one"})
+
+
+def test_route_and_stitch_write_their_data(capsys, monkeypatch, tmp_path) -> None:
+    for folder in ("routes", "stitches"):
+        (tmp_path / folder).mkdir()
+    monkeypatch.setattr(command, "HERE", tmp_path)
+    monkeypatch.setattr(command, "run_router", lambda _: "# input 0\nT GND\nT GND\nV GND\n")
+    monkeypatch.setattr(command, "stitches_of", lambda _: "1,2\n3,4\n")
+    assert command.main(["route", "rev-b"]) == 0
+    assert command.main(["stitch"]) == 0
+    out = capsys.readouterr().out.splitlines()
+    assert out == ["routes/rev-b.txt: 2 tracks, 1 vias", "stitches/rev-b.txt: 2 stitching vias",
+                   "stitches/lm317.txt: 2 stitching vias"]  # fmt: skip
+    assert (tmp_path / "stitches" / "lm317.txt").read_text(encoding="utf-8") == "1,2\n3,4\n"
+
+
+def test_simulate_prints_figures_and_renews_plots(capsys, monkeypatch, tmp_path) -> None:
+    plot = tmp_path / "sim-reset.png"
+    plot.write_bytes(b"12")
+    monkeypatch.setattr(checks, "simulations", lambda: [judged("simulation", "reset", True, "en_low 0.1 V")])
+    monkeypatch.setattr(pictures, "write_plots", lambda: [plot])
+    assert command.main(["simulate"]) == 0
+    assert "sim-reset.png: 2 bytes" in capsys.readouterr().out
+
+
+def test_simulate_without_ngspice_says_so_and_draws_nothing(capsys, monkeypatch) -> None:
+    monkeypatch.setattr(checks, "simulations", lambda: [skipped("simulation", "all", "ngspice is not installed")])
+    monkeypatch.setattr(pictures, "write_plots", lambda: pytest.fail("no plots without a simulator"))
+    assert command.main(["simulate"]) == 0
+    assert "ngspice is not installed" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize("words", [["route", "rev-c"], ["stitch", "nonsense"]])
+def test_a_variant_without_a_board_is_one_line(words: list[str], capsys) -> None:
+    assert command.main(words) == 1
+    assert "has no board (one of rev-b, lm317)" in capsys.readouterr().err
+
+
+def test_an_error_is_one_line_and_no_traceback(capsys, monkeypatch) -> None:
+    def broken() -> list[str]:
+        raise RoutingError("routes of rev-b were made for another placement")
+
+    monkeypatch.setattr(build, "write_sources", broken)
+    assert command.main(["build"]) == 1
+    assert capsys.readouterr().err == "board: routes of rev-b were made for another placement\n"
+
+
+def test_a_missing_verb_is_wrong_usage() -> None:
+    with pytest.raises(SystemExit) as stop:
+        command.main([])
+    assert stop.value.code == 2
+
+
+def test_verdicts_are_the_words_of_the_table() -> None:
+    assert [str(verdict) for verdict in Verdict] == ["ok", "FAIL", "skipped"]

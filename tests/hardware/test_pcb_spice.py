@@ -1,0 +1,123 @@
+"""The circuit simulations: every figure within its limits (with ngspice), and how decks are read (everywhere)."""
+
+import dataclasses
+import sys
+
+import pytest
+
+from hardware.pcb import checks
+from hardware.pcb.report import Verdict
+from hardware.pcb.spice import run
+from hardware.pcb.spice.deck import Deck, limits
+from hardware.pcb.spice.decks import decks
+
+needs_ngspice = pytest.mark.skipif(
+    not run.is_installed(), reason="ngspice is not installed: the circuits are not simulated (hint: make board)"
+)
+DECKS = {deck.name: deck for deck in decks()}
+
+
+@needs_ngspice
+@pytest.mark.parametrize("name", DECKS)
+def test_every_figure_is_within_its_limits(name: str) -> None:
+    result = run.simulate(DECKS[name])
+    outside = [f"{limit.measure} {value:g} {limit.unit}" for limit, value, good in result.verdicts() if not good]
+    assert outside == []
+    assert all(len(column) == len(result.columns[0]) > 10 for column in result.columns)
+
+
+@needs_ngspice
+def test_a_wrong_reset_transistor_would_be_noticed() -> None:
+    # The thesis's resistor in the emitter: EN no longer gets below the threshold.
+    deck = DECKS["reset"]
+    circuit = deck.circuit.replace("Q1 en b 0 BC817", "Q1 en b e1 BC817\nRe1 e1 0 2.2k")
+    assert circuit != deck.circuit
+    weak = dataclasses.replace(deck, circuit=circuit, measures=deck.measures[:1], limits=deck.limits[:1])
+    assert [good for *_, good in run.simulate(weak).verdicts()] == [False]
+
+
+@needs_ngspice
+def test_a_reversed_input_without_its_diode_would_be_noticed() -> None:
+    deck = DECKS["reverse"]
+    bridged = dataclasses.replace(deck, circuit=deck.circuit.replace("D1 a p12 B340A", "R9 a p12 0.01"))
+    failed = {limit.measure for limit, _, good in run.simulate(bridged).verdicts() if not good}
+    assert {"wrong", "leak"} <= failed
+
+
+def test_every_deck_says_what_it_cannot_say_and_limits_what_it_measures() -> None:
+    assert len(DECKS) == len(decks()) == 14
+    for deck in DECKS.values():
+        assert deck.cannot_say.endswith("."), deck.name
+        measured = {measure.split()[1] for measure in deck.measures}
+        assert {limit.measure for limit in deck.limits} == measured, deck.name
+        assert all(limit.low < limit.high for limit in deck.limits), deck.name
+
+
+def test_a_deck_is_written_with_its_measures_and_traces(tmp_path) -> None:
+    text = run.deck_text(DECKS["reset"], tmp_path / "traces.txt")
+    assert text.startswith("* Reset: level at the ESP32's EN\n")
+    assert "meas tran en_low min v(en)\n" in text
+    assert f"wrdata {tmp_path}/traces.txt v(pin) v(en) v(en2)\nquit\n.endc\n.end\n" in text
+
+
+DECK = Deck(name="d", title="t", circuit="R1 a 0 1", measures=("dc top max v(a)",), x_label="x", y_label="y",
+            limits=limits(("top", 1.0, 2.0, "V", "m")), traces=(("v(a)", "a"),), cannot_say="Nothing.")  # fmt: skip
+
+
+@pytest.fixture
+def fake_ngspice(tmp_path, monkeypatch):
+    """Put a stand-in in ngspice's place, which prints the given words and writes two rows of traces."""
+
+    def install(words: str, traces: str = "0 1.5\\n1 1.75\\n") -> None:
+        program = tmp_path / "ngspice"
+        program.write_text(
+            f"#!{sys.executable}\nimport sys, re\ndeck = open(sys.argv[2]).read()\nprint({words!r})\n"
+            f"open(re.search('wrdata (\\\\S+)', deck)[1], 'w').write('{traces}')\n",
+            encoding="utf-8",
+        )
+        program.chmod(0o755)
+        monkeypatch.setenv("PATH", str(tmp_path))
+
+    return install
+
+
+def test_figures_and_traces_are_read_back(fake_ngspice) -> None:
+    fake_ngspice("top                 =  1.75e+00 at= 1")
+    result = run.simulate(DECK)
+    assert (result.figures, result.columns) == ({"top": 1.75}, [[0.0, 1.0], [1.5, 1.75]])
+    assert [good for *_, good in result.verdicts()] == [True]
+
+
+def test_a_missing_figure_quotes_the_simulator(fake_ngspice) -> None:
+    fake_ngspice("Error: no such vector")
+    with pytest.raises(run.SimulationError, match=r"d: no figure for top\nError: no such vector"):
+        run.simulate(DECK)
+
+
+def test_checks_of_decks_pass_and_fail_by_their_limits(fake_ngspice, monkeypatch) -> None:
+    fake_ngspice("top = 1.75")
+    low = dataclasses.replace(DECK, limits=limits(("top", 1.8, 2.0, "V", "m")))
+    monkeypatch.setattr(checks, "decks", lambda: (DECK, low))
+    results = checks.simulations()
+    assert [result.verdict for result in results] == [Verdict.GOOD, Verdict.BAD]
+    assert results[0].detail == "top 1.75 V"
+
+
+def test_without_ngspice_it_is_said_and_skipped(monkeypatch, tmp_path) -> None:
+    monkeypatch.setenv("PATH", str(tmp_path))
+    with pytest.raises(run.NgspiceMissingError, match="not installed"):
+        run.simulate(DECK)
+    (result,) = checks.simulations()
+    assert result.verdict is Verdict.SKIPPED
+
+
+def test_a_plot_is_drawn_for_each_deck(fake_ngspice, monkeypatch, tmp_path) -> None:
+    pytest.importorskip("matplotlib", reason="matplotlib is not installed")
+    from hardware.pcb import build, pictures
+
+    fake_ngspice("top = 1.75")
+    monkeypatch.setattr(pictures, "decks", lambda: (DECK,))
+    monkeypatch.setattr(build, "PICTURES", tmp_path / "pictures")
+    (file,) = pictures.write_plots()
+    assert file.name == "sim-d.png"
+    assert file.read_bytes().startswith(b"\x89PNG")
