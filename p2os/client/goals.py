@@ -39,8 +39,8 @@ SEND_ON_LIMIT = 3
 STALL_LIMIT_NS: Nanos = 1 * NS_PER_S
 #: HEAD is repeated so often, like any speed.
 REPEAT_NS: Nanos = 200 * NS_PER_MS
-#: chosen: beyond twice the time that the limits allow.
-GRACE_NS: Nanos = 5 * NS_PER_S
+#: chosen: beyond twice the time that the limits allow: AMRISim creeps for 7 s up to its goal.
+GRACE_NS: Nanos = 10 * NS_PER_S
 
 
 @dataclass(frozen=True, slots=True)

@@ -181,7 +181,7 @@ class Robot(RobotCalls):
         Args:
             distance_m: Metres, negative backwards.
             speed_mps: The most for this way; None: the robot's limit.
-            timeout_s: Give up after so long; None: twice what the limits allow, and 5 s.
+            timeout_s: Give up after so long; None: twice what the limits allow, and 10 s.
 
         Raises:
             MotionError: it stalled, stood short of its goal, or took too long; it was stopped.
