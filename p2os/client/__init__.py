@@ -19,11 +19,12 @@ from p2os.client.notices import (
     MotionEnded,
     MotorsDisabled,
     Notice,
+    OdometryDoubtful,
     PacketArrived,
     ReconnectPlanned,
     RobotUnknown,
 )
-from p2os.client.problems import ConnectError, LinkLostError, MotionError, MotorsDisabledError
+from p2os.client.problems import ConnectError, LinkLostError, MotionError, MotorsDisabledError, NoAnswerError
 from p2os.client.robot import Robot
 from p2os.client.settings import ClientSettings
 from p2os.client.snapshots import Limits, Link, Pose, RobotState, SonarEcho
@@ -49,7 +50,9 @@ __all__ = [
     "MotionResult",
     "MotorsDisabled",
     "MotorsDisabledError",
+    "NoAnswerError",
     "Notice",
+    "OdometryDoubtful",
     "PacketArrived",
     "Pose",
     "ReconnectPlanned",

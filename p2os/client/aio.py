@@ -17,20 +17,19 @@ from collections.abc import AsyncIterator, Callable
 from types import TracebackType
 from typing import Self
 
-from p2os.client.aux_port import AuxBuffer
+from p2os.client.aux_async import AsyncAux
 from p2os.client.calls import Result, RobotCalls
 from p2os.client.core import RobotCore
 from p2os.client.engine import BLIND_POLL_S, CLOSING_S, MOST_NOTICES, SIGN_OF_LIFE_S, Opener
 from p2os.client.goals import Axis, DriveAxis, MotionResult, TurnAxis
 from p2os.client.line import Line
-from p2os.client.notices import Notice, PacketArrived
-from p2os.client.opening import core_for, motion_result, not_connected
+from p2os.client.notices import Notice
+from p2os.client.opening import core_for, motion_result, no_answer, not_connected
+from p2os.client.requests import PacketType, request_for
 from p2os.client.settings import ClientSettings
 from p2os.client.snapshots import Link, RobotState
 from p2os.errors import P2osError, TransportError
-from p2os.packets import packet_frame
 from p2os.parameters import RobotParameters
-from p2os.profiles import Profile
 from p2os.timing import NS_PER_S, Nanos
 from p2os.transport import open_url
 from p2os.transport.ports import Transport
@@ -127,6 +126,17 @@ class Robot(RobotCalls):
             raise not_connected(self._core)
         return state
 
+    async def fetch(self, kind: type[PacketType], timeout_s: float = 1.0) -> PacketType:
+        """Ask the robot for a packet of a type, and return it; otherwise as `p2os.Robot.fetch`."""
+        before = self._core.newest(kind)
+        self.send(request_for(kind))
+        if not await self._wait_for(lambda core: core.newest(kind) is not before, timeout_s):
+            raise no_answer(self._core, kind, timeout_s)
+        packet = self._core.newest(kind)
+        if packet is None:
+            raise not_connected(self._core)
+        return packet
+
     async def wait_open(self, timeout_s: float | None = None) -> None:
         """Wait until the session is open again after a loss.
 
@@ -210,30 +220,9 @@ class Robot(RobotCalls):
 
     # The robot's own serial ports ---------------------------------------------------------
 
-    def write_aux(self, data: bytes, port: int = 1) -> None:
-        """Pass bytes on to a device on the robot (TTY2)."""
-        for command in AuxBuffer(port).writing(data):
-            self.send(command)
-
-    async def read_aux(self, size: int, port: int = 1, timeout_s: float = 1.0) -> bytes:
-        """Ask for `size` bytes of a device on the robot (GETAUX, at most 200); return those that came in time."""
-        buffer = AuxBuffer(port)
-
-        def take(notice: Notice) -> None:
-            if isinstance(notice, PacketArrived):
-                frame = packet_frame(notice.packet, Profile.P2OS)
-                if frame.kind == buffer.numbers.packet:
-                    buffer.take(frame.data)
-
-        end = self.on_event(take)
-        try:
-            command = buffer.asking(size)
-            if command is not None:
-                self.send(command)
-            await self._wait_for(lambda _: len(buffer) >= size, timeout_s)
-        finally:
-            end()
-        return buffer.read(size)
+    def aux(self, port: int = 1) -> AsyncAux:
+        """Return one of the robot's own serial ports, as a file of bytes whose calls are awaited."""
+        return AsyncAux(port, send=self.send, listen=self.on_event, wait_for=self._wait_for)
 
     # The loop -----------------------------------------------------------------------------
 

@@ -8,8 +8,10 @@ have come; GETAUX 0 empties its buffer (Pioneer 3 manual, commands 42, 43, 60,
 from collections.abc import Mapping
 from dataclasses import dataclass
 
+from p2os.client.notices import Notice, PacketArrived
 from p2os.commands import Command, CommandNumber
 from p2os.errors import UsageError
+from p2os.packets import SerauxPacket
 
 #: The most bytes that one GETAUX may ask for, and that one TTY2 carries here.
 MOST_WANTED, MOST_WRITTEN = 200, 190
@@ -17,17 +19,16 @@ MOST_WANTED, MOST_WRITTEN = 200, 190
 
 @dataclass(frozen=True, slots=True)
 class AuxNumbers:
-    """The commands of one port, and the packet that answers."""
+    """The commands of one port."""
 
     write: CommandNumber
     ask: CommandNumber
-    packet: int
 
 
 AUX_PORTS: Mapping[int, AuxNumbers] = {
-    1: AuxNumbers(CommandNumber.TTY2, CommandNumber.GETAUX, 0xB0),
-    2: AuxNumbers(CommandNumber.TTY3, CommandNumber.GETAUX2, 0xB8),
-    3: AuxNumbers(CommandNumber.TTY4, CommandNumber.GETAUX3, 0xC8),
+    1: AuxNumbers(CommandNumber.TTY2, CommandNumber.GETAUX),
+    2: AuxNumbers(CommandNumber.TTY3, CommandNumber.GETAUX2),
+    3: AuxNumbers(CommandNumber.TTY4, CommandNumber.GETAUX3),
 }
 
 
@@ -37,6 +38,7 @@ class AuxBuffer:
     def __init__(self, port: int) -> None:
         if port not in AUX_PORTS:
             raise UsageError(f"the robot has no AUX port {port}", hint="1, 2 or 3")
+        self.port = port
         self.numbers = AUX_PORTS[port]
         self._data = bytearray()
         self._asked = 0
@@ -69,6 +71,12 @@ class AuxBuffer:
         self._data.clear()
         self._asked = 0
         return Command(self.numbers.ask, 0)
+
+    def notice(self, notice: Notice) -> None:
+        """Take what belongs to this port of the client's notices."""
+        packet = notice.packet if isinstance(notice, PacketArrived) else None
+        if isinstance(packet, SerauxPacket) and packet.port == self.port:
+            self.take(packet.data)
 
     def take(self, data: bytes) -> None:
         """Take the bytes of a SERAUXpac."""

@@ -4,9 +4,7 @@ import io
 
 from p2os.client.aux_port import AuxBuffer
 from p2os.client.engine import Engine
-from p2os.client.notices import Notice, PacketArrived
-from p2os.packets import packet_frame
-from p2os.profiles import Profile
+from p2os.client.notices import Notice
 
 #: chosen: a GETAUX whose answer has not come for so long is sent again; it may have been lost.
 ASK_AGAIN_S = 1.0
@@ -85,10 +83,6 @@ class AuxStream(io.RawIOBase):
                 left_s = left_s if left_s is None or not again else left_s - step_s
 
     def _take(self, notice: Notice) -> None:
-        if not isinstance(notice, PacketArrived):
-            return
-        frame = packet_frame(notice.packet, Profile.P2OS)  # no standard SIP comes as a notice, so any family will do
-        if frame.kind == self._buffer.numbers.packet:
-            with self._engine.changed:
-                self._buffer.take(frame.data)
-                self._engine.changed.notify_all()
+        with self._engine.changed:
+            self._buffer.notice(notice)
+            self._engine.changed.notify_all()

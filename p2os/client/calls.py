@@ -13,6 +13,7 @@ from typing import TypeVar
 from p2os.client.core import RobotCore
 from p2os.client.gripper import Gripper
 from p2os.client.problems import LinkLostError
+from p2os.client.requests import PacketType
 from p2os.client.snapshots import Limits, Link, Pose, RobotState
 from p2os.commands import Command, CommandNumber, sonar
 from p2os.config_packet import ConfigPacket
@@ -102,6 +103,13 @@ class RobotCalls(ABC):
     def stats(self) -> ConnectionStats:
         """Counters of the present connection: frames, noise, bad checksums, time-outs."""
         return self._run(lambda core, _: core.stats)
+
+    def newest(self, kind: type[PacketType]) -> PacketType | None:
+        """Return the last packet of a type of `p2os.packets` that came in this session, or None.
+
+        Standard packets are `state.sip`, the configuration is `config`.
+        """
+        return self._run(lambda core, _: core.newest(kind))
 
     # Motion -------------------------------------------------------------------------------
 

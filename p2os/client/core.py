@@ -19,10 +19,20 @@ from collections.abc import Callable
 
 from p2os.client.goals import Axis, Goal
 from p2os.client.mover import Mover
-from p2os.client.notices import ConfigurationKnown, Connected, GaveUp, LinkLost, Notice, RobotUnknown
+from p2os.client.notices import (
+    ConfigurationKnown,
+    Connected,
+    GaveUp,
+    LinkLost,
+    Notice,
+    OdometryDoubtful,
+    PacketArrived,
+    RobotUnknown,
+)
 from p2os.client.observer import Observer, bumpers_of, limits_of
 from p2os.client.outbox import Action
 from p2os.client.problems import LinkLostError
+from p2os.client.requests import PacketType
 from p2os.client.session import Session
 from p2os.client.settings import ClientSettings
 from p2os.client.snapshots import Limits, Link, Pose, RobotState
@@ -31,7 +41,7 @@ from p2os.commands import Command
 from p2os.config_packet import ConfigPacket
 from p2os.connection import ConnectionStats
 from p2os.errors import UsageError
-from p2os.packets import Identity
+from p2os.packets import Identity, ServerPacket
 from p2os.parameters import ParametersError, RobotParameters, load_parameters
 from p2os.profiles import Profile
 from p2os.sip import StandardSip
@@ -69,6 +79,7 @@ class RobotCore:
             settings, self._observer, send=self._session.send, drop=self._session.drop, tell=self.news.append
         )
         self._now: Nanos = 0
+        self._packets: dict[type, ServerPacket] = {}
         self._unseen_loss: str | None = None
 
     # What is known ------------------------------------------------------------------------
@@ -117,6 +128,11 @@ class RobotCore:
     def limits(self) -> Limits:
         """How fast the robot may go: its own limits, and those that were set in this session."""
         return self._mover.limits(limits_of(self.parameters, self.config))
+
+    def newest(self, kind: type[PacketType]) -> PacketType | None:
+        """Return the last packet of a type that came in this session; standard packets are `state.sip`."""
+        packet = self._packets.get(kind)
+        return packet if isinstance(packet, kind) else None
 
     @property
     def stats(self) -> ConnectionStats:
@@ -297,6 +313,8 @@ class RobotCore:
                     self._mover.lose(now)
                 case GaveUp():
                     self.problem = item
+                case PacketArrived():
+                    self._packets[type(item.packet)] = item.packet
                 case _:
                     pass
             self.news.append(item)
@@ -309,6 +327,7 @@ class RobotCore:
             except ParametersError:
                 parameters = self._load(STAND_IN)
                 self.news.append(RobotUnknown(identity.subclass, STAND_IN))
+        self._packets.clear()
         self._observer.new_session(parameters)
         self._observer.profile = self.settings.profile or guess_profile(identity.subclass)
         self._session.set_profile(self._observer.profile)
@@ -321,6 +340,8 @@ class RobotCore:
             sip = StandardSip.from_frame(sip.to_frame(self._session.profile), Profile.ARCOS)
             self._session.set_profile(Profile.ARCOS)
         state = self._observer.take(sip, now)
+        if (gap_ns := self._observer.doubtful_gap_ns(self.limits)) is not None:
+            self.news.append(OdometryDoubtful(gap_ns))
         self.news.append(state)
         self._mover.take(state, now)
 

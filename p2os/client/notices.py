@@ -110,6 +110,16 @@ class RobotUnknown:
 
 
 @dataclass(frozen=True, slots=True)
+class OdometryDoubtful:
+    """Packets came so far apart that the robot could have gone half of a counter's span, or turned half round.
+
+    The pose took the shortest step that fits, and may be wrong by whole spans.
+    """
+
+    gap_ns: Nanos
+
+
+@dataclass(frozen=True, slots=True)
 class PacketArrived:
     """A packet that is no standard SIP."""
 
@@ -129,5 +139,6 @@ Notice = (
     | BaudRaised
     | BaudKept
     | RobotUnknown
+    | OdometryDoubtful
     | PacketArrived
 )

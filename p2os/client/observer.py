@@ -6,10 +6,11 @@ from dataclasses import dataclass
 from p2os.client.pose import PoseKeeper
 from p2os.client.snapshots import Limits, Pose, RobotState, SonarEcho
 from p2os.config_packet import AROS_1_6_FIELDS, ConfigPacket
+from p2os.odometry import POSITION_MODULUS
 from p2os.parameters import RobotParameters
 from p2os.profiles import Profile
 from p2os.sip import StandardSip
-from p2os.timing import Nanos
+from p2os.timing import NS_PER_S, Nanos
 from p2os.units import in_units
 
 #: Flag bits of AROS and ARCOS packets (Pioneer 2/3 H8 manual, FLAGS): motors, STOP button.
@@ -48,6 +49,16 @@ class Observer:
         """The robot's own heading, as HEAD means it; radians, unwrapped."""
         return self._pose.robot_heading_rad
 
+    def doubtful_gap_ns(self, limits: Limits) -> Nanos | None:
+        """Return the time between the last two packets, if the odometry's counters may have wrapped in it unseen.
+
+        That is so when the robot, at its limits, could have driven half of the position's span or turned half round.
+        """
+        gap_s = self._pose.gap_ns / NS_PER_S
+        half_span_m = POSITION_MODULUS // 2 * self.parameters.distance_conv_mm / 1000
+        is_doubtful = gap_s * limits.forward_mps >= half_span_m or gap_s * limits.turn_radps >= math.pi
+        return self._pose.gap_ns if is_doubtful else None
+
     @property
     def wheels_mps(self) -> tuple[float, float]:
         """Left and right wheel in the last packet, m/s."""
@@ -75,7 +86,7 @@ class Observer:
         self.state = RobotState(
             number=self._number,
             at_ns=now,
-            pose=self._pose.take(sip, parameters),
+            pose=self._pose.take(sip, parameters, now),
             forward_mps=(units.left_mps + units.right_mps) / 2,
             turn_radps=units.turn_radps,
             left_mps=units.left_mps,

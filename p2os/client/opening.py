@@ -3,7 +3,7 @@
 from p2os.client.core import RobotCore
 from p2os.client.goals import Goal, MotionResult
 from p2os.client.notices import GaveUp
-from p2os.client.problems import ConnectError, LinkLostError, MotionError
+from p2os.client.problems import ConnectError, LinkLostError, MotionError, NoAnswerError
 from p2os.client.settings import ClientSettings
 from p2os.client.snapshots import Link
 from p2os.errors import TransportError
@@ -41,6 +41,13 @@ def not_connected(core: RobotCore) -> TransportError:
         return ConnectError(problem.reason, hint=problem.hint)
     reason = f": {problem.reason}" if problem is not None else ""
     return LinkLostError(f"no packet comes ({core.link.value}){reason}", hint="is the robot on, and the cable in?")
+
+
+def no_answer(core: RobotCore, kind: type, timeout_s: float) -> TransportError:
+    """Return the error of a request that nothing answered."""
+    if core.link is not Link.OPEN:
+        return not_connected(core)
+    return NoAnswerError(f"no {kind.__name__} within {timeout_s:g} s", hint="does this robot have the device?")
 
 
 def motion_result(goal: Goal, core: RobotCore) -> MotionResult:

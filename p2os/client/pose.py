@@ -12,12 +12,10 @@ import math
 from dataclasses import dataclass
 
 from p2os.client.snapshots import Pose
-from p2os.odometry import Unwrapper
+from p2os.odometry import POSITION_MODULUS, Odometry
 from p2os.parameters import RobotParameters
-from p2os.sip import POSITION_MASK, StandardSip
-
-#: Headings are 4096 counts to the turn, sent as 16 signed bits (Pioneer 2/3 manuals, standard SIP).
-HEADING_COUNTS = 4096
+from p2os.sip import StandardSip
+from p2os.timing import Nanos
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,18 +34,14 @@ class PoseKeeper:
         self.pose = Pose()
         #: The robot's heading as its HEAD command means it, radians, unwrapped.
         self.robot_heading_rad = 0.0
+        #: Between the last two packets of this session.
+        self.gap_ns: Nanos = 0
         self._anchor: tuple[Pose, RobotCounts] | None = None
-        self._begin()
-
-    def _begin(self) -> None:
-        self._x, self._y = Unwrapper(POSITION_MASK + 1), Unwrapper(POSITION_MASK + 1)
-        self._heading = Unwrapper(HEADING_COUNTS)
-        self._first: tuple[int, int, int] | None = None
+        self._odometry: Odometry | None = None
 
     def new_session(self) -> None:
         """Hold the pose until the next packet, which is taken to show the same place."""
-        self._begin()
-        self._anchor = None
+        self._anchor = self._odometry = None
 
     def place(self, pose: Pose) -> None:
         """Say where the robot is."""
@@ -55,27 +49,28 @@ class PoseKeeper:
         if self._anchor is not None:
             self._anchor = (pose, self._counts_now)
 
-    def take(self, sip: StandardSip, parameters: RobotParameters) -> Pose:
+    def take(self, sip: StandardSip, parameters: RobotParameters, now: Nanos) -> Pose:
         """Follow the robot to the place that a packet tells, and return it."""
-        raw = (sip.raw_x & POSITION_MASK, sip.raw_y & POSITION_MASK, sip.raw_heading)
-        if self._first is None:
+        if self._odometry is None:
+            self._odometry = Odometry(parameters)
             # Positions begin near zero; one of the upper half is a small step backwards.
-            half = (POSITION_MASK + 1) // 2
-            self._first = ((raw[0] + half) % (2 * half) - half, (raw[1] + half) % (2 * half) - half,
-                           (raw[2] + HEADING_COUNTS // 2) % HEADING_COUNTS - HEADING_COUNTS // 2)  # fmt: skip
-        for unwrapper, value in zip((self._x, self._y, self._heading), raw, strict=True):
-            unwrapper.update(value)
+            turn = parameters.angle_counts_per_turn
+            self._first = (_signed(sip.raw_x, POSITION_MODULUS), _signed(sip.raw_y, POSITION_MODULUS),
+                           _signed(sip.raw_heading, turn))  # fmt: skip
+        self.gap_ns = self._odometry.update(sip, now).gap_ns
+        x, y, heading = (first + way for first, way in zip(self._first, self._odometry.counts, strict=True))
         distance = parameters.distance_conv_mm / 1000
-        self._counts_now = RobotCounts(
-            x_m=(self._first[0] + self._x.total) * distance,
-            y_m=(self._first[1] + self._y.total) * distance,
-            heading_rad=(self._first[2] + self._heading.total) * parameters.angle_conv_rad,
-        )
+        self._counts_now = RobotCounts(x * distance, y * distance, heading * parameters.angle_conv_rad)
         self.robot_heading_rad = self._counts_now.heading_rad
         if self._anchor is None:
             self._anchor = (self.pose, self._counts_now)
         self.pose = _moved(*self._anchor, self._counts_now)
         return self.pose
+
+
+def _signed(raw: int, modulus: int) -> int:
+    half = modulus // 2
+    return (raw + half) % modulus - half
 
 
 def _moved(start: Pose, then: RobotCounts, now: RobotCounts) -> Pose:

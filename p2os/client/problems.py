@@ -14,6 +14,10 @@ class LinkLostError(TransportError):
     """The session is gone, or was gone since the last motion call; the robot was told to stop."""
 
 
+class NoAnswerError(TransportError):
+    """The robot did not answer a request in time; it may not have what was asked for."""
+
+
 class MotorsDisabledError(LocalProtocolError):
     """The motors are off, and this client does not switch them on by itself."""
 

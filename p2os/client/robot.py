@@ -20,7 +20,8 @@ from p2os.client.core import RobotCore
 from p2os.client.engine import Engine, Opener
 from p2os.client.goals import Axis, DriveAxis, MotionResult, TurnAxis
 from p2os.client.notices import Notice
-from p2os.client.opening import core_for, motion_result, not_connected
+from p2os.client.opening import core_for, motion_result, no_answer, not_connected
+from p2os.client.requests import PacketType, request_for
 from p2os.client.settings import ClientSettings
 from p2os.client.snapshots import Link, RobotState
 from p2os.parameters import RobotParameters
@@ -120,6 +121,29 @@ class Robot(RobotCalls):
             if state is None or state is before:
                 raise not_connected(engine.core)
             return state
+
+    def fetch(self, kind: type[PacketType], timeout_s: float = 1.0) -> PacketType:
+        """Ask the robot for a packet of a type, and return it.
+
+        Args:
+            kind: Such as `IoPacket` or `EncoderPacket` of `p2os.packets`.
+            timeout_s: How long it may take.
+
+        Raises:
+            NoAnswerError: None came in time; not every robot has every device.
+            LinkLostError: No session is open.
+            UsageError: Nothing asks for such a packet.
+        """
+        request, engine = request_for(kind), self._engine
+        with engine.changed:
+            before = engine.core.newest(kind)
+            self.send(request)
+            if not engine.wait_for(lambda core: core.newest(kind) is not before, timeout_s):
+                raise no_answer(engine.core, kind, timeout_s)
+            packet = engine.core.newest(kind)
+        if packet is None:
+            raise not_connected(engine.core)
+        return packet
 
     def wait_open(self, timeout_s: float | None = None) -> None:
         """Wait until the session is open again after a loss.

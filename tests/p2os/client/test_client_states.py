@@ -103,11 +103,11 @@ def test_limits_are_the_configurations_below_the_models() -> None:
 def test_the_pose_follows_any_step_up_to_half_of_a_counter(steps: list[tuple[int, int, int]]) -> None:
     keeper = PoseKeeper()
     x = y = heading = 0
-    pose = keeper.take(StandardSip(), P2DX)
+    pose = keeper.take(StandardSip(), P2DX, 0)
     for dx, dy, turn in steps:
         x, y, heading = x + dx, y + dy, heading + turn
         raw = (heading + 2048) % 4096 - 2048
-        pose = keeper.take(StandardSip(raw_x=x & 0x7FFF, raw_y=y & 0x7FFF, raw_heading=raw), P2DX)
+        pose = keeper.take(StandardSip(raw_x=x & 0x7FFF, raw_y=y & 0x7FFF, raw_heading=raw), P2DX, 0)
     assert pose.x_m == pytest.approx(x * 0.00084)
     assert pose.y_m == pytest.approx(y * 0.00084)
     assert pose.heading_rad == pytest.approx(heading * 2 * math.pi / 4096)
@@ -116,22 +116,22 @@ def test_the_pose_follows_any_step_up_to_half_of_a_counter(steps: list[tuple[int
 def test_the_heading_does_not_drift_over_ten_thousand_turns() -> None:
     keeper = PoseKeeper()
     for step in range(4 * 10_000 + 1):
-        pose = keeper.take(StandardSip(raw_heading=step * 1024 % 4096 - 2048), P2DX)
+        pose = keeper.take(StandardSip(raw_heading=step * 1024 % 4096 - 2048), P2DX, 0)
     assert pose.heading_rad == pytest.approx(10_000 * 2 * math.pi, abs=1e-9)
 
 
 def test_a_pose_goes_on_over_sessions_and_places() -> None:
     keeper = PoseKeeper()
-    keeper.take(StandardSip(), P2DX)
-    keeper.take(StandardSip(raw_x=1000, raw_heading=1024), P2DX)
+    keeper.take(StandardSip(), P2DX, 0)
+    keeper.take(StandardSip(raw_x=1000, raw_heading=1024), P2DX, 0)
     keeper.new_session()
-    keeper.take(StandardSip(), P2DX)
-    pose = keeper.take(StandardSip(raw_x=500), P2DX)
+    keeper.take(StandardSip(), P2DX, 0)
+    pose = keeper.take(StandardSip(raw_x=500), P2DX, 0)
     # The robot stood at 0.84 m looking left; its new odometry calls that ahead.
     assert (pose.x_m, pose.y_m) == pytest.approx((0.84, 0.42))
     assert pose.heading_rad == pytest.approx(math.pi / 2)
     keeper.place(Pose(10.0, 0.0, 0.0))
-    pose = keeper.take(StandardSip(raw_x=1000), P2DX)
+    pose = keeper.take(StandardSip(raw_x=1000), P2DX, 0)
     assert (pose.x_m, pose.y_m) == pytest.approx((10.42, 0.0))
     assert keeper.robot_heading_rad == 0.0
 
