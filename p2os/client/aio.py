@@ -24,7 +24,7 @@ from p2os.client.engine import BLIND_POLL_S, CLOSING_S, MOST_NOTICES, SIGN_OF_LI
 from p2os.client.goals import Axis, DriveAxis, MotionResult, TurnAxis
 from p2os.client.line import Line
 from p2os.client.notices import Notice
-from p2os.client.opening import core_for, motion_result, no_answer, not_connected
+from p2os.client.opening import core_for, motion_result, no_answer, not_connected, not_found
 from p2os.client.requests import PacketType, request_for
 from p2os.client.settings import ClientSettings
 from p2os.client.snapshots import Link, RobotState
@@ -64,6 +64,8 @@ class Robot(RobotCalls):
         self._state_callbacks: list[Callable[[RobotState], None]] = []
         self._event_callbacks: list[Callable[[Notice], None]] = []
         self._failure: BaseException | None = None
+        #: Whether the program has met the failure.
+        self._has_told = False
 
     # Coming and going ---------------------------------------------------------------------
 
@@ -77,7 +79,7 @@ class Robot(RobotCalls):
             self._run(lambda core, now: core.connect(now))
             await self._wait_for(lambda core: core.is_ready or core.link in {Link.FAILED, Link.CLOSED}, None)
             if not self._core.is_ready:
-                raise not_connected(self._core)  # noqa: TRY301  # closing is the same for every way out
+                raise not_found(self._core)  # noqa: TRY301  # closing is the same for every way out
         except BaseException:
             await self.close()
             raise
@@ -104,7 +106,7 @@ class Robot(RobotCalls):
         self, kind: type[BaseException] | None, error: BaseException | None, _: TracebackType | None
     ) -> None:
         await self.close()
-        if error is None:
+        if error is None and not self._has_told:
             self._check()
 
     # Waiting ------------------------------------------------------------------------------
@@ -340,6 +342,7 @@ class Robot(RobotCalls):
 
     def _check(self) -> None:
         if self._failure is not None:
+            self._has_told = True
             raise P2osError(f"the client failed: {self._failure}") from self._failure
 
     def _now(self) -> Nanos:

@@ -68,6 +68,8 @@ class Engine:
         self._bell.setblocking(False)
         self._bell_push.setblocking(False)
         self._failure: BaseException | None = None
+        #: Whether the program has met the failure.
+        self._has_told = False
         self._is_ending = False
         self._queues: list[deque[Notice]] = []
         self._state_callbacks: list[Callable[[RobotState], None]] = []
@@ -124,8 +126,8 @@ class Engine:
             self.changed.notify_all()
 
     def raise_failure(self, error: BaseException | None) -> None:
-        """Raise what the thread failed with, unless the program fails already."""
-        if error is None and self._failure is not None:
+        """Raise what the thread failed with, unless the program fails already or has met it."""
+        if error is None and self._failure is not None and not self._has_told:
             raise P2osError(f"the client's thread failed: {self._failure}") from self._failure
 
     # Listeners ----------------------------------------------------------------------------
@@ -247,6 +249,7 @@ class Engine:
 
     def _check(self) -> None:
         if self._failure is not None:
+            self._has_told = True
             raise P2osError(f"the client's thread failed: {self._failure}") from self._failure
 
     def _ring(self) -> None:

@@ -58,7 +58,7 @@ class Axis(Protocol):
     what: str
     asked: float
 
-    def begin(self, state: RobotState, robot_heading_rad: float) -> None:
+    def begin(self, state: RobotState) -> None:
         """Take the place from which the goal counts."""
 
     def reached(self, state: RobotState) -> float:
@@ -95,14 +95,14 @@ class DriveAxis:
         self._start = Pose()
         self._leg_ends_m: float | None = None
 
-    def begin(self, state: RobotState, robot_heading_rad: float) -> None:  # noqa: ARG002  # for turns
+    def begin(self, state: RobotState) -> None:
         """Count from here."""
-        self._start = state.pose
+        self._start = state.odometry
         self._leg_ends_m = None
 
     def reached(self, state: RobotState) -> float:
         """Return the way along the first heading, metres."""
-        start, pose = self._start, state.pose
+        start, pose = self._start, state.odometry
         return (pose.x_m - start.x_m) * math.cos(start.heading_rad) + (pose.y_m - start.y_m) * math.sin(
             start.heading_rad
         )
@@ -151,16 +151,14 @@ class TurnAxis:
         self.asked = angle_rad
         self.what = f"turn {math.degrees(angle_rad):.1f} deg"
         self._start_rad = 0.0
-        self._robot_start_rad = 0.0
 
-    def begin(self, state: RobotState, robot_heading_rad: float) -> None:
+    def begin(self, state: RobotState) -> None:
         """Count from here."""
-        self._start_rad = state.pose.heading_rad
-        self._robot_start_rad = robot_heading_rad
+        self._start_rad = state.odometry.heading_rad
 
     def reached(self, state: RobotState) -> float:
         """Return how far it has turned, radians."""
-        return state.pose.heading_rad - self._start_rad
+        return state.odometry.heading_rad - self._start_rad
 
     def is_near(self, remaining: float) -> bool:
         """Within two degrees."""
@@ -173,7 +171,7 @@ class TurnAxis:
     def command(self, remaining: float, *, standing: bool) -> Command | None:  # noqa: ARG002  # for drives
         """Return HEAD: the goal, or a step of the way to it."""
         at = self.asked - remaining
-        ahead = self._robot_start_rad + at + max(-STEP_RAD, min(STEP_RAD, remaining))
+        ahead = self._start_rad + at + max(-STEP_RAD, min(STEP_RAD, remaining))
         return Command(CommandNumber.HEAD, round(math.degrees(ahead)) % 360)
 
     def fastest_ns(self, limits: Limits) -> Nanos:
@@ -217,12 +215,12 @@ class Goal:
         #: How it ended, once it has.
         self.ended: MotionEnded | None = None
 
-    def begin(self, state: RobotState, robot_heading_rad: float, limits: Limits, now: Nanos) -> Command | None:
+    def begin(self, state: RobotState, limits: Limits, now: Nanos) -> Command | None:
         """Start from a state; return the first command."""
         self._began_at = self._said_at = self._urged_at = now
         allowed = self._limit_ns
         self._ends_at = now + (2 * self.axis.fastest_ns(limits) + GRACE_NS if allowed is None else allowed)
-        self.axis.begin(state, robot_heading_rad)
+        self.axis.begin(state)
         if self.axis.is_near(self.axis.asked):
             return None
         return self.axis.command(self.axis.asked, standing=True)

@@ -150,7 +150,7 @@ class Mover:
             self._send(axis.speed_command(min(speed, usual)), now)
             self._speed_back = axis.speed_command(usual)
         goal = self._goal = Goal(axis, limit_ns)
-        command = goal.begin(state, self._observer.robot_heading_rad, limits, now)
+        command = goal.begin(state, limits, now)
         if command is not None:
             self._send(command, now)
         return goal

@@ -1,7 +1,7 @@
 """Standard packets folded into states: SI units, one pose, the last reading of every sonar."""
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from p2os.client.pose import PoseKeeper
 from p2os.client.snapshots import Limits, Pose, RobotState, SonarEcho
@@ -44,11 +44,6 @@ class Observer:
         self._sonar: dict[int, SonarEcho] = {}
         self._number = 0
 
-    @property
-    def robot_heading_rad(self) -> float:
-        """The robot's own heading, as HEAD means it; radians, unwrapped."""
-        return self._pose.robot_heading_rad
-
     def doubtful_gap_ns(self, limits: Limits) -> Nanos | None:
         """Return the time between the last two packets, if the odometry's counters may have wrapped in it unseen.
 
@@ -71,8 +66,10 @@ class Observer:
         self._sonar.clear()
 
     def place(self, pose: Pose) -> None:
-        """Say where the robot is; states from now on begin there."""
+        """Say where the robot is; the newest state and those to come have it there."""
         self._pose.place(pose)
+        if self.state is not None:
+            self.state = replace(self.state, pose=pose)
 
     def take(self, sip: StandardSip, now: Nanos) -> RobotState:
         """Return the state that a packet tells."""
@@ -87,6 +84,7 @@ class Observer:
             number=self._number,
             at_ns=now,
             pose=self._pose.take(sip, parameters, now),
+            odometry=self._pose.odometry,
             forward_mps=(units.left_mps + units.right_mps) / 2,
             turn_radps=units.turn_radps,
             left_mps=units.left_mps,

@@ -34,12 +34,16 @@ def core_for(
     return RobotCore(chosen, parameters=parameters), place.baud if isinstance(place, SerialUrl) else None
 
 
-def not_connected(core: RobotCore) -> TransportError:
-    """Return the error that says why there is no session."""
+def not_found(core: RobotCore) -> ConnectError:
+    """Return the error that says why no session could be opened."""
     problem = core.problem
-    if isinstance(problem, GaveUp):
-        return ConnectError(problem.reason, hint=problem.hint)
-    reason = f": {problem.reason}" if problem is not None else ""
+    hint = problem.hint if isinstance(problem, GaveUp) else None
+    return ConnectError(problem.reason if problem is not None else f"not connected ({core.link.value})", hint=hint)
+
+
+def not_connected(core: RobotCore) -> LinkLostError:
+    """Return the error that says why there is no session any more."""
+    reason = f": {core.problem.reason}" if core.problem is not None else ""
     return LinkLostError(f"no packet comes ({core.link.value}){reason}", hint="is the robot on, and the cable in?")
 
 

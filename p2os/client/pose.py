@@ -9,7 +9,6 @@ turned by one fixed amount; nothing is accumulated but whole counts.
 """
 
 import math
-from dataclasses import dataclass
 
 from p2os.client.snapshots import Pose
 from p2os.odometry import POSITION_MODULUS, Odometry
@@ -18,25 +17,16 @@ from p2os.sip import StandardSip
 from p2os.timing import Nanos
 
 
-@dataclass(frozen=True, slots=True)
-class RobotCounts:
-    """The robot's own odometry since its session opened: metres, and radians that do not wrap."""
-
-    x_m: float
-    y_m: float
-    heading_rad: float
-
-
 class PoseKeeper:
     """Turns the counters of the packets into one pose."""
 
     def __init__(self) -> None:
         self.pose = Pose()
-        #: The robot's heading as its HEAD command means it, radians, unwrapped.
-        self.robot_heading_rad = 0.0
+        #: The robot's own count since its session opened; HEAD means its heading.
+        self.odometry = Pose()
         #: Between the last two packets of this session.
         self.gap_ns: Nanos = 0
-        self._anchor: tuple[Pose, RobotCounts] | None = None
+        self._anchor: tuple[Pose, Pose] | None = None
         self._odometry: Odometry | None = None
 
     def new_session(self) -> None:
@@ -47,7 +37,7 @@ class PoseKeeper:
         """Say where the robot is."""
         self.pose = pose
         if self._anchor is not None:
-            self._anchor = (pose, self._counts_now)
+            self._anchor = (pose, self.odometry)
 
     def take(self, sip: StandardSip, parameters: RobotParameters, now: Nanos) -> Pose:
         """Follow the robot to the place that a packet tells, and return it."""
@@ -60,11 +50,10 @@ class PoseKeeper:
         self.gap_ns = self._odometry.update(sip, now).gap_ns
         x, y, heading = (first + way for first, way in zip(self._first, self._odometry.counts, strict=True))
         distance = parameters.distance_conv_mm / 1000
-        self._counts_now = RobotCounts(x * distance, y * distance, heading * parameters.angle_conv_rad)
-        self.robot_heading_rad = self._counts_now.heading_rad
+        self.odometry = Pose(x * distance, y * distance, heading * parameters.angle_conv_rad)
         if self._anchor is None:
-            self._anchor = (self.pose, self._counts_now)
-        self.pose = _moved(*self._anchor, self._counts_now)
+            self._anchor = (self.pose, self.odometry)
+        self.pose = _moved(*self._anchor, self.odometry)
         return self.pose
 
 
@@ -73,7 +62,7 @@ def _signed(raw: int, modulus: int) -> int:
     return (raw + half) % modulus - half
 
 
-def _moved(start: Pose, then: RobotCounts, now: RobotCounts) -> Pose:
+def _moved(start: Pose, then: Pose, now: Pose) -> Pose:
     """Return the pose of a robot that stood at `start` when it counted `then` and counts `now`."""
     turned = start.heading_rad - then.heading_rad
     cos, sin = math.cos(turned), math.sin(turned)

@@ -20,7 +20,7 @@ from p2os.client.core import RobotCore
 from p2os.client.engine import Engine, Opener
 from p2os.client.goals import Axis, DriveAxis, MotionResult, TurnAxis
 from p2os.client.notices import Notice
-from p2os.client.opening import core_for, motion_result, no_answer, not_connected
+from p2os.client.opening import core_for, motion_result, no_answer, not_connected, not_found
 from p2os.client.requests import PacketType, request_for
 from p2os.client.settings import ClientSettings
 from p2os.client.snapshots import Link, RobotState
@@ -79,7 +79,7 @@ class Robot(RobotCalls):
                 engine.call(lambda core, now: core.connect(now))
                 engine.wait_for(lambda core: core.is_ready or core.link in {Link.FAILED, Link.CLOSED}, None)
                 if not engine.core.is_ready:
-                    raise not_connected(engine.core)  # noqa: TRY301  # closing is the same for every way out
+                    raise not_found(engine.core)  # noqa: TRY301  # closing is the same for every way out
         except BaseException:
             self.close()
             raise

@@ -83,7 +83,10 @@ class RobotState:
     number: int
     #: When the packet came, on the client's clock.
     at_ns: Nanos
+    #: Where the robot is, over sessions and `set_pose`.
     pose: Pose
+    #: The robot's own count since its session opened.
+    odometry: Pose = Pose()
     #: What the wheels do: m/s forward and of each wheel, rad/s counter-clockwise.
     forward_mps: float
     turn_radps: float

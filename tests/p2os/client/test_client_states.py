@@ -133,7 +133,7 @@ def test_a_pose_goes_on_over_sessions_and_places() -> None:
     keeper.place(Pose(10.0, 0.0, 0.0))
     pose = keeper.take(StandardSip(raw_x=1000), P2DX, 0)
     assert (pose.x_m, pose.y_m) == pytest.approx((10.42, 0.0))
-    assert keeper.robot_heading_rad == 0.0
+    assert keeper.odometry.heading_rad == 0.0
 
 
 def test_a_turn_counts_in_the_robots_own_frame_after_set_pose() -> None:

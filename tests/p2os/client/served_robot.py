@@ -1,0 +1,129 @@
+"""A virtual robot served on a real line in a thread, for tests of the client's skins; every wait is bounded."""
+
+import threading
+import time
+from collections.abc import Callable
+
+from client_rig import new_pioneer
+
+from p2os.client.settings import ClientSettings
+from p2os.commands import Command
+from p2os.pioneer.controller import Pioneer
+from p2os.pioneer.host import Host
+from p2os.timing import NS_PER_MS, Nanos
+from p2os.transport import listen_url, open_url
+from p2os.transport.ports import HungUpError, Transport
+from p2os.wire import Decoder, Frame
+
+#: A bound on every wait; reached only when something is broken.
+PATIENCE_S = 30.0
+#: Robots of tests are never open already.
+QUICK = ClientSettings(listen_ns=NS_PER_MS)
+
+
+def until(is_so: Callable[[], object], what: str = "it") -> None:
+    """Wait until something is so."""
+    end = time.monotonic() + PATIENCE_S
+    while not is_so():
+        assert time.monotonic() < end, f"{what} never came to be"
+        time.sleep(0.002)
+
+
+class ServedRobot:
+    """A host in a thread."""
+
+    def __init__(self, url: str = "tcp:127.0.0.1:0", pioneer: Pioneer | None = None) -> None:
+        self.pioneer = pioneer or new_pioneer()
+        #: What the robot is to do between two turns of its host: called once, in the host's thread.
+        self.wishes: list[Callable[[Pioneer, Nanos], None]] = []
+        listener = listen_url(url)
+        self.url = listener.description
+        self.told: list[str] = []
+        self._host = Host(self.pioneer, listener, on_event=lambda _now, what, _detail: self.told.append(what))
+        self._end = threading.Event()
+        self._thread = threading.Thread(target=self._serve, daemon=True)
+        self._thread.start()
+
+    def _serve(self) -> None:
+        try:
+            while not self._end.is_set():
+                self._host.turn(0.02)
+                while self.wishes:
+                    self.wishes.pop(0)(self.pioneer, self._host.now)
+        finally:
+            self._host.close()
+
+    @property
+    def wheels_mps(self) -> tuple[float, float]:
+        state = self.pioneer.state
+        return state.left_setpoint_mps, state.right_setpoint_mps
+
+    @property
+    def is_moving(self) -> bool:
+        return self.wheels_mps != (0.0, 0.0)
+
+    def wish(self, call: Callable[[Pioneer, Nanos], None]) -> None:
+        """Have something done to the robot, and wait until it is."""
+        self.wishes.append(call)
+        until(lambda: not self.wishes)
+
+    def close(self) -> None:
+        self._end.set()
+        self._thread.join(PATIENCE_S)
+        assert not self._thread.is_alive()
+
+
+class Recorder:
+    """Opens lines and keeps what is written to them."""
+
+    def __init__(self) -> None:
+        self.lines: list[RecordedLine] = []
+
+    def __call__(self, url: str) -> Transport:
+        self.lines.append(RecordedLine(open_url(url)))
+        return self.lines[-1]
+
+    @property
+    def said(self) -> list[Command]:
+        """All commands, on all lines."""
+        decoder = Decoder()
+        for line in self.lines:
+            decoder.receive(bytes(line.written), 0)
+        found = []
+        while (item := decoder.next_item()) is not None:
+            assert isinstance(item, Frame)
+            found.append(Command.from_frame(item))
+        return found
+
+
+class RecordedLine:
+    """A transport and what went through it."""
+
+    def __init__(self, inner: Transport) -> None:
+        self.inner = inner
+        self.description = inner.description
+        self.written = bytearray()
+        #: Nothing passes any more, and nobody is told.
+        self.is_mute = False
+        #: The next read says that the line has gone.
+        self.is_broken = False
+
+    def read(self) -> bytes:
+        if self.is_broken:
+            raise HungUpError(f"{self.description} vanished")
+        data = self.inner.read()
+        return b"" if self.is_mute else data
+
+    def write(self, data: bytes) -> None:
+        self.written += data
+        if not self.is_mute:
+            self.inner.write(data)
+
+    def fileno(self) -> int:
+        return self.inner.fileno()
+
+    def set_baud(self, baud: int) -> None:
+        self.inner.set_baud(baud)
+
+    def close(self) -> None:
+        self.inner.close()
