@@ -79,6 +79,8 @@ class BluePill:
         self.pin_listeners: list[Callable[[str, PinDrive, Nanos], None]] = []
         self._usarts = tuple(SerialPort(chip.parts.usart(n), self._activity, self._wait) for n in (1, 2, 3))
         chip.pins.on_output = self._pin_changed
+        chip.pins.is_heard = lambda: self.on_pin is not None or bool(self.pin_listeners)
+        chip.pins.on_silent_output = self._pins_changed_silently
         chip.pins["PC13"].board_pull = PinDrive.PULL_UP
         chip.pins["PB2"].board_pull = PinDrive.PULL_DOWN
 
@@ -267,6 +269,9 @@ class BluePill:
             self.on_pin(name, drive, at_ns)
         for listener in self.pin_listeners:
             listener(name, drive, at_ns)
+
+    def _pins_changed_silently(self, at_ns: Nanos) -> None:
+        self._activity.last_pin_ns = at_ns
 
     def _wait(self, port: SerialPort, pattern: bytes, within: Span) -> None:
         wait_for_bytes(self, port, pattern, within)

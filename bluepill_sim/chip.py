@@ -14,13 +14,15 @@ time of the accessing instruction.
 
 from collections.abc import Callable
 
-from bluepill_sim.block_cost import NO_BLOCK, Block, measure_block
+from bluepill_sim.block_cost import Block, measure_block
 from bluepill_sim.bus import PERIPHERAL_BYTES, PeripheralBus, SramBitBand
 from bluepill_sim.clocks import Clocks
-from bluepill_sim.cpu import BlockRecorder, Engine
+from bluepill_sim.cpu import BlockRecorder
 from bluepill_sim.cycle_clock import CycleClock
 from bluepill_sim.memory import Memory
-from bluepill_sim.processor import FaultListener, Processor
+from bluepill_sim.native_processor import make_core
+from bluepill_sim.native_registers import share_registers
+from bluepill_sim.processor import FaultListener
 from bluepill_sim.rcc import ResetCause
 from bluepill_sim.stm32f103 import (
     FLASH_BASE,
@@ -71,8 +73,7 @@ class Chip:
         self._flash_repairs: list[tuple[int, bytes]] = []
         #: Whether the peripherals exist: making them already calls back.
         self._is_complete = False
-        self.engine = Engine(self._measure)
-        self.processor = Processor(self.engine, memory)
+        self.engine, self.processor = make_core(self._measure, memory)
         self.processor.on_fault = on_fault
         self.pins = make_pins(self)
         self.parts = make_parts(self)
@@ -89,8 +90,6 @@ class Chip:
         """The exact time of the accessing instruction or event inside a peripheral, else the time reached."""
         if self._event_ns is not None:
             return self._event_ns
-        if self.engine.block is NO_BLOCK:
-            return self._clock.ns_of(self.engine.cycle)
         return self._clock.ns_of(self.engine.access_cycle)
 
     @property
@@ -170,6 +169,8 @@ class Chip:
 
     def set_irq(self, irq: int, level: bool) -> None:
         """Set the level of an interrupt line."""
+        if self.processor.nvic.levels >> irq & 1 == level:
+            return
         for listener in self.irq_listeners:
             listener(irq, level, self.now_ns)
         self.processor.nvic.set_level(irq, level)
@@ -290,7 +291,7 @@ class Chip:
         """Return the cycle of the earliest of the limit and the deadlines."""
         due = self._next_peripheral_due()
         stop = self._clock.cycle_at(limit_ns if due is None else min(due, limit_ns))
-        tick = self.processor.systick.next_cycle
+        tick = None if self.processor.ticks_alone else self.processor.systick.next_cycle
         return stop if tick is None else min(stop, tick)
 
     def _measure(self, address: int, size: int) -> Block:
@@ -311,6 +312,7 @@ class Chip:
         bits = SramBitBand(self.memory.sram)
         engine.map_io(SRAM_ALIAS, SRAM_BYTES * _ALIAS_BYTES, bits.read_bit, bits.write_bit)
         engine.map_io(PPB_BASE, PPB_BYTES, self.system.read, self.system.write)
+        share_registers(engine, self.parts.by_name.values(), self.parts.rcc, self.pins, self.ns_of)
         engine.on_read_only_write = self._write_flash
         engine.on_read_only_written = self._repair_flash
 

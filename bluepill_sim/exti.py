@@ -28,8 +28,8 @@ class Exti(Peripheral):
     REGISTERS = (
         Register(name="IMR", offset=0x00, readable=_LINES, writable=_LINES, on_write="_write_mask"),
         Register(name="EMR", offset=0x04, readable=_LINES, writable=_LINES),
-        Register(name="RTSR", offset=0x08, readable=_LINES, writable=_LINES),
-        Register(name="FTSR", offset=0x0C, readable=_LINES, writable=_LINES),
+        Register(name="RTSR", offset=0x08, readable=_LINES, writable=_LINES, on_write="_write_edges"),
+        Register(name="FTSR", offset=0x0C, readable=_LINES, writable=_LINES, on_write="_write_edges"),
         Register(name="SWIER", offset=0x10, readable=_LINES, writable=0, on_write="_write_swier"),
         Register(name="PR", offset=0x14, readable=_LINES, writable=0, write_one_to_clear=_LINES, on_write="_write_pr"),
     )
@@ -47,6 +47,7 @@ class Exti(Peripheral):
     def on_reset(self) -> None:
         """Drop every request."""
         self._levels = (self._levels & ~bits((15, 0))) | self._pin_levels()
+        self._tell_edges()
         self._update_irqs()
 
     def set_line(self, line: int, level: bool) -> None:
@@ -76,6 +77,13 @@ class Exti(Peripheral):
         self._update_irqs()
         if lines & self.words[EMR]:
             self.chip.signal("event")
+
+    def _write_edges(self, _written: int, _previous: int) -> None:
+        self._tell_edges()
+
+    def _tell_edges(self) -> None:
+        self.chip.pins.edge_lines = self.words[RTSR] | self.words[FTSR]
+        self.chip.pins.simple_is_known = False
 
     def _write_mask(self, _written: int, _previous: int) -> None:
         self._update_irqs()

@@ -7,6 +7,7 @@ Invariant: every kind has one row in `FAULT_ROWS`.
 from dataclasses import dataclass
 from enum import Enum
 
+from bluepill_sim.cpu.halt import HaltKind
 from bluepill_sim.nvic import BUS_FAULT, HARD_FAULT, MEM_MANAGE, USAGE_FAULT
 from bluepill_sim.timing import Nanos
 
@@ -97,3 +98,18 @@ class FaultReport:
         """The registers in four columns, for a person."""
         cells = [f"{name:>4} {value:08x}" for name, value in self.registers]
         return "\n".join("  ".join(cells[n : n + 4]) for n in range(0, len(cells), 4))
+
+
+#: What a halt of the engine means to the architecture.
+FAULT_OF_HALT = {
+    HaltKind.UNDEFINED: FaultKind.UNDEFINED_INSTRUCTION,
+    HaltKind.NO_COPROCESSOR: FaultKind.NO_COPROCESSOR,
+    HaltKind.INVALID_STATE: FaultKind.INVALID_STATE,
+    HaltKind.READ_ERROR: FaultKind.READ_ERROR,
+    HaltKind.WRITE_ERROR: FaultKind.WRITE_ERROR,
+    HaltKind.FETCH_ERROR: FaultKind.FETCH_ERROR,
+    HaltKind.EXECUTE_NEVER: FaultKind.EXECUTE_NEVER,
+    HaltKind.DIVIDE_BY_ZERO: FaultKind.DIVIDE_BY_ZERO,
+    HaltKind.UNALIGNED: FaultKind.UNALIGNED,
+    HaltKind.BKPT: FaultKind.BREAKPOINT,
+}

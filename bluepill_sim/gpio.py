@@ -117,6 +117,16 @@ class Gpio(Peripheral):
             changed ^= lowest
             self._pins[lowest.bit_length() - 1].set_output_bit(bool(bits_now & lowest))
 
+    def simple_outputs(self) -> int:
+        """Return the pins of which a change of the ODR bit changes nothing but what IDR reads, as a mask."""
+        return sum(1 << pin.number for pin in self._pins if pin.is_simple())
+
+    def repeat_outputs(self, pins: int) -> None:
+        """Bring pins in line with their ODR bits, which were written without them."""
+        for pin in self._pins:
+            if pins >> pin.number & 1:
+                pin.set_output_bit(bool(self.words[ODR] >> pin.number & 1))
+
     def _write_lckr(self, written: int, _previous: int) -> None:
         if not self.words[LCKR] & _LCKK:
             self.words[LCKR] = written & _PORT

@@ -125,6 +125,10 @@ class Peripheral:
         if hook is not None:
             hook(written, previous)
 
+    def masks_of(self, index: int) -> tuple[int, int, int, int]:
+        """Return what the stored word `index` keeps, takes, and clears by 1 and by 0, as masks."""
+        return self._masks[index]
+
     def reset(self) -> None:
         """Go back to the state after a system reset."""
         self.due_ns = None

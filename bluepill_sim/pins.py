@@ -152,6 +152,7 @@ class Pin:
         outside = None if level is None else bool(level)
         if outside is not self._outside:
             self._outside = outside
+            self._bank.simple_is_known = False
             self._resolve()
 
     def short(self, rail: str | None) -> None:
@@ -166,11 +167,13 @@ class Pin:
         if rail is not None and rail not in RAILS:
             raise ValueError(f"no such rail: {rail!r}; a wire can be shorted to {' or '.join(RAILS)}")
         self._rail = rail
+        self._bank.simple_is_known = False
         self._resolve()
 
     def watch(self, on: bool = True) -> None:
         """Choose whether a change of the chip's own drive ends the CPU's slice."""
         self.is_watched = on
+        self._bank.simple_is_known = False
 
     @property
     def driven(self) -> bool | None:
@@ -252,6 +255,18 @@ class Pin:
         is_input = self._mode in INPUT_MODES or self._mode in ALTERNATE_MODES
         return is_input and self._holder is None and self.is_bonded
 
+    def is_simple(self) -> bool:
+        """Whether a change of the ODR bit changes nothing but the level on the wire, and nobody is to be told."""
+        bank = self._bank
+        return (
+            self._drives == PinMode.PUSH_PULL.drives
+            and self._mode is PinMode.PUSH_PULL
+            and self._outside is None
+            and self._rail is None
+            and not self.is_watched
+            and not bank.edge_lines >> self.number & 1
+        )
+
     def snapshot(self) -> PinSnapshot:
         """Return all that decides this pin's future, as plain values."""
         holder = None if self._holder is None else (self._holder[0], self._holder[1].value)
@@ -280,6 +295,7 @@ class Pin:
 
     def _derive(self) -> None:
         """Work out `_drives` and `_reads`, by RM0008 table 20."""
+        self._bank.simple_is_known = False
         mode = self._mode
         self._reads = mode is not PinMode.ANALOG and self._holder is None
         if self._holder is not None:
@@ -348,6 +364,10 @@ class PinBank:
             five_volt_tolerant: Names of those that bear 5 V.
         """
         self._ports = ports
+        #: EXTI lines on which an edge makes a request, as a mask.
+        self.edge_lines = 0
+        #: Whether no pin has changed in what `Pin.is_simple` looks at, since whoever sets this looked.
+        self.simple_is_known = False
         #: Called with (pin, time in ns) whenever something on a wire may have changed; tools look on.
         self.wire_listeners: list[Callable[[Pin, int], None]] = []
         self._pins = {
@@ -356,6 +376,10 @@ class PinBank:
         self._by_name = {pin.name: pin for pins in self._pins.values() for pin in pins}
         #: Called with (pin name, drive, time in ns) at every change of the chip's own drive.
         self.on_output: Callable[[str, PinDrive, int], None] | None = None
+        #: Tells whether anybody beyond `on_silent_output` wants to hear of each output.
+        self.is_heard: Callable[[], bool] = lambda: self.on_output is not None
+        #: Called with the time in ns of the last output that was not told one by one.
+        self.on_silent_output: Callable[[int], None] | None = None
         #: Called when AFIO has changed `remaps` or `exti_ports`.
         self.route_listeners: list[Callable[[], None]] = []
         #: AFIO_MAPR by function, such as {"USART1": 1}; a function that is missing is not remapped.

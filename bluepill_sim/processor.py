@@ -21,7 +21,7 @@ from collections.abc import Callable
 from enum import Enum
 
 from bluepill_sim.cpu import DEBUG_HALTS, EXCEPTION_RETURN, Engine, Halt, HaltKind, Register, it_state_of
-from bluepill_sim.faults import FAULT_ROWS, HFSR_FORCED, FaultKind
+from bluepill_sim.faults import FAULT_OF_HALT, FAULT_ROWS, HFSR_FORCED, FaultKind
 from bluepill_sim.memory import Memory
 from bluepill_sim.nvic import BUS_FAULT, HARD_FAULT, NMI, SVCALL, SYSTICK, Nvic
 from bluepill_sim.systick import SysTick
@@ -57,19 +57,6 @@ class Sleep(Enum):
     EVENT = "event"
 
 
-_FAULT_OF_HALT = {
-    HaltKind.UNDEFINED: FaultKind.UNDEFINED_INSTRUCTION,
-    HaltKind.NO_COPROCESSOR: FaultKind.NO_COPROCESSOR,
-    HaltKind.INVALID_STATE: FaultKind.INVALID_STATE,
-    HaltKind.READ_ERROR: FaultKind.READ_ERROR,
-    HaltKind.WRITE_ERROR: FaultKind.WRITE_ERROR,
-    HaltKind.FETCH_ERROR: FaultKind.FETCH_ERROR,
-    HaltKind.EXECUTE_NEVER: FaultKind.EXECUTE_NEVER,
-    HaltKind.DIVIDE_BY_ZERO: FaultKind.DIVIDE_BY_ZERO,
-    HaltKind.UNALIGNED: FaultKind.UNALIGNED,
-    HaltKind.BKPT: FaultKind.BREAKPOINT,
-}
-
 #: Told of each HardFault taken and each lockup: (kind, PC, address, whether it is a lockup).
 FaultListener = Callable[[FaultKind, int, int | None, bool], None]
 
@@ -77,10 +64,13 @@ FaultListener = Callable[[FaultKind, int, int | None, bool], None]
 class Processor:
     """One core; `cycle` is its time."""
 
+    #: Whether SysTick's wraps are acted on within `run`; else whoever runs stops at each.
+    ticks_alone = False
+
     def __init__(self, engine: Engine, memory: Memory) -> None:
         self.engine = engine
-        self.nvic = Nvic()
-        self.systick = SysTick(lambda: self.pend(SYSTICK))
+        self.nvic = self._make_nvic()
+        self.systick = self._make_systick(lambda: self.pend(SYSTICK))
         self.exception_number = 0
         self.sleep = Sleep.AWAKE
         self.event_register = False
@@ -113,6 +103,12 @@ class Processor:
         self._return_write = file.batch(
             r.CONTROL, r.IPSR, r.CONTROL, r.SP, r.R0, r.R1, r.R2, r.R3, r.R12, r.LR, r.CONTROL, r.CPSR
         )
+
+    def _make_nvic(self) -> Nvic:
+        return Nvic()
+
+    def _make_systick(self, pend: Callable[[], None]) -> SysTick:
+        return SysTick(pend)
 
     # Time.
 
@@ -272,7 +268,7 @@ class Processor:
             else:
                 self._fault(FaultKind.MASKED_SVC, halt.pc)
         else:
-            self._fault(_FAULT_OF_HALT[kind], halt.pc, halt.address)
+            self._fault(FAULT_OF_HALT[kind], halt.pc, halt.address)
         if halt.watched is not None:
             self.halt = Halt(HaltKind.WATCHPOINT, self.engine.pc, halt.watched)
 

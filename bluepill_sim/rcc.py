@@ -158,6 +158,11 @@ class Rcc(Peripheral):
         gate = self._gates.get(name)
         return gate is None or bool(self.words[gate[0]] & gate[1])
 
+    def gate_address(self, name: str) -> tuple[int, int]:
+        """Return where in the host's memory the enable register of the peripheral `name` is, and its bit as a mask."""
+        index, mask = self._gates[name]
+        return self.words.buffer_info()[0] + index * self.words.itemsize, mask
+
     def reset(self, cause: ResetCause = ResetCause.POWER) -> None:
         """Go back to the state after a reset; the backup domain and the flags of CSR outlive all but a power cut."""
         flags, backup, lse = self.words[CSR] & _CSR_FLAGS, self.words[BDCR], self._ready_at[3]

@@ -52,6 +52,7 @@ class Library:
     write_registers: Callable[..., int]
     map_pointer: Callable[..., int]
     map_io: Callable[..., int]
+    protect: Callable[..., int]
     add_hook: Callable[..., int]
     delete_hook: Callable[..., int]
     context_size: Callable[..., int]
@@ -101,6 +102,7 @@ def load_library() -> Library:
         write_registers=function("uc_reg_write_batch", word, word, word, ctypes.c_int),
         map_pointer=function("uc_mem_map_ptr", word, ctypes.c_uint64, ctypes.c_size_t, ctypes.c_uint32, word),
         map_io=function("uc_mmio_map", word, ctypes.c_uint64, ctypes.c_size_t, word, word, word, word),
+        protect=function("uc_mem_protect", word, ctypes.c_uint64, ctypes.c_size_t, ctypes.c_uint32),
         add_hook=function("uc_hook_add", word, word, ctypes.c_int, word, word, ctypes.c_uint64, ctypes.c_uint64),
         delete_hook=function("uc_hook_del", word, ctypes.c_size_t),
         context_size=function("uc_context_size", word),

@@ -59,9 +59,11 @@ class BlockTable:
         self._special.clear()
         self._in_writable.clear()
 
+    def writable_at(self, address: int) -> WritableMemory | None:
+        """Return the writable memory that an address is in; None elsewhere."""
+        return next((memory for memory in self.writable if memory[0] <= address < memory[1]), None)
+
     def _writable_bytes(self, address: int, size: int) -> bytes | None:
         """Return the bytes of a block in writable memory; None elsewhere."""
-        for first, end, at in self.writable:
-            if first <= address < end:
-                return ctypes.string_at(at + address - first, size)
-        return None
+        memory = self.writable_at(address)
+        return None if memory is None else ctypes.string_at(memory[2] + address - memory[0], size)

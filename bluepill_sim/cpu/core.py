@@ -21,6 +21,12 @@ from bluepill_sim.cpu.registers import RegisterFile
 _ARCHITECTURE_ARM, _MODE_THUMB, _MODEL_CORTEX_M3 = 1, 16, 8
 _HOOK_INTERRUPT, _HOOK_CODE, _HOOK_BLOCK, _HOOK_INVALID = 1, 4, 8, 0x4000
 _HOOK_ACCESS, _HOOK_BAD_ACCESS = 0x400 | 0x800, 0x3F0
+_NATIVE_HOOKS = {
+    "block": _HOOK_BLOCK,
+    "instruction": _HOOK_CODE,
+    "interrupt": _HOOK_INTERRUPT,
+    "invalid": _HOOK_INVALID,
+}
 _PROTECTION_READ, _PROTECTION_WRITE, _PROTECTION_EXECUTE = 1, 2, 4
 #: uc_ctl numbers: item | argument count << 26 | direction (write = 1) << 30.
 _CONTROL_MODEL = 7 | 1 << 26 | 1 << 30
@@ -31,6 +37,9 @@ _NOWHERE = 0xFFFF_FFFF
 
 #: Size, mode, architecture, level, flag and two pointers come before the registers of a context (uc_priv.h).
 _CONTEXT_HEADER_BYTES = 24 + 2 * ctypes.sizeof(ctypes.c_void_p)
+
+#: Registers of the other instruction set (X0 to X30, PC), which Unicorn leaves as it likes.
+_AARCH64_WORDS = range(16, 82)
 
 #: Kind of a good access that is not a write.
 READ_ACCESS = 16
@@ -105,6 +114,11 @@ class Core:
             f"map {address:#010x}",
         )
 
+    def allow_execution(self, address: int, size: int) -> None:
+        """Let code run from a region that is mapped without x: with it, each store looks for code to forget."""
+        bits = _PROTECTION_READ | _PROTECTION_WRITE | _PROTECTION_EXECUTE
+        self._check(self._library.protect(self._handle, address, size, bits), f"change {address:#010x}")
+
     def map_io(self, address: int, size: int, read: RawRead, write: RawWrite) -> None:
         """Map a region whose accesses are calls, straight from C: they must not raise.
 
@@ -117,7 +131,7 @@ class Core:
             self._library.map_io(self._handle, address, size, reader, None, writer, None), f"map {address:#010x}"
         )
         # Only a memory hook makes Unicorn bring the PC up to date before an access; this one does nothing else.
-        self._hook(_HOOK_ACCESS, self._library.no_operation, address, address + size - 1)
+        self.note_pc(address, size)
 
     def drop_code(self, address: int, size: int) -> None:
         """Forget what was translated from bytes that have changed; not during a run."""
@@ -137,13 +151,13 @@ class Core:
         """Call before the instruction at an address, in blocks that are translated from now on."""
         self.hook_instructions(self.instruction_callback(lambda _address: call()), address, address)
 
-    def on_interrupt(self, call: Callable[[int], None]) -> None:
-        """Call (number) when the core raises an exception of Unicorn's own numbering."""
-        self._hook(_HOOK_INTERRUPT, self._pointer(binding.INTERRUPT_CALLBACK(self._guard(call, None))), 1, 0)
+    def on_interrupt(self, call: Callable[[int], None]) -> int:
+        """Call (number) when the core raises an exception of Unicorn's own numbering; return the hook."""
+        return self._hook(_HOOK_INTERRUPT, self._pointer(binding.INTERRUPT_CALLBACK(self._guard(call, None))), 1, 0)
 
-    def on_invalid(self, call: Callable[[], bool]) -> None:
-        """Call at an instruction that Unicorn does not know; True goes on after it."""
-        self._hook(_HOOK_INVALID, self._pointer(binding.INVALID_CALLBACK(self._guard(call, True))), 1, 0)
+    def on_invalid(self, call: Callable[[], bool]) -> int:
+        """Call at an instruction that Unicorn does not know; True goes on after it; return the hook."""
+        return self._hook(_HOOK_INVALID, self._pointer(binding.INVALID_CALLBACK(self._guard(call, True))), 1, 0)
 
     def on_bad_access(self, call: Callable[[int, int, int, int], bool]) -> None:
         """Call (kind, address, size, value) at an access to no memory or against its protection; True lets it pass."""
@@ -185,7 +199,11 @@ class Core:
         another machine: they never change, and so are never among the differences.
         """
         words = self._context_words()
-        return tuple((n, word) for n, (word, new) in enumerate(zip(words, self._new, strict=True)) if word != new)
+        return tuple(
+            (n, word)
+            for n, (word, new) in enumerate(zip(words, self._new, strict=True))
+            if word != new and n not in _AARCH64_WORDS
+        )
 
     def load(self, snapshot: CoreSnapshot) -> None:
         """Put back what `save` returned, in this process or another with the same library."""
@@ -219,11 +237,36 @@ class Core:
         self._keep.append(callback)
         return ctypes.cast(callback, ctypes.c_void_p)
 
-    def _hook(self, kind: int, callback: ctypes.c_void_p, first: int, last: int) -> int:
+    # For an engine in C.
+
+    @property
+    def handle(self) -> int:
+        """What the library calls this machine."""
+        return self._handle
+
+    @property
+    def library(self) -> binding.Library:
+        """The library itself."""
+        return self._library
+
+    def hook_native(self, kind: str, callback: ctypes.c_void_p, user: int, first: int = 1, last: int = 0) -> int:
+        """Call a C function with `user`: before a "block" or an "instruction", at an "interrupt", at "invalid" code."""
+        return self._hook(_NATIVE_HOOKS[kind], callback, first, last, user)
+
+    def map_io_native(self, address: int, size: int, read: ctypes.c_void_p, write: ctypes.c_void_p, user: int) -> None:
+        """Map a region whose accesses are C functions."""
+        error = self._library.map_io(self._handle, address, size, read, user, write, user)
+        self._check(error, f"map {address:#010x}")
+
+    def note_pc(self, address: int, size: int) -> int:
+        """Have the PC brought up to date before each access of a range, which is slow; return the hook."""
+        return self._hook(_HOOK_ACCESS, self._library.no_operation, address, address + size - 1)
+
+    def _hook(self, kind: int, callback: ctypes.c_void_p, first: int, last: int, user: int | None = None) -> int:
         """Add a hook; first > last is everywhere."""
         hook = ctypes.c_size_t()
         at = ctypes.addressof(hook)
-        self._check(self._library.add_hook(self._handle, at, kind, callback, None, first, last), "hook")
+        self._check(self._library.add_hook(self._handle, at, kind, callback, user, first, last), "hook")
         return hook.value
 
     def _control(self, item: int, *arguments: object) -> None:

@@ -30,6 +30,7 @@ from bluepill_sim.cpu.core import Core, CoreSnapshot, ReadAccess, WriteAccess, W
 from bluepill_sim.cpu.debug_unit import DebugUnit, Watchpoint
 from bluepill_sim.cpu.frozen import IT_BITS, Frozen, copy_of, it_state_of
 from bluepill_sim.cpu.halt import DEBUG_HALTS, Halt, HaltKind
+from bluepill_sim.cpu.io_region import guarded
 from bluepill_sim.cpu.recorder import BLOCK, BlockRecorder
 from bluepill_sim.cpu.registers import Register
 from bluepill_sim.cpu.rest import RestOfBlock, RestSnapshot
@@ -53,6 +54,7 @@ class Engine:
 
     def __init__(self, measure: Measure) -> None:
         self._core = Core(self._fail)
+        self._begin()
         self.registers = self._core.registers
         #: Time of the present border, or of the start of the running block, in cycles.
         self.cycle = 0
@@ -85,47 +87,39 @@ class Engine:
         #: The branch to itself that the recorder knows of.
         self._spins_at: int | None = None
         self._recorder: BlockRecorder | None = None
-        self._traps = Traps(self._core, self.stop_before, self._leave_it_block)
+        self._traps = self._make_traps()
         self._debug = DebugUnit(self._core, self.stop_before)
         #: Addresses that a run halts before; change it between runs as you like.
         self.breakpoints: set[int] = self._debug.breakpoints
         #: Accesses that a run halts after; likewise.
         self.watchpoints: set[Watchpoint] = self._debug.watchpoints
-        self._block_hook = self._core.on_block(self._enter_block)
-        self._core.on_interrupt(self._interrupted)
-        self._core.on_invalid(self._invalid)
+        self._block_hook = 0
+        self._install_hooks()
         self._core.on_bad_access(self._bad_access)
         self._scratch = Scratch(self._core, self._table)
+
+    def _begin(self) -> None:
+        """Get ready to hold the state, for an engine that keeps it elsewhere."""
+
+    def _make_traps(self) -> Traps:
+        return Traps(self._core, self.stop_before, self._leave_it_block)
+
+    def _install_hooks(self) -> tuple[int, ...]:
+        """Have blocks and what ends a run told; return the hooks but that of the blocks."""
+        self._block_hook = self._core.on_block(self._enter_block if self._recorder is None else self._record_block)
+        return self._core.on_interrupt(self._interrupted), self._core.on_invalid(self._invalid)
 
     # Memory.
 
     def map_memory(self, address: int, buffer: "ctypes.Array[ctypes.c_char]", *, is_writable: bool) -> None:
-        """Map a buffer as executable memory; it may be mapped more than once."""
-        self._core.map_memory(address, buffer, "rwx" if is_writable else "rx")
+        """Map a buffer, which may be mapped more than once; writable memory is executable from its first fetch on."""
+        self._core.map_memory(address, buffer, "rw" if is_writable else "rx")
         if is_writable:
             self._blocks.writable.append((address, address + len(buffer), ctypes.addressof(buffer)))
 
     def map_io(self, address: int, size: int, read: ReadAccess, write: WriteAccess) -> None:
         """Map a region whose accesses are calls; their offsets count from `address`."""
-
-        def on_read(_uc: int, offset: int, count: int, _user: int) -> int:
-            try:
-                if (self.block.has_it or self.block.start == self._run_from) and self._leave_it_block():
-                    return 0
-                return read(offset, count)
-            except BaseException as error:  # noqa: BLE001 - C stands between here and the caller
-                self._fail(error)
-                return 0
-
-        def on_write(_uc: int, offset: int, count: int, value: int, _user: int) -> None:
-            try:
-                if (self.block.has_it or self.block.start == self._run_from) and self._leave_it_block():
-                    return
-                write(offset, count, value)
-            except BaseException as error:  # noqa: BLE001 - C stands between here and the caller
-                self._fail(error)
-
-        self._core.map_io(address, size, on_read, on_write)
+        self._core.map_io(address, size, *guarded(read, write, self._is_denied, self._fail))
 
     def drop_code(self, address: int, size: int) -> None:
         """Forget what was translated and measured from bytes that have changed; not during a run."""
@@ -393,6 +387,9 @@ class Engine:
                 return False
             if self.on_read_only_write(address, size, value & (1 << 8 * size) - 1):
                 return True
+        if access == core.FETCH_PROTECTED and (memory := self._blocks.writable_at(address)) is not None:
+            self._core.allow_execution(memory[0], memory[1] - memory[0])
+            return True
         self._halt = Halt(endings.kind_of_bad_access(access), self.registers[Register.PC], address)
         return False
 
@@ -425,6 +422,10 @@ class Engine:
             self._rest.keep(frozen.block, halt.pc, frozen.stop_at)
         self._settle(halt.pc)
         return halt
+
+    def _is_denied(self) -> bool:
+        """Get ready for an access to a peripheral; return whether it is not to be made."""
+        return (self.block.has_it or self.block.start == self._run_from) and self._leave_it_block()
 
     def _leave_it_block(self) -> bool:
         """Put right what a memory hook does to ITSTATE; return whether the run has ended and access is to be denied.

@@ -9,10 +9,10 @@ from bluepill_sim.block_cost import Block
 from bluepill_sim.cpu.core import Core
 
 #: chosen: see the module's text.
-_BASE, _BYTES = 0x9FFF_FC00, 0x400
+BASE, _BYTES = 0x9FFF_FC00, 0x400
 #: CLREX, WFI.
 _CODE = bytes.fromhex("bff32f8f 30bf")
-_BLOCK = Block(_BASE, _BASE + len(_CODE), 0, 0, {})
+_BLOCK = Block(BASE, BASE + len(_CODE), 0, 0, {})
 
 
 class Scratch:
@@ -22,9 +22,9 @@ class Scratch:
         """Map it; `table` is where the engine looks blocks up."""
         self._core = core
         self._table = table
-        core.map_memory(_BASE, ctypes.create_string_buffer(_CODE, _BYTES), "x")
+        core.map_memory(BASE, ctypes.create_string_buffer(_CODE, _BYTES), "x")
 
     def clear_exclusive(self) -> None:
         """Run CLREX, between runs; the block hook is called for it."""
-        self._table[_BASE] = _BLOCK
-        self._core.start(_BASE | 1)
+        self._table[BASE] = _BLOCK
+        self._core.start(BASE | 1)

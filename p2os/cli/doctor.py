@@ -4,12 +4,14 @@ It looks, but imports and starts nothing: a broken package shows when it is used
 """
 
 import json
+import os
 import platform
 import shutil
 import sys
 from collections.abc import Callable
 from dataclasses import asdict, dataclass
 from importlib.metadata import PackageNotFoundError, version
+from importlib.util import find_spec
 from typing import Annotated
 
 import typer
@@ -52,6 +54,7 @@ class Finding:
     required: bool
 
 
+_COMPILER = "install g++ (sudo apt-get install g++), then the package again"
 _BASE, _SIM, _BULLET = "pip install p2os", "pip install 'p2os[sim]'", "pip install 'p2os[bullet]'"
 _EXPORT = "pip install 'p2os[export]'"
 
@@ -69,6 +72,12 @@ NEEDS = (
     Need(name="pyarrow", kind="package", feature="export to Parquet and Arrow", get=_EXPORT),
     Need(name="mcap", kind="package", feature="export to MCAP", get=_EXPORT),
     Need(name="tshark", kind="program", feature="captures on the command line", get="sudo apt-get install tshark"),
+    Need(
+        name="bluepill_sim._native", kind="built", feature="the emulated BluePill at full speed", get=_COMPILER,
+    ),
+    Need(
+        name="testbench._adapter_firmware", kind="built", feature="--adapter firmware", get=_COMPILER,
+    ),
     Need(
         name="arm-none-eabi-gcc", kind="program", feature="building BluePill programs",
         get="sudo apt-get install gcc-arm-none-eabi",
@@ -98,7 +107,7 @@ def examine(
         )
     ]  # fmt: skip
     for need in NEEDS:
-        found = find_program(need.name) if need.kind == "program" else package_version(need.name)
+        found = {"package": package_version, "built": built_part}.get(need.kind, find_program)(need.name)
         get = need.get
         if need.name == "pybullet" and python >= FIRST_PYTHON_WITHOUT_BULLET:
             get = "use Python 3.11: PyBullet has no wheels for later ones"
@@ -108,6 +117,17 @@ def examine(
             )
         )  # fmt: skip
     return findings
+
+
+def built_part(name: str) -> str | None:
+    """Return how a part that is compiled with the package stands, or None where it is not there."""
+    try:
+        if find_spec(name) is None:
+            return None
+    except ImportError:
+        return None
+    is_left_out = name.endswith("._native") and os.environ.get("P2OS_CORE") == "python"
+    return "built, not used: P2OS_CORE=python" if is_left_out else "built"
 
 
 def package_version(name: str) -> str | None:

@@ -88,6 +88,17 @@ def test_doctor_tells_how_to_get_what_is_missing() -> None:
     assert "get it: sudo apt-get install gcc-arm-none-eabi" in doctor.line_of(compiler)
 
 
+def test_doctor_tells_what_was_compiled(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.delenv("P2OS_CORE", raising=False)
+    assert doctor.built_part("p2os.transport") == "built"
+    assert doctor.built_part("p2os.no_such_part") is None
+    assert doctor.built_part("no_such_package.part") is None
+    monkeypatch.setattr(doctor, "find_spec", lambda _name: object())
+    assert doctor.built_part("bluepill_sim._native") == "built"
+    monkeypatch.setenv("P2OS_CORE", "python")
+    assert doctor.built_part("bluepill_sim._native") == "built, not used: P2OS_CORE=python"
+
+
 def test_doctor_knows_which_pythons_have_no_bullet() -> None:
     findings = {finding.name: finding for finding in doctor.examine(python=(3, 13))}
     assert "Python 3.11" in findings["pybullet"].get

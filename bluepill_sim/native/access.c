@@ -1,0 +1,184 @@
+/* Accesses to peripherals: which instruction makes them, and who answers.
+ *
+ * Unicorn does not bring the PC up to date for an access to I/O, but all other
+ * registers are. So the accessing instruction is found by working out which of
+ * the block's loads or stores, from the last one found on, reaches the address
+ * with the registers as they are. Blocks in which that could be mistaken (one
+ * base register, the same offset, and the base changed in between) get hooks
+ * that note the PC instead: see `native_engine.py`.
+ */
+#include "core.h"
+
+struct region_user {
+    struct core *core;
+    uint32_t number;
+    uint32_t base;
+};
+
+/* What Unicorn hands back at each access of a region; lives as long as the core's owner keeps it. */
+struct region_user *core_region(struct core *core, uint32_t number, uint32_t base)
+{
+    struct region_user *region = allocate(core, sizeof *region);
+    if (region != NULL) {
+        *region = (struct region_user){core, number, base};
+    }
+    return region;
+}
+
+/* Which region the pages belong to. */
+void core_set_paged_region(struct core *core, uint32_t number) { core->paged_region = number; }
+
+/* A hook of each access in blocks where the instruction cannot be told from the registers. */
+void core_on_note(void *engine, uint64_t address, uint32_t size, void *user)
+{
+    (void)engine;
+    (void)size;
+    ((struct core *)user)->noted = (uint32_t)address;
+}
+
+static int general(uint8_t number)
+{
+    return number < 13 ? REG_R0 + number : number == 13 ? REG_SP : number == 14 ? REG_LR : REG_PC;
+}
+
+static bool reaches(struct core *core, const struct instruction *one, uint32_t address)
+{
+    uint32_t at = read_register(core, general(one->base)) + (uint32_t)one->offset;
+    if (one->index != 255) {
+        at += read_register(core, general(one->index)) << one->shift;
+    }
+    return address - at < (uint32_t)one->bytes * one->count;
+}
+
+static bool fits(const struct instruction *one, uint32_t kind, uint32_t bytes)
+{
+    return one->kind == kind && one->bytes == bytes;
+}
+
+void resolve(struct core *core, uint32_t address, bool is_write, uint32_t bytes)
+{
+    struct shared *s = &core->shared;
+    const struct row *row = core->block;
+    s->access_cycle = s->cycle;
+    s->access_pc = row->start;
+    if (row == &core->none) {
+        s->access_pc = s->pc;
+        return;
+    }
+    if (row->flags & ROW_NOTED) {
+        const struct instruction *noted = instruction_at(row, core->noted);
+        if (noted != NULL) {
+            s->access_cycle = s->cycle + noted->cycle;
+            s->access_pc = noted->address;
+        }
+        return;
+    }
+    const uint32_t kind = is_write ? 2 : 1;
+    uint32_t first = row->count, others = 0;
+    for (uint32_t n = core->io_next; n < row->count; ++n) {
+        if (fits(&row->instructions[n], kind, bytes)) {
+            if (first == row->count) {
+                first = n;
+            } else {
+                ++others;
+            }
+        }
+    }
+    if (first == row->count) {
+        return;
+    }
+    uint32_t found = first;
+    if (others) {
+        while (found < row->count && !(fits(&row->instructions[found], kind, bytes) &&
+                                       reaches(core, &row->instructions[found], address))) {
+            ++found;
+        }
+        if (found == row->count) {
+            found = first;
+        }
+    }
+    const struct instruction *one = &row->instructions[found];
+    s->access_cycle = s->cycle + one->cycle;
+    s->access_pc = one->address;
+    core->io_next = one->count > 1 ? found : found + 1;
+}
+
+static bool is_over(const struct core *core)
+{
+    return core->shared.cycle + core->block->straight >= core->shared.stop_at;
+}
+
+static uint32_t ask_read(struct core *core, const struct region_user *region, uint32_t offset, uint32_t size)
+{
+    if (core->shared.is_python) {
+        return core->calls.read(region->number, offset, size);
+    }
+    resolve(core, region->base + offset, false, size);
+    core->shared.in_access = 1;
+    const uint32_t word = core->calls.read(region->number, offset, size);
+    core->shared.in_access = 0;
+    return word;
+}
+
+static void ask_write(struct core *core, const struct region_user *region, uint32_t offset, uint32_t size,
+                      uint32_t value)
+{
+    if (core->shared.is_python) {
+        core->calls.write(region->number, offset, size, value);
+        return;
+    }
+    resolve(core, region->base + offset, true, size);
+    core->shared.in_access = 1;
+    core->calls.write(region->number, offset, size, value);
+    core->shared.in_access = 0;
+}
+
+static bool is_clocked(const struct page *page) { return page->gate == NULL || *page->gate & page->gate_mask; }
+
+static bool has_pages(const struct region_user *region)
+{
+    return region->number == region->core->paged_region && !region->core->shared.is_python;
+}
+
+uint64_t core_read_io(void *engine, uint64_t at, unsigned size, void *user)
+{
+    (void)engine;
+    const struct region_user *region = user;
+    struct core *core = region->core;
+    const uint32_t offset = (uint32_t)at;
+    if (has_pages(region) && offset >> PAGE_SHIFT < PAGES) {
+        const struct page *page = &core->pages[offset >> PAGE_SHIFT];
+        const uint32_t index = (offset & ((1u << PAGE_SHIFT) - 1)) >> 2;
+        if (page->words != NULL && index < page->count && page->behaviour[index] & READS_PLAIN && is_clocked(page) &&
+            !is_over(core)) {
+            const uint32_t word = page->words[index];
+            return size == 4 ? word : (word >> (offset & 3) * 8) & ((1u << size * 8) - 1);
+        }
+    }
+    return ask_read(core, region, offset, size);
+}
+
+void core_write_io(void *engine, uint64_t at, unsigned size, uint64_t value, void *user)
+{
+    (void)engine;
+    const struct region_user *region = user;
+    struct core *core = region->core;
+    const uint32_t offset = (uint32_t)at;
+    if (has_pages(region) && offset >> PAGE_SHIFT < PAGES && size == 4) {
+        struct page *page = &core->pages[offset >> PAGE_SHIFT];
+        const uint32_t index = (offset & ((1u << PAGE_SHIFT) - 1)) >> 2;
+        if (page->words != NULL && index < page->count && is_clocked(page) && !is_over(core)) {
+            if (page->behaviour[index] & WRITES_PLAIN) {
+                const uint32_t *mask = page->masks[index];
+                const uint32_t written = (uint32_t)value, before = page->words[index];
+                page->words[index] =
+                    (before & mask[0] & ~(written & mask[2]) & (written | ~mask[3])) | (written & mask[1]);
+                return;
+            }
+            if (page->port != NULL && write_port(core, page, index, (uint32_t)value)) {
+                return;
+            }
+        }
+    }
+    ask_write(core, region, offset, size, (uint32_t)value);
+}

@@ -1,0 +1,225 @@
+/* The state of one native core, shared with Python: the struct begins with what both sides see.
+ *
+ * Invariant: `Shared` has the layout of bluepill_sim/cpu/native_state.py, whose
+ * size is checked against `core_shared_bytes` when the library is loaded.
+ */
+#ifndef BLUEPILL_CORE_H
+#define BLUEPILL_CORE_H
+
+#include <stdbool.h>
+#include <stddef.h>
+#include <stdint.h>
+
+#define NEVER (UINT64_C(1) << 62)
+#define NO_TIME UINT64_MAX
+#define LIKELY(x) __builtin_expect(!!(x), 1)
+#define UNLIKELY(x) __builtin_expect(!!(x), 0)
+
+/* Why a run ended; the order is that of bluepill_sim/cpu/native_state.py. */
+enum halt {
+    HALT_BORDER,
+    HALT_EXCEPTION_RETURN,
+    HALT_SUPERVISOR_CALL,
+    HALT_BREAKPOINT,
+    HALT_WAIT_INTERRUPT,
+    HALT_WAIT_EVENT,
+    HALT_UNDEFINED,
+    HALT_NO_COPROCESSOR,
+    HALT_INVALID_STATE,
+    HALT_READ_ERROR,
+    HALT_WRITE_ERROR,
+    HALT_FETCH_ERROR,
+    HALT_EXECUTE_NEVER,
+    HALT_DIVIDE_BY_ZERO,
+    HALT_UNALIGNED,
+    /* For Python alone: an exception is to be entered that this core leaves to it; a callback failed;
+     * blocks have to be translated again; a hook froze the state; the library came back without a reason. */
+    HALT_DELIVER,
+    HALT_FAILED,
+    HALT_STALE,
+    HALT_FROZEN,
+    HALT_UNEXPLAINED,
+    HALT_NONE
+};
+
+/* What a block needs beyond adding up its cycles, and how it ends. */
+enum row_flag {
+    ROW_CHANGES_MASKS = 1,
+    ROW_SENDS_EVENT = 2,
+    ROW_SELF_LOOP = 4,
+    ROW_WRITABLE = 8,
+    ROW_ATTENTION = 15,
+    ROW_ENDS_IN_WFI = 16,
+    ROW_ENDS_IN_WFE = 32,
+    ROW_ENDS_IN_YIELD = 64,
+    /* Hooks note the PC of each access. */
+    ROW_NOTED = 128
+};
+
+/* An instruction of a block: where it starts in time, and which memory it reaches for. */
+struct instruction {
+    uint32_t address;
+    uint32_t cycle;
+    int32_t offset;
+    uint8_t kind; /* 0: no access of interest, 1: load, 2: store */
+    uint8_t bytes;
+    uint8_t base;
+    uint8_t index; /* 255: none */
+    uint8_t shift;
+    uint8_t count; /* words of a multiple transfer, else 1 */
+    uint8_t padding[2];
+};
+
+struct row {
+    uint32_t start, end, straight, taken, flags, count;
+    const uint8_t *host; /* of code in writable memory: where it stands now */
+    uint8_t *code;       /* and what it was when it was measured */
+    struct row *next;    /* in the list of all rows, or of dropped ones */
+    struct instruction instructions[];
+};
+
+struct shared {
+    uint64_t cycle, stop_at, access_cycle, last_sleep_cycle;
+    uint64_t tick_base, tick_next;
+    uint64_t pending[2], active[2], enabled, levels;
+    uint32_t access_pc, in_access;
+    uint32_t pc, is_thumb;
+    uint32_t mask_stop, attention;
+    uint32_t halt_kind, halt_pc, halt_address, halt_has_address;
+    uint32_t run_from, uses_exclusive;
+    uint32_t exception_number, sleep, event_register, vector_table, scr, ccr;
+    uint32_t tick_control, tick_reload, tick_value, tick_count_flag;
+    uint32_t traps_division, grouping;
+    uint32_t it_state, is_python;
+    uint32_t pins_changed, padding;
+    uint64_t last_pin_cycle; /* the start of the block that last switched a pin silently */
+    uint8_t priorities[80];
+    /* Set by Python before the first run. */
+    uint64_t sram, flash;
+    uint32_t sram_base, sram_bytes, flash_base, flash_bytes;
+    uint32_t scratch, scratch_end;
+};
+
+/* The functions of Unicorn that this core calls. */
+struct engine_api {
+    int (*start)(void *, uint64_t, uint64_t, uint64_t, size_t);
+    int (*stop)(void *);
+    int (*read_register)(void *, int, void *);
+    int (*write_register)(void *, int, const void *);
+    int (*read_registers)(void *, const int *, void **, int);
+    int (*write_registers)(void *, const int *, void *const *, int);
+};
+
+/* A block that began, an exception that was entered (its number) or left (-1). */
+struct record {
+    uint64_t cycle;
+    uint32_t address;
+    int32_t kind;
+};
+
+/* What Python is asked: each is void where Python keeps an exception for later. */
+struct callbacks {
+    void (*unknown_block)(uint32_t address, uint32_t size);
+    uint32_t (*read)(uint32_t region, uint32_t offset, uint32_t size);
+    void (*write)(uint32_t region, uint32_t offset, uint32_t size, uint32_t value);
+    void (*trapped)(uint32_t kind, uint32_t pc, uint32_t address);
+    void (*recorded)(const struct record *rows, uint32_t count);
+};
+
+#define FLASH_SLOTS 65536
+#define SRAM_SLOTS 10240
+#define PAGE_SHIFT 10
+#define PAGES 144
+
+/* A page of peripheral registers, as declared; `words` is null where Python decides everything. */
+struct page {
+    uint32_t *words;
+    const uint32_t *gate;
+    uint32_t gate_mask;
+    uint32_t count;
+    const uint8_t *behaviour; /* of each word: bits of enum behaviour */
+    const uint32_t (*masks)[4];
+    struct port *port;
+};
+
+enum behaviour { READS_PLAIN = 1, WRITES_PLAIN = 2 };
+
+/* What lives as long as the core. */
+struct allocation {
+    struct allocation *next;
+    max_align_t data[];
+};
+
+/* One GPIO port whose plain outputs are switched here. */
+struct port {
+    uint32_t simple;  /* pins whose output this core may switch alone */
+    uint32_t changed; /* pins it has switched since Python looked */
+};
+
+struct core {
+    struct shared shared;
+    void *engine;
+    struct engine_api api;
+    struct callbacks calls;
+    struct row *block;
+    uint32_t io_next;
+    struct row none;
+    struct row *flash_rows[FLASH_SLOTS];
+    struct row *sram_rows[SRAM_SLOTS];
+    struct row *other_row; /* of code that is neither in flash nor in SRAM: the last one */
+    struct row *all, *dropped;
+    struct page pages[PAGES];
+    struct port ports[8];
+    uint32_t is_scratch;
+    uint32_t noted, spins_at;
+    uint32_t paged_region;
+    struct allocation *allocations;
+    struct record *records;
+    uint32_t record_count, record_room;
+};
+
+/* blocks.c */
+void core_on_block(void *engine, uint64_t address, uint32_t size, void *user);
+void end_run(struct core *core, uint32_t kind, uint32_t pc);
+void free_dropped(struct core *core);
+const struct instruction *instruction_at(const struct row *row, uint32_t address);
+void record(struct core *core, uint32_t address, int32_t kind);
+void core_flush(struct core *core);
+/* access.c */
+void resolve(struct core *core, uint32_t address, bool is_write, uint32_t bytes);
+/* gpio.c */
+bool write_port(struct core *core, struct page *page, uint32_t index, uint32_t value);
+/* run.c */
+void *allocate(struct core *core, size_t bytes);
+uint32_t read_register(struct core *core, int number);
+void write_register(struct core *core, int number, uint32_t value);
+uint32_t run_slice(struct core *core);
+void clear_exclusive(struct core *core);
+/* exceptions.c */
+uint64_t deliverable(const struct core *core, uint64_t *high);
+bool wakes(struct core *core);
+int deliver(struct core *core);
+bool leave(struct core *core, uint32_t exc_return);
+bool supervisor_call(struct core *core, uint32_t pc);
+void tick(struct core *core);
+int execution_priority(struct core *core, bool ignores_primask);
+
+/* Register numbers of Unicorn 2 (arm.h). */
+enum {
+    REG_CPSR = 3,
+    REG_LR = 10,
+    REG_PC = 11,
+    REG_SP = 12,
+    REG_R0 = 66,
+    REG_R12 = 78,
+    REG_IPSR = 114,
+    REG_MSP = 115,
+    REG_PSP = 116,
+    REG_CONTROL = 117,
+    REG_XPSR = 120,
+    REG_PRIMASK = 123,
+    REG_BASEPRI = 124,
+    REG_FAULTMASK = 126
+};
+
+#endif

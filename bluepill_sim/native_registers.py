@@ -1,0 +1,107 @@
+"""The declared registers, handed to the native core: those that only store need no Python.
+
+    reads plain    the register has no `on_read`
+    writes plain   it has no `on_write`
+    GPIO           BSRR, BRR and ODR, while nothing but IDR follows from a pin's level
+
+An access goes to Python when its page has no clock, when a peripheral is due
+before the block ends, and for everything else.
+
+Invariant: a pin is marked as simple only after Python has set it up as one, and
+loses the mark with each change of what made it so.
+"""
+
+import ctypes
+from collections.abc import Callable, Iterable
+from typing import TYPE_CHECKING
+
+from bluepill_sim.cpu import Engine
+from bluepill_sim.gpio import Gpio
+from bluepill_sim.peripheral import Peripheral
+from bluepill_sim.pins import PinBank
+from bluepill_sim.rcc import Rcc
+from bluepill_sim.stm32f103 import CLOCK_GATES, PERIPHERAL_BASE
+
+if TYPE_CHECKING:
+    from bluepill_sim.cpu.native_engine import NativeEngine
+
+_READS_PLAIN, _WRITES_PLAIN = 1, 2
+_PAGE_SHIFT = 10
+
+
+class _Port(ctypes.Structure):
+    """`struct port`."""
+
+    _fields_ = (("simple", ctypes.c_uint32), ("changed", ctypes.c_uint32))
+
+
+class SharedPorts:
+    """The GPIO ports whose plain outputs C switches."""
+
+    def __init__(self, engine: "NativeEngine", bank: PinBank, ns_of: Callable[[int], int]) -> None:
+        self._engine = engine
+        self._ns_of = ns_of
+        self._was_heard = True
+        self._bank = bank
+        self._ports: list[tuple[Gpio, _Port]] = []
+
+    def add(self, gpio: Gpio, port: _Port) -> None:
+        """Share a port."""
+        self._ports.append((gpio, port))
+
+    def take_over(self) -> None:
+        """Do what C has done to pins, before anybody looks at them."""
+        shared, bank = self._engine.shared, self._bank
+        shared.pins_changed = 0
+        on_output, bank.on_output = bank.on_output, None
+        for gpio, port in self._ports:
+            changed, port.changed = port.changed, 0
+            if changed:
+                gpio.repeat_outputs(changed)
+        bank.on_output = on_output
+        if bank.on_silent_output is not None:
+            bank.on_silent_output(self._ns_of(shared.last_pin_cycle))
+
+    def mark(self) -> None:
+        """Tell C which pins are simple, before a run."""
+        bank = self._bank
+        is_heard = bank.is_heard() or bool(bank.wire_listeners)
+        if bank.simple_is_known and is_heard is self._was_heard:
+            return
+        bank.simple_is_known, self._was_heard = True, is_heard
+        for gpio, port in self._ports:
+            port.simple = 0 if is_heard else gpio.simple_outputs()
+
+
+def share_registers(
+    engine: Engine, parts: Iterable[Peripheral], rcc: Rcc, bank: PinBank, ns_of: Callable[[int], int]
+) -> None:
+    """Hand the registers of a chip to its engine, if it is a native one."""
+    from bluepill_sim.cpu.native_engine import NativeEngine
+    from bluepill_sim.cpu.native_library import library
+
+    if not isinstance(engine, NativeEngine):
+        return
+    ports = SharedPorts(engine, bank, ns_of)
+    state, calls = engine.state, library()
+    calls.core_set_paged_region(state, engine.region_at(PERIPHERAL_BASE))
+    for part in parts:
+        count = len(part.REGISTERS) and max(register.offset for register in part.REGISTERS) // 4 + 1
+        behaviour = (ctypes.c_uint8 * count)()
+        masks = (ctypes.c_uint32 * (4 * count))()
+        for register in part.REGISTERS:
+            index = register.offset // 4
+            behaviour[index] = _READS_PLAIN * (register.on_read is None) | _WRITES_PLAIN * (register.on_write is None)
+            masks[4 * index : 4 * index + 4] = list(part.masks_of(index))
+        number = -1
+        if isinstance(part, Gpio):
+            number = ord(part.name[-1]) - ord("A")
+            ports.add(part, _Port.from_address(calls.core_port(state, number)))
+        gate = CLOCK_GATES.get(part.name)
+        at, mask = rcc.gate_address(part.name) if gate is not None else (None, 0)
+        words, _ = part.words.buffer_info()
+        engine.keep(behaviour, masks)
+        page = part.base - PERIPHERAL_BASE >> _PAGE_SHIFT
+        calls.core_set_page(state, page, words, count, at, mask, behaviour, masks, number)
+    engine.before_access = ports.take_over
+    engine.before_run = ports.mark

@@ -1,0 +1,54 @@
+"""The native core runs under the address and undefined-behaviour sanitizers, and with every warning an error."""
+
+import os
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+SOURCES = sorted((Path(__file__).parents[2] / "bluepill_sim" / "native").glob("*.c"))
+COMPILER = shutil.which("gcc")
+PROGRAM = """
+import sys
+from importlib.resources import files
+from bluepill_sim.cpu import native_library
+native_library.path = lambda: sys.argv[1]
+from bluepill_sim import BluePill
+for name in ("dodge", "encoders"):
+    board = BluePill(str(files("testbench.firmware") / f"{name}.elf"))
+    board.chip.record_blocks(100)
+    for step in range(40):
+        board.pin("PA4").drive(step % 3 == 0)
+        board.usart1.receive(b"x")
+        board.advance_to(board.now_ns + 777_777)
+    snapshot = board.snapshot()
+    board.advance_to(board.now_ns + 5_000_000)
+    board.restore(snapshot)
+    board.advance_to(board.now_ns + 5_000_000)
+print(type(board.chip.engine).__name__)
+"""
+
+pytestmark = pytest.mark.skipif(COMPILER is None, reason="no C compiler")
+
+
+def run(*command: str, **environment: str) -> str:
+    done = subprocess.run(
+        command, capture_output=True, text=True, timeout=120, check=False, env={**os.environ, **environment}
+    )
+    assert done.returncode == 0, done.stderr[-4000:]
+    return done.stdout
+
+
+def test_no_warning_and_no_finding(tmp_path: Path) -> None:
+    library = tmp_path / "core.so"
+    run(
+        "gcc", "-std=c11", "-O1", "-g", "-Wall", "-Wextra", "-Wconversion", "-Wno-sign-conversion", "-Werror", "-fPIC",
+        "-shared", "-fsanitize=address,undefined", "-fno-sanitize-recover=all", "-o", str(library), *map(str, SOURCES),
+    )  # fmt: skip
+    preload = run("gcc", "-print-file-name=libasan.so").strip()
+    if not Path(preload).is_file():
+        pytest.skip("the compiler comes without a sanitizer's library")
+    told = run(sys.executable, "-c", PROGRAM, str(library), LD_PRELOAD=preload, ASAN_OPTIONS="detect_leaks=0")
+    assert told.split() == ["NativeEngine"]
