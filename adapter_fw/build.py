@@ -2,6 +2,8 @@
 
     host       the self-test, with sanitizers
     program    p2os-adapter: the adapter as a PC program on any line (host/)
+    units      checks of the core's single parts, with sanitizers
+    library    the Arduino library against a robot of a few lines, with sanitizers (library/)
     replay     the fuzzing target with its corpus' reader, with sanitizers (fuzz/)
     cortex-m   the self-test on an STM32F103
     bluepill   the adapter itself on an STM32F103, its USART as the P2OS line (bluepill/)
@@ -54,10 +56,10 @@ class Target:
     is_small: bool = False
 
 
-def _on_host(output: str, *sources: Path) -> Target:
-    return Target(
-        output=output, compiler="g++", package="g++", flags=SANITIZERS, sources=sources, link=SANITIZERS
-    )  # fmt: skip
+def _on_host(output: str, *sources: Path, include: tuple[Path, ...] = ()) -> Target:
+    folders = [word for folder in include for word in ("-isystem", str(folder))]
+    flags = (*SANITIZERS, *folders)
+    return Target(output=output, compiler="g++", package="g++", flags=flags, sources=sources, link=SANITIZERS)
 
 
 def _on_cortex_m(output: str, *sources: Path) -> Target:
@@ -76,6 +78,11 @@ def _on_cortex_m(output: str, *sources: Path) -> Target:
 TARGETS = {
     "host": _on_host("selftest-host", *LIFE, SELFTEST / "host.cpp"),
     "program": _on_host("p2os-adapter", *sorted((HERE / "host").glob("*.cpp"))),
+    "units": _on_host("units", SELFTEST / "units.cpp"),
+    "library": _on_host(
+        "library", SELFTEST / "library.cpp", SELFTEST / "robot.cpp", HERE / "library" / "src" / "P2OSClient.cpp",
+        include=(HERE / "core", HERE / "library" / "src", HERE / "stubs" / "arduino"),
+    ),
     "replay": _on_host("replay", *sorted((HERE / "fuzz").glob("*.cpp")), SELFTEST / "robot.cpp"),
     "cortex-m": _on_cortex_m("selftest-cortex-m.elf", *LIFE, SELFTEST / "cortex_m.cpp"),
     "bluepill": _on_cortex_m("adapter-bluepill.elf", *sorted((HERE / "bluepill").glob("*.cpp"))),
@@ -134,7 +141,7 @@ def _version(compiler: str) -> str:
 @cache
 def _headers() -> str:
     """Return what all headers together hash to: any of them may be included by any source."""
-    headers = sorted(path for path in HERE.rglob("*") if path.suffix == ".hpp" or path.parent.name == "include")
+    headers = sorted(path for path in HERE.rglob("*") if path.suffix in {".hpp", ".h"} or path.parent.name == "include")
     return hashlib.sha256(b"".join(path.read_bytes() for path in headers)).hexdigest()
 
 

@@ -45,4 +45,22 @@ constexpr NamedRobot ROBOTS[] = {
     {"seekurjr", {1000000, 4096, 1000, 1000, 357, 400000, 1200, 1200, 80, 2500000}},
 };
 
+constexpr bool is_same_name(const char* one, const char* other) {
+  while (*one != '\0' && *one == *other) {
+    ++one;
+    ++other;
+  }
+  return *one == *other;
+}
+
+// Returns a robot's numbers, nullptr where there is no such subclass.
+constexpr const RobotNumbers* find_robot(const char* subclass) {
+  for (const NamedRobot& robot : ROBOTS) {
+    if (is_same_name(robot.subclass, subclass)) {
+      return &robot.numbers;
+    }
+  }
+  return nullptr;
+}
+
 }  // namespace adapter

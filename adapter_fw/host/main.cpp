@@ -17,6 +17,7 @@
 
 #include "../core/shell/console.hpp"
 #include "../core/shell/runner.hpp"
+#include "../core/shell/teller.hpp"
 #include "../generated/robots.hpp"
 #include "file_store.hpp"
 #include "line.hpp"
@@ -85,30 +86,6 @@ bool read_options(int count, char** words, Options& options) {
   return !options.line.empty();
 }
 
-const adapter::RobotNumbers* find_robot(const std::string& subclass) {
-  for (const adapter::NamedRobot& robot : adapter::ROBOTS) {
-    if (subclass == robot.subclass) {
-      return &robot.numbers;
-    }
-  }
-  return nullptr;
-}
-
-//: Says each event as it comes.
-class Teller final : public adapter::Observer {
- public:
-  Teller(shell::EventLog& log, shell::Writer& writer) : log_(log), writer_(writer) {}
-  void happened(p2os::Nanos now, adapter::What what, const char* detail, std::int32_t first,
-                std::int32_t second) override {
-    log_.happened(now, what, detail, first, second);
-    log_.write_last(writer_);
-  }
-
- private:
-  shell::EventLog& log_;
-  shell::Writer& writer_;
-};
-
 //: Sleeps until something has come or `span` is over; a negative descriptor is left out.
 void wait(const host::Line& line, const host::Wires& wires, int input, p2os::Nanos span) {
   pollfd files[] = {{line.descriptor(), POLLIN, 0},
@@ -133,8 +110,8 @@ int run(const Options& options, host::Line& line, host::Wires& wires, host::File
     err.write("\n");
   }
   shell::EventLog log;
-  Teller teller(log, err);
-  adapter::Adapter part(settings, *find_robot(options.robot), numbers, clock.now());
+  shell::Teller teller(log, err);
+  adapter::Adapter part(settings, *adapter::find_robot(options.robot.c_str()), numbers, clock.now());
   part.attach(&wires, &wires, &teller);
   shell::Console console({part, log, wires, store, out, numbers, "host"});
   shell::Runner runner(part, clock, line, &wires);
@@ -169,7 +146,7 @@ int main(int count, char** words) {
     return refuse("wrong usage",
                   "p2os-adapter --line tcp:HOST:PORT|/dev/ttyUSB0 [--wires SOCKET] [--robot p2dx] [--settings FILE]");
   }
-  if (find_robot(options.robot) == nullptr) {
+  if (adapter::find_robot(options.robot.c_str()) == nullptr) {
     return refuse("there is no robot " + options.robot, "a subclass such as p2dx or p3at");
   }
   struct sigaction action {};

@@ -5,13 +5,15 @@
 
 #include <cstdint>
 
-#include "../core/adapter/settings.hpp"
+#include "../../core/adapter/settings.hpp"
 
 namespace board {
 
 constexpr char REVISION[] = "rev-b";
-//: Driven, in the order of the output word: DD1, DD2, DD3, DD4, DD5, DD6, DD7, DD8, encoder1_s1, encoder1_s2, encoder1_s3, encoder2_s1, encoder2_s2, encoder2_s3.
+//: Driven, in the order of the output word; -1 hangs on the shift register: DD1, DD2, DD3, DD4, DD5, DD6, DD7, DD8, encoder1_s1, encoder1_s2, encoder1_s3, encoder2_s1, encoder2_s2, encoder2_s3.
 constexpr std::int8_t OUTPUT_PINS[] = {23, 13, 5, 25, 19, 18, 26, 27, 22, 21, 2, 14, 12, 15};
+//: Their outputs of the shift register, QA is 0, -1 is none: DD1, DD2, DD3, DD4, DD5, DD6, DD7, DD8, encoder1_s1, encoder1_s2, encoder1_s3, encoder2_s1, encoder2_s2, encoder2_s3.
+constexpr std::int8_t OUTPUT_PLACES[] = {-1, -1, -1, -1, -1, -1, -1, -1, -1, -1, -1, -1, -1, -1};
 //: Read at one instant, in the order of the input word: motor1_comm1, motor1_comm2, motor1_comm3, motor2_comm1, motor2_comm2, motor2_comm3, p2dx_con.
 constexpr std::int8_t INPUT_PINS[] = {36, 39, 34, 35, 33, 32, 4};
 constexpr std::int8_t P2OS_RX = 16;
@@ -19,6 +21,9 @@ constexpr std::int8_t P2OS_TX = 17;
 constexpr std::int8_t MODE_JUMPER = 26;
 constexpr std::int8_t MODE_BUTTON = 0;
 constexpr std::int8_t STATUS_LED = -1;
+constexpr std::int8_t SHIFT_DATA = -1;
+constexpr std::int8_t SHIFT_CLOCK = -1;
+constexpr std::int8_t SHIFT_LATCH = -1;
 constexpr adapter::WireNumbers WIRES = {8, 3, 3, 3, 0xFF, 0xFF};
 
 }  // namespace board

@@ -1,0 +1,137 @@
+#include "wires.hpp"
+
+#include <driver/gpio.h>
+#include <esp_rom_sys.h>
+#include <soc/gpio_struct.h>
+
+#include <pins.hpp>
+
+namespace esp32 {
+
+namespace {
+
+constexpr std::size_t OUTPUTS = sizeof board::OUTPUT_PINS;
+constexpr std::size_t INPUTS = sizeof board::INPUT_PINS;
+constexpr bool HAS_SHIFT_REGISTER = board::SHIFT_LATCH >= 0;
+//: Pins below this are in the first registers.
+constexpr int SECOND_REGISTER = 32;
+//: chosen: many times what the pull and the wire need.
+constexpr std::uint32_t SETTLE_US = 1'000;
+
+constexpr bool are_outputs_in_the_first_register() {
+  for (const std::int8_t pin : board::OUTPUT_PINS) {
+    if (pin >= SECOND_REGISTER) {
+      return false;
+    }
+  }
+  return true;
+}
+static_assert(are_outputs_in_the_first_register(), "one write must set every output");
+
+constexpr std::uint64_t bit_of(std::int8_t pin) { return pin >= 0 ? std::uint64_t{1} << pin : 0; }
+
+//: Those pins of the first register that carry the outputs of a word.
+std::uint32_t pins_of(std::uint32_t word) {
+  std::uint64_t pins = 0;
+  for (std::size_t place = 0; place < OUTPUTS; ++place) {
+    pins |= (word >> place & 1U) != 0 ? bit_of(board::OUTPUT_PINS[place]) : 0;
+  }
+  return static_cast<std::uint32_t>(pins);
+}
+
+void set_up(std::uint64_t pins, gpio_mode_t mode, gpio_pulldown_t pull_down, gpio_pullup_t pull_up) {
+  if (pins == 0) {
+    return;
+  }
+  gpio_config_t config = {};
+  config.pin_bit_mask = pins;
+  config.mode = mode;
+  config.pull_down_en = pull_down;
+  config.pull_up_en = pull_up;
+  config.intr_type = GPIO_INTR_DISABLE;
+  ESP_ERROR_CHECK(gpio_config(&config));
+}
+
+}  // namespace
+
+void Wires::start() {
+  std::uint64_t wires = 0;
+  for (const std::int8_t pin : board::INPUT_PINS) {
+    wires |= bit_of(pin);
+  }
+  for (const std::int8_t pin : board::OUTPUT_PINS) {
+    wires |= bit_of(pin);
+  }
+  set_up(wires, GPIO_MODE_INPUT, GPIO_PULLDOWN_DISABLE, GPIO_PULLUP_DISABLE);
+  if constexpr (HAS_SHIFT_REGISTER) {
+    set_up(bit_of(board::SHIFT_DATA) | bit_of(board::SHIFT_CLOCK) | bit_of(board::SHIFT_LATCH), GPIO_MODE_OUTPUT,
+           GPIO_PULLDOWN_DISABLE, GPIO_PULLUP_DISABLE);
+  }
+  release(0);
+}
+
+std::uint32_t Wires::read(p2os::Nanos) {
+  // The second register first and once: the motor bits of one instant.
+  const std::uint64_t second = GPIO.in1.val;
+  const std::uint64_t levels = second << SECOND_REGISTER | GPIO.in;
+  std::uint32_t word = 0;
+  for (std::size_t place = 0; place < INPUTS; ++place) {
+    word |= (levels & bit_of(board::INPUT_PINS[place])) != 0 ? 1U << place : 0;
+  }
+  return word;
+}
+
+// The levels first, then the drivers: a wire never shows an old level.
+void Wires::drive(std::uint32_t mask, std::uint32_t levels, p2os::Nanos) {
+  GPIO.out_w1ts = pins_of(mask & levels);
+  GPIO.out_w1tc = pins_of(mask & ~levels);
+  GPIO.enable_w1ts = pins_of(mask);
+  if constexpr (HAS_SHIFT_REGISTER) {
+    shift((shown_ & ~mask) | (levels & mask));
+  }
+}
+
+void Wires::release(p2os::Nanos) {
+  GPIO.enable_w1tc = pins_of(~0U);
+  if constexpr (HAS_SHIFT_REGISTER) {
+    shift(board::WIRES.safe_levels);
+  }
+}
+
+// The last bit in is QA's.
+void Wires::shift(std::uint32_t levels) {
+  shown_ = levels;
+  const auto clock = static_cast<std::uint32_t>(bit_of(board::SHIFT_CLOCK));
+  const auto data = static_cast<std::uint32_t>(bit_of(board::SHIFT_DATA));
+  const auto latch = static_cast<std::uint32_t>(bit_of(board::SHIFT_LATCH));
+  for (std::int8_t output = 7; output >= 0; --output) {
+    bool level = false;
+    for (std::size_t place = 0; place < OUTPUTS; ++place) {
+      level = level || (board::OUTPUT_PLACES[place] == output && (levels >> place & 1U) != 0);
+    }
+    GPIO.out_w1tc = clock;
+    (level ? GPIO.out_w1ts : GPIO.out_w1tc) = data;
+    GPIO.out_w1ts = clock;
+  }
+  GPIO.out_w1ts = latch;
+  GPIO.out_w1tc = latch;
+}
+
+bool is_pad_jumper_fitted() {
+  if constexpr (board::MODE_JUMPER < 0) {
+    return false;
+  }
+  set_up(bit_of(board::MODE_JUMPER), GPIO_MODE_INPUT, GPIO_PULLDOWN_ENABLE, GPIO_PULLUP_DISABLE);
+  esp_rom_delay_us(SETTLE_US);
+  return gpio_get_level(static_cast<gpio_num_t>(board::MODE_JUMPER)) != 0;
+}
+
+void start_mode_button() {
+  set_up(bit_of(board::MODE_BUTTON), GPIO_MODE_INPUT, GPIO_PULLDOWN_DISABLE, GPIO_PULLUP_ENABLE);
+}
+
+bool is_mode_button_down() {
+  return board::MODE_BUTTON >= 0 && gpio_get_level(static_cast<gpio_num_t>(board::MODE_BUTTON)) == 0;
+}
+
+}  // namespace esp32

@@ -1,0 +1,2 @@
+#pragma once
+extern "C" unsigned char btstack_init(void);
