@@ -7,7 +7,7 @@ namespace hal {
 
 class Pad {
  public:
-  //: Copies the newest report; false where none has come since the last call.
+  //: Copies the oldest report that has not been taken; false where there is none.
   virtual bool take(adapter::PadReport& report) = 0;
 
  protected:

@@ -90,16 +90,17 @@ void Wires::take_line() {
   if (std::sscanf(line_.data(), "in %x%n", &word, &end) == 1 && line_[static_cast<std::size_t>(end)] == '\0') {
     word_ = word;
   } else if (std::sscanf(line_.data(), "pad %d %d %d %d %d", &up, &down, &forward, &backward, &turn) == 5) {
-    report_ = {up != 0, down != 0, forward, backward, turn};
-    has_report_ = true;
+    reports_.push_back({up != 0, down != 0, forward, backward, turn});
   }
 }
 
 bool Wires::take(adapter::PadReport& report) {
-  const bool is_new = has_report_;
-  report = report_;
-  has_report_ = false;
-  return is_new;
+  if (reports_.empty()) {
+    return false;
+  }
+  report = reports_.front();
+  reports_.pop_front();
+  return true;
 }
 
 void Wires::leave() {

@@ -11,6 +11,7 @@
 #pragma once
 
 #include <array>
+#include <deque>
 #include <string>
 
 #include "../core/adapter/settings.hpp"
@@ -51,8 +52,8 @@ class Wires final : public hal::PinsIn, public hal::PinsOut, public hal::Pad {
   std::uint32_t word_ = 0;
   std::uint32_t driven_ = 0;
   std::uint32_t levels_ = 0;
-  adapter::PadReport report_;
-  bool has_report_ = false;
+  //: Reports that came since the last look: a press between two others must not be lost.
+  std::deque<adapter::PadReport> reports_;
   int listener_ = -1;
   int far_side_ = -1;
   std::string path_;

@@ -10,7 +10,7 @@ p2os::Nanos Runner::pass() {
     adapter_.receive({bytes.data(), size}, now);
   }
   adapter::PadReport report;
-  if (pad_ != nullptr && pad_->take(report)) {
+  while (pad_ != nullptr && pad_->take(report)) {
     adapter_.receive_pad(report, now);
   }
   adapter_.advance_to(now);
