@@ -374,7 +374,7 @@ class Adapter:
         if self._state not in OPEN_STATES:
             return
         self._agenda.sips += 1
-        self._agenda.sip_deadline = now + self.settings.liveness_ns
+        self._agenda.sip_deadline = max(now, self._stopper.heard_at + self.settings.liveness_ns)
         for reading in sip.sonar:
             self.distances.take(reading.number, reading.raw_range * self.parameters.range_um_per_count, now)
         if sip.sonar:

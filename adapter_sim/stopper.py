@@ -31,7 +31,8 @@ class Stopper:
         self._at: Nanos = 0
         self._left = 0
         self._in_peace = False
-        self._heard_at: Nanos = 0
+        #: When bytes of the robot came last. A SIP found late, behind a false header, is as old as they are.
+        self.heard_at: Nanos = 0
 
     @property
     def due_at(self) -> Nanos | None:
@@ -40,7 +41,7 @@ class Stopper:
 
     def hear(self, now: Nanos) -> None:
         """Take note that bytes of the robot came."""
-        self._heard_at = now
+        self.heard_at = now
 
     def begin(self, session: Session, now: Nanos) -> None:
         """Say the sequence and CLOSE, and plan its repetitions; `end_in_peace` may follow."""
@@ -62,13 +63,13 @@ class Stopper:
         if self._left and now >= self._at:
             self._left -= 1
             self._at = now + self._period_ns
-            if not self._in_peace or now - self._heard_at < _ECHO_NS:
+            if not self._in_peace or now - self.heard_at < _ECHO_NS:
                 session.abandon(now)
 
     def snapshot(self) -> StopperSnapshot:
         """Return all of it as plain values."""
-        return self._at, self._left, self._in_peace, self._heard_at
+        return self._at, self._left, self._in_peace, self.heard_at
 
     def restore(self, snapshot: StopperSnapshot) -> None:
         """Put back what `snapshot` returned."""
-        self._at, self._left, self._in_peace, self._heard_at = snapshot
+        self._at, self._left, self._in_peace, self.heard_at = snapshot

@@ -146,6 +146,7 @@ class World final : private hal::PinsIn, private hal::PinsOut, private shell::Wr
       robot_.advance_to(now_);
       answer();
       part_.advance_to(now_);
+      note_sips();
       send();
       if (part_.next_deadline() <= now_) {
         broken("a deadline in the past: the loop would spin");
@@ -168,9 +169,15 @@ class World final : private hal::PinsIn, private hal::PinsOut, private shell::Wr
   }
 
   void receive(Bytes bytes) {
-    const std::uint32_t sips = part_.sips();
+    heard_at_ = now_;
     part_.receive(bytes, now_);
-    sip_at_ = part_.sips() != sips ? now_ : sip_at_;
+    note_sips();
+  }
+
+  //: A SIP may be found only when bytes that hid it are given up; it is as old as they are.
+  void note_sips() {
+    sip_at_ = part_.sips() != sips_ ? heard_at_ : sip_at_;
+    sips_ = part_.sips();
   }
 
   void send() {
@@ -224,7 +231,9 @@ class World final : private hal::PinsIn, private hal::PinsOut, private shell::Wr
   shell::Console console_;
   selftest::Robot robot_;
   Nanos now_ = 0;
+  Nanos heard_at_ = 0;
   Nanos sip_at_ = 0;
+  std::uint32_t sips_ = 0;
   std::uint32_t pins_ = 0;
   std::uint32_t said_ = 0;
   std::uint8_t damage_ = 0;

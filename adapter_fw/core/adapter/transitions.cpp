@@ -98,7 +98,8 @@ void Adapter::take_sip(const p2os::Sip& sip, Nanos now) {
     return;
   }
   ++agenda_.sips;
-  agenda_.sip_deadline = now + settings_.liveness_ns;
+  // From when its bytes came: one that was found late, behind a false header, is as old as they are.
+  agenda_.sip_deadline = p2os::later(now, agenda_.heard_at + settings_.liveness_ns);
   for (std::uint8_t place = 0; place < sip.sonar_count; ++place) {
     const p2os::SonarReading reading = sip.sonar(place);
     distances_.take(reading.number, reading.raw_range * robot_.range_um_per_count, now);
