@@ -88,6 +88,7 @@ class Connection:
         identity: Server: what it says in answer to SYNC2.
         watchdog_ns: Server: how long it stays open for motion without a sound frame.
         settings: The client's times, and the firmware family for both.
+        lenient: Server: answers syncs in any order, as AMRISim does.
     """
 
     def __init__(
@@ -97,6 +98,7 @@ class Connection:
         identity: Identity | None = None,
         watchdog_ns: Nanos = WATCHDOG_NS,
         settings: ConnectionSettings | None = None,
+        lenient: bool = False,
     ) -> None:
         self.role = role
         self.settings = settings or ConnectionSettings()
@@ -104,7 +106,9 @@ class Connection:
         self._line = Line()
         self._side: ClientSide | ServerSide
         if role is Role.SERVER:
-            self._side = ServerSide(self._line, identity or Identity("", "Pioneer", "p2dx"), watchdog_ns)
+            self._side = ServerSide(
+                self._line, identity or Identity("", "Pioneer", "p2dx"), watchdog_ns, lenient=lenient
+            )
         else:
             self._side = ClientSide(self._line, self.settings)
 

@@ -7,7 +7,7 @@ from p2os.commands import Command
 from p2os.connection_parts import Line
 from p2os.events import Closed, CommandReceived, Opened, Synchronised, WatchdogExpired, WatchdogRevived
 from p2os.packets import Identity
-from p2os.state import SERVER_ARGUMENT_TABLE, SERVER_TABLE, SYNC2, ConnectionState, Reply
+from p2os.state import LENIENT_TABLE, SERVER_ARGUMENT_TABLE, SERVER_TABLE, SYNC2, ConnectionState, Reply
 from p2os.timing import Nanos
 from p2os.wire import Frame
 
@@ -19,10 +19,11 @@ class ServerSide:
     it is told before the command that the frame carries.
     """
 
-    def __init__(self, line: Line, identity: Identity, watchdog_ns: Nanos) -> None:
+    def __init__(self, line: Line, identity: Identity, watchdog_ns: Nanos, *, lenient: bool = False) -> None:
         self._line = line
         self._identity = identity
         self._watchdog_ns = watchdog_ns
+        self._bare_table = LENIENT_TABLE if lenient else SERVER_TABLE
         self.state = ConnectionState.CLOSED
         self._last_frame_ns: Nanos = 0
         self._expired = False
@@ -38,7 +39,7 @@ class ServerSide:
             self._command(frame)
             return
         table: Mapping[tuple[ConnectionState, int], tuple[ConnectionState, Reply]] = (
-            SERVER_ARGUMENT_TABLE if frame.data else SERVER_TABLE
+            SERVER_ARGUMENT_TABLE if frame.data else self._bare_table
         )
         self.state, reply = table.get((self.state, frame.kind), (self.state, None))
         self._reply(reply, frame, now)

@@ -91,6 +91,17 @@ SERVER_ARGUMENT_TABLE: Mapping[tuple[ConnectionState, int], tuple[ConnectionStat
     (_S.OPEN, SYNC2): (_S.CLOSED, Reply.CLOSE),
 }
 
+#: Server that answers syncs in any order before OPEN, as AMRISim does, which follows its client's number.
+LENIENT_TABLE: Mapping[tuple[ConnectionState, int], tuple[ConnectionState, Reply]] = {
+    **{(state, SYNC0): (_S.SYNC0, Reply.ECHO) for state in (_S.CLOSED, _S.SYNC0, _S.SYNC1, _S.SYNCED)},
+    **{(state, SYNC1): (_S.SYNC1, Reply.ECHO) for state in (_S.CLOSED, _S.SYNC0, _S.SYNC1)},
+    **{(state, SYNC2): (_S.SYNCED, Reply.IDENTIFY) for state in (_S.CLOSED, _S.SYNC0, _S.SYNC1, _S.SYNCED)},
+    (_S.SYNCED, SYNC1): (_S.OPEN, Reply.OPEN),
+    (_S.OPEN, SYNC0): (_S.OPEN, Reply.COMMAND),
+    (_S.OPEN, SYNC1): (_S.OPEN, Reply.COMMAND),
+    (_S.OPEN, SYNC2): (_S.CLOSED, Reply.CLOSE),
+}
+
 #: Client: (state, packet type) → next state while synchronising; a late echo of an earlier sync is no news.
 CLIENT_TABLE: Mapping[tuple[ConnectionState, int], ConnectionState] = {
     (_S.SYNC0, SYNC0): _S.SYNC1,

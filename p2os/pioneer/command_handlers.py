@@ -10,45 +10,15 @@ says what each firmware does.
 
 import math
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
 from enum import Enum
 
+from p2os.command_table import BY_NUMBER
 from p2os.commands import Command, CommandNumber
-from p2os.pioneer.motion import NM_PER_MM, UDEG_PER_DEG, Motion, MotionLimits
-from p2os.pioneer.odometry_counts import DeadReckoning
-from p2os.pioneer.sonar_schedule import SonarSchedule
+from p2os.pioneer.device_handlers import DEVICE_HANDLERS, Handler, number, plain, signed16
+from p2os.pioneer.motion import NM_PER_MM, UDEG_PER_DEG, MotionLimits
+from p2os.pioneer.works import Works
+from p2os.profiles import Profile
 from p2os.timing import Nanos
-
-
-@dataclass(slots=True, kw_only=True)
-class Works:
-    """The parts of a robot that commands act on."""
-
-    motion: Motion
-    reckoning: DeadReckoning
-    sonar: SonarSchedule
-    vel2_divisor: int
-    #: Someone has asked for the configuration, and the answer has not been sent.
-    config_wanted: bool = False
-
-    @property
-    def heading_udeg(self) -> int:
-        """Return how far the robot has turned since the start, in micro-degrees."""
-        return round(math.degrees(self.reckoning.turned_rad) * UDEG_PER_DEG)
-
-    @property
-    def travel_nm(self) -> int:
-        """Return how far the robot has driven along its path since the start, in nanometres."""
-        return round(self.reckoning.travel_mm * NM_PER_MM)
-
-    @property
-    def motors_enabled(self) -> bool:
-        """Tell whether the wheels have power."""
-        return self.motion.is_powered
-
-
-#: Acts on the works and returns whether it could: False when an argument is missing.
-Handler = Callable[[Works, Command, Nanos], bool]
 
 
 class Effect(Enum):
@@ -67,7 +37,7 @@ class Effect(Enum):
 def apply(works: Works, command: Command, now: Nanos) -> Effect:
     """Let a command act."""
     handler = HANDLERS.get(command.number)
-    if handler is None:
+    if handler is None or not is_known(command.number, works):
         return Effect.UNKNOWN
     if not handler(works, command, now):
         return Effect.MALFORMED
@@ -75,51 +45,34 @@ def apply(works: Works, command: Command, now: Nanos) -> Effect:
     return Effect.WAITS if is_to_move and not works.motors_enabled else Effect.DONE
 
 
-def signed16(command: Command) -> int | None:
-    """Return a command's number as the robot reads it, or None when it has none.
-
-    A positive argument from 32768 up is a negative number that a client has
-    packed itself: no robot is told to drive at 32 m/s.
-    """
-    value = command.argument
-    if not isinstance(value, int):
-        return None
-    return value - 0x10000 if 0x8000 <= value <= 0xFFFF else value
-
-
-def _number(act: Callable[[Works, int], None]) -> Handler:
-    """Return a handler of a command whose argument is one number."""
-
-    def handler(works: Works, command: Command, _now: Nanos) -> bool:
-        value = signed16(command)
-        if value is None:
-            return False
-        act(works, value)
-        return True
-
-    return handler
-
-
-def _plain(act: Callable[[Works], None]) -> Handler:
-    """Return a handler of a command whose argument, if any, does not matter."""
-
-    def handler(works: Works, _command: Command, _now: Nanos) -> bool:
-        act(works)
-        return True
-
-    return handler
+def is_known(which: int, works: Works) -> bool:
+    """Tell whether this firmware has a command; where no manual settles it, it has."""
+    row = BY_NUMBER.get(which)
+    return works.lenient or row is None or row.is_known_to(works.profile) is not False
 
 
 def _nothing(_works: Works) -> None:
     """Feed the watchdog, which any packet does."""
 
 
+def _enable(works: Works, value: int) -> None:
+    """Switch the motors, which stay off while the red button is pressed."""
+    if value and works.rack.switches.stop_button:
+        works.notes.append(("motors stay off", "the stop button is pressed"))
+        return
+    works.motion.power(on=value != 0)
+
+
 def _vel2(works: Works, command: Command, _now: Nanos) -> bool:
-    """Set both wheels: the first byte on the wire is the right one (H8 manual, command 32)."""
+    """Set both wheels: the first byte on the wire is the right one (H8 manual, command 32).
+
+    ARCOS makes a translation and a rotation of them, each within its limit.
+    """
     if not isinstance(command.argument, int):
         return False
     right, left = command.signed_bytes
-    works.motion.set_wheels(left * works.vel2_divisor, right * works.vel2_divisor)
+    drive = works.motion.set_wheels if works.profile is not Profile.ARCOS else works.motion.set_wheels_as_turn
+    drive(left * works.vel2_divisor, right * works.vel2_divisor)
     return True
 
 
@@ -147,7 +100,7 @@ def _limit(change: Callable[[MotionLimits, int], MotionLimits]) -> Handler:
     def act(works: Works, value: int) -> None:
         works.motion.limits = change(works.motion.limits, value)
 
-    return _number(act)
+    return number(act)
 
 
 def _sonar(works: Works, command: Command, now: Nanos) -> bool:
@@ -171,28 +124,29 @@ def _config(works: Works) -> None:
 
 
 HANDLERS: Mapping[int, Handler] = {
-    CommandNumber.PULSE: _plain(_nothing),
-    CommandNumber.OPEN: _plain(_nothing),  # of a session that is open already
+    CommandNumber.PULSE: plain(_nothing),
+    CommandNumber.OPEN: plain(_nothing),  # of a session that is open already
     CommandNumber.POLLING: _polling,
-    CommandNumber.ENABLE: _number(lambda works, value: works.motion.power(on=value != 0)),
+    CommandNumber.ENABLE: number(_enable),
     CommandNumber.SETA: _limit(MotionLimits.with_acceleration),
     CommandNumber.SETV: _limit(MotionLimits.with_max_velocity),
-    CommandNumber.SETO: _plain(lambda works: works.reckoning.set_origin()),
-    CommandNumber.MOVE: _number(_move),
-    CommandNumber.ROTATE: _number(lambda works, value: works.motion.set_rotation(value)),
+    CommandNumber.SETO: plain(lambda works: works.reckoning.set_origin()),
+    CommandNumber.MOVE: number(_move),
+    CommandNumber.ROTATE: number(lambda works, value: works.motion.set_rotation(value)),
     CommandNumber.SETRV: _limit(MotionLimits.with_max_rotation),
-    CommandNumber.VEL: _number(lambda works, value: works.motion.set_velocity(value)),
-    CommandNumber.HEAD: _number(_head),
-    CommandNumber.DHEAD: _number(_dhead),
-    CommandNumber.CONFIG: _plain(_config),
-    CommandNumber.RVEL: _number(lambda works, value: works.motion.set_rotation(value)),
-    CommandNumber.DCHEAD: _number(_dchead),
+    CommandNumber.VEL: number(lambda works, value: works.motion.set_velocity(value)),
+    CommandNumber.HEAD: number(_head),
+    CommandNumber.DHEAD: number(_dhead),
+    CommandNumber.CONFIG: plain(_config),
+    CommandNumber.RVEL: number(lambda works, value: works.motion.set_rotation(value)),
+    CommandNumber.DCHEAD: number(_dchead),
     CommandNumber.SETRA: _limit(MotionLimits.with_rotational_acceleration),
     CommandNumber.SONAR: _sonar,
-    CommandNumber.STOP: _plain(lambda works: works.motion.stop()),
+    CommandNumber.STOP: plain(lambda works: works.motion.stop()),
     CommandNumber.VEL2: _vel2,
-    CommandNumber.E_STOP: _plain(lambda works: works.motion.stop_now()),
-    CommandNumber.QSTOP: _plain(lambda works: works.motion.stop_now()),
+    CommandNumber.E_STOP: plain(lambda works: works.motion.stop_now()),
+    CommandNumber.QSTOP: plain(lambda works: works.motion.stop_now()),
+    **DEVICE_HANDLERS,
 }
 
 #: What moves the robot, once its motors are on.

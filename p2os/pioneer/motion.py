@@ -182,6 +182,13 @@ class Motion:
         self._first.set(_clamp(left_mm_s, self.limits.max_velocity_mm_s) * NM_PER_MM)
         self._second.set(_clamp(right_mm_s, self.limits.max_velocity_mm_s) * NM_PER_MM)
 
+    def set_wheels_as_turn(self, left_mm_s: int, right_mm_s: int) -> None:
+        """Turn two wheel speeds into a translation and a rotation, each within its limit (VEL2 of ARCOS)."""
+        self._become(Mode.TRANSLATE_ROTATE)
+        top, turn_top = self.limits.max_velocity_mm_s * NM_PER_MM, self.limits.max_rotation_deg_s * UDEG_PER_DEG
+        self._first.set(_clamp((left_mm_s + right_mm_s) * NM_PER_MM // 2, top))
+        self._second.set(_clamp(round((right_mm_s - left_mm_s) * NM_PER_MM / 2 / self._rim_nm_per_udeg), turn_top))
+
     def move_to(self, travel_nm: int) -> None:
         """Translate until the odometer of `step` shows `travel_nm` (MOVE)."""
         self._become(Mode.TRANSLATE_ROTATE)

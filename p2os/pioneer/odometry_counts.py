@@ -27,13 +27,26 @@ class _Snapshot:
     zero_rad: float
     left_rad: float
     right_rad: float
+    left_mm: float
+    right_mm: float
 
 
 class DeadReckoning:
     """The robot's odometer."""
 
-    def __init__(self, *, wheel_diameter_m: float, track_mm: int) -> None:
-        self._radius_mm = wheel_diameter_m * 500
+    def __init__(
+        self, *, wheel_diameter_m: float, track_mm: int, left_wheel: float = 1.0, right_wheel: float = 1.0
+    ) -> None:
+        """Start at the origin.
+
+        Args:
+            wheel_diameter_m: What the body's wheels measure.
+            track_mm: What the firmware believes.
+            left_wheel: True size of the left wheel over what the firmware believes; the right one alike.
+            right_wheel: The same.
+        """
+        self._left_radius_mm = wheel_diameter_m * 500 / left_wheel
+        self._right_radius_mm = wheel_diameter_m * 500 / right_wheel
         self._track_mm = track_mm
         self._left_rad = 0.0
         self._right_rad = 0.0
@@ -44,6 +57,9 @@ class DeadReckoning:
         self.turned_rad = 0.0
         #: Driven along the path since the start, forward positive.
         self.travel_mm = 0.0
+        #: Way of each rim since the start, as the encoders count it.
+        self.left_mm = 0.0
+        self.right_mm = 0.0
 
     @property
     def heading_rad(self) -> float:
@@ -61,8 +77,8 @@ class DeadReckoning:
 
     def advance(self, left_rad: float, right_rad: float) -> None:
         """Count on to these wheel angles."""
-        left_mm = (left_rad - self._left_rad) * self._radius_mm
-        right_mm = (right_rad - self._right_rad) * self._radius_mm
+        left_mm = (left_rad - self._left_rad) * self._left_radius_mm
+        right_mm = (right_rad - self._right_rad) * self._right_radius_mm
         if not left_mm and not right_mm:
             return
         self._left_rad, self._right_rad = left_rad, right_rad
@@ -73,6 +89,12 @@ class DeadReckoning:
         self.y_mm += along * math.sin(middle)
         self.turned_rad += turn
         self.travel_mm += along
+        self.left_mm += left_mm
+        self.right_mm += right_mm
+
+    def drift(self, turn_rad: float) -> None:
+        """Believe to have turned by a little more than the wheels say."""
+        self.turned_rad += turn_rad
 
     def set_origin(self) -> None:
         """Make this pose the origin (SETO)."""
@@ -89,14 +111,16 @@ class DeadReckoning:
     def snapshot(self) -> object:
         """Return all that decides the future."""
         return _Snapshot(
-            self.x_mm, self.y_mm, self.turned_rad, self.travel_mm, self._zero_rad, self._left_rad, self._right_rad
-        )
+            self.x_mm, self.y_mm, self.turned_rad, self.travel_mm, self._zero_rad, self._left_rad, self._right_rad,
+            self.left_mm, self.right_mm,
+        )  # fmt: skip
 
     def restore(self, snapshot: object) -> None:
         """Put back what `snapshot` returned."""
         saved = cast("_Snapshot", snapshot)
         self.x_mm, self.y_mm, self._zero_rad = saved.x_mm, saved.y_mm, saved.zero_rad
         self.turned_rad, self.travel_mm = saved.turned_rad, saved.travel_mm
+        self.left_mm, self.right_mm = saved.left_mm, saved.right_mm
         self.begin(saved.left_rad, saved.right_rad)
 
 

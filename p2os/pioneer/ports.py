@@ -44,6 +44,30 @@ class WheelState(WheelAngles, Protocol):
         ...
 
 
+class SensedState(WheelState, Protocol):
+    """What compass, gyro and bumpers look at: how the body really stands and turns."""
+
+    @property
+    def heading_rad(self) -> float:
+        """Heading in the world, counter-clockwise from x."""
+        ...
+
+    @property
+    def pitch_rad(self) -> float:
+        """Pitch."""
+        ...
+
+    @property
+    def turn_radps(self) -> float:
+        """Rate of turn, counter-clockwise positive."""
+        ...
+
+    @property
+    def in_contact(self) -> bool:
+        """Whether the hull touches anything but the floor."""
+        ...
+
+
 class Body(Protocol):
     """A body that is stepped."""
 
@@ -53,7 +77,7 @@ class Body(Protocol):
         ...
 
     @property
-    def state(self) -> WheelState:
+    def state(self) -> SensedState:
         """What the sensors know now."""
         ...
 

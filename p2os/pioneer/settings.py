@@ -1,9 +1,11 @@
-"""What the real robot keeps in FLASH, and how this one is asked to behave."""
+"""How a virtual robot is asked to behave: its firmware, its FLASH, its line, its sensors' errors."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from enum import Enum
 
 from p2os.errors import UsageError
+from p2os.pioneer.flash import BAUD_RATES, Flash
+from p2os.pioneer.sensor_errors import IDEAL, SensorErrors
 from p2os.profiles import Profile
 from p2os.timing import NS_PER_MS, NS_PER_S, Nanos
 
@@ -37,11 +39,19 @@ class ControllerSettings:
     name: str = "Virtual"
     serial: str = "VIRTUAL"
     profile: Profile = Profile.P2OS
+    #: Answers syncs out of order and obeys what any family knows, as AMRISim does.
+    lenient: bool = False
     sip_period_ns: Nanos = 100 * NS_PER_MS
     watchdog_ns: Nanos = 2 * NS_PER_S
     sonar_per_sip: SonarPerSip = SonarPerSip.TWO
-    #: A charged lead-acid battery; it does not run down.
+    #: The battery's resting voltage at the start; it drains from there.
     battery_decivolts: int = 126
+    #: Speed of the host's line, bit/s; None: a line that takes no time.
+    baud: int | None = None
+    flash: Flash = field(default_factory=Flash)
+    errors: SensorErrors = IDEAL
+    #: Decides every random error.
+    seed: int = 0
 
     def __post_init__(self) -> None:
         period_ms = self.sip_period_ns / NS_PER_MS
@@ -49,3 +59,17 @@ class ControllerSettings:
             raise UsageError(f"a packet every {period_ms:g} ms is not between 1 and {LONGEST_SIP_PERIOD_MS} ms")
         if not 0 <= self.battery_decivolts <= 0xFF:
             raise UsageError(f"a battery of {self.battery_decivolts / 10:g} V does not fit the packet (0 to 25.5 V)")
+        if self.baud is not None and self.baud not in BAUD_RATES:
+            rates = ", ".join(str(rate) for rate in BAUD_RATES)
+            raise UsageError(f"a line of {self.baud} bit/s is none that HOSTBAUD names", hint=f"rates: {rates}")
+
+    def with_flash(self, flash: Flash) -> "ControllerSettings":
+        """Return these settings with what a FLASH file says."""
+        return replace(
+            self,
+            flash=flash,
+            name=flash.text("name"),
+            serial=flash.text("serial"),
+            sip_period_ns=flash.number("sipcycle") * NS_PER_MS,
+            watchdog_ns=flash.number("watchdog") * NS_PER_MS,
+        )

@@ -4,8 +4,9 @@ A Pioneer 2 fires its ring in turn and each packet carries only what is new: two
 readings a cycle on a P2-DX (the SIP captured from one carries two). The real
 order of firing is settable (POLLING); the default here is the ring's.
 
-Pings stand a half and a whole cycle after the last packet; a bank that reports
-every sonar in every packet takes all readings at the end of the cycle.
+Pings stand a half and a whole cycle after the last packet, or as SONARCYCLE
+says; a bank that reports every sonar in every packet takes all readings at the
+end of the cycle.
 """
 
 from collections.abc import Sequence
@@ -38,6 +39,7 @@ class _Snapshot:
     cycle_start: Nanos
     pings_done: int
     readings: tuple[tuple[int, int], ...]
+    interval_ns: Nanos | None
 
 
 class SonarSchedule:
@@ -60,6 +62,16 @@ class SonarSchedule:
         self._cycle_start: Nanos = 0
         self._pings_done = 0
         self._readings: list[tuple[int, int]] = []
+        #: SONARCYCLE; None spreads the usual pings over the cycle.
+        self._interval_ns: Nanos | None = None
+
+    def set_interval(self, interval_ns: Nanos, now: Nanos) -> None:
+        """Fire one sonar each so often (SONARCYCLE), as many as the cycle has room for."""
+        if self._pings_per_cycle is None:
+            return
+        self._interval_ns = interval_ns
+        self._pings_done = 0
+        self._skip_passed(now)
 
     def start_cycle(self, now: Nanos) -> None:
         """Begin the cycle that ends with the packet at `now` + the cycle's length."""
@@ -108,8 +120,9 @@ class SonarSchedule:
     def snapshot(self) -> object:
         """Return all that decides the future."""
         return _Snapshot(
-            self.order, self.is_on, self._next_index, self._cycle_start, self._pings_done, tuple(self._readings)
-        )
+            self.order, self.is_on, self._next_index, self._cycle_start, self._pings_done, tuple(self._readings),
+            self._interval_ns,
+        )  # fmt: skip
 
     def restore(self, snapshot: object) -> None:
         """Put back what `snapshot` returned."""
@@ -118,12 +131,17 @@ class SonarSchedule:
         self._next_index, self._pings_done = saved.next_index, saved.pings_done
         self._cycle_start = saved.cycle_start
         self._readings = list(saved.readings)
+        self._interval_ns = saved.interval_ns
 
     @property
     def _per_cycle(self) -> int:
+        if self._interval_ns is not None:
+            return max(self._cycle_ns // self._interval_ns, 1)
         return self._pings_per_cycle or 1
 
     def _ping_time(self, index: int) -> Nanos:
+        if self._interval_ns is not None:
+            return self._cycle_start + min((index + 1) * self._interval_ns, self._cycle_ns)
         return self._cycle_start + (index + 1) * self._cycle_ns // self._per_cycle
 
     def _skip_passed(self, now: Nanos) -> None:

@@ -24,6 +24,10 @@ class WheelAngles:
     right_speed_mps: float = 0.0
     stalled_left: bool = False
     stalled_right: bool = False
+    heading_rad: float = 0.0
+    pitch_rad: float = 0.0
+    turn_radps: float = 0.0
+    in_contact: bool = False
 
 
 @dataclass

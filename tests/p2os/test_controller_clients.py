@@ -48,7 +48,7 @@ def test_aria_connects_drives_and_leaves(make_robot: MakeRobot, aria: Capture) -
     assert robot.told()[-1] == "closed"
     assert "watchdog expired" not in robot.told(), "whatever ARIA sends feeds the watchdog"
     ignored = {detail for _, what, detail in robot.events if what == "command ignored"}
-    assert ignored == {"BATTERYINFO: unknown", "DIGOUT: unknown"}
+    assert ignored == {"BATTERYINFO: unknown"}
     assert not robot.pioneer.state.motors_enabled
 
 

@@ -61,8 +61,8 @@ def test_wheel_speeds_and_translation_cancel_each_other(robot: Any) -> None:
     assert left == -right < 0, "the speed of VEL2 is not left"
 
 
-def test_rotate_is_rotation(robot: Any) -> None:
-    robot.open()
+def test_rotate_is_rotation(make_robot: MakeRobot) -> None:
+    robot = make_robot(profile=Profile.AROS).open()
     robot.say(C.ROTATE, -20)
     left, right = settle(robot)
     assert left == -right > 0
@@ -74,8 +74,8 @@ def test_an_unsigned_word_is_read_as_signed_and_never_as_full_speed(robot: Any) 
     assert settle(robot) == (-200, -200)
 
 
-def test_stop_slows_down_and_emergency_stop_does_not(robot: Any) -> None:
-    robot.open()
+def test_stop_slows_down_and_emergency_stop_does_not(make_robot: MakeRobot) -> None:
+    robot = make_robot(profile=Profile.ARCOS).open()
     for number, after_one_step in ((C.STOP, 199.7), (C.E_STOP, 0), (C.QSTOP, 0)):
         robot.say(C.VEL, 200)
         settle(robot)

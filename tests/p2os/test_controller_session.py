@@ -58,7 +58,7 @@ def test_motors_are_off_on_a_new_connection_and_who_drives_is_told(robot: Any) -
     robot.open(motors=False)
     for _ in range(3):
         robot.say(C.VEL, 200)
-    for number in (C.RVEL, C.VEL2, C.ROTATE):
+    for number in (C.RVEL, C.VEL2):
         robot.say(number, 0)
     robot.run(1000)
     assert not robot.pioneer.state.motors_enabled
@@ -242,7 +242,8 @@ def test_a_robot_tells_its_configuration(make_robot: MakeRobot, profile: Profile
     assert (config.robot_class, config.subclass, config.name) == ("Pioneer", "p2dx", "Wilma")
     assert (config.rotveltop, config.transveltop, config.transvelmax) == (500, 2200, 400)
     assert (config.transacc, config.transdecel, config.rotacc, config.rotdecel) == (300, 300, 100, 100)
-    assert (config.sipcycle, config.watchdog, config.autobaud) == (100, 2000, 0)
+    assert (config.sipcycle, config.watchdog) == (100, 2000)
+    assert config.autobaud == (0 if profile is Profile.P2OS else 1), "HOSTBAUD works, and nobody need use it"
     assert config.fields_sent == {Profile.P2OS: 36, Profile.AROS: 42, Profile.ARCOS: 67}[profile]
 
 

@@ -1,0 +1,157 @@
+"""How much the sensors err: every number of it, and the two sets that ship.
+
+`ideal` errs in nothing. `realistic` is what a Pioneer's sensors do by rule of
+thumb; each number is chosen, since no published measurement of a 2-DX was found.
+A TOML file starts from one of them and changes what it names:
+
+    based_on = "realistic"
+    [sonar]
+    noise_m = 0.02
+    [odometry]
+    left_wheel = 1.01
+
+What acts where: `p2os.pioneer.sonar_errors` on the echoes, the odometer on the
+wheel angles, the devices on compass, gyro and battery.
+"""
+
+import tomllib
+from collections.abc import Mapping
+from dataclasses import dataclass, fields, replace
+from difflib import get_close_matches
+from pathlib import Path
+
+from p2os.errors import FileError
+
+
+class SensorErrorsError(FileError):
+    """A file of sensor errors is missing or breaks its schema."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SonarErrors:
+    """What spoils a range."""
+
+    #: Standard deviation of every echo, m, and its part of the range.
+    noise_m: float = 0.0
+    noise_part: float = 0.0
+    #: Chance that an echo is not heard.
+    dropout: float = 0.0
+    #: A surface met at more than this from the square sends no echo back, deg; 90 hears all.
+    specular_deg: float = 90.0
+    #: Chance that a sonar hears the ping of the one fired before it: the range is drawn anew, always nearer.
+    crosstalk: float = 0.0
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class OdometryErrors:
+    """What spoils dead reckoning: true size over the size that the firmware believes."""
+
+    left_wheel: float = 1.0
+    right_wheel: float = 1.0
+    #: Standard deviation of the heading after 1 m of way, deg: it grows with the root of the way.
+    drift_deg: float = 0.0
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class HeadingErrors:
+    """What spoils compass and gyro."""
+
+    compass_noise_deg: float = 0.0
+    #: The same everywhere: iron of the robot itself.
+    compass_bias_deg: float = 0.0
+    #: Counts of the GYROpac; one is 0.95 deg/s.
+    gyro_noise_counts: float = 0.0
+    gyro_bias_counts: float = 0.0
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PowerErrors:
+    """What the voltmeter sees."""
+
+    #: Ohms of battery and cables: the sag under load.
+    battery_resistance_ohm: float = 0.0
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SensorErrors:
+    """All of them."""
+
+    sonar: SonarErrors = SonarErrors()
+    odometry: OdometryErrors = OdometryErrors()
+    heading: HeadingErrors = HeadingErrors()
+    power: PowerErrors = PowerErrors()
+
+
+IDEAL = SensorErrors()
+REALISTIC = SensorErrors(
+    sonar=SonarErrors(noise_m=0.01, noise_part=0.005, dropout=0.01, specular_deg=25.0, crosstalk=0.005),
+    odometry=OdometryErrors(left_wheel=1.002, right_wheel=0.999, drift_deg=0.4),
+    heading=HeadingErrors(compass_noise_deg=2.0, compass_bias_deg=5.0, gyro_noise_counts=0.7, gyro_bias_counts=1.0),
+    power=PowerErrors(battery_resistance_ohm=0.15),
+)
+SETS: Mapping[str, SensorErrors] = {"ideal": IDEAL, "realistic": REALISTIC}
+#: Key → least and most, where it is not "0 and more".
+RANGES: Mapping[str, tuple[float, float]] = {
+    "dropout": (0, 1), "crosstalk": (0, 1), "specular_deg": (0, 90), "left_wheel": (0.5, 2), "right_wheel": (0.5, 2),
+    "compass_bias_deg": (-180, 180), "gyro_bias_counts": (-512, 512),
+}  # fmt: skip
+
+
+def load_sensor_errors(name_or_path: str) -> SensorErrors:
+    """Return a set that ships, or one from a file.
+
+    Raises:
+        SensorErrorsError: There is no such set or file, or it breaks the schema.
+    """
+    if name_or_path in SETS:
+        return SETS[name_or_path]
+    path = Path(name_or_path)
+    if path.suffix != ".toml" and not path.is_file():
+        close = get_close_matches(name_or_path, SETS, n=1)
+        hint = f"did you mean {close[0]}?" if close else f"sets: {', '.join(SETS)}, or a TOML file"
+        raise SensorErrorsError(f"no set of sensor errors {name_or_path!r}", hint=hint)
+    try:
+        table = tomllib.loads(path.read_text(encoding="utf-8"))
+    except (OSError, UnicodeDecodeError) as error:
+        raise SensorErrorsError(f"cannot read {path}: {error}") from error
+    except tomllib.TOMLDecodeError as error:
+        raise SensorErrorsError(f"{path.name}: {error}", hint="it is no TOML") from error
+    return parse_sensor_errors(table, path.name)
+
+
+def parse_sensor_errors(table: Mapping[str, object], where: str) -> SensorErrors:
+    """Return the errors that a table names, from its `based_on`.
+
+    Raises:
+        SensorErrorsError: The table breaks the schema.
+    """
+    base = table.get("based_on", "ideal")
+    if base not in SETS:
+        raise SensorErrorsError(f"{where}: based_on = {base!r} is none of {', '.join(SETS)}")
+    found = SETS[str(base)]
+    sections = [part.name for part in fields(SensorErrors)]
+    for section, values in table.items():
+        if section == "based_on":
+            continue
+        if section not in sections or not isinstance(values, dict):
+            close = get_close_matches(section, sections, n=1)
+            raise SensorErrorsError(
+                f"{where}: unknown table [{section}]", hint=f"did you mean [{close[0]}]?" if close else None
+            )
+        part = getattr(found, section)
+        checked = {key: _value(where, section, key, value, part) for key, value in values.items()}
+        found = replace(found, **{section: replace(part, **checked)})
+    return found
+
+
+def _value(where: str, section: str, key: str, value: object, part: object) -> float:
+    names = [item.name for item in fields(part)]  # type: ignore[arg-type]  # one of the dataclasses above
+    if key not in names:
+        close = get_close_matches(key, names, n=1)
+        hint = f"did you mean {close[0]}?" if close else f"[{section}] has {', '.join(names)}"
+        raise SensorErrorsError(f"{where}: unknown key {section}.{key}", hint=hint)
+    least, most = RANGES.get(key, (0.0, float("inf")))
+    if isinstance(value, bool) or not isinstance(value, (int, float)) or not least <= value <= most:
+        span = f"{least:g} and more" if most == float("inf") else f"{least:g} to {most:g}"
+        raise SensorErrorsError(f"{where}: {section}.{key} = {value!r} is no number of {span}")
+    return float(value)
