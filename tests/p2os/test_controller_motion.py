@@ -8,6 +8,7 @@ import pytest
 
 from p2os.commands import CommandNumber as C
 from p2os.commands import vel2
+from p2os.profiles import Profile
 
 MakeRobot = Callable[..., Any]
 
