@@ -52,12 +52,14 @@ BUMPERS: Mapping[str, tuple[str, str]] = {
     "RearBumpers": ("NumRearBumpers", "rear_bumpers"),
 }
 DEFAULT_BAUD = 9600
+#: chosen: what a measure of a robot may be in ARIA's units; the smallest in use is an angle factor of 0.00153.
+SMALLEST, LARGEST = 1e-6, 1e6
 
 
 def counts_per_turn(radians: float) -> int:
     """Return how many counts of an angle factor make a turn; near a power of two, that power."""
     counts = 2 * math.pi / radians
-    power = 1 << round(math.log2(counts))
+    power = 1 << max(0, round(math.log2(counts)))
     return power if abs(counts / power - 1) < ANGLE_TOLERANCE else round(counts)
 
 
@@ -144,6 +146,8 @@ def _number(source: str, key: str, word: str) -> float:
         number = float(word)
     except ValueError as error:
         raise ParametersError(f"{source}: {key} = {word!r} is no number") from error
-    if not math.isfinite(number):
+    if math.isnan(number):
         raise ParametersError(f"{source}: {key} = {word!r} is no number")
+    if number and not SMALLEST <= abs(number) <= LARGEST:
+        raise ParametersError(f"{source}: {key} = {word!r} is out of range")
     return number

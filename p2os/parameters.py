@@ -9,7 +9,7 @@ from difflib import get_close_matches
 from pathlib import Path
 
 from p2os.aria_file import aria_table
-from p2os.robot_file import build_parameters, file_table, known_robots, shipped_table
+from p2os.robot_file import build_parameters, file_table, known_robots, shipped_table, text_of
 from p2os.robot_model import BodyParameters, Equipment, MotionDefaults, ParametersError, RobotParameters, SonarPose
 
 __all__ = [
@@ -57,8 +57,7 @@ def load_parameters(name_or_path: str | Path) -> RobotParameters:
     if path.suffix == ".toml" and path.is_file():
         return build_parameters(name, file_table(path))
     if path.suffix == ".p" and path.is_file():
-        text = path.read_text(encoding="utf-8", errors="replace")
-        return build_parameters(name, aria_table(name, text, nearest_model))
+        return build_parameters(name, aria_table(name, text_of(path), nearest_model))
     if path.suffix in {".toml", ".p"}:
         raise ParametersError(f"no robot file {name}", hint=f"known models: {', '.join(known_robots())}")
     close = get_close_matches(name.lower(), known_robots(), n=1)

@@ -36,6 +36,10 @@ TOP_KEYS = ("based_on", "subclass", "robot_class", "title")
 MAY_BE_ZERO = frozenset({"front_bumpers", "rear_bumpers", "max_lateral_mm_s"})
 
 
+#: chosen: beyond it a number is a mistake, or no number; the largest in use are nanometres of a few metres.
+LARGEST = 1e12
+
+
 def known_robots() -> tuple[str, ...]:
     """Return the subclasses that ship with the package."""
     return tuple(sorted(path.name.removesuffix(".toml") for path in files("p2os.robots").iterdir()
@@ -45,7 +49,7 @@ def known_robots() -> tuple[str, ...]:
 def shipped_table(name: str) -> Table:
     """Return the table of a shipped model, with what it is based on filled in."""
     text = files("p2os.robots").joinpath(f"{name}.toml").read_text(encoding="utf-8")
-    return _with_base(f"{name}.toml", text)
+    return table_of(f"{name}.toml", text)
 
 
 def file_table(path: Path) -> Table:
@@ -54,13 +58,34 @@ def file_table(path: Path) -> Table:
     Raises:
         ParametersError: The file is not TOML, or what it is based on is no shipped model.
     """
-    return _with_base(str(path), path.read_text(encoding="utf-8", errors="replace"))
+    return table_of(str(path), text_of(path))
 
 
-def _with_base(source: str, text: str) -> Table:
+def text_of(path: Path) -> str:
+    """Return what a user's file holds; bytes that are no UTF-8 are shown as such.
+
+    Raises:
+        ParametersError: The file cannot be read.
+    """
+    try:
+        return path.read_text(encoding="utf-8", errors="replace")
+    except OSError as error:
+        raise ParametersError(f"cannot read {path}: {(error.strerror or str(error)).lower()}") from error
+
+
+def table_of(source: str, text: str) -> Table:
+    """Return the table of a TOML text, with what it is based on filled in.
+
+    Args:
+        source: Its name, for messages.
+        text: TOML.
+
+    Raises:
+        ParametersError: It is not TOML, or what it is based on is no shipped model.
+    """
     try:
         table = tomllib.loads(text)
-    except tomllib.TOMLDecodeError as error:
+    except (tomllib.TOMLDecodeError, RecursionError) as error:
         raise ParametersError(f"{source}: {error}", hint="the file is not TOML") from error
     base = table.get("based_on")
     if base is None:
@@ -74,7 +99,8 @@ def merged(base: Table, table: Table) -> Table:
     """Return a model's table with the keys of another over it, section by section."""
     result = dict(base)
     for key, value in table.items():
-        result[key] = {**result[key], **value} if isinstance(value, dict) and key in result else value
+        old = result.get(key)
+        result[key] = {**old, **value} if isinstance(value, dict) and isinstance(old, dict) else value
     return result
 
 
@@ -97,6 +123,9 @@ def build_parameters(source: str, table: Table) -> RobotParameters:
     motion = _section(source, table, "motion", _keys(MotionDefaults))
     body = _section(source, table, "body", _keys(BodyParameters))
     sonar = _section(source, table, "sonar", SONAR_KEYS)
+    fitted, poses = _value(source, "sonar", sonar, "fitted", int, least=0), _poses(source, sonar.get("poses"))
+    if fitted > len(poses):
+        raise ParametersError(f"{source}: sonar.fitted = {fitted}, but there are only {len(poses)} poses")
     numbers = {f"sonar_{key}": _value(source, "sonar", sonar, key, float) for key in SONAR_KEYS[1:-1]}
     return RobotParameters(
         **values,
@@ -104,8 +133,8 @@ def build_parameters(source: str, table: Table) -> RobotParameters:
         equipment=_equipment(source, table.get("equipment", {})),
         motion=MotionDefaults(**{key: _value(source, "motion", motion, key, int) for key in _keys(MotionDefaults)}),
         body=BodyParameters(**{key: _value(source, "body", body, key, float) for key in _keys(BodyParameters)}),
-        sonar_fitted=_value(source, "sonar", sonar, "fitted", int, least=0),
-        sonar=_poses(source, sonar.get("poses")),
+        sonar_fitted=fitted,
+        sonar=poses,
     )
 
 
@@ -156,6 +185,8 @@ def _value(source: str, section: str, table: Table, key: str, kind: type, least:
     if kind in {str, bool}:
         return value
     number = cast("float", value)
+    if not abs(number) <= LARGEST:
+        raise ParametersError(f"{source}: {name} = {value!r} is out of range")
     if key != "caster_x_m" and not (number > 0 if least is None else number >= least):
         raise ParametersError(f"{source}: {name} = {value!r} must be positive")
     return kind(number)
@@ -163,7 +194,10 @@ def _value(source: str, section: str, table: Table, key: str, kind: type, least:
 
 def _poses(source: str, rows: object) -> tuple[SonarPose, ...]:
     good = isinstance(rows, list) and all(
-        isinstance(row, list) and len(row) == 3 and all(isinstance(item, (int, float)) for item in row) for row in rows
+        isinstance(row, list)
+        and len(row) == 3
+        and all(isinstance(item, (int, float)) and abs(item) <= LARGEST for item in row)
+        for row in rows
     )
     if not good:
         raise ParametersError(f"{source}: sonar.poses must be rows of [x mm, y mm, heading deg]")

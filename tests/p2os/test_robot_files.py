@@ -85,7 +85,10 @@ def test_a_robot_of_ones_own_takes_the_rest_from_its_family(tmp_path: Path) -> N
         ("Subclass p3dx\nDistConvFactor 0\n", "must be positive"),
         ("Subclass p3dx\nRobotRadius -1\n", "must be positive"),
         ("Subclass p3dx\nSonarUnit 0 1 2\n", "SonarUnit needs"),
-        ("Subclass p3dx\nDistConvFactor 0.0000001\n", "distance_nm_per_count = 0"),
+        ("Subclass p3dx\nDistConvFactor 0.0000001\n", "DistConvFactor = '0.0000001' is out of range"),
+        ("Subclass p3dx\nVelConvFactor 1e306\n", "out of range"),
+        ("Subclass p3dx\nAngleConvFactor 99\n", "angle_counts_per_turn = 0"),
+        ("Subclass p3dx\nRobotRadius inf\n", "out of range"),
     ],
 )
 def test_what_is_wrong_in_a_file_of_arias_is_named(tmp_path: Path, text: str, said: str) -> None:

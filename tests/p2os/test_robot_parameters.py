@@ -123,6 +123,10 @@ def test_the_conversions_are_those_of_the_manual() -> None:
         ("has_move = true", "has_moves = true", "unknown key equipment.has_moves"),
         ("range_um_per_count = 268", 'range_um_per_count = "268"', "is no float"),
         ("[69, 136, 90], ", "[69, 136], ", "sonar.poses"),
+        ("[69, 136, 90], ", "[69, 136, inf], ", "sonar.poses"),
+        ("fitted = 8", "fitted = 17", "only 16 poses"),
+        ("range_um_per_count = 268", "range_um_per_count = inf", "out of range"),
+        ("mass_kg = 9.0", "mass_kg = nan", "out of range"),
     ],
 )
 def test_what_is_wrong_is_named(tmp_path: Path, old: str, new: str, said: str) -> None:
@@ -130,6 +134,18 @@ def test_what_is_wrong_is_named(tmp_path: Path, old: str, new: str, said: str) -
     assert old in P2DX
     path.write_text(P2DX.replace(old, new, 1), encoding="utf-8")
     with pytest.raises(ParametersError, match=said):
+        load_parameters(path)
+
+
+@pytest.mark.parametrize("ending", ["toml", "p"])
+def test_a_file_that_cannot_be_read_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, ending: str) -> None:
+    def refuse(*_: object, **__: object) -> str:
+        raise PermissionError(13, "Permission denied")
+
+    path = tmp_path / f"mine.{ending}"
+    path.write_text("", encoding="utf-8")
+    monkeypatch.setattr(Path, "read_text", refuse)
+    with pytest.raises(ParametersError, match=r"cannot read .* permission denied"):
         load_parameters(path)
 
 
@@ -144,6 +160,12 @@ def test_a_file_of_ones_own_may_be_based_on_a_shipped_one(tmp_path: Path) -> Non
     path = tmp_path / "mine.toml"
     path.write_text('based_on = "p2dx"\nsubclass = "mine"\n[conversion]\ntrack_mm = 360\n', encoding="utf-8")
     assert (load_parameters(path).track_mm, load_parameters(path).vel2_divisor) == (360, 20)
+    path.write_text('based_on = "p2dx"\n[title]\nx = 1\n', encoding="utf-8")
+    with pytest.raises(ParametersError, match=r"title = .* is no str"):
+        load_parameters(path)
+    path.write_text("x = " + "[" * 5000, encoding="utf-8")
+    with pytest.raises(ParametersError, match="recursion"):
+        load_parameters(path)
     path.write_text('based_on = "none"\n', encoding="utf-8")
     with pytest.raises(ParametersError, match="no shipped model"):
         load_parameters(path)
