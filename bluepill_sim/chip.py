@@ -13,6 +13,7 @@ time of the accessing instruction.
 """
 
 from collections.abc import Callable
+from typing import cast
 
 from bluepill_sim.block_cost import Block, measure_block
 from bluepill_sim.bus import PERIPHERAL_BYTES, PeripheralBus, SramBitBand
@@ -66,7 +67,7 @@ class Chip:
         #: Time of the event that a peripheral is acting on, while it does.
         self._event_ns: Nanos | None = None
         self._stop_requested = False
-        self._reset_requested = False
+        self._requested_reset: ResetCause | None = None
         self._next_due: Nanos | None = None
         self._deadlines_moved = True
         self._flash_access = self.clocks.flash_wait_states, self.clocks.flash_prefetch
@@ -147,19 +148,25 @@ class Chip:
             if self._stop_requested:
                 self._stop_requested = False
                 return Reached(now, Reason.EDGE)
-            if processor.is_locked_up:
+            if processor.is_locked_up and not self.parts.has_running_watchdog:
                 engine.cycle = max(engine.cycle, clock.cycle_at(limit_ns))
                 return Reached(clock.ns_of(engine.cycle), Reason.HALT)
             if now >= limit_ns:
                 return Reached(now, Reason.DEADLINE)
+            if processor.is_locked_up:
+                engine.cycle = self._stop_cycle(limit_ns)
+                continue
             go_on(self._stop_cycle(limit_ns))
             if processor.halt is not None:
                 halt, processor.halt = processor.halt, None
                 return Reached(clock.ns_of(engine.cycle), Reason.HALT, halt)
 
     def reset(self, cause: ResetCause) -> None:
-        """Reset core and peripherals; time goes on."""
-        self._reset_requested = False
+        """Reset core and peripherals; time goes on. A power cut clears the SRAM too."""
+        self._requested_reset = None
+        if cause is ResetCause.POWER:
+            self.memory.lose_power()
+            self.engine.drop_code(SRAM_BASE, SRAM_BYTES)
         self.parts.reset(cause)
         self.system.reset()
         self.processor.reset(self._vector_table)
@@ -215,7 +222,12 @@ class Chip:
 
     def request_reset(self) -> None:
         """Reset the chip at the border of the running block (SYSRESETREQ)."""
-        self._reset_requested = True
+        self._requested_reset = ResetCause.SOFTWARE
+        self.processor.stop_at_border()
+
+    def watchdog_expired(self, name: str) -> None:
+        """Reset the chip at the border of the running block, because of the watchdog of that name."""
+        self._requested_reset = ResetCause[name]
         self.processor.stop_at_border()
 
     def signal(self, name: str) -> None:
@@ -239,7 +251,7 @@ class Chip:
             self.pins.snapshot(),
             self.clocks.snapshot(),
             self._clock.snapshot(),
-            (self._stop_requested, self._reset_requested),
+            (self._stop_requested, self._requested_reset and self._requested_reset.name),
         )
 
     def restore(self, snapshot: tuple[object, ...]) -> None:
@@ -254,7 +266,8 @@ class Chip:
         self.parts.restore(parts)  # type: ignore[arg-type]  # as above
         self.clocks.restore(clocks)  # type: ignore[arg-type]  # as above
         self._clock.restore(clock)  # type: ignore[arg-type]  # as above
-        self._stop_requested, self._reset_requested = requests  # type: ignore[misc]  # as above
+        self._stop_requested, cause = cast("tuple[bool, str | None]", requests)
+        self._requested_reset = None if cause is None else ResetCause[cause]
         self._flash_access = self.clocks.flash_wait_states, self.clocks.flash_prefetch
         self.engine.forget_costs()
         self._flash_repairs.clear()
@@ -266,8 +279,8 @@ class Chip:
         """At a border: do what was left for it, and what is due."""
         if self._flash_repairs:
             self._repair_flash()
-        if self._reset_requested:
-            self.reset(ResetCause.SOFTWARE)
+        if self._requested_reset is not None:
+            self.reset(self._requested_reset)
         cycle = self.engine.cycle
         systick = self.processor.systick
         if systick.next_cycle is not None and cycle >= systick.next_cycle:
@@ -280,6 +293,8 @@ class Chip:
                 self.parts.advance_to(due)
             finally:
                 self._event_ns = None
+        if self._requested_reset is not None:
+            self.reset(self._requested_reset)
 
     def _next_peripheral_due(self) -> Nanos | None:
         if self._deadlines_moved:

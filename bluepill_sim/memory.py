@@ -96,6 +96,10 @@ class Memory:
         """Return bytes of the flash array."""
         return ctypes.string_at(ctypes.addressof(self.flash) + offset, size)
 
+    def lose_power(self) -> None:
+        """Forget what the SRAM holds."""
+        ctypes.memset(self.sram, 0, len(self.sram))
+
     def seal(self) -> None:
         """Take the flash as it is now for the program that snapshots need not carry."""
         self._program = self.flash.raw

@@ -53,6 +53,10 @@ class ChipPorts(Protocol):
         """Call `reset` of the peripheral `name`, if it is modelled (RCC's APBxRSTR)."""
         ...
 
+    def watchdog_expired(self, name: str) -> None:
+        """Reset the chip at the border of the running block, because of the watchdog `name`: "IWDG" or "WWDG"."""
+        ...
+
     def signal(self, name: str) -> None:
         """Tell the core of a happening by name: "event" sets the event register that WFE waits for."""
         ...

@@ -15,11 +15,13 @@ from bluepill_sim.afio import Afio
 from bluepill_sim.exti import Exti
 from bluepill_sim.flash import Flash
 from bluepill_sim.gpio import Gpio
+from bluepill_sim.iwdg import Iwdg
 from bluepill_sim.peripheral import ClockBit, Peripheral, PeripheralSnapshot, Place
 from bluepill_sim.pins import PinBank, PinPorts
 from bluepill_sim.ports import ChipPorts
 from bluepill_sim.rcc import Rcc, ResetCause
 from bluepill_sim.usart import Usart
+from bluepill_sim.wwdg import Wwdg
 
 FLASH_BASE = 0x0800_0000
 #: The C8 is sold with 64 KiB and carries 128 KiB; programs that use the upper half run on most boards.
@@ -159,6 +161,8 @@ PERIPHERALS: tuple[tuple[_Maker, str, tuple[int, ...]], ...] = (
     (Usart, "USART1", (37,)),
     (Usart, "USART2", (38,)),
     (Usart, "USART3", (39,)),
+    (Iwdg, "IWDG", ()),
+    (Wwdg, "WWDG", (0,)),
 )
 
 
@@ -183,6 +187,12 @@ class ChipParts:
     def exti(self) -> Exti:
         """External interrupt/event controller."""
         return cast("Exti", self.by_name["EXTI"])
+
+    @property
+    def has_running_watchdog(self) -> bool:
+        """Whether a watchdog will reset the chip if nobody feeds it."""
+        iwdg, wwdg = cast("Iwdg", self.by_name["IWDG"]), cast("Wwdg", self.by_name["WWDG"])
+        return iwdg.is_running or wwdg.is_running
 
     def usart(self, number: int) -> Usart:
         """USART 1, 2 or 3."""

@@ -62,7 +62,9 @@ def chip() -> None:
     board.advance_to(100_000_000)
     seconds = median_seconds(lambda: board.advance_to(board.now_ns + 2_000_000_000))
     row("BluePill, SysTick 100 Hz and WFI (72 MHz)", f"{2 / seconds:.0f} x real")
-    row("BluePill, snapshot", f"{1e3 * median_seconds(board.snapshot):.2f} ms")
+    taken = board.snapshot()
+    save, restore = median_seconds(board.snapshot), median_seconds(lambda: board.restore(taken))
+    row("BluePill, snapshot and restore", f"{1e3 * save:.2f} ms, {1e3 * restore:.2f} ms", "goal: under 1 ms each")
 
 
 def bodies() -> None:

@@ -20,6 +20,7 @@ class FakeChip:
         self.signals: list[str] = []
         self.warnings: dict[str, str] = {}
         self.resets: list[str] = []
+        self.expired: list[tuple[str, int]] = []
         self.stops = 0
         self.deadline_changes = 0
         self.clock_changes = 0
@@ -53,6 +54,9 @@ class FakeChip:
         part = self.parts.by_name.get(name)
         if part is not None:
             part.reset()
+
+    def watchdog_expired(self, name: str) -> None:
+        self.expired.append((name, self.now_ns))
 
     def signal(self, name: str) -> None:
         self.signals.append(name)
