@@ -16,7 +16,9 @@ from hardware.pcb.netlist import DesignError
 from hardware.pcb.pours import KicadMissingError
 from hardware.pcb.report import Verdict, table
 from hardware.pcb.routing import HERE, RoutingError, run_router
-from hardware.pcb.spice.run import NgspiceMissingError, SimulationError
+from hardware.pcb.spice.decks import decks
+from hardware.pcb.spice.page import page_text
+from hardware.pcb.spice.run import NgspiceMissingError, SimulationError, is_installed, simulate
 
 
 def main(arguments: list[str] | None = None) -> int:
@@ -93,12 +95,18 @@ def _stitch(given: argparse.Namespace) -> int:
 
 
 def _simulate(_: argparse.Namespace) -> int:
-    results = checks.simulations()
-    print(table(results))
-    if all(result.verdict is Verdict.SKIPPED for result in results):
+    if not is_installed():
+        print(table(checks.simulations()))
         return 0
-    for path in pictures.write_plots():
+    ran = [simulate(deck) for deck in decks()]
+    results = [checks.simulation(one) for one in ran]
+    print(table(results))
+    for one in ran:
+        path = pictures.plot(one)
         print(f"{path.name}: {path.stat().st_size} bytes")
+    page = page_text(decks(), {one.deck.name: one.figures for one in ran})
+    build.SIMULATION_PAGE.write_text(page, encoding="utf-8", newline="\n")
+    print(f"{build.SIMULATION_PAGE.name}: {len(ran)} simulations")
     return 1 if any(result.verdict is Verdict.BAD for result in results) else 0
 
 

@@ -24,6 +24,7 @@ from hardware.pcb.schematic import library_text, page_text, root_text
 from hardware.pcb.schematic_pages import PAGES
 
 GENERATED = HERE / "generated"
+SIMULATION_PAGE = HERE.parent.parent / "docs" / "board-simulation.md"
 PICTURES = HERE.parent.parent / "docs" / "pictures" / "board"
 #: The date inside the archive: the oldest that the format knows, so that it never changes.
 _ZIP_DATE = (1980, 1, 1, 0, 0, 0)

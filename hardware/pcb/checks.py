@@ -13,6 +13,7 @@ from hardware.pcb.design import build as design_of
 from hardware.pcb.electrical import all_checks, bom_faults, netlist_faults
 from hardware.pcb.pin_checks import BOARDS, count_by_rule, findings
 from hardware.pcb.report import Result, judged, listed, skipped
+from hardware.pcb.spice import run
 from hardware.pcb.spice.decks import decks
 from hardware.pcb.spice.run import is_installed, simulate
 
@@ -86,9 +87,11 @@ def simulations() -> list[Result]:
     """Run every deck; without ngspice one line says so."""
     if not is_installed():
         return [skipped("simulation", "all", "ngspice is not installed (hint: tools/install_board_tools.sh)")]
-    results = []
-    for deck in decks():
-        verdicts = simulate(deck).verdicts()
-        words = "; ".join(f"{limit.measure} {value:.4g} {limit.unit}" for limit, value, _ in verdicts)
-        results.append(judged("simulation", deck.name, all(good for *_, good in verdicts), words))
-    return results
+    return [simulation(simulate(deck)) for deck in decks()]
+
+
+def simulation(ran: run.Result) -> Result:
+    """Judge what a deck gave."""
+    verdicts = ran.verdicts()
+    words = "; ".join(f"{limit.measure} {value:.4g} {limit.unit}" for limit, value, _ in verdicts)
+    return judged("simulation", ran.deck.name, all(good for *_, good in verdicts), words)

@@ -92,6 +92,12 @@ PARTS: Mapping[str, Part] = MappingProxyType({
             source="Diodes B340A sheet, memory", facts={"reverse_v": 40.0, "forward_v": 0.5, "current_a": 3.0},
         ),
         Part(
+            key="SCHOTTKY 5V", value="MBRA210L", symbol="SCHOTTKY", footprint="D_SMA",
+            description="Schottky diode 10 V 2 A, low drop", manufacturer="onsemi", mpn="MBRA210LT3G",
+            source="onsemi MBRA210L sheet, memory: the drop at 0.6 A",
+            facts={"reverse_v": 10.0, "forward_v": 0.28, "current_a": 2.0},
+        ),
+        Part(
             key="TVS12", value="SMBJ15A", symbol="TVS", footprint="D_SMB",
             description="Transient suppressor, 15 V stand-off", manufacturer="Littelfuse", mpn="SMBJ15A",
             source="Littelfuse SMBJ sheet, memory",

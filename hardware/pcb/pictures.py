@@ -11,9 +11,7 @@ from pathlib import Path
 
 from hardware.pcb import build, kicad
 from hardware.pcb.schematic_pages import PAGES
-from hardware.pcb.spice.deck import Deck
-from hardware.pcb.spice.decks import decks
-from hardware.pcb.spice.run import Result, simulate
+from hardware.pcb.spice.run import Result
 
 _PAGE_DPI = 110
 _SIDES = {
@@ -70,18 +68,15 @@ def _bare_picture(board: Path) -> Path:
     return file
 
 
-def write_plots() -> list[Path]:
-    """Simulate every deck and renew its plot."""
-    build.PICTURES.mkdir(parents=True, exist_ok=True)
-    return [_plot(simulate(deck), deck) for deck in decks()]
-
-
-def _plot(result: Result, deck: Deck) -> Path:
+def plot(result: Result) -> Path:
+    """Renew the plot of a deck that has run; return its file."""
     import matplotlib as mpl
 
     mpl.use("Agg")
     import matplotlib.pyplot as plt
 
+    deck = result.deck
+    build.PICTURES.mkdir(parents=True, exist_ok=True)
     figure, axes = plt.subplots(figsize=(5.6, 3.0), dpi=90, layout="constrained")
     x = [value * deck.x_scale for value in result.columns[0]]
     for column, (_, legend) in zip(result.columns[1:], deck.traces, strict=True):

@@ -8,6 +8,8 @@ from hardware.pcb import __main__ as command
 from hardware.pcb import build, checks, kicad, pictures
 from hardware.pcb.report import Verdict, judged, skipped
 from hardware.pcb.routing import RoutingError
+from hardware.pcb.spice.deck import Deck, limits
+from hardware.pcb.spice.run import Result
 
 RESULTS = [judged("ERC", "rev-b", True, "0 findings"), skipped("DRC", "rev-b", "KiCad 9 is not installed")]
 
@@ -72,18 +74,27 @@ def test_route_and_stitch_write_their_data(capsys, monkeypatch, tmp_path) -> Non
     assert (tmp_path / "stitches" / "lm317.txt").read_text(encoding="utf-8") == "1,2\n3,4\n"
 
 
-def test_simulate_prints_figures_and_renews_plots(capsys, monkeypatch, tmp_path) -> None:
-    plot = tmp_path / "sim-reset.png"
+def test_simulate_prints_figures_and_renews_plots_and_page(capsys, monkeypatch, tmp_path) -> None:
+    deck = Deck(name="d", title="Deck", circuit="", measures=(), limits=limits(("top", 1.0, 2.0, "V", "highest")),
+                traces=(), x_label="", y_label="", cannot_say="Nothing.")  # fmt: skip
+    plot = tmp_path / "sim-d.png"
     plot.write_bytes(b"12")
-    monkeypatch.setattr(checks, "simulations", lambda: [judged("simulation", "reset", True, "en_low 0.1 V")])
-    monkeypatch.setattr(pictures, "write_plots", lambda: [plot])
-    assert command.main(["simulate"]) == 0
-    assert "sim-reset.png: 2 bytes" in capsys.readouterr().out
+    monkeypatch.setattr(command, "is_installed", lambda: True)
+    monkeypatch.setattr(command, "decks", lambda: (deck,))
+    monkeypatch.setattr(command, "simulate", lambda _: Result(deck=deck, figures={"top": 2.5}, columns=[]))
+    monkeypatch.setattr(pictures, "plot", lambda _: plot)
+    monkeypatch.setattr(build, "SIMULATION_PAGE", tmp_path / "page.md")
+    assert command.main(["simulate"]) == 1
+    assert capsys.readouterr().out.splitlines() == [
+        "FAIL  simulation  d  top 2.5 V", "0 ok, 1 failed, 0 skipped", "sim-d.png: 2 bytes", "page.md: 1 simulations",
+    ]  # fmt: skip
+    assert "| highest | 2.5 V | 1 to 2 |" in (tmp_path / "page.md").read_text(encoding="utf-8")
 
 
 def test_simulate_without_ngspice_says_so_and_draws_nothing(capsys, monkeypatch) -> None:
+    monkeypatch.setattr(command, "is_installed", lambda: False)
     monkeypatch.setattr(checks, "simulations", lambda: [skipped("simulation", "all", "ngspice is not installed")])
-    monkeypatch.setattr(pictures, "write_plots", lambda: pytest.fail("no plots without a simulator"))
+    monkeypatch.setattr(pictures, "plot", lambda _: pytest.fail("no plots without a simulator"))
     assert command.main(["simulate"]) == 0
     assert "ngspice is not installed" in capsys.readouterr().out
 

@@ -5,11 +5,12 @@ import sys
 
 import pytest
 
-from hardware.pcb import checks
+from hardware.pcb import build, checks
 from hardware.pcb.report import Verdict
 from hardware.pcb.spice import run
 from hardware.pcb.spice.deck import Deck, limits
 from hardware.pcb.spice.decks import decks
+from hardware.pcb.spice.page import page_text, shown
 
 needs_ngspice = pytest.mark.skipif(
     not run.is_installed(), reason="ngspice is not installed: the circuits are not simulated (hint: make board)"
@@ -50,13 +51,14 @@ def test_every_deck_says_what_it_cannot_say_and_limits_what_it_measures() -> Non
         assert deck.cannot_say.endswith("."), deck.name
         measured = {measure.split()[1] for measure in deck.measures}
         assert {limit.measure for limit in deck.limits} == measured, deck.name
+        assert not {expression for expression, _ in deck.traces} & {f"v({name})" for name in measured}, deck.name
         assert all(limit.low < limit.high for limit in deck.limits), deck.name
 
 
 def test_a_deck_is_written_with_its_measures_and_traces(tmp_path) -> None:
     text = run.deck_text(DECKS["reset"], tmp_path / "traces.txt")
     assert text.startswith("* Reset: level at the ESP32's EN\n")
-    assert "meas tran en_low min v(en)\n" in text
+    assert "meas tran en_low find v(en) at=39m\n" in text
     assert f"wrdata {tmp_path}/traces.txt v(pin) v(en) v(en2)\nquit\n.endc\n.end\n" in text
 
 
@@ -113,11 +115,38 @@ def test_without_ngspice_it_is_said_and_skipped(monkeypatch, tmp_path) -> None:
 
 def test_a_plot_is_drawn_for_each_deck(fake_ngspice, monkeypatch, tmp_path) -> None:
     pytest.importorskip("matplotlib", reason="matplotlib is not installed")
-    from hardware.pcb import build, pictures
+    from hardware.pcb import pictures
 
     fake_ngspice("top = 1.75")
-    monkeypatch.setattr(pictures, "decks", lambda: (DECK,))
     monkeypatch.setattr(build, "PICTURES", tmp_path / "pictures")
-    (file,) = pictures.write_plots()
+    file = pictures.plot(run.simulate(DECK))
     assert file.name == "sim-d.png"
     assert file.read_bytes().startswith(b"\x89PNG")
+
+
+def page_figures() -> dict[str, dict[str, float]]:
+    """Return the figures that the committed page shows, by deck and measure."""
+    sections = build.SIMULATION_PAGE.read_text(encoding="utf-8").split("\n## ")[1:]
+    figures = {}
+    for deck, section in zip(decks(), sections, strict=True):
+        rows = [line.split(" | ")[1].split()[0] for line in section.splitlines() if line.startswith("| ")][2:]
+        figures[deck.name] = {limit.measure: float(row) for limit, row in zip(deck.limits, rows, strict=True)}
+    return figures
+
+
+def test_the_page_is_what_the_decks_give_with_its_own_figures() -> None:
+    assert page_text(decks(), page_figures()) == build.SIMULATION_PAGE.read_text(encoding="utf-8")
+
+
+@needs_ngspice
+def test_the_page_shows_the_figures_of_today() -> None:
+    shown_there = page_figures()
+    for deck in decks():
+        for limit, value, _ in run.simulate(deck).verdicts():
+            near = pytest.approx(value, rel=0.02, abs=1e-3 * (limit.high - limit.low))
+            assert shown_there[deck.name][limit.measure] == near, (deck.name, limit.measure)
+
+
+@pytest.mark.parametrize(("value", "text"), [(0.0, "0"), (4.999, "5"), (119.44, "119"), (2.4e-05, "2.40e-05")])
+def test_figures_have_three_digits(value: float, text: str) -> None:
+    assert shown(value) == text

@@ -22,7 +22,7 @@ class Deck:
     title: str
     #: Circuit lines; the analysis line last.
     circuit: str
-    #: `meas` lines without the word itself.
+    #: `meas` lines without the word itself. A measure becomes a vector: none may be named as a node.
     measures: tuple[str, ...]
     limits: tuple[Limit, ...]
     #: Plotted traces: expression and legend.

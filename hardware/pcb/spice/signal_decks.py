@@ -37,7 +37,8 @@ Q2 en2 b2 e2 BC817
 """
     return Deck(
         name="reset", title="Reset: level at the ESP32's EN", circuit=circuit,
-        measures=("tran en_low min v(en)", "tran en_thesis min v(en2)", "tran en_back find v(en) at=99m",
+        measures=("tran en_low find v(en) at=39m", "tran en_thesis find v(en2) at=39m",
+                  "tran en_back find v(en) at=99m",
                   "tran fall trig v(pin) val=1.5 rise=1 targ v(en) val=0.6 fall=1"),
         limits=limits(("en_low", -0.1, 0.3, "V", "EN while PB13 is high"),
                       ("en_thesis", 0.83, 3.3, "V", "the thesis's circuit never gets below the threshold"),
@@ -75,10 +76,10 @@ def _rs232() -> Deck:
     return Deck(
         name="rs232", title="RS-232 levels at 3.3 V, 3 kohm at TX and DTR, 9600 baud", circuit=_serial(3.3),
         measures=("tran high max v(dout) from=0.5m to=2m", "tran low min v(dout) from=0.5m to=2m",
-                  "tran dtr min v(dtr) from=0.5m to=2m"),
+                  "tran dtr_low min v(dtr) from=0.5m to=2m"),
         limits=limits(("high", 5.0, 15, "V", "space on TX"),
                       ("low", -15, -5.0, "V", "mark on TX"),
-                      ("dtr", 5.0, 15, "V", "DTR asserted, at its lowest")),
+                      ("dtr_low", 5.0, 15, "V", "DTR asserted, at its lowest")),
         traces=(("v(dout)", "TX (DE-9 pin 3)"), ("v(dtr)", "DTR (DE-9 pin 4)"), ("v(tx)", "TXD, logic")),
         x_label="time, ms", y_label="V", x_scale=1e3,
         cannot_say=(
@@ -92,10 +93,10 @@ def _rs232_low() -> Deck:
     return Deck(
         name="rs232-low", title="RS-232 levels at 3.0 V", circuit=_serial(3.0),
         measures=("tran high max v(dout) from=0.5m to=2m", "tran low min v(dout) from=0.5m to=2m",
-                  "tran dtr min v(dtr) from=0.5m to=2m"),
+                  "tran dtr_low min v(dtr) from=0.5m to=2m"),
         limits=limits(("high", 3.7, 15, "V", "space on TX: a receiver needs 3 V"),
                       ("low", -15, -3.7, "V", "mark on TX: a receiver needs -3 V"),
-                      ("dtr", 3.7, 15, "V", "DTR asserted")),
+                      ("dtr_low", 3.7, 15, "V", "DTR asserted")),
         traces=(("v(dout)", "TX"), ("v(dtr)", "DTR")), x_label="time, ms", y_label="V", x_scale=1e3,
         cannot_say=(
             "Whether the ESP32 module's regulator really falls to 3.0 V: this is only the lower end of the "
@@ -116,8 +117,8 @@ def _back_power(design: Design) -> Deck:
 """
     return Deck(
         name="back-power", title="ESP32 on, BluePill off: current through the series resistors", circuit=circuit,
-        measures=("dc total find v(total) at=0", "dc pin min i(vd0)", "dc rail100 find v(rail) when v(meet)=0"),
-        limits=limits(("total", 0, 25, "mA", "into the BluePill in all, its rail held at 0 V"),
+        measures=("dc all_pins find v(total) at=0", "dc pin min i(vd0)", "dc rail100 find v(rail) when v(meet)=0"),
+        limits=limits(("all_pins", 0, 25, "mA", "into the BluePill in all, its rail held at 0 V"),
                       ("pin", -5e-3, 0, "A", "into the pin with the smallest resistor"),
                       ("rail100", 0, 2.0, "V", "rail with a load of 100 ohm: below where an STM32F103 runs")),
         traces=(("v(total)", "into the BluePill, mA"), ("v(load)", "what 100 ohm would take, mA")),
@@ -159,8 +160,8 @@ Von on 0 3.3
 """
     return Deck(
         name="back-power-esp32", title="BluePill on, ESP32 off: current through the series resistors", circuit=circuit,
-        measures=("dc total find v(total) at=0", "dc rail100 find v(rail) when v(meet)=0"),
-        limits=limits(("total", 0, 25, "mA", "into the ESP32 in all, its rail held at 0 V"),
+        measures=("dc all_pins find v(total) at=0", "dc rail100 find v(rail) when v(meet)=0"),
+        limits=limits(("all_pins", 0, 25, "mA", "into the ESP32 in all, its rail held at 0 V"),
                       ("rail100", 0, 2.3, "V", "rail with a load of 100 ohm: below the ESP32's brown-out level")),
         traces=(("v(total)", "into the ESP32, mA"), ("v(load)", "what 100 ohm would take, mA")),
         x_label="rail of the unpowered ESP32, V", y_label="mA",

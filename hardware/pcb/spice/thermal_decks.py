@@ -69,10 +69,10 @@ Rl loss 0 1k
 """
     return Deck(
         name="thermal-buck", title="Buck module: allowed current against ambient", circuit=circuit,
-        measures=("dc may40 find v(may) at=40", "dc may70 find v(may) at=70", "dc loss find v(loss) at=25"),
+        measures=("dc may40 find v(may) at=40", "dc may70 find v(may) at=70", "dc lost find v(loss) at=25"),
         limits=limits(("may40", load_ma(design), 1000, "mA", "allowed at 40 degrees"),
                       ("may70", load_ma(design), 1000, "mA", "allowed at 70 degrees: still above the greatest load"),
-                      ("loss", 0, 0.6, "W", "loss at the greatest load")),
+                      ("lost", 0, 0.6, "W", "loss at the greatest load")),
         traces=(("v(may)", "allowed (data sheet)"), ("v(must)", "greatest load")),
         x_label="ambient, degrees C", y_label="mA",
         cannot_say="Nothing about heat from the ESP32 above it: the sheet's curve is for still air around the module.",

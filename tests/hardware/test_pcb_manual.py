@@ -1,0 +1,88 @@
+"""The pages about the board say what the design says."""
+
+import re
+from pathlib import Path
+
+import pytest
+
+from adapter_sim.pinout import Pull, Role, load_pinout
+from hardware.pcb import checks, kicad_checks
+from hardware.pcb.bom import rows as bom_rows
+from hardware.pcb.design import TEST_POINTS
+from hardware.pcb.design import build as design_of
+from hardware.pcb.electrical import BANK_MIN_V, BATTERY_MAX_V, BATTERY_MIN_V, LM317_AVERAGE_MA, LM317_LIMIT_MA
+from hardware.pcb.first_power_up import EXPECTED, rows
+from hardware.pcb.pin_checks import BOARDS, count_by_rule, findings
+from hardware.pcb.spice.decks import decks
+
+DOCS = Path(__file__).resolve().parents[2] / "docs"
+BOARD, BUILD = ((DOCS / name).read_text(encoding="utf-8") for name in ("board.md", "board-build.md"))
+
+
+def table(page: str, name: str) -> list[str]:
+    """Return the lines of the table behind a mark."""
+    lines = page.split(f"<!-- table: {name} -->\n")[1].splitlines()[2:]
+    return lines[: next(index for index, line in enumerate(lines) if not line.startswith("|"))]
+
+
+def test_the_pin_map_of_the_page_is_the_pin_map() -> None:
+    pulls = {Pull.DOWN: "20k down", Pull.UP: "none: strap, pulled up in the ESP32"}
+    wanted = []
+    for wire in load_pinout().wires:
+        pins = dict(wire.esp32)
+        pull = "47k, base of Q1" if wire.role is Role.RESET else pulls[wire.pull]
+        wanted.append(f"| {wire.name} | {wire.bluepill} | {pins['rev-b']} | {pins['rev-c']} | {pull} |")
+    assert table(BOARD, "pins") == wanted
+
+
+def test_the_voltages_of_the_manual_are_the_table_and_cover_every_test_point() -> None:
+    assert table(BUILD, "volts") == rows()
+    assert [row.net for row in EXPECTED] == list(TEST_POINTS)
+    for row in EXPECTED:
+        assert row.bare_v[0] <= row.bare_v[1]
+        assert row.full_v[0] <= row.full_v[1]
+
+
+def test_a_test_point_without_a_voltage_is_refused(monkeypatch) -> None:
+    monkeypatch.setattr("hardware.pcb.first_power_up.TEST_POINTS", ("GND",))
+    with pytest.raises(ValueError, match="differ"):
+        rows()
+
+
+def test_each_proof_in_the_list_of_faults_exists() -> None:
+    source = "".join(Path(module.__file__ or "").read_text(encoding="utf-8") for module in (checks, kicad_checks))
+    names = {deck.name for deck in decks()}
+    proofs = re.findall(r"(check|sim): ([^,|(]+?)(?: \(([^)]+)\))?(?=[,|]| \|)", BOARD)
+    assert len(proofs) > 20
+    rules = {rule for board in BOARDS.values() for rule in count_by_rule(findings(load_pinout(), board))}
+    for kind, name, rule in proofs:
+        if kind == "sim":
+            assert name.strip() in names, name
+        else:
+            assert f'"{name.strip()}"' in source, name
+        assert not rule or rule in rules, rule
+
+
+def test_every_check_is_explained_on_the_page() -> None:
+    explained = set(re.findall(r"^\| ([A-Za-z -]+?) \| ", BOARD, re.MULTILINE))
+    ran = {result.name for result in checks.plain()} | {"ERC", "DRC with parity", "netlist equals design", "stitching"}
+    assert ran | {"gerbers up to date", "simulation"} <= explained
+
+
+def test_limits_in_the_manual_are_those_of_the_design() -> None:
+    assert f"{BATTERY_MIN_V:g} to {BATTERY_MAX_V:g} V at J1" in BUILD
+    assert f"hold {BANK_MIN_V:g} V" in BUILD
+    assert f"{LM317_AVERAGE_MA:g} mA on average, {LM317_LIMIT_MA:g} mA in peaks" in BUILD
+
+
+def test_references_in_the_manual_are_what_it_says_of_them() -> None:
+    design = design_of()
+    assert design.component("R12").part.value == "680R"
+    assert [row.refs for row in bom_rows(design) if row.part.value == "680R"] == [("R12",)]
+    assert ("1", "ENCODER2_S2") in design.component("R43").pins
+    assert ("1", "ENCODER1_S3") in design.component("R41").pins
+    names = {component.ref for component in design.components}
+    assert not {"R33", "R44"} & names
+    assert {TEST_POINTS[7], TEST_POINTS[11], TEST_POINTS[4]} == {"ESP_EN", "DSR_N", "+3V3"}
+    for ref in re.findall(r"\b(?:R|C|D|U|J|F|Q|JP|TP)\d{1,2}\b", BUILD):
+        assert ref in names | {"U4"}, ref
