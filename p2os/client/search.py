@@ -16,13 +16,23 @@ class Try:
     attempts: int
 
 
-def search_plan(baud: int | None, bauds: tuple[int, ...], settings: ClientSettings) -> tuple[Try, ...]:
-    """Return the tries, likeliest first: quick ones at every rate, then patient ones."""
+def search_plan(
+    baud: int | None, bauds: tuple[int, ...], settings: ClientSettings, *, is_known: bool = False
+) -> tuple[Try, ...]:
+    """Return the tries, likeliest first: quick ones at every rate, then patient ones.
+
+    Args:
+        baud: The likeliest rate; None where the line has none.
+        bauds: All rates, in the order in which they are tried; repeats do no harm.
+        settings: How long a try takes.
+        is_known: The robot was open at `baud` before: it is tried again between all others.
+    """
     if baud is None:
         return Try(None, settings.quick_sync_ns, 3), Try(None, settings.patient_sync_ns, 5)
-    others = tuple(rate for rate in bauds if rate != baud)
-    quick = (Try(baud, settings.quick_sync_ns, 2), *(Try(rate, settings.quick_sync_ns, 1) for rate in others))
-    return (*quick, *(Try(rate, settings.patient_sync_ns, 1) for rate in (baud, *others)))
+    others = dict.fromkeys(rate for rate in bauds if rate != baud)
+    rates = tuple(rate for other in others for rate in ((other, baud) if is_known else (other,)))
+    quick = (Try(baud, settings.quick_sync_ns, 2), *(Try(rate, settings.quick_sync_ns, 1) for rate in rates))
+    return (*quick, *(Try(rate, settings.patient_sync_ns, 1) for rate in (baud, *rates)))
 
 
 #: How far a search came → what it says, and what to look at.

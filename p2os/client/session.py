@@ -183,9 +183,7 @@ class Session:
         if self.link is not Link.OPENING:
             return
         self._line_baud = self.baud = self.outbox.baud = baud
-        first = self._good_baud if baud is not None and self._good_baud is not None else baud
-        bauds = (baud, *self._settings.bauds) if baud is not None else ()
-        self._plan = deque(search_plan(first, tuple(dict.fromkeys(bauds)), self._settings))
+        self._plan = deque(self._search(baud))
         self._enter(Link.SEARCHING, now + TRY_LIMIT_NS)
         self._came_to = "silence"
         is_fresh = baud is None and not self._has_opened
@@ -195,6 +193,13 @@ class Session:
             self._listen_due = now + self._settings.listen_ns
         else:
             self._next_try(now)
+
+    def _search(self, baud: int | None) -> tuple[Try, ...]:
+        """Return where the robot is looked for on a line that was opened at a rate."""
+        good = self._good_baud if baud is not None else None
+        rates = (self._found_baud, baud, *self._settings.bauds)  # a robot that reboots is back at the first
+        bauds = tuple(rate for rate in rates if rate is not None)
+        return search_plan(baud if good is None else good, bauds, self._settings, is_known=good is not None)
 
     def line_failed(self, reason: str, hint: str | None, now: Nanos) -> None:
         """Take the news that the line cannot be opened."""

@@ -5,7 +5,9 @@ from client_rig import MS, WIRES, Link, Rig, S, new_pioneer
 
 from p2os.client.notices import BaudKept, BaudRaised, ConfigurationKnown, Connected, GaveUp, LinkLost, ReconnectPlanned
 from p2os.client.problems import LinkLostError
-from p2os.client.settings import ClientSettings
+from p2os.client.search import search_plan
+from p2os.client.session import TRY_LIMIT_NS
+from p2os.client.settings import BAUDS, ClientSettings
 from p2os.commands import Command, CommandNumber, enable, rvel, stop, vel
 from p2os.timing import NS_PER_S
 from p2os.wire import Decoder, Frame
@@ -165,6 +167,13 @@ def test_a_robot_that_streams_at_another_rate_is_stopped_closed_and_opened() -> 
     assert said[at - 2 : at] == [stop(), vel(0)]
     second.run(3)
     assert second.wheels == (0.0, 0.0)
+
+
+def test_a_known_rate_is_tried_between_all_others_and_the_plan_fits_its_limit() -> None:
+    plan = search_plan(38400, (9600, 38400, 9600, 19200), ClientSettings(), is_known=True)
+    assert [step.baud for step in plan] == [38400, 9600, 38400, 19200, 38400] * 2
+    longest = search_plan(9600, BAUDS, ClientSettings(), is_known=True)
+    assert sum(step.wait_ns * step.attempts for step in longest) < TRY_LIMIT_NS
 
 
 def test_a_silent_line_is_a_named_failure() -> None:
