@@ -1,0 +1,180 @@
+"""Print how fast the emulated BluePill is, next to Unicorn without hooks and to QEMU, on this machine.
+
+Each row runs one program of tools/bench_firmware, built here by
+arm-none-eabi-gcc, several times in turn with what it is compared to, and prints
+the median. Run it on an idle machine. Usage: python tools/bench_emulator.py [--quick]
+"""
+
+import os
+import shutil
+import statistics
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+from bluepill_sim import BluePill
+from bluepill_sim.cpu import native_library
+from bluepill_sim.cpu.core import Core
+from bluepill_sim.cpu.registers import Register
+from bluepill_sim.sight.probe import Probe
+
+HERE = Path(__file__).parent
+RUNTIME = HERE.parent / "testbench" / "firmware"
+RUNS = 1 if "--quick" in sys.argv else 5
+#: Program, virtual seconds a run in C and in Python, goal of the native core in times real time.
+ROWS = (("compute", 1.0, 0.02, 2.0), ("gpio", 0.5, 0.01, 1.2), ("systick", 60.0, 4.0, 150.0), ("usart", 3.0, 0.3, 5.0))
+#: Goals of the Python executor: on compute, and when idling.
+PYTHON_GOALS = {"compute": 0.05, "systick": 5.0}
+SETTLED_NS = 5_000_000
+QEMU = ("qemu-system-arm", "-M", "stm32vldiscovery", "-nographic", "-icount", "shift=0", "-monitor", "stdio")
+QEMU += ("-serial", "none")
+
+
+def build(name: str, folder: Path, *options: str) -> Path:
+    """Return a program of tools/bench_firmware, built."""
+    out = folder / f"{name}{len(options)}.elf"
+    sources = [HERE / "bench_firmware" / f"{name}.c", RUNTIME / "startup.c", RUNTIME / "memory.c"]
+    subprocess.run(
+        ["arm-none-eabi-gcc", "-mcpu=cortex-m3", "-mthumb", "-O2", "-ffreestanding", "-nostdlib", f"-I{RUNTIME}",
+         *options, f"-T{RUNTIME / 'f103c8.ld'}", *map(str, sources), "-lgcc", "-o", str(out)],
+        check=True,
+    )  # fmt: skip
+    return out
+
+
+@contextmanager
+def core(name: str) -> Iterator[None]:
+    """Choose the core of the boards that are made within."""
+    before = os.environ.get(native_library.VARIABLE)
+    os.environ[native_library.VARIABLE] = name
+    try:
+        yield
+    finally:
+        os.environ.pop(native_library.VARIABLE)
+        if before is not None:
+            os.environ[native_library.VARIABLE] = before
+
+
+def board(program: Path, name: str) -> BluePill:
+    """Return a board of one core, past the start of its clocks."""
+    with core(name):
+        made = BluePill(str(program))
+    made.advance_to(SETTLED_NS)
+    return made
+
+
+def factor(made: BluePill, seconds: float) -> float:
+    """Return the virtual seconds that pass in a second of the wall clock."""
+    begin = time.perf_counter()
+    made.advance_to(made.now_ns + round(seconds * 1e9))
+    return seconds / (time.perf_counter() - begin)
+
+
+def median(measure: Callable[[], float]) -> float:
+    """Return the median of several measurements."""
+    return statistics.median(measure() for _ in range(RUNS))
+
+
+def rounds_of(made: BluePill) -> Callable[[], int]:
+    """Return what reads the program's own count of its rounds."""
+    at = made.image.symbols.address_of("bench_rounds")
+    assert at is not None
+    return lambda: made.chip.memory.read_word(at) or 0
+
+
+def row(name: str, figure: str, note: str = "") -> None:
+    """Print one line of the table."""
+    print(f"{name:<52} {figure:>12}  {note}")
+
+
+def speeds(folder: Path) -> None:
+    """Each program, on each core."""
+    for name, native_s, python_s, goal in ROWS:
+        program = build(name, folder)
+        if native_library.path() is not None:
+            made = board(program, "native")
+            row(f"{name}, native", f"{median(lambda: factor(made, native_s)):.2f} x real", f"goal {goal:g}")  # noqa: B023 - called at once
+        slow = board(program, "python")
+        wanted = f"goal {PYTHON_GOALS[name]:g}" if name in PYTHON_GOALS else ""
+        row(f"{name}, Python", f"{median(lambda: factor(slow, python_s)):.3f} x real", wanted)  # noqa: B023 - as above
+    if native_library.path() is not None:
+        made = board(build("gpio", folder), "native")
+        probe = Probe(made)
+        row("gpio, native, every edge recorded", f"{median(lambda: factor(made, 0.02)):.3f} x real", "goal 0.2")
+        probe.finish()
+        row("snapshot of the whole machine", f"{1e3 * median(lambda: snapshot_s(made)):.2f} ms", "goal 1")
+
+
+def snapshot_s(made: BluePill) -> float:
+    """Return the seconds that a snapshot takes."""
+    begin = time.perf_counter()
+    made.snapshot()
+    return time.perf_counter() - begin
+
+
+def against_unicorn(folder: Path) -> None:
+    """Compute, with and without everything that this project adds, in turn."""
+    program = build("compute", folder)
+    made = board(program, "native" if native_library.path() else "python")
+    rounds = rounds_of(made)
+    bare = Core(lambda error: sys.exit(str(error)))
+    twin = board(program, "python")
+    for region in twin.chip.memory.regions:
+        bare.map_memory(region.base, region.buffer, "rwx" if region.is_writable else "rx")
+    bare.load(twin.chip.snapshot()[1][0][0])
+    bare_rounds = rounds_of(twin)
+
+    def pair() -> float:
+        before, begin = rounds(), time.perf_counter()
+        made.advance_to(made.now_ns + 500_000_000)
+        ours = (rounds() - before) / (time.perf_counter() - begin)
+        before, begin = bare_rounds(), time.perf_counter()
+        run_bare()
+        return ours / ((bare_rounds() - before) / (time.perf_counter() - begin))
+
+    def run_bare() -> None:
+        bare.library.start(bare.handle, bare.registers[Register.PC] | 1, 0xFFFF_FFFF, 500_000, 0)
+
+    row("compute, to Unicorn without hooks", f"{median(pair):.2f}", "goal 0.65, rounds a second, paired")
+
+
+def against_qemu(folder: Path) -> None:
+    """Compute in QEMU with its instruction counter, for two seconds of the wall clock."""
+    if shutil.which(QEMU[0]) is None:
+        row("compute, QEMU -icount shift=0", "skipped", "qemu-system-arm is not installed")
+        return
+    program = build("compute", folder, "-DBENCH_NO_CLOCK=1")
+    made = board(program, "native" if native_library.path() else "python")
+    at = made.image.symbols.address_of("bench_rounds")
+    assert at is not None
+    rounds = rounds_of(made)
+    before, begin = rounds(), time.perf_counter()
+    made.advance_to(made.now_ns + 5_000_000_000)
+    ours = (rounds() - before) / (time.perf_counter() - begin)
+    seconds = 2.0
+    with subprocess.Popen(
+        [*QEMU, "-kernel", str(program)], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
+    ) as qemu:
+        time.sleep(seconds)
+        told, _ = qemu.communicate(f"stop\nxp /1wx {at:#x}\nquit\n", timeout=20)
+    word = next(line.split(":")[1] for line in told.splitlines() if line.startswith(f"{at:016x}:"))
+    row("compute, QEMU -icount shift=0", f"{int(word, 16) / seconds / ours:.2f}", "of our rounds a second")
+
+
+def main() -> int:
+    """Print the table; 1 without a compiler for it."""
+    if shutil.which("arm-none-eabi-gcc") is None:
+        print("bench: no arm-none-eabi-gcc (hint: sudo apt-get install gcc-arm-none-eabi)")
+        return 1
+    with tempfile.TemporaryDirectory() as folder:
+        for part in (speeds, against_unicorn, against_qemu):
+            part(Path(folder))
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
