@@ -13,11 +13,12 @@ from bluepill_sim.cpu import Engine, native_library
 from bluepill_sim.cpu.block_table import Measure
 from bluepill_sim.cpu.native_state import Shared, field, flag, time
 from bluepill_sim.memory import Memory
-from bluepill_sim.nvic import Nvic
-from bluepill_sim.processor import Processor, Sleep
+from bluepill_sim.nvic import FIRST_IRQ, SYSTEM_EXCEPTIONS, Nvic
+from bluepill_sim.processor import SEVONPEND, Processor, Sleep
 from bluepill_sim.systick import SysTick
 
-_LOW = (1 << 64) - 1
+_HALF = 64
+_LOW = (1 << _HALF) - 1
 _SLEEPS = (Sleep.AWAKE, Sleep.INTERRUPT, Sleep.EVENT)
 
 
@@ -63,6 +64,20 @@ class NativeNvic(Nvic):
     def __init__(self, shared: Shared) -> None:
         self.shared = shared
         super().__init__()
+
+    def set_level(self, irq: int, level: bool) -> None:
+        """As of `Nvic`; called for each character of a USART, so it goes to the fields themselves."""
+        shared, bit = self.shared, 1 << irq
+        levels = shared.levels
+        if not level:
+            shared.levels = levels & ~bit
+        elif not levels & bit:
+            shared.levels = levels | bit
+            number = FIRST_IRQ + irq
+            if number < _HALF:
+                shared.pending_low |= 1 << number
+            else:
+                shared.pending_high |= 1 << number - _HALF
 
     @property  # type: ignore[override]  # the list is an array of bytes here
     def priorities(self) -> Sequence[int]:
@@ -146,7 +161,9 @@ class NativeProcessor(Processor):
 
     def pending_changed(self) -> None:
         """As of `Processor`; C itself looks again at a border."""
-        if self.scr & 1 << 4 and self.nvic.pending:
-            self.event_register = True
-        if self.nvic.deliverable():
-            self.shared.stop_at = 0
+        shared = self.shared
+        if shared.scr & SEVONPEND and self.nvic.pending:
+            shared.event_register = 1
+        enabled = shared.enabled << FIRST_IRQ
+        if shared.pending_low & (enabled | SYSTEM_EXCEPTIONS) or shared.pending_high & enabled >> _HALF:
+            shared.stop_at = 0

@@ -1,6 +1,6 @@
 """The declared registers, handed to the native core: those that only store need no Python.
 
-    reads plain    the register has no `on_read`
+    reads plain    the register has no `on_read`; what is read may be latched
     writes plain   it has no `on_write`
     GPIO           BSRR, BRR and ODR, while nothing but IDR follows from a pin's level
 
@@ -25,7 +25,8 @@ from bluepill_sim.stm32f103 import CLOCK_GATES, PERIPHERAL_BASE
 if TYPE_CHECKING:
     from bluepill_sim.cpu.native_engine import NativeEngine
 
-_READS_PLAIN, _WRITES_PLAIN = 1, 2
+#: Bits of a register's behaviour (`enum behaviour`); the word that latches stands above them, 0 for none.
+_READS_PLAIN, _WRITES_PLAIN, _LATCH_SHIFT = 1, 2, 4
 _PAGE_SHIFT = 10
 
 
@@ -92,6 +93,8 @@ def share_registers(
         for register in part.REGISTERS:
             index = register.offset // 4
             behaviour[index] = _READS_PLAIN * (register.on_read is None) | _WRITES_PLAIN * (register.on_write is None)
+            if register.latched_in is not None:
+                behaviour[index] |= register.latched_in // 4 << _LATCH_SHIFT
             masks[4 * index : 4 * index + 4] = list(part.masks_of(index))
         number = -1
         if isinstance(part, Gpio):

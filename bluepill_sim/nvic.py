@@ -26,7 +26,7 @@ PRIORITY_MASK = 0xF0
 IRQ_LINES = 60
 
 _IRQ_MASK = (1 << IRQ_LINES) - 1
-_SYSTEM_EXCEPTIONS = (1 << FIRST_IRQ) - 1
+SYSTEM_EXCEPTIONS = (1 << FIRST_IRQ) - 1
 
 NvicSnapshot = tuple[int, int, int, int, tuple[int, ...], int]
 
@@ -91,7 +91,7 @@ class Nvic:
     def deliverable(self) -> int:
         """Return the pending exceptions that are enabled, as a mask over exception numbers."""
         pending = self.pending
-        return pending and pending & (self.enabled << FIRST_IRQ | _SYSTEM_EXCEPTIONS)
+        return pending and pending & (self.enabled << FIRST_IRQ | SYSTEM_EXCEPTIONS)
 
     def first_pending(self) -> int | None:
         """Return the enabled pending exception of the highest priority; the lowest number among equals."""

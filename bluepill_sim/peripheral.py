@@ -71,6 +71,8 @@ class Peripheral:
         #: For each word what `Register.stored_after` is made of: kept, taken, cleared by 1, cleared by 0.
         self._masks = [(0, 0, 0, 0)] * count
         self._read_hooks: list[Callable[[], int] | None] = [None] * count
+        #: Index of the hidden word that keeps what a read returned.
+        self._latches: list[int | None] = [None] * count
         self._write_hooks: list[Callable[[int, int], None] | None] = [None] * count
         for register in self.REGISTERS:
             index = register.offset // 4
@@ -81,6 +83,8 @@ class Peripheral:
                 register.write_one_to_clear,
                 register.write_zero_to_clear,
             )
+            if register.latched_in is not None:
+                self._latches[index] = register.latched_in // 4
             if register.on_read is not None:
                 self._read_hooks[index] = cast("Callable[[], int]", getattr(self, register.on_read))
             if register.on_write is not None:
@@ -100,8 +104,12 @@ class Peripheral:
         hook = self._read_hooks[index]
         if hook is None:
             word = self.words[index]
-            if self._registers[index] is None:
+            latch = self._latches[index]
+            if latch is not None:
+                self.words[latch] = word
+            elif self._registers[index] is None:
                 self._warn_no_register(offset, "read")
+                return 0
         else:
             word = hook()
         if size == 4:

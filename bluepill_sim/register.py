@@ -36,6 +36,8 @@ class Register:
     write_zero_to_clear: int = 0
     #: Name of the peripheral's method `() -> int` that answers a read in place of the stored word.
     on_read: str | None = None
+    #: Offset of a hidden word, after the registers, in which each read leaves what it returned; None for none.
+    latched_in: int | None = None
     #: Name of the peripheral's method `(written: int, previous: int) -> None`, called after the store.
     on_write: str | None = None
     #: One line for people.

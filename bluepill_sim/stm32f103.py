@@ -212,7 +212,12 @@ class ChipParts:
 
     def next_deadline(self) -> int | None:
         """Return when the first of them next acts by itself, in ns, or None for never."""
-        return min((part.due_ns for part in self.by_name.values() if part.due_ns is not None), default=None)
+        first = None
+        for part in self.by_name.values():
+            due_ns = part.due_ns
+            if due_ns is not None and (first is None or due_ns < first):
+                first = due_ns
+        return first
 
     def advance_to(self, now_ns: int) -> None:
         """Act on everything due up to and including `now_ns`, in order of time, then of `PERIPHERALS`.

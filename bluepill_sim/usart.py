@@ -26,9 +26,12 @@ from bluepill_sim.ports import ChipPorts
 from bluepill_sim.register import Register, bits
 
 SR, DR, BRR, CR1, CR2, CR3, GTPR = range(7)
+#: Hidden: SR at its last read, half of the sequence that clears a flag.
+_SEEN = 7
 
 ORE, IDLE, RXNE, TC, TXE = (1 << n for n in (3, 4, 5, 6, 7))
 _READ_SEQUENCE_FLAGS = bits((4, 0))
+_WORD_BITS = bits((8, 0))
 _CTS_LBD = bits(9, 8)
 SBK, RWU, RE, TE, IDLEIE, RXNEIE, TCIE, TXEIE, PEIE, PS, PCE, _WAKE, M, UE = (1 << n for n in range(14))
 #: What each bit of the control registers would ask for that is not modelled.
@@ -70,7 +73,6 @@ class Usart(Peripheral):
         "_rx_half_bits",
         "_rx_due_ns",
         "_idle_due_ns",
-        "_status_seen",
         "_clock_hz",
         "_is_enabled_before",
     )
@@ -82,7 +84,7 @@ class Usart(Peripheral):
             readable=bits((9, 0)),
             writable=0,
             write_zero_to_clear=_CTS_LBD | TC | RXNE,
-            on_read="_read_sr",
+            latched_in=0x1C,
             on_write="_write_sr",
         ),
         Register(name="DR", offset=0x04, readable=0, writable=bits((8, 0)), on_read="_read_dr", on_write="_write_dr"),
@@ -113,8 +115,6 @@ class Usart(Peripheral):
     _rx_half_bits: int
     _rx_due_ns: int | None
     _idle_due_ns: int | None
-    #: SR at its last read: half of the sequence that clears a flag.
-    _status_seen: int
     #: The PCLK that the deadlines were worked out with.
     _clock_hz: int
     #: Whether transmission was on at the last write of a control register.
@@ -188,7 +188,7 @@ class Usart(Peripheral):
         self._shift = self._tdr = None
         self._tx_base_ns = self._tx_half_bits = 0
         self._tx_due_ns = self._rx_due_ns = self._idle_due_ns = None
-        self._rdr = self._status_seen = 0
+        self._rdr = self.words[_SEEN] = 0
         self._rx_queue = b""
         self._rx_base_ns = self._rx_half_bits = 0
         self._is_enabled_before = False
@@ -209,8 +209,10 @@ class Usart(Peripheral):
         """Work out all deadlines from what is on the line."""
         self._tx_due_ns = self._tx_base_ns + self._span_ns(self._tx_half_bits) if self._shift is not None else None
         self._rx_due_ns = self._rx_base_ns + self._span_ns(self._rx_half_bits) if self._rx_queue else None
-        times = [at for at in (self._tx_due_ns, self._rx_due_ns, self._idle_due_ns) if at is not None]
-        due_ns = min(times, default=None)
+        due_ns = self._tx_due_ns
+        for other in (self._rx_due_ns, self._idle_due_ns):
+            if other is not None and (due_ns is None or other < due_ns):
+                due_ns = other
         if due_ns != self.due_ns:
             self.due_ns = due_ns
             self.chip.deadline_changed()
@@ -295,23 +297,20 @@ class Usart(Peripheral):
 
     # Registers.
 
-    def _read_sr(self) -> int:
-        self._status_seen = word = self.words[SR]
-        return word
-
     def _write_sr(self, _written: int, _previous: int) -> None:
         self._update_irq()
 
     def _read_dr(self) -> int:
-        self.words[SR] &= ~(RXNE | (self._status_seen & _READ_SEQUENCE_FLAGS))
-        self._status_seen &= ~_READ_SEQUENCE_FLAGS
+        words = self.words
+        words[SR] &= ~(RXNE | (words[_SEEN] & _READ_SEQUENCE_FLAGS))
+        words[_SEEN] &= ~_READ_SEQUENCE_FLAGS
         self._update_irq()
         return self._rdr
 
     def _write_dr(self, written: int, _previous: int) -> None:
-        word = written & bits((8, 0))
-        if self._status_seen & TC:
-            self._status_seen &= ~TC
+        word = written & _WORD_BITS
+        if self.words[_SEEN] & TC:
+            self.words[_SEEN] &= ~TC
             self.words[SR] &= ~TC
         if not self._is_transmitting():
             self.chip.warn(f"{self.name}_DR: written while the transmitter is off", once=f"{self.name}:tx-off")

@@ -30,7 +30,7 @@ ROWS = (("compute", 1.0, 0.02, 2.0), ("gpio", 0.5, 0.01, 1.2), ("systick", 60.0,
 #: Goals of the Python executor: on compute, and when idling.
 PYTHON_GOALS = {"compute": 0.05, "systick": 5.0}
 SETTLED_NS = 5_000_000
-QEMU = ("qemu-system-arm", "-M", "stm32vldiscovery", "-nographic", "-icount", "shift=0", "-monitor", "stdio")
+QEMU = ("qemu-system-arm", "-M", "netduino2", "-nographic", "-icount", "shift=0", "-monitor", "stdio")
 QEMU += ("-serial", "none")
 
 
@@ -79,10 +79,14 @@ def median(measure: Callable[[], float]) -> float:
     return statistics.median(measure() for _ in range(RUNS))
 
 
+def counter_of(made: BluePill) -> int:
+    """Return where the program counts its rounds."""
+    return made.image.symbols.address_of("bench_rounds") or sys.exit("bench: the program has no bench_rounds")
+
+
 def rounds_of(made: BluePill) -> Callable[[], int]:
     """Return what reads the program's own count of its rounds."""
-    at = made.image.symbols.address_of("bench_rounds")
-    assert at is not None
+    at = counter_of(made)
     return lambda: made.chip.memory.read_word(at) or 0
 
 
@@ -149,8 +153,7 @@ def against_qemu(folder: Path) -> None:
         return
     program = build("compute", folder, "-DBENCH_NO_CLOCK=1")
     made = board(program, "native" if native_library.path() else "python")
-    at = made.image.symbols.address_of("bench_rounds")
-    assert at is not None
+    at = counter_of(made)
     rounds = rounds_of(made)
     before, begin = rounds(), time.perf_counter()
     made.advance_to(made.now_ns + 5_000_000_000)

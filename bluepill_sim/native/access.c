@@ -152,6 +152,10 @@ uint64_t core_read_io(void *engine, uint64_t at, unsigned size, void *user)
         if (page->words != NULL && index < page->count && page->behaviour[index] & READS_PLAIN && is_clocked(page) &&
             !is_over(core)) {
             const uint32_t word = page->words[index];
+            const uint32_t latch = page->behaviour[index] >> LATCH_SHIFT;
+            if (latch) {
+                page->words[latch] = word;
+            }
             return size == 4 ? word : (word >> (offset & 3) * 8) & ((1u << size * 8) - 1);
         }
     }

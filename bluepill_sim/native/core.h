@@ -142,7 +142,8 @@ struct page {
     struct port *port;
 };
 
-enum behaviour { READS_PLAIN = 1, WRITES_PLAIN = 2 };
+/* The word that latches what is read stands above the bits; 0 for none. */
+enum behaviour { READS_PLAIN = 1, WRITES_PLAIN = 2, LATCH_SHIFT = 4 };
 
 /* What lives as long as the core. */
 struct allocation {
