@@ -38,6 +38,8 @@ class Symbol:
     address: int
     #: Bytes; 0 where the file does not say.
     size: int = 0
+    #: Whether the file says that it is a function.
+    is_function: bool = field(default=False, compare=False)
 
 
 @dataclass(frozen=True, slots=True)
@@ -217,7 +219,7 @@ def _symbols(elf: "ELFFile") -> SymbolTable:  # type: ignore[name-defined]  # no
         if entry["st_shndx"] == "SHN_ABS":
             continue
         address = entry["st_value"] & ~1 if kind == "STT_FUNC" else entry["st_value"]
-        symbol = Symbol(name, address, entry["st_size"])
+        symbol = Symbol(name, address, entry["st_size"], kind == "STT_FUNC")
         # Of several names at one address the sized one tells more; then the first in the file.
         if address not in found or (symbol.size and not found[address].size):
             found[address] = symbol

@@ -1,0 +1,1 @@
+"""The debugger: GDB's remote serial protocol in front of an emulated chip."""

@@ -1,0 +1,122 @@
+"""What the debugger needs of whoever runs the chip, and why it stands still.
+
+`bluepill_sim` alone runs a lone chip; a bench runs the chip with a robot. The
+debugger does not see the difference: it asks for time to go on, and for
+snapshots.
+
+Invariant: a machine that stands still stands still as a whole.
+"""
+
+from dataclasses import dataclass
+from enum import Enum
+from typing import Protocol
+
+from bluepill_sim.board import BluePill
+from bluepill_sim.timing import Nanos, Reached
+
+
+class StopKind(Enum):
+    """Why the chip stands still."""
+
+    #: Before the instruction at a breakpoint.
+    BREAKPOINT = "breakpoint"
+    #: At an instruction that accesses a watched address.
+    WATCHPOINT = "watchpoint"
+    STEP = "step"
+    #: Ctrl-C.
+    INTERRUPT = "interrupt"
+    #: BKPT in the program.
+    BKPT = "bkpt"
+    #: A fault that the program does not handle, or a lockup.
+    FAULT = "fault"
+    #: The program ended by semihosting.
+    EXIT = "exit"
+    #: The run is over: its scenario's time is up.
+    END = "end"
+    #: Backwards: nothing older is known.
+    BEGIN = "begin"
+
+
+@dataclass(frozen=True, slots=True)
+class Stop:
+    """Why and where."""
+
+    kind: StopKind
+    #: The watched address that was accessed.
+    address: int | None = None
+    #: Exit code of the program.
+    code: int = 0
+
+
+class WatchKind(Enum):
+    """What access a watchpoint waits for; the value is GDB's word in a stop reply."""
+
+    WRITE = "watch"
+    READ = "rwatch"
+    ACCESS = "awatch"
+
+
+@dataclass(frozen=True, slots=True)
+class Watchpoint:
+    """Bytes whose accesses stop the chip."""
+
+    address: int
+    size: int
+    kind: WatchKind
+
+
+class Machine(Protocol):
+    """Who runs the chip and everything that hangs on it."""
+
+    @property
+    def board(self) -> BluePill:
+        """The chip on its board."""
+        ...
+
+    @property
+    def end_ns(self) -> Nanos | None:
+        """When the run is over; None for never."""
+        ...
+
+    def advance_to(self, limit_ns: Nanos) -> Reached:
+        """Bring everything to a time; less far where the chip halts."""
+        ...
+
+    def snapshot(self) -> object:
+        """Return all that decides the future."""
+        ...
+
+    def restore(self, snapshot: object) -> None:
+        """Put back what `snapshot` returned.
+
+        Raises:
+            BluePillError: this machine cannot go back.
+        """
+        ...
+
+    def halted(self) -> None:
+        """Be told that the chip stands still: a real robot is stopped here."""
+        ...
+
+
+class LoneChip:
+    """A board by itself."""
+
+    def __init__(self, board: BluePill) -> None:
+        self.board = board
+        self.end_ns: Nanos | None = None
+
+    def advance_to(self, limit_ns: Nanos) -> Reached:
+        """Bring the board to a time."""
+        return self.board.advance_to(limit_ns)
+
+    def snapshot(self) -> object:
+        """Return all that decides the board's future."""
+        return self.board.snapshot()
+
+    def restore(self, snapshot: object) -> None:
+        """Put back what `snapshot` returned."""
+        self.board.restore(snapshot)
+
+    def halted(self) -> None:
+        """Nobody else has to know."""
