@@ -102,6 +102,10 @@ class Chip:
         """Return when a cycle of the present frequency began."""
         return self._clock.ns_of(cycle)
 
+    def cycle_at(self, at_ns: Nanos) -> int:
+        """Return the first cycle, at the present frequency, that begins at or after a time."""
+        return self._clock.cycle_at(at_ns)
+
     def next_deadline(self) -> Nanos | None:
         """Return when a peripheral or SysTick next acts by itself; the core itself may act at any time."""
         due = self._next_peripheral_due()

@@ -30,6 +30,8 @@ class SysTick:
             pend: makes the SysTick exception pending.
         """
         self._pend = pend
+        #: Called with the cycle at which it made its exception pending; tools look on.
+        self.tick_listeners: list[Callable[[int], None]] = []
         self._control = 0
         self._reload = 0
         self._count_flag = False
@@ -53,6 +55,8 @@ class SysTick:
         self._count_flag = True
         if self._control & TICKINT:
             self._pend()
+            for listener in self.tick_listeners:
+                listener(due)
         period = (self._reload + 1) * self._divider()
         if not self._reload:
             # A reload value of 0 stops the counter at its next wrap.

@@ -99,7 +99,7 @@ def frame(payload: bytes) -> bytes:
             escaped += bytes([_ESCAPE, byte ^ _ESCAPE_BIT])
         else:
             escaped.append(byte)
-    return b"$%b#%02x" % (bytes(escaped), checksum(escaped))
+    return b"$%b#%02x" % (bytes(escaped), checksum(bytes(escaped)))
 
 
 def unescape(payload: bytes) -> bytes:

@@ -10,10 +10,9 @@ Invariant: counts only grow; watching changes nothing.
 """
 
 from collections import Counter
-from collections.abc import Iterator
 from dataclasses import dataclass, field
 
-from bluepill_sim.image import Image, Symbol
+from bluepill_sim.image import Image
 from bluepill_sim.sight.functions import FunctionTable
 from bluepill_sim.sight.line_table import LineTable
 from bluepill_sim.sight.static_code import StaticCode
@@ -98,7 +97,7 @@ class Coverage:
                 counts[block.last.address] = (0, 0)
         for (start, following), times in self._edges.items():
             block = self._code.block(start)
-            if not block.is_conditional or following is None or len(block.executed(following)) < len(block.addresses):
+            if not block.is_conditional or following is None or block.ends_before(following):
                 continue
             taken, not_taken = counts.get(block.last.address, (0, 0))
             if following == block.end:
@@ -115,16 +114,13 @@ class Coverage:
             file = found.setdefault(row.file, FileCoverage(row.file))
             file.lines[row.line] = max(file.lines.get(row.line, 0), counts.get(row.address, 0))
         for address, (taken, not_taken) in sorted(self.branches().items()):
-            row = self._table.at(address)
-            if row is not None:
-                rows = found[row.file].branches.setdefault(row.line, [])
+            place = self._table.at(address)
+            if place is not None:
+                rows = found[place.file].branches.setdefault(place.line, [])
                 rows.append(BranchCount(address, taken, not_taken))
-        for function in self._named_functions():
-            row = self._table.at(function.address)
-            if row is not None:
+        for function in self._functions.functions:
+            place = self._table.at(function.address)
+            if place is not None:
                 calls = counts.get(function.address, 0)
-                found[row.file].functions.append((function.name, row.line, calls))
+                found[place.file].functions.append((function.name, place.line, calls))
         return [found[name] for name in sorted(found)]
-
-    def _named_functions(self) -> Iterator[Symbol]:
-        return iter(self._functions.functions)

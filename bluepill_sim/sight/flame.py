@@ -51,13 +51,13 @@ def flame_svg(stacks: Mapping[tuple[str, ...], int], *, title: str, hz: int) -> 
     depth = _depth(root)
     height = _TOP + depth * _ROW + _MARGIN
     awake_ms, share = root.cycles * 1e3 / hz, root.cycles / max(1, root.cycles + asleep)
+    what = f"{root.cycles} cycles awake ({awake_ms:.3f} ms, {share:.2%} of the time)"
     lines = [
         f'<svg xmlns="http://www.w3.org/2000/svg" width="{_WIDTH}" height="{height}" viewBox="0 0 {_WIDTH} {height}">',
         f"<style>{_STYLE}</style>",
         f'<rect width="{_WIDTH}" height="{height}" fill="#fdfcf8"/>',
         f'<text class="title" x="{_MARGIN}" y="24">{escape(title)}</text>',
-        f'<text class="sub" x="{_MARGIN}" y="42">{root.cycles} cycles awake ({awake_ms:.3f} ms, {share:.2%} of the time); '
-        "width: cycles, upwards: called by the one below</text>",
+        f'<text class="sub" x="{_MARGIN}" y="42">{escape(what)}; width: cycles, upwards: called from below</text>',
     ]
     if root.cycles:
         scale = (_WIDTH - 2 * _MARGIN) / root.cycles

@@ -48,8 +48,7 @@ class FunctionTable:
         symbol = self._symbols[index]
         if symbol.size:
             return symbol.address + symbol.size
-        following = self._addresses[index + 1] if index + 1 < len(self._addresses) else symbol.address + 4
-        return following
+        return self._addresses[index + 1] if index + 1 < len(self._addresses) else symbol.address + 4
 
 
 def _may_hold_code(address: int) -> bool:

@@ -70,7 +70,9 @@ def read_lines(image: Image) -> LineTable:
         from elftools.construct.core import ConstructError
         from elftools.elf.elffile import ELFFile
     except ImportError as error:
-        raise MissingDependencyError(f"source lines need pyelftools: {error}", hint="pip install 'p2os[sim]'") from error
+        raise MissingDependencyError(
+            f"source lines need pyelftools: {error}", hint="pip install 'p2os[sim]'"
+        ) from error
     try:
         elf = ELFFile(io.BytesIO(data))
         if not elf.has_dwarf_info():
@@ -104,10 +106,8 @@ class _Files:
         name, number = _text(entry.name), entry.dir_index
         if name.startswith("/"):
             return name
-        if self._is_new:
-            folder = self._folders[number]
-        else:
-            folder = self._folders[number - 1] if number else ""
+        folders = self._folders if self._is_new else ["", *self._folders]
+        folder = folders[number]
         if not folder.startswith("/"):
             folder = f"{self._compiled_in}/{folder}" if folder not in ("", self._compiled_in) else self._compiled_in
         parts = [part for part in f"{folder}/{name}".split("/") if part != "."]

@@ -3,8 +3,9 @@
 Theory of operation. BL and BLX open a frame that remembers where the call
 comes back to; a block that begins there closes it. A jump from one function
 into another without a link is a tail call: the frame changes its name. An
-exception opens a stack of its own. Sleep is told apart: WFI and WFE cost their
-own cycle, the rest of the time is "(asleep)".
+exception opens a stack of its own, which also pays for its entry and exit.
+Sleep is told apart: the block of a WFI or WFE costs a cycle an instruction, and
+the rest of its time is "(asleep)".
 
 An operating system that switches stacks makes a thread come back on another
 one's frames; where that shows, the stack begins anew. Inclusive cycles of a
@@ -16,6 +17,7 @@ Invariant: the exclusive cycles of all functions add up to the time that was wat
 from collections import Counter
 from dataclasses import dataclass, field
 
+from bluepill_sim.processor import ENTRY_CYCLES, EXIT_CYCLES
 from bluepill_sim.sight.functions import FunctionTable
 from bluepill_sim.sight.static_code import StaticCode
 from bluepill_sim.thumb import Kind
@@ -23,6 +25,7 @@ from bluepill_sim.vectors import exception_name
 
 ASLEEP = "(asleep)"
 _SLEEPS = frozenset({Kind.WAIT_INTERRUPT, Kind.WAIT_EVENT})
+_LONGEST_EXCEPTION_CYCLES = max(ENTRY_CYCLES, EXIT_CYCLES)
 #: chosen: deeper than any stack of 20 KiB allows.
 _DEEPEST = 512
 
@@ -64,18 +67,24 @@ class Profile:
         self._functions = functions
         self._code = code
         self._stacks = [_Stack(())]
+        #: Where what was told ends; before the first block nowhere.
+        self._end: int | None = None
+        #: Who pays for what passes until the next block.
+        self._gap_names: tuple[str, ...] = ()
         #: Cycles by the names of the frames, outermost first.
         self.stacks: Counter[tuple[str, ...]] = Counter()
         self.calls: Counter[str] = Counter()
 
     # As a listener.
 
-    def block(self, address: int, following: int | None, cycle: int, cycles: int) -> None:  # noqa: ARG002 - a listener
+    def block(self, address: int, following: int | None, cycle: int, cycles: int) -> None:
         """Charge a block to the function that it is in."""
+        self._charge_gap(cycle)
+        self._end = cycle + cycles
         stack = self._stacks[-1]
         self._arrive(stack, address)
         block = self._code.block(address)
-        ends_early = len(block.executed(following)) < len(block.addresses)
+        ends_early = block.ends_before(following)
         if block.last.kind in _SLEEPS and not ends_early:
             awake = min(cycles, len(block.addresses))
             self.stacks[*stack.names, ASLEEP] += cycles - awake
@@ -83,15 +92,18 @@ class Profile:
         self.stacks[stack.names] += cycles
         stack.called_from = block.end if block.is_call and not ends_early and following != block.end else None
 
-    def enter(self, number: int, cycle: int) -> None:  # noqa: ARG002 - a listener
+    def enter(self, number: int, cycle: int) -> None:
         """Open the stack of an exception."""
+        self._charge_gap(cycle)
         below = self._stacks[-1].names if len(self._stacks) > 1 else ()
         self._stacks.append(_Stack((*below, f"<{exception_name(number)}>")))
+        self._end, self._gap_names = cycle, self._stacks[-1].root
 
-    def leave(self, cycle: int) -> None:  # noqa: ARG002 - a listener
+    def leave(self, cycle: int) -> None:
         """Close it."""
+        self._end = cycle
         if len(self._stacks) > 1:
-            self._stacks.pop()
+            self._gap_names = self._stacks.pop().root
 
     # The result.
 
@@ -117,6 +129,13 @@ class Profile:
     def folded(self) -> list[str]:
         """Return the stacks one a line, `a;b;c CYCLES`, as flame graph programs take them."""
         return [f"{';'.join(names)} {cycles}" for names, cycles in sorted(self.stacks.items()) if cycles and names]
+
+    def _charge_gap(self, cycle: int) -> None:
+        """Charge entry and exit of an exception to it; what is longer was sleep (SLEEPONEXIT)."""
+        if self._end is not None and cycle > self._end:
+            awake = min(cycle - self._end, _LONGEST_EXCEPTION_CYCLES)
+            self.stacks[self._gap_names] += awake
+            self.stacks[ASLEEP,] += cycle - self._end - awake
 
     def _arrive(self, stack: _Stack, address: int) -> None:
         """Bring the frames to the function that a block is in."""

@@ -3,7 +3,7 @@
 A recorded block tells only where it began; how far it went follows from its
 instructions and from where the next one began.
 
-Invariant: a block ends at the first instruction that may leave the straight line.
+Invariant: a block ends at the first instruction that may leave the straight line, or sleeps.
 """
 
 from collections.abc import Callable, Iterable
@@ -13,9 +13,12 @@ from bluepill_sim.memory import Memory
 from bluepill_sim.thumb import Instruction, Kind, decode
 
 #: Instructions after which execution may go on elsewhere.
-_LEAVING = frozenset(
-    {Kind.BRANCH, Kind.CALL, Kind.BRANCH_REGISTER, Kind.TABLE_BRANCH, Kind.LOAD_PC, Kind.SUPERVISOR_CALL, Kind.BREAKPOINT}
-)
+_LEAVING = frozenset({
+    Kind.BRANCH, Kind.CALL, Kind.BRANCH_REGISTER, Kind.TABLE_BRANCH, Kind.LOAD_PC, Kind.SUPERVISOR_CALL,
+    Kind.BREAKPOINT,
+})  # fmt: skip
+#: Instructions that end a block and go on after it.
+_SLEEPING = frozenset({Kind.WAIT_INTERRUPT, Kind.WAIT_EVENT})
 #: chosen: longer than any real block; code that never branches is no code.
 _MOST_INSTRUCTIONS = 1024
 _FIRST_WIDE = 0xE800
@@ -41,13 +44,17 @@ class StaticBlock:
         """Whether it may go on at its end."""
         return self.is_conditional or self.last.kind not in _LEAVING or self.last.kind is Kind.SUPERVISOR_CALL
 
+    def ends_before(self, following: int | None) -> bool:
+        """Tell whether the block was left before its last instruction, when `following` ran next; None: not known.
+
+        The engine ends a translation at pages and after instructions that change its state; a fault ends it anywhere.
+        """
+        return following in self.addresses[1:] and self.last.destination != following
+
     def executed(self, following: int | None) -> tuple[int, ...]:
-        """Return the instructions that ran, when the next block that ran began at `following`; None: not known."""
-        if following is None or not self.start < following < self.end or self.last.destination == following:
+        """Return the instructions that ran, when the next one that ran was `following`; None: not known."""
+        if following is None or not self.ends_before(following):
             return self.addresses
-        if following not in self.addresses:
-            return self.addresses
-        # The engine cut the block: it ends a translation at pages and after instructions that change its state.
         return tuple(address for address in self.addresses if address < following)
 
 
@@ -106,7 +113,7 @@ class StaticCode:
             if last.kind is Kind.IF_THEN:
                 mask = word & 0xF
                 conditional_left = 4 - ((mask & -mask).bit_length() - 1)
-            if last.kind in _LEAVING or last.loads_pc:
+            if last.kind in _LEAVING or last.kind in _SLEEPING or last.loads_pc:
                 break
         leaves = last.kind in _LEAVING or last.loads_pc
         is_conditional = leaves and (is_in_it or _has_condition(last, word))

@@ -1,22 +1,19 @@
 """Makes sense of a stream of recorded blocks: what ran, for how long, and what came next.
 
-    BLOCK a   BLOCK b   ENTRY 15   BLOCK h   RETURN   BLOCK c
-    └ a ran until b     └ b was interrupted: its own time ends here, what follows it is c
+    BLOCK a   BLOCK b   ENTRY 15 at c   BLOCK h   RETURN to c   BLOCK c
+    └ a ran, then b     └ b ran, then c was due   └ h ran, nothing of its own follows
 
-A block is told of once it is known what follows it. Interrupts stand between
-blocks, never in them, so that what follows an interrupted block is what runs
-after the return.
+A block is told of once it is known what follows it. Exceptions stand between
+blocks; a fault stands inside one, and its address says how far that came.
 
-Invariant: the cycles of all that is told add up to the time from the first row to the last.
+Invariant: the cycles of all blocks and of all gaps that exceptions leave add up
+to the time from the first row to the last.
 """
 
-from collections.abc import Callable, Iterable
-from dataclasses import dataclass, field
+from collections.abc import Iterable, Sequence
 from typing import Protocol
 
-#: (cycle, address, kind) of a recorded row; a kind is BLOCK, RETURN, or the number of the exception entered.
-BLOCK, RETURN = 0, -1
-Row = tuple[int, int, int]
+from bluepill_sim.cpu import BLOCK, EXCEPTION_RETURN, Row
 
 
 class Listener(Protocol):
@@ -35,64 +32,41 @@ class Listener(Protocol):
         ...
 
 
-@dataclass(slots=True)
-class _Running:
-    """A block that has begun; `cycles` once it has ended."""
-
-    address: int
-    cycle: int
-    cycles: int | None = None
-
-
-@dataclass(slots=True)
 class Walk:
-    """Follows the rows of one recording."""
+    """Follows the rows of one recording.
 
-    listeners: list[Listener]
-    #: The block of each thread of execution that an exception interrupted, outermost first; the last one runs.
-    _contexts: list[_Running | None] = field(default_factory=lambda: [None])
-    _last_cycle: int = 0
+    Args:
+        listeners: told of everything, in order of time.
+    """
+
+    def __init__(self, listeners: Sequence[Listener]) -> None:
+        self._listeners = tuple(listeners)
+        #: Start and cycle of the block that has begun.
+        self._running: tuple[int, int] | None = None
 
     def take(self, rows: Iterable[Row]) -> None:
         """Take the next rows."""
-        contexts = self._contexts
         for cycle, address, kind in rows:
-            self._last_cycle = cycle
-            running = contexts[-1]
             if kind == BLOCK:
-                if running is not None:
-                    self._tell(running, address, cycle)
-                contexts[-1] = _Running(address, cycle)
-                continue
-            if running is not None and running.cycles is None:
-                running.cycles = cycle - running.cycle
-            if kind == RETURN:
-                if running is not None:
-                    self._tell(running, None, cycle)
-                if len(contexts) > 1:
-                    contexts.pop()
-                else:
-                    contexts[-1] = None
-                for listener in self.listeners:
+                self._end(address, cycle)
+                self._running = address, cycle
+            elif kind == EXCEPTION_RETURN:
+                self._end(None, cycle)
+                for listener in self._listeners:
                     listener.leave(cycle)
             else:
-                contexts.append(None)
-                for listener in self.listeners:
+                self._end(address, cycle)
+                for listener in self._listeners:
                     listener.enter(kind, cycle)
 
     def finish(self, cycle: int) -> None:
         """Tell of what still runs, up to a cycle."""
-        while self._contexts:
-            running = self._contexts.pop()
-            if running is not None:
-                self._tell(running, None, cycle)
-        self._contexts.append(None)
+        self._end(None, cycle)
 
-    def _tell(self, running: _Running, following: int | None, cycle: int) -> None:
-        cycles = cycle - running.cycle if running.cycles is None else running.cycles
-        for listener in self.listeners:
-            listener.block(running.address, following, running.cycle, cycles)
-
-
-#: Drains a recorder.
-Drain = Callable[[], Iterable[Row]]
+    def _end(self, following: int | None, cycle: int) -> None:
+        if self._running is None:
+            return
+        address, began = self._running
+        self._running = None
+        for listener in self._listeners:
+            listener.block(address, following, began, cycle - began)

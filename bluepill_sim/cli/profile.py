@@ -1,0 +1,148 @@
+"""`p2os mcu profile`: where a firmware spends its cycles, its stack, and how long interrupts wait."""
+
+import json
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from bluepill_sim.board import BluePill
+from bluepill_sim.cli.columns import print_columns
+from bluepill_sim.cli.driving import parse_changes, run_driven, say, summary, tell_fault, warn_on_stderr
+from bluepill_sim.durations import to_nanos
+from bluepill_sim.errors import BluePillError
+from bluepill_sim.sight.flame import flame_svg
+from bluepill_sim.sight.functions import FunctionTable
+from bluepill_sim.sight.latency import ExceptionCost, Latency
+from bluepill_sim.sight.observation import Observation
+from bluepill_sim.sight.profile import ASLEEP, FunctionCost, Profile
+from bluepill_sim.sight.stack import StackGauge
+from bluepill_sim.sight.static_code import StaticCode
+from bluepill_sim.vectors import exception_name
+
+HELP = """Run a firmware for a while and tell where its cycles go.
+
+By function: calls, cycles of its own, cycles with what it calls. Then how deep
+the stack went, how long each interrupt waited and ran, and what the firmware
+touched that is not modelled.
+
+\b
+Examples:
+  p2os mcu profile mine.elf --for 5s             a table, the dearest first
+  p2os mcu profile mine.elf --flame mine.svg     a flame graph, for any browser
+  p2os mcu profile mine.elf --folded mine.txt    stacks for other flame graph programs
+"""
+
+#: chosen: how many functions a person wants to see.
+_SHOWN_FUNCTIONS = 20
+
+
+def register(app: typer.Typer) -> None:
+    """Add the command."""
+    app.command("profile", help=HELP)(profile)
+
+
+def profile(
+    firmware: Annotated[Path, typer.Argument(help="ELF, HEX or BIN.", metavar="FIRMWARE")],
+    span: Annotated[str, typer.Option("--for", help="Virtual time, such as 2s or 10ms.", metavar="TIME")] = "1s",
+    drive: Annotated[
+        list[str] | None, typer.Option(help="Put a level on a pin at a time; repeatable.", metavar="PIN=LEVEL@TIME")
+    ] = None,
+    flame: Annotated[Path | None, typer.Option(help="Write a flame graph.", metavar="FILE.svg")] = None,
+    folded: Annotated[Path | None, typer.Option(help="Write folded stacks.", metavar="FILE")] = None,
+    every: Annotated[bool, typer.Option("--all", help="Every function that ran.")] = False,
+    json_output: Annotated[bool, typer.Option("--json", help="Print one JSON object.")] = False,
+) -> None:
+    """Measure where the cycles go."""
+    board = BluePill(firmware)
+    changes = parse_changes(drive or [], board)
+    warn_on_stderr(board)
+    stack = StackGauge(board)
+    costs = Profile(FunctionTable(board.image), StaticCode(board.chip.memory))
+    latency = Latency(board)
+    with Observation(board, [costs, latency]):
+        run_driven(board, to_nanos(span), changes)
+    use = stack.measure()
+    if flame is not None:
+        title = f"{firmware.name}: {board.now_ns / 1e9:g} s"
+        _write(flame, flame_svg(costs.stacks, title=title, hz=board.hclk_hz))
+    if folded is not None:
+        _write(folded, "\n".join(costs.folded()) + "\n")
+    functions = costs.functions()
+    if json_output:
+        facts = {
+            "cycles": costs.total_cycles,
+            "functions": [_function_facts(f) for f in functions],
+            "stack": {"top": use.top, "room_bytes": use.room_bytes, "used_bytes": use.used_bytes},
+            "exceptions": [_exception_facts(cost) for cost in latency.by_name],
+            "warnings": board.warnings,
+        }
+        typer.echo(json.dumps(facts, sort_keys=True))
+    else:
+        _print_functions(functions if every else functions[:_SHOWN_FUNCTIONS], costs.total_cycles)
+        _print_exceptions(latency.by_name, board.hclk_hz)
+        typer.echo(str(use))
+        for warning in board.warnings:
+            typer.echo(f"not modelled, or odd: {warning}")
+    say(summary(board))
+    if tell_fault(board):
+        raise typer.Exit(1)
+
+
+def _write(path: Path, text: str) -> None:
+    try:
+        path.write_text(text, encoding="utf-8")
+    except OSError as error:
+        raise BluePillError(f"cannot write {path}: {error.strerror}", hint="give a file in a folder") from error
+
+
+def _function_facts(cost: FunctionCost) -> dict[str, object]:
+    return {
+        "name": cost.name,
+        "calls": cost.calls,
+        "cycles": cost.exclusive_cycles,
+        "cycles_with_callees": cost.inclusive_cycles,
+    }
+
+
+def _exception_facts(cost: ExceptionCost) -> dict[str, object]:
+    return {
+        "number": cost.number,
+        "name": exception_name(cost.number),
+        "entries": cost.entries,
+        "waits_known": len(cost.waits),
+        "least_wait_cycles": cost.least_wait,
+        "mean_wait_cycles": cost.mean_wait,
+        "worst_wait_cycles": cost.worst_wait,
+        "worst_duration_cycles": cost.worst_duration,
+    }
+
+
+def _print_functions(functions: list[FunctionCost], total: int) -> None:
+    awake = total - sum(f.exclusive_cycles for f in functions if f.name == ASLEEP)
+    rows = []
+    for f in functions:
+        share = f"{f.exclusive_cycles / awake:.1%}" if f.name != ASLEEP and awake else ""
+        calls = str(f.calls) if f.calls else ""
+        rows.append((f.name, calls, str(f.exclusive_cycles), share, str(f.inclusive_cycles)))
+    print_columns(("function", "calls", "cycles", "awake", "with callees"), rows, right=(1, 2, 3, 4))
+    if total:
+        typer.echo(f"{total} cycles, {awake / total:.2%} of them awake\n")
+
+
+def _print_exceptions(costs: list[ExceptionCost], hz: int) -> None:
+    def cycles(value: float | None) -> str:
+        return "" if value is None else f"{value:.0f} ({value * 1e6 / hz:.2f} µs)"
+
+    rows = [
+        (
+            exception_name(cost.number),
+            str(cost.entries),
+            *(cycles(value) for value in (cost.least_wait, cost.mean_wait, cost.worst_wait, cost.worst_duration)),
+        )
+        for cost in costs
+    ]
+    if rows:
+        headers = ("exception", "entries", "least wait", "mean", "worst", "longest run")
+        print_columns(headers, rows, right=(1, 2, 3, 4, 5))
+        typer.echo("")

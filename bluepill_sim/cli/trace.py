@@ -1,0 +1,91 @@
+"""`p2os mcu trace`: what a firmware executes, block by block or call by call."""
+
+import json
+import sys
+from contextlib import ExitStack
+from pathlib import Path
+from typing import Annotated, TextIO
+
+import typer
+
+from bluepill_sim.board import BluePill
+from bluepill_sim.cli.driving import parse_changes, run_driven, say, summary, tell_fault, warn_on_stderr
+from bluepill_sim.cpu import BlockRecorder
+from bluepill_sim.durations import to_nanos
+from bluepill_sim.errors import BluePillError
+from bluepill_sim.sight.functions import FunctionTable
+from bluepill_sim.sight.last_blocks import lines_of
+from bluepill_sim.sight.line_table import read_lines
+
+HELP = """Run a firmware and write what it executes: cycle, symbol, source line.
+
+A line is a basic block, or the entry of or return from an exception; with
+--calls only where another function begins. A loop to itself is one line.
+
+\b
+Examples:
+  p2os mcu trace mine.elf --for 1ms                    on the screen
+  p2os mcu trace mine.elf --from 2s --for 1ms          the millisecond after two seconds
+  p2os mcu trace mine.elf --for 10ms --out trace.txt   into a file
+  p2os mcu trace mine.elf --for 1ms --json             a JSON object a line
+"""
+
+_CAPACITY = 1 << 12
+
+
+def register(app: typer.Typer) -> None:
+    """Add the command."""
+    app.command("trace", help=HELP)(trace)
+
+
+def trace(
+    firmware: Annotated[Path, typer.Argument(help="ELF, HEX or BIN.", metavar="FIRMWARE")],
+    span: Annotated[str, typer.Option("--for", help="How long it is traced.", metavar="TIME")] = "1ms",
+    start: Annotated[str, typer.Option("--from", help="When the trace begins.", metavar="TIME")] = "0s",
+    drive: Annotated[
+        list[str] | None, typer.Option(help="Put a level on a pin at a time; repeatable.", metavar="PIN=LEVEL@TIME")
+    ] = None,
+    out: Annotated[Path | None, typer.Option(help="Write to a file.", metavar="FILE")] = None,
+    calls: Annotated[bool, typer.Option("--calls", help="Only where another function begins.")] = False,
+    json_output: Annotated[bool, typer.Option("--json", help="A JSON object a line.")] = False,
+) -> None:
+    """Trace the execution."""
+    board = BluePill(firmware)
+    table = read_lines(board.image)
+    functions = FunctionTable(board.image)
+    changes = parse_changes(drive or [], board)
+    warn_on_stderr(board)
+    begin_ns = to_nanos(start)
+    end_ns = begin_ns + to_nanos(span)
+    run_driven(board, begin_ns, [change for change in changes if change.at_ns < begin_ns])
+    count, last = 0, ""
+    with ExitStack() as stack:
+        stream: TextIO = sys.stdout if out is None else stack.enter_context(_open(out))
+
+        def write(recorder: BlockRecorder) -> None:
+            nonlocal count, last
+            for row in recorder.drain():
+                name = functions.name(row[1]) if not row[2] else ""
+                if calls and name == last:
+                    continue
+                last = name
+                count += 1
+                if json_output:
+                    fields = {"cycle": row[0], "address": row[1], "kind": row[2], "function": name}
+                    stream.write(json.dumps(fields | {"line": table.place(row[1])}) + "\n")
+                else:
+                    stream.write(lines_of([row], board.image.symbols, table)[0] + "\n")
+
+        recorder = board.chip.record_blocks(_CAPACITY, write)
+        run_driven(board, end_ns, [change for change in changes if change.at_ns >= begin_ns])
+        write(recorder)
+    say(f"{count} lines; {summary(board)}")
+    if tell_fault(board):
+        raise typer.Exit(1)
+
+
+def _open(path: Path) -> TextIO:
+    try:
+        return path.open("w", encoding="utf-8")
+    except OSError as error:
+        raise BluePillError(f"cannot write {path}: {error.strerror}", hint="give a file in a folder") from error
