@@ -26,6 +26,8 @@ _SMALLEST_BYTES = 8
 _SHF_ALLOC = 2
 _ELF_MAGIC = b"\x7fELF"
 _HINT = "an ELF, HEX or BIN file built for an STM32F103 at 0x08000000 is needed"
+#: chosen: so far a symbol without a size reaches; longer than any function that assembly holds.
+_UNSIZED_REACH_BYTES = 0x1_0000
 #: Names that the linker makes up inside functions: mapping symbols of the ARM ELF.
 _MAPPING_PREFIXES = ("$",)
 
@@ -59,7 +61,7 @@ class SymbolTable:
         if index >= 0:
             symbol = self.symbols[index]
             offset = address - symbol.address
-            if offset < symbol.size or not symbol.size:
+            if offset < (symbol.size or _UNSIZED_REACH_BYTES):
                 return f"{symbol.name}+{offset:#x} ({address:#010x})"
         return f"{address:#010x}"
 

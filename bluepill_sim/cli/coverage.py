@@ -43,6 +43,9 @@ def coverage(
         list[str] | None, typer.Option(help="Put a level on a pin at a time; repeatable.", metavar="PIN=LEVEL@TIME")
     ] = None,
     lcov: Annotated[Path | None, typer.Option(help="Write an lcov tracefile.", metavar="FILE")] = None,
+    sources: Annotated[
+        Path | None, typer.Option(help="Where relative names of source files start from.", metavar="FOLDER")
+    ] = None,
     missed: Annotated[bool, typer.Option("--missed", help="Name the lines that did not run.")] = False,
     fail_under: Annotated[
         float, typer.Option(help="Least share of lines, in %.", metavar="PERCENT", min=0, max=100)
@@ -61,7 +64,7 @@ def coverage(
         run_driven(board, to_nanos(span), changes)
     files = listener.files()
     if lcov is not None:
-        write_lcov(files, lcov)
+        write_lcov(files, lcov, sources=sources)
     if json_output:
         typer.echo(json.dumps([_facts(file) for file in files], sort_keys=True))
     else:

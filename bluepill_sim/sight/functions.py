@@ -8,6 +8,8 @@ from bisect import bisect_right
 from bluepill_sim.image import Image, Symbol
 from bluepill_sim.stm32f103 import FLASH_BASE, FLASH_BYTES_FITTED, SRAM_BASE, SRAM_BYTES
 
+#: chosen: so far the last symbol reaches, where the file does not say.
+_LAST_REACH_BYTES = 0x1000
 #: What is said of code that no symbol covers.
 UNKNOWN = "(unknown)"
 
@@ -48,7 +50,7 @@ class FunctionTable:
         symbol = self._symbols[index]
         if symbol.size:
             return symbol.address + symbol.size
-        return self._addresses[index + 1] if index + 1 < len(self._addresses) else symbol.address + 4
+        return self._addresses[index + 1] if index + 1 < len(self._addresses) else symbol.address + _LAST_REACH_BYTES
 
 
 def _may_hold_code(address: int) -> bool:

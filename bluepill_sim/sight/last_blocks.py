@@ -29,6 +29,11 @@ class LastBlocks:
         self._board = board
         self._saved: BoardSnapshot = board.snapshot()
 
+    @property
+    def now_ns(self) -> Nanos:
+        """The time that the board has reached."""
+        return self._board.now_ns
+
     def advance_to(self, limit_ns: Nanos) -> Reached:
         """Bring the board to a time, with saves on the way; use it in place of the board's own.
 
