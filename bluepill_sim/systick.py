@@ -30,8 +30,8 @@ class SysTick:
             pend: makes the SysTick exception pending.
         """
         self._pend = pend
-        #: Called with the cycle at which it made its exception pending; tools look on.
-        self.tick_listeners: list[Callable[[int], None]] = []
+        #: Called when the program sets it, with (cycle of that, of the next exception or None, cycles between two).
+        self.schedule_listeners: list[Callable[[int, int | None, int], None]] = []
         self._control = 0
         self._reload = 0
         self._count_flag = False
@@ -55,8 +55,6 @@ class SysTick:
         self._count_flag = True
         if self._control & TICKINT:
             self._pend()
-            for listener in self.tick_listeners:
-                listener(due)
         period = (self._reload + 1) * self._divider()
         if not self._reload:
             # A reload value of 0 stops the counter at its next wrap.
@@ -135,6 +133,9 @@ class SysTick:
         """Work out the next wrap from (value, base)."""
         if not self._control & ENABLE or not (self._value or self._reload):
             self.next_cycle = None
-            return
-        ticks = self._value or self._reload + 1
-        self.next_cycle = self._base + ticks * self._divider()
+        else:
+            ticks = self._value or self._reload + 1
+            self.next_cycle = self._base + ticks * self._divider()
+        following = self.next_cycle if self._control & TICKINT else None
+        for listener in self.schedule_listeners:
+            listener(self._base, following, (self._reload + 1) * self._divider() if self._reload else 0)

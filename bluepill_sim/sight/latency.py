@@ -1,6 +1,6 @@
 """How long interrupts wait: from the moment that one is due to the first instruction of its handler.
 
-Told of the interrupt lines and of SysTick. What a program makes pending by
+Told of the interrupt lines, and of how SysTick is set while it is watched. What a program makes pending by
 itself (PendSV, a write to NVIC_ISPR) and a line that is still high when its
 handler returns are entries without a wait of their own.
 
@@ -56,18 +56,22 @@ class Latency:
         self._board = board
         #: Cycles at which each exception fell due, oldest first, until its entry is told of.
         self._due: dict[int, list[int]] = {}
+        #: (from which cycle on, first exception, cycles between two) of SysTick, oldest first.
+        self._ticks: list[tuple[int, int | None, int]] = []
+        #: When SysTick's handler was last entered.
+        self._tick_entry = -1
         self.costs: dict[int, ExceptionCost] = {}
         #: (number, cycle of the entry, when it was due) of the handlers that run, outermost first.
         self._running: list[tuple[int, int]] = []
         #: An entry whose handler has not begun: (number, when it was due).
         self._entered: tuple[int, int | None] | None = None
         board.chip.irq_listeners.append(self._irq_changed)
-        board.chip.processor.systick.tick_listeners.append(self._ticked)
+        board.chip.processor.systick.schedule_listeners.append(self._tick_set)
 
     def detach(self) -> None:
         """Look on no more."""
         self._board.chip.irq_listeners.remove(self._irq_changed)
-        self._board.chip.processor.systick.tick_listeners.remove(self._ticked)
+        self._board.chip.processor.systick.schedule_listeners.remove(self._tick_set)
 
     @property
     def by_name(self) -> list[ExceptionCost]:
@@ -88,11 +92,15 @@ class Latency:
         """Take an entry."""
         cost = self.costs.setdefault(number, ExceptionCost(number))
         cost.entries += 1
-        dues = self._due.get(number, [])
-        passed = [due for due in dues if due <= cycle]
         # What fell due more than once before the entry is served once, and waits since the first time.
-        self._due[number] = dues[len(passed) :]
-        self._entered = number, passed[0] if passed else None
+        if number == SYSTICK:
+            due = self._tick_due(cycle)
+        else:
+            dues = self._due.get(number, [])
+            passed = [at for at in dues if at <= cycle]
+            self._due[number] = dues[len(passed) :]
+            due = passed[0] if passed else None
+        self._entered = number, due
         self._running.append((number, cycle))
 
     def leave(self, cycle: int) -> None:
@@ -109,5 +117,21 @@ class Latency:
         if level and nvic.enabled >> irq & 1:
             self._due.setdefault(FIRST_IRQ + irq, []).append(self._board.chip.cycle_at(at_ns))
 
-    def _ticked(self, cycle: int) -> None:
-        self._due.setdefault(SYSTICK, []).append(cycle)
+    def _tick_set(self, cycle: int, following: int | None, period: int) -> None:
+        self._ticks.append((cycle, following, period))
+
+    def _tick_due(self, cycle: int) -> int | None:
+        """Return when SysTick fell due first, after its last entry and up to a cycle; forget what is over."""
+        served, self._tick_entry = self._tick_entry, cycle
+        due = None
+        for index, (begin, first, period) in enumerate(self._ticks):
+            if due is None and first is not None:
+                end = self._ticks[index + 1][0] if index + 1 < len(self._ticks) else cycle
+                after = max(begin, served)
+                turns = max(0, -(-(after + 1 - first) // period)) if period else 0
+                candidate = first + turns * period
+                if after < candidate <= min(end, cycle):
+                    due = candidate
+        while len(self._ticks) > 1 and self._ticks[1][0] <= cycle:
+            self._ticks.pop(0)
+        return due
