@@ -5,7 +5,7 @@ conversions are those of `p2os.trace.describe`, asked once for each raw value th
 """
 
 from collections.abc import Callable, Sequence
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 import numpy.typing as npt
@@ -126,7 +126,7 @@ class _Builder:
         raw = RAW_OF[name]
 
         def convert(value: Any) -> Cell:
-            return _cell(self._fields(StandardSip(**{raw: value}))[name])
+            return cast("Cell", self._fields(StandardSip(**{raw: value}))[name])
 
         return convert
 
@@ -152,8 +152,8 @@ class _Builder:
         numbers = ragged.columns["number"]
 
         def convert(value: Any) -> Cell:
-            found = self._fields(StandardSip(sonar=(SonarReading(0, value),)))["sonar_m"]
-            return _cell(found["0"] if isinstance(found, dict) else None)
+            found = cast("dict[str, Cell]", self._fields(StandardSip(sonar=(SonarReading(0, value),)))["sonar_m"])
+            return found["0"]
 
         cells = np.array(self._converted(ragged.columns["raw_range"], convert), object)
         for number in np.unique(numbers).tolist():
@@ -173,10 +173,3 @@ class _Builder:
             for row, cell in zip(rows.tolist(), cells, strict=True):
                 column[row] = cell
             self._found[float(rows[0]), place] = name, column
-
-
-def _cell(value: Plain) -> Cell:
-    """Return a value that is neither a list nor an object."""
-    if isinstance(value, (list, dict)):
-        raise TypeError(f"{value!r} does not fit one cell")
-    return value

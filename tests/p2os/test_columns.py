@@ -125,6 +125,15 @@ def test_a_pause_gives_up_what_it_cuts(data: bytes, cuts: list[tuple[int, bool]]
     assert columns.damage() == damage_of(stats)
 
 
+def test_of_frames_within_frames_only_the_outermost_counts() -> None:
+    inner = Frame(b"\x77").to_bytes()
+    middle = Frame(b"\x77" + inner + b"ab").to_bytes()
+    outer = Frame(b"\x77" + middle + b"cd").to_bytes()
+    assert len(same(outer + inner)) == 2
+    assert len(same(outer[:-1] + inner)) == 2
+    assert same(outer[:-1] + b"\0" + inner).damage().rescued == 1
+
+
 def test_every_packet_that_is_read_has_a_table() -> None:
     assert {kind for kinds in KINDS.values() for kind in kinds} == {*READERS, *SIP_KINDS, IDENTITY_KIND}
 
