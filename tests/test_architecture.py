@@ -28,6 +28,7 @@ ALLOWED = {
     "p2os.trace.arrow_files": {"pyarrow"},
     "p2os.trace.mcap_files": {"mcap"},
     "p2os.columns": {"construct", "numpy"},
+    "p2os.columns.arrow": {"numpy", "pyarrow"},
     "p2os.pioneer": set(),
     "p2os.pioneer.bullet": {"pybullet", "numpy"},
     "p2os.pioneer.importers": {"yaml", "PIL"},

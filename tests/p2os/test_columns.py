@@ -2,6 +2,7 @@
 
 import dataclasses
 import json
+import sys
 from itertools import zip_longest
 from pathlib import Path
 
@@ -12,8 +13,10 @@ from hypothesis import strategies as st
 np = pytest.importorskip("numpy")
 
 from p2os.columns import Columns, Damage, decode, find_frames  # noqa: E402
+from p2os.columns.arrow import to_arrow  # noqa: E402
 from p2os.columns.objects import rows_by_objects  # noqa: E402
 from p2os.columns.tables import KINDS  # noqa: E402
+from p2os.errors import MissingDependencyError  # noqa: E402
 from p2os.packets import (  # noqa: E402
     READERS,
     BatteryPacket,
@@ -162,6 +165,23 @@ def test_numbers_come_as_arrays_and_texts_as_bytes() -> None:
     structured = sip.structured()
     assert structured["packet"].tolist() == [0, 2]
     assert structured["raw_heading"].tolist() == [0, -1]
+
+
+@given(streams)
+@settings(deadline=None)
+def test_arrow_tables_hold_the_same_rows(data: bytes) -> None:
+    pytest.importorskip("pyarrow")
+    for table in decode(data, Profile.P2OS).tables.values():
+        for packet, found in zip(table.packets.tolist(), to_arrow(table).to_pylist(), strict=True):
+            row = table.row(table.packets.tolist().index(packet))
+            listed = {name: list(value) if isinstance(value, tuple) else value for name, value in row.items()}
+            assert found == {"packet": packet, **listed}
+
+
+def test_arrow_tables_without_pyarrow_say_what_is_missing(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "pyarrow", None)
+    with pytest.raises(MissingDependencyError, match="pyarrow"):
+        to_arrow(decode(packet_frame(StandardSip(), Profile.P2OS).to_bytes(), Profile.P2OS).tables["sip"])
 
 
 @pytest.mark.parametrize("name", ["encoder", "sip"])
