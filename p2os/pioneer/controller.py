@@ -139,6 +139,11 @@ class Pioneer:
         )
 
     @property
+    def baud(self) -> int | None:
+        """Return the speed of the host's line now, bit/s; None on a line that takes no time."""
+        return self._sender.line.baud
+
+    @property
     def stats(self) -> ConnectionStats:
         """Return the counters of the line since its client came: frames, noise, bad checksums."""
         return self._connection.stats
@@ -163,8 +168,6 @@ class Pioneer:
         self._connection = self._new_connection()
         self._sender.clear()
         self._close(now, "line dropped")
-        if self.settings.baud is not None:
-            self._sender.line.set_baud(self.settings.baud)
 
     def take_output(self) -> list[bytes]:
         """Return the frames to send, one item each, oldest first, and forget them."""
@@ -381,6 +384,8 @@ class Pioneer:
         rack.switches.bump_stall, rack.switches.e_stall = 0, fresh.switches.e_stall
         rack.battery.pretended_decivolts = None if rack.battery.is_test else rack.battery.pretended_decivolts
         self._reporter.look_at_battery(now)
+        if self.settings.baud is not None:
+            self._sender.line.set_baud(self.settings.baud)
         self._complaints = ()
         was_open, self._sip_due = self._sip_due is not None, None
         if was_open:
@@ -397,8 +402,6 @@ class Pioneer:
         works.rack.switches.stop_button = keep.switches.stop_button
         works.rack.gripper.has_thing = keep.gripper.has_thing
         works.reckoning.set_origin()
-        if self.settings.baud is not None:
-            self._sender.line.set_baud(self.settings.baud)
         self._boot_at = -1 if boot_ns is None else now + boot_ns
         self._tell(now, "controller down", notice)
 

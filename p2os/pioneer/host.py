@@ -1,11 +1,14 @@
-"""A virtual Pioneer on a real line, in real time: what `p2os serve` runs.
+"""A virtual Pioneer on a real line, in real or scaled time: what `p2os serve` runs.
 
 This is the skin around `Pioneer`: it reads the clock, waits on descriptors and
 moves bytes; every decision is the controller's. It serves one client at a time.
 A second one is let in and closed at once, since a robot has one host. A client
 that vanishes stops the robot at once and frees it for the next.
 
-Virtual time is the clock's time less what was left out: the robot does not live
+A robot with a speed of its line (`settings.baud`) is heard and spoken to at that
+speed, whatever the medium; a real serial port paces itself. HOSTBAUD changes both.
+
+The robot's time is the clock's, times `speed`, less what was left out: the robot does not live
 while nobody is connected and it stands still, nor through a pause of the machine
 longer than `LONGEST_PAUSE_NS`, which is reported. So waiting costs no processor
 time and a long wait no burst of steps.
@@ -14,10 +17,12 @@ time and a long wait no burst of steps.
 import contextlib
 import select
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 from p2os.errors import TransportError
+from p2os.pioneer.aux_seat import AuxSeat
 from p2os.pioneer.controller import Pioneer
+from p2os.pioneer.paced_line import PacedLine
 from p2os.timing import NS_PER_MS, NS_PER_S, Nanos
 from p2os.transport.ports import Listener, Transport
 
@@ -34,10 +39,22 @@ ASLEEP_WAIT_S = 0.5
 SETTLE_NS: Nanos = 1 * NS_PER_S
 #: chosen: how often a line without a descriptor is asked for bytes; one millisecond is a character at 9600 bit/s.
 BLIND_POLL_S = 0.001
+#: chosen: a second of a 9600 baud line; a client that sends faster finds its own medium full.
+MOST_WAITING = 960
 
 
 class Host:
-    """Serves one virtual robot on one listener."""
+    """Serves one virtual robot on one listener.
+
+    Args:
+        pioneer: The robot.
+        listener: Where its clients come.
+        on_event: Told of clients that come and go, and of pauses.
+        clock: Nanoseconds; never goes back.
+        speed: Robot seconds a second of the clock.
+        paced: Whether bytes take the time that `settings.baud` gives them; False where the medium does it itself.
+        aux: Who hangs at the AUX ports.
+    """
 
     def __init__(
         self,
@@ -46,15 +63,25 @@ class Host:
         *,
         on_event: HostEvent | None = None,
         clock: Callable[[], Nanos] = time.monotonic_ns,
+        speed: float = 1.0,
+        paced: bool = True,
+        aux: Sequence[AuxSeat] = (),
     ) -> None:
         self.pioneer = pioneer
         self.listener = listener
+        self.aux = tuple(aux)
         self._on_event = on_event
         self._clock = clock
+        self._speed = speed
         self._client: Transport | None = None
         self._now: Nanos = 0
         self._clock_read: Nanos = clock()
         self._settled_at: Nanos = 0
+        self._baud = pioneer.baud
+        #: To the robot and from it.
+        self._lines: tuple[PacedLine, PacedLine] | None = None
+        if paced and self._baud is not None:
+            self._lines = PacedLine(self._baud), PacedLine(self._baud)
 
     @property
     def now(self) -> Nanos:
@@ -79,55 +106,113 @@ class Host:
 
     def turn(self, longest_wait_s: float) -> None:
         """Do what is due, then wait for the next deadline, bytes or client, at most so long."""
+        self.live()
+        descriptors, wait_s = self.descriptors(), min(self.wait_s(), longest_wait_s)
+        if descriptors:
+            select.select(descriptors, [], [], wait_s)
+        else:
+            time.sleep(wait_s)
+        self.listen()
+
+    def live(self) -> None:
+        """Do what is due by the clock."""
         self._read_clock()
-        self._live()
-        self._wait(longest_wait_s)
+        if self._is_asleep():
+            return
+        if self._lines is not None:
+            for at, data in self._lines[0].take(self._now):
+                self._deliver(data, at)
+        self.pioneer.advance_to(self._now)
+        self._speak()
+        self._serve_aux()
+
+    def listen(self) -> None:
+        """Take clients that have come and bytes that have arrived."""
         self._read_clock()
         self._welcome()
         self._listen_to_client()
+        if not self._is_asleep():
+            self._serve_aux()
+
+    def descriptors(self) -> list[int]:
+        """Return what tells by becoming readable that there is something to listen to."""
+        found = []
+        if (listening := self.listener.fileno()) is not None:
+            found.append(listening)
+        if self._client is not None and self._hears():
+            with contextlib.suppress(TransportError):
+                found.append(self._client.fileno())
+        if not self._is_asleep():
+            for seat in self.aux:
+                with contextlib.suppress(TransportError):
+                    found += seat.descriptors()
+        return found
+
+    def wait_s(self) -> float:
+        """Return how long nothing will be due; `ASLEEP_WAIT_S` at most."""
+        waits = [ASLEEP_WAIT_S]
+        if not self._is_asleep():
+            waits.append(AWAKE_WAIT_S)
+            waits += [max(due - self._now, 0) / NS_PER_S / self._speed for due in self._deadlines()]
+            waits += [seat.poll_s for seat in self.aux if seat.poll_s is not None]
+        if self._client is None:
+            waits.append(ASLEEP_WAIT_S if self.listener.poll_s is None else self.listener.poll_s)
+        else:
+            try:
+                self._client.fileno()
+            except TransportError:
+                waits.append(BLIND_POLL_S)
+        return min(waits)
 
     def close(self) -> None:
-        """Stop the robot, let the client go and give the port back."""
+        """Stop the robot, let the client go and give the ports back."""
         self._drop_client("the host ends")
         self.listener.close()
+        for seat in self.aux:
+            seat.close()
 
-    def _live(self) -> None:
-        if self._is_asleep():
-            return
-        self.pioneer.advance_to(self._now)
-        self._speak()
+    def _deadlines(self) -> list[Nanos]:
+        due = [self.pioneer.next_deadline()]
+        if self._lines is not None:
+            due += [line.next_deadline() for line in self._lines]
+        return [at for at in due if at is not None]
+
+    def _hears(self) -> bool:
+        """Tell whether the line to the robot takes more."""
+        return self._lines is None or self._lines[0].waiting < MOST_WAITING
 
     def _speak(self) -> None:
-        frames = self.pioneer.take_output()
-        if self._client is None or not frames:
+        data = b"".join(self.pioneer.take_output())
+        if self._lines is not None:
+            if data:
+                self._lines[1].put(data, self._now)
+            data = b"".join(lump for _, lump in self._lines[1].take(self._now))
+        if self._client is None or not data:
             return
         try:
-            self._client.write(b"".join(frames))
+            self._client.write(data)
         except TransportError as error:
             self._drop_client(str(error))
 
-    def _wait(self, longest_s: float) -> None:
-        """Sleep until something can be done."""
-        waits = [longest_s]
-        if not self._is_asleep():
-            waits.append(AWAKE_WAIT_S)
-            deadline = self.pioneer.next_deadline()
-            if deadline is not None:
-                waits.append(max(deadline - self._now, 0) / NS_PER_S)
-        descriptors = []
-        if (listening := self.listener.fileno()) is not None:
-            descriptors.append(listening)
-        if self._client is None:
-            waits.append(longest_s if self.listener.poll_s is None else self.listener.poll_s)
-        else:
-            try:
-                descriptors.append(self._client.fileno())
-            except TransportError:
-                waits.append(BLIND_POLL_S)
-        if descriptors:
-            select.select(descriptors, [], [], min(waits))
-        else:
-            time.sleep(min(waits))
+    def _deliver(self, data: bytes, at: Nanos) -> None:
+        """Let the robot hear bytes, and follow it to another speed (HOSTBAUD, and back at CLOSE)."""
+        self.pioneer.receive(data, at)
+        self._follow_speed()
+
+    def _follow_speed(self) -> None:
+        baud = self.pioneer.baud
+        if baud is None or baud == self._baud:
+            return
+        self._baud = baud
+        for line in self._lines or ():
+            line.set_baud(baud)
+        if self._client is not None and self._lines is None:
+            self._speak()
+            self._client.set_baud(baud)
+
+    def _serve_aux(self) -> None:
+        for seat in self.aux:
+            seat.move_bytes(self.pioneer, self._now)
 
     def _welcome(self) -> None:
         """Take a client that has come, or send it away when there is one."""
@@ -147,15 +232,17 @@ class Host:
 
     def _listen_to_client(self) -> bool:
         """Take what the client says; return whether it said something."""
-        if self._client is None:
+        if self._client is None or not self._hears():
             return False
         try:
             data = self._client.read()
         except TransportError as error:
             self._drop_client(str(error))
             return False
-        if data:
-            self.pioneer.receive(data, self._now)
+        if data and self._lines is not None:
+            self._lines[0].put(data, self._now)
+        elif data:
+            self._deliver(data, self._now)
             self._speak()
         return bool(data)
 
@@ -163,8 +250,14 @@ class Host:
         if self._client is None:
             return
         client, self._client = self._client, None
+        if self._lines is not None:  # its last words still come
+            self.pioneer.receive(self._lines[0].take_all(), self._now)
         self.pioneer.hang_up(self._now)
         self.pioneer.take_output()
+        self._baud = self.pioneer.baud
+        for line in self._lines or ():
+            line.clear()
+            line.set_baud(self._baud or line.baud)
         with contextlib.suppress(TransportError):
             client.close()
         self._settled_at = self._now + SETTLE_NS
@@ -182,7 +275,7 @@ class Host:
         if passed > LONGEST_PAUSE_NS:
             self._tell("lag", f"the machine paused for {passed / NS_PER_S:.1f} s; the robot's time leaves it out")
             return
-        self._now += passed
+        self._now += passed if self._speed == 1.0 else round(passed * self._speed)
 
     def _tell(self, what: str, detail: str) -> None:
         if self._on_event is not None:

@@ -399,15 +399,15 @@ def test_serve_without_pybullet_says_how_to_get_it(monkeypatch: pytest.MonkeyPat
 
 def test_a_served_robot_tells_its_host_in_the_same_process(monkeypatch: pytest.MonkeyPatch, capsys: Capture) -> None:
     class Ending:
-        def __init__(self, pioneer: Any, _listener: object, **_: object) -> None:
-            self.pioneer = pioneer
+        def __init__(self, hosts: Any, **_: object) -> None:
+            self.pioneer = hosts[0].pioneer
 
         def run(self) -> None:
             self.pioneer.on_event(1_500_000_000, "opened", "")
             self.pioneer.on_event(1_600_000_000, "motors", "on")
             signal.raise_signal(signal.SIGTERM)
 
-    monkeypatch.setattr(serve, "Host", Ending)
+    monkeypatch.setattr(serve, "Fleet", Ending)
     before = signal.getsignal(signal.SIGINT), signal.getsignal(signal.SIGTERM)
     try:
         assert main.run(["serve", "--body", "kinematic", "--port", "tcp:127.0.0.1:0"]) == 130
