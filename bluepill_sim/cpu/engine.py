@@ -160,9 +160,10 @@ class Engine:
         return Halt(HaltKind.STEP, halt.pc) if halt.kind is HaltKind.BORDER else halt
 
     def jump(self, target: int) -> None:
-        """Go on at an address, with its bit 0 as the T bit; leaves any block that the core stands inside of."""
+        """Go on at an address, with its bit 0 as the T bit; leaves the block and the IT block where the core stood."""
         self.pc = target & ~1
         self.is_thumb = bool(target & 1)
+        self.it_state = 0
         self._rest.block = None
 
     @property

@@ -156,6 +156,7 @@ static void start_handler(struct core *core, unsigned number, uint32_t handler, 
     clear_exclusive(core);
     s->pc = handler & ~1u;
     s->is_thumb = handler & 1;
+    s->it_state = 0;
 }
 
 static bool enter(struct core *core, unsigned number, uint32_t return_address)

@@ -1,10 +1,11 @@
-"""Random programs give the same registers, flags and memory here and on QEMU's Cortex-M3.
+"""Random programs give the same registers, flags and memory here and on QEMU's Cortex-M3, and on both of our cores.
 
 Unicorn descends from QEMU, so that agreement proves less than it seems to:
 what both have wrong shows only in `test_flag_vectors.py`. It does prove that
 our own hooks, block borders and stops change nothing.
 """
 
+import random
 import shutil
 import subprocess
 from pathlib import Path
@@ -13,7 +14,7 @@ import pytest
 from thumb_streams import SRAM, SRAM_BYTES, Program, program
 
 from bluepill_sim.board import BluePill
-from bluepill_sim.cpu import BLOCK
+from bluepill_sim.cpu import BLOCK, BlockRecorder, native_library
 from bluepill_sim.image import Image, SymbolTable
 
 QEMU = shutil.which("qemu-system-arm")
@@ -99,3 +100,28 @@ def test_random_programs_do_not_depend_on_breakpoints_and_steps() -> None:
         assert board.chip.step(1_000_000_000).halt is not None
     assert board.read_memory(SRAM, SRAM_BYTES) == memory
     assert board.cycle == cycles
+
+
+@pytest.mark.skipif(native_library.path() is None, reason="the native core is not built: no C compiler")
+@pytest.mark.parametrize("seed", range(20, 24))
+def test_random_programs_are_the_same_on_both_cores(seed: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Interrupted by a tick at any block: every block and exception at its cycle, and all that decides the future."""
+
+    def story(core: str) -> tuple[object, ...]:
+        monkeypatch.setenv("P2OS_CORE", core)
+        made = program(seed, 60, tick=61 + 10 * seed)
+        board = BluePill(Image("random", ((0x0800_0000, made.image),), SymbolTable(())))
+        rows: list[tuple[int, int, int]] = []
+
+        def drain(recorder: BlockRecorder) -> None:
+            rows.extend(recorder.drain())
+
+        recorder = board.chip.record_blocks(1000, drain)
+        slices = random.Random(seed)
+        while board.now_ns < 1_000_000:
+            board.advance_to(min(1_000_000, board.now_ns + slices.choice((1000, 70_000, 500_000))))
+        drain(recorder)
+        assert sum(row[2] == 15 for row in rows) > 20
+        return rows, board.cycle, board.pc, board.fault, board.snapshot().chip
+
+    assert story("native") == story("python")

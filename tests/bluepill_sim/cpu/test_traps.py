@@ -84,6 +84,7 @@ TRAPS = {
         "test_exceptions:test_an_svc_inside_an_it_block_puts_itstate_aside_and_back",
         "test_exceptions:test_an_it_block_across_a_page_border_survives_stops_and_interrupts",
     ],
+    "the ITSTATE of a trap lives on in its handler": ["test_a_handler_begins_outside_the_it_block_that_trapped"],
     "an exception breaks the exclusive reservation": ["test_stacks:test_an_exception_breaks_the_exclusive_reservation"],
     "BASEPRI keeps bits that an F103 has not": ["test_masks:test_the_low_bits_of_basepri_do_not_exist"],
     "counters stand still inside a block": ["test_time:test_counters_move_inside_a_straight_run_of_code"],
@@ -152,6 +153,17 @@ def test_a_programmed_halfword_is_seen_by_the_next_instruction_and_takes_its_tim
         "wait: ldr r0, [r4, #0]\n.half 0x4228\nbne wait\nlog r0",
     )
     assert machine.log == [0xFFFF_1234, 1, 1 << 5]
+
+
+def test_a_handler_begins_outside_the_it_block_that_trapped(run) -> None:
+    """The handler's first block is stopped too, by a write to flash: what follows must not be conditional."""
+    machine = run(
+        store(0xE000ED24, 1 << 18) + "mov32 r4, #0x20000802\nmov32 r1, #0x08008000\nmovs r5, #0\nmovs r2, #1\n"
+        "cmp r2, #1\nitt eq\nnop\nldmia r4!, {r2, r3}\nb stop\n"
+        "fault: cmp r5, #1\nstrh r5, [r1, #0]\nadds r5, #7\nadds r5, #1\nmov r0, r5\nlog r0\nb stop",
+        {6: "fault"},
+    )
+    assert machine.log == [8]
 
 
 def test_code_changed_by_one_alias_changes_at_the_other(run) -> None:

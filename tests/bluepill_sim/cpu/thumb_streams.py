@@ -276,10 +276,24 @@ class Program:
     end: int
 
 
-def program(seed: int, cases: int = CASES, length: int = 16) -> Program:
-    """Return a program; after `end` it writes its SRAM to standard output by semihosting."""
+#: Counts in SRAM, and returns.
+_HANDLER = [*mov32(0, SRAM + 0x100), 0x6801, 0x3101, 0x6001, 0x4770]
+
+
+def program(seed: int, cases: int = CASES, length: int = 16, tick: int | None = None) -> Program:
+    """Return a program; after `end` it writes its SRAM to standard output by semihosting.
+
+    Args:
+        seed: of all that is random.
+        cases: how many.
+        length: instructions of a case, about.
+        tick: reload value of a SysTick that interrupts; None for none.
+    """
     stream = Stream(random.Random(seed))
-    code = [half for _ in range(cases) for half in stream.case(length)]
+    code = list(_HANDLER)
+    if tick is not None:
+        code += [*mov32(1, 0xE000_E010), *mov32(2, tick), 0x604A, 0x608A, 0x2207, 0x600A]
+    code += [half for _ in range(cases) for half in stream.case(length)]
     end = _CODE + 2 * len(code)
     # What SYS_OPEN(":tt", "w"), SYS_WRITE(handle, SRAM, all of it) and SYS_EXIT take lies above what is written out.
     block, name = SRAM + SRAM_BYTES, SRAM + SRAM_BYTES + 16
@@ -288,5 +302,6 @@ def program(seed: int, cases: int = CASES, length: int = 16) -> Program:
     code += [0x6008, *mov32(2, SRAM), 0x604A, *mov32(2, SRAM_BYTES), 0x608A, 0x2000 | _WRITE, _SEMIHOSTING]
     code += [*mov32(1, _STOPPED), 0x2000 | _EXIT, _SEMIHOSTING, 0xE7FE]
     code += [0xBF00] * 200  # as far as literals reach
-    vectors = struct.pack("<16I", SRAM + SRAM_BYTES, _CODE | 1, *([end | 1] * 14))
+    start = _CODE + 2 * len(_HANDLER)
+    vectors = struct.pack("<16I", SRAM + SRAM_BYTES, start | 1, *([end | 1] * 13), _CODE | 1)
     return Program(vectors + struct.pack(f"<{len(code)}H", *code), end)
