@@ -159,7 +159,7 @@ def test_a_handler_begins_outside_the_it_block_that_trapped(run) -> None:
     """The handler's first block is stopped too, by a write to flash: what follows must not be conditional."""
     machine = run(
         store(0xE000ED24, 1 << 18) + "mov32 r4, #0x20000802\nmov32 r1, #0x08008000\nmovs r5, #0\nmovs r2, #1\n"
-        "cmp r2, #1\nitt eq\nnop\nldmia r4!, {r2, r3}\nb stop\n"
+        "cmp r2, #1\nitttt eq\nldmia r4!, {r2, r3}\nnop\nnop\nnop\nb stop\n"
         "fault: cmp r5, #1\nstrh r5, [r1, #0]\nadds r5, #7\nadds r5, #1\nmov r0, r5\nlog r0\nb stop",
         {6: "fault"},
     )
