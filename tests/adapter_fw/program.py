@@ -1,5 +1,6 @@
 """The adapter's PC program run for real: its console on pipes, its wires on a socket, every wait bounded."""
 
+import contextlib
 import signal
 import socket
 import subprocess
@@ -42,10 +43,11 @@ class Lines:
             raise AssertionError(f"not said: {self.lines}")
 
     def _gather(self, stream: Iterator[str]) -> None:
-        for line in stream:
-            with self._news:
-                self.lines.append(line.rstrip("\n"))
-                self._news.notify_all()
+        with contextlib.suppress(OSError):  # a program that is killed may reset its socket
+            for line in stream:
+                with self._news:
+                    self.lines.append(line.rstrip("\n"))
+                    self._news.notify_all()
         with self._news:
             self._has_ended = True
             self._news.notify_all()
