@@ -1,0 +1,133 @@
+"""Faults of the adapter's pins and supply, for tests: what a model can suffer at will.
+
+A `FaultyPins` stands between an adapter and its pin bank. It changes what is read
+and what arrives at the far side; the adapter knows nothing of it. Works for the
+model and for the firmware's core alike.
+
+Not here: faults of the serial line (the bench's own), noise in volts.
+
+Invariant: without faults it passes everything on as it is.
+"""
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import TypeAlias
+
+from adapter_sim.pinout import Direction, Pinout, Role
+from adapter_sim.ports import PinBank
+from p2os.errors import UsageError
+from p2os.timing import NS_PER_MS, Nanos
+
+#: The detector resets the chip however short the dip; a reset is looked for every sample, so this long it lasts here.
+LEAST_BROWN_OUT_NS: Nanos = 4 * NS_PER_MS
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class StuckPin:
+    """A wire that stands at one level: a short, a cold joint, a dead driver.
+
+    `until` None is for good. A stuck output takes effect at the adapter's next sample.
+    """
+
+    signal: str
+    high: bool
+    since: Nanos = 0
+    until: Nanos | None = None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Glitch:
+    """An input that reads inverted for a while: crosstalk, a bouncing plug."""
+
+    signal: str
+    at: Nanos
+    span_ns: Nanos
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class BrownOut:
+    """A supply that dips: the ESP32 is held in reset, and boots anew after it."""
+
+    at: Nanos
+    span_ns: Nanos = LEAST_BROWN_OUT_NS
+
+
+Fault: TypeAlias = StuckPin | Glitch | BrownOut
+
+
+class FaultyPins:
+    """A pin bank with faults.
+
+    Args:
+        pins: The bank as it is.
+        pinout: Names and directions of the wires.
+        faults: What goes wrong, and when.
+
+    Raises:
+        UsageError: A fault names no wire, or a glitch an output.
+    """
+
+    def __init__(self, pins: PinBank, pinout: Pinout, faults: Iterable[Fault]) -> None:
+        self._pins = pins
+        self._reset = pinout.with_role(Role.RESET)[0].name
+        self._glitches: dict[str, list[tuple[Nanos, Nanos]]] = {}
+        self._brown_outs: list[tuple[Nanos, Nanos]] = []
+        self._stuck: dict[str, list[StuckPin]] = {}
+        #: What the adapter last wanted of each stuck output, and what the wire was given.
+        self._wanted: dict[str, bool | None] = {}
+        self._given: dict[str, bool | None] = {}
+        outputs = {wire.name for wire in pinout.wires if wire.direction is Direction.TO_BLUEPILL}
+        names = {wire.name for wire in pinout.wires}
+        for fault in faults:
+            self._add(fault, names, outputs)
+        self._stuck_outputs = sorted(outputs & set(self._stuck))
+        self._wanted = dict.fromkeys(self._stuck_outputs)
+        self._given = dict.fromkeys(self._stuck_outputs)
+
+    def read(self, signal: str, at: Nanos) -> bool:
+        """Return the level of a wire as the adapter's pin sees it."""
+        for name in self._stuck_outputs:
+            self._settle(name, at)
+        level = self._pins.read(signal, at)
+        for start, end in self._glitches.get(signal, ()):
+            if start <= at < end:
+                level = not level
+        forced = self._forced(signal, at)
+        level = level if forced is None else forced
+        return level or (signal == self._reset and any(start <= at < end for start, end in self._brown_outs))
+
+    def write(self, signal: str, high: bool | None, now: Nanos) -> None:
+        """Drive a wire, as far as it lets itself be driven."""
+        if signal not in self._wanted:
+            self._pins.write(signal, high, now)
+            return
+        self._wanted[signal] = high
+        self._settle(signal, now)
+
+    def _add(self, fault: Fault, names: set[str], outputs: set[str]) -> None:
+        if isinstance(fault, BrownOut):
+            end = fault.at + max(fault.span_ns, LEAST_BROWN_OUT_NS)
+            self._brown_outs.append((fault.at, end))
+            return
+        if fault.signal not in names:
+            raise UsageError(f"there is no wire {fault.signal!r} to break", hint="the wires stand in pinout.toml")
+        if isinstance(fault, StuckPin):
+            self._stuck.setdefault(fault.signal, []).append(fault)
+        elif fault.signal in outputs:
+            raise UsageError(f"{fault.signal} is an output: a glitch on it is the far side's", hint="use StuckPin")
+        else:
+            self._glitches.setdefault(fault.signal, []).append((fault.at, fault.at + fault.span_ns))
+
+    def _forced(self, signal: str, at: Nanos) -> bool | None:
+        for fault in self._stuck.get(signal, ()):
+            if fault.since <= at and (fault.until is None or at < fault.until):
+                return fault.high
+        return None
+
+    def _settle(self, name: str, now: Nanos) -> None:
+        """Give a stuck output what it has at this instant."""
+        forced = self._forced(name, now)
+        level = self._wanted[name] if forced is None else forced
+        if level is not self._given[name]:
+            self._given[name] = level
+            self._pins.write(name, level, now)
