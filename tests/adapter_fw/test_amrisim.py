@@ -1,8 +1,9 @@
 """The PC program drives AMRISim, a simulator that is not ours, for ten real minutes.
 
 AMRISim is built on the side by whoever wants this run; the environment variable
-P2OS_AMRISIM names a command that serves a Pioneer on TCP port 8101 of this
-machine, for example `AMRISim --nomap --nogui`. Without it the test is skipped.
+P2OS_AMRISIM names a command that serves a Pioneer 3-DX on this machine, for
+example `AMRISim --nomap --no-gui -r p3dx -p 8101`, and P2OS_AMRISIM_PORT its port
+if it is another. Without it the test is skipped.
 """
 
 import os
@@ -21,7 +22,7 @@ from tests.adapter_fw.builds import built
 from tests.adapter_fw.program import CONNECT, PATIENCE_S, motors, running
 
 COMMAND = os.environ.get("P2OS_AMRISIM", "")
-ADDRESS = ("127.0.0.1", 8101)
+ADDRESS = ("127.0.0.1", int(os.environ.get("P2OS_AMRISIM_PORT", "8101")))
 SPAN_S = float(os.environ.get("P2OS_AMRISIM_SECONDS", "600"))
 
 pytestmark = [
@@ -51,7 +52,7 @@ def test_ten_minutes_with_amrisim_lose_nothing(simulator: str, tmp_path: Path) -
     stored.write_text("stop_unknown_robot 0\n", encoding="utf-8")  # its default build takes its first packet for a SYNC
     adapter, _ = built("program", tmp_path)
     chance = random.Random(6)
-    with running(adapter, simulator, "--settings", str(stored)) as program:
+    with running(adapter, simulator, "--robot", "p3dx", "--settings", str(stored)) as program:
         program.wires(CONNECT)
         program.event("driving")
         end = time.monotonic() + SPAN_S
