@@ -2,7 +2,7 @@
 
 AMRISim is built on the side by whoever wants this run; the environment variable
 P2OS_AMRISIM names a command that serves a Pioneer 3-DX on this machine, for
-example `AMRISim --nomap --no-gui -r p3dx -p 8101`, and P2OS_AMRISIM_PORT its port
+example `AMRISim --nomap --no-gui -r p3dx:one -p 8101`, and P2OS_AMRISIM_PORT its port
 if it is another. Without it the test is skipped.
 """
 
