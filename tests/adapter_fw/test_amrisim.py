@@ -10,6 +10,7 @@ import os
 import random
 import re
 import shlex
+import signal
 import socket
 import subprocess
 import time
@@ -33,7 +34,9 @@ pytestmark = [
 
 @pytest.fixture
 def simulator(tmp_path: Path) -> Iterator[str]:
-    process = subprocess.Popen(shlex.split(COMMAND), cwd=tmp_path, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+    process = subprocess.Popen(
+        shlex.split(COMMAND), cwd=tmp_path, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, start_new_session=True
+    )
     try:
         for _ in range(int(PATIENCE_S * 10)):
             with socket.socket() as probe:
@@ -43,7 +46,7 @@ def simulator(tmp_path: Path) -> Iterator[str]:
         time.sleep(1.0)  # it drops the client that only looked
         yield f"tcp:{ADDRESS[0]}:{ADDRESS[1]}"
     finally:
-        process.kill()
+        os.killpg(process.pid, signal.SIGKILL)  # its wrapper, too
         process.wait()
 
 
