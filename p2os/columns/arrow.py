@@ -30,8 +30,7 @@ def to_arrow(table: Table) -> ArrowTable:
     found: dict[str, ArrowArray] = {"packet": pa.array(table.packets)}
     found |= _arrays(table.data, table.columns, table.texts)
     for name, ragged in table.ragged.items():
-        offsets = np.searchsorted(ragged.rows, np.arange(len(table) + 1)).astype(np.int32)
-        found[name] = pa.ListArray.from_arrays(offsets, _items(table.data, ragged))
+        found[name] = pa.ListArray.from_arrays(ragged.offsets.astype(np.int32), _items(table.data, ragged))
     return pa.table(found)
 
 

@@ -149,7 +149,7 @@ class _Builder:
 
     def _sonar(self, place: int) -> None:
         ragged = self._raw.ragged["sonar"]
-        numbers = ragged.columns["number"]
+        numbers, rows = ragged.columns["number"], ragged.rows
 
         def convert(value: Any) -> Cell:
             found = cast("dict[str, Cell]", self._fields(StandardSip(sonar=(SonarReading(0, value),)))["sonar_m"])
@@ -158,9 +158,9 @@ class _Builder:
         cells = np.array(self._converted(ragged.columns["raw_range"], convert), object)
         for number in np.unique(numbers).tolist():
             items = np.flatnonzero(numbers == number)
-            behind = items[0] - np.searchsorted(ragged.rows, ragged.rows[items[0]])
+            behind = items[0] - ragged.offsets[rows[items[0]]]
             self._add_some(
-                place + float(behind) / 256, f"sonar_m_{number}", ragged.rows[items], cells[items].tolist()
+                place + float(behind) / 256, f"sonar_m_{number}", rows[items], cells[items].tolist()
             )  # fmt: skip
 
     def _add(self, place: float, name: str, cells: list[Cell]) -> None:

@@ -65,7 +65,7 @@ class Table:
         """Return a row as plain values: numbers, bytes, and tuples of what varies in number."""
         found = self._values(self.columns, self.texts, number)
         for name, ragged in self.ragged.items():
-            first, last = np.searchsorted(ragged.rows, (number, number + 1)).tolist()
+            first, last = ragged.offsets[number : number + 2].tolist()
             items = [self._values(ragged.columns, ragged.texts, place) for place in range(first, last)]
             # An array of plain numbers has the one column `value`.
             found[name] = tuple(item["value"] if list(item) == ["value"] else item for item in items)

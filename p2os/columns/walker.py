@@ -35,14 +35,19 @@ class Ragged:
     """The items of a counted array of all packets together.
 
     Args:
-        rows: Which packet of the table each item belongs to.
+        offsets: Where the items of each row of the table begin, and one past the last.
         columns: The item's numbers; an array of plain numbers has one column, `value`.
         texts: The item's texts and bytes.
     """
 
-    rows: Indexes
+    offsets: Indexes
     columns: dict[str, Column]
     texts: dict[str, Spans] = field(default_factory=dict)
+
+    @property
+    def rows(self) -> Indexes:
+        """Which row of the table each item belongs to."""
+        return np.repeat(np.arange(len(self.offsets) - 1), np.diff(self.offsets))
 
 
 @dataclass(slots=True)
@@ -119,9 +124,8 @@ class Walk:
         starts = self.places
         self.advance(counts * dtype.itemsize)
         counts = np.where(self.sound, counts, 0)
-        rows = np.repeat(np.arange(len(counts)), counts)
-        items = gather(self.data, indexes_of(starts, counts, dtype.itemsize), dtype, None)
-        self.ragged[name] = Ragged(rows, {key: items[key] for key in names})
+        items, offsets = gather_items(self.data, starts, counts, dtype)
+        self.ragged[name] = Ragged(offsets, {key: items[key] for key in names})
 
     def take_items(self, item: Construct, counts: Column) -> Ragged:
         """Read so many items of any length of each packet, one item of every packet at a time."""
@@ -137,22 +141,21 @@ class Walk:
             taken += 1
             active = active[walk.sound & (counts[active] > taken)]
         if not rows:
-            return Ragged(np.zeros(0, np.int64), {})
+            return Ragged(np.zeros(len(self.places) + 1, np.int64), {})
         order = np.argsort(np.concatenate(rows), kind="stable")
         columns = {name: np.concatenate([walk.columns[name] for walk in walks])[order] for name in walks[0].columns}
         texts = {}
         for name in walks[0].texts:
             starts = np.concatenate([walk.texts[name].starts for walk in walks])[order]
             texts[name] = Spans(starts, np.concatenate([walk.texts[name].ends for walk in walks])[order])
-        return Ragged(np.concatenate(rows)[order], columns, texts)
+        taken_of = np.bincount(np.concatenate(rows), minlength=len(self.places))
+        return Ragged(offsets_of(taken_of), columns, texts)
 
 
 def gather(
     data: npt.NDArray[np.uint8], starts: Indexes, dtype: np.dtype[np.void], sound: npt.NDArray[np.bool_] | None
 ) -> npt.NDArray[np.void]:
     """Return one record a start; zeros where a packet is not sound."""
-    if not len(starts):
-        return np.zeros(0, dtype)
     size = dtype.itemsize
     if len(data) < size:
         return np.zeros(len(starts), dtype)
@@ -165,11 +168,34 @@ def gather(
     return records
 
 
-def indexes_of(starts: Indexes, counts: Indexes, step: int = 1) -> Indexes:
-    """Return the places `start`, `start + step`, ... of each start, as many as its count says."""
-    before = np.cumsum(counts) - counts
-    total = int(counts.sum())
-    return np.repeat(starts - before * step, counts) + np.arange(0, total * step, step)
+def gather_items(
+    data: npt.NDArray[np.uint8], starts: Indexes, counts: Indexes, dtype: np.dtype[np.void]
+) -> tuple[npt.NDArray[np.void], Indexes]:
+    """Return so many records from each start on, and where those of each start begin."""
+    offsets, size = offsets_of(counts), dtype.itemsize
+    total = int(offsets[-1])
+    items = np.empty(total, dtype)
+    # Packets with as many records are copied together, the records of each in one piece.
+    for count in np.flatnonzero(np.bincount(counts, minlength=1)).tolist():
+        if count:
+            rows = np.flatnonzero(counts == count)
+            source = np.ndarray((len(data) - count * size + 1,), f"V{count * size}", data, strides=(1,))
+            target = np.ndarray((total - count + 1,), f"V{count * size}", items, strides=(size,))
+            target[offsets[rows]] = source[starts[rows]]
+    return items, offsets
+
+
+def offsets_of(counts: Indexes) -> Indexes:
+    """Return where the items of each row begin, and one past the last."""
+    offsets: Indexes = np.zeros(len(counts) + 1, np.int64)
+    np.cumsum(counts, out=offsets[1:])
+    return offsets
+
+
+def indexes_of(starts: Indexes, counts: Indexes) -> Indexes:
+    """Return the places `start`, `start + 1`, ... of each start, as many as its count says."""
+    offsets = offsets_of(counts)
+    return np.repeat(starts - offsets[:-1], counts) + np.arange(offsets[-1])
 
 
 def _bare(construct: Construct) -> Construct:

@@ -147,6 +147,11 @@ def test_nothing_decodes_to_nothing() -> None:
         assert (len(columns), columns.tables, columns.damage().noise_bytes) == (0, {}, len(data))
 
 
+@pytest.mark.parametrize("kind", [*READERS, *SIP_KINDS, IDENTITY_KIND])
+def test_a_packet_without_its_inside_is_read_as_its_object_is(kind: int) -> None:
+    same(Frame(bytes((kind,))).to_bytes())
+
+
 def test_numbers_come_as_arrays_and_texts_as_bytes() -> None:
     packets: list[ServerPacket] = [
         StandardSip(raw_x=7, sonar=(SonarReading(1, 2000), SonarReading(5, 3000))),

@@ -1,5 +1,8 @@
 """A capture's SIPs by columns against the same by rows: names, order and every cell."""
 
+import json
+import os
+import subprocess
 import sys
 from pathlib import Path
 
@@ -111,3 +114,14 @@ def test_export_of_a_large_capture_works_without_numpy(tmp_path: Path, monkeypat
     monkeypatch.setattr("p2os.cli.export.LARGE_BYTES", 0)
     monkeypatch.setitem(sys.modules, "p2os.columns.captures", None)
     assert exported(tmp_path / "rows.csv").count("\n") > 20
+
+
+@pytest.mark.slow
+def test_the_benchmark_compares_what_it_times() -> None:
+    tool = GOLDEN.parent.parent / "tools" / "bench_columns.py"
+    done = subprocess.run([sys.executable, str(tool), "--quick", "--json"], capture_output=True, text=True, check=False,
+                          timeout=300, env={**os.environ, "PYTHONPATH": str(tool.parent.parent)})  # fmt: skip
+    assert done.returncode == 0, done.stderr
+    figures = json.loads(done.stdout)
+    assert len(figures) == 3
+    assert all(row["packets"] > 9_000 and row["columns_packets_a_second"] > 0 for row in figures.values())
