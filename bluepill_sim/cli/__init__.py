@@ -2,7 +2,7 @@
 
 import typer
 
-from bluepill_sim.cli import coverage, info, pins, profile, run, trace
+from bluepill_sim.cli import coverage, debug, info, pins, profile, run, trace
 
 HELP = """Run, look into and debug a BluePill program, without a robot.
 
@@ -14,6 +14,6 @@ in the ELF, places are told by symbol and line.
 def register(app: typer.Typer) -> None:
     """Add the verb and what is below it."""
     mcu = typer.Typer(help=HELP, no_args_is_help=True, rich_markup_mode=None)
-    for module in (run, info, pins, trace, coverage, profile):
+    for module in (run, debug, info, pins, trace, coverage, profile):
         module.register(mcu)
     app.add_typer(mcu, name="mcu")

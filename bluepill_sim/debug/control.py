@@ -20,14 +20,14 @@ class StopKind(Enum):
 
     #: Before the instruction at a breakpoint.
     BREAKPOINT = "breakpoint"
-    #: At an instruction that accesses a watched address.
+    #: After an instruction that accessed a watched address.
     WATCHPOINT = "watchpoint"
     STEP = "step"
     #: Ctrl-C.
     INTERRUPT = "interrupt"
     #: BKPT in the program.
     BKPT = "bkpt"
-    #: A fault that the program does not handle, or a lockup.
+    #: A fault that the program does not handle by itself, or a lockup.
     FAULT = "fault"
     #: The program ended by semihosting.
     EXIT = "exit"
@@ -42,27 +42,10 @@ class Stop:
     """Why and where."""
 
     kind: StopKind
-    #: The watched address that was accessed.
+    #: The address that was accessed, of a WATCHPOINT.
     address: int | None = None
-    #: Exit code of the program.
+    #: Exit code of the program, of an EXIT.
     code: int = 0
-
-
-class WatchKind(Enum):
-    """What access a watchpoint waits for; the value is GDB's word in a stop reply."""
-
-    WRITE = "watch"
-    READ = "rwatch"
-    ACCESS = "awatch"
-
-
-@dataclass(frozen=True, slots=True)
-class Watchpoint:
-    """Bytes whose accesses stop the chip."""
-
-    address: int
-    size: int
-    kind: WatchKind
 
 
 class Machine(Protocol):
@@ -78,8 +61,13 @@ class Machine(Protocol):
         """When the run is over; None for never."""
         ...
 
-    def advance_to(self, limit_ns: Nanos) -> Reached:
-        """Bring everything to a time; less far where the chip halts."""
+    @property
+    def can_rewind(self) -> bool:
+        """Whether `restore` is possible: not with a real robot."""
+        ...
+
+    def advance_to(self, limit_ns: Nanos, *, by_step: bool = False) -> Reached:
+        """Bring everything to a time; less far where the chip halts, or by one instruction of the chip."""
         ...
 
     def snapshot(self) -> object:
@@ -87,11 +75,7 @@ class Machine(Protocol):
         ...
 
     def restore(self, snapshot: object) -> None:
-        """Put back what `snapshot` returned.
-
-        Raises:
-            BluePillError: this machine cannot go back.
-        """
+        """Put back what `snapshot` returned; only where `can_rewind`."""
         ...
 
     def halted(self) -> None:
@@ -102,13 +86,15 @@ class Machine(Protocol):
 class LoneChip:
     """A board by itself."""
 
+    end_ns: Nanos | None = None
+    can_rewind = True
+
     def __init__(self, board: BluePill) -> None:
         self.board = board
-        self.end_ns: Nanos | None = None
 
-    def advance_to(self, limit_ns: Nanos) -> Reached:
-        """Bring the board to a time."""
-        return self.board.advance_to(limit_ns)
+    def advance_to(self, limit_ns: Nanos, *, by_step: bool = False) -> Reached:
+        """Bring the board to a time, or one instruction on."""
+        return self.board.chip.step(limit_ns) if by_step else self.board.advance_to(limit_ns)
 
     def snapshot(self) -> object:
         """Return all that decides the board's future."""

@@ -8,6 +8,7 @@ Invariant: reading changes nothing, not even a status flag.
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from itertools import accumulate
 
 from bluepill_sim.board import BluePill
 from bluepill_sim.cpu import Register
@@ -30,6 +31,9 @@ class Inspector:
 
     def __init__(self, board: BluePill) -> None:
         self._board = board
+        ends = list(accumulate(row.size for row in REGISTERS))
+        #: Where each register begins and ends among all of them, in bytes.
+        self.layout = tuple(zip([0, *ends], ends, strict=False))
 
     # Registers.
 
@@ -75,7 +79,7 @@ class Inspector:
         """Set a register by its name in lower case; of xPSR only the flags."""
         engine = self._board.chip.engine
         if name == _PC:
-            engine.pc = value & ~1
+            engine.jump(value | 1)
         elif name == _XPSR:
             engine.registers[Register.CPSR] = engine.registers[Register.CPSR] & ~_FLAGS | value & _FLAGS
         else:

@@ -1,0 +1,57 @@
+"""`p2os mcu debug`: GDB at an emulated BluePill."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from bluepill_sim.board import BluePill
+from bluepill_sim.cli.driving import say, summary, warn_on_stderr
+from bluepill_sim.cli.gdb_server import GdbServer
+from bluepill_sim.console import connect, open_console
+from bluepill_sim.debug.control import LoneChip
+
+HELP = """Wait for GDB, and let it run, stop, look into and rewind a firmware.
+
+Breakpoints and watchpoints without limit, single steps, reverse-step and
+reverse-continue, semihosting, all registers and memories; `monitor help` lists
+what GDB has no word for. Time is virtual and stands still at a halt: nothing
+runs away while you think.
+
+\b
+Examples:
+  p2os mcu debug mine.elf                  then: gdb-multiarch mine.elf -ex "target remote :3333"
+  p2os mcu debug mine.elf --fast           virtual time as fast as it can
+  p2os mcu debug mine.elf --uart log.txt   what it sends on USART1 goes to a file
+"""
+
+DEFAULT_PORT = 3333
+
+
+def register(app: typer.Typer) -> None:
+    """Add the command."""
+    app.command("debug", help=HELP)(debug)
+
+
+def debug(
+    firmware: Annotated[Path, typer.Argument(help="ELF, HEX or BIN.", metavar="FIRMWARE")],
+    port: Annotated[
+        int, typer.Option(help="TCP port on this machine; 0 takes a free one.", min=0, max=65535)
+    ] = DEFAULT_PORT,
+    uart: Annotated[str, typer.Option(help="Where USART1 goes: - (stdout), or a file.", metavar="WHERE")] = "-",
+    fast: Annotated[bool, typer.Option("--fast", help="Do not hold virtual time back to the clock.")] = False,
+    once: Annotated[bool, typer.Option("--once", help="End when GDB leaves, however it does.")] = False,
+) -> None:
+    """Debug a firmware."""
+    board = BluePill(firmware)
+    warn_on_stderr(board)
+    server = GdbServer(LoneChip(board), port, is_paced=not fast)
+    console = open_console(uart)
+    connect(console, board.usart1)
+    say(f"waiting for GDB on port {server.port}: gdb-multiarch {firmware} -ex 'target remote :{server.port}'")
+    try:
+        server.serve(once=once)
+    finally:
+        server.close()
+        console.close()
+        say(summary(board))

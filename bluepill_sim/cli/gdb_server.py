@@ -1,0 +1,183 @@
+"""Serves one debugger at a time on a TCP port of this machine.
+
+This is skin: it owns the socket and the pace; `bluepill_sim.debug` does the rest.
+
+Invariant: the machine runs only while GDB wants it to; whoever leaves without a
+word leaves it standing still.
+"""
+
+import select
+import socket
+import time
+from collections.abc import Callable
+
+from bluepill_sim.debug.control import Machine
+from bluepill_sim.debug.execution import Execution
+from bluepill_sim.debug.packets import Mark, Packet, PacketReader, frame
+from bluepill_sim.debug.session import Session
+from bluepill_sim.errors import BluePillError
+from bluepill_sim.timing import NS_PER_S, Nanos
+
+_READ_BYTES = 4096
+#: How often a waiting server looks at Ctrl-C of its own terminal.
+_POLL_S = 0.5
+
+
+class GdbServer:
+    """Listens on the loopback interface.
+
+    Args:
+        machine: what is debugged.
+        port: TCP port; 0 takes a free one.
+        is_paced: whether virtual time goes no faster than the wall clock.
+
+    Raises:
+        BluePillError: the port is taken.
+    """
+
+    def __init__(self, machine: Machine, port: int, *, is_paced: bool = False) -> None:
+        self._machine = machine
+        self._is_paced = is_paced
+        self._listener = socket.socket(socket.AF_INET, socket.SOCK_STREAM)
+        self._listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        try:
+            self._listener.bind(("127.0.0.1", port))
+        except (OSError, OverflowError) as error:
+            self._listener.close()
+            raise BluePillError(
+                f"cannot listen on port {port}: {error}", hint="another --port, or 0 for any"
+            ) from error
+        self._listener.listen(1)
+        self.port: int = self._listener.getsockname()[1]
+        self._execution = Execution(machine, self._print)
+        self._connection: _Connection | None = None
+        #: Takes what the program prints by semihosting, when no debugger shows it.
+        self.on_print: Callable[[bytes], None] | None = None
+
+    def close(self) -> None:
+        """Give the port back."""
+        self._listener.close()
+
+    def serve(self, *, once: bool = False) -> bool:
+        """Serve debuggers until one kills the program, or detaches.
+
+        Args:
+            once: come back as well when one leaves without a word.
+
+        Returns:
+            Whether the program is to run on: it was detached from, not killed.
+        """
+        while True:
+            while not select.select([self._listener], [], [], _POLL_S)[0]:
+                pass
+            connection = _Connection(self._listener.accept()[0])
+            self._connection = connection
+            try:
+                session = self._talk(connection)
+            finally:
+                self._connection = None
+                connection.close()
+            if session.state.is_over or once:
+                self._execution.detach()
+                return not session.state.was_killed
+
+    def _talk(self, connection: "_Connection") -> Session:
+        session = Session(self._execution)
+        self._execution.wants_stop = self._make_watch(connection)
+        while not session.state.is_over:
+            packet = connection.next_packet()
+            if packet is None:
+                break
+            if packet.payload[:1] in _RESUMES or packet.payload.startswith(b"vCont;"):
+                self._execution.wants_stop = self._make_watch(connection)
+            answer = session.answer(packet.payload)
+            if packet.payload != b"k":
+                connection.send(answer)
+            connection.has_acks = not session.state.has_no_acks
+        return session
+
+    def _make_watch(self, connection: "_Connection") -> Callable[[], bool]:
+        """Return what looks for Ctrl-C and keeps the pace, from this moment on."""
+        offset_ns: Nanos = time.monotonic_ns() - self._machine.board.now_ns
+
+        def wants_stop() -> bool:
+            ahead_ns = self._machine.board.now_ns + offset_ns - time.monotonic_ns()
+            wait_s = ahead_ns / NS_PER_S if self._is_paced and ahead_ns > 0 else 0.0
+            return connection.is_interrupted(wait_s)
+
+        return wants_stop
+
+    def _print(self, data: bytes) -> None:
+        if self._connection is not None:
+            self._connection.send(b"O" + data.hex().encode())
+        if self.on_print is not None:
+            self.on_print(data)
+
+
+_RESUMES = {b"c", b"s", b"C", b"S"}
+
+
+class _Connection:
+    """One debugger's end of the line."""
+
+    def __init__(self, line: socket.socket) -> None:
+        self._line = line
+        line.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+        self._reader = PacketReader()
+        self._packets: list[Packet] = []
+        self._is_interrupted = False
+        self._is_lost = False
+        self._last = b""
+        self.has_acks = True
+
+    def close(self) -> None:
+        self._line.close()
+
+    def next_packet(self) -> Packet | None:
+        """Wait for a packet; None once the other end is gone."""
+        while not self._packets:
+            if self._is_lost:
+                return None
+            self._receive(_POLL_S)
+        self._is_interrupted = False
+        return self._packets.pop(0)
+
+    def is_interrupted(self, wait_s: float) -> bool:
+        """Look, at most so long, for a Ctrl-C; a lost line is one as well."""
+        self._receive(wait_s)
+        return self._is_interrupted or self._is_lost
+
+    def send(self, payload: bytes) -> None:
+        """Send a packet."""
+        self._last = frame(payload)
+        self._write(self._last)
+
+    def _write(self, data: bytes) -> None:
+        try:
+            self._line.sendall(data)
+        except OSError:
+            self._is_lost = True
+
+    def _receive(self, wait_s: float) -> None:
+        try:
+            if not select.select([self._line], [], [], wait_s)[0]:
+                return
+            data = self._line.recv(_READ_BYTES)
+        except OSError:
+            data = b""
+        if not data:
+            self._is_lost = True
+        for event in self._reader.receive(data):
+            self._take(event)
+
+    def _take(self, event: Packet | Mark) -> None:
+        if isinstance(event, Packet):
+            if self.has_acks:
+                self._write(b"+")
+            self._packets.append(event)
+        elif event is Mark.INTERRUPT:
+            self._is_interrupted = True
+        elif event is Mark.DAMAGED and self.has_acks:
+            self._write(b"-")
+        elif event is Mark.NAK:
+            self._write(self._last)

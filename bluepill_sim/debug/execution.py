@@ -1,0 +1,272 @@
+"""Going on, stepping, and going back: what a debugger's resume commands come to.
+
+Theory of operation. Forwards the machine runs to what halts its chip; calls of
+semihosting are served on the way. Backwards it is put to an older state and run
+forward again, once to learn what stops lie on the way, and once to the last of
+them. A run is repeatable, so it comes by the same states; nobody is told of
+anything twice.
+
+Invariant: outside of its methods the machine stands still.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from bluepill_sim.cpu import HaltKind
+from bluepill_sim.debug.control import Machine, Stop, StopKind
+from bluepill_sim.debug.history import History, Point
+from bluepill_sim.debug.semihosting import Semihosting
+from bluepill_sim.faults import FaultKind
+from bluepill_sim.timing import NS_PER_MS, NS_PER_S, Nanos, Reason
+
+#: chosen: so often a running machine looks whether somebody wants it to stop.
+SLICE_NS: Nanos = 2 * NS_PER_MS
+#: chosen: so far before a state, in cycles, single steps towards it begin.
+_MARGINS = (64, 512, 8192, 1 << 20)
+#: Bounds the steps of one way back: a program asleep or in a loop to itself takes one step for a long time.
+_MOST_STEPS = 20_000
+
+_STOP_OF_HALT = {
+    HaltKind.BREAKPOINT: StopKind.BREAKPOINT,
+    HaltKind.WATCHPOINT: StopKind.WATCHPOINT,
+    HaltKind.STEP: StopKind.STEP,
+    HaltKind.BKPT: StopKind.BKPT,
+}
+
+
+@dataclass(frozen=True, slots=True)
+class _Place:
+    """Tells one state of a run from all others."""
+
+    cycle: int
+    pc: int
+
+
+class Execution:
+    """Runs one machine for a debugger.
+
+    Args:
+        machine: what runs.
+        write: takes what the program prints by semihosting.
+    """
+
+    def __init__(self, machine: Machine, write: Callable[[bytes], None]) -> None:
+        self.machine = machine
+        self.history = History(machine)
+        #: Called between slices; True ends the run.
+        self.wants_stop: Callable[[], bool] = lambda: False
+        self._is_replaying = False
+        self._write = write
+        self._semihosting = Semihosting(machine.board, self._print)
+        self._told_fault = False
+        self._bkpt_at: int | None = None
+        machine.board.chip.processor.halts_on_bkpt = True
+        self._report = machine.board.chip.processor.on_fault
+        machine.board.chip.processor.on_fault = self._faulted
+
+    def detach(self) -> None:
+        """Let the machine run as if no debugger had been there."""
+        chip = self.machine.board.chip
+        chip.engine.breakpoints.clear()
+        chip.engine.watchpoints.clear()
+        chip.processor.halts_on_bkpt = False
+        chip.processor.on_fault = self._report
+
+    def changed(self) -> None:
+        """Begin the history anew: somebody has written to the machine."""
+        self.history.begin()
+        self._bkpt_at = None
+        self._told_fault = self.machine.board.fault is not None
+
+    # Forwards.
+
+    def go_on(self) -> Stop:
+        """Run until something stops the chip."""
+        stop = self._run(None)
+        self.machine.halted()
+        return stop
+
+    def step(self) -> Stop:
+        """Run one instruction of the program, or the entry of the exception that comes before it."""
+        self._pass_bkpt()
+        stop = self._step_once() or Stop(StopKind.INTERRUPT)
+        self.machine.halted()
+        return stop
+
+    def _run(self, until: _Place | None) -> Stop:
+        """Run to a stop; with `until` also to a state, which then counts as none: INTERRUPT."""
+        self._pass_bkpt()
+        board = self.machine.board
+        while True:
+            if self._has_ended():
+                return Stop(StopKind.END)
+            limit = board.now_ns + SLICE_NS
+            if not self._is_replaying:
+                self.history.pass_by()
+            if self.machine.end_ns is not None:
+                limit = min(limit, self.machine.end_ns)
+            if until is not None and board.cycle >= until.cycle:
+                return Stop(StopKind.INTERRUPT)
+            reached = self.machine.advance_to(limit)
+            if reached.halt is not None:
+                stop = self._stop_of(reached.halt.kind, reached.halt.address)
+                if stop is not None:
+                    return stop
+                continue
+            if self._has_new_fault() or reached.reason is Reason.HALT:
+                self._told_fault = True
+                return Stop(StopKind.FAULT)
+            if not self._is_replaying and self.wants_stop():
+                return Stop(StopKind.INTERRUPT)
+
+    def _step_once(self) -> Stop | None:
+        """Run one instruction; None where the chip sleeps until somebody wants it to stop."""
+        while True:
+            if self._has_ended():
+                return Stop(StopKind.END)
+            reached = self.machine.advance_to(self.machine.board.now_ns + SLICE_NS, by_step=True)
+            if reached.halt is not None:
+                stop = self._stop_of(reached.halt.kind, reached.halt.address)
+                return stop or Stop(StopKind.STEP)
+            if self._has_new_fault() or reached.reason is Reason.HALT:
+                self._told_fault = True
+                return Stop(StopKind.FAULT)
+            if self.wants_stop():
+                return None
+
+    def _stop_of(self, kind: HaltKind, address: int | None) -> Stop | None:
+        """Return what a halt is to the debugger; None for a call of semihosting that was served."""
+        if kind is HaltKind.BKPT:
+            pc = self.machine.board.pc
+            if not self._semihosting.is_call(pc):
+                self._bkpt_at = pc
+                return Stop(StopKind.BKPT)
+            ended = self._semihosting.serve()
+            return None if ended is None else Stop(StopKind.EXIT, code=ended.code)
+        return Stop(_STOP_OF_HALT[kind], address)
+
+    def _pass_bkpt(self) -> None:
+        """Go past the BKPT that the debugger has been told of."""
+        board = self.machine.board
+        if self._bkpt_at == board.pc:
+            board.chip.engine.jump(board.pc + 2 | 1)
+        self._bkpt_at = None
+
+    def _has_ended(self) -> bool:
+        end = self.machine.end_ns
+        return end is not None and self.machine.board.now_ns >= end
+
+    def _has_new_fault(self) -> bool:
+        return self.machine.board.fault is not None and not self._told_fault
+
+    def _faulted(self, kind: FaultKind, pc: int, address: int | None, is_lockup: bool) -> None:
+        if self._report is not None:
+            self._report(kind, pc, address, is_lockup)
+        if self._has_new_fault():
+            self.machine.board.request_stop()
+
+    def _print(self, data: bytes) -> None:
+        if not self._is_replaying:
+            self._write(data)
+
+    # Backwards.
+
+    def step_back(self) -> Stop:
+        """Go to the state before the last instruction."""
+        return self._replay(self._step_back)
+
+    def go_back(self) -> Stop:
+        """Go to the last stop before this state, or to where the history begins."""
+        return self._replay(self._go_back)
+
+    def _replay(self, act: Callable[[_Place], Stop]) -> Stop:
+        board = self.machine.board
+        self._is_replaying = True
+        self._bkpt_at = None
+        try:
+            stop = act(_Place(board.cycle, board.pc))
+        finally:
+            self._is_replaying = False
+        self.history.forget_after(board.cycle)
+        self._told_fault = board.fault is not None
+        return stop
+
+    def _step_back(self, here: _Place) -> Stop:
+        for margin in _MARGINS:
+            for point in self.history.before(here.cycle)[:2]:
+                self.machine.restore(point.snapshot)
+                self._approach(here, margin)
+                if self.machine.board.cycle >= here.cycle:
+                    continue
+                start = self.machine.snapshot()
+                count = self._count_steps(here)
+                self.machine.restore(start)
+                if count is None:
+                    continue
+                for _ in range(count - 1):
+                    self._step_once()
+                return Stop(StopKind.STEP)
+        return self._to_begin(here)
+
+    def _approach(self, here: _Place, margin: int) -> None:
+        """Run to some cycles before a state, past all stops."""
+        board = self.machine.board
+        breakpoints, watchpoints = set(board.chip.engine.breakpoints), set(board.chip.engine.watchpoints)
+        board.chip.engine.breakpoints.clear()
+        board.chip.engine.watchpoints.clear()
+        try:
+            while board.cycle < here.cycle - margin:
+                span_ns = (here.cycle - margin - board.cycle) * NS_PER_S // board.hclk_hz
+                if span_ns <= 0:
+                    break
+                reached = self.machine.advance_to(board.now_ns + min(span_ns, SLICE_NS))
+                if reached.halt is not None:
+                    self._stop_of(reached.halt.kind, reached.halt.address)
+                    self._pass_bkpt()
+        finally:
+            board.chip.engine.breakpoints.update(breakpoints)
+            board.chip.engine.watchpoints.update(watchpoints)
+
+    def _count_steps(self, here: _Place) -> int | None:
+        """Return how many steps it is to a state; None where steps do not come by it."""
+        board = self.machine.board
+        for count in range(1, _MOST_STEPS):
+            self._pass_bkpt()
+            self._step_once()
+            if (board.cycle, board.pc) == (here.cycle, here.pc):
+                return count
+            if board.cycle > here.cycle:
+                return None
+        return None
+
+    def _go_back(self, here: _Place) -> Stop:
+        for point in self.history.before(here.cycle):
+            stops = self._stops_between(point, here)
+            if stops:
+                self.machine.restore(point.snapshot)
+                for _ in range(len(stops)):
+                    self._run(None)
+                self._bkpt_at = self.machine.board.pc if stops[-1].kind is StopKind.BKPT else None
+                return stops[-1]
+            here = _Place(point.cycle, here.pc)
+        return self._to_begin(here)
+
+    def _stops_between(self, point: Point, here: _Place) -> list[Stop]:
+        self.machine.restore(point.snapshot)
+        self._told_fault = True
+        board, stops = self.machine.board, list[Stop]()
+        while True:
+            stop = self._run(here)
+            if (
+                board.cycle > here.cycle
+                or (board.cycle, board.pc) == (here.cycle, here.pc)
+                or stop.kind in {StopKind.INTERRUPT, StopKind.END, StopKind.FAULT, StopKind.EXIT}
+            ):
+                return stops
+            stops.append(stop)
+
+    def _to_begin(self, here: _Place) -> Stop:
+        first = self.history.before(here.cycle + 1)[-1:]
+        if first:
+            self.machine.restore(first[0].snapshot)
+        return Stop(StopKind.BEGIN)

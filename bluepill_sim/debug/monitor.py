@@ -1,0 +1,127 @@
+"""GDB's `monitor` commands: what a board has that GDB has no word for.
+
+Invariant: any words give lines for a person, never an exception.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from bluepill_sim.debug.execution import Execution
+from bluepill_sim.timing import NS_PER_S
+
+_LEVELS = {"0": False, "1": True, "low": False, "high": True, "z": None}
+_UNKNOWN = "not understood; monitor help lists the commands"
+
+
+@dataclass(frozen=True, slots=True)
+class Command:
+    """One row of the help."""
+
+    usage: str
+    help: str
+
+
+COMMANDS = {
+    "help": Command("help", "this list"),
+    "reset": Command("reset", "press the reset button (halt and init are taken as well); time goes on"),
+    "time": Command("time", "virtual time, cycles, clock"),
+    "pins": Command("pins [all]", "pins in use: mode, level, who drives"),
+    "pin": Command("pin PA4 [1|0|z]", "one pin; with a level: drive it from outside, z lets go"),
+    "snapshot": Command("snapshot [NAME]", "keep the whole machine's state"),
+    "restore": Command("restore [NAME]", "go back to it"),
+    "fault": Command("fault", "the fault, if there was one"),
+    "warnings": Command("warnings", "what was touched that is not modelled, and electrical mistakes"),
+}
+
+
+class Monitor:
+    """Carries out the commands for one debugger.
+
+    Args:
+        execution: the machine, standing still.
+    """
+
+    def __init__(self, execution: Execution) -> None:
+        self._execution = execution
+        self._snapshots: dict[str, object] = {}
+
+    def run(self, line: str) -> str:
+        """Return what a command has to say."""
+        words = line.split()
+        if not words:
+            words = ["help"]
+        acts: dict[str, Callable[[list[str]], str]] = {
+            "help": self._help,
+            "reset": self._reset,
+            "time": self._time,
+            "pins": self._pins,
+            "pin": self._pin,
+            "snapshot": self._snapshot,
+            "restore": self._restore,
+            "fault": self._fault,
+            "warnings": self._warnings,
+        }
+        act = acts.get(words[0])
+        return (f"{line}: {_UNKNOWN}" if act is None else act(words[1:])) + "\n"
+
+    def _help(self, _words: list[str]) -> str:
+        return "\n".join(f"{command.usage:<18} {command.help}" for command in COMMANDS.values())
+
+    def _reset(self, _words: list[str]) -> str:
+        board = self._execution.machine.board
+        board.reset()
+        self._execution.changed()
+        return f"reset: at {board.where()}"
+
+    def _time(self, _words: list[str]) -> str:
+        board = self._execution.machine.board
+        parts = [f"{board.now_ns / NS_PER_S:.9f} s of virtual time", f"{board.cycle} cycles"]
+        parts += [f"{board.hclk_hz / 1e6:g} MHz", *(["asleep"] if board.is_asleep else [])]
+        return ", ".join(parts)
+
+    def _pins(self, words: list[str]) -> str:
+        names = [pin.name for pin in self._execution.machine.board.pins]
+        lines = [self._line(name, every=bool(words)) for name in names]
+        return "\n".join(line for line in lines if line) or "no pin is in use"
+
+    def _line(self, name: str, *, every: bool) -> str:
+        pin = self._execution.machine.board.pin(name)
+        if not every and pin.mode.value == "floating input" and pin.driven is None and pin.holder is None:
+            return ""
+        level = "floating" if pin.is_floating else "high" if pin.level else "low"
+        outside = {None: "", True: ", high from outside", False: ", low from outside"}[pin.driven]
+        use = pin.holder or pin.function or ""
+        return f"{name:<5} {level:<9} {pin.mode.value}{f' ({use})' if use else ''}{outside}"
+
+    def _pin(self, words: list[str]) -> str:
+        board = self._execution.machine.board
+        bonded = {pin.name for pin in board.pins}
+        name = words[0].upper() if words else ""
+        if name not in bonded or len(words) > 2 or (len(words) == 2 and words[1].lower() not in _LEVELS):
+            return f"pin {' '.join(words)}: {_UNKNOWN}"
+        if len(words) == 2:
+            board.pin(name).drive(_LEVELS[words[1].lower()])
+            self._execution.changed()
+        return self._line(name, every=True)
+
+    def _snapshot(self, words: list[str]) -> str:
+        if not self._execution.machine.can_rewind:
+            return "a real robot cannot go back: no snapshots"
+        name = words[0] if words else "1"
+        self._snapshots[name] = self._execution.machine.snapshot()
+        return f"snapshot {name} at {self._time([])}"
+
+    def _restore(self, words: list[str]) -> str:
+        name = words[0] if words else "1"
+        if name not in self._snapshots:
+            return f"no snapshot {name}; there are: {', '.join(sorted(self._snapshots)) or 'none'}"
+        self._execution.machine.restore(self._snapshots[name])
+        self._execution.changed()
+        return f"restored {name}: {self._time([])}; say maintenance flush register-cache"
+
+    def _fault(self, _words: list[str]) -> str:
+        fault = self._execution.machine.board.fault
+        return "no fault" if fault is None else f"{fault}\n{fault.register_dump}"
+
+    def _warnings(self, _words: list[str]) -> str:
+        return "\n".join(self._execution.machine.board.warnings) or "no warnings"
