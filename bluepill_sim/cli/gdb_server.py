@@ -139,7 +139,6 @@ class _Connection:
             if self._is_lost:
                 return None
             self._receive(_POLL_S)
-        self._is_interrupted = False
         return self._packets.pop(0)
 
     def is_interrupted(self, wait_s: float) -> bool:
@@ -175,6 +174,7 @@ class _Connection:
             if self.has_acks:
                 self._write(b"+")
             self._packets.append(event)
+            self._is_interrupted = False  # a Ctrl-C is for what was asked for before it
         elif event is Mark.INTERRUPT:
             self._is_interrupted = True
         elif event is Mark.DAMAGED and self.has_acks:
