@@ -149,13 +149,13 @@ class Chip:
             if not engine.is_inside_block:
                 self._act()
             now = clock.ns_of(engine.cycle)
-            if self._stop_requested:
+            if self._stop_requested and not engine.is_inside_block:
                 self._stop_requested = False
                 return Reached(now, Reason.EDGE)
             if processor.is_locked_up and not self.parts.has_running_watchdog:
                 engine.cycle = max(engine.cycle, clock.cycle_at(limit_ns))
                 return Reached(clock.ns_of(engine.cycle), Reason.HALT)
-            if now >= limit_ns:
+            if now >= limit_ns and not engine.is_inside_block:
                 return Reached(now, Reason.DEADLINE)
             if processor.is_locked_up:
                 engine.cycle = self._stop_cycle(limit_ns)

@@ -25,7 +25,7 @@ from p2os.timing import NS_PER_S, Nanos
 from testbench.adapter_choice import AnyAdapter, make_adapter
 from testbench.chip_pins import ChipPins
 from testbench.direct import DirectRobot, DistanceSensors, JointMotor, WheelEncoder
-from testbench.loop import DEFAULT_SLICE_NS, Follower, RunLoop
+from testbench.loop import DEFAULT_SLICE_NS, Follower, LeaderReached, RunLoop
 from testbench.ports import Chip
 from testbench.recording import Recorder
 from testbench.scenario import Scenario
@@ -139,9 +139,14 @@ class Bench:
         """Return the time that the chip has come to."""
         return self.parts.chip.now_ns
 
-    def run_until(self, end: Nanos) -> None:
-        """Run to `end`, or until shortly after the firmware has died."""
-        self.loop.run_until(min(end, self.end))
+    def run_until(self, end: Nanos, advance: Callable[[int], LeaderReached] | None = None) -> None:
+        """Run to `end`, until shortly after the firmware has died, or to a debugger's halt.
+
+        Args:
+            end: when to come back.
+            advance: as of `RunLoop.run_until`.
+        """
+        self.loop.run_until(min(end, self.end), advance)
 
     def finish(self) -> Nanos:
         """Bring everything to the end of the run and write the rest of the trace; return the end's time."""

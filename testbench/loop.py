@@ -12,7 +12,11 @@ Followers are never brought to the border of a slice: the slice limit only says
 how often the leader gives control back (for pacing, progress and Ctrl-C). So
 the result does not depend on it.
 
-Invariant: when `run_until(end)` returns, every deadline before or at the time
+A debugger may halt the leader, even inside a basic block. Then `run_until`
+comes back at once; nobody is brought anywhere before the leader stands at a
+border again, so that a run with halts is the same as one without.
+
+Invariant: when `run_until(end)` returns without a halt, every deadline before or at the time
 reached has been acted on by all, in order of time.
 """
 
@@ -89,28 +93,45 @@ class RunLoop:
         self._end: Nanos = 0
         self._edges: list[Nanos] = []
         self._rounds = 0
+        self._advance: Callable[[int], LeaderReached] = leader.advance_to
         self._deadlines: list[Nanos] = []
+        #: Whether the leader has halted in this run, and whether it stands inside a block.
+        self._is_halted = False
+        self._is_inside_block = False
 
     def note_edge(self, at: Nanos) -> None:
         """Have the followers brought to `at` as well: a watched net has changed there."""
         if not self._edges or self._edges[-1] != at:
             self._edges.append(at)
 
+    def stand_still(self, *, is_inside_block: bool) -> None:
+        """Have `run_until` come back: the leader has halted for a debugger."""
+        self._is_halted, self._is_inside_block = True, is_inside_block
+
     def end_at(self, end: Nanos) -> None:
         """End the present `run_until` earlier; what was brought beyond stays there."""
         self._end = min(self._end, end)
 
-    def run_until(self, end: Nanos) -> None:
-        """Run to `end` in nanoseconds, or to what `end_at` says in the meantime.
+    def run_until(self, end: Nanos, advance: Callable[[int], LeaderReached] | None = None) -> None:
+        """Run to `end` in nanoseconds, to what `end_at` says in the meantime, or to a halt.
 
         A leader that stands still for good lets time pass like any other.
+
+        Args:
+            end: when to come back.
+            advance: brings the leader forward in place of its `advance_to`; a debugger's step.
 
         Raises:
             StuckError: Two parts wake each other for ever.
         """
         self._end = end
+        self._advance = advance or self.leader.advance_to
+        self._is_halted = False
         led = self.leader.now_ns
-        while True:
+        if self._is_inside_block:
+            self._is_inside_block = False
+            led = self._advance(end).now
+        while not self._is_halted:
             due = self._next_due()
             if due <= led and due <= self._end:
                 self._follow(due)
@@ -126,18 +147,19 @@ class RunLoop:
 
     def snapshot(self) -> dict[str, object]:
         """Return the loop's own state; the parts are saved by whoever built them."""
-        return {"now": self.now, "edges": tuple(self._edges)}
+        return {"now": self.now, "edges": tuple(self._edges), "is_inside_block": self._is_inside_block}
 
     def restore(self, snapshot: Mapping[str, object]) -> None:
         """Put back what `snapshot` returned."""
         self.now = cast("int", snapshot["now"])
         self._edges = list(cast("tuple[int, ...]", snapshot["edges"]))
+        self._is_inside_block = bool(snapshot["is_inside_block"])
 
     def _lead(self, now: Nanos, limit: Nanos) -> Nanos:
         """Let the leader run to `limit`, slice by slice; stop at an edge on a watched net. Return its time."""
-        leader, slice_ns, on_slice = self.leader, self.slice_ns, self.on_slice
-        while now < limit and not self._edges:
-            now = leader.advance_to(min(limit, now + slice_ns)).now
+        advance, slice_ns, on_slice = self._advance, self.slice_ns, self.on_slice
+        while now < limit and not self._edges and not self._is_halted:
+            now = advance(min(limit, now + slice_ns)).now
             if on_slice is not None:
                 on_slice(now)
         return now

@@ -92,6 +92,15 @@ class RemoteBench:
         chip.on_warning = lambda text: recorder.event("chip", chip.now_ns, "warning", text)
         recorder.start()
 
+    @property
+    def is_closed(self) -> bool:
+        """Whether the robot has been stopped and its line given back."""
+        return self._is_closed
+
+    def start_clock(self) -> None:
+        """Take the present as the beginning of real time: nobody has lagged while the bench stood still."""
+        self._pacer.start(self.chip.now_ns)
+
     def run_until(self, end: Nanos) -> None:
         """Run to `end` at the speed of the wall clock, then stop and close the robot.
 

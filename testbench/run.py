@@ -10,6 +10,7 @@ import contextlib
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TypeVar
 
 from p2os.errors import P2osError
 from p2os.timing import NS_PER_MS, NS_PER_S, Nanos
@@ -40,6 +41,10 @@ class Progress:
     doing: Callable[[], str]
 
 
+#: Runs a bench to its end, however it likes.
+Driver = Callable[[Bench], None]
+RemoteDriver = Callable[[RemoteBench], None]
+_AnyBench = TypeVar("_AnyBench", Bench, RemoteBench)
 ProgressListener = Callable[[Progress], None]
 
 
@@ -67,6 +72,7 @@ def run_scenario(
     speed: float | None = None,
     on_progress: ProgressListener | None = None,
     clock: Clock = wall_clock,
+    drive: Driver | None = None,
 ) -> RunResult:
     """Run a scenario in virtual time and make its run folder.
 
@@ -77,6 +83,7 @@ def run_scenario(
         speed: Virtual seconds a wall second; None runs as fast as it can.
         on_progress: Called after each slice; a KeyboardInterrupt out of it ends the run in good order.
         clock: Wall clock in nanoseconds.
+        drive: Runs the bench in place of its `run_until`; a debugger.
 
     Raises:
         P2osError: A file cannot be read, or a part is not installed.
@@ -94,7 +101,7 @@ def run_scenario(
 
         bench.on_slice = after_slice
         trace.meta(meta_of(scenario, bench.parts.world, bench.note))
-        return _record(bench, trace, folder, pacer, clock)
+        return _record(bench, trace, folder, pacer, clock, drive)
 
 
 def run_at_port(
@@ -104,10 +111,13 @@ def run_at_port(
     *,
     on_progress: ProgressListener | None = None,
     clock: Clock = wall_clock,
+    drive: RemoteDriver | None = None,
 ) -> RunResult:
     """Drive the robot at a transport in real time (mode C), stop it, and make the run folder.
 
     The transport is closed in any case. A lost line, lag and Ctrl-C are failures of the run.
+
+    With `drive`, a debugger runs the bench in place of its `run_until`.
 
     Raises:
         P2osError: A file cannot be read, or a part is not installed.
@@ -125,7 +135,7 @@ def run_at_port(
 
         bench.on_slice = after_slice
         trace.meta(meta_of(scenario, None, bench.note))
-        return _record(bench, trace, folder, pacer, clock)
+        return _record(bench, trace, folder, pacer, clock, drive)
 
 
 def doing(bench: Bench | RemoteBench) -> str:
@@ -136,7 +146,12 @@ def doing(bench: Bench | RemoteBench) -> str:
 
 
 def _record(
-    bench: Bench | RemoteBench, trace: TraceWriter, folder: Path, pacer: Pacer | None, clock: Clock
+    bench: _AnyBench,
+    trace: TraceWriter,
+    folder: Path,
+    pacer: Pacer | None,
+    clock: Clock,
+    drive: Callable[[_AnyBench], None] | None,
 ) -> RunResult:
     """Run to the end, judge the goals, write the trace's last line, and make the rest of the folder."""
     failures: list[str] = []
@@ -145,7 +160,10 @@ def _record(
     if pacer is not None:
         pacer.start(0)
     try:
-        bench.run_until(bench.scenario.duration_ns)
+        if drive is None:
+            bench.run_until(bench.scenario.duration_ns)
+        else:
+            drive(bench)
     except KeyboardInterrupt:
         was_interrupted = True
         failures.append("interrupted by Ctrl-C")

@@ -24,6 +24,7 @@ import hashlib
 import io
 import json
 from collections.abc import Mapping
+from dataclasses import dataclass
 from pathlib import Path
 from typing import IO, cast
 
@@ -37,6 +38,15 @@ RANKS = {"pin": 0, "usart": 1, "obstacle": 2, "wire": 3, "event": 4, "sonar": 5,
 
 #: A line's content.
 Entry = Mapping[str, object]
+
+
+@dataclass(frozen=True, slots=True)
+class TraceMark:
+    """A place in a trace that is being written."""
+
+    position: int
+    digest: "hashlib._Hash"
+    flushed_second: int
 
 
 def canonical(entry: Entry) -> str:
@@ -132,6 +142,16 @@ class TraceWriter:
             self._file.flush()
         except OSError as error:
             raise RunFailedError(f"cannot write {self.path}: {error.strerror}") from error
+
+    def mark(self) -> TraceMark:
+        """Return where the trace stands, for `rewind`."""
+        return TraceMark(self._file.tell(), self._hash.copy(), self._flushed_second)
+
+    def rewind(self, mark: TraceMark) -> None:
+        """Take back everything that was written after `mark`; what was told is `restore`'s business."""
+        self._file.seek(mark.position)
+        self._file.truncate()
+        self._hash, self._flushed_second = mark.digest.copy(), mark.flushed_second
 
     def snapshot(self) -> dict[str, object]:
         """Return what is told and not yet written."""

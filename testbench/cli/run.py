@@ -11,6 +11,7 @@ from typer.core import TyperCommand
 from p2os.errors import RunFailedError, UsageError
 from p2os.transport import open_url
 from testbench.cli.folders import next_folder
+from testbench.cli.gdb import debug_bench, debug_port
 from testbench.cli.progress import RunDisplay
 from testbench.cli.table import print_result
 from testbench.remote import CAUTIOUS_ROTATION_DEG_S, CAUTIOUS_VELOCITY_MM_S
@@ -35,6 +36,7 @@ Examples:
   p2os run motors --firmware build/mine.elf         your program, judged by that scenario
   p2os run dodge --world arena --seed 7 --json      one JSON object for a script
   p2os run dodge --realtime                         at the speed of the clock
+  p2os run dodge --gdb 3333                         under GDB; the robot stands still at a halt
   p2os run dodge --port serial:/dev/ttyUSB0         drive a real Pioneer; asks first
 """
 
@@ -73,6 +75,9 @@ def run(
     ] = None,
     out: Annotated[Path | None, typer.Option(help="Run folder; default runs/SCENARIO-NNN.", metavar="DIR")] = None,
     json_output: Annotated[bool, typer.Option("--json", help="Print one JSON object.")] = False,
+    gdb: Annotated[
+        int | None, typer.Option(help="Wait for GDB on this TCP port; 0 takes a free one.", metavar="PORT", min=0)
+    ] = None,
     yes: Annotated[bool, typer.Option("--yes", help="With --port: do not ask before the first motion.")] = False,
     max_speed: Annotated[
         int | None, typer.Option(help="With --port: cap of the forward speed, mm/s.", metavar="MM_S", min=1)
@@ -91,15 +96,21 @@ def run(
     )
     folder = out or next_folder(wanted.name)
     if port is not None:
-        result = drive_port(wanted, folder, port, yes=yes, max_speed=max_speed)
+        result = drive_port(wanted, folder, port, yes=yes, max_speed=max_speed, gdb=gdb)
         end_with(replace(result, was_interrupted=False), json_output=json_output)
         return
     with RunDisplay() as display:
-        result = run_scenario(wanted, folder, speed=realtime, on_progress=display.update)
+        if gdb is None:
+            result = run_scenario(wanted, folder, speed=realtime, on_progress=display.update)
+        else:
+            driver = debug_bench(gdb, is_paced=realtime is not None)
+            result = run_scenario(wanted, folder, on_progress=display.update, drive=driver)
     end_with(result, json_output=json_output)
 
 
-def drive_port(scenario: Scenario, folder: Path, url: str, *, yes: bool, max_speed: int | None) -> RunResult:
+def drive_port(
+    scenario: Scenario, folder: Path, url: str, *, yes: bool, max_speed: int | None, gdb: int | None = None
+) -> RunResult:
     """Drive the robot at a URL after asking a person.
 
     Raises:
@@ -112,7 +123,8 @@ def drive_port(scenario: Scenario, folder: Path, url: str, *, yes: bool, max_spe
         if not yes:
             ask(scenario, url)
         with RunDisplay() as display:
-            return run_at_port(scenario, folder, transport, on_progress=display.update)
+            driver = None if gdb is None else debug_port(gdb)
+            return run_at_port(scenario, folder, transport, on_progress=display.update, drive=driver)
     finally:
         transport.close()
 
