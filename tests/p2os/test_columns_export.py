@@ -56,7 +56,7 @@ waits = st.sampled_from((0, 1, 100 * NS_PER_MS, 249 * NS_PER_MS, 250 * NS_PER_MS
 
 @given(st.lists(st.tuples(waits, st.sampled_from((True, True, True, False)), bytes_of_a_chunk), max_size=9),
        st.sampled_from((ROBOT, None)), st.sampled_from(Profile))  # fmt: skip
-@settings(deadline=None)
+@settings(deadline=None, max_examples=50)
 def test_a_capture_gives_the_same_cells_either_way(
     parts: list[tuple[Nanos, bool, bytes]], direction: Direction | None, profile: Profile
 ) -> None:
