@@ -94,8 +94,10 @@ class HardLife:
         self.robot.receive = listen
         self.codes = dict.fromkeys(ENCODERS, 0)
         self.counts = {"unplugged": 0, "reboots": 0, "sessions": 0, "losses": 0, "code_steps": 0, "fooled": 0}
-        self.longest_wrong_ns = 0
+        #: The longest that the robot held a wrong speed: heard all along, and while a damaged count hid what came.
+        self.longest_wrong_ns = self.longest_hidden_ns = 0
         self._wrong_since: Nanos | None = None
+        self._was_hidden = False
         self._plugged_at: Nanos = 0
         self._wish_at: Nanos = 0
         self._motors_at: Nanos = 0
@@ -170,11 +172,16 @@ class HardLife:
         wanted = {"VEL": speeds.forward_mm_s, "RVEL": speeds.turn_deg_s}
         is_whole = self.rig.adapter.state == "driving" and not self.rig.to_robot.cut
         if not is_whole or self.heard.speeds == wanted:
-            self._wrong_since = None
-        elif self._wrong_since is None:
-            self._wrong_since = self.rig.now
+            self._wrong_since, self._was_hidden = None, False
+            return
+        self._wrong_since = self._wrong_since or self.rig.now
+        # The line delivers whole frames: a frame that has begun waits for bytes that its count only claims.
+        self._was_hidden = self._was_hidden or self.heard.decoder.next_deadline() is not None
+        span = self.rig.now - self._wrong_since
+        if self._was_hidden:
+            self.longest_hidden_ns = max(self.longest_hidden_ns, span)
         else:
-            self.longest_wrong_ns = max(self.longest_wrong_ns, self.rig.now - self._wrong_since)
+            self.longest_wrong_ns = max(self.longest_wrong_ns, span)
 
     def _check_codes(self) -> None:
         """Follow each encoder's code; it goes to a neighbour, or stays."""

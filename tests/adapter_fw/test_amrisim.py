@@ -11,7 +11,6 @@ import random
 import re
 import shlex
 import signal
-import socket
 import subprocess
 import time
 from collections.abc import Iterator
@@ -20,7 +19,7 @@ from pathlib import Path
 import pytest
 
 from tests.adapter_fw.builds import built
-from tests.adapter_fw.program import CONNECT, PATIENCE_S, motors, running
+from tests.adapter_fw.program import CONNECT, Lines, motors, running
 
 COMMAND = os.environ.get("P2OS_AMRISIM", "")
 ADDRESS = ("127.0.0.1", int(os.environ.get("P2OS_AMRISIM_PORT", "8101")))
@@ -35,15 +34,13 @@ pytestmark = [
 @pytest.fixture
 def simulator(tmp_path: Path) -> Iterator[str]:
     process = subprocess.Popen(
-        shlex.split(COMMAND), cwd=tmp_path, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, start_new_session=True
-    )
+        shlex.split(COMMAND), cwd=tmp_path, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True,
+        errors="replace", start_new_session=True,
+    )  # fmt: skip
+    assert process.stdout is not None
     try:
-        for _ in range(int(PATIENCE_S * 10)):
-            with socket.socket() as probe:
-                if probe.connect_ex(ADDRESS) == 0:
-                    break
-            time.sleep(0.1)
-        time.sleep(1.0)  # it drops the client that only looked
+        # A connection that only looked would be its one client for some time.
+        Lines(process.stdout).wait(lambda line: "ready for a client" in line)
         yield f"tcp:{ADDRESS[0]}:{ADDRESS[1]}"
     finally:
         os.killpg(process.pid, signal.SIGKILL)  # its wrapper, too
