@@ -49,6 +49,8 @@ class Target:
     compiler: str
     package: str
     flags: tuple[str, ...]
+    #: For the sources beside the core only, whose objects other targets share.
+    own_flags: tuple[str, ...] = ()
     sources: tuple[Path, ...]
     link: tuple[str, ...] = ()
     after: tuple[str, ...] = ()
@@ -57,9 +59,11 @@ class Target:
 
 
 def _on_host(output: str, *sources: Path, include: tuple[Path, ...] = ()) -> Target:
-    folders = [word for folder in include for word in ("-isystem", str(folder))]
-    flags = (*SANITIZERS, *folders)
-    return Target(output=output, compiler="g++", package="g++", flags=flags, sources=sources, link=SANITIZERS)
+    folders = tuple(word for folder in include for word in ("-isystem", str(folder)))
+    return Target(
+        output=output, compiler="g++", package="g++", flags=SANITIZERS, own_flags=folders, sources=sources,
+        link=SANITIZERS,
+    )  # fmt: skip
 
 
 def _on_cortex_m(output: str, *sources: Path) -> Target:
@@ -122,7 +126,8 @@ def _compile(target: Target, source: Path) -> Path:
     """Compile a source unless the same has been compiled before."""
     is_cxx = source.suffix == ".cpp"
     compiler = target.compiler if is_cxx else target.compiler.replace("g++", "gcc")
-    command = [compiler, *(CXX_FLAGS if is_cxx else ("-Wall",)), *target.flags, "-c", str(source)]
+    flags = (*(CXX_FLAGS if is_cxx else ("-Wall",)), *target.flags, *(() if source in CORE else target.own_flags))
+    command = [compiler, *flags, "-c", str(source)]
     made_of = hashlib.sha256("\0".join([_version(compiler), _headers(), *command]).encode() + source.read_bytes())
     result = OBJECTS / f"{source.stem}-{made_of.hexdigest()[:24]}.o"
     if not result.exists():
