@@ -173,7 +173,8 @@ class Chip:
             self.engine.drop_code(SRAM_BASE, SRAM_BYTES)
         self.parts.reset(cause)
         self.system.reset()
-        self.processor.reset(self._vector_table)
+        # A program at the start of the flash is found through its alias at 0, where VTOR points after a reset.
+        self.processor.reset(0 if self._vector_table == FLASH_BASE else self._vector_table)
         self._deadlines_moved = True
 
     # What the peripherals ask for.

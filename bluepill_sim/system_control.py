@@ -26,7 +26,7 @@ CPUID = 0x411F_C231
 DBGMCU_IDCODE = 0x2003_6410
 
 _VECTKEY, _VECTKEY_READ = 0x05FA, 0xFA05 << 16
-_SYSRESETREQ, _VECTCLRACTIVE = 1 << 2, 1 << 1
+_SYSRESETREQ, _VECTCLRACTIVE, _VECTRESET = 1 << 2, 1 << 1, 1 << 0
 _NMIPENDSET, _PENDSVSET, _PENDSVCLR, _PENDSTSET, _PENDSTCLR = (1 << n for n in (31, 28, 27, 26, 25))
 _RETTOBASE, _ISRPENDING = 1 << 11, 1 << 22
 _CCR_BITS, _SCR_BITS, _SHCSR_ENABLE_BITS = 0x31B, 0x16, 0x7 << 16
@@ -122,7 +122,7 @@ class SystemControl:
             0xE000ED34: lambda value, _: setattr(core, "mmfar", value),
             0xE000ED38: lambda value, _: setattr(core, "bfar", value),
             0xE000EDFC: lambda value, _: self._write_demcr(value),
-            0xE000EF00: lambda value, _: self._nvic.pend(FIRST_IRQ + (value & 0x1FF) % IRQ_COUNT),
+            0xE000EF00: self._write_stir,
             0xE0042004: lambda value, _: setattr(self, "_dbgmcu_cr", value),
         }
         self._add_nvic()
@@ -223,6 +223,11 @@ class SystemControl:
         self._readers[address] = read
         self._writers[address] = write
 
+    def _write_stir(self, value: int, _mask: int) -> None:
+        """Pend an interrupt by its number; one that the chip does not have is ignored."""
+        if value & 0x1FF < IRQ_COUNT:
+            self._nvic.pend(FIRST_IRQ + (value & 0x1FF))
+
     # System control block.
 
     def _read_icsr(self) -> int:
@@ -255,8 +260,8 @@ class SystemControl:
         self._nvic.priority_grouping = value >> 8 & 7
         if value & _SYSRESETREQ:
             self._chip.request_reset()
-        if value & _VECTCLRACTIVE:
-            self._chip.warn("AIRCR: VECTCLRACTIVE is not modelled", once="AIRCR:vectclractive")
+        if value & (_VECTCLRACTIVE | _VECTRESET):
+            self._chip.warn("AIRCR: VECTCLRACTIVE and VECTRESET are a debugger's: ignored", once="AIRCR:debugger")
 
     def _read_shcsr(self) -> int:
         value = self._core.shcsr

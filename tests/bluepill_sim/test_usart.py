@@ -1,6 +1,5 @@
-"""USART: true character times, double buffering, flags, interrupts."""
+"""USART, sending and set-up: true character times, double buffering, flags, interrupts."""
 
-import itertools
 from collections.abc import Callable
 from fractions import Fraction
 from typing import Any
@@ -8,38 +7,26 @@ from typing import Any
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from hypothesis.stateful import (
-    RuleBasedStateMachine,
-    initialize,
-    invariant,
-    precondition,
-    rule,
-    run_state_machine_as_test,
+
+from tests.bluepill_sim.usart_line import (
+    BRR,
+    CHARACTER_NS,
+    IRQ,
+    RE,
+    RXNE,
+    SBK,
+    TC,
+    TCIE,
+    TE,
+    TXE,
+    TXEIE,
+    UE,
+    M,
+    set_up,
+    status,
 )
 
 QUICK = settings(max_examples=40, deadline=None)
-
-ORE, IDLE, RXNE, TC, TXE = 8, 16, 32, 64, 128
-SBK, RE, TE, IDLEIE, RXNEIE, TCIE, TXEIE, PS, PCE, M, UE = (1 << n for n in (0, 2, 3, 4, 5, 6, 7, 9, 10, 12, 13))
-IRQ = 37
-#: 8 MHz / 69 = 115942 baud; ten bits take 10 * 69 / 8 MHz = 86250 ns exactly.
-BRR, CHARACTER_NS = 69, 86_250
-
-
-def set_up(chip: Any, control: int = 0, stop: int = 0) -> list[tuple[int, int]]:
-    """PA9 as alternate output, USART1 on; returns what comes out. Ends when the idle character of TE has gone."""
-    sent: list[tuple[int, int]] = []
-    chip.parts.usart(1).on_transmit = lambda word, at_ns: sent.append((word, at_ns))
-    chip.write("GPIOA.CRH", 0x4444_44B4)
-    chip.write("USART1.BRR", BRR)
-    chip.write("USART1.CR2", stop << 12)
-    chip.write("USART1.CR1", UE | TE | RE | control)
-    chip.advance(chip.now_ns + 20 * CHARACTER_NS // 10)
-    return sent
-
-
-def status(chip: Any) -> int:
-    return chip.parts.usart(1).words[0]
 
 
 def test_reset_values_are_the_manuals(fake_chip: Any) -> None:
@@ -260,129 +247,6 @@ def test_a_changed_rate_begins_with_the_next_character(fake_chip: Any) -> None:
 # Reception.
 
 
-def test_a_character_is_in_dr_when_its_stop_bit_has_ended(fake_chip: Any) -> None:
-    set_up(fake_chip, RXNEIE)
-    start_ns = fake_chip.now_ns
-    fake_chip.parts.usart(1).receive(b"Q")
-    fake_chip.advance(start_ns + CHARACTER_NS - 1)
-    assert not status(fake_chip) & RXNE
-    assert not fake_chip.irqs[IRQ]
-    fake_chip.advance(start_ns + CHARACTER_NS)
-    assert status(fake_chip) & RXNE
-    assert fake_chip.irqs[IRQ]
-    assert fake_chip.read("USART1.DR") == ord("Q")
-    assert not status(fake_chip) & RXNE
-    assert not fake_chip.irqs[IRQ]
-
-
-def test_characters_queue_at_the_speed_of_the_line(fake_chip: Any) -> None:
-    set_up(fake_chip)
-    start_ns = fake_chip.now_ns
-    usart = fake_chip.parts.usart(1)
-    usart.receive(b"ab")
-    usart.receive(b"c")
-    for number, expected in enumerate(b"abc"):
-        fake_chip.advance(start_ns + (number + 1) * CHARACTER_NS - 1)
-        assert not status(fake_chip) & RXNE
-        fake_chip.advance(start_ns + (number + 1) * CHARACTER_NS)
-        assert fake_chip.read("USART1.DR") == expected
-
-
-def test_an_unread_character_stays_and_the_next_one_is_an_overrun(fake_chip: Any) -> None:
-    set_up(fake_chip, RXNEIE)
-    fake_chip.parts.usart(1).receive(b"ab")
-    fake_chip.advance(fake_chip.now_ns + 2 * CHARACTER_NS)
-    assert status(fake_chip) & (ORE | RXNE) == ORE | RXNE
-    assert fake_chip.read("USART1.DR") == ord("a")
-    # DR alone clears RXNE; ORE needs a read of SR first, and keeps the interrupt up.
-    assert status(fake_chip) & (ORE | RXNE) == ORE
-    assert fake_chip.irqs[IRQ]
-    fake_chip.read("USART1.SR")
-    assert fake_chip.read("USART1.DR") == ord("a")
-    assert not status(fake_chip) & ORE
-    assert not fake_chip.irqs[IRQ]
-
-
-def test_rxne_is_cleared_by_writing_0_too(fake_chip: Any) -> None:
-    set_up(fake_chip)
-    fake_chip.parts.usart(1).receive(b"a")
-    fake_chip.advance(fake_chip.now_ns + CHARACTER_NS)
-    fake_chip.write("USART1.SR", ~RXNE & 0x3FF)
-    assert not status(fake_chip) & RXNE
-
-
-def test_a_line_that_stays_idle_for_a_character_says_so_once(fake_chip: Any) -> None:
-    set_up(fake_chip, IDLEIE)
-    start_ns = fake_chip.now_ns
-    fake_chip.parts.usart(1).receive(b"a")
-    fake_chip.advance(start_ns + 2 * CHARACTER_NS - 1)
-    assert not status(fake_chip) & IDLE
-    fake_chip.advance(start_ns + 2 * CHARACTER_NS)
-    assert status(fake_chip) & IDLE
-    assert fake_chip.irqs[IRQ]
-    fake_chip.read("USART1.SR")
-    fake_chip.read("USART1.DR")
-    fake_chip.advance(start_ns + 20 * CHARACTER_NS)
-    assert not status(fake_chip) & IDLE
-    assert not fake_chip.irqs[IRQ]
-
-
-def test_more_characters_put_the_idle_flag_off(fake_chip: Any) -> None:
-    set_up(fake_chip)
-    usart = fake_chip.parts.usart(1)
-    usart.receive(b"a")
-    fake_chip.advance(fake_chip.now_ns + CHARACTER_NS * 3 // 2)
-    usart.receive(b"b")
-    fake_chip.advance(fake_chip.now_ns + CHARACTER_NS)
-    assert not status(fake_chip) & IDLE
-
-
-@pytest.mark.parametrize(
-    "before",
-    [
-        lambda c: c.write("USART1.CR1", TE),
-        lambda c: c.write("USART1.BRR", 0),
-        lambda c: c.write("GPIOA.CRH", 0x4444_41B4),
-    ],
-)
-def test_a_receiver_that_is_not_set_up_loses_characters(fake_chip: Any, before: Callable[[Any], None]) -> None:
-    set_up(fake_chip)
-    before(fake_chip)
-    fake_chip.parts.usart(1).receive(b"a")
-    fake_chip.advance(fake_chip.now_ns + 10**6)
-    assert not status(fake_chip) & RXNE
-    assert list(fake_chip.warnings) == ["USART1:rx-off"]
-
-
-def test_a_receiver_switched_off_meanwhile_loses_the_rest(fake_chip: Any) -> None:
-    set_up(fake_chip)
-    fake_chip.parts.usart(1).receive(b"ab")
-    fake_chip.write("USART1.CR1", UE)
-    fake_chip.advance(fake_chip.now_ns + 10**6)
-    assert not status(fake_chip) & (RXNE | IDLE)
-    assert list(fake_chip.warnings) == ["USART1:rx-off"]
-
-
-@pytest.mark.parametrize(
-    ("control", "word", "reads"),
-    [
-        (PCE, 0x41, 0x41),
-        (PCE, 0x43, 0xC3),
-        (PCE | PS, 0x41, 0xC1),
-        (M | PCE, 0x81, 0x081),
-        (M | PCE | PS, 0x81, 0x181),
-        (M, 0x81, 0x081),
-    ],
-)
-def test_parity_takes_the_top_bit(fake_chip: Any, control: int, word: int, reads: int) -> None:
-    sent = set_up(fake_chip, control)
-    fake_chip.parts.usart(1).receive(bytes([word]))
-    fake_chip.write("USART1.DR", 0x1FF)
-    fake_chip.advance(fake_chip.now_ns + 10**6)
-    assert fake_chip.read("USART1.DR") == reads
-    assert sent[0][0] == {PCE: 0x7F, PCE | PS: 0x7F, M: 0x1FF}.get(control, 0xFF)
-
-
 @pytest.mark.parametrize(("enable", "flag"), [(TXEIE, TXE), (TCIE, TC)])
 def test_transmit_interrupts_follow_their_flags(fake_chip: Any, enable: int, flag: int) -> None:
     set_up(fake_chip, enable)
@@ -417,81 +281,3 @@ def test_reset_drops_what_is_on_its_way(fake_chip: Any) -> None:
     fake_chip.advance(fake_chip.now_ns + 10**7)
     assert sent == []
     assert fake_chip.pins["PA9"].output.value == "none"
-
-
-class UsartMachine(RuleBasedStateMachine):
-    """USART1 against a model that counts characters: what goes out, what comes in, what is lost."""
-
-    def __init__(self, chip: Any) -> None:
-        super().__init__()
-        self.chip = chip
-        self.sent = set_up(chip)
-        self.base = len(self.sent)
-        self.written: list[int] = []
-        self.arriving: list[tuple[int, int]] = []
-        self.waiting: int | None = None
-        self.overrun = self.seen_overrun = False
-
-    @initialize()
-    def settle(self) -> None:
-        self.chip.advance(self.chip.now_ns + 1)
-
-    @precondition(lambda self: status(self.chip) & TXE)
-    @rule(word=st.integers(0, 255))
-    def write(self, word: int) -> None:
-        self.chip.write("USART1.DR", word)
-        self.written.append(word)
-
-    @rule(data=st.binary(min_size=1, max_size=3))
-    def receive(self, data: bytes) -> None:
-        at_ns = self.arriving[-1][1] if self.arriving else self.chip.now_ns
-        for word in data:
-            at_ns += CHARACTER_NS
-            self.arriving.append((word, at_ns))
-        self.chip.parts.usart(1).receive(data)
-
-    @rule(share=st.sampled_from([1, 1000, CHARACTER_NS - 1, CHARACTER_NS, 3 * CHARACTER_NS]))
-    def wait(self, share: int) -> None:
-        now_ns = self.chip.now_ns + share
-        self.chip.advance(now_ns)
-        while self.arriving and self.arriving[0][1] <= now_ns:
-            word, _ = self.arriving.pop(0)
-            if self.waiting is None:
-                self.waiting = word
-            else:
-                self.overrun = True
-
-    @rule()
-    def read_status(self) -> None:
-        self.seen_overrun = bool(self.chip.read("USART1.SR") & ORE)
-        assert self.seen_overrun is self.overrun
-
-    @rule()
-    def read_data(self) -> None:
-        word = self.chip.read("USART1.DR")
-        if self.waiting is not None:
-            assert word == self.waiting
-        self.waiting = None
-        if self.seen_overrun:
-            self.overrun = self.seen_overrun = False
-
-    @rule()
-    def copy_and_go_on(self) -> None:
-        self.chip.parts.restore(self.chip.parts.snapshot())
-
-    @invariant()
-    def what_came_out_is_a_prefix_of_what_was_written(self) -> None:
-        words = [word for word, _ in self.sent]
-        assert words == self.written[: len(words)]
-        assert len(self.written) - len(words) <= 2
-        assert bool(status(self.chip) & RXNE) is (self.waiting is not None)
-
-    def teardown(self) -> None:
-        self.chip.advance(self.chip.now_ns + 3 * CHARACTER_NS)
-        assert [word for word, _ in self.sent] == self.written
-        times = [at for _, at in self.sent]
-        assert all(later - earlier >= CHARACTER_NS for earlier, later in itertools.pairwise(times))
-
-
-def test_no_character_is_invented_lost_or_swapped(make_fake_chip: Callable[[], Any]) -> None:
-    run_state_machine_as_test(lambda: UsartMachine(make_fake_chip()), settings=QUICK)

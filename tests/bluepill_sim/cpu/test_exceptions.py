@@ -230,3 +230,24 @@ def test_icsr_and_shcsr_tell_the_handler_that_runs(run) -> None:
         {11: "handler"},
     )
     assert machine.log == [11 | 1 << 11, 1 << 7, 11]
+
+
+@pytest.mark.parametrize("number", [43, 45, 100, 0x1FF])
+def test_a_software_request_for_an_interrupt_that_does_not_exist_is_ignored(run, number: int) -> None:
+    machine = run(
+        store(STIR, number) + f"isb\nmov32 r1, #{ISPR0}\nldr r0, [r1, #0]\nlog r0\nldr r0, [r1, #4]\nlog r0\n"
+        f"mov32 r1, #{ICSR}\nldr r0, [r1, #0]\nmovs r2, #1\nmov32 r2, #0x7FF000\n.half 0x4010\nlog r0"
+    )
+    assert machine.log == [0, 0, 0]
+
+
+def test_a_software_request_pends_the_interrupt_of_its_number(run) -> None:
+    machine = run(store(STIR, 42) + f"isb\nmov32 r1, #{ISPR0}\nldr r0, [r1, #4]\nlog r0")
+    assert machine.log == [1 << 10]
+
+
+@pytest.mark.parametrize("bit", [1 << 0, 1 << 1])
+def test_what_aircr_keeps_for_debuggers_is_ignored_and_warned_of(run, bit: int) -> None:
+    machine = run(store(AIRCR, 0x05FA0000 | bit) + "log #1")
+    assert machine.log == [1]
+    assert len(machine.board.warnings) == 1
