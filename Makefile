@@ -53,14 +53,15 @@ firmware: setup
 	$(BIN)/python testbench/firmware/build.py
 
 # The adapter board: `make board` writes every file anew from the design, then checks them; `make board-check` only
-# checks. KiCad 9 and ngspice are installed where apt and root allow it; what is missing is skipped aloud.
+# checks. KiCad 9 and ngspice are installed where apt and root allow it; what is missing is skipped aloud, or fails
+# with BOARD_CHECK=--strict.
 board: board-tools
 	$(BIN)/python -m hardware.pcb build
 	$(BIN)/python -m hardware.pcb simulate
 	$(BIN)/python -m hardware.pcb check
 
 board-check: board-tools
-	$(BIN)/python -m hardware.pcb check
+	$(BIN)/python -m hardware.pcb check $(BOARD_CHECK)
 
 board-tools: setup
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt -e '.[board]'

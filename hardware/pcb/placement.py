@@ -201,6 +201,6 @@ _TEXTS_OF: dict[str, list[Label]] = {
     "rev-c": [],
     "lm317": [
         Label(layer="F.SilkS", text="REV B LM317", at_mm=(50.0, 3.2), size_mm=1.2),
-        Label(layer="F.SilkS", text="5V: max 250 mA", at_mm=(50.0, 5.4), size_mm=0.9),
+        Label(layer="F.SilkS", text="5V: 150mA, peaks 250mA", at_mm=(50.0, 5.4), size_mm=0.8),
     ],
 }

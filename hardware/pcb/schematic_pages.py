@@ -79,9 +79,9 @@ _SUPPLY = {
     "J2": (18, 66), "D3": (36, 65), "JP1": (80, 68), "C4": (98, 70),
     "D4": (138, 64), "D5": (138, 74), "R61": (182, 72), "D6": (200, 72),
     # Buck and LM317 share the place: a variant has one of them.
-    "U3": (138, 26), "C3": (162, 29),
+    "U3": (138, 26), "C3": (178, 29),
     "R68": (154, 40), "R69": (172, 40), "C11": (196, 32),
-    "U4": (38, 104), "R70": (56, 118), "R71": (74, 118), "C12": (62, 107), "C13": (88, 121),
+    "U4": (38, 104), "R70": (56, 118), "R71": (74, 118), "C12": (80, 104), "C13": (96, 118),
 }  # fmt: skip
 _SERIAL = {
     "U5": (64, 40), "C5": (18, 40), "C6": (30, 40), "C7": (96, 40), "C8": (110, 40), "C9": (124, 40), "J3": (156, 40),
@@ -112,7 +112,7 @@ _BUCK_FRAMES = [
           note="The 3.3 V of this board comes from the ESP32 module's own regulator.")
 ]  # fmt: skip
 _LINEAR_FRAMES = [
-    Frame(title="12 V to 5 V, LM317: 250 mA on average, not more", left=116, top=12, right=224, bottom=50,
+    Frame(title="12 V to 5 V, LM317: 150 mA on average, 250 mA in peaks", left=116, top=12, right=224, bottom=50,
           note="5.02 V; 10.4 mA through the divider: above the minimum load."),
     Frame(title="12 V to 3.3 V, LM317: transceiver and LEDs only", left=10, top=92, right=112, bottom=132,
           note="3.34 V; the ESP32 keeps its own 3.3 V regulator."),
