@@ -63,12 +63,21 @@ def _build(_: argparse.Namespace) -> int:
             target = build.GENERATED / variant / f"{variant}-gerbers.zip"
             target.write_bytes(build.archive(files))
             print(f"{target.name}: {len(files)} files, {target.stat().st_size} bytes")
+            _write_reports(variant, board)
             for path in pictures.board_pictures(variant, board):
                 print(f"{path.name}: {path.stat().st_size} bytes")
     for variant in VARIANTS:
+        if variant not in BOARD_VARIANTS:
+            _write_reports(variant, None)
         for path in pictures.schematic_pictures(variant):
             print(f"{path.name}: {path.stat().st_size} bytes")
     return 0
+
+
+def _write_reports(variant: str, board: Path | None) -> None:
+    folder = build.GENERATED / variant
+    for name, text in kicad.reports(variant, folder / f"{variant}.kicad_sch", board).items():
+        (folder / name).write_text(text, encoding="utf-8", newline="\n")
 
 
 def _check(given: argparse.Namespace) -> int:

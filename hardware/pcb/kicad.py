@@ -88,6 +88,17 @@ def drc(board: Path) -> list[Violation]:
     return [_violation(entry) for group in groups for entry in found[group]]
 
 
+def reports(variant: str, schematic: Path, board: Path | None) -> dict[str, str]:
+    """Return KiCad's own reports of both rule checks by file name, without their dates; no board, no second report."""
+    with tempfile.TemporaryDirectory() as folder:
+        erc_file, drc_file = Path(folder) / f"{variant}-erc.rpt", Path(folder) / f"{variant}-drc.rpt"
+        run("sch", "erc", "--severity-all", "-o", erc_file, schematic)
+        if board is not None:
+            run("pcb", "drc", "--severity-all", "--schematic-parity", "-o", drc_file, board)
+        files = (erc_file, drc_file) if board is not None else (erc_file,)
+        return {file.name: without_dates(file.read_text(encoding="utf-8")) for file in files}
+
+
 def netlist(schematic: Path) -> dict[str, list[tuple[str, str]]]:
     """Return the nets that KiCad reads from a schematic: name to sorted (reference, pin)."""
     with tempfile.TemporaryDirectory() as folder:
@@ -127,6 +138,7 @@ def picture(board: Path, file: Path, *arguments: str) -> None:
 
 _DATED = re.compile(
     r"CreationDate|Created by KiCad|GenerationSoftware|DRILL file|FORMAT=.*date|^; #@! TF\.CreationDate"
+    r"|^ERC report \(|^\*\* Created on"
 )
 
 

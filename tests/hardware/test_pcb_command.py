@@ -6,6 +6,7 @@ import pytest
 
 from hardware.pcb import __main__ as command
 from hardware.pcb import build, checks, kicad, pictures
+from hardware.pcb.design import VARIANTS
 from hardware.pcb.report import Verdict, judged, skipped
 from hardware.pcb.routing import RoutingError
 from hardware.pcb.spice.deck import Deck, limits
@@ -46,17 +47,19 @@ def test_build_without_kicad_renews_the_sources_and_says_what_stays(capsys, monk
 def test_build_with_kicad_writes_the_archives_and_pictures(capsys, monkeypatch, tmp_path) -> None:
     picture = tmp_path / "top.png"
     picture.write_bytes(b"1234")
-    for variant in ("rev-b", "lm317"):
+    for variant in VARIANTS:
         (tmp_path / variant).mkdir()
     monkeypatch.setattr(build, "GENERATED", tmp_path)
     monkeypatch.setattr(build, "write_sources", list)
     monkeypatch.setattr(kicad, "version", lambda: "9.0.8")
     monkeypatch.setattr(build, "filled_project", lambda variant, folder: Path(folder) / f"{variant}.kicad_pcb")
     monkeypatch.setattr(build, "fabrication_files", lambda *_: {"a.gbr": "one"})
+    monkeypatch.setattr(kicad, "reports", lambda variant, *_: {f"{variant}-erc.rpt": "0"})
     monkeypatch.setattr(pictures, "board_pictures", lambda *_: [picture])
     monkeypatch.setattr(pictures, "schematic_pictures", lambda _: [picture])
     assert command.main(["build"]) == 0
     assert "rev-b-gerbers.zip: 1 files" in capsys.readouterr().out
+    assert (tmp_path / "rev-c" / "rev-c-erc.rpt").read_text(encoding="utf-8") == "0"
     assert (tmp_path / "lm317" / "lm317-gerbers.zip").read_bytes() == build.archive({"a.gbr": "one"})
 
 

@@ -6,7 +6,7 @@ import zipfile
 import pytest
 
 from hardware.pcb import build, kicad, kicad_checks, pictures, pours
-from hardware.pcb.design import VARIANTS
+from hardware.pcb.design import BOARD_VARIANTS, VARIANTS
 from hardware.pcb.design import build as design_of
 from hardware.pcb.footprints import FOOTPRINTS
 from hardware.pcb.pours import KicadMissingError, fill, kicad_python
@@ -90,6 +90,24 @@ def test_fabrication_files_lose_their_dates(fake_kicad, tmp_path) -> None:
     assert files == {"board-F_Cu.gtl": "G01*\n", "board-PTH.drl": "G01*\n"}
     monkeyed = kicad_checks.gerbers_up_to_date("rev-b", files)
     assert monkeyed.verdict is Verdict.BAD
+
+
+def test_reports_lose_their_dates_and_are_named_by_variant(fake_kicad, tmp_path) -> None:
+    fake_kicad("ERC report (2025-01-01, Encoding UTF8)\n** Created on 2025-01-01 **\n** ERC messages: 0\n")
+    board = tmp_path / "rev-b.kicad_pcb"
+    assert kicad.reports("rev-b", tmp_path / "rev-b.kicad_sch", board) == {
+        "rev-b-erc.rpt": "** ERC messages: 0\n", "rev-b-drc.rpt": "** ERC messages: 0\n"}  # fmt: skip
+    assert list(kicad.reports("rev-c", tmp_path / "rev-c.kicad_sch", None)) == ["rev-c-erc.rpt"]
+
+
+@pytest.mark.parametrize("variant", VARIANTS)
+def test_the_committed_reports_are_empty(variant: str) -> None:
+    folder = build.GENERATED / variant
+    assert "ERC messages: 0  Errors 0  Warnings 0" in (folder / f"{variant}-erc.rpt").read_text(encoding="utf-8")
+    if variant in BOARD_VARIANTS:
+        report = (folder / f"{variant}-drc.rpt").read_text(encoding="utf-8")
+        for line in ("Found 0 DRC violations", "Found 0 unconnected pads", "Found 0 Footprint errors"):
+            assert line in report
 
 
 def test_a_failing_kicad_is_quoted(fake_kicad, tmp_path) -> None:
