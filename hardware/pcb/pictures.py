@@ -17,10 +17,11 @@ _PAGE_DPI = 110
 _SIDES = {
     "top": ("--side", "top"),
     "bottom": ("--side", "bottom"),
-    "view": ("--rotate", "-48,0,-25", "--perspective", "--zoom", "0.62"),
+    # Without perspective, for with it KiCad draws another picture each time.
+    "view": ("--rotate", "-48,0,-25", "--zoom", "0.62"),
 }
 #: What of the picture at an angle is not sky: left, top, right, bottom.
-_CROP = (45, 230, 880, 860)
+_CROP = (60, 190, 920, 790)
 
 
 def board_pictures(variant: str, board: Path) -> list[Path]:
