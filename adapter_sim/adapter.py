@@ -22,6 +22,7 @@ from adapter_sim.masters import Masters
 from adapter_sim.outputs import Outputs
 from adapter_sim.pinout import Pinout, Role
 from adapter_sim.ports import EventCallback, PinBank
+from adapter_sim.sample_clock import SampleClock
 from adapter_sim.session import Session, SessionOpened
 from adapter_sim.settings import AdapterSettings
 from adapter_sim.states import AWAKE_STATES, NEVER, OPEN_STATES, STOPPING_STATES, AdapterState, AdapterStatus, Agenda
@@ -61,7 +62,7 @@ class Adapter:
         self.parameters = parameters
         self.settings = settings = settings or AdapterSettings()
         self.on_event = on_event
-        self._sample_period_ns = settings.sample_period_ns
+        self.samples = SampleClock(settings.sample_period_ns)
         self._driver = Driver(settings, parameters)
         self.distances = Distances(
             len(pinout.with_role(Role.DISTANCE)),
@@ -176,12 +177,15 @@ class Adapter:
             if self.inputs.is_reset(limit) != (self._state is AdapterState.RESET):
                 self._turn_reset(limit)
                 self._replan()
+            elif self.samples.is_asleep and not self.inputs.is_quiet(limit):
+                self._replan()
+                self._run(limit)
         return Reached(limit)
 
     def snapshot(self) -> dict[str, object]:
         """Return all that decides the future, as plain values."""
         return {
-            "adapter": (self._state.value, self._reason, self._now, self._next_sample, self._baud_place),
+            "adapter": (self._state.value, self._reason, self._now, self.samples.next, self._baud_place),
             "agenda": replace(self._agenda),
             "masters": self._masters.snapshot(),
             "stopper": self._stopper.snapshot(),
@@ -195,9 +199,10 @@ class Adapter:
     def restore(self, snapshot: object) -> None:
         """Put back what `snapshot` returned."""
         parts = cast("dict[str, Any]", snapshot)
-        state, self._reason, self._now, self._next_sample, self._baud_place = parts["adapter"]
+        state, self._reason, self._now, self.samples.next, self._baud_place = parts["adapter"]
         self._state = AdapterState(state)
         self._agenda = replace(parts["agenda"])
+        self.samples.is_asleep = False
         self._masters.restore(parts["masters"])
         self._stopper.restore(parts["stopper"])
         self._driver.restore(parts["driver"])
@@ -207,8 +212,6 @@ class Adapter:
         self.session.restore(parts["session"])
         self._replan()
 
-    # Time ------------------------------------------------------------------------------------------------
-
     def _run(self, limit: Nanos) -> Nanos | None:
         """Act on all that is due; return the last instant at which the pins were looked at, None for none."""
         now = None
@@ -216,9 +219,10 @@ class Adapter:
             now = self._deadline
             if now < self._other and not self._is_restless and self.inputs.is_quiet(now):
                 self._now = now
-                self._next_sample = now + self._sample_period_ns
-                self._deadline = min(self._next_sample, self._other)
+                self.samples.was_quiet(now)
+                self._deadline = self.samples.due(self._other)
             else:
+                self.samples.wake(now)
                 self._act(now)
                 self._replan()
         return now
@@ -235,11 +239,11 @@ class Adapter:
         if self.inputs.is_reset(now) != (self._state is AdapterState.RESET):
             self._turn_reset(now)
         if self._state is AdapterState.RESET:
-            self._next_sample = now + self._sample_period_ns
+            self.samples.after(now)
             return
         if self._state is AdapterState.BOOTING:
             if now < self._agenda.boot_at:
-                self._next_sample = now + self._sample_period_ns
+                self.samples.after(now)
                 return
             self._boot(now)
         self._work(now)
@@ -248,9 +252,9 @@ class Adapter:
         """Do all that is due while awake."""
         self.session.advance_to(now)
         self._take_session_events(now)
-        if now >= self._next_sample:
+        if now >= self.samples.next:
             self._sample(now)
-            self._next_sample = now + self._sample_period_ns
+            self.samples.after(now)
         if (lost_at := self._masters.pad_lost_at) is not None and now >= lost_at:
             self._lose_pad(now)
         if self._state in OPEN_STATES:
@@ -279,16 +283,17 @@ class Adapter:
             # No reading for as long as one lives: SONAR 1 was lost, or somebody switched them off.
             self.session.send(sonar(on=True), now)
             self._agenda.sonar_at = now + self.settings.distance_stale_ns
-        self._walk(now)
+        self.outputs.show_encoders(self._codes.walk(now), now)
         if self._state is AdapterState.DRIVING and now >= self._driver.pair_due_at(now):
             self._send_pair(now)
 
     def _replan(self) -> None:
         """Find the next deadline; `_other` is the earliest that is no sample."""
+        self.samples.wake(self._now)
         state = self._state
         if state not in AWAKE_STATES:
             # Only rst is looked at; `_other` keeps these instants off the fast path.
-            self._other = self._deadline = min(self._agenda.boot_at, self._next_sample)
+            self._other = self._deadline = min(self._agenda.boot_at, self.samples.next)
             return
         times = [self.session.next_deadline(), self._masters.pad_lost_at]
         if state in OPEN_STATES:
@@ -301,15 +306,13 @@ class Adapter:
         if state in {AdapterState.CLOSING, AdapterState.CONNECTING}:
             times.append(self._agenda.retry_at)
         self._other = min((time for time in times if time is not None), default=NEVER)
-        self._deadline = min(self._next_sample, self._other)
-
-    # Transitions -----------------------------------------------------------------------------------------
+        self._deadline = self.samples.due(self._other)
 
     def _clear(self) -> None:
         """Forget everything, as a reset does."""
         self._agenda = Agenda()
         self._stopper.reset()
-        self._next_sample = self._now
+        self.samples.next = self._now
         self._masters.reset()
         self._driver.reset(self._now)
         self.distances.forget()
@@ -326,14 +329,14 @@ class Adapter:
             return
         self._clear()
         self.outputs.release(now)
-        self._next_sample = now + self._sample_period_ns
+        self.samples.after(now)
         self._enter(AdapterState.RESET, now, "reset", "rst is high")
 
     def _boot(self, now: Nanos) -> None:
         self.outputs.show_safe(now)
         self.outputs.show_encoders((0, 0), now)
         self.session.stop_unknown()
-        self._next_sample = now
+        self.samples.next = now
         self._enter(AdapterState.IDLE, now, "booted", "waits for its master's wish")
 
     def _begin_session(self, now: Nanos, why: str) -> None:
@@ -391,7 +394,7 @@ class Adapter:
         if stalled != self._agenda.stalled:
             self._agenda.stalled = stalled
             self._tell(now, "stall", f"left {int(stalled[0])}, right {int(stalled[1])}")
-        self._walk(now)
+        self.outputs.show_encoders(self._codes.walk(now), now)
 
     def _drive(self, now: Nanos) -> None:
         self._driver.begin(self._masters.speeds, now)
@@ -430,8 +433,6 @@ class Adapter:
         if self.on_event is not None:
             self.on_event(now, what, detail)
 
-    # Work ------------------------------------------------------------------------------------------------
-
     def _sample(self, now: Nanos) -> None:
         have_speeds_changed, has_wish_ended = self._masters.sample(now)
         if have_speeds_changed and self._state is AdapterState.DRIVING:
@@ -440,9 +441,6 @@ class Adapter:
             self._end_wish("p2dx_con is low", now)
         if self._state is AdapterState.LOST and not self._masters.wants_robot:
             self._enter(AdapterState.IDLE, now, "idle", "ready for a new connection")
-
-    def _walk(self, now: Nanos) -> None:
-        self.outputs.show_encoders(self._codes.walk(now), now)
 
     def _send_pair(self, now: Nanos) -> None:
         if self._driver.send_pair(self.session, now):

@@ -42,6 +42,11 @@ class Inputs:
         return values[0], values[1]
 
     @property
+    def wires(self) -> tuple[str, ...]:
+        """Return the names of all wires that are looked at."""
+        return (*(name for name, _ in self._wires), self._reset_wire)
+
+    @property
     def wants_robot(self) -> bool:
         """Tell whether p2dx_con counts as high."""
         return self._connect.level

@@ -16,6 +16,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Protocol, cast
 
+from adapter_sim import Adapter
 from adapter_sim.pinout import Pinout, Pull, Role, load_pinout
 from p2os.pioneer.body import RobotBody, make_body
 from p2os.pioneer.controller import Pioneer
@@ -114,9 +115,19 @@ class Bench:
         pins = ChipPins(chip, harness, pin_of, on_watched=self.loop.note_edge)
         for wire in pinout.with_role(Role.RESET):
             pins.watch(wire.name)
+        self._wake_adapter_by_edges(pins, harness)
         chip.usart1.on_transmit = lambda byte, at: self.recorder.usart(bytes([byte]), at)
         chip.on_warning = lambda text: self.recorder.event("chip", chip.now_ns, "warning", text)
         self.recorder.start()
+
+    def _wake_adapter_by_edges(self, pins: ChipPins, harness: Harness) -> None:
+        """Let a model of the adapter that looks at settled pins wait for their edges instead of sampling on."""
+        adapter = self.parts.adapter
+        if isinstance(adapter, Adapter):
+            adapter.samples.waits_for_edges = True
+            for name in adapter.inputs.wires:
+                pins.watch(name)
+                harness[name].watch(lambda _net, _owner, at: self.loop.note_edge(at))
 
     @property
     def chip(self) -> Chip:
