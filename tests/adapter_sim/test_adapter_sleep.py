@@ -19,7 +19,8 @@ def story(steps: list[tuple[str, int, int]], *, sleeps: bool) -> list[object]:
         elif what != "wait":
             rig.pins.set(what, bool(value & 1), rig.now)
         rig.adapter.advance_to(rig.now)  # brought to the edge
-        rig.ms(span / 10)
+        # Never an edge at a sample instant itself: there, who is asked first decides.
+        rig.run(rig.now + span * MS // 10 + 37)
     return [rig.to_robot.log, rig.events, rig.adapter.state, rig.adapter.status, rig.pins.writes]
 
 
