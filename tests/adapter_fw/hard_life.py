@@ -115,6 +115,11 @@ class HardLife:
             self.rig.run(self.rig.now + 20 * MS)
             self._check()
 
+    def drain(self) -> None:
+        """Let what is on its way arrive, and what has begun be given up (250 ms of silence)."""
+        self.rig.to_adapter.cut = True
+        self.rig.run(self.rig.now + 330 * MS)
+
     def _unplug(self) -> None:
         self.counts["unplugged"] += 1
         self.rig.to_robot.cut = self.rig.to_adapter.cut = True

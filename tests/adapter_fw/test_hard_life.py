@@ -65,6 +65,7 @@ def test_five_percent_of_packets_are_damaged_and_about_one_an_hour_passes_its_su
 
 def lives_well(life: HardLife, span_ns: int, *, unplug: int, reboot: int, fool: int) -> None:
     life.live(span_ns, unplug=unplug, reboot=reboot, fool=fool)
+    life.drain()
     counts, back = life.counts, life.back
     assert (counts["unplugged"], counts["reboots"]) == (unplug, reboot)
     assert counts["losses"] >= (unplug + reboot) // 4
@@ -82,8 +83,7 @@ def lives_well(life: HardLife, span_ns: int, *, unplug: int, reboot: int, fool: 
     # Each frame is either taken or counted as rejected; one an hour passes that should not.
     numbers = life.rig.adapter.numbers
     whole = back.frames - back.damaged
-    assert whole - numbers["frames"] <= 0
-    assert numbers["frames"] - whole <= 10
+    assert 0 <= numbers["frames"] - whole <= 10
     rejected = numbers["bad_checksums"] + numbers["bad_counts"] + numbers["stalled"]
     assert rejected + numbers["noise_bytes"] >= back.damaged
     assert numbers["bad_checksums"] > back.damaged // 2
