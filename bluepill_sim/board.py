@@ -2,7 +2,7 @@
 
 This is the package's face. It loads the image, hands out pins and serial
 ports, and tells of faults and warnings. The board itself: 8 MHz crystal,
-32 kHz crystal, an LED on PC13 with its resistor to 3.3 V, BOOT1 (PB2) pulled low.
+32 kHz crystal, an LED on PC13 with its resistor to 3.3 V, BOOT0 low, BOOT1 (PB2) pulled low: both are jumpers.
 
 Invariant: results do not depend on how the caller cuts time into slices.
 """
@@ -21,7 +21,7 @@ from bluepill_sim.memory import Memory
 from bluepill_sim.pins import Pin, PinDrive
 from bluepill_sim.rcc import ResetCause
 from bluepill_sim.serial_port import Activity, SerialPort
-from bluepill_sim.stm32f103 import FLASH_BASE
+from bluepill_sim.stm32f103 import FLASH_BASE, SRAM_BASE
 from bluepill_sim.timing import Nanos, Reached
 from bluepill_sim.waiting import Condition, run_for, until, wait_for_bytes
 
@@ -36,6 +36,7 @@ class BoardSnapshot:
     warned: tuple[tuple[str, str], ...]
     #: What each USART has sent and nobody has taken.
     unread: tuple[bytes, ...]
+    boot0: bool = False
 
 
 class BluePill:
@@ -62,6 +63,8 @@ class BluePill:
         self._strict = strict
         self._warned: dict[str, str] = {}
         self._vector_offset = self.image.vector_table - FLASH_BASE
+        #: The BOOT0 jumper; looked at, with BOOT1 (PB2), at each reset: 0x flash, 11 SRAM, 10 ST's boot loader.
+        self.boot0 = False
         #: Called with each new warning.
         self.on_warning: Callable[[str], None] | None = None
         #: Called with (pin, drive, ns) at every change of what the chip itself puts on a pin.
@@ -78,6 +81,7 @@ class BluePill:
         #: More of the same: tools that look on.
         self.pin_listeners: list[Callable[[str, PinDrive, Nanos], None]] = []
         self._usarts = tuple(SerialPort(chip.parts.usart(n), self._activity, self._wait) for n in (1, 2, 3))
+        chip.boot_address = self._boot_address
         chip.pins.on_output = self._pin_changed
         chip.pins.is_heard = lambda: self.on_pin is not None or bool(self.pin_listeners)
         chip.pins.on_silent_output = self._pins_changed_silently
@@ -238,6 +242,7 @@ class BluePill:
             (activity.last_pin_ns, activity.last_usart_ns, activity.last_wfi_ns),
             tuple(self._warned.items()),
             tuple(bytes(port.unread) for port in self._usarts),
+            self.boot0,
         )
 
     def restore(self, snapshot: object) -> None:
@@ -250,6 +255,7 @@ class BluePill:
             raise TypeError(f"not a BluePill's snapshot: {type(snapshot).__name__}")
         self._live.restore(snapshot.chip)
         self.fault = snapshot.fault
+        self.boot0 = snapshot.boot0
         self._activity.last_pin_ns, self._activity.last_usart_ns, self._activity.last_wfi_ns = snapshot.activity
         self._warned = dict(snapshot.warned)
         for port, unread in zip(self._usarts, snapshot.unread, strict=True):
@@ -262,6 +268,17 @@ class BluePill:
         if self._chip is None:
             raise RuntimeError("the chip is still being made")
         return self._chip
+
+    def _boot_address(self) -> int:
+        """Return where the BOOT pins have a reset start (RM0008 3.4, table 9)."""
+        if not self.boot0:
+            return self.image.vector_table
+        if self.pin("PB2").level:
+            return SRAM_BASE
+        raise UnmodelledError(
+            "BOOT0 is set and BOOT1 is not: the chip would start ST's boot loader, which is not modelled",
+            hint="clear boot0 for the flash, or drive PB2 high for the SRAM",
+        )
 
     def _pin_changed(self, name: str, drive: PinDrive, at_ns: Nanos) -> None:
         self._activity.last_pin_ns = at_ns

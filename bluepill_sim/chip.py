@@ -58,7 +58,8 @@ class Chip:
             on_fault: told of each HardFault and lockup.
         """
         self.memory = memory
-        self._vector_table = vector_table
+        #: Returns where the vectors are that a reset starts at: what the BOOT pins say.
+        self.boot_address: Callable[[], int] = lambda: vector_table
         self._on_warning = on_warning
         self.clocks = Clocks()
         self._clock = CycleClock(self.clocks.hclk_hz)
@@ -168,13 +169,14 @@ class Chip:
     def reset(self, cause: ResetCause) -> None:
         """Reset core and peripherals; time goes on. A power cut clears the SRAM too."""
         self._requested_reset = None
+        vectors = self.boot_address()
         if cause is ResetCause.POWER:
             self.memory.lose_power()
             self.engine.drop_code(SRAM_BASE, SRAM_BYTES)
         self.parts.reset(cause)
         self.system.reset()
         # A program at the start of the flash is found through its alias at 0, where VTOR points after a reset.
-        self.processor.reset(0 if self._vector_table == FLASH_BASE else self._vector_table)
+        self.processor.reset(0 if vectors == FLASH_BASE else vectors)
         self._deadlines_moved = True
 
     # What the peripherals ask for.
