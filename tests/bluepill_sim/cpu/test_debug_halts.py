@@ -197,6 +197,40 @@ def test_watchpoints_tell_reads_from_writes_and_see_parts_of_words(boot) -> None
         Watchpoint(DATA, 0)
 
 
+def test_a_step_over_a_watched_access_tells_of_it(boot) -> None:
+    machine = boot(f"mov32 r6, #{DATA}\nw: str r6, [r6, #0]\nmovs r1, #1")
+    engine = machine.board.chip.engine
+    engine.breakpoints.add(machine.label("w"))
+    machine.board.advance_to(MS)
+    engine.watchpoints.add(Watchpoint(DATA, 4))
+    halt = machine.board.chip.step(MS).halt
+    assert halt == Halt(HaltKind.WATCHPOINT, machine.label("w") + 2, DATA)
+    assert machine.board.chip.step(MS).halt == Halt(HaltKind.STEP, machine.label("w") + 4)
+
+
+def test_a_watched_access_that_ends_the_block_by_itself_is_told_of_too(boot) -> None:
+    """POP {PC} of an exception return reads the watched word, then leaves the handler."""
+    machine = boot("svc #0\nback: nop\nb stop\ncall: push {lr}\nnop\npop {pc}", {11: "call"})
+    board = machine.board
+    board.chip.engine.breakpoints.add(machine.label("call") + 2)
+    board.advance_to(MS)
+    board.chip.engine.watchpoints.add(Watchpoint(board.register("SP"), 4, WatchKind.READ))
+    assert board.advance_to(MS).halt == Halt(HaltKind.WATCHPOINT, machine.label("back"), 0x2000_4FDC)
+
+
+def test_a_step_over_a_write_to_flash_makes_it_once(boot) -> None:
+    """Programmed twice, the halfword would be an error: only zero goes over what is not erased."""
+    unlock = store(0x4002_2004, 0x45670123) + store(0x4002_2004, 0xCDEF89AB) + store(0x4002_2010, 1)
+    machine = boot(unlock + "mov32 r1, #0x08008000\nmov32 r2, #0x1234\nw: strh r2, [r1, #0]\nldr r3, [r1, #0]\nnop")
+    machine.board.chip.engine.breakpoints.add(machine.label("w"))
+    machine.board.advance_to(MS)
+    assert machine.board.chip.step(MS).halt == Halt(HaltKind.STEP, machine.label("w") + 2)
+    assert machine.board.read_memory(0x0800_8000, 2) == b"\x34\x12"
+    machine.board.advance_to(MS)
+    assert machine.board.register("R3") == 0xFFFF_1234
+    assert not machine.board.chip.parts.flash.words[3] & 1 << 2  # PGERR
+
+
 @pytest.mark.parametrize("before", ["", "cmp r2, #65\nit eq\n"])
 def test_a_watched_access_to_a_peripheral_is_made_once(boot, before: str) -> None:
     """DR of USART1: written twice it would send two characters."""

@@ -157,7 +157,10 @@ def test_a_watchdog_resets_at_the_first_border_at_its_time(boot) -> None:
     assert machine.board.pc == machine.label("start")
 
 
-def test_a_program_that_feeds_its_watchdog_lives(boot) -> None:
-    feed = "mov32 r2, #0xAAAA\nfeed: str r2, [r1, #0]\nmov32 r3, #500000\nd: subs r3, #1\nbne d\nb feed"
-    machine = boot(TELL + START_IWDG + feed).run(500_000)
-    assert len(starts(machine)) == 1
+@pytest.mark.parametrize(("rounds", "count"), [(13_000, 1), (30_000, 2)])
+def test_a_program_that_feeds_its_watchdog_in_time_lives(boot, rounds: int, count: int) -> None:
+    """Ten milliseconds: 13000 rounds of three cycles of 125 ns are 4.9 ms, 30000 are 11.3 ms."""
+    ten_ms = store(IWDG_KR, 0x5555) + store(IWDG_KR + 8, 99)
+    feed = f"mov32 r2, #0xAAAA\nfeed: str r2, [r1, #0]\nmov32 r3, #{rounds}\nd: subs r3, #1\nbne d\nb feed"
+    machine = boot(TELL + ten_ms + START_IWDG + feed).run(60_000)
+    assert len(starts(machine)) == count
