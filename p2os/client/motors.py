@@ -14,6 +14,8 @@ from p2os.timing import NS_PER_MS, Nanos
 ENABLE_TIMES, ENABLE_EVERY_NS = 3, 200 * NS_PER_MS
 #: chosen: flags that say off are believed only so long after ENABLE: three packets.
 GRACE_NS: Nanos = 800 * NS_PER_MS
+#: Why motors went off, as the flags tell it.
+BUTTON_IS_PRESSED, BUTTON_WAS_PRESSED = "the STOP button is pressed", "the STOP button was pressed"
 
 
 class Motors:
@@ -56,9 +58,11 @@ class Motors:
         """Take a state; return why the motors went off, once."""
         if state.motors_enabled:
             self._left, self._due = 0, None
+        if self.taken_off == BUTTON_IS_PRESSED and not state.stop_button:
+            self.taken_off = BUTTON_WAS_PRESSED
         if not self.are_on or state.motors_enabled is not False or now - self._asked_at < GRACE_NS:
             return None
         self.are_on = False
         self._left, self._due = 0, None
-        self.taken_off = "the STOP button is pressed" if state.stop_button else "they were switched off at the robot"
+        self.taken_off = BUTTON_IS_PRESSED if state.stop_button else "they were switched off at the robot"
         return self.taken_off

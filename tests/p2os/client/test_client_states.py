@@ -10,7 +10,8 @@ from hypothesis import strategies as st
 
 from p2os.client.core import RobotCore, guess_profile
 from p2os.client.goals import TurnAxis
-from p2os.client.notices import PacketArrived, RobotUnknown
+from p2os.client.motors import Motors
+from p2os.client.notices import OdometryDoubtful, PacketArrived, RobotUnknown
 from p2os.client.observer import Observer, bumpers_of, limits_of
 from p2os.client.pose import PoseKeeper
 from p2os.client.settings import ClientSettings
@@ -22,6 +23,7 @@ from p2os.packets import RawPacket
 from p2os.parameters import ParametersError, RobotParameters
 from p2os.profiles import Profile
 from p2os.sip import SonarReading, StandardSip
+from p2os.timing import NS_PER_S
 
 P2DX = parameters()
 
@@ -203,3 +205,39 @@ def test_packets_of_other_kinds_come_through() -> None:
 def test_a_setting_out_of_range_is_refused(change: dict[str, int], text: str) -> None:
     with pytest.raises(UsageError, match=text):
         ClientSettings(**change)  # type: ignore[arg-type]
+
+
+def test_motors_that_the_stop_button_took_off_say_whether_it_is_still_pressed() -> None:
+    observer, motors = Observer(P2DX), Motors()
+    observer.profile = Profile.ARCOS
+
+    def flags(bits: int, now: int) -> str | None:
+        return motors.take(observer.take(StandardSip(raw_flags=bits), now), now)
+
+    motors.ask(on=True, now=0)
+    assert flags(0b000001, NS_PER_S) is None
+    assert flags(0b100000, 2 * NS_PER_S) == "the STOP button is pressed"
+    assert flags(0b100000, 3 * NS_PER_S) is None, "once"
+    assert motors.taken_off == "the STOP button is pressed"
+    assert flags(0, 4 * NS_PER_S) is None
+    assert motors.taken_off == "the STOP button was pressed"
+    motors.ask(on=True, now=5 * NS_PER_S)
+    assert flags(0b000001, 6 * NS_PER_S) is None
+    assert flags(0, 7 * NS_PER_S) == "they were switched off at the robot"
+
+
+@pytest.mark.parametrize(("gap_s", "is_doubtful"), [(0.1, False), (1.5, False), (1.9, True), (19.0, True)])
+def test_a_gap_in_which_the_robot_could_have_turned_half_round_is_told(gap_s: float, is_doubtful: bool) -> None:
+    rig = Rig(settings=ClientSettings(liveness_ns=30 * NS_PER_S)).connect()
+    rig.run(1)
+    # 100 deg/s turn half round in 1.8 s.
+    observer, now = rig.core._observer, rig.now
+    observer.take(StandardSip(), now)
+    observer.take(StandardSip(), now + round(gap_s * NS_PER_S))
+    assert (observer.doubtful_gap_ns(rig.core.limits) is not None) is is_doubtful
+    assert rig.notices(OdometryDoubtful) == []
+    rig.is_cut = True
+    rig.run(gap_s)
+    rig.is_cut = False
+    rig.run(0.5)
+    assert bool(rig.notices(OdometryDoubtful)) is is_doubtful
