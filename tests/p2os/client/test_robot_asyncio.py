@@ -128,7 +128,7 @@ def test_a_task_that_is_cancelled_in_a_drive_stops_the_robot_and_the_block_goes_
             with pytest.raises(asyncio.CancelledError):
                 await driving
             assert stop() in recorder.said
-            while served.is_moving:  # noqa: ASYNC110  # it stops in another thread
+            while served.is_moving:  # it stops in another thread
                 await robot.sleep(0.01)
             assert robot.link is Link.OPEN
 
