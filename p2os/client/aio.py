@@ -93,9 +93,9 @@ class Robot(RobotCalls):
         self._core.close(self._now())
         self._turn()  # STOP is out before anything can interrupt
         try:
-            await asyncio.wait_for(asyncio.shield(asyncio.ensure_future(self._drain())), CLOSING_S)
-        except TimeoutError:
-            pass
+            with contextlib.suppress(TimeoutError):
+                async with asyncio.timeout(CLOSING_S):
+                    await self._drain()
         finally:
             self._end()
 
@@ -246,8 +246,7 @@ class Robot(RobotCalls):
                 return False
             left = SIGN_OF_LIFE_S if ends is None else min(SIGN_OF_LIFE_S, (ends - now) / NS_PER_S)
             changed = self._changed
-            with contextlib.suppress(TimeoutError):
-                await asyncio.wait_for(changed.wait(), left)
+            await _changes(changed, left)
         return True
 
     def _turn(self) -> None:
@@ -317,8 +316,7 @@ class Robot(RobotCalls):
         """Wait until all that closing says has gone out."""
         while not self._line.is_over and self._failure is None:
             changed = self._changed
-            with contextlib.suppress(TimeoutError):
-                await asyncio.wait_for(changed.wait(), SIGN_OF_LIFE_S)
+            await _changes(changed, SIGN_OF_LIFE_S)
 
     def _end(self) -> None:
         """Give everything back; where closing could not come to its end, STOP first."""
@@ -347,6 +345,16 @@ class Robot(RobotCalls):
 
     def _now(self) -> Nanos:
         return time.monotonic_ns()
+
+
+async def _changes(changed: asyncio.Event, longest_s: float) -> None:
+    """Wait for a change, at most so long.
+
+    `asyncio.wait_for` of Python 3.11 swallows a cancellation that comes together with the change.
+    """
+    with contextlib.suppress(TimeoutError):
+        async with asyncio.timeout(longest_s):
+            await changed.wait()
 
 
 def _is_over(core: RobotCore) -> bool:

@@ -135,6 +135,19 @@ def test_a_task_that_is_cancelled_in_a_drive_stops_the_robot_and_the_block_goes_
     run(story())
 
 
+def test_a_cancellation_that_comes_together_with_a_packet_is_not_lost(served: ServedRobot) -> None:
+    async def story() -> None:
+        async with robot_on(served) as robot:
+            driving = asyncio.ensure_future(robot.drive(5.0))
+            await robot.next_state()
+            robot.on_state(lambda _: driving.cancel())  # type: ignore[arg-type,return-value]  # in the same turn
+            with pytest.raises(asyncio.CancelledError):
+                await driving
+            assert robot.link is Link.OPEN
+
+    run(story())
+
+
 def test_a_program_that_is_cancelled_in_its_block_stops_the_robot(served: ServedRobot) -> None:
     recorder = Recorder()
 
