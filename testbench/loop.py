@@ -154,6 +154,7 @@ class RunLoop:
         self.now = cast("int", snapshot["now"])
         self._edges = list(cast("tuple[int, ...]", snapshot["edges"]))
         self._is_inside_block = bool(snapshot["is_inside_block"])
+        self._rounds = 0
 
     def _lead(self, now: Nanos, limit: Nanos) -> Nanos:
         """Let the leader run to `limit`, slice by slice; stop at an edge on a watched net. Return its time."""
