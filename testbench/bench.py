@@ -5,19 +5,20 @@
 
 Mode C (a real or remote robot) is built by `testbench.remote`, on the same
 parts. The order of the followers is fixed: who drives pins first, the script
-second, the recorder last.
+and its faults second, the recorder last.
 
 Invariant: a bench that was restored from a snapshot goes on as the one that the
 snapshot was taken of.
 """
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Protocol, cast
 
 from adapter_sim import Adapter
 from adapter_sim.pinout import Pinout, Pull, Role, load_pinout
+from p2os.errors import ScenarioError
 from p2os.pioneer.body import RobotBody, make_body
 from p2os.pioneer.controller import Pioneer
 from p2os.pioneer.scenery import World
@@ -26,6 +27,7 @@ from p2os.timing import NS_PER_S, Nanos
 from testbench.adapter_choice import AnyAdapter, make_adapter
 from testbench.chip_pins import ChipPins
 from testbench.direct import DirectRobot, DistanceSensors, JointMotor, WheelEncoder
+from testbench.fault_script import FaultScript
 from testbench.loop import DEFAULT_SLICE_NS, Follower, LeaderReached, RunLoop
 from testbench.ports import Chip
 from testbench.recording import Recorder
@@ -109,7 +111,8 @@ class Bench:
             bring_to=self._bring_robot_to, on_change=self.recorder.obstacle,
         )  # fmt: skip
         self.recorder.bring_to = self._bring_robot_to
-        followers = (*self._robots, self.script, self.recorder)
+        self.faults = FaultScript(scenario.faults, bring_to=self._bring_robot_to, do=self._say_to_robot)
+        followers = (*self._robots, self.script, self.faults, self.recorder)
         self.loop = RunLoop(chip, followers, slice_ns=slice_ns, on_slice=self._after_slice)
         pin_of = {wire.name: wire.bluepill for wire in pinout.wires}
         pins = ChipPins(chip, harness, pin_of, on_watched=self.loop.note_edge)
@@ -174,6 +177,7 @@ class Bench:
             "robots": [robot.snapshot() for robot in self._robots],
             "ranges": None if self._ranges is None else self._ranges.snapshot(),
             "script": self.script.snapshot(),
+            "faults": self.faults.snapshot(),
             "recorder": self.recorder.snapshot(),
             "loop": self.loop.snapshot(),
         }
@@ -187,6 +191,7 @@ class Bench:
         if self._ranges is not None:
             self._ranges.restore(cast("Sequence[float]", snapshot["ranges"]))
         self.script.restore(snapshot["script"])
+        self.faults.restore(snapshot["faults"])
         self.recorder.restore(snapshot["recorder"])
         self.loop.restore(cast("Mapping[str, object]", snapshot["loop"]))
 
@@ -200,8 +205,17 @@ class Bench:
         for robot in self._robots:
             robot.advance_to(at)
 
+    def _say_to_robot(self, words: str, at: Nanos) -> None:
+        if self.parts.pioneer is not None:
+            self.parts.pioneer.do(words, at)
+
     def _build(self, pinout: Pinout, world: World, body: RobotBody, chip: Chip, harness: Harness) -> BenchParts:
         if self.scenario.mode == "direct":
+            if self.scenario.faults:
+                raise ScenarioError(
+                    f"{self.scenario.name}: [[fault]] acts on the robot's controller, and mode direct has none",
+                    hint="--mode adapter",
+                )
             self._robots.append(self._direct_robot(pinout, body, harness))
             return BenchParts(chip=chip, harness=harness, body=body, world=world)
         adapter, pioneer = self._adapter_and_pioneer(pinout, body, harness)
@@ -236,7 +250,8 @@ class Bench:
         to_robot, to_client = SerialLine(), SerialLine()
         adapter = make_adapter(self.scenario, OwnedPins(harness, "adapter"), pinout)
         adapter.on_event = recorder.listener("adapter")
-        pioneer = Pioneer(parameters=parameters, body=body, settings=self.scenario.controller)
+        settings = replace(self.scenario.controller, baud=to_client.baud, seed=self.scenario.seed)
+        pioneer = Pioneer(parameters=parameters, body=body, settings=settings)
         pioneer.on_event = recorder.listener("pioneer")
         ranges = self._ranges = SipRanges(parameters, pioneer.settings.profile, on_ranges=recorder.sonar)
 

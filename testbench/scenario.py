@@ -21,9 +21,12 @@ from adapter_sim.settings import AdapterSettings
 from p2os.errors import ScenarioError, UsageError
 from p2os.parameters import RobotParameters, load_parameters
 from p2os.pioneer.controller import ControllerSettings, SonarPerSip
+from p2os.pioneer.flash import load_flash
+from p2os.pioneer.sensor_errors import load_sensor_errors
 from p2os.pioneer.world import Pose, known_worlds, world_suffixes
 from p2os.timing import NS_PER_MS, NS_PER_S, Nanos
 from testbench.direct.robot import DirectSettings
+from testbench.fault_script import FaultChange, load_faults
 from testbench.goals import Goal, load_goal
 from testbench.schema import Key, Table, check_table, nearest
 from testbench.script import Change
@@ -50,6 +53,7 @@ _TOP = (
     Key(name="controller", kind="table"),
     Key(name="in_world", kind="table"),
     Key(name="obstacle", kind="tables"),
+    Key(name="fault", kind="tables"),
     Key(name="goal", kind="tables"),
 )
 _START = (
@@ -76,6 +80,8 @@ _ADAPTER = (
 _CONTROLLER = (
     Key(name="name", kind="text"),
     Key(name="sonar_per_sip", kind="text", choices=tuple(member.value for member in SonarPerSip)),
+    Key(name="errors", kind="text"),
+    Key(name="flash", kind="text"),
 )
 #: What a scenario may say otherwise for one world.
 _IN_WORLD = (
@@ -110,6 +116,7 @@ class Scenario:
     adapter_core: str = "model"
     controller: ControllerSettings = field(default_factory=ControllerSettings)
     changes: tuple[Change, ...] = ()
+    faults: tuple[FaultChange, ...] = ()
     goals: tuple[Goal, ...] = ()
     #: World → what is otherwise there.
     in_world: Mapping[str, Table] = field(default_factory=dict)
@@ -249,8 +256,9 @@ def _build(table: Table, text: str, path: Path) -> Scenario:
         direct=_direct(cast("Table", table.get("direct", {})), where),
         adapter=_adapter(cast("Table", table.get("adapter", {})), round(threshold_m * 1e6), where),
         adapter_core=str(cast("Table", table.get("adapter", {})).get("core", "model")),
-        controller=_controller(cast("Table", table.get("controller", {})), where),
+        controller=_controller(cast("Table", table.get("controller", {})), path, where),
         changes=changes,
+        faults=load_faults(cast("list[Table]", table.get("fault", [])), parameters, where),
         goals=tuple(goals),
         in_world=in_world,
     )
@@ -317,9 +325,14 @@ def _adapter(part: Table, threshold_um: int, where: str) -> AdapterSettings:
     return AdapterSettings(threshold_um=threshold_um, **values)  # type: ignore[arg-type] # check_table has seen to it
 
 
-def _controller(part: Table, where: str) -> ControllerSettings:
+def _controller(part: Table, path: Path, where: str) -> ControllerSettings:
     check_table(part, _CONTROLLER, f"{where}: [controller]")
     settings = ControllerSettings()
+    if "flash" in part:
+        settings = settings.with_flash(load_flash(path.parent / str(part["flash"])))
+    if "errors" in part:
+        beside = path.parent / str(part["errors"])
+        settings = replace(settings, errors=load_sensor_errors(str(beside if beside.is_file() else part["errors"])))
     if "name" in part:
         settings = replace(settings, name=str(part["name"]))
     if "sonar_per_sip" in part:

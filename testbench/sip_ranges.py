@@ -6,7 +6,7 @@ before the first reading the sonar's longest range.
 
 from collections.abc import Callable, Sequence
 
-from p2os.errors import RemoteProtocolError
+from p2os.errors import LocalProtocolError, RemoteProtocolError
 from p2os.parameters import RobotParameters
 from p2os.profiles import Profile
 from p2os.sip import SIP_KINDS, StandardSip
@@ -34,7 +34,7 @@ class SipRanges:
             if frame.kind not in SIP_KINDS:
                 return
             sip = StandardSip.from_frame(frame, self._profile)
-        except RemoteProtocolError:
+        except (LocalProtocolError, RemoteProtocolError):  # a noisy line: no sound frame
             return
         self.take_sip(sip, now)
 

@@ -197,13 +197,15 @@ class Pioneer:
         sonar = self.parameters.sonar_fitted
         fault = read_fault(words, sonar=sonar, complete=first == "fault") if first in {"fault", "mend"} else None
         self.advance_to(now)
-        if fault is None:
-            apply_input(self._works, text)
-        elif first == "fault":
+        if fault is not None and first == "fault":
+            self._tell(now, first, words)
             break_now(self._patient(now), fault)
         else:
-            mend_now(self._patient(now), fault)
-        self._tell(now, first, words)
+            if fault is None:
+                apply_input(self._works, text)
+            else:
+                mend_now(self._patient(now), fault)
+            self._tell(now, first, words)
         self._tell_notes(now)
 
     def reboot(self, now: Nanos, *, notice: str = "reboot") -> None:

@@ -1,0 +1,105 @@
+"""Timed faults of the robot: the `[[fault]]` tables of a scenario, and what carries them out.
+
+    [[fault]]
+    at_s = 5.0
+    fault = "sonar-stuck 3 1.2"
+    for_s = 2.0                  # then it is mended; without it stays
+
+The words are those of `p2os.pioneer.faults`. They act on the robot's controller,
+so they need mode B; which bits a noisy line turns is decided by the scenario's seed.
+
+Invariant: a fault at t is felt by everything that happens after t, and by
+nothing that happened up to t.
+"""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import cast
+
+from p2os.errors import ScenarioError, UsageError
+from p2os.parameters import RobotParameters
+from p2os.pioneer.faults import MOMENTARY, read_fault
+from p2os.timing import NS_PER_S, Nanos, Reached
+from testbench.schema import Key, Table, check_table
+
+_KEYS = (
+    Key(name="at_s", kind="number", required=True, least=0),
+    Key(name="fault", kind="text", required=True),
+    Key(name="for_s", kind="number", above=0),
+)
+
+
+@dataclass(frozen=True, slots=True)
+class FaultChange:
+    """What is said to the robot at a time: "fault WORDS" or "mend WORDS"."""
+
+    at: Nanos
+    words: str
+
+
+def load_faults(tables: Sequence[Table], parameters: RobotParameters, where: str) -> tuple[FaultChange, ...]:
+    """Return what a scenario's `[[fault]]` tables ask for, in order of time.
+
+    Raises:
+        ScenarioError: A table breaks the schema, or names no fault.
+    """
+    found: list[FaultChange] = []
+    for number, table in enumerate(tables, start=1):
+        place = f"{where}: [[fault]] {number}"
+        check_table(table, _KEYS, place)
+        words = str(table["fault"])
+        try:
+            fault = read_fault(words, sonar=parameters.sonar_fitted)
+        except UsageError as error:
+            raise ScenarioError(f"{place}: {error}", hint=error.hint) from error
+        at = _nanos(table, "at_s")
+        found.append(FaultChange(at, f"fault {words}"))
+        if "for_s" in table:
+            if fault.name in MOMENTARY:
+                raise ScenarioError(f"{place}: for_s, but {fault.name} happens once", hint="leave for_s out")
+            found.append(FaultChange(at + _nanos(table, "for_s"), f"mend {words}"))
+    return tuple(sorted(found, key=lambda change: change.at))
+
+
+class FaultScript:
+    """Says each change at its time.
+
+    Args:
+        changes: In order of time.
+        bring_to: Brings the robot to an instant, and its words onto the line.
+        do: Says words to the robot.
+    """
+
+    def __init__(
+        self, changes: Sequence[FaultChange], *, bring_to: Callable[[Nanos], None], do: Callable[[str, Nanos], None]
+    ) -> None:
+        self._changes = tuple(changes)
+        self._bring_to = bring_to
+        self._do = do
+        self._done = 0
+
+    def next_deadline(self) -> Nanos | None:
+        """Return when the next change is due."""
+        return self._changes[self._done].at if self._done < len(self._changes) else None
+
+    def advance_to(self, limit: Nanos) -> Reached:
+        """Say what is due."""
+        while self._done < len(self._changes) and self._changes[self._done].at <= limit:
+            change = self._changes[self._done]
+            self._bring_to(change.at)
+            self._do(change.words, change.at)
+            self._bring_to(change.at)
+            self._done += 1
+        return Reached(limit)
+
+    def snapshot(self) -> dict[str, object]:
+        """Return how many changes were made."""
+        return {"done": self._done}
+
+    def restore(self, snapshot: object) -> None:
+        """Put back what `snapshot` returned; the robot is restored by whoever owns it."""
+        self._done = cast("int", cast("Mapping[str, object]", snapshot)["done"])
+
+
+def _nanos(table: Table, key: str) -> Nanos:
+    return round(float(cast("float", table[key])) * NS_PER_S)
