@@ -63,9 +63,7 @@ def test_words_that_mean_nothing_change_nothing(robot: Any, text: str) -> None:
     assert robot.pioneer.snapshot() == before
 
 
-@pytest.mark.parametrize(
-    ("fault", "expected"), [("stuck", (1.2, 1.2)), ("dead", (5.0, 5.0)), ("noisy", (0.1, 5.0))]
-)
+@pytest.mark.parametrize(("fault", "expected"), [("stuck", (1.2, 1.2)), ("dead", (5.0, 5.0)), ("noisy", (0.1, 5.0))])
 def test_a_broken_sonar_says_so_and_the_others_do_not(fault: str, expected: tuple[float, float]) -> None:
     value = {"stuck": 1.2, "dead": 0.0, "noisy": 0.3}[fault]
     heard = [hear(Walls(), (0, 1), P2DX, IDEAL.sonar, {1: (fault, value)}, Chance(seed)) for seed in range(20)]

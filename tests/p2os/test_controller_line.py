@@ -1,6 +1,7 @@
 """The line's speed: what fits goes, extras are dropped, the period stretches, and nothing ever queues."""
 
 from collections.abc import Callable
+from itertools import pairwise
 from typing import Any
 
 import pytest
@@ -29,7 +30,7 @@ def sip_times(robot: Any, milliseconds: int) -> list[int]:
 
 
 def gaps(times: list[int]) -> set[int]:
-    return {later - earlier for earlier, later in zip(times, times[1:], strict=False)}
+    return {later - earlier for earlier, later in pairwise(times)}
 
 
 def test_a_line_that_keeps_up_carries_a_packet_a_cycle_and_tells_its_load(make_robot: MakeRobot) -> None:
@@ -64,9 +65,7 @@ def all_sonar() -> Any:
 
 
 def test_a_packet_longer_than_its_cycle_stretches_it(make_robot: MakeRobot) -> None:
-    robot = make_robot(
-        baud=9600, sip_period_ns=20 * NS_PER_MS, profile=Profile.ARCOS, sonar_per_sip=all_sonar()
-    ).open()
+    robot = make_robot(baud=9600, sip_period_ns=20 * NS_PER_MS, profile=Profile.ARCOS, sonar_per_sip=all_sonar()).open()
     robot.run(500)
     size = len(robot.sip().to_frame(Profile.ARCOS).to_bytes())
     times = sip_times(robot, 2000)
@@ -117,7 +116,7 @@ def test_a_paced_line_loses_and_hastens_nothing(puts: list[tuple[int, bytes]], b
     assert line.waiting == 0
     assert line.next_deadline() is None
     character_ns = 10 * NS_PER_S / baud
-    for (earlier, _), (later, lump) in zip(heard, heard[1:], strict=False):
+    for (earlier, _), (later, lump) in pairwise(heard):
         assert len(lump) <= LUMP
         assert later - earlier >= len(lump) * character_ns - 1
 
