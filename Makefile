@@ -43,6 +43,8 @@ unit: setup
 	$(BIN)/pytest -n $(JOBS) -m 'slow and not soak and not hardware'
 
 bench: setup
+	$(BIN)/python tools/bench_emulator.py
+	$(BIN)/python tools/bench_columns.py
 	$(BIN)/python tools/bench_speed.py
 
 soak: setup
