@@ -50,5 +50,13 @@ def test_no_warning_and_no_finding(tmp_path: Path) -> None:
     preload = run("gcc", "-print-file-name=libasan.so").strip()
     if not Path(preload).is_file():
         pytest.skip("the compiler comes without a sanitizer's library")
-    told = run(sys.executable, "-c", PROGRAM, str(library), LD_PRELOAD=preload, ASAN_OPTIONS="detect_leaks=0")
+    told = run(
+        sys.executable,
+        "-c",
+        PROGRAM,
+        str(library),
+        LD_PRELOAD=preload,
+        ASAN_OPTIONS="detect_leaks=0",
+        P2OS_CORE="native",
+    )
     assert told.split() == ["NativeEngine"]
