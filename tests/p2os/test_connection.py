@@ -326,6 +326,16 @@ def test_silence_is_a_loss_and_stop_is_the_first_frame_out() -> None:
     assert sent(end) == [Command(0)]
 
 
+def test_open_is_sent_again_where_no_packet_follows_it_and_no_more_often_than_asked() -> None:
+    end, now = opened_client(open_attempts=2)
+    end.advance_to(now + 300 * MS - 1)
+    assert sent(end) == []
+    end.advance_to(now + 300 * MS)
+    assert sent(end) == [Command(CommandNumber.OPEN)]
+    end.advance_to(now + 700 * MS)
+    assert sent(end) == []
+
+
 def test_an_echo_is_late_before_the_first_packet_and_a_restart_after_it() -> None:
     end, now = opened_client()
     feed(end, now, Frame(b"\1"))
