@@ -1,24 +1,12 @@
-"""A game pad as the adapter's other master: plain reports in, a wish and speeds out.
+"""A game pad as the adapter's other master: `p2os.gamepad`, with the adapter's settings."""
 
-Up connects, Down disconnects, R2 drives forward, L2 backward, the right stick
-turns: the mapping of the thesis. The wish lasts from Up to Down, or until the
-pad is lost or the robot is; it has to be given anew then. A button that was down
-when the pad went, or when the robot was given to it, must come up before it
-means anything.
-
-Not here: pads themselves. Whoever reads one (the ESP32's shell, the host's
-`p2os teleop --pad`) brings its reports into this form.
-"""
-
-from dataclasses import dataclass
 from enum import StrEnum
-from typing import TypeAlias
 
 from adapter_sim.settings import AdapterSettings
-from p2os.timing import Nanos
+from p2os.gamepad import STICK_FULL, TRIGGER_FULL, GamepadSnapshot, PadReport
+from p2os.gamepad import Gamepad as AnyGamepad
 
-#: Full deflections: a trigger from 0, the stick from its middle.
-TRIGGER_FULL, STICK_FULL = 1023, 511
+__all__ = ["STICK_FULL", "TRIGGER_FULL", "Gamepad", "GamepadSnapshot", "Master", "PadReport"]
 
 
 class Master(StrEnum):
@@ -28,84 +16,12 @@ class Master(StrEnum):
     PAD = "pad"
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class PadReport:
-    """One report of a pad, of whatever make.
-
-    Args:
-        up: The button that connects.
-        down: The button that disconnects; it wins over Up.
-        forward: R2, 0 to 1023.
-        backward: L2, 0 to 1023.
-        turn: Right stick, −512 (left) to 511 (right).
-    """
-
-    up: bool = False
-    down: bool = False
-    forward: int = 0
-    backward: int = 0
-    turn: int = 0
-
-
-#: Time of the last report or None, forward, turn, Up as last seen, wish.
-GamepadSnapshot: TypeAlias = tuple[Nanos | None, int, int, bool, bool]
-
-
-class Gamepad:
+class Gamepad(AnyGamepad):
     """What the newest report asks for."""
 
     def __init__(self, settings: AdapterSettings) -> None:
-        self._trigger_dead = settings.pad_trigger_dead
-        self._stick_dead = settings.pad_stick_dead
-        self._loss_ns = settings.pad_loss_ns
-        self._reported_at: Nanos | None = None
-        #: Deflections after their dead zones: forward of 1023, turn to the left of 511.
-        self.forward = 0
-        self.turn = 0
-        self._was_up = True
-        self.wants_robot = False
-
-    @property
-    def lost_at(self) -> Nanos | None:
-        """Return when the pad counts as lost unless a report comes before; None before its first report."""
-        return None if self._reported_at is None else self._reported_at + self._loss_ns
-
-    def take(self, report: PadReport, now: Nanos) -> None:
-        """Take a report that came at `now`."""
-        self._reported_at = now
-        if report.down:
-            self.wants_robot = False
-        elif report.up and not self._was_up:
-            self.wants_robot = True
-        self._was_up = report.up
-        dead = self._trigger_dead
-        self.forward = _outside(report.forward, dead, TRIGGER_FULL) - _outside(report.backward, dead, TRIGGER_FULL)
-        self.turn = -_outside(report.turn, self._stick_dead, STICK_FULL)
-
-    def forget_wish(self) -> None:
-        """Forget the wish: the session that it asked for has ended."""
-        self.wants_robot = False
-
-    def lose(self) -> None:
-        """Take note that the pad is lost."""
-        self._reported_at = None
-        self.wants_robot = False
-        self._was_up = True
-        self.forward = self.turn = 0
-
-    def snapshot(self) -> GamepadSnapshot:
-        """Return all of it as plain values."""
-        return self._reported_at, self.forward, self.turn, self._was_up, self.wants_robot
-
-    def restore(self, snapshot: GamepadSnapshot) -> None:
-        """Put back what `snapshot` returned."""
-        self._reported_at, self.forward, self.turn, self._was_up, self.wants_robot = snapshot
-
-
-def _outside(value: int, dead: int, full: int) -> int:
-    """Return a deflection with its dead zone taken out and the rest stretched to the full range, towards zero."""
-    size = abs(value)
-    if size <= dead:
-        return 0
-    stretched = (min(size, full) - dead) * full // (full - dead)
-    return stretched if value >= 0 else -stretched
+        super().__init__(
+            trigger_dead=settings.pad_trigger_dead,
+            stick_dead=settings.pad_stick_dead,
+            loss_ns=settings.pad_loss_ns,
+        )

@@ -11,14 +11,18 @@ from typing import Annotated
 
 import typer
 
+from p2os.cli.pad_source import SdlPad
 from p2os.cli.quantities import Quantity, parse_quantity
 from p2os.cli.signals import end_on_signals
 from p2os.cli.teleop_keys import Teleop, split_keys
+from p2os.cli.teleop_pad import PadDriver
 from p2os.client import Link, Robot
 from p2os.client.problems import LinkLostError
 from p2os.errors import MissingDependencyError, UsageError
+from p2os.gamepad import PAD_MPS, PAD_RADPS
+from p2os.timing import NS_PER_S
 
-HELP = """Drive a robot with the keyboard.
+HELP = """Drive a robot with the keyboard, or with a game pad.
 
 Hold a key to drive; let it go and the robot stops. So it does when the
 terminal hangs, the link is lost, or anything ends the program.
@@ -35,6 +39,10 @@ Keys:
 Examples:
   p2os teleop tcp:127.0.0.1:8101
   p2os teleop serial:/dev/ttyUSB0 --vel 150mm/s --turn-rate 20deg/s
+  p2os teleop tcp:127.0.0.1:8101 --pad
+
+With --pad: Up connects, Down lets go, R2 drives ahead, L2 back, the right stick
+turns; a pad that goes away stops the robot within 200 ms.
 """
 DEFAULT_VEL, DEFAULT_RATE = "0.3m/s", "45deg/s"
 #: chosen: how often keys are looked for and the line is renewed.
@@ -50,15 +58,28 @@ def register(app: typer.Typer) -> None:
 
 def teleop(
     url: Annotated[str, typer.Argument(help="Where the robot is.", metavar="URL")],
-    vel: Annotated[str, typer.Option(help="Speed of a held key.", metavar="SPEED")] = DEFAULT_VEL,
-    turn_rate: Annotated[str, typer.Option(help="Turning speed of a held key.", metavar="RATE")] = DEFAULT_RATE,
+    vel: Annotated[
+        str, typer.Option(help=f"Speed of a held key or a full trigger; {DEFAULT_VEL}, pad 0.4m/s.", metavar="SPEED")
+    ] = "",
+    turn_rate: Annotated[
+        str,
+        typer.Option(
+            help=f"Turning speed of a held key or a full stick; {DEFAULT_RATE}, pad 1.7rad/s.", metavar="RATE"
+        ),
+    ] = "",
+    pad: Annotated[bool, typer.Option("--pad", help="Drive by game pad instead of keys.")] = False,
     robot: Annotated[str, typer.Option(help="Robot model or TOML file, if it is not what the robot says.")] = "",
 ) -> None:
-    """Drive by keyboard."""
-    forward_mps = parse_quantity(vel, Quantity.SPEED, "--vel")
-    turn_radps = parse_quantity(turn_rate, Quantity.TURN_RATE, "--turn-rate")
+    """Drive by keyboard or pad."""
+    forward_mps = parse_quantity(vel or (f"{PAD_MPS}m/s" if pad else DEFAULT_VEL), Quantity.SPEED, "--vel")
+    turn_radps = parse_quantity(
+        turn_rate or (f"{PAD_RADPS}rad/s" if pad else DEFAULT_RATE), Quantity.TURN_RATE, "--turn-rate"
+    )
     if forward_mps <= 0 or turn_radps <= 0:
         raise UsageError("--vel and --turn-rate must be positive", hint="p2os teleop --help")
+    if pad:
+        drive_by_pad(url, robot or None, (forward_mps, turn_radps))
+        return
     if not sys.stdin.isatty():
         raise UsageError("there is no keyboard: stdin is not a terminal", hint="p2os drive URL --vel 0.2m/s --for 2s")
     end_on_signals()
@@ -70,6 +91,21 @@ def teleop(
                 turn(keys, client)
         finally:
             sys.stderr.write("\r\n")
+
+
+def drive_by_pad(url: str, model: str | None, fastest: tuple[float, float]) -> None:
+    """Drive by the first game pad of this machine."""
+    end_on_signals()
+    with SdlPad() as pad:
+        sys.stderr.write(f"game pad: {pad.name}\n")
+        PadDriver(
+            pad.report,
+            lambda: Robot(url, model=model),
+            fastest,
+            clock=time.monotonic_ns,
+            wait=lambda span_ns: time.sleep(span_ns / NS_PER_S),
+            say=lambda text: print(text, file=sys.stderr),  # noqa: T201 - the skin
+        ).run()
 
 
 def turn(keys: Teleop, client: Robot) -> None:

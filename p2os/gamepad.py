@@ -1,0 +1,111 @@
+"""A game pad as what drives a robot: plain reports in, a wish and deflections out.
+
+Up connects, Down disconnects, R2 drives forward, L2 backward, the right stick
+turns: the mapping of the thesis. The wish lasts from Up to Down, or until the
+pad is lost or the robot is; it has to be given anew then. A button that was down
+when the pad went, or when the robot was given to it, must come up before it
+means anything.
+
+Not here: pads themselves. Whoever reads one (the adapter's firmware, `p2os
+teleop --pad`) brings its reports into this form.
+"""
+
+from dataclasses import dataclass
+from typing import TypeAlias
+
+from p2os.timing import NS_PER_MS, Nanos
+
+#: Full deflections: a trigger from 0, the stick from its middle.
+TRIGGER_FULL, STICK_FULL = 1023, 511
+#: Speeds at full deflection, m/s and rad/s (the thesis, listing 5.5; the later repository has 0.5 m/s).
+PAD_MPS, PAD_RADPS = 0.4, 1.7
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PadReport:
+    """One report of a pad, of whatever make.
+
+    Args:
+        up: The button that connects.
+        down: The button that disconnects; it wins over Up.
+        forward: R2, 0 to 1023.
+        backward: L2, 0 to 1023.
+        turn: Right stick, −512 (left) to 511 (right).
+    """
+
+    up: bool = False
+    down: bool = False
+    forward: int = 0
+    backward: int = 0
+    turn: int = 0
+
+
+#: Time of the last report or None, forward, turn, Up as last seen, wish.
+GamepadSnapshot: TypeAlias = tuple[Nanos | None, int, int, bool, bool]
+
+
+class Gamepad:
+    """What the newest report asks for."""
+
+    def __init__(self, *, trigger_dead: int = 40, stick_dead: int = 40, loss_ns: Nanos = 150 * NS_PER_MS) -> None:
+        """Make a pad that has not reported yet.
+
+        Args:
+            trigger_dead: Deflection of a trigger up to which it counts as released, 0 to 1022.
+            stick_dead: The same of the stick, 0 to 510.
+            loss_ns: Silence after which the pad counts as lost, nanoseconds.
+        """
+        self._trigger_dead = trigger_dead
+        self._stick_dead = stick_dead
+        self._loss_ns = loss_ns
+        self._reported_at: Nanos | None = None
+        #: Deflections after their dead zones: forward of 1023, turn to the left of 511.
+        self.forward = 0
+        self.turn = 0
+        self._was_up = True
+        self.wants_robot = False
+
+    @property
+    def lost_at(self) -> Nanos | None:
+        """Return when the pad counts as lost unless a report comes before; None before its first report."""
+        return None if self._reported_at is None else self._reported_at + self._loss_ns
+
+    def take(self, report: PadReport, now: Nanos) -> None:
+        """Take a report that came at `now`."""
+        self._reported_at = now
+        if report.down:
+            self.wants_robot = False
+        elif report.up and not self._was_up:
+            self.wants_robot = True
+        self._was_up = report.up
+        dead = self._trigger_dead
+        self.forward = _outside(report.forward, dead, TRIGGER_FULL) - _outside(report.backward, dead, TRIGGER_FULL)
+        self.turn = -_outside(report.turn, self._stick_dead, STICK_FULL)
+
+    def forget_wish(self) -> None:
+        """Forget the wish: the session that it asked for has ended."""
+        self.wants_robot = False
+
+    def lose(self) -> None:
+        """Take note that the pad is lost."""
+        self._reported_at = None
+        self.wants_robot = False
+        self._was_up = True
+        self.forward = self.turn = 0
+
+    def snapshot(self) -> GamepadSnapshot:
+        """Return all of it as plain values."""
+        return self._reported_at, self.forward, self.turn, self._was_up, self.wants_robot
+
+    def restore(self, snapshot: GamepadSnapshot) -> None:
+        """Put back what `snapshot` returned."""
+        self._reported_at, self.forward, self.turn, self._was_up, self.wants_robot = snapshot
+
+
+def _outside(value: int, dead: int, full: int) -> int:
+    """Return a deflection with its dead zone taken out and the rest stretched to the full range, towards zero."""
+    size = abs(value)
+    if size <= dead:
+        return 0
+    stretched = (min(size, full) - dead) * full // (full - dead)
+    return stretched if value >= 0 else -stretched
