@@ -34,6 +34,7 @@ ALLOWED = {
     "p2os.pioneer.importers": {"yaml", "PIL"},
     "p2os.pioneer.mujoco": {"mujoco", "numpy"},
     "p2os.cli.world_picture": {"matplotlib"},
+    "p2os.cli.pad_source": {"pygame"},
     "bluepill_sim": set(),
     "bluepill_sim.cpu": {"unicorn"},
     "bluepill_sim.image": {"elftools", "intelhex"},
