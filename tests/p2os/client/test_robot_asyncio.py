@@ -127,9 +127,9 @@ def test_a_task_that_is_cancelled_in_a_drive_stops_the_robot_and_the_block_goes_
             driving.cancel()
             with pytest.raises(asyncio.CancelledError):
                 await driving
-            assert stop() in recorder.said
             while served.is_moving:  # it stops in another thread
                 await robot.sleep(0.01)
+            assert stop() in recorder.said
             assert robot.link is Link.OPEN
 
     run(story())
