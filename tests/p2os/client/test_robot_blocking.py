@@ -250,9 +250,7 @@ def test_packets_are_fetched_by_their_type(served: ServedRobot) -> None:
         assert robot.newest(RawPacket) is None
         with pytest.raises(UsageError, match="nothing asks for a StandardSip"):
             robot.fetch(StandardSip)
-        counts = EncoderPacket(left_counts=7, right_counts=-9)
-        threading.Timer(0.1, served.wish, (lambda pioneer, now: pioneer._connection.send(counts, now),)).start()
-        assert robot.fetch(EncoderPacket, timeout_s=30).right_counts in {-9, 0}
+        assert robot.fetch(EncoderPacket, timeout_s=30).right_counts == 0
         assert robot.newest(EncoderPacket) is not None
 
 
