@@ -6,12 +6,10 @@ machine. Usage: python tools/bench_speed.py [--quick]
 
 import math
 import statistics
-import struct
 import sys
 import tempfile
 import time
 from collections.abc import Callable
-from importlib.resources import files
 from pathlib import Path
 
 from p2os.parameters import load_parameters
@@ -40,31 +38,6 @@ def median_seconds(work: Callable[[], object]) -> float:
 def row(name: str, figure: str, note: str = "") -> None:
     """Print one line of the table."""
     print(f"{name:<44} {figure:>18}  {note}")
-
-
-def busy_image() -> bytes:
-    """Return a program that never sleeps: vector table, then `adds r0, #1; b .-2`."""
-    return struct.pack("<II", 0x20005000, 0x08000009) + bytes.fromhex("01 30 fd e7")
-
-
-def chip() -> None:
-    """Compute without sleep, and sleep with SysTick."""
-    from bluepill_sim.board import BluePill
-
-    with tempfile.TemporaryDirectory() as folder:
-        image = Path(folder) / "busy.bin"
-        image.write_bytes(busy_image())
-        board = BluePill(str(image))
-        board.advance_to(1_000_000)
-        seconds = median_seconds(lambda: board.advance_to(board.now_ns + 20_000_000))
-        row("BluePill, never sleeps (8 MHz)", f"{0.02 / seconds:.3f} x real", "pure Python executor")
-    board = BluePill(str(files("testbench.firmware") / "motors.elf"))
-    board.advance_to(100_000_000)
-    seconds = median_seconds(lambda: board.advance_to(board.now_ns + 2_000_000_000))
-    row("BluePill, SysTick 100 Hz and WFI (72 MHz)", f"{2 / seconds:.0f} x real")
-    taken = board.snapshot()
-    save, restore = median_seconds(board.snapshot), median_seconds(lambda: board.restore(taken))
-    row("BluePill, snapshot and restore", f"{1e3 * save:.2f} ms, {1e3 * restore:.2f} ms", "goal: under 1 ms each")
 
 
 def bodies() -> None:
@@ -141,5 +114,5 @@ def chain() -> None:
 
 
 if __name__ == "__main__":
-    for part in (wire, chip, bodies, chain):
+    for part in (wire, bodies, chain):
         part()

@@ -21,9 +21,10 @@ from collections.abc import Callable
 from bluepill_sim.block_cost import NO_BLOCK, Block
 from bluepill_sim.cpu import scratch
 from bluepill_sim.cpu.accesses import Access, accesses_of, is_ambiguous
-from bluepill_sim.cpu.core import ReadAccess, WriteAccess
+from bluepill_sim.cpu.core import RawRead, RawWrite, ReadAccess, WriteAccess
 from bluepill_sim.cpu.engine import Engine, EngineSnapshot
 from bluepill_sim.cpu.halt import Halt, HaltKind
+from bluepill_sim.cpu.io_region import guarded
 from bluepill_sim.cpu.native_library import (
     ENGINE_FUNCTIONS,
     READ,
@@ -83,7 +84,7 @@ class NativeEngine(Engine):
     _run_from = field("run_from", "As of `Engine`.")
 
     def _begin(self) -> None:
-        self._regions: list[tuple[int, int, ReadAccess, WriteAccess]] = []
+        self._regions: list[tuple[int, int, RawRead, RawWrite]] = []
         self._code: list[tuple[int, int, int]] = []
         self._known: dict[int, Block] = {}
         self._noted: set[int] = set()
@@ -141,7 +142,7 @@ class NativeEngine(Engine):
     def map_io(self, address: int, size: int, read: ReadAccess, write: WriteAccess) -> None:
         """As of `Engine`."""
         number = len(self._regions)
-        self._regions.append((address, size, read, write))
+        self._regions.append((address, size, *guarded(read, write, self._is_denied, self._fail)))
         user = library().core_region(self._state, number, address)
         self._core.map_io_native(address, size, address_of("core_read_io"), address_of("core_write_io"), user)
 
@@ -325,7 +326,8 @@ class NativeEngine(Engine):
     def _add_row(self, block: Block) -> None:
         start, size = block.start, block.end - block.start
         self._known[start] = block
-        host = next((at + start - first for first, end, at in self._blocks.writable if first <= start < end), None)
+        memory = self._blocks.writable_at(start)
+        host = None if memory is None else memory[2] + start - memory[0]
         code = next(ctypes.string_at(at + start - first, size) for first, end, at in self._code if first <= start < end)
         accesses = {access.address: access for access in accesses_of(code, start)}
         flags = _ENDS.get(block.last, 0)
@@ -357,20 +359,10 @@ class NativeEngine(Engine):
             self._core.hook_native("instruction", address_of("core_on_note"), self._state.value or 0, address, address)
 
     def _read_io(self, region: int, offset: int, size: int) -> int:
-        try:
-            if self._is_denied():
-                return 0
-            return self._regions[region][2](offset, size)
-        except BaseException as error:  # noqa: BLE001 - C stands between here and the caller
-            self._fail(error)
-            return 0
+        return self._regions[region][2](0, offset, size, 0)
 
     def _write_io(self, region: int, offset: int, size: int, value: int) -> None:
-        try:
-            if not self._is_denied():
-                self._regions[region][3](offset, size, value)
-        except BaseException as error:  # noqa: BLE001 - C stands between here and the caller
-            self._fail(error)
+        self._regions[region][3](0, offset, size, value, 0)
 
     def _is_denied(self) -> bool:
         """Get ready for an access; tell whether the run has ended before it."""

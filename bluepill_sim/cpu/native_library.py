@@ -26,7 +26,7 @@ RECORDED = ctypes.CFUNCTYPE(None, ctypes.c_void_p, ctypes.c_uint32)
 
 
 #: The functions of Unicorn that C calls, by their names in `binding.Library`.
-ENGINE_FUNCTIONS = ("start", "stop", "read_register", "write_register", "read_registers", "write_registers")
+ENGINE_FUNCTIONS = ("start", "stop", "read_register", "read_registers", "write_registers")
 
 
 class EngineApi(ctypes.Structure):
@@ -64,7 +64,6 @@ _FUNCTIONS = {
     "core_region": "ppuu",
     "core_trap": "ppuuu",
     "core_start_recording": "bpu",
-    "core_flush": "vp",
 }
 _TYPES: dict[str, Any] = {
     "v": None, "b": ctypes.c_bool, "i": ctypes.c_int32, "u": ctypes.c_uint32, "l": ctypes.c_uint64,

@@ -5,7 +5,6 @@ field; `native_library.py` refuses a library that has another size of it.
 """
 
 import ctypes
-from collections.abc import Callable
 from typing import Any
 
 from bluepill_sim.cpu.halt import HaltKind
@@ -33,8 +32,8 @@ HALT_KINDS = (
 )
 HALT_NUMBERS = {kind: number for number, kind in enumerate(HALT_KINDS)}
 #: What follows them: for Python alone.
-BORDER, EXCEPTION_RETURN = 0, 1
-DELIVER, FAILED, STALE, FROZEN, UNEXPLAINED, NONE = range(len(HALT_KINDS), len(HALT_KINDS) + 6)
+BORDER = 0
+DELIVER, FAILED, STALE, FROZEN, UNEXPLAINED = range(len(HALT_KINDS), len(HALT_KINDS) + 5)
 
 _U8, _U32, _U64 = ctypes.c_uint8, ctypes.c_uint32, ctypes.c_uint64
 
@@ -93,7 +92,7 @@ class Shared(ctypes.Structure):
         ("flash_base", _U32),
         ("flash_bytes", _U32),
         ("scratch", _U32),
-        ("scratch_end", _U32),
+        ("_last_padding", _U32),
     )
 
 
@@ -149,7 +148,3 @@ def time(name: str, doc: str) -> Any:
         setattr(self.shared, name, NO_TIME if value is None else value)
 
     return property(read, write, doc=doc)
-
-
-#: Functions that take and give what `Shared` holds.
-Accessor = Callable[[Any], int]

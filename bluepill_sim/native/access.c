@@ -55,7 +55,7 @@ static bool fits(const struct instruction *one, uint32_t kind, uint32_t bytes)
     return one->kind == kind && one->bytes == bytes;
 }
 
-void resolve(struct core *core, uint32_t address, bool is_write, uint32_t bytes)
+static void resolve(struct core *core, uint32_t address, bool is_write, uint32_t bytes)
 {
     struct shared *s = &core->shared;
     const struct row *row = core->block;
@@ -108,13 +108,18 @@ static bool is_over(const struct core *core)
     return core->shared.cycle + core->block->straight >= core->shared.stop_at;
 }
 
+/* Tells Python which instruction asks, unless Python itself runs the blocks and knows. */
+static void begin_access(struct core *core, uint32_t address, bool is_write, uint32_t size)
+{
+    if (!core->shared.is_python) {
+        resolve(core, address, is_write, size);
+        core->shared.in_access = 1;
+    }
+}
+
 static uint32_t ask_read(struct core *core, const struct region_user *region, uint32_t offset, uint32_t size)
 {
-    if (core->shared.is_python) {
-        return core->calls.read(region->number, offset, size);
-    }
-    resolve(core, region->base + offset, false, size);
-    core->shared.in_access = 1;
+    begin_access(core, region->base + offset, false, size);
     const uint32_t word = core->calls.read(region->number, offset, size);
     core->shared.in_access = 0;
     return word;
@@ -123,12 +128,7 @@ static uint32_t ask_read(struct core *core, const struct region_user *region, ui
 static void ask_write(struct core *core, const struct region_user *region, uint32_t offset, uint32_t size,
                       uint32_t value)
 {
-    if (core->shared.is_python) {
-        core->calls.write(region->number, offset, size, value);
-        return;
-    }
-    resolve(core, region->base + offset, true, size);
-    core->shared.in_access = 1;
+    begin_access(core, region->base + offset, true, size);
     core->calls.write(region->number, offset, size, value);
     core->shared.in_access = 0;
 }

@@ -12,7 +12,6 @@
 
 #define NEVER (UINT64_C(1) << 62)
 #define NO_TIME UINT64_MAX
-#define LIKELY(x) __builtin_expect(!!(x), 1)
 #define UNLIKELY(x) __builtin_expect(!!(x), 0)
 
 /* Why a run ended; the order is that of bluepill_sim/cpu/native_state.py. */
@@ -97,7 +96,7 @@ struct shared {
     /* Set by Python before the first run. */
     uint64_t sram, flash;
     uint32_t sram_base, sram_bytes, flash_base, flash_bytes;
-    uint32_t scratch, scratch_end;
+    uint32_t scratch, last_padding;
 };
 
 /* The functions of Unicorn that this core calls. */
@@ -105,7 +104,6 @@ struct engine_api {
     int (*start)(void *, uint64_t, uint64_t, uint64_t, size_t);
     int (*stop)(void *);
     int (*read_register)(void *, int, void *);
-    int (*write_register)(void *, int, const void *);
     int (*read_registers)(void *, const int *, void **, int);
     int (*write_registers)(void *, const int *, void *const *, int);
 };
@@ -186,16 +184,12 @@ void free_dropped(struct core *core);
 const struct instruction *instruction_at(const struct row *row, uint32_t address);
 void record(struct core *core, uint32_t address, int32_t kind);
 void core_flush(struct core *core);
-/* access.c */
-void resolve(struct core *core, uint32_t address, bool is_write, uint32_t bytes);
 /* gpio.c */
 bool write_port(struct core *core, struct page *page, uint32_t index, uint32_t value);
 /* run.c */
 void *allocate(struct core *core, size_t bytes);
 uint32_t read_register(struct core *core, int number);
-void write_register(struct core *core, int number, uint32_t value);
-uint32_t run_slice(struct core *core);
-void clear_exclusive(struct core *core);
+void core_clear_exclusive(struct core *core);
 /* exceptions.c */
 uint64_t deliverable(const struct core *core, uint64_t *high);
 bool wakes(struct core *core);
@@ -203,7 +197,6 @@ int deliver(struct core *core);
 bool leave(struct core *core, uint32_t exc_return);
 bool supervisor_call(struct core *core, uint32_t pc);
 void tick(struct core *core);
-int execution_priority(struct core *core, bool ignores_primask);
 
 /* Register numbers of Unicorn 2 (arm.h). */
 enum {

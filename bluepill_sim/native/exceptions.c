@@ -71,7 +71,7 @@ static int active_priority(const struct shared *s)
     return best;
 }
 
-int execution_priority(struct core *core, bool ignores_primask)
+static int execution_priority(struct core *core, bool ignores_primask)
 {
     const struct shared *s = &core->shared;
     static const int numbers[3] = {REG_PRIMASK, REG_BASEPRI, REG_FAULTMASK};
@@ -153,7 +153,7 @@ static void start_handler(struct core *core, unsigned number, uint32_t handler, 
     uint32_t values[4] = {sp, number, (cpsr & ~IT_BITS) | CPSR_T, link};
     void *at[4] = {&values[0], &values[1], &values[2], &values[3]};
     core->api.write_registers(core->engine, numbers, at, 4);
-    clear_exclusive(core);
+    core_clear_exclusive(core);
     s->pc = handler & ~1u;
     s->is_thumb = handler & 1;
     s->it_state = 0;
@@ -236,7 +236,7 @@ bool leave(struct core *core, uint32_t exc_return)
         set_bit(s->pending, number);
     }
     s->event_register = 1;
-    clear_exclusive(core);
+    core_clear_exclusive(core);
     const unsigned following = first_pending(core);
     if (following && can_preempt(core, following, false)) {
         record(core, exc_return | 1, -1);

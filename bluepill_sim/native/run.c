@@ -15,11 +15,6 @@ uint32_t read_register(struct core *core, int number)
     return value;
 }
 
-void write_register(struct core *core, int number, uint32_t value)
-{
-    core->api.write_register(core->engine, number, &value);
-}
-
 void *allocate(struct core *core, size_t bytes)
 {
     struct allocation *one = calloc(1, sizeof *one + bytes);
@@ -140,7 +135,7 @@ void core_on_trap(void *engine, uint64_t address, uint32_t size, void *user)
 }
 
 /* Breaks the exclusive reservation, by CLREX and WFI on the scratch page. */
-void clear_exclusive(struct core *core)
+void core_clear_exclusive(struct core *core)
 {
     if (core->shared.uses_exclusive) {
         core->is_scratch = 1;
@@ -153,8 +148,6 @@ void clear_exclusive(struct core *core)
         core->is_scratch = 0;
     }
 }
-
-void core_clear_exclusive(struct core *core) { clear_exclusive(core); }
 
 static uint32_t cycles_until(const struct row *row, uint32_t address)
 {
@@ -179,7 +172,7 @@ static void settle(struct core *core, uint32_t pc)
 }
 
 /* Runs to the first border at or after `stop_at`, or to what ends the run before; returns why. */
-uint32_t run_slice(struct core *core)
+static uint32_t run_slice(struct core *core)
 {
     struct shared *s = &core->shared;
     s->halt_kind = HALT_NONE;

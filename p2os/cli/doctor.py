@@ -106,8 +106,9 @@ def examine(
             get="install Python 3.11 or newer", required=True,
         )
     ]  # fmt: skip
+    finders = {"program": find_program, "package": package_version, "built": built_part}
     for need in NEEDS:
-        found = {"package": package_version, "built": built_part}.get(need.kind, find_program)(need.name)
+        found = finders[need.kind](need.name)
         get = need.get
         if need.name == "pybullet" and python >= FIRST_PYTHON_WITHOUT_BULLET:
             get = "use Python 3.11: PyBullet has no wheels for later ones"

@@ -11,7 +11,7 @@ from typing import ClassVar
 from construct import Array, Bytes, Construct, GreedyBytes, Int8ul, Int16ul, Int32ul, NullTerminated, Struct, this
 
 from p2os.errors import LocalProtocolError, RemoteProtocolError
-from p2os.packets.layout import build, parse
+from p2os.packets.layout import LaidOutPacket, build, parse
 from p2os.wire import Frame
 
 
@@ -68,7 +68,7 @@ class GripperState(IntFlag):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class GripperPacket:
+class GripperPacket(LaidOutPacket):
     """GRIPPERpac: what kind of gripper there is and what it does.
 
     Args:
@@ -91,26 +91,9 @@ class GripperPacket:
         """The state by the names of its bits."""
         return GripperState(self.state)
 
-    def to_frame(self) -> Frame:
-        """Return the frame.
-
-        Raises:
-            LocalProtocolError: A value does not fit its field.
-        """
-        return build(self.KIND, self.LAYOUT, asdict(self))
-
-    @classmethod
-    def from_frame(cls, frame: Frame) -> "GripperPacket":
-        """Read the packet.
-
-        Raises:
-            RemoteProtocolError: It is too short.
-        """
-        return cls(**parse(cls.LAYOUT, frame))
-
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class JoystickPacket:
+class JoystickPacket(LaidOutPacket):
     """JOYSTICKpac: the joystick plugged into the robot.
 
     Axes and throttle are 0 to 1023, 512 in the middle. ARIA turns the sign of x.
@@ -128,23 +111,6 @@ class JoystickPacket:
     raw_throttle: int = 0
     #: Bytes after the last field that this project knows.
     rest: bytes = b""
-
-    def to_frame(self) -> Frame:
-        """Return the frame.
-
-        Raises:
-            LocalProtocolError: A value does not fit its field.
-        """
-        return build(self.KIND, self.LAYOUT, asdict(self))
-
-    @classmethod
-    def from_frame(cls, frame: Frame) -> "JoystickPacket":
-        """Read the packet.
-
-        Raises:
-            RemoteProtocolError: It is too short.
-        """
-        return cls(**parse(cls.LAYOUT, frame))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -9,7 +9,8 @@ frame of that kind that `parse` accepts.
 """
 
 import io
-from typing import Any
+from dataclasses import asdict, dataclass
+from typing import Any, ClassVar, Self
 
 from construct import Construct, ConstructError
 
@@ -47,3 +48,28 @@ def build(kind: int, layout: Construct, fields: Fields) -> Frame:
     except ConstructError as error:
         raise LocalProtocolError(f"packet 0x{kind:02X}: a value does not fit its field: {error}") from error
     return Frame(bytes((kind,)) + data + fields.get("rest", b""))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class LaidOutPacket:
+    """A packet whose fields are those of its layout, by the same names."""
+
+    KIND: ClassVar[int]
+    LAYOUT: ClassVar[Construct]
+
+    def to_frame(self) -> Frame:
+        """Return the frame.
+
+        Raises:
+            LocalProtocolError: A value does not fit its field.
+        """
+        return build(self.KIND, self.LAYOUT, asdict(self))
+
+    @classmethod
+    def from_frame(cls, frame: Frame) -> Self:
+        """Read the packet.
+
+        Raises:
+            RemoteProtocolError: It is too short.
+        """
+        return cls(**parse(cls.LAYOUT, frame))

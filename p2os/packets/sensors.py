@@ -10,7 +10,7 @@ from typing import ClassVar
 
 from construct import Array, Construct, Int8ul, Int16sl, Int16ul, Int32sl, Struct, this
 
-from p2os.packets.layout import build, parse
+from p2os.packets.layout import LaidOutPacket, build, parse
 from p2os.wire import Frame
 
 #: The analog inputs of an IOpac: 0 to 1023 for 0 to 5 V.
@@ -22,7 +22,7 @@ GYRO_DEG_S_PER_COUNT = 5 / 1023 * 300 / 2.5
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class EncoderPacket:
+class EncoderPacket(LaidOutPacket):
     """ENCODERpac: both wheels' encoder counts since the robot was switched on, signed 32 bits."""
 
     KIND: ClassVar[int] = 0x90
@@ -32,23 +32,6 @@ class EncoderPacket:
     right_counts: int
     #: Bytes after the last field that this project knows.
     rest: bytes = b""
-
-    def to_frame(self) -> Frame:
-        """Return the frame.
-
-        Raises:
-            LocalProtocolError: A value does not fit its field.
-        """
-        return build(self.KIND, self.LAYOUT, asdict(self))
-
-    @classmethod
-    def from_frame(cls, frame: Frame) -> "EncoderPacket":
-        """Read the packet.
-
-        Raises:
-            RemoteProtocolError: It is too short.
-        """
-        return cls(**parse(cls.LAYOUT, frame))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

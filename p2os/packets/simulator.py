@@ -23,7 +23,7 @@ from construct import (
 )
 
 from p2os.errors import LocalProtocolError
-from p2os.packets.layout import build, parse
+from p2os.packets.layout import LaidOutPacket, build, parse
 from p2os.wire import Frame
 
 _TEXT = NullTerminated(GreedyBytes)
@@ -32,7 +32,7 @@ TEN_MILLION = 10_000_000
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class SimstatPacket:
+class SimstatPacket(LaidOutPacket):
     """SIMSTAT: the simulator's clock and the true pose, as asked for by SIM_STAT.
 
     Intervals in ms, the true position in mm, its heading in degrees; latitude,
@@ -80,15 +80,6 @@ class SimstatPacket:
         """
         _without_nul(self.raw_name, self.raw_version)
         return build(self.KIND, self.LAYOUT, asdict(self))
-
-    @classmethod
-    def from_frame(cls, frame: Frame) -> "SimstatPacket":
-        """Read the packet.
-
-        Raises:
-            RemoteProtocolError: It is too short.
-        """
-        return cls(**parse(cls.LAYOUT, frame))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -240,7 +231,7 @@ class SimLaserPacket:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class MapChangedPacket:
+class MapChangedPacket(LaidOutPacket):
     """The simulator has loaded another map.
 
     Args:
@@ -266,15 +257,6 @@ class MapChangedPacket:
         """
         _without_nul(self.raw_name)
         return build(self.KIND, self.LAYOUT, asdict(self))
-
-    @classmethod
-    def from_frame(cls, frame: Frame) -> "MapChangedPacket":
-        """Read the packet.
-
-        Raises:
-            RemoteProtocolError: It is too short.
-        """
-        return cls(**parse(cls.LAYOUT, frame))
 
 
 def _without_nul(*texts: bytes) -> None:

@@ -1,6 +1,7 @@
 """Tables as Apache Parquet and Arrow (Feather) files; needs the extra `export`."""
 
 from pathlib import Path
+from typing import Any
 
 from p2os.errors import MissingDependencyError
 from p2os.trace.table import Table
@@ -15,12 +16,10 @@ def write_parquet(table: Table, path: Path) -> None:
         MissingDependencyError: pyarrow is not installed.
         OSError: The file cannot be written.
     """
-    try:
-        import pyarrow as pa
-        from pyarrow import parquet
-    except ImportError as error:
-        raise MissingDependencyError(f"{path.suffix} files need pyarrow", hint=HINT) from error
-    parquet.write_table(pa.table(dict(table.columns)), path)
+    columns = _columns(table, path)
+    from pyarrow import parquet
+
+    parquet.write_table(columns, path)
 
 
 def write_arrow(table: Table, path: Path) -> None:
@@ -30,10 +29,17 @@ def write_arrow(table: Table, path: Path) -> None:
         MissingDependencyError: pyarrow is not installed.
         OSError: The file cannot be written.
     """
+    columns = _columns(table, path)
+    from pyarrow import ipc
+
+    with path.open("wb") as file, ipc.new_file(file, columns.schema) as writer:
+        writer.write_table(columns)
+
+
+def _columns(table: Table, path: Path) -> Any:
+    """Return a table as pyarrow's."""
     try:
         import pyarrow as pa
     except ImportError as error:
         raise MissingDependencyError(f"{path.suffix} files need pyarrow", hint=HINT) from error
-    columns = pa.table(dict(table.columns))
-    with path.open("wb") as file, pa.ipc.new_file(file, columns.schema) as writer:
-        writer.write_table(columns)
+    return pa.table(dict(table.columns))
