@@ -60,9 +60,11 @@ class Fleet:
         ready = self._wait(max(wait_s, 0.0))
         now_s = time.monotonic()
         for index, host in enumerate(self.hosts):
-            if self._due_s[index] <= now_s or not ready.isdisjoint(self._listening[index]):
+            is_due = self._due_s[index] <= now_s  # it lives in the next turn: looking ahead here would put that off
+            if is_due or not ready.isdisjoint(self._listening[index]):
                 host.listen()
-                self._look_ahead(index)
+                if not is_due:
+                    self._look_ahead(index)
         if self.control is not None and self.control.serve(self.hosts):
             self._due_s = [0.0] * len(self.hosts)
 

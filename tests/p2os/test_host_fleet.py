@@ -247,6 +247,12 @@ def test_a_fleet_serves_each_of_its_robots_and_takes_orders(serving: Serving) ->
         line.close()
 
 
+def test_a_robot_whose_client_vanishes_in_motion_lives_on_to_a_stand(serving: Serving) -> None:
+    drive(serving, 0).close()
+    body = serving.robots[0].body
+    serving.wait_for(lambda: body.state.left_speed_mps == 0 and any("client gone" in told for told in serving.told))
+
+
 def address(url: str) -> tuple[str, int]:
     return "127.0.0.1", int(url.rpartition(":")[2])
 
