@@ -12,15 +12,17 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from bluepill_sim.chip import Chip
-from bluepill_sim.cpu import GENERAL, Register
+from bluepill_sim.cpu import GENERAL, Register, Row
 from bluepill_sim.durations import Span
-from bluepill_sim.errors import UnmodelledError
+from bluepill_sim.errors import ImageError, UnmodelledError
 from bluepill_sim.faults import FAULT_ROWS, FaultKind, FaultReport
 from bluepill_sim.image import Image, load_image
 from bluepill_sim.memory import Memory
 from bluepill_sim.pins import Pin, PinDrive
 from bluepill_sim.rcc import ResetCause
 from bluepill_sim.serial_port import Activity, SerialPort
+from bluepill_sim.sight.last_blocks import lines_of
+from bluepill_sim.sight.line_table import LineTable, read_lines
 from bluepill_sim.stm32f103 import FLASH_BASE, SRAM_BASE
 from bluepill_sim.timing import Nanos, Reached
 from bluepill_sim.waiting import Condition, run_for, until, wait_for_bytes
@@ -225,6 +227,19 @@ class BluePill:
         """Return where the program is: "symbol+0x12 (0x08000123)"."""
         return self.image.symbols.where(self.pc)
 
+    @property
+    def last_rows(self) -> tuple[Row, ...]:
+        """What ran last, oldest first: up to the fault, if there was one, else up to now (rows of `BlockRecorder`)."""
+        return self._live.engine.log.rows() if self.fault is None else self.fault.last_rows
+
+    def last_blocks(self) -> list[str]:
+        """Return what ran last as lines for a person: the last 32 blocks and exceptions, with symbol and line."""
+        try:
+            table = read_lines(self.image)
+        except ImageError:  # the file has been built anew meanwhile, or never had lines
+            table = LineTable()
+        return lines_of(self.last_rows, self.image.symbols, table)
+
     def register(self, name: str) -> int:
         """Return a register by its name, such as "R0", "SP" or "XPSR"."""
         return self._live.engine.registers[Register[name.upper()]]
@@ -326,4 +341,5 @@ class BluePill:
             registers=tuple(registers),
             at_ns=self._chip.now_ns,
             is_lockup=is_lockup,
+            last_rows=self._chip.engine.log.rows(),
         )

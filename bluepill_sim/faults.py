@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from enum import Enum
 
 from bluepill_sim.cpu.halt import HaltKind
+from bluepill_sim.cpu.recorder import Row
 from bluepill_sim.nvic import BUS_FAULT, HARD_FAULT, MEM_MANAGE, USAGE_FAULT
 from bluepill_sim.timing import Nanos
 
@@ -85,6 +86,8 @@ class FaultReport:
     at_ns: Nanos
     #: Whether the core has locked up: nothing but a reset moves it.
     is_lockup: bool = False
+    #: What ran up to the fault, oldest first: rows of `BlockRecorder`, at most 32.
+    last_rows: tuple[Row, ...] = ()
 
     def __str__(self) -> str:
         """Return one line for a person."""

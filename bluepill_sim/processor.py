@@ -382,8 +382,7 @@ class Processor:
         self.engine.jump(target)
 
     def _record(self, address: int, kind: int) -> None:
-        if self.engine.recorder is not None:
-            self.engine.recorder.put(self.cycle, address, kind)
+        self.engine.log.tell((self.cycle, address, kind))
 
     # Faults.
 

@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING
 from bluepill_sim.durations import Span, to_nanos
 from bluepill_sim.errors import BluePillError
 from bluepill_sim.serial_port import SerialPort
+from bluepill_sim.sight.last_blocks import title_of
 from bluepill_sim.timing import NS_PER_MS, NS_PER_S, Nanos, Reached, Reason
 
 if TYPE_CHECKING:
@@ -53,28 +54,32 @@ def run_to(board: "BluePill", end_ns: Nanos) -> Reached:
             return reached
 
 
-def until(board: "BluePill", condition: Condition, timeout: Span) -> Nanos:
+def until(
+    board: "BluePill", condition: Condition, timeout: Span, advance: Callable[[Nanos], Reached] | None = None
+) -> Nanos:
     """Run until a condition holds; return when that was.
 
     Args:
         board: what runs.
         condition: words of this module's text, or a function of the board, looked at each millisecond.
         timeout: the longest wait, in virtual time.
+        advance: brings the board to a time, or less far; None is the board's own.
 
     Raises:
-        WaitError: the time is over, or the core halted for good.
+        WaitError: the time is over, or the core halted for good; its notes show what ran last.
         BluePillError: the words are not understood.
     """
+    advance = advance or board.advance_to
     end_ns = board.now_ns + to_nanos(timeout)
     with _watch(board, condition) as (holds, step_ns):
         while not holds():
             if board.now_ns >= end_ns:
-                raise WaitError(
-                    f"not seen within {to_nanos(timeout) / NS_PER_S:g} s: {_name(condition)}; {_state(board)}"
+                raise _given_up(
+                    board, f"not seen within {to_nanos(timeout) / NS_PER_S:g} s: {_name(condition)}; {_state(board)}"
                 )
             limit = end_ns if step_ns is None else min(end_ns, board.now_ns + step_ns)
-            if board.advance_to(limit).reason is Reason.HALT and not holds():
-                raise WaitError(f"the core halted before: {_name(condition)}; {_state(board)}")
+            if advance(limit).reason is Reason.HALT and not holds():
+                raise _given_up(board, f"the core halted before: {_name(condition)}; {_state(board)}")
         return board.now_ns
 
 
@@ -93,9 +98,10 @@ def wait_for_bytes(board: "BluePill", port: SerialPort, pattern: bytes, within: 
             reached = board.advance_to(end_ns)
             if reached.reason is Reason.HALT or (board.now_ns >= end_ns and pattern not in port.unread):
                 last = bytes(port.unread[-_SHOWN:])
-                raise WaitError(
+                raise _given_up(
+                    board,
                     f"{port.name} did not send {pattern!r} within {to_nanos(within) / NS_PER_S:g} s; "
-                    f"it sent {last!r}; {_state(board)}"
+                    f"it sent {last!r}; {_state(board)}",
                 )
 
 
@@ -167,6 +173,15 @@ def _stop_at_words(board: "BluePill", port: SerialPort, sent: bytearray | None =
 
 def _name(condition: Condition) -> str:
     return condition if isinstance(condition, str) else getattr(condition, "__name__", "the condition")
+
+
+def _given_up(board: "BluePill", message: str) -> WaitError:
+    """Return the error of a wait; pytest and tracebacks show its note, one line for a person does not."""
+    error = WaitError(message)
+    lines = board.last_blocks()
+    if lines:
+        error.add_note("\n".join([title_of(len(lines)), *lines]))
+    return error
 
 
 def _state(board: "BluePill") -> str:

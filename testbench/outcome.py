@@ -17,7 +17,7 @@ SUMMARY_NAME = "summary.json"
 _FROM_META = ("firmware_sha256", "scenario", "mode", "body", "world", "seed")
 _FROM_END = (
     "virtual_s", "wall_s", "real_time_factor", "distance_m", "collisions", "min_clearance_m", "trace_sha256",
-    "passed", "failures", "goals_met", "notes",
+    "passed", "failures", "goals_met", "notes", "last_blocks",
 )  # fmt: skip
 
 
@@ -47,4 +47,5 @@ def _end_of_a_cut_run(record: RunRecord) -> Json:
         "failures": [f"the run was cut at {record.last_ns / NS_PER_S:.1f} s"],
         "goals_met": [],
         "notes": [],
+        "last_blocks": [],
     }

@@ -63,6 +63,10 @@ class Chip(Protocol):
         """What the firmware died of; None while it lives."""
         ...
 
+    def last_blocks(self) -> Sequence[str]:
+        """Return what it ran last, up to the fault if there was one, as lines for a person."""
+        ...
+
     @property
     def activity(self) -> Activity:
         """When the firmware was last seen alive."""

@@ -183,6 +183,7 @@ def _record(
             "failures": failures + missed,
             "goals_met": met,
             "notes": notes(bench, end, pacer),
+            "last_blocks": last_blocks(bench, end, was_interrupted=was_interrupted),
             "worst_lag_ms": None if pacer is None else round(pacer.worst_lag_ns / NS_PER_MS, 1),
         }
     )
@@ -208,9 +209,25 @@ def notes(bench: Bench | RemoteBench, end: Nanos, pacer: Pacer | None) -> list[s
     chip = bench.chip
     result = [note for note in (bench.note,) if note]
     result += chip.warnings
-    seen = max(chip.activity.last_pin_ns, chip.activity.last_usart_ns, chip.activity.last_wfi_ns)
-    if chip.fault is None and end - seen >= QUIET_NS:
+    if is_quiet(bench, end):
+        seen = _last_seen_ns(bench)
         result.append(f"no pin, USART or WFI was seen since {seen / NS_PER_S:.3f} s; the program is at {chip.where()}")
     if pacer is not None and pacer.worst_lag_ns > PACED_SLICE_NS:
         result.append(f"the run lagged behind the wall clock by up to {pacer.worst_lag_ns / NS_PER_MS:.0f} ms")
     return result
+
+
+def last_blocks(bench: Bench | RemoteBench, end: Nanos, *, was_interrupted: bool) -> list[str]:
+    """Return what the program ran last, where that tells why it ended: it died, it hangs, or somebody had enough."""
+    wanted = was_interrupted or bench.chip.fault is not None or is_quiet(bench, end)
+    return list(bench.chip.last_blocks()) if wanted else []
+
+
+def is_quiet(bench: Bench | RemoteBench, end: Nanos) -> bool:
+    """Tell whether a program that has not died gives no sign of life."""
+    return bench.chip.fault is None and end - _last_seen_ns(bench) >= QUIET_NS
+
+
+def _last_seen_ns(bench: Bench | RemoteBench) -> Nanos:
+    activity = bench.chip.activity
+    return max(activity.last_pin_ns, activity.last_usart_ns, activity.last_wfi_ns)

@@ -4,16 +4,25 @@ Invariant: the same list gives the same run, whatever the slices.
 """
 
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 
 from bluepill_sim.board import BluePill
 from bluepill_sim.durations import to_nanos
 from bluepill_sim.errors import BluePillError
+from bluepill_sim.sight.last_blocks import title_of
 from bluepill_sim.timing import NS_PER_S, Nanos, Reached, Reason
+from bluepill_sim.waiting import WaitError
 
 _LEVELS = {"0": False, "1": True, "low": False, "high": True, "z": None}
 _HINT = "PIN=LEVEL@TIME with a level of 0, 1 or z, such as PA6=1@3.5s"
+
+
+class OverBudgetError(BluePillError):
+    """A run took longer than it may."""
+
+    exit_code = 1
 
 
 @dataclass(frozen=True, slots=True, order=True)
@@ -47,20 +56,64 @@ def parse_changes(texts: Sequence[str], board: BluePill) -> list[Change]:
     return sorted(changes, key=lambda change: change.at_ns)
 
 
-def run_driven(
-    board: BluePill, end_ns: Nanos, changes: Sequence[Change], advance: Callable[[Nanos], Reached] | None = None
-) -> Reached:
-    """Run to a time and put the changes on the pins at theirs; a halt for good ends it."""
-    advance = advance or board.advance_to
-    for change in (*changes, None):
-        limit = end_ns if change is None else min(change.at_ns, end_ns)
-        while board.now_ns < limit:
-            reached = advance(limit)
+class Schedule:
+    """A board, and what happens at its pins."""
+
+    def __init__(
+        self, board: BluePill, changes: Sequence[Change], advance: Callable[[Nanos], Reached] | None = None
+    ) -> None:
+        """Plan changes.
+
+        Args:
+            board: the board.
+            changes: by time.
+            advance: brings the board to a time, or less far; None is the board's own.
+        """
+        self._board = board
+        self._left = list(reversed(changes))
+        self._advance = advance or board.advance_to
+
+    def advance_to(self, limit_ns: Nanos) -> Reached:
+        """Bring the board to a time, or less far, and put what is due by then on its pins."""
+        self._act(self._board.now_ns)
+        due_ns = self._left[-1].at_ns if self._left else limit_ns
+        reached = self._advance(min(limit_ns, due_ns))
+        self._act(self._board.now_ns)
+        return reached
+
+    def run_to(self, end_ns: Nanos) -> Reached:
+        """Run to a time, past edges; a halt for good ends it."""
+        self._act(self._board.now_ns)
+        while self._board.now_ns < end_ns:
+            reached = self.advance_to(end_ns)
             if reached.reason is Reason.HALT:
                 return reached
-        if change is not None and change.at_ns <= end_ns:
-            board.pin(change.pin).drive(change.level)
-    return Reached(board.now_ns)
+        return Reached(self._board.now_ns)
+
+    def _act(self, now_ns: Nanos) -> None:
+        while self._left and self._left[-1].at_ns <= now_ns:
+            change = self._left.pop()
+            self._board.pin(change.pin).drive(change.level)
+
+
+def run_driven(board: BluePill, end_ns: Nanos, changes: Sequence[Change]) -> Reached:
+    """Run to a time and put the changes on the pins at theirs; a halt for good ends it."""
+    with showing_where_it_hangs(board):
+        return Schedule(board, changes).run_to(end_ns)
+
+
+@contextmanager
+def showing_where_it_hangs(board: BluePill) -> Iterator[None]:
+    """Tell what ran last when a person, the clock or a wait gives a run up."""
+    try:
+        yield
+    except (KeyboardInterrupt, OverBudgetError, WaitError):
+        say(f"given up at {summary(board)}")
+        if board.fault is None:
+            tell_last_blocks(board)
+        else:
+            tell_fault(board)
+        raise
 
 
 def say(line: str) -> None:
@@ -83,10 +136,19 @@ def summary(board: BluePill) -> str:
 
 
 def tell_fault(board: BluePill) -> bool:
-    """Tell of a fault, if there is one, with the registers; return whether there is."""
+    """Tell of a fault, if there is one, with the registers and the last blocks; return whether there is."""
     if board.fault is None:
         return False
     say(f"fault: {board.fault}")
     for line in board.fault.register_dump.splitlines():
         say(f"  {line}")
+    tell_last_blocks(board)
     return True
+
+
+def tell_last_blocks(board: BluePill) -> None:
+    """Tell what a board ran last."""
+    lines = board.last_blocks()
+    say(title_of(len(lines)))
+    for line in lines:
+        say(line)

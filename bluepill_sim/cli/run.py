@@ -8,13 +8,20 @@ from typing import Annotated
 import typer
 
 from bluepill_sim.board import BluePill
-from bluepill_sim.cli.driving import parse_changes, run_driven, say, summary, tell_fault, warn_on_stderr
+from bluepill_sim.cli.driving import (
+    OverBudgetError,
+    Schedule,
+    parse_changes,
+    say,
+    showing_where_it_hangs,
+    summary,
+    tell_fault,
+    warn_on_stderr,
+)
 from bluepill_sim.console import connect, open_console
 from bluepill_sim.durations import to_nanos
-from bluepill_sim.errors import BluePillError
-from bluepill_sim.sight.last_blocks import STRIDE_NS, LastBlocks, lines_of
-from bluepill_sim.sight.line_table import read_lines
 from bluepill_sim.timing import NS_PER_MS, NS_PER_S, Nanos, Reached, Reason
+from bluepill_sim.waiting import until as wait_until
 
 HELP = """Boot a firmware on an emulated BluePill; what it sends on USART1 goes to stdout.
 
@@ -34,16 +41,12 @@ Examples:
 #: chosen: how often a running program is given to whoever types, and held back to the clock.
 SLICE_NS: Nanos = 2 * NS_PER_MS
 DEFAULT_SPAN = "1s"
+#: chosen: so often the wall clock is looked at.
+STRIDE_NS: Nanos = 20 * NS_PER_MS
 #: chosen: longer than any run that somebody waits for.
 _BUDGET_S = 600.0
 #: Without an end: until Ctrl-C.
 _FOR_EVER = "31536000s"
-
-
-class OverBudgetError(BluePillError):
-    """A run took longer than it may."""
-
-    exit_code = 1
 
 
 def register(app: typer.Typer) -> None:
@@ -76,49 +79,35 @@ def run(
     carry = connect(console, board.usart1)
     if uart == "pty:":
         say(f"USART1 is at {console.description}")
-    last = LastBlocks(board)
+    advance = _paced(board, carry) if realtime or uart == "pty:" else _bounded(board, budget_s)
+    schedule = Schedule(board, changes, advance)
     try:
-        if until is not None:
-            run_driven(board, 0, changes)
-            board.until(until, timeout=end_ns)
-        elif realtime or uart == "pty:":
-            run_driven(board, end_ns, changes, _paced(board, carry))
-        else:
-            run_driven(board, end_ns, changes, _bounded(last, budget_s))
-    except (KeyboardInterrupt, OverBudgetError) as error:
-        say("interrupted" if isinstance(error, KeyboardInterrupt) else "given up")
-        tell_last_blocks(last, board)
-        raise
+        with showing_where_it_hangs(board):
+            if until is None:
+                schedule.run_to(end_ns)
+            else:
+                wait_until(board, until, end_ns, schedule.advance_to)
     finally:
         console.close()
         if uart == "-" and board.usart1.unread and not board.usart1.unread.endswith(b"\n"):
             typer.echo("")
         say(summary(board))
     if tell_fault(board):
-        tell_last_blocks(last, board)
         raise typer.Exit(1)
 
 
-def tell_last_blocks(last: LastBlocks, board: BluePill) -> None:
-    """Tell a person what a board ran last."""
-    rows = last.rows()
-    say(f"the last {len(rows)} blocks, by cycle:")
-    for line in lines_of(rows, board.image.symbols, read_lines(board.image)):
-        say(line)
-
-
-def _bounded(last: LastBlocks, budget_s: float) -> Callable[[Nanos], Reached]:
+def _bounded(board: BluePill, budget_s: float) -> Callable[[Nanos], Reached]:
     """Return a way to advance that ends with the wall clock's budget, however a program spins."""
     end_ns = time.monotonic_ns() + int(budget_s * NS_PER_S)
 
     def advance(limit_ns: Nanos) -> Reached:
         while True:
-            reached = last.advance_to(min(limit_ns, last.now_ns + STRIDE_NS))
+            reached = board.advance_to(min(limit_ns, board.now_ns + STRIDE_NS))
             if reached.reason is not Reason.DEADLINE or reached.now >= limit_ns:
                 return reached
             if time.monotonic_ns() > end_ns:
                 raise OverBudgetError(
-                    f"{budget_s:g} s of wall clock are used up at {last.now_ns / NS_PER_S:.6f} s of virtual time",
+                    f"{budget_s:g} s of wall clock are used up at {board.now_ns / NS_PER_S:.6f} s of virtual time",
                     hint="--budget gives more, --for asks for less",
                 )
 

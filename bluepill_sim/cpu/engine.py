@@ -25,13 +25,14 @@ from dataclasses import replace
 
 from bluepill_sim.block_cost import NO_BLOCK
 from bluepill_sim.cpu import core, endings
+from bluepill_sim.cpu.block_log import BlockLog, KeptRows, LastRows
 from bluepill_sim.cpu.block_table import BlockTable, Measure
 from bluepill_sim.cpu.core import Core, CoreSnapshot, ReadAccess, WriteAccess, WriteToReadOnly
 from bluepill_sim.cpu.debug_unit import DebugUnit, Watchpoint
 from bluepill_sim.cpu.frozen import IT_BITS, Frozen, copy_of, it_state_of
 from bluepill_sim.cpu.halt import DEBUG_HALTS, Halt, HaltKind
 from bluepill_sim.cpu.io_region import guarded
-from bluepill_sim.cpu.recorder import BLOCK, BlockRecorder
+from bluepill_sim.cpu.recorder import BLOCK, BlockRecorder, Row
 from bluepill_sim.cpu.registers import Register
 from bluepill_sim.cpu.rest import RestOfBlock, RestSnapshot
 from bluepill_sim.cpu.scratch import Scratch
@@ -41,8 +42,8 @@ from bluepill_sim.cpu.traps import Traps
 _NEVER = 1 << 62
 
 _T_BIT = 1 << 24
-#: Registers, cycle, PC, T bit, whether exclusive accesses are used, the rest of a block.
-EngineSnapshot = tuple[CoreSnapshot, int, int, bool, bool, RestSnapshot | None]
+#: Registers, cycle, PC, T bit, whether exclusive accesses are used, the rest of a block, the last rows.
+EngineSnapshot = tuple[CoreSnapshot, int, int, bool, bool, RestSnapshot | None, tuple[Row, ...]]
 
 
 class Engine:
@@ -84,9 +85,9 @@ class Engine:
         self._frozen: Frozen | None = None
         self._rest = RestOfBlock()
         self._is_stepping = False
-        #: The branch to itself that the recorder knows of.
-        self._spins_at: int | None = None
-        self._recorder: BlockRecorder | None = None
+        #: What ran last; the processor tells it of exceptions.
+        self.log = BlockLog(self._make_last_rows(), self._fail)
+        self._tell = self.log.tell
         self._traps = self._make_traps()
         self._debug = DebugUnit(self._core, self.stop_before)
         #: Addresses that a run halts before; change it between runs as you like.
@@ -101,12 +102,15 @@ class Engine:
     def _begin(self) -> None:
         """Get ready to hold the state, for an engine that keeps it elsewhere."""
 
+    def _make_last_rows(self) -> KeptRows:
+        return LastRows()
+
     def _make_traps(self) -> Traps:
         return Traps(self._core, self.stop_before, self._leave_it_block)
 
     def _install_hooks(self) -> tuple[int, ...]:
         """Have blocks and what ends a run told; return the hooks but that of the blocks."""
-        self._block_hook = self._core.on_block(self._enter_block if self._recorder is None else self._record_block)
+        self._block_hook = self._core.on_block(self._enter_block)
         return self._core.on_interrupt(self._interrupted), self._core.on_invalid(self._invalid)
 
     # Memory.
@@ -173,15 +177,16 @@ class Engine:
 
     @property
     def recorder(self) -> BlockRecorder | None:
-        """Who is told of each block; None for nobody. Set it between runs; the processor tells it of exceptions."""
-        return self._recorder
+        """Who is told of each block and each exception; None for nobody. Set it between runs."""
+        return self.log.recorder
 
     @recorder.setter
     def recorder(self, recorder: BlockRecorder | None) -> None:
-        self._recorder = recorder
-        self._core.remove_hook(self._block_hook)
-        self._block_hook = self._core.on_block(self._enter_block if recorder is None else self._record_block)
-        self._core.drop_all_code()
+        self._take_recorder(recorder)
+
+    def _take_recorder(self, recorder: BlockRecorder | None) -> None:
+        self.log.recorder = recorder
+        self._tell = self.log.tell
 
     def _run(self, stop_at: int) -> Halt:
         self.stop_at = stop_at
@@ -261,22 +266,23 @@ class Engine:
         """Break the exclusive reservation, as an exception does; leaves `pc` alone."""
         if not self._blocks.uses_exclusive:
             return
-        saved = self.cycle, self.stop_at, self._recorder
-        self.stop_at, self._recorder = _NEVER, None
+        saved = self.cycle, self.stop_at, self._tell
+        self.stop_at, self._tell = _NEVER, lambda row: None  # noqa: ARG005 - nobody is to know
         self._scratch.clear_exclusive()
-        self.cycle, self.stop_at, self._recorder = saved
+        self.cycle, self.stop_at, self._tell = saved
         self.block = NO_BLOCK
 
     # Snapshots.
 
     def snapshot(self) -> EngineSnapshot:
         """Return the core's state, memory left aside."""
-        rest = self._rest.snapshot()
-        return self._core.save(), self.cycle, self.pc, self.is_thumb, self._blocks.uses_exclusive, rest
+        rest, rows = self._rest.snapshot(), self.log.rows()
+        return self._core.save(), self.cycle, self.pc, self.is_thumb, self._blocks.uses_exclusive, rest, rows
 
     def restore(self, snapshot: EngineSnapshot) -> None:
         """Put back what `snapshot` returned; memory is the caller's business, before this call."""
-        registers, self.cycle, self.pc, self.is_thumb, self._blocks.uses_exclusive, rest = snapshot
+        registers, self.cycle, self.pc, self.is_thumb, self._blocks.uses_exclusive, rest, rows = snapshot
+        self.log.put_back(rows)
         self._core.load(registers)
         self.it_state = it_state_of(self.registers[Register.CPSR])
         self.block = NO_BLOCK
@@ -301,24 +307,10 @@ class Engine:
                 self._enter_special(address, size)
             else:
                 self.block = known
+                self._tell((cycle, address, BLOCK))
         except BaseException as error:  # noqa: BLE001 - C stands between here and the caller; Ctrl-C arrives here
             self._fail(error)
             self._stop_at_border(address)
-
-    def _record_block(self, uc: int, address: int, size: int, user: int) -> None:
-        """Enter a block, and tell of it: not of the rest of one, and of a branch to itself once."""
-        before = self.block
-        self._enter_block(uc, address, size, user)
-        block = self.block
-        if block is NO_BLOCK or block is self._rest.resumed or self._frozen is not None or self._recorder is None:
-            return
-        if block.is_self_loop and self._spins_at == address and (before is block or self._run_from == address):
-            return
-        self._spins_at = address if block.is_self_loop else None
-        try:
-            self._recorder.put(self.cycle, address, BLOCK)
-        except BaseException as error:  # noqa: BLE001 - C stands between here and the caller
-            self._fail(error)
 
     def _enter_special(self, address: int, size: int) -> None:
         """Enter a block that is new, stands in writable memory, or needs attention."""
@@ -342,6 +334,10 @@ class Engine:
             self.stop_at = 0
         if block.sends_event and self.on_event is not None:
             self.on_event()
+        if block.is_self_loop:
+            self.log.tell_spin(self.cycle, address)
+        else:
+            self._tell((self.cycle, address, BLOCK))
 
     def _resume(self, stop_at: int) -> None:
         """Get ready to go on inside a block."""

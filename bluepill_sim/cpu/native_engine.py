@@ -14,13 +14,13 @@ state is in `shared`, whoever ran last.
 """
 
 import ctypes
-import struct
 import weakref
 from collections.abc import Callable
 
 from bluepill_sim.block_cost import NO_BLOCK, Block
 from bluepill_sim.cpu import scratch
 from bluepill_sim.cpu.accesses import Access, accesses_of, is_ambiguous
+from bluepill_sim.cpu.block_log import KeptRows
 from bluepill_sim.cpu.core import RawRead, RawWrite, ReadAccess, WriteAccess
 from bluepill_sim.cpu.engine import Engine, EngineSnapshot
 from bluepill_sim.cpu.halt import Halt, HaltKind
@@ -44,9 +44,11 @@ from bluepill_sim.cpu.native_state import (
     FROZEN,
     HALT_KINDS,
     HALT_NUMBERS,
+    RECORD,
     STALE,
     UNEXPLAINED,
     InstructionRow,
+    NativeLastRows,
     Shared,
     field,
     flag,
@@ -62,8 +64,6 @@ _ENDS = {Kind.WAIT_INTERRUPT: 16, Kind.WAIT_EVENT: 32, Kind.YIELD: 64}
 _NO_BLOCK_START = 0xFFFF_FFFF
 #: Chosen: so often at least Python looks at signals, such as Ctrl-C.
 _SLICE_CYCLES = 20_000_000
-#: `struct record`.
-_RECORD = struct.Struct("<QIi")
 #: Chosen: rows that C keeps before Python takes them.
 _RECORD_ROOM = 4096
 
@@ -273,15 +273,8 @@ class NativeEngine(Engine):
         else:
             library().core_clear_exclusive(self._state)
 
-    @property
-    def recorder(self) -> BlockRecorder | None:
-        """As of `Engine`."""
-        return self._recorder
-
-    @recorder.setter
-    def recorder(self, recorder: BlockRecorder | None) -> None:
-        self.use_python(False)
-        self._recorder = recorder
+    def _take_recorder(self, recorder: BlockRecorder | None) -> None:
+        super()._take_recorder(recorder)
         if not library().core_start_recording(self._state, 0 if recorder is None else _RECORD_ROOM):
             raise MemoryError("no memory for a record of blocks")
 
@@ -306,6 +299,9 @@ class NativeEngine(Engine):
             core.hook_native("invalid", address_of("core_on_invalid"), user),
         )
         return self._native_hooks
+
+    def _make_last_rows(self) -> KeptRows:
+        return NativeLastRows(self.shared)
 
     def _make_traps(self) -> Traps:
         return NativeTraps(self._core, self.stop_before, self._leave_it_block, self._state)
@@ -380,9 +376,9 @@ class NativeEngine(Engine):
 
     def _take_records(self, rows: int, count: int) -> None:
         try:
-            if self._recorder is not None:
-                put = self._recorder.put
-                for cycle, address, kind in _RECORD.iter_unpack(ctypes.string_at(rows, count * _RECORD.size)):
+            if self.recorder is not None:
+                put = self.recorder.put
+                for cycle, address, kind in RECORD.iter_unpack(ctypes.string_at(rows, count * RECORD.size)):
                     put(cycle, address, kind)
         except BaseException as error:  # noqa: BLE001 - C stands between here and the caller
             self._fail(error)

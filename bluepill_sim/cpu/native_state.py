@@ -5,9 +5,13 @@ field; `native_library.py` refuses a library that has another size of it.
 """
 
 import ctypes
+import struct
+from collections.abc import Sequence
 from typing import Any
 
+from bluepill_sim.cpu.block_log import LAST_ROWS
 from bluepill_sim.cpu.halt import HaltKind
+from bluepill_sim.cpu.recorder import BLOCK, Row
 
 #: What stands for "never" and for "none" among times.
 NO_TIME = (1 << 64) - 1
@@ -35,7 +39,16 @@ HALT_NUMBERS = {kind: number for number, kind in enumerate(HALT_KINDS)}
 BORDER = 0
 DELIVER, FAILED, STALE, FROZEN, UNEXPLAINED = range(len(HALT_KINDS), len(HALT_KINDS) + 5)
 
+#: `struct record`, for many at a time.
+RECORD = struct.Struct("<QIi")
+
 _U8, _U32, _U64 = ctypes.c_uint8, ctypes.c_uint32, ctypes.c_uint64
+
+
+class Record(ctypes.Structure):
+    """`struct record`."""
+
+    _fields_ = (("cycle", _U64), ("address", _U32), ("kind", ctypes.c_int32))
 
 
 class Shared(ctypes.Structure):
@@ -81,7 +94,7 @@ class Shared(ctypes.Structure):
         ("it_state", _U32),
         ("is_python", _U32),
         ("pins_changed", _U32),
-        ("_padding", _U32),
+        ("is_fresh", _U32),
         ("last_pin_cycle", _U64),
         ("priorities", _U8 * 76),
         ("_priorities_end", _U8 * 4),
@@ -93,6 +106,8 @@ class Shared(ctypes.Structure):
         ("flash_bytes", _U32),
         ("scratch", _U32),
         ("_last_padding", _U32),
+        ("told", _U64),
+        ("last", Record * LAST_ROWS),
     )
 
 
@@ -148,3 +163,38 @@ def time(name: str, doc: str) -> Any:
         setattr(self.shared, name, NO_TIME if value is None else value)
 
     return property(read, write, doc=doc)
+
+
+class NativeLastRows:
+    """`KeptRows` in the shared struct."""
+
+    is_fresh = flag("is_fresh", "As of `KeptRows`.")
+
+    def __init__(self, shared: Shared) -> None:
+        self.shared = shared
+
+    def append(self, row: Row) -> None:
+        """As of `KeptRows`."""
+        shared = self.shared
+        shared.last[shared.told % LAST_ROWS] = row
+        shared.told += 1
+
+    def rows(self) -> tuple[Row, ...]:
+        """As of `KeptRows`."""
+        shared = self.shared
+        count = min(shared.told, LAST_ROWS)
+        rows = tuple(RECORD.iter_unpack(bytes(shared.last)))
+        first = shared.told % LAST_ROWS
+        return (rows[first:] + rows[:first])[-count:] if count else ()
+
+    def put_back(self, rows: Sequence[Row]) -> None:
+        """As of `KeptRows`."""
+        self.shared.told = 0
+        for row in rows:
+            self.append(row)
+
+    def ends_with_block(self, address: int) -> bool:
+        """As of `KeptRows`."""
+        shared = self.shared
+        last = shared.last[(shared.told - 1) % LAST_ROWS]
+        return bool(shared.told) and last.kind == BLOCK and last.address == address

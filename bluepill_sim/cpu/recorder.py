@@ -1,4 +1,4 @@
-"""What ran, block by block: a bounded record that costs nothing while nobody asks for it.
+"""What ran, block by block: a bounded record for whoever asks; the last rows are kept in any case (`block_log.py`).
 
     (cycle, address, BLOCK)              a basic block began
     (cycle, address, n > 0)              exception n was entered from the instruction at `address`

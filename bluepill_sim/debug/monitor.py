@@ -29,7 +29,8 @@ COMMANDS = {
     "pin": Command("pin PA4 [1|0|z]", "one pin; with a level: drive it from outside, z lets go"),
     "snapshot": Command("snapshot [NAME]", "keep the whole machine's state"),
     "restore": Command("restore [NAME]", "go back to it"),
-    "fault": Command("fault", "the fault, if there was one"),
+    "fault": Command("fault", "the fault, if there was one, with what ran before it"),
+    "blocks": Command("blocks", "the last 32 blocks and exceptions (those before the fault, if there was one)"),
     "warnings": Command("warnings", "what was touched that is not modelled, and electrical mistakes"),
 }
 
@@ -59,6 +60,7 @@ class Monitor:
             "snapshot": self._snapshot,
             "restore": self._restore,
             "fault": self._fault,
+            "blocks": self._blocks,
             "warnings": self._warnings,
         }
         act = acts.get(words[0])
@@ -121,7 +123,12 @@ class Monitor:
 
     def _fault(self, _words: list[str]) -> str:
         fault = self._execution.machine.board.fault
-        return "no fault" if fault is None else f"{fault}\n{fault.register_dump}"
+        if fault is None:
+            return "no fault"
+        return "\n".join([f"{fault}\n{fault.register_dump}", *self._execution.machine.board.last_blocks()])
+
+    def _blocks(self, _words: list[str]) -> str:
+        return "\n".join(self._execution.machine.board.last_blocks()) or "nothing has run yet"
 
     def _warnings(self, _words: list[str]) -> str:
         return "\n".join(self._execution.machine.board.warnings) or "no warnings"

@@ -37,6 +37,50 @@ static void stop_at_border(struct core *core, uint32_t address)
     end_run(core, HALT_BORDER, address);
 }
 
+void core_flush(struct core *core)
+{
+    if (core->record_count) {
+        const uint32_t count = core->record_count;
+        core->record_count = 0;
+        core->calls.recorded(core->records, count);
+    }
+}
+
+/* Has Python told of a row, when there are enough of them. */
+static void pass_on(struct core *core, const struct record *row)
+{
+    core->shared.is_fresh = 0;
+    core->records[core->record_count++] = *row;
+    if (core->record_count == core->record_room) {
+        core_flush(core);
+    }
+}
+
+/* Keeps a row, and passes it on to whoever records. */
+static inline void tell(struct core *core, uint64_t cycle, uint32_t address, int32_t kind)
+{
+    const struct record row = {cycle, address, kind};
+    core->shared.last[core->shared.told++ % LAST_ROWS] = row;
+    if (UNLIKELY(core->records != NULL)) {
+        pass_on(core, &row);
+    }
+}
+
+void record(struct core *core, uint32_t address, int32_t kind) { tell(core, core->shared.cycle, address, kind); }
+
+/* Tells of a branch to itself: once, however long it spins; as `Engine._tell_spin`. */
+static void tell_spin(struct core *core, uint32_t address)
+{
+    const struct shared *s = &core->shared;
+    const struct record *last = &s->last[(s->told - 1) % LAST_ROWS];
+    if (!s->told || last->kind != 0 || last->address != address) {
+        record(core, address, 0);
+    } else if (core->records != NULL && s->is_fresh) {
+        const struct record row = {s->cycle, address, 0};
+        pass_on(core, &row);
+    }
+}
+
 /* A block that is new, stands in writable memory, or needs attention. */
 static void enter_special(struct core *core, uint32_t address, uint32_t size, struct row *row)
 {
@@ -74,40 +118,10 @@ static void enter_special(struct core *core, uint32_t address, uint32_t size, st
     if (row->flags & ROW_SENDS_EVENT) {
         s->event_register = 1;
     }
-}
-
-/* Tells of a block that has been entered; of a branch to itself once, however long it spins. */
-static void record_block(struct core *core, const struct row *before, uint32_t address)
-{
-    const struct row *row = core->block;
-    if (row == &core->none) {
-        return;
-    }
-    const bool spins = row->flags & ROW_SELF_LOOP;
-    if (spins && core->spins_at == address && (before == row || core->shared.run_from == address)) {
-        return;
-    }
-    core->spins_at = spins ? address : UINT32_MAX;
-    record(core, address, 0);
-}
-
-void record(struct core *core, uint32_t address, int32_t kind)
-{
-    if (core->records == NULL) {
-        return;
-    }
-    core->records[core->record_count++] = (struct record){core->shared.cycle, address, kind};
-    if (core->record_count == core->record_room) {
-        core_flush(core);
-    }
-}
-
-void core_flush(struct core *core)
-{
-    if (core->record_count) {
-        const uint32_t count = core->record_count;
-        core->record_count = 0;
-        core->calls.recorded(core->records, count);
+    if (row->flags & ROW_SELF_LOOP) {
+        tell_spin(core, address);
+    } else {
+        record(core, address, 0);
     }
 }
 
@@ -118,7 +132,7 @@ bool core_start_recording(struct core *core, uint32_t room)
     core->records = room ? malloc(room * sizeof *core->records) : NULL;
     core->record_room = room;
     core->record_count = 0;
-    core->spins_at = UINT32_MAX;
+    core->shared.is_fresh = 1;
     return !room || core->records != NULL;
 }
 
@@ -140,9 +154,7 @@ void core_on_block(void *engine, uint64_t at, uint32_t size, void *user)
     } else {
         core->block = row;
         core->io_next = 0;
-    }
-    if (UNLIKELY(core->records != NULL)) {
-        record_block(core, before, address);
+        tell(core, cycle, address, 0);
     }
 }
 

@@ -77,6 +77,16 @@ struct row {
     struct instruction instructions[];
 };
 
+/* A block that began, an exception that was entered (its number) or left (-1). */
+struct record {
+    uint64_t cycle;
+    uint32_t address;
+    int32_t kind;
+};
+
+/* How many of them are kept whether or not anybody records; a power of 2. */
+#define LAST_ROWS 32
+
 struct shared {
     uint64_t cycle, stop_at, access_cycle, last_sleep_cycle;
     uint64_t tick_base, tick_next;
@@ -90,13 +100,16 @@ struct shared {
     uint32_t tick_control, tick_reload, tick_value, tick_count_flag;
     uint32_t traps_division, grouping;
     uint32_t it_state, is_python;
-    uint32_t pins_changed, padding;
+    uint32_t pins_changed;
+    uint32_t is_fresh; /* whoever records has not been told of anything yet */
     uint64_t last_pin_cycle; /* the start of the block that last switched a pin silently */
     uint8_t priorities[80];
     /* Set by Python before the first run. */
     uint64_t sram, flash;
     uint32_t sram_base, sram_bytes, flash_base, flash_bytes;
     uint32_t scratch, last_padding;
+    uint64_t told; /* rows so far: the next one goes to `last` at this, modulo its size */
+    struct record last[LAST_ROWS];
 };
 
 /* The functions of Unicorn that this core calls. */
@@ -106,13 +119,6 @@ struct engine_api {
     int (*read_register)(void *, int, void *);
     int (*read_registers)(void *, const int *, void **, int);
     int (*write_registers)(void *, const int *, void *const *, int);
-};
-
-/* A block that began, an exception that was entered (its number) or left (-1). */
-struct record {
-    uint64_t cycle;
-    uint32_t address;
-    int32_t kind;
 };
 
 /* What Python is asked: each is void where Python keeps an exception for later. */
@@ -170,7 +176,7 @@ struct core {
     struct page pages[PAGES];
     struct port ports[8];
     uint32_t is_scratch;
-    uint32_t noted, spins_at;
+    uint32_t noted;
     uint32_t paged_region;
     struct allocation *allocations;
     struct record *records;

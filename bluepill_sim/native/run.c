@@ -37,7 +37,7 @@ struct core *core_new(void *engine, const struct engine_api *api, const struct c
         core->calls = *calls;
         core->none.start = core->none.end = UINT32_MAX;
         core->block = &core->none;
-        core->spins_at = core->paged_region = UINT32_MAX;
+        core->paged_region = UINT32_MAX;
         core->shared.last_sleep_cycle = core->shared.tick_next = NO_TIME;
     }
     return core;

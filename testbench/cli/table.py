@@ -6,6 +6,7 @@ from typing import cast
 from rich.console import Console
 from rich.table import Table
 
+from bluepill_sim.sight.last_blocks import title_of
 from testbench.run import RunResult
 
 
@@ -24,6 +25,11 @@ def print_result(result: RunResult, console: Console | None = None) -> None:
         console.print(failure, markup=False, soft_wrap=True)
     for note in cast("Sequence[str]", outcome["notes"]):
         console.print(f"note    {note}", markup=False, soft_wrap=True)
+    blocks = cast("Sequence[str]", outcome["last_blocks"] or ())
+    if blocks:
+        console.print(title_of(len(blocks)))
+    for line in blocks:
+        console.print(line, markup=False, soft_wrap=True)
     console.print(f"{'passed' if result.passed else 'FAILED'}; report: {result.report}", markup=False, soft_wrap=True)
 
 

@@ -119,12 +119,17 @@ def _lead(meta: Json) -> str:
 
 
 def _goals(end: Json) -> str:
-    """Return the goals as a list, those missed with their reason."""
+    """Return the goals as a list, those missed with their reason; then what a dead program ran last."""
     failures = cast("list[str]", end.get("failures") or [])
     met = cast("list[str]", end.get("goals_met") or [])
     items = [f'<li class="passed">{html.escape(text)}</li>' for text in met]
     items += [f"<li>{html.escape(text)}</li>" for text in failures]
-    return f'<ul class="goals">{"".join(items)}</ul>' if items else ""
+    goals = f'<ul class="goals">{"".join(items)}</ul>' if items else ""
+    blocks = cast("list[str]", end.get("last_blocks") or [])
+    if not blocks:
+        return goals
+    text = html.escape("\n".join(blocks))
+    return f"{goals}<details><summary>What ran last, by cycle</summary><pre>{text}</pre></details>"
 
 
 def _footer(record: RunRecord) -> str:

@@ -78,6 +78,9 @@ class FakeChip:
     def pin(self, name: str) -> FakePin:
         return self._pins.setdefault(name, FakePin(self, name))
 
+    def last_blocks(self) -> list[str]:
+        return [] if self.fault is None else ["          12  main+0x4 (0x08000104)"]
+
     def where(self) -> str:
         return "main+0x4 (0x08000104)"
 

@@ -72,6 +72,12 @@ def test_a_program_that_spins_is_legal_and_is_told_of(capsys: pytest.CaptureFixt
     assert outcome["virtual_s"] == 1.2
     assert any("no pin, USART or WFI was seen since 0.000 s; the program is at" in note for note in outcome["notes"])
     assert "0x08000042" in str(outcome["notes"])
+    assert "0x08000042" in outcome["last_blocks"][-1]
+
+
+def test_a_program_that_is_alive_needs_no_last_blocks(capsys: pytest.CaptureFixture[str]) -> None:
+    assert p2os(["run", make(thumb.SLEEP), "--json"]) == 0
+    assert json.loads(capsys.readouterr().out)["last_blocks"] == []
 
 
 @pytest.mark.parametrize(
@@ -86,6 +92,15 @@ def test_a_firmware_that_dies_ends_with_1_and_says_where(
     outcome = json.loads(capsys.readouterr().out)
     assert outcome["failures"][0].startswith("firmware fault: ")
     assert says in outcome["failures"][0]
+    assert 1 <= len(outcome["last_blocks"]) <= 32
+
+
+def test_what_a_dead_program_ran_last_is_in_the_table_and_in_the_report(capsys: pytest.CaptureFixture[str]) -> None:
+    assert p2os(["run", make(thumb.NOWHERE), "--out", "dead"]) == 1
+    out = capsys.readouterr().out.splitlines()
+    block = out[out.index("the last block, by cycle:") + 1]
+    assert block.split() == ["0", "0x08000042"]
+    assert block in Path("dead/report.html").read_text(encoding="utf-8")
 
 
 @pytest.mark.parametrize(

@@ -15,6 +15,7 @@ from thumb_streams import SRAM, SRAM_BYTES, Program, program
 
 from bluepill_sim.board import BluePill
 from bluepill_sim.cpu import BLOCK, BlockRecorder, native_library
+from bluepill_sim.cpu.block_log import LAST_ROWS
 from bluepill_sim.image import Image, SymbolTable
 
 QEMU = shutil.which("qemu-system-arm")
@@ -121,6 +122,7 @@ def test_random_programs_are_the_same_on_both_cores(seed: int, monkeypatch: pyte
         while board.now_ns < 1_000_000:
             board.advance_to(min(1_000_000, board.now_ns + slices.choice((1000, 70_000, 500_000))))
         drain(recorder)
+        assert board.chip.engine.log.rows() == tuple(rows[-LAST_ROWS:])
         assert sum(row[2] == 15 for row in rows) > 20
         return rows, board.cycle, board.pc, board.fault, board.snapshot().chip
 

@@ -12,7 +12,7 @@ from bluepill_sim.image import SymbolTable
 from bluepill_sim.sight.coverage import Coverage
 from bluepill_sim.sight.flame import flame_svg
 from bluepill_sim.sight.functions import UNKNOWN, FunctionTable
-from bluepill_sim.sight.last_blocks import LastBlocks, lines_of
+from bluepill_sim.sight.last_blocks import lines_of
 from bluepill_sim.sight.latency import Latency
 from bluepill_sim.sight.line_table import LineTable
 from bluepill_sim.sight.observation import Observation
@@ -161,33 +161,25 @@ FAULT = SYSTICK + "mov32 r4, #2000\nloop: subs r4, #1\nbne loop\nmov32 r1, #0x60
 
 
 def test_the_last_blocks_of_a_fault_are_those_before_it(boot) -> None:
-    whole = boot(FAULT + "\ntick: bx lr\n", {15: "tick"})
-    recorder = whole.board.chip.record_blocks(100_000)
-    whole.run(1000)
     machine = boot(FAULT + "\ntick: bx lr\n", {15: "tick"})
-    last = LastBlocks(machine.board)
-    last.advance_to(1_000_000)
+    recorder = machine.board.chip.record_blocks(100_000)
+    machine.run(1000)
     assert machine.board.fault is not None
-    rows = last.rows()
-    everything = [row for row in recorder.drain() if row[0] < whole.board.chip.cycle_at(whole.board.fault.at_ns)]
-    assert rows == [row for row in everything if row[0] <= rows[-1][0]][-32:]
-    assert machine.label("loop") in {row[1] for row in rows}
-    assert machine.board.snapshot() == whole.board.snapshot()
+    at_fault = machine.board.chip.cycle_at(machine.board.fault.at_ns)
+    before = [row for row in recorder.drain() if row[0] < at_fault]
+    assert machine.board.last_rows == tuple(before[-32:])
+    assert machine.label("loop") in {row[1] for row in machine.board.last_rows}
+    assert len(machine.board.last_blocks()) == 32
 
 
 def test_the_last_blocks_of_a_spinning_program_are_those_up_to_now(boot) -> None:
     source = SYSTICK + "loop: adds r3, #1\nadds r3, #1\nb loop\ntick: bx lr\n"
     machine = boot(source, {15: "tick"})
     recorder = machine.board.chip.record_blocks(50)
-    last = LastBlocks(machine.board)
-    last.advance_to(300_000)
-    machine.board.pin("PA0").drive(True)
-    last.advance_to(500_000)
-    assert last.rows() == recorder.last(32)
-    lines = lines_of(recorder.drain()[-1:], machine.image.symbols, LineTable())
-    assert lines == [
-        f"{recorder.capacity and lines[0].split()[0]:>12}  {machine.image.symbols.where(machine.label('loop'))}"
-    ]
+    machine.run(500)
+    assert machine.board.last_rows == tuple(recorder.last(32))
+    cycle, _, _ = recorder.last(1)[0]
+    assert machine.board.last_blocks()[-1] == f"{cycle:>12}  {machine.board.where()}"
 
 
 def test_rows_read_as_sentences() -> None:
