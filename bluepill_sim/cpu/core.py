@@ -20,7 +20,7 @@ from bluepill_sim.cpu.registers import RegisterFile
 # Not MODE_MCLASS: that silently makes a Cortex-M33.
 _ARCHITECTURE_ARM, _MODE_THUMB, _MODEL_CORTEX_M3 = 1, 16, 8
 _HOOK_INTERRUPT, _HOOK_CODE, _HOOK_BLOCK, _HOOK_INVALID = 1, 4, 8, 0x4000
-_HOOK_ACCESS, _HOOK_BAD_ACCESS = 0x400 | 0x800, 0x3F0
+_HOOK_ACCESS, _HOOK_BAD_ACCESS, _HOOK_TLB_FILL = 0x400 | 0x800, 0x3F0, 0x20000
 _NATIVE_HOOKS = {
     "block": _HOOK_BLOCK,
     "instruction": _HOOK_CODE,
@@ -32,14 +32,19 @@ _PROTECTION_READ, _PROTECTION_WRITE, _PROTECTION_EXECUTE = 1, 2, 4
 _CONTROL_MODEL = 7 | 1 << 26 | 1 << 30
 _CONTROL_DROP_CODE = 9 | 2 << 26 | 1 << 30
 _CONTROL_DROP_ALL_CODE = 10 | 1 << 30
-#: No instruction stands at an odd address, so a run never ends there.
-_NOWHERE = 0xFFFF_FFFF
+_CONTROL_TLB = 12 | 1 << 26 | 1 << 30
+_TLB_OF_HOOKS = 1
+#: No instruction stands at an odd address, so a run never ends there; the page is one that executes (`scratch.py`).
+_NOWHERE = 0x9FFF_FFFF
 
 #: Size, mode, architecture, level, flag and two pointers come before the registers of a context (uc_priv.h).
 _CONTEXT_HEADER_BYTES = 24 + 2 * ctypes.sizeof(ctypes.c_void_p)
 
 #: Registers of the other instruction set (X0 to X30, PC), which Unicorn leaves as it likes.
 _AARCH64_WORDS = range(16, 82)
+#: Syndrome, status, address and level of Unicorn's own last exception, which nothing reads again.
+_LAST_EXCEPTION_WORDS = range(756, 761)
+_UNSAVED_WORDS = {*_AARCH64_WORDS, *_LAST_EXCEPTION_WORDS}
 
 #: Kind of a good access that is not a write.
 READ_ACCESS = 16
@@ -159,9 +164,12 @@ class Core:
         """Call at an instruction that Unicorn does not know; True goes on after it; return the hook."""
         return self._hook(_HOOK_INVALID, self._pointer(binding.INVALID_CALLBACK(self._guard(call, True))), 1, 0)
 
-    def on_bad_access(self, call: Callable[[int, int, int, int], bool]) -> None:
-        """Call (kind, address, size, value) at an access to no memory or against its protection; True lets it pass."""
-        self._hook(_HOOK_BAD_ACCESS, self._pointer(binding.MEMORY_CALLBACK(self._guard(call, True))), 1, 0)
+    def on_bad_access(self, call: Callable[[int, int, int, int], bool], first: int = 1, last: int = 0) -> int:
+        """Call (kind, address, size, value) at an access to no memory or against its protection; return the hook.
+
+        True lets the access pass; first > last is everywhere.
+        """
+        return self._hook(_HOOK_BAD_ACCESS, self._pointer(binding.MEMORY_CALLBACK(self._guard(call, True))), first, last)
 
     def on_access(self, first: int, last: int, call: Callable[[int, int, int, int], bool]) -> None:
         """Call (kind, address, size, value) before every access in a range; slow."""
@@ -202,7 +210,7 @@ class Core:
         return tuple(
             (n, word)
             for n, (word, new) in enumerate(zip(words, self._new, strict=True))
-            if word != new and n not in _AARCH64_WORDS
+            if word != new and n not in _UNSAVED_WORDS
         )
 
     def load(self, snapshot: CoreSnapshot) -> None:
@@ -252,6 +260,11 @@ class Core:
     def hook_native(self, kind: str, callback: ctypes.c_void_p, user: int, first: int = 1, last: int = 0) -> int:
         """Call a C function with `user`: before a "block" or an "instruction", at an "interrupt", at "invalid" code."""
         return self._hook(_NATIVE_HOOKS[kind], callback, first, last, user)
+
+    def fill_tlb_native(self, callback: ctypes.c_void_p, user: int) -> None:
+        """Have a C function say what may be done with each page, in place of the core's own memory map."""
+        self._control(_CONTROL_TLB, ctypes.c_int(_TLB_OF_HOOKS))
+        self._hook(_HOOK_TLB_FILL, callback, 1, 0, user)
 
     def map_io_native(self, address: int, size: int, read: ctypes.c_void_p, write: ctypes.c_void_p, user: int) -> None:
         """Map a region whose accesses are C functions."""

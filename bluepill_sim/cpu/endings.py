@@ -11,6 +11,9 @@ from bluepill_sim.thumb import Kind
 #: Branches to these addresses are exception returns in handler mode (ARMv7-M B1.5.8).
 FIRST_EXCEPTION_RETURN = 0xFFFF_FFE0
 
+#: UC_ERR_EXCEPTION, and the number of the interrupt that it stands for.
+_DENIED, _PREFETCH_ABORT = 21, 3
+
 #: 3 and 8 are told apart by the PC.
 _INTERRUPTS = {
     2: HaltKind.SUPERVISOR_CALL,
@@ -56,11 +59,13 @@ def kind_of_invalid(block: Block, pc: int, *, is_thumb: bool) -> HaltKind | None
 
 
 def halt_without_reason(error: int, block: Block, pc: int) -> Halt:
-    """Tell why Unicorn came back without having called anything: WFI is the only way.
+    """Tell why Unicorn came back without having called anything: WFI, or a fetch that its TLB denied.
 
     Raises:
         RuntimeError: it was not; a bug here.
     """
     if error == 0 and block.last is Kind.WAIT_INTERRUPT and pc == block.end:
         return Halt(HaltKind.WAIT_INTERRUPT, pc)
+    if error == _DENIED:
+        return Halt(kind_of_interrupt(_PREFETCH_ABORT, pc), pc)
     raise RuntimeError(f"Unicorn stopped at {pc:#010x} with error {error}")

@@ -96,7 +96,7 @@ class Engine:
         self.watchpoints: set[Watchpoint] = self._debug.watchpoints
         self._block_hook = 0
         self._install_hooks()
-        self._core.on_bad_access(self._bad_access)
+        self._bad_access_hook = self._core.on_bad_access(self._bad_access)
         self._scratch = Scratch(self._core, self._table)
 
     def _begin(self) -> None:

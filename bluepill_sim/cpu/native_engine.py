@@ -133,11 +133,21 @@ class NativeEngine(Engine):
         super().map_memory(address, buffer, is_writable=is_writable)
         shared, host = self.shared, ctypes.addressof(buffer)
         if is_writable:
+            self._store_inline(address, len(buffer))
             shared.sram, shared.sram_base, shared.sram_bytes = host, address, len(buffer)
         elif address == 0:
             shared.flash, shared.flash_bytes = host, len(buffer)
             shared.flash_base = next((first for first, _, at in self._code if at == host), 0)
         self._code.append((address, address + len(buffer), host))
+
+    def _store_inline(self, address: int, size: int) -> None:
+        """Let stores to a memory run in translated code: no hook on it, and no page of it for code until a fetch."""
+        core = self._core
+        core.allow_execution(address, size)
+        core.remove_hook(self._bad_access_hook)
+        for first, last in ((0, address - 1), (address + size, 0xFFFF_FFFF)):
+            core.on_bad_access(self._bad_access, first, last)
+        core.fill_tlb_native(address_of("core_on_tlb_fill"), self._state.value or 0)
 
     def map_io(self, address: int, size: int, read: ReadAccess, write: WriteAccess) -> None:
         """As of `Engine`."""

@@ -6,7 +6,10 @@
 
 enum { FOR_INTERRUPT = 1, FOR_EVENT = 2 };
 #define FIRST_EXCEPTION_RETURN 0xFFFFFFE0u
-#define NOWHERE 0xFFFFFFFFu
+/* No instruction stands at an odd address, so a run never ends there; the page is that of `scratch`. */
+#define NOWHERE 0x9FFFFFFFu
+/* UC_ERR_EXCEPTION: the TLB denied a fetch. */
+#define DENIED 21
 
 uint32_t read_register(struct core *core, int number)
 {
@@ -68,6 +71,11 @@ void core_set_page(struct core *core, uint32_t number, uint32_t *words, uint32_t
 
 struct port *core_port(struct core *core, uint32_t number) { return &core->ports[number]; }
 
+static uint32_t kind_of_denied_fetch(uint32_t pc)
+{
+    return pc >= FIRST_EXCEPTION_RETURN ? HALT_EXCEPTION_RETURN : HALT_EXECUTE_NEVER;
+}
+
 /* Unicorn's own numbers of what ends a run; 3 and 8 are told apart by the PC. */
 void core_on_interrupt(void *engine, uint32_t number, void *user)
 {
@@ -78,7 +86,7 @@ void core_on_interrupt(void *engine, uint32_t number, void *user)
     switch (number) {
     case 2: kind = HALT_SUPERVISOR_CALL; break;
     case 3:
-    case 8: kind = pc >= FIRST_EXCEPTION_RETURN ? HALT_EXCEPTION_RETURN : HALT_EXECUTE_NEVER; break;
+    case 8: kind = kind_of_denied_fetch(pc); break;
     case 4: kind = HALT_UNALIGNED; break;
     case 7: kind = HALT_BREAKPOINT; break;
     case 17: kind = HALT_NO_COPROCESSOR; break;
@@ -183,7 +191,8 @@ static uint32_t run_slice(struct core *core)
     if (s->halt_kind == HALT_NONE) {
         const uint32_t pc = read_register(core, REG_PC);
         s->halt_pc = pc;
-        s->halt_kind = error == 0 && core->block->flags & ROW_ENDS_IN_WFI && pc == core->block->end
+        s->halt_kind = error == DENIED ? kind_of_denied_fetch(pc)
+                       : error == 0 && core->block->flags & ROW_ENDS_IN_WFI && pc == core->block->end
                            ? HALT_WAIT_INTERRUPT
                            : HALT_UNEXPLAINED;
         s->halt_address = (uint32_t)error;
