@@ -169,7 +169,9 @@ class Core:
 
         True lets the access pass; first > last is everywhere.
         """
-        return self._hook(_HOOK_BAD_ACCESS, self._pointer(binding.MEMORY_CALLBACK(self._guard(call, True))), first, last)
+        return self._hook(
+            _HOOK_BAD_ACCESS, self._pointer(binding.MEMORY_CALLBACK(self._guard(call, True))), first, last
+        )
 
     def on_access(self, first: int, last: int, call: Callable[[int, int, int, int], bool]) -> None:
         """Call (kind, address, size, value) before every access in a range; slow."""

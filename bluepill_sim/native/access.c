@@ -15,6 +15,8 @@ struct region_user {
     uint32_t base;
 };
 
+#define IN_PAGE ((1u << PAGE_SHIFT) - 1)
+
 /* What Unicorn hands back at each access of a region; lives as long as the core's owner keeps it. */
 struct region_user *core_region(struct core *core, uint32_t number, uint32_t base)
 {
@@ -117,72 +119,61 @@ static void begin_access(struct core *core, uint32_t address, bool is_write, uin
     }
 }
 
-static uint32_t ask_read(struct core *core, const struct region_user *region, uint32_t offset, uint32_t size)
+static RARELY uint32_t ask_read(const struct region_user *region, uint32_t offset, uint32_t size)
 {
+    struct core *core = region->core;
     begin_access(core, region->base + offset, false, size);
     const uint32_t word = core->calls.read(region->number, offset, size);
     core->shared.in_access = 0;
     return word;
 }
 
-static void ask_write(struct core *core, const struct region_user *region, uint32_t offset, uint32_t size,
-                      uint32_t value)
+static RARELY void ask_write(const struct region_user *region, uint32_t offset, uint32_t size, uint32_t value)
 {
+    struct core *core = region->core;
     begin_access(core, region->base + offset, true, size);
     core->calls.write(region->number, offset, size, value);
     core->shared.in_access = 0;
 }
 
-static bool is_clocked(const struct page *page) { return page->gate == NULL || *page->gate & page->gate_mask; }
-
-static bool has_pages(const struct region_user *region)
+/* The page of a register that may be answered here: it has a clock, and nothing is due before the block ends. */
+static struct page *open_page(const struct region_user *region, uint32_t offset)
 {
-    return region->number == region->core->paged_region && !region->core->shared.is_python;
+    struct core *core = region->core;
+    if (region->number != core->paged_region || core->shared.is_python || offset >> PAGE_SHIFT >= PAGES ||
+        is_over(core)) {
+        return NULL;
+    }
+    struct page *page = &core->pages[offset >> PAGE_SHIFT];
+    const bool is_there = (offset & IN_PAGE) >> 2 < page->count;
+    return is_there && (page->gate == NULL || *page->gate & page->gate_mask) ? page : NULL;
 }
 
 uint64_t core_read_io(void *engine, uint64_t at, unsigned size, void *user)
 {
     (void)engine;
-    const struct region_user *region = user;
-    struct core *core = region->core;
-    const uint32_t offset = (uint32_t)at;
-    if (has_pages(region) && offset >> PAGE_SHIFT < PAGES) {
-        const struct page *page = &core->pages[offset >> PAGE_SHIFT];
-        const uint32_t index = (offset & ((1u << PAGE_SHIFT) - 1)) >> 2;
-        if (page->words != NULL && index < page->count && page->behaviour[index] & READS_PLAIN && is_clocked(page) &&
-            !is_over(core)) {
-            const uint32_t word = page->words[index];
-            const uint32_t latch = page->behaviour[index] >> LATCH_SHIFT;
-            if (latch) {
-                page->words[latch] = word;
-            }
-            return size == 4 ? word : (word >> (offset & 3) * 8) & ((1u << size * 8) - 1);
-        }
+    const uint32_t offset = (uint32_t)at, index = (offset & IN_PAGE) >> 2;
+    const struct page *page = open_page(user, offset);
+    if (page == NULL || !(page->behaviour[index] & READS_PLAIN)) {
+        return ask_read(user, offset, size);
     }
-    return ask_read(core, region, offset, size);
+    const uint32_t word = page->words[index], latch = page->behaviour[index] >> LATCH_SHIFT;
+    if (latch) {
+        page->words[latch] = word;
+    }
+    return size == 4 ? word : (word >> (offset & 3) * 8) & ((1u << size * 8) - 1);
 }
 
 void core_write_io(void *engine, uint64_t at, unsigned size, uint64_t value, void *user)
 {
     (void)engine;
-    const struct region_user *region = user;
-    struct core *core = region->core;
-    const uint32_t offset = (uint32_t)at;
-    if (has_pages(region) && offset >> PAGE_SHIFT < PAGES && size == 4) {
-        struct page *page = &core->pages[offset >> PAGE_SHIFT];
-        const uint32_t index = (offset & ((1u << PAGE_SHIFT) - 1)) >> 2;
-        if (page->words != NULL && index < page->count && is_clocked(page) && !is_over(core)) {
-            if (page->behaviour[index] & WRITES_PLAIN) {
-                const uint32_t *mask = page->masks[index];
-                const uint32_t written = (uint32_t)value, before = page->words[index];
-                page->words[index] =
-                    (before & mask[0] & ~(written & mask[2]) & (written | ~mask[3])) | (written & mask[1]);
-                return;
-            }
-            if (page->port != NULL && write_port(core, page, index, (uint32_t)value)) {
-                return;
-            }
-        }
+    const uint32_t offset = (uint32_t)at, index = (offset & IN_PAGE) >> 2, written = (uint32_t)value;
+    struct page *page = size == 4 ? open_page(user, offset) : NULL;
+    if (page != NULL && page->behaviour[index] & WRITES_PLAIN) {
+        const uint32_t *mask = page->masks[index], before = page->words[index];
+        page->words[index] = (before & mask[0] & ~(written & mask[2]) & (written | ~mask[3])) | (written & mask[1]);
+    } else if (page == NULL || page->port == NULL ||
+               !write_port(((const struct region_user *)user)->core, page, index, written)) {
+        ask_write(user, offset, size, written);
     }
-    ask_write(core, region, offset, size, (uint32_t)value);
 }

@@ -13,6 +13,8 @@
 #define NEVER (UINT64_C(1) << 62)
 #define NO_TIME UINT64_MAX
 #define UNLIKELY(x) __builtin_expect(!!(x), 0)
+/* Kept out of its callers, which stay short enough to need no stack. */
+#define RARELY __attribute__((noinline, cold))
 
 /* Why a run ended; the order is that of bluepill_sim/cpu/native_state.py. */
 enum halt {
@@ -183,8 +185,9 @@ struct core {
     uint32_t record_count, record_room;
 };
 
+/* For this library alone: such calls need no table. */
+#pragma GCC visibility push(hidden)
 /* blocks.c */
-void core_on_block(void *engine, uint64_t address, uint32_t size, void *user);
 void end_run(struct core *core, uint32_t kind, uint32_t pc);
 void free_dropped(struct core *core);
 const struct instruction *instruction_at(const struct row *row, uint32_t address);
@@ -195,7 +198,6 @@ bool write_port(struct core *core, struct page *page, uint32_t index, uint32_t v
 /* run.c */
 void *allocate(struct core *core, size_t bytes);
 uint32_t read_register(struct core *core, int number);
-void core_clear_exclusive(struct core *core);
 /* exceptions.c */
 uint64_t deliverable(const struct core *core, uint64_t *high);
 bool wakes(struct core *core);
@@ -203,6 +205,9 @@ int deliver(struct core *core);
 bool leave(struct core *core, uint32_t exc_return);
 bool supervisor_call(struct core *core, uint32_t pc);
 void tick(struct core *core);
+#pragma GCC visibility pop
+/* run.c, for Python as well. */
+void core_clear_exclusive(struct core *core);
 
 /* Register numbers of Unicorn 2 (arm.h). */
 enum {
