@@ -20,7 +20,12 @@ from p2os.timing import NS_PER_MS, Nanos
 
 #: One step of every body: 1 kHz.
 STEP_NS: Nanos = NS_PER_MS
-BODY_NAMES = ("kinematic", "bullet")
+BODY_NAMES = ("kinematic", "bullet", "mujoco")
+#: How a package that is missing is got, by the body that needs it.
+_HINTS = {
+    "bullet": "pip install 'p2os[bullet]' (Python 3.11), or --body kinematic",
+    "mujoco": "pip install 'p2os[mujoco]', or --body kinematic",
+}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -143,24 +148,28 @@ def make_body(name: str, world: World, parameters: RobotParameters) -> RobotBody
     """Return a body that stands at the world's start.
 
     Args:
-        name: `kinematic` (exact, no dependency) or `bullet` (PyBullet).
+        name: `kinematic` (exact, no dependency), `bullet` (PyBullet) or `mujoco` (MuJoCo).
         world: Where it is.
         parameters: What it is.
 
     Raises:
         UsageError: There is no body of that name.
-        MissingDependencyError: PyBullet or NumPy is not installed.
+        MissingDependencyError: The engine or NumPy is not installed.
+        WorldError: The world has something that this body cannot take.
     """
     if name == "kinematic":
         from p2os.pioneer.kinematic import KinematicBody
 
         return KinematicBody(world, parameters)
-    if name != "bullet":
+    if name not in BODY_NAMES:
         raise UsageError(f"no body {name!r}", hint=f"bodies: {', '.join(BODY_NAMES)}")
     try:
-        from p2os.pioneer.bullet import BulletBody
+        if name == "bullet":
+            from p2os.pioneer.bullet import BulletBody
+
+            return BulletBody(world, parameters)
+        from p2os.pioneer.mujoco import MujocoBody
+
+        return MujocoBody(world, parameters)
     except ModuleNotFoundError as error:
-        raise MissingDependencyError(
-            f"the bullet body needs {error.name}", hint="pip install 'p2os[bullet]' (Python 3.11), or --body kinematic"
-        ) from error
-    return BulletBody(world, parameters)
+        raise MissingDependencyError(f"the {name} body needs {error.name}", hint=_HINTS[name]) from error

@@ -2,46 +2,24 @@
 
 import math
 import pickle
-from collections.abc import Callable
 
 import pytest
 
 from p2os.errors import UsageError, WorldError
 from p2os.parameters import load_parameters
-from p2os.pioneer.body import BODY_NAMES, BodyState, RobotBody, make_body
+from p2os.pioneer.body import BodyState, RobotBody, make_body
 from p2os.pioneer.scenery import Obstacle, Pose, World
 from p2os.pioneer.world import load_world, parse_world
+from tests.p2os.bodies import Maker, drive, each_body, ramped
 
 P2DX = load_parameters("p2dx")
 EMPTY = parse_world('name = "empty"\ndescription = ""\nextent_m = [-4, -4, 4, 4]', "empty")
 TRACK_M = P2DX.track_mm / 1000
-DT_S = 0.001
-
-Maker = Callable[..., RobotBody]
 
 
-@pytest.fixture(
-    params=[pytest.param(name, marks=pytest.mark.bullet if name == "bullet" else ()) for name in BODY_NAMES]
-)
+@pytest.fixture(params=each_body())
 def make(request: pytest.FixtureRequest) -> Maker:
-    if request.param == "bullet":
-        pytest.importorskip("pybullet")
     return lambda world=EMPTY: make_body(request.param, world, P2DX)
-
-
-def drive(body: RobotBody, left: float, right: float, seconds: float) -> BodyState:
-    for _ in range(round(seconds / DT_S)):
-        body.step(left, right)
-    return body.state
-
-
-def ramped(body: RobotBody, left: float, right: float, seconds: float) -> BodyState:
-    """Drive with a trapezoid, 0.5 s up and 0.5 s down, and come to rest."""
-    steps = round(seconds / DT_S)
-    for step in range(steps):
-        share = min(1.0, (step + 0.5) / 500, (steps - step - 0.5) / 500)
-        body.step(left * share, right * share)
-    return drive(body, 0, 0, 0.3)
 
 
 def test_it_stands_where_it_was_put(make: Maker) -> None:
@@ -156,11 +134,10 @@ def test_an_obstacle_below_the_ring_gives_no_echo(make: Maker) -> None:
     assert body.clearance() < 1.0
 
 
-@pytest.mark.bullet
+@pytest.mark.parametrize("engine", each_body("kinematic"))
 @pytest.mark.parametrize("name", ["room", "corridor", "arena"])
-def test_the_bodies_agree_on_what_the_ring_hears_and_what_is_near(name: str) -> None:
-    pytest.importorskip("pybullet")
-    bodies = [make_body(engine, load_world(name, 5), P2DX) for engine in BODY_NAMES]
+def test_the_bodies_agree_on_what_the_ring_hears_and_what_is_near(name: str, engine: str) -> None:
+    bodies = [make_body(one, load_world(name, 5), P2DX) for one in ("kinematic", engine)]
     for turn in range(6):
         for body in bodies:
             body.reset(Pose(0.1 * turn, -0.05 * turn, turn), 0)
@@ -169,15 +146,26 @@ def test_the_bodies_agree_on_what_the_ring_hears_and_what_is_near(name: str) -> 
         assert bodies[1].clearance() == pytest.approx(bodies[0].clearance(), abs=0.001)
 
 
-@pytest.mark.bullet
-def test_the_physical_robot_climbs_the_incline() -> None:
-    pytest.importorskip("pybullet")
-    body = make_body("bullet", load_world("ramp"), P2DX)
+@pytest.mark.parametrize("engine", each_body("kinematic"))
+def test_the_physical_robot_climbs_the_incline(engine: str) -> None:
+    body = make_body(engine, load_world("ramp"), P2DX)
     body.reset(Pose(1.5, 0, 0), 0)
     heights = [drive(body, 0.3, 0.3, 1.0) for _ in range(16)]
     assert heights[-1].z_m == pytest.approx(0.18, abs=0.005)
     assert max(state.pitch_rad for state in heights) == pytest.approx(-min(0, *[-s.pitch_rad for s in heights]))
     assert heights[-1].collisions == 0
+
+
+def test_to_look_changes_nothing(make: Maker) -> None:
+    seen, unseen = make(load_world("room")), make(load_world("room"))
+    for _ in range(300):
+        seen.step(0.3, 0.25)
+        seen.ranges(range(8))
+        seen.echoes([3])
+        seen.clearance()
+        seen.snapshot()
+        unseen.step(0.3, 0.25)
+    assert seen.state == unseen.state
 
 
 def test_the_plan_view_says_what_it_leaves_out() -> None:

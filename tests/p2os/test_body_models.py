@@ -2,19 +2,17 @@
 
 import math
 import pickle
-from collections.abc import Callable
 
 import pytest
 
 from p2os.parameters import RobotParameters, known_robots, load_parameters
-from p2os.pioneer.body import BODY_NAMES, BodyState, RobotBody, make_body
+from p2os.pioneer.body import BODY_NAMES, make_body
 from p2os.pioneer.scenery import Obstacle, Pose, World
+from tests.p2os.bodies import Maker, drive, marks_of, ramped
 
 #: The quick ones: one of each build (two wheels and a caster, four wheels, small, large).
 QUICK = {"p2dx", "p3at", "amigo", "powerbot"}
 EMPTY = World(name="e", source="e", description="", start=Pose(0, 0, 0), extent=(-4, -4, 4, 4), obstacles=())
-
-Maker = Callable[..., RobotBody]
 
 
 @pytest.fixture(
@@ -22,7 +20,7 @@ Maker = Callable[..., RobotBody]
         pytest.param(
             (engine, model),
             id=f"{engine}-{model}",
-            marks=([pytest.mark.bullet] if engine == "bullet" else []) + ([] if model in QUICK else [pytest.mark.slow]),
+            marks=[*marks_of(engine), *([] if model in QUICK else [pytest.mark.slow])],
         )
         for model in known_robots()
         for engine in BODY_NAMES
@@ -30,24 +28,8 @@ Maker = Callable[..., RobotBody]
 )
 def robot(request: pytest.FixtureRequest) -> tuple[RobotParameters, Maker]:
     engine, model = request.param
-    if engine != "kinematic":
-        pytest.importorskip({"bullet": "pybullet"}.get(engine, engine))
     parameters = load_parameters(model)
     return parameters, lambda world=EMPTY: make_body(engine, world, parameters)
-
-
-def drive(body: RobotBody, left: float, right: float, seconds: float) -> BodyState:
-    for _ in range(round(seconds * 1000)):
-        body.step(left, right)
-    return body.state
-
-
-def ramped(body: RobotBody, left: float, right: float, seconds: float) -> BodyState:
-    steps = round(seconds * 1000)
-    for step in range(steps):
-        share = min(1.0, (step + 0.5) / 500, (steps - step - 0.5) / 500)
-        body.step(left * share, right * share)
-    return drive(body, 0, 0, 0.3)
 
 
 def test_it_stands_level_drives_straight_and_turns_as_its_wheels_say(robot: tuple[RobotParameters, Maker]) -> None:

@@ -13,6 +13,7 @@ from p2os.parameters import load_parameters
 from p2os.pioneer.body import RobotBody, make_body
 from p2os.pioneer.scenery import Obstacle
 from p2os.pioneer.world import load_world
+from tests.p2os.bodies import each_body, marks_of
 
 P2DX = load_parameters("p2dx")
 #: Restores a snapshot in a process of its own and prints the digest of what follows.
@@ -36,7 +37,7 @@ from p2os.parameters import load_parameters
 from p2os.pioneer.body import make_body
 from p2os.pioneer.world import load_world
 try:
-    make_body("bullet", load_world("room"), load_parameters("p2dx"))
+    make_body(sys.argv[2], load_world("room"), load_parameters("p2dx"))
 except MissingDependencyError as error:
     print(error, error.hint)
 """
@@ -63,10 +64,8 @@ def run(*arguments: str, seed: str = "0") -> subprocess.CompletedProcess[str]:
     )
 
 
-@pytest.mark.parametrize("name", ["kinematic", pytest.param("bullet", marks=pytest.mark.bullet)])
+@pytest.mark.parametrize("name", each_body())
 def test_a_snapshot_goes_on_alike_in_other_processes(name: str, tmp_path: Path) -> None:
-    if name == "bullet":
-        pytest.importorskip("pybullet")
     body = make_body(name, load_world("arena", 3), P2DX)
     body.place(Obstacle(name="post", x_m=0.5, y_m=0.0, radius_m=0.05))
     body.remove("thing 2")
@@ -94,13 +93,19 @@ def test_the_engine_comes_where_standard_error_is_closed() -> None:
     assert run("-c", "import os; os.close(2); import p2os.pioneer.bullet; print('there')").stdout == "there\n"
 
 
-@pytest.mark.parametrize("missing", ["pybullet", "numpy"])
-def test_a_missing_engine_is_named_with_the_way_to_get_it(missing: str) -> None:
-    if missing == "numpy":
-        pytest.importorskip("pybullet")
-    done = run("-c", MISSING, missing)
-    assert missing in done.stdout
-    assert "pip install" in done.stdout
+@pytest.mark.parametrize(
+    ("body", "missing"),
+    [
+        ("bullet", "pybullet"),
+        pytest.param("bullet", "numpy", marks=marks_of("bullet")),
+        ("mujoco", "mujoco"),
+        pytest.param("mujoco", "numpy", marks=marks_of("mujoco")),
+    ],
+)
+def test_a_missing_engine_is_named_with_the_way_to_get_it(body: str, missing: str) -> None:
+    done = run("-c", MISSING, missing, body)
+    assert f"the {body} body needs {missing}" in done.stdout
+    assert f"pip install 'p2os[{body}]'" in done.stdout
 
 
 def test_a_blocked_robot_goes_on_when_the_thing_is_taken_away() -> None:

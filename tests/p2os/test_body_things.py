@@ -2,20 +2,19 @@
 
 import math
 import pickle
-from collections.abc import Callable
 
 import pytest
 
 from p2os.errors import WorldError
 from p2os.parameters import load_parameters
-from p2os.pioneer.body import BODY_NAMES, BodyState, RobotBody, make_body
+from p2os.pioneer.body import RobotBody, make_body
 from p2os.pioneer.scenery import Mesh, Obstacle, Pose, World
 from p2os.pioneer.walk import Repeat, Walk
 from p2os.pioneer.world import load_world
+from tests.p2os.bodies import Maker, drive, each_body
 
 P2DX = load_parameters("p2dx")
 FRONT_M = P2DX.body.hull_front_m
-Maker = Callable[..., RobotBody]
 
 #: A hollow box of 4 x 4 m, 1 m high, and a floor on the ground, as a modeller exports a room.
 ROOM = Mesh(
@@ -34,19 +33,9 @@ def world_of(*things: Obstacle, meshes: tuple[Mesh, ...] = ()) -> World:
     )  # fmt: skip
 
 
-@pytest.fixture(
-    params=[pytest.param(name, marks=pytest.mark.bullet if name == "bullet" else ()) for name in BODY_NAMES]
-)
+@pytest.fixture(params=each_body())
 def make(request: pytest.FixtureRequest) -> Maker:
-    if request.param == "bullet":
-        pytest.importorskip("pybullet")
     return lambda world: make_body(request.param, world, P2DX)
-
-
-def drive(body: RobotBody, left: float, right: float, seconds: float) -> BodyState:
-    for _ in range(round(seconds * 1000)):
-        body.step(left, right)
-    return body.state
 
 
 def box(name: str = "box", x: float = 1.0, **fields: float | bool) -> Obstacle:

@@ -25,21 +25,29 @@ from p2os.pioneer.body import STEP_NS, BodyState, Turned
 from p2os.pioneer.bullet.building import add_building, melted
 from p2os.pioneer.bullet.engine import pybullet
 from p2os.pioneer.bullet.model import (
-    FLOOR_GROUP,
     HEARD,
     LEFT,
-    LOW_GROUP,
     RIGHT,
     add_floor,
     add_obstacle,
     add_robot,
-    group_of,
     move_obstacle,
     park_obstacle,
 )
 from p2os.pioneer.bullet.rays import RayFans
 from p2os.pioneer.contacts import ContactCounter
 from p2os.pioneer.fan import Echo
+from p2os.pioneer.physical import (
+    FLOOR_GROUP,
+    GRAVITY_MPS2,
+    LOW_GROUP,
+    PUSHED_M,
+    SETTLE_STEPS,
+    STALL_RIM_MPS,
+    STALL_STEPS,
+    STALL_TORQUE_SHARE,
+    group_of,
+)
 from p2os.pioneer.plan import Plan
 from p2os.pioneer.scenery import Obstacle, Pose, World
 from p2os.pioneer.sonar import cones, reading
@@ -47,20 +55,12 @@ from p2os.pioneer.static_plan import Bands, StaticPlan
 from p2os.pioneer.walk import Walker
 from p2os.timing import NS_PER_S, Nanos
 
-#: Steps after a reset in which the robot comes to rest on its wheels.
-SETTLE_STEPS = 300
-#: A wheel is stalled when its motor gives this share of its torque, its rim is slower than that, for so many steps.
-STALL_TORQUE_SHARE = 0.95
-STALL_RIM_MPS = 0.05
-STALL_STEPS = 200
 #: Bullet keeps contact points a little apart; touching is no farther than this, m.
 TOUCH_M = 1e-4
 #: No point of the hull is faster than this: both rims at the highest ceiling of any model, against each other, m/s.
 FASTEST_MPS = 8.0
 #: Farther than this from everything, contacts need not be looked for; looked again after so many steps otherwise.
 FAR_M, LOOK_STEPS = 0.1, 50
-#: A thing that was displaced by less stands where it stood, m.
-PUSHED_M = 1e-4
 _DT_S = STEP_NS / NS_PER_S
 WHEELS = (LEFT, RIGHT)
 
@@ -129,7 +129,7 @@ class BulletBody:
             fixedTimeStep=STEP_NS / NS_PER_S, deterministicOverlappingPairs=1, enableFileCaching=0,
             physicsClientId=client,
         )  # fmt: skip
-        pybullet.setGravity(0, 0, -9.81, physicsClientId=client)
+        pybullet.setGravity(0, 0, -GRAVITY_MPS2, physicsClientId=client)
         self._floors = {add_floor(self._world, client)}
         self._robot, self._centre = add_robot(self._parameters, pose, client)
         _, driven_on = add_building(self._world, client)

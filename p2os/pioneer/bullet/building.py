@@ -8,18 +8,14 @@ are what the hull meets. Level faces on the ground are left out: the floor is
 there, and the seams of triangles would shake the wheels.
 """
 
-import math
 from collections.abc import Iterable, Sequence
 
 from p2os.pioneer.bullet.engine import pybullet
-from p2os.pioneer.bullet.model import FLOOR_GROUP, LEVEL, OBSTACLE_GROUP, make_static
+from p2os.pioneer.bullet.model import LEVEL, make_static
 from p2os.pioneer.geometry import Footprint
+from p2os.pioneer.physical import FLOOR_GROUP, OBSTACLE_GROUP, ON_FLOOR_M, is_level
 from p2os.pioneer.scenery import Obstacle, Triangle, Vertex, World
 
-#: chosen: a Pioneer climbs no more than half of it.
-LEVEL_RAD = math.radians(20)
-#: A level face as near to height 0 is the floor itself, m.
-ON_FLOOR_M = 2e-3
 #: chosen: so few fixed boxes stay bodies of their own, which meet a hull more exactly than triangles.
 FEW_BOXES = 12
 #: The engine takes no more corners in one shape.
@@ -46,7 +42,7 @@ def add_building(world: World, client: int) -> tuple[list[int], list[int]]:
     for mesh in world.meshes:
         for a, b, c in mesh.triangles:
             corners = (mesh.vertices[a], mesh.vertices[b], mesh.vertices[c])
-            if not _is_level(corners):
+            if not is_level(corners):
                 walls.append(corners)
             elif max(abs(z) for _, _, z in corners) > ON_FLOOR_M:
                 floors.append(corners)
@@ -78,10 +74,3 @@ def _box(item: Obstacle) -> Iterable[Corners]:
     (d, c, b, a) = Footprint(item).polygon[::-1]
     corners = [(x, y, z) for z in (low, high) for x, y in (a, b, c, d)]
     return [(corners[i], corners[j], corners[k]) for i, j, k in BOX_FACES]
-
-
-def _is_level(corners: Corners) -> bool:
-    (ax, ay, az), (bx, by, bz), (cx, cy, cz) = corners
-    ux, uy, uz, vx, vy, vz = bx - ax, by - ay, bz - az, cx - ax, cy - ay, cz - az
-    nx, ny, nz = uy * vz - uz * vy, uz * vx - ux * vz, ux * vy - uy * vx
-    return abs(nz) > math.cos(LEVEL_RAD) * math.sqrt(nx * nx + ny * ny + nz * nz)
