@@ -20,6 +20,7 @@ from adapter_sim.codec import BitOrder
 from adapter_sim.settings import AdapterSettings
 from p2os.errors import ScenarioError, UsageError
 from p2os.parameters import RobotParameters, load_parameters
+from p2os.pioneer.body import BODY_NAMES
 from p2os.pioneer.controller import ControllerSettings, SonarPerSip
 from p2os.pioneer.flash import load_flash
 from p2os.pioneer.sensor_errors import load_sensor_errors
@@ -35,7 +36,6 @@ from testbench.script_file import load_changes
 MODES = ("direct", "adapter")
 #: What runs in the adapter's place: the Python model, or the firmware's C++ core.
 ADAPTER_CORES = ("model", "firmware")
-BODIES = ("kinematic", "bullet")
 
 _TOP = (
     Key(name="description", kind="text"),
@@ -43,7 +43,7 @@ _TOP = (
     Key(name="world", kind="text", required=True),
     Key(name="robot", kind="text"),
     Key(name="mode", kind="text", choices=MODES),
-    Key(name="body", kind="text", choices=BODIES),
+    Key(name="body", kind="text", choices=BODY_NAMES),
     Key(name="seed", kind="whole", least=0),
     Key(name="duration_s", kind="number", required=True, above=0),
     Key(name="threshold_m", kind="number", above=0),
@@ -144,7 +144,7 @@ class Scenario:
         """
         _refuse_unknown("mode", mode, MODES)
         _refuse_unknown("adapter", adapter_core, ADAPTER_CORES)
-        _refuse_unknown("body", body, BODIES)
+        _refuse_unknown("body", body, BODY_NAMES)
         if duration_s is not None and not 0 < duration_s < math.inf:
             raise UsageError(f"a run of {duration_s:g} s cannot be", hint="--duration takes seconds above 0")
         if firmware is not None and not firmware.is_file():

@@ -48,6 +48,7 @@ _EXTRAS = {
     "matplotlib": "sim",
     "pybullet": "bullet",
     "numpy": "bullet",
+    "mujoco": "mujoco",
     "pyarrow": "export",
     "mcap": "export",
 }

@@ -68,7 +68,7 @@ def serve(
     ] = None,
     robot: Annotated[str, typer.Option(help="Robot model, or a TOML file.")] = "p2dx",
     world: Annotated[str, typer.Option(help="World, or a TOML file.")] = "room",
-    body: Annotated[str, typer.Option(help="Physics: bullet, or kinematic (plan view).")] = "bullet",
+    body: Annotated[str, typer.Option(help="Physics: bullet, mujoco, or kinematic (plan view).")] = "bullet",
     seed: Annotated[int, typer.Option(help="Seed of a scattered world and of every sensor's error.")] = 0,
     firmware: Annotated[
         Profile, typer.Option(help="Whose packets it sends; some clients of newer robots need ARCOS.")

@@ -41,7 +41,7 @@ def served_pioneer(
         url: Where to listen; port 0 takes any free one, `pty:PATH` is a serial port.
         robot: Model, or a file of parameters.
         world: World, or a file of one.
-        body: `kinematic` or `bullet`.
+        body: `kinematic`, `bullet` or `mujoco`.
         seed: Of everything random.
         settings: How the robot's firmware behaves.
         on_event: Told (nanoseconds, what, detail) from the robot's thread.

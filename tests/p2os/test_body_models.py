@@ -64,7 +64,8 @@ def test_the_same_calls_and_a_restore_give_the_same_bits(robot: tuple[RobotParam
 def test_stop_is_stop_and_a_wall_stops_it(robot: tuple[RobotParameters, Maker]) -> None:
     parameters, make = robot
     body = make()
-    drive(body, 0.2, 0.2, 0.5)
+    # With ramps, as its firmware drives: a PatrolBot that stops at once from 0.2 m/s tips forward onto its nose.
+    ramped(body, 0.2, 0.2, 1.0)
     stopped = drive(body, 0.0, 0.0, 1.0)
     later = drive(body, 0.0, 0.0, 0.5)
     assert math.hypot(later.x_m - stopped.x_m, later.y_m - stopped.y_m) < 1e-4
