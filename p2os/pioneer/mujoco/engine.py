@@ -1,4 +1,4 @@
-"""The one import of MuJoCo, and the settings of its solver.
+"""The settings of MuJoCo's solver.
 
 MuJoCo's contacts and joint frictions are soft by default: a robot on them turns
 0.7 degrees short. The settings below make them as good as rigid, as far as steps
