@@ -99,6 +99,11 @@ class Chip:
         """The time of the accessing instruction, in cycles."""
         return self.engine.access_cycle
 
+    @property
+    def time_base(self) -> tuple[int, Nanos, int]:
+        """The present frequency in Hz, and the time in ns and the cycle from which it counts."""
+        return self._clock.snapshot()
+
     def ns_of(self, cycle: int) -> Nanos:
         """Return when a cycle of the present frequency began."""
         return self._clock.ns_of(cycle)

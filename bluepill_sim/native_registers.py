@@ -16,6 +16,7 @@ from collections.abc import Callable, Iterable
 from typing import TYPE_CHECKING
 
 from bluepill_sim.cpu import Engine
+from bluepill_sim.cpu.native_library import library
 from bluepill_sim.gpio import Gpio
 from bluepill_sim.peripheral import Peripheral
 from bluepill_sim.pins import PinBank
@@ -43,6 +44,7 @@ class SharedPorts:
         self._engine = engine
         self._ns_of = ns_of
         self._was_heard = True
+        self._is_recording = False
         self._bank = bank
         self._ports: list[tuple[Gpio, _Port]] = []
 
@@ -54,19 +56,28 @@ class SharedPorts:
         """Do what C has done to pins, before anybody looks at them."""
         shared, bank = self._engine.shared, self._bank
         shared.pins_changed = 0
+        for take in bank.bulk_takers:
+            take()
+        library().core_drop_pins(self._engine.state)
         on_output, bank.on_output = bank.on_output, None
+        wire_listeners, bank.wire_listeners = bank.wire_listeners, []
         for gpio, port in self._ports:
             changed, port.changed = port.changed, 0
             if changed:
                 gpio.repeat_outputs(changed)
-        bank.on_output = on_output
+        bank.on_output, bank.wire_listeners = on_output, wire_listeners
         if bank.on_silent_output is not None:
             bank.on_silent_output(self._ns_of(shared.last_pin_cycle))
 
     def mark(self) -> None:
         """Tell C which pins are simple, before a run."""
         bank = self._bank
-        is_heard = bank.is_heard() or bool(bank.wire_listeners)
+        is_recording = bool(bank.bulk_takers)
+        if is_recording is not self._is_recording:
+            self._is_recording = is_recording
+            if not library().core_record_pins(self._engine.state, is_recording):
+                raise MemoryError("no memory for a record of pins")
+        is_heard = bank.is_heard() or len(bank.wire_listeners) > len(bank.bulk_takers)
         if bank.simple_is_known and is_heard is self._was_heard:
             return
         bank.simple_is_known, self._was_heard = True, is_heard
@@ -79,7 +90,6 @@ def share_registers(
 ) -> None:
     """Hand the registers of a chip to its engine, if it is a native one."""
     from bluepill_sim.cpu.native_engine import NativeEngine
-    from bluepill_sim.cpu.native_library import library
 
     if not isinstance(engine, NativeEngine):
         return

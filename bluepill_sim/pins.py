@@ -370,6 +370,8 @@ class PinBank:
         self.simple_is_known = False
         #: Called with (pin, time in ns) whenever something on a wire may have changed; tools look on.
         self.wire_listeners: list[Callable[[Pin, int], None]] = []
+        #: Those of them who take changes of simple pins in bulk where a core keeps them: called to do so.
+        self.bulk_takers: list[Callable[[], None]] = []
         self._pins = {
             port: tuple(self._make(port, n, bonded, five_volt_tolerant) for n in range(16)) for port in self.PORTS
         }

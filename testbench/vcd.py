@@ -6,10 +6,9 @@ Source: IEEE 1364-2005, chapter 18 (four-state VCD).
 from collections.abc import Iterator
 from pathlib import Path
 
+from bluepill_sim.sight.vcd import identifier
 from testbench.report.run_record import RunRecord
 from testbench.report.signals import grouped
-
-FIRST_CODE, LAST_CODE = 33, 126
 
 
 def write_vcd(record: RunRecord, path: Path) -> None:
@@ -30,7 +29,7 @@ def edges_in_order(record: RunRecord) -> Iterator[tuple[int, int, int]]:
 
 def _lines(record: RunRecord) -> Iterator[str]:
     names = nets_in_order(record)
-    codes = [_code(index) for index in range(len(names))]
+    codes = [identifier(index) for index in range(len(names))]
     yield "$version p2os test bench $end"
     yield "$timescale 1 ns $end"
     yield "$scope module bench $end"
@@ -46,10 +45,3 @@ def _lines(record: RunRecord) -> Iterator[str]:
         yield f"{level}{codes[index]}"
     if record.last_ns > now:
         yield f"#{record.last_ns}"
-
-
-def _code(index: int) -> str:
-    """Return the identifier code of a variable: printable ASCII, shortest first."""
-    base = LAST_CODE - FIRST_CODE + 1
-    code = chr(FIRST_CODE + index % base)
-    return code if index < base else _code(index // base - 1) + code

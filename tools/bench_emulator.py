@@ -21,12 +21,19 @@ from bluepill_sim.cpu import native_library
 from bluepill_sim.cpu.core import Core
 from bluepill_sim.cpu.registers import Register
 from bluepill_sim.sight.probe import Probe
+from bluepill_sim.sight.vcd import write_vcd
 
 HERE = Path(__file__).parent
 RUNTIME = HERE.parent / "testbench" / "firmware"
 RUNS = 1 if "--quick" in sys.argv else 5
 #: Program, virtual seconds a run in C and in Python, goal of the native core in times real time.
-ROWS = (("compute", 1.0, 0.02, 2.0), ("gpio", 0.5, 0.01, 1.2), ("systick", 60.0, 4.0, 150.0), ("usart", 3.0, 0.3, 5.0))
+ROWS = (
+    ("compute", 1.0, 0.02, 2.0),
+    ("gpio", 0.5, 0.01, 1.2),
+    ("bitbang", 0.5, 0.01, None),
+    ("systick", 60.0, 4.0, 150.0),
+    ("usart", 3.0, 0.3, 5.0),
+)
 #: Goals of the Python executor: on compute, and when idling.
 PYTHON_GOALS = {"compute": 0.05, "systick": 5.0}
 SETTLED_NS = 5_000_000
@@ -101,16 +108,28 @@ def speeds(folder: Path) -> None:
         program = build(name, folder)
         if native_library.path() is not None:
             made = board(program, "native")
-            row(f"{name}, native", f"{median(lambda: factor(made, native_s)):.2f} x real", f"goal {goal:g}")  # noqa: B023 - called at once
+            note = "" if goal is None else f"goal {goal:g}"
+            row(f"{name}, native", f"{median(lambda: factor(made, native_s)):.2f} x real", note)  # noqa: B023 - called at once
         slow = board(program, "python")
         wanted = f"goal {PYTHON_GOALS[name]:g}" if name in PYTHON_GOALS else ""
         row(f"{name}, Python", f"{median(lambda: factor(slow, python_s)):.3f} x real", wanted)  # noqa: B023 - as above
     if native_library.path() is not None:
+        program = build("bitbang", folder)
+        figure = median(lambda: recorded(program, folder / "pins.vcd"))
+        row("bitbang, native, every edge to a VCD file", f"{figure:.2f} x real", "goal 0.2, two edges a round")
         made = board(build("gpio", folder), "native")
-        probe = Probe(made)
-        row("gpio, native, every edge recorded", f"{median(lambda: factor(made, 0.02)):.3f} x real", "goal 0.2")
-        probe.finish()
         row("snapshot of the whole machine", f"{1e3 * median(lambda: snapshot_s(made)):.2f} ms", "goal 1")
+
+
+def recorded(program: Path, path: Path) -> float:
+    """Return the virtual seconds that a second of the wall clock runs, records and writes."""
+    made = board(program, "native")
+    probe = Probe(made)
+    begin = time.perf_counter()
+    made.advance_to(made.now_ns + 100_000_000)
+    probe.finish()
+    write_vcd(probe, path)
+    return 0.1 / (time.perf_counter() - begin)
 
 
 def snapshot_s(made: BluePill) -> float:

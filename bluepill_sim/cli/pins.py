@@ -17,8 +17,8 @@ from bluepill_sim.timing import NS_PER_S
 
 HELP = """Run a firmware for a while, then show each pin: mode, level, who drives it, edges.
 
-With --vcd or --sr the pins are also written as waveforms, with SysTick, the
-interrupt lines, the running exception and the USARTs' characters beside them.
+With --vcd or --sr the pins are also written as waveforms, with the interrupt
+lines and what the USARTs send beside them.
 
 \b
 Examples:

@@ -64,6 +64,16 @@ _FUNCTIONS = {
     "core_region": "ppuu",
     "core_trap": "ppuuu",
     "core_start_recording": "bpu",
+    "core_record_pins": "bpb",
+    "core_drop_pins": "vp",
+    "edge_log_new": "p",
+    "edge_log_free": "vp",
+    "edge_log_put": "bpluu",
+    "edge_log_take": "bppllupp",
+    "edge_log_write": "ipppull",
+    "edge_log_rows": "pp",
+    "edge_log_count": "zp",
+    "edge_log_used": "vpp",
 }
 _TYPES: dict[str, Any] = {
     "v": None, "b": ctypes.c_bool, "i": ctypes.c_int32, "u": ctypes.c_uint32, "l": ctypes.c_uint64,

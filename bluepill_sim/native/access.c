@@ -52,12 +52,45 @@ static bool reaches(struct core *core, const struct instruction *one, uint32_t a
     return address - at < (uint32_t)one->bytes * one->count;
 }
 
-static bool fits(const struct instruction *one, uint32_t kind, uint32_t bytes)
+/* The first instruction from `n` on that makes accesses of this kind and width; `count` of the row for none. */
+static uint32_t fitting(const struct row *row, uint32_t n, bool is_write, uint32_t bytes)
 {
-    return one->kind == kind && one->bytes == bytes;
+    while (n < row->count && (row->instructions[n].kind != (is_write ? 2 : 1) || row->instructions[n].bytes != bytes)) {
+        ++n;
+    }
+    return n;
 }
 
-static void resolve(struct core *core, uint32_t address, bool is_write, uint32_t bytes)
+/* The instruction that makes an access: the only one of its kind that is left, or the first that reaches there. */
+static uint32_t find_access(struct core *core, uint32_t address, bool is_write, uint32_t bytes)
+{
+    const struct row *row = core->block;
+    uint32_t n = fitting(row, core->io_next, is_write, bytes);
+    if (n < row->count && fitting(row, n + 1, is_write, bytes) < row->count) {
+        while (n < row->count && !reaches(core, &row->instructions[n], address)) {
+            n = fitting(row, n + 1, is_write, bytes);
+        }
+    }
+    return n;
+}
+
+static void pass(struct core *core, uint32_t n)
+{
+    core->io_next = core->block->instructions[n].count > 1 ? n : n + 1;
+}
+
+/* Notes an access that nobody asks about, so that the next one of the block is not taken for it. */
+void skip(struct core *core, uint32_t address, bool is_write, uint32_t bytes)
+{
+    if (UNLIKELY(core->skipped_count == SKIPPED)) {
+        resolve(core, address, is_write, bytes);
+    } else {
+        core->skipped[core->skipped_count++] = (struct skipped){address, (uint8_t)bytes, is_write};
+    }
+}
+
+/* Works out which instruction of the block makes an access, and with it when. */
+void resolve(struct core *core, uint32_t address, bool is_write, uint32_t bytes)
 {
     struct shared *s = &core->shared;
     const struct row *row = core->block;
@@ -75,34 +108,23 @@ static void resolve(struct core *core, uint32_t address, bool is_write, uint32_t
         }
         return;
     }
-    const uint32_t kind = is_write ? 2 : 1;
-    uint32_t first = row->count, others = 0;
-    for (uint32_t n = core->io_next; n < row->count; ++n) {
-        if (fits(&row->instructions[n], kind, bytes)) {
-            if (first == row->count) {
-                first = n;
-            } else {
-                ++others;
-            }
+    for (uint32_t k = 0; k < core->skipped_count; ++k) {
+        const struct skipped *one = &core->skipped[k];
+        const uint32_t n = find_access(core, one->address, one->is_write, one->bytes);
+        if (n < row->count) {
+            pass(core, n);
         }
     }
-    if (first == row->count) {
-        return;
+    core->skipped_count = 0;
+    uint32_t found = find_access(core, address, is_write, bytes);
+    if (found == row->count) {
+        found = fitting(row, core->io_next, is_write, bytes);
     }
-    uint32_t found = first;
-    if (others) {
-        while (found < row->count && !(fits(&row->instructions[found], kind, bytes) &&
-                                       reaches(core, &row->instructions[found], address))) {
-            ++found;
-        }
-        if (found == row->count) {
-            found = first;
-        }
+    if (found < row->count) {
+        s->access_cycle = s->cycle + row->instructions[found].cycle;
+        s->access_pc = row->instructions[found].address;
+        pass(core, found);
     }
-    const struct instruction *one = &row->instructions[found];
-    s->access_cycle = s->cycle + one->cycle;
-    s->access_pc = one->address;
-    core->io_next = one->count > 1 ? found : found + 1;
 }
 
 static bool is_over(const struct core *core)
@@ -152,15 +174,17 @@ static struct page *open_page(const struct region_user *region, uint32_t offset)
 uint64_t core_read_io(void *engine, uint64_t at, unsigned size, void *user)
 {
     (void)engine;
+    const struct region_user *region = user;
     const uint32_t offset = (uint32_t)at, index = (offset & IN_PAGE) >> 2;
-    const struct page *page = open_page(user, offset);
+    const struct page *page = open_page(region, offset);
     if (page == NULL || !(page->behaviour[index] & READS_PLAIN)) {
-        return ask_read(user, offset, size);
+        return ask_read(region, offset, size);
     }
     const uint32_t word = page->words[index], latch = page->behaviour[index] >> LATCH_SHIFT;
     if (latch) {
         page->words[latch] = word;
     }
+    skip(region->core, region->base + offset, false, size);
     return size == 4 ? word : (word >> (offset & 3) * 8) & ((1u << size * 8) - 1);
 }
 
@@ -168,12 +192,14 @@ void core_write_io(void *engine, uint64_t at, unsigned size, uint64_t value, voi
 {
     (void)engine;
     const uint32_t offset = (uint32_t)at, index = (offset & IN_PAGE) >> 2, written = (uint32_t)value;
-    struct page *page = size == 4 ? open_page(user, offset) : NULL;
+    const struct region_user *region = user;
+    struct page *page = size == 4 ? open_page(region, offset) : NULL;
     if (page != NULL && page->behaviour[index] & WRITES_PLAIN) {
         const uint32_t *mask = page->masks[index], before = page->words[index];
         page->words[index] = (before & mask[0] & ~(written & mask[2]) & (written | ~mask[3])) | (written & mask[1]);
+        skip(region->core, region->base + offset, true, size);
     } else if (page == NULL || page->port == NULL ||
-               !write_port(((const struct region_user *)user)->core, page, index, written)) {
-        ask_write(user, offset, size, written);
+               !write_port(region->core, page, index, written, region->base + offset)) {
+        ask_write(region, offset, size, written);
     }
 }

@@ -110,8 +110,7 @@ static void enter_special(struct core *core, uint32_t address, uint32_t size, st
         stop_at_border(core, address);
         return;
     }
-    core->block = row;
-    core->io_next = 0;
+    begin_block(core, row);
     if (row->flags & ROW_CHANGES_MASKS && s->mask_stop) {
         s->stop_at = 0;
     }
@@ -152,8 +151,7 @@ void core_on_block(void *engine, uint64_t at, uint32_t size, void *user)
     if (UNLIKELY(row == NULL || row->flags & ROW_ATTENTION)) {
         enter_special(core, address, size, row);
     } else {
-        core->block = row;
-        core->io_next = 0;
+        begin_block(core, row);
         tell(core, cycle, address, 0);
     }
 }

@@ -157,6 +157,23 @@ struct allocation {
     max_align_t data[];
 };
 
+/* An edge of outputs that this core has switched: pins of a port, and the levels of all of it after. */
+struct pin_row {
+    uint64_t cycle;
+    uint16_t port, changed, levels, padding;
+};
+
+/* Room for what is recorded before Python takes it over; a block never adds more than the slack. */
+#define PIN_ROWS 32768
+#define PIN_SLACK 1024
+
+/* An access that was answered here without asking which instruction made it. */
+struct skipped {
+    uint32_t address;
+    uint8_t bytes, is_write;
+};
+#define SKIPPED 8
+
 /* One GPIO port whose plain outputs are switched here. */
 struct port {
     uint32_t simple;  /* pins whose output this core may switch alone */
@@ -169,7 +186,9 @@ struct core {
     struct engine_api api;
     struct callbacks calls;
     struct row *block;
-    uint32_t io_next;
+    uint32_t io_next;       /* the first instruction of the block that may make the next access */
+    uint32_t skipped_count; /* accesses since that are not yet counted in it */
+    struct skipped skipped[SKIPPED];
     struct row none;
     struct row *flash_rows[FLASH_SLOTS];
     struct row *sram_rows[SRAM_SLOTS];
@@ -183,7 +202,15 @@ struct core {
     struct allocation *allocations;
     struct record *records;
     uint32_t record_count, record_room;
+    struct pin_row *pin_rows; /* null: nobody records the pins */
+    uint32_t pin_count;
 };
+
+static inline void begin_block(struct core *core, struct row *row)
+{
+    core->block = row;
+    core->io_next = core->skipped_count = 0;
+}
 
 /* For this library alone: such calls need no table. */
 #pragma GCC visibility push(hidden)
@@ -194,7 +221,10 @@ const struct instruction *instruction_at(const struct row *row, uint32_t address
 void record(struct core *core, uint32_t address, int32_t kind);
 void core_flush(struct core *core);
 /* gpio.c */
-bool write_port(struct core *core, struct page *page, uint32_t index, uint32_t value);
+bool write_port(struct core *core, struct page *page, uint32_t index, uint32_t value, uint32_t address);
+/* access.c */
+void resolve(struct core *core, uint32_t address, bool is_write, uint32_t bytes);
+void skip(struct core *core, uint32_t address, bool is_write, uint32_t bytes);
 /* run.c */
 void *allocate(struct core *core, size_t bytes);
 uint32_t read_register(struct core *core, int number);

@@ -53,6 +53,7 @@ void core_free(struct core *core)
     core_forget_rows(core);
     free_dropped(core);
     free(core->records);
+    free(core->pin_rows);
     while (core->allocations != NULL) {
         struct allocation *one = core->allocations;
         core->allocations = one->next;
@@ -186,7 +187,7 @@ static uint32_t run_slice(struct core *core)
     s->halt_kind = HALT_NONE;
     s->halt_has_address = 0;
     s->run_from = s->pc;
-    core->io_next = 0;
+    core->io_next = core->skipped_count = 0;
     const int error = core->api.start(core->engine, s->pc | s->is_thumb, NOWHERE, 0, 0);
     if (s->halt_kind == HALT_NONE) {
         const uint32_t pc = read_register(core, REG_PC);

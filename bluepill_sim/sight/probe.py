@@ -13,11 +13,14 @@ Invariant: looking on changes nothing; edges of one signal are in order of time
 and differ from one to the next.
 """
 
-from collections.abc import Callable
+import ctypes
+from collections.abc import Callable, MutableSequence
 from typing import TypeVar
 
 from bluepill_sim.board import BluePill
-from bluepill_sim.pins import Pin
+from bluepill_sim.cpu.native_engine import NativeEngine
+from bluepill_sim.pins import Pin, PinBank
+from bluepill_sim.sight.edge_log import EdgeLog, NativeEdgeLog, PythonEdgeLog
 from bluepill_sim.timing import Nanos
 from bluepill_sim.vectors import IRQ_NAMES
 
@@ -39,14 +42,28 @@ class Probe:
     def __init__(self, board: BluePill, *, with_signals: bool = True) -> None:
         self._board = board
         self.start_ns = self.end_ns = board.now_ns
-        #: Edges after the start, by signal; `initial` is what was there before.
-        self.edges: dict[str, list[Edge]] = {}
-        self.initial: dict[str, int] = {}
-        self.words: dict[str, list[tuple[Nanos, int]]] = {}
-        self._last: dict[str, int] = {}
+        ports = [board.chip.pins.port(letter) for letter in PinBank.PORTS]
+        inside = [f"irq.{name}" for name in IRQ_NAMES] + [f"{name}.tx" for name in board.serial_ports]
+        #: Every signal in the order in which a person reads them, the words of the USARTs behind.
+        self.names = [pin.name for port in ports for pin in port] + sorted(inside)
+        self.first_word = len(self.names)
+        self.names += [f"{name}.word" for name in sorted(board.serial_ports)]
+        self._numbers = {name: number for number, name in enumerate(self.names)}
+        #: Values at the start, by signal: of all pins, and of what has changed inside.
+        self.initial = {pin.name: _value(pin) for pin in board.pins}
         self._undo: list[Callable[[], None]] = []
-        for pin in board.pins:
-            self.initial[pin.name] = self._last[pin.name] = _value(pin)
+        levels = [_value(pin) for port in ports for pin in port]
+        bonded = [sum(1 << pin.number for pin in port if pin.is_bonded) for port in ports]
+        engine = board.chip.engine
+        self._last: dict[int, int] = {}
+        if isinstance(engine, NativeEngine):
+            log = NativeEdgeLog(bonded, levels)
+            self._levels: MutableSequence[int] | ctypes.Array[ctypes.c_uint8] = log.last
+            self.log: EdgeLog = log
+            self._listen(board.chip.pins.bulk_takers, lambda: log.take(engine.state, board.chip.time_base))
+        else:
+            self._levels = levels
+            self.log = PythonEdgeLog()
         self._listen(board.chip.pins.wire_listeners, self._wire_changed)
         if with_signals:
             self._listen(board.chip.irq_listeners, self._irq_changed)
@@ -59,34 +76,57 @@ class Probe:
         while self._undo:
             self._undo.pop()()
 
+    @property
+    def edges(self) -> dict[str, list[Edge]]:
+        """Edges after the start, by signal."""
+        return self._by_name(0, self.first_word)
+
+    @property
+    def words(self) -> dict[str, list[tuple[Nanos, int]]]:
+        """Characters, by signal, at the end of their stop bit."""
+        return self._by_name(self.first_word, len(self.names))
+
+    def _by_name(self, first: int, end: int) -> dict[str, list[Edge]]:
+        rows: dict[str, list[Edge]] = {}
+        for at_ns, number, value in self.log.rows():
+            if first <= number < end:
+                rows.setdefault(self.names[number], []).append((at_ns, value))
+        return rows
+
     def _listen(self, listeners: list[_Listener], listener: _Listener) -> None:
         listeners.append(listener)
         self._undo.append(lambda: listeners.remove(listener))
 
     def _put(self, name: str, value: int, at_ns: Nanos) -> None:
-        last = self._last.get(name)
+        number = self._numbers[name]
+        last = self._last.get(number)
         if last is None:
             self.initial[name] = last = 0
         if value != last:
-            self._last[name] = value
-            self.edges.setdefault(name, []).append((at_ns, value))
+            self._last[number] = value
+            self.log.put(at_ns, number, value)
 
     def _wire_changed(self, pin: Pin, at_ns: Nanos) -> None:
         if pin.is_bonded:
-            self._put(pin.name, _value(pin), at_ns)
+            number = self._numbers[pin.name]
+            value = _value(pin)
+            if value != self._levels[number]:
+                self._levels[number] = value
+                self.log.put(at_ns, number, value)
 
     def _irq_changed(self, irq: int, level: bool, at_ns: Nanos) -> None:
         self._put(f"irq.{IRQ_NAMES[irq]}", int(level), at_ns)
 
     def _word_listener(self, name: str, peripheral: str) -> Callable[[int, Nanos], None]:
         usart = self._board.chip.parts.usart(int(peripheral[-1]))
-        line, words = f"{name}.tx", f"{name}.word"
+        line = f"{name}.tx"
+        line_number, word_number = self._numbers[line], self._numbers[f"{name}.word"]
 
         def sent(word: int, at_ns: Nanos) -> None:
-            self.words.setdefault(words, []).append((at_ns, word))
+            self.log.put(at_ns, word_number, word)
             bit_ns = usart.bit_ns
-            if line not in self._last:
-                self.initial[line] = self._last[line] = 1
+            if line_number not in self._last:
+                self.initial[line] = self._last[line_number] = 1
             begin = at_ns - 10 * bit_ns
             for number, level in enumerate([0, *(word >> n & 1 for n in range(8)), 1]):
                 self._put(line, level, begin + number * bit_ns)
@@ -100,12 +140,12 @@ def _value(pin: Pin) -> int:
 
 def signals_in_order(probe: Probe) -> list[str]:
     """Return the signals as a person reads them: pins by port and number, then what is inside; unused ones left out."""
-    names = {name for name, edges in probe.edges.items() if edges}
-    names |= {name for name, value in probe.initial.items() if value != FLOATING}
-    return sorted(names, key=_order)
+    used = probe.log.used()
+    names = probe.names[: probe.first_word]
+    return [name for n, name in enumerate(names) if n in used or probe.initial.get(name, FLOATING) != FLOATING]
 
 
-def _order(name: str) -> tuple[int, str, int]:
-    if name.startswith("P") and "." not in name:
-        return 0, name[1], int(name[2:])
-    return 1, name, 0
+def words_in_order(probe: Probe) -> list[str]:
+    """Return the signals that are characters; unused ones left out."""
+    used = probe.log.used()
+    return [name for n, name in enumerate(probe.names) if n >= probe.first_word and n in used]

@@ -1,14 +1,16 @@
 """Writes what a probe has recorded as a value change dump, which GTKWave and sigrok open.
 
 Source: IEEE 1364-2005, chapter 18 (four-state VCD).
-Invariant: the same recording gives the same bytes; times are in nanoseconds.
+Invariant: the same recording gives the same bytes, whichever log holds it; times are in nanoseconds.
 """
 
+import os
 from collections.abc import Iterator
 from pathlib import Path
 
 from bluepill_sim.errors import BluePillError
-from bluepill_sim.sight.probe import Probe, signals_in_order
+from bluepill_sim.sight.edge_log import NativeEdgeLog
+from bluepill_sim.sight.probe import Probe, signals_in_order, words_in_order
 
 _FIRST_CODE, _LAST_CODE = 33, 126
 _LETTERS = "01z"
@@ -21,58 +23,54 @@ def write_vcd(probe: Probe, path: Path) -> None:
     Raises:
         BluePillError: the file cannot be written.
     """
+    codes = _codes(probe)
+    log = probe.log
     try:
-        path.write_text("\n".join(vcd_lines(probe)) + "\n", encoding="ascii")
+        with path.open("w", encoding="ascii", newline="\n") as file:
+            file.writelines(f"{line}\n" for line in _head(probe, codes))
+            if not isinstance(log, NativeEdgeLog):
+                file.writelines(f"{line}\n" for line in _changes(probe, codes))
+        if isinstance(log, NativeEdgeLog):
+            texts = [codes.get(name, "") for name in probe.names]
+            log.write(os.fsencode(path), texts, probe.first_word, (probe.start_ns, probe.end_ns))
     except OSError as error:
         raise BluePillError(f"cannot write {path}: {error.strerror}", hint="give a file in a folder") from error
 
 
-def vcd_lines(probe: Probe) -> Iterator[str]:
-    """Return the lines of the dump."""
-    signals, words = signals_in_order(probe), sorted(probe.words)
-    codes = {name: _code(index) for index, name in enumerate([*signals, *words])}
+def identifier(index: int) -> str:
+    """Return the identifier code of a variable: printable ASCII, shortest first."""
+    base = _LAST_CODE - _FIRST_CODE + 1
+    code = chr(_FIRST_CODE + index % base)
+    return code if index < base else identifier(index // base - 1) + code
+
+
+def _codes(probe: Probe) -> dict[str, str]:
+    return {name: identifier(index) for index, name in enumerate([*signals_in_order(probe), *words_in_order(probe)])}
+
+
+def _head(probe: Probe, codes: dict[str, str]) -> Iterator[str]:
+    words = words_in_order(probe)
     yield "$version p2os bluepill_sim $end"
     yield "$timescale 1 ns $end"
     yield "$scope module bluepill $end"
-    for name in signals:
-        yield f"$var wire 1 {codes[name]} {name} $end"
-    for name in words:
-        yield f"$var reg {_WORD_BITS} {codes[name]} {name} $end"
+    for name, code in codes.items():
+        yield f"$var reg {_WORD_BITS} {code} {name} $end" if name in words else f"$var wire 1 {code} {name} $end"
     yield "$upscope $end"
     yield "$enddefinitions $end"
     yield f"#{probe.start_ns}"
     yield "$dumpvars"
-    for name in signals:
-        yield f"{_LETTERS[probe.initial[name]]}{codes[name]}"
-    for name in words:
-        yield f"bx {codes[name]}"
+    for name, code in codes.items():
+        yield f"bx {code}" if name in words else f"{_LETTERS[probe.initial[name]]}{code}"
     yield "$end"
-    yield from _changes(probe, signals, words, codes)
 
 
-def _changes(probe: Probe, signals: list[str], words: list[str], codes: dict[str, str]) -> Iterator[str]:
-    changes = [
-        (at, order, f"{_LETTERS[value]}{codes[name]}")
-        for order, name in enumerate(signals)
-        for at, value in probe.edges.get(name, ())
-    ]
-    changes += [
-        (at, len(signals) + order, f"b{word:b} {codes[name]}")
-        for order, name in enumerate(words)
-        for at, word in probe.words[name]
-    ]
+def _changes(probe: Probe, codes: dict[str, str]) -> Iterator[str]:
     now = probe.start_ns
-    for at, _order, line in sorted(changes, key=lambda change: change[:2]):
-        if at > now:
-            now = at
-            yield f"#{at}"
-        yield line
+    for at_ns, number, value in probe.log.rows():
+        if at_ns > now:
+            now = at_ns
+            yield f"#{at_ns}"
+        code = codes[probe.names[number]]
+        yield f"b{value:b} {code}" if number >= probe.first_word else f"{_LETTERS[value]}{code}"
     if probe.end_ns > now:
         yield f"#{probe.end_ns}"
-
-
-def _code(index: int) -> str:
-    """Return the identifier code of a variable: printable ASCII, shortest first."""
-    base = _LAST_CODE - _FIRST_CODE + 1
-    code = chr(_FIRST_CODE + index % base)
-    return code if index < base else _code(index // base - 1) + code

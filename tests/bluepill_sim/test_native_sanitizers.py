@@ -15,14 +15,21 @@ import sys
 from importlib.resources import files
 from bluepill_sim.cpu import native_library
 native_library.path = lambda: sys.argv[1]
+from pathlib import Path
 from bluepill_sim import BluePill
-for name in ("dodge", "encoders"):
+from bluepill_sim.sight.probe import Probe
+from bluepill_sim.sight.vcd import write_vcd
+for name in ("dodge", "motors", "encoders"):
     board = BluePill(str(files("testbench.firmware") / f"{name}.elf"))
     board.chip.record_blocks(100)
     for step in range(40):
         board.pin("PA4").drive(step % 3 == 0)
         board.usart1.receive(b"x")
         board.advance_to(board.now_ns + 777_777)
+    probe = Probe(board)
+    board.advance_to(board.now_ns + 300_000_000)
+    probe.finish()
+    write_vcd(probe, Path(sys.argv[2]))
     snapshot = board.snapshot()
     board.advance_to(board.now_ns + 5_000_000)
     board.restore(snapshot)
@@ -55,6 +62,7 @@ def test_no_warning_and_no_finding(tmp_path: Path) -> None:
         "-c",
         PROGRAM,
         str(library),
+        str(tmp_path / "pins.vcd"),
         LD_PRELOAD=preload,
         ASAN_OPTIONS="detect_leaks=0",
         P2OS_CORE="native",

@@ -9,9 +9,10 @@ from pathlib import Path
 import pytest
 from records import motor_pins, record
 
+from bluepill_sim.sight.vcd import identifier
 from testbench.report.run_record import RunRecord
 from testbench.sigrok import write_sigrok
-from testbench.vcd import _code, edges_in_order, nets_in_order, write_vcd
+from testbench.vcd import edges_in_order, nets_in_order, write_vcd
 
 MS = 1_000_000
 
@@ -79,7 +80,7 @@ def test_a_run_without_pins_still_has_its_files(tmp_path: Path) -> None:
 
 
 def test_codes_of_variables_are_short_and_different() -> None:
-    codes = [_code(index) for index in range(10_000)]
+    codes = [identifier(index) for index in range(10_000)]
     assert len(set(codes)) == len(codes)
     assert max(map(len, codes)) == 3
 

@@ -1,0 +1,18 @@
+/* Reads a port once and writes another one three times, as fast as it can: the bit-banger's loop. */
+#include "clock.h"
+
+volatile uint32_t bench_rounds;
+
+int main(void)
+{
+    clock_start();
+    RCC->APB2ENR |= RCC_APB2ENR_IOPAEN | RCC_APB2ENR_IOPBEN;
+    GPIOB->CRL = (GPIOB->CRL & ~(0xFu << 20)) | GPIO_OUTPUT_PUSH_PULL_2MHZ << 20;
+    for (;;) {
+        uint32_t level = GPIOA->IDR;
+        GPIOB->BSRR = level & 1u << 4 ? 1u << 5 : 1u << 21;
+        GPIOB->BSRR = 1u << 5;
+        GPIOB->BSRR = 1u << 21;
+        ++bench_rounds;
+    }
+}
