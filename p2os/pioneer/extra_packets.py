@@ -37,8 +37,8 @@ def battery_packet(works: Works) -> BatteryPacket:
 MAKERS: Mapping[Extra, Maker] = {
     Extra.GYRO: lambda works, _flash, _bumps, _now: works.rack.gyro.take_packet(),
     Extra.JOYSTICK: lambda works, _flash, _bumps, _now: works.rack.joystick.packet(),
-    Extra.IO: lambda works, _flash, bumps, _now: works.rack.pins.packet(
-        front=bumps[0], rear=bumps[1], decivolts=works.rack.battery.decivolts
+    Extra.IO: lambda works, _flash, bumps, now: works.rack.pins.packet(
+        digital_in=works.rack.digital_in(now), front=bumps[0], rear=bumps[1], decivolts=works.rack.battery.decivolts
     ),
     Extra.ENCODER: lambda works, flash, _bumps, _now: encoder_packet(works, flash),
     Extra.GRIPPER: lambda works, _flash, _bumps, now: works.rack.gripper.packet(now),

@@ -67,7 +67,7 @@ def standard_packet(
         analog_port=rack.pins.selected,
         gripper_state=int(rack.gripper.state(now)),
         raw_analog=rack.pins.raw_analog,
-        digital_in=rack.pins.digital_in,
+        digital_in=rack.digital_in(now),
         digital_out=rack.pins.digital_out,
         tail=_arcos_tail(works, wheels, parameters) if profile is Profile.ARCOS else (),
     )

@@ -189,6 +189,24 @@ def test_a_gripper_closes_lifts_and_feels_what_it_holds(make_robot: MakeRobot) -
     assert robot.sip().gripper_state == start
 
 
+@pytest.mark.parametrize(("kind", "shown"), [(1, True), (2, False)])
+def test_a_gripper_on_the_users_inputs_shows_its_switches_there(make_robot: MakeRobot, kind: int, shown: bool) -> None:
+    """ARIA reads paddles and lift of such a gripper from DIGIN, which stood still: it never closed."""
+    from p2os.pioneer.flash import Flash
+
+    robot = make_robot(flash=Flash().with_values({"gripper": kind})).open()
+    for number in (8, 7):  # deploy, store
+        robot.say(C.GRIPPER, number)
+        robot.run(4000)
+        sip = robot.sip()
+        assert (sip.digital_in & 0x3F == sip.gripper_state & 0x3F) is shown
+        assert sip.digital_in & 0xC0 == 0
+        robot.say(C.IOREQUEST, 1)
+        robot.run(200)
+        (answer,) = [frame for frame in robot.frames() if frame.kind == 0xF0]
+        assert answer.data[1] == sip.digital_in
+
+
 def test_the_stick_drives_while_its_button_is_held(robot: Any) -> None:
     robot.open()
     robot.say(C.JOYDRIVE, 1)

@@ -52,6 +52,10 @@ MOVES: dict[int, tuple[int | None, int | None]] = {
     7: (1, 1), 8: (-1, -1), 15: (0, 0),
 }  # fmt: skip
 PRESSURE, CARRY = 16, 17
+#: `kind` of one whose switches hang at the user's digital inputs.
+ON_USER_IO = 1
+#: The states that are switches; the two above them are the controller's own.
+SWITCHES = 0x3F
 
 
 @dataclass(slots=True)

@@ -60,17 +60,18 @@ class Pins:
         """The selected port as the packet carries it, 0 to 255."""
         return self.analog[self.selected - 1] >> 2
 
-    def packet(self, *, front: int, rear: int, decivolts: int) -> IoPacket:
+    def packet(self, *, digital_in: int, front: int, rear: int, decivolts: int) -> IoPacket:
         """Return the answer to IOREQUEST.
 
         Args:
+            digital_in: The user's inputs, with what hangs at them.
             front: Pressed front segments; in this packet low is pressed.
             rear: Pressed rear segments.
             decivolts: The battery, which the last analog port shows.
         """
         battery = min(round(decivolts / 10 / BATTERY_DIVIDER / 5 * FULL_SCALE), FULL_SCALE)
         return IoPacket(
-            digital_in=(self.digital_in, ~front & 0xFF, ~rear & 0xFF, 0xFF),
+            digital_in=(digital_in, ~front & 0xFF, ~rear & 0xFF, 0xFF),
             digital_out=(self.digital_out,),
             raw_analog=(*self.analog[:-1], battery),
         )

@@ -5,10 +5,11 @@ from typing import cast
 
 from p2os.pioneer.devices.aux_ports import PORTS, AuxPort
 from p2os.pioneer.devices.battery import Battery
-from p2os.pioneer.devices.gripper import Gripper
+from p2os.pioneer.devices.gripper import ON_USER_IO, SWITCHES, Gripper
 from p2os.pioneer.devices.heading_sensors import Compass, Gyro
 from p2os.pioneer.devices.joystick import Joystick
 from p2os.pioneer.devices.pins import Pins
+from p2os.timing import Nanos
 
 
 @dataclass(slots=True)
@@ -38,6 +39,16 @@ class Rack:
     gyro: Gyro = field(default_factory=Gyro)
     aux: tuple[AuxPort, ...] = field(default_factory=lambda: tuple(AuxPort(number) for number in PORTS))
     switches: Switches = field(default_factory=Switches)
+
+    def digital_in(self, now: Nanos) -> int:
+        """Return the user's inputs; a gripper on them holds the lower six with its switches.
+
+        ARIA reads such a gripper here and not in the gripper's own byte.
+        """
+        pins = self.pins.digital_in
+        if self.gripper.kind != ON_USER_IO:
+            return pins
+        return pins & ~SWITCHES | int(self.gripper.state(now)) & SWITCHES
 
     def snapshot(self) -> object:
         """Return all that decides the future."""
