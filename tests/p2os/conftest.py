@@ -154,6 +154,12 @@ def client_side(name: str) -> list[tuple[float, bytes]]:
 
 
 @pytest.fixture
+def captured() -> Callable[[str], list[tuple[float, bytes]]]:
+    """Return a function from a capture's name to what its client said."""
+    return client_side
+
+
+@pytest.fixture
 def aria() -> list[tuple[float, bytes]]:
     """AriaCoda's demo: 34 s of driving and turning."""
     return client_side("aria_p2de")
