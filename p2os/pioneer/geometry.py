@@ -121,9 +121,13 @@ class Footprint:
         """Return the distance to a convex polygon; 0 where they overlap."""
         if not self.polygon:
             return max(0.0, _point_polygon(self.x, self.y, hull) - self.radius)
-        if not _apart(hull, self.polygon) and not _apart(self.polygon, hull):
+        if self.overlaps(hull):
             return 0.0
         return min(_nearest(hull, self.polygon), _nearest(self.polygon, hull))
+
+    def overlaps(self, hull: Polygon) -> bool:
+        """Tell whether this polygon and a convex one overlap or touch; of a circle, never asked."""
+        return not _apart(hull, self.polygon) and not _apart(self.polygon, hull)
 
     def way_out(self, hull: Polygon) -> Point:
         """Return the shortest move that takes this out of a convex polygon that it overlaps.

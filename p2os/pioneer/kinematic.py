@@ -6,7 +6,8 @@ of the sonar ring; what is lower than the hull stops the wheels, unless it is a
 sill. A step that would bring the hull into a thing does not happen: the wheels
 stall until the set-points lead away. A thing that can be pushed slides out of
 the way, without turning, where it has room and its friction is less than what
-the motors can push. What walks by itself goes on through the robot.
+the motors can push. What walks by itself goes on through the robot. Another
+robot of the same world stops it as a wall does.
 
 It serves as the oracle for the other bodies, and where PyBullet is not to be had.
 """
@@ -16,9 +17,10 @@ from collections.abc import Sequence
 
 from p2os.parameters import RobotParameters
 from p2os.pioneer.body import STEP_NS, BodyState, Turned
+from p2os.pioneer.company import Company, Stand
 from p2os.pioneer.contacts import ContactCounter
 from p2os.pioneer.fan import Direction, Echo, cast, echoes
-from p2os.pioneer.geometry import Footprint
+from p2os.pioneer.geometry import Footprint, hull_polygon, placed
 from p2os.pioneer.plan import Plan
 from p2os.pioneer.scenery import Obstacle, Pose, World
 from p2os.pioneer.sonar import cones, reading
@@ -50,6 +52,8 @@ class KinematicBody:
         self._radius_m = parameters.body.wheel_diameter_m / 2
         body = parameters.body
         self._static = StaticPlan(world, parameters)
+        self._hull = hull_polygon(body)
+        self._company: Company | None = None
         #: The greatest force of both motors together, N.
         self._push_n = 2 * body.motor_torque_nm / self._radius_m
         self._longest_m = parameters.sonar_range_m
@@ -81,6 +85,19 @@ class KinematicBody:
             in_contact=self._contacts.touching,
         )
 
+    @property
+    def stand(self) -> Stand:
+        """Where it stands, without the rest of its state."""
+        return Stand(self._x, self._y, self._heading)
+
+    def join(self, company: Company | None) -> None:
+        """Meet others from now on, also after a reset."""
+        self._company = company
+
+    def bump(self) -> None:
+        """Feel that another robot has driven against the hull."""
+        self._is_bumped = True
+
     def reset(self, pose: Pose, seed: int) -> BodyState:
         """Stand still at a pose in the world as it was made; nothing here is random."""
         del seed
@@ -95,6 +112,8 @@ class KinematicBody:
         self._left_angle = self._right_angle = self._left = self._right = 0.0
         self._asked = (0.0, 0.0)
         self._stalled = False
+        #: Another robot has driven against this one since the last step.
+        self._is_bumped = False
         #: The last set-points, where they would have brought the hull into a thing.
         self._blocked_at: tuple[float, float] | None = None
         self._contacts = ContactCounter()
@@ -112,17 +131,21 @@ class KinematicBody:
         if left_mps == 0.0 and right_mps == 0.0:
             self._left = self._right = 0.0
             self._stalled = False
-            self._contacts.update(touching=self._free_m == 0.0)
+            self._contacts.update(touching=self._is_bumped or self._free_m == 0.0)
+            self._is_bumped = False
             return Turned(self._left_angle, self._right_angle)
         forward, turn = (left_mps + right_mps) / 2 * _DT_S, (right_mps - left_mps) / self._track_m * _DT_S
         x, y, heading = self._moved(forward, turn)
-        # What was blocked stays so: neither the pose nor the plan has changed since.
-        blocked = self._asked == self._blocked_at or self._is_blocked(
-            x, y, heading, abs(forward) + abs(turn) * self._hull_reach
-        )
-        self._blocked_at = self._asked if blocked else None
+        blocked = self._company is not None and bool(self._company.near) and self._meets(self._company, x, y, heading)
+        if not blocked:
+            # What was blocked stays so: neither the pose nor the plan has changed since.
+            blocked = self._asked == self._blocked_at or self._is_blocked(
+                x, y, heading, abs(forward) + abs(turn) * self._hull_reach
+            )
+            self._blocked_at = self._asked if blocked else None
         self._stalled = blocked
-        self._contacts.update(touching=blocked or self._free_m == 0.0)
+        self._contacts.update(touching=blocked or self._is_bumped or self._free_m == 0.0)
+        self._is_bumped = False
         if blocked:
             self._left = self._right = 0.0
             return Turned(self._left_angle, self._right_angle)
@@ -159,6 +182,27 @@ class KinematicBody:
         self._free_m = free
         return False
 
+    def _meets(self, company: Company, x: float, y: float, heading: float) -> bool:
+        """Tell whether another robot is in the way, and let it feel so; one that was put into another may move."""
+        reach = self._hull_reach
+        found = []
+        for other in company.near:
+            shape = other.footprint(other.live)
+            if math.dist((x, y), (shape.x, shape.y)) <= reach + shape.reach:
+                found.append((other, shape))
+        if not found:
+            return False
+        hull = placed(self._hull, x, y, heading)
+        found = [(other, shape) for other, shape in found if shape.overlaps(hull)]
+        if not found:
+            return False
+        here = placed(self._hull, self._x, self._y, self._heading)
+        if any(shape.overlaps(here) for _, shape in found):
+            return False
+        for other, _ in found:
+            other.bump()
+        return True
+
     def _push(self, x: float, y: float, heading: float) -> bool:
         """Push what is in the way; tell whether all of it went."""
         names = self._plan.touched(x, y, heading)
@@ -166,7 +210,8 @@ class KinematicBody:
         resistance_n = sum(item.mass_kg * item.friction * GRAVITY_MPS2 for item in things)
         if len(things) < len(names) or resistance_n > self._push_n:
             return False
-        if not all(self._plan.push(item.name, x, y, heading) for item in things):
+        robots = () if self._company is None else [other.footprint(other.live) for other in self._company.near]
+        if not all(self._plan.push(item.name, x, y, heading, robots) for item in things):
             return False
         self._moved_things |= dict.fromkeys(item.name for item in things)
         return True
@@ -216,11 +261,18 @@ class KinematicBody:
 
     def _heard(self, x: float, y: float, rays: Sequence[Direction]) -> Sequence[Footprint]:
         xs, ys = [x, *(x + self._longest_m * dx for dx, _ in rays)], [y, *(y + self._longest_m * dy for _, dy in rays)]
-        return self._plan.heard_within(min(xs), min(ys), max(xs), max(ys))
+        box = (min(xs), min(ys), max(xs), max(ys))
+        if self._company is None:
+            return self._plan.heard_within(*box)
+        return [*self._plan.heard_within(*box), *self._company.heard_within(*box)]
 
     def clearance(self) -> float:
         """Return the distance from the hull to the nearest thing that it could touch, metres."""
-        return self._plan.clearance(self._x, self._y, self._heading)
+        free = self._plan.clearance(self._x, self._y, self._heading)
+        if self._company is None:
+            return free
+        hull = placed(self._hull, self._x, self._y, self._heading)
+        return min([free, *(shape.distance(hull) for shape in self._company.touchable())])
 
     def place(self, obstacle: Obstacle) -> None:
         """Put an obstacle with a new name into the world."""
@@ -241,6 +293,8 @@ class KinematicBody:
 
     def take_moved(self) -> list[Obstacle]:
         """Return what has walked or was pushed since this was asked last, where it is now."""
+        if not self._moved_things:
+            return []
         moved, self._moved_things = self._moved_things, {}
         return [item for item in self._plan.obstacles if item.name in moved]
 
@@ -250,7 +304,7 @@ class KinematicBody:
             "pose": (self._x, self._y, self._heading),
             "wheels": (self._left_angle, self._right_angle, self._left, self._right),
             "asked": self._asked,
-            "stalled": self._stalled,
+            "stalled": (self._stalled, self._is_bumped),
             "free_m": self._free_m,
             "contacts": self._contacts.snapshot(),
             "obstacles": self._plan.obstacles,
@@ -269,7 +323,8 @@ class KinematicBody:
         self._walkers = {name: (since, Walker(walks[name])) for name, since in snapshot["walking"].items()}
         self._x, self._y, self._heading = snapshot["pose"]
         self._left_angle, self._right_angle, self._left, self._right = snapshot["wheels"]
-        self._asked, self._stalled = snapshot["asked"], snapshot["stalled"]
+        self._asked = snapshot["asked"]
+        self._stalled, self._is_bumped = snapshot["stalled"]
         self._contacts.restore(snapshot["contacts"])
         self._changed()
         self._free_m = snapshot["free_m"]

@@ -140,10 +140,10 @@ class Plan:
             names.append("")
         return names
 
-    def push(self, name: str, x_m: float, y_m: float, heading_rad: float) -> bool:
+    def push(self, name: str, x_m: float, y_m: float, heading_rad: float, robots: Iterable[Footprint] = ()) -> bool:
         """Push a thing out of the hull at a pose, the shortest way; tell whether there is room for it.
 
-        The thing slides and does not turn.
+        The thing slides and does not turn. It finds no room where one of the other robots stands.
         """
         thing = self._touchable[name]
         dx, dy = thing.way_out(placed(self._hull, x_m, y_m, heading_rad))
@@ -155,7 +155,7 @@ class Plan:
         shape = Footprint(moved)
         x0, y0, x1, y1 = shape.bounds
         others = [other for other in self._touchable.values() if other.name != name]
-        if any(_overlap(shape, other) for other in (*others, *self._static.touched.near(x0, y0, x1, y1))):
+        if any(_overlap(shape, other) for other in (*others, *robots, *self._static.touched.near(x0, y0, x1, y1))):
             return False
         self._keep(moved)
         return True

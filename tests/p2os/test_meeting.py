@@ -1,0 +1,287 @@
+"""Robots that share one world: what they see and feel of each other, and that nothing else decides it."""
+
+import math
+import pickle
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from p2os.commands import Command
+from p2os.commands import CommandNumber as C
+from p2os.errors import UsageError
+from p2os.parameters import load_parameters
+from p2os.pioneer.body import make_body
+from p2os.pioneer.controller import ControllerSettings, Pioneer
+from p2os.pioneer.kinematic import KinematicBody
+from p2os.pioneer.meeting import SLICE_NS, Meeting
+from p2os.pioneer.scenery import Pose, World
+from p2os.pioneer.world import parse_world
+from p2os.timing import NS_PER_MS
+
+P2DX = load_parameters("p2dx")
+HALL = parse_world('name = "hall"\nextent_m = [-4, -4, 4, 4]', "hall")
+CARTON = parse_world(
+    'name = "c"\nextent_m = [-4, -4, 4, 4]\n[[box]]\nname = "carton"\nx_m = 0.0\ny_m = 0.0\nlength_m = 0.3\n'
+    'width_m = 0.3\nmass_kg = 1.5\n[[cylinder]]\nname = "visitor"\nx_m = 0\ny_m = 2\nradius_m = 0.2\n'
+    "path_m = [[0, 2], [2, 2]]",
+    "c",
+)
+FACING = ((-1.0, 0.0, 0.0), (1.0, 0.0, 180.0))
+#: Of the hull's front before the axle, m.
+FRONT_M = P2DX.body.hull_front_m
+
+Places = Sequence[tuple[float, float, float]]
+Meet = Callable[..., Meeting]
+
+
+@pytest.fixture(params=["kinematic", pytest.param("bullet", marks=pytest.mark.bullet)])
+def meet(request: pytest.FixtureRequest) -> Meet:
+    if request.param == "bullet":
+        pytest.importorskip("pybullet")
+    return lambda places=FACING, world=HALL: meeting(places, world, request.param)
+
+
+def meeting(places: Places, world: World = HALL, engine: str = "kinematic") -> Meeting:
+    robots = []
+    for number, (x, y, degrees) in enumerate(places):
+        body = make_body(engine, world, P2DX)
+        body.reset(Pose(x, y, math.radians(degrees)), 0)
+        robots.append((Pioneer(parameters=P2DX, body=body, settings=ControllerSettings(seed=number)), body))
+    return Meeting(robots, world)
+
+
+def say(made: Meeting, index: int, number: int, argument: int | None = None, *, at: int = 0) -> None:
+    made.bring(index, at)
+    made.robots[index].receive(Command(number, argument).to_frame().to_bytes(), at)
+
+
+def drive(made: Meeting, *speeds: int) -> None:
+    """Open a session with each robot and let it drive so fast, mm/s."""
+    for index, speed in enumerate(speeds):
+        for number, argument in ((0, None), (1, None), (2, None), (C.OPEN, None), (C.ENABLE, 1), (C.VEL, speed)):
+            say(made, index, number, argument)
+
+
+def live(made: Meeting, seconds: float, *, since: float = 0.0) -> float:
+    """Live on, with a word to every robot twice a second; return when it ends."""
+    end = since + seconds
+    while since < end:
+        since = min(since + 0.5, end)
+        at = round(since * 1e9)
+        made.advance_to(at)
+        for index in range(len(made.seats)):
+            say(made, index, C.PULSE, at=at)
+    return end
+
+
+def gap(made: Meeting) -> float:
+    first, second = (seat.body.state for seat in made.seats[:2])
+    return math.dist((first.x_m, first.y_m), (second.x_m, second.y_m)) - 2 * FRONT_M
+
+
+def test_two_robots_that_face_each_other_read_the_gap_between_them(meet: Meet) -> None:
+    for distance in (0.5, 1.0, 2.4):
+        made = meet(((-distance, 0.3, 0.0), (distance, 0.3, 180.0)))
+        for seat in made.seats:
+            # The two middle transducers sit 14 mm behind the hull's front, at P2DX.sonar[3] and [4].
+            behind = FRONT_M - P2DX.sonar[3].x_mm / 1000
+            assert seat.body.ranges([3, 4]) == pytest.approx([gap(made) + behind] * 2, abs=0.01)
+            assert seat.body.echoes([3])[0]
+            assert seat.body.clearance() == pytest.approx(gap(made), abs=0.001)
+
+
+def test_a_robot_that_drives_is_seen_where_it_is(meet: Meet) -> None:
+    made = meet()
+    drive(made, 400, 0)
+    live(made, 2.0)
+    behind = FRONT_M - P2DX.sonar[3].x_mm / 1000
+    # It stands at the last border: 10 ms at 0.4 m/s are 4 mm.
+    assert made.seats[1].body.ranges([3])[0] == pytest.approx(gap(made) + behind, abs=0.01)
+
+
+def test_two_that_push_each_other_head_on_both_stall_and_part_again(meet: Meet) -> None:
+    made = meet()
+    drive(made, 300, 300)
+    now = live(made, 6.0)
+    states = [seat.body.state for seat in made.seats]
+    assert gap(made) == pytest.approx(0.0, abs=0.002)
+    assert [state.stalled_left and state.stalled_right for state in states] == [True, True]
+    assert [(state.collisions, state.in_contact) for state in states] == [(1, True)] * 2
+    for index in (0, 1):
+        say(made, index, C.VEL, -300, at=round(now * 1e9))
+    live(made, 3.0, since=now)
+    assert gap(made) > 0.5
+    assert not any(seat.body.state.in_contact for seat in made.seats)
+
+
+def test_a_robot_that_stands_is_a_wall_that_feels_the_push(meet: Meet) -> None:
+    made = meet()
+    drive(made, 300, 0)
+    live(made, 7.0)
+    pushing, standing = (seat.body.state for seat in made.seats)
+    assert pushing.stalled_left
+    # In the physical body a wall that is leant against gives way by less than its contacts' slop.
+    assert standing.x_m == pytest.approx(1.0, abs=0.005)
+    assert (standing.collisions, standing.in_contact) == (1, True)
+
+
+def test_a_reset_or_a_reboot_of_one_leaves_the_others_and_its_own_body_standing() -> None:
+    made, alone = meeting(FACING), meeting(FACING)
+    for one in (made, alone):
+        drive(one, 0, 200)
+        live(one, 1.0)
+    made.bring(0, 10**9)
+    made.robots[0].reboot(10**9)
+    for one in (made, alone):
+        one.robots[1].take_output()
+        live(one, 4.0, since=1.0)
+    assert made.robots[1].take_output() == alone.robots[1].take_output()
+    assert made.seats[1].body.state == alone.seats[1].body.state
+    assert made.seats[0].body.state.x_m == -1.0
+    assert made.seats[1].body.state.x_m < 0.25
+
+
+def test_what_one_pushes_the_other_sees_and_is_stopped_by(meet: Meet) -> None:
+    made = meet(((-0.8, 0.0, 0.0), (2.0, 0.0, 180.0), (-3.0, 3.0, 0.0)), CARTON)
+    before = made.seats[1].body.ranges([3])[0]
+    drive(made, 200, 0, 0)
+    now = live(made, 5.0)
+    after = [seat.body.ranges([3])[0] for seat in made.seats]
+    assert after[1] < before - 0.2
+    places = [seat.body.state.x_m for seat in made.seats]
+    assert places[0] > -0.3
+    live(made, 15.0, since=now)
+    # The carton is between them now: 0.3 m, and both hulls.
+    assert gap(made) == pytest.approx(0.3, abs=0.02)
+    assert made.seats[0].body.state.stalled_left
+
+
+def test_robots_far_from_each_other_live_alone_and_near_ones_step_by_step() -> None:
+    made = meeting(((0.0, 0.0, 0.0), (0.0, 0.6, 0.0), (0.0, 3.0, 0.0)))
+    assert [seat.company.is_close for seat in made.seats] == [True, True, False]
+    assert made.next_deadline() is None
+    drive(made, 0, 300, 0)
+    assert made.next_deadline() == 100 * NS_PER_MS
+    live(made, 8.0)
+    assert [seat.company.is_close for seat in made.seats] == [False] * 3
+
+
+def test_hulls_never_overlap() -> None:
+    made = meeting(((0.0, 0.0, 0.0), (1.0, 0.1, 170.0), (0.4, 1.0, -90.0), (0.4, -1.0, 80.0)))
+    drive(made, 500, 500, 500, 500)
+    for index, turn in enumerate((10, -15, 20, -5)):
+        say(made, index, C.RVEL, turn)
+    now = 0.0
+    for _ in range(100):
+        now = live(made, 0.1, since=now)
+        for seat in made.seats:
+            hull = [corner for corner in seat.presence.footprint(seat.presence.look()).polygon]
+            for other in seat.company.others:
+                assert not other.footprint(other.look()).overlaps(tuple(hull))
+
+
+def test_bodies_of_different_steps_cannot_meet() -> None:
+    class Slow(KinematicBody):
+        dt_ns = 3 * NS_PER_MS
+
+    robots = []
+    for kind in (KinematicBody, Slow):
+        body = kind(HALL, P2DX)
+        robots.append((Pioneer(parameters=P2DX, body=body), body))
+    with pytest.raises(UsageError, match="one step"):
+        Meeting(robots, HALL)
+
+
+def test_a_thing_of_the_world_may_have_a_robots_name() -> None:
+    crowded = replace(HALL, obstacles=(replace(CARTON.obstacles[0], name="robot 2", x_m=3.0),))
+    made = meeting(FACING, crowded)
+    assert [seat.presence.name for seat in made.seats] == ["robot 1", "robot 2'"]
+
+
+# The same bytes, whoever asks first -------------------------------------------------------
+
+#: Close enough that all of them are in each other's way soon, around a carton.
+CROWD = ((-0.9, 0.0, 0.0), (0.9, 0.1, 180.0), (0.0, -1.0, 90.0), (-2.6, 2.6, -45.0))
+ORDERS = st.lists(
+    st.tuples(
+        st.integers(0, 3_000_000_000), st.integers(0, 3),
+        st.sampled_from([(C.VEL, 400), (C.VEL, -300), (C.RVEL, 60), (C.RVEL, -40), (C.VEL, 0), (C.PULSE, None)]),
+    ),
+    max_size=12,
+)  # fmt: skip
+
+
+def life(
+    made: Meeting, orders: Sequence[tuple[int, int, tuple[int, int | None]]], looks: Sequence[int], *, backwards: bool
+) -> tuple[list[bytes], list[object]]:
+    """Give orders at their times, look in between, and return every wire's bytes and where everybody is."""
+    drive(made, 300, 300, 300, 0)
+    sign = -1 if backwards else 1
+    events = [(at, 1, sign * index, words) for at, index, words in orders]
+    events += [(at, 0, 0, (0, None)) for at in looks]
+    wires: list[bytes] = [b""] * len(made.seats)
+    for at, is_order, signed, (number, argument) in sorted(events, key=lambda event: event[:3]):
+        if is_order:
+            say(made, abs(signed), number, argument, at=at)
+        else:
+            made.advance_to(at)
+        wires = [wire + b"".join(robot.take_output()) for wire, robot in zip(wires, made.robots, strict=True)]
+    made.advance_to(3_200_000_000)
+    wires = [wire + b"".join(robot.take_output()) for wire, robot in zip(wires, made.robots, strict=True)]
+    return wires, [seat.body.state for seat in made.seats]
+
+
+@settings(max_examples=15, deadline=None)
+@given(orders=ORDERS, looks=st.lists(st.integers(0, 3_100_000_000), max_size=30))
+def test_the_same_bytes_however_often_and_in_whatever_order_robots_are_asked(
+    orders: list[tuple[int, int, tuple[int, int | None]]], looks: list[int]
+) -> None:
+    once = {(at, index): (at, index, words) for at, index, words in orders}
+    chosen = list(once.values())
+    first = life(meeting(CROWD, CARTON), chosen, [], backwards=False)
+    assert life(meeting(CROWD, CARTON), chosen, looks, backwards=True) == first
+
+
+@settings(max_examples=10, deadline=None)
+@given(orders=ORDERS, half=st.integers(0, 3_000_000_000))
+def test_a_meeting_that_was_saved_goes_on_as_it_would_have(
+    orders: list[tuple[int, int, tuple[int, int | None]]], half: int
+) -> None:
+    made = meeting(CROWD, CARTON)
+    life_until(made, orders, half)
+    saved = pickle.loads(pickle.dumps(made.snapshot()))  # noqa: S301  # our own bytes
+    ends = []
+    for other in (made, made, meeting(CROWD, CARTON)):
+        other.restore(saved)
+        other.advance_to(half + 20 * SLICE_NS)
+        ends.append(([robot.take_output() for robot in other.robots], [seat.body.state for seat in other.seats]))
+    assert ends[0] == ends[1] == ends[2]
+
+
+@pytest.mark.bullet
+def test_physical_robots_repeat_and_go_on_after_a_restore() -> None:
+    pytest.importorskip("pybullet")
+    orders = [(900_000_123, 0, (C.RVEL, 30)), (1_400_000_000, 1, (C.VEL, -100)), (1_400_000_000, 2, (C.RVEL, 40))]
+    first = life(meeting(CROWD, CARTON, "bullet"), orders, [], backwards=False)
+    looks = [n * 77_000_001 for n in range(40)]
+    assert life(meeting(CROWD, CARTON, "bullet"), orders, looks, backwards=True) == first
+    made = meeting(CROWD, CARTON, "bullet")
+    life_until(made, orders, 1_501_000_000)
+    saved = pickle.loads(pickle.dumps(made.snapshot()))  # noqa: S301  # our own bytes
+    ends = []
+    for other in (made, meeting(CROWD, CARTON, "bullet")):
+        other.restore(saved)
+        other.advance_to(2_500_000_000)
+        ends.append(([robot.take_output() for robot in other.robots], [seat.body.state for seat in other.seats]))
+    assert ends[0] == ends[1]
+
+
+def life_until(made: Meeting, orders: Sequence[tuple[int, int, tuple[int, int | None]]], end: int) -> None:
+    drive(made, 300, 300, 300, 0)
+    for at, index, (number, argument) in sorted(orders, key=lambda order: order[:2]):
+        if at <= end:
+            say(made, index, number, argument, at=at)
+    made.advance_to(end)
