@@ -11,7 +11,7 @@ from typing import NamedTuple, Protocol, runtime_checkable
 
 from p2os.parameters import RobotParameters
 from p2os.pioneer.body import RobotBody
-from p2os.pioneer.geometry import Footprint
+from p2os.pioneer.geometry import Footprint, hull_polygon, placed
 from p2os.pioneer.scenery import Obstacle, World
 from p2os.pioneer.static_plan import Bands
 
@@ -41,6 +41,7 @@ class Presence:
         shape = parameters.body
         self.name, self.body = name, body
         self._sociable = body if isinstance(body, Sociable) else None
+        self._hull = hull_polygon(shape)
         self._ahead_m = (shape.hull_front_m - shape.hull_rear_m) / 2
         self._outline = Obstacle(
             name=name, x_m=0.0, y_m=0.0, length_m=shape.hull_front_m + shape.hull_rear_m, width_m=shape.hull_width_m,
@@ -73,7 +74,7 @@ class Presence:
         if shape is None:
             if len(self._shapes) >= KEPT:
                 self._shapes.clear()
-            shape = self._shapes[stand] = Footprint(self.obstacle(stand))
+            shape = self._shapes[stand] = Footprint.of_polygon(self.name, placed(self._hull, *stand))
         return shape
 
     def bump(self) -> None:

@@ -8,35 +8,33 @@ that vanishes stops the robot at once and frees it for the next.
 A robot with a speed of its line (`settings.baud`) is heard and spoken to at that
 speed, whatever the medium; a real serial port paces itself. HOSTBAUD changes both.
 
-The robot's time is the clock's, times `speed`, less what was left out: the robot does not live
-while nobody is connected and it stands still, nor through a pause of the machine
-longer than `LONGEST_PAUSE_NS`, which is reported. So waiting costs no processor
-time and a long wait no burst of steps.
+Its time is a `RobotTime`: the robot does not live while nobody is connected and it stands
+still, nor through a pause of the machine, which is reported. Robots of one world (`meeting`)
+share theirs; one that has no client is then carried along by the others.
 """
 
 import contextlib
 import select
 import time
 from collections.abc import Callable, Sequence
+from functools import partial
 
 from p2os.errors import TransportError
 from p2os.pioneer.aux_seat import AuxSeat
 from p2os.pioneer.controller import Pioneer
+from p2os.pioneer.meeting import Meeting
 from p2os.pioneer.paced_line import PacedLine
-from p2os.timing import NS_PER_MS, NS_PER_S, Nanos
+from p2os.pioneer.robot_time import SETTLE_NS, RobotTime
+from p2os.timing import NS_PER_S, Nanos
 from p2os.transport.ports import Listener, Transport
 
 #: (robot's time in ns, what happened in a word or two, detail).
 HostEvent = Callable[[Nanos, str, str], None]
 
-#: chosen: three SIP cycles; a machine that lags more is reported rather than chased.
-LONGEST_PAUSE_NS: Nanos = 300 * NS_PER_MS
 #: chosen: well below the pause, and often enough for a robot that is connected but not open.
 AWAKE_WAIT_S = 0.1
 #: chosen: how soon `run` notices that it should end.
 ASLEEP_WAIT_S = 0.5
-#: chosen: how long the body lives on after its client has left, to come to rest.
-SETTLE_NS: Nanos = 1 * NS_PER_S
 #: chosen: how often a line without a descriptor is asked for bytes; one millisecond is a character at 9600 bit/s.
 BLIND_POLL_S = 0.001
 #: chosen: a second of a 9600 baud line; a client that sends faster finds its own medium full.
@@ -52,6 +50,8 @@ class Host:
         on_event: Told of clients that come and go, and of pauses.
         clock: Nanoseconds; never goes back.
         speed: Robot seconds a second of the clock.
+        shared: The time and the meeting of robots that share a world, with this one's number there, from 0;
+            the time then knows the clock and the speed.
         paced: Whether bytes take the time that `settings.baud` gives them; False where the medium does it itself.
         aux: Who hangs at the AUX ports.
     """
@@ -64,6 +64,7 @@ class Host:
         on_event: HostEvent | None = None,
         clock: Callable[[], Nanos] = time.monotonic_ns,
         speed: float = 1.0,
+        shared: tuple[RobotTime, Meeting, int] | None = None,
         paced: bool = True,
         aux: Sequence[AuxSeat] = (),
     ) -> None:
@@ -71,11 +72,13 @@ class Host:
         self.listener = listener
         self.aux = tuple(aux)
         self._on_event = on_event
-        self._clock = clock
-        self._speed = speed
+        self._time = RobotTime(clock, speed) if shared is None else shared[0]
+        self._bring: Callable[[Nanos], object] = self._advance_to
+        if shared is not None:
+            _, meeting, number = shared
+            meeting.seats[number].advance_to = self._advance_to
+            self._bring = partial(meeting.bring, number)
         self._client: Transport | None = None
-        self._now: Nanos = 0
-        self._clock_read: Nanos = clock()
         self._settled_at: Nanos = 0
         self._baud = pioneer.baud
         #: To the robot and from it.
@@ -86,7 +89,7 @@ class Host:
     @property
     def now(self) -> Nanos:
         """Return the robot's time, in nanoseconds."""
-        return self._now
+        return self._time.now
 
     @property
     def client(self) -> str | None:
@@ -119,10 +122,7 @@ class Host:
         self._read_clock()
         if self._is_asleep():
             return
-        if self._lines is not None:
-            for at, data in self._lines[0].take(self._now):
-                self._deliver(data, at)
-        self.pioneer.advance_to(self._now)
+        self._bring(self.now)
         self._speak()
         self._serve_aux()
 
@@ -153,7 +153,7 @@ class Host:
         waits = [ASLEEP_WAIT_S]
         if not self._is_asleep():
             waits.append(AWAKE_WAIT_S)
-            waits += [max(due - self._now, 0) / NS_PER_S / self._speed for due in self._deadlines()]
+            waits += [max(due - self.now, 0) / NS_PER_S / self._time.speed for due in self._deadlines()]
             waits += [seat.poll_s for seat in self.aux if seat.poll_s is not None]
         if self._client is None:
             waits.append(ASLEEP_WAIT_S if self.listener.poll_s is None else self.listener.poll_s)
@@ -171,6 +171,22 @@ class Host:
         for seat in self.aux:
             seat.close()
 
+    def do(self, words: str) -> None:
+        """Break, mend or press something on the robot: the words of `Pioneer.do`.
+
+        Raises:
+            UsageError: They mean nothing; nothing has changed then.
+        """
+        self._bring(self.now)
+        self.pioneer.do(words, self.now)
+
+    def _advance_to(self, limit: Nanos) -> None:
+        """Let the robot live until `limit`, and hear what arrives by then on a line that takes its time."""
+        if self._lines is not None:
+            for at, data in self._lines[0].take(limit):
+                self._deliver(data, at)
+        self.pioneer.advance_to(limit)
+
     def _deadlines(self) -> list[Nanos]:
         due = [self.pioneer.next_deadline()]
         if self._lines is not None:
@@ -185,8 +201,8 @@ class Host:
         data = b"".join(self.pioneer.take_output())
         if self._lines is not None:
             if data:
-                self._lines[1].put(data, self._now)
-            data = b"".join(lump for _, lump in self._lines[1].take(self._now))
+                self._lines[1].put(data, self.now)
+            data = b"".join(lump for _, lump in self._lines[1].take(self.now))
         if self._client is None or not data:
             return
         try:
@@ -211,8 +227,10 @@ class Host:
             self._client.set_baud(baud)
 
     def _serve_aux(self) -> None:
+        if self.aux:
+            self._bring(self.now)
         for seat in self.aux:
-            seat.move_bytes(self.pioneer, self._now)
+            seat.move_bytes(self.pioneer, self.now)
 
     def _welcome(self) -> None:
         """Take a client that has come, or send it away when there is one."""
@@ -227,7 +245,9 @@ class Host:
             self._tell("client refused", f"{transport.description}: {self._client.description} is connected")
             transport.close()
             return
+        self.pioneer.take_output()  # what it said to nobody
         self._client = transport
+        self._time.client_came()
         self._tell("client connected", transport.description)
 
     def _listen_to_client(self) -> bool:
@@ -240,9 +260,10 @@ class Host:
             self._drop_client(str(error))
             return False
         if data and self._lines is not None:
-            self._lines[0].put(data, self._now)
+            self._lines[0].put(data, self.now)
         elif data:
-            self._deliver(data, self._now)
+            self._bring(self.now)
+            self._deliver(data, self.now)
             self._speak()
         return bool(data)
 
@@ -250,9 +271,11 @@ class Host:
         if self._client is None:
             return
         client, self._client = self._client, None
+        self._time.client_left()
+        self._bring(self.now)
         if self._lines is not None:  # its last words still come
-            self.pioneer.receive(self._lines[0].take_all(), self._now)
-        self.pioneer.hang_up(self._now)
+            self.pioneer.receive(self._lines[0].take_all(), self.now)
+        self.pioneer.hang_up(self.now)
         self.pioneer.take_output()
         self._baud = self.pioneer.baud
         for line in self._lines or ():
@@ -260,23 +283,17 @@ class Host:
             line.set_baud(self._baud or line.baud)
         with contextlib.suppress(TransportError):
             client.close()
-        self._settled_at = self._now + SETTLE_NS
+        self._settled_at = self.now + SETTLE_NS
         self._tell("client gone", reason)
 
     def _is_asleep(self) -> bool:
-        return self._client is None and self._now >= self._settled_at
+        return self._client is None and self.now >= self._settled_at
 
     def _read_clock(self) -> None:
         """Bring the robot's time up to the clock's, leaving out what the robot need not live."""
-        read = self._clock()
-        passed, self._clock_read = read - self._clock_read, read
-        if self._is_asleep():
-            return
-        if passed > LONGEST_PAUSE_NS:
-            self._tell("lag", f"the machine paused for {passed / NS_PER_S:.1f} s; the robot's time leaves it out")
-            return
-        self._now += passed if self._speed == 1.0 else round(passed * self._speed)
+        if pause := self._time.read():
+            self._tell("lag", f"the machine paused for {pause / NS_PER_S:.1f} s; the robot's time leaves it out")
 
     def _tell(self, what: str, detail: str) -> None:
         if self._on_event is not None:
-            self._on_event(self._now, what, detail)
+            self._on_event(self.now, what, detail)

@@ -185,15 +185,15 @@ class KinematicBody:
     def _meets(self, company: Company, x: float, y: float, heading: float) -> bool:
         """Tell whether another robot is in the way, and let it feel so; one that was put into another may move."""
         reach = self._hull_reach
-        found = []
-        for other in company.near:
-            shape = other.footprint(other.live)
-            if math.dist((x, y), (shape.x, shape.y)) <= reach + shape.reach:
-                found.append((other, shape))
-        if not found:
+        close = [
+            other for other in company.near
+            if math.hypot(other.live[0] - x, other.live[1] - y) <= reach + other.reach_m
+        ]  # fmt: skip
+        if not close:
             return False
         hull = placed(self._hull, x, y, heading)
-        found = [(other, shape) for other, shape in found if shape.overlaps(hull)]
+        shapes = [(other, other.footprint(other.live)) for other in close]
+        found = [(other, shape) for other, shape in shapes if shape.overlaps(hull)]
         if not found:
             return False
         here = placed(self._hull, self._x, self._y, self._heading)

@@ -69,5 +69,5 @@ def _addressed(text: str, robots: int) -> tuple[range, str]:
 def _one(number: int, host: Host, words: str) -> str:
     if words == "status":
         return status_line(number, host)
-    host.pioneer.do(words, host.now)
+    host.do(words)
     return f"robot {number}: {words}"

@@ -12,7 +12,8 @@ import pytest
 from p2os.commands import Command
 from p2os.commands import CommandNumber as C
 from p2os.errors import TransportError
-from p2os.pioneer.host import LONGEST_PAUSE_NS, SETTLE_NS, Host
+from p2os.pioneer.host import Host
+from p2os.pioneer.robot_time import LONGEST_PAUSE_NS, SETTLE_NS
 from p2os.sip import SIP_KINDS
 from p2os.timing import NS_PER_MS
 from p2os.transport import HungUpError, Listener, Loops, Transport, listen_url, open_url
