@@ -1,8 +1,10 @@
 """`p2os serve`: be a Pioneer on a line, for any P2OS program to drive."""
 
 import json
+import math
 import os
 import sys
+import time
 from collections.abc import Sequence
 from dataclasses import replace
 from functools import partial
@@ -13,28 +15,40 @@ import typer
 
 from p2os.cli.signals import end_on_signals
 from p2os.errors import UsageError
-from p2os.parameters import load_parameters
 from p2os.pioneer.aux_seat import AuxSeat
-from p2os.pioneer.body import make_body
 from p2os.pioneer.control_line import ControlLine
-from p2os.pioneer.controller import ControllerSettings, Pioneer, SonarPerSip
-from p2os.pioneer.flash import BAUD_RATES, load_flash
+from p2os.pioneer.controller import ControllerSettings, SonarPerSip
+from p2os.pioneer.flash import load_flash
 from p2os.pioneer.fleet import Fleet
+from p2os.pioneer.fleet_file import load_fleet
+from p2os.pioneer.fleet_order import (
+    DEFAULT_PORT,
+    MOST_ROBOTS,
+    FleetOrder,
+    MadeFleet,
+    RobotOrder,
+    following_ports,
+    make_fleet,
+    read_aux,
+)
 from p2os.pioneer.host import Host
 from p2os.pioneer.orders import status_line
+from p2os.pioneer.robot_time import RobotTime
+from p2os.pioneer.scenery import Pose
 from p2os.pioneer.sensor_errors import load_sensor_errors
-from p2os.pioneer.world import load_world
 from p2os.profiles import Profile
 from p2os.timing import NS_PER_S, Nanos
-from p2os.transport import Listener, PtyUrl, SerialUrl, TcpUrl, listen_url, parse_url
+from p2os.transport import listen_url
 
-DEFAULT_PORT = "tcp:127.0.0.1:8101"
 #: `--control` with this, and no option on a terminal, takes orders from standard input.
 STANDARD_INPUT = "-"
 #: chosen: a tenth of real time is still a debugger's pace; past a hundred no body keeps up.
 SLOWEST, FASTEST = 0.01, 100.0
-#: The AUX ports (H8 manual: AUX1 to AUX3).
-AUX_PORTS = ("1", "2", "3")
+#: Options that a fleet's file takes the place of.
+IN_FLEET_FILE = (
+    "port", "robot", "world", "body", "seed", "firmware", "lenient", "all_sonar", "flash", "errors", "baud", "robots",
+    "at", "apart", "aux", "fault",
+)  # fmt: skip
 
 HELP = f"""Be a Pioneer robot on a line, in real time, until Ctrl-C.
 
@@ -52,7 +66,9 @@ Examples:
   p2os serve --world arena --seed 7   among obstacles scattered from a seed
   p2os serve --baud 9600              bytes take the time of a real line
   p2os serve --errors realistic       sonar, odometry and compass err as real ones
-  p2os serve --robots 3               three of them, on ports 8101 to 8103
+  p2os serve --robots 3               three of them in one room, on ports 8101 to 8103
+  p2os serve --robots 2 --at 0,0 --at 1.5,0,180   face to face
+  p2os serve --fleet fleet.toml       robots of all kinds from a file
   p2os serve --fault "sonar-stuck 3 1.2"   sonar 3 says 1.2 m whatever comes
 """
 
@@ -63,6 +79,7 @@ def register(app: typer.Typer) -> None:
 
 
 def serve(
+    context: typer.Context,
     port: Annotated[
         list[str] | None, typer.Option(help="Where clients find the robot; again for one more.", metavar="URL")
     ] = None,
@@ -86,7 +103,17 @@ def serve(
     baud: Annotated[
         int | None, typer.Option(help="Speed of the line, bit/s: bytes take that time on pty: and tcp: too.")
     ] = None,
-    robots: Annotated[int, typer.Option(help="How many, on the ports that follow.", min=1, max=256)] = 1,
+    robots: Annotated[int, typer.Option(help="How many, on the ports that follow.", min=1, max=MOST_ROBOTS)] = 1,
+    at: Annotated[
+        list[str] | None,
+        typer.Option(help="Where a robot begins; again for the next. Metres, degrees.", metavar="X,Y[,HEADING]"),
+    ] = None,
+    apart: Annotated[
+        bool, typer.Option("--apart", help="A copy of the world for each robot: they do not meet.")
+    ] = False,
+    fleet: Annotated[
+        Path | None, typer.Option(help="TOML file with the world and every robot.", metavar="FILE")
+    ] = None,
     speed: Annotated[
         float, typer.Option(help="Robot seconds a second.", min=SLOWEST, max=FASTEST, metavar="FACTOR")
     ] = 1.0,
@@ -105,115 +132,106 @@ def serve(
     json_output: Annotated[bool, typer.Option("--json", help="Print the start line as JSON.")] = False,
 ) -> None:
     """Serve virtual robots until Ctrl-C."""
-    ports = port_urls(port or [DEFAULT_PORT], robots)
-    settings = ControllerSettings(
-        profile=firmware, lenient=lenient, sonar_per_sip=SonarPerSip.ALL if all_sonar else SonarPerSip.TWO,
-        errors=load_sensor_errors(errors), seed=seed,
-    )  # fmt: skip
-    if flash is not None:
-        settings = settings.with_flash(load_flash(flash))
-    seats = aux_urls(aux or [], len(ports))
-    hosts: list[Host] = []
-    try:
-        for number, url in enumerate(ports, start=1):
-            speed_of_line = baud if baud is not None else _serial_baud(url)
-            pioneer = make_pioneer(
-                robot=robot, world=world, body=body, seed=seed,
-                settings=replace(settings, baud=speed_of_line, seed=seed + number - 1),
-            )  # fmt: skip
-            for words in fault or ():
-                pioneer.do(f"fault {words}", 0)
-            pioneer.on_event = on_event = partial(_tell, f"robot {number}  " if len(ports) > 1 else "")
-            hosts.append(
-                Host(
-                    pioneer, listen_url(url), on_event=on_event, speed=speed,
-                    paced=not url.startswith("serial:"), aux=seats if number == 1 else (),
-                )
-            )  # fmt: skip
-    except BaseException:
-        for host in hosts:
-            host.close()
-        raise
-    for host in hosts:
-        where = host.listener.description
-        if json_output:
-            start = {"url": where, "robot": robot, "world": world, "body": body, "seed": seed}
-            typer.echo(json.dumps(start))
-        else:
-            typer.echo(f"{where}  {robot} in {world}, {body} body; Ctrl-C ends")
-    for seat in seats:
-        typer.echo(f"AUX{seat.port} of the first robot: {seat.listener.description}", err=json_output)
+    if fleet is not None:
+        _refuse_beside_fleet(context)
+        order = load_fleet(fleet)
+    else:
+        settings = ControllerSettings(
+            profile=firmware, lenient=lenient, sonar_per_sip=SonarPerSip.ALL if all_sonar else SonarPerSip.TWO,
+            errors=load_sensor_errors(errors), baud=baud,
+        )  # fmt: skip
+        if flash is not None:
+            settings = settings.with_flash(load_flash(flash))
+        ports = following_ports(port or [DEFAULT_PORT], robots)
+        if aux and len(ports) > 1:
+            raise UsageError("--aux is for one robot", hint="--fleet FILE gives each robot its own")
+        places = [_place(text) for text in at or ()]
+        if len(places) > len(ports):
+            raise UsageError(f"{len(places)} places for {len(ports)} robots", hint=f"--robots {len(places)}")
+        first = RobotOrder(
+            model=robot, settings=settings, faults=tuple(fault or ()), aux=tuple(read_aux(text) for text in aux or ())
+        )
+        order = FleetOrder(
+            robots=tuple(
+                replace(first, port=url, at=places[number] if number < len(places) else None)
+                for number, url in enumerate(ports)
+            ),
+            world=world, body=body, seed=seed, apart=apart,
+        )  # fmt: skip
+    made = make_fleet(order)
+    hosts = open_hosts(order, made, speed=speed)
+    for number, host in enumerate(hosts):
+        _say_start(order, made.starts[number], number, host, as_json=json_output)
     sys.stdout.flush()
-    note = getattr(hosts[0].pioneer.body, "note", None)
-    if note:
-        sys.stderr.write(f"note: {note}\n")
+    if made.note:
+        sys.stderr.write(f"note: {made.note}\n")
     end_on_signals()
     tick = None if status is None else (status, partial(_show_status, hosts))
     Fleet(hosts, control=_control(control), on_tick=tick).run()
 
 
-def make_pioneer(
-    *, robot: str, world: str, body: str, seed: int = 0, settings: ControllerSettings | None = None
-) -> Pioneer:
-    """Return a virtual robot standing at the start of a world.
+def open_hosts(order: FleetOrder, made: MadeFleet, *, speed: float = 1.0) -> list[Host]:
+    """Return a host for each robot of a fleet, listening at its port.
 
     Raises:
-        UsageError: there is no such body.
-        ParametersError: there is no such robot.
-        WorldError: the world cannot be read.
-        MissingDependencyError: the body needs a package that is not installed.
+        TransportError: A port is taken or cannot be had; none is kept open then.
     """
-    parameters = load_parameters(robot)
-    place = load_world(world, seed=seed)
-    physical = make_body(body, place, parameters)
-    physical.reset(place.start, seed)
-    return Pioneer(parameters=parameters, body=physical, settings=settings)
+    shared_time = RobotTime(time.monotonic_ns, speed)
+    hosts: list[Host] = []
+    try:
+        for number, (robot, pioneer) in enumerate(zip(order.robots, made.robots, strict=True)):
+            who = f"robot {number + 1}  " if len(made.robots) > 1 else ""
+            pioneer.on_event = on_event = partial(_tell, who)
+            hosts.append(
+                Host(
+                    pioneer, listen_url(robot.port), on_event=on_event, speed=speed,
+                    shared=None if made.meeting is None else (shared_time, made.meeting, number),
+                    paced=not robot.port.startswith("serial:"),
+                )
+            )  # fmt: skip
+            hosts[-1].aux = tuple(AuxSeat(port, listen_url(url)) for port, url in robot.aux)
+    except BaseException:
+        for host in hosts:
+            host.close()
+        raise
+    return hosts
 
 
-def port_urls(given: Sequence[str], robots: int) -> list[str]:
-    """Return a URL a robot: those given, then those that follow the last one.
+def _place(text: str) -> Pose:
+    """Return the place that a text as `1.5,0,90` names.
 
     Raises:
-        UsageError: A text is no URL, or nothing follows the last one.
+        UsageError: It names none.
     """
-    found = list(given)
-    for text in found:
-        parse_url(text)
-    last, base = parse_url(found[-1]), len(found)
-    for step in range(1, robots - base + 1):
-        if isinstance(last, TcpUrl):
-            if last.port + step > 0xFFFF:
-                raise UsageError(f"{robots} robots from {last} on: ports end at 65535")
-            found.append(str(replace(last, port=last.port and last.port + step)))
-        elif isinstance(last, PtyUrl):
-            found.append(f"pty:{last.path}{step + 1}" if last.path else "pty:")
-        else:
-            raise UsageError(f"no port follows {last}", hint="name each robot's own: --port A --port B")
-    return found
+    hint = "metres and degrees: --at 1.5,0,90 or --at 1.5,0"
+    try:
+        values = [float(part) for part in text.split(",")]
+    except ValueError:
+        values = []
+    if len(values) not in {2, 3} or not all(math.isfinite(value) for value in values):
+        raise UsageError(f"--at {text!r} is no place", hint=hint)
+    return Pose(values[0], values[1], math.radians(values[2]) if len(values) > 2 else 0.0)
 
 
-def aux_urls(given: Sequence[str], robots: int) -> list[AuxSeat]:
-    """Return who hangs at the AUX ports.
-
-    Raises:
-        UsageError: A text is not N=URL, or a port is named twice.
-        TransportError: The place is taken.
-    """
-    seats: dict[int, Listener] = {}
-    if given and robots > 1:
-        raise UsageError("--aux is for one robot", hint="serve each robot by itself")
-    for text in given:
-        number, equals, url = text.partition("=")
-        if not equals or number not in AUX_PORTS or int(number) in seats:
-            raise UsageError(f"--aux {text!r} names no AUX port", hint="--aux 1=pty:/tmp/aux1; ports are 1, 2 and 3")
-        seats[int(number)] = listen_url(url)
-    return [AuxSeat(number, listener) for number, listener in seats.items()]
+def _refuse_beside_fleet(context: typer.Context) -> None:
+    for name in IN_FLEET_FILE:
+        source = context.get_parameter_source(name)
+        if source is not None and source.name == "COMMANDLINE":
+            raise UsageError(f"--{name.replace('_', '-')} beside --fleet", hint="the fleet's file says that")
 
 
-def _serial_baud(url: str) -> int | None:
-    """Return the speed of a real serial port, where the robot knows such a one."""
-    parsed = parse_url(url)
-    return parsed.baud if isinstance(parsed, SerialUrl) and parsed.baud in BAUD_RATES else None
+def _say_start(order: FleetOrder, start: Pose, number: int, host: Host, *, as_json: bool) -> None:
+    where, model = host.listener.description, order.robots[number].model
+    place = start.x_m, start.y_m, math.degrees(start.heading_rad)
+    if as_json:
+        told = {"url": where, "robot": model, "world": order.world, "body": order.body, "seed": order.seed}
+        typer.echo(json.dumps(told | {"at": [round(value, 6) for value in place]}))
+    else:
+        at = " at {:.2f}, {:.2f} m, {:.0f}°".format(*place) if len(order.robots) > 1 else ""
+        typer.echo(f"{where}  {model} in {order.world}{at}, {order.body} body; Ctrl-C ends")
+    for seat in host.aux:
+        who = f"robot {number + 1}" if len(order.robots) > 1 else "the robot"
+        typer.echo(f"AUX{seat.port} of {who}: {seat.listener.description}", err=as_json)
 
 
 def _control(url: str | None) -> ControlLine | None:

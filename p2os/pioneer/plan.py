@@ -47,6 +47,11 @@ class Plan:
         return cls(movable, parameters, StaticPlan(world, parameters))
 
     @property
+    def hull_reach_m(self) -> float:
+        """How far the hull's farthest point is from the middle of the axle."""
+        return self._hull_reach
+
+    @property
     def obstacles(self) -> tuple[Obstacle, ...]:
         """All that is not part of the building, in the order of its placing."""
         return tuple(self._obstacles.values())

@@ -1,22 +1,18 @@
-"""The verbs ports, doctor, info and serve."""
+"""The verbs ports, doctor and info."""
 
 import json
 import os
-import select
-import signal
-import subprocess
 import sys
-import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
 import pytest
 
-from p2os.cli import doctor, info, main, ports, serve
+from p2os.cli import doctor, info, ports
 from p2os.cli.main import run
 from p2os.config_packet import ConfigPacket
-from p2os.errors import MissingDependencyError, RemoteProtocolError, TransportError
+from p2os.errors import RemoteProtocolError, TransportError
 from p2os.packets import Identity
 from p2os.pioneer.command_handlers import Effect
 from p2os.sip import SonarReading, StandardSip
@@ -281,139 +277,3 @@ def test_info_is_printed_for_programs(told: Callable[..., None], capsys: Capture
     told(Identity("Wilma", "Pioneer", "p2dx"), SIP, None)
     assert run(["info", "tcp:x", "--json"]) == 0
     assert json.loads(capsys.readouterr().out)["config"] is None
-
-
-# serve ----------------------------------------------------------------------------------
-
-
-class Serving:
-    """`p2os serve` as a process of its own."""
-
-    def __init__(self, *words: str) -> None:
-        self.process = subprocess.Popen(
-            [COMMAND, "serve", "--body", "kinematic", "--json", *words], stdout=subprocess.PIPE, stderr=subprocess.PIPE,
-            text=True,
-        )  # fmt: skip
-        assert self.process.stdout is not None
-        assert select.select([self.process.stdout], [], [], PATIENCE_S)[0], "it never started"
-        self.start = json.loads(self.process.stdout.readline())
-
-    def end(self, number: int = signal.SIGINT) -> tuple[int, str]:
-        self.process.send_signal(number)
-        _, err = self.process.communicate(timeout=PATIENCE_S)
-        return self.process.returncode, err
-
-
-@pytest.fixture
-def serving(tmp_path: Path) -> Iterator[Callable[..., Serving]]:
-    started: list[Serving] = []
-
-    def begin(*words: str) -> Serving:
-        started.append(Serving(*words))
-        return started[-1]
-
-    yield begin
-    for each in started:
-        if each.process.poll() is None:
-            each.process.kill()
-            each.process.communicate(timeout=PATIENCE_S)
-
-
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
-def test_serve_says_where_it_is_serves_and_ends_cleanly(serving: Callable[..., Serving], number: int) -> None:
-    served = serving("--port", "tcp:127.0.0.1:0", "--world", "arena", "--seed", "7", "--firmware", "ARCOS")
-    assert served.start["world"] == "arena"
-    asked = subprocess.run(
-        [COMMAND, "info", served.start["url"], "--json"], capture_output=True, text=True, timeout=PATIENCE_S, check=True
-    )
-    assert json.loads(asked.stdout)["subclass"] == "p2dx"
-    code, err = served.end(number)
-    assert code == 130
-    assert "client connected: tcp:127.0.0.1:" in err
-    assert "opened" in err
-    assert "client gone" in err
-    assert "Traceback" not in err
-
-
-def test_serve_on_a_terminal_removes_its_link(serving: Callable[..., Serving], tmp_path: Path) -> None:
-    link = tmp_path / "robot"
-    served = serving("--port", f"pty:{link}", "--all-sonar")
-    assert link.is_symlink()
-    asked = subprocess.run(
-        [COMMAND, "info", f"serial:{link}", "--json"], capture_output=True, text=True, timeout=PATIENCE_S, check=True
-    )
-    assert len(json.loads(asked.stdout)["sip"]["sonar_m"]) == 8
-    assert served.end()[0] == 130
-    assert not link.is_symlink()
-
-
-def test_serve_costs_next_to_nothing_while_it_waits(serving: Callable[..., Serving]) -> None:
-    served = serving("--port", "tcp:127.0.0.1:0")
-
-    def used_s() -> float:
-        fields = Path(f"/proc/{served.process.pid}/stat").read_text().rpartition(")")[2].split()
-        return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
-
-    time.sleep(0.3)
-    before = used_s()
-    time.sleep(1.0)
-    assert used_s() - before <= 0.05
-    served.end()
-
-
-def test_serve_refuses_a_port_that_is_taken(serving: Callable[..., Serving], capsys: Capture) -> None:
-    served = serving("--port", "tcp:127.0.0.1:0")
-    assert run(["serve", "--body", "kinematic", "--port", served.start["url"]]) == 1
-    assert "another program listens there" in capsys.readouterr().err
-
-
-@pytest.mark.parametrize(
-    ("words", "code", "message"),
-    [
-        (["--body", "jelly"], 2, "p2os: no body 'jelly'"),
-        (["--world", "nowhere"], 2, "p2os: no world 'nowhere'"),
-        (["--robot", "r2d2"], 2, "p2os: no robot model 'r2d2'"),
-        (["--port", "COM3", "--body", "kinematic"], 2, "p2os: 'COM3' is not a port URL"),
-        (["--port", "serial:COM3", "--body", "kinematic"], 1, "p2os: cannot open COM3: no such port"),
-        (["--port", "loop:x", "--body", "kinematic"], 2, "p2os: loop:x exists only inside one program"),
-        (["--firmware", "PSOS"], 2, "p2os: Invalid value for '--firmware'"),
-    ],
-)
-def test_serve_refuses_what_cannot_be(words: list[str], code: int, message: str, capsys: Capture) -> None:
-    assert run(["serve", *words]) == code
-    captured = capsys.readouterr()
-    assert captured.out == ""
-    lines = captured.err.splitlines()
-    assert lines[0].startswith(message)
-    assert lines[1].startswith("hint: ")
-
-
-def test_serve_without_pybullet_says_how_to_get_it(monkeypatch: pytest.MonkeyPatch, capsys: Capture) -> None:
-    def missing(*_: object) -> None:
-        raise MissingDependencyError("the bullet body needs pybullet", hint="pip install 'p2os[bullet]'")
-
-    monkeypatch.setattr(serve, "make_body", missing)
-    assert run(["serve"]) == 2
-    assert capsys.readouterr().err == "p2os: the bullet body needs pybullet\nhint: pip install 'p2os[bullet]'\n"
-
-
-def test_a_served_robot_tells_its_host_in_the_same_process(monkeypatch: pytest.MonkeyPatch, capsys: Capture) -> None:
-    class Ending:
-        def __init__(self, hosts: Any, **_: object) -> None:
-            self.pioneer = hosts[0].pioneer
-
-        def run(self) -> None:
-            self.pioneer.on_event(1_500_000_000, "opened", "")
-            self.pioneer.on_event(1_600_000_000, "motors", "on")
-            signal.raise_signal(signal.SIGTERM)
-
-    monkeypatch.setattr(serve, "Fleet", Ending)
-    before = signal.getsignal(signal.SIGINT), signal.getsignal(signal.SIGTERM)
-    try:
-        assert main.run(["serve", "--body", "kinematic", "--port", "tcp:127.0.0.1:0"]) == 130
-    finally:
-        signal.signal(signal.SIGINT, before[0])
-        signal.signal(signal.SIGTERM, before[1])
-    captured = capsys.readouterr()
-    assert "p2dx in room, kinematic body; Ctrl-C ends" in captured.out
-    assert "     1.500 s  opened\n     1.600 s  motors: on\n" in captured.err
