@@ -37,10 +37,16 @@ Places = Sequence[tuple[float, float, float]]
 Meet = Callable[..., Meeting]
 
 
-@pytest.fixture(params=["kinematic", pytest.param("bullet", marks=pytest.mark.bullet)])
+@pytest.fixture(
+    params=[
+        "kinematic",
+        pytest.param("bullet", marks=pytest.mark.bullet),
+        pytest.param("mujoco", marks=pytest.mark.slow),
+    ]
+)
 def meet(request: pytest.FixtureRequest) -> Meet:
-    if request.param == "bullet":
-        pytest.importorskip("pybullet")
+    if request.param != "kinematic":
+        pytest.importorskip({"bullet": "pybullet"}.get(request.param, request.param))
     return lambda places=FACING, world=HALL: meeting(places, world, request.param)
 
 
