@@ -13,6 +13,7 @@ from typing import Annotated
 
 import typer
 
+from p2os.cli.event_lines import EventLines
 from p2os.cli.signals import end_on_signals
 from p2os.errors import UsageError
 from p2os.pioneer.aux_seat import AuxSeat
@@ -37,7 +38,6 @@ from p2os.pioneer.robot_time import RobotTime
 from p2os.pioneer.scenery import Pose
 from p2os.pioneer.sensor_errors import load_sensor_errors
 from p2os.profiles import Profile
-from p2os.timing import NS_PER_S, Nanos
 from p2os.transport import listen_url
 
 #: `--control` with this, and no option on a terminal, takes orders from standard input.
@@ -181,7 +181,7 @@ def open_hosts(order: FleetOrder, made: MadeFleet, *, speed: float = 1.0) -> lis
     try:
         for number, (robot, pioneer) in enumerate(zip(order.robots, made.robots, strict=True)):
             who = f"robot {number + 1}  " if len(made.robots) > 1 else ""
-            pioneer.on_event = on_event = partial(_tell, who)
+            pioneer.on_event = on_event = EventLines(_write, who).tell
             hosts.append(
                 Host(
                     pioneer, listen_url(robot.port), on_event=on_event, speed=speed,
@@ -250,6 +250,6 @@ def _show_status(hosts: Sequence[Host]) -> None:
     sys.stdout.flush()
 
 
-def _tell(who: str, now: Nanos, what: str, detail: str) -> None:
-    sys.stderr.write(f"{now / NS_PER_S:10.3f} s  {who}{what}{': ' if detail else ''}{detail}\n")
+def _write(text: str) -> None:
+    sys.stderr.write(text)
     sys.stderr.flush()
