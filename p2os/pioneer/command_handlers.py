@@ -34,6 +34,10 @@ class Effect(Enum):
     WAITS = "motors are off (ENABLE 1 turns them on)"
 
 
+#: What has no effect.
+IGNORED = frozenset({Effect.UNKNOWN, Effect.MALFORMED})
+
+
 def apply(works: Works, command: Command, now: Nanos) -> Effect:
     """Let a command act."""
     handler = HANDLERS.get(command.number)

@@ -45,7 +45,7 @@ from p2os.connection import (
 from p2os.packets import Identity, ResetNotice
 from p2os.parameters import RobotParameters
 from p2os.pioneer.chance import Chance
-from p2os.pioneer.command_handlers import Effect, apply
+from p2os.pioneer.command_handlers import IGNORED, MOTION_COMMANDS, Effect, apply
 from p2os.pioneer.controller_state import ControllerSnapshot, ControllerState
 from p2os.pioneer.faults import read_fault
 from p2os.pioneer.faults_acting import Patient, break_now, mend_now
@@ -68,7 +68,6 @@ __all__ = ["ControllerSettings", "ControllerState", "EventCallback", "Pioneer", 
 #: (now in ns, what happened in a word or two, detail).
 EventCallback = Callable[[Nanos, str, str], None]
 
-IGNORED = frozenset({Effect.UNKNOWN, Effect.MALFORMED})
 #: chosen: from a reset to the notice that the controller is there again.
 BOOT_NS: Nanos = 500 * NS_PER_MS
 
@@ -417,6 +416,8 @@ class Pioneer:
     def _obey(self, command: Command, now: Nanos) -> None:
         works, had_power = self._works, self._works.motors_enabled
         effect = apply(works, command, now)
+        if command.number in MOTION_COMMANDS and self.body.state.stalled_left and self.body.state.stalled_right:
+            works.motion.begin_from_stand()  # chosen: else a client cannot back off a wall before it gives up
         if effect in IGNORED:
             self._ignored += 1
         complaint = f"{command.name}: {effect.value}"

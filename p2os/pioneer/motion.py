@@ -210,6 +210,11 @@ class Motion:
         self._second.stop_now()
         self._wheels = (0.0, 0.0)
 
+    def begin_from_stand(self) -> None:
+        """Ramp from zero to what is set, as wheels do that a wall has stopped."""
+        self._first.speed = self._second.speed = 0
+        self._wheels = (0.0, 0.0)
+
     def power(self, *, on: bool) -> None:
         """Switch the motors (ENABLE); off stops the wheels at once and forgets every command."""
         if not on:

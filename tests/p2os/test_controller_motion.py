@@ -87,6 +87,21 @@ def test_stop_slows_down_and_emergency_stop_does_not(make_robot: MakeRobot) -> N
         assert robot.pioneer.state.motors_enabled
 
 
+def test_a_robot_that_a_wall_has_stopped_backs_off_at_once(robot: Any) -> None:
+    """ARIA gives a way out of a stall a second; the ramp down from a speed that nothing moves with took longer."""
+    robot.open()
+    robot.say(C.VEL, 400)
+    settle(robot)
+    robot.body.stall(left=True, right=False)
+    robot.say(C.VEL, -200)
+    robot.run(1)
+    assert robot.body.state.left_speed_mps > 0.3, "one wheel alone: the other still turns"
+    robot.body.stall(left=True, right=True)
+    robot.say(C.VEL, -200)
+    robot.run(100)
+    assert robot.body.state.left_speed_mps == pytest.approx(-0.03), "100 ms at 300 mm/s²"
+
+
 def test_accelerations_are_set_by_sign(robot: Any) -> None:
     robot.open()
     robot.say(C.SETA, 1000)
