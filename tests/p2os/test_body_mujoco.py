@@ -1,6 +1,5 @@
 """What is MuJoCo's own: meshes, things that come while it drives, and a robot that is squeezed."""
 
-
 import pytest
 
 from p2os.errors import WorldError
