@@ -40,6 +40,9 @@ FASTEST_MPS = 8.0
 #: How much nearer two hulls can come within a slice, m.
 CLOSING_M = 2 * FASTEST_MPS * SLICE_NS / NS_PER_S
 
+#: chosen: how far apart two robots may be and still be looked at in a sweep, beyond being near, m.
+LOOSE_M = 0.4
+
 
 @dataclass(slots=True)
 class Seat:
@@ -109,6 +112,11 @@ class Meeting:
                 for other in seat.company.others:
                     seat.body.place(other.obstacle(other.live))
                     seat.shown[other.name] = other.live
+        #: Those who keep copies of the others in their worlds.
+        self._copying = tuple(seat for seat in self.seats if seat.shown is not None)
+        #: Where all stood at the last sweep, and how much two of them at least were farther apart than near.
+        self._swept: list[Stand] = []
+        self._loose_m = 0.0
         self._close: tuple[Seat, ...] = ()
         self._alone: tuple[Seat, ...] = self.seats
         self._part()
@@ -170,6 +178,7 @@ class Meeting:
             seat.presence.live, seat.presence.at_border = Stand(*live), Stand(*at_border)
             seat.company.come_near(self.seats[number].presence for number in near)
             seat.shown = None if shown is None else {name: Stand(*stand) for name, stand in shown}
+        self._loose_m = 0.0  # sweep at the next border
         self._sort()
 
     # Within a slice ------------------------------------------------------------------
@@ -195,7 +204,7 @@ class Meeting:
                 seat.advance_to(start + 1)  # the least time that takes the body to its next step
                 seat.presence.look()
                 self._take_pushed(seat)
-                self._show(seat.presence, seat.presence.live, close)
+                self._show(seat.presence, seat.presence.live, only_close=True)
             times.step_border = start + self._step_ns
         for seat in close:
             seat.advance_to(limit)
@@ -213,11 +222,12 @@ class Meeting:
                         other.body.move(item.name, item.x_m, item.y_m, item.heading_rad)
             reports[seat.number] = item
 
-    @staticmethod
-    def _show(presence: Presence, stand: Stand, seats: Sequence[Seat]) -> None:
+    def _show(self, presence: Presence, stand: Stand, *, only_close: bool = False) -> None:
         """Move a robot in the worlds of those that keep a copy of it there."""
         name = presence.name
-        for seat in seats:
+        for seat in self._copying:
+            if only_close and not seat.company.is_close:
+                continue
             if seat.shown is not None and seat.presence is not presence and seat.shown[name] != stand:
                 presence.move_in(seat.body, stand)
                 seat.shown[name] = stand
@@ -232,7 +242,7 @@ class Meeting:
         self._spread_pushed()
         for seat in self.seats:
             seat.presence.at_border = seat.presence.live
-            self._show(seat.presence, seat.presence.live, self.seats)
+            self._show(seat.presence, seat.presence.live)
         self._part()
 
     def _spread_pushed(self) -> None:
@@ -250,23 +260,37 @@ class Meeting:
 
     def _part(self) -> None:
         """Find who could touch whom before the next border: sweep along x over circles around the hulls."""
+        if not self._close and self._is_as_swept():
+            return
         near: dict[int, list[int]] = {}
         row = sorted((*seat.presence.live[:2], seat.presence.reach_m, seat.number) for seat in self.seats)
-        widest = max(reach for _, _, reach, _ in row) + self._margin_m
+        farthest = max(reach for _, _, reach, _ in row) + self._margin_m + LOOSE_M
+        self._loose_m = LOOSE_M
         for place, (x, y, reach, number) in enumerate(row):
             for other in range(place + 1, len(row)):
                 other_x, other_y, other_reach, other_number = row[other]
-                if other_x - x > reach + widest:
+                if other_x - x > reach + farthest:
                     break
-                if math.hypot(other_x - x, other_y - y) < reach + other_reach + self._margin_m:
+                between_m = math.hypot(other_x - x, other_y - y) - reach - other_reach - self._margin_m
+                if between_m < 0:
                     near.setdefault(number, []).append(other_number)
                     near.setdefault(other_number, []).append(number)
+                self._loose_m = min(self._loose_m, between_m)
+        self._swept = [seat.presence.live for seat in self.seats]
         if not near and not self._close:
             return
         for seat in self.seats:
             numbers = sorted(near.get(seat.number, ()))
             seat.company.come_near(self.seats[number].presence for number in numbers)
         self._sort()
+
+    def _is_as_swept(self) -> bool:
+        """Tell whether nobody has moved so far since the last sweep that two could be near to each other now."""
+        allowed_m = self._loose_m / 2
+        return allowed_m > 0 and all(
+            math.hypot(seat.presence.live[0] - before[0], seat.presence.live[1] - before[1]) < allowed_m
+            for seat, before in zip(self.seats, self._swept, strict=True)
+        )
 
     def _sort(self) -> None:
         self._close = tuple(seat for seat in self.seats if seat.company.is_close)
