@@ -12,15 +12,16 @@ Invariant: a fault at t is felt by everything that happens after t, and by
 nothing that happened up to t.
 """
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import cast
 
 from p2os.errors import ScenarioError, UsageError
 from p2os.parameters import RobotParameters
 from p2os.pioneer.faults import MOMENTARY, read_fault
-from p2os.timing import NS_PER_S, Nanos, Reached
+from p2os.timing import NS_PER_S, Nanos
 from testbench.schema import Key, Table, check_table
+from testbench.timeline import Timeline
 
 _KEYS = (
     Key(name="at_s", kind="number", required=True, least=0),
@@ -61,7 +62,7 @@ def load_faults(tables: Sequence[Table], parameters: RobotParameters, where: str
     return tuple(sorted(found, key=lambda change: change.at))
 
 
-class FaultScript:
+class FaultScript(Timeline[FaultChange]):
     """Says each change at its time.
 
     Args:
@@ -73,32 +74,14 @@ class FaultScript:
     def __init__(
         self, changes: Sequence[FaultChange], *, bring_to: Callable[[Nanos], None], do: Callable[[str, Nanos], None]
     ) -> None:
-        self._changes = tuple(changes)
+        super().__init__(changes, self._apply)
         self._bring_to = bring_to
         self._do = do
-        self._done = 0
 
-    def next_deadline(self) -> Nanos | None:
-        """Return when the next change is due."""
-        return self._changes[self._done].at if self._done < len(self._changes) else None
-
-    def advance_to(self, limit: Nanos) -> Reached:
-        """Say what is due."""
-        while self._done < len(self._changes) and self._changes[self._done].at <= limit:
-            change = self._changes[self._done]
-            self._bring_to(change.at)
-            self._do(change.words, change.at)
-            self._bring_to(change.at)
-            self._done += 1
-        return Reached(limit)
-
-    def snapshot(self) -> dict[str, object]:
-        """Return how many changes were made."""
-        return {"done": self._done}
-
-    def restore(self, snapshot: object) -> None:
-        """Put back what `snapshot` returned; the robot is restored by whoever owns it."""
-        self._done = cast("int", cast("Mapping[str, object]", snapshot)["done"])
+    def _apply(self, change: FaultChange) -> None:
+        self._bring_to(change.at)
+        self._do(change.words, change.at)
+        self._bring_to(change.at)
 
 
 def _nanos(table: Table, key: str) -> Nanos:

@@ -13,12 +13,12 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from enum import Enum
-from typing import cast
 
 from p2os.parameters import RobotParameters
 from p2os.pioneer.body import RobotBody
 from p2os.pioneer.scenery import Obstacle
-from p2os.timing import NS_PER_MS, Nanos, Reached
+from p2os.timing import NS_PER_MS, Nanos
+from testbench.timeline import Timeline
 
 #: chosen: the robot moves 10 mm at most in between.
 FOLLOW_NS: Nanos = 50 * NS_PER_MS
@@ -59,11 +59,11 @@ class Change:
 ChangeListener = Callable[[str, str, Nanos, Mapping[str, object]], None]
 
 
-class Script:
+class Script(Timeline[Change]):
     """Applies changes at their times.
 
     Args:
-        changes: In order of time.
+        changes: In any order.
         body: Where they are applied.
         parameters: Where the sonar sit.
         bring_to: Brings the body to an instant.
@@ -79,34 +79,14 @@ class Script:
         bring_to: Callable[[Nanos], None],
         on_change: ChangeListener | None = None,
     ) -> None:
-        self._changes = tuple(sorted(changes, key=lambda change: change.at))
+        super().__init__(changes, self._apply)
         self._body = body
         self._parameters = parameters
         self._bring_to = bring_to
         self._on_change = on_change
-        self._done = 0
-
-    def next_deadline(self) -> Nanos | None:
-        """Return when the next change is due."""
-        return self._changes[self._done].at if self._done < len(self._changes) else None
-
-    def advance_to(self, limit: Nanos) -> Reached:
-        """Apply what is due."""
-        while self._done < len(self._changes) and self._changes[self._done].at <= limit:
-            self._bring_to(self._changes[self._done].at)
-            self._apply(self._changes[self._done])
-            self._done += 1
-        return Reached(limit)
-
-    def snapshot(self) -> dict[str, object]:
-        """Return how many changes were applied."""
-        return {"done": self._done}
-
-    def restore(self, snapshot: object) -> None:
-        """Put back what `snapshot` returned; the body is restored by whoever owns it."""
-        self._done = cast("int", cast("Mapping[str, object]", snapshot)["done"])
 
     def _apply(self, change: Change) -> None:
+        self._bring_to(change.at)
         x_m, y_m, heading_rad = change.x_m, change.y_m, change.heading_rad
         if change.before is not None:
             x_m, y_m, heading_rad = self._place_before(change.before)

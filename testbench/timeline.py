@@ -1,0 +1,54 @@
+"""Changes at their times: what scripts of the world and of faults have in common.
+
+Invariant: each change is applied once, in order of time, and saving and restoring keeps the place.
+"""
+
+from collections.abc import Callable, Mapping, Sequence
+from typing import Generic, Protocol, TypeVar, cast
+
+from p2os.timing import Nanos, Reached
+
+
+class Timed(Protocol):
+    """What is due at a time."""
+
+    @property
+    def at(self) -> Nanos:
+        """When."""
+        ...
+
+
+T = TypeVar("T", bound=Timed)
+
+
+class Timeline(Generic[T]):
+    """Applies changes when they are due.
+
+    Args:
+        changes: In any order; those of one time keep theirs.
+        apply: Makes one change.
+    """
+
+    def __init__(self, changes: Sequence[T], apply: Callable[[T], None]) -> None:
+        self._changes = tuple(sorted(changes, key=lambda change: change.at))
+        self._apply_change = apply
+        self._done = 0
+
+    def next_deadline(self) -> Nanos | None:
+        """Return when the next change is due."""
+        return self._changes[self._done].at if self._done < len(self._changes) else None
+
+    def advance_to(self, limit: Nanos) -> Reached:
+        """Make every change that is due."""
+        while self._done < len(self._changes) and self._changes[self._done].at <= limit:
+            self._apply_change(self._changes[self._done])
+            self._done += 1
+        return Reached(limit)
+
+    def snapshot(self) -> dict[str, object]:
+        """Return how many changes were made."""
+        return {"done": self._done}
+
+    def restore(self, snapshot: object) -> None:
+        """Put back what `snapshot` returned; what was changed is restored by whoever owns it."""
+        self._done = cast("int", cast("Mapping[str, object]", snapshot)["done"])
