@@ -23,6 +23,7 @@ from bluepill_sim.cycle_clock import CycleClock
 from bluepill_sim.memory import Memory
 from bluepill_sim.native_processor import make_core
 from bluepill_sim.native_registers import share_registers
+from bluepill_sim.native_streams import SharedStreams
 from bluepill_sim.processor import FaultListener
 from bluepill_sim.rcc import ResetCause
 from bluepill_sim.stm32f103 import (
@@ -123,14 +124,14 @@ class Chip:
 
     def advance_to(self, limit_ns: Nanos) -> Reached:
         """Run to the first block border at or after a time, or to what stops the chip before."""
-        return self._advance(limit_ns, self.processor.run)
+        return self._advance(limit_ns, self.processor.run, self._streams)
 
     def step(self, limit_ns: Nanos) -> Reached:
         """Run one instruction, or the entry of the exception that comes before it: HALT with a STEP.
 
         A core that sleeps first goes on to what wakes it; DEADLINE where that comes after `limit_ns`.
         """
-        return self._advance(limit_ns, self.processor.step)
+        return self._advance(limit_ns, self.processor.step, None)
 
     def record_blocks(self, capacity: int, on_full: Callable[[BlockRecorder], None] | None = None) -> BlockRecorder:
         """Record each block, exception entry and exception return from now on; `stop_recording` ends it.
@@ -149,7 +150,7 @@ class Chip:
         """Record no more."""
         self.engine.recorder = None
 
-    def _advance(self, limit_ns: Nanos, go_on: Callable[[int], None]) -> Reached:
+    def _advance(self, limit_ns: Nanos, go_on: Callable[[int], None], streams: SharedStreams | None) -> Reached:
         processor, engine, clock = self.processor, self.engine, self._clock
         while True:
             if not engine.is_inside_block:
@@ -166,6 +167,8 @@ class Chip:
             if processor.is_locked_up:
                 engine.cycle = self._stop_cycle(limit_ns)
                 continue
+            if streams is not None and streams.give():
+                self._deadlines_moved = True
             go_on(self._stop_cycle(limit_ns))
             if processor.halt is not None:
                 halt, processor.halt = processor.halt, None
@@ -302,7 +305,8 @@ class Chip:
             self._event_ns = due
             self._deadlines_moved = True
             try:
-                self.parts.advance_to(due)
+                self._next_due = self.parts.act_at(due)
+                self._deadlines_moved = False
             finally:
                 self._event_ns = None
         if self._requested_reset is not None:
@@ -339,7 +343,7 @@ class Chip:
         bits = SramBitBand(self.memory.sram)
         engine.map_io(SRAM_ALIAS, SRAM_BYTES * _ALIAS_BYTES, bits.read_bit, bits.write_bit)
         engine.map_io(PPB_BASE, PPB_BYTES, self.system.read, self.system.write)
-        share_registers(engine, self.parts.by_name.values(), self.parts.rcc, self.pins, self.ns_of)
+        self._streams = share_registers(self, self.parts.by_name.values(), self.parts.rcc)
         engine.on_read_only_write = self._write_flash
         engine.on_read_only_written = self._repair_flash
 

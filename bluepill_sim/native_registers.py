@@ -3,6 +3,7 @@
     reads plain    the register has no `on_read`; what is read may be latched
     writes plain   it has no `on_write`
     GPIO           BSRR, BRR and ODR, while nothing but IDR follows from a pin's level
+    USART          DR, while characters follow each other and nobody listens to interrupt lines
 
 An access goes to Python when its page has no clock, when a peripheral is due
 before the block ends, and for everything else.
@@ -12,22 +13,24 @@ loses the mark with each change of what made it so.
 """
 
 import ctypes
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sized
 from typing import TYPE_CHECKING
 
-from bluepill_sim.cpu import Engine
 from bluepill_sim.cpu.native_library import library
 from bluepill_sim.gpio import Gpio
+from bluepill_sim.native_streams import UNSEEN, SharedStreams
 from bluepill_sim.peripheral import Peripheral
 from bluepill_sim.pins import PinBank
 from bluepill_sim.rcc import Rcc
 from bluepill_sim.stm32f103 import CLOCK_GATES, PERIPHERAL_BASE
+from bluepill_sim.usart import Usart
 
 if TYPE_CHECKING:
+    from bluepill_sim.chip import Chip
     from bluepill_sim.cpu.native_engine import NativeEngine
 
 #: Bits of a register's behaviour (`enum behaviour`); the word that latches stands above them, 0 for none.
-_READS_PLAIN, _WRITES_PLAIN, _LATCH_SHIFT = 1, 2, 4
+_READS_PLAIN, _WRITES_PLAIN, _USART_DATA, _LATCH_SHIFT = 1, 2, 4, 4
 _PAGE_SHIFT = 10
 
 
@@ -38,13 +41,23 @@ class _Port(ctypes.Structure):
 
 
 class SharedPorts:
-    """The GPIO ports whose plain outputs C switches."""
+    """The GPIO ports whose plain outputs C switches, and who listens to what C does."""
 
-    def __init__(self, engine: "NativeEngine", bank: PinBank, ns_of: Callable[[int], int]) -> None:
+    def __init__(
+        self,
+        engine: "NativeEngine",
+        bank: PinBank,
+        irq_listeners: Sized,
+        streams: SharedStreams,
+        ns_of: Callable[[int], int],
+    ) -> None:
         self._engine = engine
         self._ns_of = ns_of
         self._was_heard = True
         self._is_recording = False
+        self._irq_listeners = irq_listeners
+        self.streams = streams
+        self._listener_count = 0
         self._bank = bank
         self._ports: list[tuple[Gpio, _Port]] = []
 
@@ -55,7 +68,9 @@ class SharedPorts:
     def take_over(self) -> None:
         """Do what C has done to pins, before anybody looks at them."""
         shared, bank = self._engine.shared, self._bank
-        shared.pins_changed = 0
+        if shared.unseen & UNSEEN:
+            self.streams.take_back()
+        shared.unseen = 0
         for take in bank.bulk_takers:
             take()
         library().core_drop_pins(self._engine.state)
@@ -70,8 +85,11 @@ class SharedPorts:
             bank.on_silent_output(self._ns_of(shared.last_pin_cycle))
 
     def mark(self) -> None:
-        """Tell C which pins are simple, before a run."""
+        """Tell C which pins are simple and who listens, before a run."""
         bank = self._bank
+        if len(self._irq_listeners) != self._listener_count:
+            self._listener_count = len(self._irq_listeners)
+            self._engine.shared.tells_irqs = self._listener_count != 0
         is_recording = bool(bank.bulk_takers)
         if is_recording is not self._is_recording:
             self._is_recording = is_recording
@@ -85,15 +103,16 @@ class SharedPorts:
             port.simple = 0 if is_heard else gpio.simple_outputs()
 
 
-def share_registers(
-    engine: Engine, parts: Iterable[Peripheral], rcc: Rcc, bank: PinBank, ns_of: Callable[[int], int]
-) -> None:
-    """Hand the registers of a chip to its engine, if it is a native one."""
+def share_registers(chip: "Chip", parts: Iterable[Peripheral], rcc: Rcc) -> SharedStreams | None:
+    """Hand the registers of a chip to its engine, if it is a native one; return what it has of its USARTs."""
     from bluepill_sim.cpu.native_engine import NativeEngine
 
+    engine = chip.engine
     if not isinstance(engine, NativeEngine):
-        return
-    ports = SharedPorts(engine, bank, ns_of)
+        return None
+    parts = tuple(parts)
+    streams = SharedStreams(chip, engine, [part for part in parts if isinstance(part, Usart)])
+    ports = SharedPorts(engine, chip.pins, chip.irq_listeners, streams, chip.ns_of)
     state, calls = engine.state, library()
     calls.core_set_paged_region(state, engine.region_at(PERIPHERAL_BASE))
     for part in parts:
@@ -103,6 +122,8 @@ def share_registers(
         for register in part.REGISTERS:
             index = register.offset // 4
             behaviour[index] = _READS_PLAIN * (register.on_read is None) | _WRITES_PLAIN * (register.on_write is None)
+            if isinstance(part, Usart) and register.name == "DR":
+                behaviour[index] |= _USART_DATA
             if register.latched_in is not None:
                 behaviour[index] |= register.latched_in // 4 << _LATCH_SHIFT
             masks[4 * index : 4 * index + 4] = list(part.masks_of(index))
@@ -115,6 +136,7 @@ def share_registers(
         words, _ = part.words.buffer_info()
         engine.keep(behaviour, masks)
         page = part.base - PERIPHERAL_BASE >> _PAGE_SHIFT
-        calls.core_set_page(state, page, words, count, at, mask, behaviour, masks, number)
+        calls.core_set_page(state, page, words, count, at, mask, behaviour, masks, number, (*part.place.irqs, 0)[0])
     engine.before_access = ports.take_over
     engine.before_run = ports.mark
+    return streams

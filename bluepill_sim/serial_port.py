@@ -58,6 +58,7 @@ class SerialPort:
         #: What was sent and not yet taken.
         self.unread = bytearray()
         usart.on_transmit = self._transmitted
+        usart.is_heard = lambda: self.on_transmit is not None or bool(self.listeners)
 
     def receive(self, data: bytes) -> None:
         """Send characters to the RX pin, at the speed of the line."""

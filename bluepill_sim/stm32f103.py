@@ -219,23 +219,20 @@ class ChipParts:
                 first = due_ns
         return first
 
-    def advance_to(self, now_ns: int) -> None:
-        """Act on everything due up to and including `now_ns`, in order of time, then of `PERIPHERALS`.
+    def act_at(self, due_ns: int) -> int | None:
+        """Act on what is due at the first deadline, in the order of `PERIPHERALS`; return the next deadline.
 
         Raises:
             RuntimeError: a peripheral has not done what was due, and would be asked for ever; a bug of its model.
         """
-        while True:
-            due_ns = self.next_deadline()
-            if due_ns is None or due_ns > now_ns:
-                return
-            for part in self.by_name.values():
-                if part.due_ns == due_ns:
-                    part.advance_to(due_ns)
-                    if part.due_ns is not None and part.due_ns <= due_ns:
-                        raise RuntimeError(
-                            f"{part.place.name} is still due at {part.due_ns} ns after acting at {due_ns} ns"
-                        )
+        for part in self.by_name.values():
+            if part.due_ns == due_ns:
+                part.advance_to(due_ns)
+                if part.due_ns is not None and part.due_ns <= due_ns:
+                    raise RuntimeError(
+                        f"{part.place.name} is still due at {part.due_ns} ns after acting at {due_ns} ns"
+                    )
+        return self.next_deadline()
 
     def snapshot(self) -> dict[str, PeripheralSnapshot]:
         """Return all that decides their future, as plain values."""

@@ -26,8 +26,11 @@ from bluepill_sim.ports import ChipPorts
 from bluepill_sim.register import Register, bits
 
 SR, DR, BRR, CR1, CR2, CR3, GTPR = range(7)
-#: Hidden: SR at its last read, half of the sequence that clears a flag.
-_SEEN = 7
+#: Hidden words, which the native core knows too: SR at its last read (half of the sequence that clears a
+#: flag), what stands behind the shift register, what is in it (0: nothing), and what DR reads.
+_SEEN, _TDR, _SHIFT, _RDR = range(7, 11)
+#: Marks a data word in `_TDR` and `_SHIFT`; what the shift register holds besides.
+_HELD, _PREAMBLE, _BREAK = 1 << 16, 1 << 17, 1 << 18
 
 ORE, IDLE, RXNE, TC, TXE = (1 << n for n in (3, 4, 5, 6, 7))
 _READ_SEQUENCE_FLAGS = bits((4, 0))
@@ -54,20 +57,15 @@ PINS = {
     "USART2": {0: ("PA2", "PA3"), 1: ("PD5", "PD6")},
     "USART3": {0: ("PB10", "PB11"), 1: ("PC10", "PC11"), 3: ("PD8", "PD9")},
 }
-#: What the shift register holds besides a data word.
-_PREAMBLE, _BREAK = -1, -2
 
 
 class Usart(Peripheral):
     """Universal asynchronous receiver transmitter."""
 
     STATE = (
-        "_shift",
-        "_tdr",
         "_tx_base_ns",
         "_tx_half_bits",
         "_tx_due_ns",
-        "_rdr",
         "_rx_queue",
         "_rx_base_ns",
         "_rx_half_bits",
@@ -101,15 +99,11 @@ class Usart(Peripheral):
         Register(name="GTPR", offset=0x18, readable=bits((15, 0)), writable=bits((15, 0))),
     )
 
-    #: What the shift register sends: a word, _PREAMBLE, _BREAK, or None; and the word behind it while TXE is 0.
-    _shift: int | None
-    _tdr: int | None
     #: Start of the run of characters, and half-bits from there to the end of the present one.
     _tx_base_ns: int
     _tx_half_bits: int
     _tx_due_ns: int | None
-    #: What DR reads, and the characters from outside that have not fully arrived.
-    _rdr: int
+    #: The characters from outside that have not fully arrived.
     _rx_queue: bytes
     _rx_base_ns: int
     _rx_half_bits: int
@@ -124,6 +118,8 @@ class Usart(Peripheral):
         super().__init__(chip, place)
         #: Called with (word, time in ns) at the end of each stop bit that goes out.
         self.on_transmit: Callable[[int, int], None] | None = None
+        #: Tells whether anybody wants each of these calls at its own time; else they may come later, together.
+        self.is_heard: Callable[[], bool] = lambda: self.on_transmit is not None
         self._source = f"{place.name}_TX"
         self._pins = PINS[place.name]
         self._tx_pin, self._rx_pin = (chip.pins[name] for name in self._pins[0])
@@ -148,6 +144,39 @@ class Usart(Peripheral):
         self._rx_queue += bytes(data)
         self._idle_due_ns = None
         self._schedule()
+
+    # For a core that ends the characters of a transmission by itself.
+
+    def can_stream(self) -> bool:
+        """Whether all that goes on here is characters going out, heard by nobody at their own time."""
+        words = self.words
+        return (
+            self._tx_due_ns is not None
+            and self._tx_half_bits > 0
+            and self._rx_due_ns is None
+            and self._idle_due_ns is None
+            and words[_SHIFT] != _BREAK
+            and words[CR1] & (UE | TE | SBK) == UE | TE
+            and not self.is_heard()
+            and self._tx_pin.carries(self._source)
+        )
+
+    def give_stream(self) -> tuple[int, int, int, int]:
+        """Give the transmission away; `due_ns` is None until it comes back.
+
+        Returns:
+            Start of the run of characters in ns, half-bits from there to the
+            end of the present one, half-bits of a frame, clock in Hz.
+        """
+        self.due_ns = None
+        return self._tx_base_ns, self._tx_half_bits, self._frame_half_bits(), self._clock_hz
+
+    def take_stream_back(self, half_bits: int, sent: list[tuple[int, int]]) -> None:
+        """Go on with a transmission `half_bits` after its start, of which (word, ns) have gone out meanwhile."""
+        self._tx_half_bits = half_bits
+        self._schedule()
+        for word, at_ns in sent:
+            self._emit(word, at_ns)
 
     # For the chip.
 
@@ -185,10 +214,10 @@ class Usart(Peripheral):
         self._schedule()
 
     def _clear(self) -> None:
-        self._shift = self._tdr = None
+        self.words[_SHIFT] = self.words[_TDR] = 0
         self._tx_base_ns = self._tx_half_bits = 0
         self._tx_due_ns = self._rx_due_ns = self._idle_due_ns = None
-        self._rdr = self.words[_SEEN] = 0
+        self.words[_RDR] = self.words[_SEEN] = 0
         self._rx_queue = b""
         self._rx_base_ns = self._rx_half_bits = 0
         self._is_enabled_before = False
@@ -207,7 +236,7 @@ class Usart(Peripheral):
 
     def _schedule(self) -> None:
         """Work out all deadlines from what is on the line."""
-        self._tx_due_ns = self._tx_base_ns + self._span_ns(self._tx_half_bits) if self._shift is not None else None
+        self._tx_due_ns = self._tx_base_ns + self._span_ns(self._tx_half_bits) if self.words[_SHIFT] else None
         self._rx_due_ns = self._rx_base_ns + self._span_ns(self._rx_half_bits) if self._rx_queue else None
         due_ns = self._tx_due_ns
         for other in (self._rx_due_ns, self._idle_due_ns):
@@ -231,14 +260,15 @@ class Usart(Peripheral):
 
     def _load(self, item: int, base_ns: int, before_half_bits: int = 0) -> None:
         """Put an item into the shift register, `before_half_bits` after `base_ns`."""
-        self._shift = item
+        self.words[_SHIFT] = item
         self._tx_base_ns = base_ns
         self._tx_half_bits = before_half_bits + self._frame_half_bits()
 
     def _end_transmission(self, at_ns: int) -> None:
-        ended, self._shift = self._shift, None
-        if ended is not None and ended >= 0:
-            self._emit(ended, at_ns)
+        words = self.words
+        ended, words[_SHIFT] = words[_SHIFT], 0
+        if ended & _HELD:
+            self._emit(ended & _WORD_BITS, at_ns)
         if ended == _BREAK:
             self.words[CR1] &= ~SBK
         if not self._is_transmitting():
@@ -246,9 +276,9 @@ class Usart(Peripheral):
             self.words[SR] |= TC
         elif self.words[CR1] & SBK:
             self._load(_BREAK, self._tx_base_ns, self._tx_half_bits)
-        elif self._tdr is not None:
-            item, self._tdr = self._tdr, None
-            self.words[SR] |= TXE
+        elif words[_TDR]:
+            item, words[_TDR] = words[_TDR], 0
+            words[SR] |= TXE
             self._load(item, self._tx_base_ns, self._tx_half_bits)
         else:
             self.words[SR] |= TC
@@ -280,7 +310,7 @@ class Usart(Peripheral):
         if self.words[SR] & RXNE:
             self.words[SR] |= ORE
         else:
-            self._rdr = self._with_parity(word)
+            self.words[_RDR] = self._with_parity(word)
             self.words[SR] |= RXNE
         if not self._rx_queue:
             self._idle_due_ns = at_ns + self._span_ns(self._frame_half_bits())
@@ -305,7 +335,7 @@ class Usart(Peripheral):
         words[SR] &= ~(RXNE | (words[_SEEN] & _READ_SEQUENCE_FLAGS))
         words[_SEEN] &= ~_READ_SEQUENCE_FLAGS
         self._update_irq()
-        return self._rdr
+        return words[_RDR]
 
     def _write_dr(self, written: int, _previous: int) -> None:
         word = written & _WORD_BITS
@@ -316,13 +346,13 @@ class Usart(Peripheral):
             self.chip.warn(f"{self.name}_DR: written while the transmitter is off", once=f"{self.name}:tx-off")
         elif self.words[BRR] == 0:
             self.chip.warn(f"{self.name}_DR: written while BRR is 0: no baud rate", once=f"{self.name}:brr")
-        elif self._shift is None:
-            self._load(word, self.chip.now_ns)
+        elif not self.words[_SHIFT]:
+            self._load(_HELD | word, self.chip.now_ns)
             self._schedule()
         else:
-            if self._tdr is not None:
+            if self.words[_TDR]:
                 self.chip.warn(f"{self.name}_DR: written while TXE is 0: a character is lost", once=f"{self.name}:txe")
-            self._tdr = word
+            self.words[_TDR] = _HELD | word
             self.words[SR] &= ~TXE
         self._update_irq()
 
@@ -340,17 +370,17 @@ class Usart(Peripheral):
         has_rate = self.words[BRR] > 0
         if is_enabled and not self._is_enabled_before:
             self._tx_pin.connect(self._source, level=True)
-            if self._shift is None and has_rate:
+            if not self.words[_SHIFT] and has_rate:
                 self._load(_PREAMBLE, self.chip.now_ns)
-        elif not self.words[CR1] & TE and self._shift is not None:
+        elif not self.words[CR1] & TE and self.words[_SHIFT]:
             # UE lets the present character end; TE cuts it off (RM0008 27.3.2).
             self.chip.warn(f"{self.name}_CR1: TE cleared during a character, which is lost", once=f"{self.name}:te")
-            self._shift = self._tdr = None
+            self.words[_SHIFT] = self.words[_TDR] = 0
             self.words[SR] |= TXE | TC
-        if not is_enabled and self._shift is None:
+        if not is_enabled and not self.words[_SHIFT]:
             self._tx_pin.disconnect(self._source)
         self._is_enabled_before = is_enabled
-        if is_enabled and self.words[CR1] & SBK and self._shift is None and has_rate:
+        if is_enabled and self.words[CR1] & SBK and not self.words[_SHIFT] and has_rate:
             self._load(_BREAK, self.chip.now_ns)
 
     def _write_brr(self, _written: int, _previous: int) -> None:

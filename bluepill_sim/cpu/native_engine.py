@@ -202,21 +202,21 @@ class NativeEngine(Engine):
             self.forget_costs()
         if self.before_run is not None:
             self.before_run()
-        while True:
-            kind = library().core_run(self._state, min(limit, shared.cycle + _SLICE_CYCLES))
-            if shared.pins_changed and self.before_access is not None:
-                self.before_access()
-            if self._failure is not None:
-                failure, self._failure = self._failure, None
-                self._frozen = None
-                raise failure
-            if kind != STALE:
-                halt = self._halt_of(kind)
-                if halt is not None and halt.kind is HaltKind.TAKEN_WRITE:
-                    self.use_python(True)
-                    halt = self._step_over_write(limit)
-                return kind == DELIVER, None if halt is not None and halt.kind is HaltKind.STEP else halt
+        kind = library().core_run(self._state, min(limit, shared.cycle + _SLICE_CYCLES))
+        if shared.unseen and self.before_access is not None:
+            self.before_access()
+        if self._failure is not None:
+            failure, self._failure = self._failure, None
+            self._frozen = None
+            raise failure
+        if kind == STALE:
             traps.arm()
+            return False, None
+        halt = self._halt_of(kind)
+        if halt is not None and halt.kind is HaltKind.TAKEN_WRITE:
+            self.use_python(True)
+            halt = self._step_over_write(limit)
+        return kind == DELIVER, None if halt is not None and halt.kind is HaltKind.STEP else halt
 
     def _halt_of(self, kind: int) -> Halt | None:
         """Return what ended a run in C; None where only its time was up, or Python is to go on."""
@@ -373,7 +373,7 @@ class NativeEngine(Engine):
     def _is_denied(self) -> bool:
         """Get ready for an access; tell whether the run has ended before it."""
         shared = self.shared
-        if shared.pins_changed and self.before_access is not None:
+        if shared.unseen and self.before_access is not None:
             self.before_access()
         return super()._is_denied() if shared.is_python else self._frozen is not None
 

@@ -93,7 +93,7 @@ class Shared(ctypes.Structure):
         ("grouping", _U32),
         ("it_state", _U32),
         ("is_python", _U32),
-        ("pins_changed", _U32),
+        ("unseen", _U32),
         ("is_fresh", _U32),
         ("last_pin_cycle", _U64),
         ("priorities", _U8 * 76),
@@ -105,7 +105,7 @@ class Shared(ctypes.Structure):
         ("flash_base", _U32),
         ("flash_bytes", _U32),
         ("scratch", _U32),
-        ("_last_padding", _U32),
+        ("tells_irqs", _U32),
         ("told", _U64),
         ("last", Record * LAST_ROWS),
     )

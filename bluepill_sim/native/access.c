@@ -177,12 +177,15 @@ uint64_t core_read_io(void *engine, uint64_t at, unsigned size, void *user)
     const struct region_user *region = user;
     const uint32_t offset = (uint32_t)at, index = (offset & IN_PAGE) >> 2;
     const struct page *page = open_page(region, offset);
-    if (page == NULL || !(page->behaviour[index] & READS_PLAIN)) {
+    uint32_t word;
+    if (page != NULL && page->behaviour[index] & READS_PLAIN) {
+        const uint32_t latch = page->behaviour[index] >> LATCH_SHIFT;
+        word = page->words[index];
+        if (latch) {
+            page->words[latch] = word;
+        }
+    } else if (page == NULL || !(page->behaviour[index] & USART_DATA) || !read_usart_data(region->core, page, &word)) {
         return ask_read(region, offset, size);
-    }
-    const uint32_t word = page->words[index], latch = page->behaviour[index] >> LATCH_SHIFT;
-    if (latch) {
-        page->words[latch] = word;
     }
     skip(region->core, region->base + offset, false, size);
     return size == 4 ? word : (word >> (offset & 3) * 8) & ((1u << size * 8) - 1);
@@ -193,13 +196,25 @@ void core_write_io(void *engine, uint64_t at, unsigned size, uint64_t value, voi
     (void)engine;
     const uint32_t offset = (uint32_t)at, index = (offset & IN_PAGE) >> 2, written = (uint32_t)value;
     const struct region_user *region = user;
-    struct page *page = size == 4 ? open_page(region, offset) : NULL;
-    if (page != NULL && page->behaviour[index] & WRITES_PLAIN) {
-        const uint32_t *mask = page->masks[index], before = page->words[index];
-        page->words[index] = (before & mask[0] & ~(written & mask[2]) & (written | ~mask[3])) | (written & mask[1]);
+    struct page *page = open_page(region, offset);
+    bool is_done = false;
+    if (page != NULL && size == 4) {
+        if (page->behaviour[index] & WRITES_PLAIN) {
+            const uint32_t *mask = page->masks[index], before = page->words[index];
+            page->words[index] = (before & mask[0] & ~(written & mask[2]) & (written | ~mask[3])) | (written & mask[1]);
+            is_done = true;
+        } else if (page->port != NULL) {
+            if (write_port(region->core, page, index, written, region->base + offset)) {
+                return;
+            }
+        }
+    }
+    if (!is_done && page != NULL && size >= 2 && page->behaviour[index] & USART_DATA) {
+        is_done = write_usart_data(region->core, page, written);
+    }
+    if (is_done) {
         skip(region->core, region->base + offset, true, size);
-    } else if (page == NULL || page->port == NULL ||
-               !write_port(region->core, page, index, written, region->base + offset)) {
+    } else {
         ask_write(region, offset, size, written);
     }
 }

@@ -102,14 +102,15 @@ struct shared {
     uint32_t tick_control, tick_reload, tick_value, tick_count_flag;
     uint32_t traps_division, grouping;
     uint32_t it_state, is_python;
-    uint32_t pins_changed;
+    uint32_t unseen; /* what Python has not seen yet: numbers of pins, or STREAMS_UNSEEN */
     uint32_t is_fresh; /* whoever records has not been told of anything yet */
     uint64_t last_pin_cycle; /* the start of the block that last switched a pin silently */
     uint8_t priorities[80];
     /* Set by Python before the first run. */
     uint64_t sram, flash;
     uint32_t sram_base, sram_bytes, flash_base, flash_bytes;
-    uint32_t scratch, last_padding;
+    uint32_t scratch;
+    uint32_t tells_irqs; /* somebody listens to the interrupt lines */
     uint64_t told; /* rows so far: the next one goes to `last` at this, modulo its size */
     struct record last[LAST_ROWS];
 };
@@ -146,10 +147,11 @@ struct page {
     const uint8_t *behaviour; /* of each word: bits of enum behaviour */
     const uint32_t (*masks)[4];
     struct port *port;
+    uint32_t irq;
 };
 
 /* The word that latches what is read stands above the bits; 0 for none. */
-enum behaviour { READS_PLAIN = 1, WRITES_PLAIN = 2, LATCH_SHIFT = 4 };
+enum behaviour { READS_PLAIN = 1, WRITES_PLAIN = 2, USART_DATA = 4, LATCH_SHIFT = 4 };
 
 /* What lives as long as the core. */
 struct allocation {
@@ -173,6 +175,31 @@ struct skipped {
     uint8_t bytes, is_write;
 };
 #define SKIPPED 8
+
+/* A character that has gone out, at the end of its stop bit. */
+struct sent {
+    uint64_t ns;
+    uint32_t word, padding;
+};
+
+#define STREAMS 3
+#define SENT 1024
+#define STREAMS_UNSEEN (1u << 31)
+
+/* A transmission of a USART while this core has it: `bluepill_sim/native_streams.py` knows the layout. */
+struct stream {
+    uint32_t *words;
+    uint64_t base_ns, half_bits; /* of the end of the present character; no half-bits: Python has it */
+    uint64_t due_ns, due_cycle;
+    uint32_t irq, frame_half_bits, clock_hz, sent_count;
+    struct sent sent[SENT];
+};
+
+/* Where cycles and nanoseconds are tied together. */
+struct time_base {
+    uint64_t base_ns, base_cycle;
+    uint32_t frequency_hz;
+};
 
 /* One GPIO port whose plain outputs are switched here. */
 struct port {
@@ -204,6 +231,9 @@ struct core {
     uint32_t record_count, record_room;
     struct pin_row *pin_rows; /* null: nobody records the pins */
     uint32_t pin_count;
+    struct stream streams[STREAMS];
+    uint64_t stream_next; /* the cycle at which the first of them ends a character */
+    struct time_base time;
 };
 
 static inline void begin_block(struct core *core, struct row *row)
@@ -222,6 +252,11 @@ void record(struct core *core, uint32_t address, int32_t kind);
 void core_flush(struct core *core);
 /* gpio.c */
 bool write_port(struct core *core, struct page *page, uint32_t index, uint32_t value, uint32_t address);
+/* usart.c */
+bool write_usart_data(struct core *core, const struct page *page, uint32_t value);
+bool read_usart_data(struct core *core, const struct page *page, uint32_t *word);
+/* streams.c */
+void end_characters(struct core *core);
 /* access.c */
 void resolve(struct core *core, uint32_t address, bool is_write, uint32_t bytes);
 void skip(struct core *core, uint32_t address, bool is_write, uint32_t bytes);

@@ -45,7 +45,7 @@ bool write_port(struct core *core, struct page *page, uint32_t index, uint32_t v
         page->words[ODR] = after;
         page->words[IDR] = (page->words[IDR] & ~changed) | (after & changed);
         page->port->changed |= changed;
-        core->shared.pins_changed |= changed;
+        core->shared.unseen |= changed;
         if (core->pin_rows != NULL) {
             record_pins(core, page, changed, address);
             return true;

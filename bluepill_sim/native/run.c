@@ -41,7 +41,10 @@ struct core *core_new(void *engine, const struct engine_api *api, const struct c
         core->none.start = core->none.end = UINT32_MAX;
         core->block = &core->none;
         core->paged_region = UINT32_MAX;
-        core->shared.last_sleep_cycle = core->shared.tick_next = NO_TIME;
+        core->shared.last_sleep_cycle = core->shared.tick_next = core->stream_next = NO_TIME;
+        for (uint32_t n = 0; n < STREAMS; ++n) {
+            core->streams[n].due_cycle = NO_TIME;
+        }
     }
     return core;
 }
@@ -63,11 +66,12 @@ void core_free(struct core *core)
 }
 
 void core_set_page(struct core *core, uint32_t number, uint32_t *words, uint32_t count, const uint32_t *gate,
-                   uint32_t gate_mask, const uint8_t *behaviour, const uint32_t (*masks)[4], int port)
+                   uint32_t gate_mask, const uint8_t *behaviour, const uint32_t (*masks)[4], int port,
+                   uint32_t irq)
 {
     core->pages[number] = (struct page){.words = words, .gate = gate, .gate_mask = gate_mask, .count = count,
                                         .behaviour = behaviour, .masks = masks,
-                                        .port = port < 0 ? NULL : &core->ports[port]};
+                                        .port = port < 0 ? NULL : &core->ports[port], .irq = irq};
 }
 
 struct port *core_port(struct core *core, uint32_t number) { return &core->ports[number]; }
@@ -225,10 +229,14 @@ static uint32_t run(struct core *core, uint64_t limit)
         if (s->cycle >= s->tick_next) {
             tick(core);
         }
+        if (s->cycle >= core->stream_next) {
+            end_characters(core);
+        }
         if (s->attention || s->cycle >= limit) {
             return HALT_BORDER;
         }
-        const uint64_t stop = s->tick_next < limit ? s->tick_next : limit;
+        const uint64_t event = s->tick_next < core->stream_next ? s->tick_next : core->stream_next;
+        const uint64_t stop = event < limit ? event : limit;
         if (s->sleep && !wakes(core)) {
             if (s->cycle < stop) {
                 s->cycle = stop;

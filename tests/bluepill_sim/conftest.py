@@ -74,7 +74,7 @@ class FakeChip:
                 break
             assert due_ns >= self.now_ns
             self.now_ns = due_ns
-            self.parts.advance_to(due_ns)
+            self.parts.act_at(due_ns)
         self.now_ns = to_ns
 
     def write(self, register: str, value: int, size: int = 4, byte: int = 0) -> None:

@@ -1,0 +1,110 @@
+/* Characters that a USART sends one after the other: their ends, without Python.
+ *
+ * Python hands a transmission over before a run, where nobody hears the
+ * characters one by one, and takes it back with what was sent before it looks
+ * at anything (`native_streams.py`). Source: RM0008 27.3.2.
+ */
+#include "core.h"
+
+enum { SR = 0, BRR = 2, CR1 = 3, TDR = 8, SHIFT = 9 };
+enum { IDLE = 1 << 4, RXNE = 1 << 5, TC = 1 << 6, TXE = 1 << 7 };
+enum { SEVONPEND = 16, FIRST_IRQ = 16 };
+#define HELD 0x10000u
+#define WORD 0x1FFu
+#define NS_PER_S UINT64_C(1000000000)
+
+struct stream *core_stream(struct core *core, uint32_t number) { return &core->streams[number]; }
+
+/* Works out when the present character ends, and the first cycle from then on. */
+static void schedule(struct core *core, struct stream *stream)
+{
+    const struct time_base *time = &core->time;
+    const uint32_t baud = stream->words[BRR];
+    stream->due_ns = stream->base_ns +
+                     (uint64_t)((__uint128_t)stream->half_bits * baud * NS_PER_S / (2 * (uint64_t)stream->clock_hz));
+    const __uint128_t cycles = (__uint128_t)(stream->due_ns - time->base_ns) * time->frequency_hz;
+    stream->due_cycle = time->base_cycle + (uint64_t)((cycles + NS_PER_S - 1) / NS_PER_S);
+}
+
+static void find_next(struct core *core)
+{
+    core->stream_next = NO_TIME;
+    for (uint32_t n = 0; n < STREAMS; ++n) {
+        if (core->streams[n].due_cycle < core->stream_next) {
+            core->stream_next = core->streams[n].due_cycle;
+        }
+    }
+}
+
+/* Goes on with the transmissions that Python has filled in, those with `half_bits`. */
+void core_start_streams(struct core *core, uint32_t frequency_hz, uint64_t base_ns, uint64_t base_cycle)
+{
+    core->time = (struct time_base){base_ns, base_cycle, frequency_hz};
+    for (uint32_t n = 0; n < STREAMS; ++n) {
+        core->streams[n].sent_count = 0;
+        core->streams[n].due_cycle = NO_TIME;
+        if (core->streams[n].half_bits) {
+            schedule(core, &core->streams[n]);
+        }
+    }
+    find_next(core);
+    core->shared.unseen |= STREAMS_UNSEEN;
+}
+
+/* Python has them back. */
+void core_stop_streams(struct core *core)
+{
+    for (uint32_t n = 0; n < STREAMS; ++n) {
+        core->streams[n].half_bits = 0;
+        core->streams[n].due_cycle = NO_TIME;
+    }
+    core->stream_next = NO_TIME;
+}
+
+static void raise_line(struct core *core, uint32_t irq)
+{
+    struct shared *s = &core->shared;
+    if (s->levels >> irq & 1) {
+        return;
+    }
+    s->levels |= UINT64_C(1) << irq;
+    s->pending[(irq + FIRST_IRQ) / 64] |= UINT64_C(1) << (irq + FIRST_IRQ) % 64;
+    if (s->scr & SEVONPEND) {
+        s->event_register = 1;
+    }
+}
+
+static void end_character(struct core *core, struct stream *stream)
+{
+    uint32_t *words = stream->words;
+    if (words[SHIFT] & HELD) {
+        stream->sent[stream->sent_count++] = (struct sent){stream->due_ns, words[SHIFT] & WORD, 0};
+        if (stream->sent_count == SENT) {
+            core->shared.attention = 1;
+        }
+    }
+    words[SHIFT] = words[TDR];
+    words[TDR] = 0;
+    if (words[SHIFT]) {
+        words[SR] |= TXE;
+        stream->half_bits += stream->frame_half_bits;
+        schedule(core, stream);
+    } else {
+        words[SR] |= TC;
+        stream->due_cycle = NO_TIME;
+    }
+    if (words[SR] & words[CR1] & (TXE | TC | RXNE | IDLE)) {
+        raise_line(core, stream->irq);
+    }
+}
+
+/* Ends the characters whose time has come. */
+void end_characters(struct core *core)
+{
+    for (uint32_t n = 0; n < STREAMS; ++n) {
+        while (core->shared.cycle >= core->streams[n].due_cycle && core->streams[n].sent_count < SENT) {
+            end_character(core, &core->streams[n]);
+        }
+    }
+    find_next(core);
+}
