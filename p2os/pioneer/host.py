@@ -26,7 +26,8 @@ from p2os.pioneer.meeting import Meeting
 from p2os.pioneer.paced_line import PacedLine
 from p2os.pioneer.robot_time import SETTLE_NS, RobotTime
 from p2os.timing import NS_PER_S, Nanos
-from p2os.transport.ports import Listener, Transport
+from p2os.transport.hang_up import has_hung_up
+from p2os.transport.ports import READ_BYTES, Listener, Transport
 
 #: (robot's time in ns, what happened in a word or two, detail).
 HostEvent = Callable[[Nanos, str, str], None]
@@ -252,7 +253,10 @@ class Host:
 
     def _listen_to_client(self) -> bool:
         """Take what the client says; return whether it said something."""
-        if self._client is None or not self._hears():
+        if self._client is None:
+            return False
+        if not self._hears():
+            self._leave_who_has_gone(self._client)
             return False
         try:
             data = self._client.read()
@@ -265,7 +269,18 @@ class Host:
             self._bring(self.now)
             self._deliver(data, self.now)
             self._speak()
+        if len(data) == READ_BYTES and self._client is not None:  # more waits
+            self._leave_who_has_gone(self._client)
         return bool(data)
+
+    def _leave_who_has_gone(self, client: Transport) -> None:
+        """Drop a client that has left more bytes than could be heard so far: they are lost with its cable."""
+        with contextlib.suppress(TransportError):
+            if not has_hung_up(client.fileno()):
+                return
+            while client.read():
+                pass
+        self._drop_client(f"{client.description} left while its bytes were under way")
 
     def _drop_client(self, reason: str) -> None:
         if self._client is None:

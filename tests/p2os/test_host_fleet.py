@@ -20,7 +20,7 @@ from p2os.pioneer.host import MOST_WAITING, Host
 from p2os.pioneer.orders import obey
 from p2os.sip import SIP_KINDS
 from p2os.timing import NS_PER_MS, NS_PER_S
-from p2os.transport import Loops, Transport, listen_url, open_url
+from p2os.transport import Listener, Loops, Transport, listen_url, open_url
 from p2os.wire import Decoder, Frame
 
 #: A bound on every wait; reached only when something is broken.
@@ -53,16 +53,27 @@ def frames(line: Transport, decoder: Decoder) -> list[Frame]:
 class Looped:
     """A host on a line inside this process, with a clock that the test holds."""
 
-    def __init__(self, robot: Any, **host: Any) -> None:
+    def __init__(self, robot: Any, *, listener: Listener | None = None, **host: Any) -> None:
         self.loops, self.clock, self.told = Loops(), Clock(), list[str]()
         self.robot = robot
+        self.url = "loop:robot" if listener is None else listener.description
         self.host = Host(
-            robot.pioneer, self.loops.listen("robot"), clock=self.clock,
+            robot.pioneer, listener or self.loops.listen("robot"), clock=self.clock,
             on_event=lambda _now, what, detail: self.told.append(f"{what}: {detail}"), **host,
         )  # fmt: skip
-        self.line = open_url("loop:robot", loops=self.loops)
+        self.line = self.reopen()
         self.decoder = Decoder()
         self.host.turn(0)
+
+    def live(self, milliseconds: int) -> None:
+        """Let the host live while nobody listens."""
+        for _ in range(milliseconds):
+            self.clock.now += NS_PER_MS
+            self.host.turn(0)
+
+    def reopen(self) -> Transport:
+        """Come as a new client; a terminal is opened as the serial port that it looks like."""
+        return open_url(self.url.replace("pty:", "serial:"), loops=self.loops)
 
     def run(self, milliseconds: int) -> list[tuple[int, Frame]]:
         found = []
@@ -115,6 +126,42 @@ def test_a_flood_on_a_paced_line_waits_in_the_medium_not_in_memory(make_robot: C
     assert lines[0].waiting <= MOST_WAITING + 4096
     assert lines[1].waiting < 500
     looped.host.close()
+
+
+@pytest.mark.parametrize("url", ["loop:", "pty:", "tcp:127.0.0.1:0"])
+def test_who_floods_a_paced_line_and_vanishes_leaves_it_free_at_once(make_robot: Callable[..., Any], url: str) -> None:
+    """Megabytes wait in a socket, minutes at 9600 bit/s: the next client was refused till the last had come."""
+    made = Looped(make_robot(baud=9600), listener=None if url == "loop:" else listen_url(url))
+    made.open()
+    say(made.line, C.ENABLE, 1)
+    say(made.line, C.VEL, 200)
+    assert any(frame.kind == 0x33 for _, frame in made.run(500))
+    for _ in range(8):  # 7200 bytes: 7.5 s of such a line
+        made.line.write(Command(C.VEL, 200).to_frame().to_bytes() * 100)
+        made.run(1)
+    made.line.close()
+    made.live(50)
+    assert any("client gone" in told for told in made.told)
+    assert not made.robot.pioneer.state.motors_enabled
+    made.line = made.reopen()
+    made.decoder = Decoder()
+    made.run(50)
+    made.open()
+    assert made.robot.pioneer.state.open
+    made.line.close()
+    made.host.close()
+
+
+def test_who_floods_and_vanishes_is_not_obeyed_to_the_last_frame(make_robot: Callable[..., Any]) -> None:
+    """Seconds of frames may wait in a socket; a robot whose client has gone stands at once."""
+    made = Looped(make_robot())
+    made.open()
+    for _ in range(40):
+        made.line.write(Command(C.VEL, 200).to_frame().to_bytes() * 100)
+    made.line.close()
+    made.live(2)
+    assert any("client gone" in told for told in made.told)
+    made.host.close()
 
 
 def test_a_robot_lives_faster_than_the_clock_when_asked(make_robot: Callable[..., Any]) -> None:
