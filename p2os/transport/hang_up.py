@@ -4,7 +4,7 @@ import select
 
 
 def has_hung_up(descriptor: int) -> bool:
-    """Tell whether the other end is closed, though bytes may still wait to be read; False where a system cannot tell."""
+    """Tell whether the other end is closed, though bytes may still wait; False where a system cannot tell."""
     if not hasattr(select, "poll"):
         return False
     closed_for_writing: int = getattr(select, "POLLRDHUP", 0)  # Linux alone tells that of a socket
