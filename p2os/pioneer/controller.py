@@ -48,7 +48,7 @@ from p2os.pioneer.chance import Chance
 from p2os.pioneer.command_handlers import IGNORED, MOTION_COMMANDS, Effect, apply
 from p2os.pioneer.controller_state import ControllerSnapshot, ControllerState
 from p2os.pioneer.faults import read_fault
-from p2os.pioneer.faults_acting import Patient, break_now, mend_now
+from p2os.pioneer.faults_acting import Patient, break_now, broken_now, mend_now
 from p2os.pioneer.fresh import limits_of, new_rack
 from p2os.pioneer.guard import is_watching, look_at_bumpers
 from p2os.pioneer.live_inputs import apply_input
@@ -83,8 +83,7 @@ class Pioneer:
         settings: ControllerSettings | None = None,
         on_event: EventCallback | None = None,
     ) -> None:
-        self.parameters = parameters
-        self.body = body
+        self.parameters, self.body = parameters, body
         self.settings = settings or ControllerSettings()
         self.on_event = on_event
         self._body_now: Nanos = 0
@@ -135,6 +134,7 @@ class Pioneer:
             line_load_percent=self._sender.line.load_percent,
             baud=self._sender.line.baud,
             packets_dropped=works.requests.dropped + self._sender.lost,
+            broken=broken_now(works),
         )
 
     @property

@@ -27,6 +27,8 @@ class ControllerState:
     baud: int | None
     #: Extra packets and answers that found no room on the line, since the start.
     packets_dropped: int
+    #: The words of every fault that lasts.
+    broken: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

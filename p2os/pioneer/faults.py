@@ -12,6 +12,7 @@ own, so that a run with faults repeats.
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from difflib import get_close_matches
 
 from p2os.errors import UsageError
 from p2os.pioneer.chance import Chance
@@ -69,12 +70,15 @@ def read_fault(text: str, *, sonar: int, complete: bool = True) -> Fault:
     """
     name, *rest = text.split() or [""]
     if name not in FAULTS:
-        raise UsageError(f"no fault {name!r}", hint=f"faults: {', '.join(FAULTS)}")
+        close = get_close_matches(name, FAULTS, n=1)
+        hint = f"did you mean {close[0]}?" if close else f"faults: {', '.join(FAULTS)}"
+        raise UsageError(f"no fault {name!r}" if name else "which fault?", hint=hint)
     words = FAULTS[name][0]
     usage = " ".join([name, *words])
     optional = {"METRES", "RATE", "VOLTS"} if not complete else set()
     if len(rest) > len(words) or len(rest) < len([word for word in words if word not in optional]):
-        raise UsageError(f"{text!r} is no fault", hint=f"say {usage}")
+        what = "says too much" if len(rest) > len(words) else "is not all of it"
+        raise UsageError(f"{text!r} {what}", hint=f"say {usage}")
     found = Fault(name)
     for word, given in zip(words, rest, strict=False):
         found = _with(found, word, given, usage, sonar)

@@ -37,6 +37,25 @@ def mend_now(patient: Patient, fault: Fault) -> None:
     _MEND[fault.name](patient, fault)
 
 
+def broken_now(works: Works) -> tuple[str, ...]:
+    """Return the words of every fault that lasts, as `mend` takes them."""
+    faults, battery, pins = works.faults, works.rack.battery, works.rack.pins
+    found = [Fault(f"sonar-{kind}", number=n + 1, value=value) for n, (kind, value) in sorted(faults.sonar.items())]
+    sides = (("left", faults.left_blocked), ("right", faults.right_blocked))
+    found += [Fault("wheel-blocked", side=side) for side, is_blocked in sides if is_blocked]
+    if faults.is_loose:
+        found.append(Fault("loose-connector"))
+    if faults.bit_error_rate:
+        found.append(Fault("line-noise", value=faults.bit_error_rate))
+    if battery.pretended_decivolts is not None and not battery.is_test:
+        found.append(Fault("low-battery", value=battery.pretended_decivolts / 10))
+    if works.rack.switches.stop_button:
+        found.append(Fault("stop-button"))
+    for side, pressed in (("front", pins.front_pressed), ("rear", pins.rear_pressed)):
+        found += [Fault("bumper", side=side, number=bit + 1) for bit in range(7) if pressed >> bit & 1]
+    return tuple(fault.text for fault in found)
+
+
 def _sonar(patient: Patient, fault: Fault) -> None:
     patient.faults.sonar[fault.number - 1] = (fault.name.removeprefix("sonar-"), fault.value)
 

@@ -18,13 +18,16 @@ import select
 import time
 from collections.abc import Callable, Sequence
 from functools import partial
+from typing import cast
 
 from p2os.errors import TransportError
 from p2os.pioneer.aux_seat import AuxSeat
+from p2os.pioneer.body import RobotBody
 from p2os.pioneer.controller import Pioneer
 from p2os.pioneer.meeting import Meeting
 from p2os.pioneer.paced_line import PacedLine
 from p2os.pioneer.robot_time import SETTLE_NS, RobotTime
+from p2os.pioneer.world_orders import change_world
 from p2os.timing import NS_PER_S, Nanos
 from p2os.transport.hang_up import has_hung_up
 from p2os.transport.ports import READ_BYTES, Listener, Transport
@@ -75,8 +78,11 @@ class Host:
         self._on_event = on_event
         self._time = RobotTime(clock, speed) if shared is None else shared[0]
         self._bring: Callable[[Nanos], object] = self._advance_to
+        #: Who shares the robot's world, if anybody does.
+        self.meeting: Meeting | None = None
         if shared is not None:
             _, meeting, number = shared
+            self.meeting = meeting
             meeting.seats[number].advance_to = self._advance_to
             self._bring = partial(meeting.bring, number)
         self._client: Transport | None = None
@@ -180,6 +186,19 @@ class Host:
         """
         self._bring(self.now)
         self.pioneer.do(words, self.now)
+
+    def change_world(self, words: str) -> str:
+        """Change the world of the robot and of all that share it: an order of `world_orders`; return what was done.
+
+        Raises:
+            UsageError: The words mean nothing; nothing has changed then.
+            WorldError: There is no such thing, or it is part of the building.
+        """
+        if self.meeting is not None:
+            robots = [seat.presence.name for seat in self.meeting.seats]
+            return change_world(self.meeting.bodies_at(self.now), words, robots)
+        self._bring(self.now)
+        return change_world([cast("RobotBody", self.pioneer.body)], words)
 
     def _advance_to(self, limit: Nanos) -> None:
         """Let the robot live until `limit`, and hear what arrives by then on a line that takes its time."""

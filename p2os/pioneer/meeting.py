@@ -126,6 +126,14 @@ class Meeting:
         """The robots, the first first."""
         return tuple(seat.pioneer for seat in self.seats)
 
+    def bodies_at(self, now: Nanos) -> list[RobotBody]:
+        """Return every robot's body, all brought to a time, for what changes the world of all of them.
+
+        The robots themselves are not to be moved or removed by it.
+        """
+        self.advance_to(now)
+        return [seat.body for seat in self.seats]
+
     def next_deadline(self) -> Nanos | None:
         """Return when bytes of any robot will come out; None when never."""
         due = [at for seat in self.seats if (at := seat.pioneer.next_deadline()) is not None]

@@ -19,6 +19,8 @@ from p2os.pioneer.static_plan import Bands, StaticPlan
 
 #: The first ring of a search for the nearest wall beyond the hull; it is doubled until something is found, m.
 FIRST_RING_M = 2.0
+#: chosen: as many names as a line of help holds.
+NAMED = 12
 #: How far a pushed thing is kept from what pushes it, m.
 APART_M = 1e-6
 
@@ -98,7 +100,9 @@ class Plan:
             )
         if name not in self._obstacles:
             close = get_close_matches(name, self._obstacles, n=1)
-            raise WorldError(f"no obstacle {name!r}", hint=f"did you mean {close[0]!r}?" if close else None)
+            there = ", ".join(list(self._obstacles)[:NAMED]) or "nothing that can change"
+            hint = f"did you mean {close[0]!r}?" if close else f"there is {there}"
+            raise WorldError(f"no obstacle {name!r}", hint=hint)
         return self._obstacles[name]
 
     def clearance(self, x_m: float, y_m: float, heading_rad: float, *, no_more_than: float = INFINITY) -> float:

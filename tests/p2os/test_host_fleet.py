@@ -208,7 +208,7 @@ def test_orders_go_to_one_robot_or_all_and_are_answered(make_robot: Callable[...
     assert "12.6 V" in second
     assert any("sonar-stuck NUMBER METRES" in line for line in obey(hosts, "help"))
     assert obey(hosts, "3: status") == ["error: no robot '3'", "hint: robots: 1 to 2"]
-    assert obey(hosts, "dance")[0] == "error: no input 'dance'"
+    assert obey(hosts, "dance")[0] == "error: no order 'dance'"
 
 
 class Serving:
