@@ -45,6 +45,8 @@ unit: setup
 bench: setup
 	$(BIN)/python tools/bench_emulator.py
 	$(BIN)/python tools/bench_columns.py
+	$(BIN)/python tools/bench_bodies.py
+	$(BIN)/python tools/bench_pioneer.py
 	$(BIN)/python tools/bench_speed.py
 
 soak: setup

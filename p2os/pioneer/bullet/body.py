@@ -23,7 +23,7 @@ from typing import Any, cast
 from p2os.parameters import RobotParameters
 from p2os.pioneer.body import STEP_NS, BodyState, Turned
 from p2os.pioneer.bullet.building import add_building, melted
-from p2os.pioneer.bullet.engine import pybullet
+from p2os.pioneer.bullet.engine import pybullet, start_anew
 from p2os.pioneer.bullet.model import (
     HEARD,
     LEFT,
@@ -39,7 +39,6 @@ from p2os.pioneer.contacts import ContactCounter
 from p2os.pioneer.fan import Echo
 from p2os.pioneer.physical import (
     FLOOR_GROUP,
-    GRAVITY_MPS2,
     LOW_GROUP,
     PUSHED_M,
     SETTLE_STEPS,
@@ -55,11 +54,6 @@ from p2os.pioneer.static_plan import Bands, StaticPlan
 from p2os.pioneer.walk import Walker
 from p2os.timing import NS_PER_S, Nanos
 
-#: Where the solver ends its rounds. At Bullet's own 1e-7 a robot that stands turns by 74 urad a second and a line of
-#: 1 m is 0.11 mm off; at 1e-8, 23 urad and 0.04 mm, for a quarter of the speed; below, speed is lost faster (measured).
-RESIDUAL = 1e-8
-#: The share of a depth that is taken back in a step: what was put into a robot does not fling it away.
-EASED_OUT = 0.01
 #: Bullet keeps contact points a little apart; touching is no farther than this, m.
 TOUCH_M = 1e-4
 #: No point of the hull is faster than this: both rims at the highest ceiling of any model, against each other, m/s.
@@ -129,13 +123,7 @@ class BulletBody:
         its making on: a thing that was taken out is parked, not removed.
         """
         client = self._client
-        pybullet.resetSimulation(physicsClientId=client)
-        pybullet.setPhysicsEngineParameter(
-            fixedTimeStep=STEP_NS / NS_PER_S, deterministicOverlappingPairs=1, enableFileCaching=0,
-            solverResidualThreshold=RESIDUAL, contactERP=EASED_OUT,
-            physicsClientId=client,
-        )  # fmt: skip
-        pybullet.setGravity(0, 0, -GRAVITY_MPS2, physicsClientId=client)
+        start_anew(client)
         self._floors = {add_floor(self._world, client)}
         self._robot, self._centre = add_robot(self._parameters, pose, client)
         _, driven_on = add_building(self._world, client)
