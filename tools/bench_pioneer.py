@@ -41,7 +41,7 @@ def many_robots() -> None:
             robot.receive(command(C.PULSE), at)
             robot.take_output()
     used = time.process_time() - begin
-    print(f"{ROBOTS} robots turning, kinematic: {100 * used / LIVED_S:.0f} % of one core in real time (goal: below 100)")
+    print(f"{ROBOTS} robots turning, kinematic: {100 * used / LIVED_S:.0f} % of one core in real time (goal: < 100)")
 
 
 def one_served() -> None:
