@@ -41,6 +41,10 @@ AWAKE_WAIT_S = 0.1
 ASLEEP_WAIT_S = 0.5
 #: chosen: how often a line without a descriptor is asked for bytes; one millisecond is a character at 9600 bit/s.
 BLIND_POLL_S = 0.001
+#: chosen: no P2OS client says more than its line carries for so long; one that does, or that has left as much, goes.
+LONGEST_BEHIND_NS: Nanos = 5 * NS_PER_S
+#: chosen: 4 MB of a client that is dropped are read away, so that a terminal is clean for the next.
+MOST_READS_LOST = 1024
 #: chosen: a second of a 9600 baud line; a client that sends faster finds its own medium full.
 MOST_WAITING = 960
 
@@ -88,6 +92,8 @@ class Host:
         self._client: Transport | None = None
         self._settled_at: Nanos = 0
         self._baud = pioneer.baud
+        #: Since when more waits than could be heard at once.
+        self._behind_since: Nanos | None = None
         #: To the robot and from it.
         self._lines: tuple[PacedLine, PacedLine] | None = None
         if paced and self._baud is not None:
@@ -275,7 +281,7 @@ class Host:
         if self._client is None:
             return False
         if not self._hears():
-            self._leave_who_has_gone(self._client)
+            self._look_at_backlog(self._client)
             return False
         try:
             data = self._client.read()
@@ -288,23 +294,34 @@ class Host:
             self._bring(self.now)
             self._deliver(data, self.now)
             self._speak()
-        if len(data) == READ_BYTES and self._client is not None:  # more waits
-            self._leave_who_has_gone(self._client)
+        if len(data) < READ_BYTES:
+            self._behind_since = None
+        elif self._client is not None:  # more waits
+            self._look_at_backlog(self._client)
         return bool(data)
 
-    def _leave_who_has_gone(self, client: Transport) -> None:
-        """Drop a client that has left more bytes than could be heard so far: they are lost with its cable."""
+    def _look_at_backlog(self, client: Transport) -> None:
+        """Drop a client that has left more than could be heard so far, or that shouts for too long.
+
+        What a client has closed may still wait in its own machine, behind what it
+        had to say: then only its shouting tells. What it has said is lost.
+        """
+        if self._behind_since is None:
+            self._behind_since = self.now
         with contextlib.suppress(TransportError):
-            if not has_hung_up(client.fileno()):
+            is_gone = has_hung_up(client.fileno())
+            if not is_gone and self.now - self._behind_since < LONGEST_BEHIND_NS:
                 return
-            while client.read():
-                pass
-        self._drop_client(f"{client.description} left while its bytes were under way")
+            for _ in range(MOST_READS_LOST):
+                if not client.read():
+                    break
+        limit_s = LONGEST_BEHIND_NS // NS_PER_S
+        self._drop_client(f"{client.description} said more than can be heard for {limit_s} s, or left")
 
     def _drop_client(self, reason: str) -> None:
         if self._client is None:
             return
-        client, self._client = self._client, None
+        client, self._client, self._behind_since = self._client, None, None
         self._time.client_left()
         self._bring(self.now)
         if self._lines is not None:  # its last words still come

@@ -16,7 +16,7 @@ from p2os.commands import CommandNumber as C
 from p2os.pioneer.aux_seat import AuxSeat
 from p2os.pioneer.control_line import ControlLine
 from p2os.pioneer.fleet import Fleet
-from p2os.pioneer.host import MOST_WAITING, Host
+from p2os.pioneer.host import LONGEST_BEHIND_NS, MOST_WAITING, Host
 from p2os.pioneer.orders import obey
 from p2os.sip import SIP_KINDS
 from p2os.timing import NS_PER_MS, NS_PER_S
@@ -161,6 +161,21 @@ def test_who_floods_and_vanishes_is_not_obeyed_to_the_last_frame(make_robot: Cal
     made.line.close()
     made.live(2)
     assert any("client gone" in told for told in made.told)
+    made.host.close()
+
+
+def test_who_shouts_for_five_seconds_is_dropped_and_a_burst_is_not(make_robot: Callable[..., Any]) -> None:
+    """What a dead client's machine still holds hides that it is dead."""
+    made = Looped(make_robot(baud=9600))
+    made.open()
+    shout = Command(C.VEL, 200).to_frame().to_bytes() * 400
+    made.line.write(shout)  # 3600 bytes
+    made.live(4500)
+    made.line.write(shout * 5)
+    made.live(LONGEST_BEHIND_NS // NS_PER_MS - 100)
+    assert not any("client gone" in told for told in made.told)
+    made.live(200)
+    assert any("said more than can be heard" in told for told in made.told)
     made.host.close()
 
 
