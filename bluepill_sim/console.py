@@ -24,6 +24,7 @@ class SerialPort(Protocol):
     """What a console needs of a USART."""
 
     on_transmit: Callable[[int, int], None] | None
+    hears_late: bool
 
     def receive(self, data: bytes) -> None:
         """Take characters from outside."""
@@ -149,7 +150,7 @@ def open_console(where: str) -> Console:
 
 def connect(console: Console, port: SerialPort) -> Callable[[], None]:
     """Connect a console to a USART, and return the function that carries what was typed to the chip."""
-    port.on_transmit = console.write
+    port.on_transmit, port.hears_late = console.write, True
 
     def carry() -> None:
         data = console.poll()

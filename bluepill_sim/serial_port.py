@@ -53,12 +53,14 @@ class SerialPort:
         self.name = usart.name
         #: Called with (word, ns) at the end of each stop bit that goes out.
         self.on_transmit: WordListener | None = None
+        #: Whether `on_transmit` may be called later than that, for several characters together: cheaper.
+        self.hears_late = False
         #: More of the same: tools that look on.
         self.listeners: list[WordListener] = []
         #: What was sent and not yet taken.
         self.unread = bytearray()
         usart.on_transmit = self._transmitted
-        usart.is_heard = lambda: self.on_transmit is not None or bool(self.listeners)
+        usart.is_heard = self._is_heard
 
     def receive(self, data: bytes) -> None:
         """Send characters to the RX pin, at the speed of the line."""
@@ -88,6 +90,9 @@ class SerialPort:
         taken = bytes(self.unread[:end])
         del self.unread[:end]
         return taken
+
+    def _is_heard(self) -> bool:
+        return bool(self.listeners) or (self.on_transmit is not None and not self.hears_late)
 
     def _transmitted(self, word: int, at_ns: Nanos) -> None:
         self._activity.last_usart_ns = at_ns

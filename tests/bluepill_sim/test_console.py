@@ -16,6 +16,7 @@ class Port:
     """A USART for a console."""
 
     on_transmit: Callable[[int, int], None] | None = None
+    hears_late: bool = False
 
     def __init__(self) -> None:
         self.received = b""

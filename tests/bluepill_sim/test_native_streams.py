@@ -142,6 +142,17 @@ def test_who_listens_hears_each_character_at_its_time() -> None:
     assert {late for _, late in heard["native"]} == {0}
 
 
+def test_who_may_hear_late_hears_the_same() -> None:
+    heard: dict[str, list[tuple[int, int]]] = {"native": [], "python": []}
+    for core, words in heard.items():
+        board = make(streaming(200), core)
+        board.usart1.on_transmit = lambda word, at_ns, words=words: words.append((word, at_ns))
+        board.usart1.hears_late = True
+        board.advance_to(30_000_000)
+    assert heard["native"] == heard["python"]
+    assert len(heard["native"]) == 200
+
+
 def test_a_fork_in_the_middle_of_a_stream_goes_on_alike() -> None:
     native, python = make(streaming(), "native"), make(streaming(), "python")
     native.advance_to(3_456_789)
