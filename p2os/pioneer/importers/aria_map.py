@@ -27,6 +27,8 @@ DEFAULT_RESOLUTION_MM = 20
 POINT_CELL_MM = 50
 #: So many cells on either side of a line belong to it.
 BESIDE = range(-2, 3)
+#: chosen: cells on all lines together, 100 km of walls on the grid of points.
+MOST_LINE_CELLS = 2_000_000
 #: Cells of the finest grid that points are put on.
 MOST_CELLS = 50_000_000
 MARK_KINDS: Mapping[str, str] = {
@@ -62,7 +64,7 @@ class _Reader:
         self._counted = {"NumLines:": 0, "NumPoints:": 0}
 
     def read(self) -> World:
-        lines = read_text(self._path).splitlines()
+        lines = read_text(self._path).removeprefix("\ufeff").splitlines()
         if not lines or not lines[0].startswith("2D-Map"):
             raise WorldError(f"{self._path}:1: an ARIA map begins with 2D-Map")
         take: Callable[[str, int], None] = self._header
@@ -136,7 +138,10 @@ class _Reader:
         if not self._points:
             return
         size = max(self._resolution_mm, POINT_CELL_MM) if self._lines else self._resolution_mm
-        cells = {(round(x / size), round(y / size)) for x, y in self._points} - self._cells_at_lines(size)
+        at_lines = self._cells_at_lines(size)
+        seen = {(round(x / size), round(y / size)) for x, y in self._points}
+        # Points on lines and beside them are the same walls again.
+        cells = {(x, y) for x, y in seen if not any((x + i, y + j) in at_lines for i in BESIDE for j in BESIDE)}
         if not cells:
             return
         left, low = min(x for x, _ in cells), min(y for _, y in cells)
@@ -162,13 +167,16 @@ class _Reader:
             )
 
     def _cells_at_lines(self, size: int) -> set[tuple[int, int]]:
-        """Return the cells on lines and beside them: points there are the same walls again."""
+        """Return the cells on lines."""
+        length_mm = sum(math.dist(a, b) for a, b in self._lines) * 1000
+        if length_mm / size > MOST_LINE_CELLS:
+            raise WorldError(f"{self._path}: its lines are too long for points on a grid of {size} mm")
         found: set[tuple[int, int]] = set()
         for (ax, ay), (bx, by) in self._lines:
             steps = max(1, round(math.hypot(bx - ax, by - ay) * 1000 / size))
             for step in range(steps + 1):
                 x, y = (ax + (bx - ax) * step / steps) * 1000 / size, (ay + (by - ay) * step / steps) * 1000 / size
-                found |= {(round(x) + i, round(y) + j) for i in BESIDE for j in BESIDE}
+                found.add((round(x), round(y)))
         return found
 
     def _numbers(self, text: str, number: int, count: int) -> list[float]:

@@ -2,16 +2,16 @@
 
 Taken: `triangles`, `polylist`, `polygons` of every geometry that the scene shows,
 node transforms (`matrix`, `translate`, `rotate`, `scale`), instances of nodes.
-Left out: lines, splines, skins and morphs, materials, cameras, lights,
-animation, `lookat` and `skew`.
+Left out, and said: lines, strips and fans, polygons with holes, skins and morphs,
+cameras, lights, `lookat` and `skew`. Materials and animation need no word.
 """
 
 import math
 from collections.abc import Iterator
-from itertools import pairwise
 from pathlib import Path
 
 from p2os.errors import WorldError
+from p2os.pioneer.importers.polygon import triangulated
 from p2os.pioneer.importers.transform import IDENTITY, Transform, about_axis, after, apply, moved, scaled
 from p2os.pioneer.importers.xml_tree import Element, numbers, read_xml
 from p2os.pioneer.scenery import Triangle, Vertex
@@ -115,6 +115,8 @@ class _Reader:
             if faces.tag in SKIPPED_FACES:
                 self._skipped[f"COLLADA <{faces.tag}>"] = None
             if faces.tag in {"triangles", "polylist", "polygons"}:
+                if faces.first("ph") is not None:
+                    self._skipped["COLLADA <ph>: polygons with holes"] = None
                 self._faces(faces, sources, points_of, place)
 
     def _faces(
@@ -134,8 +136,10 @@ class _Reader:
         for polygon in self._polygons(faces, stride, offset):
             if not all(0 <= index < len(points) for index in polygon):
                 raise WorldError(f"{self._path}:{faces.line}: a face names a vertex that is not there")
-            first = polygon[0]
-            self._triangles += [(base + first, base + b, base + c) for b, c in pairwise(polygon[1:])]
+            corners = [self._vertices[base + index] for index in polygon]
+            self._triangles += [
+                (base + polygon[a], base + polygon[b], base + polygon[c]) for a, b, c in triangulated(corners)
+            ]
             if len(self._triangles) > MOST_TRIANGLES:
                 raise WorldError(f"{self._path}: more than {MOST_TRIANGLES} triangles", hint="decimate it first")
 
@@ -146,6 +150,8 @@ class _Reader:
         for element in faces.all("p"):
             indices = self._wholes(element)[offset::stride]
             if faces.tag == "polygons":
+                if len(indices) < 3:
+                    raise WorldError(f"{self._path}:{element.line}: a face is cut short")
                 yield indices
                 continue
             place = 0

@@ -179,7 +179,7 @@ class Collection:
 
     def add_thing(self, item: Obstacle) -> None:
         """Take an upright box or cylinder whose name no other has."""
-        if max(abs(item.x_m), abs(item.y_m), item.reach_m) > FARTHEST_M:
+        if max(abs(item.x_m), abs(item.y_m), item.reach_m, abs(item.base_m), item.height_m) > FARTHEST_M:
             raise WorldError(f"{self.path}: {item.name!r} is farther out than {FARTHEST_M:g} m")
         self.obstacles.append(item)
         if len(self.obstacles) > MOST_THINGS:

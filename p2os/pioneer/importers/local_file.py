@@ -38,6 +38,8 @@ def find_local(uri: str, beside: Path) -> Path:
 
 
 def _sized(path: Path) -> Path:
+    if not path.is_file() and not path.is_dir():
+        raise WorldError(f"{path}: neither a file nor a folder", hint="a pipe or a device is not read")
     if path.is_file() and path.stat().st_size > LARGEST_FILE_BYTES:
         raise WorldError(f"{path}: larger than {LARGEST_FILE_BYTES >> 20} MiB", hint="make it simpler first")
     return path

@@ -8,11 +8,11 @@ it, an STL as Z up; COLLADA says both.
 import struct
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from itertools import pairwise
 from pathlib import Path
 
 from p2os.errors import WorldError
 from p2os.pioneer.importers.placing import with_z_up
+from p2os.pioneer.importers.polygon import triangulated
 from p2os.pioneer.scenery import Triangle, Vertex
 
 #: Of a binary STL: a header of 80 bytes, a count, then 50 bytes a triangle.
@@ -51,9 +51,13 @@ def read_triangles(path: Path, up: str = "auto") -> Triangles:
 def _read_obj(path: Path) -> tuple[Triangles, str]:
     found = Triangles()
     left_out: set[str] = set()
-    text = path.read_text(encoding="utf-8", errors="replace").replace("\\\n", " ")
+    text = path.read_text(encoding="utf-8-sig", errors="replace")
+    joined = ""
     for number, line in enumerate(text.split("\n"), start=1):
-        words = line.split()
+        if line.rstrip("\r").endswith("\\"):  # goes on in the next line
+            joined += line.rstrip("\r")[:-1] + " "
+            continue
+        words, joined = (joined + line).split(), ""
         if not words or words[0].startswith("#"):
             continue
         try:
@@ -61,8 +65,9 @@ def _read_obj(path: Path) -> tuple[Triangles, str]:
                 x, y, z = (float(word) for word in words[1:4])
                 found.vertices.append((x, y, z))
             elif words[0] == "f":
-                corners = [_index(word, len(found.vertices)) for word in words[1:]]
-                found.triangles += [(corners[0], b, c) for b, c in pairwise(corners[1:])]
+                corners = _corners(words[1:], len(found.vertices))
+                pieces = triangulated([found.vertices[corner] for corner in corners])
+                found.triangles += [(corners[a], corners[b], corners[c]) for a, b, c in pieces]
         except (ValueError, IndexError) as error:
             raise WorldError(f"{path}:{number}: {' '.join(words[:6])!r} cannot be read") from error
         if len(found.triangles) > MOST_TRIANGLES or len(found.vertices) > MOST_VERTICES:
@@ -71,6 +76,13 @@ def _read_obj(path: Path) -> tuple[Triangles, str]:
             left_out.add(words[0])
     found.skipped += [f"OBJ statement {word!r} (curves, lines and points are no walls)" for word in sorted(left_out)]
     return found, "y"
+
+
+def _corners(words: list[str], count: int) -> list[int]:
+    """Return the vertices of a face."""
+    if len(words) < 3:
+        raise IndexError(words)
+    return [_index(word, count) for word in words]
 
 
 def _index(word: str, count: int) -> int:
@@ -100,8 +112,8 @@ def _read_stl_text(path: Path, data: bytes) -> Triangles:
     corners: list[Vertex] = []
     facet: list[Vertex] = []
     ended = False
-    for number, line in enumerate(data.decode("ascii", "replace").split("\n"), start=1):
-        words = line.split()
+    for number, line in enumerate(data.decode("ascii", "replace").splitlines(), start=1):
+        words = line.lower().split()
         if not words:
             continue
         if words[0] == "vertex":

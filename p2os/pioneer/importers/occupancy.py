@@ -91,8 +91,9 @@ def _settings(path: Path) -> _Settings:
         mark = getattr(error, "problem_mark", None)
         line = f":{mark.line + 1}" if mark is not None else ""
         raise WorldError(f"{path}{line}: {getattr(error, 'problem', None) or 'the file is not YAML'}") from error
-    except (ValueError, RecursionError) as error:
-        raise WorldError(f"{path}: the file is not YAML") from error
+    except (ValueError, LookupError, TypeError, AttributeError, RecursionError) as error:
+        # What the library raises where a tag and its value do not fit: `!!int ''`, `!!bool maybe`, `!!timestamp x`.
+        raise WorldError(f"{path}: a value does not fit its tag", hint="plain numbers and words need no tag") from error
     if not isinstance(table, Mapping) or "image" not in table:
         raise WorldError(f"{path}: no map: it names no image", hint=f"a map has {', '.join(KEYS)}")
     origin = table.get("origin")
@@ -100,7 +101,7 @@ def _settings(path: Path) -> _Settings:
         raise WorldError(f"{path}: origin must be [x, y, yaw]", hint="metres and radians")
     mode = table.get("mode", "trinary")
     if mode not in MODES:
-        raise WorldError(f"{path}: mode = {mode!r} is unknown", hint=f"one of {', '.join(MODES)}")
+        raise WorldError(f"{path}: mode = {_shown(mode)} is unknown", hint=f"one of {', '.join(MODES)}")
     if not isinstance(table["image"], str):
         raise WorldError(f"{path}: image must name a file")
     x, y, yaw = (_number(path, "origin", value, -FARTHEST_M, FARTHEST_M) for value in origin)
@@ -117,8 +118,17 @@ def _settings(path: Path) -> _Settings:
 
 def _number(path: Path, key: str, value: object, least: float, most: float) -> float:
     if isinstance(value, bool) or not isinstance(value, (int, float)) or not least <= value <= most:
-        raise WorldError(f"{path}: {key} = {value!r:.40} must be a number from {least:g} to {most:g}")
+        raise WorldError(f"{path}: {key} = {_shown(value)} must be a number from {least:g} to {most:g}")
     return float(value)
+
+
+def _shown(value: object) -> str:
+    """Return a value for a message; YAML's anchors make small files of huge values, which are not written out."""
+    if isinstance(value, str):
+        return f"{value[:40]!r}"
+    if isinstance(value, int) and abs(value) > MOST_PIXELS:
+        return "a huge number"
+    return f"{value!r}" if value is None or isinstance(value, (int, float)) else f"a {type(value).__name__}"
 
 
 def _image(settings: _Settings) -> tuple[int, int, bytes]:

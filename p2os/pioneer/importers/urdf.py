@@ -30,8 +30,9 @@ def read(path: Path, up: str) -> World:
     parents = {_ends(joint, "child", path): joint for joint in joints}
     if any(joint.get("type") not in {"fixed", ""} for joint in joints):
         collection.skip("that joints move: each stands at its zero")
+    places: dict[str, Transform] = {}
     for link in root.all("link"):
-        place = _place(link.get("name"), parents, path)
+        place = _place(link.get("name"), parents, places, path)
         shown = link.all("collision") or link.all("visual")
         for number, shape in enumerate(shown):
             geometry = shape.first("geometry")
@@ -42,17 +43,17 @@ def read(path: Path, up: str) -> World:
     return collection.world()
 
 
-def _place(link: str, parents: dict[str, Element], path: Path) -> Transform:
-    """Return where a link is, from its chain of joints."""
-    place = IDENTITY
-    seen = {link}
-    while link in parents:
-        joint = parents[link]
-        place = after(_origin(joint, path), place)
-        link = _ends(joint, "parent", path)
-        if link in seen:
-            raise WorldError(f"{path}:{joint.line}: the joints go round in a ring at link {link!r}")
-        seen.add(link)
+def _place(link: str, parents: dict[str, Element], places: dict[str, Transform], path: Path) -> Transform:
+    """Return where a link is, from its chain of joints; `places` keeps what is known of other links."""
+    chain: dict[str, Element] = {}
+    while link in parents and link not in places:
+        chain[link] = parents[link]
+        link = _ends(parents[link], "parent", path)
+        if link in chain:
+            raise WorldError(f"{path}:{chain[link].line}: the joints go round in a ring at link {link!r}")
+    place = places.get(link, IDENTITY)
+    for child, joint in reversed(chain.items()):
+        place = places[child] = after(place, _origin(joint, path))
     return place
 
 
