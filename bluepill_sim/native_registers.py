@@ -66,11 +66,16 @@ class SharedPorts:
         self._ports.append((gpio, port))
 
     def take_over(self) -> None:
-        """Do what C has done to pins, before anybody looks at them."""
-        shared, bank = self._engine.shared, self._bank
-        if shared.unseen & UNSEEN:
+        """Do what C has done to pins and USARTs, before anybody looks at them."""
+        shared = self._engine.shared
+        unseen, shared.unseen = shared.unseen, 0
+        if unseen & ~UNSEEN:
+            self._take_pins_over()
+        if unseen & UNSEEN:
             self.streams.take_back()
-        shared.unseen = 0
+
+    def _take_pins_over(self) -> None:
+        bank = self._bank
         for take in bank.bulk_takers:
             take()
         library().core_drop_pins(self._engine.state)
@@ -82,7 +87,7 @@ class SharedPorts:
                 gpio.repeat_outputs(changed)
         bank.on_output, bank.wire_listeners = on_output, wire_listeners
         if bank.on_silent_output is not None:
-            bank.on_silent_output(self._ns_of(shared.last_pin_cycle))
+            bank.on_silent_output(self._ns_of(self._engine.shared.last_pin_cycle))
 
     def mark(self) -> None:
         """Tell C which pins are simple and who listens, before a run."""

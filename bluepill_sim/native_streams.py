@@ -74,9 +74,11 @@ class SharedStreams:
         return True
 
     def take_back(self) -> None:
-        """Take all of them back, and pass on what was sent."""
+        """Take all of them back, then pass on what was sent."""
         given, self._given = self._given, []
+        sent = [(usart, [(one.word, one.ns) for one in stream.sent[: stream.sent_count]]) for usart, stream in given]
         for usart, stream in given:
-            sent = [(one.word, one.ns) for one in stream.sent[: stream.sent_count]]
-            usart.take_stream_back(stream.half_bits, sent)
+            usart.take_stream_back(stream.half_bits)
         library().core_stop_streams(self._engine.state)
+        for usart, words in sent:
+            usart.tell_sent(words)

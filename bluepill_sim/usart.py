@@ -171,11 +171,14 @@ class Usart(Peripheral):
         self.due_ns = None
         return self._tx_base_ns, self._tx_half_bits, self._frame_half_bits(), self._clock_hz
 
-    def take_stream_back(self, half_bits: int, sent: list[tuple[int, int]]) -> None:
-        """Go on with a transmission `half_bits` after its start, of which (word, ns) have gone out meanwhile."""
+    def take_stream_back(self, half_bits: int) -> None:
+        """Go on with a transmission `half_bits` after its start."""
         self._tx_half_bits = half_bits
         self._schedule()
-        for word, at_ns in sent:
+
+    def tell_sent(self, words: list[tuple[int, int]]) -> None:
+        """Tell of characters (word, ns) that have gone out meanwhile."""
+        for word, at_ns in words:
             self._emit(word, at_ns)
 
     # For the chip.

@@ -153,6 +153,21 @@ def test_who_may_hear_late_hears_the_same() -> None:
     assert len(heard["native"]) == 200
 
 
+def test_a_listener_that_fails_loses_no_time_of_the_line() -> None:
+    board, twin = make(streaming(), "native"), make(streaming(), "native")
+
+    def fail(_word: int, _at_ns: int) -> None:
+        raise RuntimeError("the far end is gone")
+
+    board.usart1.on_transmit, board.usart1.hears_late = fail, True
+    with pytest.raises(RuntimeError, match="gone"):
+        board.advance_to(3_000_000)
+    board.usart1.on_transmit = None
+    for one in (board, twin):
+        one.advance_to(8_000_000)
+    assert state(board) == state(twin)
+
+
 def test_a_fork_in_the_middle_of_a_stream_goes_on_alike() -> None:
     native, python = make(streaming(), "native"), make(streaming(), "python")
     native.advance_to(3_456_789)
