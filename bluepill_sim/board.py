@@ -86,6 +86,7 @@ class BluePill:
         chip.boot_address = self._boot_address
         chip.pins.on_output = self._pin_changed
         chip.pins.is_heard = lambda: self.on_pin is not None or bool(self.pin_listeners)
+        chip.pins.is_fed = lambda pin: any(port.listens_at(pin.name) for port in self._usarts)
         chip.pins.on_silent_output = self._pins_changed_silently
         chip.pins["PC13"].board_pull = PinDrive.PULL_UP
         chip.pins["PB2"].board_pull = PinDrive.PULL_DOWN

@@ -15,11 +15,12 @@ time of the accessing instruction.
 from collections.abc import Callable
 from typing import cast
 
-from bluepill_sim.block_cost import Block, measure_block
+from bluepill_sim.block_cost import NO_BLOCK, Block, measure_block
 from bluepill_sim.bus import PERIPHERAL_BYTES, PeripheralBus, SramBitBand
 from bluepill_sim.clocks import Clocks
-from bluepill_sim.cpu import BlockRecorder
+from bluepill_sim.cpu import GENERAL, BlockRecorder
 from bluepill_sim.cycle_clock import CycleClock
+from bluepill_sim.forced_bits import forced_bits
 from bluepill_sim.memory import Memory
 from bluepill_sim.native_processor import make_core
 from bluepill_sim.native_registers import share_registers
@@ -41,6 +42,8 @@ from bluepill_sim.timing import Nanos, Reached, Reason
 #: Bit-band alias regions (RM0008 3.3.2) and how many alias bytes there are for each byte.
 SRAM_ALIAS, PERIPHERAL_ALIAS = 0x2200_0000, 0x4200_0000
 _ALIAS_BYTES = 32
+#: The upper byte of the first halfword of a 32-bit instruction is this or more.
+_FIRST_WIDE_BYTE = 0xE8
 
 #: Takes a message, its key, and the address of the instruction that caused it.
 WarningListener = Callable[[str, str, int], None]
@@ -250,9 +253,9 @@ class Chip:
         if name == "event":
             self.processor.send_event()
 
-    def warn(self, message: str, *, once: str) -> None:
+    def warn(self, message: str, *, once: str, pc: int | None = None) -> None:
         """Pass on a warning."""
-        self._on_warning(message, once, self.engine.access_pc)
+        self._on_warning(message, once, self.engine.access_pc if pc is None else pc)
 
     # Snapshots.
 
@@ -344,8 +347,20 @@ class Chip:
         engine.map_io(SRAM_ALIAS, SRAM_BYTES * _ALIAS_BYTES, bits.read_bit, bits.write_bit)
         engine.map_io(PPB_BASE, PPB_BYTES, self.system.read, self.system.write)
         self._streams = share_registers(self, self.parts.by_name.values(), self.parts.rcc)
+        self.pins.written_by = self._written_by
         engine.on_read_only_write = self._write_flash
         engine.on_read_only_written = self._repair_flash
+
+    def _written_by(self, address: int) -> tuple[int, int]:
+        """Return which bits of the word at an address the running store means, and where it stands."""
+        engine, memory = self.engine, self.memory
+        pc = engine.access_pc
+        start = pc if engine.block is NO_BLOCK else engine.block.start
+        second = memory.read(pc, 2)
+        is_wide = second is not None and second[1] >= _FIRST_WIDE_BYTE
+        code = memory.read(start, pc - start + (4 if is_wide else 2)) or b""
+        registers = [engine.registers[register] for register in GENERAL[:15]]
+        return forced_bits(code, registers, address, memory.read), pc
 
     def _write_flash(self, address: int, size: int, value: int) -> bool:
         """Take a write of the core to the flash array: its controller decides; False: no flash is there."""

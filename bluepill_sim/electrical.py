@@ -1,4 +1,4 @@
-"""What is wrong with a wire, in words: drivers that fight, shorts, too many volts.
+"""What is wrong with a wire, in words: drivers that fight, shorts, too many volts, inputs that float.
 
 The pins know levels, not currents; what they can tell is told here. Each
 complaint is a warning, once a pin, with the program's place.
@@ -9,6 +9,7 @@ Source: data sheet DS5319 tables 5 and 6 (pin definitions, absolute maximum rati
 Invariant: these functions only read.
 """
 
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
@@ -39,6 +40,13 @@ def contention(pin: "Pin") -> str:
     """Return what to say of two drivers that fight."""
     outside = "high" if pin.driven else "low"
     return f"{pin.name}: two drivers fight: the chip drives it {pin.output.value}, the other end {outside}"
+
+
+def floating_inputs(names: Sequence[str]) -> str:
+    """Return what to say of inputs that nobody drives."""
+    one = len(names) == 1
+    what, they = ("floating input", "it reads") if one else ("floating inputs", "they read")
+    return f"{', '.join(names)}: {what} that nobody drives: {they} 0 here and anything on a board; configured"
 
 
 def short_circuit(pin: "Pin", rail: str) -> str:

@@ -154,6 +154,9 @@ class Pin:
             self._outside = outside
             self._bank.simple_is_known = False
             self._resolve()
+            if outside is None:
+                for listener in self._bank.release_listeners:
+                    listener(self)
 
     def short(self, rail: str | None) -> None:
         """Tie the wire to a supply rail, as a solder bridge does; None cuts it again.
@@ -295,8 +298,7 @@ class Pin:
 
     def _derive(self) -> None:
         """Work out `_drives` and `_reads`, by RM0008 table 20."""
-        self._bank.simple_is_known = False
-        mode = self._mode
+        self._bank.simple_is_known, mode = False, self._mode
         self._reads = mode is not PinMode.ANALOG and self._holder is None
         if self._holder is not None:
             self._drives = (self._holder[1],) * 2
@@ -386,6 +388,12 @@ class PinBank:
         self.route_listeners: list[Callable[[], None]] = []
         #: AFIO_MAPR by function, such as {"USART1": 1}; a function that is missing is not remapped.
         self.remaps: dict[str, int] = {}
+        #: Called with each pin that the outside lets go.
+        self.release_listeners: list[Callable[[Pin], None]] = []
+        #: Returns which bits of a register's word the running store means, and where it stands.
+        self.written_by: Callable[[int], tuple[int, int]] = lambda _address: (0, 0)
+        #: Tells whether somebody speaks to a pin in characters, not in levels.
+        self.is_fed: Callable[[Pin], bool] = lambda _pin: False
         #: The port that feeds each EXTI line 0 to 15 (AFIO_EXTICR); the list stays the same for ever.
         self.exti_ports: list[str] = ["A"] * 16
 

@@ -61,6 +61,9 @@ class ChipPorts(Protocol):
         """Tell the core of a happening by name: "event" sets the event register that WFE waits for."""
         ...
 
-    def warn(self, message: str, *, once: str) -> None:
-        """Warn of what the firmware does wrong, or of what is not modelled; once for each key."""
+    def warn(self, message: str, *, once: str, pc: int | None = None) -> None:
+        """Warn of what the firmware does wrong, or of what is not modelled; once for each key.
+
+        With `pc`: of what the instruction there did; else it is the one that runs.
+        """
         ...

@@ -10,7 +10,7 @@ from typing import Protocol
 
 from bluepill_sim.durations import Span
 from bluepill_sim.timing import Nanos
-from bluepill_sim.usart import Usart
+from bluepill_sim.usart import CR1, PINS, RE, UE, Usart
 
 #: chosen: six seconds of a line at 115200; older ones are forgotten.
 KEPT_BYTES = 64 * 1024
@@ -65,6 +65,13 @@ class SerialPort:
     def receive(self, data: bytes) -> None:
         """Send characters to the RX pin, at the speed of the line."""
         self._usart.receive(data)
+
+    def listens_at(self, pin: str) -> bool:
+        """Tell whether the receiver is on and takes its characters from a pin: those of `receive`, or its level."""
+        usart = self._usart
+        is_on = usart.words[CR1] & (UE | RE) == UE | RE
+        pins = PINS[usart.name].get(usart.chip.pins.remaps.get(usart.name, 0))
+        return is_on and pins is not None and pins[1] == pin
 
     def read(self) -> bytes:
         """Return what was sent and not yet taken, and take it."""

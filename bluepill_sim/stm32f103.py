@@ -199,11 +199,11 @@ class ChipParts:
         return cast("Usart", self.by_name[f"USART{number}"])
 
     def reset(self, cause: ResetCause) -> None:
-        """Reset every peripheral."""
+        """Reset every peripheral; the clocks first, so that nobody takes the old ones for too fast."""
+        self.rcc.reset(cause)
         for part in self.by_name.values():
             if part is not self.rcc:
                 part.reset()
-        self.rcc.reset(cause)
 
     def clock_changed(self) -> None:
         """Tell every peripheral that the frequencies have changed."""

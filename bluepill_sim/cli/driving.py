@@ -11,12 +11,23 @@ from dataclasses import dataclass
 from bluepill_sim.board import BluePill
 from bluepill_sim.durations import to_nanos
 from bluepill_sim.errors import BluePillError
+from bluepill_sim.pins import Pin
 from bluepill_sim.sight.last_blocks import title_of
 from bluepill_sim.timing import NS_PER_S, Nanos, Reached, Reason
 from bluepill_sim.waiting import WaitError
 
-_LEVELS = {"0": False, "1": True, "low": False, "high": True, "z": None}
-_HINT = "PIN=LEVEL@TIME with a level of 0, 1 or z, such as PA6=1@3.5s"
+#: What a level's word does to a pin; "gnd" and "3v3" are solder bridges.
+_LEVELS: dict[str, Callable[[Pin], None]] = {
+    "0": lambda pin: pin.drive(0),
+    "1": lambda pin: pin.drive(1),
+    "low": lambda pin: pin.drive(0),
+    "high": lambda pin: pin.drive(1),
+    "5v": lambda pin: pin.drive(1, volts=5.0),
+    "z": lambda pin: pin.drive(None),
+    "gnd": lambda pin: pin.short("GND"),
+    "3v3": lambda pin: pin.short("3V3"),
+}
+_HINT = "PIN=LEVEL@TIME with a level of 0, 1, z, 5V, GND or 3V3, such as PA6=1@3.5s"
 
 
 class OverBudgetError(BluePillError):
@@ -25,13 +36,14 @@ class OverBudgetError(BluePillError):
     exit_code = 1
 
 
-@dataclass(frozen=True, slots=True, order=True)
+@dataclass(frozen=True, slots=True)
 class Change:
     """A level put on a pin from outside, at a time."""
 
     at_ns: Nanos
     pin: str
-    level: bool | None
+    #: One of the words that `--drive` knows.
+    level: str
 
 
 def parse_changes(texts: Sequence[str], board: BluePill) -> list[Change]:
@@ -52,7 +64,7 @@ def parse_changes(texts: Sequence[str], board: BluePill) -> list[Change]:
             is_bonded = False
         if not is_bonded:
             raise BluePillError(f"--drive {text!r}: the chip has no leg {name.upper()}", hint=_HINT)
-        changes.append(Change(to_nanos(at) if at else 0, name.upper(), _LEVELS[level.lower()]))
+        changes.append(Change(to_nanos(at) if at else 0, name.upper(), level.lower()))
     return sorted(changes, key=lambda change: change.at_ns)
 
 
@@ -93,7 +105,7 @@ class Schedule:
     def _act(self, now_ns: Nanos) -> None:
         while self._left and self._left[-1].at_ns <= now_ns:
             change = self._left.pop()
-            self._board.pin(change.pin).drive(change.level)
+            _LEVELS[change.level](self._board.pin(change.pin))
 
 
 def run_driven(board: BluePill, end_ns: Nanos, changes: Sequence[Change]) -> Reached:

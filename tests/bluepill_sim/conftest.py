@@ -61,7 +61,7 @@ class FakeChip:
     def signal(self, name: str) -> None:
         self.signals.append(name)
 
-    def warn(self, message: str, *, once: str) -> None:
+    def warn(self, message: str, *, once: str, pc: int | None = None) -> None:  # noqa: ARG002 - there is no program
         self.warnings.setdefault(once, message)
 
     # For the tests.

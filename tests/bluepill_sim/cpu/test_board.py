@@ -35,7 +35,22 @@ def test_the_example_programs_boot_and_idle_without_a_warning(name: str) -> None
     board = BluePill(FOLDER / f"{name}.elf")
     text = bytearray()
     board.usart1.on_transmit = lambda word, _at: text.append(word)
-    for signal in ("PA4", "PA5", "PA6", "PA7", "PB0", "PB1", "PB10", "PB11", "PB4", "PB3", "PB15", "PC13"):
+    for signal in (
+        "PA4",
+        "PA5",
+        "PA6",
+        "PA7",
+        "PB0",
+        "PB1",
+        "PB10",
+        "PB11",
+        "PB4",
+        "PB3",
+        "PB15",
+        "PC13",
+        "PC14",
+        "PC15",
+    ):
         board.pin(signal).drive(False)
     assert board.advance_to(200_000_000).reason is Reason.DEADLINE
     assert board.warnings == []

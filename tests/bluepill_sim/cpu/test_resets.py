@@ -1,7 +1,10 @@
 """Resets, their causes, and where a program starts."""
 
+from importlib.resources import files
+
 import pytest
 
+from bluepill_sim.board import BluePill
 from bluepill_sim.rcc import ResetCause
 from bluepill_sim.timing import Reason
 
@@ -13,6 +16,17 @@ START_IWDG = f"mov32 r1, #{IWDG_KR}\nmov32 r2, #0xCCCC\nstr r2, [r1, #0]\n"
 
 def store(address: int, value: int) -> str:
     return f"mov32 r1, #{address}\nmov32 r2, #{value}\nstr r2, [r1, #0]\n"
+
+
+def test_a_reset_at_full_speed_is_nothing_to_warn_of() -> None:
+    board = BluePill(str(files("testbench.firmware") / "dodge.elf"))
+    board.chip.pins.is_fed = lambda _pin: True
+    board.run_for("10 ms")
+    assert board.hclk_hz == 72_000_000
+    board.reset()
+    assert board.hclk_hz == 8_000_000
+    board.run_for("10 ms")
+    assert board.warnings == []
 
 
 def test_a_reset_by_software_starts_the_program_again(boot) -> None:
