@@ -175,9 +175,8 @@ ldr r2, [r1, #0]
 mov32 r1, #0x40010800
 mov32 r2, #0x44424444
 str r2, [r1, #0]
-turn: mov32 r2, #0x10
+mov32 r2, #0x10
 str r2, [r1, #16]
-mov32 r2, #0x100000
-str r2, [r1, #16]
-b turn
+sleep: wfi
+b sleep
 """
