@@ -12,6 +12,7 @@ Invariant: `level(at)` depends on the drives stamped at or before `at` only, not
 on the order in which different owners told of them.
 """
 
+from bisect import bisect_right
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from enum import Enum
@@ -150,8 +151,7 @@ class Net:
         """Drop what no reader at or after `limit` can see; return True where later drives are still remembered."""
         later = False
         for history in self._drives.values():
-            while len(history) > 1 and history[1][0] <= limit:
-                del history[0]
+            del history[: bisect_right(history, limit, lo=1, key=_time_of) - 1]
             later = later or history[-1][0] > limit
         return later
 
@@ -233,10 +233,14 @@ class OwnedPins:
 
 
 def _at(history: list[tuple[Nanos, Drive]], at: Nanos) -> Drive:
-    for time, drive in reversed(history):
-        if time <= at:
-            return drive
-    return RELEASED
+    if not history or history[-1][0] <= at:
+        return history[-1][1] if history else RELEASED
+    place = bisect_right(history, at, key=_time_of)
+    return history[place - 1][1] if place else RELEASED
+
+
+def _time_of(item: tuple[Nanos, Drive]) -> Nanos:
+    return item[0]
 
 
 def _is_hard(drive: Drive) -> bool:
