@@ -10,72 +10,24 @@ change of `output` is told to `PinBank.on_output` once, with its exact time.
 """
 
 from collections.abc import Callable, Iterator
-from enum import Enum
-from typing import Protocol, Self, TypeAlias
+from typing import Protocol, TypeAlias
 
 from bluepill_sim.electrical import RAILS, contention, overvoltage, short_circuit
+from bluepill_sim.pin_modes import (
+    ALTERNATE_MODES,
+    DRIVES_BY_VALUE,
+    INPUT_MODES,
+    MODES_BY_VALUE,
+    PinDrive,
+    PinMode,
+)
+
+__all__ = ["ALTERNATE_MODES", "INPUT_MODES", "Pin", "PinBank", "PinDrive", "PinMode", "PinPorts", "PinSnapshot"]
 
 #: Level of the outside driver, mode, ODR bit, holder (owner, drive), connections, watched, output, level, rail.
 PinSnapshot: TypeAlias = tuple[
     bool | None, str, bool, tuple[str, str] | None, tuple[tuple[str, bool], ...], bool, str, bool, str | None
 ]
-
-
-class PinDrive(Enum):
-    """What the chip itself puts on a wire."""
-
-    #: The level that it makes when nobody stronger drives; None: none.
-    level: bool | None
-    #: Whether it is stronger than any pull.
-    is_strong: bool
-
-    def __new__(cls, label: str, level: bool | None, is_strong: bool) -> Self:
-        """Make a member whose value is its label."""
-        member = object.__new__(cls)
-        member._value_ = label
-        member.level, member.is_strong = level, is_strong
-        return member
-
-    #: Nothing: the chip listens, or has the pin in analog mode.
-    NONE = "none", None, False
-    #: Strong 0.
-    LOW = "low", False, True
-    #: Strong 1.
-    HIGH = "high", True, True
-    #: Weak 1 (about 40 kΩ).
-    PULL_UP = "pull-up", True, False
-    #: Weak 0 (about 40 kΩ).
-    PULL_DOWN = "pull-down", False, False
-
-
-class PinMode(Enum):
-    """What GPIOx_CRL/CRH make of a pin."""
-
-    #: What the chip drives for a 0 and for a 1: the ODR bit, or the level of the alternate function.
-    drives: tuple[PinDrive, PinDrive]
-
-    def __new__(cls, label: str, low: PinDrive, high: PinDrive) -> Self:
-        """Make a member whose value is its label."""
-        member = object.__new__(cls)
-        member._value_ = label
-        member.drives = (low, high)
-        return member
-
-    #: Schmitt trigger off: reads 0.
-    ANALOG = "analog", PinDrive.NONE, PinDrive.NONE
-    FLOATING = "floating input", PinDrive.NONE, PinDrive.NONE
-    #: Input with the pull that the ODR bit chooses.
-    PULLED = "pulled input", PinDrive.PULL_DOWN, PinDrive.PULL_UP
-    PUSH_PULL = "output", PinDrive.LOW, PinDrive.HIGH
-    OPEN_DRAIN = "open-drain output", PinDrive.LOW, PinDrive.NONE
-    ALTERNATE_PUSH_PULL = "alternate function", PinDrive.LOW, PinDrive.HIGH
-    ALTERNATE_OPEN_DRAIN = "open-drain alternate function", PinDrive.LOW, PinDrive.NONE
-
-
-ALTERNATE_MODES = (PinMode.ALTERNATE_PUSH_PULL, PinMode.ALTERNATE_OPEN_DRAIN)
-INPUT_MODES = (PinMode.FLOATING, PinMode.PULLED)
-_DRIVES_BY_VALUE = {drive.value: drive for drive in PinDrive}
-_MODES_BY_VALUE = {mode.value: mode for mode in PinMode}
 
 
 class PinPorts(Protocol):
@@ -289,10 +241,10 @@ class Pin:
         """Put back what `snapshot` returned; tells nobody."""
         self._outside, mode, self._output_bit, holder, sources, self.is_watched, output, self.level, rail = snapshot
         self._rail = rail
-        self._mode = _MODES_BY_VALUE[mode]
-        self._holder = None if holder is None else (holder[0], _DRIVES_BY_VALUE[holder[1]])
+        self._mode = MODES_BY_VALUE[mode]
+        self._holder = None if holder is None else (holder[0], DRIVES_BY_VALUE[holder[1]])
         self._sources = dict(sources)
-        self.output = _DRIVES_BY_VALUE[output]
+        self.output = DRIVES_BY_VALUE[output]
         self._derive()
         self.input = self.level and self._reads
 
