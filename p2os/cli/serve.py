@@ -1,5 +1,6 @@
 """`p2os serve`: be a Pioneer on a line, for any P2OS program to drive."""
 
+import contextlib
 import json
 import math
 import os
@@ -159,15 +160,21 @@ def serve(
             world=world, body=body, seed=seed, apart=apart,
         )  # fmt: skip
     made = make_fleet(order)
-    hosts = open_hosts(order, made, speed=speed)
-    for number, host in enumerate(hosts):
-        _say_start(order, made.starts[number], number, host, as_json=json_output)
-    sys.stdout.flush()
-    if made.note:
-        sys.stderr.write(f"note: {made.note}\n")
     end_on_signals()
-    tick = None if status is None else (status, partial(_show_status, hosts))
-    Fleet(hosts, control=_control(control), on_tick=tick).run()
+    with contextlib.ExitStack() as opened:
+        orders = _control(control)
+        if orders is not None:
+            opened.callback(orders.close)
+        hosts = open_hosts(order, made, speed=speed)
+        for host in hosts:
+            opened.callback(host.close)
+        for number, host in enumerate(hosts):
+            _say_start(order, made.starts[number], number, host, as_json=json_output)
+        sys.stdout.flush()
+        if made.note:
+            _write(f"note: {made.note}\n")
+        tick = None if status is None else (status, partial(_show_status, hosts))
+        Fleet(hosts, control=orders, on_tick=tick).run()
 
 
 def open_hosts(order: FleetOrder, made: MadeFleet, *, speed: float = 1.0) -> list[Host]:
@@ -240,7 +247,7 @@ def _control(url: str | None) -> ControlLine | None:
     if url is None:
         return None
     listener = listen_url(url)
-    sys.stderr.write(f"orders: {listener.description}\n")
+    _write(f"orders: {listener.description}\n")
     return ControlLine(listener)
 
 
@@ -251,5 +258,6 @@ def _show_status(hosts: Sequence[Host]) -> None:
 
 
 def _write(text: str) -> None:
-    sys.stderr.write(text)
-    sys.stderr.flush()
+    with contextlib.suppress(OSError):  # a terminal that was closed must not keep the robots from stopping
+        sys.stderr.write(text)
+        sys.stderr.flush()

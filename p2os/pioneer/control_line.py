@@ -22,15 +22,21 @@ class Terminal:
 
         if not self.is_ours() or not select.select([0], [], [], 0)[0]:
             return b""
-        data = os.read(0, READ_BYTES)
+        try:
+            data = os.read(0, READ_BYTES)
+        except OSError as error:
+            raise HungUpError(f"the terminal is gone: {error.strerror}") from error
         if not data:
             raise HungUpError("the terminal has ended")
         return data
 
     def write(self, data: bytes) -> None:
         """Show an answer."""
-        sys.stderr.write(data.decode())
-        sys.stderr.flush()
+        try:
+            sys.stderr.write(data.decode())
+            sys.stderr.flush()
+        except OSError as error:
+            raise HungUpError(f"the terminal is gone: {error.strerror}") from error
 
     def fileno(self) -> int:
         """Return standard input."""

@@ -148,8 +148,12 @@ def load_flash(path: Path) -> Flash:
     """
     try:
         table = tomllib.loads(path.read_text(encoding="utf-8"))
-    except (OSError, UnicodeDecodeError) as error:
-        raise FlashError(f"cannot read FLASH file {path}: {error}") from error
+    except OSError as error:
+        raise FlashError(
+            f"cannot read FLASH file {path}: {error.strerror}", hint="docs/pioneer.md shows one"
+        ) from error
+    except UnicodeDecodeError as error:
+        raise FlashError(f"cannot read FLASH file {path}: not a text file", hint="it is a TOML file") from error
     except tomllib.TOMLDecodeError as error:
         raise FlashError(f"{path.name}: {error}", hint="it is no TOML") from error
     values = table.get("flash")

@@ -112,8 +112,10 @@ def load_sensor_errors(name_or_path: str) -> SensorErrors:
         raise SensorErrorsError(f"no set of sensor errors {name_or_path!r}", hint=hint)
     try:
         table = tomllib.loads(path.read_text(encoding="utf-8"))
-    except (OSError, UnicodeDecodeError) as error:
-        raise SensorErrorsError(f"cannot read {path}: {error}") from error
+    except OSError as error:
+        raise SensorErrorsError(f"cannot read {path}: {error.strerror}", hint=f"sets: {', '.join(SETS)}") from error
+    except UnicodeDecodeError as error:
+        raise SensorErrorsError(f"cannot read {path}: not a text file", hint="it is a TOML file") from error
     except tomllib.TOMLDecodeError as error:
         raise SensorErrorsError(f"{path.name}: {error}", hint="it is no TOML") from error
     return parse_sensor_errors(table, path.name)

@@ -51,6 +51,10 @@ def load_world(name_or_path: str | Path, seed: int = 0) -> World:
         return parse_world(text, f"{name}.toml", seed)
     path = Path(name)
     if not path.is_file():
+        if path.suffix.lower() in world_suffixes():
+            raise WorldError(f"no world {name!r}: there is no such file", hint="p2os world list names what ships")
+        if path.is_dir():
+            raise WorldError(f"no world {name!r}: that is a folder", hint="name a file in it")
         close = get_close_matches(name, known_worlds(), n=1)
         hint = f"did you mean {close[0]}?" if close else f"shipped worlds: {', '.join(known_worlds())}"
         raise WorldError(f"no world {name!r}", hint=hint)

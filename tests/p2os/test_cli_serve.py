@@ -9,18 +9,32 @@ import sys
 import time
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
 
 from p2os.cli import main, serve
 from p2os.cli.main import run
+from p2os.cli.signals import end_on_signals
 from p2os.errors import MissingDependencyError
 from p2os.pioneer import fleet_order
+from p2os.pioneer.control_line import Terminal
+from p2os.transport import HungUpError
 
 PATIENCE_S = 30.0
 COMMAND = str(Path(sys.executable).parent / "p2os")
 Capture = pytest.CaptureFixture[str]
+
+
+@pytest.fixture(autouse=True)
+def _own_signals() -> Iterator[None]:
+    """Give the signals back that a verb has taken in this process."""
+    numbers = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
+    before = [signal.getsignal(number) for number in numbers]
+    yield
+    for number, handler in zip(numbers, before, strict=True):
+        signal.signal(number, handler)
 
 
 class Serving:
@@ -56,7 +70,7 @@ def serving(tmp_path: Path) -> Iterator[Callable[..., Serving]]:
             each.process.communicate(timeout=PATIENCE_S)
 
 
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
 def test_serve_says_where_it_is_serves_and_ends_cleanly(serving: Callable[..., Serving], number: int) -> None:
     served = serving("--port", "tcp:127.0.0.1:0", "--world", "arena", "--seed", "7", "--firmware", "ARCOS")
     assert served.start["world"] == "arena"
@@ -109,6 +123,15 @@ def test_serve_refuses_a_port_that_is_taken(serving: Callable[..., Serving], cap
     [
         (["--body", "jelly"], 2, "p2os: no body 'jelly'"),
         (["--world", "nowhere"], 2, "p2os: no world 'nowhere'"),
+        (["--world", "nowhere.toml"], 2, "p2os: no world 'nowhere.toml': there is no such file"),
+        (["--world", "."], 2, "p2os: no world '.': that is a folder"),
+        (["--flash", "none.toml"], 2, "p2os: cannot read FLASH file none.toml: No such file or directory"),
+        (["--errors", "none.toml"], 2, "p2os: cannot read none.toml: No such file or directory"),
+        (
+            ["--body", "kinematic", "--port", "tcp:127.0.0.1:0", "--control", "COM3"],
+            2,
+            "p2os: 'COM3' is not a port URL",
+        ),
         (["--robot", "r2d2"], 2, "p2os: no robot model 'r2d2'"),
         (["--port", "COM3", "--body", "kinematic"], 2, "p2os: 'COM3' is not a port URL"),
         (["--port", "serial:COM3", "--body", "kinematic"], 1, "p2os: cannot open COM3: no such port"),
@@ -149,6 +172,31 @@ def test_serve_puts_a_fleet_into_one_world(tmp_path: Path, serving: Callable[...
     assert "Traceback" not in err
 
 
+def test_a_terminal_that_is_gone_is_left_and_keeps_nothing_from_stopping(monkeypatch: pytest.MonkeyPatch) -> None:
+    def gone(*_: object) -> None:
+        raise OSError(5, "Input/output error")
+
+    terminal = Terminal()
+    monkeypatch.setattr(terminal, "is_ours", lambda: True)
+    monkeypatch.setattr("select.select", lambda *_: ([0], [], []))
+    monkeypatch.setattr("os.read", gone)
+    with pytest.raises(HungUpError, match="the terminal is gone: Input/output error"):
+        terminal.read()
+    monkeypatch.setattr(sys, "stderr", SimpleNamespace(write=gone, flush=gone))
+    with pytest.raises(HungUpError, match="the terminal is gone"):
+        terminal.write(b"robot 1: status\n")
+    serve._write("told to nobody\n")
+
+
+def test_a_program_that_was_made_deaf_to_hang_ups_stays_so(monkeypatch: pytest.MonkeyPatch) -> None:
+    signal.signal(signal.SIGHUP, signal.SIG_IGN)
+    end_on_signals()
+    assert signal.getsignal(signal.SIGHUP) is signal.SIG_IGN
+    with monkeypatch.context() as windows:
+        windows.delattr(signal, "SIGHUP")
+        end_on_signals()
+
+
 def test_serve_without_pybullet_says_how_to_get_it(monkeypatch: pytest.MonkeyPatch, capsys: Capture) -> None:
     def missing(*_: object) -> None:
         raise MissingDependencyError("the bullet body needs pybullet", hint="pip install 'p2os[bullet]'")
@@ -169,12 +217,7 @@ def test_a_served_robot_tells_its_host_in_the_same_process(monkeypatch: pytest.M
             signal.raise_signal(signal.SIGTERM)
 
     monkeypatch.setattr(serve, "Fleet", Ending)
-    before = signal.getsignal(signal.SIGINT), signal.getsignal(signal.SIGTERM)
-    try:
-        assert main.run(["serve", "--body", "kinematic", "--port", "tcp:127.0.0.1:0"]) == 130
-    finally:
-        signal.signal(signal.SIGINT, before[0])
-        signal.signal(signal.SIGTERM, before[1])
+    assert main.run(["serve", "--body", "kinematic", "--port", "tcp:127.0.0.1:0"]) == 130
     captured = capsys.readouterr()
     assert "p2dx in room, kinematic body; Ctrl-C ends" in captured.out
     assert "     1.500 s  opened\n     1.600 s  motors: on\n" in captured.err
