@@ -12,6 +12,7 @@
 
 #define NEVER (UINT64_C(1) << 62)
 #define NO_TIME UINT64_MAX
+#define NS_PER_S UINT64_C(1000000000)
 #define UNLIKELY(x) __builtin_expect(!!(x), 0)
 /* Kept out of its callers, which stay short enough to need no stack. */
 #define RARELY __attribute__((noinline, cold))

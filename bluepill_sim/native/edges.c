@@ -11,7 +11,6 @@
 
 #include "core.h"
 
-#define NS_PER_S UINT64_C(1000000000)
 #define PINS_OF_A_PORT 16
 #define SIGNALS 256
 enum { LOW = 0, HIGH = 1, FLOATING = 2 };

@@ -5,13 +5,9 @@
  * at anything (`native_streams.py`). Source: RM0008 27.3.2.
  */
 #include "core.h"
+#include "usart.h"
 
-enum { SR = 0, BRR = 2, CR1 = 3, TDR = 8, SHIFT = 9 };
-enum { IDLE = 1 << 4, RXNE = 1 << 5, TC = 1 << 6, TXE = 1 << 7 };
 enum { SEVONPEND = 16, FIRST_IRQ = 16 };
-#define HELD 0x10000u
-#define WORD 0x1FFu
-#define NS_PER_S UINT64_C(1000000000)
 
 struct stream *core_stream(struct core *core, uint32_t number) { return &core->streams[number]; }
 
@@ -93,7 +89,7 @@ static void end_character(struct core *core, struct stream *stream)
         words[SR] |= TC;
         stream->due_cycle = NO_TIME;
     }
-    if (words[SR] & words[CR1] & (TXE | TC | RXNE | IDLE)) {
+    if (words[SR] & words[CR1] & ASKING) {
         raise_line(core, stream->irq);
     }
 }

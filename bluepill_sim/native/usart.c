@@ -2,22 +2,15 @@
  *
  * A write while the shift register is busy fills TDR, a read empties RDR; both
  * only clear flags, so that the interrupt line can fall but not rise. All else
- * is the business of bluepill_sim/usart.py, which has these words too.
- * Source: RM0008 27.6.
+ * is the business of bluepill_sim/usart.py.
  */
 #include "core.h"
-
-enum { SR = 0, BRR = 2, CR1 = 3, SEEN = 7, TDR = 8, SHIFT = 9, RDR = 10 };
-enum { ORE = 1 << 3, IDLE = 1 << 4, RXNE = 1 << 5, TC = 1 << 6, TXE = 1 << 7 };
-enum { TE = 1 << 3, RXNEIE = 1 << 5, UE = 1 << 13 };
-#define WORD 0x1FFu
-#define HELD 0x10000u
-#define READ_SEQUENCE_FLAGS 0x1Fu
+#include "usart.h"
 
 static void update_irq(struct core *core, const struct page *page)
 {
     const uint32_t status = page->words[SR], control = page->words[CR1];
-    const bool asks = status & control & (TXE | TC | RXNE | IDLE) || (status & ORE && control & RXNEIE);
+    const bool asks = status & control & ASKING || (status & ORE && control & RXNEIE);
     if (!asks) {
         core->shared.levels &= ~(UINT64_C(1) << page->irq);
     }
