@@ -23,7 +23,7 @@ STEP_NS: Nanos = NS_PER_MS
 BODY_NAMES = ("kinematic", "bullet", "mujoco")
 #: How a package that is missing is got, by the body that needs it.
 _HINTS = {
-    "bullet": "pip install 'p2os[bullet]' (Python 3.11), or --body kinematic",
+    "bullet": "pip install 'p2os[bullet]' (Python 3.11), or --body mujoco or kinematic",
     "mujoco": "pip install 'p2os[mujoco]', or --body kinematic",
 }
 

@@ -23,7 +23,7 @@ class ContactCounter:
         if touching:
             self.collisions += self._apart >= APART_STEPS
             self._apart = 0
-        else:
+        elif self._apart < APART_STEPS:
             self._apart = min(APART_STEPS, self._apart + steps)
         self.touching = touching
 

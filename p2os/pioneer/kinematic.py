@@ -59,6 +59,7 @@ class KinematicBody:
         self._longest_m = parameters.sonar_range_m
         #: How far any point of the hull moves when the robot turns by 1 rad.
         self._hull_reach = math.hypot(max(body.hull_front_m, body.hull_rear_m), body.hull_width_m / 2)
+        self._x, self._y, self._heading, self._cos, self._sin = 0.0, 0.0, 0.0, 1.0, 0.0
         self.reset(world.start, 0)
 
     @property
@@ -108,7 +109,7 @@ class KinematicBody:
         for item in self._world.obstacles:
             if not item.fixed:
                 self._put(item)
-        self._x, self._y, self._heading = pose.x_m, pose.y_m, pose.heading_rad
+        self._take_pose(pose.x_m, pose.y_m, pose.heading_rad)
         self._left_angle = self._right_angle = self._left = self._right = 0.0
         self._asked = (0.0, 0.0)
         self._stalled = False
@@ -127,7 +128,7 @@ class KinematicBody:
         self._steps += 1
         if self._walkers and self._steps % WALK_STEPS == 0:
             self._walk()
-        self._asked = (left_mps, right_mps)
+        self._asked = asked = (left_mps, right_mps)
         if left_mps == 0.0 and right_mps == 0.0:
             self._left = self._right = 0.0
             self._stalled = False
@@ -135,44 +136,49 @@ class KinematicBody:
             self._is_bumped = False
             return Turned(self._left_angle, self._right_angle)
         forward, turn = (left_mps + right_mps) / 2 * _DT_S, (right_mps - left_mps) / self._track_m * _DT_S
-        x, y, heading = self._moved(forward, turn)
+        c, s = self._cos, self._sin
+        heading = self._heading + turn
+        if abs(turn) < STRAIGHT_RAD:
+            x, y = self._x + forward * c, self._y + forward * s
+            if heading != self._heading:
+                c, s = math.cos(heading), math.sin(heading)
+        else:
+            radius, c, s = forward / turn, math.cos(heading), math.sin(heading)
+            x = self._x + radius * (s - self._sin)
+            y = self._y - radius * (c - self._cos)
+        travel = abs(forward) + abs(turn) * self._hull_reach
         blocked = self._company is not None and bool(self._company.near) and self._meets(self._company, x, y, heading)
         if not blocked:
             # What was blocked stays so: neither the pose nor the plan has changed since.
-            blocked = self._asked == self._blocked_at or self._is_blocked(
-                x, y, heading, abs(forward) + abs(turn) * self._hull_reach
-            )
-            self._blocked_at = self._asked if blocked else None
+            blocked = asked == self._blocked_at
+            if not blocked:
+                if self._free_m > travel:
+                    self._free_m -= travel
+                else:
+                    blocked = self._is_blocked(x, y, heading)
+            self._blocked_at = asked if blocked else None
         self._stalled = blocked
         self._contacts.update(touching=blocked or self._is_bumped or self._free_m == 0.0)
         self._is_bumped = False
         if blocked:
             self._left = self._right = 0.0
             return Turned(self._left_angle, self._right_angle)
-        self._x, self._y, self._heading = x, y, heading
+        self._x, self._y, self._heading, self._cos, self._sin = x, y, heading, c, s
         self._left, self._right = left_mps, right_mps
         self._left_angle += left_mps * _DT_S / self._radius_m
         self._right_angle += right_mps * _DT_S / self._radius_m
         return Turned(self._left_angle, self._right_angle)
 
-    def _moved(self, forward: float, turn: float) -> tuple[float, float, float]:
-        """Return the pose after an arc of this length and turn."""
-        heading = self._heading
-        if abs(turn) < STRAIGHT_RAD:
-            return self._x + forward * math.cos(heading), self._y + forward * math.sin(heading), heading + turn
-        radius, after = forward / turn, heading + turn
-        x = self._x + radius * (math.sin(after) - math.sin(heading))
-        y = self._y - radius * (math.cos(after) - math.cos(heading))
-        return x, y, after
+    def _take_pose(self, x_m: float, y_m: float, heading_rad: float) -> None:
+        """Take a pose, and what is often asked of its heading."""
+        self._x, self._y, self._heading = x_m, y_m, heading_rad
+        self._cos, self._sin = math.cos(heading_rad), math.sin(heading_rad)
 
-    def _is_blocked(self, x: float, y: float, heading: float, travel: float) -> bool:
+    def _is_blocked(self, x: float, y: float, heading: float) -> bool:
         """Tell whether the pose is inside a thing, and keep the bound on what is free around the hull.
 
         A robot that is inside one already (because it was put there) may move.
         """
-        if self._free_m > travel:
-            self._free_m -= travel
-            return False
         free = self._plan.clearance(x, y, heading, no_more_than=LOOK_AHEAD_M)
         if free == 0.0 and self._free_m > 0.0:
             if not self._push(x, y, heading):
@@ -255,7 +261,7 @@ class KinematicBody:
 
     def _fan(self, number: int) -> tuple[float, float, list[Direction]]:
         """Return where a sonar is and the directions of its rays, the rightmost first."""
-        cone, c, s = self._cones[number], math.cos(self._heading), math.sin(self._heading)
+        cone, c, s = self._cones[number], self._cos, self._sin
         x, y = self._x + cone.x_m * c - cone.y_m * s, self._y + cone.x_m * s + cone.y_m * c
         return x, y, [(dx * c - dy * s, dx * s + dy * c) for dx, dy in cone.directions]
 
@@ -321,7 +327,7 @@ class KinematicBody:
         self._moved_things = dict.fromkeys(snapshot["moved"])
         walks = {item.name: item.walk for item in self._plan.obstacles if item.walk is not None}
         self._walkers = {name: (since, Walker(walks[name])) for name, since in snapshot["walking"].items()}
-        self._x, self._y, self._heading = snapshot["pose"]
+        self._take_pose(*snapshot["pose"])
         self._left_angle, self._right_angle, self._left, self._right = snapshot["wheels"]
         self._asked = snapshot["asked"]
         self._stalled, self._is_bumped = snapshot["stalled"]

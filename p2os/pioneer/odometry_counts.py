@@ -84,7 +84,7 @@ class DeadReckoning:
         self._left_rad, self._right_rad = left_rad, right_rad
         turn = (right_mm - left_mm) / self._track_mm
         along = (left_mm + right_mm) / 2
-        middle = self.heading_rad + turn / 2  # exact for an arc to second order
+        middle = self.turned_rad - self._zero_rad + turn / 2  # exact for an arc to second order
         self.x_mm += along * math.cos(middle)
         self.y_mm += along * math.sin(middle)
         self.turned_rad += turn
