@@ -142,6 +142,8 @@ def warn_on_stderr(board: BluePill) -> None:
 def summary(board: BluePill) -> str:
     """Return where a run has come to, in one line."""
     doing = "asleep at" if board.is_asleep else "at"
+    if board.is_asleep and board.next_deadline() is None:
+        doing = "asleep, and nothing on the chip is due to wake it, at"
     count = len(board.warnings)
     warned = f", {count} warning{'s' if count != 1 else ''}" if count else ""
     return f"{board.now_ns / NS_PER_S:.6f} s of virtual time, {board.cycle} cycles, {doing} {board.where()}{warned}"

@@ -126,3 +126,12 @@ def test_a_program_that_takes_too_long_is_given_up(tmp_path: Path, capfd: pytest
     error = capfd.readouterr().err
     assert "are used up at" in error
     assert "the last 32 blocks" in error
+
+
+def test_a_program_that_sleeps_for_good_is_told_of(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    image = tmp_path / "sleeps.bin"
+    image.write_bytes(bytes.fromhex("00500020 09000008 72b630bffde7"))  # cpsid i; wfi; b back to it
+    assert run(["mcu", "run", str(image), "--for", "1s"]) == 0
+    assert "asleep, and nothing on the chip is due to wake it, at 0x0800000c" in capfd.readouterr().err
+    assert run(["mcu", "run", SENSORS, "--for", "10ms"]) == 0
+    assert "cycles, asleep at tick_wait_until" in capfd.readouterr().err
