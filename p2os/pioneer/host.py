@@ -308,15 +308,17 @@ class Host:
         """
         if self._behind_since is None:
             self._behind_since = self.now
+        reason = f"{client.description} left while its bytes waited"
         with contextlib.suppress(TransportError):
-            is_gone = has_hung_up(client.fileno())
-            if not is_gone and self.now - self._behind_since < LONGEST_BEHIND_NS:
-                return
+            if not has_hung_up(client.fileno()):
+                if self.now - self._behind_since < LONGEST_BEHIND_NS:
+                    return
+                limit_s = LONGEST_BEHIND_NS // NS_PER_S
+                reason = f"{client.description} said more than can be heard for {limit_s} s"
             for _ in range(MOST_READS_LOST):
                 if not client.read():
                     break
-        limit_s = LONGEST_BEHIND_NS // NS_PER_S
-        self._drop_client(f"{client.description} said more than can be heard for {limit_s} s, or left")
+        self._drop_client(reason)
 
     def _drop_client(self, reason: str) -> None:
         if self._client is None:

@@ -16,6 +16,9 @@ CONNECT_TIMEOUT_S = 3.0
 #: chosen: a minute of SIPs; a client that is further behind will never catch up.
 BACKLOG_BYTES = 65_536
 
+#: A robot that has a client lets a second one in and closes at once, which is all that TCP can say of it.
+HUNG_UP_HINT = "a robot has one client: is another program connected, or has the robot's side ended?"
+
 _LISTEN_HINTS = {
     errno.EADDRINUSE: "another program listens there; choose another port, or tcp:127.0.0.1:0 for any free one",
     errno.EACCES: "choose a port above 1023",
@@ -42,7 +45,7 @@ class SocketTransport:
         except OSError as error:
             raise self._lost(error) from error
         if not data:
-            raise HungUpError(f"{self.description} closed the connection")
+            raise HungUpError(f"{self.description} closed the connection", hint=HUNG_UP_HINT)
         return data
 
     def write(self, data: bytes) -> None:
@@ -69,7 +72,7 @@ class SocketTransport:
         self._socket.close()
 
     def _lost(self, error: OSError) -> HungUpError:
-        return HungUpError(f"{self.description} was lost: {_reason(error)}")
+        return HungUpError(f"{self.description} was lost: {_reason(error)}", hint=HUNG_UP_HINT)
 
 
 class TcpListener:

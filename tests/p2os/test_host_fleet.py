@@ -141,7 +141,7 @@ def test_who_floods_a_paced_line_and_vanishes_leaves_it_free_at_once(make_robot:
         made.run(1)
     made.line.close()
     made.live(50)
-    assert any("client gone" in told for told in made.told)
+    assert any("left while its bytes waited" in told for told in made.told)
     assert not made.robot.pioneer.state.motors_enabled
     made.line = made.reopen()
     made.decoder = Decoder()
