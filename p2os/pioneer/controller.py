@@ -45,7 +45,7 @@ from p2os.connection import (
 from p2os.packets import Identity, ResetNotice
 from p2os.parameters import RobotParameters
 from p2os.pioneer.chance import Chance
-from p2os.pioneer.command_handlers import IGNORED, MOTION_COMMANDS, Effect, apply
+from p2os.pioneer.command_handlers import IGNORED, Effect, apply
 from p2os.pioneer.controller_state import ControllerSnapshot, ControllerState
 from p2os.pioneer.faults import read_fault
 from p2os.pioneer.faults_acting import Patient, break_now, broken_now, mend_now
@@ -414,9 +414,9 @@ class Pioneer:
         self._tell(now, "controller up", "it says so with packet 0xFF and waits for SYNC0")
 
     def _obey(self, command: Command, now: Nanos) -> None:
-        works, had_power = self._works, self._works.motors_enabled
+        works, had_power, asked = self._works, self._works.motors_enabled, self._works.motion.asked
         effect = apply(works, command, now)
-        if command.number in MOTION_COMMANDS and self.body.state.stalled_left and self.body.state.stalled_right:
+        if works.motion.asked != asked and self.body.state.stalled_left and self.body.state.stalled_right:
             works.motion.begin_from_stand()  # chosen: else a client cannot back off a wall before it gives up
         if effect in IGNORED:
             self._ignored += 1

@@ -242,6 +242,12 @@ class Motion:
         return self._wheels
 
     @property
+    def asked(self) -> tuple[object, ...]:
+        """Return what was set last, to compare with what is set next."""
+        first, second = self._first, self._second
+        return self.mode, first.set_speed, first.goal, second.set_speed, second.goal
+
+    @property
     def has_goal(self) -> bool:
         """Tell whether the robot drives or turns to somewhere, so that `step` needs to know where it is."""
         return self._first.goal is not None or self._second.goal is not None

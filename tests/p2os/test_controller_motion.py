@@ -98,6 +98,10 @@ def test_a_robot_that_a_wall_has_stopped_backs_off_at_once(robot: Any) -> None:
     assert robot.body.state.left_speed_mps > 0.3, "one wheel alone: the other still turns"
     robot.body.stall(left=True, right=True)
     robot.say(C.VEL, -200)
+    robot.run(1)
+    assert robot.body.state.left_speed_mps > 0.3, "what was set already is no news"
+    robot.say(C.VEL, 400)
+    robot.say(C.VEL, -200)
     robot.run(100)
     assert robot.body.state.left_speed_mps == pytest.approx(-0.03), "100 ms at 300 mm/s²"
 
