@@ -3,6 +3,7 @@
 Run it on an idle machine. Usage: python tools/bench_pioneer.py [ROBOTS]
 """
 
+import math
 import statistics
 import sys
 import time
@@ -13,14 +14,18 @@ from p2os.commands import CommandNumber as C
 from p2os.parameters import load_parameters
 from p2os.pioneer.body import make_body
 from p2os.pioneer.controller import Pioneer
+from p2os.pioneer.meeting import Meeting
+from p2os.pioneer.scenery import Pose
 from p2os.pioneer.served import served_pioneer
-from p2os.pioneer.world import load_world
+from p2os.pioneer.world import World, parse_world
 from p2os.timing import NS_PER_MS, NS_PER_S
 from p2os.transport import open_url
 
 ROBOTS = int(sys.argv[1]) if len(sys.argv) > 1 else 64
 #: Robot seconds of the first figure, seconds of the others.
 LIVED_S, WATCHED_S = 10, 5
+#: How they stand: so many in a row, so far from each other.
+ROW, PITCH_M = math.isqrt(ROBOTS - 1) + 1, 2.0
 
 
 def command(number: int, argument: int | None = None) -> bytes:
@@ -28,20 +33,41 @@ def command(number: int, argument: int | None = None) -> bytes:
     return Command(number, argument).to_frame().to_bytes()
 
 
+def hall() -> World:
+    """Return an empty hall with room for all of them, 2 m apart."""
+    half = PITCH_M * (ROW + 1) / 2
+    corners = ((-half, -half), (half, -half), (half, half), (-half, half))
+    walls = "".join(
+        f'[[wall]]\nname = "{number}"\nfrom_m = {list(begin)}\nto_m = {list(end)}\nfixed = true\n'
+        for number, (begin, end) in enumerate(zip(corners, (*corners[1:], corners[0]), strict=True))
+    )
+    return parse_world(f'name = "hall"\nextent_m = [-{half}, -{half}, {half}, {half}]\n{walls}', "hall")
+
+
 def many_robots() -> None:
-    """Print how much of one core many driving robots take in real time."""
-    parameters, world = load_parameters("p2dx"), load_world("room")
-    robots = [Pioneer(parameters=parameters, body=make_body("kinematic", world, parameters)) for _ in range(ROBOTS)]
-    for robot in robots:
-        for data in (*map(command, (0, 1, 2, 1)), command(C.ENABLE, 1), command(C.RVEL, 20)):
-            robot.receive(data, 0)
-    begin = time.process_time()
-    for at in range(100 * NS_PER_MS, LIVED_S * NS_PER_S + 1, 100 * NS_PER_MS):
-        for robot in robots:
-            robot.receive(command(C.PULSE), at)
-            robot.take_output()
-    used = time.process_time() - begin
-    print(f"{ROBOTS} robots turning, kinematic: {100 * used / LIVED_S:.0f} % of one core in real time (goal: < 100)")
+    """Print how much of one core many turning robots take in real time, in one world and each in its own."""
+    parameters, world = load_parameters("p2dx"), hall()
+    for is_shared in (False, True):
+        made = []
+        for number in range(ROBOTS):
+            body = make_body("kinematic", world, parameters)
+            x, y = (PITCH_M * (place - (ROW - 1) / 2) for place in divmod(number, ROW))
+            body.reset(Pose(x, y, 0.0), 0)
+            made.append((Pioneer(parameters=parameters, body=body), body))
+        meeting = Meeting(made, world) if is_shared else None
+        for robot, _ in made:
+            for data in (*map(command, (0, 1, 2, 1)), command(C.ENABLE, 1), command(C.RVEL, 20)):
+                robot.receive(data, 0)
+        begin = time.process_time()
+        for at in range(100 * NS_PER_MS, LIVED_S * NS_PER_S + 1, 100 * NS_PER_MS):
+            for number, (robot, _) in enumerate(made):
+                if meeting is not None:
+                    meeting.bring(number, at)
+                robot.receive(command(C.PULSE), at)
+                robot.take_output()
+        used = 100 * (time.process_time() - begin) / LIVED_S
+        where = "in one world" if is_shared else "each in its own world"
+        print(f"{ROBOTS} robots turning, kinematic, {where}: {used:.0f} % of one core in real time (goal: < 100)")
 
 
 def one_served() -> None:
