@@ -9,6 +9,7 @@ from fake_chip import FakeChip, PinDrive
 
 from testbench.bench import Bench
 from testbench.scenario import Scenario, load_scenario
+from tests.p2os.bodies import each_body
 
 S, MS = 10**9, 10**6
 LEFT, RIGHT = ("PB7", "PB6", "PB5"), ("PA1", "PA2", "PA3")
@@ -43,7 +44,7 @@ def entries(made: Bench, kind: str) -> list[dict[str, object]]:
     return [entry for entry in map(json.loads, made.trace.text.splitlines()) if entry["k"] == kind]
 
 
-BODIES = ["kinematic", pytest.param("bullet", marks=pytest.mark.bullet)]
+BODIES = each_body()
 MODES = ["direct", "adapter"]
 
 
