@@ -128,6 +128,23 @@ def may_write(code: bytes, at: int) -> int:
     return 1 << (second >> 12) | 1 << (second >> 8 & 15) | 1 << (first & 15)
 
 
+def only_reads(code: bytes) -> bool:
+    """Tell whether a straight run of code stores nothing and speaks to no coprocessor: rather no than a wrong yes."""
+    at = 0
+    while at + 2 <= len(code):
+        first = code[at] | code[at + 1] << 8
+        if first >= _FIRST_WIDE:
+            if first & 0xFE10 in (0xE800, 0xF800) or first & 0xEC00 == 0xEC00:
+                return False
+            at += 4
+            continue
+        is_store = first & 0xF000 in (0x6000, 0x7000, 0x8000, 0x9000) and not first & 0x0800
+        if is_store or 0x5000 <= first < 0x5600 or first & 0xFE00 == 0xB400 or first & 0xF800 == 0xC000:
+            return False
+        at += 2
+    return True
+
+
 def is_ambiguous(code: bytes, start: int) -> bool:
     """Tell whether two accesses look alike although the first one's base may change in between.
 

@@ -19,7 +19,7 @@ from collections.abc import Callable
 
 from bluepill_sim.block_cost import NO_BLOCK, Block
 from bluepill_sim.cpu import scratch
-from bluepill_sim.cpu.accesses import Access, accesses_of, is_ambiguous
+from bluepill_sim.cpu.accesses import Access, accesses_of, is_ambiguous, only_reads
 from bluepill_sim.cpu.block_log import KeptRows
 from bluepill_sim.cpu.core import RawRead, RawWrite, ReadAccess, WriteAccess
 from bluepill_sim.cpu.engine import Engine, EngineSnapshot
@@ -59,7 +59,7 @@ from bluepill_sim.cpu.traps import Traps
 from bluepill_sim.thumb import Kind
 
 #: Flags of a row (`enum row_flag`).
-_CHANGES_MASKS, _SENDS_EVENT, _SELF_LOOP, _WRITABLE, _NOTED = 1, 2, 4, 8, 128
+_CHANGES_MASKS, _SENDS_EVENT, _SELF_LOOP, _WRITABLE, _NOTED, _READS = 1, 2, 4, 8, 128, 256
 _ENDS = {Kind.WAIT_INTERRUPT: 16, Kind.WAIT_EVENT: 32, Kind.YIELD: 64}
 _NO_BLOCK_START = 0xFFFF_FFFF
 #: Chosen: so often at least Python looks at signals, such as Ctrl-C.
@@ -341,6 +341,7 @@ class NativeEngine(Engine):
             _CHANGES_MASKS * block.changes_masks | _SENDS_EVENT * block.sends_event | _SELF_LOOP * block.is_self_loop
         )
         flags |= _WRITABLE * (host is not None)
+        flags |= _READS * (only_reads(code) and not block.has_exclusive)
         if is_ambiguous(code, start):
             flags |= _NOTED
             if not accesses.keys() <= self._noted:

@@ -144,6 +144,7 @@ static void begin_access(struct core *core, uint32_t address, bool is_write, uin
 static RARELY uint32_t ask_read(const struct region_user *region, uint32_t offset, uint32_t size)
 {
     struct core *core = region->core;
+    core->polling.asked = 1;
     begin_access(core, region->base + offset, false, size);
     const uint32_t word = core->calls.read(region->number, offset, size);
     core->shared.in_access = 0;

@@ -66,6 +66,9 @@ static inline void tell(struct core *core, uint64_t cycle, uint32_t address, int
     }
 }
 
+/* Keeps a row of which nobody is told. */
+void keep(struct core *core, uint64_t cycle, uint32_t address, int32_t kind) { tell(core, cycle, address, kind); }
+
 void record(struct core *core, uint32_t address, int32_t kind) { tell(core, core->shared.cycle, address, kind); }
 
 /* Tells of a branch to itself: once, however long it spins; as `Engine._tell_spin`. */
@@ -153,6 +156,10 @@ void core_on_block(void *engine, uint64_t at, uint32_t size, void *user)
     } else {
         begin_block(core, row);
         tell(core, cycle, address, 0);
+        if (UNLIKELY(row == before) && row->flags & ROW_READS && waits_in_vain(core, row)) {
+            wait_on(core, row);
+            stop_at_border(core, address);
+        }
     }
 }
 

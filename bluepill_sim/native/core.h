@@ -55,7 +55,9 @@ enum row_flag {
     ROW_ENDS_IN_WFE = 32,
     ROW_ENDS_IN_YIELD = 64,
     /* Hooks note the PC of each access. */
-    ROW_NOTED = 128
+    ROW_NOTED = 128,
+    /* It stores nothing: the same registers before it twice running are the same for ever. */
+    ROW_READS = 256
 };
 
 /* An instruction of a block: where it starts in time, and which memory it reaches for. */
@@ -202,6 +204,15 @@ struct time_base {
     uint32_t frequency_hz;
 };
 
+/* A loop that waits for something: what it looked like at its start, one round ago. */
+struct polling {
+    const struct row *row;
+    uint64_t cycle;
+    int32_t rounds;
+    uint32_t asked; /* Python has answered since */
+    uint32_t registers[16];
+};
+
 /* One GPIO port whose plain outputs are switched here. */
 struct port {
     uint32_t simple;  /* pins whose output this core may switch alone */
@@ -235,6 +246,7 @@ struct core {
     struct stream streams[STREAMS];
     uint64_t stream_next; /* the cycle at which the first of them ends a character */
     struct time_base time;
+    struct polling polling;
 };
 
 static inline void begin_block(struct core *core, struct row *row)
@@ -251,6 +263,10 @@ void free_dropped(struct core *core);
 const struct instruction *instruction_at(const struct row *row, uint32_t address);
 void record(struct core *core, uint32_t address, int32_t kind);
 void core_flush(struct core *core);
+void keep(struct core *core, uint64_t cycle, uint32_t address, int32_t kind);
+/* polling.c */
+bool waits_in_vain(struct core *core, const struct row *row);
+void wait_on(struct core *core, const struct row *row);
 /* gpio.c */
 bool write_port(struct core *core, struct page *page, uint32_t index, uint32_t value, uint32_t address);
 /* usart.c */
