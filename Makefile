@@ -9,6 +9,8 @@ VENV   := .venv
 BIN    := $(VENV)/bin
 STAMP  := $(VENV)/.set-up
 JOBS   ?= 2
+# What is built with the package: set up again when it has changed.
+COMPILED := $(wildcard bluepill_sim/native/*) $(shell find adapter_fw/core adapter_fw/capi -type f)
 
 .PHONY: setup demo test lint type unit bench soak clean firmware board board-check board-tools
 
@@ -16,7 +18,7 @@ setup: $(STAMP)
 
 # PyBullet has no wheels beyond Python 3.11: elsewhere the extra installs NumPy
 # alone, and everything but the `bullet` body works.
-$(STAMP): pyproject.toml constraints.txt
+$(STAMP): pyproject.toml constraints.txt $(COMPILED)
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || \
 	    { echo "make: Python 3.11 or newer is needed (hint: make PYTHON=/path/to/python3.11)"; exit 2; }
 	@test -x $(BIN)/python || $(PYTHON) -m venv $(VENV) || \

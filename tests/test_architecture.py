@@ -55,7 +55,15 @@ SKIN = (
 )  # fmt: skip
 
 #: Within p2os, packages above the core that the core must not import.
-ABOVE_CORE = ("p2os.transport", "p2os.cli", "p2os.pioneer", "p2os.client", "p2os.trace", "p2os.columns")
+ABOVE_CORE = (
+    "p2os.__main__",
+    "p2os.transport",
+    "p2os.cli",
+    "p2os.pioneer",
+    "p2os.client",
+    "p2os.trace",
+    "p2os.columns",
+)
 
 #: `from p2os import Robot` is fetched on first use: the one look upwards.
 FRONT_DOOR = "p2os"

@@ -1,6 +1,7 @@
 """The command line as such: verbs found, errors told in one line and a hint, exit codes."""
 
 import os
+import runpy
 import subprocess
 import sys
 from collections.abc import Callable
@@ -188,3 +189,11 @@ def test_a_reader_that_leaves_early_gets_no_traceback() -> None:
         process.wait(timeout=60)
     assert b"Traceback" not in err
     assert b"Exception ignored" not in err
+
+
+def test_the_package_runs_as_a_module(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
+    monkeypatch.setattr(sys, "argv", ["p2os", "--version"])
+    with pytest.raises(SystemExit) as end:
+        runpy.run_module("p2os", run_name="__main__")
+    assert end.value.code in (None, 0)
+    assert capsys.readouterr().out.strip()
