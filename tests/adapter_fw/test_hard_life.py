@@ -90,6 +90,7 @@ def lives_well(life: HardLife, span_ns: int, *, unplug: int, reboot: int, fool: 
     assert numbers["overflows"] == 0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", [1])
 def test_a_minute_of_hard_life(seed: int) -> None:
     lives_well(HardLife(seed, bit_error_rate=BIT_ERROR_RATE), 60 * NS_PER_S, unplug=3, reboot=3, fool=3)

@@ -109,10 +109,10 @@ for machine in MACHINES.values():
         deadline=None,
         suppress_health_check=[HealthCheck.too_slow, HealthCheck.data_too_large],
     )
-TestFirmware = FirmwareMachine.TestCase
+TestFirmware = pytest.mark.slow(FirmwareMachine.TestCase)
 TestFirmwareDeafRobot = FirmwareDeafRobotMachine.TestCase
 TestPad = PadMachine.TestCase
-TestFirmwarePad = FirmwarePadMachine.TestCase
+TestFirmwarePad = pytest.mark.slow(FirmwarePadMachine.TestCase)
 
 
 def driven_by_pad(kind: type) -> Rig:

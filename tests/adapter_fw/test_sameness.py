@@ -194,6 +194,7 @@ LIVES = given(st.lists(STEPS, min_size=30, max_size=60), SETTINGS, st.booleans()
 QUIET = [HealthCheck.too_slow, HealthCheck.data_too_large, HealthCheck.large_base_example]
 
 
+@pytest.mark.slow
 @settings(max_examples=12, deadline=None, suppress_health_check=QUIET)
 @LIVES
 def test_firmware_and_model_do_the_same_in_any_life(steps: list, adapter_settings: AdapterSettings, four: bool) -> None:

@@ -55,6 +55,7 @@ def model_bytes(wanted: Scenario) -> bytes:
     return b"".join(sent)
 
 
+@pytest.mark.slow
 def test_the_core_on_a_second_bluepill_drives_the_robot(tmp_path: Path) -> None:
     bench = run_second(built("bluepill", tmp_path)[0], scenario("dodge", 3.9))
     assert bench.second.state == "driving"

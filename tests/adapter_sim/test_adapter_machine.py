@@ -209,7 +209,7 @@ for machine, examples in ((AdapterMachine, 30), (DeafRobotMachine, 30), (Pioneer
     )
 
 TestAdapter = AdapterMachine.TestCase
-TestDeafRobot = DeafRobotMachine.TestCase
+TestDeafRobot = pytest.mark.slow(DeafRobotMachine.TestCase)
 TestPioneer = PioneerMachine.TestCase
 
 

@@ -1,5 +1,6 @@
 """An adapter that waits for edges does what one that samples on does, at the same times."""
 
+import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -31,6 +32,7 @@ STEPS = st.lists(
 )
 
 
+@pytest.mark.slow
 @given(steps=STEPS)
 @settings(max_examples=60, deadline=None)
 def test_it_does_the_same_asleep_and_awake(steps: list[tuple[str, int, int]]) -> None:

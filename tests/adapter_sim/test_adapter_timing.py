@@ -226,6 +226,7 @@ def test_sonar_is_asked_for_again_when_no_reading_comes(driving: Rig) -> None:
     assert driving.pins.distances() == "11111111"
 
 
+@pytest.mark.slow
 def test_an_adapter_does_not_depend_on_how_time_is_sliced() -> None:
     traces = []
     for slice_ns in (1 * MS, 100_000, 7_777):

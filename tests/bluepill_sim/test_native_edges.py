@@ -79,6 +79,7 @@ def test_both_logs_write_the_same_file(tmp_path: Path) -> None:
     assert written[0].count(b"\n#") > 400
 
 
+@pytest.mark.slow
 def test_a_full_buffer_loses_nothing() -> None:
     toggle = f"movs r2, #15\nstr r2, [r6, #{BSRR}]\nstr r2, [r6, #{BRR}]\n"
     inner = f"movs r4, #255\nagain: nop\n{toggle * 4}subs r4, #1\nbne again\n"

@@ -94,6 +94,7 @@ def live(board: BluePill, seed: int, slices: int) -> list[tuple[Any, ...]]:
     return found
 
 
+@pytest.mark.slow
 @settings(max_examples=40, deadline=None)
 @given(choices=PROGRAMS, seed=st.integers(0, 1000))
 def test_every_slice_ends_alike(choices: dict[str, Any], seed: int) -> None:

@@ -150,6 +150,7 @@ def test_many_fixed_boxes_are_met_and_heard_as_single_ones_are(make: Maker) -> N
     assert other.state.collisions == one.state.collisions == 1
 
 
+@pytest.mark.slow
 def test_a_snapshot_holds_walkers_and_pushed_things(make: Maker) -> None:
     world = load_world("office")
     body = make(world)

@@ -250,6 +250,7 @@ def life(
     return wires, [seat.body.state for seat in made.seats]
 
 
+@pytest.mark.slow
 @settings(max_examples=8, deadline=None)
 @given(orders=ORDERS, looks=st.lists(st.integers(50_000_000, 1_550_000_000), max_size=20))
 def test_the_same_bytes_however_often_and_in_whatever_order_robots_are_asked(
@@ -283,6 +284,7 @@ def test_a_meeting_that_was_saved_goes_on_as_it_would_have(
     assert ends[0] == ends[1] == ends[2]
 
 
+@pytest.mark.slow
 @pytest.mark.bullet
 def test_physical_robots_repeat_and_go_on_after_a_restore() -> None:
     pytest.importorskip("pybullet")
