@@ -70,8 +70,9 @@ def pins(
 def pin_rows(board: BluePill, probe: Probe) -> list[dict[str, object]]:
     """Return what is to be told of each pin that has a leg."""
     rows: list[dict[str, object]] = []
+    all_edges = probe.edges
     for pin in board.pins:
-        edges = probe.edges.get(pin.name, [])
+        edges = all_edges.get(pin.name, [])
         is_untouched = pin.mode.value == "floating input" and pin.driven is None and not edges
         rows.append(
             {

@@ -66,8 +66,7 @@ static inline void tell(struct core *core, uint64_t cycle, uint32_t address, int
     }
 }
 
-/* Keeps a row of which nobody is told. */
-void keep(struct core *core, uint64_t cycle, uint32_t address, int32_t kind) { tell(core, cycle, address, kind); }
+void record_at(struct core *core, uint64_t cycle, uint32_t address, int32_t kind) { tell(core, cycle, address, kind); }
 
 void record(struct core *core, uint32_t address, int32_t kind) { tell(core, core->shared.cycle, address, kind); }
 

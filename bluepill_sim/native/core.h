@@ -13,6 +13,9 @@
 #define NEVER (UINT64_C(1) << 62)
 #define NO_TIME UINT64_MAX
 #define NS_PER_S UINT64_C(1000000000)
+/* ITSTATE in the CPSR, and the exception number of interrupt line 0. */
+#define IT_BITS 0x0600FC00u
+#define FIRST_IRQ 16
 #define UNLIKELY(x) __builtin_expect(!!(x), 0)
 /* Kept out of its callers, which stay short enough to need no stack. */
 #define RARELY __attribute__((noinline, cold))
@@ -263,7 +266,7 @@ void free_dropped(struct core *core);
 const struct instruction *instruction_at(const struct row *row, uint32_t address);
 void record(struct core *core, uint32_t address, int32_t kind);
 void core_flush(struct core *core);
-void keep(struct core *core, uint64_t cycle, uint32_t address, int32_t kind);
+void record_at(struct core *core, uint64_t cycle, uint32_t address, int32_t kind);
 /* polling.c */
 bool waits_in_vain(struct core *core, const struct row *row);
 void wait_on(struct core *core, const struct row *row);
@@ -286,6 +289,7 @@ bool wakes(struct core *core);
 int deliver(struct core *core);
 bool leave(struct core *core, uint32_t exc_return);
 bool supervisor_call(struct core *core, uint32_t pc);
+void pend(struct core *core, unsigned number);
 void tick(struct core *core);
 #pragma GCC visibility pop
 /* run.c, for Python as well. */

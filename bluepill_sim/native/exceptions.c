@@ -9,13 +9,12 @@
 #include "core.h"
 
 enum { ENTRY_CYCLES = 12, EXIT_CYCLES = 12, TAIL_CHAIN_CYCLES = 6, FRAME_BYTES = 32 };
-enum { NMI = 2, HARD_FAULT = 3, SVCALL = 11, SYSTICK = 15, FIRST_IRQ = 16, THREAD_PRIORITY = 256 };
+enum { NMI = 2, HARD_FAULT = 3, SVCALL = 11, SYSTICK = 15, THREAD_PRIORITY = 256 };
 enum { SLEEPONEXIT = 2, SEVONPEND = 16, STKALIGN = 1 << 9, SPSEL = 2, NPRIV = 1 };
 enum { AWAKE, FOR_INTERRUPT, FOR_EVENT };
 
 #define T_BIT (1u << 24)
 #define ALIGN_BIT (1u << 9)
-#define IT_BITS 0x0600FC00u
 #define FLAG_BITS 0xF8000000u
 #define CPSR_T (1u << 5)
 #define TO_HANDLER 0xFFFFFFF0u
@@ -289,15 +288,21 @@ bool wakes(struct core *core)
 }
 
 /* SysTick comes to 0 at or before the present cycle: as SysTick.advance_to. */
+/* Makes an exception pending, at a border. */
+void pend(struct core *core, unsigned number)
+{
+    set_bit(core->shared.pending, number);
+    if (core->shared.scr & SEVONPEND) {
+        core->shared.event_register = 1;
+    }
+}
+
 void tick(struct core *core)
 {
     struct shared *s = &core->shared;
     s->tick_count_flag = 1;
     if (s->tick_control & 2) {
-        set_bit(s->pending, SYSTICK);
-        if (s->scr & SEVONPEND) {
-            s->event_register = 1;
-        }
+        pend(core, SYSTICK);
     }
     s->tick_value = 0;
     if (!s->tick_reload) {

@@ -56,7 +56,7 @@ void wait_on(struct core *core, const struct row *row)
     struct shared *s = &core->shared;
     const uint64_t rounds = (s->stop_at - s->cycle + row->taken - 1) / row->taken;
     for (uint64_t n = rounds > LAST_ROWS ? rounds - LAST_ROWS : 1; n < rounds; ++n) {
-        keep(core, s->cycle + n * row->taken, row->start, 0);
+        record_at(core, s->cycle + n * row->taken, row->start, 0);
     }
     s->cycle += rounds * row->taken;
 }

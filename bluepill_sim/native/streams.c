@@ -7,7 +7,6 @@
 #include "core.h"
 #include "usart.h"
 
-enum { SEVONPEND = 16, FIRST_IRQ = 16 };
 
 struct stream *core_stream(struct core *core, uint32_t number) { return &core->streams[number]; }
 
@@ -59,14 +58,10 @@ void core_stop_streams(struct core *core)
 
 static void raise_line(struct core *core, uint32_t irq)
 {
-    struct shared *s = &core->shared;
-    if (s->levels >> irq & 1) {
-        return;
-    }
-    s->levels |= UINT64_C(1) << irq;
-    s->pending[(irq + FIRST_IRQ) / 64] |= UINT64_C(1) << (irq + FIRST_IRQ) % 64;
-    if (s->scr & SEVONPEND) {
-        s->event_register = 1;
+    const uint64_t line = UINT64_C(1) << irq;
+    if (!(core->shared.levels & line)) {
+        core->shared.levels |= line;
+        pend(core, irq + FIRST_IRQ);
     }
 }
 

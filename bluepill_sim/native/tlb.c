@@ -7,7 +7,6 @@
 #include "core.h"
 
 enum { MAY_READ = 1, MAY_WRITE = 2, MAY_EXECUTE = 4, FETCH = 18 };
-#define IT_BITS 0x0600FC00u
 
 /* `uc_tlb_entry` of unicorn.h. */
 struct tlb_entry {

@@ -23,7 +23,8 @@ def write_sigrok(probe: Probe, path: Path) -> None:
     names = signals_in_order(probe)
     start_ns, span_ns = probe.start_ns, probe.end_ns - probe.start_ns
     rate_hz = next((rate for rate in RATES_HZ if span_ns * rate // NS_PER_S < MOST_SAMPLES), RATES_HZ[-1])
-    edges = sorted((at - start_ns, n, value) for n, name in enumerate(names) for at, value in probe.edges.get(name, ()))
+    by_name = probe.edges
+    edges = sorted((at - start_ns, n, value) for n, name in enumerate(names) for at, value in by_name.get(name, ()))
     bits = sum((probe.initial[name] & 1) << n for n, name in enumerate(names))
     try:
         write_session(path, names, rate_hz, runs(edges, bits, span_ns, rate_hz))

@@ -23,11 +23,12 @@ def write_vcd(probe: Probe, path: Path) -> None:
     Raises:
         BluePillError: the file cannot be written.
     """
-    codes = _codes(probe)
+    signals, words = signals_in_order(probe), words_in_order(probe)
+    codes = {name: identifier(index) for index, name in enumerate([*signals, *words])}
     log = probe.log
     try:
         with path.open("w", encoding="ascii", newline="\n") as file:
-            file.writelines(f"{line}\n" for line in _head(probe, codes))
+            file.writelines(f"{line}\n" for line in _head(probe, codes, words))
             if not isinstance(log, NativeEdgeLog):
                 file.writelines(f"{line}\n" for line in _changes(probe, codes))
         if isinstance(log, NativeEdgeLog):
@@ -44,12 +45,7 @@ def identifier(index: int) -> str:
     return code if index < base else identifier(index // base - 1) + code
 
 
-def _codes(probe: Probe) -> dict[str, str]:
-    return {name: identifier(index) for index, name in enumerate([*signals_in_order(probe), *words_in_order(probe)])}
-
-
-def _head(probe: Probe, codes: dict[str, str]) -> Iterator[str]:
-    words = words_in_order(probe)
+def _head(probe: Probe, codes: dict[str, str], words: list[str]) -> Iterator[str]:
     yield "$version p2os bluepill_sim $end"
     yield "$timescale 1 ns $end"
     yield "$scope module bluepill $end"

@@ -16,7 +16,6 @@ file, the line and the key.
 """
 
 import math
-import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from difflib import get_close_matches
@@ -29,7 +28,7 @@ from p2os.pioneer.fleet_order import DEFAULT_PORT, FleetOrder, RobotOrder, follo
 from p2os.pioneer.scenery import Pose
 from p2os.pioneer.sensor_errors import load_sensor_errors
 from p2os.pioneer.settings import ControllerSettings, SonarPerSip
-from p2os.pioneer.toml_places import TomlPlaces, find_places, line_of_error
+from p2os.pioneer.toml_places import TomlPlaces, read_toml
 from p2os.profiles import Profile
 
 
@@ -134,14 +133,7 @@ def parse_fleet(text: str, source: str, folder: Path) -> FleetOrder:
     Raises:
         FleetError: The text is no TOML or breaks the schema; the message names the source, the line and the key.
     """
-    try:
-        table = tomllib.loads(text)
-    except tomllib.TOMLDecodeError as error:
-        what, line = line_of_error(str(error), text)
-        raise FleetError(f"{source}:{line}: {what}", hint="the file is not TOML") from error
-    except RecursionError as error:
-        raise FleetError(f"{source}:1: nested too deeply", hint="the file is not a fleet") from error
-    places = find_places(text)
+    table, places = read_toml(text, source, "a fleet", FleetError)
     top = _Section(source, places, folder, "", 0, table)
     top.check_keys(TOP_KEYS)
     rows = cast("list[object]", top.get("robot", []))

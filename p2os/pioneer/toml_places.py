@@ -9,7 +9,11 @@ the line of what holds them.
 """
 
 import re
+import tomllib
 from dataclasses import dataclass, field
+from typing import Any
+
+from p2os.errors import FileError
 
 _HEADER = re.compile(r"\s*(\[\[?)\s*([^\]]+?)\s*\]\]?\s*(?:#.*)?$")
 _KEY = re.compile(r"\s*([A-Za-z0-9_.\-\"']+)\s*=")
@@ -56,6 +60,27 @@ def find_places(text: str) -> TomlPlaces:
             rest = line[key.end() :]
         depth, closing = _after(rest, depth, closing)
     return found
+
+
+def read_toml(text: str, source: str, what: str, error_type: type[FileError]) -> tuple[dict[str, Any], TomlPlaces]:
+    """Return a text's table and the places of its keys.
+
+    Args:
+        text: The file's text.
+        source: What to call it in messages.
+        what: What it should be, such as "a world".
+        error_type: What to raise.
+
+    Raises:
+        FileError: One of `error_type`: the text is no TOML; the message names the source and the line.
+    """
+    try:
+        return tomllib.loads(text), find_places(text)
+    except tomllib.TOMLDecodeError as error:
+        complaint, line = line_of_error(str(error), text)
+        raise error_type(f"{source}:{line}: {complaint}", hint="the file is not TOML") from error
+    except RecursionError as error:
+        raise error_type(f"{source}:1: nested too deeply", hint=f"the file is not {what}") from error
 
 
 def line_of_error(message: str, text: str) -> tuple[str, int]:

@@ -5,7 +5,6 @@ writes what this reads.
 """
 
 import math
-import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from difflib import get_close_matches
@@ -15,7 +14,7 @@ from typing import Any
 from p2os.errors import WorldError
 from p2os.pioneer.arena import arena
 from p2os.pioneer.scenery import Kind, Mark, Mesh, Obstacle, Pose, World
-from p2os.pioneer.toml_places import TomlPlaces, find_places, line_of_error
+from p2os.pioneer.toml_places import TomlPlaces, read_toml
 from p2os.pioneer.walk import Repeat, Walk
 
 Table = dict[str, Any]
@@ -91,14 +90,7 @@ def parse_world(text: str, source: str, seed: int = 0, folder: Path | None = Non
         WorldError: The text is no TOML or breaks the schema; the message names the source, the line and the key.
         MissingDependencyError: An imported file needs a reader that is not installed.
     """
-    try:
-        table = tomllib.loads(text)
-    except tomllib.TOMLDecodeError as error:
-        what, line = line_of_error(str(error), text)
-        raise WorldError(f"{source}:{line}: {what}", hint="the file is not TOML") from error
-    except RecursionError as error:
-        raise WorldError(f"{source}:1: nested too deeply", hint="the file is not a world") from error
-    places = find_places(text)
+    table, places = read_toml(text, source, "a world", WorldError)
     top = Section(source, places, "", 0, table)
     _only(top, TOP_KEYS)
     start = _start(Section(source, places, "start", 0, _table(top, "start")))
