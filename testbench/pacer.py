@@ -11,14 +11,10 @@ from collections.abc import Callable
 
 from p2os.errors import LocalProtocolError
 from p2os.timing import NS_PER_MS, NS_PER_S, Nanos
-
-#: A clock that never goes back, in nanoseconds.
-Clock = Callable[[], Nanos]
+from p2os.transport.wall_clock import Clock, wall_clock
 
 #: chosen: the grain of pacing, fine enough for a line of 9600 bit/s.
 PACED_SLICE_NS: Nanos = 2 * NS_PER_MS
-
-wall_clock: Clock = time.monotonic_ns
 
 
 class Pacer:
@@ -58,7 +54,7 @@ class Pacer:
         ahead = now - self.wall_ns()
         if ahead > 0:
             self._sleep(ahead / self.speed / NS_PER_S)
-            ahead = 0
+            ahead = min(now - self.wall_ns(), 0)  # a sleep can last longer: the machine may have slept too
         self.lag_ns = -ahead
         self.worst_lag_ns = max(self.worst_lag_ns, self.lag_ns)
 

@@ -14,6 +14,7 @@ from collections.abc import Callable
 
 from adapter_sim.pinout import Role, load_pinout
 from adapter_sim.states import AdapterState
+from p2os.client.interrupts import held_back
 from p2os.errors import RemoteProtocolError, RunFailedError, TransportError
 from p2os.sip import SIP_KINDS, StandardSip
 from p2os.timing import NS_PER_MS, NS_PER_S, Nanos
@@ -114,13 +115,19 @@ class RemoteBench:
             self.close()
 
     def close(self) -> None:
-        """Stop the robot, close its session and give the line back; closing twice is harmless."""
+        """Stop the robot, close its session and give the line back; closing twice is harmless.
+
+        Interrupts (Ctrl-C) meanwhile are raised when that is done.
+        """
+        held_back(self._close)
+
+    def _close(self) -> None:
         if self._is_closed:
             return
-        self._is_closed = True
         with contextlib.suppress(TransportError):  # the robot's watchdog stops it
             stop_robot(self._transport)
             self.recorder.event("bench", self.loop.now + 1, "robot stopped", "STOP, VEL 0, RVEL 0 twice, CLOSE")
+        self._is_closed = True
         with contextlib.suppress(TransportError):
             self._transport.close()
 

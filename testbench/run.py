@@ -15,10 +15,11 @@ from typing import TypeVar
 from p2os.errors import P2osError
 from p2os.timing import NS_PER_MS, NS_PER_S, Nanos
 from p2os.transport import Transport
+from p2os.transport.wall_clock import Clock, wall_clock
 from testbench.artefacts import make_artefacts
 from testbench.bench import Bench
 from testbench.goals import judge
-from testbench.pacer import PACED_SLICE_NS, Clock, Pacer, wall_clock
+from testbench.pacer import PACED_SLICE_NS, Pacer
 from testbench.remote import RemoteBench
 from testbench.report.run_record import Json, read_run
 from testbench.run_folder import meta_of, prepare_folder

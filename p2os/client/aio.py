@@ -5,13 +5,16 @@
 
 All decisions are `RobotCore`'s; the loop's own readers and timers turn the
 line, so there is no thread. Lines are opened in the loop's executor. While the
-loop is blocked nothing is sent, and the robot's watchdog stops it.
+loop is blocked nothing is sent; when it goes on, the robot is told to stop first.
+
+The loop knows an `AsyncEngine` only, never the `Robot`: so a robot that the program
+forgets is collected, and that stops it. The end of `asyncio.run` does too.
 """
 
 import asyncio
 import contextlib
 import math
-import time
+import weakref
 from collections import deque
 from collections.abc import AsyncIterator, Callable
 from types import TracebackType
@@ -20,7 +23,7 @@ from typing import Self
 from p2os.client.aux_async import AsyncAux
 from p2os.client.calls import Result, RobotCalls
 from p2os.client.core import RobotCore
-from p2os.client.engine import BLIND_POLL_S, CLOSING_S, MOST_NOTICES, SIGN_OF_LIFE_S, Opener
+from p2os.client.engine import CLOSING_S, MOST_NOTICES, SIGN_OF_LIFE_S, Opener
 from p2os.client.goals import Axis, DriveAxis, MotionResult, TurnAxis
 from p2os.client.line import Line
 from p2os.client.notices import Notice
@@ -33,6 +36,190 @@ from p2os.parameters import RobotParameters
 from p2os.timing import NS_PER_S, Nanos
 from p2os.transport import open_url
 from p2os.transport.ports import Transport
+from p2os.transport.waiting import BLIND_POLL_S
+from p2os.transport.wall_clock import Clock, wall_clock
+
+
+class AsyncEngine:
+    """Drives one core on one line by an event loop's readers and timers.
+
+    Args:
+        core: The client.
+        baud: Speed at which a serial line is opened; None for other lines.
+        open_line: Opens the line; called in the loop's executor.
+        clock: Nanoseconds that never go back, and go on while the machine sleeps.
+    """
+
+    def __init__(
+        self, core: RobotCore, baud: int | None, open_line: Callable[[], Transport], clock: Clock = wall_clock
+    ) -> None:
+        self.core = core
+        self.queues: list[deque[Notice]] = []
+        self.state_callbacks: list[Callable[[RobotState], None]] = []
+        self.event_callbacks: list[Callable[[Notice], None]] = []
+        self.failure: BaseException | None = None
+        #: Whether the program has met the failure.
+        self.has_told = False
+        self._line = Line(core, baud, clock)
+        self._open_line = open_line
+        self._loop: asyncio.AbstractEventLoop | None = None
+        self._keeper: asyncio.Task[None] | None = None
+        self._changed = asyncio.Event()
+        self._timer: asyncio.TimerHandle | None = None
+        self._watched: int | None = None
+        self._opening: asyncio.Task[None] | None = None
+        self._is_closed = False
+
+    def start(self) -> None:
+        """Begin to move bytes in the running loop.
+
+        Raises:
+            P2osError: The robot was closed.
+        """
+        if self._is_closed:
+            raise P2osError("this robot was closed", hint="make another Robot")
+        if self._loop is None:
+            self._loop = asyncio.get_running_loop()
+            self._keeper = self._loop.create_task(self._keep())
+
+    def run(self, call: Callable[[RobotCore, Nanos], Result]) -> Result:
+        """Act on the core, now; what it wants to send leaves at once."""
+        self.check()
+        now = self._line.now()
+        self.core.touch(now)
+        result = call(self.core, now)
+        self._turn()
+        return result
+
+    async def wait_for(self, is_so: Callable[[RobotCore], bool], timeout_s: float | None) -> bool:
+        """Wait until something is so; the program is known to live meanwhile."""
+        ends = None if timeout_s is None else self._line.now() + round(timeout_s * NS_PER_S)
+        while not is_so(self.core):
+            self.check()
+            now = self._line.now()
+            self.core.touch(now)
+            if ends is not None and now >= ends:
+                return False
+            left = SIGN_OF_LIFE_S if ends is None else min(SIGN_OF_LIFE_S, (ends - now) / NS_PER_S)
+            await _changes(self._changed, left)
+        return True
+
+    async def close(self) -> None:
+        """Stop the robot, end the session, give the line back; whatever comes between, `finish` does the rest."""
+        try:
+            if not self._is_closed:
+                self._is_closed = True
+                self.core.close(self._line.now())
+                self._turn()  # STOP is out before anything can interrupt
+            with contextlib.suppress(TimeoutError):
+                async with asyncio.timeout(CLOSING_S):
+                    while not self._line.is_over and self.failure is None:
+                        await _changes(self._changed, SIGN_OF_LIFE_S)
+        finally:
+            self.finish()
+
+    def finish(self) -> None:
+        """Give everything back, with or without a loop; where closing could not come to its end, STOP goes first."""
+        self._is_closed = True
+        try:
+            self._line.finish()
+        finally:
+            if self._loop is not None and not self._loop.is_closed():
+                self._let_go_of_loop()
+            self._changed.set()
+
+    def check(self) -> None:
+        """Raise what the client failed with.
+
+        Raises:
+            P2osError: It failed.
+        """
+        if self.failure is not None:
+            self.has_told = True
+            raise P2osError(f"the client failed: {self.failure}") from self.failure
+
+    async def _keep(self) -> None:
+        """Wait for the loop's end: `asyncio.run` cancels what is left."""
+        try:
+            await asyncio.get_running_loop().create_future()
+        finally:
+            self.finish()
+
+    def _let_go_of_loop(self) -> None:
+        if self._timer is not None:
+            self._timer.cancel()
+            self._timer = None
+        self._unwatch()
+        keeper, self._keeper = self._keeper, None
+        if keeper is not None:
+            keeper.cancel()
+
+    def _turn(self) -> None:
+        """Do what is due, tell the news, and arrange to be woken."""
+        if self._timer is not None:
+            self._timer.cancel()
+            self._timer = None
+        try:
+            self._line.turn()
+            self._tell()
+        except BaseException as error:
+            self.failure = error
+            self.finish()
+            if not isinstance(error, Exception):
+                raise
+            return
+        if self._line.is_wanted and self._opening is None:
+            self._opening = asyncio.ensure_future(self._open())
+        self._arrange()
+
+    def _arrange(self) -> None:
+        loop = self._loop
+        if loop is None:
+            return
+        transport, wait_s = self._line.transport, self._line.wait_s()
+        descriptor = None
+        if transport is not None:
+            try:
+                descriptor = transport.fileno()
+            except TransportError:
+                wait_s = min(wait_s, BLIND_POLL_S)
+        if descriptor != self._watched:
+            self._unwatch()
+            if descriptor is not None:
+                loop.add_reader(descriptor, self._turn)
+                self._watched = descriptor
+        if not self._line.is_over:
+            self._timer = loop.call_later(wait_s, self._turn)
+
+    def _tell(self) -> None:
+        news = list(self.core.news)
+        self.core.news.clear()
+        for item in news:
+            if isinstance(item, RobotState):
+                for on_state in tuple(self.state_callbacks):
+                    on_state(item)
+                continue
+            for queue in self.queues:
+                queue.append(item)
+            for on_event in tuple(self.event_callbacks):
+                on_event(item)
+        changed, self._changed = self._changed, asyncio.Event()
+        changed.set()
+
+    async def _open(self) -> None:
+        try:
+            transport = await asyncio.get_running_loop().run_in_executor(None, self._open_line)
+        except Exception as error:  # noqa: BLE001  # an opener may raise anything; the wait for it has to end
+            self._line.failed(error)
+        else:
+            self._line.opened(transport)
+        self._opening = None
+        self._turn()
+
+    def _unwatch(self) -> None:
+        if self._watched is not None and self._loop is not None:
+            self._loop.remove_reader(self._watched)
+            self._watched = None
 
 
 class Robot(RobotCalls):
@@ -48,24 +235,15 @@ class Robot(RobotCalls):
         deadman_s: float | None = 2.0,
         settings: ClientSettings | None = None,
         opener: Opener = open_url,
+        clock: Clock = wall_clock,
     ) -> None:
-        self._core, baud = core_for(
+        core, baud = core_for(
             url, model=model, auto_enable=auto_enable, reconnect=reconnect, deadman_s=deadman_s, settings=settings
         )
         self.url = url
-        self._opener = opener
-        self._line = Line(self._core, baud)
-        self._changed = asyncio.Event()
-        self._timer: asyncio.TimerHandle | None = None
-        self._watched: int | None = None
-        self._opening: asyncio.Task[None] | None = None
-        self._is_closed = False
-        self._queues: list[deque[Notice]] = []
-        self._state_callbacks: list[Callable[[RobotState], None]] = []
-        self._event_callbacks: list[Callable[[Notice], None]] = []
-        self._failure: BaseException | None = None
-        #: Whether the program has met the failure.
-        self._has_told = False
+        self._core = core
+        self._engine = AsyncEngine(core, baud, lambda: opener(url), clock)
+        self._finalizer = weakref.finalize(self, self._engine.finish)
 
     # Coming and going ---------------------------------------------------------------------
 
@@ -75,6 +253,7 @@ class Robot(RobotCalls):
         Raises:
             ConnectError: the line cannot be opened, or no robot answers.
         """
+        self._engine.start()
         try:
             self._run(lambda core, now: core.connect(now))
             await self._wait_for(lambda core: core.is_ready or core.link in {Link.FAILED, Link.CLOSED}, None)
@@ -87,17 +266,7 @@ class Robot(RobotCalls):
 
     async def close(self) -> None:
         """Stop the robot, end the session, give the line back; twice is harmless."""
-        if self._is_closed:
-            return
-        self._is_closed = True
-        self._core.close(self._now())
-        self._turn()  # STOP is out before anything can interrupt
-        try:
-            with contextlib.suppress(TimeoutError):
-                async with asyncio.timeout(CLOSING_S):
-                    await self._drain()
-        finally:
-            self._end()
+        await self._engine.close()
 
     async def __aenter__(self) -> Self:
         return await self.connect()
@@ -106,8 +275,8 @@ class Robot(RobotCalls):
         self, kind: type[BaseException] | None, error: BaseException | None, _: TracebackType | None
     ) -> None:
         await self.close()
-        if error is None and not self._has_told:
-            self._check()
+        if error is None and not self._engine.has_told:
+            self._engine.check()
 
     # Waiting ------------------------------------------------------------------------------
 
@@ -162,8 +331,8 @@ class Robot(RobotCalls):
 
     async def events(self) -> AsyncIterator[Notice]:
         """Yield what happens beside the states, from now on, in order; ends when the client does."""
-        queue: deque[Notice] = deque(maxlen=MOST_NOTICES)
-        self._queues.append(queue)
+        engine, queue = self._engine, deque[Notice](maxlen=MOST_NOTICES)
+        engine.queues.append(queue)
         try:
             while True:
                 await self._wait_for(lambda core: bool(queue) or _is_over(core), None)
@@ -171,20 +340,22 @@ class Robot(RobotCalls):
                     return
                 yield queue.popleft()
         finally:
-            self._queues = [other for other in self._queues if other is not queue]
+            engine.queues = [other for other in engine.queues if other is not queue]
 
     def on_state(self, callback: Callable[[RobotState], None]) -> Callable[[], None]:
         """Call `callback` with each state, in the loop; return what ends that.
 
         An exception in it stops the robot and is raised in the program's next call.
         """
-        self._state_callbacks.append(callback)
-        return lambda: _remove(self._state_callbacks, callback)
+        callbacks = self._engine.state_callbacks
+        callbacks.append(callback)
+        return lambda: _remove(callbacks, callback)
 
     def on_event(self, callback: Callable[[Notice], None]) -> Callable[[], None]:
         """Call `callback` with what happens beside the states; otherwise as `on_state`."""
-        self._event_callbacks.append(callback)
-        return lambda: _remove(self._event_callbacks, callback)
+        callbacks = self._engine.event_callbacks
+        callbacks.append(callback)
+        return lambda: _remove(callbacks, callback)
 
     # Motion that waits --------------------------------------------------------------------
 
@@ -216,7 +387,7 @@ class Robot(RobotCalls):
         try:
             await self._wait_for(lambda _: goal.ended is not None, None)
         finally:
-            if goal.ended is None and self._failure is None:
+            if goal.ended is None and self._engine.failure is None:
                 self._run(lambda core, now: core.cancel_goal(goal, now))
         return motion_result(goal, self._core)
 
@@ -226,125 +397,11 @@ class Robot(RobotCalls):
         """Return one of the robot's own serial ports, as a file of bytes whose calls are awaited."""
         return AsyncAux(port, send=self.send, listen=self.on_event, wait_for=self._wait_for)
 
-    # The loop -----------------------------------------------------------------------------
-
     def _run(self, call: Callable[[RobotCore, Nanos], Result]) -> Result:
-        self._check()
-        now = self._now()
-        self._core.touch(now)
-        result = call(self._core, now)
-        self._turn()
-        return result
+        return self._engine.run(call)
 
     async def _wait_for(self, is_so: Callable[[RobotCore], bool], timeout_s: float | None) -> bool:
-        ends = None if timeout_s is None else self._now() + round(timeout_s * NS_PER_S)
-        while not is_so(self._core):
-            self._check()
-            now = self._now()
-            self._core.touch(now)
-            if ends is not None and now >= ends:
-                return False
-            left = SIGN_OF_LIFE_S if ends is None else min(SIGN_OF_LIFE_S, (ends - now) / NS_PER_S)
-            changed = self._changed
-            await _changes(changed, left)
-        return True
-
-    def _turn(self) -> None:
-        """Do what is due, tell the news, and arrange to be woken."""
-        if self._timer is not None:
-            self._timer.cancel()
-            self._timer = None
-        try:
-            self._line.turn(self._now())
-            self._tell()
-        except BaseException as error:
-            self._failure = error
-            self._end()
-            if not isinstance(error, Exception):
-                raise
-            return
-        if self._line.is_wanted and self._opening is None:
-            self._opening = asyncio.ensure_future(self._open())
-        self._arrange()
-
-    def _arrange(self) -> None:
-        loop = asyncio.get_running_loop()
-        transport, wake = self._line.transport, self._line.next_wake()
-        descriptor, waits = None, []
-        if transport is not None:
-            try:
-                descriptor = transport.fileno()
-            except TransportError:
-                waits.append(BLIND_POLL_S)
-        if descriptor != self._watched:
-            self._unwatch()
-            if descriptor is not None:
-                loop.add_reader(descriptor, self._turn)
-                self._watched = descriptor
-        if wake is not None:
-            waits.append(max(wake - self._now(), 0) / NS_PER_S)
-        if waits:
-            self._timer = loop.call_later(min(waits), self._turn)
-
-    def _tell(self) -> None:
-        news = list(self._core.news)
-        self._core.news.clear()
-        for item in news:
-            if isinstance(item, RobotState):
-                for on_state in tuple(self._state_callbacks):
-                    on_state(item)
-                continue
-            for queue in self._queues:
-                queue.append(item)
-            for on_event in tuple(self._event_callbacks):
-                on_event(item)
-        changed, self._changed = self._changed, asyncio.Event()
-        changed.set()
-
-    async def _open(self) -> None:
-        loop = asyncio.get_running_loop()
-        try:
-            transport: Transport = await loop.run_in_executor(None, self._opener, self.url)
-        except P2osError as error:
-            self._line.failed(error, self._now())
-        else:
-            self._line.opened(transport, self._now())
-        self._opening = None
-        self._turn()
-
-    async def _drain(self) -> None:
-        """Wait until all that closing says has gone out."""
-        while not self._line.is_over and self._failure is None:
-            changed = self._changed
-            await _changes(changed, SIGN_OF_LIFE_S)
-
-    def _end(self) -> None:
-        """Give everything back; where closing could not come to its end, STOP first."""
-        if self._timer is not None:
-            self._timer.cancel()
-            self._timer = None
-        now = self._now()
-        with contextlib.suppress(Exception):
-            self._core.close(now)
-            while not self._core.is_quiet:  # nothing is left to space the frames: they go now
-                due = self._core.next_deadline()
-                self._line.write(now if due is None else max(now, due))
-        self._unwatch()
-        self._line.close()
-        self._changed.set()
-
-    def _unwatch(self) -> None:
-        if self._watched is not None:
-            asyncio.get_running_loop().remove_reader(self._watched)
-            self._watched = None
-
-    def _check(self) -> None:
-        if self._failure is not None:
-            self._has_told = True
-            raise P2osError(f"the client failed: {self._failure}") from self._failure
-
-    def _now(self) -> Nanos:
-        return time.monotonic_ns()
+        return await self._engine.wait_for(is_so, timeout_s)
 
 
 async def _changes(changed: asyncio.Event, longest_s: float) -> None:

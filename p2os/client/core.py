@@ -76,8 +76,9 @@ class RobotCore:
         self._session = Session(settings)
         self._observer = Observer(parameters or load(STAND_IN))
         self._mover = Mover(
-            settings, self._observer, send=self._session.send, drop=self._session.drop, tell=self.news.append
-        )
+            settings, self._observer, send=self._session.send, send_first=self._session.send_first,
+            drop=self._session.drop, tell=self.news.append,
+        )  # fmt: skip
         self._now: Nanos = 0
         self._packets: dict[type, ServerPacket] = {}
         self._unseen_loss: str | None = None
@@ -263,6 +264,14 @@ class RobotCore:
         self.advance_to(now)
         self._session.receive(data, now)
         self._collect(now)
+
+    def take_gap(self, gap_ns: Nanos, now: Nanos) -> None:
+        """Tell the robot to stop before anything else: program or machine paused for `gap_ns`, which ended just now.
+
+        `now` is the time before the gap; what was due in it has not been acted on.
+        """
+        if self.link is Link.OPEN:
+            self._mover.take_gap(gap_ns, now)
 
     def take_action(self, now: Nanos) -> Action | None:
         """Return the next thing to do with the line, if any is due."""

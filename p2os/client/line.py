@@ -1,33 +1,60 @@
-"""The client's core joined to a byte line: what both skins do each time they wake.
+"""The client's core joined to a byte line and a clock: what both robots do each time they wake.
 
-No clock is read and nothing is waited for here.
+Nothing is waited for here. The core's time is the clock's without the gaps in which
+packets came: what waited in the system while the program or its machine paused was
+sent in time, so no time-out may run over it.
+
+After a gap STOP is the first frame out, then what waits is read, then it is judged:
+where nothing sound waited, the gap counts as silence of the robot.
+
+Invariant: `finish` returns, or is left by an exception, only after STOP has been written to a line that takes it.
 """
 
+import contextlib
+
 from p2os.client.core import RobotCore
+from p2os.client.interrupts import held_back
 from p2os.client.outbox import CloseLine, OpenLine, Send, SetBaud
 from p2os.client.snapshots import Link
+from p2os.commands import Command, CommandNumber, enable, stop, vel
 from p2os.errors import P2osError, TransportError
-from p2os.timing import Nanos
+from p2os.timing import NS_PER_S, Nanos
 from p2os.transport.ports import Transport
+from p2os.transport.wall_clock import Clock, GapWatch, wall_clock
 
 #: chosen: more reads a turn than any line fills between two wakes; a flood must not starve the clock.
 MOST_READS = 16
+#: chosen: the longest wait of a line that has nothing to do.
+LONGEST_WAIT_NS: Nanos = NS_PER_S // 2
+
+#: What is written where the core cannot be asked any more: it was interrupted, or has failed. Some of it may have been
+#: said already, which does no harm.
+LAST_FRAMES = b"".join(
+    command.to_frame().to_bytes() for command in (stop(), vel(0), enable(False), Command(CommandNumber.CLOSE))
+)
 
 
 class Line:
-    """Moves bytes between a `RobotCore` and the transport that its skin opens.
+    """Moves bytes between a `RobotCore` and the transport that its owner opens.
 
     Args:
         core: The client.
         baud: Speed at which a serial line is opened; None for other lines.
+        clock: Nanoseconds that never go back, and go on while the machine sleeps.
     """
 
-    def __init__(self, core: RobotCore, baud: int | None) -> None:
+    def __init__(self, core: RobotCore, baud: int | None, clock: Clock = wall_clock) -> None:
         self.core = core
         self._baud = baud
+        self._clock = clock
         self._transport: Transport | None = None
+        #: The clock's time of the last look, and what the core's time leaves out of it.
+        self._looked_at: Nanos = clock()
+        self._left_out: Nanos = 0
+        self._watch = GapWatch(self._looked_at)
+        #: The core's time of the last turn.
         self._turned_at: Nanos = 0
-        #: The skin is to open the line and to call `opened` or `failed`.
+        #: The owner is to open the line and to call `opened` or `failed`.
         self.is_wanted = False
 
     @property
@@ -40,22 +67,33 @@ class Line:
         """Whether the client is closed and everything has gone out."""
         return self.core.link is Link.CLOSED and self.core.is_quiet and self._transport is None and not self.is_wanted
 
-    def opened(self, transport: Transport, now: Nanos) -> None:
+    def now(self) -> Nanos:
+        """Read the clock and return the core's time; after a gap the robot is told to stop before anything else."""
+        self._looked_at = self._clock()
+        if (gap_ns := self._watch.gap(self._looked_at)) > 0:
+            self._take_gap(gap_ns)
+        return self._looked_at - self._left_out
+
+    def opened(self, transport: Transport) -> None:
         """Take the line that was wanted; it is closed where it is not wanted any more."""
         self.is_wanted = False
+        now = self.now()
         if self.core.link is not Link.OPENING:
             transport.close()
             return
         self._transport = transport
         self.core.line_opened(now, self._baud)
 
-    def failed(self, error: P2osError, now: Nanos) -> None:
-        """Take the news that the line cannot be opened."""
+    def failed(self, error: Exception) -> None:
+        """Take the news that the line cannot be opened, whatever its opener raised."""
         self.is_wanted = False
-        self.core.line_failed(str(error), error.hint, now)
+        hint = error.hint if isinstance(error, P2osError) else None
+        reason = str(error) if isinstance(error, P2osError) else f"{type(error).__name__}: {error}"
+        self.core.line_failed(reason, hint, self.now())
 
-    def turn(self, now: Nanos) -> None:
-        """Read, act on time, write: all that is to be done at `now`."""
+    def turn(self) -> None:
+        """Read, act on time, write: all that is to be done now."""
+        now = self.now()
         self._read(now)
         self.core.advance_to(now)
         self.write(now)
@@ -79,13 +117,45 @@ class Line:
                 case _:
                     pass  # the line has gone meanwhile
 
-    def next_wake(self) -> Nanos | None:
-        """Return when `turn` is due without bytes."""
-        return self.core.next_deadline()
+    def wait_s(self) -> float:
+        """Return for how many seconds nothing is due without bytes; whoever comes back later has had a gap."""
+        deadline = self._looked_at + LONGEST_WAIT_NS
+        if (due := self.core.next_deadline()) is not None:
+            deadline = max(min(deadline, due + self._left_out), self._looked_at)  # 0 is at once
+        self._watch.expect(deadline)
+        return max(deadline - self._clock(), 0) / NS_PER_S
 
-    def close(self) -> None:
-        """Give the line back without a word."""
+    def finish(self) -> None:
+        """Stop the robot, close its session and give the line back, all at once: nobody is left to space the frames.
+
+        Interrupts (Ctrl-C) meanwhile are raised when that is done. Doing it twice is harmless.
+        """
+        with contextlib.suppress(Exception):  # a line that fails cannot be told more; the robot's watchdog stops it
+            held_back(self._finish)
+
+    def _finish(self) -> None:
+        if self._transport is not None:
+            with contextlib.suppress(TransportError):
+                self._transport.write(LAST_FRAMES)
+        with contextlib.suppress(Exception):  # an interrupt can have left it in any state
+            self.core.close(self._looked_at - self._left_out)
         self._close()
+
+    def _take_gap(self, gap_ns: Nanos) -> None:
+        if self.core.link is not Link.OPEN:
+            self._left_out += gap_ns  # a search goes on where it was
+            return
+        heard = self.core.stats.frames_received
+        now = self._looked_at - self._left_out - gap_ns
+        self.core.take_gap(gap_ns, now)
+        self.write(now)
+        self._read(now)
+        if self.core.stats.frames_received != heard:
+            self._left_out += gap_ns
+            return
+        now += gap_ns  # the robot was silent for so long
+        self.core.advance_to(now)
+        self.write(now)
 
     def _read(self, now: Nanos) -> None:
         for _ in range(MOST_READS):
@@ -101,10 +171,7 @@ class Line:
             self.core.receive(data, self._arrival(now))
 
     def _arrival(self, now: Nanos) -> Nanos:
-        """Return when bytes that waited in the system arrived: before any time-out that they would have prevented.
-
-        A program that was held up for a second must not take its own pause for the robot's silence.
-        """
+        """Return when bytes that waited in the system arrived: before any time-out that they would have prevented."""
         due = self.core.next_deadline()
         if due is None or due > now:
             return now

@@ -11,7 +11,7 @@ from dataclasses import replace
 
 from p2os.client.goals import Axis, Goal
 from p2os.client.motors import Motors
-from p2os.client.notices import DeadmanStopped, Disobeyed, MotionEnded, MotorsDisabled, Notice
+from p2os.client.notices import DeadmanStopped, Disobeyed, GapStopped, MotionEnded, MotorsDisabled, Notice
 from p2os.client.obedience import Obedience
 from p2os.client.observer import Observer
 from p2os.client.problems import MotorsDisabledError
@@ -20,7 +20,7 @@ from p2os.client.snapshots import Limits, RobotState
 from p2os.client.speeds import STILL, SpeedKeeper, Speeds
 from p2os.commands import Command, CommandNumber, enable, stop
 from p2os.errors import LocalProtocolError, UsageError
-from p2os.timing import Nanos
+from p2os.timing import NS_PER_S, Nanos
 
 #: What moves a robot: sent raw, it takes the place of held speeds.
 MOTION_NUMBERS = frozenset(
@@ -47,6 +47,7 @@ class Mover:
         settings: The client's.
         observer: What is known of the robot.
         send: Sends a command of the open session.
+        send_first: Sends one before all that waits, at once.
         drop: Forgets those commands, by number, that have not left yet.
         tell: Takes what the program is to know.
     """
@@ -57,12 +58,14 @@ class Mover:
         observer: Observer,
         *,
         send: Callable[[Command, Nanos], None],
+        send_first: Callable[[Command, Nanos], None],
         drop: Callable[[Container[int]], None],
         tell: Callable[[Notice], None],
     ) -> None:
         self._settings = settings
         self._observer = observer
         self._send = send
+        self._send_first = send_first
         self._drop = drop
         self._tell = tell
         self._speeds = SpeedKeeper(spacing_ns=settings.speed_spacing_ns, refresh_ns=settings.refresh_ns)
@@ -129,6 +132,16 @@ class Mover:
             self._send(Command(CommandNumber.E_STOP), now)
         self._send(stop(), now)
         self._hold(STILL, now)
+
+    def take_gap(self, gap_ns: Nanos, now: Nanos) -> None:
+        """Stop at once, and hold zero speeds where something moved the robot: what was asked is old news."""
+        was_moving = self._goal is not None or not self._speeds.wanted.are_zero
+        self._end_goal(f"the program or its machine paused for {gap_ns / NS_PER_S:.1f} s", now)
+        self._drop(MOTION_NUMBERS)
+        self._send_first(stop(), now)
+        if was_moving:
+            self._hold(STILL, now)
+            self._tell(GapStopped(gap_ns))
 
     def begin_goal(self, axis: Axis, limit_ns: Nanos | None, speed: float | None, limits: Limits, now: Nanos) -> Goal:
         """Begin a goal; its end is a `MotionEnded`.

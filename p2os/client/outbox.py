@@ -69,6 +69,11 @@ class Outbox:
         """Queue frames."""
         self._queue.extend(Send(frame) for frame in frames)
 
+    def send_first(self, frames: Iterable[bytes]) -> None:
+        """Put frames before all that waits; the first may go at once, for the line has been still for long."""
+        self._queue.extendleft(reversed([Send(frame) for frame in frames]))
+        self._free_at = 0
+
     def drop_frames(self, numbers: Container[int] | None = None) -> None:
         """Forget frames that were not sent, those of some commands or all: what follows matters more."""
         self._queue = deque(

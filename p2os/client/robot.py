@@ -27,6 +27,7 @@ from p2os.client.snapshots import Link, RobotState
 from p2os.parameters import RobotParameters
 from p2os.timing import NS_PER_S, Nanos
 from p2os.transport import open_url
+from p2os.transport.wall_clock import Clock, wall_clock
 
 
 class Robot(RobotCalls):
@@ -40,6 +41,7 @@ class Robot(RobotCalls):
         deadman_s: A speed is taken back when the program has made no call for so long; None: never.
         settings: All settings at once, in place of the three before.
         opener: Opens the line; for lines that no URL names.
+        clock: Nanoseconds that never go back, and go on while the machine sleeps.
 
     Raises:
         UsageError: The URL is none.
@@ -56,12 +58,13 @@ class Robot(RobotCalls):
         deadman_s: float | None = 2.0,
         settings: ClientSettings | None = None,
         opener: Opener = open_url,
+        clock: Clock = wall_clock,
     ) -> None:
         core, baud = core_for(
             url, model=model, auto_enable=auto_enable, reconnect=reconnect, deadman_s=deadman_s, settings=settings
         )
         self.url = url
-        self._engine = Engine(core, baud, lambda: opener(url))
+        self._engine = Engine(core, baud, lambda: opener(url), clock)
         self._finalizer = weakref.finalize(self, self._engine.shut_down)
 
     # Coming and going ---------------------------------------------------------------------

@@ -163,6 +163,12 @@ class Session:
             self._connection.send(command, now)
             self.outbox.send(self._connection.take_output())
 
+    def send_first(self, command: Command, now: Nanos) -> None:
+        """Send a command of the open session before all that waits, at once."""
+        if self._connection.is_open:
+            self._connection.send(command, now)
+            self.outbox.send_first(self._connection.take_output())
+
     def drop(self, numbers: Container[int]) -> None:
         """Forget commands that have not left: something overtakes them."""
         self.outbox.drop_frames(numbers)

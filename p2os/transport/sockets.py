@@ -109,6 +109,8 @@ def connect_tcp(url: TcpUrl) -> Transport:
     """
     try:
         connection = socket.create_connection((url.host, url.port), timeout=CONNECT_TIMEOUT_S)
+    except UnicodeError as error:  # IDNA: an empty or too long part
+        raise TransportError(f"cannot connect to {url}: {url.host!r} is no host name", hint="tcp:HOST:8101") from error
     except OSError as error:
         raise TransportError(
             f"cannot connect to {url}: {_reason(error)}", hint=f"is a robot served there? (p2os serve --port {url})"

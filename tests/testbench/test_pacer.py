@@ -49,6 +49,14 @@ def test_lag_is_told_and_the_worst_is_kept() -> None:
     assert (pacer.lag_ns, pacer.worst_lag_ns) == (0, 3_000_000)
 
 
+def test_a_sleep_that_lasts_longer_is_lag_at_once() -> None:
+    clock = Clock()
+    pacer = Pacer(clock=clock, sleep=lambda _: setattr(clock, "now", clock.now + 3 * 10**9))
+    pacer.start(0)
+    pacer.keep_pace(2_000_000)
+    assert pacer.lag_ns == 3 * 10**9 - 2_000_000
+
+
 def test_no_speed_is_no_pace() -> None:
     with pytest.raises(LocalProtocolError):
         Pacer(speed=0.0)

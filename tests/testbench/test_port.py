@@ -1,5 +1,6 @@
 """Mode C: a robot at a port is driven in real time, and stopped however the run ends."""
 
+import contextlib
 import io
 import json
 import re
@@ -11,6 +12,7 @@ import time
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
+from types import FrameType
 
 import pytest
 from fake_chip import FakeChip, PinDrive
@@ -102,6 +104,47 @@ def test_lag_of_more_than_100_ms_stops_the_robot() -> None:
     with pytest.raises(RunFailedError, match=r"lagged 10\d ms behind the clock at 0.50\d s"):
         made.run_until(S)
     assert line.sent.endswith(STOP_SEQUENCE)
+
+
+def test_a_machine_that_slept_in_the_pacers_wait_stops_the_robot_first() -> None:
+    line, clock = FakeLine(), Clock()
+    made = bench(line, clock)
+    sent_before: list[int] = []
+
+    def doze(seconds: float) -> None:
+        clock.now += round(seconds * S)
+        if clock.now >= S // 2 and not sent_before:
+            sent_before.append(len(line.sent))
+            clock.now += 3 * S
+
+    made._pacer._sleep = doze  # the clock that is injected stands under the wait itself
+    with pytest.raises(RunFailedError, match=r"lagged 3\d\d\d ms behind the clock"):
+        made.run_until(S)
+    assert line.sent[sent_before[0] :] == STOP_SEQUENCE
+
+
+@pytest.mark.parametrize("place", range(1, 12))
+def test_a_second_ctrl_c_in_closing_leaves_the_robot_told(place: int) -> None:
+    line, lines = FakeLine(), [0]
+    made = bench(line, Clock())
+
+    def trace(frame: FrameType, event: str, _: object) -> object:
+        if frame.f_code.co_filename.endswith(("remote.py", "interrupts.py", "port_seat.py")):
+            lines[0] += event == "line"
+            if event == "line" and lines[0] == place + 1:  # the first line has done nothing yet
+                raise KeyboardInterrupt
+        return trace
+
+    sys.settrace(trace)  # type: ignore[arg-type]  # what it returns traces on
+    try:
+        with contextlib.suppress(KeyboardInterrupt):
+            made.close()
+    finally:
+        sys.settrace(None)
+    assert lines[0] > place, "there are so many lines"
+    made.close()
+    assert line.sent.endswith(STOP_SEQUENCE)
+    assert line.is_closed
 
 
 def test_lag_of_less_does_not() -> None:

@@ -32,14 +32,16 @@ def until(is_so: Callable[[], object], what: str = "it") -> None:
 class ServedRobot:
     """A host in a thread."""
 
-    def __init__(self, url: str = "tcp:127.0.0.1:0", pioneer: Pioneer | None = None) -> None:
+    def __init__(self, url: str = "tcp:127.0.0.1:0", pioneer: Pioneer | None = None, *, speed: float = 1.0) -> None:
         self.pioneer = pioneer or new_pioneer()
         #: What the robot is to do between two turns of its host: called once, in the host's thread.
         self.wishes: list[Callable[[Pioneer, Nanos], None]] = []
         listener = listen_url(url)
         self.url = listener.description
         self.told: list[str] = []
-        self._host = Host(self.pioneer, listener, on_event=lambda _now, what, _detail: self.told.append(what))
+        self._host = Host(
+            self.pioneer, listener, on_event=lambda _now, what, _detail: self.told.append(what), speed=speed
+        )
         self._end = threading.Event()
         self._thread = threading.Thread(target=self._serve, daemon=True)
         self._thread.start()

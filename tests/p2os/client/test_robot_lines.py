@@ -128,13 +128,13 @@ class BrokenLine:
 
 def test_a_line_that_takes_no_bytes_is_lost_and_given_back() -> None:
     core, broken = RobotCore(ClientSettings()), BrokenLine()
-    line = Line(core, 9600)
+    line = Line(core, 9600, lambda: 0)
     core.connect(0)
-    line.turn(0)
+    line.turn()
     assert line.is_wanted
     transport: Transport = broken
-    line.opened(transport, 0)
-    line.turn(0)
+    line.opened(transport)
+    line.turn()
     assert broken.is_closed
     assert core.link is Link.FAILED
     assert core.problem is not None
@@ -143,12 +143,12 @@ def test_a_line_that_takes_no_bytes_is_lost_and_given_back() -> None:
 
 def test_a_line_that_comes_too_late_is_given_back() -> None:
     core, late = RobotCore(ClientSettings()), BrokenLine()
-    line = Line(core, None)
+    line = Line(core, None, lambda: 0)
     core.connect(0)
-    line.turn(0)
+    line.turn()
     core.close(1)
-    line.opened(late, 2)
-    line.turn(3)
+    line.opened(late)
+    line.turn()
     assert late.is_closed
     assert line.is_over
 

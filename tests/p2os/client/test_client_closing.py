@@ -1,0 +1,300 @@
+"""Whatever ends a client, and however often it is interrupted: STOP, VEL 0, ENABLE 0 and CLOSE go out."""
+
+import asyncio
+import contextlib
+import gc
+import os
+import resource
+import signal
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from types import FrameType
+from typing import Any, Self
+
+import pytest
+from served_robot import QUICK, Recorder, ServedRobot, until
+
+import p2os
+from p2os import Robot
+from p2os.client import ConnectError, LinkLostError
+from p2os.client.aio import Robot as AsyncRobot
+from p2os.client.interrupts import held_back
+from p2os.commands import Command, CommandNumber, enable, stop, vel
+from p2os.transport import open_url
+from p2os.transport.ports import Transport
+
+LAST_WORDS = [stop(), vel(0), enable(False), Command(CommandNumber.CLOSE)]
+OURS = str(Path(p2os.__file__).parent)
+
+
+@pytest.fixture
+def served() -> Iterator[ServedRobot]:
+    robot = ServedRobot()
+    yield robot
+    robot.close()
+
+
+def was_told(recorder: Recorder) -> bool:
+    """Tell whether STOP, VEL 0, ENABLE 0 and CLOSE were said, in this order, after the last speed."""
+    said = recorder.said
+    last_speed = max((place for place, command in enumerate(said) if command == vel(300)), default=-1)
+    left = iter(said[last_speed + 1 :])
+    return all(word in left for word in LAST_WORDS)
+
+
+class Interrupter:
+    """Raises KeyboardInterrupt at the n-th line that the program's own thread runs in some files."""
+
+    def __init__(self, place: int, files: tuple[str, ...]) -> None:
+        self.place, self.files = place, files
+        self.lines = 0
+        self.at = ""
+
+    def __enter__(self) -> Self:
+        sys.settrace(self._trace)
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        sys.settrace(None)
+
+    def _trace(self, frame: FrameType, event: str, _: object) -> Any:
+        if not frame.f_code.co_filename.startswith(self.files):
+            return None
+        if event == "line":
+            self.lines += 1
+            if self.lines == self.place:
+                self.at = f"{frame.f_code.co_filename}:{frame.f_lineno}"
+                raise KeyboardInterrupt
+        return self._trace
+
+
+def interrupt_everywhere(story: Callable[[int], tuple[int, str, Recorder]], served: ServedRobot, step: int = 1) -> int:
+    """Run a story with an interrupt at its first line, at its second and so on, until it has no more; count them."""
+    place = step
+    while True:
+        lines, at, recorder = story(place)
+        gc.collect()
+        until(lambda recorder=recorder: was_told(recorder), f"the last words after an interrupt at {at}")  # type: ignore[misc]
+        until(lambda: not served.pioneer.state.open)
+        if lines < place:
+            return place - 1
+        place += step
+
+
+@pytest.fixture
+def hasty() -> Iterator[ServedRobot]:
+    """A robot whose time runs eight times as fast, so that sessions open quickly."""
+    robot = ServedRobot(speed=8.0)
+    yield robot
+    robot.close()
+
+
+@pytest.mark.slow
+def test_a_second_ctrl_c_at_any_line_of_closing_leaves_the_robot_told(hasty: ServedRobot) -> None:
+    files = (OURS, threading.__file__)
+
+    def story(place: int) -> tuple[int, str, Recorder]:
+        recorder = Recorder()
+        interrupter = Interrupter(place, files)
+        robot = Robot(hasty.url, settings=QUICK, opener=recorder).connect()
+        robot.set_velocity(0.3)
+        until(lambda: vel(300) in recorder.said)
+        with contextlib.suppress(KeyboardInterrupt), interrupter:
+            robot.close()
+        return interrupter.lines, interrupter.at, recorder
+
+    assert interrupt_everywhere(story, hasty) > 20
+
+
+@pytest.mark.parametrize("step", [pytest.param(7, marks=pytest.mark.slow), pytest.param(1, marks=pytest.mark.soak)])
+def test_a_second_ctrl_c_at_any_line_of_an_asyncio_closing_leaves_the_robot_told(hasty: ServedRobot, step: int) -> None:
+    def story(place: int) -> tuple[int, str, Recorder]:
+        recorder = Recorder()
+        interrupter = Interrupter(place, (OURS,))
+
+        async def main() -> None:
+            robot = AsyncRobot(hasty.url, settings=QUICK, opener=recorder)
+            await robot.connect()
+            robot.set_velocity(0.3)
+            with interrupter:
+                await robot.close()
+
+        with contextlib.suppress(KeyboardInterrupt):
+            asyncio.run(main())
+        return interrupter.lines, interrupter.at, recorder
+
+    assert interrupt_everywhere(story, hasty, step) > 100
+
+
+def test_a_burst_of_interrupts_cannot_shorten_the_closing(served: ServedRobot) -> None:
+    recorder = Recorder()
+    robot = Robot(served.url, settings=QUICK, opener=recorder).connect()
+    robot.set_velocity(0.3)
+    until(lambda: served.is_moving)
+    interrupts: list[str] = []
+
+    def interrupt(_number: int, frame: FrameType | None) -> None:
+        while frame is not None and frame.f_code.co_name != "shut_down":
+            frame = frame.f_back
+        if frame is not None and len(interrupts) < 30:
+            interrupts.append("")
+            raise KeyboardInterrupt
+
+    before = signal.signal(signal.SIGALRM, interrupt)
+    signal.setitimer(signal.ITIMER_REAL, 0.0005, 0.0005)
+    try:
+        with pytest.raises(KeyboardInterrupt):
+            robot.close()
+    finally:
+        signal.setitimer(signal.ITIMER_REAL, 0)
+        signal.signal(signal.SIGALRM, before)
+    assert len(interrupts) > 3
+    until(lambda: recorder.said[-4:] == LAST_WORDS)
+    until(lambda: not served.is_moving and not served.pioneer.state.open)
+
+
+def test_work_is_done_to_its_end_before_an_interrupt_is_raised() -> None:
+    seen: list[str] = []
+
+    def work() -> None:
+        seen.append("begun")
+        if len(seen) < 3:
+            raise KeyboardInterrupt
+        seen.append("done")
+
+    with pytest.raises(KeyboardInterrupt):
+        held_back(work)
+    assert seen == ["begun", "begun", "begun", "done"]
+
+    def fail() -> None:
+        raise ZeroDivisionError
+
+    with pytest.raises(ZeroDivisionError):
+        held_back(fail)
+
+
+def test_closing_inside_a_callback_says_everything(served: ServedRobot) -> None:
+    recorder = Recorder()
+    robot = Robot(served.url, settings=QUICK, opener=recorder).connect()
+    robot.set_velocity(0.3)
+    until(lambda: served.is_moving)
+    robot.on_state(lambda _: robot.close())
+    until(lambda: recorder.said[-4:] == LAST_WORDS)
+    until(lambda: not served.is_moving and not served.pioneer.state.open)
+    with pytest.raises(LinkLostError):
+        robot.set_velocity(0.3)
+
+
+def test_closing_while_a_callback_blocks_stops_the_robot_at_once(served: ServedRobot) -> None:
+    recorder, over = Recorder(), threading.Event()
+    robot = Robot(served.url, settings=QUICK, opener=recorder).connect()
+    robot.set_velocity(0.3)
+    until(lambda: served.is_moving)
+    in_callback = threading.Event()
+    robot.on_state(lambda _: (in_callback.set(), over.wait(30))[0])  # type: ignore[func-returns-value]
+    assert in_callback.wait(30)
+    began = time.monotonic()
+    threading.Timer(0.6, over.set).start()
+    robot.close()
+    assert was_told(recorder)
+    assert time.monotonic() - began < 5
+    until(lambda: not served.is_moving and not served.pioneer.state.open)
+
+
+def test_an_asyncio_callback_may_have_the_robot_closed(served: ServedRobot) -> None:
+    recorder = Recorder()
+
+    async def story() -> None:
+        robot = AsyncRobot(served.url, settings=QUICK, opener=recorder)
+        await robot.connect()
+        robot.set_velocity(0.3)
+        tasks: list[asyncio.Task[None]] = []
+        robot.on_state(lambda _: tasks.append(asyncio.ensure_future(robot.close())) if not tasks else None)
+        while not tasks:  # noqa: ASYNC110  # the robot's next packet
+            await asyncio.sleep(0.01)
+        await tasks[0]
+
+    asyncio.run(story())
+    assert recorder.said[-4:] == LAST_WORDS
+
+
+def test_an_asyncio_robot_that_is_forgotten_is_stopped(served: ServedRobot) -> None:
+    recorder = Recorder()
+
+    async def story() -> None:
+        robot = AsyncRobot(served.url, settings=QUICK, opener=recorder)
+        await robot.connect()
+        robot.set_velocity(0.3)
+        await asyncio.sleep(0.1)
+        del robot
+        gc.collect()
+        assert recorder.said[-4:] == LAST_WORDS
+
+    asyncio.run(story())
+    until(lambda: not served.pioneer.state.open)
+
+
+def test_an_asyncio_robot_whose_loop_has_ended_is_stopped(served: ServedRobot) -> None:
+    recorder = Recorder()
+    robot = AsyncRobot(served.url, settings=QUICK, opener=recorder)
+
+    async def story() -> None:
+        await robot.connect()
+        robot.set_velocity(0.3)
+
+    asyncio.run(story())
+    assert recorder.said[-4:] == LAST_WORDS
+    until(lambda: not served.pioneer.state.open)
+
+
+def test_an_asyncio_robot_whose_loop_was_closed_without_a_word_is_stopped_with_the_program(
+    served: ServedRobot,
+) -> None:
+    program = f"""
+import asyncio
+from p2os.client.aio import Robot
+robot = Robot({served.url!r})
+loop = asyncio.new_event_loop()
+loop.run_until_complete(robot.connect())
+robot._engine._loop = loop
+async def go(): robot.set_velocity(0.3); await asyncio.sleep(0.3)
+loop.run_until_complete(go())
+"""
+    subprocess.run([sys.executable, "-c", program], check=True, capture_output=True, timeout=60)
+    until(lambda: not served.pioneer.state.open and not served.is_moving)
+
+
+@pytest.mark.parametrize("error", [UnicodeError("label empty or too long"), ZeroDivisionError("x"), OSError("y")])
+def test_an_opener_that_raises_anything_ends_the_wait_with_a_reason(error: Exception) -> None:
+    def opener(_: str) -> Transport:
+        raise error
+
+    with pytest.raises(ConnectError, match=str(error)):
+        Robot("tcp:127.0.0.1:1", opener=opener).connect()
+    with pytest.raises(ConnectError, match=str(error)):
+        asyncio.run(AsyncRobot("tcp:127.0.0.1:1", opener=opener).connect())
+
+
+def test_a_host_name_that_cannot_be_one_is_refused_in_one_line() -> None:
+    with pytest.raises(ConnectError, match=r"cannot connect to tcp:a\.\.b:8101"):
+        Robot("tcp:a..b:8101").connect()
+
+
+@pytest.mark.skipif(os.name != "posix", reason="descriptors are Unix's")
+def test_a_robot_connects_above_1024_descriptors(served: ServedRobot) -> None:
+    before = resource.getrlimit(resource.RLIMIT_NOFILE)
+    if before[1] < 1300:
+        pytest.skip("this machine allows no more than 1300 descriptors")
+    resource.setrlimit(resource.RLIMIT_NOFILE, (max(1300, before[0]), before[1]))
+    spare = [os.open(os.devnull, os.O_RDONLY) for _ in range(1100)]
+    try:
+        with Robot(served.url, settings=QUICK, opener=open_url) as robot:
+            robot.next_state()
+    finally:
+        for descriptor in spare:
+            os.close(descriptor)
+        resource.setrlimit(resource.RLIMIT_NOFILE, before)

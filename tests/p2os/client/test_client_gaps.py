@@ -1,0 +1,340 @@
+"""Gaps in a client's time: the machine slept, or the program was held up. STOP first, then read, then judge."""
+
+import asyncio
+import threading
+import time
+from collections.abc import Iterator
+
+import pytest
+from client_rig import new_pioneer
+from served_robot import QUICK, Recorder, ServedRobot, until
+
+from p2os import Robot
+from p2os.client import GapStopped, Link, LinkLost, LinkLostError, MotionError, Notice, ReconnectPlanned
+from p2os.client.aio import Robot as AsyncRobot
+from p2os.client.core import RobotCore
+from p2os.client.goals import DriveAxis
+from p2os.client.line import Line
+from p2os.commands import Command, stop, vel
+from p2os.timing import NS_PER_MS, NS_PER_S, Nanos
+from p2os.transport.ports import HungUpError
+from p2os.transport.wall_clock import GAP_NS, wall_clock
+from p2os.wire import Decoder, Frame
+
+
+class SuspendingClock:
+    """The clock of this machine, and of a machine that slept."""
+
+    def __init__(self) -> None:
+        self._slept: Nanos = 0
+
+    def __call__(self) -> Nanos:
+        return wall_clock() + self._slept
+
+    def suspend(self, seconds: float) -> None:
+        self._slept += round(seconds * NS_PER_S)
+
+
+class Bench:
+    """A client's line and a virtual robot, in memory and in virtual time."""
+
+    description = "in memory"
+
+    def __init__(self) -> None:
+        self.clock_ns: Nanos = 5 * NS_PER_S
+        self.pioneer = new_pioneer()
+        self.core = RobotCore(QUICK)
+        self.said: list[Command] = []
+        self.notices: list[Notice] = []
+        self.is_gone = False
+        self._decoder = Decoder()
+        self._arrived = b""
+        self._robot_ns: Nanos = 0
+        self.line = Line(self.core, None, lambda: self.clock_ns)
+        self.core.connect(self.line.now())
+        self.run(2.0)
+        assert self.core.link is Link.OPEN
+
+    # A transport ----------------------------------------------------------------------
+
+    def read(self) -> bytes:
+        if self.is_gone:
+            raise HungUpError("gone")
+        data, self._arrived = self._arrived, b""
+        return data
+
+    def write(self, data: bytes) -> None:
+        self._decoder.receive(data, 0)
+        while isinstance(item := self._decoder.next_item(), Frame):
+            self.said.append(Command.from_frame(item))
+        self.pioneer.receive(data, self._robot_ns)
+
+    def fileno(self) -> int:
+        raise AssertionError
+
+    def set_baud(self, baud: int) -> None: ...
+
+    def close(self) -> None: ...
+
+    # Time -----------------------------------------------------------------------------
+
+    def pass_by(self, span_ns: Nanos, *, robot_lives: bool = True) -> None:
+        """Let time pass without the client."""
+        self.clock_ns += span_ns
+        if robot_lives:
+            self._robot_ns += span_ns
+            self.pioneer.advance_to(self._robot_ns)
+            self._arrived += b"".join(self.pioneer.take_output())
+
+    def turn(self) -> None:
+        self.line.turn()
+        if self.line.is_wanted:
+            self.line.opened(self)
+        self.notices += [item for item in self.core.news if not hasattr(item, "sip")]
+        self.core.news.clear()
+
+    def run(self, seconds: float) -> None:
+        end = self.clock_ns + round(seconds * NS_PER_S)
+        while self.clock_ns < end:
+            self.turn()
+            wait_ns = round(self.line.wait_s() * NS_PER_S)
+            self.pass_by(max(1, min(wait_ns, 10 * NS_PER_MS, end - self.clock_ns)))
+        self.turn()
+        self.core.touch(self.line.now())
+
+    def drive(self) -> None:
+        self.core.set_velocity(0.3, 0.0, self.line.now())
+        self.run(0.5)
+        assert self.wheels[0] > 0
+        self.said.clear()
+        self.notices.clear()
+
+    @property
+    def wheels(self) -> tuple[float, float]:
+        return self.pioneer.state.left_setpoint_mps, self.pioneer.state.right_setpoint_mps
+
+    def late_by(self, gap_ns: Nanos, *, robot_lives: bool = True) -> None:
+        """End a wait so long after its deadline."""
+        self.turn()
+        wait_ns = round(self.line.wait_s() * NS_PER_S)
+        self.said.clear()
+        self.pass_by(wait_ns + gap_ns, robot_lives=robot_lives)
+
+
+@pytest.mark.parametrize(("gap_ns", "stops"), [(GAP_NS - 1, False), (GAP_NS, False), (GAP_NS + 1, True)])
+def test_a_wait_that_ends_350_ms_late_is_not_yet_a_gap(gap_ns: Nanos, stops: bool) -> None:
+    bench = Bench()
+    bench.drive()
+    bench.late_by(gap_ns)
+    bench.turn()
+    assert (bench.said[0] == stop()) is stops
+    assert bench.core.commanded.are_zero is stops
+    assert bench.core.link is Link.OPEN
+
+
+@pytest.mark.parametrize("gap_ms", [400, 1000, 1100, 3000, 60_000])
+def test_after_a_gap_in_which_packets_came_the_robot_stands_and_the_link_lives(gap_ms: int) -> None:
+    bench = Bench()
+    bench.drive()
+    bench.late_by(gap_ms * NS_PER_MS)
+    bench.turn()
+    assert bench.said[0] == stop()
+    assert [type(notice) for notice in bench.notices] == [GapStopped]
+    bench.run(3.0)
+    assert bench.core.link is Link.OPEN
+    assert bench.wheels == (0.0, 0.0)
+    assert vel(300) not in bench.said
+    bench.core.set_velocity(0.2, 0.0, bench.line.now())
+    bench.run(0.5)
+    assert bench.wheels[0] > 0, "asked anew it moves"
+
+
+def test_a_gap_in_which_nothing_came_is_silence_and_loses_the_link() -> None:
+    bench = Bench()
+    bench.drive()
+    bench.late_by(1100 * NS_PER_MS, robot_lives=False)
+    bench.turn()
+    assert bench.said[0] == stop()
+    assert [type(notice) for notice in bench.notices][:2] == [GapStopped, LinkLost]
+    assert bench.core.link is Link.WAITING
+    with pytest.raises(LinkLostError):
+        bench.core.set_velocity(0.3, 0.0, bench.line.now())
+
+
+def test_a_short_gap_without_a_packet_is_not_a_loss() -> None:
+    bench = Bench()
+    bench.drive()
+    bench.late_by(400 * NS_PER_MS, robot_lives=False)
+    bench.turn()
+    assert bench.core.link is Link.OPEN
+    assert bench.said[0] == stop()
+
+
+def test_a_line_that_went_in_a_gap_is_lost_and_nothing_raises() -> None:
+    bench = Bench()
+    bench.drive()
+    bench.late_by(5 * NS_PER_S)
+    bench.is_gone = True
+    bench.turn()
+    assert bench.said[0] == stop()
+    assert isinstance(bench.notices[-1], ReconnectPlanned)
+    assert bench.core.link is not Link.OPEN
+
+
+def test_a_call_after_a_gap_stops_the_robot_before_it_does_anything() -> None:
+    bench = Bench()
+    bench.drive()
+    bench.late_by(2 * NS_PER_S)
+    bench.core.set_velocity(0.2, 0.0, bench.line.now())
+    bench.turn()
+    assert bench.said[0] == stop()
+    assert vel(300) not in bench.said
+
+
+def test_a_gap_ends_a_drive() -> None:
+    bench = Bench()
+    goal = bench.core.begin_goal(DriveAxis(4.0), None, None, bench.line.now())
+    bench.run(0.5)
+    assert bench.wheels[0] > 0
+    bench.late_by(2 * NS_PER_S)
+    bench.turn()
+    assert bench.said[0] == stop()
+    assert goal.ended is not None
+    assert goal.ended.problem == "the program or its machine paused for 2.0 s"
+    bench.run(3.0)
+    assert bench.wheels == (0.0, 0.0)
+
+
+def test_a_gap_of_a_robot_that_stands_is_told_to_nobody() -> None:
+    bench = Bench()
+    bench.notices.clear()
+    bench.late_by(2 * NS_PER_S)
+    bench.turn()
+    assert bench.said[0] == stop()
+    assert bench.notices == []
+
+
+def test_a_gap_while_the_robot_is_looked_for_does_not_use_the_search_up() -> None:
+    bench = Bench()
+    core = RobotCore(QUICK)
+    clock = [NS_PER_S]
+    line = Line(core, None, lambda: clock[0])
+    core.connect(line.now())
+    line.turn()
+    line.opened(bench)
+    line.turn()
+    line.wait_s()
+    clock[0] += 3600 * NS_PER_S
+    line.turn()
+    assert core.link is Link.SEARCHING
+
+
+# On real lines, with the injected clock under every wait --------------------------------------
+
+
+@pytest.fixture
+def served() -> Iterator[ServedRobot]:
+    robot = ServedRobot()
+    yield robot
+    robot.close()
+
+
+def robot_with(clock: SuspendingClock, served: ServedRobot, recorder: Recorder) -> Robot:
+    return Robot(served.url, settings=QUICK, opener=recorder, clock=clock)
+
+
+@pytest.mark.parametrize("what", ["hold", "drive"])
+def test_a_blocking_robot_whose_machine_slept_stops_first_and_never_drives_on(served: ServedRobot, what: str) -> None:
+    clock, recorder, told = SuspendingClock(), Recorder(), list[Notice]()
+    with robot_with(clock, served, recorder) as robot:
+        robot.on_event(told.append)
+        said: list[int] = []
+
+        def fall_asleep() -> None:
+            until(lambda: served.is_moving)
+            time.sleep(0.2)
+            _suspend_in_callback(robot, clock, recorder, said)
+
+        threading.Thread(target=fall_asleep, daemon=True).start()
+        if what == "hold":
+            robot.set_velocity(0.3)
+            robot.sleep(2.0)
+        else:
+            with pytest.raises((MotionError, LinkLostError), match="paused for"):
+                robot.drive(5.0)
+        until(lambda: said)
+        assert recorder.said[said[0]] == stop()
+        assert vel(300) not in recorder.said[said[0] :]
+        until(lambda: not served.is_moving)
+        assert any(isinstance(notice, GapStopped) for notice in told)
+
+
+def _suspend_in_callback(robot: Robot, clock: SuspendingClock, recorder: Recorder, said: list[int]) -> None:
+    """Let the machine sleep in the thread that turns the line: nothing is written meanwhile."""
+
+    def once(_: object) -> None:
+        if not said:
+            said.append(len(recorder.said))
+            clock.suspend(5.0)
+
+    robot.on_state(once)
+
+
+def test_an_asyncio_robot_whose_machine_slept_stops_first_and_never_drives_on(served: ServedRobot) -> None:
+    clock, recorder, told = SuspendingClock(), Recorder(), list[Notice]()
+
+    async def story() -> None:
+        async with AsyncRobot(served.url, settings=QUICK, opener=recorder, clock=clock) as robot:
+            robot.on_event(told.append)
+            robot.set_velocity(0.3)
+            while not served.is_moving:  # noqa: ASYNC110  # it moves in another thread
+                await asyncio.sleep(0.005)
+            said = len(recorder.said)
+            clock.suspend(5.0)
+            await asyncio.sleep(0.5)
+            assert recorder.said[said] == stop()
+            assert vel(300) not in recorder.said[said:]
+            until(lambda: not served.is_moving)
+
+    asyncio.run(story())
+    assert isinstance(told[0], GapStopped)
+
+
+@pytest.mark.parametrize("pause_s", [1.2, 2.5])
+def test_an_asyncio_program_that_blocks_its_loop_keeps_a_sound_link_and_stops(
+    served: ServedRobot, pause_s: float
+) -> None:
+    recorder, told = Recorder(), list[Notice]()
+
+    async def story() -> None:
+        async with AsyncRobot(served.url, settings=QUICK, opener=recorder) as robot:
+            robot.on_event(told.append)
+            robot.set_velocity(0.3)
+            await asyncio.sleep(0.3)
+            said = len(recorder.said)
+            time.sleep(pause_s)  # noqa: ASYNC251  # this is what is tried
+            await asyncio.sleep(0.3)
+            assert robot.link is Link.OPEN
+            assert recorder.said[said] == stop()
+            until(lambda: not served.is_moving)
+
+    asyncio.run(story())
+    assert [type(notice) for notice in told] == [GapStopped]
+
+
+def test_a_callback_that_blocks_keeps_a_sound_link_and_stops(served: ServedRobot) -> None:
+    recorder, told, blocked = Recorder(), list[Notice](), threading.Event()
+
+    def block_once(_: object) -> None:
+        if not blocked.is_set():
+            blocked.set()
+            time.sleep(1.3)
+
+    with Robot(served.url, settings=QUICK, opener=recorder) as robot:
+        robot.on_event(told.append)
+        robot.set_velocity(0.3)
+        until(lambda: served.is_moving)
+        robot.on_state(block_once)
+        until(lambda: any(isinstance(notice, GapStopped) for notice in told))
+        assert robot.link is Link.OPEN
+        until(lambda: not served.is_moving)
