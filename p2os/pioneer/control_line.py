@@ -9,6 +9,7 @@ from p2os.errors import TransportError
 from p2os.pioneer.host import Host
 from p2os.pioneer.orders import LONGEST_LINE, obey
 from p2os.transport.ports import READ_BYTES, HungUpError, Listener, Transport
+from p2os.transport.waiting import wait_readable
 
 
 class Terminal:
@@ -18,9 +19,7 @@ class Terminal:
 
     def read(self) -> bytes:
         """Return what was typed."""
-        import select
-
-        if not self.is_ours() or not select.select([0], [], [], 0)[0]:
+        if not self.is_ours() or not wait_readable((0,), 0):
             return b""
         try:
             data = os.read(0, READ_BYTES)
