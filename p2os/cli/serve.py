@@ -18,7 +18,7 @@ from p2os.cli.quantities import parse_duration
 from p2os.cli.signals import end_on_signals
 from p2os.errors import UsageError
 from p2os.pioneer.aux_seat import AuxSeat
-from p2os.pioneer.control_line import ControlLine
+from p2os.pioneer.control_line import ControlLine, say_on_stderr
 from p2os.pioneer.controller import ControllerSettings, SonarPerSip
 from p2os.pioneer.flash import load_flash
 from p2os.pioneer.fleet import Fleet
@@ -252,7 +252,7 @@ def _say_start(order: FleetOrder, start: Pose, number: int, host: Host, *, as_js
 
 def _control(url: str | None) -> ControlLine | None:
     if url == STANDARD_INPUT or (url is None and os.isatty(0)):
-        return ControlLine(None)
+        return ControlLine(None, _write)
     if url is None:
         return None
     listener = listen_url(url)
@@ -268,5 +268,4 @@ def _show_status(hosts: Sequence[Host]) -> None:
 
 def _write(text: str) -> None:
     with contextlib.suppress(OSError):  # a terminal that was closed must not keep the robots from stopping
-        sys.stderr.write(text)
-        sys.stderr.flush()
+        say_on_stderr(text)
