@@ -178,6 +178,16 @@ class Connection:
         if isinstance(self._side, ClientSide):
             self._side.set_profile(profile)
 
+    def count_silence(self, silence: Nanos, now: Nanos) -> None:
+        """Server: let the watchdog count a time in which nothing came, and which `now` does not contain.
+
+        Raises:
+            LocalProtocolError: This is the client's end.
+        """
+        if not isinstance(self._side, ServerSide):
+            raise LocalProtocolError("only the server's end has a watchdog")
+        self._side.count_silence(silence, now)
+
     def next_deadline(self) -> Nanos | None:
         """Return when a timeout, a PULSE or the watchdog is due."""
         due = [at for at in (self._decoder.next_deadline(), self._side.next_deadline()) if at is not None]

@@ -81,6 +81,10 @@ class ServerSide:
             self._line.stats.watchdog_stops += 1
             self._line.events.append(WatchdogExpired())
 
+    def count_silence(self, silence: Nanos, now: Nanos) -> None:
+        """Let the watchdog count a time in which nothing came, and which `now` does not contain."""
+        self._last_frame_ns = max(self._last_frame_ns - silence, now - self._watchdog_ns)
+
     def snapshot(self) -> object:
         """Return all that decides the future."""
         return self.state, self._last_frame_ns, self._expired

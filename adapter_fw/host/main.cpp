@@ -3,7 +3,9 @@
 //   p2os-adapter --line tcp:127.0.0.1:8101 [--wires /tmp/wires.sock] [--robot p2dx] [--settings FILE]
 //
 // Standard input is the console (type help), events go to standard error with the
-// milliseconds since the start. SIGINT and SIGTERM stop and close the robot first.
+// milliseconds since the start; nobody has to read them. Every signal that would end or
+// stop the program stops and closes the robot first, but SIGKILL and SIGSTOP, which none
+// can catch, and those of a crash. After a pause (suspend, SIGSTOP) STOP goes out first.
 // Exit codes: 1 the line is gone or cannot be opened, 2 wrong usage, 130 interrupted.
 
 #include <poll.h>
@@ -21,38 +23,42 @@
 #include "../generated/robots.hpp"
 #include "file_store.hpp"
 #include "line.hpp"
+#include "standard.hpp"
 #include "wires.hpp"
 
 namespace {
 
 constexpr int RESTART = -1, INTERRUPTED = 130;
+//: chosen: some lines; a file without end on standard input must not keep the robot waiting.
+constexpr int TYPED_A_TURN = 256;
 
 volatile std::sig_atomic_t interrupted = 0;
 
-class MonotonicClock final : public hal::Clock {
+#ifdef CLOCK_BOOTTIME
+//: It counts the time in which the machine sleeps; Linux' CLOCK_MONOTONIC does not.
+constexpr clockid_t CLOCK = CLOCK_BOOTTIME;
+#else
+constexpr clockid_t CLOCK = CLOCK_MONOTONIC;
+#endif
+
+//: Ctrl-C, Ctrl-Z, a quit, a closed terminal, kill, and what ends a program unless it is caught.
+constexpr int ENDING[] = {SIGINT,  SIGTERM, SIGHUP,    SIGQUIT, SIGTSTP, SIGUSR1,
+                          SIGUSR2, SIGALRM, SIGVTALRM, SIGPROF, SIGXCPU};
+//: A far side that has gone, a full disk, and the terminal of another program: each call says so itself.
+constexpr int IGNORED[] = {SIGPIPE, SIGXFSZ, SIGTTIN, SIGTTOU};
+
+class WallClock final : public hal::Clock {
  public:
   p2os::Nanos now() override { return read() - start_; }
 
  private:
   static p2os::Nanos read() {
     timespec time{};
-    ::clock_gettime(CLOCK_MONOTONIC, &time);
+    ::clock_gettime(CLOCK, &time);
     return time.tv_sec * p2os::NS_PER_S + time.tv_nsec;
   }
 
   p2os::Nanos start_ = read();
-};
-
-class Standard final : public shell::Writer {
- public:
-  explicit Standard(std::FILE* file) : file_(file) {}
-  void write(const char* text) override {
-    std::fputs(text, file_);
-    std::fflush(file_);
-  }
-
- private:
-  std::FILE* file_;
 };
 
 struct Options {
@@ -86,6 +92,22 @@ bool read_options(int count, char** words, Options& options) {
   return !options.line.empty();
 }
 
+//: A program that was started deaf to SIGHUP (nohup) stays so.
+void catch_signals() {
+  struct sigaction action {};
+  action.sa_handler = [](int) { interrupted = 1; };
+  for (const int number : ENDING) {
+    struct sigaction before {};
+    ::sigaction(number, nullptr, &before);
+    if (number != SIGHUP || before.sa_handler != SIG_IGN) {
+      ::sigaction(number, &action, nullptr);
+    }
+  }
+  for (const int number : IGNORED) {
+    std::signal(number, SIG_IGN);
+  }
+}
+
 //: Sleeps until something has come or `span` is over; a negative descriptor is left out.
 void wait(const host::Line& line, const host::Wires& wires, int input, p2os::Nanos span) {
   pollfd files[] = {{line.descriptor(), POLLIN, 0},
@@ -98,12 +120,11 @@ void wait(const host::Line& line, const host::Wires& wires, int input, p2os::Nan
 }
 
 //: Returns the exit code, or RESTART.
-int run(const Options& options, host::Line& line, host::Wires& wires, host::FileStore& store,
-        MonotonicClock& clock) {
+int run(const Options& options, host::Line& line, host::Wires& wires, host::FileStore& store, host::Standard& out,
+        host::Standard& err, WallClock& clock) {
   const adapter::WireNumbers numbers;
   const char* fault = nullptr;
   const adapter::Settings settings = shell::stored_settings(store, numbers, fault);
-  Standard out(stdout), err(stderr);
   if (fault != nullptr) {
     err.write("stored settings are left out: ");
     err.write(fault);
@@ -121,20 +142,23 @@ int run(const Options& options, host::Line& line, host::Wires& wires, host::File
   while (true) {
     wires.serve();
     const p2os::Nanos due = runner.pass();
-    if (interrupted != 0 || console.wants_restart() || line.is_gone()) {
-      part.shutdown("the program ends", clock.now());
-      runner.pass();
-      return line.is_gone() ? 1 : interrupted != 0 ? INTERRUPTED : RESTART;
-    }
-    wait(line, wires, input, due - clock.now());
     char character = 0;
-    for (pollfd file{input, POLLIN, 0}; ::poll(&file, 1, 0) > 0; file.fd = input) {
+    pollfd file{input, POLLIN, 0};
+    for (int taken = 0; taken < TYPED_A_TURN && ::poll(&file, 1, 0) > 0; ++taken, file.fd = input) {
       if (::read(input, &character, 1) == 1) {
         console.take(character, clock.now());
       } else {
         input = -1;  // a console that has ended leaves the adapter running
       }
     }
+    out.flush();
+    err.flush();
+    if (interrupted != 0 || console.wants_restart() || line.is_gone()) {
+      part.shutdown("the program ends", clock.now());
+      runner.pass();
+      return line.is_gone() ? 1 : interrupted != 0 ? INTERRUPTED : RESTART;
+    }
+    wait(line, wires, input, due - clock.now());
   }
 }
 
@@ -149,11 +173,7 @@ int main(int count, char** words) {
   if (adapter::find_robot(options.robot.c_str()) == nullptr) {
     return refuse("there is no robot " + options.robot, "a subclass such as p2dx or p3at");
   }
-  struct sigaction action {};
-  action.sa_handler = [](int) { interrupted = 1; };
-  ::sigaction(SIGINT, &action, nullptr);
-  ::sigaction(SIGTERM, &action, nullptr);
-  std::signal(SIGPIPE, SIG_IGN);
+  catch_signals();
   host::FileStore store(options.settings);
   host::Wires wires({});
   if (!options.wires.empty() && !wires.listen(options.wires)) {
@@ -164,14 +184,15 @@ int main(int count, char** words) {
     std::fprintf(stderr, "p2os-adapter: cannot open %s\nhint: p2os ports\n", line.error().c_str());
     return 1;
   }
-  MonotonicClock clock;
+  host::Standard out(STDOUT_FILENO), err(STDERR_FILENO);
+  WallClock clock;
   int ended = RESTART;
   while (ended == RESTART) {
-    ended = run(options, line, wires, store, clock);
+    ended = run(options, line, wires, store, out, err, clock);
   }
   if (line.is_gone()) {
-    std::fprintf(stderr, "p2os-adapter: the line %s is gone\nhint: is the robot on, and its cable in?\n",
-                 options.line.c_str());
+    const std::string what = "p2os-adapter: the line " + options.line + " is gone\n";
+    err.write((what + "hint: is the robot on, and its cable in?\n").c_str());
   }
   return ended;
 }

@@ -12,6 +12,13 @@
 
 namespace host {
 
+namespace {
+
+//: chosen: dozens of words; a far side that never ends must not keep the robot waiting.
+constexpr int READS_A_TURN = 16;
+
+}  // namespace
+
 Wires::~Wires() {
   leave();
   if (listener_ >= 0) {
@@ -48,8 +55,9 @@ void Wires::serve() {
     }
   }
   char bytes[64];
-  ssize_t taken = 0;
-  while (far_side_ >= 0 && (taken = ::read(far_side_, bytes, sizeof bytes)) > 0) {
+  ssize_t taken = 1;
+  for (int reads = 0; reads < READS_A_TURN && far_side_ >= 0 && taken > 0; ++reads) {
+    taken = ::read(far_side_, bytes, sizeof bytes);
     for (ssize_t place = 0; place < taken; ++place) {
       take(bytes[place]);
     }

@@ -1,4 +1,4 @@
-// Checks of what no life exercises: the LED, the mode button, numbers as text, faults of settings.
+// Checks of what no life exercises: the LED, the mode button, numbers as text, faults of settings, gaps.
 //
 // Prints each broken claim; ends with `ok` and exit code 0, or with 1.
 
@@ -8,6 +8,7 @@
 #include "../core/adapter/fields.hpp"
 #include "../core/shell/led.hpp"
 #include "../core/shell/mode_button.hpp"
+#include "../core/shell/runner.hpp"
 #include "../core/shell/text.hpp"
 
 namespace {
@@ -113,6 +114,111 @@ void check_faults() {
   }
 }
 
+class StandingClock final : public hal::Clock {
+ public:
+  Nanos now() override {
+    at += looks_before_sleep-- == 0 ? NS_PER_S : 0;
+    return at;
+  }
+  Nanos at = 0;
+  //: The machine falls asleep for a second after so many looks; a machine can in any line.
+  int looks_before_sleep = -1;
+};
+
+class Recorder final : public hal::Uart {
+ public:
+  std::size_t read(std::uint8_t*, std::size_t) override { return 0; }
+  void write(p2os::Bytes data) override {
+    if (count < sizeof kinds) {
+      kinds[count] = data[3];
+    }
+    ++count;
+  }
+  void set_baud(std::int32_t) override {}
+  //: Command numbers of the frames.
+  std::uint8_t kinds[64] = {};
+  std::size_t count = 0;
+};
+
+class HeldPins final : public hal::PinsIn {
+ public:
+  std::uint32_t read(Nanos) override { return word; }
+  std::uint32_t word = 1U << 6;
+};
+
+//: An adapter whose p2dx_con is high, and which nobody answers: it is connecting.
+struct Connecting {
+  Connecting() {
+    part.attach(&pins, nullptr, nullptr);
+    while (part.state() != State::CONNECTING) {
+      turn();
+    }
+    turn();
+    uart.count = 0;
+  }
+  void turn() { clock.at = runner.pass(); }
+
+  //: STOP, VEL, RVEL, CLOSE and nothing before.
+  bool has_stopped() const {
+    return uart.count >= 4 && uart.kinds[0] == 29 && uart.kinds[1] == 11 && uart.kinds[2] == 21 && uart.kinds[3] == 2;
+  }
+
+  StandingClock clock;
+  Recorder uart;
+  HeldPins pins;
+  adapter::Adapter part{{}, {}, {}, 0};
+  shell::Runner runner{part, clock, uart, nullptr};
+};
+
+void check_gaps() {
+  Connecting late;
+  late.clock.at += shell::Runner::GAP_NS;
+  late.turn();
+  claim(late.part.state() == State::CONNECTING, "350 ms late is no gap");
+
+  Connecting paused;
+  paused.clock.at += shell::Runner::GAP_NS + 1;
+  paused.turn();
+  claim(paused.part.state() == State::LOST && paused.has_stopped(), "a nanosecond more is one: STOP goes out first");
+  claim(std::strcmp(paused.part.reason(), "the program paused") == 0, "and it says why");
+  const Nanos later = paused.clock.at + 10 * NS_PER_S;
+  while (paused.clock.at < later) {
+    paused.turn();
+  }
+  claim(paused.part.state() == State::LOST, "it waits for a new wish");
+  paused.pins.word = 0;
+  while (paused.part.state() == State::LOST) {
+    paused.turn();
+  }
+  paused.pins.word = 1U << 6;
+  for (int turns = 0; turns < 1'000; ++turns) {
+    paused.turn();
+  }
+  claim(paused.part.state() == State::CONNECTING, "and goes on with it");
+
+  Connecting slept;
+  slept.clock.at += Nanos{365} * 86'400 * NS_PER_S;
+  slept.turn();
+  claim(slept.has_stopped() && slept.uart.count == 4, "a year is not lived through");
+
+  Connecting awake, sleepy;
+  Nanos says_at = 0;  // SYNC0 again
+  while (awake.uart.count == 0) {
+    says_at = awake.clock.at;
+    awake.turn();
+  }
+  while (sleepy.clock.at < says_at) {
+    sleepy.turn();
+  }
+  sleepy.clock.looks_before_sleep = 1;
+  sleepy.turn();
+  claim(awake.uart.kinds[3] == 0 && sleepy.has_stopped(), "what was due before a gap within the pass stays unsaid");
+
+  adapter::Adapter off({}, {}, {}, 0);
+  off.skip_to("gap", 150 * NS_PER_MS);
+  claim(off.state() == State::BOOTING, "a gap in the boot is a longer boot");
+}
+
 }  // namespace
 
 int main() {
@@ -120,6 +226,7 @@ int main() {
   check_button();
   check_numbers();
   check_faults();
+  check_gaps();
   if (broken == 0) {
     std::puts("ok");
   }

@@ -5,7 +5,6 @@ import json
 import math
 import os
 import sys
-import time
 from collections.abc import Sequence
 from dataclasses import replace
 from functools import partial
@@ -15,10 +14,11 @@ from typing import Annotated
 import typer
 
 from p2os.cli.event_lines import EventLines
+from p2os.cli.quantities import parse_duration
 from p2os.cli.signals import end_on_signals
 from p2os.errors import UsageError
 from p2os.pioneer.aux_seat import AuxSeat
-from p2os.pioneer.control_line import ControlLine
+from p2os.pioneer.control_line import ControlLine, say_on_stderr
 from p2os.pioneer.controller import ControllerSettings, SonarPerSip
 from p2os.pioneer.flash import load_flash
 from p2os.pioneer.fleet import Fleet
@@ -40,6 +40,7 @@ from p2os.pioneer.scenery import Pose
 from p2os.pioneer.sensor_errors import load_sensor_errors
 from p2os.profiles import Profile
 from p2os.transport import listen_url
+from p2os.transport.wall_clock import wall_clock
 
 #: `--control` with this, and no option on a terminal, takes orders from standard input.
 STANDARD_INPUT = "-"
@@ -48,7 +49,7 @@ SLOWEST, FASTEST = 0.01, 100.0
 #: Options that a fleet's file takes the place of.
 IN_FLEET_FILE = (
     "port", "robot", "world", "body", "seed", "firmware", "lenient", "all_sonar", "flash", "errors", "baud", "robots",
-    "at", "apart", "aux", "fault",
+    "at", "apart", "aux", "fault", "sync_limit",
 )  # fmt: skip
 
 HELP = f"""Be a Pioneer robot on a line, in real time, until Ctrl-C.
@@ -70,6 +71,7 @@ Examples:
   p2os serve --robots 3               three of them in one room, on ports 8101 to 8103
   p2os serve --robots 2 --at 0,0 --at 1.5,0,180   face to face
   p2os serve --fleet fleet.toml       robots of all kinds from a file
+  p2os serve --sync-limit 10s         who does not connect to the robot within 10 s makes room
   p2os serve --fault "sonar-stuck 3 1.2"   sonar 3 says 1.2 m whatever comes
 """
 
@@ -124,6 +126,12 @@ def serve(
     fault: Annotated[
         list[str] | None, typer.Option(help='Broken from the start: "sonar-stuck 3 1.2".', metavar="WORDS")
     ] = None,
+    sync_limit: Annotated[
+        str | None,
+        typer.Option(
+            help="Let a client go that has no open session for so long, as 10s. Default: never.", metavar="TIME"
+        ),
+    ] = None,
     control: Annotated[
         str | None, typer.Option(help="Where orders come: a URL, or - for standard input.", metavar="URL")
     ] = None,
@@ -150,8 +158,9 @@ def serve(
         if len(places) > len(ports):
             raise UsageError(f"{len(places)} places for {len(ports)} robots", hint=f"--robots {len(places)}")
         first = RobotOrder(
-            model=robot, settings=settings, faults=tuple(fault or ()), aux=tuple(read_aux(text) for text in aux or ())
-        )
+            model=robot, settings=settings, faults=tuple(fault or ()), aux=tuple(read_aux(text) for text in aux or ()),
+            sync_limit_ns=None if sync_limit is None else parse_duration(sync_limit, "--sync-limit"),
+        )  # fmt: skip
         order = FleetOrder(
             robots=tuple(
                 replace(first, port=url, at=places[number] if number < len(places) else None)
@@ -183,7 +192,7 @@ def open_hosts(order: FleetOrder, made: MadeFleet, *, speed: float = 1.0) -> lis
     Raises:
         TransportError: A port is taken or cannot be had; none is kept open then.
     """
-    shared_time = RobotTime(time.monotonic_ns, speed)
+    shared_time = RobotTime(wall_clock, speed)
     hosts: list[Host] = []
     try:
         for number, (robot, pioneer) in enumerate(zip(order.robots, made.robots, strict=True)):
@@ -193,7 +202,7 @@ def open_hosts(order: FleetOrder, made: MadeFleet, *, speed: float = 1.0) -> lis
                 Host(
                     pioneer, listen_url(robot.port), on_event=on_event, speed=speed,
                     shared=None if made.meeting is None else (shared_time, made.meeting, number),
-                    paced=not robot.port.startswith("serial:"),
+                    paced=not robot.port.startswith("serial:"), sync_limit_ns=robot.sync_limit_ns,
                 )
             )  # fmt: skip
             hosts[-1].aux = tuple(AuxSeat(port, listen_url(url)) for port, url in robot.aux)
@@ -243,7 +252,7 @@ def _say_start(order: FleetOrder, start: Pose, number: int, host: Host, *, as_js
 
 def _control(url: str | None) -> ControlLine | None:
     if url == STANDARD_INPUT or (url is None and os.isatty(0)):
-        return ControlLine(None)
+        return ControlLine(None, _write)
     if url is None:
         return None
     listener = listen_url(url)
@@ -259,5 +268,4 @@ def _show_status(hosts: Sequence[Host]) -> None:
 
 def _write(text: str) -> None:
     with contextlib.suppress(OSError):  # a terminal that was closed must not keep the robots from stopping
-        sys.stderr.write(text)
-        sys.stderr.flush()
+        say_on_stderr(text)

@@ -3,24 +3,36 @@
 import contextlib
 import os
 import sys
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 from p2os.errors import TransportError
 from p2os.pioneer.host import Host
 from p2os.pioneer.orders import LONGEST_LINE, obey
 from p2os.transport.ports import READ_BYTES, HungUpError, Listener, Transport
+from p2os.transport.waiting import wait_readable
+
+
+def say_on_stderr(text: str) -> None:
+    """Write a text to standard error at once."""
+    sys.stderr.write(text)
+    sys.stderr.flush()
 
 
 class Terminal:
-    """Standard input as a line: orders are typed, answers go to standard error."""
+    """Standard input as a line: orders are typed, answers go to standard error.
+
+    Args:
+        say: Takes the answers' text; an OSError of it ends the line.
+    """
 
     description = "the terminal"
 
+    def __init__(self, say: Callable[[str], object] = say_on_stderr) -> None:
+        self._say = say
+
     def read(self) -> bytes:
         """Return what was typed."""
-        import select
-
-        if not self.is_ours() or not select.select([0], [], [], 0)[0]:
+        if not self.is_ours() or not wait_readable((0,), 0):
             return b""
         try:
             data = os.read(0, READ_BYTES)
@@ -33,8 +45,7 @@ class Terminal:
     def write(self, data: bytes) -> None:
         """Show an answer."""
         try:
-            sys.stderr.write(data.decode())
-            sys.stderr.flush()
+            self._say(data.decode())
         except OSError as error:
             raise HungUpError(f"the terminal is gone: {error.strerror}") from error
 
@@ -62,11 +73,12 @@ class ControlLine:
 
     Args:
         listener: Where that person comes; None takes standard input.
+        say: Takes the answers where standard input is taken.
     """
 
-    def __init__(self, listener: Listener | None) -> None:
+    def __init__(self, listener: Listener | None, say: Callable[[str], object] = say_on_stderr) -> None:
         self._listener = listener
-        self._person: Transport | None = Terminal() if listener is None else None
+        self._person: Transport | None = Terminal(say) if listener is None else None
         self._typed = b""
 
     @property

@@ -161,6 +161,11 @@ class Pioneer:
         self._connection.receive(data, now)
         self._take_events(now)
 
+    def count_silence(self, silence: Nanos, now: Nanos) -> None:
+        """Let the watchdog count a pause, in ns, that was left out of the robot's time."""
+        self.advance_to(now)
+        self._connection.count_silence(silence, now)
+
     def hang_up(self, now: Nanos) -> None:
         """Stop at once and close, as when the host sees its client vanish."""
         self.advance_to(now)

@@ -3,12 +3,13 @@
 Invariant: a host that has nothing due and nothing to read costs a comparison a round.
 """
 
-import select
-import time
 from collections.abc import Callable, Sequence
 
 from p2os.pioneer.control_line import ControlLine
 from p2os.pioneer.host import ASLEEP_WAIT_S, Host
+from p2os.timing import NS_PER_S
+from p2os.transport.waiting import wait_readable
+from p2os.transport.wall_clock import wall_clock
 
 
 class Fleet:
@@ -30,7 +31,7 @@ class Fleet:
         self.hosts = tuple(hosts)
         self.control = control
         self._on_tick = on_tick
-        self._next_tick_s = time.monotonic() + on_tick[0] if on_tick else float("inf")
+        self._next_tick_s = _now_s() + on_tick[0] if on_tick else float("inf")
         #: When each is to live next, by the clock, and what it listens to.
         self._due_s = [0.0] * len(self.hosts)
         self._listening: list[list[int]] = [[] for _ in self.hosts]
@@ -48,7 +49,7 @@ class Fleet:
 
     def turn(self, longest_wait_s: float) -> None:
         """Let everyone live who is due, wait for the next deadline or bytes, and listen to those who have some."""
-        now_s = time.monotonic()
+        now_s = _now_s()
         for index, host in enumerate(self.hosts):
             if self._due_s[index] <= now_s:
                 host.live()
@@ -56,9 +57,9 @@ class Fleet:
         if now_s >= self._next_tick_s and self._on_tick is not None:
             self._next_tick_s = now_s + self._on_tick[0]
             self._on_tick[1]()
-        wait_s = min(*self._due_s, self._next_tick_s, now_s + longest_wait_s) - time.monotonic()
-        ready = self._wait(max(wait_s, 0.0))
-        now_s = time.monotonic()
+        wait_s = min(*self._due_s, self._next_tick_s, now_s + longest_wait_s) - _now_s()
+        ready = self._wait(wait_s)
+        now_s = _now_s()
         for index, host in enumerate(self.hosts):
             is_due = self._due_s[index] <= now_s  # it lives in the next turn: looking ahead here would put that off
             if is_due or not ready.isdisjoint(self._listening[index]):
@@ -70,7 +71,7 @@ class Fleet:
 
     def _look_ahead(self, index: int) -> None:
         host = self.hosts[index]
-        self._due_s[index] = time.monotonic() + host.wait_s()
+        self._due_s[index] = _now_s() + host.wait_s()
         self._listening[index] = host.descriptors()
 
     def _wait(self, wait_s: float) -> set[int]:
@@ -78,7 +79,8 @@ class Fleet:
         if self.control is not None:
             descriptors += self.control.descriptors()
             wait_s = min(wait_s, self.control.poll_s or wait_s)
-        if not descriptors:
-            time.sleep(wait_s)
-            return set()
-        return set(select.select(descriptors, [], [], wait_s)[0])
+        return wait_readable(descriptors, wait_s)
+
+
+def _now_s() -> float:
+    return wall_clock() / NS_PER_S

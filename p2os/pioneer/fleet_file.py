@@ -30,6 +30,7 @@ from p2os.pioneer.sensor_errors import load_sensor_errors
 from p2os.pioneer.settings import ControllerSettings, SonarPerSip
 from p2os.pioneer.toml_places import TomlPlaces, read_toml
 from p2os.profiles import Profile
+from p2os.timing import NS_PER_S, Nanos
 
 
 class FleetError(FileError):
@@ -56,6 +57,7 @@ KINDS: Mapping[str, tuple[tuple[type, ...], str]] = {
     "baud": ((int,), "a whole number"),
     "aux": ((list,), "a list of texts"),
     "faults": ((list,), "a list of texts"),
+    "sync_limit_s": ((int, float), "a number of seconds, more than 0 and less than 1e9"),
 }
 TOP_KEYS = ("world", "body", "seed", "apart", "robot")
 ROBOT_KEYS = tuple(key for key in KINDS if key not in TOP_KEYS)
@@ -171,13 +173,22 @@ def _robots(section: _Section, before: list[RobotOrder]) -> list[RobotOrder]:
         aux = tuple(read_aux(text) for text in section.texts("aux"))
         first = RobotOrder(
             port=ports[0], model=str(section.get("model", "p2dx")), at=_place(section), settings=_settings(section),
-            faults=tuple(section.texts("faults")), aux=aux,
+            faults=tuple(section.texts("faults")), aux=aux, sync_limit_ns=_sync_limit(section),
         )  # fmt: skip
     except FleetError:
         raise
     except P2osError as error:
         raise section.error(key, str(error), error.hint) from error
     return [replace(first, port=port) for port in ports]
+
+
+def _sync_limit(section: _Section) -> Nanos | None:
+    seconds = cast("float | None", section.get("sync_limit_s", None))
+    if seconds is None:
+        return None
+    if not 0 < seconds < 1e9:
+        raise section.error("sync_limit_s", f"sync_limit_s must be {KINDS['sync_limit_s'][1]}")
+    return round(seconds * NS_PER_S)
 
 
 def _place(section: _Section) -> Pose | None:

@@ -16,6 +16,7 @@ from p2os.pioneer.scenery import Pose, World
 from p2os.pioneer.settings import ControllerSettings
 from p2os.pioneer.start_places import start_places
 from p2os.pioneer.world import load_world
+from p2os.timing import Nanos
 from p2os.transport import PtyUrl, SerialUrl, TcpUrl, parse_url
 
 #: Where the first robot is found when nothing else is said.
@@ -37,9 +38,10 @@ class RobotOrder:
         settings: How its firmware behaves; a line without a speed takes that of a real serial port.
         faults: What is broken from the start, in the words of `faults`.
         aux: (AUX port, URL) of what hangs there.
+        sync_limit_ns: A client without an open session for so many nanoseconds is let go; None: never.
 
     Raises:
-        UsageError: An AUX port is none, or named twice.
+        UsageError: An AUX port is none, or named twice; the limit is not positive.
     """
 
     port: str = DEFAULT_PORT
@@ -48,8 +50,11 @@ class RobotOrder:
     settings: ControllerSettings = field(default_factory=ControllerSettings)
     faults: tuple[str, ...] = ()
     aux: tuple[tuple[int, str], ...] = ()
+    sync_limit_ns: Nanos | None = None
 
     def __post_init__(self) -> None:
+        if self.sync_limit_ns is not None and self.sync_limit_ns <= 0:
+            raise UsageError(f"a limit of {self.sync_limit_ns} ns for synchronising must be more than 0")
         ports = [number for number, _ in self.aux]
         if len(set(ports)) < len(ports) or not set(ports) <= set(AUX_PORTS):
             raise UsageError(f"AUX ports {ports}: each of 1, 2 and 3 once at most", hint="1=pty:/tmp/aux1")

@@ -2,20 +2,20 @@
 
 This is the skin around `Pioneer`: it reads the clock, waits on descriptors and
 moves bytes; every decision is the controller's. It serves one client at a time.
-A second one is let in and closed at once, since a robot has one host. A client
-that vanishes stops the robot at once and frees it for the next.
+A second one is let in, told so in a line and let go, since a robot has one host. A client
+that vanishes stops the robot at once and frees it for the next; so does one that has no open
+session for longer than `sync_limit_ns`, if there is such a limit.
 
 A robot with a speed of its line (`settings.baud`) is heard and spoken to at that
 speed, whatever the medium; a real serial port paces itself. HOSTBAUD changes both.
 
 Its time is a `RobotTime`: the robot does not live while nobody is connected and it stands
-still, nor through a pause of the machine, which is reported. Robots of one world (`meeting`)
+still, nor through a pause of the machine, which is reported, and which is silence for its
+watchdog: a real robot would have heard nothing either. Robots of one world (`meeting`)
 share theirs; one that has no client is then carried along by the others.
 """
 
 import contextlib
-import select
-import time
 from collections.abc import Callable, Sequence
 from functools import partial
 from typing import cast
@@ -29,8 +29,10 @@ from p2os.pioneer.paced_line import PacedLine
 from p2os.pioneer.robot_time import SETTLE_NS, RobotTime
 from p2os.pioneer.world_orders import change_world
 from p2os.timing import NS_PER_S, Nanos
-from p2os.transport.hang_up import has_hung_up
+from p2os.transport.hang_up import TurnedAway, has_hung_up
 from p2os.transport.ports import READ_BYTES, Listener, Transport
+from p2os.transport.waiting import BLIND_POLL_S, wait_readable
+from p2os.transport.wall_clock import wall_clock
 
 #: (robot's time in ns, what happened in a word or two, detail).
 HostEvent = Callable[[Nanos, str, str], None]
@@ -39,8 +41,6 @@ HostEvent = Callable[[Nanos, str, str], None]
 AWAKE_WAIT_S = 0.1
 #: chosen: how soon `run` notices that it should end.
 ASLEEP_WAIT_S = 0.5
-#: chosen: how often a line without a descriptor is asked for bytes; one millisecond is a character at 9600 bit/s.
-BLIND_POLL_S = 0.001
 #: chosen: no P2OS client says more than its line carries for so long; one that does, or that has left as much, goes.
 LONGEST_BEHIND_NS: Nanos = 5 * NS_PER_S
 #: chosen: 4 MB of a client that is dropped are read away, so that a terminal is clean for the next.
@@ -62,6 +62,8 @@ class Host:
             the time then knows the clock and the speed.
         paced: Whether bytes take the time that `settings.baud` gives them; False where the medium does it itself.
         aux: Who hangs at the AUX ports.
+        sync_limit_ns: A client that has no open session for so many nanoseconds of the clock is let go; None: never.
+            Without effect on a terminal or serial port, which cannot be closed on who has it open.
     """
 
     def __init__(
@@ -70,11 +72,12 @@ class Host:
         listener: Listener,
         *,
         on_event: HostEvent | None = None,
-        clock: Callable[[], Nanos] = time.monotonic_ns,
+        clock: Callable[[], Nanos] = wall_clock,
         speed: float = 1.0,
         shared: tuple[RobotTime, Meeting, int] | None = None,
         paced: bool = True,
         aux: Sequence[AuxSeat] = (),
+        sync_limit_ns: Nanos | None = None,
     ) -> None:
         self.pioneer = pioneer
         self.listener = listener
@@ -90,6 +93,13 @@ class Host:
             meeting.seats[number].advance_to = self._advance_to
             self._bring = partial(meeting.bring, number)
         self._client: Transport | None = None
+        self._turned_away = TurnedAway(self._time.clock)
+        self._sync_limit_ns = sync_limit_ns
+        #: When the client came, and when it had an open session last.
+        self._came_at: Nanos = 0
+        self._open_at: Nanos = 0
+        #: What was left out of the time so far.
+        self._left_out: Nanos = self._time.left_out
         self._settled_at: Nanos = 0
         self._baud = pioneer.baud
         #: Since when more waits than could be heard at once.
@@ -123,21 +133,19 @@ class Host:
     def turn(self, longest_wait_s: float) -> None:
         """Do what is due, then wait for the next deadline, bytes or client, at most so long."""
         self.live()
-        descriptors, wait_s = self.descriptors(), min(self.wait_s(), longest_wait_s)
-        if descriptors:
-            select.select(descriptors, [], [], wait_s)
-        else:
-            time.sleep(wait_s)
+        wait_readable(self.descriptors(), min(self.wait_s(), longest_wait_s))
         self.listen()
 
     def live(self) -> None:
         """Do what is due by the clock."""
         self._read_clock()
+        self._turned_away.look()
         if self._is_asleep():
             return
         self._bring(self.now)
         self._speak()
         self._serve_aux()
+        self._look_at_session()
 
     def listen(self) -> None:
         """Take clients that have come and bytes that have arrived."""
@@ -163,7 +171,7 @@ class Host:
 
     def wait_s(self) -> float:
         """Return how long nothing will be due; `ASLEEP_WAIT_S` at most."""
-        waits = [ASLEEP_WAIT_S]
+        waits = [AWAKE_WAIT_S if self._turned_away else ASLEEP_WAIT_S]
         if not self._is_asleep():
             waits.append(AWAKE_WAIT_S)
             waits += [max(due - self.now, 0) / NS_PER_S / self._time.speed for due in self._deadlines()]
@@ -180,6 +188,7 @@ class Host:
     def close(self) -> None:
         """Stop the robot, let the client go and give the ports back."""
         self._drop_client("the host ends")
+        self._turned_away.close()
         self.listener.close()
         for seat in self.aux:
             seat.close()
@@ -268,11 +277,14 @@ class Host:
         while self._listen_to_client():  # a client that has just left makes room for this one
             pass
         if self._client is not None:
-            self._tell("client refused", f"{transport.description}: {self._client.description} is connected")
-            transport.close()
+            first = self._client.description
+            self._tell("client refused", f"{transport.description}: {first} is connected")
+            connected_s = (self.now - self._came_at) / self._time.speed / NS_PER_S
+            peer = first.removeprefix("tcp:")
+            self._turned_away.add(transport, f"busy: {peer} is connected for {connected_s:.0f} s")
             return
         self.pioneer.take_output()  # what it said to nobody
-        self._client = transport
+        self._client, self._came_at, self._open_at = transport, self.now, self.now
         self._time.client_came()
         self._tell("client connected", transport.description)
 
@@ -300,6 +312,16 @@ class Host:
             self._look_at_backlog(self._client)
         return bool(data)
 
+    def _look_at_session(self) -> None:
+        """Let a client go that has had no open session for too long."""
+        if self._client is None or self._sync_limit_ns is None or self.listener.fileno() is None:
+            return
+        if self.pioneer.state.open:
+            self._open_at = self.now
+        elif self.now - self._open_at >= self._sync_limit_ns * self._time.speed:
+            limit_s = self._sync_limit_ns / NS_PER_S
+            self._drop_client(f"{self._client.description} had no open session for {limit_s:g} s", tell=True)
+
     def _look_at_backlog(self, client: Transport) -> None:
         """Drop a client that has left more than could be heard so far, or that shouts for too long.
 
@@ -320,7 +342,8 @@ class Host:
                     break
         self._drop_client(reason)
 
-    def _drop_client(self, reason: str) -> None:
+    def _drop_client(self, reason: str, *, tell: bool = False) -> None:
+        """Stop the robot and let its client go; `tell` sends the reason."""
         if self._client is None:
             return
         client, self._client, self._behind_since = self._client, None, None
@@ -334,8 +357,11 @@ class Host:
         for line in self._lines or ():
             line.clear()
             line.set_baud(self._baud or line.baud)
-        with contextlib.suppress(TransportError):
-            client.close()
+        if tell:
+            self._turned_away.add(client, reason)
+        else:
+            with contextlib.suppress(TransportError):
+                client.close()
         self._settled_at = self.now + SETTLE_NS
         self._tell("client gone", reason)
 
@@ -346,6 +372,10 @@ class Host:
         """Bring the robot's time up to the clock's, leaving out what the robot need not live."""
         if pause := self._time.read():
             self._tell("lag", f"the machine paused for {pause / NS_PER_S:.1f} s; the robot's time leaves it out")
+        if silence := self._time.left_out - self._left_out:
+            self._left_out += silence
+            self._bring(self.now)
+            self.pioneer.count_silence(silence, self.now)
 
     def _tell(self, what: str, detail: str) -> None:
         if self._on_event is not None:

@@ -2,7 +2,8 @@
 
 Robots do not live while nobody is connected and they have come to rest, nor through a pause of
 the machine longer than `LONGEST_PAUSE_NS`. So waiting costs no processor time and a long wait no
-burst of steps. Robots that share a world share their time: it goes on while any of them has a client.
+burst of steps. What pauses have left out is counted: for a robot's watchdog it is silence. Robots
+that share a world share their time: it goes on while any of them has a client.
 """
 
 from collections.abc import Callable
@@ -27,7 +28,9 @@ class RobotTime:
         self.speed = speed
         #: Nanoseconds of the robots' time.
         self.now: Nanos = 0
-        self._clock = clock
+        #: Nanoseconds of the robots' time that pauses would have been, all in all.
+        self.left_out: Nanos = 0
+        self.clock = clock
         self._clock_read: Nanos = clock()
         self._clients = 0
         self._settled_at: Nanos = 0
@@ -42,12 +45,14 @@ class RobotTime:
         self._settled_at = self.now + SETTLE_NS
 
     def read(self) -> Nanos:
-        """Bring the time up to the clock's; return how long a pause was left out, 0 for none."""
-        read = self._clock()
+        """Bring the time up to the clock's; return how long a pause of the clock was left out, 0 for none."""
+        read = self.clock()
         passed, self._clock_read = read - self._clock_read, read
         if not self._clients and self.now >= self._settled_at:
             return 0
+        lived = passed if self.speed == 1.0 else round(passed * self.speed)
         if passed > LONGEST_PAUSE_NS:
+            self.left_out += lived
             return passed
-        self.now += passed if self.speed == 1.0 else round(passed * self.speed)
+        self.now += lived
         return 0

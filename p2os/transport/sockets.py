@@ -1,8 +1,10 @@
 """TCP lines: connecting, listening, and the byte line over any connected socket.
 
-Nagle's algorithm is off: a frame must not wait for its answer.
+Nagle's algorithm is off: a frame must not wait for its answer. Keepalive is on: a peer
+that vanishes without a word (power, cable, suspend) is noticed within some 10 s.
 """
 
+import contextlib
 import errno
 import socket
 import sys
@@ -16,7 +18,20 @@ CONNECT_TIMEOUT_S = 3.0
 #: chosen: a minute of SIPs; a client that is further behind will never catch up.
 BACKLOG_BYTES = 65_536
 
-#: A robot that has a client lets a second one in and closes at once, which is all that TCP can say of it.
+#: Option of a TCP socket → value, where the system has it.
+#: chosen: 4 s of silence and three probes 2 s apart are 10 s, which a network's hiccup does not last;
+#: the last one, in ms, is the same for a peer that leaves bytes unconfirmed, to which no probes are sent.
+KEEPALIVE = {
+    "TCP_KEEPIDLE": 4,
+    "TCP_KEEPALIVE": 4,  # macOS' name of the same
+    "TCP_KEEPINTVL": 2,
+    "TCP_KEEPCNT": 3,
+    "TCP_USER_TIMEOUT": 10_000,
+}
+#: chosen: longer than any reason for turning a peer away; what begins a connection and is longer is no such line.
+LONGEST_REASON = 120
+
+#: A robot that has a client tells a second one so and closes; other programs may close without a word.
 HUNG_UP_HINT = "a robot has one client: is another program connected, or has the robot's side ended?"
 
 _LISTEN_HINTS = {
@@ -32,9 +47,15 @@ class SocketTransport:
         self.description = description
         self._socket = connection
         self._unsent = b""
+        #: The first bytes that came, as long as they may be all that the far side has to say.
+        self._first = b""
         connection.setblocking(False)
         if connection.family != getattr(socket, "AF_UNIX", None):
             connection.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+            connection.setsockopt(socket.SOL_SOCKET, socket.SO_KEEPALIVE, 1)
+            for name, value in KEEPALIVE.items():
+                if (option := getattr(socket, name, None)) is not None:
+                    connection.setsockopt(socket.IPPROTO_TCP, option, value)
 
     def read(self) -> bytes:
         """Return what has arrived without waiting."""
@@ -45,7 +66,9 @@ class SocketTransport:
         except OSError as error:
             raise self._lost(error) from error
         if not data:
-            raise HungUpError(f"{self.description} closed the connection", hint=HUNG_UP_HINT)
+            raise HungUpError(f"{self.description} closed the connection{self._reason()}", hint=HUNG_UP_HINT)
+        if len(self._first) <= LONGEST_REASON:
+            self._first += data[: LONGEST_REASON + 1]
         return data
 
     def write(self, data: bytes) -> None:
@@ -67,12 +90,35 @@ class SocketTransport:
     def set_baud(self, baud: int) -> None:
         """Do nothing: a socket has no line speed."""
 
+    def turn_away(self, reason: str) -> None:
+        """Tell the peer in one line why it cannot stay, and that nothing more will come.
+
+        The peer's error shows the line if nothing else was said. Closing at once could lose it: `TurnedAway` waits.
+
+        Args:
+            reason: A few words; what is not ASCII is lost.
+        """
+        with contextlib.suppress(OSError):  # it has left already
+            with contextlib.suppress(BlockingIOError):  # it does not read
+                if not self._unsent:
+                    self._socket.send(reason.encode("ascii", "replace")[: LONGEST_REASON - 2] + b"\r\n")
+            self._socket.shutdown(socket.SHUT_WR)
+
     def close(self) -> None:
         """Close the socket."""
         self._socket.close()
 
     def _lost(self, error: OSError) -> HungUpError:
-        return HungUpError(f"{self.description} was lost: {_reason(error)}", hint=HUNG_UP_HINT)
+        with contextlib.suppress(OSError):  # its last words may still wait
+            self._first += self._socket.recv(LONGEST_REASON + 1)
+        return HungUpError(f"{self.description} was lost: {_reason(error)}{self._reason()}", hint=HUNG_UP_HINT)
+
+    def _reason(self) -> str:
+        """Return what the far side said if that was a line of text and nothing else, as the end of a message."""
+        text = self._first.decode("ascii", "replace")
+        line = text.removesuffix("\r\n")
+        is_line = line != text and len(text) <= LONGEST_REASON and line.isprintable() and "\ufffd" not in line
+        return f": {line}" if is_line else ""
 
 
 class TcpListener:

@@ -1,6 +1,7 @@
 """The adapter's PC program run for real: its console on pipes, its wires on a socket, every wait bounded."""
 
 import contextlib
+import os
 import signal
 import socket
 import subprocess
@@ -9,6 +10,11 @@ import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
+
+from p2os.commands import Command
+from p2os.transport import HungUpError, listen_url, open_url
+from p2os.transport.waiting import wait_readable
+from p2os.wire import Decoder, Frame
 
 #: Generous: a loaded machine is no fault of the program.
 PATIENCE_S = 60.0
@@ -53,18 +59,69 @@ class Lines:
             self._news.notify_all()
 
 
-class Program:
-    """A running p2os-adapter."""
+class Relay:
+    """Stands between the program and a robot, and keeps what the program says."""
 
-    def __init__(self, path: Path, folder: Path, line: str, *options: str) -> None:
+    def __init__(self, robot: str) -> None:
+        self._listener = listen_url("tcp:127.0.0.1:0")
+        self.url = self._listener.description
+        #: Each frame as its command, without its argument where it has none.
+        self.said: list[Command] = []
+        self._robot = robot
+        self._over = threading.Event()
+        self._news = threading.Condition()
+        self._thread = threading.Thread(target=self._carry, daemon=True)
+        self._thread.start()
+
+    def wait(self, is_so: Callable[[list[Command]], bool]) -> None:
+        """Wait until what the program has said so far is so."""
+        with self._news:
+            assert self._news.wait_for(lambda: is_so(self.said), PATIENCE_S), self.said[-40:]
+
+    def close(self) -> None:
+        """Take the line away from both."""
+        self._over.set()
+        self._thread.join(PATIENCE_S)
+        self._listener.close()
+
+    def _carry(self) -> None:
+        near = None
+        while near is None and not self._over.is_set():
+            wait_readable([self._listener.fileno() or 0], REPORT_S)
+            near = self._listener.accept()
+        if near is None:
+            return
+        far, decoder = open_url(self._robot), Decoder()
+        with contextlib.suppress(HungUpError):
+            while not self._over.is_set():
+                wait_readable([near.fileno(), far.fileno()], REPORT_S)
+                near.write(far.read())
+                data = near.read()
+                far.write(data)
+                decoder.receive(data, 0)
+                with self._news:
+                    while (item := decoder.next_item()) is not None:
+                        assert isinstance(item, Frame)
+                        self.said.append(Command.from_frame(item))
+                    self._news.notify_all()
+        for line in (near, far):
+            line.close()
+
+
+class Program:
+    """A running p2os-adapter; `stderr` takes its events elsewhere, to a descriptor."""
+
+    def __init__(
+        self, path: Path, folder: Path, line: str, *options: str, stderr: int = subprocess.PIPE, **variables: str
+    ) -> None:
         self.wires_path = folder / "wires.sock"
         self.process = subprocess.Popen(
             [path, "--line", line, "--wires", str(self.wires_path), *options],
-            stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, bufsize=1,
+            stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=stderr, text=True, bufsize=1,
+            env=os.environ | variables,
         )  # fmt: skip
         assert self.process.stdout is not None
-        assert self.process.stderr is not None
-        self.said, self.events = Lines(self.process.stdout), Lines(self.process.stderr)
+        self.said, self.events = Lines(self.process.stdout), Lines(self.process.stderr or iter(()))
         self.said.wait(lambda line: line.startswith("P2OS adapter"))
         self.socket = socket.socket(socket.AF_UNIX)
         self.socket.connect(str(self.wires_path))
@@ -114,10 +171,10 @@ class Program:
 
 
 @contextmanager
-def running(path: Path, line: str, *options: str) -> Iterator[Program]:
+def running(path: Path, line: str, *options: str, stderr: int = subprocess.PIPE, **variables: str) -> Iterator[Program]:
     """Run the program while the block runs."""
     with tempfile.TemporaryDirectory() as folder:  # short: a socket's path has at most 107 characters
-        program = Program(path, Path(folder), line, *options)
+        program = Program(path, Path(folder), line, *options, stderr=stderr, **variables)
         try:
             yield program
         finally:
@@ -125,5 +182,5 @@ def running(path: Path, line: str, *options: str) -> Iterator[Program]:
             program.process.wait()
             program.socket.close()
             for stream in (program.process.stdin, program.process.stdout, program.process.stderr):
-                assert stream is not None
-                stream.close()
+                if stream is not None:
+                    stream.close()

@@ -1,15 +1,25 @@
 """p2os-adapter, the core as a PC program, drives a virtual Pioneer over TCP and over a terminal, in real time."""
 
+import contextlib
+import fcntl
+import os
+import pty
+import shutil
 import signal
+import struct
 import subprocess
+import termios
+import time
 from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 
+from p2os.commands import Command
+from p2os.commands import CommandNumber as C
 from p2os.pioneer.served import served_pioneer
 from tests.adapter_fw.builds import built
-from tests.adapter_fw.program import CONNECT, PATIENCE_S, RESET, Lines, motors, running
+from tests.adapter_fw.program import CONNECT, PATIENCE_S, RESET, Lines, Program, Relay, motors, running
 
 
 @pytest.fixture(scope="module")
@@ -61,7 +71,14 @@ def test_wires_drive_the_robot_and_encoders_come_back(adapter: Path, line: str, 
     assert any(what.startswith("closed") for what in robot.told), robot.told
 
 
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+#: Every signal of the program's table; the real-time ones and those of a crash are not caught.
+ENDING = [
+    signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT, signal.SIGTSTP, signal.SIGUSR1, signal.SIGUSR2,
+    signal.SIGALRM, signal.SIGVTALRM, signal.SIGPROF, signal.SIGXCPU,
+]  # fmt: skip
+
+
+@pytest.mark.parametrize("number", ENDING)
 def test_an_interrupted_program_stops_and_closes_the_robot_first(
     adapter: Path, tcp: str, robot: Robot, number: signal.Signals
 ) -> None:
@@ -203,3 +220,180 @@ def test_a_console_that_ends_leaves_the_adapter_running(adapter: Path, tcp: str)
         program.wires(CONNECT | RESET)
         program.event("reset: rst is high")
         assert program.end() == 130
+
+
+def test_a_program_that_was_made_deaf_to_hang_ups_stays_so(adapter: Path, tcp: str) -> None:
+    before = signal.signal(signal.SIGHUP, signal.SIG_IGN)  # what nohup does; a child inherits it
+    try:
+        with running(adapter, tcp) as program:
+            program.wires(CONNECT)
+            program.event("driving")
+            program.process.send_signal(signal.SIGHUP)
+            program.wires(CONNECT | motors(2, 2))
+            program.event("command: VEL 125")
+            assert program.end() == 130
+    finally:
+        signal.signal(signal.SIGHUP, before)
+
+
+# Pauses ----------------------------------------------------------------------------------
+
+STOPS = [C.STOP, C.VEL, C.RVEL, C.CLOSE]
+#: A gap begins at 350 ms.
+PAUSE_S = 0.6
+
+
+@pytest.fixture
+def relay(robot: Robot) -> Iterator[Relay]:
+    with served_pioneer(on_event=robot.happened) as served:
+        made = Relay(served)
+        yield made
+        made.close()
+
+
+def drive(program: Program, relay: Relay) -> None:
+    program.wires(CONNECT | motors(2, 2))
+    relay.wait(lambda said: said.count(Command(C.VEL, 125)) > 3)
+
+
+def check_stood_until_a_new_wish(program: Program, relay: Relay, before: int) -> None:
+    """Look at what the program has said since a pause, while p2dx_con and the motors' wires stood as before."""
+    relay.wait(lambda said: len(said) >= before + 4)
+    assert [command.number for command in relay.said[before : before + 4]] == STOPS
+    assert [command.argument for command in relay.said[before + 1 : before + 3]] == [0, 0]
+    assert "the program paused" in program.event("lost")
+    time.sleep(PAUSE_S)
+    assert {command.number for command in relay.said[before:]} == set(STOPS)
+    program.wires(motors(2, 2))
+    program.event("idle")
+    again = len(relay.said)
+    program.wires(CONNECT | motors(2, 2))
+    relay.wait(lambda said: Command(C.VEL, 125) in said[again:])
+
+
+def test_a_stopped_program_says_stop_first_when_it_goes_on(adapter: Path, relay: Relay) -> None:
+    with running(adapter, relay.url) as program:
+        drive(program, relay)
+        program.process.send_signal(signal.SIGSTOP)
+        time.sleep(PAUSE_S)
+        before = len(relay.said)
+        program.process.send_signal(signal.SIGCONT)
+        check_stood_until_a_new_wish(program, relay, before)
+
+
+def test_a_stopped_program_that_is_ended_says_stop_first_too(adapter: Path, relay: Relay, robot: Robot) -> None:
+    with running(adapter, relay.url) as program:
+        drive(program, relay)
+        program.process.send_signal(signal.SIGSTOP)
+        time.sleep(PAUSE_S)
+        before = len(relay.said)
+        program.process.send_signal(signal.SIGTERM)
+        program.process.send_signal(signal.SIGCONT)
+        assert program.process.wait(PATIENCE_S) == 130
+        relay.wait(lambda said: len(said) >= before + 4)
+        assert [command.number for command in relay.said[before : before + 4]] == STOPS
+    assert "closed: by its client" in robot.told
+
+
+#: Takes the place of the C library's: the clock that counts suspend runs ahead by what a file says.
+SHIFTED_CLOCK = """
+#define _GNU_SOURCE
+#include <fcntl.h>
+#include <stdlib.h>
+#include <sys/mman.h>
+#include <sys/syscall.h>
+#include <time.h>
+#include <unistd.h>
+static volatile long* ahead_s;
+int clock_gettime(clockid_t which, struct timespec* time) {
+  if (ahead_s == NULL) {
+    const int file = open(getenv("AHEAD"), O_RDONLY);
+    ahead_s = mmap(NULL, sizeof *ahead_s, PROT_READ, MAP_SHARED, file, 0);
+    close(file);
+  }
+  const int result = (int)syscall(SYS_clock_gettime, which, time);
+  time->tv_sec += which == CLOCK_BOOTTIME ? *ahead_s : 0;
+  return result;
+}
+"""
+
+
+def test_a_program_that_slept_with_its_machine_says_stop_first(adapter: Path, relay: Relay, tmp_path: Path) -> None:
+    """A suspend is a leap of CLOCK_BOOTTIME that CLOCK_MONOTONIC does not show."""
+    if not hasattr(time, "CLOCK_BOOTTIME") or shutil.which("gcc") is None:
+        pytest.skip("needs Linux and gcc")
+    source, library, ahead = tmp_path / "shift.c", tmp_path / "shift.so", tmp_path / "ahead"
+    source.write_text(SHIFTED_CLOCK, encoding="utf-8")
+    subprocess.run(["gcc", "-shared", "-fPIC", "-o", library, source], check=True, timeout=PATIENCE_S)
+    ahead.write_bytes(struct.pack("l", 0))
+    variables = {"LD_PRELOAD": str(library), "AHEAD": str(ahead), "ASAN_OPTIONS": "verify_asan_link_order=0"}
+    with running(adapter, relay.url, **variables) as program:
+        drive(program, relay)
+        with ahead.open("r+b", buffering=0) as file:
+            file.write(struct.pack("l", 8 * 3600))
+        relay.wait(lambda said: Command(C.STOP) in said[-8:])
+        stopped = len(relay.said) - 1 - relay.said[::-1].index(Command(C.STOP))
+        check_stood_until_a_new_wish(program, relay, stopped)
+
+
+# Standard error that nobody reads --------------------------------------------------------
+
+
+def take_nothing(descriptor: int) -> None:
+    """Fill a pipe or a terminal that nobody reads up to its last byte."""
+    os.set_blocking(descriptor, False)
+    for size in (100, 1):
+        with contextlib.suppress(BlockingIOError):
+            while True:
+                os.write(descriptor, b"x" * size)
+    os.set_blocking(descriptor, True)
+
+
+@pytest.fixture(params=["pipe", "terminal", "held terminal"])
+def unread(request: pytest.FixtureRequest) -> Iterator[int]:
+    """A standard error that takes nothing."""
+    reader, writer = os.pipe() if request.param == "pipe" else pty.openpty()
+    if request.param == "held terminal":
+        termios.tcflow(writer, termios.TCOOFF)  # Ctrl-S
+    else:
+        take_nothing(writer)
+    yield writer
+    if request.param != "pipe":
+        termios.tcflow(writer, termios.TCOON)
+    for descriptor in (reader, writer):
+        os.close(descriptor)
+
+
+def test_nobody_who_reads_the_events_keeps_no_command_from_the_robot(
+    adapter: Path, relay: Relay, robot: Robot, unread: int
+) -> None:
+    with running(adapter, relay.url, stderr=unread) as program:
+        for _ in range(3):  # each tells half a dozen events
+            drive(program, relay)
+            program.wires(CONNECT)
+            relay.wait(lambda said: said[-1] == Command(C.RVEL, 0) and said[-2] == Command(C.VEL, 0))
+            relay.said.clear()
+        drive(program, relay)
+        assert fcntl.fcntl(unread, fcntl.F_GETFL) & os.O_NONBLOCK == 0, "others have it open too"
+        assert program.end() == 130
+        relay.wait(lambda said: [command.number for command in said[-4:]] == STOPS)
+    assert "closed: by its client" in robot.told
+
+
+def test_lines_that_nobody_read_are_counted(adapter: Path, tcp: str) -> None:
+    reader, writer = os.pipe()
+    take_nothing(writer)
+    with running(adapter, tcp, stderr=writer) as program:
+        for _ in range(1_000):  # 2,000 lines of some 20 bytes, of which 16 KB wait
+            program.type("master pad", "master bluepill")
+            program.answer("ok")
+            program.answer("ok")
+        os.close(writer)
+        heard = os.fdopen(reader)
+        events = Lines(heard)
+        note = events.wait(lambda line: line.endswith(" lines were left out)"))
+        assert 500 < int(note[1:].split()[0]) < 2_000
+        program.type("master pad")
+        events.wait(lambda line: "master: pad" in line)
+        program.end()
+    heard.close()

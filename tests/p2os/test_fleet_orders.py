@@ -35,6 +35,7 @@ errors = "realistic"
 baud = 19200
 aux = ["1=pty:/tmp/aux1"]
 faults = ["sonar-dead 3"]
+sync_limit_s = 2.5
 flash = "own.toml"
 
 [[robot]]
@@ -57,6 +58,7 @@ def test_a_file_names_every_robot(tmp_path: Path) -> None:
     assert first.at == Pose(1.0, 0.0, math.pi)
     assert (first.settings.profile, first.settings.baud, first.settings.name) == (Profile.ARCOS, 19200, "Wilma")
     assert (first.aux, first.faults) == (((1, "pty:/tmp/aux1"),), ("sonar-dead 3",))
+    assert first.sync_limit_ns == 2_500_000_000
     assert second == RobotOrder(port="tcp:127.0.0.1:8102")
     assert third.at is last.at is None
 
@@ -88,6 +90,8 @@ def test_a_file_names_every_robot(tmp_path: Path) -> None:
         ('[[robot]]\naux = ["4=pty:"]', "f:2: '4=pty:' names no AUX port"),
         ('[[robot]]\naux = ["1=pty:", "1=pty:/tmp/x"]', "f:2: AUX ports [1, 1]"),
         ("[[robot]]\nfaults = [1]", "f:2: faults must be a list of texts"),
+        ("[[robot]]\nsync_limit_s = 0", "f:2: sync_limit_s must be a number of seconds, more than 0"),
+        ("[[robot]]\nsync_limit_s = nan", "f:2: sync_limit_s must be a number of seconds, more than 0"),
         ("a = " + "[" * 5000, "f:1:"),
     ],
 )

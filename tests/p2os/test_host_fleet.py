@@ -2,6 +2,7 @@
 
 import os
 import random
+import resource
 import socket
 import threading
 import time
@@ -351,7 +352,7 @@ def test_after_a_client_that_means_harm_the_next_is_served(serving: Serving, har
 def test_a_client_that_floods_and_never_reads_is_left_and_the_robot_stands(serving: Serving) -> None:
     line = drive(serving, 0)
     with socket.create_connection(address(serving.urls[0]), timeout=PATIENCE_S) as second:
-        assert second.recv(1) == b"", "refused while somebody drives"
+        assert second.recv(5) == b"busy:", "refused while somebody drives"
     questions = Command(C.CONFIG).to_frame().to_bytes() * 100
     end = time.monotonic() + PATIENCE_S
     while not any("client gone" in told for told in serving.told):
@@ -384,3 +385,147 @@ def test_a_silent_client_is_stopped_by_the_watchdog_though_it_stays(make_robot: 
     assert looped.robot.pioneer.state.left_setpoint_mps == 0
     assert looped.host.client is not None
     looped.host.close()
+
+
+def driving(make_robot: Callable[..., Any], **host: Any) -> Looped:
+    made = Looped(make_robot(), **host)
+    made.open()
+    say(made.line, C.ENABLE, 1)
+    say(made.line, C.VEL, 300)
+    made.run(1500)
+    assert made.robot.body.state.left_speed_mps == pytest.approx(0.3)
+    return made
+
+
+def test_a_robot_whose_client_was_killed_behind_an_open_line_brakes_after_two_seconds(
+    make_robot: Callable[..., Any],
+) -> None:
+    """A terminal that another program has open, or a relay: nothing tells that the client is dead."""
+    made = driving(make_robot)
+    say(made.line, C.PULSE)
+    made.run(1)
+    last_frame_ms = made.clock.now // NS_PER_MS
+    speeds = []
+    for _ in range(6000):
+        made.run(1)
+        speeds.append((made.clock.now // NS_PER_MS - last_frame_ms, made.robot.body.state.left_speed_mps))
+    begins = next(at for at, speed in speeds if speed < 0.3 - 1e-9)
+    assert 2000 < begins <= 2002  # the watchdog's 2 s, and the first step of the ramp
+    stands = next(at for at, speed in speeds if speed == 0)
+    assert stands <= begins + 1001  # 300 mm/s at 300 mm/s²
+    assert all(speed == 0 for at, speed in speeds if at >= stands)
+    made.host.close()
+
+
+def test_a_pause_of_the_machine_is_silence_for_the_watchdog(make_robot: Callable[..., Any]) -> None:
+    """A real robot would have stood long ago; ours went on with its old speed for two seconds of its own."""
+    made = driving(make_robot)
+    made.clock.now += 3600 * NS_PER_S
+    made.run(1)
+    assert made.robot.pioneer.state.watchdog_expired
+    made.run(1001)
+    assert made.robot.body.state.left_speed_mps == 0
+    say(made.line, C.PULSE)
+    made.run(1001)
+    assert made.robot.body.state.left_speed_mps == pytest.approx(0.3), "the next frame revives it, as the real one"
+    made.host.close()
+
+
+def test_shorter_pauses_add_up_to_the_watchdogs_time(make_robot: Callable[..., Any]) -> None:
+    made = driving(make_robot)
+    say(made.line, C.PULSE)
+    made.run(1)
+    made.clock.now += 900 * NS_PER_MS
+    made.run(99)
+    made.clock.now += 900 * NS_PER_MS
+    made.run(100)
+    assert not made.robot.pioneer.state.watchdog_expired
+    made.run(1)
+    assert made.robot.pioneer.state.watchdog_expired
+    made.host.close()
+
+
+def test_a_client_that_never_reads_is_left_and_the_robot_stands(make_robot: Callable[..., Any]) -> None:
+    made = driving(make_robot)
+    for _ in range(4000):
+        say(made.line, C.CONFIG)
+        made.live(50)
+        if made.host.client is None:
+            break
+    assert made.told[-1].startswith("client gone: loop:robot has stopped reading")
+    made.live(1000)
+    assert made.robot.body.state.left_speed_mps == 0
+    made.line = made.reopen()
+    made.decoder = Decoder()
+    made.run(1)
+    made.open()
+    assert made.robot.pioneer.state.open
+    made.host.close()
+
+
+# Clients that do not synchronise ---------------------------------------------------------
+
+
+def test_a_silent_client_is_let_go_at_the_limit_and_told(make_robot: Callable[..., Any]) -> None:
+    made = Looped(make_robot(), sync_limit_ns=10 * NS_PER_S)
+    say(made.line, 0)  # to synchronise is no session yet
+    made.live(9_999)
+    assert made.host.client is not None
+    made.live(1)
+    assert made.told[-1] == "client gone: loop:robot had no open session for 10 s"
+    assert made.line.read().endswith(b"loop:robot had no open session for 10 s\r\n")
+    made.line = made.reopen()
+    made.live(1)
+    assert made.told[-1] == "client connected: loop:robot"
+    made.host.close()
+
+
+def test_a_client_with_a_session_stays_and_its_time_begins_anew_with_close(make_robot: Callable[..., Any]) -> None:
+    made = Looped(make_robot(), sync_limit_ns=NS_PER_S, speed=4.0)
+    made.open()
+    made.live(5_000)
+    assert made.host.client is not None, "silent, but the watchdog has stopped its robot"
+    say(made.line, C.CLOSE)
+    made.live(990)
+    assert made.host.client is not None
+    made.live(20)
+    assert made.host.client is None
+    made.host.close()
+
+
+def test_who_has_a_terminal_open_cannot_be_sent_away(make_robot: Callable[..., Any]) -> None:
+    made = Looped(make_robot(), listener=listen_url("pty:"), sync_limit_ns=NS_PER_S)
+    made.live(3_000)
+    assert made.told == [f"client connected: {made.url}"]
+    made.line.close()
+    made.host.close()
+
+
+# More descriptors than select knows ------------------------------------------------------
+
+
+@pytest.fixture
+def past_select() -> Iterator[None]:
+    """Let every descriptor that is opened from now on be above what `select` takes."""
+    soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
+    if hard != resource.RLIM_INFINITY and hard < 2048:
+        pytest.skip(f"this system allows {hard} descriptors")
+    resource.setrlimit(resource.RLIMIT_NOFILE, (2048, hard))
+    first = os.open(os.devnull, os.O_RDONLY)
+    taken = [first]
+    while taken[-1] < 1100:
+        taken.append(os.dup(first))
+    yield
+    for descriptor in taken:
+        os.close(descriptor)
+    resource.setrlimit(resource.RLIMIT_NOFILE, (soft, hard))
+
+
+def test_a_robot_is_served_past_a_thousand_descriptors(past_select: None, serving: Serving) -> None:
+    line = drive(serving, 0)
+    assert line.fileno() > 1024
+    orders = open_url(serving.orders)
+    orders.write(b"status\n")
+    serving.wait_for(orders.read)
+    for each in (line, orders):
+        each.close()

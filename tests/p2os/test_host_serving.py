@@ -1,6 +1,7 @@
 """A virtual robot on real lines: loopback TCP and pseudo-terminals, in real time, with bounded waits."""
 
 import os
+import re
 import socket
 import threading
 import time
@@ -150,10 +151,39 @@ def test_a_second_tcp_client_is_refused_aloud(make_robot: Callable[..., Any]) ->
     first.open()
     port = int(served.url.rpartition(":")[2])
     with socket.create_connection(("127.0.0.1", port), timeout=PATIENCE_S) as second:
-        assert second.recv(1) == b""
+        second.sendall(bytes(100))  # to close while these wait would reset the connection: the words would be lost
+        heard = b"".join(iter(lambda: second.recv(100), b""))
+    assert re.fullmatch(rb"busy: 127\.0\.0\.1:\d+ is connected for \d+ s\r\n", heard)
     served.wait_for("client refused")
     first.hear(lambda frame: frame.kind in SIP_KINDS)
     first.close()
+    served.close()
+
+
+def test_our_own_client_says_why_it_was_refused(make_robot: Callable[..., Any]) -> None:
+    served = Served(make_robot(), "tcp:127.0.0.1:0")
+    first = Caller(served.url)
+    first.open()
+    with pytest.raises(HungUpError, match=r"closed the connection: busy: 127\.0\.0\.1:\d+ is connected for 0 s"):
+        Caller(served.url).hear(lambda _frame: False)
+    first.close()
+    served.close()
+
+
+def test_a_client_that_only_ends_what_it_says_leaves_a_robot_that_stands(make_robot: Callable[..., Any]) -> None:
+    """Half-closed (shutdown): it could still hear, but nobody would stop the robot any more."""
+    served = Served(make_robot(), "tcp:127.0.0.1:0")
+    with socket.create_connection(("127.0.0.1", int(served.url.rpartition(":")[2])), timeout=PATIENCE_S) as client:
+        for number, argument in ((0, None), (1, None), (2, None), (C.OPEN, None), (C.ENABLE, 1), (C.VEL, 300)):
+            client.sendall(Command(number, argument).to_frame().to_bytes())
+        end = time.monotonic() + PATIENCE_S
+        while not served.robot.pioneer.state.motors_enabled:
+            assert time.monotonic() < end
+            time.sleep(0.002)
+        client.shutdown(socket.SHUT_WR)
+        served.wait_for("client gone")
+        assert not served.robot.pioneer.state.motors_enabled
+        Caller(served.url).open()
     served.close()
 
 

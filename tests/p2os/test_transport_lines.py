@@ -11,7 +11,8 @@ import pytest
 import serial
 
 from p2os.errors import TransportError, UsageError
-from p2os.transport import HungUpError, Listener, Loops, Transport, listen_url, open_url
+from p2os.transport import HungUpError, Listener, Loops, Transport, listen_url, open_url, sockets
+from p2os.transport.hang_up import LONGEST_LEAVING_NS, MOST_LEAVING, TurnedAway
 from p2os.transport.serial_port import SerialListener, SerialTransport, list_serial_ports
 from p2os.transport.sockets import BACKLOG_BYTES, SocketTransport
 from p2os.transport.url import SerialUrl
@@ -175,6 +176,133 @@ def test_a_client_that_stops_reading_is_an_error_before_memory_runs_out() -> Non
         flood()
     far.close()
     with pytest.raises(HungUpError):
+        transport.write(b"x")
+    transport.close()
+
+
+@pytest.mark.parametrize("end", ["near", "far"])
+def test_a_tcp_peer_that_vanishes_is_noticed_within_ten_seconds(tmp_path: Path, end: str) -> None:
+    """Nothing here can make a peer vanish; the system is asked what it will do."""
+    line = make_line("tcp:127.0.0.1:0", tmp_path)
+    with socket.socket(fileno=os.dup(getattr(line, end).fileno())) as asked:
+        assert asked.getsockopt(socket.SOL_SOCKET, socket.SO_KEEPALIVE)
+        if hasattr(socket, "TCP_USER_TIMEOUT"):  # else other systems' names and defaults hold
+            idle, every, probes, unconfirmed_ms = (
+                asked.getsockopt(socket.IPPROTO_TCP, option)
+                for option in (socket.TCP_KEEPIDLE, socket.TCP_KEEPINTVL, socket.TCP_KEEPCNT, socket.TCP_USER_TIMEOUT)
+            )
+            assert idle + every * probes <= 10
+            assert unconfirmed_ms <= 10_000
+    line.close()
+
+
+def test_a_tcp_peer_that_confirms_nothing_is_given_up(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A window that stays shut is the one silence that a loopback can show."""
+    if not hasattr(socket, "TCP_USER_TIMEOUT"):
+        pytest.skip("this system has no such option")
+    monkeypatch.setitem(sockets.KEEPALIVE, "TCP_USER_TIMEOUT", 200)
+    listener = listen_url("tcp:127.0.0.1:0")
+    with socket.create_connection(("127.0.0.1", int(listener.description.rpartition(":")[2]))) as silent:
+        near = wait_for(listener.accept)
+        assert isinstance(near, SocketTransport)
+
+        def given_up() -> bool:
+            try:
+                near.write(bytes(BACKLOG_BYTES))
+            except HungUpError as error:
+                return "timed out" in str(error)
+            except TransportError:  # it has stopped reading; this is about what the system does
+                near._unsent = b""
+            return False
+
+        wait_for(given_up)
+        assert silent.fileno() >= 0
+        near.close()
+    listener.close()
+
+
+class Standing:
+    """A clock that stands until it is told."""
+
+    now = 0
+
+    def __call__(self) -> int:
+        return self.now
+
+
+def turned_away(tmp_path: Path, reason: str, said: bytes = b"") -> tuple[Line, TurnedAway, Standing]:
+    line, clock = make_line("tcp:127.0.0.1:0", tmp_path), Standing()
+    line.far.write(said)
+    leaving = TurnedAway(clock)
+    leaving.add(line.near, reason)
+    return line, leaving, clock
+
+
+def test_a_peer_that_is_turned_away_reads_why_though_it_had_spoken(tmp_path: Path) -> None:
+    line, leaving, _ = turned_away(tmp_path, "busy: somebody is here", said=bytes(1000))
+
+    def hung_up() -> str:
+        line.far.write(b"more")
+        try:
+            line.far.read()
+        except HungUpError as error:
+            return str(error)
+        return ""
+
+    assert str(wait_for(hung_up)).endswith("closed the connection: busy: somebody is here")
+    assert len(leaving) == 1
+    line.far.close()
+
+    def left() -> bool:
+        leaving.look()
+        return not leaving
+
+    wait_for(left)
+    line.listener.close()
+
+
+def test_a_peer_that_does_not_leave_is_closed_in_time(tmp_path: Path) -> None:
+    line, leaving, clock = turned_away(tmp_path, "busy")
+    clock.now = LONGEST_LEAVING_NS - 1
+    leaving.look()
+    assert len(leaving) == 1
+    clock.now += 1
+    leaving.look()
+    assert not leaving
+    line.close()
+
+
+def test_no_more_than_a_few_are_leaving_at_once() -> None:
+    leaving, far = TurnedAway(Standing()), []
+    for _ in range(MOST_LEAVING + 3):
+        one, other = socket.socketpair()
+        far.append(other)
+        leaving.add(SocketTransport(one, "loop:x"), "busy")
+    assert len(leaving) == MOST_LEAVING
+    leaving.close()
+    assert not leaving
+    for each in far:
+        each.close()
+
+
+@pytest.mark.parametrize("said", [b"busy", b"busy\x07\r\n", b"b\xfcsy\r\n", b"one\r\ntwo\r\n", b"x" * 200 + b"\r\n"])
+def test_what_is_no_line_of_text_is_no_reason(said: bytes) -> None:
+    near, far = socket.socketpair()
+    transport = SocketTransport(near, "loop:x")
+    far.sendall(said)
+    far.close()
+    with pytest.raises(HungUpError) as caught:
+        read_all(transport, 1000)
+    assert str(caught.value) == "loop:x closed the connection"
+    transport.close()
+
+
+def test_a_reason_is_shown_too_where_writing_fails_first() -> None:
+    near, far = socket.socketpair()
+    transport = SocketTransport(near, "loop:x")
+    far.sendall(b"busy: somebody is here\r\n")
+    far.close()
+    with pytest.raises(HungUpError, match="busy: somebody is here"):
         transport.write(b"x")
     transport.close()
 

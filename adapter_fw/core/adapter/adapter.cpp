@@ -117,6 +117,15 @@ void Adapter::shutdown(const char* reason, Nanos now) {
   }
 }
 
+void Adapter::skip_to(const char* reason, Nanos now) {
+  now_ = later(now_, now);
+  next_sample_ = later(next_sample_, now);
+  if (is_awake()) {
+    lose(What::LOST, reason, now);
+  }
+  replan();
+}
+
 void Adapter::advance_to(Nanos limit) {
   if (run(limit) == limit) {
     return;

@@ -9,7 +9,7 @@
 //     SETTLING    OPEN: SETO and SONAR 1 sent, waits for odometry zero; distances live
 //     DRIVING     ENABLE 1 sent; motor values become VEL and RVEL; all live
 //     CLOSING     the wish has ended: STOP, VEL 0, RVEL 0, CLOSE sent; lasts stop_repeat_ns
-//     LOST        no SIP, no belief, no pad, or a shutdown: the same four sent; waits for the wish to end
+//     LOST        no SIP, no belief, no pad, a gap or a shutdown: the same four sent; waits for the wish to end
 //
 // From LOST the way to motion leads over a new wish, whatever the robot does
 // meanwhile. adapter_sim/states.py has the table of transitions; this is its twin,
@@ -96,6 +96,9 @@ class Adapter final : private p2os::ClientListener {
   void set_master(Master master, Nanos now);
   // Stops the robot, drives every output to its safe level, and waits for the wish to end. `reason` is static.
   void shutdown(const char* reason, Nanos now);
+  // Leaves out the time up to `now`, in which nobody called: what was due in it is not done late, the robot is
+  // stopped as by `shutdown`, and STOP is the next frame out. `reason` is static.
+  void skip_to(const char* reason, Nanos now);
 
   // Acts on everything due up to and including `limit`, then looks at rst.
   void advance_to(Nanos limit);
