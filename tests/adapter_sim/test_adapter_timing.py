@@ -10,7 +10,9 @@ from adapter_sim.belief import Belief
 from adapter_sim.mixing import Speeds
 from adapter_sim.pacing import Pacer
 from adapter_sim.sampler import Debounce, Majority
+from p2os.commands import CommandNumber
 from p2os.sip import SonarReading
+from p2os.wire import Frame
 from tests.adapter_sim.conftest import CHARACTER_NS, MS, FakePins, FakeRobot, Rig
 
 
@@ -258,3 +260,43 @@ def test_a_sample_reads_each_input_once_at_its_instant() -> None:
     samples = {at: names for at, names in pins.at.items() if len(names) > 1}
     assert sorted(samples) == [at * MS for at in range(300, 331, 2)]
     assert all(len({name for name in names if name != "rst"}) == 7 for names in samples.values())
+
+
+def stop_is_out_at(rig: Rig, since: int) -> int:
+    """Return when the last byte of the first STOP since an instant has left, behind what was on the line before."""
+    free_at = 0
+    for at, data in rig.to_robot.log:
+        free_at = max(at, free_at) + len(data) * CHARACTER_NS
+        if at >= since and Frame.from_bytes(data).kind == CommandNumber.STOP:
+            return free_at
+    raise AssertionError("no STOP")
+
+
+def busy(seed_ms: int) -> Rig:
+    """Return a rig whose line is as full of speeds as it gets: the motor pins change at every sample."""
+    rig = Rig()
+    rig.connect()
+    for step in range(120):
+        rig.pins.motors(step % 3 + 1, 3 - step % 3, rig.now + step * 8 * MS + seed_ms * MS)
+    return rig
+
+
+def test_stop_is_out_375_ms_after_the_last_sip_and_35_ms_after_p2dx_con_fell_however_full_the_line() -> None:
+    silences, releases = [], []
+    for phase_ms in range(0, 100, 3):
+        rig = busy(phase_ms % 8)
+        rig.ms(250 + phase_ms)
+        rig.robot.sends = False
+        silent_at = last_sip_at(rig)
+        rig.ms(450)
+        silences.append(stop_is_out_at(rig, silent_at) - silent_at)
+        rig = busy(phase_ms % 8)
+        rig.ms(250 + phase_ms)
+        released_at = rig.now
+        rig.pins.set("p2dx_con", False, released_at)
+        rig.ms(100)
+        releases.append(stop_is_out_at(rig, released_at) - released_at)
+    # 350 ms, then up to two pairs of 18.75 ms that are on the line or next to it, and STOP's own 6.25 ms.
+    assert 370 * MS < max(silences) <= 375 * MS, max(silences)
+    # 10 ms of debouncing from the next sample on, and the same.
+    assert 17 * MS < max(releases) <= 35 * MS, max(releases)
