@@ -196,6 +196,20 @@ def test_the_watchdog_bites_at_its_tick_and_not_one_before() -> None:
     assert end.stats.watchdog_stops == 1
 
 
+def test_silence_outside_of_the_time_counts_for_the_watchdog() -> None:
+    end = opened_server()
+    end.count_silence(NS_PER_S, 0)
+    end.advance_to(NS_PER_S - 1)
+    assert events(end) == []
+    end.advance_to(NS_PER_S)
+    assert events(end) == [WatchdogExpired()]
+    other = opened_server()
+    other.count_silence(3600 * NS_PER_S, 5)
+    assert other.next_deadline() == 5, "never before now"
+    with pytest.raises(LocalProtocolError, match="only the server's end"):
+        client().count_silence(1, 0)
+
+
 def test_noise_does_not_feed_the_watchdog() -> None:
     end = opened_server()
     end.receive(b"WMS2\r", 2 * NS_PER_S - 1)

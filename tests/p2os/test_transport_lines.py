@@ -272,6 +272,13 @@ def test_a_peer_that_does_not_leave_is_closed_in_time(tmp_path: Path) -> None:
     line.close()
 
 
+def test_a_terminal_cannot_be_told_and_is_let_go_at_once() -> None:
+    leaving, line = TurnedAway(Standing()), open_url("pty:")
+    leaving.add(line, "busy")
+    assert not leaving
+    assert line.fileno() == -1
+
+
 def test_no_more_than_a_few_are_leaving_at_once() -> None:
     leaving, far = TurnedAway(Standing()), []
     for _ in range(MOST_LEAVING + 3):
