@@ -70,6 +70,13 @@ class DeadmanStopped:
 
 
 @dataclass(frozen=True, slots=True)
+class GapStopped:
+    """The program or its machine paused for so long while the robot was to move; it was told to stop."""
+
+    gap_ns: Nanos
+
+
+@dataclass(frozen=True, slots=True)
 class MotionEnded:
     """A `drive` or `turn` is over.
 
@@ -135,6 +142,7 @@ Notice = (
     | Disobeyed
     | MotorsDisabled
     | DeadmanStopped
+    | GapStopped
     | MotionEnded
     | BaudRaised
     | BaudKept
