@@ -26,7 +26,7 @@ from testbench.run_folder import meta_of, prepare_folder
 from testbench.scenario import Scenario
 from testbench.trace import TRACE_NAME, TraceWriter
 
-#: chosen: without pacing, control comes back often enough for progress and Ctrl-C.
+#: chosen: without pacing, control comes back often enough for progress and signals.
 UNPACED_SLICE_NS: Nanos = 10 * NS_PER_MS
 #: Nothing seen of the firmware for so long at the end of a run is worth a word: it spins, or has died quietly.
 QUIET_NS: Nanos = 1 * NS_PER_S
@@ -56,7 +56,7 @@ class RunResult:
     folder: Path
     outcome: Json
     report: Path
-    #: Ctrl-C ended it.
+    #: A signal ended it.
     was_interrupted: bool
 
     @property
@@ -116,7 +116,7 @@ def run_at_port(
 ) -> RunResult:
     """Drive the robot at a transport in real time (mode C), stop it, and make the run folder.
 
-    The transport is closed in any case. A lost line, lag and Ctrl-C are failures of the run.
+    The transport is closed in any case. A lost line, lag and a signal are failures of the run.
 
     With `drive`, a debugger runs the bench in place of its `run_until`.
 
@@ -165,9 +165,9 @@ def _record(
             bench.run_until(bench.scenario.duration_ns)
         else:
             drive(bench)
-    except KeyboardInterrupt:
+    except KeyboardInterrupt as interruption:
         was_interrupted = True
-        failures.append("interrupted by Ctrl-C")
+        failures.append(f"interrupted ({interruption})" if interruption.args else "interrupted")
     except P2osError as error:
         failures.append(str(error))
     end = bench.finish()

@@ -30,14 +30,18 @@ class GdbServer:
         machine: what is debugged.
         port: TCP port; 0 takes a free one.
         is_paced: whether virtual time goes no faster than the wall clock.
+        on_wait: called twice a second at least while a debugger is waited for; may raise to end the serving.
 
     Raises:
         BluePillError: the port is taken.
     """
 
-    def __init__(self, machine: Machine, port: int, *, is_paced: bool = False) -> None:
+    def __init__(
+        self, machine: Machine, port: int, *, is_paced: bool = False, on_wait: Callable[[], None] = lambda: None
+    ) -> None:
         self._machine = machine
         self._is_paced = is_paced
+        self._on_wait = on_wait
         self._listener = socket.socket(socket.AF_INET, socket.SOCK_STREAM)
         self._listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
         try:
@@ -69,8 +73,8 @@ class GdbServer:
         """
         while True:
             while not select.select([self._listener], [], [], _POLL_S)[0]:
-                pass
-            connection = _Connection(self._listener.accept()[0])
+                self._on_wait()
+            connection = _Connection(self._listener.accept()[0], self._on_wait)
             self._connection = connection
             try:
                 session = self._talk(connection)
@@ -120,8 +124,9 @@ _RESUMES = {b"c", b"s", b"C", b"S"}
 class _Connection:
     """One debugger's end of the line."""
 
-    def __init__(self, line: socket.socket) -> None:
+    def __init__(self, line: socket.socket, on_wait: Callable[[], None]) -> None:
         self._line = line
+        self._on_wait = on_wait
         line.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
         self._reader = PacketReader()
         self._packets: list[Packet] = []
@@ -138,6 +143,7 @@ class _Connection:
         while not self._packets:
             if self._is_lost:
                 return None
+            self._on_wait()
             self._receive(_POLL_S)
         return self._packets.pop(0)
 

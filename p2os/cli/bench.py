@@ -2,23 +2,23 @@
 
 import contextlib
 import json
-import select
 import sys
-import time
-from collections.abc import Callable
 from dataclasses import asdict, dataclass
 from typing import Annotated
 
 import typer
 
+from p2os.cli.holding import hold_robot
+from p2os.cli.line_wait import wait_for_line
 from p2os.cli.link_quality import LinkQuality, Spread, spread_of
 from p2os.cli.quantities import parse_duration
-from p2os.cli.signals import end_on_signals
+from p2os.cli.signals import postponed
 from p2os.commands import Command, CommandNumber
 from p2os.connection import ConfigReceived, ConnectFailed, Connection, ConnectionLost, Role, SipReceived
 from p2os.errors import RemoteProtocolError, TransportError
 from p2os.timing import NS_PER_MS, NS_PER_S, Nanos
 from p2os.transport import Transport, open_url
+from p2os.transport.wall_clock import Clock, wall_clock
 
 HELP = """Measure a link to a robot, without moving it.
 
@@ -39,8 +39,6 @@ ANSWER_WAIT_NS: Nanos = 500 * NS_PER_MS
 PAUSE_NS: Nanos = 300 * NS_PER_MS
 #: Questions without an answer after which no more are asked.
 MOST_UNANSWERED = 3
-LONGEST_WAIT_S = 0.1
-BLIND_POLL_S = 0.001
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -118,7 +116,7 @@ class Bench:
         )  # fmt: skip
 
 
-def measure(transport: Transport, lasts_ns: Nanos, clock: Callable[[], Nanos] = time.monotonic_ns) -> Measured:
+def measure(transport: Transport, lasts_ns: Nanos, clock: Clock = wall_clock) -> Measured:
     """Measure a line for so long after its first packet, and leave the robot closed.
 
     Raises:
@@ -130,24 +128,16 @@ def measure(transport: Transport, lasts_ns: Nanos, clock: Callable[[], Nanos] = 
         data = b""
         while bench.first_sip_ns is None or clock() < bench.first_sip_ns + lasts_ns:
             transport.write(bench.turn(data, clock()))
-            _wait(bench, transport, clock())
+            wait_for_line(transport, bench.next_deadline(), clock())
             data = transport.read()
     except RemoteProtocolError as error:
         raise RemoteProtocolError(f"no robot on {transport.description}: {error}", hint="p2os scan") from error
     finally:
-        bench.connection.disconnect(clock())
-        with contextlib.suppress(TransportError):
-            transport.write(b"".join(bench.connection.take_output()))
+        with postponed():
+            bench.connection.disconnect(clock())
+            with contextlib.suppress(TransportError):
+                transport.write(b"".join(bench.connection.take_output()))
     return bench.result(clock())
-
-
-def _wait(bench: Bench, transport: Transport, now: Nanos) -> None:
-    due = bench.next_deadline()
-    wait_s = LONGEST_WAIT_S if due is None else min(max(due - now, 0) / NS_PER_S, LONGEST_WAIT_S)
-    try:
-        select.select([transport.fileno()], [], [], wait_s)
-    except (TransportError, OSError):
-        time.sleep(BLIND_POLL_S)
 
 
 def register(app: typer.Typer) -> None:
@@ -162,7 +152,7 @@ def bench(
 ) -> None:
     """Measure a link."""
     lasts_ns = parse_duration(duration, "--for")
-    end_on_signals()
+    hold_robot()
     with contextlib.closing(open_url(url)) as transport:
         measured = measure(transport, lasts_ns)
     if json_output:
@@ -170,7 +160,6 @@ def bench(
         return
     for line in lines_of(measured):
         typer.echo(line)
-    sys.stdout.flush()
     lost = measured.missed + measured.bad_checksums + measured.given_up
     sys.stderr.write(f"{measured.packets} packets in {measured.seconds:.1f} s, {lost or 'none'} lost or damaged\n")
 

@@ -2,24 +2,26 @@
 
 One client at a time; each gets its own line to the robot. When either side
 goes, the other is let go too, and a robot whose session was open is brought to
-a stand first.
+a stand first. So it is when the bridge itself has paused (the machine slept, the
+process was stopped): what a client said before is old news, and never passed on.
+
+Invariant: bytes are passed on before anything is shown or recorded.
 """
 
 import contextlib
-import select
-import time
 from collections.abc import Callable
 
+from p2os.cli.signals import postponed
 from p2os.errors import TransportError
 from p2os.timing import NS_PER_MS, NS_PER_S, Nanos
 from p2os.trace import Chunk, Direction
 from p2os.trace.tap import Tap
 from p2os.transport.ports import Listener, Transport
+from p2os.transport.waiting import BLIND_POLL_S, wait_readable
+from p2os.transport.wall_clock import Clock, GapWatch, wall_clock
 
 #: chosen: how soon the loop notices that it should end.
 LONGEST_WAIT_S = 0.2
-#: chosen: how often a line without a descriptor is asked for bytes.
-BLIND_POLL_S = 0.002
 #: From HOSTBAUD to our own change of speed: the command has to leave at the old one. ARIA waits 10 ms.
 BAUD_DELAY_NS: Nanos = 20 * NS_PER_MS
 
@@ -44,7 +46,7 @@ class Bridge:
         *,
         on_chunk: Callable[[Chunk], None],
         on_event: Callable[[str], None],
-        clock: Callable[[], Nanos] = time.monotonic_ns,
+        clock: Clock = wall_clock,
     ) -> None:
         self._listener = listener
         self._open_robot = open_robot
@@ -52,6 +54,8 @@ class Bridge:
         self._on_event = on_event
         self._clock = clock
         self._start = clock()
+        self._gaps = GapWatch(self._start)
+        self._woke_at = self._start
         self._client: Transport | None = None
         self._robot: Transport | None = None
         self._spare: Transport | None = robot
@@ -71,11 +75,16 @@ class Bridge:
             while not until():
                 self.turn()
         finally:
-            self.close()
+            with postponed():
+                self.close()
 
     def turn(self) -> None:
         """Wait for bytes or a client, and pass on what came."""
         self._wait()
+        self._woke_at = self._clock()
+        gap_ns = self._gaps.gap(self._woke_at)
+        if gap_ns and self._tap.farewell():
+            self._part(f"the bridge paused for {gap_ns / NS_PER_S:.1f} s")
         if self._client is None:
             self._welcome()
             return
@@ -86,10 +95,12 @@ class Bridge:
 
     def close(self) -> None:
         """Let both sides go and stop listening."""
-        self._part("the bridge ends")
-        if self._spare is not None:
-            self._spare.close()
-        self._listener.close()
+        try:
+            self._part("the bridge ends")
+        finally:
+            if self._spare is not None:
+                self._spare.close()
+            self._listener.close()
 
     def _welcome(self) -> None:
         client = self._listener.accept()
@@ -125,11 +136,14 @@ class Bridge:
             return
         if not data or target is None:
             return
-        self._on_chunk(self._tap.hear(direction, data, self.now))
+        chunk, lost = self._tap.hear(direction, data, self.now), ""
         try:
             target.write(data)
         except TransportError as error:
-            self._part(str(error))
+            lost = str(error)
+        self._on_chunk(chunk)
+        if lost:
+            self._part(lost)
 
     def _change_baud(self) -> None:
         if self._tap.new_baud is None or self._robot is None:
@@ -151,11 +165,11 @@ class Bridge:
             with contextlib.suppress(TransportError):
                 robot.write(farewell)
             robot.close()
+        client.close()
+        self.sessions += 1
         if farewell:
             self._on_chunk(self._tap.hear(Direction.TO_ROBOT, farewell, self.now))
             self._on_event("the session was open: sent STOP, VEL 0 and CLOSE")
-        client.close()
-        self.sessions += 1
         self._on_event(f"client gone: {reason}")
 
     def _wait(self) -> None:
@@ -175,7 +189,5 @@ class Bridge:
                 longest = BLIND_POLL_S
         if self._baud_due is not None:
             longest = min(longest, max(self._baud_due - self.now, 0) / NS_PER_S)
-        if descriptors:
-            select.select(descriptors, [], [], longest)
-        else:
-            time.sleep(longest)
+        self._gaps.expect(self._woke_at + round(longest * NS_PER_S))
+        wait_readable(descriptors, longest)

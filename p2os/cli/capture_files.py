@@ -3,6 +3,8 @@
 Each chunk is flushed, so that a program that is killed leaves a file that can be read.
 """
 
+import contextlib
+from collections.abc import Iterator
 from pathlib import Path
 from types import TracebackType
 from typing import IO, Protocol, Self
@@ -31,10 +33,11 @@ class RecordingFile:
     """A recording of ours, written as it happens.
 
     Raises:
-        FileError: The file cannot be written.
+        FileError: The file cannot be written, now or later.
     """
 
     def __init__(self, path: Path, note: str = "") -> None:
+        self._path = path
         self._file = _open(path)
         self._write(header_line(note))
 
@@ -44,11 +47,13 @@ class RecordingFile:
 
     def close(self) -> None:
         """End the file."""
-        self._file.close()
+        with _naming(self._path):
+            self._file.close()
 
     def _write(self, line: str) -> None:
-        self._file.write(line.encode("ascii"))
-        self._file.flush()
+        with _naming(self._path):
+            self._file.write(line.encode("ascii"))
+            self._file.flush()
 
 
 class PcapFile:
@@ -59,28 +64,32 @@ class PcapFile:
         base_ns: When the capture began, in nanoseconds since 1970.
 
     Raises:
-        FileError: The file cannot be written.
+        FileError: The file cannot be written, now or later.
     """
 
     def __init__(self, path: Path, base_ns: Nanos) -> None:
+        self._path = path
         self._file = _open(path)
         self._base_ns = base_ns
         self._cutter = FrameCutter()
-        self._file.write(file_header())
-        self._file.flush()
+        with _naming(path):
+            self._file.write(file_header())
+            self._file.flush()
 
     def take(self, chunk: Chunk) -> None:
         """Write the frames that a chunk completes."""
-        for piece in self._cutter.take(chunk):
-            self._file.write(record(piece, self._base_ns))
-        self._file.flush()
+        with _naming(self._path):
+            for piece in self._cutter.take(chunk):
+                self._file.write(record(piece, self._base_ns))
+            self._file.flush()
 
     def close(self) -> None:
         """Write what is left of broken frames, and end the file."""
-        if not self._file.closed:
-            for piece in self._cutter.finish():
-                self._file.write(record(piece, self._base_ns))
-        self._file.close()
+        with _naming(self._path):
+            if not self._file.closed:
+                for piece in self._cutter.finish():
+                    self._file.write(record(piece, self._base_ns))
+            self._file.close()
 
 
 class Sinks:
@@ -95,8 +104,17 @@ class Sinks:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        for sink in self._sinks:
-            sink.close()
+        self.close()
+
+    def close(self) -> None:
+        """Close each, whatever becomes of the others.
+
+        Raises:
+            FileError: A file cannot be written.
+        """
+        with contextlib.ExitStack() as closing:
+            for sink in reversed(self._sinks):
+                closing.callback(sink.close)
 
     def take(self, chunk: Chunk) -> None:
         """Hand a chunk to each."""
@@ -105,7 +123,14 @@ class Sinks:
 
 
 def _open(path: Path) -> IO[bytes]:
-    try:
+    with _naming(path):
         return path.open("wb")
+
+
+@contextlib.contextmanager
+def _naming(path: Path) -> Iterator[None]:
+    """Raise what the system refuses as an error that names the file."""
+    try:
+        yield
     except OSError as error:
         raise FileError(f"cannot write {path}: {(error.strerror or str(error)).lower()}") from error

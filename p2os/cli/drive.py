@@ -8,8 +8,9 @@ from typing import Annotated
 
 import typer
 
+from p2os.cli.holding import held
 from p2os.cli.quantities import Quantity, parse_duration, parse_quantity
-from p2os.cli.signals import end_on_signals
+from p2os.cli.watched import Watch
 from p2os.client import MotionResult, Robot
 from p2os.errors import UsageError
 from p2os.timing import NS_PER_S, Nanos
@@ -17,8 +18,8 @@ from p2os.timing import NS_PER_S, Nanos
 HELP = """Move a robot, and leave it standing.
 
 A way comes before an angle; each is watched until the robot has arrived. With
---for, speeds are held for a time. Numbers need their units. Ctrl-C, an error and
-a lost link stop the robot first.
+--for, speeds are held for a time, and watched as well. Numbers need their units.
+A signal, an error and a lost link stop the robot first.
 
 \b
 Examples:
@@ -82,8 +83,7 @@ def drive(
         rate_radps=parse_quantity(turn_rate, Quantity.TURN_RATE, "--turn-rate") if turn_rate else None,
         lasts_ns=parse_duration(duration, "--for") if duration else None,
     )
-    end_on_signals()
-    with Robot(url, model=robot or None, reconnect=False) as client:
+    with held(Robot(url, model=robot or None, reconnect=False)) as client:
         steps = carry_out(plan, client)
         pose = client.pose
     if json_output:
@@ -101,11 +101,13 @@ def carry_out(plan: Plan, robot: Robot) -> list[dict[str, object]]:
     """
     steps: list[dict[str, object]] = []
     if plan.lasts_ns is not None:
-        robot.set_velocity(plan.speed_mps or 0.0, plan.rate_radps or 0.0)
-        robot.sleep(plan.lasts_ns / NS_PER_S)
-        _check_link(robot)
+        forward_mps, turn_radps = plan.speed_mps or 0.0, plan.rate_radps or 0.0
+        what = f"hold {forward_mps:.2f} m/s, {math.degrees(turn_radps):.0f} deg/s"
+        watch = Watch(robot, what, moves=bool(forward_mps or turn_radps))
+        robot.set_velocity(forward_mps, turn_radps)
+        watch.wait(plan.lasts_ns)
         robot.stop()
-        steps.append({"what": "hold", "forward_mps": plan.speed_mps or 0.0, "turn_radps": plan.rate_radps or 0.0,
+        steps.append({"what": "hold", "forward_mps": forward_mps, "turn_radps": turn_radps,
                       "took_s": plan.lasts_ns / NS_PER_S})  # fmt: skip
         _wait_until_it_stands(robot)
     if plan.forward_m is not None:
@@ -129,11 +131,6 @@ def _step(what: str, unit: str, result: MotionResult) -> dict[str, object]:
         f"reached_{unit}": round(result.reached, 6),
         "took_s": round(result.took_ns / NS_PER_S, 3),
     }
-
-
-def _check_link(robot: Robot) -> None:
-    """Raise if the link was lost while a speed was held: a stop that nobody hears is no success."""
-    robot.next_state()
 
 
 def _wait_until_it_stands(robot: Robot) -> None:

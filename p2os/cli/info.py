@@ -3,14 +3,14 @@
 import contextlib
 import json
 import math
-import select
-import time
-from collections.abc import Callable
 from dataclasses import asdict, dataclass
 from typing import Annotated
 
 import typer
 
+from p2os.cli.holding import hold_robot
+from p2os.cli.line_wait import wait_for_line
+from p2os.cli.signals import postponed
 from p2os.commands import Command, CommandNumber
 from p2os.config_packet import FIELDS, ConfigPacket
 from p2os.connection import (
@@ -30,6 +30,7 @@ from p2os.sip import POSITION_MASK, StandardSip
 from p2os.timing import NS_PER_S, Nanos
 from p2os.transport import Transport, open_url
 from p2os.transport.ports import HungUpError
+from p2os.transport.wall_clock import Clock, wall_clock
 from p2os.units import in_units
 
 HELP = """Connect to a robot, print who it is, how it is set and what it senses, and leave.
@@ -51,8 +52,6 @@ Ends with exit code 1 when nobody answers.
 CONFIG_WAIT_NS: Nanos = 1 * NS_PER_S
 #: chosen: the session may take six SYNC0 of a second each, and a robot may need to be stopped first.
 LONGEST_NS: Nanos = 12 * NS_PER_S
-#: chosen: how often a line that cannot be waited for is read.
-BLIND_POLL_S = 0.005
 #: Positions have 15 bits.
 POSITION_SPAN = POSITION_MASK + 1
 #: Units of the fields of the CONFIGpac that have one (`ConfigPacket`).
@@ -77,7 +76,7 @@ class RobotInfo:
     config: ConfigPacket | None = None
 
 
-def ask(transport: Transport, *, clock: Callable[[], Nanos] = time.monotonic_ns) -> RobotInfo:
+def ask(transport: Transport, *, clock: Clock = wall_clock) -> RobotInfo:
     """Connect, listen until the robot has said all, and leave it closed.
 
     Raises:
@@ -90,12 +89,13 @@ def ask(transport: Transport, *, clock: Callable[[], Nanos] = time.monotonic_ns)
     except HungUpError as error:
         raise TransportError(str(error), hint="is another program connected to the robot?") from error
     finally:
-        connection.disconnect(clock())
-        with contextlib.suppress(TransportError):  # whoever has gone needs no goodbye
-            transport.write(b"".join(connection.take_output()))
+        with postponed():
+            connection.disconnect(clock())
+            with contextlib.suppress(TransportError):  # whoever has gone needs no goodbye
+                transport.write(b"".join(connection.take_output()))
 
 
-def _listen(connection: Connection, transport: Transport, clock: Callable[[], Nanos]) -> RobotInfo:
+def _listen(connection: Connection, transport: Transport, clock: Clock) -> RobotInfo:
     start = clock()
     connection.connect(start)
     identity: Identity | None = None
@@ -125,18 +125,8 @@ def _listen(connection: Connection, transport: Transport, clock: Callable[[], Na
         if identity is not None and sip is not None and (config is not None or waited):
             return RobotInfo(identity=identity, sip=sip, config=config)
         transport.write(b"".join(connection.take_output()))
-        _wait(connection, transport, now)
+        wait_for_line(transport, connection.next_deadline(), now)
     raise RemoteProtocolError(f"the robot on {transport.description} answers, but sends no packets")
-
-
-def _wait(connection: Connection, transport: Transport, now: Nanos) -> None:
-    """Sleep until bytes come or the connection wants to act."""
-    deadline = connection.next_deadline()
-    wait_s = 0.1 if deadline is None else min(max(deadline - now, 0) / NS_PER_S, 0.1)
-    try:
-        select.select([transport.fileno()], [], [], wait_s)
-    except (OSError, ValueError):  # pragma: no cover - Windows waits on sockets only
-        time.sleep(BLIND_POLL_S)
 
 
 def _hint(transport: Transport) -> str:
@@ -155,11 +145,9 @@ def info(
     json_output: Annotated[bool, typer.Option("--json", help="Print a JSON object.")] = False,
 ) -> None:
     """Print what a robot says of itself."""
-    transport = open_url(url)
-    try:
+    hold_robot()
+    with contextlib.closing(open_url(url)) as transport:
         found = ask(transport)
-    finally:
-        transport.close()
     parameters, is_known = _parameters(found.identity.subclass)
     if json_output:
         typer.echo(json.dumps(as_plain(found, parameters), indent=2))

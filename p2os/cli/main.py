@@ -5,9 +5,10 @@ Verbs are modules with `register(app)`, found by the entry points of the group
 here. A verb whose module cannot be imported is still listed, with what it lacks.
 
 Results go to stdout, all else to stderr. An error is one line and one hint.
-Exit codes: 0 done, 1 the operation failed, 2 wrong usage, 130 interrupted.
+Exit codes: 0 done, 1 the operation failed, 2 wrong usage, 130 interrupted, by whatever signal.
 """
 
+import contextlib
 import os
 import sys
 import traceback
@@ -18,6 +19,8 @@ from typing import Annotated
 import typer
 
 import p2os
+from p2os.cli.printing import restored_output
+from p2os.cli.signals import end_on_signals, ignore_signals, restored_signals
 from p2os.errors import MissingDependencyError
 
 GROUP = "p2os.verbs"
@@ -58,7 +61,10 @@ def main(arguments: Sequence[str] | None = None) -> None:
     """Run the command line and end the process with its exit code."""
     words = list(sys.argv[1:] if arguments is None else arguments)
     trace = "--trace" in words
-    sys.exit(run([word for word in words if word != "--trace"], trace=trace))
+    end_on_signals()
+    code = run([word for word in words if word != "--trace"], trace=trace)
+    ignore_signals()  # a robot that was not let go before is when Python ends, and the exit code stands
+    sys.exit(code)
 
 
 def run(words: list[str], *, trace: bool = False) -> int:
@@ -68,17 +74,19 @@ def run(words: list[str], *, trace: bool = False) -> int:
         words: what follows `p2os`.
         trace: show where in the program an error arose.
     """
-    try:
-        command = typer.main.get_command(make_app(words))
-        result = command.main(words or ["--help"], prog_name="p2os", standalone_mode=False)
-    except (KeyboardInterrupt, typer.Abort):
-        return EXIT_INTERRUPTED
-    except BrokenPipeError:  # the reader of our stdout has left, e.g. `p2os ports | head -1`
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-        return EXIT_FAILED
-    except Exception as error:  # noqa: BLE001 - the one place where every error becomes a line
-        return report(error, words, trace=trace)
-    return result if isinstance(result, int) else 0
+    with restored_signals(), restored_output():
+        end_on_signals()
+        try:
+            command = typer.main.get_command(make_app(words))
+            result = command.main(words or ["--help"], prog_name="p2os", standalone_mode=False)
+        except (KeyboardInterrupt, typer.Abort):
+            return EXIT_INTERRUPTED
+        except BrokenPipeError:  # the reader of our stdout has left, e.g. `p2os ports | head -1`
+            os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+            return EXIT_FAILED
+        except Exception as error:  # noqa: BLE001 - the one place where every error becomes a line
+            return report(error, words, trace=trace)
+        return result if isinstance(result, int) else 0
 
 
 def report(error: Exception, words: Sequence[str], *, trace: bool = False) -> int:
@@ -170,4 +178,5 @@ def _one_line(text: str) -> str:
 
 
 def _say(line: str) -> None:
-    sys.stderr.write(f"{line}\n")
+    with contextlib.suppress(OSError):  # nobody reads it: the exit code tells
+        sys.stderr.write(f"{line}\n")

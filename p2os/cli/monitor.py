@@ -2,20 +2,20 @@
 
 import json
 import sys
-import time
 from collections import deque
 from typing import Annotated
 
 import typer
 
 from p2os.cli.dashboard import Sight, draw, line_of
+from p2os.cli.holding import held
 from p2os.cli.link_quality import LinkQuality
 from p2os.cli.quantities import parse_duration
-from p2os.cli.signals import end_on_signals
 from p2os.client import Notice, PacketArrived, Robot, RobotState
 from p2os.errors import MissingDependencyError
 from p2os.timing import NS_PER_MS, NS_PER_S, Nanos
 from p2os.trace.describe import plain
+from p2os.transport.wall_clock import wall_clock
 
 HELP = """Show a robot's state as it comes, without moving it: pose, speeds, a ring of its
 sonar, battery, bumpers, flags, and how good the link is.
@@ -47,8 +47,7 @@ def monitor(
 ) -> None:
     """Show a robot."""
     lasts_ns = parse_duration(duration, "--for") if duration else None
-    end_on_signals()
-    with Robot(url, model=robot or None, auto_enable=False) as client:
+    with held(Robot(url, model=robot or None, auto_enable=False)) as client:
         if json_output or not sys.stdout.isatty():
             _print_states(client, lasts_ns, as_json=json_output)
         else:
@@ -74,13 +73,12 @@ def words_of(notice: Notice) -> str:
 
 
 def _print_states(client: Robot, lasts_ns: Nanos | None, *, as_json: bool) -> None:
-    ends = None if lasts_ns is None else time.monotonic_ns() + lasts_ns
+    ends = None if lasts_ns is None else wall_clock() + lasts_ns
     count = 0
     for state in client.states():
         typer.echo(json.dumps(state_as_plain(state)) if as_json else line_of(state))
-        sys.stdout.flush()
         count += 1
-        if ends is not None and time.monotonic_ns() >= ends:
+        if ends is not None and wall_clock() >= ends:
             break
     if not as_json:
         sys.stderr.write(f"{count} packets\n")
@@ -99,10 +97,10 @@ def _show(client: Robot, url: str, lasts_ns: Nanos | None) -> None:
     client.on_state(lambda state: quality.packet(state.at_ns))
     identity = client.identity
     title = f"{identity.name or 'robot'} ({client.parameters.title}, {client.profile.value}) on {url}"
-    ends = None if lasts_ns is None else time.monotonic_ns() + lasts_ns
+    ends = None if lasts_ns is None else wall_clock() + lasts_ns
     console = Console()
     with Live(console=console, auto_refresh=False, screen=True) as live:
-        while ends is None or time.monotonic_ns() < ends:
+        while ends is None or wall_clock() < ends:
             sight = Sight(
                 title=title, link=client.link, state=client.state, limits=client.limits, parameters=client.parameters,
                 stats=client.stats, quality=quality, news=tuple(news),

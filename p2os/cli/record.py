@@ -1,7 +1,6 @@
 """`p2os record`: listen to a robot and keep every byte of both sides."""
 
 import contextlib
-import select
 import sys
 import time
 from collections.abc import Callable
@@ -11,13 +10,16 @@ from typing import Annotated
 import typer
 
 from p2os.cli.capture_files import PcapFile, RecordingFile, Sink, Sinks
+from p2os.cli.holding import hold_robot
+from p2os.cli.line_wait import wait_for_line
 from p2os.cli.quantities import parse_duration
-from p2os.cli.signals import end_on_signals
+from p2os.cli.signals import postponed
 from p2os.connection import ConnectFailed, Connection, ConnectionLost, Role, SipReceived
 from p2os.errors import RemoteProtocolError, TransportError
 from p2os.timing import NS_PER_S, Nanos
 from p2os.trace import Chunk, Direction
 from p2os.transport import Transport, open_url
+from p2os.transport.wall_clock import Clock, wall_clock
 
 HELP = """Connect to a robot, keep its motors off, and record all that both sides say.
 
@@ -31,8 +33,6 @@ Examples:
 To record another program's session, put `p2os sniff` in between.
 """
 DEFAULT_OUT = Path("recording.jsonl")
-LONGEST_WAIT_S = 0.1
-BLIND_POLL_S = 0.002
 
 
 def record_session(
@@ -40,7 +40,7 @@ def record_session(
     on_chunk: Callable[[Chunk], None],
     *,
     lasts_ns: Nanos | None = None,
-    clock: Callable[[], Nanos] = time.monotonic_ns,
+    clock: Clock = wall_clock,
 ) -> int:
     """Listen to a robot until the time is over or an exception (Ctrl-C) ends it; return the number of SIPs.
 
@@ -60,15 +60,15 @@ def record_session(
 
     def speak() -> None:
         for data in connection.take_output():
-            on_chunk(Chunk(at_ns=clock() - start, direction=Direction.TO_ROBOT, data=data))
             transport.write(data)
+            on_chunk(Chunk(at_ns=clock() - start, direction=Direction.TO_ROBOT, data=data))
 
     sips, ends_at = 0, None
     try:
         connection.connect(clock())
         while ends_at is None or clock() < ends_at:
             speak()
-            _wait(connection, transport, clock())
+            wait_for_line(transport, connection.next_deadline(), clock())
             data, now = transport.read(), clock()
             if data:
                 on_chunk(Chunk(at_ns=now - start, direction=Direction.FROM_ROBOT, data=data))
@@ -82,19 +82,14 @@ def record_session(
                     sips += 1
                     ends_at = now + lasts_ns if ends_at is None and lasts_ns is not None else ends_at
     finally:
-        connection.disconnect(clock())
-        with contextlib.suppress(TransportError):
-            speak()
+        with postponed():
+            connection.disconnect(clock())
+            farewell = b"".join(connection.take_output())
+            with contextlib.suppress(TransportError):
+                transport.write(farewell)
+            if farewell:
+                on_chunk(Chunk(at_ns=clock() - start, direction=Direction.TO_ROBOT, data=farewell))
     return sips
-
-
-def _wait(connection: Connection, transport: Transport, now: Nanos) -> None:
-    deadline = connection.next_deadline()
-    wait_s = LONGEST_WAIT_S if deadline is None else min(max(deadline - now, 0) / NS_PER_S, LONGEST_WAIT_S)
-    try:
-        select.select([transport.fileno()], [], [], wait_s)
-    except (TransportError, OSError):
-        time.sleep(BLIND_POLL_S)
 
 
 def register(app: typer.Typer) -> None:
@@ -110,19 +105,20 @@ def record(
 ) -> None:
     """Record a robot."""
     lasts_ns = parse_duration(duration, "--for") if duration else None
+    hold_robot()
     transport = open_url(url)
     sinks: list[Sink] = []
-    begun = time.monotonic()
+    began = wall_clock()
     with contextlib.closing(transport), Sinks(sinks) as all_sinks:
         sinks.append(RecordingFile(out, note=f"p2os record {url}"))
         if pcap is not None:
             sinks.append(PcapFile(pcap, time.time_ns()))
-        end_on_signals()
         sys.stderr.write(f"recording {url} into {out}" + ("" if lasts_ns else "; Ctrl-C ends") + "\n")
         try:
             sips = record_session(transport, all_sinks.take, lasts_ns=lasts_ns)
         except KeyboardInterrupt:
-            sys.stderr.write(f"interrupted after {time.monotonic() - begun:.1f} s; {out} is complete up to there\n")
+            lasted_s = (wall_clock() - began) / NS_PER_S
+            sys.stderr.write(f"interrupted after {lasted_s:.1f} s; {out} is complete up to there\n")
             raise
-    sys.stderr.write(f"{sips} SIPs in {time.monotonic() - begun:.1f} s\n")
+    sys.stderr.write(f"{sips} SIPs in {(wall_clock() - began) / NS_PER_S:.1f} s\n")
     typer.echo(out)

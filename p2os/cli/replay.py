@@ -1,25 +1,26 @@
 """`p2os replay`: play a recorded conversation again, as its robot or as its client."""
 
 import contextlib
-import select
 import sys
-import time
-from collections.abc import Callable
 from enum import Enum
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
-from p2os.cli.signals import end_on_signals
+from p2os.cli.holding import hold_robot
+from p2os.cli.line_wait import LONGEST_WAIT_NS, wait_for_line
+from p2os.cli.signals import postponed
 from p2os.commands import CommandNumber
-from p2os.errors import FileError, RemoteProtocolError, TransportError, UsageError
+from p2os.errors import FileError, RemoteProtocolError, RunFailedError, TransportError, UsageError
 from p2os.timing import NS_PER_S, Nanos
 from p2os.trace import Capture, Direction, frame_chunks, read_file
 from p2os.trace.replay import Replay
 from p2os.trace.tap import Tap, frame_of
 from p2os.transport import listen_url, open_url
 from p2os.transport.ports import HungUpError, Listener, Transport
+from p2os.transport.waiting import wait_readable
+from p2os.transport.wall_clock import Clock, GapWatch, wall_clock
 
 HELP = """Play a recorded conversation again.
 
@@ -38,8 +39,6 @@ Examples:
 """
 #: chosen: three times what clients wait for the answer to a SYNC.
 PATIENCE_NS: Nanos = 3 * NS_PER_S
-LONGEST_WAIT_S = 0.1
-BLIND_POLL_S = 0.002
 #: Speeds that are refused are mistakes.
 SLOWEST, FASTEST = 0.01, 100.0
 #: Commands that move a robot whose motors are on.
@@ -66,46 +65,42 @@ def play(
     transport: Transport,
     role: Direction,
     *,
-    clock: Callable[[], Nanos] = time.monotonic_ns,
+    clock: Clock = wall_clock,
     patience_ns: Nanos = PATIENCE_NS,
 ) -> None:
     """Play one side over a line until all was said; leave a robot standing and closed.
 
     Raises:
         RemoteProtocolError: As the client: the robot does not answer the handshake.
+        RunFailedError: As the client: this program or its machine paused.
         TransportError: The line was lost.
     """
-    tap = Tap()
+    tap, is_client = Tap(), role is Direction.TO_ROBOT
     try:
         replay.start(clock())
+        gaps = GapWatch(clock())
         while replay.frames_left:
             now = clock()
+            if (gap_ns := gaps.gap(now)) and is_client:
+                raise RunFailedError(f"paused for {gap_ns / NS_PER_S:.1f} s: the recorded times have gone by")
             replay.advance_to(now)
             for data in replay.take_output():
                 tap.hear(role, data, now)
                 transport.write(data)
-            if role is Direction.TO_ROBOT and replay.waited(now) > patience_ns:
+            if is_client and replay.waited(now) > patience_ns:
                 raise RemoteProtocolError(
                     f"{transport.description} does not give {replay.awaited}, as in the recording",
                     hint="is a robot behind it? (p2os info URL)",
                 )
-            _wait(replay, transport, now)
+            wait_for_line(transport, replay.next_deadline(), now, gaps)
             data, now = transport.read(), clock()
             tap.hear(role.opposite, data, now)
             replay.receive(data, now)
     finally:
-        if role is Direction.TO_ROBOT and (farewell := tap.farewell()):
-            with contextlib.suppress(TransportError):
-                transport.write(farewell)
-
-
-def _wait(replay: Replay, transport: Transport, now: Nanos) -> None:
-    deadline = replay.next_deadline()
-    wait_s = LONGEST_WAIT_S if deadline is None else min(max(deadline - now, 0) / NS_PER_S, LONGEST_WAIT_S)
-    try:
-        select.select([transport.fileno()], [], [], wait_s)
-    except (TransportError, OSError):
-        time.sleep(BLIND_POLL_S)
+        with postponed():
+            if is_client and (farewell := tap.farewell()):
+                with contextlib.suppress(TransportError):
+                    transport.write(farewell)
 
 
 def motions_of(capture: Capture) -> int:
@@ -133,14 +128,13 @@ def replay(
         who = "robot" if side is Side.ROBOT else "client"
         raise FileError(f"{file} holds nothing that a {who} said", hint="p2os decode shows what it holds")
     frames = player.frames_left
-    end_on_signals()
     if side is Side.CLIENT:
         _ask(motions_of(capture), url, yes=yes)
+        hold_robot()
         transport = open_url(url)
     else:
         listener = listen_url(url)
         sys.stderr.write(f"waiting for a client on {listener.description}; Ctrl-C ends\n")
-        sys.stderr.flush()
         transport = _first(listener)
     with contextlib.closing(transport):
         try:
@@ -162,8 +156,5 @@ def _ask(motions: int, url: str, *, yes: bool) -> None:
 def _first(listener: Listener) -> Transport:
     while (transport := listener.accept()) is None:
         descriptor = listener.fileno()
-        if descriptor is None:
-            time.sleep(listener.poll_s or LONGEST_WAIT_S)
-        else:
-            select.select([descriptor], [], [], LONGEST_WAIT_S)
+        wait_readable(() if descriptor is None else (descriptor,), listener.poll_s or LONGEST_WAIT_NS / NS_PER_S)
     return transport

@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from p2os.cli.signals import end_on_signals
+from p2os.cli.holding import held, hold_robot
 from p2os.client import ClientSettings, Connected, ConnectError, Robot
 from p2os.client.settings import BAUDS
 from p2os.errors import P2osError, TransportError, UsageError
@@ -68,11 +68,10 @@ def scan(
     if wrong:
         raise UsageError(f"--baud {wrong[0]} is no speed of a serial line", hint=f"one of {', '.join(map(str, BAUDS))}")
     places = urls or [*(port["url"] for port in list_serial_ports()), SIMULATOR]
-    end_on_signals()
+    hold_robot()
     found = []
     for place in places:
         sys.stderr.write(f"{place}: ")
-        sys.stderr.flush()
         try:
             robot = identify(place, tuple(baud) if baud else BAUDS)
         except (ConnectError, TransportError) as error:
@@ -116,7 +115,7 @@ def identify(url: str, bauds: tuple[int, ...] = BAUDS) -> Found:
 
     robot = Robot(_at_first(url, bauds), settings=settings)
     robot.on_event(note)
-    with robot:
+    with held(robot):
         identity, config = robot.identity, robot.config
         firmware = robot.profile.value
         if config is not None and config.firmware_version:

@@ -6,15 +6,15 @@ from typing import Annotated
 
 import typer
 
+from p2os.cli.holding import held
 from p2os.cli.quantities import parse_duration
-from p2os.cli.signals import end_on_signals
+from p2os.cli.watched import Watch
 from p2os.client import ConfigurationKnown, Notice, PacketArrived, Robot
 from p2os.command_table import ROWS, Argument, CommandRow, command_row
 from p2os.commands import Command, command
 from p2os.errors import LocalProtocolError, UsageError
 from p2os.packets import ServerPacket, packet_frame
 from p2os.profiles import Profile
-from p2os.timing import NS_PER_S
 from p2os.trace.describe import describe_packet
 
 HELP = """Send one command to a robot, and show what it answers.
@@ -58,18 +58,17 @@ def send(
         return
     if len(words) < 2:
         raise UsageError("name the robot's URL and a command", hint="p2os send tcp:127.0.0.1:8101 SONAR 0")
-    waits_s = parse_duration(wait, "--wait") / NS_PER_S
+    waits_ns = parse_duration(wait, "--wait")
     wanted = make_command(words[1], words[2:])
-    end_on_signals()
     answers: list[ServerPacket] = []
-    with Robot(words[0], reconnect=False) as robot:
+    with held(Robot(words[0], reconnect=False)) as robot:
         profile = robot.profile
         warning = unknown_to(wanted, profile)
         if warning:
             sys.stderr.write(f"note: {warning}\n")
         robot.on_event(lambda notice: answers.extend(_packets(notice)))
         robot.send(wanted)
-        robot.sleep(waits_s)
+        Watch(robot, f"wait for answers to {wanted.name}", moves=False).wait(waits_ns)
         parameters = robot.parameters
     sent = {"command": wanted.name, "number": int(wanted.number), "hex": wanted.to_frame().to_bytes().hex()}
     described = [describe_packet(packet_frame(packet, profile), profile, parameters) for packet in answers]
@@ -157,7 +156,6 @@ def _list(word: str, *, as_json: bool) -> None:
     for row in rows:
         typer.echo(f"{int(row.number):3d}  {row.name:<{width}}  {row.takes}")
         typer.echo(f"     {'':<{width}}  {row.meaning}")
-    sys.stdout.flush()
     sys.stderr.write(f"{len(rows)} commands\n")
 
 

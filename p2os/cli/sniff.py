@@ -10,9 +10,10 @@ import typer
 
 from p2os.cli.bridge import Bridge
 from p2os.cli.capture_files import PcapFile, RecordingFile, Sink, Sinks
+from p2os.cli.holding import hold_robot
 from p2os.cli.quantities import parse_duration
 from p2os.cli.reading import DEFAULT_ROBOT
-from p2os.cli.signals import end_on_signals
+from p2os.cli.signals import postponed
 from p2os.parameters import load_parameters
 from p2os.profiles import Profile
 from p2os.trace import Chunk, Lister, Reading, Row
@@ -24,8 +25,9 @@ DEFAULT_LISTEN = "tcp:127.0.0.1:8102"
 HELP = f"""Sit between a client and a robot, pass everything on, and show or record it.
 
 Let the client connect to the URL of --listen instead of the robot's. When the
-client goes or Ctrl-C ends it while a session is open, the robot is told STOP,
-VEL 0 and CLOSE.
+client goes, Ctrl-C ends it or a file cannot be written while a session is open, the
+robot is told STOP, VEL 0 and CLOSE. What is printed never holds the two up: a
+reader that does not read misses lines, and is told how many.
 
 \b
 Examples:
@@ -64,7 +66,6 @@ class Screen:
         self.damaged += not row.valid
         if not self._quiet:
             typer.echo(json.dumps(row.as_plain()) if self._as_json else line_of(row))
-            sys.stdout.flush()
 
 
 def register(app: typer.Typer) -> None:
@@ -98,6 +99,7 @@ def sniff(
         raise typer.BadParameter("name the robot's URL", param_hint="URL")
     lasts_ns = parse_duration(duration, "--for") if duration else None
     reading = Reading(profile=profile, parameters=load_parameters(robot))
+    hold_robot()
     robot_line = open_url(url)
     listener = listen_url(listen)
     screen = Screen(reading, as_json=json_output, quiet=quiet)
@@ -109,15 +111,14 @@ def sniff(
             sinks.append(PcapFile(pcap, time.time_ns()))
         bridge = Bridge(listener, robot_line, lambda: open_url(url), on_chunk=all_sinks.take, on_event=_tell)
         _tell(f"listening on {listener.description} for the robot on {url}; Ctrl-C ends")
-        end_on_signals()
         try:
             bridge.run(lambda: (once and bridge.sessions > 0) or (lasts_ns is not None and bridge.now >= lasts_ns))
         finally:
-            lasted_s = bridge.now / 1e9
-            all_sinks.__exit__(None, None, None)
-            _tell(summary_of(screen.rows, screen.damaged, lasted_s))
+            with postponed():
+                lasted_s = bridge.now / 1e9
+                all_sinks.close()
+                _tell(summary_of(screen.rows, screen.damaged, lasted_s))
 
 
 def _tell(text: str) -> None:
     sys.stderr.write(f"{text}\n")
-    sys.stderr.flush()

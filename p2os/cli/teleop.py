@@ -3,29 +3,32 @@
 import contextlib
 import math
 import os
-import select
 import sys
 import time
-from collections.abc import Iterator
+from collections import deque
+from collections.abc import Callable, Iterator
 from typing import Annotated
 
 import typer
 
+from p2os.cli.holding import held, hold_robot
 from p2os.cli.pad_source import SdlPad
 from p2os.cli.quantities import Quantity, parse_quantity
-from p2os.cli.signals import end_on_signals
-from p2os.cli.teleop_keys import Teleop, split_keys
-from p2os.cli.teleop_pad import PadDriver
-from p2os.client import Link, Robot
+from p2os.cli.teleop_keys import QUIT_KEYS, Teleop, split_keys
+from p2os.cli.teleop_pad import PadDriver, is_stop
+from p2os.client import Link, Notice, Robot
 from p2os.client.problems import LinkLostError
 from p2os.errors import MissingDependencyError, UsageError
 from p2os.gamepad import PAD_MPS, PAD_RADPS
-from p2os.timing import NS_PER_S
+from p2os.timing import NS_PER_MS, NS_PER_S, Nanos
+from p2os.transport.waiting import wait_readable
+from p2os.transport.wall_clock import Clock, GapWatch, wall_clock
 
 HELP = """Drive a robot with the keyboard, or with a game pad.
 
-Hold a key to drive; let it go and the robot stops. So it does when the
-terminal hangs, the link is lost, or anything ends the program.
+Hold a key to drive; let it go and the robot stops. So it does when the terminal
+hangs, the link is lost, the machine sleeps, or anything ends the program: a key
+must be pressed anew then.
 
 \b
 Keys:
@@ -46,7 +49,7 @@ turns; a pad that goes away stops the robot within 200 ms.
 """
 DEFAULT_VEL, DEFAULT_RATE = "0.3m/s", "45deg/s"
 #: chosen: how often keys are looked for and the line is renewed.
-TURN_S = 0.05
+TURN_NS: Nanos = 50 * NS_PER_MS
 #: chosen: a lone Esc and an arrow key begin alike; the rest of an arrow follows at once.
 ESCAPE_WAIT_S = 0.03
 
@@ -82,43 +85,76 @@ def teleop(
         return
     if not sys.stdin.isatty():
         raise UsageError("there is no keyboard: stdin is not a terminal", hint="p2os drive URL --vel 0.2m/s --for 2s")
-    end_on_signals()
-    keys = Teleop(forward_mps, turn_radps)
-    with Robot(url, model=robot or None) as client, raw_keyboard():
+    with held(Robot(url, model=robot or None)) as client, raw_keyboard():
         sys.stderr.write("hold arrows or w a s d to drive, space stops, + - change the speed, q ends\r\n")
+        loop = KeyLoop(Teleop(forward_mps, turn_radps), client)
         try:
-            while not keys.is_over:
-                turn(keys, client)
+            while not loop.keys.is_over:
+                loop.turn()
         finally:
             sys.stderr.write("\r\n")
 
 
 def drive_by_pad(url: str, model: str | None, fastest: tuple[float, float]) -> None:
     """Drive by the first game pad of this machine."""
-    end_on_signals()
+    hold_robot()
     with SdlPad() as pad:
         sys.stderr.write(f"game pad: {pad.name}\n")
         PadDriver(
             pad.report,
-            lambda: Robot(url, model=model),
+            lambda: held(Robot(url, model=model)),
             fastest,
-            clock=time.monotonic_ns,
+            clock=wall_clock,
             wait=lambda span_ns: time.sleep(span_ns / NS_PER_S),
             say=lambda text: print(text, file=sys.stderr),  # noqa: T201 - the skin
         ).run()
 
 
-def turn(keys: Teleop, client: Robot) -> None:
-    """Take the keys that came, tell the robot, show where it is."""
-    for key in read_keys(TURN_S):
-        keys.press(key, time.monotonic_ns())
-    keys.advance_to(time.monotonic_ns())
-    try:
-        client.set_velocity(*keys.speeds)
-    except LinkLostError:  # looked for again by the client; nothing moves meanwhile, nor at once afterwards
-        keys.press(" ", time.monotonic_ns())
-    sys.stderr.write(f"\r\x1b[K{status(keys, client)}")
-    sys.stderr.flush()
+class KeyLoop:
+    """Hands what the keys want to the robot, turn by turn.
+
+    After a pause of the program nothing is held any more, and keys that waited
+    mean nothing, but for those that end it; the next press or repetition drives.
+
+    Args:
+        keys: What the keys want.
+        client: The robot.
+        read: Returns the keys that came within so many nanoseconds.
+        clock: Nanoseconds that never run back.
+    """
+
+    def __init__(
+        self,
+        keys: Teleop,
+        client: Robot,
+        *,
+        read: Callable[[Nanos], list[str]] | None = None,
+        clock: Clock = wall_clock,
+    ) -> None:
+        self.keys = keys
+        self._client = client
+        self._read = read_keys if read is None else read
+        self._clock = clock
+        self._gaps = GapWatch(clock())
+        self._stops: deque[Notice] = deque()
+        client.on_event(lambda notice: self._stops.append(notice) if is_stop(notice) else None)
+
+    def turn(self) -> None:
+        """Take the keys that came, tell the robot, show where it is."""
+        self._gaps.expect(self._clock() + TURN_NS)
+        pressed = self._read(TURN_NS)
+        now = self._clock()
+        if self._gaps.gap(now) or self._stops:
+            self._stops.clear()
+            pressed = [" ", *(key for key in pressed if key in QUIT_KEYS)]
+        for key in pressed:
+            self.keys.press(key, now)
+        self.keys.advance_to(now)
+        try:
+            self._client.set_velocity(*self.keys.speeds)
+        except LinkLostError:  # looked for again by the client; nothing moves meanwhile, nor at once afterwards
+            self.keys.press(" ", now)
+        sys.stderr.write(f"\r\x1b[K{status(self.keys, self._client)}")
 
 
 def status(keys: Teleop, client: Robot) -> str:
@@ -134,15 +170,15 @@ def status(keys: Teleop, client: Robot) -> str:
     )
 
 
-def read_keys(longest_s: float) -> list[str]:
+def read_keys(longest_ns: Nanos) -> list[str]:
     """Return the keys that came within so long; waits for the first only."""
     descriptor = sys.stdin.fileno()
-    if not select.select([descriptor], [], [], longest_s)[0]:
+    if not wait_readable((descriptor,), longest_ns / NS_PER_S):
         return []
     data = os.read(descriptor, 256)
     if not data:  # the terminal has gone
         return ["q"]
-    if data.endswith(b"\x1b") and select.select([descriptor], [], [], ESCAPE_WAIT_S)[0]:
+    if data.endswith(b"\x1b") and wait_readable((descriptor,), ESCAPE_WAIT_S):
         data += os.read(descriptor, 256)
     return split_keys(data.decode("utf-8", "replace"))
 
@@ -162,7 +198,7 @@ def raw_keyboard() -> Iterator[None]:
     descriptor = sys.stdin.fileno()
     before = termios.tcgetattr(descriptor)
     try:
-        tty.setcbreak(descriptor)
+        tty.setcbreak(descriptor, termios.TCSANOW)  # the other ways wait for a terminal that is held
         yield
     finally:
-        termios.tcsetattr(descriptor, termios.TCSADRAIN, before)
+        termios.tcsetattr(descriptor, termios.TCSANOW, before)

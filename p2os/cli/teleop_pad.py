@@ -1,15 +1,20 @@
 """Driving by game pad: Up connects, R2, L2 and the right stick drive, Down lets the robot go.
 
-Invariant: the robot stands unless a report younger than the pad's loss time asks for more.
+Invariant: the robot stands unless a report younger than the pad's loss time asks for more,
+and after a pause of the program until Up is pressed anew.
 """
 
+import contextlib
+from collections import deque
 from collections.abc import Callable
 from contextlib import AbstractContextManager
 from typing import Protocol
 
+from p2os.client.notices import DeadmanStopped, GapStopped, Notice
 from p2os.client.problems import LinkLostError
 from p2os.gamepad import STICK_FULL, TRIGGER_FULL, Gamepad, PadReport
-from p2os.timing import NS_PER_MS, Nanos
+from p2os.timing import NS_PER_MS, NS_PER_S, Nanos
+from p2os.transport.wall_clock import GapWatch
 
 #: How often the pad is asked, nanoseconds.
 PERIOD_NS: Nanos = 20 * NS_PER_MS
@@ -20,6 +25,10 @@ class Driven(Protocol):
 
     def set_velocity(self, forward_mps: float, turn_radps: float) -> None:
         """Drive at these speeds from now on."""
+        ...
+
+    def on_event(self, callback: Callable[[Notice], None]) -> object:
+        """Call `callback` with what happens, from any thread."""
         ...
 
 
@@ -70,15 +79,22 @@ class PadDriver:
 
     def _drive(self, robot: Driven) -> str:
         """Hand speeds on while the wish lasts; return why it ended."""
+        stops: deque[Notice] = deque()
+        robot.on_event(lambda notice: stops.append(notice) if is_stop(notice) else None)
+        gaps = GapWatch(self._clock())
         while True:
+            if (gap_ns := gaps.gap(self._clock())) or stops:
+                _stop(robot)
+                self._pad.lose()
+                return f"paused for {gap_ns / NS_PER_S:.1f} s" if gap_ns else "the client stopped the robot"
             self._look()
             lost_at = self._pad.lost_at
             if lost_at is None or self._clock() >= lost_at:
-                robot.set_velocity(0.0, 0.0)
+                _stop(robot)
                 self._pad.lose()
                 return "the pad is lost"
             if not self._pad.wants_robot:
-                robot.set_velocity(0.0, 0.0)
+                _stop(robot)
                 return "Down was pressed"
             try:
                 robot.set_velocity(
@@ -86,6 +102,7 @@ class PadDriver:
                 )
             except LinkLostError:
                 return "the link is lost"
+            gaps.expect(self._clock() + PERIOD_NS)
             self._wait(PERIOD_NS)
 
     def _look(self) -> PadReport | None:
@@ -93,3 +110,13 @@ class PadDriver:
         if report is not None:
             self._pad.take(report, self._clock())
         return report
+
+
+def is_stop(notice: Notice) -> bool:
+    """Tell whether the client has stopped the robot by itself: what drove it must be asked for anew."""
+    return isinstance(notice, (GapStopped, DeadmanStopped))
+
+
+def _stop(robot: Driven) -> None:
+    with contextlib.suppress(LinkLostError):  # it stands by itself then
+        robot.set_velocity(0.0, 0.0)

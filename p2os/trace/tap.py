@@ -1,7 +1,9 @@
 """What somebody between a client and a robot has to know: is a session open, at which speed.
 
 Invariant: the farewell of a session that is not open is empty, so that a tap
-adds nothing to a conversation that ended by itself.
+adds nothing to a conversation that ended by itself. Where the tap cannot know
+(it has not heard the beginning, or not all of it) a command that only a session
+has stands for one: a farewell too many harms nobody.
 """
 
 from p2os.commands import Command, CommandNumber, stop, vel
@@ -22,6 +24,8 @@ class Tap:
     def __init__(self) -> None:
         self._cutter = FrameCutter()
         self._session = Session()
+        #: Whether the client has sent more than syncs since the last CLOSE.
+        self._was_commanded = False
         #: The speed to which the client has just told the robot to go, in bit/s; set it back to None when done.
         self.new_baud: int | None = None
 
@@ -33,13 +37,15 @@ class Tap:
             if frame is None:
                 continue
             self._session.name_of(frame, direction, now)
+            if direction is Direction.TO_ROBOT and frame.kind >= CommandNumber.CLOSE:
+                self._was_commanded = frame.kind > CommandNumber.CLOSE
             if direction is Direction.TO_ROBOT and frame.kind == CommandNumber.HOSTBAUD:
                 self.new_baud = HOST_BAUDS.get(Command.from_frame(frame).integer or 0)
         return chunk
 
     def farewell(self) -> bytes:
         """Return what brings a robot whose client has gone to a stand: STOP, VEL 0, CLOSE; empty if it is closed."""
-        if not self._session.is_open:
+        if not (self._session.is_open or self._was_commanded):
             return b""
         commands = (stop(), vel(0), Command(CommandNumber.CLOSE))
         return b"".join(command.to_frame().to_bytes() for command in commands)

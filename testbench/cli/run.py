@@ -8,6 +8,8 @@ from typing import Annotated
 import typer
 from typer.core import TyperCommand
 
+from p2os.cli.holding import hold_robot
+from p2os.cli.main import EXIT_INTERRUPTED
 from p2os.errors import RunFailedError, UsageError
 from p2os.transport import open_url
 from testbench.cli.folders import next_folder
@@ -17,8 +19,6 @@ from testbench.cli.table import print_result
 from testbench.remote import CAUTIOUS_ROTATION_DEG_S, CAUTIOUS_VELOCITY_MM_S
 from testbench.run import RunResult, run_at_port, run_scenario
 from testbench.scenario import Scenario, load_scenario
-
-EXIT_INTERRUPTED = 130
 
 HELP = """Run a scenario: the firmware boots on an emulated BluePill and its pins drive a robot.
 
@@ -96,14 +96,13 @@ def run(
     )
     folder = out or next_folder(wanted.name)
     if port is not None:
-        result = drive_port(wanted, folder, port, yes=yes, max_speed=max_speed, gdb=gdb)
-        end_with(replace(result, was_interrupted=False), json_output=json_output)
+        end_with(drive_port(wanted, folder, port, yes=yes, max_speed=max_speed, gdb=gdb), json_output=json_output)
         return
     with RunDisplay() as display:
         if gdb is None:
             result = run_scenario(wanted, folder, speed=realtime, on_progress=display.update)
         else:
-            driver = debug_bench(gdb, is_paced=realtime is not None)
+            driver = debug_bench(gdb, is_paced=realtime is not None, on_wait=display.raise_if_interrupted)
             result = run_scenario(wanted, folder, on_progress=display.update, drive=driver)
     end_with(result, json_output=json_output)
 
@@ -122,8 +121,9 @@ def drive_port(
     try:
         if not yes:
             ask(scenario, url)
+        hold_robot()
         with RunDisplay() as display:
-            driver = None if gdb is None else debug_port(gdb)
+            driver = None if gdb is None else debug_port(gdb, on_wait=display.raise_if_interrupted)
             return run_at_port(scenario, folder, transport, on_progress=display.update, drive=driver)
     finally:
         transport.close()

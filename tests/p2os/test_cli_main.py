@@ -12,6 +12,7 @@ import pytest
 import typer
 
 from p2os.cli import main as cli
+from p2os.cli.signals import restored_signals
 from p2os.errors import FileError, TransportError
 
 GROUP = "p2os.verbs"
@@ -172,7 +173,7 @@ def test_main_ends_the_process_and_understands_trace_anywhere(
     offer: Callable[[object], None], capsys: pytest.CaptureFixture[str]
 ) -> None:
     offer(raising(TransportError("gone")))
-    with pytest.raises(SystemExit) as caught:
+    with restored_signals(), pytest.raises(SystemExit) as caught:
         cli.main(["act", "--trace"])
     assert caught.value.code == 1
     assert "Traceback" in capsys.readouterr().err

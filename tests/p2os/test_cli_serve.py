@@ -18,7 +18,7 @@ import pytest
 
 from p2os.cli import main, serve
 from p2os.cli.main import run
-from p2os.cli.signals import end_on_signals
+from p2os.cli.signals import restored_signals
 from p2os.commands import Command
 from p2os.errors import MissingDependencyError
 from p2os.pioneer import fleet_order
@@ -33,11 +33,8 @@ Capture = pytest.CaptureFixture[str]
 @pytest.fixture(autouse=True)
 def _own_signals() -> Iterator[None]:
     """Give the signals back that a verb has taken in this process."""
-    numbers = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
-    before = [signal.getsignal(number) for number in numbers]
-    yield
-    for number, handler in zip(numbers, before, strict=True):
-        signal.signal(number, handler)
+    with restored_signals():
+        yield
 
 
 class Serving:
@@ -219,15 +216,6 @@ def test_a_terminal_that_is_gone_is_left_and_keeps_nothing_from_stopping(monkeyp
     with pytest.raises(HungUpError, match="the terminal is gone"):
         terminal.write(b"robot 1: status\n")
     serve._write("told to nobody\n")
-
-
-def test_a_program_that_was_made_deaf_to_hang_ups_stays_so(monkeypatch: pytest.MonkeyPatch) -> None:
-    signal.signal(signal.SIGHUP, signal.SIG_IGN)
-    end_on_signals()
-    assert signal.getsignal(signal.SIGHUP) is signal.SIG_IGN
-    with monkeypatch.context() as windows:
-        windows.delattr(signal, "SIGHUP")
-        end_on_signals()
 
 
 def test_serve_without_pybullet_says_how_to_get_it(monkeypatch: pytest.MonkeyPatch, capsys: Capture) -> None:

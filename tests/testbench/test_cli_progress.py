@@ -1,12 +1,12 @@
-"""The progress line, and a Ctrl-C that waits for a good moment."""
+"""The progress line, and signals that wait for a good moment."""
 
 import io
-import os
 import signal
 
 import pytest
 from rich.console import Console
 
+from p2os.cli.signals import end_on_signals, restored_signals
 from testbench.cli import progress
 from testbench.cli.progress import RunDisplay
 from testbench.cli.table import rows
@@ -37,20 +37,16 @@ def test_elsewhere_nothing_is_shown(capsys: pytest.CaptureFixture[str]) -> None:
     assert capsys.readouterr() == ("", "")
 
 
-def test_ctrl_c_waits_for_the_next_update_and_the_old_handler_comes_back() -> None:
-    before = signal.getsignal(signal.SIGINT)
-    with RunDisplay(is_shown=False) as display:
-        os.kill(os.getpid(), signal.SIGINT)
-        with pytest.raises(KeyboardInterrupt):
-            display.update(at(1))
-    assert signal.getsignal(signal.SIGINT) is before
-
-
-def test_a_second_ctrl_c_does_not_wait() -> None:
-    with RunDisplay(is_shown=False):
-        os.kill(os.getpid(), signal.SIGINT)
-        with pytest.raises(KeyboardInterrupt):
-            os.kill(os.getpid(), signal.SIGINT)
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
+def test_a_signal_waits_for_the_next_update(number: int) -> None:
+    with restored_signals():
+        end_on_signals()
+        with RunDisplay(is_shown=False) as display:
+            signal.raise_signal(number)
+            with pytest.raises(KeyboardInterrupt, match=signal.Signals(number).name):
+                display.update(at(1))
+            signal.raise_signal(number)
+            display.update(at(2))
 
 
 def test_the_table_leaves_out_what_nobody_can_tell() -> None:

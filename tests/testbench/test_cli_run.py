@@ -209,13 +209,14 @@ def started(duration_s: float, *words: str) -> subprocess.Popen[str]:
     raise AssertionError(process.communicate()[1])
 
 
-def test_ctrl_c_leaves_a_complete_folder_and_130() -> None:
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
+def test_a_signal_leaves_a_complete_folder_and_130(number: signal.Signals) -> None:
     process = started(10_000, "--json")
-    process.send_signal(signal.SIGINT)
+    process.send_signal(number)
     out, err = process.communicate(timeout=60)
     assert process.returncode == 130, err
     outcome = json.loads(out)
-    assert outcome["failures"] == ["interrupted by Ctrl-C"]
+    assert outcome["failures"] == [f"interrupted ({number.name})"]
     assert Path("there/report.html").is_file()
     record = read_run(Path("there"))
     assert not record.is_cut

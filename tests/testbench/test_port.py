@@ -265,14 +265,18 @@ def test_a_robot_that_vanishes_ends_the_run_with_1(
 
 
 @pytest.mark.slow
-def test_ctrl_c_stops_a_served_robot_and_ends_with_1(robot: tuple[str, subprocess.Popen[str]], tmp_path: Path) -> None:
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT, signal.SIGTSTP])
+def test_a_signal_stops_a_served_robot_and_ends_with_130(
+    number: signal.Signals, robot: tuple[str, subprocess.Popen[str]], tmp_path: Path
+) -> None:
     command = [*COMMAND, "run", "motors", "--port", robot[0], "--yes", "--out", "run", "--json"]
     run = subprocess.Popen(command, cwd=tmp_path, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
     time.sleep(5)
-    run.send_signal(signal.SIGINT)
+    run.send_signal(number)
     out, err = run.communicate(timeout=60)
-    assert run.returncode == 1, err
-    assert json.loads(out)["failures"]
+    assert run.returncode == 130, err
+    assert json.loads(out)["failures"][0] == f"interrupted ({number.name})"
+    assert (tmp_path / "run" / "report.html").is_file()
     robot[1].send_signal(signal.SIGINT)
     told = robot[1].communicate(timeout=20)[1]
     assert re.search(r"closed", told), told

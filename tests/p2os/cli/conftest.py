@@ -1,12 +1,16 @@
 """A virtual Pioneer served over TCP in the background, for the verbs that talk to a robot."""
 
+import sys
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
+from pathlib import Path
 
 import pytest
 
 from p2os.cli import main as cli
 from p2os.pioneer.served import served_pioneer
+
+sys.path.insert(0, str(Path(__file__).parents[1] / "client"))  # `ServedRobot`, whose wheels can be looked at
 
 
 @dataclass

@@ -7,18 +7,16 @@ from pathlib import Path
 
 import pytest
 
-from p2os.cli import record as record_verb
-from p2os.cli import replay as replay_verb
 from p2os.cli.bridge import Bridge
 from p2os.cli.quantities import Quantity, parse_duration, parse_quantity
 from p2os.cli.record import record_session
 from p2os.cli.replay import motions_of, play
 from p2os.commands import Command, CommandNumber
-from p2os.errors import RemoteProtocolError, TransportError, UsageError
+from p2os.errors import FileError, RemoteProtocolError, RunFailedError, TransportError, UsageError
 from p2os.timing import NS_PER_S
 from p2os.trace import Chunk, Direction, capture_of, read_file, read_pcap, write_recording
 from p2os.trace.replay import Replay
-from p2os.transport import HungUpError, Loops, listen_url, open_url
+from p2os.transport import HungUpError, Loops, listen_url, open_url, waiting
 
 TO, FROM = Direction.TO_ROBOT, Direction.FROM_ROBOT
 PATIENCE_S = 60.0
@@ -28,13 +26,6 @@ STOP_FIRST = b"".join(
     command.to_frame().to_bytes()
     for command in (Command(CommandNumber.STOP), Command(CommandNumber.VEL, 0), Command(CommandNumber.CLOSE))
 )
-
-
-@pytest.fixture(autouse=True)
-def quiet_signals(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Leave the test runner's own signal handlers alone."""
-    for verb in ("record", "replay", "sniff"):
-        monkeypatch.setattr(f"p2os.cli.{verb}.end_on_signals", lambda: None)
 
 
 def test_a_robot_is_recorded_and_left_closed(served: object, run: Run, tmp_path: Path, capsys: Capture) -> None:
@@ -146,8 +137,7 @@ class Clock:
 
 @pytest.fixture
 def no_waiting(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(record_verb, "BLIND_POLL_S", 0)
-    monkeypatch.setattr(replay_verb, "BLIND_POLL_S", 0)
+    monkeypatch.setattr(waiting, "BLIND_POLL_S", 0)
 
 
 @pytest.mark.usefixtures("no_waiting")
@@ -193,6 +183,96 @@ def test_a_bridge_follows_a_change_of_speed_and_stops_the_robot_when_it_ends() -
     assert robot.read().endswith(STOP_FIRST)
     assert told[-2:] == ["the session was open: sent STOP, VEL 0 and CLOSE", "client gone: the bridge ends"]
     assert chunks[-1].data == STOP_FIRST
+
+
+SIP = bytes.fromhex("fafb1b32000000000000000000007d00000000000000000000000000327d")
+VEL_200 = Command(CommandNumber.VEL, 200).to_frame().to_bytes()
+
+
+class Joined:
+    """A bridge between a client and a robot whose session is open, on a clock that a test sets."""
+
+    def __init__(self, on_chunk: Callable[[Chunk], None] = lambda _chunk: None) -> None:
+        loops, self.now, self.told = Loops(), 0, []
+        robots = loops.listen("robot")
+        self.bridge = Bridge(
+            loops.listen("client"), loops.connect("robot"), lambda: loops.connect("robot"),
+            on_chunk=on_chunk, on_event=self.told.append, clock=lambda: self.now,
+        )  # fmt: skip
+        self.robot, self.client = robots.accept(), loops.connect("client")
+        self.bridge.turn()
+        self.robot.write(SIP)
+        self.bridge.turn()
+
+
+def test_after_a_pause_a_bridge_stops_the_robot_and_passes_nothing_on_that_has_waited() -> None:
+    joined = Joined()
+    joined.client.write(VEL_200)
+    joined.now += 3_200_000_000
+    joined.bridge.turn()
+    assert joined.robot.read() == STOP_FIRST
+    assert joined.told[-1] == "client gone: the bridge paused for 3.0 s"
+    assert joined.client.read() == SIP
+    with pytest.raises(HungUpError):
+        joined.client.read()
+
+
+def test_a_pause_of_a_third_of_a_second_is_borne_and_one_without_a_session_harms_nobody() -> None:
+    joined = Joined()
+    joined.client.write(VEL_200)
+    joined.now += 549_000_000  # the wait ends after 200 ms, and 350 ms more are no gap
+    joined.bridge.turn()
+    assert joined.robot.read() == VEL_200
+    joined.client.write(STOP_FIRST)
+    joined.bridge.turn()
+    joined.now += 10 * NS_PER_S
+    joined.bridge.turn()
+    assert joined.robot.read() == STOP_FIRST
+    assert len(joined.told) == 1
+
+
+def test_a_bridge_passes_on_before_it_shows_and_says_farewell_when_showing_fails() -> None:
+    seen: list[bytes] = []
+
+    def fail(chunk: Chunk) -> None:
+        if chunk.data == VEL_200:
+            seen.append(joined.robot.read())
+            raise FileError("cannot write talk.jsonl: no space left on device")
+        if seen:
+            raise BrokenPipeError
+
+    joined = Joined(fail)
+    joined.client.write(VEL_200)
+    with pytest.raises(BrokenPipeError):
+        joined.bridge.run(lambda: False)
+    assert seen == [VEL_200]
+    assert joined.robot.read() == STOP_FIRST
+    assert joined.client.read() == SIP
+    with pytest.raises(HungUpError):
+        joined.client.read()
+
+
+@pytest.mark.usefixtures("no_waiting")
+def test_a_replay_that_has_paused_stops_the_robot() -> None:
+    drive = capture_of([(0, TO, VEL_200), (60 * NS_PER_S, TO, Command(0).to_frame().to_bytes())])
+    line, now = Line(b"", SIP), [0]
+
+    def read() -> bytes:
+        now[0] += 20_000_000 if line.says else 500_000_000  # a wait is 100 ms at most
+        return Line.read(line)
+
+    line.read = read  # type: ignore[method-assign]
+    with pytest.raises(RunFailedError, match=r"paused for 0\.4 s"):
+        play(Replay(drive, TO), line, TO, clock=lambda: now[0])
+    assert line.heard == VEL_200 + STOP_FIRST
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="this system has no full disk at hand")
+def test_a_disk_that_is_full_is_named(served: object, run: Run, capsys: Capture) -> None:
+    for words in (["record", served.url, "--out", "/dev/full"], ["sniff", served.url, "--listen", "tcp:127.0.0.1:0",
+                  "--pcap", "/dev/full"]):  # fmt: skip
+        assert run(*words) == 2
+        assert "p2os: cannot write /dev/full: no space left on device\n" in capsys.readouterr().err
 
 
 def test_a_bridge_whose_robot_is_gone_refuses_its_client() -> None:

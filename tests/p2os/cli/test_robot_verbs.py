@@ -2,28 +2,41 @@
 
 import json
 import math
+import re
+import sys
+import threading
+import time
 from collections.abc import Callable
+from pathlib import Path
 
 import pytest
 
-from p2os.cli import bench as bench_verb
+sys.path.insert(0, str(Path(__file__).parent))
+
+from driven import PATIENCE_S, STOP, HeardRobot, until
+
 from p2os.cli.bench import Bench, lines_of, measure
 from p2os.cli.monitor import words_of
 from p2os.cli.ports import guess
 from p2os.cli.send import make_command
-from p2os.client import LinkLost, MotorsDisabled, ReconnectPlanned
+from p2os.cli.watched import Watch, problem_of
+from p2os.client import (
+    DeadmanStopped,
+    GapStopped,
+    LinkLost,
+    MotionError,
+    MotorsDisabled,
+    Notice,
+    ReconnectPlanned,
+    Robot,
+)
+from p2os.commands import CommandNumber
 from p2os.errors import RemoteProtocolError, TransportError, UsageError
 from p2os.timing import NS_PER_MS, NS_PER_S
+from p2os.transport import waiting
 
 Run = Callable[..., int]
 Capture = pytest.CaptureFixture[str]
-
-
-@pytest.fixture(autouse=True)
-def quiet_signals(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Leave the test runner's own signal handlers alone."""
-    for verb in ("bench", "drive", "monitor", "scan", "send", "teleop"):
-        monkeypatch.setattr(f"p2os.cli.{verb}.end_on_signals", lambda: None)
 
 
 def test_a_robot_drives_a_way_then_an_angle_and_stands(served: object, run: Run, capsys: Capture) -> None:
@@ -43,6 +56,79 @@ def test_a_speed_is_held_for_a_time(served: object, run: Run, capsys: Capture) -
     out = capsys.readouterr().out
     assert out.startswith("at x -0.")
     assert out.endswith("heading 0.0 deg\n")
+
+
+def test_a_wall_ends_a_held_speed_with_its_reason(run: Run, capsys: Capture) -> None:
+    robot = HeardRobot()
+    try:
+        began = time.monotonic()
+        assert run("drive", robot.url, "--vel", "-1.5m/s", "--for", "30s") == 1
+        assert time.monotonic() - began < 15
+        captured = capsys.readouterr()
+        assert re.fullmatch(r"p2os: hold -1\.50 m/s, 0 deg/s: stalled, after \d\.\d s\n", captured.err)
+        assert captured.out == ""
+        assert robot.when_heard(STOP, began)
+    finally:
+        robot.close()
+
+
+def test_a_robot_that_vanishes_ends_a_held_speed_and_a_wait_at_once(run: Run, capsys: Capture) -> None:
+    for words in (("drive", "--vel", "100mm/s", "--for", "30s"), ("send", "VEL", "100", "--wait", "30s")):
+        robot = HeardRobot()
+        gone_at: list[float] = []
+
+        def vanish(robot: HeardRobot = robot, gone_at: list[float] = gone_at) -> None:
+            until(lambda: CommandNumber.VEL in robot.numbers, "VEL")
+            gone_at.append(time.monotonic())
+            robot.close()
+
+        thread = threading.Thread(target=vanish)
+        thread.start()
+        assert run(words[0], robot.url, *words[1:]) == 1
+        assert time.monotonic() - gone_at[0] < 1.5
+        thread.join(PATIENCE_S)
+        assert "the link was lost" in capsys.readouterr().err
+
+
+def test_motors_that_go_off_end_a_held_speed(run: Run, capsys: Capture) -> None:
+    robot = HeardRobot()
+
+    def press() -> None:
+        robot.wait_until_it_drives()
+        robot.wish(lambda pioneer, now: pioneer.do("fault stop-button", now))
+
+    thread = threading.Thread(target=press)
+    thread.start()
+    try:
+        assert run("drive", robot.url, "--vel", "100mm/s", "--for", "30s") == 1
+    finally:
+        thread.join(PATIENCE_S)
+        robot.close()
+    assert capsys.readouterr().err.startswith("p2os: hold 0.10 m/s, 0 deg/s: ")
+
+
+@pytest.mark.parametrize(
+    ("notice", "moves", "problem"),
+    [
+        (LinkLost("silence"), False, "the link was lost: silence"),
+        (GapStopped(3 * NS_PER_S), False, "this program paused for 3.0 s"),
+        (DeadmanStopped(2 * NS_PER_S), True, "this program did nothing for 2.0 s"),
+        (DeadmanStopped(2 * NS_PER_S), False, None), (MotorsDisabled("button"), True, "button"),
+        (MotorsDisabled("button"), False, None), (ReconnectPlanned(1, 5), True, None),
+    ],
+)  # fmt: skip
+def test_what_ends_a_watched_wait(notice: Notice, moves: bool, problem: str | None) -> None:
+    assert problem_of(notice, moves=moves) == problem
+
+
+def test_a_pause_ends_a_watched_wait_and_stops_the_robot(served: object) -> None:
+    times = iter([0, 450 * NS_PER_MS])
+    with Robot(served.url) as robot:
+        robot.set_velocity(0.1)
+        with pytest.raises(MotionError, match=r"hold: this program paused for 0\.4 s, after 0\.5 s"):
+            Watch(robot, "hold", moves=True, clock=lambda: next(times)).wait(NS_PER_S)
+        robot.sleep(0.5)
+        assert robot.state.forward_mps == pytest.approx(0, abs=0.02)
 
 
 def test_a_command_is_sent_and_its_answer_shown(served: object, run: Run, capsys: Capture) -> None:
@@ -151,7 +237,7 @@ def test_a_line_without_a_robot_cannot_be_measured(monkeypatch: pytest.MonkeyPat
         def fileno(self) -> int:
             raise TransportError("cannot be waited for")
 
-    monkeypatch.setattr(bench_verb, "BLIND_POLL_S", 0)
+    monkeypatch.setattr(waiting, "BLIND_POLL_S", 0)
     times = iter(range(0, 10**12, 50 * NS_PER_MS))
     with pytest.raises(RemoteProtocolError, match="no robot on tcp:nowhere"):
         measure(Silent(), NS_PER_S, clock=lambda: next(times))

@@ -7,11 +7,14 @@ import signal
 import subprocess
 import sys
 import time
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 
+from p2os.cli.teleop import KeyLoop
 from p2os.cli.teleop_keys import FIRST_HOLD_NS, KEYS, NEXT_HOLD_NS, QUIT_KEYS, STOP_KEYS, Teleop, split_keys
+from p2os.client import DeadmanStopped, GapStopped, Link, LinkLost, Notice
 from p2os.timing import NS_PER_MS
 
 PATIENCE_S = 60.0
@@ -86,6 +89,62 @@ def test_plus_and_minus_change_the_speed_within_limits() -> None:
 )  # fmt: skip
 def test_characters_become_keys(text: str, keys: list[str]) -> None:
     assert split_keys(text) == keys
+
+
+class Client:
+    """A robot's client that keeps what it is told."""
+
+    link = Link.CLOSED
+
+    def __init__(self) -> None:
+        self.speeds: list[tuple[float, float]] = []
+
+    def on_event(self, callback: Callable[[Notice], None]) -> None:
+        self.tell = callback
+
+    def set_velocity(self, forward_mps: float, turn_radps: float) -> None:
+        self.speeds.append((forward_mps, turn_radps))
+
+
+@pytest.fixture
+def paused() -> tuple[Client, KeyLoop, list[list[str]], list[int]]:
+    """A client, a loop, the keys of each turn to come, and the clock."""
+    client, pressed, now = Client(), [], [0]
+    return client, KeyLoop(teleop(), client, read=lambda _ns: pressed.pop(0), clock=lambda: now[0]), pressed, now
+
+
+def test_a_key_is_not_held_over_a_pause_nor_are_those_that_waited(
+    paused: tuple[Client, KeyLoop, list[list[str]], list[int]],
+) -> None:
+    client, loop, pressed, now = paused
+    pressed += [["w"], ["w", "w"], [], ["w"], ["w", "q"]]
+
+    def read(_ns: int) -> list[str]:
+        now[0] += {5: 0, 4: 500 * NS_PER_MS}.get(len(pressed), 10 * NS_PER_MS)
+        return pressed.pop(0)
+
+    loop._read = read
+    for _ in range(4):
+        loop.turn()
+    assert client.speeds == [(0.3, 0.0), (0.0, 0.0), (0.0, 0.0), (0.3, 0.0)]
+    now[0] += 0
+    loop._read = lambda _ns: now.__setitem__(0, now[0] + 401 * NS_PER_MS) or pressed.pop(0)  # type: ignore[func-returns-value]
+    loop.turn()
+    assert loop.keys.is_over
+
+
+@pytest.mark.parametrize("notice", [GapStopped(NS_PER_MS), DeadmanStopped(NS_PER_MS)])
+def test_a_robot_that_its_client_has_stopped_waits_for_the_next_press(
+    paused: tuple[Client, KeyLoop, list[list[str]], list[int]], notice: Notice
+) -> None:
+    client, loop, pressed, _ = paused
+    pressed += [["w"], [], []]
+    loop.turn()
+    client.tell(notice)
+    loop.turn()
+    client.tell(LinkLost("that ends itself"))
+    loop.turn()
+    assert client.speeds == [(0.3, 0.0), (0.0, 0.0), (0.0, 0.0)]
 
 
 class Terminal:

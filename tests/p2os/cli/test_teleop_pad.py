@@ -14,6 +14,7 @@ from p2os.cli import pad_source, teleop
 from p2os.cli.main import run
 from p2os.cli.pad_source import SdlPad
 from p2os.cli.teleop_pad import PERIOD_NS, PadDriver
+from p2os.client import GapStopped, Notice
 from p2os.client.problems import LinkLostError
 from p2os.errors import MissingDependencyError, UsageError
 from p2os.gamepad import PAD_MPS, PAD_RADPS, Gamepad, PadReport
@@ -51,6 +52,9 @@ class Bench:
     def __exit__(self, *_: object) -> None:
         self.left += 1
 
+    def on_event(self, callback: Callable[[Notice], None]) -> None:
+        self.tell = callback
+
     def set_velocity(self, forward_mps: float, turn_radps: float) -> None:
         if len(self.told) == self.link_fails_at:
             self.told.append((self.now, 0, 0))
@@ -78,6 +82,40 @@ def test_a_pad_that_goes_stops_the_robot_in_200_ms_and_up_must_be_given_anew() -
     lost_at = next(at for at, forward, _ in bench.told if forward == 0)
     assert lost_at - 2 * PERIOD_NS <= 200 * NS_PER_MS
     assert "the pad is lost: the robot stands; Up connects again" in bench.said
+
+
+class PausedBench(Bench):
+    """The fourth wait takes half a second."""
+
+    waits = 0
+
+    def wait(self, span_ns: int) -> None:
+        self.waits += 1
+        self.now += 500 * NS_PER_MS if self.waits == 4 else span_ns
+
+
+def test_after_a_pause_up_must_be_given_anew() -> None:
+    drive = PadReport(forward=1023)
+    bench = PausedBench([NOTHING, UP, drive, drive, drive, drive])
+    assert (bench.entered, bench.left) == (1, 1)
+    assert [forward for _, forward, _ in bench.told] == [PAD_MPS, PAD_MPS, 0]
+    assert "paused for 0.5 s: the robot stands; Up connects again" in bench.said
+
+
+class StoppedBench(Bench):
+    """The client stops the robot by itself."""
+
+    def set_velocity(self, forward_mps: float, turn_radps: float) -> None:
+        super().set_velocity(forward_mps, turn_radps)
+        if len(self.told) == 2:
+            self.tell(GapStopped(NS_PER_MS))
+
+
+def test_after_a_stop_of_the_client_up_must_be_given_anew() -> None:
+    bench = StoppedBench([NOTHING, UP, *[PadReport(forward=1023)] * 4])
+    assert bench.left == 1
+    assert [forward for _, forward, _ in bench.told] == [PAD_MPS, PAD_MPS, 0]
+    assert "the client stopped the robot: the robot stands; Up connects again" in bench.said
 
 
 def test_a_lost_link_ends_the_session() -> None:

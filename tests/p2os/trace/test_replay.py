@@ -96,6 +96,14 @@ def test_a_tap_says_farewell_only_to_a_robot_whose_session_is_open() -> None:
     assert (said[0], said[len(said) // 2], said[-1]) == (b"", stop_first, b"")
 
 
+def test_a_tap_that_has_not_heard_the_beginning_says_farewell_to_a_robot_that_was_told_to_move() -> None:
+    tap = Tap()
+    tap.hear(TO, command(CommandNumber.VEL, 200), 0)
+    assert tap.farewell()
+    tap.hear(TO, command(CommandNumber.CLOSE), 1)
+    assert tap.farewell() == b""
+
+
 @pytest.mark.parametrize(("code", "baud"), [(0, 9600), (2, 38400), (4, 115200), (9, None)])
 def test_a_tap_hears_a_change_of_speed(code: int, baud: int | None) -> None:
     tap = Tap()

@@ -1,0 +1,233 @@
+"""Standard output and standard error that never wait for their reader.
+
+A terminal held with Ctrl-S, a pager that does not read, a pipe that is full: an
+ordinary `write` waits for all of them, and a program that holds a robot must
+not. `queue_output` puts a queue and a thread of its own before each of the two.
+What does not fit is left out, by whole lines, and told by number once the reader
+reads again. A reader that has gone is told of by BrokenPipeError, once; what is
+written after that goes nowhere.
+
+Verbs that only print results keep the ordinary streams: `p2os decode | less` is
+to wait, and to lose nothing.
+
+Invariant: `write` never blocks, and no text waits in the streams below.
+"""
+
+import contextlib
+import errno
+import io
+import os
+import select
+import sys
+import threading
+from collections import deque
+from collections.abc import Iterator
+from typing import TextIO
+
+from p2os.errors import FileError
+from p2os.timing import NS_PER_S
+from p2os.transport.wall_clock import wall_clock
+
+#: chosen: some ten thousand lines; minutes of a robot's talk.
+MOST_CHARACTERS = 1 << 20
+#: chosen: a reader that takes nothing for so long at the end is not waited for.
+FLUSH_S = 1.0
+#: What a write of the system is given at once: as much as a pipe holds.
+_CHUNK_CHARACTERS = 1 << 16
+#: EIO: a terminal that has hung up.
+_GONE = frozenset({errno.EPIPE, errno.EIO})
+#: A write that begins so begins a line, or draws over one.
+_LINE_BEGINNINGS = ("\r", "\x1b")
+
+
+class QueuedStream(io.TextIOBase):
+    """A text stream that hands on to another one's descriptor, in a thread of its own.
+
+    Args:
+        below: The stream in whose place this stands; it is flushed first.
+        name: What it is called in messages.
+        notes: Where the lines left out are told of; None: here.
+    """
+
+    def __init__(self, below: TextIO, name: str, notes: "QueuedStream | None" = None) -> None:
+        below.flush()
+        self.below = below
+        self._descriptor = below.fileno()
+        self._encoding, self._errors = below.encoding, below.errors
+        self._name = name
+        self._notes = notes
+        self._changed = threading.Condition()
+        self._queue: deque[str] = deque()
+        self._characters = 0
+        self._written = 0
+        self._error: OSError | None = None
+        self._has_told_error = False
+        self._is_at_start = True
+        self._is_leaving_out = False
+        self._left_out = 0
+        self._is_over = False
+        threading.Thread(target=self._hand_on, name=f"p2os-{name}", daemon=True).start()
+
+    # What makes it a text stream --------------------------------------------------------------
+
+    @property
+    def encoding(self) -> str:  # type: ignore[override]  # a property there as well
+        """The encoding of the stream below."""
+        return self._encoding
+
+    @property
+    def errors(self) -> str | None:  # type: ignore[override]  # a property there as well
+        """What the stream below does with characters that it cannot encode."""
+        return self._errors
+
+    def fileno(self) -> int:
+        """Return the descriptor."""
+        return self._descriptor
+
+    def isatty(self) -> bool:
+        """Tell whether a terminal is behind it."""
+        return self.below.isatty()
+
+    def writable(self) -> bool:
+        """Tell that it can be written to."""
+        return True
+
+    def flush(self) -> None:
+        """Do nothing: all is on its way, and nobody waits."""
+
+    def write(self, text: str) -> int:
+        """Queue a text, or leave it out where the queue is full.
+
+        Raises:
+            BrokenPipeError: The reader has gone; raised once.
+            FileError: The system refuses to write, as a full disk does; raised once.
+            TypeError: This is no text.
+        """
+        if not isinstance(text, str):
+            raise TypeError(f"a text stream takes str, not {type(text).__name__}")
+        begins = self._is_at_start or text.startswith(_LINE_BEGINNINGS)
+        with self._changed:
+            if self._error is not None:
+                self._raise_once(self._error)
+                return len(text)
+            if begins:
+                self._begin_line()
+            if self._is_leaving_out:
+                self._left_out += begins + text[:-1].count("\n")
+            else:
+                self._queue.append(text)
+                self._characters += len(text)
+                self._changed.notify_all()
+            self._is_at_start = text.endswith("\n")
+        return len(text)
+
+    # What it does beside ----------------------------------------------------------------------
+
+    def finish(self) -> None:
+        """Wait until all is written, at most `FLUSH_S` without any progress; then let the thread go."""
+        with self._changed:
+            self._tell_left_out()
+            written, since = self._written, wall_clock()
+            while self._characters and self._error is None:
+                left_s = FLUSH_S - (wall_clock() - since) / NS_PER_S
+                if left_s <= 0:
+                    break
+                self._changed.wait(left_s)
+                if self._written != written:
+                    written, since = self._written, wall_clock()
+            self._is_over = True
+            self._changed.notify_all()
+
+    def _begin_line(self) -> None:
+        """Decide whether the line that begins now is left out."""
+        # A reader that takes one line in a while gets many at once, and one note of those in between.
+        most = MOST_CHARACTERS // 2 if self._is_leaving_out else MOST_CHARACTERS
+        self._is_leaving_out = self._characters >= most
+        if not self._is_leaving_out:
+            self._tell_left_out()
+
+    def _tell_left_out(self) -> None:
+        left_out, self._left_out = self._left_out, 0
+        if not left_out:
+            return
+        note = f"p2os: {left_out} lines of {self._name} left out: the reader does not read\n"
+        if self._notes is not None:
+            self._notes.write(note)
+        else:
+            self._queue.append(note)
+            self._characters += len(note)
+
+    def _raise_once(self, error: OSError) -> None:
+        if self._has_told_error:
+            return
+        self._has_told_error = True
+        if error.errno in _GONE:
+            raise BrokenPipeError(errno.EPIPE, f"nobody reads {self._name}") from error
+        raise FileError(f"cannot write to {self._name}: {(error.strerror or str(error)).lower()}") from error
+
+    def _hand_on(self) -> None:
+        while True:
+            with self._changed:
+                while not self._queue and not self._is_over:
+                    self._changed.wait()
+                if not self._queue:
+                    return
+                text = ""
+                while self._queue and len(text) < _CHUNK_CHARACTERS:
+                    text += self._queue.popleft()
+            try:
+                self._write_all(text.encode(self._encoding, self._errors or "strict"))
+            except OSError as error:
+                with self._changed:
+                    self._error = error
+                    self._queue.clear()
+                    self._characters = 0
+                    self._changed.notify_all()
+                return
+            with self._changed:
+                self._characters -= len(text)
+                self._changed.notify_all()
+
+    def _write_all(self, data: bytes) -> None:
+        while data:
+            try:
+                count = os.write(self._descriptor, data)
+            except BlockingIOError:  # somebody else has made the terminal so
+                select.select([], [self._descriptor], [])
+                continue
+            data = data[count:]
+            with self._changed:
+                self._written += count
+                self._changed.notify_all()
+
+
+def queue_output() -> None:
+    """Put a queue before standard output and standard error; once is enough.
+
+    Streams without a descriptor (a test's) hold nobody up and stay as they are.
+    """
+    if not isinstance(sys.stderr, QueuedStream) and _has_descriptor(sys.stderr):
+        sys.stderr = QueuedStream(sys.stderr, "standard error")
+    notes = sys.stderr if isinstance(sys.stderr, QueuedStream) else None
+    if not isinstance(sys.stdout, QueuedStream) and _has_descriptor(sys.stdout):
+        sys.stdout = QueuedStream(sys.stdout, "standard output", notes)
+
+
+@contextlib.contextmanager
+def restored_output() -> Iterator[None]:
+    """Put the streams back that were there before, at the end of the block, and wait a moment for their readers."""
+    stdout, stderr = sys.stdout, sys.stderr
+    try:
+        yield
+    finally:
+        queued = [stream for stream in (sys.stdout, sys.stderr) if isinstance(stream, QueuedStream)]
+        sys.stdout, sys.stderr = stdout, stderr
+        for stream in queued:
+            stream.finish()
+
+
+def _has_descriptor(stream: TextIO | None) -> bool:
+    try:
+        return stream is not None and stream.fileno() >= 0
+    except (OSError, ValueError):  # io.UnsupportedOperation is both
+        return False

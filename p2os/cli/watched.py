@@ -1,0 +1,104 @@
+"""Waiting beside a robot that does something: over in time, or at once when it cannot do it any more."""
+
+import contextlib
+from collections import deque
+
+from p2os.client import (
+    DeadmanStopped,
+    Disobeyed,
+    GapStopped,
+    Link,
+    LinkLost,
+    LinkLostError,
+    MotionError,
+    MotorsDisabled,
+    Notice,
+    Robot,
+    RobotState,
+)
+from p2os.client.goals import STALL_LIMIT_NS
+from p2os.timing import NS_PER_MS, NS_PER_S, Nanos
+from p2os.transport.wall_clock import Clock, GapWatch, wall_clock
+
+#: chosen: how soon a notice is seen; packets come every 100 ms.
+LOOK_NS: Nanos = 50 * NS_PER_MS
+
+
+class Watch:
+    """Keeps an eye on a robot while it waits.
+
+    Args:
+        robot: A connected one.
+        what: What it does, as a message begins: "hold 0.20 m/s".
+        moves: Whether it is to move: stalls, wheels and motors that do not obey and the deadman count then.
+        clock: Nanoseconds that never run back.
+    """
+
+    def __init__(self, robot: Robot, what: str, *, moves: bool, clock: Clock = wall_clock) -> None:
+        self._robot, self._what, self._moves, self._clock = robot, what, moves, clock
+        self._notices: deque[Notice] = deque()
+        self._stalled_since: Nanos | None = None
+
+    def wait(self, lasts_ns: Nanos) -> None:
+        """Wait so long.
+
+        Raises:
+            LinkLostError: The link was lost; the wait is over then.
+            MotionError: The robot does not do what it is to do; it was stopped first.
+        """
+        forget = self._robot.on_event(self._notices.append)
+        now = began = self._clock()
+        gaps = GapWatch(now)
+        try:
+            while (left_ns := began + lasts_ns - now) > 0:
+                gaps.expect(now + min(left_ns, LOOK_NS))
+                self._robot.sleep(min(left_ns, LOOK_NS) / NS_PER_S)
+                now = self._clock()
+                gap_ns = gaps.gap(now)
+                if (problem := problem_of(GapStopped(gap_ns), moves=True) if gap_ns else self._look()) is not None:
+                    self._end(problem, now - began)
+        finally:
+            forget()
+
+    def _look(self) -> str | None:
+        """Return what is wrong now."""
+        while self._notices:
+            notice = self._notices.popleft()
+            if (problem := problem_of(notice, moves=self._moves)) is not None:
+                return problem
+        if self._robot.link is not Link.OPEN:
+            return "the link was lost"
+        return self._stall(self._robot.state) if self._moves else None
+
+    def _stall(self, state: RobotState) -> str | None:
+        if not state.is_stalled:
+            self._stalled_since = None
+            return None
+        if self._stalled_since is None:
+            self._stalled_since = state.at_ns
+        return "stalled" if state.at_ns - self._stalled_since >= STALL_LIMIT_NS else None
+
+    def _end(self, problem: str, after_ns: Nanos) -> None:
+        with contextlib.suppress(LinkLostError):
+            self._robot.stop()
+        text = f"{self._what}: {problem}, after {after_ns / NS_PER_S:.1f} s"
+        if self._robot.link is not Link.OPEN:
+            raise LinkLostError(text, hint="is the robot on, and the cable in?")
+        raise MotionError(text)
+
+
+def problem_of(notice: Notice, *, moves: bool) -> str | None:
+    """Return why a robot cannot go on after a notice, or None where it can."""
+    match notice:
+        case LinkLost():
+            return f"the link was lost: {notice.reason}"
+        case GapStopped():
+            return f"this program paused for {notice.gap_ns / NS_PER_S:.1f} s"
+        case DeadmanStopped() if moves:
+            return f"this program did nothing for {notice.silent_ns / NS_PER_S:.1f} s"
+        case Disobeyed() if moves:
+            return notice.text
+        case MotorsDisabled() if moves:
+            return notice.reason
+        case _:
+            return None

@@ -1,0 +1,92 @@
+"""A verb in a process of its own that drives a robot served here, and what the robot was told."""
+
+import os
+import pty
+import subprocess
+import sys
+import time
+from collections.abc import Sequence
+from pathlib import Path
+
+from served_robot import PATIENCE_S, ServedRobot, until
+
+from p2os.commands import Command, CommandNumber
+from p2os.timing import Nanos
+from p2os.wire import Decoder, Frame
+
+COMMAND = (sys.executable, "-m", "p2os")
+CLOSE, STOP, VEL = CommandNumber.CLOSE, CommandNumber.STOP, CommandNumber.VEL
+
+
+class HeardRobot(ServedRobot):
+    """A served robot that keeps what it was told."""
+
+    def __init__(self) -> None:
+        self.heard: list[tuple[float, Command]] = []
+        decoder = Decoder()
+        super().__init__()
+        receive = self.pioneer.receive
+
+        def hear(data: bytes, now: Nanos) -> object:
+            decoder.receive(data, now)
+            while (item := decoder.next_item()) is not None:
+                if isinstance(item, Frame):
+                    self.heard.append((time.monotonic(), Command.from_frame(item)))
+            return receive(data, now)
+
+        self.pioneer.receive = hear  # type: ignore[method-assign,assignment]
+
+    @property
+    def numbers(self) -> list[int]:
+        return [int(command.number) for _, command in self.heard]
+
+    def when_heard(self, number: int, since: float) -> float:
+        """Wait for a command that comes after a moment; return when it came."""
+
+        def found() -> float:
+            return next((at for at, command in list(self.heard) if at >= since and command.number == number), 0.0)
+
+        until(found, f"command {number}")
+        return found()
+
+    def wait_until_it_drives(self) -> None:
+        until(lambda: self.is_moving and self.pioneer.state.left_setpoint_mps > 0.02, "motion")
+
+
+class Driver:
+    """A verb in a process of its own, on a terminal of its own."""
+
+    def __init__(self, words: Sequence[str], *, on_terminal: bool = False, cwd: Path | None = None) -> None:
+        self.keyboard = -1
+        if on_terminal:
+            self.keyboard, inside = pty.openpty()
+            self.process = subprocess.Popen(words, stdin=inside, stdout=inside, stderr=inside, start_new_session=True)
+            os.close(inside)
+        else:
+            self.process = subprocess.Popen(
+                words, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.PIPE, cwd=cwd
+            )
+
+    def press(self, keys: str) -> None:
+        os.write(self.keyboard, keys.encode())
+
+    def end(self) -> tuple[int, str]:
+        """Wait for the end; return the exit code and what was said."""
+        try:
+            if self.keyboard < 0:
+                out, err = self.process.communicate(timeout=PATIENCE_S)
+                return self.process.returncode, (out + err).decode()
+            return self.process.wait(PATIENCE_S), ""
+        finally:
+            self.close()
+
+    def close(self) -> None:
+        if self.process.poll() is None:
+            self.process.kill()
+            self.process.wait(PATIENCE_S)
+        if self.keyboard >= 0:
+            os.close(self.keyboard)
+            self.keyboard = -1
+
+
+__all__ = ["CLOSE", "COMMAND", "PATIENCE_S", "STOP", "VEL", "Driver", "HeardRobot", "until"]

@@ -1,0 +1,246 @@
+"""What is printed never stands between a client and a robot: readers that do not read, and readers that go."""
+
+import contextlib
+import fcntl
+import io
+import os
+import pty
+import select
+import socket
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+sys.path.insert(0, str(Path(__file__).parent))
+
+from driven import COMMAND, PATIENCE_S, STOP, VEL, Driver, HeardRobot, until
+
+from p2os.cli import printing
+from p2os.cli.printing import MOST_CHARACTERS, QueuedStream, queue_output, restored_output
+from p2os.errors import FileError
+
+
+class Pipe:
+    """A pipe whose reader reads when the test says so."""
+
+    def __init__(self) -> None:
+        self.reader, writer = os.pipe()
+        self.below = os.fdopen(writer, "w", encoding="utf-8")
+
+    def read_until(self, end: str) -> str:
+        text = ""
+        while not text.endswith(end):
+            assert select.select([self.reader], [], [], PATIENCE_S)[0], text[-300:]
+            text += os.read(self.reader, 1 << 16).decode()
+        return text
+
+
+@pytest.fixture
+def pipe() -> Iterator[Pipe]:
+    pipe = Pipe()
+    yield pipe
+    with contextlib.suppress(OSError):
+        os.close(pipe.reader)
+    with contextlib.suppress(OSError):
+        pipe.below.close()
+
+
+@pytest.fixture
+def impatient(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(printing, "FLUSH_S", 0.05)
+
+
+def test_what_is_written_arrives_in_order(pipe: Pipe) -> None:
+    stream = QueuedStream(pipe.below, "standard output")
+    for number in range(1000):
+        print(number, "é", file=stream)
+    print("end", file=stream, flush=True)
+    assert pipe.read_until("end\n").splitlines()[:-1] == [f"{number} é" for number in range(1000)]
+    assert (stream.encoding, stream.fileno(), stream.isatty()) == ("utf-8", pipe.below.fileno(), False)
+    with pytest.raises(TypeError):
+        stream.write(b"bytes")  # type: ignore[arg-type]
+
+
+@pytest.mark.usefixtures("impatient")
+def test_a_reader_that_does_not_read_misses_whole_lines_and_is_told_how_many(pipe: Pipe) -> None:
+    stream = QueuedStream(pipe.below, "standard output")
+    line = "x" * 999 + "\n"
+    most = MOST_CHARACTERS // 1000 + 500
+    began = time.monotonic()
+    for _ in range(most):
+        stream.write(line)
+    for piece in ("half a ", "line\n", "\rstatus", "\rstatus", "\n"):
+        stream.write(piece)
+    stream.finish()
+    assert time.monotonic() - began < 2
+    lines = pipe.read_until("read\n").splitlines(keepends=True)
+    written = lines.count(line)
+    told = f"p2os: {most + 3 - written} lines of standard output left out: the reader does not read\n"
+    assert lines == [line] * written + [told]
+
+
+def test_lines_left_out_of_standard_output_are_told_of_on_standard_error(pipe: Pipe) -> None:
+    errors = Pipe()
+    notes = QueuedStream(errors.below, "standard error")
+    stream = QueuedStream(pipe.below, "standard output", notes)
+    line = "x" * 4095 + "\n"
+    for _ in range(MOST_CHARACTERS // 4096 + 100):
+        stream.write(line)
+    read = 0
+    while read < MOST_CHARACTERS:
+        assert select.select([pipe.reader], [], [], PATIENCE_S)[0]
+        read += len(os.read(pipe.reader, 1 << 16))
+    until(lambda: stream._characters < MOST_CHARACTERS // 2, "room")
+    stream.write("{}\n")
+    pipe.read_until("{}\n")
+    told = errors.read_until("read\n")
+    assert told.startswith("p2os: ")
+    assert 50 < int(told.split()[1]) <= 100
+
+
+def test_a_reader_that_goes_is_told_of_once(pipe: Pipe) -> None:
+    stream = QueuedStream(pipe.below, "standard output")
+    os.close(pipe.reader)
+    stream.write("to nobody\n")
+    until(lambda: stream._error, "the error")
+    with pytest.raises(BrokenPipeError, match="nobody reads standard output"):
+        stream.write("again\n")
+    assert stream.write("and again\n") == 10
+    stream.finish()
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="this system has no full disk at hand")
+def test_a_disk_that_is_full_is_named() -> None:
+    with open("/dev/full", "w", encoding="utf-8") as full:  # noqa: PTH123  # a device
+        stream = QueuedStream(full, "standard output")
+        stream.write("x\n")
+        until(lambda: stream._error, "the error")
+        with pytest.raises(FileError, match="cannot write to standard output: no space left on device"):
+            stream.write("x\n")
+
+
+def test_the_streams_are_replaced_for_a_while_where_they_could_hold_anybody_up(
+    pipe: Pipe, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    captured = io.StringIO()
+    monkeypatch.setattr(sys, "stdout", captured)
+    monkeypatch.setattr(sys, "stderr", pipe.below)
+    with restored_output():
+        queue_output()
+        queue_output()
+        assert sys.stdout is captured
+        assert isinstance(sys.stderr, QueuedStream)
+        assert sys.stderr.below is pipe.below
+        sys.stderr.write("told\n")
+    assert sys.stderr is pipe.below
+    assert pipe.read_until("\n") == "told\n"
+
+
+# The verbs --------------------------------------------------------------------------------
+
+
+@pytest.fixture
+def robot() -> Iterator[HeardRobot]:
+    robot = HeardRobot()
+    yield robot
+    robot.close()
+
+
+def fill(descriptor: int) -> None:
+    """Fill a pipe or a terminal until nothing more fits, as an output that nobody reads."""
+    os.set_blocking(descriptor, False)
+    for piece in (b"." * 1024, b"."):
+        with contextlib.suppress(BlockingIOError):
+            while True:
+                os.write(descriptor, piece)
+    os.set_blocking(descriptor, True)
+
+
+@pytest.mark.slow
+def test_sniff_passes_on_what_nobody_wants_to_see(robot: HeardRobot) -> None:
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        between = f"tcp:127.0.0.1:{probe.getsockname()[1]}"
+    reader, writer = os.pipe()
+    with contextlib.suppress(AttributeError, OSError):
+        fcntl.fcntl(writer, fcntl.F_SETPIPE_SZ, 4096)
+    fill(writer)
+    sniff = subprocess.Popen([*COMMAND, "sniff", robot.url, "--listen", between], stdout=writer, stderr=subprocess.PIPE)
+    os.close(writer)
+    assert sniff.stderr is not None
+    assert b"listening" in sniff.stderr.readline()
+    client = Driver([*COMMAND, "drive", between, "--vel", "100mm/s", "--for", "1min"])
+    try:
+        robot.wait_until_it_drives()
+        sent = len([number for number in robot.numbers if number == VEL])
+        until(lambda: robot.numbers.count(VEL) > sent + 3, "more of the client's frames")
+        asked_at = time.monotonic()
+        client.process.terminate()
+        assert robot.when_heard(STOP, asked_at) - asked_at < 0.3
+        assert client.end()[0] == 130
+        ended_at = time.monotonic()
+        sniff.terminate()
+        assert sniff.wait(PATIENCE_S) == 130
+        assert time.monotonic() - ended_at < 2.5, "the flush at the end is bounded"
+    finally:
+        client.close()
+        sniff.kill()
+        sniff.communicate()
+        os.close(reader)
+
+
+def test_sniff_whose_reader_goes_says_farewell(robot: HeardRobot) -> None:
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        between = f"tcp:127.0.0.1:{probe.getsockname()[1]}"
+    sniff = Driver([*COMMAND, "sniff", robot.url, "--listen", between])
+    assert sniff.process.stdout is not None
+    assert sniff.process.stderr is not None
+    assert b"listening" in sniff.process.stderr.readline()
+    client = Driver([*COMMAND, "drive", between, "--vel", "100mm/s", "--for", "1min"])
+    try:
+        robot.wait_until_it_drives()
+        gone_at = time.monotonic()
+        sniff.process.stdout.close()
+        robot.when_heard(STOP, gone_at)
+        assert sniff.process.wait(PATIENCE_S) == 1
+        assert client.end()[0] == 1
+    finally:
+        client.close()
+        sniff.close()
+
+
+@pytest.mark.slow
+def test_a_key_let_go_stops_the_robot_though_the_terminal_is_held(robot: HeardRobot) -> None:
+    keyboard, inside = pty.openpty()
+    fill(inside)
+    process = subprocess.Popen(
+        [*COMMAND, "teleop", robot.url], stdin=inside, stdout=inside, stderr=inside, start_new_session=True
+    )
+    os.close(inside)
+    try:
+        until(lambda: 1 in robot.numbers, "a session")
+        time.sleep(0.5)  # the terminal is made raw after the robot is connected, and cannot be seen to be
+        os.write(keyboard, b"w")
+        robot.wait_until_it_drives()
+        for _ in range(5):
+            time.sleep(0.05)
+            os.write(keyboard, b"w")
+        let_go_at = time.monotonic()
+        zero_at = 0.0
+        while not zero_at and time.monotonic() < let_go_at + PATIENCE_S:
+            zero_at = next(
+                (at for at, command in list(robot.heard)
+                 if at > let_go_at and command.number == VEL and command.integer == 0), 0.0,
+            )  # fmt: skip
+        assert 0.2 < zero_at - let_go_at < 0.8
+        os.write(keyboard, b"q")
+        assert process.wait(PATIENCE_S) == 0
+    finally:
+        process.kill()
+        process.wait(PATIENCE_S)
+        os.close(keyboard)

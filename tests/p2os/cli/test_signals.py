@@ -1,0 +1,216 @@
+"""Whatever signal ends a verb: the robot is told to stop first, and the exit code is 130."""
+
+import signal
+import socket
+import sys
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import pytest
+
+sys.path.insert(0, str(Path(__file__).parent))
+
+from driven import CLOSE, COMMAND, STOP, Driver, HeardRobot, until
+
+from p2os.cli import signals
+from p2os.cli.main import run
+from p2os.cli.signals import ENDING_NS, FATAL, end_on_signals, end_on_suspension, postponed, restored_signals
+from p2os.commands import Command, CommandNumber
+from p2os.timing import NS_PER_S
+from p2os.trace import Direction, capture_of, write_recording
+
+NUMBERS = [signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT, signal.SIGUSR1, signal.SIGTSTP]
+IDENTITY = bytes.fromhex("fafb18025669727475616c0050696f6e6565720070326478002a13")
+PAD = """
+import sys
+from p2os.cli import teleop
+from p2os.cli.main import main
+from p2os.gamepad import PadReport
+
+class Pad:
+    name = "a pad"
+    def __init__(self): self.reports = iter([PadReport(), PadReport(up=True)])
+    def __enter__(self): return self
+    def __exit__(self, *_): pass
+    def report(self): return next(self.reports, PadReport(forward=600))
+
+teleop.SdlPad = Pad
+main(["teleop", sys.argv[1], "--pad"])
+"""
+
+
+@pytest.fixture
+def robot() -> Iterator[HeardRobot]:
+    robot = HeardRobot()
+    yield robot
+    robot.close()
+
+
+@pytest.fixture
+def drivers() -> Iterator[list[Driver]]:
+    """Those that a test has started; none outlives it."""
+    started: list[Driver] = []
+    yield started
+    for driver in started:
+        driver.close()
+
+
+def recorded_drive(folder: Path) -> str:
+    """A recording that drives for a minute."""
+    frames = [Command(0), Command(1), Command(2), Command(1), Command(4, 1), Command(11, 200)]
+    robot = [Command(0).to_frame().to_bytes(), Command(1).to_frame().to_bytes(), IDENTITY]
+    talk = []
+    for place, command in enumerate(frames):
+        talk.append((place * 1000, Direction.TO_ROBOT, command.to_frame().to_bytes()))
+        if place < 3:
+            talk.append((place * 1000 + 500, Direction.FROM_ROBOT, robot[place]))
+    pulses = [(second * NS_PER_S, Direction.TO_ROBOT, Command(0).to_frame().to_bytes()) for second in range(1, 60)]
+    path = folder / "drive.jsonl"
+    path.write_text(write_recording(capture_of(talk + pulses)))
+    return str(path)
+
+
+def free_port() -> str:
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        return f"tcp:127.0.0.1:{probe.getsockname()[1]}"
+
+
+def by_keys(url: str, _folder: Path) -> list[Driver]:
+    return [Driver([*COMMAND, "teleop", url], on_terminal=True)]
+
+
+def by_pad(url: str, _folder: Path) -> list[Driver]:
+    return [Driver([sys.executable, "-c", PAD, url])]
+
+
+def by_drive(url: str, _folder: Path) -> list[Driver]:
+    return [Driver([*COMMAND, "drive", url, "--vel", "100mm/s", "--for", "1min"])]
+
+
+def by_way(url: str, _folder: Path) -> list[Driver]:
+    return [Driver([*COMMAND, "drive", url, "--forward", "1m", "--vel", "50mm/s"])]
+
+
+def by_replay(url: str, folder: Path) -> list[Driver]:
+    return [Driver([*COMMAND, "replay", recorded_drive(folder), url, "--as", "client"])]
+
+
+def through_sniff(url: str, folder: Path) -> list[Driver]:
+    between = free_port()
+    sniff = Driver([*COMMAND, "sniff", url, "--listen", between, "--quiet"])
+    assert sniff.process.stderr is not None
+    assert b"listening" in sniff.process.stderr.readline()
+    return [sniff, Driver([*COMMAND, "drive", between, "--vel", "100mm/s", "--for", "1min"])]
+
+
+#: Each drives the robot; the first of its processes is the one that is interrupted.
+VERBS: list[Callable[[str, Path], list[Driver]]] = [by_drive, by_way, by_keys, by_pad, by_replay, through_sniff]
+
+
+@pytest.mark.parametrize("number", NUMBERS)
+@pytest.mark.parametrize("begin", VERBS)
+def test_a_signal_stops_the_robot_first(
+    begin: Callable[[str, Path], list[Driver]], number: signal.Signals, robot: HeardRobot, drivers: list[Driver],
+    tmp_path: Path,
+) -> None:  # fmt: skip
+    drivers += begin(robot.url, tmp_path)
+    if begin is by_keys:
+        until(lambda: CommandNumber.OPEN in robot.numbers, "a session")
+        time.sleep(0.3)  # the terminal is made raw after the robot is connected
+        drivers[0].press("w")
+    robot.wait_until_it_drives()
+    sent_at = time.monotonic()
+    drivers[0].process.send_signal(number)
+    stopped_at = robot.when_heard(STOP, sent_at)
+    assert stopped_at - sent_at < 0.5
+    assert robot.when_heard(CLOSE, sent_at) >= stopped_at
+    code, said = drivers[0].end()
+    assert code == 130, said
+    assert "Traceback" not in said
+    until(lambda: not robot.is_moving, "rest")
+
+
+@pytest.mark.parametrize("number", NUMBERS)
+def test_a_command_that_was_sent_is_taken_back_by_a_signal(
+    number: signal.Signals, robot: HeardRobot, drivers: list[Driver]
+) -> None:
+    drivers.append(Driver([*COMMAND, "send", robot.url, "VEL", "200", "--wait", "1min"]))
+    until(lambda: (CommandNumber.VEL, 200) in [(command.number, command.integer) for _, command in robot.heard], "VEL")
+    sent_at = time.monotonic()
+    drivers[0].process.send_signal(number)
+    assert drivers[0].end()[0] == 130
+    assert robot.when_heard(STOP, sent_at) <= robot.when_heard(CLOSE, sent_at)
+
+
+def test_many_signals_do_not_cut_the_stopping_short(robot: HeardRobot, drivers: list[Driver]) -> None:
+    drivers.append(Driver([*COMMAND, "drive", robot.url, "--vel", "100mm/s", "--for", "1min"]))
+    robot.wait_until_it_drives()
+    for number in (signal.SIGTERM, signal.SIGHUP, signal.SIGINT, signal.SIGQUIT) * 5:
+        drivers[0].process.send_signal(number)
+        time.sleep(0.002)
+    assert drivers[0].end()[0] == 130
+    assert robot.numbers[-1] == CLOSE
+    assert STOP in robot.numbers
+
+
+# The handlers by themselves ---------------------------------------------------------------
+
+
+@pytest.fixture
+def now(monkeypatch: pytest.MonkeyPatch) -> Iterator[list[int]]:
+    """Our handlers, on a clock that a test sets."""
+    time_ns = [0]
+    monkeypatch.setattr(signals, "wall_clock", lambda: time_ns[0])
+    with restored_signals():
+        for number in NUMBERS:
+            signal.signal(number, signal.SIG_DFL)
+        end_on_signals()
+        yield time_ns
+
+
+def test_the_first_signal_interrupts_and_the_next_ones_wait_three_seconds(now: list[int]) -> None:
+    with pytest.raises(KeyboardInterrupt, match="SIGTERM"):
+        signal.raise_signal(signal.SIGTERM)
+    now[0] = ENDING_NS - 1
+    signal.raise_signal(signal.SIGINT)
+    now[0] = ENDING_NS
+    with pytest.raises(KeyboardInterrupt, match="SIGHUP"):
+        signal.raise_signal(signal.SIGHUP)
+
+
+def test_a_signal_waits_for_the_end_of_what_must_not_be_interrupted(now: list[int]) -> None:
+    done = []
+    with pytest.raises(KeyboardInterrupt, match="SIGUSR2"):  # noqa: PT012  # the block is what is tested
+        with postponed(), postponed() as inner:
+            signal.raise_signal(signal.SIGUSR2)
+            done.append("all of it")
+            del inner
+        done.append("not this")
+    assert done == ["all of it"]
+
+
+def test_every_signal_of_the_table_is_handled_and_given_back(now: list[int]) -> None:
+    handlers = {signal.getsignal(getattr(signal, name)) for name in FATAL if hasattr(signal, name)}
+    assert len(handlers) == 1
+    assert signal.getsignal(signal.SIGTSTP) is signal.SIG_DFL
+    end_on_suspension()
+    assert signal.getsignal(signal.SIGTSTP) in handlers
+    assert signal.getsignal(signal.SIGTTOU) is signal.SIG_IGN
+
+
+def test_a_program_that_was_made_deaf_to_hang_ups_stays_so(monkeypatch: pytest.MonkeyPatch) -> None:
+    with restored_signals():
+        signal.signal(signal.SIGHUP, signal.SIG_IGN)
+        signal.signal(signal.SIGINT, signal.SIG_IGN)
+        monkeypatch.delattr(signal, "SIGUSR2")  # as on other systems
+        end_on_signals()
+        assert signal.getsignal(signal.SIGHUP) is signal.SIG_IGN
+        assert signal.getsignal(signal.SIGINT) is not signal.SIG_IGN, "a shell makes background programs deaf to it"
+
+
+def test_a_run_of_the_command_line_gives_the_handlers_back() -> None:
+    before = [signal.getsignal(number) for number in NUMBERS]
+    assert run(["--version"]) == 0
+    assert [signal.getsignal(number) for number in NUMBERS] == before
