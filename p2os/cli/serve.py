@@ -14,8 +14,8 @@ from typing import Annotated
 import typer
 
 from p2os.cli.event_lines import EventLines
+from p2os.cli.printing import queue_output
 from p2os.cli.quantities import parse_duration
-from p2os.cli.signals import end_on_signals
 from p2os.errors import UsageError
 from p2os.pioneer.aux_seat import AuxSeat
 from p2os.pioneer.control_line import ControlLine, say_on_stderr
@@ -169,7 +169,7 @@ def serve(
             world=world, body=body, seed=seed, apart=apart,
         )  # fmt: skip
     made = make_fleet(order)
-    end_on_signals()
+    queue_output()
     with contextlib.ExitStack() as opened:
         orders = _control(control)
         if orders is not None:

@@ -23,14 +23,10 @@ from collections.abc import Iterator
 from types import FrameType, TracebackType
 from typing import Self
 
+from p2os.client.signals import FATAL, signal_numbers
 from p2os.timing import NS_PER_S, Nanos
 from p2os.transport.wall_clock import wall_clock
 
-#: What kills a program that does not handle it, by name: not every system has each.
-FATAL = (
-    "SIGINT", "SIGTERM", "SIGHUP", "SIGQUIT", "SIGUSR1", "SIGUSR2", "SIGALRM", "SIGVTALRM", "SIGPROF", "SIGXCPU",
-    "SIGPOLL", "SIGPWR", "SIGSTKFLT",
-)  # fmt: skip
 #: Caught even where they are ignored: shells start background programs deaf to the keyboard's two.
 ALWAYS_CAUGHT = frozenset({"SIGINT", "SIGQUIT", "SIGTERM"})
 #: Ctrl-Z would leave a robot driving by its last order; a program that holds one ends instead.
@@ -80,14 +76,14 @@ def end_on_suspension() -> None:
     if threading.current_thread() is not threading.main_thread() or ending is None:
         return
     _catch(ending, SUSPENDING)
-    for number in _numbers(IGNORED):
+    for number in signal_numbers(IGNORED):
         signal.signal(number, signal.SIG_IGN)
 
 
 def ignore_signals() -> None:
     """Let nothing interrupt the last moments of the process: all is said and done."""
     if threading.current_thread() is threading.main_thread():
-        for number in _numbers(FATAL):
+        for number in signal_numbers(FATAL):
             signal.signal(number, signal.SIG_IGN)
 
 
@@ -97,7 +93,7 @@ def restored_signals() -> Iterator[None]:
     if threading.current_thread() is not threading.main_thread():
         yield
         return
-    before = {number: signal.getsignal(number) for number in _numbers(FATAL + SUSPENDING + IGNORED)}
+    before = {number: signal.getsignal(number) for number in signal_numbers(FATAL + SUSPENDING + IGNORED)}
     try:
         yield
     finally:
@@ -135,13 +131,9 @@ class postponed:  # noqa: N801  # reads as `with postponed():`
 
 
 def _catch(ending: _Ending, names: tuple[str, ...]) -> None:
-    for number in _numbers(names):
+    for number in signal_numbers(names):
         if number.name in ALWAYS_CAUGHT or signal.getsignal(number) is not signal.SIG_IGN:
             signal.signal(number, ending.handle)
-
-
-def _numbers(names: tuple[str, ...]) -> list[signal.Signals]:
-    return [number for name in names if (number := getattr(signal, name, None)) is not None]
 
 
 def _present() -> _Ending | None:

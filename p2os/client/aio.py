@@ -30,6 +30,7 @@ from p2os.client.notices import Notice
 from p2os.client.opening import core_for, motion_result, no_answer, not_connected, not_found
 from p2os.client.requests import PacketType, request_for
 from p2os.client.settings import ClientSettings
+from p2os.client.signals import exit_on_signals
 from p2os.client.snapshots import Link, RobotState
 from p2os.errors import P2osError, TransportError
 from p2os.parameters import RobotParameters
@@ -68,7 +69,7 @@ class AsyncEngine:
         self._timer: asyncio.TimerHandle | None = None
         self._watched: int | None = None
         self._opening: asyncio.Task[None] | None = None
-        self._is_closed = False
+        self._is_closed = self._is_finished = False
 
     def start(self) -> None:
         """Begin to move bytes in the running loop.
@@ -113,7 +114,7 @@ class AsyncEngine:
                 self._turn()  # STOP is out before anything can interrupt
             with contextlib.suppress(TimeoutError):
                 async with asyncio.timeout(CLOSING_S):
-                    while not self._line.is_over and self.failure is None:
+                    while not (self._line.is_over or self._is_finished) and self.failure is None:
                         await _changes(self._changed, SIGN_OF_LIFE_S)
         finally:
             self.finish()
@@ -124,6 +125,7 @@ class AsyncEngine:
         try:
             self._line.finish()
         finally:
+            self._is_finished = True
             if self._loop is not None and not self._loop.is_closed():
                 self._let_go_of_loop()
             self._changed.set()
@@ -253,6 +255,7 @@ class Robot(RobotCalls):
         Raises:
             ConnectError: the line cannot be opened, or no robot answers.
         """
+        exit_on_signals()
         self._engine.start()
         try:
             self._run(lambda core, now: core.connect(now))

@@ -23,6 +23,7 @@ from p2os.client.notices import Notice
 from p2os.client.opening import core_for, motion_result, no_answer, not_connected, not_found
 from p2os.client.requests import PacketType, request_for
 from p2os.client.settings import ClientSettings
+from p2os.client.signals import exit_on_signals
 from p2os.client.snapshots import Link, RobotState
 from p2os.parameters import RobotParameters
 from p2os.timing import NS_PER_S, Nanos
@@ -76,6 +77,7 @@ class Robot(RobotCalls):
             ConnectError: the line cannot be opened, or no robot answers; the message says how far it came.
         """
         engine = self._engine
+        exit_on_signals()
         engine.start()
         try:
             with engine.changed:

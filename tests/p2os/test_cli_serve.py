@@ -184,7 +184,6 @@ def test_serve_lets_a_silent_client_go_at_its_limit(serving: Callable[..., Servi
     assert "had no open session for 0.3 s" in err
 
 
-@pytest.mark.xfail(strict=False, reason="serve writes its lines to a blocking standard error")
 @pytest.mark.skipif(not hasattr(fcntl, "F_SETPIPE_SZ"), reason="Linux alone has pipes of a chosen size")
 def test_nobody_who_reads_its_lines_keeps_no_client_from_the_robot(serving: Callable[..., Serving]) -> None:
     """A terminal held with Ctrl-S, or a full pipe: the lines are lost, not the robot."""

@@ -268,6 +268,62 @@ loop.run_until_complete(go())
     until(lambda: not served.pioneer.state.open and not served.is_moving)
 
 
+CLIENTS = {
+    "blocking": """
+from p2os import Robot
+with Robot({url!r}) as r:
+    r.set_velocity(0.3); print(1, flush=True); r.sleep(60)
+""",
+    "asyncio": """
+import asyncio
+from p2os.client.aio import Robot
+async def main():
+    async with Robot({url!r}) as r:
+        r.set_velocity(0.3); print(1, flush=True); await r.sleep(60)
+asyncio.run(main())
+""",
+}
+
+
+@pytest.mark.skipif(os.name != "posix", reason="signals are Unix's")
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT, signal.SIGUSR1, signal.SIGALRM])
+@pytest.mark.parametrize("client", CLIENTS)
+def test_a_signal_that_would_kill_a_program_stops_its_robot_first(
+    served: ServedRobot, client: str, number: signal.Signals
+) -> None:
+    program = subprocess.Popen([sys.executable, "-c", CLIENTS[client].format(url=served.url)], stdout=subprocess.PIPE)
+    try:
+        assert program.stdout is not None
+        assert program.stdout.read(1)
+        until(lambda: served.is_moving)
+        program.send_signal(number)
+        program.send_signal(number)
+        assert program.wait(60) == 128 + number
+    finally:
+        program.kill()
+        program.wait()
+        program.stdout.close()  # type: ignore[union-attr]  # a pipe was asked for
+    until(lambda: not served.is_moving and not served.pioneer.state.motors_enabled)
+
+
+@pytest.mark.skipif(os.name != "posix", reason="signals are Unix's")
+def test_signals_that_a_program_handles_or_ignores_stay_so(served: ServedRobot) -> None:
+    caught: list[int] = []
+    before = {number: signal.getsignal(number) for number in (signal.SIGUSR1, signal.SIGHUP, signal.SIGTERM)}
+    signal.signal(signal.SIGUSR1, lambda number, _: caught.append(number))
+    signal.signal(signal.SIGHUP, signal.SIG_IGN)
+    signal.signal(signal.SIGTERM, signal.SIG_DFL)
+    try:
+        with Robot(served.url, settings=QUICK):
+            os.kill(os.getpid(), signal.SIGUSR1)
+            os.kill(os.getpid(), signal.SIGHUP)
+            assert signal.getsignal(signal.SIGTERM) is not signal.SIG_DFL
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)
+    assert caught == [signal.SIGUSR1]
+
+
 @pytest.mark.parametrize("error", [UnicodeError("label empty or too long"), ZeroDivisionError("x"), OSError("y")])
 def test_an_opener_that_raises_anything_ends_the_wait_with_a_reason(error: Exception) -> None:
     def opener(_: str) -> Transport:
