@@ -74,19 +74,12 @@ def run(words: list[str], *, trace: bool = False) -> int:
         words: what follows `p2os`.
         trace: show where in the program an error arose.
     """
-    with restored_signals(), restored_output():
-        end_on_signals()
-        try:
-            command = typer.main.get_command(make_app(words))
-            result = command.main(words or ["--help"], prog_name="p2os", standalone_mode=False)
-        except (KeyboardInterrupt, typer.Abort):
-            return EXIT_INTERRUPTED
-        except BrokenPipeError:  # the reader of our stdout has left, e.g. `p2os ports | head -1`
-            os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-            return EXIT_FAILED
-        except Exception as error:  # noqa: BLE001 - the one place where every error becomes a line
-            return report(error, words, trace=trace)
-        return result if isinstance(result, int) else 0
+    try:
+        with restored_signals(), restored_output():
+            end_on_signals()
+            return _run(words, trace=trace)
+    except KeyboardInterrupt:  # while the last words were on their way
+        return EXIT_INTERRUPTED
 
 
 def report(error: Exception, words: Sequence[str], *, trace: bool = False) -> int:
@@ -144,6 +137,20 @@ def add_verbs(app: typer.Typer, entries: Iterable[EntryPoint]) -> None:
             _add_missing(app, entry.name, error)
         else:
             module.register(app)
+
+
+def _run(words: list[str], *, trace: bool) -> int:
+    try:
+        command = typer.main.get_command(make_app(words))
+        result = command.main(words or ["--help"], prog_name="p2os", standalone_mode=False)
+    except (KeyboardInterrupt, typer.Abort):
+        return EXIT_INTERRUPTED
+    except BrokenPipeError:  # the reader of our stdout has left, e.g. `p2os ports | head -1`
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return EXIT_FAILED
+    except Exception as error:  # noqa: BLE001 - the one place where every error becomes a line
+        return report(error, words, trace=trace)
+    return result if isinstance(result, int) else 0
 
 
 def _add_missing(app: typer.Typer, name: str, error: ImportError) -> None:

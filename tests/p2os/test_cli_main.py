@@ -194,7 +194,7 @@ def test_a_reader_that_leaves_early_gets_no_traceback() -> None:
 
 def test_the_package_runs_as_a_module(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
     monkeypatch.setattr(sys, "argv", ["p2os", "--version"])
-    with pytest.raises(SystemExit) as end:
+    with restored_signals(), pytest.raises(SystemExit) as end:
         runpy.run_module("p2os", run_name="__main__")
     assert end.value.code in (None, 0)
     assert capsys.readouterr().out.strip()

@@ -159,7 +159,15 @@ def test_p2os_run_waits_for_gdb_and_goes_on_when_it_detaches(
 def test_a_killed_run_has_failed(gdb: list[bytes]) -> None:
     gdb += [b"s", b"vKill;1"]
     with pytest.raises(RunFailedError, match="killed by the debugger"):
-        debug_bench(0, is_paced=False)(Bench(scenario()))
+        debug_bench(0, is_paced=False, on_wait=lambda: None)(Bench(scenario()))
+
+
+def test_a_signal_ends_the_waiting_for_a_debugger() -> None:
+    def interrupt() -> None:
+        raise KeyboardInterrupt("SIGTERM")
+
+    with pytest.raises(KeyboardInterrupt, match="SIGTERM"):
+        debug_bench(0, is_paced=False, on_wait=interrupt)(Bench(scenario()))
 
 
 class Line:
@@ -187,7 +195,7 @@ def test_a_real_robot_is_stopped_by_the_first_halt(gdb: list[bytes], tmp_path: P
     gdb += [b"Z0,%x,2" % where, b"c", b"bc", b"c", b"D"]
     line = Line()
     wanted = replace(scenario("adapter", 5.0), changes=())
-    run_at_port(wanted, tmp_path / "run", line, drive=debug_port(0))  # type: ignore[arg-type]
+    run_at_port(wanted, tmp_path / "run", line, drive=debug_port(0, on_wait=lambda: None))  # type: ignore[arg-type]
     # The run is over with the halt: nothing goes back, and going on ends it.
     assert Gdb.answers == [b"OK", b"T05thread:1;", b"E01", b"W00", b"OK"]
     assert line.is_closed

@@ -3,6 +3,8 @@
 import contextlib
 import io
 import json
+import os
+import pty
 import re
 import signal
 import socket
@@ -280,6 +282,40 @@ def test_a_signal_stops_a_served_robot_and_ends_with_130(
     robot[1].send_signal(signal.SIGINT)
     told = robot[1].communicate(timeout=20)[1]
     assert re.search(r"closed", told), told
+
+
+@pytest.mark.slow
+def test_a_terminal_that_is_held_holds_up_neither_the_run_nor_its_end(
+    robot: tuple[str, subprocess.Popen[str]], tmp_path: Path
+) -> None:
+    terminal, inside = pty.openpty()
+    os.set_blocking(inside, False)
+    with contextlib.suppress(BlockingIOError):
+        while True:
+            os.write(inside, b".")
+    os.set_blocking(inside, True)
+    command = [*COMMAND, "run", "motors", "--port", robot[0], "--yes", "--out", "run", "--json"]
+    run = subprocess.Popen(command, cwd=tmp_path, stdout=subprocess.PIPE, stderr=inside, text=True)
+    os.close(inside)
+    time.sleep(4)
+    run.send_signal(signal.SIGTERM)
+    out, _ = run.communicate(timeout=60)
+    os.close(terminal)
+    if "lagged" in json.loads(out)["failures"][0]:
+        pytest.skip("this machine is too busy for real time now")
+    assert json.loads(out)["failures"][0] == "interrupted (SIGTERM)"
+    assert run.returncode == 130
+
+
+@pytest.mark.slow
+def test_a_signal_ends_the_waiting_for_a_debugger(robot: tuple[str, subprocess.Popen[str]], tmp_path: Path) -> None:
+    command = [*COMMAND, "run", "motors", "--port", robot[0], "--yes", "--out", "run", "--gdb", "0"]
+    run = subprocess.Popen(command, cwd=tmp_path, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    assert run.stderr is not None
+    assert "waiting for GDB" in run.stderr.readline()
+    run.send_signal(signal.SIGTERM)
+    _, err = run.communicate(timeout=60)
+    assert run.returncode == 130, err
 
 
 def test_nobody_at_the_port_is_one_line(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:

@@ -214,6 +214,24 @@ def test_sniff_whose_reader_goes_says_farewell(robot: HeardRobot) -> None:
         sniff.close()
 
 
+def test_a_signal_while_the_last_words_wait_for_a_reader_ends_at_once(robot: HeardRobot) -> None:
+    reader, writer = os.pipe()
+    fill(writer)
+    process = subprocess.Popen([*COMMAND, "info", robot.url], stdout=writer, stderr=writer)
+    os.close(writer)
+    try:
+        began = time.monotonic()
+        until(lambda: "client gone" in robot.told, "the end")
+        time.sleep(0.3)
+        process.terminate()
+        assert process.wait(PATIENCE_S) == 130
+        assert time.monotonic() - began < PATIENCE_S
+    finally:
+        process.kill()
+        process.wait(PATIENCE_S)
+        os.close(reader)
+
+
 @pytest.mark.slow
 def test_a_key_let_go_stops_the_robot_though_the_terminal_is_held(robot: HeardRobot) -> None:
     keyboard, inside = pty.openpty()

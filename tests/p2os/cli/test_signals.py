@@ -155,6 +155,29 @@ def test_many_signals_do_not_cut_the_stopping_short(robot: HeardRobot, drivers: 
     assert STOP in robot.numbers
 
 
+@pytest.mark.parametrize(("begin", "code"), [(by_drive, 1), (by_replay, 1), (through_sniff, None)])
+def test_a_program_that_was_suspended_stops_the_robot_before_anything_else(
+    begin: Callable[[str, Path], list[Driver]], code: int | None, robot: HeardRobot, drivers: list[Driver],
+    tmp_path: Path,
+) -> None:  # fmt: skip
+    drivers += begin(robot.url, tmp_path)
+    robot.wait_until_it_drives()
+    drivers[0].process.send_signal(signal.SIGSTOP)
+    time.sleep(0.9)  # longer than a wait of 0.2 s and a gap of 0.35 s
+    heard = len(robot.heard)
+    woken_at = time.monotonic()
+    drivers[0].process.send_signal(signal.SIGCONT)
+    assert robot.when_heard(STOP, woken_at) - woken_at < 0.5
+    robot.when_heard(CLOSE, woken_at)
+    if begin is not by_drive:  # whose own client stops it
+        assert robot.numbers[heard:] == [STOP, CommandNumber.VEL, CLOSE]
+    if code is None:
+        drivers[0].process.send_signal(signal.SIGINT)
+    ended, said = drivers[0].end()
+    assert ended == (130 if code is None else code)
+    assert "paused for 0." in said
+
+
 # The handlers by themselves ---------------------------------------------------------------
 
 
