@@ -49,7 +49,7 @@ ALLOWED = {
 #: The skin: what may read a clock, open a port or start a thread.
 SKIN = (
     "p2os.transport", "p2os.cli", "p2os.pioneer.host", "p2os.pioneer.served", "p2os.pioneer.fleet",
-    "p2os.pioneer.control_line", "p2os.client.engine", "p2os.client.aio", "p2os.client.signals",
+    "p2os.pioneer.control_line", "p2os.client.engine", "p2os.client.aio", "p2os.client.interrupts",
     "bluepill_sim.cli", "bluepill_sim.console",
     "testbench.cli", "testbench.pacer", "testbench.live", "testbench.report", "testbench.firmware.build",
 )  # fmt: skip

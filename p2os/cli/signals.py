@@ -23,7 +23,7 @@ from collections.abc import Iterator
 from types import FrameType, TracebackType
 from typing import Self
 
-from p2os.client.signals import FATAL, signal_numbers
+from p2os.client.interrupts import FATAL, signal_numbers
 from p2os.timing import NS_PER_S, Nanos
 from p2os.transport.wall_clock import wall_clock
 

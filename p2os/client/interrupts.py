@@ -1,6 +1,40 @@
-"""Work that an interrupt must not cut short: telling a robot to stop."""
+"""What interrupts a program: signals that end it in good order, and work that none of them may cut short.
 
+Python itself raises an exception with Ctrl-C alone; other signals kill at once, and a robot would drive on until its
+watchdog stops it. So a program that has a robot ends by SystemExit on them. Whoever handles a signal in a way of
+their own keeps it, and one that the program was made deaf to (`nohup` and SIGHUP) stays so. Ctrl-Z suspends as ever:
+the robot's watchdog stops it, and STOP is the first frame when the program goes on.
+
+SIGKILL, SIGSTOP and a power cut cannot be caught.
+"""
+
+import signal
+import threading
 from collections.abc import Callable
+from types import FrameType
+
+#: What kills a program that does not handle it, by name: not every system has each.
+FATAL = (
+    "SIGINT", "SIGTERM", "SIGHUP", "SIGQUIT", "SIGUSR1", "SIGUSR2", "SIGALRM", "SIGVTALRM", "SIGPROF", "SIGXCPU",
+    "SIGPOLL", "SIGPWR", "SIGSTKFLT",
+)  # fmt: skip
+
+
+def signal_numbers(names: tuple[str, ...]) -> list[signal.Signals]:
+    """Return those of some signals that this system has."""
+    return [number for name in names if (number := getattr(signal, name, None)) is not None]
+
+
+def exit_on_signals() -> None:
+    """Let each of `FATAL` that nobody handles raise SystemExit, with the exit code of a shell: 128 and its number.
+
+    Only a program's main thread can; in others nothing is changed.
+    """
+    if threading.current_thread() is not threading.main_thread():
+        return
+    for number in signal_numbers(FATAL):
+        if signal.getsignal(number) is signal.SIG_DFL:
+            signal.signal(number, _exit)
 
 
 def held_back(work: Callable[[], None]) -> None:
@@ -24,3 +58,7 @@ def held_back(work: Callable[[], None]) -> None:
             held = interrupt
     if held is not None:
         raise held
+
+
+def _exit(number: int, _frame: FrameType | None) -> None:
+    raise SystemExit(128 + number)
