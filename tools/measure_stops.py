@@ -62,24 +62,37 @@ SHIM = """
 #define _GNU_SOURCE
 #include <dlfcn.h>
 #include <fcntl.h>
+#include <semaphore.h>
 #include <stdlib.h>
 #include <sys/mman.h>
 #include <time.h>
+static long long slept(void) {
+  static volatile long long *shared;
+  if (!shared) shared = mmap(0, 8, PROT_READ, MAP_SHARED, open(getenv("SLEPT_NS"), O_RDONLY), 0);
+  return *shared;
+}
+static struct timespec later(const struct timespec *at, long long by) {
+  long long ns = at->tv_sec * 1000000000LL + at->tv_nsec + by;
+  return (struct timespec){ns / 1000000000LL, ns % 1000000000LL};
+}
 int clock_gettime(clockid_t id, struct timespec *out) {
   static int (*real)(clockid_t, struct timespec *);
-  static volatile long long *slept;
-  if (!real) {
-    int file = open(getenv("SLEPT_NS"), O_RDONLY);
-    slept = mmap(0, 8, PROT_READ, MAP_SHARED, file, 0);
-    real = (int (*)(clockid_t, struct timespec *))dlsym(RTLD_NEXT, "clock_gettime");
-  }
+  if (!real) real = (int (*)(clockid_t, struct timespec *))dlsym(RTLD_NEXT, "clock_gettime");
   int result = real(id, out);
-  if (id == CLOCK_MONOTONIC || id == CLOCK_MONOTONIC_RAW || id == CLOCK_MONOTONIC_COARSE) {
-    long long ns = out->tv_sec * 1000000000LL + out->tv_nsec - *slept;
-    out->tv_sec = ns / 1000000000LL;
-    out->tv_nsec = ns % 1000000000LL;
-  }
+  if (id == CLOCK_MONOTONIC || id == CLOCK_MONOTONIC_RAW || id == CLOCK_MONOTONIC_COARSE) *out = later(out, -slept());
   return result;
+}
+int sem_clockwait(sem_t *semaphore, clockid_t id, const struct timespec *until) {
+  static int (*real)(sem_t *, clockid_t, const struct timespec *);
+  if (!real) real = (int (*)(sem_t *, clockid_t, const struct timespec *))dlsym(RTLD_NEXT, "sem_clockwait");
+  struct timespec at = id == CLOCK_MONOTONIC ? later(until, slept()) : *until;
+  return real(semaphore, id, &at);
+}
+int clock_nanosleep(clockid_t id, int flags, const struct timespec *span, struct timespec *left) {
+  static int (*real)(clockid_t, int, const struct timespec *, struct timespec *);
+  if (!real) *(void **)&real = dlsym(RTLD_NEXT, "clock_nanosleep");
+  struct timespec at = id == CLOCK_MONOTONIC && (flags & TIMER_ABSTIME) ? later(span, slept()) : *span;
+  return real(id, flags, &at, left);
 }
 """
 
@@ -235,7 +248,6 @@ WAYS = (
     Way("asyncio Robot", (sys.executable, "-c", ASYNC_CLIENT, "{url}")),
     Way("drive --vel", (*DRIVE, "{url}", "--vel", "0.3m/s", "--for", "60s")),
     Way("drive --forward", (*DRIVE, "{url}", "--forward", "6m", "--vel", "0.3m/s")),
-    Way("send VEL", (*P2OS, "send", "{url}", "VEL", "300", "--wait", "60s")),
     Way("teleop", (*P2OS, "teleop", "{url}"), has_keys=True),
     Way("replay", (*P2OS, "replay", "{recording}", "{url}", "--as", "client", "--yes")),
     Way("sniff", (*P2OS, "sniff", "{url}", "--listen", "{listen}"),
@@ -308,29 +320,34 @@ class Happening:
 
     name: str
     do: Callable[[Driver, Cable], float]
-    #: The process can say nothing, or the line carries nothing: the robot's watchdog stops it.
-    by_watchdog: bool = False
+    #: The process can say nothing, the line carries nothing and the robot's watchdog stops it, or zero speeds do.
+    without_stop: bool = False
     #: The wheels may stand before it is over; STOP has to be the first frame afterwards, if any comes.
     is_pause: bool = False
     has_blocked_output: bool = False
+    #: Who holds a key lets it go with it: the next repetition would be asking anew.
+    lets_key_go: bool = False
     only: tuple[str, ...] = ()
+    #: Ways to which it does not apply: Ctrl-Z suspends a program of one's own, which SIGSTOP stands for.
+    but_not: tuple[str, ...] = ()
 
 
-SIGNALS = ("SIGINT", "SIGTERM", "SIGHUP", "SIGQUIT", "SIGUSR1", "SIGTSTP")
+SIGNALS = ("SIGINT", "SIGTERM", "SIGHUP", "SIGQUIT", "SIGUSR1")
 HAPPENINGS = (
     *(Happening(name, sent(signal.Signals[name])) for name in SIGNALS),
+    Happening("SIGTSTP", sent(signal.SIGTSTP), but_not=("Robot", "asyncio Robot")),
     Happening("SIGINT x 20", twice),
-    Happening("SIGKILL", sent(signal.SIGKILL), by_watchdog=True),
+    Happening("SIGKILL", sent(signal.SIGKILL), without_stop=True),
     *(
-        Happening(f"{name} {span_s:g} s", paused(span_s, by_suspend=name == "suspend"), is_pause=True)
+        Happening(f"{name} {span_s:g} s", paused(span_s, by_suspend=name == "suspend"), is_pause=True, lets_key_go=True)
         for name in ("SIGSTOP", "suspend")
         for span_s in PAUSES_S
     ),
-    Happening("line cut 3 s", cut, is_pause=True),
-    Happening("line closed", closed, by_watchdog=True),
+    Happening("line cut 3 s", cut, is_pause=True, lets_key_go=True),
+    Happening("line closed", closed, without_stop=True, lets_key_go=True),
     Happening("output blocked, SIGINT", sent(signal.SIGINT), has_blocked_output=True),
-    Happening("output blocked, key let go", released, has_blocked_output=True, only=("teleop",)),
-    Happening("key let go", released, only=("teleop",)),
+    Happening("output blocked, key let go", released, has_blocked_output=True, without_stop=True, only=("teleop",)),
+    Happening("key let go", released, without_stop=True, only=("teleop",)),
 )
 
 
@@ -361,6 +378,8 @@ def measure(way: Way, event: Happening, tools: "Tools") -> Row:
             row.problem = f"it never drove (exit code {driver.process.poll()})"
             return row
         time.sleep(0.7)
+        if event.lets_key_go:
+            driver.is_held.clear()
         began = time.monotonic()
         at = event.do(driver, cable)
         until(lambda: not robot.is_moving and bool(stops(cable, at) or driver.process.poll() is not None), LONGEST_S)
@@ -393,7 +412,7 @@ def fault(row: Row, event: Happening) -> str:
         return "it moves again"
     if event.is_pause and row.first not in {"", "STOP"}:
         return f"{row.first} is the first frame after the pause"
-    if row.stop_ms is None and not event.by_watchdog and not (event.is_pause and row.exit_code is not None):
+    if row.stop_ms is None and not event.without_stop and not (event.is_pause and not row.first):
         return "no STOP"
     return ""
 
@@ -432,7 +451,12 @@ def start(way: Way, url: str, folder: Path, tools: Tools, *, blocked: bool, stac
     def filled(parts: tuple[str, ...]) -> list[str]:
         return [words.get(part, part) for part in parts]
 
-    environment = os.environ | {"LD_PRELOAD": str(tools.shim), "SLEPT_NS": str(slept_path), "PYTHONPATH": str(ROOT)}
+    environment = os.environ | {
+        "LD_PRELOAD": str(tools.shim),
+        "SLEPT_NS": str(slept_path),
+        "ASAN_OPTIONS": "verify_asan_link_order=0",
+        "PYTHONPATH": str(ROOT),
+    }
     output: int = full_pipe(stack) if blocked else subprocess.DEVNULL
     keys = -1
     if way.has_keys:
@@ -491,7 +515,8 @@ def hold_key(keys: int, driver: Driver, is_blocked: bool, is_over: threading.Eve
 
 def drive_wires(path: Path, is_over: threading.Event) -> None:
     """Be the BluePill of `p2os-adapter`: connect, and both motors ahead."""
-    until(path.exists, STARTING_S)
+    if not until(path.exists, STARTING_S):
+        return
     with socket.socket(socket.AF_UNIX) as wires:
         wires.connect(str(path))
         wires.setblocking(False)
@@ -571,6 +596,7 @@ def main() -> int:
     wanted = [
         (way, event) for way in ways for event in HAPPENINGS
         if (not options.event or event.name in options.event) and (not event.only or way.name in event.only)
+        and way.name not in event.but_not
     ]  # fmt: skip
     is_bad = False
     if not options.json:

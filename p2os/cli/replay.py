@@ -11,6 +11,7 @@ import typer
 from p2os.cli.holding import hold_robot
 from p2os.cli.line_wait import LONGEST_WAIT_NS, wait_for_line
 from p2os.cli.signals import postponed
+from p2os.client import ClientSettings
 from p2os.commands import CommandNumber
 from p2os.errors import FileError, RemoteProtocolError, RunFailedError, TransportError, UsageError
 from p2os.timing import NS_PER_S, Nanos
@@ -39,6 +40,8 @@ Examples:
 """
 #: chosen: three times what clients wait for the answer to a SYNC.
 PATIENCE_NS: Nanos = 3 * NS_PER_S
+#: A robot that has said nothing for so long is lost, as it is to a client.
+SILENCE_NS: Nanos = ClientSettings().liveness_ns
 #: Speeds that are refused are mistakes.
 SLOWEST, FASTEST = 0.01, 100.0
 #: Commands that move a robot whose motors are on.
@@ -71,14 +74,14 @@ def play(
     """Play one side over a line until all was said; leave a robot standing and closed.
 
     Raises:
-        RemoteProtocolError: As the client: the robot does not answer the handshake.
+        RemoteProtocolError: As the client: the robot does not answer the handshake, or has fallen silent.
         RunFailedError: As the client: this program or its machine paused.
         TransportError: The line was lost.
     """
     tap, is_client = Tap(), role is Direction.TO_ROBOT
     try:
         replay.start(clock())
-        gaps = GapWatch(clock())
+        gaps, heard_at = GapWatch(clock()), None
         while replay.frames_left:
             now = clock()
             if (gap_ns := gaps.gap(now)) and is_client:
@@ -92,8 +95,13 @@ def play(
                     f"{transport.description} does not give {replay.awaited}, as in the recording",
                     hint="is a robot behind it? (p2os info URL)",
                 )
+            if is_client and heard_at is not None and now - heard_at > SILENCE_NS:
+                raise RemoteProtocolError(
+                    f"no packet for {(now - heard_at) / NS_PER_S:.1f} s", hint="is the robot on, and the cable in?"
+                )
             wait_for_line(transport, replay.next_deadline(), now, gaps)
             data, now = transport.read(), clock()
+            heard_at = now if data else heard_at
             tap.hear(role.opposite, data, now)
             replay.receive(data, now)
     finally:

@@ -41,9 +41,9 @@ CLOSING_S = 2.0
 HANDOVER_S = 0.2
 #: chosen: how often a closing program looks whether that is done.
 LOOK_S = 0.002
-#: chosen: who cannot have the lock for so long goes on without: a program that was interrupted inside of Python's own
-#: `threading` can leave it locked for ever.
-LOCK_S = 1.0
+#: chosen: an ending that cannot have the lock in a second goes on without: a program that was interrupted inside of
+#: Python's own `threading` can leave it locked for ever. Several tries: one can run out while the process is stopped.
+LOCK_TRIES, LOCK_S = 5, 0.2
 #: How many notices wait for a slow reader.
 MOST_NOTICES = 1000
 #: A waiting program is known to live: it is asked so often.
@@ -187,7 +187,9 @@ class Engine:
 
     @contextlib.contextmanager
     def _locked(self) -> Iterator[None]:
-        has_lock = self._lock.acquire(timeout=LOCK_S)
+        has_lock, tries = self._lock.acquire(timeout=LOCK_S), 1
+        while not (has_lock or (self._is_ending and tries >= LOCK_TRIES)):
+            has_lock, tries = self._lock.acquire(timeout=LOCK_S), tries + 1
         try:
             yield
         finally:

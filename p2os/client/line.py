@@ -20,7 +20,7 @@ from p2os.commands import Command, CommandNumber, enable, stop, vel
 from p2os.errors import P2osError, TransportError
 from p2os.timing import NS_PER_S, Nanos
 from p2os.transport.ports import Transport
-from p2os.transport.wall_clock import Clock, GapWatch, wall_clock
+from p2os.transport.wall_clock import GAP_NS, Clock, GapWatch, wall_clock
 
 #: chosen: more reads a turn than any line fills between two wakes; a flood must not starve the clock.
 MOST_READS = 16
@@ -100,8 +100,8 @@ class Line:
         self._turned_at = now
 
     def write(self, now: Nanos) -> None:
-        """Carry out the actions that are due."""
-        while (action := self.core.take_action(now)) is not None:
+        """Carry out the actions that are due; none where a gap has begun since the last look: they are old then."""
+        while not self._is_stale() and (action := self.core.take_action(now)) is not None:
             match action:
                 case OpenLine():
                     self.is_wanted = True
@@ -140,6 +140,12 @@ class Line:
         with contextlib.suppress(Exception):  # an interrupt can have left it in any state
             self.core.close(self._looked_at - self._left_out)
         self._close()
+
+    def _is_stale(self) -> bool:
+        if self.core.link is not Link.OPEN or self._clock() - self._looked_at <= GAP_NS:
+            return False
+        self._watch.expect(self._looked_at)  # the next look tells the gap
+        return True
 
     def _take_gap(self, gap_ns: Nanos) -> None:
         if self.core.link is not Link.OPEN:

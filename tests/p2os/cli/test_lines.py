@@ -267,6 +267,30 @@ def test_a_replay_that_has_paused_stops_the_robot() -> None:
     assert line.heard == VEL_200 + STOP_FIRST
 
 
+@pytest.mark.usefixtures("no_waiting")
+@pytest.mark.parametrize(("silence_ms", "goes_on"), [(1000, True), (1001, False)])
+def test_a_replay_to_a_robot_that_has_fallen_silent_stops_it_and_ends(silence_ms: int, goes_on: bool) -> None:
+    drive = capture_of([(0, TO, VEL_200), (1_100_000_000, TO, Command(0).to_frame().to_bytes())])
+    line, now = Line(SIP), [0]
+
+    def read() -> bytes:
+        if line.says:
+            return Line.read(line)
+        now[0] = min(now[0] + 90_000_000, silence_ms * 1_000_000)
+        if now[0] == silence_ms * 1_000_000 and goes_on:
+            now[0] = 1_100_000_000
+            return SIP
+        return b""
+
+    line.read = read  # type: ignore[method-assign]
+    if goes_on:
+        play(Replay(drive, TO), line, TO, clock=lambda: now[0])
+    else:
+        with pytest.raises(RemoteProtocolError, match=r"no packet for 1\.0 s"):
+            play(Replay(drive, TO), line, TO, clock=lambda: now[0])
+    assert line.heard.endswith(STOP_FIRST)
+
+
 @pytest.mark.skipif(not Path("/dev/full").exists(), reason="this system has no full disk at hand")
 def test_a_disk_that_is_full_is_named(served: object, run: Run, capsys: Capture) -> None:
     for words in (["record", served.url, "--out", "/dev/full"], ["sniff", served.url, "--listen", "tcp:127.0.0.1:0",

@@ -191,6 +191,30 @@ def test_a_call_after_a_gap_stops_the_robot_before_it_does_anything() -> None:
     assert vel(300) not in bench.said
 
 
+def test_a_machine_that_sleeps_in_the_middle_of_a_turn_sends_nothing_old() -> None:
+    bench = Bench()
+    bench.drive()
+    bench.core.set_velocity(0.4, 0.0, bench.line.now())
+    slept: list[Nanos] = []
+    advance = bench.core.advance_to
+
+    def sleep_then(limit: Nanos) -> object:
+        reached = advance(limit)
+        if not slept:
+            slept.append(limit)
+            bench.pass_by(2 * NS_PER_S)
+        return reached
+
+    bench.core.advance_to = sleep_then  # type: ignore[method-assign,assignment]  # between the look and the writing
+    bench.turn()
+    assert slept
+    assert bench.said == []
+    bench.line.wait_s()
+    bench.turn()
+    assert bench.said[0] == stop()
+    assert vel(400) not in bench.said
+
+
 def test_a_gap_ends_a_drive() -> None:
     bench = Bench()
     goal = bench.core.begin_goal(DriveAxis(4.0), None, None, bench.line.now())

@@ -1,0 +1,31 @@
+"""The table of `tools/measure_stops.py`, a few rows of it: real processes, a real line, a suspend."""
+
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parent.parent
+EVENTS = ("SIGTERM", "SIGINT x 20", "SIGKILL", "suspend 1 s", "suspend 3 s", "line cut 3 s", "output blocked, SIGINT")
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(os.name != "posix", reason="signals are Unix's")
+def test_a_robot_stands_whatever_happens_to_its_driver() -> None:
+    ways = ("Robot", "asyncio Robot", "drive --vel", "run --port")
+    words = [word for way in ways for word in ("--way", way)] + [
+        word for event in EVENTS for word in ("--event", event)
+    ]
+    done = subprocess.run(
+        [sys.executable, "tools/measure_stops.py", "--json", *words],
+        cwd=ROOT, capture_output=True, text=True, timeout=300, check=False,
+    )  # fmt: skip
+    rows = [json.loads(line) for line in done.stdout.splitlines()]
+    assert len(rows) == len(ways) * len(EVENTS), done.stderr
+    assert [row for row in rows if row["problem"] or row["moves_again"]] == []
+    told = [row["stop_ms"] for row in rows if row["event"] in {"SIGTERM", "suspend 1 s", "output blocked, SIGINT"}]
+    assert max(told) < 500
+    assert done.returncode == 0
