@@ -10,7 +10,7 @@ BIN    := $(VENV)/bin
 STAMP  := $(VENV)/.set-up
 JOBS   ?= 2
 # What is built with the package: set up again when it has changed.
-COMPILED := $(wildcard bluepill_sim/native/*) $(shell find adapter_fw/core adapter_fw/capi -type f)
+COMPILED := $(wildcard bluepill_sim/native/source/*) $(shell find adapter_fw/core adapter_fw/capi -type f)
 
 .PHONY: setup demo test lint type unit bench soak clean firmware board board-check board-tools
 
@@ -56,7 +56,7 @@ soak: setup
 
 # Rebuilds the example firmware (needs gcc-arm-none-eabi); `make test` compares.
 firmware: setup
-	$(BIN)/python testbench/firmware/build.py
+	$(BIN)/python robot_bench/firmware/build.py
 
 # The adapter board: `make board` writes every file anew from the design, then checks them; `make board-check` only
 # checks. KiCad 9 and ngspice are installed where apt and root allow it; what is missing is skipped aloud, or fails

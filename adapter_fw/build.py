@@ -25,7 +25,7 @@ from functools import cache
 from pathlib import Path
 
 HERE = Path(__file__).resolve().parent
-BLUEPILL = HERE.parent / "testbench" / "firmware"
+BLUEPILL = HERE.parent / "robot_bench" / "firmware"
 SELFTEST = HERE / "selftest"
 #: Objects by what they were made of; deleting the folder costs a minute.
 OBJECTS = HERE / "build" / "objects"

@@ -4,17 +4,14 @@ It knows the pin-out (pinout.toml), the robot's parameters and the protocol, but
 neither the chip nor the world: it meets them at wires.
 """
 
-from adapter_sim.adapter import Adapter
+from adapter_sim.adapter import Adapter, AdapterState, AdapterStatus
 from adapter_sim.codec import BitOrder, encoder_code, is_near, motor_code, motor_value
 from adapter_sim.distances import threshold_um
-from adapter_sim.faults import BrownOut, FaultyPins, Glitch, StuckPin
-from adapter_sim.gamepad import Gamepad, Master, PadReport
-from adapter_sim.mixing import Mixer, Speeds
+from adapter_sim.faults import BrownOut, FaultyPins, Glitch, SlowLoop, StuckPin
+from adapter_sim.mixing import Gamepad, Master, Mixer, PadReport, Speeds
 from adapter_sim.pinout import Pinout, PinoutError, load_pinout, parse_pinout
-from adapter_sim.ports import EventCallback, PinBank
+from adapter_sim.pins import EventCallback, PinBank
 from adapter_sim.settings import AdapterSettings, EncoderAtOpen, MotorMeaning
-from adapter_sim.slow_loop import SlowLoop
-from adapter_sim.states import AdapterState, AdapterStatus
 from adapter_sim.waveforms import Waveforms
 
 __all__ = [

@@ -1,37 +1,139 @@
 """The ESP32 adapter between a BluePill's pins and a Pioneer's P2OS line.
 
 It is a client of the robot, driven by pins or by a game pad, never by both. The
-states and their table stand in states.py; here is what happens in them. The
-firmware in adapter_fw/core is its twin, byte for byte and edge for edge.
+states and their table stand below. The firmware in adapter_fw/core is its twin, byte for byte and edge for edge.
 
 Not modelled: the ESP32 itself, the time that its program needs, analog levels.
 
 Invariant: within one instant the order is fixed: reset wire, boot, connection,
-sample, pad, loss, belief, distances, encoders, speeds, stops. A change of rst is seen
+sample, pad, loss, plausibility, distances, encoders, speeds, stops. A change of rst is seen
 at the end of a slice, where the bench's watched nets put it, and at each sample.
+
+The adapter's states and when it leaves them.
+
+Theory of operation
+-------------------
+The adapter is a client of the robot, driven by pins. It samples its inputs at
+fixed instants (`sample_period_ns` apart, counted from the end of its boot), and
+its state moves only there, at its own deadlines, and when bytes arrive:
+
+    RESET       rst is high: outputs released to their pulls, nothing runs
+    BOOTING     rst fell (or power came): released still, for `boot_ns`
+    IDLE        outputs safe, waits for its master's connect request: p2dx_con, or the pad's Up
+    CONNECTING  the P2OS connection is being made; outputs safe
+    SETTLING    OPEN: SETO and SONAR 1 sent, waits for odometry zero; distances live
+    DRIVING     ENABLE 1 sent; motor values become VEL and RVEL; all live
+    CLOSING     the connect request ended: STOP, VEL 0, RVEL 0, CLOSE sent; lasts `stop_repeat_ns`
+    LOST        no SIP, implausible motion, no pad, a shutdown: the same four sent; waits for the connect request to end
+
+    from         rst high  boot over  requested      withdrawn     opened    odometry 0      ended or not
+                                                                             or settle_ns    believed
+    RESET        ·         ·          ·              ·             ·         ·               ·
+    BOOTING      RESET     IDLE       ·              ·             ·         ·               ·
+    IDLE         RESET     ·          CONNECTING     ·             ·         ·               ·
+    CONNECTING   RESET     ·          ·              CLOSING       SETTLING  ·               tries again
+    SETTLING     RESET     ·          ·              CLOSING       ·         DRIVING         LOST
+    DRIVING      RESET     ·          ·              CLOSING       ·         ·               LOST
+    CLOSING      RESET     ·          ·              ·             ·         ·               ·
+    LOST         RESET     ·          ·              ·             IDLE      ·               ·
+
+RESET leaves to BOOTING when rst is low, CLOSING to IDLE when its time is over.
+From LOST the way to motion leads over a new connect request (p2dx_con low and high again, or
+Up), whatever the robot does meanwhile. A change of masters leads to LOST too.
+
+Any packet revives the last speed of a robot that its watchdog has stopped. So
+the first frames after a loss are STOP, VEL 0, RVEL 0, and the same three stand
+before every SYNC0 and go out after a boot: the adapter cannot know what the
+robot was doing before.
+
+Invariant: of the outputs, only SETTLING and DRIVING show what the robot reports.
 """
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
+from enum import StrEnum
 from typing import Any, cast
 
 from adapter_sim.distances import Distances, threshold_um
 from adapter_sim.driver import Driver
-from adapter_sim.gamepad import Master, PadReport
-from adapter_sim.inputs import Inputs
+from adapter_sim.encoders import WheelCodes
 from adapter_sim.masters import Masters
-from adapter_sim.outputs import Outputs
-from adapter_sim.pinout import Pinout, Role
-from adapter_sim.ports import EventCallback, PinBank
-from adapter_sim.sample_clock import SampleClock
-from adapter_sim.session import Session, SessionOpened
+from adapter_sim.mixing import Master, PadReport, Speeds
+from adapter_sim.pinout import Pinout, WireRole
+from adapter_sim.pins import EventCallback, Inputs, Outputs, PinBank, SampleClock
+from adapter_sim.session import Session, SessionOpened, StopRepeater
 from adapter_sim.settings import AdapterSettings
-from adapter_sim.states import AWAKE_STATES, NEVER, OPEN_STATES, STOPPING_STATES, AdapterState, AdapterStatus, Agenda
-from adapter_sim.stopper import Stopper
-from adapter_sim.wheel_codes import WheelCodes
-from p2os.commands import set_origin, sonar
-from p2os.parameters import RobotParameters
-from p2os.sip import StandardSip
+from p2os.protocol.commands import set_origin, sonar
+from p2os.protocol.sip import StandardSip
+from p2os.robots.parameters import RobotParameters
 from p2os.timing import NS_PER_S, Nanos, Reached
+
+
+class AdapterState(StrEnum):
+    """What the adapter is doing; see the theory of operation."""
+
+    RESET = "reset"
+    BOOTING = "booting"
+    IDLE = "idle"
+    CONNECTING = "connecting"
+    SETTLING = "settling"
+    DRIVING = "driving"
+    CLOSING = "closing"
+    LOST = "lost"
+
+
+#: States in which the robot's session is open.
+OPEN_STATES = frozenset({AdapterState.SETTLING, AdapterState.DRIVING})
+#: States in which bytes are listened to and inputs are sampled.
+AWAKE_STATES = frozenset(AdapterState) - {AdapterState.RESET, AdapterState.BOOTING}
+#: States in which the stop sequence is repeated.
+STOPPING_STATES = frozenset({AdapterState.CLOSING, AdapterState.LOST, AdapterState.IDLE})
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class AdapterStatus:
+    """What the adapter knows at this moment, for people and tests."""
+
+    state: AdapterState
+    #: Why the state is what it is.
+    reason: str
+    #: Motor values taken, motor1 first.
+    motors: tuple[int, int]
+    #: Speeds of the last pair sent.
+    speeds: Speeds
+    #: Level of each distance wire, wire 1 first.
+    distances: tuple[bool, ...]
+    #: Last range of each sonar in µm, None where unknown.
+    ranges_um: tuple[int | None, ...]
+    #: Encoder steps since OPEN, (left, right), and those on the pins.
+    counts: tuple[int, int]
+    counts_shown: tuple[int, int]
+    #: SIPs taken and odometry jumps since the boot.
+    sips: int
+    odometry_jumps: int
+
+
+#: Later than any deadline.
+NEVER: Nanos = 1 << 62
+
+
+@dataclass(slots=True, kw_only=True)
+class Agenda:
+    """What the adapter has set out to do, and when; a reset wipes it."""
+
+    #: End of the boot.
+    boot_at: Nanos = NEVER
+    #: Next try to connect, or end of CLOSING.
+    retry_at: Nanos = NEVER
+    #: The session is lost unless a SIP comes before.
+    sip_deadline: Nanos = NEVER
+    #: From here on the odometry is taken as it is.
+    settle_at: Nanos = NEVER
+    #: SONAR 1 is said again unless a reading comes before.
+    sonar_at: Nanos = NEVER
+    #: Stall flags of the last SIP.
+    stalled: tuple[bool, bool] = (False, False)
+    #: SIPs taken.
+    sips: int = 0
 
 
 class Adapter:
@@ -65,7 +167,7 @@ class Adapter:
         self.samples = SampleClock(settings.sample_period_ns)
         self._driver = Driver(settings, parameters)
         self.distances = Distances(
-            len(pinout.with_role(Role.DISTANCE)),
+            len(pinout.with_role(WireRole.DISTANCE)),
             threshold_um=threshold_um(settings.threshold_um, parameters),
             stale_ns=settings.distance_stale_ns,
         )
@@ -74,7 +176,7 @@ class Adapter:
         self.outputs = Outputs(pins, pinout)
         self.inputs = Inputs(pins, pinout, settings)
         self._masters = Masters(self.inputs, self._driver.mixer, settings, master)
-        self._stopper = Stopper(settings)
+        self._stop_repeater = StopRepeater(settings)
         self._baud_place = 0
         self._now = now
         #: The earliest deadline, and the earliest that is no sample.
@@ -122,7 +224,7 @@ class Adapter:
         self._run(now - 1)
         if self._state in AWAKE_STATES:
             self._now = now
-            self._stopper.hear(now)
+            self._stop_repeater.hear(now)
             self.session.receive(data, now)
             self._take_session_events(now)
             self._replan()
@@ -131,16 +233,16 @@ class Adapter:
         """Take a pad's report that came at `now`; without effect on the robot while the BluePill is master."""
         self._run(now - 1)
         self._now = max(self._now, now)
-        has_wish_ended = self._masters.take_pad(report, now)
+        has_request_ended = self._masters.take_pad(report, now)
         if self._state in AWAKE_STATES:
-            if has_wish_ended:
-                self._end_wish("Down was pressed", now)
+            if has_request_ended:
+                self._end_request("Down was pressed", now)
             if self._state is AdapterState.DRIVING:
                 self._driver.want(self._masters.speeds)
         self._replan()
 
     def set_master(self, master: Master, now: Nanos) -> None:
-        """Give the robot to another master: it is stopped and closed first, and only a new wish starts it."""
+        """Give the robot to another master: it is stopped and closed; only a new connect request starts it."""
         self._run(now - 1)
         if master is self._masters.master:
             return
@@ -150,11 +252,11 @@ class Adapter:
         self._masters.switch(master)
         self._tell(now, "master", master.value)
         if self._state in AWAKE_STATES:
-            self._enter(AdapterState.LOST, now, "master", "waits for the new master's wish, given anew")
+            self._enter(AdapterState.LOST, now, "master", "waits for a new connect request of the new master")
         self._replan()
 
     def shutdown(self, reason: str, now: Nanos) -> None:
-        """Stop the robot, drive every output to its safe level, and wait for the wish to end."""
+        """Stop the robot, drive every output to its safe level, and wait for the connect request to end."""
         self._run(now - 1)
         self._now = max(self._now, now)
         if self._state in AWAKE_STATES:
@@ -188,7 +290,7 @@ class Adapter:
             "adapter": (self._state.value, self._reason, self._now, self.samples.next, self._baud_place),
             "agenda": replace(self._agenda),
             "masters": self._masters.snapshot(),
-            "stopper": self._stopper.snapshot(),
+            "stop_repeater": self._stop_repeater.snapshot(),
             "driver": self._driver.snapshot(),
             "distances": self.distances.snapshot(),
             "codes": self._codes.snapshot(),
@@ -204,7 +306,7 @@ class Adapter:
         self._agenda = replace(parts["agenda"])
         self.samples.is_asleep = False
         self._masters.restore(parts["masters"])
-        self._stopper.restore(parts["stopper"])
+        self._stop_repeater.restore(parts["stop_repeater"])
         self._driver.restore(parts["driver"])
         self.distances.restore(parts["distances"])
         self._codes.restore(parts["codes"])
@@ -229,9 +331,9 @@ class Adapter:
 
     @property
     def _is_restless(self) -> bool:
-        """Tell whether the state is left at the next sample even if the pins stand still: a pad's wish came or went."""
-        left_by_wish = {AdapterState.IDLE: True, AdapterState.LOST: False}
-        return left_by_wish.get(self._state) is self._masters.wants_robot
+        """Tell whether the state is left at the next sample by a pad's connect request alone."""
+        left_by_request = {AdapterState.IDLE: True, AdapterState.LOST: False}
+        return left_by_request.get(self._state) is self._masters.wants_robot
 
     def _act(self, now: Nanos) -> None:
         """Do all that is due at `now`, in the fixed order."""
@@ -260,11 +362,11 @@ class Adapter:
         if self._state in OPEN_STATES:
             self._run_open(now)
         if self._state in STOPPING_STATES:
-            self._stopper.repeat(self.session, now)
+            self._stop_repeater.repeat(self.session, now)
         if self._state is AdapterState.CLOSING and now >= self._agenda.retry_at:
             self._enter(AdapterState.IDLE, now, "idle", "closed")
         if self._state is AdapterState.IDLE and self._masters.wants_robot:
-            self._begin_session(now, self._masters.wish)
+            self._begin_session(now, self._masters.connect_request)
         if self._state is AdapterState.CONNECTING and now >= self._agenda.retry_at:
             self._begin_session(now, "trying again")
 
@@ -272,8 +374,8 @@ class Adapter:
         if now >= self._agenda.sip_deadline:
             self._lose(now, "lost", "no SIP in time")
             return
-        if self._state is AdapterState.DRIVING and now >= self._driver.belief.ends_at:
-            self._lose(now, "disbelief", self._driver.belief.describe())
+        if self._state is AdapterState.DRIVING and now >= self._driver.plausibility.ends_at:
+            self._lose(now, "implausible", self._driver.plausibility.describe())
             return
         expires_at = self.distances.expires_at
         if expires_at is not None and now >= expires_at:
@@ -300,9 +402,9 @@ class Adapter:
             times += [self._agenda.sip_deadline, self._agenda.sonar_at, self.distances.expires_at]
             times += self._codes.due_at(self._now)
         if state is AdapterState.DRIVING:
-            times += [self._driver.belief.ends_at, self._driver.pair_due_at(self._now)]
+            times += [self._driver.plausibility.ends_at, self._driver.pair_due_at(self._now)]
         if state in STOPPING_STATES:
-            times.append(self._stopper.due_at)
+            times.append(self._stop_repeater.due_at)
         if state in {AdapterState.CLOSING, AdapterState.CONNECTING}:
             times.append(self._agenda.retry_at)
         self._other = min((time for time in times if time is not None), default=NEVER)
@@ -311,7 +413,7 @@ class Adapter:
     def _clear(self) -> None:
         """Forget everything, as a reset does."""
         self._agenda = Agenda()
-        self._stopper.reset()
+        self._stop_repeater.reset()
         self.samples.next = self._now
         self._masters.reset()
         self._driver.reset(self._now)
@@ -337,10 +439,10 @@ class Adapter:
         self.outputs.show_encoders((0, 0), now)
         self.session.stop_unknown()
         self.samples.next = now
-        self._enter(AdapterState.IDLE, now, "booted", "waits for its master's wish")
+        self._enter(AdapterState.IDLE, now, "booted", "waits for its master's connect request")
 
     def _begin_session(self, now: Nanos, why: str) -> None:
-        self._stopper.cancel()
+        self._stop_repeater.cancel()
         self._agenda.retry_at = NEVER
         self.session.connect(now)
         self._enter(AdapterState.CONNECTING, now, "connecting", why)
@@ -377,7 +479,7 @@ class Adapter:
         if self._state not in OPEN_STATES:
             return
         self._agenda.sips += 1
-        self._agenda.sip_deadline = max(now, self._stopper.heard_at + self.settings.liveness_ns)
+        self._agenda.sip_deadline = max(now, self._stop_repeater.heard_at + self.settings.liveness_ns)
         for reading in sip.sonar:
             self.distances.take(reading.number, reading.raw_range * self.parameters.range_um_per_count, now)
         if sip.sonar:
@@ -402,24 +504,24 @@ class Adapter:
 
     def _lose(self, now: Nanos, what: str, why: str) -> None:
         self._halt(now)
-        self._masters.forget_wish()
-        self._enter(AdapterState.LOST, now, what, f"{why}; stopped until its master's wish is given anew")
+        self._masters.forget_request()
+        self._enter(AdapterState.LOST, now, what, f"{why}; stopped until its master asks for a connection anew")
 
     def _lose_pad(self, now: Nanos) -> None:
         if self._masters.lose_pad() and (self._state is AdapterState.CONNECTING or self._state in OPEN_STATES):
             self._lose(now, "pad lost", "no report of the pad in time")
 
-    def _end_wish(self, why: str, now: Nanos) -> None:
+    def _end_request(self, why: str, now: Nanos) -> None:
         """Leave the robot, which the master no longer wants."""
         if self._state is AdapterState.CONNECTING or self._state in OPEN_STATES:
             self._halt(now)
-            self._stopper.end_in_peace()
+            self._stop_repeater.end_in_peace()
             self._agenda.retry_at = now + self.settings.stop_repeat_ns
             self._enter(AdapterState.CLOSING, now, "disconnected", why)
 
     def _halt(self, now: Nanos) -> None:
         """Stop and close the robot, and show what is known: nothing."""
-        self._stopper.begin(self.session, now)
+        self._stop_repeater.begin(self.session, now)
         self.distances.forget()
         self._driver.stop()
         self.outputs.show_safe(now)
@@ -434,11 +536,11 @@ class Adapter:
             self.on_event(now, what, detail)
 
     def _sample(self, now: Nanos) -> None:
-        have_speeds_changed, has_wish_ended = self._masters.sample(now)
+        have_speeds_changed, has_request_ended = self._masters.sample(now)
         if have_speeds_changed and self._state is AdapterState.DRIVING:
             self._driver.want(self._masters.speeds)
-        if has_wish_ended:
-            self._end_wish("p2dx_con is low", now)
+        if has_request_ended:
+            self._end_request("p2dx_con is low", now)
         if self._state is AdapterState.LOST and not self._masters.wants_robot:
             self._enter(AdapterState.IDLE, now, "idle", "ready for a new connection")
 

@@ -7,7 +7,7 @@ where there is none or it has gone stale: what is not known is an obstacle.
 from typing import TypeAlias
 
 from adapter_sim.codec import is_near
-from p2os.parameters import RobotParameters
+from p2os.robots.parameters import RobotParameters
 from p2os.timing import Nanos
 
 #: Range in µm and time of each reading, None where there is none.

@@ -7,16 +7,26 @@ model and for the firmware's core alike.
 Not here: faults of the serial line (the bench's own), noise in volts.
 
 Invariant: without faults it passes everything on as it is.
+
+An adapter whose program is slow: it looks and acts only every so often.
+
+Theory of operation. The model's own loop takes no time. Here a pass begins each
+`pass_ns`; bytes that come in between wait in the UART, pins are read as they stand
+when the pass begins, and everything that was due since the last pass happens now:
+hardware can only answer for the present.
+
+Invariant: nothing leaves, and no pin changes, between two passes.
 """
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
-from typing import TypeAlias
+from typing import Protocol, TypeAlias
 
-from adapter_sim.pinout import Direction, Pinout, Role
-from adapter_sim.ports import PinBank
+from adapter_sim.adapter import AdapterState, AdapterStatus
+from adapter_sim.pinout import Direction, Pinout, WireRole
+from adapter_sim.pins import PinBank
 from p2os.errors import UsageError
-from p2os.timing import NS_PER_MS, Nanos
+from p2os.timing import NS_PER_MS, Nanos, Reached
 
 #: The detector resets the chip however short the dip; a reset is looked for every sample, so this long it lasts here.
 LEAST_BROWN_OUT_NS: Nanos = 4 * NS_PER_MS
@@ -69,7 +79,7 @@ class FaultyPins:
 
     def __init__(self, pins: PinBank, pinout: Pinout, faults: Iterable[Fault]) -> None:
         self._pins = pins
-        self._reset = pinout.with_role(Role.RESET)[0].name
+        self._reset = pinout.with_role(WireRole.RESET)[0].name
         self._glitches: dict[str, list[tuple[Nanos, Nanos]]] = {}
         self._brown_outs: list[tuple[Nanos, Nanos]] = []
         self._stuck: dict[str, list[StuckPin]] = {}
@@ -131,3 +141,104 @@ class FaultyPins:
         if level is not self._given[name]:
             self._given[name] = level
             self._pins.write(name, level, now)
+
+
+class AnyAdapter(Protocol):
+    """What a loop runs: the model, or the firmware's core in its place."""
+
+    @property
+    def state(self) -> AdapterState:
+        """Return what the adapter is doing."""
+        ...
+
+    @property
+    def status(self) -> AdapterStatus:
+        """Return what the adapter knows."""
+        ...
+
+    def receive(self, data: bytes, now: Nanos) -> None:
+        """Take bytes that the line has delivered at `now`."""
+        ...
+
+    def take_output(self) -> list[bytes]:
+        """Return the frames to send, and forget them."""
+        ...
+
+    def next_deadline(self) -> Nanos | None:
+        """Return when it next wants to act."""
+        ...
+
+    def advance_to(self, limit: Nanos) -> Reached:
+        """Act on everything due up to `limit`."""
+        ...
+
+
+class SlowLoop:
+    """A slow program around an adapter.
+
+    Args:
+        make: Makes the adapter with the pins that it is given.
+        pins: Its ends of the wires.
+        pass_ns: From the begin of a pass to the next one.
+        now: When power comes.
+
+    Raises:
+        UsageError: A pass that takes no time is no slow loop.
+    """
+
+    def __init__(self, make: Callable[[PinBank], AnyAdapter], pins: PinBank, pass_ns: Nanos, now: Nanos = 0) -> None:
+        if pass_ns <= 0:
+            raise UsageError(f"a pass of {pass_ns} ns is no slow loop", hint="use the adapter itself")
+        self._pins = _PresentPins(pins, now)
+        self.adapter = make(self._pins)
+        self._pass_ns = pass_ns
+        self._next_pass = now
+        self._waiting = bytearray()
+
+    @property
+    def state(self) -> AdapterState:
+        """Return what the adapter is doing."""
+        return self.adapter.state
+
+    @property
+    def status(self) -> AdapterStatus:
+        """Return what the adapter knows."""
+        return self.adapter.status
+
+    def receive(self, data: bytes, now: Nanos) -> None:
+        """Let bytes wait for the next pass."""
+        self.advance_to(now - 1)
+        self._waiting += data
+
+    def take_output(self) -> list[bytes]:
+        """Return the frames to send, and forget them."""
+        return self.adapter.take_output()
+
+    def next_deadline(self) -> Nanos:
+        """Return when the next pass begins."""
+        return self._next_pass
+
+    def advance_to(self, limit: Nanos) -> Reached:
+        """Do every pass up to and including `limit`."""
+        while self._next_pass <= limit:
+            now = self._pins.now = self._next_pass
+            if self._waiting:
+                self.adapter.receive(bytes(self._waiting), now)
+                self._waiting.clear()
+            self.adapter.advance_to(now)
+            self._next_pass = now + self._pass_ns
+        return Reached(limit)
+
+
+class _PresentPins:
+    """A pin bank that answers for the present only, whatever instant is meant."""
+
+    def __init__(self, pins: PinBank, now: Nanos) -> None:
+        self._pins = pins
+        self.now = now
+
+    def read(self, signal: str, at: Nanos) -> bool:  # noqa: ARG002 - what the hardware cannot do
+        return self._pins.read(signal, self.now)
+
+    def write(self, signal: str, high: bool | None, now: Nanos) -> None:  # noqa: ARG002
+        self._pins.write(signal, high, self.now)

@@ -6,9 +6,8 @@ stale after a change, but they move nothing.
 
 from typing import TypeAlias
 
-from adapter_sim.gamepad import Gamepad, GamepadSnapshot, Master, PadReport
-from adapter_sim.inputs import Inputs, InputSnapshot
-from adapter_sim.mixing import Mixer, Speeds
+from adapter_sim.mixing import Gamepad, GamepadSnapshot, Master, Mixer, PadReport, Speeds
+from adapter_sim.pins import Inputs, InputSnapshot
 from adapter_sim.settings import AdapterSettings
 from p2os.timing import Nanos
 
@@ -21,7 +20,7 @@ class Masters:
 
     Args:
         inputs: The BluePill's pins.
-        mixer: Turns either's wishes into speeds.
+        mixer: Turns what either asks for into speeds.
         settings: Dead zones and times of the pad.
         master: Who commands at first.
     """
@@ -45,18 +44,18 @@ class Masters:
         return self._mixer.mix(*self.inputs.motors)
 
     @property
-    def wish(self) -> str:
-        """Return how the master makes its wish known."""
+    def connect_request(self) -> str:
+        """Return how the master makes its connect request known."""
         return "Up was pressed" if self.master is Master.PAD else "p2dx_con is high"
 
     def sample(self, now: Nanos) -> tuple[bool, bool]:
-        """Sample the pins; tell whether the speeds asked for may have changed, and whether the wish has just ended."""
+        """Sample the pins; tell whether speeds may have changed, and whether the connect request has just ended."""
         motors_changed, connect_changed = self.inputs.sample(now)
         is_master = self.master is Master.BLUEPILL
         return is_master and motors_changed, is_master and connect_changed and not self.inputs.wants_robot
 
     def take_pad(self, report: PadReport, now: Nanos) -> bool:
-        """Take a report; tell whether it ended the wish."""
+        """Take a report; tell whether it ended the connect request."""
         wanted = self._pad.wants_robot
         self._pad.take(report, now)
         return self.master is Master.PAD and wanted and not self._pad.wants_robot
@@ -72,9 +71,9 @@ class Masters:
         self._pad.lose()
         return wanted
 
-    def forget_wish(self) -> None:
-        """Forget the pad's wish; p2dx_con keeps standing as it stands."""
-        self._pad.forget_wish()
+    def forget_request(self) -> None:
+        """Forget the pad's connect request; p2dx_con keeps standing as it stands."""
+        self._pad.forget_request()
 
     def switch(self, master: Master) -> None:
         """Listen to another master; the pad has to report anew."""

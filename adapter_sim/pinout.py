@@ -1,9 +1,15 @@
 """The pin-out, read from pinout.toml and checked.
 
-Not here: which pins of an ESP32 can do what (pin_rules.py).
-
 Invariant: a `Pinout` that exists names every wire once, gives every pin of the
 BluePill to one wire only, and has for each value all bits from 0 to width − 1.
+
+What an ESP32's pins can and cannot do, asked of a pin-out.
+
+Source: reference of the ESP32 D1 mini's pins as the board review found them:
+GPIO6..11 carry the module's flash, GPIO34..39 are inputs only, GPIO0, 2, 5, 12
+and 15 are straps that decide how the chip boots.
+
+Not here: series resistors, voltages, rise times (the board's own checks).
 """
 
 import re
@@ -31,7 +37,7 @@ class Direction(StrEnum):
     TO_ADAPTER = "to_adapter"
 
 
-class Role(StrEnum):
+class WireRole(StrEnum):
     """What a wire is for."""
 
     #: High: an obstacle nearer than the threshold.
@@ -76,7 +82,7 @@ class Wire:
     """One of the wires between BluePill and adapter."""
 
     name: str
-    role: Role
+    role: WireRole
     direction: Direction
     #: Pin of the BluePill, for example "PA4".
     bluepill: str
@@ -102,7 +108,7 @@ class Value:
     """A number carried by several wires."""
 
     name: str
-    role: Role
+    role: WireRole
     side: str
     width: int
     #: Names of its wires, least significant first.
@@ -147,7 +153,7 @@ class Pinout:
         """Return a value by its name; KeyError where there is none."""
         return {value.name: value for value in self.values}[name]
 
-    def with_role(self, role: Role) -> tuple[Wire, ...]:
+    def with_role(self, role: WireRole) -> tuple[Wire, ...]:
         """Return the wires of a role, in the order of the table."""
         return tuple(wire for wire in self.wires if wire.role is role)
 
@@ -208,18 +214,18 @@ _BLUEPILL_PIN = re.compile(r"P[A-C]([0-9]|1[0-5])")
 _ESP32_PIN = re.compile(r"IO([0-9]|[12][0-9]|3[0-9])|EN|HC595\.Q[A-H]")
 #: Who drives the wires of a role.
 _DRIVEN = {
-    Role.DISTANCE: Direction.TO_BLUEPILL,
-    Role.ENCODER: Direction.TO_BLUEPILL,
-    Role.MOTOR: Direction.TO_ADAPTER,
-    Role.CONNECT: Direction.TO_ADAPTER,
-    Role.RESET: Direction.TO_ADAPTER,
+    WireRole.DISTANCE: Direction.TO_BLUEPILL,
+    WireRole.ENCODER: Direction.TO_BLUEPILL,
+    WireRole.MOTOR: Direction.TO_ADAPTER,
+    WireRole.CONNECT: Direction.TO_ADAPTER,
+    WireRole.RESET: Direction.TO_ADAPTER,
 }
 #: Values that the adapter cannot do without, with their roles and sides.
 _NEEDED_VALUES = {
-    "encoder1": (Role.ENCODER, "left"),
-    "encoder2": (Role.ENCODER, "right"),
-    "motor1": (Role.MOTOR, "left"),
-    "motor2": (Role.MOTOR, "right"),
+    "encoder1": (WireRole.ENCODER, "left"),
+    "encoder2": (WireRole.ENCODER, "right"),
+    "motor1": (WireRole.MOTOR, "left"),
+    "motor2": (WireRole.MOTOR, "right"),
 }
 
 _Kind = TypeVar("_Kind", bound=StrEnum)
@@ -295,7 +301,7 @@ def _revision(row: _Row) -> Revision:
 
 
 def _wire(row: _Row, revisions: list[str]) -> Wire:
-    name, role = row.text("name"), row.choice("role", Role)
+    name, role = row.text("name"), row.choice("role", WireRole)
     pins = row.pins("esp32", revisions)
     missing = [revision for revision in revisions if revision not in pins]
     if missing:
@@ -312,7 +318,7 @@ def _wire(row: _Row, revisions: list[str]) -> Wire:
     safe = row.get("safe")
     if safe not in (0, 1, "hold") or isinstance(safe, bool):
         raise row.fault("safe", safe, '0, 1 or "hold"')
-    of_value = role in {Role.ENCODER, Role.MOTOR}
+    of_value = role in {WireRole.ENCODER, WireRole.MOTOR}
     result = Wire(
         name=name,
         role=role,
@@ -324,14 +330,14 @@ def _wire(row: _Row, revisions: list[str]) -> Wire:
         esp32=tuple((revision, None if pins[revision] == "NC" else pins[revision]) for revision in revisions),
         value=row.text("value") if of_value else None,
         bit=row.integer("bit") if of_value else None,
-        number=row.integer("number") if role is Role.DISTANCE else None,
+        number=row.integer("number") if role is WireRole.DISTANCE else None,
     )
     row.finish()
     return result
 
 
 def _value(row: _Row, wires: tuple[Wire, ...]) -> Value:
-    name, role, width = row.text("name"), row.choice("role", Role), row.integer("width")
+    name, role, width = row.text("name"), row.choice("role", WireRole), row.integer("width")
     own = sorted((wire for wire in wires if wire.value == name), key=lambda wire: wire.bit or 0)
     bits = [wire.bit for wire in own]
     if width < 1 or bits != list(range(width)):
@@ -367,19 +373,96 @@ def _refuse_twins(where: str, what: str, names: list[str]) -> None:
 
 
 def _check_roles(where: str, wires: tuple[Wire, ...], values: tuple[Value, ...]) -> None:
-    for role in (Role.CONNECT, Role.RESET):
+    for role in (WireRole.CONNECT, WireRole.RESET):
         count = sum(wire.role is role for wire in wires)
         if count != 1:
             raise PinoutError(f"{where}: {count} wires have the role {role.value!r}, expected 1")
-    numbers = [wire.number for wire in wires if wire.role is Role.DISTANCE]
+    numbers = [wire.number for wire in wires if wire.role is WireRole.DISTANCE]
     if numbers != list(range(1, len(numbers) + 1)):
         raise PinoutError(f"{where}: distance wires are numbered {numbers}, expected 1, 2, 3 ... in order")
     found = {value.name: (value.role, value.side) for value in values}
     if found != _NEEDED_VALUES:
         raise PinoutError(f"{where}: values are {sorted(found)}, expected {sorted(_NEEDED_VALUES)} with their sides")
-    widths = {value.width for value in values if value.role is Role.ENCODER}
+    widths = {value.width for value in values if value.role is WireRole.ENCODER}
     if len(widths) != 1:
         raise PinoutError(f"{where}: the encoders have {sorted(widths)} wires, expected as many each")
     stray = [wire.name for wire in wires if wire.value is not None and wire.value not in found]
     if stray:
         raise PinoutError(f"{where}: wire {stray[0]!r} belongs to no [[value]]")
+
+
+#: Pins of the module's own flash chip.
+FLASH_GPIO = frozenset(range(6, 12))
+#: Pins without an output driver.
+INPUT_ONLY_GPIO = frozenset(range(34, 40))
+#: Pins read at boot; a BluePill that drives one can keep the ESP32 from booting.
+STRAP_GPIO = frozenset({0, 2, 5, 12, 15})
+#: Pins of the second input register: read together, they are one atomic sample.
+SECOND_REGISTER_GPIO = frozenset(range(32, 40))
+
+
+def faults_of(pinout: Pinout, revision: str) -> list[str]:
+    """Return why a revision of the board cannot work, one line each, in the order of the table.
+
+    Raises:
+        KeyError: The pin-out has no such revision.
+    """
+    faults: list[str] = []
+    taken: dict[str, str] = {}
+    for wire in pinout.wires:
+        pin = wire.esp32_pin(revision)
+        faults += _wire_faults(wire, pin)
+        if pin is not None and pin in taken:
+            faults.append(f"{wire.name}: {pin} is {taken[pin]} already")
+        elif pin is not None:
+            taken[pin] = wire.name
+    for auxiliary in pinout.auxiliaries:
+        pin = dict(auxiliary.esp32).get(revision)
+        if pin is None:
+            continue
+        if pin in taken and taken[pin] != auxiliary.shares:
+            faults.append(f"{auxiliary.name}: {pin} is {taken[pin]} already")
+        taken.setdefault(pin, auxiliary.name)
+    motors = [_gpio(wire.esp32_pin(revision)) for wire in pinout.with_role(WireRole.MOTOR)]
+    if any(gpio not in SECOND_REGISTER_GPIO for gpio in motors):
+        faults.append("motor wires: not all in IO32..IO39, so no one read samples them at one instant")
+    return faults
+
+
+def require_usable(pinout: Pinout, revision: str) -> None:
+    """Refuse a revision that cannot work.
+
+    Raises:
+        PinoutError: It does not exist, or has faults; the message has the first, the hint the number.
+    """
+    known = {entry.name: entry for entry in pinout.revisions}
+    if revision not in known:
+        raise PinoutError(f"board revision {revision!r} is unknown", hint="one of " + ", ".join(known))
+    faults = faults_of(pinout, revision)
+    if not faults and known[revision].status is Status.FAULTY:
+        faults = [known[revision].note]
+    if faults:
+        raise PinoutError(
+            f"board revision {revision!r} cannot work: {faults[0]}",
+            hint=f"{len(faults)} such faults; {pinout.default_revision} has none",
+        )
+
+
+def _wire_faults(wire: Wire, pin: str | None) -> list[str]:
+    if pin is None:
+        return [f"{wire.name}: no pin of the ESP32"]
+    gpio = _gpio(pin)
+    if gpio is None:
+        return []
+    faults = []
+    if gpio in FLASH_GPIO:
+        faults.append(f"{wire.name}: {pin} carries the module's flash")
+    if wire.direction is Direction.TO_BLUEPILL and gpio in INPUT_ONLY_GPIO:
+        faults.append(f"{wire.name}: {pin} is an input only, but must be driven")
+    if wire.direction is Direction.TO_ADAPTER and gpio in STRAP_GPIO:
+        faults.append(f"{wire.name}: {pin} is a boot strap, but the BluePill drives it")
+    return faults
+
+
+def _gpio(pin: str | None) -> int | None:
+    return int(pin[2:]) if pin is not None and pin.startswith("IO") else None

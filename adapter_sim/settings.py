@@ -77,11 +77,11 @@ class AdapterSettings:
     #: After a connection that failed, the next try begins this much later.
     retry_ns: Nanos = 1 * NS_PER_S
     #: SIP speeds that neither approach the command nor come with a stall flag for this long.
-    disbelief_ns: Nanos = 1 * NS_PER_S
+    plausibility_ns: Nanos = 1 * NS_PER_S
     #: A wheel within this of its command is believed. # chosen: over half a step of 62.5 mm/s
-    disbelief_tolerance_mm_s: int = 40
+    plausibility_tolerance_mm_s: int = 40
     #: Coming nearer by this much counts as approaching. # chosen: above the jitter of a wheel at rest
-    disbelief_progress_mm_s: int = 5
+    plausibility_progress_mm_s: int = 5
     #: A distance older than this is unknown. # chosen: two rounds of eight sonar at two a SIP, and two lost SIPs
     distance_stale_ns: Nanos = 1 * NS_PER_S
     #: How long the odometry may take to read zero after SETO, before it is taken as it is.
@@ -166,7 +166,7 @@ _MAY_BE_ZERO = frozenset(
     {
         "connect_after_ns", "disconnect_after_ns", "boot_ns", "encoder_dwell_ns", "stop_repeats",
         "max_velocity_mm_s", "max_rotation_deg_s", "step_um_per_s", "angular_step_urad_per_s",
-        "threshold_um", "disbelief_tolerance_mm_s", "pad_velocity_mm_s", "pad_rotation_mrad_s", "pad_trigger_dead",
+        "threshold_um", "plausibility_tolerance_mm_s", "pad_velocity_mm_s", "pad_rotation_mrad_s", "pad_trigger_dead",
         "pad_stick_dead",
     }
 )  # fmt: skip

@@ -8,7 +8,7 @@ seen), outputs the instants at which it drove.
 from bisect import bisect_right
 from collections.abc import Sequence
 
-from adapter_sim.ports import PinBank
+from adapter_sim.pins import PinBank
 from p2os.errors import UsageError
 from p2os.timing import NS_PER_MS, Nanos
 

@@ -1,13 +1,12 @@
 """An emulated STM32F103 on its BluePill board; knows nothing of robots or P2OS."""
 
-from bluepill_sim.board import BluePill, BoardSnapshot
+from bluepill_sim.board import BluePill, BoardSnapshot, WaitError
+from bluepill_sim.core.faults import FaultKind, FaultReport
 from bluepill_sim.errors import BluePillError, ImageError, MissingDependencyError, UnmodelledError
-from bluepill_sim.faults import FaultKind, FaultReport
-from bluepill_sim.image import Image, Symbol, SymbolTable, load_image
-from bluepill_sim.pins import Pin, PinDrive
+from bluepill_sim.fabric.pins import Pin, PinDrive
+from bluepill_sim.program.image import Image, Symbol, SymbolTable, load_image
 from bluepill_sim.serial_port import Activity, SerialPort
 from bluepill_sim.timing import Nanos, Reached, Reason
-from bluepill_sim.waiting import WaitError
 
 __all__ = [
     "Activity",

@@ -1,33 +1,40 @@
 """The whole chip: core, memories, bus and peripherals, brought forward together.
 
-Theory of operation. At each block border: peripherals and SysTick act on what
+Theory of operation. At each block boundary: peripherals and SysTick act on what
 is due, a requested reset is done, then the core goes on to the earliest of the
 limit and the next deadline. A peripheral that moves a deadline or an interrupt
-line inside an access ends the core's slice at the border of the running block,
+line inside an access ends the core's slice at the boundary of the running block,
 so that what happens never depends on where the caller's slices end.
 
 This is not the board: pins are handed out and images are loaded by `board.py`.
 
 Invariant: time never goes back; `now_ns` inside a peripheral's access is the
 time of the accessing instruction.
+
+The bus between the core and the peripherals: routing, clock gates, bit-band.
+
+Source: RM0008 sections 3.1, 3.3.2 (bit-band) and 7.3 (clock gates).
+Invariant: a peripheral sees an access only while its clock is on.
 """
 
+import ctypes
 from collections.abc import Callable
-from typing import cast
+from typing import Protocol, cast
 
-from bluepill_sim.block_cost import NO_BLOCK, Block, measure_block
-from bluepill_sim.bus import PERIPHERAL_BYTES, PeripheralBus, SramBitBand
-from bluepill_sim.clocks import Clocks
-from bluepill_sim.cpu import GENERAL, BlockRecorder
-from bluepill_sim.cycle_clock import CycleClock
-from bluepill_sim.forced_bits import forced_bits
+from bluepill_sim.core import GENERAL, BlockRecorder
+from bluepill_sim.core.block_cost import NO_BLOCK, Block, measure_block
+from bluepill_sim.core.forced_bits import forced_bits
+from bluepill_sim.core.processor import FaultListener
+from bluepill_sim.core.system_control import PPB_BASE, PPB_BYTES, SystemControl
+from bluepill_sim.fabric.clocks import Clocks
+from bluepill_sim.fabric.registers import Peripheral
 from bluepill_sim.memory import Memory
-from bluepill_sim.native_processor import make_core
-from bluepill_sim.native_registers import share_registers
-from bluepill_sim.native_streams import SharedStreams
-from bluepill_sim.processor import FaultListener
-from bluepill_sim.rcc import ResetCause
+from bluepill_sim.native.processor import make_core
+from bluepill_sim.native.registers import share_registers
+from bluepill_sim.native.streams import SharedStreams
+from bluepill_sim.peripherals.rcc import Rcc, ResetCause
 from bluepill_sim.stm32f103 import (
+    CLOCK_GATES,
     FLASH_BASE,
     FLASH_BYTES_FITTED,
     PERIPHERAL_BASE,
@@ -35,9 +42,97 @@ from bluepill_sim.stm32f103 import (
     SRAM_BYTES,
     make_parts,
     make_pins,
+    name_at,
 )
-from bluepill_sim.system_control import PPB_BASE, PPB_BYTES, SystemControl
-from bluepill_sim.timing import Nanos, Reached, Reason
+from bluepill_sim.timing import CycleClock, Nanos, Reached, Reason
+
+#: What is mapped as peripherals: APB1, APB2 and AHB up to the end of CRC and reserved pages.
+PERIPHERAL_BYTES = 0x2_4000
+_PAGE_SHIFT = 10
+
+
+class Surroundings(Protocol):
+    """What the bus needs of the chip."""
+
+    def warn(self, message: str, *, once: str) -> None:
+        """Warn of what the firmware does wrong, or of what is not modelled."""
+        ...
+
+
+class PeripheralBus:
+    """Reads and writes of the peripheral region; offsets count from PERIPHERAL_BASE."""
+
+    def __init__(self, parts: dict[str, Peripheral], rcc: Rcc, chip: Surroundings) -> None:
+        self._pages = {
+            (part.base - PERIPHERAL_BASE >> _PAGE_SHIFT) + page: part
+            for part in parts.values()
+            for page in range(part.place.size >> _PAGE_SHIFT)
+        }
+        self._rcc = rcc
+        self._chip = chip
+
+    def read(self, offset: int, size: int) -> int:
+        """Return what the core reads."""
+        part = self._pages.get(offset >> _PAGE_SHIFT)
+        if part is None or not self._rcc.is_clocked(part.name):
+            self._refuse(part, offset, "read of")
+            return 0
+        return part.read(PERIPHERAL_BASE + offset - part.base, size)
+
+    def write(self, offset: int, size: int, value: int) -> None:
+        """Take what the core writes."""
+        part = self._pages.get(offset >> _PAGE_SHIFT)
+        if part is None or not self._rcc.is_clocked(part.name):
+            self._refuse(part, offset, f"write of {value:#x} to")
+            return
+        part.write(PERIPHERAL_BASE + offset - part.base, size, value)
+
+    def read_bit(self, offset: int, size: int) -> int:
+        """Return a bit through its alias; `offset` counts from the alias region."""
+        del size  # a narrow access reads the same bit
+        bit = offset >> 2 & 31
+        return self.read(offset >> 5 & ~3, 4) >> bit & 1
+
+    def write_bit(self, offset: int, size: int, value: int) -> None:
+        """Set a bit through its alias: the bus matrix reads the word, changes the bit, writes the word."""
+        del size
+        bit = 1 << (offset >> 2 & 31)
+        word = self.read(offset >> 5 & ~3, 4)
+        self.write(offset >> 5 & ~3, 4, word | bit if value & 1 else word & ~bit)
+
+    def _refuse(self, part: Peripheral | None, offset: int, what: str) -> None:
+        """Warn of an access to nothing: it reads 0, and a write is lost."""
+        address = PERIPHERAL_BASE + offset
+        if part is None:
+            name = name_at(address)
+            text = f"{name} is not modelled" if name else "no peripheral is here"
+            self._chip.warn(f"{text} ({what} {address:#010x})", once=f"unmodelled:{name or address & ~0x3FF:}")
+            return
+        gate = CLOCK_GATES[part.name]
+        self._chip.warn(
+            f"{part.name} has no clock: RCC_{gate.register} bit {gate.bit} is 0 ({what} {address:#010x})",
+            once=f"clock:{part.name}",
+        )
+
+
+class SramBitBand:
+    """The alias region of the SRAM's bits."""
+
+    def __init__(self, sram: "ctypes.Array[ctypes.c_char]") -> None:
+        self._bytes = (ctypes.c_ubyte * len(sram)).from_buffer(sram)
+
+    def read_bit(self, offset: int, size: int) -> int:
+        """Return a bit through its alias."""
+        del size
+        return self._bytes[offset >> 5] >> (offset >> 2 & 7) & 1
+
+    def write_bit(self, offset: int, size: int, value: int) -> None:
+        """Set a bit through its alias."""
+        del size
+        bit = 1 << (offset >> 2 & 7)
+        at = offset >> 5
+        self._bytes[at] = self._bytes[at] | bit if value & 1 else self._bytes[at] & ~bit
+
 
 #: Bit-band alias regions (RM0008 3.3.2) and how many alias bytes there are for each byte.
 SRAM_ALIAS, PERIPHERAL_ALIAS = 0x2200_0000, 0x4200_0000
@@ -58,8 +153,8 @@ class Chip:
         Args:
             memory: its memories.
             vector_table: where the program's vectors are.
-            on_warning: told of each warning.
-            on_fault: told of each HardFault and lockup.
+            on_warning: notified of each warning.
+            on_fault: notified of each HardFault and lockup.
         """
         self.memory = memory
         #: Returns where the vectors are that a reset starts at: what the BOOT pins say.
@@ -126,7 +221,7 @@ class Chip:
         return tick_ns if due is None else min(due, tick_ns)
 
     def advance_to(self, limit_ns: Nanos) -> Reached:
-        """Run to the first block border at or after a time, or to what stops the chip before."""
+        """Run to the first block boundary at or after a time, or to what stops the chip before."""
         return self._advance(limit_ns, self.processor.run, self._streams)
 
     def step(self, limit_ns: Nanos) -> Reached:
@@ -222,14 +317,14 @@ class Chip:
         self.deadline_changed()
 
     def request_stop(self) -> None:
-        """End the slice at the border of the running block."""
+        """End the slice at the boundary of the running block."""
         self._stop_requested = True
-        self.processor.stop_at_border()
+        self.processor.stop_at_boundary()
 
     def deadline_changed(self) -> None:
-        """Look at the deadlines again at the border of the running block."""
+        """Look at the deadlines again at the boundary of the running block."""
         self._deadlines_moved = True
-        self.processor.stop_at_border()
+        self.processor.stop_at_boundary()
 
     def reset_peripheral(self, name: str) -> None:
         """Reset one peripheral."""
@@ -239,14 +334,14 @@ class Chip:
             self.deadline_changed()
 
     def request_reset(self) -> None:
-        """Reset the chip at the border of the running block (SYSRESETREQ)."""
+        """Reset the chip at the boundary of the running block (SYSRESETREQ)."""
         self._requested_reset = ResetCause.SOFTWARE
-        self.processor.stop_at_border()
+        self.processor.stop_at_boundary()
 
     def watchdog_expired(self, name: str) -> None:
-        """Reset the chip at the border of the running block, because of the watchdog of that name."""
+        """Reset the chip at the boundary of the running block, because of the watchdog of that name."""
         self._requested_reset = ResetCause[name]
-        self.processor.stop_at_border()
+        self.processor.stop_at_boundary()
 
     def signal(self, name: str) -> None:
         """Set the event register."""
@@ -294,7 +389,7 @@ class Chip:
     # Plumbing.
 
     def _act(self) -> None:
-        """At a border: do what was left for it, and what is due."""
+        """At a boundary: do what was left for it, and what is due."""
         if self._flash_repairs:
             self._repair_flash()
         if self._requested_reset is not None:
@@ -381,7 +476,7 @@ class Chip:
 
 
 class _FlashArray:
-    """The flash array, as its controller sees it; changes become code at the next border."""
+    """The flash array, as its controller sees it; changes become code at the next boundary."""
 
     def __init__(self, memory: Memory, repairs: list[tuple[int, bytes]]) -> None:
         self._memory = memory

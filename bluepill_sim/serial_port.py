@@ -8,9 +8,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Protocol
 
-from bluepill_sim.durations import Span
-from bluepill_sim.timing import Nanos
-from bluepill_sim.usart import CR1, PINS, RE, UE, Usart
+from bluepill_sim.peripherals.usart import CR1, PINS, RE, UE, Usart
+from bluepill_sim.timing import Nanos, Span
 
 #: chosen: six seconds of a line at 115200; older ones are forgotten.
 KEPT_BYTES = 64 * 1024
@@ -54,13 +53,13 @@ class SerialPort:
         #: Called with (word, ns) at the end of each stop bit that goes out.
         self.on_transmit: WordListener | None = None
         #: Whether `on_transmit` may be called later than that, for several characters together: cheaper.
-        self.hears_late = False
+        self.is_notified_late = False
         #: More of the same: tools that look on.
         self.listeners: list[WordListener] = []
         #: What was sent and not yet taken.
         self.unread = bytearray()
         usart.on_transmit = self._transmitted
-        usart.is_heard = self._is_heard
+        usart.is_subscribed = self._is_subscribed
 
     def receive(self, data: bytes) -> None:
         """Send characters to the RX pin, at the speed of the line."""
@@ -98,8 +97,8 @@ class SerialPort:
         del self.unread[:end]
         return taken
 
-    def _is_heard(self) -> bool:
-        return bool(self.listeners) or (self.on_transmit is not None and not self.hears_late)
+    def _is_subscribed(self) -> bool:
+        return bool(self.listeners) or (self.on_transmit is not None and not self.is_notified_late)
 
     def _transmitted(self, word: int, at_ns: Nanos) -> None:
         self._activity.last_usart_ns = at_ns

@@ -11,17 +11,17 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import TypeAlias, cast
 
-from bluepill_sim.afio import Afio
-from bluepill_sim.exti import Exti
-from bluepill_sim.flash import Flash
-from bluepill_sim.gpio import Gpio
-from bluepill_sim.iwdg import Iwdg
-from bluepill_sim.peripheral import ClockBit, Peripheral, PeripheralSnapshot, Place
-from bluepill_sim.pins import PinBank, PinPorts
-from bluepill_sim.ports import ChipPorts
-from bluepill_sim.rcc import Rcc, ResetCause
-from bluepill_sim.usart import Usart
-from bluepill_sim.wwdg import Wwdg
+from bluepill_sim.fabric.pins import PinBank, PinPorts
+from bluepill_sim.fabric.ports import ChipPorts
+from bluepill_sim.fabric.registers import ClockBit, Peripheral, PeripheralSnapshot, Place
+from bluepill_sim.peripherals.afio import Afio
+from bluepill_sim.peripherals.exti import Exti
+from bluepill_sim.peripherals.flash import Flash
+from bluepill_sim.peripherals.gpio import Gpio
+from bluepill_sim.peripherals.iwdg import Iwdg
+from bluepill_sim.peripherals.rcc import Rcc, ResetCause
+from bluepill_sim.peripherals.usart import Usart
+from bluepill_sim.peripherals.wwdg import Wwdg
 
 FLASH_BASE = 0x0800_0000
 #: The C8 is sold with 64 KiB and carries 128 KiB; programs that use the upper half run on most boards.

@@ -5,13 +5,77 @@ this package knows nothing of robots or their protocol and imports none of it.
 
 Invariant: `advance_to(limit)` leaves the chip with every deadline at or before
 the time reached already acted on.
+
+Why a run of the engine ended.
+
+Invariant: a `Halt` names the next instruction to run, or the one that failed.
+
+Spans of time as people write them: "10 ms", "1.5s", "250us".
+
+Invariant: the result is exact: no binary fraction stands between the text and its nanoseconds.
+
+Cycles of the core and nanoseconds of the world, one from the other.
+
+Both are integers, tied together at one point (base_ns, base_cycle) that moves
+only when the frequency changes; nothing is accumulated.
+
+Invariant: `cycle_at(ns)` is the first cycle whose `ns_of` is at or after `ns`.
 """
 
+import re
 from dataclasses import dataclass
+from decimal import Decimal
 from enum import Enum
 from typing import TypeAlias
 
-from bluepill_sim.cpu.halt import Halt
+from bluepill_sim.errors import BluePillError
+
+
+class HaltKind(Enum):
+    """Why a run ended."""
+
+    #: At a block boundary, because `stop_at` was reached.
+    BOUNDARY = "boundary"
+    EXCEPTION_RETURN = "exception return"
+    SUPERVISOR_CALL = "SVC"
+    BKPT = "BKPT"
+    WAIT_INTERRUPT = "WFI"
+    WAIT_EVENT = "WFE"
+    UNDEFINED = "undefined instruction"
+    NO_COPROCESSOR = "no coprocessor"
+    INVALID_STATE = "not in Thumb state"
+    READ_ERROR = "read of nothing"
+    WRITE_ERROR = "write to nothing"
+    FETCH_ERROR = "fetch from nothing"
+    EXECUTE_NEVER = "fetch from a region that must not be executed"
+    #: The engine's own: before a write to read-only memory that somebody takes.
+    TAKEN_WRITE = "write to flash"
+    DIVIDE_BY_ZERO = "division by zero"
+    UNALIGNED = "unaligned access"
+    #: A debugger's: before the instruction at a breakpoint.
+    BREAKPOINT = "breakpoint"
+    #: A debugger's: after the instruction that made a watched access, to `address`.
+    WATCHPOINT = "watchpoint"
+    #: A debugger's: after one instruction.
+    STEP = "step"
+
+
+#: Halts that only a debugger asks for; BKPT is one of them while a debugger is attached.
+DEBUG_HALTS = frozenset({HaltKind.BREAKPOINT, HaltKind.WATCHPOINT, HaltKind.STEP})
+
+
+@dataclass(frozen=True, slots=True)
+class Halt:
+    """Why and where a run ended."""
+
+    kind: HaltKind
+    #: The next instruction to run; for a fault, the one that failed.
+    pc: int
+    #: What a failed or watched access was to.
+    address: int | None = None
+    #: A watched access that the instruction made before it ended the run for a reason of its own.
+    watched: int | None = None
+
 
 #: A point in virtual time, or a span of it, in nanoseconds.
 Nanos: TypeAlias = int
@@ -42,3 +106,68 @@ class Reached:
     reason: Reason = Reason.DEADLINE
     #: What a debugger asked for: BREAKPOINT, WATCHPOINT, STEP or BKPT; None for all else.
     halt: Halt | None = None
+
+
+#: A span: nanoseconds, or a number with its unit.
+Span = int | str
+
+_UNITS = {"ns": 1, "us": NS_PER_US, "µs": NS_PER_US, "ms": NS_PER_MS, "s": NS_PER_S, "min": 60 * NS_PER_S}
+_TEXT = re.compile(r"(?P<number>\d+\.?\d*|\.\d+)\s*(?P<unit>[a-zµ]+)", re.ASCII | re.IGNORECASE)
+_MICRO = "\N{GREEK SMALL LETTER MU}s"
+#: chosen: longer than anybody waits, and far inside what the chip counts.
+_LONGEST_NS = 366 * 24 * 3600 * NS_PER_S
+
+
+def to_nanos(span: Span) -> Nanos:
+    """Return a span in nanoseconds.
+
+    Args:
+        span: nanoseconds as an integer, or a number with one of ns, us, ms, s, min.
+
+    Raises:
+        BluePillError: it has no unit, a negative or absurd length, or is no span at all.
+    """
+    if isinstance(span, bool) or not isinstance(span, int | str):
+        raise BluePillError(f"{span!r} is no span of time", hint='nanoseconds as an integer, or "10 ms"')
+    if isinstance(span, int):
+        nanos = span
+    else:
+        found = _TEXT.fullmatch(span.strip().replace("\N{MICRO SIGN}", "u").replace(_MICRO, "us"))
+        unit = None if found is None else _UNITS.get(found["unit"].lower())
+        if found is None or unit is None:
+            raise BluePillError(f"{span!r} is no span of time", hint="a number with ns, us, ms, s or min, such as 10ms")
+        nanos = int(Decimal(found["number"]) * unit)
+    if not 0 <= nanos <= _LONGEST_NS:
+        raise BluePillError(f"{span!r} is negative or longer than a year", hint="give a span such as 10ms")
+    return nanos
+
+
+class CycleClock:
+    """The relation between cycles and nanoseconds at the present frequency."""
+
+    def __init__(self, frequency_hz: int) -> None:
+        self.frequency_hz = frequency_hz
+        self._base_ns = 0
+        self._base_cycle = 0
+
+    def ns_of(self, cycle: int) -> Nanos:
+        """Return when a cycle begins, rounded down."""
+        return self._base_ns + (cycle - self._base_cycle) * NS_PER_S // self.frequency_hz
+
+    def cycle_at(self, at_ns: Nanos) -> int:
+        """Return the first cycle that begins at or after a time."""
+        return self._base_cycle - (self._base_ns - at_ns) * self.frequency_hz // NS_PER_S
+
+    def set_frequency(self, frequency_hz: int, cycle: int) -> None:
+        """Go on at another frequency from `cycle` on."""
+        self._base_ns = self.ns_of(cycle)
+        self._base_cycle = cycle
+        self.frequency_hz = frequency_hz
+
+    def snapshot(self) -> tuple[int, int, int]:
+        """Return the state as plain values."""
+        return self.frequency_hz, self._base_ns, self._base_cycle
+
+    def restore(self, snapshot: tuple[int, int, int]) -> None:
+        """Put back what `snapshot` returned."""
+        self.frequency_hz, self._base_ns, self._base_cycle = snapshot

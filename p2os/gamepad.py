@@ -1,7 +1,7 @@
-"""A game pad as what drives a robot: plain reports in, a wish and deflections out.
+"""A game pad as what drives a robot: plain reports in, a connect request and deflections out.
 
 Up connects, Down disconnects, R2 drives forward, L2 backward, the right stick
-turns: the mapping of the thesis. The wish lasts from Up to Down, or until the
+turns: the mapping of the thesis. The connect request lasts from Up to Down, or until the
 pad is lost or the robot is; it has to be given anew then. A button that was down
 when the pad went, or when the robot was given to it, must come up before it
 means anything.
@@ -40,7 +40,7 @@ class PadReport:
     turn: int = 0
 
 
-#: Time of the last report or None, forward, turn, Up as last seen, wish.
+#: Time of the last report or None, forward, turn, Up as last seen, connect request.
 GamepadSnapshot: TypeAlias = tuple[Nanos | None, int, int, bool, bool]
 
 
@@ -82,8 +82,8 @@ class Gamepad:
         self.forward = _outside(report.forward, dead, TRIGGER_FULL) - _outside(report.backward, dead, TRIGGER_FULL)
         self.turn = -_outside(report.turn, self._stick_dead, STICK_FULL)
 
-    def forget_wish(self) -> None:
-        """Forget the wish: the session that it asked for has ended."""
+    def forget_request(self) -> None:
+        """Forget the connect request: the session that it asked for has ended."""
         self.wants_robot = False
 
     def lose(self) -> None:

@@ -9,14 +9,14 @@ import statistics
 import sys
 import time
 
-from p2os.commands import Command
-from p2os.commands import CommandNumber as C
 from p2os.errors import MissingDependencyError
-from p2os.parameters import load_parameters
-from p2os.pioneer.body import BODY_NAMES, make_body
-from p2os.pioneer.controller import Pioneer
-from p2os.pioneer.scenery import Pose
-from p2os.pioneer.world import load_world, parse_world
+from p2os.pioneer.body.choose import BODY_NAMES, make_body
+from p2os.pioneer.controller.controller import Pioneer
+from p2os.pioneer.world.find import load_world, parse_world
+from p2os.pioneer.world.model import Pose
+from p2os.protocol.commands import Command
+from p2os.protocol.commands import CommandNumber as C
+from p2os.robots.parameters import load_parameters
 from p2os.timing import NS_PER_MS, NS_PER_S
 
 P2DX = load_parameters("p2dx")

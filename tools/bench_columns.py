@@ -18,10 +18,11 @@ from collections.abc import Callable, Iterator
 from itertools import zip_longest
 from pathlib import Path
 
-from p2os.columns import decode
-from p2os.columns.objects import rows_by_objects
-from p2os.config_packet import ConfigPacket
-from p2os.packets import (
+from p2os.capture.columns import decode
+from p2os.capture.columns.objects import rows_by_objects
+from p2os.protocol.config_packet import ConfigPacket
+from p2os.protocol.frames import Decoder, Frame
+from p2os.protocol.packets import (
     BatteryPacket,
     CompassPacket,
     EncoderPacket,
@@ -38,8 +39,7 @@ from p2os.packets import (
     packet_frame,
     read_packet,
 )
-from p2os.profiles import Profile
-from p2os.wire import Decoder, Frame
+from p2os.protocol.profiles import Profile
 
 SEED = 20
 PROFILE = Profile.AROS

@@ -17,14 +17,13 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from bluepill_sim import BluePill
-from bluepill_sim.cpu import native_library
-from bluepill_sim.cpu.core import Core
-from bluepill_sim.cpu.registers import Register
+from bluepill_sim.core.machine import Core, Register
+from bluepill_sim.native import library as native_library
 from bluepill_sim.sight.probe import Probe
 from bluepill_sim.sight.vcd import write_vcd
 
 HERE = Path(__file__).parent
-RUNTIME = HERE.parent / "testbench" / "firmware"
+RUNTIME = HERE.parent / "robot_bench" / "firmware"
 RUNS = 1 if "--quick" in sys.argv else 5
 #: Program, virtual seconds a run in C and in Python, goal of the native core in times real time.
 ROWS = (

@@ -9,15 +9,15 @@ import sys
 import time
 from itertools import pairwise
 
-from p2os.commands import Command
-from p2os.commands import CommandNumber as C
-from p2os.parameters import load_parameters
-from p2os.pioneer.body import make_body
-from p2os.pioneer.controller import Pioneer
-from p2os.pioneer.meeting import Meeting
-from p2os.pioneer.scenery import Pose
-from p2os.pioneer.served import served_pioneer
-from p2os.pioneer.world import World, parse_world
+from p2os.pioneer.body.choose import make_body
+from p2os.pioneer.controller.controller import Pioneer
+from p2os.pioneer.serve.background import served_pioneer
+from p2os.pioneer.serve.multi_robot_world import MultiRobotWorld
+from p2os.pioneer.world.find import World, parse_world
+from p2os.pioneer.world.model import Pose
+from p2os.protocol.commands import Command
+from p2os.protocol.commands import CommandNumber as C
+from p2os.robots.parameters import load_parameters
 from p2os.timing import NS_PER_MS, NS_PER_S
 from p2os.transport import open_url
 
@@ -54,15 +54,15 @@ def many_robots() -> None:
             x, y = (PITCH_M * (place - (ROW - 1) / 2) for place in divmod(number, ROW))
             body.reset(Pose(x, y, 0.0), 0)
             made.append((Pioneer(parameters=parameters, body=body), body))
-        meeting = Meeting(made, world) if is_shared else None
+        multi_robot_world = MultiRobotWorld(made, world) if is_shared else None
         for robot, _ in made:
             for data in (*map(command, (0, 1, 2, 1)), command(C.ENABLE, 1), command(C.RVEL, 20)):
                 robot.receive(data, 0)
         begin = time.process_time()
         for at in range(100 * NS_PER_MS, LIVED_S * NS_PER_S + 1, 100 * NS_PER_MS):
             for number, (robot, _) in enumerate(made):
-                if meeting is not None:
-                    meeting.bring(number, at)
+                if multi_robot_world is not None:
+                    multi_robot_world.bring(number, at)
                 robot.receive(command(C.PULSE), at)
                 robot.take_output()
         used = 100 * (time.process_time() - begin) / LIVED_S

@@ -11,9 +11,9 @@ import time
 from collections.abc import Callable
 from pathlib import Path
 
-from p2os.profiles import Profile
-from p2os.sip import SonarReading, StandardSip
-from p2os.wire import Decoder
+from p2os.protocol.frames import Decoder
+from p2os.protocol.profiles import Profile
+from p2os.protocol.sip import SonarReading, StandardSip
 
 RUNS = 1 if "--quick" in sys.argv else 3
 

@@ -15,24 +15,21 @@ from collections.abc import Callable, Iterable, Iterator, Mapping
 from importlib.resources import files
 from pathlib import Path
 
-from p2os.aria_file import aria_table
-from p2os.commands import Command
-from p2os.connection import Connection, Role
+from p2os.capture import Direction, Reading, capture_of, read_capture, rows_of
+from p2os.capture.explain import explain
 from p2os.errors import FileError, P2osError
-from p2os.packets import packet_frame, read_packet
-from p2os.parameters import known_robots, load_parameters, nearest_model
-from p2os.pioneer.body import make_body
-from p2os.pioneer.controller import Pioneer
-from p2os.pioneer.world import parse_world
-from p2os.profiles import Profile
-from p2os.robot_file import build_parameters, table_of
-from p2os.state import ConnectionState
+from p2os.pioneer.body.choose import make_body
+from p2os.pioneer.controller.controller import Pioneer
+from p2os.pioneer.world.find import parse_world
+from p2os.protocol.commands import Command
+from p2os.protocol.connection import Connection, ConnectionRole, ConnectionState
+from p2os.protocol.frames import GIVE_UP_NS, KEPT_BYTES, MAX_COUNT, PREFIX_BYTES, Decoder, Frame
+from p2os.protocol.packets import packet_frame, read_packet
+from p2os.protocol.profiles import Profile
+from p2os.robots.aria_file import aria_table
+from p2os.robots.model_file import build_parameters, table_of
+from p2os.robots.parameters import known_robots, load_parameters, nearest_model
 from p2os.timing import NS_PER_MS, Nanos
-from p2os.trace import Direction, Reading, capture_of, read_capture, rows_of
-from p2os.trace.explain import explain
-from p2os.wire import Decoder, Frame
-from p2os.wire.decoder import GIVE_UP_NS, KEPT_BYTES
-from p2os.wire.frame import MAX_COUNT, PREFIX_BYTES
 
 ROOT = Path(__file__).resolve().parent.parent
 GOLDEN = ROOT / "tests" / "golden"
@@ -106,17 +103,17 @@ def fuzz_rows(data: bytes) -> None:
 
 def fuzz_server(data: bytes) -> None:
     """A server takes anything, answers with sound frames, and keeps its deadlines ahead of the time."""
-    _fuzz_connection(Connection(Role.SERVER), data)
+    _fuzz_connection(Connection(ConnectionRole.SERVER), data)
 
 
 def fuzz_client(data: bytes) -> None:
     """A client takes anything from its robot, and begins anew whenever it may."""
-    _fuzz_connection(Connection(Role.CLIENT), data)
+    _fuzz_connection(Connection(ConnectionRole.CLIENT), data)
 
 
 def _fuzz_connection(end: Connection, data: bytes) -> None:
     for now, chunk in chunks_of(data):
-        if end.role is Role.CLIENT and end.state in AT_REST:
+        if end.role is ConnectionRole.CLIENT and end.state in AT_REST:
             end.connect(now)
         end.receive(chunk, now)
         end.advance_to(now)
@@ -141,8 +138,8 @@ def fuzz_robot(data: bytes) -> None:
 
 def fuzz_columns(data: bytes) -> None:
     """Columns are the objects, row by row."""
-    from p2os.columns import decode
-    from p2os.columns.objects import rows_by_objects
+    from p2os.capture.columns import decode
+    from p2os.capture.columns.objects import rows_by_objects
 
     for profile in (Profile.P2OS, Profile.AROS):
         for ours, theirs in itertools.zip_longest(decode(data, profile).rows(), rows_by_objects(data, profile)):

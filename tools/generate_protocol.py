@@ -12,9 +12,9 @@ from pathlib import Path
 
 from construct import Array, Bytes, Construct, FormatField, NullTerminated, Renamed, Struct
 
-from p2os import sip
-from p2os.commands import MAX_STRING_BYTES, NEGATIVE, POSITIVE, ROWS, STRING, Command, command, vel2
-from p2os.config_packet import (
+from p2os.protocol import sip
+from p2os.protocol.commands import MAX_STRING_BYTES, NEGATIVE, POSITIVE, ROWS, STRING, Command, command, vel2
+from p2os.protocol.config_packet import (
     AMRISIM_FIELDS,
     AROS_1_6_FIELDS,
     AROS_1_7_FIELDS,
@@ -22,8 +22,9 @@ from p2os.config_packet import (
     FIELDS,
     P2OS_FIELDS,
 )
-from p2os.odometry import PLAYER_POSITION_MODULUS, POSITION_MODULUS
-from p2os.packets import (
+from p2os.protocol.frames import GIVE_UP_NS, HEADER, MAX_COUNT, MAX_PAYLOAD_BYTES, MIN_COUNT, Frame
+from p2os.protocol.odometry import PLAYER_POSITION_MODULUS, POSITION_MODULUS
+from p2os.protocol.packets import (
     PACKET_NAMES,
     READERS,
     ArmInfoPacket,
@@ -43,11 +44,9 @@ from p2os.packets import (
     SimLaserPacket,
     SimstatPacket,
 )
-from p2os.parameters import known_robots, load_parameters
-from p2os.profiles import Profile
+from p2os.protocol.profiles import Profile
+from p2os.robots.parameters import known_robots, load_parameters
 from p2os.timing import NS_PER_MS
-from p2os.wire.decoder import GIVE_UP_NS
-from p2os.wire.frame import HEADER, MAX_COUNT, MAX_PAYLOAD_BYTES, MIN_COUNT, Frame
 
 PAGE = Path(__file__).resolve().parent.parent / "PROTOCOL.md"
 BLOCK = re.compile(r"(<!-- table: (?P<name>[a-z ]+) -->\n)(?P<body>.*?)(<!-- end -->)", re.DOTALL)

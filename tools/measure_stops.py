@@ -33,16 +33,16 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
 
-from p2os.commands import Command, CommandNumber
 from p2os.errors import TransportError
-from p2os.parameters import load_parameters
-from p2os.pioneer.body import make_body
-from p2os.pioneer.controller import Pioneer
-from p2os.pioneer.host import Host
-from p2os.pioneer.world import load_world
+from p2os.pioneer.body.choose import make_body
+from p2os.pioneer.controller.controller import Pioneer
+from p2os.pioneer.serve.host import Host
+from p2os.pioneer.world.find import load_world
+from p2os.protocol.commands import Command, CommandNumber
+from p2os.protocol.frames import Decoder, Frame
+from p2os.robots.parameters import load_parameters
 from p2os.transport import Transport, listen_url, open_url
 from p2os.transport.waiting import wait_readable
-from p2os.wire import Decoder, Frame
 
 ROOT = Path(__file__).resolve().parents[1]
 #: How long a process is stopped or its machine sleeps: the wheels turn on, or the robot's watchdog has stopped them.

@@ -5,8 +5,8 @@
 
 #include <cstdint>
 
-#include "../core/shell/event_log.hpp"
-#include "../core/shell/runner.hpp"
+#include "../core/app/event_log.hpp"
+#include "../core/app/runner.hpp"
 #include "hardware.hpp"
 #include "registers.hpp"
 
@@ -28,10 +28,10 @@ extern "C" int main() {
   bluepill::Clock clock;
   bluepill::Wires wires;
   bluepill::Uart uart;
-  static shell::EventLog log;
+  static app::EventLog log;
   adapter::Adapter part({}, {}, {}, clock.now());
   part.attach(&wires, &wires, &log);
-  shell::Runner runner(part, clock, uart, nullptr);
+  app::Runner runner(part, clock, uart, nullptr);
   for (;;) {
     const std::uint64_t started = bluepill::cycles();
     runner.pass();

@@ -16,7 +16,7 @@
 
 #include "../core/adapter/adapter.hpp"
 #include "../core/adapter/fields.hpp"
-#include "../core/shell/console.hpp"
+#include "../core/app/console.hpp"
 #include "../selftest/robot.hpp"
 
 namespace {
@@ -67,7 +67,7 @@ adapter::Settings settings_of(Source& source, const adapter::WireNumbers& wires)
   return adapter::fault_of(settings, wires) == nullptr ? settings : adapter::Settings{};
 }
 
-class World final : private hal::PinsIn, private hal::PinsOut, private shell::Writer, private shell::Store {
+class World final : private hal::PinsIn, private hal::PinsOut, private app::Writer, private app::Store {
  public:
   explicit World(Source& source)
       : source_(source),
@@ -227,8 +227,8 @@ class World final : private hal::PinsIn, private hal::PinsOut, private shell::Wr
   Source& source_;
   adapter::Settings settings_;
   adapter::Adapter part_;
-  shell::EventLog log_;
-  shell::Console console_;
+  app::EventLog log_;
+  app::Console console_;
   selftest::Robot robot_;
   Nanos now_ = 0;
   Nanos heard_at_ = 0;

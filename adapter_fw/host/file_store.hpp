@@ -4,11 +4,11 @@
 #include <map>
 #include <string>
 
-#include "../core/shell/console.hpp"
+#include "../core/app/console.hpp"
 
 namespace host {
 
-class FileStore final : public shell::Store {
+class FileStore final : public app::Store {
  public:
   explicit FileStore(std::string path);
 

@@ -17,9 +17,9 @@
 #include <ctime>
 #include <string>
 
-#include "../core/shell/console.hpp"
-#include "../core/shell/runner.hpp"
-#include "../core/shell/teller.hpp"
+#include "../core/app/console.hpp"
+#include "../core/app/runner.hpp"
+#include "../core/app/teller.hpp"
 #include "../generated/robots.hpp"
 #include "file_store.hpp"
 #include "line.hpp"
@@ -124,18 +124,18 @@ int run(const Options& options, host::Line& line, host::Wires& wires, host::File
         host::Standard& err, WallClock& clock) {
   const adapter::WireNumbers numbers;
   const char* fault = nullptr;
-  const adapter::Settings settings = shell::stored_settings(store, numbers, fault);
+  const adapter::Settings settings = app::stored_settings(store, numbers, fault);
   if (fault != nullptr) {
     err.write("stored settings are left out: ");
     err.write(fault);
     err.write("\n");
   }
-  shell::EventLog log;
-  shell::Teller teller(log, err);
+  app::EventLog log;
+  app::Teller teller(log, err);
   adapter::Adapter part(settings, *adapter::find_robot(options.robot.c_str()), numbers, clock.now());
   part.attach(&wires, &wires, &teller);
-  shell::Console console({part, log, wires, store, out, numbers, "host"});
-  shell::Runner runner(part, clock, line, &wires);
+  app::Console console({part, log, wires, store, out, numbers, "host"});
+  app::Runner runner(part, clock, line, &wires);
   wires.release(clock.now());
   console.banner();
   int input = STDIN_FILENO;

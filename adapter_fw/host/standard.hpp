@@ -9,11 +9,11 @@
 #include <cstdint>
 #include <string>
 
-#include "../core/shell/text.hpp"
+#include "../core/app/text.hpp"
 
 namespace host {
 
-class Standard final : public shell::Writer {
+class Standard final : public app::Writer {
  public:
   //: chosen: more than the console's longest answer, and more than a minute of events.
   static constexpr std::size_t MOST_WAITING = 16'384;

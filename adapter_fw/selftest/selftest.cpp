@@ -22,9 +22,9 @@ constexpr Nanos STEP_NS = 1 * NS_PER_MS;
 constexpr Nanos LIVENESS_NS = 350 * NS_PER_MS;
 
 //: Numerical Recipes' generator: the same numbers on every machine.
-class Chance {
+class RandomSource {
  public:
-  explicit Chance(std::uint32_t seed) : state_(seed) {}
+  explicit RandomSource(std::uint32_t seed) : state_(seed) {}
 
   std::uint32_t below(std::uint32_t limit) {
     state_ = state_ * 1'664'525U + 1'013'904'223U;
@@ -38,7 +38,7 @@ class Chance {
 //: The adapter with everything around it.
 class Life final : private hal::PinsIn, private hal::PinsOut, private adapter::Observer {
  public:
-  explicit Life(std::uint32_t seed) : chance_(seed), part_(adapter::Settings{}, {}, {}, 0) {
+  explicit Life(std::uint32_t seed) : random_source_(seed), part_(adapter::Settings{}, {}, {}, 0) {
     part_.attach(this, this, this);
   }
 
@@ -46,7 +46,7 @@ class Life final : private hal::PinsIn, private hal::PinsOut, private adapter::O
     for (now_ = 0; now_ < span && result_.failure == nullptr; now_ += STEP_NS) {
       if (now_ >= next_accident_) {
         accident();
-        next_accident_ = now_ + (100 + chance_.below(2'400)) * NS_PER_MS;
+        next_accident_ = now_ + (100 + random_source_.below(2'400)) * NS_PER_MS;
       }
       if (now_ >= next_report_) {
         report_pad();
@@ -84,8 +84,8 @@ class Life final : private hal::PinsIn, private hal::PinsOut, private adapter::O
       for (std::size_t place = 0; place < answer.size; ++place) {
         bytes[place] = answer[place];
       }
-      if (chance_.below(40) == 0) {
-        bytes[chance_.below(static_cast<std::uint32_t>(answer.size))] ^= static_cast<std::uint8_t>(1U << chance_.below(8));
+      if (random_source_.below(40) == 0) {
+        bytes[random_source_.below(static_cast<std::uint32_t>(answer.size))] ^= static_cast<std::uint8_t>(1U << random_source_.below(8));
       }
       const std::uint32_t sips = part_.sips();
       timed([&] { part_.receive({bytes.data(), answer.size}, now_); });
@@ -115,7 +115,7 @@ class Life final : private hal::PinsIn, private hal::PinsOut, private adapter::O
   }
 
   void accident() {
-    switch (chance_.below(12)) {
+    switch (random_source_.below(12)) {
       case 0:
         pins_ ^= 1U << 6;  // p2dx_con
         break;
@@ -130,7 +130,7 @@ class Life final : private hal::PinsIn, private hal::PinsOut, private adapter::O
         robot_.reboot();
         break;
       case 4:
-        part_.set_master(chance_.below(2) == 0 ? adapter::Master::BLUEPILL : adapter::Master::PAD, now_);
+        part_.set_master(random_source_.below(2) == 0 ? adapter::Master::BLUEPILL : adapter::Master::PAD, now_);
         break;
       case 5:
         up_ = !up_;
@@ -144,7 +144,7 @@ class Life final : private hal::PinsIn, private hal::PinsOut, private adapter::O
       default:
         // Most of the time things go well: the line is whole, the BluePill wants the robot, its motors change.
         is_cut_ = false;
-        pins_ = (pins_ & ~(1U << 7) & ~0x3FU) | 1U << 6 | chance_.below(64);
+        pins_ = (pins_ & ~(1U << 7) & ~0x3FU) | 1U << 6 | random_source_.below(64);
         break;
     }
   }
@@ -152,15 +152,15 @@ class Life final : private hal::PinsIn, private hal::PinsOut, private adapter::O
   void noise() {
     std::uint8_t bytes[24];
     for (std::uint8_t& byte : bytes) {
-      byte = static_cast<std::uint8_t>(chance_.below(4) == 0 ? 0xFA + chance_.below(2) : chance_.below(256));
+      byte = static_cast<std::uint8_t>(random_source_.below(4) == 0 ? 0xFA + random_source_.below(2) : random_source_.below(256));
     }
     part_.receive({bytes, sizeof bytes}, now_);
   }
 
   void report_pad() {
     if (has_pad_) {
-      part_.receive_pad({up_, false, static_cast<std::int32_t>(chance_.below(1'024)), 0,
-                         static_cast<std::int32_t>(chance_.below(1'024)) - 512},
+      part_.receive_pad({up_, false, static_cast<std::int32_t>(random_source_.below(1'024)), 0,
+                         static_cast<std::int32_t>(random_source_.below(1'024)) - 512},
                         now_);
     }
   }
@@ -189,7 +189,7 @@ class Life final : private hal::PinsIn, private hal::PinsOut, private adapter::O
 
   void happened(Nanos now, adapter::What what, const char*, std::int32_t first, std::int32_t second) override {
     result_.sessions += what == adapter::What::CONNECTED ? 1 : 0;
-    result_.losses += what == adapter::What::LOST || what == adapter::What::DISBELIEF ? 1 : 0;
+    result_.losses += what == adapter::What::LOST || what == adapter::What::IMPLAUSIBLE ? 1 : 0;
     mix(now);
     mix_byte(static_cast<std::uint8_t>(what));
     mix(first);
@@ -204,7 +204,7 @@ class Life final : private hal::PinsIn, private hal::PinsOut, private adapter::O
 
   void mix_byte(std::uint8_t byte) { result_.hash = (result_.hash ^ byte) * 16'777'619U; }
 
-  Chance chance_;
+  RandomSource random_source_;
   Adapter part_;
   Robot robot_;
   Result result_;

@@ -6,10 +6,10 @@
 #include <cstring>
 
 #include "../core/adapter/fields.hpp"
-#include "../core/shell/led.hpp"
-#include "../core/shell/mode_button.hpp"
-#include "../core/shell/runner.hpp"
-#include "../core/shell/text.hpp"
+#include "../core/app/led.hpp"
+#include "../core/app/mode_button.hpp"
+#include "../core/app/runner.hpp"
+#include "../core/app/text.hpp"
 
 namespace {
 
@@ -32,9 +32,9 @@ void claim(bool holds, const char* what) {
 //: Times that the LED comes on within a period.
 int flashes(State state, Master master = Master::BLUEPILL) {
   int count = 0;
-  bool before = shell::led_is_on(state, master, shell::LED_PERIOD_NS - NS_PER_MS);
-  for (Nanos at = 0; at < shell::LED_PERIOD_NS; at += NS_PER_MS) {
-    const bool is_on = shell::led_is_on(state, master, at);
+  bool before = app::led_is_on(state, master, app::LED_PERIOD_NS - NS_PER_MS);
+  for (Nanos at = 0; at < app::LED_PERIOD_NS; at += NS_PER_MS) {
+    const bool is_on = app::led_is_on(state, master, at);
     count += is_on && !before ? 1 : 0;
     before = is_on;
   }
@@ -42,20 +42,20 @@ int flashes(State state, Master master = Master::BLUEPILL) {
 }
 
 void check_led() {
-  claim(flashes(State::RESET) == 0 && !shell::led_is_on(State::BOOTING, Master::BLUEPILL, 0), "dark until the boot");
+  claim(flashes(State::RESET) == 0 && !app::led_is_on(State::BOOTING, Master::BLUEPILL, 0), "dark until the boot");
   claim(flashes(State::IDLE) == 1, "idle is one flash");
   claim(flashes(State::CONNECTING) == 2, "connecting is two");
   claim(flashes(State::SETTLING) == 3, "settling is three");
   claim(flashes(State::CLOSING) == 4, "closing is four");
-  claim(flashes(State::DRIVING) == 0 && shell::led_is_on(State::DRIVING, Master::BLUEPILL, 0), "driving is on");
+  claim(flashes(State::DRIVING) == 0 && app::led_is_on(State::DRIVING, Master::BLUEPILL, 0), "driving is on");
   claim(flashes(State::DRIVING, Master::PAD) == 1, "driving by the pad has one gap");
   claim(flashes(State::LOST) == 20, "lost flickers ten times a second");
 }
 
 void check_button() {
-  shell::ModeButton held;
+  app::ModeButton held;
   claim(!held.take(true, 0) && !held.take(true, NS_PER_S), "a button held from the start says nothing");
-  shell::ModeButton button;
+  app::ModeButton button;
   button.take(false, 0);
   claim(!button.take(true, 49 * NS_PER_MS), "49 ms do not count");
   claim(button.take(true, 50 * NS_PER_MS), "50 ms do");
@@ -66,7 +66,7 @@ void check_button() {
   claim(!button.take(true, 2 * NS_PER_S + 60 * NS_PER_MS), "a bounce begins anew");
 }
 
-class Page final : public shell::Writer {
+class Page final : public app::Writer {
  public:
   void write(const char* text) override { std::strncat(text_, text, sizeof text_ - std::strlen(text_) - 1); }
   bool is(const char* text) const { return std::strcmp(text_, text) == 0; }
@@ -77,14 +77,14 @@ class Page final : public shell::Writer {
 
 void check_numbers() {
   Page page;
-  shell::write_number(page, INT64_MIN);
-  shell::write_number(page, 0);
-  shell::write_number(page, INT64_MAX);
+  app::write_number(page, INT64_MIN);
+  app::write_number(page, 0);
+  app::write_number(page, INT64_MAX);
   claim(page.is("-922337203685477580809223372036854775807"), "the ends of 64 bits are written");
   std::int64_t value = 0;
-  claim(shell::read_number("-42", value) && value == -42, "a number is read");
+  claim(app::read_number("-42", value) && value == -42, "a number is read");
   for (const char* text : {"", "-", "4x", "0x10", " 4", "1234567890123456789", "--1"}) {
-    claim(!shell::read_number(text, value), text);
+    claim(!app::read_number(text, value), text);
   }
 }
 
@@ -167,17 +167,17 @@ struct Connecting {
   Recorder uart;
   HeldPins pins;
   adapter::Adapter part{{}, {}, {}, 0};
-  shell::Runner runner{part, clock, uart, nullptr};
+  app::Runner runner{part, clock, uart, nullptr};
 };
 
 void check_gaps() {
   Connecting late;
-  late.clock.at += shell::Runner::GAP_NS;
+  late.clock.at += app::Runner::GAP_NS;
   late.turn();
   claim(late.part.state() == State::CONNECTING, "350 ms late is no gap");
 
   Connecting paused;
-  paused.clock.at += shell::Runner::GAP_NS + 1;
+  paused.clock.at += app::Runner::GAP_NS + 1;
   paused.turn();
   claim(paused.part.state() == State::LOST && paused.has_stopped(), "a nanosecond more is one: STOP goes out first");
   claim(std::strcmp(paused.part.reason(), "the program paused") == 0, "and it says why");
@@ -185,7 +185,7 @@ void check_gaps() {
   while (paused.clock.at < later) {
     paused.turn();
   }
-  claim(paused.part.state() == State::LOST, "it waits for a new wish");
+  claim(paused.part.state() == State::LOST, "it waits for a new connect request");
   paused.pins.word = 0;
   while (paused.part.state() == State::LOST) {
     paused.turn();

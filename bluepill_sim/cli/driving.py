@@ -8,13 +8,11 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 
-from bluepill_sim.board import BluePill
-from bluepill_sim.durations import to_nanos
+from bluepill_sim.board import BluePill, WaitError
 from bluepill_sim.errors import BluePillError
-from bluepill_sim.pins import Pin
-from bluepill_sim.sight.last_blocks import title_of
-from bluepill_sim.timing import NS_PER_S, Nanos, Reached, Reason
-from bluepill_sim.waiting import WaitError
+from bluepill_sim.fabric.pins import Pin
+from bluepill_sim.program.last_blocks import title_of
+from bluepill_sim.timing import NS_PER_S, Nanos, Reached, Reason, to_nanos
 
 #: What a level's word does to a pin; "gnd" and "3v3" are solder bridges.
 _LEVELS: dict[str, Callable[[Pin], None]] = {

@@ -1,6 +1,6 @@
 """Serves one debugger at a time on a TCP port of this machine.
 
-This is skin: it owns the socket and the pace; `bluepill_sim.debug` does the rest.
+This is the I/O layer: it owns the socket and the pace; `bluepill_sim.debug` does the rest.
 
 Invariant: the machine runs only while GDB wants it to; whoever leaves without a
 word leaves it standing still.
@@ -13,8 +13,8 @@ from collections.abc import Callable
 
 from bluepill_sim.debug.control import Machine
 from bluepill_sim.debug.execution import Execution
+from bluepill_sim.debug.gdb_session import GdbSession
 from bluepill_sim.debug.packets import Mark, Packet, PacketReader, frame
-from bluepill_sim.debug.session import Session
 from bluepill_sim.errors import BluePillError
 from bluepill_sim.timing import NS_PER_S, Nanos
 
@@ -85,8 +85,8 @@ class GdbServer:
                 self._execution.detach()
                 return not session.state.was_killed
 
-    def _talk(self, connection: "_Connection") -> Session:
-        session = Session(self._execution)
+    def _talk(self, connection: "_Connection") -> GdbSession:
+        session = GdbSession(self._execution)
         self._execution.wants_stop = self._make_watch(connection)
         while not session.state.is_over:
             packet = connection.next_packet()

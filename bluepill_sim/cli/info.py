@@ -9,11 +9,10 @@ import typer
 from bluepill_sim.board import BluePill
 from bluepill_sim.cli.columns import print_columns
 from bluepill_sim.cli.driving import run_driven
-from bluepill_sim.durations import to_nanos
-from bluepill_sim.image import Image
-from bluepill_sim.sight.elf_file import Layout, layout, stack_top, variables_end, vectors
+from bluepill_sim.program.elf_file import Layout, layout, stack_top, variables_end, vectors
+from bluepill_sim.program.image import Image
 from bluepill_sim.stm32f103 import FLASH_BYTES, SRAM_BYTES
-from bluepill_sim.timing import NS_PER_S
+from bluepill_sim.timing import NS_PER_S, to_nanos
 
 HELP = """Tell what a firmware is: sections, sizes, vectors, largest symbols, stack.
 

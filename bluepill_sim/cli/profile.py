@@ -9,16 +9,16 @@ import typer
 from bluepill_sim.board import BluePill
 from bluepill_sim.cli.columns import print_columns
 from bluepill_sim.cli.driving import parse_changes, run_driven, say, summary, tell_fault, warn_on_stderr
-from bluepill_sim.durations import to_nanos
+from bluepill_sim.core.nvic import exception_name
 from bluepill_sim.errors import BluePillError
+from bluepill_sim.program.functions import FunctionTable
+from bluepill_sim.program.static_code import StaticCode
+from bluepill_sim.sight.cycle_profile import ASLEEP, CycleProfile, FunctionCost
 from bluepill_sim.sight.flame import flame_svg
-from bluepill_sim.sight.functions import FunctionTable
 from bluepill_sim.sight.latency import ExceptionCost, Latency
 from bluepill_sim.sight.observation import Observation
-from bluepill_sim.sight.profile import ASLEEP, FunctionCost, Profile
 from bluepill_sim.sight.stack import StackGauge
-from bluepill_sim.sight.static_code import StaticCode
-from bluepill_sim.vectors import exception_name
+from bluepill_sim.timing import to_nanos
 
 HELP = """Run a firmware for a while and tell where its cycles go.
 
@@ -58,7 +58,7 @@ def profile(
     changes = parse_changes(drive or [], board)
     warn_on_stderr(board)
     stack = StackGauge(board)
-    costs = Profile(FunctionTable(board.image), StaticCode(board.chip.memory))
+    costs = CycleProfile(FunctionTable(board.image), StaticCode(board.chip.memory))
     latency = Latency(board)
     with Observation(board, [costs, latency]):
         run_driven(board, to_nanos(span), changes)

@@ -8,6 +8,8 @@ from typing import Annotated
 import typer
 
 from bluepill_sim.board import BluePill
+from bluepill_sim.board import until as wait_until
+from bluepill_sim.cli.console import connect, open_console
 from bluepill_sim.cli.driving import (
     OverBudgetError,
     Schedule,
@@ -18,10 +20,7 @@ from bluepill_sim.cli.driving import (
     tell_fault,
     warn_on_stderr,
 )
-from bluepill_sim.console import connect, open_console
-from bluepill_sim.durations import to_nanos
-from bluepill_sim.timing import NS_PER_MS, NS_PER_S, Nanos, Reached, Reason
-from bluepill_sim.waiting import until as wait_until
+from bluepill_sim.timing import NS_PER_MS, NS_PER_S, Nanos, Reached, Reason, to_nanos
 
 HELP = """Boot a firmware on an emulated BluePill; what it sends on USART1 goes to stdout.
 

@@ -10,12 +10,12 @@ import typer
 
 from bluepill_sim.board import BluePill
 from bluepill_sim.cli.driving import parse_changes, run_driven, say, summary, tell_fault, warn_on_stderr
-from bluepill_sim.cpu import BlockRecorder
-from bluepill_sim.durations import to_nanos
+from bluepill_sim.core import BlockRecorder
 from bluepill_sim.errors import BluePillError
-from bluepill_sim.sight.functions import FunctionTable
-from bluepill_sim.sight.last_blocks import lines_of
-from bluepill_sim.sight.line_table import read_lines
+from bluepill_sim.program.functions import FunctionTable
+from bluepill_sim.program.last_blocks import lines_of
+from bluepill_sim.program.line_table import read_lines
+from bluepill_sim.timing import to_nanos
 
 HELP = """Run a firmware and write what it executes: cycle, symbol, source line.
 

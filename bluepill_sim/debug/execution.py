@@ -12,11 +12,11 @@ Invariant: outside of its methods the machine stands still.
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from bluepill_sim.cpu import HaltKind
+from bluepill_sim.core import HaltKind
+from bluepill_sim.core.faults import FaultKind
 from bluepill_sim.debug.control import Machine, Stop, StopKind
 from bluepill_sim.debug.history import History, Point
 from bluepill_sim.debug.semihosting import Semihosting
-from bluepill_sim.faults import FaultKind
 from bluepill_sim.timing import NS_PER_MS, NS_PER_S, Nanos, Reason
 
 #: chosen: so often a running machine looks whether somebody wants it to stop.
@@ -58,7 +58,7 @@ class Execution:
         self._is_replaying = False
         self._write = write
         self._semihosting = Semihosting(machine.board, self._print)
-        self._told_fault = False
+        self._reported_fault = False
         self._bkpt_at: int | None = None
         machine.board.chip.processor.halts_on_bkpt = True
         self._report = machine.board.chip.processor.on_fault
@@ -76,7 +76,7 @@ class Execution:
         """Begin the history anew: somebody has written to the machine."""
         self.history.begin()
         self._bkpt_at = None
-        self._told_fault = self.machine.board.fault is not None
+        self._reported_fault = self.machine.board.fault is not None
 
     # Forwards.
 
@@ -114,7 +114,7 @@ class Execution:
                     return stop
                 continue
             if self._has_new_fault() or reached.reason is Reason.HALT:
-                self._told_fault = True
+                self._reported_fault = True
                 return Stop(StopKind.FAULT)
             if not self._is_replaying and self.wants_stop():
                 return Stop(StopKind.INTERRUPT)
@@ -129,7 +129,7 @@ class Execution:
                 stop = self._stop_of(reached.halt.kind, reached.halt.address)
                 return stop or Stop(StopKind.STEP)
             if self._has_new_fault() or reached.reason is Reason.HALT:
-                self._told_fault = True
+                self._reported_fault = True
                 return Stop(StopKind.FAULT)
             if self.wants_stop():
                 return None
@@ -157,7 +157,7 @@ class Execution:
         return end is not None and self.machine.board.now_ns >= end
 
     def _has_new_fault(self) -> bool:
-        return self.machine.board.fault is not None and not self._told_fault
+        return self.machine.board.fault is not None and not self._reported_fault
 
     def _faulted(self, kind: FaultKind, pc: int, address: int | None, is_lockup: bool) -> None:
         if self._report is not None:
@@ -188,7 +188,7 @@ class Execution:
         finally:
             self._is_replaying = False
         self.history.forget_after(board.cycle)
-        self._told_fault = board.fault is not None
+        self._reported_fault = board.fault is not None
         return stop
 
     def _step_back(self, here: _Place) -> Stop:
@@ -253,7 +253,7 @@ class Execution:
 
     def _stops_between(self, point: Point, here: _Place) -> list[Stop]:
         self.machine.restore(point.snapshot)
-        self._told_fault = True
+        self._reported_fault = True
         board, stops = self.machine.board, list[Stop]()
         while True:
             stop = self._run(here)

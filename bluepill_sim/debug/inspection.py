@@ -11,11 +11,11 @@ from dataclasses import dataclass
 from itertools import accumulate
 
 from bluepill_sim.board import BluePill
-from bluepill_sim.cpu import Register
+from bluepill_sim.core import Register
+from bluepill_sim.core.system_control import PPB_BASE, PPB_BYTES
 from bluepill_sim.debug.description import REGISTERS
 from bluepill_sim.errors import BluePillError
 from bluepill_sim.stm32f103 import BASES, FLASH_BASE, FLASH_BYTES_FITTED, name_at
-from bluepill_sim.system_control import PPB_BASE, PPB_BYTES
 
 _PERIPHERAL_BYTES = 0x400
 _HANDLER_IPSR = 3

@@ -13,7 +13,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from bluepill_sim.board import BluePill
-from bluepill_sim.cpu import Register
+from bluepill_sim.core import Register
 from bluepill_sim.timing import NS_PER_S
 
 #: The encoding of BKPT 0xAB.

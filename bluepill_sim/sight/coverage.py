@@ -12,10 +12,10 @@ Invariant: counts only grow; watching changes nothing.
 from collections import Counter
 from dataclasses import dataclass, field
 
-from bluepill_sim.image import Image
-from bluepill_sim.sight.functions import FunctionTable
-from bluepill_sim.sight.line_table import LineTable
-from bluepill_sim.sight.static_code import StaticCode
+from bluepill_sim.program.functions import FunctionTable
+from bluepill_sim.program.image import Image
+from bluepill_sim.program.line_table import LineTable
+from bluepill_sim.program.static_code import StaticCode
 
 
 @dataclass(frozen=True, slots=True)

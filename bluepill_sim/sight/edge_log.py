@@ -15,7 +15,7 @@ from bisect import insort
 from collections.abc import Iterator
 from typing import Protocol
 
-from bluepill_sim.cpu.native_library import library
+from bluepill_sim.native.library import library
 from bluepill_sim.timing import Nanos
 
 #: (ns, number of the signal, value).

@@ -5,7 +5,7 @@ itself (PendSV, a write to NVIC_ISPR) and a line that is still high when its
 handler returns are entries without a wait of their own.
 
 On an idle chip a wait is 12 cycles (TRM 5.7), and what the running block still
-needs: exceptions enter at block borders here, at instructions on silicon.
+needs: exceptions enter at block boundaries here, at instructions on silicon.
 
 Invariant: of one exception, entries = waits known + waits not known.
 """
@@ -13,7 +13,7 @@ Invariant: of one exception, entries = waits known + waits not known.
 from dataclasses import dataclass, field
 
 from bluepill_sim.board import BluePill
-from bluepill_sim.nvic import FIRST_IRQ, SYSTICK
+from bluepill_sim.core.nvic import FIRST_IRQ, SYSTICK
 from bluepill_sim.timing import Nanos
 
 

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from typing import Self
 
 from bluepill_sim.board import BluePill
-from bluepill_sim.cpu import BlockRecorder
+from bluepill_sim.core import BlockRecorder
 from bluepill_sim.sight.walk import Listener, Walk
 
 #: chosen: rows that wait before they are handed on; a few megabytes.

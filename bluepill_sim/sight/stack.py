@@ -14,7 +14,7 @@ Invariant: the paint of a word depends on its address alone, and is no value tha
 from dataclasses import dataclass
 
 from bluepill_sim.board import BluePill
-from bluepill_sim.sight.elf_file import stack_top, variables_end
+from bluepill_sim.program.elf_file import stack_top, variables_end
 
 _WORD_BYTES = 4
 

@@ -13,7 +13,7 @@ to the time from the first row to the last.
 from collections.abc import Iterable, Sequence
 from typing import Protocol
 
-from bluepill_sim.cpu import BLOCK, EXCEPTION_RETURN, Row
+from bluepill_sim.core import BLOCK, EXCEPTION_RETURN, BlockRow
 
 
 class Listener(Protocol):
@@ -36,7 +36,7 @@ class Walk:
     """Follows the rows of one recording.
 
     Args:
-        listeners: told of everything, in order of time.
+        listeners: notified of everything, in order of time.
     """
 
     def __init__(self, listeners: Sequence[Listener]) -> None:
@@ -44,7 +44,7 @@ class Walk:
         #: Start and cycle of the block that has begun.
         self._running: tuple[int, int] | None = None
 
-    def take(self, rows: Iterable[Row]) -> None:
+    def take(self, rows: Iterable[BlockRow]) -> None:
         """Take the next rows."""
         for cycle, address, kind in rows:
             if kind == BLOCK:

@@ -8,14 +8,15 @@ import sys
 import tempfile
 from pathlib import Path
 
-from hardware.pcb import build, checks, kicad, pictures
-from hardware.pcb.design import BOARD_VARIANTS, VARIANTS
-from hardware.pcb.design import build as design_of
-from hardware.pcb.kicad_checks import stitches_of
-from hardware.pcb.netlist import DesignError
-from hardware.pcb.pours import KicadMissingError
-from hardware.pcb.report import Verdict, table
-from hardware.pcb.routing import HERE, RoutingError, run_router
+from hardware.pcb.checks import checks
+from hardware.pcb.checks.kicad_checks import stitches_of
+from hardware.pcb.checks.report import Verdict, table
+from hardware.pcb.circuit.design import BOARD_VARIANTS, VARIANTS
+from hardware.pcb.circuit.design import build as design_of
+from hardware.pcb.circuit.netlist import DesignError
+from hardware.pcb.layout.routing import HERE, RoutingError, run_router
+from hardware.pcb.outputs import build, kicad, pictures
+from hardware.pcb.outputs.pours import KicadMissingError
 from hardware.pcb.spice.decks import decks
 from hardware.pcb.spice.page import page_text
 from hardware.pcb.spice.run import NgspiceMissingError, SimulationError, is_installed, simulate

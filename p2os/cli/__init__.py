@@ -1,1 +1,1 @@
-"""The command `p2os VERB`: a thin skin on functions that scripts can call."""
+"""The command `p2os VERB`: a thin layer over functions that scripts can call."""

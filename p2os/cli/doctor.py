@@ -77,7 +77,7 @@ NEEDS = (
         name="bluepill_sim._native", kind="built", feature="the emulated BluePill at full speed", get=_COMPILER,
     ),
     Need(
-        name="testbench._adapter_firmware", kind="built", feature="--adapter firmware", get=_COMPILER,
+        name="robot_bench._adapter_firmware", kind="built", feature="--adapter firmware", get=_COMPILER,
     ),
     Need(
         name="arm-none-eabi-gcc", kind="program", feature="building BluePill programs",

@@ -1,34 +1,38 @@
 """The client: `Robot`, blocking here and in `p2os`, and for asyncio in `p2os.client.aio`.
 
 `RobotCore` is the client without a line and without a clock, for tests and for
-skins of one's own.
+I/O layers of one's own.
 """
 
+from p2os.client.calls import Gripper, GripperAction
 from p2os.client.core import RobotCore
 from p2os.client.goals import MotionResult
-from p2os.client.gripper import Gripper, GripperAction
 from p2os.client.notices import (
     BaudKept,
     BaudRaised,
     ConfigurationKnown,
     Connected,
+    ConnectError,
     DeadmanStopped,
     Disobeyed,
     GapStopped,
     GaveUp,
     LinkLost,
+    LinkLostError,
     MotionEnded,
+    MotionError,
     MotorsDisabled,
+    MotorsDisabledError,
+    NoAnswerError,
     Notice,
     OdometryDoubtful,
     PacketArrived,
     ReconnectPlanned,
     RobotUnknown,
 )
-from p2os.client.problems import ConnectError, LinkLostError, MotionError, MotorsDisabledError, NoAnswerError
 from p2os.client.robot import Robot
 from p2os.client.settings import ClientSettings
-from p2os.client.snapshots import Limits, Link, Pose, RobotState, SonarEcho
+from p2os.client.snapshots import Limits, Link, RobotPose, RobotState, SonarEcho
 
 __all__ = [
     "BaudKept",
@@ -56,10 +60,10 @@ __all__ = [
     "Notice",
     "OdometryDoubtful",
     "PacketArrived",
-    "Pose",
     "ReconnectPlanned",
     "Robot",
     "RobotCore",
+    "RobotPose",
     "RobotState",
     "RobotUnknown",
     "SonarEcho",

@@ -20,20 +20,18 @@ from collections.abc import AsyncIterator, Callable
 from types import TracebackType
 from typing import Self
 
-from p2os.client.aux_async import AsyncAux
+from p2os.client.aux_ports import AsyncAux
 from p2os.client.calls import Result, RobotCalls
-from p2os.client.core import RobotCore
-from p2os.client.engine import CLOSING_S, MOST_NOTICES, SIGN_OF_LIFE_S, Opener
+from p2os.client.core import PacketType, RobotCore, request_for
 from p2os.client.goals import Axis, DriveAxis, MotionResult, TurnAxis
 from p2os.client.interrupts import exit_on_signals
-from p2os.client.line import Line
+from p2os.client.line import Line, core_for, motion_result, no_answer, not_connected, not_found
 from p2os.client.notices import Notice
-from p2os.client.opening import core_for, motion_result, no_answer, not_connected, not_found
-from p2os.client.requests import PacketType, request_for
+from p2os.client.robot_thread import CLOSING_S, MOST_NOTICES, SIGN_OF_LIFE_S, Opener
 from p2os.client.settings import ClientSettings
 from p2os.client.snapshots import Link, RobotState
 from p2os.errors import P2osError, TransportError
-from p2os.parameters import RobotParameters
+from p2os.robots.parameters import RobotParameters
 from p2os.timing import NS_PER_S, Nanos
 from p2os.transport import open_url
 from p2os.transport.ports import Transport

@@ -1,28 +1,113 @@
-"""What a program can ask of a `Robot` without waiting: one list of calls for both skins.
+"""What a program can ask of a `Robot` without waiting: one list of calls for both I/O layers.
 
 The blocking and the asyncio robot differ in how they wait, not in what they can
 do, so these calls stand here once. Each one is carried out at once on the core
 and its frames leave in order; P2OS acknowledges nothing.
+
+The gripper: its commands by name.
+
+Source: Pioneer 2 gripper manual, command 33 and its arguments.
 """
 
 import math
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable
-from typing import TypeVar
+from enum import IntEnum
+from typing import Protocol, TypeVar
 
-from p2os.client.core import RobotCore
-from p2os.client.gripper import Gripper
-from p2os.client.problems import LinkLostError
-from p2os.client.requests import PacketType
-from p2os.client.snapshots import Limits, Link, Pose, RobotState
-from p2os.commands import Command, CommandNumber, sonar
-from p2os.config_packet import ConfigPacket
-from p2os.connection import ConnectionStats
+from p2os.client.core import PacketType, RobotCore
+from p2os.client.notices import LinkLostError
+from p2os.client.snapshots import Limits, Link, RobotPose, RobotState
 from p2os.errors import UsageError
-from p2os.packets import Identity
-from p2os.parameters import RobotParameters
-from p2os.profiles import Profile
+from p2os.protocol.commands import Command, CommandNumber, sonar
+from p2os.protocol.config_packet import ConfigPacket
+from p2os.protocol.connection import ConnectionStats
+from p2os.protocol.packets import Identity
+from p2os.protocol.profiles import Profile
+from p2os.robots.parameters import RobotParameters
 from p2os.timing import Nanos
+
+
+class GripperAction(IntEnum):
+    """The arguments of GRIPPER."""
+
+    OPEN = 1
+    CLOSE = 2
+    STOP = 3
+    LIFT_UP = 4
+    LIFT_DOWN = 5
+    LIFT_STOP = 6
+    #: Close and lift, for driving.
+    STORE = 7
+    #: Lower and open, ready to grasp.
+    DEPLOY = 8
+    #: Stop paddles and lift.
+    HALT = 15
+    #: The grasping pressure; its value goes before it with GRIPPERVAL.
+    PRESSURE = 16
+    #: Lift for so long; its value goes before it with GRIPPERVAL.
+    LIFT_CARRY = 17
+
+
+class Sender(Protocol):
+    """Sends one command with its argument."""
+
+    def __call__(self, command: int, argument: int | bytes | None = None) -> None:
+        """Send it."""
+
+
+class Gripper:
+    """Paddles and lift; what they do shows in GRIPPERpacs (`request`)."""
+
+    def __init__(self, send: Sender) -> None:
+        self._send = send
+
+    def act(self, action: GripperAction) -> None:
+        """Send any of the gripper's actions."""
+        self._send(CommandNumber.GRIPPER, int(action))
+
+    def open(self) -> None:
+        """Open the paddles."""
+        self.act(GripperAction.OPEN)
+
+    def close(self) -> None:
+        """Close the paddles until they grasp."""
+        self.act(GripperAction.CLOSE)
+
+    def stop(self) -> None:
+        """Stop paddles and lift."""
+        self.act(GripperAction.HALT)
+
+    def lift_up(self) -> None:
+        """Raise the lift."""
+        self.act(GripperAction.LIFT_UP)
+
+    def lift_down(self) -> None:
+        """Lower the lift."""
+        self.act(GripperAction.LIFT_DOWN)
+
+    def store(self) -> None:
+        """Close and lift, for driving."""
+        self.act(GripperAction.STORE)
+
+    def deploy(self) -> None:
+        """Lower and open, ready to grasp."""
+        self.act(GripperAction.DEPLOY)
+
+    def set_pressure(self, value: int) -> None:
+        """Set the grasping pressure, 0 to 255 of the gripper's own units."""
+        self._send(CommandNumber.GRIPPERVAL, value)
+        self.act(GripperAction.PRESSURE)
+
+    def carry(self, value: int) -> None:
+        """Move the lift for `value` times 20 ms, upwards where positive."""
+        self._send(CommandNumber.GRIPPERVAL, value)
+        self.act(GripperAction.LIFT_CARRY)
+
+    def request(self, *, always: bool = False) -> None:
+        """Ask for a GRIPPERpac, or for one a cycle; it comes as a `PacketArrived`."""
+        self._send(CommandNumber.GRIPREQUEST, 2 if always else 1)
+
 
 Result = TypeVar("Result")
 #: What a request packet's argument means: one packet, or one after the other.
@@ -53,7 +138,7 @@ class RobotCalls(ABC):
         return state
 
     @property
-    def pose(self) -> Pose:
+    def pose(self) -> RobotPose:
         """The newest pose: metres, and radians that do not wrap."""
         return self.state.pose
 
@@ -105,7 +190,7 @@ class RobotCalls(ABC):
         return self._run(lambda core, _: core.stats)
 
     def newest(self, kind: type[PacketType]) -> PacketType | None:
-        """Return the last packet of a type of `p2os.packets` that came in this session, or None.
+        """Return the last packet of a type of `p2os.protocol.packets` that came in this session, or None.
 
         Standard packets are `state.sip`, the configuration is `config`.
         """
@@ -170,7 +255,7 @@ class RobotCalls(ABC):
 
     def set_pose(self, x_m: float = 0.0, y_m: float = 0.0, heading_rad: float = 0.0) -> None:
         """Say where the robot is; states from now on count from there. The robot is not told."""
-        self._run(lambda core, _: core.set_pose(Pose(x_m, y_m, heading_rad)))
+        self._run(lambda core, _: core.set_pose(RobotPose(x_m, y_m, heading_rad)))
 
     # Anything -----------------------------------------------------------------------------
 

@@ -1,9 +1,9 @@
-"""The client without a line and without a clock: what both skins of `Robot` drive.
+"""The client without a line and without a clock: what both I/O layers of `Robot` drive.
 
-A skin carries out `take_action`, feeds `line_opened`, `line_failed`,
+An I/O layer carries out `take_action`, feeds `line_opened`, `line_failed`,
 `line_lost` and `receive`, calls `advance_to` at `next_deadline`, and hands on
 `news`. Everything else is decided here, in the time that is passed in: the
-`Session` keeps the link, the `Observer` makes states of packets, the `Mover`
+`LinkSupervisor` keeps the link, the `Observer` makes states of packets, the `Mover`
 moves the robot.
 
 After a loss the first motion call raises `LinkLostError`, even if the link is
@@ -11,19 +11,26 @@ back by then: the program has to know.
 
 Invariant: after a loss nothing but zero speeds goes out until a motion call
 has returned without raising.
+
+Packets that a robot sends only when it is asked: what asks for each of them, once.
+
+A robot without the device stays silent; `fetch` then ends with `NoAnswerError`.
 """
 
 import math
 from collections import deque
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
+from typing import TypeVar
 
 from p2os.client.goals import Axis, Goal
-from p2os.client.mover import Mover
+from p2os.client.link import LinkSupervisor
+from p2os.client.mover import Mover, Speeds
 from p2os.client.notices import (
     ConfigurationKnown,
     Connected,
     GaveUp,
     LinkLost,
+    LinkLostError,
     Notice,
     OdometryDoubtful,
     PacketArrived,
@@ -31,21 +38,60 @@ from p2os.client.notices import (
 )
 from p2os.client.observer import Observer, bumpers_of, limits_of
 from p2os.client.outbox import Action
-from p2os.client.problems import LinkLostError
-from p2os.client.requests import PacketType
-from p2os.client.session import Session
 from p2os.client.settings import ClientSettings
-from p2os.client.snapshots import Limits, Link, Pose, RobotState
-from p2os.client.speeds import Speeds
-from p2os.commands import Command
-from p2os.config_packet import ConfigPacket
-from p2os.connection import ConnectionStats
+from p2os.client.snapshots import Limits, Link, RobotPose, RobotState
 from p2os.errors import UsageError
-from p2os.packets import Identity, ServerPacket
-from p2os.parameters import ParametersError, RobotParameters, load_parameters
-from p2os.profiles import Profile
-from p2os.sip import StandardSip
+from p2os.protocol.commands import Command, CommandNumber
+from p2os.protocol.config_packet import ConfigPacket
+from p2os.protocol.connection import ConnectionStats
+from p2os.protocol.packets import (
+    ArmInfoPacket,
+    ArmPacket,
+    BatteryPacket,
+    CompassPacket,
+    EncoderPacket,
+    GripperPacket,
+    GyroPacket,
+    Identity,
+    IoPacket,
+    JoystickPacket,
+    PlaylistPacket,
+    ServerPacket,
+)
+from p2os.protocol.profiles import Profile
+from p2os.protocol.sip import StandardSip
+from p2os.robots.parameters import ParametersError, RobotParameters, load_parameters
 from p2os.timing import Nanos, Reached
+
+#: Any type of packet, for calls that return the type that they were given.
+PacketType = TypeVar("PacketType", bound=ServerPacket)
+
+#: Type of packet → the command that makes the robot send one (manuals, client commands).
+REQUESTS: Mapping[type, Command] = {
+    ArmInfoPacket: Command(CommandNumber.ARM_INFO),
+    ArmPacket: Command(CommandNumber.ARM_STATUS, 1),
+    BatteryPacket: Command(CommandNumber.BATTERYINFO, 1),
+    CompassPacket: Command(CommandNumber.TCM2, 2),
+    EncoderPacket: Command(CommandNumber.ENCODER, 1),
+    GripperPacket: Command(CommandNumber.GRIPREQUEST, 1),
+    GyroPacket: Command(CommandNumber.GYRO, 1),
+    IoPacket: Command(CommandNumber.IOREQUEST, 1),
+    JoystickPacket: Command(CommandNumber.JOYREQUEST, 1),
+    PlaylistPacket: Command(CommandNumber.PLAYLIST),
+}
+
+
+def request_for(kind: type) -> Command:
+    """Return the command that asks for a type of packet.
+
+    Raises:
+        UsageError: Nothing asks for it.
+    """
+    if kind not in REQUESTS:
+        names = ", ".join(sorted(known.__name__ for known in REQUESTS))
+        raise UsageError(f"nothing asks for a {kind.__name__}", hint=f"one of {names}")
+    return REQUESTS[kind]
+
 
 #: Whose parameters stand in for a model that nobody knows.
 STAND_IN = "p2dx"
@@ -73,7 +119,7 @@ class RobotCore:
         self.problem: GaveUp | LinkLost | None = None
         self._given = parameters
         self._load = load
-        self._session = Session(settings)
+        self._session = LinkSupervisor(settings)
         self._observer = Observer(parameters or load(STAND_IN))
         self._mover = Mover(
             settings, self._observer, send=self._session.send, send_first=self._session.send_first,
@@ -81,7 +127,7 @@ class RobotCore:
         )  # fmt: skip
         self._now: Nanos = 0
         self._packets: dict[type, ServerPacket] = {}
-        self._unseen_loss: str | None = None
+        self._unreported_loss: str | None = None
 
     # What is known ------------------------------------------------------------------------
 
@@ -160,7 +206,7 @@ class RobotCore:
     def connect(self, now: Nanos) -> None:
         """Begin to look for the robot."""
         self.touch(now)
-        self.problem, self._unseen_loss = None, None
+        self.problem, self._unreported_loss = None, None
         self._session.connect()
 
     def close(self, now: Nanos) -> None:
@@ -238,7 +284,7 @@ class RobotCore:
         """Stop, if this goal is still under way."""
         self._mover.cancel_goal(goal, now)
 
-    def set_pose(self, pose: Pose) -> None:
+    def set_pose(self, pose: RobotPose) -> None:
         """Say where the robot is; the robot itself is not told."""
         self._observer.place(pose)
 
@@ -318,7 +364,7 @@ class RobotCore:
                 case ConfigurationKnown():
                     self._observer.bumpers = bumpers_of(item.config)
                 case LinkLost():
-                    self.problem, self._unseen_loss = item, item.reason
+                    self.problem, self._unreported_loss = item, item.reason
                     self._mover.lose(now)
                 case GaveUp():
                     self.problem = item
@@ -364,7 +410,7 @@ class RobotCore:
 
     def _require_motion(self, now: Nanos) -> None:
         """Refuse to move a robot of which the program does not know enough, and switch its motors on."""
-        lost, self._unseen_loss = self._unseen_loss, None
+        lost, self._unreported_loss = self._unreported_loss, None
         self._require_open()
         if lost is not None:
             raise LinkLostError(f"the link was lost and is back: {lost}", hint="the robot stands; call again to go on")

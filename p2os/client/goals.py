@@ -15,8 +15,8 @@ from dataclasses import dataclass, replace
 from typing import Protocol
 
 from p2os.client.notices import MotionEnded
-from p2os.client.snapshots import Limits, Pose, RobotState
-from p2os.commands import Command, CommandNumber
+from p2os.client.snapshots import Limits, RobotPose, RobotState
+from p2os.protocol.commands import Command, CommandNumber
 from p2os.timing import NS_PER_MS, NS_PER_S, Nanos
 
 #: ARIA's documentation advises no MOVE beyond 5 m.
@@ -92,7 +92,7 @@ class DriveAxis:
     def __init__(self, distance_m: float) -> None:
         self.asked = distance_m
         self.what = f"drive {distance_m:.3f} m"
-        self._start = Pose()
+        self._start = RobotPose()
         self._leg_ends_m: float | None = None
 
     def begin(self, state: RobotState) -> None:

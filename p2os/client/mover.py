@@ -3,24 +3,234 @@
 A new motion takes the old one's place. A loss, the deadman, motors that go off,
 a stop and a goal's end lead to nothing or to held zero speeds; only a call of
 the program leads away from there.
+
+Whether the motors are on, as far as anybody can know.
+
+Motors are off after every OPEN. ENABLE has no answer; AROS and ARCOS robots say
+in their flags whether the motors are on, P2OS robots do not. ENABLE is sent a
+few times in a row, for a frame can be lost. Once they were on, motors that go
+off were switched off by somebody at the robot: they stay off until the program
+asks for them.
+
+Whether the robot does what it is told: the wheel speeds of its packets are the only witness.
+
+A robot that obeys is near its command, or comes nearer, or says that it is
+stalled; each packet that shows one of the three passes the plausibility check. "Nearer"
+means that the larger error of the two wheels fell below the least seen under
+this command by more than jitter, so that a robot that merely trembles is not
+believed for long.
+
+The speed that the robot is to have now, and when it is said.
+
+P2OS acknowledges nothing, so the present speed is sent on change and again at
+least every `refresh_ns`. Changes that come faster than `speed_spacing_ns` wait,
+and what they overtake is never sent.
+
+Invariant: nothing is sent until a speed was first set, nor after `release`.
 """
 
 import math
 from collections.abc import Callable, Container, Mapping
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 from p2os.client.goals import Axis, Goal
-from p2os.client.motors import Motors
-from p2os.client.notices import DeadmanStopped, Disobeyed, GapStopped, MotionEnded, MotorsDisabled, Notice
-from p2os.client.obedience import Obedience
+from p2os.client.notices import (
+    DeadmanStopped,
+    Disobeyed,
+    GapStopped,
+    MotionEnded,
+    MotorsDisabled,
+    MotorsDisabledError,
+    Notice,
+)
 from p2os.client.observer import Observer
-from p2os.client.problems import MotorsDisabledError
 from p2os.client.settings import ClientSettings
 from p2os.client.snapshots import Limits, RobotState
-from p2os.client.speeds import STILL, SpeedKeeper, Speeds
-from p2os.commands import Command, CommandNumber, enable, stop
 from p2os.errors import LocalProtocolError, UsageError
-from p2os.timing import NS_PER_S, Nanos
+from p2os.protocol.commands import Command, CommandNumber, enable, rvel, stop, vel
+from p2os.timing import NS_PER_MS, NS_PER_S, Nanos
+
+#: ENABLE goes out so often, so far apart.
+ENABLE_TIMES, ENABLE_EVERY_NS = 3, 200 * NS_PER_MS
+#: chosen: flags that say off are believed only so long after ENABLE: three packets.
+GRACE_NS: Nanos = 800 * NS_PER_MS
+#: Why motors went off, as the flags tell it.
+BUTTON_IS_PRESSED, BUTTON_WAS_PRESSED = "the STOP button is pressed", "the STOP button was pressed"
+
+
+class Motors:
+    """What is known of the motors of one session after another."""
+
+    def __init__(self) -> None:
+        #: Whether this session was told ENABLE 1 and nothing has switched the motors off since.
+        self.are_on = False
+        #: Why they went off without being told, or None.
+        self.taken_off: str | None = None
+        self._left = 0
+        self._due: Nanos | None = None
+        self._asked_at: Nanos = 0
+
+    def new_session(self) -> None:
+        """Know that they are off."""
+        self.are_on, self.taken_off = False, None
+        self._left, self._due = 0, None
+
+    def ask(self, *, on: bool, now: Nanos) -> None:
+        """Note that ENABLE is being sent."""
+        self.are_on, self.taken_off = on, None
+        self._asked_at = now
+        self._left = ENABLE_TIMES - 1 if on else 0
+        self._due = now + ENABLE_EVERY_NS if self._left else None
+
+    def next_deadline(self) -> Nanos | None:
+        """Return when ENABLE is to be sent again."""
+        return self._due
+
+    def take_repeat(self, now: Nanos) -> bool:
+        """Tell whether ENABLE is to be sent now."""
+        if self._due is None or now < self._due:
+            return False
+        self._left -= 1
+        self._due = now + ENABLE_EVERY_NS if self._left else None
+        return True
+
+    def take(self, state: RobotState, now: Nanos) -> str | None:
+        """Take a state; return why the motors went off, once."""
+        if state.motors_enabled:
+            self._left, self._due = 0, None
+        if self.taken_off == BUTTON_IS_PRESSED and not state.stop_button:
+            self.taken_off = BUTTON_WAS_PRESSED
+        if not self.are_on or state.motors_enabled is not False or now - self._asked_at < GRACE_NS:
+            return None
+        self.are_on = False
+        self._left, self._due = 0, None
+        self.taken_off = BUTTON_IS_PRESSED if state.stop_button else "they were switched off at the robot"
+        return self.taken_off
+
+
+#: chosen: 1 deg/s is 3 mm/s at the rim of a 2-DX, speeds are whole mm/s, and motors hunt.
+TOLERANCE_MPS = 0.04
+#: chosen: beside it, for large robots at speed.
+TOLERANCE_SHARE = 0.15
+#: chosen: less than a tenth of what the gentlest acceleration makes between two packets.
+PROGRESS_MPS = 0.002
+
+
+class PlausibilityCheck:
+    """Compares what was commanded with what the wheels do, in m/s of each wheel."""
+
+    def __init__(self, patience_ns: Nanos) -> None:
+        self._patience_ns = patience_ns
+        self._command: tuple[float, float] | None = None
+        self._least_error = 0.0
+        self._plausible_at: Nanos = 0
+        self._has_reported = False
+        self._was_near = False
+
+    def expect(self, wheels: tuple[float, float] | None, measured: tuple[float, float], now: Nanos) -> None:
+        """Take what the wheels are to do from now on; None: nothing is expected of them.
+
+        A new command measures progress from where the wheels are, and buys no time.
+        """
+        if wheels == self._command:
+            return
+        if wheels is None or self._command is None:
+            self._plausible_at, self._has_reported = now, False
+        self._command = wheels
+        if wheels is not None:
+            self._least_error = self._error(measured)
+
+    def take(self, measured: tuple[float, float], *, stalled: bool, now: Nanos) -> str | None:
+        """Take the wheel speeds of a packet; return what is not believed, once, or None."""
+        if self._command is None:
+            return None
+        error = self._error(measured)
+        near = error <= TOLERANCE_MPS + TOLERANCE_SHARE * max(map(abs, self._command))
+        if near or stalled or error <= self._least_error - PROGRESS_MPS:
+            self._least_error, self._plausible_at, self._has_reported = error, now, False
+            self._was_near = near
+            return None
+        if self._was_near:
+            self._was_near, self._least_error = False, error  # it has left by itself: its way back counts from here
+        if self._has_reported or now - self._plausible_at < self._patience_ns:
+            return None
+        self._has_reported = True
+        return (
+            f"for {self._patience_ns / NS_PER_S:g} s the wheels are at {measured[0]:.2f} and {measured[1]:.2f} m/s, "
+            f"commanded {self._command[0]:.2f} and {self._command[1]:.2f}, and no stall flag"
+        )
+
+    def _error(self, measured: tuple[float, float]) -> float:
+        command = self._command or measured
+        return max(abs(command[0] - measured[0]), abs(command[1] - measured[1]))
+
+
+@dataclass(frozen=True, slots=True)
+class Speeds:
+    """What VEL and RVEL carry: whole mm/s forward and deg/s counter-clockwise."""
+
+    forward_mm_s: int = 0
+    turn_deg_s: int = 0
+
+    @classmethod
+    def of(cls, forward_mps: float, turn_radps: float) -> "Speeds":
+        """Round SI units to what the wire can carry."""
+        return cls(round(forward_mps * 1000), round(math.degrees(turn_radps)))
+
+    @property
+    def forward_mps(self) -> float:
+        """Metres a second."""
+        return self.forward_mm_s / 1000
+
+    @property
+    def turn_radps(self) -> float:
+        """Radians a second."""
+        return math.radians(self.turn_deg_s)
+
+    @property
+    def are_zero(self) -> bool:
+        """Whether the robot is to stand."""
+        return self == STILL
+
+
+STILL = Speeds()
+
+
+class SpeedKeeper:
+    """The newest speeds, and when to say them."""
+
+    def __init__(self, *, spacing_ns: Nanos, refresh_ns: Nanos) -> None:
+        self._spacing_ns = spacing_ns
+        self._refresh_ns = refresh_ns
+        self.wanted = STILL
+        self.is_held = False
+        self._said: Speeds | None = None
+        self._said_at: Nanos = 0
+
+    def hold(self, speeds: Speeds) -> None:
+        """Keep the robot at these speeds from now on."""
+        self.wanted = speeds
+        self.is_held = True
+
+    def release(self) -> None:
+        """Say nothing more: something else moves the robot, or nothing does."""
+        self.wanted = STILL
+        self.is_held = False
+        self._said = None
+
+    def next_deadline(self) -> Nanos | None:
+        """Return when the speeds are to be said, or None while none are held; 0 for at once."""
+        if not self.is_held:
+            return None
+        if self._said is None:
+            return self._said_at + self._spacing_ns if self._said_at else 0
+        return self._said_at + (self._spacing_ns if self.wanted != self._said else self._refresh_ns)
+
+    def take(self, now: Nanos) -> tuple[Command, Command]:
+        """Return the two commands to send at `now`."""
+        self._said, self._said_at = self.wanted, now
+        return vel(self.wanted.forward_mm_s), rvel(self.wanted.turn_deg_s)
+
 
 #: What moves a robot: sent raw, it takes the place of held speeds.
 MOTION_NUMBERS = frozenset(
@@ -70,7 +280,7 @@ class Mover:
         self._tell = tell
         self._speeds = SpeedKeeper(spacing_ns=settings.speed_spacing_ns, refresh_ns=settings.refresh_ns)
         self._motors = Motors()
-        self._obedience = Obedience(settings.disbelief_ns)
+        self._plausibility = PlausibilityCheck(settings.plausibility_ns)
         self._goal: Goal | None = None
         #: Puts the robot's largest speed back after a goal with its own.
         self._speed_back: Command | None = None
@@ -195,7 +405,7 @@ class Mover:
         """Let nothing move the robot any more, without a word to it."""
         self._end_goal(why, now)
         self._speeds.release()
-        self._obedience.expect(None, self._observer.wheels_mps, now)
+        self._plausibility.expect(None, self._observer.wheels_mps, now)
 
     def lose(self, now: Nanos) -> None:
         """Take the loss of the link: nothing more can be sent."""
@@ -209,7 +419,7 @@ class Mover:
             self.forget("the motors went off", now)
             self._tell(MotorsDisabled(f"motors are disabled: {reason}"))
         wheels = (state.left_mps, state.right_mps)
-        doubt = self._obedience.take(wheels, stalled=state.is_stalled, now=now)
+        doubt = self._plausibility.take(wheels, stalled=state.is_stalled, now=now)
         if doubt is not None:
             stands = max(map(abs, wheels)) == 0
             advice = "; are the motors disabled (MOTORS button, STOP button)?" if stands else ""
@@ -257,7 +467,7 @@ class Mover:
         self._speeds.hold(speeds)
         rim = speeds.turn_radps * self._observer.parameters.track_mm / 2000
         wheels = (speeds.forward_mps - rim, speeds.forward_mps + rim)
-        self._obedience.expect(wheels, self._observer.wheels_mps, now)
+        self._plausibility.expect(wheels, self._observer.wheels_mps, now)
 
     def _end_goal(self, problem: str | None, now: Nanos) -> None:
         goal, self._goal = self._goal, None

@@ -1,10 +1,36 @@
-"""What a client tells its program beside the states: past-tense facts, in order."""
+"""What a client tells its program beside the states: past-tense facts, in order.
+
+What a client raises, one class for each thing that a program may want to catch.
+
+All are `P2osError`: one line for a person, and a hint.
+"""
 
 from dataclasses import dataclass
 
-from p2os.config_packet import ConfigPacket
-from p2os.packets import Identity, ServerPacket
+from p2os.errors import LocalProtocolError, TransportError
+from p2os.protocol.config_packet import ConfigPacket
+from p2os.protocol.packets import Identity, ServerPacket
 from p2os.timing import Nanos
+
+
+class ConnectError(TransportError):
+    """No session could be opened; the message says how far it came."""
+
+
+class LinkLostError(TransportError):
+    """The session is gone, or was gone since the last motion call; the robot was told to stop."""
+
+
+class NoAnswerError(TransportError):
+    """The robot did not answer a request in time; it may not have what was asked for."""
+
+
+class MotorsDisabledError(LocalProtocolError):
+    """The motors are off, and this client does not switch them on by itself."""
+
+
+class MotionError(LocalProtocolError):
+    """`drive` or `turn` did not arrive: it stalled, was too slow, or something else took its place."""
 
 
 @dataclass(frozen=True, slots=True)

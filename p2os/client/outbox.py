@@ -1,4 +1,4 @@
-"""What a skin is to do with the line, in order and no faster than the robot can take it.
+"""What an I/O layer is to do with the line, in order and no faster than the robot can take it.
 
 AROS loses commands that come nearer than 3 to 5 ms (Pioneer 2/3 H8 manual, page
 42), so frames leave one by one. Opening, closing and changing the speed of the
@@ -9,8 +9,8 @@ from collections import deque
 from collections.abc import Container, Iterable
 from dataclasses import dataclass
 
+from p2os.protocol.frames import PREFIX_BYTES
 from p2os.timing import NS_PER_S, Nanos
-from p2os.wire.frame import PREFIX_BYTES
 
 #: Bits of a byte on a serial line: start, eight, stop.
 BITS_PER_BYTE = 10

@@ -14,18 +14,17 @@ from collections.abc import Callable, Iterator
 from types import TracebackType
 from typing import Self
 
-from p2os.client.aux_stream import AuxStream
+from p2os.client.aux_ports import AuxStream
 from p2os.client.calls import Result, RobotCalls
-from p2os.client.core import RobotCore
-from p2os.client.engine import Engine, Opener
+from p2os.client.core import PacketType, RobotCore, request_for
 from p2os.client.goals import Axis, DriveAxis, MotionResult, TurnAxis
 from p2os.client.interrupts import exit_on_signals
+from p2os.client.line import core_for, motion_result, no_answer, not_connected, not_found
 from p2os.client.notices import Notice
-from p2os.client.opening import core_for, motion_result, no_answer, not_connected, not_found
-from p2os.client.requests import PacketType, request_for
+from p2os.client.robot_thread import Opener, RobotThread
 from p2os.client.settings import ClientSettings
 from p2os.client.snapshots import Link, RobotState
-from p2os.parameters import RobotParameters
+from p2os.robots.parameters import RobotParameters
 from p2os.timing import NS_PER_S, Nanos
 from p2os.transport import open_url
 from p2os.transport.wall_clock import Clock, wall_clock
@@ -65,7 +64,7 @@ class Robot(RobotCalls):
             url, model=model, auto_enable=auto_enable, reconnect=reconnect, deadman_s=deadman_s, settings=settings
         )
         self.url = url
-        self._engine = Engine(core, baud, lambda: opener(url), clock)
+        self._engine = RobotThread(core, baud, lambda: opener(url), clock)
         self._finalizer = weakref.finalize(self, self._engine.shut_down)
 
     # Coming and going ---------------------------------------------------------------------
@@ -131,7 +130,7 @@ class Robot(RobotCalls):
         """Ask the robot for a packet of a type, and return it.
 
         Args:
-            kind: Such as `IoPacket` or `EncoderPacket` of `p2os.packets`.
+            kind: Such as `IoPacket` or `EncoderPacket` of `p2os.protocol.packets`.
             timeout_s: How long it may take.
 
         Raises:

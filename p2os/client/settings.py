@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 
 from p2os.errors import UsageError
-from p2os.profiles import Profile
+from p2os.protocol.profiles import Profile
 from p2os.timing import NS_PER_MS, NS_PER_S, Nanos
 
 #: Baud rates of a Pioneer's HOST port, the likeliest first (Pioneer 3 manual, HOSTBAUD; 9600 is the default).
@@ -37,13 +37,13 @@ class ClientSettings:
     #: AROS loses commands that come nearer than 3 to 5 ms (Pioneer 2/3 H8 manual, page 42).
     command_spacing_ns: Nanos = 5 * NS_PER_MS
     #: A robot that neither approaches its command nor says that it stalls for so long is reported.
-    disbelief_ns: Nanos = 1 * NS_PER_S
+    plausibility_ns: Nanos = 1 * NS_PER_S
     #: How long a fresh TCP line is listened to for a robot that is open already: two and a half cycles.
     listen_ns: Nanos = 250 * NS_PER_MS
     #: First round of the search, one try a rate: robots answer within 110 ms (measured on a simulator).
     quick_sync_ns: Nanos = 400 * NS_PER_MS
     #: Second round, for slow lines; ARIA waits as long.
-    patient_sync_ns: Nanos = 1 * NS_PER_S
+    slow_sync_ns: Nanos = 1 * NS_PER_S
     #: From the identity to OPEN: the manual's spacing of commands.
     open_delay_ns: Nanos = 5 * NS_PER_MS
     #: From the first OPEN to the first packet; OPEN is repeated meanwhile.
@@ -59,8 +59,9 @@ class ClientSettings:
     longest_backoff_ns: Nanos = 5 * NS_PER_S
 
     def __post_init__(self) -> None:
-        for name in ("liveness_ns", "refresh_ns", "speed_spacing_ns", "command_spacing_ns", "disbelief_ns", "listen_ns",
-                     "quick_sync_ns", "patient_sync_ns", "open_delay_ns", "first_packet_ns", "raise_window_ns",
+        for name in ("liveness_ns", "refresh_ns", "speed_spacing_ns", "command_spacing_ns", "plausibility_ns",
+                     "listen_ns",
+                     "quick_sync_ns", "slow_sync_ns", "open_delay_ns", "first_packet_ns", "raise_window_ns",
                      "backoff_ns", "longest_backoff_ns"):  # fmt: skip
             if getattr(self, name) <= 0:
                 raise UsageError(f"{name} = {getattr(self, name)} must be positive")

@@ -9,7 +9,7 @@ import math
 from dataclasses import dataclass
 from enum import Enum
 
-from p2os.sip import StandardSip
+from p2os.protocol.sip import StandardSip
 from p2os.timing import Nanos
 
 
@@ -33,7 +33,7 @@ class Link(Enum):
 
 
 @dataclass(frozen=True, slots=True)
-class Pose:
+class RobotPose:
     """A place and a direction: metres, and radians that do not wrap."""
 
     x_m: float = 0.0
@@ -84,9 +84,9 @@ class RobotState:
     #: When the packet came, on the client's clock.
     at_ns: Nanos
     #: Where the robot is, over sessions and `set_pose`.
-    pose: Pose
+    pose: RobotPose
     #: The robot's own count since its session opened.
-    odometry: Pose = Pose()
+    odometry: RobotPose = RobotPose()
     #: What the wheels do: m/s forward and of each wheel, rad/s counter-clockwise.
     forward_mps: float
     turn_radps: float

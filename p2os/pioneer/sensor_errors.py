@@ -10,7 +10,7 @@ A TOML file starts from one of them and changes what it names:
     [odometry]
     left_wheel = 1.01
 
-What acts where: `p2os.pioneer.sonar_errors` on the echoes, the odometer on the
+What acts where: `p2os.pioneer.sonar.errors` on the echoes, the odometer on the
 wheel angles, the devices on compass, gyro and battery.
 """
 
@@ -34,11 +34,11 @@ class SonarErrors:
     #: Standard deviation of every echo, m, and its part of the range.
     noise_m: float = 0.0
     noise_part: float = 0.0
-    #: Chance that an echo is not heard.
+    #: Probability that an echo is not heard.
     dropout: float = 0.0
     #: A surface met at more than this from the square sends no echo back, deg; 90 hears all.
     specular_deg: float = 90.0
-    #: Chance that a sonar hears the ping of the one fired before it: the range is drawn anew, always nearer.
+    #: Probability that a sonar hears the ping of the one fired before it: the range is drawn anew, always nearer.
     crosstalk: float = 0.0
 
 

@@ -1,6 +1,6 @@
 """Byte lines behind one function: `open_url("serial:… | tcp:… | pty: | loop:…")`.
 
-Nothing here knows of frames or robots, and nothing below the skin imports it.
+Nothing here knows of frames or robots, and nothing below the I/O layer imports it.
 """
 
 from pathlib import Path

@@ -1,11 +1,95 @@
-"""Waiting for descriptors: the one place that does."""
+"""Waiting for descriptors: the one place that does.
 
+How lines end: whether the far side has gone, and peers that are sent away with a word.
+
+`has_hung_up` asks without reading what the far side has left behind. `TurnedAway` keeps
+the lines of peers that were told why they cannot stay until they have heard it: to close
+a socket whose bytes are unread resets the connection, and the reset overtakes the words.
+"""
+
+import contextlib
 import select
 import time
 from collections.abc import Iterable
 
 from p2os.errors import TransportError
-from p2os.transport.ports import Transport
+from p2os.timing import NS_PER_S, Nanos
+from p2os.transport.ports import READ_BYTES, Transport
+from p2os.transport.sockets import SocketTransport
+from p2os.transport.wall_clock import Clock
+
+#: chosen: a peer reads a line within a round trip, and this is many.
+LONGEST_LEAVING_NS: Nanos = 2 * NS_PER_S
+#: chosen: of a thousand that come at once these hear why; each is a descriptor meanwhile.
+MOST_LEAVING = 16
+#: chosen: 64 KB of what such a peer still says are read away a look, so that none of them keeps the others waiting.
+READS_A_LOOK = 16
+
+
+def has_hung_up(descriptor: int) -> bool:
+    """Tell whether the other end is closed, though bytes may still wait; False where a system cannot tell."""
+    if not hasattr(select, "poll"):
+        return False
+    closed_for_writing: int = getattr(select, "POLLRDHUP", 0)  # Linux alone tells that of a socket
+    poll = select.poll()
+    poll.register(descriptor, closed_for_writing)
+    gone = select.POLLHUP | select.POLLERR | closed_for_writing
+    return any(event & gone for _, event in poll.poll(0))
+
+
+class TurnedAway:
+    """Peers that were told why they cannot stay.
+
+    Args:
+        clock: Nanoseconds; never goes back.
+    """
+
+    def __init__(self, clock: Clock) -> None:
+        self._clock = clock
+        self._leaving: list[tuple[Transport, Nanos]] = []
+
+    def __len__(self) -> int:
+        """Return how many have not left yet."""
+        return len(self._leaving)
+
+    def add(self, transport: Transport, reason: str) -> None:
+        """Tell a peer a reason, and close its line once it has left; at once where a line cannot carry a reason."""
+        if not isinstance(transport, SocketTransport):
+            _close(transport)
+            return
+        transport.turn_away(reason)
+        self._leaving.append((transport, self._clock() + LONGEST_LEAVING_NS))
+        if len(self._leaving) > MOST_LEAVING:
+            _close(self._leaving.pop(0)[0])
+        self.look()
+
+    def look(self) -> None:
+        """Close the lines of those that have left, or that were given time enough."""
+        if self._leaving:
+            now = self._clock()
+            self._leaving = [(line, until) for line, until in self._leaving if not _is_over(line, is_late=now >= until)]
+
+    def close(self) -> None:
+        """Close every line."""
+        while self._leaving:
+            _close(self._leaving.pop()[0])
+
+
+def _is_over(transport: Transport, *, is_late: bool) -> bool:
+    with contextlib.suppress(TransportError):
+        for _ in range(READS_A_LOOK):
+            if len(transport.read()) < READ_BYTES:
+                break
+        if not is_late:
+            return False
+    _close(transport)
+    return True
+
+
+def _close(transport: Transport) -> None:
+    with contextlib.suppress(TransportError):
+        transport.close()
+
 
 #: chosen: how often a line without a descriptor is asked for bytes; a millisecond is a character at 9600 bit/s.
 BLIND_POLL_S = 0.001

@@ -3,21 +3,21 @@
     adapter core (C++) ── line with bit errors, unplugged now and then ── p2os.pioneer ── kinematic body
 
 The BluePill of this life changes its motor values every few seconds, and gives its
-wish anew when the adapter has lost the robot.
+ask anew when the adapter has lost the robot.
 """
 
 import random
 from dataclasses import dataclass, field
 
-from p2os.commands import Command
 from p2os.errors import RemoteProtocolError
-from p2os.parameters import load_parameters
-from p2os.pioneer.body import make_body
-from p2os.pioneer.controller import ControllerSettings, Pioneer, SonarPerSip
-from p2os.pioneer.world import load_world
+from p2os.pioneer.body.choose import make_body
+from p2os.pioneer.controller.controller import ControllerSettings, Pioneer, SonarPerSip
+from p2os.pioneer.world.find import load_world
+from p2os.protocol.commands import Command
+from p2os.protocol.frames import Decoder, Frame
+from p2os.robots.parameters import load_parameters
 from p2os.timing import NS_PER_MS, NS_PER_S, Nanos
-from p2os.wire import Decoder, Frame
-from testbench.adapter_firmware import FirmwareAdapter
+from robot_bench.adapter import FirmwareAdapter
 from tests.adapter_sim.conftest import Rig
 
 MS = NS_PER_MS
@@ -31,19 +31,19 @@ ENCODERS = ("encoder1", "encoder2")
 class BadLine:
     """Flips bits at a rate; a start or stop bit that flips makes the character any other."""
 
-    def __init__(self, bit_error_rate: float, chance: random.Random) -> None:
-        self._rate, self._chance = bit_error_rate, chance
+    def __init__(self, bit_error_rate: float, random_source: random.Random) -> None:
+        self._rate, self._random_source = bit_error_rate, random_source
         self.frames = self.damaged = 0
         #: What went in and what came out, of the last frame.
         self.last: tuple[bytes, bytes] = (b"", b"")
 
     def damage(self, frame: bytes) -> bytes:
-        data, chance = bytearray(frame), self._chance
-        place = int(chance.expovariate(self._rate)) if self._rate else 1 << 60
+        data, random_source = bytearray(frame), self._random_source
+        place = int(random_source.expovariate(self._rate)) if self._rate else 1 << 60
         while place < len(data) * BITS_PER_CHARACTER:
             character, bit = divmod(place, BITS_PER_CHARACTER)
-            data[character] ^= 1 << (bit - 1) if 1 <= bit <= 8 else chance.randrange(1, 256)
-            place += 1 + int(chance.expovariate(self._rate))
+            data[character] ^= 1 << (bit - 1) if 1 <= bit <= 8 else random_source.randrange(1, 256)
+            place += 1 + int(random_source.expovariate(self._rate))
         self.frames += 1
         self.damaged += data != frame
         self.last = (frame, bytes(data))
@@ -74,7 +74,7 @@ class HardLife:
     """The life of one adapter; `live` runs it, every promise is checked on the way."""
 
     def __init__(self, seed: int, *, bit_error_rate: float) -> None:
-        self.chance = chance = random.Random(seed)
+        self.random_source = random_source = random.Random(seed)
         parameters = load_parameters("p2dx")
         world = load_world("room", seed=seed)
         body = make_body("kinematic", world, parameters)
@@ -83,7 +83,7 @@ class HardLife:
         self.robot = Pioneer(parameters=parameters, body=body, settings=settings)
         self.rig = rig = Rig(robot=self.robot, kind=FirmwareAdapter)
         self.heard = Heard()
-        self.forth, self.back = BadLine(bit_error_rate, chance), BadLine(bit_error_rate, chance)
+        self.forth, self.back = BadLine(bit_error_rate, random_source), BadLine(bit_error_rate, random_source)
         rig.to_robot.damage, rig.to_adapter.damage = self.forth.damage, self.back.damage
         receive = self.robot.receive
 
@@ -99,19 +99,19 @@ class HardLife:
         self._wrong_since: Nanos | None = None
         self._was_hidden = False
         self._plugged_at: Nanos = 0
-        self._wish_at: Nanos = 0
+        self._request_at: Nanos = 0
         self._motors_at: Nanos = 0
 
     def live(self, span: Nanos, *, unplug: int, reboot: int, fool: int = 0) -> None:
         """Live for a span with so many accidents at random times."""
         kinds = ["unplug"] * unplug + ["reboot"] * reboot + ["fool"] * fool
         end = self.rig.now + span
-        accidents = sorted((self.chance.randrange(self.rig.now, end), kind) for kind in kinds)
+        accidents = sorted((self.random_source.randrange(self.rig.now, end), kind) for kind in kinds)
         self.rig.pins.set("p2dx_con", True, self.rig.now)
         while self.rig.now < end:
             while accidents and accidents[0][0] <= self.rig.now:
                 getattr(self, f"_{accidents.pop(0)[1]}")()
-            self._wish()
+            self._connect_request()
             self.rig.run(self.rig.now + 20 * MS)
             self._check()
 
@@ -123,7 +123,7 @@ class HardLife:
     def _unplug(self) -> None:
         self.counts["unplugged"] += 1
         self.rig.to_robot.cut = self.rig.to_adapter.cut = True
-        self._plugged_at = self.rig.now + self.chance.randrange(30 * MS, 3 * NS_PER_S)
+        self._plugged_at = self.rig.now + self.random_source.randrange(30 * MS, 3 * NS_PER_S)
 
     def _reboot(self) -> None:
         """Forget the session and stand, as a controller that is switched off and on."""
@@ -137,19 +137,19 @@ class HardLife:
             wrong = Command.from_frame(Frame(bytes((11, 0x3B, 0xC8, 0)))).to_frame().to_bytes()
             self.robot.receive(wrong, self.rig.now)
 
-    def _wish(self) -> None:
-        """Be the BluePill: new motors, and the wish anew after a loss."""
+    def _connect_request(self) -> None:
+        """Be the BluePill: new motors, and the connect request anew after a loss."""
         rig = self.rig
         if self._plugged_at and rig.now >= self._plugged_at:
             rig.to_robot.cut = rig.to_adapter.cut = False
             self._plugged_at = 0
-        if rig.adapter.state == "lost" and rig.now >= self._wish_at:
+        if rig.adapter.state == "lost" and rig.now >= self._request_at:
             rig.pins.set("p2dx_con", False, rig.now)
             rig.pins.set("p2dx_con", True, rig.now + 40 * MS)
-            self._wish_at = rig.now + NS_PER_S
+            self._request_at = rig.now + NS_PER_S
         if rig.now >= self._motors_at:
-            rig.pins.motors(self.chance.randint(-4, 3), self.chance.randint(-4, 3), rig.now)
-            self._motors_at = rig.now + self.chance.randrange(500 * MS, 4 * NS_PER_S)
+            rig.pins.motors(self.random_source.randint(-4, 3), self.random_source.randint(-4, 3), rig.now)
+            self._motors_at = rig.now + self.random_source.randrange(500 * MS, 4 * NS_PER_S)
 
     # Promises.
 
@@ -207,6 +207,6 @@ class HardLife:
     def _check_events(self) -> None:
         for _, what, detail in self.rig.events:
             self.counts["sessions"] += what == "connected"
-            if what in {"lost", "disbelief"}:
+            if what in {"lost", "implausible"}:
                 self.counts["losses"] += 1
                 assert detail, "a loss has a reason"

@@ -11,10 +11,10 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-from p2os.commands import Command
+from p2os.protocol.commands import Command
+from p2os.protocol.frames import Decoder, Frame
 from p2os.transport import HungUpError, listen_url, open_url
 from p2os.transport.waiting import wait_readable
-from p2os.wire import Decoder, Frame
 
 #: Generous: a loaded machine is no fault of the program.
 PATIENCE_S = 60.0

@@ -10,15 +10,15 @@ each step, and what it drives carries the time of the instruction that did it.
 from collections.abc import Callable
 from pathlib import Path
 
-from adapter_sim.pinout import Pinout, Role
-from adapter_sim.states import AdapterState
+from adapter_sim.adapter import AdapterState
+from adapter_sim.pinout import Pinout, WireRole
 from bluepill_sim import BluePill
-from bluepill_sim.pins import PinDrive
-from p2os.pioneer.controller import Pioneer
+from bluepill_sim.fabric.pins import PinDrive
+from p2os.pioneer.controller.controller import Pioneer
 from p2os.timing import NS_PER_MS, Nanos, Reached
-from testbench.bench import Bench
-from testbench.sip_ranges import SipRanges
-from testbench.wires import OwnedPins
+from robot_bench.bench import Bench
+from robot_bench.recording.client_view import SipRanges
+from robot_bench.wires.nets import OwnedPins
 
 #: A quarter of what the adapter samples with.
 STEP_NS: Nanos = NS_PER_MS // 2
@@ -42,9 +42,9 @@ class SecondBluePill:
         self._on_the_line: list[tuple[Nanos, int]] = []
         self._step_at: Nanos = 0
         names = [name for value in ("motor1", "motor2") for name in pinout.value(value).wires]
-        names += [pinout.with_role(role)[0].name for role in (Role.CONNECT, Role.RESET)]
+        names += [pinout.with_role(role)[0].name for role in (WireRole.CONNECT, WireRole.RESET)]
         self._inputs = list(zip(names, map(self.chip.pin, INPUTS), strict=True))
-        outputs = [wire.name for wire in pinout.with_role(Role.DISTANCE)]
+        outputs = [wire.name for wire in pinout.with_role(WireRole.DISTANCE)]
         outputs += [name for value in ("encoder1", "encoder2") for name in pinout.value(value).wires]
         self._outputs = dict(zip(OUTPUTS, outputs, strict=True))
         self.chip.on_pin = self._drives

@@ -51,15 +51,15 @@ def test_ten_minutes_with_amrisim_lose_nothing(simulator: str, tmp_path: Path) -
     stored = tmp_path / "settings"
     stored.write_text("stop_unknown_robot 0\n", encoding="utf-8")  # its default build takes its first packet for a SYNC
     adapter, _ = built("program", tmp_path)
-    chance = random.Random(6)
+    random_source = random.Random(6)
     with running(adapter, simulator, "--robot", "p3dx", "--settings", str(stored)) as program:
         program.wires(CONNECT)
         program.event("driving")
         end = time.monotonic() + SPAN_S
         while time.monotonic() < end:
-            program.wires(CONNECT | motors(chance.randint(-4, 3), chance.randint(-4, 3)))
-            time.sleep(chance.uniform(0.3, 3.0))
-            assert not [line for line in program.events.lines if "lost" in line or "disbelief" in line]
+            program.wires(CONNECT | motors(random_source.randint(-4, 3), random_source.randint(-4, 3)))
+            time.sleep(random_source.uniform(0.3, 3.0))
+            assert not [line for line in program.events.lines if "lost" in line or "implausible" in line]
         program.wires(CONNECT)
         program.type("status")
         counters = program.answer("SIPs ")

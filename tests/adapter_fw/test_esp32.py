@@ -9,8 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from adapter_sim.pin_rules import faults_of
-from adapter_sim.pinout import load_pinout
+from adapter_sim.pinout import faults_of, load_pinout
 from tests.adapter_fw.builds import BUILD, ROOT, built, load_script
 
 CHECK = load_script("adapter_fw/check_esp32.py")
@@ -93,7 +92,7 @@ def test_the_librarys_two_descriptions_agree_with_each_other_and_the_firmware() 
     lines = (FIRMWARE / "library" / "library.properties").read_text(encoding="utf-8").splitlines()
     properties = dict(line.split("=", 1) for line in lines)
     assert (described["name"], described["version"]) == (properties["name"], properties["version"])
-    header = (FIRMWARE / "core" / "shell" / "version.hpp").read_text(encoding="utf-8")
+    header = (FIRMWARE / "core" / "app" / "version.hpp").read_text(encoding="utf-8")
     assert f'"{described["version"]}"' in header
     for example in described["examples"]:
         for name in example["files"]:

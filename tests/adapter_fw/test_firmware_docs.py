@@ -17,7 +17,7 @@ def test_the_wiring_is_that_of_the_pinout() -> None:
 
 
 def test_every_line_of_the_console_is_explained() -> None:
-    source = (ROOT / "adapter_fw" / "core" / "shell" / "console.cpp").read_text(encoding="utf-8")
+    source = (ROOT / "adapter_fw" / "core" / "app" / "console.cpp").read_text(encoding="utf-8")
     verbs = set(re.findall(r'is\("(\w+)", \d\)', source))
     assert len(verbs) == 10 + 1, verbs
     for verb in verbs:
@@ -31,7 +31,7 @@ def test_every_proof_that_is_named_exists() -> None:
 
 
 def test_the_version_in_the_bring_up_is_the_firmwares() -> None:
-    header = (ROOT / "adapter_fw" / "core" / "shell" / "version.hpp").read_text(encoding="utf-8")
+    header = (ROOT / "adapter_fw" / "core" / "app" / "version.hpp").read_text(encoding="utf-8")
     version = re.search(r'"([\d.]+)"', header)
     assert version is not None
     assert f"P2OS adapter {version[1]}, board rev-b; type help" in TEXT

@@ -12,11 +12,11 @@ from math import sqrt
 
 import pytest
 
-from p2os.profiles import Profile
-from p2os.sip import SonarReading, StandardSip
+from p2os.protocol.frames import checksum
+from p2os.protocol.profiles import Profile
+from p2os.protocol.sip import SonarReading, StandardSip
 from p2os.timing import NS_PER_MS, NS_PER_S
-from p2os.wire import checksum
-from testbench.adapter_firmware import is_available
+from robot_bench.adapter import is_available
 from tests.adapter_fw.hard_life import BITS_PER_CHARACTER, HardLife
 
 pytestmark = pytest.mark.skipif(not is_available(), reason="the firmware core is not built: no C++17 compiler")

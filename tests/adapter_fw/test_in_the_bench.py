@@ -6,9 +6,9 @@ import pytest
 
 from p2os.errors import UsageError
 from p2os.timing import NS_PER_S
-from testbench.adapter_firmware import FirmwareAdapter, default_settings, is_available, setting_numbers
-from testbench.bench import Bench
-from testbench.scenario import Scenario, load_scenario
+from robot_bench.adapter import FirmwareAdapter, default_settings, is_available, setting_numbers
+from robot_bench.bench import Bench
+from robot_bench.scenario.scenario import Scenario, load_scenario
 from tests.adapter_fw.builds import load_script
 from tests.adapter_fw.twins import PARAMETERS, PINOUT, AdapterSettings, FakePins
 

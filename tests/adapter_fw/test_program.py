@@ -15,9 +15,9 @@ from pathlib import Path
 
 import pytest
 
-from p2os.commands import Command
-from p2os.commands import CommandNumber as C
-from p2os.pioneer.served import served_pioneer
+from p2os.pioneer.serve.background import served_pioneer
+from p2os.protocol.commands import Command
+from p2os.protocol.commands import CommandNumber as C
 from tests.adapter_fw.builds import built
 from tests.adapter_fw.program import CONNECT, PATIENCE_S, RESET, Lines, Program, Relay, motors, running
 
@@ -90,7 +90,9 @@ def test_an_interrupted_program_stops_and_closes_the_robot_first(
     assert "closed: by its client" in robot.told
 
 
-def test_wires_that_are_pulled_out_end_the_wish_and_the_next_ones_see_the_levels(adapter: Path, tcp: str) -> None:
+def test_wires_that_are_pulled_out_end_the_connect_request_and_the_next_ones_see_the_levels(
+    adapter: Path, tcp: str
+) -> None:
     with running(adapter, tcp) as program:
         program.wires(CONNECT | motors(2, 2))
         program.event("command: VEL 125")
@@ -256,7 +258,7 @@ def drive(program: Program, relay: Relay) -> None:
     relay.wait(lambda said: said.count(Command(C.VEL, 125)) > 3)
 
 
-def check_stood_until_a_new_wish(program: Program, relay: Relay, before: int) -> None:
+def check_stood_until_a_new_connect_request(program: Program, relay: Relay, before: int) -> None:
     """Look at what the program has said since a pause, while p2dx_con and the motors' wires stood as before."""
     relay.wait(lambda said: len(said) >= before + 4)
     assert [command.number for command in relay.said[before : before + 4]] == STOPS
@@ -278,7 +280,7 @@ def test_a_stopped_program_says_stop_first_when_it_goes_on(adapter: Path, relay:
         time.sleep(PAUSE_S)
         before = len(relay.said)
         program.process.send_signal(signal.SIGCONT)
-        check_stood_until_a_new_wish(program, relay, before)
+        check_stood_until_a_new_connect_request(program, relay, before)
 
 
 def test_a_stopped_program_that_is_ended_says_stop_first_too(adapter: Path, relay: Relay, robot: Robot) -> None:
@@ -333,7 +335,7 @@ def test_a_program_that_slept_with_its_machine_says_stop_first(adapter: Path, re
             file.write(struct.pack("l", 8 * 3600))
         relay.wait(lambda said: Command(C.STOP) in said[-8:])
         stopped = len(relay.said) - 1 - relay.said[::-1].index(Command(C.STOP))
-        check_stood_until_a_new_wish(program, relay, stopped)
+        check_stood_until_a_new_connect_request(program, relay, stopped)
 
 
 # Standard error that nobody reads --------------------------------------------------------

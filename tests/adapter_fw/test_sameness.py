@@ -11,13 +11,13 @@ from hypothesis import strategies as st
 
 from adapter_sim import AdapterSettings
 from adapter_sim.codec import BitOrder
-from adapter_sim.gamepad import Master, PadReport
+from adapter_sim.mixing import Master, PadReport
 from adapter_sim.pinout import parse_pinout
 from adapter_sim.settings import EncoderAtOpen, MotorMeaning
-from p2os.profiles import Profile
-from p2os.sip import SonarReading
-from p2os.wire import Frame
-from testbench.adapter_firmware import is_available
+from p2os.protocol.frames import Frame
+from p2os.protocol.profiles import Profile
+from p2os.protocol.sip import SonarReading
+from robot_bench.adapter import is_available
 from tests.adapter_fw.twins import MS, Twins
 from tests.adapter_sim.conftest import four_bits
 

@@ -6,11 +6,11 @@ from pathlib import Path
 
 import pytest
 
-from p2os.commands import Command
+from p2os.protocol.commands import Command
+from p2os.protocol.frames import Decoder, Frame
 from p2os.timing import NS_PER_MS, NS_PER_S
-from p2os.wire import Decoder, Frame
-from testbench.bench import Bench
-from testbench.scenario import Scenario, load_scenario
+from robot_bench.bench import Bench
+from robot_bench.scenario.scenario import Scenario, load_scenario
 from tests.adapter_fw.budgets import documented, is_as_documented
 from tests.adapter_fw.builds import built
 from tests.adapter_fw.second_bluepill import SecondBluePillBench

@@ -3,14 +3,14 @@
 from dataclasses import dataclass, field, replace
 
 from adapter_sim import Adapter, AdapterSettings, Pinout, load_pinout
-from adapter_sim.gamepad import Master, PadReport
-from p2os.packets import Identity
-from p2os.parameters import load_parameters
-from p2os.profiles import Profile
-from p2os.sip import SonarReading, StandardSip
+from adapter_sim.mixing import Master, PadReport
+from p2os.protocol.frames import Frame
+from p2os.protocol.packets import Identity
+from p2os.protocol.profiles import Profile
+from p2os.protocol.sip import SonarReading, StandardSip
+from p2os.robots.parameters import load_parameters
 from p2os.timing import NS_PER_MS, Nanos
-from p2os.wire import Frame
-from testbench.adapter_firmware import FirmwareAdapter
+from robot_bench.adapter import FirmwareAdapter
 from tests.adapter_sim.conftest import FakePins
 
 PARAMETERS = load_parameters("p2dx")

@@ -7,13 +7,13 @@ from pathlib import Path
 import pytest
 
 from adapter_sim import Adapter, AdapterSettings, Pinout, load_pinout, motor_code
-from p2os.commands import Command
-from p2os.connection import CommandReceived, Connection, Opened, Role
-from p2os.packets import Identity
-from p2os.parameters import load_parameters
-from p2os.sip import SonarReading, StandardSip
+from p2os.protocol.commands import Command
+from p2os.protocol.connection import CommandReceived, Connection, ConnectionRole, Opened
+from p2os.protocol.frames import Frame
+from p2os.protocol.packets import Identity
+from p2os.protocol.sip import SonarReading, StandardSip
+from p2os.robots.parameters import load_parameters
 from p2os.timing import NS_PER_MS, Nanos
-from p2os.wire import Frame
 
 PARAMETERS = load_parameters("p2dx")
 PINOUT = load_pinout()
@@ -76,7 +76,7 @@ class FakeRobot:
     """A server that obeys at once, and sends a SIP every 100 ms once open."""
 
     def __init__(self) -> None:
-        self.connection = Connection(Role.SERVER, identity=Identity("Fake", "Pioneer", "p2dx"))
+        self.connection = Connection(ConnectionRole.SERVER, identity=Identity("Fake", "Pioneer", "p2dx"))
         self.commands: list[tuple[Nanos, Command]] = []
         self.sip = StandardSip(sonar=tuple(SonarReading(number, 32_000) for number in range(8)))
         self.forward = self.turn = 0

@@ -8,7 +8,7 @@ from itertools import pairwise
 import pytest
 
 from adapter_sim import Adapter, AdapterSettings, EncoderAtOpen, parse_pinout
-from p2os.sip import SonarReading, StandardSip
+from p2os.protocol.sip import SonarReading, StandardSip
 from tests.adapter_sim.conftest import MS, PARAMETERS, PINOUT, FakePins, FakeRobot, Rig, four_bits
 
 

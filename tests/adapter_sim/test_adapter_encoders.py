@@ -7,9 +7,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from adapter_sim.encoders import HALF_COUNTS, ONE_BITS, EncoderGeometry, Encoders, forward_step, sine
-from adapter_sim.wheel_codes import CodeWalk
-from p2os.parameters import load_parameters
+from adapter_sim.encoders import HALF_COUNTS, ONE_BITS, CodeWalk, EncoderGeometry, Encoders, forward_step, sine
+from p2os.robots.parameters import load_parameters
 
 GEOMETRY = EncoderGeometry.of(load_parameters("p2dx"), 350_000_000)
 STEP_MM = math.pi * 165 / 8
@@ -98,12 +97,12 @@ def test_a_circle_home_does_not_return_the_encoders_to_zero() -> None:
 @pytest.mark.parametrize("side_mm", [500, 2_000, 7_000])
 @pytest.mark.parametrize("lost", [0.0, 0.05])
 def test_a_square_of_several_metres_ends_on_the_true_count(side_mm: int, lost: float) -> None:
-    encoders, walker, chance = fresh(), Walker(), random.Random(5)
+    encoders, walker, random_source = fresh(), Walker(), random.Random(5)
     for _ in range(4):
         for rolls in ([(12.5, 12.5)] * (side_mm // 12), [(-6.25, 6.25)] * 45):
             for left, right in rolls:
                 walker.roll(left, right)
-                if chance.random() >= lost:
+                if random_source.random() >= lost:
                     encoders.take(*walker.raw())
     encoders.take(*walker.raw())
     # A count of 0.84 mm × 2π of turning, and 0.27 mm of heading.
@@ -113,13 +112,13 @@ def test_a_square_of_several_metres_ends_on_the_true_count(side_mm: int, lost: f
 @settings(max_examples=15, deadline=None)
 @given(st.integers(0, 2**32), st.sampled_from([0.0, 0.05, 0.3]))
 def test_minutes_of_driving_do_not_add_up_an_error(seed: int, lost: float) -> None:
-    encoders, walker, chance = fresh(), Walker(), random.Random(seed)
+    encoders, walker, random_source = fresh(), Walker(), random.Random(seed)
     left = right = 0.0
     for packet in range(3_000):  # five minutes
         if packet % 13 == 0:
-            left, right = chance.uniform(-25, 25), chance.uniform(-25, 25)
+            left, right = random_source.uniform(-25, 25), random_source.uniform(-25, 25)
         walker.roll(left, right)
-        if chance.random() >= lost or packet % 3 == 0:
+        if random_source.random() >= lost or packet % 3 == 0:
             encoders.take(*walker.raw())
     encoders.take(*walker.raw())
     assert worst_error_mm(encoders, walker) < 20  # a third of a step of 64.8 mm

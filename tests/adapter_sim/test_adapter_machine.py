@@ -13,9 +13,9 @@ from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, initialize, invariant, precondition, rule
 
 from adapter_sim import Adapter, AdapterSettings
-from p2os.pioneer.body import make_body
-from p2os.pioneer.controller import Pioneer
-from p2os.pioneer.world import load_world
+from p2os.pioneer.body.choose import make_body
+from p2os.pioneer.controller.controller import Pioneer
+from p2os.pioneer.world.find import load_world
 from tests.adapter_sim.conftest import MS, PARAMETERS, FakeRobot, Rig
 
 #: Four steps of 62.5 mm/s; (3 + 4) steps over 357 mm.
@@ -51,7 +51,7 @@ class WatchedRig(Rig):
         if sips != self.sips:
             self.sips, self.last_sip = sips, self.now
         for at, what, _ in self.events[self.told :]:
-            if what in {"lost", "disbelief"}:
+            if what in {"lost", "implausible"}:
                 self.allowed = False
                 first = [name for _, name, _ in self.sent(at)][:3]
                 assert first == ["STOP", "VEL", "RVEL"], (what, first)
@@ -135,14 +135,14 @@ class AdapterMachine(RuleBasedStateMachine):
 
     @rule(seed=st.integers(0, 2**16), share=st.sampled_from([0.0, 0.05, 0.5]))
     def noise(self, seed: int, share: float) -> None:
-        chance = random.Random(seed)
+        random_source = random.Random(seed)
 
         def damage(frame: bytes) -> bytes:
-            if chance.random() >= share:
+            if random_source.random() >= share:
                 return frame
-            place = chance.randrange(len(frame))
-            return chance.choice(
-                [b"", frame[:place], frame[:place] + bytes((chance.randrange(256),)) + frame[place + 1 :]]
+            place = random_source.randrange(len(frame))
+            return random_source.choice(
+                [b"", frame[:place], frame[:place] + bytes((random_source.randrange(256),)) + frame[place + 1 :]]
             )
 
         self.rig.to_robot.damage = self.rig.to_adapter.damage = damage
@@ -180,7 +180,7 @@ class DeafRobotMachine(AdapterMachine):
     def nobody_drives_a_deaf_robot_for_long(self) -> None:
         rig = self.rig
         if rig.adapter.state == "driving":
-            assert rig.now <= rig.adapter._driver.belief.ends_at
+            assert rig.now <= rig.adapter._driver.plausibility.ends_at
 
 
 class PioneerMachine(AdapterMachine):
@@ -228,10 +228,10 @@ def counts_of_body(rig: Rig) -> tuple[int, int]:
 
 @pytest.mark.parametrize("seed", [1, 2])
 def test_counts_on_the_pins_equal_the_bodys_wheels_to_one_step(seed: int) -> None:
-    rig, chance = pioneer_rig(), random.Random(seed)
+    rig, random_source = pioneer_rig(), random.Random(seed)
     shown, codes = [0, 0], [0, 0]
     for step in range(42):
-        steps = [0, 0] if step >= 40 else [chance.choice([-2, -1, 0, 1, 2]) for _ in range(2)]
+        steps = [0, 0] if step >= 40 else [random_source.choice([-2, -1, 0, 1, 2]) for _ in range(2)]
         rig.pins.motors(*steps, rig.now)
         for _ in range(100):
             rig.ms(10)  # a program that polls at 100 Hz

@@ -7,8 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from adapter_sim import PinoutError, load_pinout, parse_pinout
-from adapter_sim.pin_rules import faults_of, require_usable
-from adapter_sim.pinout import Direction, Pull, Role, Safe
+from adapter_sim.pinout import Direction, Pull, Safe, WireRole, faults_of, require_usable
 from tests.adapter_sim.conftest import PINOUT, four_bits
 from tests.adapter_sim.conftest import PINOUT_TEXT as TEXT
 
@@ -34,7 +33,7 @@ def test_the_third_wire_of_a_value_weighs_most() -> None:
 
 
 def test_levels_are_safe_by_role() -> None:
-    safe = {Role.DISTANCE: Safe.HIGH, Role.ENCODER: Safe.HOLD}
+    safe = {WireRole.DISTANCE: Safe.HIGH, WireRole.ENCODER: Safe.HOLD}
     for wire in PINOUT.wires:
         assert wire.safe is safe.get(wire.role, Safe.LOW)
         assert wire.idle is (wire.pull is Pull.UP)

@@ -4,7 +4,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from adapter_sim.sample_clock import SampleClock
+from adapter_sim.pins import SampleClock
 from tests.adapter_sim.conftest import MS, Rig
 
 

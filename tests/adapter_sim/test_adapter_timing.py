@@ -6,13 +6,12 @@ from itertools import pairwise
 import pytest
 
 from adapter_sim import AdapterSettings
-from adapter_sim.belief import Belief
+from adapter_sim.driver import CommandPacer, PlausibilityCheck
 from adapter_sim.mixing import Speeds
-from adapter_sim.pacing import Pacer
-from adapter_sim.sampler import Debounce, Majority
-from p2os.commands import CommandNumber
-from p2os.sip import SonarReading
-from p2os.wire import Frame
+from adapter_sim.pins import Debounce, Majority
+from p2os.protocol.commands import CommandNumber
+from p2os.protocol.frames import Frame
+from p2os.protocol.sip import SonarReading
 from tests.adapter_sim.conftest import CHARACTER_NS, MS, FakePins, FakeRobot, Rig
 
 
@@ -82,7 +81,7 @@ def test_the_adapter_boots_300_ms_after_rst_falls(rig: Rig) -> None:
 
 
 def test_a_changed_pair_goes_out_at_once_or_at_the_spacing() -> None:
-    pacer = Pacer(spacing_ns=25 * MS, refresh_ns=200 * MS)
+    pacer = CommandPacer(spacing_ns=25 * MS, refresh_ns=200 * MS)
     pacer.begin(Speeds(1, 0))
     assert pacer.due_at(7) == 7
     pacer.take(1_000)
@@ -146,23 +145,23 @@ def test_one_second_of_deaf_wheels_is_disbelieved(driving: Rig) -> None:
     driving.pins.motors(3, 3, driving.now)
     driving.ms(2_000)
     at, what, why = driving.events[-1]
-    assert what == "disbelief"
+    assert what == "implausible"
     assert "wheels at 0 and 0 mm/s for 1.0 s, commanded 188 and 188" in why
     assert [name for _, name, _ in driving.sent(at)][:4] == ["STOP", "VEL", "RVEL", "CLOSE"]
 
 
-def doubt() -> Belief:
-    belief = Belief(patience_ns=1_000, tolerance_mm_s=40, progress_mm_s=5)
-    belief.begin(0)
-    belief.take(0, 0, stalled=False, now=0)
-    belief.expect(200, 200)
-    return belief
+def doubt() -> PlausibilityCheck:
+    plausibility = PlausibilityCheck(patience_ns=1_000, tolerance_mm_s=40, progress_mm_s=5)
+    plausibility.begin(0)
+    plausibility.take(0, 0, stalled=False, now=0)
+    plausibility.expect(200, 200)
+    return plausibility
 
 
-def test_patience_runs_from_the_last_belief() -> None:
-    belief = doubt()
-    belief.take(0, 0, stalled=False, now=900)
-    assert belief.ends_at == 1_000
+def test_patience_runs_from_the_last_plausibility() -> None:
+    plausibility = doubt()
+    plausibility.take(0, 0, stalled=False, now=900)
+    assert plausibility.ends_at == 1_000
 
 
 @pytest.mark.parametrize(
@@ -175,33 +174,35 @@ def test_patience_runs_from_the_last_belief() -> None:
         ((0, 0), True, 1_900),
     ],
 )
-def test_belief_is_renewed_by_approach_nearness_or_stall(speeds: tuple[int, int], stalled: bool, ends_at: int) -> None:
-    belief = doubt()
-    belief.take(*speeds, stalled=stalled, now=900)
-    assert belief.ends_at == ends_at
+def test_plausibility_is_renewed_by_approach_nearness_or_stall(
+    speeds: tuple[int, int], stalled: bool, ends_at: int
+) -> None:
+    plausibility = doubt()
+    plausibility.take(*speeds, stalled=stalled, now=900)
+    assert plausibility.ends_at == ends_at
 
 
 def test_jitter_does_not_buy_time_for_ever() -> None:
-    belief = doubt()
+    plausibility = doubt()
     for now in range(0, 5_000, 100):
-        belief.take(now // 100 % 2 * 6, now // 100 % 2 * 6, stalled=False, now=now)
-    assert belief.ends_at == 1_100
+        plausibility.take(now // 100 % 2 * 6, now // 100 % 2 * 6, stalled=False, now=now)
+    assert plausibility.ends_at == 1_100
 
 
 def test_a_new_command_buys_no_time() -> None:
-    belief = doubt()
+    plausibility = doubt()
     for now in range(100, 900, 100):
-        belief.expect(-200 if now % 200 else 200, 100)
-        belief.take(0, 0, stalled=False, now=now)
-    assert belief.ends_at == 1_000
+        plausibility.expect(-200 if now % 200 else 200, 100)
+        plausibility.take(0, 0, stalled=False, now=now)
+    assert plausibility.ends_at == 1_000
 
 
 def test_a_robot_knocked_off_its_speed_may_come_back_slowly() -> None:
-    belief = doubt()
-    belief.take(200, 200, stalled=False, now=100)
+    plausibility = doubt()
+    plausibility.take(200, 200, stalled=False, now=100)
     for now, speed in ((900, 20), (1_000, 40), (1_800, 60)):
-        belief.take(speed, speed, stalled=False, now=now)
-    assert belief.ends_at == 2_800
+        plausibility.take(speed, speed, stalled=False, now=now)
+    assert plausibility.ends_at == 2_800
 
 
 def test_a_distance_is_an_obstacle_once_it_is_a_second_old(driving: Rig) -> None:

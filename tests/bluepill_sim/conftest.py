@@ -4,7 +4,7 @@ from collections.abc import Callable
 
 import pytest
 
-from bluepill_sim.clocks import Clocks
+from bluepill_sim.fabric.clocks import Clocks
 from bluepill_sim.stm32f103 import ChipParts, make_parts, make_pins
 
 

@@ -5,8 +5,8 @@ from typing import Any
 
 import pytest
 
-from bluepill_sim.clocks import Clocks
-from bluepill_sim.pins import PinBank
+from bluepill_sim.fabric.clocks import Clocks
+from bluepill_sim.fabric.pins import PinBank
 
 #: Initial SP, reset vector, and there an endless loop (`b .`).
 IDLE_PROGRAM = (0x2000_5000).to_bytes(4, "little") + (0x0800_0009).to_bytes(4, "little") + b"\xfe\xe7\xfe\xe7"

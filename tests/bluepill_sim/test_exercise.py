@@ -11,7 +11,7 @@ import pytest
 pytest.importorskip("unicorn")
 
 from bluepill_sim.board import BluePill, BoardSnapshot
-from bluepill_sim.pins import PinDrive
+from bluepill_sim.fabric.pins import PinDrive
 
 HERE = Path(__file__).resolve().parent / "firmware"
 COMPILER = "arm-none-eabi-gcc"

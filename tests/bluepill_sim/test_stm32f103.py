@@ -4,7 +4,7 @@ from typing import Any
 
 import pytest
 
-from bluepill_sim.rcc import ResetCause
+from bluepill_sim.peripherals.rcc import ResetCause
 from bluepill_sim.stm32f103 import (
     BASES,
     BONDED_PINS,

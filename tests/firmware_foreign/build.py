@@ -10,7 +10,7 @@ import sys
 import tempfile
 from pathlib import Path
 
-from testbench.firmware import build as examples
+from robot_bench.firmware import build as examples
 
 HERE = Path(__file__).resolve().parent
 SOURCES = ("main.c", "hal/hal.c", "hal/hal_cortex.c", "hal/hal_gpio.c", "hal/hal_rcc.c", "hal/hal_uart.c")

@@ -45,7 +45,7 @@ _MODULE = """
 @pytest.fixture
 def fake_kicad(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[..., None]:
     """Put stand-ins in KiCad's place; returns a function that sets what they answer."""
-    from hardware.pcb import kicad, pours
+    from hardware.pcb.outputs import kicad, pours
 
     folder = tmp_path / "bin"
     folder.mkdir()

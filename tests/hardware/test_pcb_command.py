@@ -5,10 +5,11 @@ from pathlib import Path
 import pytest
 
 from hardware.pcb import __main__ as command
-from hardware.pcb import build, checks, kicad, pictures
-from hardware.pcb.design import VARIANTS
-from hardware.pcb.report import Verdict, judged, skipped
-from hardware.pcb.routing import RoutingError
+from hardware.pcb.checks import checks
+from hardware.pcb.checks.report import Verdict, judged, skipped
+from hardware.pcb.circuit.design import VARIANTS
+from hardware.pcb.layout.routing import RoutingError
+from hardware.pcb.outputs import build, kicad, pictures
 from hardware.pcb.spice.deck import Deck, limits
 from hardware.pcb.spice.run import Result
 

@@ -5,14 +5,14 @@ import shutil
 
 import pytest
 
-from hardware.pcb import build, copper, rules
-from hardware.pcb.design import BOARD_VARIANTS
-from hardware.pcb.design import build as design_of
-from hardware.pcb.footprints import FOOTPRINTS
-from hardware.pcb.netlist import DesignError, make
-from hardware.pcb.placement import Place, place, unturn
-from hardware.pcb.pours import kept_stitches, load_stitches, stitch_at, stitches_text
-from hardware.pcb.routing import (
+from hardware.pcb.checks import copper
+from hardware.pcb.circuit.design import BOARD_VARIANTS
+from hardware.pcb.circuit.design import build as design_of
+from hardware.pcb.circuit.netlist import DesignError, make
+from hardware.pcb.layout import rules
+from hardware.pcb.layout.footprints import FOOTPRINTS
+from hardware.pcb.layout.placement import Place, place, unturn
+from hardware.pcb.layout.routing import (
     RoutingError,
     antenna_area,
     fingerprint,
@@ -22,8 +22,10 @@ from hardware.pcb.routing import (
     run_router,
     turn,
 )
-from hardware.pcb.sexp import node
-from hardware.pcb.shapes import PadKind
+from hardware.pcb.layout.shapes import PadKind
+from hardware.pcb.outputs import build
+from hardware.pcb.outputs.pours import kept_stitches, load_stitches, stitch_at, stitches_text
+from hardware.pcb.outputs.sexp import node
 
 
 @pytest.mark.parametrize("variant", BOARD_VARIANTS)

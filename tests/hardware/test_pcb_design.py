@@ -5,12 +5,12 @@ import dataclasses
 import pytest
 
 from adapter_sim.pinout import load_pinout
-from hardware.pcb.design import VARIANTS, build
-from hardware.pcb.electrical import Check, all_checks, bom_faults, netlist_faults
-from hardware.pcb.modules import BLUEPILL_PINS, ESP32_PINS
-from hardware.pcb.netlist import Design, DesignError, make
-from hardware.pcb.parts import PARTS, Part
-from hardware.pcb.pin_checks import BOARDS, count_by_rule, findings
+from hardware.pcb.checks.pin_checks import BOARDS, count_by_rule, findings
+from hardware.pcb.circuit.design import VARIANTS, build
+from hardware.pcb.circuit.electrical import Check, all_checks, bom_faults, netlist_faults
+from hardware.pcb.circuit.modules import BLUEPILL_PINS, ESP32_PINS
+from hardware.pcb.circuit.netlist import Design, DesignError, make
+from hardware.pcb.circuit.parts import PARTS, Part
 
 PINOUT = load_pinout()
 

@@ -8,13 +8,14 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from hardware.pcb import build, checks, gerbers, project
-from hardware.pcb.bom import rows
-from hardware.pcb.design import BOARD_VARIANTS
-from hardware.pcb.design import build as design_of
-from hardware.pcb.placement import place
-from hardware.pcb.report import Verdict, table
-from hardware.pcb.sexp import SexpError, Text, child, children, node, number, parse, render, word
+from hardware.pcb.checks import checks, gerbers
+from hardware.pcb.checks.report import Verdict, table
+from hardware.pcb.circuit.design import BOARD_VARIANTS
+from hardware.pcb.circuit.design import build as design_of
+from hardware.pcb.layout.placement import place
+from hardware.pcb.outputs import build, project
+from hardware.pcb.outputs.bom import rows
+from hardware.pcb.outputs.sexp import SexpError, Text, child, children, node, number, parse, render, word
 
 
 @pytest.fixture(scope="module")

@@ -5,13 +5,14 @@ import zipfile
 
 import pytest
 
-from hardware.pcb import build, kicad, kicad_checks, pictures, pours
-from hardware.pcb.design import BOARD_VARIANTS, VARIANTS
-from hardware.pcb.design import build as design_of
-from hardware.pcb.footprints import FOOTPRINTS
-from hardware.pcb.pours import KicadMissingError, fill, kicad_python
-from hardware.pcb.report import Verdict
-from hardware.pcb.routing import RoutingError
+from hardware.pcb.checks import kicad_checks
+from hardware.pcb.checks.report import Verdict
+from hardware.pcb.circuit.design import BOARD_VARIANTS, VARIANTS
+from hardware.pcb.circuit.design import build as design_of
+from hardware.pcb.layout.footprints import FOOTPRINTS
+from hardware.pcb.layout.routing import RoutingError
+from hardware.pcb.outputs import build, kicad, pictures, pours
+from hardware.pcb.outputs.pours import KicadMissingError, fill, kicad_python
 
 needs_kicad = pytest.mark.skipif(
     kicad.version() is None,
@@ -221,7 +222,7 @@ TWINS = {
 def test_pads_stand_where_kicad_s_own_library_has_them(name: str) -> None:
     from pathlib import Path
 
-    from hardware.pcb.sexp import children, parse, word
+    from hardware.pcb.outputs.sexp import children, parse, word
 
     library, _, twin = TWINS[name].partition("/")
     file = Path("/usr/share/kicad/footprints") / f"{library}.pretty" / f"{twin}.kicad_mod"

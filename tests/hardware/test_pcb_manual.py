@@ -5,14 +5,14 @@ from pathlib import Path
 
 import pytest
 
-from adapter_sim.pinout import Pull, Role, load_pinout
-from hardware.pcb import checks, kicad_checks
-from hardware.pcb.bom import rows as bom_rows
-from hardware.pcb.design import TEST_POINTS
-from hardware.pcb.design import build as design_of
-from hardware.pcb.electrical import BANK_MIN_V, BATTERY_MAX_V, BATTERY_MIN_V, LM317_AVERAGE_MA, LM317_LIMIT_MA
-from hardware.pcb.first_power_up import EXPECTED, rows
-from hardware.pcb.pin_checks import BOARDS, count_by_rule, findings
+from adapter_sim.pinout import Pull, WireRole, load_pinout
+from hardware.pcb.checks import checks, kicad_checks
+from hardware.pcb.checks.pin_checks import BOARDS, count_by_rule, findings
+from hardware.pcb.circuit.design import TEST_POINTS
+from hardware.pcb.circuit.design import build as design_of
+from hardware.pcb.circuit.electrical import BANK_MIN_V, BATTERY_MAX_V, BATTERY_MIN_V, LM317_AVERAGE_MA, LM317_LIMIT_MA
+from hardware.pcb.circuit.first_power_up import EXPECTED, rows
+from hardware.pcb.outputs.bom import rows as bom_rows
 from hardware.pcb.spice.decks import decks
 
 DOCS = Path(__file__).resolve().parents[2] / "docs"
@@ -30,7 +30,7 @@ def test_the_pin_map_of_the_page_is_the_pin_map() -> None:
     wanted = []
     for wire in load_pinout().wires:
         pins = dict(wire.esp32)
-        pull = "47k, base of Q1" if wire.role is Role.RESET else pulls[wire.pull]
+        pull = "47k, base of Q1" if wire.role is WireRole.RESET else pulls[wire.pull]
         wanted.append(f"| {wire.name} | {wire.bluepill} | {pins['rev-b']} | {pins['rev-c']} | {pull} |")
     assert table(BOARD, "pins") == wanted
 
@@ -44,7 +44,7 @@ def test_the_voltages_of_the_manual_are_the_table_and_cover_every_test_point() -
 
 
 def test_a_test_point_without_a_voltage_is_refused(monkeypatch) -> None:
-    monkeypatch.setattr("hardware.pcb.first_power_up.TEST_POINTS", ("GND",))
+    monkeypatch.setattr("hardware.pcb.circuit.first_power_up.TEST_POINTS", ("GND",))
     with pytest.raises(ValueError, match="differ"):
         rows()
 

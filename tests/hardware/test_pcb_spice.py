@@ -5,8 +5,9 @@ import sys
 
 import pytest
 
-from hardware.pcb import build, checks
-from hardware.pcb.report import Verdict
+from hardware.pcb.checks import checks
+from hardware.pcb.checks.report import Verdict
+from hardware.pcb.outputs import build
 from hardware.pcb.spice import run
 from hardware.pcb.spice.deck import Deck, limits
 from hardware.pcb.spice.decks import decks
@@ -115,7 +116,7 @@ def test_without_ngspice_it_is_said_and_skipped(monkeypatch, tmp_path) -> None:
 
 def test_a_plot_is_drawn_for_each_deck(fake_ngspice, monkeypatch, tmp_path) -> None:
     pytest.importorskip("matplotlib", reason="matplotlib is not installed")
-    from hardware.pcb import pictures
+    from hardware.pcb.outputs import pictures
 
     fake_ngspice("top = 1.75")
     monkeypatch.setattr(build, "PICTURES", tmp_path / "pictures")

@@ -7,13 +7,13 @@ from pathlib import Path
 
 import pytest
 
-from p2os.commands import Command, CommandNumber
-from p2os.parameters import RobotParameters, load_parameters
-from p2os.pioneer.controller import ControllerSettings, Pioneer
-from p2os.profiles import Profile
-from p2os.sip import SIP_KINDS, StandardSip
+from p2os.pioneer.controller.controller import ControllerSettings, Pioneer
+from p2os.protocol.commands import Command, CommandNumber
+from p2os.protocol.frames import Decoder, Frame
+from p2os.protocol.profiles import Profile
+from p2os.protocol.sip import SIP_KINDS, StandardSip
+from p2os.robots.parameters import RobotParameters, load_parameters
 from p2os.timing import NS_PER_MS
-from p2os.wire import Decoder, Frame
 
 
 @dataclass(frozen=True)

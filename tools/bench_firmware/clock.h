@@ -2,7 +2,7 @@
 #ifndef BENCH_CLOCK_H
 #define BENCH_CLOCK_H
 
-#include "../../testbench/firmware/f103.h"
+#include "../../robot_bench/firmware/f103.h"
 
 #define BENCH_HCLK_HZ 72000000u
 

@@ -1,5 +1,5 @@
 /* Sleeps between SysTicks of 1 kHz at 72 MHz. */
-#include "../../testbench/firmware/f103.h"
+#include "../../robot_bench/firmware/f103.h"
 #include "clock.h"
 
 volatile uint32_t bench_rounds;

@@ -1,5 +1,5 @@
 /* Streams characters at 115200 baud, one an interrupt. */
-#include "../../testbench/firmware/f103.h"
+#include "../../robot_bench/firmware/f103.h"
 #include "clock.h"
 
 volatile uint32_t bench_rounds;

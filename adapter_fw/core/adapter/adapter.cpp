@@ -43,7 +43,7 @@ Adapter::Adapter(const Settings& settings, const RobotNumbers& robot, const Wire
       majority_(settings.sample_count),
       connect_(settings.connect_after_ns, settings.disconnect_after_ns),
       pad_(settings),
-      belief_(settings),
+      plausibility_(settings),
       pacer_(settings),
       left_walk_(settings.encoder_dwell_ns),
       right_walk_(settings.encoder_dwell_ns),
@@ -80,7 +80,7 @@ void Adapter::receive_pad(const PadReport& report, Nanos now) {
   pad_.take(report, now);
   if (master_ == Master::PAD && is_awake()) {
     if (wanted && !wants_robot()) {
-      end_of_wish("Down was pressed", now);
+      end_of_request("Down was pressed", now);
     }
     if (state_ == State::DRIVING) {
       pacer_.want(wanted_speeds());
@@ -103,7 +103,7 @@ void Adapter::set_master(Master master, Nanos now) {
   pad_.lose();
   tell(now, What::MASTER, text(master));
   if (is_awake()) {
-    enter(State::LOST, now, What::MASTER_WAITS, "waits for the new master's wish, given anew");
+    enter(State::LOST, now, What::MASTER_WAITS, "waits for a new connect request of the new master");
   }
   replan();
 }
@@ -204,8 +204,8 @@ void Adapter::run_open(Nanos now) {
     lose(What::LOST, "no SIP in time", now);
     return;
   }
-  if (state_ == State::DRIVING && now >= belief_.ends_at()) {
-    lose(What::DISBELIEF, "the wheels do not follow, and no stall flag", now);
+  if (state_ == State::DRIVING && now >= plausibility_.ends_at()) {
+    lose(What::IMPLAUSIBLE, "the wheels do not follow, and no stall flag", now);
     return;
   }
   if (now >= distances_.expires_at()) {
@@ -246,7 +246,7 @@ void Adapter::replan() {
     due = earlier(due, right_walk_.due_at(counts.right, now_));
   }
   if (state_ == State::DRIVING) {
-    due = earlier(due, earlier(belief_.ends_at(), pacer_.due_at(now_)));
+    due = earlier(due, earlier(plausibility_.ends_at(), pacer_.due_at(now_)));
   }
   if (is_stopping() && agenda_.stops_left > 0) {
     due = earlier(due, agenda_.stop_at);
@@ -272,7 +272,7 @@ void Adapter::sample(Nanos now) {
       pacer_.want(wanted_speeds());
     }
     if (connect_changed && !wants_robot()) {
-      end_of_wish("p2dx_con is low", now);
+      end_of_request("p2dx_con is low", now);
     }
   }
   if (state_ == State::LOST && !wants_robot()) {
@@ -296,7 +296,7 @@ void Adapter::send_pair(Nanos now) {
   }
   client_.send(CommandFrame(CommandNumber::VEL, speeds.forward_mm_s), now);
   client_.send(CommandFrame(CommandNumber::RVEL, speeds.turn_deg_s), now);
-  belief_.expect(mixer_.wheels_mm_s(speeds));
+  plausibility_.expect(mixer_.wheels_mm_s(speeds));
   if (speeds != before) {
     tell(now, What::COMMAND, "", speeds.forward_mm_s, speeds.turn_deg_s);
   }

@@ -8,22 +8,22 @@
 //     CONNECTING  the P2OS connection is being made; outputs safe
 //     SETTLING    OPEN: SETO and SONAR 1 sent, waits for odometry zero; distances live
 //     DRIVING     ENABLE 1 sent; motor values become VEL and RVEL; all live
-//     CLOSING     the wish has ended: STOP, VEL 0, RVEL 0, CLOSE sent; lasts stop_repeat_ns
-//     LOST        no SIP, no belief, no pad, a gap or a shutdown: the same four sent; waits for the wish to end
+//     CLOSING     the connect request has ended: STOP, VEL 0, RVEL 0, CLOSE sent; lasts stop_repeat_ns
+//     LOST        no SIP, implausible motion, no pad, a gap or a shutdown: the same four sent; waits for the connect request to end
 //
-// From LOST the way to motion leads over a new wish, whatever the robot does
-// meanwhile. adapter_sim/states.py has the table of transitions; this is its twin,
+// From LOST the way to motion leads over a new connect request, whatever the robot does
+// meanwhile. adapter_sim/adapter.py has the table of transitions; this is its twin,
 // and a test drives both with the same pins, bytes and times.
 //
 // Invariant: within one instant the order is fixed: reset wire, boot, connection,
-// sample, loss, belief, distances, encoders, speeds, stops.
+// sample, loss, plausibility, distances, encoders, speeds, stops.
 #pragma once
 
 #include <cstdint>
 
 #include "../../hal/pins.hpp"
 #include "../p2os/client.hpp"
-#include "belief.hpp"
+#include "plausibility.hpp"
 #include "distances.hpp"
 #include "encoders.hpp"
 #include "gamepad.hpp"
@@ -39,7 +39,7 @@ enum class State : std::uint8_t { RESET, BOOTING, IDLE, CONNECTING, SETTLING, DR
 //: What happened; the words are those of the Python model.
 enum class What : std::uint8_t {
   RESET, BOOTING, BOOTED, CONNECTING, CONNECTED, NO_CONNECTION, DRIVING, COMMAND, STALL, ODOMETRY_JUMPED,
-  DISCONNECTED, IDLE, LOST, DISBELIEF, PAD_LOST, MASTER, MASTER_WAITS, SHUTDOWN,
+  DISCONNECTED, IDLE, LOST, IMPLAUSIBLE, PAD_LOST, MASTER, MASTER_WAITS, SHUTDOWN,
 };
 const char* text(State state);
 const char* text(What what);
@@ -61,7 +61,7 @@ struct Agenda {
   std::int32_t stops_left = 0;
   std::int32_t enables_left = 0;
   std::uint32_t sips = 0;
-  //: Whether the session ended on the wish of its master.
+  //: Whether the session ended on the connect request of its master.
   bool closed_in_peace = false;
   bool stall_left = false;
   bool stall_right = false;
@@ -92,9 +92,9 @@ class Adapter final : private p2os::ClientListener {
   void receive(p2os::Bytes data, Nanos now);
   // Takes a pad's report that came at `now`.
   void receive_pad(const PadReport& report, Nanos now);
-  // Gives the robot to another master: stopped and closed first, and only a new wish starts it.
+  // Gives the robot to another master: stopped and closed first, and only a new connect request starts it.
   void set_master(Master master, Nanos now);
-  // Stops the robot, drives every output to its safe level, and waits for the wish to end. `reason` is static.
+  // Stops the robot, drives every output to its safe level, and waits for the connect request to end. `reason` is static.
   void shutdown(const char* reason, Nanos now);
   // Leaves out the time up to `now`, in which nobody called: what was due in it is not done late, the robot is
   // stopped as by `shutdown`, and STOP is the next frame out. `reason` is static.
@@ -142,7 +142,7 @@ class Adapter final : private p2os::ClientListener {
   void drive(Nanos now);
   void lose(What what, const char* why, Nanos now);
   void lose_pad(Nanos now);
-  void end_of_wish(const char* why, Nanos now);
+  void end_of_request(const char* why, Nanos now);
   void halt(Nanos now);
   void sample(Nanos now);
   void walk(Nanos now);
@@ -174,8 +174,8 @@ class Adapter final : private p2os::ClientListener {
   Majority majority_;
   Debounce connect_;
   Gamepad pad_;
-  Belief belief_;
-  Pacer pacer_;
+  PlausibilityCheck plausibility_;
+  CommandPacer pacer_;
   CodeWalk left_walk_;
   CodeWalk right_walk_;
   p2os::Identity identity_;

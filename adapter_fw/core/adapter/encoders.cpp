@@ -80,7 +80,7 @@ void Encoders::begin(Wheels counts) {
   turn_.forget();
   has_heading_ = false;
   heading_ = forward_ = 0;
-  // The lower border of a count, rounded up, so that floor gives the same count again.
+  // The lower boundary of a count, rounded up, so that floor gives the same count again.
   const std::int64_t steps = std::int64_t{1} << width_;
   offset_nm_ = {ceiling_divide(counts.left * per_turn_nm_, steps), ceiling_divide(counts.right * per_turn_nm_, steps)};
 }

@@ -1,7 +1,7 @@
-// A game pad as the adapter's other master: plain reports in, a wish and speeds out.
+// A game pad as the adapter's other master: plain reports in, a connect request and speeds out.
 //
 // Up connects, Down disconnects, R2 drives forward, L2 backward, the right stick
-// turns: the mapping of the thesis. The wish lasts from Up to Down, or until the
+// turns: the mapping of the thesis. The connect request lasts from Up to Down, or until the
 // pad is lost or the robot is; it has to be given anew then.
 #pragma once
 
@@ -31,8 +31,8 @@ class Gamepad {
   // Takes a report that came at `now`.
   void take(const PadReport& report, Nanos now);
 
-  // Forgets the wish: the session that it asked for has ended.
-  void forget_wish() { wants_robot_ = false; }
+  // Forgets the connect request: the session that it asked for has ended.
+  void forget_request() { wants_robot_ = false; }
   void reset() { *this = Gamepad(trigger_dead_, stick_dead_, loss_ns_); }
 
   bool wants_robot() const { return wants_robot_; }

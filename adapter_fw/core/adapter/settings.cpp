@@ -18,14 +18,14 @@ constexpr Nanos MIN_SAMPLE_NS = NS_PER_MS / 10, MIN_SPACING_NS = 1 * NS_PER_MS, 
 bool are_positive(const Settings& settings) {
   return settings.sample_period_ns > 0 && settings.pair_spacing_ns > 0 && settings.refresh_ns > 0 &&
          settings.pulse_ns > 0 && settings.liveness_ns > 0 && settings.first_sip_ns > 0 && settings.retry_ns > 0 &&
-         settings.disbelief_ns > 0 && settings.distance_stale_ns > 0 && settings.settle_ns > 0 &&
-         settings.stop_repeat_ns > 0 && settings.disbelief_progress_mm_s > 0 && settings.pad_loss_ns > 0;
+         settings.plausibility_ns > 0 && settings.distance_stale_ns > 0 && settings.settle_ns > 0 &&
+         settings.stop_repeat_ns > 0 && settings.plausibility_progress_mm_s > 0 && settings.pad_loss_ns > 0;
 }
 
 bool are_not_negative(const Settings& settings) {
   return settings.connect_after_ns >= 0 && settings.disconnect_after_ns >= 0 && settings.boot_ns >= 0 &&
          settings.encoder_dwell_ns >= 0 && settings.stop_repeats >= 0 && settings.step_um_per_s >= 0 &&
-         settings.angular_step_urad_per_s >= 0 && settings.disbelief_tolerance_mm_s >= 0 &&
+         settings.angular_step_urad_per_s >= 0 && settings.plausibility_tolerance_mm_s >= 0 &&
          settings.pad_velocity_mm_s >= 0 && settings.pad_rotation_mrad_s >= 0;
 }
 
@@ -44,13 +44,13 @@ bool are_bounded(const Settings& settings) {
   for (const Nanos time :
        {settings.sample_period_ns, settings.connect_after_ns, settings.disconnect_after_ns, settings.boot_ns,
         settings.pair_spacing_ns, settings.refresh_ns, settings.pulse_ns, settings.liveness_ns, settings.first_sip_ns,
-        settings.retry_ns, settings.disbelief_ns, settings.distance_stale_ns, settings.settle_ns,
+        settings.retry_ns, settings.plausibility_ns, settings.distance_stale_ns, settings.settle_ns,
         settings.encoder_dwell_ns, settings.stop_repeat_ns, settings.pad_loss_ns}) {
     if (time > MAX_TIME_NS) {
       return false;
     }
   }
-  return settings.disbelief_tolerance_mm_s <= MAX_SPEED_MM_S && settings.disbelief_progress_mm_s <= MAX_SPEED_MM_S;
+  return settings.plausibility_tolerance_mm_s <= MAX_SPEED_MM_S && settings.plausibility_progress_mm_s <= MAX_SPEED_MM_S;
 }
 
 }  // namespace

@@ -79,9 +79,9 @@ struct Settings {
   Nanos liveness_ns = 350 * NS_PER_MS;
   Nanos first_sip_ns = 1 * NS_PER_S;
   Nanos retry_ns = 1 * NS_PER_S;
-  Nanos disbelief_ns = 1 * NS_PER_S;
-  std::int64_t disbelief_tolerance_mm_s = 40;
-  std::int64_t disbelief_progress_mm_s = 5;
+  Nanos plausibility_ns = 1 * NS_PER_S;
+  std::int64_t plausibility_tolerance_mm_s = 40;
+  std::int64_t plausibility_progress_mm_s = 5;
   Nanos distance_stale_ns = 1 * NS_PER_S;
   Nanos settle_ns = 500 * NS_PER_MS;
   EncoderAtOpen encoder_at_open = EncoderAtOpen::ZERO;

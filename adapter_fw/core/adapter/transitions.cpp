@@ -21,7 +21,7 @@ void Adapter::clear() {
   majority_.reset();
   connect_.reset();
   pad_.lose();
-  belief_.begin(now_);
+  plausibility_.begin(now_);
   pacer_.begin({});
   distances_.forget();
   encoders_.begin({});
@@ -51,7 +51,7 @@ void Adapter::boot(Nanos now) {
   outputs_.show_encoders({}, now);
   client_.stop_unknown();
   next_sample_ = now;
-  enter(State::IDLE, now, What::BOOTED, "waits for its master's wish");
+  enter(State::IDLE, now, What::BOOTED, "waits for its master's connect request");
 }
 
 void Adapter::begin_session(Nanos now, const char* why) {
@@ -120,7 +120,7 @@ void Adapter::take_sip(const p2os::Sip& sip, Nanos now) {
   }
   const Wheels measured{divide_half_away(sip.raw_left_velocity * robot_.velocity_um_s_per_count, 1'000),
                         divide_half_away(sip.raw_right_velocity * robot_.velocity_um_s_per_count, 1'000)};
-  belief_.take(measured, sip.stall_left || sip.stall_right, now);
+  plausibility_.take(measured, sip.stall_left || sip.stall_right, now);
   if (sip.stall_left != agenda_.stall_left || sip.stall_right != agenda_.stall_right) {
     agenda_.stall_left = sip.stall_left;
     agenda_.stall_right = sip.stall_right;
@@ -132,14 +132,14 @@ void Adapter::take_sip(const p2os::Sip& sip, Nanos now) {
 void Adapter::drive(Nanos now) {
   agenda_.enables_left = ENABLES;
   pacer_.begin(wanted_speeds());
-  belief_.begin(now);
+  plausibility_.begin(now);
   enter(State::DRIVING, now, What::DRIVING, "odometry is taken, motors enabled");
 }
 
 void Adapter::lose(What what, const char* why, Nanos now) {
   halt(now);
   agenda_.closed_in_peace = false;
-  pad_.forget_wish();
+  pad_.forget_request();
   enter(State::LOST, now, what, why);
 }
 
@@ -152,7 +152,7 @@ void Adapter::lose_pad(Nanos now) {
 }
 
 // The master no longer wants the robot.
-void Adapter::end_of_wish(const char* why, Nanos now) {
+void Adapter::end_of_request(const char* why, Nanos now) {
   if (state_ == State::CONNECTING || is_open()) {
     halt(now);
     agenda_.closed_in_peace = true;

@@ -14,7 +14,7 @@ const char* text(What what) {
   constexpr const char* WORDS[] = {
       "reset",   "booting", "booted",          "connecting",   "connected", "no connection",
       "driving", "command", "stall",           "odometry jumped", "disconnected", "idle",
-      "lost",    "disbelief", "pad lost",      "master",       "master",    "shutdown",
+      "lost",    "implausible", "pad lost",      "master",       "master",    "shutdown",
   };
   return WORDS[static_cast<std::size_t>(what)];
 }

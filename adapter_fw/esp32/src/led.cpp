@@ -21,7 +21,7 @@ void start_led() {
 
 void show_on_led(const adapter::Adapter& part, p2os::Nanos now) {
   if constexpr (HAS_LED) {
-    gpio_set_level(LED, shell::led_is_on(part.state(), part.master(), now) ? 1 : 0);
+    gpio_set_level(LED, app::led_is_on(part.state(), part.master(), now) ? 1 : 0);
   }
 }
 

@@ -1,7 +1,7 @@
 // The status LED, on boards whose pin map has one; on others nothing.
 #pragma once
 
-#include "../../core/shell/led.hpp"
+#include "../../core/app/led.hpp"
 
 namespace esp32 {
 

@@ -14,10 +14,10 @@
 
 #include <pins.hpp>
 
-#include "../../core/shell/console.hpp"
-#include "../../core/shell/mode_button.hpp"
-#include "../../core/shell/runner.hpp"
-#include "../../core/shell/teller.hpp"
+#include "../../core/app/console.hpp"
+#include "../../core/app/mode_button.hpp"
+#include "../../core/app/runner.hpp"
+#include "../../core/app/teller.hpp"
 #include "../../generated/robots.hpp"
 #include "clock.hpp"
 #include "led.hpp"
@@ -54,23 +54,23 @@ adapter::Master other(adapter::Master master) {
   esp32::start_mode_button();
   esp32::start_led();
   const char* fault = nullptr;
-  const adapter::Settings settings = shell::stored_settings(store, board::WIRES, fault);
+  const adapter::Settings settings = app::stored_settings(store, board::WIRES, fault);
   if (fault != nullptr) {
     terminal.write("stored settings are left out: ");
     terminal.write(fault);
     terminal.write("\n");
   }
   line.start(settings.bauds[0]);
-  static shell::EventLog log;
-  static shell::Teller teller(log, terminal);
+  static app::EventLog log;
+  static app::Teller teller(log, terminal);
   static adapter::Adapter part(settings, ROBOT, board::WIRES, clock.now());
   part.attach(&wires, &wires, &teller);
   if (starts_with_pad) {
     part.set_master(adapter::Master::PAD, clock.now());
   }
-  shell::Runner runner(part, clock, line, esp32::pad());
-  shell::Console console({part, log, wires, store, terminal, board::WIRES, board::REVISION});
-  shell::ModeButton button;
+  app::Runner runner(part, clock, line, esp32::pad());
+  app::Console console({part, log, wires, store, terminal, board::WIRES, board::REVISION});
+  app::ModeButton button;
   console.banner();
   ESP_ERROR_CHECK(esp_task_wdt_add(nullptr));
   TickType_t woken_at = xTaskGetTickCount();

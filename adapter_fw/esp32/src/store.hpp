@@ -6,11 +6,11 @@
 
 #include <nvs.h>
 
-#include "../../core/shell/console.hpp"
+#include "../../core/app/console.hpp"
 
 namespace esp32 {
 
-class Store final : public shell::Store {
+class Store final : public app::Store {
  public:
   // Opens the store; one that is damaged, or of another layout, is begun anew.
   void start();

@@ -4,11 +4,11 @@
 // person who reads slowly must not stop the robot.
 #pragma once
 
-#include "../../core/shell/text.hpp"
+#include "../../core/app/text.hpp"
 
 namespace esp32 {
 
-class Terminal final : public shell::Writer {
+class Terminal final : public app::Writer {
  public:
   void start();
 

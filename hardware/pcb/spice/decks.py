@@ -3,7 +3,7 @@
 Values come from the design, so that a changed resistor changes the deck.
 """
 
-from hardware.pcb.design import build
+from hardware.pcb.circuit.design import build
 from hardware.pcb.spice.deck import Deck
 from hardware.pcb.spice.signal_decks import signal_decks
 from hardware.pcb.spice.supply_decks import supply_decks

@@ -10,7 +10,7 @@ from hardware.pcb.spice.deck import Deck
 _HEAD = """# The board, simulated
 
 Circuits of the [adapter board](board.md) in ngspice,
-with our own behavioural models: `hardware/pcb/spice/models.py` says
+with our own behavioural models: `hardware/pcb/spice/deck.py` says
 where each figure comes from. They show what the circuit's values make of the data sheets' figures. No board has been
 built: nothing here is a measurement. Each figure has limits,
 and `tests/hardware/test_pcb_spice.py` and `make board-check`

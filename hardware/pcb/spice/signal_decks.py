@@ -1,13 +1,12 @@
 """Signals: reset, RS-232 levels, and current that one module feeds into the other."""
 
 from adapter_sim.pinout import Direction, load_pinout
-from hardware.pcb.design import series_wires
-from hardware.pcb.electrical import ohms
-from hardware.pcb.modules import NOT_5V_TOLERANT
-from hardware.pcb.netlist import Design
-from hardware.pcb.parts import PARTS
-from hardware.pcb.spice import models
-from hardware.pcb.spice.deck import Deck, limits
+from hardware.pcb.circuit.design import series_wires
+from hardware.pcb.circuit.electrical import ohms
+from hardware.pcb.circuit.modules import NOT_5V_TOLERANT
+from hardware.pcb.circuit.netlist import Design
+from hardware.pcb.circuit.parts import PARTS
+from hardware.pcb.spice.deck import BC817, CLAMP, MAX3232, Deck, limits
 
 
 def signal_decks(design: Design) -> tuple[Deck, ...]:
@@ -17,7 +16,7 @@ def signal_decks(design: Design) -> tuple[Deck, ...]:
 
 def _reset(design: Design) -> Deck:
     circuit = f"""
-{models.BC817}
+{BC817}
 V3 v3 0 3.3
 Vpin pin 0 PULSE(0 2.9 10m 1u 1u 30m 200m)
 * rev B
@@ -56,7 +55,7 @@ Q2 en2 b2 e2 BC817
 def _serial(vcc: float) -> str:
     return f"""
 .param cpump={PARTS["C 100n"].facts["farad"]:g}
-{models.MAX3232}
+{MAX3232}
 Vcc vcc 0 {vcc:g}
 Vtx tx 0 PULSE(0 3.3 0.2m 1u 1u 104u 208u)
 Vdin2 din2 0 0
@@ -111,7 +110,7 @@ def _back_power(design: Design) -> Deck:
         for n, ref in enumerate(_clamped(design))
     )
     circuit = f"""
-{models.CLAMP}
+{CLAMP}
 {lines}
 {_RAIL}
 """
@@ -153,7 +152,7 @@ def _back_power_esp(design: Design) -> Deck:
     lines = "\n".join(f"Rs{n} on p{n} {ohms(design, ref) + 30:g}\nDc{n} p{n} rail CLAMP"
                       for n, ref in enumerate(_driven_by_bluepill()))  # fmt: skip
     circuit = f"""
-{models.CLAMP}
+{CLAMP}
 Von on 0 3.3
 {lines}
 {_RAIL}

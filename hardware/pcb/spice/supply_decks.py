@@ -1,10 +1,9 @@
 """Supplies: start-up, load steps, light load, inrush and a battery the wrong way round."""
 
-from hardware.pcb.electrical import BATTERY_MAX_V, LM317_LIMIT_MA, ohms
-from hardware.pcb.netlist import Design
-from hardware.pcb.parts import PARTS
-from hardware.pcb.spice import models
-from hardware.pcb.spice.deck import Deck, limits
+from hardware.pcb.circuit.electrical import BATTERY_MAX_V, LM317_LIMIT_MA, ohms
+from hardware.pcb.circuit.netlist import Design
+from hardware.pcb.circuit.parts import PARTS
+from hardware.pcb.spice.deck import B340A, BUCK, LM317, SMBJ15A, Deck, limits
 
 
 def supply_decks(linear: Design) -> tuple[Deck, ...]:
@@ -27,8 +26,8 @@ R1 c1 0 0.15
 
 def _startup_buck() -> Deck:
     circuit = f"""
-{models.B340A}
-{models.BUCK}
+{B340A}
+{BUCK}
 {_INPUT}
 X1 p12 0 reg BUCK
 C3 reg 0 22u
@@ -53,8 +52,8 @@ Rload reg 0 25
 
 def _lm317(design: Design, upper: str, lower: str) -> str:
     return f"""
-{models.B340A}
-{models.LM317}
+{B340A}
+{LM317}
 {_INPUT}
 X1 p12 adj out LM317
 R68 out adj {ohms(design, upper):g}
@@ -87,7 +86,7 @@ Rload out 0 25
 
 def _step_buck() -> Deck:
     circuit = f"""
-{models.BUCK}
+{BUCK}
 Vin p12 0 11.2
 X1 p12 0 reg BUCK
 C3 reg c3 22u
@@ -113,7 +112,7 @@ Iload reg 0 PULSE(20m 500m 8m 1u 1u 2m 10m)
 
 def _step_lm317(design: Design) -> Deck:
     circuit = f"""
-{models.LM317}
+{LM317}
 Vin p12 0 11.2
 X1 p12 adj out LM317
 R68 out adj {ohms(design, "R68"):g}
@@ -142,7 +141,7 @@ Iload out 0 PULSE(20m {LM317_LIMIT_MA:g}m 100m 1u 1u 2m 10m)
 
 def _minimum_load(design: Design) -> Deck:
     circuit = f"""
-{models.LM317}
+{LM317}
 Vin p12 0 11.2
 X1 p12 a1 ours LM317
 R1 ours a1 {ohms(design, "R70"):g}
@@ -175,7 +174,7 @@ Vcur cur 0 0
 
 def _inrush() -> Deck:
     circuit = f"""
-{models.B340A}
+{B340A}
 Vbat bat 0 PWL(0 0 10u 0 11u {BATTERY_MAX_V:g})
 Rbat bat w 0.08
 Lwire w f 0.7u
@@ -201,8 +200,8 @@ Rq q 0 1g
 
 def _reverse() -> Deck:
     circuit = f"""
-{models.B340A}
-{models.SMBJ15A}
+{B340A}
+{SMBJ15A}
 Vbat bat 0 PWL(0 -15 3 15)
 Rbat bat f 0.1
 Rptc f a 0.13

@@ -1,8 +1,8 @@
 """Heat: junction of the LM317 and allowed current of the buck module against ambient."""
 
-from hardware.pcb.electrical import BATTERY_MAX_V, LM317_AVERAGE_MA, LM317_CHARGING_MA, LM317_LIMIT_MA, load_ma
-from hardware.pcb.netlist import Design
-from hardware.pcb.parts import PARTS
+from hardware.pcb.circuit.electrical import BATTERY_MAX_V, LM317_AVERAGE_MA, LM317_CHARGING_MA, LM317_LIMIT_MA, load_ma
+from hardware.pcb.circuit.netlist import Design
+from hardware.pcb.circuit.parts import PARTS
 from hardware.pcb.spice.deck import Deck, limits
 
 

@@ -6,7 +6,7 @@ many bytes have come, and 0 flushes what waits.
 
 from dataclasses import dataclass
 
-from p2os.packets import SerauxPacket
+from p2os.protocol.packets import SerauxPacket
 
 #: chosen: what a port keeps; older bytes are lost, as in the firmware's ring.
 BUFFER_BYTES = 256

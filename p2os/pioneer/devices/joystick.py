@@ -6,7 +6,7 @@ held the stick sets both speeds, as far as JOYVEL and JOYRVEL of the FLASH go.
 
 from dataclasses import dataclass
 
-from p2os.packets import JoystickPacket
+from p2os.protocol.packets import JoystickPacket
 
 CENTRE, SPAN = 512, 512
 

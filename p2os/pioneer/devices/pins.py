@@ -6,7 +6,7 @@ PTUPOS). What nothing drives reads as in the one packet captured from a P2-DX.
 
 from dataclasses import dataclass
 
-from p2os.packets import IoPacket
+from p2os.protocol.packets import IoPacket
 
 #: Digital inputs and outputs of the captured P2-DX.
 CAPTURED_IN, CAPTURED_OUT = 0x30, 0xF0

@@ -8,11 +8,10 @@ import time
 from collections.abc import Sequence
 from pathlib import Path
 
-from served_robot import PATIENCE_S, ServedRobot, until
-
-from p2os.commands import Command, CommandNumber
+from p2os.protocol.commands import Command, CommandNumber
+from p2os.protocol.frames import Decoder, Frame
 from p2os.timing import Nanos
-from p2os.wire import Decoder, Frame
+from tests.p2os.client.served_robot import PATIENCE_S, ServedRobot, until
 
 COMMAND = (sys.executable, "-m", "p2os")
 CLOSE, STOP, VEL = CommandNumber.CLOSE, CommandNumber.STOP, CommandNumber.VEL

@@ -7,13 +7,12 @@ from dataclasses import replace
 import pytest
 from rich.console import Console
 
-from p2os.cli.canvas import Canvas
-from p2os.cli.dashboard import Sight, bar, draw
-from p2os.cli.link_quality import LinkQuality, spread_of
-from p2os.client import Limits, Link, Pose, RobotState, SonarEcho
-from p2os.connection import ConnectionStats
-from p2os.parameters import load_parameters
-from p2os.sip import StandardSip
+from p2os.cli.links.link_quality import LinkQuality, spread_of
+from p2os.cli.robots.dashboard import Canvas, Sight, bar, draw
+from p2os.client import Limits, Link, RobotPose, RobotState, SonarEcho
+from p2os.protocol.connection import ConnectionStats
+from p2os.protocol.sip import StandardSip
+from p2os.robots.parameters import load_parameters
 from p2os.timing import NS_PER_MS
 
 LIMITS = Limits(1.5, 3.0, 0.3, 0.3, 1.0, 1.0)
@@ -25,7 +24,7 @@ def echo(number: int, angle_deg: float, range_m: float, *, is_echo: bool = True)
 
 
 STATE = RobotState(
-    number=1, at_ns=0, pose=Pose(1.25, -0.5, math.pi / 2), forward_mps=0.75, turn_radps=-1.5, left_mps=0.8,
+    number=1, at_ns=0, pose=RobotPose(1.25, -0.5, math.pi / 2), forward_mps=0.75, turn_radps=-1.5, left_mps=0.8,
     right_mps=0.7, is_moving=True, motors_enabled=True, battery_v=11.2, stall_left=True, stall_right=False,
     front_bumpers=(2, 3), rear_bumpers=(), sonar=(echo(0, 90, 0.3), echo(3, 10, 1.0), echo(5, -40, 9, is_echo=False)),
     compass_rad=None, analog_port=5, analog_v=1.0, digital_in=0x81, digital_out=0, stop_button=True,
@@ -73,7 +72,7 @@ def test_without_a_packet_it_says_so() -> None:
 @pytest.mark.parametrize("motors", [None, True, False])
 def test_no_state_breaks_it(motors: bool | None) -> None:
     bare = replace(STATE, sonar=(), battery_v=14.0, stall_left=False, front_bumpers=(), motors_enabled=motors,
-                   stop_button=None, pose=Pose(1e6, -1e6, 1e4))  # fmt: skip
+                   stop_button=None, pose=RobotPose(1e6, -1e6, 1e4))  # fmt: skip
     assert "no echo" in picture(sight(bare))
     assert "no echo" in picture(sight(bare), 80)
 

@@ -1,6 +1,6 @@
 """The lines that `p2os serve` prints."""
 
-from p2os.cli.event_lines import MOST_LINES, EventLines
+from p2os.cli.virtual.serve import MOST_LINES, EventLines
 from p2os.timing import NS_PER_S
 
 

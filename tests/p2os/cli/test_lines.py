@@ -7,15 +7,15 @@ from pathlib import Path
 
 import pytest
 
-from p2os.cli.bridge import Bridge
+from p2os.capture import Chunk, Direction, capture_of, read_file, read_pcap, write_recording
+from p2os.capture.replay import Replay
+from p2os.cli.captures.record import record_session
+from p2os.cli.captures.replay import motions_of, play
+from p2os.cli.captures.sniff import Bridge
 from p2os.cli.quantities import Quantity, parse_duration, parse_quantity
-from p2os.cli.record import record_session
-from p2os.cli.replay import motions_of, play
-from p2os.commands import Command, CommandNumber
 from p2os.errors import FileError, RemoteProtocolError, RunFailedError, TransportError, UsageError
+from p2os.protocol.commands import Command, CommandNumber
 from p2os.timing import NS_PER_S
-from p2os.trace import Chunk, Direction, capture_of, read_file, read_pcap, write_recording
-from p2os.trace.replay import Replay
 from p2os.transport import HungUpError, Loops, listen_url, open_url, waiting
 
 TO, FROM = Direction.TO_ROBOT, Direction.FROM_ROBOT

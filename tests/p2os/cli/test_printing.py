@@ -17,11 +17,10 @@ import pytest
 
 sys.path.insert(0, str(Path(__file__).parent))
 
-from driven import COMMAND, PATIENCE_S, STOP, VEL, Driver, HeardRobot, until
-
 from p2os.cli import printing
 from p2os.cli.printing import MOST_CHARACTERS, QueuedStream, queue_output, restored_output
 from p2os.errors import FileError
+from tests.p2os.cli.driven import COMMAND, PATIENCE_S, STOP, VEL, Driver, HeardRobot, until
 
 
 class Pipe:

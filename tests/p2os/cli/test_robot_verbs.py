@@ -13,12 +13,10 @@ import pytest
 
 sys.path.insert(0, str(Path(__file__).parent))
 
-from driven import PATIENCE_S, STOP, HeardRobot, until
-
-from p2os.cli.bench import Bench, lines_of, measure
-from p2os.cli.monitor import words_of
-from p2os.cli.ports import guess
-from p2os.cli.send import make_command
+from p2os.cli.links.bench import Bench, lines_of, measure
+from p2os.cli.links.ports import guess
+from p2os.cli.robots.monitor import words_of
+from p2os.cli.robots.send import make_command
 from p2os.cli.watched import Watch, problem_of
 from p2os.client import (
     DeadmanStopped,
@@ -30,10 +28,11 @@ from p2os.client import (
     ReconnectPlanned,
     Robot,
 )
-from p2os.commands import CommandNumber
 from p2os.errors import RemoteProtocolError, TransportError, UsageError
+from p2os.protocol.commands import CommandNumber
 from p2os.timing import NS_PER_MS, NS_PER_S
 from p2os.transport import waiting
+from tests.p2os.cli.driven import PATIENCE_S, STOP, HeardRobot, until
 
 Run = Callable[..., int]
 Capture = pytest.CaptureFixture[str]
@@ -95,7 +94,7 @@ def test_motors_that_go_off_end_a_held_speed(run: Run, capsys: Capture) -> None:
 
     def press() -> None:
         robot.wait_until_it_drives()
-        robot.wish(lambda pioneer, now: pioneer.do("fault stop-button", now))
+        robot.connect_request(lambda pioneer, now: pioneer.do("fault stop-button", now))
 
     thread = threading.Thread(target=press)
     thread.start()
@@ -307,9 +306,9 @@ def test_ports_are_guessed_by_what_they_say_they_are(
     assert guess(port, tmp_path).startswith(words)
 
 
-@pytest.mark.parametrize(("timer", "is_told"), [("16\n", True), ("1\n", False), ("soon", False)])
-def test_a_slow_latency_timer_is_told(timer: str, is_told: bool, tmp_path: object) -> None:
+@pytest.mark.parametrize(("timer", "is_reported"), [("16\n", True), ("1\n", False), ("soon", False)])
+def test_a_slow_latency_timer_is_told(timer: str, is_reported: bool, tmp_path: object) -> None:
     (tmp_path / "ttyUSB0").mkdir()
     (tmp_path / "ttyUSB0" / "latency_timer").write_text(timer)
     port = {"url": "serial:/dev/ttyUSB0", "description": "FT232R", "hardware": "USB VID:PID=0403:6001"}
-    assert ("latency timer of 16 ms" in guess(port, tmp_path)) is is_told
+    assert ("latency timer of 16 ms" in guess(port, tmp_path)) is is_reported

@@ -11,20 +11,19 @@ import pytest
 
 sys.path.insert(0, str(Path(__file__).parent))
 
-from driven import CLOSE, COMMAND, STOP, Driver, HeardRobot, until
-
+from p2os.capture import Direction, capture_of, write_recording
 from p2os.cli import signals
 from p2os.cli.main import run
 from p2os.cli.signals import ENDING_NS, FATAL, end_on_signals, end_on_suspension, postponed, restored_signals
-from p2os.commands import Command, CommandNumber
+from p2os.protocol.commands import Command, CommandNumber
 from p2os.timing import NS_PER_S
-from p2os.trace import Direction, capture_of, write_recording
+from tests.p2os.cli.driven import CLOSE, COMMAND, STOP, Driver, HeardRobot, until
 
 NUMBERS = [signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT, signal.SIGUSR1, signal.SIGTSTP]
 IDENTITY = bytes.fromhex("fafb18025669727475616c0050696f6e6565720070326478002a13")
 PAD = """
 import sys
-from p2os.cli import teleop
+from p2os.cli.robots import teleop
 from p2os.cli.main import main
 from p2os.gamepad import PadReport
 

@@ -12,8 +12,7 @@ from pathlib import Path
 
 import pytest
 
-from p2os.cli.teleop import KeyLoop
-from p2os.cli.teleop_keys import FIRST_HOLD_NS, KEYS, NEXT_HOLD_NS, QUIT_KEYS, STOP_KEYS, Teleop, split_keys
+from p2os.cli.robots.teleop import FIRST_HOLD_NS, KEYS, NEXT_HOLD_NS, QUIT_KEYS, STOP_KEYS, KeyLoop, Teleop, split_keys
 from p2os.client import DeadmanStopped, GapStopped, Link, LinkLost, Notice
 from p2os.timing import NS_PER_MS
 

@@ -1,4 +1,4 @@
-"""Driving by game pad: the wish, the loss, the speeds; and a pad that SDL makes up."""
+"""Driving by game pad: the connect request, the loss, the speeds; and a pad that SDL makes up."""
 
 import ctypes
 import os
@@ -10,12 +10,12 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from p2os.cli import pad_source, teleop
 from p2os.cli.main import run
-from p2os.cli.pad_source import SdlPad
-from p2os.cli.teleop_pad import PERIOD_NS, PadDriver
+from p2os.cli.robots import pad_source, teleop
+from p2os.cli.robots.pad_source import SdlPad
+from p2os.cli.robots.teleop import PERIOD_NS, PadDriver
 from p2os.client import GapStopped, Notice
-from p2os.client.problems import LinkLostError
+from p2os.client.notices import LinkLostError
 from p2os.errors import MissingDependencyError, UsageError
 from p2os.gamepad import PAD_MPS, PAD_RADPS, Gamepad, PadReport
 from p2os.timing import NS_PER_MS
@@ -211,7 +211,7 @@ def test_the_verb_drives_by_pad(monkeypatch: pytest.MonkeyPatch, capsys: pytest.
         def report(self) -> PadReport | None:
             return next(self.scripts, None)
 
-    from p2os.pioneer.served import served_pioneer
+    from p2os.pioneer.serve.background import served_pioneer
 
     monkeypatch.setattr(teleop, "SdlPad", Scripted)
     with served_pioneer() as url:

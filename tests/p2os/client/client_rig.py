@@ -16,30 +16,30 @@ from p2os.client.notices import LinkLost, Notice
 from p2os.client.outbox import CloseLine, OpenLine, Send, SetBaud
 from p2os.client.settings import ClientSettings
 from p2os.client.snapshots import Link, RobotState
-from p2os.commands import Command
-from p2os.parameters import RobotParameters, load_parameters
-from p2os.pioneer.body import make_body
-from p2os.pioneer.controller import ControllerSettings, Pioneer
-from p2os.pioneer.world import load_world
+from p2os.pioneer.body.choose import make_body
+from p2os.pioneer.controller.controller import ControllerSettings, Pioneer
+from p2os.pioneer.world.find import load_world
+from p2os.protocol.commands import Command
+from p2os.protocol.frames import Frame
+from p2os.robots.parameters import RobotParameters, load_parameters
 from p2os.timing import NS_PER_MS, NS_PER_S
-from p2os.wire import Frame
 
 MS, S = NS_PER_MS, NS_PER_S
 #: bytes and chance → pieces that arrive, each with its delay.
 Wire = Callable[[bytes, Random], list[tuple[int, bytes]]]
 
 
-def _flip(data: bytes, chance: Random) -> bytes:
-    place = chance.randrange(len(data))
-    return data[:place] + bytes((data[place] ^ 1 << chance.randrange(8),)) + data[place + 1 :]
+def _flip(data: bytes, random_source: Random) -> bytes:
+    place = random_source.randrange(len(data))
+    return data[:place] + bytes((data[place] ^ 1 << random_source.randrange(8),)) + data[place + 1 :]
 
 
 WIRES: dict[str, Wire] = {
     "perfect": lambda data, _: [(0, data)],
     "byte by byte": lambda data, _: [(index * MS, data[index : index + 1]) for index in range(len(data))],
-    "late": lambda data, chance: [(chance.randrange(0, 60) * MS, data)],
-    "lossy": lambda data, chance: [] if chance.random() < 0.1 else [(0, data)],
-    "garbling": lambda data, chance: [(0, _flip(data, chance) if chance.random() < 0.1 else data)],
+    "late": lambda data, random_source: [(random_source.randrange(0, 60) * MS, data)],
+    "lossy": lambda data, random_source: [] if random_source.random() < 0.1 else [(0, data)],
+    "garbling": lambda data, random_source: [(0, _flip(data, random_source) if random_source.random() < 0.1 else data)],
 }
 
 
@@ -70,7 +70,7 @@ class Rig:
 
     def __post_init__(self) -> None:
         self.core = RobotCore(self.settings)
-        self.chance = Random(self.seed)
+        self.random_source = Random(self.seed)
         self.is_plugged = True
         #: A cut line of which neither end is told: a half-open TCP peer, a loose wire.
         self.is_cut = False
@@ -213,8 +213,8 @@ class Rig:
         if self.is_cut or not self.is_plugged:
             return
         if self.baud is not None and self.line_baud != self.robot_baud:
-            data = bytes(self.chance.randrange(256) for _ in data)
-        for delay, piece in WIRES[self.wire](data, self.chance):
+            data = bytes(self.random_source.randrange(256) for _ in data)
+        for delay, piece in WIRES[self.wire](data, self.random_source):
             at = self._last[to_robot] = max(self._last.get(to_robot, 0), self.now + delay)
             self._count += 1
             heapq.heappush(self._on_the_way, (at, self._count, to_robot, piece))

@@ -4,16 +4,15 @@ import threading
 import time
 from collections.abc import Callable
 
-from client_rig import new_pioneer
-
 from p2os.client.settings import ClientSettings
-from p2os.commands import Command
-from p2os.pioneer.controller import Pioneer
-from p2os.pioneer.host import Host
+from p2os.pioneer.controller.controller import Pioneer
+from p2os.pioneer.serve.host import Host
+from p2os.protocol.commands import Command
+from p2os.protocol.frames import Decoder, Frame
 from p2os.timing import NS_PER_MS, Nanos
 from p2os.transport import listen_url, open_url
 from p2os.transport.ports import HungUpError, Transport
-from p2os.wire import Decoder, Frame
+from tests.p2os.client.client_rig import new_pioneer
 
 #: A bound on every wait; reached only when something is broken.
 PATIENCE_S = 30.0
@@ -64,7 +63,7 @@ class ServedRobot:
     def is_moving(self) -> bool:
         return self.wheels_mps != (0.0, 0.0)
 
-    def wish(self, call: Callable[[Pioneer, Nanos], None]) -> None:
+    def connect_request(self, call: Callable[[Pioneer, Nanos], None]) -> None:
         """Have something done to the robot, and wait until it is."""
         self.wishes.append(call)
         until(lambda: not self.wishes)

@@ -4,17 +4,16 @@ import math
 from collections.abc import Callable
 
 import pytest
-from client_rig import Rig
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from p2os.client.calls import Result, RobotCalls
+from p2os.client.calls import GripperAction, Result, RobotCalls
 from p2os.client.core import RobotCore
-from p2os.client.gripper import GripperAction
-from p2os.commands import Command
-from p2os.commands import CommandNumber as C
 from p2os.errors import LocalProtocolError, UsageError
+from p2os.protocol.commands import Command
+from p2os.protocol.commands import CommandNumber as C
 from p2os.timing import Nanos
+from tests.p2os.client.client_rig import Rig
 
 
 class Calls(RobotCalls):

@@ -6,8 +6,6 @@ import time
 from collections.abc import Iterator
 
 import pytest
-from client_rig import new_pioneer
-from served_robot import QUICK, Recorder, ServedRobot, until
 
 from p2os import Robot
 from p2os.client import GapStopped, Link, LinkLost, LinkLostError, MotionError, Notice, ReconnectPlanned
@@ -15,11 +13,13 @@ from p2os.client.aio import Robot as AsyncRobot
 from p2os.client.core import RobotCore
 from p2os.client.goals import DriveAxis
 from p2os.client.line import Line
-from p2os.commands import Command, stop, vel
+from p2os.protocol.commands import Command, stop, vel
+from p2os.protocol.frames import Decoder, Frame
 from p2os.timing import NS_PER_MS, NS_PER_S, Nanos
 from p2os.transport.ports import HungUpError
 from p2os.transport.wall_clock import GAP_NS, wall_clock
-from p2os.wire import Decoder, Frame
+from tests.p2os.client.client_rig import new_pioneer
+from tests.p2os.client.served_robot import QUICK, Recorder, ServedRobot, until
 
 
 class SuspendingClock:

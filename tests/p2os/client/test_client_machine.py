@@ -1,4 +1,4 @@
-"""Any story of a client and a robot: every line, any wish, any mishap, in virtual time.
+"""Any story of a client and a robot: every line, any request, any mishap, in virtual time.
 
 Invariants: a search ends, open or with a name, within its bound; between a loss
 and the next motion call that did not raise, every speed on the wire is zero; the
@@ -7,16 +7,16 @@ first frames after a loss are STOP and VEL 0; a robot that hears nothing stands.
 
 from collections.abc import Callable
 
-from client_rig import MS, WIRES, Link, Rig, S
 from hypothesis import settings as hypothesis_settings
 from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, initialize, invariant, precondition, rule
 
 from p2os.client.goals import DriveAxis, TurnAxis
-from p2os.client.problems import LinkLostError, MotorsDisabledError
-from p2os.client.session import TRY_LIMIT_NS
-from p2os.commands import CommandNumber as C
-from p2os.commands import stop, vel
+from p2os.client.link import TRY_LIMIT_NS
+from p2os.client.notices import LinkLostError, MotorsDisabledError
+from p2os.protocol.commands import CommandNumber as C
+from p2os.protocol.commands import stop, vel
+from tests.p2os.client.client_rig import MS, WIRES, Link, Rig, S
 
 MOVING = {C.VEL, C.RVEL, C.MOVE, C.HEAD, C.DHEAD, C.VEL2}
 #: A robot that hears nothing: its watchdog of 2 s, and from 0.75 m/s at 0.3 m/s2 to a stand.
@@ -80,7 +80,7 @@ class Story(RuleBasedStateMachine):
             self.rig.core.stop(self.rig.now)
 
     @rule(is_cut=st.booleans())
-    def the_line_is_cut_or_mended(self, is_cut: bool) -> None:
+    def the_line_is_cut_or_cleared(self, is_cut: bool) -> None:
         self.rig.is_cut = is_cut
 
     @rule()

@@ -10,11 +10,10 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import pytest
-from client_rig import MS, Link, Rig, S
 
-from p2os.client.notices import Connected, DeadmanStopped, LinkLost, Notice, PacketArrived
-from p2os.client.problems import LinkLostError
-from p2os.commands import CommandNumber, stop, vel
+from p2os.client.notices import Connected, DeadmanStopped, LinkLost, LinkLostError, Notice, PacketArrived
+from p2os.protocol.commands import CommandNumber, stop, vel
+from tests.p2os.client.client_rig import MS, Link, Rig, S
 
 SPEED_MPS = 0.4
 WATCHDOG_NS = 2 * S
@@ -23,12 +22,12 @@ STEP_NS = 10 * MS
 
 @dataclass(frozen=True)
 class Mishap:
-    """One story: what happens, what mends it and when, and what the program is told."""
+    """One story: what happens, what clears it and when, and what the program is told."""
 
     name: str
     baud: int | None
     happen: Callable[[Rig], None]
-    mend: Callable[[Rig], None] = lambda _rig: None
+    clear: Callable[[Rig], None] = lambda _rig: None
     mended_after_s: float = 3.0
     told: str | None = None
 
@@ -105,7 +104,7 @@ def test_the_robot_stops_by_its_watchdog_and_stays_until_it_is_asked(mishap: Mis
     at, said = rig.now, len(rig.said)
     mishap.happen(rig)
     watch = Watch(rig).living(mishap.mended_after_s)
-    mishap.mend(rig)
+    mishap.clear(rig)
     watch.living(10)
     if mishap.told is None:
         assert rig.notices(LinkLost) == []

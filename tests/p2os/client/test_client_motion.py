@@ -4,16 +4,23 @@ import math
 from itertools import pairwise
 
 import pytest
-from client_rig import MS, Link, Rig, S, new_pioneer
 
 from p2os.client.goals import DriveAxis, TurnAxis
-from p2os.client.notices import DeadmanStopped, Disobeyed, LinkLost, MotionEnded, MotorsDisabled
-from p2os.client.problems import LinkLostError, MotorsDisabledError
+from p2os.client.mover import Speeds
+from p2os.client.notices import (
+    DeadmanStopped,
+    Disobeyed,
+    LinkLost,
+    LinkLostError,
+    MotionEnded,
+    MotorsDisabled,
+    MotorsDisabledError,
+)
 from p2os.client.settings import ClientSettings
-from p2os.client.speeds import Speeds
-from p2os.commands import Command, CommandNumber, enable, rvel, stop, vel
 from p2os.errors import UsageError
-from p2os.profiles import Profile
+from p2os.protocol.commands import Command, CommandNumber, enable, rvel, stop, vel
+from p2os.protocol.profiles import Profile
+from tests.p2os.client.client_rig import MS, Link, Rig, S, new_pioneer
 
 MOVE, HEAD, SETV = CommandNumber.MOVE, CommandNumber.HEAD, CommandNumber.SETV
 
@@ -104,7 +111,7 @@ def test_motors_that_somebody_switches_off_stay_off_until_asked() -> None:
     assert rig.commands().count(enable(True)) == 1, "the flags say that they are on"
     assert rig.core.state is not None
     assert rig.core.state.motors_enabled
-    rig.pioneer._works.motion.power(on=False)
+    rig.pioneer._context.motion.power(on=False)
     rig.living(0.3)
     assert rig.notices(MotorsDisabled) == [MotorsDisabled("motors are disabled: they were switched off at the robot")]
     before = len(rig.said)
@@ -168,7 +175,7 @@ def test_a_deaf_robot_is_reported_after_a_second_and_once() -> None:
     rig.core.set_velocity(0.3, 0.0, rig.now)
     rig.living(2)
     rig.pioneer.receive = lambda _, now: rig.pioneer.advance_to(now)  # type: ignore[method-assign]
-    rig.pioneer._works.motion.set_velocity(0)
+    rig.pioneer._context.motion.set_velocity(0)
     begun = rig.now
     rig.living(3)
     (doubt,) = rig.notices(Disobeyed)
@@ -272,7 +279,7 @@ def test_a_goal_that_takes_too_long_is_given_up() -> None:
 
 def test_a_robot_whose_motors_do_not_come_on_ends_the_goal() -> None:
     rig = Rig().connect()
-    rig.pioneer._works.motion.power = lambda **_: None  # type: ignore[method-assign]
+    rig.pioneer._context.motion.power = lambda **_: None  # type: ignore[method-assign]
     goal = rig.core.begin_goal(DriveAxis(1.0), None, None, rig.now)
     rig.until(lambda: goal.ended is not None)
     assert goal.ended is not None

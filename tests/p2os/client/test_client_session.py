@@ -1,16 +1,23 @@
 """The life of the link: finding a robot, losing it, finding it again; in virtual time."""
 
 import pytest
-from client_rig import MS, WIRES, Link, Rig, S, new_pioneer
 
-from p2os.client.notices import BaudKept, BaudRaised, ConfigurationKnown, Connected, GaveUp, LinkLost, ReconnectPlanned
-from p2os.client.problems import LinkLostError
-from p2os.client.search import search_plan
-from p2os.client.session import TRY_LIMIT_NS
+from p2os.client.link import TRY_LIMIT_NS, search_plan
+from p2os.client.notices import (
+    BaudKept,
+    BaudRaised,
+    ConfigurationKnown,
+    Connected,
+    GaveUp,
+    LinkLost,
+    LinkLostError,
+    ReconnectPlanned,
+)
 from p2os.client.settings import BAUDS, ClientSettings
-from p2os.commands import Command, CommandNumber, enable, rvel, stop, vel
+from p2os.protocol.commands import Command, CommandNumber, enable, rvel, stop, vel
+from p2os.protocol.frames import Decoder, Frame
 from p2os.timing import NS_PER_S
-from p2os.wire import Decoder, Frame
+from tests.p2os.client.client_rig import MS, WIRES, Link, Rig, S, new_pioneer
 
 STOPS = [stop(), vel(0), rvel(0)]
 CLOSE = Command(CommandNumber.CLOSE)

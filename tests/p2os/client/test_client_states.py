@@ -4,26 +4,25 @@ import math
 from dataclasses import replace
 
 import pytest
-from client_rig import Rig, new_pioneer, parameters
 from hypothesis import given
 from hypothesis import strategies as st
 
 from p2os.client.core import RobotCore, guess_profile
 from p2os.client.goals import TurnAxis
-from p2os.client.motors import Motors
+from p2os.client.mover import Motors
 from p2os.client.notices import OdometryDoubtful, PacketArrived, RobotUnknown
-from p2os.client.observer import Observer, bumpers_of, limits_of
-from p2os.client.pose import PoseKeeper
+from p2os.client.observer import Observer, PoseKeeper, bumpers_of, limits_of
 from p2os.client.settings import ClientSettings
-from p2os.client.snapshots import Pose
-from p2os.commands import Command, CommandNumber
-from p2os.config_packet import AROS_1_6_FIELDS, ConfigPacket
+from p2os.client.snapshots import RobotPose
 from p2os.errors import UsageError
-from p2os.packets import RawPacket
-from p2os.parameters import ParametersError, RobotParameters
-from p2os.profiles import Profile
-from p2os.sip import SonarReading, StandardSip
+from p2os.protocol.commands import Command, CommandNumber
+from p2os.protocol.config_packet import AROS_1_6_FIELDS, ConfigPacket
+from p2os.protocol.packets import RawPacket
+from p2os.protocol.profiles import Profile
+from p2os.protocol.sip import SonarReading, StandardSip
+from p2os.robots.parameters import ParametersError, RobotParameters
 from p2os.timing import NS_PER_S
+from tests.p2os.client.client_rig import Rig, new_pioneer, parameters
 
 P2DX = parameters()
 
@@ -132,7 +131,7 @@ def test_a_pose_goes_on_over_sessions_and_places() -> None:
     # The robot stood at 0.84 m looking left; its new odometry calls that ahead.
     assert (pose.x_m, pose.y_m) == pytest.approx((0.84, 0.42))
     assert pose.heading_rad == pytest.approx(math.pi / 2)
-    keeper.place(Pose(10.0, 0.0, 0.0))
+    keeper.place(RobotPose(10.0, 0.0, 0.0))
     pose = keeper.take(StandardSip(raw_x=1000), P2DX, 0)
     assert (pose.x_m, pose.y_m) == pytest.approx((10.42, 0.0))
     assert keeper.odometry.heading_rad == 0.0
@@ -140,10 +139,10 @@ def test_a_pose_goes_on_over_sessions_and_places() -> None:
 
 def test_a_turn_counts_in_the_robots_own_frame_after_set_pose() -> None:
     rig = Rig().connect()
-    rig.core.set_pose(Pose(1.0, 2.0, math.radians(45)))
+    rig.core.set_pose(RobotPose(1.0, 2.0, math.radians(45)))
     rig.run(0.2)
     assert rig.core.state is not None
-    assert rig.core.state.pose == Pose(1.0, 2.0, math.radians(45))
+    assert rig.core.state.pose == RobotPose(1.0, 2.0, math.radians(45))
     goal = rig.core.begin_goal(TurnAxis(math.radians(-90)), None, None, rig.now)
     rig.until(lambda: goal.ended is not None)
     assert Command(CommandNumber.HEAD, 270) in rig.commands()

@@ -6,14 +6,14 @@ from collections.abc import Coroutine, Iterator
 from typing import Any
 
 import pytest
-from served_robot import PATIENCE_S, QUICK, Recorder, ServedRobot, until
 
 from p2os.client import ClientSettings, ConnectError, Link, LinkLostError, MotionEnded, MotionError, Notice, RobotState
 from p2os.client.aio import Robot
-from p2os.commands import Command, CommandNumber, enable, stop, vel
 from p2os.errors import P2osError
-from p2os.packets import EncoderPacket, IoPacket, SerauxPacket
+from p2os.protocol.commands import Command, CommandNumber, enable, stop, vel
+from p2os.protocol.packets import EncoderPacket, IoPacket, SerauxPacket
 from p2os.timing import NS_PER_MS
+from tests.p2os.client.served_robot import PATIENCE_S, QUICK, Recorder, ServedRobot, until
 
 LAST_WORDS = [stop(), vel(0), enable(False), Command(CommandNumber.CLOSE)]
 
@@ -259,13 +259,15 @@ def test_packets_are_fetched_and_the_robots_own_port_is_a_file(served: ServedRob
         async with robot_on(served, recorder) as robot:
             asking = asyncio.ensure_future(robot.fetch(EncoderPacket, timeout_s=PATIENCE_S))
             await asyncio.sleep(0.01)
-            served.wish(
+            served.connect_request(
                 lambda pioneer, now: pioneer._connection.send(EncoderPacket(left_counts=1, right_counts=2), now)
             )
             assert isinstance(await asking, EncoderPacket)
             port = robot.aux()
             assert await port.write(b"x" * 200) == 200
-            served.wish(lambda pioneer, now: pioneer._connection.send(SerauxPacket(data=b"hello world"), now))
+            served.connect_request(
+                lambda pioneer, now: pioneer._connection.send(SerauxPacket(data=b"hello world"), now)
+            )
             port.timeout_s = None
             assert await port.read(8) == b"hello wo"
             assert await port.read(3) == b"rld"

@@ -6,7 +6,6 @@ import threading
 from collections.abc import Iterator
 
 import pytest
-from served_robot import QUICK, Recorder, ServedRobot, until
 
 from p2os import Robot
 from p2os.client import (
@@ -21,12 +20,13 @@ from p2os.client import (
 )
 from p2os.client.settings import ClientSettings
 from p2os.client.snapshots import Link
-from p2os.commands import Command, CommandNumber, enable, stop, vel
 from p2os.errors import P2osError, UsageError
-from p2os.packets import EncoderPacket, IoPacket, RawPacket, SerauxPacket, StandardSip
-from p2os.parameters import ParametersError
-from p2os.profiles import Profile
+from p2os.protocol.commands import Command, CommandNumber, enable, stop, vel
+from p2os.protocol.packets import EncoderPacket, IoPacket, RawPacket, SerauxPacket, StandardSip
+from p2os.protocol.profiles import Profile
+from p2os.robots.parameters import ParametersError
 from p2os.timing import NS_PER_MS
+from tests.p2os.client.served_robot import QUICK, Recorder, ServedRobot, until
 
 LAST_WORDS = [stop(), vel(0), enable(False), Command(CommandNumber.CLOSE)]
 
@@ -269,9 +269,11 @@ def test_the_robots_own_serial_port_is_a_file(served: ServedRobot) -> None:
         assert port.writable()
         assert port.write(b"x" * 200) == 200
         until(lambda: [c.number for c in recorder.said].count(CommandNumber.TTY2) == 2)
-        served.wish(lambda pioneer, now: pioneer._connection.send(SerauxPacket(data=b"hello "), now))
+        served.connect_request(lambda pioneer, now: pioneer._connection.send(SerauxPacket(data=b"hello "), now))
         threading.Timer(
-            0.1, served.wish, (lambda pioneer, now: pioneer._connection.send(SerauxPacket(data=b"world"), now),)
+            0.1,
+            served.connect_request,
+            (lambda pioneer, now: pioneer._connection.send(SerauxPacket(data=b"world"), now),),
         ).start()
         port.timeout_s = None
         assert port.read(8) == b"hello wo"

@@ -7,8 +7,6 @@ import threading
 from pathlib import Path
 
 import pytest
-from client_rig import Rig
-from served_robot import QUICK, Recorder, ServedRobot, until
 
 from p2os import Robot
 from p2os.client import ConnectError, LinkLost, LinkLostError, Notice, ReconnectPlanned
@@ -16,10 +14,12 @@ from p2os.client.core import RobotCore
 from p2os.client.line import Line
 from p2os.client.settings import ClientSettings
 from p2os.client.snapshots import Link
-from p2os.commands import enable, rvel, stop, vel
 from p2os.errors import TransportError
+from p2os.protocol.commands import enable, rvel, stop, vel
 from p2os.timing import NS_PER_MS
 from p2os.transport.ports import Transport
+from tests.p2os.client.client_rig import Rig
+from tests.p2os.client.served_robot import QUICK, Recorder, ServedRobot, until
 
 STOPS = b"".join(command.to_frame().to_bytes() for command in (stop(), vel(0), rvel(0)))
 
@@ -66,7 +66,7 @@ def test_a_robot_at_a_terminal_is_opened_by_its_pty_url_too(tmp_path: Path) -> N
 
 def test_a_port_that_accepts_and_says_nothing_is_no_robot() -> None:
     listening = socket.create_server(("127.0.0.1", 0))
-    settings = ClientSettings(listen_ns=NS_PER_MS, quick_sync_ns=20 * NS_PER_MS, patient_sync_ns=20 * NS_PER_MS)
+    settings = ClientSettings(listen_ns=NS_PER_MS, quick_sync_ns=20 * NS_PER_MS, slow_sync_ns=20 * NS_PER_MS)
     try:
         with (
             pytest.raises(ConnectError, match="no answer") as caught,
@@ -90,7 +90,7 @@ def test_a_web_server_is_only_noise() -> None:
 
     thread = threading.Thread(target=greet, daemon=True)
     thread.start()
-    settings = ClientSettings(quick_sync_ns=20 * NS_PER_MS, patient_sync_ns=20 * NS_PER_MS)
+    settings = ClientSettings(quick_sync_ns=20 * NS_PER_MS, slow_sync_ns=20 * NS_PER_MS)
     try:
         with (
             pytest.raises(ConnectError, match="only noise"),
@@ -127,15 +127,15 @@ class BrokenLine:
 
 
 def test_a_line_that_takes_no_bytes_is_lost_and_given_back() -> None:
-    core, broken = RobotCore(ClientSettings()), BrokenLine()
+    core, injected = RobotCore(ClientSettings()), BrokenLine()
     line = Line(core, 9600, lambda: 0)
     core.connect(0)
     line.turn()
     assert line.is_wanted
-    transport: Transport = broken
+    transport: Transport = injected
     line.opened(transport)
     line.turn()
-    assert broken.is_closed
+    assert injected.is_closed
     assert core.link is Link.FAILED
     assert core.problem is not None
     assert "bytes too many" in core.problem.reason

@@ -1,0 +1,77 @@
+// Whether the robot does what it is told, and when to tell it again.
+//
+// P2OS acknowledges nothing. The only witness is the pair of wheel speeds in each
+// SIP: a robot that obeys is near its command, or comes nearer, or says that it is
+// stalled. Each SIP that shows one of the three passes the plausibility check; when none has
+// done so for plausibility_ns, the robot's motion is implausible.
+#pragma once
+
+#include <cstdint>
+
+#include "mixing.hpp"
+#include "settings.hpp"
+
+namespace adapter {
+
+class PlausibilityCheck {
+ public:
+  explicit PlausibilityCheck(const Settings& settings)
+      : patience_ns_(settings.plausibility_ns),
+        tolerance_mm_s_(settings.plausibility_tolerance_mm_s),
+        progress_mm_s_(settings.plausibility_progress_mm_s) {}
+
+  // Trusts the robot anew.
+  void begin(Nanos now);
+
+  // Takes a command that is being sent; a new one measures progress from here, and buys no time.
+  void expect(Wheels command);
+
+  // Takes the wheel speeds and stall flags of a SIP.
+  void take(Wheels measured, bool stalled, Nanos now);
+
+  // Returns when the patience runs out unless a SIP renews it.
+  Nanos ends_at() const { return renewed_ + patience_ns_; }
+
+  Wheels command() const { return command_; }
+  Wheels measured() const { return measured_; }
+
+ private:
+  std::int64_t error() const;
+
+  Nanos patience_ns_;
+  std::int64_t tolerance_mm_s_;
+  std::int64_t progress_mm_s_;
+  Wheels command_;
+  Wheels measured_;
+  std::int64_t least_error_ = 0;
+  Nanos renewed_ = 0;
+};
+
+//: The newest speeds, and when a VEL+RVEL pair goes out: on a change, not too near to the last, and again when old.
+class CommandPacer {
+ public:
+  explicit CommandPacer(const Settings& settings)
+      : spacing_ns_(settings.pair_spacing_ns), refresh_ns_(settings.refresh_ns) {}
+
+  // Starts with a first pair that is due at once.
+  void begin(Speeds speeds);
+
+  // Returns when the next pair is due; `now` for at once.
+  Nanos due_at(Nanos now) const;
+
+  // Returns the speeds to send at `now`, as sent.
+  Speeds take(Nanos now);
+
+  Speeds sent() const { return sent_; }
+  void want(Speeds speeds) { wanted_ = speeds; }
+
+ private:
+  Nanos spacing_ns_;
+  Nanos refresh_ns_;
+  Speeds wanted_;
+  Speeds sent_;
+  Nanos sent_at_ = 0;
+  bool has_sent_ = false;
+};
+
+}  // namespace adapter

@@ -1,0 +1,160 @@
+"""USART1 to the outside: standard output, a file, or a pseudo-terminal.
+
+This is the I/O layer: it is the one file here that opens things. The chip runs in
+virtual time and the console in none: what the chip sends is written as it
+comes out, what a person types is given to the chip when `poll` is called.
+
+Invariant: a console never makes the emulator wait; what cannot be written at
+once to a pseudo-terminal that nobody reads is dropped and counted.
+"""
+
+import os
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from typing import BinaryIO, Protocol
+
+from bluepill_sim.errors import BluePillError
+
+#: Most bytes taken from a pseudo-terminal at one poll. Chosen: more than anybody types.
+_READ_BYTES = 4096
+
+
+class SerialPort(Protocol):
+    """What a console needs of a USART."""
+
+    on_transmit: Callable[[int, int], None] | None
+    is_notified_late: bool
+
+    def receive(self, data: bytes) -> None:
+        """Take characters from outside."""
+        ...
+
+
+class Console(Protocol):
+    """The far end of a serial line."""
+
+    @property
+    def description(self) -> str:
+        """Where it goes, for people."""
+        ...
+
+    def write(self, word: int, at_ns: int) -> None:
+        """Take one character that the chip has sent; fits `on_transmit`."""
+        ...
+
+    def poll(self) -> bytes:
+        """Return what has come from the far end since the last call, without waiting."""
+        ...
+
+    def close(self) -> None:
+        """Let go of whatever it has opened."""
+        ...
+
+
+class StreamConsole:
+    """Writes to a binary stream; nothing ever comes back."""
+
+    def __init__(self, stream: BinaryIO, description: str, *, is_owner: bool = True) -> None:
+        """Make it.
+
+        Args:
+            stream: Where the characters go; flushed at each line end.
+            description: Where that is, for people.
+            is_owner: Whether `close` closes the stream.
+        """
+        self.description = description
+        self._stream = stream
+        self._is_owner = is_owner
+
+    def write(self, word: int, at_ns: int) -> None:  # noqa: ARG002 - the signature of `on_transmit`
+        """Write one character."""
+        self._stream.write(bytes([word & 0xFF]))
+        if word == ord("\n"):
+            self._stream.flush()
+
+    def poll(self) -> bytes:
+        """Return nothing: a stream is one-way."""
+        return b""
+
+    def close(self) -> None:
+        """Flush, and close the stream if it is ours."""
+        self._stream.flush()
+        if self._is_owner:
+            self._stream.close()
+
+
+class PtyConsole:
+    """A pseudo-terminal that any terminal program can open (not on Windows)."""
+
+    def __init__(self) -> None:
+        """Open one.
+
+        Raises:
+            BluePillError: This system has no pseudo-terminals, or none is left.
+        """
+        try:
+            import tty
+
+            self._master, self._slave = os.openpty()
+        except (ImportError, AttributeError, OSError) as error:
+            raise BluePillError(
+                f"cannot open a pseudo-terminal: {error}", hint="give a file name, or - for standard output"
+            ) from error
+        tty.setraw(self._slave)
+        os.set_blocking(self._master, False)
+        self.description = os.ttyname(self._slave)
+        #: Characters that nobody has read in time.
+        self.dropped = 0
+
+    def write(self, word: int, at_ns: int) -> None:  # noqa: ARG002 - the signature of `on_transmit`
+        """Write one character, or drop it when the far end does not read."""
+        try:
+            os.write(self._master, bytes([word & 0xFF]))
+        except BlockingIOError:
+            self.dropped += 1
+
+    def poll(self) -> bytes:
+        """Return what has been typed."""
+        try:
+            return os.read(self._master, _READ_BYTES)
+        except BlockingIOError:
+            return b""
+
+    def close(self) -> None:
+        """Close both ends."""
+        os.close(self._master)
+        os.close(self._slave)
+
+
+def open_console(where: str) -> Console:
+    """Return the console that a name asks for.
+
+    Args:
+        where: "-" for standard output, "pty:" for a new pseudo-terminal, else a file to write.
+
+    Raises:
+        BluePillError: It cannot be opened.
+    """
+    if where == "-":
+        return StreamConsole(sys.stdout.buffer, "standard output", is_owner=False)
+    if where == "pty:":
+        return PtyConsole()
+    try:
+        return StreamConsole(Path(where).open("wb"), where)
+    except OSError as error:
+        raise BluePillError(
+            f"cannot write {where}: {error.strerror}", hint="give a file in a folder that exists"
+        ) from error
+
+
+def connect(console: Console, port: SerialPort) -> Callable[[], None]:
+    """Connect a console to a USART, and return the function that carries what was typed to the chip."""
+    port.on_transmit, port.is_notified_late = console.write, True
+
+    def carry() -> None:
+        data = console.poll()
+        if data:
+            port.receive(data)
+
+    return carry

@@ -1,0 +1,132 @@
+"""Breakpoints, watchpoints and single steps of an engine: the part that only debugging needs.
+
+Theory of operation. Hooks stand on just the addresses that are wanted, so that
+a run with breakpoints is as fast as one without; a single step hooks every
+instruction for its own duration. A hook never lets the engine go on from a
+half-done state: `Engine.stop_before` undoes what runs after it (Unicorn cannot
+end a run inside an IT block), so that the core stands exactly before the
+instruction. A watchpoint stops the same way, and then the instruction is
+stepped over: what is told is that the access has been made.
+
+Not modelled: the four comparators of the DWT and the six of the FPB; there are
+as many breakpoints and watchpoints as one likes. An instruction that its IT
+block skips breaks nothing. Stacking by an exception is not watched.
+
+Invariant: between runs the hooks are those of `breakpoints` and `watchpoints`
+as they were when the last run began.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from enum import Enum
+
+from bluepill_sim.core.machine import READ_ACCESS, Core, Register
+from bluepill_sim.timing import HaltKind
+
+
+class WatchKind(Enum):
+    """Which accesses a watchpoint waits for."""
+
+    READ = "read"
+    WRITE = "write"
+    ACCESS = "access"
+
+
+@dataclass(frozen=True, slots=True)
+class Watchpoint:
+    """Bytes whose accesses by the program halt the core.
+
+    Raises:
+        ValueError: it is empty.
+    """
+
+    address: int
+    size: int
+    kind: WatchKind = WatchKind.WRITE
+
+    def __post_init__(self) -> None:
+        if self.size < 1:
+            raise ValueError(f"a watchpoint watches 1 byte or more, not {self.size}")
+
+    def sees(self, address: int, size: int, *, is_read: bool) -> bool:
+        """Tell whether an access is one that it waits for."""
+        if self.kind is (WatchKind.WRITE if is_read else WatchKind.READ):
+            return False
+        return address < self.address + self.size and self.address < address + size
+
+
+class DebugUnit:
+    """The hooks of one core."""
+
+    def __init__(self, core: Core, stop_before: Callable[[HaltKind, int, int | None], None]) -> None:
+        self._core = core
+        self._stop_before = stop_before
+        #: Addresses of instructions that the core stops before; take effect with the next run.
+        self.breakpoints: set[int] = set()
+        #: Take effect with the next run.
+        self.watchpoints: set[Watchpoint] = set()
+        #: The instruction that a run starts with and that has already been stopped at; None for none.
+        self.passes: int | None = None
+        #: Whether accesses go unwatched, for the step that makes one.
+        self.is_blind = False
+        self._break_hooks: dict[int, int] = {}
+        self._watch_hooks: dict[Watchpoint, int] = {}
+        self._on_instruction = core.instruction_callback(self._at_breakpoint)
+        self._on_step = core.instruction_callback(self._at_step)
+        self._on_access = core.access_callback(self._at_access)
+        self._step_from: int | None = None
+
+    @property
+    def has_hooks(self) -> bool:
+        """Whether hooks are in place."""
+        return bool(self._break_hooks) or bool(self._watch_hooks)
+
+    @property
+    def is_armed(self) -> bool:
+        """Whether the hooks are those that are wanted."""
+        return self._break_hooks.keys() == self.breakpoints and self._watch_hooks.keys() == self.watchpoints
+
+    def arm(self) -> None:
+        """Put hooks where they are wanted and nowhere else, between runs."""
+        core = self._core
+        for address in self._break_hooks.keys() - self.breakpoints:
+            core.remove_hook(self._break_hooks.pop(address))
+        for address in self.breakpoints - self._break_hooks.keys():
+            self._break_hooks[address] = core.hook_instructions(self._on_instruction, address, address)
+        for old in self._watch_hooks.keys() - self.watchpoints:
+            core.remove_hook(self._watch_hooks.pop(old))
+        for new in self.watchpoints - self._watch_hooks.keys():
+            # An access that begins up to three bytes before may reach into it.
+            first = max(0, new.address - 3)
+            self._watch_hooks[new] = core.hook_accesses(self._on_access, first, new.address + new.size - 1)
+        core.drop_all_code()
+
+    def begin_step(self, pc: int) -> int:
+        """Hook every instruction; return the hook for `end_step`."""
+        self._step_from = pc
+        hook = self._core.hook_instructions(self._on_step, 1, 0)
+        self._core.drop_all_code()
+        return hook
+
+    def end_step(self, hook: int) -> None:
+        """Take the hook of `begin_step` away."""
+        self._core.remove_hook(hook)
+        self._core.drop_all_code()
+
+    def _at_breakpoint(self, address: int) -> None:
+        if address == self.passes:
+            self.passes = None
+        elif address in self._break_hooks:
+            self._stop_before(HaltKind.BREAKPOINT, address, None)
+
+    def _at_step(self, address: int) -> None:
+        if address != self._step_from:
+            self._stop_before(HaltKind.STEP, address, None)
+            return
+        self._step_from = None  # the same instruction again is the next one
+
+    def _at_access(self, access: int, address: int, size: int, _value: int) -> bool:
+        is_read = access == READ_ACCESS
+        if not self.is_blind and any(point.sees(address, size, is_read=is_read) for point in self._watch_hooks):
+            self._stop_before(HaltKind.WATCHPOINT, self._core.registers[Register.PC], address)
+        return True

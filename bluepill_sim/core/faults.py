@@ -1,0 +1,117 @@
+"""Faults: what can go wrong in the core, which exception it raises, and the report of it.
+
+Source: ARMv7-M Architecture Reference Manual B1.5.14 and B3.2.15 to B3.2.18.
+Invariant: every kind has one row in `FAULT_ROWS`.
+"""
+
+from dataclasses import dataclass
+from enum import Enum
+
+from bluepill_sim.core.nvic import BUS_FAULT, HARD_FAULT, MEM_MANAGE, USAGE_FAULT
+from bluepill_sim.core.recorder import BlockRow
+from bluepill_sim.timing import HaltKind, Nanos
+
+#: HFSR bits.
+HFSR_VECTTBL, HFSR_FORCED, HFSR_DEBUGEVT = 1 << 1, 1 << 30, 1 << 31
+#: CFSR bits that say that BFAR and MMFAR hold an address.
+CFSR_BFARVALID, CFSR_MMARVALID = 1 << 15, 1 << 7
+
+
+class FaultKind(Enum):
+    """What went wrong, in words for a person."""
+
+    UNDEFINED_INSTRUCTION = "undefined instruction"
+    INVALID_STATE = "branch to an even address (not Thumb)"
+    INVALID_RETURN = "invalid exception return"
+    NO_COPROCESSOR = "coprocessor instruction"
+    UNALIGNED = "unaligned access"
+    DIVIDE_BY_ZERO = "division by zero"
+    FETCH_ERROR = "instruction fetch from nothing"
+    READ_ERROR = "read of nothing"
+    WRITE_ERROR = "write to nothing"
+    STACKING = "stack outside memory at exception entry"
+    UNSTACKING = "stack outside memory at exception return"
+    EXECUTE_NEVER = "instruction fetch from a region that must not be executed"
+    VECTOR_READ = "vector table outside memory"
+    BREAKPOINT = "BKPT without a debugger"
+    MASKED_SVC = "SVC that its priority does not allow"
+
+
+@dataclass(frozen=True, slots=True)
+class FaultRow:
+    """What a fault raises and which status bits it sets."""
+
+    exception: int
+    cfsr: int = 0
+    hfsr: int = 0
+
+
+FAULT_ROWS = {
+    FaultKind.UNDEFINED_INSTRUCTION: FaultRow(USAGE_FAULT, cfsr=1 << 16),
+    FaultKind.INVALID_STATE: FaultRow(USAGE_FAULT, cfsr=1 << 17),
+    FaultKind.INVALID_RETURN: FaultRow(USAGE_FAULT, cfsr=1 << 18),
+    FaultKind.NO_COPROCESSOR: FaultRow(USAGE_FAULT, cfsr=1 << 19),
+    FaultKind.UNALIGNED: FaultRow(USAGE_FAULT, cfsr=1 << 24),
+    FaultKind.DIVIDE_BY_ZERO: FaultRow(USAGE_FAULT, cfsr=1 << 25),
+    FaultKind.FETCH_ERROR: FaultRow(BUS_FAULT, cfsr=1 << 8),
+    FaultKind.READ_ERROR: FaultRow(BUS_FAULT, cfsr=1 << 9 | CFSR_BFARVALID),
+    FaultKind.WRITE_ERROR: FaultRow(BUS_FAULT, cfsr=1 << 9 | CFSR_BFARVALID),
+    FaultKind.UNSTACKING: FaultRow(BUS_FAULT, cfsr=1 << 11),
+    FaultKind.STACKING: FaultRow(BUS_FAULT, cfsr=1 << 12),
+    FaultKind.EXECUTE_NEVER: FaultRow(MEM_MANAGE, cfsr=1 << 0),
+    FaultKind.VECTOR_READ: FaultRow(HARD_FAULT, hfsr=HFSR_VECTTBL),
+    FaultKind.BREAKPOINT: FaultRow(HARD_FAULT, hfsr=HFSR_DEBUGEVT),
+    FaultKind.MASKED_SVC: FaultRow(HARD_FAULT, hfsr=HFSR_FORCED),
+}
+
+_EXCEPTION_NAMES = {HARD_FAULT: "HardFault", MEM_MANAGE: "MemManage", BUS_FAULT: "BusFault", USAGE_FAULT: "UsageFault"}
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class FaultReport:
+    """A fault that the firmware did not handle by itself: a HardFault taken, or a lockup."""
+
+    kind: FaultKind
+    #: The exception that the fault belongs to, before it was escalated to HardFault.
+    exception: int
+    #: The failing instruction.
+    pc: int
+    #: Where that is: "symbol+0x12 (0x08000123)".
+    where: str
+    #: What the failed access was to; None where no access failed.
+    address: int | None
+    #: Name and value of R0 to R12, SP, LR, PC and xPSR at the fault.
+    registers: tuple[tuple[str, int], ...]
+    at_ns: Nanos
+    #: Whether the core has locked up: nothing but a reset moves it.
+    is_lockup: bool = False
+    #: What ran up to the fault, oldest first: rows of `BlockRecorder`, at most 32.
+    last_rows: tuple[BlockRow, ...] = ()
+
+    def __str__(self) -> str:
+        """Return one line for a person."""
+        access = "" if self.address is None else f", address {self.address:#010x}"
+        end = "; the core is locked up" if self.is_lockup else ""
+        name = _EXCEPTION_NAMES.get(self.exception, f"exception {self.exception}")
+        return f"{name}: {self.kind.value} at {self.where}{access}, t = {self.at_ns / 1e9:.6f} s{end}"
+
+    @property
+    def register_dump(self) -> str:
+        """The registers in four columns, for a person."""
+        cells = [f"{name:>4} {value:08x}" for name, value in self.registers]
+        return "\n".join("  ".join(cells[n : n + 4]) for n in range(0, len(cells), 4))
+
+
+#: What a halt of the engine means to the architecture.
+FAULT_OF_HALT = {
+    HaltKind.UNDEFINED: FaultKind.UNDEFINED_INSTRUCTION,
+    HaltKind.NO_COPROCESSOR: FaultKind.NO_COPROCESSOR,
+    HaltKind.INVALID_STATE: FaultKind.INVALID_STATE,
+    HaltKind.READ_ERROR: FaultKind.READ_ERROR,
+    HaltKind.WRITE_ERROR: FaultKind.WRITE_ERROR,
+    HaltKind.FETCH_ERROR: FaultKind.FETCH_ERROR,
+    HaltKind.EXECUTE_NEVER: FaultKind.EXECUTE_NEVER,
+    HaltKind.DIVIDE_BY_ZERO: FaultKind.DIVIDE_BY_ZERO,
+    HaltKind.UNALIGNED: FaultKind.UNALIGNED,
+    HaltKind.BKPT: FaultKind.BREAKPOINT,
+}

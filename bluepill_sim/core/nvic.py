@@ -1,0 +1,196 @@
+"""NVIC: which exceptions are pending, enabled and active, and which comes first.
+
+This holds the state and the arithmetic of priorities. Stacking, vectors and
+the masks PRIMASK, BASEPRI and FAULTMASK are the business of `processor.py`; the registers
+through which firmware sees all this are in `system_control.py`.
+
+Source: ARMv7-M Architecture Reference Manual B1.5.4 and B3.4; RM0008 table 63.
+Invariant: an exception is pending at most once; a line that stays high makes
+its interrupt pending again when its handler returns.
+
+Names of the exceptions and interrupts of an STM32F103C8.
+
+Source: ARMv7-M Architecture Reference Manual table B1-4; RM0008 table 63 (medium density).
+Invariant: position n of `IRQ_NAMES` is interrupt line n, which is exception 16 + n.
+"""
+
+from collections.abc import Iterator
+
+NMI, HARD_FAULT, MEM_MANAGE, BUS_FAULT, USAGE_FAULT = 2, 3, 4, 5, 6
+SVCALL, DEBUG_MONITOR, PENDSV, SYSTICK = 11, 12, 14, 15
+#: Exception number of interrupt line 0.
+FIRST_IRQ = 16
+
+#: Priority of thread mode: lower than that of every exception.
+THREAD_PRIORITY = 256
+#: Priorities that cannot be set.
+FIXED_PRIORITIES = {1: -3, NMI: -2, HARD_FAULT: -1}
+#: An STM32F103 implements the upper four bits of a priority (PM0056 2.3.5).
+PRIORITY_MASK = 0xF0
+#: Lines that an STM32F10x can have; a medium-density part uses 43.
+IRQ_LINES = 60
+
+_IRQ_MASK = (1 << IRQ_LINES) - 1
+SYSTEM_EXCEPTIONS = (1 << FIRST_IRQ) - 1
+
+NvicSnapshot = tuple[int, int, int, int, tuple[int, ...], int]
+
+
+class Nvic:
+    """State of all exceptions; numbers are those of the architecture (IRQ line n is 16 + n)."""
+
+    def __init__(self) -> None:
+        #: Bit masks over exception numbers.
+        self.pending = 0
+        self.active = 0
+        #: Bit masks over interrupt lines.
+        self.enabled = 0
+        self.levels = 0
+        self.priorities = [0] * (FIRST_IRQ + IRQ_LINES)
+        #: AIRCR.PRIGROUP.
+        self.priority_grouping = 0
+
+    def reset(self) -> None:
+        """Go back to the state after a reset; the levels of the lines are their drivers' business."""
+        self.pending = self.active = self.enabled = 0
+        self.priorities = [0] * (FIRST_IRQ + IRQ_LINES)
+        self.priority_grouping = 0
+
+    # Interrupt lines.
+
+    def set_level(self, irq: int, level: bool) -> None:
+        """Set a line; its rising edge makes the interrupt pending."""
+        bit = 1 << irq
+        if level:
+            if not self.levels & bit:
+                self.levels |= bit
+                self.pending |= bit << FIRST_IRQ
+        else:
+            self.levels &= ~bit
+
+    def pend(self, number: int) -> None:
+        """Make an exception pending."""
+        self.pending |= 1 << number
+
+    def unpend(self, number: int) -> None:
+        """Take an exception off the pending ones."""
+        self.pending &= ~(1 << number)
+
+    def clear_pending_irqs(self, irqs: int) -> None:
+        """Clear pending bits of interrupt lines; a line that is still high keeps its own."""
+        self.pending &= ~((irqs & ~(self.levels & ~self._active_irqs())) << FIRST_IRQ)
+
+    def activate(self, number: int) -> None:
+        """Note that the handler of an exception starts."""
+        self.pending &= ~(1 << number)
+        self.active |= 1 << number
+
+    def deactivate(self, number: int) -> None:
+        """Note that the handler of an exception has returned."""
+        self.active &= ~(1 << number)
+        if number >= FIRST_IRQ and self.levels >> (number - FIRST_IRQ) & 1:
+            self.pending |= 1 << number
+
+    # Priorities.
+
+    def deliverable(self) -> int:
+        """Return the pending exceptions that are enabled, as a mask over exception numbers."""
+        pending = self.pending
+        return pending and pending & (self.enabled << FIRST_IRQ | SYSTEM_EXCEPTIONS)
+
+    def first_pending(self) -> int | None:
+        """Return the enabled pending exception of the highest priority; the lowest number among equals."""
+        candidates = self.deliverable()
+        if not candidates:
+            return None
+        if not candidates & candidates - 1:
+            return candidates.bit_length() - 1
+        return min(_numbers(candidates), key=lambda number: (self.priority(number), number))
+
+    def priority(self, number: int) -> int:
+        """Return the priority of an exception; lower comes first."""
+        fixed = FIXED_PRIORITIES.get(number)
+        return self.priorities[number] if fixed is None else fixed
+
+    def group_priority(self, priority: int) -> int:
+        """Return the part of a priority that decides on preemption (AIRCR.PRIGROUP)."""
+        if priority < 0 or priority >= THREAD_PRIORITY:
+            return priority
+        return priority & ~((2 << self.priority_grouping) - 1)
+
+    def active_priority(self) -> int:
+        """Return the group priority of the handlers that are active, masks left aside."""
+        if not self.active:
+            return THREAD_PRIORITY
+        return min(self.group_priority(self.priority(number)) for number in _numbers(self.active))
+
+    def can_preempt(self, number: int, execution_priority: int) -> bool:
+        """Tell whether an exception may interrupt what runs at `execution_priority`."""
+        return self.group_priority(self.priority(number)) < execution_priority
+
+    def set_priority(self, number: int, value: int) -> None:
+        """Set a priority byte; only the upper four bits exist."""
+        self.priorities[number] = value & PRIORITY_MASK
+
+    # Snapshots.
+
+    def snapshot(self) -> NvicSnapshot:
+        """Return the state as plain values."""
+        return (
+            self.pending,
+            self.active,
+            self.enabled,
+            self.levels,
+            tuple(self.priorities),
+            self.priority_grouping,
+        )
+
+    def restore(self, snapshot: NvicSnapshot) -> None:
+        """Put back what `snapshot` returned."""
+        self.pending, self.active, self.enabled, self.levels, priorities, self.priority_grouping = snapshot
+        self.priorities = list(priorities)
+
+    def _active_irqs(self) -> int:
+        return self.active >> FIRST_IRQ & _IRQ_MASK
+
+
+def _numbers(mask: int) -> Iterator[int]:
+    """Iterate over the positions of the bits of a mask, lowest first."""
+    while mask:
+        lowest = mask & -mask
+        yield lowest.bit_length() - 1
+        mask ^= lowest
+
+
+_SYSTEM_NAMES = {
+    1: "Reset",
+    2: "NMI",
+    3: "HardFault",
+    4: "MemManage",
+    5: "BusFault",
+    6: "UsageFault",
+    11: "SVCall",
+    12: "DebugMonitor",
+    14: "PendSV",
+    15: "SysTick",
+}
+
+IRQ_NAMES = (
+    "WWDG", "PVD", "TAMPER", "RTC", "FLASH", "RCC", "EXTI0", "EXTI1", "EXTI2", "EXTI3", "EXTI4",
+    "DMA1_Channel1", "DMA1_Channel2", "DMA1_Channel3", "DMA1_Channel4", "DMA1_Channel5", "DMA1_Channel6",
+    "DMA1_Channel7", "ADC1_2", "USB_HP_CAN_TX", "USB_LP_CAN_RX0", "CAN_RX1", "CAN_SCE", "EXTI9_5", "TIM1_BRK",
+    "TIM1_UP", "TIM1_TRG_COM", "TIM1_CC", "TIM2", "TIM3", "TIM4", "I2C1_EV", "I2C1_ER", "I2C2_EV", "I2C2_ER",
+    "SPI1", "SPI2", "USART1", "USART2", "USART3", "EXTI15_10", "RTCAlarm", "USBWakeUp",
+)  # fmt: skip
+
+#: Entries of the vector table, the stack pointer at 0 included.
+VECTOR_COUNT = FIRST_IRQ + len(IRQ_NAMES)
+
+
+def exception_name(number: int) -> str:
+    """Return the name of an exception, such as "SysTick" or "USART1"; "thread" for 0."""
+    if not number:
+        return "thread"
+    if FIRST_IRQ <= number < VECTOR_COUNT:
+        return IRQ_NAMES[number - FIRST_IRQ]
+    return _SYSTEM_NAMES.get(number, f"exception {number}")

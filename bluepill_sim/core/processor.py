@@ -1,0 +1,449 @@
+"""The Cortex-M3 around its instructions: exceptions, priorities, faults, sleep.
+
+Theory of operation. The engine runs blocks and says why it ended; here the
+rest of the architecture is done by hand, always at a block boundary:
+
+    pending, enabled, and of a higher priority than what runs  -> enter
+    branch to EXC_RETURN  -> tail-chain if something is pending, else unstack
+    SVC, fault            -> enter at once, escalated to HardFault if it may not
+    HardFault that faults -> lockup: only a reset helps
+    WFI, WFE              -> asleep: time jumps to whoever wakes the core
+
+Not modelled: the MPU, late arrival, lazy stacking (no FPU), the privilege
+check of the system control space, DebugMonitor.
+
+Source: ARMv7-M Architecture Reference Manual B1.5; TRM r1p1 chapter 5 for cycles.
+Invariant: `exception_number` is what IPSR holds in the engine.
+"""
+
+import struct
+from collections.abc import Callable
+from enum import Enum
+
+from bluepill_sim.core.blocks import it_state_of
+from bluepill_sim.core.engine import Engine
+from bluepill_sim.core.faults import FAULT_OF_HALT, FAULT_ROWS, HFSR_FORCED, FaultKind
+from bluepill_sim.core.machine import Register
+from bluepill_sim.core.nvic import BUS_FAULT, HARD_FAULT, NMI, SVCALL, SYSTICK, Nvic
+from bluepill_sim.core.recorder import EXCEPTION_RETURN
+from bluepill_sim.core.systick import SysTick
+from bluepill_sim.memory import Memory
+from bluepill_sim.timing import DEBUG_HALTS, Halt, HaltKind
+
+#: TRM r1p1 5.7 and 5.9: cycles from the boundary to the first instruction of the handler, and back.
+ENTRY_CYCLES, EXIT_CYCLES, TAIL_CHAIN_CYCLES = 12, 12, 6
+
+#: SHCSR enable bits.
+MEMFAULTENA = 1 << 16
+#: SCR bits.
+SLEEPONEXIT, SEVONPEND = 1 << 1, 1 << 4
+#: CCR bits; reset value of an STM32F10x (PM0056 4.4.6).
+UNALIGN_TRP, DIV_0_TRP, STKALIGN = 1 << 3, 1 << 4, 1 << 9
+
+_FRAME = struct.Struct("<8I")
+_FRAME_BYTES = 32
+_T_BIT, _IT_BITS, _FLAG_BITS = 1 << 24, 0x0600_FC00, 0xF800_0000
+_ALIGN_BIT = 1 << 9
+#: T is elsewhere in CPSR than in xPSR; the engine needs its other bits as they are.
+_CPSR_T = 1 << 5
+_SPSEL, _NPRIV = 2, 1
+#: EXC_RETURN without its lowest bit, which a branch strips: to handler, to thread on MSP, to thread on PSP.
+_TO_HANDLER, _TO_THREAD_MSP, _TO_THREAD_PSP = 0xFFFF_FFF0, 0xFFFF_FFF8, 0xFFFF_FFFC
+
+
+class Sleep(Enum):
+    """What the core waits for."""
+
+    AWAKE = "awake"
+    #: WFI: an interrupt that would be taken if PRIMASK were clear.
+    INTERRUPT = "interrupt"
+    #: WFE: the event register.
+    EVENT = "event"
+
+
+#: Told of each HardFault taken and each lockup: (kind, PC, address, whether it is a lockup).
+FaultListener = Callable[[FaultKind, int, int | None, bool], None]
+
+
+class Processor:
+    """One core; `cycle` is its time."""
+
+    #: Whether SysTick's wraps are acted on within `run`; else whoever runs stops at each.
+    ticks_alone = False
+
+    def __init__(self, engine: Engine, memory: Memory) -> None:
+        self.engine = engine
+        self.nvic = self._make_nvic()
+        self.systick = self._make_systick(lambda: self.pend(SYSTICK))
+        self.exception_number = 0
+        self.sleep = Sleep.AWAKE
+        self.event_register = False
+        self.is_locked_up = False
+        #: When the core last went to sleep, in cycles; None before the first time.
+        self.last_sleep_cycle: int | None = None
+        self.on_fault: FaultListener | None = None
+        #: Why a debugger's halt ended the last run; None where none did.
+        self.halt: Halt | None = None
+        #: Whether BKPT halts for a debugger; without one it is a fault.
+        self.halts_on_bkpt = False
+        # Registers of the system control block, as plain words.
+        self.vector_table = 0
+        self.scr = 0
+        self.ccr = STKALIGN
+        self.shcsr = 0
+        self.cfsr = 0
+        self.hfsr = 0
+        self.bfar = 0
+        self.mmfar = 0
+        self._memory = memory
+        engine.on_event = self.send_event
+        r = Register
+        file = engine.registers
+        self._masks = file.batch(r.PRIMASK, r.BASEPRI, r.FAULTMASK)
+        self._entry_read = file.batch(r.R0, r.R1, r.R2, r.R3, r.R12, r.LR, r.XPSR, r.SP, r.CONTROL, r.CPSR)
+        self._entry_write = file.batch(r.SP, r.IPSR, r.CPSR, r.LR)
+        self._return_read = file.batch(r.CONTROL, r.CPSR, r.PSP, r.MSP)
+        # CONTROL thrice: nPRIV would forbid the next writes, SPSEL is only taken in thread mode, nPRIV comes last.
+        self._return_write = file.batch(
+            r.CONTROL, r.IPSR, r.CONTROL, r.SP, r.R0, r.R1, r.R2, r.R3, r.R12, r.LR, r.CONTROL, r.CPSR
+        )
+
+    def _make_nvic(self) -> Nvic:
+        return Nvic()
+
+    def _make_systick(self, pend: Callable[[], None]) -> SysTick:
+        return SysTick(pend)
+
+    # Time.
+
+    @property
+    def cycle(self) -> int:
+        """The time of the present boundary, in cycles."""
+        return self.engine.cycle
+
+    @property
+    def is_asleep(self) -> bool:
+        """Whether it waits in WFI or WFE."""
+        return self.sleep is not Sleep.AWAKE
+
+    def reset(self, vector_table: int) -> None:
+        """Start at the vectors of `vector_table`."""
+        self.nvic.reset()
+        self.systick.reset()
+        self.exception_number = 0
+        self.sleep = Sleep.AWAKE
+        self.event_register = self.is_locked_up = False
+        self.vector_table = vector_table
+        self.scr = self.shcsr = self.cfsr = self.hfsr = self.bfar = self.mmfar = 0
+        self.set_ccr(STKALIGN)
+        registers = self.engine.registers
+        # A faulting handler may have left any of these; leave handler mode last.
+        registers[Register.IPSR] = 3
+        for register in (Register.CONTROL, Register.PRIMASK, Register.BASEPRI, Register.FAULTMASK, Register.IPSR):
+            registers[register] = 0
+        registers[Register.CPSR] = registers[Register.CPSR] & ~(_IT_BITS | _FLAG_BITS) | _CPSR_T
+        registers[Register.LR] = 0xFFFF_FFFF
+        self.engine.clear_exclusive()
+        stack = self._memory.read_word(vector_table)
+        entry = self._memory.read_word(vector_table + 4)
+        if stack is None or entry is None:
+            self._lock_up(FaultKind.VECTOR_READ, vector_table, vector_table)
+            return
+        registers[Register.SP] = stack & ~3
+        self._jump(entry)
+
+    def run(self, stop_at: int) -> None:
+        """Go on to the first boundary at or after `stop_at` cycles, or less far; never beyond an event of the core."""
+        if self.sleep is not Sleep.AWAKE and not self._wakes():
+            self.engine.cycle = max(self.engine.cycle, stop_at)
+            return
+        if self.nvic.pending and not self.engine.is_inside_block:
+            if self._deliver():
+                return
+            self.engine.stops_after_mask_change = self.nvic.deliverable() != 0
+        else:
+            self.engine.stops_after_mask_change = False
+        halt = self.engine.run(stop_at)
+        if halt.kind is not HaltKind.BOUNDARY:
+            self._act_on(halt)
+
+    def step(self, stop_at: int) -> None:
+        """Run one instruction, or enter the exception that comes before it; `halt` says that it is done.
+
+        A core that sleeps goes on to `stop_at`, or wakes.
+        """
+        if self.sleep is not Sleep.AWAKE and not self._wakes():
+            self.engine.cycle = max(self.engine.cycle, stop_at)
+            return
+        if self.nvic.pending and not self.engine.is_inside_block and self._deliver():
+            self.halt = Halt(HaltKind.STEP, self.engine.pc)
+            return
+        self.engine.stops_after_mask_change = self.nvic.deliverable() != 0
+        self._act_on(self.engine.step(stop_at))
+        if self.halt is None:
+            self.halt = Halt(HaltKind.STEP, self.engine.pc)
+
+    def stop_at_boundary(self) -> None:
+        """End the running slice at the next block boundary."""
+        self.engine.stop_at = 0
+
+    # What others do to the core.
+
+    def pend(self, number: int) -> None:
+        """Make an exception pending."""
+        self.nvic.pend(number)
+        self.pending_changed()
+
+    def pending_changed(self) -> None:
+        """Look again at what may interrupt, at the next boundary."""
+        if self.scr & SEVONPEND and self.nvic.pending:
+            self.event_register = True
+        if self.nvic.deliverable():
+            self.stop_at_boundary()
+
+    def send_event(self) -> None:
+        """Set the event register that WFE waits for."""
+        self.event_register = True
+
+    def set_ccr(self, value: int) -> None:
+        """Write CCR."""
+        self.ccr = value
+        self.engine.set_traps(division=bool(value & DIV_0_TRP), unaligned=bool(value & UNALIGN_TRP))
+
+    def execution_priority(self, *, ignores_primask: bool = False) -> int:
+        """Return the priority of what runs, masks included."""
+        primask, basepri, faultmask = self._masks.read()
+        priority = self.nvic.active_priority()
+        basepri &= 0xF0  # the engine keeps the low bits that an STM32F103 does not have
+        if basepri:
+            priority = min(priority, self.nvic.group_priority(basepri))
+        if primask & 1 and not ignores_primask:
+            priority = min(priority, 0)
+        if faultmask & 1:
+            priority = min(priority, -1)
+        return priority
+
+    # Sleep.
+
+    def _wakes(self) -> bool:
+        """Wake the core if there is reason to, and tell whether it is awake."""
+        number = self.nvic.first_pending()
+        if number is not None:
+            # An exception that PRIMASK alone holds back wakes WFI, but not WFE.
+            priority = self.execution_priority(ignores_primask=self.sleep is Sleep.INTERRUPT)
+            if self.nvic.can_preempt(number, priority):
+                self.sleep = Sleep.AWAKE
+        if self.sleep is Sleep.EVENT and self.event_register:
+            self.event_register = False
+            self.sleep = Sleep.AWAKE
+        return self.sleep is Sleep.AWAKE
+
+    def _fall_asleep(self, sleep: Sleep) -> None:
+        self.last_sleep_cycle = self.cycle
+        if sleep is Sleep.EVENT and self.event_register:
+            self.event_register = False
+            return
+        self.sleep = sleep
+
+    # Exceptions.
+
+    def _deliver(self) -> bool:
+        """Enter the pending exception that may interrupt, if there is one."""
+        number = self.nvic.first_pending()
+        if number is None or not self.nvic.can_preempt(number, self.execution_priority()):
+            return False
+        self._enter(number, self.engine.pc)
+        return True
+
+    def _act_on(self, halt: Halt) -> None:
+        kind = halt.kind
+        if kind in DEBUG_HALTS or (kind is HaltKind.BKPT and self.halts_on_bkpt):
+            self.halt = halt
+            return
+        if kind is HaltKind.EXCEPTION_RETURN:
+            self._leave(halt.pc)
+        elif kind is HaltKind.WAIT_INTERRUPT:
+            self._fall_asleep(Sleep.INTERRUPT)
+        elif kind is HaltKind.WAIT_EVENT:
+            self._fall_asleep(Sleep.EVENT)
+        elif kind is HaltKind.SUPERVISOR_CALL:
+            if self.nvic.can_preempt(SVCALL, self.execution_priority()):
+                self._enter(SVCALL, halt.pc)
+            else:
+                self._fault(FaultKind.MASKED_SVC, halt.pc)
+        else:
+            self._fault(FAULT_OF_HALT[kind], halt.pc, halt.address)
+        if halt.watched is not None:
+            self.halt = Halt(HaltKind.WATCHPOINT, self.engine.pc, halt.watched)
+
+    def _enter(self, number: int, return_address: int) -> None:
+        """Stack, and start the handler of an exception."""
+        r0, r1, r2, r3, r12, lr, xpsr, sp, control, cpsr = self._entry_read.read()
+        in_thread = not self.exception_number
+        frame_at = sp - _FRAME_BYTES
+        xpsr = xpsr & ~(_T_BIT | _ALIGN_BIT) | (_T_BIT if self.engine.is_thumb else 0) | self.exception_number
+        if self.ccr & STKALIGN and frame_at & 4:
+            frame_at -= 4
+            xpsr |= _ALIGN_BIT
+        frame_at &= 0xFFFF_FFFF
+        exc_return = _TO_HANDLER if not in_thread else _TO_THREAD_PSP if control & _SPSEL else _TO_THREAD_MSP
+        frame = _FRAME.pack(r0, r1, r2, r3, r12, lr, return_address, xpsr)
+        if not self._memory.write(frame_at, frame):
+            number = self._stacking_failed(number, return_address, frame_at)
+            if not number:
+                return
+        self._record(return_address, number)
+        self._start_handler(number, frame_at, exc_return | 1, cpsr)
+        self.engine.cycle += ENTRY_CYCLES
+
+    def _stacking_failed(self, number: int, pc: int, frame_at: int) -> int:
+        """Return the exception to take in place of one that cannot be stacked; 0 after a lockup."""
+        self.cfsr |= FAULT_ROWS[FaultKind.STACKING].cfsr
+        if number in {NMI, HARD_FAULT}:
+            self._lock_up(FaultKind.STACKING, pc, frame_at)
+            return 0
+        if self.shcsr & MEMFAULTENA << 1 and self.nvic.can_preempt(BUS_FAULT, self.execution_priority()):
+            return BUS_FAULT
+        self.hfsr |= HFSR_FORCED
+        self._report(FaultKind.STACKING, pc, frame_at, is_lockup=False)
+        return HARD_FAULT
+
+    def _start_handler(self, number: int, sp: int, link: int, cpsr: int) -> None:
+        """Go to the handler of an exception, with the frame in place."""
+        self.nvic.activate(number)
+        self.exception_number = number
+        self.event_register = True
+        self.sleep = Sleep.AWAKE
+        self._entry_write.write((sp, number, cpsr & ~_IT_BITS | _CPSR_T, link))
+        self.engine.clear_exclusive()
+        vector = self._memory.read_word(self.vector_table + 4 * number)
+        if vector is None:
+            self._vector_failed(number)
+        else:
+            self._jump(vector)
+
+    def _vector_failed(self, number: int) -> None:
+        self.hfsr |= FAULT_ROWS[FaultKind.VECTOR_READ].hfsr
+        address = self.vector_table + 4 * number
+        if number == HARD_FAULT:
+            self._lock_up(FaultKind.VECTOR_READ, self.engine.pc, address)
+            return
+        self._fault(FaultKind.VECTOR_READ, self.engine.pc, address)
+
+    def _leave(self, exc_return: int) -> None:
+        """Return from the handler that runs: chain to the next one, or unstack."""
+        number = self.exception_number
+        if not number:
+            self._fault(FaultKind.EXECUTE_NEVER, exc_return)
+            return
+        to_thread = exc_return in {_TO_THREAD_MSP, _TO_THREAD_PSP}
+        is_last = self.nvic.active == 1 << number
+        if not (to_thread or exc_return == _TO_HANDLER) or to_thread is not is_last:
+            self.nvic.deactivate(number)
+            self._fault(FaultKind.INVALID_RETURN, exc_return)
+            return
+        self.nvic.deactivate(number)
+        if number != NMI:
+            self.engine.registers[Register.FAULTMASK] = 0
+        self.event_register = True
+        self.engine.clear_exclusive()
+        control, cpsr, psp, msp = self._return_read.read()
+        following = self.nvic.first_pending()
+        if following is not None and self.nvic.can_preempt(following, self.execution_priority()):
+            self._record(exc_return | 1, EXCEPTION_RETURN)
+            self._record(exc_return | 1, following)
+            self._start_handler(following, msp, exc_return | 1, cpsr)
+            self.engine.cycle += TAIL_CHAIN_CYCLES
+            return
+        self._unstack(exc_return, control, cpsr, psp if exc_return == _TO_THREAD_PSP else msp)
+        self.engine.cycle += EXIT_CYCLES
+
+    def _unstack(self, exc_return: int, control: int, cpsr: int, frame_at: int) -> None:
+        data = self._memory.read(frame_at, _FRAME_BYTES)
+        if data is None:
+            self._fault(FaultKind.UNSTACKING, exc_return, frame_at)
+            return
+        r0, r1, r2, r3, r12, lr, pc, xpsr = _FRAME.unpack(data)
+        number = xpsr & 0x1FF
+        to_thread = exc_return != _TO_HANDLER
+        if to_thread is not (number == 0):
+            self._fault(FaultKind.INVALID_RETURN, exc_return)
+            return
+        self.exception_number = number
+        stack_select = _SPSEL if exc_return == _TO_THREAD_PSP else 0
+        sp = frame_at + _FRAME_BYTES + (4 if xpsr & _ALIGN_BIT else 0)
+        kept = _FLAG_BITS | _IT_BITS
+        flags = cpsr & ~kept | xpsr & kept | _CPSR_T
+        last_control = control & _NPRIV | stack_select
+        self._return_write.write((0, number, stack_select, sp, r0, r1, r2, r3, r12, lr, last_control, flags))
+        self.engine.jump(pc & ~1 | bool(xpsr & _T_BIT))
+        self.engine.it_state = it_state_of(xpsr)
+        self._record(self.engine.pc, EXCEPTION_RETURN)
+        if to_thread and self.scr & SLEEPONEXIT:
+            self._fall_asleep(Sleep.INTERRUPT)
+
+    def _jump(self, target: int) -> None:
+        self.engine.jump(target)
+
+    def _record(self, address: int, kind: int) -> None:
+        self.engine.log.tell((self.cycle, address, kind))
+
+    # Faults.
+
+    def _fault(self, kind: FaultKind, pc: int, address: int | None = None) -> None:
+        """Take the exception of a fault, or HardFault where it may not be taken, or lock up."""
+        row = FAULT_ROWS[kind]
+        self.cfsr |= row.cfsr
+        self.hfsr |= row.hfsr
+        if address is not None and kind in {FaultKind.READ_ERROR, FaultKind.WRITE_ERROR}:
+            self.bfar = address
+        number = row.exception
+        priority = self.execution_priority()
+        is_enabled = number == HARD_FAULT or self.shcsr & MEMFAULTENA << (number - 4)
+        if not is_enabled or not self.nvic.can_preempt(number, priority):
+            self.hfsr |= HFSR_FORCED
+            number = HARD_FAULT
+        if not self.nvic.can_preempt(number, priority):
+            self._lock_up(kind, pc, address)
+            return
+        if number == HARD_FAULT:
+            self._report(kind, pc, address, is_lockup=False)
+        self._enter(number, pc)
+
+    def _lock_up(self, kind: FaultKind, pc: int, address: int | None) -> None:
+        self.is_locked_up = True
+        self._report(kind, pc, address, is_lockup=True)
+
+    def _report(self, kind: FaultKind, pc: int, address: int | None, *, is_lockup: bool) -> None:
+        if self.on_fault is not None:
+            self.on_fault(kind, pc, address, is_lockup)
+
+    # Snapshots.
+
+    def snapshot(self) -> tuple[object, ...]:
+        """Return all that decides the core's future, memory left aside."""
+        return (
+            self.engine.snapshot(),
+            self.nvic.snapshot(),
+            self.systick.snapshot(),
+            tuple(getattr(self, name) for name in _STATE),
+            self.sleep.value,
+        )
+
+    def restore(self, snapshot: tuple[object, ...]) -> None:
+        """Put back what `snapshot` returned."""
+        engine, nvic, systick, state, sleep = snapshot
+        self.engine.restore(engine)  # type: ignore[arg-type]  # a snapshot is opaque to its keeper
+        self.nvic.restore(nvic)  # type: ignore[arg-type]  # as above
+        self.systick.restore(systick)  # type: ignore[arg-type]  # as above
+        for name, value in zip(_STATE, state, strict=True):  # type: ignore[call-overload]  # as above
+            setattr(self, name, value)
+        self.sleep = Sleep(sleep)
+        self.set_ccr(self.ccr)
+
+
+#: Plain attributes of a `Processor` that decide its future.
+_STATE = (
+    "exception_number", "event_register", "is_locked_up", "last_sleep_cycle",
+    "vector_table", "scr", "ccr", "shcsr", "cfsr", "hfsr", "bfar", "mmfar",
+)  # fmt: skip

@@ -1,0 +1,186 @@
+"""What ran, block by block: a bounded record for whoever asks; the last rows are kept in any case (`BlockLog`).
+
+    (cycle, address, BLOCK)              a basic block began
+    (cycle, address, n > 0)              exception n was entered from the instruction at `address`
+    (cycle, address, EXCEPTION_RETURN)   a handler was left; `address` runs next
+
+The cycle of an entry or a return is that of the boundary where it begins; the
+next block's says when it was done. A tail-chain is a return and an entry at
+one time, with the EXC_RETURN value as the address of both. A branch to itself
+is told of once, however long it spins.
+
+Invariant: rows are in the order of time, and independent of the caller's slices.
+
+The last rows of a core, kept whether or not anybody records, and passed on to whoever does.
+
+A verdict on a program that hangs or dies shows them. Rows are those of
+`recorder.py`.
+
+Invariant: the same run leaves the same rows, on both executors, recorded or not.
+"""
+
+from collections import deque
+from collections.abc import Callable, Sequence
+from typing import Protocol
+
+#: Kinds of rows that are not the number of an entered exception.
+BLOCK, EXCEPTION_RETURN = 0, -1
+
+#: Cycle, address, kind.
+BlockRow = tuple[int, int, int]
+
+
+class BlockRecorder:
+    """Keeps the last rows until somebody takes them."""
+
+    def __init__(self, capacity: int, on_full: Callable[["BlockRecorder"], None] | None = None) -> None:
+        """Record nothing yet.
+
+        Args:
+            capacity: how many rows are kept, 1 or more; when there are more the oldest are lost.
+            on_full: called when that many wait, at a block boundary, to drain them; it must not touch the chip.
+
+        Raises:
+            ValueError: there is no room for a row.
+        """
+        if capacity < 1:
+            raise ValueError(f"a recorder keeps 1 row or more, not {capacity}")
+        self.capacity = capacity
+        #: Rows that nobody has taken and that had to go.
+        self.lost = 0
+        self._on_full = on_full
+        self._rows: deque[BlockRow] = deque(maxlen=capacity)
+
+    def __len__(self) -> int:
+        """Return how many rows wait."""
+        return len(self._rows)
+
+    def put(self, cycle: int, address: int, kind: int) -> None:
+        """Add a row."""
+        rows = self._rows
+        if len(rows) == self.capacity:
+            if self._on_full is not None:
+                self._on_full(self)
+            if len(rows) == self.capacity:
+                self.lost += 1
+        rows.append((cycle, address, kind))
+
+    def drain(self) -> list[BlockRow]:
+        """Take all rows, oldest first."""
+        rows = list(self._rows)
+        self._rows.clear()
+        return rows
+
+    def last(self, count: int) -> list[BlockRow]:
+        """Return the last rows, oldest first, and leave them."""
+        return list(self._rows)[-count:] if count > 0 else []
+
+
+#: How many rows every core keeps (`LAST_ROWS` of bluepill_sim/native/source/core.h).
+LAST_ROWS = 32
+
+
+class KeptRows(Protocol):
+    """The last rows of a core."""
+
+    #: Whether the recorder has not been notified of anything yet.
+    is_first: bool
+
+    def append(self, row: BlockRow) -> None:
+        """Add a row; the oldest goes when there are more than `LAST_ROWS`."""
+        ...
+
+    def rows(self) -> tuple[BlockRow, ...]:
+        """Return them, oldest first."""
+        ...
+
+    def put_back(self, rows: Sequence[BlockRow]) -> None:
+        """Have these and no others."""
+        ...
+
+    def ends_with_block(self, address: int) -> bool:
+        """Tell whether the last row is of the block at an address."""
+        ...
+
+
+class LastRows:
+    """`KeptRows` in Python."""
+
+    def __init__(self) -> None:
+        self._rows: deque[BlockRow] = deque(maxlen=LAST_ROWS)
+        self.is_first = False
+
+    @property
+    def append(self) -> Callable[[BlockRow], None]:
+        """The list's own: it is called for each block."""
+        return self._rows.append
+
+    def rows(self) -> tuple[BlockRow, ...]:
+        """As of `KeptRows`."""
+        return tuple(self._rows)
+
+    def put_back(self, rows: Sequence[BlockRow]) -> None:
+        """As of `KeptRows`."""
+        self._rows.clear()
+        self._rows.extend(rows)
+
+    def ends_with_block(self, address: int) -> bool:
+        """As of `KeptRows`."""
+        return bool(self._rows) and self._rows[-1][1:] == (address, BLOCK)
+
+
+class BlockLog:
+    """Takes the rows of one core."""
+
+    def __init__(self, last: KeptRows, fail: Callable[[BaseException], None]) -> None:
+        """Keep rows.
+
+        Args:
+            last: where.
+            fail: notified of what a recorder raises, since C stands between here and the caller.
+        """
+        self._last = last
+        self._fail = fail
+        self._recorder: BlockRecorder | None = None
+        #: Takes a row; another one when the recorder changes.
+        self.tell: Callable[[BlockRow], None] = last.append
+
+    @property
+    def recorder(self) -> BlockRecorder | None:
+        """Who is told of all rows from now on."""
+        return self._recorder
+
+    @recorder.setter
+    def recorder(self, recorder: BlockRecorder | None) -> None:
+        self._recorder = recorder
+        self._last.is_first = True
+        self.tell = self._last.append if recorder is None else self._keep_and_pass_on
+
+    def tell_spin(self, cycle: int, address: int) -> None:
+        """Take the row of a branch to itself: once, however long it spins."""
+        row = cycle, address, BLOCK
+        if not self._last.ends_with_block(address):
+            self.tell(row)
+        elif self._recorder is not None and self._last.is_first:
+            self.pass_on(row)
+
+    def pass_on(self, row: BlockRow) -> None:
+        """Tell the recorder of a row that is kept already."""
+        self._last.is_first = False
+        if self._recorder is not None:
+            try:
+                self._recorder.put(*row)
+            except BaseException as error:  # noqa: BLE001 - C stands between here and the caller
+                self._fail(error)
+
+    def rows(self) -> tuple[BlockRow, ...]:
+        """Return what ran last, oldest first: at most `LAST_ROWS` rows."""
+        return self._last.rows()
+
+    def put_back(self, rows: Sequence[BlockRow]) -> None:
+        """Have run these last."""
+        self._last.put_back(rows)
+
+    def _keep_and_pass_on(self, row: BlockRow) -> None:
+        self._last.append(row)
+        self.pass_on(row)

@@ -1,0 +1,288 @@
+"""What each packet of GDB asks for, and the answer to it.
+
+Sans I/O: payloads go in, payloads come out; whoever owns the connection frames
+them. Commands that run the machine come back when it stands still.
+
+Source: Debugging with GDB, appendix E "GDB Remote Serial Protocol".
+Invariant: any payload at all gives an answer (empty: not supported), never an exception.
+"""
+
+import binascii
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from bluepill_sim.core import WatchKind, Watchpoint
+from bluepill_sim.debug.control import Stop, StopKind
+from bluepill_sim.debug.description import FLASH_PAGE_BYTES, memory_map_xml, target_xml
+from bluepill_sim.debug.execution import Execution
+from bluepill_sim.debug.inspection import Inspector
+from bluepill_sim.debug.monitor import Monitor
+from bluepill_sim.debug.packets import MOST_BYTES
+from bluepill_sim.errors import BluePillError
+from bluepill_sim.stm32f103 import FLASH_BASE, FLASH_BYTES_FITTED
+
+_OK, _NOT_SUPPORTED = b"OK", b""
+#: chosen: errno-like numbers; GDB shows them and knows no others.
+_BAD, _NO_MEMORY, _NO_REGISTER = b"E01", b"E0e", b"E16"
+#: GDB's numbers of signals: SIGINT, SIGTRAP, SIGSEGV.
+_SIGNALS = {StopKind.INTERRUPT: 2, StopKind.FAULT: 11}
+_SIGTRAP = 5
+#: A reply's bytes stand as two digits each.
+_MOST_READ = MOST_BYTES // 2 - 16
+#: The instruction set never needs longer watches; bounds the hooks.
+_LONGEST_WATCH = 4096
+_WATCH_KINDS = {b"2": WatchKind.WRITE, b"3": WatchKind.READ, b"4": WatchKind.ACCESS}
+_WATCH_WORDS = {WatchKind.WRITE: b"watch", WatchKind.READ: b"rwatch", WatchKind.ACCESS: b"awatch"}
+_FEATURES = (
+    f"PacketSize={MOST_BYTES:x};qXfer:features:read+;qXfer:memory-map:read+;QStartNoAckMode+;vContSupported+;"
+    "hwbreak+;ReverseStep+;ReverseContinue+"
+).encode()
+
+
+@dataclass(slots=True)
+class State:
+    """How a session stands."""
+
+    #: Whether GDB has asked for no acknowledgements.
+    has_no_acks: bool = False
+    #: Whether GDB has left, and whether the machine is to run on.
+    is_over: bool = False
+    was_killed: bool = False
+
+
+class GdbSession:
+    """One debugger at one machine.
+
+    Args:
+        execution: the machine, standing still.
+    """
+
+    def __init__(self, execution: Execution) -> None:
+        self.state = State()
+        self._execution = execution
+        self._inspector = Inspector(execution.machine.board)
+        self._monitor = Monitor(execution)
+        self._stop = Stop(StopKind.STEP)
+        self._flash: dict[int, bytes] = {}
+        self._by_letter: dict[bytes, Callable[[bytes], bytes]] = {
+            b"?": lambda _: self._stop_reply(self._stop),
+            b"g": lambda _: _hex(self._inspector.read_registers()),
+            b"G": self._write_registers,
+            b"p": self._read_register,
+            b"P": self._write_register,
+            b"m": self._read_memory,
+            b"M": self._write_memory,
+            b"X": self._write_binary,
+            b"c": lambda at: self._resume(at, self._execution.go_on),
+            b"s": lambda at: self._resume(at, self._execution.step),
+            b"C": lambda rest: self._resume(rest.partition(b";")[2], self._execution.go_on),
+            b"S": lambda rest: self._resume(rest.partition(b";")[2], self._execution.step),
+            b"b": self._backwards,
+            b"Z": lambda rest: self._point(rest, is_set=True),
+            b"z": lambda rest: self._point(rest, is_set=False),
+            b"k": lambda _: self._leave(was_killed=True),
+            b"D": lambda _: self._leave(was_killed=False),
+            b"H": lambda _: _OK,
+            b"T": lambda _: _OK,
+            b"q": self._query,
+            b"Q": self._set,
+            b"v": self._verbose,
+        }
+
+        self._by_word: dict[bytes, Callable[[bytes], bytes]] = {
+            b"Cont": self._continue,
+            b"Kill": lambda _: self._leave(was_killed=True),
+            b"FlashErase": lambda rest: self._erase_flash(*_numbers(rest)),
+            b"FlashWrite": self._write_flash,
+            b"FlashDone": lambda _: self._program_flash(),
+        }
+
+    def answer(self, payload: bytes) -> bytes:
+        """Return the answer to a payload; empty: not supported."""
+        act = self._by_letter.get(payload[:1])
+        if act is None:
+            return _NOT_SUPPORTED
+        try:
+            return act(payload[1:])
+        except (ValueError, IndexError, BluePillError):
+            return _BAD
+
+    # Registers and memory.
+
+    def _write_registers(self, digits: bytes) -> bytes:
+        data = binascii.unhexlify(digits)
+        for number in range(len(self._inspector.layout)):
+            begin, end = self._inspector.layout[number]
+            if end <= len(data):
+                self._inspector.write_register(number, data[begin:end])
+        self._execution.changed()
+        return _OK
+
+    def _read_register(self, digits: bytes) -> bytes:
+        number = int(digits, 16)
+        if number >= len(self._inspector.layout):
+            return _NO_REGISTER
+        return _hex(self._inspector.read_register(number))
+
+    def _write_register(self, rest: bytes) -> bytes:
+        number, _, digits = rest.partition(b"=")
+        self._inspector.write_register(int(number, 16), binascii.unhexlify(digits))
+        self._execution.changed()
+        return _OK
+
+    def _read_memory(self, rest: bytes) -> bytes:
+        address, size = _numbers(rest)
+        data = self._inspector.read_memory(address, min(size, _MOST_READ)) if size else b""
+        return _NO_MEMORY if data is None else _hex(data)
+
+    def _write_memory(self, rest: bytes) -> bytes:
+        where, _, digits = rest.partition(b":")
+        return self._write(*_numbers(where), binascii.unhexlify(digits))
+
+    def _write_binary(self, rest: bytes) -> bytes:
+        where, _, data = rest.partition(b":")
+        return self._write(*_numbers(where), data)
+
+    def _write(self, address: int, size: int, data: bytes) -> bytes:
+        if size != len(data):
+            return _BAD
+        if data and not self._inspector.write_memory(address, data):
+            return _NO_MEMORY
+        if data:
+            self._execution.changed()
+        return _OK
+
+    # Running.
+
+    def _resume(self, address: bytes, run: Callable[[], Stop]) -> bytes:
+        if address:
+            self._inspector.set_register("pc", int(address, 16))
+            self._execution.changed()
+        self._stop = run()
+        return self._stop_reply(self._stop)
+
+    def _backwards(self, rest: bytes) -> bytes:
+        if rest not in {b"s", b"c"}:
+            return _NOT_SUPPORTED
+        if not self._execution.machine.can_rewind:
+            return _BAD
+        self._stop = self._execution.step_back() if rest == b"s" else self._execution.go_back()
+        return self._stop_reply(self._stop)
+
+    def _stop_reply(self, stop: Stop) -> bytes:
+        match stop.kind:
+            case StopKind.EXIT:
+                return b"W%02x" % stop.code
+            case StopKind.END:
+                return b"W00"
+            case StopKind.BEGIN:
+                return b"T05replaylog:begin;thread:1;"
+            case StopKind.WATCHPOINT if (point := self._watchpoint_at(stop.address)) is not None:
+                return b"T05%b:%x;thread:1;" % (_WATCH_WORDS[point.kind], point.address)
+        return b"T%02xthread:1;" % _SIGNALS.get(stop.kind, _SIGTRAP)
+
+    def _watchpoint_at(self, address: int | None) -> Watchpoint | None:
+        points = self._execution.machine.board.chip.engine.watchpoints
+        # An access may begin up to three bytes before what it reaches into.
+        near = [p for p in points if address is not None and p.address - 4 < address < p.address + p.size]
+        return min(near, key=lambda p: (p.address, p.size, p.kind.value), default=None)
+
+    def _point(self, rest: bytes, *, is_set: bool) -> bytes:
+        kind, where, size, *_ = rest.split(b";")[0].split(b",")
+        address, length = int(where, 16), int(size, 16)
+        engine = self._execution.machine.board.chip.engine
+        if kind in {b"0", b"1"}:
+            (engine.breakpoints.add if is_set else engine.breakpoints.discard)(address & ~1)
+            return _OK
+        if kind not in _WATCH_KINDS:
+            return _NOT_SUPPORTED
+        if not 1 <= length <= _LONGEST_WATCH:
+            return _BAD
+        point = Watchpoint(address, length, _WATCH_KINDS[kind])
+        (engine.watchpoints.add if is_set else engine.watchpoints.discard)(point)
+        return _OK
+
+    def _leave(self, *, was_killed: bool) -> bytes:
+        self.state.is_over, self.state.was_killed = True, was_killed
+        return _OK
+
+    # Words.
+
+    def _query(self, rest: bytes) -> bytes:
+        name, _, argument = rest.partition(b":" if not rest.startswith(b"Rcmd") else b",")
+        if name == b"Xfer":
+            return _transfer(argument)
+        if name == b"Rcmd":
+            text = self._monitor.run(binascii.unhexlify(argument).decode("utf-8", "replace"))
+            return _hex(text.encode()[:_MOST_READ])
+        return _ANSWERS.get(name, _NOT_SUPPORTED)
+
+    def _set(self, rest: bytes) -> bytes:
+        if rest == b"StartNoAckMode":
+            self.state.has_no_acks = True
+            return _OK
+        return _NOT_SUPPORTED
+
+    def _verbose(self, rest: bytes) -> bytes:
+        if rest == b"Cont?":
+            return b"vCont;c;C;s;S"
+        name, _, argument = rest.partition(b":" if rest.startswith(b"Flash") else b";")
+        act = self._by_word.get(name)
+        return _NOT_SUPPORTED if act is None else act(argument)
+
+    def _continue(self, actions: bytes) -> bytes:
+        run = {b"c": self._execution.go_on, b"s": self._execution.step}.get(actions[:1].lower())
+        return _BAD if run is None else self._resume(b"", run)
+
+    def _write_flash(self, rest: bytes) -> bytes:
+        where, _, data = rest.partition(b":")
+        self._flash[int(where, 16)] = data
+        return _OK
+
+    def _erase_flash(self, address: int, size: int) -> bytes:
+        begin = address - FLASH_BASE if address >= FLASH_BASE else address
+        if begin % FLASH_PAGE_BYTES or not 0 <= begin <= FLASH_BYTES_FITTED - size:
+            return _NO_MEMORY
+        self._flash[address] = b"\xff" * size
+        return _OK
+
+    def _program_flash(self) -> bytes:
+        rows, self._flash = list(self._flash.items()), {}
+        for address, data in rows:
+            if data and not self._inspector.write_memory(address, data):
+                return _NO_MEMORY
+        self._execution.changed()
+        return _OK
+
+
+#: Answers that never change; there is one thread.
+_ANSWERS = {
+    b"Supported": _FEATURES,
+    b"C": b"QC1",
+    b"fThreadInfo": b"m1",
+    b"sThreadInfo": b"l",
+    b"Attached": b"1",
+    b"Symbol": _OK,
+}
+_DOCUMENTS = {b"features:read:target.xml": target_xml, b"memory-map:read:": memory_map_xml}
+
+
+def _transfer(argument: bytes) -> bytes:
+    """Answer qXfer: a part of a document."""
+    name, _, where = argument.rpartition(b":")
+    make = _DOCUMENTS.get(name)
+    if make is None:
+        return b"E00"
+    offset, size = _numbers(where)
+    text = make().encode()
+    part = text[offset : offset + min(size, _MOST_READ)]
+    return (b"l" if offset + len(part) >= len(text) else b"m") + part
+
+
+def _numbers(text: bytes) -> tuple[int, int]:
+    first, _, second = text.partition(b",")
+    return int(first, 16), int(second, 16)
+
+
+def _hex(data: bytes) -> bytes:
+    return binascii.hexlify(data)

@@ -1,0 +1,1 @@
+"""What the parts of the chip meet through: registers, pins and clocks."""

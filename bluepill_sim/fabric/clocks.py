@@ -1,0 +1,78 @@
+"""The clocks of the chip as every part sees them: frequencies, and the flash wait states set for them.
+
+This is the common point only. RCC decides the frequencies and FLASH the wait
+states (each tells `ChipPorts.clock_changed`); USARTs, timers and the CPU read
+them. Sources: RM0008 sections 3.3.3 and 7.2, data sheet DS5319 table 9.
+Invariant: every frequency is a whole number of hertz, and `hclk_hz` > 0.
+"""
+
+from dataclasses import dataclass
+
+#: Highest SYSCLK/HCLK/PCLK2, in Hz (DS5319 table 9).
+MAX_SYSCLK_HZ = 72_000_000
+#: Highest PCLK1, in Hz (DS5319 table 9).
+MAX_PCLK1_HZ = 36_000_000
+#: HSI after reset, in Hz (RM0008 7.2.2).
+HSI_HZ = 8_000_000
+#: Highest SYSCLK for 0, 1, 2 wait states, in Hz (RM0008 3.3.3, FLASH_ACR).
+MAX_SYSCLK_BY_WAIT_STATES = (24_000_000, 48_000_000, 72_000_000)
+
+
+@dataclass(slots=True)
+class Clocks:
+    """The clock tree's outputs, kept up to date by RCC and FLASH."""
+
+    sysclk_hz: int = HSI_HZ
+    hclk_hz: int = HSI_HZ
+    pclk1_hz: int = HSI_HZ
+    pclk2_hz: int = HSI_HZ
+    #: Clock of TIM2-7 and TIM1/8: PCLKx, doubled when its prescaler is not 1.
+    timer1_hz: int = HSI_HZ
+    timer2_hz: int = HSI_HZ
+    #: FLASH_ACR LATENCY, 0 to 2 wait states.
+    flash_wait_states: int = 0
+    #: FLASH_ACR PRFTBE.
+    flash_prefetch: bool = True
+
+    def snapshot(self) -> tuple[int, int, int, int, int, int, int, bool]:
+        """Return the values in the order of the fields."""
+        return (
+            self.sysclk_hz,
+            self.hclk_hz,
+            self.pclk1_hz,
+            self.pclk2_hz,
+            self.timer1_hz,
+            self.timer2_hz,
+            self.flash_wait_states,
+            self.flash_prefetch,
+        )
+
+    def restore(self, snapshot: tuple[int, int, int, int, int, int, int, bool]) -> None:
+        """Put back what `snapshot` returned."""
+        (
+            self.sysclk_hz,
+            self.hclk_hz,
+            self.pclk1_hz,
+            self.pclk2_hz,
+            self.timer1_hz,
+            self.timer2_hz,
+            self.flash_wait_states,
+            self.flash_prefetch,
+        ) = snapshot
+
+
+def illegal_settings(clocks: Clocks) -> list[tuple[str, str]]:
+    """Return what the data sheet forbids in the present setting, as (key, sentence) pairs."""
+    found = []
+    if clocks.sysclk_hz > MAX_SYSCLK_HZ:
+        found.append(("clock:sysclk", f"SYSCLK is {clocks.sysclk_hz} Hz, above {MAX_SYSCLK_HZ} Hz"))
+    if clocks.pclk1_hz > MAX_PCLK1_HZ:
+        found.append(("clock:pclk1", f"PCLK1 is {clocks.pclk1_hz} Hz, above {MAX_PCLK1_HZ} Hz"))
+    highest = MAX_SYSCLK_BY_WAIT_STATES[min(clocks.flash_wait_states, 2)]
+    if highest < clocks.sysclk_hz <= MAX_SYSCLK_HZ:
+        states = clocks.flash_wait_states
+        what = f"FLASH_ACR LATENCY is {states} at a SYSCLK of {clocks.sysclk_hz} Hz: good up to {highest} Hz"
+        found.append(("clock:latency", what))
+    if not clocks.flash_prefetch and clocks.hclk_hz != clocks.sysclk_hz:
+        found.append(("clock:prefetch", "FLASH_ACR PRFTBE is off while the AHB prescaler is not 1"))
+    return found

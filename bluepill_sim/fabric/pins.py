@@ -1,0 +1,507 @@
+"""The pins of the chip: where its parts and the outside world meet.
+
+A pin has one driver inside (GPIO, an alternate function, or the debug port)
+and one outside. What is not modelled: volts, currents, slew rates, and the
+two clocks of the input synchroniser.
+
+Source: RM0008 sections 9.1 and 9.3.5.
+Invariant: `output` and `level` follow from the other attributes alone; every
+change of `output` is told to `PinBank.on_output` once, with its exact time.
+
+What a pin can do to its wire, and what GPIO can make of a pin.
+
+Source: RM0008 9.1, table 20.
+Invariant: these are plain values; `pins.py` has the pins.
+
+What is wrong with a wire, in words: drivers that fight, shorts, too many volts, inputs that float.
+
+The pins know levels, not currents; what they can tell is told here. Each
+complaint is a warning, once a pin, with the program's place.
+
+Not modelled: currents through clamp diodes, the total current of the supply
+pins, and slew rates.
+Source: data sheet DS5319 tables 5 and 6 (pin definitions, absolute maximum ratings).
+Invariant: these functions only read.
+"""
+
+from collections.abc import Callable, Iterator, Sequence
+from enum import Enum
+from typing import Protocol, Self, TypeAlias
+
+
+class PinDrive(Enum):
+    """What the chip itself puts on a wire."""
+
+    #: The level that it makes when nobody stronger drives; None: none.
+    level: bool | None
+    #: Whether it is stronger than any pull.
+    is_strong: bool
+
+    def __new__(cls, label: str, level: bool | None, is_strong: bool) -> Self:
+        """Make a member whose value is its label."""
+        member = object.__new__(cls)
+        member._value_ = label
+        member.level, member.is_strong = level, is_strong
+        return member
+
+    #: Nothing: the chip listens, or has the pin in analog mode.
+    NONE = "none", None, False
+    #: Strong 0.
+    LOW = "low", False, True
+    #: Strong 1.
+    HIGH = "high", True, True
+    #: Weak 1 (about 40 kΩ).
+    PULL_UP = "pull-up", True, False
+    #: Weak 0 (about 40 kΩ).
+    PULL_DOWN = "pull-down", False, False
+
+
+class PinMode(Enum):
+    """What GPIOx_CRL/CRH make of a pin."""
+
+    #: What the chip drives for a 0 and for a 1: the ODR bit, or the level of the alternate function.
+    drives: tuple[PinDrive, PinDrive]
+
+    def __new__(cls, label: str, low: PinDrive, high: PinDrive) -> Self:
+        """Make a member whose value is its label."""
+        member = object.__new__(cls)
+        member._value_ = label
+        member.drives = (low, high)
+        return member
+
+    #: Schmitt trigger off: reads 0.
+    ANALOG = "analog", PinDrive.NONE, PinDrive.NONE
+    FLOATING = "floating input", PinDrive.NONE, PinDrive.NONE
+    #: Input with the pull that the ODR bit chooses.
+    PULLED = "pulled input", PinDrive.PULL_DOWN, PinDrive.PULL_UP
+    PUSH_PULL = "output", PinDrive.LOW, PinDrive.HIGH
+    OPEN_DRAIN = "open-drain output", PinDrive.LOW, PinDrive.NONE
+    ALTERNATE_PUSH_PULL = "alternate function", PinDrive.LOW, PinDrive.HIGH
+    ALTERNATE_OPEN_DRAIN = "open-drain alternate function", PinDrive.LOW, PinDrive.NONE
+
+
+ALTERNATE_MODES = (PinMode.ALTERNATE_PUSH_PULL, PinMode.ALTERNATE_OPEN_DRAIN)
+INPUT_MODES = (PinMode.FLOATING, PinMode.PULLED)
+DRIVES_BY_VALUE = {drive.value: drive for drive in PinDrive}
+MODES_BY_VALUE = {mode.value: mode for mode in PinMode}
+
+
+#: What a wire can be shorted to, and the level that it then has.
+RAILS = {"GND": False, "3V3": True}
+#: An input that is not 5 V-tolerant bears VDD + 0.3 V (DS5319 table 6); chosen: what counts as more than that.
+MOST_VOLTS = 3.65
+
+
+def overvoltage(pin: "Pin", volts: float) -> str | None:
+    """Return what is wrong with so many volts on a pin; None when it bears them."""
+    if volts <= MOST_VOLTS:
+        return None
+    if not pin.is_five_volt_tolerant:
+        reason = "it bears 3.6 V at most"
+    elif pin.output.is_strong:
+        reason = "it bears 5 V only as an input"
+    elif pin.output.level is not None:
+        reason = "it bears 5 V only without its pull"
+    else:
+        return None
+    return f"{volts:g} V on {pin.name}: {reason}"
+
+
+def contention(pin: "Pin") -> str:
+    """Return what to say of two drivers that fight."""
+    outside = "high" if pin.driven else "low"
+    return f"{pin.name}: two drivers fight: the chip drives it {pin.output.value}, the other end {outside}"
+
+
+def floating_inputs(names: Sequence[str]) -> str:
+    """Return what to say of inputs that nobody drives."""
+    one = len(names) == 1
+    what, they = ("floating input", "it reads") if one else ("floating inputs", "they read")
+    return f"{', '.join(names)}: {what} that nobody drives: {they} 0 here and anything on a board; configured"
+
+
+def short_circuit(pin: "Pin", rail: str) -> str:
+    """Return what to say of an output that works against a supply rail."""
+    return f"{pin.name}: output {pin.output.value} is shorted to {rail}"
+
+
+__all__ = ["ALTERNATE_MODES", "INPUT_MODES", "Pin", "PinBank", "PinDrive", "PinMode", "PinPorts", "PinSnapshot"]
+
+#: Level of the outside driver, mode, ODR bit, holder (owner, drive), connections, watched, output, level, rail.
+PinSnapshot: TypeAlias = tuple[
+    bool | None, str, bool, tuple[str, str] | None, tuple[tuple[str, bool], ...], bool, str, bool, str | None
+]
+
+
+class PinPorts(Protocol):
+    """What the pins need of the chip."""
+
+    def warn(self, message: str, *, once: str) -> None:
+        """Warn once for each key."""
+        ...
+
+    @property
+    def now_ns(self) -> int:
+        """The exact time of what is happening now."""
+        ...
+
+    def request_stop(self) -> None:
+        """End the CPU's slice at the boundary of the running block."""
+        ...
+
+
+class Pin:
+    """One pin of one port, seen from outside (`drive`, `level`, `output`, `watch`) and from inside."""
+
+    def __init__(
+        self, bank: "PinBank", port: str, number: int, *, is_bonded: bool, is_five_volt_tolerant: bool = False
+    ) -> None:
+        self._bank = bank
+        self.port = port
+        self.number = number
+        self.name = f"P{port}{number}"
+        #: Whether the package has a leg for it.
+        self.is_bonded = is_bonded
+        #: Whether it bears 5 V as an input without a pull (DS5319 table 5, "FT").
+        self.is_five_volt_tolerant = is_five_volt_tolerant
+        #: What the board hangs on the pin: PULL_UP, PULL_DOWN or NONE.
+        self.board_pull = PinDrive.NONE
+        #: What the chip itself puts on the wire.
+        self.output = PinDrive.NONE
+        #: The logic level on the wire; a floating wire is taken as low.
+        self.level = False
+        #: What the digital input sees: `level`, or False while the Schmitt trigger is off or the pin is held.
+        self.input = False
+        #: Whether a change of `output` ends the CPU's slice.
+        self.is_watched = False
+        #: Called at every change of `input`, in the order of subscription (GPIO's IDR, EXTI).
+        self.listeners: list[Callable[[Pin], None]] = []
+        self._outside: bool | None = None
+        self._rail: str | None = None
+        self._mode = PinMode.FLOATING
+        self._output_bit = False
+        self._holder: tuple[str, PinDrive] | None = None
+        self._sources: dict[str, bool] = {}
+        # What follows from the mode, the holder and the sources, kept at hand because pins change often:
+        # the drive for an ODR bit of 0 and of 1, and whether the digital input reads the wire.
+        self._drives = PinMode.FLOATING.drives
+        self._reads = True
+
+    # From outside the chip.
+
+    def drive(self, level: bool | int | None, *, volts: float | None = None) -> None:
+        """Put a level (False, True, or 0, 1) on the wire from outside; None lets go.
+
+        Args:
+            level: What the other end drives.
+            volts: How high a 1 is; None is 3.3 V. More than the pin bears is warned of.
+
+        Raises:
+            ValueError: The package has no leg for this pin.
+        """
+        if not self.is_bonded:
+            raise ValueError(f"{self.name} is not bonded out on this package")
+        complaint = overvoltage(self, volts) if volts is not None and level else None
+        if complaint is not None:
+            self._bank.warn(complaint, once=f"{self.name}:volts")
+        outside = None if level is None else bool(level)
+        if outside is not self._outside:
+            self._outside = outside
+            self._bank.simple_is_known = False
+            self._resolve()
+            if outside is None:
+                for listener in self._bank.release_listeners:
+                    listener(self)
+
+    def short(self, rail: str | None) -> None:
+        """Tie the wire to a supply rail, as a solder bridge does; None cuts it again.
+
+        Args:
+            rail: "GND" or "3V3".
+
+        Raises:
+            ValueError: There is no such rail.
+        """
+        if rail is not None and rail not in RAILS:
+            raise ValueError(f"no such rail: {rail!r}; a wire can be shorted to {' or '.join(RAILS)}")
+        self._rail = rail
+        self._bank.simple_is_known = False
+        self._resolve()
+
+    def watch(self, on: bool = True) -> None:
+        """Choose whether a change of the chip's own drive ends the CPU's slice."""
+        self.is_watched = on
+        self._bank.simple_is_known = False
+
+    @property
+    def driven(self) -> bool | None:
+        """What the outside world puts on the wire; None is nothing."""
+        return self._outside
+
+    @property
+    def is_floating(self) -> bool:
+        """Whether nobody drives or pulls the wire."""
+        is_driven = self._outside is not None or self._rail is not None
+        return self.output is PinDrive.NONE and not is_driven and self.board_pull is PinDrive.NONE
+
+    @property
+    def is_contended(self) -> bool:
+        """Whether chip and outside world drive the wire to different levels."""
+        outside = self._outside if self._rail is None else RAILS[self._rail]
+        return self.output.is_strong and outside is not None and self.output.level is not outside
+
+    @property
+    def function(self) -> str | None:
+        """The alternate function that the wire shows, such as "USART1_TX"; None for none."""
+        source = min(self._sources, default=None)
+        return source if source is not None and self.carries(source) else None
+
+    # From inside the chip.
+
+    @property
+    def mode(self) -> PinMode:
+        """What GPIO has configured, whether or not GPIO has the pin now."""
+        return self._mode
+
+    @property
+    def holder(self) -> str | None:
+        """Who keeps GPIO off the pin, such as "JTDO"; None for nobody."""
+        return None if self._holder is None else self._holder[0]
+
+    def configure(self, mode: PinMode, output_bit: bool) -> None:
+        """Set mode and ODR bit (called by GPIO)."""
+        self._mode = mode
+        self._output_bit = output_bit
+        self._update()
+
+    def set_output_bit(self, output_bit: bool) -> None:
+        """Set the ODR bit (called by GPIO)."""
+        self._output_bit = output_bit
+        self._put(self._drives[output_bit])
+
+    def hold(self, owner: str, drive: PinDrive = PinDrive.NONE) -> None:
+        """Take the pin from GPIO for a fixed function, such as the debug port."""
+        self._holder = (owner, drive)
+        self._update()
+
+    def release(self) -> None:
+        """Give the pin back to GPIO."""
+        self._holder = None
+        self._update()
+
+    def connect(self, source: str, level: bool) -> None:
+        """Offer `level` as the alternate function `source`; the latest call of each source counts."""
+        self._sources[source] = level
+        self._update()
+
+    def disconnect(self, source: str) -> None:
+        """Take the alternate function `source` off the pin."""
+        if self._sources.pop(source, None) is not None:
+            self._update()
+
+    def carries(self, source: str) -> bool:
+        """Whether the wire shows the alternate function `source`."""
+        return (
+            self._mode in ALTERNATE_MODES
+            and self._holder is None
+            and self.is_bonded
+            and min(self._sources, default=None) == source
+        )
+
+    def is_listening(self) -> bool:
+        """Whether an alternate function can receive from this pin: an input that nobody holds."""
+        is_input = self._mode in INPUT_MODES or self._mode in ALTERNATE_MODES
+        return is_input and self._holder is None and self.is_bonded
+
+    def is_simple(self) -> bool:
+        """Whether a change of the ODR bit changes nothing but the level on the wire, and nobody is to be told."""
+        bank = self._bank
+        return (
+            self._drives == PinMode.PUSH_PULL.drives
+            and self._mode is PinMode.PUSH_PULL
+            and self._outside is None
+            and self._rail is None
+            and not self.is_watched
+            and not bank.edge_lines >> self.number & 1
+        )
+
+    def snapshot(self) -> PinSnapshot:
+        """Return all that decides this pin's future, as plain values."""
+        holder = None if self._holder is None else (self._holder[0], self._holder[1].value)
+        return (
+            self._outside,
+            self._mode.value,
+            self._output_bit,
+            holder,
+            tuple(self._sources.items()),
+            self.is_watched,
+            self.output.value,
+            self.level,
+            self._rail,
+        )
+
+    def restore(self, snapshot: PinSnapshot) -> None:
+        """Put back what `snapshot` returned; tells nobody."""
+        self._outside, mode, self._output_bit, holder, sources, self.is_watched, output, self.level, rail = snapshot
+        self._rail = rail
+        self._mode = MODES_BY_VALUE[mode]
+        self._holder = None if holder is None else (holder[0], DRIVES_BY_VALUE[holder[1]])
+        self._sources = dict(sources)
+        self.output = DRIVES_BY_VALUE[output]
+        self._derive()
+        self.input = self.level and self._reads
+
+    def _derive(self) -> None:
+        """Work out `_drives` and `_reads`, by RM0008 table 20."""
+        self._bank.simple_is_known, mode = False, self._mode
+        self._reads = mode is not PinMode.ANALOG and self._holder is None
+        if self._holder is not None:
+            self._drives = (self._holder[1],) * 2
+        elif mode not in ALTERNATE_MODES:
+            self._drives = mode.drives
+        elif self._sources:
+            # Two functions on one pin are unspecified; chosen: the first by name drives.
+            self._drives = (mode.drives[self._sources[min(self._sources)]],) * 2
+        else:
+            # "Not specified" (RM0008 9.1.9); chosen: nothing drives.
+            self._drives = (PinDrive.NONE,) * 2
+
+    def _update(self) -> None:
+        self._derive()
+        self._put(self._drives[self._output_bit])
+
+    def _put(self, output: PinDrive) -> None:
+        """Put a drive on the wire."""
+        if output is not self.output:
+            self.output = output
+            self._bank.output_changed(self)
+        self._resolve()
+
+    def _resolve(self) -> None:
+        """Bring `level` and `input` up to date and tell the listeners of a change of the input."""
+        output, outside = self.output, self._outside
+        level: bool
+        if self._rail is not None:
+            level = RAILS[self._rail]
+            if output.is_strong and output.level is not level:
+                self._bank.warn(short_circuit(self, self._rail), once=f"{self.name}:short")
+        elif outside is None:
+            # A weak pull of the chip is stronger than the board's (40 kΩ against an LED or 100 kΩ).
+            level = bool(self.board_pull.level if output.level is None else output.level)
+        elif output.is_strong:
+            # Chosen: of two strong drivers that differ the low one wins.
+            level = outside and bool(output.level)
+            if level is not outside or level is not output.level:
+                self._bank.warn(contention(self), once=f"{self.name}:contention")
+        else:
+            level = outside
+        self.level = level
+        seen = level and self._reads
+        if seen is not self.input:
+            self.input = seen
+            for listener in self.listeners:
+                listener(self)
+        if self._bank.wire_listeners:
+            self._bank.wire_changed(self)
+
+
+class PinBank:
+    """All pins of the chip, and the switches between them and its peripherals."""
+
+    PORTS = "ABCDE"
+
+    def __init__(
+        self, ports: PinPorts, bonded: frozenset[str], five_volt_tolerant: frozenset[str] = frozenset()
+    ) -> None:
+        """Make the pins.
+
+        Args:
+            ports: The chip.
+            bonded: Names of the pins that the package has legs for, such as "PA4".
+            five_volt_tolerant: Names of those that bear 5 V.
+        """
+        self._ports = ports
+        #: EXTI lines on which an edge makes a request, as a mask.
+        self.edge_lines = 0
+        #: Whether no pin has changed in what `Pin.is_simple` looks at, since whoever sets this looked.
+        self.simple_is_known = False
+        #: Called with (pin, time in ns) whenever something on a wire may have changed; tools look on.
+        self.wire_listeners: list[Callable[[Pin, int], None]] = []
+        #: Those of them who take changes of simple pins in bulk where a core keeps them: called to do so.
+        self.bulk_takers: list[Callable[[], None]] = []
+        self._pins = {
+            port: tuple(self._make(port, n, bonded, five_volt_tolerant) for n in range(16)) for port in self.PORTS
+        }
+        self._by_name = {pin.name: pin for pins in self._pins.values() for pin in pins}
+        #: Called with (pin name, drive, time in ns) at every change of the chip's own drive.
+        self.on_output: Callable[[str, PinDrive, int], None] | None = None
+        #: Tells whether anybody beyond `on_silent_output` wants to hear of each output.
+        self.is_subscribed: Callable[[], bool] = lambda: self.on_output is not None
+        #: Called with the time in ns of the last output that was not told one by one.
+        self.on_silent_output: Callable[[int], None] | None = None
+        #: Called when AFIO has changed `remaps` or `exti_ports`.
+        self.route_listeners: list[Callable[[], None]] = []
+        #: AFIO_MAPR by function, such as {"USART1": 1}; a function that is missing is not remapped.
+        self.remaps: dict[str, int] = {}
+        #: Called with each pin that the outside lets go.
+        self.release_listeners: list[Callable[[Pin], None]] = []
+        #: Returns which bits of a register's word the running store means, and where it stands.
+        self.written_by: Callable[[int], tuple[int, int]] = lambda _address: (0, 0)
+        #: Tells whether somebody speaks to a pin in characters, not in levels.
+        self.is_fed: Callable[[Pin], bool] = lambda _pin: False
+        #: The port that feeds each EXTI line 0 to 15 (AFIO_EXTICR); the list stays the same for ever.
+        self.exti_ports: list[str] = ["A"] * 16
+
+    def __getitem__(self, name: str) -> Pin:
+        """Return the pin `name`, such as "PC13".
+
+        Raises:
+            KeyError: The chip has no such pin.
+        """
+        return self._by_name[name]
+
+    def __iter__(self) -> Iterator[Pin]:
+        """Iterate over the pins in the order of the ports."""
+        return iter(self._by_name.values())
+
+    def port(self, letter: str) -> tuple[Pin, ...]:
+        """Return the 16 pins of a port, bonded or not."""
+        return self._pins[letter]
+
+    def route_changed(self) -> None:
+        """Tell the listeners that AFIO has changed `remaps` or `exti_ports`."""
+        for listener in self.route_listeners:
+            listener()
+
+    def output_changed(self, pin: Pin) -> None:
+        """Pass on a change of a pin's own drive (called by the pin)."""
+        if self.on_output is not None:
+            self.on_output(pin.name, pin.output, self._ports.now_ns)
+        if pin.is_watched:
+            self._ports.request_stop()
+
+    def wire_changed(self, pin: Pin) -> None:
+        """Tell the tools that a pin's wire may have changed (called by the pin)."""
+        now_ns = self._ports.now_ns
+        for listener in self.wire_listeners:
+            listener(pin, now_ns)
+
+    def warn(self, message: str, *, once: str) -> None:
+        """Warn of something electrical."""
+        self._ports.warn(message, once=once)
+
+    def _make(self, port: str, number: int, bonded: frozenset[str], tolerant: frozenset[str]) -> Pin:
+        name = f"P{port}{number}"
+        return Pin(self, port, number, is_bonded=name in bonded, is_five_volt_tolerant=name in tolerant)
+
+    def snapshot(self) -> tuple[tuple[PinSnapshot, ...], tuple[tuple[str, int], ...], tuple[str, ...]]:
+        """Return all that decides the pins' future, as plain values."""
+        return tuple(p.snapshot() for p in self), tuple(self.remaps.items()), tuple(self.exti_ports)
+
+    def restore(self, snapshot: tuple[tuple[PinSnapshot, ...], tuple[tuple[str, int], ...], tuple[str, ...]]) -> None:
+        """Put back what `snapshot` returned; tells nobody."""
+        pins, remaps, exti_ports = snapshot
+        for pin, state in zip(self, pins, strict=True):
+            pin.restore(state)
+        self.remaps = dict(remaps)
+        self.exti_ports[:] = exti_ports

@@ -1,0 +1,69 @@
+"""What a peripheral needs of the chip around it.
+
+Peripherals never import each other: they meet at pins, at IRQ lines, at the
+clocks, and at nothing else. The chip (`board.py`) implements this protocol;
+the tests have a fake that passes the same contract test.
+"""
+
+from typing import Protocol
+
+from bluepill_sim.fabric.clocks import Clocks
+from bluepill_sim.fabric.pins import PinBank
+
+
+class ChipPorts(Protocol):
+    """The chip, as one of its peripherals sees it."""
+
+    @property
+    def now_ns(self) -> int:
+        """The exact time of the accessing instruction inside `read`/`write`, else the time reached."""
+        ...
+
+    @property
+    def clocks(self) -> Clocks:
+        """The one shared object of frequencies; RCC and FLASH write it."""
+        ...
+
+    @property
+    def pins(self) -> PinBank:
+        """The one shared bank of pins; GPIO, AFIO and the alternate functions write it."""
+        ...
+
+    def set_irq(self, irq: int, level: bool) -> None:
+        """Set the level of interrupt line `irq` (0 to 59; USART1 is 37)."""
+        ...
+
+    def pulse_irq(self, irq: int) -> None:
+        """Make interrupt `irq` pending once, without a level that stays."""
+        ...
+
+    def clock_changed(self) -> None:
+        """Tell that `clocks` has new values: re-base cycles, and tell each peripheral's `clock_changed`."""
+        ...
+
+    def request_stop(self) -> None:
+        """End the CPU's slice at the boundary of the running block."""
+        ...
+
+    def deadline_changed(self) -> None:
+        """Tell that this peripheral's `next_deadline` may be earlier than before."""
+        ...
+
+    def reset_peripheral(self, name: str) -> None:
+        """Call `reset` of the peripheral `name`, if it is modelled (RCC's APBxRSTR)."""
+        ...
+
+    def watchdog_expired(self, name: str) -> None:
+        """Reset the chip at the boundary of the running block, because of the watchdog `name`: "IWDG" or "WWDG"."""
+        ...
+
+    def signal(self, name: str) -> None:
+        """Tell the core of a happening by name: "event" sets the event register that WFE waits for."""
+        ...
+
+    def warn(self, message: str, *, once: str, pc: int | None = None) -> None:
+        """Warn of what the firmware does wrong, or of what is not modelled; once for each key.
+
+        With `pc`: of what the instruction there did; else it is the one that runs.
+        """
+        ...

@@ -1,0 +1,287 @@
+"""The base of every peripheral: a table of registers, executed.
+
+This is not a bus: whether a peripheral's clock is on, bit-band, and addresses
+outside the peripherals are the business of `chip.py`. A peripheral declares
+`REGISTERS`, names in `STATE` its plain attributes beyond the registers, and
+writes methods for what a read or write *causes*.
+
+A peripheral that acts by itself keeps the time of its next action in
+`due_ns`; accesses catch up to that time first, so that a register never reads
+older than the instruction that asks.
+
+Access width: RM0008 section 3.1: an APB bridge turns a byte or halfword write
+into a word by duplicating the data; AHB peripherals have byte lanes.
+Invariant: `words[offset // 4]` of a register without `on_read` is what reads return.
+
+A hardware register as a declaration: which bits store, which clear, which call code.
+
+This is not a register's behaviour beyond its bits: what a write *causes* is a
+method of the peripheral, named here by `on_read` and `on_write`. The table
+that a peripheral makes of these declarations is executed by `Peripheral`
+(and may be executed by any other executor: nothing here is Python-specific).
+
+Source: RM0008 section 2.1 (list of abbreviations for registers).
+Invariant: a stored word never holds a bit outside `readable`, so that the
+store of a register without `on_read` *is* what a read returns.
+"""
+
+from array import array
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import ClassVar, TypeAlias, cast
+
+from bluepill_sim.fabric.ports import ChipPorts
+
+#: Every bit of a 32-bit register.
+WORD = 0xFFFF_FFFF
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Register:
+    """One register of a peripheral, as the reference manual tabulates it."""
+
+    #: The manual's name without the peripheral's, such as "CRL".
+    name: str
+    #: Byte offset from the peripheral's base, a multiple of 4.
+    offset: int
+    #: Value after reset, as it reads.
+    reset: int = 0
+    #: Bits that read as stored; all others read 0.
+    readable: int = WORD
+    #: Bits that take the value written (r/w). Bits that are writable but not readable are seen by `on_write` only.
+    writable: int = WORD
+    #: Bits cleared by writing 1 and left alone by 0 (rc_w1).
+    write_one_to_clear: int = 0
+    #: Bits cleared by writing 0 and left alone by 1 (rc_w0).
+    write_zero_to_clear: int = 0
+    #: Name of the peripheral's method `() -> int` that answers a read in place of the stored word.
+    on_read: str | None = None
+    #: Offset of a hidden word, after the registers, in which each read leaves what it returned; None for none.
+    latched_in: int | None = None
+    #: Name of the peripheral's method `(written: int, previous: int) -> None`, called after the store.
+    on_write: str | None = None
+    #: One line for people.
+    doc: str = ""
+
+    def __post_init__(self) -> None:
+        """Refuse a declaration that contradicts itself.
+
+        Raises:
+            ValueError: A mask is wider than a word, two kinds of bits overlap,
+                or the reset value holds bits that do not read.
+        """
+        if self.offset % 4:
+            raise ValueError(f"{self.name}: offset {self.offset:#x} is not that of a word")
+        for mask in (self.reset, self.readable, self.writable, self.write_one_to_clear, self.write_zero_to_clear):
+            if mask & ~WORD:
+                raise ValueError(f"{self.name}: {mask:#x} is wider than a word")
+        clears = self.write_one_to_clear | self.write_zero_to_clear
+        if self.write_one_to_clear & self.write_zero_to_clear or clears & self.writable:
+            raise ValueError(f"{self.name}: a bit is either writable, cleared by 1 or cleared by 0")
+        if self.reset & ~self.readable:
+            raise ValueError(f"{self.name}: the reset value holds bits that do not read")
+
+    @property
+    def is_plain_read(self) -> bool:
+        """Whether a read returns the stored word and causes nothing."""
+        return self.on_read is None
+
+    def widen(self, previous: int, value: int, lanes: int) -> int:
+        """Return the whole-word write that does what a write of some byte lanes does.
+
+        Args:
+            previous: The stored word.
+            value: The data, already shifted to its lanes.
+            lanes: 0xFF for each byte lane written, 0 for the others.
+        """
+        untouched = (previous & self.writable) | self.write_zero_to_clear
+        return (value & lanes) | (untouched & ~lanes)
+
+    def stored_after(self, previous: int, written: int) -> int:
+        """Return the word stored after `written` (a whole word) meets `previous`."""
+        kept = previous & ~self.writable & ~(written & self.write_one_to_clear)
+        kept &= written | ~self.write_zero_to_clear
+        return (kept | (written & self.writable)) & self.readable
+
+
+def bits(*positions: int | tuple[int, int]) -> int:
+    """Return a mask of bit positions and of (high, low) fields, as the manual prints them.
+
+    >>> hex(bits(0, (7, 4)))
+    '0xf1'
+    """
+    mask = 0
+    for position in positions:
+        high, low = position if isinstance(position, tuple) else (position, position)
+        mask |= ((1 << (high - low + 1)) - 1) << low
+    return mask
+
+
+#: A peripheral's registers and its `STATE` attributes, in declared order.
+PeripheralSnapshot: TypeAlias = tuple[tuple[int, ...], tuple[object, ...]]
+
+
+@dataclass(frozen=True, slots=True)
+class ClockBit:
+    """The bit of an RCC enable register that clocks a peripheral; the reset bit has the same place."""
+
+    #: "AHBENR", "APB1ENR" or "APB2ENR".
+    register: str
+    bit: int
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Place:
+    """Where one peripheral sits in the chip: a row of the chip's page."""
+
+    name: str
+    base: int
+    #: None: always clocked.
+    clock: ClockBit | None = None
+    #: Interrupt lines, in the order that the peripheral's class says.
+    irqs: tuple[int, ...] = ()
+    size: int = 0x400
+
+
+class Peripheral:
+    """A block of registers at an address of the chip."""
+
+    REGISTERS: ClassVar[tuple[Register, ...]] = ()
+    #: Names of the attributes beyond the registers that decide the future: plain, immutable values.
+    STATE: ClassVar[tuple[str, ...]] = ()
+    #: Whether narrow writes touch only their bytes (AHB) or are duplicated over the word (APB).
+    HAS_BYTE_LANES: ClassVar[bool] = False
+
+    def __init__(self, chip: ChipPorts, place: Place) -> None:
+        self.chip = chip
+        self.place = place
+        self.name = place.name
+        self.base = place.base
+        #: When this peripheral next acts by itself, in ns; None for never.
+        self.due_ns: int | None = None
+        #: The stored words of the whole block, indexed by offset // 4; the object stays the same for ever.
+        self.words = array("I", bytes(place.size))
+        count = place.size // 4
+        self._registers: list[Register | None] = [None] * count
+        #: For each word what `Register.stored_after` is made of: kept, taken, cleared by 1, cleared by 0.
+        self._masks = [(0, 0, 0, 0)] * count
+        self._read_hooks: list[Callable[[], int] | None] = [None] * count
+        #: Index of the hidden word that keeps what a read returned.
+        self._latches: list[int | None] = [None] * count
+        self._write_hooks: list[Callable[[int, int], None] | None] = [None] * count
+        for register in self.REGISTERS:
+            index = register.offset // 4
+            self._registers[index] = register
+            self._masks[index] = (
+                register.readable & ~register.writable,
+                register.readable & register.writable,
+                register.write_one_to_clear,
+                register.write_zero_to_clear,
+            )
+            if register.latched_in is not None:
+                self._latches[index] = register.latched_in // 4
+            if register.on_read is not None:
+                self._read_hooks[index] = cast("Callable[[], int]", getattr(self, register.on_read))
+            if register.on_write is not None:
+                self._write_hooks[index] = cast("Callable[[int, int], None]", getattr(self, register.on_write))
+            self.words[index] = register.reset
+
+    def read(self, offset: int, size: int) -> int:
+        """Return what the bus reads.
+
+        Args:
+            offset: Byte offset from the base, aligned to `size`.
+            size: 1, 2 or 4 bytes.
+        """
+        if self.due_ns is not None and self.chip.now_ns >= self.due_ns:
+            self.advance_to(self.chip.now_ns)
+        index = offset >> 2
+        hook = self._read_hooks[index]
+        if hook is None:
+            word = self.words[index]
+            latch = self._latches[index]
+            if latch is not None:
+                self.words[latch] = word
+            elif self._registers[index] is None:
+                self._warn_no_register(offset, "read")
+                return 0
+        else:
+            word = hook()
+        if size == 4:
+            return word
+        return (word >> ((offset & 3) * 8)) & ((1 << (size * 8)) - 1)
+
+    def write(self, offset: int, size: int, value: int) -> None:
+        """Take what the bus writes; arguments as of `read`."""
+        if self.due_ns is not None and self.chip.now_ns >= self.due_ns:
+            self.advance_to(self.chip.now_ns)
+        index = offset >> 2
+        register = self._registers[index]
+        if register is None:
+            self._warn_no_register(offset, "write")
+            return
+        previous = self.words[index]
+        written = value if size == 4 else self._narrow(register, offset, size, value)
+        kept, taken, one, zero = self._masks[index]
+        self.words[index] = previous & kept & ~(written & one) & (written | ~zero) | written & taken
+        hook = self._write_hooks[index]
+        if hook is not None:
+            hook(written, previous)
+
+    def masks_of(self, index: int) -> tuple[int, int, int, int]:
+        """Return what the stored word `index` keeps, takes, and clears by 1 and by 0, as masks."""
+        return self._masks[index]
+
+    def reset(self) -> None:
+        """Go back to the state after a system reset."""
+        self.due_ns = None
+        for register in self.REGISTERS:
+            self.words[register.offset // 4] = register.reset
+        self.on_reset()
+
+    def on_reset(self) -> None:
+        """Put back what is not a register; called by `reset` after the registers."""
+
+    def next_deadline(self) -> int | None:
+        """Return when this peripheral next acts by itself, in ns, or None for never."""
+        return self.due_ns
+
+    def advance_to(self, now_ns: int) -> None:
+        """Act on everything due up to and including `now_ns`, in order of its time."""
+
+    def clock_changed(self) -> None:
+        """Learn that the frequencies in `chip.clocks` have changed just now."""
+
+    def snapshot(self) -> PeripheralSnapshot:
+        """Return all that decides this peripheral's future, as plain values."""
+        return tuple(self.words), (self.due_ns, *(getattr(self, name) for name in self.STATE))
+
+    def restore(self, snapshot: PeripheralSnapshot) -> None:
+        """Put back what `snapshot` returned; tells nobody."""
+        words, (due_ns, *state) = snapshot
+        self.words[:] = array("I", words)
+        self.due_ns = cast("int | None", due_ns)
+        for name, value in zip(self.STATE, state, strict=True):
+            setattr(self, name, value)
+
+    def _narrow(self, register: Register, offset: int, size: int, value: int) -> int:
+        """Return the word that the peripheral sees when the CPU writes 1 or 2 bytes."""
+        shift = (offset & 3) * 8
+        mask = (1 << (size * 8)) - 1
+        previous = self.words[register.offset // 4]
+        in_lanes = register.widen(previous, (value & mask) << shift, mask << shift)
+        if self.HAS_BYTE_LANES:
+            return in_lanes
+        duplicated = (value & mask) * (0x0101_0101 if size == 1 else 0x0001_0001) & WORD
+        if register.stored_after(previous, duplicated) != register.stored_after(previous, in_lanes):
+            self.chip.warn(
+                f"{self.name}_{register.name}: a {size * 8}-bit write is duplicated over the word by the APB bridge",
+                once=f"{self.name}_{register.name}:narrow",
+            )
+        return duplicated
+
+    def _warn_no_register(self, offset: int, what: str) -> None:
+        self.chip.warn(
+            f"{self.name}+{offset:#04x}: {what} of an address without a register",
+            once=f"{self.name}+{offset & ~3:#04x}",
+        )

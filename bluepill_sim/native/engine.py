@@ -1,0 +1,431 @@
+"""An engine whose blocks are entered in C: the same runs, without Python at each boundary.
+
+Theory of operation. The state of a run stands in a struct of the C core, and
+the attributes of `Engine` are windows on it. C charges blocks, ends runs,
+answers plain registers and does exceptions of the ordinary kind; it calls
+Python for a block that it does not know, for a register that causes something,
+and for a trap that springs.
+
+A debugger's watchpoints and steps, and the rest of a block after a halt, are
+Python's business: for those runs the hooks are exchanged, and this is `Engine`.
+
+Invariant: `shared.is_python` tells whose hooks are in place; between runs all
+state is in `shared`, whoever ran last.
+
+The traps of the native core: the same hooks, that look at their register in C.
+
+Invariant: Python is called only by a trap that springs.
+"""
+
+import ctypes
+import weakref
+from collections.abc import Callable
+
+from bluepill_sim.core.accesses import Access, accesses_of, is_ambiguous, only_reads
+from bluepill_sim.core.block_cost import NO_BLOCK, Block
+from bluepill_sim.core.engine import Engine, EngineSnapshot, StopBefore, Traps
+from bluepill_sim.core.machine import GENERAL, SCRATCH_BASE, Core, RawRead, RawWrite, ReadAccess, WriteAccess, guarded
+from bluepill_sim.core.recorder import BlockRecorder, KeptRows
+from bluepill_sim.core.thumb import Kind
+from bluepill_sim.native.library import (
+    ENGINE_FUNCTIONS,
+    READ,
+    RECORDED,
+    TRAPPED,
+    UNKNOWN_BLOCK,
+    WRITE,
+    Callbacks,
+    EngineApi,
+    address_of,
+    library,
+)
+from bluepill_sim.native.state import (
+    BOUNDARY,
+    DELIVER,
+    FAILED,
+    FROZEN,
+    HALT_KINDS,
+    HALT_NUMBERS,
+    RECORD,
+    STALE,
+    UNEXPLAINED,
+    InstructionRow,
+    NativeLastRows,
+    Shared,
+    field,
+    flag,
+)
+from bluepill_sim.timing import Halt, HaltKind
+
+
+class NativeTraps(Traps):
+    """Watches the instructions that may trap, without entering Python at each of them."""
+
+    def __init__(
+        self, core: Core, stop_before: StopBefore, leave_it_block: Callable[[], object], state: ctypes.c_void_p
+    ) -> None:
+        super().__init__(core, stop_before, leave_it_block)
+        self._state = state
+
+    def _trap(self, address: int, number: int, kind: HaltKind) -> None:
+        if (address, number, kind) in self._trapped:
+            return
+        self._trapped.add((address, number, kind))
+        user = library().core_trap(self._state, address, GENERAL[number].value, HALT_NUMBERS[kind])
+        self._core.hook_native("instruction", address_of("core_on_trap"), user, address, address)
+
+
+#: Flags of a row (`enum row_flag`).
+_CHANGES_MASKS, _SENDS_EVENT, _SELF_LOOP, _WRITABLE, _NOTED, _READS = 1, 2, 4, 8, 128, 256
+_ENDS = {Kind.WAIT_INTERRUPT: 16, Kind.WAIT_EVENT: 32, Kind.YIELD: 64}
+_NO_BLOCK_START = 0xFFFF_FFFF
+#: Chosen: so often at least Python looks at signals, such as Ctrl-C.
+_SLICE_CYCLES = 20_000_000
+#: Chosen: rows that C keeps before Python takes them.
+_RECORD_ROOM = 4096
+
+
+class NativeEngine(Engine):
+    """`Engine`, with its hot half in C.
+
+    Raises:
+        MissingDependencyError: Unicorn or the native core is not installed.
+    """
+
+    cycle = field("cycle", "As of `Engine`.")
+    stop_at = field("stop_at", "As of `Engine`.")
+    pc = field("pc", "As of `Engine`.")
+    is_thumb = flag("is_thumb", "As of `Engine`.")
+    it_state = field("it_state", "As of `Engine`.")
+    stops_after_mask_change = flag("mask_stop", "As of `Engine`.")
+    _run_from = field("run_from", "As of `Engine`.")
+
+    def _begin(self) -> None:
+        self._regions: list[tuple[int, int, RawRead, RawWrite]] = []
+        self._code: list[tuple[int, int, int]] = []
+        self._known: dict[int, Block] = {}
+        self._noted: set[int] = set()
+        #: The block that Python holds in place of C's.
+        self._held: Block | None = NO_BLOCK
+        self._native_hooks: tuple[int, ...] = ()
+        self._pc_hooks: tuple[int, ...] = ()
+        #: Called before Python looks at what C may have changed (levels of pins).
+        self.before_access: Callable[[], None] | None = None
+        #: Called before each run in C.
+        self.before_run: Callable[[], None] | None = None
+        self._kept: list[object] = []
+        unicorn = self._core.library
+        api = EngineApi(*(ctypes.cast(getattr(unicorn, name), ctypes.c_void_p) for name in ENGINE_FUNCTIONS))
+        #: Keeps the callbacks alive.
+        self._calls = Callbacks(
+            UNKNOWN_BLOCK(self._measure_block), READ(self._read_io), WRITE(self._write_io), TRAPPED(self._trapped),
+            RECORDED(self._take_records),
+        )  # fmt: skip
+        self._state = state = ctypes.c_void_p(
+            library().core_new(self._core.handle, ctypes.addressof(api), ctypes.addressof(self._calls))
+        )
+        if not state.value:
+            raise MemoryError("no memory for the native core")
+        self.shared = Shared.from_address(state.value)
+        self.shared.scratch = SCRATCH_BASE
+        weakref.finalize(self, library().core_free, state)
+
+    @property
+    def state(self) -> ctypes.c_void_p:
+        """The C core, for whoever shares more with it."""
+        return self._state
+
+    def keep(self, *buffers: object) -> None:
+        """Keep what C has pointers to."""
+        self._kept.extend(buffers)
+
+    def region_at(self, address: int) -> int:
+        """Return the number of the I/O region that begins at an address."""
+        return next(number for number, region in enumerate(self._regions) if region[0] == address)
+
+    # Memory.
+
+    def map_memory(self, address: int, buffer: "ctypes.Array[ctypes.c_char]", *, is_writable: bool) -> None:
+        """As of `Engine`; the writable memory is where C stacks, that at 0 is where it looks for vectors."""
+        super().map_memory(address, buffer, is_writable=is_writable)
+        shared, host = self.shared, ctypes.addressof(buffer)
+        if is_writable:
+            self._store_inline(address, len(buffer))
+            shared.sram, shared.sram_base, shared.sram_bytes = host, address, len(buffer)
+        elif address == 0:
+            shared.flash, shared.flash_bytes = host, len(buffer)
+            shared.flash_base = next((first for first, _, at in self._code if at == host), 0)
+        self._code.append((address, address + len(buffer), host))
+
+    def _store_inline(self, address: int, size: int) -> None:
+        """Let stores to a memory run in translated code: no hook on it, and no page of it for code until a fetch."""
+        core = self._core
+        core.allow_execution(address, size)
+        core.remove_hook(self._bad_access_hook)
+        for first, last in ((0, address - 1), (address + size, 0xFFFF_FFFF)):
+            core.on_bad_access(self._bad_access, first, last)
+        core.fill_tlb_native(address_of("core_on_tlb_fill"), self._state.value or 0)
+
+    def map_io(self, address: int, size: int, read: ReadAccess, write: WriteAccess) -> None:
+        """As of `Engine`."""
+        number = len(self._regions)
+        self._regions.append((address, size, *guarded(read, write, self._is_denied, self._fail)))
+        user = library().core_region(self._state, number, address)
+        self._core.map_io_native(address, size, address_of("core_read_io"), address_of("core_write_io"), user)
+
+    def forget_costs(self) -> None:
+        """As of `Engine`."""
+        super().forget_costs()
+        library().core_forget_rows(self._state)
+
+    def set_traps(self, *, division: bool, unaligned: bool) -> None:
+        """As of `Engine`."""
+        self.shared.traps_division = division
+        super().set_traps(division=division, unaligned=unaligned)
+
+    # Running.
+
+    def run(self, stop_at: int) -> Halt:
+        """As of `Engine`."""
+        self.use_python(True)
+        return super().run(stop_at)
+
+    def step(self, stop_at: int) -> Halt:
+        """As of `Engine`."""
+        self.use_python(True)
+        return super().step(stop_at)
+
+    @property
+    def needs_python(self) -> bool:
+        """Whether the next run is one that C does not do."""
+        return bool(self.watchpoints) or self._rest.block is not None
+
+    def go_on(self, limit: int) -> tuple[bool, Halt | None]:
+        """Run, sleep and take exceptions up to the first boundary at or after `limit` cycles, or less far.
+
+        Returns:
+            Whether an exception waits that C leaves to Python, and what ended
+            the run: None for a boundary.
+
+        Raises:
+            Exception: whatever a peripheral's callback raised.
+        """
+        self.use_python(False)
+        debug, traps, shared = self._debug, self._traps, self.shared
+        if (debug.breakpoints or debug.has_hooks) and not debug.is_armed:
+            debug.arm()
+        if traps.have_changed:
+            traps.begin()
+            self.forget_costs()
+        if self.before_run is not None:
+            self.before_run()
+        kind = library().core_run(self._state, min(limit, shared.cycle + _SLICE_CYCLES))
+        if shared.dirty and self.before_access is not None:
+            self.before_access()
+        if self._failure is not None:
+            failure, self._failure = self._failure, None
+            self._frozen = None
+            raise failure
+        if kind == STALE:
+            traps.arm()
+            return False, None
+        halt = self._halt_of(kind)
+        if halt is not None and halt.kind is HaltKind.TAKEN_WRITE:
+            self.use_python(True)
+            halt = self._step_over_write(limit)
+        return kind == DELIVER, None if halt is not None and halt.kind is HaltKind.STEP else halt
+
+    def _halt_of(self, kind: int) -> Halt | None:
+        """Return what ended a run in C; None where only its time was up, or Python is to go on."""
+        shared = self.shared
+        if kind in (BOUNDARY, DELIVER):
+            return None
+        if kind == FROZEN and self._frozen is not None:
+            return self._thaw(self._frozen)
+        if kind == UNEXPLAINED:
+            raise RuntimeError(f"Unicorn stopped at {shared.halt_pc:#010x} with error {shared.halt_address}")
+        return Halt(HALT_KINDS[kind], shared.halt_pc, shared.halt_address if shared.halt_has_address else None)
+
+    def use_python(self, wanted: bool) -> None:
+        """Exchange the hooks, if they are not those that are wanted."""
+        shared, core = self.shared, self._core
+        if bool(shared.is_python) is wanted:
+            return
+        shared.is_python = wanted
+        for hook in (*self._native_hooks, *self._pc_hooks):
+            core.remove_hook(hook)
+        self._native_hooks = self._pc_hooks = ()
+        if wanted:
+            self._held = NO_BLOCK
+            self._pc_hooks = tuple(core.note_pc(address, size) for address, size, _, _ in self._regions)
+            self._native_hooks = (*super()._install_hooks(), self._block_hook)
+        else:
+            self._native_hooks = self._install_hooks()
+            self._held = None
+        core.drop_all_code()
+
+    @property
+    def block(self) -> Block:
+        """As of `Engine`."""
+        if self._held is not None:
+            return self._held
+        start = library().core_block_start(self._state)
+        return NO_BLOCK if start == _NO_BLOCK_START else self._known[start]
+
+    @block.setter
+    def block(self, block: Block) -> None:
+        if self.shared.is_python:
+            self._held = block
+        else:
+            self._held = None if block is NO_BLOCK else block
+            library().core_leave_block(self._state)
+
+    @property
+    def access_cycle(self) -> int:
+        """As of `Engine`."""
+        shared = self.shared
+        if shared.in_access:
+            return int(shared.access_cycle)
+        return super().access_cycle
+
+    @property
+    def access_pc(self) -> int:
+        """As of `Engine`."""
+        return self.shared.access_pc if self.shared.in_access else super().access_pc
+
+    def clear_exclusive(self) -> None:
+        """As of `Engine`."""
+        if self.shared.is_python:
+            super().clear_exclusive()
+        else:
+            library().core_clear_exclusive(self._state)
+
+    def _take_recorder(self, recorder: BlockRecorder | None) -> None:
+        super()._take_recorder(recorder)
+        if not library().core_start_recording(self._state, 0 if recorder is None else _RECORD_ROOM):
+            raise MemoryError("no memory for a record of blocks")
+
+    def restore(self, snapshot: EngineSnapshot) -> None:
+        """As of `Engine`."""
+        super().restore(snapshot)
+        self.shared.uses_exclusive = self._blocks.uses_exclusive
+
+    def stop_before(self, kind: HaltKind, pc: int, address: int | None = None) -> None:
+        """As of `Engine`."""
+        super().stop_before(kind, pc, address)
+        self.shared.halt_kind = FROZEN
+
+    # What C calls.
+
+    def _install_hooks(self) -> tuple[int, ...]:
+        core, user = self._core, self._state.value or 0
+        self._held = None
+        self._native_hooks = (
+            core.hook_native("block", address_of("core_on_block"), user),
+            core.hook_native("interrupt", address_of("core_on_interrupt"), user),
+            core.hook_native("invalid", address_of("core_on_invalid"), user),
+        )
+        return self._native_hooks
+
+    def _make_last_rows(self) -> KeptRows:
+        return NativeLastRows(self.shared)
+
+    def _make_traps(self) -> Traps:
+        return NativeTraps(self._core, self.stop_before, self._leave_it_block, self._state)
+
+    def _measure_block(self, address: int, size: int) -> None:
+        """Tell C of a block that it does not know."""
+        try:
+            block = self._blocks.at(address, size)
+            self.shared.uses_exclusive = self._blocks.uses_exclusive
+            if self._traps.needs_hooks(block):
+                self.shared.halt_kind = STALE
+            else:
+                self._add_row(block)
+        except BaseException as error:  # noqa: BLE001 - C stands between here and the caller
+            self._fail(error)
+            self.shared.halt_kind = FAILED
+
+    def _add_row(self, block: Block) -> None:
+        start, size = block.start, block.end - block.start
+        self._known[start] = block
+        memory = self._blocks.writable_at(start)
+        host = None if memory is None else memory[2] + start - memory[0]
+        code = next(ctypes.string_at(at + start - first, size) for first, end, at in self._code if first <= start < end)
+        accesses = {access.address: access for access in accesses_of(code, start)}
+        flags = _ENDS.get(block.last, 0)
+        flags |= (
+            _CHANGES_MASKS * block.changes_masks | _SENDS_EVENT * block.sends_event | _SELF_LOOP * block.is_self_loop
+        )
+        flags |= _WRITABLE * (host is not None)
+        flags |= _READS * (only_reads(code) and not block.has_exclusive)
+        if is_ambiguous(code, start):
+            flags |= _NOTED
+            if not accesses.keys() <= self._noted:
+                self._note(accesses)
+                self._traps.stale.append(block)
+                self.shared.halt_kind = STALE
+                return
+        rows = (InstructionRow * len(block.offsets))()
+        for row, (at, cycle) in zip(rows, block.offsets.items(), strict=True):
+            row.address, row.cycle = at, cycle
+            _fill(row, accesses.get(at))
+        added = library().core_add_row(
+            self._state, start, block.end, block.straight, block.taken, flags, ctypes.addressof(rows), len(rows), host
+        )
+        if not added:
+            raise RuntimeError(f"no room for the block at {start:#010x}")
+
+    def _note(self, accesses: dict[int, Access]) -> None:
+        """Have the PC of these instructions noted, in code that is translated from now on."""
+        for address in accesses.keys() - self._noted:
+            self._noted.add(address)
+            self._core.hook_native("instruction", address_of("core_on_note"), self._state.value or 0, address, address)
+
+    def _read_io(self, region: int, offset: int, size: int) -> int:
+        return self._regions[region][2](0, offset, size, 0)
+
+    def _write_io(self, region: int, offset: int, size: int, value: int) -> None:
+        self._regions[region][3](0, offset, size, value, 0)
+
+    def _is_denied(self) -> bool:
+        """Get ready for an access; tell whether the run has ended before it."""
+        shared = self.shared
+        if shared.dirty and self.before_access is not None:
+            self.before_access()
+        return super()._is_denied() if shared.is_python else self._frozen is not None
+
+    def _trapped(self, kind: int, pc: int, value: int) -> None:
+        try:
+            halt = HALT_KINDS[kind]
+            self.stop_before(halt, pc, value if halt is HaltKind.UNALIGNED else None)
+        except BaseException as error:  # noqa: BLE001 - C stands between here and the caller
+            self._fail(error)
+
+    def _take_records(self, rows: int, count: int) -> None:
+        try:
+            if self.recorder is not None:
+                put = self.recorder.put
+                for cycle, address, kind in RECORD.iter_unpack(ctypes.string_at(rows, count * RECORD.size)):
+                    put(cycle, address, kind)
+        except BaseException as error:  # noqa: BLE001 - C stands between here and the caller
+            self._fail(error)
+
+    def _bad_access(self, access: int, address: int, size: int, value: int) -> bool:
+        self._halt = None
+        goes_on = super()._bad_access(access, address, size, value)
+        halt: Halt | None = self._halt
+        if not goes_on and halt is not None and self._frozen is None:
+            shared = self.shared
+            shared.halt_kind, shared.halt_pc = HALT_NUMBERS[halt.kind], halt.pc
+            shared.halt_address, shared.halt_has_address = address, 1
+        return goes_on
+
+
+def _fill(row: InstructionRow, access: Access | None) -> None:
+    """Write down what an instruction reaches for."""
+    if access is None:
+        return
+    row.kind = 1 if access.is_load else 2
+    row.bytes, row.base, row.offset = access.bytes, access.base, access.offset
+    row.index, row.shift, row.count = 255 if access.index is None else access.index, access.shift, access.count

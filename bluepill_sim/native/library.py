@@ -1,0 +1,133 @@
+"""The native core's shared library: found next to the package, loaded by ctypes.
+
+It is built with the package where a C compiler is there (`pip install` says
+nothing if not). `P2OS_CORE=python` in the environment chooses the Python
+executor, `P2OS_CORE=native` insists on this one.
+"""
+
+import ctypes
+import os
+from functools import cache
+from importlib.util import find_spec
+from typing import Any
+
+from bluepill_sim.errors import BluePillError, MissingDependencyError
+from bluepill_sim.native.state import Shared
+
+#: The name of the environment variable, and what it may hold.
+VARIABLE, CHOICES = "P2OS_CORE", ("native", "python")
+_HINT = "install a C compiler, then the package again"
+
+UNKNOWN_BLOCK = ctypes.CFUNCTYPE(None, ctypes.c_uint32, ctypes.c_uint32)
+READ = ctypes.CFUNCTYPE(ctypes.c_uint32, ctypes.c_uint32, ctypes.c_uint32, ctypes.c_uint32)
+WRITE = ctypes.CFUNCTYPE(None, ctypes.c_uint32, ctypes.c_uint32, ctypes.c_uint32, ctypes.c_uint32)
+TRAPPED = ctypes.CFUNCTYPE(None, ctypes.c_uint32, ctypes.c_uint32, ctypes.c_uint32)
+RECORDED = ctypes.CFUNCTYPE(None, ctypes.c_void_p, ctypes.c_uint32)
+
+
+#: The functions of Unicorn that C calls, by their names in `binding.Library`.
+ENGINE_FUNCTIONS = ("start", "stop", "read_register", "read_registers", "write_registers")
+
+
+class EngineApi(ctypes.Structure):
+    """`struct engine_api`."""
+
+    _fields_ = tuple((name, ctypes.c_void_p) for name in ENGINE_FUNCTIONS)
+
+
+class Callbacks(ctypes.Structure):
+    """`struct callbacks`."""
+
+    _fields_ = (
+        ("unknown_block", UNKNOWN_BLOCK),
+        ("read", READ),
+        ("write", WRITE),
+        ("trapped", TRAPPED),
+        ("recorded", RECORDED),
+    )
+
+
+#: Result and arguments: v nothing, b flag, i signed, u 32 bits, l 64 bits, z size, p pointer.
+_FUNCTIONS = {
+    "core_shared_bytes": "z",
+    "core_new": "pppp",
+    "core_free": "vp",
+    "core_run": "upl",
+    "core_add_row": "bpuuuuupup",
+    "core_forget_rows": "vp",
+    "core_block_start": "up",
+    "core_set_page": "vpupupuppiu",
+    "core_set_paged_region": "vpu",
+    "core_port": "ppu",
+    "core_clear_exclusive": "vp",
+    "core_leave_block": "vp",
+    "core_region": "ppuu",
+    "core_trap": "ppuuu",
+    "core_start_recording": "bpu",
+    "core_record_pins": "bpb",
+    "core_drop_pins": "vp",
+    "core_stream": "ppu",
+    "core_start_streams": "vpull",
+    "core_stop_streams": "vp",
+    "edge_log_new": "p",
+    "edge_log_free": "vp",
+    "edge_log_put": "bpluu",
+    "edge_log_take": "bppllupp",
+    "edge_log_write": "ipppull",
+    "edge_log_rows": "pp",
+    "edge_log_count": "zp",
+    "edge_log_used": "vpp",
+}
+_TYPES: dict[str, Any] = {
+    "v": None, "b": ctypes.c_bool, "i": ctypes.c_int32, "u": ctypes.c_uint32, "l": ctypes.c_uint64,
+    "z": ctypes.c_size_t, "p": ctypes.c_void_p,
+}  # fmt: skip
+
+
+def is_wanted() -> bool:
+    """Tell whether engines are to be native.
+
+    Raises:
+        BluePillError: `P2OS_CORE` holds neither "native" nor "python".
+        MissingDependencyError: it insists on a native core that is not built.
+    """
+    choice = os.environ.get(VARIABLE, "")
+    if choice and choice not in CHOICES:
+        raise BluePillError(
+            f"{VARIABLE}={choice}: no such core", hint=f"{VARIABLE} is {' or '.join(CHOICES)}, or not set"
+        )
+    if choice == "native" and path() is None:
+        raise MissingDependencyError("the native core is not built", hint=_HINT)
+    return choice != "python" and path() is not None
+
+
+@cache
+def path() -> str | None:
+    """Return where the library is; None where it was not built."""
+    spec = find_spec("bluepill_sim._native")
+    return None if spec is None else spec.origin
+
+
+@cache
+def library() -> ctypes.PyDLL:
+    """Return the loaded library.
+
+    Raises:
+        MissingDependencyError: it was not built, or is of another version of the package.
+    """
+    where = path()
+    if where is None:
+        raise MissingDependencyError("the native core is not built", hint=_HINT)
+    loaded = ctypes.PyDLL(where)  # keeps the interpreter's lock: callbacks come often
+    for name, signature in _FUNCTIONS.items():
+        function = getattr(loaded, name)
+        function.restype = _TYPES[signature[0]]
+        function.argtypes = [_TYPES[letter] for letter in signature[1:]]
+    if loaded.core_shared_bytes() != ctypes.sizeof(Shared):
+        raise MissingDependencyError("the native core is of another version", hint="install the package again")
+    return loaded
+
+
+def address_of(name: str) -> ctypes.c_void_p:
+    """Return a function of the library as a callback for Unicorn."""
+    return ctypes.cast(library()[name], ctypes.c_void_p)

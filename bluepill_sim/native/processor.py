@@ -1,0 +1,170 @@
+"""The processor of the native core: exceptions of the ordinary kind, NVIC and SysTick live in C.
+
+Each class is its Python namesake with its state in the struct that C shares;
+whatever C leaves to Python is done by the methods inherited.
+
+Invariant: there is one copy of the state, in `shared`.
+"""
+
+from collections.abc import Callable, Sequence
+from typing import Any
+
+from bluepill_sim.core import Engine
+from bluepill_sim.core.blocks import Measure
+from bluepill_sim.core.nvic import FIRST_IRQ, SYSTEM_EXCEPTIONS, Nvic
+from bluepill_sim.core.processor import SEVONPEND, Processor, Sleep
+from bluepill_sim.core.systick import SysTick
+from bluepill_sim.memory import Memory
+from bluepill_sim.native import library as native_library
+from bluepill_sim.native.state import Shared, field, flag, time
+
+_HALF = 64
+_LOW = (1 << _HALF) - 1
+_SLEEPS = (Sleep.AWAKE, Sleep.INTERRUPT, Sleep.EVENT)
+
+
+def make_core(measure: Measure, memory: Memory) -> tuple[Engine, Processor]:
+    """Return the engine and the processor: native ones where they are built and wanted.
+
+    Raises:
+        BluePillError: `P2OS_CORE` names no core.
+        MissingDependencyError: Unicorn is not installed, or the core insisted on is not built.
+    """
+    if not native_library.is_wanted():
+        engine = Engine(measure)
+        return engine, Processor(engine, memory)
+    from bluepill_sim.native.engine import NativeEngine
+
+    native = NativeEngine(measure)
+    return native, NativeProcessor(native, memory)
+
+
+def _wide(name: str, doc: str) -> Any:
+    """Return a property over two 64-bit fields: a mask over exception numbers."""
+    low, high = f"{name}_low", f"{name}_high"
+
+    def read(self: Any) -> int:
+        return getattr(self.shared, low) | getattr(self.shared, high) << 64  # type: ignore[no-any-return]  # ctypes
+
+    def write(self: Any, value: int) -> None:
+        setattr(self.shared, low, value & _LOW)
+        setattr(self.shared, high, value >> 64 & _LOW)
+
+    return property(read, write, doc=doc)
+
+
+class NativeNvic(Nvic):
+    """`Nvic` over the shared struct."""
+
+    pending = _wide("pending", "As of `Nvic`.")
+    active = _wide("active", "As of `Nvic`.")
+    enabled = field("enabled", "As of `Nvic`.")
+    levels = field("levels", "As of `Nvic`.")
+    priority_grouping = field("grouping", "As of `Nvic`.")
+
+    def __init__(self, shared: Shared) -> None:
+        self.shared = shared
+        super().__init__()
+
+    def set_level(self, irq: int, level: bool) -> None:
+        """As of `Nvic`; called for each character of a USART, so it goes to the fields themselves."""
+        shared, bit = self.shared, 1 << irq
+        levels = shared.levels
+        if not level:
+            shared.levels = levels & ~bit
+        elif not levels & bit:
+            shared.levels = levels | bit
+            number = FIRST_IRQ + irq
+            if number < _HALF:
+                shared.pending_low |= 1 << number
+            else:
+                shared.pending_high |= 1 << number - _HALF
+
+    @property  # type: ignore[override]  # the list is an array of bytes here
+    def priorities(self) -> Sequence[int]:
+        """As of `Nvic`."""
+        return self.shared.priorities  # type: ignore[no-any-return]  # an array of bytes
+
+    @priorities.setter
+    def priorities(self, values: Sequence[int]) -> None:
+        self.shared.priorities[:] = list(values)
+
+
+class NativeSysTick(SysTick):
+    """`SysTick` over the shared struct."""
+
+    _control = field("tick_control", "As of `SysTick`.")
+    _reload = field("tick_reload", "As of `SysTick`.")
+    _value = field("tick_value", "As of `SysTick`.")
+    _base = field("tick_base", "As of `SysTick`.")
+    _count_flag = flag("tick_count_flag", "As of `SysTick`.")
+    next_cycle = time("tick_next", "As of `SysTick`.")
+
+    def __init__(self, pend: Callable[[], None], shared: Shared) -> None:
+        self.shared = shared
+        super().__init__(pend)
+
+
+class NativeProcessor(Processor):
+    """`Processor` over the shared struct; C runs, Python does what is out of the ordinary."""
+
+    ticks_alone = True
+
+    exception_number = field("exception_number", "As of `Processor`.")
+    event_register = flag("event_register", "As of `Processor`.")
+    vector_table = field("vector_table", "As of `Processor`.")
+    scr = field("scr", "As of `Processor`.")
+    ccr = field("ccr", "As of `Processor`.")
+    last_sleep_cycle = time("last_sleep_cycle", "As of `Processor`.")
+
+    def __init__(self, engine: Any, memory: Memory) -> None:
+        self.shared: Shared = engine.shared
+        self._native = engine
+        super().__init__(engine, memory)
+
+    def _make_nvic(self) -> Nvic:
+        return NativeNvic(self.shared)
+
+    def _make_systick(self, pend: Callable[[], None]) -> SysTick:
+        return NativeSysTick(pend, self.shared)
+
+    @property
+    def sleep(self) -> Sleep:
+        """As of `Processor`."""
+        return _SLEEPS[self.shared.sleep]
+
+    @sleep.setter
+    def sleep(self, sleep: Sleep) -> None:
+        self.shared.sleep = _SLEEPS.index(sleep)
+
+    def run(self, stop_at: int) -> None:
+        """As of `Processor`; the ticks of SysTick on the way are no reason to come back."""
+        if self._native.needs_python:
+            super().run(self._before_tick(stop_at))
+            return
+        must_deliver, halt = self._native.go_on(stop_at)
+        if must_deliver:
+            self._deliver()
+        elif halt is not None:
+            self._act_on(halt)
+
+    def step(self, stop_at: int) -> None:
+        """As of `Processor`."""
+        super().step(self._before_tick(stop_at))
+
+    def _before_tick(self, stop_at: int) -> int:
+        tick = self.systick.next_cycle
+        return stop_at if tick is None else min(stop_at, tick)
+
+    def stop_at_boundary(self) -> None:
+        """As of `Processor`."""
+        self.shared.stop_at, self.shared.attention = 0, 1
+
+    def pending_changed(self) -> None:
+        """As of `Processor`; C itself looks again at a boundary."""
+        shared = self.shared
+        if shared.scr & SEVONPEND and self.nvic.pending:
+            shared.event_register = 1
+        enabled = shared.enabled << FIRST_IRQ
+        if shared.pending_low & (enabled | SYSTEM_EXCEPTIONS) or shared.pending_high & enabled >> _HALF:
+            shared.stop_at = 0

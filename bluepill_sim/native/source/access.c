@@ -1,0 +1,221 @@
+/* Accesses to peripherals: which instruction makes them, and who answers.
+ *
+ * Unicorn does not bring the PC up to date for an access to I/O, but all other
+ * registers are. So the accessing instruction is found by working out which of
+ * the block's loads or stores, from the last one found on, reaches the address
+ * with the registers as they are. Blocks in which that could be mistaken (one
+ * base register, the same offset, and the base changed in between) get hooks
+ * that note the PC instead: see `native/engine.py`.
+ */
+#include "core.h"
+
+struct region_user {
+    struct core *core;
+    uint32_t number;
+    uint32_t base;
+};
+
+#define IN_PAGE ((1u << PAGE_SHIFT) - 1)
+
+/* What Unicorn hands back at each access of a region; lives as long as the core's owner keeps it. */
+struct region_user *core_region(struct core *core, uint32_t number, uint32_t base)
+{
+    struct region_user *region = allocate(core, sizeof *region);
+    if (region != NULL) {
+        *region = (struct region_user){core, number, base};
+    }
+    return region;
+}
+
+/* Which region the pages belong to. */
+void core_set_paged_region(struct core *core, uint32_t number) { core->paged_region = number; }
+
+/* A hook of each access in blocks where the instruction cannot be told from the registers. */
+void core_on_note(void *engine, uint64_t address, uint32_t size, void *user)
+{
+    (void)engine;
+    (void)size;
+    ((struct core *)user)->noted = (uint32_t)address;
+}
+
+static int general(uint8_t number)
+{
+    return number < 13 ? REG_R0 + number : number == 13 ? REG_SP : number == 14 ? REG_LR : REG_PC;
+}
+
+static bool reaches(struct core *core, const struct instruction *one, uint32_t address)
+{
+    uint32_t at = read_register(core, general(one->base)) + (uint32_t)one->offset;
+    if (one->index != 255) {
+        at += read_register(core, general(one->index)) << one->shift;
+    }
+    return address - at < (uint32_t)one->bytes * one->count;
+}
+
+/* The first instruction from `n` on that makes accesses of this kind and width; `count` of the row for none. */
+static uint32_t fitting(const struct row *row, uint32_t n, bool is_write, uint32_t bytes)
+{
+    while (n < row->count && (row->instructions[n].kind != (is_write ? 2 : 1) || row->instructions[n].bytes != bytes)) {
+        ++n;
+    }
+    return n;
+}
+
+/* The instruction that makes an access: the only one of its kind that is left, or the first that reaches there. */
+static uint32_t find_access(struct core *core, uint32_t address, bool is_write, uint32_t bytes)
+{
+    const struct row *row = core->block;
+    uint32_t n = fitting(row, core->io_next, is_write, bytes);
+    if (n < row->count && fitting(row, n + 1, is_write, bytes) < row->count) {
+        while (n < row->count && !reaches(core, &row->instructions[n], address)) {
+            n = fitting(row, n + 1, is_write, bytes);
+        }
+    }
+    return n;
+}
+
+static void pass(struct core *core, uint32_t n)
+{
+    core->io_next = core->block->instructions[n].count > 1 ? n : n + 1;
+}
+
+/* Notes an access that nobody asks about, so that the next one of the block is not taken for it. */
+void skip(struct core *core, uint32_t address, bool is_write, uint32_t bytes)
+{
+    if (UNLIKELY(core->skipped_count == SKIPPED)) {
+        resolve(core, address, is_write, bytes);
+    } else {
+        core->skipped[core->skipped_count++] = (struct skipped){address, (uint8_t)bytes, is_write};
+    }
+}
+
+/* Works out which instruction of the block makes an access, and with it when. */
+void resolve(struct core *core, uint32_t address, bool is_write, uint32_t bytes)
+{
+    struct shared *s = &core->shared;
+    const struct row *row = core->block;
+    s->access_cycle = s->cycle;
+    s->access_pc = row->start;
+    if (row == &core->none) {
+        s->access_pc = s->pc;
+        return;
+    }
+    if (row->flags & ROW_NOTED) {
+        const struct instruction *noted = instruction_at(row, core->noted);
+        if (noted != NULL) {
+            s->access_cycle = s->cycle + noted->cycle;
+            s->access_pc = noted->address;
+        }
+        return;
+    }
+    for (uint32_t k = 0; k < core->skipped_count; ++k) {
+        const struct skipped *one = &core->skipped[k];
+        const uint32_t n = find_access(core, one->address, one->is_write, one->bytes);
+        if (n < row->count) {
+            pass(core, n);
+        }
+    }
+    core->skipped_count = 0;
+    uint32_t found = find_access(core, address, is_write, bytes);
+    if (found == row->count) {
+        found = fitting(row, core->io_next, is_write, bytes);
+    }
+    if (found < row->count) {
+        s->access_cycle = s->cycle + row->instructions[found].cycle;
+        s->access_pc = row->instructions[found].address;
+        pass(core, found);
+    }
+}
+
+static bool is_over(const struct core *core)
+{
+    return core->shared.cycle + core->block->straight >= core->shared.stop_at;
+}
+
+/* Tells Python which instruction asks, unless Python itself runs the blocks and knows. */
+static void begin_access(struct core *core, uint32_t address, bool is_write, uint32_t size)
+{
+    if (!core->shared.is_python) {
+        resolve(core, address, is_write, size);
+        core->shared.in_access = 1;
+    }
+}
+
+static RARELY uint32_t ask_read(const struct region_user *region, uint32_t offset, uint32_t size)
+{
+    struct core *core = region->core;
+    core->polling.asked = 1;
+    begin_access(core, region->base + offset, false, size);
+    const uint32_t word = core->calls.read(region->number, offset, size);
+    core->shared.in_access = 0;
+    return word;
+}
+
+static RARELY void ask_write(const struct region_user *region, uint32_t offset, uint32_t size, uint32_t value)
+{
+    struct core *core = region->core;
+    begin_access(core, region->base + offset, true, size);
+    core->calls.write(region->number, offset, size, value);
+    core->shared.in_access = 0;
+}
+
+/* The page of a register that may be answered here: it has a clock, and nothing is due before the block ends. */
+static struct page *open_page(const struct region_user *region, uint32_t offset)
+{
+    struct core *core = region->core;
+    if (region->number != core->paged_region || core->shared.is_python || offset >> PAGE_SHIFT >= PAGES ||
+        is_over(core)) {
+        return NULL;
+    }
+    struct page *page = &core->pages[offset >> PAGE_SHIFT];
+    const bool is_there = (offset & IN_PAGE) >> 2 < page->count;
+    return is_there && (page->gate == NULL || *page->gate & page->gate_mask) ? page : NULL;
+}
+
+uint64_t core_read_io(void *engine, uint64_t at, unsigned size, void *user)
+{
+    (void)engine;
+    const struct region_user *region = user;
+    const uint32_t offset = (uint32_t)at, index = (offset & IN_PAGE) >> 2;
+    const struct page *page = open_page(region, offset);
+    uint32_t word;
+    if (page != NULL && page->behaviour[index] & READS_PLAIN) {
+        const uint32_t latch = page->behaviour[index] >> LATCH_SHIFT;
+        word = page->words[index];
+        if (latch) {
+            page->words[latch] = word;
+        }
+    } else if (page == NULL || !(page->behaviour[index] & USART_DATA) || !read_usart_data(region->core, page, &word)) {
+        return ask_read(region, offset, size);
+    }
+    skip(region->core, region->base + offset, false, size);
+    return size == 4 ? word : (word >> (offset & 3) * 8) & ((1u << size * 8) - 1);
+}
+
+void core_write_io(void *engine, uint64_t at, unsigned size, uint64_t value, void *user)
+{
+    (void)engine;
+    const uint32_t offset = (uint32_t)at, index = (offset & IN_PAGE) >> 2, written = (uint32_t)value;
+    const struct region_user *region = user;
+    struct page *page = open_page(region, offset);
+    bool is_done = false;
+    if (page != NULL && size == 4) {
+        if (page->behaviour[index] & WRITES_PLAIN) {
+            const uint32_t *mask = page->masks[index], before = page->words[index];
+            page->words[index] = (before & mask[0] & ~(written & mask[2]) & (written | ~mask[3])) | (written & mask[1]);
+            is_done = true;
+        } else if (page->port != NULL) {
+            if (write_port(region->core, page, index, written, region->base + offset)) {
+                return;
+            }
+        }
+    }
+    if (!is_done && page != NULL && size >= 2 && page->behaviour[index] & USART_DATA) {
+        is_done = write_usart_data(region->core, page, written);
+    }
+    if (is_done) {
+        skip(region->core, region->base + offset, true, size);
+    } else {
+        ask_write(region, offset, size, written);
+    }
+}

@@ -1,0 +1,227 @@
+/* Entering basic blocks: charge the one that has ended, end the run or go on. */
+#include <stdlib.h>
+#include <string.h>
+
+#include "core.h"
+
+static struct row **slot(struct core *core, uint32_t address)
+{
+    const struct shared *s = &core->shared;
+    if (address - s->flash_base < s->flash_bytes || address < s->flash_bytes) {
+        return &core->flash_rows[(address & (2 * FLASH_SLOTS - 1)) >> 1];
+    }
+    if (address - s->sram_base < 2 * SRAM_SLOTS) {
+        return &core->sram_rows[(address - s->sram_base) >> 1];
+    }
+    return &core->other_row;
+}
+
+static struct row *find(struct core *core, uint32_t address)
+{
+    struct row *row = *slot(core, address);
+    return row != NULL && row->start == address ? row : NULL;
+}
+
+void end_run(struct core *core, uint32_t kind, uint32_t pc)
+{
+    if (core->shared.halt_kind != HALT_FROZEN) {
+        core->shared.halt_kind = kind;
+        core->shared.halt_pc = pc;
+    }
+    core->api.stop(core->engine);
+}
+
+static void stop_at_boundary(struct core *core, uint32_t address)
+{
+    core->block = &core->none;
+    end_run(core, HALT_BORDER, address);
+}
+
+void core_flush(struct core *core)
+{
+    if (core->record_count) {
+        const uint32_t count = core->record_count;
+        core->record_count = 0;
+        core->calls.recorded(core->records, count);
+    }
+}
+
+/* Has Python told of a row, when there are enough of them. */
+static void pass_on(struct core *core, const struct record *row)
+{
+    core->shared.is_first = 0;
+    core->records[core->record_count++] = *row;
+    if (core->record_count == core->record_room) {
+        core_flush(core);
+    }
+}
+
+/* Keeps a row, and passes it on to whoever records. */
+static inline void tell(struct core *core, uint64_t cycle, uint32_t address, int32_t kind)
+{
+    const struct record row = {cycle, address, kind};
+    core->shared.last[core->shared.told++ % LAST_ROWS] = row;
+    if (UNLIKELY(core->records != NULL)) {
+        pass_on(core, &row);
+    }
+}
+
+void record_at(struct core *core, uint64_t cycle, uint32_t address, int32_t kind) { tell(core, cycle, address, kind); }
+
+void record(struct core *core, uint32_t address, int32_t kind) { tell(core, core->shared.cycle, address, kind); }
+
+/* Tells of a branch to itself: once, however long it spins; as `Engine._tell_spin`. */
+static void tell_spin(struct core *core, uint32_t address)
+{
+    const struct shared *s = &core->shared;
+    const struct record *last = &s->last[(s->told - 1) % LAST_ROWS];
+    if (!s->told || last->kind != 0 || last->address != address) {
+        record(core, address, 0);
+    } else if (core->records != NULL && s->is_first) {
+        const struct record row = {s->cycle, address, 0};
+        pass_on(core, &row);
+    }
+}
+
+/* A block that is new, stands in writable memory, or needs attention. */
+static void enter_special(struct core *core, uint32_t address, uint32_t size, struct row *row)
+{
+    struct shared *s = &core->shared;
+    if (core->is_scratch) {
+        return;
+    }
+    if (row != NULL && row->flags & ROW_WRITABLE && memcmp(row->host, row->code, row->end - row->start) != 0) {
+        row = NULL;
+    }
+    if (row == NULL) {
+        core->calls.unknown_block(address, size);
+        row = find(core, address);
+        if (s->halt_kind != HALT_NONE || row == NULL) {
+            if (s->halt_kind == HALT_NONE) {
+                s->halt_kind = HALT_FAILED;
+            }
+            core->block = &core->none;
+            end_run(core, s->halt_kind, address);
+            return;
+        }
+    }
+    if (row->flags & ROW_SELF_LOOP && row == core->block) {
+        /* It has gone round once: nothing but an interrupt ends it, so go round until the time is up. */
+        uint64_t left = s->stop_at - s->cycle;
+        s->cycle += (left + row->taken - 1) / row->taken * row->taken;
+        stop_at_boundary(core, address);
+        return;
+    }
+    begin_block(core, row);
+    if (row->flags & ROW_CHANGES_MASKS && s->mask_stop) {
+        s->stop_at = 0;
+    }
+    if (row->flags & ROW_SENDS_EVENT) {
+        s->event_register = 1;
+    }
+    if (row->flags & ROW_SELF_LOOP) {
+        tell_spin(core, address);
+    } else {
+        record(core, address, 0);
+    }
+}
+
+/* Records from now on, `room` rows before Python is told; 0: no more. Returns false without memory for it. */
+bool core_start_recording(struct core *core, uint32_t room)
+{
+    free(core->records);
+    core->records = room ? malloc(room * sizeof *core->records) : NULL;
+    core->record_room = room;
+    core->record_count = 0;
+    core->shared.is_first = 1;
+    return !room || core->records != NULL;
+}
+
+void core_on_block(void *engine, uint64_t at, uint32_t size, void *user)
+{
+    (void)engine;
+    struct core *core = user;
+    const struct row *before = core->block;
+    const uint32_t address = (uint32_t)at;
+    const uint64_t cycle = core->shared.cycle + (address == before->end ? before->straight : before->taken);
+    core->shared.cycle = cycle;
+    if (UNLIKELY(cycle >= core->shared.stop_at)) {
+        stop_at_boundary(core, address);
+        return;
+    }
+    struct row *row = find(core, address);
+    if (UNLIKELY(row == NULL || row->flags & ROW_ATTENTION)) {
+        enter_special(core, address, size, row);
+    } else {
+        begin_block(core, row);
+        tell(core, cycle, address, 0);
+        if (UNLIKELY(row == before) && row->flags & ROW_READS && polls_unchanged(core, row)) {
+            wait_on(core, row);
+            stop_at_boundary(core, address);
+        }
+    }
+}
+
+/* Returns false without memory for it. `instructions` has `count` rows, the costs are those of block_cost.py. */
+bool core_add_row(struct core *core, uint32_t start, uint32_t end, uint32_t straight, uint32_t taken, uint32_t flags,
+                  const struct instruction *instructions, uint32_t count, const uint8_t *host)
+{
+    struct row **at = slot(core, start);
+    const size_t list = count * sizeof *instructions;
+    struct row *row = malloc(sizeof *row + list);
+    uint8_t *code = host == NULL ? NULL : malloc(end - start);
+    if (row == NULL || (host != NULL && code == NULL)) {
+        free(row);
+        free(code);
+        return false;
+    }
+    *row = (struct row){.start = start, .end = end, .straight = straight, .taken = taken, .flags = flags,
+                        .count = count, .host = host, .code = code, .next = core->all};
+    memcpy(row->instructions, instructions, list);
+    if (host != NULL) {
+        memcpy(code, host, end - start);
+    }
+    core->all = row;
+    *at = row;
+    return true;
+}
+
+/* Measure every block again when it is next entered; the one that runs keeps its costs. */
+void core_forget_rows(struct core *core)
+{
+    memset(core->flash_rows, 0, sizeof core->flash_rows);
+    memset(core->sram_rows, 0, sizeof core->sram_rows);
+    core->other_row = NULL;
+    struct row **end = &core->all;
+    while (*end != NULL) {
+        end = &(*end)->next;
+    }
+    *end = core->dropped;
+    core->dropped = core->all;
+    core->all = NULL;
+}
+
+void free_dropped(struct core *core)
+{
+    while (core->dropped != NULL) {
+        struct row *row = core->dropped;
+        core->dropped = row->next;
+        free(row->code);
+        free(row);
+    }
+}
+
+const struct instruction *instruction_at(const struct row *row, uint32_t address)
+{
+    for (uint32_t n = 0; n < row->count; ++n) {
+        if (row->instructions[n].address == address) {
+            return &row->instructions[n];
+        }
+    }
+    return NULL;
+}
+
+/* Start of the block that runs; all ones for none. */
+uint32_t core_block_start(const struct core *core) { return core->block->start; }
+
+void core_leave_block(struct core *core) { core->block = &core->none; }

@@ -1,0 +1,316 @@
+/* Exceptions of the ordinary kind: entry, return, tail-chaining, SysTick, sleep.
+ *
+ * What is out of the ordinary (a frame outside SRAM, a vector outside the
+ * flash, an escalation, a lockup) is left to bluepill_sim/core/processor.py, before
+ * anything has changed. Source: ARMv7-M Architecture Reference Manual B1.5.
+ */
+#include <string.h>
+
+#include "core.h"
+
+enum { ENTRY_CYCLES = 12, EXIT_CYCLES = 12, TAIL_CHAIN_CYCLES = 6, FRAME_BYTES = 32 };
+enum { NMI = 2, HARD_FAULT = 3, SVCALL = 11, SYSTICK = 15, THREAD_PRIORITY = 256 };
+enum { SLEEPONEXIT = 2, SEVONPEND = 16, STKALIGN = 1 << 9, SPSEL = 2, NPRIV = 1 };
+enum { AWAKE, FOR_INTERRUPT, FOR_EVENT };
+
+#define T_BIT (1u << 24)
+#define ALIGN_BIT (1u << 9)
+#define FLAG_BITS 0xF8000000u
+#define CPSR_T (1u << 5)
+#define TO_HANDLER 0xFFFFFFF0u
+#define TO_THREAD_MSP 0xFFFFFFF8u
+#define TO_THREAD_PSP 0xFFFFFFFCu
+
+uint64_t deliverable(const struct core *core, uint64_t *high)
+{
+    const struct shared *s = &core->shared;
+    *high = s->pending[1] & (s->enabled >> (64 - FIRST_IRQ));
+    return s->pending[0] & (s->enabled << FIRST_IRQ | ((1u << FIRST_IRQ) - 1));
+}
+
+static int priority_of(const struct shared *s, unsigned number)
+{
+    return number == 1 ? -3 : number == NMI ? -2 : number == HARD_FAULT ? -1 : s->priorities[number];
+}
+
+static int group(const struct shared *s, int priority)
+{
+    return priority < 0 || priority >= THREAD_PRIORITY ? priority : priority & ~(int)((2u << s->grouping) - 1);
+}
+
+/* The enabled pending exception of the highest priority, the lowest number among equals; 0: none. */
+static unsigned first_pending(const struct core *core)
+{
+    uint64_t words[2];
+    words[0] = deliverable(core, &words[1]);
+    unsigned best = 0;
+    int best_priority = 1 << 10;
+    for (unsigned word = 0; word < 2; ++word) {
+        for (uint64_t left = words[word]; left; left &= left - 1) {
+            const unsigned number = 64 * word + (unsigned)__builtin_ctzll(left);
+            const int priority = priority_of(&core->shared, number);
+            if (priority < best_priority) {
+                best = number;
+                best_priority = priority;
+            }
+        }
+    }
+    return best;
+}
+
+static int active_priority(const struct shared *s)
+{
+    int best = THREAD_PRIORITY;
+    for (unsigned word = 0; word < 2; ++word) {
+        for (uint64_t left = s->active[word]; left; left &= left - 1) {
+            const int one = group(s, priority_of(s, 64 * word + (unsigned)__builtin_ctzll(left)));
+            best = one < best ? one : best;
+        }
+    }
+    return best;
+}
+
+static int execution_priority(struct core *core, bool ignores_primask)
+{
+    const struct shared *s = &core->shared;
+    static const int numbers[3] = {REG_PRIMASK, REG_BASEPRI, REG_FAULTMASK};
+    uint32_t masks[3];
+    void *at[3] = {&masks[0], &masks[1], &masks[2]};
+    core->api.read_registers(core->engine, numbers, at, 3);
+    int priority = active_priority(s);
+    /* The engine keeps the low bits of BASEPRI that an STM32F103 does not have. */
+    const int base = (int)(masks[1] & 0xF0);
+    if (base && group(s, base) < priority) {
+        priority = group(s, base);
+    }
+    if (masks[0] & 1 && !ignores_primask && priority > 0) {
+        priority = 0;
+    }
+    if (masks[2] & 1 && priority > -1) {
+        priority = -1;
+    }
+    return priority;
+}
+
+static bool can_preempt(struct core *core, unsigned number, bool ignores_primask)
+{
+    return group(&core->shared, priority_of(&core->shared, number)) < execution_priority(core, ignores_primask);
+}
+
+static uint32_t *sram_at(const struct core *core, uint32_t address, uint32_t bytes)
+{
+    const struct shared *s = &core->shared;
+    const uint32_t offset = address - s->sram_base;
+    return offset < s->sram_bytes && s->sram_bytes - offset >= bytes && !(address & 3)
+               ? (uint32_t *)(uintptr_t)(s->sram + offset)
+               : NULL;
+}
+
+/* The handler of an exception; 0 where Python has to look. */
+static uint32_t vector(const struct core *core, unsigned number)
+{
+    const struct shared *s = &core->shared;
+    const uint32_t address = s->vector_table + 4 * number;
+    const uint8_t *host;
+    if (address - s->flash_base < s->flash_bytes - 3) {
+        host = (const uint8_t *)(uintptr_t)s->flash + (address - s->flash_base);
+    } else if (address < s->flash_bytes - 3) {
+        host = (const uint8_t *)(uintptr_t)s->flash + address;
+    } else {
+        host = (const uint8_t *)sram_at(core, address, 4);
+        if (host == NULL) {
+            return 0;
+        }
+    }
+    uint32_t word;
+    memcpy(&word, host, sizeof word);
+    return word;
+}
+
+/* Whether `vector` finds every vector itself. */
+static bool has_vectors(const struct core *core)
+{
+    const struct shared *s = &core->shared;
+    const uint32_t bytes = 4 * (FIRST_IRQ + 64);
+    return s->vector_table - s->flash_base < s->flash_bytes - bytes || s->vector_table < s->flash_bytes - bytes ||
+           sram_at(core, s->vector_table, bytes) != NULL;
+}
+
+static void set_bit(uint64_t *words, unsigned number) { words[number >> 6] |= UINT64_C(1) << (number & 63); }
+static void clear_bit(uint64_t *words, unsigned number) { words[number >> 6] &= ~(UINT64_C(1) << (number & 63)); }
+
+static void start_handler(struct core *core, unsigned number, uint32_t handler, uint32_t sp, uint32_t link,
+                          uint32_t cpsr)
+{
+    struct shared *s = &core->shared;
+    clear_bit(s->pending, number);
+    set_bit(s->active, number);
+    s->exception_number = number;
+    s->event_register = 1;
+    s->sleep = AWAKE;
+    static const int numbers[4] = {REG_SP, REG_IPSR, REG_CPSR, REG_LR};
+    uint32_t values[4] = {sp, number, (cpsr & ~IT_BITS) | CPSR_T, link};
+    void *at[4] = {&values[0], &values[1], &values[2], &values[3]};
+    core->api.write_registers(core->engine, numbers, at, 4);
+    core_clear_exclusive(core);
+    s->pc = handler & ~1u;
+    s->is_thumb = handler & 1;
+    s->it_state = 0;
+}
+
+static bool enter(struct core *core, unsigned number, uint32_t return_address)
+{
+    struct shared *s = &core->shared;
+    const uint32_t handler = vector(core, number);
+    static const int numbers[10] = {REG_R0,     REG_R0 + 1, REG_R0 + 2, REG_R0 + 3,  REG_R12,
+                                    REG_LR,     REG_XPSR,   REG_SP,     REG_CONTROL, REG_CPSR};
+    uint32_t value[10];
+    void *at[10];
+    for (int n = 0; n < 10; ++n) {
+        at[n] = &value[n];
+    }
+    core->api.read_registers(core->engine, numbers, at, 10);
+    const uint32_t control = value[8], cpsr = value[9];
+    uint32_t frame_at = value[7] - FRAME_BYTES;
+    uint32_t xpsr = (value[6] & ~(T_BIT | ALIGN_BIT)) | (s->is_thumb ? T_BIT : 0) | s->exception_number;
+    if (s->ccr & STKALIGN && frame_at & 4) {
+        frame_at -= 4;
+        xpsr |= ALIGN_BIT;
+    }
+    uint32_t *frame = sram_at(core, frame_at, FRAME_BYTES);
+    if (frame == NULL || handler == 0) {
+        return false;
+    }
+    const uint32_t words[8] = {value[0], value[1], value[2], value[3], value[4], value[5], return_address, xpsr};
+    memcpy(frame, words, sizeof words);
+    const uint32_t exc_return = s->exception_number ? TO_HANDLER : control & SPSEL ? TO_THREAD_PSP : TO_THREAD_MSP;
+    record(core, return_address, (int32_t)number);
+    start_handler(core, number, handler, frame_at, exc_return | 1, cpsr);
+    s->cycle += ENTRY_CYCLES;
+    return true;
+}
+
+/* 1: an exception was entered; 0: none may be; -1: Python has to. */
+int deliver(struct core *core)
+{
+    const unsigned number = first_pending(core);
+    if (!number || !can_preempt(core, number, false)) {
+        return 0;
+    }
+    return enter(core, number, core->shared.pc) ? 1 : -1;
+}
+
+bool supervisor_call(struct core *core, uint32_t pc)
+{
+    return can_preempt(core, SVCALL, false) && enter(core, SVCALL, pc);
+}
+
+/* Returns from the handler that runs; false: Python has to, and nothing has changed. */
+bool leave(struct core *core, uint32_t exc_return)
+{
+    struct shared *s = &core->shared;
+    const unsigned number = s->exception_number;
+    const bool to_thread = exc_return == TO_THREAD_MSP || exc_return == TO_THREAD_PSP;
+    uint64_t left[2] = {s->active[0], s->active[1]};
+    clear_bit(left, number);
+    const bool is_last = !left[0] && !left[1];
+    if (!number || !(to_thread || exc_return == TO_HANDLER) || to_thread != is_last) {
+        return false;
+    }
+    static const int numbers[5] = {REG_CONTROL, REG_CPSR, REG_PSP, REG_MSP, REG_FAULTMASK};
+    uint32_t value[5];
+    void *at[12] = {&value[0], &value[1], &value[2], &value[3], &value[4]};
+    core->api.read_registers(core->engine, numbers, at, 5);
+    const uint32_t control = value[0], cpsr = value[1], psp = value[2], msp = value[3];
+    uint32_t *frame = sram_at(core, exc_return == TO_THREAD_PSP ? psp : msp, FRAME_BYTES);
+    if (frame == NULL || value[4] || !has_vectors(core)) {
+        return false;
+    }
+    const uint32_t xpsr = frame[7];
+    if (to_thread != ((xpsr & 0x1FF) == 0)) {
+        return false;
+    }
+    clear_bit(s->active, number);
+    if (number >= FIRST_IRQ && s->levels >> (number - FIRST_IRQ) & 1) {
+        set_bit(s->pending, number);
+    }
+    s->event_register = 1;
+    core_clear_exclusive(core);
+    const unsigned following = first_pending(core);
+    if (following && can_preempt(core, following, false)) {
+        record(core, exc_return | 1, -1);
+        record(core, exc_return | 1, (int32_t)following);
+        start_handler(core, following, vector(core, following), msp, exc_return | 1, cpsr);
+        s->cycle += TAIL_CHAIN_CYCLES;
+        return true;
+    }
+    s->exception_number = xpsr & 0x1FF;
+    const uint32_t select = exc_return == TO_THREAD_PSP ? SPSEL : 0;
+    const uint32_t sp = (exc_return == TO_THREAD_PSP ? psp : msp) + FRAME_BYTES + (xpsr & ALIGN_BIT ? 4 : 0);
+    const uint32_t kept = FLAG_BITS | IT_BITS;
+    /* CONTROL thrice: nPRIV would forbid the next writes, SPSEL is only taken in thread mode, nPRIV comes last. */
+    static const int to[12] = {REG_CONTROL, REG_IPSR,   REG_CONTROL, REG_SP,  REG_R0, REG_R0 + 1,
+                               REG_R0 + 2,  REG_R0 + 3, REG_R12,     REG_LR,  REG_CONTROL, REG_CPSR};
+    uint32_t values[12] = {0,        s->exception_number, select,   sp,       frame[0],
+                           frame[1], frame[2],            frame[3], frame[4], frame[5],
+                           (control & NPRIV) | select,    (cpsr & ~kept) | (xpsr & kept) | CPSR_T};
+    for (int n = 0; n < 12; ++n) {
+        at[n] = &values[n];
+    }
+    const uint32_t pc = frame[6];
+    core->api.write_registers(core->engine, to, at, 12);
+    s->pc = pc & ~1u;
+    s->is_thumb = (xpsr & T_BIT) != 0;
+    s->it_state = (xpsr >> 25 & 3) | (xpsr >> 10 & 0x3F) << 2;
+    record(core, s->pc, -1);
+    if (to_thread && s->scr & SLEEPONEXIT) {
+        s->last_sleep_cycle = s->cycle;
+        s->sleep = FOR_INTERRUPT;
+    }
+    s->cycle += EXIT_CYCLES;
+    return true;
+}
+
+/* Wakes the core if there is reason to; tells whether it is awake. */
+bool wakes(struct core *core)
+{
+    struct shared *s = &core->shared;
+    const unsigned number = first_pending(core);
+    /* An exception that PRIMASK alone holds back wakes WFI, but not WFE. */
+    if (number && can_preempt(core, number, s->sleep == FOR_INTERRUPT)) {
+        s->sleep = AWAKE;
+    }
+    if (s->sleep == FOR_EVENT && s->event_register) {
+        s->event_register = 0;
+        s->sleep = AWAKE;
+    }
+    return s->sleep == AWAKE;
+}
+
+/* SysTick comes to 0 at or before the present cycle: as SysTick.advance_to. */
+/* Makes an exception pending, at a boundary. */
+void pend(struct core *core, unsigned number)
+{
+    set_bit(core->shared.pending, number);
+    if (core->shared.scr & SEVONPEND) {
+        core->shared.event_register = 1;
+    }
+}
+
+void tick(struct core *core)
+{
+    struct shared *s = &core->shared;
+    s->tick_count_flag = 1;
+    if (s->tick_control & 2) {
+        pend(core, SYSTICK);
+    }
+    s->tick_value = 0;
+    if (!s->tick_reload) {
+        s->tick_base = s->tick_next;
+        s->tick_next = NO_TIME;
+        return;
+    }
+    const uint64_t period = (uint64_t)(s->tick_reload + 1) * (s->tick_control & 4 ? 1 : 8);
+    s->tick_base = s->tick_next + (s->cycle - s->tick_next) / period * period;
+    s->tick_next = s->tick_base + period;
+}

@@ -1,0 +1,286 @@
+/* Slices: from boundary to boundary until the time is up, an event, or what Python must decide. */
+#include <stdlib.h>
+#include <string.h>
+
+#include "core.h"
+
+enum { FOR_INTERRUPT = 1, FOR_EVENT = 2 };
+#define FIRST_EXCEPTION_RETURN 0xFFFFFFE0u
+/* No instruction stands at an odd address, so a run never ends there; the page is that of `scratch`. */
+#define NOWHERE 0x9FFFFFFFu
+/* UC_ERR_EXCEPTION: the TLB denied a fetch. */
+#define DENIED 21
+
+uint32_t read_register(struct core *core, int number)
+{
+    uint32_t value = 0;
+    core->api.read_register(core->engine, number, &value);
+    return value;
+}
+
+void *allocate(struct core *core, size_t bytes)
+{
+    struct allocation *one = calloc(1, sizeof *one + bytes);
+    if (one == NULL) {
+        return NULL;
+    }
+    one->next = core->allocations;
+    core->allocations = one;
+    return one->data;
+}
+
+size_t core_shared_bytes(void) { return sizeof(struct shared); }
+
+struct core *core_new(void *engine, const struct engine_api *api, const struct callbacks *calls)
+{
+    struct core *core = calloc(1, sizeof *core);
+    if (core != NULL) {
+        core->engine = engine;
+        core->api = *api;
+        core->calls = *calls;
+        core->none.start = core->none.end = UINT32_MAX;
+        core->block = &core->none;
+        core->paged_region = UINT32_MAX;
+        core->shared.last_sleep_cycle = core->shared.tick_next = core->stream_next = NO_TIME;
+        for (uint32_t n = 0; n < STREAMS; ++n) {
+            core->streams[n].due_cycle = NO_TIME;
+        }
+    }
+    return core;
+}
+
+void core_forget_rows(struct core *core);
+
+void core_free(struct core *core)
+{
+    core_forget_rows(core);
+    free_dropped(core);
+    free(core->records);
+    free(core->pin_rows);
+    while (core->allocations != NULL) {
+        struct allocation *one = core->allocations;
+        core->allocations = one->next;
+        free(one);
+    }
+    free(core);
+}
+
+void core_set_page(struct core *core, uint32_t number, uint32_t *words, uint32_t count, const uint32_t *gate,
+                   uint32_t gate_mask, const uint8_t *behaviour, const uint32_t (*masks)[4], int port,
+                   uint32_t irq)
+{
+    core->pages[number] = (struct page){.words = words, .gate = gate, .gate_mask = gate_mask, .count = count,
+                                        .behaviour = behaviour, .masks = masks,
+                                        .port = port < 0 ? NULL : &core->ports[port], .irq = irq};
+}
+
+struct port *core_port(struct core *core, uint32_t number) { return &core->ports[number]; }
+
+static uint32_t kind_of_denied_fetch(uint32_t pc)
+{
+    return pc >= FIRST_EXCEPTION_RETURN ? HALT_EXCEPTION_RETURN : HALT_EXECUTE_NEVER;
+}
+
+/* Unicorn's own numbers of what ends a run; 3 and 8 are told apart by the PC. */
+void core_on_interrupt(void *engine, uint32_t number, void *user)
+{
+    (void)engine;
+    struct core *core = user;
+    const uint32_t pc = read_register(core, REG_PC);
+    uint32_t kind = HALT_UNDEFINED;
+    switch (number) {
+    case 2: kind = HALT_SUPERVISOR_CALL; break;
+    case 3:
+    case 8: kind = kind_of_denied_fetch(pc); break;
+    case 4: kind = HALT_UNALIGNED; break;
+    case 7: kind = HALT_BREAKPOINT; break;
+    case 17: kind = HALT_NO_COPROCESSOR; break;
+    default: break;
+    }
+    end_run(core, kind, pc);
+}
+
+/* Unicorn takes WFE and YIELD for undefined, with the PC already past them; the rest stands at the PC. */
+bool core_on_invalid(void *engine, void *user)
+{
+    (void)engine;
+    struct core *core = user;
+    const uint32_t pc = read_register(core, REG_PC);
+    const uint32_t ends = pc == core->block->end ? core->block->flags : 0;
+    if (ends & ROW_ENDS_IN_YIELD) {
+        return true;
+    }
+    if (ends & ROW_ENDS_IN_WFE) {
+        end_run(core, HALT_WAIT_EVENT, pc);
+    } else {
+        end_run(core, read_register(core, REG_XPSR) & 1u << 24 ? HALT_UNDEFINED : HALT_INVALID_STATE, pc);
+    }
+    return true;
+}
+
+struct trap {
+    struct core *core;
+    uint32_t address, number, kind;
+};
+
+/* What Unicorn hands back before the instruction at `address`, which looks at a register. */
+struct trap *core_trap(struct core *core, uint32_t address, uint32_t number, uint32_t kind)
+{
+    struct trap *trap = allocate(core, sizeof *trap);
+    if (trap != NULL) {
+        *trap = (struct trap){core, address, number, kind};
+    }
+    return trap;
+}
+
+/* Before an instruction that may trap: a division, or a transfer that must be aligned. */
+void core_on_trap(void *engine, uint64_t address, uint32_t size, void *user)
+{
+    (void)engine;
+    (void)address;
+    (void)size;
+    const struct trap *trap = user;
+    struct core *core = trap->core;
+    const uint32_t value = read_register(core, (int)trap->number);
+    if (trap->kind == HALT_UNALIGNED ? (value & 3) != 0 : core->shared.traps_division && value == 0) {
+        core->calls.trapped(trap->kind, trap->address, value);
+    }
+}
+
+/* Breaks the exclusive reservation, by CLREX and WFI on the scratch page. */
+void core_clear_exclusive(struct core *core)
+{
+    if (core->shared.uses_exclusive) {
+        core->is_scratch = 1;
+        const uint64_t cycle = core->shared.cycle, stop_at = core->shared.stop_at;
+        core->shared.stop_at = NEVER;
+        core->block = &core->none;
+        core->api.start(core->engine, core->shared.scratch | 1, NOWHERE, 0, 0);
+        core->shared.cycle = cycle;
+        core->shared.stop_at = stop_at;
+        core->is_scratch = 0;
+    }
+}
+
+static uint32_t cycles_until(const struct row *row, uint32_t address)
+{
+    if (address == row->end) {
+        return row->straight;
+    }
+    const struct instruction *one = instruction_at(row, address);
+    return one == NULL ? row->taken : one->cycle;
+}
+
+/* Charges what of the running block has been run when the core stands at `pc`. */
+static void settle(struct core *core, uint32_t pc)
+{
+    const struct row *row = core->block;
+    core->block = &core->none;
+    if (row != &core->none) {
+        /* The refill of an exception return is part of the exception's exit. */
+        core->shared.cycle += pc >= FIRST_EXCEPTION_RETURN ? row->straight : cycles_until(row, pc);
+    }
+    core->shared.pc = pc;
+    core->shared.is_thumb = read_register(core, REG_XPSR) >> 24 & 1;
+}
+
+/* Runs to the first boundary at or after `stop_at`, or to what ends the run before; returns why. */
+static uint32_t run_slice(struct core *core)
+{
+    struct shared *s = &core->shared;
+    s->halt_kind = HALT_NONE;
+    s->halt_has_address = 0;
+    s->run_from = s->pc;
+    core->io_next = core->skipped_count = 0;
+    const int error = core->api.start(core->engine, s->pc | s->is_thumb, NOWHERE, 0, 0);
+    if (s->halt_kind == HALT_NONE) {
+        const uint32_t pc = read_register(core, REG_PC);
+        s->halt_pc = pc;
+        s->halt_kind = error == DENIED ? kind_of_denied_fetch(pc)
+                       : error == 0 && core->block->flags & ROW_ENDS_IN_WFI && pc == core->block->end
+                           ? HALT_WAIT_INTERRUPT
+                           : HALT_UNEXPLAINED;
+        s->halt_address = (uint32_t)error;
+    }
+    if (s->halt_kind != HALT_FROZEN) {
+        s->it_state = 0;
+        settle(core, s->halt_pc);
+    }
+    return s->halt_kind;
+}
+
+static void fall_asleep(struct core *core, uint32_t what)
+{
+    struct shared *s = &core->shared;
+    s->last_sleep_cycle = s->cycle;
+    if (what == FOR_EVENT && s->event_register) {
+        s->event_register = 0;
+        return;
+    }
+    s->sleep = what;
+}
+
+static uint32_t run(struct core *core, uint64_t limit)
+{
+    struct shared *s = &core->shared;
+    free_dropped(core);
+    s->attention = 0;
+    for (;;) {
+        if (s->cycle >= s->tick_next) {
+            tick(core);
+        }
+        if (s->cycle >= core->stream_next) {
+            end_characters(core);
+        }
+        if (s->attention || s->cycle >= limit) {
+            return HALT_BORDER;
+        }
+        const uint64_t event = s->tick_next < core->stream_next ? s->tick_next : core->stream_next;
+        const uint64_t stop = event < limit ? event : limit;
+        if (s->sleep && !wakes(core)) {
+            if (s->cycle < stop) {
+                s->cycle = stop;
+            }
+            continue;
+        }
+        if (s->pending[0] | s->pending[1]) {
+            const int entered = deliver(core);
+            if (entered < 0) {
+                return HALT_DELIVER;
+            }
+            if (entered) {
+                continue;
+            }
+            uint64_t high;
+            s->mask_stop = deliverable(core, &high) || high;
+        } else {
+            s->mask_stop = 0;
+        }
+        s->stop_at = stop;
+        const uint32_t kind = run_slice(core);
+        switch (kind) {
+        case HALT_BORDER: break;
+        case HALT_WAIT_INTERRUPT: fall_asleep(core, FOR_INTERRUPT); break;
+        case HALT_WAIT_EVENT: fall_asleep(core, FOR_EVENT); break;
+        case HALT_EXCEPTION_RETURN:
+            if (!leave(core, s->halt_pc)) {
+                return kind;
+            }
+            break;
+        case HALT_SUPERVISOR_CALL:
+            if (!supervisor_call(core, s->halt_pc)) {
+                return kind;
+            }
+            break;
+        default: return kind;
+        }
+    }
+}
+
+/* Goes on to the first boundary at or after `limit`; returns why it ended, HALT_BORDER at a boundary or when asked to. */
+uint32_t core_run(struct core *core, uint64_t limit)
+{
+    const uint32_t kind = run(core, limit);
+    core_flush(core);
+    return kind;
+}

@@ -1,0 +1,1 @@
+"""The peripherals of the STM32F103, one a file; none imports another."""

@@ -1,0 +1,224 @@
+"""FLASH: access control, and the program/erase controller.
+
+Modelled: wait states and prefetch (the CPU's block costs read them from
+`chip.clocks`), the two keys, halfword programming, page and mass erase with
+typical times, the error flags. Not modelled: option bytes (declared, warned),
+write protection, the half-cycle access, and the stall of a CPU that fetches
+from flash while it is being programmed.
+
+Source: RM0008 section 3.3.3, PM0075 sections 2 and 3; times from DS5319 table 28.
+Invariant: the memory changes only while CR is unlocked and PG, PER or MER says so.
+"""
+
+from typing import Protocol
+
+from bluepill_sim.fabric.clocks import illegal_settings
+from bluepill_sim.fabric.ports import ChipPorts
+from bluepill_sim.fabric.registers import Peripheral, Place, Register, bits
+
+ACR, KEYR, OPTKEYR, SR, CR, AR = range(6)
+
+KEY1, KEY2 = 0x4567_0123, 0xCDEF_89AB
+PG, PER, MER, OPTPG, OPTER, STRT, LOCK, OPTWRE, ERRIE, EOPIE = (1 << n for n in (0, 1, 2, 4, 5, 6, 7, 9, 10, 12))
+BSY, PGERR, WRPRTERR, EOP = 1, 1 << 2, 1 << 4, 1 << 5
+
+#: Bytes of a page of a medium-density part (PM0075 table 2).
+PAGE_BYTES = 1024
+#: Halfword programming, page erase, mass erase (DS5319 table 28, typical; erase: the lower bound given).
+PROGRAM_NS, PAGE_ERASE_NS, MASS_ERASE_NS = 52_500, 20_000_000, 20_000_000
+#: Where the flash appears besides its alias at 0.
+FLASH_BASE = 0x0800_0000
+
+_OPTION_BITS = OPTPG | OPTER
+
+
+class FlashMemory(Protocol):
+    """The flash array, as its controller needs it; offsets are from its start."""
+
+    @property
+    def size(self) -> int:
+        """Size of the array in bytes."""
+        ...
+
+    def read(self, offset: int, size: int) -> bytes:
+        """Return `size` bytes."""
+        ...
+
+    def write(self, offset: int, data: bytes) -> None:
+        """Replace bytes, and drop whatever was translated from them."""
+        ...
+
+
+class Flash(Peripheral):
+    """Flash memory interface."""
+
+    HAS_BYTE_LANES = True
+    STATE = ("_key_step", "_address")
+    REGISTERS = (
+        Register(
+            name="ACR",
+            offset=0x00,
+            reset=bits(5, 4),
+            readable=bits((5, 0)),
+            writable=bits(4, 3, (2, 0)),
+            on_write="_write_acr",
+        ),
+        Register(name="KEYR", offset=0x04, readable=0, on_write="_write_keyr"),
+        Register(name="OPTKEYR", offset=0x08, readable=0, on_write="_write_optkeyr"),
+        Register(
+            name="SR",
+            offset=0x0C,
+            readable=BSY | PGERR | WRPRTERR | EOP,
+            writable=0,
+            write_one_to_clear=PGERR | WRPRTERR | EOP,
+            on_write="_write_sr",
+        ),
+        Register(
+            name="CR",
+            offset=0x10,
+            reset=LOCK,
+            readable=PG | PER | MER | OPTPG | OPTER | STRT | LOCK | OPTWRE | ERRIE | EOPIE,
+            writable=PG | PER | MER | OPTPG | OPTER | STRT | LOCK | ERRIE | EOPIE,
+            on_write="_write_cr",
+        ),
+        Register(name="AR", offset=0x14, readable=0, on_write="_write_ar"),
+        Register(name="OBR", offset=0x1C, reset=0x03FF_FFFC, writable=0, doc="option bytes as delivered"),
+        Register(name="WRPR", offset=0x20, reset=0xFFFF_FFFF, writable=0, doc="no page is write-protected"),
+    )
+
+    def __init__(self, chip: ChipPorts, place: Place) -> None:
+        super().__init__(chip, place)
+        #: The array; the board sets it. None: programming is warned of and does nothing.
+        self.memory: FlashMemory | None = None
+        #: Keys of the unlock sequence seen; -1: a wrong one, locked until reset.
+        self._key_step = 0
+        self._address = 0
+
+    def program(self, offset: int, size: int, value: int) -> None:
+        """Take a write by the CPU to the flash array itself.
+
+        Args:
+            offset: Byte offset from the start of the array.
+            size: 1, 2 or 4 bytes; only halfwords can be programmed.
+            value: The data.
+        """
+        if not self.words[CR] & PG or self.words[CR] & LOCK:
+            self.chip.warn("write to flash without FLASH_CR PG: ignored", once="FLASH:write")
+            return
+        if size != 2 or self._is_busy():
+            self._finish(PGERR)
+            return
+        memory = self._array()
+        if memory is None:
+            return
+        if memory.read(offset, 2) != b"\xff\xff" and value:
+            self._finish(PGERR)
+            return
+        memory.write(offset, value.to_bytes(2, "little"))
+        self._begin(PROGRAM_NS)
+
+    def advance_to(self, now_ns: int) -> None:
+        """End the operation that is due."""
+        if self.due_ns is not None and self.due_ns <= now_ns:
+            self.due_ns = None
+            self.words[SR] &= ~BSY
+            self.words[CR] &= ~STRT
+            self._finish(EOP)
+
+    def on_reset(self) -> None:
+        """Lock the controller; no wait state."""
+        self._key_step = 0
+        self._address = 0
+        self._set_access(0, has_prefetch=True)
+        self.chip.set_irq(self.place.irqs[0], False)
+
+    def _write_acr(self, written: int, _previous: int) -> None:
+        latency = written & 7
+        if latency > 2:
+            self.chip.warn(f"FLASH_ACR: LATENCY = {latency} is reserved", once="FLASH:latency")
+        has_prefetch = bool(written & 1 << 4)
+        self.words[ACR] = (self.words[ACR] & ~(1 << 5)) | (1 << 5 if has_prefetch else 0)
+        self._set_access(latency, has_prefetch=has_prefetch)
+
+    def _set_access(self, latency: int, *, has_prefetch: bool) -> None:
+        clocks = self.chip.clocks
+        if (clocks.flash_wait_states, clocks.flash_prefetch) == (latency, has_prefetch):
+            return
+        clocks.flash_wait_states, clocks.flash_prefetch = latency, has_prefetch
+        self.chip.clock_changed()
+        for key, message in illegal_settings(clocks):
+            self.chip.warn(message, once=key)
+
+    def _write_keyr(self, written: int, _previous: int) -> None:
+        if self._key_step < 0 or not self.words[CR] & LOCK:
+            return
+        if written != (KEY1, KEY2)[self._key_step]:
+            self._key_step = -1
+            self.chip.warn("FLASH_KEYR: wrong key, locked until reset", once="FLASH:key")
+        elif self._key_step == 1:
+            self._key_step = 0
+            self.words[CR] &= ~LOCK
+        else:
+            self._key_step = 1
+
+    def _write_optkeyr(self, _written: int, _previous: int) -> None:
+        self.chip.warn("FLASH_OPTKEYR: option bytes are not modelled", once="FLASH:options")
+
+    def _write_sr(self, _written: int, _previous: int) -> None:
+        self._update_irq()
+
+    def _write_cr(self, written: int, previous: int) -> None:
+        if previous & LOCK or self._is_busy():
+            self.words[CR] = previous
+            if previous & LOCK and written & ~LOCK:
+                self.chip.warn("FLASH_CR: written while locked: ignored", once="FLASH:locked")
+            return
+        # LOCK can be set by software, not cleared: `previous` was unlocked, so a 1 is new.
+        if written & _OPTION_BITS:
+            self.chip.warn("FLASH_CR: option bytes are not modelled", once="FLASH:options")
+        if written & STRT:
+            self._erase(written)
+        self._update_irq()
+
+    def _write_ar(self, written: int, _previous: int) -> None:
+        self._address = written
+
+    def _erase(self, control: int) -> None:
+        memory = self._array()
+        if memory is None or not control & (MER | PER):
+            self.words[CR] &= ~STRT
+            return
+        if control & MER:
+            memory.write(0, b"\xff" * memory.size)
+            self._begin(MASS_ERASE_NS)
+            return
+        page = (self._address - FLASH_BASE) // PAGE_BYTES * PAGE_BYTES
+        if not 0 <= page < memory.size:
+            self.words[CR] &= ~STRT
+            self._finish(WRPRTERR)
+            return
+        memory.write(page, b"\xff" * PAGE_BYTES)
+        self._begin(PAGE_ERASE_NS)
+
+    def _array(self) -> FlashMemory | None:
+        if self.memory is None:
+            self.chip.warn("FLASH: programming and erasing are not modelled on this board", once="FLASH:memory")
+        return self.memory
+
+    def _is_busy(self) -> bool:
+        return bool(self.words[SR] & BSY)
+
+    def _begin(self, duration_ns: int) -> None:
+        self.words[SR] |= BSY
+        self.due_ns = self.chip.now_ns + duration_ns
+        self.chip.deadline_changed()
+
+    def _finish(self, flag: int) -> None:
+        self.words[SR] |= flag
+        self._update_irq()
+
+    def _update_irq(self) -> None:
+        status, control = self.words[SR], self.words[CR]
+        done = status & EOP and control & EOPIE
+        failed = status & (PGERR | WRPRTERR) and control & ERRIE
+        self.chip.set_irq(self.place.irqs[0], bool(done or failed))

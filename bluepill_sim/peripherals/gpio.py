@@ -1,0 +1,194 @@
+"""GPIOA to GPIOE: port configuration, data registers, the lock.
+
+Modelled: all modes of CRL/CRH, pulls by ODR, open drain, atomic set/reset,
+the key sequence of LCKR. Not modelled: output speed, the two APB2 clocks of
+the input synchroniser. IDR is kept up to date by the pins, so that reading it is plain.
+
+Source: RM0008 sections 9.1 and 9.2.
+A pin that the program configures as a floating input is looked at a little
+later: somebody should drive it by then. What a program never configures floats
+unnoticed, as does what it configures by writing the reset value over a whole
+register: nothing tells whether that pin was meant.
+
+Invariant: bit n of the stored IDR is `pins[n].input`.
+"""
+
+from bluepill_sim.fabric.pins import Pin, PinMode, floating_inputs
+from bluepill_sim.fabric.ports import ChipPorts
+from bluepill_sim.fabric.registers import Peripheral, Place, Register, bits
+
+CRL, CRH, IDR, ODR, BSRR, BRR, LCKR = range(7)
+
+_PORT = bits((15, 0))
+_LCKK = 1 << 16
+#: CNF = 01, MODE = 00 for each pin: floating input.
+_CR_RESET = 0x4444_4444
+#: CNF[1:0] MODE[1:0] of a pin after reset.
+_FLOATING_NIBBLE = 0x4
+
+#: chosen: so long after its configuration a wire may still come.
+SETTLING_NS = 1_000_000
+
+_INPUT_MODES = (PinMode.ANALOG, PinMode.FLOATING, PinMode.PULLED, PinMode.FLOATING)
+_OUTPUT_MODES = (PinMode.PUSH_PULL, PinMode.OPEN_DRAIN, PinMode.ALTERNATE_PUSH_PULL, PinMode.ALTERNATE_OPEN_DRAIN)
+#: Mode by CNF[1:0] MODE[1:0] (RM0008 table 20); CNF = 11, MODE = 00 is reserved and taken as floating.
+PIN_MODES = tuple((_OUTPUT_MODES if nibble & 3 else _INPUT_MODES)[nibble >> 2] for nibble in range(16))
+
+
+class Gpio(Peripheral):
+    """One general-purpose I/O port; the last letter of its name is the port's."""
+
+    STATE = ("_lock_writes", "_locked", "_meant", "_warned")
+    REGISTERS = (
+        Register(name="CRL", offset=0x00, reset=_CR_RESET, on_write="_write_crl"),
+        Register(name="CRH", offset=0x04, reset=_CR_RESET, on_write="_write_crh"),
+        Register(name="IDR", offset=0x08, readable=_PORT, writable=0),
+        Register(name="ODR", offset=0x0C, readable=_PORT, writable=_PORT, on_write="_write_odr"),
+        Register(name="BSRR", offset=0x10, readable=0, on_write="_write_bsrr"),
+        Register(name="BRR", offset=0x14, readable=0, writable=_PORT, on_write="_write_brr"),
+        Register(
+            name="LCKR", offset=0x18, readable=_LCKK | _PORT, writable=0, on_read="_read_lckr", on_write="_write_lckr"
+        ),
+    )
+
+    def __init__(self, chip: ChipPorts, place: Place) -> None:
+        super().__init__(chip, place)
+        self._pins = chip.pins.port(place.name[-1])
+        #: The last three writes to LCKR.
+        self._lock_writes: tuple[int, ...] = ()
+        #: Pins whose configuration is frozen until reset.
+        self._locked = 0
+        #: Pins that the program has made floating inputs on purpose, and where: (number, address of the store).
+        self._meant: tuple[tuple[int, int], ...] = ()
+        #: Pins that were told of as floating.
+        self._warned = 0
+        chip.pins.release_listeners.append(self._released)
+        for pin in self._pins:
+            pin.listeners.append(self._input_changed)
+            self._input_changed(pin)
+
+    def on_reset(self) -> None:
+        """Make every pin a floating input and undo the lock."""
+        self._lock_writes = ()
+        self._locked = 0
+        self._meant = ()
+        for pin in self._pins:
+            pin.configure(PinMode.FLOATING, output_bit=False)
+            self._input_changed(pin)
+
+    def _input_changed(self, pin: Pin) -> None:
+        bit = 1 << pin.number
+        if pin.input:
+            self.words[IDR] |= bit
+        else:
+            self.words[IDR] &= ~bit
+
+    def _write_crl(self, _written: int, previous: int) -> None:
+        self._configure(CRL, 0, previous)
+
+    def _write_crh(self, _written: int, previous: int) -> None:
+        self._configure(CRH, 8, previous)
+
+    def _configure(self, register: int, first: int, previous: int) -> None:
+        """Bring the eight pins from `first` on into the modes that `register` now asks for."""
+        changed = self.words[register] ^ previous
+        forced, pc = self.chip.pins.written_by(self.base + 4 * register)
+        for position in range(8):
+            nibble_mask = 0xF << (4 * position)
+            number = first + position
+            nibble = self.words[register] >> (4 * position) & 0xF
+            if (changed | forced) & nibble_mask:
+                self._mean(number, pc, is_floating=nibble == _FLOATING_NIBBLE)
+            if not changed & nibble_mask:
+                continue
+            if self._locked >> number & 1:
+                self.words[register] ^= changed & nibble_mask
+                self.chip.warn(f"P{self.name[-1]}{number}: configured while locked: ignored", once=f"{self.name}:lock")
+                continue
+            pin = self._pins[number]
+            if pin.holder is not None and nibble != _FLOATING_NIBBLE:
+                self.chip.warn(
+                    f"{pin.name} belongs to {pin.holder}: its GPIO configuration has no effect until it is released",
+                    once=f"{pin.name}:held",
+                )
+            pin.configure(PIN_MODES[nibble], bool(self.words[ODR] >> number & 1))
+
+    def _mean(self, number: int, pc: int, *, is_floating: bool) -> None:
+        """Note whether a pin is meant as a floating input."""
+        others = tuple(pair for pair in self._meant if pair[0] != number)
+        if is_floating and not self._locked >> number & 1:
+            self._meant = (*others, (number, pc))
+            self._look_later()
+        else:
+            self._meant = others
+
+    def _released(self, pin: Pin) -> None:
+        """Look again at an input that nobody drives any more."""
+        if pin.port == self.name[-1] and any(number == pin.number for number, _ in self._meant):
+            self._look_later()
+
+    def _look_later(self) -> None:
+        self.due_ns = self.chip.now_ns + SETTLING_NS
+        self.chip.deadline_changed()
+
+    def advance_to(self, now_ns: int) -> None:
+        """Warn of the inputs that are meant and float."""
+        if self.due_ns is None or now_ns < self.due_ns:
+            return
+        self.due_ns = None
+        floating = [(self._pins[n], pc) for n, pc in sorted(self._meant) if not self._warned >> n & 1]
+        floating = [(p, pc) for p, pc in floating if _is_lost(p) and not self.chip.pins.is_fed(p)]
+        if floating:
+            self._warned |= sum(1 << pin.number for pin, _ in floating)
+            names = [pin.name for pin, _ in floating]
+            self.chip.warn(floating_inputs(names), once=f"floating:{' '.join(names)}", pc=floating[0][1])
+
+    def _write_odr(self, _written: int, previous: int) -> None:
+        self._output(self.words[ODR], previous)
+
+    def _write_bsrr(self, written: int, _previous: int) -> None:
+        previous = self.words[ODR]
+        # A set wins over a reset of the same bit (RM0008 9.2.5).
+        self._output(previous & ~(written >> 16) | written & _PORT, previous)
+
+    def _write_brr(self, written: int, _previous: int) -> None:
+        previous = self.words[ODR]
+        self._output(previous & ~(written & _PORT), previous)
+
+    def _output(self, bits_now: int, previous: int) -> None:
+        self.words[ODR] = bits_now
+        changed = bits_now ^ previous
+        while changed:
+            lowest = changed & -changed
+            changed ^= lowest
+            self._pins[lowest.bit_length() - 1].set_output_bit(bool(bits_now & lowest))
+
+    def simple_outputs(self) -> int:
+        """Return the pins of which a change of the ODR bit changes nothing but what IDR reads, as a mask."""
+        return sum(1 << pin.number for pin in self._pins if pin.is_simple())
+
+    def repeat_outputs(self, pins: int) -> None:
+        """Bring pins in line with their ODR bits, which were written without them."""
+        for pin in self._pins:
+            if pins >> pin.number & 1:
+                pin.set_output_bit(bool(self.words[ODR] >> pin.number & 1))
+
+    def _write_lckr(self, written: int, _previous: int) -> None:
+        if not self.words[LCKR] & _LCKK:
+            self.words[LCKR] = written & _PORT
+            self._lock_writes = (*self._lock_writes, written & (_LCKK | _PORT))[-3:]
+
+    def _read_lckr(self) -> int:
+        """Return LCKR; a read after the three writes reads LCKK as 0 and closes the lock."""
+        word = self.words[LCKR]
+        pins = word & _PORT
+        # The same pins three times, with LCKK = 1, 0, 1 (RM0008 9.2.7).
+        if self._lock_writes == (_LCKK | pins, pins, _LCKK | pins) and not word & _LCKK:
+            self._locked = pins
+            self.words[LCKR] |= _LCKK
+        return word
+
+
+def _is_lost(pin: Pin) -> bool:
+    """Tell whether a pin floats as an input of GPIO, on a leg."""
+    return pin.is_floating and pin.mode is PinMode.FLOATING and pin.holder is None and pin.is_bonded

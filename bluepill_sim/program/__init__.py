@@ -1,0 +1,1 @@
+"""What a firmware file says of itself: image, symbols, lines, functions, basic blocks."""

@@ -1,0 +1,1 @@
+"""Every check of the board, and the table of verdicts."""

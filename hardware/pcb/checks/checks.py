@@ -1,0 +1,98 @@
+"""Every check of the board: what is asked, the verdict, the figures.
+
+Plain Python always runs; KiCad, ngspice and gerbonara where they are installed, and a
+check that could not run says so. Invariant: no check changes a file.
+"""
+
+from collections import Counter
+
+from adapter_sim.pinout import load_pinout
+from hardware.pcb.checks import copper, gerbers, kicad_checks
+from hardware.pcb.checks.pin_checks import BOARDS, count_by_rule, findings
+from hardware.pcb.checks.report import Result, judged, listed, skipped
+from hardware.pcb.circuit.design import BOARD_VARIANTS, VARIANTS
+from hardware.pcb.circuit.design import build as design_of
+from hardware.pcb.circuit.electrical import all_checks, bom_faults, netlist_faults
+from hardware.pcb.outputs import build
+from hardware.pcb.spice import run
+from hardware.pcb.spice.decks import decks
+from hardware.pcb.spice.run import is_installed, simulate
+
+#: What the rules must find on the thesis's two maps (docs/board.md lists them).
+THESIS_FINDINGS = {
+    "thesis-table3": {"double": 1, "flash": 6, "input-only": 1, "jtag": 2, "no-pin": 1, "strap": 4},
+    "thesis-board": {"5V": 19, "double": 1, "flash": 1, "input-only": 1, "jtag": 2, "no-pin": 5, "strap": 4},
+}
+
+
+def run_all() -> list[Result]:
+    """Run every check, plain ones first."""
+    return [*plain(), *kicad_checks.with_kicad(), *simulations()]
+
+
+def plain() -> list[Result]:
+    """Run what needs nothing but Python."""
+    results = pin_rules()
+    for variant in VARIANTS:
+        design = design_of(variant)
+        results.append(listed("netlist complete", variant, netlist_faults(design), f"{len(design.nets())} nets"))
+        words = f"{len(design.components)} components"
+        results.append(listed("bill of materials", variant, bom_faults(design), words))
+        figures = all_checks(design)
+        outside = [str(check) for check in figures if not check.is_good]
+        results.append(listed("electrical", variant, outside, f"{len(figures)} figures within their limits"))
+    for variant in BOARD_VARIANTS:
+        design = design_of(variant)
+        tracks, vias = build.copper_of(design)
+        words = f"{len(tracks)} tracks, {len(vias)} vias"
+        results.append(listed("copper connected", variant, copper.faults(design, tracks, vias), words))
+        results.append(gerbers_reread(variant))
+    sources = build.sources()
+    stale = [f"{name} is stale" for name in build.stale_files(sources)]
+    results.append(listed("generated files", "all", stale, f"{len(sources)} files up to date"))
+    return results
+
+
+def gerbers_reread(variant: str) -> Result:
+    """Read the committed gerbers with a library that is not KiCad's, and hold them against the design."""
+    files = build.fabrication_archive(variant)
+    if not files:
+        return listed("gerbers re-read", variant, ["there is no archive (hint: make board)"], "")
+    if not gerbers.is_installed():
+        return skipped("gerbers re-read", variant, "gerbonara is not installed (hint: pip install 'p2os[board]')")
+    reading = gerbers.read(files)
+    words = (
+        f"{reading.width_mm:g} x {reading.height_mm:g} mm, {reading.copper_layers} copper layers, "
+        f"{reading.plated} + {reading.unplated} holes"
+    )
+    design = design_of(variant)
+    _, vias = build.copper_of(design)
+    return listed("gerbers re-read", variant, gerbers.faults(design, vias, reading), words)
+
+
+def pin_rules() -> list[Result]:
+    """Ask the pin rules of our revisions, which break none, and of the thesis's, whose faults they must find."""
+    results = []
+    for board in BOARDS.values():
+        found = count_by_rule(findings(load_pinout(), board))
+        wanted = THESIS_FINDINGS.get(board.revision, {})
+        words = ", ".join(f"{count} {rule}" for rule, count in found.items()) or "none"
+        kind = "the known ones" if wanted else "none allowed"
+        results.append(
+            judged("pin rules", board.revision, found == wanted, f"{Counter(found).total()} findings ({words}), {kind}")
+        )
+    return results
+
+
+def simulations() -> list[Result]:
+    """Run every deck; without ngspice one line says so."""
+    if not is_installed():
+        return [skipped("simulation", "all", "ngspice is not installed (hint: tools/install_board_tools.sh)")]
+    return [simulation(simulate(deck)) for deck in decks()]
+
+
+def simulation(ran: run.Result) -> Result:
+    """Judge what a deck gave."""
+    verdicts = ran.verdicts()
+    words = "; ".join(f"{limit.measure} {value:.4g} {limit.unit}" for limit, value, _ in verdicts)
+    return judged("simulation", ran.deck.name, all(good for *_, good in verdicts), words)

@@ -1,0 +1,332 @@
+"""Every footprint of the board, drawn by functions of a few measures.
+
+Sources: IPC-7351B nominal land patterns for chips and SOIC; JEDEC outlines MS-012,
+TO-236, TO-261, DO-214; makers' drawings for connectors (memory). tests/hardware
+compares pad centres and drills with KiCad's own library where that is installed.
+
+Footprints of the two plugged-in modules: sockets, pin names, the antenna's free area.
+
+Both are one footprint each (adjacent sockets would overlap as parts of their own).
+Origin: pin 1. Row distances are the modules' own; the BluePill's 15.24 mm is that of
+a DIP-40, the D1 mini's inner rows stand 22.86 mm apart (measured on the thesis's drawing).
+"""
+
+from collections.abc import Mapping
+from types import MappingProxyType
+
+from hardware.pcb.circuit.modules import BLUEPILL_PINS, ESP32_PINS, ESP32_SILKSCREEN
+from hardware.pcb.layout.shapes import Box, Circle, Footprint, Label, Line, Pad, PadKind, PadShape, courtyard, rectangle
+
+PITCH_MM = 2.54
+BLUEPILL_ROWS_MM = 15.24
+ESP32_INNER_ROWS_MM = 22.86
+#: Free of copper on both sides, relative to pin 1 of the ESP32: left, top, right, bottom.
+ANTENNA_AREA_MM = (4.3, -13.0, 23.6, -4.0)
+
+_PCB_BLUE, _PCB_BLACK, _SOCKET, _METAL = (0.1, 0.2, 0.5), (0.1, 0.1, 0.12), (0.08, 0.08, 0.09), (0.7, 0.7, 0.72)
+#: A socket of 8.5 mm and a pin header of 2.5 mm hold a module's board at 11 mm.
+_MODULE_Z_MM = (11.0, 12.6)
+
+
+def bluepill() -> Footprint:
+    """Draw the BluePill: 20 pins down the left, 20 up the right, USB at the top."""
+    places = [(0.0, PITCH_MM * index) for index in range(20)]
+    places += [(BLUEPILL_ROWS_MM, PITCH_MM * (19 - index)) for index in range(20)]
+    names: list[Line | Circle | Label] = []
+    for name, (x, y) in zip(BLUEPILL_PINS, places, strict=True):
+        names.append(_name(name, x + (-1.35 if x == 0 else 1.35), y, "right" if x == 0 else "left"))
+    left, right, top, bottom = -3.8, 19.04, -2.37, 50.63
+    drawings = [
+        *_outline(left, top, right, bottom), *names, _first(-1.35, -1.7),
+        *rectangle("F.SilkS", 3.6, top, 11.6, top + 4.5), *_socket(0, 20), *_socket(BLUEPILL_ROWS_MM, 20),
+        Label(layer="F.SilkS", text="USB", at_mm=(7.62, top + 2.2), size_mm=1.2),
+        Label(layer="F.SilkS", text="BluePill", at_mm=(7.62, 22.0), size_mm=1.8),
+        Label(layer="F.SilkS", text="SWD", at_mm=(7.62, bottom - 1.6), size_mm=1.2),
+    ]  # fmt: skip
+    boxes = [_strip(0, 20), _strip(BLUEPILL_ROWS_MM, 20)]
+    boxes += [Box(center_mm=(7.62, 24.13), size_mm=(22.84, 53.0), z_mm=_MODULE_Z_MM, colour=_PCB_BLUE),
+              Box(center_mm=(7.62, 0.3), size_mm=(7.5, 5.6), z_mm=(12.6, 15.2), colour=_METAL),
+              Box(center_mm=(7.62, 26.0), size_mm=(7.0, 7.0), z_mm=(12.6, 14.0), colour=_PCB_BLACK)]  # fmt: skip
+    return Footprint(
+        name="MODULE_BLUEPILL", description="STM32 BluePill on two 1x20 sockets", pads=_pads(places),
+        drawings=tuple(drawings), ref_at_mm=(7.62, 19.0), boxes=tuple(boxes),
+    )  # fmt: skip
+
+
+def esp32_d1_mini() -> Footprint:
+    """Draw the ESP32 D1 mini: two double rows of 2x10, antenna at the top, USB at the bottom."""
+    columns = (0.0, PITCH_MM, PITCH_MM + ESP32_INNER_ROWS_MM, 2 * PITCH_MM + ESP32_INNER_ROWS_MM)
+    places = [(x, PITCH_MM * index) for x in columns for index in range(10)]
+    names: list[Line | Circle | Label] = []
+    for index, (pin, (x, y)) in enumerate(zip(ESP32_PINS, places, strict=True)):
+        is_left_hand = index // 10 in {0, 2}
+        text = ESP32_SILKSCREEN.get(pin, pin.removeprefix("IO"))
+        names.append(_name(text, x + (-1.35 if is_left_hand else 1.35), y, "right" if is_left_hand else "left"))
+    right = columns[3]
+    left_edge, right_edge, top, bottom = -1.8, right + 1.8, -9.0, 30.0
+    keep_left, keep_top, keep_right, keep_bottom = ANTENNA_AREA_MM
+    _ = keep_top
+    drawings = [
+        *_outline(left_edge, top, right_edge, bottom), *names, _first(-1.35, -1.7),
+        *_socket(0, 10, 2), *_socket(columns[2], 10, 2),
+        *rectangle("F.SilkS", right / 2 - 4, bottom - 5.0, right / 2 + 4, bottom),
+        *rectangle("F.SilkS", keep_left, top, keep_right, keep_bottom),
+        Label(layer="F.SilkS", text="ANTENNA", at_mm=(right / 2, (top + keep_bottom) / 2), size_mm=1.2),
+        Label(layer="F.SilkS", text="ESP32 D1 mini", at_mm=(right / 2, 12.0), size_mm=1.3),
+        Label(layer="F.SilkS", text="USB", at_mm=(right / 2, bottom - 2.5), size_mm=1.2),
+    ]  # fmt: skip
+    boxes = [_strip(1.27, 10, 2), _strip(right - 1.27, 10, 2)]
+    boxes += [Box(center_mm=(right / 2, (top + bottom) / 2), size_mm=(right + 3.6, bottom - top), z_mm=_MODULE_Z_MM,
+                  colour=_PCB_BLACK),
+              Box(center_mm=(right / 2, 4.5), size_mm=(16.0, 18.0), z_mm=(12.6, 15.8), colour=_METAL),
+              Box(center_mm=(right / 2, 27.5), size_mm=(7.5, 5.0), z_mm=(12.6, 15.2), colour=_METAL)]  # fmt: skip
+    return Footprint(
+        name="MODULE_ESP32_D1_MINI", description="ESP32 D1 mini (40 pins) on four 1x10 sockets", pads=_pads(places),
+        drawings=tuple(drawings), ref_at_mm=(right / 2, 9.2), boxes=tuple(boxes),
+    )  # fmt: skip
+
+
+def _pads(places: list[tuple[float, float]]) -> tuple[Pad, ...]:
+    return tuple(
+        Pad(number=str(number), kind=PadKind.THROUGH, shape=PadShape.RECT if number == 1 else PadShape.CIRCLE,
+            at_mm=place, size_mm=(1.7, 1.7), drill_mm=1.0)
+        for number, place in enumerate(places, start=1)
+    )  # fmt: skip
+
+
+def _name(text: str, x: float, y: float, justify: str) -> Label:
+    return Label(layer="F.SilkS", text=text, at_mm=(x, y), size_mm=0.8, justify=justify)
+
+
+def _first(x: float, y: float) -> Circle:
+    return Circle(layer="F.SilkS", center_mm=(x, y), radius_mm=0.2, is_filled=True)
+
+
+def _outline(left: float, top: float, right: float, bottom: float) -> list[Line]:
+    # On the silkscreen only the short sides: the pins' names stand where the long ones would run.
+    silk = [Line(layer="F.SilkS", start_mm=(left, y), end_mm=(right, y)) for y in (top, bottom)]
+    return [*rectangle("F.Fab", left, top, right, bottom, 0.1), *silk,
+            *courtyard(left - 0.25, top - 0.25, right + 0.25, bottom + 0.25)]  # fmt: skip
+
+
+def _socket(x: float, count: int, columns: int = 1) -> list[Line]:
+    right = x + PITCH_MM * (columns - 1)
+    return rectangle("F.Fab", x - 1.27, -1.27, right + 1.27, PITCH_MM * (count - 1) + 1.27, 0.1)
+
+
+def _strip(x: float, count: int, columns: int = 1) -> Box:
+    length = PITCH_MM * count
+    return Box(center_mm=(x, (length - PITCH_MM) / 2), size_mm=(2.5 * columns, length), z_mm=(0, 8.5), colour=_SOCKET)
+
+
+BLACK, GREY, BROWN, GREEN = (0.08, 0.08, 0.09), (0.55, 0.56, 0.58), (0.55, 0.42, 0.27), (0.12, 0.45, 0.2)
+BLUE, WHITE = (0.1, 0.2, 0.45), (0.9, 0.9, 0.86)
+
+
+def _smd(number: str, x: float, y: float, width: float, height: float) -> Pad:
+    return Pad(number=number, kind=PadKind.SMD, shape=PadShape.ROUND_RECT, at_mm=(x, y), size_mm=(width, height))
+
+
+def _hole(number: str, x: float, y: float, size: float, drill: float, shape: PadShape = PadShape.CIRCLE) -> Pad:
+    return Pad(number=number, kind=PadKind.THROUGH, shape=shape, at_mm=(x, y), size_mm=(size, size), drill_mm=drill)
+
+
+def _chip(
+    name: str,
+    pad: tuple[float, float, float],
+    body: tuple[float, float, float],
+    numbers: tuple[str, str] = ("1", "2"),
+    colour: tuple[float, float, float] = BLACK,
+) -> Footprint:
+    """Draw a part with two end pads; pad = (centre, width, height), body = (length, width, height)."""
+    centre, width, height = pad
+    long, wide, tall = body
+    half = max(height, wide) / 2 + 0.25
+    edge = centre + width / 2 + 0.25
+    lines: list[Line | Circle | Label] = [*rectangle("F.Fab", -long / 2, -wide / 2, long / 2, wide / 2, 0.1)]
+    inner = centre - width / 2 - 0.2
+    if numbers == ("K", "A"):
+        # The cathode's end is closed: the bar that a person looks for.
+        top = half + 0.0
+        lines += [Line(layer="F.SilkS", start_mm=(-edge, -top), end_mm=(-edge, top), width_mm=0.2)]
+        lines += [Line(layer="F.SilkS", start_mm=(-edge, y), end_mm=(centre, y)) for y in (-top, top)]
+        lines += [Line(layer="F.Fab", start_mm=(-long / 4, -wide / 2), end_mm=(-long / 4, wide / 2), width_mm=0.1)]
+    elif inner > 0.1:
+        lines += [
+            Line(layer="F.SilkS", start_mm=(-inner, y), end_mm=(inner, y)) for y in (-wide / 2 - 0.1, wide / 2 + 0.1)
+        ]
+    lines += courtyard(-edge, -half, edge, half)
+    return Footprint(
+        name=name,
+        description=f"{long:g} x {wide:g} mm, two end pads",
+        pads=(_smd(numbers[0], -centre, 0, width, height), _smd(numbers[1], centre, 0, width, height)),
+        drawings=tuple(lines),
+        ref_at_mm=(0, -half - 0.6),
+        boxes=(Box(center_mm=(0, 0), size_mm=(long, wide), z_mm=(0.05, tall), colour=colour),),
+    )
+
+
+def _sot23() -> Footprint:
+    pads = (
+        _smd("1", -0.9375, -0.95, 1.475, 0.6),
+        _smd("2", -0.9375, 0.95, 1.475, 0.6),
+        _smd("3", 0.9375, 0, 1.475, 0.6),
+    )
+    silk = [Line(layer="F.SilkS", start_mm=(0.65, y), end_mm=(-0.65, y)) for y in (-1.65, 1.65)]
+    return Footprint(
+        name="SOT23", description="SOT-23 (TO-236)", pads=pads,
+        drawings=(*rectangle("F.Fab", -0.65, -1.45, 0.65, 1.45, 0.1), *silk,
+                  Circle(layer="F.SilkS", center_mm=(-1.3, -1.6), radius_mm=0.12, is_filled=True),
+                  *courtyard(-1.95, -1.8, 1.95, 1.8)),
+        ref_at_mm=(0, -2.4),
+        boxes=(Box(center_mm=(0, 0), size_mm=(1.3, 2.9), z_mm=(0.1, 1.0), colour=BLACK),),
+    )  # fmt: skip
+
+
+def _sot223() -> Footprint:
+    pads = tuple(_smd(str(n), -3.15, y, 2.0, 1.5) for n, y in ((1, -2.3), (2, 0.0), (3, 2.3)))
+    silk = [Line(layer="F.SilkS", start_mm=(-1.9, y), end_mm=(1.9, y)) for y in (-3.45, 3.45)]
+    return Footprint(
+        name="SOT223", description="SOT-223 (TO-261), tab on pin 2",
+        pads=(*pads, _smd("2", 3.15, 0, 2.0, 3.8)),
+        drawings=(*rectangle("F.Fab", -1.75, -3.25, 1.75, 3.25, 0.1), *silk,
+                  Circle(layer="F.SilkS", center_mm=(-3.15, -3.5), radius_mm=0.15, is_filled=True),
+                  *courtyard(-4.4, -3.7, 4.4, 3.7)),
+        ref_at_mm=(0, -4.3),
+        boxes=(Box(center_mm=(0, 0), size_mm=(3.5, 6.5), z_mm=(0.1, 1.7), colour=BLACK),),
+    )  # fmt: skip
+
+
+def _soic16() -> Footprint:
+    pads = []
+    for index in range(8):
+        y = -4.445 + 1.27 * index
+        pads += [_smd(str(index + 1), -2.475, y, 1.95, 0.6), _smd(str(16 - index), 2.475, y, 1.95, 0.6)]
+    silk = [Line(layer="F.SilkS", start_mm=(-1.95, y), end_mm=(1.95, y)) for y in (-5.1, 5.1)]
+    return Footprint(
+        name="SOIC16", description="SOIC-16, 3.9 x 9.9 mm, pitch 1.27 mm (MS-012)", pads=tuple(pads),
+        drawings=(*rectangle("F.Fab", -1.95, -4.95, 1.95, 4.95, 0.1), *silk,
+                  Circle(layer="F.SilkS", center_mm=(-3.9, -4.445), radius_mm=0.2, is_filled=True),
+                  *courtyard(-3.7, -5.35, 3.7, 5.35)),
+        ref_at_mm=(0, -5.9),
+        boxes=(Box(center_mm=(0, 0), size_mm=(3.9, 9.9), z_mm=(0.15, 1.65), colour=BLACK),),
+    )  # fmt: skip
+
+
+def _header(name: str, columns: int, rows: int) -> Footprint:
+    pads, boxes = [], []
+    for row in range(rows):
+        for column in range(columns):
+            first = row == 0 and column == 0
+            number = str(row * columns + column + 1)
+            shape = PadShape.RECT if first else PadShape.OVAL
+            pads.append(_hole(number, 2.54 * column, 2.54 * row, 1.7, 1.0, shape))
+            boxes.append(
+                Box(center_mm=(2.54 * column, 2.54 * row), size_mm=(0.64, 0.64), z_mm=(-3, 8.5), colour=GREY)
+            )  # fmt: skip
+    right, bottom = 2.54 * (columns - 1) + 1.33, 2.54 * (rows - 1) + 1.33
+    boxes.append(Box(center_mm=((right - 1.33) / 2, (bottom - 1.33) / 2),
+                     size_mm=(right + 1.2, bottom + 1.2), z_mm=(0, 2.5), colour=BLACK))  # fmt: skip
+    return Footprint(
+        name=name, description=f"Pin header {columns} x {rows}, 2.54 mm", pads=tuple(pads),
+        drawings=(*rectangle("F.SilkS", -1.33, -1.33, right, bottom),
+                  *rectangle("F.Fab", -1.27, -1.27, right - 0.06, bottom - 0.06, 0.1),
+                  Line(layer="F.SilkS", start_mm=(-1.6, -1.6), end_mm=(-1.6, 0), width_mm=0.2),
+                  *courtyard(-1.8, -1.8, right + 0.47, bottom + 0.47)),
+        ref_at_mm=((right - 1.33) / 2, -2.4),
+        boxes=tuple(boxes),
+    )  # fmt: skip
+
+
+def _terminal() -> Footprint:
+    pads = (_hole("1", 0, 0, 2.6, 1.3, PadShape.RECT), _hole("2", 5.08, 0, 2.6, 1.3))
+    return Footprint(
+        name="TERMINAL_5.08", description="Screw terminal 2 x 5.08 mm, wires enter from below", pads=pads,
+        drawings=(*rectangle("F.SilkS", -2.6, -5.3, 7.68, 4.6), *rectangle("F.Fab", -2.54, -5.2, 7.62, 4.5, 0.1),
+                  Line(layer="F.SilkS", start_mm=(-2.6, 2.6), end_mm=(7.68, 2.6)),
+                  *courtyard(-3.04, -5.7, 8.12, 5.1)),
+        ref_at_mm=(2.54, -6.2),
+        boxes=(Box(center_mm=(2.54, -0.35), size_mm=(10.16, 9.7), z_mm=(0, 10), colour=GREEN),),
+    )  # fmt: skip
+
+
+def _buck() -> Footprint:
+    pads = tuple(
+        Pad(number=str(index + 1), kind=PadKind.THROUGH, shape=PadShape.RECT if index == 0 else PadShape.OVAL,
+            at_mm=(2.54 * index, 0), size_mm=(1.5, 2.5), drill_mm=1.0)
+        for index in range(3)
+    )  # fmt: skip
+    names = [Label(layer="F.SilkS", text=text, at_mm=(2.54 * index, 2.8), size_mm=0.8)
+             for index, text in enumerate(("IN", "G", "OUT"))]  # fmt: skip
+    return Footprint(
+        name="SIP3_BUCK", description="SIP-3 step-down module 11.7 x 7.6 mm", pads=pads,
+        drawings=(*rectangle("F.SilkS", -3.4, -5.7, 8.48, 2.0), *rectangle("F.Fab", -3.3, -5.6, 8.38, 2.0, 0.1), *names,
+                  *courtyard(-3.55, -5.85, 8.65, 3.4)),
+        ref_at_mm=(2.54, -3.6),
+        boxes=(Box(center_mm=(2.54, -1.8), size_mm=(11.7, 7.6), z_mm=(0.5, 10.7), colour=BLACK),),
+    )  # fmt: skip
+
+
+def _radial() -> Footprint:
+    pads = (_hole("1", 0, 0, 1.6, 0.8, PadShape.RECT), _hole("2", 3.5, 0, 1.6, 0.8))
+    return Footprint(
+        name="CP_RADIAL_D8", description="Electrolytic capacitor, 8 mm, pitch 3.5 mm", pads=pads,
+        drawings=(Circle(layer="F.SilkS", center_mm=(1.75, 0), radius_mm=4.12),
+                  Circle(layer="F.Fab", center_mm=(1.75, 0), radius_mm=4.0, width_mm=0.1),
+                  Label(layer="F.SilkS", text="+", at_mm=(-1.45, -1.3), size_mm=1.0),
+                  *courtyard(-2.55, -4.3, 6.05, 4.3)),
+        ref_at_mm=(1.75, 2.1),
+        boxes=(Box(center_mm=(1.75, 0), size_mm=(7.2, 7.2), z_mm=(0, 11.5), colour=BLUE),),
+    )  # fmt: skip
+
+
+def _de9() -> Footprint:
+    pads = [_hole("0", x, 1.42, 4.0, 3.2) for x in (-6.96, 18.04)]
+    pads += [_hole(str(n + 1), 2.77 * n, 0, 1.6, 1.0, PadShape.RECT if n == 0 else PadShape.CIRCLE) for n in range(5)]
+    pads += [_hole(str(n + 6), 1.385 + 2.77 * n, 2.84, 1.6, 1.0) for n in range(4)]
+    names = [Label(layer="F.SilkS", text=str(n + 1), at_mm=(2.77 * n, -1.45), size_mm=0.8) for n in range(5)]
+    return Footprint(
+        name="DE9_MALE", description="DE-9 plug, right angle, edge 10.54 mm below pin 1", pads=tuple(pads),
+        drawings=(*rectangle("F.Fab", -9.9, -1.8, 20.96, 10.54, 0.1), *names,
+                  *(Line(layer="F.SilkS", start_mm=(x, -2.3), end_mm=(x, 9.9)) for x in (-10.0, 21.06)),
+                  Line(layer="F.SilkS", start_mm=(-10.0, -2.3), end_mm=(21.06, -2.3)),
+                  *courtyard(-10.4, -2.4, 21.48, 17.4)),
+        ref_at_mm=(5.54, -3.1),
+        boxes=(Box(center_mm=(5.54, 4.4), size_mm=(30.8, 12.3), z_mm=(0, 12.5), colour=GREY),
+               Box(center_mm=(5.54, 13.5), size_mm=(16.9, 6.0), z_mm=(1.8, 10.5), colour=(0.7, 0.7, 0.72))),
+    )  # fmt: skip
+
+
+def _test_point() -> Footprint:
+    pad = Pad(number="1", kind=PadKind.SMD, shape=PadShape.CIRCLE, at_mm=(0, 0), size_mm=(1.5, 1.5))
+    return Footprint(name="TESTPOINT", description="Test point 1.5 mm", pads=(pad,),
+                     drawings=(Circle(layer="F.SilkS", center_mm=(0, 0), radius_mm=1.0),
+                               *courtyard(-1.2, -1.2, 1.2, 1.2)),
+                     ref_at_mm=(0, -1.7))  # fmt: skip
+
+
+def _mounting_hole() -> Footprint:
+    pad = Pad(number="", kind=PadKind.HOLE, shape=PadShape.CIRCLE, at_mm=(0, 0), size_mm=(3.2, 3.2), drill_mm=3.2)
+    return Footprint(name="HOLE_M3", description="Mounting hole M3", pads=(pad,),
+                     drawings=(Circle(layer="F.SilkS", center_mm=(0, 0), radius_mm=3.0),
+                               Circle(layer="F.CrtYd", center_mm=(0, 0), radius_mm=3.2, width_mm=0.05)),
+                     ref_at_mm=(0, -3.6))  # fmt: skip
+
+
+def _all() -> list[Footprint]:
+    return [
+        _chip("R_0805", (0.9125, 1.025, 1.4), (2.0, 1.25, 0.55)),
+        _chip("C_0805", (0.95, 1.0, 1.45), (2.0, 1.25, 1.25), colour=BROWN),
+        _chip("C_1206", (1.475, 1.15, 1.8), (3.2, 1.6, 1.6), colour=BROWN),
+        _chip("LED_0805", (0.9375, 0.975, 1.4), (2.0, 1.25, 0.8), ("K", "A"), WHITE),
+        _chip("D_SMA", (2.0, 2.5, 1.8), (4.3, 2.6, 2.3), ("K", "A")),
+        _chip("D_SMB", (2.15, 2.5, 2.3), (4.4, 3.6, 2.3), ("K", "A")),
+        _chip("F_1812", (2.1375, 1.125, 3.4), (4.5, 3.2, 1.6), colour=GREEN),
+        _sot23(), _sot223(), _soic16(), _terminal(), _buck(), _radial(), _de9(), _test_point(), _mounting_hole(),
+        _header("HEADER_1X2", 1, 2), _header("HEADER_1X3", 1, 3), _header("HEADER_2X12", 2, 12),
+        bluepill(), esp32_d1_mini(),
+    ]  # fmt: skip
+
+
+#: Every footprint by its name.
+FOOTPRINTS: Mapping[str, Footprint] = MappingProxyType({footprint.name: footprint for footprint in _all()})

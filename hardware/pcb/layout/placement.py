@@ -1,0 +1,206 @@
+"""Where every part stands, in millimetres from the board's upper left corner.
+
+Left: the BluePill; middle: one row for each wire (series resistor, pull-down), in
+the order of the BluePill's pins so that few tracks cross; right: the ESP32 with its
+antenna at the upper edge; below: supply, RS-232 and the connectors at the lower edge.
+
+Invariant: `place` gives every component of a board variant exactly one place.
+"""
+
+from dataclasses import dataclass
+
+from adapter_sim.pinout import load_pinout
+from hardware.pcb.circuit.design import PULL_OFFSET, series_wires
+from hardware.pcb.circuit.modules import BLUEPILL_PINS
+from hardware.pcb.circuit.netlist import Design, DesignError
+from hardware.pcb.layout.footprints import BLUEPILL_ROWS_MM, PITCH_MM
+from hardware.pcb.layout.shapes import Label
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Place:
+    """Position and angle of a part; `ref_mm` moves its reference (relative to the part, board axes)."""
+
+    x_mm: float
+    y_mm: float
+    angle_deg: float = 0.0
+    ref_mm: tuple[float, float] | None = None
+
+
+#: Pin 1 of the modules.
+BLUEPILL_AT_MM = (11.0, 10.5)
+ESP32_AT_MM = (62.5, 11.5)
+#: The rows of resistors: first row, distance, columns of series resistor and pull-down.
+ROW_TOP_MM, ROW_PITCH_MM, SERIES_X_MM, PULL_X_MM = 8.5, 2.75, 46.0, 52.6
+
+
+def place(design: Design) -> dict[str, Place]:
+    """Return the place of every component.
+
+    Raises:
+        DesignError: A component has none, or there is one too many.
+    """
+    places = {**_FIXED, **_VARIANTS[design.variant], **_rows(design)}
+    refs = {component.ref for component in design.components}
+    if refs != set(places):
+        raise DesignError(f"no place for {sorted(refs - set(places))}; no part for {sorted(set(places) - refs)}")
+    return places
+
+
+def row_order() -> list[str]:
+    """Return the names of the wires with a resistor, from the top row to the bottom row."""
+    heights = {}
+    for number, pin in enumerate(BLUEPILL_PINS):
+        is_left = number < 20
+        heights[pin] = (number if is_left else 39 - number, is_left)
+    wires = series_wires(load_pinout())
+    return [wire.name for wire in sorted(wires, key=lambda wire: heights[wire.bluepill])]
+
+
+def silk_labels(design: Design) -> list[Label]:
+    """Return the texts of the board that belong to no part."""
+    return [*_TEXTS, *_header_names(design), *_row_names(), *_TEXTS_OF[design.variant]]
+
+
+def short_name(wire: str) -> str:
+    """Return the name of a wire that fits beside a pin: DD1, E1S2, M2C3, CON."""
+    return wire.replace("encoder", "E").replace("motor", "M").replace("_s", "S").replace("_comm", "C").replace(
+        "p2dx_con", "CON").upper()  # fmt: skip
+
+
+def unturn(offset: tuple[float, float], angle: float) -> tuple[float, float]:
+    """Return an offset in board axes as one in the axes of a turned footprint."""
+    x, y = offset
+    quarter = round(angle / 90) % 4
+    return {0: (x, y), 1: (-y, x), 2: (-x, -y), 3: (y, -x)}[quarter]
+
+
+def _rows(design: Design) -> dict[str, Place]:
+    refs = {component.ref for component in design.components}
+    places = {}
+    numbers = {wire.name: number for number, wire in enumerate(series_wires(load_pinout()), start=1)}
+    for row, name in enumerate(row_order()):
+        y = ROW_TOP_MM + ROW_PITCH_MM * row
+        places[f"R{numbers[name]}"] = Place(x_mm=SERIES_X_MM, y_mm=y, ref_mm=(3.1, 0))
+        pull = f"R{numbers[name] + PULL_OFFSET}"
+        if pull in refs:
+            places[pull] = Place(x_mm=PULL_X_MM, y_mm=y, ref_mm=(3.1, 0))
+    return places
+
+
+def _row_names() -> list[Label]:
+    return []
+
+
+def _header_names(design: Design) -> list[Label]:
+    """Return the name of each net beside its pin of the logic header."""
+    header, at = design.component("J4"), _FIXED["J4"]
+    labels = []
+    for pin, net in header.pins:
+        row, column = divmod(int(pin) - 1, 2)
+        text = (
+            "GND"
+            if net == "GND"
+            else "RST"
+            if net == "RST_REQ"
+            else short_name((net or "").removesuffix("_BP").lower())
+        )
+        x = at.x_mm + (-1.75 if column == 0 else PITCH_MM + 1.75)
+        labels.append(Label(layer="F.SilkS", text=text, at_mm=(x, at.y_mm + PITCH_MM * row), size_mm=0.8,
+                            justify="right" if column == 0 else "left"))  # fmt: skip
+    return labels
+
+
+_BP_X, _BP_Y = BLUEPILL_AT_MM
+_FIXED = {
+    "U1": Place(x_mm=_BP_X, y_mm=_BP_Y),
+    "U2": Place(x_mm=ESP32_AT_MM[0], y_mm=ESP32_AT_MM[1]),
+    "J4": Place(x_mm=_BP_X + BLUEPILL_ROWS_MM + 9.2, y_mm=17.5, ref_mm=(1.27, -2.6)),
+    # 12 V input, from the lower left corner to the right
+    "J1": Place(x_mm=11.0, y_mm=94.4, ref_mm=(2.54, 3.6)),
+    "F1": Place(x_mm=10.5, y_mm=83.5),
+    "D1": Place(x_mm=18.6, y_mm=83.5, angle_deg=180),
+    "D2": Place(x_mm=25.6, y_mm=83.0, angle_deg=90, ref_mm=(0, -4.6)),
+    "C1": Place(x_mm=32.0, y_mm=80.5, angle_deg=270),
+    "C2": Place(x_mm=26.0, y_mm=76.6),
+    # 5 V from a power bank
+    "J2": Place(x_mm=25.0, y_mm=94.4, ref_mm=(2.54, 3.6)),
+    "D3": Place(x_mm=40.5, y_mm=92.5, angle_deg=180),
+    "JP1": Place(x_mm=55.0, y_mm=82.0, ref_mm=(0, 7.4)),
+    "C4": Place(x_mm=51.0, y_mm=77.0, angle_deg=90, ref_mm=(2.3, 0)),
+    "D4": Place(x_mm=13.0, y_mm=69.0, angle_deg=0),
+    "D5": Place(x_mm=66.5, y_mm=52.0),
+    "R61": Place(x_mm=43.5, y_mm=96.5),
+    "D6": Place(x_mm=50.0, y_mm=96.5, angle_deg=180),
+    "C3": Place(x_mm=51.0, y_mm=88.0, angle_deg=270, ref_mm=(-2.3, 0)),
+    # RS-232
+    "U5": Place(x_mm=76.0, y_mm=71.0),
+    "C5": Place(x_mm=69.0, y_mm=67.0, angle_deg=270, ref_mm=(2.1, 0)),
+    "C6": Place(x_mm=69.0, y_mm=73.5, angle_deg=270, ref_mm=(2.1, 0)),
+    "C7": Place(x_mm=64.8, y_mm=67.0, angle_deg=270, ref_mm=(2.1, 0)),
+    "C8": Place(x_mm=64.8, y_mm=73.5, angle_deg=270, ref_mm=(2.1, 0)),
+    "C9": Place(x_mm=82.5, y_mm=66.0, angle_deg=270, ref_mm=(2.1, 0)),
+    "J3": Place(x_mm=70.5, y_mm=89.46),
+    "R62": Place(x_mm=84.5, y_mm=60.5),
+    "R63": Place(x_mm=84.5, y_mm=57.0),
+    "R64": Place(x_mm=91.0, y_mm=66.0),
+    "D7": Place(x_mm=96.0, y_mm=66.0, angle_deg=180, ref_mm=(0, 1.7)),
+    "R65": Place(x_mm=91.0, y_mm=71.0),
+    "D8": Place(x_mm=96.0, y_mm=71.0, angle_deg=180, ref_mm=(0, 1.7)),
+    # reset and mode
+    "Q1": Place(x_mm=58.0, y_mm=70.0),
+    "R66": Place(x_mm=46.0, y_mm=69.0),
+    "R67": Place(x_mm=52.6, y_mm=70.5),
+    "J5": Place(x_mm=60.5, y_mm=60.0, ref_mm=(-2.9, 1.27)),
+    "R60": Place(x_mm=66.5, y_mm=62.5),
+    # holes and test points
+    "H1": Place(x_mm=4.0, y_mm=4.0), "H2": Place(x_mm=96.0, y_mm=4.0),
+    "H3": Place(x_mm=4.0, y_mm=96.0), "H4": Place(x_mm=96.0, y_mm=96.0),
+    "TP1": Place(x_mm=34.0, y_mm=75.9), "TP2": Place(x_mm=37.0, y_mm=71.5),
+    "TP3": Place(x_mm=43.5, y_mm=88.6), "TP4": Place(x_mm=56.0, y_mm=77.0),
+    "TP5": Place(x_mm=87.5, y_mm=76.5), "TP6": Place(x_mm=20.5, y_mm=69.0),
+    "TP7": Place(x_mm=74.0, y_mm=52.0), "TP8": Place(x_mm=63.0, y_mm=80.5),
+    "TP9": Place(x_mm=61.5, y_mm=66.3), "TP10": Place(x_mm=69.0, y_mm=80.5),
+    "TP11": Place(x_mm=75.0, y_mm=80.5), "TP12": Place(x_mm=81.0, y_mm=80.5),
+}  # fmt: skip
+
+_VARIANTS: dict[str, dict[str, Place]] = {
+    "rev-b": {"U3": Place(x_mm=40.0, y_mm=82.5)},
+    "lm317": {
+        "U3": Place(x_mm=43.0, y_mm=80.5),
+        "R68": Place(x_mm=38.0, y_mm=87.5, angle_deg=90, ref_mm=(0, -2.35)),
+        "R69": Place(x_mm=40.4, y_mm=87.5, angle_deg=90, ref_mm=(0, -2.35)),
+        "C11": Place(x_mm=47.0, y_mm=87.0),
+        "C3": Place(x_mm=51.0, y_mm=88.0, angle_deg=270),
+        "U4": Place(x_mm=27.5, y_mm=70.0, ref_mm=(0, 4.4)),
+        "C12": Place(x_mm=34.3, y_mm=69.0, angle_deg=90, ref_mm=(0, -3.1)),
+        "R70": Place(x_mm=40.5, y_mm=69.5, angle_deg=90, ref_mm=(2.5, 0)),
+        "R71": Place(x_mm=40.5, y_mm=73.4, angle_deg=90, ref_mm=(2.5, 0)),
+        "C13": Place(x_mm=27.5, y_mm=64.5),
+        "TP3": Place(x_mm=47.0, y_mm=91.8),
+    },
+}  # fmt: skip
+
+_TEXTS: list[Label] = [
+    Label(layer="F.SilkS", text="BluePill to Pioneer adapter", at_mm=(25.0, 3.2), size_mm=1.4),
+    Label(layer="F.SilkS", text="+12V-", at_mm=(13.54, 87.9), size_mm=1.5),
+    Label(layer="F.SilkS", text="+5V-", at_mm=(27.54, 87.9), size_mm=1.5),
+    Label(layer="F.SilkS", text="11-14.8V", at_mm=(13.0, 86.2), size_mm=0.9),
+    Label(layer="F.SilkS", text="12V", at_mm=(57.0, 82.0), size_mm=0.9, justify="left"),
+    Label(layer="F.SilkS", text="BANK", at_mm=(57.0, 87.08), size_mm=0.8, justify="left"),
+    Label(layer="F.SilkS", text="MODE", at_mm=(60.5, 57.4), size_mm=0.9),
+    Label(layer="F.SilkS", text="PWR", at_mm=(53.6, 96.5), size_mm=0.9),
+    Label(layer="F.SilkS", text="TX", at_mm=(96.0, 63.9), size_mm=0.9),
+    Label(layer="F.SilkS", text="RX", at_mm=(96.0, 68.9), size_mm=0.9),
+    Label(layer="F.SilkS", text="HOST (RS-232 plug, DTE)", at_mm=(76.0, 98.2), size_mm=1.0),
+    Label(layer="F.SilkS", text="LOGIC", at_mm=(36.7, 12.4), size_mm=1.0),
+    Label(layer="F.SilkS", text="3.3V only", at_mm=(36.7, 49.3), size_mm=0.8),
+]  # fmt: skip
+_TEXTS_OF: dict[str, list[Label]] = {
+    "rev-b": [Label(layer="F.SilkS", text="REV B", at_mm=(50.0, 3.2), size_mm=1.6)],
+    "rev-c": [],
+    "lm317": [
+        Label(layer="F.SilkS", text="REV B LM317", at_mm=(50.0, 3.2), size_mm=1.2),
+        Label(layer="F.SilkS", text="5V: 150mA, peaks 250mA", at_mm=(50.0, 5.4), size_mm=0.8),
+    ],
+}

@@ -1,0 +1,1 @@
+"""Every file made of the design: schematic, board, bill of materials, pictures."""

@@ -1,0 +1,106 @@
+"""What was said on a P2OS line, by whom and when: chunks of bytes with time and direction.
+
+A capture knows nothing of frames; `p2os.capture.listing` finds them. Where a
+source tells no direction (raw bytes, plain hex), a chunk has none and each
+frame's is guessed from its shape.
+
+Invariant: chunks are in the order in which they were read, and time never runs back.
+"""
+
+from collections.abc import Iterable
+from dataclasses import dataclass, field
+from enum import Enum
+
+from p2os.errors import LocalProtocolError
+from p2os.timing import Nanos
+
+
+class Direction(Enum):
+    """Who spoke."""
+
+    #: From the client to the robot: commands.
+    TO_ROBOT = "c2r"
+    #: From the robot to its client: packets.
+    FROM_ROBOT = "r2c"
+
+    @property
+    def opposite(self) -> "Direction":
+        """The other one."""
+        return Direction.FROM_ROBOT if self is Direction.TO_ROBOT else Direction.TO_ROBOT
+
+    @property
+    def arrow(self) -> str:
+        """`>` to the robot, `<` from it."""
+        return ">" if self is Direction.TO_ROBOT else "<"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Chunk:
+    """Bytes that arrived together.
+
+    Args:
+        at_ns: When, in nanoseconds since the capture's start.
+        direction: Who sent them, or None where the source does not tell.
+        data: The bytes.
+
+    Raises:
+        LocalProtocolError: The time is negative.
+    """
+
+    at_ns: Nanos
+    direction: Direction | None
+    data: bytes
+
+    def __post_init__(self) -> None:
+        if self.at_ns < 0:
+            raise LocalProtocolError(f"a chunk at {self.at_ns} ns: time begins at 0")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Capture:
+    """A recorded conversation.
+
+    Args:
+        chunks: In the order of time.
+        has_time: Whether the source told times; without, all are 0.
+        note: Free text, such as which robot and program were recorded.
+    """
+
+    chunks: tuple[Chunk, ...] = ()
+    has_time: bool = True
+    note: str = ""
+
+    @property
+    def duration_ns(self) -> Nanos:
+        """When the last chunk came, in nanoseconds."""
+        return self.chunks[-1].at_ns if self.chunks else 0
+
+    def bytes_of(self, direction: Direction | None) -> bytes:
+        """Return all that was sent one way, joined."""
+        return b"".join(chunk.data for chunk in self.chunks if chunk.direction is direction)
+
+
+@dataclass(slots=True)
+class CaptureBuilder:
+    """Collects chunks whose times may step back a little, as clocks of captures do."""
+
+    chunks: list[Chunk] = field(default_factory=list)
+    _last_ns: Nanos = 0
+
+    def add(self, at_ns: Nanos, direction: Direction | None, data: bytes) -> None:
+        """Take bytes; a time before the last one is moved up to it."""
+        self._last_ns = max(self._last_ns, at_ns)
+        if data:
+            self.chunks.append(Chunk(at_ns=self._last_ns, direction=direction, data=data))
+
+    def build(self, *, has_time: bool = True, note: str = "") -> Capture:
+        """Return the capture."""
+        return Capture(chunks=tuple(self.chunks), has_time=has_time, note=note)
+
+
+def capture_of(chunks: Iterable[tuple[Nanos, Direction | None, bytes]], *, has_time: bool = True) -> Capture:
+    """Return a capture of (nanoseconds, direction, bytes)."""
+    builder = CaptureBuilder()
+    for at_ns, direction, data in chunks:
+        builder.add(at_ns, direction, data)
+    return builder.build(has_time=has_time)

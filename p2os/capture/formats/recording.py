@@ -1,0 +1,103 @@
+"""Recordings as JSON lines: ours, those of run folders, and those of other recorders.
+
+Ours: a first line `{"format": "p2os-recording", "version": 1, "note": …}`, then
+one object a chunk: `t` nanoseconds since the start, `dir` `c2r` or `r2c`, `hex`.
+A run folder's wire.jsonl is the same without the first line.
+
+Others: `t` seconds, `dir` `c2s`, `s2c` or `event`; events are left out.
+"""
+
+import json
+from collections.abc import Mapping
+
+from p2os.capture.chunks import Capture, CaptureBuilder, Chunk, Direction
+from p2os.errors import FileError
+from p2os.timing import NS_PER_S, Nanos
+
+FORMAT = "p2os-recording"
+VERSION = 1
+#: Spelling of `dir` → who spoke, and the unit of `t` in nanoseconds.
+_DIRECTIONS: Mapping[str, tuple[Direction | None, int]] = {
+    "c2r": (Direction.TO_ROBOT, 1),
+    "r2c": (Direction.FROM_ROBOT, 1),
+    "c2s": (Direction.TO_ROBOT, NS_PER_S),
+    "s2c": (Direction.FROM_ROBOT, NS_PER_S),
+    "event": (None, NS_PER_S),
+}
+#: chosen: eleven days; a larger number of seconds is a mistake of the unit.
+LONGEST_NS: Nanos = 1_000_000 * NS_PER_S
+
+
+def read_recording(text: str) -> Capture:
+    """Read JSON lines of any of the three kinds.
+
+    Raises:
+        FileError: A line is no chunk; the message names it.
+    """
+    builder, note = CaptureBuilder(), ""
+    for number, line in enumerate(text.splitlines(), 1):
+        if not line.strip():
+            continue
+        entry = _object(line, number)
+        if "format" in entry:
+            note = _header(entry, number)
+            continue
+        spelling = entry.get("dir")
+        if not isinstance(spelling, str) or spelling not in _DIRECTIONS:
+            raise FileError(f"line {number}: dir {spelling!r} is none of {', '.join(_DIRECTIONS)}")
+        direction, unit_ns = _DIRECTIONS[spelling]
+        data = _hex(entry.get("hex", ""), number)
+        at_ns = _time(entry.get("t"), unit_ns, number)
+        if direction is not None:
+            builder.add(at_ns, direction, data)
+    return builder.build(note=note)
+
+
+def header_line(note: str = "") -> str:
+    """Return the first line of a recording of ours."""
+    return json.dumps({"format": FORMAT, "version": VERSION, "note": note}) + "\n"
+
+
+def chunk_line(chunk: Chunk) -> str:
+    """Return the line of a chunk in a recording of ours; a chunk without direction is the robot's."""
+    direction = chunk.direction or Direction.FROM_ROBOT
+    return json.dumps({"t": chunk.at_ns, "dir": direction.value, "hex": chunk.data.hex()}) + "\n"
+
+
+def write_recording(capture: Capture) -> str:
+    """Return a capture as a recording of ours."""
+    return header_line(capture.note) + "".join(chunk_line(chunk) for chunk in capture.chunks)
+
+
+def _object(line: str, number: int) -> Mapping[str, object]:
+    try:
+        entry = json.loads(line)
+    except (json.JSONDecodeError, RecursionError) as error:
+        raise FileError(
+            f"line {number} is no JSON object", hint="was the file cut off? delete its last line"
+        ) from error
+    if not isinstance(entry, dict):
+        raise FileError(f"line {number} is no JSON object")
+    return entry
+
+
+def _header(entry: Mapping[str, object], number: int) -> str:
+    if entry["format"] != FORMAT or entry.get("version") != VERSION:
+        said = f"{entry['format']!r} version {entry.get('version')!r}"
+        raise FileError(f"line {number}: {said} is not {FORMAT} version {VERSION}", hint="renew p2os")
+    return str(entry.get("note", ""))
+
+
+def _hex(value: object, number: int) -> bytes:
+    try:
+        return bytes.fromhex(str(value))
+    except ValueError as error:
+        raise FileError(f"line {number}: hex {str(value)[:40]!r} is no hex text") from error
+
+
+def _time(value: object, unit_ns: int, number: int) -> Nanos:
+    if isinstance(value, bool) or not isinstance(value, (int, float)):
+        raise FileError(f"line {number}: t {value!r} is no number")
+    if not 0 <= value * unit_ns <= LONGEST_NS:
+        raise FileError(f"line {number}: t {value!r} is not a time from the start")
+    return round(value * unit_ns)

@@ -1,0 +1,383 @@
+"""A capture as rows: every frame read, every damaged byte told, in the order of time.
+
+Three decoders run side by side: one a direction, and one for bytes whose
+direction the source does not tell. Rows partition what was sent: each byte
+stands in exactly one row, except that a rejected frame's row shows all of its
+bytes, also those that turned out to hold another frame.
+
+Where a recorded session stands, to tell SYNC0 from PULSE and client from robot.
+
+Numbers 0, 1 and 2 mean SYNC0, SYNC1, SYNC2 before a session is open and PULSE,
+OPEN, CLOSE in it: the same bytes. A listener who has not heard the beginning
+knows only once a robot's packet goes by.
+
+Rows as lines for a person: when, which way, what, and what stands in it.
+"""
+
+import math
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass, field
+from enum import Enum
+from typing import cast
+
+from p2os.capture.chunks import Capture, Chunk, Direction
+from p2os.capture.describe import Plain, describe_command, describe_packet
+from p2os.protocol.commands import NEGATIVE, POSITIVE, STRING, CommandNumber
+from p2os.protocol.frames import BadChecksum, BadCount, Decoder, Frame, Item, Noise, Stalled
+from p2os.protocol.packets import IDENTITY_KIND, RESET_KINDS
+from p2os.protocol.profiles import Profile
+from p2os.protocol.sip import HEAD_BYTES, READING_BYTES, SIP_KINDS
+from p2os.robots.parameters import RobotParameters
+from p2os.timing import NS_PER_MS, NS_PER_S, Nanos
+
+SYNC_NAMES = ("SYNC0", "SYNC1", "SYNC2")
+COMMAND_NAMES = ("PULSE", "OPEN", "CLOSE")
+#: chosen: packets that were on their way when CLOSE was sent; three cycles.
+IN_FLIGHT_NS: Nanos = 300 * NS_PER_MS
+
+
+class _State(Enum):
+    CLOSED = "closed"
+    #: The robot has said who it is; the next number 1 is OPEN.
+    SYNCED = "synced"
+    OPEN = "open"
+
+
+class RecordedSession:
+    """Follows one conversation."""
+
+    def __init__(self) -> None:
+        self._state = _State.CLOSED
+        self._closed_at: Nanos | None = None
+
+    @property
+    def is_open(self) -> bool:
+        """Whether a session is open, as far as was heard."""
+        return self._state is _State.OPEN
+
+    def name_of(self, frame: Frame, direction: Direction | None, now: Nanos) -> str:
+        """Take a frame; return its name if it is one of the six, else an empty string."""
+        if direction is Direction.FROM_ROBOT:
+            return self._hear_robot(frame, now)
+        if frame.kind > CommandNumber.CLOSE:
+            return ""
+        if self._state is _State.SYNCED and frame.kind == CommandNumber.OPEN:
+            self._state = _State.OPEN
+        is_command = self._state is _State.OPEN or (bool(frame.data) and frame.kind != CommandNumber.PULSE)
+        if not is_command:
+            return SYNC_NAMES[frame.kind]
+        if frame.kind == CommandNumber.CLOSE:
+            self._state, self._closed_at = _State.CLOSED, now
+        return COMMAND_NAMES[frame.kind]
+
+    def _hear_robot(self, frame: Frame, now: Nanos) -> str:
+        if frame.kind == IDENTITY_KIND and frame.data:
+            self._state = _State.SYNCED
+        elif frame.kind in RESET_KINDS:
+            self._state = _State.CLOSED
+        elif frame.kind > IDENTITY_KIND and (self._closed_at is None or now > self._closed_at + IN_FLIGHT_NS):
+            self._state, self._closed_at = _State.OPEN, None
+        elif frame.kind <= IDENTITY_KIND and not frame.data:
+            self._state = _State.CLOSED
+            return SYNC_NAMES[frame.kind]
+        return ""
+
+
+def guess_direction(frame: Frame) -> Direction | None:
+    """Return who is likely to have sent a frame, by its shape; None where both would send the same bytes."""
+    data = frame.data
+    if frame.kind <= IDENTITY_KIND and not data:
+        return None
+    if frame.kind == IDENTITY_KIND and data.count(b"\0") >= 3 and data[-1:] == b"\0":
+        return Direction.FROM_ROBOT
+    if frame.kind in SIP_KINDS and len(frame.payload) >= HEAD_BYTES:
+        readings = frame.payload[19]
+        if len(frame.payload) >= HEAD_BYTES + READING_BYTES * readings:
+            return Direction.FROM_ROBOT
+    if _is_argument(data):
+        return Direction.TO_ROBOT
+    return Direction.FROM_ROBOT
+
+
+def _is_argument(data: bytes) -> bool:
+    """Tell whether a command's argument may look so: none, an integer, a string, or SETO's lone type byte."""
+    if not data or data in (bytes((POSITIVE,)), bytes((NEGATIVE,))):
+        return True
+    if data[0] in {POSITIVE, NEGATIVE}:
+        return len(data) == 3
+    return data[0] == STRING and len(data) >= 2 and len(data) - 2 - data[1] in {0, 1}
+
+
+#: Longer than any decoder waits for the rest of a frame.
+_LONG_AFTER_NS: Nanos = NS_PER_S
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Reading:
+    """How a capture is to be read: the firmware's family, and whose units."""
+
+    profile: Profile
+    parameters: RobotParameters
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ListingRow:
+    """One frame, or one run of bytes that is none.
+
+    Args:
+        at_ns: When its last byte had come, in nanoseconds since the start.
+        direction: Who sent it; None where nobody can tell.
+        data: Its bytes on the wire.
+        kind: Command number or packet type; None for what is no frame.
+        name: The manual's word, or what is wrong.
+        fields: What stands inside, SI units, in the order of the wire.
+        problem: One sentence about what is wrong; empty for a sound frame.
+    """
+
+    at_ns: Nanos
+    direction: Direction | None
+    data: bytes
+    kind: int | None
+    name: str
+    fields: dict[str, Plain] = field(default_factory=dict)
+    problem: str = ""
+
+    @property
+    def valid(self) -> bool:
+        """Whether this is a sound frame."""
+        return not self.problem
+
+    def as_plain(self) -> dict[str, Plain]:
+        """Return it as JSON wants it: `t` in seconds."""
+        return {
+            "t": self.at_ns / NS_PER_S,
+            "dir": None if self.direction is None else self.direction.value,
+            "type": self.kind,
+            "name": self.name,
+            "fields": self.fields,
+            "valid": self.valid,
+        }
+
+
+class Lister:
+    """Turns chunks into rows as they come.
+
+    Args:
+        reading: How to read what stands in the frames.
+    """
+
+    def __init__(self, reading: Reading) -> None:
+        self._reading = reading
+        self._session = RecordedSession()
+        self._streams: dict[Direction | None, _Stream] = {}
+
+    def take(self, chunk: Chunk) -> Iterator[ListingRow]:
+        """Take a chunk; yield the rows that it completes."""
+        if chunk.direction not in self._streams:
+            self._streams[chunk.direction] = _Stream(chunk.direction)
+        yield from self.advance_to(chunk.at_ns)
+        stream = self._streams[chunk.direction]
+        stream.decoder.receive(chunk.data, chunk.at_ns)
+        yield from self._drain(stream, chunk.at_ns)
+
+    def advance_to(self, now: Nanos) -> Iterator[ListingRow]:
+        """Yield what has been given up by `now` nanoseconds: frames whose rest never came."""
+        for stream in self._streams.values():
+            stream.decoder.advance_to(now)
+            yield from self._drain(stream, now)
+
+    def finish(self, now: Nanos) -> Iterator[ListingRow]:
+        """Yield what was left when the capture ended."""
+        for stream in self._streams.values():
+            stream.decoder.advance_to(now + _LONG_AFTER_NS)
+            yield from self._drain(stream, now)
+
+    def _drain(self, stream: "_Stream", now: Nanos) -> Iterator[ListingRow]:
+        while (item := stream.decoder.next_item()) is not None:
+            row = self._row(stream, item, now)
+            if row is not None:
+                yield row
+
+    def _row(self, stream: "_Stream", item: Item, now: Nanos) -> ListingRow | None:
+        if isinstance(item, Frame):
+            stream.consume(len(item.to_bytes()))
+            return self._frame_row(stream.direction, item, now)
+        if isinstance(item, Noise):
+            shown = stream.consume_noise(item.data)
+            if not shown:
+                return None
+            return _damage(stream, now, shown, "noise", f"{len(shown)} bytes outside any frame")
+        if isinstance(item, BadChecksum):
+            stream.reject(len(item.data))
+            problem = f"checksum: 0x{item.expected:04X} expected, got 0x{item.got:04X}"
+            return _damage(stream, now, item.data, "bad checksum", problem)
+        if isinstance(item, BadCount):
+            data = b"\xfa\xfb" + bytes((item.count,))
+            stream.reject(len(data))
+            return _damage(stream, now, data, "bad count", f"count {item.count}: frames have 3 to 204")
+        stream.reject(len(item.data))
+        return _damage(stream, now, item.data, "cut off", _cut_off(item))
+
+    def _frame_row(self, direction: Direction | None, frame: Frame, now: Nanos) -> ListingRow:
+        if direction is None:
+            direction = guess_direction(frame)
+        sync_name = self._session.name_of(frame, direction, now)
+        if direction is Direction.FROM_ROBOT:
+            name, fields = describe_packet(frame, self._reading.profile, self._reading.parameters)
+        else:
+            name, fields = describe_command(frame)
+        return ListingRow(
+            at_ns=now, direction=direction, data=frame.to_bytes(), kind=frame.kind, name=sync_name or name,
+            fields=fields,
+        )  # fmt: skip
+
+
+def rows_of(capture: Capture, reading: Reading) -> Iterator[ListingRow]:
+    """Yield every row of a capture."""
+    lister = Lister(reading)
+    for chunk in capture.chunks:
+        yield from lister.take(chunk)
+    yield from lister.finish(capture.duration_ns)
+
+
+class FrameCutter:
+    """Cuts chunks at frames as they come: one chunk a frame, or a run of bytes that is none.
+
+    Nothing is lost: all that comes out, joined by direction, is all that went in.
+    """
+
+    def __init__(self) -> None:
+        self._decoders: dict[Direction | None, Decoder] = {}
+        self._last: Nanos = 0
+
+    def take(self, chunk: Chunk) -> Iterator[Chunk]:
+        """Take a chunk; yield what it completes, with its time."""
+        decoder = self._decoders.setdefault(chunk.direction, Decoder())
+        self._last = chunk.at_ns
+        decoder.receive(chunk.data, self._last)
+        yield from self._cut(decoder, chunk.direction)
+
+    def finish(self) -> Iterator[Chunk]:
+        """Yield what was begun and never completed."""
+        for direction, decoder in self._decoders.items():
+            decoder.advance_to(self._last + _LONG_AFTER_NS)
+            yield from self._cut(decoder, direction)
+
+    def _cut(self, decoder: Decoder, direction: Direction | None) -> Iterator[Chunk]:
+        while (item := decoder.next_item()) is not None:
+            if isinstance(item, (Frame, Noise)):
+                data = item.data if isinstance(item, Noise) else item.to_bytes()
+                yield Chunk(at_ns=self._last, direction=direction, data=data)
+
+
+def frame_chunks(chunks: Iterable[Chunk]) -> Iterator[Chunk]:
+    """Yield the same bytes cut at frames."""
+    cutter = FrameCutter()
+    for chunk in chunks:
+        yield from cutter.take(chunk)
+    yield from cutter.finish()
+
+
+class _Stream:
+    """One direction's decoder, and how far its bytes were told."""
+
+    def __init__(self, direction: Direction | None) -> None:
+        self.direction = direction
+        self.decoder = Decoder()
+        self._place = 0
+        #: Bytes before this place were shown in the row of a rejected frame.
+        self._shown_to = 0
+
+    def consume(self, size: int) -> None:
+        self._place += size
+
+    def consume_noise(self, data: bytes) -> bytes:
+        """Return what of the noise was not shown yet."""
+        new = data[max(0, self._shown_to - self._place) :]
+        self._place += len(data)
+        return new
+
+    def reject(self, size: int) -> None:
+        self._shown_to = max(self._shown_to, self._place + size)
+
+
+def _damage(stream: _Stream, now: Nanos, data: bytes, name: str, problem: str) -> ListingRow:
+    fields: dict[str, Plain] = {"bytes": data.hex(" "), "problem": problem}
+    return ListingRow(
+        at_ns=now, direction=stream.direction, data=data, kind=None, name=name, fields=fields, problem=problem
+    )  # fmt: skip
+
+
+def _cut_off(item: Stalled) -> str:
+    if len(item.data) < 3:
+        return "a header whose frame never came"
+    return f"{len(item.data)} of {item.data[2] + 3} bytes came"
+
+
+#: The longest run of bytes shown in one line; `--explain` shows all.
+SHOWN_BYTES = 24
+
+
+def line_of(row: ListingRow, *, has_time: bool = True) -> str:
+    """Return a row as one line."""
+    time = f"{row.at_ns / NS_PER_S:10.6f} s  " if has_time else ""
+    arrow = " " if row.direction is None else row.direction.arrow
+    if not row.valid:
+        return f"{time}{arrow} !! {row.name}: {row.problem}: {_hex(row.data)}"
+    return f"{time}{arrow} {row.name}{_inside(row)}"
+
+
+def summary_of(rows: int, damaged: int, capture_s: float) -> str:
+    """Return the last line of a listing."""
+    packets = rows - damaged
+    text = f"{packets} packet{'' if packets == 1 else 's'}"
+    if capture_s > 0:
+        text += f" in {capture_s:.3f} s"
+    return f"{text}, {damaged} damaged" if damaged else f"{text}, none damaged"
+
+
+def _inside(row: ListingRow) -> str:
+    if "x_m" in row.fields:
+        return f"  {_sip(row.fields)}"
+    if "argument" in row.fields and not set(row.fields) - {"argument", "unit"}:
+        return f" {row.fields['argument']} {row.fields.get('unit', '')}".rstrip()
+    if "text" in row.fields:
+        return f' "{row.fields["text"]}" ({row.fields["argument"]})'
+    inside = {name: value for name, value in row.fields.items() if name not in {"argument", "unit"}}
+    shown = ", ".join(f"{name} {_value(value)}" for name, value in inside.items())
+    unit = f", each x {row.fields['unit']}" if "unit" in row.fields else ""
+    return f"  {shown}{unit}" if shown else ""
+
+
+def _sip(fields: dict[str, Plain]) -> str:
+    number = {name: value for name, value in fields.items() if isinstance(value, (int, float))}
+    text = (
+        f"x {number['x_m']:.3f} m, y {number['y_m']:.3f} m, heading {math.degrees(number['heading_rad']):.1f} deg, "
+        f"wheels {number['left_mps']:.3f} {number['right_mps']:.3f} m/s, {number['battery_v']:.1f} V"
+    )
+    stalls = [side for side in ("left", "right") if fields[f"stall_{side}"]]
+    if stalls:
+        text += f", stalled {' and '.join(stalls)}"
+    sonar = cast("dict[str, float]", fields["sonar_m"])
+    if sonar:
+        text += ", sonar " + " ".join(f"{place}:{range_m:.3f}" for place, range_m in sonar.items()) + " m"
+    return text
+
+
+def _value(value: Plain) -> str:
+    if isinstance(value, str):
+        return value if value and " " not in value else f'"{value}"'
+    if isinstance(value, list):
+        return "[" + " ".join(_value(item) for item in value) + "]"
+    if isinstance(value, dict):
+        return "{" + " ".join(f"{key}:{_value(item)}" for key, item in value.items()) + "}"
+    if value is None:
+        return "none"
+    if isinstance(value, bool):
+        return "yes" if value else "no"
+    return str(value)
+
+
+def _hex(data: bytes) -> str:
+    shown = data[:SHOWN_BYTES].hex(" ")
+    return shown if len(data) <= SHOWN_BYTES else f"{shown} … ({len(data)} bytes)"

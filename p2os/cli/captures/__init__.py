@@ -1,0 +1,1 @@
+"""Verbs for recorded conversations: take them, read them, play them, convert them."""

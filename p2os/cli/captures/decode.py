@@ -1,0 +1,84 @@
+"""`p2os decode`: bytes of any origin, as readable lines, as JSON, or byte by byte."""
+
+import json
+import sys
+from collections.abc import Iterator
+from typing import Annotated
+
+import typer
+
+from p2os.capture import Capture, ListingRow, Reading, explain, read_argument, read_capture, rows_of
+from p2os.capture.explain import lines_of
+from p2os.capture.listing import line_of, summary_of
+from p2os.cli.captures.reading import DIRECTION_HELP, PROFILE_HELP, ROBOT_HELP, direction_of, reading_of
+from p2os.errors import UsageError
+from p2os.protocol.profiles import Profile
+from p2os.timing import NS_PER_S
+
+HELP = """Show what stands in P2OS bytes.
+
+SOURCE is a file, the folder of a run, hex text, or - for stdin. Files may be
+recordings of p2os, JSON lines of others, pcap or pcapng, hex text (also of xxd
+and hexdump -C), or raw bytes.
+
+\b
+Examples:
+  p2os decode fa fb 06 0b 3b c8 00 d3 3b          one line: VEL 200
+  p2os decode --explain fafb03000000              every byte in words
+  p2os decode session.jsonl                       a recording, one line a packet
+  p2os decode trace.pcap --json | jq .name        one JSON object a packet
+  p2os decode dump.bin --dir r2c --robot p3dx --profile ARCOS
+  p2os decode session.jsonl --only damaged        what was wrong on the line
+
+> goes to the robot, < comes from it, !! is damaged. The exit code is 0 also when
+frames are damaged: that is a result.
+"""
+
+
+def register(app: typer.Typer) -> None:
+    """Add the verb."""
+    app.command("decode", help=HELP)(decode)
+
+
+def decode(
+    source: Annotated[list[str], typer.Argument(help="File, folder, hex text, or - for stdin.", metavar="SOURCE")],
+    json_output: Annotated[bool, typer.Option("--json", help="Print one JSON object a packet.")] = False,
+    explained: Annotated[bool, typer.Option("--explain", help="Say what every byte means.")] = False,
+    only: Annotated[
+        str, typer.Option("--only", help="Names to show, comma-separated, such as SIP,VEL or damaged.", metavar="NAMES")
+    ] = "",
+    direction: Annotated[str, typer.Option("--dir", help=DIRECTION_HELP)] = "auto",
+    robot: Annotated[str, typer.Option(help=ROBOT_HELP)] = "",
+    profile: Annotated[Profile | None, typer.Option(help=PROFILE_HELP)] = None,
+) -> None:
+    """Print what stands in a capture."""
+    if json_output and explained:
+        raise UsageError("--json and --explain exclude each other", hint="--json already holds every field")
+    said_by = direction_of(direction)
+    capture = read_capture(sys.stdin.buffer.read(), said_by) if source == ["-"] else read_argument(source, said_by)
+    reading = reading_of(capture, robot=robot, profile=profile)
+    wanted = {name.strip().lower() for name in only.split(",") if name.strip()}
+    shown = damaged = 0
+    for row in _chosen(rows_of(capture, reading), wanted):
+        shown += 1
+        damaged += not row.valid
+        _show(row, capture, reading, as_json=json_output, explained=explained)
+    if not json_output:
+        sys.stdout.flush()
+        sys.stderr.write(f"{summary_of(shown, damaged, capture.duration_ns / NS_PER_S)}\n")
+
+
+def _chosen(rows: Iterator[ListingRow], wanted: set[str]) -> Iterator[ListingRow]:
+    for row in rows:
+        if not wanted or row.name.lower() in wanted or ("damaged" in wanted and not row.valid):
+            yield row
+
+
+def _show(row: ListingRow, capture: Capture, reading: Reading, *, as_json: bool, explained: bool) -> None:
+    if as_json:
+        typer.echo(json.dumps(row.as_plain()))
+        return
+    typer.echo(line_of(row, has_time=capture.has_time))
+    if explained:
+        for line in lines_of(explain(row, reading)):
+            typer.echo(line)

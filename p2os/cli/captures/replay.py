@@ -1,0 +1,167 @@
+"""`p2os replay`: play a recorded conversation again, as its robot or as its client."""
+
+import contextlib
+import sys
+from enum import Enum
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from p2os.capture import Capture, Direction, frame_chunks, read_file
+from p2os.capture.replay import Replay, Tap, frame_of
+from p2os.cli.holding import hold_robot
+from p2os.cli.line_wait import LONGEST_WAIT_NS, wait_for_line
+from p2os.cli.signals import postponed
+from p2os.client import ClientSettings
+from p2os.errors import FileError, RemoteProtocolError, RunFailedError, TransportError, UsageError
+from p2os.protocol.commands import CommandNumber
+from p2os.timing import NS_PER_S, Nanos
+from p2os.transport import listen_url, open_url
+from p2os.transport.ports import HungUpError, Listener, Transport
+from p2os.transport.waiting import wait_readable
+from p2os.transport.wall_clock import Clock, GapWatch, wall_clock
+
+HELP = """Play a recorded conversation again.
+
+As the robot, it waits for a client at URL and tells it what the recorded robot
+said. As the client, it connects to a robot at URL and sends what the recorded
+client sent: the robot MOVES as it did. The handshake keeps in step with the far
+side; all else comes at its recorded time. At the end, on Ctrl-C and on any error
+a robot whose session is still open is told STOP, VEL 0 and CLOSE.
+
+\b
+Examples:
+  p2os replay talk.jsonl tcp:127.0.0.1:8101                 be the recorded robot
+  p2os replay talk.jsonl pty:/tmp/robot --speed 2           twice as fast
+  p2os replay talk.pcap tcp:127.0.0.1:8101 --as client      drive a robot as then
+  p2os replay talk.jsonl serial:/dev/ttyUSB0 --as client --yes
+"""
+#: chosen: three times what clients wait for the answer to a SYNC.
+PATIENCE_NS: Nanos = 3 * NS_PER_S
+#: A robot that has said nothing for so long is lost, as it is to a client.
+SILENCE_NS: Nanos = ClientSettings().liveness_ns
+#: Speeds that are refused are mistakes.
+SLOWEST, FASTEST = 0.01, 100.0
+#: Commands that move a robot whose motors are on.
+MOTION = frozenset({
+    CommandNumber.MOVE, CommandNumber.ROTATE, CommandNumber.VEL, CommandNumber.HEAD, CommandNumber.DHEAD,
+    CommandNumber.RVEL, CommandNumber.DCHEAD, CommandNumber.VEL2, CommandNumber.LATVEL,
+})  # fmt: skip
+
+
+class Side(Enum):
+    """Whom to be."""
+
+    ROBOT = "robot"
+    CLIENT = "client"
+
+    @property
+    def role(self) -> Direction:
+        """Whose bytes are sent."""
+        return Direction.FROM_ROBOT if self is Side.ROBOT else Direction.TO_ROBOT
+
+
+def play(
+    replay: Replay,
+    transport: Transport,
+    role: Direction,
+    *,
+    clock: Clock = wall_clock,
+    patience_ns: Nanos = PATIENCE_NS,
+) -> None:
+    """Play one side over a line until all was said; leave a robot standing and closed.
+
+    Raises:
+        RemoteProtocolError: As the client: the robot does not answer the handshake, or has fallen silent.
+        RunFailedError: As the client: this program or its machine paused.
+        TransportError: The line was lost.
+    """
+    tap, is_client = Tap(), role is Direction.TO_ROBOT
+    try:
+        replay.start(clock())
+        gaps, heard_at = GapWatch(clock()), None
+        while replay.frames_left:
+            now = clock()
+            if (gap_ns := gaps.gap(now)) and is_client:
+                raise RunFailedError(f"paused for {gap_ns / NS_PER_S:.1f} s: the recorded times have gone by")
+            replay.advance_to(now)
+            for data in replay.take_output():
+                tap.hear(role, data, now)
+                transport.write(data)
+            if is_client and replay.waited(now) > patience_ns:
+                raise RemoteProtocolError(
+                    f"{transport.description} does not give {replay.awaited}, as in the recording",
+                    hint="is a robot behind it? (p2os info URL)",
+                )
+            if is_client and heard_at is not None and now - heard_at > SILENCE_NS:
+                raise RemoteProtocolError(
+                    f"no packet for {(now - heard_at) / NS_PER_S:.1f} s", hint="is the robot on, and the cable in?"
+                )
+            wait_for_line(transport, replay.next_deadline(), now, gaps)
+            data, now = transport.read(), clock()
+            heard_at = now if data else heard_at
+            tap.hear(role.opposite, data, now)
+            replay.receive(data, now)
+    finally:
+        with postponed():
+            if is_client and (farewell := tap.farewell()):
+                with contextlib.suppress(TransportError):
+                    transport.write(farewell)
+
+
+def motions_of(capture: Capture) -> int:
+    """Return how many commands of a capture move a robot."""
+    frames = (frame_of(piece) for piece in frame_chunks(capture.chunks) if piece.direction is Direction.TO_ROBOT)
+    return sum(frame is not None and frame.kind in MOTION for frame in frames)
+
+
+def register(app: typer.Typer) -> None:
+    """Add the verb."""
+    app.command("replay", help=HELP)(replay)
+
+
+def replay(
+    file: Annotated[Path, typer.Argument(help="Recording, JSON lines, pcap, or a run's folder.", metavar="FILE")],
+    url: Annotated[str, typer.Argument(help="Where the far side is, or comes.", metavar="URL")],
+    side: Annotated[Side, typer.Option("--as", help="Whom to be.")] = Side.ROBOT,
+    speed: Annotated[float, typer.Option(help="2: twice as fast.", min=SLOWEST, max=FASTEST)] = 1.0,
+    yes: Annotated[bool, typer.Option("--yes", help="Do not ask before moving a robot on a serial port.")] = False,
+) -> None:
+    """Play a recording."""
+    capture = read_file(file)
+    player = Replay(capture, side.role, speed=speed)
+    if not player.frames_left:
+        who = "robot" if side is Side.ROBOT else "client"
+        raise FileError(f"{file} holds nothing that a {who} said", hint="p2os decode shows what it holds")
+    frames = player.frames_left
+    if side is Side.CLIENT:
+        _ask(motions_of(capture), url, yes=yes)
+        hold_robot()
+        transport = open_url(url)
+    else:
+        listener = listen_url(url)
+        sys.stderr.write(f"waiting for a client on {listener.description}; Ctrl-C ends\n")
+        transport = _first(listener)
+    with contextlib.closing(transport):
+        try:
+            play(player, transport, side.role)
+        except HungUpError as error:
+            sent = frames - player.frames_left
+            raise TransportError(f"after {sent} of {frames} frames: {error}", hint=error.hint) from error
+    sys.stderr.write(f"{frames} frames sent\n")
+
+
+def _ask(motions: int, url: str, *, yes: bool) -> None:
+    if not motions or yes or not url.startswith("serial:"):
+        return
+    if not sys.stdin.isatty():
+        raise UsageError(f"the recording holds {motions} motion commands for the robot on {url}", hint="add --yes")
+    typer.confirm(f"The robot will move: {motions} motion commands. Is there room?", abort=True, err=True)
+
+
+def _first(listener: Listener) -> Transport:
+    while (transport := listener.accept()) is None:
+        descriptor = listener.fileno()
+        wait_readable(() if descriptor is None else (descriptor,), listener.poll_s or LONGEST_WAIT_NS / NS_PER_S)
+    return transport

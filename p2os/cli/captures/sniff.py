@@ -1,0 +1,314 @@
+"""`p2os sniff`: sit between a client and a robot, and show or record what they say.
+
+The loop of `p2os sniff`: bytes from a client to a robot and back, and heard on the way.
+
+One client at a time; each gets its own line to the robot. When either side
+goes, the other is let go too, and a robot whose session was open is brought to
+a stand first. So it is when the bridge itself has paused (the machine slept, the
+process was stopped): what a client said before is old news, and never passed on.
+
+Invariant: bytes are passed on before anything is shown or recorded.
+"""
+
+import contextlib
+import json
+import sys
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from p2os.capture import Chunk, Direction, Lister, ListingRow, Reading
+from p2os.capture.listing import line_of, summary_of
+from p2os.capture.replay import Tap
+from p2os.cli.captures.capture_files import PcapFile, RecordingFile, Sink, Sinks
+from p2os.cli.captures.reading import DEFAULT_ROBOT
+from p2os.cli.holding import hold_robot
+from p2os.cli.quantities import parse_duration
+from p2os.cli.signals import postponed
+from p2os.errors import TransportError
+from p2os.protocol.profiles import Profile
+from p2os.robots.parameters import load_parameters
+from p2os.timing import NS_PER_MS, NS_PER_S, Nanos
+from p2os.transport import listen_url, open_url
+from p2os.transport.ports import Listener, Transport
+from p2os.transport.waiting import BLIND_POLL_S, wait_readable
+from p2os.transport.wall_clock import Clock, GapWatch, wall_clock
+
+#: chosen: how soon the loop notices that it should end.
+LONGEST_WAIT_S = 0.2
+#: From HOSTBAUD to our own change of speed: the command has to leave at the old one. ARIA waits 10 ms.
+BAUD_DELAY_NS: Nanos = 20 * NS_PER_MS
+
+
+class Bridge:
+    """Joins the clients of a listener to a robot.
+
+    Args:
+        listener: Where clients come.
+        robot: The line to the robot for the first client: opened early, so that its absence shows at once.
+        open_robot: Opens a line to the robot for each further client.
+        on_chunk: Told all that goes by.
+        on_event: Told who comes and goes.
+        clock: Nanoseconds that never run back.
+    """
+
+    def __init__(
+        self,
+        listener: Listener,
+        robot: Transport,
+        open_robot: Callable[[], Transport],
+        *,
+        on_chunk: Callable[[Chunk], None],
+        on_event: Callable[[str], None],
+        clock: Clock = wall_clock,
+    ) -> None:
+        self._listener = listener
+        self._open_robot = open_robot
+        self._on_chunk = on_chunk
+        self._on_event = on_event
+        self._clock = clock
+        self._start = clock()
+        self._gaps = GapWatch(self._start)
+        self._woke_at = self._start
+        self._client: Transport | None = None
+        self._robot: Transport | None = None
+        self._spare: Transport | None = robot
+        self._tap = Tap()
+        self._baud_due: Nanos | None = None
+        #: How many clients have come and gone.
+        self.sessions = 0
+
+    @property
+    def now(self) -> Nanos:
+        """Nanoseconds since the bridge was made."""
+        return self._clock() - self._start
+
+    def run(self, until: Callable[[], bool]) -> None:
+        """Join until `until` says so or an exception (Ctrl-C) ends it; then let both go."""
+        try:
+            while not until():
+                self.turn()
+        finally:
+            with postponed():
+                self.close()
+
+    def turn(self) -> None:
+        """Wait for bytes or a client, and pass on what came."""
+        self._wait()
+        self._woke_at = self._clock()
+        gap_ns = self._gaps.gap(self._woke_at)
+        if gap_ns and self._tap.farewell():
+            self._part(f"the bridge paused for {gap_ns / NS_PER_S:.1f} s")
+        if self._client is None:
+            self._welcome()
+            return
+        self._pass(Direction.TO_ROBOT, self._client)
+        if self._robot is not None:
+            self._pass(Direction.FROM_ROBOT, self._robot)
+        self._change_baud()
+
+    def close(self) -> None:
+        """Let both sides go and stop listening."""
+        try:
+            self._part("the bridge ends")
+        finally:
+            if self._spare is not None:
+                self._spare.close()
+            self._listener.close()
+
+    def _welcome(self) -> None:
+        client = self._listener.accept()
+        if client is None:
+            return
+        try:
+            self._robot = self._robot_line()
+        except TransportError as error:
+            client.close()
+            self._on_event(f"client refused: {error}")
+            return
+        self._client, self._tap, self._baud_due = client, Tap(), None
+        self._on_event(f"client connected: {client.description}")
+
+    def _robot_line(self) -> Transport:
+        """Return the line that was opened early if it still lives, else a new one."""
+        spare, self._spare = self._spare, None
+        if spare is None:
+            return self._open_robot()
+        try:
+            spare.read()  # what a robot said before there was a client is of no use to it
+        except TransportError:
+            spare.close()
+            return self._open_robot()
+        return spare
+
+    def _pass(self, direction: Direction, source: Transport) -> None:
+        target = self._robot if direction is Direction.TO_ROBOT else self._client
+        try:
+            data = source.read()
+        except TransportError as error:
+            self._part(str(error))
+            return
+        if not data or target is None:
+            return
+        chunk, lost = self._tap.hear(direction, data, self.now), ""
+        try:
+            target.write(data)
+        except TransportError as error:
+            lost = str(error)
+        self._on_chunk(chunk)
+        if lost:
+            self._part(lost)
+
+    def _change_baud(self) -> None:
+        if self._tap.new_baud is None or self._robot is None:
+            return
+        if self._baud_due is None:
+            self._baud_due = self.now + BAUD_DELAY_NS
+        elif self.now >= self._baud_due:
+            self._on_event(f"robot told to talk at {self._tap.new_baud} bit/s: following")
+            self._robot.set_baud(self._tap.new_baud)
+            self._tap.new_baud, self._baud_due = None, None
+
+    def _part(self, reason: str) -> None:
+        """Stop the robot if its session is open, and let both sides go."""
+        if self._client is None:
+            return
+        client, robot, self._client, self._robot = self._client, self._robot, None, None
+        farewell = self._tap.farewell()
+        if robot is not None:
+            with contextlib.suppress(TransportError):
+                robot.write(farewell)
+            robot.close()
+        client.close()
+        self.sessions += 1
+        if farewell:
+            self._on_chunk(self._tap.hear(Direction.TO_ROBOT, farewell, self.now))
+            self._on_event("the session was open: sent STOP, VEL 0 and CLOSE")
+        self._on_event(f"client gone: {reason}")
+
+    def _wait(self) -> None:
+        descriptors, longest = [], LONGEST_WAIT_S
+        if self._client is None:
+            listening = self._listener.fileno()
+            if listening is None:
+                longest = self._listener.poll_s or LONGEST_WAIT_S
+            else:
+                descriptors.append(listening)
+        for transport in (self._client, self._robot):
+            if transport is None:
+                continue
+            try:
+                descriptors.append(transport.fileno())
+            except TransportError:
+                longest = BLIND_POLL_S
+        if self._baud_due is not None:
+            longest = min(longest, max(self._baud_due - self.now, 0) / NS_PER_S)
+        self._gaps.expect(self._woke_at + round(longest * NS_PER_S))
+        wait_readable(descriptors, longest)
+
+
+DEFAULT_LISTEN = "tcp:127.0.0.1:8102"
+
+HELP = f"""Sit between a client and a robot, pass everything on, and show or record it.
+
+Let the client connect to the URL of --listen instead of the robot's. When the
+client goes, Ctrl-C ends it or a file cannot be written while a session is open, the
+robot is told STOP, VEL 0 and CLOSE. What is printed never holds the two up: a
+reader that does not read misses lines, and is told how many.
+
+\b
+Examples:
+  p2os sniff serial:/dev/ttyUSB0 --listen pty:/tmp/robot   a client that wants a serial port
+  p2os sniff tcp:127.0.0.1:8101                            listens on {DEFAULT_LISTEN}
+  p2os sniff tcp:127.0.0.1:8101 --out talk.jsonl --quiet   record, show nothing
+  p2os sniff tcp:127.0.0.1:8101 --pcap talk.pcap           for Wireshark
+  p2os sniff --install-dissector                           put p2os.lua where Wireshark finds it
+"""
+
+
+class Screen:
+    """Shows rows on stdout as they come."""
+
+    def __init__(self, reading: Reading, *, as_json: bool, quiet: bool) -> None:
+        self._lister = Lister(reading)
+        self._as_json = as_json
+        self._quiet = quiet
+        self._last_ns = 0
+        self.rows = 0
+        self.damaged = 0
+
+    def take(self, chunk: Chunk) -> None:
+        """Show what a chunk completes."""
+        self._last_ns = chunk.at_ns
+        for row in self._lister.take(chunk):
+            self._show(row)
+
+    def close(self) -> None:
+        """Show what was left."""
+        for row in self._lister.finish(self._last_ns):
+            self._show(row)
+
+    def _show(self, row: ListingRow) -> None:
+        self.rows += 1
+        self.damaged += not row.valid
+        if not self._quiet:
+            typer.echo(json.dumps(row.as_plain()) if self._as_json else line_of(row))
+
+
+def register(app: typer.Typer) -> None:
+    """Add the verb."""
+    app.command("sniff", help=HELP)(sniff)
+
+
+def sniff(
+    url: Annotated[str | None, typer.Argument(help="Where the robot is.", metavar="URL", show_default=False)] = None,
+    listen: Annotated[str, typer.Option(help="Where the client connects.", metavar="URL")] = DEFAULT_LISTEN,
+    out: Annotated[Path | None, typer.Option(help="Record here (JSON lines).", metavar="FILE")] = None,
+    pcap: Annotated[Path | None, typer.Option(help="Record here, for Wireshark.", metavar="FILE")] = None,
+    json_output: Annotated[bool, typer.Option("--json", help="Print one JSON object a packet.")] = False,
+    quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Print no packets.")] = False,
+    once: Annotated[bool, typer.Option("--once", help="End when the first client has gone.")] = False,
+    duration: Annotated[str, typer.Option("--for", help="End after so long.", metavar="TIME")] = "",
+    robot: Annotated[str, typer.Option(help="Robot model, or a TOML file, for units.")] = DEFAULT_ROBOT,
+    profile: Annotated[Profile, typer.Option(help="Firmware family, for layouts.")] = Profile.P2OS,
+    install_dissector: Annotated[
+        bool,
+        typer.Option("--install-dissector", help="Copy the dissector into Wireshark's folder of plug-ins, and end."),
+    ] = False,
+) -> None:
+    """Join clients to a robot until Ctrl-C."""
+    if install_dissector:
+        from p2os.capture.dissector import install
+
+        typer.echo(f"installed {install()}")
+        return
+    if url is None:
+        raise typer.BadParameter("name the robot's URL", param_hint="URL")
+    lasts_ns = parse_duration(duration, "--for") if duration else None
+    reading = Reading(profile=profile, parameters=load_parameters(robot))
+    hold_robot()
+    robot_line = open_url(url)
+    listener = listen_url(listen)
+    screen = Screen(reading, as_json=json_output, quiet=quiet)
+    sinks: list[Sink] = [screen]
+    with Sinks(sinks) as all_sinks:
+        if out is not None:
+            sinks.append(RecordingFile(out, note=f"p2os sniff {url}"))
+        if pcap is not None:
+            sinks.append(PcapFile(pcap, time.time_ns()))
+        bridge = Bridge(listener, robot_line, lambda: open_url(url), on_chunk=all_sinks.take, on_event=_tell)
+        _tell(f"listening on {listener.description} for the robot on {url}; Ctrl-C ends")
+        try:
+            bridge.run(lambda: (once and bridge.sessions > 0) or (lasts_ns is not None and bridge.now >= lasts_ns))
+        finally:
+            with postponed():
+                lasted_s = bridge.now / 1e9
+                all_sinks.close()
+                _tell(summary_of(screen.rows, screen.damaged, lasted_s))
+
+
+def _tell(text: str) -> None:
+    sys.stderr.write(f"{text}\n")

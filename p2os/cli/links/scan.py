@@ -1,0 +1,149 @@
+"""`p2os scan`: look for a robot on every port and at every speed, and say who it is."""
+
+import json
+import sys
+from dataclasses import asdict, dataclass
+from typing import Annotated
+
+import typer
+
+from p2os.cli.holding import held, hold_robot
+from p2os.client import ClientSettings, Connected, ConnectError, Robot
+from p2os.client.settings import BAUDS
+from p2os.errors import P2osError, TransportError, UsageError
+from p2os.robots.parameters import ParametersError, load_parameters
+from p2os.timing import NS_PER_MS, NS_PER_S
+from p2os.transport.serial_port import list_serial_ports
+
+#: Where simulated Pioneers listen.
+SIMULATOR = "tcp:127.0.0.1:8101"
+
+HELP = f"""Look for robots, and say who they are.
+
+Without a URL it tries every serial port of this machine and {SIMULATOR}.
+Each serial port is tried at its own speed and at {", ".join(map(str, BAUDS))} bit/s, which
+takes up to ten seconds a port. A robot that is still streaming to an earlier
+program is stopped; motors stay off. Other devices on the ports get some bytes
+that they will not understand.
+
+\b
+Examples:
+  p2os scan                          every port
+  p2os scan serial:/dev/ttyUSB0      one port, every speed
+  p2os scan tcp:10.0.0.5:8101 --json
+  p2os scan --baud 9600              one speed only
+
+Ends with exit code 1 when nobody answers.
+"""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Found:
+    """A robot and where it is."""
+
+    url: str
+    name: str
+    robot_class: str
+    subclass: str
+    #: What the subclass stands for; empty if it is not known.
+    title: str
+    firmware: str
+    baud: int | None
+    #: From the first SYNC0 of the try that succeeded to the first packet.
+    connect_ms: int
+
+
+def register(app: typer.Typer) -> None:
+    """Add the verb."""
+    app.command("scan", help=HELP)(scan)
+
+
+def scan(
+    urls: Annotated[list[str] | None, typer.Argument(help="Where to look.", metavar="[URL…]")] = None,
+    baud: Annotated[list[int] | None, typer.Option(help="Try this speed only; may be repeated.", metavar="N")] = None,
+    json_output: Annotated[bool, typer.Option("--json", help="Print a JSON list.")] = False,
+) -> None:
+    """Look for robots."""
+    wrong = [rate for rate in baud or [] if not 300 <= rate <= 4_000_000]
+    if wrong:
+        raise UsageError(f"--baud {wrong[0]} is no speed of a serial line", hint=f"one of {', '.join(map(str, BAUDS))}")
+    places = urls or [*(port["url"] for port in list_serial_ports()), SIMULATOR]
+    hold_robot()
+    found = []
+    for place in places:
+        sys.stderr.write(f"{place}: ")
+        try:
+            robot = identify(place, tuple(baud) if baud else BAUDS)
+        except (ConnectError, TransportError) as error:
+            sys.stderr.write(f"no ({error})\n")
+            continue
+        except UsageError:
+            sys.stderr.write("\n")
+            raise
+        sys.stderr.write("a robot\n")
+        found.append(robot)
+    if json_output:
+        typer.echo(json.dumps([asdict(robot) for robot in found], indent=2))
+    else:
+        for robot in found:
+            typer.echo(line_of(robot))
+    if not found:
+        raise P2osError(
+            f"no robot on {len(places)} port{'' if len(places) == 1 else 's'}",
+            hint="is it on, and the cable a null-modem one? p2os ports; docs/troubleshooting.md",
+        )
+
+
+def identify(url: str, bauds: tuple[int, ...] = BAUDS) -> Found:
+    """Return who the robot on a line is.
+
+    Args:
+        url: The line.
+        bauds: Speeds to try on a serial line.
+
+    Raises:
+        UsageError: The URL is none.
+        ConnectError, TransportError: Nobody answers, or there is no such port.
+    """
+    settings = ClientSettings(reconnect=False, auto_enable=False, bauds=bauds, raise_baud=None)
+    took_ns = 0
+
+    def note(notice: object) -> None:
+        nonlocal took_ns
+        if isinstance(notice, Connected):
+            took_ns = notice.took_ns
+
+    robot = Robot(_at_first(url, bauds), settings=settings)
+    robot.on_event(note)
+    with held(robot):
+        identity, config = robot.identity, robot.config
+        firmware = robot.profile.value
+        if config is not None and config.firmware_version:
+            firmware += f" {config.firmware_version}"
+        rate = robot.baud
+    where = url.split("?", maxsplit=1)[0] + (f"?baud={rate}" if rate else "")
+    return Found(
+        url=where, name=identity.name, robot_class=identity.robot_class, subclass=identity.subclass,
+        title=_title(identity.subclass), firmware=firmware, baud=rate, connect_ms=took_ns // NS_PER_MS,
+    )  # fmt: skip
+
+
+def line_of(robot: Found) -> str:
+    """Return a robot as one line."""
+    title = f" ({robot.title})" if robot.title else " (unknown model)"
+    return (
+        f"{robot.url}  {robot.name or '(no name)'}: {robot.robot_class} {robot.subclass}{title}, {robot.firmware}, "
+        f"answered in {robot.connect_ms * NS_PER_MS / NS_PER_S:.2f} s"
+    )
+
+
+def _at_first(url: str, bauds: tuple[int, ...]) -> str:
+    """Return a serial URL with the first of the speeds to try, unless it names one itself."""
+    return f"{url}?baud={bauds[0]}" if url.startswith("serial:") and "?" not in url else url
+
+
+def _title(subclass: str) -> str:
+    try:
+        return load_parameters(subclass.lower()).title
+    except ParametersError:
+        return ""

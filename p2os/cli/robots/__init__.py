@@ -1,0 +1,1 @@
+"""Verbs for one robot at a line: who it is, drive it, send to it, watch it."""

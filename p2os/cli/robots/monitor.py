@@ -1,0 +1,109 @@
+"""`p2os monitor`: a robot's state, drawn as it comes."""
+
+import json
+import sys
+from collections import deque
+from typing import Annotated
+
+import typer
+
+from p2os.capture.describe import plain
+from p2os.cli.holding import held
+from p2os.cli.links.link_quality import LinkQuality
+from p2os.cli.quantities import parse_duration
+from p2os.cli.robots.dashboard import Sight, draw, line_of
+from p2os.client import Notice, PacketArrived, Robot, RobotState
+from p2os.errors import MissingDependencyError
+from p2os.timing import NS_PER_MS, NS_PER_S, Nanos
+from p2os.transport.wall_clock import wall_clock
+
+HELP = """Show a robot's state as it comes, without moving it: pose, speeds, a ring of its
+sonar, battery, bumpers, flags, and how good the link is.
+
+Ctrl-C ends. A lost robot is looked for again. Without a terminal one line a
+packet is printed.
+
+\b
+Examples:
+  p2os monitor tcp:127.0.0.1:8101           the dashboard
+  p2os monitor serial:/dev/ttyUSB0 --for 1min
+  p2os monitor URL --json | jq .battery_v   one JSON object a packet
+"""
+#: How often the picture is renewed; packets come ten times a second.
+PICTURES_PER_S = 10
+NEWS_LINES = 4
+
+
+def register(app: typer.Typer) -> None:
+    """Add the verb."""
+    app.command("monitor", help=HELP)(monitor)
+
+
+def monitor(
+    url: Annotated[str, typer.Argument(help="Where the robot is.", metavar="URL")],
+    duration: Annotated[str, typer.Option("--for", help="End after so long.", metavar="TIME")] = "",
+    robot: Annotated[str, typer.Option(help="Robot model or TOML file, if it is not what the robot says.")] = "",
+    json_output: Annotated[bool, typer.Option("--json", help="Print one JSON object a packet.")] = False,
+) -> None:
+    """Show a robot."""
+    lasts_ns = parse_duration(duration, "--for") if duration else None
+    with held(Robot(url, model=robot or None, auto_enable=False)) as client:
+        if json_output or not sys.stdout.isatty():
+            _print_states(client, lasts_ns, as_json=json_output)
+        else:
+            _show(client, url, lasts_ns)
+
+
+def state_as_plain(state: RobotState) -> dict[str, object]:
+    """Return a state for JSON: SI units, sonar by number, None where there is no echo."""
+    names = ("forward_mps", "turn_radps", "left_mps", "right_mps", "is_moving", "motors_enabled", "battery_v",
+             "stall_left", "stall_right", "front_bumpers", "rear_bumpers", "compass_rad", "analog_v", "digital_in",
+             "digital_out", "stop_button", "state_of_charge", "temperature_c")  # fmt: skip
+    pose = {"x_m": state.pose.x_m, "y_m": state.pose.y_m, "heading_rad": state.pose.heading_rad}
+    sonar = {str(echo.number): echo.range_m if echo.is_echo else None for echo in state.sonar}
+    fields = {"t": state.at_ns / NS_PER_S, **pose, **{name: getattr(state, name) for name in names}, "sonar_m": sonar}
+    return {name: plain(value) for name, value in fields.items()}
+
+
+def words_of(notice: Notice) -> str:
+    """Return what happened, for a person."""
+    name = "".join(f" {letter.lower()}" if letter.isupper() else letter for letter in type(notice).__name__).strip()
+    detail = getattr(notice, "reason", None) or getattr(notice, "text", None) or getattr(notice, "what", None)
+    return f"{name}: {detail}" if detail else name
+
+
+def _print_states(client: Robot, lasts_ns: Nanos | None, *, as_json: bool) -> None:
+    ends = None if lasts_ns is None else wall_clock() + lasts_ns
+    count = 0
+    for state in client.states():
+        typer.echo(json.dumps(state_as_plain(state)) if as_json else line_of(state))
+        count += 1
+        if ends is not None and wall_clock() >= ends:
+            break
+    if not as_json:
+        sys.stderr.write(f"{count} packets\n")
+
+
+def _show(client: Robot, url: str, lasts_ns: Nanos | None) -> None:
+    try:
+        from rich.console import Console
+        from rich.live import Live
+    except ImportError as error:  # pragma: no cover - rich comes with every installation
+        raise MissingDependencyError("the dashboard needs rich", hint="pip install rich, or --json") from error
+    news: deque[str] = deque(maxlen=NEWS_LINES)
+    config = client.config
+    quality = LinkQuality(config.sipcycle * NS_PER_MS if config is not None and config.sipcycle else None)
+    client.on_event(lambda notice: None if isinstance(notice, PacketArrived) else news.append(words_of(notice)))
+    client.on_state(lambda state: quality.packet(state.at_ns))
+    identity = client.identity
+    title = f"{identity.name or 'robot'} ({client.parameters.title}, {client.profile.value}) on {url}"
+    ends = None if lasts_ns is None else wall_clock() + lasts_ns
+    console = Console()
+    with Live(console=console, auto_refresh=False, screen=True) as live:
+        while ends is None or wall_clock() < ends:
+            sight = Sight(
+                title=title, link=client.link, state=client.state, limits=client.limits, parameters=client.parameters,
+                stats=client.stats, quality=quality, news=tuple(news),
+            )  # fmt: skip
+            live.update(draw(sight, console.width), refresh=True)
+            client.sleep(1 / PICTURES_PER_S)

@@ -1,0 +1,1 @@
+"""Verbs for the virtual robot: serve it, and its worlds."""

@@ -1,0 +1,313 @@
+"""`p2os serve`: be a Pioneer on a line, for any P2OS program to drive.
+
+What robots do, a line each, and never a flood of lines: a client that shouts syncs would fill a disk with them.
+
+Invariant: no more than `MOST_LINES` a second of a robot's own time, and what was
+left out is told by number with the next line.
+"""
+
+import contextlib
+import json
+import math
+import os
+import sys
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from functools import partial
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from p2os.cli.printing import queue_output
+from p2os.cli.quantities import parse_duration
+from p2os.errors import UsageError
+from p2os.pioneer.controller.controller import ControllerSettings, SonarPerSip
+from p2os.pioneer.controller.flash import load_flash
+from p2os.pioneer.sensor_errors import load_sensor_errors
+from p2os.pioneer.serve.aux_endpoint import AuxEndpoint
+from p2os.pioneer.serve.control_line import ControlLine, say_on_stderr
+from p2os.pioneer.serve.fleet import Fleet
+from p2os.pioneer.serve.fleet_file import load_fleet
+from p2os.pioneer.serve.fleet_order import (
+    DEFAULT_PORT,
+    MOST_ROBOTS,
+    FleetOrder,
+    MadeFleet,
+    RobotOrder,
+    following_ports,
+    make_fleet,
+    read_aux,
+)
+from p2os.pioneer.serve.host import Host
+from p2os.pioneer.serve.orders import status_line
+from p2os.pioneer.serve.robot_time import RobotTime
+from p2os.pioneer.world.model import Pose
+from p2os.protocol.profiles import Profile
+from p2os.timing import NS_PER_S, Nanos
+from p2os.transport import listen_url
+from p2os.transport.wall_clock import wall_clock
+
+#: chosen: several times what an eager client causes, and still readable.
+MOST_LINES = 50
+
+
+class EventLines:
+    """The lines of one robot.
+
+    Args:
+        write: Takes a line's text, with its end.
+        who: Begins each line after the time; empty for a robot that is alone.
+    """
+
+    def __init__(self, write: Callable[[str], object], who: str = "") -> None:
+        self._write = write
+        self._who = who
+        self._second = -1
+        self._written = 0
+        self._left_out = 0
+
+    def tell(self, now: Nanos, what: str, detail: str) -> None:
+        """Write that something happened, or count it where its second is full."""
+        if now // NS_PER_S != self._second:
+            self._second, self._written = now // NS_PER_S, 0
+        if self._written >= MOST_LINES:
+            self._left_out += 1
+            return
+        self._written += 1
+        if self._left_out:
+            left_out, self._left_out = self._left_out, 0
+            self._line(now, "left out", f"{left_out} lines like the last")
+        self._line(now, what, detail)
+
+    def _line(self, now: Nanos, what: str, detail: str) -> None:
+        self._write(f"{now / NS_PER_S:10.3f} s  {self._who}{what}{': ' if detail else ''}{detail}\n")
+
+
+#: `--control` with this, and no option on a terminal, takes orders from standard input.
+STANDARD_INPUT = "-"
+#: chosen: a tenth of real time is still a debugger's pace; past a hundred no body keeps up.
+SLOWEST, FASTEST = 0.01, 100.0
+#: Options that a fleet's file takes the place of.
+IN_FLEET_FILE = (
+    "port", "robot", "world", "body", "seed", "firmware", "lenient", "all_sonar", "flash", "errors", "baud", "robots",
+    "at", "apart", "aux", "fault", "sync_limit",
+)  # fmt: skip
+
+HELP = f"""Be a Pioneer robot on a line, in real time, until Ctrl-C.
+
+ARIA, player's p2os driver, ROS nodes and this project's own programs connect to
+it as to a real robot. One client at a time; a second one is refused. When a
+client vanishes the robot stops at once and waits for the next. Type "help" while
+it runs to see what can be broken, pressed and asked.
+
+\b
+Examples:
+  p2os serve                          a 2-DX in a room on {DEFAULT_PORT}
+  p2os serve --port tcp:0.0.0.0:8101  the same, for other machines too
+  p2os serve --port pty:/tmp/robot    on a terminal that programs open as a serial port
+  p2os serve --port serial:/dev/ttyUSB0?baud=9600
+  p2os serve --world arena --seed 7   among obstacles scattered from a seed
+  p2os serve --baud 9600              bytes take the time of a real line
+  p2os serve --errors realistic       sonar, odometry and compass err as real ones
+  p2os serve --robots 3               three of them in one room, on ports 8101 to 8103
+  p2os serve --robots 2 --at 0,0 --at 1.5,0,180   face to face
+  p2os serve --fleet fleet.toml       robots of all kinds from a file
+  p2os serve --sync-limit 10s         who does not connect to the robot within 10 s makes room
+  p2os serve --fault "sonar-stuck 3 1.2"   sonar 3 says 1.2 m whatever comes
+"""
+
+
+def register(app: typer.Typer) -> None:
+    """Add the verb."""
+    app.command("serve", help=HELP)(serve)
+
+
+def serve(
+    context: typer.Context,
+    port: Annotated[
+        list[str] | None, typer.Option(help="Where clients find the robot; again for one more.", metavar="URL")
+    ] = None,
+    robot: Annotated[str, typer.Option(help="Robot model, or a TOML file.")] = "p2dx",
+    world: Annotated[str, typer.Option(help="World, or a TOML file.")] = "room",
+    body: Annotated[str, typer.Option(help="Physics: bullet, mujoco, or kinematic (plan view).")] = "bullet",
+    seed: Annotated[int, typer.Option(help="Seed of a scattered world and of every sensor's error.")] = 0,
+    firmware: Annotated[
+        Profile, typer.Option(help="Whose packets it sends; some clients of newer robots need ARCOS.")
+    ] = Profile.P2OS,
+    lenient: Annotated[
+        bool, typer.Option("--lenient", help="Answer syncs in any order and obey any family's commands, as AMRISim.")
+    ] = False,
+    all_sonar: Annotated[
+        bool, typer.Option("--all-sonar", help="Send every sonar in every packet, not two as a Pioneer 2 does.")
+    ] = False,
+    flash: Annotated[Path | None, typer.Option(help="TOML file with the robot's FLASH parameters.")] = None,
+    errors: Annotated[
+        str, typer.Option(help="Sensors' errors: ideal, realistic, or a TOML file.", metavar="NAME")
+    ] = "ideal",
+    baud: Annotated[
+        int | None, typer.Option(help="Speed of the line, bit/s: bytes take that time on pty: and tcp: too.")
+    ] = None,
+    robots: Annotated[int, typer.Option(help="How many, on the ports that follow.", min=1, max=MOST_ROBOTS)] = 1,
+    at: Annotated[
+        list[str] | None,
+        typer.Option(help="Where a robot begins; again for the next. Metres, degrees.", metavar="X,Y[,HEADING]"),
+    ] = None,
+    apart: Annotated[
+        bool, typer.Option("--apart", help="A copy of the world for each robot: they do not meet.")
+    ] = False,
+    fleet: Annotated[
+        Path | None, typer.Option(help="TOML file with the world and every robot.", metavar="FILE")
+    ] = None,
+    speed: Annotated[
+        float, typer.Option(help="Robot seconds a second.", min=SLOWEST, max=FASTEST, metavar="FACTOR")
+    ] = 1.0,
+    aux: Annotated[
+        list[str] | None, typer.Option(help="A line at an AUX port: 1=pty:/tmp/aux1.", metavar="N=URL")
+    ] = None,
+    fault: Annotated[
+        list[str] | None, typer.Option(help='Broken from the start: "sonar-stuck 3 1.2".', metavar="WORDS")
+    ] = None,
+    sync_limit: Annotated[
+        str | None,
+        typer.Option(
+            help="Let a client go that has no open session for so long, as 10s. Default: never.", metavar="TIME"
+        ),
+    ] = None,
+    control: Annotated[
+        str | None, typer.Option(help="Where orders come: a URL, or - for standard input.", metavar="URL")
+    ] = None,
+    status: Annotated[
+        float | None, typer.Option(help="Print each robot's state so often, seconds.", min=0.1, metavar="S")
+    ] = None,
+    json_output: Annotated[bool, typer.Option("--json", help="Print the start line as JSON.")] = False,
+) -> None:
+    """Serve virtual robots until Ctrl-C."""
+    if fleet is not None:
+        _refuse_beside_fleet(context)
+        order = load_fleet(fleet)
+    else:
+        settings = ControllerSettings(
+            profile=firmware, lenient=lenient, sonar_per_sip=SonarPerSip.ALL if all_sonar else SonarPerSip.TWO,
+            errors=load_sensor_errors(errors), baud=baud,
+        )  # fmt: skip
+        if flash is not None:
+            settings = settings.with_flash(load_flash(flash))
+        ports = following_ports(port or [DEFAULT_PORT], robots)
+        if aux and len(ports) > 1:
+            raise UsageError("--aux is for one robot", hint="--fleet FILE gives each robot its own")
+        places = [_place(text) for text in at or ()]
+        if len(places) > len(ports):
+            raise UsageError(f"{len(places)} places for {len(ports)} robots", hint=f"--robots {len(places)}")
+        first = RobotOrder(
+            model=robot, settings=settings, faults=tuple(fault or ()), aux=tuple(read_aux(text) for text in aux or ()),
+            sync_limit_ns=None if sync_limit is None else parse_duration(sync_limit, "--sync-limit"),
+        )  # fmt: skip
+        order = FleetOrder(
+            robots=tuple(
+                replace(first, port=url, at=places[number] if number < len(places) else None)
+                for number, url in enumerate(ports)
+            ),
+            world=world, body=body, seed=seed, apart=apart,
+        )  # fmt: skip
+    made = make_fleet(order)
+    queue_output()
+    with contextlib.ExitStack() as opened:
+        orders = _control(control)
+        if orders is not None:
+            opened.callback(orders.close)
+        hosts = open_hosts(order, made, speed=speed)
+        for host in hosts:
+            opened.callback(host.close)
+        for number, host in enumerate(hosts):
+            _say_start(order, made.starts[number], number, host, as_json=json_output)
+        sys.stdout.flush()
+        if made.note:
+            _write(f"note: {made.note}\n")
+        tick = None if status is None else (status, partial(_show_status, hosts))
+        Fleet(hosts, control=orders, on_tick=tick).run()
+
+
+def open_hosts(order: FleetOrder, made: MadeFleet, *, speed: float = 1.0) -> list[Host]:
+    """Return a host for each robot of a fleet, listening at its port.
+
+    Raises:
+        TransportError: A port is taken or cannot be had; none is kept open then.
+    """
+    shared_time = RobotTime(wall_clock, speed)
+    hosts: list[Host] = []
+    try:
+        for number, (robot, pioneer) in enumerate(zip(order.robots, made.robots, strict=True)):
+            who = f"robot {number + 1}  " if len(made.robots) > 1 else ""
+            pioneer.on_event = on_event = EventLines(_write, who).tell
+            hosts.append(
+                Host(
+                    pioneer, listen_url(robot.port), on_event=on_event, speed=speed,
+                    shared=None if made.multi_robot_world is None else (shared_time, made.multi_robot_world, number),
+                    paced=not robot.port.startswith("serial:"), sync_limit_ns=robot.sync_limit_ns,
+                )
+            )  # fmt: skip
+            hosts[-1].aux = tuple(AuxEndpoint(port, listen_url(url)) for port, url in robot.aux)
+    except BaseException:
+        for host in hosts:
+            host.close()
+        raise
+    return hosts
+
+
+def _place(text: str) -> Pose:
+    """Return the place that a text as `1.5,0,90` names.
+
+    Raises:
+        UsageError: It names none.
+    """
+    hint = "metres and degrees: --at 1.5,0,90 or --at 1.5,0"
+    try:
+        values = [float(part) for part in text.split(",")]
+    except ValueError:
+        values = []
+    if len(values) not in {2, 3} or not all(math.isfinite(value) for value in values):
+        raise UsageError(f"--at {text!r} is no place", hint=hint)
+    return Pose(values[0], values[1], math.radians(values[2]) if len(values) > 2 else 0.0)
+
+
+def _refuse_beside_fleet(context: typer.Context) -> None:
+    for name in IN_FLEET_FILE:
+        source = context.get_parameter_source(name)
+        if source is not None and source.name == "COMMANDLINE":
+            raise UsageError(f"--{name.replace('_', '-')} beside --fleet", hint="the fleet's file says that")
+
+
+def _say_start(order: FleetOrder, start: Pose, number: int, host: Host, *, as_json: bool) -> None:
+    where, model = host.listener.description, order.robots[number].model
+    place = start.x_m, start.y_m, math.degrees(start.heading_rad)
+    if as_json:
+        told = {"url": where, "robot": model, "world": order.world, "body": order.body, "seed": order.seed}
+        typer.echo(json.dumps(told | {"at": [round(value, 6) for value in place]}))
+    else:
+        at = " at {:.2f}, {:.2f} m, {:.0f}°".format(*place) if len(order.robots) > 1 else ""
+        typer.echo(f"{where}  {model} in {order.world}{at}, {order.body} body; Ctrl-C ends")
+    for endpoint in host.aux:
+        who = f"robot {number + 1}" if len(order.robots) > 1 else "the robot"
+        typer.echo(f"AUX{endpoint.port} of {who}: {endpoint.listener.description}", err=as_json)
+
+
+def _control(url: str | None) -> ControlLine | None:
+    if url == STANDARD_INPUT or (url is None and os.isatty(0)):
+        return ControlLine(None, _write)
+    if url is None:
+        return None
+    listener = listen_url(url)
+    _write(f"orders: {listener.description}\n")
+    return ControlLine(listener)
+
+
+def _show_status(hosts: Sequence[Host]) -> None:
+    for number, host in enumerate(hosts, start=1):
+        typer.echo(status_line(number, host))
+    sys.stdout.flush()
+
+
+def _write(text: str) -> None:
+    with contextlib.suppress(OSError):  # a terminal that was closed must not keep the robots from stopping
+        say_on_stderr(text)

@@ -1,0 +1,190 @@
+"""`p2os world`: list, draw, check, make and convert the places a robot can be in."""
+
+import json
+import shutil
+import sys
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from p2os.errors import FileError, MissingDependencyError, UsageError
+from p2os.pioneer.world.drawing import svg, text
+from p2os.pioneer.world.find import known_worlds, load_world
+from p2os.pioneer.world.formats import Placing, read_placed
+from p2os.pioneer.world.makers import KINDS, make_world
+from p2os.pioneer.world.model import World
+from p2os.pioneer.world.writer import write_world
+
+HELP = """List, draw, check, make and convert worlds.
+
+A world is one that ships, a TOML file, or a file of another program: an ARIA
+map, an occupancy image with its YAML, SDF, URDF, OBJ, STL or COLLADA.
+
+\b
+Examples:
+  p2os world list                                 those that ship
+  p2os world show maze                            draw one in the terminal
+  p2os world show room.dae --out room.png         as a picture (.png or .svg)
+  p2os world check my.toml                        find what is wrong, with its line
+  p2os world new --kind maze --seed 7 --out my.toml
+  p2os world convert floor.yaml --out floor.toml
+"""
+#: Widest drawing in a terminal, in characters.
+WIDEST_COLUMNS = 100
+#: Files that may say otherwise which axis is up.
+MESH_SUFFIXES = (".obj", ".stl", ".dae")
+
+WORLD = Annotated[str, typer.Argument(help="A world that ships, or a file.", metavar="FILE|NAME")]
+SEED = Annotated[int, typer.Option(help="Seed of a world that is made from one.")]
+UP = Annotated[
+    str, typer.Option(help="Which axis is up in a mesh file: x, y or z; auto is what its format says or is used to.")
+]
+
+
+def register(app: typer.Typer) -> None:
+    """Add the verb."""
+    world = typer.Typer(help=HELP, rich_markup_mode=None)
+    world.callback(invoke_without_command=True)(_without_verb)
+    world.command("list")(list_worlds)
+    world.command("show")(show)
+    world.command("check")(check)
+    world.command("new")(new)
+    world.command("convert")(convert)
+    app.add_typer(world, name="world", help=HELP)
+
+
+def _without_verb(context: typer.Context) -> None:
+    """List the worlds where nothing else is asked for."""
+    if context.invoked_subcommand is None:
+        list_worlds(json_output=False)
+
+
+def list_worlds(
+    json_output: Annotated[bool, typer.Option("--json", help="Print a JSON object.")] = False,
+) -> None:
+    """List the worlds that ship."""
+    worlds = [load_world(name) for name in known_worlds()]
+    if json_output:
+        typer.echo(json.dumps({world.name: world.description for world in worlds}, indent=2))
+        return
+    for world in worlds:
+        typer.echo(f"{world.name:<10}{_size(world):>14}  {world.description}")
+
+
+def show(
+    world: WORLD,
+    out: Annotated[Path | None, typer.Option(help="Write a picture: .png or .svg.")] = None,
+    seed: SEED = 0,
+    up: UP = "auto",
+) -> None:
+    """Draw a world in the terminal, or into a file."""
+    place = _load(world, seed, up)
+    _tell_skipped(place)
+    if out is None:
+        columns = min(shutil.get_terminal_size((80, 24)).columns, WIDEST_COLUMNS)
+        typer.echo("\n".join(text(place, columns)))
+        typer.echo(_summary(place))
+        return
+    suffix = out.suffix.lower()
+    if suffix not in {".png", ".svg"}:
+        raise UsageError(f"no picture can be written to {out}", hint="--out FILE.png or FILE.svg")
+    try:
+        if suffix == ".svg":
+            out.write_text(svg(place), encoding="utf-8")
+        else:
+            _write_png(place, out)
+    except OSError as error:
+        raise FileError(f"{out}: {error.strerror}") from error
+    typer.echo(f"{out}: {_summary(place)}")
+
+
+def check(world: WORLD, seed: SEED = 0, up: UP = "auto") -> None:
+    """Read a world and say what is in it; an error names its line."""
+    place = _load(world, seed, up)
+    _tell_skipped(place)
+    typer.echo(f"{place.source}: {_summary(place)}")
+
+
+def new(
+    out: Annotated[Path | None, typer.Option(help="The file to write; without it the text is printed.")] = None,
+    kind: Annotated[str, typer.Option(help=f"What to make: {', '.join(KINDS)}.")] = "arena",
+    seed: Annotated[int, typer.Option(help="The same seed makes the same world.")] = 0,
+) -> None:
+    """Make a world from a seed."""
+    _write(make_world(kind, seed), out)
+
+
+def convert(
+    world: WORLD,
+    out: Annotated[Path | None, typer.Option(help="The file to write; without it the text is printed.")] = None,
+    seed: SEED = 0,
+    up: UP = "auto",
+) -> None:
+    """Write any readable world as a TOML file, to be changed by hand."""
+    place = _load(world, seed, up)
+    _tell_skipped(place)
+    _write(place, out)
+
+
+def _load(world: str, seed: int, up: str) -> World:
+    """Return a world; only a mesh file has an up axis to be told."""
+    if up == "auto":
+        return load_world(world, seed)
+    path = Path(world)
+    if path.suffix.lower() not in MESH_SUFFIXES:
+        raise UsageError(f"--up is for a mesh file, not for {world}", hint=f"a file with {', '.join(MESH_SUFFIXES)}")
+    return read_placed(path, Placing(up=up))
+
+
+def _write(place: World, out: Path | None) -> None:
+    if out is None:
+        sys.stdout.write(write_world(place))
+        return
+    if out.suffix.lower() != ".toml":
+        raise UsageError(f"a world cannot be written to {out}", hint="--out FILE.toml")
+    try:
+        out.write_text(write_world(place), encoding="utf-8")
+    except OSError as error:
+        raise FileError(f"{out}: {error.strerror}") from error
+    typer.echo(f"{out}: {_summary(place)}")
+
+
+def _write_png(place: World, out: Path) -> None:
+    from p2os.cli.virtual.world_picture import write_png
+
+    try:
+        write_png(place, out)
+    except ModuleNotFoundError as error:
+        raise MissingDependencyError(
+            f"a PNG needs {error.name}", hint=f"--out {out.with_suffix('.svg')}, or pip install 'p2os[sim]'"
+        ) from error
+
+
+def _summary(place: World) -> str:
+    """Return what a world holds, in a line."""
+    moving = sum(item.walk is not None for item in place.obstacles)
+    pushed = sum(item.mass_kg > 0 for item in place.obstacles)
+    counts = [
+        (len(place.obstacles), "obstacle"), (len(place.meshes), "mesh"), (moving, "that walks"),
+        (pushed, "that can be pushed"),
+    ]  # fmt: skip
+    said = ", ".join(_count(number, what) for number, what in counts if number or what == "obstacle")
+    return f"{place.name}, {_size(place)}: {said}"
+
+
+def _count(number: int, what: str) -> str:
+    if what.startswith("that"):
+        return f"{number} {what if number == 1 else what.replace('walks', 'walk')}"
+    plural = {"mesh": "meshes"}.get(what, f"{what}s")
+    return f"{number} {what if number == 1 else plural}"
+
+
+def _size(place: World) -> str:
+    x0, y0, x1, y1 = place.extent
+    return f"{x1 - x0:.1f} x {y1 - y0:.1f} m"
+
+
+def _tell_skipped(place: World) -> None:
+    for line in place.skipped:
+        sys.stderr.write(f"note: {line}\n")

@@ -1,0 +1,239 @@
+"""One of the robot's own serial ports for asyncio: `AuxStream`'s twin, waiting with `await`.
+
+Bytes to and from the serial ports of the robot itself: TTY2 and GETAUX, and their brothers.
+
+TTY2 passes bytes on. GETAUX n makes the robot send a SERAUXpac when n bytes
+have come; GETAUX 0 empties its buffer (Pioneer 3 manual, commands 42, 43, 60,
+61, 66, 67). So a reader has to ask, for as many as it wants and no more.
+
+One of the robot's own serial ports as a file of bytes (TTY2 and GETAUX behind it).
+"""
+
+import io
+from collections.abc import Awaitable, Callable, Mapping
+from dataclasses import dataclass
+
+from p2os.client.core import RobotCore
+from p2os.client.notices import Notice, PacketArrived
+from p2os.client.robot_thread import RobotThread
+from p2os.errors import UsageError
+from p2os.protocol.commands import Command, CommandNumber
+from p2os.protocol.packets import SerauxPacket
+
+#: The most bytes that one GETAUX may ask for, and that one TTY2 carries here.
+MOST_WANTED, MOST_WRITTEN = 200, 190
+
+
+@dataclass(frozen=True, slots=True)
+class AuxNumbers:
+    """The commands of one port."""
+
+    write: CommandNumber
+    ask: CommandNumber
+
+
+AUX_PORTS: Mapping[int, AuxNumbers] = {
+    1: AuxNumbers(CommandNumber.TTY2, CommandNumber.GETAUX),
+    2: AuxNumbers(CommandNumber.TTY3, CommandNumber.GETAUX2),
+    3: AuxNumbers(CommandNumber.TTY4, CommandNumber.GETAUX3),
+}
+
+
+class AuxBuffer:
+    """What has come from one port, and what has been asked for."""
+
+    def __init__(self, port: int) -> None:
+        if port not in AUX_PORTS:
+            raise UsageError(f"the robot has no AUX port {port}", hint="1, 2 or 3")
+        self.port = port
+        self.numbers = AUX_PORTS[port]
+        self._data = bytearray()
+        self._asked = 0
+
+    def __len__(self) -> int:
+        return len(self._data)
+
+    def writing(self, data: bytes) -> list[Command]:
+        """Return the commands that pass `data` on."""
+        return [
+            Command(self.numbers.write, data[place : place + MOST_WRITTEN])
+            for place in range(0, len(data), MOST_WRITTEN)
+        ]
+
+    def asking(self, size: int, *, again: bool = False) -> Command | None:
+        """Return what asks for enough bytes to have `size`, or None where that was asked already.
+
+        Args:
+            size: Bytes wanted in all.
+            again: Ask anew: the first asking may have been lost.
+        """
+        missing = min(size - len(self._data), MOST_WANTED)
+        if missing <= 0 or (self._asked and not again):
+            return None
+        self._asked = missing
+        return Command(self.numbers.ask, missing)
+
+    def flushing(self) -> Command:
+        """Return what empties the robot's buffer; ours is emptied too."""
+        self._data.clear()
+        self._asked = 0
+        return Command(self.numbers.ask, 0)
+
+    def notice(self, notice: Notice) -> None:
+        """Take what belongs to this port of the client's notices."""
+        packet = notice.packet if isinstance(notice, PacketArrived) else None
+        if isinstance(packet, SerauxPacket) and packet.port == self.port:
+            self.take(packet.data)
+
+    def take(self, data: bytes) -> None:
+        """Take the bytes of a SERAUXpac."""
+        self._data += data
+        self._asked = 0
+
+    def read(self, size: int) -> bytes:
+        """Return at most `size` bytes of those that have come."""
+        data = bytes(self._data[:size])
+        del self._data[:size]
+        return data
+
+
+#: chosen: a GETAUX whose answer has not come for so long is sent again; it may have been lost.
+ASK_AGAIN_S = 1.0
+
+
+class AuxStream(io.RawIOBase):
+    """Bytes to and from a device on the robot.
+
+    `read` waits for as many bytes as it is asked for, at most `timeout_s`, and
+    returns what has come. `io.BufferedRWPair` and `io.TextIOWrapper` fit on top.
+
+    Args:
+        engine: The robot's.
+        port: 1, 2 or 3.
+        timeout_s: How long a read waits; None: for ever.
+    """
+
+    def __init__(self, engine: RobotThread, port: int, timeout_s: float | None = 1.0) -> None:
+        super().__init__()
+        self.timeout_s = timeout_s
+        self._engine = engine
+        self._buffer = AuxBuffer(port)
+        self._end = engine.on_event(self._take)
+
+    def readable(self) -> bool:
+        """Return True."""
+        return True
+
+    def writable(self) -> bool:
+        """Return True."""
+        return True
+
+    def write(self, data: bytes | bytearray | memoryview) -> int:  # type: ignore[override]  # any buffer of bytes
+        """Pass all of `data` on to the device.
+
+        Raises:
+            LinkLostError: no session is open.
+        """
+        for command in self._buffer.writing(bytes(data)):
+            self._engine.call(lambda core, now, command=command: core.send(command, now))  # type: ignore[misc]
+        return len(data)
+
+    def read(self, size: int = -1) -> bytes:
+        """Return `size` bytes, or those that came within `timeout_s`; -1: what has come."""
+        if size >= 0:
+            self._wait(size)
+        with self._engine.changed:
+            return self._buffer.read(len(self._buffer) if size < 0 else size)
+
+    def readinto(self, buffer: memoryview) -> int:  # type: ignore[override]  # a writable buffer
+        """Fill a buffer as far as bytes come within `timeout_s`; return how many."""
+        data = self.read(len(buffer))
+        buffer[: len(data)] = data
+        return len(data)
+
+    def flush_input(self) -> None:
+        """Forget what has come, here and in the robot (GETAUX 0)."""
+        command = self._buffer.flushing()
+        self._engine.call(lambda core, now: core.send(command, now))
+
+    def close(self) -> None:
+        """Listen no more."""
+        self._end()
+        super().close()
+
+    def _wait(self, size: int) -> None:
+        left_s, again = self.timeout_s, False
+        with self._engine.changed:
+            while len(self._buffer) < size and (left_s is None or left_s > 0):
+                command = self._buffer.asking(size, again=again)
+                if command is not None:
+                    self._engine.call(lambda core, now, command=command: core.send(command, now))  # type: ignore[misc]
+                before = len(self._buffer)
+                step_s = ASK_AGAIN_S if left_s is None else min(ASK_AGAIN_S, left_s)
+                again = not self._engine.wait_for(lambda _, before=before: len(self._buffer) > before, step_s)  # type: ignore[misc]
+                left_s = left_s if left_s is None or not again else left_s - step_s
+
+    def _take(self, notice: Notice) -> None:
+        with self._engine.changed:
+            self._buffer.notice(notice)
+            self._engine.changed.notify_all()
+
+
+class AsyncAux:
+    """Bytes to and from a device on the robot.
+
+    Args:
+        port: 1, 2 or 3.
+        send: Sends a command of the open session.
+        listen: Has a callback called with each notice; returns what ends that.
+        wait_for: Waits until something is so of the client's core, at most so many seconds.
+        timeout_s: How long a read waits; None: for ever.
+    """
+
+    def __init__(
+        self,
+        port: int,
+        *,
+        send: Callable[[Command], None],
+        listen: Callable[[Callable[[Notice], None]], Callable[[], None]],
+        wait_for: Callable[[Callable[[RobotCore], bool], float | None], Awaitable[bool]],
+        timeout_s: float | None = 1.0,
+    ) -> None:
+        self.timeout_s = timeout_s
+        self._send = send
+        self._wait_for = wait_for
+        self._buffer = AuxBuffer(port)
+        self._end = listen(self._buffer.notice)
+
+    async def write(self, data: bytes) -> int:
+        """Pass all of `data` on to the device; return how many bytes that were.
+
+        Raises:
+            LinkLostError: no session is open.
+        """
+        for command in self._buffer.writing(data):
+            self._send(command)
+        return len(data)
+
+    async def read(self, size: int = -1) -> bytes:
+        """Return `size` bytes, or those that came within `timeout_s`; -1: what has come."""
+        if size < 0:
+            return self._buffer.read(len(self._buffer))
+        left_s, again = self.timeout_s, False
+        while len(self._buffer) < size and (left_s is None or left_s > 0):
+            command = self._buffer.asking(size, again=again)
+            if command is not None:
+                self._send(command)
+            before = len(self._buffer)
+            step_s = ASK_AGAIN_S if left_s is None else min(ASK_AGAIN_S, left_s)
+            again = not await self._wait_for(lambda _, before=before: len(self._buffer) > before, step_s)  # type: ignore[misc]  # bound now
+            left_s = left_s if left_s is None or not again else left_s - step_s
+        return self._buffer.read(size)
+
+    async def flush_input(self) -> None:
+        """Forget what has come, here and in the robot (GETAUX 0)."""
+        self._send(self._buffer.flushing())
+
+    def close(self) -> None:
+        """Listen no more."""
+        self._end()

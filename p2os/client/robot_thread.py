@@ -1,0 +1,282 @@
+"""The thread behind the blocking robot: it waits for bytes, deadlines and calls, and turns the line.
+
+One lock guards the core. Calls of the program act on the core under it and ring
+a bell that wakes the thread; the thread tells `changed` after each turn. The
+line is opened outside the lock, for that can take seconds.
+
+Closing is the thread's work: signals interrupt the program's own thread only, so
+none of them can come between the frames that stop the robot. Where the thread is
+held up by a callback, the caller of `shut_down` does it in its place.
+
+Invariant: `shut_down` returns after STOP has been written, whatever state the
+thread is in and however often it is interrupted.
+"""
+
+import contextlib
+import socket
+import threading
+import time
+from collections import deque
+from collections.abc import Callable, Iterator
+from typing import Any
+
+from p2os.client.calls import Result
+from p2os.client.core import RobotCore
+from p2os.client.interrupts import held_back
+from p2os.client.line import Line
+from p2os.client.notices import Notice
+from p2os.client.snapshots import RobotState
+from p2os.errors import P2osError, TransportError
+from p2os.timing import NS_PER_S, Nanos
+from p2os.transport.ports import Transport
+from p2os.transport.waiting import BLIND_POLL_S, wait_readable
+from p2os.transport.wall_clock import Clock, wall_clock
+
+#: Opens the line that a URL names.
+Opener = Callable[[str], Transport]
+
+#: chosen: how long closing may take: a dozen frames at 9600 baud.
+CLOSING_S = 2.0
+#: chosen: a thread that has not begun to close by then is held up in a callback; two SIP cycles.
+HANDOVER_S = 0.2
+#: chosen: how often a closing program looks whether that is done.
+LOOK_S = 0.002
+#: chosen: an ending that cannot have the lock in a second goes on without: a program that was interrupted inside of
+#: Python's own `threading` can leave it locked for ever. Several tries: one can run out while the process is stopped.
+LOCK_TRIES, LOCK_S = 5, 0.2
+#: How many notices wait for a slow reader.
+MOST_NOTICES = 1000
+#: A waiting program is known to live: it is asked so often.
+SIGN_OF_LIFE_S = 0.25
+
+
+class RobotThread:
+    """Drives one core on one line, in real time.
+
+    Args:
+        core: The client.
+        baud: Speed at which a serial line is opened; None for other lines.
+        open_line: Opens the line.
+        clock: Nanoseconds that never go back, and go on while the machine sleeps.
+    """
+
+    def __init__(
+        self, core: RobotCore, baud: int | None, open_line: Callable[[], Transport], clock: Clock = wall_clock
+    ) -> None:
+        self.core = core
+        self._lock = threading.RLock()
+        self.changed = threading.Condition(self._lock)
+        self._line = Line(core, baud, clock)
+        self._open_line = open_line
+        self._thread: threading.Thread | None = None
+        self._bell, self._bell_push = socket.socketpair()
+        self._bell.setblocking(False)
+        self._bell_push.setblocking(False)
+        self._failure: BaseException | None = None
+        #: Whether the program has met the failure.
+        self._has_reported = False
+        #: The program wants to close; somebody has begun to; the thread is at its end.
+        self._is_ending = False
+        self._is_closing = False
+        self._has_ended = False
+        self._queues: list[deque[Notice]] = []
+        self._state_callbacks: list[Callable[[RobotState], None]] = []
+        self._event_callbacks: list[Callable[[Notice], None]] = []
+
+    def start(self) -> None:
+        """Begin to move bytes."""
+        with self._lock:
+            if self._is_ending:
+                raise P2osError("this robot was closed", hint="make another Robot")
+            if self._thread is None:
+                self._thread = threading.Thread(target=self._live, name="p2os-robot", daemon=True)
+                self._thread.start()
+
+    def call(self, call: Callable[[RobotCore, Nanos], Result]) -> Result:
+        """Act on the core, now; what it wants to send leaves at once."""
+        with self._lock:
+            self._check()
+            now = self._line.now()
+            self.core.touch(now)
+            result = call(self.core, now)
+        self._ring()
+        return result
+
+    def wait_for(self, is_so: Callable[[RobotCore], bool], timeout_s: float | None) -> bool:
+        """Wait, under `changed`, until something is so; the program is known to live meanwhile."""
+        ends = None if timeout_s is None else self._line.now() + round(timeout_s * NS_PER_S)
+        while not is_so(self.core):
+            self._check()
+            now = self._line.now()
+            self.core.touch(now)
+            if ends is not None and now >= ends:
+                return False
+            left = SIGN_OF_LIFE_S if ends is None else min(SIGN_OF_LIFE_S, (ends - now) / NS_PER_S)
+            self.changed.wait(left)
+        return True
+
+    def shut_down(self) -> None:
+        """Stop the robot, close the session and the line, end the thread; twice is harmless.
+
+        Interrupts (Ctrl-C) meanwhile are raised when that is done. From a callback it returns at once, and the
+        thread closes when the callback has returned.
+        """
+        self._is_ending = True  # from here on the thread does it, whatever becomes of the caller
+        ends_s = time.monotonic() + CLOSING_S
+        held_back(lambda: self._wait_for_the_end(ends_s))
+
+    def raise_failure(self, error: BaseException | None) -> None:
+        """Raise what the thread failed with, unless the program fails already or has met it."""
+        if error is None and self._failure is not None and not self._has_reported:
+            raise P2osError(f"the client's thread failed: {self._failure}") from self._failure
+
+    # Listeners ----------------------------------------------------------------------------
+
+    def subscribe(self) -> deque[Notice]:
+        """Return a queue that gets every notice from now on."""
+        queue: deque[Notice] = deque(maxlen=MOST_NOTICES)
+        with self._lock:
+            self._queues.append(queue)
+        return queue
+
+    def unsubscribe(self, queue: deque[Notice]) -> None:
+        """Give a queue back."""
+        with self._lock:
+            self._queues = [other for other in self._queues if other is not queue]
+
+    def on_state(self, callback: Callable[[RobotState], None]) -> Callable[[], None]:
+        """Call `callback` with each state."""
+        return self._listen(self._state_callbacks, callback)
+
+    def on_event(self, callback: Callable[[Notice], None]) -> Callable[[], None]:
+        """Call `callback` with each notice."""
+        return self._listen(self._event_callbacks, callback)
+
+    def _listen(self, callbacks: list[Any], callback: Callable[..., None]) -> Callable[[], None]:
+        with self._lock:
+            callbacks.append(callback)
+
+        def end() -> None:
+            with self._lock, contextlib.suppress(ValueError):
+                callbacks.remove(callback)
+
+        return end
+
+    # Closing ------------------------------------------------------------------------------
+
+    def _wait_for_the_end(self, ends_s: float) -> None:
+        """Wait until the thread has closed; do it here where the thread cannot.
+
+        It looks at flags and sleeps: an interrupt inside of Python's own events and joins leaves their locks taken.
+        """
+        self._ring()
+        if self._thread is threading.current_thread():
+            return
+        handover_s = min(time.monotonic() + HANDOVER_S, ends_s)
+        while self._thread is not None and not self._is_closing and time.monotonic() < handover_s:
+            time.sleep(LOOK_S)
+        if not self._is_closing:
+            self._is_closing = True
+            with self._locked():
+                self._line.finish()
+        while self._thread is not None and not self._has_ended and time.monotonic() < ends_s:
+            time.sleep(LOOK_S)
+        if not self._has_ended:
+            with self._locked():
+                self._line.finish()
+
+    @contextlib.contextmanager
+    def _locked(self) -> Iterator[None]:
+        has_lock, tries = self._lock.acquire(timeout=LOCK_S), 1
+        while not (has_lock or (self._is_ending and tries >= LOCK_TRIES)):
+            has_lock, tries = self._lock.acquire(timeout=LOCK_S), tries + 1
+        try:
+            yield
+        finally:
+            if has_lock:
+                self._lock.release()
+
+    # The thread ---------------------------------------------------------------------------
+
+    def _live(self) -> None:
+        try:
+            while not self._turn():
+                self._wait()
+        except BaseException as error:  # noqa: BLE001  # whatever it is: the robot stops, the program is told
+            self._failure = error
+        finally:
+            with self._locked():
+                self._is_closing = True
+                self._line.finish()
+                self._has_ended = True
+                with contextlib.suppress(RuntimeError):  # without the lock nobody can be told; their waits end by time
+                    self.changed.notify_all()
+
+    def _turn(self) -> bool:
+        """Do what is due; return whether all is over."""
+        with self._locked():
+            if self._is_ending and not self._is_closing:
+                self._is_closing = True
+                self.core.close(self._line.now())
+            self._line.turn()
+            wants_line = self._line.is_wanted
+            news = self._take_news()
+        self._tell(news)
+        if wants_line:
+            self._open()
+        return self._is_closing and self._line.is_over
+
+    def _open(self) -> None:
+        try:
+            transport = self._open_line()
+        except Exception as error:  # noqa: BLE001  # an opener may raise anything; the wait for it has to end
+            with self._locked():
+                self._line.failed(error)
+        else:
+            with self._locked():
+                self._line.opened(transport)
+        self._ring()
+
+    def _take_news(self) -> list[RobotState | Notice]:
+        news = list(self.core.news)
+        self.core.news.clear()
+        for item in news:
+            if not isinstance(item, RobotState):
+                for queue in self._queues:
+                    queue.append(item)
+        if news:
+            self.changed.notify_all()
+        return news
+
+    def _tell(self, news: list[RobotState | Notice]) -> None:
+        """Call the callbacks, without the lock."""
+        for item in news:
+            if isinstance(item, RobotState):
+                for on_state in tuple(self._state_callbacks):
+                    on_state(item)
+            else:
+                for on_event in tuple(self._event_callbacks):
+                    on_event(item)
+
+    def _wait(self) -> None:
+        """Sleep until bytes, a deadline or a call."""
+        with self._locked():
+            wait_s, transport = self._line.wait_s(), self._line.transport
+            waiting: list[int] = [self._bell.fileno()]
+            if transport is not None:
+                try:
+                    waiting.append(transport.fileno())
+                except TransportError:
+                    wait_s = min(wait_s, BLIND_POLL_S)
+        wait_readable(waiting, wait_s)
+        with contextlib.suppress(BlockingIOError):
+            self._bell.recv(4096)
+
+    def _check(self) -> None:
+        if self._failure is not None:
+            self._has_reported = True
+            raise P2osError(f"the client's thread failed: {self._failure}") from self._failure
+
+    def _ring(self) -> None:
+        with contextlib.suppress(OSError):  # full: it wakes anyway
+            self._bell_push.send(b"\0")

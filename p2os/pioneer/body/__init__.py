@@ -1,0 +1,1 @@
+"""The bodies that a controller moves: one contract, three engines."""

@@ -1,0 +1,136 @@
+"""What the controller needs of a body, whichever engine moves it.
+
+A body is stepped by the controller at fixed multiples of `dt_ns` with
+rim-speed set-points, and answers with its state. Frames: world x, y in metres,
+heading in radians counter-clockwise; robot frame x forward, y left, origin in
+the middle of the axle, on the floor.
+
+Invariant: the same calls after the same `reset` give the same states, bit for bit.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import NamedTuple, Protocol
+
+from p2os.pioneer.body.ray_cast import Echo
+from p2os.pioneer.world.model import Obstacle, Pose
+from p2os.timing import NS_PER_MS, Nanos
+
+#: One step of every body: 1 kHz.
+STEP_NS: Nanos = NS_PER_MS
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class BodyState:
+    """Where the body is and how it moves.
+
+    Metres, radians, m/s and rad/s. Wheel angles count from the reset, positive
+    forward; rim speeds are those achieved, not those asked for. A stalled wheel
+    is one that its motor cannot turn. `collisions` counts new contacts of the
+    hull with anything but the floor.
+    """
+
+    x_m: float = 0.0
+    y_m: float = 0.0
+    z_m: float = 0.0
+    heading_rad: float = 0.0
+    pitch_rad: float = 0.0
+    left_angle_rad: float = 0.0
+    right_angle_rad: float = 0.0
+    left_speed_mps: float = 0.0
+    right_speed_mps: float = 0.0
+    forward_mps: float = 0.0
+    turn_radps: float = 0.0
+    stalled_left: bool = False
+    stalled_right: bool = False
+    collisions: int = 0
+    in_contact: bool = False
+
+
+class WheelAngles(Protocol):
+    """What a step tells at once; a `BodyState` is one too."""
+
+    @property
+    def left_angle_rad(self) -> float:
+        """Rotation of the left wheel since the reset."""
+        ...
+
+    @property
+    def right_angle_rad(self) -> float:
+        """Rotation of the right wheel since the reset."""
+        ...
+
+
+class Turned(NamedTuple):
+    """Wheel angles alone, for a body that reads the rest of its state only when asked."""
+
+    left_angle_rad: float
+    right_angle_rad: float
+
+
+class RobotBody(Protocol):
+    """A robot as a physical thing in a world."""
+
+    @property
+    def name(self) -> str:
+        """Which engine this is."""
+        ...
+
+    @property
+    def note(self) -> str | None:
+        """What a reader of a result has to know of this engine, or None."""
+        ...
+
+    @property
+    def dt_ns(self) -> Nanos:
+        """The length of a step; it divides a second."""
+        ...
+
+    @property
+    def state(self) -> BodyState:
+        """The state after the last step."""
+        ...
+
+    def reset(self, pose: Pose, seed: int) -> BodyState:
+        """Stand still at a pose, wheels at angle 0, collisions at 0."""
+        ...
+
+    def step(self, left_mps: float, right_mps: float) -> WheelAngles:
+        """Move on by `dt_ns` with these rim-speed set-points; `state` has the rest."""
+        ...
+
+    def ranges(self, numbers: Sequence[int]) -> list[float]:
+        """Return what these sonar read now, metres from each transducer; the robot file's range where no echo comes."""
+        ...
+
+    def echoes(self, numbers: Sequence[int]) -> list[list[Echo]]:
+        """Return what each ray of some sonar meets, for a model of the sensor: range and angle, the rightmost first."""
+        ...
+
+    def take_moved(self) -> list[Obstacle]:
+        """Return what has walked or was pushed since this was asked last, where it is now."""
+        ...
+
+    def clearance(self) -> float:
+        """Return the plan-view distance from the hull to the nearest thing it could touch, metres; 0 in contact."""
+        ...
+
+    def place(self, obstacle: Obstacle) -> None:
+        """Put an obstacle with a new name into the world."""
+        ...
+
+    def move(self, name: str, x_m: float, y_m: float, heading_rad: float) -> None:
+        """Put an obstacle somewhere else."""
+        ...
+
+    def remove(self, name: str) -> None:
+        """Take an obstacle out of the world."""
+        ...
+
+    def snapshot(self) -> object:
+        """Return all that decides the future."""
+        ...
+
+    def restore(self, snapshot: object) -> None:
+        """Put back what `snapshot` returned."""
+        ...

@@ -1,0 +1,340 @@
+"""The exact body: a plan view without mass, without any dependency.
+
+Within a step both rims keep their set-points and the path is the exact arc.
+Slopes are flat to it; walls and echoes are those at the height of the hull and
+of the sonar ring; what is lower than the hull stops the wheels, unless it is a
+sill. A step that would bring the hull into a thing does not happen: the wheels
+stall until the set-points lead away. A thing that can be pushed slides out of
+the way, without turning, where it has room and its friction is less than what
+the motors can push. What walks by itself goes on through the robot. Another
+robot of the same world stops it as a wall does.
+
+It serves as the oracle for the other bodies, and where PyBullet is not to be had.
+"""
+
+import math
+from collections.abc import Sequence
+
+from p2os.pioneer.body.contacts import ContactCounter
+from p2os.pioneer.body.contract import STEP_NS, BodyState, Turned
+from p2os.pioneer.body.other_robots import OtherRobots, StandingPose
+from p2os.pioneer.body.ray_cast import Direction, Echo, cast, echoes
+from p2os.pioneer.sonar.ring import cones, reading
+from p2os.pioneer.world.geometry import Footprint, hull_polygon, placed
+from p2os.pioneer.world.model import Obstacle, Pose, Walker, World
+from p2os.pioneer.world.plan import Plan, StaticPlan
+from p2os.robots.parameters import RobotParameters
+from p2os.timing import NS_PER_S, Nanos
+
+#: Below this turn in one step the arc is a straight line to double precision, rad.
+STRAIGHT_RAD = 1e-9
+#: Farther than this nothing is measured exactly, m: it only bounds how soon the next look is due.
+LOOK_AHEAD_M = 2.0
+#: What walks is moved each 10 ms (chosen: 8 mm at a walker's pace).
+WALK_STEPS = 10
+GRAVITY_MPS2 = 9.81
+_DT_S = STEP_NS / NS_PER_S
+
+
+class KinematicBody:
+    """A differential drive on a plan."""
+
+    name = "kinematic"
+    dt_ns: Nanos = STEP_NS
+
+    def __init__(self, world: World, parameters: RobotParameters) -> None:
+        self._world = world
+        self._parameters = parameters
+        self._cones = cones(parameters)
+        self._track_m = parameters.track_mm / 1000
+        self._radius_m = parameters.body.wheel_diameter_m / 2
+        body = parameters.body
+        self._static = StaticPlan(world, parameters)
+        self._hull = hull_polygon(body)
+        self._other_robots: OtherRobots | None = None
+        #: The greatest force of both motors together, N.
+        self._push_n = 2 * body.motor_torque_nm / self._radius_m
+        self._longest_m = parameters.sonar_range_m
+        #: How far any point of the hull moves when the robot turns by 1 rad.
+        self._hull_reach = math.hypot(max(body.hull_front_m, body.hull_rear_m), body.hull_width_m / 2)
+        self._x, self._y, self._heading, self._cos, self._sin = 0.0, 0.0, 0.0, 1.0, 0.0
+        self.reset(world.start, 0)
+
+    @property
+    def note(self) -> str | None:
+        """Say that slopes are flat where the world has some."""
+        return "the kinematic body is a plan view: slopes are flat to it" if self._world.has_slopes else None
+
+    @property
+    def state(self) -> BodyState:
+        """The state after the last step."""
+        return BodyState(
+            x_m=self._x,
+            y_m=self._y,
+            heading_rad=math.remainder(self._heading, 2 * math.pi),
+            left_angle_rad=self._left_angle,
+            right_angle_rad=self._right_angle,
+            left_speed_mps=self._left,
+            right_speed_mps=self._right,
+            forward_mps=(self._left + self._right) / 2,
+            turn_radps=(self._right - self._left) / self._track_m,
+            stalled_left=self._stalled and self._asked[0] != 0.0,
+            stalled_right=self._stalled and self._asked[1] != 0.0,
+            collisions=self._contacts.collisions,
+            in_contact=self._contacts.touching,
+        )
+
+    @property
+    def standing_pose(self) -> StandingPose:
+        """Where it stands, without the rest of its state."""
+        return StandingPose(self._x, self._y, self._heading)
+
+    def join(self, other_robots: OtherRobots | None) -> None:
+        """Meet others from now on, also after a reset."""
+        self._other_robots = other_robots
+
+    def bump(self) -> None:
+        """Feel that another robot has driven against the hull."""
+        self._is_bumped = True
+
+    def reset(self, pose: Pose, seed: int) -> BodyState:
+        """Stand still at a pose in the world as it was made; nothing here is random."""
+        del seed
+        self._steps = 0
+        self._walkers: dict[str, tuple[int, Walker]] = {}
+        self._plan = Plan((), self._parameters, self._static)
+        self._moved_things: dict[str, None] = {}
+        for item in self._world.obstacles:
+            if not item.fixed:
+                self._put(item)
+        self._take_pose(pose.x_m, pose.y_m, pose.heading_rad)
+        self._left_angle = self._right_angle = self._left = self._right = 0.0
+        self._asked = (0.0, 0.0)
+        self._stalled = False
+        #: Another robot has driven against this one since the last step.
+        self._is_bumped = False
+        #: The last set-points, where they would have brought the hull into a thing.
+        self._blocked_at: tuple[float, float] | None = None
+        self._contacts = ContactCounter()
+        #: No thing is nearer to the hull than this; 0 only where the hull is inside one.
+        self._free_m = 0.0
+        self._changed()
+        return self.state
+
+    def step(self, left_mps: float, right_mps: float) -> Turned:
+        """Move on by one step along the exact arc, or stall."""
+        self._steps += 1
+        if self._walkers and self._steps % WALK_STEPS == 0:
+            self._walk()
+        self._asked = asked = (left_mps, right_mps)
+        if left_mps == 0.0 and right_mps == 0.0:
+            self._left = self._right = 0.0
+            self._stalled = False
+            self._contacts.update(touching=self._is_bumped or self._free_m == 0.0)
+            self._is_bumped = False
+            return Turned(self._left_angle, self._right_angle)
+        forward, turn = (left_mps + right_mps) / 2 * _DT_S, (right_mps - left_mps) / self._track_m * _DT_S
+        c, s = self._cos, self._sin
+        heading = self._heading + turn
+        if abs(turn) < STRAIGHT_RAD:
+            x, y = self._x + forward * c, self._y + forward * s
+            if heading != self._heading:
+                c, s = math.cos(heading), math.sin(heading)
+        else:
+            radius, c, s = forward / turn, math.cos(heading), math.sin(heading)
+            x = self._x + radius * (s - self._sin)
+            y = self._y - radius * (c - self._cos)
+        travel = abs(forward) + abs(turn) * self._hull_reach
+        blocked = (
+            self._other_robots is not None
+            and bool(self._other_robots.near)
+            and self._meets(self._other_robots, x, y, heading)
+        )
+        if not blocked:
+            # What was blocked stays so: neither the pose nor the plan has changed since.
+            blocked = asked == self._blocked_at
+            if not blocked:
+                if self._free_m > travel:
+                    self._free_m -= travel
+                else:
+                    blocked = self._is_blocked(x, y, heading)
+            self._blocked_at = asked if blocked else None
+        self._stalled = blocked
+        self._contacts.update(touching=blocked or self._is_bumped or self._free_m == 0.0)
+        self._is_bumped = False
+        if blocked:
+            self._left = self._right = 0.0
+            return Turned(self._left_angle, self._right_angle)
+        self._x, self._y, self._heading, self._cos, self._sin = x, y, heading, c, s
+        self._left, self._right = left_mps, right_mps
+        self._left_angle += left_mps * _DT_S / self._radius_m
+        self._right_angle += right_mps * _DT_S / self._radius_m
+        return Turned(self._left_angle, self._right_angle)
+
+    def _take_pose(self, x_m: float, y_m: float, heading_rad: float) -> None:
+        """Take a pose, and what is often asked of its heading."""
+        self._x, self._y, self._heading = x_m, y_m, heading_rad
+        self._cos, self._sin = math.cos(heading_rad), math.sin(heading_rad)
+
+    def _is_blocked(self, x: float, y: float, heading: float) -> bool:
+        """Tell whether the pose is inside a thing, and keep the bound on what is free around the hull.
+
+        A robot that is inside one already (because it was put there) may move.
+        """
+        free = self._plan.clearance(x, y, heading, no_more_than=LOOK_AHEAD_M)
+        if free == 0.0 and self._free_m > 0.0:
+            if not self._push(x, y, heading):
+                return True
+            self._contacts.update(touching=True, steps=0)
+            free = self._plan.clearance(x, y, heading, no_more_than=LOOK_AHEAD_M)
+        self._free_m = free
+        return False
+
+    def _meets(self, other_robots: OtherRobots, x: float, y: float, heading: float) -> bool:
+        """Tell whether another robot is in the way, and let it feel so; one that was put into another may move."""
+        reach = self._hull_reach
+        close = [
+            other for other in other_robots.near
+            if math.hypot(other.live[0] - x, other.live[1] - y) <= reach + other.reach_m
+        ]  # fmt: skip
+        if not close:
+            return False
+        hull = placed(self._hull, x, y, heading)
+        shapes = [(other, other.footprint(other.live)) for other in close]
+        found = [(other, shape) for other, shape in shapes if shape.overlaps(hull)]
+        if not found:
+            return False
+        here = placed(self._hull, self._x, self._y, self._heading)
+        if any(shape.overlaps(here) for _, shape in found):
+            return False
+        for other, _ in found:
+            other.bump()
+        return True
+
+    def _push(self, x: float, y: float, heading: float) -> bool:
+        """Push what is in the way; tell whether all of it went."""
+        names = self._plan.touched(x, y, heading)
+        things = [item for item in self._plan.obstacles if item.name in names and item.mass_kg > 0]
+        resistance_n = sum(item.mass_kg * item.friction * GRAVITY_MPS2 for item in things)
+        if len(things) < len(names) or resistance_n > self._push_n:
+            return False
+        robots = (
+            () if self._other_robots is None else [other.footprint(other.live) for other in self._other_robots.near]
+        )
+        if not all(self._plan.push(item.name, x, y, heading, robots) for item in things):
+            return False
+        self._moved_things |= dict.fromkeys(item.name for item in things)
+        return True
+
+    def _walk(self) -> None:
+        """Put everything that walks where it is by now."""
+        for name, (since, walker) in self._walkers.items():
+            x, y, heading = walker.pose_at((self._steps - since) * _DT_S)
+            self._plan.move(name, x, y, heading)
+            self._moved_things[name] = None
+        self._changed()
+
+    def _put(self, obstacle: Obstacle) -> None:
+        """Put a thing into the plan; one that walks begins at its first point, now."""
+        self._plan.place(obstacle)
+        if obstacle.walk is not None:
+            walker = Walker(obstacle.walk)
+            self._walkers[obstacle.name] = (self._steps, walker)
+            self._plan.move(obstacle.name, *walker.pose_at(0.0))
+
+    def _changed(self) -> None:
+        """Prepare for a plan that is another one now."""
+        self._blocked_at = None
+        self._free_m = self._plan.clearance(self._x, self._y, self._heading, no_more_than=LOOK_AHEAD_M)
+
+    def ranges(self, numbers: Sequence[int]) -> list[float]:
+        """Return the nearest echo of each cone, metres."""
+        return [self._range(number) for number in numbers]
+
+    def _range(self, number: int) -> float:
+        x, y, rays = self._rays(number)
+        return reading(min(cast(self._heard(x, y, rays), x, y, rays, self._longest_m)), self._parameters)
+
+    def echoes(self, numbers: Sequence[int]) -> list[list[Echo]]:
+        """Return what each ray of some sonar meets, with the angle at which it meets it."""
+        found = []
+        for number in numbers:
+            x, y, rays = self._rays(number)
+            found.append(echoes(self._heard(x, y, rays), x, y, rays, self._longest_m))
+        return found
+
+    def _rays(self, number: int) -> tuple[float, float, list[Direction]]:
+        """Return where a sonar is and the directions of its rays, the rightmost first."""
+        cone, c, s = self._cones[number], self._cos, self._sin
+        x, y = self._x + cone.x_m * c - cone.y_m * s, self._y + cone.x_m * s + cone.y_m * c
+        return x, y, [(dx * c - dy * s, dx * s + dy * c) for dx, dy in cone.directions]
+
+    def _heard(self, x: float, y: float, rays: Sequence[Direction]) -> Sequence[Footprint]:
+        xs, ys = [x, *(x + self._longest_m * dx for dx, _ in rays)], [y, *(y + self._longest_m * dy for _, dy in rays)]
+        box = (min(xs), min(ys), max(xs), max(ys))
+        if self._other_robots is None:
+            return self._plan.heard_within(*box)
+        return [*self._plan.heard_within(*box), *self._other_robots.heard_within(*box)]
+
+    def clearance(self) -> float:
+        """Return the distance from the hull to the nearest thing that it could touch, metres."""
+        free = self._plan.clearance(self._x, self._y, self._heading)
+        if self._other_robots is None:
+            return free
+        hull = placed(self._hull, self._x, self._y, self._heading)
+        return min([free, *(shape.distance(hull) for shape in self._other_robots.touchable())])
+
+    def place(self, obstacle: Obstacle) -> None:
+        """Put an obstacle with a new name into the world."""
+        self._put(obstacle)
+        self._changed()
+
+    def move(self, name: str, x_m: float, y_m: float, heading_rad: float) -> None:
+        """Put an obstacle somewhere else; one that walks stays there."""
+        self._walkers.pop(name, None)
+        self._plan.move(name, x_m, y_m, heading_rad)
+        self._changed()
+
+    def remove(self, name: str) -> None:
+        """Take an obstacle out of the world."""
+        self._plan.remove(name)
+        self._walkers.pop(name, None)
+        self._changed()
+
+    def take_moved(self) -> list[Obstacle]:
+        """Return what has walked or was pushed since this was asked last, where it is now."""
+        if not self._moved_things:
+            return []
+        moved, self._moved_things = self._moved_things, {}
+        return [item for item in self._plan.obstacles if item.name in moved]
+
+    def snapshot(self) -> object:
+        """Return all that decides the future."""
+        return {
+            "pose": (self._x, self._y, self._heading),
+            "wheels": (self._left_angle, self._right_angle, self._left, self._right),
+            "asked": self._asked,
+            "stalled": (self._stalled, self._is_bumped),
+            "free_m": self._free_m,
+            "contacts": self._contacts.snapshot(),
+            "obstacles": self._plan.obstacles,
+            "steps": self._steps,
+            "walking": {name: since for name, (since, _) in self._walkers.items()},
+            "moved": tuple(self._moved_things),
+        }
+
+    def restore(self, snapshot: object) -> None:
+        """Put back what `snapshot` returned."""
+        assert isinstance(snapshot, dict)  # noqa: S101  # our own value
+        self._plan = Plan(snapshot["obstacles"], self._parameters, self._static)
+        self._steps = snapshot["steps"]
+        self._moved_things = dict.fromkeys(snapshot["moved"])
+        walks = {item.name: item.walk for item in self._plan.obstacles if item.walk is not None}
+        self._walkers = {name: (since, Walker(walks[name])) for name, since in snapshot["walking"].items()}
+        self._take_pose(*snapshot["pose"])
+        self._left_angle, self._right_angle, self._left, self._right = snapshot["wheels"]
+        self._asked = snapshot["asked"]
+        self._stalled, self._is_bumped = snapshot["stalled"]
+        self._contacts.restore(snapshot["contacts"])
+        self._changed()
+        self._free_m = snapshot["free_m"]

@@ -1,5 +1,0 @@
-"""The physical body on PyBullet; the only importer of pybullet and NumPy."""
-
-from p2os.pioneer.bullet.body import BulletBody
-
-__all__ = ["BulletBody"]

@@ -1,0 +1,65 @@
+"""What the firmware watches by itself: bumpers, stalls, the stop button, the battery.
+
+Source: Pioneer 2/3 H8 manual (BUMPSTALL, E_STALL), Pioneer 3 manual: a pressed
+bumper stalls the robot only when it drives that way. How often the firmware
+looks at the bumpers is chosen; the battery is looked at once a packet.
+
+Where a body touches something the segment is not known: the middle one of the
+ring on the side of the way is pressed.
+"""
+
+from p2os.pioneer.controller.context import Context
+from p2os.pioneer.controller.flash import Flash
+from p2os.pioneer.controller.ports import SensedState
+from p2os.timing import NS_PER_MS, Nanos
+
+#: chosen: the bumpers are looked at so often while BUMPSTALL is on.
+BUMPER_WATCH_NS: Nanos = 20 * NS_PER_MS
+FRONT, REAR = 1, 2
+
+
+def is_watching(context: Context) -> bool:
+    """Tell whether the bumpers are watched."""
+    return context.devices.switches.bump_stall != 0
+
+
+def look_at_bumpers(context: Context, body: SensedState, flash: Flash, now: Nanos) -> bool:
+    """Stop for a bumper that is pressed on the side of the way; tell whether it did just now."""
+    context.bumper_watch.next_ns = now + BUMPER_WATCH_NS
+    front, rear = pressed(context, body, flash)
+    left, right = context.motion.wheels_mps
+    way = left + right
+    policy = context.devices.switches.bump_stall
+    if not (front and policy & FRONT and way > 0) and not (rear and policy & REAR and way < 0):
+        return False
+    context.motion.stop_now()
+    context.bumper_watch.stalled_until = now + flash.number("stallcount") * NS_PER_MS
+    return True
+
+
+def pressed(context: Context, body: SensedState, flash: Flash) -> tuple[int, int]:
+    """Return the pressed segments, front and rear, bit 0 is segment 1."""
+    pins = context.devices.pins
+    front, rear = pins.front_pressed, pins.rear_pressed
+    if body.in_contact:
+        left, right = context.motion.wheels_mps
+        if left + right >= 0:
+            front |= _middle(flash.number("frontbumps"))
+        if left + right <= 0:
+            rear |= _middle(flash.number("rearbumps"))
+    return front, rear
+
+
+def _middle(segments: int) -> int:
+    return 1 << segments // 2 if segments else 0
+
+
+def stalls(context: Context, body: SensedState, now: Nanos) -> tuple[bool, bool]:
+    """Return whether the left and right wheel are told to be stalled."""
+    switches, faults = context.devices.switches, context.faults
+    both = now < context.bumper_watch.stalled_until or (switches.stop_button and switches.e_stall)
+    left, right = context.motion.wheels_mps
+    return (
+        both or body.stalled_left or (faults.left_blocked and left != 0),
+        both or body.stalled_right or (faults.right_blocked and right != 0),
+    )

@@ -1,0 +1,404 @@
+"""What each client command does to the robot: one small function a command, and the table of them.
+
+Commands that are not in the table are unknown to this robot: they are counted
+and ignored, as a real one ignores them. A command that needs a number and comes
+without one is malformed and has no effect either.
+
+Source: the command tables of the Pioneer 2 and Pioneer 2/3 H8 manuals; `docs`
+says what each firmware does.
+
+What each command does to the robot's devices: the table beside that of motion and sonar.
+
+Source: the command tables of the manuals (`p2os.protocol.command_table`). Devices that a
+robot does not have answer as the firmware does without them: a GRIPPERpac of
+type 0, an empty playlist, an arm that is not connected.
+"""
+
+import math
+from collections.abc import Callable, Mapping
+from enum import Enum
+
+from p2os.pioneer.controller.context import Context
+from p2os.pioneer.controller.flash import BAUD_RATES
+from p2os.pioneer.controller.motion import NM_PER_MM, UDEG_PER_DEG, MotionLimits
+from p2os.pioneer.controller.packet_requests import Extra
+from p2os.pioneer.devices.heading_sensors import CompassMode
+from p2os.protocol.command_table import BY_NUMBER
+from p2os.protocol.commands import Command, CommandNumber
+from p2os.protocol.profiles import Profile
+from p2os.timing import NS_PER_MS, Nanos
+
+Handler = Callable[[Context, Command, Nanos], bool]
+
+#: A duration of SAY (M2: 20 ms).
+SAY_UNIT_MS = 20
+#: Least and most of SONARCYCLE, ms (H8 manual).
+SONAR_CYCLE_MS = (2, 120)
+
+
+def signed16(command: Command) -> int | None:
+    """Return a command's number as the robot reads it, or None when it has none.
+
+    A positive argument from 32768 up is a negative number that a client has
+    packed itself: no robot is told to drive at 32 m/s.
+    """
+    value = command.argument
+    if not isinstance(value, int):
+        return None
+    return value - 0x10000 if 0x8000 <= value <= 0xFFFF else value
+
+
+def number(act: Callable[[Context, int], None]) -> Handler:
+    """Return a handler of a command whose argument is one number."""
+
+    def handler(context: Context, command: Command, _now: Nanos) -> bool:
+        value = signed16(command)
+        if value is None:
+            return False
+        act(context, value)
+        return True
+
+    return handler
+
+
+def plain(act: Callable[[Context], None]) -> Handler:
+    """Return a handler of a command whose argument, if any, does not matter."""
+
+    def handler(context: Context, _command: Command, _now: Nanos) -> bool:
+        act(context)
+        return True
+
+    return handler
+
+
+def _timed(act: Callable[[Context, int, Nanos], None]) -> Handler:
+    def handler(context: Context, command: Command, now: Nanos) -> bool:
+        value = signed16(command)
+        if value is None:
+            return False
+        act(context, value, now)
+        return True
+
+    return handler
+
+
+def _two_bytes(act: Callable[[Context, int, int], None]) -> Handler:
+    """Return a handler of two bytes, the first on the wire first, the sign undone before they part."""
+
+    def handler(context: Context, command: Command, _now: Nanos) -> bool:
+        if not isinstance(command.argument, int):
+            return False
+        act(context, *command.two_bytes)
+        return True
+
+    return handler
+
+
+def _text(act: Callable[[Context, bytes], None]) -> Handler:
+    def handler(context: Context, command: Command, _now: Nanos) -> bool:
+        if not isinstance(command.argument, bytes):
+            return False
+        act(context, command.argument)
+        return True
+
+    return handler
+
+
+def _request(extra: Extra) -> Handler:
+    return number(lambda context, value: context.requests.set(extra, value))
+
+
+def _once(extra: Extra) -> Handler:
+    return plain(lambda context: context.requests.set(extra, 1))
+
+
+def _digout(context: Context, low: int, high: int) -> None:
+    """Set outputs: the high byte is the mask, as all tables have it; one worked example (M4 p. 49) differs."""
+    context.devices.pins.drive(high, low)
+
+
+def _tcm2(context: Context, value: int) -> None:
+    if value == CompassMode.ONE_PACKET:
+        context.requests.set(Extra.COMPASS, 1)
+        return
+    context.devices.compass.command(value)
+    context.requests.set(Extra.COMPASS, 2 if value == CompassMode.CONTINUOUS else 0)
+
+
+def _gyro(context: Context, value: int, now: Nanos) -> None:
+    context.devices.gyro.switch(on=value != 0, now=now)
+    context.requests.set(Extra.GYRO, 2 if context.devices.gyro.is_on else 0)
+
+
+def _joydrive(context: Context, value: int) -> None:
+    context.devices.joystick.may_drive = value != 0
+    context.let_the_stick_drive()
+
+
+def _say(context: Context, data: bytes) -> None:
+    milliseconds = sum(data[0:40:2]) * SAY_UNIT_MS
+    context.notes.append(("says", f"{min(len(data) // 2, 20)} tones, {milliseconds / 1000:g} s"))
+
+
+def _sound(context: Context, value: int) -> None:
+    context.notes.append(("plays sound", str(value)))
+
+
+def _buzzer(context: Context, value: int) -> None:
+    context.devices.switches.buzzer = value != 0
+
+
+def _bump_stall(context: Context, value: int) -> None:
+    context.devices.switches.bump_stall = value & 3
+
+
+def _e_stall(context: Context, value: int) -> None:
+    context.devices.switches.e_stall = value != 0
+
+
+def _hostbaud(context: Context, value: int) -> None:
+    if 0 <= value < len(BAUD_RATES):
+        context.baud_wanted = BAUD_RATES[value]
+
+
+def _aux_baud(port: int) -> Handler:
+    def act(context: Context, value: int) -> None:
+        if 0 <= value < len(BAUD_RATES):
+            context.devices.aux[port - 1].baud = BAUD_RATES[value]
+
+    return number(act)
+
+
+def _aux_send(port: int) -> Handler:
+    return _text(lambda context, data: context.devices.aux[port - 1].send(data))
+
+
+def _aux_ask(port: int) -> Handler:
+    return number(lambda context, value: context.devices.aux[port - 1].request(value))
+
+
+def _sonar_cycle(context: Context, value: int, now: Nanos) -> None:
+    least, most = SONAR_CYCLE_MS
+    context.sonar.set_interval(min(max(value, least), most) * NS_PER_MS, now)
+
+
+def _battest(context: Context, value: int) -> None:
+    """Pretend a voltage (ARCOS, 0.1 V; 0 the true one), or a low one (AROS SHUTDOWN 1)."""
+    battery = context.devices.battery
+    if context.profile is Profile.AROS:
+        battery.pretended_decivolts = context.low_battery_decivolts - 1 if value == 1 else None
+        if value == 2:
+            context.notes.append(("shuts the computer down", "SHUTDOWN 2"))
+    else:
+        battery.pretended_decivolts = value if value > 0 else None
+    battery.is_test = True
+
+
+def _restart(context: Context, what: str) -> None:
+    context.restart_wanted = what
+
+
+def _charge(context: Context, value: int) -> None:
+    context.notes.append(("charger", "deployed" if value else "retracted"))
+
+
+def _kept(name: str) -> Handler:
+    """Take a number that changes nothing here: gains, calibrations, lamps, power of things that are not fitted."""
+    return number(lambda context, value: context.kept.__setitem__(name, value))
+
+
+_C = CommandNumber
+#: Working gains and calibrations: told back by CONFIG, felt by nothing here.
+KEPT = {
+    _C.ROTKP: "rotkp", _C.ROTKV: "rotkv", _C.ROTKI: "rotki", _C.TRANSKP: "transkp", _C.TRANSKV: "transkv",
+    _C.TRANSKI: "transki", _C.REVCOUNT: "revcount", _C.DRIFTFACTOR: "driftfactor", _C.TICKSMM: "ticksmm",
+    _C.GYROCALCW: "gyrocw", _C.GYROCALCCW: "gyroccw",
+}  # fmt: skip
+#: Of things that this robot does not have; taken in silence, as the firmware does.
+NOT_FITTED = (
+    _C.DOCK, _C.MOVINGBLINK, _C.CALCOMP, _C.ARM_POWER, _C.ARM_AUTOPARK, _C.ARM_GRIPPARK, _C.POWER_PC, _C.POWER_LRF,
+    _C.POWER_5V, _C.POWER_12V, _C.POWER_AUX_PC, _C.POWER_TOUCHSCREEN, _C.POWER_PTZ, _C.POWER_AUDIO, _C.POWER_LRF2,
+    _C.ARM_INIT, _C.ARM_CHECK, _C.ARM_HOME, _C.ARM_PARK, _C.ARM_POS, _C.ARM_SPEED, _C.ARM_STOP, _C.LCD,
+)  # fmt: skip
+
+DEVICE_HANDLERS: Mapping[int, Handler] = {
+    _C.SAY: _text(_say),
+    _C.JOYREQUEST: _request(Extra.JOYSTICK),
+    _C.ENCODER: _request(Extra.ENCODER),
+    _C.DIGOUT: _two_bytes(_digout),
+    _C.GRIPPER: _timed(lambda context, value, now: context.devices.gripper.command(value, now)),
+    _C.ADSEL: number(lambda context, value: context.devices.pins.select(value)),
+    _C.GRIPPERVAL: number(lambda context, value: setattr(context.devices.gripper, "value", value)),
+    _C.GRIPREQUEST: _request(Extra.GRIPPER),
+    _C.IOREQUEST: _request(Extra.IO),
+    _C.PTUPOS: _two_bytes(lambda context, width, port: context.devices.pins.set_servo(port, width)),
+    _C.TTY2: _aux_send(1),
+    _C.GETAUX: _aux_ask(1),
+    _C.TTY3: _aux_send(2),
+    _C.GETAUX2: _aux_ask(2),
+    _C.TTY4: _aux_send(3),
+    _C.GETAUX3: _aux_ask(3),
+    _C.BUMPSTALL: number(_bump_stall),
+    _C.TCM2: number(_tcm2),
+    _C.JOYDRIVE: number(_joydrive),
+    _C.SONARCYCLE: _timed(_sonar_cycle),
+    _C.HOSTBAUD: number(_hostbaud),
+    _C.AUX1BAUD: _aux_baud(1),
+    _C.AUX2BAUD: _aux_baud(2),
+    _C.AUX3BAUD: _aux_baud(3),
+    _C.E_STALL: number(_e_stall),
+    _C.GYRO: _timed(_gyro),
+    _C.BATTERYINFO: _request(Extra.BATTERY),
+    _C.CHARGE: number(_charge),
+    _C.ARM_INFO: _once(Extra.ARM_INFO),
+    _C.ARM_STATUS: _request(Extra.ARM),
+    _C.SOUND: number(_sound),
+    _C.PLAYLIST: _once(Extra.PLAYLIST),
+    _C.SOUNDTOG: number(_buzzer),
+    _C.BATTEST: number(_battest),
+    _C.RESET: plain(lambda context: _restart(context, "RESET")),
+    _C.MAINTENANCE: plain(lambda context: _restart(context, "MAINTENANCE")),
+    **{number_: _kept(name) for number_, name in KEPT.items()},
+    **dict.fromkeys(NOT_FITTED, plain(lambda _context: None)),
+}
+
+
+class Effect(Enum):
+    """What has become of a command."""
+
+    #: It acts.
+    DONE = "done"
+    #: This robot does not know it; ignored.
+    UNKNOWN = "unknown"
+    #: Its number or text is missing; ignored.
+    MALFORMED = "malformed"
+    #: It is taken, and acts when the motors are on.
+    WAITS = "motors are off (ENABLE 1 turns them on)"
+
+
+#: What has no effect.
+IGNORED = frozenset({Effect.UNKNOWN, Effect.MALFORMED})
+
+
+def apply(context: Context, command: Command, now: Nanos) -> Effect:
+    """Let a command act."""
+    handler = HANDLERS.get(command.number)
+    if handler is None or not is_known(command.number, context):
+        return Effect.UNKNOWN
+    if not handler(context, command, now):
+        return Effect.MALFORMED
+    is_to_move = command.number in MOTION_COMMANDS and command.argument != 0
+    return Effect.WAITS if is_to_move and not context.motors_enabled else Effect.DONE
+
+
+def is_known(which: int, context: Context) -> bool:
+    """Tell whether this firmware has a command; where no manual settles it, it has."""
+    row = BY_NUMBER.get(which)
+    return context.lenient or row is None or row.is_known_to(context.profile) is not False
+
+
+def _nothing(_context: Context) -> None:
+    """Feed the watchdog, which any packet does."""
+
+
+def _enable(context: Context, value: int) -> None:
+    """Switch the motors, which stay off while the red button is pressed."""
+    if value and context.devices.switches.stop_button:
+        context.notes.append(("motors stay off", "the stop button is pressed"))
+        return
+    context.motion.power(on=value != 0)
+
+
+def _vel2(context: Context, command: Command, _now: Nanos) -> bool:
+    """Set both wheels: the first byte on the wire is the right one (H8 manual, command 32).
+
+    ARCOS makes a translation and a rotation of them, each within its limit.
+    """
+    if not isinstance(command.argument, int):
+        return False
+    right, left = command.signed_bytes
+    drive = context.motion.set_wheels if context.profile is not Profile.ARCOS else context.motion.set_wheels_as_turn
+    drive(left * context.vel2_divisor, right * context.vel2_divisor)
+    return True
+
+
+def _head(context: Context, degrees: int) -> None:
+    zero = round(math.degrees(context.reckoning.zero_rad) * UDEG_PER_DEG)
+    context.motion.turn_to(zero + degrees * UDEG_PER_DEG)
+
+
+def _dhead(context: Context, degrees: int) -> None:
+    context.motion.turn_to(context.heading_udeg + degrees * UDEG_PER_DEG)
+
+
+def _dchead(context: Context, degrees: int) -> None:
+    goal = context.motion.heading_goal_udeg
+    context.motion.turn_to((context.heading_udeg if goal is None else goal) + degrees * UDEG_PER_DEG)
+
+
+def _move(context: Context, mm: int) -> None:
+    context.motion.move_to(context.travel_nm + mm * NM_PER_MM)
+
+
+def _limit(change: Callable[[MotionLimits, int], MotionLimits]) -> Handler:
+    """Return a handler that changes the limits of the motion."""
+
+    def act(context: Context, value: int) -> None:
+        context.motion.limits = change(context.motion.limits, value)
+
+    return number(act)
+
+
+def _sonar(context: Context, command: Command, now: Nanos) -> bool:
+    value = signed16(command)
+    if value is None:
+        return False
+    context.sonar.switch(on=value != 0, now=now)
+    return True
+
+
+def _polling(context: Context, command: Command, now: Nanos) -> bool:
+    """Set the firing order; on the wire sonar are numbered from 1."""
+    if not isinstance(command.argument, bytes):
+        return False
+    context.sonar.poll([number - 1 for number in command.argument], now)
+    return True
+
+
+def _config(context: Context) -> None:
+    context.config_wanted = True
+
+
+HANDLERS: Mapping[int, Handler] = {
+    CommandNumber.PULSE: plain(_nothing),
+    CommandNumber.OPEN: plain(_nothing),  # of a session that is open already
+    CommandNumber.POLLING: _polling,
+    CommandNumber.ENABLE: number(_enable),
+    CommandNumber.SETA: _limit(MotionLimits.with_acceleration),
+    CommandNumber.SETV: _limit(MotionLimits.with_max_velocity),
+    CommandNumber.SETO: plain(lambda context: context.reckoning.set_origin()),
+    CommandNumber.MOVE: number(_move),
+    CommandNumber.ROTATE: number(lambda context, value: context.motion.set_rotation(value)),
+    CommandNumber.SETRV: _limit(MotionLimits.with_max_rotation),
+    CommandNumber.VEL: number(lambda context, value: context.motion.set_velocity(value)),
+    CommandNumber.HEAD: number(_head),
+    CommandNumber.DHEAD: number(_dhead),
+    CommandNumber.CONFIG: plain(_config),
+    CommandNumber.RVEL: number(lambda context, value: context.motion.set_rotation(value)),
+    CommandNumber.DCHEAD: number(_dchead),
+    CommandNumber.SETRA: _limit(MotionLimits.with_rotational_acceleration),
+    CommandNumber.SONAR: _sonar,
+    CommandNumber.STOP: plain(lambda context: context.motion.stop()),
+    CommandNumber.VEL2: _vel2,
+    CommandNumber.E_STOP: plain(lambda context: context.motion.stop_now()),
+    CommandNumber.QSTOP: plain(lambda context: context.motion.stop_now()),
+    **DEVICE_HANDLERS,
+}
+
+#: What moves the robot, once its motors are on.
+MOTION_COMMANDS = frozenset(
+    {
+        CommandNumber.MOVE, CommandNumber.ROTATE, CommandNumber.VEL, CommandNumber.HEAD, CommandNumber.DHEAD,
+        CommandNumber.RVEL, CommandNumber.DCHEAD, CommandNumber.VEL2,
+    }
+)  # fmt: skip

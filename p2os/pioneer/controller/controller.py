@@ -1,0 +1,535 @@
+"""The robot's own firmware, as a passive state machine above a body.
+
+Bytes of a client go in, bytes of the robot come out, and the body is stepped in
+between: handshake, motion commands, odometry, sonar, watchdog.
+
+Theory of operation
+-------------------
+The `Connection` (server role) speaks the handshake and keeps the watchdog; its
+events drive the rest. While open, a standard packet (SIP) goes out every cycle,
+counted from OPEN. Motors are off on each new connection; a client turns them on
+with ENABLE. When no valid packet comes for the watchdog's time the wheels slow
+down to a stand; the next packet releases them and they ramp back to the last
+set speed, unless that packet says otherwise. CLOSE, and a host that sees its
+client vanish (`hang_up`), take the power from the wheels at once.
+
+The line has a speed (`sender`, `line`): a packet is made when the line is free
+for it. A reset (RESET, a brown-out) takes the power from the wheels and leaves
+the controller deaf for its boot time; then it says so (packet 0xFF) and waits
+for SYNC0. MAINTENANCE leaves it deaf for good, until it is rebooted.
+
+What a client sets (limits, sonar order) is lost when it closes, as the H8
+manual says of AROS 1.3 and later; earlier firmware kept it until power-down.
+
+Invariant: at time t the body stands at its first step boundary at or after t, so
+the result does not depend on how often anybody calls `advance_to`.
+
+What a controller is doing, for whoever looks, and what is saved of it.
+
+What a robot starts with, and comes back to when its session ends: devices and limits, from its FLASH.
+"""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from typing import cast
+
+from p2os.pioneer.controller.bumper_watch import is_watching, look_at_bumpers
+from p2os.pioneer.controller.commands import IGNORED, Effect, apply
+from p2os.pioneer.controller.context import BumperWatch, Context
+from p2os.pioneer.controller.dead_reckoning import DeadReckoning
+from p2os.pioneer.controller.fault_actions import FaultTarget, clear_now, inject_now, injected_now
+from p2os.pioneer.controller.faults import read_fault
+from p2os.pioneer.controller.live_inputs import apply_input
+from p2os.pioneer.controller.motion import Motion, MotionLimits
+from p2os.pioneer.controller.packet_requests import Requests
+from p2os.pioneer.controller.ports import Body, WheelAngles
+from p2os.pioneer.controller.reporter import Reporter
+from p2os.pioneer.controller.sender import Sender
+from p2os.pioneer.controller.settings import ControllerSettings, SonarPerSip
+from p2os.pioneer.devices.battery import Battery
+from p2os.pioneer.devices.devices import Devices
+from p2os.pioneer.random_source import RandomSource
+from p2os.pioneer.sonar.schedule import SonarSchedule
+from p2os.protocol.commands import Command
+from p2os.protocol.connection import (
+    Closed,
+    CommandReceived,
+    Connection,
+    ConnectionRole,
+    ConnectionSettings,
+    ConnectionStats,
+    Event,
+    Opened,
+    Synchronised,
+    WatchdogExpired,
+    WatchdogRevived,
+)
+from p2os.protocol.packets import Identity, ResetNotice
+from p2os.protocol.profiles import Profile
+from p2os.robots.parameters import RobotParameters
+from p2os.timing import NS_PER_MS, NS_PER_S, Nanos, Reached
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ControllerState:
+    """What the controller is doing, as plain values."""
+
+    open: bool
+    motors_enabled: bool
+    watchdog_expired: bool
+    sonar_on: bool
+    #: Rim-speed set-points of this moment, after the ramps, in m/s.
+    left_setpoint_mps: float
+    right_setpoint_mps: float
+    #: What the robot believes of its pose, since the last SETO.
+    x_mm: float
+    y_mm: float
+    heading_rad: float
+    #: Commands that had no effect since the start: not known, or without their number.
+    ignored_commands: int
+    battery_v: float
+    #: How much of the line the last second took, percent; None on a line that takes no time.
+    line_load_percent: int | None
+    #: Speed of the line now, bit/s.
+    baud: int | None
+    #: Extra packets and answers that found no room on the line, since the start.
+    packets_dropped: int
+    #: The words of every fault that lasts.
+    injected: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ControllerSnapshot:
+    """All that decides a controller's future; `own` is what `Pioneer` itself counts."""
+
+    body: object
+    own: tuple[object, ...]
+    complaints: tuple[str, ...]
+    connection: object
+    sender: object
+    context: object
+
+
+#: chosen: keeps a fresh battery above the half of a decivolt, so that it does not flicker.
+BATTERY_MARGIN_V = 0.04
+#: FLASH parameter → the limit that it sets.
+LIMITS = {
+    "transveltop": "top_velocity_mm_s", "rotveltop": "top_rotation_deg_s", "transvelmax": "max_velocity_mm_s",
+    "rotvelmax": "max_rotation_deg_s", "transacc": "accel_mm_s2", "transdecel": "decel_mm_s2",
+    "rotacc": "rot_accel_deg_s2", "rotdecel": "rot_decel_deg_s2",
+}  # fmt: skip
+
+
+def new_devices(settings: ControllerSettings) -> Devices:
+    """Return the devices of a robot that was just switched on."""
+    flash = settings.flash
+    devices = Devices(
+        battery=Battery.resting_at(
+            settings.battery_decivolts / 10 + BATTERY_MARGIN_V, settings.errors.power.battery_resistance_ohm
+        )
+    )
+    devices.gripper.kind = flash.number("gripper")
+    devices.gyro.is_fitted = flash.number("hasgyro") > 0 and settings.profile is not Profile.P2OS
+    devices.switches.e_stall = settings.profile is not Profile.P2OS
+    return devices
+
+
+def limits_of(parameters: RobotParameters, values: Mapping[str, int | str]) -> MotionLimits:
+    """Return the limits with which a robot starts: those of its file, but for what its FLASH says."""
+    limits = MotionLimits.of(parameters)
+    found = {mine: value for name, mine in LIMITS.items() if isinstance(value := values.get(name), int)}
+    return replace(limits, **found)
+
+
+__all__ = ["ControllerSettings", "ControllerState", "EventCallback", "Pioneer", "SonarPerSip"]
+
+#: (now in ns, what happened in a word or two, detail).
+EventCallback = Callable[[Nanos, str, str], None]
+
+#: chosen: from a reset to the notice that the controller is there again.
+BOOT_NS: Nanos = 500 * NS_PER_MS
+
+
+class Pioneer:
+    """A P2OS robot: its controller and its body."""
+
+    def __init__(
+        self,
+        *,
+        parameters: RobotParameters,
+        body: Body,
+        settings: ControllerSettings | None = None,
+        on_event: EventCallback | None = None,
+    ) -> None:
+        self.parameters, self.body = parameters, body
+        self.settings = settings or ControllerSettings()
+        self.on_event = on_event
+        self._body_now: Nanos = 0
+        self._sip_due: Nanos | None = None
+        #: When the controller is there again after a reset; -1: it waits in maintenance for a reboot.
+        self._boot_at: Nanos | None = None
+        self._ignored = 0
+        self._complaints: tuple[str, ...] = ()
+        self._connection = self._new_connection()
+        self._sender = Sender(self.settings.baud)
+        flash, odometry = self.settings.flash, self.settings.errors.odometry
+        self._context = Context(
+            motion=Motion(limits_of(parameters, flash.values), track_mm=parameters.track_mm, dt_ns=body.dt_ns),
+            reckoning=DeadReckoning(
+                wheel_diameter_m=parameters.body.wheel_diameter_m, track_mm=parameters.track_mm,
+                left_wheel=odometry.left_wheel, right_wheel=odometry.right_wheel,
+            ),
+            sonar=self._new_sonar(),
+            vel2_divisor=parameters.vel2_divisor,
+            devices=new_devices(self.settings),
+            profile=self.settings.profile,
+            lenient=self.settings.lenient,
+            joystick_mm_s=flash.number("joyvel"),
+            joystick_deg_s=flash.number("joyrvel"),
+            low_battery_decivolts=flash.number("lowbattery"),
+            random_source=RandomSource(self.settings.seed),
+        )  # fmt: skip
+        self._reporter = Reporter(self._context, body, self._sender, parameters, self.settings, self._tell)
+        self._context.reckoning.begin(body.state.left_angle_rad, body.state.right_angle_rad)
+
+    @property
+    def state(self) -> ControllerState:
+        """Return what the controller is doing now."""
+        context = self._context
+        left, right = context.motion.wheels_mps
+        return ControllerState(
+            open=self._sip_due is not None,
+            motors_enabled=context.motors_enabled,
+            watchdog_expired=context.motion.is_held,
+            sonar_on=context.sonar.is_on,
+            left_setpoint_mps=left,
+            right_setpoint_mps=right,
+            x_mm=context.reckoning.x_mm,
+            y_mm=context.reckoning.y_mm,
+            heading_rad=context.reckoning.heading_rad,
+            ignored_commands=self._ignored,
+            battery_v=context.devices.battery.decivolts / 10,
+            line_load_percent=self._sender.line.load_percent,
+            baud=self._sender.line.baud,
+            packets_dropped=context.requests.dropped + self._sender.lost,
+            injected=injected_now(context),
+        )
+
+    @property
+    def baud(self) -> int | None:
+        """Return the speed of the host's line now, bit/s; None on a line that takes no time."""
+        return self._sender.line.baud
+
+    @property
+    def stats(self) -> ConnectionStats:
+        """Return the counters of the line since its client came: frames, noise, bad checksums."""
+        return self._connection.stats
+
+    def receive(self, data: bytes, now: Nanos) -> None:
+        """Take bytes that the line has delivered at `now`.
+
+        A command acts from the first body step at or after `now`. What is due at
+        `now` itself is done first, so that a packet shows the robot before it.
+        """
+        self.advance_to(now)
+        if self._boot_at is not None:
+            return
+        if self._context.faults.spoils_line:
+            data = self._context.faults.spoil(data, self._context.random_source, to_robot=True)
+        self._connection.receive(data, now)
+        self._take_events(now)
+
+    def count_silence(self, silence: Nanos, now: Nanos) -> None:
+        """Let the watchdog count a pause, in ns, that was left out of the robot's time."""
+        self.advance_to(now)
+        self._connection.count_silence(silence, now)
+
+    def hang_up(self, now: Nanos) -> None:
+        """Stop at once and close, as when the host sees its client vanish."""
+        self.advance_to(now)
+        self._connection = self._new_connection()
+        self._sender.clear()
+        self._close(now, "line dropped")
+
+    def take_output(self) -> list[bytes]:
+        """Return the frames to send, one item each, oldest first, and forget them."""
+        output = self._sender.take_output()
+        if self._context.faults.spoils_line:
+            spoilt = (self._context.faults.spoil(data, self._context.random_source, to_robot=False) for data in output)
+            return [data for data in spoilt if data]
+        return output
+
+    def receive_aux(self, port: int, data: bytes, now: Nanos) -> None:
+        """Take bytes of the device at an AUX port, 1 to 3."""
+        self.advance_to(now)
+        self._context.devices.aux[port - 1].receive(data)
+        self._reporter.look_at_aux()
+
+    def take_aux_output(self, port: int) -> bytes:
+        """Return the bytes for the device at an AUX port, 1 to 3, and forget them."""
+        return self._context.devices.aux[port - 1].take_outgoing()
+
+    def do(self, text: str, now: Nanos) -> None:
+        """Inject or clear a fault, or press something: "fault WORDS", "clear WORDS", or the words of a live input.
+
+        Raises:
+            UsageError: The words mean nothing; nothing has changed then.
+        """
+        first, _, words = text.strip().partition(" ")
+        sonar = self.parameters.sonar_fitted
+        fault = read_fault(words, sonar=sonar, complete=first == "fault") if first in {"fault", "clear"} else None
+        self.advance_to(now)
+        if fault is not None and first == "fault":
+            self._tell(now, first, words)
+            inject_now(self._fault_target(now), fault)
+        else:
+            if fault is None:
+                apply_input(self._context, text)
+            else:
+                clear_now(self._fault_target(now), fault)
+            self._tell(now, first, words)
+        self._tell_notes(now)
+
+    def reboot(self, now: Nanos, *, notice: str = "reboot") -> None:
+        """Start the controller anew, as after a dip of its supply: motors off, session gone, odometry at 0."""
+        self.advance_to(now)
+        self._restart(now, notice, boot_ns=BOOT_NS)
+
+    def next_deadline(self) -> Nanos | None:
+        """Return when bytes will come out or the watchdog will bite; None when neither ever will."""
+        if self._boot_at is not None:
+            return self._boot_at if self._boot_at >= 0 else None
+        sip = None if self._sip_due is None else self._sender.turn_after(self._sip_due)
+        due = [at for at in (sip, self._connection.next_deadline(), self._sender.next_deadline()) if at is not None]
+        return min(due, default=None)
+
+    def advance_to(self, limit: Nanos) -> Reached:
+        """Act on everything due up to and including `limit`, and bring the body there."""
+        while (due := self._next_due()) is not None and due <= limit:
+            self._step_body_to(due)
+            self._act(due)
+        self._step_body_to(limit)
+        return Reached(limit)
+
+    def snapshot(self) -> object:
+        """Return all that decides the future, body included, as a plain value."""
+        return ControllerSnapshot(
+            body=self.body.snapshot(),
+            own=(self._body_now, self._sip_due, self._boot_at, self._ignored),
+            complaints=self._complaints,
+            connection=self._connection.snapshot(),
+            sender=self._sender.snapshot(),
+            context=self._context.snapshot(),
+        )
+
+    def restore(self, snapshot: object) -> None:
+        """Put back what `snapshot` returned."""
+        saved = cast("ControllerSnapshot", snapshot)
+        self.body.restore(saved.body)
+        self._body_now, self._sip_due, self._boot_at, self._ignored = cast(
+            "tuple[Nanos, Nanos | None, Nanos | None, int]", saved.own
+        )
+        self._complaints = saved.complaints
+        self._connection.restore(saved.connection)
+        self._sender.restore(saved.sender)
+        self._context.restore(saved.context)
+
+    # Time ----------------------------------------------------------------------------
+
+    def _next_due(self) -> Nanos | None:
+        """Return when anything happens next, also what shows only in the next packet."""
+        due = self.next_deadline()
+        if self._sip_due is None or due is None:
+            return due
+        context = self._context
+        if (ping := context.sonar.next_ping()) is not None:
+            due = min(due, ping.at)
+        if context.devices.gyro.is_on:
+            due = min(due, context.devices.gyro.next_ns)
+        if is_watching(context):
+            due = min(due, context.bumper_watch.next_ns)
+        return due
+
+    def _act(self, now: Nanos) -> None:
+        """Do all that is due at `now`: the connection's own, then sensors, then the packet that carries them."""
+        if self._boot_at is not None:
+            self._boot(now)
+            return
+        self._connection.advance_to(now)
+        self._take_events(now)
+        if self._sip_due is None:
+            self._sender.flush(now)
+            return
+        context = self._context
+        if context.devices.gyro.is_on and context.devices.gyro.next_ns <= now:
+            self._reporter.sample_gyro()
+        watch_due = is_watching(context) and context.bumper_watch.next_ns <= now
+        if watch_due and look_at_bumpers(context, self.body.state, self.settings.flash, now):
+            self._tell(now, "bumper stall", "the robot drove against a pressed bumper")
+        ping = context.sonar.next_ping()
+        if ping is not None and ping.at <= now:
+            self._reporter.fire(ping.numbers)
+        if self._sip_due is not None and self._sip_due <= now and self._sender.is_turn_of_packet(now):
+            self._sip_due = self._reporter.send_standard_packet(self._connection, now)
+        self._sender.flush(now)
+
+    def _step_body_to(self, limit: Nanos) -> None:
+        """Step the body to its first step boundary at or after `limit`."""
+        if self._body_now >= limit:
+            return
+        context, body = self._context, self.body
+        motion, step, advance = context.motion, body.step, context.reckoning.advance
+        if self._context.faults.left_blocked or self._context.faults.right_blocked:
+            step = self._step_blocked
+        steps = -((self._body_now - limit) // body.dt_ns)
+        self._body_now += steps * body.dt_ns
+        while steps and not motion.is_steady:
+            left, right = motion.step(context.travel_nm, context.heading_udeg) if motion.has_goal else motion.step(0, 0)
+            wheels = step(left, right)
+            advance(wheels.left_angle_rad, wheels.right_angle_rad)
+            steps -= 1
+        left, right = motion.wheels_mps  # steady until the next command
+        for _ in range(steps):
+            wheels = step(left, right)
+            advance(wheels.left_angle_rad, wheels.right_angle_rad)
+
+    def _step_blocked(self, left_mps: float, right_mps: float) -> WheelAngles:
+        """Step the body with wheels that do not turn."""
+        faults = self._context.faults
+        return self.body.step(0.0 if faults.left_blocked else left_mps, 0.0 if faults.right_blocked else right_mps)
+
+    def _new_connection(self) -> Connection:
+        identity = Identity(
+            name=self.settings.name, robot_class=self.parameters.robot_class, subclass=self.parameters.subclass
+        )
+        return Connection(
+            ConnectionRole.SERVER, identity=identity, watchdog_ns=self.settings.watchdog_ns,
+            settings=ConnectionSettings(profile=self.settings.profile), lenient=self.settings.lenient,
+        )  # fmt: skip
+
+    def _new_sonar(self) -> SonarSchedule:
+        return SonarSchedule(
+            self.parameters.sonar_fitted,
+            pings_per_cycle=self.settings.sonar_per_sip.pings_per_cycle,
+            cycle_ns=self.settings.sip_period_ns,
+        )
+
+    def _fault_target(self, now: Nanos) -> FaultTarget:
+        return FaultTarget(
+            self._context.faults, self._context, lambda notice: self._restart(now, notice, boot_ns=BOOT_NS)
+        )
+
+    # Events of the connection ----------------------------------------------------------
+
+    def _take_events(self, now: Nanos) -> None:
+        while (event := self._connection.next_event()) is not None:
+            self._take(event, now)
+        self._sender.answer(self._connection.take_output(), now)
+
+    def _take(self, event: Event, now: Nanos) -> None:
+        match event:
+            case Synchronised():
+                self._tell(now, "synchronised", "")
+            case Opened():
+                self._open(now)
+            case Closed():
+                self._close(now, "by its client")
+            case CommandReceived():
+                self._obey(event.command, now)
+            case WatchdogExpired():
+                self._context.motion.hold()
+                self._tell(now, "watchdog expired", f"no packet for {self.settings.watchdog_ns / NS_PER_S:g} s")
+            case WatchdogRevived():
+                self._context.motion.release()
+                self._tell(now, "watchdog revived", "the last set speeds hold again")
+            case _:
+                pass  # noise is counted in `stats`
+
+    def _open(self, now: Nanos) -> None:
+        context = self._context
+        context.motion.power(on=False)
+        context.reckoning.set_origin()
+        context.sonar.start_cycle(now)
+        context.bumper_watch = BumperWatch(next_ns=now)
+        self._sender.line.begin_session(now)
+        self._reporter.look_at_battery(now)
+        self._sip_due = now + self.settings.sip_period_ns
+        self._tell(now, "opened", "")
+
+    def _close(self, now: Nanos, detail: str) -> None:
+        context = self._context
+        context.motion.power(on=False)
+        context.motion.release()
+        context.motion.limits = limits_of(self.parameters, self.settings.flash.values)
+        context.sonar = self._new_sonar()
+        context.requests = Requests(dropped=context.requests.dropped)
+        context.kept.clear()
+        devices, defaults = context.devices, new_devices(self.settings)
+        devices.gyro, devices.compass = defaults.gyro, defaults.compass
+        devices.joystick.may_drive = devices.joystick.drives = devices.switches.battery_reported = False
+        devices.switches.bump_stall, devices.switches.e_stall = 0, defaults.switches.e_stall
+        devices.battery.pretended_decivolts = None if devices.battery.is_test else devices.battery.pretended_decivolts
+        self._reporter.look_at_battery(now)
+        if self.settings.baud is not None:
+            self._sender.line.set_baud(self.settings.baud)
+        self._complaints = ()
+        was_open, self._sip_due = self._sip_due is not None, None
+        if was_open:
+            self._tell(now, "closed", detail)
+
+    def _restart(self, now: Nanos, notice: str, *, boot_ns: Nanos | None) -> None:
+        """Take the power from everything; None waits for a reboot."""
+        self._connection = self._new_connection()
+        self._sender.clear()
+        self._close(now, notice)
+        context, keep = self._context, self._context.devices
+        context.devices = new_devices(self.settings)
+        context.devices.battery, context.devices.pins, context.devices.joystick = keep.battery, keep.pins, keep.joystick
+        context.devices.switches.stop_button = keep.switches.stop_button
+        context.devices.gripper.has_thing = keep.gripper.has_thing
+        context.reckoning.set_origin()
+        self._boot_at = -1 if boot_ns is None else now + boot_ns
+        self._tell(now, "controller down", notice)
+
+    def _boot(self, now: Nanos) -> None:
+        if self._boot_at is None or not 0 <= self._boot_at <= now:
+            return
+        self._boot_at = None
+        self._sender.answer([ResetNotice().to_frame().to_bytes()], now)
+        self._tell(now, "controller up", "it says so with packet 0xFF and waits for SYNC0")
+
+    def _obey(self, command: Command, now: Nanos) -> None:
+        context, had_power, asked = self._context, self._context.motors_enabled, self._context.motion.asked
+        effect = apply(context, command, now)
+        if context.motion.asked != asked and self.body.state.stalled_left and self.body.state.stalled_right:
+            context.motion.begin_from_stand()  # chosen: else a client cannot back off a wall before it gives up
+        if effect in IGNORED:
+            self._ignored += 1
+        complaint = f"{command.name}: {effect.value}"
+        if effect is not Effect.DONE and complaint not in self._complaints:  # a client may repeat itself
+            self._complaints += (complaint,)
+            self._tell(now, "command ignored" if effect in IGNORED else "command waits", complaint)
+        if context.motors_enabled is not had_power:
+            self._tell(now, "motors", "on" if context.motors_enabled else "off")
+        self._tell_notes(now)
+        self._reporter.look_at_aux()
+        if context.baud_wanted is not None:
+            self._sender.line.set_baud(context.baud_wanted)
+            self._tell(now, "host baud", f"{context.baud_wanted} bit/s")
+            context.baud_wanted = None
+        if context.config_wanted:
+            context.config_wanted = False
+            if self._connection.is_open:  # else the client has asked and closed in one breath
+                self._connection.send(self._reporter.configuration(), now)
+        if context.restart_wanted is not None:
+            notice, context.restart_wanted = context.restart_wanted, None
+            self._restart(now, notice, boot_ns=BOOT_NS if notice == "RESET" else None)
+
+    def _tell_notes(self, now: Nanos) -> None:
+        notes, self._context.notes = self._context.notes, []
+        for what, detail in notes:
+            self._tell(now, what, detail)
+
+    def _tell(self, now: Nanos, what: str, detail: str) -> None:
+        if self.on_event is not None:
+            self.on_event(now, what, detail)

@@ -1,0 +1,144 @@
+"""What breaking and mending does: one small function a fault, and the table of them."""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+
+from p2os.errors import UsageError
+from p2os.pioneer.controller.context import Context
+from p2os.pioneer.controller.faults import MOMENTARY, Fault, Faults
+
+
+@dataclass(frozen=True, slots=True)
+class FaultTarget:
+    """What faults act on."""
+
+    faults: Faults
+    context: Context
+    #: Starts the controller anew; the argument says why.
+    restart: Callable[[str], None]
+
+
+Act = Callable[[FaultTarget, Fault], None]
+
+
+def inject_now(target: FaultTarget, fault: Fault) -> None:
+    """Break something."""
+    _INJECT[fault.name](target, fault)
+
+
+def clear_now(target: FaultTarget, fault: Fault) -> None:
+    """Clear it; what is not injected stays so.
+
+    Raises:
+        UsageError: It happens once, so that there is nothing to clear.
+    """
+    if fault.name in MOMENTARY:
+        raise UsageError(f"there is nothing to clear after {fault.name}", hint="the controller boots by itself")
+    _CLEAR[fault.name](target, fault)
+
+
+def injected_now(context: Context) -> tuple[str, ...]:
+    """Return the words of every fault that lasts, as `clear` takes them."""
+    faults, battery, pins = context.faults, context.devices.battery, context.devices.pins
+    found = [Fault(f"sonar-{kind}", number=n + 1, value=value) for n, (kind, value) in sorted(faults.sonar.items())]
+    sides = (("left", faults.left_blocked), ("right", faults.right_blocked))
+    found += [Fault("wheel-blocked", side=side) for side, is_blocked in sides if is_blocked]
+    if faults.is_loose:
+        found.append(Fault("loose-connector"))
+    if faults.bit_error_rate:
+        found.append(Fault("line-noise", value=faults.bit_error_rate))
+    if battery.pretended_decivolts is not None and not battery.is_test:
+        found.append(Fault("low-battery", value=battery.pretended_decivolts / 10))
+    if context.devices.switches.stop_button:
+        found.append(Fault("stop-button"))
+    for side, pressed in (("front", pins.front_pressed), ("rear", pins.rear_pressed)):
+        found += [Fault("bumper", side=side, number=bit + 1) for bit in range(7) if pressed >> bit & 1]
+    return tuple(fault.text for fault in found)
+
+
+def _sonar(target: FaultTarget, fault: Fault) -> None:
+    target.faults.sonar[fault.number - 1] = (fault.name.removeprefix("sonar-"), fault.value)
+
+
+def _sonar_well(target: FaultTarget, fault: Fault) -> None:
+    target.faults.sonar.pop(fault.number - 1, None)
+
+
+def _wheel(*, blocked: bool) -> Act:
+    return lambda target, fault: setattr(target.faults, f"{fault.side}_blocked", blocked)
+
+
+def _loose(*, is_loose: bool) -> Act:
+    def act(target: FaultTarget, _fault: Fault) -> None:
+        target.faults.is_loose = is_loose
+        target.faults.gap_in = target.faults.gap_out = 0
+
+    return act
+
+
+def _noise(target: FaultTarget, fault: Fault) -> None:
+    target.faults.bit_error_rate = fault.value
+
+
+def _quiet(target: FaultTarget, _fault: Fault) -> None:
+    target.faults.bit_error_rate = 0.0
+
+
+def _volts(target: FaultTarget, fault: Fault) -> None:
+    battery = target.context.devices.battery
+    battery.pretended_decivolts, battery.is_test = round(fault.value * 10), False
+
+
+def _true_volts(target: FaultTarget, _fault: Fault) -> None:
+    target.context.devices.battery.pretended_decivolts = None
+
+
+def _press(target: FaultTarget, _fault: Fault) -> None:
+    target.context.devices.switches.stop_button = True
+    target.context.motion.power(on=False)
+
+
+def _release(target: FaultTarget, _fault: Fault) -> None:
+    target.context.devices.switches.stop_button = False
+
+
+def _bump(target: FaultTarget, fault: Fault) -> None:
+    pins, bit = target.context.devices.pins, 1 << fault.number - 1
+    if fault.side == "front":
+        pins.front_pressed |= bit
+    else:
+        pins.rear_pressed |= bit
+
+
+def _unbump(target: FaultTarget, fault: Fault) -> None:
+    pins, bit = target.context.devices.pins, 1 << fault.number - 1
+    if fault.side == "front":
+        pins.front_pressed &= ~bit
+    else:
+        pins.rear_pressed &= ~bit
+
+
+_INJECT: Mapping[str, Act] = {
+    "sonar-stuck": _sonar,
+    "sonar-noisy": _sonar,
+    "sonar-dead": _sonar,
+    "wheel-blocked": _wheel(blocked=True),
+    "loose-connector": _loose(is_loose=True),
+    "line-noise": _noise,
+    "low-battery": _volts,
+    "brown-out": lambda target, _fault: target.restart("brown-out"),
+    "reboot": lambda target, _fault: target.restart("reboot"),
+    "stop-button": _press,
+    "bumper": _bump,
+}
+_CLEAR: Mapping[str, Act] = {
+    "sonar-stuck": _sonar_well,
+    "sonar-noisy": _sonar_well,
+    "sonar-dead": _sonar_well,
+    "wheel-blocked": _wheel(blocked=False),
+    "loose-connector": _loose(is_loose=False),
+    "line-noise": _quiet,
+    "low-battery": _true_volts,
+    "stop-button": _release,
+    "bumper": _unbump,
+}

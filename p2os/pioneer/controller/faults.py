@@ -1,0 +1,154 @@
+"""Faults on request: what is injected now, and the words that inject and clear it.
+
+A fault is a line of words, the same in a scenario and at the control line of
+`p2os serve`; `FAULTS` lists them. `clear` with the same first words ends it.
+
+    sonar-stuck 3 1.2        sonar 3 (from 1) says 1.2 m whatever comes
+    line-noise 0.001         one bit in a thousand is turned, both ways
+
+Line faults spoil whole bytes on their way; the random streams are the robot's
+own, so that a run with faults repeats.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from difflib import get_close_matches
+
+from p2os.errors import UsageError
+from p2os.pioneer.random_source import RandomSource
+
+#: chosen: a loose contact swallows 1 to so many bytes at a time.
+LONGEST_GAP_BYTES = 40
+#: chosen: how often a byte begins a gap.
+LOOSE_CHANCE = 0.02
+
+#: First word → (the others, what happens).
+FAULTS: Mapping[str, tuple[tuple[str, ...], str]] = {
+    "sonar-stuck": (("NUMBER", "METRES"), "a sonar, counted from 1, says always the same"),
+    "sonar-noisy": (("NUMBER", "METRES"), "a sonar errs by this standard deviation"),
+    "sonar-dead": (("NUMBER",), "a sonar hears nothing"),
+    "wheel-blocked": (("SIDE",), "the left or right wheel does not turn; its motor stalls"),
+    "loose-connector": ((), "runs of bytes are lost, both ways"),
+    "line-noise": (("RATE",), "so many of the bits are turned, both ways"),
+    "low-battery": (("VOLTS",), "the voltmeter says so much"),
+    "brown-out": ((), "the supply dips: the controller starts anew, motors off"),
+    "reboot": ((), "the controller starts anew"),
+    "stop-button": ((), "the red button is pressed: motors off until it is cleared and ENABLE comes"),
+    "bumper": (("SIDE", "SEGMENT"), "a segment of the front or rear bumper, counted from 1, is pressed"),
+}
+SIDES = {"wheel-blocked": ("left", "right"), "bumper": ("front", "rear")}
+#: Happen once: there is nothing to clear.
+MOMENTARY = frozenset({"brown-out", "reboot"})
+
+
+@dataclass(frozen=True, slots=True)
+class Fault:
+    """One fault, read and checked."""
+
+    name: str
+    side: str = ""
+    number: int = 0
+    value: float = 0.0
+
+    @property
+    def text(self) -> str:
+        """The words that make it."""
+        value = {"NUMBER": str(self.number), "SEGMENT": str(self.number), "SIDE": self.side}
+        return " ".join([self.name, *(value.get(word, f"{self.value:g}") for word in FAULTS[self.name][0])])
+
+
+def read_fault(text: str, *, sonar: int, complete: bool = True) -> Fault:
+    """Read the words of a fault.
+
+    Args:
+        text: The words.
+        sonar: How many sonar the robot has.
+        complete: Whether the value at the end must be there; to clear a fault it need not.
+
+    Raises:
+        UsageError: There is no such fault, or a word is missing or out of range.
+    """
+    name, *rest = text.split() or [""]
+    if name not in FAULTS:
+        close = get_close_matches(name, FAULTS, n=1)
+        hint = f"did you mean {close[0]}?" if close else f"faults: {', '.join(FAULTS)}"
+        raise UsageError(f"no fault {name!r}" if name else "which fault?", hint=hint)
+    words = FAULTS[name][0]
+    usage = " ".join([name, *words])
+    optional = {"METRES", "RATE", "VOLTS"} if not complete else set()
+    if len(rest) > len(words) or len(rest) < len([word for word in words if word not in optional]):
+        what = "says too much" if len(rest) > len(words) else "is not all of it"
+        raise UsageError(f"{text!r} {what}", hint=f"say {usage}")
+    found = Fault(name)
+    for word, given in zip(words, rest, strict=False):
+        found = _with(found, word, given, usage, sonar)
+    return found
+
+
+def _with(fault: Fault, word: str, given: str, usage: str, sonar: int) -> Fault:
+    side, number, value = fault.side, fault.number, fault.value
+    if word == "SIDE":
+        if given not in SIDES[fault.name]:
+            raise UsageError(f"{given!r} is none of {', '.join(SIDES[fault.name])}", hint=f"say {usage}")
+        side = given
+    elif word in {"NUMBER", "SEGMENT"}:
+        most = sonar if word == "NUMBER" else 7
+        number = int(given) if given.isdecimal() else 0
+        if not 1 <= number <= most:
+            raise UsageError(f"{fault.name}: {given!r} is no number of 1 to {most}", hint=f"say {usage}")
+    else:
+        most_value = {"METRES": 100.0, "RATE": 0.5, "VOLTS": 25.5}[word]
+        try:
+            value = float(given)
+        except ValueError:
+            value = -1.0
+        if not 0 <= value <= most_value:
+            raise UsageError(f"{fault.name}: {given!r} is no number of 0 to {most_value:g}", hint=f"say {usage}")
+    return Fault(fault.name, side, number, value)
+
+
+@dataclass(slots=True)
+class Faults:
+    """What is broken now, as far as it is not a device's own state."""
+
+    #: 0-based sonar → (stuck, noisy or dead; value).
+    sonar: dict[int, tuple[str, float]] = field(default_factory=dict)
+    left_blocked: bool = False
+    right_blocked: bool = False
+    is_loose: bool = False
+    bit_error_rate: float = 0.0
+    #: Bytes that the loose contact still swallows, to the robot and from it.
+    gap_in: int = 0
+    gap_out: int = 0
+
+    @property
+    def spoils_line(self) -> bool:
+        """Whether bytes suffer on their way."""
+        return self.is_loose or self.bit_error_rate > 0
+
+    def spoil(self, data: bytes, random_source: RandomSource, *, to_robot: bool) -> bytes:
+        """Return what is left of bytes that pass the line."""
+        stream = random_source.of("line in" if to_robot else "line out")
+        gap = self.gap_in if to_robot else self.gap_out
+        found = bytearray()
+        for byte in data:
+            if self.is_loose and not gap and stream.random() < LOOSE_CHANCE:
+                gap = stream.randint(1, LONGEST_GAP_BYTES)
+            if gap:
+                gap -= 1
+                continue
+            if self.bit_error_rate and stream.random() < 1 - (1 - self.bit_error_rate) ** 8:
+                byte ^= 1 << stream.randrange(8)  # noqa: PLW2901 - the byte that arrives
+            found.append(byte)
+        if to_robot:
+            self.gap_in = gap
+        else:
+            self.gap_out = gap
+        return bytes(found)
+
+    def copy(self) -> "Faults":
+        """Return a copy."""
+        return Faults(
+            dict(self.sonar), self.left_blocked, self.right_blocked, self.is_loose, self.bit_error_rate,
+            self.gap_in, self.gap_out,
+        )  # fmt: skip

@@ -1,0 +1,81 @@
+"""What a person can do to a robot that runs: the words of the control line, and what they do.
+
+fault sonar-stuck 3 1.2       break something (`p2os.pioneer.controller.faults` lists what)
+clear sonar-stuck 3            and clear it
+joystick 512 1023 1           stick to the front with the button held
+analog 2 512                  half the full scale on analog port 2
+digital 255                   all digital inputs high
+thing on                      something stands between the gripper's paddles
+charger on                    the charger is plugged in
+"""
+
+from collections.abc import Callable, Mapping
+
+from p2os.errors import UsageError
+from p2os.pioneer.controller.context import Context
+
+#: First word → (the others, what it means).
+INPUTS: Mapping[str, tuple[tuple[str, ...], str]] = {
+    "joystick": (("X", "Y", "BUTTON"), "where the robot's own stick stands, 0 to 1023, and whether its button is held"),
+    "analog": (("PORT", "RAW"), "a voltage at an analog port of 1 to 9, 0 to 1023 for 0 to 5 V"),
+    "digital": (("BYTE",), "the eight digital inputs, 0 to 255"),
+    "thing": (("ON_OFF",), "something between the gripper's paddles"),
+    "charger": (("ON_OFF",), "the charger is plugged in"),
+}
+#: Word → least and most.
+LIMITS = {"X": (0, 1023), "Y": (0, 1023), "BUTTON": (0, 1), "PORT": (1, 9), "RAW": (0, 1023), "BYTE": (0, 255)}
+ON_OFF = {"on": 1, "off": 0}
+
+
+def apply_input(context: Context, text: str) -> None:
+    """Do what the words say.
+
+    Raises:
+        UsageError: They are no input, or a word is missing or out of range.
+    """
+    name, *rest = text.split() or [""]
+    if name not in INPUTS:
+        raise UsageError(f"no input {name!r}", hint=f"inputs: {', '.join(INPUTS)}")
+    words = INPUTS[name][0]
+    usage = f"say {' '.join([name, *words])}"
+    if len(rest) != len(words):
+        raise UsageError(f"{text!r} is no input", hint=usage)
+    _ACTS[name](context, [_number(word, given, usage) for word, given in zip(words, rest, strict=True)])
+
+
+def _number(word: str, given: str, usage: str) -> int:
+    if word == "ON_OFF":
+        if given not in ON_OFF:
+            raise UsageError(f"{given!r} is neither on nor off", hint=usage)
+        return ON_OFF[given]
+    least, most = LIMITS[word]
+    if not given.isdecimal() or not least <= int(given) <= most:
+        raise UsageError(f"{given!r} is no number of {least} to {most}", hint=usage)
+    return int(given)
+
+
+def _joystick(context: Context, values: list[int]) -> None:
+    stick = context.devices.joystick
+    stick.x, stick.y, stick.button1 = values
+    context.let_the_stick_drive()
+
+
+def _digital(context: Context, values: list[int]) -> None:
+    context.devices.pins.digital_in = values[0]
+
+
+def _thing(context: Context, values: list[int]) -> None:
+    context.devices.gripper.has_thing = bool(values[0])
+
+
+def _charger(context: Context, values: list[int]) -> None:
+    context.devices.battery.is_charging = bool(values[0])
+
+
+_ACTS: Mapping[str, Callable[[Context, list[int]], None]] = {
+    "joystick": _joystick,
+    "analog": lambda context, values: context.devices.pins.set_analog(values[0], values[1]),
+    "digital": _digital,
+    "thing": _thing,
+    "charger": _charger,
+}

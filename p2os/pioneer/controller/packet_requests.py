@@ -1,0 +1,90 @@
+"""Which extra packets a client has asked for: none, one, or one a cycle.
+
+Source: Pioneer 2/3 H8 manual p. 49 and Pioneer 3 manual p. 43: extra packets
+follow the standard one, but ARCOS sends GYROpac and JOYSTICKpac just before it;
+the standard packet has priority and extra ones are dropped when the line is too
+slow. One that was asked for once waits for a cycle with room.
+"""
+
+from dataclasses import dataclass
+from enum import Enum
+
+from p2os.protocol.profiles import Profile
+
+
+class Extra(Enum):
+    """A packet that goes out beside the standard one, in the order in which they go."""
+
+    GYRO = "GYROpac"
+    JOYSTICK = "JOYSTICKpac"
+    IO = "IOpac"
+    ENCODER = "ENCODERpac"
+    GRIPPER = "GRIPPERpac"
+    COMPASS = "TCM2pac"
+    AUX1 = "SERAUXpac"
+    AUX2 = "SERAUX2pac"
+    AUX3 = "SERAUX3pac"
+    PLAYLIST = "PLAYLISTpac"
+    ARM = "ARMpac"
+    ARM_INFO = "ARMINFOpac"
+    BATTERY = "BATTERYpac"
+
+
+#: What ARCOS sends before the standard packet.
+FIRST_ON_ARCOS = frozenset({Extra.GYRO, Extra.JOYSTICK})
+#: chosen: after so many cycles without room a packet asked for once goes all the same, and the cycle stretches.
+PATIENCE_CYCLES = 5
+
+
+@dataclass(slots=True)
+class Requests:
+    """What is asked for."""
+
+    continuous: frozenset[Extra] = frozenset()
+    once: frozenset[Extra] = frozenset()
+    #: Cycles in which a packet asked for once found no room.
+    waited: int = 0
+    #: Packets that found no room, since the start.
+    dropped: int = 0
+
+    def set(self, extra: Extra, value: int) -> None:
+        """Do as the argument says: 0 stops, 1 asks for one, 2 and more for one a cycle."""
+        self.continuous = self.continuous | {extra} if value > 1 else self.continuous - {extra}
+        self.once = self.once | {extra} if value == 1 else self.once - {extra}
+
+    def wanted(self, profile: Profile) -> tuple[list[Extra], list[Extra]]:
+        """Return what goes before the standard packet and what after it."""
+        asked = [extra for extra in Extra if extra in self.continuous or extra in self.once]
+        before = [extra for extra in asked if profile is Profile.ARCOS and extra in FIRST_ON_ARCOS]
+        return before, [extra for extra in asked if extra not in before]
+
+    def sent(self, extra: Extra) -> None:
+        """Note that a packet has gone."""
+        self.once -= {extra}
+        self.waited = 0
+
+    def no_room(self, extra: Extra) -> None:
+        """Note that a packet found no room."""
+        if extra in self.once:
+            self.waited += 1
+        else:
+            self.dropped += 1
+
+    def must_go(self, extra: Extra) -> bool:
+        """Tell whether a packet has waited long enough."""
+        return extra in self.once and self.waited >= PATIENCE_CYCLES
+
+    def snapshot(self) -> object:
+        """Return all that decides the future."""
+        return _names(self.continuous), _names(self.once), self.waited, self.dropped
+
+    def restore(self, snapshot: object) -> None:
+        """Put back what `snapshot` returned."""
+        assert isinstance(snapshot, tuple)  # noqa: S101  # our own value
+        continuous, once, self.waited, self.dropped = snapshot
+        self.continuous = frozenset(Extra[name] for name in continuous)
+        self.once = frozenset(Extra[name] for name in once)
+
+
+def _names(extras: frozenset[Extra]) -> tuple[str, ...]:
+    return tuple(sorted(extra.name for extra in extras))

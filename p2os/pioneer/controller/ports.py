@@ -1,0 +1,98 @@
+"""What the controller needs of a body: to turn its wheels, and to hear what they and the sonar say."""
+
+from collections.abc import Sequence
+from typing import Protocol
+
+from p2os.timing import Nanos
+
+
+class WheelAngles(Protocol):
+    """What the encoders say after a step."""
+
+    @property
+    def left_angle_rad(self) -> float:
+        """Turned by the left wheel since the body was reset, forward positive."""
+        ...
+
+    @property
+    def right_angle_rad(self) -> float:
+        """Turned by the right wheel since the body was reset, forward positive."""
+        ...
+
+
+class WheelState(WheelAngles, Protocol):
+    """What the robot's own sensors know of its body; the pose is not among it."""
+
+    @property
+    def left_speed_mps(self) -> float:
+        """Speed of the left wheel's rim."""
+        ...
+
+    @property
+    def right_speed_mps(self) -> float:
+        """Speed of the right wheel's rim."""
+        ...
+
+    @property
+    def stalled_left(self) -> bool:
+        """Whether the left motor is stalled."""
+        ...
+
+    @property
+    def stalled_right(self) -> bool:
+        """Whether the right motor is stalled."""
+        ...
+
+
+class SensedState(WheelState, Protocol):
+    """What compass, gyro and bumpers look at: how the body really stands and turns."""
+
+    @property
+    def heading_rad(self) -> float:
+        """Heading in the world, counter-clockwise from x."""
+        ...
+
+    @property
+    def pitch_rad(self) -> float:
+        """Pitch."""
+        ...
+
+    @property
+    def turn_radps(self) -> float:
+        """Rate of turn, counter-clockwise positive."""
+        ...
+
+    @property
+    def in_contact(self) -> bool:
+        """Whether the hull touches anything but the floor."""
+        ...
+
+
+class Body(Protocol):
+    """A body that is stepped."""
+
+    @property
+    def dt_ns(self) -> Nanos:
+        """Length of a step; a whole number of microseconds."""
+        ...
+
+    @property
+    def state(self) -> SensedState:
+        """What the sensors know now."""
+        ...
+
+    def step(self, left_mps: float, right_mps: float) -> WheelAngles:
+        """Live one step with these rim-speed set-points."""
+        ...
+
+    def ranges(self, numbers: Sequence[int]) -> Sequence[float]:
+        """Return the range that each sonar hears now, in metres; the longest range where there is no echo."""
+        ...
+
+    def snapshot(self) -> object:
+        """Return all that decides the future."""
+        ...
+
+    def restore(self, snapshot: object) -> None:
+        """Put back what `snapshot` returned."""
+        ...

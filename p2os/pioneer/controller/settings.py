@@ -1,0 +1,75 @@
+"""How a virtual robot is asked to behave: its firmware, its FLASH, its line, its sensors' errors."""
+
+from dataclasses import dataclass, field, replace
+from enum import Enum
+
+from p2os.errors import UsageError
+from p2os.pioneer.controller.flash import BAUD_RATES, Flash
+from p2os.pioneer.sensor_errors import IDEAL, SensorErrors
+from p2os.protocol.profiles import Profile
+from p2os.timing import NS_PER_MS, NS_PER_S, Nanos
+
+#: The CONFIGpac has one byte for the cycle.
+LONGEST_SIP_PERIOD_MS = 255
+
+
+class SonarPerSip(Enum):
+    """How many sonar readings a standard packet carries."""
+
+    #: Two new readings a cycle in ring order, as a Pioneer 2 sends them.
+    TWO = "two"
+    #: Every fitted sonar in every packet.
+    ALL = "all"
+
+    @property
+    def pings_per_cycle(self) -> int | None:
+        """Return the readings a packet, or None for all."""
+        return 2 if self is SonarPerSip.TWO else None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ControllerSettings:
+    """The settings of a virtual robot's firmware.
+
+    Raises:
+        UsageError: a value cannot be sent in the robot's packets.
+    """
+
+    #: Says the answer to SYNC2; ARIA takes "MobileSim" for its own simulator, so any other name will do.
+    name: str = "Virtual"
+    serial: str = "VIRTUAL"
+    profile: Profile = Profile.P2OS
+    #: Answers syncs out of order and obeys what any family knows, as AMRISim does.
+    lenient: bool = False
+    sip_period_ns: Nanos = 100 * NS_PER_MS
+    watchdog_ns: Nanos = 2 * NS_PER_S
+    sonar_per_sip: SonarPerSip = SonarPerSip.TWO
+    #: The battery's resting voltage at the start; it drains from there.
+    battery_decivolts: int = 126
+    #: Speed of the host's line, bit/s; None: a line that takes no time.
+    baud: int | None = None
+    flash: Flash = field(default_factory=Flash)
+    errors: SensorErrors = IDEAL
+    #: Decides every random error.
+    seed: int = 0
+
+    def __post_init__(self) -> None:
+        period_ms = self.sip_period_ns / NS_PER_MS
+        if not 1 <= period_ms <= LONGEST_SIP_PERIOD_MS:
+            raise UsageError(f"a packet every {period_ms:g} ms is not between 1 and {LONGEST_SIP_PERIOD_MS} ms")
+        if not 0 <= self.battery_decivolts <= 0xFF:
+            raise UsageError(f"a battery of {self.battery_decivolts / 10:g} V does not fit the packet (0 to 25.5 V)")
+        if self.baud is not None and self.baud not in BAUD_RATES:
+            rates = ", ".join(str(rate) for rate in BAUD_RATES)
+            raise UsageError(f"a line of {self.baud} bit/s is none that HOSTBAUD names", hint=f"rates: {rates}")
+
+    def with_flash(self, flash: Flash) -> "ControllerSettings":
+        """Return these settings with what a FLASH file says."""
+        return replace(
+            self,
+            flash=flash,
+            name=flash.text("name"),
+            serial=flash.text("serial"),
+            sip_period_ns=flash.number("sipcycle") * NS_PER_MS,
+            watchdog_ns=flash.number("watchdog") * NS_PER_MS,
+        )

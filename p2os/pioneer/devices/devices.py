@@ -1,0 +1,69 @@
+"""All devices of one robot, saved and restored together."""
+
+from dataclasses import dataclass, field, replace
+from typing import cast
+
+from p2os.pioneer.devices.aux_ports import PORTS, AuxPort
+from p2os.pioneer.devices.battery import Battery
+from p2os.pioneer.devices.gripper import ON_USER_IO, SWITCHES, Gripper
+from p2os.pioneer.devices.heading_sensors import Compass, Gyro
+from p2os.pioneer.devices.joystick import Joystick
+from p2os.pioneer.devices.pins import Pins
+from p2os.timing import Nanos
+
+
+@dataclass(slots=True)
+class Switches:
+    """What the firmware keeps in single bits and numbers."""
+
+    #: BUMPSTALL: 0 off, 1 front, 2 rear, 3 both.
+    bump_stall: int = 0
+    #: E_STALL: the stop button causes a stall.
+    e_stall: bool = False
+    #: The red button is pressed.
+    stop_button: bool = False
+    buzzer: bool = True
+    #: Somebody has said the battery is low, once a session.
+    battery_reported: bool = False
+
+
+@dataclass(slots=True)
+class Devices:
+    """The devices."""
+
+    battery: Battery = field(default_factory=Battery)
+    gripper: Gripper = field(default_factory=Gripper)
+    pins: Pins = field(default_factory=Pins)
+    joystick: Joystick = field(default_factory=Joystick)
+    compass: Compass = field(default_factory=Compass)
+    gyro: Gyro = field(default_factory=Gyro)
+    aux: tuple[AuxPort, ...] = field(default_factory=lambda: tuple(AuxPort(number) for number in PORTS))
+    switches: Switches = field(default_factory=Switches)
+
+    def digital_in(self, now: Nanos) -> int:
+        """Return the user's inputs; a gripper on them holds the lower six with its switches.
+
+        ARIA reads such a gripper here and not in the gripper's own byte.
+        """
+        pins = self.pins.digital_in
+        if self.gripper.kind != ON_USER_IO:
+            return pins
+        return pins & ~SWITCHES | int(self.gripper.state(now)) & SWITCHES
+
+    def snapshot(self) -> object:
+        """Return all that decides the future."""
+        return _copy(self)
+
+    def restore(self, snapshot: object) -> None:
+        """Put back what `snapshot` returned."""
+        saved = _copy(cast("Devices", snapshot))
+        self.battery, self.gripper, self.pins, self.joystick = saved.battery, saved.gripper, saved.pins, saved.joystick
+        self.compass, self.gyro, self.aux, self.switches = saved.compass, saved.gyro, saved.aux, saved.switches
+
+
+def _copy(devices: Devices) -> Devices:
+    return Devices(
+        battery=replace(devices.battery), gripper=replace(devices.gripper), pins=replace(devices.pins),
+        joystick=replace(devices.joystick), compass=replace(devices.compass), gyro=replace(devices.gyro),
+        aux=tuple(replace(port) for port in devices.aux), switches=replace(devices.switches),
+    )  # fmt: skip

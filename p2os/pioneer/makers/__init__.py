@@ -1,5 +1,0 @@
-"""Worlds made from a seed: `p2os world new`."""
-
-from p2os.pioneer.makers.kinds import KINDS, make_world
-
-__all__ = ["KINDS", "make_world"]

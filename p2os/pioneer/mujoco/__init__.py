@@ -1,5 +1,0 @@
-"""The second physical body, on MuJoCo: a cross-check of `bullet`; the only importer of mujoco."""
-
-from p2os.pioneer.mujoco.body import MujocoBody
-
-__all__ = ["MujocoBody"]

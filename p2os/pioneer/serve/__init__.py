@@ -1,0 +1,1 @@
+"""Virtual robots on real lines, in real or scaled time: one host, or a fleet in one world."""

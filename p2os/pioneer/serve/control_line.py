@@ -1,0 +1,128 @@
+"""Where a person gives orders to robots that run: the terminal, or a line that programs open."""
+
+import contextlib
+import os
+import sys
+from collections.abc import Callable, Sequence
+
+from p2os.errors import TransportError
+from p2os.pioneer.serve.host import Host
+from p2os.pioneer.serve.orders import LONGEST_LINE, obey
+from p2os.transport.ports import READ_BYTES, HungUpError, Listener, Transport
+from p2os.transport.waiting import wait_readable
+
+
+def say_on_stderr(text: str) -> None:
+    """Write a text to standard error at once."""
+    sys.stderr.write(text)
+    sys.stderr.flush()
+
+
+class Terminal:
+    """Standard input as a line: orders are typed, answers go to standard error.
+
+    Args:
+        say: Takes the answers' text; an OSError of it ends the line.
+    """
+
+    description = "the terminal"
+
+    def __init__(self, say: Callable[[str], object] = say_on_stderr) -> None:
+        self._say = say
+
+    def read(self) -> bytes:
+        """Return what was typed."""
+        if not self.is_ours() or not wait_readable((0,), 0):
+            return b""
+        try:
+            data = os.read(0, READ_BYTES)
+        except OSError as error:
+            raise HungUpError(f"the terminal is gone: {error.strerror}") from error
+        if not data:
+            raise HungUpError("the terminal has ended")
+        return data
+
+    def write(self, data: bytes) -> None:
+        """Show an answer."""
+        try:
+            self._say(data.decode())
+        except OSError as error:
+            raise HungUpError(f"the terminal is gone: {error.strerror}") from error
+
+    def fileno(self) -> int:
+        """Return standard input."""
+        return 0
+
+    def set_baud(self, _baud: int) -> None:
+        """Do nothing."""
+
+    def close(self) -> None:
+        """Leave standard input open."""
+
+    @staticmethod
+    def is_ours() -> bool:
+        """Tell whether we may read: a program in the background that reads its terminal is stopped."""
+        try:
+            return not os.isatty(0) or os.tcgetpgrp(0) == os.getpgrp()
+        except (OSError, AttributeError):  # Windows has no process groups
+            return False
+
+
+class ControlLine:
+    """Takes orders, one a line, from one person at a time.
+
+    Args:
+        listener: Where that person comes; None takes standard input.
+        say: Takes the answers where standard input is taken.
+    """
+
+    def __init__(self, listener: Listener | None, say: Callable[[str], object] = say_on_stderr) -> None:
+        self._listener = listener
+        self._person: Transport | None = Terminal(say) if listener is None else None
+        self._typed = b""
+
+    @property
+    def poll_s(self) -> float | None:
+        """Return how often somebody has to look whether a person has come; None where a descriptor tells."""
+        return None if self._person is not None or self._listener is None else self._listener.poll_s
+
+    def descriptors(self) -> list[int]:
+        """Return what tells that there is something to do."""
+        if isinstance(self._person, Terminal) and not self._person.is_ours():
+            return []
+        found = None
+        if self._person is not None:
+            found = self._person.fileno()
+        elif self._listener is not None:
+            found = self._listener.fileno()
+        return [] if found is None else [found]
+
+    def serve(self, hosts: Sequence[Host]) -> bool:
+        """Take what has been said and answer it; return whether there was anything."""
+        if self._person is None and self._listener is not None:
+            self._person, self._typed = self._listener.accept(), b""
+        if self._person is None:
+            return False
+        try:
+            data = self._person.read()
+            *lines, self._typed = (self._typed + data).replace(b"\r", b"\n").split(b"\n")
+            self._typed = self._typed[-LONGEST_LINE:]
+            told = [line[:LONGEST_LINE].decode(errors="replace") for line in lines if line.strip()]
+            for line in told:
+                self._person.write("".join(f"{row}\n" for row in obey(hosts, line)).encode())
+        except TransportError:
+            self._leave()
+            return False
+        return bool(told)
+
+    def close(self) -> None:
+        """Let the person go and give the place back."""
+        self._leave()
+        if self._listener is not None:
+            self._listener.close()
+
+    def _leave(self) -> None:
+        if self._person is not None:
+            with contextlib.suppress(TransportError):
+                self._person.close()
+            self._person = None

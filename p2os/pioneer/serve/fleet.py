@@ -1,0 +1,86 @@
+"""Many hosts in one thread: each lives when it is due, and one wait serves them all.
+
+Invariant: a host that has nothing due and nothing to read costs a comparison a round.
+"""
+
+from collections.abc import Callable, Sequence
+
+from p2os.pioneer.serve.control_line import ControlLine
+from p2os.pioneer.serve.host import ASLEEP_WAIT_S, Host
+from p2os.timing import NS_PER_S
+from p2os.transport.waiting import wait_readable
+from p2os.transport.wall_clock import wall_clock
+
+
+class Fleet:
+    """Serves many robots.
+
+    Args:
+        hosts: One a robot.
+        control: Where a person gives orders, or None.
+        on_tick: Called so often, in seconds, if given.
+    """
+
+    def __init__(
+        self,
+        hosts: Sequence[Host],
+        *,
+        control: ControlLine | None = None,
+        on_tick: tuple[float, Callable[[], None]] | None = None,
+    ) -> None:
+        self.hosts = tuple(hosts)
+        self.control = control
+        self._on_tick = on_tick
+        self._next_tick_s = _now_s() + on_tick[0] if on_tick else float("inf")
+        #: When each is to live next, by the clock, and what it listens to.
+        self._due_s = [0.0] * len(self.hosts)
+        self._listening: list[list[int]] = [[] for _ in self.hosts]
+
+    def run(self, *, until: Callable[[], bool] = lambda: False) -> None:
+        """Serve until `until` says so or an exception (Ctrl-C) ends it; then let every client go."""
+        try:
+            while not until():
+                self.turn(ASLEEP_WAIT_S)
+        finally:
+            for host in self.hosts:
+                host.close()
+            if self.control is not None:
+                self.control.close()
+
+    def turn(self, longest_wait_s: float) -> None:
+        """Let everyone live who is due, wait for the next deadline or bytes, and listen to those who have some."""
+        now_s = _now_s()
+        for index, host in enumerate(self.hosts):
+            if self._due_s[index] <= now_s:
+                host.live()
+                self._look_ahead(index)
+        if now_s >= self._next_tick_s and self._on_tick is not None:
+            self._next_tick_s = now_s + self._on_tick[0]
+            self._on_tick[1]()
+        wait_s = min(*self._due_s, self._next_tick_s, now_s + longest_wait_s) - _now_s()
+        ready = self._wait(wait_s)
+        now_s = _now_s()
+        for index, host in enumerate(self.hosts):
+            is_due = self._due_s[index] <= now_s  # it lives in the next turn: looking ahead here would put that off
+            if is_due or not ready.isdisjoint(self._listening[index]):
+                host.listen()
+                if not is_due:
+                    self._look_ahead(index)
+        if self.control is not None and self.control.serve(self.hosts):
+            self._due_s = [0.0] * len(self.hosts)
+
+    def _look_ahead(self, index: int) -> None:
+        host = self.hosts[index]
+        self._due_s[index] = _now_s() + host.wait_s()
+        self._listening[index] = host.descriptors()
+
+    def _wait(self, wait_s: float) -> set[int]:
+        descriptors = [descriptor for found in self._listening for descriptor in found]
+        if self.control is not None:
+            descriptors += self.control.descriptors()
+            wait_s = min(wait_s, self.control.poll_s or wait_s)
+        return wait_readable(descriptors, wait_s)
+
+
+def _now_s() -> float:
+    return wall_clock() / NS_PER_S

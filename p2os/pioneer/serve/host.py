@@ -1,0 +1,381 @@
+"""A virtual Pioneer on a real line, in real or scaled time: what `p2os serve` runs.
+
+This is the I/O layer around `Pioneer`: it reads the clock, waits on descriptors and
+moves bytes; every decision is the controller's. It serves one client at a time.
+A second one is let in, told so in a line and let go, since a robot has one host. A client
+that vanishes stops the robot at once and frees it for the next; so does one that has no open
+session for longer than `sync_limit_ns`, if there is such a limit.
+
+A robot with a speed of its line (`settings.baud`) is heard and spoken to at that
+speed, whatever the medium; a real serial port paces itself. HOSTBAUD changes both.
+
+Its time is a `RobotTime`: the robot does not live while nobody is connected and it stands
+still, nor through a pause of the machine, which is reported, and which is silence for its
+watchdog: a real robot would have heard nothing either. Robots of one world (`multi_robot_world`)
+share theirs; one that has no client is then carried along by the others.
+"""
+
+import contextlib
+from collections.abc import Callable, Sequence
+from functools import partial
+from typing import cast
+
+from p2os.errors import TransportError
+from p2os.pioneer.body.contract import RobotBody
+from p2os.pioneer.controller.controller import Pioneer
+from p2os.pioneer.serve.aux_endpoint import AuxEndpoint
+from p2os.pioneer.serve.multi_robot_world import MultiRobotWorld
+from p2os.pioneer.serve.paced_line import PacedLine
+from p2os.pioneer.serve.robot_time import SETTLE_NS, RobotTime
+from p2os.pioneer.serve.world_orders import change_world
+from p2os.timing import NS_PER_S, Nanos
+from p2os.transport.ports import READ_BYTES, Listener, Transport
+from p2os.transport.waiting import BLIND_POLL_S, TurnedAway, has_hung_up, wait_readable
+from p2os.transport.wall_clock import wall_clock
+
+#: (robot's time in ns, what happened in a word or two, detail).
+HostEvent = Callable[[Nanos, str, str], None]
+
+#: chosen: well below the pause, and often enough for a robot that is connected but not open.
+AWAKE_WAIT_S = 0.1
+#: chosen: how soon `run` notices that it should end.
+ASLEEP_WAIT_S = 0.5
+#: chosen: no P2OS client says more than its line carries for so long; one that does, or that has left as much, goes.
+LONGEST_BEHIND_NS: Nanos = 5 * NS_PER_S
+#: chosen: 4 MB of a client that is dropped are read away, so that a terminal is clean for the next.
+MOST_READS_LOST = 1024
+#: chosen: a second of a 9600 baud line; a client that sends faster finds its own medium full.
+MOST_WAITING = 960
+
+
+class Host:
+    """Serves one virtual robot on one listener.
+
+    Args:
+        pioneer: The robot.
+        listener: Where its clients come.
+        on_event: Told of clients that come and go, and of pauses.
+        clock: Nanoseconds; never goes back.
+        speed: Robot seconds a second of the clock.
+        shared: The time and the multi-robot world of robots that share a world, with this one's number there, from 0;
+            the time then knows the clock and the speed.
+        paced: Whether bytes take the time that `settings.baud` gives them; False where the medium does it itself.
+        aux: Who hangs at the AUX ports.
+        sync_limit_ns: A client that has no open session for so many nanoseconds of the clock is let go; None: never.
+            Without effect on a terminal or serial port, which cannot be closed on who has it open.
+    """
+
+    def __init__(
+        self,
+        pioneer: Pioneer,
+        listener: Listener,
+        *,
+        on_event: HostEvent | None = None,
+        clock: Callable[[], Nanos] = wall_clock,
+        speed: float = 1.0,
+        shared: tuple[RobotTime, MultiRobotWorld, int] | None = None,
+        paced: bool = True,
+        aux: Sequence[AuxEndpoint] = (),
+        sync_limit_ns: Nanos | None = None,
+    ) -> None:
+        self.pioneer = pioneer
+        self.listener = listener
+        self.aux = tuple(aux)
+        self._on_event = on_event
+        self._time = RobotTime(clock, speed) if shared is None else shared[0]
+        self._bring: Callable[[Nanos], object] = self._advance_to
+        #: Who shares the robot's world, if anybody does.
+        self.multi_robot_world: MultiRobotWorld | None = None
+        if shared is not None:
+            _, multi_robot_world, number = shared
+            self.multi_robot_world = multi_robot_world
+            multi_robot_world.members[number].advance_to = self._advance_to
+            self._bring = partial(multi_robot_world.bring, number)
+        self._client: Transport | None = None
+        self._turned_away = TurnedAway(self._time.clock)
+        self._sync_limit_ns = sync_limit_ns
+        #: When the client came, and when it had an open session last.
+        self._came_at: Nanos = 0
+        self._open_at: Nanos = 0
+        #: What was left out of the time so far.
+        self._left_out: Nanos = self._time.left_out
+        self._settled_at: Nanos = 0
+        self._baud = pioneer.baud
+        #: Since when more waits than could be heard at once.
+        self._behind_since: Nanos | None = None
+        #: To the robot and from it.
+        self._lines: tuple[PacedLine, PacedLine] | None = None
+        if paced and self._baud is not None:
+            self._lines = PacedLine(self._baud), PacedLine(self._baud)
+
+    @property
+    def now(self) -> Nanos:
+        """Return the robot's time, in nanoseconds."""
+        return self._time.now
+
+    @property
+    def client(self) -> str | None:
+        """Return who is connected, or None."""
+        return None if self._client is None else self._client.description
+
+    def run(self, *, until: Callable[[], bool] = lambda: False) -> None:
+        """Serve until `until` says so or an exception (Ctrl-C) ends it; then let the client go.
+
+        `until` is asked after every round: at least twice a second.
+        """
+        try:
+            while not until():
+                self.turn(ASLEEP_WAIT_S)
+        finally:
+            self.close()
+
+    def turn(self, longest_wait_s: float) -> None:
+        """Do what is due, then wait for the next deadline, bytes or client, at most so long."""
+        self.live()
+        wait_readable(self.descriptors(), min(self.wait_s(), longest_wait_s))
+        self.listen()
+
+    def live(self) -> None:
+        """Do what is due by the clock."""
+        self._read_clock()
+        self._turned_away.look()
+        if self._is_asleep():
+            return
+        self._bring(self.now)
+        self._speak()
+        self._serve_aux()
+        self._look_at_session()
+
+    def listen(self) -> None:
+        """Take clients that have come and bytes that have arrived."""
+        self._read_clock()
+        self._welcome()
+        self._listen_to_client()
+        if not self._is_asleep():
+            self._serve_aux()
+
+    def descriptors(self) -> list[int]:
+        """Return what tells by becoming readable that there is something to listen to."""
+        found = []
+        if (listening := self.listener.fileno()) is not None:
+            found.append(listening)
+        if self._client is not None and self._may_receive():
+            with contextlib.suppress(TransportError):
+                found.append(self._client.fileno())
+        if not self._is_asleep():
+            for member in self.aux:
+                with contextlib.suppress(TransportError):
+                    found += member.descriptors()
+        return found
+
+    def wait_s(self) -> float:
+        """Return how long nothing will be due; `ASLEEP_WAIT_S` at most."""
+        waits = [AWAKE_WAIT_S if self._turned_away else ASLEEP_WAIT_S]
+        if not self._is_asleep():
+            waits.append(AWAKE_WAIT_S)
+            waits += [max(due - self.now, 0) / NS_PER_S / self._time.speed for due in self._deadlines()]
+            waits += [member.poll_s for member in self.aux if member.poll_s is not None]
+        if self._client is None:
+            waits.append(ASLEEP_WAIT_S if self.listener.poll_s is None else self.listener.poll_s)
+        else:
+            try:
+                self._client.fileno()
+            except TransportError:
+                waits.append(BLIND_POLL_S)
+        return min(waits)
+
+    def close(self) -> None:
+        """Stop the robot, let the client go and give the ports back."""
+        self._drop_client("the host ends")
+        self._turned_away.close()
+        self.listener.close()
+        for member in self.aux:
+            member.close()
+
+    def do(self, words: str) -> None:
+        """Inject or clear a fault, or press something on the robot: the words of `Pioneer.do`.
+
+        Raises:
+            UsageError: They mean nothing; nothing has changed then.
+        """
+        self._bring(self.now)
+        self.pioneer.do(words, self.now)
+
+    def change_world(self, words: str) -> str:
+        """Change the world of the robot and of all that share it: an order of `world_orders`; return what was done.
+
+        Raises:
+            UsageError: The words mean nothing; nothing has changed then.
+            WorldError: There is no such thing, or it is part of the building.
+        """
+        if self.multi_robot_world is not None:
+            robots = [member.as_other.name for member in self.multi_robot_world.members]
+            return change_world(self.multi_robot_world.bodies_at(self.now), words, robots)
+        self._bring(self.now)
+        return change_world([cast("RobotBody", self.pioneer.body)], words)
+
+    def _advance_to(self, limit: Nanos) -> None:
+        """Let the robot live until `limit`, and hear what arrives by then on a line that takes its time."""
+        if self._lines is not None:
+            for at, data in self._lines[0].take(limit):
+                self._deliver(data, at)
+        self.pioneer.advance_to(limit)
+
+    def _deadlines(self) -> list[Nanos]:
+        due = [self.pioneer.next_deadline()]
+        if self._lines is not None:
+            due += [line.next_deadline() for line in self._lines]
+        return [at for at in due if at is not None]
+
+    def _may_receive(self) -> bool:
+        """Tell whether the line to the robot takes more."""
+        return self._lines is None or self._lines[0].waiting < MOST_WAITING
+
+    def _speak(self) -> None:
+        data = b"".join(self.pioneer.take_output())
+        if self._lines is not None:
+            if data:
+                self._lines[1].put(data, self.now)
+            data = b"".join(lump for _, lump in self._lines[1].take(self.now))
+        if self._client is None or not data:
+            return
+        try:
+            self._client.write(data)
+        except TransportError as error:
+            self._drop_client(str(error))
+
+    def _deliver(self, data: bytes, at: Nanos) -> None:
+        """Let the robot hear bytes, and follow it to another speed (HOSTBAUD, and back at CLOSE)."""
+        self.pioneer.receive(data, at)
+        self._follow_speed()
+
+    def _follow_speed(self) -> None:
+        baud = self.pioneer.baud
+        if baud is None or baud == self._baud:
+            return
+        self._baud = baud
+        for line in self._lines or ():
+            line.set_baud(baud)
+        if self._client is not None and self._lines is None:
+            self._speak()
+            self._client.set_baud(baud)
+
+    def _serve_aux(self) -> None:
+        if self.aux:
+            self._bring(self.now)
+        for member in self.aux:
+            member.move_bytes(self.pioneer, self.now)
+
+    def _welcome(self) -> None:
+        """Take a client that has come, or send it away when there is one."""
+        if self._client is not None and self.listener.fileno() is None:
+            return
+        transport = self.listener.accept()
+        if transport is None:
+            return
+        while self._listen_to_client():  # a client that has just left makes room for this one
+            pass
+        if self._client is not None:
+            first = self._client.description
+            self._tell("client refused", f"{transport.description}: {first} is connected")
+            connected_s = (self.now - self._came_at) / self._time.speed / NS_PER_S
+            peer = first.removeprefix("tcp:")
+            self._turned_away.add(transport, f"busy: {peer} is connected for {connected_s:.0f} s")
+            return
+        self.pioneer.take_output()  # what it said to nobody
+        self._client, self._came_at, self._open_at = transport, self.now, self.now
+        self._time.client_came()
+        self._tell("client connected", transport.description)
+
+    def _listen_to_client(self) -> bool:
+        """Take what the client says; return whether it said something."""
+        if self._client is None:
+            return False
+        if not self._may_receive():
+            self._look_at_backlog(self._client)
+            return False
+        try:
+            data = self._client.read()
+        except TransportError as error:
+            self._drop_client(str(error))
+            return False
+        if data and self._lines is not None:
+            self._lines[0].put(data, self.now)
+        elif data:
+            self._bring(self.now)
+            self._deliver(data, self.now)
+            self._speak()
+        if len(data) < READ_BYTES:
+            self._behind_since = None
+        elif self._client is not None:  # more waits
+            self._look_at_backlog(self._client)
+        return bool(data)
+
+    def _look_at_session(self) -> None:
+        """Let a client go that has had no open session for too long."""
+        if self._client is None or self._sync_limit_ns is None or self.listener.fileno() is None:
+            return
+        if self.pioneer.state.open:
+            self._open_at = self.now
+        elif self.now - self._open_at >= self._sync_limit_ns * self._time.speed:
+            limit_s = self._sync_limit_ns / NS_PER_S
+            self._drop_client(f"{self._client.description} had no open session for {limit_s:g} s", tell=True)
+
+    def _look_at_backlog(self, client: Transport) -> None:
+        """Drop a client that has left more than could be heard so far, or that shouts for too long.
+
+        What a client has closed may still wait in its own machine, behind what it
+        had to say: then only its shouting tells. What it has said is lost.
+        """
+        if self._behind_since is None:
+            self._behind_since = self.now
+        reason = f"{client.description} left while its bytes waited"
+        with contextlib.suppress(TransportError):
+            if not has_hung_up(client.fileno()):
+                if self.now - self._behind_since < LONGEST_BEHIND_NS:
+                    return
+                limit_s = LONGEST_BEHIND_NS // NS_PER_S
+                reason = f"{client.description} said more than can be heard for {limit_s} s"
+            for _ in range(MOST_READS_LOST):
+                if not client.read():
+                    break
+        self._drop_client(reason)
+
+    def _drop_client(self, reason: str, *, tell: bool = False) -> None:
+        """Stop the robot and let its client go; `tell` sends the reason."""
+        if self._client is None:
+            return
+        client, self._client, self._behind_since = self._client, None, None
+        self._time.client_left()
+        self._bring(self.now)
+        if self._lines is not None:  # its last words still come
+            self.pioneer.receive(self._lines[0].take_all(), self.now)
+        self.pioneer.hang_up(self.now)
+        self.pioneer.take_output()
+        self._baud = self.pioneer.baud
+        for line in self._lines or ():
+            line.clear()
+            line.set_baud(self._baud or line.baud)
+        if tell:
+            self._turned_away.add(client, reason)
+        else:
+            with contextlib.suppress(TransportError):
+                client.close()
+        self._settled_at = self.now + SETTLE_NS
+        self._tell("client gone", reason)
+
+    def _is_asleep(self) -> bool:
+        return self._client is None and self.now >= self._settled_at
+
+    def _read_clock(self) -> None:
+        """Bring the robot's time up to the clock's, leaving out what the robot need not live."""
+        if pause := self._time.read():
+            self._tell("lag", f"the machine paused for {pause / NS_PER_S:.1f} s; the robot's time leaves it out")
+        if silence := self._time.left_out - self._left_out:
+            self._left_out += silence
+            self._bring(self.now)
+            self.pioneer.count_silence(silence, self.now)
+
+    def _tell(self, what: str, detail: str) -> None:
+        if self._on_event is not None:
+            self._on_event(self.now, what, detail)

@@ -1,0 +1,115 @@
+"""Orders that change the world of robots that run: things come, move and go.
+
+place box 1 0.5 0.3 0.2         a box, its middle at x and y, so long and so wide; a heading may follow
+place post 2 0 0.05             a post, so thick from its middle
+move box-1 1 1 90               a thing somewhere else; names with spaces stand in quotes
+remove box-1                    and away
+
+Metres and degrees. A thing that an order places is called by its shape and a number.
+"""
+
+import contextlib
+import math
+import shlex
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import replace
+
+from p2os.errors import UsageError, WorldError
+from p2os.pioneer.body.contract import RobotBody
+from p2os.pioneer.world.model import Obstacle
+
+#: First words → (the others, what it means); a word in brackets may be left out.
+WORLD_ORDERS: Mapping[str, tuple[tuple[str, ...], str]] = {
+    "place box": (("X", "Y", "LENGTH", "WIDTH", "[HEADING]"), "a box comes into the world, metres and degrees"),
+    "place post": (("X", "Y", "RADIUS"), "a post comes into the world"),
+    "move": (("NAME", "X", "Y", "[HEADING]"), "a thing that is not part of the building goes elsewhere"),
+    "remove": (("NAME",), "and away"),
+}
+#: chosen: as high as a person's hip, above every sonar ring.
+HEIGHT_M = 1.0
+#: chosen: farther away than any floor reaches; a slip of the finger.
+FARTHEST_M = 1000.0
+#: chosen: of one shape; more slow every step.
+MOST_THINGS = 100
+SIZES = frozenset({"LENGTH", "WIDTH", "RADIUS"})
+
+
+def is_world_order(text: str) -> bool:
+    """Tell whether a line is one of these orders, or begins as one."""
+    return text.split(maxsplit=1)[:1] in (["place"], ["move"], ["remove"])
+
+
+def change_world(bodies: Sequence[RobotBody], text: str, robots: Collection[str] = ()) -> str:
+    """Do what the words say, in every body's copy of the world; return what was done.
+
+    Args:
+        bodies: All that share the world, brought to one time.
+        text: The words.
+        robots: What the robots are called among the things; an order cannot name them.
+
+    Raises:
+        UsageError: The words mean nothing, or name a robot.
+        WorldError: There is no such thing, or it is part of the building; nothing has changed then.
+    """
+    order, values = _read(text)
+    if values.get("NAME") in robots:
+        raise UsageError(f"{values['NAME']!r} is a robot", hint="robots move by themselves")
+    if order == "remove":
+        for body in bodies:
+            body.remove(str(values["NAME"]))
+        return f"{values['NAME']} is gone"
+    x, y, heading = (float(values.get(word, 0.0)) for word in ("X", "Y", "HEADING"))
+    where = f"at {x:g}, {y:g}"
+    if order == "move":
+        for body in bodies:
+            body.move(str(values["NAME"]), x, y, math.radians(heading))
+        return f"{values['NAME']} {where}"
+    length, width, radius = (float(values.get(word, 0.0)) for word in ("LENGTH", "WIDTH", "RADIUS"))
+    thing = Obstacle(
+        name="", x_m=x, y_m=y, heading_rad=math.radians(heading), length_m=length, width_m=width, radius_m=radius,
+        height_m=HEIGHT_M,
+    )  # fmt: skip
+    thing = _placed(bodies[0], thing, order.removeprefix("place "))
+    for body in bodies[1:]:
+        body.place(thing)
+    return f"{thing.name} {where}"
+
+
+def _placed(body: RobotBody, thing: Obstacle, shape: str) -> Obstacle:
+    """Put a thing into a body's world under the first name that is free; return it."""
+    for number in range(1, MOST_THINGS + 1):
+        named = replace(thing, name=f"{shape}-{number}")
+        with contextlib.suppress(WorldError):  # the name is taken
+            body.place(named)
+            return named
+    raise UsageError(f"there are {MOST_THINGS} of that shape already", hint="remove some")
+
+
+def _read(text: str) -> tuple[str, dict[str, str | float]]:
+    """Return which order it is and the value of each of its words."""
+    try:
+        said = shlex.split(text)
+    except ValueError:
+        raise UsageError(f"{text!r}: a quote is open", hint="""move "thing 3" 1 1""") from None
+    order = next((name for name in WORLD_ORDERS if said[: len(name.split())] == name.split()), None)
+    if order is None:
+        raise UsageError(f"{text!r} is no order", hint="say place box …, or place post …")
+    words = WORLD_ORDERS[order][0]
+    usage, given = f"say {' '.join([order, *words])}", said[len(order.split()) :]
+    least = len([word for word in words if not word.startswith("[")])
+    if not least <= len(given) <= len(words):
+        raise UsageError(f"{text!r} is not all of it" if len(given) < least else f"{text!r} says too much", hint=usage)
+    return order, {word.strip("[]"): _value(word, value, usage) for word, value in zip(words, given, strict=False)}
+
+
+def _value(word: str, given: str, usage: str) -> str | float:
+    if word == "NAME":
+        return given
+    try:
+        value = float(given)
+    except ValueError:
+        value = math.nan
+    least = 0.001 if word in SIZES else -FARTHEST_M
+    if not least <= value <= FARTHEST_M:
+        raise UsageError(f"{given!r} is no number of {least:g} to {FARTHEST_M:g}", hint=usage)
+    return value

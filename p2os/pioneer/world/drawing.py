@@ -1,0 +1,239 @@
+"""A world as shapes to draw: the one list that the pictures and the terminal share.
+
+A world as an SVG picture; no dependency.
+
+A world as characters for a terminal: two square points in each, one above the other.
+"""
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+from enum import Enum
+from html import escape
+
+from p2os.pioneer.world.geometry import Footprint
+from p2os.pioneer.world.model import CUT_M, Kind, Obstacle, World, cut, shadow
+
+Point = tuple[float, float]
+
+
+class Look(Enum):
+    """How a shape is drawn: its fill colour."""
+
+    FLOOR = "#e6e9de"
+    RAMP = "#d3dac2"
+    #: Above the hull, like a table's top: passed beneath.
+    OVERHEAD = "#dcd3ea"
+    THING = "#b9a66b"
+    PUSHED = "#d9944a"
+    WALL = "#4a5560"
+    WALKING = "#1b6ca8"
+    #: A scripted path.
+    PATH = "#7fb2d6"
+    #: A line or an area that programs keep out of.
+    FORBIDDEN = "#d98c8c"
+    GOAL = "#5a9367"
+
+
+#: What is drawn later covers what is drawn before.
+ORDER = tuple(Look)
+#: Of the dot that is drawn for a goal.
+MARK_RADIUS_M = 0.08
+#: What begins higher is passed beneath by a Pioneer 2.
+OVERHEAD_M = 0.22
+
+
+@dataclass(frozen=True, slots=True)
+class Shape:
+    """A polygon of some points, a line (open), or a circle (one point and a radius); metres."""
+
+    look: Look
+    name: str
+    points: tuple[Point, ...]
+    radius_m: float = 0.0
+    is_open: bool = False
+
+
+def shapes(world: World) -> list[Shape]:
+    """Return what there is to draw, the lowest first."""
+    found = [_thing(item) for item in world.obstacles]
+    for item in world.obstacles:
+        if item.walk is not None:
+            points = item.walk.points_m
+            found.append(Shape(Look.PATH, f"{item.name}'s path", points, is_open=True))
+    for mark in world.marks:
+        look = Look.FORBIDDEN if mark.kind == "forbidden" else Look.GOAL
+        is_open, radius = len(mark.points_m) > 1, 0.0 if len(mark.points_m) > 1 else MARK_RADIUS_M
+        points = (*mark.points_m, mark.points_m[0]) if len(mark.points_m) > 2 else mark.points_m
+        found.append(Shape(look, mark.name or mark.kind, points, radius, is_open=is_open))
+    for mesh in world.meshes:
+        found += [
+            Shape(Look.THING, mesh.name, polygon) for polygon in shadow(mesh, CUT_M / 4, CUT_M) if len(polygon) > 2
+        ]
+        found += [Shape(Look.WALL, mesh.name, segment, is_open=True) for segment in cut(mesh, CUT_M)]
+    return sorted(found, key=lambda shape: ORDER.index(shape.look))
+
+
+def start_arrow(world: World, length_m: float) -> tuple[Point, ...]:
+    """Return an arrowhead at the start that looks where the robot looks."""
+    start, outline = world.start, ((1.0, 0.0), (-0.7, 0.6), (-0.4, 0.0), (-0.7, -0.6))
+    c, s = length_m * math.cos(start.heading_rad), length_m * math.sin(start.heading_rad)
+    return tuple((start.x_m + x * c - y * s, start.y_m + x * s + y * c) for x, y in outline)
+
+
+def _thing(item: Obstacle) -> Shape:
+    at = (item.x_m, item.y_m) if item.walk is None else item.walk.points_m[0]
+    if item.is_cylinder:
+        return Shape(_look(item), item.name, (at,), item.radius_m)
+    return Shape(_look(item), item.name, Footprint(item).polygon)
+
+
+def _look(item: Obstacle) -> Look:
+    if item.kind.is_driven_on:
+        return Look.RAMP if item.kind is Kind.RAMP else Look.FLOOR
+    if item.walk is not None:
+        return Look.WALKING
+    if item.base_m - item.floor_m >= OVERHEAD_M:
+        return Look.OVERHEAD
+    if item.kind in {Kind.WALL, Kind.RAIL}:
+        return Look.WALL
+    return Look.PUSHED if item.mass_kg else Look.THING
+
+
+#: The longer side of the plan, in pixels.
+SIDE_PX = 760
+EDGE_PX = 44
+INK, GRID, START = "#22303c", "#e3e6ea", "#c8553d"
+
+
+def svg(world: World) -> str:
+    """Return the picture: plan, start, a grid of metres and the world's name."""
+    x0, y0, x1, y1 = world.extent
+    scale = SIDE_PX / max(x1 - x0, y1 - y0)
+    width, height = (x1 - x0) * scale + 2 * EDGE_PX, (y1 - y0) * scale + 2 * EDGE_PX
+
+    def at(x: float, y: float) -> str:
+        return f"{EDGE_PX + (x - x0) * scale:.1f},{EDGE_PX + (y1 - y) * scale:.1f}"
+
+    def drawn(shape: Shape) -> str:
+        title = f"<title>{escape(shape.name)}</title>"
+        if shape.radius_m:
+            x, y = at(*shape.points[0]).split(",")
+            radius = max(shape.radius_m * scale, 1.0)
+            return f'<circle cx="{x}" cy="{y}" r="{radius:.1f}" fill="{shape.look.value}">{title}</circle>'
+        points = " ".join(at(*point) for point in shape.points)
+        if shape.is_open:
+            style = f'fill="none" stroke="{shape.look.value}" stroke-width="2"'
+            return f'<polyline points="{points}" {style}>{title}</polyline>'
+        return f'<polygon points="{points}" fill="{shape.look.value}">{title}</polygon>'
+
+    step = grid_step(max(x1 - x0, y1 - y0))
+    size, font = f'width="{width:.0f}" height="{height:.0f}"', 'font-family="sans-serif" font-size="12"'
+    lines = [
+        f'<svg xmlns="http://www.w3.org/2000/svg" {size} viewBox="0 0 {width:.0f} {height:.0f}" {font} fill="{INK}">',
+        f'<rect width="{width:.0f}" height="{height:.0f}" fill="white"/>',
+    ]
+    for x in ticks(x0, x1, step):
+        (px, top), (_, bottom) = at(x, y1).split(","), at(x, y0).split(",")
+        lines.append(f'<line x1="{px}" y1="{top}" x2="{px}" y2="{bottom}" stroke="{GRID}"/>')
+        lines.append(f'<text x="{px}" y="{float(bottom) + 16:.1f}" text-anchor="middle">{x:g}</text>')
+    for y in ticks(y0, y1, step):
+        (left, py), (right, _) = at(x0, y).split(","), at(x1, y).split(",")
+        lines.append(f'<line x1="{left}" y1="{py}" x2="{right}" y2="{py}" stroke="{GRID}"/>')
+        lines.append(f'<text x="{float(left) - 6:.1f}" y="{float(py) + 4:.1f}" text-anchor="end">{y:g}</text>')
+    lines += [drawn(shape) for shape in shapes(world)]
+    arrow = " ".join(at(*point) for point in start_arrow(world, arrow_length(world)))
+    lines.append(f'<polygon points="{arrow}" fill="{START}"><title>start</title></polygon>')
+    lines.append(f'<text x="{EDGE_PX}" y="26" font-size="16" font-weight="bold">{escape(world.name)}</text>')
+    lines.append(f'<text x="{width - EDGE_PX:.0f}" y="26" text-anchor="end">metres</text></svg>')
+    return "\n".join(lines) + "\n"
+
+
+def grid_step(span_m: float) -> float:
+    """Return the distance of grid lines: 1, 2 or 5 times a power of ten, for ten lines or fewer."""
+    power = 10.0 ** math.floor(math.log10(span_m / 10))
+    return next(power * factor for factor in (1, 2, 5, 10) if span_m / (power * factor) <= 10)
+
+
+def ticks(low: float, high: float, step: float) -> list[float]:
+    """Return the whole multiples of a step between two bounds."""
+    return [number * step for number in range(math.ceil(low / step), math.floor(high / step) + 1)]
+
+
+def arrow_length(world: World) -> float:
+    """Return the half length of the start's arrow: a robot's, or enough to be seen in a large world."""
+    x0, y0, x1, y1 = world.extent
+    return max(0.22, max(x1 - x0, y1 - y0) / 60)
+
+
+#: Which looks are drawn in characters; what is driven on or beneath would hide the rest.
+SOLID = (Look.THING, Look.PUSHED, Look.WALL, Look.WALKING)
+#: Upper and lower point taken → character.
+BLOCKS = {(False, False): " ", (True, False): "▀", (False, True): "▄", (True, True): "█"}
+#: By eighths of a turn, from east counter-clockwise.
+ARROWS = "→↗↑↖←↙↓↘"
+
+
+def text(world: World, columns: int) -> list[str]:
+    """Return the rows of the drawing, the northern first; the arrow is the start.
+
+    Args:
+        world: What to draw.
+        columns: How wide it may be; at least 8.
+    """
+    x0, y0, x1, y1 = world.extent
+    columns = max(8, columns)
+    point_m = (x1 - x0) / columns
+    rows = max(2, math.ceil((y1 - y0) / point_m))
+    taken = [[False] * columns for _ in range(rows + rows % 2)]
+    for shape in shapes(world):
+        if shape.look in SOLID:
+            for column, row in _points(shape, x0, y1, point_m):
+                if 0 <= row < len(taken) and 0 <= column < columns:
+                    taken[row][column] = True
+    lines = [
+        "".join(BLOCKS[upper, lower] for upper, lower in zip(taken[row], taken[row + 1], strict=True))
+        for row in range(0, len(taken), 2)
+    ]
+    column, row = int((world.start.x_m - x0) / point_m), int((y1 - world.start.y_m) / point_m) // 2
+    if 0 <= row < len(lines) and 0 <= column < columns:
+        arrow = ARROWS[round(world.start.heading_rad / (math.pi / 4)) % 8]
+        lines[row] = lines[row][:column] + arrow + lines[row][column + 1 :]
+    return [line.rstrip() for line in lines]
+
+
+def _points(shape: Shape, x0: float, y1: float, point_m: float) -> Iterator[tuple[int, int]]:
+    """Yield column and row of each point that a shape covers, at least one."""
+    xs, ys = [x for x, _ in shape.points], [y for _, y in shape.points]
+    r = shape.radius_m
+    first, last = int((min(xs) - r - x0) / point_m), int((max(xs) + r - x0) / point_m)
+    top, bottom = int((y1 - max(ys) - r) / point_m), int((y1 - min(ys) + r) / point_m)
+    for row in range(top, bottom + 1):
+        for column in range(first, last + 1):
+            if _covers(shape, x0 + (column + 0.5) * point_m, y1 - (row + 0.5) * point_m, point_m / 2):
+                yield column, row
+
+
+def _covers(shape: Shape, x: float, y: float, slack_m: float) -> bool:
+    points = shape.points
+    if shape.radius_m:
+        return math.hypot(x - points[0][0], y - points[0][1]) <= max(shape.radius_m, slack_m)
+    if not shape.is_open and _is_inside(points, x, y):
+        return True
+    ends = points[1:] if shape.is_open else (*points[1:], points[0])
+    return any(_distance(x, y, a, b) <= slack_m for a, b in zip(points, ends, strict=False))
+
+
+def _is_inside(points: tuple[tuple[float, float], ...], x: float, y: float) -> bool:
+    """Tell whether a point is on the left of every edge of a convex counter-clockwise outline."""
+    return all(
+        (bx - ax) * (y - ay) - (by - ay) * (x - ax) >= 0
+        for (ax, ay), (bx, by) in zip(points, (*points[1:], points[0]), strict=True)
+    )
+
+
+def _distance(x: float, y: float, a: tuple[float, float], b: tuple[float, float]) -> float:
+    ex, ey = b[0] - a[0], b[1] - a[1]
+    length = ex * ex + ey * ey
+    share = 0.0 if length == 0 else min(1.0, max(0.0, ((x - a[0]) * ex + (y - a[1]) * ey) / length))
+    return math.hypot(x - a[0] - share * ex, y - a[1] - share * ey)

@@ -1,0 +1,63 @@
+"""Find a world: one that ships, a world file, or a file of another program.
+
+Worlds that ship and our own files are TOML (`file`); all else is read by
+`formats`.
+"""
+
+from difflib import get_close_matches
+from importlib.resources import files
+from pathlib import Path
+
+from p2os.errors import WorldError
+from p2os.pioneer.world.file import parse_world, read_obstacle
+from p2os.pioneer.world.model import Kind, Mesh, Obstacle, Pose, World
+from p2os.pioneer.world.text_file import read_text
+
+__all__ = [
+    "Kind", "Mesh", "Obstacle", "Pose", "World", "known_worlds", "load_world", "parse_world", "read_obstacle",
+    "world_suffixes",
+]  # fmt: skip
+
+
+def known_worlds() -> tuple[str, ...]:
+    """Return the names of the worlds that ship with the package."""
+    entries = files("p2os.pioneer.world.worlds").iterdir()
+    return tuple(sorted(path.name.removesuffix(".toml") for path in entries if path.name.endswith(".toml")))
+
+
+def world_suffixes() -> tuple[str, ...]:
+    """Return the endings of the files that are read as worlds, `.toml` first."""
+    from p2os.pioneer.world.formats import FORMATS
+
+    return (".toml", *FORMATS)
+
+
+def load_world(name_or_path: str | Path, seed: int = 0) -> World:
+    """Return a shipped world by its name, or one from a file.
+
+    Args:
+        name_or_path: A name (`p2os world list`), or a file whose ending `world_suffixes` names.
+        seed: For a world that is made from one.
+
+    Raises:
+        WorldError: The world is unknown, or its file is missing or broken.
+        MissingDependencyError: The file's reader is not installed.
+    """
+    name = str(name_or_path)
+    if name in known_worlds():
+        text = files("p2os.pioneer.world.worlds").joinpath(f"{name}.toml").read_text(encoding="utf-8")
+        return parse_world(text, f"{name}.toml", seed)
+    path = Path(name)
+    if not path.is_file():
+        if path.suffix.lower() in world_suffixes():
+            raise WorldError(f"no world {name!r}: there is no such file", hint="p2os world list names what ships")
+        if path.is_dir():
+            raise WorldError(f"no world {name!r}: that is a folder", hint="name a file in it")
+        close = get_close_matches(name, known_worlds(), n=1)
+        hint = f"did you mean {close[0]}?" if close else f"shipped worlds: {', '.join(known_worlds())}"
+        raise WorldError(f"no world {name!r}", hint=hint)
+    if path.suffix.lower() != ".toml":
+        from p2os.pioneer.world.formats import read_world
+
+        return read_world(path)
+    return parse_world(read_text(path), name, seed, path.parent)

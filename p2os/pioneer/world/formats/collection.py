@@ -1,0 +1,264 @@
+"""What a reader has found so far: upright boxes and cylinders as things, all else as meshes.
+
+Readers of robot and world descriptions put their shapes here, each with its
+place in the world; the collection names them, bounds them and finds a start.
+
+Find a place where a robot can stand, in a world whose file names none.
+"""
+
+import math
+from collections.abc import Iterable, Sequence
+from pathlib import Path
+
+from p2os.errors import WorldError
+from p2os.pioneer.world.formats.transform import Transform, apply, upright_heading
+from p2os.pioneer.world.geometry import Footprint
+from p2os.pioneer.world.model import Kind, Mark, Mesh, Obstacle, Pose, Triangle, Vertex, World, shadow
+
+#: chosen: a Pioneer turns on the spot in it.
+FREE_M = 0.5
+#: Between these heights nothing may stand.
+LOW_M, HIGH_M = 0.05, 0.5
+#: The plan is searched on a grid of so many places along its longer side.
+PLACES = 24
+
+
+def free_start(
+    obstacles: Iterable[Obstacle], meshes: Iterable[Mesh], extent: tuple[float, float, float, float]
+) -> Pose:
+    """Return the origin where it is free, else the free place nearest to the middle, else the middle."""
+    footprints = [Footprint(item) for item in obstacles if item.stands_in(LOW_M, HIGH_M)]
+    segments = [
+        (a, b)
+        for mesh in meshes
+        for polygon in shadow(mesh, LOW_M, HIGH_M)
+        for a, b in zip(polygon, (*polygon[1:], polygon[0]), strict=True)
+    ]
+
+    def is_free(x: float, y: float) -> bool:
+        return all(thing.distance_to_point(x, y) > FREE_M for thing in footprints) and all(
+            distance_to_segment(x, y, a, b) > FREE_M for a, b in segments
+        )
+
+    x0, y0, x1, y1 = extent
+    middle_x, middle_y = (x0 + x1) / 2, (y0 + y1) / 2
+    step = max(x1 - x0, y1 - y0) / PLACES
+    grid = [
+        (x0 + step * (column + 0.5), y0 + step * (row + 0.5))
+        for column in range(math.ceil((x1 - x0) / step))
+        for row in range(math.ceil((y1 - y0) / step))
+    ]
+    grid.sort(key=lambda place: math.dist(place, (middle_x, middle_y)))
+    origin = [(0.0, 0.0)] if x0 < 0 < x1 and y0 < 0 < y1 else []
+    for x, y in (*origin, (middle_x, middle_y), *grid):
+        if is_free(x, y):
+            return Pose(round(x, 3), round(y, 3), 0.0)
+    return Pose(middle_x, middle_y, 0.0)
+
+
+def distance_to_segment(x: float, y: float, a: tuple[float, float], b: tuple[float, float]) -> float:
+    """Return the distance of a point from a segment."""
+    ex, ey = b[0] - a[0], b[1] - a[1]
+    length = ex * ex + ey * ey
+    share = 0.0 if length == 0 else min(1.0, max(0.0, ((x - a[0]) * ex + (y - a[1]) * ey) / length))
+    return math.hypot(x - a[0] - share * ex, y - a[1] - share * ey)
+
+
+MOST_TRIANGLES = 200_000
+MOST_THINGS = 20_000
+#: Farther out is no building, m.
+FARTHEST_M = 10_000.0
+#: The floor reaches so far beyond what stands on it, m.
+MARGIN_M = 0.5
+#: A sphere is made of so many bands and sectors.
+BANDS, SECTORS = 8, 16
+
+BOX_TRIANGLES: tuple[Triangle, ...] = (
+    (0, 2, 1), (0, 3, 2), (4, 5, 6), (4, 6, 7), (0, 1, 5), (0, 5, 4),
+    (1, 2, 6), (1, 6, 5), (2, 3, 7), (2, 7, 6), (3, 0, 4), (3, 4, 7),
+)  # fmt: skip
+
+
+class Collection:
+    """Gathers a file's static geometry: metres, Z up."""
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        self.obstacles: list[Obstacle] = []
+        self.meshes: list[Mesh] = []
+        self.marks: list[Mark] = []
+        self._skipped: dict[str, int] = {}
+        #: Names taken, each with the last number that was put behind it.
+        self._names: dict[str, int] = {}
+        self._triangles = 0
+
+    def skip(self, what: str) -> None:
+        """Note that something of the file is left out."""
+        self._skipped[what] = self._skipped.get(what, 0) + 1
+
+    def add_box(self, name: str, size: Sequence[float], place: Transform) -> None:
+        """Take a box about its middle: its size along its own axes."""
+        if min(size) <= 0:
+            raise WorldError(f"{self.path}: box {name!r}: its size must be above 0")
+        heading = upright_heading(place)
+        if heading is not None:
+            self.add_thing(
+                Obstacle(
+                    name=self._name(name),
+                    x_m=place[0][3],
+                    y_m=place[1][3],
+                    heading_rad=heading,
+                    length_m=size[0],
+                    width_m=size[1],
+                    height_m=size[2],
+                    base_m=place[2][3] - size[2] / 2,
+                    fixed=True,
+                )
+            )
+            return
+        x, y, z = (value / 2 for value in size)
+        corners = [
+            (-x, -y, -z), (x, -y, -z), (x, y, -z), (-x, y, -z), (-x, -y, z), (x, -y, z), (x, y, z), (-x, y, z),
+        ]  # fmt: skip
+        self.add_mesh(name, apply(place, corners), BOX_TRIANGLES)
+
+    def add_cylinder(self, name: str, radius: float, length: float, place: Transform) -> None:
+        """Take a cylinder about its middle, along its own Z."""
+        if min(radius, length) <= 0:
+            raise WorldError(f"{self.path}: cylinder {name!r}: its size must be above 0")
+        if upright_heading(place) is not None:
+            self.add_thing(
+                Obstacle(
+                    name=self._name(name),
+                    x_m=place[0][3],
+                    y_m=place[1][3],
+                    radius_m=radius,
+                    height_m=length,
+                    base_m=place[2][3] - length / 2,
+                    fixed=True,
+                )
+            )
+            return
+        rings = [(radius, -length / 2), (radius, length / 2)]
+        self._add_lathe(name, [(0.0, -length / 2), *rings, (0.0, length / 2)], place)
+
+    def add_sphere(self, name: str, radius: float, place: Transform) -> None:
+        """Take a sphere, as a mesh."""
+        if radius <= 0:
+            raise WorldError(f"{self.path}: sphere {name!r}: its size must be above 0")
+        angles = [math.pi * (band / BANDS - 0.5) for band in range(BANDS + 1)]
+        self._add_lathe(name, [(radius * math.cos(a), radius * math.sin(a)) for a in angles], place)
+
+    def add_mesh(self, name: str, vertices: Iterable[Vertex], triangles: Iterable[Triangle]) -> None:
+        """Take a mesh in the world's frame; triangles without an area are left out."""
+        corners = tuple(vertices)
+        for vertex in corners:
+            if not all(-FARTHEST_M <= value <= FARTHEST_M for value in vertex):
+                raise WorldError(
+                    f"{self.path}: {name!r}: a vertex is not finite, or farther out than {FARTHEST_M:g} m",
+                    hint="is its unit the metre?",
+                )
+        count = len(corners)
+        kept = []
+        for triangle in triangles:
+            if not all(0 <= index < count for index in triangle):
+                raise WorldError(f"{self.path}: {name!r}: a face names a vertex that is not there")
+            if len({corners[index] for index in triangle}) == 3:
+                kept.append(triangle)
+        self._triangles += len(kept)
+        if self._triangles > MOST_TRIANGLES:
+            raise WorldError(f"{self.path}: more than {MOST_TRIANGLES} triangles", hint="decimate it first")
+        if kept:
+            self.meshes.append(Mesh(name=self._name(name), vertices=corners, triangles=tuple(kept)))
+
+    def add_wall(self, name: str, a: tuple[float, float], b: tuple[float, float], *, thick: float, high: float) -> None:
+        """Take a thin wall between two points."""
+        length = math.dist(a, b)
+        if length == 0:
+            return
+        self.add_thing(
+            Obstacle(
+                name=self._name(name),
+                x_m=(a[0] + b[0]) / 2,
+                y_m=(a[1] + b[1]) / 2,
+                heading_rad=math.atan2(b[1] - a[1], b[0] - a[0]),
+                length_m=length + thick,
+                width_m=thick,
+                height_m=high,
+                kind=Kind.WALL,
+                fixed=True,
+            )
+        )
+
+    def world(self, start: Pose | None = None, extent: tuple[float, float, float, float] | None = None) -> World:
+        """Return all that was found.
+
+        Args:
+            start: Where the robot begins; None finds a free place.
+            extent: The floor; None is what things cover, and a margin.
+
+        Raises:
+            WorldError: Nothing was found.
+        """
+        if not self.obstacles and not self.meshes:
+            raise WorldError(f"{self.path}: there is nothing in it that a robot could meet", hint=self._hint())
+        bounds = extent or self._bounds()
+        return World(
+            name=self.path.stem,
+            source=str(self.path),
+            description=f"from {self.path.name}",
+            start=start or free_start(self.obstacles, self.meshes, bounds),
+            extent=bounds,
+            obstacles=tuple(self.obstacles),
+            meshes=tuple(self.meshes),
+            marks=tuple(self.marks),
+            skipped=tuple(
+                f"skipped: {what}" + (f" ({count} times)" if count > 1 else "") for what, count in self._skipped.items()
+            ),
+        )
+
+    def _add_lathe(self, name: str, profile: Sequence[tuple[float, float]], place: Transform) -> None:
+        """Take a solid of revolution about Z: (radius, height) from the bottom up."""
+        turns = [2 * math.pi * sector / SECTORS for sector in range(SECTORS)]
+        vertices = [(r * math.cos(turn), r * math.sin(turn), z) for r, z in profile for turn in turns]
+        triangles = []
+        for ring in range(len(profile) - 1):
+            for sector in range(SECTORS):
+                a, b = ring * SECTORS + sector, ring * SECTORS + (sector + 1) % SECTORS
+                triangles += [(a, b, b + SECTORS), (a, b + SECTORS, a + SECTORS)]
+        self.add_mesh(name, apply(place, vertices), triangles)
+
+    def add_thing(self, item: Obstacle) -> None:
+        """Take an upright box or cylinder whose name no other has."""
+        if max(abs(item.x_m), abs(item.y_m), item.reach_m, abs(item.base_m), item.height_m) > FARTHEST_M:
+            raise WorldError(f"{self.path}: {item.name!r} is farther out than {FARTHEST_M:g} m")
+        self.obstacles.append(item)
+        if len(self.obstacles) > MOST_THINGS:
+            raise WorldError(f"{self.path}: more than {MOST_THINGS} things", hint="make it simpler first")
+
+    def _name(self, wanted: str) -> str:
+        name, number = wanted, self._names.get(wanted, 0)
+        while name in self._names:
+            number += 1
+            name = f"{wanted} {number + 1}"
+        self._names[wanted] = number
+        self._names[name] = 0 if name != wanted else number
+        return name
+
+    def _bounds(self) -> tuple[float, float, float, float]:
+        xs: list[float] = []
+        ys: list[float] = []
+        for item in self.obstacles:
+            xs += [item.x_m - item.reach_m, item.x_m + item.reach_m]
+            ys += [item.y_m - item.reach_m, item.y_m + item.reach_m]
+        for mesh in self.meshes:
+            low, high = mesh.bounds
+            xs += [low[0], high[0]]
+            ys += [low[1], high[1]]
+        for mark in self.marks:
+            xs += [x for x, _ in mark.points_m]
+            ys += [y for _, y in mark.points_m]
+        return min(xs) - MARGIN_M, min(ys) - MARGIN_M, max(xs) + MARGIN_M, max(ys) + MARGIN_M
+
+    def _hint(self) -> str | None:
+        return f"skipped: {', '.join(self._skipped)}" if self._skipped else None

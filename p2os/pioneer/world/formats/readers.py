@@ -1,0 +1,95 @@
+"""Which reader reads which file."""
+
+from collections.abc import Mapping
+from dataclasses import replace
+from importlib import import_module
+from pathlib import Path
+from typing import Protocol, cast
+
+from p2os.errors import MissingDependencyError, WorldError
+from p2os.pioneer.world.formats.placing import Placing, placed_world
+from p2os.pioneer.world.model import World
+
+#: chosen: a mesh of 200 000 triangles in text is below it.
+LARGEST_FILE_BYTES = 64 * 1024 * 1024
+
+#: Ending → module of this package that reads such files.
+FORMATS: Mapping[str, str] = {
+    ".map": "aria_map",
+    ".yaml": "occupancy",
+    ".yml": "occupancy",
+    ".sdf": "sdf",
+    ".world": "sdf",
+    ".urdf": "urdf",
+    ".obj": "mesh_world",
+    ".stl": "mesh_world",
+    ".dae": "mesh_world",
+}
+
+
+class Reader(Protocol):
+    """What a module of `FORMATS` has."""
+
+    def read(self, path: Path, up: str) -> World:
+        """Return what a file holds, in metres with Z up.
+
+        Args:
+            path: The file; it exists and is not too large.
+            up: `auto`, or the axis that is up in the file; maps have none and refuse it.
+
+        Raises:
+            WorldError: The file is not what its ending says.
+        """
+        ...
+
+
+def read_world(path: Path) -> World:
+    """Return the world that a file of another program holds; the format is known by the ending.
+
+    Raises:
+        WorldError: No reader knows the ending, or the file is broken.
+        MissingDependencyError: The reader needs a package that is not installed.
+    """
+    return read_placed(path, Placing())
+
+
+def read_placed(path: Path, placing: Placing) -> World:
+    """Return the world of a file, moved and scaled.
+
+    Raises:
+        WorldError: No reader knows the ending, or the file is broken.
+        MissingDependencyError: The reader needs a package that is not installed.
+    """
+    module = FORMATS.get(path.suffix.lower())
+    if module is None:
+        raise WorldError(f"{path}: no reader for {path.suffix or 'a file without an ending'!s}", hint=_known())
+    try:
+        size = path.stat().st_size
+    except OSError as error:
+        raise WorldError(f"{path}: {error.strerror}") from error
+    if not path.is_file():
+        raise WorldError(f"{path}: not a file")
+    if size > LARGEST_FILE_BYTES:
+        raise WorldError(f"{path}: larger than {LARGEST_FILE_BYTES >> 20} MiB", hint="make it simpler first")
+    reader = cast("Reader", _load(module))
+    try:
+        world = reader.read(path, placing.up)
+        return placed_world(replace(world, source=str(path)), placing)
+    except OSError as error:
+        raise WorldError(f"{path}: {error.strerror or error}") from error
+    except (RecursionError, MemoryError, OverflowError) as error:
+        raise WorldError(f"{path}: too large or too deep to read", hint="make it simpler first") from error
+
+
+def _load(module: str) -> object:
+    """Import a reader, or say which package it lacks."""
+    try:
+        return import_module(f"p2os.pioneer.world.formats.{module}")
+    except ModuleNotFoundError as error:
+        raise MissingDependencyError(
+            f"reading this file needs {error.name}", hint="pip install 'p2os[worlds]'"
+        ) from error
+
+
+def _known() -> str:
+    return f"readable: .toml, {', '.join(FORMATS)}"

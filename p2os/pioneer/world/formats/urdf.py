@@ -1,0 +1,73 @@
+"""URDF as static geometry: a description of a robot or a scene, standing still.
+
+Taken: links with `collision` (with `visual` where a link has no collision) of
+box, cylinder, sphere, mesh; joints of every kind at their zero.
+
+Left out, and said: movement, masses, transmissions, sensors. Xacro files must
+be expanded first.
+"""
+
+from pathlib import Path
+
+from p2os.errors import WorldError
+from p2os.pioneer.world.formats.collection import Collection
+from p2os.pioneer.world.formats.shapes import take_geometry
+from p2os.pioneer.world.formats.transform import IDENTITY, Transform, after, from_roll_pitch_yaw
+from p2os.pioneer.world.formats.xml_tree import Element, numbers, read_xml
+from p2os.pioneer.world.model import World
+
+
+def read(path: Path, up: str) -> World:
+    """Return the world of a URDF file.
+
+    Raises:
+        WorldError: The file is no URDF, or its joints make no tree.
+    """
+    if up not in {"auto", "z"}:
+        raise WorldError(f"{path}: URDF is Z up; up = {up!r} makes no sense")
+    root, collection = read_xml(path, "robot"), Collection(path)
+    joints = root.all("joint")
+    parents = {_ends(joint, "child", path): joint for joint in joints}
+    if any(joint.get("type") not in {"fixed", ""} for joint in joints):
+        collection.skip("that joints move: each stands at its zero")
+    places: dict[str, Transform] = {}
+    for link in root.all("link"):
+        place = _place(link.get("name"), parents, places, path)
+        shown = link.all("collision") or link.all("visual")
+        for number, shape in enumerate(shown):
+            geometry = shape.first("geometry")
+            if geometry is not None:
+                name = link.get("name") + (f" {number + 1}" if len(shown) > 1 else "")
+                at = after(place, _origin(shape, path))
+                take_geometry(name, geometry, at, collection, path, in_attributes=True)
+    return collection.world()
+
+
+def _place(link: str, parents: dict[str, Element], places: dict[str, Transform], path: Path) -> Transform:
+    """Return where a link is, from its chain of joints; `places` keeps what is known of other links."""
+    chain: dict[str, Element] = {}
+    while link in parents and link not in places:
+        chain[link] = parents[link]
+        link = _ends(parents[link], "parent", path)
+        if link in chain:
+            raise WorldError(f"{path}:{chain[link].line}: the joints go round in a ring at link {link!r}")
+    place = places.get(link, IDENTITY)
+    for child, joint in reversed(chain.items()):
+        place = places[child] = after(place, _origin(joint, path))
+    return place
+
+
+def _origin(element: Element, path: Path) -> Transform:
+    origin = element.first("origin")
+    if origin is None:
+        return IDENTITY
+    x, y, z = numbers(origin, origin.get("xyz", "0 0 0"), path, 3)
+    roll, pitch, yaw = numbers(origin, origin.get("rpy", "0 0 0"), path, 3)
+    return from_roll_pitch_yaw(x, y, z, roll, pitch, yaw)
+
+
+def _ends(joint: Element, end: str, path: Path) -> str:
+    found = joint.first(end)
+    if found is None or not found.get("link"):
+        raise WorldError(f"{path}:{joint.line}: joint {joint.get('name')!r} has no {end}")
+    return found.get("link")

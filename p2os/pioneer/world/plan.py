@@ -1,0 +1,317 @@
+"""The plan of a world that changes: what stands where, by name.
+
+Both bodies keep one: it answers what is nearest to the hull and what the sonar
+can hear, and it refuses what cannot be (a second obstacle of the same name,
+moving one that is not there or that is part of the building).
+
+Footprints that never move, found by where they are.
+
+A map has thousands of walls; a question concerns a few square metres. The plan
+is cut in square cells, each with the footprints that reach into it.
+
+The plan of all that never moves: fixed obstacles and meshes, cut once and kept by place.
+"""
+
+import math
+from collections.abc import Iterable, Sequence
+from dataclasses import replace
+from difflib import get_close_matches
+from operator import itemgetter
+
+from p2os.errors import WorldError
+from p2os.pioneer.world.geometry import INFINITY, Footprint, Polygon, hull_polygon, placed, wheel_polygons
+from p2os.pioneer.world.model import Mesh, Obstacle, World, cut, shadow
+from p2os.robots.parameters import RobotParameters
+
+#: chosen: a sonar's cone touches some twenty cells.
+CELL_M = 1.0
+#: A footprint that would fill more cells than this is looked at always.
+MOST_CELLS = 4096
+
+
+class FootprintGrid:
+    """An index of footprints."""
+
+    def __init__(self, footprints: Iterable[Footprint]) -> None:
+        self.footprints = tuple(footprints)
+        self._cells: dict[tuple[int, int], list[int]] = {}
+        self._always: list[int] = []
+        for number, thing in enumerate(self.footprints):
+            x0, y0, x1, y1 = (math.floor(value / CELL_M) for value in thing.bounds)
+            if (x1 - x0 + 1) * (y1 - y0 + 1) > MOST_CELLS:
+                self._always.append(number)
+                continue
+            for column in range(x0, x1 + 1):
+                for row in range(y0, y1 + 1):
+                    self._cells.setdefault((column, row), []).append(number)
+        columns, rows = [c for c, _ in self._cells], [r for _, r in self._cells]
+        #: First and last column and row that hold anything.
+        self._span = (min(columns), min(rows), max(columns), max(rows)) if self._cells else None
+
+    def near(self, x0: float, y0: float, x1: float, y1: float) -> list[Footprint]:
+        """Return what may reach into a rectangle, each once, in one fixed order."""
+        if not self.footprints:
+            return []
+        found = set(self._always)
+        if self._span is not None:
+            cells = self._cells
+            first_column, first_row, last_column, last_row = self._span
+            for column in range(
+                max(first_column, math.floor(x0 / CELL_M)), min(last_column, math.floor(x1 / CELL_M)) + 1
+            ):
+                for row in range(max(first_row, math.floor(y0 / CELL_M)), min(last_row, math.floor(y1 / CELL_M)) + 1):
+                    found.update(cells.get((column, row), ()))
+        return [self.footprints[number] for number in sorted(found)]
+
+    def covers(self, x0: float, y0: float, x1: float, y1: float) -> bool:
+        """Tell whether nothing lies outside a rectangle: a wider search would find no more."""
+        if self._span is None:
+            return True
+        c0, r0, c1, r1 = (value * CELL_M for value in self._span)
+        return x0 <= c0 and y0 <= r0 and x1 >= c1 + CELL_M and y1 >= r1 + CELL_M
+
+
+#: chosen: wheels of 165 mm roll over what is lower, and a robot's maker calls it a sill.
+SILL_M = 0.02
+
+
+class Bands:
+    """The heights at which a robot meets things.
+
+    `touch`: what the hull meets; `ring`: where its sonar look; `low`: what passes under the
+    hull and stops its wheels.
+    """
+
+    __slots__ = ("low", "ring", "touch")
+
+    def __init__(self, parameters: RobotParameters) -> None:
+        body = parameters.body
+        self.touch = (body.ground_clearance_m, body.hull_height_m)
+        self.ring = parameters.sonar_height_m
+        self.low = (min(SILL_M, body.ground_clearance_m), body.ground_clearance_m)
+
+    def is_touched(self, item: Obstacle) -> bool:
+        """Tell whether the hull can meet it."""
+        return item.stands_in(*self.touch)
+
+    def echoes(self, item: Obstacle) -> bool:
+        """Tell whether the sonar hear it."""
+        return item.stands_in(self.ring, self.ring)
+
+    def stops_wheels(self, item: Obstacle) -> bool:
+        """Tell whether it passes under the hull and is too high to be driven over."""
+        return item.stands_in(*self.low) and not self.is_touched(item)
+
+    def is_sill(self, item: Obstacle) -> bool:
+        """Tell whether wheels drive over it."""
+        stands_on_floor = item.base_m - item.floor_m <= self.low[0]
+        return not item.kind.is_driven_on and stands_on_floor and not item.stands_in(self.low[0], math.inf)
+
+
+class StaticPlan:
+    """What is fixed in a world, for one model of robot."""
+
+    def __init__(self, world: World, parameters: RobotParameters) -> None:
+        bands = Bands(parameters)
+        self.obstacles = tuple(item for item in world.obstacles if item.fixed)
+        self.names = frozenset(item.name for item in self.obstacles) | {mesh.name for mesh in world.meshes}
+        footprints = [(item, Footprint(item)) for item in self.obstacles]
+        touched = [shape for item, shape in footprints if bands.is_touched(item)]
+        heard = [shape for item, shape in footprints if bands.echoes(item)]
+        low = [shape for item, shape in footprints if bands.stops_wheels(item)]
+        self.touched = FootprintGrid([*touched, *_shadows(world.meshes, *bands.touch)])
+        self.heard = FootprintGrid([*heard, *_cuts(world.meshes, bands.ring)])
+        self.low = FootprintGrid(low)
+
+
+def _shadows(meshes: Iterable[Mesh], low_m: float, high_m: float) -> list[Footprint]:
+    return [Footprint.of_polygon(mesh.name, polygon) for mesh in meshes for polygon in shadow(mesh, low_m, high_m)]
+
+
+def _cuts(meshes: Iterable[Mesh], height_m: float) -> list[Footprint]:
+    return [Footprint.of_polygon(mesh.name, segment) for mesh in meshes for segment in cut(mesh, height_m)]
+
+
+#: The first ring of a search for the nearest wall beyond the hull; it is doubled until something is found, m.
+FIRST_RING_M = 2.0
+#: chosen: as many names as a line of help holds.
+NAMED = 12
+#: How far a pushed thing is kept from what pushes it, m.
+APART_M = 1e-6
+
+
+class Plan:
+    """Obstacles by name, cut where they could touch the hull."""
+
+    def __init__(self, obstacles: Iterable[Obstacle], parameters: RobotParameters, static: StaticPlan) -> None:
+        body = parameters.body
+        self._bands = Bands(parameters)
+        self._static = static
+        self._hull = hull_polygon(body)
+        self._wheels = wheel_polygons(parameters)
+        self._hull_reach = max(math.hypot(x, y) for x, y in self._hull)
+        self._obstacles: dict[str, Obstacle] = {}
+        self._touchable: dict[str, Footprint] = {}
+        self._heard: dict[str, Footprint] = {}
+        self._low: dict[str, Footprint] = {}
+        for obstacle in obstacles:
+            self.place(obstacle)
+
+    @classmethod
+    def of_world(cls, world: World, parameters: RobotParameters) -> "Plan":
+        """Return the plan of a world as it was made."""
+        movable = (item for item in world.obstacles if not item.fixed)
+        return cls(movable, parameters, StaticPlan(world, parameters))
+
+    @property
+    def hull_reach_m(self) -> float:
+        """How far the hull's farthest point is from the middle of the axle."""
+        return self._hull_reach
+
+    @property
+    def obstacles(self) -> tuple[Obstacle, ...]:
+        """All that is not part of the building, in the order of its placing."""
+        return tuple(self._obstacles.values())
+
+    def place(self, obstacle: Obstacle) -> None:
+        """Put an obstacle with a new name into the plan.
+
+        Raises:
+            WorldError: The name is taken.
+        """
+        if obstacle.name in self._obstacles or obstacle.name in self._static.names:
+            raise WorldError(f"there is an obstacle {obstacle.name!r} already", hint="names are unique in a world")
+        self._keep(obstacle)
+
+    def move(self, name: str, x_m: float, y_m: float, heading_rad: float) -> Obstacle:
+        """Put an obstacle somewhere else; return it as it stands now.
+
+        Raises:
+            WorldError: There is none of that name, or it is part of the building.
+        """
+        moved = replace(self.find(name), x_m=x_m, y_m=y_m, heading_rad=heading_rad)
+        self._keep(moved)
+        return moved
+
+    def remove(self, name: str) -> None:
+        """Take an obstacle out.
+
+        Raises:
+            WorldError: There is none of that name, or it is part of the building.
+        """
+        self.find(name)
+        for table in (self._obstacles, self._touchable, self._heard, self._low):
+            table.pop(name, None)
+
+    def find(self, name: str) -> Obstacle:
+        """Return an obstacle that is not part of the building.
+
+        Raises:
+            WorldError: There is none of that name.
+        """
+        if name in self._static.names:
+            raise WorldError(
+                f"{name!r} is part of the building", hint="only what is not `fixed` and no mesh can change"
+            )
+        if name not in self._obstacles:
+            close = get_close_matches(name, self._obstacles, n=1)
+            there = ", ".join(list(self._obstacles)[:NAMED]) or "nothing that can change"
+            hint = f"did you mean {close[0]!r}?" if close else f"there is {there}"
+            raise WorldError(f"no obstacle {name!r}", hint=hint)
+        return self._obstacles[name]
+
+    def clearance(self, x_m: float, y_m: float, heading_rad: float, *, no_more_than: float = INFINITY) -> float:
+        """Return the distance from the hull, or the wheels, at a pose to the nearest thing that they could touch.
+
+        Args:
+            x_m: Where the middle of the axle is.
+            y_m: The same.
+            heading_rad: Where it looks.
+            no_more_than: Things farther than this need not be measured; the answer is then at most this.
+        """
+        hull = placed(self._hull, x_m, y_m, heading_rad)
+        nearest = self._nearest(self._touchable.values(), hull, x_m, y_m, no_more_than)
+        ring, static = FIRST_RING_M, self._static.touched
+        while static.footprints:
+            reach = min(ring, nearest) + self._hull_reach
+            box = (x_m - reach, y_m - reach, x_m + reach, y_m + reach)
+            found = self._nearest(static.near(*box), hull, x_m, y_m, nearest)
+            if found <= ring or ring >= nearest or static.covers(*box):
+                nearest = min(nearest, found)
+                break
+            ring *= 2
+        if self._low or self._static.low.footprints:
+            reach = self._hull_reach + FIRST_RING_M
+            low = [*self._low.values(), *self._static.low.near(x_m - reach, y_m - reach, x_m + reach, y_m + reach)]
+            for wheel in self._wheels:
+                nearest = self._nearest(low, placed(wheel, x_m, y_m, heading_rad), x_m, y_m, nearest)
+        return nearest
+
+    def heard_within(self, x0: float, y0: float, x1: float, y1: float) -> Sequence[Footprint]:
+        """Return what the sonar could hear in a rectangle, and perhaps some more."""
+        movable = self._heard.values()
+        return [*movable, *self._static.heard.near(x0, y0, x1, y1)] if self._static.heard.footprints else [*movable]
+
+    def touched(self, x_m: float, y_m: float, heading_rad: float) -> list[str]:
+        """Return the names of the things that the hull overlaps at a pose; of the building, one name is enough."""
+        hull = placed(self._hull, x_m, y_m, heading_rad)
+        reach = self._hull_reach
+        near = [thing for thing in self._touchable.values() if thing.distance_to_point(x_m, y_m) <= reach]
+        names = [thing.name for thing in near if thing.distance(hull) == 0.0]
+        walls = self._static.touched.near(x_m - reach, y_m - reach, x_m + reach, y_m + reach)
+        names += [wall.name for wall in walls if wall.distance(hull) == 0.0][:1]
+        if not names:  # the wheels alone
+            names.append("")
+        return names
+
+    def push(self, name: str, x_m: float, y_m: float, heading_rad: float, robots: Iterable[Footprint] = ()) -> bool:
+        """Push a thing out of the hull at a pose, the shortest way; tell whether there is room for it.
+
+        The thing slides and does not turn. It finds no room where one of the other robots stands.
+        """
+        thing = self._touchable[name]
+        dx, dy = thing.way_out(placed(self._hull, x_m, y_m, heading_rad))
+        length = math.hypot(dx, dy)
+        if length == 0.0:
+            return True
+        share = 1 + APART_M / length
+        moved = replace(self._obstacles[name], x_m=thing.x + dx * share, y_m=thing.y + dy * share)
+        shape = Footprint(moved)
+        x0, y0, x1, y1 = shape.bounds
+        others = [other for other in self._touchable.values() if other.name != name]
+        if any(_overlap(shape, other) for other in (*others, *robots, *self._static.touched.near(x0, y0, x1, y1))):
+            return False
+        self._keep(moved)
+        return True
+
+    def _nearest(self, things: Iterable[Footprint], hull: Polygon, x_m: float, y_m: float, nearest: float) -> float:
+        """Return the least distance from a hull about (x, y) to some things, or `nearest` where that is less."""
+        # No point of the hull is farther from the axle than its reach: the likely nearest first, then stop.
+        looked_at = list(things)
+        bounds = [thing.distance_to_point(x_m, y_m) - self._hull_reach for thing in looked_at]
+        for bound, thing in sorted(zip(bounds, looked_at, strict=True), key=itemgetter(0)):
+            if bound >= nearest:
+                break
+            nearest = min(nearest, thing.distance(hull))
+        return nearest
+
+    def _keep(self, obstacle: Obstacle) -> None:
+        name, bands = obstacle.name, self._bands
+        self._obstacles[name] = obstacle
+        touched, heard, low = bands.is_touched(obstacle), bands.echoes(obstacle), bands.stops_wheels(obstacle)
+        if touched or heard or low:
+            shape = Footprint(obstacle)
+            for table, belongs in ((self._touchable, touched), (self._heard, heard), (self._low, low)):
+                if belongs:
+                    table[name] = shape
+
+
+def _overlap(one: Footprint, other: Footprint) -> bool:
+    """Tell whether two footprints overlap."""
+    if math.dist((one.x, one.y), (other.x, other.y)) > one.reach + other.reach:
+        return False
+    if one.polygon:
+        return other.distance(one.polygon) == 0.0
+    if other.polygon:
+        return one.distance(other.polygon) == 0.0
+    return math.dist((one.x, one.y), (other.x, other.y)) < one.radius + other.radius

@@ -1,0 +1,289 @@
+"""A re-scanning decoder: bytes in, frames and remarks out.
+
+Theory of operation. Bytes wait in one buffer. At its head the decoder wants
+`FA FB`, a count of 3 to 204, and that many bytes. Whatever does not fit costs
+one byte: the head moves on by one and the same bytes are looked at again, so a
+damaged frame hides nothing that follows it. A frame whose bytes stop coming for
+`GIVE_UP_NS` is treated as damaged, so that a false header with a legal count
+cannot hold up a quiet line.
+
+The price of re-scanning: a frame that stands inside the payload of a damaged
+frame can be found. Inside a sound frame nothing is looked for.
+
+Invariant: the buffer never holds more than one frame (207 bytes) between calls.
+
+The P2OS checksum (Pioneer manuals, "Packet checksum").
+
+A 16-bit sum of big-endian pairs over the bytes from the command or type byte
+to the last argument; an odd last byte is XORed into the low byte. Header,
+count and the checksum itself are left out.
+
+A P2OS frame: header, count, payload, checksum.
+
+Source: Pioneer 3 manual, page 32; P2OS manual, page 36.
+Invariant: a `Frame` that exists can be sent; `from_bytes` and `to_bytes` are inverses.
+"""
+
+from collections import deque
+from dataclasses import dataclass, replace
+from typing import cast
+
+from p2os.errors import LocalProtocolError
+from p2os.timing import NS_PER_MS, Nanos, Reached
+
+
+def checksum(data: bytes) -> int:
+    """Return the checksum of a frame's payload, 0 to 0xFFFF."""
+    even = len(data) & ~1
+    total = 256 * sum(data[0:even:2]) + sum(data[1:even:2])
+    if len(data) != even:
+        return (total & 0xFFFF) ^ data[-1]
+    return total & 0xFFFF
+
+
+HEADER = b"\xfa\xfb"
+#: Header and count.
+PREFIX_BYTES = 3
+CHECKSUM_BYTES = 2
+#: The count covers the payload and the checksum. Smallest: one command byte.
+MIN_COUNT = 3
+#: Largest count that an ARCOS robot accepts (Pioneer 3 manual, page 32).
+MAX_COUNT = 204
+MAX_PAYLOAD_BYTES = MAX_COUNT - CHECKSUM_BYTES
+
+
+@dataclass(frozen=True, slots=True)
+class Frame:
+    """One frame, without header, count and checksum.
+
+    Args:
+        payload: Command or type byte and arguments, 1 to 202 bytes.
+
+    Raises:
+        LocalProtocolError: The payload is empty or too long to be framed.
+    """
+
+    payload: bytes
+
+    def __post_init__(self) -> None:
+        if not 1 <= len(self.payload) <= MAX_PAYLOAD_BYTES:
+            raise LocalProtocolError(
+                f"a payload of {len(self.payload)} bytes cannot be framed (1 to {MAX_PAYLOAD_BYTES})",
+                hint="split the data over several packets",
+            )
+
+    @property
+    def kind(self) -> int:
+        """The command number (client) or packet type (robot)."""
+        return self.payload[0]
+
+    @property
+    def data(self) -> bytes:
+        """What follows the command number or packet type."""
+        return self.payload[1:]
+
+    def to_bytes(self) -> bytes:
+        """Return the frame as it goes over the wire."""
+        count = len(self.payload) + CHECKSUM_BYTES
+        return HEADER + bytes((count,)) + self.payload + checksum(self.payload).to_bytes(CHECKSUM_BYTES, "big")
+
+    @classmethod
+    def from_bytes(cls, data: bytes) -> "Frame":
+        """Read exactly one frame.
+
+        Raises:
+            LocalProtocolError: `data` is not one whole and sound frame.
+        """
+        if data[:2] != HEADER or len(data) < PREFIX_BYTES + MIN_COUNT or len(data) != data[2] + PREFIX_BYTES:
+            raise LocalProtocolError(f"not one whole frame: {data.hex(' ')}")
+        payload, stated = data[PREFIX_BYTES:-CHECKSUM_BYTES], int.from_bytes(data[-CHECKSUM_BYTES:], "big")
+        if stated != checksum(payload):
+            raise LocalProtocolError(f"checksum: expected 0x{checksum(payload):04X}, got 0x{stated:04X}")
+        return cls(payload)
+
+
+#: chosen: two and a half SIP cycles; the longest frame takes 216 ms at 9600 baud, but its bytes never pause so long.
+GIVE_UP_NS: Nanos = 250 * NS_PER_MS
+#: How many of the bytes last rejected are kept for a person to look at.
+KEPT_BYTES = 32
+
+
+@dataclass(frozen=True, slots=True)
+class Noise:
+    """Bytes outside any frame, in one run."""
+
+    data: bytes
+
+
+@dataclass(frozen=True, slots=True)
+class BadChecksum:
+    """A frame's length of bytes whose checksum is wrong; they are scanned again after its first byte."""
+
+    data: bytes
+    expected: int
+    got: int
+
+
+@dataclass(frozen=True, slots=True)
+class BadCount:
+    """A header with a count that no frame has."""
+
+    count: int
+
+
+@dataclass(frozen=True, slots=True)
+class Stalled:
+    """The start of a frame whose rest did not come in time; scanned again after its first byte."""
+
+    data: bytes
+
+
+Item = Frame | Noise | BadChecksum | BadCount | Stalled
+
+
+@dataclass(slots=True)
+class DecoderStats:
+    """What has passed the decoder so far; counts of items, and of bytes where the name says so."""
+
+    frames: int = 0
+    noise_bytes: int = 0
+    bad_checksums: int = 0
+    bad_counts: int = 0
+    stalled: int = 0
+    #: Frames found among the bytes of a rejected one.
+    rescued: int = 0
+    #: The bytes that were rejected last, at most 32, whatever the reason.
+    last_rejected: bytes = b""
+    #: The last offending bytes of each kind, at most 32.
+    last_noise: bytes = b""
+    last_bad_checksum: bytes = b""
+    last_bad_count: bytes = b""
+    last_stalled: bytes = b""
+
+
+class Decoder:
+    """Turn a stream of bytes into frames, whatever the stream holds."""
+
+    def __init__(self) -> None:
+        self._buffer = bytearray()
+        self._noise = bytearray()
+        self._items: deque[Item] = deque()
+        self._last_byte_ns: Nanos = 0
+        #: Bytes at the head of the buffer that belong to a frame already rejected.
+        self._rescanned = 0
+        self.stats = DecoderStats()
+
+    def receive(self, data: bytes, now: Nanos) -> None:
+        """Take bytes that arrived at `now` nanoseconds, any number of them."""
+        self.advance_to(now)
+        if data:
+            self._last_byte_ns = now
+            self._buffer += data
+            self._scan()
+
+    def next_item(self) -> Item | None:
+        """Return what was found next, in the order of the stream, or None."""
+        return self._items.popleft() if self._items else None
+
+    def next_deadline(self) -> Nanos | None:
+        """Return when the frame that has begun will be given up."""
+        return self._last_byte_ns + GIVE_UP_NS if self._buffer else None
+
+    def advance_to(self, limit: Nanos) -> Reached:
+        """Give up a frame whose bytes stopped, and scan its bytes again."""
+        if self._buffer and limit >= self._last_byte_ns + GIVE_UP_NS:
+            while self._buffer:
+                self.stats.stalled += 1
+                self.stats.last_stalled = bytes(self._buffer[:KEPT_BYTES])
+                self._items.append(Stalled(bytes(self._buffer)))
+                self._reject(len(self._buffer))
+                self._scan()
+        return Reached(limit)
+
+    def _scan(self) -> None:
+        """Find everything that the buffer holds."""
+        buffer = self._buffer
+        while buffer:
+            start = self._header()
+            if start:
+                self._drop_noise(start)
+                continue
+            if len(buffer) < PREFIX_BYTES:
+                break
+            count = buffer[2]
+            if not MIN_COUNT <= count <= MAX_COUNT:
+                self._flush_noise()
+                self.stats.bad_counts += 1
+                self.stats.last_bad_count = bytes(buffer[:KEPT_BYTES])
+                self._items.append(BadCount(count))
+                self._reject(PREFIX_BYTES)
+                continue
+            size = count + PREFIX_BYTES
+            if len(buffer) < size:
+                break
+            self._judge(bytes(buffer[:size]))
+        self._flush_noise()
+
+    def _header(self) -> int:
+        """Return how many bytes stand before the first header, or before what may become one."""
+        start = self._buffer.find(HEADER)
+        if start >= 0:
+            return start
+        return len(self._buffer) - (1 if self._buffer[-1] == HEADER[0] else 0)
+
+    def _judge(self, data: bytes) -> None:
+        """Take a whole frame's bytes for a frame, or reject them."""
+        payload = data[PREFIX_BYTES:-CHECKSUM_BYTES]
+        got, expected = int.from_bytes(data[-CHECKSUM_BYTES:], "big"), checksum(payload)
+        self._flush_noise()
+        if got == expected:
+            self.stats.frames += 1
+            self.stats.rescued += self._rescanned > 0
+            self._items.append(Frame(payload))
+            self._consume(len(data))
+            return
+        self.stats.bad_checksums += 1
+        self.stats.last_bad_checksum = data[:KEPT_BYTES]
+        self._items.append(BadChecksum(data, expected, got))
+        self._reject(len(data))
+
+    def _reject(self, size: int) -> None:
+        """Drop the first byte of a rejected frame of `size` bytes; the rest is scanned again."""
+        self.stats.last_rejected = bytes(self._buffer[:KEPT_BYTES])
+        self._rescanned = max(self._rescanned, size)
+        self._drop_noise(1)
+
+    def _drop_noise(self, size: int) -> None:
+        self.stats.noise_bytes += size
+        self._noise += self._buffer[:size]
+        self._consume(size)
+
+    def _consume(self, size: int) -> None:
+        del self._buffer[:size]
+        self._rescanned = max(0, self._rescanned - size)
+
+    def _flush_noise(self) -> None:
+        if self._noise:
+            noise = bytes(self._noise)
+            self.stats.last_noise = noise[:KEPT_BYTES]
+            self._items.append(Noise(noise))
+            self._noise.clear()
+
+    def snapshot(self) -> object:
+        """Return all that decides the future."""
+        return (
+            bytes(self._buffer),
+            bytes(self._noise),
+            tuple(self._items),
+            self._last_byte_ns,
+            self._rescanned,
+            replace(self.stats),
+        )
+
+    def restore(self, snapshot: object) -> None:
+        """Put back what `snapshot` returned."""
+        saved = cast("tuple[bytes, bytes, tuple[Item, ...], Nanos, int, DecoderStats]", snapshot)
+        buffer, noise, items, self._last_byte_ns, self._rescanned, stats = saved
+        self._buffer, self._noise = bytearray(buffer), bytearray(noise)
+        self._items = deque(items)
+        self.stats = replace(stats)

@@ -1,0 +1,211 @@
+"""The standard server information packet (SIP), types 0x30 to 0x34.
+
+Source: P2OS manual, SIP table; Pioneer 2/3 H8 (AROS) and Pioneer 3 (ARCOS)
+manuals for the tail. Raw values keep `raw_` in their names: `p2os.protocol.units` turns
+them into SI.
+
+Invariant: `StandardSip.from_frame(sip.to_frame(profile), profile) == sip`.
+"""
+
+import struct
+from dataclasses import dataclass
+
+from construct import Array, ConstructError, Int8ul, Int16sl, Int16ul, Struct, this
+
+from p2os.errors import LocalProtocolError, RemoteProtocolError
+from p2os.protocol.frames import Frame
+from p2os.protocol.profiles import Profile
+
+#: Types that clients take for a standard SIP; 0x32 standing, 0x33 moving.
+SIP_KINDS = (0x30, 0x31, 0x32, 0x33, 0x34)
+STANDING, MOVING = 0x32, 0x33
+#: Position counts are 15 bits wide; bit 15 is masked.
+POSITION_MASK = 0x7FFF
+
+#: From the byte after the type to the sonar readings.
+HEAD = Struct(
+    "raw_x" / Int16ul,
+    "raw_y" / Int16ul,
+    "raw_heading" / Int16sl,
+    "raw_left_velocity" / Int16sl,
+    "raw_right_velocity" / Int16sl,
+    "raw_battery" / Int8ul,
+    "left" / Int8ul,
+    "right" / Int8ul,
+    "raw_control" / Int16sl,
+    "raw_flags" / Int16ul,
+    "raw_compass" / Int8ul,
+    "count" / Int8ul,
+    "sonar" / Array(this.count, Struct("number" / Int8ul, "raw_range" / Int16ul)),
+    "first" / Int8ul,
+    "second" / Int8ul,
+    "raw_analog" / Int8ul,
+    "digital_in" / Int8ul,
+    "digital_out" / Int8ul,
+)
+_HEAD = HEAD.compile()
+#: Bytes of the head without sonar, type byte included.
+HEAD_BYTES = 25
+READING_BYTES = 3
+
+#: The ARCOS tail: (field, bytes, signed). Firmware only ever appends.
+TAIL = (
+    ("raw_battery_x10", 2, False),
+    ("charge_state", 1, True),
+    ("raw_rotation_velocity", 2, True),
+    ("fault_flags", 2, False),
+    ("raw_lateral_velocity", 2, True),
+    ("raw_temperature", 1, True),
+    ("state_of_charge", 1, False),
+    ("controller_time_us", 4, False),
+    ("raw_flags3", 4, False),
+)
+
+
+@dataclass(frozen=True, slots=True)
+class SonarReading:
+    """One new sonar reading.
+
+    Args:
+        number: From 0.
+        raw_range: Counts of RangeConvFactor, 0 to 0xFFFF.
+    """
+
+    number: int
+    raw_range: int
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class StandardSip:
+    """One standard SIP, as on the wire.
+
+    Positions are 15-bit counts, headings 4096 to the turn, speeds mm/s, the
+    battery in 0.1 V. Bumpers hold seven bits, segment 1 in bit 0 (bits 1 to 7 of
+    the stall bytes). `raw_flags` is servo 1's pulse width on P2OS robots.
+    `tail` holds the ARCOS fields that were sent, in the order of `TAIL`.
+    """
+
+    kind: int = STANDING
+    raw_x: int = 0
+    raw_y: int = 0
+    raw_heading: int = 0
+    raw_left_velocity: int = 0
+    raw_right_velocity: int = 0
+    raw_battery: int = 0
+    stall_left: bool = False
+    stall_right: bool = False
+    rear_bumpers: int = 0
+    front_bumpers: int = 0
+    raw_control: int = 0
+    raw_flags: int = 0
+    raw_compass: int = 0
+    sonar: tuple[SonarReading, ...] = ()
+    analog_port: int = 0
+    gripper_state: int = 0
+    raw_analog: int = 0
+    digital_in: int = 0
+    digital_out: int = 0
+    tail: tuple[int, ...] = ()
+    #: Bytes after the last field that this project knows.
+    rest: bytes = b""
+
+    @property
+    def moving(self) -> bool:
+        """Whether the robot says that its wheels turn."""
+        return self.kind == MOVING
+
+    @property
+    def motors_enabled(self) -> bool:
+        """Bit 0 of the flags: true only of AROS and ARCOS robots."""
+        return bool(self.raw_flags & 1)
+
+    def tail_field(self, name: str) -> int | None:
+        """Return a field of the ARCOS tail by its name in `TAIL`, or None where it was not sent."""
+        names = [row[0] for row in TAIL]
+        place = names.index(name)
+        return self.tail[place] if place < len(self.tail) else None
+
+    def to_frame(self, profile: Profile) -> Frame:
+        """Return the frame of this packet in a firmware family's layout.
+
+        Raises:
+            LocalProtocolError: A value does not fit its field.
+        """
+        port_and_gripper = (self.analog_port, self.gripper_state)
+        first, second = port_and_gripper[::-1] if profile.has_gripper_first else port_and_gripper
+        fields = {
+            "raw_x": self.raw_x,
+            "raw_y": self.raw_y,
+            "raw_heading": self.raw_heading,
+            "raw_left_velocity": self.raw_left_velocity,
+            "raw_right_velocity": self.raw_right_velocity,
+            "raw_battery": self.raw_battery,
+            "left": self.rear_bumpers << 1 | self.stall_left,
+            "right": self.front_bumpers << 1 | self.stall_right,
+            "raw_control": self.raw_control,
+            "raw_flags": self.raw_flags,
+            "raw_compass": self.raw_compass,
+            "count": len(self.sonar),
+            "sonar": [{"number": reading.number, "raw_range": reading.raw_range} for reading in self.sonar],
+            "first": first,
+            "second": second,
+            "raw_analog": self.raw_analog,
+            "digital_in": self.digital_in,
+            "digital_out": self.digital_out,
+        }
+        try:
+            body: bytes = _HEAD.build(fields)
+            tail = [
+                value.to_bytes(size, "little", signed=signed)
+                for value, (_, size, signed) in zip(self.tail, TAIL, strict=False)
+            ]
+        except (ConstructError, OverflowError, struct.error) as error:
+            raise LocalProtocolError(f"a value does not fit the SIP: {error}") from error
+        return Frame(bytes((self.kind,)) + body + b"".join(tail) + self.rest)
+
+    @classmethod
+    def from_frame(cls, frame: Frame, profile: Profile) -> "StandardSip":
+        """Read a SIP; the fields of the tail are those that its length leaves room for.
+
+        Raises:
+            RemoteProtocolError: The packet is shorter than its own sonar count says.
+        """
+        data = frame.payload
+        count = data[19] if len(data) > 19 else 0
+        size = HEAD_BYTES + READING_BYTES * count
+        if len(data) < size:
+            raise RemoteProtocolError(f"a SIP of {len(data)} bytes with {count} sonar readings: {size} expected")
+        head = _HEAD.parse(data[1:size])
+        port, gripper = (
+            (head["second"], head["first"]) if profile.has_gripper_first else (head["first"], head["second"])
+        )
+        tail, place = [], size
+        for _, width, signed in TAIL:
+            if place + width > len(data):
+                break
+            tail.append(int.from_bytes(data[place : place + width], "little", signed=signed))
+            place += width
+        return cls(
+            kind=frame.kind,
+            raw_x=head["raw_x"],
+            raw_y=head["raw_y"],
+            raw_heading=head["raw_heading"],
+            raw_left_velocity=head["raw_left_velocity"],
+            raw_right_velocity=head["raw_right_velocity"],
+            raw_battery=head["raw_battery"],
+            stall_left=bool(head["left"] & 1),
+            stall_right=bool(head["right"] & 1),
+            rear_bumpers=head["left"] >> 1,
+            front_bumpers=head["right"] >> 1,
+            raw_control=head["raw_control"],
+            raw_flags=head["raw_flags"],
+            raw_compass=head["raw_compass"],
+            sonar=tuple(SonarReading(item["number"], item["raw_range"]) for item in head["sonar"]),
+            analog_port=port,
+            gripper_state=gripper,
+            raw_analog=head["raw_analog"],
+            digital_in=head["digital_in"],
+            digital_out=head["digital_out"],
+            tail=tuple(tail),
+            rest=data[place:],
+        )

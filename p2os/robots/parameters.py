@@ -1,0 +1,100 @@
+"""Parameters of a robot: by its subclass, from a file of one's own, or for whatever a robot says it is.
+
+One TOML file a model in `p2os/robots/`, each number with its source; a user's
+own file is TOML too, or one of ARIA's (`.p`).
+"""
+
+from dataclasses import dataclass
+from difflib import get_close_matches
+from pathlib import Path
+
+from p2os.robots.aria_file import aria_table
+from p2os.robots.model import BodyParameters, Equipment, MotionDefaults, ParametersError, RobotParameters, SonarPose
+from p2os.robots.model_file import build_parameters, file_table, known_robots, shipped_table, text_of
+
+__all__ = [
+    "BodyParameters",
+    "Equipment",
+    "MatchedParameters",
+    "MotionDefaults",
+    "ParametersError",
+    "RobotParameters",
+    "SonarPose",
+    "known_robots",
+    "load_parameters",
+    "parameters_for",
+]
+
+#: What an unknown robot is taken for when its name says nothing.
+FALLBACK = "p2dx"
+#: Beginnings of names that belong to a shipped model, where no model's own name begins them.
+FAMILIES = {
+    "p2a": "p2at", "p2p": "p2pb", "p2": "p2dx", "p3at": "p3at-sh", "p3a": "p3at-sh", "p3": "p3dx-sh",
+    "amigo": "amigo-sh", "power": "powerbot-sh", "patrol": "patrolbot-sh", "people": "peoplebot-sh", "perf": "perfpb",
+    "mt400": "patrolbot-sh", "researchpb": "patrolbot-sh", "psos": "pion1m", "pion": "pion1m", "seekur": "seekur",
+}  # fmt: skip
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class MatchedParameters:
+    """What is taken for a robot, and what a person should be told of it."""
+
+    parameters: RobotParameters
+    #: None where the model is known or parameters were given.
+    warning: str | None = None
+
+
+def load_parameters(name_or_path: str | Path) -> RobotParameters:
+    """Return a model's parameters, by its subclass or from a file (TOML, or ARIA's `.p`).
+
+    Raises:
+        ParametersError: The model is unknown, or the file is missing or breaks the schema.
+    """
+    name = str(name_or_path)
+    if name.lower() in known_robots():
+        return build_parameters(f"{name.lower()}.toml", shipped_table(name.lower()))
+    path = Path(name)
+    if path.suffix == ".toml" and path.is_file():
+        return build_parameters(name, file_table(path))
+    if path.suffix == ".p" and path.is_file():
+        return build_parameters(name, aria_table(name, text_of(path), nearest_model))
+    if path.suffix in {".toml", ".p"}:
+        raise ParametersError(f"no robot file {name}", hint=f"known models: {', '.join(known_robots())}")
+    close = get_close_matches(name.lower(), known_robots(), n=1)
+    hint = f"did you mean {close[0]}?" if close else f"known models: {', '.join(known_robots())}"
+    raise ParametersError(f"no robot model {name!r}", hint=hint)
+
+
+def parameters_for(subclass: str, given: str | Path | RobotParameters | None = None) -> MatchedParameters:
+    """Return the parameters for what a robot says it is; an unknown subclass falls back with a warning.
+
+    Args:
+        subclass: From the robot's identity, in any case.
+        given: Parameters, a model or a file that a person has named; they win whatever the robot says.
+
+    Raises:
+        ParametersError: What was given is unknown, missing or breaks the schema.
+    """
+    if isinstance(given, RobotParameters):
+        return MatchedParameters(parameters=given)
+    if given is not None:
+        return MatchedParameters(parameters=load_parameters(given))
+    if subclass.lower() in known_robots():
+        return MatchedParameters(parameters=load_parameters(subclass))
+    parameters = load_parameters(nearest_model(subclass))
+    return MatchedParameters(
+        parameters=parameters,
+        warning=(
+            f"no robot model {subclass!r}: taken for a {parameters.title} ({parameters.subclass}); distances, speeds"
+            " and sonar may be wrong. A file of its own (TOML, or ARIA's .p) sets them right"
+        ),
+    )
+
+
+def nearest_model(subclass: str) -> str:
+    """Return the shipped model that a name belongs to: itself, the longest name it begins with, or its family."""
+    name = subclass.lower()
+    models = [model for model in known_robots() if name.startswith(model)]
+    if models:
+        return max(models, key=len)
+    return next((model for start, model in FAMILIES.items() if name.startswith(start)), FALLBACK)

@@ -1,0 +1,378 @@
+"""Which adapter stands between the wires and the robot: the model, or the firmware's own core.
+
+The adapter's firmware core in the model's place: the same calls, executed by the C++ of adapter_fw.
+
+The core is a shared library with a plain C interface (adapter_fw/capi), built
+with the package where a C++17 compiler is there, and loaded by ctypes. What is
+told (events, status) has the model's words, so that a run's log can be compared.
+
+Invariant: nothing is decided here; pins, bytes, times and settings go through as
+they are.
+"""
+
+import ctypes
+from collections.abc import Callable
+from functools import cache
+from importlib.util import find_spec
+from typing import Any, TypeAlias, cast
+
+from adapter_sim.adapter import Adapter, AdapterState, AdapterStatus
+from adapter_sim.codec import BitOrder
+from adapter_sim.distances import threshold_um
+from adapter_sim.mixing import Master, PadReport, Speeds
+from adapter_sim.pinout import Pinout, Safe, WireRole
+from adapter_sim.pins import EventCallback, PinBank
+from adapter_sim.settings import AdapterSettings, EncoderAtOpen, MotorMeaning
+from p2os.errors import MissingDependencyError, UsageError
+from p2os.robots.parameters import RobotParameters
+from p2os.timing import NS_PER_S, Nanos, Reached
+from robot_bench.scenario.scenario import Scenario
+
+#: Of adapter_capi.h.
+VERSION = 1
+_MAX_FRAME_BYTES = 9
+
+_Read = ctypes.CFUNCTYPE(ctypes.c_uint32, ctypes.c_void_p, ctypes.c_int64)
+_Drive = ctypes.CFUNCTYPE(None, ctypes.c_void_p, ctypes.c_uint32, ctypes.c_uint32, ctypes.c_int64)
+_Happened = ctypes.CFUNCTYPE(
+    None, ctypes.c_void_p, ctypes.c_int64, ctypes.c_char_p, ctypes.c_char_p, ctypes.c_int32, ctypes.c_int32
+)
+
+
+class _Callbacks(ctypes.Structure):
+    _fields_ = (("user", ctypes.c_void_p), ("read", _Read), ("drive", _Drive), ("happened", _Happened))
+
+
+#: Settings that are one of several, in the order of the firmware's enumerations.
+_CHOICES: dict[str, tuple[str, ...]] = {
+    "bit_order": tuple(BitOrder),
+    "motor_meaning": tuple(MotorMeaning),
+    "encoder_at_open": tuple(EncoderAtOpen),
+}
+
+#: Result and arguments of each function: v nothing, s text, i 32 bits, l 64 bits, z size, p pointer.
+_FUNCTIONS = {
+    "adapter_version": "i",
+    "adapter_new": "ppppplp",
+    "adapter_free": "vp",
+    "adapter_setting_name": "si",
+    "adapter_setting_default": "li",
+    "adapter_robot_name": "si",
+    "adapter_wire_name": "si",
+    "adapter_status_name": "si",
+    "adapter_receive": "vppzl",
+    "adapter_receive_pad": "vpiiiil",
+    "adapter_set_master": "vpil",
+    "adapter_shutdown": "vpsl",
+    "adapter_advance_to": "vpl",
+    "adapter_next_deadline": "lp",
+    "adapter_take_output": "zpp",
+    "adapter_status": "vpp",
+    "adapter_state": "sp",
+    "adapter_reason": "sp",
+    "adapter_robot_text": "spi",
+    "adapter_state_size": "z",
+    "adapter_save": "vpp",
+    "adapter_restore": "vpp",
+}
+_TYPES: dict[str, Any] = {
+    "v": None, "s": ctypes.c_char_p, "i": ctypes.c_int32, "l": ctypes.c_int64, "z": ctypes.c_size_t,
+    "p": ctypes.c_void_p,
+}  # fmt: skip
+
+
+def is_available() -> bool:
+    """Tell whether the firmware's library was built with this package."""
+    return find_spec("robot_bench._adapter_firmware") is not None
+
+
+@cache
+def _library() -> Any:
+    spec = find_spec("robot_bench._adapter_firmware")
+    if spec is None or spec.origin is None:
+        raise MissingDependencyError(
+            "the adapter's firmware core is not built",
+            hint="install a C++17 compiler (apt-get install g++) and the package again",
+        )
+    library = ctypes.CDLL(spec.origin)
+    for name, kinds in _FUNCTIONS.items():
+        function = getattr(library, name)
+        function.restype = _TYPES[kinds[0]]
+        function.argtypes = [_TYPES[kind] for kind in kinds[1:]]
+    if library.adapter_version() != VERSION:
+        raise MissingDependencyError(
+            f"the adapter's firmware core has interface {library.adapter_version()}, expected {VERSION}",
+            hint="install the package again",
+        )
+    return library
+
+
+def _names(function: Callable[[int], bytes | None]) -> list[str]:
+    names: list[str] = []
+    while (name := function(len(names))) is not None:
+        names.append(name.decode())
+    return names
+
+
+def _numbers(names: list[str], values: dict[str, int]) -> Any:
+    return (ctypes.c_int64 * len(names))(*(values[name] for name in names))
+
+
+def default_settings() -> dict[str, int]:
+    """Return the firmware's own defaults, by the names of its settings."""
+    library = _library()
+    return {
+        name: library.adapter_setting_default(place) for place, name in enumerate(_names(library.adapter_setting_name))
+    }
+
+
+def setting_numbers(settings: AdapterSettings, parameters: RobotParameters) -> dict[str, int]:
+    """Return a model's settings as the firmware's numbers."""
+    numbers = {}
+    for name in default_settings():
+        if name.startswith("baud"):
+            place = int(name.removeprefix("baud"))
+            numbers[name] = settings.bauds[place] if place < len(settings.bauds) else 0
+            continue
+        value = getattr(settings, name)
+        if name == "threshold_um":
+            value = threshold_um(value, parameters)
+        if name in _CHOICES:
+            value = _CHOICES[name].index(value)
+        numbers[name] = -1 if value is None else int(value)
+    return numbers
+
+
+def robot_numbers(parameters: RobotParameters) -> dict[str, int]:
+    """Return a robot's numbers as the firmware wants them."""
+    return {
+        "distance_nm_per_count": parameters.distance_nm_per_count,
+        "angle_counts_per_turn": parameters.angle_counts_per_turn,
+        "velocity_um_s_per_count": parameters.velocity_um_s_per_count,
+        "range_um_per_count": parameters.range_um_per_count,
+        "track_mm": parameters.track_mm,
+        "wheel_diameter_um": round(parameters.body.wheel_diameter_m * 10**6),
+        "ceiling_mm_s": parameters.max_velocity_mm_s,
+        "max_velocity_mm_s": min(parameters.max_velocity_mm_s, parameters.motion.max_velocity_mm_s),
+        "max_rotation_deg_s": min(parameters.max_rotation_deg_s, parameters.motion.max_rotation_deg_s),
+        "half_sonar_range_um": threshold_um(None, parameters),
+    }
+
+
+def wire_numbers(pinout: Pinout) -> dict[str, int]:
+    """Return a pin-out's widths and safe levels as the firmware wants them."""
+    distances = pinout.with_role(WireRole.DISTANCE)
+    return {
+        "distances": len(distances),
+        "motor1_width": pinout.value("motor1").width,
+        "motor2_width": pinout.value("motor2").width,
+        "encoder_width": pinout.value("encoder1").width,
+        "safe_mask": sum(1 << bit for bit, wire in enumerate(distances) if wire.safe is not Safe.HOLD),
+        "safe_levels": sum(1 << bit for bit, wire in enumerate(distances) if wire.safe is Safe.HIGH),
+    }
+
+
+class FirmwareAdapter:
+    """The firmware core as a passive part in virtual time; see `adapter_sim.Adapter`.
+
+    Args:
+        pins: Its ends of the wires.
+        pinout: Names, widths and levels of the wires.
+        parameters: The robot's own numbers.
+        settings: None takes the defaults.
+        on_event: Told of each transition.
+        now: When power comes, in nanoseconds.
+
+    Raises:
+        MissingDependencyError: The library was not built.
+        UsageError: The firmware refuses a number.
+    """
+
+    def __init__(
+        self,
+        *,
+        pins: PinBank,
+        pinout: Pinout,
+        parameters: RobotParameters,
+        settings: AdapterSettings | None = None,
+        on_event: EventCallback | None = None,
+        now: Nanos = 0,
+    ) -> None:
+        self._library = library = _library()
+        self.pinout = pinout
+        self.parameters = parameters
+        self.settings = settings = settings or AdapterSettings()
+        self.on_event = on_event
+        self._pins = pins
+        motors = [name for value in ("motor1", "motor2") for name in pinout.value(value).wires]
+        ends = [pinout.with_role(role)[0].name for role in (WireRole.CONNECT, WireRole.RESET)]
+        self._inputs = [(name, 1 << bit) for bit, name in enumerate([*motors, *ends])]
+        self._outputs = [wire.name for wire in pinout.with_role(WireRole.DISTANCE)]
+        self._outputs += [name for value in ("encoder1", "encoder2") for name in pinout.value(value).wires]
+        self._status_names = _names(library.adapter_status_name)
+        self._failure: BaseException | None = None
+        self._callbacks = _Callbacks(None, _Read(self._read), _Drive(self._drive), _Happened(self._happened))
+        fault = ctypes.c_char_p()
+        self._handle = library.adapter_new(
+            _numbers(_names(library.adapter_setting_name), setting_numbers(settings, parameters)),
+            _numbers(_names(library.adapter_robot_name), robot_numbers(parameters)),
+            _numbers(_names(library.adapter_wire_name), wire_numbers(pinout)),
+            ctypes.byref(self._callbacks), now, ctypes.byref(fault),
+        )  # fmt: skip
+        if not self._handle:
+            raise UsageError(f"the adapter's firmware refuses its numbers: {(fault.value or b'').decode()}")
+
+    def __del__(self) -> None:
+        if getattr(self, "_handle", None):
+            self._library.adapter_free(self._handle)
+
+    @property
+    def state(self) -> AdapterState:
+        """Return what the adapter is doing."""
+        return AdapterState(self._library.adapter_state(self._handle).decode())
+
+    @property
+    def master(self) -> Master:
+        """Return who commands."""
+        return list(Master)[self.numbers["master"]]
+
+    @property
+    def baud(self) -> int:
+        """Return the line speed that is being tried or used."""
+        return self.numbers["baud"]
+
+    @property
+    def numbers(self) -> dict[str, int]:
+        """Return everything the firmware counts and knows, by name."""
+        values = (ctypes.c_int64 * len(self._status_names))()
+        self._library.adapter_status(self._handle, values)
+        return dict(zip(self._status_names, values, strict=True))
+
+    @property
+    def status(self) -> AdapterStatus:
+        """Return what the adapter knows at this moment; single ranges stay in the firmware."""
+        numbers = self.numbers
+        count = len(self.pinout.with_role(WireRole.DISTANCE))
+        return AdapterStatus(
+            state=self.state,
+            reason=self._library.adapter_reason(self._handle).decode(),
+            motors=(numbers["motor1"], numbers["motor2"]),
+            speeds=Speeds(numbers["forward_mm_s"], numbers["turn_deg_s"]),
+            distances=tuple(bool(numbers["levels"] >> bit & 1) for bit in range(count)),
+            ranges_um=(None,) * count,
+            counts=(numbers["left_count"], numbers["right_count"]),
+            counts_shown=(numbers["left_shown"], numbers["right_shown"]),
+            sips=numbers["sips"],
+            odometry_jumps=numbers["jumps"],
+        )
+
+    def receive(self, data: bytes, now: Nanos) -> None:
+        """Take bytes that the line has delivered at `now`."""
+        self._library.adapter_receive(self._handle, data, len(data), now)
+        self._raise_failure()
+
+    def receive_pad(self, report: PadReport, now: Nanos) -> None:
+        """Take a pad's report that came at `now`."""
+        buttons = report.up | report.down << 1
+        self._library.adapter_receive_pad(self._handle, buttons, report.forward, report.backward, report.turn, now)
+        self._raise_failure()
+
+    def set_master(self, master: Master, now: Nanos) -> None:
+        """Give the robot to another master."""
+        self._library.adapter_set_master(self._handle, list(Master).index(master), now)
+        self._raise_failure()
+
+    def shutdown(self, reason: str, now: Nanos) -> None:
+        """Stop the robot, drive every output to its safe level, and wait for the connect request to end."""
+        self._library.adapter_shutdown(self._handle, reason.encode(), now)
+        self._raise_failure()
+
+    def take_output(self) -> list[bytes]:
+        """Return the frames to send, one item each, oldest first, and forget them."""
+        frame, frames = ctypes.create_string_buffer(_MAX_FRAME_BYTES), []
+        while size := self._library.adapter_take_output(self._handle, frame):
+            frames.append(frame.raw[:size])
+        return frames
+
+    def next_deadline(self) -> Nanos | None:
+        """Return the next sample instant or deadline, in nanoseconds."""
+        return cast("int", self._library.adapter_next_deadline(self._handle))
+
+    def advance_to(self, limit: Nanos) -> Reached:
+        """Act on everything due up to and including `limit`, then look at rst."""
+        self._library.adapter_advance_to(self._handle, limit)
+        self._raise_failure()
+        return Reached(limit)
+
+    def snapshot(self) -> bytes:
+        """Return all that decides the future; only the same build of the firmware can read it back."""
+        state = ctypes.create_string_buffer(self._library.adapter_state_size())
+        self._library.adapter_save(self._handle, state)
+        return state.raw
+
+    def restore(self, snapshot: object) -> None:
+        """Put back what `snapshot` returned."""
+        self._library.adapter_restore(self._handle, cast("bytes", snapshot))
+
+    # What the firmware calls. An exception must not cross the C code: it is kept, and raised behind it.
+
+    def _read(self, _user: object, at: int) -> int:
+        try:
+            read = self._pins.read
+            return sum(weight for name, weight in self._inputs if read(name, at))
+        except BaseException as failure:  # noqa: BLE001 - raised again by _raise_failure
+            self._failure = failure
+            return 0
+
+    def _drive(self, _user: object, mask: int, levels: int, now: int) -> None:
+        try:
+            for bit, name in enumerate(self._outputs):
+                if not mask:
+                    self._pins.write(name, None, now)
+                elif mask >> bit & 1:
+                    self._pins.write(name, bool(levels >> bit & 1), now)
+        except BaseException as failure:  # noqa: BLE001 - raised again by _raise_failure
+            self._failure = failure
+
+    def _happened(self, _user: object, now: int, what: bytes, detail: bytes, first: int, second: int) -> None:
+        try:
+            if self.on_event is not None:
+                self.on_event(now, what.decode(), self._detail(what.decode(), detail.decode(), first, second))
+        except BaseException as failure:  # noqa: BLE001 - raised again by _raise_failure
+            self._failure = failure
+
+    def _detail(self, what: str, detail: str, first: int, second: int) -> str:
+        if what == "command":
+            numbers = self.numbers
+            return f"VEL {first}, RVEL {second} (motors {numbers['motor1']}, {numbers['motor2']})"
+        if what == "stall":
+            return f"left {first}, right {second}"
+        if what == "connected":
+            name, *kinds = (
+                self._library.adapter_robot_text(self._handle, place).decode("latin-1") for place in range(3)
+            )
+            return " ".join(part for part in (*kinds, name) if part)
+        if what == "no connection":
+            return f"{detail}; tries again in {first * 10**6 / NS_PER_S:.1f} s"
+        return detail
+
+    def _raise_failure(self) -> None:
+        failure, self._failure = self._failure, None
+        if failure is not None:
+            raise failure
+
+
+AnyAdapter: TypeAlias = Adapter | FirmwareAdapter
+
+#: What a scenario and a command line call them.
+_KINDS: dict[str, type[Adapter] | type[FirmwareAdapter]] = {"model": Adapter, "firmware": FirmwareAdapter}
+
+
+def make_adapter(scenario: Scenario, pins: PinBank, pinout: Pinout) -> AnyAdapter:
+    """Return the adapter that a scenario wants.
+
+    Raises:
+        MissingDependencyError: The firmware's core is wanted and was not built.
+    """
+    kind = _KINDS[scenario.adapter_core]
+    return kind(pins=pins, pinout=pinout, parameters=scenario.parameters, settings=scenario.adapter)

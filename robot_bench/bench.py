@@ -1,0 +1,292 @@
+"""The composition root: builds the chip, the wires, the robot and the loop for a scenario.
+
+    mode A, direct     chip ─ nets ─ motors, encoders, sensors ─ body
+    mode B, adapter    chip ─ nets ─ adapter ─ lines at 9600 8N1 ─ controller ─ body
+
+Mode C (a real or remote robot) is built by `robot_bench.remote`, on the same
+parts. The order of the followers is fixed: who drives pins first, the script
+and its faults second, the recorder last.
+
+Invariant: a bench that was restored from a snapshot goes on as the one that the
+snapshot was taken of.
+"""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Protocol, cast
+
+from adapter_sim import Adapter
+from adapter_sim.pinout import Pinout, Pull, WireRole, load_pinout
+from p2os.errors import ScenarioError
+from p2os.pioneer.body.choose import make_body
+from p2os.pioneer.body.contract import RobotBody
+from p2os.pioneer.controller.controller import Pioneer
+from p2os.pioneer.world.find import load_world
+from p2os.pioneer.world.model import World
+from p2os.timing import NS_PER_S, Nanos
+from robot_bench.adapter import AnyAdapter, make_adapter
+from robot_bench.direct import DirectRobot, DistanceSensors, JointMotor, WheelEncoder
+from robot_bench.loop import DEFAULT_SLICE_NS, Follower, LeaderReached, RunLoop
+from robot_bench.recording.client_view import SipRanges
+from robot_bench.recording.recorder import Recorder
+from robot_bench.recording.trace import TraceWriter
+from robot_bench.scenario.fault_script import FaultScript
+from robot_bench.scenario.scenario import Scenario
+from robot_bench.scenario.world_script import Script
+from robot_bench.wires.chip_pins import ChipPins
+from robot_bench.wires.endpoints import Endpoint
+from robot_bench.wires.nets import Harness, Net, OwnedPins, Strength
+from robot_bench.wires.ports import Chip
+from robot_bench.wires.serial_line import SerialLine
+
+#: chosen: so long a run goes on after the firmware has died, to show what the robot does then.
+AFTER_FAULT_NS: Nanos = 1 * NS_PER_S
+#: Owner of the resistors on the wires.
+RESISTORS = "board"
+
+
+class Saved(Protocol):
+    """A part that can be saved."""
+
+    def snapshot(self) -> object:
+        """Return all that decides this part's future."""
+        ...
+
+    def restore(self, snapshot: object) -> None:
+        """Put back what `snapshot` returned."""
+        ...
+
+
+class RobotSide(Follower, Saved, Protocol):
+    """What stands at the far end of the wires and owns the body."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class BenchParts:
+    """The parts of a bench, for those who want to look at one."""
+
+    chip: Chip
+    harness: Harness
+    body: RobotBody
+    world: World
+    adapter: AnyAdapter | None = None
+    pioneer: Pioneer | None = None
+
+
+class Bench:
+    """A run in virtual time.
+
+    Args:
+        scenario: What to run.
+        trace: Where the recording goes; None records in memory.
+        chip: Runs the firmware; None boots the scenario's on an emulated BluePill.
+        slice_ns: How often the loop gives control back; without effect on the result.
+        on_slice: Called after each slice with the time reached; may raise to end the run.
+    """
+
+    def __init__(
+        self,
+        scenario: Scenario,
+        *,
+        trace: TraceWriter | None = None,
+        chip: Chip | None = None,
+        slice_ns: Nanos = DEFAULT_SLICE_NS,
+        on_slice: Callable[[Nanos], None] | None = None,
+    ) -> None:
+        self.scenario = scenario
+        self.trace = trace or TraceWriter()
+        self.on_slice = on_slice
+        pinout = load_pinout()
+        world = load_world(scenario.world, seed=scenario.seed)
+        body = make_body(scenario.body, world, scenario.parameters)
+        body.reset(scenario.start or world.start, scenario.seed)
+        chip = chip or boot(scenario.firmware)
+        harness = make_harness(pinout)
+        self.recorder = Recorder(self.trace, harness, body=body)
+        self._robots: list[RobotSide] = []
+        self._ranges: SipRanges | None = None
+        self.parts = self._build(pinout, world, body, chip, harness)
+        self.script = Script(
+            scenario.changes, body, scenario.parameters,
+            bring_to=self._bring_robot_to, on_change=self.recorder.obstacle,
+        )  # fmt: skip
+        self.recorder.bring_to = self._bring_robot_to
+        self.faults = FaultScript(scenario.faults, bring_to=self._bring_robot_to, do=self._say_to_robot)
+        followers = (*self._robots, self.script, self.faults, self.recorder)
+        self.loop = RunLoop(chip, followers, slice_ns=slice_ns, on_slice=self._after_slice)
+        pin_of = {wire.name: wire.bluepill for wire in pinout.wires}
+        pins = ChipPins(chip, harness, pin_of, on_watched=self.loop.note_edge)
+        for wire in pinout.with_role(WireRole.RESET):
+            pins.watch(wire.name)
+        self._wake_adapter_by_edges(pins, harness)
+        chip.usart1.on_transmit = lambda byte, at: self.recorder.usart(bytes([byte]), at)
+        chip.on_warning = lambda text: self.recorder.event("chip", chip.now_ns, "warning", text)
+        self.recorder.start()
+
+    def _wake_adapter_by_edges(self, pins: ChipPins, harness: Harness) -> None:
+        """Let a model of the adapter that looks at settled pins wait for their edges instead of sampling on."""
+        adapter = self.parts.adapter
+        if isinstance(adapter, Adapter):
+            adapter.samples.waits_for_edges = True
+            for name in adapter.inputs.wires:
+                pins.watch(name)
+                harness[name].watch(lambda _net, _owner, at: self.loop.note_edge(at))
+
+    @property
+    def chip(self) -> Chip:
+        """Return the chip."""
+        return self.parts.chip
+
+    @property
+    def note(self) -> str | None:
+        """Return what a reader of the result has to know of the body."""
+        return self.parts.body.note
+
+    @property
+    def end(self) -> Nanos:
+        """Return when the run ends, as far as is known now."""
+        fault, duration_ns = self.chip.fault, self.scenario.duration_ns
+        return duration_ns if fault is None else min(duration_ns, fault.at_ns + AFTER_FAULT_NS)
+
+    @property
+    def now(self) -> Nanos:
+        """Return the time that the chip has come to."""
+        return self.parts.chip.now_ns
+
+    def run_until(self, end: Nanos, advance: Callable[[int], LeaderReached] | None = None) -> None:
+        """Run to `end`, until shortly after the firmware has died, or to a debugger's halt.
+
+        Args:
+            end: when to come back.
+            advance: as of `RunLoop.run_until`.
+        """
+        self.loop.run_until(min(end, self.end), advance)
+
+    def finish(self) -> Nanos:
+        """Bring everything to the end of the run and write the rest of the trace; return the end's time."""
+        end = min(self.now, self.end)
+        self.loop.finish(end)
+        self.recorder.finish(end)
+        return end
+
+    def snapshot(self) -> dict[str, object]:
+        """Return all that decides the rest of the run, as a value that can be pickled."""
+        return {
+            "chip": self.parts.chip.snapshot(),
+            "harness": self.parts.harness.snapshot(),
+            "robots": [robot.snapshot() for robot in self._robots],
+            "ranges": None if self._ranges is None else self._ranges.snapshot(),
+            "script": self.script.snapshot(),
+            "faults": self.faults.snapshot(),
+            "recorder": self.recorder.snapshot(),
+            "loop": self.loop.snapshot(),
+        }
+
+    def restore(self, snapshot: Mapping[str, object]) -> None:
+        """Put back what `snapshot` returned; the scenario must be the same."""
+        self.parts.chip.restore(snapshot["chip"])
+        self.parts.harness.restore(cast("Mapping[str, Mapping[str, object]]", snapshot["harness"]))
+        for robot, state in zip(self._robots, cast("Sequence[object]", snapshot["robots"]), strict=True):
+            robot.restore(state)
+        if self._ranges is not None:
+            self._ranges.restore(cast("Sequence[float]", snapshot["ranges"]))
+        self.script.restore(snapshot["script"])
+        self.faults.restore(snapshot["faults"])
+        self.recorder.restore(snapshot["recorder"])
+        self.loop.restore(cast("Mapping[str, object]", snapshot["loop"]))
+
+    def _after_slice(self, now: Nanos) -> None:
+        if self.chip.fault is not None:
+            self.loop.end_at(self.end)
+        if self.on_slice is not None:
+            self.on_slice(now)
+
+    def _bring_robot_to(self, at: Nanos) -> None:
+        for robot in self._robots:
+            robot.advance_to(at)
+
+    def _say_to_robot(self, words: str, at: Nanos) -> None:
+        if self.parts.pioneer is not None:
+            self.parts.pioneer.do(words, at)
+
+    def _build(self, pinout: Pinout, world: World, body: RobotBody, chip: Chip, harness: Harness) -> BenchParts:
+        if self.scenario.mode == "direct":
+            if self.scenario.faults:
+                raise ScenarioError(
+                    f"{self.scenario.name}: [[fault]] acts on the robot's controller, and mode direct has none",
+                    hint="--mode adapter",
+                )
+            self._robots.append(self._direct_robot(pinout, body, harness))
+            return BenchParts(chip=chip, harness=harness, body=body, world=world)
+        adapter, pioneer = self._adapter_and_pioneer(pinout, body, harness)
+        return BenchParts(chip=chip, harness=harness, body=body, world=world, adapter=adapter, pioneer=pioneer)
+
+    def _direct_robot(self, pinout: Pinout, body: RobotBody, harness: Harness) -> DirectRobot:
+        settings = self.scenario.direct
+
+        def nets(value: str) -> list[Net]:
+            return [harness[name] for name in pinout.value(value).wires]
+
+        def motor(value: str) -> JointMotor:
+            return JointMotor(
+                nets(value), step_um_per_s=settings.step_um_per_s, ramp_um_per_s2=settings.ramp_um_per_s2,
+                dt_ns=body.dt_ns, bit_order=settings.bit_order,
+            )  # fmt: skip
+
+        wires = pinout.with_role(WireRole.DISTANCE)
+        sensors = DistanceSensors(
+            [harness[wire.name] for wire in wires],
+            threshold_um=self.scenario.threshold_um, period_ns=settings.sensor_period_ns,
+        )  # fmt: skip
+        sensors.on_sample = self.recorder.sonar
+        return DirectRobot(
+            body, left=motor("motor1"), right=motor("motor2"),
+            encoders=(WheelEncoder(nets("encoder1")), WheelEncoder(nets("encoder2"))),
+            sensors=sensors, sonar_numbers=range(len(wires)), encoder_period_ns=settings.encoder_period_ns,
+        )  # fmt: skip
+
+    def _adapter_and_pioneer(self, pinout: Pinout, body: RobotBody, harness: Harness) -> tuple[AnyAdapter, Pioneer]:
+        recorder, parameters = self.recorder, self.scenario.parameters
+        to_robot, to_client = SerialLine(), SerialLine()
+        adapter = make_adapter(self.scenario, OwnedPins(harness, "adapter"), pinout)
+        adapter.on_event = recorder.listener("adapter")
+        settings = replace(self.scenario.controller, baud=to_client.baud, seed=self.scenario.seed)
+        pioneer = Pioneer(parameters=parameters, body=body, settings=settings)
+        pioneer.on_event = recorder.listener("pioneer")
+        ranges = self._ranges = SipRanges(parameters, pioneer.settings.profile, on_ranges=recorder.sonar)
+
+        def arrives_at_client(data: bytes, at: Nanos) -> None:
+            recorder.wire("r2c", data, at)
+            ranges.take(data, at)
+
+        self._robots.append(Endpoint(adapter, incoming=to_client, outgoing=to_robot, on_arrival=arrives_at_client))
+        self._robots.append(
+            Endpoint(
+                pioneer,
+                incoming=to_robot,
+                outgoing=to_client,
+                on_arrival=lambda data, at: recorder.wire("c2r", data, at),
+            )
+        )
+        return adapter, pioneer
+
+
+def boot(firmware: Path) -> Chip:
+    """Return an emulated BluePill with a firmware, at its reset.
+
+    Raises:
+        MissingDependencyError: The emulator's engine is not installed.
+    """
+    from bluepill_sim.board import BluePill
+
+    return BluePill(firmware)
+
+
+def make_harness(pinout: Pinout) -> Harness:
+    """Return the wires of a pin-out, with the resistors that hang on them."""
+    harness = Harness(Net(wire.name, idle=wire.idle) for wire in pinout.wires)
+    for wire in pinout.wires:
+        if wire.pull is not Pull.NONE:
+            harness[wire.name].drive(RESISTORS, wire.pull is Pull.UP, Strength.PULL, 0)
+    return harness

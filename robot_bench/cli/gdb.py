@@ -1,0 +1,54 @@
+"""`p2os run --gdb`: a scenario under GDB, with robot and world standing still at each halt."""
+
+import sys
+from collections.abc import Callable
+
+from bluepill_sim.cli.gdb_server import GdbServer
+from p2os.errors import RunFailedError
+from robot_bench.bench import Bench
+from robot_bench.debugging import BenchMachine, RemoteMachine
+from robot_bench.remote import RemoteBench
+from robot_bench.run import Driver, RemoteDriver
+
+
+def debug_bench(port: int, *, is_paced: bool, on_wait: Callable[[], None]) -> Driver:
+    """Return what lets GDB run a bench.
+
+    Args:
+        port: TCP port on this machine; 0 takes a free one.
+        is_paced: whether virtual time goes no faster than the wall clock.
+        on_wait: called while GDB is waited for; may raise to end the run.
+    """
+
+    def drive(bench: Bench) -> None:
+        _serve(GdbServer(BenchMachine(bench), port, is_paced=is_paced, on_wait=on_wait), bench)
+        bench.run_until(bench.scenario.duration_ns)
+
+    return drive
+
+
+def debug_port(port: int, *, on_wait: Callable[[], None]) -> RemoteDriver:
+    """Return what lets GDB run a bench with a real robot, which the first halt stops; arguments as of `debug_bench`."""
+
+    def drive(bench: RemoteBench) -> None:
+        try:
+            _serve(GdbServer(RemoteMachine(bench), port, on_wait=on_wait), bench)
+            if not bench.is_closed:
+                bench.run_until(bench.scenario.duration_ns)
+        finally:
+            bench.close()
+
+    return drive
+
+
+def _serve(server: GdbServer, bench: Bench | RemoteBench) -> None:
+    firmware = bench.scenario.firmware
+    sys.stderr.write(
+        f"waiting for GDB on port {server.port}: gdb-multiarch {firmware} -ex 'target remote :{server.port}'\n"
+    )
+    try:
+        runs_on = server.serve()
+    finally:
+        server.close()
+    if not runs_on:
+        raise RunFailedError("killed by the debugger", hint="detach lets the run go on")

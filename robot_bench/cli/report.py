@@ -1,0 +1,39 @@
+"""`p2os report`: makes everything in a run folder anew from its trace."""
+
+import json
+from pathlib import Path
+from typing import Annotated, cast
+
+import typer
+
+from robot_bench.report.make import make_artefacts
+
+HELP = """Make the report of a run, and all else in its folder, anew from trace.jsonl.
+
+A run that was killed has its trace up to the last virtual second: this makes
+the rest.
+
+\b
+Examples:
+  p2os report runs/dodge-001          report.html, plots, pins.vcd, pins.sr, summary.json
+  p2os report runs/dodge-001 --json   print the summary as well
+"""
+
+
+def register(app: typer.Typer) -> None:
+    """Add the verb."""
+    app.command("report", help=HELP)(report)
+
+
+def report(
+    folder: Annotated[Path, typer.Argument(help="A run folder.", metavar="DIR")],
+    json_output: Annotated[bool, typer.Option("--json", help="Print the summary as one JSON object.")] = False,
+) -> None:
+    """Make a run's report."""
+    made = make_artefacts(folder)
+    if json_output:
+        typer.echo(json.dumps(made.outcome, sort_keys=True))
+        return
+    for failure in cast("list[str]", made.outcome["failures"]):
+        typer.echo(f"failed  {failure}")
+    typer.echo(f"report: {made.report}")

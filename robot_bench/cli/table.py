@@ -1,0 +1,52 @@
+"""The summary of a run for a person: a table, the notes, and one last line."""
+
+from collections.abc import Mapping, Sequence
+from typing import cast
+
+from rich.console import Console
+from rich.table import Table
+
+from bluepill_sim.program.last_blocks import title_of
+from robot_bench.run import RunResult
+
+
+def print_result(result: RunResult, console: Console | None = None) -> None:
+    """Print what a run came to, on stdout."""
+    console = console or Console(highlight=False)
+    outcome = result.outcome
+    table = Table(show_header=False, box=None, pad_edge=False)
+    for name, value in rows(outcome):
+        table.add_row(name, value)
+    console.print(table)
+    for goal in cast("Sequence[str]", outcome["goals_met"]):
+        console.print(f"[green]met[/]     {goal}", soft_wrap=True)
+    for failure in cast("Sequence[str]", outcome["failures"]):
+        console.print("[red]failed[/]  ", end="")
+        console.print(failure, markup=False, soft_wrap=True)
+    for note in cast("Sequence[str]", outcome["notes"]):
+        console.print(f"note    {note}", markup=False, soft_wrap=True)
+    blocks = cast("Sequence[str]", outcome["last_blocks"] or ())
+    if blocks:
+        console.print(title_of(len(blocks)))
+    for line in blocks:
+        console.print(line, markup=False, soft_wrap=True)
+    console.print(f"{'passed' if result.passed else 'FAILED'}; report: {result.report}", markup=False, soft_wrap=True)
+
+
+def rows(outcome: Mapping[str, object]) -> list[tuple[str, str]]:
+    """Return the table's rows: name, and value with its unit."""
+    what = f"{outcome['scenario']} in {outcome['world']}, mode {outcome['mode']}, body {outcome['body']}"
+    found = [
+        ("scenario", f"{what}, seed {outcome['seed']}"),
+        ("virtual time", _with_unit(outcome["virtual_s"], ".1f", "s")),
+        ("speed", _with_unit(outcome["real_time_factor"], ".1f", "× real time")),
+        ("distance", _with_unit(outcome["distance_m"], ".2f", "m")),
+        ("collisions", _with_unit(outcome["collisions"], "d", "")),
+        ("least clearance", _with_unit(outcome["min_clearance_m"], ".3f", "m")),
+        ("trace", str(outcome["trace_sha256"] or "")[:16]),
+    ]  # fmt: skip
+    return [(name, value) for name, value in found if value]
+
+
+def _with_unit(value: object, form: str, unit: str) -> str:
+    return "" if value is None else f"{value:{form}} {unit}".strip()

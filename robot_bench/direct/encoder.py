@@ -1,0 +1,29 @@
+"""An absolute wheel encoder: a few wires that show which sector of a turn the wheel is in.
+
+The sector is taken by floor, so that −1 degree is the last sector. All wires
+change at one instant; a real disc's wires do not, which is not modelled.
+"""
+
+import math
+from collections.abc import Sequence
+
+from adapter_sim.codec import encoder_code
+from p2os.timing import Nanos
+from robot_bench.direct.distance import OWNER
+from robot_bench.wires.nets import Net, Strength
+
+#: One turn in units of a nanoradian: the sectors' boundaries are off by less than 1e-9 rad.
+NRAD_PER_TURN = round(2 * math.pi * 1e9)
+
+
+class WheelEncoder:
+    """One wheel's encoder; `nets` are its wires, least significant first."""
+
+    def __init__(self, nets: Sequence[Net]) -> None:
+        self._nets = tuple(nets)
+
+    def show(self, angle_rad: float, now: Nanos) -> None:
+        """Set the wires to the wheel's angle since the start."""
+        code = encoder_code(round(angle_rad * 1e9), NRAD_PER_TURN, len(self._nets))
+        for bit, net in enumerate(self._nets):
+            net.drive(OWNER, bool(code >> bit & 1), Strength.PUSH_PULL, now)

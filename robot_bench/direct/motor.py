@@ -1,0 +1,66 @@
+"""A joint motor that takes its speed from a few wires.
+
+The value of the wires times the speed of a step is the wanted rim speed; the
+motor approaches it along the ramp that the scenario gives. It reads its wires
+at the start of each step of the body, so a change acts from the next step on.
+
+Not modelled: current, load and stall; the body knows those.
+
+Invariant: integers of µm/s throughout, exact at every step.
+"""
+
+from collections.abc import Sequence
+
+from adapter_sim.codec import BitOrder, motor_value
+from p2os.errors import LocalProtocolError
+from p2os.timing import NS_PER_S, Nanos
+from robot_bench.wires.nets import Net
+
+
+class JointMotor:
+    """One wheel's motor.
+
+    Args:
+        nets: The wires of the value, least significant first.
+        step_um_per_s: Rim speed of one step of the value.
+        ramp_um_per_s2: Most change of speed a second; None jumps.
+        dt_ns: Length of a step of the body; the ramp must come to whole µm/s a step.
+    """
+
+    def __init__(
+        self,
+        nets: Sequence[Net],
+        *,
+        step_um_per_s: int,
+        ramp_um_per_s2: int | None,
+        dt_ns: Nanos,
+        bit_order: BitOrder = BitOrder.COMM3_MSB,
+    ) -> None:
+        self._nets = tuple(nets)
+        self._step_um_per_s = step_um_per_s
+        self._bit_order = bit_order
+        self._change: int | None = None
+        if ramp_um_per_s2 is not None:
+            self._change, rest = divmod(ramp_um_per_s2 * dt_ns, NS_PER_S)
+            if rest or self._change <= 0:
+                raise LocalProtocolError(f"a ramp of {ramp_um_per_s2} µm/s² is no whole number of µm/s in {dt_ns} ns")
+        self.speed_um_per_s = 0
+
+    def value(self, at: Nanos) -> int:
+        """Return the signed value on the wires at the instant `at`."""
+        code = 0
+        for bit, net in enumerate(self._nets):
+            if net.level(at):
+                code |= 1 << bit
+        return motor_value(code, len(self._nets), self._bit_order)
+
+    def step(self, at: Nanos) -> int:
+        """Return the rim speed in µm/s for the step of the body that starts at `at`."""
+        wanted = self.value(at) * self._step_um_per_s
+        if self._change is None:
+            self.speed_um_per_s = wanted
+        elif wanted > self.speed_um_per_s:
+            self.speed_um_per_s = min(wanted, self.speed_um_per_s + self._change)
+        else:
+            self.speed_um_per_s = max(wanted, self.speed_um_per_s - self._change)
+        return self.speed_um_per_s

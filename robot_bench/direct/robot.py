@@ -1,0 +1,118 @@
+"""The plant of mode A: a body with motors, encoders and distance sensors on wires.
+
+The body is stepped at multiples of its dt from time 0, lazily: a step is made
+when someone wants to know what is behind it. The motors' wires are read at the
+start of each step, from the nets' history.
+
+Invariant: at time t the body has made every step that ended at or before t.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import cast
+
+from adapter_sim.codec import BitOrder
+from p2os.errors import UsageError
+from p2os.pioneer.body.contract import BodyState, RobotBody
+from p2os.timing import NS_PER_MS, Nanos, Reached
+from robot_bench.direct.distance import DistanceSensors
+from robot_bench.direct.encoder import WheelEncoder
+from robot_bench.direct.motor import JointMotor
+
+UM_PER_M = 1_000_000
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class DirectSettings:
+    """What a scenario can say about the plug-ins of mode A."""
+
+    step_um_per_s: int = 62_500
+    #: None lets the wheels jump to their speed, as a velocity joint without a torque limit does.
+    ramp_um_per_s2: int | None = 300_000
+    #: chosen: a ranging module at 20 Hz.
+    sensor_period_ns: Nanos = 50 * NS_PER_MS
+    #: chosen: ten times as often as the 100 Hz programs look at a wheel at full speed.
+    encoder_period_ns: Nanos = 5 * NS_PER_MS
+    bit_order: BitOrder = BitOrder.COMM3_MSB
+
+    def __post_init__(self) -> None:
+        for name in ("step_um_per_s", "sensor_period_ns", "encoder_period_ns"):
+            if getattr(self, name) <= 0:
+                raise UsageError(f"direct setting {name} must be above 0, got {getattr(self, name)}")
+
+
+class DirectRobot:
+    """A body whose motors and sensors hang on wires."""
+
+    def __init__(
+        self,
+        body: RobotBody,
+        *,
+        left: JointMotor,
+        right: JointMotor,
+        encoders: tuple[WheelEncoder, WheelEncoder],
+        sensors: DistanceSensors,
+        sonar_numbers: Sequence[int],
+        encoder_period_ns: Nanos,
+    ) -> None:
+        self.body = body
+        self.sensors = sensors
+        self._left, self._right = left, right
+        self._left_encoder, self._right_encoder = encoders
+        self._sonar_numbers = tuple(sonar_numbers)
+        self._encoder_period_ns = encoder_period_ns
+        self._next_encoder: Nanos = 0
+        self._steps = 0
+
+    def next_deadline(self) -> Nanos:
+        """Return when a wire may change next."""
+        return min(self._next_encoder, self.sensors.next_deadline())
+
+    def advance_to(self, limit: Nanos) -> Reached:
+        """Step the body and set the wires as they are due."""
+        while True:
+            due = self.next_deadline()
+            if due > limit:
+                break
+            self._step_to(due)
+            if self._next_encoder <= due:
+                self._show_encoders(due)
+            if self.sensors.next_deadline() <= due:
+                self.sensors.sample(self.body.ranges(self._sonar_numbers), due)
+        self._step_to(limit)
+        return Reached(limit)
+
+    def snapshot(self) -> dict[str, object]:
+        """Return all that decides the future, body included."""
+        return {
+            "body": self.body.snapshot(),
+            "steps": self._steps,
+            "speeds": (self._left.speed_um_per_s, self._right.speed_um_per_s),
+            "next_encoder": self._next_encoder,
+            "sensors": self.sensors.snapshot(),
+        }
+
+    def restore(self, snapshot: object) -> None:
+        """Put back what `snapshot` returned."""
+        state = cast("Mapping[str, object]", snapshot)
+        self.body.restore(state["body"])
+        self._steps = cast("int", state["steps"])
+        self._left.speed_um_per_s, self._right.speed_um_per_s = cast("tuple[int, int]", state["speeds"])
+        self._next_encoder = cast("int", state["next_encoder"])
+        self.sensors.restore(cast("dict[str, object]", state["sensors"]))
+
+    def _step_to(self, limit: Nanos) -> None:
+        body, dt_ns = self.body, self.body.dt_ns
+        left, right = self._left, self._right
+        steps = self._steps
+        while (steps + 1) * dt_ns <= limit:
+            start = steps * dt_ns
+            body.step(left.step(start) / UM_PER_M, right.step(start) / UM_PER_M)
+            steps += 1
+        self._steps = steps
+
+    def _show_encoders(self, now: Nanos) -> None:
+        state: BodyState = self.body.state
+        self._left_encoder.show(state.left_angle_rad, now)
+        self._right_encoder.show(state.right_angle_rad, now)
+        self._next_encoder = now + self._encoder_period_ns

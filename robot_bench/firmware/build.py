@@ -1,0 +1,115 @@
+"""Build the example programs for the BluePill: `python robot_bench/firmware/build.py [--out DIR]`.
+
+Each program is one C file with `main` beside the shared board files; the ELF
+keeps its debug information with paths relative to this folder, so that the
+same compiler gives the same bytes wherever the folder lies.
+Source: gcc-arm-none-eabi of Debian 12 (12.2.rel1) built the committed files.
+"""
+
+import argparse
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+
+HERE = Path(__file__).resolve().parent
+COMPILER = "arm-none-eabi-gcc"
+#: First line of `arm-none-eabi-gcc --version` for the compiler of the committed ELFs.
+COMPILER_VERSION = "arm-none-eabi-gcc (15:12.2.rel1-1) 12.2.1 20221205"
+BOARD_SOURCES = ("startup.c", "memory.c", "board.c", "pins.c", "tick.c", "uart.c")
+#: Program name to its own sources.
+PROGRAMS = {
+    "motors": ("motors.c",),
+    "sensors": ("sensors.c",),
+    "encoders": ("encoders.c", "odometer.c"),
+    "dodge": ("dodge.c", "dodge_fsm.c", "odometer.c"),
+}
+MACHINE_FLAGS = ("-mcpu=cortex-m3", "-mthumb")
+COMPILE_FLAGS = (
+    *MACHINE_FLAGS,
+    "-std=c11",
+    "-Og",
+    "-g",
+    "-gdwarf-4",
+    "-gno-record-gcc-switches",
+    "-Wall",
+    "-Wextra",
+    "-Wshadow",
+    "-Wconversion",
+    "-Wmissing-prototypes",
+    "-Werror",
+    "-ffreestanding",
+    "-ffunction-sections",
+    "-fdata-sections",
+    "-fno-common",
+    "-fno-tree-loop-distribute-patterns",  # memset is not to become a call of itself
+)
+LINK_FLAGS = (
+    *MACHINE_FLAGS,
+    "-nostdlib",
+    "-Wl,--gc-sections",
+    "-Wl,--build-id=none",
+    "-Wl,--fatal-warnings",
+    "-Wl,-z,max-page-size=4",
+)
+
+
+def compiler_version() -> str | None:
+    """Return the first line of the compiler's `--version`; None where it is not installed."""
+    try:
+        done = subprocess.run([COMPILER, "--version"], capture_output=True, text=True, check=True)  # noqa: S603
+    except FileNotFoundError:
+        return None
+    return done.stdout.splitlines()[0]
+
+
+def build_elf(sources: tuple[str, ...], *, folder: Path, linker_script: str, output: Path) -> None:
+    """Compile and link `sources` of `folder` into the ELF `output`.
+
+    Raises:
+        subprocess.CalledProcessError: The compiler refused; its words are on stderr.
+    """
+    headers = subprocess.run([COMPILER, "-print-file-name=include"], capture_output=True, text=True, check=True)  # noqa: S603
+    prefix_maps = (f"-ffile-prefix-map={folder}=.", f"-ffile-prefix-map={headers.stdout.strip()}=gcc")
+    with tempfile.TemporaryDirectory() as scratch:
+        objects = []
+        for source in sources:
+            target = str(Path(scratch) / source.replace("/", "_").replace(".c", ".o"))
+            _run([COMPILER, *COMPILE_FLAGS, *prefix_maps, "-c", source, "-o", target], folder)
+            objects.append(target)
+        _run([COMPILER, *LINK_FLAGS, "-T", linker_script, *objects, "-lgcc", "-o", str(output)], folder)
+    output.chmod(0o644)
+
+
+def build_programs(output_folder: Path) -> list[Path]:
+    """Build every example program into `output_folder` and return the ELFs."""
+    built = []
+    for name, own in PROGRAMS.items():
+        output = output_folder.resolve() / f"{name}.elf"
+        build_elf((*BOARD_SOURCES, *own), folder=HERE, linker_script="f103c8.ld", output=output)
+        built.append(output)
+    return built
+
+
+def _run(command: list[str], folder: Path) -> None:
+    subprocess.run(command, cwd=folder, check=True)  # noqa: S603
+
+
+def main() -> int:
+    """Build, and say the size of each file."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0] if __doc__ else None)
+    parser.add_argument("--out", type=Path, default=HERE, help="folder for the ELFs (default: beside the sources)")
+    folder = parser.parse_args().out
+    version = compiler_version()
+    if version is None:
+        print(f"build: {COMPILER} is not installed\nhint: apt-get install gcc-arm-none-eabi", file=sys.stderr)  # noqa: T201
+        return 2
+    if version != COMPILER_VERSION:
+        print(f"build: note: {version} gives other bytes than {COMPILER_VERSION}", file=sys.stderr)  # noqa: T201
+    for elf in build_programs(folder):
+        print(f"{elf.name}: {elf.stat().st_size} bytes")  # noqa: T201
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,188 @@
+"""The one run loop: the chip leads, everything else follows to each deadline.
+
+Theory of operation. The leader (the emulated BluePill) runs to the earliest
+deadline of the others. It may stop short at an edge on a watched net, and late
+by one basic block. Then every deadline that the leader has passed is acted on,
+in order of time: those who are due are brought there, in their fixed order. At
+the moment of an edge on a watched net all are. Nets keep their history, so that
+a follower at time t reads the levels of t. A follower that needs another one
+brought up to date first (the recorder, the body) says so itself.
+
+Followers are never brought to the boundary of a slice: the slice limit only says
+how often the leader gives control back (for pacing, progress and Ctrl-C). So
+the result does not depend on it.
+
+A debugger may halt the leader, even inside a basic block. Then `run_until`
+comes back at once; nobody is brought anywhere before the leader stands at a
+boundary again, so that a run with halts is the same as one without.
+
+Invariant: when `run_until(end)` returns without a halt, every deadline before or at the time
+reached has been acted on by all, in order of time.
+"""
+
+from collections.abc import Callable, Mapping, Sequence
+from typing import Protocol, cast
+
+from p2os.errors import P2osError
+from p2os.timing import NS_PER_MS, Nanos, Reached
+
+#: chosen: the pacer's grain; small enough for a live view, large enough to cost nothing.
+DEFAULT_SLICE_NS: Nanos = 1 * NS_PER_MS
+#: How often followers may wake each other at one and the same instant before it is called a fault.
+MOST_ROUNDS = 16
+#: Later than any deadline.
+NEVER: Nanos = 1 << 62
+
+
+class Leader(Protocol):
+    """What leads: it executes a program and may overrun a limit by one basic block."""
+
+    @property
+    def now_ns(self) -> int:
+        """The time reached."""
+        ...
+
+    def advance_to(self, limit_ns: int) -> "LeaderReached":
+        """Run to `limit_ns`, at most a basic block beyond; less far where a watched net changes."""
+        ...
+
+
+class LeaderReached(Protocol):
+    """How far a leader came."""
+
+    @property
+    def now(self) -> int:
+        """The time reached."""
+        ...
+
+
+class Follower(Protocol):
+    """A part that is brought to deadlines."""
+
+    def next_deadline(self) -> Nanos | None:
+        """Return when this part next wants to act, or None for never."""
+        ...
+
+    def advance_to(self, limit: Nanos) -> Reached:
+        """Act on everything due up to and including `limit`."""
+        ...
+
+
+class StuckError(P2osError):
+    """Parts kept waking each other without time passing; any such case is a bug here."""
+
+
+class RunLoop:
+    """Brings a leader and its followers forward together."""
+
+    def __init__(
+        self,
+        leader: Leader,
+        followers: Sequence[Follower],
+        *,
+        slice_ns: Nanos = DEFAULT_SLICE_NS,
+        on_slice: Callable[[Nanos], None] | None = None,
+    ) -> None:
+        self.leader = leader
+        self.followers = tuple(followers)
+        self.slice_ns = slice_ns
+        #: Called with the leader's time after each slice; may raise to end the run.
+        self.on_slice = on_slice
+        #: The last instant that all followers were brought to.
+        self.now: Nanos = 0
+        self._end: Nanos = 0
+        self._edges: list[Nanos] = []
+        self._rounds = 0
+        self._advance: Callable[[int], LeaderReached] = leader.advance_to
+        self._deadlines: list[Nanos] = []
+        #: Whether the leader has halted in this run, and whether it stands inside a block.
+        self._is_halted = False
+        self._is_inside_block = False
+
+    def note_edge(self, at: Nanos) -> None:
+        """Have the followers brought to `at` as well: a watched net has changed there."""
+        if not self._edges or self._edges[-1] != at:
+            self._edges.append(at)
+
+    def stand_still(self, *, is_inside_block: bool) -> None:
+        """Have `run_until` come back: the leader has halted for a debugger."""
+        self._is_halted, self._is_inside_block = True, is_inside_block
+
+    def end_at(self, end: Nanos) -> None:
+        """End the present `run_until` earlier; what was brought beyond stays there."""
+        self._end = min(self._end, end)
+
+    def run_until(self, end: Nanos, advance: Callable[[int], LeaderReached] | None = None) -> None:
+        """Run to `end` in nanoseconds, to what `end_at` says in the meantime, or to a halt.
+
+        A leader that stands still for good lets time pass like any other.
+
+        Args:
+            end: when to come back.
+            advance: brings the leader forward in place of its `advance_to`; a debugger's step.
+
+        Raises:
+            StuckError: Two parts wake each other for ever.
+        """
+        self._end = end
+        self._advance = advance or self.leader.advance_to
+        self._is_halted = False
+        led = self.leader.now_ns
+        if self._is_inside_block:
+            self._is_inside_block = False
+            led = self._advance(end).now
+        while not self._is_halted:
+            due = self._next_due()
+            if due <= led and due <= self._end:
+                self._follow(due)
+            elif led >= self._end:
+                return
+            else:
+                led = self._lead(led, min(due, self._end))
+
+    def finish(self, end: Nanos) -> None:
+        """Bring the followers to `end` itself, so that their state is that of the end of the run."""
+        for follower in self.followers:
+            follower.advance_to(min(end, max(self.leader.now_ns, self.now)))
+
+    def snapshot(self) -> dict[str, object]:
+        """Return the loop's own state; the parts are saved by whoever built them."""
+        return {"now": self.now, "edges": tuple(self._edges), "is_inside_block": self._is_inside_block}
+
+    def restore(self, snapshot: Mapping[str, object]) -> None:
+        """Put back what `snapshot` returned."""
+        self.now = cast("int", snapshot["now"])
+        self._edges = list(cast("tuple[int, ...]", snapshot["edges"]))
+        self._is_inside_block = bool(snapshot["is_inside_block"])
+        self._rounds = 0
+
+    def _lead(self, now: Nanos, limit: Nanos) -> Nanos:
+        """Let the leader run to `limit`, slice by slice; stop at an edge on a watched net. Return its time."""
+        advance, slice_ns, on_slice = self._advance, self.slice_ns, self.on_slice
+        while now < limit and not self._edges and not self._is_halted:
+            now = advance(min(limit, now + slice_ns)).now
+            if on_slice is not None:
+                on_slice(now)
+        return now
+
+    def _next_due(self) -> Nanos:
+        """Return the earliest deadline, and note everybody's."""
+        due = self._edges[0] if self._edges else NEVER
+        noted = self._deadlines = [
+            NEVER if at is None else at for at in [part.next_deadline() for part in self.followers]
+        ]
+        return min(due, *noted) if noted else due
+
+    def _follow(self, due: Nanos) -> None:
+        """Bring those who are due to `due`, as noted; at a watched edge everybody."""
+        self._rounds = self._rounds + 1 if due <= self.now else 0
+        if self._rounds > MOST_ROUNDS:
+            late = [type(part).__name__ for part in self.followers if (part.next_deadline() or NEVER) <= due]
+            raise StuckError(f"time stands still at {due} ns: {', '.join(late)} stay due")
+        self.now = max(self.now, due)
+        has_edge = bool(self._edges) and self._edges[0] <= due
+        while self._edges and self._edges[0] <= due:
+            self._edges.pop(0)
+        for follower, deadline in zip(self.followers, self._deadlines, strict=True):
+            if has_edge or deadline <= due:
+                follower.advance_to(self.now)

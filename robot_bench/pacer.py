@@ -1,0 +1,63 @@
+"""Wall-clock time for the bench: pacing of real-time runs and the measure of every run.
+
+The only module of the bench, beside the command line, that reads a clock or
+sleeps. The models never see it: it is called between two slices of the loop.
+
+Invariant: a pacer never changes what a run computes, only when.
+"""
+
+import time
+from collections.abc import Callable
+
+from p2os.errors import LocalProtocolError
+from p2os.timing import NS_PER_MS, NS_PER_S, Nanos
+from p2os.transport.wall_clock import Clock, wall_clock
+
+#: chosen: the grain of pacing, fine enough for a line of 9600 bit/s.
+PACED_SLICE_NS: Nanos = 2 * NS_PER_MS
+
+
+class RealTimePacer:
+    """Holds virtual time back to the wall clock, and says how far it lags behind.
+
+    Args:
+        speed: Virtual seconds a wall second, above 0.
+        clock: Wall clock in nanoseconds.
+        sleep: Waits so many seconds.
+    """
+
+    def __init__(
+        self,
+        *,
+        speed: float = 1.0,
+        clock: Clock = wall_clock,
+        sleep: Callable[[float], None] = time.sleep,
+    ) -> None:
+        if speed <= 0:
+            raise LocalProtocolError(f"a pacer needs a speed above 0, got {speed}")
+        self.speed = speed
+        self._clock = clock
+        self._sleep = sleep
+        self._began: Nanos = clock()
+        self._base: Nanos = 0
+        #: How far virtual time stands behind the wall clock, ns of virtual time; 0 when it keeps up.
+        self.lag_ns: Nanos = 0
+        self.worst_lag_ns: Nanos = 0
+
+    def start(self, now: Nanos) -> None:
+        """Begin pacing at virtual time `now`."""
+        self._began, self._base = self._clock(), now
+        self.lag_ns = self.worst_lag_ns = 0
+
+    def keep_pace(self, now: Nanos) -> None:
+        """Wait until the wall clock has come to virtual time `now`."""
+        ahead = now - self.wall_ns()
+        if ahead > 0:
+            self._sleep(ahead / self.speed / NS_PER_S)
+            ahead = min(now - self.wall_ns(), 0)  # a sleep can last longer: the machine may have slept too
+        self.lag_ns = -ahead
+        self.worst_lag_ns = max(self.worst_lag_ns, self.lag_ns)
+
+    def wall_ns(self) -> Nanos:
+        """Return the virtual time that the wall clock stands for."""
+        return self._base + int((self._clock() - self._began) * self.speed)

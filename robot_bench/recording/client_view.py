@@ -1,0 +1,96 @@
+"""The pose of a real robot as far as its own odometry tells, for the recording of mode C.
+
+Integers of the trace: micrometres, microradians, µm/s. Wheel angles are not in
+a standard packet and stay 0; collisions cannot be told.
+
+The sonar ranges that a client knows, gathered from the standard packets it receives.
+
+A Pioneer 2 sends two readings a packet; the others keep their last value, and
+before the first reading the sonar's longest range.
+"""
+
+import math
+from collections.abc import Callable, Sequence
+
+from p2os.errors import LocalProtocolError, RemoteProtocolError
+from p2os.protocol.frames import Frame
+from p2os.protocol.odometry import Unwrapper
+from p2os.protocol.profiles import Profile
+from p2os.protocol.sip import POSITION_MASK, SIP_KINDS, StandardSip
+from p2os.robots.parameters import RobotParameters
+from p2os.timing import Nanos
+
+UM_PER_M = 1_000_000
+
+
+class SipRanges:
+    """Ranges of all fitted sonar; tells them after each packet that brings a reading."""
+
+    def __init__(
+        self, parameters: RobotParameters, profile: Profile, *, on_ranges: Callable[[Nanos, Sequence[float]], None]
+    ) -> None:
+        self._profile = profile
+        self._parameters = parameters
+        self._on_ranges = on_ranges
+        self._ranges_m = [parameters.sonar_range_m] * parameters.sonar_fitted
+
+    def take(self, data: bytes, now: Nanos) -> None:
+        """Look into one frame; anything but a standard packet is passed over."""
+        try:
+            frame = Frame.from_bytes(data)
+            if frame.kind not in SIP_KINDS:
+                return
+            sip = StandardSip.from_frame(frame, self._profile)
+        except (LocalProtocolError, RemoteProtocolError):  # a noisy line: no sound frame
+            return
+        self.take_sip(sip, now)
+
+    def take_sip(self, sip: StandardSip, now: Nanos) -> None:
+        """Take the readings of a standard packet."""
+        for reading in sip.sonar:
+            if reading.number < len(self._ranges_m):
+                metres = reading.raw_range * self._parameters.range_um_per_count / UM_PER_M
+                self._ranges_m[reading.number] = min(metres, self._parameters.sonar_range_m)
+        if sip.sonar:
+            self._on_ranges(now, self._ranges_m)
+
+    def snapshot(self) -> tuple[float, ...]:
+        """Return the ranges."""
+        return tuple(self._ranges_m)
+
+    def restore(self, snapshot: Sequence[float]) -> None:
+        """Put back what `snapshot` returned."""
+        self._ranges_m = list(snapshot)
+
+
+NM_PER_UM = 1_000
+
+
+class OdometryPose:
+    """Follows the standard packets of one session."""
+
+    def __init__(self, parameters: RobotParameters) -> None:
+        self._parameters = parameters
+        self._x, self._y = Unwrapper(POSITION_MASK + 1), Unwrapper(POSITION_MASK + 1)
+        #: Path over ground, metres.
+        self.distance_m = 0.0
+
+    def take(self, sip: StandardSip) -> dict[str, int]:
+        """Return the pose entry of a packet."""
+        per_count_um = self._parameters.distance_nm_per_count / NM_PER_UM
+        step = math.hypot(self._x.update(sip.raw_x), self._y.update(sip.raw_y))
+        self.distance_m += step * per_count_um / 1e6
+        turn = sip.raw_heading / self._parameters.angle_counts_per_turn * 2 * math.pi
+        speed_um = self._parameters.velocity_um_s_per_count
+        return {
+            "x": round(self._x.total * per_count_um),
+            "y": round(self._y.total * per_count_um),
+            "z": 0,
+            "h": round(turn * 1e6),
+            "p": 0,
+            "l": sip.raw_left_velocity * speed_um,
+            "r": sip.raw_right_velocity * speed_um,
+            "la": 0,
+            "ra": 0,
+            "c": 0,
+        }

@@ -1,0 +1,224 @@
+"""What a run writes down: pins, text, wire bytes, state logs, ranges and poses.
+
+The recorder is the last follower of the loop. It samples the pose each 50 ms,
+tells the trace what has passed, and keeps the few figures that a summary needs
+and no trace holds (the clearance).
+
+Invariant: it changes nothing that it watches.
+"""
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from typing import Protocol, cast
+
+from p2os.pioneer.body.contract import BodyState
+from p2os.pioneer.world.model import Obstacle
+from p2os.timing import NS_PER_MS, Nanos, Reached
+from robot_bench.recording.trace import TraceWriter
+from robot_bench.wires.nets import Harness, Net
+
+SAMPLE_NS: Nanos = 50 * NS_PER_MS
+#: A line of text longer than this is written in pieces.
+LONGEST_TEXT = 64
+MICRO = 1_000_000
+
+
+class Observed(Protocol):
+    """What the recorder wants to know of a body."""
+
+    @property
+    def state(self) -> BodyState:
+        """Where it is and how it moves."""
+        ...
+
+    def clearance(self) -> float:
+        """Return metres between the hull and the nearest thing in the plan view."""
+        ...
+
+    def take_moved(self) -> Sequence[Obstacle]:
+        """Return what has walked or was pushed since this was asked last."""
+        ...
+
+
+class Recorder:
+    """Watches the parts and fills the trace.
+
+    Args:
+        trace: Where entries go.
+        harness: The wires; every one is recorded.
+        body: What moves; None where nobody can tell.
+        sample_ns: Time between two poses.
+    """
+
+    def __init__(
+        self,
+        trace: TraceWriter,
+        harness: Harness,
+        *,
+        body: Observed | None,
+        sample_ns: Nanos = SAMPLE_NS,
+    ) -> None:
+        self.trace = trace
+        #: Brings the body to an instant before it is looked at; whoever owns the body sets it.
+        self.bring_to: Callable[[Nanos], None] = lambda _at: None
+        self.min_clearance_m: float | None = None
+        self.distance_m = 0.0
+        #: The state at the last sample; None before the first.
+        self.last_state: BodyState | None = None
+        #: What the firmware printed last.
+        self.last_line = ""
+        self._harness = harness
+        self._body = body
+        self._sample_ns = sample_ns
+        self._next_sample: Nanos = 0
+        self._changed: dict[str, None] = {}
+        self._text = b""
+        self._sonar_mm: list[int] | None = None
+        for net in harness:
+            net.watch(self._note_change)
+
+    def start(self) -> None:
+        """Write every wire's level at time 0."""
+        for net in self._harness:
+            net.edges_until(0)
+            self.trace.add("pin", 0, {"net": net.name, "v": int(net.level(0))})
+
+    def usart(self, data: bytes, at: Nanos) -> None:
+        """Take characters that the chip has sent, their last one complete at `at`."""
+        for byte in data:
+            self._text += bytes([byte])
+            if byte == ord("\n") or len(self._text) >= LONGEST_TEXT:
+                self._tell_text(at)
+
+    def wire(self, direction: str, data: bytes, at: Nanos) -> None:
+        """Take bytes that have arrived: `c2r` client to robot, `r2c` back."""
+        self.trace.add("wire", at, {"dir": direction, "hex": data.hex()})
+
+    def event(self, who: str, at: Nanos, what: str, detail: str) -> None:
+        """Take a line of a part's state log."""
+        self.trace.add("event", at, {"who": who, "what": what, "detail": detail})
+
+    def listener(self, who: str) -> Callable[[Nanos, str, str], None]:
+        """Return a callback for a part's state log."""
+        return lambda at, what, detail: self.event(who, at, what, detail)
+
+    def obstacle(self, op: str, name: str, at: Nanos, fields: Mapping[str, object]) -> None:
+        """Take a change of the world."""
+        self.trace.add("obstacle", at, {"op": op, "name": name, **fields})
+
+    def sonar(self, at: Nanos, metres: Sequence[float]) -> None:
+        """Take ranges in metres, all sonar in order; written when they differ from the last."""
+        mm = [round(value * 1000) for value in metres]
+        if mm != self._sonar_mm:
+            self._sonar_mm = mm
+            self.trace.add("sonar", at, {"mm": mm})
+
+    def next_deadline(self) -> Nanos:
+        """Return when the next pose is due."""
+        return self._next_sample
+
+    def advance_to(self, limit: Nanos) -> Reached:
+        """Sample the pose where due, and write what nobody can precede any more."""
+        if self._next_sample <= limit:
+            self.bring_to(limit)
+            self._sample(limit)
+            self._next_sample = limit + self._sample_ns - limit % self._sample_ns
+            self._pass(limit - 1)
+        return Reached(limit)
+
+    def finish(self, end: Nanos) -> None:
+        """Write everything up to `end`, a last pose and an unfinished line of text."""
+        if self._text:
+            self._tell_text(end)
+        if self._next_sample - self._sample_ns < end:
+            self._sample(end)
+        self._pass(end)
+
+    def snapshot(self) -> dict[str, object]:
+        """Return what decides the rest of the recording."""
+        return {
+            "trace": self.trace.snapshot(),
+            "min_clearance_m": self.min_clearance_m,
+            "distance_m": self.distance_m,
+            "last_state": self.last_state,
+            "next_sample": self._next_sample,
+            "changed": tuple(self._changed),
+            "text": self._text,
+            "sonar_mm": None if self._sonar_mm is None else tuple(self._sonar_mm),
+        }
+
+    def restore(self, snapshot: object) -> None:
+        """Put back what `snapshot` returned."""
+        state = cast("Mapping[str, object]", snapshot)
+        self.trace.restore(state["trace"])
+        self.min_clearance_m = cast("float | None", state["min_clearance_m"])
+        self.distance_m = cast("float", state["distance_m"])
+        self.last_state = cast("BodyState | None", state["last_state"])
+        self._next_sample = cast("int", state["next_sample"])
+        self._changed = dict.fromkeys(cast("tuple[str, ...]", state["changed"]))
+        self._text = cast("bytes", state["text"])
+        sonar = cast("tuple[int, ...] | None", state["sonar_mm"])
+        self._sonar_mm = None if sonar is None else list(sonar)
+
+    def _note_change(self, net: Net, _owner: str, _at: Nanos) -> None:
+        self._changed[net.name] = None
+
+    def _tell_text(self, at: Nanos) -> None:
+        self.trace.add("usart", at, {"hex": self._text.hex()})
+        self.last_line = self._text.decode("utf-8", "replace").strip()
+        self._text = b""
+
+    def _sample(self, at: Nanos) -> None:
+        if self._body is None:
+            return
+        state = self._body.state
+        if self.last_state is not None:
+            self.distance_m += math.hypot(state.x_m - self.last_state.x_m, state.y_m - self.last_state.y_m)
+        self.last_state = state
+        clearance = self._body.clearance()
+        if self.min_clearance_m is None or clearance < self.min_clearance_m:
+            self.min_clearance_m = clearance
+        self.trace.add("pose", at, pose_entry(state))
+        for item in self._body.take_moved():
+            self.obstacle("move", item.name, at, moved_entry(item))
+
+    def _pass(self, limit: Nanos) -> None:
+        """Write what is stamped at or before `limit`, and let the wires forget it."""
+        if self._changed:
+            self._tell_edges(limit)
+        self.trace.write_until(limit)
+
+    def _tell_edges(self, limit: Nanos) -> None:
+        changed, self._changed = self._changed, {}
+        for net in self._harness:
+            if net.name not in changed:
+                continue
+            for at, level in net.edges_until(limit):
+                self.trace.add("pin", at, {"net": net.name, "v": int(level)})
+            for fight in net.take_contentions():
+                self.event(
+                    "bench", fight.at, "contention", f"{net.name} is driven hard by {' and '.join(fight.owners)}"
+                )
+            if net.forget_before(limit):
+                self._changed[net.name] = None
+
+
+def moved_entry(item: Obstacle) -> dict[str, object]:
+    """Return where a thing is, rounded to a micrometre and a microradian."""
+    return {"x": round(item.x_m, 6), "y": round(item.y_m, 6), "heading": round(item.heading_rad, 6)}
+
+
+def pose_entry(state: BodyState) -> dict[str, int]:
+    """Return a body's state in the integers of the trace."""
+    return {
+        "x": round(state.x_m * MICRO),
+        "y": round(state.y_m * MICRO),
+        "z": round(state.z_m * MICRO),
+        "h": round(state.heading_rad * MICRO),
+        "p": round(state.pitch_rad * MICRO),
+        "l": round(state.left_speed_mps * MICRO),
+        "r": round(state.right_speed_mps * MICRO),
+        "la": round(state.left_angle_rad * MICRO),
+        "ra": round(state.right_angle_rad * MICRO),
+        "c": state.collisions,
+    }

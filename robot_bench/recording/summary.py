@@ -1,0 +1,97 @@
+"""The figures of a run that a person reads first.
+
+They come from the trace's end line where the run came to its end, and from the
+samples themselves where it was cut.
+
+The outcome of a run in figures: what `run --json` prints and `summary.json` keeps.
+
+The figures come from the trace: from its end line where there is one, and from
+the samples where the run was cut.
+"""
+
+import json
+import math
+from collections.abc import Mapping
+from itertools import pairwise
+from pathlib import Path
+
+from p2os.timing import NS_PER_S
+from robot_bench.recording.run_record import Json, RunRecord
+
+#: Side of the cells that a run's coverage is counted in, metres.
+CELL_M = 0.5
+
+
+def verdict(record: RunRecord) -> str:
+    """Return `passed`, `failed`, or `cut at … s` for a run without an end."""
+    if record.is_cut:
+        return f"cut at {record.last_ns / NS_PER_S:.1f} s"
+    return "passed" if record.end.get("passed") else "failed"
+
+
+def distance_m(record: RunRecord) -> float:
+    """Return the length of the path over ground, metres."""
+    return sum(math.hypot(b.x - a.x, b.y - a.y) for a, b in pairwise(record.poses)) / 1e6
+
+
+def cells_entered(record: RunRecord) -> int:
+    """Return how many different cells of 0.5 m the robot's centre was in."""
+    side = CELL_M * 1e6
+    return len({(math.floor(pose.x / side), math.floor(pose.y / side)) for pose in record.poses})
+
+
+def figures(record: RunRecord) -> list[tuple[str, str]]:
+    """Return (name, value with unit) for each figure of the summary table."""
+    rows = [
+        ("virtual time", f"{record.last_ns / NS_PER_S:.1f} s"),
+        ("distance", f"{distance_m(record):.2f} m"),
+        ("cells of 0.5 m entered", f"{cells_entered(record)}"),
+        ("collisions", f"{record.poses[-1].collisions if record.poses else 0}"),
+    ]
+    clearance = record.end.get("min_clearance_m")
+    if isinstance(clearance, (int, float)):
+        rows.append(("least clearance", f"{clearance:.3f} m"))
+    rows.append(("packets on the wire", f"{len(record.wire)}"))
+    factor = record.end.get("real_time_factor")
+    if isinstance(factor, (int, float)):
+        rows.append(("speed", f"{factor:.1f} × real time"))
+    return rows
+
+
+SUMMARY_NAME = "summary.json"
+
+_FROM_META = ("firmware_sha256", "scenario", "mode", "body", "world", "seed")
+_FROM_END = (
+    "virtual_s", "wall_s", "real_time_factor", "distance_m", "collisions", "min_clearance_m", "trace_sha256",
+    "passed", "failures", "goals_met", "notes", "last_blocks",
+)  # fmt: skip
+
+
+def outcome_of(record: RunRecord) -> Json:
+    """Return a run's figures as one JSON object."""
+    result: Json = {key: record.meta.get(key) for key in _FROM_META}
+    world = result["world"]
+    result["world"] = world.get("name") if isinstance(world, Mapping) else world
+    end = _end_of_a_cut_run(record) if record.is_cut else record.end
+    result.update((key, end.get(key)) for key in _FROM_END)
+    return result
+
+
+def write_outcome(record: RunRecord, folder: Path) -> Json:
+    """Write `summary.json` and return what it holds."""
+    outcome = outcome_of(record)
+    (folder / SUMMARY_NAME).write_text(json.dumps(outcome, indent=2, sort_keys=True) + "\n", encoding="utf-8")
+    return outcome
+
+
+def _end_of_a_cut_run(record: RunRecord) -> Json:
+    return {
+        "virtual_s": record.last_ns / NS_PER_S,
+        "distance_m": round(distance_m(record), 6),
+        "collisions": record.poses[-1].collisions if record.poses else None,
+        "passed": False,
+        "failures": [f"the run was cut at {record.last_ns / NS_PER_S:.1f} s"],
+        "goals_met": [],
+        "notes": [],
+        "last_blocks": [],
+    }

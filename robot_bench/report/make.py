@@ -1,0 +1,81 @@
+"""Write a run folder's report: `report.html` and the PNG plots.
+
+Makes everything in a run folder that is not the trace itself, from the trace.
+
+trace.jsonl    the single source, written while the run goes on
+summary.json   figures and verdict
+pins.vcd       all wires, exact to the nanosecond
+pins.sr        all wires, sampled, for PulseView
+wire.jsonl     P2OS bytes, one message a line
+usart.txt      what the firmware printed
+report.html    the report, and PNG plots beside it
+"""
+
+import json
+from dataclasses import dataclass
+from pathlib import Path
+
+from robot_bench.recording.run_record import Json, RunRecord, read_run
+from robot_bench.recording.summary import write_outcome
+from robot_bench.recording.waveforms import write_sigrok, write_vcd
+from robot_bench.report.page import render_page
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ReportFiles:
+    """Where the parts of a report were written."""
+
+    page: Path
+    #: Empty where Matplotlib is not installed.
+    plots: tuple[Path, ...]
+
+
+def make_report(folder: Path) -> ReportFiles:
+    """Make the report of a run from its trace; what is there already is written anew.
+
+    Without Matplotlib (the extra `sim`) the page is written and the plots are left out.
+
+    Raises:
+        TraceError: The folder holds no readable trace.
+    """
+    record = read_run(folder)
+    page = folder / "report.html"
+    page.write_text(render_page(record), encoding="utf-8")
+    try:
+        from robot_bench.report.plots import write_plots
+    except ModuleNotFoundError:
+        return ReportFiles(page=page, plots=())
+    return ReportFiles(page=page, plots=write_plots(record, folder))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Artefacts:
+    """What was made of a run."""
+
+    outcome: Json
+    report: Path
+
+
+def make_artefacts(folder: Path) -> Artefacts:
+    """Write all that can be made from a run folder's trace, anew where it is there already.
+
+    Raises:
+        TraceError: The folder holds no readable trace.
+    """
+    record = read_run(folder)
+    outcome = write_outcome(record, folder)
+    write_vcd(record, folder / "pins.vcd")
+    write_sigrok(record, folder / "pins.sr")
+    write_wire(record, folder / "wire.jsonl")
+    (folder / "usart.txt").write_bytes(b"".join(data for _, data in record.usart))
+    report = make_report(folder)
+    return Artefacts(outcome=outcome, report=report.page)
+
+
+def write_wire(record: RunRecord, path: Path) -> None:
+    """Write the P2OS bytes: when they had arrived, which way, and what they are."""
+    lines = [
+        json.dumps({"t": chunk.t, "dir": chunk.direction, "hex": chunk.data.hex()}, sort_keys=True)
+        for chunk in record.wire
+    ]
+    path.write_text("".join(line + "\n" for line in lines), encoding="utf-8")

@@ -1,0 +1,299 @@
+"""Runs a scenario into a run folder: the functions behind `p2os run`.
+
+The trace is written while the run goes on; when the run ends, however it ends,
+the goals are judged from it and everything else in the folder is made from it.
+
+Invariant: whatever raises in between, the trace is closed and readable.
+
+The run folder, and the first line of its trace.
+
+What the folder holds is listed in `robot_bench.report.make__artefacts`.
+"""
+
+import contextlib
+import hashlib
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from importlib.metadata import version
+from pathlib import Path
+from typing import TypeVar
+
+from p2os.errors import P2osError, UsageError
+from p2os.pioneer.world.model import Pose, World
+from p2os.timing import NS_PER_MS, NS_PER_S, Nanos
+from p2os.transport import Transport
+from p2os.transport.wall_clock import Clock, wall_clock
+from robot_bench.bench import Bench
+from robot_bench.pacer import PACED_SLICE_NS, RealTimePacer
+from robot_bench.recording.run_record import Json, read_run
+from robot_bench.recording.summary import SUMMARY_NAME
+from robot_bench.recording.trace import TRACE_NAME, TraceWriter
+from robot_bench.remote import RemoteBench
+from robot_bench.report.make import make_artefacts
+from robot_bench.scenario.goals import judge
+from robot_bench.scenario.scenario import Scenario
+
+#: What mode C says of the place that it knows nothing of; 8 m of an empty plan.
+UNKNOWN_PLACE: Json = {"name": "the real one", "extent": [-4.0, -4.0, 4.0, 4.0], "obstacles": []}
+
+
+def prepare_folder(folder: Path) -> None:
+    """Make a run folder, or clear one of an earlier run.
+
+    Raises:
+        UsageError: The folder holds something else.
+    """
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise UsageError(f"cannot make the run folder {folder}: {error.strerror}") from error
+    if any(folder.iterdir()) and not (folder / TRACE_NAME).is_file():
+        raise UsageError(f"{folder} holds something that is no run", hint="--out takes a new or an empty folder")
+    for name in (TRACE_NAME, SUMMARY_NAME, "report.html", "pins.vcd", "pins.sr", "wire.jsonl", "usart.txt"):
+        (folder / name).unlink(missing_ok=True)
+
+
+def meta_of(scenario: Scenario, world: World | None, note: str | None) -> Json:
+    """Return the trace's first line: what was run, where, with what robot; no world is mode C."""
+    parameters = scenario.parameters
+    start = Pose(0.0, 0.0, 0.0) if world is None else scenario.start or world.start
+    return {
+        "version": version("p2os"),
+        "scenario": scenario.name,
+        "description": scenario.description,
+        "text": scenario.text,
+        "firmware": scenario.firmware.name,
+        "firmware_sha256": hashlib.sha256(scenario.firmware.read_bytes()).hexdigest(),
+        "mode": "port" if world is None else scenario.mode,
+        "body": "remote" if world is None else scenario.body,
+        "seed": None if world is None else scenario.seed,
+        "duration_s": scenario.duration_ns / NS_PER_S,
+        "threshold_m": scenario.threshold_m,
+        "step_mps": (scenario.direct if scenario.mode == "direct" else scenario.adapter).step_um_per_s / 1e6,
+        "note": note,
+        "start": {"x": start.x_m, "y": start.y_m, "heading": start.heading_rad},
+        "world": UNKNOWN_PLACE if world is None else world.to_plain(),
+        "robot": {
+            "name": scenario.robot,
+            "front_m": parameters.body.hull_front_m,
+            "rear_m": parameters.body.hull_rear_m,
+            "width_m": parameters.body.hull_width_m,
+            "track_m": parameters.track_mm / 1000,
+            "wheel_diameter_m": parameters.body.wheel_diameter_m,
+            "sonar": [
+                [sonar.x_mm / 1000, sonar.y_mm / 1000, math.radians(sonar.heading_deg)]
+                for sonar in parameters.sonar[: parameters.sonar_fitted]
+            ],
+            "sonar_cone_rad": math.radians(parameters.sonar_cone_deg),
+            "sonar_range_m": parameters.sonar_range_m,
+        },
+    }
+
+
+#: chosen: without pacing, control comes back often enough for progress and signals.
+UNPACED_SLICE_NS: Nanos = 10 * NS_PER_MS
+#: Nothing seen of the firmware for so long at the end of a run is worth a word: it spins, or has died quietly.
+QUIET_NS: Nanos = 1 * NS_PER_S
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Progress:
+    """Where a run stands."""
+
+    now: Nanos
+    duration_ns: Nanos
+    #: Returns what the robot is doing, in a few words.
+    doing: Callable[[], str]
+
+
+#: Runs a bench to its end, however it likes.
+Driver = Callable[[Bench], None]
+RemoteDriver = Callable[[RemoteBench], None]
+_AnyBench = TypeVar("_AnyBench", Bench, RemoteBench)
+ProgressListener = Callable[[Progress], None]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RunResult:
+    """A run that came to an end."""
+
+    folder: Path
+    outcome: Json
+    report: Path
+    #: A signal ended it.
+    was_interrupted: bool
+
+    @property
+    def passed(self) -> bool:
+        """Whether every goal was met and nothing failed."""
+        return bool(self.outcome["passed"])
+
+
+def run_scenario(
+    scenario: Scenario,
+    folder: Path,
+    *,
+    slice_ns: Nanos | None = None,
+    speed: float | None = None,
+    on_progress: ProgressListener | None = None,
+    clock: Clock = wall_clock,
+    drive: Driver | None = None,
+) -> RunResult:
+    """Run a scenario in virtual time and make its run folder.
+
+    Args:
+        scenario: What to run.
+        folder: Where to; made where it is missing.
+        slice_ns: How often the loop gives control back; without effect on the result.
+        speed: Virtual seconds a wall second; None runs as fast as it can.
+        on_progress: Called after each slice; a KeyboardInterrupt out of it ends the run in good order.
+        clock: Wall clock in nanoseconds.
+        drive: Runs the bench in place of its `run_until`; a debugger.
+
+    Raises:
+        P2osError: A file cannot be read, or a part is not installed.
+    """
+    prepare_folder(folder)
+    pacer = None if speed is None else RealTimePacer(speed=speed, clock=clock)
+    with contextlib.closing(TraceWriter(folder / TRACE_NAME)) as trace:
+        bench = Bench(scenario, trace=trace, slice_ns=slice_ns or (PACED_SLICE_NS if pacer else UNPACED_SLICE_NS))
+
+        def after_slice(now: Nanos) -> None:
+            if pacer is not None:
+                pacer.keep_pace(now)
+            if on_progress is not None:
+                on_progress(Progress(now=now, duration_ns=scenario.duration_ns, doing=lambda: doing(bench)))
+
+        bench.on_slice = after_slice
+        trace.meta(meta_of(scenario, bench.parts.world, bench.note))
+        return _record(bench, trace, folder, pacer, clock, drive)
+
+
+def run_at_port(
+    scenario: Scenario,
+    folder: Path,
+    transport: Transport,
+    *,
+    on_progress: ProgressListener | None = None,
+    clock: Clock = wall_clock,
+    drive: RemoteDriver | None = None,
+) -> RunResult:
+    """Drive the robot at a transport in real time (mode C), stop it, and make the run folder.
+
+    The transport is closed in any case. A lost line, lag and a signal are failures of the run.
+
+    With `drive`, a debugger runs the bench in place of its `run_until`.
+
+    Raises:
+        P2osError: A file cannot be read, or a part is not installed.
+    """
+    pacer = RealTimePacer(clock=clock)
+    with contextlib.ExitStack() as stack:
+        stack.callback(transport.close)
+        prepare_folder(folder)
+        trace = stack.enter_context(contextlib.closing(TraceWriter(folder / TRACE_NAME)))
+        bench = RemoteBench(scenario, transport, pacer, trace=trace)
+
+        def after_slice(now: Nanos) -> None:
+            if on_progress is not None:
+                on_progress(Progress(now=now, duration_ns=scenario.duration_ns, doing=lambda: doing(bench)))
+
+        bench.on_slice = after_slice
+        trace.meta(meta_of(scenario, None, bench.note))
+        return _record(bench, trace, folder, pacer, clock, drive)
+
+
+def doing(bench: Bench | RemoteBench) -> str:
+    """Return what the robot is doing, in a few words."""
+    state, text = bench.recorder.last_state, bench.recorder.last_line
+    wheels = "" if state is None else f"{state.left_speed_mps * 1000:+.0f} / {state.right_speed_mps * 1000:+.0f} mm/s"
+    return f"{wheels}  {text}".strip()
+
+
+def _record(
+    bench: _AnyBench,
+    trace: TraceWriter,
+    folder: Path,
+    pacer: RealTimePacer | None,
+    clock: Clock,
+    drive: Callable[[_AnyBench], None] | None,
+) -> RunResult:
+    """Run to the end, judge the goals, write the trace's last line, and make the rest of the folder."""
+    failures: list[str] = []
+    was_interrupted = False
+    began = clock()
+    if pacer is not None:
+        pacer.start(0)
+    try:
+        if drive is None:
+            bench.run_until(bench.scenario.duration_ns)
+        else:
+            drive(bench)
+    except KeyboardInterrupt as interruption:
+        was_interrupted = True
+        failures.append(f"interrupted ({interruption})" if interruption.args else "interrupted")
+    except P2osError as error:
+        failures.append(str(error))
+    end = bench.finish()
+    wall_s = (clock() - began) / NS_PER_S
+    if bench.chip.fault is not None:
+        failures.append(f"firmware fault: {bench.chip.fault}")
+    record = read_run(folder)
+    met, missed = judge(record, bench.scenario.goals)
+    trace.end(
+        _figures(bench, end, wall_s)
+        | {
+            "trace_sha256": trace.sha256,
+            "passed": not failures and not missed,
+            "failures": failures + missed,
+            "goals_met": met,
+            "notes": notes(bench, end, pacer),
+            "last_blocks": last_blocks(bench, end, was_interrupted=was_interrupted),
+            "worst_lag_ms": None if pacer is None else round(pacer.worst_lag_ns / NS_PER_MS, 1),
+        }
+    )
+    made = make_artefacts(folder)
+    return RunResult(folder=folder, outcome=made.outcome, report=made.report, was_interrupted=was_interrupted)
+
+
+def _figures(bench: Bench | RemoteBench, end: Nanos, wall_s: float) -> Json:
+    recorder, virtual_s = bench.recorder, end / NS_PER_S
+    clearance = recorder.min_clearance_m
+    return {
+        "virtual_s": virtual_s,
+        "wall_s": round(wall_s, 3),
+        "real_time_factor": round(virtual_s / wall_s, 2) if wall_s > 0 else None,
+        "distance_m": round(recorder.distance_m, 6),
+        "collisions": None if recorder.last_state is None else recorder.last_state.collisions,
+        "min_clearance_m": None if clearance is None else round(clearance, 6),
+    }
+
+
+def notes(bench: Bench | RemoteBench, end: Nanos, pacer: RealTimePacer | None) -> list[str]:
+    """Return what a reader of the result should know besides the verdict."""
+    chip = bench.chip
+    result = [note for note in (bench.note,) if note]
+    result += chip.warnings
+    if is_quiet(bench, end):
+        seen = _last_seen_ns(bench)
+        result.append(f"no pin, USART or WFI was seen since {seen / NS_PER_S:.3f} s; the program is at {chip.where()}")
+    if pacer is not None and pacer.worst_lag_ns > PACED_SLICE_NS:
+        result.append(f"the run lagged behind the wall clock by up to {pacer.worst_lag_ns / NS_PER_MS:.0f} ms")
+    return result
+
+
+def last_blocks(bench: Bench | RemoteBench, end: Nanos, *, was_interrupted: bool) -> list[str]:
+    """Return what the program ran last, where that tells why it ended: it died, it hangs, or somebody had enough."""
+    wanted = was_interrupted or bench.chip.fault is not None or is_quiet(bench, end)
+    return list(bench.chip.last_blocks()) if wanted else []
+
+
+def is_quiet(bench: Bench | RemoteBench, end: Nanos) -> bool:
+    """Tell whether a program that has not died gives no sign of life."""
+    return bench.chip.fault is None and end - _last_seen_ns(bench) >= QUIET_NS
+
+
+def _last_seen_ns(bench: Bench | RemoteBench) -> Nanos:
+    activity = bench.chip.activity
+    return max(activity.last_pin_ns, activity.last_usart_ns, activity.last_wfi_ns)

@@ -1,0 +1,88 @@
+"""Timed faults of the robot: the `[[fault]]` tables of a scenario, and what carries them out.
+
+    [[fault]]
+    at_s = 5.0
+    fault = "sonar-stuck 3 1.2"
+    for_s = 2.0                  # then it is cleared; without it stays
+
+The words are those of `p2os.pioneer.controller.faults`. They act on the robot's controller,
+so they need mode B; which bits a noisy line turns is decided by the scenario's seed.
+
+Invariant: a fault at t is felt by everything that happens after t, and by
+nothing that happened up to t.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import cast
+
+from p2os.errors import ScenarioError, UsageError
+from p2os.pioneer.controller.faults import MOMENTARY, read_fault
+from p2os.robots.parameters import RobotParameters
+from p2os.timing import NS_PER_S, Nanos
+from robot_bench.scenario.schema import Key, Table, check_table
+from robot_bench.scenario.timeline import Timeline
+
+_KEYS = (
+    Key(name="at_s", kind="number", required=True, least=0),
+    Key(name="fault", kind="text", required=True),
+    Key(name="for_s", kind="number", above=0),
+)
+
+
+@dataclass(frozen=True, slots=True)
+class FaultChange:
+    """What is said to the robot at a time: "fault WORDS" or "clear WORDS"."""
+
+    at: Nanos
+    words: str
+
+
+def load_faults(tables: Sequence[Table], parameters: RobotParameters, where: str) -> tuple[FaultChange, ...]:
+    """Return what a scenario's `[[fault]]` tables ask for, in order of time.
+
+    Raises:
+        ScenarioError: A table breaks the schema, or names no fault.
+    """
+    found: list[FaultChange] = []
+    for number, table in enumerate(tables, start=1):
+        place = f"{where}: [[fault]] {number}"
+        check_table(table, _KEYS, place)
+        words = str(table["fault"])
+        try:
+            fault = read_fault(words, sonar=parameters.sonar_fitted)
+        except UsageError as error:
+            raise ScenarioError(f"{place}: {error}", hint=error.hint) from error
+        at = _nanos(table, "at_s")
+        found.append(FaultChange(at, f"fault {words}"))
+        if "for_s" in table:
+            if fault.name in MOMENTARY:
+                raise ScenarioError(f"{place}: for_s, but {fault.name} happens once", hint="leave for_s out")
+            found.append(FaultChange(at + _nanos(table, "for_s"), f"clear {words}"))
+    return tuple(sorted(found, key=lambda change: change.at))
+
+
+class FaultScript(Timeline[FaultChange]):
+    """Says each change at its time.
+
+    Args:
+        changes: In order of time.
+        bring_to: Brings the robot to an instant, and its words onto the line.
+        do: Says words to the robot.
+    """
+
+    def __init__(
+        self, changes: Sequence[FaultChange], *, bring_to: Callable[[Nanos], None], do: Callable[[str, Nanos], None]
+    ) -> None:
+        super().__init__(changes, self._apply)
+        self._bring_to = bring_to
+        self._do = do
+
+    def _apply(self, change: FaultChange) -> None:
+        self._bring_to(change.at)
+        self._do(change.words, change.at)
+        self._bring_to(change.at)
+
+
+def _nanos(table: Table, key: str) -> Nanos:
+    return round(float(cast("float", table[key])) * NS_PER_S)

@@ -1,0 +1,344 @@
+"""A scenario file: which program, in which world, what happens, what is wanted.
+
+TOML, checked key by key; units stand in the keys. `docs/scenarios.md` lists
+every key. Files that are named in it are looked for beside it, then among those
+that ship.
+
+Invariant: a `Scenario` that exists can be run: its firmware and its world are
+there, and every value is in range.
+"""
+
+import math
+import tomllib
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from importlib.resources import as_file, files
+from pathlib import Path
+from typing import cast
+
+from adapter_sim.codec import BitOrder
+from adapter_sim.settings import AdapterSettings
+from p2os.errors import ScenarioError, UsageError
+from p2os.pioneer.body.choose import BODY_NAMES
+from p2os.pioneer.controller.controller import ControllerSettings, SonarPerSip
+from p2os.pioneer.controller.flash import load_flash
+from p2os.pioneer.sensor_errors import load_sensor_errors
+from p2os.pioneer.world.find import Pose, known_worlds, world_suffixes
+from p2os.robots.parameters import RobotParameters, load_parameters
+from p2os.timing import NS_PER_MS, NS_PER_S, Nanos
+from robot_bench.direct.robot import DirectSettings
+from robot_bench.scenario.fault_script import FaultChange, load_faults
+from robot_bench.scenario.goals import Goal, load_goal
+from robot_bench.scenario.schema import Key, Table, check_table, nearest
+from robot_bench.scenario.world_script import Change, load_changes
+
+MODES = ("direct", "adapter")
+#: What runs in the adapter's place: the Python model, or the firmware's C++ core.
+ADAPTER_CORES = ("model", "firmware")
+
+_TOP = (
+    Key(name="description", kind="text"),
+    Key(name="firmware", kind="text", required=True),
+    Key(name="world", kind="text", required=True),
+    Key(name="robot", kind="text"),
+    Key(name="mode", kind="text", choices=MODES),
+    Key(name="body", kind="text", choices=BODY_NAMES),
+    Key(name="seed", kind="whole", least=0),
+    Key(name="duration_s", kind="number", required=True, above=0),
+    Key(name="threshold_m", kind="number", above=0),
+    Key(name="start", kind="table"),
+    Key(name="direct", kind="table"),
+    Key(name="adapter", kind="table"),
+    Key(name="controller", kind="table"),
+    Key(name="in_world", kind="table"),
+    Key(name="obstacle", kind="tables"),
+    Key(name="fault", kind="tables"),
+    Key(name="goal", kind="tables"),
+)
+_START = (
+    Key(name="x_m", kind="number", required=True),
+    Key(name="y_m", kind="number", required=True),
+    Key(name="heading_deg", kind="number"),
+)
+_DIRECT = (
+    Key(name="step_mm_s", kind="number", above=0),
+    Key(name="ramp_mm_s2", kind="number", least=0),
+    Key(name="sensor_period_ms", kind="whole", least=1),
+    Key(name="encoder_period_ms", kind="whole", least=1),
+    Key(name="bit_order", kind="text", choices=tuple(BitOrder)),
+)
+_ADAPTER = (
+    Key(name="core", kind="text", choices=ADAPTER_CORES),
+    Key(name="step_mm_s", kind="number", above=0),
+    Key(name="bit_order", kind="text", choices=tuple(BitOrder)),
+    Key(name="motor_meaning", kind="text", choices=("wheels", "linear_angular")),
+    Key(name="max_velocity_mm_s", kind="whole", least=0),
+    Key(name="max_rotation_deg_s", kind="whole", least=0),
+    Key(name="encoder_at_open", kind="text", choices=("zero", "continue")),
+)
+_CONTROLLER = (
+    Key(name="name", kind="text"),
+    Key(name="sonar_per_sip", kind="text", choices=tuple(member.value for member in SonarPerSip)),
+    Key(name="errors", kind="text"),
+    Key(name="flash", kind="text"),
+)
+#: What a scenario may say otherwise for one world.
+_IN_WORLD = (
+    Key(name="threshold_m", kind="number", above=0),
+    Key(name="duration_s", kind="number", above=0),
+    Key(name="start", kind="table"),
+)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Scenario:
+    """Everything that a run needs to know."""
+
+    name: str
+    description: str
+    #: The file's own text, for the run folder.
+    text: str
+    firmware: Path
+    #: A shipped world's name or a file.
+    world: str
+    parameters: RobotParameters
+    robot: str
+    mode: str = "adapter"
+    body: str = "bullet"
+    seed: int = 0
+    duration_ns: Nanos
+    threshold_um: int
+    #: None starts where the world says.
+    start: Pose | None = None
+    direct: DirectSettings = field(default_factory=DirectSettings)
+    adapter: AdapterSettings = field(default_factory=AdapterSettings)
+    adapter_core: str = "model"
+    controller: ControllerSettings = field(default_factory=ControllerSettings)
+    changes: tuple[Change, ...] = ()
+    faults: tuple[FaultChange, ...] = ()
+    goals: tuple[Goal, ...] = ()
+    #: World → what is otherwise there.
+    in_world: Mapping[str, Table] = field(default_factory=dict)
+
+    @property
+    def threshold_m(self) -> float:
+        """The distance below which something counts as an obstacle, metres."""
+        return self.threshold_um / 1e6
+
+    def with_options(
+        self,
+        *,
+        firmware: Path | None = None,
+        mode: str | None = None,
+        adapter_core: str | None = None,
+        body: str | None = None,
+        world: str | None = None,
+        seed: int | None = None,
+        duration_s: float | None = None,
+    ) -> "Scenario":
+        """Return the scenario with what a command line says otherwise; None keeps it as it is.
+
+        Raises:
+            UsageError: A value cannot be.
+        """
+        _refuse_unknown("mode", mode, MODES)
+        _refuse_unknown("adapter", adapter_core, ADAPTER_CORES)
+        _refuse_unknown("body", body, BODY_NAMES)
+        if duration_s is not None and not 0 < duration_s < math.inf:
+            raise UsageError(f"a run of {duration_s:g} s cannot be", hint="--duration takes seconds above 0")
+        if firmware is not None and not firmware.is_file():
+            raise UsageError(f"there is no firmware file {firmware}", hint="give an ELF, HEX or BIN file")
+        moved = self if world is None else self._moved_to(world)
+        return replace(
+            moved,
+            firmware=firmware or moved.firmware,
+            mode=mode or moved.mode,
+            adapter_core=adapter_core or moved.adapter_core,
+            body=body or moved.body,
+            seed=moved.seed if seed is None else seed,
+            duration_ns=moved.duration_ns if duration_s is None else round(duration_s * NS_PER_S),
+        )
+
+    def _moved_to(self, world: str) -> "Scenario":
+        resolve_world(world, Path(), "--world", error=UsageError)
+        moved = replace(self, world=world, start=self.start if world == self.world else None)
+        return _apply_in_world(moved, self.in_world.get(world, {}))
+
+
+def load_scenario(name_or_path: str) -> Scenario:
+    """Return a shipped scenario by its name, or one from a file.
+
+    Raises:
+        ScenarioError: There is no such scenario, or it breaks the schema.
+    """
+    if name_or_path in known_scenarios():
+        with as_file(files("robot_bench.scenarios").joinpath(f"{name_or_path}.toml")) as path:
+            return read_scenario(path)
+    path = Path(name_or_path)
+    if not path.is_file():
+        if path.suffix == ".toml" or len(path.parts) > 1:
+            raise ScenarioError(f"there is no scenario file {path}")
+        raise ScenarioError(f"there is no scenario {name_or_path!r}", hint=nearest(name_or_path, known_scenarios()))
+    return read_scenario(path)
+
+
+def known_scenarios() -> tuple[str, ...]:
+    """Return the names of the scenarios that ship."""
+    folder = files("robot_bench.scenarios")
+    return tuple(sorted(item.name.removesuffix(".toml") for item in folder.iterdir() if item.name.endswith(".toml")))
+
+
+def read_scenario(path: Path) -> Scenario:
+    """Read and check a scenario file.
+
+    Raises:
+        ScenarioError: The file cannot be read or breaks the schema.
+    """
+    try:
+        text = path.read_text(encoding="utf-8")
+        table = tomllib.loads(text)
+    except (OSError, UnicodeDecodeError) as error:
+        raise ScenarioError(f"cannot read scenario {path}: {error}") from error
+    except tomllib.TOMLDecodeError as error:
+        raise ScenarioError(f"{path.name}: {error}", hint="it is no TOML") from error
+    return _build(table, text, path)
+
+
+def resolve_world(
+    world: str, folder: Path, where: str, *, error: type[ScenarioError | UsageError] = ScenarioError
+) -> str:
+    """Return a shipped world's name or the path of a world file.
+
+    Raises:
+        ScenarioError: There is no such world.
+        UsageError: Likewise, where `error` says so.
+    """
+    if world in known_worlds():
+        return world
+    if Path(world).suffix.lower() in world_suffixes():
+        path = folder / world
+        if path.is_file():
+            return str(path)
+        raise error(f"{where}: there is no world file {path}", hint=f"worlds that ship: {', '.join(known_worlds())}")
+    raise error(f"{where}: there is no world {world!r}", hint=nearest(world, known_worlds()))
+
+
+def _build(table: Table, text: str, path: Path) -> Scenario:
+    where = path.name
+    check_table(table, _TOP, where)
+    robot = str(table.get("robot", "p2dx"))
+    parameters = load_parameters(robot)
+    threshold_m = cast("float", table.get("threshold_m", parameters.sonar_range_m / 2))
+    in_world = cast("Mapping[str, Table]", table.get("in_world", {}))
+    for world, part in in_world.items():
+        check_table({world: part}, (Key(name=world, kind="table"),), f"{where}: [in_world]")
+        check_table(part, _IN_WORLD, f"{where}: [in_world.{world}]")
+    changes = load_changes(cast("list[Table]", table.get("obstacle", [])), parameters, where)
+    goals = [
+        load_goal(goal, f"{where}: [[goal]] {number}")
+        for number, goal in enumerate(cast("list[Table]", table.get("goal", [])), start=1)
+    ]
+    scenario = Scenario(
+        name=path.stem,
+        description=str(table.get("description", "")),
+        text=text,
+        firmware=_firmware(str(table["firmware"]), path),
+        world=resolve_world(str(table["world"]), path.parent, f"{where}: world"),
+        parameters=parameters,
+        robot=robot,
+        mode=str(table.get("mode", "adapter")),
+        body=str(table.get("body", "bullet")),
+        seed=cast("int", table.get("seed", 0)),
+        duration_ns=round(cast("float", table["duration_s"]) * NS_PER_S),
+        threshold_um=round(threshold_m * 1e6),
+        start=_start(table, where),
+        direct=_direct(cast("Table", table.get("direct", {})), where),
+        adapter=_adapter(cast("Table", table.get("adapter", {})), round(threshold_m * 1e6), where),
+        adapter_core=str(cast("Table", table.get("adapter", {})).get("core", "model")),
+        controller=_controller(cast("Table", table.get("controller", {})), path, where),
+        changes=changes,
+        faults=load_faults(cast("list[Table]", table.get("fault", [])), parameters, where),
+        goals=tuple(goals),
+        in_world=in_world,
+    )
+    return _apply_in_world(scenario, in_world.get(scenario.world, {}))
+
+
+def _apply_in_world(scenario: Scenario, part: Table) -> Scenario:
+    if "threshold_m" in part:
+        threshold_um = round(cast("float", part["threshold_m"]) * 1e6)
+        adapter = replace(scenario.adapter, threshold_um=threshold_um)
+        scenario = replace(scenario, threshold_um=threshold_um, adapter=adapter)
+    if "duration_s" in part:
+        scenario = replace(scenario, duration_ns=round(cast("float", part["duration_s"]) * NS_PER_S))
+    if "start" in part:
+        scenario = replace(scenario, start=_start(part, f"{scenario.name}.toml: [in_world]"))
+    return scenario
+
+
+def _firmware(name: str, path: Path) -> Path:
+    """Return the file beside the scenario, or the shipped program of that name."""
+    beside = path.parent / name
+    if beside.is_file():
+        return beside
+    shipped = files("robot_bench.firmware").joinpath(name if name.endswith(".elf") else f"{name}.elf")
+    if shipped.is_file():
+        return Path(str(shipped))
+    raise ScenarioError(
+        f"{path.name}: firmware: there is no file {name!r} beside it, nor a program of that name that ships",
+        hint="the path is relative to the scenario file",
+    )
+
+
+def _start(table: Table, where: str) -> Pose | None:
+    if "start" not in table:
+        return None
+    part = cast("Table", table["start"])
+    check_table(part, _START, f"{where}: [start]")
+    heading_rad = math.radians(cast("float", part.get("heading_deg", 0.0)))
+    return Pose(x_m=cast("float", part["x_m"]), y_m=cast("float", part["y_m"]), heading_rad=heading_rad)
+
+
+def _direct(part: Table, where: str) -> DirectSettings:
+    check_table(part, _DIRECT, f"{where}: [direct]")
+    settings = DirectSettings()
+    if "step_mm_s" in part:
+        settings = replace(settings, step_um_per_s=round(cast("float", part["step_mm_s"]) * 1000))
+    if "ramp_mm_s2" in part:
+        ramp = round(cast("float", part["ramp_mm_s2"]) * 1000)
+        settings = replace(settings, ramp_um_per_s2=ramp or None)
+    if "sensor_period_ms" in part:
+        settings = replace(settings, sensor_period_ns=cast("int", part["sensor_period_ms"]) * NS_PER_MS)
+    if "encoder_period_ms" in part:
+        settings = replace(settings, encoder_period_ns=cast("int", part["encoder_period_ms"]) * NS_PER_MS)
+    if "bit_order" in part:
+        settings = replace(settings, bit_order=BitOrder(str(part["bit_order"])))
+    return settings
+
+
+def _adapter(part: Table, threshold_um: int, where: str) -> AdapterSettings:
+    check_table(part, _ADAPTER, f"{where}: [adapter]")
+    values = {name: value for name, value in part.items() if name not in {"step_mm_s", "core"}}
+    if "step_mm_s" in part:
+        values["step_um_per_s"] = round(cast("float", part["step_mm_s"]) * 1000)
+    return AdapterSettings(threshold_um=threshold_um, **values)  # type: ignore[arg-type] # check_table has seen to it
+
+
+def _controller(part: Table, path: Path, where: str) -> ControllerSettings:
+    check_table(part, _CONTROLLER, f"{where}: [controller]")
+    settings = ControllerSettings()
+    if "flash" in part:
+        settings = settings.with_flash(load_flash(path.parent / str(part["flash"])))
+    if "errors" in part:
+        beside = path.parent / str(part["errors"])
+        settings = replace(settings, errors=load_sensor_errors(str(beside if beside.is_file() else part["errors"])))
+    if "name" in part:
+        settings = replace(settings, name=str(part["name"]))
+    if "sonar_per_sip" in part:
+        settings = replace(settings, sonar_per_sip=SonarPerSip(str(part["sonar_per_sip"])))
+    return settings
+
+
+def _refuse_unknown(option: str, value: str | None, known: tuple[str, ...]) -> None:
+    if value is not None and value not in known:
+        raise UsageError(f"there is no {option} {value!r}", hint=" or ".join(f"--{option} {word}" for word in known))

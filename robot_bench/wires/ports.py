@@ -1,0 +1,93 @@
+"""What the bench needs of an emulated chip.
+
+`bluepill_sim.board.BluePill` has this shape, and so have the fakes of the tests.
+"""
+
+from collections.abc import Callable, Sequence
+from typing import Protocol
+
+from bluepill_sim.fabric.pins import PinDrive
+from robot_bench.loop import LeaderReached
+from robot_bench.wires.chip_pins import ChipPin
+
+
+class Usart(Protocol):
+    """A serial port of the chip, from outside."""
+
+    #: Called with each byte that the chip has sent, and when its stop bit ended, in ns.
+    on_transmit: Callable[[int, int], None] | None
+
+
+class ChipActivity(Protocol):
+    """When the firmware was last seen alive, in ns."""
+
+    last_pin_ns: int
+    last_usart_ns: int
+    last_wfi_ns: int
+
+
+class ChipFault(Protocol):
+    """What the firmware died of; printed, it is one line for a person."""
+
+    @property
+    def at_ns(self) -> int:
+        """When."""
+        ...
+
+
+class Chip(Protocol):
+    """A chip that runs a firmware and leads the bench's time."""
+
+    #: Called with (pin, its own drive, ns) at each change of what the chip puts on a wire.
+    on_pin: Callable[[str, PinDrive, int], None] | None
+    #: Called with each warning, once.
+    on_warning: Callable[[str], None] | None
+
+    @property
+    def now_ns(self) -> int:
+        """The time reached."""
+        ...
+
+    @property
+    def usart1(self) -> Usart:
+        """The port that firmware prints on."""
+        ...
+
+    @property
+    def warnings(self) -> Sequence[str]:
+        """Everything that was warned of, oldest first."""
+        ...
+
+    @property
+    def fault(self) -> ChipFault | None:
+        """What the firmware died of; None while it lives."""
+        ...
+
+    def last_blocks(self) -> Sequence[str]:
+        """Return what it ran last, up to the fault if there was one, as lines for a person."""
+        ...
+
+    @property
+    def activity(self) -> ChipActivity:
+        """When the firmware was last seen alive."""
+        ...
+
+    def pin(self, name: str) -> ChipPin:
+        """Return a pin by its name, such as "PA4"."""
+        ...
+
+    def advance_to(self, limit_ns: int) -> LeaderReached:
+        """Run to `limit_ns`, at most a basic block beyond; less far where a watched pin changes."""
+        ...
+
+    def where(self) -> str:
+        """Return where the program is: symbol, offset and address."""
+        ...
+
+    def snapshot(self) -> object:
+        """Return all that decides the chip's future."""
+        ...
+
+    def restore(self, snapshot: object) -> None:
+        """Put back what `snapshot` returned."""
+        ...

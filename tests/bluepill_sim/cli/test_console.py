@@ -1,0 +1,104 @@
+"""The console: a USART's far end in a file or a pseudo-terminal."""
+
+import io
+import os
+import select
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from bluepill_sim.cli.console import PtyConsole, StreamConsole, connect, open_console
+from bluepill_sim.errors import BluePillError
+
+
+class Port:
+    """A USART for a console."""
+
+    on_transmit: Callable[[int, int], None] | None = None
+    is_notified_late: bool = False
+
+    def __init__(self) -> None:
+        self.received = b""
+
+    def receive(self, data: bytes) -> None:
+        self.received += data
+
+    def send(self, data: bytes) -> None:
+        for word in data:
+            assert self.on_transmit is not None
+            self.on_transmit(word, 0)
+
+
+def test_a_file_gets_every_character(tmp_path: Path) -> None:
+    path = tmp_path / "usart.txt"
+    console, port = open_console(str(path)), Port()
+    carry = connect(console, port)
+    port.send(b"hello\n")
+    assert path.read_bytes() == b"hello\n"
+    port.send(b"more")
+    carry()
+    console.close()
+    assert path.read_bytes() == b"hello\nmore"
+    assert port.received == b""
+    assert console.description == str(path)
+
+
+def test_a_borrowed_stream_stays_open() -> None:
+    stream = io.BytesIO()
+    console = StreamConsole(stream, "memory", is_owner=False)
+    console.write(0x141, 0)
+    console.close()
+    assert stream.getvalue() == b"A"
+
+
+def test_standard_output_is_a_dash(capfdbinary: pytest.CaptureFixture[bytes]) -> None:
+    console = open_console("-")
+    console.write(ord("\n"), 0)
+    console.close()
+    assert capfdbinary.readouterr().out == b"\n"
+
+
+def test_a_file_that_cannot_be_written_is_one_line(tmp_path: Path) -> None:
+    with pytest.raises(BluePillError, match=r"cannot write .*: No such file or directory"):
+        open_console(str(tmp_path / "missing" / "usart.txt"))
+
+
+def test_a_pseudo_terminal_goes_both_ways() -> None:
+    console, port = PtyConsole(), Port()
+    carry = connect(console, port)
+    far = os.open(console.description, os.O_RDWR | os.O_NOCTTY)
+    port.send(b"\x00a\n")
+    assert b"".join(os.read(far, 1) for _ in range(3)) == b"\x00a\n"
+    carry()
+    os.write(far, b"hi\r")
+    while len(port.received) < 3:  # the kernel hands it over in its own time
+        assert select.select([console._master], [], [], 5)[0]
+        carry()
+    assert port.received == b"hi\r"
+    os.close(far)
+    console.close()
+
+
+def test_a_pseudo_terminal_that_nobody_reads_drops(monkeypatch: pytest.MonkeyPatch) -> None:
+    console = PtyConsole()
+
+    def refuse(*_arguments: object) -> int:
+        raise BlockingIOError
+
+    monkeypatch.setattr(os, "write", refuse)
+    console.write(1, 0)
+    assert console.dropped == 1
+    console.close()
+
+
+def test_a_pseudo_terminal_is_opened_by_name() -> None:
+    console = open_console("pty:")
+    assert isinstance(console, PtyConsole)
+    console.close()
+
+
+def test_a_system_without_pseudo_terminals_says_so(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.delattr(os, "openpty")
+    with pytest.raises(BluePillError, match="cannot open a pseudo-terminal"):
+        PtyConsole()

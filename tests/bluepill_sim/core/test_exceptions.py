@@ -1,0 +1,253 @@
+"""Exceptions by hand: entry, return, priorities, and the state that they save."""
+
+import pytest
+
+ICSR, AIRCR, SHPR3, ISER0, ISPR0, IPR0, STIR = (
+    0xE000ED04,
+    0xE000ED0C,
+    0xE000ED20,
+    0xE000E100,
+    0xE000E200,
+    0xE000E400,
+    0xE000EF00,
+)
+PENDSV = 1 << 28
+
+
+def store(address: int, value: int) -> str:
+    return f"mov32 r1, #{address}\nmov32 r2, #{value}\nstr r2, [r1, #0]\n"
+
+
+def test_svc_enters_its_handler_and_returns_after_it(run) -> None:
+    machine = run("log #1\nsvc #5\nlog #3\nb stop\nsvc_handler: log #2\nbx lr", {11: "svc_handler"})
+    assert machine.log == [1, 2, 3]
+
+
+def test_every_way_of_returning_from_a_handler_works(run) -> None:
+    machine = run(
+        """
+        svc #0
+        log #2
+        svc #1
+        log #4
+        b stop
+handler: log #1
+        push {lr}
+        cmp r5, #0
+        bne other
+        movs r5, #1
+        pop {pc}
+other:  .half 0xF85D, 0xFB04   ; ldr pc, [sp], #4
+        """,
+        {11: "handler"},
+    )
+    assert machine.log == [1, 2, 1, 4]
+
+
+def test_svc_to_pendsv_tail_chains_without_unstacking(run) -> None:
+    """SVC pends PendSV of lower priority: PendSV runs right after it, on the same frame, 6 cycles later."""
+    machine = run(
+        store(SHPR3, 0xF0 << 16)
+        + """svc #0
+        log #4
+        b stop
+handler: log #1
+        mov r5, sp
+        mov32 r1, #0xE000ED04
+        mov32 r2, #0x10000000
+        str r2, [r1, #0]
+        isb
+        log #2
+        bx lr
+pendsv: mov r0, sp
+        subs r0, r5, r0
+        log r0
+        bx lr""",
+        {11: "handler", 14: "pendsv"},
+    )
+    assert machine.log == [1, 2, 0, 4]
+
+
+def test_a_higher_priority_preempts_and_a_lower_one_waits(run) -> None:
+    """IRQ 0 at 0x80 pends IRQ 1 at 0x40 (preempts at once) and IRQ 2 at 0xC0 (waits)."""
+    machine = run(
+        store(IPR0, 0x00C04080)
+        + store(ISER0, 7)
+        + store(STIR, 0)
+        + """isb
+        log #6
+        b stop
+irq0:   push {lr}
+        log #1
+        movs r2, #1
+        str r2, [r1, #0]
+        isb
+        log #3
+        movs r2, #2
+        str r2, [r1, #0]
+        isb
+        log #4
+        pop {pc}
+irq1:   log #2
+        bx lr
+irq2:   log #5
+        bx lr""",
+        {16: "irq0", 17: "irq1", 18: "irq2"},
+    )
+    assert machine.log == [1, 2, 3, 4, 5, 6]
+
+
+def test_priority_grouping_keeps_subpriorities_from_preempting(run) -> None:
+    """With PRIGROUP = 7 no bit preempts: the handler ends first, then the higher subpriority comes."""
+    machine = run(
+        store(AIRCR, 0x05FA0700)
+        + store(IPR0, 0x4080)
+        + store(ISER0, 3)
+        + store(STIR, 0)
+        + """isb
+        log #4
+        b stop
+irq0:   log #1
+        movs r2, #1
+        str r2, [r1, #0]
+        isb
+        log #2
+        bx lr
+irq1:   log #3
+        bx lr""",
+        {16: "irq0", 17: "irq1"},
+    )
+    assert machine.log == [1, 2, 3, 4]
+
+
+def test_of_equal_priorities_the_lower_number_comes_first(run) -> None:
+    machine = run(
+        "cpsid i\n"
+        + store(ISER0, 7)
+        + store(ISPR0, 6)
+        + "cpsie i\nlog #3\nb stop\nirq1: log #1\nbx lr\nirq2: log #2\nbx lr",
+        {17: "irq1", 18: "irq2"},
+    )
+    assert machine.log == [1, 2, 3]
+
+
+def test_an_svc_inside_an_it_block_puts_itstate_aside_and_back(run) -> None:
+    """The handler must not start inside the interrupted IT block, and the rest of it must still be conditional."""
+    machine = run(
+        """
+        movs r4, #1
+        cmp r4, #1
+        ittte eq
+        .half 0xDF00
+        .half 0x2502
+        .half 0x2603
+        .half 0x2504
+        mov r0, r5
+        log r0
+        mov r0, r6
+        log r0
+        b stop
+handler: movs r0, #9
+        cmp r0, #1
+        log #1
+        bx lr""",
+        {11: "handler"},
+    )
+    assert machine.log == [1, 2, 3]
+
+
+def test_an_interrupt_between_two_instructions_of_an_it_block_keeps_its_state(run) -> None:
+    """A store inside an IT block pends PendSV; the block ends first, then it comes, and nothing is lost."""
+    machine = run(
+        """
+        mov32 r1, #0xE000ED04
+        mov32 r2, #0x10000000
+        cmp r5, #0
+        itte eq
+        .half 0x600A
+        .half 0x2502
+        .half 0x2609
+        isb
+        mov r0, r5
+        log r0
+        mov r0, r6
+        log r0
+        b stop
+pendsv: log #1
+        bx lr""",
+        {14: "pendsv"},
+    )
+    assert machine.log == [1, 2, 0]
+
+
+@pytest.mark.parametrize("pad", range(58, 68))
+def test_an_it_block_across_a_page_boundary_survives_stops_and_interrupts(boot, pad: int) -> None:
+    """Unicorn cuts blocks at 1 KiB, maybe inside an IT block: stop at every boundary, with a tick each 7 µs."""
+    source = (
+        store(0xE000E014, 55)
+        + store(0xE000E018, 0)
+        + store(0xE000E010, 7)
+        + "movs r5, #0\nmovs r6, #0\nmovs r4, #100\nb go\n"
+        + "nop\n" * (pad + 260)
+        + "go: cmp r4, #0\nitete ne\n.half 0x3501\n.half 0x3601\n.half 0x3502\n.half 0x3601\n"
+        "subs r4, #1\nbne go\nmov r0, r5\nlog r0\nmov r0, r6\nlog r0\nb stop\n"
+        "tick: movs r0, #0\ncmp r0, #0\nbx lr"
+    )
+    machine = boot(source, {15: "tick"}).run(2000, slice_us=0.001 * 125)
+    assert machine.log == [300, 0]
+
+
+def test_an_interrupt_line_that_stays_high_interrupts_again(boot) -> None:
+    machine = boot(store(ISER0, 1 << 6) + "loop: b loop\nirq: log #1\nbx lr", {16 + 6: "irq"})
+    chip = machine.board._live
+    machine.run(10)
+    chip.set_irq(6, True)
+    machine.run(30)
+    assert len(machine.log) > 2
+    chip.set_irq(6, False)
+    machine.run(10)
+    settled = len(machine.log)
+    machine.run(10)
+    assert len(machine.log) == settled
+    chip.pulse_irq(6)
+    machine.run(10)
+    assert len(machine.log) == settled + 1
+
+
+@pytest.mark.parametrize(("pending", "bits"), [(PENDSV, 1 << 28 | 14 << 12), (1 << 26, 1 << 26 | 15 << 12)])
+def test_icsr_tells_what_is_pending_and_clears_it(run, pending: int, bits: int) -> None:
+    machine = run(
+        "cpsid i\n" + store(ICSR, pending) + "ldr r0, [r1, #0]\nlog r0\n" + store(ICSR, pending >> 1)
+        + "ldr r0, [r1, #0]\nlog r0"
+    )  # fmt: skip
+    assert machine.log == [bits | 1 << 11, 1 << 11]
+
+
+def test_icsr_and_shcsr_tell_the_handler_that_runs(run) -> None:
+    machine = run(
+        "svc #0\nb stop\nhandler: mov32 r1, #0xE000ED04\nldr r0, [r1, #0]\nlog r0\n"
+        "mov32 r1, #0xE000ED24\nldr r0, [r1, #0]\nlog r0\nmrs r0, ipsr\nlog r0\nbx lr",
+        {11: "handler"},
+    )
+    assert machine.log == [11 | 1 << 11, 1 << 7, 11]
+
+
+@pytest.mark.parametrize("number", [43, 45, 100, 0x1FF])
+def test_a_software_request_for_an_interrupt_that_does_not_exist_is_ignored(run, number: int) -> None:
+    machine = run(
+        store(STIR, number) + f"isb\nmov32 r1, #{ISPR0}\nldr r0, [r1, #0]\nlog r0\nldr r0, [r1, #4]\nlog r0\n"
+        f"mov32 r1, #{ICSR}\nldr r0, [r1, #0]\nmovs r2, #1\nmov32 r2, #0x7FF000\n.half 0x4010\nlog r0"
+    )
+    assert machine.log == [0, 0, 0]
+
+
+def test_a_software_request_pends_the_interrupt_of_its_number(run) -> None:
+    machine = run(store(STIR, 42) + f"isb\nmov32 r1, #{ISPR0}\nldr r0, [r1, #4]\nlog r0")
+    assert machine.log == [1 << 10]
+
+
+@pytest.mark.parametrize("bit", [1 << 0, 1 << 1])
+def test_what_aircr_keeps_for_debuggers_is_ignored_and_warned_of(run, bit: int) -> None:
+    machine = run(store(AIRCR, 0x05FA0000 | bit) + "log #1")
+    assert machine.log == [1]
+    assert len(machine.board.warnings) == 1

@@ -1,0 +1,113 @@
+"""The record of blocks and exceptions: what is in it, its bounds, and that it changes nothing."""
+
+import pytest
+
+from bluepill_sim.core import BLOCK, EXCEPTION_RETURN, BlockRecorder
+
+SYSTICK = "mov32 r1, #0xE000E010\nmov32 r2, #799\nstr r2, [r1, #4]\nstr r2, [r1, #8]\nmovs r2, #7\nstr r2, [r1, #0]\n"
+CALLS = "movs r5, #3\nloop: bl work\nsubs r5, #1\nbne loop\nb stop\nwork: bx lr"
+MS = 1_000_000
+
+
+def test_each_block_is_told_of_with_the_cycle_of_its_start(boot) -> None:
+    machine = boot(CALLS)
+    recorder = machine.board.chip.record_blocks(100)
+    machine.board.advance_to(MS)
+    label = machine.label
+    start, loop, work = label("start"), label("loop"), label("work")
+    # R7, movs and bl: 3 + 2; bx lr: 3; subs and a taken bne: 3; bl: 2; the last bne falls through: 2; b stop: 2.
+    assert recorder.drain() == [
+        (0, start, BLOCK), (5, work, BLOCK), (8, loop + 4, BLOCK), (11, loop, BLOCK), (13, work, BLOCK),
+        (16, loop + 4, BLOCK), (19, loop, BLOCK), (21, work, BLOCK), (24, loop + 4, BLOCK), (26, loop + 8, BLOCK),
+        (28, label("stop"), BLOCK),
+    ]  # fmt: skip
+    assert recorder.drain() == []
+
+
+def test_exceptions_are_told_of_with_the_place_they_interrupt(boot) -> None:
+    machine = boot(SYSTICK + "movs r3, #0\nloop: adds r3, #1\nb loop\ntick: adds r6, #1\nbx lr", {15: "tick"})
+    recorder = machine.board.chip.record_blocks(10_000)
+    machine.run(120)
+    rows = recorder.drain()
+    at = next(n for n, row in enumerate(rows) if row[2] == 15)
+    entry, handler, back, again = rows[at : at + 4]
+    assert entry[1] == machine.label("loop")
+    assert handler == (entry[0] + 12, machine.label("tick"), BLOCK)
+    assert back == (handler[0] + 2, machine.label("loop"), EXCEPTION_RETURN)
+    assert again == (back[0] + 12, machine.label("loop"), BLOCK)
+
+
+def test_a_tail_chain_is_a_return_and_an_entry_at_one_time(boot) -> None:
+    source = "svc #0\nb stop\ncall: mov32 r1, #0xE000ED04\nmov32 r2, #0x10000000\nstr r2, [r1, #0]\nbx lr\nsv: bx lr"
+    machine = boot(source, {11: "call", 14: "sv"})
+    recorder = machine.board.chip.record_blocks(100)
+    machine.run(100)
+    exceptions = [row for row in recorder.drain() if row[2] != BLOCK]
+    (entry, left, chained, back) = exceptions
+    assert (entry[2], left[2], chained[2], back[2]) == (11, EXCEPTION_RETURN, 14, EXCEPTION_RETURN)
+    assert left[0] == chained[0]
+    assert left[1] == chained[1] == 0xFFFF_FFF9
+    assert back[0] == chained[0] + 6 + 1
+
+
+def test_rows_do_not_depend_on_slices(boot) -> None:
+    def rows(slice_us: float | None) -> list[tuple[int, int, int]]:
+        source = SYSTICK + "movs r3, #200\nloop: subs r3, #1\nbne loop\nspin: b spin\ntick: adds r6, #1\nbx lr"
+        machine = boot(source, {15: "tick"})
+        recorder = machine.board.chip.record_blocks(100_000)
+        machine.run(1000, slice_us)
+        return recorder.drain()
+
+    whole = rows(None)
+    assert [row[2] for row in whole].count(15) == 9
+    assert rows(7) == whole
+    assert rows(1) == whole
+
+
+def test_recording_changes_nothing_and_can_begin_and_end_anywhere(boot) -> None:
+    plain, recorded = boot(CALLS).run(1), boot(CALLS).run(1)
+    recorder = recorded.board.chip.record_blocks(1000)
+    plain.run(2)
+    recorded.run(2)
+    assert len(recorder) > 0
+    recorded.board.chip.stop_recording()
+    count = len(recorder)
+    plain.run(100)
+    recorded.run(100)
+    assert len(recorder) == count
+    assert (plain.board.cycle, plain.board.pc) == (recorded.board.cycle, recorded.board.pc)
+
+
+def test_a_recorder_is_bounded(boot) -> None:
+    recorder = BlockRecorder(3)
+    for n in range(5):
+        recorder.put(n, 0, BLOCK)
+    assert [row[0] for row in recorder.last(2)] == [3, 4]
+    assert recorder.last(0) == []
+    assert [row[0] for row in recorder.drain()] == [2, 3, 4]
+    assert recorder.lost == 2
+    with pytest.raises(ValueError, match="not 0"):
+        BlockRecorder(0)
+
+
+def test_a_full_recorder_asks_to_be_drained(boot) -> None:
+    whole = boot(CALLS)
+    expected = whole.board.chip.record_blocks(100)
+    whole.run(100)
+    taken: list[tuple[int, int, int]] = []
+    machine = boot(CALLS)
+    recorder = machine.board.chip.record_blocks(2, lambda full: taken.extend(full.drain()))
+    machine.run(100)
+    assert recorder.lost == 0
+    assert taken + recorder.drain() == expected.drain()
+
+
+def test_an_error_of_whoever_drains_comes_out_of_the_run(boot) -> None:
+    machine = boot(CALLS)
+
+    def fail(_recorder: BlockRecorder) -> None:
+        raise OSError("disk full")
+
+    machine.board.chip.record_blocks(2, fail)
+    with pytest.raises(OSError, match="disk full"):
+        machine.run(100)

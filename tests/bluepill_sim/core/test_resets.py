@@ -1,0 +1,180 @@
+"""Resets, their causes, and where a program starts."""
+
+from importlib.resources import files
+
+import pytest
+
+from bluepill_sim.board import BluePill
+from bluepill_sim.peripherals.rcc import ResetCause
+from bluepill_sim.timing import Reason
+
+AIRCR = 0xE000ED0C
+RCC_CSR, RCC_APB1ENR = 0x40021024, 0x4002101C
+IWDG_KR, WWDG_CR = 0x40003000, 0x40002C00
+START_IWDG = f"mov32 r1, #{IWDG_KR}\nmov32 r2, #0xCCCC\nstr r2, [r1, #0]\n"
+
+
+def store(address: int, value: int) -> str:
+    return f"mov32 r1, #{address}\nmov32 r2, #{value}\nstr r2, [r1, #0]\n"
+
+
+def test_a_reset_at_full_speed_is_nothing_to_warn_of() -> None:
+    board = BluePill(str(files("robot_bench.firmware") / "dodge.elf"))
+    board.chip.pins.is_fed = lambda _pin: True
+    board.run_for("10 ms")
+    assert board.hclk_hz == 72_000_000
+    board.reset()
+    assert board.hclk_hz == 8_000_000
+    board.run_for("10 ms")
+    assert board.warnings == []
+
+
+def test_a_reset_by_software_starts_the_program_again(boot) -> None:
+    machine = boot(
+        """
+        mov32 r3, #0x20001000
+        ldr r0, [r3, #0]
+        adds r0, #1
+        str r0, [r3, #0]
+        cmp r0, #3
+        beq stop
+        """
+        + store(AIRCR, 0x05FA0004)
+        + "here: b here"
+    )
+    machine.run(500)
+    assert machine.is_done
+    assert machine.board.read_memory(0x20001000, 4) == b"\x03\0\0\0"
+    assert machine.board.now_ns >= 500_000
+
+
+def test_a_write_to_aircr_without_its_key_does_nothing(run) -> None:
+    assert run(store(AIRCR, 0x12340004) + "log #1").log == [1]
+
+
+def test_vectors_follow_vtor(run) -> None:
+    machine = run(
+        """
+        mov32 r1, #0x20004000
+        mov32 r2, #handler+1
+        str r2, [r1, #44]
+        mov32 r3, #0xE000ED08
+        str r1, [r3, #0]
+        ldr r0, [r3, #0]
+        svc #0
+        log r0
+        b stop
+handler: log #1
+        bx lr"""
+    )
+    assert machine.log == [1, 0x20004000]
+
+
+def test_a_program_above_a_boot_loader_starts_at_its_own_vectors(boot) -> None:
+    machine = boot("svc #0\nlog #2\nb stop\nhandler: log #1\nbx lr", {11: "handler"}, origin=0x0800_2000).run()
+    assert machine.log == [1, 2]
+    assert machine.board.image.vector_table == 0x0800_2000
+
+
+#: Logs RCC_CSR, clears its flags, and counts the starts in SRAM; `again` is done only at the first.
+TELL = f"""
+        mov32 r1, #{RCC_CSR}
+        ldr r0, [r1, #0]
+        mov32 r3, #0x20001000
+        ldr r4, [r3, #0]
+        adds r4, #1
+        str r4, [r3, #0]
+        mov r5, r4
+        adds r5, r5, r5
+        adds r5, r5, r5
+        str r0, [r3, r5]
+        mov32 r2, #0x01000000
+        str r2, [r1, #0]
+        cmp r4, #1
+        beq again
+        b stop
+again:  nop
+"""
+FLAGS = {
+    ResetCause.POWER: 0x0C00_0000,
+    ResetCause.PIN: 0x0400_0000,
+    ResetCause.SOFTWARE: 0x1400_0000,
+    ResetCause.IWDG: 0x2400_0000,
+    ResetCause.WWDG: 0x4400_0000,
+}
+#: What the program does at its first start.
+DEEDS = {
+    ResetCause.SOFTWARE: store(AIRCR, 0x05FA0004) + "here: b here",
+    ResetCause.IWDG: START_IWDG + "here: b here",
+    ResetCause.WWDG: store(RCC_APB1ENR, 1 << 11) + store(WWDG_CR, 0xFF) + "here: wfi\nb here",
+}
+
+
+def starts(machine) -> list[int]:
+    """RCC_CSR at each start, oldest first."""
+    data = machine.board.read_memory(0x20001000, 40)
+    words = [int.from_bytes(data[n : n + 4], "little") for n in range(0, 40, 4)]
+    return words[1 : words[0] + 1]
+
+
+@pytest.mark.parametrize("cause", DEEDS)
+def test_the_program_reads_why_it_was_reset(boot, cause: ResetCause) -> None:
+    machine = boot(TELL + DEEDS[cause]).run(500_000)
+    assert starts(machine) == [FLAGS[ResetCause.POWER], FLAGS[cause]]
+    assert machine.is_done
+    assert machine.board.fault is None
+
+
+def test_the_reset_button_is_told_from_power(boot) -> None:
+    machine = boot(TELL).run(100)
+    machine.board.reset()
+    machine.run(100)
+    assert starts(machine) == [FLAGS[ResetCause.POWER], FLAGS[ResetCause.PIN]]
+
+
+def test_a_power_cut_clears_the_sram_and_the_flags(boot) -> None:
+    machine = boot(TELL).run(100)
+    machine.board.reset()
+    machine.run(100)
+    machine.board.chip.reset(ResetCause.POWER)
+    machine.run(100)
+    assert starts(machine) == [FLAGS[ResetCause.POWER]]
+
+
+def test_a_watchdog_ends_a_lockup_whatever_the_slices(boot) -> None:
+    """The stack is gone, so that the fault cannot be stacked: nothing but the watchdog moves the core."""
+    source = TELL + START_IWDG + "mov32 r0, #0x10000000\nmov sp, r0\npush {r0}"
+    whole, sliced = boot(source), boot(source)
+    assert whole.board.advance_to(1_000_000_000).reason is Reason.DEADLINE
+    sliced.run(1_000_000, slice_us=7000)
+    assert starts(whole) == starts(sliced) == [FLAGS[ResetCause.POWER], FLAGS[ResetCause.IWDG]]
+    # Started after two dozen cycles of 125 ns: 4096 counts of 100 us.
+    assert whole.board.fault is not None
+    assert whole.board.fault.is_lockup
+    assert whole.is_done
+
+
+def test_a_lockup_without_a_watchdog_is_the_end(boot) -> None:
+    machine = boot("mov32 r0, #0x10000000\nmov sp, r0\npush {r0}")
+    assert machine.board.advance_to(1_000_000).reason is Reason.HALT
+
+
+def test_a_watchdog_resets_at_the_first_boundary_at_its_time(boot) -> None:
+    machine = boot(TELL + START_IWDG + "here: b here")
+    iwdg = machine.board.chip.parts.by_name["IWDG"]
+    machine.run(1000)
+    due = iwdg.due_ns
+    machine.board.advance_to(due - 1000)
+    assert len(starts(machine)) == 1
+    assert machine.board.pc == machine.label("here")
+    machine.board.advance_to(due)
+    assert machine.board.pc == machine.label("start")
+
+
+@pytest.mark.parametrize(("rounds", "count"), [(13_000, 1), (30_000, 2)])
+def test_a_program_that_feeds_its_watchdog_in_time_lives(boot, rounds: int, count: int) -> None:
+    """Ten milliseconds: 13000 rounds of three cycles of 125 ns are 4.9 ms, 30000 are 11.3 ms."""
+    ten_ms = store(IWDG_KR, 0x5555) + store(IWDG_KR + 8, 99)
+    feed = f"mov32 r2, #0xAAAA\nfeed: str r2, [r1, #0]\nmov32 r3, #{rounds}\nd: subs r3, #1\nbne d\nb feed"
+    machine = boot(TELL + ten_ms + START_IWDG + feed).run(60_000)
+    assert len(starts(machine)) == count

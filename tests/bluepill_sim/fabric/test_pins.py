@@ -1,0 +1,236 @@
+"""Pins: who drives the wire, what it reads, and who is told when."""
+
+import itertools
+from collections.abc import Callable
+from typing import Any
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from bluepill_sim.fabric.pins import Pin, PinBank, PinDrive, PinMode
+
+QUICK = settings(max_examples=40, deadline=None)
+
+MODES = list(PinMode)
+
+
+class Ports:
+    """What a bank needs of its chip."""
+
+    now_ns = 0
+    stops = 0
+
+    def __init__(self) -> None:
+        self.warnings: dict[str, str] = {}
+
+    def request_stop(self) -> None:
+        self.stops += 1
+
+    def warn(self, message: str, *, once: str) -> None:
+        self.warnings.setdefault(once, message)
+
+
+@pytest.fixture
+def ports() -> Ports:
+    return Ports()
+
+
+@pytest.fixture
+def bank(ports: Ports) -> PinBank:
+    return PinBank(ports, frozenset({"PA0", "PA1", "PC13"}))
+
+
+@pytest.mark.parametrize(
+    ("mode", "bit", "drive"),
+    [
+        (PinMode.ANALOG, True, PinDrive.NONE),
+        (PinMode.FLOATING, True, PinDrive.NONE),
+        (PinMode.PULLED, True, PinDrive.PULL_UP),
+        (PinMode.PULLED, False, PinDrive.PULL_DOWN),
+        (PinMode.PUSH_PULL, True, PinDrive.HIGH),
+        (PinMode.PUSH_PULL, False, PinDrive.LOW),
+        (PinMode.OPEN_DRAIN, True, PinDrive.NONE),
+        (PinMode.OPEN_DRAIN, False, PinDrive.LOW),
+        (PinMode.ALTERNATE_PUSH_PULL, True, PinDrive.NONE),
+        (PinMode.ALTERNATE_OPEN_DRAIN, False, PinDrive.NONE),
+    ],
+)
+def test_mode_and_output_bit_decide_the_drive(bank: PinBank, mode: PinMode, bit: bool, drive: PinDrive) -> None:
+    bank["PA0"].configure(mode, output_bit=bit)
+    assert bank["PA0"].output is drive
+
+
+@pytest.mark.parametrize(
+    ("own", "outside", "level", "contended"),
+    [
+        (PinDrive.HIGH, None, True, False),
+        (PinDrive.LOW, None, False, False),
+        (PinDrive.HIGH, True, True, False),
+        (PinDrive.HIGH, False, False, True),
+        (PinDrive.LOW, True, False, True),
+        (PinDrive.PULL_UP, None, True, False),
+        (PinDrive.PULL_UP, False, False, False),
+        (PinDrive.PULL_DOWN, None, False, False),
+        (PinDrive.PULL_DOWN, True, True, False),
+        (PinDrive.NONE, True, True, False),
+        (PinDrive.NONE, False, False, False),
+        (PinDrive.NONE, None, False, False),
+    ],
+)
+def test_the_level_is_that_of_the_strongest(
+    bank: PinBank, own: PinDrive, outside: bool | None, level: bool, contended: bool
+) -> None:
+    pin = bank["PA0"]
+    pin.hold("TEST", own)
+    pin.drive(outside)
+    assert (pin.level, pin.is_contended, pin.driven) == (level, contended, outside)
+    assert pin.is_floating is (own is PinDrive.NONE and outside is None)
+
+
+def test_what_the_board_hangs_on_a_pin_is_weaker_than_the_chips_pull(bank: PinBank) -> None:
+    pin = bank["PC13"]
+    pin.board_pull = PinDrive.PULL_UP
+    pin.drive(False)
+    pin.drive(None)
+    assert pin.level
+    assert not pin.is_floating
+    pin.configure(PinMode.PULLED, output_bit=False)
+    assert not pin.level
+
+
+def test_an_analog_pin_reads_low_whatever_the_wire_does(bank: PinBank) -> None:
+    pin = bank["PA0"]
+    pin.configure(PinMode.ANALOG, output_bit=False)
+    pin.drive(True)
+    assert (pin.level, pin.input) == (True, False)
+    pin.configure(PinMode.FLOATING, output_bit=False)
+    assert pin.input
+
+
+def test_a_held_pin_ignores_its_configuration_until_released(bank: PinBank) -> None:
+    pin = bank["PA0"]
+    pin.hold("JTDO")
+    pin.configure(PinMode.PUSH_PULL, output_bit=True)
+    assert (pin.holder, pin.output, pin.input) == ("JTDO", PinDrive.NONE, False)
+    assert pin.mode is PinMode.PUSH_PULL
+    pin.release()
+    assert (pin.holder, pin.output, pin.input) == (None, PinDrive.HIGH, True)
+
+
+def test_an_alternate_function_drives_only_in_alternate_mode(bank: PinBank) -> None:
+    pin = bank["PA0"]
+    pin.connect("TIM", level=True)
+    assert pin.output is PinDrive.NONE
+    assert not pin.carries("TIM")
+    pin.configure(PinMode.ALTERNATE_PUSH_PULL, output_bit=False)
+    assert pin.output is PinDrive.HIGH
+    assert pin.carries("TIM")
+    pin.connect("TIM", level=False)
+    assert pin.output is PinDrive.LOW
+    pin.configure(PinMode.ALTERNATE_OPEN_DRAIN, output_bit=False)
+    pin.connect("TIM", level=True)
+    assert pin.output is PinDrive.NONE
+    pin.connect("ADC", level=False)
+    assert not pin.carries("TIM")
+    pin.disconnect("ADC")
+    pin.disconnect("ADC")
+    assert pin.carries("TIM")
+
+
+def test_every_change_of_the_own_drive_is_told_once_with_its_time(bank: PinBank, ports: Ports) -> None:
+    told: list[tuple[str, PinDrive, int]] = []
+    bank.on_output = lambda *change: told.append(change)
+    pin = bank["PA1"]
+    pin.configure(PinMode.PUSH_PULL, output_bit=False)
+    ports.now_ns = 17
+    pin.set_output_bit(True)
+    pin.set_output_bit(True)
+    pin.drive(True)
+    assert told == [("PA1", PinDrive.LOW, 0), ("PA1", PinDrive.HIGH, 17)]
+
+
+def test_a_change_of_a_watched_pin_asks_for_a_stop(bank: PinBank, ports: Ports) -> None:
+    pin = bank["PA1"]
+    pin.watch()
+    pin.configure(PinMode.PUSH_PULL, output_bit=True)
+    assert ports.stops == 1
+    pin.drive(False)
+    assert ports.stops == 1
+    pin.watch(False)
+    pin.set_output_bit(False)
+    assert ports.stops == 1
+
+
+def test_listeners_learn_of_changes_of_the_input_only(bank: PinBank) -> None:
+    seen: list[tuple[str, bool]] = []
+    pin = bank["PA0"]
+    pin.listeners.append(lambda changed: seen.append((changed.name, changed.input)))
+    pin.drive(True)
+    pin.drive(True)
+    pin.hold("JTDI", PinDrive.PULL_UP)
+    pin.drive(None)
+    assert seen == [("PA0", True), ("PA0", False)]
+
+
+def test_a_pin_without_a_leg_cannot_be_driven(bank: PinBank) -> None:
+    with pytest.raises(ValueError, match="PA5 is not bonded out"):
+        bank["PA5"].drive(True)
+    bank["PA5"].connect("X", level=True)
+    bank["PA5"].configure(PinMode.ALTERNATE_PUSH_PULL, output_bit=True)
+    assert not bank["PA5"].carries("X")
+    assert not bank["PA5"].is_listening()
+    with pytest.raises(KeyError):
+        bank["PF0"]
+
+
+def test_the_bank_goes_port_by_port(bank: PinBank) -> None:
+    pins = list(bank)
+    assert [pin.name for pin in (pins[0], pins[16], pins[-1])] == ["PA0", "PB0", "PE15"]
+    assert bank.port("C")[13] is bank["PC13"]
+
+
+ACTIONS = st.lists(
+    st.one_of(
+        st.tuples(st.just("drive"), st.sampled_from([True, False, None])),
+        st.tuples(st.just("configure"), st.sampled_from(MODES)),
+        st.tuples(st.just("bit"), st.booleans()),
+        st.tuples(st.just("hold"), st.sampled_from(list(PinDrive))),
+        st.tuples(st.just("release"), st.none()),
+        st.tuples(st.just("connect"), st.booleans()),
+        st.tuples(st.just("disconnect"), st.none()),
+    ),
+    max_size=20,
+)
+
+
+def act(pin: Pin, what: str, value: Any) -> None:
+    methods: dict[str, Callable[[], None]] = {
+        "drive": lambda: pin.drive(value),
+        "configure": lambda: pin.configure(value, output_bit=True),
+        "bit": lambda: pin.set_output_bit(value),
+        "hold": lambda: pin.hold("X", value),
+        "release": pin.release,
+        "connect": lambda: pin.connect("AF", level=value),
+        "disconnect": lambda: pin.disconnect("AF"),
+    }
+    methods[what]()
+
+
+@QUICK
+@given(actions=ACTIONS)
+def test_output_and_level_follow_from_the_state_alone(actions: Any) -> None:
+    bank = PinBank(Ports(), frozenset({"PA0"}))
+    told: list[PinDrive] = []
+    bank.on_output = lambda _name, drive, _ns: told.append(drive)
+    pin = bank["PA0"]
+    for what, value in actions:
+        act(pin, what, value)
+    other = PinBank(Ports(), frozenset({"PA0"}))
+    other.restore(bank.snapshot())
+    copy = other["PA0"]
+    assert (copy.output, copy.level, copy.input) == (pin.output, pin.level, pin.input)
+    copy._update()
+    assert (copy.output, copy.level, copy.input) == (pin.output, pin.level, pin.input)
+    assert all(a is not b for a, b in itertools.pairwise(told))
+    assert (told[-1] if told else PinDrive.NONE) is pin.output

@@ -1,0 +1,265 @@
+"""Registers: what a declaration promises about every bit."""
+
+from array import array
+from collections.abc import Callable
+from typing import Any
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from bluepill_sim.fabric.registers import WORD, Peripheral, Place, Register, bits
+from bluepill_sim.stm32f103 import PERIPHERALS
+
+QUICK = settings(max_examples=40, deadline=None)
+
+WORDS = st.integers(0, WORD)
+NAMES = [name for _, name, _ in PERIPHERALS]
+
+
+@st.composite
+def declarations(draw: st.DrawFn) -> Register:
+    writable = draw(WORDS)
+    one = draw(WORDS) & ~writable
+    zero = draw(WORDS) & ~writable & ~one
+    readable = draw(WORDS)
+    return Register(
+        name="R",
+        offset=0,
+        reset=draw(WORDS) & readable,
+        readable=readable,
+        writable=writable,
+        write_one_to_clear=one,
+        write_zero_to_clear=zero,
+    )
+
+
+def bit_after(register: Register, bit: int, previous: int, written: int) -> int:
+    """The same rules, for one bit, as the manual's list of abbreviations words them."""
+    mask = 1 << bit
+    before, data = bool(previous & mask), bool(written & mask)
+    if not register.readable & mask:
+        return 0
+    if register.writable & mask:
+        return data
+    if register.write_one_to_clear & mask:
+        return before and not data
+    if register.write_zero_to_clear & mask:
+        return before and data
+    return before
+
+
+@QUICK
+@given(register=declarations(), previous=WORDS, written=WORDS)
+def test_each_bit_follows_its_kind(register: Register, previous: int, written: int) -> None:
+    previous &= register.readable
+    after = register.stored_after(previous, written)
+    assert [after >> n & 1 for n in range(32)] == [bit_after(register, n, previous, written) for n in range(32)]
+
+
+@QUICK
+@given(register=declarations(), previous=WORDS, value=WORDS, lanes=st.sampled_from([0xFF, 0xFF00, 0xFFFF_0000, WORD]))
+def test_a_write_of_some_lanes_leaves_the_other_lanes_alone(
+    register: Register, previous: int, value: int, lanes: int
+) -> None:
+    previous &= register.readable
+    after = register.stored_after(previous, register.widen(previous, value, lanes))
+    whole = register.stored_after(previous, value)
+    assert after == (whole & lanes) | (previous & ~lanes)
+
+
+@pytest.mark.parametrize(
+    "fields",
+    [
+        {"offset": 2},
+        {"readable": 1 << 32},
+        {"write_one_to_clear": 1},
+        {"writable": 0, "write_one_to_clear": 1, "write_zero_to_clear": 1},
+        {"readable": 0, "reset": 1},
+    ],
+)
+def test_a_declaration_that_contradicts_itself_is_refused(fields: dict[str, int]) -> None:
+    with pytest.raises(ValueError, match="R"):
+        Register(**{"name": "R", "offset": 0, **fields})  # type: ignore[arg-type]  # deliberately wrong
+
+
+def test_bits_reads_as_the_manual_prints() -> None:
+    assert bits(0, (7, 4), 31) == 0x8000_00F1
+
+
+class Toy(Peripheral):
+    """One register of each kind of access."""
+
+    STATE = ("total",)
+    REGISTERS = (
+        Register(name="PLAIN", offset=0x00, reset=0x1234_5678),
+        Register(name="SUM", offset=0x04, readable=0, on_read="_read_sum", on_write="_write_sum"),
+    )
+
+    total = 0
+
+    def _read_sum(self) -> int:
+        return self.total
+
+    def _write_sum(self, written: int, _previous: int) -> None:
+        self.total += written
+
+
+class ByteToy(Toy):
+    """The same behind a bus with byte lanes."""
+
+    HAS_BYTE_LANES = True
+
+
+def toy(make: type[Toy], chip: Any) -> Toy:
+    return make(chip, Place(name="TOY", base=0))
+
+
+def test_reads_of_any_width_are_slices_of_the_word(fake_chip: Any) -> None:
+    part = toy(Toy, fake_chip)
+    assert [part.read(n, 1) for n in range(4)] == [0x78, 0x56, 0x34, 0x12]
+    assert [part.read(n, 2) for n in (0, 2)] == [0x5678, 0x1234]
+    assert part.read(0, 4) == 0x1234_5678
+    assert part.REGISTERS[0].is_plain_read
+    assert not part.REGISTERS[1].is_plain_read
+
+
+def test_a_narrow_write_is_duplicated_by_the_apb_bridge(fake_chip: Any) -> None:
+    part = toy(Toy, fake_chip)
+    part.write(1, 1, 0xAB)
+    assert part.read(0, 4) == 0xABAB_ABAB
+    part.write(2, 2, 0x1234)
+    assert part.read(0, 4) == 0x1234_1234
+    assert list(fake_chip.warnings) == ["TOY_PLAIN:narrow"]
+
+
+def test_a_narrow_write_has_byte_lanes_on_the_ahb(fake_chip: Any) -> None:
+    part = toy(ByteToy, fake_chip)
+    part.write(1, 1, 0xAB)
+    assert part.read(0, 4) == 0x1234_AB78
+    assert not fake_chip.warnings
+
+
+def test_hooks_see_the_write_and_answer_the_read(fake_chip: Any) -> None:
+    part = toy(Toy, fake_chip)
+    part.write(4, 4, 5)
+    part.write(4, 4, 7)
+    assert part.read(4, 4) == 12
+    state = part.snapshot()
+    part.write(4, 4, 1)
+    part.restore(state)
+    assert part.read(4, 4) == 12
+
+
+def test_an_address_without_a_register_reads_0_ignores_writes_and_is_warned_of(fake_chip: Any) -> None:
+    part = toy(Toy, fake_chip)
+    part.write(0x10, 4, 1)
+    assert part.read(0x10, 4) == 0
+    assert part.read(0x3FC, 4) == 0
+    assert list(fake_chip.warnings) == ["TOY+0x10", "TOY+0x3fc"]
+
+
+def test_a_peripheral_without_deadlines_does_nothing_by_itself(fake_chip: Any) -> None:
+    part = toy(Toy, fake_chip)
+    before = part.snapshot()
+    part.advance_to(10**12)
+    part.clock_changed()
+    assert part.next_deadline() is None
+    assert part.snapshot() == before
+
+
+# Every modelled register file.
+
+ACCESSES = st.lists(
+    st.tuples(
+        st.integers(0, 15),
+        st.sampled_from([1, 2, 4]),
+        st.integers(0, 3),
+        WORDS | st.sampled_from([0x4567_0123, 0xCDEF_89AB, 0x1_0000, 0x200C, 0x271]),
+        st.integers(0, 3_000_000),
+    ),
+    max_size=30,
+)
+
+
+def access_at_random(chip: Any, name: str, accesses: list[tuple[int, int, int, int, int]]) -> None:
+    part = chip.parts.by_name[name]
+    for number, size, byte, value, wait_ns in accesses:
+        register = part.REGISTERS[number % len(part.REGISTERS)]
+        part.write(register.offset + byte // size * size, size, value & ((1 << 8 * size) - 1))
+        chip.advance(chip.now_ns + wait_ns)
+        part.read(register.offset, 4)
+
+
+@pytest.mark.parametrize("name", NAMES)
+@QUICK
+@given(accesses=ACCESSES)
+def test_no_write_leaves_a_bit_that_does_not_read(make_fake_chip: Callable[[], Any], name: str, accesses: Any) -> None:
+    chip = make_fake_chip()
+    access_at_random(chip, name, accesses)
+    part = chip.parts.by_name[name]
+    for register in part.REGISTERS:
+        stored = part.words[register.offset // 4]
+        assert stored & ~register.readable == 0, register.name
+        if register.on_read is None:
+            assert part.read(register.offset, 4) == stored
+            assert sum(part.read(register.offset + n, 1) << 8 * n for n in range(4)) == stored
+
+
+@pytest.mark.parametrize("name", NAMES)
+@QUICK
+@given(value=WORDS)
+def test_a_plain_register_stores_exactly_its_mask(make_fake_chip: Callable[[], Any], name: str, value: int) -> None:
+    part = make_fake_chip().parts.by_name[name]
+    for register in part.REGISTERS:
+        if register.on_write is None:
+            before = part.read(register.offset, 4)
+            part.write(register.offset, 4, value)
+            assert part.read(register.offset, 4) == register.stored_after(before, value), register.name
+
+
+@pytest.mark.parametrize("name", NAMES)
+@QUICK
+@given(accesses=ACCESSES)
+def test_reset_brings_back_every_reset_value(make_fake_chip: Callable[[], Any], name: str, accesses: Any) -> None:
+    chip = make_fake_chip()
+    access_at_random(chip, name, accesses)
+    part = chip.parts.by_name[name]
+    part.reset()
+    assert part.next_deadline() is None
+    for register in part.REGISTERS:
+        if register.name != "IDR":
+            assert part.words[register.offset // 4] == register.reset, register.name
+
+
+@pytest.mark.parametrize("name", NAMES)
+@QUICK
+@given(before=ACCESSES, after=ACCESSES)
+def test_a_restored_peripheral_goes_on_identically(
+    make_fake_chip: Callable[[], Any], name: str, before: Any, after: Any
+) -> None:
+    chip = make_fake_chip()
+    access_at_random(chip, name, before)
+    now_ns, clocks = chip.now_ns, chip.clocks.snapshot()
+    pins, parts = chip.pins.snapshot(), chip.parts.snapshot()
+    other = make_fake_chip()
+    other.now_ns = now_ns
+    other.clocks.restore(clocks)
+    other.pins.restore(pins)
+    other.parts.restore(parts)
+    assert other.parts.snapshot() == parts
+    access_at_random(chip, name, after)
+    access_at_random(other, name, after)
+    assert (other.parts.snapshot(), other.pins.snapshot()) == (chip.parts.snapshot(), chip.pins.snapshot())
+    assert other.clocks.snapshot() == chip.clocks.snapshot()
+
+
+def test_words_stay_one_object_for_whoever_reads_them_natively(fake_chip: Any) -> None:
+    part = fake_chip.parts.by_name["GPIOA"]
+    words = part.words
+    state = part.snapshot()
+    part.reset()
+    part.restore(state)
+    assert part.words is words
+    assert isinstance(words, array)
+    assert words.itemsize == 4

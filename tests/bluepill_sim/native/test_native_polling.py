@@ -1,0 +1,140 @@
+"""Loops that wait: the native core lets their time pass at once, and stands where the Python executor stands."""
+
+import random
+from typing import Any
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from bluepill_sim import BluePill
+from bluepill_sim.core.accesses import only_reads
+from bluepill_sim.native import library as native_library
+from tests.bluepill_sim.core.conftest import Machine
+from tests.bluepill_sim.native.test_native_core import state
+
+pytestmark = pytest.mark.skipif(native_library.path() is None, reason="the native core is not built: no C compiler")
+
+SYSTICK = 15
+#: SysTick each 1000 cycles counts a word of SRAM up; port A has its clock; the cycle counter runs.
+SET_UP = """
+mov32 r0, #0x40021018
+movs r1, #4
+str r1, [r0, #0]
+mov32 r0, #0xE000EDFC
+mov32 r1, #0x01000000
+str r1, [r0, #0]
+mov32 r0, #0xE0001000
+movs r1, #1
+str r1, [r0, #0]
+mov32 r0, #0xE000E014
+mov32 r1, #999
+str r1, [r0, #0]
+movs r1, #0
+str r1, [r0, #4]
+mov32 r6, #0x20000800
+mov32 r0, #0xE000E010
+movs r1, #7
+str r1, [r0, #0]
+movs r5, #0
+b main
+tick: mov32 r0, #0x20000800
+ldr r1, [r0, #0]
+adds r1, #1
+str r1, [r0, #0]
+bx lr
+main: nop
+"""
+#: Loops that wait for something; `@` is the number of the loop. The halfwords compare r3 with r4 and shift r3
+#: (lsls #31, lsls #20, lsrs #9).
+WAITS = {
+    "a tick": "ldr r4, [r6, #0]\nb w@\nw@: ldr r3, [r6, #0]\n.half 0x42A3\nbeq w@",
+    "some ticks": "ldr r4, [r6, #0]\nadds r4, #3\nb w@\nw@: ldr r3, [r6, #0]\n.half 0x42A3\nbne w@",
+    "a pin": "mov32 r4, #0x40010808\nb w@\nw@: ldr r3, [r4, #0]\n.half 0x07DB\nbpl w@",
+    "the cycle counter": "mov32 r4, #0xE0001004\nb w@\nw@: ldr r3, [r4, #0]\n.half 0x051B\nbpl w@",
+    "a bit of the time": "mov32 r4, #0xE000E018\nb w@\nw@: ldr r3, [r4, #0]\n.half 0x0A5B\nbne w@",
+    "a count": "movs r3, #200\nb w@\nw@: ldr r4, [r6, #0]\nsubs r3, #1\nbne w@",
+    "two things": "ldr r4, [r6, #0]\nb w@\nw@: ldr r3, [r6, #0]\n.half 0x42A3\nbne x@\nb w@\nx@: nop",
+    "with a store": "ldr r4, [r6, #0]\nb w@\nw@: str r3, [r6, #4]\nldr r3, [r6, #0]\n.half 0x42A3\nbeq w@",
+}
+
+
+def program(waits: list[str]) -> str:
+    loops = [WAITS[name].replace("@", str(number)) + "\nadds r5, #1" for number, name in enumerate(waits)]
+    return "\n".join([SET_UP, *loops, "b main"])
+
+
+def make(source: str, core: str) -> BluePill:
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("P2OS_CORE", core)
+        board = Machine(source, {SYSTICK: "tick"}).board
+    board.usart1.on_transmit = board.on_pin = None
+    return board
+
+
+def live(board: BluePill, seed: int, slices: int) -> list[dict[str, Any]]:
+    dice = random.Random(seed)
+    states = []
+    for _ in range(slices):
+        board.pin("PA0").drive(dice.random() < 0.5)
+        board.advance_to(board.now_ns + dice.choice([1, 999, 20_000, 130_000, 700_000]))
+        states.append(state(board) | {"r5": board.register("R5")})
+    return states
+
+
+@pytest.mark.slow
+@settings(max_examples=40, deadline=None)
+@given(waits=st.lists(st.sampled_from(sorted(WAITS)), min_size=1, max_size=4), seed=st.integers(0, 1000))
+def test_every_slice_ends_alike(waits: list[str], seed: int) -> None:
+    source = program(waits)
+    native, python = (live(make(source, core), seed, 14) for core in ("native", "python"))
+    for number, (one, other) in enumerate(zip(native, python, strict=True)):
+        for name in one:
+            assert one[name] == other[name], (number, name)
+
+
+@pytest.mark.parametrize("wait", sorted(WAITS))
+def test_every_wait_ends(wait: str) -> None:
+    board = make(program([wait]), "native")
+    for step in range(40):
+        board.pin("PA0").drive(step % 2)
+        board.advance_to(board.now_ns + 1_000_000)
+    assert board.register("R5") > 20
+
+
+def test_rounds_that_are_recorded_are_all_run() -> None:
+    rows: dict[str, list[Any]] = {}
+    for core in ("native", "python"):
+        board = make(program(["a tick", "a pin"]), core)
+        rows[core] = []
+        recorder = board.chip.record_blocks(1000, lambda recorder, core=core: rows[core].extend(recorder.drain()))
+        live(board, 5, 10)
+        rows[core] += recorder.drain()
+    assert rows["native"] == rows["python"]
+    assert len(rows["native"]) > 1000
+
+
+def test_an_hour_of_waiting_for_a_pin_is_over_at_once() -> None:
+    board = make(program(["a pin"]).replace("movs r1, #7", "movs r1, #0"), "native")
+    board.pin("PA0").drive(0)
+    board.advance_to(3600 * 10**9)  # round by round this takes a quarter of an hour
+    assert board.register("R5") == 0
+    board.pin("PA0").drive(1)
+    board.advance_to(board.now_ns + 1_000_000)
+    assert board.register("R5") > 100
+
+
+#: (halfwords, whether they only read).
+CODES = [
+    ("680B 079B", True), ("600B", False), ("B403", False), ("BC03", True), ("C10D", False), ("C90D", True),
+    ("9802", True), ("9002", False), ("5088", False), ("5688", True), ("5888", True), ("7048", False),
+    ("F8C1 0123", False), ("F8D1 0123", True), ("E8D1 F000", True), ("E941 0202", False), ("8048", False),
+    ("E9D1 0202", True), ("EE00 0A10", False), ("F101 0001", True), ("BF30", True), ("F7FF FFFC", True),
+    ("FC00 0000", False),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("words", "is_reading"), CODES)
+def test_a_store_is_seen(words: str, is_reading: bool) -> None:
+    code = b"".join(int(word, 16).to_bytes(2, "little") for word in words.split())
+    assert only_reads(code) is is_reading

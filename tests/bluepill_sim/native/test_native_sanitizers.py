@@ -1,0 +1,70 @@
+"""The native core runs under the address and undefined-behaviour sanitizers, and with every warning an error."""
+
+import os
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+SOURCES = sorted((Path(__file__).parents[3] / "bluepill_sim" / "native" / "source").glob("*.c"))
+COMPILER = shutil.which("gcc")
+PROGRAM = """
+import sys
+from importlib.resources import files
+from bluepill_sim.native import library as native_library
+native_library.path = lambda: sys.argv[1]
+from pathlib import Path
+from bluepill_sim import BluePill
+from bluepill_sim.sight.probe import Probe
+from bluepill_sim.sight.vcd import write_vcd
+for name in ("dodge", "motors", "encoders"):
+    board = BluePill(str(files("robot_bench.firmware") / f"{name}.elf"))
+    board.chip.record_blocks(100)
+    for step in range(40):
+        board.pin("PA4").drive(step % 3 == 0)
+        board.usart1.receive(b"x")
+        board.advance_to(board.now_ns + 777_777)
+    probe = Probe(board)
+    board.advance_to(board.now_ns + 300_000_000)
+    probe.finish()
+    write_vcd(probe, Path(sys.argv[2]))
+    snapshot = board.snapshot()
+    board.advance_to(board.now_ns + 5_000_000)
+    board.restore(snapshot)
+    board.advance_to(board.now_ns + 5_000_000)
+print(type(board.chip.engine).__name__)
+"""
+
+pytestmark = pytest.mark.skipif(COMPILER is None, reason="no C compiler")
+
+
+def run(*command: str, **environment: str) -> str:
+    done = subprocess.run(
+        command, capture_output=True, text=True, timeout=120, check=False, env={**os.environ, **environment}
+    )
+    assert done.returncode == 0, done.stderr[-4000:]
+    return done.stdout
+
+
+def test_no_warning_and_no_finding(tmp_path: Path) -> None:
+    library = tmp_path / "core.so"
+    run(
+        "gcc", "-std=c11", "-O1", "-g", "-Wall", "-Wextra", "-Wconversion", "-Wno-sign-conversion", "-Werror", "-fPIC",
+        "-shared", "-fsanitize=address,undefined", "-fno-sanitize-recover=all", "-o", str(library), *map(str, SOURCES),
+    )  # fmt: skip
+    preload = run("gcc", "-print-file-name=libasan.so").strip()
+    if not Path(preload).is_file():
+        pytest.skip("the compiler comes without a sanitizer's library")
+    told = run(
+        sys.executable,
+        "-c",
+        PROGRAM,
+        str(library),
+        str(tmp_path / "pins.vcd"),
+        LD_PRELOAD=preload,
+        ASAN_OPTIONS="detect_leaks=0",
+        P2OS_CORE="native",
+    )
+    assert told.split() == ["NativeEngine"]

@@ -1,0 +1,261 @@
+"""RCC: start-up times, the clock tree, what may not be changed, gates, resets."""
+
+from collections.abc import Callable
+from typing import Any
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from bluepill_sim.fabric.clocks import Clocks, illegal_settings
+from bluepill_sim.peripherals.rcc import OSCILLATORS, Rcc, ResetCause
+from bluepill_sim.stm32f103 import BASES, CLOCK_GATES, Place
+
+QUICK = settings(max_examples=40, deadline=None)
+
+HSEON, HSERDY, HSEBYP, PLLON, PLLRDY = 1 << 16, 1 << 17, 1 << 18, 1 << 24, 1 << 25
+HSE_NS, PLL_NS = 2_000_000, 200_000
+
+
+def set_bits(chip: Any, register: str, mask: int) -> None:
+    chip.write(register, chip.read(register) | mask)
+
+
+def clear_bits(chip: Any, register: str, mask: int) -> None:
+    chip.write(register, chip.read(register) & ~mask)
+
+
+@pytest.mark.parametrize(
+    ("register", "on", "ready", "start_ns"),
+    [
+        ("RCC.CR", HSEON, HSERDY, 2_000_000),
+        ("RCC.CR", PLLON, PLLRDY, 200_000),
+        ("RCC.BDCR", 1, 2, 1_500_000_000),
+        ("RCC.CSR", 1, 2, 85_000),
+    ],
+)
+def test_an_oscillator_is_ready_after_its_start_up_time(
+    fake_chip: Any, register: str, on: int, ready: int, start_ns: int
+) -> None:
+    fake_chip.advance(1000)
+    set_bits(fake_chip, register, on)
+    fake_chip.advance(1000 + start_ns - 1)
+    assert not fake_chip.read(register) & ready
+    fake_chip.advance(1000 + start_ns)
+    assert fake_chip.read(register) & ready
+    clear_bits(fake_chip, register, on)
+    assert not fake_chip.read(register) & ready
+
+
+def test_a_read_catches_up_with_the_time_of_its_instruction(fake_chip: Any) -> None:
+    set_bits(fake_chip, "RCC.CR", HSEON)
+    fake_chip.now_ns = HSE_NS
+    assert fake_chip.read("RCC.CR") & HSERDY
+
+
+def test_the_pll_waits_for_its_source(fake_chip: Any) -> None:
+    fake_chip.write("RCC.CFGR", 1 << 16)
+    fake_chip.write("RCC.CR", fake_chip.read("RCC.CR") | HSEON | PLLON)
+    fake_chip.advance(HSE_NS + PLL_NS - 1)
+    assert not fake_chip.read("RCC.CR") & PLLRDY
+    fake_chip.advance(HSE_NS + PLL_NS)
+    assert fake_chip.read("RCC.CR") & PLLRDY
+
+
+def test_a_board_without_a_crystal_never_gets_ready(fake_chip: Any) -> None:
+    rcc = Rcc(fake_chip, Place(name="RCC", base=BASES["RCC"], irqs=(5,)), gates={}, hse_hz=None)
+    rcc.write(0, 4, 0x83 | HSEON)
+    assert rcc.next_deadline() is None
+    assert rcc.is_clocked("GPIOA")
+
+
+FACTORS = [*range(2, 17), 16]
+
+
+@pytest.mark.parametrize("number", range(16))
+@pytest.mark.parametrize(("source", "input_hz"), [(0, 4_000_000), (1 << 16, 8_000_000), (3 << 16, 4_000_000)])
+def test_every_pll_factor_and_source_gives_its_frequency(
+    fake_chip: Any, number: int, source: int, input_hz: int
+) -> None:
+    fake_chip.write("FLASH.ACR", 0x12)
+    fake_chip.write("RCC.CFGR", source | number << 18)
+    set_bits(fake_chip, "RCC.CR", HSEON | PLLON)
+    set_bits(fake_chip, "RCC.CFGR", 2)
+    fake_chip.advance(HSE_NS + PLL_NS)
+    expected_hz = input_hz * FACTORS[number]
+    assert fake_chip.clocks.sysclk_hz == expected_hz
+    assert ("clock:sysclk" in fake_chip.warnings) is (expected_hz > 72_000_000)
+    assert ("clock:pclk1" in fake_chip.warnings) is (expected_hz > 36_000_000)
+
+
+@QUICK
+@given(hpre=st.integers(0, 15), ppre1=st.integers(0, 7), ppre2=st.integers(0, 7))
+def test_the_dividers_make_the_buses(make_fake_chip: Callable[[], Any], hpre: int, ppre1: int, ppre2: int) -> None:
+    chip = make_fake_chip()
+    chip.write("RCC.CFGR", hpre << 4 | ppre1 << 8 | ppre2 << 11)
+    ahb = 1 if hpre < 8 else [2, 4, 8, 16, 64, 128, 256, 512][hpre - 8]
+    apb1, apb2 = (1 if p < 4 else 2 ** (p - 3) for p in (ppre1, ppre2))
+    clocks = chip.clocks
+    assert clocks.hclk_hz == 8_000_000 // ahb
+    assert (clocks.pclk1_hz, clocks.pclk2_hz) == (clocks.hclk_hz // apb1, clocks.hclk_hz // apb2)
+    assert clocks.timer1_hz == clocks.pclk1_hz * min(apb1, 2)
+    assert clocks.timer2_hz == clocks.pclk2_hz * min(apb2, 2)
+
+
+def test_a_switch_waits_until_its_source_is_ready(fake_chip: Any) -> None:
+    fake_chip.write("RCC.CFGR", 1)
+    assert fake_chip.read("RCC.CFGR") == 1
+    set_bits(fake_chip, "RCC.CR", HSEON)
+    fake_chip.advance(HSE_NS - 1)
+    assert fake_chip.read("RCC.CFGR") & 0xC == 0
+    fake_chip.advance(HSE_NS)
+    assert fake_chip.read("RCC.CFGR") & 0xC == 4
+
+
+def test_the_usual_start_reaches_72_mhz_without_a_warning(fake_chip: Any) -> None:
+    fake_chip.run_at_72_mhz()
+    clocks = fake_chip.clocks
+    assert (clocks.hclk_hz, clocks.pclk1_hz, clocks.pclk2_hz) == (72_000_000, 36_000_000, 72_000_000)
+    assert (clocks.timer1_hz, clocks.timer2_hz) == (72_000_000, 72_000_000)
+    assert fake_chip.warnings == {}
+    assert fake_chip.clock_changes > 0
+
+
+def test_what_clocks_sysclk_cannot_be_stopped(fake_chip: Any) -> None:
+    clear_bits(fake_chip, "RCC.CR", 1)
+    assert fake_chip.read("RCC.CR") & 3 == 3
+    fake_chip.run_at_72_mhz()
+    clear_bits(fake_chip, "RCC.CR", PLLON | HSEON | 1)
+    assert fake_chip.read("RCC.CR") & (PLLON | PLLRDY | HSEON | HSERDY | 3) == PLLON | PLLRDY | HSEON | HSERDY
+    assert list(fake_chip.warnings) == ["RCC:in-use"]
+    fake_chip.write("RCC.CFGR", fake_chip.read("RCC.CFGR") & ~3 | 1)
+    clear_bits(fake_chip, "RCC.CR", HSEON)
+    assert fake_chip.read("RCC.CR") & HSEON
+    clear_bits(fake_chip, "RCC.CR", PLLON)
+    assert not fake_chip.read("RCC.CR") & PLLRDY
+
+
+def test_pll_settings_are_fixed_while_it_is_on(fake_chip: Any) -> None:
+    fake_chip.run_at_72_mhz()
+    before = fake_chip.read("RCC.CFGR")
+    fake_chip.write("RCC.CFGR", before ^ 3 << 18)
+    assert fake_chip.read("RCC.CFGR") == before
+    assert list(fake_chip.warnings) == ["RCC:pll-on"]
+
+
+def test_a_bypass_is_chosen_before_the_crystal_runs(fake_chip: Any) -> None:
+    set_bits(fake_chip, "RCC.CR", HSEBYP)
+    assert fake_chip.read("RCC.CR") & HSEBYP
+    set_bits(fake_chip, "RCC.CR", HSEON)
+    clear_bits(fake_chip, "RCC.CR", HSEBYP)
+    assert fake_chip.read("RCC.CR") & HSEBYP
+
+
+def test_the_fourth_clock_source_does_not_exist(fake_chip: Any) -> None:
+    fake_chip.write("RCC.CFGR", 3)
+    assert fake_chip.read("RCC.CFGR") == 0
+    assert list(fake_chip.warnings) == ["RCC:sw"]
+
+
+def test_too_few_wait_states_are_warned_of(fake_chip: Any) -> None:
+    fake_chip.run_at_72_mhz()
+    fake_chip.write("FLASH.ACR", 0x11)
+    assert fake_chip.warnings == {
+        "clock:latency": "FLASH_ACR LATENCY is 1 at a SYSCLK of 72000000 Hz: good up to 48000000 Hz"
+    }
+
+
+@pytest.mark.parametrize(("hz", "states", "is_good"), [
+    (24_000_000, 0, True), (24_000_001, 0, False), (48_000_000, 1, True), (48_000_001, 1, False), (72_000_000, 2, True)
+])  # fmt: skip
+def test_wait_states_have_their_limits_to_the_hertz(hz: int, states: int, is_good: bool) -> None:
+    clocks = Clocks(sysclk_hz=hz, hclk_hz=hz, flash_wait_states=states)
+    assert (illegal_settings(clocks) == []) is is_good
+
+
+def test_prefetch_must_stay_on_with_an_ahb_prescaler(fake_chip: Any) -> None:
+    fake_chip.write("FLASH.ACR", 0)
+    assert fake_chip.warnings == {}
+    fake_chip.write("RCC.CFGR", 8 << 4)
+    assert list(fake_chip.warnings) == ["clock:prefetch"]
+
+
+@pytest.mark.parametrize("name", CLOCK_GATES)
+def test_each_gate_clocks_its_peripheral(fake_chip: Any, name: str) -> None:
+    gate = CLOCK_GATES[name]
+    rcc = fake_chip.parts.rcc
+    assert not rcc.is_clocked(name)
+    fake_chip.write(f"RCC.{gate.register}", 1 << gate.bit)
+    assert rcc.is_clocked(name)
+    assert fake_chip.read(f"RCC.{gate.register}") == 1 << gate.bit
+    fake_chip.write(f"RCC.{gate.register}", 0)
+    assert not rcc.is_clocked(name)
+    assert rcc.is_clocked("RCC")
+
+
+def test_a_reset_bit_resets_its_peripheral_once(fake_chip: Any) -> None:
+    fake_chip.write("GPIOA.ODR", 7)
+    fake_chip.write("RCC.APB2RSTR", 1 << 2 | 1 << 12)
+    assert fake_chip.read("GPIOA.ODR") == 0
+    fake_chip.write("RCC.APB2RSTR", 1 << 2)
+    fake_chip.write("RCC.APB1RSTR", 1 << 17)
+    assert fake_chip.resets == ["GPIOA", "SPI1", "USART2"]
+
+
+def test_a_ready_interrupt_is_raised_and_cleared(fake_chip: Any) -> None:
+    fake_chip.write("RCC.CIR", 1 << 11)
+    set_bits(fake_chip, "RCC.CR", HSEON)
+    fake_chip.advance(HSE_NS)
+    assert fake_chip.irqs[5]
+    assert fake_chip.read("RCC.CIR") == 1 << 11 | 1 << 3
+    fake_chip.write("RCC.CIR", 1 << 19, 1, 2)  # as libraries do: one byte
+    assert fake_chip.irqs[5]
+    fake_chip.parts.rcc.write(0x0A, 1, 1 << 3)
+    assert not fake_chip.irqs[5]
+    assert fake_chip.read("RCC.CIR") == 1 << 11
+
+
+def test_flags_without_enable_raise_nothing(fake_chip: Any) -> None:
+    set_bits(fake_chip, "RCC.CR", HSEON)
+    fake_chip.advance(HSE_NS)
+    assert fake_chip.read("RCC.CIR") == 1 << 3
+    assert not fake_chip.irqs[5]
+
+
+@pytest.mark.parametrize("cause", list(ResetCause))
+def test_the_cause_of_a_reset_is_kept_until_removed(fake_chip: Any, cause: ResetCause) -> None:
+    fake_chip.write("RCC.CSR", 1 << 24)
+    assert fake_chip.read("RCC.CSR") == 0
+    fake_chip.parts.reset(cause)
+    assert fake_chip.read("RCC.CSR") == cause.value
+    fake_chip.parts.reset(ResetCause.PIN)
+    assert fake_chip.read("RCC.CSR") == cause.value | ResetCause.PIN.value
+
+
+def test_a_reset_goes_back_to_hsi(fake_chip: Any) -> None:
+    fake_chip.run_at_72_mhz()
+    fake_chip.parts.reset(ResetCause.SOFTWARE)
+    assert fake_chip.clocks == Clocks()
+    assert fake_chip.read("RCC.CR") == 0x83
+    assert fake_chip.parts.next_deadline() is None
+
+
+def test_the_backup_domain_outlives_all_but_a_power_cut(fake_chip: Any) -> None:
+    fake_chip.write("RCC.BDCR", 1 << 8 | 1)
+    fake_chip.advance(1_000_000_000)
+    fake_chip.parts.reset(ResetCause.PIN)
+    assert fake_chip.parts.next_deadline() == OSCILLATORS[3].start_ns
+    fake_chip.advance(OSCILLATORS[3].start_ns)
+    assert fake_chip.read("RCC.BDCR") == 1 << 8 | 3
+    fake_chip.write("RCC.BDCR", 1 << 16)
+    assert fake_chip.read("RCC.BDCR") == 1 << 16
+    fake_chip.write("RCC.BDCR", 1)
+    fake_chip.parts.reset(ResetCause.POWER)
+    assert fake_chip.read("RCC.BDCR") == 0
+
+
+def test_the_slow_crystal_takes_its_pins(fake_chip: Any) -> None:
+    fake_chip.write("RCC.BDCR", 1)
+    assert [fake_chip.pins[name].holder for name in ("PC13", "PC14", "PC15")] == [None, "OSC32_IN", "OSC32_OUT"]
+    fake_chip.write("RCC.BDCR", 0)
+    assert fake_chip.pins["PC14"].holder is None

@@ -1,0 +1,72 @@
+"""Reset values of every modelled register, as the manuals print them; and that each exists.
+
+Source: RM0008 (the register tables of each chapter), PM0056 chapter 4, PM0075 for FLASH, ARM C1 for DWT.
+"""
+
+import struct
+from typing import Any
+
+import pytest
+
+from bluepill_sim.board import BluePill
+from bluepill_sim.core.system_control import PPB_BASE
+from bluepill_sim.program.image import Image, SymbolTable
+
+#: What is not 0, by peripheral and register; write-only registers read 0.
+PERIPHERALS = {
+    "RCC": {"CR": 0x0000_0083, "AHBENR": 0x14, "CSR": 0x0C00_0000},
+    "FLASH": {"ACR": 0x30, "CR": 0x80, "OBR": 0x03FF_FFFC, "WRPR": 0xFFFF_FFFF},
+    "AFIO": {},
+    **{f"GPIO{port}": {"CRL": 0x4444_4444, "CRH": 0x4444_4444} for port in "ABCDE"},
+    "EXTI": {},
+    **{f"USART{number}": {"SR": 0xC0} for number in (1, 2, 3)},
+    "IWDG": {"RLR": 0xFFF},
+    "WWDG": {"CR": 0x7F, "CFR": 0x7F},
+}
+#: Reset values of the core's registers; GPIOA's IDR apart, nothing here depends on the outside.
+CORE = {
+    0xE000_E004: 1,  # ICTR
+    0xE000_E010: 0, 0xE000_E014: 0, 0xE000_E018: 0, 0xE000_E01C: 0x4000_2328,  # SysTick
+    **{0xE000_E100 + 0x80 * kind + 4 * word: 0 for kind in range(5) for word in (0, 1)},  # NVIC
+    **{0xE000_E400 + 4 * word: 0 for word in range(11)},
+    0xE000_ED00: 0x411F_C231,  # CPUID
+    0xE000_ED08: 0,  # VTOR
+    0xE000_ED0C: 0xFA05_0000,  # AIRCR
+    0xE000_ED10: 0, 0xE000_ED14: 0x200,  # SCR, CCR
+    0xE000_ED18: 0, 0xE000_ED1C: 0, 0xE000_ED20: 0, 0xE000_ED24: 0,  # SHPR1 to SHPR3, SHCSR
+    0xE000_ED28: 0, 0xE000_ED2C: 0, 0xE000_ED34: 0, 0xE000_ED38: 0,  # CFSR, HFSR, MMFAR, BFAR
+    0xE000_EDFC: 0,  # DEMCR
+    0xE000_1000: 0x4000_0000, 0xE000_1004: 0,  # DWT_CTRL, CYCCNT
+    0xE004_2000: 0x2003_6410, 0xE004_2004: 0,  # DBGMCU
+}  # fmt: skip
+
+
+def test_every_modelled_peripheral_stands_in_the_table(fake_chip: Any) -> None:
+    assert set(fake_chip.parts.by_name) == set(PERIPHERALS)
+
+
+@pytest.mark.parametrize("name", PERIPHERALS)
+def test_registers_read_their_reset_values(fake_chip: Any, name: str) -> None:
+    part = fake_chip.parts.by_name[name]
+    values = {register.name: part.read(register.offset, 4) for register in part.REGISTERS}
+    assert {register: value for register, value in values.items() if value} == PERIPHERALS[name]
+
+
+@pytest.mark.parametrize("name", PERIPHERALS)
+def test_a_reset_brings_them_back(fake_chip: Any, name: str) -> None:
+    """Whatever was written; BDCR and the flags of CSR have a test of their own."""
+    part = fake_chip.parts.by_name[name]
+    for register in part.REGISTERS:
+        if (name, register.name) not in {("RCC", "APB1RSTR"), ("RCC", "APB2RSTR")}:
+            part.write(register.offset, 4, 0x5555_5555)
+    part.reset()
+    values = {register.name: part.read(register.offset, 4) for register in part.REGISTERS}
+    assert {register: value for register, value in values.items() if value} == PERIPHERALS[name]
+
+
+def test_the_cores_registers_read_their_reset_values() -> None:
+    image = Image("idle", ((0x0800_0000, struct.pack("<IIH", 0x2000_5000, 0x0800_0009, 0xE7FE)),), SymbolTable(()))
+    board = BluePill(image)
+    for address, value in CORE.items():
+        assert hex(board.chip.system.read(address - PPB_BASE, 4)) == hex(value), hex(address)
+    assert board.warnings == []

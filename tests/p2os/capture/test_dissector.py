@@ -1,0 +1,101 @@
+"""The Wireshark dissector: its tables are ours, and tshark shows what we show."""
+
+import re
+import shutil
+import struct
+import subprocess
+from importlib.resources import as_file, files
+from pathlib import Path
+
+import pytest
+
+from p2os.capture import Direction, capture_of, frame_chunks, read_file, write_pcap
+from p2os.capture.dissector import install
+from p2os.cli.main import run
+from p2os.errors import FileError
+from p2os.protocol.commands import CommandNumber
+from p2os.protocol.packets import PACKET_NAMES
+
+GOLDEN = Path(__file__).resolve().parents[2] / "golden" / "captures" / "aria_p2de.jsonl"
+TSHARK = shutil.which("tshark")
+needs_tshark = pytest.mark.skipif(
+    TSHARK is None, reason="tshark is not installed: the Wireshark dissector is NOT tested"
+)
+
+
+def shown(capture: Path, *fields: str) -> list[list[str]]:
+    """Return what tshark reads out of a capture with the dissector."""
+    asked = [word for field in fields for word in ("-e", field)]
+    with as_file(files("p2os.trace") / "p2os.lua") as script:
+        done = subprocess.run(
+            [str(TSHARK), "-n", "-X", f"lua_script:{script}", "-r", str(capture), "-T", "fields", *asked],
+            capture_output=True, text=True, timeout=60, check=True,
+        )  # fmt: skip
+    assert "Lua" not in done.stderr
+    return [line.split("\t") for line in done.stdout.splitlines()]
+
+
+def lua_table(name: str) -> dict[int, str]:
+    text = (files("p2os.trace") / "p2os.lua").read_text(encoding="utf-8")
+    body = re.search(rf"local {name} = {{(.*?)\n}}", text, re.DOTALL)
+    assert body is not None
+    return {int(number, 0): word for number, word in re.findall(r'\[(\w+)\] = "([^"]+)"', body[1])}
+
+
+def test_the_dissector_knows_the_same_names() -> None:
+    assert lua_table("commands") == {int(number): number.name for number in CommandNumber}
+    assert lua_table("packets") == dict(PACKET_NAMES)
+
+
+@needs_tshark
+def test_tshark_shows_a_capture_of_ours(tmp_path: Path) -> None:
+    capture = read_file(GOLDEN)
+    pieces = list(frame_chunks(capture.chunks))
+    last = [(chunk.at_ns, chunk.direction, chunk.data) for chunk in pieces[-1:]]
+    broken = capture_of([*last, (last[0][0] + 5, Direction.TO_ROBOT, bytes.fromhex("fafb060b3bc800d300"))])
+    pieces += list(frame_chunks(broken.chunks[1:]))
+    path = tmp_path / "talk.pcap"
+    path.write_bytes(write_pcap(pieces, base_ns=1_700_000_000_000_000_000))
+    rows = shown(path, "p2os.direction", "p2os.command", "p2os.packet", "p2os.argument", "p2os.sip.x", "p2os.bad")
+    assert len(rows) == len(pieces)
+    for row, piece in zip(rows[:-1], pieces, strict=False):
+        direction, command, packet, _, x, bad = row
+        kind, to_robot = piece.data[3], piece.direction is Direction.TO_ROBOT
+        assert (direction, bad) in {("0" if to_robot else "1", word) for word in ("0", "False")}
+        assert (command, packet) == ((str(kind), "") if to_robot else ("", f"0x{kind:02x}"))
+        if kind == 0x32 and not to_robot:
+            assert int(x) == int.from_bytes(piece.data[4:6], "little")
+    assert rows[-1][5] in {"1", "True"}
+    assert [row[3] for row in rows if row[1] == "5"] == ["300", "-300"]
+
+
+@needs_tshark
+def test_tshark_finds_frames_that_tcp_has_cut(tmp_path: Path) -> None:
+    frames = [chunk.data for chunk in read_file(GOLDEN).chunks if chunk.direction is Direction.FROM_ROBOT][:6]
+    stream, packets, sequence = b"".join(frames), [], 1
+    for start in range(0, len(stream), 50):
+        data = stream[start : start + 50]
+        tcp = struct.pack(">HHIIBBHHH", 8101, 40000, sequence, 0, 5 << 4, 0x18, 1000, 0, 0) + data
+        packets.append(struct.pack(">BBHHHBBH", 0x45, 0, 20 + len(tcp), 0, 0, 64, 6, 0) + b"\x7f\0\0\1" * 2 + tcp)
+        sequence += len(data)
+    records = b"".join(
+        struct.pack("<IIII", 1, place, len(data), len(data)) + data for place, data in enumerate(packets)
+    )
+    path = tmp_path / "tcp.pcap"
+    path.write_bytes(struct.pack("<IHHiIII", 0xA1B2C3D4, 2, 4, 0, 0, 65535, 101) + records)
+    kinds = [kind for (row,) in shown(path, "p2os.packet") for kind in row.split(",") if kind]
+    assert kinds == [f"0x{frame[3]:02x}" for frame in frames]
+    assert read_file(path).bytes_of(Direction.FROM_ROBOT) == stream
+
+
+def test_the_dissector_is_put_where_wireshark_looks(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setenv("HOME", str(tmp_path))
+    assert run(["sniff", "--install-dissector"]) == 0
+    target = tmp_path / ".local/lib/wireshark/plugins/p2os.lua"
+    assert capsys.readouterr().out == f"installed {target}\n"
+    assert target.read_bytes() == (files("p2os.trace") / "p2os.lua").read_bytes()
+    (tmp_path / "file").write_text("")
+    with pytest.raises(FileError, match="cannot write"):
+        install(tmp_path / "file")

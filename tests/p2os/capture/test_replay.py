@@ -1,0 +1,116 @@
+"""Recorded conversations played again, in virtual time; and what a tap says at the end."""
+
+from pathlib import Path
+
+import pytest
+
+from p2os.capture import Chunk, Direction, capture_of, frame_chunks, read_file
+from p2os.capture.replay import Replay, Tap, frame_of
+from p2os.protocol.commands import Command, CommandNumber
+from p2os.protocol.connection import Connection, ConnectionRole, ConnectionState, SipReceived
+from p2os.timing import NS_PER_MS, NS_PER_S
+
+GOLDEN = Path(__file__).resolve().parents[2] / "golden" / "captures"
+TO, FROM = Direction.TO_ROBOT, Direction.FROM_ROBOT
+#: AMRISim sent one SIP whose sonar count promises more readings than it holds.
+ONE_UNSOUND = 1
+ARIA = read_file(GOLDEN / "aria_p2de.jsonl")
+
+
+def command(number: int, argument: int | None = None) -> bytes:
+    return Command(number, argument).to_frame().to_bytes()
+
+
+@pytest.mark.parametrize("step_ms", [1, 7, 50])
+def test_a_client_connects_to_a_recorded_robot_and_hears_all_its_packets(step_ms: int) -> None:
+    robot, client = Replay(ARIA, FROM), Connection(ConnectionRole.CLIENT)
+    robot.start(0)
+    now, sips, synchronised = 700 * NS_PER_MS, [], []
+    client.connect(now)
+    while robot.frames_left and now < 60 * NS_PER_S:
+        for data in client.take_output():
+            robot.receive(data, now)
+        robot.advance_to(now)
+        for data in robot.take_output():
+            client.receive(data, now)
+        client.advance_to(now)
+        while (event := client.next_event()) is not None:
+            sips += [event.sip] if isinstance(event, SipReceived) else []
+            synchronised += [event.identity.subclass] if hasattr(event, "identity") else []
+        now += step_ms * NS_PER_MS
+    assert synchronised == ["p2de"]
+    assert robot.frames_left == 0
+    assert client.state is ConnectionState.OPEN
+    recorded = [piece for piece in frame_chunks(ARIA.chunks) if piece.direction is FROM]
+    assert len(sips) == sum(piece.data[3] in {0x32, 0x33} for piece in recorded) - ONE_UNSOUND
+
+
+def test_a_recorded_client_waits_for_the_robot_s_answers_and_keeps_its_pace_afterwards() -> None:
+    talk = capture_of([
+        (0, TO, command(0)), (10, FROM, command(0)), (20, TO, command(1)), (25, FROM, command(1)),
+        (100, TO, command(11, 200)), (150, TO, command(29)),
+    ])  # fmt: skip
+    client = Replay(talk, TO, speed=0.5)
+    client.start(1000)
+    client.advance_to(1000)
+    assert client.take_output() == [command(0)]
+    client.advance_to(1500)
+    assert client.take_output() == []
+    assert (client.awaited, client.next_deadline()) == ("an answer to a SYNC", None)
+    assert client.waited(1600) == 1600 - 1040
+    client.receive(command(0), 1700)
+    client.advance_to(1700)
+    assert (client.take_output(), client.waited(1700)) == ([command(1)], 0)
+    client.receive(command(1), 1701)
+    assert (client.awaited, client.next_deadline()) == ("", 1700 + 160)
+    client.advance_to(1859)
+    assert client.take_output() == []
+    client.advance_to(1860)
+    assert client.take_output() == [command(11, 200)]
+    client.advance_to(10_000)
+    assert client.take_output() == [command(29)]
+    assert (client.frames_left, client.awaited, client.next_deadline()) == (0, "", None)
+
+
+def test_a_recorded_robot_says_what_it_waits_for() -> None:
+    robot = Replay(ARIA, FROM)
+    robot.start(5)
+    robot.advance_to(NS_PER_S)
+    assert (robot.take_output(), robot.awaited) == ([], "SYNC0")
+
+
+def test_an_empty_capture_has_nothing_to_play() -> None:
+    replay = Replay(capture_of([]), TO)
+    replay.start(0)
+    assert (replay.frames_left, replay.next_deadline(), replay.awaited) == (0, None, "")
+
+
+def test_a_tap_says_farewell_only_to_a_robot_whose_session_is_open() -> None:
+    tap, said = Tap(), []
+    for chunk in ARIA.chunks:
+        assert tap.hear(chunk.direction or TO, chunk.data, chunk.at_ns).data == chunk.data
+        said.append(tap.farewell())
+    stop_first = command(CommandNumber.STOP) + command(CommandNumber.VEL, 0) + command(CommandNumber.CLOSE)
+    assert set(said) == {b"", stop_first}
+    assert (said[0], said[len(said) // 2], said[-1]) == (b"", stop_first, b"")
+
+
+def test_a_tap_that_has_not_heard_the_beginning_says_farewell_to_a_robot_that_was_told_to_move() -> None:
+    tap = Tap()
+    tap.hear(TO, command(CommandNumber.VEL, 200), 0)
+    assert tap.farewell()
+    tap.hear(TO, command(CommandNumber.CLOSE), 1)
+    assert tap.farewell() == b""
+
+
+@pytest.mark.parametrize(("code", "baud"), [(0, 9600), (2, 38400), (4, 115200), (9, None)])
+def test_a_tap_hears_a_change_of_speed(code: int, baud: int | None) -> None:
+    tap = Tap()
+    tap.hear(TO, command(CommandNumber.HOSTBAUD, code), 0)
+    assert tap.new_baud == baud
+
+
+def test_what_is_no_whole_frame_is_none() -> None:
+    good = command(11, 5)
+    for data in (good[:-1], b"\0" + good, good[:-1] + b"\x00", b"\xfa\xfb\x03"):
+        assert frame_of(Chunk(at_ns=0, direction=TO, data=data)) is None

@@ -1,0 +1,200 @@
+"""The command line as such: verbs found, errors told in one line and a hint, exit codes."""
+
+import os
+import runpy
+import subprocess
+import sys
+from collections.abc import Callable
+from importlib.metadata import EntryPoint
+from pathlib import Path
+
+import pytest
+import typer
+
+from p2os.cli import main as cli
+from p2os.cli.signals import restored_signals
+from p2os.errors import FileError, TransportError
+
+GROUP = "p2os.verbs"
+
+
+def entry(name: str, value: str) -> EntryPoint:
+    return EntryPoint(name=name, value=value, group=GROUP)
+
+
+class Verb:
+    """A verb that does what the test says."""
+
+    def __init__(self, act: Callable[[], object]) -> None:
+        self.act = act
+
+    def register(self, app: typer.Typer) -> None:
+        app.command("act", help="Act.")(self.run)
+
+    def run(self) -> None:
+        self.act()
+
+
+@pytest.fixture
+def offer(monkeypatch: pytest.MonkeyPatch) -> Callable[[Callable[[], object]], None]:
+    """Offer a verb `act` that runs a function, beside the verb `ports`."""
+
+    class Offered(EntryPoint):
+        def load(self) -> object:
+            return Verb(acts[0])
+
+    acts: list[Callable[[], object]] = []
+
+    def do(act: Callable[[], object]) -> None:
+        acts.append(act)
+        found = [Offered("act", "nowhere", GROUP), entry("ports", "p2os.cli.links.ports")]
+        monkeypatch.setattr(cli, "verbs", lambda: found)
+
+    return do
+
+
+def raising(error: BaseException) -> Callable[[], None]:
+    def act() -> None:
+        raise error
+
+    return act
+
+
+def test_no_words_show_help_with_every_verb_and_examples(capsys: pytest.CaptureFixture[str]) -> None:
+    assert cli.run([]) == 0
+    out = capsys.readouterr().out
+    for text in ("serve", "info", "ports", "doctor", "p2os serve", "--trace"):
+        assert text in out
+
+
+def test_the_version_is_printed(capsys: pytest.CaptureFixture[str]) -> None:
+    assert cli.run(["--version"]) == 0
+    assert capsys.readouterr().out.count(".") == 2
+
+
+@pytest.mark.parametrize(
+    ("error", "code", "lines"),
+    [
+        (
+            TransportError("cannot open x: gone", hint="p2os ports"),
+            1,
+            ["p2os: cannot open x: gone", "hint: p2os ports"],
+        ),
+        (TransportError("several\n  lines"), 1, ["p2os: several lines"]),
+        (FileError("no such file"), 2, ["p2os: no such file"]),
+        (KeyError("oops"), 1, ["p2os: this is a bug: KeyError: 'oops'", "hint: run it again with --trace and report"]),
+    ],
+)
+def test_an_error_is_one_line_and_one_hint(
+    offer: Callable[[object], None], capsys: pytest.CaptureFixture[str], error: Exception, code: int, lines: list[str]
+) -> None:
+    offer(raising(error))
+    assert cli.run(["act"]) == code
+    captured = capsys.readouterr()
+    assert captured.out == ""
+    told = captured.err.splitlines()
+    assert len(told) == len(lines)
+    assert all(line.startswith(wanted) for line, wanted in zip(told, lines, strict=True))
+
+
+def test_trace_shows_where_an_error_arose(offer: Callable[[object], None], capsys: pytest.CaptureFixture[str]) -> None:
+    offer(raising(TransportError("gone")))
+    assert cli.run(["act"], trace=True) == 1
+    err = capsys.readouterr().err
+    assert "Traceback" in err
+    assert err.endswith("p2os: gone\n")
+
+
+@pytest.mark.parametrize("interruption", [KeyboardInterrupt(), typer.Abort()])
+def test_an_interruption_ends_with_130(offer: Callable[[object], None], interruption: BaseException) -> None:
+    offer(raising(interruption))
+    assert cli.run(["act"]) == 130
+
+
+def test_a_verb_can_choose_its_exit_code(offer: Callable[[object], None]) -> None:
+    offer(raising(typer.Exit(1)))
+    assert cli.run(["act"]) == 1
+    offer(lambda: None)
+
+
+@pytest.mark.parametrize(
+    ("words", "message", "hint"),
+    [
+        (["frob"], "p2os: No such command 'frob'", "hint: p2os --help"),
+        (["--frob"], "p2os: No such option: --frob", "hint: p2os --help"),
+        (["ports", "--frob"], "p2os: No such option: --frob", "hint: p2os ports --help"),
+        (["info"], "p2os: Missing argument 'URL'", "hint: p2os info --help"),
+    ],
+)
+def test_wrong_usage_ends_with_2(capsys: pytest.CaptureFixture[str], words: list[str], message: str, hint: str) -> None:
+    assert cli.run(words) == 2
+    told = capsys.readouterr().err.splitlines()
+    assert told[0].startswith(message)
+    assert told[1] == hint
+
+
+def test_only_the_verb_that_is_named_is_imported() -> None:
+    code = """
+import sys
+from p2os.cli.main import run
+run(["doctor", "--json"])
+sys.exit("p2os.cli.virtual.serve" in sys.modules)
+"""
+    subprocess.run([sys.executable, "-c", code], check=True, capture_output=True, timeout=60)
+
+
+@pytest.mark.parametrize(
+    ("module", "lacking", "hint"),
+    [
+        ("p2os.no_such_module", "p2os.no_such_module", "p2os doctor"),
+        ("lacks_unicorn", "unicorn_engine_missing", "p2os doctor"),
+        ("lacks_pybullet", "pybullet", "pip install 'p2os[bullet]'"),
+    ],
+)
+def test_a_verb_that_cannot_be_imported_says_what_it_lacks_and_others_work(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], tmp_path: Path,
+    module: str, lacking: str, hint: str,
+) -> None:  # fmt: skip
+    (tmp_path / "lacks_unicorn.py").write_text("import unicorn_engine_missing")
+    (tmp_path / "lacks_pybullet.py").write_text("import pybullet")
+    monkeypatch.syspath_prepend(str(tmp_path))
+    monkeypatch.setitem(sys.modules, "pybullet", None)
+    monkeypatch.setattr(cli, "verbs", lambda: [entry("run", module), entry("ports", "p2os.cli.links.ports")])
+    assert cli.run(["--help"]) == 0
+    out = " ".join(capsys.readouterr().out.split())
+    assert f"run (missing: needs {lacking}" in out
+    assert "ports List the serial ports" in out
+    assert cli.run(["run", "dodge", "--world", "arena"]) == 2
+    assert capsys.readouterr().err == f"p2os: `p2os run` needs {lacking}\nhint: {hint}\n"
+    assert cli.run(["ports", "--json"]) == 0
+
+
+def test_main_ends_the_process_and_understands_trace_anywhere(
+    offer: Callable[[object], None], capsys: pytest.CaptureFixture[str]
+) -> None:
+    offer(raising(TransportError("gone")))
+    with restored_signals(), pytest.raises(SystemExit) as caught:
+        cli.main(["act", "--trace"])
+    assert caught.value.code == 1
+    assert "Traceback" in capsys.readouterr().err
+
+
+@pytest.mark.skipif(os.name != "posix", reason="pipes close differently elsewhere")
+def test_a_reader_that_leaves_early_gets_no_traceback() -> None:
+    command = [str(Path(sys.executable).parent / "p2os"), "doctor", "--json"]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE) as process:
+        assert process.stdout is not None
+        assert process.stderr is not None
+        process.stdout.close()
+        err = process.stderr.read()
+        process.wait(timeout=60)
+    assert b"Traceback" not in err
+    assert b"Exception ignored" not in err
+
+
+def test_the_package_runs_as_a_module(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
+    monkeypatch.setattr(sys, "argv", ["p2os", "--version"])
+    with restored_signals(), pytest.raises(SystemExit) as end:
+        runpy.run_module("p2os", run_name="__main__")
+    assert end.value.code in (None, 0)
+    assert capsys.readouterr().out.strip()

@@ -1,0 +1,281 @@
+"""The verbs ports, doctor and info."""
+
+import json
+import os
+import sys
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from p2os.cli import doctor
+from p2os.cli.links import ports
+from p2os.cli.main import run
+from p2os.cli.robots import info
+from p2os.errors import RemoteProtocolError, TransportError
+from p2os.pioneer.controller.commands import Effect
+from p2os.protocol.config_packet import ConfigPacket
+from p2os.protocol.packets import Identity
+from p2os.protocol.sip import SonarReading, StandardSip
+from p2os.timing import NS_PER_MS
+from p2os.transport import HungUpError
+
+PATIENCE_S = 30.0
+COMMAND = str(Path(sys.executable).parent / "p2os")
+Capture = pytest.CaptureFixture[str]
+
+# ports ----------------------------------------------------------------------------------
+
+TWO_PORTS = [
+    {"url": "serial:/dev/ttyS0", "description": "n/a", "hardware": "n/a"},
+    {"url": "serial:/dev/ttyUSB0", "description": "USB Serial", "hardware": "USB VID:PID=1A86:7523"},
+]
+
+
+def test_ports_are_listed_as_urls(monkeypatch: pytest.MonkeyPatch, capsys: Capture) -> None:
+    monkeypatch.setattr(ports, "list_serial_ports", lambda: TWO_PORTS)
+    assert run(["ports"]) == 0
+    captured = capsys.readouterr()
+    assert captured.out.splitlines() == [
+        "serial:/dev/ttyS0",
+        "                     a port of the machine itself: a robot may be on it, if it is wired at all",
+        "serial:/dev/ttyUSB0  USB Serial, USB VID:PID=1A86:7523",
+        "                     CH340 adapter, also on ESP32 boards: a robot or the adapter board may be behind it",
+    ]
+    assert captured.err == "2 serial ports\nhint: p2os scan asks them who is there\n"
+
+
+def test_no_ports_is_a_result_with_a_hint(monkeypatch: pytest.MonkeyPatch, capsys: Capture) -> None:
+    monkeypatch.setattr(ports, "list_serial_ports", list)
+    assert run(["ports"]) == 0
+    captured = capsys.readouterr()
+    assert captured.out == ""
+    assert captured.err.startswith("no serial ports\nhint: ")
+    monkeypatch.setattr(ports, "list_serial_ports", lambda: TWO_PORTS[:1])
+    run(["ports"])
+    assert capsys.readouterr().err.startswith("1 serial port\n")
+
+
+def test_ports_are_listed_for_programs(monkeypatch: pytest.MonkeyPatch, capsys: Capture) -> None:
+    monkeypatch.setattr(ports, "list_serial_ports", lambda: TWO_PORTS)
+    assert run(["ports", "--json"]) == 0
+    found = json.loads(capsys.readouterr().out)
+    assert [{name: port[name] for name in TWO_PORTS[0]} for port in found] == TWO_PORTS
+    assert all(port["guess"] for port in found)
+
+
+# doctor ---------------------------------------------------------------------------------
+
+
+def test_doctor_tells_what_is_there(capsys: Capture) -> None:
+    assert run(["doctor"]) == 0
+    captured = capsys.readouterr()
+    assert "ok       pyserial " in captured.out
+    assert " installed, " in captured.err
+    assert run(["doctor", "--json"]) == 0
+    findings = json.loads(capsys.readouterr().out)
+    assert {"python", "unicorn", "pybullet", "arm-none-eabi-gcc"} <= {finding["name"] for finding in findings}
+
+
+def test_doctor_tells_how_to_get_what_is_missing() -> None:
+    findings = {finding.name: finding for finding in doctor.examine(find_program=lambda _name: None)}
+    compiler = findings["arm-none-eabi-gcc"]
+    assert compiler.found is None
+    assert "missing  arm-none-eabi-gcc" in doctor.line_of(compiler)
+    assert "get it: sudo apt-get install gcc-arm-none-eabi" in doctor.line_of(compiler)
+
+
+def test_doctor_tells_what_was_compiled(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.delenv("P2OS_CORE", raising=False)
+    assert doctor.built_part("p2os.transport") == "built"
+    assert doctor.built_part("p2os.no_such_part") is None
+    assert doctor.built_part("no_such_package.part") is None
+    monkeypatch.setattr(doctor, "find_spec", lambda _name: object())
+    assert doctor.built_part("bluepill_sim._native") == "built"
+    monkeypatch.setenv("P2OS_CORE", "python")
+    assert doctor.built_part("bluepill_sim._native") == "built, not used: P2OS_CORE=python"
+
+
+def test_doctor_knows_which_pythons_have_no_bullet() -> None:
+    findings = {finding.name: finding for finding in doctor.examine(python=(3, 13))}
+    assert "Python 3.11" in findings["pybullet"].get
+    findings = {finding.name: finding for finding in doctor.examine(python=(3, 10))}
+    assert findings["python"].found is None
+
+
+def test_doctor_fails_when_something_is_missing_that_all_verbs_need(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(doctor, "package_version", lambda name: None if name == "pyserial" else "1.0")
+    assert run(["doctor"]) == 1
+    monkeypatch.setattr(doctor, "package_version", lambda name: None if name == "unicorn" else "1.0")
+    assert run(["doctor"]) == 0
+
+
+def test_a_package_that_is_not_there_has_no_version() -> None:
+    assert doctor.package_version("no-such-package-at-all") is None
+
+
+# info -----------------------------------------------------------------------------------
+
+
+class ToRobot:
+    """A line straight into a virtual robot, with a clock that runs as fast as it is read."""
+
+    description = "loop:robot"
+
+    def __init__(self, robot: Any, *, deaf: bool = False) -> None:
+        self.robot, self.deaf = robot, deaf
+        self.now = robot.now
+        self.hangs_up_at: int | None = None
+        self._read, self._write = os.pipe()
+
+    def clock(self) -> int:
+        self.now += 5 * NS_PER_MS
+        return self.now
+
+    def read(self) -> bytes:
+        if self.hangs_up_at is not None and self.now >= self.hangs_up_at:
+            raise HungUpError("loop:robot closed the connection")
+        self.robot.pioneer.advance_to(self.now)
+        return b"".join(self.robot.pioneer.take_output())
+
+    def write(self, data: bytes) -> None:
+        if self.hangs_up_at is not None and self.now >= self.hangs_up_at:
+            raise HungUpError("loop:robot closed the connection")
+        if data and not self.deaf:
+            self.robot.now = self.now
+            self.robot.send(data)
+            os.write(self._write, b"x")  # readable at once: no wall-clock waiting in this test
+
+    def fileno(self) -> int:
+        os.write(self._write, b"x")
+        return self._read
+
+    def close(self) -> None:
+        os.close(self._read)
+        os.close(self._write)
+
+
+@pytest.fixture
+def line(robot: Any) -> Iterator[ToRobot]:
+    made = ToRobot(robot)
+    yield made
+    made.close()
+
+
+def test_a_robot_tells_who_it_is_and_is_left_closed(line: ToRobot) -> None:
+    found = info.ask(line, clock=line.clock)  # type: ignore[arg-type]
+    assert found.identity == Identity("Virtual", "Pioneer", "p2dx")
+    assert found.config is not None
+    assert found.sip.raw_battery == 126
+    assert not line.robot.pioneer.state.open
+    assert "motors" not in line.robot.told()
+
+
+def test_a_robot_still_streaming_to_somebody_is_stopped_first(line: ToRobot) -> None:
+    line.robot.open()
+    line.robot.say(11, 300)
+    line.robot.run(500)
+    line.now = line.robot.now
+    assert info.ask(line, clock=line.clock).identity.subclass == "p2dx"  # type: ignore[arg-type]
+    assert line.robot.told().count("closed") == 2
+
+
+def test_a_robot_that_knows_no_config_still_answers(line: ToRobot, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("p2os.pioneer.controller.controller.apply", lambda *_: Effect.UNKNOWN)
+    assert info.ask(line, clock=line.clock).config is None  # type: ignore[arg-type]
+
+
+def test_nobody_answering_is_an_error_with_a_hint(robot: Any) -> None:
+    line = ToRobot(robot, deaf=True)
+    with pytest.raises(RemoteProtocolError, match="no robot on loop:robot: no answer") as caught:
+        info.ask(line, clock=line.clock)  # type: ignore[arg-type]
+    assert "p2os serve" in str(caught.value.hint)
+    line.description = "serial:/dev/ttyUSB0?baud=9600"
+    with pytest.raises(RemoteProtocolError) as caught:
+        info.ask(line, clock=line.clock)  # type: ignore[arg-type]
+    assert "speed" in str(caught.value.hint)
+    line.close()
+
+
+def test_a_robot_that_synchronises_but_sends_nothing_is_an_error(
+    line: ToRobot, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(type(line.robot.pioneer), "_next_due", lambda _self: None)
+    with pytest.raises(RemoteProtocolError, match="no robot on loop:robot: no packet"):
+        info.ask(line, clock=line.clock)  # type: ignore[arg-type]
+
+
+def test_a_robot_that_takes_for_ever_is_an_error(line: ToRobot, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(info, "LONGEST_NS", 50 * NS_PER_MS)
+    with pytest.raises(RemoteProtocolError, match="sends no packets"):
+        info.ask(line, clock=line.clock)  # type: ignore[arg-type]
+
+
+def test_a_line_that_hangs_up_is_an_error_with_a_hint(line: ToRobot) -> None:
+    line.hangs_up_at = 50 * NS_PER_MS
+    with pytest.raises(TransportError, match="closed the connection") as caught:
+        info.ask(line, clock=line.clock)  # type: ignore[arg-type]
+    assert "another program" in str(caught.value.hint)
+
+
+@pytest.fixture
+def told(monkeypatch: pytest.MonkeyPatch) -> Callable[..., None]:
+    """Let `p2os info` find a robot that says this."""
+
+    class Closing:
+        def close(self) -> None:
+            pass
+
+    def tell(identity: Identity, sip: StandardSip, config: ConfigPacket | None) -> None:
+        monkeypatch.setattr(info, "open_url", lambda _url: Closing())
+        monkeypatch.setattr(info, "ask", lambda _transport: info.RobotInfo(identity=identity, sip=sip, config=config))
+
+    return tell
+
+
+SIP = StandardSip(
+    raw_x=32767, raw_y=1000, raw_heading=1024, raw_left_velocity=100, raw_right_velocity=-100, raw_battery=130,
+    stall_left=True, stall_right=True, sonar=(SonarReading(3, 1000),),
+)  # fmt: skip
+
+
+def test_info_is_printed_with_units(told: Callable[..., None], capsys: Capture) -> None:
+    told(Identity("", "Pioneer", "p2dx"), SIP, ConfigPacket(subclass="p2dx", watchdog=2000, fields_sent=19))
+    assert run(["info", "tcp:x"]) == 0
+    out = capsys.readouterr().out
+    for line in (
+        "name      (none)",
+        "model     p2dx (Pioneer 2-DX)",
+        "position  x -0.001 m, y 0.840 m, heading 90.0 deg",
+        "wheels    left 0.100 m/s, right -0.100 m/s",
+        "stalled   left and right",
+        "battery   13.0 V",
+        "sonar     3: 0.268 m",
+        "config    watchdog          2000 ms",
+    ):
+        assert f"{line}\n" in out
+    assert "stallval" not in out, "fields that were not sent are not shown"
+
+
+def test_info_of_an_unknown_model_says_whose_units_it_uses(told: Callable[..., None], capsys: Capture) -> None:
+    told(Identity("Box", "Pioneer", "box9000"), StandardSip(), None)
+    assert run(["info", "tcp:x"]) == 0
+    out = capsys.readouterr().out
+    assert "model     box9000 (unknown model, units of a Pioneer 2-DX)\n" in out
+    assert "sonar     off\n" in out
+    assert "stalled   none\n" in out
+    assert "config    the robot does not tell it\n" in out
+
+
+def test_info_is_printed_for_programs(told: Callable[..., None], capsys: Capture) -> None:
+    told(Identity("Wilma", "Pioneer", "p2dx"), SIP, ConfigPacket(subclass="p2dx", fields_sent=3))
+    assert run(["info", "tcp:x", "--json"]) == 0
+    plain = json.loads(capsys.readouterr().out)
+    assert plain["name"] == "Wilma"
+    assert plain["sip"]["x_m"] == -0.00084
+    assert plain["sip"]["sonar_m"] == [[3, 0.268]]
+    assert plain["config"] == {"robot_class": "Pioneer", "subclass": "p2dx", "serial": ""}
+    told(Identity("Wilma", "Pioneer", "p2dx"), SIP, None)
+    assert run(["info", "tcp:x", "--json"]) == 0
+    assert json.loads(capsys.readouterr().out)["config"] is None

@@ -1,0 +1,100 @@
+"""`p2os world`: what a person types and gets."""
+
+import json
+import sys
+from pathlib import Path
+
+import pytest
+
+from p2os.cli.main import run
+from p2os.pioneer.world.find import known_worlds, load_world
+
+COMMANDS_THAT_FAIL = [
+    (["world", "show", "rooom"], "p2os: no world 'rooom'\nhint: did you mean room?\n"),
+    (["world", "show", "room", "--out", "room.jpg"], "hint: --out FILE.png or FILE.svg\n"),
+    (["world", "show", "room", "--out", "missing/room.svg"], "No such file or directory\n"),
+    (["world", "new", "--kind", "swamp"], "hint: kinds: arena, doorway, maze, office, slalom\n"),
+    (["world", "new", "--out", "a.txt"], "hint: --out FILE.toml\n"),
+    (["world", "new", "--out", "missing/a.toml"], "No such file or directory\n"),
+    (["world", "check", "."], "no world '.'"),
+]
+
+
+@pytest.mark.parametrize(("words", "said"), COMMANDS_THAT_FAIL)
+def test_what_cannot_be_is_one_line_and_a_hint(
+    words: list[str], said: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert run(words) == 2
+    out, err = capsys.readouterr()
+    assert out == ""
+    assert said in err
+    assert err.count("\n") <= 2
+
+
+@pytest.mark.parametrize("words", [["world"], ["world", "list"]])
+def test_the_worlds_that_ship_are_listed(words: list[str], capsys: pytest.CaptureFixture[str]) -> None:
+    assert run(words) == 0
+    lines = capsys.readouterr().out.splitlines()
+    assert [line.split()[0] for line in lines] == list(known_worlds())
+
+
+def test_the_list_comes_as_json(capsys: pytest.CaptureFixture[str]) -> None:
+    assert run(["world", "list", "--json"]) == 0
+    assert set(json.loads(capsys.readouterr().out)) == set(known_worlds())
+
+
+@pytest.mark.parametrize("name", known_worlds())
+def test_a_world_is_drawn_in_the_terminal(name: str, capsys: pytest.CaptureFixture[str]) -> None:
+    assert run(["world", "show", name]) == 0
+    out = capsys.readouterr().out
+    drawing, summary = out.splitlines()[:-1], out.splitlines()[-1]
+    assert summary.startswith(f"{name}, ")
+    assert "→" in out
+    assert max(map(len, drawing)) <= 100
+    assert sum(character in "▀▄█" for line in drawing for character in line) > 50
+
+
+@pytest.mark.parametrize("suffix", [".png", ".svg"])
+def test_a_world_is_drawn_into_a_file(suffix: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    if suffix == ".png":
+        pytest.importorskip("matplotlib")
+    path = tmp_path / f"office{suffix}"
+    assert run(["world", "show", "office", "--out", str(path)]) == 0
+    data = path.read_bytes()
+    assert data.startswith(b"\x89PNG" if suffix == ".png" else b"<svg ")
+    assert "1 that walks, 6 that can be pushed" in capsys.readouterr().out
+    if suffix == ".svg":
+        assert "<title>visitor</title>" in data.decode()
+
+
+def test_a_png_without_matplotlib_points_to_svg(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setitem(sys.modules, "matplotlib.figure", None)
+    assert run(["world", "show", "room", "--out", str(tmp_path / "room.png")]) == 2
+    assert "room.svg" in capsys.readouterr().err
+
+
+def test_a_made_world_is_checked_and_converted_to_itself(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert run(["world", "new", "--kind", "maze", "--seed", "7", "--out", "mine.toml"]) == 0
+    assert run(["world", "check", "mine.toml"]) == 0
+    assert "mine.toml: maze, 9.4 x 9.4 m: " in capsys.readouterr().out
+    assert run(["world", "convert", "mine.toml", "--out", "again.toml"]) == 0
+    assert Path("again.toml").read_bytes() == Path("mine.toml").read_bytes()
+    assert load_world("again.toml") == load_world("mine.toml")
+    capsys.readouterr()
+    assert run(["world", "new", "--kind", "maze", "--seed", "7"]) == 0
+    assert capsys.readouterr().out == Path("mine.toml").read_text()
+
+
+def test_a_broken_world_is_named_with_its_line(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    Path("bad.toml").write_text('name = "x"\nextent_m = [0, 0, 1, 1]\n\n[start]\nx_mm = 3\n')
+    assert run(["world", "check", "bad.toml"]) == 2
+    assert capsys.readouterr().err == "p2os: bad.toml:5: unknown key start.x_mm\nhint: did you mean start.x_m?\n"

@@ -1,6 +1,0 @@
-"""The rig that the tests of the client share."""
-
-import sys
-from pathlib import Path
-
-sys.path.insert(0, str(Path(__file__).parent))

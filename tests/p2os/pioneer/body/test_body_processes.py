@@ -1,0 +1,136 @@
+"""A body gives the same bits in every process, and PyBullet comes in silence or with a hint."""
+
+import hashlib
+import os
+import pickle
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from p2os.pioneer.body.choose import make_body
+from p2os.pioneer.body.contract import RobotBody
+from p2os.pioneer.world.find import load_world
+from p2os.pioneer.world.model import Obstacle
+from p2os.robots.parameters import load_parameters
+from tests.p2os.pioneer.body.bodies import each_body, marks_of
+
+P2DX = load_parameters("p2dx")
+#: Restores a snapshot in a process of its own and prints the digest of what follows.
+FOLLOW = """
+import importlib.util, pathlib, pickle, sys
+name, test, snapshot = sys.argv[1:]
+spec = importlib.util.spec_from_file_location("follow", test)
+module = importlib.util.module_from_spec(spec)
+spec.loader.exec_module(module)
+body = module.make_body(name, module.load_world("arena", 3), module.P2DX)
+body.restore(pickle.loads(pathlib.Path(snapshot).read_bytes()))
+print(module.digest_of_the_rest(body))
+"""
+
+#: Asks for the body where a module cannot be imported, and prints what is said.
+MISSING = """
+import sys
+sys.modules[sys.argv[1]] = None
+from p2os.errors import MissingDependencyError
+from p2os.robots.parameters import load_parameters
+from p2os.pioneer.body.choose import make_body
+from p2os.pioneer.world.find import load_world
+try:
+    make_body(sys.argv[2], load_world("room"), load_parameters("p2dx"))
+except MissingDependencyError as error:
+    print(error, error.hint)
+"""
+
+#: Makes a body between two words of its own, and prints nothing else.
+SPEAKS = """
+import sys
+sys.stdout.write("before ")
+from p2os.pioneer.body.choose import make_body
+from p2os.robots.parameters import load_parameters
+from p2os.pioneer.world.find import load_world
+make_body("bullet", load_world("room"), load_parameters("p2dx"))
+sys.stdout.write("after")
+sys.stderr.write("heard")
+"""
+
+
+def digest_of_the_rest(body: RobotBody) -> str:
+    """Drive on for 0.6 s, into a post and back, and hash all that is seen."""
+    seen = []
+    for number in range(600):
+        body.step(0.4 if number < 400 else -0.2, 0.38 if number < 400 else -0.3)
+        if number % 20 == 0:
+            seen.append((body.state, body.ranges([2, 3, 4]), body.clearance()))
+    return hashlib.sha256(repr(seen).encode()).hexdigest()
+
+
+def run(*arguments: str, seed: str = "0") -> subprocess.CompletedProcess[str]:
+    environment = {
+        **os.environ,
+        "PYTHONHASHSEED": seed,
+        "PYTHONPATH": os.pathsep.join(path for path in sys.path if path),
+    }
+    return subprocess.run(
+        [sys.executable, *arguments], env=environment, capture_output=True, text=True, timeout=60, check=True
+    )
+
+
+@pytest.mark.parametrize("name", each_body())
+def test_a_snapshot_goes_on_alike_in_other_processes(name: str, tmp_path: Path) -> None:
+    body = make_body(name, load_world("arena", 3), P2DX)
+    body.place(Obstacle(name="post", x_m=0.5, y_m=0.0, radius_m=0.05))
+    body.remove("thing 2")
+    for _ in range(900):
+        body.step(0.35, 0.35)
+    (tmp_path / "snapshot").write_bytes(pickle.dumps(body.snapshot()))
+
+    here = digest_of_the_rest(body)
+
+    assert body.state.collisions >= 1
+    for seed in ("1", "2"):
+        assert run("-c", FOLLOW, name, __file__, str(tmp_path / "snapshot"), seed=seed).stdout.strip() == here
+
+
+@pytest.mark.bullet
+def test_the_engine_comes_without_its_banner() -> None:
+    pytest.importorskip("pybullet")
+    done = run("-c", SPEAKS, seed="0")
+    assert (done.stdout, done.stderr) == ("before after", "heard")
+
+
+@pytest.mark.bullet
+def test_the_engine_comes_where_standard_error_is_closed() -> None:
+    pytest.importorskip("pybullet")
+    assert run("-c", "import os; os.close(2); import p2os.pioneer.body.bullet; print('there')").stdout == "there\n"
+
+
+@pytest.mark.parametrize(
+    ("body", "missing"),
+    [
+        ("bullet", "pybullet"),
+        pytest.param("bullet", "numpy", marks=marks_of("bullet")),
+        ("mujoco", "mujoco"),
+        pytest.param("mujoco", "numpy", marks=marks_of("mujoco")),
+    ],
+)
+def test_a_missing_engine_is_named_with_the_way_to_get_it(body: str, missing: str) -> None:
+    done = run("-c", MISSING, missing, body)
+    assert f"the {body} body needs {missing}" in done.stdout
+    assert f"pip install 'p2os[{body}]'" in done.stdout
+
+
+def test_a_blocked_robot_goes_on_when_the_thing_is_taken_away() -> None:
+    body = make_body("kinematic", load_world("room"), P2DX)
+    body.place(Obstacle(name="post", x_m=0.3, y_m=0.0, radius_m=0.1))
+    for _ in range(300):
+        body.step(0.2, 0.2)
+    stuck = body.state
+    body.step(0.2, 0.2)
+    assert stuck.stalled_left
+    assert body.state == stuck
+    body.remove("post")
+    body.step(0.2, 0.2)
+    assert body.state.x_m > stuck.x_m
+    assert not body.state.stalled_left

@@ -1,0 +1,314 @@
+"""Robots that share one world: what they see and feel of each other, and that nothing else decides it."""
+
+import math
+import pickle
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from p2os.errors import UsageError
+from p2os.pioneer.body.choose import make_body
+from p2os.pioneer.body.kinematic import KinematicBody
+from p2os.pioneer.controller.controller import ControllerSettings, Pioneer
+from p2os.pioneer.serve.multi_robot_world import SLICE_NS, MultiRobotWorld
+from p2os.pioneer.world.find import parse_world
+from p2os.pioneer.world.model import Pose, World
+from p2os.protocol.commands import Command
+from p2os.protocol.commands import CommandNumber as C
+from p2os.robots.parameters import load_parameters
+from p2os.timing import NS_PER_MS
+
+P2DX = load_parameters("p2dx")
+HALL = parse_world('name = "hall"\nextent_m = [-4, -4, 4, 4]', "hall")
+CARTON = parse_world(
+    'name = "c"\nextent_m = [-4, -4, 4, 4]\n[[box]]\nname = "carton"\nx_m = 0.0\ny_m = 0.0\nlength_m = 0.3\n'
+    'width_m = 0.3\nmass_kg = 1.5\n[[cylinder]]\nname = "visitor"\nx_m = 0\ny_m = 2\nradius_m = 0.2\n'
+    "path_m = [[0, 2], [2, 2]]",
+    "c",
+)
+FACING = ((-1.0, 0.0, 0.0), (1.0, 0.0, 180.0))
+#: Of the hull's front before the axle, m.
+FRONT_M = P2DX.body.hull_front_m
+
+Places = Sequence[tuple[float, float, float]]
+Meet = Callable[..., MultiRobotWorld]
+
+
+@pytest.fixture(
+    params=[
+        "kinematic",
+        pytest.param("bullet", marks=pytest.mark.bullet),
+        pytest.param("mujoco", marks=pytest.mark.slow),
+    ]
+)
+def meet(request: pytest.FixtureRequest) -> Meet:
+    if request.param != "kinematic":
+        pytest.importorskip({"bullet": "pybullet"}.get(request.param, request.param))
+    return lambda places=FACING, world=HALL: multi_robot_world(places, world, request.param)
+
+
+def multi_robot_world(places: Places, world: World = HALL, engine: str = "kinematic") -> MultiRobotWorld:
+    robots = []
+    for number, (x, y, degrees) in enumerate(places):
+        body = make_body(engine, world, P2DX)
+        body.reset(Pose(x, y, math.radians(degrees)), 0)
+        robots.append((Pioneer(parameters=P2DX, body=body, settings=ControllerSettings(seed=number)), body))
+    return MultiRobotWorld(robots, world)
+
+
+def say(made: MultiRobotWorld, index: int, number: int, argument: int | None = None, *, at: int = 0) -> None:
+    made.bring(index, at)
+    made.robots[index].receive(Command(number, argument).to_frame().to_bytes(), at)
+
+
+def drive(made: MultiRobotWorld, *speeds: int, apart_ns: int = 0) -> None:
+    """Open a session with each robot, one so long after the other, and let it drive so fast, mm/s."""
+    for index, speed in enumerate(speeds):
+        for number, argument in ((0, None), (1, None), (2, None), (C.OPEN, None), (C.ENABLE, 1), (C.VEL, speed)):
+            say(made, index, number, argument, at=index * apart_ns)
+
+
+def live(made: MultiRobotWorld, seconds: float, *, since: float = 0.0) -> float:
+    """Live on, with a word to every robot twice a second; return when it ends."""
+    end = since + seconds
+    while since < end:
+        since = min(since + 0.5, end)
+        at = round(since * 1e9)
+        made.advance_to(at)
+        for index in range(len(made.members)):
+            say(made, index, C.PULSE, at=at)
+    return end
+
+
+def gap(made: MultiRobotWorld) -> float:
+    first, second = (member.body.state for member in made.members[:2])
+    return math.dist((first.x_m, first.y_m), (second.x_m, second.y_m)) - 2 * FRONT_M
+
+
+def test_two_robots_that_face_each_other_read_the_gap_between_them(meet: Meet) -> None:
+    for distance in (0.5, 1.0, 2.4):
+        made = meet(((-distance, 0.3, 0.0), (distance, 0.3, 180.0)))
+        for member in made.members:
+            # The two middle transducers sit 14 mm behind the hull's front, at P2DX.sonar[3] and [4].
+            behind = FRONT_M - P2DX.sonar[3].x_mm / 1000
+            assert member.body.ranges([3, 4]) == pytest.approx([gap(made) + behind] * 2, abs=0.01)
+            assert member.body.echoes([3])[0]
+            assert member.body.clearance() == pytest.approx(gap(made), abs=0.001)
+
+
+def test_a_robot_that_drives_is_seen_where_it_is(meet: Meet) -> None:
+    made = meet()
+    drive(made, 400, 0)
+    live(made, 2.0)
+    behind = FRONT_M - P2DX.sonar[3].x_mm / 1000
+    # It stands at the last boundary: 10 ms at 0.4 m/s are 4 mm.
+    assert made.members[1].body.ranges([3])[0] == pytest.approx(gap(made) + behind, abs=0.01)
+
+
+def test_two_that_push_each_other_head_on_both_stall_and_part_again(meet: Meet) -> None:
+    made = meet()
+    drive(made, 300, 300)
+    now = live(made, 6.0)
+    states = [member.body.state for member in made.members]
+    assert gap(made) == pytest.approx(0.0, abs=0.002)
+    assert [state.stalled_left and state.stalled_right for state in states] == [True, True]
+    assert [(state.collisions, state.in_contact) for state in states] == [(1, True)] * 2
+    for index in (0, 1):
+        say(made, index, C.VEL, -300, at=round(now * 1e9))
+    live(made, 3.0, since=now)
+    assert gap(made) > 0.5
+    assert not any(member.body.state.in_contact for member in made.members)
+
+
+def test_a_robot_that_stands_is_a_wall_that_feels_the_push(meet: Meet) -> None:
+    made = meet()
+    drive(made, 300, 0)
+    live(made, 7.0)
+    pushing, standing = (member.body.state for member in made.members)
+    assert pushing.stalled_left
+    # In the physical body a wall that is leant against gives way by less than its contacts' slop.
+    assert standing.x_m == pytest.approx(1.0, abs=0.005)
+    assert (standing.collisions, standing.in_contact) == (1, True)
+
+
+def test_a_reset_or_a_reboot_of_one_leaves_the_others_and_its_own_body_standing() -> None:
+    made, alone = multi_robot_world(FACING), multi_robot_world(FACING)
+    for one in (made, alone):
+        drive(one, 0, 200)
+        live(one, 1.0)
+    made.bring(0, 10**9)
+    made.robots[0].reboot(10**9)
+    for one in (made, alone):
+        one.robots[1].take_output()
+        live(one, 4.0, since=1.0)
+    assert made.robots[1].take_output() == alone.robots[1].take_output()
+    assert made.members[1].body.state == alone.members[1].body.state
+    assert made.members[0].body.state.x_m == -1.0
+    assert made.members[1].body.state.x_m < 0.25
+
+
+def test_what_one_pushes_the_other_sees_and_is_stopped_by(meet: Meet) -> None:
+    made = meet(((-0.5, 0.0, 0.0), (1.0, 0.0, 180.0)), CARTON)
+    before = made.members[1].body.ranges([3])[0]
+    drive(made, 300, 0)
+    now = live(made, 1.8)
+    assert made.members[1].body.ranges([3])[0] < before - 0.15
+    live(made, 2.7, since=now)
+    # The carton is between them now: 0.3 m, and both hulls.
+    assert gap(made) == pytest.approx(0.3, abs=0.02)
+    assert made.members[0].body.state.stalled_left
+
+
+def test_robots_far_from_each_other_live_alone_and_near_ones_step_by_step() -> None:
+    made = multi_robot_world(((0.0, 0.0, 0.0), (0.0, 0.6, 0.0), (0.0, 3.0, 0.0)))
+    assert [member.other_robots.is_close for member in made.members] == [True, True, False]
+    assert made.next_deadline() is None
+    drive(made, 0, 300, 0)
+    assert made.next_deadline() == 100 * NS_PER_MS
+    live(made, 8.0)
+    assert [member.other_robots.is_close for member in made.members] == [False] * 3
+
+
+def test_hulls_never_overlap() -> None:
+    made = multi_robot_world(((0.0, 0.0, 0.0), (1.0, 0.1, 170.0), (0.4, 1.0, -90.0), (0.4, -1.0, 80.0)))
+    drive(made, 500, 500, 500, 500)
+    for index, turn in enumerate((10, -15, 20, -5)):
+        say(made, index, C.RVEL, turn)
+    now = 0.0
+    for _ in range(40):
+        now = live(made, 0.1, since=now)
+        for member in made.members:
+            hull = member.as_other.footprint(member.as_other.look()).polygon
+            for other in member.other_robots.others:
+                assert not other.footprint(other.look()).overlaps(hull)
+
+
+def test_bodies_of_different_steps_cannot_meet() -> None:
+    class Slow(KinematicBody):
+        dt_ns = 3 * NS_PER_MS
+
+    robots = []
+    for kind in (KinematicBody, Slow):
+        body = kind(HALL, P2DX)
+        robots.append((Pioneer(parameters=P2DX, body=body), body))
+    with pytest.raises(UsageError, match="one step"):
+        MultiRobotWorld(robots, HALL)
+
+
+def test_a_thing_of_the_world_may_have_a_robots_name() -> None:
+    crowded = replace(HALL, obstacles=(replace(CARTON.obstacles[0], name="robot 2", x_m=3.0),))
+    made = multi_robot_world(FACING, crowded)
+    assert [member.as_other.name for member in made.members] == ["robot 1", "robot 2'"]
+
+
+def test_a_thing_that_was_pushed_is_seen_from_afar(meet: Meet) -> None:
+    made = meet(((-0.5, 0.0, 0.0), (3.4, 0.0, 180.0)), CARTON)
+    before = made.members[1].body.ranges([3])[0]
+    drive(made, 300, 0)
+    live(made, 1.8)
+    assert not made.members[1].other_robots.is_close
+    assert made.members[1].body.ranges([3])[0] < before - 0.15
+
+
+# The same bytes, whoever asks first -------------------------------------------------------
+
+#: Close enough that all of them are in each other's way soon, around a carton.
+CROWD = ((-0.5, 0.0, 0.0), (0.5, 0.05, 180.0), (0.0, -0.6, 90.0), (-2.6, 2.6, -45.0))
+#: So that pings and packets of each fall between the steps and the boundaries.
+UNEVEN_NS = 17_300_007
+#: Looks that fall between any two of them.
+DENSE = range(700_000_000, 1_000_000_000, 370_000)
+ORDERS = st.lists(
+    st.tuples(
+        st.integers(50_000_000, 1_500_000_000), st.integers(0, 3),
+        st.sampled_from([(C.VEL, 400), (C.VEL, -300), (C.RVEL, 60), (C.RVEL, -40), (C.VEL, 0), (C.PULSE, None)]),
+    ),
+    max_size=12,
+)  # fmt: skip
+
+
+def life(
+    made: MultiRobotWorld,
+    orders: Sequence[tuple[int, int, tuple[int, int | None]]],
+    looks: Sequence[int],
+    *,
+    backwards: bool,
+) -> tuple[list[bytes], list[object]]:
+    """Give orders at their times, look in between, and return every wire's bytes and where everybody is."""
+    drive(made, 300, 300, 300, 200, apart_ns=UNEVEN_NS)
+    sign = -1 if backwards else 1
+    events = [(at, 1, sign * index, words) for at, index, words in orders]
+    events += [(at, 0, 0, (0, None)) for at in looks]
+    wires: list[bytes] = [b""] * len(made.members)
+    for at, is_order, signed, (number, argument) in sorted(events, key=lambda event: event[:3]):
+        if is_order:
+            say(made, abs(signed), number, argument, at=at)
+        else:
+            made.advance_to(at)
+        wires = [wire + b"".join(robot.take_output()) for wire, robot in zip(wires, made.robots, strict=True)]
+    made.advance_to(1_600_000_000)
+    wires = [wire + b"".join(robot.take_output()) for wire, robot in zip(wires, made.robots, strict=True)]
+    return wires, [member.body.state for member in made.members]
+
+
+@pytest.mark.slow
+@settings(max_examples=8, deadline=None)
+@given(orders=ORDERS, looks=st.lists(st.integers(50_000_000, 1_550_000_000), max_size=20))
+def test_the_same_bytes_however_often_and_in_whatever_order_robots_are_asked(
+    orders: list[tuple[int, int, tuple[int, int | None]]], looks: list[int]
+) -> None:
+    once = {(at, index): (at, index, words) for at, index, words in orders}
+    chosen = list(once.values())
+    first = life(multi_robot_world(CROWD, CARTON), chosen, [], backwards=False)
+    assert life(multi_robot_world(CROWD, CARTON), chosen, [*looks, *DENSE], backwards=True) == first
+
+
+def test_two_that_look_at_each_other_from_near_say_the_same_however_often_they_are_asked() -> None:
+    places = ((-0.45, 0.0, 0.0), (0.45, 0.0, 180.0), (-3.0, -3.0, 0.0), (-3.0, 3.0, 0.0))
+    first = life(multi_robot_world(places), [], [], backwards=False)
+    assert life(multi_robot_world(places), [], DENSE, backwards=True) == first
+
+
+@settings(max_examples=6, deadline=None)
+@given(orders=ORDERS, half=st.integers(50_000_000, 1_500_000_000))
+def test_a_multi_robot_world_that_was_saved_goes_on_as_it_would_have(
+    orders: list[tuple[int, int, tuple[int, int | None]]], half: int
+) -> None:
+    made = multi_robot_world(CROWD, CARTON)
+    life_until(made, orders, half)
+    saved = pickle.loads(pickle.dumps(made.snapshot()))  # noqa: S301  # our own bytes
+    ends = []
+    for other in (made, made, multi_robot_world(CROWD, CARTON)):
+        other.restore(saved)
+        other.advance_to(half + 20 * SLICE_NS)
+        ends.append(([robot.take_output() for robot in other.robots], [member.body.state for member in other.members]))
+    assert ends[0] == ends[1] == ends[2]
+
+
+@pytest.mark.slow
+@pytest.mark.bullet
+def test_physical_robots_repeat_and_go_on_after_a_restore() -> None:
+    pytest.importorskip("pybullet")
+    orders = [(600_000_123, 0, (C.RVEL, 30)), (900_000_000, 1, (C.VEL, -100)), (900_000_000, 2, (C.RVEL, 40))]
+    first = life(multi_robot_world(CROWD, CARTON, "bullet"), orders, [], backwards=False)
+    assert life(multi_robot_world(CROWD, CARTON, "bullet"), orders, DENSE, backwards=True) == first
+    made = multi_robot_world(CROWD, CARTON, "bullet")
+    life_until(made, orders, 901_000_000)
+    saved = pickle.loads(pickle.dumps(made.snapshot()))  # noqa: S301  # our own bytes
+    ends = []
+    for other in (made, multi_robot_world(CROWD, CARTON, "bullet")):
+        other.restore(saved)
+        other.advance_to(1_400_000_000)
+        ends.append(([robot.take_output() for robot in other.robots], [member.body.state for member in other.members]))
+    assert ends[0] == ends[1]
+
+
+def life_until(made: MultiRobotWorld, orders: Sequence[tuple[int, int, tuple[int, int | None]]], end: int) -> None:
+    drive(made, 300, 300, 300, 200, apart_ns=UNEVEN_NS)
+    for at, index, (number, argument) in sorted(orders, key=lambda order: order[:2]):
+        if at <= end:
+            say(made, index, number, argument, at=at)
+    made.advance_to(end)

@@ -1,0 +1,32 @@
+"""What a world file may not say, beside misspelt keys: each refusal names the file and the place."""
+
+import re
+
+import pytest
+
+from p2os.errors import WorldError
+from p2os.pioneer.world.find import parse_world
+
+HEAD = 'name = "a"\nextent_m = [0, 0, 1, 1]\n'
+BOX = '[[box]]\nname = "b"\nx_m = 0\ny_m = 0\nlength_m = 1\nwidth_m = 1\n'
+
+
+@pytest.mark.parametrize(
+    ("text", "place"),
+    [
+        ("arena = 5\n", "arena"),
+        ("[arena]\ncount = 5\n", "arena.count"),
+        (BOX.replace("width_m = 1", "width_m = -1"), "'b'"),
+        (BOX.replace("x_m = 0", "x_m = nan"), "box.x_m"),
+        (BOX + 'kind = "tree"\n', "'tree'"),
+        ('[[wall]]\nname = "w"\nfrom_m = [0, 0]\nto_m = [0, 0]\nthickness_m = 0\n', "'w'"),
+        (BOX + BOX, "two obstacles"),
+    ],
+)
+def test_a_refusal_is_one_line_with_file_and_place(text: str, place: str) -> None:
+    with pytest.raises(WorldError) as caught:
+        parse_world(HEAD + text, "mine.toml")
+    said = str(caught.value)
+    assert re.match(r"mine\.toml:\d+: ", said)
+    assert place in said
+    assert "\n" not in said

@@ -1,0 +1,226 @@
+"""Commands and packets: two-way for every row, tolerant of what clients really send."""
+
+import dataclasses
+import json
+import math
+from pathlib import Path
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from p2os.errors import LocalProtocolError, RemoteProtocolError
+from p2os.protocol import commands
+from p2os.protocol.commands import Command, CommandNumber
+from p2os.protocol.config_packet import FIELDS, P2OS_FIELDS, ConfigPacket
+from p2os.protocol.frames import Frame
+from p2os.protocol.packets import Identity, RawPacket, packet_frame, read_packet
+from p2os.protocol.profiles import Profile
+from p2os.protocol.sip import TAIL, SonarReading, StandardSip
+from p2os.protocol.units import in_units
+from p2os.robots.parameters import load_parameters
+
+GOLDEN = Path(__file__).parents[2] / "golden"
+VECTORS = json.loads((GOLDEN / "p2os_vectors.json").read_text(encoding="utf-8"))
+VECTORS = VECTORS["vectors"] if isinstance(VECTORS, dict) else VECTORS
+VALID = [vector for vector in VECTORS if vector["valid"]]
+TO_ROBOT = [vector for vector in VALID if vector["decoded"]["direction"].startswith("client")]
+FROM_ROBOT = [vector for vector in VALID if vector["decoded"]["direction"].startswith("robot")]
+#: Frames that real clients send and that we read but never write.
+ONLY_READ = {"seto_player_truncated", "tty2_RS_cr_aria_comStr"}
+
+arguments = st.one_of(st.none(), st.integers(-0xFFFF, 0xFFFF), st.binary(max_size=199))
+u8, u16, s16 = st.integers(0, 0xFF), st.integers(0, 0xFFFF), st.integers(-0x8000, 0x7FFF)
+sips = st.builds(
+    StandardSip,
+    kind=st.sampled_from((0x30, 0x31, 0x32, 0x33, 0x34)),
+    raw_x=u16, raw_y=u16, raw_heading=s16, raw_left_velocity=s16, raw_right_velocity=s16, raw_battery=u8,
+    stall_left=st.booleans(), stall_right=st.booleans(),
+    rear_bumpers=st.integers(0, 127), front_bumpers=st.integers(0, 127),
+    raw_control=s16, raw_flags=u16, raw_compass=u8,
+    sonar=st.lists(st.builds(SonarReading, u8, u16), max_size=32).map(tuple),
+    analog_port=u8, gripper_state=u8, raw_analog=u8, digital_in=u8, digital_out=u8,
+)  # fmt: skip
+
+
+@pytest.mark.parametrize("vector", TO_ROBOT, ids=lambda vector: vector["name"])
+def test_a_command_vector_reads_and_writes(vector: dict) -> None:
+    frame = Frame.from_bytes(bytes.fromhex(vector["hex"]))
+    command, said = Command.from_frame(frame), vector["decoded"]
+    assert command.number == said["command"]
+    if isinstance(said.get("arg"), int):
+        assert (
+            command.integer == said["arg"] or command.two_bytes[0] | command.two_bytes[1] << 8 == said["arg"] & 0xFFFF
+        )
+    if vector["name"] not in ONLY_READ:
+        assert command.to_frame() == frame
+
+
+@pytest.mark.parametrize("vector", FROM_ROBOT, ids=lambda vector: vector["name"])
+def test_a_packet_vector_reads_and_writes(vector: dict) -> None:
+    frame, said = Frame.from_bytes(bytes.fromhex(vector["hex"])), vector["decoded"]
+    packet = Identity.from_frame(frame) if frame.kind == 2 else read_packet(frame, Profile.P2OS)
+    assert packet_frame(packet, Profile.P2OS) == frame
+    if isinstance(packet, StandardSip):
+        assert (packet.raw_x, packet.raw_heading, packet.moving) == (said["x_raw"], said["th_raw"], said["moving"])
+        assert packet.raw_battery == round(said["battery_V"] * 10)
+        assert [[s.number, s.raw_range] for s in packet.sonar] == said["sonar"]
+        assert (packet.digital_in, packet.digital_out) == (said["digin"], said["digout"])
+    elif isinstance(packet, ConfigPacket):
+        shared = {name: said[name] for name, _ in FIELDS if name in said}
+        assert {name: getattr(packet, name) for name in shared} == shared
+        assert packet.fields_sent == P2OS_FIELDS
+
+
+def test_the_arcos_tail_reads_by_name() -> None:
+    vector = next(vector for vector in VALID if vector["name"] == "sip_arcos_ext")
+    sip = StandardSip.from_frame(Frame.from_bytes(bytes.fromhex(vector["hex"])), Profile.ARCOS)
+    assert sip.tail_field("raw_battery_x10") == 126
+    assert sip.tail_field("raw_rotation_velocity") == -150
+    assert sip.tail_field("raw_temperature") == -127
+    assert sip.tail_field("controller_time_us") is None
+
+
+@given(st.integers(0, 255), arguments)
+def test_a_command_survives_the_wire(number: int, argument: int | bytes | None) -> None:
+    command = Command(number, argument)
+    assert Command.from_frame(command.to_frame()) == command
+    assert command.name
+
+
+@given(st.integers(0, 255), st.binary(max_size=201))
+def test_any_frame_reads_as_some_command(number: int, data: bytes) -> None:
+    command = Command.from_frame(Frame(bytes((number,)) + data))
+    assert command.number == number
+    command.to_frame()
+
+
+@pytest.mark.parametrize(("number", "argument"), [(256, None), (-1, None), (11, 0x10000), (42, bytes(200))])
+def test_a_command_that_does_not_fit_is_refused(number: int, argument: int | bytes | None) -> None:
+    with pytest.raises(LocalProtocolError):
+        Command(number, argument)
+
+
+@given(st.integers(-128, 127), st.integers(-128, 127))
+def test_vel2_survives_the_sign_trap(left: int, right: int) -> None:
+    command = Command.from_frame(commands.vel2(left, right).to_frame())
+    assert command.signed_bytes == (right, left)
+    as_player_sends_it = Command(CommandNumber.VEL2, (left & 0xFF) << 8 | right & 0xFF)
+    assert as_player_sends_it.signed_bytes == (right, left)
+
+
+def test_two_bytes_travel_as_a_negative_integer_when_the_high_bit_is_set() -> None:
+    digout = Command.from_frame(Frame.from_bytes(bytes.fromhex("fafb061e1bab00c91b")))
+    assert digout.two_bytes == (0x55, 0xFF)
+
+
+def test_what_has_no_integer_has_no_two_bytes() -> None:
+    with pytest.raises(LocalProtocolError):
+        _ = commands.stop().two_bytes
+    with pytest.raises(LocalProtocolError):
+        commands.vel2(128, 0)
+    assert Command(CommandNumber.TTY2, b"x").integer is None
+
+
+def test_the_small_constructors_say_what_they_mean() -> None:
+    assert [c.to_frame().payload.hex() for c in (
+        commands.pulse(), commands.enable(True), commands.stop(), commands.vel(-200), commands.rvel(10),
+        commands.sonar(False), commands.set_origin(),
+    )] == ["00", "043b0100", "1d", "0b1bc800", "153b0a00", "1c3b0000", "07"]  # fmt: skip
+
+
+@given(sips, st.sampled_from(Profile))
+def test_a_sip_survives_the_wire(sip: StandardSip, profile: Profile) -> None:
+    assert StandardSip.from_frame(sip.to_frame(profile), profile) == sip
+
+
+def integers_of(size: int, *, signed: bool) -> st.SearchStrategy[int]:
+    span = 1 << 8 * size
+    return st.integers(-span // 2, span // 2 - 1) if signed else st.integers(0, span - 1)
+
+
+@given(sips, st.integers(0, len(TAIL)), st.binary(max_size=5), st.data())
+def test_a_tail_of_any_length_survives(sip: StandardSip, fields: int, rest: bytes, data: st.DataObject) -> None:
+    tail = tuple(data.draw(integers_of(size, signed=signed)) for _, size, signed in TAIL[:fields])
+    whole = dataclasses.replace(sip, tail=tail, rest=rest if fields == len(TAIL) else b"")
+    assert StandardSip.from_frame(whole.to_frame(Profile.ARCOS), Profile.ARCOS) == whole
+
+
+def test_gripper_and_analog_port_change_places_with_the_firmware() -> None:
+    sip = StandardSip(analog_port=5, gripper_state=9)
+    assert sip.to_frame(Profile.P2OS).payload[20:22] == b"\x05\x09"
+    assert sip.to_frame(Profile.AROS).payload[20:22] == b"\x09\x05"
+    assert [profile.has_flags for profile in Profile] == [False, True, True]
+    assert StandardSip(raw_flags=1).motors_enabled
+
+
+@pytest.mark.parametrize("change", [{"raw_x": 65536}, {"raw_heading": 40000}, {"tail": (70000,)}])
+def test_a_sip_that_does_not_fit_is_refused(change: dict) -> None:
+    with pytest.raises(LocalProtocolError):
+        StandardSip(**change).to_frame(Profile.P2OS)
+
+
+def test_a_sip_cut_anywhere_is_raw_and_never_lost() -> None:
+    whole = StandardSip(sonar=(SonarReading(1, 2),)).to_frame(Profile.P2OS).payload
+    for cut in range(1, len(whole)):
+        assert read_packet(Frame(whole[:cut]), Profile.P2OS) == RawPacket(0x32, whole[1:cut])
+        with pytest.raises(RemoteProtocolError):
+            StandardSip.from_frame(Frame(whole[:cut]), Profile.P2OS)
+
+
+def test_units_are_si() -> None:
+    sip = StandardSip(
+        kind=0x33, raw_x=0x8000 | 1000, raw_heading=1024, raw_left_velocity=-100, raw_right_velocity=257,
+        raw_battery=125, sonar=(SonarReading(3, 1000),),
+    )  # fmt: skip
+    values = in_units(sip, load_parameters("p2dx"))
+    assert values.x_m == pytest.approx(0.84)
+    assert values.heading_rad == pytest.approx(math.pi / 2)
+    assert (values.left_mps, values.right_mps) == pytest.approx((-0.1, 0.257))
+    assert values.turn_radps == pytest.approx(1.0)
+    assert values.battery_v == pytest.approx(12.5)
+    assert values.sonar_m == ((3, pytest.approx(0.268)),)
+
+
+texts = st.text(st.characters(min_codepoint=1, max_codepoint=255), max_size=10)
+
+
+@given(texts, texts, texts)
+def test_an_identity_survives_the_wire(name: str, robot_class: str, subclass: str) -> None:
+    identity = Identity(name, robot_class, subclass)
+    assert Identity.from_frame(identity.to_frame()) == identity
+
+
+def test_an_identity_with_missing_strings_has_empty_ones() -> None:
+    assert Identity.from_frame(Frame(b"\x02Wilma")) == Identity("Wilma", "", "")
+
+
+@given(texts, st.integers(0, 255), st.integers(0, 0xFFFF), st.integers(-0x8000, 0x7FFF), st.integers(0, 2**32 - 1))
+def test_a_config_survives_the_wire(text: str, byte: int, word: int, signed: int, flags: int) -> None:
+    packet = ConfigPacket(
+        subclass=text, firmware_version=text, sipcycle=byte, watchdog=word, driftfactor=signed, configflags=flags,
+        gyrofw=signed, fields_sent=len(FIELDS),
+    )  # fmt: skip
+    assert ConfigPacket.from_frame(packet.to_frame()) == packet
+
+
+def test_a_config_cut_anywhere_has_the_fields_that_were_sent() -> None:
+    packet = ConfigPacket(subclass="p2dx", watchdog=2000, transki=4)
+    whole = packet.to_frame().payload
+    for cut in range(1, len(whole)):
+        part = ConfigPacket.from_frame(Frame(whole[:cut]))
+        assert part.fields_sent < P2OS_FIELDS
+    assert ConfigPacket.from_frame(Frame(whole)) == packet
+
+
+@pytest.mark.parametrize("change", [{"watchdog": 65536}, {"name": "€"}, {"name": "x" * 300}])
+def test_a_config_that_does_not_fit_is_refused(change: dict) -> None:
+    with pytest.raises(LocalProtocolError):
+        ConfigPacket(**change).to_frame()
+
+
+@given(st.integers(3, 255), st.binary(max_size=100))
+def test_an_unknown_packet_comes_through_raw(kind: int, data: bytes) -> None:
+    packet = read_packet(Frame(bytes((kind,)) + data), Profile.P2OS)
+    assert packet_frame(RawPacket(kind, data), Profile.P2OS) == Frame(bytes((kind,)) + data)
+    assert packet is not None

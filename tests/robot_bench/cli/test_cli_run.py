@@ -1,0 +1,262 @@
+"""`p2os run`, `report` and `demo`: what they print, what they leave behind, how they end."""
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+from p2os.cli.main import run as p2os
+from robot_bench.cli.demo import best_body
+from robot_bench.cli.folders import next_folder
+from robot_bench.cli.run import capped
+from robot_bench.recording.run_record import read_run
+from robot_bench.scenario.scenario import load_scenario
+from tests.robot_bench.firmware import thumb
+
+COMMAND = [sys.executable, "-c", "from p2os.cli.main import main; main()"]
+QUICK = ["--mode", "direct", "--body", "kinematic", "--duration", "0.2"]
+#: What `run --json` prints at the least.
+KEYS = {
+    "firmware_sha256", "scenario", "mode", "body", "seed", "virtual_s", "wall_s", "real_time_factor", "distance_m",
+    "collisions", "min_clearance_m", "trace_sha256", "passed", "failures",
+}  # fmt: skip
+
+LEAST = 'firmware = "x.bin"\nworld = "room"\nduration_s = 0.2\nthreshold_m = 0.6\nbody = "kinematic"\nmode = "direct"\n'
+
+
+@pytest.fixture(autouse=True)
+def _in_an_empty_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+
+
+def make(firmware: bytes, text: str = LEAST) -> str:
+    Path("x.bin").write_bytes(firmware)
+    Path("mine.toml").write_text(text, encoding="utf-8")
+    return "mine.toml"
+
+
+def test_a_run_that_meets_its_goals_ends_with_0_and_its_report(capsys: pytest.CaptureFixture[str]) -> None:
+    assert p2os(["run", make(thumb.SLEEP)]) == 0
+    out, err = capsys.readouterr()
+    assert out.splitlines()[-1] == "passed; report: runs/mine-001/report.html"
+    assert "virtual time" in out
+    assert err == ""
+    assert Path("runs/mine-001/report.html").is_file()
+
+
+def test_json_is_one_object_with_all_that_was_promised(capsys: pytest.CaptureFixture[str]) -> None:
+    assert p2os(["run", make(thumb.SLEEP), "--json", "--out", "there"]) == 0
+    outcome = json.loads(capsys.readouterr().out)
+    assert outcome.keys() >= KEYS
+    assert (outcome["virtual_s"], outcome["collisions"], outcome["passed"]) == (0.2, 0, True)
+    assert read_run(Path("there")).end["trace_sha256"] == outcome["trace_sha256"]
+
+
+def test_a_goal_that_is_missed_ends_with_1_and_is_named(capsys: pytest.CaptureFixture[str]) -> None:
+    scenario = make(thumb.SLEEP, LEAST + '[[goal]]\nkind = "min_distance"\ndistance_m = 1\n')
+    assert p2os(["run", scenario]) == 1
+    out = capsys.readouterr().out
+    assert "failed  min_distance: 0.00 m were driven, 1.00 m are wanted" in out
+    assert "FAILED" in out
+
+
+def test_a_program_that_spins_is_legal_and_is_told_of(capsys: pytest.CaptureFixture[str]) -> None:
+    text = LEAST.replace("0.2", "1.2")
+    assert p2os(["run", make(thumb.SPIN, text), "--json"]) == 0
+    outcome = json.loads(capsys.readouterr().out)
+    assert outcome["virtual_s"] == 1.2
+    assert any("no pin, USART or WFI was seen since 0.000 s; the program is at" in note for note in outcome["notes"])
+    assert "0x08000042" in str(outcome["notes"])
+    assert "0x08000042" in outcome["last_blocks"][-1]
+
+
+def test_a_program_that_is_alive_needs_no_last_blocks(capsys: pytest.CaptureFixture[str]) -> None:
+    assert p2os(["run", make(thumb.SLEEP), "--json"]) == 0
+    assert json.loads(capsys.readouterr().out)["last_blocks"] == []
+
+
+@pytest.mark.parametrize(
+    ("firmware", "says"),
+    [(thumb.NOWHERE, "0x60000000"), (thumb.DIVIDE, "divi"), (thumb.OVERFLOW, "0x1fff")],
+    ids=["nowhere", "divide", "overflow"],
+)
+def test_a_firmware_that_dies_ends_with_1_and_says_where(
+    firmware: bytes, says: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert p2os(["run", make(firmware), "--json"]) == 1
+    outcome = json.loads(capsys.readouterr().out)
+    assert outcome["failures"][0].startswith("firmware fault: ")
+    assert says in outcome["failures"][0]
+    assert 1 <= len(outcome["last_blocks"]) <= 32
+
+
+def test_what_a_dead_program_ran_last_is_in_the_table_and_in_the_report(capsys: pytest.CaptureFixture[str]) -> None:
+    assert p2os(["run", make(thumb.NOWHERE), "--out", "dead"]) == 1
+    out = capsys.readouterr().out.splitlines()
+    block = out[out.index("the last block, by cycle:") + 1]
+    assert block.split() == ["0", "0x08000042"]
+    assert block in Path("dead/report.html").read_text(encoding="utf-8")
+
+
+@pytest.mark.parametrize(
+    ("name", "content"),
+    [
+        ("missing.elf", None),
+        ("empty.bin", b""),
+        ("random.elf", bytes(range(256))),
+        ("cut.elf", Path(__file__).parents[3].joinpath("robot_bench/firmware/motors.elf").read_bytes()[:700]),
+        ("x86.elf", Path(sys.executable).resolve().read_bytes()[:4096]),
+        ("no_flash.hex", b":020000042000DA\n:0400000001020304F2\n:00000001FF\n"),
+    ],
+)
+def test_a_firmware_that_is_none_is_one_line_and_2(
+    name: str, content: bytes | None, capsys: pytest.CaptureFixture[str]
+) -> None:
+    if content is not None:
+        Path(name).write_bytes(content)
+    assert p2os(["run", "motors", *QUICK, "--firmware", name]) == 2
+    err = capsys.readouterr().err.splitlines()
+    assert err[0].startswith("p2os: ")
+    assert name in err[0]
+    assert len(err) <= 2
+    assert "Error" not in err[0]
+
+
+@pytest.mark.parametrize(
+    ("words", "says"),
+    [
+        (["run", "doge"], "there is no scenario 'doge'"),
+        (["run", "dodge", "--mode", "dirct"], "there is no mode 'dirct'"),
+        (["run", "dodge", "--body", "box"], "there is no body 'box'"),
+        (["run", "dodge", "--world", "moon"], "there is no world 'moon'"),
+        (["run", "dodge", "--duration", "0"], "a run of 0 s cannot be"),
+        (["run", "dodge", "--duration", "nan"], "a run of nan s cannot be"),
+        (["run", "dodge", "--realtime", "-1"], "--realtime -1 cannot be"),
+        (["run", "dodge", "--yes"], "--yes goes with --port only"),
+        (["run", "dodge", "--max-speed", "100"], "--max-speed goes with --port only"),
+        (["run", "dodge", "--port", "tcp:127.0.0.1:1", "--mode", "direct"], "--mode cannot stand beside --port"),
+        (["run", "dodge", "--port", "tcp:127.0.0.1:1", "--body", "bullet"], "--body cannot stand beside --port"),
+        (["run", "dodge", "--port", "tcp:127.0.0.1:1", "--world", "room"], "--world cannot stand beside --port"),
+        (["run", "dodge", "--port", "tcp:127.0.0.1:1", "--seed", "1"], "--seed cannot stand beside --port"),
+        (["run", "dodge", "--out", "."], "holds something that is no run"),
+        (["report", "nowhere"], "holds no trace.jsonl"),
+    ],
+)
+def test_wrong_usage_is_one_line_with_a_hint_and_2(
+    words: list[str], says: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    Path("something").touch()
+    assert p2os(words) == 2
+    out, err = capsys.readouterr()
+    assert out == ""
+    assert err.splitlines()[0].startswith("p2os: ")
+    assert says in err.splitlines()[0]
+    assert [line.startswith("hint: ") for line in err.splitlines()[1:]] in ([True], [])
+
+
+def test_realtime_takes_the_clocks_time_with_or_without_a_number(capsys: pytest.CaptureFixture[str]) -> None:
+    scenario = make(thumb.SLEEP, LEAST.replace("0.2", "0.4"))
+    for words, least_s in ((["--realtime"], 0.4), (["--realtime", "4", "--json"], 0.1)):
+        began = time.monotonic()
+        assert p2os(["run", scenario, *words]) == 0
+        assert time.monotonic() - began >= least_s
+    assert json.loads(capsys.readouterr().out.splitlines()[-1])["real_time_factor"] <= 4.05
+
+
+def test_a_report_is_made_anew_from_the_trace_alone(capsys: pytest.CaptureFixture[str]) -> None:
+    p2os(["run", make(thumb.SLEEP), "--out", "there"])
+    before = {path.name: path.read_bytes() for path in Path("there").iterdir()}
+    for path in Path("there").iterdir():
+        if path.name != "trace.jsonl":
+            path.unlink()
+    capsys.readouterr()
+    assert p2os(["report", "there"]) == 0
+    assert capsys.readouterr().out == "report: there/report.html\n"
+    for name in ("summary.json", "pins.vcd", "pins.sr", "usart.txt", "wire.jsonl", "report.html"):
+        assert Path("there", name).read_bytes() == before[name]
+    assert p2os(["report", "there", "--json"]) == 0
+    assert json.loads(capsys.readouterr().out)["passed"] is True
+
+
+def test_a_run_folder_is_used_again_and_numbers_go_on() -> None:
+    scenario = make(thumb.SLEEP)
+    for _ in range(2):
+        assert p2os(["run", scenario, "--out", "there"]) == 0
+    assert p2os(["run", scenario]) == 0
+    assert next_folder("mine").name == "mine-002"
+    Path("runs/mine-041").mkdir()
+    assert next_folder("mine").name == "mine-042"
+    assert next_folder("min").name == "min-001"
+
+
+def started(duration_s: float, *words: str) -> subprocess.Popen[str]:
+    """A run in a process of its own that has begun to write."""
+    scenario = make(thumb.SLEEP, LEAST.replace("0.2", str(duration_s)))
+    process = subprocess.Popen(
+        [*COMMAND, "run", scenario, "--out", "there", *words], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+    )
+    deadline = time.monotonic() + 60
+    while time.monotonic() < deadline:
+        if Path("there/trace.jsonl").is_file() and Path("there/trace.jsonl").read_bytes().count(b"\n") > 60:
+            return process
+        time.sleep(0.02)
+    process.kill()
+    raise AssertionError(process.communicate()[1])
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
+def test_a_signal_leaves_a_complete_folder_and_130(number: signal.Signals) -> None:
+    process = started(10_000, "--json")
+    process.send_signal(number)
+    out, err = process.communicate(timeout=60)
+    assert process.returncode == 130, err
+    outcome = json.loads(out)
+    assert outcome["failures"] == [f"interrupted ({number.name})"]
+    assert Path("there/report.html").is_file()
+    record = read_run(Path("there"))
+    assert not record.is_cut
+    assert record.last_ns / 1e9 == pytest.approx(outcome["virtual_s"])
+
+
+def test_kill_9_leaves_a_trace_that_makes_a_report(capsys: pytest.CaptureFixture[str]) -> None:
+    process = started(10_000)
+    os.kill(process.pid, signal.SIGKILL)
+    process.communicate(timeout=60)
+    record = read_run(Path("there"))
+    assert record.is_cut
+    assert record.last_ns >= 10**9
+    assert p2os(["report", "there", "--json"]) == 0
+    outcome = json.loads(capsys.readouterr().out)
+    assert outcome["passed"] is False
+    assert outcome["failures"][0].startswith("the run was cut at")
+
+
+def test_demo_runs_dodge_in_the_room(capsys: pytest.CaptureFixture[str]) -> None:
+    assert p2os(["demo", "--duration", "0.1", "--json"]) == 1, "nothing is reached in 0.1 s"
+    outcome = json.loads(capsys.readouterr().out)
+    assert (outcome["scenario"], outcome["mode"], outcome["world"]) == ("dodge", "adapter", "room")
+    assert Path("runs/demo-001/report.html").is_file()
+
+
+def test_demo_without_pybullet_says_so_and_goes_on(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    for name in [name for name in sys.modules if name.startswith(("pybullet", "p2os.pioneer.body.bullet"))]:
+        monkeypatch.delitem(sys.modules, name)
+    monkeypatch.setitem(sys.modules, "pybullet", None)
+    assert best_body() == "kinematic"
+    assert "PyBullet is not here" in capsys.readouterr().err
+    assert p2os(["run", "dodge", "--body", "bullet", "--duration", "0.1"]) == 2
+    assert "hint: pip install 'p2os[bullet]'" in capsys.readouterr().err
+
+
+def test_an_untried_program_is_capped_unless_told() -> None:
+    scenario = load_scenario("dodge")
+    assert capped(scenario, None).adapter.max_velocity_mm_s == 200
+    assert capped(scenario, None).adapter.max_rotation_deg_s == 45
+    assert capped(scenario, 350).adapter.max_velocity_mm_s == 350

@@ -1,0 +1,123 @@
+"""The trace is sorted, canonical, hashed, and readable after the process was killed."""
+
+import hashlib
+import json
+import os
+import signal
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from p2os.errors import FileError, LocalProtocolError, RunFailedError
+from robot_bench.recording.trace import RANKS, TraceWriter, canonical
+
+S = 10**9
+
+
+def test_a_line_has_one_spelling() -> None:
+    assert canonical({"t": 1, "k": "pin", "net": "µ"}) == '{"k":"pin","net":"\\u00b5","t":1}'
+
+
+@given(
+    st.lists(st.tuples(st.integers(0, 40), st.sampled_from(sorted(RANKS)), st.integers(0, 3)), max_size=20), st.data()
+)
+def test_when_it_is_written_changes_nothing(entries: list[tuple[int, str, int]], data: st.DataObject) -> None:
+    entries = sorted(entries, key=lambda entry: entry[0])
+    at_once, in_pieces = TraceWriter(), TraceWriter()
+    for at, kind, value in entries:
+        at_once.add(kind, at, {"v": value})
+        in_pieces.add(kind, at, {"v": value})
+        if data.draw(st.booleans()):
+            in_pieces.write_until(at - 1)
+    for trace in (at_once, in_pieces):
+        trace.write_until(50)
+    assert in_pieces.text == at_once.text
+    assert in_pieces.sha256 == at_once.sha256 == hashlib.sha256(at_once.text.encode()).hexdigest()
+    times = [json.loads(line)["t"] for line in at_once.text.splitlines()]
+    assert times == sorted(times)
+
+
+def test_kinds_of_one_instant_have_a_fixed_order() -> None:
+    trace = TraceWriter()
+    for kind in sorted(RANKS, reverse=True):
+        trace.add(kind, 5, {})
+    trace.write_until(5)
+    assert [json.loads(line)["k"] for line in trace.text.splitlines()] == sorted(RANKS, key=RANKS.__getitem__)
+
+
+def test_what_comes_after_its_time_was_written_is_a_bug() -> None:
+    trace = TraceWriter()
+    trace.write_until(5)
+    with pytest.raises(LocalProtocolError, match="at 5 ns comes after 5 ns"):
+        trace.add("pin", 5, {})
+
+
+def test_first_and_last_line_are_not_hashed(tmp_path: Path) -> None:
+    path = tmp_path / "trace.jsonl"
+    trace = TraceWriter(path)
+    trace.meta({"version": "1"})
+    trace.add("pin", 0, {"net": "DD1", "v": 0})
+    trace.write_until(0)
+    digest = trace.sha256
+    trace.end({"passed": True})
+    lines = path.read_text().splitlines(keepends=True)
+    assert [json.loads(line)["k"] for line in lines] == ["meta", "pin", "end"]
+    assert digest == hashlib.sha256(lines[1].encode()).hexdigest()
+    trace.close()
+
+
+def test_a_trace_that_cannot_be_written_is_one_line(tmp_path: Path) -> None:
+    with pytest.raises(FileError, match=r"cannot write .*No such file or directory"):
+        TraceWriter(tmp_path / "nowhere" / "trace.jsonl")
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="there is no /dev/full")
+def test_a_full_disk_is_one_line() -> None:
+    trace = TraceWriter(Path("/dev/full"))
+    with pytest.raises(RunFailedError, match="cannot write /dev/full: No space left on device"):
+        trace.meta({})
+    trace.close()
+
+
+def test_a_restored_writer_goes_on_alike() -> None:
+    first, second = TraceWriter(), TraceWriter()
+    first.add("pin", 3, {"v": 1})
+    first.add("pin", 9, {"v": 2})
+    first.write_until(5)
+    second.restore(first.snapshot())
+    first_text = first.text
+    for trace in (first, second):
+        trace.add("pin", 7, {"v": 3})
+        trace.write_until(10)
+    assert first.text == first_text + second.text
+
+
+KILLED = """
+import os, sys
+from pathlib import Path
+from robot_bench.recording.trace import TraceWriter
+trace = TraceWriter(Path(sys.argv[1]))
+trace.meta({})
+for ms in range(0, 2600, 100):
+    trace.add("pose", ms * 10**6, {"x": ms})
+    trace.write_until(ms * 10**6)
+print("ready", flush=True)
+sys.stdin.read()
+"""
+
+
+def test_a_killed_process_leaves_everything_up_to_its_last_whole_second(tmp_path: Path) -> None:
+    path = tmp_path / "trace.jsonl"
+    process = subprocess.Popen(
+        [sys.executable, "-c", KILLED, str(path)], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
+    )
+    assert process.stdout is not None
+    assert process.stdout.readline() == "ready\n"
+    os.kill(process.pid, signal.SIGKILL)
+    process.communicate(timeout=10)
+    times = [json.loads(line).get("t", -1) for line in path.read_text().splitlines()]
+    assert max(times) >= 2 * S

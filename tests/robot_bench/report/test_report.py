@@ -1,0 +1,127 @@
+"""Reports are made from a trace alone, whole or cut at any byte."""
+
+import json
+from pathlib import Path
+
+import pytest
+
+from p2os.protocol.packets import EncoderPacket
+from robot_bench.recording.run_record import TraceError, WireChunk, read_run
+from robot_bench.recording.signals import grouped, motor_steps
+from robot_bench.recording.summary import cells_entered, distance_m, figures, verdict
+from robot_bench.report import make_report
+from robot_bench.report.packets import describe
+
+SIP = "fafb1b33a604000000049600fa007d00000004030000000000000000"
+
+
+def entries() -> list[dict[str, object]]:
+    """A short run: two poses a metre apart, a few edges, a line of text, a packet."""
+    world = {
+        "name": "room",
+        "extent": [-3.0, -3.0, 3.0, 3.0],
+        "obstacles": [
+            {"name": "north", "shape": "box", "kind": "wall", "x": 0, "y": 3, "heading": 0, "length": 6, "width": 0.1},
+            {"name": "post", "shape": "cylinder", "kind": "obstacle", "x": 1, "y": 1, "radius": 0.2},
+        ],
+    }
+    robot = {"front_m": 0.18, "rear_m": 0.26, "width_m": 0.38, "sonar": [[0.069, 0.136, 1.57]], "sonar_cone_rad": 0.5}
+    pose = {"k": "pose", "y": 0, "z": 0, "p": 0, "l": 187500, "r": 187500, "la": 0, "ra": 0, "c": 0}
+    return [
+        {"k": "meta", "scenario": "motors", "mode": "adapter", "world": world, "robot": robot, "threshold_m": 0.6},
+        {**pose, "t": 0, "x": 0, "h": 0},
+        {"t": 0, "k": "pin", "net": "motor1_comm1", "v": 0},
+        {"t": 0, "k": "pin", "net": "motor1_comm2", "v": 0},
+        {"t": 0, "k": "pin", "net": "motor1_comm3", "v": 0},
+        {"t": 10, "k": "pin", "net": "motor1_comm1", "v": 1},
+        {"t": 10, "k": "pin", "net": "motor1_comm2", "v": 1},
+        {"t": 20, "k": "pin", "net": "motor1_comm1", "v": 0},
+        {"t": 20, "k": "pin", "net": "motor1_comm2", "v": 0},
+        {"t": 20, "k": "pin", "net": "motor1_comm3", "v": 1},
+        {"t": 30, "k": "sonar", "mm": [540, 3000, 3000, 3000, 3000, 3000, 3000, 3000]},
+        {"t": 40, "k": "usart", "hex": b"hello </script> w".hex()},
+        {"t": 50, "k": "usart", "hex": b"orld\nrest".hex()},
+        {"t": 60, "k": "wire", "dir": "c2r", "hex": "fafb060b3bc800d33b"},
+        {"t": 60, "k": "wire", "dir": "r2c", "hex": "00fafb03000000"},
+        {"t": 70, "k": "event", "who": "adapter", "what": "connected", "detail": "p2dx_con"},
+        {"t": 80, "k": "obstacle", "op": "move", "name": "post", "x": 2, "y": 2},
+        {"t": 81, "k": "obstacle", "op": "remove", "name": "north"},
+        {**pose, "t": 1_000_000_000, "x": 1_000_000, "h": 100, "c": 1},
+        {
+            "k": "end",
+            "passed": True,
+            "goals_met": ["1 m"],
+            "failures": [],
+            "trace_sha256": "ab",
+            "min_clearance_m": 0.3,
+        },
+    ]
+
+
+@pytest.fixture
+def run(tmp_path: Path) -> Path:
+    lines = [json.dumps(entry) + "\n" for entry in entries()]
+    (tmp_path / "trace.jsonl").write_text("".join(lines), encoding="utf-8")
+    return tmp_path
+
+
+def test_a_whole_run_is_read_back(run: Path) -> None:
+    record = read_run(run)
+    assert verdict(record) == "passed"
+    assert distance_m(record) == pytest.approx(1.0)
+    assert cells_entered(record) == 2
+    assert record.usart_lines() == [(50, "hello </script> world"), (50, "rest")]
+    assert ("collisions", "1") in figures(record)
+
+
+def test_the_motor_pins_read_as_twos_complement(run: Path) -> None:
+    assert motor_steps(read_run(run).pins, 1) == [(0, 0), (10, 3), (20, -4)]
+    assert motor_steps(read_run(run).pins, 2) == []
+
+
+def test_nets_that_the_pin_out_does_not_know_come_last() -> None:
+    assert grouped(["spare", "DD1"]) == [("distance", ["DD1"]), ("other", ["spare"])]
+
+
+def test_the_page_is_one_file_that_no_text_of_the_run_can_break(run: Path) -> None:
+    files = make_report(run)
+    page = files.page.read_text(encoding="utf-8")
+    assert "hello </script>" not in page
+    assert "http" not in page.replace("http-equiv", "")
+    assert page.count("</script>") == 2
+    assert "VEL" in page
+    for plot in files.plots:
+        assert plot.read_bytes().startswith(b"\x89PNG")
+
+
+def test_a_trace_cut_at_any_byte_still_has_its_report(run: Path) -> None:
+    path = run / "trace.jsonl"
+    whole = path.read_bytes()
+    first_line = whole.index(b"\n") + 1
+    for cut in range(first_line, len(whole), 7):
+        path.write_bytes(whole[:cut])
+        record = read_run(run)
+        assert verdict(record).startswith("cut at")
+        make_page_only(run)
+    path.write_bytes(whole[: first_line - 2])
+    with pytest.raises(TraceError):
+        read_run(run)
+
+
+def make_page_only(folder: Path) -> None:
+    from robot_bench.report.page import render_page
+
+    assert "cut at" in render_page(read_run(folder))
+
+
+def test_a_folder_without_a_trace_is_refused_with_a_hint(tmp_path: Path) -> None:
+    with pytest.raises(TraceError) as caught:
+        make_report(tmp_path)
+    assert caught.value.hint is not None
+
+
+def test_a_packet_beyond_the_standard_one_is_named_with_its_fields() -> None:
+    frame = EncoderPacket(left_counts=5, right_counts=-7).to_frame()
+    assert describe(WireChunk(t=0, direction="r2c", data=frame.to_bytes())) == [
+        ("EncoderPacket", "left_counts 5, right_counts -7")
+    ]

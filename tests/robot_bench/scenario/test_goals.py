@@ -1,0 +1,124 @@
+"""Each goal tells in one sentence what a run lacks, and nothing when it lacks nothing."""
+
+import math
+
+import pytest
+
+from robot_bench.recording.run_record import RunRecord
+from robot_bench.scenario.goals import KINDS, Goal, judge, load_goal
+from tests.robot_bench.records import S, motor_pins, pose, record, text
+
+EIGHTH = math.pi / 4 * 1e6
+
+
+def failure(kind: str, run: RunRecord, **arguments: object) -> str | None:
+    goal = load_goal({"kind": kind, **arguments}, "mine.toml: [[goal]] 1")
+    assert goal.wanted
+    return goal.failure(run)
+
+
+def test_every_kind_of_goal_is_tried_here() -> None:
+    names = " ".join(name for name in globals() if name.startswith("test_goal_"))
+    assert [kind for kind in KINDS if kind not in names] == []
+
+
+def test_goal_no_collision() -> None:
+    touched = record(poses=[pose(), pose(S, 500_000, -250_000, collisions=2)])
+    assert failure("no_collision", record(poses=[pose()])) is None
+    assert failure("no_collision", touched) == "2 collision(s), the first at 1.000 s, x 0.50 m, y -0.25 m"
+
+
+def test_goal_min_distance() -> None:
+    run = record(poses=[pose(), pose(S, 3_000_000), pose(2 * S, 3_000_000, 4_000_000)], last_ns=60 * S)
+    assert failure("min_distance", run, distance_m=7) is None
+    assert failure("min_distance", run, distance_m=7.1) == "7.00 m were driven, 7.10 m are wanted"
+    assert failure("min_distance", run, distance_m_a_minute=7) is None
+    assert failure("min_distance", run, distance_m_a_minute=7.5) == "7.00 m were driven, 7.50 m are wanted"
+
+
+def test_goal_cells() -> None:
+    run = record(poses=[pose(), pose(1, 600_000), pose(2, -1)])
+    assert failure("cells", run, least=3) is None
+    assert failure("cells", run, least=4) == "3 cells of 0.5 m were entered, 4 are wanted"
+
+
+SEQUENCE = [[0, 0], [3, 3], [-4, -4], [0, 0]]
+
+
+@pytest.mark.parametrize("skew_ns", [0, 300, 999_999])
+def test_goal_motor_sequence_that_is_right(skew_ns: int) -> None:
+    pins = motor_pins((0, 0, 0), (3, 3, 3), (6, -4, -4), (9, 0, 0), skew_ns=skew_ns)
+    assert failure("motor_sequence", record(pins=pins, last_ns=12 * S), values=SEQUENCE, held_s=3) is None
+
+
+def test_goal_motor_sequence_that_is_wrong() -> None:
+    pins = motor_pins((0, 0, 0), (3, 3, 2), (6, -4, -4), (9, 0, 0))
+    run = record(pins=pins, last_ns=11 * S)
+    assert failure("motor_sequence", run, values=SEQUENCE) == (
+        "the motor pins said +0/+0 +3/+2 -4/-4 +0/+0, not +0/+0 +3/+3 -4/-4 +0/+0"
+    )
+    short = failure("motor_sequence", run, values=[[0, 0], [3, 2], [-4, -4], [0, 0]], held_s=3)
+    assert short == "(0, 0) was held 2.000 s, 3 s are wanted"
+
+
+def test_goal_usart_contains_and_usart_lacks() -> None:
+    run = record(usart=text((1, "dodge: CRUISE"), (2, "dodge: TURN_LEFT")))
+    assert failure("usart_contains", run, text="TURN") is None
+    assert failure("usart_contains", run, text="HELP") == "'HELP' was not printed; the last line is 'dodge: TURN_LEFT'"
+    assert failure("usart_lacks", run, text="HELP") is None
+    assert failure("usart_lacks", run, text="TURN") == "'TURN' was printed at 2.000 s"
+    assert failure("usart_contains", record(), text="x") == "'x' was not printed; nothing was printed"
+
+
+def test_goal_usart_in_order() -> None:
+    run = record(usart=text((1, "a"), (2, "b"), (3, "a")))
+    assert failure("usart_in_order", run, texts=["a", "b", "a"]) is None
+    assert failure("usart_in_order", run, texts=["b", "a", "b"]) == (
+        "'b' was not printed in its turn; the last line is 'a'"
+    )
+
+
+@pytest.mark.parametrize(("left", "right", "lacks"), [(9, -3, None), (10, -2, None), (7, -3, "left"), (9, -5, "right")])
+def test_goal_encoder_counts_match(left: int, right: int, lacks: str | None) -> None:
+    pins = {f"encoder1_s{bit}": [(0, 0)] for bit in (1, 2, 3)}
+    poses = [pose(), pose(5 * S, la=round(9.4 * EIGHTH), ra=round(-2.5 * EIGHTH))]
+    run = record(pins=pins, poses=poses, usart=text((5.01, f"encoders: done left={left} right={right}")))
+    said = failure("encoder_counts_match", run)
+    assert (said is None) if lacks is None else (said is not None and said.startswith(lacks))
+    assert failure("encoder_counts_match", record()) == "no counts were printed; nothing was printed"
+
+
+def placed(*numbers: int) -> list[dict[str, object]]:
+    return [{"t": 10 * n * S, "op": "place", "name": "post", "sonar": n} for n in numbers]
+
+
+def test_goal_sensor_named() -> None:
+    said = [(10.2, "sensor 1 on"), (11.2, "sensor 1 off"), (20.2, "sensor 2 on"), (21.2, "sensor 2 off")]
+    run = record(obstacles=placed(1, 2), usart=text(*said), last_ns=30 * S)
+    assert failure("sensor_named", run) is None
+    missed = record(obstacles=placed(1, 2), usart=text(*said[:3]), last_ns=30 * S)
+    assert (
+        failure("sensor_named", missed) == "with something before sonar 2 from 20.000 s on it printed ['sensor 2 on']"
+    )
+    other = record(obstacles=placed(1), usart=text(*said, (11.5, "sensor 7 on")), last_ns=30 * S)
+    assert failure("sensor_named", other) is not None
+    early = record(obstacles=placed(1), usart=text((5, "sensor 4 on"), *said[:2]), last_ns=30 * S)
+    assert failure("sensor_named", early) == "'sensor 4 on' was printed before anything was placed"
+    assert failure("sensor_named", record()) == "nothing was placed before a sonar"
+
+
+def test_a_real_robot_is_not_asked_what_it_cannot_tell() -> None:
+    run = record(poses=[pose(collisions=1)])
+    goals = (Goal(kind="no_collision", arguments={}), Goal(kind="min_distance", arguments={"distance_m": 1}))
+    assert [line.split(":")[0] for line in judge(run, goals)[1]] == ["no_collision", "min_distance"]
+    run.meta["mode"] = "port"
+    assert [line.split(":")[0] for line in judge(run, goals)[1]] == ["min_distance"]
+
+
+def test_what_is_met_is_told_as_it_was_wanted() -> None:
+    run = record(poses=[pose()], usart=text((1, "x")))
+    met, failures = judge(
+        run, (Goal(kind="no_collision", arguments={}), Goal(kind="usart_lacks", arguments={"text": "x"}))
+    )
+    assert met == ["touches nothing"]
+    assert failures == ["usart_lacks: 'x' was printed at 1.000 s"]

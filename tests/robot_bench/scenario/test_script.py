@@ -1,0 +1,110 @@
+"""Timed changes of the world act at their time, on a body that was brought there."""
+
+import math
+
+import pytest
+
+from p2os.errors import ScenarioError
+from p2os.pioneer.body.choose import make_body
+from p2os.pioneer.world.find import load_world
+from p2os.pioneer.world.model import Obstacle, Pose
+from p2os.robots.parameters import load_parameters
+from robot_bench.scenario.world_script import BeforeSonar, Change, Op, Script, load_changes
+
+S = 10**9
+P2DX = load_parameters("p2dx")
+
+
+def post(name: str = "post") -> Obstacle:
+    return Obstacle(name=name, x_m=0, y_m=0, radius_m=0.02, height_m=0.5)
+
+
+def script(*changes: Change) -> tuple[Script, list[tuple[str, str, int, dict[str, object]]], list[int]]:
+    body = make_body("kinematic", load_world("room"), P2DX)
+    body.reset(Pose(-1.0, 0.0, math.pi / 2), 0)
+    told: list[tuple[str, str, int, dict[str, object]]] = []
+    brought: list[int] = []
+    made = Script(
+        changes,
+        body,
+        P2DX,
+        bring_to=brought.append,
+        on_change=lambda op, name, at, f: told.append((op, name, at, dict(f))),
+    )
+    return made, told, brought
+
+
+def test_changes_happen_in_order_of_time_each_at_its_own() -> None:
+    made, told, brought = script(
+        Change(at=3 * S, op=Op.REMOVE, name="post"),
+        Change(at=S, op=Op.PLACE, name="post", obstacle=post(), x_m=1, y_m=-1),
+        Change(at=2 * S, op=Op.MOVE, name="post", x_m=1.5, y_m=-1, heading_rad=0.5),
+    )
+    assert made.next_deadline() == S
+    made.advance_to(S)
+    assert [op for op, *_ in told] == ["place"]
+    made.advance_to(5 * S)
+    assert brought == [S, 2 * S, 3 * S]
+    assert [(op, at) for op, _, at, _ in told] == [("place", S), ("move", 2 * S), ("remove", 3 * S)]
+    assert told[0][3]["radius"] == 0.02
+    assert told[1][3] == {"x": 1.5, "y": -1, "heading": 0.5}
+    assert told[2][3] == {}
+    assert made.next_deadline() is None
+
+
+@pytest.mark.parametrize("number", range(1, 9))
+def test_a_thing_before_a_sonar_is_what_that_sonar_sees(number: int) -> None:
+    change = Change(at=0, op=Op.PLACE, name="post", obstacle=post(), before=BeforeSonar(number=number, distance_m=0.45))
+    made, told, _ = script(change)
+    made.advance_to(0)
+    ranges = made._body.ranges(range(8))
+    assert ranges[number - 1] == pytest.approx(0.45 - 0.02, abs=0.002)
+    assert told[0][3]["sonar"] == number
+    assert [n for n, metres in enumerate(ranges, start=1) if metres < 0.6] == [number]
+
+
+def test_a_restored_script_does_nothing_twice() -> None:
+    changes = [
+        Change(at=at * S, op=Op.PLACE, name=f"post {at}", obstacle=post(f"post {at}"), x_m=1, y_m=at / 4)
+        for at in (1, 2)
+    ]
+    first, _, _ = script(*changes)
+    first.advance_to(S)
+    second, told, _ = script(*changes)
+    second.restore(first.snapshot())
+    second.advance_to(3 * S)
+    assert [name for _, name, _, _ in told] == ["post 2"]
+
+
+SIZES = ("length_m", "width_m", "height_m")
+WALKING = {"at_s": 1.0, "name": "visitor", "shape": "cylinder", "radius_m": 0.2, "height_m": 1.7}
+
+
+def test_a_placed_thing_walks_and_another_can_be_pushed() -> None:
+    parameters = load_parameters("p2dx")
+    tables = [
+        {**WALKING, "path_m": [[1, 0], [2.0, 0]], "speed_mps": 0.8, "repeat": "once"},
+        {"at_s": 2.0, "name": "box", "x_m": 1, "y_m": 1, **dict.fromkeys(SIZES, 0.3), "mass_kg": 2.0},
+    ]
+    first, second = load_changes(tables, parameters, "s.toml")
+    assert first.obstacle is not None
+    assert first.obstacle.walk is not None
+    assert first.obstacle.walk.pose_at(0.5)[0] == 1.4
+    assert second.obstacle is not None
+    assert (second.obstacle.mass_kg, second.obstacle.friction) == (2.0, 0.5)
+
+
+@pytest.mark.parametrize(
+    ("more", "said"),
+    [
+        ({"path_m": [[1, 0], [2]]}, "path_m must be"),
+        ({"path_m": [[1, 0], [True, 2]]}, "path_m must be"),
+        ({"path_m": [[1, 0]]}, "two points"),
+        ({"path_m": [[1, 0], [2, 0]], "repeat": "never"}, "none of once"),
+        ({"path_m": [[1, 0], [2, 0]], "mass_kg": 1}, "only one of"),
+        ({"path_m": [[1, 0], [2, 0]], "before_sonar": 3, "distance_m": 1}, "path_m must be"),
+    ],
+)
+def test_a_path_that_cannot_be_is_refused(more: dict[str, object], said: str) -> None:
+    with pytest.raises(ScenarioError, match=said):
+        load_changes([{**WALKING, **more}], load_parameters("p2dx"), "s.toml")

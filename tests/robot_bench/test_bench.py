@@ -1,0 +1,142 @@
+"""A bench with a scripted chip: both modes, any slice, cut in two, the same trace."""
+
+import json
+import pickle
+from dataclasses import replace
+
+import pytest
+
+from robot_bench.bench import Bench
+from robot_bench.scenario.scenario import Scenario, load_scenario
+from tests.p2os.pioneer.body.bodies import each_body
+from tests.robot_bench.wires.fake_chip import FakeChip, PinDrive
+
+S, MS = 10**9, 10**6
+LEFT, RIGHT = ("PB7", "PB6", "PB5"), ("PA1", "PA2", "PA3")
+
+
+def drives(*steps: tuple[float, int, int]) -> list[tuple[int, str, PinDrive]]:
+    """What a program does that connects at once and sets (seconds, left, right)."""
+    script = [(0, "PB13", PinDrive.LOW), (10, "PB12", PinDrive.HIGH)]
+    for at, *values in steps:
+        for pins, value in zip((LEFT, RIGHT), values, strict=True):
+            for bit, pin in enumerate(pins):
+                script.append((round(at * S) + 300 * bit, pin, PinDrive.HIGH if value >> bit & 1 else PinDrive.LOW))
+    return script
+
+
+def scenario(mode: str, body: str = "kinematic", duration_s: float = 3.0) -> Scenario:
+    return load_scenario("motors").with_options(mode=mode, body=body, duration_s=duration_s)
+
+
+def bench(of: Scenario, slice_ns: int = MS, *, block_ns: int = 700) -> Bench:
+    chip = FakeChip(drives((0, 0, 0), (1, 3, 3), (2, -4, 1)), [(S // 2, b"hello\nworld")], block_ns=block_ns)
+    return Bench(of, chip=chip, slice_ns=slice_ns)
+
+
+def finished(made: Bench) -> Bench:
+    made.run_until(made.scenario.duration_ns)
+    made.finish()
+    return made
+
+
+def entries(made: Bench, kind: str) -> list[dict[str, object]]:
+    return [entry for entry in map(json.loads, made.trace.text.splitlines()) if entry["k"] == kind]
+
+
+BODIES = each_body()
+MODES = ["direct", "adapter"]
+
+
+@pytest.mark.parametrize("body", BODIES)
+@pytest.mark.parametrize("mode", MODES)
+def test_the_slice_limit_changes_nothing(mode: str, body: str) -> None:
+    hashes = {finished(bench(scenario(mode, body, 1.5), slice_ns)).trace.sha256 for slice_ns in (10 * MS, MS, 100_000)}
+    assert len(hashes) == 1
+
+
+@pytest.mark.parametrize("body", BODIES)
+@pytest.mark.parametrize("mode", MODES)
+@pytest.mark.parametrize("cut_ns", [1_234_567_890, 500_000_000 + 87_000 * 7])
+def test_a_bench_restored_half_way_goes_on_alike(mode: str, body: str, cut_ns: int) -> None:
+    whole = finished(bench(scenario(mode, body))).trace.text
+    first = bench(scenario(mode, body))
+    first.run_until(cut_ns)
+    second = bench(scenario(mode, body))
+    second.restore(pickle.loads(pickle.dumps(first.snapshot())))  # noqa: S301 - our own bytes
+    assert first.trace.text + finished(second).trace.text == whole
+
+
+@pytest.mark.parametrize("mode", MODES)
+def test_the_robot_drives_as_its_pins_say(mode: str) -> None:
+    made = finished(bench(scenario(mode)))
+    pose = entries(made, "pose")[-1]
+    assert pose["t"] == 3 * S
+    # -4 and +1 steps of 62.5 mm/s, reached by then from 187.5 mm/s at 300 mm/s² or more a wheel: 1.46 s is not enough.
+    assert pose["l"] < 0 < pose["r"]  # type: ignore[operator]
+    assert made.recorder.distance_m > 0.1
+    assert made.recorder.min_clearance_m is not None
+
+
+def test_the_trace_begins_with_every_wire_and_ends_with_a_pose() -> None:
+    made = finished(bench(scenario("direct", duration_s=1.02)))
+    pins = entries(made, "pin")
+    assert len({entry["net"] for entry in pins if entry["t"] == 0}) == 22
+    assert [entry["t"] for entry in entries(made, "pose")][-2:] == [S, S + 20 * MS]
+
+
+def test_text_is_told_by_line_and_the_rest_at_the_end() -> None:
+    made = finished(bench(scenario("direct", duration_s=1)))
+    lines = [(entry["t"], bytes.fromhex(str(entry["hex"]))) for entry in entries(made, "usart")]
+    assert lines == [(S // 2 + 87_000 * 5, b"hello\n"), (S, b"world")]
+    assert made.recorder.last_line == "world"
+
+
+def test_text_without_an_end_is_told_in_pieces() -> None:
+    made = finished(Bench(scenario("direct", duration_s=1), chip=FakeChip(text=[(0, b"x" * 100)])))
+    assert [len(bytes.fromhex(str(entry["hex"]))) for entry in entries(made, "usart")] == [64, 36]
+
+
+def test_a_fight_over_a_wire_is_told() -> None:
+    chip = FakeChip([*drives((0, 0, 0)), (S, "PA4", PinDrive.HIGH)])
+    made = finished(Bench(scenario("direct", duration_s=1.5), chip=chip))
+    fights = [entry for entry in entries(made, "event") if entry["what"] == "contention"]
+    assert [(entry["t"], entry["detail"]) for entry in fights] == [(S, "DD1 is driven hard by bluepill and sensor")]
+
+
+def test_the_adapter_is_reset_by_an_edge_at_its_very_time() -> None:
+    chip = FakeChip([*drives((0, 0, 0)), (S + 123, "PB13", PinDrive.HIGH), (S + 456_789, "PB13", PinDrive.LOW)])
+    made = finished(Bench(scenario("adapter", duration_s=2), chip=chip))
+    told = [(entry["t"], entry["what"]) for entry in entries(made, "event") if entry["who"] == "adapter"]
+    assert (S + 123, "reset") in told
+    assert (S + 456_789 + 300 * MS, "booted") in told
+
+
+def test_changes_of_the_world_happen_at_their_time() -> None:
+    sensors = load_scenario("sensors").with_options(mode="direct", body="kinematic", duration_s=2)
+    early = replace(sensors, changes=tuple(replace(change, at=change.at - 5 * S) for change in sensors.changes[:20]))
+    made = finished(Bench(early, chip=FakeChip(drives((0, 0, 0)))))
+    changes = [(entry["t"], entry["op"], entry.get("sonar")) for entry in entries(made, "obstacle")]
+    assert changes[0] == (S, "place", 1)
+    assert changes[-1] == (S + 950 * MS, "move", None)
+    near = [entry["t"] for entry in entries(made, "pin") if entry["net"] == "DD1" and entry["v"]]
+    assert near == [S + 50 * MS], "sampled at S before the post stood there, and 50 ms later"
+
+
+def test_warnings_of_the_chip_stand_in_the_log() -> None:
+    chip = FakeChip(drives((0, 0, 0)))
+    made = Bench(scenario("direct", duration_s=1), chip=chip)
+    assert chip.on_warning is not None
+    chip.on_warning("TIM2 is not modelled")
+    finished(made)
+    assert entries(made, "event")[0] == {
+        "k": "event", "t": 0, "who": "chip", "what": "warning", "detail": "TIM2 is not modelled",
+    }  # fmt: skip
+
+
+@pytest.mark.parametrize("slice_ns", [100_000, MS, 10 * MS])
+def test_a_run_ends_a_second_after_the_firmware_has_died(slice_ns: int) -> None:
+    chip = FakeChip(drives((0, 0, 0), (0.2, 3, 3)), halts_at=S // 2)
+    made = finished(Bench(scenario("direct"), chip=chip, slice_ns=slice_ns))
+    assert entries(made, "pose")[-1]["t"] == S + S // 2
+    assert made.finish() == S + S // 2

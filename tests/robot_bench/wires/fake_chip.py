@@ -1,0 +1,123 @@
+"""A chip without a processor: a script of pin changes and printed text, with times."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from enum import Enum
+from types import SimpleNamespace
+
+from bluepill_sim.fabric.pins import PinDrive
+
+
+class Reason(Enum):
+    """As the real chip's."""
+
+    DEADLINE = "deadline"
+    EDGE = "edge"
+    HALT = "halt"
+
+
+@dataclass(frozen=True)
+class Reached:
+    now: int
+    reason: Reason
+
+
+@dataclass(frozen=True)
+class FakeFault:
+    at_ns: int
+
+    def __str__(self) -> str:
+        return f"HardFault: no such instruction at main+0x4 (0x08000104), t = {self.at_ns / 1e9:.6f} s"
+
+
+class FakePin:
+    def __init__(self, chip: "FakeChip", name: str) -> None:
+        self._chip = chip
+        self.name = name
+        self.outside: bool | None = None
+        self.is_watched = False
+
+    def drive(self, level: bool | None) -> None:
+        if level is not self.outside:
+            self.outside = level
+            self._chip.inputs.append((self._chip.now_ns, self.name, level))
+
+    def watch(self, on: bool = True) -> None:
+        self.is_watched = on
+
+
+class FakeChip:
+    """Leads like the real one: it overruns every limit to its next block boundary, `block_ns` apart."""
+
+    def __init__(
+        self,
+        pins: Sequence[tuple[int, str, PinDrive]] = (),
+        text: Sequence[tuple[int, bytes]] = (),
+        *,
+        block_ns: int = 700,
+        halts_at: int | None = None,
+    ) -> None:
+        self.now_ns = 0
+        self.inputs: list[tuple[int, str, bool | None]] = []
+        self.on_pin: Callable[[str, PinDrive, int], None] | None = None
+        self.on_warning: Callable[[str], None] | None = None
+        self.usart1 = SimpleNamespace(on_transmit=None)
+        self.warnings: list[str] = []
+        self.fault: FakeFault | None = None
+        self.activity = SimpleNamespace(last_pin_ns=0, last_usart_ns=0, last_wfi_ns=0)
+        self._pins: dict[str, FakePin] = {}
+        bytes_out = [(at + 87_000 * n, byte) for at, line in text for n, byte in enumerate(line)]
+        self._script: list[tuple[int, str, object]] = sorted(
+            [(at, pin, drive) for at, pin, drive in pins] + [(at, "", byte) for at, byte in bytes_out],
+            key=lambda item: item[0],
+        )
+        self._done = 0
+        self._block_ns = block_ns
+        self._halts_at = halts_at
+
+    def pin(self, name: str) -> FakePin:
+        return self._pins.setdefault(name, FakePin(self, name))
+
+    def last_blocks(self) -> list[str]:
+        return [] if self.fault is None else ["          12  main+0x4 (0x08000104)"]
+
+    def where(self) -> str:
+        return "main+0x4 (0x08000104)"
+
+    def advance_to(self, limit: int) -> Reached:
+        while self.now_ns < limit:
+            boundary = (limit + self._block_ns - 1) // self._block_ns * self._block_ns
+            if self._done < len(self._script) and self._script[self._done][0] <= boundary:
+                at, name, what = self._script[self._done]
+                self._done += 1
+                self.now_ns = max(self.now_ns, at)
+                if self._tell(at, name, what):
+                    self.now_ns = (at + self._block_ns - 1) // self._block_ns * self._block_ns
+                    return Reached(self.now_ns, Reason.EDGE)
+                continue
+            if self._halts_at is not None and boundary >= self._halts_at:
+                self.fault = FakeFault(self._halts_at)
+                self.now_ns = limit
+                return Reached(self.now_ns, Reason.HALT)
+            self.now_ns = boundary
+        return Reached(self.now_ns, Reason.DEADLINE)
+
+    def _tell(self, at: int, name: str, what: object) -> bool:
+        if name:
+            self.activity.last_pin_ns = at
+            assert isinstance(what, PinDrive)
+            if self.on_pin is not None:
+                self.on_pin(name, what, at)
+            return self.pin(name).is_watched
+        self.activity.last_usart_ns = at
+        if self.usart1.on_transmit is not None:
+            self.usart1.on_transmit(what, at)
+        return False
+
+    def snapshot(self) -> object:
+        return (self.now_ns, self._done, tuple((name, pin.outside) for name, pin in self._pins.items()))
+
+    def restore(self, snapshot: object) -> None:
+        self.now_ns, self._done, pins = snapshot  # type: ignore[misc]
+        for name, outside in pins:
+            self.pin(name).outside = outside

@@ -1,6 +1,0 @@
-"""Fakes and short runs that the tests of the bench share."""
-
-import sys
-from pathlib import Path
-
-sys.path.insert(0, str(Path(__file__).parent))
