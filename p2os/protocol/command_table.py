@@ -1,4 +1,6 @@
-"""Every client command: what it takes, in which unit and range, who knows it, what it does.
+"""Every client command: what it takes, in which unit and range, which firmware knows it, what it does.
+
+How a command becomes bytes stands in `p2os.protocol.commands`.
 
 Source: command tables of the Pioneer 2 (P2OS), Pioneer 2/3 H8 (AROS) and
 Pioneer 3 (ARCOS) manuals; ARIA's list for what only ARIA and simulators name.
@@ -6,12 +8,6 @@ A version is the first one that the manual prints; "-" is not in that manual,
 "?" has not been seen. Where sources contradict each other, the row says so.
 
 Invariant: `ROWS` has one row for each `CommandNumber`.
-
-Every command number that a manual or a client in use names.
-
-What each one means, takes and who knows it stands in `p2os.protocol.command_table`.
-Source: command tables of the Pioneer 2 (P2OS), Pioneer 2/3 H8 (AROS) and
-Pioneer 3 (ARCOS) manuals; ARIA's list for what only ARIA and simulators name.
 """
 
 from collections.abc import Mapping
@@ -24,7 +20,7 @@ from p2os.protocol.profiles import Profile
 
 
 class CommandNumber(IntEnum):
-    """A client command by the manuals' word; where one number has two meanings, the table tells both."""
+    """A client command by the manuals' word; where one number has two meanings, the table has both."""
 
     PULSE = 0
     OPEN = 1
@@ -466,7 +462,7 @@ ROWS = (
     _row(_N.SIM_SET_POSE, (_A.DATA,), "", (12, 12), "- - -",
          "Simulators: move the robot; x and y in mm and the heading in degrees as three integers of 32 bits."),
     _row(_N.SIM_RESET, (_A.NONE,), "", None, "- - -", "Simulators: back to where the robot began."),
-    _row(_N.SIM_MODEL_CONFIG, (_A.DATA,), "", (0, 200), "- - -", "Simulators: a robot tells its measures."),
+    _row(_N.SIM_MODEL_CONFIG, (_A.DATA,), "", (0, 200), "- - -", "Simulators: a robot sends its dimensions."),
     _row(_N.SIM_LRF_ENABLE, (_A.INTEGER,), "", (0, 2), "- - -", "Simulators: laser packets 0 off, 1 on, 2 extended."),
     _row(_N.SIM_LRF_SET_FOV_START, (_A.INTEGER,), "deg", None, "- - -", "Simulators: where the laser's field begins."),
     _row(_N.SIM_LRF_SET_FOV_END, (_A.INTEGER,), "deg", None, "- - -", "Simulators: where the laser's field ends."),

@@ -74,7 +74,7 @@ class Command:
 
     @property
     def name(self) -> str:
-        """The manual's word for the command, or its number."""
+        """The command's name in the manuals, or its number."""
         row = self.row
         return f"command {self.number}" if row is None else row.name
 

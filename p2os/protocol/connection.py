@@ -1,34 +1,29 @@
 """One end of a P2OS line, as a passive state machine: bytes and time in, events and bytes out.
 
-Theory of operation and the tables stand in `p2os.protocol.connection`. This module adds
+It opens no port and reads no clock; which robot is looked for, and where, is
+the client's (`p2os.client.link`).
+
+Theory of operation. Three numbers do double duty: 0, 1 and 2 are SYNC0, SYNC1
+and SYNC2 while the two ends synchronise, and PULSE, OPEN and CLOSE once the
+session is open. The robot (server) echoes SYNC0 and SYNC1 and answers SYNC2 with
+its identity; SYNC0 restarts the handshake at any time before OPEN, a sync out of
+order gets no answer, and a sync repeated (because its echo was lost) is answered
+again. Once open, SYNC0 *is* a PULSE: a client that finds the robot streaming has
+to stop it and CLOSE first.
+
+The tables say which number leads from which state to which. Beside them stands
 what is counted in time: the client's timeouts, PULSE and liveness, the server's
 watchdog. Both roles share the decoder, the queues and the statistics; what only
-one of them does stands in `ClientSide` and `ServerSide`.
+one of them does stands in `_ClientSide` and `_ServerSide`.
 
 Safety rules of the client: to a robot that may be open from an earlier session,
 and after every loss, the first frames out are STOP and VEL 0, before CLOSE or
 SYNC0; any packet after a watchdog stop would revive the robot's last speed.
 
-Any exception other than `LocalProtocolError` for a call that the state does not
-allow is a bug here; no bytes received raise.
-
-The states of a connection, and its transitions as tables.
-
-Theory of operation. Three numbers do double duty: 0, 1 and 2 are SYNC0, SYNC1
-and SYNC2 while the two ends find each other, and PULSE, OPEN and CLOSE once the
-session is open. The robot (server) echoes SYNC0 and SYNC1 and answers SYNC2 with
-its identity; SYNC0 restarts it at any time before OPEN, a sync out of order gets
-no answer, and a sync repeated (because its echo was lost) is answered again. Once
-open, SYNC0 *is* a PULSE: a client that finds the robot streaming has to stop it
-and CLOSE first.
-
 Source: Pioneer 2/3 H8 manual, pages 42 and 43; Pioneer 3 manual, page 33.
 
-What both ends of a connection share: settings, statistics, and the line's queues.
-
-The client's end: synchronises, opens, keeps the robot's watchdog fed, notices silence.
-
-The robot's end: answers the handshake and keeps the watchdog.
+Invariant: no bytes received raise. Any exception other than `LocalProtocolError`
+for a call that the state does not allow is a bug here.
 """
 
 from collections import deque
@@ -62,6 +57,28 @@ from p2os.protocol.profiles import Profile
 from p2os.protocol.sip import SIP_KINDS, StandardSip
 from p2os.timing import NS_PER_MS, NS_PER_S, Nanos, Reached
 
+__all__ = [
+    "Closed",
+    "CommandReceived",
+    "ConfigReceived",
+    "ConnectFailed",
+    "Connection",
+    "ConnectionLost",
+    "ConnectionRole",
+    "ConnectionSettings",
+    "ConnectionState",
+    "ConnectionStats",
+    "Event",
+    "FrameIgnored",
+    "NoiseReceived",
+    "Opened",
+    "PacketReceived",
+    "SipReceived",
+    "Synchronised",
+    "WatchdogExpired",
+    "WatchdogRevived",
+]
+
 SYNC0, SYNC1, SYNC2 = 0, 1, 2
 
 
@@ -83,7 +100,7 @@ class ConnectionState(Enum):
     SYNC1 = "sync1"
     #: Client: SYNC2 is out.
     SYNC2 = "sync2"
-    #: The identity was said; OPEN is next.
+    #: The identity was sent; OPEN is next.
     SYNCED = "synced"
     #: Packets flow.
     OPEN = "open"
@@ -100,11 +117,11 @@ class Reply(Enum):
 
     #: Send the frame back.
     ECHO = "echo"
-    #: Say name, class and subclass.
+    #: Send name, class and subclass.
     IDENTIFY = "identify"
-    #: Tell the owner that the session is open.
+    #: Report to the owner that the session is open.
     OPEN = "open"
-    #: Tell the owner that it is closed.
+    #: Report to the owner that it is closed.
     CLOSE = "close"
     #: Hand the command to the owner.
     COMMAND = "command"
@@ -150,7 +167,7 @@ LENIENT_TABLE: Mapping[tuple[ConnectionState, int], tuple[ConnectionState, Reply
     (_S.OPEN, SYNC2): (_S.CLOSED, Reply.CLOSE),
 }
 
-#: Client: (state, packet type) → next state while synchronising; a late echo of an earlier sync is no news.
+#: Client: (state, packet type) → next state while synchronising; a late echo of an earlier sync is ignored.
 CLIENT_TABLE: Mapping[tuple[ConnectionState, int], ConnectionState] = {
     (_S.SYNC0, SYNC0): _S.SYNC1,
     (_S.SYNC1, SYNC1): _S.SYNC2,
@@ -159,6 +176,15 @@ CLIENT_TABLE: Mapping[tuple[ConnectionState, int], ConnectionState] = {
 
 #: Client: the sync that is out in each state.
 SYNC_OF_STATE: Mapping[ConnectionState, int] = {_S.SYNC0: SYNC0, _S.SYNC1: SYNC1, _S.SYNC2: SYNC2}
+
+#: States in which a session may be begun.
+IDLE = (_S.CLOSED, _S.LOST, _S.FAILED)
+#: Frames that a robot sends back as they came, while it is not open.
+ECHOES = (SYNC0, SYNC1)
+#: The robot's watchdog timeout, as shipped (CONFIGpac watchdog).
+WATCHDOG_NS: Nanos = 2 * NS_PER_S
+
+Message = Command | ServerPacket | Frame
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -177,7 +203,7 @@ class ConnectionSettings:
     close_wait_ns: Nanos = 200 * NS_PER_MS
     #: From the identity to OPEN; ARIA waits one cycle.
     open_delay_ns: Nanos = 100 * NS_PER_MS
-    #: A PULSE goes out when nothing else did for so long; the robot's watchdog bites after 2 s.
+    #: A PULSE goes out when nothing else did for so long; the robot's watchdog expires after 2 s.
     pulse_ns: Nanos = 500 * NS_PER_MS
     #: From OPEN to the first packet.
     first_packet_ns: Nanos = NS_PER_S
@@ -206,7 +232,7 @@ class ConnectionStats:
     frames_sent: int = 0
     #: Sound frames that the state had no use for.
     frames_ignored: int = 0
-    #: Packets of a known type whose inside was not sound.
+    #: Packets of a known type whose content was not sound.
     malformed: int = 0
     watchdog_stops: int = 0
     sync_timeouts: int = 0
@@ -214,328 +240,13 @@ class ConnectionStats:
     wire: DecoderStats = field(default_factory=DecoderStats)
 
 
-class Line:
-    """The queues between a connection's side and its owner."""
-
-    def __init__(self) -> None:
-        self.events: deque[Event] = deque()
-        self.output: list[bytes] = []
-        self.stats = ConnectionStats()
-        self.last_sent_ns: Nanos = 0
-
-    def put(self, frame: Frame, now: Nanos) -> None:
-        """Queue a frame for the wire."""
-        self.output.append(frame.to_bytes())
-        self.stats.frames_sent += 1
-        self.last_sent_ns = now
-
-
-#: States in which a session may be begun.
-IDLE = (_S.CLOSED, _S.LOST, _S.FAILED)
-#: Frames that a robot sends back as they came, while it is not open.
-ECHOES = (SYNC0, SYNC1)
-
-
-class ClientSide:
-    """What a client does with each frame and at its deadlines."""
-
-    def __init__(self, line: Line, settings: ConnectionSettings) -> None:
-        self._line = line
-        self._settings = settings
-        self.state = _S.CLOSED
-        #: When the present state runs out: a sync's answer, OPEN, SYNC0 after CLOSE, or liveness.
-        self._due: Nanos | None = None
-        self._attempts = 0
-        #: When OPEN goes out again, how often it has, and whether a packet has come since.
-        self._open_due: Nanos | None = None
-        self._opens = 0
-        self._has_heard = False
-
-    def connect(self, now: Nanos) -> None:
-        """Begin to open a session."""
-        if self.state not in IDLE:
-            raise LocalProtocolError(f"cannot connect: the connection is {self.state.value}", hint="disconnect first")
-        self._attempts = 0
-        if self.state is _S.LOST:
-            self._stop_and_close(now)
-        else:
-            self._sync(_S.SYNC0, now)
-
-    def disconnect(self, now: Nanos) -> None:
-        """Leave the robot standing and closed."""
-        if self.state is not _S.CLOSED:
-            self._say(now, stop(), vel(0), enable(False), Command(CommandNumber.CLOSE))
-            self._enter(_S.CLOSED, None)
-            self._line.events.append(Closed())
-
-    def take(self, frame: Frame, now: Nanos) -> None:
-        """Act on a sound frame."""
-        if self.state is _S.OPEN:
-            self._take_packet(frame, now)
-        elif self.state in SYNC_OF_STATE:
-            self._take_answer(frame, now)
-        else:
-            self._line.stats.frames_ignored += 1
-
-    def _take_answer(self, frame: Frame, now: Nanos) -> None:
-        """Act on what came while a sync is out."""
-        if frame.kind in SIP_KINDS:
-            self._stop_and_close(now)
-            return
-        if frame.kind in RESET_KINDS:
-            self._retry(now)
-            return
-        following = CLIENT_TABLE.get((self.state, frame.kind))
-        if following is None or (frame.kind == SYNC2) is not bool(frame.data):
-            self._line.stats.frames_ignored += 1
-            if frame.kind > SYNC2:
-                self._line.events.append(FrameIgnored(frame))
-        elif following is _S.SYNCED:
-            self._line.events.append(Synchronised(Identity.from_frame(frame)))
-            self._enter(_S.SYNCED, now + self._settings.open_delay_ns)
-        else:
-            self._sync(following, now)
-
-    def _take_packet(self, frame: Frame, now: Nanos) -> None:
-        """Act on a packet of the open session."""
-        if frame.kind in RESET_KINDS:
-            self._lose("the robot's controller was reset", now)
-            return
-        if frame.kind in ECHOES and not frame.data:
-            # What a robot answers before OPEN. Echoes that were late came before the first packet.
-            if self._has_heard:
-                self._lose("the robot was restarted", now)
-            else:
-                self._line.stats.frames_ignored += 1
-            return
-        self._has_heard, self._open_due = True, None
-        self._due = now + self._settings.liveness_ns
-        packet = read_packet(frame, self._settings.profile)
-        if isinstance(packet, StandardSip):
-            self._line.events.append(SipReceived(packet))
-        elif isinstance(packet, ConfigPacket):
-            self._line.events.append(ConfigReceived(packet))
-        else:
-            self._line.stats.malformed += frame.kind in SIP_KINDS
-            self._line.events.append(PacketReceived(packet))
-
-    def next_deadline(self) -> Nanos | None:
-        """Return when a timeout or a PULSE is due."""
-        if self.state is not _S.OPEN or self._due is None:
-            return self._due
-        due = min(self._due, self._line.last_sent_ns + self._settings.pulse_ns)
-        return due if self._open_due is None else min(due, self._open_due)
-
-    def set_profile(self, profile: Profile) -> None:
-        """Read packets in a firmware family's layout from now on."""
-        self._settings = replace(self._settings, profile=profile)
-
-    def advance_to(self, now: Nanos) -> None:
-        """Act on what is due at `now`."""
-        if self._due is not None and now >= self._due:
-            self._time_out(now)
-        if self.state is _S.OPEN and self._open_due is not None and now >= self._open_due:
-            self._open(now)
-        if self.state is _S.OPEN and now >= self._line.last_sent_ns + self._settings.pulse_ns:
-            self._say(now, pulse())
-
-    def _time_out(self, now: Nanos) -> None:
-        if self.state in SYNC_OF_STATE:
-            self._line.stats.sync_timeouts += 1
-            self._retry(now)
-        elif self.state is _S.RECOVERING:
-            self._sync(_S.SYNC0, now)
-        elif self.state is _S.SYNCED:
-            self._enter(_S.OPEN, now + self._settings.first_packet_ns)
-            self._opens, self._has_heard = 0, False
-            self._open(now)
-            self._line.events.append(Opened())
-        else:
-            silence = self._settings.liveness_ns if self._has_heard else self._settings.first_packet_ns
-            after = "" if self._has_heard else " after OPEN"
-            self._lose(f"no packet for {silence / NS_PER_MS:g} ms{after}", now)
-
-    def _open(self, now: Nanos) -> None:
-        """Send OPEN, and know when to send it again."""
-        self._say(now, Command(CommandNumber.OPEN))
-        self._opens += 1
-        again = self._opens < self._settings.open_attempts
-        self._open_due = now + self._settings.open_retry_ns if again else None
-
-    def _retry(self, now: Nanos) -> None:
-        """Begin again at SYNC0, or give up."""
-        if self._attempts >= self._settings.sync_attempts:
-            self._enter(_S.FAILED, None)
-            self._line.events.append(ConnectFailed(f"no answer to {self._attempts} SYNC0"))
-        else:
-            self._sync(_S.SYNC0, now)
-
-    def _sync(self, state: ConnectionState, now: Nanos) -> None:
-        """Send the sync of a state and wait for its answer."""
-        if state is _S.SYNC0:
-            self._attempts += 1
-            if self._settings.stop_first:
-                self._say(now, stop(), vel(0), rvel(0))
-        self._say(now, Command(SYNC_OF_STATE[state]))
-        self._enter(state, now + self._settings.sync_timeout_ns)
-
-    def _stop_and_close(self, now: Nanos) -> None:
-        """Bring a robot that may be open and moving to a stand, close it, and try again."""
-        if self._attempts >= self._settings.sync_attempts:
-            self._say(now, stop(), vel(0), Command(CommandNumber.CLOSE))
-            self._retry(now)
-            return
-        self._say(now, stop(), vel(0), Command(CommandNumber.CLOSE))
-        self._enter(_S.RECOVERING, now + self._settings.close_wait_ns)
-
-    def _lose(self, reason: str, now: Nanos) -> None:
-        self._line.stats.losses += 1
-        self._say(now, stop(), vel(0))
-        self._enter(_S.LOST, None)
-        self._line.events.append(ConnectionLost(reason))
-
-    def _say(self, now: Nanos, *commands: Command) -> None:
-        for command in commands:
-            self._line.put(command.to_frame(), now)
-
-    def _enter(self, state: ConnectionState, due: Nanos | None) -> None:
-        self.state, self._due, self._open_due = state, due, None
-
-    def snapshot(self) -> object:
-        """Return all that decides the future."""
-        return self.state, self._due, self._attempts, self._open_due, self._opens, self._has_heard, self._settings
-
-    def restore(self, snapshot: object) -> None:
-        """Put back what `snapshot` returned."""
-        saved = cast("tuple[ConnectionState, Nanos | None, int, Nanos | None, int, bool, ConnectionSettings]", snapshot)
-        self.state, self._due, self._attempts, self._open_due, self._opens, self._has_heard, self._settings = saved
-
-
-class ServerSide:
-    """What a server does with each frame and at its one deadline.
-
-    The watchdog runs from OPEN. It fires once, and the first sound frame after
-    it is told before the command that the frame carries.
-    """
-
-    def __init__(self, line: Line, identity: Identity, watchdog_ns: Nanos, *, lenient: bool = False) -> None:
-        self._line = line
-        self._identity = identity
-        self._watchdog_ns = watchdog_ns
-        self._bare_table = LENIENT_TABLE if lenient else SERVER_TABLE
-        self.state = ConnectionState.CLOSED
-        self._last_frame_ns: Nanos = 0
-        self._expired = False
-
-    def take(self, frame: Frame, now: Nanos) -> None:
-        """Act on a sound frame."""
-        if self.state is ConnectionState.OPEN:
-            self._last_frame_ns = now
-            if self._expired:
-                self._expired = False
-                self._line.events.append(WatchdogRevived())
-        if frame.kind > SYNC2:
-            self._command(frame)
-            return
-        table: Mapping[tuple[ConnectionState, int], tuple[ConnectionState, Reply]] = (
-            SERVER_ARGUMENT_TABLE if frame.data else self._bare_table
-        )
-        self.state, reply = table.get((self.state, frame.kind), (self.state, None))
-        self._reply(reply, frame, now)
-
-    def _command(self, frame: Frame) -> None:
-        if self.state is ConnectionState.OPEN:
-            self._line.events.append(CommandReceived(Command.from_frame(frame)))
-        else:
-            self._line.stats.frames_ignored += 1
-
-    def _reply(self, reply: Reply | None, frame: Frame, now: Nanos) -> None:
-        match reply:
-            case Reply.ECHO:
-                self._line.put(frame, now)
-            case Reply.IDENTIFY:
-                self._line.put(self._identity.to_frame(), now)
-                self._line.events.append(Synchronised(self._identity))
-            case Reply.OPEN:
-                self._last_frame_ns, self._expired = now, False
-                self._line.events.append(Opened())
-            case Reply.CLOSE:
-                self._line.events.append(Closed())
-            case Reply.COMMAND:
-                self._command(frame)
-            case _:
-                self._line.stats.frames_ignored += 1
-
-    def next_deadline(self) -> Nanos | None:
-        """Return when the watchdog bites."""
-        if self.state is not ConnectionState.OPEN or self._expired:
-            return None
-        return self._last_frame_ns + self._watchdog_ns
-
-    def advance_to(self, now: Nanos) -> None:
-        """Let the watchdog bite if it is due."""
-        due = self.next_deadline()
-        if due is not None and now >= due:
-            self._expired = True
-            self._line.stats.watchdog_stops += 1
-            self._line.events.append(WatchdogExpired())
-
-    def count_silence(self, silence: Nanos, now: Nanos) -> None:
-        """Let the watchdog count a time in which nothing came, and which `now` does not contain."""
-        self._last_frame_ns = max(self._last_frame_ns - silence, now - self._watchdog_ns)
-
-    def snapshot(self) -> object:
-        """Return all that decides the future."""
-        return self.state, self._last_frame_ns, self._expired
-
-    def restore(self, snapshot: object) -> None:
-        """Put back what `snapshot` returned."""
-        self.state, self._last_frame_ns, self._expired = cast("tuple[ConnectionState, Nanos, bool]", snapshot)
-
-
-__all__ = [
-    "Closed",
-    "CommandReceived",
-    "ConfigReceived",
-    "ConnectFailed",
-    "Connection",
-    "ConnectionLost",
-    "ConnectionRole",
-    "ConnectionSettings",
-    "ConnectionState",
-    "ConnectionStats",
-    "Event",
-    "FrameIgnored",
-    "NoiseReceived",
-    "Opened",
-    "PacketReceived",
-    "SipReceived",
-    "Synchronised",
-    "WatchdogExpired",
-    "WatchdogRevived",
-]
-
-Message = Command | ServerPacket | Frame
-WATCHDOG_NS: Nanos = 2 * NS_PER_S
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class _Snapshot:
-    decoder: object
-    side: object
-    events: tuple[Event, ...]
-    output: tuple[bytes, ...]
-    stats: ConnectionStats
-    last_sent_ns: Nanos
-
-
 class Connection:
     """One end of a P2OS line.
 
     Args:
         role: Which end this is.
-        identity: Server: what it says in answer to SYNC2.
-        watchdog_ns: Server: how long it stays open for motion without a sound frame.
+        identity: Server: what it sends in answer to SYNC2.
+        watchdog_ns: Server: how long the robot may move without a sound frame.
         settings: The client's times, and the firmware family for both.
         lenient: Server: answers syncs in any order, as AMRISim does.
     """
@@ -552,14 +263,14 @@ class Connection:
         self.role = role
         self.settings = settings or ConnectionSettings()
         self._decoder = Decoder()
-        self._line = Line()
-        self._side: ClientSide | ServerSide
+        self._queues = _Queues()
+        self._side: _ClientSide | _ServerSide
         if role is ConnectionRole.SERVER:
-            self._side = ServerSide(
-                self._line, identity or Identity("", "Pioneer", "p2dx"), watchdog_ns, lenient=lenient
+            self._side = _ServerSide(
+                self._queues, identity or Identity("", "Pioneer", "p2dx"), watchdog_ns, lenient=lenient
             )
         else:
-            self._side = ClientSide(self._line, self.settings)
+            self._side = _ClientSide(self._queues, self.settings)
 
     @property
     def state(self) -> ConnectionState:
@@ -574,21 +285,21 @@ class Connection:
     @property
     def stats(self) -> ConnectionStats:
         """Counters since the beginning; a copy."""
-        return replace(self._line.stats, wire=replace(self._decoder.stats))
+        return replace(self._queues.stats, wire=replace(self._decoder.stats))
 
     def receive(self, data: bytes, now: Nanos) -> None:
-        """Take bytes that arrived at `now` nanoseconds; noise is counted and told, never raised."""
+        """Take bytes that arrived at `now` nanoseconds; noise is counted and reported, never raised."""
         self.advance_to(now)
         self._decoder.receive(data, now)
         self._drain(now)
 
     def next_event(self) -> Event | None:
         """Return what happened next, or None."""
-        return self._line.events.popleft() if self._line.events else None
+        return self._queues.events.popleft() if self._queues.events else None
 
     def take_output(self) -> list[bytes]:
         """Return what has to go out, one item a frame, in order."""
-        output, self._line.output = self._line.output, []
+        output, self._queues.output = self._queues.output, []
         return output
 
     def send(self, message: Message, now: Nanos) -> None:
@@ -607,7 +318,7 @@ class Connection:
             frame = message.to_frame()
         else:
             frame = packet_frame(message, self.settings.profile)
-        self._line.put(frame, now)
+        self._queues.put(frame, now)
 
     def connect(self, now: Nanos) -> None:
         """Client: begin to open a session; a lost or half-open one is stopped and closed first.
@@ -624,7 +335,7 @@ class Connection:
     def set_profile(self, profile: Profile) -> None:
         """Read and write packets in a firmware family's layout from now on."""
         self.settings = replace(self.settings, profile=profile)
-        if isinstance(self._side, ClientSide):
+        if isinstance(self._side, _ClientSide):
             self._side.set_profile(profile)
 
     def count_silence(self, silence: Nanos, now: Nanos) -> None:
@@ -633,7 +344,7 @@ class Connection:
         Raises:
             LocalProtocolError: This is the client's end.
         """
-        if not isinstance(self._side, ServerSide):
+        if not isinstance(self._side, _ServerSide):
             raise LocalProtocolError("only the server's end has a watchdog")
         self._side.count_silence(silence, now)
 
@@ -652,14 +363,14 @@ class Connection:
 
     def snapshot(self) -> object:
         """Return all that decides the future."""
-        line = self._line
+        queues = self._queues
         return _Snapshot(
             decoder=self._decoder.snapshot(),
             side=self._side.snapshot(),
-            events=tuple(line.events),
-            output=tuple(line.output),
-            stats=replace(line.stats),
-            last_sent_ns=line.last_sent_ns,
+            events=tuple(queues.events),
+            output=tuple(queues.output),
+            stats=replace(queues.stats),
+            last_sent_ns=queues.last_sent_ns,
         )
 
     def restore(self, snapshot: object) -> None:
@@ -667,21 +378,301 @@ class Connection:
         saved = cast("_Snapshot", snapshot)
         self._decoder.restore(saved.decoder)
         self._side.restore(saved.side)
-        self._line.events = deque(saved.events)
-        self._line.output = list(saved.output)
-        self._line.stats = replace(saved.stats)
-        self._line.last_sent_ns = saved.last_sent_ns
+        self._queues.events = deque(saved.events)
+        self._queues.output = list(saved.output)
+        self._queues.stats = replace(saved.stats)
+        self._queues.last_sent_ns = saved.last_sent_ns
 
-    def _client(self, verb: str) -> ClientSide:
-        if not isinstance(self._side, ClientSide):
+    def _client(self, verb: str) -> "_ClientSide":
+        if not isinstance(self._side, _ClientSide):
             raise LocalProtocolError(f"a server cannot {verb}: it waits for its client")
         return self._side
 
     def _drain(self, now: Nanos) -> None:
-        """Hand every item that the decoder found to the side whose turn it is."""
+        """Hand every item that the decoder found to this end's side."""
         while (item := self._decoder.next_item()) is not None:
             if isinstance(item, Frame):
-                self._line.stats.frames_received += 1
+                self._queues.stats.frames_received += 1
                 self._side.take(item, now)
             else:
-                self._line.events.append(NoiseReceived(item))
+                self._queues.events.append(NoiseReceived(item))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Snapshot:
+    decoder: object
+    side: object
+    events: tuple[Event, ...]
+    output: tuple[bytes, ...]
+    stats: ConnectionStats
+    last_sent_ns: Nanos
+
+
+class _Queues:
+    """The queues between a connection's side and its owner."""
+
+    def __init__(self) -> None:
+        self.events: deque[Event] = deque()
+        self.output: list[bytes] = []
+        self.stats = ConnectionStats()
+        self.last_sent_ns: Nanos = 0
+
+    def put(self, frame: Frame, now: Nanos) -> None:
+        """Queue a frame for the wire."""
+        self.output.append(frame.to_bytes())
+        self.stats.frames_sent += 1
+        self.last_sent_ns = now
+
+
+class _ClientSide:
+    """What a client does with each frame and at its deadlines."""
+
+    def __init__(self, queues: _Queues, settings: ConnectionSettings) -> None:
+        self._queues = queues
+        self._settings = settings
+        self.state = _S.CLOSED
+        #: When the present state runs out: a sync's answer, OPEN, SYNC0 after CLOSE, or liveness.
+        self._due: Nanos | None = None
+        self._attempts = 0
+        #: When OPEN goes out again, how often it has, and whether a packet has come since.
+        self._open_due: Nanos | None = None
+        self._opens = 0
+        self._has_received = False
+
+    def connect(self, now: Nanos) -> None:
+        """Begin to open a session."""
+        if self.state not in IDLE:
+            raise LocalProtocolError(f"cannot connect: the connection is {self.state.value}", hint="disconnect first")
+        self._attempts = 0
+        if self.state is _S.LOST:
+            self._stop_and_close(now)
+        else:
+            self._sync(_S.SYNC0, now)
+
+    def disconnect(self, now: Nanos) -> None:
+        """Stop the robot and close its session."""
+        if self.state is not _S.CLOSED:
+            self._send(now, stop(), vel(0), enable(False), Command(CommandNumber.CLOSE))
+            self._enter(_S.CLOSED, None)
+            self._queues.events.append(Closed())
+
+    def take(self, frame: Frame, now: Nanos) -> None:
+        """Act on a sound frame."""
+        if self.state is _S.OPEN:
+            self._take_packet(frame, now)
+        elif self.state in SYNC_OF_STATE:
+            self._take_answer(frame, now)
+        else:
+            self._queues.stats.frames_ignored += 1
+
+    def _take_answer(self, frame: Frame, now: Nanos) -> None:
+        """Act on what came while a sync is out."""
+        if frame.kind in SIP_KINDS:
+            self._stop_and_close(now)
+            return
+        if frame.kind in RESET_KINDS:
+            self._retry(now)
+            return
+        following = CLIENT_TABLE.get((self.state, frame.kind))
+        if following is None or (frame.kind == SYNC2) is not bool(frame.data):
+            self._queues.stats.frames_ignored += 1
+            if frame.kind > SYNC2:
+                self._queues.events.append(FrameIgnored(frame))
+        elif following is _S.SYNCED:
+            self._queues.events.append(Synchronised(Identity.from_frame(frame)))
+            self._enter(_S.SYNCED, now + self._settings.open_delay_ns)
+        else:
+            self._sync(following, now)
+
+    def _take_packet(self, frame: Frame, now: Nanos) -> None:
+        """Act on a packet of the open session."""
+        if frame.kind in RESET_KINDS:
+            self._lose("the robot's controller was reset", now)
+            return
+        if frame.kind in ECHOES and not frame.data:
+            # What a robot answers before OPEN. Echoes that were late came before the first packet.
+            if self._has_received:
+                self._lose("the robot was restarted", now)
+            else:
+                self._queues.stats.frames_ignored += 1
+            return
+        self._has_received, self._open_due = True, None
+        self._due = now + self._settings.liveness_ns
+        packet = read_packet(frame, self._settings.profile)
+        if isinstance(packet, StandardSip):
+            self._queues.events.append(SipReceived(packet))
+        elif isinstance(packet, ConfigPacket):
+            self._queues.events.append(ConfigReceived(packet))
+        else:
+            self._queues.stats.malformed += frame.kind in SIP_KINDS
+            self._queues.events.append(PacketReceived(packet))
+
+    def next_deadline(self) -> Nanos | None:
+        """Return when a timeout or a PULSE is due."""
+        if self.state is not _S.OPEN or self._due is None:
+            return self._due
+        due = min(self._due, self._queues.last_sent_ns + self._settings.pulse_ns)
+        return due if self._open_due is None else min(due, self._open_due)
+
+    def set_profile(self, profile: Profile) -> None:
+        """Read packets in a firmware family's layout from now on."""
+        self._settings = replace(self._settings, profile=profile)
+
+    def advance_to(self, now: Nanos) -> None:
+        """Act on what is due at `now`."""
+        if self._due is not None and now >= self._due:
+            self._time_out(now)
+        if self.state is _S.OPEN and self._open_due is not None and now >= self._open_due:
+            self._open(now)
+        if self.state is _S.OPEN and now >= self._queues.last_sent_ns + self._settings.pulse_ns:
+            self._send(now, pulse())
+
+    def _time_out(self, now: Nanos) -> None:
+        if self.state in SYNC_OF_STATE:
+            self._queues.stats.sync_timeouts += 1
+            self._retry(now)
+        elif self.state is _S.RECOVERING:
+            self._sync(_S.SYNC0, now)
+        elif self.state is _S.SYNCED:
+            self._enter(_S.OPEN, now + self._settings.first_packet_ns)
+            self._opens, self._has_received = 0, False
+            self._open(now)
+            self._queues.events.append(Opened())
+        else:
+            silence = self._settings.liveness_ns if self._has_received else self._settings.first_packet_ns
+            after = "" if self._has_received else " after OPEN"
+            self._lose(f"no packet for {silence / NS_PER_MS:g} ms{after}", now)
+
+    def _open(self, now: Nanos) -> None:
+        """Send OPEN, and know when to send it again."""
+        self._send(now, Command(CommandNumber.OPEN))
+        self._opens += 1
+        again = self._opens < self._settings.open_attempts
+        self._open_due = now + self._settings.open_retry_ns if again else None
+
+    def _retry(self, now: Nanos) -> None:
+        """Begin again at SYNC0, or give up."""
+        if self._attempts >= self._settings.sync_attempts:
+            self._enter(_S.FAILED, None)
+            self._queues.events.append(ConnectFailed(f"no answer to {self._attempts} SYNC0"))
+        else:
+            self._sync(_S.SYNC0, now)
+
+    def _sync(self, state: ConnectionState, now: Nanos) -> None:
+        """Send the sync of a state and wait for its answer."""
+        if state is _S.SYNC0:
+            self._attempts += 1
+            if self._settings.stop_first:
+                self._send(now, stop(), vel(0), rvel(0))
+        self._send(now, Command(SYNC_OF_STATE[state]))
+        self._enter(state, now + self._settings.sync_timeout_ns)
+
+    def _stop_and_close(self, now: Nanos) -> None:
+        """Stop a robot that may be open and moving, close its session, and try again."""
+        self._send(now, stop(), vel(0), Command(CommandNumber.CLOSE))
+        if self._attempts >= self._settings.sync_attempts:
+            self._retry(now)
+        else:
+            self._enter(_S.RECOVERING, now + self._settings.close_wait_ns)
+
+    def _lose(self, reason: str, now: Nanos) -> None:
+        self._queues.stats.losses += 1
+        self._send(now, stop(), vel(0))
+        self._enter(_S.LOST, None)
+        self._queues.events.append(ConnectionLost(reason))
+
+    def _send(self, now: Nanos, *commands: Command) -> None:
+        for command in commands:
+            self._queues.put(command.to_frame(), now)
+
+    def _enter(self, state: ConnectionState, due: Nanos | None) -> None:
+        self.state, self._due, self._open_due = state, due, None
+
+    def snapshot(self) -> object:
+        """Return all that decides the future."""
+        return self.state, self._due, self._attempts, self._open_due, self._opens, self._has_received, self._settings
+
+    def restore(self, snapshot: object) -> None:
+        """Put back what `snapshot` returned."""
+        saved = cast("tuple[ConnectionState, Nanos | None, int, Nanos | None, int, bool, ConnectionSettings]", snapshot)
+        self.state, self._due, self._attempts, self._open_due, self._opens, self._has_received, self._settings = saved
+
+
+class _ServerSide:
+    """What a server does with each frame and at its one deadline.
+
+    The watchdog runs from OPEN. It expires once, and the first sound frame after
+    that is reported before the command that the frame carries.
+    """
+
+    def __init__(self, queues: _Queues, identity: Identity, watchdog_ns: Nanos, *, lenient: bool = False) -> None:
+        self._queues = queues
+        self._identity = identity
+        self._watchdog_ns = watchdog_ns
+        self._bare_table = LENIENT_TABLE if lenient else SERVER_TABLE
+        self.state = ConnectionState.CLOSED
+        self._last_frame_ns: Nanos = 0
+        self._expired = False
+
+    def take(self, frame: Frame, now: Nanos) -> None:
+        """Act on a sound frame."""
+        if self.state is ConnectionState.OPEN:
+            self._last_frame_ns = now
+            if self._expired:
+                self._expired = False
+                self._queues.events.append(WatchdogRevived())
+        if frame.kind > SYNC2:
+            self._command(frame)
+            return
+        table = SERVER_ARGUMENT_TABLE if frame.data else self._bare_table
+        self.state, reply = table.get((self.state, frame.kind), (self.state, None))
+        self._reply(reply, frame, now)
+
+    def _command(self, frame: Frame) -> None:
+        if self.state is ConnectionState.OPEN:
+            self._queues.events.append(CommandReceived(Command.from_frame(frame)))
+        else:
+            self._queues.stats.frames_ignored += 1
+
+    def _reply(self, reply: Reply | None, frame: Frame, now: Nanos) -> None:
+        match reply:
+            case Reply.ECHO:
+                self._queues.put(frame, now)
+            case Reply.IDENTIFY:
+                self._queues.put(self._identity.to_frame(), now)
+                self._queues.events.append(Synchronised(self._identity))
+            case Reply.OPEN:
+                self._last_frame_ns, self._expired = now, False
+                self._queues.events.append(Opened())
+            case Reply.CLOSE:
+                self._queues.events.append(Closed())
+            case Reply.COMMAND:
+                self._command(frame)
+            case _:
+                self._queues.stats.frames_ignored += 1
+
+    def next_deadline(self) -> Nanos | None:
+        """Return when the watchdog expires."""
+        if self.state is not ConnectionState.OPEN or self._expired:
+            return None
+        return self._last_frame_ns + self._watchdog_ns
+
+    def advance_to(self, now: Nanos) -> None:
+        """Let the watchdog expire if it is due."""
+        due = self.next_deadline()
+        if due is not None and now >= due:
+            self._expired = True
+            self._queues.stats.watchdog_stops += 1
+            self._queues.events.append(WatchdogExpired())
+
+    def count_silence(self, silence: Nanos, now: Nanos) -> None:
+        """Let the watchdog count a time in which nothing came, and which `now` does not contain."""
+        self._last_frame_ns = max(self._last_frame_ns - silence, now - self._watchdog_ns)
+
+    def snapshot(self) -> object:
+        """Return all that decides the future."""
+        return self.state, self._last_frame_ns, self._expired
+
+    def restore(self, snapshot: object) -> None:
+        """Put back what `snapshot` returned."""
+        self.state, self._last_frame_ns, self._expired = cast("tuple[ConnectionState, Nanos, bool]", snapshot)

@@ -1,4 +1,4 @@
-"""What a connection tells its owner: past-tense facts, in the order of the stream."""
+"""What a connection reports to its owner: past-tense facts, in the order of the stream."""
 
 from dataclasses import dataclass
 
@@ -11,7 +11,7 @@ from p2os.protocol.sip import StandardSip
 
 @dataclass(frozen=True, slots=True)
 class Synchronised:
-    """SYNC0, SYNC1 and SYNC2 are done; the robot has said who it is."""
+    """SYNC0, SYNC1 and SYNC2 are done; the robot has sent its identity."""
 
     identity: Identity
 
@@ -23,7 +23,7 @@ class Opened:
 
 @dataclass(frozen=True, slots=True)
 class Closed:
-    """The session was ended by one of the two."""
+    """The session was closed, by either end."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,33 +49,33 @@ class ConfigReceived:
 
 @dataclass(frozen=True, slots=True)
 class PacketReceived:
-    """The client took a packet of another type, or one whose inside is not sound."""
+    """The client took a packet of another type, or one whose content is not sound."""
 
     packet: ServerPacket
 
 
 @dataclass(frozen=True, slots=True)
 class FrameIgnored:
-    """The client took a sound frame that answers nothing it has said while synchronising."""
+    """The client took a sound frame that answers nothing it has sent while synchronising."""
 
     frame: Frame
 
 
 @dataclass(frozen=True, slots=True)
 class NoiseReceived:
-    """Bytes came that are no sound frame."""
+    """Bytes were received that are no sound frame."""
 
     item: Noise | BadChecksum | BadCount | Stalled
 
 
 @dataclass(frozen=True, slots=True)
 class WatchdogExpired:
-    """Server: no sound frame came for the watchdog's time; the robot has to stop."""
+    """Server: no sound frame came within the watchdog's timeout; the robot has to stop."""
 
 
 @dataclass(frozen=True, slots=True)
 class WatchdogRevived:
-    """Server: the first frame after the watchdog; the last speeds hold again unless it says otherwise."""
+    """Server: the first frame after the watchdog; the last speeds apply again unless it sets others."""
 
 
 @dataclass(frozen=True, slots=True)

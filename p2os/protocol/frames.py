@@ -1,27 +1,22 @@
-"""A re-scanning decoder: bytes in, frames and remarks out.
+"""P2OS frames on the wire: header, count, payload, checksum; and the decoder that finds them in a stream.
+
+What stands in a payload is read elsewhere (`p2os.protocol.commands`,
+`p2os.protocol.packets`).
 
 Theory of operation. Bytes wait in one buffer. At its head the decoder wants
 `FA FB`, a count of 3 to 204, and that many bytes. Whatever does not fit costs
 one byte: the head moves on by one and the same bytes are looked at again, so a
 damaged frame hides nothing that follows it. A frame whose bytes stop coming for
 `GIVE_UP_NS` is treated as damaged, so that a false header with a legal count
-cannot hold up a quiet line.
-
-The price of re-scanning: a frame that stands inside the payload of a damaged
-frame can be found. Inside a sound frame nothing is looked for.
-
-Invariant: the buffer never holds more than one frame (207 bytes) between calls.
-
-The P2OS checksum (Pioneer manuals, "Packet checksum").
-
-A 16-bit sum of big-endian pairs over the bytes from the command or type byte
-to the last argument; an odd last byte is XORed into the low byte. Header,
-count and the checksum itself are left out.
-
-A P2OS frame: header, count, payload, checksum.
+cannot hold up a quiet line. The price of re-scanning: a frame that stands inside
+the payload of a damaged frame can be found. Inside a sound frame nothing is
+looked for.
 
 Source: Pioneer 3 manual, page 32; P2OS manual, page 36.
-Invariant: a `Frame` that exists can be sent; `from_bytes` and `to_bytes` are inverses.
+
+Invariants: a `Frame` that exists can be sent, and `from_bytes` and `to_bytes`
+are inverses. The decoder's buffer never holds more than one frame (207 bytes)
+between calls.
 """
 
 from collections import deque
@@ -30,16 +25,6 @@ from typing import cast
 
 from p2os.errors import LocalProtocolError
 from p2os.timing import NS_PER_MS, Nanos, Reached
-
-
-def checksum(data: bytes) -> int:
-    """Return the checksum of a frame's payload, 0 to 0xFFFF."""
-    even = len(data) & ~1
-    total = 256 * sum(data[0:even:2]) + sum(data[1:even:2])
-    if len(data) != even:
-        return (total & 0xFFFF) ^ data[-1]
-    return total & 0xFFFF
-
 
 HEADER = b"\xfa\xfb"
 #: Header and count.
@@ -50,6 +35,10 @@ MIN_COUNT = 3
 #: Largest count that an ARCOS robot accepts (Pioneer 3 manual, page 32).
 MAX_COUNT = 204
 MAX_PAYLOAD_BYTES = MAX_COUNT - CHECKSUM_BYTES
+#: chosen: two and a half SIP cycles; the longest frame takes 216 ms at 9600 baud, but its bytes never pause so long.
+GIVE_UP_NS: Nanos = 250 * NS_PER_MS
+#: How many of the bytes last rejected are kept for a person to look at.
+KEPT_BYTES = 32
 
 
 @dataclass(frozen=True, slots=True)
@@ -102,10 +91,17 @@ class Frame:
         return cls(payload)
 
 
-#: chosen: two and a half SIP cycles; the longest frame takes 216 ms at 9600 baud, but its bytes never pause so long.
-GIVE_UP_NS: Nanos = 250 * NS_PER_MS
-#: How many of the bytes last rejected are kept for a person to look at.
-KEPT_BYTES = 32
+def checksum(data: bytes) -> int:
+    """Return the checksum of a frame's payload, 0 to 0xFFFF.
+
+    A 16-bit sum of big-endian pairs; an odd last byte is XORed into the low byte.
+    Source: Pioneer manuals, "Packet checksum".
+    """
+    even = len(data) & ~1
+    total = 256 * sum(data[0:even:2]) + sum(data[1:even:2])
+    if len(data) != even:
+        return (total & 0xFFFF) ^ data[-1]
+    return total & 0xFFFF
 
 
 @dataclass(frozen=True, slots=True)
@@ -221,7 +217,7 @@ class Decoder:
             size = count + PREFIX_BYTES
             if len(buffer) < size:
                 break
-            self._judge(bytes(buffer[:size]))
+            self._check(bytes(buffer[:size]))
         self._flush_noise()
 
     def _header(self) -> int:
@@ -231,8 +227,8 @@ class Decoder:
             return start
         return len(self._buffer) - (1 if self._buffer[-1] == HEADER[0] else 0)
 
-    def _judge(self, data: bytes) -> None:
-        """Take a whole frame's bytes for a frame, or reject them."""
+    def _check(self, data: bytes) -> None:
+        """Check a whole frame's bytes by their checksum: take the frame, or reject them."""
         payload = data[PREFIX_BYTES:-CHECKSUM_BYTES]
         got, expected = int.from_bytes(data[-CHECKSUM_BYTES:], "big"), checksum(payload)
         self._flush_noise()

@@ -1,7 +1,7 @@
 """What a robot sends: one frozen dataclass a kind of packet, read and written by one declaration.
 
 `read_packet(frame, profile)` reads any frame of an open session. A type that is
-not declared, or a packet whose inside is not sound, comes through as a
+not declared, or a packet whose content is not sound, comes through as a
 `RawPacket`: nothing is ever lost.
 """
 

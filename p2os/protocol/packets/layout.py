@@ -2,7 +2,7 @@
 
 A layout covers the bytes after the packet's type that are known; firmware only
 ever appends, so what follows them is kept as `rest`. A packet that ends inside
-its layout is not sound and is refused: `read_packet` then gives it raw.
+its layout is not sound and is refused: `read_packet` then returns it raw.
 
 Invariant: `build(kind, layout, **parse(layout, frame)) == frame` for every
 frame of that kind that `parse` accepts.
@@ -24,7 +24,7 @@ def parse(layout: Construct, frame: Frame) -> Fields:
     """Return the fields of a frame's data by their names, and what follows them as `rest`.
 
     Raises:
-        RemoteProtocolError: The data is shorter than the layout says.
+        RemoteProtocolError: The data is shorter than the layout.
     """
     stream = io.BytesIO(frame.data)
     try:

@@ -1,14 +1,14 @@
-"""Which type is which packet: the one table, and reading by it.
+"""Which type is which packet: the one table, reading by it, and the two packets that are not in it.
 
-Source: the packet tables of the manuals and ARIA's list of types. A type whose
-layout nobody has published (0x7B, 0x7C, 0x95, 0x9A, 0xD3, 0xD5, 0xDA) has a
-name here and comes through raw.
+The answer to SYNC2 (`Identity`) is read by its type alone; a type that is unknown, or
+a packet whose content is not sound, stays a `RawPacket`.
 
-A packet whose inside is not read: an unknown type, or one that is not sound.
+Source: the packet tables of the manuals and ARIA's list of types; Pioneer 3
+manual, page 33, for the identity: every client takes a single type-2 frame. A
+type whose layout nobody has published (0x7B, 0x7C, 0x95, 0x9A, 0xD3, 0xD5, 0xDA)
+has a name here and comes through raw.
 
-Who a robot says it is: the answer to SYNC2.
-
-Source: Pioneer 3 manual, page 33; every client takes a single type-2 frame.
+Invariant: `packet_frame(read_packet(frame, profile), profile) == frame` for every frame.
 """
 
 from collections.abc import Callable, Mapping
@@ -32,10 +32,14 @@ from p2os.protocol.packets.simulator import MapChangedPacket, SiminfoPacket, Sim
 from p2os.protocol.profiles import Profile
 from p2os.protocol.sip import SIP_KINDS, StandardSip
 
+IDENTITY_KIND = 0x02
+#: An identity is three strings, each with its NUL.
+_IDENTITY_STRINGS = 3
+
 
 @dataclass(frozen=True, slots=True)
 class RawPacket:
-    """A packet whose inside is not read here.
+    """A packet whose content is not read here.
 
     Args:
         kind: Packet type, 0 to 255.
@@ -50,12 +54,9 @@ class RawPacket:
         return Frame(bytes((self.kind,)) + self.data)
 
 
-IDENTITY_KIND = 0x02
-
-
 @dataclass(frozen=True, slots=True)
 class Identity:
-    """Who a robot says it is, in its answer to SYNC2.
+    """What a robot identifies itself as, in its answer to SYNC2.
 
     Args:
         name: From FLASH, may be empty; clients keep 19 characters.
@@ -123,7 +124,7 @@ READERS: Mapping[int, Callable[[Frame], PlainPacket]] = {
     **dict.fromkeys(ResetNotice.KINDS, ResetNotice.from_frame),
 }
 
-#: Packet type → the manuals' word.
+#: Packet type → its name in the manuals.
 PACKET_NAMES: Mapping[int, str] = {
     0x00: "SYNC0", 0x01: "SYNC1", IDENTITY_KIND: "IDENTITY", CONFIG_KIND: "CONFIGpac",
     **dict.fromkeys(SIP_KINDS, "SIP"),
@@ -133,19 +134,17 @@ PACKET_NAMES: Mapping[int, str] = {
     0xD0: "PLAYLISTpac", 0xD3: "MARCDEBUG", 0xD5: "MAXLIMITS", 0xDA: "WHEELINFO", 0xE0: "GRIPPERpac",
     0xF0: "IOpac", 0xF8: "JOYSTICKpac", 0xFA: "BATTERYpac", 0xFE: "RESET", 0xFF: "RESET",
 }  # fmt: skip
-#: An identity is three strings, each with its NUL.
-_IDENTITY_STRINGS = 3
 
 
 def packet_name(kind: int) -> str:
-    """Return the manuals' word for a packet type, or its number."""
+    """Return the name of a packet type in the manuals, or its number."""
     return PACKET_NAMES.get(kind, f"packet 0x{kind:02X}")
 
 
 def read_packet(frame: Frame, profile: Profile) -> ServerPacket:
     """Read a packet of an open session by its type.
 
-    A packet of an unknown type, or whose inside is not sound, comes through raw:
+    A packet of an unknown type, or whose content is not sound, comes through raw:
     `packet_frame(read_packet(frame, profile), profile) == frame` for every frame.
     """
     try:
