@@ -19,10 +19,10 @@ from typing import Protocol, cast
 from adapter_sim import Adapter
 from adapter_sim.pinout import Pinout, Pull, WireRole, load_pinout
 from p2os.errors import ScenarioError
-from p2os.pioneer.body.choose import make_body
 from p2os.pioneer.body.contract import RobotBody
-from p2os.pioneer.controller.controller import Pioneer
-from p2os.pioneer.world.find import load_world
+from p2os.pioneer.body.factory import make_body
+from p2os.pioneer.controller import Pioneer
+from p2os.pioneer.world import load_world
 from p2os.pioneer.world.model import World
 from p2os.timing import NS_PER_S, Nanos
 from robot_bench.adapter import AnyAdapter, make_adapter

@@ -36,7 +36,7 @@ ALLOWED = {
     "p2os.cli.virtual.world_picture": {"matplotlib"},
     "p2os.cli.robots.pad_source": {"pygame"},
     "bluepill_sim": set(),
-    "bluepill_sim.core.machine": {"unicorn"},
+    "bluepill_sim.core.unicorn_core": {"unicorn"},
     "bluepill_sim.program.image": {"elftools", "intelhex"},
     "bluepill_sim.program.elf_file": {"elftools"},
     "bluepill_sim.program.line_table": {"elftools"},
@@ -48,7 +48,7 @@ ALLOWED = {
 
 #: The I/O layer: what may read a clock, open a port or start a thread.
 IO_LAYER = (
-    "p2os.transport", "p2os.cli", "p2os.pioneer.serve.host", "p2os.pioneer.serve.background",
+    "p2os.transport", "p2os.cli", "p2os.pioneer.serve.host", "p2os.pioneer.serve.background_host",
     "p2os.pioneer.serve.fleet",
     "p2os.pioneer.serve.control_line", "p2os.client.robot_thread", "p2os.client.aio", "p2os.client.interrupts",
     "bluepill_sim.cli", "bluepill_sim.cli.console",
@@ -63,7 +63,7 @@ LAYERS = {
     ),
     "bluepill_sim": (
         ("errors",), ("timing",), ("fabric",), ("peripherals",), ("stm32f103",), ("memory", "serial_port"), ("core",),
-        ("program", "native"), ("chip",), ("board",), ("debug", "sight"), ("cli",),
+        ("program", "native"), ("chip",), ("board",), ("analysis", "debug"), ("cli",),
     ),
     "adapter_sim": (
         ("codec",), ("settings", "pinout"), ("pins", "mixing", "encoders", "distances", "session"),

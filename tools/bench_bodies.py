@@ -10,9 +10,9 @@ import sys
 import time
 
 from p2os.errors import MissingDependencyError
-from p2os.pioneer.body.choose import BODY_NAMES, make_body
-from p2os.pioneer.controller.controller import Pioneer
-from p2os.pioneer.world.find import load_world, parse_world
+from p2os.pioneer.body.factory import BODY_NAMES, make_body
+from p2os.pioneer.controller import Pioneer
+from p2os.pioneer.world import load_world, parse_world
 from p2os.pioneer.world.model import Pose
 from p2os.protocol.commands import Command
 from p2os.protocol.commands import CommandNumber as C

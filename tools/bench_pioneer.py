@@ -9,11 +9,11 @@ import sys
 import time
 from itertools import pairwise
 
-from p2os.pioneer.body.choose import make_body
-from p2os.pioneer.controller.controller import Pioneer
-from p2os.pioneer.serve.background import served_pioneer
+from p2os.pioneer.body.factory import make_body
+from p2os.pioneer.controller import Pioneer
+from p2os.pioneer.serve import served_pioneer
 from p2os.pioneer.serve.multi_robot_world import MultiRobotWorld
-from p2os.pioneer.world.find import World, parse_world
+from p2os.pioneer.world import World, parse_world
 from p2os.pioneer.world.model import Pose
 from p2os.protocol.commands import Command
 from p2os.protocol.commands import CommandNumber as C

@@ -18,9 +18,9 @@ from pathlib import Path
 from p2os.capture import Direction, Reading, capture_of, read_capture, rows_of
 from p2os.capture.explain import explain
 from p2os.errors import FileError, P2osError
-from p2os.pioneer.body.choose import make_body
-from p2os.pioneer.controller.controller import Pioneer
-from p2os.pioneer.world.find import parse_world
+from p2os.pioneer.body.factory import make_body
+from p2os.pioneer.controller import Pioneer
+from p2os.pioneer.world import parse_world
 from p2os.protocol.commands import Command
 from p2os.protocol.connection import Connection, ConnectionRole, ConnectionState
 from p2os.protocol.frames import GIVE_UP_NS, KEPT_BYTES, MAX_COUNT, PREFIX_BYTES, Decoder, Frame

@@ -26,7 +26,7 @@ MODULES = {
     "p2os.protocol.frames": "frames, and the decoder that re-scans",
     "p2os.protocol.connection": "both ends of a session, without a clock",
     "p2os.capture.columns": "captures as columns",
-    "p2os.pioneer.serve.background": "a virtual Pioneer for a test",
+    "p2os.pioneer.serve": "a virtual Pioneer for a test",
     "p2os.gamepad": "the mapping of a game pad",
     "p2os.errors": "what may be raised",
     "bluepill_sim": "the emulated BluePill",

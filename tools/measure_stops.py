@@ -34,10 +34,10 @@ from dataclasses import asdict, dataclass, field
 from pathlib import Path
 
 from p2os.errors import TransportError
-from p2os.pioneer.body.choose import make_body
-from p2os.pioneer.controller.controller import Pioneer
+from p2os.pioneer.body.factory import make_body
+from p2os.pioneer.controller import Pioneer
 from p2os.pioneer.serve.host import Host
-from p2os.pioneer.world.find import load_world
+from p2os.pioneer.world import load_world
 from p2os.protocol.commands import Command, CommandNumber
 from p2os.protocol.frames import Decoder, Frame
 from p2os.robots.parameters import load_parameters

@@ -1,1 +1,7 @@
-"""The virtual Pioneer: its controller, its body, its sonar, and the worlds it drives in."""
+"""The virtual Pioneer: its controller, devices, body and sonar, the worlds it drives in, and what serves it.
+
+`controller` is the robot's firmware, `devices` what is fitted to it, `body` its motion
+(three engines), `sonar` its ring, `world` the places it drives in, `serve` puts robots on
+real lines. `sensor_errors` holds every number of how the sensors err, `random_source` the
+seeded streams behind them, `toml_places` the lines of keys in the files read here.
+"""

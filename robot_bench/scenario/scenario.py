@@ -19,11 +19,11 @@ from typing import cast
 from adapter_sim.codec import BitOrder
 from adapter_sim.settings import AdapterSettings
 from p2os.errors import ScenarioError, UsageError
-from p2os.pioneer.body.choose import BODY_NAMES
-from p2os.pioneer.controller.controller import ControllerSettings, SonarPerSip
+from p2os.pioneer.body.factory import BODY_NAMES
+from p2os.pioneer.controller import ControllerSettings, SonarPerSip
 from p2os.pioneer.controller.flash import load_flash
 from p2os.pioneer.sensor_errors import load_sensor_errors
-from p2os.pioneer.world.find import Pose, known_worlds, world_suffixes
+from p2os.pioneer.world import Pose, known_worlds, world_suffixes
 from p2os.robots.parameters import RobotParameters, load_parameters
 from p2os.timing import NS_PER_MS, NS_PER_S, Nanos
 from robot_bench.direct.robot import DirectSettings

@@ -10,9 +10,9 @@ import random
 from dataclasses import dataclass, field
 
 from p2os.errors import RemoteProtocolError
-from p2os.pioneer.body.choose import make_body
-from p2os.pioneer.controller.controller import ControllerSettings, Pioneer, SonarPerSip
-from p2os.pioneer.world.find import load_world
+from p2os.pioneer.body.factory import make_body
+from p2os.pioneer.controller import ControllerSettings, Pioneer, SonarPerSip
+from p2os.pioneer.world import load_world
 from p2os.protocol.commands import Command
 from p2os.protocol.frames import Decoder, Frame
 from p2os.robots.parameters import load_parameters

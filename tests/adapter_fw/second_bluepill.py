@@ -14,7 +14,7 @@ from adapter_sim.adapter import AdapterState
 from adapter_sim.pinout import Pinout, WireRole
 from bluepill_sim import BluePill
 from bluepill_sim.fabric.pins import PinDrive
-from p2os.pioneer.controller.controller import Pioneer
+from p2os.pioneer.controller import Pioneer
 from p2os.timing import NS_PER_MS, Nanos, Reached
 from robot_bench.bench import Bench
 from robot_bench.recording.client_view import SipRanges

@@ -15,7 +15,7 @@ from pathlib import Path
 
 import pytest
 
-from p2os.pioneer.serve.background import served_pioneer
+from p2os.pioneer.serve import served_pioneer
 from p2os.protocol.commands import Command
 from p2os.protocol.commands import CommandNumber as C
 from tests.adapter_fw.builds import built

@@ -13,9 +13,9 @@ from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, initialize, invariant, precondition, rule
 
 from adapter_sim import Adapter, AdapterSettings
-from p2os.pioneer.body.choose import make_body
-from p2os.pioneer.controller.controller import Pioneer
-from p2os.pioneer.world.find import load_world
+from p2os.pioneer.body.factory import make_body
+from p2os.pioneer.controller import Pioneer
+from p2os.pioneer.world import load_world
 from tests.adapter_sim.conftest import MS, PARAMETERS, FakeRobot, Rig
 
 #: Four steps of 62.5 mm/s; (3 + 4) steps over 357 mm.

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from p2os.pioneer.controller.controller import ControllerSettings, Pioneer
+from p2os.pioneer.controller import ControllerSettings, Pioneer
 from p2os.protocol.commands import Command, CommandNumber
 from p2os.protocol.frames import Decoder, Frame
 from p2os.protocol.profiles import Profile

@@ -22,11 +22,11 @@ import typer
 from p2os.cli.printing import queue_output
 from p2os.cli.quantities import parse_duration
 from p2os.errors import UsageError
-from p2os.pioneer.controller.controller import ControllerSettings, SonarPerSip
+from p2os.pioneer.controller import ControllerSettings, SonarPerSip
 from p2os.pioneer.controller.flash import load_flash
 from p2os.pioneer.sensor_errors import load_sensor_errors
 from p2os.pioneer.serve.aux_endpoint import AuxEndpoint
-from p2os.pioneer.serve.control_line import ControlLine, say_on_stderr
+from p2os.pioneer.serve.control_line import ControlLine, write_stderr
 from p2os.pioneer.serve.fleet import Fleet
 from p2os.pioneer.serve.fleet_file import load_fleet
 from p2os.pioneer.serve.fleet_order import (
@@ -220,7 +220,7 @@ def serve(
         for host in hosts:
             opened.callback(host.close)
         for number, host in enumerate(hosts):
-            _say_start(order, made.starts[number], number, host, as_json=json_output)
+            _print_start(order, made.starts[number], number, host, as_json=json_output)
         sys.stdout.flush()
         if made.note:
             _write(f"note: {made.note}\n")
@@ -278,7 +278,7 @@ def _refuse_beside_fleet(context: typer.Context) -> None:
             raise UsageError(f"--{name.replace('_', '-')} beside --fleet", hint="the fleet's file says that")
 
 
-def _say_start(order: FleetOrder, start: Pose, number: int, host: Host, *, as_json: bool) -> None:
+def _print_start(order: FleetOrder, start: Pose, number: int, host: Host, *, as_json: bool) -> None:
     where, model = host.listener.description, order.robots[number].model
     place = start.x_m, start.y_m, math.degrees(start.heading_rad)
     if as_json:
@@ -310,4 +310,4 @@ def _show_status(hosts: Sequence[Host]) -> None:
 
 def _write(text: str) -> None:
     with contextlib.suppress(OSError):  # a terminal that was closed must not keep the robots from stopping
-        say_on_stderr(text)
+        write_stderr(text)

@@ -9,8 +9,8 @@ from typing import Annotated
 import typer
 
 from p2os.errors import FileError, MissingDependencyError, UsageError
+from p2os.pioneer.world import known_worlds, load_world
 from p2os.pioneer.world.drawing import svg, text
-from p2os.pioneer.world.find import known_worlds, load_world
 from p2os.pioneer.world.formats import Placing, read_placed
 from p2os.pioneer.world.makers import KINDS, make_world
 from p2os.pioneer.world.model import World
@@ -80,7 +80,7 @@ def show(
 ) -> None:
     """Draw a world in the terminal, or into a file."""
     place = _load(world, seed, up)
-    _tell_skipped(place)
+    _print_skipped(place)
     if out is None:
         columns = min(shutil.get_terminal_size((80, 24)).columns, WIDEST_COLUMNS)
         typer.echo("\n".join(text(place, columns)))
@@ -102,7 +102,7 @@ def show(
 def check(world: WORLD, seed: SEED = 0, up: UP = "auto") -> None:
     """Read a world and say what is in it; an error names its line."""
     place = _load(world, seed, up)
-    _tell_skipped(place)
+    _print_skipped(place)
     typer.echo(f"{place.source}: {_summary(place)}")
 
 
@@ -123,7 +123,7 @@ def convert(
 ) -> None:
     """Write any readable world as a TOML file, to be changed by hand."""
     place = _load(world, seed, up)
-    _tell_skipped(place)
+    _print_skipped(place)
     _write(place, out)
 
 
@@ -185,6 +185,6 @@ def _size(place: World) -> str:
     return f"{x1 - x0:.1f} x {y1 - y0:.1f} m"
 
 
-def _tell_skipped(place: World) -> None:
+def _print_skipped(place: World) -> None:
     for line in place.skipped:
         sys.stderr.write(f"note: {line}\n")

@@ -273,8 +273,8 @@ class KinematicBody:
         xs, ys = [x, *(x + self._longest_m * dx for dx, _ in rays)], [y, *(y + self._longest_m * dy for _, dy in rays)]
         box = (min(xs), min(ys), max(xs), max(ys))
         if self._other_robots is None:
-            return self._plan.heard_within(*box)
-        return [*self._plan.heard_within(*box), *self._other_robots.heard_within(*box)]
+            return self._plan.echoing_within(*box)
+        return [*self._plan.echoing_within(*box), *self._other_robots.echoing_within(*box)]
 
     def clearance(self) -> float:
         """Return the distance from the hull to the nearest thing that it could touch, metres."""

@@ -118,7 +118,7 @@ class OtherRobots:
         """Return where this robot sees another one."""
         return other.live if self.is_close else other.at_boundary
 
-    def heard_within(self, x0: float, y0: float, x1: float, y1: float) -> Iterator[Footprint]:
+    def echoing_within(self, x0: float, y0: float, x1: float, y1: float) -> Iterator[Footprint]:
         """Return the others whose hulls may reach into a rectangle and are heard by this robot's sonar."""
         for other in self._heard:
             standing_pose, reach = self.standing_pose_of(other), other.reach_m

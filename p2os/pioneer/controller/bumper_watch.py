@@ -23,7 +23,7 @@ def is_watching(context: Context) -> bool:
     return context.devices.switches.bump_stall != 0
 
 
-def look_at_bumpers(context: Context, body: SensedState, flash: Flash, now: Nanos) -> bool:
+def check_bumpers(context: Context, body: SensedState, flash: Flash, now: Nanos) -> bool:
     """Stop for a bumper that is pressed on the side of the way; tell whether it did just now."""
     context.bumper_watch.next_ns = now + BUMPER_WATCH_NS
     front, rear = pressed(context, body, flash)

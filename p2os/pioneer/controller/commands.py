@@ -132,7 +132,7 @@ def _gyro(context: Context, value: int, now: Nanos) -> None:
 
 def _joydrive(context: Context, value: int) -> None:
     context.devices.joystick.may_drive = value != 0
-    context.let_the_stick_drive()
+    context.follow_joystick()
 
 
 def _say(context: Context, data: bytes) -> None:

@@ -7,7 +7,7 @@ from p2os.pioneer.controller.dead_reckoning import DeadReckoning
 from p2os.pioneer.controller.faults import Faults
 from p2os.pioneer.controller.motion import NM_PER_MM, UDEG_PER_DEG, Motion
 from p2os.pioneer.controller.packet_requests import Requests
-from p2os.pioneer.devices.devices import Devices
+from p2os.pioneer.devices.fitted import Devices
 from p2os.pioneer.random_source import RandomSource
 from p2os.pioneer.sonar.schedule import SonarSchedule
 from p2os.protocol.profiles import Profile
@@ -73,7 +73,7 @@ class Context:
         """Tell whether the wheels have power."""
         return self.motion.is_powered
 
-    def let_the_stick_drive(self) -> None:
+    def follow_joystick(self) -> None:
         """Follow the joystick while its button is held and it may drive; stop once when it no longer does."""
         stick = self.devices.joystick
         if stick.may_drive and stick.button1:

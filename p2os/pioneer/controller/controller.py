@@ -33,7 +33,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from typing import cast
 
-from p2os.pioneer.controller.bumper_watch import is_watching, look_at_bumpers
+from p2os.pioneer.controller.bumper_watch import check_bumpers, is_watching
 from p2os.pioneer.controller.commands import IGNORED, Effect, apply
 from p2os.pioneer.controller.context import BumperWatch, Context
 from p2os.pioneer.controller.dead_reckoning import DeadReckoning
@@ -47,7 +47,7 @@ from p2os.pioneer.controller.reporter import Reporter
 from p2os.pioneer.controller.sender import Sender
 from p2os.pioneer.controller.settings import ControllerSettings, SonarPerSip
 from p2os.pioneer.devices.battery import Battery
-from p2os.pioneer.devices.devices import Devices
+from p2os.pioneer.devices.fitted import Devices
 from p2os.pioneer.random_source import RandomSource
 from p2os.pioneer.sonar.schedule import SonarSchedule
 from p2os.protocol.commands import Command
@@ -234,7 +234,7 @@ class Pioneer:
         self.advance_to(now)
         if self._boot_at is not None:
             return
-        if self._context.faults.spoils_line:
+        if self._context.faults.corrupts_line:
             data = self._context.faults.spoil(data, self._context.random_source, to_robot=True)
         self._connection.receive(data, now)
         self._take_events(now)
@@ -254,7 +254,7 @@ class Pioneer:
     def take_output(self) -> list[bytes]:
         """Return the frames to send, one item each, oldest first, and forget them."""
         output = self._sender.take_output()
-        if self._context.faults.spoils_line:
+        if self._context.faults.corrupts_line:
             spoilt = (self._context.faults.spoil(data, self._context.random_source, to_robot=False) for data in output)
             return [data for data in spoilt if data]
         return output
@@ -263,7 +263,7 @@ class Pioneer:
         """Take bytes of the device at an AUX port, 1 to 3."""
         self.advance_to(now)
         self._context.devices.aux[port - 1].receive(data)
-        self._reporter.look_at_aux()
+        self._reporter.check_aux_requests()
 
     def take_aux_output(self, port: int) -> bytes:
         """Return the bytes for the device at an AUX port, 1 to 3, and forget them."""
@@ -288,7 +288,7 @@ class Pioneer:
             else:
                 clear_now(self._fault_target(now), fault)
             self._tell(now, first, words)
-        self._tell_notes(now)
+        self._report_notes(now)
 
     def reboot(self, now: Nanos, *, notice: str = "reboot") -> None:
         """Start the controller anew, as after a dip of its supply: motors off, session gone, odometry at 0."""
@@ -364,7 +364,7 @@ class Pioneer:
         if context.devices.gyro.is_on and context.devices.gyro.next_ns <= now:
             self._reporter.sample_gyro()
         watch_due = is_watching(context) and context.bumper_watch.next_ns <= now
-        if watch_due and look_at_bumpers(context, self.body.state, self.settings.flash, now):
+        if watch_due and check_bumpers(context, self.body.state, self.settings.flash, now):
             self._tell(now, "bumper stall", "the robot drove against a pressed bumper")
         ping = context.sonar.next_ping()
         if ping is not None and ping.at <= now:
@@ -435,7 +435,7 @@ class Pioneer:
             case Closed():
                 self._close(now, "by its client")
             case CommandReceived():
-                self._obey(event.command, now)
+                self._execute(event.command, now)
             case WatchdogExpired():
                 self._context.motion.hold()
                 self._tell(now, "watchdog expired", f"no packet for {self.settings.watchdog_ns / NS_PER_S:g} s")
@@ -452,7 +452,7 @@ class Pioneer:
         context.sonar.start_cycle(now)
         context.bumper_watch = BumperWatch(next_ns=now)
         self._sender.line.begin_session(now)
-        self._reporter.look_at_battery(now)
+        self._reporter.check_battery(now)
         self._sip_due = now + self.settings.sip_period_ns
         self._tell(now, "opened", "")
 
@@ -469,7 +469,7 @@ class Pioneer:
         devices.joystick.may_drive = devices.joystick.drives = devices.switches.battery_reported = False
         devices.switches.bump_stall, devices.switches.e_stall = 0, defaults.switches.e_stall
         devices.battery.pretended_decivolts = None if devices.battery.is_test else devices.battery.pretended_decivolts
-        self._reporter.look_at_battery(now)
+        self._reporter.check_battery(now)
         if self.settings.baud is not None:
             self._sender.line.set_baud(self.settings.baud)
         self._complaints = ()
@@ -498,11 +498,11 @@ class Pioneer:
         self._sender.answer([ResetNotice().to_frame().to_bytes()], now)
         self._tell(now, "controller up", "it says so with packet 0xFF and waits for SYNC0")
 
-    def _obey(self, command: Command, now: Nanos) -> None:
+    def _execute(self, command: Command, now: Nanos) -> None:
         context, had_power, asked = self._context, self._context.motors_enabled, self._context.motion.asked
         effect = apply(context, command, now)
         if context.motion.asked != asked and self.body.state.stalled_left and self.body.state.stalled_right:
-            context.motion.begin_from_stand()  # chosen: else a client cannot back off a wall before it gives up
+            context.motion.ramp_from_zero()  # chosen: else a client cannot back off a wall before it gives up
         if effect in IGNORED:
             self._ignored += 1
         complaint = f"{command.name}: {effect.value}"
@@ -511,8 +511,8 @@ class Pioneer:
             self._tell(now, "command ignored" if effect in IGNORED else "command waits", complaint)
         if context.motors_enabled is not had_power:
             self._tell(now, "motors", "on" if context.motors_enabled else "off")
-        self._tell_notes(now)
-        self._reporter.look_at_aux()
+        self._report_notes(now)
+        self._reporter.check_aux_requests()
         if context.baud_wanted is not None:
             self._sender.line.set_baud(context.baud_wanted)
             self._tell(now, "host baud", f"{context.baud_wanted} bit/s")
@@ -525,7 +525,7 @@ class Pioneer:
             notice, context.restart_wanted = context.restart_wanted, None
             self._restart(now, notice, boot_ns=BOOT_NS if notice == "RESET" else None)
 
-    def _tell_notes(self, now: Nanos) -> None:
+    def _report_notes(self, now: Nanos) -> None:
         notes, self._context.notes = self._context.notes, []
         for what, detail in notes:
             self._tell(now, what, detail)

@@ -60,7 +60,7 @@ def _sonar(target: FaultTarget, fault: Fault) -> None:
     target.faults.sonar[fault.number - 1] = (fault.name.removeprefix("sonar-"), fault.value)
 
 
-def _sonar_well(target: FaultTarget, fault: Fault) -> None:
+def _clear_sonar(target: FaultTarget, fault: Fault) -> None:
     target.faults.sonar.pop(fault.number - 1, None)
 
 
@@ -84,12 +84,12 @@ def _quiet(target: FaultTarget, _fault: Fault) -> None:
     target.faults.bit_error_rate = 0.0
 
 
-def _volts(target: FaultTarget, fault: Fault) -> None:
+def _pretend_voltage(target: FaultTarget, fault: Fault) -> None:
     battery = target.context.devices.battery
     battery.pretended_decivolts, battery.is_test = round(fault.value * 10), False
 
 
-def _true_volts(target: FaultTarget, _fault: Fault) -> None:
+def _clear_voltage(target: FaultTarget, _fault: Fault) -> None:
     target.context.devices.battery.pretended_decivolts = None
 
 
@@ -102,7 +102,7 @@ def _release(target: FaultTarget, _fault: Fault) -> None:
     target.context.devices.switches.stop_button = False
 
 
-def _bump(target: FaultTarget, fault: Fault) -> None:
+def _press_bumper(target: FaultTarget, fault: Fault) -> None:
     pins, bit = target.context.devices.pins, 1 << fault.number - 1
     if fault.side == "front":
         pins.front_pressed |= bit
@@ -110,7 +110,7 @@ def _bump(target: FaultTarget, fault: Fault) -> None:
         pins.rear_pressed |= bit
 
 
-def _unbump(target: FaultTarget, fault: Fault) -> None:
+def _release_bumper(target: FaultTarget, fault: Fault) -> None:
     pins, bit = target.context.devices.pins, 1 << fault.number - 1
     if fault.side == "front":
         pins.front_pressed &= ~bit
@@ -125,20 +125,20 @@ _INJECT: Mapping[str, Act] = {
     "wheel-blocked": _wheel(blocked=True),
     "loose-connector": _loose(is_loose=True),
     "line-noise": _noise,
-    "low-battery": _volts,
+    "low-battery": _pretend_voltage,
     "brown-out": lambda target, _fault: target.restart("brown-out"),
     "reboot": lambda target, _fault: target.restart("reboot"),
     "stop-button": _press,
-    "bumper": _bump,
+    "bumper": _press_bumper,
 }
 _CLEAR: Mapping[str, Act] = {
-    "sonar-stuck": _sonar_well,
-    "sonar-noisy": _sonar_well,
-    "sonar-dead": _sonar_well,
+    "sonar-stuck": _clear_sonar,
+    "sonar-noisy": _clear_sonar,
+    "sonar-dead": _clear_sonar,
     "wheel-blocked": _wheel(blocked=False),
     "loose-connector": _loose(is_loose=False),
     "line-noise": _quiet,
-    "low-battery": _true_volts,
+    "low-battery": _clear_voltage,
     "stop-button": _release,
-    "bumper": _unbump,
+    "bumper": _release_bumper,
 }

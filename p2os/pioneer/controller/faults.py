@@ -20,7 +20,7 @@ from p2os.pioneer.random_source import RandomSource
 #: chosen: a loose contact swallows 1 to so many bytes at a time.
 LONGEST_GAP_BYTES = 40
 #: chosen: how often a byte begins a gap.
-LOOSE_CHANCE = 0.02
+GAP_PROBABILITY = 0.02
 
 #: First word → (the others, what happens).
 FAULTS: Mapping[str, tuple[tuple[str, ...], str]] = {
@@ -122,7 +122,7 @@ class Faults:
     gap_out: int = 0
 
     @property
-    def spoils_line(self) -> bool:
+    def corrupts_line(self) -> bool:
         """Whether bytes suffer on their way."""
         return self.is_loose or self.bit_error_rate > 0
 
@@ -132,7 +132,7 @@ class Faults:
         gap = self.gap_in if to_robot else self.gap_out
         found = bytearray()
         for byte in data:
-            if self.is_loose and not gap and stream.random() < LOOSE_CHANCE:
+            if self.is_loose and not gap and stream.random() < GAP_PROBABILITY:
                 gap = stream.randint(1, LONGEST_GAP_BYTES)
             if gap:
                 gap -= 1

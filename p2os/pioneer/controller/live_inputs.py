@@ -57,7 +57,7 @@ def _number(word: str, given: str, usage: str) -> int:
 def _joystick(context: Context, values: list[int]) -> None:
     stick = context.devices.joystick
     stick.x, stick.y, stick.button1 = values
-    context.let_the_stick_drive()
+    context.follow_joystick()
 
 
 def _digital(context: Context, values: list[int]) -> None:

@@ -168,35 +168,35 @@ class Motion:
 
     def set_velocity(self, mm_s: int) -> None:
         """Translate at a speed (VEL)."""
-        self._become(Mode.TRANSLATE_ROTATE)
+        self._set_mode(Mode.TRANSLATE_ROTATE)
         self._first.set(_clamp(mm_s, self.limits.max_velocity_mm_s) * NM_PER_MM)
 
     def set_rotation(self, deg_s: int) -> None:
         """Turn at a speed, positive counter-clockwise (RVEL, ROTATE)."""
-        self._become(Mode.TRANSLATE_ROTATE)
+        self._set_mode(Mode.TRANSLATE_ROTATE)
         self._second.set(_clamp(deg_s, self.limits.max_rotation_deg_s) * UDEG_PER_DEG)
 
     def set_wheels(self, left_mm_s: int, right_mm_s: int) -> None:
         """Turn the wheels at two speeds (VEL2)."""
-        self._become(Mode.WHEELS)
+        self._set_mode(Mode.WHEELS)
         self._first.set(_clamp(left_mm_s, self.limits.max_velocity_mm_s) * NM_PER_MM)
         self._second.set(_clamp(right_mm_s, self.limits.max_velocity_mm_s) * NM_PER_MM)
 
     def set_wheels_as_turn(self, left_mm_s: int, right_mm_s: int) -> None:
         """Turn two wheel speeds into a translation and a rotation, each within its limit (VEL2 of ARCOS)."""
-        self._become(Mode.TRANSLATE_ROTATE)
+        self._set_mode(Mode.TRANSLATE_ROTATE)
         top, turn_top = self.limits.max_velocity_mm_s * NM_PER_MM, self.limits.max_rotation_deg_s * UDEG_PER_DEG
         self._first.set(_clamp((left_mm_s + right_mm_s) * NM_PER_MM // 2, top))
         self._second.set(_clamp(round((right_mm_s - left_mm_s) * NM_PER_MM / 2 / self._rim_nm_per_udeg), turn_top))
 
     def move_to(self, travel_nm: int) -> None:
         """Translate until the odometer of `step` shows `travel_nm` (MOVE)."""
-        self._become(Mode.TRANSLATE_ROTATE)
+        self._set_mode(Mode.TRANSLATE_ROTATE)
         self._first.goal = travel_nm
 
     def turn_to(self, heading_udeg: int) -> None:
         """Turn the shorter way to a heading (HEAD, DHEAD, DCHEAD)."""
-        self._become(Mode.TRANSLATE_ROTATE)
+        self._set_mode(Mode.TRANSLATE_ROTATE)
         self._second.goal = heading_udeg % UDEG_PER_TURN
 
     def stop(self) -> None:
@@ -210,7 +210,7 @@ class Motion:
         self._second.stop_now()
         self._wheels = (0.0, 0.0)
 
-    def begin_from_stand(self) -> None:
+    def ramp_from_zero(self) -> None:
         """Ramp from zero to what is set, as wheels do that a wall has stopped."""
         self._first.speed = self._second.speed = 0
         self._wheels = (0.0, 0.0)
@@ -321,7 +321,7 @@ class Motion:
     def _per_step(self, acceleration: int) -> int:
         return acceleration * self._dt_ns // _STEP_DIVISOR
 
-    def _become(self, mode: Mode) -> None:
+    def _set_mode(self, mode: Mode) -> None:
         if mode is self.mode:
             return
         first, second = self._first.speed, self._second.speed

@@ -33,7 +33,7 @@ class Extra(Enum):
 #: What ARCOS sends before the standard packet.
 FIRST_ON_ARCOS = frozenset({Extra.GYRO, Extra.JOYSTICK})
 #: chosen: after so many cycles without room a packet asked for once goes all the same, and the cycle stretches.
-PATIENCE_CYCLES = 5
+LONGEST_WAIT_CYCLES = 5
 
 
 @dataclass(slots=True)
@@ -72,7 +72,7 @@ class Requests:
 
     def must_go(self, extra: Extra) -> bool:
         """Tell whether a packet has waited long enough."""
-        return extra in self.once and self.waited >= PATIENCE_CYCLES
+        return extra in self.once and self.waited >= LONGEST_WAIT_CYCLES
 
     def snapshot(self) -> object:
         """Return all that decides the future."""

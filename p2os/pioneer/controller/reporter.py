@@ -227,13 +227,13 @@ class Reporter:
             ]
         )
 
-    def look_at_aux(self) -> None:
+    def check_aux_requests(self) -> None:
         """Answer GETAUX where enough bytes have come."""
         for port, extra in zip(self.context.devices.aux, AUX_EXTRAS, strict=True):
             if port.has_answer:
                 self.context.requests.set(extra, 1)
 
-    def look_at_battery(self, now: Nanos) -> None:
+    def check_battery(self, now: Nanos) -> None:
         """Drain the battery, and act when it is low."""
         context, state = self.context, self.body.state
         battery, switches = context.devices.battery, context.devices.switches
@@ -258,10 +258,10 @@ class Reporter:
         )
         self.context.devices.gyro.sample(self.body.state.turn_radps, errors.gyro_bias_counts + noise)
 
-    def _look_at_sensors(self, now: Nanos) -> None:
+    def _sample_sensors(self, now: Nanos) -> None:
         """Do what the firmware does once a packet: battery, compass, odometry's own drift."""
         context, errors = self.context, self.settings.errors
-        self.look_at_battery(now)
+        self.check_battery(now)
         compass = context.devices.compass
         if (compass.mode or Extra.COMPASS in context.requests.once) and compass.is_due(now):
             noise = errors.heading.compass_noise_deg
@@ -280,7 +280,7 @@ class Reporter:
     def send_standard_packet(self, connection: Connection, now: Nanos) -> Nanos:
         """Send the packet of this moment and what goes with it; return when the next is due."""
         context, settings, sender = self.context, self.settings, self._sender
-        self._look_at_sensors(now)
+        self._sample_sensors(now)
         state = self.body.state
         segments = pressed(context, state, settings.flash)
         told = self._bumpers_reported(segments)

@@ -6,7 +6,7 @@ Bytes pass between it and the controller; AUX lines are not paced.
 import contextlib
 
 from p2os.errors import TransportError
-from p2os.pioneer.controller.controller import Pioneer
+from p2os.pioneer.controller import Pioneer
 from p2os.timing import Nanos
 from p2os.transport.ports import Listener, Transport
 

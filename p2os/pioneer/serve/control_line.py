@@ -7,12 +7,12 @@ from collections.abc import Callable, Sequence
 
 from p2os.errors import TransportError
 from p2os.pioneer.serve.host import Host
-from p2os.pioneer.serve.orders import LONGEST_LINE, obey
+from p2os.pioneer.serve.orders import LONGEST_LINE, execute
 from p2os.transport.ports import READ_BYTES, HungUpError, Listener, Transport
 from p2os.transport.waiting import wait_readable
 
 
-def say_on_stderr(text: str) -> None:
+def write_stderr(text: str) -> None:
     """Write a text to standard error at once."""
     sys.stderr.write(text)
     sys.stderr.flush()
@@ -27,7 +27,7 @@ class Terminal:
 
     description = "the terminal"
 
-    def __init__(self, say: Callable[[str], object] = say_on_stderr) -> None:
+    def __init__(self, say: Callable[[str], object] = write_stderr) -> None:
         self._say = say
 
     def read(self) -> bytes:
@@ -76,40 +76,40 @@ class ControlLine:
         say: Takes the answers where standard input is taken.
     """
 
-    def __init__(self, listener: Listener | None, say: Callable[[str], object] = say_on_stderr) -> None:
+    def __init__(self, listener: Listener | None, say: Callable[[str], object] = write_stderr) -> None:
         self._listener = listener
-        self._person: Transport | None = Terminal(say) if listener is None else None
+        self._operator: Transport | None = Terminal(say) if listener is None else None
         self._typed = b""
 
     @property
     def poll_s(self) -> float | None:
         """Return how often somebody has to look whether a person has come; None where a descriptor tells."""
-        return None if self._person is not None or self._listener is None else self._listener.poll_s
+        return None if self._operator is not None or self._listener is None else self._listener.poll_s
 
     def descriptors(self) -> list[int]:
         """Return what tells that there is something to do."""
-        if isinstance(self._person, Terminal) and not self._person.is_ours():
+        if isinstance(self._operator, Terminal) and not self._operator.is_ours():
             return []
         found = None
-        if self._person is not None:
-            found = self._person.fileno()
+        if self._operator is not None:
+            found = self._operator.fileno()
         elif self._listener is not None:
             found = self._listener.fileno()
         return [] if found is None else [found]
 
     def serve(self, hosts: Sequence[Host]) -> bool:
         """Take what has been said and answer it; return whether there was anything."""
-        if self._person is None and self._listener is not None:
-            self._person, self._typed = self._listener.accept(), b""
-        if self._person is None:
+        if self._operator is None and self._listener is not None:
+            self._operator, self._typed = self._listener.accept(), b""
+        if self._operator is None:
             return False
         try:
-            data = self._person.read()
+            data = self._operator.read()
             *lines, self._typed = (self._typed + data).replace(b"\r", b"\n").split(b"\n")
             self._typed = self._typed[-LONGEST_LINE:]
             told = [line[:LONGEST_LINE].decode(errors="replace") for line in lines if line.strip()]
             for line in told:
-                self._person.write("".join(f"{row}\n" for row in obey(hosts, line)).encode())
+                self._operator.write("".join(f"{row}\n" for row in execute(hosts, line)).encode())
         except TransportError:
             self._leave()
             return False
@@ -122,7 +122,7 @@ class ControlLine:
             self._listener.close()
 
     def _leave(self) -> None:
-        if self._person is not None:
+        if self._operator is not None:
             with contextlib.suppress(TransportError):
-                self._person.close()
-            self._person = None
+                self._operator.close()
+            self._operator = None

@@ -6,7 +6,7 @@ Invariant: a host that has nothing due and nothing to read costs a comparison a 
 from collections.abc import Callable, Sequence
 
 from p2os.pioneer.serve.control_line import ControlLine
-from p2os.pioneer.serve.host import ASLEEP_WAIT_S, Host
+from p2os.pioneer.serve.host import IDLE_WAIT_S, Host
 from p2os.timing import NS_PER_S
 from p2os.transport.waiting import wait_readable
 from p2os.transport.wall_clock import wall_clock
@@ -40,7 +40,7 @@ class Fleet:
         """Serve until `until` says so or an exception (Ctrl-C) ends it; then let every client go."""
         try:
             while not until():
-                self.turn(ASLEEP_WAIT_S)
+                self.turn(IDLE_WAIT_S)
         finally:
             for host in self.hosts:
                 host.close()
@@ -53,7 +53,7 @@ class Fleet:
         for index, host in enumerate(self.hosts):
             if self._due_s[index] <= now_s:
                 host.live()
-                self._look_ahead(index)
+                self._schedule(index)
         if now_s >= self._next_tick_s and self._on_tick is not None:
             self._next_tick_s = now_s + self._on_tick[0]
             self._on_tick[1]()
@@ -65,11 +65,11 @@ class Fleet:
             if is_due or not ready.isdisjoint(self._listening[index]):
                 host.listen()
                 if not is_due:
-                    self._look_ahead(index)
+                    self._schedule(index)
         if self.control is not None and self.control.serve(self.hosts):
             self._due_s = [0.0] * len(self.hosts)
 
-    def _look_ahead(self, index: int) -> None:
+    def _schedule(self, index: int) -> None:
         host = self.hosts[index]
         self._due_s[index] = _now_s() + host.wait_s()
         self._listening[index] = host.descriptors()

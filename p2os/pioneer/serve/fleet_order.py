@@ -7,13 +7,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
 from p2os.errors import UsageError
-from p2os.pioneer.body.choose import make_body
 from p2os.pioneer.body.contract import RobotBody
-from p2os.pioneer.controller.controller import Pioneer
+from p2os.pioneer.body.factory import make_body
+from p2os.pioneer.controller import Pioneer
 from p2os.pioneer.controller.flash import BAUD_RATES
 from p2os.pioneer.controller.settings import ControllerSettings
 from p2os.pioneer.serve.multi_robot_world import MultiRobotWorld
-from p2os.pioneer.world.find import load_world
+from p2os.pioneer.world import load_world
 from p2os.pioneer.world.model import Pose, World
 from p2os.pioneer.world.start_places import start_places
 from p2os.robots.parameters import RobotParameters, load_parameters

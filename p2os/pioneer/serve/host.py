@@ -22,7 +22,7 @@ from typing import cast
 
 from p2os.errors import TransportError
 from p2os.pioneer.body.contract import RobotBody
-from p2os.pioneer.controller.controller import Pioneer
+from p2os.pioneer.controller import Pioneer
 from p2os.pioneer.serve.aux_endpoint import AuxEndpoint
 from p2os.pioneer.serve.multi_robot_world import MultiRobotWorld
 from p2os.pioneer.serve.paced_line import PacedLine
@@ -30,16 +30,16 @@ from p2os.pioneer.serve.robot_time import SETTLE_NS, RobotTime
 from p2os.pioneer.serve.world_orders import change_world
 from p2os.timing import NS_PER_S, Nanos
 from p2os.transport.ports import READ_BYTES, Listener, Transport
-from p2os.transport.waiting import BLIND_POLL_S, TurnedAway, has_hung_up, wait_readable
+from p2os.transport.waiting import BLIND_POLL_S, ClosingLines, has_hung_up, wait_readable
 from p2os.transport.wall_clock import wall_clock
 
 #: (robot's time in ns, what happened in a word or two, detail).
 HostEvent = Callable[[Nanos, str, str], None]
 
 #: chosen: well below the pause, and often enough for a robot that is connected but not open.
-AWAKE_WAIT_S = 0.1
+ACTIVE_WAIT_S = 0.1
 #: chosen: how soon `run` notices that it should end.
-ASLEEP_WAIT_S = 0.5
+IDLE_WAIT_S = 0.5
 #: chosen: no P2OS client says more than its line carries for so long; one that does, or that has left as much, goes.
 LONGEST_BEHIND_NS: Nanos = 5 * NS_PER_S
 #: chosen: 4 MB of a client that is dropped are read away, so that a terminal is clean for the next.
@@ -92,7 +92,7 @@ class Host:
             multi_robot_world.members[number].advance_to = self._advance_to
             self._bring = partial(multi_robot_world.bring, number)
         self._client: Transport | None = None
-        self._turned_away = TurnedAway(self._time.clock)
+        self._closing_lines = ClosingLines(self._time.clock)
         self._sync_limit_ns = sync_limit_ns
         #: When the client came, and when it had an open session last.
         self._came_at: Nanos = 0
@@ -125,7 +125,7 @@ class Host:
         """
         try:
             while not until():
-                self.turn(ASLEEP_WAIT_S)
+                self.turn(IDLE_WAIT_S)
         finally:
             self.close()
 
@@ -138,20 +138,20 @@ class Host:
     def live(self) -> None:
         """Do what is due by the clock."""
         self._read_clock()
-        self._turned_away.look()
-        if self._is_asleep():
+        self._closing_lines.poll()
+        if self._is_idle():
             return
         self._bring(self.now)
-        self._speak()
+        self._send_output()
         self._serve_aux()
-        self._look_at_session()
+        self._check_session()
 
     def listen(self) -> None:
         """Take clients that have come and bytes that have arrived."""
         self._read_clock()
-        self._welcome()
-        self._listen_to_client()
-        if not self._is_asleep():
+        self._accept_client()
+        self._read_client()
+        if not self._is_idle():
             self._serve_aux()
 
     def descriptors(self) -> list[int]:
@@ -162,21 +162,21 @@ class Host:
         if self._client is not None and self._may_receive():
             with contextlib.suppress(TransportError):
                 found.append(self._client.fileno())
-        if not self._is_asleep():
+        if not self._is_idle():
             for member in self.aux:
                 with contextlib.suppress(TransportError):
                     found += member.descriptors()
         return found
 
     def wait_s(self) -> float:
-        """Return how long nothing will be due; `ASLEEP_WAIT_S` at most."""
-        waits = [AWAKE_WAIT_S if self._turned_away else ASLEEP_WAIT_S]
-        if not self._is_asleep():
-            waits.append(AWAKE_WAIT_S)
+        """Return how long nothing will be due; `IDLE_WAIT_S` at most."""
+        waits = [ACTIVE_WAIT_S if self._closing_lines else IDLE_WAIT_S]
+        if not self._is_idle():
+            waits.append(ACTIVE_WAIT_S)
             waits += [max(due - self.now, 0) / NS_PER_S / self._time.speed for due in self._deadlines()]
             waits += [member.poll_s for member in self.aux if member.poll_s is not None]
         if self._client is None:
-            waits.append(ASLEEP_WAIT_S if self.listener.poll_s is None else self.listener.poll_s)
+            waits.append(IDLE_WAIT_S if self.listener.poll_s is None else self.listener.poll_s)
         else:
             try:
                 self._client.fileno()
@@ -187,7 +187,7 @@ class Host:
     def close(self) -> None:
         """Stop the robot, let the client go and give the ports back."""
         self._drop_client("the host ends")
-        self._turned_away.close()
+        self._closing_lines.close()
         self.listener.close()
         for member in self.aux:
             member.close()
@@ -231,7 +231,7 @@ class Host:
         """Tell whether the line to the robot takes more."""
         return self._lines is None or self._lines[0].waiting < MOST_WAITING
 
-    def _speak(self) -> None:
+    def _send_output(self) -> None:
         data = b"".join(self.pioneer.take_output())
         if self._lines is not None:
             if data:
@@ -257,7 +257,7 @@ class Host:
         for line in self._lines or ():
             line.set_baud(baud)
         if self._client is not None and self._lines is None:
-            self._speak()
+            self._send_output()
             self._client.set_baud(baud)
 
     def _serve_aux(self) -> None:
@@ -266,33 +266,33 @@ class Host:
         for member in self.aux:
             member.move_bytes(self.pioneer, self.now)
 
-    def _welcome(self) -> None:
+    def _accept_client(self) -> None:
         """Take a client that has come, or send it away when there is one."""
         if self._client is not None and self.listener.fileno() is None:
             return
         transport = self.listener.accept()
         if transport is None:
             return
-        while self._listen_to_client():  # a client that has just left makes room for this one
+        while self._read_client():  # a client that has just left makes room for this one
             pass
         if self._client is not None:
             first = self._client.description
             self._tell("client refused", f"{transport.description}: {first} is connected")
             connected_s = (self.now - self._came_at) / self._time.speed / NS_PER_S
             peer = first.removeprefix("tcp:")
-            self._turned_away.add(transport, f"busy: {peer} is connected for {connected_s:.0f} s")
+            self._closing_lines.add(transport, f"busy: {peer} is connected for {connected_s:.0f} s")
             return
         self.pioneer.take_output()  # what it said to nobody
         self._client, self._came_at, self._open_at = transport, self.now, self.now
         self._time.client_came()
         self._tell("client connected", transport.description)
 
-    def _listen_to_client(self) -> bool:
+    def _read_client(self) -> bool:
         """Take what the client says; return whether it said something."""
         if self._client is None:
             return False
         if not self._may_receive():
-            self._look_at_backlog(self._client)
+            self._check_backlog(self._client)
             return False
         try:
             data = self._client.read()
@@ -304,14 +304,14 @@ class Host:
         elif data:
             self._bring(self.now)
             self._deliver(data, self.now)
-            self._speak()
+            self._send_output()
         if len(data) < READ_BYTES:
             self._behind_since = None
         elif self._client is not None:  # more waits
-            self._look_at_backlog(self._client)
+            self._check_backlog(self._client)
         return bool(data)
 
-    def _look_at_session(self) -> None:
+    def _check_session(self) -> None:
         """Let a client go that has had no open session for too long."""
         if self._client is None or self._sync_limit_ns is None or self.listener.fileno() is None:
             return
@@ -321,7 +321,7 @@ class Host:
             limit_s = self._sync_limit_ns / NS_PER_S
             self._drop_client(f"{self._client.description} had no open session for {limit_s:g} s", tell=True)
 
-    def _look_at_backlog(self, client: Transport) -> None:
+    def _check_backlog(self, client: Transport) -> None:
         """Drop a client that has left more than could be heard so far, or that shouts for too long.
 
         What a client has closed may still wait in its own machine, behind what it
@@ -357,14 +357,14 @@ class Host:
             line.clear()
             line.set_baud(self._baud or line.baud)
         if tell:
-            self._turned_away.add(client, reason)
+            self._closing_lines.add(client, reason)
         else:
             with contextlib.suppress(TransportError):
                 client.close()
         self._settled_at = self.now + SETTLE_NS
         self._tell("client gone", reason)
 
-    def _is_asleep(self) -> bool:
+    def _is_idle(self) -> bool:
         return self._client is None and self.now >= self._settled_at
 
     def _read_clock(self) -> None:

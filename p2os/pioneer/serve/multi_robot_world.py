@@ -36,7 +36,7 @@ from p2os.pioneer.body.other_robots import (
     free_name,
     highest_floor,
 )
-from p2os.pioneer.controller.controller import Pioneer
+from p2os.pioneer.controller import Pioneer
 from p2os.pioneer.world.model import Obstacle, World
 from p2os.timing import NS_PER_MS, NS_PER_S, Nanos, Reached
 
@@ -48,7 +48,7 @@ FASTEST_MPS = 8.0
 CLOSING_M = 2 * FASTEST_MPS * SLICE_NS / NS_PER_S
 
 #: chosen: how far apart two robots may be and still be looked at in a sweep, beyond being near, m.
-LOOSE_M = 0.4
+SPARE_M = 0.4
 
 
 @dataclass(slots=True)
@@ -123,10 +123,10 @@ class MultiRobotWorld:
         self._copying = tuple(member for member in self.members if member.shown is not None)
         #: Where all stood at the last sweep, and how much two of them at least were farther apart than near.
         self._swept: list[StandingPose] = []
-        self._loose_m = 0.0
+        self._spare_m = 0.0
         self._close: tuple[Member, ...] = ()
         self._alone: tuple[Member, ...] = self.members
-        self._part()
+        self._find_close()
 
     @property
     def robots(self) -> tuple[Pioneer, ...]:
@@ -149,7 +149,7 @@ class MultiRobotWorld:
     def advance_to(self, limit: Nanos) -> Reached:
         """Bring every robot to a time."""
         self._pass_boundaries(limit)
-        self._live_close(limit)
+        self._step_close(limit)
         for member in self._alone:
             member.advance_to(limit)
         return Reached(limit)
@@ -164,7 +164,7 @@ class MultiRobotWorld:
         self._pass_boundaries(limit)
         member = self.members[number]
         if member.other_robots.is_close:
-            self._live_close(limit)
+            self._step_close(limit)
         else:
             member.advance_to(limit)
 
@@ -206,22 +206,22 @@ class MultiRobotWorld:
             member.shown = (
                 None if shown is None else {name: StandingPose(*standing_pose) for name, standing_pose in shown}
             )
-        self._loose_m = 0.0  # sweep at the next boundary
-        self._sort()
+        self._spare_m = 0.0  # sweep at the next boundary
+        self._regroup()
 
     # Within a slice ------------------------------------------------------------------
 
     def _pass_boundaries(self, limit: Nanos) -> None:
         """Bring everybody past every boundary before a time."""
         while (end := self._times.slice_end) < limit:
-            self._live_close(end)
+            self._step_close(end)
             for member in self._alone:
                 member.advance_to(end)
             self._times.slice_end += SLICE_NS
             self._times.step_boundary = end
-            self._look_around()
+            self._exchange_poses()
 
-    def _live_close(self, limit: Nanos) -> None:
+    def _step_close(self, limit: Nanos) -> None:
         """Bring those that are near to somebody to a time of this slice, step by step together."""
         close, times = self._close, self._times
         while close and times.step_boundary < limit:
@@ -262,7 +262,7 @@ class MultiRobotWorld:
 
     # At a boundary ---------------------------------------------------------------------
 
-    def _look_around(self) -> None:
+    def _exchange_poses(self) -> None:
         """Show everybody where all the others and the pushed things are now."""
         for member in self._alone:
             member.as_other.look()
@@ -271,7 +271,7 @@ class MultiRobotWorld:
         for member in self.members:
             member.as_other.at_boundary = member.as_other.live
             self._show(member.as_other, member.as_other.live)
-        self._part()
+        self._find_close()
 
     def _spread_pushed(self) -> None:
         for name, reports in self._pushed.reports.items():
@@ -286,14 +286,14 @@ class MultiRobotWorld:
         standing_pose = self.members[number].as_other.live
         return math.dist((standing_pose.x_m, standing_pose.y_m), (item.x_m, item.y_m))
 
-    def _part(self) -> None:
+    def _find_close(self) -> None:
         """Find who could touch whom before the next boundary: sweep along x over circles around the hulls."""
-        if not self._close and self._is_as_swept():
+        if not self._close and self._is_sweep_valid():
             return
         near: dict[int, list[int]] = {}
         row = sorted((*member.as_other.live[:2], member.as_other.reach_m, member.number) for member in self.members)
-        farthest = max(reach for _, _, reach, _ in row) + self._margin_m + LOOSE_M
-        self._loose_m = LOOSE_M
+        farthest = max(reach for _, _, reach, _ in row) + self._margin_m + SPARE_M
+        self._spare_m = SPARE_M
         for place, (x, y, reach, number) in enumerate(row):
             for other in range(place + 1, len(row)):
                 other_x, other_y, other_reach, other_number = row[other]
@@ -303,24 +303,24 @@ class MultiRobotWorld:
                 if between_m < 0:
                     near.setdefault(number, []).append(other_number)
                     near.setdefault(other_number, []).append(number)
-                self._loose_m = min(self._loose_m, between_m)
+                self._spare_m = min(self._spare_m, between_m)
         self._swept = [member.as_other.live for member in self.members]
         if not near and not self._close:
             return
         for member in self.members:
             numbers = sorted(near.get(member.number, ()))
             member.other_robots.come_near(self.members[number].as_other for number in numbers)
-        self._sort()
+        self._regroup()
 
-    def _is_as_swept(self) -> bool:
+    def _is_sweep_valid(self) -> bool:
         """Tell whether nobody has moved so far since the last sweep that two could be near to each other now."""
-        allowed_m = self._loose_m / 2
+        allowed_m = self._spare_m / 2
         return allowed_m > 0 and all(
             math.hypot(member.as_other.live[0] - before[0], member.as_other.live[1] - before[1]) < allowed_m
             for member, before in zip(self.members, self._swept, strict=True)
         )
 
-    def _sort(self) -> None:
+    def _regroup(self) -> None:
         self._close = tuple(member for member in self.members if member.other_robots.is_close)
         self._alone = tuple(member for member in self.members if not member.other_robots.is_close)
 

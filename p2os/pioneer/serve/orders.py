@@ -26,7 +26,7 @@ LONGEST_LINE = 200
 FIRST_WORDS = ("status", "fault", "clear", "place", "move", "remove", *INPUTS, "help")
 
 
-def obey(hosts: Sequence[Host], text: str) -> list[str]:
+def execute(hosts: Sequence[Host], text: str) -> list[str]:
     """Do what a line says, and return the answer's lines."""
     try:
         numbers, words = _addressed(text.strip(), len(hosts))

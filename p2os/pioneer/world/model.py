@@ -12,7 +12,7 @@ it walks through other things, and into the robot.
 
 A world: a start and the things that stand in it, as plain values.
 
-A world knows nothing of engines; `p2os.pioneer.world.find` reads it from TOML and `arena`
+A world knows nothing of engines; `p2os.pioneer.world.loader` reads it from TOML and `arena`
 makes one from a seed.
 """
 

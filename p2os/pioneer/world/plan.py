@@ -247,7 +247,7 @@ class Plan:
                 nearest = self._nearest(low, placed(wheel, x_m, y_m, heading_rad), x_m, y_m, nearest)
         return nearest
 
-    def heard_within(self, x0: float, y0: float, x1: float, y1: float) -> Sequence[Footprint]:
+    def echoing_within(self, x0: float, y0: float, x1: float, y1: float) -> Sequence[Footprint]:
         """Return what the sonar could hear in a rectangle, and perhaps some more."""
         movable = self._heard.values()
         return [*movable, *self._static.heard.near(x0, y0, x1, y1)] if self._static.heard.footprints else [*movable]

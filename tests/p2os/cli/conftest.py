@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from p2os.cli import main as cli
-from p2os.pioneer.serve.background import served_pioneer
+from p2os.pioneer.serve import served_pioneer
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "client"))  # `ServedRobot`, whose wheels can be looked at
 

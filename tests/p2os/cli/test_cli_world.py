@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from p2os.cli.main import run
-from p2os.pioneer.world.find import known_worlds, load_world
+from p2os.pioneer.world import known_worlds, load_world
 
 COMMANDS_THAT_FAIL = [
     (["world", "show", "rooom"], "p2os: no world 'rooom'\nhint: did you mean room?\n"),

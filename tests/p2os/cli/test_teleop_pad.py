@@ -211,7 +211,7 @@ def test_the_verb_drives_by_pad(monkeypatch: pytest.MonkeyPatch, capsys: pytest.
         def report(self) -> PadReport | None:
             return next(self.scripts, None)
 
-    from p2os.pioneer.serve.background import served_pioneer
+    from p2os.pioneer.serve import served_pioneer
 
     monkeypatch.setattr(teleop, "SdlPad", Scripted)
     with served_pioneer() as url:

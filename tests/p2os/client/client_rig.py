@@ -16,9 +16,9 @@ from p2os.client.notices import LinkLost, Notice
 from p2os.client.outbox import CloseLine, OpenLine, Send, SetBaud
 from p2os.client.settings import ClientSettings
 from p2os.client.snapshots import Link, RobotState
-from p2os.pioneer.body.choose import make_body
-from p2os.pioneer.controller.controller import ControllerSettings, Pioneer
-from p2os.pioneer.world.find import load_world
+from p2os.pioneer.body.factory import make_body
+from p2os.pioneer.controller import ControllerSettings, Pioneer
+from p2os.pioneer.world import load_world
 from p2os.protocol.commands import Command
 from p2os.protocol.frames import Frame
 from p2os.robots.parameters import RobotParameters, load_parameters

@@ -5,7 +5,7 @@ import time
 from collections.abc import Callable
 
 from p2os.client.settings import ClientSettings
-from p2os.pioneer.controller.controller import Pioneer
+from p2os.pioneer.controller import Pioneer
 from p2os.pioneer.serve.host import Host
 from p2os.protocol.commands import Command
 from p2os.protocol.frames import Decoder, Frame

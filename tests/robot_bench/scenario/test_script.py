@@ -5,8 +5,8 @@ import math
 import pytest
 
 from p2os.errors import ScenarioError
-from p2os.pioneer.body.choose import make_body
-from p2os.pioneer.world.find import load_world
+from p2os.pioneer.body.factory import make_body
+from p2os.pioneer.world import load_world
 from p2os.pioneer.world.model import Obstacle, Pose
 from p2os.robots.parameters import load_parameters
 from robot_bench.scenario.world_script import BeforeSonar, Change, Op, Script, load_changes

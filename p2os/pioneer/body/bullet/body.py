@@ -22,7 +22,7 @@ from typing import Any, cast
 
 from p2os.pioneer.body.bullet.engine import pybullet, start_anew
 from p2os.pioneer.body.bullet.model import (
-    HEARD,
+    ECHOING,
     LEFT,
     RIGHT,
     add_building,
@@ -163,14 +163,14 @@ class BulletBody:
             self._contacts.update(touching=False)
         else:
             self._contacts.update(touching=self._is_touching())
-            self._look_around()
+            self._exchange_poses()
         stalling = self._stalling
         stalling[0] = self._stalled_for(stalling[0], left) if abs(left[3]) > self._straining_nm else 0
         stalling[1] = self._stalled_for(stalling[1], right) if abs(right[3]) > self._straining_nm else 0
         zero = self._zero
         return Turned(left[0] - zero[0], right[0] - zero[1])
 
-    def _look_around(self) -> None:
+    def _exchange_poses(self) -> None:
         """Find for how many steps nothing can touch the robot, so that contacts need not be asked for."""
         self._look_in -= 1
         if self._look_in > 0 or self._contacts.touching or self._is_busy:
@@ -271,7 +271,7 @@ class BulletBody:
             return []
         _ = self.state  # reads the robot's frame
         starts, ends = self._sonar_rays.points(numbers, self._origin, self._matrix)
-        hits = pybullet.rayTestBatch(starts, ends, collisionFilterMask=HEARD, physicsClientId=self._client)
+        hits = pybullet.rayTestBatch(starts, ends, collisionFilterMask=ECHOING, physicsClientId=self._client)
         return cast("list[tuple[Any, ...]]", hits)
 
     def clearance(self) -> float:

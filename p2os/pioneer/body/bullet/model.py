@@ -47,7 +47,7 @@ from p2os.robots.parameters import RobotParameters
 #: Links of the robot.
 LEFT, RIGHT, CASTER = 0, 1, 2
 #: What a ray may meet.
-HEARD = OBSTACLE_GROUP | FLOOR_GROUP | PUSHED_GROUP | LOW_GROUP
+ECHOING = OBSTACLE_GROUP | FLOOR_GROUP | PUSHED_GROUP | LOW_GROUP
 #: The group that Bullet gives its rays.
 RAY_GROUP = 1
 #: Of all that stands fast: Bullet multiplies the frictions of both sides.

@@ -75,7 +75,7 @@ MOST_PIECES = 5000
 #: MuJoCo's meshes have four corners at least.
 LEAST_CORNERS = 4
 #: As in `model`, which imports this.
-_HEARD, _UNHEARD = 0, 1
+_ECHOING, _SILENT = 0, 1
 _BOX, _MESH = mujoco.mjtGeom.mjGEOM_BOX, mujoco.mjtGeom.mjGEOM_MESH
 
 
@@ -95,8 +95,8 @@ def add_mesh(spec: mujoco.MjSpec, mesh: Mesh, name: str, bands: Bands) -> None:
             hint="--body bullet or --body kinematic",
         )
     _asset(spec, name, [value for vertex in mesh.vertices for value in vertex], mesh.triangles)
-    spec.worldbody.add_geom(type=_MESH, meshname=name, contype=0, conaffinity=0, group=_HEARD)
-    met = {"contype": OBSTACLE_GROUP, "conaffinity": 0, "friction": [0.0, 0.0, 0.0], "group": _UNHEARD}
+    spec.worldbody.add_geom(type=_MESH, meshname=name, contype=0, conaffinity=0, group=_ECHOING)
+    met = {"contype": OBSTACLE_GROUP, "conaffinity": 0, "friction": [0.0, 0.0, 0.0], "group": _SILENT}
     for number, outline in enumerate(pieces):
         if len(outline) == 2:
             (ax, ay), (bx, by) = outline
@@ -152,7 +152,7 @@ def _asset(
 
 
 #: Groups of geometry as MuJoCo's rays choose them: what they meet, and what they pass through.
-HEARD, UNHEARD = 0, 1
+ECHOING, SILENT = 0, 1
 WHEELS = ("left wheel", "right wheel")
 ROTORS = ("left rotor", "right rotor")
 ROBOT, HULL = "robot", "hull"
@@ -211,7 +211,7 @@ def _of_group(model: mujoco.MjModel, group: int) -> frozenset[int]:
 
 def _collision(group: int, meets: int, friction: float) -> dict[str, object]:
     """Return what a piece of geometry meets; of two that meet, the greater friction counts."""
-    return {"contype": group, "conaffinity": meets, "friction": [friction, 0.0, 0.0], "condim": 3, "group": HEARD}
+    return {"contype": group, "conaffinity": meets, "friction": [friction, 0.0, 0.0], "condim": 3, "group": ECHOING}
 
 
 def _shape(item: Obstacle) -> dict[str, object]:
@@ -238,9 +238,9 @@ def _add_robot(spec: mujoco.MjSpec, parameters: RobotParameters) -> None:
     radius = own.wheel_diameter_m / 2
     robot = spec.worldbody.add_body(name=ROBOT)
     robot.add_freejoint(name=ROBOT)
-    hull = _collision(HULL_GROUP, HULL_MEETS, HULL_FRICTION) | {"group": UNHEARD, "priority": 1}
-    wheel = _collision(0, WHEEL_MEETS, WHEEL_FRICTION) | {"group": UNHEARD}
-    caster = _collision(0, WHEEL_MEETS, 0.0) | {"group": UNHEARD, "priority": 1, "condim": 1}
+    hull = _collision(HULL_GROUP, HULL_MEETS, HULL_FRICTION) | {"group": SILENT, "priority": 1}
+    wheel = _collision(0, WHEEL_MEETS, WHEEL_FRICTION) | {"group": SILENT}
+    caster = _collision(0, WHEEL_MEETS, 0.0) | {"group": SILENT, "priority": 1, "condim": 1}
     # The hull's mass is a box about the chassis' own centre, lower than the geometry's middle on a tall robot.
     inertia = [mass / 12 * (a * a + b * b) for a, b in ((width, height), (length, height), (length, width))]
     solid = robot.add_body(name=HULL, pos=chassis.centre, mass=mass, inertia=inertia, explicitinertial=True)
@@ -256,7 +256,7 @@ def _add_robot(spec: mujoco.MjSpec, parameters: RobotParameters) -> None:
         body.add_geom(type=_SPHERE, size=(radius, 0.0, 0.0), mass=own.wheel_mass_kg, **wheel)
         rotor = spec.worldbody.add_body(name=rotor_name, pos=(0.0, 0.0, ROTORS_AT_M))
         rotor.add_joint(name=rotor_name, type=_HINGE, axis=(0.0, 1.0, 0.0), armature=ROTOR_INERTIA)
-        rotor.add_geom(type=_SPHERE, size=(0.01, 0.0, 0.0), contype=0, conaffinity=0, group=UNHEARD)
+        rotor.add_geom(type=_SPHERE, size=(0.01, 0.0, 0.0), contype=0, conaffinity=0, group=SILENT)
         motor = spec.add_tendon(
             name=name, frictionloss=own.motor_torque_nm, solref_friction=list(MOTOR_SOLREF),
             solimp_friction=list(RIGID_SOLIMP),

@@ -8,8 +8,8 @@ from p2os.pioneer.body.ray_cast import Echo
 from p2os.pioneer.sonar.ring import Cone
 from p2os.pioneer.world.geometry import INFINITY
 
-#: Which groups of geometry a ray meets: that of `model.HEARD` alone.
-_HEARD = np.array([1, 0, 0, 0, 0, 0], dtype=np.uint8)
+#: Which groups of geometry a ray meets: that of `model.ECHOING` alone.
+_ECHOING = np.array([1, 0, 0, 0, 0, 0], dtype=np.uint8)
 
 
 class SonarRays:
@@ -59,7 +59,7 @@ class SonarRays:
         ways = self._ways[number]
         rays = ways[:, :1] * turn[:, 0] + ways[:, 1:2] * turn[:, 1]
         mujoco.mj_multiRay(
-            model, data, begin, rays.ravel(), _HEARD, True, -1, self._numbers, self._ranges, self._normals,
+            model, data, begin, rays.ravel(), _ECHOING, True, -1, self._numbers, self._ranges, self._normals,
             len(ways), self._longest_m,
         )  # fmt: skip
         return rays

@@ -6,8 +6,8 @@ from importlib.util import find_spec
 import pytest
 from _pytest.mark.structures import ParameterSet
 
-from p2os.pioneer.body.choose import BODY_NAMES
 from p2os.pioneer.body.contract import BodyState, RobotBody
+from p2os.pioneer.body.factory import BODY_NAMES
 
 #: The package that a body needs, which is also the name of its test mark where it has one.
 ENGINES = {"bullet": "pybullet", "mujoco": "mujoco"}

@@ -14,9 +14,9 @@ import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
-from p2os.pioneer.body.choose import make_body
 from p2os.pioneer.body.contract import BodyState, RobotBody
-from p2os.pioneer.world.find import load_world
+from p2os.pioneer.body.factory import make_body
+from p2os.pioneer.world import load_world
 from p2os.pioneer.world.model import Pose, World
 from p2os.robots.parameters import load_parameters
 from tests.p2os.pioneer.body.bodies import drive, each_body, ramped

@@ -5,7 +5,7 @@ import pickle
 
 import pytest
 
-from p2os.pioneer.body.choose import BODY_NAMES, make_body
+from p2os.pioneer.body.factory import BODY_NAMES, make_body
 from p2os.pioneer.world.model import Obstacle, Pose, World
 from p2os.robots.parameters import RobotParameters, known_robots, load_parameters
 from tests.p2os.pioneer.body.bodies import Maker, drive, marks_of, ramped

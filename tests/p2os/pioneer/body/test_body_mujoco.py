@@ -3,7 +3,7 @@
 import pytest
 
 from p2os.errors import WorldError
-from p2os.pioneer.body.choose import make_body
+from p2os.pioneer.body.factory import make_body
 from p2os.pioneer.world.model import Mesh, Obstacle, Pose, Repeat, Triangle, Vertex, Walk, World
 from p2os.robots.parameters import load_parameters
 from tests.p2os.pioneer.body.bodies import drive, marks_of

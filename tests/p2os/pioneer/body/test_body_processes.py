@@ -9,9 +9,9 @@ from pathlib import Path
 
 import pytest
 
-from p2os.pioneer.body.choose import make_body
 from p2os.pioneer.body.contract import RobotBody
-from p2os.pioneer.world.find import load_world
+from p2os.pioneer.body.factory import make_body
+from p2os.pioneer.world import load_world
 from p2os.pioneer.world.model import Obstacle
 from p2os.robots.parameters import load_parameters
 from tests.p2os.pioneer.body.bodies import each_body, marks_of
@@ -35,8 +35,8 @@ import sys
 sys.modules[sys.argv[1]] = None
 from p2os.errors import MissingDependencyError
 from p2os.robots.parameters import load_parameters
-from p2os.pioneer.body.choose import make_body
-from p2os.pioneer.world.find import load_world
+from p2os.pioneer.body.factory import make_body
+from p2os.pioneer.world import load_world
 try:
     make_body(sys.argv[2], load_world("room"), load_parameters("p2dx"))
 except MissingDependencyError as error:
@@ -47,9 +47,9 @@ except MissingDependencyError as error:
 SPEAKS = """
 import sys
 sys.stdout.write("before ")
-from p2os.pioneer.body.choose import make_body
+from p2os.pioneer.body.factory import make_body
 from p2os.robots.parameters import load_parameters
-from p2os.pioneer.world.find import load_world
+from p2os.pioneer.world import load_world
 make_body("bullet", load_world("room"), load_parameters("p2dx"))
 sys.stdout.write("after")
 sys.stderr.write("heard")

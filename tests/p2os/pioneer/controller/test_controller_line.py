@@ -59,7 +59,7 @@ def test_extra_packets_that_do_not_fit_are_dropped_and_the_cycle_stays(make_robo
 
 
 def all_sonar() -> Any:
-    from p2os.pioneer.controller.controller import SonarPerSip
+    from p2os.pioneer.controller import SonarPerSip
 
     return SonarPerSip.ALL
 

@@ -7,7 +7,7 @@ from hypothesis import settings
 from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, initialize, invariant, precondition, rule
 
-from p2os.pioneer.controller.controller import ControllerSettings
+from p2os.pioneer.controller import ControllerSettings
 from p2os.pioneer.controller.sender import MOST_ANSWERS
 from p2os.pioneer.sensor_errors import REALISTIC
 from p2os.protocol.commands import CommandNumber as C
@@ -76,7 +76,7 @@ class Controller(RuleBasedStateMachine):
         self.robot.pioneer.hang_up(self.robot.now)
         assert self.robot.pioneer.state.left_setpoint_mps == self.robot.pioneer.state.right_setpoint_mps == 0
 
-    @precondition(lambda self: not self.robot.pioneer.snapshot().context["faults"].spoils_line)
+    @precondition(lambda self: not self.robot.pioneer.snapshot().context["faults"].corrupts_line)
     @rule()
     def close_and_find_it_standing(self) -> None:
         self.say(C.CLOSE)

@@ -3,7 +3,7 @@
 from collections.abc import Callable
 from typing import Any
 
-from p2os.pioneer.controller.controller import SonarPerSip
+from p2os.pioneer.controller import SonarPerSip
 from p2os.protocol.commands import CommandNumber as C
 from p2os.protocol.profiles import Profile
 from p2os.protocol.sip import MOVING, STANDING

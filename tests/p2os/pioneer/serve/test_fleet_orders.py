@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from p2os.errors import UsageError
 from p2os.pioneer.serve.fleet_file import FleetError, load_fleet, parse_fleet
 from p2os.pioneer.serve.fleet_order import FleetOrder, RobotOrder, following_ports, make_fleet
-from p2os.pioneer.world.find import load_world
+from p2os.pioneer.world import load_world
 from p2os.pioneer.world.geometry import Footprint, hull_polygon, placed
 from p2os.pioneer.world.model import Pose
 from p2os.pioneer.world.plan import Plan

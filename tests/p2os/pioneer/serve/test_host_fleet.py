@@ -16,7 +16,7 @@ from p2os.pioneer.serve.aux_endpoint import AuxEndpoint
 from p2os.pioneer.serve.control_line import ControlLine
 from p2os.pioneer.serve.fleet import Fleet
 from p2os.pioneer.serve.host import LONGEST_BEHIND_NS, MOST_WAITING, Host
-from p2os.pioneer.serve.orders import obey
+from p2os.pioneer.serve.orders import execute
 from p2os.protocol.commands import Command
 from p2os.protocol.commands import CommandNumber as C
 from p2os.protocol.frames import Decoder, Frame
@@ -216,15 +216,15 @@ def test_a_device_at_an_aux_port_talks_through_the_robot(make_robot: Callable[..
 
 def test_orders_go_to_one_robot_or_all_and_are_answered(make_robot: Callable[..., Any]) -> None:
     hosts = [Looped(make_robot(baud=rate)).host for rate in (None, 9600)]
-    assert obey(hosts, "2: fault sonar-dead 1") == ["robot 2: fault sonar-dead 1"]
+    assert execute(hosts, "2: fault sonar-dead 1") == ["robot 2: fault sonar-dead 1"]
     assert hosts[0].pioneer.snapshot().context["faults"].sonar == {}  # type: ignore[attr-defined]
-    assert len(obey(hosts, "thing on")) == 2
-    first, second = obey(hosts, "status")
+    assert len(execute(hosts, "thing on")) == 2
+    first, second = execute(hosts, "status")
     assert first.startswith("robot 1 at 0.0 s: no session")
     assert "12.6 V" in second
-    assert any("sonar-stuck NUMBER METRES" in line for line in obey(hosts, "help"))
-    assert obey(hosts, "3: status") == ["error: no robot '3'", "hint: robots: 1 to 2"]
-    assert obey(hosts, "dance")[0] == "error: no order 'dance'"
+    assert any("sonar-stuck NUMBER METRES" in line for line in execute(hosts, "help"))
+    assert execute(hosts, "3: status") == ["error: no robot '3'", "hint: robots: 1 to 2"]
+    assert execute(hosts, "dance")[0] == "error: no order 'dance'"
 
 
 class Serving:

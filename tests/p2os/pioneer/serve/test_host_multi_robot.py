@@ -8,7 +8,7 @@ import pytest
 from p2os.pioneer.controller.settings import ControllerSettings
 from p2os.pioneer.serve.fleet_order import FleetOrder, RobotOrder, make_fleet
 from p2os.pioneer.serve.host import Host
-from p2os.pioneer.serve.orders import obey
+from p2os.pioneer.serve.orders import execute
 from p2os.pioneer.serve.robot_time import LONGEST_PAUSE_NS, SETTLE_NS, RobotTime
 from p2os.pioneer.world.model import Pose
 from p2os.protocol.commands import Command
@@ -113,7 +113,7 @@ def test_a_robot_without_a_client_is_carried_along_and_seen() -> None:
     hall.say(C.PULSE, to=[0])
     hall.run(250)
     assert hall.time.now == 250 * NS_PER_MS
-    assert obey(hall.hosts, "2: fault wheel-blocked left") == ["robot 2: fault wheel-blocked left"]
+    assert execute(hall.hosts, "2: fault wheel-blocked left") == ["robot 2: fault wheel-blocked left"]
     assert hall.multi_robot_world.members[0].body.ranges([3])[0] == pytest.approx(hall.gap_m + 0.014, abs=0.01)
     hall.close()
 
@@ -155,7 +155,7 @@ def test_time_stands_still_while_nobody_is_there_and_leaves_pauses_out() -> None
 def test_what_a_robot_says_while_nobody_listens_is_not_told_to_the_next_client() -> None:
     hall = Hall()
     hall.call(0)
-    obey(hall.hosts, "2: fault reboot")
+    execute(hall.hosts, "2: fault reboot")
     hall.run(900)
     hall.lines.append(open_url("loop:1", loops=hall.loops))
     assert hall.run(100)[1] == b""

@@ -10,11 +10,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from p2os.errors import UsageError
-from p2os.pioneer.body.choose import make_body
+from p2os.pioneer.body.factory import make_body
 from p2os.pioneer.body.kinematic import KinematicBody
-from p2os.pioneer.controller.controller import ControllerSettings, Pioneer
+from p2os.pioneer.controller import ControllerSettings, Pioneer
 from p2os.pioneer.serve.multi_robot_world import SLICE_NS, MultiRobotWorld
-from p2os.pioneer.world.find import parse_world
+from p2os.pioneer.world import parse_world
 from p2os.pioneer.world.model import Pose, World
 from p2os.protocol.commands import Command
 from p2os.protocol.commands import CommandNumber as C

@@ -6,7 +6,7 @@ from p2os.pioneer.controller.faults import FAULTS
 from p2os.pioneer.serve.fleet_order import FleetOrder, RobotOrder, make_fleet
 from p2os.pioneer.serve.host import Host
 from p2os.pioneer.serve.multi_robot_world import MultiRobotWorld
-from p2os.pioneer.serve.orders import obey
+from p2os.pioneer.serve.orders import execute
 from p2os.pioneer.serve.robot_time import RobotTime
 from p2os.transport import Loops
 
@@ -34,14 +34,14 @@ def test_things_come_move_and_go_for_all_robots_of_a_world(engine: str) -> None:
     assert multi_robot_world is not None
     body = multi_robot_world.members[0].body
     free = body.ranges([3])[0]
-    assert obey(hosts, "place box 0.8 0 0.2 0.4 90") == ["world: box-1 at 0.8, 0"]
+    assert execute(hosts, "place box 0.8 0 0.2 0.4 90") == ["world: box-1 at 0.8, 0"]
     assert body.ranges([3])[0] == pytest.approx(0.8 - 0.2 - 0.166, abs=0.01)
-    assert obey(hosts, "place box 2.9 -2.9 0.1 0.1") == ["world: box-2 at 2.9, -2.9"]
-    assert obey(hosts, "2: move box-1 1.2 0") == ["world: box-1 at 1.2, 0"]
+    assert execute(hosts, "place box 2.9 -2.9 0.1 0.1") == ["world: box-2 at 2.9, -2.9"]
+    assert execute(hosts, "2: move box-1 1.2 0") == ["world: box-1 at 1.2, 0"]
     assert body.ranges([3])[0] == pytest.approx(1.2 - 0.1 - 0.166, abs=0.01)
-    assert obey(hosts, "remove box-1") == ["world: box-1 is gone"]
+    assert execute(hosts, "remove box-1") == ["world: box-1 is gone"]
     assert body.ranges([3])[0] == pytest.approx(free)
-    assert obey(hosts, "place post 0.7 0 0.1") == ["world: post-1 at 0.7, 0"]
+    assert execute(hosts, "place post 0.7 0 0.1") == ["world: post-1 at 0.7, 0"]
     for member in multi_robot_world.members:
         member.body.remove("post-1")
 
@@ -71,7 +71,7 @@ def test_an_order_that_cannot_be_changes_nothing(engine: str, words: str, messag
     hosts, multi_robot_world = hosts_of(engine)
     assert multi_robot_world is not None
     before = [member.body.ranges(range(8)) for member in multi_robot_world.members]
-    answer = obey(hosts, words)
+    answer = execute(hosts, words)
     assert answer[0].startswith(message)
     assert answer[1].startswith("hint: ")
     assert [member.body.ranges(range(8)) for member in multi_robot_world.members] == before
@@ -79,10 +79,10 @@ def test_an_order_that_cannot_be_changes_nothing(engine: str, words: str, messag
 
 def test_robots_apart_have_worlds_of_their_own() -> None:
     hosts, _ = hosts_of("kinematic", apart=True)
-    assert obey(hosts, "place post 0.7 0 0.1") == [
+    assert execute(hosts, "place post 0.7 0 0.1") == [
         "world of robot 1: post-1 at 0.7, 0", "world of robot 2: post-1 at 0.7, 0",
     ]  # fmt: skip
-    assert obey(hosts, "2: remove post-1") == ["world of robot 2: post-1 is gone"]
+    assert execute(hosts, "2: remove post-1") == ["world of robot 2: post-1 is gone"]
     ranges = [host.pioneer.body.ranges([3])[0] for host in hosts]
     assert ranges[0] < ranges[1]
 
@@ -90,8 +90,8 @@ def test_robots_apart_have_worlds_of_their_own() -> None:
 def test_there_is_an_end_to_what_is_placed() -> None:
     hosts, _ = hosts_of("kinematic", robots=1)
     for _ in range(100):
-        obey(hosts, "place post 3 3 0.01")
-    assert obey(hosts, "place post 3 3 0.01")[0] == "error: there are 100 of that shape already"
+        execute(hosts, "place post 3 3 0.01")
+    assert execute(hosts, "place post 3 3 0.01")[0] == "error: there are 100 of that shape already"
 
 
 WORDS = {"NUMBER": "3", "METRES": "1.25", "SIDE": "left", "RATE": "0.001", "VOLTS": "10.9", "SEGMENT": "2"}
@@ -103,16 +103,16 @@ def test_each_fault_is_injected_reported_and_cleared_live(name: str) -> None:
     words = " ".join([name, *(WORDS[word] for word in FAULTS[name][0])])
     if name == "bumper":
         words = "bumper rear 2"
-    assert obey([host], f"fault {words}") == [f"robot 1: fault {words}"]
+    assert execute([host], f"fault {words}") == [f"robot 1: fault {words}"]
     if name in {"reboot", "brown-out"}:
         assert host.pioneer.state.injected == ()
-        assert obey([host], f"clear {name}")[0] == f"error: there is nothing to clear after {name}"
+        assert execute([host], f"clear {name}")[0] == f"error: there is nothing to clear after {name}"
         return
     assert host.pioneer.state.injected == (words,)
-    assert obey([host], "status")[0].endswith(f"injected: {words}")
-    assert obey([host], "clear all") == [f"robot 1: cleared {words}"]
-    assert obey([host], "clear all") == ["robot 1: cleared nothing: nothing was injected"]
-    assert "injected" not in obey([host], "status")[0]
+    assert execute([host], "status")[0].endswith(f"injected: {words}")
+    assert execute([host], "clear all") == [f"robot 1: cleared {words}"]
+    assert execute([host], "clear all") == ["robot 1: cleared nothing: nothing was injected"]
+    assert "injected" not in execute([host], "status")[0]
 
 
 @pytest.mark.parametrize(
@@ -129,10 +129,10 @@ def test_each_fault_is_injected_reported_and_cleared_live(name: str) -> None:
 )
 def test_words_that_mean_nothing_are_answered_with_what_would(words: str, answer: list[str]) -> None:
     hosts, _ = hosts_of("kinematic", robots=1)
-    for line, expected in zip(obey(hosts, words), answer, strict=True):
+    for line, expected in zip(execute(hosts, words), answer, strict=True):
         assert line.startswith(expected)
 
 
 def test_help_tells_every_order() -> None:
-    text = "\n".join(obey([], "help"))
+    text = "\n".join(execute([], "help"))
     assert all(word in text for word in ("place box X Y LENGTH WIDTH [HEADING]", "clear all", "fault reboot", "N: …"))

@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from p2os.errors import WorldError
-from p2os.pioneer.world.find import load_world, parse_world
+from p2os.pioneer.world import load_world, parse_world
 from p2os.pioneer.world.formats.rectangles import rectangles
 from p2os.pioneer.world.model import World
 from p2os.pioneer.world.writer import write_world

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from p2os.errors import WorldError
-from p2os.pioneer.world.find import load_world, parse_world
+from p2os.pioneer.world import load_world, parse_world
 from p2os.pioneer.world.formats import Placing, read_placed
 from p2os.pioneer.world.model import Mesh, cut, shadow
 from p2os.pioneer.world.writer import write_world

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from p2os.cli.main import run
 from p2os.errors import WorldError
-from p2os.pioneer.world.find import load_world
+from p2os.pioneer.world import load_world
 from p2os.pioneer.world.formats.polygon import MOST_CORNERS, triangulated
 from p2os.pioneer.world.model import World, cut
 

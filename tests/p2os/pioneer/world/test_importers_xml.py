@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from p2os.errors import WorldError
-from p2os.pioneer.world.find import load_world, parse_world
+from p2os.pioneer.world import load_world, parse_world
 from p2os.pioneer.world.writer import write_world
 
 CRATE = """<sdf version="1.7"><model name="crate"><static>true</static><pose>1 0 0 0 0 0</pose>

@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from p2os.errors import WorldError
-from p2os.pioneer.world.find import known_worlds, load_world, parse_world
+from p2os.pioneer.world import known_worlds, load_world, parse_world
 from p2os.pioneer.world.geometry import Footprint, hull_polygon, placed
 from p2os.pioneer.world.model import Kind, Obstacle
 from p2os.pioneer.world.plan import Plan

@@ -5,7 +5,7 @@ import re
 import pytest
 
 from p2os.errors import WorldError
-from p2os.pioneer.world.find import parse_world
+from p2os.pioneer.world import parse_world
 
 HEAD = 'name = "a"\nextent_m = [0, 0, 1, 1]\n'
 BOX = '[[box]]\nname = "b"\nx_m = 0\ny_m = 0\nlength_m = 1\nwidth_m = 1\n'

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from p2os.errors import UsageError, WorldError
 from p2os.pioneer.toml_places import find_places, line_of_error
-from p2os.pioneer.world.find import known_worlds, load_world, parse_world
+from p2os.pioneer.world import known_worlds, load_world, parse_world
 from p2os.pioneer.world.makers import KINDS, make_world
 from p2os.pioneer.world.model import Kind, Mesh, Obstacle, Pose, Repeat, Walk, World
 from p2os.pioneer.world.plan import Plan

@@ -1,4 +1,4 @@
-"""Find a world: one that ships, a world file, or a file of another program.
+"""Load a world: one that ships, a world file, or a file of another program.
 
 Worlds that ship and our own files are TOML (`file`); all else is read by
 `formats`.
@@ -9,14 +9,9 @@ from importlib.resources import files
 from pathlib import Path
 
 from p2os.errors import WorldError
-from p2os.pioneer.world.file import parse_world, read_obstacle
-from p2os.pioneer.world.model import Kind, Mesh, Obstacle, Pose, World
+from p2os.pioneer.world.file import parse_world
+from p2os.pioneer.world.model import World
 from p2os.pioneer.world.text_file import read_text
-
-__all__ = [
-    "Kind", "Mesh", "Obstacle", "Pose", "World", "known_worlds", "load_world", "parse_world", "read_obstacle",
-    "world_suffixes",
-]  # fmt: skip
 
 
 def known_worlds() -> tuple[str, ...]:

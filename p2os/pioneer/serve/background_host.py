@@ -12,10 +12,10 @@ import threading
 from collections.abc import Callable, Iterator
 
 from p2os.errors import P2osError
-from p2os.pioneer.body.choose import make_body
-from p2os.pioneer.controller.controller import ControllerSettings, Pioneer
+from p2os.pioneer.body.factory import make_body
+from p2os.pioneer.controller import ControllerSettings, Pioneer
 from p2os.pioneer.serve.host import Host
-from p2os.pioneer.world.find import load_world
+from p2os.pioneer.world import load_world
 from p2os.robots.parameters import load_parameters
 from p2os.timing import Nanos
 from p2os.transport import listen_url
