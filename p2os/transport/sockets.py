@@ -1,7 +1,7 @@
 """TCP lines: connecting, listening, and the byte line over any connected socket.
 
 Nagle's algorithm is off: a frame must not wait for its answer. Keepalive is on: a peer
-that vanishes without a word (power, cable, suspend) is noticed within some 10 s.
+that vanishes without notice (power, cable, suspend) is noticed within some 10 s.
 """
 
 import contextlib
@@ -28,10 +28,10 @@ KEEPALIVE = {
     "TCP_KEEPCNT": 3,
     "TCP_USER_TIMEOUT": 10_000,
 }
-#: chosen: longer than any reason for turning a peer away; what begins a connection and is longer is no such line.
+#: chosen: longer than any reason for a refusal; what begins a connection and is longer is no such line.
 LONGEST_REASON = 120
 
-#: A robot that has a client tells a second one so and closes; other programs may close without a word.
+#: A robot that has a client sends a second one the reason and closes; other programs may close without one.
 HUNG_UP_HINT = "a robot has one client: is another program connected, or has the robot's side ended?"
 
 _LISTEN_HINTS = {
@@ -47,7 +47,7 @@ class SocketTransport:
         self.description = description
         self._socket = connection
         self._unsent = b""
-        #: The first bytes that came, as long as they may be all that the far side has to say.
+        #: The first bytes that came, as long as they may be all that the far side sends.
         self._first = b""
         connection.setblocking(False)
         if connection.family != getattr(socket, "AF_UNIX", None):
@@ -90,10 +90,10 @@ class SocketTransport:
     def set_baud(self, baud: int) -> None:
         """Do nothing: a socket has no line speed."""
 
-    def turn_away(self, reason: str) -> None:
-        """Tell the peer in one line why it cannot stay, and that nothing more will come.
+    def refuse(self, reason: str) -> None:
+        """Send the peer in one line why it is refused, and that nothing more will come.
 
-        The peer's error shows the line if nothing else was said. Closing at once could lose it: `TurnedAway` waits.
+        The peer's error shows the line if nothing else was said. Closing at once could lose it: `ClosingLines` waits.
 
         Args:
             reason: A few words; what is not ASCII is lost.
@@ -109,12 +109,12 @@ class SocketTransport:
         self._socket.close()
 
     def _lost(self, error: OSError) -> HungUpError:
-        with contextlib.suppress(OSError):  # its last words may still wait
+        with contextlib.suppress(OSError):  # a reason may still wait
             self._first += self._socket.recv(LONGEST_REASON + 1)
         return HungUpError(f"{self.description} was lost: {_reason(error)}{self._reason()}", hint=HUNG_UP_HINT)
 
     def _reason(self) -> str:
-        """Return what the far side said if that was a line of text and nothing else, as the end of a message."""
+        """Return what the far side sent if that was a line of text and nothing else, as the end of a message."""
         text = self._first.decode("ascii", "replace")
         line = text.removesuffix("\r\n")
         is_line = line != text and len(text) <= LONGEST_REASON and line.isprintable() and "\ufffd" not in line

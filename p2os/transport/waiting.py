@@ -1,10 +1,12 @@
-"""Waiting for descriptors: the one place that does.
+"""Waiting for lines, and how they end: every wait for a descriptor in the project is one of these.
 
-How lines end: whether the far side has gone, and peers that are sent away with a word.
+`wait_readable` waits for descriptors, `wait_for_bytes` and `wait_for_line` for one line.
+`has_hung_up` asks whether the far side has gone, without reading what it has left behind.
+`ClosingLines` keeps the lines of peers that were refused until they have read why: to
+close a socket whose bytes are unread resets the connection, and the reset overtakes the
+reason. Opening and reading lines is the transports' (`p2os.transport.ports`).
 
-`has_hung_up` asks without reading what the far side has left behind. `TurnedAway` keeps
-the lines of peers that were told why they cannot stay until they have heard it: to close
-a socket whose bytes are unread resets the connection, and the reset overtakes the words.
+Invariant: no wait lasts longer than it was asked to.
 """
 
 import contextlib
@@ -13,88 +15,23 @@ import time
 from collections.abc import Iterable
 
 from p2os.errors import TransportError
-from p2os.timing import NS_PER_S, Nanos
+from p2os.timing import NS_PER_MS, NS_PER_S, Nanos
 from p2os.transport.ports import READ_BYTES, Transport
 from p2os.transport.sockets import SocketTransport
-from p2os.transport.wall_clock import Clock
-
-#: chosen: a peer reads a line within a round trip, and this is many.
-LONGEST_LEAVING_NS: Nanos = 2 * NS_PER_S
-#: chosen: of a thousand that come at once these hear why; each is a descriptor meanwhile.
-MOST_LEAVING = 16
-#: chosen: 64 KB of what such a peer still says are read away a look, so that none of them keeps the others waiting.
-READS_A_LOOK = 16
-
-
-def has_hung_up(descriptor: int) -> bool:
-    """Tell whether the other end is closed, though bytes may still wait; False where a system cannot tell."""
-    if not hasattr(select, "poll"):
-        return False
-    closed_for_writing: int = getattr(select, "POLLRDHUP", 0)  # Linux alone tells that of a socket
-    poll = select.poll()
-    poll.register(descriptor, closed_for_writing)
-    gone = select.POLLHUP | select.POLLERR | closed_for_writing
-    return any(event & gone for _, event in poll.poll(0))
-
-
-class TurnedAway:
-    """Peers that were told why they cannot stay.
-
-    Args:
-        clock: Nanoseconds; never goes back.
-    """
-
-    def __init__(self, clock: Clock) -> None:
-        self._clock = clock
-        self._leaving: list[tuple[Transport, Nanos]] = []
-
-    def __len__(self) -> int:
-        """Return how many have not left yet."""
-        return len(self._leaving)
-
-    def add(self, transport: Transport, reason: str) -> None:
-        """Tell a peer a reason, and close its line once it has left; at once where a line cannot carry a reason."""
-        if not isinstance(transport, SocketTransport):
-            _close(transport)
-            return
-        transport.turn_away(reason)
-        self._leaving.append((transport, self._clock() + LONGEST_LEAVING_NS))
-        if len(self._leaving) > MOST_LEAVING:
-            _close(self._leaving.pop(0)[0])
-        self.look()
-
-    def look(self) -> None:
-        """Close the lines of those that have left, or that were given time enough."""
-        if self._leaving:
-            now = self._clock()
-            self._leaving = [(line, until) for line, until in self._leaving if not _is_over(line, is_late=now >= until)]
-
-    def close(self) -> None:
-        """Close every line."""
-        while self._leaving:
-            _close(self._leaving.pop()[0])
-
-
-def _is_over(transport: Transport, *, is_late: bool) -> bool:
-    with contextlib.suppress(TransportError):
-        for _ in range(READS_A_LOOK):
-            if len(transport.read()) < READ_BYTES:
-                break
-        if not is_late:
-            return False
-    _close(transport)
-    return True
-
-
-def _close(transport: Transport) -> None:
-    with contextlib.suppress(TransportError):
-        transport.close()
-
+from p2os.transport.wall_clock import Clock, GapWatch
 
 #: chosen: how often a line without a descriptor is asked for bytes; a millisecond is a character at 9600 bit/s.
 BLIND_POLL_S = 0.001
 #: `select` ends waits to the microsecond, but knows no descriptor from here on (FD_SETSIZE); `poll` to the millisecond.
 SELECT_LIMIT = 1024
+#: chosen: how soon a loop on a line notices that it should end.
+LONGEST_WAIT_NS: Nanos = 100 * NS_PER_MS
+#: chosen: a peer reads a reason within a round trip, and this is many.
+LONGEST_CLOSING_NS: Nanos = 2 * NS_PER_S
+#: chosen: of a thousand that come at once so many get the reason; each is a descriptor meanwhile.
+MOST_CLOSING = 16
+#: chosen: 64 KB of what such a peer still sends are discarded a poll, so that none of them keeps the others waiting.
+READS_A_POLL = 16
 
 
 def wait_readable(descriptors: Iterable[int], longest_s: float) -> set[int]:
@@ -123,3 +60,83 @@ def wait_for_bytes(transport: Transport, longest_s: float) -> None:
         wait_readable((transport.fileno(),), longest_s)
     except (TransportError, OSError, ValueError):  # no descriptor, or a line that was closed: its `read` tells
         time.sleep(min(max(longest_s, 0.0), BLIND_POLL_S))
+
+
+def wait_for_line(transport: Transport, due: Nanos | None, now: Nanos, gaps: GapWatch | None = None) -> None:
+    """Wait until a line has bytes or something is due, at most `LONGEST_WAIT_NS`.
+
+    Args:
+        transport: The line.
+        due: When something is, on the clock of `now`; None: nothing.
+        now: When the work before this wait began.
+        gaps: Is given the time at which the wait ends at the latest.
+    """
+    longest_ns = LONGEST_WAIT_NS if due is None else min(max(due - now, 0), LONGEST_WAIT_NS)
+    if gaps is not None:
+        gaps.expect(now + longest_ns)
+    wait_for_bytes(transport, longest_ns / NS_PER_S)
+
+
+def has_hung_up(descriptor: int) -> bool:
+    """Tell whether the other end is closed, though bytes may still wait; False where a system cannot tell."""
+    if not hasattr(select, "poll"):
+        return False
+    closed_for_writing: int = getattr(select, "POLLRDHUP", 0)  # Linux alone tells that of a socket
+    poll = select.poll()
+    poll.register(descriptor, closed_for_writing)
+    gone = select.POLLHUP | select.POLLERR | closed_for_writing
+    return any(event & gone for _, event in poll.poll(0))
+
+
+class ClosingLines:
+    """Lines of peers that were refused with a reason, open until the peer has read it.
+
+    Args:
+        clock: Nanoseconds; never goes back.
+    """
+
+    def __init__(self, clock: Clock) -> None:
+        self._clock = clock
+        self._closing: list[tuple[Transport, Nanos]] = []
+
+    def __len__(self) -> int:
+        """Return how many have not left yet."""
+        return len(self._closing)
+
+    def add(self, transport: Transport, reason: str) -> None:
+        """Send a peer the reason, and close its line once it has left; at once where a line cannot carry a reason."""
+        if not isinstance(transport, SocketTransport):
+            _close(transport)
+            return
+        transport.refuse(reason)
+        self._closing.append((transport, self._clock() + LONGEST_CLOSING_NS))
+        if len(self._closing) > MOST_CLOSING:
+            _close(self._closing.pop(0)[0])
+        self.poll()
+
+    def poll(self) -> None:
+        """Close the lines of peers that have left, or that were given time enough."""
+        if self._closing:
+            now = self._clock()
+            self._closing = [(line, until) for line, until in self._closing if not _is_over(line, is_late=now >= until)]
+
+    def close(self) -> None:
+        """Close every line."""
+        while self._closing:
+            _close(self._closing.pop()[0])
+
+
+def _is_over(transport: Transport, *, is_late: bool) -> bool:
+    with contextlib.suppress(TransportError):
+        for _ in range(READS_A_POLL):
+            if len(transport.read()) < READ_BYTES:
+                break
+        if not is_late:
+            return False
+    _close(transport)
+    return True
+
+
+def _close(transport: Transport) -> None:
+    with contextlib.suppress(TransportError):
+        transport.close()

@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 from typer.core import TyperCommand
 
-from p2os.cli.holding import hold_robot
+from p2os.cli.held_robot import hold_robot
 from p2os.cli.main import EXIT_INTERRUPTED
 from p2os.errors import RunFailedError, UsageError
 from p2os.transport import open_url

@@ -10,8 +10,7 @@ import typer
 
 from p2os.capture import Capture, Direction, frame_chunks, read_file
 from p2os.capture.replay import Replay, Tap, frame_of
-from p2os.cli.holding import hold_robot
-from p2os.cli.line_wait import LONGEST_WAIT_NS, wait_for_line
+from p2os.cli.held_robot import hold_robot
 from p2os.cli.signals import postponed
 from p2os.client import ClientSettings
 from p2os.errors import FileError, RemoteProtocolError, RunFailedError, TransportError, UsageError
@@ -19,7 +18,7 @@ from p2os.protocol.commands import CommandNumber
 from p2os.timing import NS_PER_S, Nanos
 from p2os.transport import listen_url, open_url
 from p2os.transport.ports import HungUpError, Listener, Transport
-from p2os.transport.waiting import wait_readable
+from p2os.transport.waiting import LONGEST_WAIT_NS, wait_for_line, wait_readable
 from p2os.transport.wall_clock import Clock, GapWatch, wall_clock
 
 HELP = """Play a recorded conversation again.

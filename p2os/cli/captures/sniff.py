@@ -25,7 +25,7 @@ from p2os.capture.listing import line_of, summary_of
 from p2os.capture.replay import Tap
 from p2os.cli.captures.capture_files import PcapFile, RecordingFile, Sink, Sinks
 from p2os.cli.captures.reading import DEFAULT_ROBOT
-from p2os.cli.holding import hold_robot
+from p2os.cli.held_robot import hold_robot
 from p2os.cli.quantities import parse_duration
 from p2os.cli.signals import postponed
 from p2os.errors import TransportError

@@ -8,8 +8,7 @@ from typing import Annotated
 
 import typer
 
-from p2os.cli.holding import hold_robot
-from p2os.cli.line_wait import wait_for_line
+from p2os.cli.held_robot import hold_robot
 from p2os.cli.links.link_quality import LinkQuality, Spread, spread_of
 from p2os.cli.quantities import parse_duration
 from p2os.cli.signals import postponed
@@ -25,6 +24,7 @@ from p2os.protocol.connection import (
 )
 from p2os.timing import NS_PER_MS, NS_PER_S, Nanos
 from p2os.transport import Transport, open_url
+from p2os.transport.waiting import wait_for_line
 from p2os.transport.wall_clock import Clock, wall_clock
 
 HELP = """Measure a link to a robot, without moving it.

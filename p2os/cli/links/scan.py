@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from p2os.cli.holding import held, hold_robot
+from p2os.cli.held_robot import held, hold_robot
 from p2os.client import ClientSettings, Connected, ConnectError, Robot
 from p2os.client.settings import BAUDS
 from p2os.errors import P2osError, TransportError, UsageError

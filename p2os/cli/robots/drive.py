@@ -8,9 +8,8 @@ from typing import Annotated
 
 import typer
 
-from p2os.cli.holding import held
+from p2os.cli.held_robot import RobotWatch, held
 from p2os.cli.quantities import Quantity, parse_duration, parse_quantity
-from p2os.cli.watched import Watch
 from p2os.client import MotionResult, Robot
 from p2os.errors import UsageError
 from p2os.timing import NS_PER_S, Nanos
@@ -103,7 +102,7 @@ def carry_out(plan: Plan, robot: Robot) -> list[dict[str, object]]:
     if plan.lasts_ns is not None:
         forward_mps, turn_radps = plan.speed_mps or 0.0, plan.rate_radps or 0.0
         what = f"hold {forward_mps:.2f} m/s, {math.degrees(turn_radps):.0f} deg/s"
-        watch = Watch(robot, what, moves=bool(forward_mps or turn_radps))
+        watch = RobotWatch(robot, what, moves=bool(forward_mps or turn_radps))
         robot.set_velocity(forward_mps, turn_radps)
         watch.wait(plan.lasts_ns)
         robot.stop()

@@ -8,8 +8,7 @@ from typing import Annotated
 
 import typer
 
-from p2os.cli.holding import hold_robot
-from p2os.cli.line_wait import wait_for_line
+from p2os.cli.held_robot import hold_robot
 from p2os.cli.signals import postponed
 from p2os.errors import RemoteProtocolError, TransportError
 from p2os.protocol.commands import Command, CommandNumber
@@ -31,6 +30,7 @@ from p2os.robots.parameters import ParametersError, RobotParameters, load_parame
 from p2os.timing import NS_PER_S, Nanos
 from p2os.transport import Transport, open_url
 from p2os.transport.ports import HungUpError
+from p2os.transport.waiting import wait_for_line
 from p2os.transport.wall_clock import Clock, wall_clock
 
 HELP = """Connect to a robot, print who it is, how it is set and what it senses, and leave.

@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from p2os.capture.describe import plain
-from p2os.cli.holding import held
+from p2os.cli.held_robot import held
 from p2os.cli.links.link_quality import LinkQuality
 from p2os.cli.quantities import parse_duration
 from p2os.cli.robots.dashboard import Sight, draw, line_of

@@ -7,9 +7,8 @@ from typing import Annotated
 import typer
 
 from p2os.capture.describe import describe_packet
-from p2os.cli.holding import held
+from p2os.cli.held_robot import RobotWatch, held
 from p2os.cli.quantities import parse_duration
-from p2os.cli.watched import Watch
 from p2os.client import ConfigurationKnown, Notice, PacketArrived, Robot
 from p2os.errors import LocalProtocolError, UsageError
 from p2os.protocol.command_table import ROWS, Argument, CommandRow, command_row
@@ -68,7 +67,7 @@ def send(
             sys.stderr.write(f"note: {warning}\n")
         robot.on_event(lambda notice: answers.extend(_packets(notice)))
         robot.send(wanted)
-        Watch(robot, f"wait for answers to {wanted.name}", moves=False).wait(waits_ns)
+        RobotWatch(robot, f"wait for answers to {wanted.name}", moves=False).wait(waits_ns)
         parameters = robot.parameters
     sent = {"command": wanted.name, "number": int(wanted.number), "hex": wanted.to_frame().to_bytes().hex()}
     described = [describe_packet(packet_frame(packet, profile), profile, parameters) for packet in answers]

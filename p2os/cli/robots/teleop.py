@@ -28,7 +28,7 @@ from typing import Annotated, Protocol
 
 import typer
 
-from p2os.cli.holding import held, hold_robot
+from p2os.cli.held_robot import held, hold_robot
 from p2os.cli.quantities import Quantity, parse_quantity
 from p2os.cli.robots.pad_source import SdlPad
 from p2os.client import Link, Robot

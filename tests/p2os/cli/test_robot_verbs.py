@@ -13,11 +13,11 @@ import pytest
 
 sys.path.insert(0, str(Path(__file__).parent))
 
+from p2os.cli.held_robot import RobotWatch, problem_of
 from p2os.cli.links.bench import Bench, lines_of, measure
 from p2os.cli.links.ports import guess
 from p2os.cli.robots.monitor import words_of
 from p2os.cli.robots.send import make_command
-from p2os.cli.watched import Watch, problem_of
 from p2os.client import (
     DeadmanStopped,
     GapStopped,
@@ -125,7 +125,7 @@ def test_a_pause_ends_a_watched_wait_and_stops_the_robot(served: object) -> None
     with Robot(served.url) as robot:
         robot.set_velocity(0.1)
         with pytest.raises(MotionError, match=r"hold: this program paused for 0\.4 s, after 0\.5 s"):
-            Watch(robot, "hold", moves=True, clock=lambda: next(times)).wait(NS_PER_S)
+            RobotWatch(robot, "hold", moves=True, clock=lambda: next(times)).wait(NS_PER_S)
         robot.sleep(0.5)
         assert robot.state.forward_mps == pytest.approx(0, abs=0.02)
 

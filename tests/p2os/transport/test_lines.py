@@ -15,7 +15,7 @@ from p2os.transport import HungUpError, Listener, Loops, Transport, listen_url, 
 from p2os.transport.serial_port import SerialListener, SerialTransport, list_serial_ports
 from p2os.transport.sockets import BACKLOG_BYTES, SocketTransport
 from p2os.transport.url import SerialUrl
-from p2os.transport.waiting import LONGEST_LEAVING_NS, MOST_LEAVING, TurnedAway
+from p2os.transport.waiting import LONGEST_CLOSING_NS, MOST_CLOSING, ClosingLines
 
 #: A bound on every wait of these tests; reached only when something is broken.
 PATIENCE_S = 5.0
@@ -230,16 +230,16 @@ class Standing:
         return self.now
 
 
-def turned_away(tmp_path: Path, reason: str, said: bytes = b"") -> tuple[Line, TurnedAway, Standing]:
+def refused(tmp_path: Path, reason: str, said: bytes = b"") -> tuple[Line, ClosingLines, Standing]:
     line, clock = make_line("tcp:127.0.0.1:0", tmp_path), Standing()
     line.far.write(said)
-    leaving = TurnedAway(clock)
+    leaving = ClosingLines(clock)
     leaving.add(line.near, reason)
     return line, leaving, clock
 
 
-def test_a_peer_that_is_turned_away_reads_why_though_it_had_spoken(tmp_path: Path) -> None:
-    line, leaving, _ = turned_away(tmp_path, "busy: somebody is here", said=bytes(1000))
+def test_a_peer_that_is_refused_reads_why_though_it_had_spoken(tmp_path: Path) -> None:
+    line, leaving, _ = refused(tmp_path, "busy: somebody is here", said=bytes(1000))
 
     def hung_up() -> str:
         line.far.write(b"more")
@@ -254,7 +254,7 @@ def test_a_peer_that_is_turned_away_reads_why_though_it_had_spoken(tmp_path: Pat
     line.far.close()
 
     def left() -> bool:
-        leaving.look()
+        leaving.poll()
         return not leaving
 
     wait_for(left)
@@ -262,30 +262,30 @@ def test_a_peer_that_is_turned_away_reads_why_though_it_had_spoken(tmp_path: Pat
 
 
 def test_a_peer_that_does_not_leave_is_closed_in_time(tmp_path: Path) -> None:
-    line, leaving, clock = turned_away(tmp_path, "busy")
-    clock.now = LONGEST_LEAVING_NS - 1
-    leaving.look()
+    line, leaving, clock = refused(tmp_path, "busy")
+    clock.now = LONGEST_CLOSING_NS - 1
+    leaving.poll()
     assert len(leaving) == 1
     clock.now += 1
-    leaving.look()
+    leaving.poll()
     assert not leaving
     line.close()
 
 
 def test_a_terminal_cannot_be_told_and_is_let_go_at_once() -> None:
-    leaving, line = TurnedAway(Standing()), open_url("pty:")
+    leaving, line = ClosingLines(Standing()), open_url("pty:")
     leaving.add(line, "busy")
     assert not leaving
     assert line.fileno() == -1
 
 
 def test_no_more_than_a_few_are_leaving_at_once() -> None:
-    leaving, far = TurnedAway(Standing()), []
-    for _ in range(MOST_LEAVING + 3):
+    leaving, far = ClosingLines(Standing()), []
+    for _ in range(MOST_CLOSING + 3):
         one, other = socket.socketpair()
         far.append(other)
         leaving.add(SocketTransport(one, "loop:x"), "busy")
-    assert len(leaving) == MOST_LEAVING
+    assert len(leaving) == MOST_CLOSING
     leaving.close()
     assert not leaving
     for each in far:

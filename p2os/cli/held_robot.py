@@ -1,8 +1,21 @@
-"""Waiting beside a robot that does something: over in time, or at once when it cannot do it any more."""
+"""A robot that a verb holds: connected, watched while it does something, and released undisturbed.
+
+`hold_robot` is also for verbs that stand between a robot and its client: it
+prepares the process. What the robot does is the verbs' own.
+
+Invariant: from `hold_robot` on, nothing suspends the program from its terminal, nothing
+that it prints makes it wait, and no signal cuts the release of a robot short.
+"""
 
 import contextlib
+import sys
 from collections import deque
+from collections.abc import Iterator
+from contextlib import AbstractContextManager
+from typing import TypeVar
 
+from p2os.cli.printing import queue_output
+from p2os.cli.signals import end_on_suspension, postponed
 from p2os.client import (
     DeadmanStopped,
     Disobeyed,
@@ -23,14 +36,38 @@ from p2os.transport.wall_clock import Clock, GapWatch, wall_clock
 #: chosen: how soon a notice is seen; packets come every 100 ms.
 LOOK_NS: Nanos = 50 * NS_PER_MS
 
+Held = TypeVar("Held")
 
-class Watch:
-    """Keeps an eye on a robot while it waits.
+
+def hold_robot() -> None:
+    """Prepare the process for holding a robot; before anything is sent to it."""
+    end_on_suspension()
+    queue_output()
+
+
+@contextlib.contextmanager
+def held(robot: AbstractContextManager[Held]) -> Iterator[Held]:
+    """Connect a robot for a block, and release it undisturbed by signals when the block is left."""
+    hold_robot()
+    client = robot.__enter__()
+    try:
+        yield client
+    except BaseException:
+        with postponed():
+            if not robot.__exit__(*sys.exc_info()):
+                raise
+    else:
+        with postponed():
+            robot.__exit__(None, None, None)
+
+
+class RobotWatch:
+    """Waits beside a robot that does something: until the time is over, or at once when it cannot go on.
 
     Args:
         robot: A connected one.
         what: What it does, as a message begins: "hold 0.20 m/s".
-        moves: Whether it is to move: stalls, wheels and motors that do not obey and the deadman count then.
+        moves: Whether it is to move: stalls, wheels and motors that do not follow and the deadman count then.
         clock: Nanoseconds that never run back.
     """
 
@@ -46,7 +83,7 @@ class Watch:
             LinkLostError: The link was lost; the wait is over then.
             MotionError: The robot does not do what it is to do; it was stopped first.
         """
-        forget = self._robot.on_event(self._notices.append)
+        unsubscribe = self._robot.on_event(self._notices.append)
         now = began = self._clock()
         gaps = GapWatch(now)
         try:
@@ -55,12 +92,12 @@ class Watch:
                 self._robot.sleep(min(left_ns, LOOK_NS) / NS_PER_S)
                 now = self._clock()
                 gap_ns = gaps.gap(now)
-                if (problem := problem_of(GapStopped(gap_ns), moves=True) if gap_ns else self._look()) is not None:
+                if (problem := problem_of(GapStopped(gap_ns), moves=True) if gap_ns else self._problem()) is not None:
                     self._end(problem, now - began)
         finally:
-            forget()
+            unsubscribe()
 
-    def _look(self) -> str | None:
+    def _problem(self) -> str | None:
         """Return what is wrong now."""
         while self._notices:
             notice = self._notices.popleft()
