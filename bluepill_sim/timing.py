@@ -1,25 +1,12 @@
-"""The contract for time that the emulated chip keeps.
+"""Time of the emulated chip: nanoseconds, spans in words, core cycles, and why a run stopped.
 
-The shapes are those of the rest of the project, defined here once more because
-this package knows nothing of robots or their protocol and imports none of it.
+Nothing here keeps time; the chip (`chip.py`) and the engine (`core/engine.py`)
+do. The shapes of `Nanos`, `Reason` and `Reached` are those of the rest of the
+project, defined here once more because this package knows nothing of robots or
+their protocol and imports none of it.
 
-Invariant: `advance_to(limit)` leaves the chip with every deadline at or before
-the time reached already acted on.
-
-Why a run of the engine ended.
-
-Invariant: a `Halt` names the next instruction to run, or the one that failed.
-
-Spans of time as people write them: "10 ms", "1.5s", "250us".
-
-Invariant: the result is exact: no binary fraction stands between the text and its nanoseconds.
-
-Cycles of the core and nanoseconds of the world, one from the other.
-
-Both are integers, tied together at one point (base_ns, base_cycle) that moves
-only when the frequency changes; nothing is accumulated.
-
-Invariant: `cycle_at(ns)` is the first cycle whose `ns_of` is at or after `ns`.
+Invariant: all times are integers, and nothing is accumulated; `advance_to(limit)`
+of the chip leaves it with every deadline at or before the time reached acted on.
 """
 
 import re
@@ -30,9 +17,15 @@ from typing import TypeAlias
 
 from bluepill_sim.errors import BluePillError
 
+#: A point in virtual time, or a span of it, in nanoseconds.
+Nanos: TypeAlias = int
+NS_PER_US = 1_000
+NS_PER_MS = 1_000_000
+NS_PER_S = 1_000_000_000
+
 
 class HaltKind(Enum):
-    """Why a run ended."""
+    """Why a run of the engine ended."""
 
     #: At a block boundary, because `stop_at` was reached.
     BOUNDARY = "boundary"
@@ -66,7 +59,7 @@ DEBUG_HALTS = frozenset({HaltKind.BREAKPOINT, HaltKind.WATCHPOINT, HaltKind.STEP
 
 @dataclass(frozen=True, slots=True)
 class Halt:
-    """Why and where a run ended."""
+    """Why and where a run of the engine ended."""
 
     kind: HaltKind
     #: The next instruction to run; for a fault, the one that failed.
@@ -77,14 +70,6 @@ class Halt:
     watched: int | None = None
 
 
-#: A point in virtual time, or a span of it, in nanoseconds.
-Nanos: TypeAlias = int
-
-NS_PER_US = 1_000
-NS_PER_MS = 1_000_000
-NS_PER_S = 1_000_000_000
-
-
 class Reason(Enum):
     """Why the chip stopped where it did."""
 
@@ -92,7 +77,7 @@ class Reason(Enum):
     DEADLINE = "deadline"
     #: A watched pin changed.
     EDGE = "edge"
-    #: The firmware is locked up, or a debugger stands the chip still: `Reached.halt` tells which.
+    #: The firmware is locked up, or a debugger has halted the chip: `Reached.halt` tells which.
     HALT = "halt"
     #: The outcome of the run is decided; the chip itself never says so.
     VERDICT = "verdict"
@@ -108,42 +93,12 @@ class Reached:
     halt: Halt | None = None
 
 
-#: A span: nanoseconds, or a number with its unit.
-Span = int | str
-
-_UNITS = {"ns": 1, "us": NS_PER_US, "µs": NS_PER_US, "ms": NS_PER_MS, "s": NS_PER_S, "min": 60 * NS_PER_S}
-_TEXT = re.compile(r"(?P<number>\d+\.?\d*|\.\d+)\s*(?P<unit>[a-zµ]+)", re.ASCII | re.IGNORECASE)
-_MICRO = "\N{GREEK SMALL LETTER MU}s"
-#: chosen: longer than anybody waits, and far inside what the chip counts.
-_LONGEST_NS = 366 * 24 * 3600 * NS_PER_S
-
-
-def to_nanos(span: Span) -> Nanos:
-    """Return a span in nanoseconds.
-
-    Args:
-        span: nanoseconds as an integer, or a number with one of ns, us, ms, s, min.
-
-    Raises:
-        BluePillError: it has no unit, a negative or absurd length, or is no span at all.
-    """
-    if isinstance(span, bool) or not isinstance(span, int | str):
-        raise BluePillError(f"{span!r} is no span of time", hint='nanoseconds as an integer, or "10 ms"')
-    if isinstance(span, int):
-        nanos = span
-    else:
-        found = _TEXT.fullmatch(span.strip().replace("\N{MICRO SIGN}", "u").replace(_MICRO, "us"))
-        unit = None if found is None else _UNITS.get(found["unit"].lower())
-        if found is None or unit is None:
-            raise BluePillError(f"{span!r} is no span of time", hint="a number with ns, us, ms, s or min, such as 10ms")
-        nanos = int(Decimal(found["number"]) * unit)
-    if not 0 <= nanos <= _LONGEST_NS:
-        raise BluePillError(f"{span!r} is negative or longer than a year", hint="give a span such as 10ms")
-    return nanos
-
-
 class CycleClock:
-    """The relation between cycles and nanoseconds at the present frequency."""
+    """Cycles of the core and nanoseconds of the world, one from the other.
+
+    They are tied together at one point (base_ns, base_cycle), which moves only when
+    the frequency changes; `cycle_at(ns)` is the first cycle whose `ns_of` is at or after `ns`.
+    """
 
     def __init__(self, frequency_hz: int) -> None:
         self.frequency_hz = frequency_hz
@@ -171,3 +126,36 @@ class CycleClock:
     def restore(self, snapshot: tuple[int, int, int]) -> None:
         """Put back what `snapshot` returned."""
         self.frequency_hz, self._base_ns, self._base_cycle = snapshot
+
+
+#: A span: nanoseconds, or a number with its unit.
+Span = int | str
+_UNITS = {"ns": 1, "us": NS_PER_US, "µs": NS_PER_US, "ms": NS_PER_MS, "s": NS_PER_S, "min": 60 * NS_PER_S}
+_TEXT = re.compile(r"(?P<number>\d+\.?\d*|\.\d+)\s*(?P<unit>[a-zµ]+)", re.ASCII | re.IGNORECASE)
+_MICRO = "\N{GREEK SMALL LETTER MU}s"
+#: chosen: longer than anybody waits, and far inside what the chip counts.
+_LONGEST_NS = 366 * 24 * 3600 * NS_PER_S
+
+
+def to_nanos(span: Span) -> Nanos:
+    """Return a span in nanoseconds: exactly, for no binary fraction stands between the text and its value.
+
+    Args:
+        span: nanoseconds as an integer, or a number with one of ns, us, ms, s, min.
+
+    Raises:
+        BluePillError: it has no unit, a negative or absurd length, or is no span at all.
+    """
+    if isinstance(span, bool) or not isinstance(span, int | str):
+        raise BluePillError(f"{span!r} is no span of time", hint='nanoseconds as an integer, or "10 ms"')
+    if isinstance(span, int):
+        nanos = span
+    else:
+        found = _TEXT.fullmatch(span.strip().replace("\N{MICRO SIGN}", "u").replace(_MICRO, "us"))
+        unit = None if found is None else _UNITS.get(found["unit"].lower())
+        if found is None or unit is None:
+            raise BluePillError(f"{span!r} is no span of time", hint="a number with ns, us, ms, s or min, such as 10ms")
+        nanos = int(Decimal(found["number"]) * unit)
+    if not 0 <= nanos <= _LONGEST_NS:
+        raise BluePillError(f"{span!r} is negative or longer than a year", hint="give a span such as 10ms")
+    return nanos

@@ -33,7 +33,7 @@ def board_of(bench: Bench | RemoteBench) -> BluePill:
 
 
 class BenchMachine:
-    """A bench in virtual time, as `bluepill_sim.debug.control.Machine`."""
+    """A bench in virtual time, as `bluepill_sim.debug.machine.Machine`."""
 
     can_rewind = True
 

@@ -17,10 +17,10 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from bluepill_sim import BluePill
-from bluepill_sim.core.machine import Core, Register
-from bluepill_sim.native import library as native_library
-from bluepill_sim.sight.probe import Probe
-from bluepill_sim.sight.vcd import write_vcd
+from bluepill_sim.core.unicorn_core import UnicornCore, Register
+from bluepill_sim.native.library import CORE_VARIABLE, library_path
+from bluepill_sim.analysis.probe import Probe
+from bluepill_sim.analysis.vcd import write_vcd
 
 HERE = Path(__file__).parent
 RUNTIME = HERE.parent / "robot_bench" / "firmware"
@@ -55,14 +55,14 @@ def build(name: str, folder: Path, *options: str) -> Path:
 @contextmanager
 def core(name: str) -> Iterator[None]:
     """Choose the core of the boards that are made within."""
-    before = os.environ.get(native_library.VARIABLE)
-    os.environ[native_library.VARIABLE] = name
+    before = os.environ.get(CORE_VARIABLE)
+    os.environ[CORE_VARIABLE] = name
     try:
         yield
     finally:
-        os.environ.pop(native_library.VARIABLE)
+        os.environ.pop(CORE_VARIABLE)
         if before is not None:
-            os.environ[native_library.VARIABLE] = before
+            os.environ[CORE_VARIABLE] = before
 
 
 def board(program: Path, name: str) -> BluePill:
@@ -105,14 +105,14 @@ def speeds(folder: Path) -> None:
     """Each program, on each core."""
     for name, native_s, python_s, goal in ROWS:
         program = build(name, folder)
-        if native_library.path() is not None:
+        if library_path() is not None:
             made = board(program, "native")
             note = "" if goal is None else f"goal {goal:g}"
             row(f"{name}, native", f"{median(lambda: factor(made, native_s)):.2f} x real", note)  # noqa: B023 - called at once
         slow = board(program, "python")
         wanted = f"goal {PYTHON_GOALS[name]:g}" if name in PYTHON_GOALS else ""
         row(f"{name}, Python", f"{median(lambda: factor(slow, python_s)):.3f} x real", wanted)  # noqa: B023 - as above
-    if native_library.path() is not None:
+    if library_path() is not None:
         program = build("bitbang", folder)
         figure = median(lambda: recorded(program, folder / "pins.vcd"))
         row("bitbang, native, every edge to a VCD file", f"{figure:.2f} x real", "goal 0.2, two edges a round")
@@ -141,9 +141,9 @@ def snapshot_s(made: BluePill) -> float:
 def against_unicorn(folder: Path) -> None:
     """Compute, with and without everything that this project adds, in turn."""
     program = build("compute", folder)
-    made = board(program, "native" if native_library.path() else "python")
+    made = board(program, "native" if library_path() else "python")
     rounds = rounds_of(made)
-    bare = Core(lambda error: sys.exit(str(error)))
+    bare = UnicornCore(lambda error: sys.exit(str(error)))
     twin = board(program, "python")
     for region in twin.chip.memory.regions:
         bare.map_memory(region.base, region.buffer, "rwx" if region.is_writable else "rx")
@@ -170,7 +170,7 @@ def against_qemu(folder: Path) -> None:
         row("compute, QEMU -icount shift=0", "skipped", "qemu-system-arm is not installed")
         return
     program = build("compute", folder, "-DBENCH_NO_CLOCK=1")
-    made = board(program, "native" if native_library.path() else "python")
+    made = board(program, "native" if library_path() else "python")
     at = counter_of(made)
     rounds = rounds_of(made)
     before, begin = rounds(), time.perf_counter()

@@ -6,15 +6,15 @@ from typing import Annotated
 
 import typer
 
+from bluepill_sim.analysis.coverage import Coverage, FileCoverage
+from bluepill_sim.analysis.lcov import write_lcov
+from bluepill_sim.analysis.observation import Observation
 from bluepill_sim.board import BluePill
 from bluepill_sim.cli.columns import print_columns
 from bluepill_sim.cli.driving import parse_changes, run_driven, say, summary, tell_fault, warn_on_stderr
 from bluepill_sim.errors import BluePillError
 from bluepill_sim.program.line_table import read_lines
 from bluepill_sim.program.static_code import StaticCode
-from bluepill_sim.sight.coverage import Coverage, FileCoverage
-from bluepill_sim.sight.lcov import write_lcov
-from bluepill_sim.sight.observation import Observation
 from bluepill_sim.timing import to_nanos
 
 HELP = """Run a firmware for a while and tell which of its lines and branches ran.

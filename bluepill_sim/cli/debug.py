@@ -9,7 +9,7 @@ from bluepill_sim.board import BluePill
 from bluepill_sim.cli.console import connect, open_console
 from bluepill_sim.cli.driving import say, summary, warn_on_stderr
 from bluepill_sim.cli.gdb_server import GdbServer
-from bluepill_sim.debug.control import LoneChip
+from bluepill_sim.debug.machine import LoneChip
 
 HELP = """Wait for GDB, and let it run, stop, look into and rewind a firmware.
 

@@ -11,9 +11,9 @@ import socket
 import time
 from collections.abc import Callable
 
-from bluepill_sim.debug.control import Machine
 from bluepill_sim.debug.execution import Execution
 from bluepill_sim.debug.gdb_session import GdbSession
+from bluepill_sim.debug.machine import Machine
 from bluepill_sim.debug.packets import Mark, Packet, PacketReader, frame
 from bluepill_sim.errors import BluePillError
 from bluepill_sim.timing import NS_PER_S, Nanos

@@ -6,12 +6,12 @@ from typing import Annotated
 
 import typer
 
+from bluepill_sim.analysis.probe import Probe
+from bluepill_sim.analysis.sigrok import write_sigrok
+from bluepill_sim.analysis.vcd import write_vcd
 from bluepill_sim.board import BluePill
 from bluepill_sim.cli.columns import print_columns
 from bluepill_sim.cli.driving import parse_changes, run_driven, say, summary, tell_fault, warn_on_stderr
-from bluepill_sim.sight.probe import Probe
-from bluepill_sim.sight.sigrok import write_sigrok
-from bluepill_sim.sight.vcd import write_vcd
 from bluepill_sim.timing import NS_PER_S, to_nanos
 
 HELP = """Run a firmware for a while, then show each pin: mode, level, who drives it, edges.

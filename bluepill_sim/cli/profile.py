@@ -6,6 +6,11 @@ from typing import Annotated
 
 import typer
 
+from bluepill_sim.analysis.cycle_profile import ASLEEP, CycleProfile, FunctionCost
+from bluepill_sim.analysis.flame import flame_svg
+from bluepill_sim.analysis.latency import ExceptionCost, Latency
+from bluepill_sim.analysis.observation import Observation
+from bluepill_sim.analysis.stack import StackGauge
 from bluepill_sim.board import BluePill
 from bluepill_sim.cli.columns import print_columns
 from bluepill_sim.cli.driving import parse_changes, run_driven, say, summary, tell_fault, warn_on_stderr
@@ -13,11 +18,6 @@ from bluepill_sim.core.nvic import exception_name
 from bluepill_sim.errors import BluePillError
 from bluepill_sim.program.functions import FunctionTable
 from bluepill_sim.program.static_code import StaticCode
-from bluepill_sim.sight.cycle_profile import ASLEEP, CycleProfile, FunctionCost
-from bluepill_sim.sight.flame import flame_svg
-from bluepill_sim.sight.latency import ExceptionCost, Latency
-from bluepill_sim.sight.observation import Observation
-from bluepill_sim.sight.stack import StackGauge
 from bluepill_sim.timing import to_nanos
 
 HELP = """Run a firmware for a while and tell where its cycles go.

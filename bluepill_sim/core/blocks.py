@@ -1,29 +1,20 @@
-"""The rest of a block, when a debugger halted the core inside of it.
+"""Basic blocks as an engine keeps them: the measured ones, and one in which a run was halted.
 
-Going on, it costs what was left of the block's cycles, and its run ends when
-the halted one would have: so halts change no time.
+What a block costs is worked out by `block_cost.py`; entering and charging blocks
+is the engine's business.
 
-Invariant: there is a rest only between a halt and the run that goes on from it.
+Theory of operation. Blocks in flash are looked up in one dictionary, which is
+what a run spends its time in. Apart from it stand blocks that need more than
+their cycles added up, and blocks in writable memory, whose bytes are compared
+each time. Unicorn ends a run that a hook stops only after the IT block that it
+is in, and makes the access that the hook looked at; so the state before the
+instruction is kept (`Frozen`), and what runs after the hook is undone. Going on
+from there costs what was left of the block's cycles, and ends when the halted
+run would have (`RestOfBlock`): so halts change no time.
 
-The state before an instruction where a hook ends a run.
-
-Unicorn ends a run that a hook stops only after the IT block that it is in, and
-makes the access that a hook looked at. What runs after the hook is therefore
-undone: registers and memories are put back.
-
-Invariant: `put_back` leaves the core exactly before the instruction, ITSTATE included.
-
-The blocks that an engine has measured, by address.
-
-Blocks in flash are looked up in one dictionary, which is what a run spends its
-time in. Apart from it stand blocks that need more than their cycles added up,
-and blocks in writable memory, whose bytes are compared each time.
-
-Invariant: an address is in `plain` only if its block takes no attention and its bytes cannot change during a run.
-
-What the numbers mean with which Unicorn ends a run.
-
-Source: unicorn.h, and target/arm of Unicorn 2.1 (EXCP_ numbers).
+Invariant: an address is in `plain` only if its block takes no attention and its
+bytes cannot change during a run; there is a rest only between a halt and the run
+that goes on from it.
 """
 
 import ctypes
@@ -31,17 +22,9 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from bluepill_sim.core.block_cost import NO_BLOCK, Block
-from bluepill_sim.core.machine import (
-    FETCH_PROTECTED,
-    FETCH_UNMAPPED,
-    WRITE_PROTECTED,
-    WRITE_UNMAPPED,
-    Core,
-    CoreSnapshot,
-    Register,
-)
 from bluepill_sim.core.thumb import Kind
-from bluepill_sim.timing import Halt, HaltKind
+from bluepill_sim.core.unicorn_core import CoreSnapshot, Register, UnicornCore
+from bluepill_sim.timing import Halt
 
 #: ITSTATE in CPSR and xPSR: bits 1 to 0 at 26, bits 7 to 2 at 15.
 IT_BITS = 0x0600_FC00
@@ -49,43 +32,11 @@ IT_BITS = 0x0600_FC00
 #: First address, address after, place in the host's memory.
 WritableMemory = tuple[int, int, int]
 
-
-def it_state_of(psr: int) -> int:
-    """Return ITSTATE of a CPSR or xPSR, its bits in the architecture's order."""
-    return psr >> 25 & 3 | (psr >> 10 & 0x3F) << 2
-
-
-@dataclass(frozen=True, slots=True)
-class Frozen:
-    """All that running on would change."""
-
-    halt: Halt
-    block: Block
-    cycle: int
-    stop_at: int
-    it_state: int
-    registers: CoreSnapshot
-    #: What each writable memory held.
-    memories: tuple[bytes, ...]
-
-    def put_back(self, core: Core, writable: list[WritableMemory]) -> None:
-        """Undo what has run since."""
-        for (first, end, at), data in zip(writable, self.memories, strict=True):
-            if ctypes.string_at(at, end - first) != data:
-                ctypes.memmove(at, data, len(data))
-                core.drop_code(first, end - first)
-        core.load(self.registers)
-        flags = core.registers[Register.CPSR] & ~IT_BITS
-        core.registers[Register.CPSR] = flags | (self.it_state & 3) << 25 | (self.it_state >> 2) << 10
-
-
-def copy_of(writable: list[WritableMemory]) -> tuple[bytes, ...]:
-    """Return what each writable memory holds."""
-    return tuple(ctypes.string_at(at, end - first) for first, end, at in writable)
-
-
 #: Returns the costs of the block of `size` bytes at `address`.
 Measure = Callable[[int, int], Block]
+
+#: Start, end, straight, taken, offsets, ITSTATEs, kind of the last instruction, when the run was to end.
+RestSnapshot = tuple[int, int, int, int, tuple[tuple[int, int], ...], tuple[tuple[int, int], ...], str, int]
 
 
 class BlockTable:
@@ -140,75 +91,32 @@ class BlockTable:
         return None if memory is None else ctypes.string_at(memory[2] + address - memory[0], size)
 
 
-#: Branches to these addresses are exception returns in handler mode (ARMv7-M B1.5.8).
-FIRST_EXCEPTION_RETURN = 0xFFFF_FFE0
+@dataclass(frozen=True, slots=True)
+class Frozen:
+    """The state before the instruction at which a hook ended a run: all that running on would change."""
 
-#: UC_ERR_EXCEPTION, and the number of the interrupt that it stands for.
-_DENIED, _PREFETCH_ABORT = 21, 3
+    halt: Halt
+    block: Block
+    cycle: int
+    stop_at: int
+    it_state: int
+    registers: CoreSnapshot
+    #: What each writable memory held.
+    memories: tuple[bytes, ...]
 
-#: 3 and 8 are told apart by the PC.
-_INTERRUPTS = {
-    2: HaltKind.SUPERVISOR_CALL,
-    3: HaltKind.EXECUTE_NEVER,
-    4: HaltKind.UNALIGNED,
-    7: HaltKind.BKPT,
-    8: HaltKind.EXECUTE_NEVER,
-    17: HaltKind.NO_COPROCESSOR,
-}
-
-_BAD_ACCESSES = {
-    WRITE_UNMAPPED: HaltKind.WRITE_ERROR,
-    WRITE_PROTECTED: HaltKind.WRITE_ERROR,
-    FETCH_UNMAPPED: HaltKind.FETCH_ERROR,
-    FETCH_PROTECTED: HaltKind.FETCH_ERROR,
-}
-
-
-def kind_of_interrupt(number: int, pc: int) -> HaltKind:
-    """Return what an exception of Unicorn's own numbering is."""
-    kind = _INTERRUPTS.get(number, HaltKind.UNDEFINED)
-    if kind is HaltKind.EXECUTE_NEVER and pc >= FIRST_EXCEPTION_RETURN:
-        return HaltKind.EXCEPTION_RETURN
-    return kind
-
-
-def kind_of_bad_access(access: int) -> HaltKind:
-    """Return what an access to no memory, or against its protection, is."""
-    return _BAD_ACCESSES.get(access, HaltKind.READ_ERROR)
-
-
-def kind_of_invalid(block: Block, pc: int, *, is_thumb: bool) -> HaltKind | None:
-    """Return what an instruction is that Unicorn does not know; None for one that does nothing.
-
-    It takes WFE and YIELD for undefined, with the PC already past them; the rest stands at the PC.
-    """
-    last = block.last if pc == block.end else None
-    if last is Kind.YIELD:
-        return None
-    if last is Kind.WAIT_EVENT:
-        return HaltKind.WAIT_EVENT
-    return HaltKind.UNDEFINED if is_thumb else HaltKind.INVALID_STATE
-
-
-def halt_without_reason(error: int, block: Block, pc: int) -> Halt:
-    """Tell why Unicorn came back without having called anything: WFI, or a fetch that its TLB denied.
-
-    Raises:
-        RuntimeError: it was not; a bug here.
-    """
-    if error == 0 and block.last is Kind.WAIT_INTERRUPT and pc == block.end:
-        return Halt(HaltKind.WAIT_INTERRUPT, pc)
-    if error == _DENIED:
-        return Halt(kind_of_interrupt(_PREFETCH_ABORT, pc), pc)
-    raise RuntimeError(f"Unicorn stopped at {pc:#010x} with error {error}")
-
-
-#: Start, end, straight, taken, offsets, ITSTATEs, kind of the last instruction, when the run was to end.
-RestSnapshot = tuple[int, int, int, int, tuple[tuple[int, int], ...], tuple[tuple[int, int], ...], str, int]
+    def put_back(self, core: UnicornCore, writable: list[WritableMemory]) -> None:
+        """Undo what has run since: the core stands exactly before the instruction, ITSTATE included."""
+        for (first, end, at), data in zip(writable, self.memories, strict=True):
+            if ctypes.string_at(at, end - first) != data:
+                ctypes.memmove(at, data, len(data))
+                core.drop_code(first, end - first)
+        core.load(self.registers)
+        flags = core.registers[Register.CPSR] & ~IT_BITS
+        core.registers[Register.CPSR] = flags | (self.it_state & 3) << 25 | (self.it_state >> 2) << 10
 
 
 class RestOfBlock:
-    """What is left of a block; empty most of the time."""
+    """What is left of a block that a debugger halted inside; empty most of the time."""
 
     def __init__(self) -> None:
         #: None where the core stands at a boundary.
@@ -229,7 +137,7 @@ class RestOfBlock:
             self.block, self._stop_at = block.rest(pc), stop_at
 
     def resume(self, table: dict[int, Block], stop_at: int) -> None:
-        """Get ready for a run that begins inside the block."""
+        """Prepare a run that begins inside the block."""
         if self.block is not None:
             self._displaced = table.pop(self.block.start, None)
             self._stop_at = min(stop_at, self._stop_at)
@@ -260,3 +168,13 @@ class RestOfBlock:
         start, end, straight, taken, offsets, it_states, last, self._stop_at = snapshot
         self.block = block = Block(start, end, straight, taken, dict(offsets))
         block.it_states, block.has_it, block.last = dict(it_states), True, Kind(last)
+
+
+def copy_of(writable: list[WritableMemory]) -> tuple[bytes, ...]:
+    """Return what each writable memory holds."""
+    return tuple(ctypes.string_at(at, end - first) for first, end, at in writable)
+
+
+def it_state_of(psr: int) -> int:
+    """Return ITSTATE of a CPSR or xPSR, its bits in the architecture's order."""
+    return psr >> 25 & 3 | (psr >> 10 & 0x3F) << 2

@@ -6,10 +6,10 @@ instruction for its own duration. A hook never lets the engine go on from a
 half-done state: `Engine.stop_before` undoes what runs after it (Unicorn cannot
 end a run inside an IT block), so that the core stands exactly before the
 instruction. A watchpoint stops the same way, and then the instruction is
-stepped over: what is told is that the access has been made.
+stepped over: the halt that is reported is one after the access.
 
 Not modelled: the four comparators of the DWT and the six of the FPB; there are
-as many breakpoints and watchpoints as one likes. An instruction that its IT
+any number of breakpoints and watchpoints. An instruction that its IT
 block skips breaks nothing. Stacking by an exception is not watched.
 
 Invariant: between runs the hooks are those of `breakpoints` and `watchpoints`
@@ -20,7 +20,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from enum import Enum
 
-from bluepill_sim.core.machine import READ_ACCESS, Core, Register
+from bluepill_sim.core.unicorn_core import READ_ACCESS, Register, UnicornCore
 from bluepill_sim.timing import HaltKind
 
 
@@ -58,7 +58,7 @@ class Watchpoint:
 class DebugUnit:
     """The hooks of one core."""
 
-    def __init__(self, core: Core, stop_before: Callable[[HaltKind, int, int | None], None]) -> None:
+    def __init__(self, core: UnicornCore, stop_before: Callable[[HaltKind, int, int | None], None]) -> None:
         self._core = core
         self._stop_before = stop_before
         #: Addresses of instructions that the core stops before; take effect with the next run.
@@ -67,8 +67,8 @@ class DebugUnit:
         self.watchpoints: set[Watchpoint] = set()
         #: The instruction that a run starts with and that has already been stopped at; None for none.
         self.passes: int | None = None
-        #: Whether accesses go unwatched, for the step that makes one.
-        self.is_blind = False
+        #: Whether accesses to watched bytes pass, for the step that makes one.
+        self.ignores_accesses = False
         self._break_hooks: dict[int, int] = {}
         self._watch_hooks: dict[Watchpoint, int] = {}
         self._on_instruction = core.instruction_callback(self._at_breakpoint)
@@ -127,6 +127,6 @@ class DebugUnit:
 
     def _at_access(self, access: int, address: int, size: int, _value: int) -> bool:
         is_read = access == READ_ACCESS
-        if not self.is_blind and any(point.sees(address, size, is_read=is_read) for point in self._watch_hooks):
+        if not self.ignores_accesses and any(point.sees(address, size, is_read=is_read) for point in self._watch_hooks):
             self._stop_before(HaltKind.WATCHPOINT, self._core.registers[Register.PC], address)
         return True

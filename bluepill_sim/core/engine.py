@@ -1,5 +1,8 @@
 """A Cortex-M3 that runs basic blocks and counts their cycles.
 
+This is not the processor: exceptions, priorities, sleeping and the meaning of
+faults are the business of `processor.py`.
+
 Theory of operation. Unicorn translates a basic block at a time and calls
 `_enter_block` before each. There the cost of the block *before* is added,
 since only now it is known whether its branch was taken; and there, and nowhere
@@ -7,24 +10,16 @@ else, a run ends when its time is up. So a run always stops at a block boundary,
 unless an instruction itself ends it: WFI, WFE, SVC, BKPT, exception return, or
 a fault.
 
-This is not the processor: exceptions, priorities, sleeping and the meaning of
-faults are the business of `processor.py`. What Unicorn gets wrong is put right
-here: an access to a peripheral never stops the engine (Unicorn would run it
-twice), it moves `stop_at`; divisions by zero and unaligned multiple transfers,
-which Unicorn lets pass, are caught by hooks on just those addresses; a hook
-that ends a run has what ran after it undone, since Unicorn goes on to the end
-of an IT block (`stop_before`).
+What Unicorn gets wrong is put right here. An access to a peripheral never stops
+the engine (Unicorn would run it twice), it moves `stop_at`. Divisions by zero
+and unaligned multiple transfers, which Unicorn lets pass, are caught by hooks on
+just those addresses (`Traps`). A hook that ends a run has what ran after it
+undone, since Unicorn goes on to the end of an IT block (`stop_before`).
 
+Source: ARMv7-M Architecture Reference Manual A3.2.1, B1.5.8, B3.2.8 (CCR);
+unicorn.h, and target/arm of Unicorn 2.1 for the numbers with which a run ends.
 Invariant: between runs `cycle` is the time of the boundary that stands at `pc`,
 or of the instruction there where `is_inside_block`.
-
-What a Cortex-M3 traps and Unicorn lets pass: divisions by zero, and accesses that must be aligned.
-
-Hooks stand on just the instructions that may trap; a block that has some is
-translated again with them, the first time that it is entered.
-
-Source: ARMv7-M Architecture Reference Manual A3.2.1, B3.2.8 (CCR).
-Invariant: a block in `_armed` was translated with its hooks in place.
 """
 
 import ctypes
@@ -33,7 +28,6 @@ from dataclasses import replace
 
 from bluepill_sim.core.block_cost import NO_BLOCK, Block
 from bluepill_sim.core.blocks import (
-    FIRST_EXCEPTION_RETURN,
     IT_BITS,
     BlockTable,
     Frozen,
@@ -41,39 +35,515 @@ from bluepill_sim.core.blocks import (
     RestOfBlock,
     RestSnapshot,
     copy_of,
-    halt_without_reason,
     it_state_of,
-    kind_of_bad_access,
-    kind_of_interrupt,
-    kind_of_invalid,
 )
 from bluepill_sim.core.debug_unit import DebugUnit, Watchpoint
-from bluepill_sim.core.machine import (
+from bluepill_sim.core.recorder import BLOCK, BlockLog, BlockRecorder, BlockRow, KeptRows, LastRows
+from bluepill_sim.core.thumb import Kind
+from bluepill_sim.core.unicorn_core import (
     FETCH_PROTECTED,
+    FETCH_UNMAPPED,
     GENERAL,
+    SCRATCH_BASE,
+    SCRATCH_END,
     WRITE_PROTECTED,
-    Core,
+    WRITE_UNMAPPED,
     CoreSnapshot,
     ReadAccess,
     Register,
-    Scratch,
+    UnicornCore,
     WriteAccess,
     WriteToReadOnly,
-    guarded,
+    io_callbacks,
 )
-from bluepill_sim.core.recorder import BLOCK, BlockLog, BlockRecorder, BlockRow, KeptRows, LastRows
 from bluepill_sim.timing import DEBUG_HALTS, Halt, HaltKind
 
 #: Stops the engine before the instruction at an address: (kind, PC, address of the data).
 StopBefore = Callable[[HaltKind, int, int | None], None]
+#: Registers, cycle, PC, T bit, whether exclusive accesses are used, the rest of a block, the last rows.
+EngineSnapshot = tuple[CoreSnapshot, int, int, bool, bool, RestSnapshot | None, tuple[BlockRow, ...]]
 #: Flash and SRAM lie below; peripherals above have rules of their own.
 _LAST_NORMAL_ADDRESS = 0x21FF_FFFF
 
+#: Branches to these addresses are exception returns in handler mode (ARMv7-M B1.5.8).
+_FIRST_EXCEPTION_RETURN = 0xFFFF_FFE0
+
+#: The scratch page as a block: it costs nothing.
+_SCRATCH_BLOCK = Block(SCRATCH_BASE, SCRATCH_END, 0, 0, {})
+
+#: Later than any run.
+_NEVER = 1 << 62
+
+_T_BIT = 1 << 24
+
+#: UC_ERR_EXCEPTION, and the number of the interrupt that it stands for.
+_DENIED, _PREFETCH_ABORT = 21, 3
+
+#: 3 and 8 are told apart by the PC.
+_INTERRUPTS = {
+    2: HaltKind.SUPERVISOR_CALL,
+    3: HaltKind.EXECUTE_NEVER,
+    4: HaltKind.UNALIGNED,
+    7: HaltKind.BKPT,
+    8: HaltKind.EXECUTE_NEVER,
+    17: HaltKind.NO_COPROCESSOR,
+}
+
+_BAD_ACCESSES = {
+    WRITE_UNMAPPED: HaltKind.WRITE_ERROR,
+    WRITE_PROTECTED: HaltKind.WRITE_ERROR,
+    FETCH_UNMAPPED: HaltKind.FETCH_ERROR,
+    FETCH_PROTECTED: HaltKind.FETCH_ERROR,
+}
+
+
+class Engine:
+    """Runs instructions between block boundaries; see the theory of operation above.
+
+    Raises:
+        MissingDependencyError: Unicorn is not installed.
+    """
+
+    def __init__(self, measure: Measure) -> None:
+        self._core = UnicornCore(self._fail)
+        self._make_state()
+        self.registers = self._core.registers
+        #: Time of the present boundary, or of the start of the running block, in cycles.
+        self.cycle = 0
+        #: The run ends at the first boundary at or after this time; 0 ends it at the next one.
+        self.stop_at = 0
+        #: The next instruction, and whether the T bit is set.
+        self.pc = 0
+        self.is_thumb = True
+        #: The block that is running.
+        self.block = NO_BLOCK
+        #: Whether a block that may unmask an interrupt ends the run at its boundary.
+        self.stops_after_mask_change = False
+        #: Called when the firmware executes SEV.
+        self.on_event: Callable[[], None] | None = None
+        #: Called with writes to read-only memory, and after the instruction that made them.
+        self.on_read_only_write: WriteToReadOnly | None = None
+        self.on_read_only_written: Callable[[], None] | None = None
+        self._lets_writes_through = False
+        self._blocks = BlockTable(measure)
+        self._table = self._blocks.plain
+        self._halt: Halt | None = None
+        #: Where the run started: its first block may start inside an IT block.
+        self._run_from = 0
+        self._failure: BaseException | None = None
+        #: ITSTATE at the start of the next run.
+        self.it_state = 0
+        self._frozen: Frozen | None = None
+        self._rest = RestOfBlock()
+        self._is_stepping = False
+        #: What ran last; the processor adds the exceptions.
+        self.log = BlockLog(self._make_last_rows(), self._fail)
+        self._log_row = self.log.add
+        self._traps = self._make_traps()
+        self._debug = DebugUnit(self._core, self.stop_before)
+        #: Addresses that a run halts before; change it between runs as you like.
+        self.breakpoints: set[int] = self._debug.breakpoints
+        #: Accesses that a run halts after; likewise.
+        self.watchpoints: set[Watchpoint] = self._debug.watchpoints
+        self._block_hook = 0
+        self._install_hooks()
+        self._bad_access_hook = self._core.on_bad_access(self._bad_access)
+
+    def _make_state(self) -> None:
+        """Make what holds the state, for an engine that keeps it elsewhere."""
+
+    def _make_last_rows(self) -> KeptRows:
+        return LastRows()
+
+    def _make_traps(self) -> "Traps":
+        return Traps(self._core, self.stop_before, self._leave_it_block)
+
+    def _install_hooks(self) -> tuple[int, ...]:
+        """Hook blocks and what ends a run; return the hooks but that of the blocks."""
+        self._block_hook = self._core.on_block(self._enter_block)
+        return self._core.on_interrupt(self._interrupted), self._core.on_invalid(self._invalid)
+
+    # Memory.
+
+    def map_memory(self, address: int, buffer: "ctypes.Array[ctypes.c_char]", *, is_writable: bool) -> None:
+        """Map a buffer, which may be mapped more than once; writable memory is executable from its first fetch on."""
+        self._core.map_memory(address, buffer, "rw" if is_writable else "rx")
+        if is_writable:
+            self._blocks.writable.append((address, address + len(buffer), ctypes.addressof(buffer)))
+
+    def map_io(self, address: int, size: int, read: ReadAccess, write: WriteAccess) -> None:
+        """Map a region whose accesses are calls; their offsets count from `address`."""
+        self._core.map_io(address, size, *io_callbacks(read, write, self._is_denied, self._fail))
+
+    def drop_code(self, address: int, size: int) -> None:
+        """Forget what was translated and measured from bytes that have changed; not during a run."""
+        self._core.drop_code(address, size)
+        self.forget_costs()
+
+    def forget_costs(self) -> None:
+        """Measure every block again when it is next entered."""
+        self._blocks.forget()
+
+    def set_traps(self, *, division: bool, unaligned: bool) -> None:
+        """Choose whether divisions by zero and unaligned single accesses end a run; holds from the next block."""
+        if self._traps.choose(division=division, unaligned=unaligned):
+            self.stop_at = 0
+
+    # Running.
+
+    def run(self, stop_at: int) -> Halt:
+        """Run from `pc` to the first block boundary at or after `stop_at` cycles, or to what ends the run before.
+
+        Raises:
+            Exception: whatever a peripheral's callback raised.
+        """
+        halt = self._run(stop_at)
+        while halt.kind is HaltKind.TAKEN_WRITE:
+            halt = self._step_over_write(stop_at)
+            if halt.kind is HaltKind.STEP:
+                halt = self._run(stop_at)
+        return halt if halt.kind is not HaltKind.WATCHPOINT else self._step_over_access(halt, stop_at)
+
+    def step(self, stop_at: int) -> Halt:
+        """Run one instruction: a STEP, or whatever else ends it; what an IT block skips is stepped over."""
+        halt = self._step(stop_at)
+        if halt.kind is HaltKind.TAKEN_WRITE:
+            halt = self._step_over_write(stop_at)
+        elif halt.kind is HaltKind.WATCHPOINT:
+            halt = self._step_over_access(halt, stop_at)
+        return Halt(HaltKind.STEP, halt.pc) if halt.kind is HaltKind.BOUNDARY else halt
+
+    def jump(self, target: int) -> None:
+        """Go on at an address, with its bit 0 as the T bit; leaves the block and the IT block where the core stood."""
+        self.pc = target & ~1
+        self.is_thumb = bool(target & 1)
+        self.it_state = 0
+        self._rest.block = None
+
+    @property
+    def is_inside_block(self) -> bool:
+        """Whether a debugger halted the core inside a block: no boundary, so nothing may interrupt here."""
+        return self._rest.is_at(self.pc)
+
+    @property
+    def recorder(self) -> BlockRecorder | None:
+        """Who is notified of each block and each exception; None for nobody. Set it between runs."""
+        return self.log.recorder
+
+    @recorder.setter
+    def recorder(self, recorder: BlockRecorder | None) -> None:
+        self._set_recorder(recorder)
+
+    def _set_recorder(self, recorder: BlockRecorder | None) -> None:
+        self.log.recorder = recorder
+        self._log_row = self.log.add
+
+    def _run(self, stop_at: int) -> Halt:
+        self.stop_at = stop_at
+        debug, traps = self._debug, self._traps
+        if (debug.breakpoints or debug.watchpoints or debug.has_hooks) and not debug.is_armed:
+            debug.arm()
+        if traps.have_changed:
+            traps.apply()
+            self.forget_costs()
+        if self._rest.block is not None:
+            self._resume(stop_at)
+        while True:
+            self._halt = None
+            self._run_from = self.pc
+            error = self._core.start(self.pc | self.is_thumb)
+            self._rest.resumed = None
+            if self._failure is not None:
+                failure, self._failure = self._failure, None
+                self._frozen = None
+                self._settle(self.registers[Register.PC])
+                raise failure
+            if not traps.stale:
+                break
+            self._settle(self.pc)
+            traps.arm()
+        if self._frozen is not None:
+            return self._thaw(self._frozen)
+        self.it_state = 0
+        halt = self._halt or _halt_without_reason(error, self.block, self.registers[Register.PC])
+        self._settle(halt.pc)
+        return halt
+
+    def _step(self, stop_at: int) -> Halt:
+        hook = self._debug.begin_step(self.pc)
+        self._is_stepping = True
+        try:
+            return self._run(stop_at)
+        finally:
+            self._is_stepping = False
+            self._debug.end_step(hook)
+
+    def _step_over_access(self, halt: Halt, stop_at: int) -> Halt:
+        """Let the instruction make the watched access that it was stopped before."""
+        self._debug.ignores_accesses = True
+        try:
+            after = self.step(stop_at)
+        finally:
+            self._debug.ignores_accesses = False
+        if after.kind is HaltKind.STEP:
+            return Halt(HaltKind.WATCHPOINT, after.pc, halt.address)
+        return replace(after, watched=halt.address)
+
+    def _step_over_write(self, stop_at: int) -> Halt:
+        """Let the instruction write to read-only memory, and have put right at once what Unicorn stores there."""
+        self._lets_writes_through = True
+        try:
+            return self._step(stop_at)
+        finally:
+            self._lets_writes_through = False
+            if self.on_read_only_written is not None:
+                self.on_read_only_written()
+
+    @property
+    def access_cycle(self) -> int:
+        """The time of the instruction that is accessing a peripheral, in cycles; the boundary's between runs."""
+        block = self.block
+        if block is NO_BLOCK:
+            return self.cycle
+        return self.cycle + block.cycles_until(self.registers[Register.PC])
+
+    @property
+    def access_pc(self) -> int:
+        """The instruction that is accessing a peripheral; the next one between runs."""
+        return self.pc if self.block is NO_BLOCK else self.registers[Register.PC]
+
+    def clear_exclusive(self) -> None:
+        """Break the exclusive reservation, as an exception does; leaves `pc` alone."""
+        if not self._blocks.uses_exclusive:
+            return
+        saved = self.cycle, self.stop_at, self._log_row
+        self.stop_at, self._log_row = _NEVER, lambda row: None  # noqa: ARG005 - the scratch page is not recorded
+        self._table[SCRATCH_BASE] = _SCRATCH_BLOCK
+        self._core.clear_exclusive()
+        self.cycle, self.stop_at, self._log_row = saved
+        self.block = NO_BLOCK
+
+    # Snapshots.
+
+    def snapshot(self) -> EngineSnapshot:
+        """Return the core's state, memory left aside."""
+        rest, rows = self._rest.snapshot(), self.log.rows()
+        return self._core.save(), self.cycle, self.pc, self.is_thumb, self._blocks.uses_exclusive, rest, rows
+
+    def restore(self, snapshot: EngineSnapshot) -> None:
+        """Put back what `snapshot` returned; memory is the caller's business, before this call."""
+        registers, self.cycle, self.pc, self.is_thumb, self._blocks.uses_exclusive, rest, rows = snapshot
+        self.log.put_back(rows)
+        self._core.load(registers)
+        self.it_state = it_state_of(self.registers[Register.CPSR])
+        self.block = NO_BLOCK
+        self._rest.restore(rest)
+        if self._blocks.ran_writable:
+            self._core.drop_all_code()
+            self._blocks.forget()
+
+    # Entering blocks.
+
+    def _enter_block(self, _uc: int, address: int, size: int, _user: int) -> None:
+        """Charge the block that has ended, then end the run or go on with the block at `address`."""
+        try:
+            block = self.block
+            cycle = self.cycle + (block.straight if address == block.end else block.taken)
+            self.cycle = cycle
+            if cycle >= self.stop_at:
+                self._stop_at_boundary(address)
+                return
+            known = self._table.get(address)
+            if known is None:
+                self._enter_special(address, size)
+            else:
+                self.block = known
+                self._log_row((cycle, address, BLOCK))
+        except BaseException as error:  # noqa: BLE001 - C stands between here and the caller; Ctrl-C arrives here
+            self._fail(error)
+            self._stop_at_boundary(address)
+
+    def _enter_special(self, address: int, size: int) -> None:
+        """Enter a block that is new, stands in writable memory, or needs attention."""
+        if self._rest.block is not None:
+            rest, self.stop_at = self._rest.enter(self._table, address, size)
+            if rest is not None:
+                self.block = rest
+                return
+        block = self._blocks.at(address, size)
+        if self._traps.needs_hooks(block):
+            self._stop_at_boundary(address)
+            return
+        if block.is_self_loop and block is self.block and not self._is_stepping:
+            # It has gone round once: nothing but an interrupt ends it, so go round until the time is up.
+            rounds = max(0, -((self.cycle - self.stop_at) // block.taken))
+            self.cycle += rounds * block.taken
+            self._stop_at_boundary(address)
+            return
+        self.block = block
+        if block.changes_masks and self.stops_after_mask_change:
+            self.stop_at = 0
+        if block.sends_event and self.on_event is not None:
+            self.on_event()
+        if block.is_self_loop:
+            self.log.add_spin(self.cycle, address)
+        else:
+            self._log_row((self.cycle, address, BLOCK))
+
+    def _resume(self, stop_at: int) -> None:
+        """Prepare a run that goes on inside a block."""
+        if not self.is_inside_block:
+            self._rest.block = None
+            return
+        self._debug.passes = self.pc
+        self._rest.resume(self._table, stop_at)
+        self.stop_at = _NEVER  # this is no boundary
+
+    # Ending runs.
+
+    def _stop_at_boundary(self, address: int) -> None:
+        self.block = NO_BLOCK
+        self.pc = address
+        self._end(HaltKind.BOUNDARY, address)
+
+    def _end(self, kind: HaltKind, pc: int, address: int | None = None) -> None:
+        self._halt = Halt(kind, pc, address)
+        self._core.stop()
+
+    def _fail(self, error: BaseException) -> None:
+        """Keep an exception until the next boundary; an access to a peripheral is never stopped half-way."""
+        self._failure = error
+        self.stop_at = 0
+
+    def _interrupted(self, number: int) -> None:
+        pc = self.registers[Register.PC]
+        self._end(_kind_of_interrupt(number, pc), pc)
+
+    def _invalid(self) -> bool:
+        pc = self.registers[Register.PC]
+        kind = _kind_of_invalid(self.block, pc, is_thumb=bool(self.registers[Register.XPSR] & _T_BIT))
+        if kind is not None:
+            self._end(kind, pc)
+        return True
+
+    def _bad_access(self, access: int, address: int, size: int, value: int) -> bool:
+        if self._frozen is not None:
+            return False
+        if access == WRITE_PROTECTED and self.on_read_only_write is not None:
+            if not self._lets_writes_through:
+                self.stop_before(HaltKind.TAKEN_WRITE, self.registers[Register.PC], address)
+                return False
+            if self.on_read_only_write(address, size, value & (1 << 8 * size) - 1):
+                return True
+        if access == FETCH_PROTECTED and (memory := self._blocks.writable_at(address)) is not None:
+            self._core.allow_execution(memory[0], memory[1] - memory[0])
+            return True
+        self._halt = Halt(_kind_of_bad_access(access), self.registers[Register.PC], address)
+        return False
+
+    def stop_before(self, kind: HaltKind, pc: int, address: int | None = None) -> None:
+        """End the run before the instruction at `pc`, from a hook of it; what runs after that is undone."""
+        if self._frozen is not None:
+            return
+        begins_in_it = self.it_state if self.block.start == self._run_from else 0
+        self._frozen = Frozen(
+            Halt(kind, pc, address),
+            self.block,
+            self.cycle,
+            self.stop_at,
+            self.block.it_state_at(pc, begins_in_it),
+            self._core.save(),
+            copy_of(self._blocks.writable),
+        )
+        self._run_from = self.block.start  # so that accesses to peripherals look, and are not made
+        self.stop_at = 0
+        self._core.stop()
+
+    def _thaw(self, frozen: Frozen) -> Halt:
+        """Put the state back that a hook froze."""
+        self._frozen = None
+        frozen.put_back(self._core, self._blocks.writable)
+        self.block, self.cycle = frozen.block, frozen.cycle
+        self.stop_at, self.it_state = frozen.stop_at, frozen.it_state
+        halt = frozen.halt
+        if halt.kind in DEBUG_HALTS or halt.kind is HaltKind.TAKEN_WRITE:
+            self._rest.keep(frozen.block, halt.pc, frozen.stop_at)
+        self._settle(halt.pc)
+        return halt
+
+    def _is_denied(self) -> bool:
+        """Prepare an access to a peripheral; return whether it is not to be made."""
+        return (self.block.has_it or self.block.start == self._run_from) and self._leave_it_block()
+
+    def _leave_it_block(self) -> bool:
+        """Put right what a memory hook does to ITSTATE; return whether the run has ended and access is to be denied.
+
+        To find the PC of an access Unicorn restores the state at that instruction,
+        ITSTATE included; but translated code keeps ITSTATE clear while a block runs,
+        and the next block would start in the middle of an IT block.
+        """
+        state = self.registers[Register.CPSR]
+        if state & IT_BITS:
+            self.registers[Register.CPSR] = state & ~IT_BITS
+        return self._frozen is not None
+
+    def _settle(self, pc: int) -> None:
+        """Charge what of the running block has been run when the core stands at `pc`."""
+        block, self.block = self.block, NO_BLOCK
+        if block is not NO_BLOCK:
+            is_return = pc >= _FIRST_EXCEPTION_RETURN  # the refill is part of the exception's exit
+            self.cycle += block.straight if is_return else block.cycles_until(pc)
+        self.pc = pc
+        self.is_thumb = bool(self.registers[Register.XPSR] & _T_BIT)
+
+
+def _kind_of_interrupt(number: int, pc: int) -> HaltKind:
+    """Return what an exception of Unicorn's own numbering is."""
+    kind = _INTERRUPTS.get(number, HaltKind.UNDEFINED)
+    if kind is HaltKind.EXECUTE_NEVER and pc >= _FIRST_EXCEPTION_RETURN:
+        return HaltKind.EXCEPTION_RETURN
+    return kind
+
+
+def _kind_of_bad_access(access: int) -> HaltKind:
+    """Return what an access to no memory, or against its protection, is."""
+    return _BAD_ACCESSES.get(access, HaltKind.READ_ERROR)
+
+
+def _kind_of_invalid(block: Block, pc: int, *, is_thumb: bool) -> HaltKind | None:
+    """Return what an instruction is that Unicorn does not know; None for one that does nothing.
+
+    It takes WFE and YIELD for undefined, with the PC already past them; the rest stands at the PC.
+    """
+    last = block.last if pc == block.end else None
+    if last is Kind.YIELD:
+        return None
+    if last is Kind.WAIT_EVENT:
+        return HaltKind.WAIT_EVENT
+    return HaltKind.UNDEFINED if is_thumb else HaltKind.INVALID_STATE
+
+
+def _halt_without_reason(error: int, block: Block, pc: int) -> Halt:
+    """Return why Unicorn came back without having called a hook: WFI, or a fetch that its TLB denied.
+
+    Raises:
+        RuntimeError: it was neither; a bug here.
+    """
+    if error == 0 and block.last is Kind.WAIT_INTERRUPT and pc == block.end:
+        return Halt(HaltKind.WAIT_INTERRUPT, pc)
+    if error == _DENIED:
+        return Halt(_kind_of_interrupt(_PREFETCH_ABORT, pc), pc)
+    raise RuntimeError(f"Unicorn stopped at {pc:#010x} with error {error}")
+
 
 class Traps:
-    """Watches the instructions that may trap."""
+    """Hooks on the instructions that may trap; see the theory of operation above.
 
-    def __init__(self, core: Core, stop_before: StopBefore, leave_it_block: Callable[[], object]) -> None:
+    A block that has such instructions is translated again with the hooks, the first
+    time that it is entered; one in `_armed` was translated with its hooks in place.
+    """
+
+    def __init__(self, core: UnicornCore, stop_before: StopBefore, leave_it_block: Callable[[], object]) -> None:
         self._core = core
         self._stop_before = stop_before
         self._leave_it_block = leave_it_block
@@ -95,8 +565,8 @@ class Traps:
         self.have_changed = True
         return True
 
-    def begin(self) -> None:
-        """Take up what was chosen, between runs."""
+    def apply(self) -> None:
+        """Apply what was chosen, between runs."""
         self.have_changed = False
         if self._unaligned and not self._watches_alignment:
             self._watches_alignment = True
@@ -154,411 +624,3 @@ class Traps:
                 self._stop_before(kind, address, None)
 
         self._core.on_instruction(address, look_at_base if kind is HaltKind.UNALIGNED else look_at_divisor)
-
-
-#: Later than any run.
-_NEVER = 1 << 62
-
-_T_BIT = 1 << 24
-#: Registers, cycle, PC, T bit, whether exclusive accesses are used, the rest of a block, the last rows.
-EngineSnapshot = tuple[CoreSnapshot, int, int, bool, bool, RestSnapshot | None, tuple[BlockRow, ...]]
-
-
-class Engine:
-    """Runs instructions between block boundaries; see the module's text.
-
-    Raises:
-        MissingDependencyError: Unicorn is not installed.
-    """
-
-    def __init__(self, measure: Measure) -> None:
-        self._core = Core(self._fail)
-        self._begin()
-        self.registers = self._core.registers
-        #: Time of the present boundary, or of the start of the running block, in cycles.
-        self.cycle = 0
-        #: The run ends at the first boundary at or after this time; 0 ends it at the next one.
-        self.stop_at = 0
-        #: The next instruction, and whether the T bit is set.
-        self.pc = 0
-        self.is_thumb = True
-        #: The block that is running.
-        self.block = NO_BLOCK
-        #: Whether a block that may unmask an interrupt ends the run at its boundary.
-        self.stops_after_mask_change = False
-        #: Called when the firmware executes SEV.
-        self.on_event: Callable[[], None] | None = None
-        #: Called with writes to read-only memory, and after the instruction that made them.
-        self.on_read_only_write: WriteToReadOnly | None = None
-        self.on_read_only_written: Callable[[], None] | None = None
-        self._lets_writes_through = False
-        self._blocks = BlockTable(measure)
-        self._table = self._blocks.plain
-        self._halt: Halt | None = None
-        #: Where the run started: its first block may start inside an IT block.
-        self._run_from = 0
-        self._failure: BaseException | None = None
-        #: ITSTATE at the start of the next run.
-        self.it_state = 0
-        self._frozen: Frozen | None = None
-        self._rest = RestOfBlock()
-        self._is_stepping = False
-        #: What ran last; the processor tells it of exceptions.
-        self.log = BlockLog(self._make_last_rows(), self._fail)
-        self._tell = self.log.tell
-        self._traps = self._make_traps()
-        self._debug = DebugUnit(self._core, self.stop_before)
-        #: Addresses that a run halts before; change it between runs as you like.
-        self.breakpoints: set[int] = self._debug.breakpoints
-        #: Accesses that a run halts after; likewise.
-        self.watchpoints: set[Watchpoint] = self._debug.watchpoints
-        self._block_hook = 0
-        self._install_hooks()
-        self._bad_access_hook = self._core.on_bad_access(self._bad_access)
-        self._scratch = Scratch(self._core, self._table)
-
-    def _begin(self) -> None:
-        """Get ready to hold the state, for an engine that keeps it elsewhere."""
-
-    def _make_last_rows(self) -> KeptRows:
-        return LastRows()
-
-    def _make_traps(self) -> Traps:
-        return Traps(self._core, self.stop_before, self._leave_it_block)
-
-    def _install_hooks(self) -> tuple[int, ...]:
-        """Have blocks and what ends a run told; return the hooks but that of the blocks."""
-        self._block_hook = self._core.on_block(self._enter_block)
-        return self._core.on_interrupt(self._interrupted), self._core.on_invalid(self._invalid)
-
-    # Memory.
-
-    def map_memory(self, address: int, buffer: "ctypes.Array[ctypes.c_char]", *, is_writable: bool) -> None:
-        """Map a buffer, which may be mapped more than once; writable memory is executable from its first fetch on."""
-        self._core.map_memory(address, buffer, "rw" if is_writable else "rx")
-        if is_writable:
-            self._blocks.writable.append((address, address + len(buffer), ctypes.addressof(buffer)))
-
-    def map_io(self, address: int, size: int, read: ReadAccess, write: WriteAccess) -> None:
-        """Map a region whose accesses are calls; their offsets count from `address`."""
-        self._core.map_io(address, size, *guarded(read, write, self._is_denied, self._fail))
-
-    def drop_code(self, address: int, size: int) -> None:
-        """Forget what was translated and measured from bytes that have changed; not during a run."""
-        self._core.drop_code(address, size)
-        self.forget_costs()
-
-    def forget_costs(self) -> None:
-        """Measure every block again when it is next entered."""
-        self._blocks.forget()
-
-    def set_traps(self, *, division: bool, unaligned: bool) -> None:
-        """Choose whether divisions by zero and unaligned single accesses end a run; holds from the next block."""
-        if self._traps.choose(division=division, unaligned=unaligned):
-            self.stop_at = 0
-
-    # Running.
-
-    def run(self, stop_at: int) -> Halt:
-        """Run from `pc` to the first block boundary at or after `stop_at` cycles, or to what ends the run before.
-
-        Raises:
-            Exception: whatever a peripheral's callback raised.
-        """
-        halt = self._run(stop_at)
-        while halt.kind is HaltKind.TAKEN_WRITE:
-            halt = self._step_over_write(stop_at)
-            if halt.kind is HaltKind.STEP:
-                halt = self._run(stop_at)
-        return halt if halt.kind is not HaltKind.WATCHPOINT else self._step_over_access(halt, stop_at)
-
-    def step(self, stop_at: int) -> Halt:
-        """Run one instruction: a STEP, or whatever else ends it; what an IT block skips is stepped over."""
-        halt = self._step(stop_at)
-        if halt.kind is HaltKind.TAKEN_WRITE:
-            halt = self._step_over_write(stop_at)
-        elif halt.kind is HaltKind.WATCHPOINT:
-            halt = self._step_over_access(halt, stop_at)
-        return Halt(HaltKind.STEP, halt.pc) if halt.kind is HaltKind.BOUNDARY else halt
-
-    def jump(self, target: int) -> None:
-        """Go on at an address, with its bit 0 as the T bit; leaves the block and the IT block where the core stood."""
-        self.pc = target & ~1
-        self.is_thumb = bool(target & 1)
-        self.it_state = 0
-        self._rest.block = None
-
-    @property
-    def is_inside_block(self) -> bool:
-        """Whether a debugger halted the core inside a block: no boundary, so nothing may interrupt here."""
-        return self._rest.is_at(self.pc)
-
-    @property
-    def recorder(self) -> BlockRecorder | None:
-        """Who is told of each block and each exception; None for nobody. Set it between runs."""
-        return self.log.recorder
-
-    @recorder.setter
-    def recorder(self, recorder: BlockRecorder | None) -> None:
-        self._take_recorder(recorder)
-
-    def _take_recorder(self, recorder: BlockRecorder | None) -> None:
-        self.log.recorder = recorder
-        self._tell = self.log.tell
-
-    def _run(self, stop_at: int) -> Halt:
-        self.stop_at = stop_at
-        debug, traps = self._debug, self._traps
-        if (debug.breakpoints or debug.watchpoints or debug.has_hooks) and not debug.is_armed:
-            debug.arm()
-        if traps.have_changed:
-            traps.begin()
-            self.forget_costs()
-        if self._rest.block is not None:
-            self._resume(stop_at)
-        while True:
-            self._halt = None
-            self._run_from = self.pc
-            error = self._core.start(self.pc | self.is_thumb)
-            self._rest.resumed = None
-            if self._failure is not None:
-                failure, self._failure = self._failure, None
-                self._frozen = None
-                self._settle(self.registers[Register.PC])
-                raise failure
-            if not traps.stale:
-                break
-            self._settle(self.pc)
-            traps.arm()
-        if self._frozen is not None:
-            return self._thaw(self._frozen)
-        self.it_state = 0
-        halt = self._halt or halt_without_reason(error, self.block, self.registers[Register.PC])
-        self._settle(halt.pc)
-        return halt
-
-    def _step(self, stop_at: int) -> Halt:
-        hook = self._debug.begin_step(self.pc)
-        self._is_stepping = True
-        try:
-            return self._run(stop_at)
-        finally:
-            self._is_stepping = False
-            self._debug.end_step(hook)
-
-    def _step_over_access(self, halt: Halt, stop_at: int) -> Halt:
-        """Let the instruction make the watched access that it was stopped before."""
-        self._debug.is_blind = True
-        try:
-            after = self.step(stop_at)
-        finally:
-            self._debug.is_blind = False
-        if after.kind is HaltKind.STEP:
-            return Halt(HaltKind.WATCHPOINT, after.pc, halt.address)
-        return replace(after, watched=halt.address)
-
-    def _step_over_write(self, stop_at: int) -> Halt:
-        """Let the instruction write to read-only memory, and have put right at once what Unicorn stores there."""
-        self._lets_writes_through = True
-        try:
-            return self._step(stop_at)
-        finally:
-            self._lets_writes_through = False
-            if self.on_read_only_written is not None:
-                self.on_read_only_written()
-
-    @property
-    def access_cycle(self) -> int:
-        """The time of the instruction that is accessing a peripheral, in cycles; the boundary's between runs."""
-        block = self.block
-        if block is NO_BLOCK:
-            return self.cycle
-        return self.cycle + block.cycles_until(self.registers[Register.PC])
-
-    @property
-    def access_pc(self) -> int:
-        """The instruction that is accessing a peripheral; the next one between runs."""
-        return self.pc if self.block is NO_BLOCK else self.registers[Register.PC]
-
-    def clear_exclusive(self) -> None:
-        """Break the exclusive reservation, as an exception does; leaves `pc` alone."""
-        if not self._blocks.uses_exclusive:
-            return
-        saved = self.cycle, self.stop_at, self._tell
-        self.stop_at, self._tell = _NEVER, lambda row: None  # noqa: ARG005 - nobody is to know
-        self._scratch.clear_exclusive()
-        self.cycle, self.stop_at, self._tell = saved
-        self.block = NO_BLOCK
-
-    # Snapshots.
-
-    def snapshot(self) -> EngineSnapshot:
-        """Return the core's state, memory left aside."""
-        rest, rows = self._rest.snapshot(), self.log.rows()
-        return self._core.save(), self.cycle, self.pc, self.is_thumb, self._blocks.uses_exclusive, rest, rows
-
-    def restore(self, snapshot: EngineSnapshot) -> None:
-        """Put back what `snapshot` returned; memory is the caller's business, before this call."""
-        registers, self.cycle, self.pc, self.is_thumb, self._blocks.uses_exclusive, rest, rows = snapshot
-        self.log.put_back(rows)
-        self._core.load(registers)
-        self.it_state = it_state_of(self.registers[Register.CPSR])
-        self.block = NO_BLOCK
-        self._rest.restore(rest)
-        if self._blocks.ran_writable:
-            self._core.drop_all_code()
-            self._blocks.forget()
-
-    # Entering blocks.
-
-    def _enter_block(self, _uc: int, address: int, size: int, _user: int) -> None:
-        """Charge the block that has ended, then end the run or go on with the block at `address`."""
-        try:
-            block = self.block
-            cycle = self.cycle + (block.straight if address == block.end else block.taken)
-            self.cycle = cycle
-            if cycle >= self.stop_at:
-                self._stop_at_boundary(address)
-                return
-            known = self._table.get(address)
-            if known is None:
-                self._enter_special(address, size)
-            else:
-                self.block = known
-                self._tell((cycle, address, BLOCK))
-        except BaseException as error:  # noqa: BLE001 - C stands between here and the caller; Ctrl-C arrives here
-            self._fail(error)
-            self._stop_at_boundary(address)
-
-    def _enter_special(self, address: int, size: int) -> None:
-        """Enter a block that is new, stands in writable memory, or needs attention."""
-        if self._rest.block is not None:
-            rest, self.stop_at = self._rest.enter(self._table, address, size)
-            if rest is not None:
-                self.block = rest
-                return
-        block = self._blocks.at(address, size)
-        if self._traps.needs_hooks(block):
-            self._stop_at_boundary(address)
-            return
-        if block.is_self_loop and block is self.block and not self._is_stepping:
-            # It has gone round once: nothing but an interrupt ends it, so go round until the time is up.
-            rounds = max(0, -((self.cycle - self.stop_at) // block.taken))
-            self.cycle += rounds * block.taken
-            self._stop_at_boundary(address)
-            return
-        self.block = block
-        if block.changes_masks and self.stops_after_mask_change:
-            self.stop_at = 0
-        if block.sends_event and self.on_event is not None:
-            self.on_event()
-        if block.is_self_loop:
-            self.log.tell_spin(self.cycle, address)
-        else:
-            self._tell((self.cycle, address, BLOCK))
-
-    def _resume(self, stop_at: int) -> None:
-        """Get ready to go on inside a block."""
-        if not self.is_inside_block:
-            self._rest.block = None
-            return
-        self._debug.passes = self.pc
-        self._rest.resume(self._table, stop_at)
-        self.stop_at = _NEVER  # this is no boundary
-
-    # Ending runs.
-
-    def _stop_at_boundary(self, address: int) -> None:
-        self.block = NO_BLOCK
-        self.pc = address
-        self._end(HaltKind.BOUNDARY, address)
-
-    def _end(self, kind: HaltKind, pc: int, address: int | None = None) -> None:
-        self._halt = Halt(kind, pc, address)
-        self._core.stop()
-
-    def _fail(self, error: BaseException) -> None:
-        """Keep an exception until the next boundary; an access to a peripheral is never stopped half-way."""
-        self._failure = error
-        self.stop_at = 0
-
-    def _interrupted(self, number: int) -> None:
-        pc = self.registers[Register.PC]
-        self._end(kind_of_interrupt(number, pc), pc)
-
-    def _invalid(self) -> bool:
-        pc = self.registers[Register.PC]
-        kind = kind_of_invalid(self.block, pc, is_thumb=bool(self.registers[Register.XPSR] & _T_BIT))
-        if kind is not None:
-            self._end(kind, pc)
-        return True
-
-    def _bad_access(self, access: int, address: int, size: int, value: int) -> bool:
-        if self._frozen is not None:
-            return False
-        if access == WRITE_PROTECTED and self.on_read_only_write is not None:
-            if not self._lets_writes_through:
-                self.stop_before(HaltKind.TAKEN_WRITE, self.registers[Register.PC], address)
-                return False
-            if self.on_read_only_write(address, size, value & (1 << 8 * size) - 1):
-                return True
-        if access == FETCH_PROTECTED and (memory := self._blocks.writable_at(address)) is not None:
-            self._core.allow_execution(memory[0], memory[1] - memory[0])
-            return True
-        self._halt = Halt(kind_of_bad_access(access), self.registers[Register.PC], address)
-        return False
-
-    def stop_before(self, kind: HaltKind, pc: int, address: int | None = None) -> None:
-        """End the run before the instruction at `pc`, from a hook of it; what runs after that is undone."""
-        if self._frozen is not None:
-            return
-        begins_in_it = self.it_state if self.block.start == self._run_from else 0
-        self._frozen = Frozen(
-            Halt(kind, pc, address),
-            self.block,
-            self.cycle,
-            self.stop_at,
-            self.block.it_state_at(pc, begins_in_it),
-            self._core.save(),
-            copy_of(self._blocks.writable),
-        )
-        self._run_from = self.block.start  # so that accesses to peripherals look, and are not made
-        self.stop_at = 0
-        self._core.stop()
-
-    def _thaw(self, frozen: Frozen) -> Halt:
-        """Put the state back that a hook froze."""
-        self._frozen = None
-        frozen.put_back(self._core, self._blocks.writable)
-        self.block, self.cycle = frozen.block, frozen.cycle
-        self.stop_at, self.it_state = frozen.stop_at, frozen.it_state
-        halt = frozen.halt
-        if halt.kind in DEBUG_HALTS or halt.kind is HaltKind.TAKEN_WRITE:
-            self._rest.keep(frozen.block, halt.pc, frozen.stop_at)
-        self._settle(halt.pc)
-        return halt
-
-    def _is_denied(self) -> bool:
-        """Get ready for an access to a peripheral; return whether it is not to be made."""
-        return (self.block.has_it or self.block.start == self._run_from) and self._leave_it_block()
-
-    def _leave_it_block(self) -> bool:
-        """Put right what a memory hook does to ITSTATE; return whether the run has ended and access is to be denied.
-
-        To find the PC of an access Unicorn restores the state at that instruction,
-        ITSTATE included; but translated code keeps ITSTATE clear while a block runs,
-        and the next block would start in the middle of an IT block.
-        """
-        state = self.registers[Register.CPSR]
-        if state & IT_BITS:
-            self.registers[Register.CPSR] = state & ~IT_BITS
-        return self._frozen is not None
-
-    def _settle(self, pc: int) -> None:
-        """Charge what of the running block has been run when the core stands at `pc`."""
-        block, self.block = self.block, NO_BLOCK
-        if block is not NO_BLOCK:
-            is_return = pc >= FIRST_EXCEPTION_RETURN  # the refill is part of the exception's exit
-            self.cycle += block.straight if is_return else block.cycles_until(pc)
-        self.pc = pc
-        self.is_thumb = bool(self.registers[Register.XPSR] & _T_BIT)

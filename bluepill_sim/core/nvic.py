@@ -1,17 +1,12 @@
-"""NVIC: which exceptions are pending, enabled and active, and which comes first.
+"""NVIC: which exceptions are pending, enabled and active, which comes first, and what they are called.
 
 This holds the state and the arithmetic of priorities. Stacking, vectors and
 the masks PRIMASK, BASEPRI and FAULTMASK are the business of `processor.py`; the registers
 through which firmware sees all this are in `system_control.py`.
 
-Source: ARMv7-M Architecture Reference Manual B1.5.4 and B3.4; RM0008 table 63.
+Source: ARMv7-M Architecture Reference Manual B1.5.4, table B1-4 and B3.4; RM0008 table 63 (medium density).
 Invariant: an exception is pending at most once; a line that stays high makes
 its interrupt pending again when its handler returns.
-
-Names of the exceptions and interrupts of an STM32F103C8.
-
-Source: ARMv7-M Architecture Reference Manual table B1-4; RM0008 table 63 (medium density).
-Invariant: position n of `IRQ_NAMES` is interrupt line n, which is exception 16 + n.
 """
 
 from collections.abc import Iterator
@@ -20,6 +15,31 @@ NMI, HARD_FAULT, MEM_MANAGE, BUS_FAULT, USAGE_FAULT = 2, 3, 4, 5, 6
 SVCALL, DEBUG_MONITOR, PENDSV, SYSTICK = 11, 12, 14, 15
 #: Exception number of interrupt line 0.
 FIRST_IRQ = 16
+
+_SYSTEM_NAMES = {
+    1: "Reset",
+    2: "NMI",
+    3: "HardFault",
+    4: "MemManage",
+    5: "BusFault",
+    6: "UsageFault",
+    11: "SVCall",
+    12: "DebugMonitor",
+    14: "PendSV",
+    15: "SysTick",
+}
+
+#: By interrupt line: line n is exception 16 + n.
+IRQ_NAMES = (
+    "WWDG", "PVD", "TAMPER", "RTC", "FLASH", "RCC", "EXTI0", "EXTI1", "EXTI2", "EXTI3", "EXTI4",
+    "DMA1_Channel1", "DMA1_Channel2", "DMA1_Channel3", "DMA1_Channel4", "DMA1_Channel5", "DMA1_Channel6",
+    "DMA1_Channel7", "ADC1_2", "USB_HP_CAN_TX", "USB_LP_CAN_RX0", "CAN_RX1", "CAN_SCE", "EXTI9_5", "TIM1_BRK",
+    "TIM1_UP", "TIM1_TRG_COM", "TIM1_CC", "TIM2", "TIM3", "TIM4", "I2C1_EV", "I2C1_ER", "I2C2_EV", "I2C2_ER",
+    "SPI1", "SPI2", "USART1", "USART2", "USART3", "EXTI15_10", "RTCAlarm", "USBWakeUp",
+)  # fmt: skip
+
+#: Entries of the vector table, the stack pointer at 0 included.
+VECTOR_COUNT = FIRST_IRQ + len(IRQ_NAMES)
 
 #: Priority of thread mode: lower than that of every exception.
 THREAD_PRIORITY = 256
@@ -51,7 +71,7 @@ class Nvic:
         self.priority_grouping = 0
 
     def reset(self) -> None:
-        """Go back to the state after a reset; the levels of the lines are their drivers' business."""
+        """Go back to the state after a reset; the levels of the lines belong to the peripherals."""
         self.pending = self.active = self.enabled = 0
         self.priorities = [0] * (FIRST_IRQ + IRQ_LINES)
         self.priority_grouping = 0
@@ -154,39 +174,6 @@ class Nvic:
         return self.active >> FIRST_IRQ & _IRQ_MASK
 
 
-def _numbers(mask: int) -> Iterator[int]:
-    """Iterate over the positions of the bits of a mask, lowest first."""
-    while mask:
-        lowest = mask & -mask
-        yield lowest.bit_length() - 1
-        mask ^= lowest
-
-
-_SYSTEM_NAMES = {
-    1: "Reset",
-    2: "NMI",
-    3: "HardFault",
-    4: "MemManage",
-    5: "BusFault",
-    6: "UsageFault",
-    11: "SVCall",
-    12: "DebugMonitor",
-    14: "PendSV",
-    15: "SysTick",
-}
-
-IRQ_NAMES = (
-    "WWDG", "PVD", "TAMPER", "RTC", "FLASH", "RCC", "EXTI0", "EXTI1", "EXTI2", "EXTI3", "EXTI4",
-    "DMA1_Channel1", "DMA1_Channel2", "DMA1_Channel3", "DMA1_Channel4", "DMA1_Channel5", "DMA1_Channel6",
-    "DMA1_Channel7", "ADC1_2", "USB_HP_CAN_TX", "USB_LP_CAN_RX0", "CAN_RX1", "CAN_SCE", "EXTI9_5", "TIM1_BRK",
-    "TIM1_UP", "TIM1_TRG_COM", "TIM1_CC", "TIM2", "TIM3", "TIM4", "I2C1_EV", "I2C1_ER", "I2C2_EV", "I2C2_ER",
-    "SPI1", "SPI2", "USART1", "USART2", "USART3", "EXTI15_10", "RTCAlarm", "USBWakeUp",
-)  # fmt: skip
-
-#: Entries of the vector table, the stack pointer at 0 included.
-VECTOR_COUNT = FIRST_IRQ + len(IRQ_NAMES)
-
-
 def exception_name(number: int) -> str:
     """Return the name of an exception, such as "SysTick" or "USART1"; "thread" for 0."""
     if not number:
@@ -194,3 +181,11 @@ def exception_name(number: int) -> str:
     if FIRST_IRQ <= number < VECTOR_COUNT:
         return IRQ_NAMES[number - FIRST_IRQ]
     return _SYSTEM_NAMES.get(number, f"exception {number}")
+
+
+def _numbers(mask: int) -> Iterator[int]:
+    """Iterate over the positions of the bits of a mask, lowest first."""
+    while mask:
+        lowest = mask & -mask
+        yield lowest.bit_length() - 1
+        mask ^= lowest

@@ -23,10 +23,10 @@ from enum import Enum
 from bluepill_sim.core.blocks import it_state_of
 from bluepill_sim.core.engine import Engine
 from bluepill_sim.core.faults import FAULT_OF_HALT, FAULT_ROWS, HFSR_FORCED, FaultKind
-from bluepill_sim.core.machine import Register
 from bluepill_sim.core.nvic import BUS_FAULT, HARD_FAULT, NMI, SVCALL, SYSTICK, Nvic
 from bluepill_sim.core.recorder import EXCEPTION_RETURN
 from bluepill_sim.core.systick import SysTick
+from bluepill_sim.core.unicorn_core import Register
 from bluepill_sim.memory import Memory
 from bluepill_sim.timing import DEBUG_HALTS, Halt, HaltKind
 
@@ -61,7 +61,7 @@ class Sleep(Enum):
     EVENT = "event"
 
 
-#: Told of each HardFault taken and each lockup: (kind, PC, address, whether it is a lockup).
+#: Called with each HardFault taken and each lockup: (kind, PC, address, whether it is a lockup).
 FaultListener = Callable[[FaultKind, int, int | None, bool], None]
 
 
@@ -386,7 +386,7 @@ class Processor:
         self.engine.jump(target)
 
     def _record(self, address: int, kind: int) -> None:
-        self.engine.log.tell((self.cycle, address, kind))
+        self.engine.log.add((self.cycle, address, kind))
 
     # Faults.
 

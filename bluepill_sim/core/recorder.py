@@ -1,4 +1,4 @@
-"""What ran, block by block: a bounded record for whoever asks; the last rows are kept in any case (`BlockLog`).
+"""What ran, block by block: a record for tools, and the last rows of every core.
 
     (cycle, address, BLOCK)              a basic block began
     (cycle, address, n > 0)              exception n was entered from the instruction at `address`
@@ -7,16 +7,14 @@
 The cycle of an entry or a return is that of the boundary where it begins; the
 next block's says when it was done. A tail-chain is a return and an entry at
 one time, with the EXC_RETURN value as the address of both. A branch to itself
-is told of once, however long it spins.
+is one row, however long it spins.
 
-Invariant: rows are in the order of time, and independent of the caller's slices.
+A `BlockRecorder` is what a tool attaches; the last `LAST_ROWS` rows are kept
+whether or not there is one (`BlockLog`), for the report on a program that hangs
+or dies.
 
-The last rows of a core, kept whether or not anybody records, and passed on to whoever does.
-
-A verdict on a program that hangs or dies shows them. Rows are those of
-`recorder.py`.
-
-Invariant: the same run leaves the same rows, on both executors, recorded or not.
+Invariant: rows are in the order of time and independent of the caller's slices;
+the same run leaves the same rows, on both executors, recorded or not.
 """
 
 from collections import deque
@@ -29,16 +27,19 @@ BLOCK, EXCEPTION_RETURN = 0, -1
 #: Cycle, address, kind.
 BlockRow = tuple[int, int, int]
 
+#: How many rows every core keeps (`LAST_ROWS` of bluepill_sim/native/source/core.h).
+LAST_ROWS = 32
+
 
 class BlockRecorder:
-    """Keeps the last rows until somebody takes them."""
+    """Keeps the last rows until they are drained."""
 
     def __init__(self, capacity: int, on_full: Callable[["BlockRecorder"], None] | None = None) -> None:
         """Record nothing yet.
 
         Args:
             capacity: how many rows are kept, 1 or more; when there are more the oldest are lost.
-            on_full: called when that many wait, at a block boundary, to drain them; it must not touch the chip.
+            on_full: called at a block boundary when that many wait, to drain them; it must not touch the chip.
 
         Raises:
             ValueError: there is no room for a row.
@@ -46,7 +47,7 @@ class BlockRecorder:
         if capacity < 1:
             raise ValueError(f"a recorder keeps 1 row or more, not {capacity}")
         self.capacity = capacity
-        #: Rows that nobody has taken and that had to go.
+        #: Rows that were overwritten before they were drained.
         self.lost = 0
         self._on_full = on_full
         self._rows: deque[BlockRow] = deque(maxlen=capacity)
@@ -76,8 +77,61 @@ class BlockRecorder:
         return list(self._rows)[-count:] if count > 0 else []
 
 
-#: How many rows every core keeps (`LAST_ROWS` of bluepill_sim/native/source/core.h).
-LAST_ROWS = 32
+class BlockLog:
+    """Takes the rows of one core."""
+
+    def __init__(self, last: "KeptRows", fail: Callable[[BaseException], None]) -> None:
+        """Keep rows.
+
+        Args:
+            last: where.
+            fail: called with what a recorder raises, since C stands between here and the caller.
+        """
+        self._last = last
+        self._fail = fail
+        self._recorder: BlockRecorder | None = None
+        #: Takes a row; another one when the recorder changes.
+        self.add: Callable[[BlockRow], None] = last.append
+
+    @property
+    def recorder(self) -> BlockRecorder | None:
+        """Who is notified of all rows from now on."""
+        return self._recorder
+
+    @recorder.setter
+    def recorder(self, recorder: BlockRecorder | None) -> None:
+        self._recorder = recorder
+        self._last.is_first = True
+        self.add = self._last.append if recorder is None else self._keep_and_pass_on
+
+    def add_spin(self, cycle: int, address: int) -> None:
+        """Take the row of a branch to itself: once, however long it spins."""
+        row = cycle, address, BLOCK
+        if not self._last.ends_with_block(address):
+            self.add(row)
+        elif self._recorder is not None and self._last.is_first:
+            self.pass_on(row)
+
+    def pass_on(self, row: BlockRow) -> None:
+        """Notify the recorder of a row that is kept already."""
+        self._last.is_first = False
+        if self._recorder is not None:
+            try:
+                self._recorder.put(*row)
+            except BaseException as error:  # noqa: BLE001 - C stands between here and the caller
+                self._fail(error)
+
+    def rows(self) -> tuple[BlockRow, ...]:
+        """Return what ran last, oldest first: at most `LAST_ROWS` rows."""
+        return self._last.rows()
+
+    def put_back(self, rows: Sequence[BlockRow]) -> None:
+        """Have run these last."""
+        self._last.put_back(rows)
+
+    def _keep_and_pass_on(self, row: BlockRow) -> None:
+        self._last.append(row)
+        self.pass_on(row)
 
 
 class KeptRows(Protocol):
@@ -95,7 +149,7 @@ class KeptRows(Protocol):
         ...
 
     def put_back(self, rows: Sequence[BlockRow]) -> None:
-        """Have these and no others."""
+        """Hold these and no others."""
         ...
 
     def ends_with_block(self, address: int) -> bool:
@@ -127,60 +181,3 @@ class LastRows:
     def ends_with_block(self, address: int) -> bool:
         """As of `KeptRows`."""
         return bool(self._rows) and self._rows[-1][1:] == (address, BLOCK)
-
-
-class BlockLog:
-    """Takes the rows of one core."""
-
-    def __init__(self, last: KeptRows, fail: Callable[[BaseException], None]) -> None:
-        """Keep rows.
-
-        Args:
-            last: where.
-            fail: notified of what a recorder raises, since C stands between here and the caller.
-        """
-        self._last = last
-        self._fail = fail
-        self._recorder: BlockRecorder | None = None
-        #: Takes a row; another one when the recorder changes.
-        self.tell: Callable[[BlockRow], None] = last.append
-
-    @property
-    def recorder(self) -> BlockRecorder | None:
-        """Who is told of all rows from now on."""
-        return self._recorder
-
-    @recorder.setter
-    def recorder(self, recorder: BlockRecorder | None) -> None:
-        self._recorder = recorder
-        self._last.is_first = True
-        self.tell = self._last.append if recorder is None else self._keep_and_pass_on
-
-    def tell_spin(self, cycle: int, address: int) -> None:
-        """Take the row of a branch to itself: once, however long it spins."""
-        row = cycle, address, BLOCK
-        if not self._last.ends_with_block(address):
-            self.tell(row)
-        elif self._recorder is not None and self._last.is_first:
-            self.pass_on(row)
-
-    def pass_on(self, row: BlockRow) -> None:
-        """Tell the recorder of a row that is kept already."""
-        self._last.is_first = False
-        if self._recorder is not None:
-            try:
-                self._recorder.put(*row)
-            except BaseException as error:  # noqa: BLE001 - C stands between here and the caller
-                self._fail(error)
-
-    def rows(self) -> tuple[BlockRow, ...]:
-        """Return what ran last, oldest first: at most `LAST_ROWS` rows."""
-        return self._last.rows()
-
-    def put_back(self, rows: Sequence[BlockRow]) -> None:
-        """Have run these last."""
-        self._last.put_back(rows)
-
-    def _keep_and_pass_on(self, row: BlockRow) -> None:
-        self._last.append(row)
-        self.pass_on(row)

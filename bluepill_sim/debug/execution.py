@@ -14,8 +14,8 @@ from dataclasses import dataclass
 
 from bluepill_sim.core import HaltKind
 from bluepill_sim.core.faults import FaultKind
-from bluepill_sim.debug.control import Machine, Stop, StopKind
 from bluepill_sim.debug.history import History, Point
+from bluepill_sim.debug.machine import Machine, Stop, StopKind
 from bluepill_sim.debug.semihosting import Semihosting
 from bluepill_sim.timing import NS_PER_MS, NS_PER_S, Nanos, Reason
 

@@ -12,12 +12,12 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from bluepill_sim.core import WatchKind, Watchpoint
-from bluepill_sim.debug.control import Stop, StopKind
-from bluepill_sim.debug.description import FLASH_PAGE_BYTES, memory_map_xml, target_xml
 from bluepill_sim.debug.execution import Execution
-from bluepill_sim.debug.inspection import Inspector
+from bluepill_sim.debug.inspector import Inspector
+from bluepill_sim.debug.machine import Stop, StopKind
 from bluepill_sim.debug.monitor import Monitor
 from bluepill_sim.debug.packets import MOST_BYTES
+from bluepill_sim.debug.target_description import FLASH_PAGE_BYTES, memory_map_xml, target_xml
 from bluepill_sim.errors import BluePillError
 from bluepill_sim.stm32f103 import FLASH_BASE, FLASH_BYTES_FITTED
 

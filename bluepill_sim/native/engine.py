@@ -3,18 +3,14 @@
 Theory of operation. The state of a run stands in a struct of the C core, and
 the attributes of `Engine` are windows on it. C charges blocks, ends runs,
 answers plain registers and does exceptions of the ordinary kind; it calls
-Python for a block that it does not know, for a register that causes something,
-and for a trap that springs.
+Python for a block that it does not know, for a register with side effects, and
+for an instruction that traps.
 
 A debugger's watchpoints and steps, and the rest of a block after a halt, are
 Python's business: for those runs the hooks are exchanged, and this is `Engine`.
 
 Invariant: `shared.is_python` tells whose hooks are in place; between runs all
 state is in `shared`, whoever ran last.
-
-The traps of the native core: the same hooks, that look at their register in C.
-
-Invariant: Python is called only by a trap that springs.
 """
 
 import ctypes
@@ -24,18 +20,27 @@ from collections.abc import Callable
 from bluepill_sim.core.accesses import Access, accesses_of, is_ambiguous, only_reads
 from bluepill_sim.core.block_cost import NO_BLOCK, Block
 from bluepill_sim.core.engine import Engine, EngineSnapshot, StopBefore, Traps
-from bluepill_sim.core.machine import GENERAL, SCRATCH_BASE, Core, RawRead, RawWrite, ReadAccess, WriteAccess, guarded
 from bluepill_sim.core.recorder import BlockRecorder, KeptRows
 from bluepill_sim.core.thumb import Kind
+from bluepill_sim.core.unicorn_core import (
+    GENERAL,
+    SCRATCH_BASE,
+    RawRead,
+    RawWrite,
+    ReadAccess,
+    UnicornCore,
+    WriteAccess,
+    io_callbacks,
+)
 from bluepill_sim.native.library import (
-    ENGINE_FUNCTIONS,
     READ,
     RECORDED,
     TRAPPED,
+    UNICORN_FUNCTIONS,
     UNKNOWN_BLOCK,
     WRITE,
     Callbacks,
-    EngineApi,
+    UnicornApi,
     address_of,
     library,
 )
@@ -57,29 +62,11 @@ from bluepill_sim.native.state import (
 )
 from bluepill_sim.timing import Halt, HaltKind
 
-
-class NativeTraps(Traps):
-    """Watches the instructions that may trap, without entering Python at each of them."""
-
-    def __init__(
-        self, core: Core, stop_before: StopBefore, leave_it_block: Callable[[], object], state: ctypes.c_void_p
-    ) -> None:
-        super().__init__(core, stop_before, leave_it_block)
-        self._state = state
-
-    def _trap(self, address: int, number: int, kind: HaltKind) -> None:
-        if (address, number, kind) in self._trapped:
-            return
-        self._trapped.add((address, number, kind))
-        user = library().core_trap(self._state, address, GENERAL[number].value, HALT_NUMBERS[kind])
-        self._core.hook_native("instruction", address_of("core_on_trap"), user, address, address)
-
-
 #: Flags of a row (`enum row_flag`).
 _CHANGES_MASKS, _SENDS_EVENT, _SELF_LOOP, _WRITABLE, _NOTED, _READS = 1, 2, 4, 8, 128, 256
 _ENDS = {Kind.WAIT_INTERRUPT: 16, Kind.WAIT_EVENT: 32, Kind.YIELD: 64}
 _NO_BLOCK_START = 0xFFFF_FFFF
-#: Chosen: so often at least Python looks at signals, such as Ctrl-C.
+#: Chosen: at least so often Python handles signals, such as Ctrl-C.
 _SLICE_CYCLES = 20_000_000
 #: Chosen: rows that C keeps before Python takes them.
 _RECORD_ROOM = 4096
@@ -100,12 +87,12 @@ class NativeEngine(Engine):
     stops_after_mask_change = flag("mask_stop", "As of `Engine`.")
     _run_from = field("run_from", "As of `Engine`.")
 
-    def _begin(self) -> None:
+    def _make_state(self) -> None:
         self._regions: list[tuple[int, int, RawRead, RawWrite]] = []
         self._code: list[tuple[int, int, int]] = []
         self._known: dict[int, Block] = {}
         self._noted: set[int] = set()
-        #: The block that Python holds in place of C's.
+        #: The block that Python has entered, in place of the one of C; None: ask C.
         self._held: Block | None = NO_BLOCK
         self._native_hooks: tuple[int, ...] = ()
         self._pc_hooks: tuple[int, ...] = ()
@@ -115,7 +102,7 @@ class NativeEngine(Engine):
         self.before_run: Callable[[], None] | None = None
         self._kept: list[object] = []
         unicorn = self._core.library
-        api = EngineApi(*(ctypes.cast(getattr(unicorn, name), ctypes.c_void_p) for name in ENGINE_FUNCTIONS))
+        api = UnicornApi(*(ctypes.cast(getattr(unicorn, name), ctypes.c_void_p) for name in UNICORN_FUNCTIONS))
         #: Keeps the callbacks alive.
         self._calls = Callbacks(
             UNKNOWN_BLOCK(self._measure_block), READ(self._read_io), WRITE(self._write_io), TRAPPED(self._trapped),
@@ -132,7 +119,7 @@ class NativeEngine(Engine):
 
     @property
     def state(self) -> ctypes.c_void_p:
-        """The C core, for whoever shares more with it."""
+        """The C core, for what else is shared with it (registers, USARTs)."""
         return self._state
 
     def keep(self, *buffers: object) -> None:
@@ -169,7 +156,7 @@ class NativeEngine(Engine):
     def map_io(self, address: int, size: int, read: ReadAccess, write: WriteAccess) -> None:
         """As of `Engine`."""
         number = len(self._regions)
-        self._regions.append((address, size, *guarded(read, write, self._is_denied, self._fail)))
+        self._regions.append((address, size, *io_callbacks(read, write, self._is_denied, self._fail)))
         user = library().core_region(self._state, number, address)
         self._core.map_io_native(address, size, address_of("core_read_io"), address_of("core_write_io"), user)
 
@@ -215,7 +202,7 @@ class NativeEngine(Engine):
         if (debug.breakpoints or debug.has_hooks) and not debug.is_armed:
             debug.arm()
         if traps.have_changed:
-            traps.begin()
+            traps.apply()
             self.forget_costs()
         if self.before_run is not None:
             self.before_run()
@@ -300,8 +287,8 @@ class NativeEngine(Engine):
         else:
             library().core_clear_exclusive(self._state)
 
-    def _take_recorder(self, recorder: BlockRecorder | None) -> None:
-        super()._take_recorder(recorder)
+    def _set_recorder(self, recorder: BlockRecorder | None) -> None:
+        super()._set_recorder(recorder)
         if not library().core_start_recording(self._state, 0 if recorder is None else _RECORD_ROOM):
             raise MemoryError("no memory for a record of blocks")
 
@@ -334,7 +321,7 @@ class NativeEngine(Engine):
         return NativeTraps(self._core, self.stop_before, self._leave_it_block, self._state)
 
     def _measure_block(self, address: int, size: int) -> None:
-        """Tell C of a block that it does not know."""
+        """Give C the row of a block that it does not know."""
         try:
             block = self._blocks.at(address, size)
             self.shared.uses_exclusive = self._blocks.uses_exclusive
@@ -377,7 +364,7 @@ class NativeEngine(Engine):
             raise RuntimeError(f"no room for the block at {start:#010x}")
 
     def _note(self, accesses: dict[int, Access]) -> None:
-        """Have the PC of these instructions noted, in code that is translated from now on."""
+        """Hook these instructions so that C notes their PC, in code that is translated from now on."""
         for address in accesses.keys() - self._noted:
             self._noted.add(address)
             self._core.hook_native("instruction", address_of("core_on_note"), self._state.value or 0, address, address)
@@ -389,7 +376,7 @@ class NativeEngine(Engine):
         self._regions[region][3](0, offset, size, value, 0)
 
     def _is_denied(self) -> bool:
-        """Get ready for an access; tell whether the run has ended before it."""
+        """Prepare an access; return whether the run has ended before it."""
         shared = self.shared
         if shared.dirty and self.before_access is not None:
             self.before_access()
@@ -422,8 +409,25 @@ class NativeEngine(Engine):
         return goes_on
 
 
+class NativeTraps(Traps):
+    """`Traps` whose hooks look at the register in C; Python is called only when one traps."""
+
+    def __init__(
+        self, core: UnicornCore, stop_before: StopBefore, leave_it_block: Callable[[], object], state: ctypes.c_void_p
+    ) -> None:
+        super().__init__(core, stop_before, leave_it_block)
+        self._state = state
+
+    def _trap(self, address: int, number: int, kind: HaltKind) -> None:
+        if (address, number, kind) in self._trapped:
+            return
+        self._trapped.add((address, number, kind))
+        user = library().core_trap(self._state, address, GENERAL[number].value, HALT_NUMBERS[kind])
+        self._core.hook_native("instruction", address_of("core_on_trap"), user, address, address)
+
+
 def _fill(row: InstructionRow, access: Access | None) -> None:
-    """Write down what an instruction reaches for."""
+    """Fill in which memory an instruction accesses."""
     if access is None:
         return
     row.kind = 1 if access.is_load else 2

@@ -1,7 +1,7 @@
 """The native core's shared library: found next to the package, loaded by ctypes.
 
-It is built with the package where a C compiler is there (`pip install` says
-nothing if not). `P2OS_CORE=python` in the environment chooses the Python
+It is built with the package where there is a C compiler (`pip install` does not
+mention it if not). `P2OS_CORE=python` in the environment chooses the Python
 executor, `P2OS_CORE=native` insists on this one.
 """
 
@@ -15,7 +15,7 @@ from bluepill_sim.errors import BluePillError, MissingDependencyError
 from bluepill_sim.native.state import Shared
 
 #: The name of the environment variable, and what it may hold.
-VARIABLE, CHOICES = "P2OS_CORE", ("native", "python")
+CORE_VARIABLE, CORE_CHOICES = "P2OS_CORE", ("native", "python")
 _HINT = "install a C compiler, then the package again"
 
 UNKNOWN_BLOCK = ctypes.CFUNCTYPE(None, ctypes.c_uint32, ctypes.c_uint32)
@@ -25,14 +25,14 @@ TRAPPED = ctypes.CFUNCTYPE(None, ctypes.c_uint32, ctypes.c_uint32, ctypes.c_uint
 RECORDED = ctypes.CFUNCTYPE(None, ctypes.c_void_p, ctypes.c_uint32)
 
 
-#: The functions of Unicorn that C calls, by their names in `binding.Library`.
-ENGINE_FUNCTIONS = ("start", "stop", "read_register", "read_registers", "write_registers")
+#: The functions of Unicorn that C calls, by their names in `core.unicorn_core.UnicornLibrary`.
+UNICORN_FUNCTIONS = ("start", "stop", "read_register", "read_registers", "write_registers")
 
 
-class EngineApi(ctypes.Structure):
-    """`struct engine_api`."""
+class UnicornApi(ctypes.Structure):
+    """`struct unicorn_api`."""
 
-    _fields_ = tuple((name, ctypes.c_void_p) for name in ENGINE_FUNCTIONS)
+    _fields_ = tuple((name, ctypes.c_void_p) for name in UNICORN_FUNCTIONS)
 
 
 class Callbacks(ctypes.Structure):
@@ -84,25 +84,26 @@ _TYPES: dict[str, Any] = {
 }  # fmt: skip
 
 
-def is_wanted() -> bool:
+def is_native_wanted() -> bool:
     """Tell whether engines are to be native.
 
     Raises:
         BluePillError: `P2OS_CORE` holds neither "native" nor "python".
         MissingDependencyError: it insists on a native core that is not built.
     """
-    choice = os.environ.get(VARIABLE, "")
-    if choice and choice not in CHOICES:
+    choice = os.environ.get(CORE_VARIABLE, "")
+    if choice and choice not in CORE_CHOICES:
         raise BluePillError(
-            f"{VARIABLE}={choice}: no such core", hint=f"{VARIABLE} is {' or '.join(CHOICES)}, or not set"
+            f"{CORE_VARIABLE}={choice}: no such core",
+            hint=f"{CORE_VARIABLE} is {' or '.join(CORE_CHOICES)}, or not set",
         )
-    if choice == "native" and path() is None:
+    if choice == "native" and library_path() is None:
         raise MissingDependencyError("the native core is not built", hint=_HINT)
-    return choice != "python" and path() is not None
+    return choice != "python" and library_path() is not None
 
 
 @cache
-def path() -> str | None:
+def library_path() -> str | None:
     """Return where the library is; None where it was not built."""
     spec = find_spec("bluepill_sim._native")
     return None if spec is None else spec.origin
@@ -115,7 +116,7 @@ def library() -> ctypes.PyDLL:
     Raises:
         MissingDependencyError: it was not built, or is of another version of the package.
     """
-    where = path()
+    where = library_path()
     if where is None:
         raise MissingDependencyError("the native core is not built", hint=_HINT)
     loaded = ctypes.PyDLL(where)  # keeps the interpreter's lock: callbacks come often

@@ -15,7 +15,7 @@ from bluepill_sim.core.nvic import FIRST_IRQ, SYSTEM_EXCEPTIONS, Nvic
 from bluepill_sim.core.processor import SEVONPEND, Processor, Sleep
 from bluepill_sim.core.systick import SysTick
 from bluepill_sim.memory import Memory
-from bluepill_sim.native import library as native_library
+from bluepill_sim.native.library import is_native_wanted
 from bluepill_sim.native.state import Shared, field, flag, time
 
 _HALF = 64
@@ -30,7 +30,7 @@ def make_core(measure: Measure, memory: Memory) -> tuple[Engine, Processor]:
         BluePillError: `P2OS_CORE` names no core.
         MissingDependencyError: Unicorn is not installed, or the core insisted on is not built.
     """
-    if not native_library.is_wanted():
+    if not is_native_wanted():
         engine = Engine(measure)
         return engine, Processor(engine, memory)
     from bluepill_sim.native.engine import NativeEngine

@@ -3,7 +3,7 @@
     reads plain    the register has no `on_read`; what is read may be latched
     writes plain   it has no `on_write`
     GPIO           BSRR, BRR and ODR, while nothing but IDR follows from a pin's level
-    USART          DR, while characters follow each other and nobody listens to interrupt lines
+    USART          DR, while characters follow each other and the interrupt lines have no listeners
 
 An access goes to Python when its page has no clock, when a peripheral is due
 before the block ends, and for everything else.
@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING
 from bluepill_sim.fabric.pins import PinBank
 from bluepill_sim.fabric.registers import Peripheral
 from bluepill_sim.native.library import library
-from bluepill_sim.native.streams import DIRTY, ChipInC, SharedStreams
+from bluepill_sim.native.streams import DIRTY, NativePorts, SharedStreams
 from bluepill_sim.peripherals.gpio import Gpio
 from bluepill_sim.peripherals.rcc import Rcc
 from bluepill_sim.peripherals.usart import Usart
@@ -40,7 +40,7 @@ class _Port(ctypes.Structure):
 
 
 class SharedPorts:
-    """The GPIO ports whose plain outputs C switches, and who listens to what C does."""
+    """The GPIO ports whose plain outputs C switches, and what C has to know of listeners."""
 
     def __init__(
         self,
@@ -65,7 +65,7 @@ class SharedPorts:
         self._ports.append((gpio, port))
 
     def take_over(self) -> None:
-        """Do what C has done to pins and USARTs, before anybody looks at them."""
+        """Bring pins and USARTs in line with what C has done, before they are read."""
         shared = self._engine.shared
         dirty, shared.dirty = shared.dirty, 0
         if dirty & ~DIRTY:
@@ -89,11 +89,11 @@ class SharedPorts:
             bank.on_silent_output(self._ns_of(self._engine.shared.last_pin_cycle))
 
     def mark(self) -> None:
-        """Tell C which pins are simple and who listens, before a run."""
+        """Mark for C, before a run, which pins are simple and whether there are listeners."""
         bank = self._bank
         if len(self._irq_listeners) != self._listener_count:
             self._listener_count = len(self._irq_listeners)
-            self._engine.shared.tells_irqs = self._listener_count != 0
+            self._engine.shared.has_irq_listeners = self._listener_count != 0
         is_recording = bool(bank.bulk_takers)
         if is_recording is not self._is_recording:
             self._is_recording = is_recording
@@ -107,7 +107,7 @@ class SharedPorts:
             port.simple = 0 if is_subscribed else gpio.simple_outputs()
 
 
-def share_registers(chip: ChipInC, parts: Iterable[Peripheral], rcc: Rcc) -> SharedStreams | None:
+def share_registers(chip: NativePorts, parts: Iterable[Peripheral], rcc: Rcc) -> SharedStreams | None:
     """Hand the registers of a chip to its engine, if it is a native one; return what it has of its USARTs."""
     from bluepill_sim.native.engine import NativeEngine
 

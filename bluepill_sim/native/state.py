@@ -34,7 +34,7 @@ HALT_KINDS = (
     HaltKind.UNALIGNED,
 )
 HALT_NUMBERS = {kind: number for number, kind in enumerate(HALT_KINDS)}
-#: What follows them: for Python alone.
+#: The kinds that follow them, for Python alone.
 BOUNDARY = 0
 DELIVER, FAILED, STALE, FROZEN, UNEXPLAINED = range(len(HALT_KINDS), len(HALT_KINDS) + 5)
 
@@ -104,8 +104,8 @@ class Shared(ctypes.Structure):
         ("flash_base", _U32),
         ("flash_bytes", _U32),
         ("scratch", _U32),
-        ("tells_irqs", _U32),
-        ("told", _U64),
+        ("has_irq_listeners", _U32),
+        ("logged", _U64),
         ("last", Record * LAST_ROWS),
     )
 
@@ -175,25 +175,25 @@ class NativeLastRows:
     def append(self, row: BlockRow) -> None:
         """As of `KeptRows`."""
         shared = self.shared
-        shared.last[shared.told % LAST_ROWS] = row
-        shared.told += 1
+        shared.last[shared.logged % LAST_ROWS] = row
+        shared.logged += 1
 
     def rows(self) -> tuple[BlockRow, ...]:
         """As of `KeptRows`."""
         shared = self.shared
-        count = min(shared.told, LAST_ROWS)
+        count = min(shared.logged, LAST_ROWS)
         rows = tuple(RECORD.iter_unpack(bytes(shared.last)))
-        first = shared.told % LAST_ROWS
+        first = shared.logged % LAST_ROWS
         return (rows[first:] + rows[:first])[-count:] if count else ()
 
     def put_back(self, rows: Sequence[BlockRow]) -> None:
         """As of `KeptRows`."""
-        self.shared.told = 0
+        self.shared.logged = 0
         for row in rows:
             self.append(row)
 
     def ends_with_block(self, address: int) -> bool:
         """As of `KeptRows`."""
         shared = self.shared
-        last = shared.last[(shared.told - 1) % LAST_ROWS]
-        return bool(shared.told) and last.kind == BLOCK and last.address == address
+        last = shared.last[(shared.logged - 1) % LAST_ROWS]
+        return bool(shared.logged) and last.kind == BLOCK and last.address == address

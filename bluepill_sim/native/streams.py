@@ -1,7 +1,7 @@
-"""Transmissions of the USARTs, handed to the native core while nobody subscribes to their characters one by one.
+"""Transmissions of the USARTs, handed to the native core while no listener needs each character at its time.
 
-Theory of operation. Before a run in C each USART that only sends gives its
-transmission away: from then on C ends its characters and starts the next ones
+Theory of operation. Before a run in C each USART that only sends hands its
+transmission over: from then on C ends its characters and starts the next ones
 (`native/streams.c`). Before Python looks at anything, in the middle of a run or
 at its end, the transmission comes back, with the characters that were sent.
 
@@ -50,7 +50,7 @@ class _Stream(ctypes.Structure):
     )
 
 
-class ChipInC(Protocol):
+class NativePorts(Protocol):
     """What the native core needs of the chip whose registers it holds."""
 
     engine: Engine
@@ -70,7 +70,7 @@ class ChipInC(Protocol):
 class SharedStreams:
     """The transmissions of one chip."""
 
-    def __init__(self, chip: ChipInC, engine: "NativeEngine", usarts: list[Usart]) -> None:
+    def __init__(self, chip: NativePorts, engine: "NativeEngine", usarts: list[Usart]) -> None:
         self._chip = chip
         self._engine = engine
         self._streams: list[tuple[Usart, _Stream]] = []
@@ -82,7 +82,7 @@ class SharedStreams:
         self._given: list[tuple[Usart, _Stream]] = []
 
     def give(self) -> bool:
-        """Hand over what can be, before a run in C; tell whether that moved a deadline."""
+        """Hand over what can be, before a run in C; return whether that moved a deadline."""
         given = [pair for pair in self._streams if pair[0].can_stream()]
         if not given or self._engine.needs_python or self._chip.irq_listeners:
             return False
@@ -101,4 +101,4 @@ class SharedStreams:
             usart.take_stream_back(stream.half_bits)
         library().core_stop_streams(self._engine.state)
         for usart, words in sent:
-            usart.tell_sent(words)
+            usart.report_sent(words)

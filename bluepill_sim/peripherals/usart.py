@@ -175,7 +175,7 @@ class Usart(Peripheral):
         self._tx_half_bits = half_bits
         self._schedule()
 
-    def tell_sent(self, words: list[tuple[int, int]]) -> None:
+    def report_sent(self, words: list[tuple[int, int]]) -> None:
         """Tell of characters (word, ns) that have gone out meanwhile."""
         for word, at_ns in words:
             self._emit(word, at_ns)

@@ -10,8 +10,8 @@ Source: IEEE 1364-2005, chapter 18 (four-state VCD).
 from collections.abc import Iterator
 from pathlib import Path
 
-from bluepill_sim.sight.sigrok_session import MOST_SAMPLES, runs, sample_at, write_session
-from bluepill_sim.sight.vcd import identifier
+from bluepill_sim.analysis.sigrok_session import MOST_SAMPLES, runs, sample_at, write_session
+from bluepill_sim.analysis.vcd import identifier
 from robot_bench.recording.run_record import RunRecord
 from robot_bench.recording.signals import grouped
 

@@ -8,7 +8,7 @@ from typing import ClassVar
 
 import pytest
 
-from bluepill_sim.debug.control import StopKind
+from bluepill_sim.debug.machine import StopKind
 from bluepill_sim.debug.execution import Execution
 from bluepill_sim.debug.packets import frame
 from bluepill_sim.errors import BluePillError

@@ -1,4 +1,4 @@
-/* Accesses to peripherals: which instruction makes them, and who answers.
+/* Accesses to peripherals: which instruction makes them, and whether C or Python answers.
  *
  * Unicorn does not bring the PC up to date for an access to I/O, but all other
  * registers are. So the accessing instruction is found by working out which of
@@ -17,7 +17,7 @@ struct region_user {
 
 #define IN_PAGE ((1u << PAGE_SHIFT) - 1)
 
-/* What Unicorn hands back at each access of a region; lives as long as the core's owner keeps it. */
+/* What Unicorn hands back at each access of a region; it is freed with the core. */
 struct region_user *core_region(struct core *core, uint32_t number, uint32_t base)
 {
     struct region_user *region = allocate(core, sizeof *region);
@@ -31,9 +31,9 @@ struct region_user *core_region(struct core *core, uint32_t number, uint32_t bas
 void core_set_paged_region(struct core *core, uint32_t number) { core->paged_region = number; }
 
 /* A hook of each access in blocks where the instruction cannot be told from the registers. */
-void core_on_note(void *engine, uint64_t address, uint32_t size, void *user)
+void core_on_note(void *unicorn, uint64_t address, uint32_t size, void *user)
 {
-    (void)engine;
+    (void)unicorn;
     (void)size;
     ((struct core *)user)->noted = (uint32_t)address;
 }
@@ -79,7 +79,7 @@ static void pass(struct core *core, uint32_t n)
     core->io_next = core->block->instructions[n].count > 1 ? n : n + 1;
 }
 
-/* Notes an access that nobody asks about, so that the next one of the block is not taken for it. */
+/* Notes an access whose instruction is not looked for now, so that the next one of the block is not taken for it. */
 void skip(struct core *core, uint32_t address, bool is_write, uint32_t bytes)
 {
     if (UNLIKELY(core->skipped_count == SKIPPED)) {
@@ -132,7 +132,7 @@ static bool is_over(const struct core *core)
     return core->shared.cycle + core->block->straight >= core->shared.stop_at;
 }
 
-/* Tells Python which instruction asks, unless Python itself runs the blocks and knows. */
+/* Finds the accessing instruction for Python, unless Python itself runs the blocks and knows it. */
 static void begin_access(struct core *core, uint32_t address, bool is_write, uint32_t size)
 {
     if (!core->shared.is_python) {
@@ -172,9 +172,9 @@ static struct page *open_page(const struct region_user *region, uint32_t offset)
     return is_there && (page->gate == NULL || *page->gate & page->gate_mask) ? page : NULL;
 }
 
-uint64_t core_read_io(void *engine, uint64_t at, unsigned size, void *user)
+uint64_t core_read_io(void *unicorn, uint64_t at, unsigned size, void *user)
 {
-    (void)engine;
+    (void)unicorn;
     const struct region_user *region = user;
     const uint32_t offset = (uint32_t)at, index = (offset & IN_PAGE) >> 2;
     const struct page *page = open_page(region, offset);
@@ -192,9 +192,9 @@ uint64_t core_read_io(void *engine, uint64_t at, unsigned size, void *user)
     return size == 4 ? word : (word >> (offset & 3) * 8) & ((1u << size * 8) - 1);
 }
 
-void core_write_io(void *engine, uint64_t at, unsigned size, uint64_t value, void *user)
+void core_write_io(void *unicorn, uint64_t at, unsigned size, uint64_t value, void *user)
 {
-    (void)engine;
+    (void)unicorn;
     const uint32_t offset = (uint32_t)at, index = (offset & IN_PAGE) >> 2, written = (uint32_t)value;
     const struct region_user *region = user;
     struct page *page = open_page(region, offset);

@@ -28,13 +28,13 @@ void end_run(struct core *core, uint32_t kind, uint32_t pc)
         core->shared.halt_kind = kind;
         core->shared.halt_pc = pc;
     }
-    core->api.stop(core->engine);
+    core->api.stop(core->unicorn);
 }
 
 static void stop_at_boundary(struct core *core, uint32_t address)
 {
     core->block = &core->none;
-    end_run(core, HALT_BORDER, address);
+    end_run(core, HALT_BOUNDARY, address);
 }
 
 void core_flush(struct core *core)
@@ -46,7 +46,7 @@ void core_flush(struct core *core)
     }
 }
 
-/* Has Python told of a row, when there are enough of them. */
+/* Passes a row on to Python, when there are enough of them. */
 static void pass_on(struct core *core, const struct record *row)
 {
     core->shared.is_first = 0;
@@ -56,26 +56,26 @@ static void pass_on(struct core *core, const struct record *row)
     }
 }
 
-/* Keeps a row, and passes it on to whoever records. */
-static inline void tell(struct core *core, uint64_t cycle, uint32_t address, int32_t kind)
+/* Keeps a row, and passes it on if a recorder is attached. */
+static inline void log_row(struct core *core, uint64_t cycle, uint32_t address, int32_t kind)
 {
     const struct record row = {cycle, address, kind};
-    core->shared.last[core->shared.told++ % LAST_ROWS] = row;
+    core->shared.last[core->shared.logged++ % LAST_ROWS] = row;
     if (UNLIKELY(core->records != NULL)) {
         pass_on(core, &row);
     }
 }
 
-void record_at(struct core *core, uint64_t cycle, uint32_t address, int32_t kind) { tell(core, cycle, address, kind); }
+void record_at(struct core *core, uint64_t cycle, uint32_t address, int32_t kind) { log_row(core, cycle, address, kind); }
 
-void record(struct core *core, uint32_t address, int32_t kind) { tell(core, core->shared.cycle, address, kind); }
+void record(struct core *core, uint32_t address, int32_t kind) { log_row(core, core->shared.cycle, address, kind); }
 
-/* Tells of a branch to itself: once, however long it spins; as `Engine._tell_spin`. */
-static void tell_spin(struct core *core, uint32_t address)
+/* Logs a branch to itself: once, however long it spins; as `BlockLog.add_spin`. */
+static void log_spin(struct core *core, uint32_t address)
 {
     const struct shared *s = &core->shared;
-    const struct record *last = &s->last[(s->told - 1) % LAST_ROWS];
-    if (!s->told || last->kind != 0 || last->address != address) {
+    const struct record *last = &s->last[(s->logged - 1) % LAST_ROWS];
+    if (!s->logged || last->kind != 0 || last->address != address) {
         record(core, address, 0);
     } else if (core->records != NULL && s->is_first) {
         const struct record row = {s->cycle, address, 0};
@@ -120,13 +120,13 @@ static void enter_special(struct core *core, uint32_t address, uint32_t size, st
         s->event_register = 1;
     }
     if (row->flags & ROW_SELF_LOOP) {
-        tell_spin(core, address);
+        log_spin(core, address);
     } else {
         record(core, address, 0);
     }
 }
 
-/* Records from now on, `room` rows before Python is told; 0: no more. Returns false without memory for it. */
+/* Records from now on, `room` rows before Python is called; 0: no more. Returns false without memory for it. */
 bool core_start_recording(struct core *core, uint32_t room)
 {
     free(core->records);
@@ -137,9 +137,9 @@ bool core_start_recording(struct core *core, uint32_t room)
     return !room || core->records != NULL;
 }
 
-void core_on_block(void *engine, uint64_t at, uint32_t size, void *user)
+void core_on_block(void *unicorn, uint64_t at, uint32_t size, void *user)
 {
-    (void)engine;
+    (void)unicorn;
     struct core *core = user;
     const struct row *before = core->block;
     const uint32_t address = (uint32_t)at;
@@ -154,7 +154,7 @@ void core_on_block(void *engine, uint64_t at, uint32_t size, void *user)
         enter_special(core, address, size, row);
     } else {
         begin_block(core, row);
-        tell(core, cycle, address, 0);
+        log_row(core, cycle, address, 0);
         if (UNLIKELY(row == before) && row->flags & ROW_READS && polls_unchanged(core, row)) {
             wait_on(core, row);
             stop_at_boundary(core, address);

@@ -22,10 +22,10 @@
 
 /* Why a run ended; the order is that of bluepill_sim/native/state.py. */
 enum halt {
-    HALT_BORDER,
+    HALT_BOUNDARY,
     HALT_EXCEPTION_RETURN,
     HALT_SUPERVISOR_CALL,
-    HALT_BREAKPOINT,
+    HALT_BKPT,
     HALT_WAIT_INTERRUPT,
     HALT_WAIT_EVENT,
     HALT_UNDEFINED,
@@ -92,7 +92,7 @@ struct record {
     int32_t kind;
 };
 
-/* How many of them are kept whether or not anybody records; a power of 2. */
+/* How many of them are kept with or without a recorder; a power of 2. */
 #define LAST_ROWS 32
 
 struct shared {
@@ -108,21 +108,21 @@ struct shared {
     uint32_t tick_control, tick_reload, tick_value, tick_count_flag;
     uint32_t traps_division, grouping;
     uint32_t it_state, is_python;
-    uint32_t dirty; /* what Python has not seen yet: numbers of pins, or STREAMS_DIRTY */
-    uint32_t is_first; /* whoever records has not been notified of anything yet */
+    uint32_t dirty; /* what C has changed since Python looked: numbers of pins, or STREAMS_DIRTY */
+    uint32_t is_first; /* the recorder has not had a row yet */
     uint64_t last_pin_cycle; /* the start of the block that last switched a pin silently */
     uint8_t priorities[80];
     /* Set by Python before the first run. */
     uint64_t sram, flash;
     uint32_t sram_base, sram_bytes, flash_base, flash_bytes;
     uint32_t scratch;
-    uint32_t tells_irqs; /* somebody listens to the interrupt lines */
-    uint64_t told; /* rows so far: the next one goes to `last` at this, modulo its size */
+    uint32_t has_irq_listeners; /* the interrupt lines have listeners */
+    uint64_t logged; /* rows so far: the next one goes to `last` at this, modulo its size */
     struct record last[LAST_ROWS];
 };
 
 /* The functions of Unicorn that this core calls. */
-struct engine_api {
+struct unicorn_api {
     int (*start)(void *, uint64_t, uint64_t, uint64_t, size_t);
     int (*stop)(void *);
     int (*read_register)(void *, int, void *);
@@ -159,7 +159,7 @@ struct page {
 /* The word that latches what is read stands above the bits; 0 for none. */
 enum behaviour { READS_PLAIN = 1, WRITES_PLAIN = 2, USART_DATA = 4, LATCH_SHIFT = 4 };
 
-/* What lives as long as the core. */
+/* Memory that is freed with the core. */
 struct allocation {
     struct allocation *next;
     max_align_t data[];
@@ -207,7 +207,7 @@ struct time_base {
     uint32_t frequency_hz;
 };
 
-/* A loop that waits for something: what it looked like at its start, one round ago. */
+/* A loop that waits for something: its state at its start, one round ago. */
 struct polling {
     const struct row *row;
     uint64_t cycle;
@@ -224,8 +224,8 @@ struct port {
 
 struct core {
     struct shared shared;
-    void *engine;
-    struct engine_api api;
+    void *unicorn;
+    struct unicorn_api api;
     struct callbacks calls;
     struct row *block;
     uint32_t io_next;       /* the first instruction of the block that may make the next access */
@@ -244,7 +244,7 @@ struct core {
     struct allocation *allocations;
     struct record *records;
     uint32_t record_count, record_room;
-    struct pin_row *pin_rows; /* null: nobody records the pins */
+    struct pin_row *pin_rows; /* null: pins are not recorded */
     uint32_t pin_count;
     struct stream streams[STREAMS];
     uint64_t stream_next; /* the cycle at which the first of them ends a character */

@@ -76,9 +76,9 @@ static int execution_priority(struct core *core, bool ignores_primask)
     static const int numbers[3] = {REG_PRIMASK, REG_BASEPRI, REG_FAULTMASK};
     uint32_t masks[3];
     void *at[3] = {&masks[0], &masks[1], &masks[2]};
-    core->api.read_registers(core->engine, numbers, at, 3);
+    core->api.read_registers(core->unicorn, numbers, at, 3);
     int priority = active_priority(s);
-    /* The engine keeps the low bits of BASEPRI that an STM32F103 does not have. */
+    /* Unicorn keeps the low bits of BASEPRI that an STM32F103 does not have. */
     const int base = (int)(masks[1] & 0xF0);
     if (base && group(s, base) < priority) {
         priority = group(s, base);
@@ -151,7 +151,7 @@ static void start_handler(struct core *core, unsigned number, uint32_t handler, 
     static const int numbers[4] = {REG_SP, REG_IPSR, REG_CPSR, REG_LR};
     uint32_t values[4] = {sp, number, (cpsr & ~IT_BITS) | CPSR_T, link};
     void *at[4] = {&values[0], &values[1], &values[2], &values[3]};
-    core->api.write_registers(core->engine, numbers, at, 4);
+    core->api.write_registers(core->unicorn, numbers, at, 4);
     core_clear_exclusive(core);
     s->pc = handler & ~1u;
     s->is_thumb = handler & 1;
@@ -169,7 +169,7 @@ static bool enter(struct core *core, unsigned number, uint32_t return_address)
     for (int n = 0; n < 10; ++n) {
         at[n] = &value[n];
     }
-    core->api.read_registers(core->engine, numbers, at, 10);
+    core->api.read_registers(core->unicorn, numbers, at, 10);
     const uint32_t control = value[8], cpsr = value[9];
     uint32_t frame_at = value[7] - FRAME_BYTES;
     uint32_t xpsr = (value[6] & ~(T_BIT | ALIGN_BIT)) | (s->is_thumb ? T_BIT : 0) | s->exception_number;
@@ -220,7 +220,7 @@ bool leave(struct core *core, uint32_t exc_return)
     static const int numbers[5] = {REG_CONTROL, REG_CPSR, REG_PSP, REG_MSP, REG_FAULTMASK};
     uint32_t value[5];
     void *at[12] = {&value[0], &value[1], &value[2], &value[3], &value[4]};
-    core->api.read_registers(core->engine, numbers, at, 5);
+    core->api.read_registers(core->unicorn, numbers, at, 5);
     const uint32_t control = value[0], cpsr = value[1], psp = value[2], msp = value[3];
     uint32_t *frame = sram_at(core, exc_return == TO_THREAD_PSP ? psp : msp, FRAME_BYTES);
     if (frame == NULL || value[4] || !has_vectors(core)) {
@@ -258,7 +258,7 @@ bool leave(struct core *core, uint32_t exc_return)
         at[n] = &values[n];
     }
     const uint32_t pc = frame[6];
-    core->api.write_registers(core->engine, to, at, 12);
+    core->api.write_registers(core->unicorn, to, at, 12);
     s->pc = pc & ~1u;
     s->is_thumb = (xpsr & T_BIT) != 0;
     s->it_state = (xpsr >> 25 & 3) | (xpsr >> 10 & 0x3F) << 2;
@@ -271,7 +271,7 @@ bool leave(struct core *core, uint32_t exc_return)
     return true;
 }
 
-/* Wakes the core if there is reason to; tells whether it is awake. */
+/* Wakes the core if there is reason to; returns whether it is awake. */
 bool wakes(struct core *core)
 {
     struct shared *s = &core->shared;
@@ -287,7 +287,6 @@ bool wakes(struct core *core)
     return s->sleep == AWAKE;
 }
 
-/* SysTick comes to 0 at or before the present cycle: as SysTick.advance_to. */
 /* Makes an exception pending, at a boundary. */
 void pend(struct core *core, unsigned number)
 {
@@ -297,6 +296,7 @@ void pend(struct core *core, unsigned number)
     }
 }
 
+/* SysTick comes to 0 at or before the present cycle: as SysTick.advance_to. */
 void tick(struct core *core)
 {
     struct shared *s = &core->shared;

@@ -1,8 +1,8 @@
-/* Outputs of a GPIO port that nobody watches one by one: the data registers and the pins' own levels.
+/* Outputs of a GPIO port whose edges have no listener: the data registers and the pins' own levels.
  *
  * Python says which pins are so simple that a change of their ODR bit changes
  * nothing but the level that IDR reads; it takes the changes over before it
- * looks at a pin. Whoever records the pins takes rows over in bulk. Source: RM0008 9.2.
+ * looks at a pin. A tool that records the pins takes the rows over in bulk. Source: RM0008 9.2.
  */
 #include <stdlib.h>
 

@@ -22,7 +22,7 @@ static void look(struct core *core, uint32_t registers[16])
     for (int n = 0; n < 16; ++n) {
         at[n] = &registers[n];
     }
-    core->api.read_registers(core->engine, numbers, at, 16);
+    core->api.read_registers(core->unicorn, numbers, at, 16);
 }
 
 /* Called when a block is entered right after itself. */

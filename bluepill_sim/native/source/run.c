@@ -1,4 +1,4 @@
-/* Slices: from boundary to boundary until the time is up, an event, or what Python must decide. */
+/* Slices: from boundary to boundary until the time is up, an event comes, or Python must decide. */
 #include <stdlib.h>
 #include <string.h>
 
@@ -14,7 +14,7 @@ enum { FOR_INTERRUPT = 1, FOR_EVENT = 2 };
 uint32_t read_register(struct core *core, int number)
 {
     uint32_t value = 0;
-    core->api.read_register(core->engine, number, &value);
+    core->api.read_register(core->unicorn, number, &value);
     return value;
 }
 
@@ -31,11 +31,11 @@ void *allocate(struct core *core, size_t bytes)
 
 size_t core_shared_bytes(void) { return sizeof(struct shared); }
 
-struct core *core_new(void *engine, const struct engine_api *api, const struct callbacks *calls)
+struct core *core_new(void *unicorn, const struct unicorn_api *api, const struct callbacks *calls)
 {
     struct core *core = calloc(1, sizeof *core);
     if (core != NULL) {
-        core->engine = engine;
+        core->unicorn = unicorn;
         core->api = *api;
         core->calls = *calls;
         core->none.start = core->none.end = UINT32_MAX;
@@ -82,9 +82,9 @@ static uint32_t kind_of_denied_fetch(uint32_t pc)
 }
 
 /* Unicorn's own numbers of what ends a run; 3 and 8 are told apart by the PC. */
-void core_on_interrupt(void *engine, uint32_t number, void *user)
+void core_on_interrupt(void *unicorn, uint32_t number, void *user)
 {
-    (void)engine;
+    (void)unicorn;
     struct core *core = user;
     const uint32_t pc = read_register(core, REG_PC);
     uint32_t kind = HALT_UNDEFINED;
@@ -93,7 +93,7 @@ void core_on_interrupt(void *engine, uint32_t number, void *user)
     case 3:
     case 8: kind = kind_of_denied_fetch(pc); break;
     case 4: kind = HALT_UNALIGNED; break;
-    case 7: kind = HALT_BREAKPOINT; break;
+    case 7: kind = HALT_BKPT; break;
     case 17: kind = HALT_NO_COPROCESSOR; break;
     default: break;
     }
@@ -101,9 +101,9 @@ void core_on_interrupt(void *engine, uint32_t number, void *user)
 }
 
 /* Unicorn takes WFE and YIELD for undefined, with the PC already past them; the rest stands at the PC. */
-bool core_on_invalid(void *engine, void *user)
+bool core_on_invalid(void *unicorn, void *user)
 {
-    (void)engine;
+    (void)unicorn;
     struct core *core = user;
     const uint32_t pc = read_register(core, REG_PC);
     const uint32_t ends = pc == core->block->end ? core->block->flags : 0;
@@ -134,9 +134,9 @@ struct trap *core_trap(struct core *core, uint32_t address, uint32_t number, uin
 }
 
 /* Before an instruction that may trap: a division, or a transfer that must be aligned. */
-void core_on_trap(void *engine, uint64_t address, uint32_t size, void *user)
+void core_on_trap(void *unicorn, uint64_t address, uint32_t size, void *user)
 {
-    (void)engine;
+    (void)unicorn;
     (void)address;
     (void)size;
     const struct trap *trap = user;
@@ -155,7 +155,7 @@ void core_clear_exclusive(struct core *core)
         const uint64_t cycle = core->shared.cycle, stop_at = core->shared.stop_at;
         core->shared.stop_at = NEVER;
         core->block = &core->none;
-        core->api.start(core->engine, core->shared.scratch | 1, NOWHERE, 0, 0);
+        core->api.start(core->unicorn, core->shared.scratch | 1, NOWHERE, 0, 0);
         core->shared.cycle = cycle;
         core->shared.stop_at = stop_at;
         core->is_scratch = 0;
@@ -192,7 +192,7 @@ static uint32_t run_slice(struct core *core)
     s->halt_has_address = 0;
     s->run_from = s->pc;
     core->io_next = core->skipped_count = 0;
-    const int error = core->api.start(core->engine, s->pc | s->is_thumb, NOWHERE, 0, 0);
+    const int error = core->api.start(core->unicorn, s->pc | s->is_thumb, NOWHERE, 0, 0);
     if (s->halt_kind == HALT_NONE) {
         const uint32_t pc = read_register(core, REG_PC);
         s->halt_pc = pc;
@@ -233,7 +233,7 @@ static uint32_t run(struct core *core, uint64_t limit)
             end_characters(core);
         }
         if (s->attention || s->cycle >= limit) {
-            return HALT_BORDER;
+            return HALT_BOUNDARY;
         }
         const uint64_t event = s->tick_next < core->stream_next ? s->tick_next : core->stream_next;
         const uint64_t stop = event < limit ? event : limit;
@@ -259,7 +259,7 @@ static uint32_t run(struct core *core, uint64_t limit)
         s->stop_at = stop;
         const uint32_t kind = run_slice(core);
         switch (kind) {
-        case HALT_BORDER: break;
+        case HALT_BOUNDARY: break;
         case HALT_WAIT_INTERRUPT: fall_asleep(core, FOR_INTERRUPT); break;
         case HALT_WAIT_EVENT: fall_asleep(core, FOR_EVENT); break;
         case HALT_EXCEPTION_RETURN:
@@ -277,7 +277,7 @@ static uint32_t run(struct core *core, uint64_t limit)
     }
 }
 
-/* Goes on to the first boundary at or after `limit`; returns why it ended, HALT_BORDER at a boundary or when asked to. */
+/* Goes on to the first boundary at or after `limit`; returns why it ended, HALT_BOUNDARY at a boundary or when asked to. */
 uint32_t core_run(struct core *core, uint64_t limit)
 {
     const uint32_t kind = run(core, limit);

@@ -1,12 +1,11 @@
 /* Characters that a USART sends one after the other: their ends, without Python.
  *
- * Python hands a transmission over before a run, where nobody subscribes to the
- * characters one by one, and takes it back with what was sent before it looks
+ * Python hands a transmission over before a run, where no listener needs each
+ * character at its time, and takes it back with what was sent before it looks
  * at anything (`native/streams.py`). Source: RM0008 27.3.2.
  */
 #include "core.h"
 #include "usart.h"
-
 
 struct stream *core_stream(struct core *core, uint32_t number) { return &core->streams[number]; }
 

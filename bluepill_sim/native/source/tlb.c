@@ -27,14 +27,14 @@ static void clear_it_state(struct core *core)
     if (state & IT_BITS) {
         state &= ~IT_BITS;
         void *const value = &state;
-        core->api.write_registers(core->engine, &number, &value, 1);
+        core->api.write_registers(core->unicorn, &number, &value, 1);
     }
 }
 
 /* False where nothing executes: the run ends with an exception of the library. */
-bool core_on_tlb_fill(void *engine, uint64_t address, int access, struct tlb_entry *entry, void *user)
+bool core_on_tlb_fill(void *unicorn, uint64_t address, int access, struct tlb_entry *entry, void *user)
 {
-    (void)engine;
+    (void)unicorn;
     struct core *core = user;
     const uint32_t page = (uint32_t)address;
     entry->address = page;

@@ -19,7 +19,7 @@ static void update_irq(struct core *core, const struct page *page)
 bool write_usart_data(struct core *core, const struct page *page, uint32_t value)
 {
     uint32_t *words = page->words;
-    if (core->shared.tells_irqs || (words[CR1] & (UE | TE)) != (UE | TE) || words[BRR] == 0 || words[SHIFT] == 0 ||
+    if (core->shared.has_irq_listeners || (words[CR1] & (UE | TE)) != (UE | TE) || words[BRR] == 0 || words[SHIFT] == 0 ||
         words[TDR] != 0) {
         return false;
     }
@@ -35,7 +35,7 @@ bool write_usart_data(struct core *core, const struct page *page, uint32_t value
 
 bool read_usart_data(struct core *core, const struct page *page, uint32_t *word)
 {
-    if (core->shared.tells_irqs) {
+    if (core->shared.has_irq_listeners) {
         return false;
     }
     uint32_t *words = page->words;

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from bluepill_sim import BluePill
-from bluepill_sim.native import library as native_library
+from bluepill_sim.native.library import library_path
 from p2os.cli.main import run
 from tests.bluepill_sim.core.conftest import Machine
 
@@ -18,7 +18,7 @@ PROGRAMS["foreign"] = Path(__file__).parents[2] / "firmware_foreign" / "foreign.
 INPUTS = ("PA4", "PA5", "PA6", "PA7", "PB0", "PB1", "PB10", "PB11", "PB4", "PB3", "PB15", "PC13", "PC14", "PC15")
 CORES = [
     "python",
-    pytest.param("native", marks=pytest.mark.skipif(native_library.path() is None, reason="no native core is built")),
+    pytest.param("native", marks=pytest.mark.skipif(library_path() is None, reason="no native core is built")),
 ]
 
 

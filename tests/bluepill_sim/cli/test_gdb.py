@@ -12,7 +12,7 @@ import pytest
 
 from bluepill_sim.board import BluePill
 from bluepill_sim.cli.gdb_server import GdbServer
-from bluepill_sim.debug.control import LoneChip
+from bluepill_sim.debug.machine import LoneChip
 from bluepill_sim.debug.packets import frame
 from bluepill_sim.errors import BluePillError
 from p2os.cli.main import run

@@ -7,13 +7,13 @@ import pytest
 from bluepill_sim.board import BluePill, WaitError
 from bluepill_sim.core import BLOCK, EXCEPTION_RETURN, BlockRecorder, BlockRow
 from bluepill_sim.core.recorder import LAST_ROWS
-from bluepill_sim.native import library as native_library
+from bluepill_sim.native.library import library_path
 from bluepill_sim.program.image import Image, SymbolTable
 from tests.bluepill_sim.core.thumb_streams import Program, program
 
 CORES = [
     "python",
-    pytest.param("native", marks=pytest.mark.skipif(native_library.path() is None, reason="no native core is built")),
+    pytest.param("native", marks=pytest.mark.skipif(library_path() is None, reason="no native core is built")),
 ]
 TICKS = """
 mov32 r1, #0xE000E010
@@ -39,7 +39,7 @@ def make_board(made: Program) -> BluePill:
     return BluePill(Image("random", ((0x0800_0000, made.image),), SymbolTable(())))
 
 
-@pytest.mark.skipif(native_library.path() is None, reason="no native core is built")
+@pytest.mark.skipif(library_path() is None, reason="no native core is built")
 @pytest.mark.parametrize("seed", range(30, 34))
 def test_random_programs_leave_the_same_rows_on_both_cores(seed: int, monkeypatch: pytest.MonkeyPatch) -> None:
     """With nobody recording, at any boundary, with exceptions in between, in halves on one core and on the other."""

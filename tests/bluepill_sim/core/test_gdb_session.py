@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from bluepill_sim.debug.control import LoneChip, StopKind
+from bluepill_sim.debug.machine import LoneChip, StopKind
 from bluepill_sim.debug.execution import Execution
 from bluepill_sim.debug.gdb_session import GdbSession
 

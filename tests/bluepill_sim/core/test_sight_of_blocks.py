@@ -13,13 +13,13 @@ from bluepill_sim.program.image import SymbolTable
 from bluepill_sim.program.last_blocks import lines_of
 from bluepill_sim.program.line_table import LineTable
 from bluepill_sim.program.static_code import StaticCode
-from bluepill_sim.sight.coverage import Coverage
-from bluepill_sim.sight.cycle_profile import ASLEEP, CycleProfile
-from bluepill_sim.sight.flame import flame_svg
-from bluepill_sim.sight.latency import Latency
-from bluepill_sim.sight.observation import Observation
-from bluepill_sim.sight.stack import StackGauge
-from bluepill_sim.sight.walk import Walk
+from bluepill_sim.analysis.coverage import Coverage
+from bluepill_sim.analysis.cycle_profile import ASLEEP, CycleProfile
+from bluepill_sim.analysis.flame import flame_svg
+from bluepill_sim.analysis.latency import Latency
+from bluepill_sim.analysis.observation import Observation
+from bluepill_sim.analysis.stack import StackGauge
+from bluepill_sim.analysis.walk import Walk
 from bluepill_sim.timing import NS_PER_MS
 
 SYSTICK = "mov32 r1, #0xE000E010\nmov32 r2, #799\nstr r2, [r1, #4]\nstr r2, [r1, #8]\nmovs r2, #7\nstr r2, [r1, #0]\n"
@@ -147,7 +147,7 @@ def test_the_stack_is_measured_to_the_word(boot) -> None:
     machine.image = machine.board.image
     gauge = StackGauge.__new__(StackGauge)
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("bluepill_sim.sight.stack.variables_end", lambda _image: 0x2000_0200)
+        patch.setattr("bluepill_sim.analysis.stack.variables_end", lambda _image: 0x2000_0200)
         gauge.__init__(machine.board)
         assert gauge.measure().used_bytes == 0
         machine.run(100)

@@ -8,13 +8,13 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from bluepill_sim.errors import BluePillError
-from bluepill_sim.native import library as native_library
-from bluepill_sim.sight.edge_log import NativeEdgeLog, PythonEdgeLog
-from bluepill_sim.sight.probe import Probe
-from bluepill_sim.sight.vcd import write_vcd
+from bluepill_sim.native.library import library_path
+from bluepill_sim.analysis.edge_log import NativeEdgeLog, PythonEdgeLog
+from bluepill_sim.analysis.probe import Probe
+from bluepill_sim.analysis.vcd import write_vcd
 from tests.bluepill_sim.core.conftest import Machine
 
-pytestmark = pytest.mark.skipif(native_library.path() is None, reason="the native core is not built: no C compiler")
+pytestmark = pytest.mark.skipif(library_path() is None, reason="the native core is not built: no C compiler")
 
 GPIOB = 0x4001_0C00
 #: Port B on, PB0 to PB3 push-pull outputs (PB3 is the debug port's), PB4 an input with a pull that ODR chooses.

@@ -13,12 +13,12 @@ COMPILER = shutil.which("gcc")
 PROGRAM = """
 import sys
 from importlib.resources import files
-from bluepill_sim.native import library as native_library
-native_library.path = lambda: sys.argv[1]
+from bluepill_sim.native import library
+library.library_path = lambda: sys.argv[1]
 from pathlib import Path
 from bluepill_sim import BluePill
-from bluepill_sim.sight.probe import Probe
-from bluepill_sim.sight.vcd import write_vcd
+from bluepill_sim.analysis.probe import Probe
+from bluepill_sim.analysis.vcd import write_vcd
 for name in ("dodge", "motors", "encoders"):
     board = BluePill(str(files("robot_bench.firmware") / f"{name}.elf"))
     board.chip.record_blocks(100)
@@ -57,7 +57,7 @@ def test_no_warning_and_no_finding(tmp_path: Path) -> None:
     preload = run("gcc", "-print-file-name=libasan.so").strip()
     if not Path(preload).is_file():
         pytest.skip("the compiler comes without a sanitizer's library")
-    told = run(
+    printed = run(
         sys.executable,
         "-c",
         PROGRAM,
@@ -67,4 +67,4 @@ def test_no_warning_and_no_finding(tmp_path: Path) -> None:
         ASAN_OPTIONS="detect_leaks=0",
         P2OS_CORE="native",
     )
-    assert told.split() == ["NativeEngine"]
+    assert printed.split() == ["NativeEngine"]

@@ -4,10 +4,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from bluepill_sim.native import library as native_library
+from bluepill_sim.native.library import library_path
 from tests.bluepill_sim.core.conftest import Machine
 
-pytestmark = pytest.mark.skipif(native_library.path() is None, reason="the native core is not built: no C compiler")
+pytestmark = pytest.mark.skipif(library_path() is None, reason="the native core is not built: no C compiler")
 
 #: A page of SRAM that nothing has touched, and the vectors' neighbour where the function is put.
 FRESH, CODE = 0x2000_1800, 0x2000_1000

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from bluepill_sim.sight.vcd import identifier
+from bluepill_sim.analysis.vcd import identifier
 from robot_bench.recording.run_record import RunRecord
 from robot_bench.recording.waveforms import edges_in_order, nets_in_order, write_sigrok, write_vcd
 from tests.robot_bench.records import motor_pins, record

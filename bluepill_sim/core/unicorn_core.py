@@ -1,35 +1,22 @@
-"""A page of code of our own, for what only an instruction can do: breaking the exclusive reservation.
+"""The Cortex-M3 that Unicorn emulates, through the few functions of its C interface that the engine uses.
 
-Invariant: it lies where an STM32F103C has nothing, outside the regions that never execute.
+`UnicornCore` is a thin layer over the library: no time, no costs of blocks, no
+exceptions of the architecture; those are the business of `engine.py` and
+`processor.py`. This is the only module that imports Unicorn, and only when a
+core is made, so that the rest of the package works without it.
 
-The few functions of Unicorn's C interface that the engine uses, by ctypes.
+Theory of operation. The Python binding that ships with Unicorn wraps each call
+and each callback; going to the library directly, by ctypes, halves the price of
+both, and they are what a run spends its time in. A call costs a microsecond
+whatever it carries, so registers that belong together move in one call
+(`Batch`). Accesses to peripherals are calls of Python, straight from C. A
+Python exception cannot pass through C: each callback hands it to `on_failure`
+and answers with a default. What only an instruction can do (CLREX) is run on a
+scratch page of our own.
 
-The Python binding that ships with Unicorn wraps each call and each callback;
-going to the library directly halves the price of both, and they are what a run
-spends its time in. Unicorn is imported here only, and only when an engine is
-made, so that the rest of the package works without it.
-
-Source: unicorn.h of Unicorn 2.1.
-
-The registers of the engine, read and written in batches without allocating.
-
-A Python call into the library costs a microsecond whatever it carries, so
-that exception entry and return move all they need in one call each.
-
-Invariant: a `Batch` refers to the same C arrays for its whole life.
-
-One Unicorn machine: a bare Cortex-M3 with memory maps, hooks and contexts.
-
-This is the thin layer over the library: no time, no blocks, no exceptions of
-the architecture. A Python exception inside a callback cannot pass through C:
-it is handed to `on_failure` and the callback answers with a default.
-
-Source: unicorn.h and uc_priv.h of Unicorn 2.1.
-Invariant: whatever the library keeps a pointer to lives as long as this object.
-
-Regions of peripherals: their accesses are calls of Python, straight from C.
-
-Invariant: a callback never raises; what it should have raised is kept by `fail`.
+Source: unicorn.h, arm.h and uc_priv.h of Unicorn 2.1.
+Invariant: whatever the library keeps a pointer to lives as long as its
+`UnicornCore`, and never moves.
 """
 
 import ctypes
@@ -40,111 +27,11 @@ from dataclasses import dataclass
 from enum import Enum
 from typing import TypeVar, cast
 
-from bluepill_sim.core.block_cost import Block
 from bluepill_sim.errors import MissingDependencyError
-
-#: void (*)(uc, address, size, user): a basic block is about to run, or an instruction.
-BLOCK_CALLBACK = ctypes.CFUNCTYPE(None, ctypes.c_void_p, ctypes.c_uint64, ctypes.c_uint32, ctypes.c_void_p)
-#: void (*)(uc, intno, user)
-INTERRUPT_CALLBACK = ctypes.CFUNCTYPE(None, ctypes.c_void_p, ctypes.c_uint32, ctypes.c_void_p)
-#: bool (*)(uc, user)
-INVALID_CALLBACK = ctypes.CFUNCTYPE(ctypes.c_bool, ctypes.c_void_p, ctypes.c_void_p)
-#: bool (*)(uc, type, address, size, value, user)
-MEMORY_CALLBACK = ctypes.CFUNCTYPE(
-    ctypes.c_bool, ctypes.c_void_p, ctypes.c_int, ctypes.c_uint64, ctypes.c_int, ctypes.c_int64, ctypes.c_void_p
-)
-#: uint64_t (*)(uc, offset, size, user)
-READ_CALLBACK = ctypes.CFUNCTYPE(ctypes.c_uint64, ctypes.c_void_p, ctypes.c_uint64, ctypes.c_uint, ctypes.c_void_p)
-#: void (*)(uc, offset, size, value, user)
-WRITE_CALLBACK = ctypes.CFUNCTYPE(
-    None, ctypes.c_void_p, ctypes.c_uint64, ctypes.c_uint, ctypes.c_uint64, ctypes.c_void_p
-)
-
-
-#: What C functions take here.
-_Argument = ctypes.c_void_p | ctypes.c_int | ctypes.c_uint32 | ctypes.c_uint64 | ctypes.c_size_t
-
-
-@dataclass(frozen=True, slots=True)
-class Library:
-    """The loaded library: each attribute is one C function."""
-
-    open: Callable[..., int]
-    close: Callable[..., int]
-    control: Callable[..., int]
-    start: Callable[..., int]
-    stop: Callable[..., int]
-    read_register: Callable[..., int]
-    write_register: Callable[..., int]
-    read_registers: Callable[..., int]
-    write_registers: Callable[..., int]
-    map_pointer: Callable[..., int]
-    map_io: Callable[..., int]
-    protect: Callable[..., int]
-    add_hook: Callable[..., int]
-    delete_hook: Callable[..., int]
-    context_size: Callable[..., int]
-    context_save: Callable[..., int]
-    context_restore: Callable[..., int]
-    context_alloc: Callable[..., int]
-    context_free: Callable[..., int]
-    #: A C function without effect, to be given as a callback that costs nothing.
-    no_operation: ctypes.c_void_p
-    version: str
-
-
-def load_library() -> Library:
-    """Load Unicorn.
-
-    Raises:
-        MissingDependencyError: it is not installed.
-    """
-    try:
-        import unicorn
-        from unicorn.unicorn_py3.unicorn import uclib
-    except ImportError as error:
-        raise MissingDependencyError(
-            f"the BluePill needs the unicorn library: {error}", hint="pip install 'p2os[sim]'"
-        ) from error
-    # PyDLL keeps the interpreter lock: the engine calls back into Python at each
-    # block, and taking the lock there costs as much as the callback.
-    library = ctypes.PyDLL(uclib._name)  # noqa: SLF001 - the only place where the binding keeps the path
-    word = ctypes.c_void_p
-
-    def function(name: str, *arguments: type[_Argument]) -> Callable[..., int]:
-        result = library[name]
-        result.argtypes = arguments
-        result.restype = ctypes.c_int
-        return cast("Callable[..., int]", result)
-
-    no_operation = ctypes.cast(library["uc_arch_supported"], ctypes.c_void_p)  # looks at a number, returns a flag
-    return Library(
-        open=function("uc_open", ctypes.c_int, ctypes.c_int, word),
-        close=function("uc_close", word),
-        control=library["uc_ctl"],  # variadic: its arguments are wrapped at the call
-        start=function("uc_emu_start", word, ctypes.c_uint64, ctypes.c_uint64, ctypes.c_uint64, ctypes.c_size_t),
-        stop=function("uc_emu_stop", word),
-        read_register=function("uc_reg_read", word, ctypes.c_int, word),
-        write_register=function("uc_reg_write", word, ctypes.c_int, word),
-        read_registers=function("uc_reg_read_batch", word, word, word, ctypes.c_int),
-        write_registers=function("uc_reg_write_batch", word, word, word, ctypes.c_int),
-        map_pointer=function("uc_mem_map_ptr", word, ctypes.c_uint64, ctypes.c_size_t, ctypes.c_uint32, word),
-        map_io=function("uc_mmio_map", word, ctypes.c_uint64, ctypes.c_size_t, word, word, word, word),
-        protect=function("uc_mem_protect", word, ctypes.c_uint64, ctypes.c_size_t, ctypes.c_uint32),
-        add_hook=function("uc_hook_add", word, word, ctypes.c_int, word, word, ctypes.c_uint64, ctypes.c_uint64),
-        delete_hook=function("uc_hook_del", word, ctypes.c_size_t),
-        context_size=function("uc_context_size", word),
-        context_save=function("uc_context_save", word, word),
-        context_restore=function("uc_context_restore", word, word),
-        context_alloc=function("uc_context_alloc", word, word),
-        context_free=function("uc_context_free", word),
-        no_operation=no_operation,
-        version=str(getattr(unicorn, "__version__", "unknown")),
-    )
 
 
 class Register(Enum):
-    """A register, by the number that the library gives it (arm.h of Unicorn 2.1)."""
+    """A register of the core, by the number that the library gives it (arm.h of Unicorn 2.1)."""
 
     R0 = 66
     R1 = 67
@@ -175,68 +62,34 @@ class Register(Enum):
     PRIMASK = 123
 
 
-class Batch:
-    """A fixed list of registers, moved together."""
-
-    def __init__(self, library: Library, handle: int, registers: tuple[Register, ...]) -> None:
-        count = len(registers)
-        self.values = (ctypes.c_uint32 * count)()
-        self._numbers = (ctypes.c_int * count)(*(r.value for r in registers))
-        base = ctypes.addressof(self.values)
-        self._pointers = (ctypes.c_void_p * count)(*(base + 4 * n for n in range(count)))
-        self._count = count
-        self._handle = handle
-        self._read = library.read_registers
-        self._write = library.write_registers
-        self._at = (ctypes.addressof(self._numbers), ctypes.addressof(self._pointers))
-
-    def read(self) -> tuple[int, ...]:
-        """Return the registers' values, in order."""
-        self._read(self._handle, *self._at, self._count)
-        return tuple(self.values)
-
-    def write(self, values: tuple[int, ...]) -> None:
-        """Set the registers, in order."""
-        self.values[:] = list(values)
-        self._write(self._handle, *self._at, self._count)
-
-
-class RegisterFile:
-    """All registers, one at a time."""
-
-    def __init__(self, library: Library, handle: int) -> None:
-        self._handle = handle
-        self._library = library
-        self._value = ctypes.c_uint32()
-        self._at = ctypes.addressof(self._value)
-        self._read = library.read_register
-        self._write = library.write_register
-
-    def __getitem__(self, register: Register) -> int:
-        """Return one register."""
-        self._read(self._handle, register.value, self._at)
-        return self._value.value
-
-    def __setitem__(self, register: Register, value: int) -> None:
-        """Set one register."""
-        self._value.value = value
-        self._write(self._handle, register.value, self._at)
-
-    def general(self, number: int) -> int:
-        """Return R0 to R15 by number."""
-        return self[GENERAL[number]]
-
-    def batch(self, *registers: Register) -> Batch:
-        """Return a list of registers to be moved together."""
-        return Batch(self._library, self._handle, registers)
-
-
 #: R0 to R15 in order.
 GENERAL = (
     Register.R0, Register.R1, Register.R2, Register.R3, Register.R4, Register.R5, Register.R6, Register.R7,
     Register.R8, Register.R9, Register.R10, Register.R11, Register.R12, Register.SP, Register.LR, Register.PC,
 )  # fmt: skip
 
+#: Kind of a good access that is not a write.
+READ_ACCESS = 16
+#: Kinds of bad accesses.
+WRITE_UNMAPPED, FETCH_UNMAPPED, WRITE_PROTECTED, FETCH_PROTECTED = 20, 21, 22, 24
+
+#: (uc, offset, size, user) and (uc, offset, size, value, user): accesses to an I/O region.
+RawRead = Callable[[int, int, int, int], int]
+RawWrite = Callable[[int, int, int, int, int], None]
+#: Reads (offset, size) of an I/O region, writes (offset, size, value).
+ReadAccess = Callable[[int, int], int]
+WriteAccess = Callable[[int, int, int], None]
+#: Takes (address, size, value) written to read-only memory; False refuses it.
+WriteToReadOnly = Callable[[int, int, int], bool]
+#: (index, word) of each word of the registers that differs from a new core's.
+CoreSnapshot = tuple[tuple[int, int], ...]
+
+#: The scratch page. chosen: where an STM32F103C has nothing, outside the regions that never execute.
+SCRATCH_BASE, _SCRATCH_BYTES = 0x9FFF_FC00, 0x400
+#: CLREX, WFI.
+_SCRATCH_CODE = bytes.fromhex("bff32f8f 30bf")
+#: Address after it.
+SCRATCH_END = SCRATCH_BASE + len(_SCRATCH_CODE)
 
 # Not MODE_MCLASS: that silently makes a Cortex-M33.
 _ARCHITECTURE_ARM, _MODE_THUMB, _MODEL_CORTEX_M3 = 1, 16, 8
@@ -255,51 +108,51 @@ _CONTROL_DROP_CODE = 9 | 2 << 26 | 1 << 30
 _CONTROL_DROP_ALL_CODE = 10 | 1 << 30
 _CONTROL_TLB = 12 | 1 << 26 | 1 << 30
 _TLB_OF_HOOKS = 1
-#: No instruction stands at an odd address, so a run never ends there; the page is one that executes (`Scratch`).
+#: No instruction stands at an odd address, so a run never ends there; the page is the scratch page, which executes.
 _NOWHERE = 0x9FFF_FFFF
 
 #: Size, mode, architecture, level, flag and two pointers come before the registers of a context (uc_priv.h).
 _CONTEXT_HEADER_BYTES = 24 + 2 * ctypes.sizeof(ctypes.c_void_p)
-
 #: Registers of the other instruction set (X0 to X30, PC), which Unicorn leaves as it likes.
 _AARCH64_WORDS = range(16, 82)
 #: Syndrome, status, address and level of Unicorn's own last exception, which nothing reads again.
 _LAST_EXCEPTION_WORDS = range(756, 761)
 _UNSAVED_WORDS = {*_AARCH64_WORDS, *_LAST_EXCEPTION_WORDS}
 
-#: Kind of a good access that is not a write.
-READ_ACCESS = 16
-#: Kinds of bad accesses.
-WRITE_UNMAPPED, FETCH_UNMAPPED, WRITE_PROTECTED, FETCH_PROTECTED = 20, 21, 22, 24
+#: void (*)(uc, address, size, user): a basic block is about to run, or an instruction.
+BLOCK_CALLBACK = ctypes.CFUNCTYPE(None, ctypes.c_void_p, ctypes.c_uint64, ctypes.c_uint32, ctypes.c_void_p)
+#: void (*)(uc, intno, user)
+INTERRUPT_CALLBACK = ctypes.CFUNCTYPE(None, ctypes.c_void_p, ctypes.c_uint32, ctypes.c_void_p)
+#: bool (*)(uc, user)
+INVALID_CALLBACK = ctypes.CFUNCTYPE(ctypes.c_bool, ctypes.c_void_p, ctypes.c_void_p)
+#: bool (*)(uc, type, address, size, value, user)
+MEMORY_CALLBACK = ctypes.CFUNCTYPE(
+    ctypes.c_bool, ctypes.c_void_p, ctypes.c_int, ctypes.c_uint64, ctypes.c_int, ctypes.c_int64, ctypes.c_void_p
+)
+#: uint64_t (*)(uc, offset, size, user)
+READ_CALLBACK = ctypes.CFUNCTYPE(ctypes.c_uint64, ctypes.c_void_p, ctypes.c_uint64, ctypes.c_uint, ctypes.c_void_p)
+#: void (*)(uc, offset, size, value, user)
+WRITE_CALLBACK = ctypes.CFUNCTYPE(
+    None, ctypes.c_void_p, ctypes.c_uint64, ctypes.c_uint, ctypes.c_uint64, ctypes.c_void_p
+)
 
-#: (uc, offset, size, user) and (uc, offset, size, value, user): accesses to an I/O region.
-RawRead = Callable[[int, int, int, int], int]
-RawWrite = Callable[[int, int, int, int, int], None]
-
-#: Reads (offset, size) of an I/O region, writes (offset, size, value).
-ReadAccess = Callable[[int, int], int]
-WriteAccess = Callable[[int, int, int], None]
-#: Takes (address, size, value) written to read-only memory; False refuses it.
-WriteToReadOnly = Callable[[int, int, int], bool]
-
-#: (index, word) of each word of the registers that differs from a new core's.
-CoreSnapshot = tuple[tuple[int, int], ...]
-
+#: What C functions take here.
+_Argument = ctypes.c_void_p | ctypes.c_int | ctypes.c_uint32 | ctypes.c_uint64 | ctypes.c_size_t
 _Result = TypeVar("_Result")
 
 
-class Core:
-    """A bare Cortex-M3.
+class UnicornCore:
+    """A bare Cortex-M3: registers, memory maps, hooks and contexts.
 
     Raises:
         MissingDependencyError: Unicorn is not installed.
     """
 
     def __init__(self, on_failure: Callable[[BaseException], None]) -> None:
-        """Make a machine without memory.
+        """Make a core without memory, but for the scratch page.
 
         Args:
-            on_failure: notified of exceptions inside callbacks.
+            on_failure: called with each exception inside a callback.
         """
         self._library = library = load_library()
         self._on_failure = on_failure
@@ -317,6 +170,7 @@ class Core:
         self._buffers: list[object] = []
         weakref.finalize(self, _close, library, self._handle, self._context, self._buffers)
         self.registers = RegisterFile(library, self._handle)
+        self.map_memory(SCRATCH_BASE, ctypes.create_string_buffer(_SCRATCH_CODE, _SCRATCH_BYTES), "x")
 
     # Running.
 
@@ -327,6 +181,10 @@ class Core:
     def stop(self) -> None:
         """End the run; only from a hook, never from an access to I/O, which would be run again."""
         self._library.stop(self._handle)
+
+    def clear_exclusive(self) -> None:
+        """Run CLREX on the scratch page, between runs; the block hook is called for it."""
+        self.start(SCRATCH_BASE | 1)
 
     # Memory.
 
@@ -379,18 +237,18 @@ class Core:
 
     def on_interrupt(self, call: Callable[[int], None]) -> int:
         """Call (number) when the core raises an exception of Unicorn's own numbering; return the hook."""
-        return self._hook(_HOOK_INTERRUPT, self._pointer(INTERRUPT_CALLBACK(self._guard(call, None))), 1, 0)
+        return self._hook(_HOOK_INTERRUPT, self._pointer(INTERRUPT_CALLBACK(self._for_c(call, None))), 1, 0)
 
     def on_invalid(self, call: Callable[[], bool]) -> int:
         """Call at an instruction that Unicorn does not know; True goes on after it; return the hook."""
-        return self._hook(_HOOK_INVALID, self._pointer(INVALID_CALLBACK(self._guard(call, True))), 1, 0)
+        return self._hook(_HOOK_INVALID, self._pointer(INVALID_CALLBACK(self._for_c(call, True))), 1, 0)
 
     def on_bad_access(self, call: Callable[[int, int, int, int], bool], first: int = 1, last: int = 0) -> int:
         """Call (kind, address, size, value) at an access to no memory or against its protection; return the hook.
 
         True lets the access pass; first > last is everywhere.
         """
-        return self._hook(_HOOK_BAD_ACCESS, self._pointer(MEMORY_CALLBACK(self._guard(call, True))), first, last)
+        return self._hook(_HOOK_BAD_ACCESS, self._pointer(MEMORY_CALLBACK(self._for_c(call, True))), first, last)
 
     def on_access(self, first: int, last: int, call: Callable[[int, int, int, int], bool]) -> None:
         """Call (kind, address, size, value) before every access in a range; slow."""
@@ -401,11 +259,11 @@ class Core:
 
     def instruction_callback(self, call: Callable[[int], None]) -> ctypes.c_void_p:
         """Return what `hook_instructions` takes for a function of an instruction's address."""
-        return self._pointer(BLOCK_CALLBACK(self._guard(lambda address, _size: call(address), None)))
+        return self._pointer(BLOCK_CALLBACK(self._for_c(lambda address, _size: call(address), None)))
 
     def access_callback(self, call: Callable[[int, int, int, int], bool]) -> ctypes.c_void_p:
         """Return what `hook_accesses` takes for a function of (kind, address, size, value)."""
-        return self._pointer(MEMORY_CALLBACK(self._guard(call, True)))
+        return self._pointer(MEMORY_CALLBACK(self._for_c(call, True)))
 
     def hook_instructions(self, callback: ctypes.c_void_p, first: int, last: int) -> int:
         """Call before each instruction in a range, everywhere if first > last; return the hook."""
@@ -448,33 +306,33 @@ class Core:
         size = self._library.context_size(self._handle) - _CONTEXT_HEADER_BYTES
         return array("I", ctypes.string_at(self._context + _CONTEXT_HEADER_BYTES, size))
 
-    # Plumbing.
+    # Internals.
 
-    def _guard(self, call: Callable[..., _Result], default: _Result) -> Callable[..., _Result]:
+    def _for_c(self, call: Callable[..., _Result], default: _Result) -> Callable[..., _Result]:
         """Return a callback for C: it drops the handle before and the user pointer after the arguments."""
 
-        def guarded(_uc: int, *arguments: int) -> _Result:
+        def callback(_uc: int, *arguments: int) -> _Result:
             try:
                 return call(*arguments[:-1])
             except BaseException as error:  # noqa: BLE001 - see the module's text
                 self._on_failure(error)
                 return default
 
-        return guarded
+        return callback
 
     def _pointer(self, callback: "ctypes._FuncPointer") -> ctypes.c_void_p:
         self._keep.append(callback)
         return ctypes.cast(callback, ctypes.c_void_p)
 
-    # For an engine in C.
+    # For the native core.
 
     @property
     def handle(self) -> int:
-        """What the library calls this machine."""
+        """The library's handle of this core."""
         return self._handle
 
     @property
-    def library(self) -> Library:
+    def library(self) -> "UnicornLibrary":
         """The library itself."""
         return self._library
 
@@ -513,17 +371,73 @@ class Core:
             raise RuntimeError(f"Unicorn cannot {what}: error {error}")
 
 
-def _close(library: Library, handle: int, context: int, buffers: list[object]) -> None:
-    """Free a machine whose `Core` is gone."""
+def _close(library: "UnicornLibrary", handle: int, context: int, buffers: list[object]) -> None:
+    """Free what the library holds for a `UnicornCore` that is gone."""
     library.context_free(context)
     library.close(handle)
     buffers.clear()
 
 
-def guarded(
+class RegisterFile:
+    """All registers, one at a time."""
+
+    def __init__(self, library: "UnicornLibrary", handle: int) -> None:
+        self._handle = handle
+        self._library = library
+        self._value = ctypes.c_uint32()
+        self._at = ctypes.addressof(self._value)
+        self._read = library.read_register
+        self._write = library.write_register
+
+    def __getitem__(self, register: Register) -> int:
+        """Return one register."""
+        self._read(self._handle, register.value, self._at)
+        return self._value.value
+
+    def __setitem__(self, register: Register, value: int) -> None:
+        """Set one register."""
+        self._value.value = value
+        self._write(self._handle, register.value, self._at)
+
+    def general(self, number: int) -> int:
+        """Return R0 to R15 by number."""
+        return self[GENERAL[number]]
+
+    def batch(self, *registers: Register) -> "Batch":
+        """Return a list of registers to be moved together."""
+        return Batch(self._library, self._handle, registers)
+
+
+class Batch:
+    """A fixed list of registers, moved together."""
+
+    def __init__(self, library: "UnicornLibrary", handle: int, registers: tuple[Register, ...]) -> None:
+        count = len(registers)
+        self.values = (ctypes.c_uint32 * count)()
+        self._numbers = (ctypes.c_int * count)(*(r.value for r in registers))
+        base = ctypes.addressof(self.values)
+        self._pointers = (ctypes.c_void_p * count)(*(base + 4 * n for n in range(count)))
+        self._count = count
+        self._handle = handle
+        self._read = library.read_registers
+        self._write = library.write_registers
+        self._at = (ctypes.addressof(self._numbers), ctypes.addressof(self._pointers))
+
+    def read(self) -> tuple[int, ...]:
+        """Return the registers' values, in order."""
+        self._read(self._handle, *self._at, self._count)
+        return tuple(self.values)
+
+    def write(self, values: tuple[int, ...]) -> None:
+        """Set the registers, in order."""
+        self.values[:] = list(values)
+        self._write(self._handle, *self._at, self._count)
+
+
+def io_callbacks(
     read: ReadAccess, write: WriteAccess, is_denied: Callable[[], bool], fail: Callable[[BaseException], None]
 ) -> tuple[RawRead, RawWrite]:
-    """Return callbacks that look whether the access is to be made at all, and that never raise."""
+    """Return the callbacks of an I/O region: they make no access that is denied, and never raise."""
 
     def on_read(_uc: int, offset: int, count: int, _user: int) -> int:
         try:
@@ -542,23 +456,79 @@ def guarded(
     return on_read, on_write
 
 
-#: chosen: see the module's text.
-SCRATCH_BASE, _BYTES = 0x9FFF_FC00, 0x400
-#: CLREX, WFI.
-_CODE = bytes.fromhex("bff32f8f 30bf")
-_BLOCK = Block(SCRATCH_BASE, SCRATCH_BASE + len(_CODE), 0, 0, {})
+@dataclass(frozen=True, slots=True)
+class UnicornLibrary:
+    """The library, loaded by ctypes: each attribute is one C function (unicorn.h of Unicorn 2.1)."""
+
+    open: Callable[..., int]
+    close: Callable[..., int]
+    control: Callable[..., int]
+    start: Callable[..., int]
+    stop: Callable[..., int]
+    read_register: Callable[..., int]
+    write_register: Callable[..., int]
+    read_registers: Callable[..., int]
+    write_registers: Callable[..., int]
+    map_pointer: Callable[..., int]
+    map_io: Callable[..., int]
+    protect: Callable[..., int]
+    add_hook: Callable[..., int]
+    delete_hook: Callable[..., int]
+    context_size: Callable[..., int]
+    context_save: Callable[..., int]
+    context_restore: Callable[..., int]
+    context_alloc: Callable[..., int]
+    context_free: Callable[..., int]
+    #: A C function without effect, to be given as a callback that costs nothing.
+    no_operation: ctypes.c_void_p
+    version: str
 
 
-class Scratch:
-    """The page of one core."""
+def load_library() -> UnicornLibrary:
+    """Load Unicorn.
 
-    def __init__(self, core: Core, table: dict[int, Block]) -> None:
-        """Map it; `table` is where the engine looks blocks up."""
-        self._core = core
-        self._table = table
-        core.map_memory(SCRATCH_BASE, ctypes.create_string_buffer(_CODE, _BYTES), "x")
+    Raises:
+        MissingDependencyError: it is not installed.
+    """
+    try:
+        import unicorn
+        from unicorn.unicorn_py3.unicorn import uclib
+    except ImportError as error:
+        raise MissingDependencyError(
+            f"the BluePill needs the unicorn library: {error}", hint="pip install 'p2os[sim]'"
+        ) from error
+    # PyDLL keeps the interpreter lock: the engine calls back into Python at each
+    # block, and taking the lock there costs as much as the callback.
+    library = ctypes.PyDLL(uclib._name)  # noqa: SLF001 - the only place where the binding keeps the path
+    word = ctypes.c_void_p
 
-    def clear_exclusive(self) -> None:
-        """Run CLREX, between runs; the block hook is called for it."""
-        self._table[SCRATCH_BASE] = _BLOCK
-        self._core.start(SCRATCH_BASE | 1)
+    def function(name: str, *arguments: type[_Argument]) -> Callable[..., int]:
+        result = library[name]
+        result.argtypes = arguments
+        result.restype = ctypes.c_int
+        return cast("Callable[..., int]", result)
+
+    no_operation = ctypes.cast(library["uc_arch_supported"], ctypes.c_void_p)  # looks at a number, returns a flag
+    return UnicornLibrary(
+        open=function("uc_open", ctypes.c_int, ctypes.c_int, word),
+        close=function("uc_close", word),
+        control=library["uc_ctl"],  # variadic: its arguments are wrapped at the call
+        start=function("uc_emu_start", word, ctypes.c_uint64, ctypes.c_uint64, ctypes.c_uint64, ctypes.c_size_t),
+        stop=function("uc_emu_stop", word),
+        read_register=function("uc_reg_read", word, ctypes.c_int, word),
+        write_register=function("uc_reg_write", word, ctypes.c_int, word),
+        read_registers=function("uc_reg_read_batch", word, word, word, ctypes.c_int),
+        write_registers=function("uc_reg_write_batch", word, word, word, ctypes.c_int),
+        map_pointer=function("uc_mem_map_ptr", word, ctypes.c_uint64, ctypes.c_size_t, ctypes.c_uint32, word),
+        map_io=function("uc_mmio_map", word, ctypes.c_uint64, ctypes.c_size_t, word, word, word, word),
+        protect=function("uc_mem_protect", word, ctypes.c_uint64, ctypes.c_size_t, ctypes.c_uint32),
+        add_hook=function("uc_hook_add", word, word, ctypes.c_int, word, word, ctypes.c_uint64, ctypes.c_uint64),
+        delete_hook=function("uc_hook_del", word, ctypes.c_size_t),
+        context_size=function("uc_context_size", word),
+        context_save=function("uc_context_save", word, word),
+        context_restore=function("uc_context_restore", word, word),
+        context_alloc=function("uc_context_alloc", word, word),
+        context_free=function("uc_context_free", word),
+        no_operation=no_operation,
+        version=str(getattr(unicorn, "__version__", "unknown")),
+    )

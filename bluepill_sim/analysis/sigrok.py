@@ -5,9 +5,9 @@ Invariant: the same recording gives the same bytes.
 
 from pathlib import Path
 
+from bluepill_sim.analysis.probe import Probe, signals_in_order
+from bluepill_sim.analysis.sigrok_session import MOST_SAMPLES, RATE_NAMES, runs, write_session
 from bluepill_sim.errors import BluePillError
-from bluepill_sim.sight.probe import Probe, signals_in_order
-from bluepill_sim.sight.sigrok_session import MOST_SAMPLES, RATE_NAMES, runs, write_session
 from bluepill_sim.timing import NS_PER_S
 
 #: Sample rates to choose from, Hz, the finest first.

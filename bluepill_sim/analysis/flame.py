@@ -11,7 +11,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from html import escape
 
-from bluepill_sim.sight.cycle_profile import ASLEEP
+from bluepill_sim.analysis.cycle_profile import ASLEEP
 
 _WIDTH, _ROW, _MARGIN, _TOP = 1200, 20, 12, 52
 #: Narrower boxes are left out; texts need a little more room.

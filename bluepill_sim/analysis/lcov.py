@@ -7,8 +7,8 @@ Invariant: the same coverage gives the same bytes.
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
+from bluepill_sim.analysis.coverage import FileCoverage
 from bluepill_sim.errors import BluePillError
-from bluepill_sim.sight.coverage import FileCoverage
 
 
 def write_lcov(files: Sequence[FileCoverage], path: Path, *, sources: Path | None = None) -> None:

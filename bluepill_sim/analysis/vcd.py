@@ -8,9 +8,9 @@ import os
 from collections.abc import Iterator
 from pathlib import Path
 
+from bluepill_sim.analysis.edge_log import NativeEdgeLog
+from bluepill_sim.analysis.probe import Probe, signals_in_order, words_in_order
 from bluepill_sim.errors import BluePillError
-from bluepill_sim.sight.edge_log import NativeEdgeLog
-from bluepill_sim.sight.probe import Probe, signals_in_order, words_in_order
 
 _FIRST_CODE, _LAST_CODE = 33, 126
 _LETTERS = "01z"

@@ -7,9 +7,9 @@ the same as one that nobody observes.
 from collections.abc import Sequence
 from typing import Self
 
+from bluepill_sim.analysis.walk import Listener, Walk
 from bluepill_sim.board import BluePill
 from bluepill_sim.core import BlockRecorder
-from bluepill_sim.sight.walk import Listener, Walk
 
 #: chosen: rows that wait before they are handed on; a few megabytes.
 _CAPACITY = 1 << 15

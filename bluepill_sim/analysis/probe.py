@@ -17,11 +17,11 @@ import ctypes
 from collections.abc import Callable, MutableSequence
 from typing import TypeVar
 
+from bluepill_sim.analysis.edge_log import EdgeLog, NativeEdgeLog, PythonEdgeLog
 from bluepill_sim.board import BluePill
 from bluepill_sim.core.nvic import IRQ_NAMES
 from bluepill_sim.fabric.pins import Pin, PinBank
 from bluepill_sim.native.engine import NativeEngine
-from bluepill_sim.sight.edge_log import EdgeLog, NativeEdgeLog, PythonEdgeLog
 from bluepill_sim.timing import Nanos
 
 #: Nobody drives.

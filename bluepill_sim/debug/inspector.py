@@ -13,7 +13,7 @@ from itertools import accumulate
 from bluepill_sim.board import BluePill
 from bluepill_sim.core import Register
 from bluepill_sim.core.system_control import PPB_BASE, PPB_BYTES
-from bluepill_sim.debug.description import REGISTERS
+from bluepill_sim.debug.target_description import REGISTERS
 from bluepill_sim.errors import BluePillError
 from bluepill_sim.stm32f103 import BASES, FLASH_BASE, FLASH_BYTES_FITTED, name_at
 
