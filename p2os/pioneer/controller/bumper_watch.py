@@ -55,7 +55,7 @@ def _middle(segments: int) -> int:
 
 
 def stalls(context: Context, body: SensedState, now: Nanos) -> tuple[bool, bool]:
-    """Return whether the left and right wheel are told to be stalled."""
+    """Return whether the left and right wheel are reported as stalled."""
     switches, faults = context.devices.switches, context.faults
     both = now < context.bumper_watch.stalled_until or (switches.stop_button and switches.e_stall)
     left, right = context.motion.wheels_mps

@@ -1,17 +1,17 @@
 """What each client command does to the robot: one small function a command, and the table of them.
 
-Commands that are not in the table are unknown to this robot: they are counted
-and ignored, as a real one ignores them. A command that needs a number and comes
-without one is malformed and has no effect either.
+`apply` is the way in. Commands that are not in `HANDLERS` are unknown to this robot:
+they are counted and ignored, as a real one ignores them. A command that needs a
+number and comes without one is malformed and has no effect either. What a command
+leaves to be sent or restarted it only notes in the context; the controller does it.
 
-Source: the command tables of the Pioneer 2 and Pioneer 2/3 H8 manuals; `docs`
-says what each firmware does.
+Devices that a robot does not have answer as the firmware does without them: a
+GRIPPERpac of type 0, an empty playlist, an arm that is not connected.
 
-What each command does to the robot's devices: the table beside that of motion and sonar.
+Source: the command tables of the Pioneer 2 and Pioneer 2/3 H8 manuals
+(`p2os.protocol.command_table` has which firmware knows what).
 
-Source: the command tables of the manuals (`p2os.protocol.command_table`). Devices that a
-robot does not have answer as the firmware does without them: a GRIPPERpac of
-type 0, an empty playlist, an arm that is not connected.
+Invariant: a handler acts at once and within the context; none reads a clock or sends.
 """
 
 import math
@@ -30,86 +30,134 @@ from p2os.timing import NS_PER_MS, Nanos
 
 Handler = Callable[[Context, Command, Nanos], bool]
 
+_C = CommandNumber
+
 #: A duration of SAY (M2: 20 ms).
 SAY_UNIT_MS = 20
 #: Least and most of SONARCYCLE, ms (H8 manual).
 SONAR_CYCLE_MS = (2, 120)
+#: What moves the robot, once its motors are on.
+MOTION_COMMANDS = frozenset({_C.MOVE, _C.ROTATE, _C.VEL, _C.HEAD, _C.DHEAD, _C.RVEL, _C.DCHEAD, _C.VEL2})
+#: Working gains and calibrations: reported by CONFIG, without effect here.
+KEPT = {
+    _C.ROTKP: "rotkp", _C.ROTKV: "rotkv", _C.ROTKI: "rotki", _C.TRANSKP: "transkp", _C.TRANSKV: "transkv",
+    _C.TRANSKI: "transki", _C.REVCOUNT: "revcount", _C.DRIFTFACTOR: "driftfactor", _C.TICKSMM: "ticksmm",
+    _C.GYROCALCW: "gyrocw", _C.GYROCALCCW: "gyroccw",
+}  # fmt: skip
+#: Of things that this robot does not have; taken in silence, as the firmware does.
+NOT_FITTED = (
+    _C.DOCK, _C.MOVINGBLINK, _C.CALCOMP, _C.ARM_POWER, _C.ARM_AUTOPARK, _C.ARM_GRIPPARK, _C.POWER_PC, _C.POWER_LRF,
+    _C.POWER_5V, _C.POWER_12V, _C.POWER_AUX_PC, _C.POWER_TOUCHSCREEN, _C.POWER_PTZ, _C.POWER_AUDIO, _C.POWER_LRF2,
+    _C.ARM_INIT, _C.ARM_CHECK, _C.ARM_HOME, _C.ARM_PARK, _C.ARM_POS, _C.ARM_SPEED, _C.ARM_STOP, _C.LCD,
+)  # fmt: skip
 
 
-def signed16(command: Command) -> int | None:
-    """Return a command's number as the robot reads it, or None when it has none.
+class Effect(Enum):
+    """What has become of a command."""
 
-    A positive argument from 32768 up is a negative number that a client has
-    packed itself: no robot is told to drive at 32 m/s.
+    #: It acts.
+    DONE = "done"
+    #: This robot does not know it; ignored.
+    UNKNOWN = "unknown"
+    #: Its number or text is missing; ignored.
+    MALFORMED = "malformed"
+    #: It is taken, and acts when the motors are on.
+    WAITS = "motors are off (ENABLE 1 turns them on)"
+
+
+#: What has no effect.
+IGNORED = frozenset({Effect.UNKNOWN, Effect.MALFORMED})
+
+
+def apply(context: Context, command: Command, now: Nanos) -> Effect:
+    """Execute a command on the robot's parts, and return what has become of it."""
+    handler = HANDLERS.get(command.number)
+    if handler is None or not is_known(command.number, context):
+        return Effect.UNKNOWN
+    if not handler(context, command, now):
+        return Effect.MALFORMED
+    is_to_move = command.number in MOTION_COMMANDS and command.argument != 0
+    return Effect.WAITS if is_to_move and not context.motors_enabled else Effect.DONE
+
+
+def is_known(which: int, context: Context) -> bool:
+    """Tell whether this firmware has a command; where no manual settles it, it has."""
+    row = BY_NUMBER.get(which)
+    return context.lenient or row is None or row.is_known_to(context.profile) is not False
+
+
+# Motion and sonar ----------------------------------------------------------------------
+
+
+def _nothing(_context: Context) -> None:
+    """Feed the watchdog, which any packet does."""
+
+
+def _enable(context: Context, value: int) -> None:
+    """Switch the motors, which stay off while the red button is pressed."""
+    if value and context.devices.switches.stop_button:
+        context.notes.append(("motors stay off", "the stop button is pressed"))
+        return
+    context.motion.power(on=value != 0)
+
+
+def _vel2(context: Context, command: Command, _now: Nanos) -> bool:
+    """Set both wheels: the first byte on the wire is the right one (H8 manual, command 32).
+
+    ARCOS makes a translation and a rotation of them, each within its limit.
     """
-    value = command.argument
-    if not isinstance(value, int):
-        return None
-    return value - 0x10000 if 0x8000 <= value <= 0xFFFF else value
+    if not isinstance(command.argument, int):
+        return False
+    right, left = command.signed_bytes
+    drive = context.motion.set_wheels if context.profile is not Profile.ARCOS else context.motion.set_wheels_as_turn
+    drive(left * context.vel2_divisor, right * context.vel2_divisor)
+    return True
 
 
-def number(act: Callable[[Context, int], None]) -> Handler:
-    """Return a handler of a command whose argument is one number."""
-
-    def handler(context: Context, command: Command, _now: Nanos) -> bool:
-        value = signed16(command)
-        if value is None:
-            return False
-        act(context, value)
-        return True
-
-    return handler
+def _head(context: Context, degrees: int) -> None:
+    zero = round(math.degrees(context.reckoning.zero_rad) * UDEG_PER_DEG)
+    context.motion.turn_to(zero + degrees * UDEG_PER_DEG)
 
 
-def plain(act: Callable[[Context], None]) -> Handler:
-    """Return a handler of a command whose argument, if any, does not matter."""
-
-    def handler(context: Context, _command: Command, _now: Nanos) -> bool:
-        act(context)
-        return True
-
-    return handler
+def _dhead(context: Context, degrees: int) -> None:
+    context.motion.turn_to(context.heading_udeg + degrees * UDEG_PER_DEG)
 
 
-def _timed(act: Callable[[Context, int, Nanos], None]) -> Handler:
-    def handler(context: Context, command: Command, now: Nanos) -> bool:
-        value = signed16(command)
-        if value is None:
-            return False
-        act(context, value, now)
-        return True
-
-    return handler
+def _dchead(context: Context, degrees: int) -> None:
+    goal = context.motion.heading_goal_udeg
+    context.motion.turn_to((context.heading_udeg if goal is None else goal) + degrees * UDEG_PER_DEG)
 
 
-def _two_bytes(act: Callable[[Context, int, int], None]) -> Handler:
-    """Return a handler of two bytes, the first on the wire first, the sign undone before they part."""
-
-    def handler(context: Context, command: Command, _now: Nanos) -> bool:
-        if not isinstance(command.argument, int):
-            return False
-        act(context, *command.two_bytes)
-        return True
-
-    return handler
+def _move(context: Context, mm: int) -> None:
+    context.motion.move_to(context.travel_nm + mm * NM_PER_MM)
 
 
-def _text(act: Callable[[Context, bytes], None]) -> Handler:
-    def handler(context: Context, command: Command, _now: Nanos) -> bool:
-        if not isinstance(command.argument, bytes):
-            return False
-        act(context, command.argument)
-        return True
+def _limit(change: Callable[[MotionLimits, int], MotionLimits]) -> Handler:
+    """Return a handler that changes the limits of the motion."""
 
-    return handler
+    def act(context: Context, value: int) -> None:
+        context.motion.limits = change(context.motion.limits, value)
 
-
-def _request(extra: Extra) -> Handler:
-    return number(lambda context, value: context.requests.set(extra, value))
+    return _number(act)
 
 
-def _once(extra: Extra) -> Handler:
-    return plain(lambda context: context.requests.set(extra, 1))
+def _sonar(context: Context, value: int, now: Nanos) -> None:
+    context.sonar.switch(on=value != 0, now=now)
+
+
+def _polling(context: Context, command: Command, now: Nanos) -> bool:
+    """Set the firing order; on the wire sonar are numbered from 1."""
+    if not isinstance(command.argument, bytes):
+        return False
+    context.sonar.poll([sonar - 1 for sonar in command.argument], now)
+    return True
+
+
+def _config(context: Context) -> None:
+    context.config_wanted = True
+
+
+# Devices and packets -------------------------------------------------------------------
 
 
 def _digout(context: Context, low: int, high: int) -> None:
@@ -166,7 +214,7 @@ def _aux_baud(port: int) -> Handler:
         if 0 <= value < len(BAUD_RATES):
             context.devices.aux[port - 1].baud = BAUD_RATES[value]
 
-    return number(act)
+    return _number(act)
 
 
 def _aux_send(port: int) -> Handler:
@@ -174,7 +222,7 @@ def _aux_send(port: int) -> Handler:
 
 
 def _aux_ask(port: int) -> Handler:
-    return number(lambda context, value: context.devices.aux[port - 1].request(value))
+    return _number(lambda context, value: context.devices.aux[port - 1].request(value))
 
 
 def _sonar_cycle(context: Context, value: int, now: Nanos) -> None:
@@ -202,33 +250,116 @@ def _charge(context: Context, value: int) -> None:
     context.notes.append(("charger", "deployed" if value else "retracted"))
 
 
+# Handlers by what their command's argument is ------------------------------------------
+
+
+def _signed16(command: Command) -> int | None:
+    """Return a command's number as the robot reads it, or None when it has none.
+
+    A positive argument from 32768 up is a negative number that a client has
+    packed itself: no robot is told to drive at 32 m/s.
+    """
+    value = command.argument
+    if not isinstance(value, int):
+        return None
+    return value - 0x10000 if 0x8000 <= value <= 0xFFFF else value
+
+
+def _number(act: Callable[[Context, int], None]) -> Handler:
+    """Return a handler of a command whose argument is one number."""
+    return _timed(lambda context, value, _now: act(context, value))
+
+
+def _plain(act: Callable[[Context], None]) -> Handler:
+    """Return a handler of a command whose argument, if any, does not matter."""
+
+    def handler(context: Context, _command: Command, _now: Nanos) -> bool:
+        act(context)
+        return True
+
+    return handler
+
+
+def _timed(act: Callable[[Context, int, Nanos], None]) -> Handler:
+    """Return a handler of a number that acts from this moment on."""
+
+    def handler(context: Context, command: Command, now: Nanos) -> bool:
+        value = _signed16(command)
+        if value is None:
+            return False
+        act(context, value, now)
+        return True
+
+    return handler
+
+
+def _two_bytes(act: Callable[[Context, int, int], None]) -> Handler:
+    """Return a handler of two bytes, the first on the wire first, the sign undone before they part."""
+
+    def handler(context: Context, command: Command, _now: Nanos) -> bool:
+        if not isinstance(command.argument, int):
+            return False
+        act(context, *command.two_bytes)
+        return True
+
+    return handler
+
+
+def _text(act: Callable[[Context, bytes], None]) -> Handler:
+    def handler(context: Context, command: Command, _now: Nanos) -> bool:
+        if not isinstance(command.argument, bytes):
+            return False
+        act(context, command.argument)
+        return True
+
+    return handler
+
+
+def _request(extra: Extra) -> Handler:
+    return _number(lambda context, value: context.requests.set(extra, value))
+
+
+def _once(extra: Extra) -> Handler:
+    return _plain(lambda context: context.requests.set(extra, 1))
+
+
 def _kept(name: str) -> Handler:
     """Take a number that changes nothing here: gains, calibrations, lamps, power of things that are not fitted."""
-    return number(lambda context, value: context.kept.__setitem__(name, value))
+    return _number(lambda context, value: context.kept.__setitem__(name, value))
 
 
-_C = CommandNumber
-#: Working gains and calibrations: told back by CONFIG, felt by nothing here.
-KEPT = {
-    _C.ROTKP: "rotkp", _C.ROTKV: "rotkv", _C.ROTKI: "rotki", _C.TRANSKP: "transkp", _C.TRANSKV: "transkv",
-    _C.TRANSKI: "transki", _C.REVCOUNT: "revcount", _C.DRIFTFACTOR: "driftfactor", _C.TICKSMM: "ticksmm",
-    _C.GYROCALCW: "gyrocw", _C.GYROCALCCW: "gyroccw",
-}  # fmt: skip
-#: Of things that this robot does not have; taken in silence, as the firmware does.
-NOT_FITTED = (
-    _C.DOCK, _C.MOVINGBLINK, _C.CALCOMP, _C.ARM_POWER, _C.ARM_AUTOPARK, _C.ARM_GRIPPARK, _C.POWER_PC, _C.POWER_LRF,
-    _C.POWER_5V, _C.POWER_12V, _C.POWER_AUX_PC, _C.POWER_TOUCHSCREEN, _C.POWER_PTZ, _C.POWER_AUDIO, _C.POWER_LRF2,
-    _C.ARM_INIT, _C.ARM_CHECK, _C.ARM_HOME, _C.ARM_PARK, _C.ARM_POS, _C.ARM_SPEED, _C.ARM_STOP, _C.LCD,
-)  # fmt: skip
-
-DEVICE_HANDLERS: Mapping[int, Handler] = {
+HANDLERS: Mapping[int, Handler] = {
+    # motion and sonar
+    _C.PULSE: _plain(_nothing),
+    _C.OPEN: _plain(_nothing),  # of a session that is open already
+    _C.POLLING: _polling,
+    _C.ENABLE: _number(_enable),
+    _C.SETA: _limit(MotionLimits.with_acceleration),
+    _C.SETV: _limit(MotionLimits.with_max_velocity),
+    _C.SETO: _plain(lambda context: context.reckoning.set_origin()),
+    _C.MOVE: _number(_move),
+    _C.ROTATE: _number(lambda context, value: context.motion.set_rotation(value)),
+    _C.SETRV: _limit(MotionLimits.with_max_rotation),
+    _C.VEL: _number(lambda context, value: context.motion.set_velocity(value)),
+    _C.HEAD: _number(_head),
+    _C.DHEAD: _number(_dhead),
+    _C.CONFIG: _plain(_config),
+    _C.RVEL: _number(lambda context, value: context.motion.set_rotation(value)),
+    _C.DCHEAD: _number(_dchead),
+    _C.SETRA: _limit(MotionLimits.with_rotational_acceleration),
+    _C.SONAR: _timed(_sonar),
+    _C.STOP: _plain(lambda context: context.motion.stop()),
+    _C.VEL2: _vel2,
+    _C.E_STOP: _plain(lambda context: context.motion.stop_now()),
+    _C.QSTOP: _plain(lambda context: context.motion.stop_now()),
+    # devices and packets
     _C.SAY: _text(_say),
     _C.JOYREQUEST: _request(Extra.JOYSTICK),
     _C.ENCODER: _request(Extra.ENCODER),
     _C.DIGOUT: _two_bytes(_digout),
     _C.GRIPPER: _timed(lambda context, value, now: context.devices.gripper.command(value, now)),
-    _C.ADSEL: number(lambda context, value: context.devices.pins.select(value)),
-    _C.GRIPPERVAL: number(lambda context, value: setattr(context.devices.gripper, "value", value)),
+    _C.ADSEL: _number(lambda context, value: context.devices.pins.select(value)),
+    _C.GRIPPERVAL: _number(lambda context, value: setattr(context.devices.gripper, "value", value)),
     _C.GRIPREQUEST: _request(Extra.GRIPPER),
     _C.IOREQUEST: _request(Extra.IO),
     _C.PTUPOS: _two_bytes(lambda context, width, port: context.devices.pins.set_servo(port, width)),
@@ -238,167 +369,26 @@ DEVICE_HANDLERS: Mapping[int, Handler] = {
     _C.GETAUX2: _aux_ask(2),
     _C.TTY4: _aux_send(3),
     _C.GETAUX3: _aux_ask(3),
-    _C.BUMPSTALL: number(_bump_stall),
-    _C.TCM2: number(_tcm2),
-    _C.JOYDRIVE: number(_joydrive),
+    _C.BUMPSTALL: _number(_bump_stall),
+    _C.TCM2: _number(_tcm2),
+    _C.JOYDRIVE: _number(_joydrive),
     _C.SONARCYCLE: _timed(_sonar_cycle),
-    _C.HOSTBAUD: number(_hostbaud),
+    _C.HOSTBAUD: _number(_hostbaud),
     _C.AUX1BAUD: _aux_baud(1),
     _C.AUX2BAUD: _aux_baud(2),
     _C.AUX3BAUD: _aux_baud(3),
-    _C.E_STALL: number(_e_stall),
+    _C.E_STALL: _number(_e_stall),
     _C.GYRO: _timed(_gyro),
     _C.BATTERYINFO: _request(Extra.BATTERY),
-    _C.CHARGE: number(_charge),
+    _C.CHARGE: _number(_charge),
     _C.ARM_INFO: _once(Extra.ARM_INFO),
     _C.ARM_STATUS: _request(Extra.ARM),
-    _C.SOUND: number(_sound),
+    _C.SOUND: _number(_sound),
     _C.PLAYLIST: _once(Extra.PLAYLIST),
-    _C.SOUNDTOG: number(_buzzer),
-    _C.BATTEST: number(_battest),
-    _C.RESET: plain(lambda context: _restart(context, "RESET")),
-    _C.MAINTENANCE: plain(lambda context: _restart(context, "MAINTENANCE")),
-    **{number_: _kept(name) for number_, name in KEPT.items()},
-    **dict.fromkeys(NOT_FITTED, plain(lambda _context: None)),
+    _C.SOUNDTOG: _number(_buzzer),
+    _C.BATTEST: _number(_battest),
+    _C.RESET: _plain(lambda context: _restart(context, "RESET")),
+    _C.MAINTENANCE: _plain(lambda context: _restart(context, "MAINTENANCE")),
+    **{number: _kept(name) for number, name in KEPT.items()},
+    **dict.fromkeys(NOT_FITTED, _plain(lambda _context: None)),
 }
-
-
-class Effect(Enum):
-    """What has become of a command."""
-
-    #: It acts.
-    DONE = "done"
-    #: This robot does not know it; ignored.
-    UNKNOWN = "unknown"
-    #: Its number or text is missing; ignored.
-    MALFORMED = "malformed"
-    #: It is taken, and acts when the motors are on.
-    WAITS = "motors are off (ENABLE 1 turns them on)"
-
-
-#: What has no effect.
-IGNORED = frozenset({Effect.UNKNOWN, Effect.MALFORMED})
-
-
-def apply(context: Context, command: Command, now: Nanos) -> Effect:
-    """Let a command act."""
-    handler = HANDLERS.get(command.number)
-    if handler is None or not is_known(command.number, context):
-        return Effect.UNKNOWN
-    if not handler(context, command, now):
-        return Effect.MALFORMED
-    is_to_move = command.number in MOTION_COMMANDS and command.argument != 0
-    return Effect.WAITS if is_to_move and not context.motors_enabled else Effect.DONE
-
-
-def is_known(which: int, context: Context) -> bool:
-    """Tell whether this firmware has a command; where no manual settles it, it has."""
-    row = BY_NUMBER.get(which)
-    return context.lenient or row is None or row.is_known_to(context.profile) is not False
-
-
-def _nothing(_context: Context) -> None:
-    """Feed the watchdog, which any packet does."""
-
-
-def _enable(context: Context, value: int) -> None:
-    """Switch the motors, which stay off while the red button is pressed."""
-    if value and context.devices.switches.stop_button:
-        context.notes.append(("motors stay off", "the stop button is pressed"))
-        return
-    context.motion.power(on=value != 0)
-
-
-def _vel2(context: Context, command: Command, _now: Nanos) -> bool:
-    """Set both wheels: the first byte on the wire is the right one (H8 manual, command 32).
-
-    ARCOS makes a translation and a rotation of them, each within its limit.
-    """
-    if not isinstance(command.argument, int):
-        return False
-    right, left = command.signed_bytes
-    drive = context.motion.set_wheels if context.profile is not Profile.ARCOS else context.motion.set_wheels_as_turn
-    drive(left * context.vel2_divisor, right * context.vel2_divisor)
-    return True
-
-
-def _head(context: Context, degrees: int) -> None:
-    zero = round(math.degrees(context.reckoning.zero_rad) * UDEG_PER_DEG)
-    context.motion.turn_to(zero + degrees * UDEG_PER_DEG)
-
-
-def _dhead(context: Context, degrees: int) -> None:
-    context.motion.turn_to(context.heading_udeg + degrees * UDEG_PER_DEG)
-
-
-def _dchead(context: Context, degrees: int) -> None:
-    goal = context.motion.heading_goal_udeg
-    context.motion.turn_to((context.heading_udeg if goal is None else goal) + degrees * UDEG_PER_DEG)
-
-
-def _move(context: Context, mm: int) -> None:
-    context.motion.move_to(context.travel_nm + mm * NM_PER_MM)
-
-
-def _limit(change: Callable[[MotionLimits, int], MotionLimits]) -> Handler:
-    """Return a handler that changes the limits of the motion."""
-
-    def act(context: Context, value: int) -> None:
-        context.motion.limits = change(context.motion.limits, value)
-
-    return number(act)
-
-
-def _sonar(context: Context, command: Command, now: Nanos) -> bool:
-    value = signed16(command)
-    if value is None:
-        return False
-    context.sonar.switch(on=value != 0, now=now)
-    return True
-
-
-def _polling(context: Context, command: Command, now: Nanos) -> bool:
-    """Set the firing order; on the wire sonar are numbered from 1."""
-    if not isinstance(command.argument, bytes):
-        return False
-    context.sonar.poll([number - 1 for number in command.argument], now)
-    return True
-
-
-def _config(context: Context) -> None:
-    context.config_wanted = True
-
-
-HANDLERS: Mapping[int, Handler] = {
-    CommandNumber.PULSE: plain(_nothing),
-    CommandNumber.OPEN: plain(_nothing),  # of a session that is open already
-    CommandNumber.POLLING: _polling,
-    CommandNumber.ENABLE: number(_enable),
-    CommandNumber.SETA: _limit(MotionLimits.with_acceleration),
-    CommandNumber.SETV: _limit(MotionLimits.with_max_velocity),
-    CommandNumber.SETO: plain(lambda context: context.reckoning.set_origin()),
-    CommandNumber.MOVE: number(_move),
-    CommandNumber.ROTATE: number(lambda context, value: context.motion.set_rotation(value)),
-    CommandNumber.SETRV: _limit(MotionLimits.with_max_rotation),
-    CommandNumber.VEL: number(lambda context, value: context.motion.set_velocity(value)),
-    CommandNumber.HEAD: number(_head),
-    CommandNumber.DHEAD: number(_dhead),
-    CommandNumber.CONFIG: plain(_config),
-    CommandNumber.RVEL: number(lambda context, value: context.motion.set_rotation(value)),
-    CommandNumber.DCHEAD: number(_dchead),
-    CommandNumber.SETRA: _limit(MotionLimits.with_rotational_acceleration),
-    CommandNumber.SONAR: _sonar,
-    CommandNumber.STOP: plain(lambda context: context.motion.stop()),
-    CommandNumber.VEL2: _vel2,
-    CommandNumber.E_STOP: plain(lambda context: context.motion.stop_now()),
-    CommandNumber.QSTOP: plain(lambda context: context.motion.stop_now()),
-    **DEVICE_HANDLERS,
-}
-
-#: What moves the robot, once its motors are on.
-MOTION_COMMANDS = frozenset(
-    {
-        CommandNumber.MOVE, CommandNumber.ROTATE, CommandNumber.VEL, CommandNumber.HEAD, CommandNumber.DHEAD,
-        CommandNumber.RVEL, CommandNumber.DCHEAD, CommandNumber.VEL2,
-    }
-)  # fmt: skip

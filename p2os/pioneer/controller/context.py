@@ -1,4 +1,7 @@
-"""The parts of a robot that commands act on."""
+"""The parts of a robot that commands act on, saved and restored together.
+
+No command is carried out here (`commands`), and nothing is sent (`reporter`).
+"""
 
 import math
 from dataclasses import dataclass, field, replace
@@ -20,7 +23,7 @@ class BumperWatch:
 
     #: When it looks next.
     next_ns: Nanos = 0
-    #: Until when both wheels are told to be stalled by a bumper.
+    #: Until when both wheels are reported as stalled by a bumper.
     stalled_until: Nanos = -1
 
 
@@ -35,7 +38,7 @@ class Context:
     devices: Devices = field(default_factory=Devices)
     requests: Requests = field(default_factory=Requests)
     profile: Profile = Profile.P2OS
-    #: Obeys what any family knows.
+    #: Executes what any family knows.
     lenient: bool = False
     #: The joystick's full throw.
     joystick_mm_s: int = 0
@@ -55,7 +58,7 @@ class Context:
     baud_wanted: int | None = None
     #: RESET or MAINTENANCE.
     restart_wanted: str | None = None
-    #: To be told: (what in a word or two, detail).
+    #: Events to be notified: (what in a word or two, detail).
     notes: list[tuple[str, str]] = field(default_factory=list)
 
     @property
@@ -96,7 +99,7 @@ class Context:
             "kept": tuple(sorted(self.kept.items())),
             "faults": self.faults.copy(),
             "bumper_watch": replace(self.bumper_watch),
-            "chance": self.random_source.snapshot(),
+            "random_source": self.random_source.snapshot(),
             "drifted_at_mm": self.drifted_at_mm,
         }
 
@@ -110,5 +113,5 @@ class Context:
         self.requests.restore(snapshot["requests"])
         self.kept = dict(snapshot["kept"])
         self.faults, self.bumper_watch = snapshot["faults"].copy(), replace(snapshot["bumper_watch"])
-        self.random_source.restore(snapshot["chance"])
+        self.random_source.restore(snapshot["random_source"])
         self.drifted_at_mm = snapshot["drifted_at_mm"]

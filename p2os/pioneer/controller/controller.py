@@ -1,35 +1,37 @@
 """The robot's own firmware, as a passive state machine above a body.
 
 Bytes of a client go in, bytes of the robot come out, and the body is stepped in
-between: handshake, motion commands, odometry, sonar, watchdog.
+between: handshake, motion commands, odometry, sonar, watchdog. It is no I/O layer:
+it reads no clock and opens no line (`p2os.pioneer.serve` does), and what the single
+parts do is theirs: `motion`, `commands`, `reporter`, `sender`, `faults`.
 
 Theory of operation
 -------------------
-The `Connection` (server role) speaks the handshake and keeps the watchdog; its
+The `Connection` (server role) runs the handshake and keeps the watchdog; its
 events drive the rest. While open, a standard packet (SIP) goes out every cycle,
 counted from OPEN. Motors are off on each new connection; a client turns them on
 with ENABLE. When no valid packet comes for the watchdog's time the wheels slow
 down to a stand; the next packet releases them and they ramp back to the last
-set speed, unless that packet says otherwise. CLOSE, and a host that sees its
+set speed, unless that packet commands otherwise. CLOSE, and a host that sees its
 client vanish (`hang_up`), take the power from the wheels at once.
 
-The line has a speed (`sender`, `line`): a packet is made when the line is free
-for it. A reset (RESET, a brown-out) takes the power from the wheels and leaves
-the controller deaf for its boot time; then it says so (packet 0xFF) and waits
-for SYNC0. MAINTENANCE leaves it deaf for good, until it is rebooted.
+The line has a speed (`sender`): a packet is made when the line is free for it. A
+reset (RESET, a brown-out) takes the power from the wheels, and the controller
+receives nothing for its boot time; then it announces itself (packet 0xFF) and waits
+for SYNC0. After MAINTENANCE it receives nothing until it is rebooted.
 
-What a client sets (limits, sonar order) is lost when it closes, as the H8
-manual says of AROS 1.3 and later; earlier firmware kept it until power-down.
+Devices and limits start from the FLASH. What a client sets of them (limits, sonar
+order) is lost when it closes, as the H8 manual states for AROS 1.3 and later;
+earlier firmware kept it until power-down.
+
+Source: Pioneer 2 and Pioneer 2/3 H8 manuals, chapters on client commands, packets
+and the watchdog.
 
 Invariant: at time t the body stands at its first step boundary at or after t, so
 the result does not depend on how often anybody calls `advance_to`.
-
-What a controller is doing, for whoever looks, and what is saved of it.
-
-What a robot starts with, and comes back to when its session ends: devices and limits, from its FLASH.
 """
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import cast
 
@@ -39,13 +41,14 @@ from p2os.pioneer.controller.context import BumperWatch, Context
 from p2os.pioneer.controller.dead_reckoning import DeadReckoning
 from p2os.pioneer.controller.fault_actions import FaultTarget, clear_now, inject_now, injected_now
 from p2os.pioneer.controller.faults import read_fault
+from p2os.pioneer.controller.flash import Flash
 from p2os.pioneer.controller.live_inputs import apply_input
 from p2os.pioneer.controller.motion import Motion, MotionLimits
 from p2os.pioneer.controller.packet_requests import Requests
 from p2os.pioneer.controller.ports import Body, WheelAngles
 from p2os.pioneer.controller.reporter import Reporter
 from p2os.pioneer.controller.sender import Sender
-from p2os.pioneer.controller.settings import ControllerSettings, SonarPerSip
+from p2os.pioneer.controller.settings import ControllerSettings
 from p2os.pioneer.devices.battery import Battery
 from p2os.pioneer.devices.fitted import Devices
 from p2os.pioneer.random_source import RandomSource
@@ -69,6 +72,20 @@ from p2os.protocol.profiles import Profile
 from p2os.robots.parameters import RobotParameters
 from p2os.timing import NS_PER_MS, NS_PER_S, Nanos, Reached
 
+#: (now in ns, what happened in a word or two, detail).
+EventCallback = Callable[[Nanos, str, str], None]
+
+#: chosen: from a reset to the notice that the controller is there again.
+BOOT_NS: Nanos = 500 * NS_PER_MS
+#: chosen: keeps a full battery above the half of a decivolt, so that it does not flicker.
+BATTERY_MARGIN_V = 0.04
+#: FLASH parameter → the limit that it sets.
+LIMITS = {
+    "transveltop": "top_velocity_mm_s", "rotveltop": "top_rotation_deg_s", "transvelmax": "max_velocity_mm_s",
+    "rotvelmax": "max_rotation_deg_s", "transacc": "accel_mm_s2", "transdecel": "decel_mm_s2",
+    "rotacc": "rot_accel_deg_s2", "rotdecel": "rot_decel_deg_s2",
+}  # fmt: skip
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ControllerState:
@@ -81,7 +98,7 @@ class ControllerState:
     #: Rim-speed set-points of this moment, after the ramps, in m/s.
     left_setpoint_mps: float
     right_setpoint_mps: float
-    #: What the robot believes of its pose, since the last SETO.
+    #: What the robot estimates its pose to be, since the last SETO.
     x_mm: float
     y_mm: float
     heading_rad: float
@@ -96,58 +113,6 @@ class ControllerState:
     packets_dropped: int
     #: The words of every fault that lasts.
     injected: tuple[str, ...] = ()
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class ControllerSnapshot:
-    """All that decides a controller's future; `own` is what `Pioneer` itself counts."""
-
-    body: object
-    own: tuple[object, ...]
-    complaints: tuple[str, ...]
-    connection: object
-    sender: object
-    context: object
-
-
-#: chosen: keeps a fresh battery above the half of a decivolt, so that it does not flicker.
-BATTERY_MARGIN_V = 0.04
-#: FLASH parameter → the limit that it sets.
-LIMITS = {
-    "transveltop": "top_velocity_mm_s", "rotveltop": "top_rotation_deg_s", "transvelmax": "max_velocity_mm_s",
-    "rotvelmax": "max_rotation_deg_s", "transacc": "accel_mm_s2", "transdecel": "decel_mm_s2",
-    "rotacc": "rot_accel_deg_s2", "rotdecel": "rot_decel_deg_s2",
-}  # fmt: skip
-
-
-def new_devices(settings: ControllerSettings) -> Devices:
-    """Return the devices of a robot that was just switched on."""
-    flash = settings.flash
-    devices = Devices(
-        battery=Battery.resting_at(
-            settings.battery_decivolts / 10 + BATTERY_MARGIN_V, settings.errors.power.battery_resistance_ohm
-        )
-    )
-    devices.gripper.kind = flash.number("gripper")
-    devices.gyro.is_fitted = flash.number("hasgyro") > 0 and settings.profile is not Profile.P2OS
-    devices.switches.e_stall = settings.profile is not Profile.P2OS
-    return devices
-
-
-def limits_of(parameters: RobotParameters, values: Mapping[str, int | str]) -> MotionLimits:
-    """Return the limits with which a robot starts: those of its file, but for what its FLASH says."""
-    limits = MotionLimits.of(parameters)
-    found = {mine: value for name, mine in LIMITS.items() if isinstance(value := values.get(name), int)}
-    return replace(limits, **found)
-
-
-__all__ = ["ControllerSettings", "ControllerState", "EventCallback", "Pioneer", "SonarPerSip"]
-
-#: (now in ns, what happened in a word or two, detail).
-EventCallback = Callable[[Nanos, str, str], None]
-
-#: chosen: from a reset to the notice that the controller is there again.
-BOOT_NS: Nanos = 500 * NS_PER_MS
 
 
 class Pioneer:
@@ -174,14 +139,14 @@ class Pioneer:
         self._sender = Sender(self.settings.baud)
         flash, odometry = self.settings.flash, self.settings.errors.odometry
         self._context = Context(
-            motion=Motion(limits_of(parameters, flash.values), track_mm=parameters.track_mm, dt_ns=body.dt_ns),
+            motion=Motion(_limits_of(parameters, flash), track_mm=parameters.track_mm, dt_ns=body.dt_ns),
             reckoning=DeadReckoning(
                 wheel_diameter_m=parameters.body.wheel_diameter_m, track_mm=parameters.track_mm,
                 left_wheel=odometry.left_wheel, right_wheel=odometry.right_wheel,
             ),
             sonar=self._new_sonar(),
             vel2_divisor=parameters.vel2_divisor,
-            devices=new_devices(self.settings),
+            devices=_new_devices(self.settings),
             profile=self.settings.profile,
             lenient=self.settings.lenient,
             joystick_mm_s=flash.number("joyvel"),
@@ -189,7 +154,7 @@ class Pioneer:
             low_battery_decivolts=flash.number("lowbattery"),
             random_source=RandomSource(self.settings.seed),
         )  # fmt: skip
-        self._reporter = Reporter(self._context, body, self._sender, parameters, self.settings, self._tell)
+        self._reporter = Reporter(self._context, body, self._sender, parameters, self.settings, self._notify)
         self._context.reckoning.begin(body.state.left_angle_rad, body.state.right_angle_rad)
 
     @property
@@ -235,7 +200,7 @@ class Pioneer:
         if self._boot_at is not None:
             return
         if self._context.faults.corrupts_line:
-            data = self._context.faults.spoil(data, self._context.random_source, to_robot=True)
+            data = self._context.faults.corrupt(data, self._context.random_source, to_robot=True)
         self._connection.receive(data, now)
         self._take_events(now)
 
@@ -253,11 +218,11 @@ class Pioneer:
 
     def take_output(self) -> list[bytes]:
         """Return the frames to send, one item each, oldest first, and forget them."""
-        output = self._sender.take_output()
-        if self._context.faults.corrupts_line:
-            spoilt = (self._context.faults.spoil(data, self._context.random_source, to_robot=False) for data in output)
-            return [data for data in spoilt if data]
-        return output
+        output, context = self._sender.take_output(), self._context
+        if not context.faults.corrupts_line:
+            return output
+        corrupted = (context.faults.corrupt(data, context.random_source, to_robot=False) for data in output)
+        return [data for data in corrupted if data]
 
     def receive_aux(self, port: int, data: bytes, now: Nanos) -> None:
         """Take bytes of the device at an AUX port, 1 to 3."""
@@ -270,7 +235,7 @@ class Pioneer:
         return self._context.devices.aux[port - 1].take_outgoing()
 
     def do(self, text: str, now: Nanos) -> None:
-        """Inject or clear a fault, or press something: "fault WORDS", "clear WORDS", or the words of a live input.
+        """Inject or clear a fault, or operate something: "fault WORDS", "clear WORDS", or the words of a live input.
 
         Raises:
             UsageError: The words mean nothing; nothing has changed then.
@@ -280,14 +245,14 @@ class Pioneer:
         fault = read_fault(words, sonar=sonar, complete=first == "fault") if first in {"fault", "clear"} else None
         self.advance_to(now)
         if fault is not None and first == "fault":
-            self._tell(now, first, words)
+            self._notify(now, first, words)
             inject_now(self._fault_target(now), fault)
         else:
             if fault is None:
                 apply_input(self._context, text)
             else:
                 clear_now(self._fault_target(now), fault)
-            self._tell(now, first, words)
+            self._notify(now, first, words)
         self._report_notes(now)
 
     def reboot(self, now: Nanos, *, notice: str = "reboot") -> None:
@@ -296,7 +261,7 @@ class Pioneer:
         self._restart(now, notice, boot_ns=BOOT_NS)
 
     def next_deadline(self) -> Nanos | None:
-        """Return when bytes will come out or the watchdog will bite; None when neither ever will."""
+        """Return when bytes will come out or the watchdog will expire; None when neither ever will."""
         if self._boot_at is not None:
             return self._boot_at if self._boot_at >= 0 else None
         sip = None if self._sip_due is None else self._sender.turn_after(self._sip_due)
@@ -313,9 +278,12 @@ class Pioneer:
 
     def snapshot(self) -> object:
         """Return all that decides the future, body included, as a plain value."""
-        return ControllerSnapshot(
+        return _Snapshot(
             body=self.body.snapshot(),
-            own=(self._body_now, self._sip_due, self._boot_at, self._ignored),
+            body_now=self._body_now,
+            sip_due=self._sip_due,
+            boot_at=self._boot_at,
+            ignored=self._ignored,
             complaints=self._complaints,
             connection=self._connection.snapshot(),
             sender=self._sender.snapshot(),
@@ -324,12 +292,10 @@ class Pioneer:
 
     def restore(self, snapshot: object) -> None:
         """Put back what `snapshot` returned."""
-        saved = cast("ControllerSnapshot", snapshot)
+        saved = cast("_Snapshot", snapshot)
         self.body.restore(saved.body)
-        self._body_now, self._sip_due, self._boot_at, self._ignored = cast(
-            "tuple[Nanos, Nanos | None, Nanos | None, int]", saved.own
-        )
-        self._complaints = saved.complaints
+        self._body_now, self._sip_due, self._boot_at = saved.body_now, saved.sip_due, saved.boot_at
+        self._ignored, self._complaints = saved.ignored, saved.complaints
         self._connection.restore(saved.connection)
         self._sender.restore(saved.sender)
         self._context.restore(saved.context)
@@ -365,7 +331,7 @@ class Pioneer:
             self._reporter.sample_gyro()
         watch_due = is_watching(context) and context.bumper_watch.next_ns <= now
         if watch_due and check_bumpers(context, self.body.state, self.settings.flash, now):
-            self._tell(now, "bumper stall", "the robot drove against a pressed bumper")
+            self._notify(now, "bumper stall", "the robot drove against a pressed bumper")
         ping = context.sonar.next_ping()
         if ping is not None and ping.at <= now:
             self._reporter.fire(ping.numbers)
@@ -379,7 +345,7 @@ class Pioneer:
             return
         context, body = self._context, self.body
         motion, step, advance = context.motion, body.step, context.reckoning.advance
-        if self._context.faults.left_blocked or self._context.faults.right_blocked:
+        if context.faults.left_blocked or context.faults.right_blocked:
             step = self._step_blocked
         steps = -((self._body_now - limit) // body.dt_ns)
         self._body_now += steps * body.dt_ns
@@ -398,6 +364,8 @@ class Pioneer:
         faults = self._context.faults
         return self.body.step(0.0 if faults.left_blocked else left_mps, 0.0 if faults.right_blocked else right_mps)
 
+    # Parts that are made anew -----------------------------------------------------------
+
     def _new_connection(self) -> Connection:
         identity = Identity(
             name=self.settings.name, robot_class=self.parameters.robot_class, subclass=self.parameters.subclass
@@ -415,9 +383,7 @@ class Pioneer:
         )
 
     def _fault_target(self, now: Nanos) -> FaultTarget:
-        return FaultTarget(
-            self._context.faults, self._context, lambda notice: self._restart(now, notice, boot_ns=BOOT_NS)
-        )
+        return FaultTarget(self._context, lambda notice: self._restart(now, notice, boot_ns=BOOT_NS))
 
     # Events of the connection ----------------------------------------------------------
 
@@ -429,7 +395,7 @@ class Pioneer:
     def _take(self, event: Event, now: Nanos) -> None:
         match event:
             case Synchronised():
-                self._tell(now, "synchronised", "")
+                self._notify(now, "synchronised", "")
             case Opened():
                 self._open(now)
             case Closed():
@@ -438,10 +404,10 @@ class Pioneer:
                 self._execute(event.command, now)
             case WatchdogExpired():
                 self._context.motion.hold()
-                self._tell(now, "watchdog expired", f"no packet for {self.settings.watchdog_ns / NS_PER_S:g} s")
+                self._notify(now, "watchdog expired", f"no packet for {self.settings.watchdog_ns / NS_PER_S:g} s")
             case WatchdogRevived():
                 self._context.motion.release()
-                self._tell(now, "watchdog revived", "the last set speeds hold again")
+                self._notify(now, "watchdog revived", "the last set speeds hold again")
             case _:
                 pass  # noise is counted in `stats`
 
@@ -454,17 +420,17 @@ class Pioneer:
         self._sender.line.begin_session(now)
         self._reporter.check_battery(now)
         self._sip_due = now + self.settings.sip_period_ns
-        self._tell(now, "opened", "")
+        self._notify(now, "opened", "")
 
     def _close(self, now: Nanos, detail: str) -> None:
         context = self._context
         context.motion.power(on=False)
         context.motion.release()
-        context.motion.limits = limits_of(self.parameters, self.settings.flash.values)
+        context.motion.limits = _limits_of(self.parameters, self.settings.flash)
         context.sonar = self._new_sonar()
         context.requests = Requests(dropped=context.requests.dropped)
         context.kept.clear()
-        devices, defaults = context.devices, new_devices(self.settings)
+        devices, defaults = context.devices, _new_devices(self.settings)
         devices.gyro, devices.compass = defaults.gyro, defaults.compass
         devices.joystick.may_drive = devices.joystick.drives = devices.switches.battery_reported = False
         devices.switches.bump_stall, devices.switches.e_stall = 0, defaults.switches.e_stall
@@ -475,7 +441,7 @@ class Pioneer:
         self._complaints = ()
         was_open, self._sip_due = self._sip_due is not None, None
         if was_open:
-            self._tell(now, "closed", detail)
+            self._notify(now, "closed", detail)
 
     def _restart(self, now: Nanos, notice: str, *, boot_ns: Nanos | None) -> None:
         """Take the power from everything; None waits for a reboot."""
@@ -483,43 +449,45 @@ class Pioneer:
         self._sender.clear()
         self._close(now, notice)
         context, keep = self._context, self._context.devices
-        context.devices = new_devices(self.settings)
+        context.devices = _new_devices(self.settings)
         context.devices.battery, context.devices.pins, context.devices.joystick = keep.battery, keep.pins, keep.joystick
         context.devices.switches.stop_button = keep.switches.stop_button
         context.devices.gripper.has_thing = keep.gripper.has_thing
         context.reckoning.set_origin()
         self._boot_at = -1 if boot_ns is None else now + boot_ns
-        self._tell(now, "controller down", notice)
+        self._notify(now, "controller down", notice)
 
     def _boot(self, now: Nanos) -> None:
         if self._boot_at is None or not 0 <= self._boot_at <= now:
             return
         self._boot_at = None
         self._sender.answer([ResetNotice().to_frame().to_bytes()], now)
-        self._tell(now, "controller up", "it says so with packet 0xFF and waits for SYNC0")
+        self._notify(now, "controller up", "it says so with packet 0xFF and waits for SYNC0")
+
+    # Commands and events ---------------------------------------------------------------
 
     def _execute(self, command: Command, now: Nanos) -> None:
-        context, had_power, asked = self._context, self._context.motors_enabled, self._context.motion.asked
+        context, had_power, set_before = self._context, self._context.motors_enabled, self._context.motion.setpoints
         effect = apply(context, command, now)
-        if context.motion.asked != asked and self.body.state.stalled_left and self.body.state.stalled_right:
+        if context.motion.setpoints != set_before and self.body.state.stalled_left and self.body.state.stalled_right:
             context.motion.ramp_from_zero()  # chosen: else a client cannot back off a wall before it gives up
         if effect in IGNORED:
             self._ignored += 1
         complaint = f"{command.name}: {effect.value}"
-        if effect is not Effect.DONE and complaint not in self._complaints:  # a client may repeat itself
+        if effect is not Effect.DONE and complaint not in self._complaints:  # once a session
             self._complaints += (complaint,)
-            self._tell(now, "command ignored" if effect in IGNORED else "command waits", complaint)
+            self._notify(now, "command ignored" if effect in IGNORED else "command waits", complaint)
         if context.motors_enabled is not had_power:
-            self._tell(now, "motors", "on" if context.motors_enabled else "off")
+            self._notify(now, "motors", "on" if context.motors_enabled else "off")
         self._report_notes(now)
         self._reporter.check_aux_requests()
         if context.baud_wanted is not None:
             self._sender.line.set_baud(context.baud_wanted)
-            self._tell(now, "host baud", f"{context.baud_wanted} bit/s")
+            self._notify(now, "host baud", f"{context.baud_wanted} bit/s")
             context.baud_wanted = None
         if context.config_wanted:
             context.config_wanted = False
-            if self._connection.is_open:  # else the client has asked and closed in one breath
+            if self._connection.is_open:  # else the client has asked and closed at the same instant
                 self._connection.send(self._reporter.configuration(), now)
         if context.restart_wanted is not None:
             notice, context.restart_wanted = context.restart_wanted, None
@@ -528,8 +496,43 @@ class Pioneer:
     def _report_notes(self, now: Nanos) -> None:
         notes, self._context.notes = self._context.notes, []
         for what, detail in notes:
-            self._tell(now, what, detail)
+            self._notify(now, what, detail)
 
-    def _tell(self, now: Nanos, what: str, detail: str) -> None:
+    def _notify(self, now: Nanos, what: str, detail: str) -> None:
         if self.on_event is not None:
             self.on_event(now, what, detail)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Snapshot:
+    """All that decides a controller's future."""
+
+    body: object
+    body_now: Nanos
+    sip_due: Nanos | None
+    boot_at: Nanos | None
+    ignored: int
+    complaints: tuple[str, ...]
+    connection: object
+    sender: object
+    context: object
+
+
+def _new_devices(settings: ControllerSettings) -> Devices:
+    """Return the devices of a robot that was just switched on."""
+    flash = settings.flash
+    devices = Devices(
+        battery=Battery.resting_at(
+            settings.battery_decivolts / 10 + BATTERY_MARGIN_V, settings.errors.power.battery_resistance_ohm
+        )
+    )
+    devices.gripper.kind = flash.number("gripper")
+    devices.gyro.is_fitted = flash.number("hasgyro") > 0 and settings.profile is not Profile.P2OS
+    devices.switches.e_stall = settings.profile is not Profile.P2OS
+    return devices
+
+
+def _limits_of(parameters: RobotParameters, flash: Flash) -> MotionLimits:
+    """Return the limits with which a robot starts: those of its file, but for what its FLASH sets."""
+    found = {limit: value for name, limit in LIMITS.items() if isinstance(value := flash.values.get(name), int)}
+    return replace(MotionLimits.of(parameters), **found)

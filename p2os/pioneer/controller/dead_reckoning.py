@@ -1,4 +1,4 @@
-"""Dead reckoning: what the robot believes of its own pose, from its wheels alone.
+"""Dead reckoning: the robot's estimate of its own pose, from its wheels alone.
 
 It uses the track of the robot's parameters, so a body with another track, a
 wheel that slips or a push shows as the odometry error that it is. The encoders'
@@ -41,8 +41,8 @@ class DeadReckoning:
 
         Args:
             wheel_diameter_m: What the body's wheels measure.
-            track_mm: What the firmware believes.
-            left_wheel: True size of the left wheel over what the firmware believes; the right one alike.
+            track_mm: What the firmware assumes.
+            left_wheel: True size of the left wheel over what the firmware assumes; the right one alike.
             right_wheel: The same.
         """
         self._left_radius_mm = wheel_diameter_m * 500 / left_wheel
@@ -93,7 +93,7 @@ class DeadReckoning:
         self.right_mm += right_mm
 
     def drift(self, turn_rad: float) -> None:
-        """Believe to have turned by a little more than the wheels say."""
+        """Turn the estimate by a little more than the wheels have turned."""
         self.turned_rad += turn_rad
 
     def set_origin(self) -> None:

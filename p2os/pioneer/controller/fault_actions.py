@@ -1,18 +1,21 @@
-"""What breaking and mending does: one small function a fault, and the table of them."""
+"""What injecting and clearing a fault does: one small function each, and the two tables of them.
+
+`faults` reads the words and holds what is injected; a fault of a device (battery,
+bumper, stop button) is kept in the device's own state.
+"""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 from p2os.errors import UsageError
 from p2os.pioneer.controller.context import Context
-from p2os.pioneer.controller.faults import MOMENTARY, Fault, Faults
+from p2os.pioneer.controller.faults import MOMENTARY, Fault
 
 
 @dataclass(frozen=True, slots=True)
 class FaultTarget:
     """What faults act on."""
 
-    faults: Faults
     context: Context
     #: Starts the controller anew; the argument says why.
     restart: Callable[[str], None]
@@ -22,12 +25,12 @@ Act = Callable[[FaultTarget, Fault], None]
 
 
 def inject_now(target: FaultTarget, fault: Fault) -> None:
-    """Break something."""
+    """Inject a fault."""
     _INJECT[fault.name](target, fault)
 
 
 def clear_now(target: FaultTarget, fault: Fault) -> None:
-    """Clear it; what is not injected stays so.
+    """Clear a fault; one that is not injected stays so.
 
     Raises:
         UsageError: It happens once, so that there is nothing to clear.
@@ -56,32 +59,32 @@ def injected_now(context: Context) -> tuple[str, ...]:
     return tuple(fault.text for fault in found)
 
 
-def _sonar(target: FaultTarget, fault: Fault) -> None:
-    target.faults.sonar[fault.number - 1] = (fault.name.removeprefix("sonar-"), fault.value)
+def _inject_sonar(target: FaultTarget, fault: Fault) -> None:
+    target.context.faults.sonar[fault.number - 1] = (fault.name.removeprefix("sonar-"), fault.value)
 
 
 def _clear_sonar(target: FaultTarget, fault: Fault) -> None:
-    target.faults.sonar.pop(fault.number - 1, None)
+    target.context.faults.sonar.pop(fault.number - 1, None)
 
 
-def _wheel(*, blocked: bool) -> Act:
-    return lambda target, fault: setattr(target.faults, f"{fault.side}_blocked", blocked)
+def _block_wheel(*, blocked: bool) -> Act:
+    return lambda target, fault: setattr(target.context.faults, f"{fault.side}_blocked", blocked)
 
 
-def _loose(*, is_loose: bool) -> Act:
+def _loosen_connector(*, is_loose: bool) -> Act:
     def act(target: FaultTarget, _fault: Fault) -> None:
-        target.faults.is_loose = is_loose
-        target.faults.gap_in = target.faults.gap_out = 0
+        target.context.faults.is_loose = is_loose
+        target.context.faults.gap_in = target.context.faults.gap_out = 0
 
     return act
 
 
-def _noise(target: FaultTarget, fault: Fault) -> None:
-    target.faults.bit_error_rate = fault.value
+def _inject_noise(target: FaultTarget, fault: Fault) -> None:
+    target.context.faults.bit_error_rate = fault.value
 
 
-def _quiet(target: FaultTarget, _fault: Fault) -> None:
-    target.faults.bit_error_rate = 0.0
+def _clear_noise(target: FaultTarget, _fault: Fault) -> None:
+    target.context.faults.bit_error_rate = 0.0
 
 
 def _pretend_voltage(target: FaultTarget, fault: Fault) -> None:
@@ -93,12 +96,12 @@ def _clear_voltage(target: FaultTarget, _fault: Fault) -> None:
     target.context.devices.battery.pretended_decivolts = None
 
 
-def _press(target: FaultTarget, _fault: Fault) -> None:
+def _press_stop(target: FaultTarget, _fault: Fault) -> None:
     target.context.devices.switches.stop_button = True
     target.context.motion.power(on=False)
 
 
-def _release(target: FaultTarget, _fault: Fault) -> None:
+def _release_stop(target: FaultTarget, _fault: Fault) -> None:
     target.context.devices.switches.stop_button = False
 
 
@@ -119,26 +122,26 @@ def _release_bumper(target: FaultTarget, fault: Fault) -> None:
 
 
 _INJECT: Mapping[str, Act] = {
-    "sonar-stuck": _sonar,
-    "sonar-noisy": _sonar,
-    "sonar-dead": _sonar,
-    "wheel-blocked": _wheel(blocked=True),
-    "loose-connector": _loose(is_loose=True),
-    "line-noise": _noise,
+    "sonar-stuck": _inject_sonar,
+    "sonar-noisy": _inject_sonar,
+    "sonar-dead": _inject_sonar,
+    "wheel-blocked": _block_wheel(blocked=True),
+    "loose-connector": _loosen_connector(is_loose=True),
+    "line-noise": _inject_noise,
     "low-battery": _pretend_voltage,
     "brown-out": lambda target, _fault: target.restart("brown-out"),
     "reboot": lambda target, _fault: target.restart("reboot"),
-    "stop-button": _press,
+    "stop-button": _press_stop,
     "bumper": _press_bumper,
 }
 _CLEAR: Mapping[str, Act] = {
     "sonar-stuck": _clear_sonar,
     "sonar-noisy": _clear_sonar,
     "sonar-dead": _clear_sonar,
-    "wheel-blocked": _wheel(blocked=False),
-    "loose-connector": _loose(is_loose=False),
-    "line-noise": _quiet,
+    "wheel-blocked": _block_wheel(blocked=False),
+    "loose-connector": _loosen_connector(is_loose=False),
+    "line-noise": _clear_noise,
     "low-battery": _clear_voltage,
-    "stop-button": _release,
+    "stop-button": _release_stop,
     "bumper": _release_bumper,
 }

@@ -3,11 +3,12 @@
 A fault is a line of words, the same in a scenario and at the control line of
 `p2os serve`; `FAULTS` lists them. `clear` with the same first words ends it.
 
-    sonar-stuck 3 1.2        sonar 3 (from 1) says 1.2 m whatever comes
-    line-noise 0.001         one bit in a thousand is turned, both ways
+    sonar-stuck 3 1.2        sonar 3 (from 1) gives 1.2 m whatever is there
+    line-noise 0.001         one bit in a thousand is flipped, both ways
 
-Line faults spoil whole bytes on their way; the random streams are the robot's
-own, so that a run with faults repeats.
+Line faults corrupt bytes on their way; the random streams are the robot's
+own, so that a run with faults repeats. What injecting one does to the robot is in
+`fault_actions`.
 """
 
 from collections.abc import Mapping
@@ -24,13 +25,13 @@ GAP_PROBABILITY = 0.02
 
 #: First word → (the others, what happens).
 FAULTS: Mapping[str, tuple[tuple[str, ...], str]] = {
-    "sonar-stuck": (("NUMBER", "METRES"), "a sonar, counted from 1, says always the same"),
+    "sonar-stuck": (("NUMBER", "METRES"), "a sonar, counted from 1, always gives the same range"),
     "sonar-noisy": (("NUMBER", "METRES"), "a sonar errs by this standard deviation"),
-    "sonar-dead": (("NUMBER",), "a sonar hears nothing"),
+    "sonar-dead": (("NUMBER",), "a sonar gets no echo"),
     "wheel-blocked": (("SIDE",), "the left or right wheel does not turn; its motor stalls"),
     "loose-connector": ((), "runs of bytes are lost, both ways"),
-    "line-noise": (("RATE",), "so many of the bits are turned, both ways"),
-    "low-battery": (("VOLTS",), "the voltmeter says so much"),
+    "line-noise": (("RATE",), "so many of the bits are flipped, both ways"),
+    "low-battery": (("VOLTS",), "the voltmeter shows so much"),
     "brown-out": ((), "the supply dips: the controller starts anew, motors off"),
     "reboot": ((), "the controller starts anew"),
     "stop-button": ((), "the red button is pressed: motors off until it is cleared and ENABLE comes"),
@@ -39,6 +40,8 @@ FAULTS: Mapping[str, tuple[tuple[str, ...], str]] = {
 SIDES = {"wheel-blocked": ("left", "right"), "bumper": ("front", "rear")}
 #: Happen once: there is nothing to clear.
 MOMENTARY = frozenset({"brown-out", "reboot"})
+#: First words of a line in earlier releases → today's.
+RENAMED_WORDS = {"mend": "clear"}
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,6 +58,16 @@ class Fault:
         """The words that make it."""
         value = {"NUMBER": str(self.number), "SEGMENT": str(self.number), "SIDE": self.side}
         return " ".join([self.name, *(value.get(word, f"{self.value:g}") for word in FAULTS[self.name][0])])
+
+
+def refuse_renamed_word(word: str) -> None:
+    """Refuse a line that begins with a word of an earlier release, by naming today's.
+
+    Raises:
+        UsageError: It is such a word.
+    """
+    if word in RENAMED_WORDS:
+        raise UsageError(f"{word} is called {RENAMED_WORDS[word]}: {RENAMED_WORDS[word]} all")
 
 
 def read_fault(text: str, *, sonar: int, complete: bool = True) -> Fault:
@@ -109,7 +122,7 @@ def _with(fault: Fault, word: str, given: str, usage: str, sonar: int) -> Fault:
 
 @dataclass(slots=True)
 class Faults:
-    """What is broken now, as far as it is not a device's own state."""
+    """What is injected now, as far as it is not a device's own state."""
 
     #: 0-based sonar → (stuck, noisy or dead; value).
     sonar: dict[int, tuple[str, float]] = field(default_factory=dict)
@@ -123,10 +136,10 @@ class Faults:
 
     @property
     def corrupts_line(self) -> bool:
-        """Whether bytes suffer on their way."""
+        """Whether bytes are lost or changed on their way."""
         return self.is_loose or self.bit_error_rate > 0
 
-    def spoil(self, data: bytes, random_source: RandomSource, *, to_robot: bool) -> bytes:
+    def corrupt(self, data: bytes, random_source: RandomSource, *, to_robot: bool) -> bytes:
         """Return what is left of bytes that pass the line."""
         stream = random_source.of("line in" if to_robot else "line out")
         gap = self.gap_in if to_robot else self.gap_out

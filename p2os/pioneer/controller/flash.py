@@ -1,4 +1,4 @@
-"""The robot's FLASH: what CONFIG tells and what a file may set, by the names of the CONFIGpac.
+"""The robot's FLASH: what CONFIG reports and what a file may set, by the names of the CONFIGpac.
 
     [flash]
     name = "Wilma"
@@ -7,7 +7,7 @@
     hostbaud = 2          # 0 9600, 1 19200, 2 38400, 3 57600, 4 115200
     transvelmax = 500     # mm/s
 
-Values that no source gives for a Pioneer 2-DX are chosen and say so.
+Values that no source gives for a Pioneer 2-DX are marked as chosen.
 
 Source: Pioneer 2/3 H8 manual and Pioneer 3 manual, CONFIGpac tables.
 """
@@ -28,9 +28,9 @@ BAUD_RATES = (9600, 19200, 38400, 57600, 115200)
 #: What the robot file says; a FLASH file cannot make another robot of it.
 FIXED = frozenset({"robot_class", "subclass", "four_motors", "frontsonar", "rearsonar"})
 FIELDS_OF_PROFILE = {Profile.P2OS: P2OS_FIELDS, Profile.AROS: AROS_1_8_FIELDS, Profile.ARCOS: ARCOS_FIELDS}
-#: chosen: the version of each family's firmware that this robot says it has.
+#: chosen: the version of each family's firmware that this robot reports.
 VERSIONS = {Profile.P2OS: "1.M", Profile.AROS: "1.8", Profile.ARCOS: "2.0"}
-#: Segments of a bumper ring that the packet can tell.
+#: Segments of a bumper ring that fit the packet.
 MOST_SEGMENTS = 7
 
 DEFAULTS: Mapping[str, int | str] = {
@@ -58,7 +58,7 @@ DEFAULTS: Mapping[str, int | str] = {
     # chosen: speeds at the joystick's full throw.
     "joyvel": 500,
     "joyrvel": 60,
-    # Gains are told and kept; the body's motors have their own.
+    # Gains are reported and kept; the body's motors have their own.
     "rotkp": 20,
     "rotkv": 20,
     "rotki": 0,

@@ -1,18 +1,19 @@
-"""What a person can do to a robot that runs: the words of the control line, and what they do.
+"""What an operator can do to a running robot's own inputs: the words of the control line, and what they do.
 
-fault sonar-stuck 3 1.2       break something (`p2os.pioneer.controller.faults` lists what)
-clear sonar-stuck 3            and clear it
 joystick 512 1023 1           stick to the front with the button held
 analog 2 512                  half the full scale on analog port 2
 digital 255                   all digital inputs high
 thing on                      something stands between the gripper's paddles
 charger on                    the charger is plugged in
+
+Faults are injected and cleared by lines of their own (`faults`).
 """
 
 from collections.abc import Callable, Mapping
 
 from p2os.errors import UsageError
 from p2os.pioneer.controller.context import Context
+from p2os.pioneer.controller.faults import refuse_renamed_word
 
 #: First word → (the others, what it means).
 INPUTS: Mapping[str, tuple[tuple[str, ...], str]] = {
@@ -28,12 +29,13 @@ ON_OFF = {"on": 1, "off": 0}
 
 
 def apply_input(context: Context, text: str) -> None:
-    """Do what the words say.
+    """Set the input that the words name.
 
     Raises:
         UsageError: They are no input, or a word is missing or out of range.
     """
     name, *rest = text.split() or [""]
+    refuse_renamed_word(name)
     if name not in INPUTS:
         raise UsageError(f"no input {name!r}", hint=f"inputs: {', '.join(INPUTS)}")
     words = INPUTS[name][0]

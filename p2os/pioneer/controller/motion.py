@@ -242,7 +242,7 @@ class Motion:
         return self._wheels
 
     @property
-    def asked(self) -> tuple[object, ...]:
+    def setpoints(self) -> tuple[object, ...]:
         """Return what was set last, to compare with what is set next."""
         first, second = self._first, self._second
         return self.mode, first.set_speed, first.goal, second.set_speed, second.goal

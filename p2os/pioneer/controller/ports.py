@@ -1,4 +1,4 @@
-"""What the controller needs of a body: to turn its wheels, and to hear what they and the sonar say."""
+"""What the controller needs of a body: to turn its wheels, and to read their sensors and the sonar."""
 
 from collections.abc import Sequence
 from typing import Protocol
@@ -7,7 +7,7 @@ from p2os.timing import Nanos
 
 
 class WheelAngles(Protocol):
-    """What the encoders say after a step."""
+    """What the encoders read after a step."""
 
     @property
     def left_angle_rad(self) -> float:
@@ -82,11 +82,11 @@ class Body(Protocol):
         ...
 
     def step(self, left_mps: float, right_mps: float) -> WheelAngles:
-        """Live one step with these rim-speed set-points."""
+        """Make one step with these rim-speed set-points."""
         ...
 
     def ranges(self, numbers: Sequence[int]) -> Sequence[float]:
-        """Return the range that each sonar hears now, in metres; the longest range where there is no echo."""
+        """Return the range that each sonar measures now, in metres; the longest range where there is no echo."""
         ...
 
     def snapshot(self) -> object:

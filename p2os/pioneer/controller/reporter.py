@@ -1,15 +1,18 @@
-"""What the robot senses and says, once a packet or once a ping: the controller's mouth.
+"""What the robot reports of itself: the standard packet, the extra packets, the CONFIGpac.
 
-It looks at the body, the devices and the random streams, and hands frames to the
-sender; when any of that happens is the controller's.
+The reporter reads the body, the devices and the random streams, once a packet or once a
+ping, and hands frames to the sender; when any of that happens is the controller's.
+It decides nothing about the line but one thing: an extra packet that does not fit
+before the next standard one is dropped.
 
-What the robot says of itself: the standard packet.
+Values that no part of this model knows are those of the one packet captured from a
+P2-DX: bumpers that are not fitted read as floating inputs, the analog port is number
+5, the heading set-point is the heading.
 
-Values that no part of this model knows are those of the one packet captured
-from a P2-DX: bumpers that are not fitted read as floating inputs, the analog
-port is number 5, the heading set-point is the heading.
+Source: Pioneer 2 and Pioneer 2/3 H8 manuals, tables of the SIP and of the extra packets.
 
-What the extra packets say: one small function a packet, and the table of them.
+Invariant: sensors are sampled before the packet that carries them, and a sonar reading
+is in one packet only.
 """
 
 import math
@@ -26,7 +29,7 @@ from p2os.pioneer.controller.packet_requests import Extra
 from p2os.pioneer.controller.ports import Body, WheelState
 from p2os.pioneer.controller.sender import Sender
 from p2os.pioneer.controller.settings import ControllerSettings
-from p2os.pioneer.sonar.errors import hear
+from p2os.pioneer.sonar.errors import measure_ranges
 from p2os.pioneer.sonar.schedule import raw_range
 from p2os.protocol.config_packet import ConfigPacket
 from p2os.protocol.connection import Connection
@@ -53,9 +56,156 @@ FLAG_MOTORS, FLAG_SONAR, FLAG_STOP_BUTTON, FLAG_E_STALL = 1 << 0, 1 << 1, 1 << 5
 FLAG_JOYSTICK, FLAG_CHARGING = 1 << 9, 1 << 10
 #: The ARCOS tail where nothing is known: no fault, no sideways motion, no thermometer, no charge sensor.
 NO_TEMPERATURE, CHARGE_UNKNOWN, CHARGE_BULK = -127, -1, 1
+#: Count, checksum and a type byte: no frame is shorter.
+SMALLEST_FRAME = 6
+#: AUX ports' packets.
+AUX_EXTRAS = (Extra.AUX1, Extra.AUX2, Extra.AUX3)
 
 
-def standard_packet(
+class Reporter:
+    """Makes the packets of one robot."""
+
+    def __init__(
+        self, context: Context, body: Body, sender: Sender, parameters: RobotParameters, settings: ControllerSettings,
+        notify: Callable[[Nanos, str, str], None],
+    ) -> None:  # fmt: skip
+        self.context = context
+        self.body = body
+        self._sender = sender
+        self.parameters = parameters
+        self.settings = settings
+        self._notify = notify
+
+    def configuration(self) -> ConfigPacket:
+        """Return the answer to CONFIG: the robot's own limits, and those in force."""
+        settings, limits, kept = self.settings, self.context.motion.limits, self.context.kept
+        working: dict[str, Any] = {name: value & 0xFFFF for name, value in kept.items() if name != "driftfactor"}
+        config = settings.flash.config(self.parameters, settings.profile)
+        return replace(
+            config, name=settings.name, serial=settings.serial, sipcycle=settings.sip_period_ns // NS_PER_MS,
+            watchdog=settings.watchdog_ns // NS_PER_MS, rotvelmax=limits.max_rotation_deg_s,
+            transvelmax=limits.max_velocity_mm_s, rotacc=limits.rot_accel_deg_s2, rotdecel=limits.rot_decel_deg_s2,
+            transacc=limits.accel_mm_s2, transdecel=limits.decel_mm_s2,
+            **working,
+        )  # fmt: skip
+
+    def fire(self, numbers: tuple[int, ...]) -> None:
+        """Let sonar ping, and keep what they measure for the next packet."""
+        parameters, settings = self.parameters, self.settings
+        ranges = measure_ranges(
+            self.body, numbers, parameters, settings.errors.sonar, self.context.faults.sonar, self.context.random_source
+        )
+        self.context.sonar.take_ping(
+            [
+                (number, raw_range(range_m, parameters, settings.profile))
+                for number, range_m in zip(numbers, ranges, strict=True)
+            ]
+        )
+
+    def check_aux_requests(self) -> None:
+        """Answer GETAUX where enough bytes have come."""
+        for port, extra in zip(self.context.devices.aux, AUX_EXTRAS, strict=True):
+            if port.has_answer:
+                self.context.requests.set(extra, 1)
+
+    def check_battery(self, now: Nanos) -> None:
+        """Drain the battery, and act when it is low."""
+        context, state = self.context, self.body.state
+        battery, switches = context.devices.battery, context.devices.switches
+        battery.look(
+            now, motors_on=context.motors_enabled, rims_mps=abs(state.left_speed_mps) + abs(state.right_speed_mps),
+            stalled=state.stalled_left + state.stalled_right,
+        )  # fmt: skip
+        if battery.decivolts < context.low_battery_decivolts and not switches.battery_reported:
+            switches.battery_reported = True
+            self._notify(now, "battery low", f"{battery.decivolts / 10:.1f} V")
+        if battery.decivolts < self.settings.flash.number("shutdownvolts") and context.motors_enabled:
+            context.motion.power(on=False)
+            self._notify(now, "motors", "off: the battery is below SHUTDOWNVOLTS")
+
+    def sample_gyro(self) -> None:
+        """Take the gyro's reading that is due."""
+        errors = self.settings.errors.heading
+        noise = (
+            self.context.random_source.of("gyro").gauss(0.0, errors.gyro_noise_counts)
+            if errors.gyro_noise_counts
+            else 0.0
+        )
+        self.context.devices.gyro.sample(self.body.state.turn_radps, errors.gyro_bias_counts + noise)
+
+    def send_standard_packet(self, connection: Connection, now: Nanos) -> Nanos:
+        """Send the packet of this moment and what goes with it; return when the next is due."""
+        context, settings, sender = self.context, self.settings, self._sender
+        self._sample_sensors(now)
+        state = self.body.state
+        segments = pressed(context, state, settings.flash)
+        bumps = self._bumpers_reported(segments)
+        packet = _standard_packet(context, state, self.parameters, stalls(context, state, now), bumps, now)
+        due = now + settings.sip_period_ns
+        frame = packet_frame(packet, settings.profile)
+        size = len(frame.to_bytes())
+        before, after = context.requests.wanted(settings.profile)
+        for extra in before:
+            self._send_extra(extra, segments, size, due, now)
+        connection.send(frame, now)
+        for data in connection.take_output():
+            sender.put(data, now)
+        for extra in after:
+            self._send_extra(extra, segments, 0, due, now)
+        sender.packet_sent()
+        sender.line.end_cycle(now)
+        context.sonar.start_cycle(now)
+        return due
+
+    def _sample_sensors(self, now: Nanos) -> None:
+        """Do what the firmware does once a packet: battery, compass, odometry's own drift."""
+        context, errors = self.context, self.settings.errors
+        self.check_battery(now)
+        compass = context.devices.compass
+        if (compass.mode or Extra.COMPASS in context.requests.once) and compass.is_due(now):
+            noise = errors.heading.compass_noise_deg
+            error = errors.heading.compass_bias_deg + (
+                self.context.random_source.of("compass").gauss(0.0, noise) if noise else 0.0
+            )
+            compass.read(self.body.state.heading_rad, self.body.state.pitch_rad, error, now)
+        if errors.odometry.drift_deg:
+            way_mm = abs(context.reckoning.travel_mm - context.drifted_at_mm)
+            context.drifted_at_mm = context.reckoning.travel_mm
+            deviation = errors.odometry.drift_deg * math.sqrt(way_mm / 1000)
+            context.reckoning.drift(
+                math.radians(self.context.random_source.of("drift").gauss(0.0, deviation)) if way_mm else 0.0
+            )
+
+    def _send_extra(self, extra: Extra, segments: tuple[int, int], reserved: int, due: Nanos, now: Nanos) -> None:
+        """Send an extra packet if it leaves room for `reserved` bytes more before the next packet is due."""
+        requests, line = self.context.requests, self._sender.line
+        if not line.fits(reserved + SMALLEST_FRAME, now, due) and not requests.must_go(extra):
+            requests.no_room(extra)
+            return
+        data = packet_frame(
+            MAKERS[extra](self.context, self.settings.flash, segments, now), self.settings.profile
+        ).to_bytes()
+        if not line.fits(reserved + len(data), now, due) and not requests.must_go(extra):
+            requests.no_room(extra)
+            return
+        requests.sent(extra)
+        self._sender.put(data, now)
+
+    def _bumpers_reported(self, segments: tuple[int, int]) -> tuple[int, int]:
+        """Return front and rear as the standard packet has them: without bumpers a P2OS robot reads ones."""
+        flash = self.settings.flash
+        floating = 0 if self.settings.profile.has_flags else BUMPERS_NOT_FITTED
+        fitted = flash.number("frontbumps"), flash.number("rearbumps")
+        return (
+            segments[0] if fitted[0] or segments[0] else floating,
+            segments[1] if fitted[1] or segments[1] else floating,
+        )
+
+
+# The standard packet --------------------------------------------------------------------
+
+
+def _standard_packet(
     context: Context,
     wheels: WheelState,
     parameters: RobotParameters,
@@ -70,7 +220,7 @@ def standard_packet(
         wheels: What its wheels do.
         parameters: Its conversions.
         stalls: Left and right wheel.
-        bumps: Front and rear segments as this family tells them.
+        bumps: Front and rear segments as this family reports them.
         now: The time, ns.
     """
     raw_x, raw_y = context.reckoning.raw_position(parameters.distance_nm_per_count)
@@ -136,11 +286,13 @@ def _arcos_tail(context: Context, wheels: WheelState, parameters: RobotParameter
     )  # fmt: skip
 
 
+# The extra packets --------------------------------------------------------------------
+
 #: What one packet is made from: the parts, the FLASH, pressed bumper segments (front, rear), the time.
 Maker = Callable[[Context, Flash, tuple[int, int], Nanos], ServerPacket]
 
 
-def encoder_packet(context: Context, flash: Flash) -> EncoderPacket:
+def _encoder_packet(context: Context, flash: Flash) -> EncoderPacket:
     """Return both encoders' counts since the start, in TICKSMM of the FLASH."""
     ticks = context.kept.get("ticksmm", flash.number("ticksmm"))
     return EncoderPacket(
@@ -149,10 +301,14 @@ def encoder_packet(context: Context, flash: Flash) -> EncoderPacket:
     )
 
 
-def battery_packet(context: Context) -> BatteryPacket:
+def _battery_packet(context: Context) -> BatteryPacket:
     """Return one battery's row: no flags, its charge twice."""
     charge = context.devices.battery.state_of_charge
     return BatteryPacket(batteries=((0, 0, 0, charge, charge),))
+
+
+def _signed32(value: int) -> int:
+    return (value + (1 << 31)) % (1 << 32) - (1 << 31)
 
 
 MAKERS: Mapping[Extra, Maker] = {
@@ -164,7 +320,7 @@ MAKERS: Mapping[Extra, Maker] = {
         rear=bumps[1],
         decivolts=context.devices.battery.decivolts,
     ),
-    Extra.ENCODER: lambda context, flash, _bumps, _now: encoder_packet(context, flash),
+    Extra.ENCODER: lambda context, flash, _bumps, _now: _encoder_packet(context, flash),
     Extra.GRIPPER: lambda context, _flash, _bumps, now: context.devices.gripper.packet(now),
     Extra.COMPASS: lambda context, _flash, _bumps, _now: context.devices.compass.packet(),
     Extra.AUX1: lambda context, _flash, _bumps, _now: context.devices.aux[0].take_answer(),
@@ -173,155 +329,5 @@ MAKERS: Mapping[Extra, Maker] = {
     Extra.PLAYLIST: lambda _context, _flash, _bumps, _now: PlaylistPacket(),
     Extra.ARM: lambda _context, _flash, _bumps, _now: ArmPacket(),
     Extra.ARM_INFO: lambda _context, _flash, _bumps, _now: ArmInfoPacket(),
-    Extra.BATTERY: lambda context, _flash, _bumps, _now: battery_packet(context),
+    Extra.BATTERY: lambda context, _flash, _bumps, _now: _battery_packet(context),
 }
-
-
-def _signed32(value: int) -> int:
-    return (value + (1 << 31)) % (1 << 32) - (1 << 31)
-
-
-#: Count, checksum and a type byte: no frame is shorter.
-SMALLEST_FRAME = 6
-#: AUX ports' packets.
-AUX_EXTRAS = (Extra.AUX1, Extra.AUX2, Extra.AUX3)
-
-
-class Reporter:
-    """Makes the packets of one robot."""
-
-    def __init__(
-        self, context: Context, body: Body, sender: Sender, parameters: RobotParameters, settings: ControllerSettings,
-        tell: Callable[[Nanos, str, str], None],
-    ) -> None:  # fmt: skip
-        self.context = context
-        self.body = body
-        self._sender = sender
-        self.parameters = parameters
-        self.settings = settings
-        self._tell = tell
-
-    def configuration(self) -> ConfigPacket:
-        """Return the answer to CONFIG: the robot's own limits, and those in force."""
-        settings, limits, kept = self.settings, self.context.motion.limits, self.context.kept
-        told: dict[str, Any] = {name: value & 0xFFFF for name, value in kept.items() if name != "driftfactor"}
-        config = settings.flash.config(self.parameters, settings.profile)
-        return replace(
-            config, name=settings.name, serial=settings.serial, sipcycle=settings.sip_period_ns // NS_PER_MS,
-            watchdog=settings.watchdog_ns // NS_PER_MS, rotvelmax=limits.max_rotation_deg_s,
-            transvelmax=limits.max_velocity_mm_s, rotacc=limits.rot_accel_deg_s2, rotdecel=limits.rot_decel_deg_s2,
-            transacc=limits.accel_mm_s2, transdecel=limits.decel_mm_s2,
-            **told,
-        )  # fmt: skip
-
-    def fire(self, numbers: tuple[int, ...]) -> None:
-        """Let sonar ping, and keep what they hear for the next packet."""
-        parameters, settings = self.parameters, self.settings
-        ranges = hear(
-            self.body, numbers, parameters, settings.errors.sonar, self.context.faults.sonar, self.context.random_source
-        )
-        self.context.sonar.take_ping(
-            [
-                (number, raw_range(range_m, parameters, settings.profile))
-                for number, range_m in zip(numbers, ranges, strict=True)
-            ]
-        )
-
-    def check_aux_requests(self) -> None:
-        """Answer GETAUX where enough bytes have come."""
-        for port, extra in zip(self.context.devices.aux, AUX_EXTRAS, strict=True):
-            if port.has_answer:
-                self.context.requests.set(extra, 1)
-
-    def check_battery(self, now: Nanos) -> None:
-        """Drain the battery, and act when it is low."""
-        context, state = self.context, self.body.state
-        battery, switches = context.devices.battery, context.devices.switches
-        battery.look(
-            now, motors_on=context.motors_enabled, rims_mps=abs(state.left_speed_mps) + abs(state.right_speed_mps),
-            stalled=state.stalled_left + state.stalled_right,
-        )  # fmt: skip
-        if battery.decivolts < context.low_battery_decivolts and not switches.battery_reported:
-            switches.battery_reported = True
-            self._tell(now, "battery low", f"{battery.decivolts / 10:.1f} V")
-        if battery.decivolts < self.settings.flash.number("shutdownvolts") and context.motors_enabled:
-            context.motion.power(on=False)
-            self._tell(now, "motors", "off: the battery is below SHUTDOWNVOLTS")
-
-    def sample_gyro(self) -> None:
-        """Take the gyro's reading that is due."""
-        errors = self.settings.errors.heading
-        noise = (
-            self.context.random_source.of("gyro").gauss(0.0, errors.gyro_noise_counts)
-            if errors.gyro_noise_counts
-            else 0.0
-        )
-        self.context.devices.gyro.sample(self.body.state.turn_radps, errors.gyro_bias_counts + noise)
-
-    def _sample_sensors(self, now: Nanos) -> None:
-        """Do what the firmware does once a packet: battery, compass, odometry's own drift."""
-        context, errors = self.context, self.settings.errors
-        self.check_battery(now)
-        compass = context.devices.compass
-        if (compass.mode or Extra.COMPASS in context.requests.once) and compass.is_due(now):
-            noise = errors.heading.compass_noise_deg
-            error = errors.heading.compass_bias_deg + (
-                self.context.random_source.of("compass").gauss(0.0, noise) if noise else 0.0
-            )
-            compass.read(self.body.state.heading_rad, self.body.state.pitch_rad, error, now)
-        if errors.odometry.drift_deg:
-            way_mm = abs(context.reckoning.travel_mm - self.context.drifted_at_mm)
-            self.context.drifted_at_mm = context.reckoning.travel_mm
-            deviation = errors.odometry.drift_deg * math.sqrt(way_mm / 1000)
-            context.reckoning.drift(
-                math.radians(self.context.random_source.of("drift").gauss(0.0, deviation)) if way_mm else 0.0
-            )
-
-    def send_standard_packet(self, connection: Connection, now: Nanos) -> Nanos:
-        """Send the packet of this moment and what goes with it; return when the next is due."""
-        context, settings, sender = self.context, self.settings, self._sender
-        self._sample_sensors(now)
-        state = self.body.state
-        segments = pressed(context, state, settings.flash)
-        told = self._bumpers_reported(segments)
-        packet = standard_packet(context, state, self.parameters, stalls(context, state, now), told, now)
-        due = now + settings.sip_period_ns
-        frame = packet_frame(packet, settings.profile)
-        size = len(frame.to_bytes())
-        before, after = context.requests.wanted(settings.profile)
-        for extra in before:
-            self._send_extra(extra, segments, size, due, now)
-        connection.send(frame, now)
-        for data in connection.take_output():
-            sender.put(data, now)
-        for extra in after:
-            self._send_extra(extra, segments, 0, due, now)
-        sender.packet_sent()
-        sender.line.end_cycle(now)
-        context.sonar.start_cycle(now)
-        return due
-
-    def _send_extra(self, extra: Extra, segments: tuple[int, int], reserved: int, due: Nanos, now: Nanos) -> None:
-        """Send an extra packet if it leaves room for `reserved` bytes more before the next packet is due."""
-        requests, line = self.context.requests, self._sender.line
-        if not line.fits(reserved + SMALLEST_FRAME, now, due) and not requests.must_go(extra):
-            requests.no_room(extra)
-            return
-        data = packet_frame(
-            MAKERS[extra](self.context, self.settings.flash, segments, now), self.settings.profile
-        ).to_bytes()
-        if not line.fits(reserved + len(data), now, due) and not requests.must_go(extra):
-            requests.no_room(extra)
-            return
-        requests.sent(extra)
-        self._sender.put(data, now)
-
-    def _bumpers_reported(self, segments: tuple[int, int]) -> tuple[int, int]:
-        """Return front and rear as the standard packet has them: without bumpers a P2OS robot reads ones."""
-        flash = self.settings.flash
-        floating = 0 if self.settings.profile.has_flags else BUMPERS_NOT_FITTED
-        fitted = flash.number("frontbumps"), flash.number("rearbumps")
-        return (
-            segments[0] if fitted[0] or segments[0] else floating,
-            segments[1] if fitted[1] or segments[1] else floating,
-        )

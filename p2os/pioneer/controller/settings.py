@@ -1,4 +1,4 @@
-"""How a virtual robot is asked to behave: its firmware, its FLASH, its line, its sensors' errors."""
+"""The settings of a virtual robot: its firmware, its FLASH, its line, its sensors' errors."""
 
 from dataclasses import dataclass, field, replace
 from enum import Enum
@@ -35,11 +35,11 @@ class ControllerSettings:
         UsageError: a value cannot be sent in the robot's packets.
     """
 
-    #: Says the answer to SYNC2; ARIA takes "MobileSim" for its own simulator, so any other name will do.
+    #: In the answer to SYNC2; ARIA takes "MobileSim" for its own simulator, so any other name will do.
     name: str = "Virtual"
     serial: str = "VIRTUAL"
     profile: Profile = Profile.P2OS
-    #: Answers syncs out of order and obeys what any family knows, as AMRISim does.
+    #: Answers syncs out of order and executes what any family knows, as AMRISim does.
     lenient: bool = False
     sip_period_ns: Nanos = 100 * NS_PER_MS
     watchdog_ns: Nanos = 2 * NS_PER_S
@@ -64,7 +64,7 @@ class ControllerSettings:
             raise UsageError(f"a line of {self.baud} bit/s is none that HOSTBAUD names", hint=f"rates: {rates}")
 
     def with_flash(self, flash: Flash) -> "ControllerSettings":
-        """Return these settings with what a FLASH file says."""
+        """Return these settings with what a FLASH file sets."""
         return replace(
             self,
             flash=flash,

@@ -2,8 +2,8 @@
 
 A ping is nine rays. A ray that meets its surface too far from the square comes
 back to nobody; the nearest of those that do come back is the range. Then, each
-by its own random stream: crosstalk (another sonar's ping heard: nearer), dropout
-(nothing heard), noise. A stuck or noisy sonar errs on top.
+by its own random stream: crosstalk (another sonar's ping received: nearer), dropout
+(no echo), noise. A stuck or noisy sonar errs on top.
 
 Not modelled: multiple reflections, the temperature of the air, surfaces that
 swallow sound.
@@ -42,14 +42,14 @@ class Ranging(Protocol):
 
 @runtime_checkable
 class Echoing(Protocol):
-    """A body that tells each ray of a ping."""
+    """A body that gives each ray of a ping."""
 
     def echoes(self, numbers: Sequence[int]) -> Sequence[Sequence[RayEcho]]:
         """Return what each ray of some sonar meets."""
         ...
 
 
-def hear(
+def measure_ranges(
     body: Ranging,
     numbers: Sequence[int],
     parameters: RobotParameters,
@@ -57,7 +57,7 @@ def hear(
     faults: Mapping[int, tuple[str, float]],
     random_source: RandomSource,
 ) -> list[float]:
-    """Return what these sonar say, metres; the robot file's longest range where no echo came.
+    """Return the ranges that these sonar measure, metres; the robot file's longest range where no echo came.
 
     Args:
         body: Where the sonar sit.
@@ -76,7 +76,7 @@ def hear(
         ]
     else:
         found = list(body.ranges(numbers))
-    heard = []
+    measured = []
     for number, true_m in zip(numbers, found, strict=True):
         range_m = min(true_m, longest)
         if errors.crosstalk and random_source.of("crosstalk").random() < errors.crosstalk:
@@ -93,5 +93,5 @@ def hear(
             range_m = longest
         elif kind == "noisy":
             range_m += random_source.of("sonar fault").gauss(0.0, value)
-        heard.append(min(max(range_m, least), longest))
-    return heard
+        measured.append(min(max(range_m, least), longest))
+    return measured

@@ -14,7 +14,7 @@ from p2os.pioneer.controller.flash import Flash, FlashError, load_flash
 from p2os.pioneer.controller.live_inputs import INPUTS
 from p2os.pioneer.random_source import RandomSource
 from p2os.pioneer.sensor_errors import IDEAL, REALISTIC, SensorErrorsError, SonarErrors, load_sensor_errors
-from p2os.pioneer.sonar.errors import hear
+from p2os.pioneer.sonar.errors import measure_ranges
 from p2os.protocol.commands import CommandNumber as C
 from p2os.protocol.profiles import Profile
 from p2os.robots.parameters import load_parameters
@@ -66,7 +66,10 @@ def test_words_that_mean_nothing_change_nothing(robot: Any, text: str) -> None:
 @pytest.mark.parametrize(("fault", "expected"), [("stuck", (1.2, 1.2)), ("dead", (5.0, 5.0)), ("noisy", (0.1, 5.0))])
 def test_a_broken_sonar_says_so_and_the_others_do_not(fault: str, expected: tuple[float, float]) -> None:
     value = {"stuck": 1.2, "dead": 0.0, "noisy": 0.3}[fault]
-    heard = [hear(Walls(), (0, 1), P2DX, IDEAL.sonar, {1: (fault, value)}, RandomSource(seed)) for seed in range(20)]
+    heard = [
+        measure_ranges(Walls(), (0, 1), P2DX, IDEAL.sonar, {1: (fault, value)}, RandomSource(seed))
+        for seed in range(20)
+    ]
     assert {first for first, _ in heard} == {2.0}
     assert all(expected[0] <= second <= expected[1] for _, second in heard)
     assert (len({second for _, second in heard}) > 10) is (fault == "noisy")
@@ -83,9 +86,9 @@ class Walls:
 
 
 def test_a_surface_met_askew_sends_its_echo_elsewhere() -> None:
-    assert hear(Walls(), (0,), P2DX, SonarErrors(specular_deg=25), {}, RandomSource()) == [3.0]
-    assert hear(Walls(), (0,), P2DX, SonarErrors(specular_deg=61), {}, RandomSource()) == [2.0]
-    assert hear(Walls(), (0,), P2DX, SonarErrors(specular_deg=5), {}, RandomSource()) == [P2DX.sonar_range_m]
+    assert measure_ranges(Walls(), (0,), P2DX, SonarErrors(specular_deg=25), {}, RandomSource()) == [3.0]
+    assert measure_ranges(Walls(), (0,), P2DX, SonarErrors(specular_deg=61), {}, RandomSource()) == [2.0]
+    assert measure_ranges(Walls(), (0,), P2DX, SonarErrors(specular_deg=5), {}, RandomSource()) == [P2DX.sonar_range_m]
 
 
 @pytest.mark.parametrize("key", ["noise_m", "dropout", "crosstalk"])
@@ -94,7 +97,7 @@ def test_errors_of_sonar_are_drawn_from_the_seed(key: str) -> None:
 
     def series(seed: int) -> list[float]:
         random_source = RandomSource(seed)
-        return [hear(Walls(), (0,), P2DX, errors, {}, random_source)[0] for _ in range(50)]
+        return [measure_ranges(Walls(), (0,), P2DX, errors, {}, random_source)[0] for _ in range(50)]
 
     assert series(1) == series(1) != series(2)
     assert all(P2DX.sonar_min_range_m <= range_m <= P2DX.sonar_range_m for range_m in series(1))
