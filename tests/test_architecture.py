@@ -5,6 +5,7 @@ here may import only what its package's row allows.
 """
 
 import ast
+import re
 import subprocess
 import sys
 from pathlib import Path, PurePosixPath
@@ -299,3 +300,15 @@ def test_no_neighbours_in_a_folder_import_each_other_in_a_circle() -> None:
 
 def test_the_judge_sees_a_circle() -> None:
     assert circles({"a": {"b"}, "b": {"c"}, "c": {"a"}, "d": {"a"}, "e": set()}) == ["a", "b", "c"]
+
+
+def test_the_map_names_what_is_there() -> None:
+    text = (ROOT / "ARCHITECTURE.md").read_text(encoding="utf-8")
+    paths = {word for word in re.findall(r"`([\w./*-]+/[\w./*-]*)`", text)}
+    assert [path for path in sorted(paths) if not any(ROOT.glob(path.rstrip("/")))] == []
+    facts = re.findall(r"`([A-Za-z_.]+)`(?: in |, )`([\w/.]+\.py)`", text)
+    assert len(facts) > 5
+    gone = [
+        (name, path) for name, path in facts if name.split(".")[-1] not in (ROOT / path).read_text(encoding="utf-8")
+    ]
+    assert gone == []
