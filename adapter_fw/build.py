@@ -30,7 +30,7 @@ SELFTEST = HERE / "selftest"
 #: Objects by what they were made of; deleting the folder costs a minute.
 OBJECTS = HERE / "build" / "objects"
 CORE = tuple(sorted((HERE / "core").rglob("*.cpp")))
-LIFE = (SELFTEST / "selftest.cpp", SELFTEST / "robot.cpp", SELFTEST / "report.cpp")
+TRIAL = (SELFTEST / "selftest.cpp", SELFTEST / "robot.cpp", SELFTEST / "report.cpp")
 
 #: Everywhere: no exceptions, no run-time types, no guards, nothing of a C++ library.
 CXX_FLAGS = (
@@ -54,7 +54,7 @@ class Target:
     sources: tuple[Path, ...]
     link: tuple[str, ...] = ()
     after: tuple[str, ...] = ()
-    #: Whether the size of the core is worth saying.
+    #: Whether the size of the core is printed.
     is_small: bool = False
 
 
@@ -80,7 +80,7 @@ def _on_cortex_m(output: str, *sources: Path) -> Target:
 
 
 TARGETS = {
-    "host": _on_host("selftest-host", *LIFE, SELFTEST / "host.cpp"),
+    "host": _on_host("selftest-host", *TRIAL, SELFTEST / "host.cpp"),
     "program": _on_host("p2os-adapter", *sorted((HERE / "host").glob("*.cpp"))),
     "units": _on_host("units", SELFTEST / "units.cpp"),
     "library": _on_host(
@@ -88,7 +88,7 @@ TARGETS = {
         include=(HERE / "core", HERE / "library" / "src", HERE / "stubs" / "arduino"),
     ),
     "replay": _on_host("replay", *sorted((HERE / "fuzz").glob("*.cpp")), SELFTEST / "robot.cpp"),
-    "cortex-m": _on_cortex_m("selftest-cortex-m.elf", *LIFE, SELFTEST / "cortex_m.cpp"),
+    "cortex-m": _on_cortex_m("selftest-cortex-m.elf", *TRIAL, SELFTEST / "cortex_m.cpp"),
     "bluepill": _on_cortex_m("adapter-bluepill.elf", *sorted((HERE / "bluepill").glob("*.cpp"))),
     "xtensa": Target(
         output="selftest-xtensa.elf",
@@ -96,7 +96,7 @@ TARGETS = {
         package="gcc-xtensa-lx106",
         flags=("-Os", "-g", "-ffreestanding", "-mlongcalls", "-mtext-section-literals",
                "-isystem", str(SELFTEST / "xtensa" / "include")),
-        sources=(*LIFE, SELFTEST / "xtensa" / "main.cpp", SELFTEST / "bare_memory.cpp",
+        sources=(*TRIAL, SELFTEST / "xtensa" / "main.cpp", SELFTEST / "bare_memory.cpp",
                  SELFTEST / "xtensa" / "start.S", SELFTEST / "xtensa" / "arithmetic.c"),
         link=("-nostdlib", "-Wl,--gc-sections", "-T", str(SELFTEST / "xtensa" / "sim.ld")),
         after=("-lgcc",),
@@ -163,7 +163,7 @@ def _run(command: list[str]) -> None:
 
 
 def main() -> int:
-    """Build what is asked for, and say its size."""
+    """Build what is asked for, and print its size."""
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )  # fmt: skip

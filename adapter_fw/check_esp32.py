@@ -1,6 +1,6 @@
 """Read the ESP32's program with a PC's compiler, against stub headers of our own: `python adapter_fw/check_esp32.py`.
 
-This is no build: it tells that names, types and the board's tables fit together,
+This is no build: it shows that names, types and the board's tables fit together,
 for each board and each pad. The ESP32's compiler and libraries are not reachable
 from here; nothing has been flashed.
 """

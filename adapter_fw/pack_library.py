@@ -25,7 +25,7 @@ def pack(folder: Path) -> Path:
 
 
 def main() -> int:
-    """Pack, and say where."""
+    """Pack, and print where."""
     parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
     parser.add_argument("--out", type=Path, default=HERE / "build", help="folder that the library's folder is put into")
     words = parser.parse_args()

@@ -1,21 +1,15 @@
 """The ESP32 adapter between a BluePill's pins and a Pioneer's P2OS line.
 
-It is a client of the robot, driven by pins or by a game pad, never by both. The
-states and their table stand below. The firmware in adapter_fw/core is its twin, byte for byte and edge for edge.
+It is a client of the robot, commanded by pins or by a game pad, never by both. The
+firmware in adapter_fw/core is its twin, byte for byte and edge for edge.
 
 Not modelled: the ESP32 itself, the time that its program needs, analog levels.
 
-Invariant: within one instant the order is fixed: reset wire, boot, connection,
-sample, pad, loss, plausibility, distances, encoders, speeds, stops. A change of rst is seen
-at the end of a slice, where the bench's watched nets put it, and at each sample.
-
-The adapter's states and when it leaves them.
-
 Theory of operation
 -------------------
-The adapter is a client of the robot, driven by pins. It samples its inputs at
-fixed instants (`sample_period_ns` apart, counted from the end of its boot), and
-its state moves only there, at its own deadlines, and when bytes arrive:
+The adapter samples its inputs at fixed instants (`sample_period_ns` apart, counted
+from the end of its boot), and its state moves only there, at its own deadlines, and
+when bytes arrive:
 
     RESET       rst is high: outputs released to their pulls, nothing runs
     BOOTING     rst fell (or power came): released still, for `boot_ns`
@@ -23,11 +17,12 @@ its state moves only there, at its own deadlines, and when bytes arrive:
     CONNECTING  the P2OS connection is being made; outputs safe
     SETTLING    OPEN: SETO and SONAR 1 sent, waits for odometry zero; distances live
     DRIVING     ENABLE 1 sent; motor values become VEL and RVEL; all live
-    CLOSING     the connect request ended: STOP, VEL 0, RVEL 0, CLOSE sent; lasts `stop_repeat_ns`
-    LOST        no SIP, implausible motion, no pad, a shutdown: the same four sent; waits for the connect request to end
+    CLOSING     the connect request was withdrawn: STOP, VEL 0, RVEL 0, CLOSE sent; lasts `stop_repeat_ns`
+    LOST        no SIP, implausible motion, no pad, a shutdown: the same four sent; waits for the
+                connect request to be withdrawn
 
-    from         rst high  boot over  requested      withdrawn     opened    odometry 0      ended or not
-                                                                             or settle_ns    believed
+    from         rst high  boot over  requested      withdrawn     opened    odometry 0      ended or
+                                                                             or settle_ns    implausible
     RESET        ·         ·          ·              ·             ·         ·               ·
     BOOTING      RESET     IDLE       ·              ·             ·         ·               ·
     IDLE         RESET     ·          CONNECTING     ·             ·         ·               ·
@@ -35,33 +30,38 @@ its state moves only there, at its own deadlines, and when bytes arrive:
     SETTLING     RESET     ·          ·              CLOSING       ·         DRIVING         LOST
     DRIVING      RESET     ·          ·              CLOSING       ·         ·               LOST
     CLOSING      RESET     ·          ·              ·             ·         ·               ·
-    LOST         RESET     ·          ·              ·             IDLE      ·               ·
+    LOST         RESET     ·          ·              IDLE          ·         ·               ·
 
 RESET leaves to BOOTING when rst is low, CLOSING to IDLE when its time is over.
-From LOST the way to motion leads over a new connect request (p2dx_con low and high again, or
-Up), whatever the robot does meanwhile. A change of masters leads to LOST too.
+From LOST the way to motion leads over a new connect request (p2dx_con low and high
+again, or Up), whatever the robot does meanwhile. A change of masters leads to LOST too.
 
 Any packet revives the last speed of a robot that its watchdog has stopped. So
 the first frames after a loss are STOP, VEL 0, RVEL 0, and the same three stand
 before every SYNC0 and go out after a boot: the adapter cannot know what the
 robot was doing before.
 
+Within one instant the order is fixed: reset wire, boot, connection, sample, pad, loss,
+plausibility, distances, encoders, speeds, stops. A change of rst is seen at the end of
+a slice, where the bench's watched nets put it, and at each sample.
+
 Invariant: of the outputs, only SETTLING and DRIVING show what the robot reports.
 """
 
 from dataclasses import dataclass, replace
 from enum import StrEnum
-from typing import Any, cast
+from typing import Any, Protocol, cast
 
 from adapter_sim.distances import Distances, threshold_um
 from adapter_sim.driver import Driver
 from adapter_sim.encoders import WheelCodes
-from adapter_sim.masters import Masters
-from adapter_sim.mixing import Master, PadReport, Speeds
+from adapter_sim.masters import Master, Masters
+from adapter_sim.mixing import Speeds
 from adapter_sim.pinout import Pinout, WireRole
 from adapter_sim.pins import EventCallback, Inputs, Outputs, PinBank, SampleClock
 from adapter_sim.session import Session, SessionOpened, StopRepeater
 from adapter_sim.settings import AdapterSettings
+from p2os.gamepad import PadReport
 from p2os.protocol.commands import set_origin, sonar
 from p2os.protocol.sip import StandardSip
 from p2os.robots.parameters import RobotParameters
@@ -81,10 +81,14 @@ class AdapterState(StrEnum):
     LOST = "lost"
 
 
+#: Later than any deadline.
+NEVER: Nanos = 1 << 62
 #: States in which the robot's session is open.
 OPEN_STATES = frozenset({AdapterState.SETTLING, AdapterState.DRIVING})
-#: States in which bytes are listened to and inputs are sampled.
-AWAKE_STATES = frozenset(AdapterState) - {AdapterState.RESET, AdapterState.BOOTING}
+#: States with a session that is open or being opened.
+SESSION_STATES = OPEN_STATES | {AdapterState.CONNECTING}
+#: States in which bytes are taken and inputs are sampled.
+RUNNING_STATES = frozenset(AdapterState) - {AdapterState.RESET, AdapterState.BOOTING}
 #: States in which the stop sequence is repeated.
 STOPPING_STATES = frozenset({AdapterState.CLOSING, AdapterState.LOST, AdapterState.IDLE})
 
@@ -112,13 +116,9 @@ class AdapterStatus:
     odometry_jumps: int
 
 
-#: Later than any deadline.
-NEVER: Nanos = 1 << 62
-
-
 @dataclass(slots=True, kw_only=True)
 class Agenda:
-    """What the adapter has set out to do, and when; a reset wipes it."""
+    """What is planned, and when; a reset clears it."""
 
     #: End of the boot.
     boot_at: Nanos = NEVER
@@ -128,12 +128,19 @@ class Agenda:
     sip_deadline: Nanos = NEVER
     #: From here on the odometry is taken as it is.
     settle_at: Nanos = NEVER
-    #: SONAR 1 is said again unless a reading comes before.
+    #: SONAR 1 is sent again unless a reading comes before.
     sonar_at: Nanos = NEVER
     #: Stall flags of the last SIP.
     stalled: tuple[bool, bool] = (False, False)
     #: SIPs taken.
     sips: int = 0
+
+
+class _Saved(Protocol):
+    """A part with a state of its own."""
+
+    def snapshot(self) -> object: ...
+    def restore(self, snapshot: Any) -> None: ...
 
 
 class Adapter:
@@ -144,7 +151,7 @@ class Adapter:
         pinout: Names, widths and levels of the wires.
         parameters: The robot's own numbers.
         settings: None takes the defaults.
-        on_event: Told of each transition.
+        on_event: Called at each transition.
         now: When power comes, in nanoseconds.
         master: Who commands; the board reads a jumper at boot.
     """
@@ -177,6 +184,11 @@ class Adapter:
         self.inputs = Inputs(pins, pinout, settings)
         self._masters = Masters(self.inputs, self._driver.mixer, settings, master)
         self._stop_repeater = StopRepeater(settings)
+        #: The parts that a snapshot saves.
+        self._parts: dict[str, _Saved] = {
+            "masters": self._masters, "stop_repeater": self._stop_repeater, "driver": self._driver,
+            "distances": self.distances, "codes": self._codes, "outputs": self.outputs, "session": self.session,
+        }  # fmt: skip
         self._baud_place = 0
         self._now = now
         #: The earliest deadline, and the earliest that is no sample.
@@ -222,9 +234,9 @@ class Adapter:
     def receive(self, data: bytes, now: Nanos) -> None:
         """Take bytes that the line has delivered at `now`; what was due earlier is done first."""
         self._run(now - 1)
-        if self._state in AWAKE_STATES:
+        if self._state in RUNNING_STATES:
             self._now = now
-            self._stop_repeater.hear(now)
+            self._stop_repeater.note_bytes(now)
             self.session.receive(data, now)
             self._take_session_events(now)
             self._replan()
@@ -234,7 +246,7 @@ class Adapter:
         self._run(now - 1)
         self._now = max(self._now, now)
         has_request_ended = self._masters.take_pad(report, now)
-        if self._state in AWAKE_STATES:
+        if self._state in RUNNING_STATES:
             if has_request_ended:
                 self._end_request("Down was pressed", now)
             if self._state is AdapterState.DRIVING:
@@ -247,19 +259,19 @@ class Adapter:
         if master is self._masters.master:
             return
         self._now = max(self._now, now)
-        if self._state is AdapterState.CONNECTING or self._state in OPEN_STATES:
+        if self._state in SESSION_STATES:
             self._halt(now)
         self._masters.switch(master)
-        self._tell(now, "master", master.value)
-        if self._state in AWAKE_STATES:
+        self._notify(now, "master", master.value)
+        if self._state in RUNNING_STATES:
             self._enter(AdapterState.LOST, now, "master", "waits for a new connect request of the new master")
         self._replan()
 
     def shutdown(self, reason: str, now: Nanos) -> None:
-        """Stop the robot, drive every output to its safe level, and wait for the connect request to end."""
+        """Stop the robot, drive every output to its safe level, and wait for the connect request to be withdrawn."""
         self._run(now - 1)
         self._now = max(self._now, now)
-        if self._state in AWAKE_STATES:
+        if self._state in RUNNING_STATES:
             self._lose(now, "shutdown", reason)
             self._replan()
 
@@ -277,9 +289,9 @@ class Adapter:
         if looked_at != limit:
             self._now = max(self._now, limit)
             if self.inputs.is_reset(limit) != (self._state is AdapterState.RESET):
-                self._turn_reset(limit)
+                self._follow_reset(limit)
                 self._replan()
-            elif self.samples.is_asleep and not self.inputs.is_quiet(limit):
+            elif self.samples.is_suspended and not self.inputs.is_quiet(limit):
                 self._replan()
                 self._run(limit)
         return Reached(limit)
@@ -289,29 +301,18 @@ class Adapter:
         return {
             "adapter": (self._state.value, self._reason, self._now, self.samples.next, self._baud_place),
             "agenda": replace(self._agenda),
-            "masters": self._masters.snapshot(),
-            "stop_repeater": self._stop_repeater.snapshot(),
-            "driver": self._driver.snapshot(),
-            "distances": self.distances.snapshot(),
-            "codes": self._codes.snapshot(),
-            "outputs": self.outputs.snapshot(),
-            "session": self.session.snapshot(),
-        }  # fmt: skip
+            **{name: part.snapshot() for name, part in self._parts.items()},
+        }
 
     def restore(self, snapshot: object) -> None:
         """Put back what `snapshot` returned."""
-        parts = cast("dict[str, Any]", snapshot)
-        state, self._reason, self._now, self.samples.next, self._baud_place = parts["adapter"]
+        saved = cast("dict[str, Any]", snapshot)
+        state, self._reason, self._now, self.samples.next, self._baud_place = saved["adapter"]
         self._state = AdapterState(state)
-        self._agenda = replace(parts["agenda"])
-        self.samples.is_asleep = False
-        self._masters.restore(parts["masters"])
-        self._stop_repeater.restore(parts["stop_repeater"])
-        self._driver.restore(parts["driver"])
-        self.distances.restore(parts["distances"])
-        self._codes.restore(parts["codes"])
-        self.outputs.restore(parts["outputs"])
-        self.session.restore(parts["session"])
+        self._agenda = replace(saved["agenda"])
+        self.samples.is_suspended = False
+        for name, part in self._parts.items():
+            part.restore(saved[name])
         self._replan()
 
     def _run(self, limit: Nanos) -> Nanos | None:
@@ -319,19 +320,19 @@ class Adapter:
         now = None
         while self._deadline <= limit:
             now = self._deadline
-            if now < self._other and not self._is_restless and self.inputs.is_quiet(now):
+            if now < self._other and not self._has_pending_request and self.inputs.is_quiet(now):
                 self._now = now
                 self.samples.was_quiet(now)
                 self._deadline = self.samples.due(self._other)
             else:
-                self.samples.wake(now)
+                self.samples.resume(now)
                 self._act(now)
                 self._replan()
         return now
 
     @property
-    def _is_restless(self) -> bool:
-        """Tell whether the state is left at the next sample by a pad's connect request alone."""
+    def _has_pending_request(self) -> bool:
+        """Tell whether the next sample leaves the state, with no edge at any pin."""
         left_by_request = {AdapterState.IDLE: True, AdapterState.LOST: False}
         return left_by_request.get(self._state) is self._masters.wants_robot
 
@@ -339,7 +340,7 @@ class Adapter:
         """Do all that is due at `now`, in the fixed order."""
         self._now = now
         if self.inputs.is_reset(now) != (self._state is AdapterState.RESET):
-            self._turn_reset(now)
+            self._follow_reset(now)
         if self._state is AdapterState.RESET:
             self.samples.after(now)
             return
@@ -348,10 +349,10 @@ class Adapter:
                 self.samples.after(now)
                 return
             self._boot(now)
-        self._work(now)
+        self._act_running(now)
 
-    def _work(self, now: Nanos) -> None:
-        """Do all that is due while awake."""
+    def _act_running(self, now: Nanos) -> None:
+        """Do all that is due in a running state."""
         self.session.advance_to(now)
         self._take_session_events(now)
         if now >= self.samples.next:
@@ -382,18 +383,33 @@ class Adapter:
             self.distances.expire(now)
             self.outputs.show_distances(self.distances.levels, now)
         if now >= self._agenda.sonar_at:
-            # No reading for as long as one lives: SONAR 1 was lost, or somebody switched them off.
+            # No reading for as long as one is valid: SONAR 1 was lost, or somebody switched them off.
             self.session.send(sonar(on=True), now)
             self._agenda.sonar_at = now + self.settings.distance_stale_ns
         self.outputs.show_encoders(self._codes.walk(now), now)
         if self._state is AdapterState.DRIVING and now >= self._driver.pair_due_at(now):
             self._send_pair(now)
 
+    def _sample(self, now: Nanos) -> None:
+        have_speeds_changed, has_request_ended = self._masters.sample(now)
+        if have_speeds_changed and self._state is AdapterState.DRIVING:
+            self._driver.want(self._masters.speeds)
+        if has_request_ended:
+            self._end_request("p2dx_con is low", now)
+        if self._state is AdapterState.LOST and not self._masters.wants_robot:
+            self._enter(AdapterState.IDLE, now, "idle", "ready for a new connection")
+
+    def _send_pair(self, now: Nanos) -> None:
+        if self._driver.send_pair(self.session, now):
+            speeds, (left, right) = self._driver.sent, self.inputs.motors
+            pair = f"VEL {speeds.forward_mm_s}, RVEL {speeds.turn_deg_s}"
+            self._notify(now, "command", f"{pair} (motors {left}, {right})")
+
     def _replan(self) -> None:
         """Find the next deadline; `_other` is the earliest that is no sample."""
-        self.samples.wake(self._now)
+        self.samples.resume(self._now)
         state = self._state
-        if state not in AWAKE_STATES:
+        if state not in RUNNING_STATES:
             # Only rst is looked at; `_other` keeps these instants off the fast path.
             self._other = self._deadline = min(self._agenda.boot_at, self.samples.next)
             return
@@ -422,8 +438,8 @@ class Adapter:
         self.session.forget()
         self._baud_place = 0
 
-    def _turn_reset(self, now: Nanos) -> None:
-        """Follow the reset wire, which stands otherwise than the state says."""
+    def _follow_reset(self, now: Nanos) -> None:
+        """Follow the reset wire, whose level does not fit the state."""
         self._now = now
         if self._state is AdapterState.RESET:
             self._agenda.boot_at = now + self.settings.boot_ns
@@ -458,7 +474,7 @@ class Adapter:
                 self.session.drop(now)
                 self._agenda.retry_at = now + self.settings.retry_ns
                 self._baud_place = (self._baud_place + 1) % len(self.settings.bauds)
-                self._tell(
+                self._notify(
                     now, "no connection", f"{event.reason}; tries again in {self.settings.retry_ns / NS_PER_S:.1f} s"
                 )
             elif self._state in OPEN_STATES:
@@ -479,7 +495,7 @@ class Adapter:
         if self._state not in OPEN_STATES:
             return
         self._agenda.sips += 1
-        self._agenda.sip_deadline = max(now, self._stop_repeater.heard_at + self.settings.liveness_ns)
+        self._agenda.sip_deadline = max(now, self._stop_repeater.received_at + self.settings.liveness_ns)
         for reading in sip.sonar:
             self.distances.take(reading.number, reading.raw_range * self.parameters.range_um_per_count, now)
         if sip.sonar:
@@ -490,12 +506,12 @@ class Adapter:
                 return
             self._drive(now)
         if not self._codes.take(sip):
-            self._tell(now, "odometry jumped", "the step is no travel; counts go on from here")
+            self._notify(now, "odometry jumped", "the step is no travel; counts go on from here")
         self._driver.take(sip, now)
         stalled = (sip.stall_left, sip.stall_right)
         if stalled != self._agenda.stalled:
             self._agenda.stalled = stalled
-            self._tell(now, "stall", f"left {int(stalled[0])}, right {int(stalled[1])}")
+            self._notify(now, "stall", f"left {int(stalled[0])}, right {int(stalled[1])}")
         self.outputs.show_encoders(self._codes.walk(now), now)
 
     def _drive(self, now: Nanos) -> None:
@@ -508,14 +524,14 @@ class Adapter:
         self._enter(AdapterState.LOST, now, what, f"{why}; stopped until its master asks for a connection anew")
 
     def _lose_pad(self, now: Nanos) -> None:
-        if self._masters.lose_pad() and (self._state is AdapterState.CONNECTING or self._state in OPEN_STATES):
+        if self._masters.lose_pad() and self._state in SESSION_STATES:
             self._lose(now, "pad lost", "no report of the pad in time")
 
     def _end_request(self, why: str, now: Nanos) -> None:
         """Leave the robot, which the master no longer wants."""
-        if self._state is AdapterState.CONNECTING or self._state in OPEN_STATES:
+        if self._state in SESSION_STATES:
             self._halt(now)
-            self._stop_repeater.end_in_peace()
+            self._stop_repeater.end_on_request()
             self._agenda.retry_at = now + self.settings.stop_repeat_ns
             self._enter(AdapterState.CLOSING, now, "disconnected", why)
 
@@ -529,22 +545,8 @@ class Adapter:
     def _enter(self, state: AdapterState, now: Nanos, what: str, why: str) -> None:
         self._state = state
         self._reason = why
-        self._tell(now, what, why)
+        self._notify(now, what, why)
 
-    def _tell(self, now: Nanos, what: str, detail: str) -> None:
+    def _notify(self, now: Nanos, what: str, detail: str) -> None:
         if self.on_event is not None:
             self.on_event(now, what, detail)
-
-    def _sample(self, now: Nanos) -> None:
-        have_speeds_changed, has_request_ended = self._masters.sample(now)
-        if have_speeds_changed and self._state is AdapterState.DRIVING:
-            self._driver.want(self._masters.speeds)
-        if has_request_ended:
-            self._end_request("p2dx_con is low", now)
-        if self._state is AdapterState.LOST and not self._masters.wants_robot:
-            self._enter(AdapterState.IDLE, now, "idle", "ready for a new connection")
-
-    def _send_pair(self, now: Nanos) -> None:
-        if self._driver.send_pair(self.session, now):
-            speeds, (left, right) = self._driver.sent, self.inputs.motors
-            self._tell(now, "command", f"VEL {speeds.forward_mm_s}, RVEL {speeds.turn_deg_s} (motors {left}, {right})")

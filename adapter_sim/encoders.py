@@ -1,6 +1,10 @@
-"""Wheel travel out of the robot's odometry, and absolute codes out of travel.
+"""The wheels' absolute codes, out of the robot's odometry: SIP to travel, travel to counts, counts to pins.
 
-The wire carries x and y (15 bits, counts of DistConvFactor) and a heading (4096
+Not here: noise, slip or the true pose; the codes show what the robot itself reports.
+
+Theory of operation
+-------------------
+Travel. The wire carries x and y (15 bits, counts of DistConvFactor) and a heading (4096
 counts a turn). Between two packets the robot moved along a chord; its signed
 projection on the mean heading, lengthened to the arc, is the forward step. The
 wheels' travels follow: forward ∓ heading × track / 2.
@@ -18,13 +22,12 @@ What keeps the errors from adding up:
 A step too long for any wheel (after SETO, or a robot that was reset) is no
 travel: it becomes the new reference and is counted.
 
-All shifts are floor shifts of signed integers of 64 bits or less.
-
-Both encoders, from the robot's odometry to the codes on the pins.
-
-Codes walk: at most one code each `encoder_dwell_ns`, so that a program that
+Codes. They walk: at most one code each `encoder_dwell_ns`, so that a program that
 polls never sees a jump, not even when packets were lost and the wheels have
 turned meanwhile.
+
+Invariant: integers only; all shifts are floor shifts of signed integers of 64 bits
+or less, so the C++ twin computes the same.
 """
 
 import math
@@ -50,7 +53,7 @@ ONE_BITS = 30
 #: (2π/4096)² / 24 in 2^-40: the arc's excess over its chord for one squared count of turn.
 _ARC_BITS = 40
 _ARC_E40 = 107_802
-#: Beyond a quarter of a turn between two packets the arc is anybody's guess.
+#: Beyond a quarter of a turn between two packets the arc is unknown: the chord is taken.
 _MOST_TURN = HEADING_MODULUS // 4
 #: π in 1e-9, for the wheel's circumference and the heading's rim travel.
 PI_E9 = 3_141_592_654
@@ -58,31 +61,78 @@ PI_E9 = 3_141_592_654
 #: sin of a quarter turn in half counts, × 2^30, rounded; a test shows that no entry is near a tie.
 _SINE = tuple(round(math.sin(math.pi * k / (2 * _QUARTER)) * (1 << ONE_BITS)) for k in range(_QUARTER + 1))
 
-
-def sine(half_counts: int) -> int:
-    """Return the sine × 2^30 of an angle in 8192nds of a turn."""
-    quadrant, within = divmod(half_counts % HALF_COUNTS, _QUARTER)
-    if quadrant & 1:
-        within = _QUARTER - within
-    value = _SINE[within]
-    return -value if quadrant & 2 else value
+#: One counter of the odometry: total and last value.
+_Counter: TypeAlias = tuple[int, int | None]
+#: Odometry, heading and forward sums, offsets in nm, jumps.
+EncoderSnapshot: TypeAlias = tuple[tuple[_Counter, _Counter, _Counter, int | None], int, int, tuple[int, int], int]
+#: Count shown, time of the last step or None.
+WalkSnapshot: TypeAlias = tuple[int, Nanos | None]
 
 
-def forward_step(dx: int, dy: int, heading_before: int, heading_after: int) -> int:
-    """Return the signed length of a step along its mean heading, in counts × 2^30.
+class WheelCodes:
+    """What both wheels have turned since OPEN, and what of it stands on the pins.
 
     Args:
-        dx: Step in x, in counts.
-        dy: Step in y, in counts.
-        heading_before: Unwrapped heading in counts before the step.
-        heading_after: The same after it.
+        settings: Dwell, and where the codes stand when a session opens.
+        parameters: The robot's lengths.
+        width: Wires of an encoder.
     """
-    mean = heading_before + heading_after
-    chord = dx * sine(mean + _QUARTER) + dy * sine(mean)
-    turn = heading_after - heading_before
-    if abs(turn) > _MOST_TURN:
-        return chord
-    return chord + ((chord >> 20) * (turn * turn * _ARC_E40) >> (_ARC_BITS - 20))
+
+    def __init__(self, settings: AdapterSettings, parameters: RobotParameters, width: int) -> None:
+        self.encoders = Encoders(EncoderGeometry.of(parameters, settings.liveness_ns), width)
+        self._at_open = settings.encoder_at_open
+        self._heading_scale = HEADING_MODULUS // parameters.angle_counts_per_turn
+        self._walks = (CodeWalk(settings.encoder_dwell_ns), CodeWalk(settings.encoder_dwell_ns))
+
+    @property
+    def counts(self) -> tuple[int, int]:
+        """Return the encoder steps of both wheels, left first."""
+        return self.encoders.counts
+
+    @property
+    def shown(self) -> tuple[int, int]:
+        """Return the counts whose codes stand on the pins."""
+        return self._walks[0].shown, self._walks[1].shown
+
+    def open(self) -> None:
+        """Begin with a session's first packet."""
+        if self._at_open is EncoderAtOpen.ZERO:
+            for walk in self._walks:
+                walk.rebase(1 << self.encoders.width)
+            self.encoders.begin()
+        else:
+            self.encoders.begin(self.shown)
+
+    def reset(self) -> None:
+        """Forget everything."""
+        self.encoders.begin()
+        self.encoders.jumps = 0
+        for walk in self._walks:
+            walk.reset()
+
+    def take(self, sip: StandardSip) -> bool:
+        """Add the odometry of a SIP; tell whether it is a plausible step."""
+        return self.encoders.take(sip.raw_x, sip.raw_y, sip.raw_heading * self._heading_scale)
+
+    def due_at(self, now: Nanos) -> list[Nanos | None]:
+        """Return when each encoder's next step is due, None where it has arrived."""
+        return [walk.due_at(target, now) for walk, target in zip(self._walks, self.counts, strict=True)]
+
+    def walk(self, now: Nanos) -> tuple[int, int]:
+        """Take the steps that are due; return the counts to show."""
+        for walk, target in zip(self._walks, self.counts, strict=True):
+            walk.step(target, now)
+        return self.shown
+
+    def snapshot(self) -> tuple[EncoderSnapshot, tuple[WalkSnapshot, ...]]:
+        """Return all of it as plain values."""
+        return self.encoders.snapshot(), tuple(walk.snapshot() for walk in self._walks)
+
+    def restore(self, snapshot: tuple[EncoderSnapshot, tuple[WalkSnapshot, ...]]) -> None:
+        """Put back what `snapshot` returned."""
+        self.encoders.restore(snapshot[0])
+        for walk, saved in zip(self._walks, snapshot[1], strict=True):
+            walk.restore(saved)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -92,7 +142,7 @@ class EncoderGeometry:
     distance_nm_per_count: int
     track_mm: int
     wheel_diameter_um: int
-    #: Longest believable step between two packets.
+    #: Longest plausible step between two packets.
     longest_step_um: int
 
     @classmethod
@@ -110,12 +160,6 @@ class EncoderGeometry:
     def circumference_nm(self) -> int:
         """Return the way of one turn of a wheel."""
         return divide_half_away(self.wheel_diameter_um * PI_E9, 10**6)
-
-
-#: One counter of the odometry: total and last value.
-_Counter: TypeAlias = tuple[int, int | None]
-#: Odometry, heading and forward sums, offsets in nm, jumps.
-EncoderSnapshot: TypeAlias = tuple[tuple[_Counter, _Counter, _Counter, int | None], int, int, tuple[int, int], int]
 
 
 class Encoders:
@@ -175,7 +219,7 @@ class Encoders:
         )
 
     def take(self, raw_x: int, raw_y: int, raw_heading: int) -> bool:
-        """Add the odometry of a packet; tell whether it could be believed as a step."""
+        """Add the odometry of a packet; tell whether it is a plausible step."""
         dx, dy, turn = self._x.update(raw_x), self._y.update(raw_y), self._turn.update(raw_heading)
         before, self._raw_heading = self._raw_heading, raw_heading % HEADING_MODULUS
         if before is None:
@@ -198,10 +242,6 @@ class Encoders:
         self._x.restore(x)
         self._y.restore(y)
         self._turn.restore(turn)
-
-
-#: Count shown, time of the last step or None.
-WalkSnapshot: TypeAlias = tuple[int, Nanos | None]
 
 
 class CodeWalk:
@@ -242,67 +282,27 @@ class CodeWalk:
         self.shown, self._stepped_at = snapshot
 
 
-class WheelCodes:
-    """What both wheels have turned since OPEN, and what of it stands on the pins.
+def sine(half_counts: int) -> int:
+    """Return the sine × 2^30 of an angle in 8192nds of a turn."""
+    quadrant, within = divmod(half_counts % HALF_COUNTS, _QUARTER)
+    if quadrant & 1:
+        within = _QUARTER - within
+    value = _SINE[within]
+    return -value if quadrant & 2 else value
+
+
+def forward_step(dx: int, dy: int, heading_before: int, heading_after: int) -> int:
+    """Return the signed length of a step along its mean heading, in counts × 2^30.
 
     Args:
-        settings: Dwell, and where the codes stand when a session opens.
-        parameters: The robot's lengths.
-        width: Wires of an encoder.
+        dx: Step in x, in counts.
+        dy: Step in y, in counts.
+        heading_before: Unwrapped heading in counts before the step.
+        heading_after: The same after it.
     """
-
-    def __init__(self, settings: AdapterSettings, parameters: RobotParameters, width: int) -> None:
-        self.encoders = Encoders(EncoderGeometry.of(parameters, settings.liveness_ns), width)
-        self._at_open = settings.encoder_at_open
-        self._heading_scale = HEADING_MODULUS // parameters.angle_counts_per_turn
-        self._walks = (CodeWalk(settings.encoder_dwell_ns), CodeWalk(settings.encoder_dwell_ns))
-
-    @property
-    def counts(self) -> tuple[int, int]:
-        """Return the encoder steps of both wheels, left first."""
-        return self.encoders.counts
-
-    @property
-    def shown(self) -> tuple[int, int]:
-        """Return the counts whose codes stand on the pins."""
-        return self._walks[0].shown, self._walks[1].shown
-
-    def open(self) -> None:
-        """Begin with a session's first packet."""
-        if self._at_open is EncoderAtOpen.ZERO:
-            for walk in self._walks:
-                walk.rebase(1 << self.encoders.width)
-            self.encoders.begin()
-        else:
-            self.encoders.begin(self.shown)
-
-    def reset(self) -> None:
-        """Forget everything."""
-        self.encoders.begin()
-        self.encoders.jumps = 0
-        for walk in self._walks:
-            walk.reset()
-
-    def take(self, sip: StandardSip) -> bool:
-        """Add the odometry of a SIP; tell whether it could be believed as a step."""
-        return self.encoders.take(sip.raw_x, sip.raw_y, sip.raw_heading * self._heading_scale)
-
-    def due_at(self, now: Nanos) -> list[Nanos | None]:
-        """Return when each encoder's next step is due, None where it has arrived."""
-        return [walk.due_at(target, now) for walk, target in zip(self._walks, self.counts, strict=True)]
-
-    def walk(self, now: Nanos) -> tuple[int, int]:
-        """Take the steps that are due; return the counts to show."""
-        for walk, target in zip(self._walks, self.counts, strict=True):
-            walk.step(target, now)
-        return self.shown
-
-    def snapshot(self) -> tuple[EncoderSnapshot, tuple[WalkSnapshot, ...]]:
-        """Return all of it as plain values."""
-        return self.encoders.snapshot(), tuple(walk.snapshot() for walk in self._walks)
-
-    def restore(self, snapshot: tuple[EncoderSnapshot, tuple[WalkSnapshot, ...]]) -> None:
-        """Put back what `snapshot` returned."""
-        self.encoders.restore(snapshot[0])
-        for walk, saved in zip(self._walks, snapshot[1], strict=True):
-            walk.restore(saved)
+    mean = heading_before + heading_after
+    chord = dx * sine(mean + _QUARTER) + dy * sine(mean)
+    turn = heading_after - heading_before
+    if abs(turn) > _MOST_TURN:
+        return chord
+    return chord + ((chord >> 20) * (turn * turn * _ARC_E40) >> (_ARC_BITS - 20))

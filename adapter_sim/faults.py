@@ -1,21 +1,16 @@
-"""Faults of the adapter's pins and supply, for tests: what a model can suffer at will.
+"""Fault injection around an adapter, for tests: its pins, its supply, the speed of its loop.
 
-A `FaultyPins` stands between an adapter and its pin bank. It changes what is read
-and what arrives at the far side; the adapter knows nothing of it. Works for the
-model and for the firmware's core alike.
+Both wrappers serve the model and the firmware's core alike, and the adapter knows
+nothing of them. `FaultyPins` stands between an adapter and its pin bank and changes
+what is read and what arrives at the far side. `SlowLoop` stands around an adapter
+whose program is slow: a pass begins each `pass_ns`; bytes that come in between wait in
+the UART, pins are read as they stand when the pass begins, and everything that was due
+since the last pass happens now, for hardware can only answer for the present.
 
 Not here: faults of the serial line (the bench's own), noise in volts.
 
-Invariant: without faults it passes everything on as it is.
-
-An adapter whose program is slow: it looks and acts only every so often.
-
-Theory of operation. The model's own loop takes no time. Here a pass begins each
-`pass_ns`; bytes that come in between wait in the UART, pins are read as they stand
-when the pass begins, and everything that was due since the last pass happens now:
-hardware can only answer for the present.
-
-Invariant: nothing leaves, and no pin changes, between two passes.
+Invariant: without faults everything passes as it is; around a slow loop nothing
+leaves, and no pin changes, between two passes.
 """
 
 from collections.abc import Callable, Iterable
@@ -107,7 +102,7 @@ class FaultyPins:
         return level or (signal == self._reset and any(start <= at < end for start, end in self._brown_outs))
 
     def write(self, signal: str, high: bool | None, now: Nanos) -> None:
-        """Drive a wire, as far as it lets itself be driven."""
+        """Drive a wire, as far as its faults let it."""
         if signal not in self._wanted:
             self._pins.write(signal, high, now)
             return
@@ -120,7 +115,7 @@ class FaultyPins:
             self._brown_outs.append((fault.at, end))
             return
         if fault.signal not in names:
-            raise UsageError(f"there is no wire {fault.signal!r} to break", hint="the wires stand in pinout.toml")
+            raise UsageError(f"there is no wire {fault.signal!r}", hint="the wires stand in pinout.toml")
         if isinstance(fault, StuckPin):
             self._stuck.setdefault(fault.signal, []).append(fault)
         elif fault.signal in outputs:
@@ -143,7 +138,7 @@ class FaultyPins:
             self._pins.write(name, level, now)
 
 
-class AnyAdapter(Protocol):
+class LoopedAdapter(Protocol):
     """What a loop runs: the model, or the firmware's core in its place."""
 
     @property
@@ -186,7 +181,7 @@ class SlowLoop:
         UsageError: A pass that takes no time is no slow loop.
     """
 
-    def __init__(self, make: Callable[[PinBank], AnyAdapter], pins: PinBank, pass_ns: Nanos, now: Nanos = 0) -> None:
+    def __init__(self, make: Callable[[PinBank], LoopedAdapter], pins: PinBank, pass_ns: Nanos, now: Nanos = 0) -> None:
         if pass_ns <= 0:
             raise UsageError(f"a pass of {pass_ns} ns is no slow loop", hint="use the adapter itself")
         self._pins = _PresentPins(pins, now)

@@ -4,19 +4,39 @@ Invariant: the other master's pins and reports are followed, so that nothing is
 stale after a change, but they move nothing.
 """
 
+from enum import StrEnum
 from typing import TypeAlias
 
-from adapter_sim.mixing import Gamepad, GamepadSnapshot, Master, Mixer, PadReport, Speeds
+from adapter_sim.mixing import Mixer, Speeds
 from adapter_sim.pins import Inputs, InputSnapshot
 from adapter_sim.settings import AdapterSettings
+from p2os.gamepad import Gamepad as AnyGamepad
+from p2os.gamepad import GamepadSnapshot, PadReport
 from p2os.timing import Nanos
+
+
+class Master(StrEnum):
+    """Who commands the robot; never both."""
+
+    BLUEPILL = "bluepill"
+    PAD = "pad"
+
+
+class Gamepad(AnyGamepad):
+    """A game pad with the adapter's settings: what its newest report asks for."""
+
+    def __init__(self, settings: AdapterSettings) -> None:
+        super().__init__(
+            trigger_dead=settings.pad_trigger_dead, stick_dead=settings.pad_stick_dead, loss_ns=settings.pad_loss_ns
+        )
+
 
 #: Master, inputs, pad.
 MastersSnapshot: TypeAlias = tuple[str, InputSnapshot, GamepadSnapshot]
 
 
 class Masters:
-    """Both masters, and which of them is listened to.
+    """Both masters, and which of them commands.
 
     Args:
         inputs: The BluePill's pins.
@@ -76,7 +96,7 @@ class Masters:
         self._pad.forget_request()
 
     def switch(self, master: Master) -> None:
-        """Listen to another master; the pad has to report anew."""
+        """Take commands from another master; the pad has to report anew."""
         self.master = master
         self._pad.lose()
 

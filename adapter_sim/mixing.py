@@ -1,4 +1,4 @@
-"""Motor values to VEL and RVEL, in integers.
+"""Motor values and a pad's deflections to VEL and RVEL, in integers.
 
 With `MotorMeaning.WHEELS` the two values are rim speeds of a differential
 drive: v = (left + right) / 2, ω = (right − left) / track. VEL takes whole mm/s
@@ -9,37 +9,14 @@ half a degree a second: 1.6 mm/s at each rim with a track of 357 mm.
 Where a speed is over its limit both are scaled by the same factor (towards
 zero), so that the robot keeps its path and only takes longer.
 
-A game pad as the adapter's other master: `p2os.gamepad`, with the adapter's settings.
+Invariant: what leaves here is within the robot's limits and those of the settings.
 """
 
 from dataclasses import dataclass
-from enum import StrEnum
 
 from adapter_sim.codec import divide_half_away
 from adapter_sim.settings import AdapterSettings, MotorMeaning
-from p2os.gamepad import STICK_FULL, TRIGGER_FULL, GamepadSnapshot, PadReport
-from p2os.gamepad import Gamepad as AnyGamepad
-
-__all__ = ["STICK_FULL", "TRIGGER_FULL", "Gamepad", "GamepadSnapshot", "Master", "PadReport"]
-
-
-class Master(StrEnum):
-    """Who commands the robot; never both."""
-
-    BLUEPILL = "bluepill"
-    PAD = "pad"
-
-
-class Gamepad(AnyGamepad):
-    """What the newest report asks for."""
-
-    def __init__(self, settings: AdapterSettings) -> None:
-        super().__init__(
-            trigger_dead=settings.pad_trigger_dead,
-            stick_dead=settings.pad_stick_dead,
-            loss_ns=settings.pad_loss_ns,
-        )
-
+from p2os.gamepad import STICK_FULL, TRIGGER_FULL
 
 #: 180/π, in 1e-9.
 DEG_PER_RAD_E9 = 57_295_779_513

@@ -1,15 +1,14 @@
-"""The pin-out, read from pinout.toml and checked.
+"""The pin-out, read from pinout.toml and checked, and what of it an ESP32's pins can bear.
 
-Invariant: a `Pinout` that exists names every wire once, gives every pin of the
-BluePill to one wire only, and has for each value all bits from 0 to width − 1.
-
-What an ESP32's pins can and cannot do, asked of a pin-out.
-
-Source: reference of the ESP32 D1 mini's pins as the board review found them:
-GPIO6..11 carry the module's flash, GPIO34..39 are inputs only, GPIO0, 2, 5, 12
+Source of the rules: reference of the ESP32 D1 mini's pins as the board review found
+them: GPIO6..11 carry the module's flash, GPIO34..39 are inputs only, GPIO0, 2, 5, 12
 and 15 are straps that decide how the chip boots.
 
 Not here: series resistors, voltages, rise times (the board's own checks).
+
+Invariant: a `Pinout` that exists names every wire once, gives every pin of the
+BluePill to one wire only, and has for each value all bits from 0 to width − 1. Whether
+a revision of the board can work is another question: `faults_of` answers it.
 """
 
 import re
@@ -158,6 +157,36 @@ class Pinout:
         return tuple(wire for wire in self.wires if wire.role is role)
 
 
+#: Version of the file format.
+SCHEMA = 1
+#: The chip has ports A to E; the BluePill brings out A to C.
+_BLUEPILL_PIN = re.compile(r"P[A-C]([0-9]|1[0-5])")
+_ESP32_PIN = re.compile(r"IO([0-9]|[12][0-9]|3[0-9])|EN|HC595\.Q[A-H]")
+#: Who drives the wires of a role.
+_DRIVEN = {
+    WireRole.DISTANCE: Direction.TO_BLUEPILL,
+    WireRole.ENCODER: Direction.TO_BLUEPILL,
+    WireRole.MOTOR: Direction.TO_ADAPTER,
+    WireRole.CONNECT: Direction.TO_ADAPTER,
+    WireRole.RESET: Direction.TO_ADAPTER,
+}
+#: Values that the adapter cannot do without, with their roles and sides.
+_NEEDED_VALUES = {
+    "encoder1": (WireRole.ENCODER, "left"),
+    "encoder2": (WireRole.ENCODER, "right"),
+    "motor1": (WireRole.MOTOR, "left"),
+    "motor2": (WireRole.MOTOR, "right"),
+}
+#: Pins of the module's own flash chip.
+FLASH_GPIO = frozenset(range(6, 12))
+#: Pins without an output driver.
+INPUT_ONLY_GPIO = frozenset(range(34, 40))
+#: Pins read at boot; a BluePill that drives one can keep the ESP32 from booting.
+STRAP_GPIO = frozenset({0, 2, 5, 12, 15})
+#: Pins of the second input register: read together, they are one atomic sample.
+SECOND_REGISTER_GPIO = frozenset(range(32, 40))
+
+
 def load_pinout(path: str | Path | None = None) -> Pinout:
     """Read and check a pin-out file.
 
@@ -194,11 +223,11 @@ def parse_pinout(text: str, where: str = "pinout") -> Pinout:
     values = tuple(_value(row, wires) for row in top.rows("value"))
     auxiliaries = tuple(_auxiliary(row, names, wires) for row in top.rows("auxiliary", optional=True))
     top.finish()
-    _refuse_twins(where, "revision", names)
-    _refuse_twins(where, "wire", [wire.name for wire in wires])
-    _refuse_twins(where, "BluePill pin", [wire.bluepill for wire in wires])
-    _refuse_twins(where, "value", [value.name for value in values])
-    _refuse_twins(where, "auxiliary", [auxiliary.name for auxiliary in auxiliaries])
+    _refuse_duplicates(where, "revision", names)
+    _refuse_duplicates(where, "wire", [wire.name for wire in wires])
+    _refuse_duplicates(where, "BluePill pin", [wire.bluepill for wire in wires])
+    _refuse_duplicates(where, "value", [value.name for value in values])
+    _refuse_duplicates(where, "auxiliary", [auxiliary.name for auxiliary in auxiliaries])
     if default not in names:
         raise PinoutError(f"{where}: default_revision {default!r} is none of {', '.join(names)}")
     _check_roles(where, wires, values)
@@ -207,26 +236,54 @@ def parse_pinout(text: str, where: str = "pinout") -> Pinout:
     )  # fmt: skip
 
 
-#: Version of the file format.
-SCHEMA = 1
-#: The chip has ports A to E; the BluePill brings out A to C.
-_BLUEPILL_PIN = re.compile(r"P[A-C]([0-9]|1[0-5])")
-_ESP32_PIN = re.compile(r"IO([0-9]|[12][0-9]|3[0-9])|EN|HC595\.Q[A-H]")
-#: Who drives the wires of a role.
-_DRIVEN = {
-    WireRole.DISTANCE: Direction.TO_BLUEPILL,
-    WireRole.ENCODER: Direction.TO_BLUEPILL,
-    WireRole.MOTOR: Direction.TO_ADAPTER,
-    WireRole.CONNECT: Direction.TO_ADAPTER,
-    WireRole.RESET: Direction.TO_ADAPTER,
-}
-#: Values that the adapter cannot do without, with their roles and sides.
-_NEEDED_VALUES = {
-    "encoder1": (WireRole.ENCODER, "left"),
-    "encoder2": (WireRole.ENCODER, "right"),
-    "motor1": (WireRole.MOTOR, "left"),
-    "motor2": (WireRole.MOTOR, "right"),
-}
+def faults_of(pinout: Pinout, revision: str) -> list[str]:
+    """Return why a revision of the board cannot work, one line each, in the order of the table.
+
+    Raises:
+        KeyError: The pin-out has no such revision.
+    """
+    faults: list[str] = []
+    taken: dict[str, str] = {}
+    for wire in pinout.wires:
+        pin = wire.esp32_pin(revision)
+        faults += _wire_faults(wire, pin)
+        if pin is not None and pin in taken:
+            faults.append(f"{wire.name}: {pin} is {taken[pin]} already")
+        elif pin is not None:
+            taken[pin] = wire.name
+    for auxiliary in pinout.auxiliaries:
+        pin = dict(auxiliary.esp32).get(revision)
+        if pin is None:
+            continue
+        if pin in taken and taken[pin] != auxiliary.shares:
+            faults.append(f"{auxiliary.name}: {pin} is {taken[pin]} already")
+        taken.setdefault(pin, auxiliary.name)
+    motors = [_gpio(wire.esp32_pin(revision)) for wire in pinout.with_role(WireRole.MOTOR)]
+    if any(gpio not in SECOND_REGISTER_GPIO for gpio in motors):
+        faults.append("motor wires: not all in IO32..IO39, so no one read samples them at one instant")
+    return faults
+
+
+def require_usable(pinout: Pinout, revision: str) -> None:
+    """Refuse a revision that cannot work.
+
+    Raises:
+        PinoutError: It does not exist, or has faults; the message has the first, the hint the number.
+    """
+    known = {entry.name: entry for entry in pinout.revisions}
+    if revision not in known:
+        raise PinoutError(f"board revision {revision!r} is unknown", hint="one of " + ", ".join(known))
+    faults = faults_of(pinout, revision)
+    if not faults and known[revision].status is Status.FAULTY:
+        faults = [known[revision].note]
+    if faults:
+        raise PinoutError(
+            f"board revision {revision!r} cannot work: {faults[0]}",
+            hint=f"{len(faults)} such faults; {pinout.default_revision} has none",
+        )
+
+
+# Reading a file: each table asks for its keys, and what is left over is refused.
 
 _Kind = TypeVar("_Kind", bound=StrEnum)
 
@@ -364,7 +421,7 @@ def _auxiliary(row: _Row, revisions: list[str], wires: tuple[Wire, ...]) -> Auxi
     )
 
 
-def _refuse_twins(where: str, what: str, names: list[str]) -> None:
+def _refuse_duplicates(where: str, what: str, names: list[str]) -> None:
     seen: set[str] = set()
     for name in names:
         if name in seen:
@@ -391,61 +448,7 @@ def _check_roles(where: str, wires: tuple[Wire, ...], values: tuple[Value, ...])
         raise PinoutError(f"{where}: wire {stray[0]!r} belongs to no [[value]]")
 
 
-#: Pins of the module's own flash chip.
-FLASH_GPIO = frozenset(range(6, 12))
-#: Pins without an output driver.
-INPUT_ONLY_GPIO = frozenset(range(34, 40))
-#: Pins read at boot; a BluePill that drives one can keep the ESP32 from booting.
-STRAP_GPIO = frozenset({0, 2, 5, 12, 15})
-#: Pins of the second input register: read together, they are one atomic sample.
-SECOND_REGISTER_GPIO = frozenset(range(32, 40))
-
-
-def faults_of(pinout: Pinout, revision: str) -> list[str]:
-    """Return why a revision of the board cannot work, one line each, in the order of the table.
-
-    Raises:
-        KeyError: The pin-out has no such revision.
-    """
-    faults: list[str] = []
-    taken: dict[str, str] = {}
-    for wire in pinout.wires:
-        pin = wire.esp32_pin(revision)
-        faults += _wire_faults(wire, pin)
-        if pin is not None and pin in taken:
-            faults.append(f"{wire.name}: {pin} is {taken[pin]} already")
-        elif pin is not None:
-            taken[pin] = wire.name
-    for auxiliary in pinout.auxiliaries:
-        pin = dict(auxiliary.esp32).get(revision)
-        if pin is None:
-            continue
-        if pin in taken and taken[pin] != auxiliary.shares:
-            faults.append(f"{auxiliary.name}: {pin} is {taken[pin]} already")
-        taken.setdefault(pin, auxiliary.name)
-    motors = [_gpio(wire.esp32_pin(revision)) for wire in pinout.with_role(WireRole.MOTOR)]
-    if any(gpio not in SECOND_REGISTER_GPIO for gpio in motors):
-        faults.append("motor wires: not all in IO32..IO39, so no one read samples them at one instant")
-    return faults
-
-
-def require_usable(pinout: Pinout, revision: str) -> None:
-    """Refuse a revision that cannot work.
-
-    Raises:
-        PinoutError: It does not exist, or has faults; the message has the first, the hint the number.
-    """
-    known = {entry.name: entry for entry in pinout.revisions}
-    if revision not in known:
-        raise PinoutError(f"board revision {revision!r} is unknown", hint="one of " + ", ".join(known))
-    faults = faults_of(pinout, revision)
-    if not faults and known[revision].status is Status.FAULTY:
-        faults = [known[revision].note]
-    if faults:
-        raise PinoutError(
-            f"board revision {revision!r} cannot work: {faults[0]}",
-            hint=f"{len(faults)} such faults; {pinout.default_revision} has none",
-        )
+# Judging a revision, pin by pin.
 
 
 def _wire_faults(wire: Wire, pin: str | None) -> list[str]:

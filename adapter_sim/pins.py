@@ -1,32 +1,31 @@
-"""The adapter's output pins: distances and encoder codes, released or driven.
+"""The adapter's pins: what it needs of the far side, when it samples, debounced inputs, outputs.
 
-Only changes are written.
+The bench's nets, a real GPIO bank and the fakes of the tests all fit `PinBank`. What
+the levels mean for the robot is not decided here; names and weights come from the
+pin-out.
 
-What the adapter needs of the far side: a bank of named pins.
+Theory of operation
+-------------------
+One sample is one word: the motor wires from bit 0 on, then p2dx_con, all read at the
+same instant, as one read of the ESP32's input register does. rst is not debounced.
 
-The bench's nets, a real GPIO bank and the fakes of the tests all fit this shape.
+Motor wires are debounced by majority: a word is taken when it makes up more than half
+of the last samples; while no word does (the BluePill is half-way through writing its
+bits), the last one taken stays. With 5 samples 2 ms apart a change is taken at its
+third sample: 4 to 6 ms after the edge. A glitch seen by two samples or fewer passes
+without effect.
 
-When the adapter looks at its input pins: every period, or only from an edge on once they have settled.
+p2dx_con is debounced by time: it counts as high once it has been seen high for MORE
+than `connect_after_ns` without a break, and as low once it has been seen low for
+`disconnect_after_ns`. Both spans run from the first sample that saw the level; a dip
+between two samples is not seen.
 
-Invariant: sample instants are whole periods apart from each other, slept through or not.
+Once the inputs have settled, sampling may be suspended until an edge comes, where
+whoever runs the adapter brings it to each edge: the samples left out would have
+changed nothing.
 
-Debounced inputs: motor wires by majority, p2dx_con by time.
-
-At each sample instant all motor wires are read together as one word. A word is
-taken when it makes up more than half of the last samples; while no word does
-(the BluePill is half-way through writing its bits), the last one taken stays.
-With 5 samples 2 ms apart a change is taken at its third sample: 4 to 6 ms after
-the edge. A glitch seen by two samples or fewer passes without effect.
-
-p2dx_con counts as high once it has been seen high for MORE than
-`connect_after_ns` without a break, and as low once it has been seen low for
-`disconnect_after_ns`. Both spans run from the first sample that saw the level;
-a dip between two samples is not seen.
-
-The adapter's input pins, sampled together.
-
-One sample is one word: the motor wires from bit 0 on, then p2dx_con. All wires
-are read at the same instant, as one read of the ESP32's input register does.
+Invariant: sample instants are whole periods apart from each other, suspended or not,
+and an output is written only when it changes.
 """
 
 from collections.abc import Callable
@@ -37,8 +36,17 @@ from adapter_sim.pinout import Pinout, Safe, WireRole
 from adapter_sim.settings import AdapterSettings
 from p2os.timing import Nanos
 
-#: Told of each transition: (now in ns, what happened in a word or two, detail).
+#: Called at each transition: (now in ns, what happened in a word or two, detail).
 EventCallback: TypeAlias = Callable[[Nanos, str, str], None]
+#: Values of the pin-out that the wheels' codes are, left first.
+ENCODER_VALUES = ("encoder1", "encoder2")
+
+#: Word taken, equal samples in a row, window.
+MajoritySnapshot: TypeAlias = tuple[int, int, tuple[int, ...]]
+#: Level that counts, level seen, since when.
+DebounceSnapshot: TypeAlias = tuple[bool, bool, Nanos]
+#: Last word, motor wires, p2dx_con.
+InputSnapshot: TypeAlias = tuple[int, MajoritySnapshot, DebounceSnapshot]
 
 
 class PinBank(Protocol):
@@ -53,16 +61,147 @@ class PinBank(Protocol):
         ...
 
 
+class Inputs:
+    """Motor values by majority, p2dx_con by time, rst as it stands."""
+
+    def __init__(self, pins: PinBank, pinout: Pinout, settings: AdapterSettings) -> None:
+        self._pins = pins
+        self._bit_order = settings.bit_order
+        self._motors = tuple(pinout.value(name) for name in ("motor1", "motor2"))
+        names = [name for value in self._motors for name in value.wires]
+        names.append(pinout.with_role(WireRole.CONNECT)[0].name)
+        self._wires = tuple((name, 1 << bit) for bit, name in enumerate(names))
+        self._connect_weight = 1 << (len(names) - 1)
+        self._reset_wire = pinout.with_role(WireRole.RESET)[0].name
+        self._majority = Majority(settings.sample_count)
+        self._connect = Debounce(settings.connect_after_ns, settings.disconnect_after_ns)
+        self._word = 0
+
+    @property
+    def motors(self) -> tuple[int, int]:
+        """Return the signed motor values taken, motor1 first."""
+        word, values = self._majority.word, []
+        for value in self._motors:
+            values.append(motor_value(word & ((1 << value.width) - 1), value.width, self._bit_order))
+            word >>= value.width
+        return values[0], values[1]
+
+    @property
+    def wires(self) -> tuple[str, ...]:
+        """Return the names of all wires that are looked at."""
+        return (*(name for name, _ in self._wires), self._reset_wire)
+
+    @property
+    def wants_robot(self) -> bool:
+        """Tell whether p2dx_con counts as high."""
+        return self._connect.level
+
+    def is_reset(self, now: Nanos) -> bool:
+        """Tell whether rst is high."""
+        return self._pins.read(self._reset_wire, now)
+
+    def is_quiet(self, now: Nanos) -> bool:
+        """Tell whether a sample at `now` would change nothing: the fast path of most instants."""
+        return (
+            self._majority.is_settled
+            and self._connect.is_settled
+            and self._read(now) == self._word
+            and not self._pins.read(self._reset_wire, now)
+        )
+
+    def sample(self, now: Nanos) -> tuple[bool, bool]:
+        """Take a sample; tell whether the motor values and whether p2dx_con have changed."""
+        word = self._word = self._read(now)
+        motors_changed = self._majority.take(word & (self._connect_weight - 1))
+        return motors_changed, self._connect.take(bool(word & self._connect_weight), now)
+
+    def reset(self) -> None:
+        """Forget all samples."""
+        self._word = 0
+        self._majority.reset()
+        self._connect.reset()
+
+    def snapshot(self) -> InputSnapshot:
+        """Return all of it as plain values."""
+        return self._word, self._majority.snapshot(), self._connect.snapshot()
+
+    def restore(self, snapshot: InputSnapshot) -> None:
+        """Put back what `snapshot` returned."""
+        self._word, majority, connect = snapshot
+        self._majority.restore(majority)
+        self._connect.restore(connect)
+
+    def _read(self, now: Nanos) -> int:
+        read, word = self._pins.read, 0
+        for name, weight in self._wires:
+            if read(name, now):
+                word |= weight
+        return word
+
+
+class Outputs:
+    """Writes levels to the pins, each change once."""
+
+    def __init__(self, pins: PinBank, pinout: Pinout) -> None:
+        self._pins = pins
+        self._distances = pinout.with_role(WireRole.DISTANCE)
+        self._encoders = tuple(
+            tuple(pinout.wire(name) for name in pinout.value(value).wires) for value in ENCODER_VALUES
+        )
+        self._shown: dict[str, bool | None] = {wire.name: None for wire in self._distances}
+        self._shown.update((wire.name, None) for wires in self._encoders for wire in wires)
+
+    def release(self, now: Nanos) -> None:
+        """Let every output follow its pull."""
+        for name in self._shown:
+            self._write(name, None, now)
+
+    def show_safe(self, now: Nanos) -> None:
+        """Drive the safe level of pinout.toml; wires that hold stay as they are."""
+        for wire in self._distances:
+            if wire.safe is not Safe.HOLD:
+                self._write(wire.name, wire.safe is Safe.HIGH, now)
+
+    def show_distances(self, levels: tuple[bool, ...], now: Nanos) -> None:
+        """Drive the distance wires, wire 1 first."""
+        for wire, level in zip(self._distances, levels, strict=True):
+            self._write(wire.name, level, now)
+
+    def show_encoders(self, counts: tuple[int, int], now: Nanos) -> None:
+        """Drive both encoders' codes, left first."""
+        for wires, count in zip(self._encoders, counts, strict=True):
+            for bit, wire in enumerate(wires):
+                self._write(wire.name, bool(count >> bit & 1), now)
+
+    @property
+    def levels(self) -> dict[str, bool | None]:
+        """Return what each output shows; None is released."""
+        return dict(self._shown)
+
+    def snapshot(self) -> tuple[tuple[str, bool | None], ...]:
+        """Return all of it as plain values."""
+        return tuple(self._shown.items())
+
+    def restore(self, snapshot: tuple[tuple[str, bool | None], ...]) -> None:
+        """Put back what `snapshot` returned; nothing is written, the wires have their own."""
+        self._shown = dict(snapshot)
+
+    def _write(self, name: str, level: bool | None, now: Nanos) -> None:
+        if self._shown[name] is not level:
+            self._shown[name] = level
+            self._pins.write(name, level, now)
+
+
 class SampleClock:
     """The next sample instant."""
 
     def __init__(self, period_ns: Nanos) -> None:
         self._period_ns = period_ns
         self.next: Nanos = 0
-        #: Whether whoever runs the adapter brings it to every edge of its input wires: then it looks at
-        #: settled pins no more until one comes.
+        #: Whether whoever runs the adapter brings it to every edge of its input wires: then settled pins
+        #: are not sampled again until one comes.
         self.waits_for_edges = False
-        self.is_asleep = False
+        self.is_suspended = False
 
     def after(self, now: Nanos) -> None:
         """Let the next sample come a period after `now`."""
@@ -71,23 +210,17 @@ class SampleClock:
     def was_quiet(self, now: Nanos) -> None:
         """Note that the sample at `now` changed nothing and that later ones will not either without an edge."""
         self.after(now)
-        self.is_asleep = self.waits_for_edges
+        self.is_suspended = self.waits_for_edges
 
-    def wake(self, now: Nanos) -> None:
+    def resume(self, now: Nanos) -> None:
         """Go on from the first sample instant at or after `now`; those before would have changed nothing."""
-        if self.is_asleep:
-            self.is_asleep = False
+        if self.is_suspended:
+            self.is_suspended = False
             self.next += max(0, -((self.next - now) // self._period_ns)) * self._period_ns
 
     def due(self, other: Nanos) -> Nanos:
         """Return the earlier of the next sample that is taken and another deadline."""
-        return other if self.is_asleep else min(self.next, other)
-
-
-#: Word taken, equal samples in a row, window.
-MajoritySnapshot: TypeAlias = tuple[int, int, tuple[int, ...]]
-#: Level that counts, level seen, since when.
-DebounceSnapshot: TypeAlias = tuple[bool, bool, Nanos]
+        return other if self.is_suspended else min(self.next, other)
 
 
 class Majority:
@@ -180,141 +313,3 @@ class Debounce:
     def restore(self, snapshot: DebounceSnapshot) -> None:
         """Put back what `snapshot` returned."""
         self.level, self._raw, self._since = snapshot
-
-
-InputSnapshot: TypeAlias = tuple[int, MajoritySnapshot, DebounceSnapshot]
-
-
-class Inputs:
-    """Motor values by majority, p2dx_con by time, rst as it stands."""
-
-    def __init__(self, pins: PinBank, pinout: Pinout, settings: AdapterSettings) -> None:
-        self._pins = pins
-        self._bit_order = settings.bit_order
-        self._motors = tuple(pinout.value(name) for name in ("motor1", "motor2"))
-        names = [name for value in self._motors for name in value.wires]
-        names.append(pinout.with_role(WireRole.CONNECT)[0].name)
-        self._wires = tuple((name, 1 << bit) for bit, name in enumerate(names))
-        self._connect_weight = 1 << (len(names) - 1)
-        self._reset_wire = pinout.with_role(WireRole.RESET)[0].name
-        self._majority = Majority(settings.sample_count)
-        self._connect = Debounce(settings.connect_after_ns, settings.disconnect_after_ns)
-        self._word = 0
-
-    @property
-    def motors(self) -> tuple[int, int]:
-        """Return the signed motor values taken, motor1 first."""
-        word, values = self._majority.word, []
-        for value in self._motors:
-            values.append(motor_value(word & ((1 << value.width) - 1), value.width, self._bit_order))
-            word >>= value.width
-        return values[0], values[1]
-
-    @property
-    def wires(self) -> tuple[str, ...]:
-        """Return the names of all wires that are looked at."""
-        return (*(name for name, _ in self._wires), self._reset_wire)
-
-    @property
-    def wants_robot(self) -> bool:
-        """Tell whether p2dx_con counts as high."""
-        return self._connect.level
-
-    def is_reset(self, now: Nanos) -> bool:
-        """Tell whether rst is high."""
-        return self._pins.read(self._reset_wire, now)
-
-    def is_quiet(self, now: Nanos) -> bool:
-        """Tell whether a sample at `now` would change nothing: the fast path of most instants."""
-        return (
-            self._majority.is_settled
-            and self._connect.is_settled
-            and self._read(now) == self._word
-            and not self._pins.read(self._reset_wire, now)
-        )
-
-    def sample(self, now: Nanos) -> tuple[bool, bool]:
-        """Take a sample; tell whether the motor values and whether p2dx_con have changed."""
-        word = self._word = self._read(now)
-        motors_changed = self._majority.take(word & (self._connect_weight - 1))
-        return motors_changed, self._connect.take(bool(word & self._connect_weight), now)
-
-    def reset(self) -> None:
-        """Forget all samples."""
-        self._word = 0
-        self._majority.reset()
-        self._connect.reset()
-
-    def snapshot(self) -> InputSnapshot:
-        """Return all of it as plain values."""
-        return self._word, self._majority.snapshot(), self._connect.snapshot()
-
-    def restore(self, snapshot: InputSnapshot) -> None:
-        """Put back what `snapshot` returned."""
-        self._word, majority, connect = snapshot
-        self._majority.restore(majority)
-        self._connect.restore(connect)
-
-    def _read(self, now: Nanos) -> int:
-        read, word = self._pins.read, 0
-        for name, weight in self._wires:
-            if read(name, now):
-                word |= weight
-        return word
-
-
-#: The values of both wheels, left first.
-ENCODER_VALUES = ("encoder1", "encoder2")
-
-
-class Outputs:
-    """Writes levels to the pins, each change once."""
-
-    def __init__(self, pins: PinBank, pinout: Pinout) -> None:
-        self._pins = pins
-        self._distances = pinout.with_role(WireRole.DISTANCE)
-        self._encoders = tuple(
-            tuple(pinout.wire(name) for name in pinout.value(value).wires) for value in ENCODER_VALUES
-        )
-        self._shown: dict[str, bool | None] = {wire.name: None for wire in self._distances}
-        self._shown.update((wire.name, None) for wires in self._encoders for wire in wires)
-
-    def release(self, now: Nanos) -> None:
-        """Let every output follow its pull."""
-        for name in self._shown:
-            self._write(name, None, now)
-
-    def show_safe(self, now: Nanos) -> None:
-        """Drive the safe level of pinout.toml; wires that hold stay as they are."""
-        for wire in self._distances:
-            if wire.safe is not Safe.HOLD:
-                self._write(wire.name, wire.safe is Safe.HIGH, now)
-
-    def show_distances(self, levels: tuple[bool, ...], now: Nanos) -> None:
-        """Drive the distance wires, wire 1 first."""
-        for wire, level in zip(self._distances, levels, strict=True):
-            self._write(wire.name, level, now)
-
-    def show_encoders(self, counts: tuple[int, int], now: Nanos) -> None:
-        """Drive both encoders' codes, left first."""
-        for wires, count in zip(self._encoders, counts, strict=True):
-            for bit, wire in enumerate(wires):
-                self._write(wire.name, bool(count >> bit & 1), now)
-
-    @property
-    def levels(self) -> dict[str, bool | None]:
-        """Return what each output shows; None is released."""
-        return dict(self._shown)
-
-    def snapshot(self) -> tuple[tuple[str, bool | None], ...]:
-        """Return all of it as plain values."""
-        return tuple(self._shown.items())
-
-    def restore(self, snapshot: tuple[tuple[str, bool | None], ...]) -> None:
-        """Put back what `snapshot` returned; nothing is written, the wires have their own."""
-        self._shown = dict(snapshot)
-
-    def _write(self, name: str, level: bool | None, now: Nanos) -> None:
-        if self._shown[name] is not level:
-            self._shown[name] = level
-            self._pins.write(name, level, now)

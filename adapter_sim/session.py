@@ -1,8 +1,9 @@
-"""A P2OS session as the adapter needs it: connect, talk, and stop the robot first.
+"""A P2OS session as the adapter needs it: connect, send and receive, and stop the robot first.
 
 Around `p2os.protocol.connection.Connection`, which synchronises and keeps the watchdog
-fed. Added here: the stop sequence before each SYNC0 and before each CLOSE, SIPs
-handed on, everything else folded into "opened" and "ended, because".
+fed. Added here: the stop sequence before each SYNC0 and before each CLOSE, and its
+repetitions after a session; SIPs handed on, everything else folded into "opened" and
+"ended, because". When to connect and when a session is lost is the adapter's to decide.
 
 Any packet revives the last speed of a robot that its watchdog has stopped, and
 the adapter cannot know what a robot was doing before. So STOP, VEL 0 and RVEL 0
@@ -10,13 +11,11 @@ stand before every SYNC0, the repeated ones included: a cable that is plugged in
 between two tries must not set the robot off. They also go out at boot: whoever
 reset the adapter may have done so while the robot drove.
 
+Nobody confirms the stop sequence, so it is repeated: after a loss it goes out once
+and then `stop_repeats` times more. A robot that was closed on its master's request
+confirms by its silence: there the sequence is repeated only while bytes still come.
+
 Invariant: what `take_output` returns begins, after `abandon`, with STOP.
-
-The stop sequence after a session, said again and again: nobody confirms it.
-
-After a loss it goes out once and then `stop_repeats` times more. A robot that was
-closed in peace shows by its silence that it has understood: to such a one the
-sequence is repeated only while it is still heard.
 """
 
 from dataclasses import dataclass
@@ -42,7 +41,7 @@ from p2os.timing import NS_PER_MS, Nanos
 
 @dataclass(frozen=True, slots=True)
 class SessionOpened:
-    """OPEN was sent to a robot that has said who it is."""
+    """OPEN was sent to a robot that has identified itself."""
 
     robot: str
 
@@ -101,7 +100,7 @@ class Session:
         self._output = [*_STOPS, _CLOSE]
 
     def drop(self, now: Nanos) -> None:
-        """End the session without a word."""
+        """End the session without sending anything."""
         self._connection.disconnect(now)
         self._connection.take_output()
         while self._connection.next_event() is not None:
@@ -109,7 +108,7 @@ class Session:
         self._output = []
 
     def forget(self) -> None:
-        """Know nothing, as after a reset."""
+        """Forget everything, as after a reset."""
         self._connection = Connection(ConnectionRole.CLIENT, settings=self._settings)
         self._output = []
         self._robot = ""
@@ -166,15 +165,15 @@ class Session:
             self._output.append(frame)
 
 
-#: A robot heard from so recently is still streaming: one SIP period.
-_ECHO_NS: Nanos = 100 * NS_PER_MS
+#: A robot whose bytes came so recently is still streaming: one SIP period.
+_STREAMING_NS: Nanos = 100 * NS_PER_MS
 
-#: Next repetition, how many are left, whether in peace, when the robot was heard last.
+#: Next repetition, how many are left, whether closed on request, when bytes of the robot came last.
 StopRepeaterSnapshot: TypeAlias = tuple[Nanos, int, bool, Nanos]
 
 
 class StopRepeater:
-    """How often the stop sequence is still to be said, and when."""
+    """How often the stop sequence still goes out, and when."""
 
     def __init__(self, settings: AdapterSettings) -> None:
         self._repeats = settings.stop_repeats
@@ -185,46 +184,46 @@ class StopRepeater:
         """Forget everything."""
         self._at: Nanos = 0
         self._left = 0
-        self._in_peace = False
+        self._is_closed_on_request = False
         #: When bytes of the robot came last. A SIP found late, behind a false header, is as old as they are.
-        self.heard_at: Nanos = 0
+        self.received_at: Nanos = 0
 
     @property
     def due_at(self) -> Nanos | None:
         """Return when the next repetition is due, None for no more."""
         return self._at if self._left else None
 
-    def hear(self, now: Nanos) -> None:
+    def note_bytes(self, now: Nanos) -> None:
         """Take note that bytes of the robot came."""
-        self.heard_at = now
+        self.received_at = now
 
     def begin(self, session: Session, now: Nanos) -> None:
-        """Say the sequence and CLOSE, and plan its repetitions; `end_in_peace` may follow."""
+        """Send the sequence and CLOSE, and plan its repetitions; `end_on_request` may follow."""
         session.abandon(now)
         self._left = self._repeats
         self._at = now + self._period_ns
-        self._in_peace = False
+        self._is_closed_on_request = False
 
-    def end_in_peace(self) -> None:
-        """Take note that the session ended on its master's connect request."""
-        self._in_peace = True
+    def end_on_request(self) -> None:
+        """Take note that the session ended because its master withdrew the connect request."""
+        self._is_closed_on_request = True
 
     def cancel(self) -> None:
         """Plan nothing more: a new session begins, and with it a new sequence."""
         self._left = 0
 
     def repeat(self, session: Session, now: Nanos) -> None:
-        """Say it again if it is due."""
+        """Send it again if it is due."""
         if self._left and now >= self._at:
             self._left -= 1
             self._at = now + self._period_ns
-            if not self._in_peace or now - self.heard_at < _ECHO_NS:
+            if not self._is_closed_on_request or now - self.received_at < _STREAMING_NS:
                 session.abandon(now)
 
     def snapshot(self) -> StopRepeaterSnapshot:
         """Return all of it as plain values."""
-        return self._at, self._left, self._in_peace, self.heard_at
+        return self._at, self._left, self._is_closed_on_request, self.received_at
 
     def restore(self, snapshot: StopRepeaterSnapshot) -> None:
         """Put back what `snapshot` returned."""
-        self._at, self._left, self._in_peace, self.heard_at = snapshot
+        self._at, self._left, self._is_closed_on_request, self.received_at = snapshot

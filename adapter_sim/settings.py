@@ -29,6 +29,12 @@ class EncoderAtOpen(StrEnum):
     CONTINUE = "continue"
 
 
+#: Settings that were renamed: old name to present name, for those who read settings from a user's file.
+RENAMED_SETTINGS = {
+    "disbelief_ns": "plausibility_ns",
+    "disbelief_tolerance_mm_s": "plausibility_tolerance_mm_s",
+    "disbelief_progress_mm_s": "plausibility_progress_mm_s",
+}
 #: More line speeds than this are not searched.
 MAX_BAUDS = 8
 
@@ -78,7 +84,7 @@ class AdapterSettings:
     retry_ns: Nanos = 1 * NS_PER_S
     #: SIP speeds that neither approach the command nor come with a stall flag for this long.
     plausibility_ns: Nanos = 1 * NS_PER_S
-    #: A wheel within this of its command is believed. # chosen: over half a step of 62.5 mm/s
+    #: A wheel within this of its command follows it. # chosen: over half a step of 62.5 mm/s
     plausibility_tolerance_mm_s: int = 40
     #: Coming nearer by this much counts as approaching. # chosen: above the jitter of a wheel at rest
     plausibility_progress_mm_s: int = 5

@@ -1,10 +1,9 @@
-"""Which adapter stands between the wires and the robot: the model, or the firmware's own core.
+"""Which adapter stands between the wires and the robot: the Python model, or the firmware's own core.
 
-The adapter's firmware core in the model's place: the same calls, executed by the C++ of adapter_fw.
-
-The core is a shared library with a plain C interface (adapter_fw/capi), built
-with the package where a C++17 compiler is there, and loaded by ctypes. What is
-told (events, status) has the model's words, so that a run's log can be compared.
+The core is the C++ of adapter_fw: a shared library with a plain C interface
+(adapter_fw/capi/adapter_capi.h), built with the package where a C++17 compiler is
+there, and loaded by ctypes. `FirmwareAdapter` takes the calls of `adapter_sim.Adapter`,
+and its events and status have the model's words, so that logs can be compared.
 
 Invariant: nothing is decided here; pins, bytes, times and settings go through as
 they are.
@@ -19,11 +18,13 @@ from typing import Any, TypeAlias, cast
 from adapter_sim.adapter import Adapter, AdapterState, AdapterStatus
 from adapter_sim.codec import BitOrder
 from adapter_sim.distances import threshold_um
-from adapter_sim.mixing import Master, PadReport, Speeds
+from adapter_sim.masters import Master
+from adapter_sim.mixing import Speeds
 from adapter_sim.pinout import Pinout, Safe, WireRole
 from adapter_sim.pins import EventCallback, PinBank
 from adapter_sim.settings import AdapterSettings, EncoderAtOpen, MotorMeaning
 from p2os.errors import MissingDependencyError, UsageError
+from p2os.gamepad import PadReport
 from p2os.robots.parameters import RobotParameters
 from p2os.timing import NS_PER_S, Nanos, Reached
 from robot_bench.scenario.scenario import Scenario
@@ -86,92 +87,6 @@ def is_available() -> bool:
     return find_spec("robot_bench._adapter_firmware") is not None
 
 
-@cache
-def _library() -> Any:
-    spec = find_spec("robot_bench._adapter_firmware")
-    if spec is None or spec.origin is None:
-        raise MissingDependencyError(
-            "the adapter's firmware core is not built",
-            hint="install a C++17 compiler (apt-get install g++) and the package again",
-        )
-    library = ctypes.CDLL(spec.origin)
-    for name, kinds in _FUNCTIONS.items():
-        function = getattr(library, name)
-        function.restype = _TYPES[kinds[0]]
-        function.argtypes = [_TYPES[kind] for kind in kinds[1:]]
-    if library.adapter_version() != VERSION:
-        raise MissingDependencyError(
-            f"the adapter's firmware core has interface {library.adapter_version()}, expected {VERSION}",
-            hint="install the package again",
-        )
-    return library
-
-
-def _names(function: Callable[[int], bytes | None]) -> list[str]:
-    names: list[str] = []
-    while (name := function(len(names))) is not None:
-        names.append(name.decode())
-    return names
-
-
-def _numbers(names: list[str], values: dict[str, int]) -> Any:
-    return (ctypes.c_int64 * len(names))(*(values[name] for name in names))
-
-
-def default_settings() -> dict[str, int]:
-    """Return the firmware's own defaults, by the names of its settings."""
-    library = _library()
-    return {
-        name: library.adapter_setting_default(place) for place, name in enumerate(_names(library.adapter_setting_name))
-    }
-
-
-def setting_numbers(settings: AdapterSettings, parameters: RobotParameters) -> dict[str, int]:
-    """Return a model's settings as the firmware's numbers."""
-    numbers = {}
-    for name in default_settings():
-        if name.startswith("baud"):
-            place = int(name.removeprefix("baud"))
-            numbers[name] = settings.bauds[place] if place < len(settings.bauds) else 0
-            continue
-        value = getattr(settings, name)
-        if name == "threshold_um":
-            value = threshold_um(value, parameters)
-        if name in _CHOICES:
-            value = _CHOICES[name].index(value)
-        numbers[name] = -1 if value is None else int(value)
-    return numbers
-
-
-def robot_numbers(parameters: RobotParameters) -> dict[str, int]:
-    """Return a robot's numbers as the firmware wants them."""
-    return {
-        "distance_nm_per_count": parameters.distance_nm_per_count,
-        "angle_counts_per_turn": parameters.angle_counts_per_turn,
-        "velocity_um_s_per_count": parameters.velocity_um_s_per_count,
-        "range_um_per_count": parameters.range_um_per_count,
-        "track_mm": parameters.track_mm,
-        "wheel_diameter_um": round(parameters.body.wheel_diameter_m * 10**6),
-        "ceiling_mm_s": parameters.max_velocity_mm_s,
-        "max_velocity_mm_s": min(parameters.max_velocity_mm_s, parameters.motion.max_velocity_mm_s),
-        "max_rotation_deg_s": min(parameters.max_rotation_deg_s, parameters.motion.max_rotation_deg_s),
-        "half_sonar_range_um": threshold_um(None, parameters),
-    }
-
-
-def wire_numbers(pinout: Pinout) -> dict[str, int]:
-    """Return a pin-out's widths and safe levels as the firmware wants them."""
-    distances = pinout.with_role(WireRole.DISTANCE)
-    return {
-        "distances": len(distances),
-        "motor1_width": pinout.value("motor1").width,
-        "motor2_width": pinout.value("motor2").width,
-        "encoder_width": pinout.value("encoder1").width,
-        "safe_mask": sum(1 << bit for bit, wire in enumerate(distances) if wire.safe is not Safe.HOLD),
-        "safe_levels": sum(1 << bit for bit, wire in enumerate(distances) if wire.safe is Safe.HIGH),
-    }
-
-
 class FirmwareAdapter:
     """The firmware core as a passive part in virtual time; see `adapter_sim.Adapter`.
 
@@ -180,7 +95,7 @@ class FirmwareAdapter:
         pinout: Names, widths and levels of the wires.
         parameters: The robot's own numbers.
         settings: None takes the defaults.
-        on_event: Told of each transition.
+        on_event: Called at each transition.
         now: When power comes, in nanoseconds.
 
     Raises:
@@ -283,7 +198,7 @@ class FirmwareAdapter:
         self._raise_failure()
 
     def shutdown(self, reason: str, now: Nanos) -> None:
-        """Stop the robot, drive every output to its safe level, and wait for the connect request to end."""
+        """Stop the robot, drive every output to its safe level, and wait for the connect request to be withdrawn."""
         self._library.adapter_shutdown(self._handle, reason.encode(), now)
         self._raise_failure()
 
@@ -364,9 +279,6 @@ class FirmwareAdapter:
 
 AnyAdapter: TypeAlias = Adapter | FirmwareAdapter
 
-#: What a scenario and a command line call them.
-_KINDS: dict[str, type[Adapter] | type[FirmwareAdapter]] = {"model": Adapter, "firmware": FirmwareAdapter}
-
 
 def make_adapter(scenario: Scenario, pins: PinBank, pinout: Pinout) -> AnyAdapter:
     """Return the adapter that a scenario wants.
@@ -374,5 +286,94 @@ def make_adapter(scenario: Scenario, pins: PinBank, pinout: Pinout) -> AnyAdapte
     Raises:
         MissingDependencyError: The firmware's core is wanted and was not built.
     """
-    kind = _KINDS[scenario.adapter_core]
+    kind = {"model": Adapter, "firmware": FirmwareAdapter}[scenario.adapter_core]
     return kind(pins=pins, pinout=pinout, parameters=scenario.parameters, settings=scenario.adapter)
+
+
+def default_settings() -> dict[str, int]:
+    """Return the firmware's own defaults, by the names of its settings."""
+    library = _library()
+    return {
+        name: library.adapter_setting_default(place) for place, name in enumerate(_names(library.adapter_setting_name))
+    }
+
+
+def setting_numbers(settings: AdapterSettings, parameters: RobotParameters) -> dict[str, int]:
+    """Return a model's settings as the firmware's numbers."""
+    numbers = {}
+    for name in default_settings():
+        if name.startswith("baud"):
+            place = int(name.removeprefix("baud"))
+            numbers[name] = settings.bauds[place] if place < len(settings.bauds) else 0
+            continue
+        value = getattr(settings, name)
+        if name == "threshold_um":
+            value = threshold_um(value, parameters)
+        if name in _CHOICES:
+            value = _CHOICES[name].index(value)
+        numbers[name] = -1 if value is None else int(value)
+    return numbers
+
+
+def robot_numbers(parameters: RobotParameters) -> dict[str, int]:
+    """Return a robot's numbers as the firmware wants them."""
+    return {
+        "distance_nm_per_count": parameters.distance_nm_per_count,
+        "angle_counts_per_turn": parameters.angle_counts_per_turn,
+        "velocity_um_s_per_count": parameters.velocity_um_s_per_count,
+        "range_um_per_count": parameters.range_um_per_count,
+        "track_mm": parameters.track_mm,
+        "wheel_diameter_um": round(parameters.body.wheel_diameter_m * 10**6),
+        "ceiling_mm_s": parameters.max_velocity_mm_s,
+        "max_velocity_mm_s": min(parameters.max_velocity_mm_s, parameters.motion.max_velocity_mm_s),
+        "max_rotation_deg_s": min(parameters.max_rotation_deg_s, parameters.motion.max_rotation_deg_s),
+        "half_sonar_range_um": threshold_um(None, parameters),
+    }
+
+
+def wire_numbers(pinout: Pinout) -> dict[str, int]:
+    """Return a pin-out's widths and safe levels as the firmware wants them."""
+    distances = pinout.with_role(WireRole.DISTANCE)
+    return {
+        "distances": len(distances),
+        "motor1_width": pinout.value("motor1").width,
+        "motor2_width": pinout.value("motor2").width,
+        "encoder_width": pinout.value("encoder1").width,
+        "safe_mask": sum(1 << bit for bit, wire in enumerate(distances) if wire.safe is not Safe.HOLD),
+        "safe_levels": sum(1 << bit for bit, wire in enumerate(distances) if wire.safe is Safe.HIGH),
+    }
+
+
+# The shared library.
+
+
+@cache
+def _library() -> Any:
+    spec = find_spec("robot_bench._adapter_firmware")
+    if spec is None or spec.origin is None:
+        raise MissingDependencyError(
+            "the adapter's firmware core is not built",
+            hint="install a C++17 compiler (apt-get install g++) and the package again",
+        )
+    library = ctypes.CDLL(spec.origin)
+    for name, kinds in _FUNCTIONS.items():
+        function = getattr(library, name)
+        function.restype = _TYPES[kinds[0]]
+        function.argtypes = [_TYPES[kind] for kind in kinds[1:]]
+    if library.adapter_version() != VERSION:
+        raise MissingDependencyError(
+            f"the adapter's firmware core has interface {library.adapter_version()}, expected {VERSION}",
+            hint="install the package again",
+        )
+    return library
+
+
+def _names(function: Callable[[int], bytes | None]) -> list[str]:
+    names: list[str] = []
+    while (name := function(len(names))) is not None:
+        names.append(name.decode())
+    return names
+
+
+def _numbers(names: list[str], values: dict[str, int]) -> Any:
+    return (ctypes.c_int64 * len(names))(*(values[name] for name in names))

@@ -33,14 +33,14 @@ from robot_bench.recording.recorder import Recorder
 from robot_bench.recording.trace import TraceWriter
 from robot_bench.scenario.fault_script import FaultScript
 from robot_bench.scenario.scenario import Scenario
-from robot_bench.scenario.world_script import Script
+from robot_bench.scenario.world_script import WorldScript
 from robot_bench.wires.chip_pins import ChipPins
 from robot_bench.wires.endpoints import Endpoint
 from robot_bench.wires.nets import Harness, Net, OwnedPins, Strength
 from robot_bench.wires.ports import Chip
 from robot_bench.wires.serial_line import SerialLine
 
-#: chosen: so long a run goes on after the firmware has died, to show what the robot does then.
+#: chosen: so long a run goes on after a fault of the firmware, to show what the robot does then.
 AFTER_FAULT_NS: Nanos = 1 * NS_PER_S
 #: Owner of the resistors on the wires.
 RESISTORS = "board"
@@ -107,24 +107,24 @@ class Bench:
         self._robots: list[RobotSide] = []
         self._ranges: SipRanges | None = None
         self.parts = self._build(pinout, world, body, chip, harness)
-        self.script = Script(
+        self.script = WorldScript(
             scenario.changes, body, scenario.parameters,
             bring_to=self._bring_robot_to, on_change=self.recorder.obstacle,
         )  # fmt: skip
         self.recorder.bring_to = self._bring_robot_to
-        self.faults = FaultScript(scenario.faults, bring_to=self._bring_robot_to, do=self._say_to_robot)
+        self.faults = FaultScript(scenario.faults, bring_to=self._bring_robot_to, do=self._inject)
         followers = (*self._robots, self.script, self.faults, self.recorder)
         self.loop = RunLoop(chip, followers, slice_ns=slice_ns, on_slice=self._after_slice)
         pin_of = {wire.name: wire.bluepill for wire in pinout.wires}
         pins = ChipPins(chip, harness, pin_of, on_watched=self.loop.note_edge)
         for wire in pinout.with_role(WireRole.RESET):
             pins.watch(wire.name)
-        self._wake_adapter_by_edges(pins, harness)
+        self._bring_adapter_to_edges(pins, harness)
         chip.usart1.on_transmit = lambda byte, at: self.recorder.usart(bytes([byte]), at)
         chip.on_warning = lambda text: self.recorder.event("chip", chip.now_ns, "warning", text)
         self.recorder.start()
 
-    def _wake_adapter_by_edges(self, pins: ChipPins, harness: Harness) -> None:
+    def _bring_adapter_to_edges(self, pins: ChipPins, harness: Harness) -> None:
         """Let a model of the adapter that looks at settled pins wait for their edges instead of sampling on."""
         adapter = self.parts.adapter
         if isinstance(adapter, Adapter):
@@ -155,11 +155,11 @@ class Bench:
         return self.parts.chip.now_ns
 
     def run_until(self, end: Nanos, advance: Callable[[int], LeaderReached] | None = None) -> None:
-        """Run to `end`, until shortly after the firmware has died, or to a debugger's halt.
+        """Run to `end`, until shortly after a fault of the firmware, or to a debugger's halt.
 
         Args:
-            end: when to come back.
-            advance: as of `RunLoop.run_until`.
+            end: When to come back.
+            advance: As of `RunLoop.run_until`.
         """
         self.loop.run_until(min(end, self.end), advance)
 
@@ -206,7 +206,7 @@ class Bench:
         for robot in self._robots:
             robot.advance_to(at)
 
-    def _say_to_robot(self, words: str, at: Nanos) -> None:
+    def _inject(self, words: str, at: Nanos) -> None:
         if self.parts.pioneer is not None:
             self.parts.pioneer.do(words, at)
 

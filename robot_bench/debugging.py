@@ -2,7 +2,7 @@
 
 In virtual time the whole bench goes back with the chip, by the snapshots of all
 its parts, and the trace loses what was written since. With a real robot nothing
-goes back, and nothing stands still by itself: before the first halt is told of,
+goes back, and nothing stands still by itself: before the first halt is reported,
 the robot is stopped and its session closed, and the run is over.
 
 Invariant: a run that a debugger has halted and let go on leaves the same trace
@@ -44,7 +44,7 @@ class BenchMachine:
 
     @property
     def end_ns(self) -> Nanos | None:
-        """When the scenario's time is up, or the firmware has been dead for a while."""
+        """When the scenario's time is up, or the firmware had its fault a while ago."""
         return self._bench.end
 
     def advance_to(self, limit_ns: Nanos, *, by_step: bool = False) -> Reached:
@@ -57,7 +57,7 @@ class BenchMachine:
             reached = run(limit)
             if reached.halt is not None:
                 self._halt = reached
-                self._bench.loop.stand_still(is_inside_block=chip.engine.is_inside_block)
+                self._bench.loop.note_halt(is_inside_block=chip.engine.is_inside_block)
             return reached
 
         self._bench.run_until(limit_ns, advance)
@@ -107,7 +107,7 @@ class RemoteMachine:
             reached = run(limit)
             if reached.halt is not None:
                 halt.append(reached)
-                self._bench.loop.stand_still(is_inside_block=chip.engine.is_inside_block)
+                self._bench.loop.note_halt(is_inside_block=chip.engine.is_inside_block)
             return reached
 
         self._bench.loop.run_until(limit_ns, advance)
@@ -122,6 +122,6 @@ class RemoteMachine:
         raise BluePillError("a real robot cannot go back")
 
     def halted(self) -> None:
-        """Stop the robot and close its session: it would drive on by its last order."""
+        """Stop the robot and close its session: it would drive on by its last command."""
         self._is_over = True
         self._bench.close()

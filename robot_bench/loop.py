@@ -6,9 +6,9 @@ by one basic block. Then every deadline that the leader has passed is acted on,
 in order of time: those who are due are brought there, in their fixed order. At
 the moment of an edge on a watched net all are. Nets keep their history, so that
 a follower at time t reads the levels of t. A follower that needs another one
-brought up to date first (the recorder, the body) says so itself.
+brought up to date first (the recorder, the body) brings it there itself.
 
-Followers are never brought to the boundary of a slice: the slice limit only says
+Followers are never brought to the boundary of a slice: the slice limit only sets
 how often the leader gives control back (for pacing, progress and Ctrl-C). So
 the result does not depend on it.
 
@@ -28,7 +28,7 @@ from p2os.timing import NS_PER_MS, Nanos, Reached
 
 #: chosen: the pacer's grain; small enough for a live view, large enough to cost nothing.
 DEFAULT_SLICE_NS: Nanos = 1 * NS_PER_MS
-#: How often followers may wake each other at one and the same instant before it is called a fault.
+#: How often followers may make each other due at one and the same instant before it is called a fault.
 MOST_ROUNDS = 16
 #: Later than any deadline.
 NEVER: Nanos = 1 << 62
@@ -69,7 +69,7 @@ class Follower(Protocol):
 
 
 class StuckError(P2osError):
-    """Parts kept waking each other without time passing; any such case is a bug here."""
+    """Parts kept making each other due without time passing; any such case is a bug here."""
 
 
 class RunLoop:
@@ -104,7 +104,7 @@ class RunLoop:
         if not self._edges or self._edges[-1] != at:
             self._edges.append(at)
 
-    def stand_still(self, *, is_inside_block: bool) -> None:
+    def note_halt(self, *, is_inside_block: bool) -> None:
         """Have `run_until` come back: the leader has halted for a debugger."""
         self._is_halted, self._is_inside_block = True, is_inside_block
 
@@ -113,16 +113,16 @@ class RunLoop:
         self._end = min(self._end, end)
 
     def run_until(self, end: Nanos, advance: Callable[[int], LeaderReached] | None = None) -> None:
-        """Run to `end` in nanoseconds, to what `end_at` says in the meantime, or to a halt.
+        """Run to `end` in nanoseconds, to what `end_at` sets in the meantime, or to a halt.
 
         A leader that stands still for good lets time pass like any other.
 
         Args:
-            end: when to come back.
-            advance: brings the leader forward in place of its `advance_to`; a debugger's step.
+            end: When to come back.
+            advance: Brings the leader forward in place of its `advance_to`; a debugger's step.
 
         Raises:
-            StuckError: Two parts wake each other for ever.
+            StuckError: Two parts make each other due without end.
         """
         self._end = end
         self._advance = advance or self.leader.advance_to
@@ -166,7 +166,7 @@ class RunLoop:
         return now
 
     def _next_due(self) -> Nanos:
-        """Return the earliest deadline, and note everybody's."""
+        """Return the earliest deadline, and note those of all."""
         due = self._edges[0] if self._edges else NEVER
         noted = self._deadlines = [
             NEVER if at is None else at for at in [part.next_deadline() for part in self.followers]
@@ -174,7 +174,7 @@ class RunLoop:
         return min(due, *noted) if noted else due
 
     def _follow(self, due: Nanos) -> None:
-        """Bring those who are due to `due`, as noted; at a watched edge everybody."""
+        """Bring those who are due to `due`, as noted; at a watched edge all."""
         self._rounds = self._rounds + 1 if due <= self.now else 0
         if self._rounds > MOST_ROUNDS:
             late = [type(part).__name__ for part in self.followers if (part.next_deadline() or NEVER) <= due]

@@ -18,7 +18,7 @@ PACED_SLICE_NS: Nanos = 2 * NS_PER_MS
 
 
 class RealTimePacer:
-    """Holds virtual time back to the wall clock, and says how far it lags behind.
+    """Holds virtual time back to the wall clock, and measures how far it lags behind.
 
     Args:
         speed: Virtual seconds a wall second, above 0.

@@ -2,9 +2,9 @@
 
     chip ─ nets ─ adapter ─ transport ─ a real Pioneer, or any P2OS server
 
-It runs in real time. A loop that lags the wall clock would steer by old news,
-so too much lag ends the run; so do a lost line and a robot that the adapter no
-longer believes. However it ends, the robot is stopped and closed.
+It runs in real time. A loop that lags the wall clock would steer by outdated data,
+so too much lag ends the run; so do a lost line and a robot that the adapter
+has lost. However it ends, the robot is stopped and closed.
 
 Invariant: `close` sends the stop sequence, once, whatever happened before.
 """

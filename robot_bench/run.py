@@ -2,12 +2,9 @@
 
 The trace is written while the run goes on; when the run ends, however it ends,
 the goals are judged from it and everything else in the folder is made from it.
+What the folder holds is listed in `robot_bench.report.make`.
 
 Invariant: whatever raises in between, the trace is closed and readable.
-
-The run folder, and the first line of its trace.
-
-What the folder holds is listed in `robot_bench.report.make__artefacts`.
 """
 
 import contextlib
@@ -34,8 +31,119 @@ from robot_bench.report.make import make_artefacts
 from robot_bench.scenario.goals import judge
 from robot_bench.scenario.scenario import Scenario
 
-#: What mode C says of the place that it knows nothing of; 8 m of an empty plan.
+#: chosen: without pacing, control comes back often enough for progress and signals.
+UNPACED_SLICE_NS: Nanos = 10 * NS_PER_MS
+#: Nothing seen of the firmware for so long at the end of a run is worth a note: it spins, or hangs.
+QUIET_NS: Nanos = 1 * NS_PER_S
+#: What mode C records as the world, of which it knows nothing: 8 m of an empty plan.
 UNKNOWN_PLACE: Json = {"name": "the real one", "extent": [-4.0, -4.0, 4.0, 4.0], "obstacles": []}
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Progress:
+    """Where a run stands."""
+
+    now: Nanos
+    duration_ns: Nanos
+    #: Returns what the robot is doing, in a few words.
+    doing: Callable[[], str]
+
+
+#: Runs a bench to its end in place of its `run_until`, as a debugger does.
+RunBench = Callable[[Bench], None]
+RunRemoteBench = Callable[[RemoteBench], None]
+_AnyBench = TypeVar("_AnyBench", Bench, RemoteBench)
+ProgressListener = Callable[[Progress], None]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RunResult:
+    """A run that came to an end."""
+
+    folder: Path
+    outcome: Json
+    report: Path
+    #: A signal ended it.
+    was_interrupted: bool
+
+    @property
+    def passed(self) -> bool:
+        """Whether every goal was met and nothing failed."""
+        return bool(self.outcome["passed"])
+
+
+def run_scenario(
+    scenario: Scenario,
+    folder: Path,
+    *,
+    slice_ns: Nanos | None = None,
+    speed: float | None = None,
+    on_progress: ProgressListener | None = None,
+    clock: Clock = wall_clock,
+    drive: RunBench | None = None,
+) -> RunResult:
+    """Run a scenario in virtual time and make its run folder.
+
+    Args:
+        scenario: What to run.
+        folder: Where to; made where it is missing.
+        slice_ns: How often the loop gives control back; without effect on the result.
+        speed: Virtual seconds a wall second; None runs as fast as it can.
+        on_progress: Called after each slice; a KeyboardInterrupt out of it ends the run in good order.
+        clock: Wall clock in nanoseconds.
+        drive: Runs the bench in place of its `run_until`; a debugger.
+
+    Raises:
+        P2osError: A file cannot be read, or a part is not installed.
+    """
+    prepare_folder(folder)
+    pacer = None if speed is None else RealTimePacer(speed=speed, clock=clock)
+    with contextlib.closing(TraceWriter(folder / TRACE_NAME)) as trace:
+        bench = Bench(scenario, trace=trace, slice_ns=slice_ns or (PACED_SLICE_NS if pacer else UNPACED_SLICE_NS))
+
+        def after_slice(now: Nanos) -> None:
+            if pacer is not None:
+                pacer.keep_pace(now)
+            if on_progress is not None:
+                on_progress(Progress(now=now, duration_ns=scenario.duration_ns, doing=lambda: doing(bench)))
+
+        bench.on_slice = after_slice
+        trace.meta(meta_of(scenario, bench.parts.world, bench.note))
+        return _record(bench, trace, folder, pacer, clock, drive)
+
+
+def run_at_port(
+    scenario: Scenario,
+    folder: Path,
+    transport: Transport,
+    *,
+    on_progress: ProgressListener | None = None,
+    clock: Clock = wall_clock,
+    drive: RunRemoteBench | None = None,
+) -> RunResult:
+    """Drive the robot at a transport in real time (mode C), stop it, and make the run folder.
+
+    The transport is closed in any case. A lost line, lag and a signal are failures of the run.
+
+    With `drive`, a debugger runs the bench in place of its `run_until`.
+
+    Raises:
+        P2osError: A file cannot be read, or a part is not installed.
+    """
+    pacer = RealTimePacer(clock=clock)
+    with contextlib.ExitStack() as stack:
+        stack.callback(transport.close)
+        prepare_folder(folder)
+        trace = stack.enter_context(contextlib.closing(TraceWriter(folder / TRACE_NAME)))
+        bench = RemoteBench(scenario, transport, pacer, trace=trace)
+
+        def after_slice(now: Nanos) -> None:
+            if on_progress is not None:
+                on_progress(Progress(now=now, duration_ns=scenario.duration_ns, doing=lambda: doing(bench)))
+
+        bench.on_slice = after_slice
+        trace.meta(meta_of(scenario, None, bench.note))
+        return _record(bench, trace, folder, pacer, clock, drive)
 
 
 def prepare_folder(folder: Path) -> None:
@@ -89,119 +197,6 @@ def meta_of(scenario: Scenario, world: World | None, note: str | None) -> Json:
             "sonar_range_m": parameters.sonar_range_m,
         },
     }
-
-
-#: chosen: without pacing, control comes back often enough for progress and signals.
-UNPACED_SLICE_NS: Nanos = 10 * NS_PER_MS
-#: Nothing seen of the firmware for so long at the end of a run is worth a word: it spins, or has died quietly.
-QUIET_NS: Nanos = 1 * NS_PER_S
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Progress:
-    """Where a run stands."""
-
-    now: Nanos
-    duration_ns: Nanos
-    #: Returns what the robot is doing, in a few words.
-    doing: Callable[[], str]
-
-
-#: Runs a bench to its end, however it likes.
-Driver = Callable[[Bench], None]
-RemoteDriver = Callable[[RemoteBench], None]
-_AnyBench = TypeVar("_AnyBench", Bench, RemoteBench)
-ProgressListener = Callable[[Progress], None]
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class RunResult:
-    """A run that came to an end."""
-
-    folder: Path
-    outcome: Json
-    report: Path
-    #: A signal ended it.
-    was_interrupted: bool
-
-    @property
-    def passed(self) -> bool:
-        """Whether every goal was met and nothing failed."""
-        return bool(self.outcome["passed"])
-
-
-def run_scenario(
-    scenario: Scenario,
-    folder: Path,
-    *,
-    slice_ns: Nanos | None = None,
-    speed: float | None = None,
-    on_progress: ProgressListener | None = None,
-    clock: Clock = wall_clock,
-    drive: Driver | None = None,
-) -> RunResult:
-    """Run a scenario in virtual time and make its run folder.
-
-    Args:
-        scenario: What to run.
-        folder: Where to; made where it is missing.
-        slice_ns: How often the loop gives control back; without effect on the result.
-        speed: Virtual seconds a wall second; None runs as fast as it can.
-        on_progress: Called after each slice; a KeyboardInterrupt out of it ends the run in good order.
-        clock: Wall clock in nanoseconds.
-        drive: Runs the bench in place of its `run_until`; a debugger.
-
-    Raises:
-        P2osError: A file cannot be read, or a part is not installed.
-    """
-    prepare_folder(folder)
-    pacer = None if speed is None else RealTimePacer(speed=speed, clock=clock)
-    with contextlib.closing(TraceWriter(folder / TRACE_NAME)) as trace:
-        bench = Bench(scenario, trace=trace, slice_ns=slice_ns or (PACED_SLICE_NS if pacer else UNPACED_SLICE_NS))
-
-        def after_slice(now: Nanos) -> None:
-            if pacer is not None:
-                pacer.keep_pace(now)
-            if on_progress is not None:
-                on_progress(Progress(now=now, duration_ns=scenario.duration_ns, doing=lambda: doing(bench)))
-
-        bench.on_slice = after_slice
-        trace.meta(meta_of(scenario, bench.parts.world, bench.note))
-        return _record(bench, trace, folder, pacer, clock, drive)
-
-
-def run_at_port(
-    scenario: Scenario,
-    folder: Path,
-    transport: Transport,
-    *,
-    on_progress: ProgressListener | None = None,
-    clock: Clock = wall_clock,
-    drive: RemoteDriver | None = None,
-) -> RunResult:
-    """Drive the robot at a transport in real time (mode C), stop it, and make the run folder.
-
-    The transport is closed in any case. A lost line, lag and a signal are failures of the run.
-
-    With `drive`, a debugger runs the bench in place of its `run_until`.
-
-    Raises:
-        P2osError: A file cannot be read, or a part is not installed.
-    """
-    pacer = RealTimePacer(clock=clock)
-    with contextlib.ExitStack() as stack:
-        stack.callback(transport.close)
-        prepare_folder(folder)
-        trace = stack.enter_context(contextlib.closing(TraceWriter(folder / TRACE_NAME)))
-        bench = RemoteBench(scenario, transport, pacer, trace=trace)
-
-        def after_slice(now: Nanos) -> None:
-            if on_progress is not None:
-                on_progress(Progress(now=now, duration_ns=scenario.duration_ns, doing=lambda: doing(bench)))
-
-        bench.on_slice = after_slice
-        trace.meta(meta_of(scenario, None, bench.note))
-        return _record(bench, trace, folder, pacer, clock, drive)
 
 
 def doing(bench: Bench | RemoteBench) -> str:
@@ -284,13 +279,13 @@ def notes(bench: Bench | RemoteBench, end: Nanos, pacer: RealTimePacer | None) -
 
 
 def last_blocks(bench: Bench | RemoteBench, end: Nanos, *, was_interrupted: bool) -> list[str]:
-    """Return what the program ran last, where that tells why it ended: it died, it hangs, or somebody had enough."""
+    """Return what the program ran last, where that shows why it ended: a fault, a hang, or an interruption."""
     wanted = was_interrupted or bench.chip.fault is not None or is_quiet(bench, end)
     return list(bench.chip.last_blocks()) if wanted else []
 
 
 def is_quiet(bench: Bench | RemoteBench, end: Nanos) -> bool:
-    """Tell whether a program that has not died gives no sign of life."""
+    """Tell whether a program without a fault shows no activity."""
     return bench.chip.fault is None and end - _last_seen_ns(bench) >= QUIET_NS
 
 

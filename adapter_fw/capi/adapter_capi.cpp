@@ -186,7 +186,7 @@ void adapter_save(const adapter_handle* handle, void* state) {
 
 void adapter_restore(adapter_handle* handle, const void* state) {
   std::memcpy(&handle->scratch, state, sizeof handle->scratch);
-  // Member by member: what an object's own process put into it (its tables, its neighbours) is left out.
+  // Member by member: what an object's own process put into it (its tables, its connections) is left out.
   handle->part = *reinterpret_cast<const Adapter*>(handle->scratch.bytes);
   handle->part.set_reason(handle->scratch.reason);
 }

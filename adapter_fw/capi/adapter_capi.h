@@ -1,5 +1,5 @@
-/* The adapter core behind a plain C interface, for a test bench that loads it as a
- * shared library in the place of its own model.
+/* The adapter core behind a plain C interface, which robot_bench loads as a
+ * shared library in the place of the model.
  *
  * Times are nanoseconds. Nothing here blocks, allocates after adapter_new, or reads
  * a clock. An adapter must be used from one thread. */
@@ -61,7 +61,7 @@ const char* adapter_status_name(int32_t place);
 void adapter_status(const adapter_handle* handle, int64_t* values);
 const char* adapter_state(const adapter_handle* handle);
 const char* adapter_reason(const adapter_handle* handle);
-/* What the robot said of itself: 0 name, 1 class, 2 subclass. */
+/* How the robot identified itself: 0 name, 1 class, 2 subclass. */
 const char* adapter_robot_text(const adapter_handle* handle, int32_t place);
 
 /* Saving: a state fits adapter_state_size() bytes, and only this build and process can read it back. */

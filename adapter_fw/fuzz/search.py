@@ -18,7 +18,7 @@ FLAGS = (
     "-std=c++17", "-O1", "-g", "-fno-exceptions", "-fno-rtti", "-fsanitize=fuzzer,address,undefined",
     "-fno-sanitize-recover=all",
 )  # fmt: skip
-#: chosen: a life of some thirty deeds, and a corpus that stays a few dozen kilobytes.
+#: chosen: a run of some thirty actions, and a corpus that stays a few dozen kilobytes.
 LONGEST_SEARCHED, LONGEST_KEPT = 300, 80
 SLOWEST_S = 20
 

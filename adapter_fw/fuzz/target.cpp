@@ -25,7 +25,7 @@ using p2os::Bytes;
 using p2os::Nanos;
 using p2os::NS_PER_MS;
 
-//: The robot's own limits: no command may leave with more, whatever the settings say.
+//: The robot's own limits: no command may leave with more, whatever is set.
 constexpr std::int32_t MOST_MM_S = 750, MOST_DEG_S = 100;
 
 [[noreturn]] void broken(const char* rule) {
@@ -55,7 +55,7 @@ class Source {
   Bytes last_;
 };
 
-//: Settings that a person could have stored; the bits say which.
+//: Settings that a person could have stored; the bits choose.
 adapter::Settings settings_of(Source& source, const adapter::WireNumbers& wires) {
   adapter::Settings settings;
   for (std::uint8_t count = source.byte() % 4; count > 0; --count) {
@@ -77,7 +77,7 @@ class World final : private hal::PinsIn, private hal::PinsOut, private app::Writ
     part_.attach(this, this, &log_);
   }
 
-  void live() {
+  void run() {
     while (!source_.is_empty()) {
       deed();
       check();
@@ -169,14 +169,14 @@ class World final : private hal::PinsIn, private hal::PinsOut, private app::Writ
   }
 
   void receive(Bytes bytes) {
-    heard_at_ = now_;
+    received_at_ = now_;
     part_.receive(bytes, now_);
     note_sips();
   }
 
   //: A SIP may be found only when bytes that hid it are given up; it is as old as they are.
   void note_sips() {
-    sip_at_ = part_.sips() != sips_ ? heard_at_ : sip_at_;
+    sip_at_ = part_.sips() != sips_ ? received_at_ : sip_at_;
     sips_ = part_.sips();
   }
 
@@ -231,7 +231,7 @@ class World final : private hal::PinsIn, private hal::PinsOut, private app::Writ
   app::Console console_;
   selftest::Robot robot_;
   Nanos now_ = 0;
-  Nanos heard_at_ = 0;
+  Nanos received_at_ = 0;
   Nanos sip_at_ = 0;
   std::uint32_t sips_ = 0;
   std::uint32_t pins_ = 0;
@@ -244,6 +244,6 @@ class World final : private hal::PinsIn, private hal::PinsOut, private app::Writ
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   Source source({data, size});
-  World(source).live();
+  World(source).run();
   return 0;
 }

@@ -97,7 +97,7 @@ std::size_t Line::read(std::uint8_t* data, std::size_t size) {
   if (taken > 0) {
     return static_cast<std::size_t>(taken);
   }
-  // A pty whose other end is closed says EIO; a socket says 0.
+  // A pty whose other end is closed gives EIO; a socket gives 0.
   if (taken == 0 ? !is_terminal_ : errno != EAGAIN && errno != EINTR) {
     is_gone_ = true;
   }

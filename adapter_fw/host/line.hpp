@@ -14,7 +14,7 @@ class Line final : public hal::Uart {
   Line& operator=(const Line&) = delete;
   ~Line();
 
-  // Opens an address; false where it cannot be, and `error()` says why.
+  // Opens an address; false where it cannot be, and `error()` is why.
   [[nodiscard]] bool open(const std::string& address, std::int32_t baud);
 
   std::size_t read(std::uint8_t* data, std::size_t size) override;

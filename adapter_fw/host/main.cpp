@@ -19,7 +19,7 @@
 
 #include "../core/app/console.hpp"
 #include "../core/app/runner.hpp"
-#include "../core/app/teller.hpp"
+#include "../core/app/event_printer.hpp"
 #include "../generated/robots.hpp"
 #include "file_store.hpp"
 #include "line.hpp"
@@ -44,7 +44,7 @@ constexpr clockid_t CLOCK = CLOCK_MONOTONIC;
 //: Ctrl-C, Ctrl-Z, a quit, a closed terminal, kill, and what ends a program unless it is caught.
 constexpr int ENDING[] = {SIGINT,  SIGTERM, SIGHUP,    SIGQUIT, SIGTSTP, SIGUSR1,
                           SIGUSR2, SIGALRM, SIGVTALRM, SIGPROF, SIGXCPU};
-//: A far side that has gone, a full disk, and the terminal of another program: each call says so itself.
+//: A far side that has gone, a full disk, and the terminal of another program: each call returns its own error.
 constexpr int IGNORED[] = {SIGPIPE, SIGXFSZ, SIGTTIN, SIGTTOU};
 
 class WallClock final : public hal::Clock {
@@ -92,7 +92,7 @@ bool read_options(int count, char** words, Options& options) {
   return !options.line.empty();
 }
 
-//: A program that was started deaf to SIGHUP (nohup) stays so.
+//: A program that was started with SIGHUP ignored (nohup) keeps it ignored.
 void catch_signals() {
   struct sigaction action {};
   action.sa_handler = [](int) { interrupted = 1; };
@@ -115,8 +115,8 @@ void wait(const host::Line& line, const host::Wires& wires, int input, p2os::Nan
                     {wires.listening(), POLLIN, 0},
                     {wires.connected(), POLLIN, 0}};
   const p2os::Nanos bounded = span < 0 ? 0 : p2os::earlier(span, 100 * p2os::NS_PER_MS);
-  timespec patience{0, static_cast<long>(bounded)};
-  ::ppoll(files, sizeof files / sizeof files[0], &patience, nullptr);
+  timespec timeout{0, static_cast<long>(bounded)};
+  ::ppoll(files, sizeof files / sizeof files[0], &timeout, nullptr);
 }
 
 //: Returns the exit code, or RESTART.
@@ -130,10 +130,11 @@ int run(const Options& options, host::Line& line, host::Wires& wires, host::File
     err.write(fault);
     err.write("\n");
   }
+  app::report_renamed(store, err);
   app::EventLog log;
-  app::Teller teller(log, err);
+  app::EventPrinter printer(log, err);
   adapter::Adapter part(settings, *adapter::find_robot(options.robot.c_str()), numbers, clock.now());
-  part.attach(&wires, &wires, &teller);
+  part.attach(&wires, &wires, &printer);
   app::Console console({part, log, wires, store, out, numbers, "host"});
   app::Runner runner(part, clock, line, &wires);
   wires.release(clock.now());

@@ -2,7 +2,7 @@
 //
 // A terminal that is held with Ctrl-S and a pipe that is full take nothing: what they
 // have not taken waits, up to MOST_WAITING bytes. From there on whole lines are left out
-// until all that waits has been taken; then their number is said.
+// until all that waits has been taken; then their number is written.
 #pragma once
 
 #include <cstddef>

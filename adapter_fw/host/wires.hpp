@@ -28,7 +28,7 @@ class Wires final : public hal::PinsIn, public hal::PinsOut, public hal::Pad {
   Wires& operator=(const Wires&) = delete;
   ~Wires();
 
-  // Waits for a far side at a path; false where it cannot, and `error()` says why.
+  // Waits for a far side at a path; false where it cannot, and `error()` is why.
   [[nodiscard]] bool listen(const std::string& path);
 
   // Takes what has come; never waits.

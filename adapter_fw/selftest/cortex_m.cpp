@@ -13,7 +13,7 @@ namespace {
 constexpr std::uint32_t HSI_HZ = 8'000'000;
 constexpr std::uint32_t BAUD = 115'200;
 constexpr std::uint32_t SYSTICK_MASK = 0xFF'FFFF;
-//: Virtual seconds of life; the result is compared with the host's.
+//: Virtual seconds of the run; the result is compared with the host's.
 constexpr p2os::Nanos SPAN_NS = 20 * p2os::NS_PER_S;
 
 volatile std::uint32_t& word(std::uint32_t address) { return *reinterpret_cast<volatile std::uint32_t*>(address); }

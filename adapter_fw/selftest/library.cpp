@@ -65,7 +65,7 @@ void check_session() {
   client.connect();
   pass(client, line, 1'000);
   claim(client.isOpen() && client.packets() > 0, "it connects");
-  claim(client.subclass()[0] == 'p', "the robot has said who it is");
+  claim(client.subclass()[0] == 'p', "the robot has identified itself");
   for (int turn = 0; turn < 20; ++turn) {
     client.drive(200, 0);
     pass(client, line, 100);

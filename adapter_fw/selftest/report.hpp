@@ -1,4 +1,4 @@
-// Says a self-test's result in lines of `name value`, on whatever takes characters.
+// Writes a self-test's result in lines of `name value`, on whatever takes characters.
 #pragma once
 
 #include "selftest.hpp"

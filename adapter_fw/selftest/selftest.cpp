@@ -36,13 +36,13 @@ class RandomSource {
 };
 
 //: The adapter with everything around it.
-class Life final : private hal::PinsIn, private hal::PinsOut, private adapter::Observer {
+class Trial final : private hal::PinsIn, private hal::PinsOut, private adapter::Observer {
  public:
-  explicit Life(std::uint32_t seed) : random_source_(seed), part_(adapter::Settings{}, {}, {}, 0) {
+  explicit Trial(std::uint32_t seed) : random_source_(seed), part_(adapter::Settings{}, {}, {}, 0) {
     part_.attach(this, this, this);
   }
 
-  Result live(Nanos span) {
+  Result run(Nanos span) {
     for (now_ = 0; now_ < span && result_.failure == nullptr; now_ += STEP_NS) {
       if (now_ >= next_accident_) {
         accident();
@@ -220,6 +220,6 @@ class Life final : private hal::PinsIn, private hal::PinsOut, private adapter::O
 
 }  // namespace
 
-Result run(Nanos span, std::uint32_t seed) { return Life(seed).live(span); }
+Result run(Nanos span, std::uint32_t seed) { return Trial(seed).run(span); }
 
 }  // namespace selftest

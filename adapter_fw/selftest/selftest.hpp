@@ -1,4 +1,4 @@
-// The core's self-test: an adapter, a robot of a few lines, and a life of accidents.
+// The core's self-test: an adapter, a robot of a few lines, and accidents.
 //
 // It needs no hardware and no operating system, so it runs wherever the core is
 // compiled to: on a PC with sanitizers, on an emulated Cortex-M3, on an Xtensa in
@@ -25,7 +25,7 @@ struct Result {
   const char* failure = nullptr;
 };
 
-// Runs a life of `span` with the accidents that `seed` brings.
+// Runs for `span` with the accidents that `seed` brings.
 Result run(p2os::Nanos span, std::uint32_t seed);
 
 //: Called before and after each call of the core; a platform with a cycle counter measures between them.

@@ -1,4 +1,4 @@
-// Checks of what no life exercises: the LED, the mode button, numbers as text, faults of settings, gaps.
+// Checks of what no run of the self-test exercises: the LED, the mode button, numbers as text, faults of settings, gaps.
 //
 // Prints each broken claim; ends with `ok` and exit code 0, or with 1.
 
@@ -54,7 +54,7 @@ void check_led() {
 
 void check_button() {
   app::ModeButton held;
-  claim(!held.take(true, 0) && !held.take(true, NS_PER_S), "a button held from the start says nothing");
+  claim(!held.take(true, 0) && !held.take(true, NS_PER_S), "a button held from the start does not count");
   app::ModeButton button;
   button.take(false, 0);
   claim(!button.take(true, 49 * NS_PER_MS), "49 ms do not count");
@@ -117,12 +117,12 @@ void check_faults() {
 class StandingClock final : public hal::Clock {
  public:
   Nanos now() override {
-    at += looks_before_sleep-- == 0 ? NS_PER_S : 0;
+    at += looks_before_pause-- == 0 ? NS_PER_S : 0;
     return at;
   }
   Nanos at = 0;
-  //: The machine falls asleep for a second after so many looks; a machine can in any line.
-  int looks_before_sleep = -1;
+  //: The machine is suspended for a second after so many looks; a machine can be in any line.
+  int looks_before_pause = -1;
 };
 
 class Recorder final : public hal::Uart {
@@ -180,7 +180,7 @@ void check_gaps() {
   paused.clock.at += app::Runner::GAP_NS + 1;
   paused.turn();
   claim(paused.part.state() == State::LOST && paused.has_stopped(), "a nanosecond more is one: STOP goes out first");
-  claim(std::strcmp(paused.part.reason(), "the program paused") == 0, "and it says why");
+  claim(std::strcmp(paused.part.reason(), "the program paused") == 0, "and it gives the reason");
   const Nanos later = paused.clock.at + 10 * NS_PER_S;
   while (paused.clock.at < later) {
     paused.turn();
@@ -210,7 +210,7 @@ void check_gaps() {
   while (sleepy.clock.at < says_at) {
     sleepy.turn();
   }
-  sleepy.clock.looks_before_sleep = 1;
+  sleepy.clock.looks_before_pause = 1;
   sleepy.turn();
   claim(awake.uart.kinds[3] == 0 && sleepy.has_stopped(), "what was due before a gap within the pass stays unsaid");
 

@@ -1,4 +1,4 @@
-"""Where run folders go when nobody says: `runs/NAME-NNN` in the current directory."""
+"""Where run folders go by default: `runs/NAME-NNN` in the current directory."""
 
 import re
 from pathlib import Path

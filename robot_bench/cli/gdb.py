@@ -8,10 +8,10 @@ from p2os.errors import RunFailedError
 from robot_bench.bench import Bench
 from robot_bench.debugging import BenchMachine, RemoteMachine
 from robot_bench.remote import RemoteBench
-from robot_bench.run import Driver, RemoteDriver
+from robot_bench.run import RunBench, RunRemoteBench
 
 
-def debug_bench(port: int, *, is_paced: bool, on_wait: Callable[[], None]) -> Driver:
+def debug_bench(port: int, *, is_paced: bool, on_wait: Callable[[], None]) -> RunBench:
     """Return what lets GDB run a bench.
 
     Args:
@@ -27,7 +27,7 @@ def debug_bench(port: int, *, is_paced: bool, on_wait: Callable[[], None]) -> Dr
     return drive
 
 
-def debug_port(port: int, *, on_wait: Callable[[], None]) -> RemoteDriver:
+def debug_port(port: int, *, on_wait: Callable[[], None]) -> RunRemoteBench:
     """Return what lets GDB run a bench with a real robot, which the first halt stops; arguments as of `debug_bench`."""
 
     def drive(bench: RemoteBench) -> None:

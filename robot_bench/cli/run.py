@@ -23,7 +23,7 @@ from robot_bench.scenario.scenario import Scenario, load_scenario
 HELP = """Run a scenario: the firmware boots on an emulated BluePill and its pins drive a robot.
 
 SCENARIO is one of those that ship (motors, sensors, encoders, dodge) or a TOML
-file. What the options leave open is as the scenario says. The run folder holds
+file. What the options leave open is the scenario's. The run folder holds
 the trace, the pins as VCD and for PulseView, and report.html.
 
 Exit code: 0 all goals were met, 1 one was missed or the run failed, 2 wrong
@@ -114,7 +114,7 @@ def drive_port(
 
     Raises:
         TransportError: The port cannot be opened.
-        RunFailedError: The person said no.
+        RunFailedError: The person declined.
     """
     scenario = capped(scenario, max_speed)
     transport = open_url(url)
@@ -130,7 +130,7 @@ def drive_port(
 
 
 def capped(scenario: Scenario, max_speed: int | None) -> Scenario:
-    """Return the scenario with the caps of an untried program, where neither it nor the command line says otherwise."""
+    """Return the scenario with the caps of an untried program, where neither it nor the command line sets any."""
     adapter = scenario.adapter
     velocity = max_speed or adapter.max_velocity_mm_s or CAUTIOUS_VELOCITY_MM_S
     rotation = adapter.max_rotation_deg_s or CAUTIOUS_ROTATION_DEG_S

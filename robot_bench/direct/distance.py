@@ -30,7 +30,7 @@ class DistanceSensors:
         self._threshold_um = threshold_um
         self._period_ns = period_ns
         self._next: Nanos = 0
-        #: Told of each sample: (ns, metres of each sensor).
+        #: Called with each sample: (ns, metres of each sensor).
         self.on_sample: Callable[[Nanos, Sequence[float]], None] | None = None
 
     def next_deadline(self) -> Nanos:

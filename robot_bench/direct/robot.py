@@ -24,7 +24,7 @@ UM_PER_M = 1_000_000
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class DirectSettings:
-    """What a scenario can say about the plug-ins of mode A."""
+    """What a scenario can set of the parts of mode A."""
 
     step_um_per_s: int = 62_500
     #: None lets the wheels jump to their speed, as a velocity joint without a torque limit does.

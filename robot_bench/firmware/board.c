@@ -34,5 +34,5 @@ void board_start(void)
 
 void board_wait_for_link(void)
 {
-    tick_sleep(PATIENCE_S * TICKS_PER_S);
+    tick_sleep(LINK_WAIT_S * TICKS_PER_S);
 }

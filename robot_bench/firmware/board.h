@@ -48,12 +48,12 @@
     X(rst, B, 13)
 
 /* No wire tells that the link is up: every program waits this long first. */
-#define PATIENCE_S 3u
+#define LINK_WAIT_S 3u
 
 /* Brings up pins, clock, tick and USART1, asks for the link, and returns at once. */
 void board_start(void);
 
-/* Sits out PATIENCE_S. */
+/* Sits out LINK_WAIT_S. */
 void board_wait_for_link(void);
 
 #endif

@@ -96,7 +96,7 @@ def _run(command: list[str], folder: Path) -> None:
 
 
 def main() -> int:
-    """Build, and say the size of each file."""
+    """Build, and print the size of each file."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0] if __doc__ else None)
     parser.add_argument("--out", type=Path, default=HERE, help="folder for the ELFs (default: beside the sources)")
     folder = parser.parse_args().out

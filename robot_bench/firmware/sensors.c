@@ -1,4 +1,4 @@
-/* sensors: says which of the eight distance sensors see an obstacle, and moves
+/* sensors: prints which of the eight distance sensors see an obstacle, and moves
  * forward only while one of them does. */
 #include "board.h"
 #include "pins.h"

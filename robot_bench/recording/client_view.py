@@ -1,12 +1,11 @@
-"""The pose of a real robot as far as its own odometry tells, for the recording of mode C.
+"""A real or simulated robot as its client sees it: ranges and odometry, out of the standard packets alone.
 
-Integers of the trace: micrometres, microradians, µm/s. Wheel angles are not in
-a standard packet and stay 0; collisions cannot be told.
+Not the truth: with a real robot nothing else is known. A Pioneer 2 sends two sonar
+readings a packet; the others keep their last value, and before the first reading the
+sonar's longest range. Wheel angles are not in a standard packet and stay 0; collisions
+are unknown.
 
-The sonar ranges that a client knows, gathered from the standard packets it receives.
-
-A Pioneer 2 sends two readings a packet; the others keep their last value, and
-before the first reading the sonar's longest range.
+Invariant: poses are the trace's integers: micrometres, microradians, µm/s.
 """
 
 import math
@@ -21,10 +20,11 @@ from p2os.robots.parameters import RobotParameters
 from p2os.timing import Nanos
 
 UM_PER_M = 1_000_000
+NM_PER_UM = 1_000
 
 
 class SipRanges:
-    """Ranges of all fitted sonar; tells them after each packet that brings a reading."""
+    """Ranges of all fitted sonar; `on_ranges` is called after each packet that brings a reading."""
 
     def __init__(
         self, parameters: RobotParameters, profile: Profile, *, on_ranges: Callable[[Nanos, Sequence[float]], None]
@@ -61,9 +61,6 @@ class SipRanges:
     def restore(self, snapshot: Sequence[float]) -> None:
         """Put back what `snapshot` returned."""
         self._ranges_m = list(snapshot)
-
-
-NM_PER_UM = 1_000
 
 
 class OdometryPose:

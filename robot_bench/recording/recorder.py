@@ -1,7 +1,7 @@
 """What a run writes down: pins, text, wire bytes, state logs, ranges and poses.
 
 The recorder is the last follower of the loop. It samples the pose each 50 ms,
-tells the trace what has passed, and keeps the few figures that a summary needs
+hands the trace what has passed, and keeps the few figures that a summary needs
 and no trace holds (the clearance).
 
 Invariant: it changes nothing that it watches.
@@ -46,7 +46,7 @@ class Recorder:
     Args:
         trace: Where entries go.
         harness: The wires; every one is recorded.
-        body: What moves; None where nobody can tell.
+        body: What moves; None where it is unknown.
         sample_ns: Time between two poses.
     """
 
@@ -88,7 +88,7 @@ class Recorder:
         for byte in data:
             self._text += bytes([byte])
             if byte == ord("\n") or len(self._text) >= LONGEST_TEXT:
-                self._tell_text(at)
+                self._write_text(at)
 
     def wire(self, direction: str, data: bytes, at: Nanos) -> None:
         """Take bytes that have arrived: `c2r` client to robot, `r2c` back."""
@@ -129,7 +129,7 @@ class Recorder:
     def finish(self, end: Nanos) -> None:
         """Write everything up to `end`, a last pose and an unfinished line of text."""
         if self._text:
-            self._tell_text(end)
+            self._write_text(end)
         if self._next_sample - self._sample_ns < end:
             self._sample(end)
         self._pass(end)
@@ -163,7 +163,7 @@ class Recorder:
     def _note_change(self, net: Net, _owner: str, _at: Nanos) -> None:
         self._changed[net.name] = None
 
-    def _tell_text(self, at: Nanos) -> None:
+    def _write_text(self, at: Nanos) -> None:
         self.trace.add("usart", at, {"hex": self._text.hex()})
         self.last_line = self._text.decode("utf-8", "replace").strip()
         self._text = b""
@@ -185,10 +185,10 @@ class Recorder:
     def _pass(self, limit: Nanos) -> None:
         """Write what is stamped at or before `limit`, and let the wires forget it."""
         if self._changed:
-            self._tell_edges(limit)
+            self._write_edges(limit)
         self.trace.write_until(limit)
 
-    def _tell_edges(self, limit: Nanos) -> None:
+    def _write_edges(self, limit: Nanos) -> None:
         changed, self._changed = self._changed, {}
         for net in self._harness:
             if net.name not in changed:

@@ -68,7 +68,7 @@ class WireChunk:
 
 @dataclass(slots=True, kw_only=True)
 class RunRecord:
-    """All that a trace says, sorted by kind, each list in order of time."""
+    """All that a trace holds, sorted by kind, each list in order of time."""
 
     meta: Json = field(default_factory=dict)
     end: Json = field(default_factory=dict)

@@ -1,12 +1,7 @@
-"""The figures of a run that a person reads first.
+"""The figures of a run: the table that a person reads first, and the outcome that `run --json` and `summary.json` give.
 
-They come from the trace's end line where the run came to its end, and from the
-samples themselves where it was cut.
-
-The outcome of a run in figures: what `run --json` prints and `summary.json` keeps.
-
-The figures come from the trace: from its end line where there is one, and from
-the samples where the run was cut.
+Invariant: they come from the trace alone: from its end line where there is one, and
+from the samples where the run was cut.
 """
 
 import json
@@ -20,6 +15,13 @@ from robot_bench.recording.run_record import Json, RunRecord
 
 #: Side of the cells that a run's coverage is counted in, metres.
 CELL_M = 0.5
+SUMMARY_NAME = "summary.json"
+
+_FROM_META = ("firmware_sha256", "scenario", "mode", "body", "world", "seed")
+_FROM_END = (
+    "virtual_s", "wall_s", "real_time_factor", "distance_m", "collisions", "min_clearance_m", "trace_sha256",
+    "passed", "failures", "goals_met", "notes", "last_blocks",
+)  # fmt: skip
 
 
 def verdict(record: RunRecord) -> str:
@@ -56,15 +58,6 @@ def figures(record: RunRecord) -> list[tuple[str, str]]:
     if isinstance(factor, (int, float)):
         rows.append(("speed", f"{factor:.1f} × real time"))
     return rows
-
-
-SUMMARY_NAME = "summary.json"
-
-_FROM_META = ("firmware_sha256", "scenario", "mode", "body", "world", "seed")
-_FROM_END = (
-    "virtual_s", "wall_s", "real_time_factor", "distance_m", "collisions", "min_clearance_m", "trace_sha256",
-    "passed", "failures", "goals_met", "notes", "last_blocks",
-)  # fmt: skip
 
 
 def outcome_of(record: RunRecord) -> Json:

@@ -12,7 +12,7 @@ only: no path, version, host or wall time. `t` is nanoseconds.
     {"k":"sonar","mm":[…]}               ranges, all sonar, when new
     {"k":"pose","x","y","z","h","p","l","r","la","ra","c"}   µm, µrad, µm/s, collisions; each 50 ms
 
-Parts tell of things in any order; the writer sorts by time, then by kind, then
+Parts report in any order; the writer sorts by time, then by kind, then
 by the order of telling. It writes only what nobody can precede any more.
 
 Invariant: the same run gives the same bytes, whatever the slices of the loop;
@@ -129,7 +129,7 @@ class TraceWriter:
     def close(self) -> None:
         """Close the file without a last line, as for a run that failed."""
         if not isinstance(self._file, io.StringIO):
-            with contextlib.suppress(OSError):  # a full disk was told of when it was first met
+            with contextlib.suppress(OSError):  # a full disk was reported when it was first met
                 self._file.close()
 
     def _flush(self) -> None:
@@ -148,13 +148,13 @@ class TraceWriter:
         return TraceMark(self._file.tell(), self._hash.copy(), self._flushed_second)
 
     def rewind(self, mark: TraceMark) -> None:
-        """Take back everything that was written after `mark`; what was told is `restore`'s business."""
+        """Take back everything that was written after `mark`; what was reported is `restore`'s business."""
         self._file.seek(mark.position)
         self._file.truncate()
         self._hash, self._flushed_second = mark.digest.copy(), mark.flushed_second
 
     def snapshot(self) -> dict[str, object]:
-        """Return what is told and not yet written."""
+        """Return what is reported and not yet written."""
         return {"pending": tuple(self._pending), "sequence": self._sequence, "written_until": self._written_until}
 
     def restore(self, snapshot: object) -> None:

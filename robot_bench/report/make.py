@@ -1,6 +1,4 @@
-"""Write a run folder's report: `report.html` and the PNG plots.
-
-Makes everything in a run folder that is not the trace itself, from the trace.
+"""Makes everything in a run folder that is not the trace itself, from the trace.
 
 trace.jsonl    the single source, written while the run goes on
 summary.json   figures and verdict
@@ -9,6 +7,8 @@ pins.sr        all wires, sampled, for PulseView
 wire.jsonl     P2OS bytes, one message a line
 usart.txt      what the firmware printed
 report.html    the report, and PNG plots beside it
+
+Invariant: nothing but the trace is read; what is there already is written anew.
 """
 
 import json

@@ -17,7 +17,7 @@ SYNCS = {0: "SYNC0 / PULSE", 1: "SYNC1 / OPEN", 2: "SYNC2 / CLOSE"}
 def describe(chunk: WireChunk) -> list[tuple[str, str]]:
     """Return (name, meaning) of each frame in a chunk, and of what is no frame.
 
-    A recording holds whole frames a chunk; what a fault has cut is told as noise.
+    A recording holds whole frames a chunk; what a fault has cut is shown as noise.
     """
     decoder = Decoder()
     decoder.receive(chunk.data, 0)

@@ -16,7 +16,7 @@ from robot_bench.recording.signals import grouped, motor_steps
 from robot_bench.recording.summary import figures, verdict
 from robot_bench.report.packets import describe
 
-#: Speed of one motor step where a trace does not say it: the adapter's default, m/s.
+#: Speed of one motor step where a trace does not hold it: the adapter's default, m/s.
 DEFAULT_STEP_MPS = 0.0625
 #: Height of one pin's row and of a group's title in page.js, pixels.
 PIN_ROW_PX = 17
@@ -119,7 +119,7 @@ def _lead(meta: Json) -> str:
 
 
 def _goals(end: Json) -> str:
-    """Return the goals as a list, those missed with their reason; then what a dead program ran last."""
+    """Return the goals as a list, those missed with their reason; then what a program with a fault ran last."""
     failures = cast("list[str]", end.get("failures") or [])
     met = cast("list[str]", end.get("goals_met") or [])
     items = [f'<li class="passed">{html.escape(text)}</li>' for text in met]

@@ -8,7 +8,7 @@
 The words are those of `p2os.pioneer.controller.faults`. They act on the robot's controller,
 so they need mode B; which bits a noisy line turns is decided by the scenario's seed.
 
-Invariant: a fault at t is felt by everything that happens after t, and by
+Invariant: a fault at t affects everything that happens after t, and
 nothing that happened up to t.
 """
 
@@ -32,7 +32,7 @@ _KEYS = (
 
 @dataclass(frozen=True, slots=True)
 class FaultChange:
-    """What is said to the robot at a time: "fault WORDS" or "clear WORDS"."""
+    """What is ordered at a time: "fault WORDS" or "clear WORDS"."""
 
     at: Nanos
     words: str
@@ -63,12 +63,12 @@ def load_faults(tables: Sequence[Table], parameters: RobotParameters, where: str
 
 
 class FaultScript(Timeline[FaultChange]):
-    """Says each change at its time.
+    """Injects and clears each fault at its time.
 
     Args:
         changes: In order of time.
         bring_to: Brings the robot to an instant, and its words onto the line.
-        do: Says words to the robot.
+        do: Carries out the words.
     """
 
     def __init__(

@@ -4,7 +4,7 @@ Each kind is a row of `KINDS`: the keys that its table may have, a sentence that
 says what is wanted, and a judge that returns what is wrong or None. `p2os
 report` can judge again, since nothing but the trace is asked.
 
-A goal that a real robot cannot tell (a collision) is not judged there.
+A goal that is unknown of a real robot (a collision) is not judged there.
 """
 
 import math
@@ -23,7 +23,7 @@ from robot_bench.scenario.schema import Key, Table, check_table, nearest
 NS_PER_MINUTE = 60 * NS_PER_S
 #: chosen: two motor values that follow each other within this are one change (two ports are written in turn).
 SKEW_NS: Nanos = 1 * NS_PER_MS
-#: What a real robot cannot tell, and what asks for a world of ours.
+#: What is unknown of a real robot, and what needs a world of ours.
 NOT_AT_A_PORT = frozenset({"no_collision", "encoder_counts_match", "sensor_named"})
 
 

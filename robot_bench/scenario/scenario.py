@@ -17,7 +17,7 @@ from pathlib import Path
 from typing import cast
 
 from adapter_sim.codec import BitOrder
-from adapter_sim.settings import AdapterSettings
+from adapter_sim.settings import RENAMED_SETTINGS, AdapterSettings
 from p2os.errors import ScenarioError, UsageError
 from p2os.pioneer.body.factory import BODY_NAMES
 from p2os.pioneer.controller import ControllerSettings, SonarPerSip
@@ -82,7 +82,7 @@ _CONTROLLER = (
     Key(name="errors", kind="text"),
     Key(name="flash", kind="text"),
 )
-#: What a scenario may say otherwise for one world.
+#: What a scenario may set otherwise for one world.
 _IN_WORLD = (
     Key(name="threshold_m", kind="number", above=0),
     Key(name="duration_s", kind="number", above=0),
@@ -108,7 +108,7 @@ class Scenario:
     seed: int = 0
     duration_ns: Nanos
     threshold_um: int
-    #: None starts where the world says.
+    #: None starts at the world's own place.
     start: Pose | None = None
     direct: DirectSettings = field(default_factory=DirectSettings)
     adapter: AdapterSettings = field(default_factory=AdapterSettings)
@@ -136,7 +136,7 @@ class Scenario:
         seed: int | None = None,
         duration_s: float | None = None,
     ) -> "Scenario":
-        """Return the scenario with what a command line says otherwise; None keeps it as it is.
+        """Return the scenario with what a command line sets otherwise; None keeps it as it is.
 
         Raises:
             UsageError: A value cannot be.
@@ -317,6 +317,11 @@ def _direct(part: Table, where: str) -> DirectSettings:
 
 
 def _adapter(part: Table, threshold_um: int, where: str) -> AdapterSettings:
+    for old, new in RENAMED_SETTINGS.items():
+        if old in part:
+            raise ScenarioError(
+                f"{where}: [adapter]: {old} is called {new}", hint="only programs set it, as AdapterSettings"
+            )
     check_table(part, _ADAPTER, f"{where}: [adapter]")
     values = {name: value for name, value in part.items() if name not in {"step_mm_s", "core"}}
     if "step_mm_s" in part:

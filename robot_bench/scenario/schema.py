@@ -1,4 +1,4 @@
-"""Checks a TOML table against a list of keys, and says in one line what is wrong.
+"""Checks a TOML table against a list of keys, and reports in one line what is wrong.
 
 A message names the file, the place in it and the key; an unknown key comes with
 the nearest key that exists. Units stand in the key (`threshold_m`), so a value

@@ -1,4 +1,4 @@
-"""The `[[obstacle]]` tables of a scenario file: timed changes of the world.
+"""Timed changes of the world: the `[[obstacle]]` tables of a scenario, and what carries them out.
 
     [[obstacle]]                       [[obstacle]]
     at_s = 10.0                        at_s = 4.0
@@ -11,16 +11,11 @@
     width_m = 0.3                      hold_s = 1.0
     height_m = 0.5
 
-With `path_m` the thing walks along these points from its placing on; with `mass_kg` the robot can push it.
-With `before_sonar` the place is relative to the robot; with `hold_s` the thing
-is kept there for so long and then taken away.
-
-Timed changes of the world: things placed, moved and removed while a run goes on.
-
 Positions are those of the world, or relative to the robot ("before sonar 3, at
-0.45 m"): these are worked out at their moment. A thing that is held before a
-sonar is placed there anew every 50 ms, so that it stays while the robot moves,
-and is taken away at the end.
+0.45 m"): these are worked out at their moment. With `hold_s` a thing is placed before
+the sonar anew every 50 ms, so that it stays there while the robot moves, and is taken
+away at the end. With `path_m` it walks along these points from its placing on; with
+`mass_kg` the robot can push it.
 
 Invariant: a change at t is seen by everything that happens after t, and by
 nothing that happened up to t.
@@ -75,11 +70,53 @@ class Change:
     before: BeforeSonar | None = None
 
 
-#: Told of each change: (operation, name, ns, what the trace shall say).
+#: Called with each change: (operation, name, ns, fields of its line in the trace).
 ChangeListener = Callable[[str, str, Nanos, Mapping[str, object]], None]
 
 
-class Script(Timeline[Change]):
+_KEYS = (
+    Key(name="at_s", kind="number", required=True, least=0),
+    Key(name="op", kind="text", choices=tuple(op.value for op in Op)),
+    Key(name="name", kind="text", required=True),
+    Key(name="shape", kind="text", choices=("box", "cylinder")),
+    Key(name="x_m", kind="number"),
+    Key(name="y_m", kind="number"),
+    Key(name="heading_deg", kind="number"),
+    Key(name="length_m", kind="number", above=0),
+    Key(name="width_m", kind="number", above=0),
+    Key(name="height_m", kind="number", above=0),
+    Key(name="radius_m", kind="number", above=0),
+    Key(name="before_sonar", kind="whole", least=1),
+    Key(name="distance_m", kind="number", above=0),
+    Key(name="hold_s", kind="number", above=0),
+    Key(name="mass_kg", kind="number", least=0),
+    Key(name="friction", kind="number", least=0),
+    Key(name="path_m", kind="list"),
+    Key(name="speed_mps", kind="number", above=0),
+    Key(name="repeat", kind="text", choices=tuple(member.value for member in Repeat)),
+)
+#: Of a thing that is pushed, and of one that walks; the same as in a world file.
+DEFAULT_FRICTION, DEFAULT_SPEED_MPS = 0.5, 0.5
+_SIZES = {"box": ("length_m", "width_m", "height_m"), "cylinder": ("radius_m", "height_m")}
+
+
+def load_changes(tables: list[Table], parameters: RobotParameters, where: str) -> tuple[Change, ...]:
+    """Return the changes that a scenario's `[[obstacle]]` tables ask for, in order of time.
+
+    Raises:
+        ScenarioError: A table breaks the schema, or asks for what cannot be.
+    """
+    changes: list[Change] = []
+    for number, table in enumerate(tables, start=1):
+        place = f"{where}: [[obstacle]] {number}"
+        check_table(table, _KEYS, place)
+        changes += _changes(table, parameters, place)
+    changes.sort(key=lambda change: change.at)
+    _check_names(changes, where)
+    return tuple(changes)
+
+
+class WorldScript(Timeline[Change]):
     """Applies changes at their times.
 
     Args:
@@ -87,7 +124,7 @@ class Script(Timeline[Change]):
         body: Where they are applied.
         parameters: Where the sonar sit.
         bring_to: Brings the body to an instant.
-        on_change: Told of each change.
+        on_change: Called with each change.
     """
 
     def __init__(
@@ -133,53 +170,6 @@ class Script(Timeline[Change]):
         x_m = state.x_m + (cosine * sonar.x_mm - sine * sonar.y_mm) / 1000 + before.distance_m * math.cos(direction)
         y_m = state.y_m + (sine * sonar.x_mm + cosine * sonar.y_mm) / 1000 + before.distance_m * math.sin(direction)
         return x_m, y_m, direction
-
-
-def _rounded(value: object) -> object:
-    """Return a length or an angle to a micrometre or microradian, anything else as it is."""
-    return round(value, 6) if isinstance(value, float) else value
-
-
-_KEYS = (
-    Key(name="at_s", kind="number", required=True, least=0),
-    Key(name="op", kind="text", choices=tuple(op.value for op in Op)),
-    Key(name="name", kind="text", required=True),
-    Key(name="shape", kind="text", choices=("box", "cylinder")),
-    Key(name="x_m", kind="number"),
-    Key(name="y_m", kind="number"),
-    Key(name="heading_deg", kind="number"),
-    Key(name="length_m", kind="number", above=0),
-    Key(name="width_m", kind="number", above=0),
-    Key(name="height_m", kind="number", above=0),
-    Key(name="radius_m", kind="number", above=0),
-    Key(name="before_sonar", kind="whole", least=1),
-    Key(name="distance_m", kind="number", above=0),
-    Key(name="hold_s", kind="number", above=0),
-    Key(name="mass_kg", kind="number", least=0),
-    Key(name="friction", kind="number", least=0),
-    Key(name="path_m", kind="list"),
-    Key(name="speed_mps", kind="number", above=0),
-    Key(name="repeat", kind="text", choices=tuple(member.value for member in Repeat)),
-)
-#: Of a thing that is pushed, and of one that walks; the same as in a world file.
-DEFAULT_FRICTION, DEFAULT_SPEED_MPS = 0.5, 0.5
-_SIZES = {"box": ("length_m", "width_m", "height_m"), "cylinder": ("radius_m", "height_m")}
-
-
-def load_changes(tables: list[Table], parameters: RobotParameters, where: str) -> tuple[Change, ...]:
-    """Return the changes that a scenario's `[[obstacle]]` tables ask for, in order of time.
-
-    Raises:
-        ScenarioError: A table breaks the schema, or asks for what cannot be.
-    """
-    changes: list[Change] = []
-    for number, table in enumerate(tables, start=1):
-        place = f"{where}: [[obstacle]] {number}"
-        check_table(table, _KEYS, place)
-        changes += _changes(table, parameters, place)
-    changes.sort(key=lambda change: change.at)
-    _check_names(changes, where)
-    return tuple(changes)
 
 
 def _changes(table: Table, parameters: RobotParameters, where: str) -> list[Change]:
@@ -295,3 +285,8 @@ def _nanos(table: Table, key: str) -> Nanos:
 
 def _at(change: Change) -> str:
     return f"{change.at / NS_PER_S:g} s"
+
+
+def _rounded(value: object) -> object:
+    """Return a length or an angle to a micrometre or microradian, anything else as it is."""
+    return round(value, 6) if isinstance(value, float) else value

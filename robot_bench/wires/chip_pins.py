@@ -1,6 +1,6 @@
 """Joins the chip's pins to the wires: drives both ways, each with its time stamp.
 
-The chip leads in time, so it is told of a level when the part that drives it
+The chip leads in time, so it is given a level when the part that drives it
 has come to that time; it acts from the first block boundary on.
 
 A resistor on the wire is passed to the chip as a level while the chip itself
@@ -79,7 +79,7 @@ class ChipPins:
             self._pass_on(net, 0)
 
     def watch(self, net: str) -> None:
-        """Have each edge that the chip makes on a net end its slice and be told."""
+        """Have each edge that the chip makes on a net end its slice and be reported to `on_watched`."""
         self._watched.add(net)
         self._pins[net].watch(True)
 

@@ -46,10 +46,10 @@ class Endpoint:
     """A part between an incoming and an outgoing line.
 
     Args:
-        part: Who sits here.
+        part: What stands here.
         incoming: The line whose arrivals it reads.
         outgoing: The line that it writes to.
-        on_arrival: Told of each delivery, before the part is: (bytes, ns).
+        on_arrival: Called with each delivery, before the part takes it: (bytes, ns).
     """
 
     def __init__(

@@ -2,14 +2,14 @@
 
 A net keeps, for each owner, the drives that are still of interest, each with
 its time stamp. So a part that stands behind the others in time still reads the
-level of its own instant. Edges are forgotten when `forget_before` says that
+level of its own instant. Edges are forgotten when `forget_before` states that
 every part has passed them.
 
 Not modelled: voltages, capacitance and edge times. A drive is a level and a
 strength; a value in volts would be one more field of `Drive`.
 
 Invariant: `level(at)` depends on the drives stamped at or before `at` only, not
-on the order in which different owners told of them.
+on the order in which different owners reported them.
 """
 
 from bisect import bisect_right
@@ -84,7 +84,7 @@ class Net:
         """Hold the wire from `now` on; it replaces what the same owner did before.
 
         Raises:
-            LocalProtocolError: `owner` has already told of something later.
+            LocalProtocolError: `owner` has already reported something later.
         """
         history = self._drives.setdefault(owner, [])
         new = Drive(level, strength) if strength is not Strength.FLOATING else RELEASED
@@ -162,7 +162,7 @@ class Net:
                 (owner, tuple((at, drive.level, drive.strength.value) for at, drive in history))
                 for owner, history in self._drives.items()
             ),
-            "told": (self._notified_until, self._notified_level, self._notified_contention),
+            "notified": (self._notified_until, self._notified_level, self._notified_contention),
             "contentions": tuple((item.at, item.owners) for item in self._contentions),
         }
 
@@ -175,7 +175,7 @@ class Net:
             for owner, history in drives
         }
         self._notified_until, self._notified_level, self._notified_contention = cast(
-            "tuple[int, bool, tuple[str, ...]]", snapshot["told"]
+            "tuple[int, bool, tuple[str, ...]]", snapshot["notified"]
         )
         self._contentions = [Contention(at, self.name, owners) for at, owners in contentions]
         self.last_edge = max((history[-1][0] for history in self._drives.values() if history), default=0)

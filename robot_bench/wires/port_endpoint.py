@@ -18,7 +18,7 @@ from robot_bench.wires.endpoints import EndpointPart
 #: chosen: a tenth of a standard packet's time on a line of 9600 bit/s.
 POLL_NS: Nanos = 2 * NS_PER_MS
 
-#: What stops a robot and lets it go, whatever it was doing: an order is sent twice, since nothing is acknowledged.
+#: What stops a robot and lets it go, whatever it was doing: each command is sent twice, since nothing is acknowledged.
 _STOPS = b"".join(command.to_frame().to_bytes() for command in (stop(), vel(0), rvel(0)))
 _CLOSE = Command(CommandNumber.CLOSE).to_frame().to_bytes()
 STOP_SEQUENCE = _STOPS + _STOPS + _CLOSE
@@ -33,8 +33,8 @@ class PortEndpoint:
     Args:
         part: The adapter.
         transport: The line to the robot.
-        on_sent: Told of each frame sent.
-        on_received: Told of what was read, before the adapter is.
+        on_sent: Called with each frame sent.
+        on_received: Called with what was read, before the adapter takes it.
     """
 
     def __init__(

@@ -19,7 +19,7 @@ class Usart(Protocol):
 
 
 class ChipActivity(Protocol):
-    """When the firmware was last seen alive, in ns."""
+    """When the firmware last showed activity, in ns."""
 
     last_pin_ns: int
     last_usart_ns: int
@@ -27,7 +27,7 @@ class ChipActivity(Protocol):
 
 
 class ChipFault(Protocol):
-    """What the firmware died of; printed, it is one line for a person."""
+    """The fault that ended the firmware; printed, it is one line for a person."""
 
     @property
     def at_ns(self) -> int:
@@ -60,7 +60,7 @@ class Chip(Protocol):
 
     @property
     def fault(self) -> ChipFault | None:
-        """What the firmware died of; None while it lives."""
+        """The fault that ended the firmware; None while it runs."""
         ...
 
     def last_blocks(self) -> Sequence[str]:
@@ -69,7 +69,7 @@ class Chip(Protocol):
 
     @property
     def activity(self) -> ChipActivity:
-        """When the firmware was last seen alive."""
+        """When the firmware last showed activity."""
         ...
 
     def pin(self, name: str) -> ChipPin:

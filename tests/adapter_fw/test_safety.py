@@ -10,7 +10,8 @@ from hypothesis import strategies as st
 from hypothesis.stateful import initialize, invariant, rule
 
 from adapter_sim import Adapter
-from adapter_sim.mixing import Master, PadReport
+from adapter_sim.masters import Master
+from p2os.gamepad import PadReport
 from robot_bench.adapter import FirmwareAdapter, is_available
 from tests.adapter_sim.conftest import MS, Rig
 from tests.adapter_sim.test_adapter_machine import AdapterMachine, DeafRobotMachine, WatchedRig

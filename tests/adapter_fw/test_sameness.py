@@ -11,7 +11,8 @@ from hypothesis import strategies as st
 
 from adapter_sim import AdapterSettings
 from adapter_sim.codec import BitOrder
-from adapter_sim.mixing import Master, PadReport
+from adapter_sim.masters import Master
+from p2os.gamepad import PadReport
 from adapter_sim.pinout import parse_pinout
 from adapter_sim.settings import EncoderAtOpen, MotorMeaning
 from p2os.protocol.frames import Frame

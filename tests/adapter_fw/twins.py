@@ -3,7 +3,8 @@
 from dataclasses import dataclass, field, replace
 
 from adapter_sim import Adapter, AdapterSettings, Pinout, load_pinout
-from adapter_sim.mixing import Master, PadReport
+from adapter_sim.masters import Master
+from p2os.gamepad import PadReport
 from p2os.protocol.frames import Frame
 from p2os.protocol.packets import Identity
 from p2os.protocol.profiles import Profile

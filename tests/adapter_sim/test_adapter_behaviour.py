@@ -75,11 +75,11 @@ def test_p2dx_con_low_stops_and_closes_within_50_ms(driving: Rig) -> None:
     assert driving.robot.forward == 0
     assert not driving.robot.connection.is_open
     assert driving.adapter.state == "idle"
-    # The robot fell silent, so the stop sequence was not said again.
+    # The robot fell silent, so the stop sequence was not sent again.
     assert names(driving, fell).count("CLOSE") == 1
 
 
-def test_a_close_that_gets_lost_is_said_again(driving: Rig) -> None:
+def test_a_close_that_gets_lost_is_sent_again(driving: Rig) -> None:
     driving.to_robot.cut = True
     driving.pins.set("p2dx_con", False, driving.now)
     driving.ms(150)
@@ -135,7 +135,7 @@ def test_other_packets_do_not_stand_in_for_a_sip(driving: Rig) -> None:
     assert "no SIP in time" in driving.adapter.status.reason
 
 
-def test_a_sip_after_the_loss_is_not_heard(driving: Rig) -> None:
+def test_a_sip_after_the_loss_is_not_taken(driving: Rig) -> None:
     driving.robot.obeys = False
     driving.pins.motors(3, 3, driving.now)
     driving.ms(1_500)
@@ -216,7 +216,7 @@ def test_a_robot_that_ignores_seto_is_driven_from_where_it_is() -> None:
     assert rig.adapter.status.counts == (0, 0)
 
 
-def test_an_odometry_jump_is_told_and_is_no_travel(driving: Rig) -> None:
+def test_an_odometry_jump_is_reported_and_is_no_travel(driving: Rig) -> None:
     driving.robot.sip = replace(driving.robot.sip, raw_x=9_000)
     driving.ms(150)
     assert driving.events[-1][1] == "odometry jumped"
@@ -224,7 +224,7 @@ def test_an_odometry_jump_is_told_and_is_no_travel(driving: Rig) -> None:
     assert driving.adapter.status.odometry_jumps == 1
 
 
-def test_a_stalled_robot_is_believed_and_told(driving: Rig) -> None:
+def test_a_stalled_robot_is_plausible_and_reported(driving: Rig) -> None:
     driving.robot.obeys = False
     driving.robot.sip = replace(driving.robot.sip, stall_left=True)
     driving.pins.motors(3, 3, driving.now)
@@ -269,7 +269,7 @@ def test_rst_while_booting_begins_the_boot_anew(rig: Rig) -> None:
     assert rig.adapter.state == "idle"
 
 
-def test_bytes_are_not_heard_before_the_boot_is_over(rig: Rig) -> None:
+def test_bytes_are_not_taken_before_the_boot_is_over(rig: Rig) -> None:
     rig.adapter.receive(StandardSip().to_frame(FakeRobot().connection.settings.profile).to_bytes(), 0)
     assert rig.adapter.session.stats.frames_received == 0
 
@@ -319,10 +319,10 @@ def test_a_snapshot_taken_anywhere_continues_alike(at_ms: int) -> None:
     copy.robot, copy.to_robot, copy.to_adapter = deepcopy((whole.robot, whole.to_robot, whole.to_adapter))
     copy.pins.history, copy.pins.outputs = whole.pins.history, dict(whole.pins.outputs)
     copy.adapter.restore(pickle.loads(pickle.dumps(whole.adapter.snapshot())))  # noqa: S301  # our own bytes
-    told = len(whole.events)
+    count = len(whole.events)
     for rig in (whole, copy):
         rig.run(2_500 * MS)
-    assert copy.events == whole.events[told:]
+    assert copy.events == whole.events[count:]
     assert copy.to_robot.log == whole.to_robot.log
     assert copy.pins.outputs == whole.pins.outputs
     assert copy.adapter.status == whole.adapter.status

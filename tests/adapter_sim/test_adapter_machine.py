@@ -33,7 +33,7 @@ class WatchedRig(Rig):
         self.last_sip = 0
         self.sips = 0
         self.checked = 0
-        self.told = 0
+        self.checked = 0
         self.commanded = (0, 0)
         self.commanded_at = 0
         self.pair_at = -(10**12)
@@ -50,14 +50,14 @@ class WatchedRig(Rig):
         sips = self.adapter.status.sips
         if sips != self.sips:
             self.sips, self.last_sip = sips, self.now
-        for at, what, _ in self.events[self.told :]:
+        for at, what, _ in self.events[self.checked :]:
             if what in {"lost", "implausible"}:
                 self.allowed = False
                 first = [name for _, name, _ in self.sent(at)][:3]
                 assert first == ["STOP", "VEL", "RVEL"], (what, first)
             elif what == "connecting":
                 self.allowed = True
-        self.told = len(self.events)
+        self.checked = len(self.events)
         for at, name, argument in self.sent()[self.checked :]:
             self._check_frame(at, name, argument)
         self.checked = len(self.to_robot.log)
@@ -245,7 +245,7 @@ def test_counts_on_the_pins_equal_the_bodys_wheels_to_one_step(seed: int) -> Non
     assert rig.adapter.state == "driving"
 
 
-def test_a_moving_robot_is_believed_through_every_change_of_speed() -> None:
+def test_a_moving_robot_is_plausible_through_every_change_of_speed() -> None:
     rig = pioneer_rig()
     for left, right in ((3, 3), (-4, -4), (3, -4), (-4, 3), (0, 0), (1, 2), (0, 3)):
         rig.pins.motors(left, right, rig.now)

@@ -140,7 +140,7 @@ def test_350_ms_without_a_sip_is_a_loss_and_stop_goes_first(driving: Rig) -> Non
     assert "no packet for 350 ms" in driving.adapter.status.reason
 
 
-def test_one_second_of_deaf_wheels_is_disbelieved(driving: Rig) -> None:
+def test_one_second_of_wheels_that_do_not_follow_is_implausible(driving: Rig) -> None:
     driving.robot.obeys = False
     driving.pins.motors(3, 3, driving.now)
     driving.ms(2_000)
@@ -151,14 +151,14 @@ def test_one_second_of_deaf_wheels_is_disbelieved(driving: Rig) -> None:
 
 
 def doubt() -> PlausibilityCheck:
-    plausibility = PlausibilityCheck(patience_ns=1_000, tolerance_mm_s=40, progress_mm_s=5)
+    plausibility = PlausibilityCheck(timeout_ns=1_000, tolerance_mm_s=40, progress_mm_s=5)
     plausibility.begin(0)
     plausibility.take(0, 0, stalled=False, now=0)
     plausibility.expect(200, 200)
     return plausibility
 
 
-def test_patience_runs_from_the_last_plausibility() -> None:
+def test_the_timeout_runs_from_the_last_plausible_packet() -> None:
     plausibility = doubt()
     plausibility.take(0, 0, stalled=False, now=900)
     assert plausibility.ends_at == 1_000

@@ -8,8 +8,8 @@ from typing import ClassVar
 
 import pytest
 
-from bluepill_sim.debug.machine import StopKind
 from bluepill_sim.debug.execution import Execution
+from bluepill_sim.debug.machine import StopKind
 from bluepill_sim.debug.packets import frame
 from bluepill_sim.errors import BluePillError
 from p2os.cli.main import run

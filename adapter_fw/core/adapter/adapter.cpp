@@ -13,8 +13,8 @@ using p2os::later;
 
 namespace {
 
-//: A robot heard from so recently is still streaming: one SIP period.
-constexpr Nanos ECHO_NS = 100 * NS_PER_MS;
+//: A robot whose bytes came so recently is still streaming: one SIP period.
+constexpr Nanos STREAMING_NS = 100 * NS_PER_MS;
 constexpr std::int32_t HEADING_MODULUS = 4'096;
 
 p2os::ClientSettings client_settings(const Settings& settings) {
@@ -66,8 +66,8 @@ void Adapter::attach(hal::PinsIn* in, hal::PinsOut* out, Observer* observer) {
 
 void Adapter::receive(p2os::Bytes data, Nanos now) {
   run(now - 1);
-  if (is_awake()) {
-    now_ = agenda_.heard_at = now;
+  if (is_running()) {
+    now_ = agenda_.received_at = now;
     client_.receive(data, now);
     replan();
   }
@@ -78,9 +78,9 @@ void Adapter::receive_pad(const PadReport& report, Nanos now) {
   now_ = later(now_, now);
   const bool wanted = wants_robot();
   pad_.take(report, now);
-  if (master_ == Master::PAD && is_awake()) {
+  if (master_ == Master::PAD && is_running()) {
     if (wanted && !wants_robot()) {
-      end_of_request("Down was pressed", now);
+      end_request("Down was pressed", now);
     }
     if (state_ == State::DRIVING) {
       pacer_.want(wanted_speeds());
@@ -95,14 +95,14 @@ void Adapter::set_master(Master master, Nanos now) {
   if (master == master_) {
     return;
   }
-  if (state_ == State::CONNECTING || is_open()) {
+  if (has_session()) {
     halt(now);
-    agenda_.closed_in_peace = false;
+    agenda_.is_closed_on_request = false;
   }
   master_ = master;
   pad_.lose();
-  tell(now, What::MASTER, text(master));
-  if (is_awake()) {
+  notify(now, What::MASTER, text(master));
+  if (is_running()) {
     enter(State::LOST, now, What::MASTER_WAITS, "waits for a new connect request of the new master");
   }
   replan();
@@ -111,7 +111,7 @@ void Adapter::set_master(Master master, Nanos now) {
 void Adapter::shutdown(const char* reason, Nanos now) {
   run(now - 1);
   now_ = later(now_, now);
-  if (is_awake()) {
+  if (is_running()) {
     lose(What::SHUTDOWN, reason, now);
     replan();
   }
@@ -120,7 +120,7 @@ void Adapter::shutdown(const char* reason, Nanos now) {
 void Adapter::skip_to(const char* reason, Nanos now) {
   now_ = later(now_, now);
   next_sample_ = later(next_sample_, now);
-  if (is_awake()) {
+  if (is_running()) {
     lose(What::LOST, reason, now);
   }
   replan();
@@ -132,7 +132,7 @@ void Adapter::advance_to(Nanos limit) {
   }
   now_ = later(now_, limit);
   if (is_reset_wire_high(limit) != (state_ == State::RESET)) {
-    turn_reset(limit);
+    follow_reset(limit);
     replan();
   }
 }
@@ -161,7 +161,7 @@ Nanos Adapter::run(Nanos limit) {
 void Adapter::act(Nanos now) {
   now_ = now;
   if (is_reset_wire_high(now) != (state_ == State::RESET)) {
-    turn_reset(now);
+    follow_reset(now);
   }
   if (state_ == State::RESET || (state_ == State::BOOTING && now < agenda_.boot_at)) {
     next_sample_ = now + settings_.sample_period_ns;
@@ -170,10 +170,10 @@ void Adapter::act(Nanos now) {
   if (state_ == State::BOOTING) {
     boot(now);
   }
-  work(now);
+  act_running(now);
 }
 
-void Adapter::work(Nanos now) {
+void Adapter::act_running(Nanos now) {
   client_.advance_to(now);
   if (now >= next_sample_) {
     sample(now);
@@ -213,7 +213,7 @@ void Adapter::run_open(Nanos now) {
     outputs_.show_distances(distances_.levels(), now);
   }
   if (now >= agenda_.sonar_at) {
-    // No reading for as long as one lives: SONAR 1 was lost, or somebody switched them off.
+    // No reading for as long as one is valid: SONAR 1 was lost, or somebody switched them off.
     client_.send(CommandFrame(CommandNumber::SONAR, 1), now);
     agenda_.sonar_at = now + settings_.distance_stale_ns;
   }
@@ -223,17 +223,17 @@ void Adapter::run_open(Nanos now) {
   }
 }
 
-// Says the stop sequence again: nobody has confirmed it; a robot closed in peace shows it by its silence.
+// Sends the stop sequence again: nobody has confirmed it; a robot closed on request does so by its silence.
 void Adapter::repeat_stop(Nanos now) {
   --agenda_.stops_left;
   agenda_.stop_at = now + settings_.stop_repeat_ns;
-  if (!agenda_.closed_in_peace || now - agenda_.heard_at < ECHO_NS) {
+  if (!agenda_.is_closed_on_request || now - agenda_.received_at < STREAMING_NS) {
     client_.abandon();
   }
 }
 
 void Adapter::replan() {
-  if (!is_awake()) {
+  if (!is_running()) {
     deadline_ = earlier(agenda_.boot_at, next_sample_);
     return;
   }
@@ -272,7 +272,7 @@ void Adapter::sample(Nanos now) {
       pacer_.want(wanted_speeds());
     }
     if (connect_changed && !wants_robot()) {
-      end_of_request("p2dx_con is low", now);
+      end_request("p2dx_con is low", now);
     }
   }
   if (state_ == State::LOST && !wants_robot()) {
@@ -298,7 +298,7 @@ void Adapter::send_pair(Nanos now) {
   client_.send(CommandFrame(CommandNumber::RVEL, speeds.turn_deg_s), now);
   plausibility_.expect(mixer_.wheels_mm_s(speeds));
   if (speeds != before) {
-    tell(now, What::COMMAND, "", speeds.forward_mm_s, speeds.turn_deg_s);
+    notify(now, What::COMMAND, "", speeds.forward_mm_s, speeds.turn_deg_s);
   }
 }
 

@@ -1,6 +1,6 @@
 // The adapter between a BluePill's pins and a Pioneer's P2OS line.
 //
-// A client of the robot, driven by pins or by a game pad, never by both:
+// A client of the robot, commanded by pins or by a game pad, never by both:
 //
 //     RESET       rst is high: outputs released to their pulls, nothing runs
 //     BOOTING     rst fell (or power came): released still, for boot_ns
@@ -8,8 +8,9 @@
 //     CONNECTING  the P2OS connection is being made; outputs safe
 //     SETTLING    OPEN: SETO and SONAR 1 sent, waits for odometry zero; distances live
 //     DRIVING     ENABLE 1 sent; motor values become VEL and RVEL; all live
-//     CLOSING     the connect request has ended: STOP, VEL 0, RVEL 0, CLOSE sent; lasts stop_repeat_ns
-//     LOST        no SIP, implausible motion, no pad, a gap or a shutdown: the same four sent; waits for the connect request to end
+//     CLOSING     the connect request was withdrawn: STOP, VEL 0, RVEL 0, CLOSE sent; lasts stop_repeat_ns
+//     LOST        no SIP, implausible motion, no pad, a gap or a shutdown: the same four sent; waits for
+//                 the connect request to be withdrawn
 //
 // From LOST the way to motion leads over a new connect request, whatever the robot does
 // meanwhile. adapter_sim/adapter.py has the table of transitions; this is its twin,
@@ -23,13 +24,13 @@
 
 #include "../../hal/pins.hpp"
 #include "../p2os/client.hpp"
-#include "plausibility.hpp"
 #include "distances.hpp"
+#include "driver.hpp"
 #include "encoders.hpp"
 #include "gamepad.hpp"
+#include "inputs.hpp"
 #include "mixing.hpp"
 #include "outputs.hpp"
-#include "sampler.hpp"
 #include "settings.hpp"
 
 namespace adapter {
@@ -45,7 +46,7 @@ const char* text(State state);
 const char* text(What what);
 const char* text(Master master);
 
-//: What the adapter has set out to do, and when; a reset wipes it. NEVER where nothing is set out.
+//: What is planned, and when; a reset clears it. NEVER where nothing is planned.
 struct Agenda {
   Nanos boot_at = p2os::NEVER;
   //: Next try to connect, or end of CLOSING.
@@ -53,21 +54,21 @@ struct Agenda {
   Nanos sip_deadline = p2os::NEVER;
   //: From here on the odometry is taken as it is.
   Nanos settle_at = p2os::NEVER;
-  //: SONAR 1 is said again unless a reading comes before.
+  //: SONAR 1 is sent again unless a reading comes before.
   Nanos sonar_at = p2os::NEVER;
   Nanos stop_at = p2os::NEVER;
   //: When bytes of the robot came last.
-  Nanos heard_at = 0;
+  Nanos received_at = 0;
   std::int32_t stops_left = 0;
   std::int32_t enables_left = 0;
   std::uint32_t sips = 0;
-  //: Whether the session ended on the connect request of its master.
-  bool closed_in_peace = false;
+  //: Whether the session ended because its master withdrew the connect request.
+  bool is_closed_on_request = false;
   bool stall_left = false;
   bool stall_right = false;
 };
 
-//: Told of each transition.
+//: Called at each transition.
 class Observer {
  public:
   //: `detail` is a static string or the reason of a shutdown; the numbers depend on `what` (see adapter.cpp).
@@ -85,7 +86,7 @@ class Adapter final : private p2os::ClientListener {
   Adapter(const Adapter& other);
   Adapter& operator=(const Adapter&) = default;
 
-  // Where the wires are and who is told; they must outlive the adapter.
+  // Where the wires are and who is notified; they must outlive the adapter.
   void attach(hal::PinsIn* in, hal::PinsOut* out, Observer* observer);
 
   // Takes bytes that arrived at `now`; what was due earlier is done first.
@@ -94,7 +95,8 @@ class Adapter final : private p2os::ClientListener {
   void receive_pad(const PadReport& report, Nanos now);
   // Gives the robot to another master: stopped and closed first, and only a new connect request starts it.
   void set_master(Master master, Nanos now);
-  // Stops the robot, drives every output to its safe level, and waits for the connect request to end. `reason` is static.
+  // Stops the robot, drives every output to its safe level, and waits for the
+  // connect request to be withdrawn. `reason` is static.
   void shutdown(const char* reason, Nanos now);
   // Leaves out the time up to `now`, in which nobody called: what was due in it is not done late, the robot is
   // stopped as by `shutdown`, and STOP is the next frame out. `reason` is static.
@@ -131,35 +133,36 @@ class Adapter final : private p2os::ClientListener {
 
   Nanos run(Nanos limit);
   void act(Nanos now);
-  void work(Nanos now);
+  void act_running(Nanos now);
   void run_open(Nanos now);
   void repeat_stop(Nanos now);
   void replan();
   void clear();
-  void turn_reset(Nanos now);
+  void follow_reset(Nanos now);
   void boot(Nanos now);
   void begin_session(Nanos now, const char* why);
   void drive(Nanos now);
   void lose(What what, const char* why, Nanos now);
   void lose_pad(Nanos now);
-  void end_of_request(const char* why, Nanos now);
+  void end_request(const char* why, Nanos now);
   void halt(Nanos now);
   void sample(Nanos now);
   void walk(Nanos now);
   void send_pair(Nanos now);
   void next_baud();
   void enter(State state, Nanos now, What what, const char* why);
-  void tell(Nanos now, What what, const char* detail, std::int32_t first = 0, std::int32_t second = 0);
+  void notify(Nanos now, What what, const char* detail, std::int32_t first = 0, std::int32_t second = 0);
   std::uint32_t read_pins(Nanos at) { return in_ ? in_->read(at) : 0; }
   bool is_reset_wire_high(Nanos at) { return (read_pins(at) >> reset_bit_ & 1U) != 0; }
-  bool is_awake() const { return state_ != State::RESET && state_ != State::BOOTING; }
+  bool is_running() const { return state_ != State::RESET && state_ != State::BOOTING; }
   bool is_open() const { return state_ == State::SETTLING || state_ == State::DRIVING; }
+  bool has_session() const { return is_open() || state_ == State::CONNECTING; }
   bool is_stopping() const { return state_ == State::CLOSING || state_ == State::LOST || state_ == State::IDLE; }
   bool wants_robot() const;
   Speeds wanted_speeds() const;
 
-  p2os::Own<hal::PinsIn> in_;
-  p2os::Own<Observer> observer_;
+  p2os::UncopiedPointer<hal::PinsIn> in_;
+  p2os::UncopiedPointer<Observer> observer_;
 
   Settings settings_;
   RobotNumbers robot_;

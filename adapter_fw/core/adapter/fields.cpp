@@ -24,6 +24,12 @@ constexpr Field<Settings> SETTINGS[] = {
 };
 static_assert(MAX_BAUDS == 8, "one row a line speed");
 
+constexpr Renamed RENAMED[] = {
+    {"disbelief_ns", "plausibility_ns"},
+    {"disbelief_tolerance_mm_s", "plausibility_tolerance_mm_s"},
+    {"disbelief_progress_mm_s", "plausibility_progress_mm_s"},
+};
+
 bool is_same(const char* one, const char* other) {
   while (*one != '\0' && *one == *other) {
     ++one;
@@ -45,6 +51,19 @@ std::int32_t find_setting(const char* name) {
     }
   }
   return -1;
+}
+
+std::int32_t renamed_count() { return static_cast<std::int32_t>(sizeof RENAMED / sizeof RENAMED[0]); }
+
+const Renamed& renamed(std::int32_t place) { return RENAMED[place]; }
+
+const char* present_name(const char* old_name) {
+  for (const Renamed& one : RENAMED) {
+    if (is_same(one.old_name, old_name)) {
+      return one.name;
+    }
+  }
+  return nullptr;
 }
 
 }  // namespace adapter

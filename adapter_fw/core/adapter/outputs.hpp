@@ -7,7 +7,7 @@
 #include <cstdint>
 
 #include "../../hal/pins.hpp"
-#include "../p2os/own.hpp"
+#include "../p2os/uncopied_pointer.hpp"
 #include "mixing.hpp"
 #include "settings.hpp"
 
@@ -58,7 +58,7 @@ class Outputs {
   void show(std::uint32_t mask, std::uint32_t levels, Nanos now);
 
   WireNumbers wires_;
-  p2os::Own<hal::PinsOut> pins_;
+  p2os::UncopiedPointer<hal::PinsOut> pins_;
   std::uint32_t driven_ = 0;
   std::uint32_t levels_ = 0;
 };

@@ -10,7 +10,7 @@ using p2os::CommandNumber;
 
 namespace {
 
-//: ENABLE 1 goes out with this many pairs: one frame may be lost. # chosen: not more, for a person may switch off
+//: ENABLE 1 goes out with this many pairs: one frame may be lost. # chosen: not more, a person may switch the motors off
 constexpr std::int32_t ENABLES = 2;
 
 }  // namespace
@@ -32,8 +32,8 @@ void Adapter::clear() {
   baud_ = 0;
 }
 
-// Follows the reset wire, which stands otherwise than the state says.
-void Adapter::turn_reset(Nanos now) {
+// Follows the reset wire, whose level does not fit the state.
+void Adapter::follow_reset(Nanos now) {
   now_ = now;
   if (state_ == State::RESET) {
     agenda_.boot_at = now + settings_.boot_ns;
@@ -87,7 +87,7 @@ void Adapter::session_ended(p2os::EndReason reason, Nanos now) {
     client_.drop();
     agenda_.retry_at = now + settings_.retry_ns;
     next_baud();
-    tell(now, What::NO_CONNECTION, p2os::text(reason), static_cast<std::int32_t>(settings_.retry_ns / NS_PER_MS));
+    notify(now, What::NO_CONNECTION, p2os::text(reason), static_cast<std::int32_t>(settings_.retry_ns / NS_PER_MS));
   } else if (is_open()) {
     lose(What::LOST, p2os::text(reason), now);
   }
@@ -99,7 +99,7 @@ void Adapter::take_sip(const p2os::Sip& sip, Nanos now) {
   }
   ++agenda_.sips;
   // From when its bytes came: one that was found late, behind a false header, is as old as they are.
-  agenda_.sip_deadline = p2os::later(now, agenda_.heard_at + settings_.liveness_ns);
+  agenda_.sip_deadline = p2os::later(now, agenda_.received_at + settings_.liveness_ns);
   for (std::uint8_t place = 0; place < sip.sonar_count; ++place) {
     const p2os::SonarReading reading = sip.sonar(place);
     distances_.take(reading.number, reading.raw_range * robot_.range_um_per_count, now);
@@ -116,7 +116,7 @@ void Adapter::take_sip(const p2os::Sip& sip, Nanos now) {
     drive(now);
   }
   if (!encoders_.take(sip.raw_x, sip.raw_y, sip.raw_heading * heading_scale_)) {
-    tell(now, What::ODOMETRY_JUMPED, "the step is no travel; counts go on from here");
+    notify(now, What::ODOMETRY_JUMPED, "the step is no travel; counts go on from here");
   }
   const Wheels measured{divide_half_away(sip.raw_left_velocity * robot_.velocity_um_s_per_count, 1'000),
                         divide_half_away(sip.raw_right_velocity * robot_.velocity_um_s_per_count, 1'000)};
@@ -124,7 +124,7 @@ void Adapter::take_sip(const p2os::Sip& sip, Nanos now) {
   if (sip.stall_left != agenda_.stall_left || sip.stall_right != agenda_.stall_right) {
     agenda_.stall_left = sip.stall_left;
     agenda_.stall_right = sip.stall_right;
-    tell(now, What::STALL, "", sip.stall_left ? 1 : 0, sip.stall_right ? 1 : 0);
+    notify(now, What::STALL, "", sip.stall_left ? 1 : 0, sip.stall_right ? 1 : 0);
   }
   walk(now);
 }
@@ -138,7 +138,7 @@ void Adapter::drive(Nanos now) {
 
 void Adapter::lose(What what, const char* why, Nanos now) {
   halt(now);
-  agenda_.closed_in_peace = false;
+  agenda_.is_closed_on_request = false;
   pad_.forget_request();
   enter(State::LOST, now, what, why);
 }
@@ -146,16 +146,16 @@ void Adapter::lose(What what, const char* why, Nanos now) {
 void Adapter::lose_pad(Nanos now) {
   const bool wanted = wants_robot();
   pad_.lose();
-  if (wanted && (state_ == State::CONNECTING || is_open())) {
+  if (wanted && has_session()) {
     lose(What::PAD_LOST, "no report of the pad in time", now);
   }
 }
 
 // The master no longer wants the robot.
-void Adapter::end_of_request(const char* why, Nanos now) {
-  if (state_ == State::CONNECTING || is_open()) {
+void Adapter::end_request(const char* why, Nanos now) {
+  if (has_session()) {
     halt(now);
-    agenda_.closed_in_peace = true;
+    agenda_.is_closed_on_request = true;
     agenda_.retry_at = now + settings_.stop_repeat_ns;
     enter(State::CLOSING, now, What::DISCONNECTED, why);
   }
@@ -178,10 +178,10 @@ void Adapter::next_baud() {
 void Adapter::enter(State state, Nanos now, What what, const char* why) {
   state_ = state;
   reason_ = why;
-  tell(now, what, why);
+  notify(now, what, why);
 }
 
-void Adapter::tell(Nanos now, What what, const char* detail, std::int32_t first, std::int32_t second) {
+void Adapter::notify(Nanos now, What what, const char* detail, std::int32_t first, std::int32_t second) {
   if (observer_) {
     observer_->happened(now, what, detail, first, second);
   }

@@ -1,7 +1,7 @@
 // The adapter's console: lines in, text out. The same on a PC and behind the ESP32's USB port.
 //
 //   help                 what there is
-//   version              firmware, board, when it was built is not said: builds are repeatable
+//   version              firmware and board; no build time, for builds are repeatable
 //   status               state, master, speeds, counts, counters of the line
 //   pins                 every wire's level
 //   log                  the last events
@@ -36,8 +36,11 @@ class Store {
   ~Store() = default;
 };
 
-// Returns the defaults with what is stored in their place; if these have a fault, the defaults, and `fault` says why.
+// Returns the defaults with what is stored in their place; if these have a fault, the defaults, and `fault` is why.
 adapter::Settings stored_settings(Store& store, const adapter::WireNumbers& wires, const char*& fault);
+
+// Writes a line for each value that is stored under the old name of a setting: it is left out.
+void report_renamed(Store& store, Writer& writer);
 
 class Console {
  public:
@@ -57,10 +60,10 @@ class Console {
   // Takes characters as they come; a line is done at its end.
   void take(char character, p2os::Nanos now);
 
-  // Says who this is; for the start.
+  // Writes firmware and board; for the start.
   void banner();
 
-  // Tells whether `restart` was asked for; the shell has to make a new adapter.
+  // Tells whether `restart` was asked for; the program has to make a new adapter.
   bool wants_restart() const { return wants_restart_; }
 
  private:
@@ -70,6 +73,7 @@ class Console {
   void get(const char* name);
   void set(const char* name, const char* value);
   void reset(const char* name);
+  void refuse_name(const char* name);
   void number(const char* name, std::int64_t value);
   void show(std::int32_t place, const adapter::Settings& settings);
 

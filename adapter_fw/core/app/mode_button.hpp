@@ -1,7 +1,7 @@
 // The button that gives the robot to the other master.
 //
 // A press counts once it has been held for HOLD_NS without a break; the button must
-// come up before it counts again. One that is held from the start on says nothing.
+// come up before it counts again. One that is held from the start on does not count.
 #pragma once
 
 #include "../p2os/time.hpp"

@@ -16,7 +16,7 @@ p2os::Nanos Runner::pass() {
     adapter_.receive_pad(report, now);
   }
   adapter_.advance_to(now);
-  look_for_gap();  // a machine can fall asleep in any line: what the one above says must not go out then
+  look_for_gap();  // a machine can be suspended in any line: what the one above queued must not go out then
   if (adapter_.baud() != baud_) {
     baud_ = adapter_.baud();
     uart_.set_baud(baud_);

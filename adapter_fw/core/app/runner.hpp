@@ -5,7 +5,7 @@
 // and other tasks only fill queues behind the hardware's interfaces.
 //
 // A gap is a pass that comes more than GAP_NS after it was due: the machine slept,
-// the program was stopped, or the task hung. What was wanted before it is old news.
+// the program was stopped, or the task hung. What was commanded before it is out of date.
 // So STOP goes out first, then what waits on the line is read, and the robot stands
 // until its master asks anew.
 #pragma once
@@ -32,7 +32,7 @@ class Runner {
   p2os::Nanos pass();
 
  private:
-  // Returns the time, before which the adapter has been told to stop if there was a gap.
+  // Returns the time, before which the adapter has stopped the robot if there was a gap.
   p2os::Nanos look_for_gap();
   void send();
 

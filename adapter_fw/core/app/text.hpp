@@ -1,4 +1,4 @@
-// Lines of text without a C library: what a console says, and the words that it is given.
+// Lines of text without a C library: what a console writes, and the words that it is given.
 #pragma once
 
 #include <cstddef>

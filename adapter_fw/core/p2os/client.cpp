@@ -56,10 +56,10 @@ void Client::connect(Nanos now) {
 
 void Client::abandon() {
   drop();
-  put(stop());
-  put(stand_still(CommandNumber::VEL));
-  put(stand_still(CommandNumber::RVEL));
-  put(CommandFrame(CommandNumber::CLOSE));
+  enqueue(stop());
+  enqueue(stand_still(CommandNumber::VEL));
+  enqueue(stand_still(CommandNumber::RVEL));
+  enqueue(CommandFrame(CommandNumber::CLOSE));
 }
 
 void Client::drop() {
@@ -69,15 +69,15 @@ void Client::drop() {
 
 void Client::send(const CommandFrame& frame, Nanos now) {
   if (is_open()) {
-    say(frame, now);
+    transmit(frame, now);
   }
 }
 
 void Client::stop_unknown() {
   if (settings_.stops_unknown_robot) {
-    put(stop());
-    put(stand_still(CommandNumber::VEL));
-    put(stand_still(CommandNumber::RVEL));
+    enqueue(stop());
+    enqueue(stand_still(CommandNumber::VEL));
+    enqueue(stand_still(CommandNumber::RVEL));
   }
 }
 
@@ -149,14 +149,14 @@ void Client::take_open_packet(Bytes payload, Nanos now) {
   }
   if (kind < IDENTITY_KIND && payload.size == 1) {
     // What a robot answers before OPEN. Echoes that were late came before the first packet.
-    if (has_heard_) {
+    if (has_received_) {
       lose(EndReason::RESTARTED, now);
     } else {
       ++stats_.frames_ignored;
     }
     return;
   }
-  has_heard_ = true;
+  has_received_ = true;
   due_ = now + settings_.liveness_ns;
   if (!is_sip_kind(kind)) {
     if (listener_) {
@@ -177,7 +177,7 @@ void Client::act(Nanos now) {
     time_out(now);
   }
   if (is_open() && now >= last_sent_ns_ + settings_.pulse_ns) {
-    say(CommandFrame(CommandNumber::PULSE), now);
+    transmit(CommandFrame(CommandNumber::PULSE), now);
   }
 }
 
@@ -188,9 +188,9 @@ void Client::time_out(Nanos now) {
   } else if (state_ == ClientState::RECOVERING) {
     sync(ClientState::SYNC0, now);
   } else if (state_ == ClientState::SYNCED) {
-    say(CommandFrame(CommandNumber::OPEN), now);
+    transmit(CommandFrame(CommandNumber::OPEN), now);
     enter(ClientState::OPEN, now + settings_.first_packet_ns);
-    has_heard_ = false;
+    has_received_ = false;
     if (listener_) {
       listener_->session_opened(identity_, now);
     }
@@ -217,15 +217,15 @@ void Client::sync(ClientState state, Nanos now) {
     stop_unknown();
   }
   const int number = static_cast<int>(state) - static_cast<int>(ClientState::SYNC0);
-  say(CommandFrame(static_cast<CommandNumber>(number)), now);
+  transmit(CommandFrame(static_cast<CommandNumber>(number)), now);
   enter(state, now + settings_.sync_timeout_ns);
 }
 
 // Brings a robot that is open, and may be moving, to a stand, closes it, and tries again.
 void Client::stop_and_close(Nanos now) {
-  say(stop(), now);
-  say(stand_still(CommandNumber::VEL), now);
-  say(CommandFrame(CommandNumber::CLOSE), now);
+  transmit(stop(), now);
+  transmit(stand_still(CommandNumber::VEL), now);
+  transmit(CommandFrame(CommandNumber::CLOSE), now);
   if (attempts_ >= settings_.sync_attempts) {
     retry(now);
   } else {
@@ -235,8 +235,8 @@ void Client::stop_and_close(Nanos now) {
 
 void Client::lose(EndReason reason, Nanos now) {
   ++stats_.losses;
-  say(stop(), now);
-  say(stand_still(CommandNumber::VEL), now);
+  transmit(stop(), now);
+  transmit(stand_still(CommandNumber::VEL), now);
   enter(ClientState::LOST, NEVER);
   if (listener_) {
     listener_->session_ended(reason, now);
@@ -248,12 +248,12 @@ void Client::enter(ClientState state, Nanos due) {
   due_ = due;
 }
 
-void Client::say(const CommandFrame& frame, Nanos now) {
-  put(frame);
+void Client::transmit(const CommandFrame& frame, Nanos now) {
+  enqueue(frame);
   last_sent_ns_ = now;
 }
 
-void Client::put(const CommandFrame& frame) {
+void Client::enqueue(const CommandFrame& frame) {
   if (count_ == OUTPUT_FRAMES) {
     ++stats_.overflows;
     return;

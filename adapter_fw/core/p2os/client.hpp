@@ -2,7 +2,7 @@
 //
 // Theory of operation. 0, 1 and 2 are SYNC0, SYNC1 and SYNC2 while the two ends
 // find each other, and PULSE, OPEN and CLOSE once the session is open. The client
-// says SYNC0 until it is echoed, then SYNC1, then SYNC2, which the robot answers
+// sends SYNC0 until it is echoed, then SYNC1, then SYNC2, which the robot answers
 // with its name; OPEN follows 100 ms later, and from then on packets flow.
 //
 //     CLOSED, LOST, FAILED  --connect-->  SYNC0 --> SYNC1 --> SYNC2 --> SYNCED --> OPEN
@@ -14,7 +14,7 @@
 // its watchdog has stopped. So STOP, VEL 0 and RVEL 0 stand before every SYNC0
 // (unless stops_unknown_robot is off), and STOP, VEL 0 before every CLOSE.
 //
-// A PULSE goes out when nothing else did for pulse_ns; the robot's watchdog bites
+// A PULSE goes out when nothing else did for pulse_ns; the robot's watchdog stops it
 // after 2 s. No heap, no exceptions, no clock.
 #pragma once
 
@@ -23,7 +23,7 @@
 
 #include "decoder.hpp"
 #include "frame.hpp"
-#include "own.hpp"
+#include "uncopied_pointer.hpp"
 #include "sip.hpp"
 #include "time.hpp"
 
@@ -46,11 +46,11 @@ struct ClientSettings {
 
 enum class ClientState : std::uint8_t { CLOSED, SYNC0, SYNC1, SYNC2, SYNCED, OPEN, RECOVERING, LOST, FAILED };
 
-//: Why a session ended; `text` says it to a person.
+//: Why a session ended; `text` gives it in words.
 enum class EndReason : std::uint8_t { NO_ANSWER, SILENCE, CONTROLLER_RESET, RESTARTED };
 const char* text(EndReason reason);
 
-//: What the robot said in answer to SYNC2; cut to 19 characters each, as other clients do.
+//: What the robot answered to SYNC2; cut to 19 characters each, as other clients do.
 struct Identity {
   static constexpr std::size_t LENGTH = 20;
   std::array<char, LENGTH> name{};
@@ -58,10 +58,10 @@ struct Identity {
   std::array<char, LENGTH> subclass{};
 };
 
-//: Told what happens, in order.
+//: Called with what happens, in order.
 class ClientListener {
  public:
-  //: OPEN was sent to a robot that has said who it is.
+  //: OPEN was sent to a robot that has identified itself.
   virtual void session_opened(const Identity& robot, Nanos now) = 0;
   //: The session was lost (STOP and VEL 0 are the next frames out), or could not be opened.
   virtual void session_ended(EndReason reason, Nanos now) = 0;
@@ -76,7 +76,7 @@ class ClientListener {
 struct ClientStats {
   std::uint32_t frames_received = 0;
   std::uint32_t frames_ignored = 0;
-  //: SIPs shorter than their own sonar count says.
+  //: SIPs shorter than their own sonar count requires.
   std::uint32_t malformed = 0;
   std::uint32_t sync_timeouts = 0;
   std::uint32_t losses = 0;
@@ -88,7 +88,7 @@ class Client final : private FrameSink {
  public:
   explicit Client(const ClientSettings& settings) : settings_(settings) {}
 
-  // Who is told; must outlive the client.
+  // Who is notified; must outlive the client.
   void set_listener(ClientListener* listener) { listener_.set(listener); }
 
   ClientState state() const { return state_; }
@@ -99,19 +99,19 @@ class Client final : private FrameSink {
   // Begins to open a session; without effect while one is open or being opened.
   void connect(Nanos now);
 
-  // Says STOP, VEL 0, RVEL 0 and CLOSE; what was not taken yet is never sent.
+  // Sends STOP, VEL 0, RVEL 0 and CLOSE; what was not taken yet is never sent.
   void abandon();
 
-  // Ends the session without a word, and forgets what was not taken.
+  // Ends the session without sending anything, and forgets what was not taken.
   void drop();
 
-  // Knows nothing, as after a reset; who is told stays.
+  // Forgets everything, as after a reset; the listener stays.
   void forget() { *this = Client(settings_); }
 
-  // Says a command of the open session; without effect while none is open.
+  // Sends a command of the open session; without effect while none is open.
   void send(const CommandFrame& frame, Nanos now);
 
-  // Says STOP, VEL 0, RVEL 0 to a robot of which nothing is known, unless the settings say not to.
+  // Sends STOP, VEL 0, RVEL 0 to a robot of which nothing is known, unless the settings forbid it.
   void stop_unknown();
 
   // Takes bytes that arrived at `now`.
@@ -138,12 +138,12 @@ class Client final : private FrameSink {
   void stop_and_close(Nanos now);
   void lose(EndReason reason, Nanos now);
   void enter(ClientState state, Nanos due);
-  void say(const CommandFrame& frame, Nanos now);
-  void put(const CommandFrame& frame);
+  void transmit(const CommandFrame& frame, Nanos now);
+  void enqueue(const CommandFrame& frame);
   bool is_syncing() const;
 
   ClientSettings settings_;
-  Own<ClientListener> listener_;
+  UncopiedPointer<ClientListener> listener_;
   Decoder decoder_;
   ClientState state_ = ClientState::CLOSED;
   //: When the present state runs out.
@@ -151,7 +151,7 @@ class Client final : private FrameSink {
   Nanos last_sent_ns_ = 0;
   std::int32_t attempts_ = 0;
   //: Whether a packet has come since OPEN.
-  bool has_heard_ = false;
+  bool has_received_ = false;
   Identity identity_;
   ClientStats stats_;
   std::array<CommandFrame, OUTPUT_FRAMES> output_{};

@@ -30,7 +30,7 @@ struct Bytes {
   constexpr Bytes from(std::size_t place) const { return {data + place, size - place}; }
 };
 
-//: Every command that the adapter and the small client say.
+//: Every command that the adapter and the small client send.
 enum class CommandNumber : std::uint8_t {
   PULSE = 0,  // SYNC0 before the session is open
   OPEN = 1,   // SYNC1

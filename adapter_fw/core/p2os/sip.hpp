@@ -35,7 +35,7 @@ struct Sip {
   // Returns one of the readings; they stay in the frame's bytes.
   SonarReading sonar(std::uint8_t place) const;
 
-  // Reads a SIP's payload; false where it is shorter than its own sonar count says.
+  // Reads a SIP's payload; false where it is shorter than its own sonar count requires.
   [[nodiscard]] static bool read(Bytes payload, Sip& sip);
 
  private:

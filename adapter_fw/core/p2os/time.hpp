@@ -1,7 +1,7 @@
 // Time as this code knows it: whole nanoseconds in 64 bits, passed in by the caller.
 //
 // Nothing here reads a clock. 64 bits last 292 years, so no comparison has to
-// mind a wrap; a shell whose clock has 32 bits widens it before it calls.
+// mind a wrap; a program whose clock has 32 bits widens it before it calls.
 #pragma once
 
 #include <cstdint>

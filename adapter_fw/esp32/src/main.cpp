@@ -5,7 +5,7 @@
 //     main      core 0: the pad's radio, where there is one.
 //
 // The task watchdog resets the chip if the adapter's task hangs for a second: the
-// outputs fall back to their pulls, and after the boot the first frames say STOP.
+// outputs fall back to their pulls, and after the boot the first frame is STOP.
 
 #include <esp_system.h>
 #include <esp_task_wdt.h>
@@ -17,7 +17,7 @@
 #include "../../core/app/console.hpp"
 #include "../../core/app/mode_button.hpp"
 #include "../../core/app/runner.hpp"
-#include "../../core/app/teller.hpp"
+#include "../../core/app/event_printer.hpp"
 #include "../../generated/robots.hpp"
 #include "clock.hpp"
 #include "led.hpp"
@@ -60,11 +60,12 @@ adapter::Master other(adapter::Master master) {
     terminal.write(fault);
     terminal.write("\n");
   }
+  app::report_renamed(store, terminal);
   line.start(settings.bauds[0]);
   static app::EventLog log;
-  static app::Teller teller(log, terminal);
+  static app::EventPrinter printer(log, terminal);
   static adapter::Adapter part(settings, ROBOT, board::WIRES, clock.now());
-  part.attach(&wires, &wires, &teller);
+  part.attach(&wires, &wires, &printer);
   if (starts_with_pad) {
     part.set_master(adapter::Master::PAD, clock.now());
   }

@@ -1,7 +1,7 @@
 // Bluepad32 as the one source of pad reports: any pad that it knows, paired without an address in the code.
 //
 // Its callbacks run on its own task; the newest report crosses to the adapter's task
-// through a queue of one, taken each millisecond. Every report counts, also one that says the same as the
+// through a queue of one, taken each millisecond. Every report counts, also one that equals the
 // last: silence means that the pad is gone. A pad that only reports changes is lost
 // to the adapter whenever its sticks are held still (setting pad_loss_ns).
 

@@ -26,7 +26,7 @@ class Wires final : public hal::PinsIn, public hal::PinsOut {
   std::uint32_t shown_ = 0;
 };
 
-// Reads the jumper that says who commands after a boot; before `start`, for the pin may be an output later.
+// Reads the jumper that chooses who commands after a boot; before `start`, for the pin may be an output later.
 bool is_pad_jumper_fitted();
 
 // Tells whether the mode button is held down.

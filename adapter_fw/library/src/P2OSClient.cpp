@@ -55,7 +55,7 @@ void P2OSClient::update() {
   }
   client_.advance_to(at);
   if (client_.is_open()) {
-    say(at);
+    send_speeds(at);
   }
   CommandFrame frame;
   while (client_.take_output(frame)) {
@@ -74,7 +74,7 @@ p2os::Nanos P2OSClient::now() {
   return now_;
 }
 
-void P2OSClient::say(p2os::Nanos at) {
+void P2OSClient::send_speeds(p2os::Nanos at) {
   if (at >= driveUntil_ && (forward_ != 0 || turn_ != 0)) {
     forward_ = turn_ = 0;
     isChanged_ = true;

@@ -21,7 +21,7 @@ class P2OSClient : private p2os::ClientListener {
   static constexpr uint8_t SONARS = 16;
   //: drive() holds so long, ms: a sketch that hangs stops the robot.
   static constexpr uint32_t DRIVE_MS = 500;
-  //: A speed is said again after so long, ms: P2OS acknowledges nothing.
+  //: A speed is sent again after so long, ms: P2OS acknowledges nothing.
   static constexpr uint32_t REFRESH_MS = 200;
 
   explicit P2OSClient(Stream& line, const P2OSRobot& robot = P2OSRobot());
@@ -42,10 +42,10 @@ class P2OSClient : private p2os::ClientListener {
   void stop() { drive(0, 0); }
 
   bool isOpen() const { return client_.is_open(); }
-  // What the robot says of itself, for example "p2dx"; empty before the first connection.
+  // The subclass that the robot answered with, for example "p2dx"; empty before the first connection.
   const char* subclass() const { return identity_.subclass.data(); }
 
-  // Where the robot believes to be since it was opened: mm, mm, degrees to the left.
+  // The pose that the robot reports, from where it was opened: mm, mm, degrees to the left.
   float x() const { return static_cast<float>(xCounts_) * robot_.mmPerCount; }
   float y() const { return static_cast<float>(yCounts_) * robot_.mmPerCount; }
   float heading() const { return heading_ * robot_.degPerCount; }
@@ -65,7 +65,7 @@ class P2OSClient : private p2os::ClientListener {
   void take_sip(const p2os::Sip& sip, p2os::Nanos now) override;
   void take_packet(p2os::Bytes, p2os::Nanos) override {}
   p2os::Nanos now();
-  void say(p2os::Nanos now);
+  void send_speeds(p2os::Nanos now);
 
   Stream& line_;
   P2OSRobot robot_;

@@ -9,7 +9,7 @@ from p2os.pioneer.body.factory import make_body
 from p2os.pioneer.world import load_world
 from p2os.pioneer.world.model import Obstacle, Pose
 from p2os.robots.parameters import load_parameters
-from robot_bench.scenario.world_script import BeforeSonar, Change, Op, Script, load_changes
+from robot_bench.scenario.world_script import BeforeSonar, Change, Op, WorldScript, load_changes
 
 S = 10**9
 P2DX = load_parameters("p2dx")
@@ -19,47 +19,47 @@ def post(name: str = "post") -> Obstacle:
     return Obstacle(name=name, x_m=0, y_m=0, radius_m=0.02, height_m=0.5)
 
 
-def script(*changes: Change) -> tuple[Script, list[tuple[str, str, int, dict[str, object]]], list[int]]:
+def script(*changes: Change) -> tuple[WorldScript, list[tuple[str, str, int, dict[str, object]]], list[int]]:
     body = make_body("kinematic", load_world("room"), P2DX)
     body.reset(Pose(-1.0, 0.0, math.pi / 2), 0)
-    told: list[tuple[str, str, int, dict[str, object]]] = []
+    changed: list[tuple[str, str, int, dict[str, object]]] = []
     brought: list[int] = []
-    made = Script(
+    made = WorldScript(
         changes,
         body,
         P2DX,
         bring_to=brought.append,
-        on_change=lambda op, name, at, f: told.append((op, name, at, dict(f))),
+        on_change=lambda op, name, at, f: changed.append((op, name, at, dict(f))),
     )
-    return made, told, brought
+    return made, changed, brought
 
 
 def test_changes_happen_in_order_of_time_each_at_its_own() -> None:
-    made, told, brought = script(
+    made, changed, brought = script(
         Change(at=3 * S, op=Op.REMOVE, name="post"),
         Change(at=S, op=Op.PLACE, name="post", obstacle=post(), x_m=1, y_m=-1),
         Change(at=2 * S, op=Op.MOVE, name="post", x_m=1.5, y_m=-1, heading_rad=0.5),
     )
     assert made.next_deadline() == S
     made.advance_to(S)
-    assert [op for op, *_ in told] == ["place"]
+    assert [op for op, *_ in changed] == ["place"]
     made.advance_to(5 * S)
     assert brought == [S, 2 * S, 3 * S]
-    assert [(op, at) for op, _, at, _ in told] == [("place", S), ("move", 2 * S), ("remove", 3 * S)]
-    assert told[0][3]["radius"] == 0.02
-    assert told[1][3] == {"x": 1.5, "y": -1, "heading": 0.5}
-    assert told[2][3] == {}
+    assert [(op, at) for op, _, at, _ in changed] == [("place", S), ("move", 2 * S), ("remove", 3 * S)]
+    assert changed[0][3]["radius"] == 0.02
+    assert changed[1][3] == {"x": 1.5, "y": -1, "heading": 0.5}
+    assert changed[2][3] == {}
     assert made.next_deadline() is None
 
 
 @pytest.mark.parametrize("number", range(1, 9))
 def test_a_thing_before_a_sonar_is_what_that_sonar_sees(number: int) -> None:
     change = Change(at=0, op=Op.PLACE, name="post", obstacle=post(), before=BeforeSonar(number=number, distance_m=0.45))
-    made, told, _ = script(change)
+    made, changed, _ = script(change)
     made.advance_to(0)
     ranges = made._body.ranges(range(8))
     assert ranges[number - 1] == pytest.approx(0.45 - 0.02, abs=0.002)
-    assert told[0][3]["sonar"] == number
+    assert changed[0][3]["sonar"] == number
     assert [n for n, metres in enumerate(ranges, start=1) if metres < 0.6] == [number]
 
 
@@ -70,10 +70,10 @@ def test_a_restored_script_does_nothing_twice() -> None:
     ]
     first, _, _ = script(*changes)
     first.advance_to(S)
-    second, told, _ = script(*changes)
+    second, changed, _ = script(*changes)
     second.restore(first.snapshot())
     second.advance_to(3 * S)
-    assert [name for _, name, _, _ in told] == ["post 2"]
+    assert [name for _, name, _, _ in changed] == ["post 2"]
 
 
 SIZES = ("length_m", "width_m", "height_m")

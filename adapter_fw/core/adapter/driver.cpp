@@ -1,4 +1,4 @@
-#include "plausibility.hpp"
+#include "driver.hpp"
 
 #include "numbers.hpp"
 
@@ -7,7 +7,7 @@ namespace adapter {
 void PlausibilityCheck::begin(Nanos now) {
   command_ = measured_ = {};
   least_error_ = 0;
-  renewed_ = now;
+  passed_at_ = now;
 }
 
 void PlausibilityCheck::expect(Wheels command) {
@@ -23,7 +23,7 @@ void PlausibilityCheck::take(Wheels measured, bool stalled, Nanos now) {
   const std::int64_t error_now = error();
   if (error_now <= tolerance_mm_s_ || stalled || error_now <= least_error_ - progress_mm_s_) {
     least_error_ = error_now;
-    renewed_ = now;
+    passed_at_ = now;
   } else if (was_near) {
     // It has left its command by itself: its way back is measured from here.
     least_error_ = error_now;

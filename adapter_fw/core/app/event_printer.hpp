@@ -1,13 +1,13 @@
-// An observer that keeps each event in the log and says it at once.
+// An observer that keeps each event in the log and prints it at once.
 #pragma once
 
 #include "event_log.hpp"
 
 namespace app {
 
-class Teller final : public adapter::Observer {
+class EventPrinter final : public adapter::Observer {
  public:
-  Teller(EventLog& log, Writer& writer) : log_(log), writer_(writer) {}
+  EventPrinter(EventLog& log, Writer& writer) : log_(log), writer_(writer) {}
 
   void happened(p2os::Nanos now, adapter::What what, const char* detail, std::int32_t first,
                 std::int32_t second) override {

@@ -1,4 +1,4 @@
-#include "sampler.hpp"
+#include "inputs.hpp"
 
 namespace adapter {
 

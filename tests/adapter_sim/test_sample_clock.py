@@ -8,11 +8,11 @@ from adapter_sim.pins import SampleClock
 from tests.adapter_sim.conftest import MS, Rig
 
 
-def story(steps: list[tuple[str, int, int]], *, sleeps: bool) -> list[object]:
+def story(steps: list[tuple[str, int, int]], *, suspends: bool) -> list[object]:
     """Run a story of (what, value, tenths of a millisecond); return all that the adapter did."""
     rig = Rig()
     rig.connect()
-    rig.adapter.samples.waits_for_edges = sleeps
+    rig.adapter.samples.waits_for_edges = suspends
     for what, value, span in steps:
         if what == "motors":
             for bit in range(6):
@@ -35,11 +35,11 @@ STEPS = st.lists(
 @pytest.mark.slow
 @given(steps=STEPS)
 @settings(max_examples=60, deadline=None)
-def test_it_does_the_same_asleep_and_awake(steps: list[tuple[str, int, int]]) -> None:
-    assert story(steps, sleeps=True) == story(steps, sleeps=False)
+def test_it_does_the_same_with_sampling_suspended(steps: list[tuple[str, int, int]]) -> None:
+    assert story(steps, suspends=True) == story(steps, suspends=False)
 
 
-def test_a_clock_sleeps_over_whole_periods() -> None:
+def test_a_clock_is_suspended_over_whole_periods() -> None:
     clock = SampleClock(2 * MS)
     clock.after(3 * MS)
     clock.was_quiet(5 * MS)
@@ -47,11 +47,11 @@ def test_a_clock_sleeps_over_whole_periods() -> None:
     clock.waits_for_edges = True
     clock.was_quiet(7 * MS)
     assert clock.due(50 * MS) == 50 * MS
-    clock.wake(13 * MS)
-    assert (clock.next, clock.is_asleep) == (13 * MS, False), "an instant that has come is not slept over"
+    clock.resume(13 * MS)
+    assert (clock.next, clock.is_suspended) == (13 * MS, False), "an instant that has come is not left out"
     clock.was_quiet(13 * MS)
-    clock.wake(13 * MS + 1)
+    clock.resume(13 * MS + 1)
     assert clock.next == 15 * MS
     clock.was_quiet(15 * MS)
-    clock.wake(17 * MS + 1)
+    clock.resume(17 * MS + 1)
     assert clock.next == 19 * MS

@@ -1,9 +1,10 @@
-// Whether the robot does what it is told, and when to tell it again.
+// The speeds that are commanded: whether the robot follows, and when a pair goes out.
 //
-// P2OS acknowledges nothing. The only witness is the pair of wheel speeds in each
-// SIP: a robot that obeys is near its command, or comes nearer, or says that it is
-// stalled. Each SIP that shows one of the three passes the plausibility check; when none has
-// done so for plausibility_ns, the robot's motion is implausible.
+// P2OS acknowledges nothing. The only feedback is the pair of wheel speeds in each
+// SIP: a robot that obeys is near its command, or comes nearer, or reports a stall.
+// Each SIP that shows one of the three passes the plausibility check; when none has
+// done so for plausibility_ns, the robot's motion is implausible. The theory stands in
+// adapter_sim/driver.py.
 #pragma once
 
 #include <cstdint>
@@ -16,11 +17,11 @@ namespace adapter {
 class PlausibilityCheck {
  public:
   explicit PlausibilityCheck(const Settings& settings)
-      : patience_ns_(settings.plausibility_ns),
+      : timeout_ns_(settings.plausibility_ns),
         tolerance_mm_s_(settings.plausibility_tolerance_mm_s),
         progress_mm_s_(settings.plausibility_progress_mm_s) {}
 
-  // Trusts the robot anew.
+  // Starts anew, with the wheels at rest.
   void begin(Nanos now);
 
   // Takes a command that is being sent; a new one measures progress from here, and buys no time.
@@ -29,8 +30,8 @@ class PlausibilityCheck {
   // Takes the wheel speeds and stall flags of a SIP.
   void take(Wheels measured, bool stalled, Nanos now);
 
-  // Returns when the patience runs out unless a SIP renews it.
-  Nanos ends_at() const { return renewed_ + patience_ns_; }
+  // Returns when the motion becomes implausible unless a SIP passes before.
+  Nanos ends_at() const { return passed_at_ + timeout_ns_; }
 
   Wheels command() const { return command_; }
   Wheels measured() const { return measured_; }
@@ -38,13 +39,13 @@ class PlausibilityCheck {
  private:
   std::int64_t error() const;
 
-  Nanos patience_ns_;
+  Nanos timeout_ns_;
   std::int64_t tolerance_mm_s_;
   std::int64_t progress_mm_s_;
   Wheels command_;
   Wheels measured_;
   std::int64_t least_error_ = 0;
-  Nanos renewed_ = 0;
+  Nanos passed_at_ = 0;
 };
 
 //: The newest speeds, and when a VEL+RVEL pair goes out: on a change, not too near to the last, and again when old.
