@@ -304,10 +304,10 @@ def test_the_judge_sees_a_circle() -> None:
 
 def test_the_map_names_what_is_there() -> None:
     text = (ROOT / "ARCHITECTURE.md").read_text(encoding="utf-8")
-    paths = {word for word in re.findall(r"`([\w./*-]+/[\w./*-]*)`", text)}
+    paths = set(re.findall(r"`([\w./*-]+/[\w./*-]*)`", text))
     assert [path for path in sorted(paths) if not any(ROOT.glob(path.rstrip("/")))] == []
     facts = re.findall(r"`([A-Za-z_.]+)`(?: in |, )`([\w/.]+\.py)`", text)
-    assert len(facts) > 5
+    assert len(facts) >= 5
     gone = [
         (name, path) for name, path in facts if name.split(".")[-1] not in (ROOT / path).read_text(encoding="utf-8")
     ]
