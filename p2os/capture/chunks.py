@@ -1,7 +1,7 @@
-"""What was said on a P2OS line, by whom and when: chunks of bytes with time and direction.
+"""What was sent on a P2OS line, by whom and when: chunks of bytes with time and direction.
 
 A capture knows nothing of frames; `p2os.capture.listing` finds them. Where a
-source tells no direction (raw bytes, plain hex), a chunk has none and each
+source gives no direction (raw bytes, plain hex), a chunk has none and each
 frame's is guessed from its shape.
 
 Invariant: chunks are in the order in which they were read, and time never runs back.
@@ -16,7 +16,7 @@ from p2os.timing import Nanos
 
 
 class Direction(Enum):
-    """Who spoke."""
+    """Which way bytes went."""
 
     #: From the client to the robot: commands.
     TO_ROBOT = "c2r"
@@ -40,7 +40,7 @@ class Chunk:
 
     Args:
         at_ns: When, in nanoseconds since the capture's start.
-        direction: Who sent them, or None where the source does not tell.
+        direction: Who sent them, or None where the source does not give it.
         data: The bytes.
 
     Raises:
@@ -62,7 +62,7 @@ class Capture:
 
     Args:
         chunks: In the order of time.
-        has_time: Whether the source told times; without, all are 0.
+        has_time: Whether the source gave times; without, all are 0.
         note: Free text, such as which robot and program were recorded.
     """
 

@@ -1,17 +1,11 @@
-"""Every byte of a frame in words.
+"""Every byte of a frame in words: header, count, number or type, fields, checksum.
 
-The parts of an explanation follow each other without gap or overlap, so that
-joined they are the frame again. The layouts come from the declarations of the
-packets themselves (`p2os.protocol.sip`, `p2os.protocol.config_packet`, `p2os.protocol.packets`).
+The layouts come from the declarations of the packets themselves (`p2os.protocol.sip`,
+`p2os.protocol.config_packet`, `p2os.protocol.packets`). A packet whose content does not
+fit its own counts is shown as plain bytes, as `read_packet` does.
 
-Invariant: the parts of any bytes, sound or damaged, partition them.
-
-The bytes of a client command in words: number, type byte, argument.
-
-The bytes of a server packet in words, after its type byte.
-
-A packet whose inside does not fit its own counts is told as plain bytes, as
-`read_packet` does.
+Invariant: the parts of any bytes, sound or damaged, partition them: joined they are
+the frame again.
 """
 
 import io
@@ -48,6 +42,103 @@ _TYPES = {
     NEGATIVE: "integer, to be taken negative",
     STRING: "string, its length first",
 }
+#: Bits of the flags of AROS and ARCOS robots.
+FLAG_BITS = (
+    "motors on", "sonar array 1 on", "sonar array 2 on", "sonar array 3 on", "sonar array 4 on", "STOP button",
+    "E_stall", "far ledge", "near ledge", "joystick button", "charger power good",
+)  # fmt: skip
+#: Packets without fields of their own → what their bytes are.
+_DATA_MEANINGS: Mapping[type, str] = {
+    RawPacket: "a packet that is not read here",
+    SerauxPacket: "bytes that came in at the AUX port",
+}
+#: Fields of the ARCOS tail that have a unit.
+_TAIL_MEANINGS: Mapping[str, Callable[[int], str]] = {
+    "raw_battery_x10": lambda raw: f"{raw / 10:.1f} V",
+    "charge_state": lambda raw: {-1: "unknown", 0: "not charging", 1: "bulk", 2: "overcharge", 3: "float",
+                                 4: "balance"}.get(raw, str(raw)),
+    "raw_rotation_velocity": lambda raw: f"{raw / 10:.1f} deg/s",
+    "raw_lateral_velocity": lambda raw: f"{raw} mm/s",
+    "raw_temperature": lambda raw: "no sensor" if raw == -127 else f"{raw} deg C",
+    "state_of_charge": lambda raw: f"{raw} %",
+    "controller_time_us": lambda raw: f"{raw} us",
+}  # fmt: skip
+
+
+@dataclass(frozen=True, slots=True)
+class Part:
+    """Some bytes of a frame and what they mean.
+
+    Args:
+        offset: Of the first byte, from the frame's header.
+        data: The bytes.
+        name: What they are, as the manuals call it.
+        meaning: Their value in words, with its unit.
+    """
+
+    offset: int
+    data: bytes
+    name: str
+    meaning: str = ""
+
+
+def explain(row: ListingRow, reading: Reading) -> list[Part]:
+    """Return the parts of a row's bytes, in order."""
+    return list(_placed(_sound(row, reading) if row.valid else _damaged(row.data)))
+
+
+def lines_of(parts: list[Part]) -> list[str]:
+    """Return an explanation as aligned lines: offset, bytes, name, meaning."""
+    lines = []
+    for part in parts:
+        for start in range(0, len(part.data), 8):
+            shown = part.data[start : start + 8].hex(" ")
+            words = f"{part.name}: {part.meaning}" if part.meaning else part.name
+            lines.append(f"  {part.offset + start:3d}  {shown:<23}  {words if start == 0 else ''}".rstrip())
+    return lines
+
+
+def _placed(spans: Iterator[Span]) -> Iterator[Part]:
+    offset = 0
+    for data, name, meaning in spans:
+        if data:
+            yield Part(offset, data, name, meaning)
+            offset += len(data)
+
+
+def _sound(row: ListingRow, reading: Reading) -> Iterator[Span]:
+    frame = Frame.from_bytes(row.data)
+    yield HEADER, "header", ""
+    yield row.data[2:3], "count", f"{row.data[2]} bytes follow, checksum included"
+    if row.direction is Direction.FROM_ROBOT:
+        kind = packet_name(frame.kind)
+        yield frame.payload[:1], "type", f"0x{frame.kind:02X}, {row.name if row.name != kind else kind}"
+        yield from packet_parts(frame, reading.profile, reading.parameters)
+    else:
+        yield from command_parts(frame, row.name)
+    yield row.data[-CHECKSUM_BYTES:], "checksum", f"0x{checksum(frame.payload):04X}, high byte first; right"
+
+
+def _damaged(data: bytes) -> Iterator[Span]:
+    """Yield how far damaged bytes look like a frame."""
+    if data[:2] != HEADER or len(data) < PREFIX_BYTES:
+        yield data, "noise", "no header, so no frame"
+        return
+    count = data[2]
+    yield HEADER, "header", ""
+    if not MIN_COUNT <= count <= MAX_COUNT:
+        yield data[2:3], "count", f"{count} is none: frames have {MIN_COUNT} to {MAX_COUNT}"
+        yield data[3:], "bytes", "looked at again for another header"
+        return
+    missing = count + PREFIX_BYTES - len(data)
+    yield data[2:3], "count", f"{count} bytes should follow" + (f", {missing} never came" if missing > 0 else "")
+    if missing > 0:
+        yield data[3:], "bytes", "looked at again for another header"
+        return
+    payload, stated = data[PREFIX_BYTES:-CHECKSUM_BYTES], int.from_bytes(data[-CHECKSUM_BYTES:], "big")
+    yield payload[:1], "number or type", f"{payload[0]} (0x{payload[0]:02X}), if it is sound"
+    yield payload[1:], "bytes", "not to be trusted"
+    yield data[-CHECKSUM_BYTES:], "checksum", f"0x{stated:04X}, but these bytes give 0x{checksum(payload):04X}"
 
 
 def command_parts(frame: Frame, name: str) -> Iterator[Span]:
@@ -91,29 +182,6 @@ def _integer(command: Command, data: bytes) -> Iterator[Span]:
     yield data, "argument", f"{value}: {row.two_bytes.high} {high}, {row.two_bytes.low} {low}"
 
 
-#: Bits of the flags of AROS and ARCOS robots.
-FLAG_BITS = (
-    "motors on", "sonar array 1 on", "sonar array 2 on", "sonar array 3 on", "sonar array 4 on", "STOP button",
-    "E_stall", "far ledge", "near ledge", "joystick button", "charger power good",
-)  # fmt: skip
-#: Packets without fields of their own → what their bytes are.
-_DATA_MEANINGS: Mapping[type, str] = {
-    RawPacket: "a packet that is not read here",
-    SerauxPacket: "bytes that came in at the AUX port",
-}
-#: Fields of the ARCOS tail that have a unit.
-_TAIL_MEANINGS: Mapping[str, Callable[[int], str]] = {
-    "raw_battery_x10": lambda raw: f"{raw / 10:.1f} V",
-    "charge_state": lambda raw: {-1: "unknown", 0: "not charging", 1: "bulk", 2: "overcharge", 3: "float",
-                                 4: "balance"}.get(raw, str(raw)),
-    "raw_rotation_velocity": lambda raw: f"{raw / 10:.1f} deg/s",
-    "raw_lateral_velocity": lambda raw: f"{raw} mm/s",
-    "raw_temperature": lambda raw: "no sensor" if raw == -127 else f"{raw} deg C",
-    "state_of_charge": lambda raw: f"{raw} %",
-    "controller_time_us": lambda raw: f"{raw} us",
-}  # fmt: skip
-
-
 def packet_parts(frame: Frame, profile: Profile, parameters: RobotParameters) -> Iterator[Span]:
     """Yield (bytes, name, meaning) from the byte after the type to the last one before the checksum."""
     data = frame.data
@@ -141,15 +209,15 @@ def _layout_of(packet: ServerPacket, frame: Frame) -> Construct | None:
 
 def walk(layout: Construct, data: bytes) -> Iterator[Span]:
     """Yield (bytes, name, value) of each leaf of a declared layout, then what follows it or does not fit it."""
-    stream, told = io.BytesIO(data), 0
+    stream, covered = io.BytesIO(data), 0
     try:
         for span in _walk(layout, stream, _context(), ""):
-            told += len(span[0])
+            covered += len(span[0])
             yield span
     except ConstructError:
-        yield data[told:], "bytes", "too few for the next field"
+        yield data[covered:], "bytes", "too few for the next field"
         return
-    yield data[told:], "rest", "after the last known field"
+    yield data[covered:], "rest", "after the last known field"
 
 
 def _walk(layout: Construct, stream: io.BytesIO, context: Any, name: str) -> Iterator[Span]:
@@ -262,79 +330,3 @@ def _strings(data: bytes, names: tuple[str, ...]) -> Iterator[Span]:
         yield data[: len(text) + 1], name, f'"{printable(text)}"'
         data = data[len(text) + 1 :]
     yield data, "rest", "after the last string"
-
-
-@dataclass(frozen=True, slots=True)
-class Part:
-    """Some bytes of a frame and what they mean.
-
-    Args:
-        offset: Of the first byte, from the frame's header.
-        data: The bytes.
-        name: What they are, as the manuals call it.
-        meaning: Their value in words, with its unit.
-    """
-
-    offset: int
-    data: bytes
-    name: str
-    meaning: str = ""
-
-
-def explain(row: ListingRow, reading: Reading) -> list[Part]:
-    """Return the parts of a row's bytes, in order."""
-    return list(_placed(_sound(row, reading) if row.valid else _damaged(row.data)))
-
-
-def lines_of(parts: list[Part]) -> list[str]:
-    """Return an explanation as aligned lines: offset, bytes, name, meaning."""
-    lines = []
-    for part in parts:
-        for start in range(0, len(part.data), 8):
-            shown = part.data[start : start + 8].hex(" ")
-            words = f"{part.name}: {part.meaning}" if part.meaning else part.name
-            lines.append(f"  {part.offset + start:3d}  {shown:<23}  {words if start == 0 else ''}".rstrip())
-    return lines
-
-
-def _placed(spans: Iterator[Span]) -> Iterator[Part]:
-    offset = 0
-    for data, name, meaning in spans:
-        if data:
-            yield Part(offset, data, name, meaning)
-            offset += len(data)
-
-
-def _sound(row: ListingRow, reading: Reading) -> Iterator[Span]:
-    frame = Frame.from_bytes(row.data)
-    yield HEADER, "header", ""
-    yield row.data[2:3], "count", f"{row.data[2]} bytes follow, checksum included"
-    if row.direction is Direction.FROM_ROBOT:
-        kind = packet_name(frame.kind)
-        yield frame.payload[:1], "type", f"0x{frame.kind:02X}, {row.name if row.name != kind else kind}"
-        yield from packet_parts(frame, reading.profile, reading.parameters)
-    else:
-        yield from command_parts(frame, row.name)
-    yield row.data[-CHECKSUM_BYTES:], "checksum", f"0x{checksum(frame.payload):04X}, high byte first; right"
-
-
-def _damaged(data: bytes) -> Iterator[Span]:
-    """Say how far damaged bytes look like a frame."""
-    if data[:2] != HEADER or len(data) < PREFIX_BYTES:
-        yield data, "noise", "no header, so no frame"
-        return
-    count = data[2]
-    yield HEADER, "header", ""
-    if not MIN_COUNT <= count <= MAX_COUNT:
-        yield data[2:3], "count", f"{count} is none: frames have {MIN_COUNT} to {MAX_COUNT}"
-        yield data[3:], "bytes", "looked at again for another header"
-        return
-    missing = count + PREFIX_BYTES - len(data)
-    yield data[2:3], "count", f"{count} bytes should follow" + (f", {missing} never came" if missing > 0 else "")
-    if missing > 0:
-        yield data[3:], "bytes", "looked at again for another header"
-        return
-    payload, stated = data[PREFIX_BYTES:-CHECKSUM_BYTES], int.from_bytes(data[-CHECKSUM_BYTES:], "big")
-    yield payload[:1], "number or type", f"{payload[0]} (0x{payload[0]:02X}), if it is sound"
-    yield payload[1:], "bytes", "not to be trusted"
-    yield data[-CHECKSUM_BYTES:], "checksum", f"0x{stated:04X}, but these bytes give 0x{checksum(payload):04X}"

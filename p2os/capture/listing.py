@@ -1,17 +1,17 @@
-"""A capture as rows: every frame read, every damaged byte told, in the order of time.
+"""A capture as rows: every frame read, every damaged byte shown, in the order of time; and rows as lines for a person.
 
-Three decoders run side by side: one a direction, and one for bytes whose
-direction the source does not tell. Rows partition what was sent: each byte
-stands in exactly one row, except that a rejected frame's row shows all of its
-bytes, also those that turned out to hold another frame.
+What stands in a frame is described in `p2os.capture.describe`, each of its bytes in
+`p2os.capture.explain`.
 
-Where a recorded session stands, to tell SYNC0 from PULSE and client from robot.
+Theory of operation. Three decoders run side by side: one a direction, and one for
+bytes whose direction the source does not give. Numbers 0, 1 and 2 mean SYNC0, SYNC1,
+SYNC2 before a session is open and PULSE, OPEN, CLOSE in it: the same bytes.
+`RecordedSession` tells them apart; where the beginning was not captured, only a
+robot's packet shows that a session is open.
 
-Numbers 0, 1 and 2 mean SYNC0, SYNC1, SYNC2 before a session is open and PULSE,
-OPEN, CLOSE in it: the same bytes. A listener who has not heard the beginning
-knows only once a robot's packet goes by.
-
-Rows as lines for a person: when, which way, what, and what stands in it.
+Invariant: rows partition what was sent. Each byte stands in exactly one row, except
+that a rejected frame's row shows all of its bytes, also those that turned out to hold
+another frame.
 """
 
 import math
@@ -23,7 +23,19 @@ from typing import cast
 from p2os.capture.chunks import Capture, Chunk, Direction
 from p2os.capture.describe import Plain, describe_command, describe_packet
 from p2os.protocol.commands import NEGATIVE, POSITIVE, STRING, CommandNumber
-from p2os.protocol.frames import BadChecksum, BadCount, Decoder, Frame, Item, Noise, Stalled
+from p2os.protocol.frames import (
+    CHECKSUM_BYTES,
+    HEADER,
+    MIN_COUNT,
+    PREFIX_BYTES,
+    BadChecksum,
+    BadCount,
+    Decoder,
+    Frame,
+    Item,
+    Noise,
+    Stalled,
+)
 from p2os.protocol.packets import IDENTITY_KIND, RESET_KINDS
 from p2os.protocol.profiles import Profile
 from p2os.protocol.sip import HEAD_BYTES, READING_BYTES, SIP_KINDS
@@ -34,82 +46,10 @@ SYNC_NAMES = ("SYNC0", "SYNC1", "SYNC2")
 COMMAND_NAMES = ("PULSE", "OPEN", "CLOSE")
 #: chosen: packets that were on their way when CLOSE was sent; three cycles.
 IN_FLIGHT_NS: Nanos = 300 * NS_PER_MS
-
-
-class _State(Enum):
-    CLOSED = "closed"
-    #: The robot has said who it is; the next number 1 is OPEN.
-    SYNCED = "synced"
-    OPEN = "open"
-
-
-class RecordedSession:
-    """Follows one conversation."""
-
-    def __init__(self) -> None:
-        self._state = _State.CLOSED
-        self._closed_at: Nanos | None = None
-
-    @property
-    def is_open(self) -> bool:
-        """Whether a session is open, as far as was heard."""
-        return self._state is _State.OPEN
-
-    def name_of(self, frame: Frame, direction: Direction | None, now: Nanos) -> str:
-        """Take a frame; return its name if it is one of the six, else an empty string."""
-        if direction is Direction.FROM_ROBOT:
-            return self._hear_robot(frame, now)
-        if frame.kind > CommandNumber.CLOSE:
-            return ""
-        if self._state is _State.SYNCED and frame.kind == CommandNumber.OPEN:
-            self._state = _State.OPEN
-        is_command = self._state is _State.OPEN or (bool(frame.data) and frame.kind != CommandNumber.PULSE)
-        if not is_command:
-            return SYNC_NAMES[frame.kind]
-        if frame.kind == CommandNumber.CLOSE:
-            self._state, self._closed_at = _State.CLOSED, now
-        return COMMAND_NAMES[frame.kind]
-
-    def _hear_robot(self, frame: Frame, now: Nanos) -> str:
-        if frame.kind == IDENTITY_KIND and frame.data:
-            self._state = _State.SYNCED
-        elif frame.kind in RESET_KINDS:
-            self._state = _State.CLOSED
-        elif frame.kind > IDENTITY_KIND and (self._closed_at is None or now > self._closed_at + IN_FLIGHT_NS):
-            self._state, self._closed_at = _State.OPEN, None
-        elif frame.kind <= IDENTITY_KIND and not frame.data:
-            self._state = _State.CLOSED
-            return SYNC_NAMES[frame.kind]
-        return ""
-
-
-def guess_direction(frame: Frame) -> Direction | None:
-    """Return who is likely to have sent a frame, by its shape; None where both would send the same bytes."""
-    data = frame.data
-    if frame.kind <= IDENTITY_KIND and not data:
-        return None
-    if frame.kind == IDENTITY_KIND and data.count(b"\0") >= 3 and data[-1:] == b"\0":
-        return Direction.FROM_ROBOT
-    if frame.kind in SIP_KINDS and len(frame.payload) >= HEAD_BYTES:
-        readings = frame.payload[19]
-        if len(frame.payload) >= HEAD_BYTES + READING_BYTES * readings:
-            return Direction.FROM_ROBOT
-    if _is_argument(data):
-        return Direction.TO_ROBOT
-    return Direction.FROM_ROBOT
-
-
-def _is_argument(data: bytes) -> bool:
-    """Tell whether a command's argument may look so: none, an integer, a string, or SETO's lone type byte."""
-    if not data or data in (bytes((POSITIVE,)), bytes((NEGATIVE,))):
-        return True
-    if data[0] in {POSITIVE, NEGATIVE}:
-        return len(data) == 3
-    return data[0] == STRING and len(data) >= 2 and len(data) - 2 - data[1] in {0, 1}
-
-
 #: Longer than any decoder waits for the rest of a frame.
 _LONG_AFTER_NS: Nanos = NS_PER_S
+#: The longest run of bytes shown in one line; `--explain` shows all.
+SHOWN_BYTES = 24
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -129,7 +69,7 @@ class ListingRow:
         direction: Who sent it; None where nobody can tell.
         data: Its bytes on the wire.
         kind: Command number or packet type; None for what is no frame.
-        name: The manual's word, or what is wrong.
+        name: Its name in the manuals, or what is wrong.
         fields: What stands inside, SI units, in the order of the wire.
         problem: One sentence about what is wrong; empty for a sound frame.
     """
@@ -240,6 +180,24 @@ def rows_of(capture: Capture, reading: Reading) -> Iterator[ListingRow]:
     yield from lister.finish(capture.duration_ns)
 
 
+def line_of(row: ListingRow, *, has_time: bool = True) -> str:
+    """Return a row as one line."""
+    time = f"{row.at_ns / NS_PER_S:10.6f} s  " if has_time else ""
+    arrow = " " if row.direction is None else row.direction.arrow
+    if not row.valid:
+        return f"{time}{arrow} !! {row.name}: {row.problem}: {_hex(row.data)}"
+    return f"{time}{arrow} {row.name}{_inside(row)}"
+
+
+def summary_of(rows: int, damaged: int, capture_s: float) -> str:
+    """Return the last line of a listing."""
+    packets = rows - damaged
+    text = f"{packets} packet{'' if packets == 1 else 's'}"
+    if capture_s > 0:
+        text += f" in {capture_s:.3f} s"
+    return f"{text}, {damaged} damaged" if damaged else f"{text}, none damaged"
+
+
 class FrameCutter:
     """Cuts chunks at frames as they come: one chunk a frame, or a run of bytes that is none.
 
@@ -278,8 +236,89 @@ def frame_chunks(chunks: Iterable[Chunk]) -> Iterator[Chunk]:
     yield from cutter.finish()
 
 
+def frame_of(piece: Chunk) -> Frame | None:
+    """Return the frame that a piece cut by `FrameCutter` is, or None for noise."""
+    data = piece.data
+    if data[:2] != HEADER or len(data) < PREFIX_BYTES + MIN_COUNT or len(data) != data[2] + PREFIX_BYTES:
+        return None
+    frame = Frame(data[PREFIX_BYTES:-CHECKSUM_BYTES])
+    return frame if frame.to_bytes() == data else None
+
+
+class _State(Enum):
+    CLOSED = "closed"
+    #: The robot has sent its identity; the next number 1 is OPEN.
+    SYNCED = "synced"
+    OPEN = "open"
+
+
+class RecordedSession:
+    """Follows one conversation."""
+
+    def __init__(self) -> None:
+        self._state = _State.CLOSED
+        self._closed_at: Nanos | None = None
+
+    @property
+    def is_open(self) -> bool:
+        """Whether a session is open, as far as was captured."""
+        return self._state is _State.OPEN
+
+    def name_of(self, frame: Frame, direction: Direction | None, now: Nanos) -> str:
+        """Take a frame; return its name if it is one of the six, else an empty string."""
+        if direction is Direction.FROM_ROBOT:
+            return self._take_packet(frame, now)
+        if frame.kind > CommandNumber.CLOSE:
+            return ""
+        if self._state is _State.SYNCED and frame.kind == CommandNumber.OPEN:
+            self._state = _State.OPEN
+        is_command = self._state is _State.OPEN or (bool(frame.data) and frame.kind != CommandNumber.PULSE)
+        if not is_command:
+            return SYNC_NAMES[frame.kind]
+        if frame.kind == CommandNumber.CLOSE:
+            self._state, self._closed_at = _State.CLOSED, now
+        return COMMAND_NAMES[frame.kind]
+
+    def _take_packet(self, frame: Frame, now: Nanos) -> str:
+        if frame.kind == IDENTITY_KIND and frame.data:
+            self._state = _State.SYNCED
+        elif frame.kind in RESET_KINDS:
+            self._state = _State.CLOSED
+        elif frame.kind > IDENTITY_KIND and (self._closed_at is None or now > self._closed_at + IN_FLIGHT_NS):
+            self._state, self._closed_at = _State.OPEN, None
+        elif frame.kind <= IDENTITY_KIND and not frame.data:
+            self._state = _State.CLOSED
+            return SYNC_NAMES[frame.kind]
+        return ""
+
+
+def guess_direction(frame: Frame) -> Direction | None:
+    """Return who is likely to have sent a frame, by its shape; None where both would send the same bytes."""
+    data = frame.data
+    if frame.kind <= IDENTITY_KIND and not data:
+        return None
+    if frame.kind == IDENTITY_KIND and data.count(b"\0") >= 3 and data[-1:] == b"\0":
+        return Direction.FROM_ROBOT
+    if frame.kind in SIP_KINDS and len(frame.payload) >= HEAD_BYTES:
+        readings = frame.payload[19]
+        if len(frame.payload) >= HEAD_BYTES + READING_BYTES * readings:
+            return Direction.FROM_ROBOT
+    if _is_argument(data):
+        return Direction.TO_ROBOT
+    return Direction.FROM_ROBOT
+
+
+def _is_argument(data: bytes) -> bool:
+    """Tell whether a command's argument may look so: none, an integer, a string, or SETO's lone type byte."""
+    if not data or data in (bytes((POSITIVE,)), bytes((NEGATIVE,))):
+        return True
+    if data[0] in {POSITIVE, NEGATIVE}:
+        return len(data) == 3
+    return data[0] == STRING and len(data) >= 2 and len(data) - 2 - data[1] in {0, 1}
+
+
 class _Stream:
-    """One direction's decoder, and how far its bytes were told."""
+    """One direction's decoder, and how far its bytes were shown."""
 
     def __init__(self, direction: Direction | None) -> None:
         self.direction = direction
@@ -312,28 +351,6 @@ def _cut_off(item: Stalled) -> str:
     if len(item.data) < 3:
         return "a header whose frame never came"
     return f"{len(item.data)} of {item.data[2] + 3} bytes came"
-
-
-#: The longest run of bytes shown in one line; `--explain` shows all.
-SHOWN_BYTES = 24
-
-
-def line_of(row: ListingRow, *, has_time: bool = True) -> str:
-    """Return a row as one line."""
-    time = f"{row.at_ns / NS_PER_S:10.6f} s  " if has_time else ""
-    arrow = " " if row.direction is None else row.direction.arrow
-    if not row.valid:
-        return f"{time}{arrow} !! {row.name}: {row.problem}: {_hex(row.data)}"
-    return f"{time}{arrow} {row.name}{_inside(row)}"
-
-
-def summary_of(rows: int, damaged: int, capture_s: float) -> str:
-    """Return the last line of a listing."""
-    packets = rows - damaged
-    text = f"{packets} packet{'' if packets == 1 else 's'}"
-    if capture_s > 0:
-        text += f" in {capture_s:.3f} s"
-    return f"{text}, {damaged} damaged" if damaged else f"{text}, none damaged"
 
 
 def _inside(row: ListingRow) -> str:

@@ -1,87 +1,24 @@
 """A recorded conversation played again, as its client or as its robot.
 
 Theory of operation. One side's frames go out again at their own times, scaled.
-The far side is alive and keeps its own time, so the handshake is kept in step
+The far side is live and keeps its own time, so the handshake is kept in step
 by what has come, not by the clock: as the client, no frame goes out before as
 many answers to SYNC0, SYNC1 and SYNC2 have come as had come in the recording;
 as the robot, each of those answers waits for its question, and the first
 packet of a session for OPEN. Time that was spent waiting moves all that follows.
 
-It is passive: time is passed in, bytes are handed out.
-
-What somebody between a client and a robot has to know: is a session open, at which speed.
-
-Invariant: the farewell of a session that is not open is empty, so that a tap
-adds nothing to a conversation that ended by itself. Where the tap cannot know
-(it has not heard the beginning, or not all of it) a command that only a session
-has stands for one: a farewell too many harms nobody.
+Invariant: it is passive, time is passed in and bytes are handed out; what goes out
+is the recorded side's bytes in their order, none added and none left out.
 """
 
 from collections import Counter
 from dataclasses import dataclass
 
 from p2os.capture.chunks import Capture, Chunk, Direction
-from p2os.capture.listing import SYNC_NAMES, FrameCutter, RecordedSession, frame_chunks
-from p2os.protocol.commands import Command, CommandNumber, stop, vel
-from p2os.protocol.frames import CHECKSUM_BYTES, HEADER, MIN_COUNT, PREFIX_BYTES, Frame
+from p2os.capture.listing import SYNC_NAMES, FrameCutter, frame_chunks, frame_of
+from p2os.protocol.commands import CommandNumber
 from p2os.protocol.packets import IDENTITY_KIND
 from p2os.timing import Nanos, Reached
-
-#: Argument of HOSTBAUD → bit/s (Pioneer 3 manual, client commands).
-HOST_BAUDS = {0: 9600, 1: 19200, 2: 38400, 3: 57600, 4: 115200}
-
-
-class Tap:
-    """Hears both directions of one conversation."""
-
-    def __init__(self) -> None:
-        self._cutter = FrameCutter()
-        self._session = RecordedSession()
-        #: Whether the client has sent more than syncs since the last CLOSE.
-        self._was_commanded = False
-        #: The speed to which the client has just told the robot to go, in bit/s; set it back to None when done.
-        self.new_baud: int | None = None
-
-    def hear(self, direction: Direction, data: bytes, now: Nanos) -> Chunk:
-        """Take bytes that go by at `now` nanoseconds, and return them as a chunk."""
-        chunk = Chunk(at_ns=now, direction=direction, data=data)
-        for piece in self._cutter.take(chunk):
-            frame = frame_of(piece)
-            if frame is None:
-                continue
-            self._session.name_of(frame, direction, now)
-            if direction is Direction.TO_ROBOT and frame.kind >= CommandNumber.CLOSE:
-                self._was_commanded = frame.kind > CommandNumber.CLOSE
-            if direction is Direction.TO_ROBOT and frame.kind == CommandNumber.HOSTBAUD:
-                self.new_baud = HOST_BAUDS.get(Command.from_frame(frame).integer or 0)
-        return chunk
-
-    def farewell(self) -> bytes:
-        """Return what brings a robot whose client has gone to a stand: STOP, VEL 0, CLOSE; empty if it is closed."""
-        if not (self._session.is_open or self._was_commanded):
-            return b""
-        commands = (stop(), vel(0), Command(CommandNumber.CLOSE))
-        return b"".join(command.to_frame().to_bytes() for command in commands)
-
-
-def frame_of(piece: Chunk) -> Frame | None:
-    """Return the frame that a piece cut by `FrameCutter` is, or None for noise."""
-    data = piece.data
-    if data[:2] != HEADER or len(data) < PREFIX_BYTES + MIN_COUNT or len(data) != data[2] + PREFIX_BYTES:
-        return None
-    frame = Frame(data[PREFIX_BYTES:-CHECKSUM_BYTES])
-    return frame if frame.to_bytes() == data else None
-
-
-@dataclass(frozen=True, slots=True)
-class _Step:
-    """Bytes to send at a time of the recording, once so many frames of a number have come."""
-
-    at_ns: Nanos
-    data: bytes
-    #: Number of the frames that are waited for, None for any of the three syncs.
-    awaited: int | None
-    count: int
 
 
 class Replay:
@@ -123,7 +60,7 @@ class Replay:
         self._shift = now - (self._scaled(self._steps[0].at_ns) if self._steps else 0)
 
     def receive(self, data: bytes, now: Nanos) -> None:
-        """Take what the far side says."""
+        """Take bytes of the far side."""
         for piece in self._cutter.take(Chunk(at_ns=now, direction=self._role.opposite, data=data)):
             frame = frame_of(piece)
             if frame is not None:
@@ -168,6 +105,17 @@ class Replay:
         if step.awaited is None:
             return sum(self._came[kind] for kind in range(IDENTITY_KIND + 1)) >= step.count
         return self._came[step.awaited] >= step.count
+
+
+@dataclass(frozen=True, slots=True)
+class _Step:
+    """Bytes to send at a time of the recording, once so many frames of a number have come."""
+
+    at_ns: Nanos
+    data: bytes
+    #: Number of the frames that are waited for, None for any of the three syncs.
+    awaited: int | None
+    count: int
 
 
 def _steps(capture: Capture, role: Direction) -> list[_Step]:

@@ -16,7 +16,7 @@ from typing import Annotated
 
 import typer
 
-HELP = """Tell what is installed, what is missing and how to get it.
+HELP = """Show what is installed, what is missing and how to get it.
 
 \b
 Examples:

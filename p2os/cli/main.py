@@ -1,4 +1,4 @@
-"""The command line: finds its verbs, runs one, and tells a person what went wrong.
+"""The command line: finds its verbs, runs one, and reports what went wrong.
 
 Verbs are modules with `register(app)`, found by the entry points of the group
 `p2os.verbs`, so that packages above this one add theirs without being imported
@@ -34,16 +34,16 @@ EPILOG = """Examples:
   p2os demo                             watch a BluePill program drive a Pioneer
   p2os run dodge --world arena          run one scenario and write a report
   p2os serve                            be a Pioneer on tcp:127.0.0.1:8101
-  p2os scan                             find a robot, and say who it is
+  p2os scan                             find a robot, and identify it
   p2os monitor tcp:127.0.0.1:8101       watch it
   p2os drive URL --forward 0.5m         move it
   p2os decode --explain fafb03000000    what bytes mean, one by one
-  p2os doctor                           tell what is installed and what is missing
+  p2os doctor                           show what is installed and what is missing
 
 With --trace anywhere, an error shows where in the program it arose.
 """
 
-#: What to say when a module of a verb needs a package that is not there: package to extra.
+#: The hint when a module of a verb needs a package that is not there: package to extra.
 _EXTRAS = {
     "unicorn": "sim",
     "elftools": "sim",
@@ -63,7 +63,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     trace = "--trace" in words
     end_on_signals()
     code = run([word for word in words if word != "--trace"], trace=trace)
-    ignore_signals()  # a robot that was not let go before is when Python ends, and the exit code stands
+    ignore_signals()  # a robot that was not released before is when Python ends, and the exit code stands
     sys.exit(code)
 
 
@@ -78,12 +78,12 @@ def run(words: list[str], *, trace: bool = False) -> int:
         with restored_signals(), restored_output():
             end_on_signals()
             return _run(words, trace=trace)
-    except KeyboardInterrupt:  # while the last words were on their way
+    except KeyboardInterrupt:  # while the last lines were being written
         return EXIT_INTERRUPTED
 
 
 def report(error: Exception, words: Sequence[str], *, trace: bool = False) -> int:
-    """Tell a person on stderr what went wrong and what to try, and return the exit code.
+    """Print on stderr what went wrong and what to try, and return the exit code.
 
     Our own errors, those of the emulator and those of the option parser carry
     `exit_code`, and a `hint` or a way to get help; anything else is a bug.
@@ -92,20 +92,20 @@ def report(error: Exception, words: Sequence[str], *, trace: bool = False) -> in
         traceback.print_exception(error)
     code = getattr(error, "exit_code", None)
     if not isinstance(code, int):
-        _say(f"p2os: this is a bug: {type(error).__name__}: {_one_line(str(error))}")
-        _say("hint: run it again with --trace and report what it says")
+        _print_error(f"p2os: this is a bug: {type(error).__name__}: {_one_line(str(error))}")
+        _print_error("hint: run it again with --trace and report the output")
         return EXIT_FAILED
     format_message = getattr(error, "format_message", None)
     if callable(format_message):  # the option parser's
-        _say(f"p2os: {_one_line(format_message()).removesuffix('.')}")
+        _print_error(f"p2os: {_one_line(format_message()).removesuffix('.')}")
         verb = next((word for word in words if not word.startswith("-")), "")
         known = verb in {entry.name for entry in verbs()}
-        _say(f"hint: p2os {verb} --help" if known else "hint: p2os --help")
+        _print_error(f"hint: p2os {verb} --help" if known else "hint: p2os --help")
         return code
-    _say(f"p2os: {_one_line(str(error))}")
+    _print_error(f"p2os: {_one_line(str(error))}")
     hint = getattr(error, "hint", None)
     if hint:
-        _say(f"hint: {_one_line(hint)}")
+        _print_error(f"hint: {_one_line(hint)}")
     return code
 
 
@@ -129,7 +129,7 @@ def make_app(words: Sequence[str] = ()) -> typer.Typer:
 
 
 def add_verbs(app: typer.Typer, entries: Iterable[EntryPoint]) -> None:
-    """Register each verb, or in its place a command that says what it lacks."""
+    """Register each verb, or in its place a command that shows what it lacks."""
     for entry in entries:
         try:
             module = entry.load()
@@ -184,6 +184,6 @@ def _one_line(text: str) -> str:
     return " ".join(text.split())
 
 
-def _say(line: str) -> None:
-    with contextlib.suppress(OSError):  # nobody reads it: the exit code tells
+def _print_error(line: str) -> None:
+    with contextlib.suppress(OSError):  # nobody reads it: the exit code remains
         sys.stderr.write(f"{line}\n")

@@ -3,8 +3,8 @@
 A terminal held with Ctrl-S, a pager that does not read, a pipe that is full: an
 ordinary `write` waits for all of them, and a program that holds a robot must
 not. `queue_output` puts a queue and a thread of its own before each of the two.
-What does not fit is left out, by whole lines, and told by number once the reader
-reads again. A reader that has gone is told of by BrokenPipeError, once; what is
+What does not fit is left out, by whole lines, and counted in a note once the reader
+reads again. A reader that has gone raises BrokenPipeError, once; what is
 written after that goes nowhere.
 
 Verbs that only print results keep the ordinary streams: `p2os decode | less` is
@@ -28,7 +28,7 @@ from p2os.errors import FileError
 from p2os.timing import NS_PER_S
 from p2os.transport.wall_clock import wall_clock
 
-#: chosen: some ten thousand lines; minutes of a robot's talk.
+#: chosen: some ten thousand lines; minutes of a robot's packets.
 MOST_CHARACTERS = 1 << 20
 #: chosen: a reader that takes nothing for so long at the end is not waited for.
 FLUSH_S = 1.0
@@ -46,7 +46,7 @@ class QueuedStream(io.TextIOBase):
     Args:
         below: The stream in whose place this stands; it is flushed first.
         name: What it is called in messages.
-        notes: Where the lines left out are told of; None: here.
+        notes: Where the number of lines left out is noted; None: here.
     """
 
     def __init__(self, below: TextIO, name: str, notes: "QueuedStream | None" = None) -> None:
@@ -61,7 +61,7 @@ class QueuedStream(io.TextIOBase):
         self._characters = 0
         self._written = 0
         self._error: OSError | None = None
-        self._has_told_error = False
+        self._has_raised = False
         self._is_at_start = True
         self._is_leaving_out = False
         self._left_out = 0
@@ -89,7 +89,7 @@ class QueuedStream(io.TextIOBase):
         return self.below.isatty()
 
     def writable(self) -> bool:
-        """Tell that it can be written to."""
+        """Return True."""
         return True
 
     def flush(self) -> None:
@@ -124,9 +124,9 @@ class QueuedStream(io.TextIOBase):
     # What it does beside ----------------------------------------------------------------------
 
     def finish(self) -> None:
-        """Wait until all is written, at most `FLUSH_S` without any progress; then let the thread go."""
+        """Wait until all is written, at most `FLUSH_S` without any progress; then end the thread."""
         with self._changed:
-            self._tell_left_out()
+            self._note_left_out()
             written, since = self._written, wall_clock()
             while self._characters and self._error is None:
                 left_s = FLUSH_S - (wall_clock() - since) / NS_PER_S
@@ -144,9 +144,9 @@ class QueuedStream(io.TextIOBase):
         most = MOST_CHARACTERS // 2 if self._is_leaving_out else MOST_CHARACTERS
         self._is_leaving_out = self._characters >= most
         if not self._is_leaving_out:
-            self._tell_left_out()
+            self._note_left_out()
 
-    def _tell_left_out(self) -> None:
+    def _note_left_out(self) -> None:
         left_out, self._left_out = self._left_out, 0
         if not left_out:
             return
@@ -158,9 +158,9 @@ class QueuedStream(io.TextIOBase):
             self._characters += len(note)
 
     def _raise_once(self, error: OSError) -> None:
-        if self._has_told_error:
+        if self._has_raised:
             return
-        self._has_told_error = True
+        self._has_raised = True
         if error.errno in _GONE:
             raise BrokenPipeError(errno.EPIPE, f"nobody reads {self._name}") from error
         raise FileError(f"cannot write to {self._name}: {(error.strerror or str(error)).lower()}") from error

@@ -1,4 +1,4 @@
-"""Every signal that would kill the program ends it in good order instead, so that `finally` blocks stop the robot.
+"""Every signal that would kill the program ends it in an orderly way instead, so that `finally` blocks stop the robot.
 
 Theory of operation. The first signal raises KeyboardInterrupt in the main thread,
 with the signal's name as its argument. From then on the program is ending, and
@@ -6,7 +6,7 @@ further signals mean nothing for `ENDING_NS`: whoever presses Ctrl-C twice, or
 closes a terminal that sends SIGHUP after SIGTERM, does not cut the stopping
 short. One that comes later raises again: an ending that takes so long hangs.
 
-Where an exception would do harm (a robot is being let go, a part of the bench is
+Where an exception would be unsafe (a robot is being released, a part of the bench is
 half-way through a slice) the signal waits: `postponed`.
 
 SIGKILL, SIGSTOP and a power cut cannot be caught: the robot's own watchdog, or
@@ -27,13 +27,13 @@ from p2os.client.interrupts import FATAL, signal_numbers
 from p2os.timing import NS_PER_S, Nanos
 from p2os.transport.wall_clock import wall_clock
 
-#: Caught even where they are ignored: shells start background programs deaf to the keyboard's two.
+#: Caught even where they are ignored: shells start background programs with the keyboard's two ignored.
 ALWAYS_CAUGHT = frozenset({"SIGINT", "SIGQUIT", "SIGTERM"})
-#: Ctrl-Z would leave a robot driving by its last order; a program that holds one ends instead.
+#: Ctrl-Z would leave a robot driving by its last command; a program that holds one ends instead.
 SUSPENDING = ("SIGTSTP",)
 #: A program that holds a robot must not be suspended for writing to its terminal in the background.
 IGNORED = ("SIGTTOU",)
-#: chosen: letting a robot go takes two seconds at most; a second more, and it hangs.
+#: chosen: releasing a robot takes two seconds at most; a second more, and it hangs.
 ENDING_NS: Nanos = 3 * NS_PER_S
 
 
@@ -62,9 +62,9 @@ class _Ending:
 
 
 def end_on_signals() -> None:
-    """Let each of `FATAL` end the program in good order; once is enough.
+    """Let each of `FATAL` end the program in an orderly way; once is enough.
 
-    One that this program was made deaf to stays so (`nohup` and SIGHUP), except `ALWAYS_CAUGHT`.
+    One that was ignored when this program started stays so (`nohup` and SIGHUP), except `ALWAYS_CAUGHT`.
     """
     if threading.current_thread() is threading.main_thread() and _present() is None:
         _catch(_Ending(), FATAL)
@@ -81,7 +81,7 @@ def end_on_suspension() -> None:
 
 
 def ignore_signals() -> None:
-    """Let nothing interrupt the last moments of the process: all is said and done."""
+    """Let nothing interrupt the end of the process: all is done."""
     if threading.current_thread() is threading.main_thread():
         for number in signal_numbers(FATAL):
             signal.signal(number, signal.SIG_IGN)

@@ -3,12 +3,14 @@
     async with Robot("tcp:127.0.0.1:8101") as robot:
         await robot.drive(0.5)
 
-All decisions are `RobotCore`'s; the loop's own readers and timers turn the
+All decisions are `RobotCore`'s; the event loop's own readers and timers turn the
 line, so there is no thread. Lines are opened in the loop's executor. While the
 loop is blocked nothing is sent; when it goes on, the robot is told to stop first.
 
-The loop knows an `AsyncEngine` only, never the `Robot`: so a robot that the program
-forgets is collected, and that stops it. The end of `asyncio.run` does too.
+The event loop refers to a `RobotLoop` only, never to the `Robot`: so a robot that the
+program drops is collected, and that stops it. The end of `asyncio.run` does too.
+
+Invariant: every way out, cancellation included, writes STOP before the line is closed.
 """
 
 import asyncio
@@ -27,7 +29,7 @@ from p2os.client.goals import Axis, DriveAxis, MotionResult, TurnAxis
 from p2os.client.interrupts import exit_on_signals
 from p2os.client.line import Line, core_for, motion_result, no_answer, not_connected, not_found
 from p2os.client.notices import Notice
-from p2os.client.robot_thread import CLOSING_S, MOST_NOTICES, SIGN_OF_LIFE_S, Opener
+from p2os.client.robot_thread import CLOSING_S, MOST_NOTICES, TOUCH_S, Opener
 from p2os.client.settings import ClientSettings
 from p2os.client.snapshots import Link, RobotState
 from p2os.errors import P2osError, TransportError
@@ -38,188 +40,7 @@ from p2os.transport.ports import Transport
 from p2os.transport.waiting import BLIND_POLL_S
 from p2os.transport.wall_clock import Clock, wall_clock
 
-
-class AsyncEngine:
-    """Drives one core on one line by an event loop's readers and timers.
-
-    Args:
-        core: The client.
-        baud: Speed at which a serial line is opened; None for other lines.
-        open_line: Opens the line; called in the loop's executor.
-        clock: Nanoseconds that never go back, and go on while the machine sleeps.
-    """
-
-    def __init__(
-        self, core: RobotCore, baud: int | None, open_line: Callable[[], Transport], clock: Clock = wall_clock
-    ) -> None:
-        self.core = core
-        self.queues: list[deque[Notice]] = []
-        self.state_callbacks: list[Callable[[RobotState], None]] = []
-        self.event_callbacks: list[Callable[[Notice], None]] = []
-        self.failure: BaseException | None = None
-        #: Whether the program has met the failure.
-        self.has_told = False
-        self._line = Line(core, baud, clock)
-        self._open_line = open_line
-        self._loop: asyncio.AbstractEventLoop | None = None
-        self._keeper: asyncio.Task[None] | None = None
-        self._changed = asyncio.Event()
-        self._timer: asyncio.TimerHandle | None = None
-        self._watched: int | None = None
-        self._opening: asyncio.Task[None] | None = None
-        self._is_closed = self._is_finished = False
-
-    def start(self) -> None:
-        """Begin to move bytes in the running loop.
-
-        Raises:
-            P2osError: The robot was closed.
-        """
-        if self._is_closed:
-            raise P2osError("this robot was closed", hint="make another Robot")
-        if self._loop is None:
-            self._loop = asyncio.get_running_loop()
-            self._keeper = self._loop.create_task(self._keep())
-
-    def run(self, call: Callable[[RobotCore, Nanos], Result]) -> Result:
-        """Act on the core, now; what it wants to send leaves at once."""
-        self.check()
-        now = self._line.now()
-        self.core.touch(now)
-        result = call(self.core, now)
-        self._turn()
-        return result
-
-    async def wait_for(self, is_so: Callable[[RobotCore], bool], timeout_s: float | None) -> bool:
-        """Wait until something is so; the program is known to live meanwhile."""
-        ends = None if timeout_s is None else self._line.now() + round(timeout_s * NS_PER_S)
-        while not is_so(self.core):
-            self.check()
-            now = self._line.now()
-            self.core.touch(now)
-            if ends is not None and now >= ends:
-                return False
-            left = SIGN_OF_LIFE_S if ends is None else min(SIGN_OF_LIFE_S, (ends - now) / NS_PER_S)
-            await _changes(self._changed, left)
-        return True
-
-    async def close(self) -> None:
-        """Stop the robot, end the session, give the line back; whatever comes between, `finish` does the rest."""
-        try:
-            if not self._is_closed:
-                self._is_closed = True
-                self.core.close(self._line.now())
-                self._turn()  # STOP is out before anything can interrupt
-            with contextlib.suppress(TimeoutError):
-                async with asyncio.timeout(CLOSING_S):
-                    while not (self._line.is_over or self._is_finished) and self.failure is None:
-                        await _changes(self._changed, SIGN_OF_LIFE_S)
-        finally:
-            self.finish()
-
-    def finish(self) -> None:
-        """Give everything back, with or without a loop; where closing could not come to its end, STOP goes first."""
-        self._is_closed = True
-        try:
-            self._line.finish()
-        finally:
-            self._is_finished = True
-            if self._loop is not None and not self._loop.is_closed():
-                self._let_go_of_loop()
-            self._changed.set()
-
-    def check(self) -> None:
-        """Raise what the client failed with.
-
-        Raises:
-            P2osError: It failed.
-        """
-        if self.failure is not None:
-            self.has_told = True
-            raise P2osError(f"the client failed: {self.failure}") from self.failure
-
-    async def _keep(self) -> None:
-        """Wait for the loop's end: `asyncio.run` cancels what is left."""
-        try:
-            await asyncio.get_running_loop().create_future()
-        finally:
-            self.finish()
-
-    def _let_go_of_loop(self) -> None:
-        if self._timer is not None:
-            self._timer.cancel()
-            self._timer = None
-        self._unwatch()
-        keeper, self._keeper = self._keeper, None
-        if keeper is not None:
-            keeper.cancel()
-
-    def _turn(self) -> None:
-        """Do what is due, tell the news, and arrange to be woken."""
-        if self._timer is not None:
-            self._timer.cancel()
-            self._timer = None
-        try:
-            self._line.turn()
-            self._tell()
-        except BaseException as error:
-            self.failure = error
-            self.finish()
-            if not isinstance(error, Exception):
-                raise
-            return
-        if self._line.is_wanted and self._opening is None:
-            self._opening = asyncio.ensure_future(self._open())
-        self._arrange()
-
-    def _arrange(self) -> None:
-        loop = self._loop
-        if loop is None:
-            return
-        transport, wait_s = self._line.transport, self._line.wait_s()
-        descriptor = None
-        if transport is not None:
-            try:
-                descriptor = transport.fileno()
-            except TransportError:
-                wait_s = min(wait_s, BLIND_POLL_S)
-        if descriptor != self._watched:
-            self._unwatch()
-            if descriptor is not None:
-                loop.add_reader(descriptor, self._turn)
-                self._watched = descriptor
-        if not self._line.is_over:
-            self._timer = loop.call_later(wait_s, self._turn)
-
-    def _tell(self) -> None:
-        news = list(self.core.news)
-        self.core.news.clear()
-        for item in news:
-            if isinstance(item, RobotState):
-                for on_state in tuple(self.state_callbacks):
-                    on_state(item)
-                continue
-            for queue in self.queues:
-                queue.append(item)
-            for on_event in tuple(self.event_callbacks):
-                on_event(item)
-        changed, self._changed = self._changed, asyncio.Event()
-        changed.set()
-
-    async def _open(self) -> None:
-        try:
-            transport = await asyncio.get_running_loop().run_in_executor(None, self._open_line)
-        except Exception as error:  # noqa: BLE001  # an opener may raise anything; the wait for it has to end
-            self._line.failed(error)
-        else:
-            self._line.opened(transport)
-        self._opening = None
-        self._turn()
-
-    def _unwatch(self) -> None:
-        if self._watched is not None and self._loop is not None:
-            self._loop.remove_reader(self._watched)
-            self._watched = None
+__all__ = ["Robot"]
 
 
 class Robot(RobotCalls):
@@ -242,8 +63,8 @@ class Robot(RobotCalls):
         )
         self.url = url
         self._core = core
-        self._engine = AsyncEngine(core, baud, lambda: opener(url), clock)
-        self._finalizer = weakref.finalize(self, self._engine.finish)
+        self._robot_loop = RobotLoop(core, baud, lambda: opener(url), clock)
+        self._finalizer = weakref.finalize(self, self._robot_loop.finish)
 
     # Coming and going ---------------------------------------------------------------------
 
@@ -254,7 +75,7 @@ class Robot(RobotCalls):
             ConnectError: the line cannot be opened, or no robot answers.
         """
         exit_on_signals()
-        self._engine.start()
+        self._robot_loop.start()
         try:
             self._run(lambda core, now: core.connect(now))
             await self._wait_for(lambda core: core.is_ready or core.link in {Link.FAILED, Link.CLOSED}, None)
@@ -267,7 +88,7 @@ class Robot(RobotCalls):
 
     async def close(self) -> None:
         """Stop the robot, end the session, give the line back; twice is harmless."""
-        await self._engine.close()
+        await self._robot_loop.close()
 
     async def __aenter__(self) -> Self:
         return await self.connect()
@@ -276,13 +97,13 @@ class Robot(RobotCalls):
         self, kind: type[BaseException] | None, error: BaseException | None, _: TracebackType | None
     ) -> None:
         await self.close()
-        if error is None and not self._engine.has_told:
-            self._engine.check()
+        if error is None and not self._robot_loop.has_reported:
+            self._robot_loop.check()
 
     # Waiting ------------------------------------------------------------------------------
 
     async def sleep(self, duration_s: float) -> None:
-        """Do nothing for so long, and be known to live: held speeds go on."""
+        """Do nothing for so long, without tripping the deadman: held speeds go on."""
         await self._wait_for(lambda _: False, duration_s)
 
     async def next_state(self, timeout_s: float = 2.0) -> RobotState:
@@ -332,8 +153,8 @@ class Robot(RobotCalls):
 
     async def events(self) -> AsyncIterator[Notice]:
         """Yield what happens beside the states, from now on, in order; ends when the client does."""
-        engine, queue = self._engine, deque[Notice](maxlen=MOST_NOTICES)
-        engine.queues.append(queue)
+        queues, queue = self._robot_loop.queues, deque[Notice](maxlen=MOST_NOTICES)
+        queues.append(queue)
         try:
             while True:
                 await self._wait_for(lambda core: bool(queue) or _is_over(core), None)
@@ -341,20 +162,20 @@ class Robot(RobotCalls):
                     return
                 yield queue.popleft()
         finally:
-            engine.queues = [other for other in engine.queues if other is not queue]
+            queues[:] = [other for other in queues if other is not queue]
 
     def on_state(self, callback: Callable[[RobotState], None]) -> Callable[[], None]:
         """Call `callback` with each state, in the loop; return what ends that.
 
         An exception in it stops the robot and is raised in the program's next call.
         """
-        callbacks = self._engine.state_callbacks
+        callbacks = self._robot_loop.state_callbacks
         callbacks.append(callback)
         return lambda: _remove(callbacks, callback)
 
     def on_event(self, callback: Callable[[Notice], None]) -> Callable[[], None]:
         """Call `callback` with what happens beside the states; otherwise as `on_state`."""
-        callbacks = self._engine.event_callbacks
+        callbacks = self._robot_loop.event_callbacks
         callbacks.append(callback)
         return lambda: _remove(callbacks, callback)
 
@@ -388,7 +209,7 @@ class Robot(RobotCalls):
         try:
             await self._wait_for(lambda _: goal.ended is not None, None)
         finally:
-            if goal.ended is None and self._engine.failure is None:
+            if goal.ended is None and self._robot_loop.failure is None:
                 self._run(lambda core, now: core.cancel_goal(goal, now))
         return motion_result(goal, self._core)
 
@@ -396,13 +217,196 @@ class Robot(RobotCalls):
 
     def aux(self, port: int = 1) -> AsyncAux:
         """Return one of the robot's own serial ports, as a file of bytes whose calls are awaited."""
-        return AsyncAux(port, send=self.send, listen=self.on_event, wait_for=self._wait_for)
+        return AsyncAux(port, send=self.send, subscribe=self.on_event, wait_for=self._wait_for)
 
     def _run(self, call: Callable[[RobotCore, Nanos], Result]) -> Result:
-        return self._engine.run(call)
+        return self._robot_loop.run(call)
 
     async def _wait_for(self, is_so: Callable[[RobotCore], bool], timeout_s: float | None) -> bool:
-        return await self._engine.wait_for(is_so, timeout_s)
+        return await self._robot_loop.wait_for(is_so, timeout_s)
+
+
+class RobotLoop:
+    """Drives one core on one line by an event loop's readers and timers.
+
+    Args:
+        core: The client.
+        baud: Speed at which a serial line is opened; None for other lines.
+        open_line: Opens the line; called in the loop's executor.
+        clock: Nanoseconds that never go back, and go on while the machine sleeps.
+    """
+
+    def __init__(
+        self, core: RobotCore, baud: int | None, open_line: Callable[[], Transport], clock: Clock = wall_clock
+    ) -> None:
+        self.core = core
+        self.queues: list[deque[Notice]] = []
+        self.state_callbacks: list[Callable[[RobotState], None]] = []
+        self.event_callbacks: list[Callable[[Notice], None]] = []
+        self.failure: BaseException | None = None
+        #: Whether the failure was raised in the program.
+        self.has_reported = False
+        self._line = Line(core, baud, clock)
+        self._open_line = open_line
+        self._loop: asyncio.AbstractEventLoop | None = None
+        self._end_task: asyncio.Task[None] | None = None
+        self._changed = asyncio.Event()
+        self._timer: asyncio.TimerHandle | None = None
+        self._watched: int | None = None
+        self._opening: asyncio.Task[None] | None = None
+        self._is_closed = self._is_finished = False
+
+    def start(self) -> None:
+        """Begin to move bytes in the running loop.
+
+        Raises:
+            P2osError: The robot was closed.
+        """
+        if self._is_closed:
+            raise P2osError("this robot was closed", hint="make another Robot")
+        if self._loop is None:
+            self._loop = asyncio.get_running_loop()
+            self._end_task = self._loop.create_task(self._until_cancelled())
+
+    def run(self, call: Callable[[RobotCore, Nanos], Result]) -> Result:
+        """Act on the core, now; what it wants to send leaves at once."""
+        self.check()
+        now = self._line.now()
+        self.core.touch(now)
+        result = call(self.core, now)
+        self._turn()
+        return result
+
+    async def wait_for(self, is_so: Callable[[RobotCore], bool], timeout_s: float | None) -> bool:
+        """Wait until something is so; the deadman does not trip meanwhile."""
+        ends = None if timeout_s is None else self._line.now() + round(timeout_s * NS_PER_S)
+        while not is_so(self.core):
+            self.check()
+            now = self._line.now()
+            self.core.touch(now)
+            if ends is not None and now >= ends:
+                return False
+            left = TOUCH_S if ends is None else min(TOUCH_S, (ends - now) / NS_PER_S)
+            await _changes(self._changed, left)
+        return True
+
+    async def close(self) -> None:
+        """Stop the robot, end the session, give the line back; whatever comes between, `finish` does the rest."""
+        try:
+            if not self._is_closed:
+                self._is_closed = True
+                self.core.close(self._line.now())
+                self._turn()  # STOP is out before anything can interrupt
+            with contextlib.suppress(TimeoutError):
+                async with asyncio.timeout(CLOSING_S):
+                    while not (self._line.is_over or self._is_finished) and self.failure is None:
+                        await _changes(self._changed, TOUCH_S)
+        finally:
+            self.finish()
+
+    def finish(self) -> None:
+        """Give everything back, with or without a loop; where closing could not come to its end, STOP goes first."""
+        self._is_closed = True
+        try:
+            self._line.finish()
+        finally:
+            self._is_finished = True
+            if self._loop is not None and not self._loop.is_closed():
+                self._let_go_of_loop()
+            self._changed.set()
+
+    def check(self) -> None:
+        """Raise what the client failed with.
+
+        Raises:
+            P2osError: It failed.
+        """
+        if self.failure is not None:
+            self.has_reported = True
+            raise P2osError(f"the client failed: {self.failure}") from self.failure
+
+    async def _until_cancelled(self) -> None:
+        """Wait for the loop's end: `asyncio.run` cancels what is left."""
+        try:
+            await asyncio.get_running_loop().create_future()
+        finally:
+            self.finish()
+
+    def _let_go_of_loop(self) -> None:
+        if self._timer is not None:
+            self._timer.cancel()
+            self._timer = None
+        self._unwatch()
+        end_task, self._end_task = self._end_task, None
+        if end_task is not None:
+            end_task.cancel()
+
+    def _turn(self) -> None:
+        """Do what is due, notify the program, and arrange the next turn."""
+        if self._timer is not None:
+            self._timer.cancel()
+            self._timer = None
+        try:
+            self._line.turn()
+            self._notify()
+        except BaseException as error:
+            self.failure = error
+            self.finish()
+            if not isinstance(error, Exception):
+                raise
+            return
+        if self._line.is_wanted and self._opening is None:
+            self._opening = asyncio.ensure_future(self._open())
+        self._arrange()
+
+    def _arrange(self) -> None:
+        loop = self._loop
+        if loop is None:
+            return
+        transport, wait_s = self._line.transport, self._line.wait_s()
+        descriptor = None
+        if transport is not None:
+            try:
+                descriptor = transport.fileno()
+            except TransportError:
+                wait_s = min(wait_s, BLIND_POLL_S)
+        if descriptor != self._watched:
+            self._unwatch()
+            if descriptor is not None:
+                loop.add_reader(descriptor, self._turn)
+                self._watched = descriptor
+        if not self._line.is_over:
+            self._timer = loop.call_later(wait_s, self._turn)
+
+    def _notify(self) -> None:
+        news = list(self.core.news)
+        self.core.news.clear()
+        for item in news:
+            if isinstance(item, RobotState):
+                for on_state in tuple(self.state_callbacks):
+                    on_state(item)
+                continue
+            for queue in self.queues:
+                queue.append(item)
+            for on_event in tuple(self.event_callbacks):
+                on_event(item)
+        changed, self._changed = self._changed, asyncio.Event()
+        changed.set()
+
+    async def _open(self) -> None:
+        try:
+            transport = await asyncio.get_running_loop().run_in_executor(None, self._open_line)
+        except Exception as error:  # noqa: BLE001  # an opener may raise anything; the wait for it has to end
+            self._line.failed(error)
+        else:
+            self._line.opened(transport)
+        self._opening = None
+        self._turn()
+
+    def _unwatch(self) -> None:
+        if self._watched is not None and self._loop is not None:
+            self._loop.remove_reader(self._watched)
+            self._watched = None
 
 
 async def _changes(changed: asyncio.Event, longest_s: float) -> None:

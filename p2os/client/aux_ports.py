@@ -1,12 +1,11 @@
-"""One of the robot's own serial ports for asyncio: `AuxStream`'s twin, waiting with `await`.
+"""The robot's own serial ports as streams of bytes: `AuxStream` blocking, `AsyncAux` for asyncio.
 
-Bytes to and from the serial ports of the robot itself: TTY2 and GETAUX, and their brothers.
+TTY2, TTY3 and TTY4 pass bytes on. GETAUX n makes the robot send a SERAUXpac when n
+bytes have come; GETAUX 0 empties its buffer (Pioneer 3 manual, commands 42, 43, 60,
+61, 66, 67). So a reader has to ask, for as many as it wants and no more; `AuxBuffer`
+knows what was asked for, the two streams only differ in how they wait.
 
-TTY2 passes bytes on. GETAUX n makes the robot send a SERAUXpac when n bytes
-have come; GETAUX 0 empties its buffer (Pioneer 3 manual, commands 42, 43, 60,
-61, 66, 67). So a reader has to ask, for as many as it wants and no more.
-
-One of the robot's own serial ports as a file of bytes (TTY2 and GETAUX behind it).
+Invariant: at most one GETAUX of a port is unanswered, unless it may have been lost.
 """
 
 import io
@@ -22,6 +21,8 @@ from p2os.protocol.packets import SerauxPacket
 
 #: The most bytes that one GETAUX may ask for, and that one TTY2 carries here.
 MOST_WANTED, MOST_WRITTEN = 200, 190
+#: chosen: a GETAUX whose answer has not come for so long is sent again; it may have been lost.
+ASK_AGAIN_S = 1.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -97,10 +98,6 @@ class AuxBuffer:
         return data
 
 
-#: chosen: a GETAUX whose answer has not come for so long is sent again; it may have been lost.
-ASK_AGAIN_S = 1.0
-
-
 class AuxStream(io.RawIOBase):
     """Bytes to and from a device on the robot.
 
@@ -108,17 +105,17 @@ class AuxStream(io.RawIOBase):
     returns what has come. `io.BufferedRWPair` and `io.TextIOWrapper` fit on top.
 
     Args:
-        engine: The robot's.
+        thread: The robot's.
         port: 1, 2 or 3.
         timeout_s: How long a read waits; None: for ever.
     """
 
-    def __init__(self, engine: RobotThread, port: int, timeout_s: float | None = 1.0) -> None:
+    def __init__(self, thread: RobotThread, port: int, timeout_s: float | None = 1.0) -> None:
         super().__init__()
         self.timeout_s = timeout_s
-        self._engine = engine
+        self._thread = thread
         self._buffer = AuxBuffer(port)
-        self._end = engine.on_event(self._take)
+        self._unsubscribe = thread.on_event(self._take)
 
     def readable(self) -> bool:
         """Return True."""
@@ -135,14 +132,14 @@ class AuxStream(io.RawIOBase):
             LinkLostError: no session is open.
         """
         for command in self._buffer.writing(bytes(data)):
-            self._engine.call(lambda core, now, command=command: core.send(command, now))  # type: ignore[misc]
+            self._thread.call(lambda core, now, command=command: core.send(command, now))  # type: ignore[misc]
         return len(data)
 
     def read(self, size: int = -1) -> bytes:
         """Return `size` bytes, or those that came within `timeout_s`; -1: what has come."""
         if size >= 0:
             self._wait(size)
-        with self._engine.changed:
+        with self._thread.changed:
             return self._buffer.read(len(self._buffer) if size < 0 else size)
 
     def readinto(self, buffer: memoryview) -> int:  # type: ignore[override]  # a writable buffer
@@ -152,31 +149,31 @@ class AuxStream(io.RawIOBase):
         return len(data)
 
     def flush_input(self) -> None:
-        """Forget what has come, here and in the robot (GETAUX 0)."""
+        """Discard what has come, here and in the robot (GETAUX 0)."""
         command = self._buffer.flushing()
-        self._engine.call(lambda core, now: core.send(command, now))
+        self._thread.call(lambda core, now: core.send(command, now))
 
     def close(self) -> None:
-        """Listen no more."""
-        self._end()
+        """Unsubscribe from the robot's packets."""
+        self._unsubscribe()
         super().close()
 
     def _wait(self, size: int) -> None:
         left_s, again = self.timeout_s, False
-        with self._engine.changed:
+        with self._thread.changed:
             while len(self._buffer) < size and (left_s is None or left_s > 0):
                 command = self._buffer.asking(size, again=again)
                 if command is not None:
-                    self._engine.call(lambda core, now, command=command: core.send(command, now))  # type: ignore[misc]
+                    self._thread.call(lambda core, now, command=command: core.send(command, now))  # type: ignore[misc]
                 before = len(self._buffer)
                 step_s = ASK_AGAIN_S if left_s is None else min(ASK_AGAIN_S, left_s)
-                again = not self._engine.wait_for(lambda _, before=before: len(self._buffer) > before, step_s)  # type: ignore[misc]
+                again = not self._thread.wait_for(lambda _, before=before: len(self._buffer) > before, step_s)  # type: ignore[misc]
                 left_s = left_s if left_s is None or not again else left_s - step_s
 
     def _take(self, notice: Notice) -> None:
-        with self._engine.changed:
+        with self._thread.changed:
             self._buffer.notice(notice)
-            self._engine.changed.notify_all()
+            self._thread.changed.notify_all()
 
 
 class AsyncAux:
@@ -185,7 +182,7 @@ class AsyncAux:
     Args:
         port: 1, 2 or 3.
         send: Sends a command of the open session.
-        listen: Has a callback called with each notice; returns what ends that.
+        subscribe: Has a callback called with each notice; returns what ends that.
         wait_for: Waits until something is so of the client's core, at most so many seconds.
         timeout_s: How long a read waits; None: for ever.
     """
@@ -195,7 +192,7 @@ class AsyncAux:
         port: int,
         *,
         send: Callable[[Command], None],
-        listen: Callable[[Callable[[Notice], None]], Callable[[], None]],
+        subscribe: Callable[[Callable[[Notice], None]], Callable[[], None]],
         wait_for: Callable[[Callable[[RobotCore], bool], float | None], Awaitable[bool]],
         timeout_s: float | None = 1.0,
     ) -> None:
@@ -203,7 +200,7 @@ class AsyncAux:
         self._send = send
         self._wait_for = wait_for
         self._buffer = AuxBuffer(port)
-        self._end = listen(self._buffer.notice)
+        self._unsubscribe = subscribe(self._buffer.notice)
 
     async def write(self, data: bytes) -> int:
         """Pass all of `data` on to the device; return how many bytes that were.
@@ -231,9 +228,9 @@ class AsyncAux:
         return self._buffer.read(size)
 
     async def flush_input(self) -> None:
-        """Forget what has come, here and in the robot (GETAUX 0)."""
+        """Discard what has come, here and in the robot (GETAUX 0)."""
         self._send(self._buffer.flushing())
 
     def close(self) -> None:
-        """Listen no more."""
-        self._end()
+        """Unsubscribe from the robot's packets."""
+        self._unsubscribe()

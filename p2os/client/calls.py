@@ -1,12 +1,10 @@
-"""What a program can ask of a `Robot` without waiting: one list of calls for both I/O layers.
+"""What a program can ask of a `Robot` without waiting: one list of calls for both I/O layers, and the gripper's.
 
 The blocking and the asyncio robot differ in how they wait, not in what they can
 do, so these calls stand here once. Each one is carried out at once on the core
 and its frames leave in order; P2OS acknowledges nothing.
 
-The gripper: its commands by name.
-
-Source: Pioneer 2 gripper manual, command 33 and its arguments.
+Source: Pioneer 3 manual, client commands; Pioneer 2 gripper manual, command 33 and its arguments.
 """
 
 import math
@@ -27,91 +25,9 @@ from p2os.protocol.profiles import Profile
 from p2os.robots.parameters import RobotParameters
 from p2os.timing import Nanos
 
-
-class GripperAction(IntEnum):
-    """The arguments of GRIPPER."""
-
-    OPEN = 1
-    CLOSE = 2
-    STOP = 3
-    LIFT_UP = 4
-    LIFT_DOWN = 5
-    LIFT_STOP = 6
-    #: Close and lift, for driving.
-    STORE = 7
-    #: Lower and open, ready to grasp.
-    DEPLOY = 8
-    #: Stop paddles and lift.
-    HALT = 15
-    #: The grasping pressure; its value goes before it with GRIPPERVAL.
-    PRESSURE = 16
-    #: Lift for so long; its value goes before it with GRIPPERVAL.
-    LIFT_CARRY = 17
-
-
-class Sender(Protocol):
-    """Sends one command with its argument."""
-
-    def __call__(self, command: int, argument: int | bytes | None = None) -> None:
-        """Send it."""
-
-
-class Gripper:
-    """Paddles and lift; what they do shows in GRIPPERpacs (`request`)."""
-
-    def __init__(self, send: Sender) -> None:
-        self._send = send
-
-    def act(self, action: GripperAction) -> None:
-        """Send any of the gripper's actions."""
-        self._send(CommandNumber.GRIPPER, int(action))
-
-    def open(self) -> None:
-        """Open the paddles."""
-        self.act(GripperAction.OPEN)
-
-    def close(self) -> None:
-        """Close the paddles until they grasp."""
-        self.act(GripperAction.CLOSE)
-
-    def stop(self) -> None:
-        """Stop paddles and lift."""
-        self.act(GripperAction.HALT)
-
-    def lift_up(self) -> None:
-        """Raise the lift."""
-        self.act(GripperAction.LIFT_UP)
-
-    def lift_down(self) -> None:
-        """Lower the lift."""
-        self.act(GripperAction.LIFT_DOWN)
-
-    def store(self) -> None:
-        """Close and lift, for driving."""
-        self.act(GripperAction.STORE)
-
-    def deploy(self) -> None:
-        """Lower and open, ready to grasp."""
-        self.act(GripperAction.DEPLOY)
-
-    def set_pressure(self, value: int) -> None:
-        """Set the grasping pressure, 0 to 255 of the gripper's own units."""
-        self._send(CommandNumber.GRIPPERVAL, value)
-        self.act(GripperAction.PRESSURE)
-
-    def carry(self, value: int) -> None:
-        """Move the lift for `value` times 20 ms, upwards where positive."""
-        self._send(CommandNumber.GRIPPERVAL, value)
-        self.act(GripperAction.LIFT_CARRY)
-
-    def request(self, *, always: bool = False) -> None:
-        """Ask for a GRIPPERpac, or for one a cycle; it comes as a `PacketArrived`."""
-        self._send(CommandNumber.GRIPREQUEST, 2 if always else 1)
-
-
 Result = TypeVar("Result")
-#: What a request packet's argument means: one packet, or one after the other.
-ONCE, ALWAYS, NEVER = 1, 2, 0
+#: What the argument of a request means: one packet, or one a cycle.
+ONCE, ALWAYS = 1, 2
 #: SAY carries at most so many notes, each at most so long (Pioneer manuals, command 15).
 MOST_NOTES, LONGEST_NOTE_S, NOTE_UNIT_S = 20, 5.1, 0.02
 
@@ -149,14 +65,14 @@ class RobotCalls(ABC):
 
     @property
     def identity(self) -> Identity:
-        """Who the robot said it is.
+        """The robot's identity.
 
         Raises:
-            LinkLostError: it has not said so yet.
+            LinkLostError: it has not been received yet.
         """
         identity = self._run(lambda core, _: core.identity)
         if identity is None:
-            raise LinkLostError("the robot has not said who it is yet", hint="connect first")
+            raise LinkLostError("the robot has not sent its identity yet", hint="connect first")
         return identity
 
     @property
@@ -254,7 +170,7 @@ class RobotCalls(ABC):
             self.send(number, round(value * factor))
 
     def set_pose(self, x_m: float = 0.0, y_m: float = 0.0, heading_rad: float = 0.0) -> None:
-        """Say where the robot is; states from now on count from there. The robot is not told."""
+        """Set where the robot is; states from now on count from there. Nothing is sent."""
         self._run(lambda core, _: core.set_pose(RobotPose(x_m, y_m, heading_rad)))
 
     # Anything -----------------------------------------------------------------------------
@@ -307,7 +223,7 @@ class RobotCalls(ABC):
         self.send(CommandNumber.ENCODER, ALWAYS if always else ONCE)
 
     @property
-    def gripper(self) -> Gripper:
+    def gripper(self) -> "Gripper":
         """The gripper's commands."""
         return Gripper(self.send)
 
@@ -334,3 +250,84 @@ class RobotCalls(ABC):
     def set_buzzer(self, on: bool) -> None:
         """Let the robot's own warnings sound, or not (SOUNDTOG)."""
         self.send(CommandNumber.SOUNDTOG, int(on))
+
+
+class GripperAction(IntEnum):
+    """The arguments of GRIPPER."""
+
+    OPEN = 1
+    CLOSE = 2
+    STOP = 3
+    LIFT_UP = 4
+    LIFT_DOWN = 5
+    LIFT_STOP = 6
+    #: Close and lift, for driving.
+    STORE = 7
+    #: Lower and open, ready to grasp.
+    DEPLOY = 8
+    #: Stop paddles and lift.
+    HALT = 15
+    #: The grasping pressure; its value goes before it with GRIPPERVAL.
+    PRESSURE = 16
+    #: Lift for so long; its value goes before it with GRIPPERVAL.
+    LIFT_CARRY = 17
+
+
+class Sender(Protocol):
+    """Sends one command with its argument."""
+
+    def __call__(self, command: int, argument: int | bytes | None = None) -> None:
+        """Send it."""
+
+
+class Gripper:
+    """Paddles and lift; what they do shows in GRIPPERpacs (`request`)."""
+
+    def __init__(self, send: Sender) -> None:
+        self._send = send
+
+    def act(self, action: GripperAction) -> None:
+        """Send any of the gripper's actions."""
+        self._send(CommandNumber.GRIPPER, int(action))
+
+    def open(self) -> None:
+        """Open the paddles."""
+        self.act(GripperAction.OPEN)
+
+    def close(self) -> None:
+        """Close the paddles until they grasp."""
+        self.act(GripperAction.CLOSE)
+
+    def stop(self) -> None:
+        """Stop paddles and lift."""
+        self.act(GripperAction.HALT)
+
+    def lift_up(self) -> None:
+        """Raise the lift."""
+        self.act(GripperAction.LIFT_UP)
+
+    def lift_down(self) -> None:
+        """Lower the lift."""
+        self.act(GripperAction.LIFT_DOWN)
+
+    def store(self) -> None:
+        """Close and lift, for driving."""
+        self.act(GripperAction.STORE)
+
+    def deploy(self) -> None:
+        """Lower and open, ready to grasp."""
+        self.act(GripperAction.DEPLOY)
+
+    def set_pressure(self, value: int) -> None:
+        """Set the grasping pressure, 0 to 255 of the gripper's own units."""
+        self._send(CommandNumber.GRIPPERVAL, value)
+        self.act(GripperAction.PRESSURE)
+
+    def carry(self, value: int) -> None:
+        """Move the lift for `value` times 20 ms, upwards where positive."""
+        self._send(CommandNumber.GRIPPERVAL, value)
+        self.act(GripperAction.LIFT_CARRY)
+
+    def request(self, *, always: bool = False) -> None:
+        """Ask for a GRIPPERpac, or for one a cycle; it comes as a `PacketArrived`."""
+        self._send(CommandNumber.GRIPREQUEST, ALWAYS if always else ONCE)

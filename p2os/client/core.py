@@ -4,17 +4,14 @@ An I/O layer carries out `take_action`, feeds `line_opened`, `line_failed`,
 `line_lost` and `receive`, calls `advance_to` at `next_deadline`, and hands on
 `news`. Everything else is decided here, in the time that is passed in: the
 `LinkSupervisor` keeps the link, the `Observer` makes states of packets, the `Mover`
-moves the robot.
+moves the robot. `REQUESTS` are the packets that a robot sends only when it is asked;
+one without the device stays silent, and `fetch` ends with `NoAnswerError`.
 
 After a loss the first motion call raises `LinkLostError`, even if the link is
 back by then: the program has to know.
 
 Invariant: after a loss nothing but zero speeds goes out until a motion call
 has returned without raising.
-
-Packets that a robot sends only when it is asked: what asks for each of them, once.
-
-A robot without the device stays silent; `fetch` then ends with `NoAnswerError`.
 """
 
 import math
@@ -79,22 +76,8 @@ REQUESTS: Mapping[type, Command] = {
     JoystickPacket: Command(CommandNumber.JOYREQUEST, 1),
     PlaylistPacket: Command(CommandNumber.PLAYLIST),
 }
-
-
-def request_for(kind: type) -> Command:
-    """Return the command that asks for a type of packet.
-
-    Raises:
-        UsageError: Nothing asks for it.
-    """
-    if kind not in REQUESTS:
-        names = ", ".join(sorted(known.__name__ for known in REQUESTS))
-        raise UsageError(f"nothing asks for a {kind.__name__}", hint=f"one of {names}")
-    return REQUESTS[kind]
-
-
-#: Whose parameters stand in for a model that nobody knows.
-STAND_IN = "p2dx"
+#: Whose parameters are used for a model that nobody knows.
+FALLBACK_MODEL = "p2dx"
 
 
 class RobotCore:
@@ -119,11 +102,11 @@ class RobotCore:
         self.problem: GaveUp | LinkLost | None = None
         self._given = parameters
         self._load = load
-        self._session = LinkSupervisor(settings)
-        self._observer = Observer(parameters or load(STAND_IN))
+        self._supervisor = LinkSupervisor(settings)
+        self._observer = Observer(parameters or load(FALLBACK_MODEL))
         self._mover = Mover(
-            settings, self._observer, send=self._session.send, send_first=self._session.send_first,
-            drop=self._session.drop, tell=self.news.append,
+            settings, self._observer, send=self._supervisor.send, send_first=self._supervisor.send_first,
+            drop=self._supervisor.drop, notify=self.news.append,
         )  # fmt: skip
         self._now: Nanos = 0
         self._packets: dict[type, ServerPacket] = {}
@@ -134,12 +117,12 @@ class RobotCore:
     @property
     def link(self) -> Link:
         """Where the client stands with its robot."""
-        return self._session.link
+        return self._supervisor.link
 
     @property
     def is_ready(self) -> bool:
         """Whether packets flow and the configuration has come, or will not."""
-        return self._session.is_ready
+        return self._supervisor.is_ready
 
     @property
     def state(self) -> RobotState | None:
@@ -148,18 +131,18 @@ class RobotCore:
 
     @property
     def identity(self) -> Identity | None:
-        """Who the robot said it is."""
-        return self._session.identity
+        """The robot's identity, from its answer to SYNC2."""
+        return self._supervisor.identity
 
     @property
     def config(self) -> ConfigPacket | None:
         """The robot's CONFIGpac, once it has come."""
-        return self._session.config
+        return self._supervisor.config
 
     @property
     def baud(self) -> int | None:
         """The line's speed; None where there is no such thing."""
-        return self._session.baud
+        return self._supervisor.baud
 
     @property
     def parameters(self) -> RobotParameters:
@@ -184,7 +167,7 @@ class RobotCore:
     @property
     def stats(self) -> ConnectionStats:
         """Counters of the present connection."""
-        return self._session.stats
+        return self._supervisor.stats
 
     @property
     def commanded(self) -> Speeds:
@@ -199,7 +182,7 @@ class RobotCore:
     @property
     def is_quiet(self) -> bool:
         """Whether nothing waits to go out."""
-        return self._session.outbox.is_empty
+        return self._supervisor.outbox.is_empty
 
     # What the program asks ----------------------------------------------------------------
 
@@ -207,15 +190,15 @@ class RobotCore:
         """Begin to look for the robot."""
         self.touch(now)
         self.problem, self._unreported_loss = None, None
-        self._session.connect()
+        self._supervisor.connect()
 
     def close(self, now: Nanos) -> None:
         """Stop the robot and leave it, whatever is under way."""
         self._mover.lose(now)
-        self._session.close(now)
+        self._supervisor.close(now)
 
     def touch(self, now: Nanos) -> None:
-        """Note that the program lives: every call of it does."""
+        """Note a call of the program: the deadman counts from the last one."""
         self._mover.touch(now)
 
     def send(self, command: Command, now: Nanos) -> None:
@@ -226,7 +209,7 @@ class RobotCore:
         """
         self._require_open()
         self._mover.note(command, now)
-        self._session.send(command, now)
+        self._supervisor.send(command, now)
 
     def set_velocity(self, forward_mps: float, turn_radps: float, now: Nanos) -> None:
         """Hold these speeds, cut to the limits, until something else is asked.
@@ -285,34 +268,34 @@ class RobotCore:
         self._mover.cancel_goal(goal, now)
 
     def set_pose(self, pose: RobotPose) -> None:
-        """Say where the robot is; the robot itself is not told."""
+        """Set where the robot is; nothing is sent to the robot."""
         self._observer.place(pose)
 
-    # What the line tells ------------------------------------------------------------------
+    # What the line reports ----------------------------------------------------------------
 
     def line_opened(self, now: Nanos, baud: int | None) -> None:
         """Take a line that is open; `baud` is None where it has no speed."""
-        self._session.line_opened(now, baud)
+        self._supervisor.line_opened(now, baud)
         self._collect(now)
 
     def line_failed(self, reason: str, hint: str | None, now: Nanos) -> None:
-        """Take the news that the line cannot be opened."""
-        self._session.line_failed(reason, hint, now)
+        """Note that the line cannot be opened."""
+        self._supervisor.line_failed(reason, hint, now)
         self._collect(now)
 
     def line_lost(self, reason: str, now: Nanos) -> None:
-        """Take the news that the line has gone."""
-        self._session.line_lost(reason, now)
+        """Note that the line has gone."""
+        self._supervisor.line_lost(reason, now)
         self._collect(now)
 
     def receive(self, data: bytes, now: Nanos) -> None:
         """Take bytes that arrived at `now`."""
         self.advance_to(now)
-        self._session.receive(data, now)
+        self._supervisor.receive(data, now)
         self._collect(now)
 
     def take_gap(self, gap_ns: Nanos, now: Nanos) -> None:
-        """Tell the robot to stop before anything else: program or machine paused for `gap_ns`, which ended just now.
+        """Send STOP before anything else: program or machine paused for `gap_ns`, which ended just now.
 
         `now` is the time before the gap; what was due in it has not been acted on.
         """
@@ -321,17 +304,17 @@ class RobotCore:
 
     def take_action(self, now: Nanos) -> Action | None:
         """Return the next thing to do with the line, if any is due."""
-        return self._session.take_action(now)
+        return self._supervisor.take_action(now)
 
     def next_deadline(self) -> Nanos | None:
         """Return when this wants to act, or an action is due."""
-        due = [self._session.next_deadline(), self._session.outbox.next_deadline(), *self._own_deadlines()]
+        due = [self._supervisor.next_deadline(), self._supervisor.outbox.next_deadline(), *self._own_deadlines()]
         return min((at for at in due if at is not None), default=None)
 
     def advance_to(self, limit: Nanos) -> Reached:
         """Act on every deadline of its own up to `limit`; actions wait for `take_action`."""
         while True:
-            due = [self._session.next_deadline(), *self._own_deadlines()]
+            due = [self._supervisor.next_deadline(), *self._own_deadlines()]
             first = min((at for at in due if at is not None), default=None)
             if first is None or first > limit:
                 self._now = max(self._now, limit)
@@ -344,17 +327,17 @@ class RobotCore:
     def _act(self, now: Nanos) -> None:
         """Do all that is due at `now`."""
         self._now = now
-        self._session.advance_to(now)
+        self._supervisor.advance_to(now)
         self._collect(now)
         if self.link is Link.OPEN:
             self._mover.act(now)
 
-    # What the session says ----------------------------------------------------------------
+    # What the link reports ----------------------------------------------------------------
 
     def _collect(self, now: Nanos) -> None:
-        session = self._session
-        while session.news:
-            item = session.news.popleft()
+        supervisor = self._supervisor
+        while supervisor.news:
+            item = supervisor.news.popleft()
             if isinstance(item, StandardSip):
                 self._take_sip(item, now)
                 continue
@@ -380,20 +363,20 @@ class RobotCore:
             try:
                 parameters = self._load(identity.subclass.lower())
             except ParametersError:
-                parameters = self._load(STAND_IN)
-                self.news.append(RobotUnknown(identity.subclass, STAND_IN))
+                parameters = self._load(FALLBACK_MODEL)
+                self.news.append(RobotUnknown(identity.subclass, FALLBACK_MODEL))
         self._packets.clear()
         self._observer.new_session(parameters)
         self._observer.profile = self.settings.profile or guess_profile(identity.subclass)
-        self._session.set_profile(self._observer.profile)
+        self._supervisor.set_profile(self._observer.profile)
         self._mover.new_session()
 
     def _take_sip(self, sip: StandardSip, now: Nanos) -> None:
         if self.settings.profile is None and sip.tail and self._observer.profile is not Profile.ARCOS:
             # Only ARCOS sends fields after DIGOUT; simulators do so under any model's name.
             self._observer.profile = Profile.ARCOS
-            sip = StandardSip.from_frame(sip.to_frame(self._session.profile), Profile.ARCOS)
-            self._session.set_profile(Profile.ARCOS)
+            sip = StandardSip.from_frame(sip.to_frame(self._supervisor.profile), Profile.ARCOS)
+            self._supervisor.set_profile(Profile.ARCOS)
         state = self._observer.take(sip, now)
         if (gap_ns := self._observer.doubtful_gap_ns(self.limits)) is not None:
             self.news.append(OdometryDoubtful(gap_ns))
@@ -415,6 +398,18 @@ class RobotCore:
         if lost is not None:
             raise LinkLostError(f"the link was lost and is back: {lost}", hint="the robot stands; call again to go on")
         self._mover.require_motors(now)
+
+
+def request_for(kind: type) -> Command:
+    """Return the command that asks for a type of packet.
+
+    Raises:
+        UsageError: Nothing asks for it.
+    """
+    if kind not in REQUESTS:
+        names = ", ".join(sorted(known.__name__ for known in REQUESTS))
+        raise UsageError(f"nothing asks for a {kind.__name__}", hint=f"one of {names}")
+    return REQUESTS[kind]
 
 
 def guess_profile(subclass: str) -> Profile:

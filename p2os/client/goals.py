@@ -204,8 +204,8 @@ class Goal:
         self._limit_ns = limit_ns
         self._ends_at: Nanos = 0
         self._began_at: Nanos = 0
-        self._said_at: Nanos = 0
-        self._urged_at: Nanos = 0
+        self._sent_at: Nanos = 0
+        self._sent_on_at: Nanos = 0
         self._standing_since: Nanos | None = None
         self._stalled_since: Nanos | None = None
         self._standing_packets = 0
@@ -217,7 +217,7 @@ class Goal:
 
     def begin(self, state: RobotState, limits: Limits, now: Nanos) -> Command | None:
         """Start from a state; return the first command."""
-        self._began_at = self._said_at = self._urged_at = now
+        self._began_at = self._sent_at = self._sent_on_at = now
         allowed = self._limit_ns
         self._ends_at = now + (2 * self.axis.fastest_ns(limits) + GRACE_NS if allowed is None else allowed)
         self.axis.begin(state)
@@ -251,23 +251,23 @@ class Goal:
         self._standing_since = now if self._standing_since is None else self._standing_since
         if axis.is_near(remaining):
             return None, self._standing_packets >= 2, None
-        if now - max(self._standing_since, self._urged_at) < SEND_ON_NS:
+        if now - max(self._standing_since, self._sent_on_at) < SEND_ON_NS:
             return self._on_the_way(remaining, now), False, None
         came_nearer = abs(remaining) < self._least_left
         self._least_left = min(self._least_left, abs(remaining))
         self._sent_on = 1 if came_nearer else self._sent_on + 1
         if self._sent_on > SEND_ON_LIMIT:
             return None, False, "the robot stands: are its motors off, or is the way blocked?"
-        self._said_at = self._urged_at = now
+        self._sent_at = self._sent_on_at = now
         return axis.command(remaining, standing=True), False, None
 
     def _on_the_way(self, remaining: float, now: Nanos) -> Command | None:
         """Return the next leg of a way, or HEAD where it is to be repeated."""
-        if isinstance(self.axis, TurnAxis) and now - self._said_at < REPEAT_NS:
+        if isinstance(self.axis, TurnAxis) and now - self._sent_at < REPEAT_NS:
             return None
         command = self.axis.command(remaining, standing=False)
         if command is not None:
-            self._said_at = now
+            self._sent_at = now
         return command
 
     def _stalled(self, state: RobotState, now: Nanos) -> str | None:

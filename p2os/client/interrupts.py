@@ -1,11 +1,15 @@
-"""What interrupts a program: signals that end it in good order, and work that none of them may cut short.
+"""What interrupts a program: signals that end it in an orderly way, and work that none of them may cut short.
 
-Python itself raises an exception with Ctrl-C alone; other signals kill at once, and a robot would drive on until its
-watchdog stops it. So a program that has a robot ends by SystemExit on them. Whoever handles a signal in a way of
-their own keeps it, and one that the program was made deaf to (`nohup` and SIGHUP) stays so. Ctrl-Z suspends as ever:
-the robot's watchdog stops it, and STOP is the first frame when the program goes on.
+Python itself raises an exception with Ctrl-C alone; other signals kill at once, and a
+robot would drive on until its watchdog stops it. So a program that has a robot ends by
+SystemExit on them. A signal with a handler of its own keeps it, and one that was ignored
+when the program started (`nohup` and SIGHUP) stays ignored. Ctrl-Z suspends as ever: the
+robot's watchdog stops it, and STOP is the first frame when the program goes on.
 
-SIGKILL, SIGSTOP and a power cut cannot be caught.
+SIGKILL, SIGSTOP and a power cut cannot be caught. The verbs of `p2os` go further: see
+`p2os.cli.signals`.
+
+Invariant: `held_back` returns, or raises an interrupt, only when its work is done.
 """
 
 import signal

@@ -1,15 +1,15 @@
-"""The client's core joined to a byte line and a clock: what both robots do each time they wake.
+"""The client's core joined to a byte line and a clock, and what both robots say when that fails.
 
-Nothing is waited for here. The core's time is the clock's without the gaps in which
-packets came: what waited in the system while the program or its machine paused was
-sent in time, so no time-out may run over it.
+`Line` is what both I/O layers do each time they wake; nothing is waited for here. The
+functions below it make a core for a URL and turn its outcomes into errors.
 
-After a gap STOP is the first frame out, then what waits is read, then it is judged:
-where nothing sound waited, the gap counts as silence of the robot.
+Theory of operation. The core's time is the clock's without the gaps in which packets
+came: what waited in the system while the program or its machine paused was sent in
+time, so no timeout may run over it. After a gap STOP is the first frame out, then what
+waits is read, then it is judged: where nothing sound waited, the gap counts as silence
+of the robot.
 
 Invariant: `finish` returns, or is left by an exception, only after STOP has been written to a line that takes it.
-
-What both I/O layers do when a robot is made, not found, or has ended a motion.
 """
 
 import contextlib
@@ -35,8 +35,8 @@ MOST_READS = 16
 LONGEST_WAIT_NS: Nanos = NS_PER_S // 2
 
 #: What is written where the core cannot be asked any more: it was interrupted, or has failed. Some of it may have been
-#: said already, which does no harm.
-LAST_FRAMES = b"".join(
+#: sent already; a repetition changes nothing.
+CLOSING_FRAMES = b"".join(
     command.to_frame().to_bytes() for command in (stop(), vel(0), enable(False), Command(CommandNumber.CLOSE))
 )
 
@@ -75,7 +75,7 @@ class Line:
         return self.core.link is Link.CLOSED and self.core.is_quiet and self._transport is None and not self.is_wanted
 
     def now(self) -> Nanos:
-        """Read the clock and return the core's time; after a gap the robot is told to stop before anything else."""
+        """Read the clock and return the core's time; after a gap STOP is sent before anything else."""
         self._looked_at = self._clock()
         if (gap_ns := self._watch.gap(self._looked_at)) > 0:
             self._take_gap(gap_ns)
@@ -137,13 +137,13 @@ class Line:
 
         Interrupts (Ctrl-C) meanwhile are raised when that is done. Doing it twice is harmless.
         """
-        with contextlib.suppress(Exception):  # a line that fails cannot be told more; the robot's watchdog stops it
+        with contextlib.suppress(Exception):  # a line that fails sends no more; the robot's watchdog stops it
             held_back(self._finish)
 
     def _finish(self) -> None:
         if self._transport is not None:
             with contextlib.suppress(TransportError):
-                self._transport.write(LAST_FRAMES)
+                self._transport.write(CLOSING_FRAMES)
         with contextlib.suppress(Exception):  # an interrupt can have left it in any state
             self.core.close(self._looked_at - self._left_out)
         self._close()
@@ -151,19 +151,19 @@ class Line:
     def _is_stale(self) -> bool:
         if self.core.link is not Link.OPEN or self._clock() - self._looked_at <= GAP_NS:
             return False
-        self._watch.expect(self._looked_at)  # the next look tells the gap
+        self._watch.expect(self._looked_at)  # the next look finds the gap
         return True
 
     def _take_gap(self, gap_ns: Nanos) -> None:
         if self.core.link is not Link.OPEN:
             self._left_out += gap_ns  # a search goes on where it was
             return
-        heard = self.core.stats.frames_received
+        received = self.core.stats.frames_received
         now = self._looked_at - self._left_out - gap_ns
         self.core.take_gap(gap_ns, now)
         self.write(now)
         self._read(now)
-        if self.core.stats.frames_received != heard:
+        if self.core.stats.frames_received != received:
             self._left_out += gap_ns
             return
         now += gap_ns  # the robot was silent for so long
@@ -184,7 +184,7 @@ class Line:
             self.core.receive(data, self._arrival(now))
 
     def _arrival(self, now: Nanos) -> Nanos:
-        """Return when bytes that waited in the system arrived: before any time-out that they would have prevented."""
+        """Return when bytes that waited in the system arrived: before any timeout that they would have prevented."""
         due = self.core.next_deadline()
         if due is None or due > now:
             return now

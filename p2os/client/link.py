@@ -1,25 +1,25 @@
-"""The life of the link: find the robot, open it, notice a loss, look for it again.
+"""The link to one robot: find it, open a session, notice a loss, look for it again.
+
+What is sent in an open session is the `Mover`'s; when actions leave, the `Outbox`'s.
 
 Theory of operation. `connect` asks for the line. When it is open, one
-`Connection` after the other tries the handshake, at each baud rate in turn,
-first quickly and then with patience (`search_plan`). A robot that is still open
+`Connection` after the other tries the handshake, at each baud rate in turn, first
+with short timeouts, then with long ones (`search_plan`). A robot that is still open
 from an earlier session takes SYNC0 for a PULSE and goes on at its last speed, so
 STOP, VEL 0 and RVEL 0 stand before each SYNC0. The one exception is a line
 without a baud rate on which no session has been: it is listened to first, and
 where not a byte comes, SYNC0 goes alone. AMRISim (MobileSim's successor) takes
 any first frame for a sync, counts on from its number, and never opens; where
 STOP had to go first, its echo of STOP betrays it, and the line is opened anew.
-After OPEN the first standard packet makes the link
-open; CONFIG is asked for, and where the robot offers it the line is made
-faster. A loss sends STOP and VEL 0, closes the line, waits, and begins again.
+After OPEN the first standard packet makes the link open; CONFIG is asked for, and
+where the robot offers it the line is made faster. A loss sends STOP and VEL 0,
+closes the line, waits, and begins again.
 
     CLOSED → OPENING → SEARCHING → STARTING → OPEN
                 ↑          ↓           ↓        ↓
              WAITING ←─────┴───────────┴────────┘   (FAILED where nothing is tried again)
 
 Invariant: each try ends within `TRY_LIMIT_NS`, open or with a reason.
-
-Where a robot is looked for, in which order, and what a search that fails has to say.
 """
 
 from collections import deque
@@ -64,58 +64,6 @@ from p2os.protocol.profiles import Profile
 from p2os.protocol.sip import StandardSip
 from p2os.timing import NS_PER_MS, NS_PER_S, Nanos
 
-
-@dataclass(frozen=True, slots=True)
-class Try:
-    """One stretch of the search: a rate (None: the line has none), how long to wait, how often."""
-
-    baud: int | None
-    wait_ns: Nanos
-    attempts: int
-
-
-def search_plan(
-    baud: int | None, bauds: tuple[int, ...], settings: ClientSettings, *, is_known: bool = False
-) -> tuple[Try, ...]:
-    """Return the tries, likeliest first: quick ones at every rate, then slow ones.
-
-    Args:
-        baud: The likeliest rate; None where the line has none.
-        bauds: All rates, in the order in which they are tried; repeats do no harm.
-        settings: How long a try takes.
-        is_known: The robot was open at `baud` before: it is tried again between all others.
-    """
-    if baud is None:
-        return Try(None, settings.quick_sync_ns, 3), Try(None, settings.slow_sync_ns, 5)
-    others = dict.fromkeys(rate for rate in bauds if rate != baud)
-    rates = tuple(rate for other in others for rate in ((other, baud) if is_known else (other,)))
-    quick = (Try(baud, settings.quick_sync_ns, 2), *(Try(rate, settings.quick_sync_ns, 1) for rate in rates))
-    return (*quick, *(Try(rate, settings.slow_sync_ns, 1) for rate in (baud, *rates)))
-
-
-#: How far a search came → what it says, and what to look at.
-REASONS: Mapping[str, tuple[str, str]] = {
-    "silence": ("no answer{where}", "is the robot on, and the cable in?"),
-    "noise": ("only noise{where}", "is this the robot's HOST port? p2os scan tries every port and rate"),
-    "answers": ("the robot answers{where}, but its handshake does not come to an end", "is the line bad?"),
-    "opened": ("the session was opened, but no standard packet followed", "is the line bad?"),
-}
-
-
-def why_not_found(came_to: str, line_baud: int | None, bauds: tuple[int, ...]) -> tuple[str, str]:
-    """Return why a search failed, and a hint.
-
-    Args:
-        came_to: How far it came, a key of `REASONS`.
-        line_baud: The rate at which the line was opened; None where it has none.
-        bauds: The rates that were tried beside it.
-    """
-    rates = dict.fromkeys((line_baud, *bauds)) if line_baud is not None else {}
-    where = f" at {', '.join(map(str, rates))} baud" if rates else ""
-    reason, hint = REASONS[came_to]
-    return reason.format(where=where), hint
-
-
 #: A try to open a session ends within this, whatever the line does.
 TRY_LIMIT_NS: Nanos = 20 * NS_PER_S
 #: chosen: CONFIG is asked for so often, so far apart: the answer takes 110 ms at 9600 baud.
@@ -126,16 +74,22 @@ WANTS_HIGHER_BAUD = 2
 SYNC0_BYTES = pulse().to_frame().to_bytes()
 #: chosen: one packet could have been on its way at the old rate; two in a row were not.
 PACKETS_THAT_PROVE_A_RATE = 2
+#: How far a search came → what its error says, and what to look at.
+REASONS: Mapping[str, tuple[str, str]] = {
+    "silence": ("no answer{where}", "is the robot on, and the cable in?"),
+    "noise": ("only noise{where}", "is this the robot's HOST port? p2os scan tries every port and rate"),
+    "answers": ("the robot answers{where}, but its handshake does not come to an end", "is the line bad?"),
+    "opened": ("the session was opened, but no standard packet followed", "is the line bad?"),
+}
 
 
-@dataclass(slots=True)
-class _Raise:
-    """A change of line speed under way."""
+@dataclass(frozen=True, slots=True)
+class Try:
+    """One stretch of the search: a rate (None: the line has none), how long to wait, how often."""
 
-    old: int
-    new: int
-    switched_at: Nanos | None = None
-    packets: int = 0
+    baud: int | None
+    wait_ns: Nanos
+    attempts: int
 
 
 class LinkSupervisor:
@@ -152,7 +106,7 @@ class LinkSupervisor:
         #: Standard packets and notices, oldest first.
         self.news: deque[StandardSip | Notice] = deque()
         self._line_baud: int | None = None
-        #: Rates at which the robot was heard last, and at which its handshake was found.
+        #: Rates at which the robot was received last, and at which its handshake was found.
         self._good_baud: int | None = None
         self._found_baud: int | None = None
         #: Whether a session has ever been opened: a robot may be left open and moving.
@@ -161,7 +115,7 @@ class LinkSupervisor:
         self._stops_first = True
         #: Whether the peer took STOP for a sync in this try.
         self._echoes_stop = False
-        #: Until when a fresh line is listened to.
+        #: Until when a line that is new is listened to.
         self._listen_due: Nanos | None = None
         self._connection = self._new_connection(settings.slow_sync_ns, 1)
         self._plan: deque[Try] = deque()
@@ -173,7 +127,7 @@ class LinkSupervisor:
         self._config_asked = 0
         self._raise: _Raise | None = None
         self._raise_refused = False
-        #: How far the present try has come: a key of `_why`.
+        #: How far the present try has come: a key of `REASONS`.
         self._came_to = "silence"
 
     @property
@@ -223,7 +177,7 @@ class LinkSupervisor:
             self.outbox.send_first(self._connection.take_output())
 
     def drop(self, numbers: Container[int]) -> None:
-        """Forget commands that have not left: something overtakes them."""
+        """Drop commands that have not left: something overtakes them."""
         self.outbox.drop_frames(numbers)
 
     @property
@@ -235,7 +189,7 @@ class LinkSupervisor:
         """Read packets in a firmware family's layout."""
         self._connection.set_profile(profile)
 
-    # What the line tells ----------------------------------------------------------------
+    # What the line reports --------------------------------------------------------------
 
     def line_opened(self, now: Nanos, baud: int | None) -> None:
         """Take a line that is open; `baud` is its speed, None where there is no such thing."""
@@ -245,9 +199,9 @@ class LinkSupervisor:
         self._plan = deque(self._search(baud))
         self._enter(Link.SEARCHING, now + TRY_LIMIT_NS)
         self._came_to = "silence"
-        is_fresh = baud is None and not self._has_opened
-        self._stops_first = not (is_fresh or self._echoes_stop)
-        if is_fresh and not self._echoes_stop:
+        is_new = baud is None and not self._has_opened
+        self._stops_first = not (is_new or self._echoes_stop)
+        if is_new and not self._echoes_stop:
             self._connection = self._new_connection(self._settings.quick_sync_ns, 1)
             self._listen_due = now + self._settings.listen_ns
         else:
@@ -261,12 +215,12 @@ class LinkSupervisor:
         return search_plan(baud if good is None else good, bauds, self._settings, is_known=good is not None)
 
     def line_failed(self, reason: str, hint: str | None, now: Nanos) -> None:
-        """Take the news that the line cannot be opened."""
+        """Note that the line cannot be opened."""
         if self.link is Link.OPENING:
             self._give_up_try(reason, hint, now)
 
     def line_lost(self, reason: str, now: Nanos) -> None:
-        """Take the news that the line has gone, with all that was to be sent on it."""
+        """Note that the line has gone, with all that was to be sent on it."""
         if self.link is Link.OPEN:
             self.news.append(LinkLost(reason))
             self._wait_or_fail(reason, None, now)
@@ -361,7 +315,7 @@ class LinkSupervisor:
         )
 
     def _collect(self, now: Nanos) -> None:
-        """Hand on what the connection says and wants to send."""
+        """Hand on the connection's events and output."""
         connection = self._connection
         while (event := connection.next_event()) is not None:
             self._take(event, now)
@@ -394,7 +348,7 @@ class LinkSupervisor:
                 pass
 
     def _take_end(self, event: ConnectFailed | ConnectionLost, now: Nanos) -> None:
-        """Act on a handshake or a session that is over; what it still has to say goes out."""
+        """Act on a handshake or a session that is over; what it still has to send goes out."""
         is_loss = self.link is Link.OPEN
         if is_loss:
             self.outbox.drop_frames()
@@ -426,7 +380,7 @@ class LinkSupervisor:
         if self._echoes_stop:
             return
         self._echoes_stop = True
-        self._connection = self._new_connection(self._settings.quick_sync_ns, 1)  # the old one has no more to say
+        self._connection = self._new_connection(self._settings.quick_sync_ns, 1)  # the old one sends no more
         self.outbox.drop_frames({CommandNumber.PULSE})  # VEL 0 and RVEL 0 still go
         self.outbox.put(CloseLine(), OpenLine())
         self._enter(Link.OPENING, None)
@@ -492,7 +446,7 @@ class LinkSupervisor:
         return self._raise.switched_at + self._settings.raise_window_ns
 
     def _fall_back(self, now: Nanos) -> None:
-        """Go back to the rate at which the robot was heard."""
+        """Go back to the rate at which the robot was received."""
         if self._raise is None:
             return
         self.news.append(BaudKept(self._raise.old, self._raise.new))
@@ -505,3 +459,46 @@ class LinkSupervisor:
         self.link, self._due = link, due
         if link is not Link.OPEN:
             self._config_due, self._raise, self._listen_due = None, None, None
+
+
+def search_plan(
+    baud: int | None, bauds: tuple[int, ...], settings: ClientSettings, *, is_known: bool = False
+) -> tuple[Try, ...]:
+    """Return the tries, likeliest first: quick ones at every rate, then slow ones.
+
+    Args:
+        baud: The likeliest rate; None where the line has none.
+        bauds: All rates, in the order in which they are tried; repeats do no harm.
+        settings: How long a try takes.
+        is_known: The robot was open at `baud` before: it is tried again between all others.
+    """
+    if baud is None:
+        return Try(None, settings.quick_sync_ns, 3), Try(None, settings.slow_sync_ns, 5)
+    others = dict.fromkeys(rate for rate in bauds if rate != baud)
+    rates = tuple(rate for other in others for rate in ((other, baud) if is_known else (other,)))
+    quick = (Try(baud, settings.quick_sync_ns, 2), *(Try(rate, settings.quick_sync_ns, 1) for rate in rates))
+    return (*quick, *(Try(rate, settings.slow_sync_ns, 1) for rate in (baud, *rates)))
+
+
+def why_not_found(came_to: str, line_baud: int | None, bauds: tuple[int, ...]) -> tuple[str, str]:
+    """Return why a search failed, and a hint.
+
+    Args:
+        came_to: How far it came, a key of `REASONS`.
+        line_baud: The rate at which the line was opened; None where it has none.
+        bauds: The rates that were tried beside it.
+    """
+    rates = dict.fromkeys((line_baud, *bauds)) if line_baud is not None else {}
+    where = f" at {', '.join(map(str, rates))} baud" if rates else ""
+    reason, hint = REASONS[came_to]
+    return reason.format(where=where), hint
+
+
+@dataclass(slots=True)
+class _Raise:
+    """A change of line speed under way."""
+
+    old: int
+    new: int
+    switched_at: Nanos | None = None
+    packets: int = 0

@@ -1,32 +1,27 @@
 """What moves the robot: nothing, held speeds, or one goal; and what takes that away again.
 
-A new motion takes the old one's place. A loss, the deadman, motors that go off,
-a stop and a goal's end lead to nothing or to held zero speeds; only a call of
-the program leads away from there.
+Which speeds a goal needs is decided in `p2os.client.goals`.
 
-Whether the motors are on, as far as anybody can know.
+Theory of operation. A new motion takes the old one's place. A loss, the deadman,
+motors that go off, a stop and a goal's end lead to nothing or to held zero speeds;
+only a call of the program leads away from there.
 
-Motors are off after every OPEN. ENABLE has no answer; AROS and ARCOS robots say
-in their flags whether the motors are on, P2OS robots do not. ENABLE is sent a
-few times in a row, for a frame can be lost. Once they were on, motors that go
-off were switched off by somebody at the robot: they stay off until the program
-asks for them.
+`SpeedKeeper`: P2OS acknowledges nothing, so the present speed is sent on change and
+again at least every `refresh_ns`. Changes that come faster than `speed_spacing_ns`
+wait, and what they overtake is never sent.
 
-Whether the robot does what it is told: the wheel speeds of its packets are the only witness.
+`Motors`: they are off after every OPEN. ENABLE has no answer; AROS and ARCOS robots
+report in their flags whether the motors are on, P2OS robots do not. ENABLE is sent a
+few times in a row, for a frame can be lost. Once they were on, motors that go off were
+switched off by somebody at the robot: they stay off until the program asks for them.
 
-A robot that obeys is near its command, or comes nearer, or says that it is
-stalled; each packet that shows one of the three passes the plausibility check. "Nearer"
-means that the larger error of the two wheels fell below the least seen under
-this command by more than jitter, so that a robot that merely trembles is not
-believed for long.
+`PlausibilityCheck`: the wheel speeds of the packets are the only evidence that the
+robot follows its commands. One that follows is near its command, or comes nearer, or
+reports a stall; each packet that shows one of the three passes the check. "Nearer"
+means that the larger error of the two wheels fell below the least seen under this
+command by more than jitter, so that noise alone does not pass for long.
 
-The speed that the robot is to have now, and when it is said.
-
-P2OS acknowledges nothing, so the present speed is sent on change and again at
-least every `refresh_ns`. Changes that come faster than `speed_spacing_ns` wait,
-and what they overtake is never sent.
-
-Invariant: nothing is sent until a speed was first set, nor after `release`.
+Invariant: no speed is sent until one was first set, nor after `release`.
 """
 
 import math
@@ -50,119 +45,35 @@ from p2os.errors import LocalProtocolError, UsageError
 from p2os.protocol.commands import Command, CommandNumber, enable, rvel, stop, vel
 from p2os.timing import NS_PER_MS, NS_PER_S, Nanos
 
+#: What moves a robot: sent raw, it takes the place of held speeds.
+MOTION_NUMBERS = frozenset(
+    {CommandNumber.MOVE, CommandNumber.ROTATE, CommandNumber.VEL, CommandNumber.HEAD, CommandNumber.DHEAD,
+     CommandNumber.RVEL, CommandNumber.DCHEAD, CommandNumber.VEL2, CommandNumber.LATVEL, CommandNumber.STOP,
+     CommandNumber.E_STOP, CommandNumber.QSTOP}
+)  # fmt: skip
+
+#: (command, is its argument positive) → the limit that it sets.
+LIMIT_NAMES: Mapping[tuple[int, bool], str] = {
+    (CommandNumber.SETV, True): "forward_mps",
+    (CommandNumber.SETRV, True): "turn_radps",
+    (CommandNumber.SETA, True): "accel_mps2",
+    (CommandNumber.SETA, False): "decel_mps2",
+    (CommandNumber.SETRA, True): "turn_accel_radps2",
+    (CommandNumber.SETRA, False): "turn_decel_radps2",
+}
+
 #: ENABLE goes out so often, so far apart.
 ENABLE_TIMES, ENABLE_EVERY_NS = 3, 200 * NS_PER_MS
-#: chosen: flags that say off are believed only so long after ENABLE: three packets.
+#: chosen: flags that report off are ignored for so long after ENABLE: three packets.
 GRACE_NS: Nanos = 800 * NS_PER_MS
-#: Why motors went off, as the flags tell it.
+#: Why motors went off, by the flags.
 BUTTON_IS_PRESSED, BUTTON_WAS_PRESSED = "the STOP button is pressed", "the STOP button was pressed"
-
-
-class Motors:
-    """What is known of the motors of one session after another."""
-
-    def __init__(self) -> None:
-        #: Whether this session was told ENABLE 1 and nothing has switched the motors off since.
-        self.are_on = False
-        #: Why they went off without being told, or None.
-        self.taken_off: str | None = None
-        self._left = 0
-        self._due: Nanos | None = None
-        self._asked_at: Nanos = 0
-
-    def new_session(self) -> None:
-        """Know that they are off."""
-        self.are_on, self.taken_off = False, None
-        self._left, self._due = 0, None
-
-    def ask(self, *, on: bool, now: Nanos) -> None:
-        """Note that ENABLE is being sent."""
-        self.are_on, self.taken_off = on, None
-        self._asked_at = now
-        self._left = ENABLE_TIMES - 1 if on else 0
-        self._due = now + ENABLE_EVERY_NS if self._left else None
-
-    def next_deadline(self) -> Nanos | None:
-        """Return when ENABLE is to be sent again."""
-        return self._due
-
-    def take_repeat(self, now: Nanos) -> bool:
-        """Tell whether ENABLE is to be sent now."""
-        if self._due is None or now < self._due:
-            return False
-        self._left -= 1
-        self._due = now + ENABLE_EVERY_NS if self._left else None
-        return True
-
-    def take(self, state: RobotState, now: Nanos) -> str | None:
-        """Take a state; return why the motors went off, once."""
-        if state.motors_enabled:
-            self._left, self._due = 0, None
-        if self.taken_off == BUTTON_IS_PRESSED and not state.stop_button:
-            self.taken_off = BUTTON_WAS_PRESSED
-        if not self.are_on or state.motors_enabled is not False or now - self._asked_at < GRACE_NS:
-            return None
-        self.are_on = False
-        self._left, self._due = 0, None
-        self.taken_off = BUTTON_IS_PRESSED if state.stop_button else "they were switched off at the robot"
-        return self.taken_off
-
-
 #: chosen: 1 deg/s is 3 mm/s at the rim of a 2-DX, speeds are whole mm/s, and motors hunt.
 TOLERANCE_MPS = 0.04
 #: chosen: beside it, for large robots at speed.
 TOLERANCE_SHARE = 0.15
 #: chosen: less than a tenth of what the gentlest acceleration makes between two packets.
 PROGRESS_MPS = 0.002
-
-
-class PlausibilityCheck:
-    """Compares what was commanded with what the wheels do, in m/s of each wheel."""
-
-    def __init__(self, patience_ns: Nanos) -> None:
-        self._patience_ns = patience_ns
-        self._command: tuple[float, float] | None = None
-        self._least_error = 0.0
-        self._plausible_at: Nanos = 0
-        self._has_reported = False
-        self._was_near = False
-
-    def expect(self, wheels: tuple[float, float] | None, measured: tuple[float, float], now: Nanos) -> None:
-        """Take what the wheels are to do from now on; None: nothing is expected of them.
-
-        A new command measures progress from where the wheels are, and buys no time.
-        """
-        if wheels == self._command:
-            return
-        if wheels is None or self._command is None:
-            self._plausible_at, self._has_reported = now, False
-        self._command = wheels
-        if wheels is not None:
-            self._least_error = self._error(measured)
-
-    def take(self, measured: tuple[float, float], *, stalled: bool, now: Nanos) -> str | None:
-        """Take the wheel speeds of a packet; return what is not believed, once, or None."""
-        if self._command is None:
-            return None
-        error = self._error(measured)
-        near = error <= TOLERANCE_MPS + TOLERANCE_SHARE * max(map(abs, self._command))
-        if near or stalled or error <= self._least_error - PROGRESS_MPS:
-            self._least_error, self._plausible_at, self._has_reported = error, now, False
-            self._was_near = near
-            return None
-        if self._was_near:
-            self._was_near, self._least_error = False, error  # it has left by itself: its way back counts from here
-        if self._has_reported or now - self._plausible_at < self._patience_ns:
-            return None
-        self._has_reported = True
-        return (
-            f"for {self._patience_ns / NS_PER_S:g} s the wheels are at {measured[0]:.2f} and {measured[1]:.2f} m/s, "
-            f"commanded {self._command[0]:.2f} and {self._command[1]:.2f}, and no stall flag"
-        )
-
-    def _error(self, measured: tuple[float, float]) -> float:
-        command = self._command or measured
-        return max(abs(command[0] - measured[0]), abs(command[1] - measured[1]))
 
 
 @dataclass(frozen=True, slots=True)
@@ -196,60 +107,6 @@ class Speeds:
 STILL = Speeds()
 
 
-class SpeedKeeper:
-    """The newest speeds, and when to say them."""
-
-    def __init__(self, *, spacing_ns: Nanos, refresh_ns: Nanos) -> None:
-        self._spacing_ns = spacing_ns
-        self._refresh_ns = refresh_ns
-        self.wanted = STILL
-        self.is_held = False
-        self._said: Speeds | None = None
-        self._said_at: Nanos = 0
-
-    def hold(self, speeds: Speeds) -> None:
-        """Keep the robot at these speeds from now on."""
-        self.wanted = speeds
-        self.is_held = True
-
-    def release(self) -> None:
-        """Say nothing more: something else moves the robot, or nothing does."""
-        self.wanted = STILL
-        self.is_held = False
-        self._said = None
-
-    def next_deadline(self) -> Nanos | None:
-        """Return when the speeds are to be said, or None while none are held; 0 for at once."""
-        if not self.is_held:
-            return None
-        if self._said is None:
-            return self._said_at + self._spacing_ns if self._said_at else 0
-        return self._said_at + (self._spacing_ns if self.wanted != self._said else self._refresh_ns)
-
-    def take(self, now: Nanos) -> tuple[Command, Command]:
-        """Return the two commands to send at `now`."""
-        self._said, self._said_at = self.wanted, now
-        return vel(self.wanted.forward_mm_s), rvel(self.wanted.turn_deg_s)
-
-
-#: What moves a robot: sent raw, it takes the place of held speeds.
-MOTION_NUMBERS = frozenset(
-    {CommandNumber.MOVE, CommandNumber.ROTATE, CommandNumber.VEL, CommandNumber.HEAD, CommandNumber.DHEAD,
-     CommandNumber.RVEL, CommandNumber.DCHEAD, CommandNumber.VEL2, CommandNumber.LATVEL, CommandNumber.STOP,
-     CommandNumber.E_STOP, CommandNumber.QSTOP}
-)  # fmt: skip
-
-#: (command, is its argument positive) → the limit that it sets.
-LIMIT_NAMES: Mapping[tuple[int, bool], str] = {
-    (CommandNumber.SETV, True): "forward_mps",
-    (CommandNumber.SETRV, True): "turn_radps",
-    (CommandNumber.SETA, True): "accel_mps2",
-    (CommandNumber.SETA, False): "decel_mps2",
-    (CommandNumber.SETRA, True): "turn_accel_radps2",
-    (CommandNumber.SETRA, False): "turn_decel_radps2",
-}
-
-
 class Mover:
     """Keeps one robot moving as it was last asked.
 
@@ -258,8 +115,8 @@ class Mover:
         observer: What is known of the robot.
         send: Sends a command of the open session.
         send_first: Sends one before all that waits, at once.
-        drop: Forgets those commands, by number, that have not left yet.
-        tell: Takes what the program is to know.
+        drop: Drops those commands, by number, that have not left yet.
+        notify: Takes what the program is to know.
     """
 
     def __init__(
@@ -270,14 +127,14 @@ class Mover:
         send: Callable[[Command, Nanos], None],
         send_first: Callable[[Command, Nanos], None],
         drop: Callable[[Container[int]], None],
-        tell: Callable[[Notice], None],
+        notify: Callable[[Notice], None],
     ) -> None:
         self._settings = settings
         self._observer = observer
         self._send = send
         self._send_first = send_first
         self._drop = drop
-        self._tell = tell
+        self._notify = notify
         self._speeds = SpeedKeeper(spacing_ns=settings.speed_spacing_ns, refresh_ns=settings.refresh_ns)
         self._motors = Motors()
         self._plausibility = PlausibilityCheck(settings.plausibility_ns)
@@ -302,7 +159,7 @@ class Mover:
         return replace(own, **self._set_limits)
 
     def touch(self, now: Nanos) -> None:
-        """Note that the program lives."""
+        """Note a call of the program, for the deadman."""
         self._called_at = now
 
     # What the program asks ----------------------------------------------------------------
@@ -325,7 +182,7 @@ class Mover:
         """Switch the motors."""
         if not on:
             self._drop(MOTION_NUMBERS)
-            self.forget("motors off", now)
+            self.release("motors off", now)
         self._motors.ask(on=on, now=now)
         self._send(enable(on), now)
 
@@ -344,29 +201,29 @@ class Mover:
         self._hold(STILL, now)
 
     def take_gap(self, gap_ns: Nanos, now: Nanos) -> None:
-        """Stop at once, and hold zero speeds where something moved the robot: what was asked is old news."""
+        """Stop at once, and hold zero speeds where something moved the robot: what was asked is out of date."""
         was_moving = self._goal is not None or not self._speeds.wanted.are_zero
         self._end_goal(f"the program or its machine paused for {gap_ns / NS_PER_S:.1f} s", now)
         self._drop(MOTION_NUMBERS)
         self._send_first(stop(), now)
         if was_moving:
             self._hold(STILL, now)
-            self._tell(GapStopped(gap_ns))
+            self._notify(GapStopped(gap_ns))
 
     def begin_goal(self, axis: Axis, limit_ns: Nanos | None, speed: float | None, limits: Limits, now: Nanos) -> Goal:
         """Begin a goal; its end is a `MotionEnded`.
 
         Raises:
             UsageError: The way, angle or speed is no number, or the speed is not positive.
-            LocalProtocolError: The robot has not said where it is.
+            LocalProtocolError: No packet has shown where the robot is.
         """
         if not math.isfinite(axis.asked) or (speed is not None and not (math.isfinite(speed) and speed > 0)):
             raise UsageError(f"{axis.what} at {speed} is no motion")
         state = self._observer.state
         if state is None:
-            raise LocalProtocolError("the robot has not said where it is yet", hint="wait for a state")
+            raise LocalProtocolError("the robot has not sent its position yet", hint="wait for a state")
         self._drop(MOTION_NUMBERS)
-        self.forget("another goal", now)
+        self.release("another goal", now)
         if speed is not None:
             usual = axis.speed_of(limits)
             limits = axis.with_speed(limits, min(speed, usual))
@@ -387,7 +244,7 @@ class Mover:
         """Take note of a command that the program sends by itself."""
         if command.number in MOTION_NUMBERS:
             self._drop(MOTION_NUMBERS)
-            self.forget("another command", now)
+            self.release("another command", now)
         value = command.integer
         name = LIMIT_NAMES.get((command.number, value is not None and value > 0))
         if name is not None and value:
@@ -401,8 +258,8 @@ class Mover:
         self._motors.new_session()
         self._set_limits.clear()  # CLOSE takes the robot back to its own
 
-    def forget(self, why: str, now: Nanos) -> None:
-        """Let nothing move the robot any more, without a word to it."""
+    def release(self, why: str, now: Nanos) -> None:
+        """Let nothing move the robot any more, and send nothing."""
         self._end_goal(why, now)
         self._speeds.release()
         self._plausibility.expect(None, self._observer.wheels_mps, now)
@@ -410,20 +267,20 @@ class Mover:
     def lose(self, now: Nanos) -> None:
         """Take the loss of the link: nothing more can be sent."""
         self._speed_back = None
-        self.forget("the link was lost", now)
+        self.release("the link was lost", now)
         self.new_session()
 
     def take(self, state: RobotState, now: Nanos) -> None:
         """Hold a state against what was asked."""
         if (reason := self._motors.take(state, now)) is not None:
-            self.forget("the motors went off", now)
-            self._tell(MotorsDisabled(f"motors are disabled: {reason}"))
+            self.release("the motors went off", now)
+            self._notify(MotorsDisabled(f"motors are disabled: {reason}"))
         wheels = (state.left_mps, state.right_mps)
         doubt = self._plausibility.take(wheels, stalled=state.is_stalled, now=now)
         if doubt is not None:
             stands = max(map(abs, wheels)) == 0
             advice = "; are the motors disabled (MOTORS button, STOP button)?" if stands else ""
-            self._tell(Disobeyed(doubt + advice))
+            self._notify(Disobeyed(doubt + advice))
         self._follow_goal(state, now)
 
     def deadlines(self) -> list[Nanos | None]:
@@ -434,7 +291,7 @@ class Mover:
     def act(self, now: Nanos) -> None:
         """Do what is due at `now` in an open session."""
         if (deadman := self._deadman_due()) is not None and now >= deadman:
-            self._tell(DeadmanStopped(now - self._called_at))
+            self._notify(DeadmanStopped(now - self._called_at))
             self.stop("deadman", now)
         if self._goal is not None and (late := self._goal.time_is_up(now)) is not None:
             self.stop(late, now)
@@ -446,10 +303,10 @@ class Mover:
                 self._send(command, now)
 
     def _deadman_due(self) -> Nanos | None:
-        patience = self._settings.deadman_ns
-        if patience is None or self._speeds.wanted.are_zero:
+        timeout_ns = self._settings.deadman_ns
+        if timeout_ns is None or self._speeds.wanted.are_zero:
             return None
-        return self._called_at + patience
+        return self._called_at + timeout_ns
 
     def _follow_goal(self, state: RobotState, now: Nanos) -> None:
         if self._goal is None:
@@ -475,7 +332,142 @@ class Mover:
             return
         result = goal.result(now)
         goal.ended = MotionEnded(goal.axis.what, result.asked, result.reached, result.took_ns, problem)
-        self._tell(goal.ended)
+        self._notify(goal.ended)
         if self._speed_back is not None:
             self._send(self._speed_back, now)
             self._speed_back = None
+
+
+class SpeedKeeper:
+    """The newest speeds, and when to send them."""
+
+    def __init__(self, *, spacing_ns: Nanos, refresh_ns: Nanos) -> None:
+        self._spacing_ns = spacing_ns
+        self._refresh_ns = refresh_ns
+        self.wanted = STILL
+        self.is_held = False
+        self._sent: Speeds | None = None
+        self._sent_at: Nanos = 0
+
+    def hold(self, speeds: Speeds) -> None:
+        """Keep the robot at these speeds from now on."""
+        self.wanted = speeds
+        self.is_held = True
+
+    def release(self) -> None:
+        """Send nothing more: something else moves the robot, or nothing does."""
+        self.wanted = STILL
+        self.is_held = False
+        self._sent = None
+
+    def next_deadline(self) -> Nanos | None:
+        """Return when the speeds are to be sent, or None while none are held; 0 for at once."""
+        if not self.is_held:
+            return None
+        if self._sent is None:
+            return self._sent_at + self._spacing_ns if self._sent_at else 0
+        return self._sent_at + (self._spacing_ns if self.wanted != self._sent else self._refresh_ns)
+
+    def take(self, now: Nanos) -> tuple[Command, Command]:
+        """Return the two commands to send at `now`."""
+        self._sent, self._sent_at = self.wanted, now
+        return vel(self.wanted.forward_mm_s), rvel(self.wanted.turn_deg_s)
+
+
+class Motors:
+    """What is known of the motors of one session after another."""
+
+    def __init__(self) -> None:
+        #: Whether ENABLE 1 was sent in this session and nothing has switched the motors off since.
+        self.are_on = False
+        #: Why they went off without a command, or None.
+        self.taken_off: str | None = None
+        self._left = 0
+        self._due: Nanos | None = None
+        self._asked_at: Nanos = 0
+
+    def new_session(self) -> None:
+        """Know that they are off."""
+        self.are_on, self.taken_off = False, None
+        self._left, self._due = 0, None
+
+    def ask(self, *, on: bool, now: Nanos) -> None:
+        """Note that ENABLE is being sent."""
+        self.are_on, self.taken_off = on, None
+        self._asked_at = now
+        self._left = ENABLE_TIMES - 1 if on else 0
+        self._due = now + ENABLE_EVERY_NS if self._left else None
+
+    def next_deadline(self) -> Nanos | None:
+        """Return when ENABLE is to be sent again."""
+        return self._due
+
+    def take_repeat(self, now: Nanos) -> bool:
+        """Return whether ENABLE is to be sent now."""
+        if self._due is None or now < self._due:
+            return False
+        self._left -= 1
+        self._due = now + ENABLE_EVERY_NS if self._left else None
+        return True
+
+    def take(self, state: RobotState, now: Nanos) -> str | None:
+        """Take a state; return why the motors went off, once."""
+        if state.motors_enabled:
+            self._left, self._due = 0, None
+        if self.taken_off == BUTTON_IS_PRESSED and not state.stop_button:
+            self.taken_off = BUTTON_WAS_PRESSED
+        if not self.are_on or state.motors_enabled is not False or now - self._asked_at < GRACE_NS:
+            return None
+        self.are_on = False
+        self._left, self._due = 0, None
+        self.taken_off = BUTTON_IS_PRESSED if state.stop_button else "they were switched off at the robot"
+        return self.taken_off
+
+
+class PlausibilityCheck:
+    """Compares what was commanded with what the wheels do, in m/s of each wheel."""
+
+    def __init__(self, timeout_ns: Nanos) -> None:
+        self._timeout_ns = timeout_ns
+        self._command: tuple[float, float] | None = None
+        self._least_error = 0.0
+        self._plausible_at: Nanos = 0
+        self._has_reported = False
+        self._was_near = False
+
+    def expect(self, wheels: tuple[float, float] | None, measured: tuple[float, float], now: Nanos) -> None:
+        """Take what the wheels are to do from now on; None: nothing is expected of them.
+
+        A new command measures progress from where the wheels are, and buys no time.
+        """
+        if wheels == self._command:
+            return
+        if wheels is None or self._command is None:
+            self._plausible_at, self._has_reported = now, False
+        self._command = wheels
+        if wheels is not None:
+            self._least_error = self._error(measured)
+
+    def take(self, measured: tuple[float, float], *, stalled: bool, now: Nanos) -> str | None:
+        """Take the wheel speeds of a packet; return what is implausible, once, or None."""
+        if self._command is None:
+            return None
+        error = self._error(measured)
+        near = error <= TOLERANCE_MPS + TOLERANCE_SHARE * max(map(abs, self._command))
+        if near or stalled or error <= self._least_error - PROGRESS_MPS:
+            self._least_error, self._plausible_at, self._has_reported = error, now, False
+            self._was_near = near
+            return None
+        if self._was_near:
+            self._was_near, self._least_error = False, error  # it has left by itself: its way back counts from here
+        if self._has_reported or now - self._plausible_at < self._timeout_ns:
+            return None
+        self._has_reported = True
+        return (
+            f"for {self._timeout_ns / NS_PER_S:g} s the wheels are at {measured[0]:.2f} and {measured[1]:.2f} m/s, "
+            f"commanded {self._command[0]:.2f} and {self._command[1]:.2f}, and no stall flag"
+        )
+
+    def _error(self, measured: tuple[float, float]) -> float:
+        command = self._command or measured
+        return max(abs(command[0] - measured[0]), abs(command[1] - measured[1]))

@@ -1,8 +1,7 @@
-"""What a client tells its program beside the states: past-tense facts, in order.
+"""What a client reports to its program beside the states: errors that it raises, and notices of what happened.
 
-What a client raises, one class for each thing that a program may want to catch.
-
-All are `P2osError`: one line for a person, and a hint.
+Errors are one class for each thing that a program may want to catch; all are
+`P2osError`: one line for a person, and a hint. Notices are past-tense facts, in order.
 """
 
 from dataclasses import dataclass
@@ -76,14 +75,14 @@ class GaveUp:
 
 @dataclass(frozen=True, slots=True)
 class Disobeyed:
-    """For a second the wheels neither came near what was commanded nor did the robot say that they stall."""
+    """For a second the wheels neither came near what was commanded nor did the robot report a stall."""
 
     text: str
 
 
 @dataclass(frozen=True, slots=True)
 class MotorsDisabled:
-    """The motors went off without being told; speeds and goals are forgotten."""
+    """The motors went off without a command; speeds and goals are dropped."""
 
     reason: str
 
@@ -128,7 +127,7 @@ class BaudRaised:
 
 @dataclass(frozen=True, slots=True)
 class BaudKept:
-    """The robot was not heard at the higher speed; the line is back at the old one."""
+    """No packet came at the higher speed; the line is back at the old one."""
 
     baud: int
     tried: int

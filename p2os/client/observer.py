@@ -1,10 +1,10 @@
 """Standard packets folded into states: SI units, one pose, the last reading of every sonar.
 
-Where the robot is, followed over wraps of its counters and over sessions.
+Units and wraps are `p2os.protocol`'s; where a state goes is the core's.
 
 The robot counts from where its session opened. A client's pose goes on: at the
 first packet of a later session the robot is taken to stand where it was last
-seen, since nobody knows how far it was carried meanwhile.
+seen, since nobody knows how far it was carried meanwhile (`PoseKeeper`).
 
 Invariant: within a session the pose is the robot's own odometry, moved and
 turned by one fixed amount; nothing is accumulated but whole counts.
@@ -21,61 +21,6 @@ from p2os.protocol.sip import StandardSip
 from p2os.protocol.units import in_units
 from p2os.robots.parameters import RobotParameters
 from p2os.timing import NS_PER_S, Nanos
-
-
-class PoseKeeper:
-    """Turns the counters of the packets into one pose."""
-
-    def __init__(self) -> None:
-        self.pose = RobotPose()
-        #: The robot's own count since its session opened; HEAD means its heading.
-        self.odometry = RobotPose()
-        #: Between the last two packets of this session.
-        self.gap_ns: Nanos = 0
-        self._anchor: tuple[RobotPose, RobotPose] | None = None
-        self._odometry: Odometry | None = None
-
-    def new_session(self) -> None:
-        """Hold the pose until the next packet, which is taken to show the same place."""
-        self._anchor = self._odometry = None
-
-    def place(self, pose: RobotPose) -> None:
-        """Say where the robot is."""
-        self.pose = pose
-        if self._anchor is not None:
-            self._anchor = (pose, self.odometry)
-
-    def take(self, sip: StandardSip, parameters: RobotParameters, now: Nanos) -> RobotPose:
-        """Follow the robot to the place that a packet tells, and return it."""
-        if self._odometry is None:
-            self._odometry = Odometry(parameters)
-            # Positions begin near zero; one of the upper half is a small step backwards.
-            turn = parameters.angle_counts_per_turn
-            self._first = (_signed(sip.raw_x, POSITION_MODULUS), _signed(sip.raw_y, POSITION_MODULUS),
-                           _signed(sip.raw_heading, turn))  # fmt: skip
-        self.gap_ns = self._odometry.update(sip, now).gap_ns
-        x, y, heading = (first + way for first, way in zip(self._first, self._odometry.counts, strict=True))
-        distance = parameters.distance_conv_mm / 1000
-        self.odometry = RobotPose(x * distance, y * distance, heading * parameters.angle_conv_rad)
-        if self._anchor is None:
-            self._anchor = (self.pose, self.odometry)
-        self.pose = _moved(*self._anchor, self.odometry)
-        return self.pose
-
-
-def _signed(raw: int, modulus: int) -> int:
-    half = modulus // 2
-    return (raw + half) % modulus - half
-
-
-def _moved(start: RobotPose, then: RobotPose, now: RobotPose) -> RobotPose:
-    """Return the pose of a robot that stood at `start` when it counted `then` and counts `now`."""
-    turned = start.heading_rad - then.heading_rad
-    cos, sin = math.cos(turned), math.sin(turned)
-    dx, dy = now.x_m - then.x_m, now.y_m - then.y_m
-    heading = start.heading_rad + now.heading_rad - then.heading_rad
-    return RobotPose(start.x_m + cos * dx - sin * dy, start.y_m + sin * dx + cos * dy, heading)
-
 
 #: Flag bits of AROS and ARCOS packets (Pioneer 2/3 H8 manual, FLAGS): motors, STOP button.
 MOTORS_FLAG, STOP_BUTTON_FLAG = 1 << 0, 1 << 5
@@ -130,18 +75,18 @@ class Observer:
         self._sonar.clear()
 
     def place(self, pose: RobotPose) -> None:
-        """Say where the robot is; the newest state and those to come have it there."""
+        """Set where the robot is; the newest state and those to come have it there."""
         self._pose.place(pose)
         if self.state is not None:
             self.state = replace(self.state, pose=pose)
 
     def take(self, sip: StandardSip, now: Nanos) -> RobotState:
-        """Return the state that a packet tells."""
+        """Return the state that a packet makes."""
         self._number += 1
         parameters = self.parameters
         units = in_units(sip, parameters)
         for number, range_m in units.sonar_m:
-            self._hear(number, range_m, now)
+            self._take_echo(number, range_m, now)
         has_flags = self.profile.has_flags
         charge, temperature = sip.tail_field("state_of_charge"), sip.tail_field("raw_temperature")
         self.state = RobotState(
@@ -173,7 +118,7 @@ class Observer:
         )
         return self.state
 
-    def _hear(self, number: int, range_m: float, now: Nanos) -> None:
+    def _take_echo(self, number: int, range_m: float, now: Nanos) -> None:
         """Keep a reading, and where on its sonar's axis it came from."""
         if number >= len(self.parameters.sonar):
             return
@@ -215,6 +160,60 @@ def bumpers_of(config: ConfigPacket | None) -> Bumpers:
     if config is None or config.fields_sent < AROS_1_6_FIELDS:
         return Bumpers()
     return Bumpers(config.frontbumps, config.rearbumps)
+
+
+class PoseKeeper:
+    """Turns the counters of the packets into one pose."""
+
+    def __init__(self) -> None:
+        self.pose = RobotPose()
+        #: The robot's own count since its session opened; HEAD means its heading.
+        self.odometry = RobotPose()
+        #: Between the last two packets of this session.
+        self.gap_ns: Nanos = 0
+        self._anchor: tuple[RobotPose, RobotPose] | None = None
+        self._odometry: Odometry | None = None
+
+    def new_session(self) -> None:
+        """Hold the pose until the next packet, which is taken to show the same place."""
+        self._anchor = self._odometry = None
+
+    def place(self, pose: RobotPose) -> None:
+        """Set where the robot is."""
+        self.pose = pose
+        if self._anchor is not None:
+            self._anchor = (pose, self.odometry)
+
+    def take(self, sip: StandardSip, parameters: RobotParameters, now: Nanos) -> RobotPose:
+        """Follow the robot to the place that a packet shows, and return it."""
+        if self._odometry is None:
+            self._odometry = Odometry(parameters)
+            # Positions begin near zero; one of the upper half is a small step backwards.
+            turn = parameters.angle_counts_per_turn
+            self._first = (_signed(sip.raw_x, POSITION_MODULUS), _signed(sip.raw_y, POSITION_MODULUS),
+                           _signed(sip.raw_heading, turn))  # fmt: skip
+        self.gap_ns = self._odometry.update(sip, now).gap_ns
+        x, y, heading = (first + way for first, way in zip(self._first, self._odometry.counts, strict=True))
+        distance = parameters.distance_conv_mm / 1000
+        self.odometry = RobotPose(x * distance, y * distance, heading * parameters.angle_conv_rad)
+        if self._anchor is None:
+            self._anchor = (self.pose, self.odometry)
+        self.pose = _moved(*self._anchor, self.odometry)
+        return self.pose
+
+
+def _signed(raw: int, modulus: int) -> int:
+    half = modulus // 2
+    return (raw + half) % modulus - half
+
+
+def _moved(start: RobotPose, then: RobotPose, now: RobotPose) -> RobotPose:
+    """Return the pose of a robot that stood at `start` when it counted `then` and counts `now`."""
+    turned = start.heading_rad - then.heading_rad
+    cos, sin = math.cos(turned), math.sin(turned)
+    dx, dy = now.x_m - then.x_m, now.y_m - then.y_m
+    heading = start.heading_rad + now.heading_rad - then.heading_rad
+    return RobotPose(start.x_m + cos * dx - sin * dy, start.y_m + sin * dx + cos * dy, heading)
 
 
 def _pressed(bits: int, fitted: int) -> tuple[int, ...]:

@@ -20,7 +20,7 @@ DRAIN_MARGIN_NS: Nanos = 20_000_000
 
 @dataclass(frozen=True, slots=True)
 class OpenLine:
-    """Open the line and say how it went: `line_opened` or `line_failed`."""
+    """Open the line and report how it went: `line_opened` or `line_failed`."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -75,7 +75,7 @@ class Outbox:
         self._free_at = 0
 
     def drop_frames(self, numbers: Container[int] | None = None) -> None:
-        """Forget frames that were not sent, those of some commands or all: what follows matters more."""
+        """Drop frames that were not sent, those of some commands or all: what follows matters more."""
         self._queue = deque(
             action
             for action in self._queue
@@ -83,7 +83,7 @@ class Outbox:
         )
 
     def clear(self) -> None:
-        """Forget everything: the line has gone."""
+        """Drop everything: the line has gone."""
         self._queue.clear()
 
     def next_deadline(self) -> Nanos | None:

@@ -3,7 +3,8 @@
     with Robot("tcp:127.0.0.1:8101") as robot:
         robot.drive(0.5)
 
-All decisions are `RobotCore`'s. Here are the clock, the thread and the waiting.
+All decisions are `RobotCore`'s. Here are the clock and the waiting; the thread is a
+`RobotThread`.
 The robot is stopped and the session closed when the block is left for any
 reason, and when the program ends without leaving it.
 """
@@ -35,7 +36,7 @@ class Robot(RobotCalls):
 
     Args:
         url: Where it is: `serial:/dev/ttyUSB0`, `tcp:HOST:8101`, `pty:PATH`.
-        model: A model's name, a file of parameters, or the parameters; None: what the robot says.
+        model: A model's name, a file of parameters, or the parameters; None: by the robot's identity.
         auto_enable: Switch the motors on with the first motion of a session.
         reconnect: Look for a lost robot again; nothing moves until asked.
         deadman_s: A speed is taken back when the program has made no call for so long; None: never.
@@ -64,8 +65,8 @@ class Robot(RobotCalls):
             url, model=model, auto_enable=auto_enable, reconnect=reconnect, deadman_s=deadman_s, settings=settings
         )
         self.url = url
-        self._engine = RobotThread(core, baud, lambda: opener(url), clock)
-        self._finalizer = weakref.finalize(self, self._engine.shut_down)
+        self._thread = RobotThread(core, baud, lambda: opener(url), clock)
+        self._finalizer = weakref.finalize(self, self._thread.shut_down)
 
     # Coming and going ---------------------------------------------------------------------
 
@@ -75,15 +76,15 @@ class Robot(RobotCalls):
         Raises:
             ConnectError: the line cannot be opened, or no robot answers; the message says how far it came.
         """
-        engine = self._engine
+        thread = self._thread
         exit_on_signals()
-        engine.start()
+        thread.start()
         try:
-            with engine.changed:
-                engine.call(lambda core, now: core.connect(now))
-                engine.wait_for(lambda core: core.is_ready or core.link in {Link.FAILED, Link.CLOSED}, None)
-                if not engine.core.is_ready:
-                    raise not_found(engine.core)  # noqa: TRY301  # closing is the same for every way out
+            with thread.changed:
+                thread.call(lambda core, now: core.connect(now))
+                thread.wait_for(lambda core: core.is_ready or core.link in {Link.FAILED, Link.CLOSED}, None)
+                if not thread.core.is_ready:
+                    raise not_found(thread.core)  # noqa: TRY301  # closing is the same for every way out
         except BaseException:
             self.close()
             raise
@@ -91,25 +92,25 @@ class Robot(RobotCalls):
 
     def close(self) -> None:
         """Stop the robot, end the session, give the line back; twice is harmless."""
-        self._engine.shut_down()
+        self._thread.shut_down()
 
     def __enter__(self) -> Self:
         return self.connect()
 
     def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, _: TracebackType | None) -> None:
         self.close()
-        self._engine.raise_failure(error)
+        self._thread.raise_failure(error)
 
     # Waiting ------------------------------------------------------------------------------
 
     def sleep(self, duration_s: float) -> None:
-        """Do nothing for so long, and be known to live: held speeds go on.
+        """Do nothing for so long, without tripping the deadman: held speeds go on.
 
         Raises:
             P2osError: the client's thread failed meanwhile.
         """
-        with self._engine.changed:
-            self._engine.wait_for(lambda _: False, duration_s)
+        with self._thread.changed:
+            self._thread.wait_for(lambda _: False, duration_s)
 
     def next_state(self, timeout_s: float = 2.0) -> RobotState:
         """Wait for the next packet and return its state.
@@ -117,13 +118,13 @@ class Robot(RobotCalls):
         Raises:
             LinkLostError: none came in time.
         """
-        engine = self._engine
-        with engine.changed:
-            before = engine.core.state
-            engine.wait_for(lambda core: core.state is not before, timeout_s)
-            state = engine.core.state
+        thread = self._thread
+        with thread.changed:
+            before = thread.core.state
+            thread.wait_for(lambda core: core.state is not before, timeout_s)
+            state = thread.core.state
             if state is None or state is before:
-                raise not_connected(engine.core)
+                raise not_connected(thread.core)
             return state
 
     def fetch(self, kind: type[PacketType], timeout_s: float = 1.0) -> PacketType:
@@ -138,15 +139,15 @@ class Robot(RobotCalls):
             LinkLostError: No session is open.
             UsageError: Nothing asks for such a packet.
         """
-        request, engine = request_for(kind), self._engine
-        with engine.changed:
-            before = engine.core.newest(kind)
+        request, thread = request_for(kind), self._thread
+        with thread.changed:
+            before = thread.core.newest(kind)
             self.send(request)
-            if not engine.wait_for(lambda core: core.newest(kind) is not before, timeout_s):
-                raise no_answer(engine.core, kind, timeout_s)
-            packet = engine.core.newest(kind)
+            if not thread.wait_for(lambda core: core.newest(kind) is not before, timeout_s):
+                raise no_answer(thread.core, kind, timeout_s)
+            packet = thread.core.newest(kind)
         if packet is None:
-            raise not_connected(engine.core)
+            raise not_connected(thread.core)
         return packet
 
     def wait_open(self, timeout_s: float | None = None) -> None:
@@ -155,19 +156,19 @@ class Robot(RobotCalls):
         Raises:
             LinkLostError: it is not, in time or for good.
         """
-        engine = self._engine
-        with engine.changed:
-            engine.wait_for(lambda core: core.link in {Link.OPEN, Link.FAILED, Link.CLOSED}, timeout_s)
-            if engine.core.link is not Link.OPEN:
-                raise not_connected(engine.core)
+        thread = self._thread
+        with thread.changed:
+            thread.wait_for(lambda core: core.link in {Link.OPEN, Link.FAILED, Link.CLOSED}, timeout_s)
+            if thread.core.link is not Link.OPEN:
+                raise not_connected(thread.core)
 
     def states(self) -> Iterator[RobotState]:
         """Yield each new state as it comes, the newest where the program is slow; ends when the client does."""
-        engine, last = self._engine, None
+        thread, last = self._thread, None
         while True:
-            with engine.changed:
-                engine.wait_for(lambda core, seen=last: core.state is not seen or _is_over(core), None)  # type: ignore[misc]  # bound now
-                state = engine.core.state
+            with thread.changed:
+                thread.wait_for(lambda core, seen=last: core.state is not seen or _is_over(core), None)  # type: ignore[misc]  # bound now
+                state = thread.core.state
                 if state is None or state is last:
                     return
             last = state
@@ -175,29 +176,29 @@ class Robot(RobotCalls):
 
     def events(self) -> Iterator[Notice]:
         """Yield what happens beside the states, from now on, in order; ends when the client does."""
-        engine = self._engine
-        queue = engine.subscribe()
+        thread = self._thread
+        queue = thread.subscribe()
         try:
             while True:
-                with engine.changed:
-                    engine.wait_for(lambda core: bool(queue) or _is_over(core), None)
+                with thread.changed:
+                    thread.wait_for(lambda core: bool(queue) or _is_over(core), None)
                     if not queue:
                         return
                     notice = queue.popleft()
                 yield notice
         finally:
-            engine.unsubscribe(queue)
+            thread.unsubscribe(queue)
 
     def on_state(self, callback: Callable[[RobotState], None]) -> Callable[[], None]:
         """Call `callback` with each state, from the client's thread; return what ends that.
 
         An exception in it stops the robot and is raised in the program's next call.
         """
-        return self._engine.on_state(callback)
+        return self._thread.on_state(callback)
 
     def on_event(self, callback: Callable[[Notice], None]) -> Callable[[], None]:
         """Call `callback` with what happens beside the states; otherwise as `on_state`."""
-        return self._engine.on_event(callback)
+        return self._thread.on_event(callback)
 
     # Motion that waits --------------------------------------------------------------------
 
@@ -245,22 +246,22 @@ class Robot(RobotCalls):
 
     def aux(self, port: int = 1) -> AuxStream:
         """Return one of the robot's own serial ports, as a file of bytes."""
-        return AuxStream(self._engine, port)
+        return AuxStream(self._thread, port)
 
     def _reach(self, axis: Axis, speed: float | None, timeout_s: float | None) -> MotionResult:
-        engine = self._engine
+        thread = self._thread
         limit_ns = None if timeout_s is None else round(timeout_s * NS_PER_S)
-        with engine.changed:
-            goal = engine.call(lambda core, now: core.begin_goal(axis, limit_ns, speed, now))
+        with thread.changed:
+            goal = thread.call(lambda core, now: core.begin_goal(axis, limit_ns, speed, now))
             try:
-                engine.wait_for(lambda _: goal.ended is not None, None)
+                thread.wait_for(lambda _: goal.ended is not None, None)
             finally:
                 if goal.ended is None:
-                    engine.call(lambda core, now: core.cancel_goal(goal, now))
-            return motion_result(goal, engine.core)
+                    thread.call(lambda core, now: core.cancel_goal(goal, now))
+            return motion_result(goal, thread.core)
 
     def _run(self, call: Callable[[RobotCore, Nanos], Result]) -> Result:
-        return self._engine.call(call)
+        return self._thread.call(call)
 
 
 def _is_over(core: RobotCore) -> bool:

@@ -1,8 +1,9 @@
 """The thread behind the blocking robot: it waits for bytes, deadlines and calls, and turns the line.
 
-One lock guards the core. Calls of the program act on the core under it and ring
-a bell that wakes the thread; the thread tells `changed` after each turn. The
-line is opened outside the lock, for that can take seconds.
+One lock guards the core. Calls of the program act on the core under it and wake
+the thread; the thread notifies `changed` after each turn. The line is opened
+outside the lock, for that can take seconds. Its twin for asyncio is `RobotLoop`
+in `p2os.client.aio`.
 
 Closing is the thread's work: signals interrupt the program's own thread only, so
 none of them can come between the frames that stop the robot. Where the thread is
@@ -46,8 +47,8 @@ LOOK_S = 0.002
 LOCK_TRIES, LOCK_S = 5, 0.2
 #: How many notices wait for a slow reader.
 MOST_NOTICES = 1000
-#: A waiting program is known to live: it is asked so often.
-SIGN_OF_LIFE_S = 0.25
+#: chosen: how often a waiting program counts as having made a call, for the deadman.
+TOUCH_S = 0.25
 
 
 class RobotThread:
@@ -69,11 +70,11 @@ class RobotThread:
         self._line = Line(core, baud, clock)
         self._open_line = open_line
         self._thread: threading.Thread | None = None
-        self._bell, self._bell_push = socket.socketpair()
-        self._bell.setblocking(False)
-        self._bell_push.setblocking(False)
+        self._wake, self._wake_push = socket.socketpair()
+        self._wake.setblocking(False)
+        self._wake_push.setblocking(False)
         self._failure: BaseException | None = None
-        #: Whether the program has met the failure.
+        #: Whether the failure was raised in the program.
         self._has_reported = False
         #: The program wants to close; somebody has begun to; the thread is at its end.
         self._is_ending = False
@@ -89,7 +90,7 @@ class RobotThread:
             if self._is_ending:
                 raise P2osError("this robot was closed", hint="make another Robot")
             if self._thread is None:
-                self._thread = threading.Thread(target=self._live, name="p2os-robot", daemon=True)
+                self._thread = threading.Thread(target=self._run, name="p2os-robot", daemon=True)
                 self._thread.start()
 
     def call(self, call: Callable[[RobotCore, Nanos], Result]) -> Result:
@@ -99,11 +100,11 @@ class RobotThread:
             now = self._line.now()
             self.core.touch(now)
             result = call(self.core, now)
-        self._ring()
+        self._wake_thread()
         return result
 
     def wait_for(self, is_so: Callable[[RobotCore], bool], timeout_s: float | None) -> bool:
-        """Wait, under `changed`, until something is so; the program is known to live meanwhile."""
+        """Wait, under `changed`, until something is so; the deadman does not trip meanwhile."""
         ends = None if timeout_s is None else self._line.now() + round(timeout_s * NS_PER_S)
         while not is_so(self.core):
             self._check()
@@ -111,7 +112,7 @@ class RobotThread:
             self.core.touch(now)
             if ends is not None and now >= ends:
                 return False
-            left = SIGN_OF_LIFE_S if ends is None else min(SIGN_OF_LIFE_S, (ends - now) / NS_PER_S)
+            left = TOUCH_S if ends is None else min(TOUCH_S, (ends - now) / NS_PER_S)
             self.changed.wait(left)
         return True
 
@@ -126,7 +127,7 @@ class RobotThread:
         held_back(lambda: self._wait_for_the_end(ends_s))
 
     def raise_failure(self, error: BaseException | None) -> None:
-        """Raise what the thread failed with, unless the program fails already or has met it."""
+        """Raise what the thread failed with, unless the program fails already or it was raised before."""
         if error is None and self._failure is not None and not self._has_reported:
             raise P2osError(f"the client's thread failed: {self._failure}") from self._failure
 
@@ -140,27 +141,27 @@ class RobotThread:
         return queue
 
     def unsubscribe(self, queue: deque[Notice]) -> None:
-        """Give a queue back."""
+        """Put nothing more into a queue."""
         with self._lock:
             self._queues = [other for other in self._queues if other is not queue]
 
     def on_state(self, callback: Callable[[RobotState], None]) -> Callable[[], None]:
         """Call `callback` with each state."""
-        return self._listen(self._state_callbacks, callback)
+        return self._subscribed(self._state_callbacks, callback)
 
     def on_event(self, callback: Callable[[Notice], None]) -> Callable[[], None]:
         """Call `callback` with each notice."""
-        return self._listen(self._event_callbacks, callback)
+        return self._subscribed(self._event_callbacks, callback)
 
-    def _listen(self, callbacks: list[Any], callback: Callable[..., None]) -> Callable[[], None]:
+    def _subscribed(self, callbacks: list[Any], callback: Callable[..., None]) -> Callable[[], None]:
         with self._lock:
             callbacks.append(callback)
 
-        def end() -> None:
+        def unsubscribe() -> None:
             with self._lock, contextlib.suppress(ValueError):
                 callbacks.remove(callback)
 
-        return end
+        return unsubscribe
 
     # Closing ------------------------------------------------------------------------------
 
@@ -169,7 +170,7 @@ class RobotThread:
 
         It looks at flags and sleeps: an interrupt inside of Python's own events and joins leaves their locks taken.
         """
-        self._ring()
+        self._wake_thread()
         if self._thread is threading.current_thread():
             return
         handover_s = min(time.monotonic() + HANDOVER_S, ends_s)
@@ -198,18 +199,18 @@ class RobotThread:
 
     # The thread ---------------------------------------------------------------------------
 
-    def _live(self) -> None:
+    def _run(self) -> None:
         try:
             while not self._turn():
                 self._wait()
-        except BaseException as error:  # noqa: BLE001  # whatever it is: the robot stops, the program is told
+        except BaseException as error:  # noqa: BLE001  # whatever it is: the robot stops, the program gets it
             self._failure = error
         finally:
             with self._locked():
                 self._is_closing = True
                 self._line.finish()
                 self._has_ended = True
-                with contextlib.suppress(RuntimeError):  # without the lock nobody can be told; their waits end by time
+                with contextlib.suppress(RuntimeError):  # without the lock nobody can be notified; their waits time out
                     self.changed.notify_all()
 
     def _turn(self) -> bool:
@@ -221,7 +222,7 @@ class RobotThread:
             self._line.turn()
             wants_line = self._line.is_wanted
             news = self._take_news()
-        self._tell(news)
+        self._notify(news)
         if wants_line:
             self._open()
         return self._is_closing and self._line.is_over
@@ -235,7 +236,7 @@ class RobotThread:
         else:
             with self._locked():
                 self._line.opened(transport)
-        self._ring()
+        self._wake_thread()
 
     def _take_news(self) -> list[RobotState | Notice]:
         news = list(self.core.news)
@@ -248,7 +249,7 @@ class RobotThread:
             self.changed.notify_all()
         return news
 
-    def _tell(self, news: list[RobotState | Notice]) -> None:
+    def _notify(self, news: list[RobotState | Notice]) -> None:
         """Call the callbacks, without the lock."""
         for item in news:
             if isinstance(item, RobotState):
@@ -262,7 +263,7 @@ class RobotThread:
         """Sleep until bytes, a deadline or a call."""
         with self._locked():
             wait_s, transport = self._line.wait_s(), self._line.transport
-            waiting: list[int] = [self._bell.fileno()]
+            waiting: list[int] = [self._wake.fileno()]
             if transport is not None:
                 try:
                     waiting.append(transport.fileno())
@@ -270,13 +271,13 @@ class RobotThread:
                     wait_s = min(wait_s, BLIND_POLL_S)
         wait_readable(waiting, wait_s)
         with contextlib.suppress(BlockingIOError):
-            self._bell.recv(4096)
+            self._wake.recv(4096)
 
     def _check(self) -> None:
         if self._failure is not None:
             self._has_reported = True
             raise P2osError(f"the client's thread failed: {self._failure}") from self._failure
 
-    def _ring(self) -> None:
+    def _wake_thread(self) -> None:
         with contextlib.suppress(OSError):  # full: it wakes anyway
-            self._bell_push.send(b"\0")
+            self._wake_push.send(b"\0")

@@ -1,4 +1,4 @@
-"""How a client behaves: its times, its limits of patience, and what it does by itself."""
+"""How a client behaves: its times, its timeouts, and what it does by itself."""
 
 from dataclasses import dataclass
 
@@ -36,9 +36,9 @@ class ClientSettings:
     speed_spacing_ns: Nanos = 40 * NS_PER_MS
     #: AROS loses commands that come nearer than 3 to 5 ms (Pioneer 2/3 H8 manual, page 42).
     command_spacing_ns: Nanos = 5 * NS_PER_MS
-    #: A robot that neither approaches its command nor says that it stalls for so long is reported.
+    #: A robot that neither approaches its command nor reports a stall for so long is reported as `Disobeyed`.
     plausibility_ns: Nanos = 1 * NS_PER_S
-    #: How long a fresh TCP line is listened to for a robot that is open already: two and a half cycles.
+    #: How long a new TCP line is listened to for a robot that is open already: two and a half cycles.
     listen_ns: Nanos = 250 * NS_PER_MS
     #: First round of the search, one try a rate: robots answer within 110 ms (measured on a simulator).
     quick_sync_ns: Nanos = 400 * NS_PER_MS
@@ -60,9 +60,8 @@ class ClientSettings:
 
     def __post_init__(self) -> None:
         for name in ("liveness_ns", "refresh_ns", "speed_spacing_ns", "command_spacing_ns", "plausibility_ns",
-                     "listen_ns",
-                     "quick_sync_ns", "slow_sync_ns", "open_delay_ns", "first_packet_ns", "raise_window_ns",
-                     "backoff_ns", "longest_backoff_ns"):  # fmt: skip
+                     "listen_ns", "quick_sync_ns", "slow_sync_ns", "open_delay_ns", "first_packet_ns",
+                     "raise_window_ns", "backoff_ns", "longest_backoff_ns"):  # fmt: skip
             if getattr(self, name) <= 0:
                 raise UsageError(f"{name} = {getattr(self, name)} must be positive")
         if self.deadman_ns is not None and self.deadman_ns <= 0:

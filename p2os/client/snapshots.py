@@ -77,7 +77,7 @@ class Limits:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RobotState:
-    """One moment of the robot, as its standard packet told it."""
+    """One moment of the robot, as its standard packet reported it."""
 
     #: Packets since the client was made, from 1.
     number: int
@@ -94,7 +94,7 @@ class RobotState:
     right_mps: float
     #: The packet's own claim that the wheels turn.
     is_moving: bool
-    #: None: P2OS robots do not say.
+    #: None: P2OS robots do not report it.
     motors_enabled: bool | None
     battery_v: float
     stall_left: bool
@@ -102,7 +102,7 @@ class RobotState:
     #: Segments that are pressed, numbered from 1; empty where the robot has no bumpers.
     front_bumpers: tuple[int, ...]
     rear_bumpers: tuple[int, ...]
-    #: The last reading of every sonar heard in this session, by number.
+    #: The last reading of every sonar in this session, by number.
     sonar: tuple[SonarEcho, ...]
     #: None without a compass.
     compass_rad: float | None

@@ -1,13 +1,13 @@
 """The clock of everything that runs in real time, and the watch for gaps in it.
 
 `time.monotonic` stands still on Linux while the machine sleeps, and so would every
-deadman and time-out that is measured by it. `wall_clock` counts that time, where the
+deadman and timeout that is measured by it. `wall_clock` counts that time, where the
 system has such a clock (CLOCK_BOOTTIME; macOS' and Windows' monotonic clocks are taken
 as they are).
 
 A gap is a wait that ends more than `GAP_NS` after its deadline: the machine slept, the
-process was stopped, or its processor was busy elsewhere. Whoever moves a robot tells
-it to stop before anything else then: what was asked before the gap is old news.
+process was stopped, or its processor was busy elsewhere. Whoever moves a robot sends
+it STOP before anything else then: what was asked before the gap is out of date.
 """
 
 import time
@@ -18,7 +18,7 @@ from p2os.timing import NS_PER_MS, Nanos
 #: Nanoseconds that never go back, and go on while the machine sleeps.
 Clock = Callable[[], Nanos]
 
-#: chosen: the adapter's liveness, three SIP cycles and a frame: as long as silence of the robot is borne.
+#: chosen: the adapter's liveness, three SIP cycles and a frame: as long as silence of the robot is tolerated.
 GAP_NS: Nanos = 350 * NS_PER_MS
 
 if hasattr(time, "CLOCK_BOOTTIME"):
@@ -32,7 +32,7 @@ else:  # pragma: no cover - other systems than Linux
 
 
 class GapWatch:
-    """Tells gaps from waits.
+    """Finds waits that ended too late.
 
     Each time that it wakes, its owner calls `gap`; before it waits, `expect`.
     Time that passes between the two belongs to the wait: a machine can fall asleep
@@ -47,6 +47,6 @@ class GapWatch:
         self._deadline = deadline
 
     def gap(self, now: Nanos) -> Nanos:
-        """Return how long after its deadline the wait has ended if that is a gap, else 0; tells each gap once."""
+        """Return how long after its deadline the wait has ended if that is a gap, else 0; each gap is returned once."""
         late, self._deadline = now - self._deadline, max(now, self._deadline)
         return late if late > GAP_NS else 0

@@ -1,19 +1,16 @@
-"""Frames of a whole capture at once: where each sound frame stands, found without a loop over bytes.
+"""Frames of a whole capture at once: where each sound frame stands, and what was wrong, without a loop over bytes.
 
 The result is that of the decoder of `p2os.protocol.frames` fed with the same bytes and then
 left alone until it gives up: rejected frames are scanned again, frames inside
-sound frames are not looked for.
+sound frames are not looked for. What the frames hold is read in `p2os.capture.columns.tables`.
 
-How. Every place with `FA FB`, a legal count and room for the frame is a
+Theory of operation. Every place with `FA FB`, a legal count and room for the frame is a
 candidate. A prefix sum of pairs, modulo 2^32, gives each candidate's checksum as
 a difference of two numbers. Of candidates that overlap (rare: a frame within a
 payload) the first wins.
 
-Invariant: the frames are in the order of the stream and do not overlap.
-
-What was wrong with a capture: the decoder's counters, from the columns' side.
-
-Invariant: equal to `p2os.protocol.frames.DecoderStats` of a decoder that was fed the same bytes and left alone.
+Invariants: the frames are in the order of the stream and do not overlap; `Damage` equals the
+`p2os.protocol.frames.DecoderStats` of a decoder that was fed the same bytes and left alone.
 """
 
 from dataclasses import dataclass
@@ -142,7 +139,7 @@ Flags: TypeAlias = npt.NDArray[np.bool_]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Damage:
-    """Counts of what was rejected; of bytes where the name says so."""
+    """Counts of what was rejected; of bytes where the name ends so."""
 
     noise_bytes: int
     bad_checksums: int

@@ -1,7 +1,7 @@
 """Bytes written as text: `fafb03000000`, `FA FB 03`, `0xFA, 0xFB`, and what xxd and hexdump -C print.
 
 A line may begin with `>` (to the robot) or `<` (from it); `#` begins a comment.
-Lines without either belong to one stream whose direction is not told.
+Lines without either belong to one stream whose direction is not given.
 """
 
 import re

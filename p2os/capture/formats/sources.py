@@ -19,7 +19,7 @@ def read_capture(data: bytes, direction: Direction | None = None) -> Capture:
 
     Args:
         data: The content of a file.
-        direction: Who sent raw or hex bytes whose source does not tell.
+        direction: Who sent raw or hex bytes whose source does not give it.
 
     Raises:
         FileError: The content is of one of these kinds, and broken.
@@ -35,8 +35,8 @@ def read_capture(data: bytes, direction: Direction | None = None) -> Capture:
         capture = capture_of([(0, direction, data)], has_time=False)
     if direction is None:
         return capture
-    told = [(chunk.at_ns, chunk.direction or direction, chunk.data) for chunk in capture.chunks]
-    return capture_of(told, has_time=False)
+    directed = [(chunk.at_ns, chunk.direction or direction, chunk.data) for chunk in capture.chunks]
+    return capture_of(directed, has_time=False)
 
 
 def read_file(path: Path, direction: Direction | None = None) -> Capture:

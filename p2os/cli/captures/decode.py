@@ -43,7 +43,7 @@ def register(app: typer.Typer) -> None:
 def decode(
     source: Annotated[list[str], typer.Argument(help="File, folder, hex text, or - for stdin.", metavar="SOURCE")],
     json_output: Annotated[bool, typer.Option("--json", help="Print one JSON object a packet.")] = False,
-    explained: Annotated[bool, typer.Option("--explain", help="Say what every byte means.")] = False,
+    explained: Annotated[bool, typer.Option("--explain", help="Show what every byte means.")] = False,
     only: Annotated[
         str, typer.Option("--only", help="Names to show, comma-separated, such as SIP,VEL or damaged.", metavar="NAMES")
     ] = "",
@@ -54,8 +54,8 @@ def decode(
     """Print what stands in a capture."""
     if json_output and explained:
         raise UsageError("--json and --explain exclude each other", hint="--json already holds every field")
-    said_by = direction_of(direction)
-    capture = read_capture(sys.stdin.buffer.read(), said_by) if source == ["-"] else read_argument(source, said_by)
+    sent_by = direction_of(direction)
+    capture = read_capture(sys.stdin.buffer.read(), sent_by) if source == ["-"] else read_argument(source, sent_by)
     reading = reading_of(capture, robot=robot, profile=profile)
     wanted = {name.strip().lower() for name in only.split(",") if name.strip()}
     shown = damaged = 0

@@ -1,7 +1,7 @@
 """How the verbs that show captures choose units and layout: `--robot`, `--profile`, `--dir`.
 
-Left open, both are found in the capture itself: the robot says its model in
-answer to SYNC2, and the model says which firmware family it runs.
+Left open, both are found in the capture itself: the robot gives its model in
+answer to SYNC2, and the model implies which firmware family it runs.
 """
 
 from p2os.capture import Capture, Direction, Reading, frame_chunks
@@ -12,17 +12,17 @@ from p2os.protocol.profiles import Profile
 from p2os.protocol.sip import HEAD_BYTES, READING_BYTES, SIP_KINDS
 from p2os.robots.parameters import ParametersError, RobotParameters, load_parameters
 
-ROBOT_HELP = "Robot model, or a TOML file, for units; default: as the capture says, else p2dx."
+ROBOT_HELP = "Robot model, or a TOML file, for units; default: by the capture, else p2dx."
 PROFILE_HELP = "Firmware family, for layouts; default: as the packets look."
 DIRECTION_HELP = "Who sent bytes of unknown origin: c2r (client), r2c (robot) or auto."
 DEFAULT_ROBOT = "p2dx"
 
 
 def direction_of(text: str) -> Direction | None:
-    """Return what `--dir` says, None for auto.
+    """Return the direction that `--dir` names, None for auto.
 
     Raises:
-        UsageError: It says something else.
+        UsageError: It names something else.
     """
     if text == "auto":
         return None
@@ -43,9 +43,9 @@ def reading_of(capture: Capture, *, robot: str = "", profile: Profile | None = N
     Raises:
         ParametersError: There is no such model or file.
     """
-    said, looks = _look(capture) if not robot or profile is None else ("", Profile.P2OS)
-    parameters = load_parameters(robot) if robot else _parameters(said)
-    return Reading(profile=profile or looks, parameters=parameters)
+    subclass, guessed = _look(capture) if not robot or profile is None else ("", Profile.P2OS)
+    parameters = load_parameters(robot) if robot else _parameters(subclass)
+    return Reading(profile=profile or guessed, parameters=parameters)
 
 
 def _parameters(subclass: str) -> RobotParameters:
@@ -59,7 +59,7 @@ def _look(capture: Capture) -> tuple[str, Profile]:
     """Return the model and the firmware family that a capture shows.
 
     A SIP longer than its sonar readings need has the tail that only ARCOS sends;
-    AROS cannot be told from P2OS by its shape.
+    AROS and P2OS have the same shape.
     """
     subclass, profile = "", Profile.P2OS
     for chunk in frame_chunks(capture.chunks):

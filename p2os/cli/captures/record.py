@@ -1,4 +1,4 @@
-"""`p2os record`: listen to a robot and keep every byte of both sides."""
+"""`p2os record`: open a session, motors off, and keep every byte of both sides."""
 
 import contextlib
 import sys
@@ -21,7 +21,7 @@ from p2os.transport import Transport, open_url
 from p2os.transport.waiting import wait_for_line
 from p2os.transport.wall_clock import Clock, wall_clock
 
-HELP = """Connect to a robot, keep its motors off, and record all that both sides say.
+HELP = """Connect to a robot, keep its motors off, and record all that both sides send.
 
 \b
 Examples:
@@ -44,11 +44,11 @@ def record_session(
 ) -> int:
     """Listen to a robot until the time is over or an exception (Ctrl-C) ends it; return the number of SIPs.
 
-    The robot is left standing and closed, whatever happens.
+    The robot is left stopped and closed, whatever happens.
 
     Args:
         transport: The line.
-        on_chunk: Told every chunk of both sides, time counted from the start.
+        on_chunk: Called with every chunk of both sides, time counted from the start.
         lasts_ns: How long from the first packet on; None for ever.
         clock: Nanoseconds that never run back.
 
@@ -58,7 +58,7 @@ def record_session(
     """
     start, connection = clock(), Connection(ConnectionRole.CLIENT)
 
-    def speak() -> None:
+    def send() -> None:
         for data in connection.take_output():
             transport.write(data)
             on_chunk(Chunk(at_ns=clock() - start, direction=Direction.TO_ROBOT, data=data))
@@ -67,7 +67,7 @@ def record_session(
     try:
         connection.connect(clock())
         while ends_at is None or clock() < ends_at:
-            speak()
+            send()
             wait_for_line(transport, connection.next_deadline(), clock())
             data, now = transport.read(), clock()
             if data:
@@ -84,11 +84,11 @@ def record_session(
     finally:
         with postponed():
             connection.disconnect(clock())
-            farewell = b"".join(connection.take_output())
+            closing = b"".join(connection.take_output())
             with contextlib.suppress(TransportError):
-                transport.write(farewell)
-            if farewell:
-                on_chunk(Chunk(at_ns=clock() - start, direction=Direction.TO_ROBOT, data=farewell))
+                transport.write(closing)
+            if closing:
+                on_chunk(Chunk(at_ns=clock() - start, direction=Direction.TO_ROBOT, data=closing))
     return sips
 
 

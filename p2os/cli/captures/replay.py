@@ -9,7 +9,9 @@ from typing import Annotated
 import typer
 
 from p2os.capture import Capture, Direction, frame_chunks, read_file
-from p2os.capture.replay import Replay, Tap, frame_of
+from p2os.capture.listing import frame_of
+from p2os.capture.replay import Replay
+from p2os.capture.tap import Tap
 from p2os.cli.held_robot import hold_robot
 from p2os.cli.signals import postponed
 from p2os.client import ClientSettings
@@ -23,11 +25,11 @@ from p2os.transport.wall_clock import Clock, GapWatch, wall_clock
 
 HELP = """Play a recorded conversation again.
 
-As the robot, it waits for a client at URL and tells it what the recorded robot
-said. As the client, it connects to a robot at URL and sends what the recorded
+As the robot, it waits for a client at URL and sends it what the recorded robot
+sent. As the client, it connects to a robot at URL and sends what the recorded
 client sent: the robot MOVES as it did. The handshake keeps in step with the far
 side; all else comes at its recorded time. At the end, on Ctrl-C and on any error
-a robot whose session is still open is told STOP, VEL 0 and CLOSE.
+a robot whose session is still open is sent STOP, VEL 0 and CLOSE.
 
 \b
 Examples:
@@ -37,8 +39,8 @@ Examples:
   p2os replay talk.jsonl serial:/dev/ttyUSB0 --as client --yes
 """
 #: chosen: three times what clients wait for the answer to a SYNC.
-PATIENCE_NS: Nanos = 3 * NS_PER_S
-#: A robot that has said nothing for so long is lost, as it is to a client.
+ANSWER_TIMEOUT_NS: Nanos = 3 * NS_PER_S
+#: A robot that has sent nothing for so long is lost, as it is to a client.
 SILENCE_NS: Nanos = ClientSettings().liveness_ns
 #: Speeds that are refused are mistakes.
 SLOWEST, FASTEST = 0.01, 100.0
@@ -67,9 +69,9 @@ def play(
     role: Direction,
     *,
     clock: Clock = wall_clock,
-    patience_ns: Nanos = PATIENCE_NS,
+    answer_timeout_ns: Nanos = ANSWER_TIMEOUT_NS,
 ) -> None:
-    """Play one side over a line until all was said; leave a robot standing and closed.
+    """Play one side over a line until all was sent; leave a robot stopped and closed.
 
     Raises:
         RemoteProtocolError: As the client: the robot does not answer the handshake, or has fallen silent.
@@ -79,34 +81,34 @@ def play(
     tap, is_client = Tap(), role is Direction.TO_ROBOT
     try:
         replay.start(clock())
-        gaps, heard_at = GapWatch(clock()), None
+        gaps, received_at = GapWatch(clock()), None
         while replay.frames_left:
             now = clock()
             if (gap_ns := gaps.gap(now)) and is_client:
                 raise RunFailedError(f"paused for {gap_ns / NS_PER_S:.1f} s: the recorded times have gone by")
             replay.advance_to(now)
             for data in replay.take_output():
-                tap.hear(role, data, now)
+                tap.observe(role, data, now)
                 transport.write(data)
-            if is_client and replay.waited(now) > patience_ns:
+            if is_client and replay.waited(now) > answer_timeout_ns:
                 raise RemoteProtocolError(
                     f"{transport.description} does not give {replay.awaited}, as in the recording",
                     hint="is a robot behind it? (p2os info URL)",
                 )
-            if is_client and heard_at is not None and now - heard_at > SILENCE_NS:
+            if is_client and received_at is not None and now - received_at > SILENCE_NS:
                 raise RemoteProtocolError(
-                    f"no packet for {(now - heard_at) / NS_PER_S:.1f} s", hint="is the robot on, and the cable in?"
+                    f"no packet for {(now - received_at) / NS_PER_S:.1f} s", hint="is the robot on, and the cable in?"
                 )
             wait_for_line(transport, replay.next_deadline(), now, gaps)
             data, now = transport.read(), clock()
-            heard_at = now if data else heard_at
-            tap.hear(role.opposite, data, now)
+            received_at = now if data else received_at
+            tap.observe(role.opposite, data, now)
             replay.receive(data, now)
     finally:
         with postponed():
-            if is_client and (farewell := tap.farewell()):
+            if is_client and (closing := tap.closing_frames()):
                 with contextlib.suppress(TransportError):
-                    transport.write(farewell)
+                    transport.write(closing)
 
 
 def motions_of(capture: Capture) -> int:
@@ -132,7 +134,7 @@ def replay(
     player = Replay(capture, side.role, speed=speed)
     if not player.frames_left:
         who = "robot" if side is Side.ROBOT else "client"
-        raise FileError(f"{file} holds nothing that a {who} said", hint="p2os decode shows what it holds")
+        raise FileError(f"{file} holds nothing that a {who} sent", hint="p2os decode shows what it holds")
     frames = player.frames_left
     if side is Side.CLIENT:
         _ask(motions_of(capture), url, yes=yes)

@@ -1,11 +1,11 @@
-"""`p2os sniff`: sit between a client and a robot, and show or record what they say.
+"""`p2os sniff`: stand between a client and a robot, and show or record what they send.
 
-The loop of `p2os sniff`: bytes from a client to a robot and back, and heard on the way.
+`Bridge` passes bytes on and knows neither screen nor files; the verb joins them.
 
 One client at a time; each gets its own line to the robot. When either side
-goes, the other is let go too, and a robot whose session was open is brought to
-a stand first. So it is when the bridge itself has paused (the machine slept, the
-process was stopped): what a client said before is old news, and never passed on.
+goes, the other is released too, and a robot whose session was open is stopped
+first. So it is when the bridge itself has paused (the machine slept, the
+process was stopped): what a client sent before is out of date, and never passed on.
 
 Invariant: bytes are passed on before anything is shown or recorded.
 """
@@ -22,7 +22,7 @@ import typer
 
 from p2os.capture import Chunk, Direction, Lister, ListingRow, Reading
 from p2os.capture.listing import line_of, summary_of
-from p2os.capture.replay import Tap
+from p2os.capture.tap import Tap
 from p2os.cli.captures.capture_files import PcapFile, RecordingFile, Sink, Sinks
 from p2os.cli.captures.reading import DEFAULT_ROBOT
 from p2os.cli.held_robot import hold_robot
@@ -37,21 +37,94 @@ from p2os.transport.ports import Listener, Transport
 from p2os.transport.waiting import BLIND_POLL_S, wait_readable
 from p2os.transport.wall_clock import Clock, GapWatch, wall_clock
 
+DEFAULT_LISTEN = "tcp:127.0.0.1:8102"
+
+HELP = f"""Stand between a client and a robot, pass everything on, and show or record it.
+
+Let the client connect to the URL of --listen instead of the robot's. When the
+client goes, Ctrl-C ends it or a file cannot be written while a session is open, the
+robot is sent STOP, VEL 0 and CLOSE. What is printed never holds the two up: a
+reader that does not read misses lines, and gets their number.
+
+\b
+Examples:
+  p2os sniff serial:/dev/ttyUSB0 --listen pty:/tmp/robot   a client that wants a serial port
+  p2os sniff tcp:127.0.0.1:8101                            listens on {DEFAULT_LISTEN}
+  p2os sniff tcp:127.0.0.1:8101 --out talk.jsonl --quiet   record, show nothing
+  p2os sniff tcp:127.0.0.1:8101 --pcap talk.pcap           for Wireshark
+  p2os sniff --install-dissector                           put p2os.lua where Wireshark finds it
+"""
 #: chosen: how soon the loop notices that it should end.
 LONGEST_WAIT_S = 0.2
 #: From HOSTBAUD to our own change of speed: the command has to leave at the old one. ARIA waits 10 ms.
 BAUD_DELAY_NS: Nanos = 20 * NS_PER_MS
 
 
+def register(app: typer.Typer) -> None:
+    """Add the verb."""
+    app.command("sniff", help=HELP)(sniff)
+
+
+def sniff(
+    url: Annotated[str | None, typer.Argument(help="Where the robot is.", metavar="URL", show_default=False)] = None,
+    listen: Annotated[str, typer.Option(help="Where the client connects.", metavar="URL")] = DEFAULT_LISTEN,
+    out: Annotated[Path | None, typer.Option(help="Record here (JSON lines).", metavar="FILE")] = None,
+    pcap: Annotated[Path | None, typer.Option(help="Record here, for Wireshark.", metavar="FILE")] = None,
+    json_output: Annotated[bool, typer.Option("--json", help="Print one JSON object a packet.")] = False,
+    quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Print no packets.")] = False,
+    once: Annotated[bool, typer.Option("--once", help="End when the first client has gone.")] = False,
+    duration: Annotated[str, typer.Option("--for", help="End after so long.", metavar="TIME")] = "",
+    robot: Annotated[str, typer.Option(help="Robot model, or a TOML file, for units.")] = DEFAULT_ROBOT,
+    profile: Annotated[Profile, typer.Option(help="Firmware family, for layouts.")] = Profile.P2OS,
+    install_dissector: Annotated[
+        bool,
+        typer.Option("--install-dissector", help="Copy the dissector into Wireshark's folder of plug-ins, and end."),
+    ] = False,
+) -> None:
+    """Bridge clients to a robot until Ctrl-C."""
+    if install_dissector:
+        from p2os.capture.dissector import install
+
+        typer.echo(f"installed {install()}")
+        return
+    if url is None:
+        raise typer.BadParameter("name the robot's URL", param_hint="URL")
+    lasts_ns = parse_duration(duration, "--for") if duration else None
+    reading = Reading(profile=profile, parameters=load_parameters(robot))
+    hold_robot()
+    robot_line = open_url(url)
+    listener = listen_url(listen)
+    screen = Screen(reading, as_json=json_output, quiet=quiet)
+    sinks: list[Sink] = [screen]
+    with Sinks(sinks) as all_sinks:
+        if out is not None:
+            sinks.append(RecordingFile(out, note=f"p2os sniff {url}"))
+        if pcap is not None:
+            sinks.append(PcapFile(pcap, time.time_ns()))
+        bridge = Bridge(listener, robot_line, lambda: open_url(url), on_chunk=all_sinks.take, on_event=_print)
+        _print(f"listening on {listener.description} for the robot on {url}; Ctrl-C ends")
+        try:
+            bridge.run(lambda: (once and bridge.sessions > 0) or (lasts_ns is not None and bridge.now >= lasts_ns))
+        finally:
+            with postponed():
+                lasted_s = bridge.now / 1e9
+                all_sinks.close()
+                _print(summary_of(screen.rows, screen.damaged, lasted_s))
+
+
+def _print(text: str) -> None:
+    sys.stderr.write(f"{text}\n")
+
+
 class Bridge:
-    """Joins the clients of a listener to a robot.
+    """Bridges the clients of a listener to a robot.
 
     Args:
         listener: Where clients come.
         robot: The line to the robot for the first client: opened early, so that its absence shows at once.
         open_robot: Opens a line to the robot for each further client.
-        on_chunk: Told all that goes by.
-        on_event: Told who comes and goes.
+        on_chunk: Called with all that goes by.
+        on_event: Called with one line when a client comes or goes.
         clock: Nanoseconds that never run back.
     """
 
@@ -87,7 +160,7 @@ class Bridge:
         return self._clock() - self._start
 
     def run(self, until: Callable[[], bool]) -> None:
-        """Join until `until` says so or an exception (Ctrl-C) ends it; then let both go."""
+        """Bridge until `until` is true or an exception (Ctrl-C) ends it; then release both."""
         try:
             while not until():
                 self.turn()
@@ -100,10 +173,10 @@ class Bridge:
         self._wait()
         self._woke_at = self._clock()
         gap_ns = self._gaps.gap(self._woke_at)
-        if gap_ns and self._tap.farewell():
-            self._part(f"the bridge paused for {gap_ns / NS_PER_S:.1f} s")
+        if gap_ns and self._tap.closing_frames():
+            self._release(f"the bridge paused for {gap_ns / NS_PER_S:.1f} s")
         if self._client is None:
-            self._welcome()
+            self._accept()
             return
         self._pass(Direction.TO_ROBOT, self._client)
         if self._robot is not None:
@@ -111,15 +184,15 @@ class Bridge:
         self._change_baud()
 
     def close(self) -> None:
-        """Let both sides go and stop listening."""
+        """Release both sides and stop listening."""
         try:
-            self._part("the bridge ends")
+            self._release("the bridge ends")
         finally:
             if self._spare is not None:
                 self._spare.close()
             self._listener.close()
 
-    def _welcome(self) -> None:
+    def _accept(self) -> None:
         client = self._listener.accept()
         if client is None:
             return
@@ -133,12 +206,12 @@ class Bridge:
         self._on_event(f"client connected: {client.description}")
 
     def _robot_line(self) -> Transport:
-        """Return the line that was opened early if it still lives, else a new one."""
+        """Return the line that was opened early if it is still open, else a new one."""
         spare, self._spare = self._spare, None
         if spare is None:
             return self._open_robot()
         try:
-            spare.read()  # what a robot said before there was a client is of no use to it
+            spare.read()  # what a robot sent before there was a client is of no use to it
         except TransportError:
             spare.close()
             return self._open_robot()
@@ -149,18 +222,18 @@ class Bridge:
         try:
             data = source.read()
         except TransportError as error:
-            self._part(str(error))
+            self._release(str(error))
             return
         if not data or target is None:
             return
-        chunk, lost = self._tap.hear(direction, data, self.now), ""
+        chunk, lost = self._tap.observe(direction, data, self.now), ""
         try:
             target.write(data)
         except TransportError as error:
             lost = str(error)
         self._on_chunk(chunk)
         if lost:
-            self._part(lost)
+            self._release(lost)
 
     def _change_baud(self) -> None:
         if self._tap.new_baud is None or self._robot is None:
@@ -168,24 +241,24 @@ class Bridge:
         if self._baud_due is None:
             self._baud_due = self.now + BAUD_DELAY_NS
         elif self.now >= self._baud_due:
-            self._on_event(f"robot told to talk at {self._tap.new_baud} bit/s: following")
+            self._on_event(f"robot told to use {self._tap.new_baud} bit/s: following")
             self._robot.set_baud(self._tap.new_baud)
             self._tap.new_baud, self._baud_due = None, None
 
-    def _part(self, reason: str) -> None:
-        """Stop the robot if its session is open, and let both sides go."""
+    def _release(self, reason: str) -> None:
+        """Stop the robot if its session is open, and release both sides."""
         if self._client is None:
             return
         client, robot, self._client, self._robot = self._client, self._robot, None, None
-        farewell = self._tap.farewell()
+        closing = self._tap.closing_frames()
         if robot is not None:
             with contextlib.suppress(TransportError):
-                robot.write(farewell)
+                robot.write(closing)
             robot.close()
         client.close()
         self.sessions += 1
-        if farewell:
-            self._on_chunk(self._tap.hear(Direction.TO_ROBOT, farewell, self.now))
+        if closing:
+            self._on_chunk(self._tap.observe(Direction.TO_ROBOT, closing, self.now))
             self._on_event("the session was open: sent STOP, VEL 0 and CLOSE")
         self._on_event(f"client gone: {reason}")
 
@@ -208,25 +281,6 @@ class Bridge:
             longest = min(longest, max(self._baud_due - self.now, 0) / NS_PER_S)
         self._gaps.expect(self._woke_at + round(longest * NS_PER_S))
         wait_readable(descriptors, longest)
-
-
-DEFAULT_LISTEN = "tcp:127.0.0.1:8102"
-
-HELP = f"""Sit between a client and a robot, pass everything on, and show or record it.
-
-Let the client connect to the URL of --listen instead of the robot's. When the
-client goes, Ctrl-C ends it or a file cannot be written while a session is open, the
-robot is told STOP, VEL 0 and CLOSE. What is printed never holds the two up: a
-reader that does not read misses lines, and is told how many.
-
-\b
-Examples:
-  p2os sniff serial:/dev/ttyUSB0 --listen pty:/tmp/robot   a client that wants a serial port
-  p2os sniff tcp:127.0.0.1:8101                            listens on {DEFAULT_LISTEN}
-  p2os sniff tcp:127.0.0.1:8101 --out talk.jsonl --quiet   record, show nothing
-  p2os sniff tcp:127.0.0.1:8101 --pcap talk.pcap           for Wireshark
-  p2os sniff --install-dissector                           put p2os.lua where Wireshark finds it
-"""
 
 
 class Screen:
@@ -256,59 +310,3 @@ class Screen:
         self.damaged += not row.valid
         if not self._quiet:
             typer.echo(json.dumps(row.as_plain()) if self._as_json else line_of(row))
-
-
-def register(app: typer.Typer) -> None:
-    """Add the verb."""
-    app.command("sniff", help=HELP)(sniff)
-
-
-def sniff(
-    url: Annotated[str | None, typer.Argument(help="Where the robot is.", metavar="URL", show_default=False)] = None,
-    listen: Annotated[str, typer.Option(help="Where the client connects.", metavar="URL")] = DEFAULT_LISTEN,
-    out: Annotated[Path | None, typer.Option(help="Record here (JSON lines).", metavar="FILE")] = None,
-    pcap: Annotated[Path | None, typer.Option(help="Record here, for Wireshark.", metavar="FILE")] = None,
-    json_output: Annotated[bool, typer.Option("--json", help="Print one JSON object a packet.")] = False,
-    quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Print no packets.")] = False,
-    once: Annotated[bool, typer.Option("--once", help="End when the first client has gone.")] = False,
-    duration: Annotated[str, typer.Option("--for", help="End after so long.", metavar="TIME")] = "",
-    robot: Annotated[str, typer.Option(help="Robot model, or a TOML file, for units.")] = DEFAULT_ROBOT,
-    profile: Annotated[Profile, typer.Option(help="Firmware family, for layouts.")] = Profile.P2OS,
-    install_dissector: Annotated[
-        bool,
-        typer.Option("--install-dissector", help="Copy the dissector into Wireshark's folder of plug-ins, and end."),
-    ] = False,
-) -> None:
-    """Join clients to a robot until Ctrl-C."""
-    if install_dissector:
-        from p2os.capture.dissector import install
-
-        typer.echo(f"installed {install()}")
-        return
-    if url is None:
-        raise typer.BadParameter("name the robot's URL", param_hint="URL")
-    lasts_ns = parse_duration(duration, "--for") if duration else None
-    reading = Reading(profile=profile, parameters=load_parameters(robot))
-    hold_robot()
-    robot_line = open_url(url)
-    listener = listen_url(listen)
-    screen = Screen(reading, as_json=json_output, quiet=quiet)
-    sinks: list[Sink] = [screen]
-    with Sinks(sinks) as all_sinks:
-        if out is not None:
-            sinks.append(RecordingFile(out, note=f"p2os sniff {url}"))
-        if pcap is not None:
-            sinks.append(PcapFile(pcap, time.time_ns()))
-        bridge = Bridge(listener, robot_line, lambda: open_url(url), on_chunk=all_sinks.take, on_event=_tell)
-        _tell(f"listening on {listener.description} for the robot on {url}; Ctrl-C ends")
-        try:
-            bridge.run(lambda: (once and bridge.sessions > 0) or (lasts_ns is not None and bridge.now >= lasts_ns))
-        finally:
-            with postponed():
-                lasted_s = bridge.now / 1e9
-                all_sinks.close()
-                _tell(summary_of(screen.rows, screen.damaged, lasted_s))
-
-
-def _tell(text: str) -> None:
-    sys.stderr.write(f"{text}\n")

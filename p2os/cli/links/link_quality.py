@@ -44,7 +44,7 @@ class LinkQuality:
     """Follows the packets of one session.
 
     Args:
-        cycle_ns: The robot's cycle as its CONFIGpac says; None: what the packets show.
+        cycle_ns: The robot's cycle by its CONFIGpac; None: by the packets.
     """
 
     def __init__(self, cycle_ns: Nanos | None = None) -> None:
@@ -68,7 +68,7 @@ class LinkQuality:
 
     @property
     def cycle_ns(self) -> Nanos:
-        """The robot's cycle: as told, else the median of the pauses so far; 0 before there are any."""
+        """The robot's cycle: as given, else the median of the pauses so far; 0 before there are any."""
         if self._cycle_ns:
             return self._cycle_ns
         return sorted(self._gaps)[len(self._gaps) // 2] if self._gaps else 0

@@ -13,12 +13,12 @@ from p2os.transport.serial_port import list_serial_ports
 
 HELP = """List the serial ports of this machine, with a guess of what is there.
 
-Nothing is opened or sent: the guess is by what the USB device says it is. To
+Nothing is opened or sent: the guess is by the description of the USB device. To
 ask the ports themselves, use `p2os scan`.
 
 \b
 Examples:
-  p2os ports           one port a line: its URL, what it says it is, what it may be
+  p2os ports           one port a line: its URL, its description, what it may be
   p2os ports --json    the same for programs
 """
 #: USB vendor:product → what it is and whether a robot may be behind it (usb.ids; the vendors' data sheets).
@@ -39,11 +39,11 @@ ADAPTERS: Mapping[str, str] = {
     "303A:1001": "ESP32 with a USB port of its own: the adapter board, no robot",
 }
 _VID_PID = re.compile(r"VID:PID=([0-9A-Fa-f]{4}:[0-9A-Fa-f]{4})")
-#: The vendor whose adapters hold bytes back for as long as their latency timer says.
+#: The vendor whose adapters hold bytes back for as long as their latency timer runs.
 FTDI = "0403"
-#: Linux tells the timer there, in milliseconds.
+#: Linux shows the timer there, in milliseconds.
 LATENCY_FOLDER = Path("/sys/bus/usb-serial/devices")
-#: Above this, the timer is worth a word: packets of a Pioneer come in bursts of it.
+#: Above this, the timer is worth a note: packets of a Pioneer come in bursts of it.
 LATENCY_MS = 2
 
 
@@ -78,7 +78,7 @@ def guess(port: Mapping[str, str], latency_folder: Path = LATENCY_FOLDER) -> str
 
     Args:
         port: Its url, description and hardware, as `list_serial_ports` gives them.
-        latency_folder: Where Linux tells the latency timers of USB adapters.
+        latency_folder: Where Linux shows the latency timers of USB adapters.
     """
     found = _VID_PID.search(port["hardware"])
     name = port["url"].removeprefix("serial:").rsplit("/", maxsplit=1)[-1]

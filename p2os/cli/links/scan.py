@@ -1,4 +1,4 @@
-"""`p2os scan`: look for a robot on every port and at every speed, and say who it is."""
+"""`p2os scan`: look for a robot on every port and at every speed, and identify it."""
 
 import json
 import sys
@@ -18,7 +18,7 @@ from p2os.transport.serial_port import list_serial_ports
 #: Where simulated Pioneers listen.
 SIMULATOR = "tcp:127.0.0.1:8101"
 
-HELP = f"""Look for robots, and say who they are.
+HELP = f"""Look for robots, and identify them.
 
 Without a URL it tries every serial port of this machine and {SIMULATOR}.
 Each serial port is tried at its own speed and at {", ".join(map(str, BAUDS))} bit/s, which
@@ -95,7 +95,7 @@ def scan(
 
 
 def identify(url: str, bauds: tuple[int, ...] = BAUDS) -> Found:
-    """Return who the robot on a line is.
+    """Return the identity of the robot on a line.
 
     Args:
         url: The line.

@@ -1,8 +1,8 @@
 """The picture that `p2os monitor` draws of a robot's state. No line, no clock, no terminal.
 
-A drawing of dots in a terminal: each character is a braille pattern of 2 by 4 dots.
-
-Coordinates are dots from the upper left; what lies outside is left out.
+`Dashboard` is what is shown, `draw` how. `Canvas` draws dots in a terminal: each
+character is a braille pattern of 2 by 4 dots; coordinates are dots from the upper left,
+and what lies outside is left out.
 """
 
 import itertools
@@ -22,9 +22,157 @@ from p2os.client import Limits, Link, RobotState, SonarEcho
 from p2os.protocol.connection import ConnectionStats
 from p2os.robots.parameters import RobotParameters
 
+#: Characters of the sonar ring; a character is twice as high as wide.
+RING_COLUMNS, RING_ROWS = 52, 24
+#: chosen: what a Pioneer sees of a room; echoes beyond are drawn at the rim.
+RING_METRES = 3.0
+#: chosen: nearer than this a Pioneer 2 cannot turn without touching; nearer than twice as much it should slow down.
+NEAR_M = 0.35
+BAR_CHARACTERS = 20
+#: The motion panel beside the ring; the panels on the left.
+PANEL_COLUMNS, WIDE_COLUMNS = 54, 112
+#: chosen: lead batteries of 12 V: full, and where a Pioneer's own warning begins (LowBattery of the manuals).
+FULL_V, LOW_V = 13.0, 11.5
+
+#: A point of the robot's frame, in metres → its dot.
+Place: TypeAlias = Callable[[float, float], tuple[float, float]]
 #: Bit of each dot of a braille character, by (column, row) (Unicode standard, block 2800).
 _DOTS = ((0x01, 0x02, 0x04, 0x40), (0x08, 0x10, 0x20, 0x80))
 _BLANK = 0x2800
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Dashboard:
+    """All that is shown."""
+
+    title: str
+    link: Link
+    state: RobotState | None
+    limits: Limits
+    parameters: RobotParameters
+    stats: ConnectionStats
+    quality: LinkQuality
+    #: What happened last, the newest at the end.
+    news: tuple[str, ...] = ()
+
+
+def draw(dashboard: Dashboard, columns: int = WIDE_COLUMNS) -> RenderableType:
+    """Return the whole dashboard.
+
+    Args:
+        dashboard: What is to be seen.
+        columns: Width of the terminal; in a narrow one the ring and two lines have to do.
+    """
+    style = {Link.OPEN: "green", Link.WAITING: "yellow", Link.FAILED: "red"}.get(dashboard.link, "yellow")
+    heading = Text.assemble((f" {dashboard.title} ", "bold"), "  ", (dashboard.link.value, style))
+    if dashboard.state is None:
+        return Group(heading, Text("no packet yet"), news_panel(dashboard.news))
+    ring = ring_panel(dashboard.state, dashboard.parameters)
+    if columns < WIDE_COLUMNS:
+        return Group(
+            heading, Text(f" {line_of(dashboard.state)}"), ring, *(Text(f" {news}") for news in dashboard.news[-1:])
+        )
+    left = Group(motion_panel(dashboard.state, dashboard.limits), health_panel(dashboard.state), link_panel(dashboard))
+    return Group(heading, Columns([left, ring]), news_panel(dashboard.news))
+
+
+def line_of(state: RobotState) -> str:
+    """Return a state as one line."""
+    pose, nearest = state.pose, state.nearest()
+    return (
+        f"x {pose.x_m:.3f} m, y {pose.y_m:.3f} m, heading {math.degrees(pose.heading_rad):.1f} deg, "
+        f"{state.forward_mps:.3f} m/s, {math.degrees(state.turn_radps):.1f} deg/s, {state.battery_v:.1f} V, "
+        + (f"nearest {nearest.range_m:.3f} m" if nearest else "no echo")
+        + (", STALLED" if state.is_stalled else "")
+    )
+
+
+def motion_panel(state: RobotState, limits: Limits) -> Panel:
+    """Return pose and speeds."""
+    pose, degrees = state.pose, math.degrees
+    table = _table()
+    table.add_row("x", f"{pose.x_m:9.3f} m", "")
+    table.add_row("y", f"{pose.y_m:9.3f} m", "")
+    table.add_row("heading", f"{degrees(math.remainder(pose.heading_rad, 2 * math.pi)):9.1f} deg", "")
+    table.add_row("forward", f"{state.forward_mps:9.3f} m/s", bar(state.forward_mps, limits.forward_mps))
+    table.add_row("turn", f"{degrees(state.turn_radps):9.1f} deg/s", bar(state.turn_radps, limits.turn_radps))
+    return Panel(table, title="motion", width=PANEL_COLUMNS)
+
+
+def health_panel(state: RobotState) -> Panel:
+    """Return battery, motors, stalls and bumpers."""
+    table = _table()
+    share = (state.battery_v - LOW_V) / (FULL_V - LOW_V)
+    style = "green" if share > 0.4 else "yellow" if share > 0 else "bold red"
+    table.add_row(
+        "battery", f"{state.battery_v:9.1f} V", Text("█" * round(BAR_CHARACTERS * min(max(share, 0), 1)), style)
+    )
+    motors = {None: "unknown", True: "on", False: "off"}[state.motors_enabled]
+    table.add_row("motors", f"{motors:>9}", "moving" if state.is_moving else "standing")
+    stalls = [side for side, stalled in (("left", state.stall_left), ("right", state.stall_right)) if stalled]
+    table.add_row("stalled", Text(f"{' '.join(stalls) or 'no':>9}", "bold red" if stalls else ""), "")
+    bumped = [
+        *(f"front {number}" for number in state.front_bumpers),
+        *(f"rear {number}" for number in state.rear_bumpers),
+    ]
+    table.add_row(
+        "bumpers", Text(f"{'free' if not bumped else 'hit':>9}", "bold red" if bumped else ""), ", ".join(bumped)
+    )
+    table.add_row("digital", f"in {state.digital_in:08b}", f"out {state.digital_out:08b}")
+    if state.stop_button:
+        table.add_row("STOP", Text("  pressed", "bold red"), "")
+    return Panel(table, title="health", width=PANEL_COLUMNS)
+
+
+def link_panel(dashboard: Dashboard) -> Panel:
+    """Return how well packets come."""
+    table, spread, wire = _table(), dashboard.quality.spread, dashboard.stats.wire
+    if spread is not None:
+        table.add_row(
+            "packets", f"{dashboard.quality.packets:9d}", f"every {spread.mean_ms:.1f} ms ± {spread.deviation_ms:.1f}"
+        )
+        table.add_row("longest", f"{spread.most_ms:9.1f} ms", f"{dashboard.quality.missed} missed")
+    damaged = wire.bad_checksums + wire.bad_counts + wire.stalled
+    style = "yellow" if damaged else ""
+    table.add_row("damaged", Text(f"{damaged:9d}", style), f"{wire.noise_bytes} bytes of noise")
+    return Panel(table, title="link", width=PANEL_COLUMNS)
+
+
+def ring_panel(state: RobotState, parameters: RobotParameters) -> Panel:
+    """Return the robot from above, forward upwards, and the echoes of its sonar."""
+    canvas = Canvas(RING_COLUMNS, RING_ROWS)
+    scale = min(canvas.width, canvas.height) / 2 / RING_METRES
+    middle = canvas.width / 2, canvas.height / 2
+
+    def place(x_m: float, y_m: float) -> tuple[float, float]:
+        """Return the dot of a point of the robot's frame: x ahead is up, y to the left is left."""
+        return middle[0] - y_m * scale, middle[1] - x_m * scale
+
+    for metres in (1.0, 2.0):
+        for step in range(60):
+            angle = step * math.pi / 30
+            canvas.dot(*place(metres * math.cos(angle), metres * math.sin(angle)), "dim")
+        canvas.text(*place(metres, 0.12), f"{metres:.0f} m", "dim")
+    _draw_robot(canvas, place, parameters, stalled=state.is_stalled)
+    for echo in state.sonar:
+        _draw_echo(canvas, place, echo)
+    nearest = state.nearest()
+    subtitle = f"nearest {nearest.range_m:.2f} m (sonar {nearest.number})" if nearest else "no echo"
+    rows = [Text.assemble(*runs) for runs in canvas.lines()]
+    return Panel(Group(*rows), title="sonar", subtitle=subtitle, width=RING_COLUMNS + 4)
+
+
+def news_panel(news: Iterable[str]) -> Panel:
+    """Return what happened last."""
+    return Panel(Text("\n".join(news) or "nothing"), title="events", width=PANEL_COLUMNS + RING_COLUMNS + 5)
+
+
+def bar(value: float, most: float) -> Text:
+    """Return a bar from the middle: to the right for positive values."""
+    half = BAR_CHARACTERS // 2
+    filled = min(half, round(abs(value) / most * half)) if most > 0 else 0
+    left, right = ("█" * filled, "") if value < 0 else ("", "█" * filled)
+    return Text(f"{left:>{half}}│{right:<{half}}", "cyan")
 
 
 class Canvas:
@@ -86,154 +234,6 @@ class Canvas:
             else:
                 runs.append((letter, style))
         return runs
-
-
-#: Characters of the sonar ring; a character is twice as high as wide.
-RING_COLUMNS, RING_ROWS = 52, 24
-#: chosen: what a Pioneer sees of a room; echoes beyond are drawn at the rim.
-RING_METRES = 3.0
-#: chosen: nearer than this a Pioneer 2 cannot turn without touching; nearer than twice as much it should slow down.
-NEAR_M = 0.35
-BAR_CHARACTERS = 20
-#: The motion panel beside the ring; the panels on the left.
-PANEL_COLUMNS, WIDE_COLUMNS = 54, 112
-#: chosen: lead batteries of 12 V: full, and where a Pioneer's own warning begins (LowBattery of the manuals).
-FULL_V, LOW_V = 13.0, 11.5
-
-#: A point of the robot's frame, in metres → its dot.
-Place: TypeAlias = Callable[[float, float], tuple[float, float]]
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Sight:
-    """All that is shown."""
-
-    title: str
-    link: Link
-    state: RobotState | None
-    limits: Limits
-    parameters: RobotParameters
-    stats: ConnectionStats
-    quality: LinkQuality
-    #: What happened last, the newest at the end.
-    news: tuple[str, ...] = ()
-
-
-def draw(sight: Sight, columns: int = WIDE_COLUMNS) -> RenderableType:
-    """Return the whole dashboard.
-
-    Args:
-        sight: What is to be seen.
-        columns: Width of the terminal; in a narrow one the ring and two lines have to do.
-    """
-    style = {Link.OPEN: "green", Link.WAITING: "yellow", Link.FAILED: "red"}.get(sight.link, "yellow")
-    heading = Text.assemble((f" {sight.title} ", "bold"), "  ", (sight.link.value, style))
-    if sight.state is None:
-        return Group(heading, Text("no packet yet"), news_panel(sight.news))
-    ring = ring_panel(sight.state, sight.parameters)
-    if columns < WIDE_COLUMNS:
-        return Group(heading, Text(f" {line_of(sight.state)}"), ring, *(Text(f" {news}") for news in sight.news[-1:]))
-    left = Group(motion_panel(sight.state, sight.limits), health_panel(sight.state), link_panel(sight))
-    return Group(heading, Columns([left, ring]), news_panel(sight.news))
-
-
-def line_of(state: RobotState) -> str:
-    """Return a state as one line."""
-    pose, nearest = state.pose, state.nearest()
-    return (
-        f"x {pose.x_m:.3f} m, y {pose.y_m:.3f} m, heading {math.degrees(pose.heading_rad):.1f} deg, "
-        f"{state.forward_mps:.3f} m/s, {math.degrees(state.turn_radps):.1f} deg/s, {state.battery_v:.1f} V, "
-        + (f"nearest {nearest.range_m:.3f} m" if nearest else "no echo")
-        + (", STALLED" if state.is_stalled else "")
-    )
-
-
-def motion_panel(state: RobotState, limits: Limits) -> Panel:
-    """Return pose and speeds."""
-    pose, degrees = state.pose, math.degrees
-    table = _table()
-    table.add_row("x", f"{pose.x_m:9.3f} m", "")
-    table.add_row("y", f"{pose.y_m:9.3f} m", "")
-    table.add_row("heading", f"{degrees(math.remainder(pose.heading_rad, 2 * math.pi)):9.1f} deg", "")
-    table.add_row("forward", f"{state.forward_mps:9.3f} m/s", bar(state.forward_mps, limits.forward_mps))
-    table.add_row("turn", f"{degrees(state.turn_radps):9.1f} deg/s", bar(state.turn_radps, limits.turn_radps))
-    return Panel(table, title="motion", width=PANEL_COLUMNS)
-
-
-def health_panel(state: RobotState) -> Panel:
-    """Return battery, motors, stalls and bumpers."""
-    table = _table()
-    share = (state.battery_v - LOW_V) / (FULL_V - LOW_V)
-    style = "green" if share > 0.4 else "yellow" if share > 0 else "bold red"
-    table.add_row(
-        "battery", f"{state.battery_v:9.1f} V", Text("█" * round(BAR_CHARACTERS * min(max(share, 0), 1)), style)
-    )
-    motors = {None: "not told", True: "on", False: "off"}[state.motors_enabled]
-    table.add_row("motors", f"{motors:>9}", "moving" if state.is_moving else "standing")
-    stalls = [side for side, stalled in (("left", state.stall_left), ("right", state.stall_right)) if stalled]
-    table.add_row("stalled", Text(f"{' '.join(stalls) or 'no':>9}", "bold red" if stalls else ""), "")
-    bumped = [
-        *(f"front {number}" for number in state.front_bumpers),
-        *(f"rear {number}" for number in state.rear_bumpers),
-    ]
-    table.add_row(
-        "bumpers", Text(f"{'free' if not bumped else 'hit':>9}", "bold red" if bumped else ""), ", ".join(bumped)
-    )
-    table.add_row("digital", f"in {state.digital_in:08b}", f"out {state.digital_out:08b}")
-    if state.stop_button:
-        table.add_row("STOP", Text("  pressed", "bold red"), "")
-    return Panel(table, title="health", width=PANEL_COLUMNS)
-
-
-def link_panel(sight: Sight) -> Panel:
-    """Return how well packets come."""
-    table, spread, wire = _table(), sight.quality.spread, sight.stats.wire
-    if spread is not None:
-        table.add_row(
-            "packets", f"{sight.quality.packets:9d}", f"every {spread.mean_ms:.1f} ms ± {spread.deviation_ms:.1f}"
-        )
-        table.add_row("longest", f"{spread.most_ms:9.1f} ms", f"{sight.quality.missed} missed")
-    damaged = wire.bad_checksums + wire.bad_counts + wire.stalled
-    style = "yellow" if damaged else ""
-    table.add_row("damaged", Text(f"{damaged:9d}", style), f"{wire.noise_bytes} bytes of noise")
-    return Panel(table, title="link", width=PANEL_COLUMNS)
-
-
-def ring_panel(state: RobotState, parameters: RobotParameters) -> Panel:
-    """Return the robot from above, forward upwards, and what its sonar hear."""
-    canvas = Canvas(RING_COLUMNS, RING_ROWS)
-    scale = min(canvas.width, canvas.height) / 2 / RING_METRES
-    middle = canvas.width / 2, canvas.height / 2
-
-    def place(x_m: float, y_m: float) -> tuple[float, float]:
-        """Return the dot of a point of the robot's frame: x ahead is up, y to the left is left."""
-        return middle[0] - y_m * scale, middle[1] - x_m * scale
-
-    for metres in (1.0, 2.0):
-        for step in range(60):
-            angle = step * math.pi / 30
-            canvas.dot(*place(metres * math.cos(angle), metres * math.sin(angle)), "dim")
-        canvas.text(*place(metres, 0.12), f"{metres:.0f} m", "dim")
-    _draw_robot(canvas, place, parameters, stalled=state.is_stalled)
-    for echo in state.sonar:
-        _draw_echo(canvas, place, echo)
-    nearest = state.nearest()
-    subtitle = f"nearest {nearest.range_m:.2f} m (sonar {nearest.number})" if nearest else "no echo"
-    rows = [Text.assemble(*runs) for runs in canvas.lines()]
-    return Panel(Group(*rows), title="sonar", subtitle=subtitle, width=RING_COLUMNS + 4)
-
-
-def news_panel(news: Iterable[str]) -> Panel:
-    """Return what happened last."""
-    return Panel(Text("\n".join(news) or "nothing"), title="events", width=PANEL_COLUMNS + RING_COLUMNS + 5)
-
-
-def bar(value: float, most: float) -> Text:
-    """Return a bar from the middle: to the right for positive values."""
-    half = BAR_CHARACTERS // 2
-    filled = min(half, round(abs(value) / most * half)) if most > 0 else 0
-    left, right = ("█" * filled, "") if value < 0 else ("", "█" * filled)
-    return Text(f"{left:>{half}}│{right:<{half}}", "cyan")
 
 
 def _draw_robot(canvas: Canvas, place: Place, parameters: RobotParameters, *, stalled: bool) -> None:

@@ -71,7 +71,7 @@ def drive(
     vel: Annotated[str, typer.Option(help="Speed: held with --for, else the most.", metavar="SPEED")] = "",
     turn_rate: Annotated[str, typer.Option(help="Turning speed, likewise.", metavar="RATE")] = "",
     duration: Annotated[str, typer.Option("--for", help="How long the speeds are held.", metavar="TIME")] = "",
-    robot: Annotated[str, typer.Option(help="Robot model or TOML file, if it is not what the robot says.")] = "",
+    robot: Annotated[str, typer.Option(help="Robot model or TOML file, if it is not what the robot reports.")] = "",
     json_output: Annotated[bool, typer.Option("--json", help="Print a JSON object.")] = False,
 ) -> None:
     """Move a robot."""
@@ -93,7 +93,7 @@ def drive(
 
 
 def carry_out(plan: Plan, robot: Robot) -> list[dict[str, object]]:
-    """Do what a plan says and tell stderr of each step; return the steps in SI units.
+    """Carry out a plan, each step with a line on stderr; return the steps in SI units.
 
     Raises:
         MotionError, LinkLostError, MotorsDisabledError: The robot did not arrive; it was stopped.
@@ -133,7 +133,7 @@ def _step(what: str, unit: str, result: MotionResult) -> dict[str, object]:
 
 
 def _wait_until_it_stands(robot: Robot) -> None:
-    """Return when two packets in a row say that the wheels stand, or after a second more than any Pioneer needs."""
+    """Return when the wheels stand in two packets in a row, or after a second more than any Pioneer needs."""
     standing = 0
     for _ in range(50):
         state = robot.next_state()

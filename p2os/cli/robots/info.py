@@ -68,7 +68,7 @@ FALLBACK_MODEL = "p2dx"
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RobotInfo:
-    """What a robot has told of itself."""
+    """What a robot reports of itself."""
 
     identity: Identity
     sip: StandardSip
@@ -77,7 +77,7 @@ class RobotInfo:
 
 
 def ask(transport: Transport, *, clock: Clock = wall_clock) -> RobotInfo:
-    """Connect, listen until the robot has said all, and leave it closed.
+    """Connect, listen until the robot has sent all, and leave it closed.
 
     Raises:
         RemoteProtocolError: nobody answers, or not all of it.
@@ -85,17 +85,17 @@ def ask(transport: Transport, *, clock: Clock = wall_clock) -> RobotInfo:
     """
     connection = Connection(ConnectionRole.CLIENT, settings=ConnectionSettings(liveness_ns=2 * NS_PER_S))
     try:
-        return _listen(connection, transport, clock)
+        return _collect(connection, transport, clock)
     except HungUpError as error:
         raise TransportError(str(error), hint="is another program connected to the robot?") from error
     finally:
         with postponed():
             connection.disconnect(clock())
-            with contextlib.suppress(TransportError):  # whoever has gone needs no goodbye
+            with contextlib.suppress(TransportError):  # the robot has gone: nothing to close
                 transport.write(b"".join(connection.take_output()))
 
 
-def _listen(connection: Connection, transport: Transport, clock: Clock) -> RobotInfo:
+def _collect(connection: Connection, transport: Transport, clock: Clock) -> RobotInfo:
     start = clock()
     connection.connect(start)
     identity: Identity | None = None
@@ -144,7 +144,7 @@ def info(
     url: Annotated[str, typer.Argument(help="Where the robot is.", metavar="URL")],
     json_output: Annotated[bool, typer.Option("--json", help="Print a JSON object.")] = False,
 ) -> None:
-    """Print what a robot says of itself."""
+    """Print what a robot reports of itself."""
     hold_robot()
     with contextlib.closing(open_url(url)) as transport:
         found = ask(transport)
@@ -157,7 +157,7 @@ def info(
 
 
 def as_plain(found: RobotInfo, parameters: RobotParameters) -> dict[str, object]:
-    """Return what a robot has told as plain values, speeds and lengths in SI units, for JSON."""
+    """Return what a robot reports as plain values, speeds and lengths in SI units, for JSON."""
     identity, config = found.identity, found.config
     sensed = {name: _rounded(value) for name, value in asdict(in_units(found.sip, parameters)).items()}
     sensed["x_m"] = _rounded(_signed(found.sip.raw_x, parameters))
@@ -170,7 +170,7 @@ def as_plain(found: RobotInfo, parameters: RobotParameters) -> dict[str, object]
 
 
 def lines_of(found: RobotInfo, parameters: RobotParameters, *, is_known: bool) -> list[tuple[str, str]]:
-    """Return what a robot has told as (name, text with units) for a person."""
+    """Return what a robot reports as (name, text with units) for a person."""
     identity, sensed = found.identity, in_units(found.sip, parameters)
     x_m, y_m = _signed(found.sip.raw_x, parameters), _signed(found.sip.raw_y, parameters)
     stalls = [side for side, is_stalled in (("left", sensed.stall_left), ("right", sensed.stall_right)) if is_stalled]
@@ -186,7 +186,7 @@ def lines_of(found: RobotInfo, parameters: RobotParameters, *, is_known: bool) -
         ("sonar", ", ".join(f"{number}: {range_m:.3f} m" for number, range_m in sensed.sonar_m) or "off"),
     ]
     if found.config is None:
-        return [*lines, ("config", "the robot does not tell it")]
+        return [*lines, ("config", "the robot does not send it")]
     shown = [(name, getattr(found.config, name)) for name, _ in FIELDS[: found.config.fields_sent]]
     return [*lines, *(("config", f"{name:<18}{value} {UNITS.get(name, '')}".rstrip()) for name, value in shown)]
 

@@ -11,7 +11,7 @@ from p2os.capture.describe import plain
 from p2os.cli.held_robot import held
 from p2os.cli.links.link_quality import LinkQuality
 from p2os.cli.quantities import parse_duration
-from p2os.cli.robots.dashboard import Sight, draw, line_of
+from p2os.cli.robots.dashboard import Dashboard, draw, line_of
 from p2os.client import Notice, PacketArrived, Robot, RobotState
 from p2os.errors import MissingDependencyError
 from p2os.timing import NS_PER_MS, NS_PER_S, Nanos
@@ -42,7 +42,7 @@ def register(app: typer.Typer) -> None:
 def monitor(
     url: Annotated[str, typer.Argument(help="Where the robot is.", metavar="URL")],
     duration: Annotated[str, typer.Option("--for", help="End after so long.", metavar="TIME")] = "",
-    robot: Annotated[str, typer.Option(help="Robot model or TOML file, if it is not what the robot says.")] = "",
+    robot: Annotated[str, typer.Option(help="Robot model or TOML file, if it is not what the robot reports.")] = "",
     json_output: Annotated[bool, typer.Option("--json", help="Print one JSON object a packet.")] = False,
 ) -> None:
     """Show a robot."""
@@ -66,7 +66,7 @@ def state_as_plain(state: RobotState) -> dict[str, object]:
 
 
 def words_of(notice: Notice) -> str:
-    """Return what happened, for a person."""
+    """Return a notice in words, for a person."""
     name = "".join(f" {letter.lower()}" if letter.isupper() else letter for letter in type(notice).__name__).strip()
     detail = getattr(notice, "reason", None) or getattr(notice, "text", None) or getattr(notice, "what", None)
     return f"{name}: {detail}" if detail else name
@@ -101,9 +101,9 @@ def _show(client: Robot, url: str, lasts_ns: Nanos | None) -> None:
     console = Console()
     with Live(console=console, auto_refresh=False, screen=True) as live:
         while ends is None or wall_clock() < ends:
-            sight = Sight(
+            dashboard = Dashboard(
                 title=title, link=client.link, state=client.state, limits=client.limits, parameters=client.parameters,
                 stats=client.stats, quality=quality, news=tuple(news),
             )  # fmt: skip
-            live.update(draw(sight, console.width), refresh=True)
+            live.update(draw(dashboard, console.width), refresh=True)
             client.sleep(1 / PICTURES_PER_S)

@@ -1,19 +1,16 @@
-"""`p2os teleop`: drive a robot with the keyboard.
+"""`p2os teleop`: drive a robot with the keyboard, or with a game pad.
 
-Keys to speeds, with a deadman: no key for a while and the robot stops.
+What reads a pad is `p2os.cli.robots.pad_source`, what its buttons mean `p2os.gamepad`.
 
-Theory of operation. A terminal tells when a key is pressed and repeats it while
-it is held, but never that it was let go. The first press drives for as long as
-keyboards take to begin to repeat; each repetition drives on for a shorter time.
-So a tap is a short push, a held key drives, and a key let go, a terminal that
-hangs or a person who walks away stop the robot.
+Theory of operation. A terminal shows when a key is pressed and repeats it while it is
+held, but never that it was released. The first press drives for as long as keyboards
+take to begin to repeat; each repetition drives on for a shorter time. So a tap is a
+short push, a held key drives, and a key released, a terminal that hangs or a person
+who walks away stop the robot (`Teleop`, passive; `KeyLoop` around it). With a pad, Up
+connects, R2, L2 and the right stick drive, Down releases the robot (`PadDriver`).
 
-Passive: keys and times are passed in.
-
-Driving by game pad: Up connects, R2, L2 and the right stick drive, Down lets the robot go.
-
-Invariant: the robot stands unless a report younger than the pad's loss time asks for more,
-and after a pause of the program until Up is pressed anew.
+Invariant: the robot stands unless a key or a report younger than its hold or loss time
+asks for more, and after a pause of the program until a key or Up is pressed anew.
 """
 
 import contextlib
@@ -39,6 +36,34 @@ from p2os.timing import NS_PER_MS, NS_PER_S, Nanos
 from p2os.transport.waiting import wait_readable
 from p2os.transport.wall_clock import Clock, GapWatch, wall_clock
 
+HELP = """Drive a robot with the keyboard, or with a game pad.
+
+Hold a key to drive; let it go and the robot stops. So it does when the terminal
+hangs, the link is lost, the machine sleeps, or anything ends the program: a key
+must be pressed anew then.
+
+\b
+Keys:
+  arrows, w a s d, or i j , l   ahead, left, back, right
+  u o m .                       bends: ahead-left, ahead-right, back-left, back-right
+  space, k, x                   stop
+  + -                           faster, slower
+  q, Esc, Ctrl-C                end
+
+\b
+Examples:
+  p2os teleop tcp:127.0.0.1:8101
+  p2os teleop serial:/dev/ttyUSB0 --vel 150mm/s --turn-rate 20deg/s
+  p2os teleop tcp:127.0.0.1:8101 --pad
+
+With --pad: Up connects, Down releases it, R2 drives ahead, L2 back, the right stick
+turns; a pad that goes away stops the robot within 200 ms.
+"""
+DEFAULT_VEL, DEFAULT_RATE = "0.3m/s", "45deg/s"
+#: chosen: how often keys are looked for and the line is renewed.
+TURN_NS: Nanos = 50 * NS_PER_MS
+#: chosen: a lone Esc and an arrow key begin alike; the rest of an arrow follows at once.
+ESCAPE_WAIT_S = 0.03
 #: Keyboards begin to repeat after 250 to 660 ms (X11's default is 660 ms).
 FIRST_HOLD_NS: Nanos = 700 * NS_PER_MS
 #: chosen: keyboards repeat every 25 to 50 ms; slow links bunch the repetitions up.
@@ -63,29 +88,71 @@ SEQUENCES: Mapping[str, str] = {
     "\x1b[A": "up", "\x1b[B": "down", "\x1b[C": "right", "\x1b[D": "left",
     "\x1bOA": "up", "\x1bOB": "down", "\x1bOC": "right", "\x1bOD": "left",
 }  # fmt: skip
+#: How often the pad is read.
+PAD_PERIOD_NS: Nanos = 20 * NS_PER_MS
+
+#: Returns the pad's report; None while it is gone.
+Reports = Callable[[], PadReport | None]
 
 
-def split_keys(text: str) -> list[str]:
-    """Return the keys that a terminal's characters stand for."""
-    keys, place = [], 0
-    while place < len(text):
-        sequence = text[place : place + 3]
-        if sequence in SEQUENCES:
-            keys.append(SEQUENCES[sequence])
-            place += 3
-        elif text[place] == "\x1b" and text[place + 1 : place + 2] in {"[", "O"}:
-            end = next(
-                (at for at in range(place + 2, len(text)) if text[at].isalpha() or text[at] == "~"), len(text) - 1
-            )
-            place = end + 1  # a key that means nothing here
-        else:
-            keys.append("escape" if text[place] == "\x1b" else text[place].lower())
-            place += 1
-    return keys
+def register(app: typer.Typer) -> None:
+    """Add the verb."""
+    app.command("teleop", help=HELP)(teleop)
+
+
+def teleop(
+    url: Annotated[str, typer.Argument(help="Where the robot is.", metavar="URL")],
+    vel: Annotated[
+        str, typer.Option(help=f"Speed of a held key or a full trigger; {DEFAULT_VEL}, pad 0.4m/s.", metavar="SPEED")
+    ] = "",
+    turn_rate: Annotated[
+        str,
+        typer.Option(
+            help=f"Turning speed of a held key or a full stick; {DEFAULT_RATE}, pad 1.7rad/s.", metavar="RATE"
+        ),
+    ] = "",
+    pad: Annotated[bool, typer.Option("--pad", help="Drive by game pad instead of keys.")] = False,
+    robot: Annotated[str, typer.Option(help="Robot model or TOML file, if it is not what the robot reports.")] = "",
+) -> None:
+    """Drive by keyboard or pad."""
+    forward_mps = parse_quantity(vel or (f"{PAD_MPS}m/s" if pad else DEFAULT_VEL), Quantity.SPEED, "--vel")
+    turn_radps = parse_quantity(
+        turn_rate or (f"{PAD_RADPS}rad/s" if pad else DEFAULT_RATE), Quantity.TURN_RATE, "--turn-rate"
+    )
+    if forward_mps <= 0 or turn_radps <= 0:
+        raise UsageError("--vel and --turn-rate must be positive", hint="p2os teleop --help")
+    if pad:
+        drive_by_pad(url, robot or None, (forward_mps, turn_radps))
+        return
+    if not sys.stdin.isatty():
+        raise UsageError("there is no keyboard: stdin is not a terminal", hint="p2os drive URL --vel 0.2m/s --for 2s")
+    with held(Robot(url, model=robot or None)) as client, raw_keyboard():
+        sys.stderr.write("hold arrows or w a s d to drive, space stops, + - change the speed, q ends\r\n")
+        loop = KeyLoop(Teleop(forward_mps, turn_radps), client)
+        try:
+            while not loop.keys.is_over:
+                loop.turn()
+        finally:
+            sys.stderr.write("\r\n")
+
+
+def drive_by_pad(url: str, model: str | None, fastest: tuple[float, float]) -> None:
+    """Drive by the first game pad of this machine."""
+    hold_robot()
+    with SdlPad() as pad:
+        sys.stderr.write(f"game pad: {pad.name}\n")
+        PadDriver(
+            pad.report,
+            lambda: held(Robot(url, model=model)),
+            fastest,
+            clock=wall_clock,
+            wait=lambda span_ns: time.sleep(span_ns / NS_PER_S),
+            report=lambda text: print(text, file=sys.stderr),  # noqa: T201 - the I/O layer
+        ).run()
 
 
 class Teleop:
-    """What the keys want of the robot.
+    """What the keys ask of the robot.
 
     Args:
         forward_mps: Speed of a full step, m/s.
@@ -141,206 +208,14 @@ class Teleop:
             self._until = None
 
 
-#: How often the pad is asked, nanoseconds.
-PERIOD_NS: Nanos = 20 * NS_PER_MS
-
-
-class Driven(Protocol):
-    """What is needed of the robot's client."""
-
-    def set_velocity(self, forward_mps: float, turn_radps: float) -> None:
-        """Drive at these speeds from now on."""
-        ...
-
-    def on_event(self, callback: Callable[[Notice], None]) -> object:
-        """Call `callback` with what happens, from any thread."""
-        ...
-
-
-#: Returns how the pad stands; None while it is gone.
-Reports = Callable[[], PadReport | None]
-
-
-class PadDriver:
-    """One pad and one robot.
-
-    Args:
-        reports: The pad.
-        connect: Opens the robot; leaving it stops the motors.
-        fastest: Speeds at full deflection, m/s and rad/s.
-        clock: Returns the time, nanoseconds.
-        wait: Lets so many nanoseconds pass.
-        say: Told of each change, one line.
-    """
-
-    def __init__(
-        self,
-        reports: Reports,
-        connect: Callable[[], AbstractContextManager[Driven]],
-        fastest: tuple[float, float],
-        *,
-        clock: Callable[[], Nanos],
-        wait: Callable[[Nanos], None],
-        say: Callable[[str], None],
-    ) -> None:
-        self._reports, self._connect, self._fastest = reports, connect, fastest
-        self._clock, self._wait, self._say = clock, wait, say
-        self._pad = Gamepad()
-
-    def run(self) -> None:
-        """Drive until the pad is gone for good while no robot is connected."""
-        self._say("Up connects")
-        while True:
-            while not self._pad.wants_robot:
-                if self._look() is None:
-                    self._say("the pad is gone")
-                    return
-                self._wait(PERIOD_NS)
-            with self._connect() as robot:
-                self._say("connected: R2 ahead, L2 back, right stick turns, Down lets go")
-                why = self._drive(robot)
-            self._pad.forget_request()
-            self._say(f"{why}: the robot stands; Up connects again")
-
-    def _drive(self, robot: Driven) -> str:
-        """Hand speeds on while the connect request lasts; return why it ended."""
-        stops: deque[Notice] = deque()
-        robot.on_event(lambda notice: stops.append(notice) if is_stop(notice) else None)
-        gaps = GapWatch(self._clock())
-        while True:
-            if (gap_ns := gaps.gap(self._clock())) or stops:
-                _stop(robot)
-                self._pad.lose()
-                return f"paused for {gap_ns / NS_PER_S:.1f} s" if gap_ns else "the client stopped the robot"
-            self._look()
-            lost_at = self._pad.lost_at
-            if lost_at is None or self._clock() >= lost_at:
-                _stop(robot)
-                self._pad.lose()
-                return "the pad is lost"
-            if not self._pad.wants_robot:
-                _stop(robot)
-                return "Down was pressed"
-            try:
-                robot.set_velocity(
-                    self._fastest[0] * self._pad.forward / TRIGGER_FULL, self._fastest[1] * self._pad.turn / STICK_FULL
-                )
-            except LinkLostError:
-                return "the link is lost"
-            gaps.expect(self._clock() + PERIOD_NS)
-            self._wait(PERIOD_NS)
-
-    def _look(self) -> PadReport | None:
-        report = self._reports()
-        if report is not None:
-            self._pad.take(report, self._clock())
-        return report
-
-
-def is_stop(notice: Notice) -> bool:
-    """Tell whether the client has stopped the robot by itself: what drove it must be asked for anew."""
-    return isinstance(notice, (GapStopped, DeadmanStopped))
-
-
-def _stop(robot: Driven) -> None:
-    with contextlib.suppress(LinkLostError):  # it stands by itself then
-        robot.set_velocity(0.0, 0.0)
-
-
-HELP = """Drive a robot with the keyboard, or with a game pad.
-
-Hold a key to drive; let it go and the robot stops. So it does when the terminal
-hangs, the link is lost, the machine sleeps, or anything ends the program: a key
-must be pressed anew then.
-
-\b
-Keys:
-  arrows, w a s d, or i j , l   ahead, left, back, right
-  u o m .                       bends: ahead-left, ahead-right, back-left, back-right
-  space, k, x                   stop
-  + -                           faster, slower
-  q, Esc, Ctrl-C                end
-
-\b
-Examples:
-  p2os teleop tcp:127.0.0.1:8101
-  p2os teleop serial:/dev/ttyUSB0 --vel 150mm/s --turn-rate 20deg/s
-  p2os teleop tcp:127.0.0.1:8101 --pad
-
-With --pad: Up connects, Down lets go, R2 drives ahead, L2 back, the right stick
-turns; a pad that goes away stops the robot within 200 ms.
-"""
-DEFAULT_VEL, DEFAULT_RATE = "0.3m/s", "45deg/s"
-#: chosen: how often keys are looked for and the line is renewed.
-TURN_NS: Nanos = 50 * NS_PER_MS
-#: chosen: a lone Esc and an arrow key begin alike; the rest of an arrow follows at once.
-ESCAPE_WAIT_S = 0.03
-
-
-def register(app: typer.Typer) -> None:
-    """Add the verb."""
-    app.command("teleop", help=HELP)(teleop)
-
-
-def teleop(
-    url: Annotated[str, typer.Argument(help="Where the robot is.", metavar="URL")],
-    vel: Annotated[
-        str, typer.Option(help=f"Speed of a held key or a full trigger; {DEFAULT_VEL}, pad 0.4m/s.", metavar="SPEED")
-    ] = "",
-    turn_rate: Annotated[
-        str,
-        typer.Option(
-            help=f"Turning speed of a held key or a full stick; {DEFAULT_RATE}, pad 1.7rad/s.", metavar="RATE"
-        ),
-    ] = "",
-    pad: Annotated[bool, typer.Option("--pad", help="Drive by game pad instead of keys.")] = False,
-    robot: Annotated[str, typer.Option(help="Robot model or TOML file, if it is not what the robot says.")] = "",
-) -> None:
-    """Drive by keyboard or pad."""
-    forward_mps = parse_quantity(vel or (f"{PAD_MPS}m/s" if pad else DEFAULT_VEL), Quantity.SPEED, "--vel")
-    turn_radps = parse_quantity(
-        turn_rate or (f"{PAD_RADPS}rad/s" if pad else DEFAULT_RATE), Quantity.TURN_RATE, "--turn-rate"
-    )
-    if forward_mps <= 0 or turn_radps <= 0:
-        raise UsageError("--vel and --turn-rate must be positive", hint="p2os teleop --help")
-    if pad:
-        drive_by_pad(url, robot or None, (forward_mps, turn_radps))
-        return
-    if not sys.stdin.isatty():
-        raise UsageError("there is no keyboard: stdin is not a terminal", hint="p2os drive URL --vel 0.2m/s --for 2s")
-    with held(Robot(url, model=robot or None)) as client, raw_keyboard():
-        sys.stderr.write("hold arrows or w a s d to drive, space stops, + - change the speed, q ends\r\n")
-        loop = KeyLoop(Teleop(forward_mps, turn_radps), client)
-        try:
-            while not loop.keys.is_over:
-                loop.turn()
-        finally:
-            sys.stderr.write("\r\n")
-
-
-def drive_by_pad(url: str, model: str | None, fastest: tuple[float, float]) -> None:
-    """Drive by the first game pad of this machine."""
-    hold_robot()
-    with SdlPad() as pad:
-        sys.stderr.write(f"game pad: {pad.name}\n")
-        PadDriver(
-            pad.report,
-            lambda: held(Robot(url, model=model)),
-            fastest,
-            clock=wall_clock,
-            wait=lambda span_ns: time.sleep(span_ns / NS_PER_S),
-            say=lambda text: print(text, file=sys.stderr),  # noqa: T201 - the I/O layer
-        ).run()
-
-
 class KeyLoop:
-    """Hands what the keys want to the robot, turn by turn.
+    """Hands what the keys ask for to the robot, turn by turn.
 
     After a pause of the program nothing is held any more, and keys that waited
     mean nothing, but for those that end it; the next press or repetition drives.
 
     Args:
-        keys: What the keys want.
+        keys: What the keys ask for.
         client: The robot.
         read: Returns the keys that came within so many nanoseconds.
         clock: Nanoseconds that never run back.
@@ -363,7 +238,7 @@ class KeyLoop:
         client.on_event(lambda notice: self._stops.append(notice) if is_stop(notice) else None)
 
     def turn(self) -> None:
-        """Take the keys that came, tell the robot, show where it is."""
+        """Take the keys that came, send the speeds, show where the robot is."""
         self._gaps.expect(self._clock() + TURN_NS)
         pressed = self._read(TURN_NS)
         now = self._clock()
@@ -393,6 +268,25 @@ def status(keys: Teleop, client: Robot) -> str:
     )
 
 
+def split_keys(text: str) -> list[str]:
+    """Return the keys that a terminal's characters stand for."""
+    keys, place = [], 0
+    while place < len(text):
+        sequence = text[place : place + 3]
+        if sequence in SEQUENCES:
+            keys.append(SEQUENCES[sequence])
+            place += 3
+        elif text[place] == "\x1b" and text[place + 1 : place + 2] in {"[", "O"}:
+            end = next(
+                (at for at in range(place + 2, len(text)) if text[at].isalpha() or text[at] == "~"), len(text) - 1
+            )
+            place = end + 1  # a key that means nothing here
+        else:
+            keys.append("escape" if text[place] == "\x1b" else text[place].lower())
+            place += 1
+    return keys
+
+
 def read_keys(longest_ns: Nanos) -> list[str]:
     """Return the keys that came within so long; waits for the first only."""
     descriptor = sys.stdin.fileno()
@@ -408,7 +302,7 @@ def read_keys(longest_ns: Nanos) -> list[str]:
 
 @contextlib.contextmanager
 def raw_keyboard() -> Iterator[None]:
-    """Let keys through one by one and unseen, and put the terminal back afterwards.
+    """Read keys one by one without echo, and put the terminal back afterwards.
 
     Raises:
         MissingDependencyError: This system has no Unix terminals.
@@ -425,3 +319,101 @@ def raw_keyboard() -> Iterator[None]:
         yield
     finally:
         termios.tcsetattr(descriptor, termios.TCSANOW, before)
+
+
+class Driven(Protocol):
+    """What is needed of the robot's client."""
+
+    def set_velocity(self, forward_mps: float, turn_radps: float) -> None:
+        """Drive at these speeds from now on."""
+        ...
+
+    def on_event(self, callback: Callable[[Notice], None]) -> object:
+        """Call `callback` with what happens, from any thread."""
+        ...
+
+
+class PadDriver:
+    """One pad and one robot.
+
+    Args:
+        reports: The pad.
+        connect: Opens the robot; leaving it stops the motors.
+        fastest: Speeds at full deflection, m/s and rad/s.
+        clock: Returns the time, nanoseconds.
+        wait: Lets so many nanoseconds pass.
+        report: Called with one line at each change.
+    """
+
+    def __init__(
+        self,
+        reports: Reports,
+        connect: Callable[[], AbstractContextManager[Driven]],
+        fastest: tuple[float, float],
+        *,
+        clock: Callable[[], Nanos],
+        wait: Callable[[Nanos], None],
+        report: Callable[[str], None],
+    ) -> None:
+        self._reports, self._connect, self._fastest = reports, connect, fastest
+        self._clock, self._wait, self._report = clock, wait, report
+        self._pad = Gamepad()
+
+    def run(self) -> None:
+        """Drive until the pad is gone for good while no robot is connected."""
+        self._report("Up connects")
+        while True:
+            while not self._pad.wants_robot:
+                if self._look() is None:
+                    self._report("the pad is gone")
+                    return
+                self._wait(PAD_PERIOD_NS)
+            with self._connect() as robot:
+                self._report("connected: R2 ahead, L2 back, right stick turns, Down releases the robot")
+                why = self._drive(robot)
+            self._pad.forget_request()
+            self._report(f"{why}: the robot stands; Up connects again")
+
+    def _drive(self, robot: Driven) -> str:
+        """Hand speeds on while the connect request lasts; return why it ended."""
+        stops: deque[Notice] = deque()
+        robot.on_event(lambda notice: stops.append(notice) if is_stop(notice) else None)
+        gaps = GapWatch(self._clock())
+        while True:
+            if (gap_ns := gaps.gap(self._clock())) or stops:
+                _stop(robot)
+                self._pad.lose()
+                return f"paused for {gap_ns / NS_PER_S:.1f} s" if gap_ns else "the client stopped the robot"
+            self._look()
+            lost_at = self._pad.lost_at
+            if lost_at is None or self._clock() >= lost_at:
+                _stop(robot)
+                self._pad.lose()
+                return "the pad is lost"
+            if not self._pad.wants_robot:
+                _stop(robot)
+                return "Down was pressed"
+            try:
+                robot.set_velocity(
+                    self._fastest[0] * self._pad.forward / TRIGGER_FULL, self._fastest[1] * self._pad.turn / STICK_FULL
+                )
+            except LinkLostError:
+                return "the link is lost"
+            gaps.expect(self._clock() + PAD_PERIOD_NS)
+            self._wait(PAD_PERIOD_NS)
+
+    def _look(self) -> PadReport | None:
+        report = self._reports()
+        if report is not None:
+            self._pad.take(report, self._clock())
+        return report
+
+
+def is_stop(notice: Notice) -> bool:
+    """Tell whether the client has stopped the robot by itself: what drove it must be asked for again."""
+    return isinstance(notice, (GapStopped, DeadmanStopped))
+
+
+def _stop(robot: Driven) -> None:
+    with contextlib.suppress(LinkLostError):  # it stands by itself then
+        robot.set_velocity(0.0, 0.0)

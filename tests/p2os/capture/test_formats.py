@@ -196,7 +196,7 @@ def test_what_is_no_tcp_is_left_out() -> None:
     assert read_capture(network_file([b"ARP"], 1, bytes(12) + b"\x08\x06")).chunks == ()
     with pytest.raises(FileError, match="link type 105 is not read here"):
         read_capture(network_file([b"beacon"], 105, b""))
-    with pytest.raises(FileError, match="tells no direction"):
+    with pytest.raises(FileError, match="gives no direction"):
         read_capture(network_file([b"\x07data"], 147, b""))
 
 

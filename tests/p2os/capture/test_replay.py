@@ -1,11 +1,13 @@
-"""Recorded conversations played again, in virtual time; and what a tap says at the end."""
+"""Recorded conversations played again, in virtual time; and what a tap sends at the end."""
 
 from pathlib import Path
 
 import pytest
 
 from p2os.capture import Chunk, Direction, capture_of, frame_chunks, read_file
-from p2os.capture.replay import Replay, Tap, frame_of
+from p2os.capture.listing import frame_of
+from p2os.capture.replay import Replay
+from p2os.capture.tap import Tap
 from p2os.protocol.commands import Command, CommandNumber
 from p2os.protocol.connection import Connection, ConnectionRole, ConnectionState, SipReceived
 from p2os.timing import NS_PER_MS, NS_PER_S
@@ -85,28 +87,28 @@ def test_an_empty_capture_has_nothing_to_play() -> None:
     assert (replay.frames_left, replay.next_deadline(), replay.awaited) == (0, None, "")
 
 
-def test_a_tap_says_farewell_only_to_a_robot_whose_session_is_open() -> None:
-    tap, said = Tap(), []
+def test_a_tap_has_closing_frames_only_for_a_robot_whose_session_is_open() -> None:
+    tap, closing = Tap(), []
     for chunk in ARIA.chunks:
-        assert tap.hear(chunk.direction or TO, chunk.data, chunk.at_ns).data == chunk.data
-        said.append(tap.farewell())
+        assert tap.observe(chunk.direction or TO, chunk.data, chunk.at_ns).data == chunk.data
+        closing.append(tap.closing_frames())
     stop_first = command(CommandNumber.STOP) + command(CommandNumber.VEL, 0) + command(CommandNumber.CLOSE)
-    assert set(said) == {b"", stop_first}
-    assert (said[0], said[len(said) // 2], said[-1]) == (b"", stop_first, b"")
+    assert set(closing) == {b"", stop_first}
+    assert (closing[0], closing[len(closing) // 2], closing[-1]) == (b"", stop_first, b"")
 
 
-def test_a_tap_that_has_not_heard_the_beginning_says_farewell_to_a_robot_that_was_told_to_move() -> None:
+def test_a_tap_that_has_not_seen_the_beginning_has_closing_frames_for_a_robot_that_was_told_to_move() -> None:
     tap = Tap()
-    tap.hear(TO, command(CommandNumber.VEL, 200), 0)
-    assert tap.farewell()
-    tap.hear(TO, command(CommandNumber.CLOSE), 1)
-    assert tap.farewell() == b""
+    tap.observe(TO, command(CommandNumber.VEL, 200), 0)
+    assert tap.closing_frames()
+    tap.observe(TO, command(CommandNumber.CLOSE), 1)
+    assert tap.closing_frames() == b""
 
 
 @pytest.mark.parametrize(("code", "baud"), [(0, 9600), (2, 38400), (4, 115200), (9, None)])
-def test_a_tap_hears_a_change_of_speed(code: int, baud: int | None) -> None:
+def test_a_tap_sees_a_change_of_speed(code: int, baud: int | None) -> None:
     tap = Tap()
-    tap.hear(TO, command(CommandNumber.HOSTBAUD, code), 0)
+    tap.observe(TO, command(CommandNumber.HOSTBAUD, code), 0)
     assert tap.new_baud == baud
 
 

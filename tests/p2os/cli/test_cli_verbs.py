@@ -265,7 +265,7 @@ def test_info_of_an_unknown_model_says_whose_units_it_uses(told: Callable[..., N
     assert "model     box9000 (unknown model, units of a Pioneer 2-DX)\n" in out
     assert "sonar     off\n" in out
     assert "stalled   none\n" in out
-    assert "config    the robot does not tell it\n" in out
+    assert "config    the robot does not send it\n" in out
 
 
 def test_info_is_printed_for_programs(told: Callable[..., None], capsys: Capture) -> None:

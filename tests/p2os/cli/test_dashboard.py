@@ -8,7 +8,7 @@ import pytest
 from rich.console import Console
 
 from p2os.cli.links.link_quality import LinkQuality, spread_of
-from p2os.cli.robots.dashboard import Canvas, Sight, bar, draw
+from p2os.cli.robots.dashboard import Canvas, Dashboard, bar, draw
 from p2os.client import Limits, Link, RobotPose, RobotState, SonarEcho
 from p2os.protocol.connection import ConnectionStats
 from p2os.protocol.sip import StandardSip
@@ -32,24 +32,24 @@ STATE = RobotState(
 )  # fmt: skip
 
 
-def picture(sight: Sight, columns: int = 120) -> str:
+def picture(dashboard: Dashboard, columns: int = 120) -> str:
     console = Console(width=columns, height=60, record=True, file=io.StringIO())
-    console.print(draw(sight, columns))
+    console.print(draw(dashboard, columns))
     return console.export_text()
 
 
-def sight(state: RobotState | None = STATE, link: Link = Link.OPEN) -> Sight:
+def dashboard(state: RobotState | None = STATE, link: Link = Link.OPEN) -> Dashboard:
     quality = LinkQuality(100 * NS_PER_MS)
     for at_ms in (0, 100, 200, 302, 602, 700):
         quality.packet(at_ms * NS_PER_MS)
-    return Sight(
+    return Dashboard(
         title="Wilma", link=link, state=state, limits=LIMITS, parameters=load_parameters("p2dx"),
         stats=ConnectionStats(), quality=quality, news=("link lost: no packet",),
     )  # fmt: skip
 
 
 def test_everything_has_its_place() -> None:
-    text = picture(sight())
+    text = picture(dashboard())
     for words in (
         "Wilma", "open", "1.250 m", "-0.500 m", "90.0 deg", "0.750 m/s", "11.2 V", "left", "front 2, front 3",
         "in 10000001", "pressed", "6 ", "2 missed", "nearest 0.30 m (sonar 0)", "link lost: no packet",
@@ -59,22 +59,22 @@ def test_everything_has_its_place() -> None:
 
 
 def test_a_narrow_terminal_gets_the_ring_and_one_line() -> None:
-    text = picture(sight(), 80)
+    text = picture(dashboard(), 80)
     assert "─ sonar ─" in text
     assert "─ motion ─" not in text
     assert max(len(line) for line in text.splitlines()) <= 80
 
 
 def test_without_a_packet_it_says_so() -> None:
-    assert "no packet yet" in picture(sight(None, Link.SEARCHING))
+    assert "no packet yet" in picture(dashboard(None, Link.SEARCHING))
 
 
 @pytest.mark.parametrize("motors", [None, True, False])
 def test_no_state_breaks_it(motors: bool | None) -> None:
     bare = replace(STATE, sonar=(), battery_v=14.0, stall_left=False, front_bumpers=(), motors_enabled=motors,
                    stop_button=None, pose=RobotPose(1e6, -1e6, 1e4))  # fmt: skip
-    assert "no echo" in picture(sight(bare))
-    assert "no echo" in picture(sight(bare), 80)
+    assert "no echo" in picture(dashboard(bare))
+    assert "no echo" in picture(dashboard(bare), 80)
 
 
 def test_bars_grow_from_the_middle() -> None:

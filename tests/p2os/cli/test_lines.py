@@ -231,7 +231,7 @@ def test_a_pause_of_a_third_of_a_second_is_borne_and_one_without_a_session_harms
     assert len(joined.told) == 1
 
 
-def test_a_bridge_passes_on_before_it_shows_and_says_farewell_when_showing_fails() -> None:
+def test_a_bridge_passes_on_before_it_shows_and_sends_the_closing_frames_when_showing_fails() -> None:
     seen: list[bytes] = []
 
     def fail(chunk: Chunk) -> None:
@@ -326,7 +326,7 @@ def test_a_bridge_whose_robot_is_gone_refuses_its_client() -> None:
         (["replay", "gone.jsonl", "tcp:x"], 2, "p2os: cannot read gone.jsonl"),
         (["replay", "FILE", "tcp:127.0.0.1:1", "--as", "client"], 1, "p2os: cannot connect"),
         (["replay", "FILE", "serial:/dev/ttyUSB99", "--as", "client"], 2, "p2os: the recording holds 1 motion"),
-        (["replay", "FILE", "pty:"], 2, "p2os: FILE holds nothing that a robot said"),
+        (["replay", "FILE", "pty:"], 2, "p2os: FILE holds nothing that a robot sent"),
         (["replay", "FILE", "tcp:x", "--speed", "0"], 2, "p2os: Invalid value"),
         (["replay", "FILE", "tcp:x", "--as", "dog"], 2, "p2os: Invalid value"),
     ],

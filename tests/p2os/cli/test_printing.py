@@ -192,7 +192,7 @@ def test_sniff_passes_on_what_nobody_wants_to_see(robot: HeardRobot) -> None:
         os.close(reader)
 
 
-def test_sniff_whose_reader_goes_says_farewell(robot: HeardRobot) -> None:
+def test_sniff_whose_reader_goes_sends_the_closing_frames(robot: HeardRobot) -> None:
     with socket.socket() as probe:
         probe.bind(("127.0.0.1", 0))
         between = f"tcp:127.0.0.1:{probe.getsockname()[1]}"

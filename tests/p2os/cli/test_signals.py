@@ -222,7 +222,7 @@ def test_every_signal_of_the_table_is_handled_and_given_back(now: list[int]) -> 
     assert signal.getsignal(signal.SIGTTOU) is signal.SIG_IGN
 
 
-def test_a_program_that_was_made_deaf_to_hang_ups_stays_so(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_program_that_was_started_with_hang_ups_ignored_keeps_ignoring_them(monkeypatch: pytest.MonkeyPatch) -> None:
     with restored_signals():
         signal.signal(signal.SIGHUP, signal.SIG_IGN)
         signal.signal(signal.SIGINT, signal.SIG_IGN)

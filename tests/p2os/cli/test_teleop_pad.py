@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from p2os.cli.main import run
 from p2os.cli.robots import pad_source, teleop
 from p2os.cli.robots.pad_source import SdlPad
-from p2os.cli.robots.teleop import PERIOD_NS, PadDriver
+from p2os.cli.robots.teleop import PAD_PERIOD_NS, PadDriver
 from p2os.client import GapStopped, Notice
 from p2os.client.notices import LinkLostError
 from p2os.errors import MissingDependencyError, UsageError
@@ -39,7 +39,7 @@ class Bench:
             (PAD_MPS, PAD_RADPS),
             clock=lambda: self.now,
             wait=self.wait,
-            say=self.said.append,
+            report=self.said.append,
         ).run()
 
     def wait(self, span_ns: int) -> None:
@@ -80,7 +80,7 @@ def test_a_pad_that_goes_stops_the_robot_in_200_ms_and_up_must_be_given_anew() -
     bench = Bench([NOTHING, UP, drive, *[None] * 9, PadReport(up=True, forward=1023), drive, drive])
     assert (bench.entered, bench.left) == (1, 1)
     lost_at = next(at for at, forward, _ in bench.told if forward == 0)
-    assert lost_at - 2 * PERIOD_NS <= 200 * NS_PER_MS
+    assert lost_at - 2 * PAD_PERIOD_NS <= 200 * NS_PER_MS
     assert "the pad is lost: the robot stands; Up connects again" in bench.said
 
 

@@ -260,7 +260,7 @@ from p2os.client.aio import Robot
 robot = Robot({served.url!r})
 loop = asyncio.new_event_loop()
 loop.run_until_complete(robot.connect())
-robot._engine._loop = loop
+robot._robot_loop._loop = loop
 async def go(): robot.set_velocity(0.3); await asyncio.sleep(0.3)
 loop.run_until_complete(go())
 """

@@ -133,7 +133,7 @@ def test_ctrl_c_ends_any_wait_and_stops_the_robot(served: ServedRobot, what: str
 
 def _interrupt_when_waiting(robot: Robot, what: str) -> None:
     wanted = Link.SEARCHING if what == "connect" else Link.OPEN
-    until(lambda: robot._engine.core.link is wanted)
+    until(lambda: robot._thread.core.link is wanted)
     _thread.interrupt_main()
 
 
@@ -159,7 +159,7 @@ def test_an_error_in_a_callback_stops_the_robot_and_reaches_the_program(served: 
             robot.set_velocity(0.3)
     with pytest.raises(P2osError, match="thread failed"), robot_on(served) as robot:  # noqa: PT012  # its end raises
         robot.on_state(lambda _: 1 // 0)  # type: ignore[arg-type,return-value]
-        until(lambda: robot._engine._failure is not None)
+        until(lambda: robot._thread._failure is not None)
 
 
 def test_a_program_that_hangs_is_stopped_by_the_deadman(served: ServedRobot) -> None:
@@ -193,7 +193,7 @@ def test_before_the_first_packet_nothing_is_known(served: ServedRobot) -> None:
     robot = robot_on(served)
     with pytest.raises(LinkLostError, match="has not sent a packet yet"):
         _ = robot.state
-    with pytest.raises(LinkLostError, match="has not said who it is yet"):
+    with pytest.raises(LinkLostError, match="has not sent its identity yet"):
         _ = robot.identity
     with pytest.raises(LinkLostError, match="no robot is connected"):
         robot.set_velocity(0.1)
