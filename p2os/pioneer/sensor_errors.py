@@ -29,22 +29,22 @@ class SensorErrorsError(FileError):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SonarErrors:
-    """What spoils a range."""
+    """The errors of a range."""
 
     #: Standard deviation of every echo, m, and its part of the range.
     noise_m: float = 0.0
     noise_part: float = 0.0
-    #: Probability that an echo is not heard.
+    #: Probability that an echo is lost.
     dropout: float = 0.0
-    #: A surface met at more than this from the square sends no echo back, deg; 90 hears all.
+    #: A surface met at more than this from the square sends no echo back, deg; 90 loses none.
     specular_deg: float = 90.0
-    #: Probability that a sonar hears the ping of the one fired before it: the range is drawn anew, always nearer.
+    #: Probability that a sonar receives the ping of the one fired before it: the range is drawn anew, always nearer.
     crosstalk: float = 0.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class OdometryErrors:
-    """What spoils dead reckoning: true size over the size that the firmware believes."""
+    """The errors of dead reckoning: true size over the size that the firmware assumes."""
 
     left_wheel: float = 1.0
     right_wheel: float = 1.0
@@ -54,7 +54,7 @@ class OdometryErrors:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class HeadingErrors:
-    """What spoils compass and gyro."""
+    """The errors of compass and gyro."""
 
     compass_noise_deg: float = 0.0
     #: The same everywhere: iron of the robot itself.
@@ -66,7 +66,7 @@ class HeadingErrors:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PowerErrors:
-    """What the voltmeter sees."""
+    """The errors of the voltmeter."""
 
     #: Ohms of battery and cables: the sag under load.
     battery_resistance_ohm: float = 0.0

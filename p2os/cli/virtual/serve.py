@@ -1,9 +1,11 @@
 """`p2os serve`: be a Pioneer on a line, for any P2OS program to drive.
 
-What robots do, a line each, and never a flood of lines: a client that shouts syncs would fill a disk with them.
+Options and a fleet's file become a `FleetOrder`; `p2os.pioneer.serve` makes the robots and
+serves them. What the robots do is printed on standard error, a line an event.
 
-Invariant: no more than `MOST_LINES` a second of a robot's own time, and what was
-left out is told by number with the next line.
+Invariant: no more than `MOST_LINES` event lines a second of a robot's own time, so that a
+client that floods the line with syncs does not fill a disk; how many were left out is in
+the next line.
 """
 
 import contextlib
@@ -50,40 +52,6 @@ from p2os.transport.wall_clock import wall_clock
 
 #: chosen: several times what an eager client causes, and still readable.
 MOST_LINES = 50
-
-
-class EventLines:
-    """The lines of one robot.
-
-    Args:
-        write: Takes a line's text, with its end.
-        who: Begins each line after the time; empty for a robot that is alone.
-    """
-
-    def __init__(self, write: Callable[[str], object], who: str = "") -> None:
-        self._write = write
-        self._who = who
-        self._second = -1
-        self._written = 0
-        self._left_out = 0
-
-    def tell(self, now: Nanos, what: str, detail: str) -> None:
-        """Write that something happened, or count it where its second is full."""
-        if now // NS_PER_S != self._second:
-            self._second, self._written = now // NS_PER_S, 0
-        if self._written >= MOST_LINES:
-            self._left_out += 1
-            return
-        self._written += 1
-        if self._left_out:
-            left_out, self._left_out = self._left_out, 0
-            self._line(now, "left out", f"{left_out} lines like the last")
-        self._line(now, what, detail)
-
-    def _line(self, now: Nanos, what: str, detail: str) -> None:
-        self._write(f"{now / NS_PER_S:10.3f} s  {self._who}{what}{': ' if detail else ''}{detail}\n")
-
-
 #: `--control` with this, and no option on a terminal, takes orders from standard input.
 STANDARD_INPUT = "-"
 #: chosen: a tenth of real time is still a debugger's pace; past a hundred no body keeps up.
@@ -99,7 +67,7 @@ HELP = f"""Be a Pioneer robot on a line, in real time, until Ctrl-C.
 ARIA, player's p2os driver, ROS nodes and this project's own programs connect to
 it as to a real robot. One client at a time; a second one is refused. When a
 client vanishes the robot stops at once and waits for the next. Type "help" while
-it runs to see what can be broken, pressed and asked.
+it runs to see the faults that can be injected, the inputs, and what can be asked.
 
 \b
 Examples:
@@ -113,8 +81,8 @@ Examples:
   p2os serve --robots 3               three of them in one room, on ports 8101 to 8103
   p2os serve --robots 2 --at 0,0 --at 1.5,0,180   face to face
   p2os serve --fleet fleet.toml       robots of all kinds from a file
-  p2os serve --sync-limit 10s         who does not connect to the robot within 10 s makes room
-  p2os serve --fault "sonar-stuck 3 1.2"   sonar 3 says 1.2 m whatever comes
+  p2os serve --sync-limit 10s         a client that does not open a session within 10 s is dropped
+  p2os serve --fault "sonar-stuck 3 1.2"   sonar 3 gives 1.2 m whatever is there
 """
 
 
@@ -136,7 +104,7 @@ def serve(
         Profile, typer.Option(help="Whose packets it sends; some clients of newer robots need ARCOS.")
     ] = Profile.P2OS,
     lenient: Annotated[
-        bool, typer.Option("--lenient", help="Answer syncs in any order and obey any family's commands, as AMRISim.")
+        bool, typer.Option("--lenient", help="Answer syncs in any order and execute any family's commands, as AMRISim.")
     ] = False,
     all_sonar: Annotated[
         bool, typer.Option("--all-sonar", help="Send every sonar in every packet, not two as a Pioneer 2 does.")
@@ -154,7 +122,7 @@ def serve(
         typer.Option(help="Where a robot begins; again for the next. Metres, degrees.", metavar="X,Y[,HEADING]"),
     ] = None,
     apart: Annotated[
-        bool, typer.Option("--apart", help="A copy of the world for each robot: they do not meet.")
+        bool, typer.Option("--apart", help="A copy of the world for each robot, without the others.")
     ] = False,
     fleet: Annotated[
         Path | None, typer.Option(help="TOML file with the world and every robot.", metavar="FILE")
@@ -166,16 +134,16 @@ def serve(
         list[str] | None, typer.Option(help="A line at an AUX port: 1=pty:/tmp/aux1.", metavar="N=URL")
     ] = None,
     fault: Annotated[
-        list[str] | None, typer.Option(help='Broken from the start: "sonar-stuck 3 1.2".', metavar="WORDS")
+        list[str] | None, typer.Option(help='Injected from the start: "sonar-stuck 3 1.2".', metavar="WORDS")
     ] = None,
     sync_limit: Annotated[
         str | None,
         typer.Option(
-            help="Let a client go that has no open session for so long, as 10s. Default: never.", metavar="TIME"
+            help="Drop a client that has no open session for so long, as 10s. Default: never.", metavar="TIME"
         ),
     ] = None,
     control: Annotated[
-        str | None, typer.Option(help="Where orders come: a URL, or - for standard input.", metavar="URL")
+        str | None, typer.Option(help="Where orders come from: a URL, or - for standard input.", metavar="URL")
     ] = None,
     status: Annotated[
         float | None, typer.Option(help="Print each robot's state so often, seconds.", min=0.1, metavar="S")
@@ -239,7 +207,7 @@ def open_hosts(order: FleetOrder, made: MadeFleet, *, speed: float = 1.0) -> lis
     try:
         for number, (robot, pioneer) in enumerate(zip(order.robots, made.robots, strict=True)):
             who = f"robot {number + 1}  " if len(made.robots) > 1 else ""
-            pioneer.on_event = on_event = EventLines(_write, who).tell
+            pioneer.on_event = on_event = EventLines(_write, who).write_event
             hosts.append(
                 Host(
                     pioneer, listen_url(robot.port), on_event=on_event, speed=speed,
@@ -275,15 +243,15 @@ def _refuse_beside_fleet(context: typer.Context) -> None:
     for name in IN_FLEET_FILE:
         source = context.get_parameter_source(name)
         if source is not None and source.name == "COMMANDLINE":
-            raise UsageError(f"--{name.replace('_', '-')} beside --fleet", hint="the fleet's file says that")
+            raise UsageError(f"--{name.replace('_', '-')} beside --fleet", hint="the fleet's file sets that")
 
 
 def _print_start(order: FleetOrder, start: Pose, number: int, host: Host, *, as_json: bool) -> None:
     where, model = host.listener.description, order.robots[number].model
     place = start.x_m, start.y_m, math.degrees(start.heading_rad)
     if as_json:
-        told = {"url": where, "robot": model, "world": order.world, "body": order.body, "seed": order.seed}
-        typer.echo(json.dumps(told | {"at": [round(value, 6) for value in place]}))
+        row = {"url": where, "robot": model, "world": order.world, "body": order.body, "seed": order.seed}
+        typer.echo(json.dumps(row | {"at": [round(value, 6) for value in place]}))
     else:
         at = " at {:.2f}, {:.2f} m, {:.0f}°".format(*place) if len(order.robots) > 1 else ""
         typer.echo(f"{where}  {model} in {order.world}{at}, {order.body} body; Ctrl-C ends")
@@ -311,3 +279,35 @@ def _show_status(hosts: Sequence[Host]) -> None:
 def _write(text: str) -> None:
     with contextlib.suppress(OSError):  # a terminal that was closed must not keep the robots from stopping
         write_stderr(text)
+
+
+class EventLines:
+    """Prints the events of one robot, a line each.
+
+    Args:
+        write: Takes a line's text, with its end.
+        who: Begins each line after the time; empty for a robot that is alone.
+    """
+
+    def __init__(self, write: Callable[[str], object], who: str = "") -> None:
+        self._write = write
+        self._who = who
+        self._second = -1
+        self._written = 0
+        self._left_out = 0
+
+    def write_event(self, now: Nanos, what: str, detail: str) -> None:
+        """Write that something happened, or count it where its second is full."""
+        if now // NS_PER_S != self._second:
+            self._second, self._written = now // NS_PER_S, 0
+        if self._written >= MOST_LINES:
+            self._left_out += 1
+            return
+        self._written += 1
+        if self._left_out:
+            left_out, self._left_out = self._left_out, 0
+            self._line(now, "left out", f"{left_out} lines like the last")
+        self._line(now, what, detail)
+
+    def _line(self, now: Nanos, what: str, detail: str) -> None:
+        self._write(f"{now / NS_PER_S:10.3f} s  {self._who}{what}{': ' if detail else ''}{detail}\n")

@@ -32,13 +32,13 @@ Examples:
 """
 #: Widest drawing in a terminal, in characters.
 WIDEST_COLUMNS = 100
-#: Files that may say otherwise which axis is up.
+#: Files whose up axis may be named.
 MESH_SUFFIXES = (".obj", ".stl", ".dae")
 
 WORLD = Annotated[str, typer.Argument(help="A world that ships, or a file.", metavar="FILE|NAME")]
 SEED = Annotated[int, typer.Option(help="Seed of a world that is made from one.")]
 UP = Annotated[
-    str, typer.Option(help="Which axis is up in a mesh file: x, y or z; auto is what its format says or is used to.")
+    str, typer.Option(help="Which axis is up in a mesh file: x, y or z; auto is what its format states or usually has.")
 ]
 
 
@@ -100,7 +100,7 @@ def show(
 
 
 def check(world: WORLD, seed: SEED = 0, up: UP = "auto") -> None:
-    """Read a world and say what is in it; an error names its line."""
+    """Read a world and print what is in it; an error names its line."""
     place = _load(world, seed, up)
     _print_skipped(place)
     typer.echo(f"{place.source}: {_summary(place)}")
@@ -128,7 +128,7 @@ def convert(
 
 
 def _load(world: str, seed: int, up: str) -> World:
-    """Return a world; only a mesh file has an up axis to be told."""
+    """Return a world; only a mesh file takes an up axis."""
     if up == "auto":
         return load_world(world, seed)
     path = Path(world)
@@ -169,8 +169,8 @@ def _summary(place: World) -> str:
         (len(place.obstacles), "obstacle"), (len(place.meshes), "mesh"), (moving, "that walks"),
         (pushed, "that can be pushed"),
     ]  # fmt: skip
-    said = ", ".join(_count(number, what) for number, what in counts if number or what == "obstacle")
-    return f"{place.name}, {_size(place)}: {said}"
+    counted = ", ".join(_count(number, what) for number, what in counts if number or what == "obstacle")
+    return f"{place.name}, {_size(place)}: {counted}"
 
 
 def _count(number: int, what: str) -> str:

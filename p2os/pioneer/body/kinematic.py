@@ -62,7 +62,7 @@ class KinematicBody:
 
     @property
     def note(self) -> str | None:
-        """Say that slopes are flat where the world has some."""
+        """That slopes are flat, where the world has some."""
         return "the kinematic body is a plan view: slopes are flat to it" if self._world.has_slopes else None
 
     @property
@@ -195,12 +195,12 @@ class KinematicBody:
         reach = self._hull_reach
         close = [
             other for other in other_robots.near
-            if math.hypot(other.live[0] - x, other.live[1] - y) <= reach + other.reach_m
+            if math.hypot(other.current[0] - x, other.current[1] - y) <= reach + other.reach_m
         ]  # fmt: skip
         if not close:
             return False
         hull = placed(self._hull, x, y, heading)
-        shapes = [(other, other.footprint(other.live)) for other in close]
+        shapes = [(other, other.footprint(other.current)) for other in close]
         found = [(other, shape) for other, shape in shapes if shape.overlaps(hull)]
         if not found:
             return False
@@ -219,7 +219,7 @@ class KinematicBody:
         if len(things) < len(names) or resistance_n > self._push_n:
             return False
         robots = (
-            () if self._other_robots is None else [other.footprint(other.live) for other in self._other_robots.near]
+            () if self._other_robots is None else [other.footprint(other.current) for other in self._other_robots.near]
         )
         if not all(self._plan.push(item.name, x, y, heading, robots) for item in things):
             return False
@@ -253,14 +253,14 @@ class KinematicBody:
 
     def _range(self, number: int) -> float:
         x, y, rays = self._rays(number)
-        return reading(min(cast(self._heard(x, y, rays), x, y, rays, self._longest_m)), self._parameters)
+        return reading(min(cast(self._echoing(x, y, rays), x, y, rays, self._longest_m)), self._parameters)
 
     def echoes(self, numbers: Sequence[int]) -> list[list[Echo]]:
         """Return what each ray of some sonar meets, with the angle at which it meets it."""
         found = []
         for number in numbers:
             x, y, rays = self._rays(number)
-            found.append(echoes(self._heard(x, y, rays), x, y, rays, self._longest_m))
+            found.append(echoes(self._echoing(x, y, rays), x, y, rays, self._longest_m))
         return found
 
     def _rays(self, number: int) -> tuple[float, float, list[Direction]]:
@@ -269,7 +269,7 @@ class KinematicBody:
         x, y = self._x + cone.x_m * c - cone.y_m * s, self._y + cone.x_m * s + cone.y_m * c
         return x, y, [(dx * c - dy * s, dx * s + dy * c) for dx, dy in cone.directions]
 
-    def _heard(self, x: float, y: float, rays: Sequence[Direction]) -> Sequence[Footprint]:
+    def _echoing(self, x: float, y: float, rays: Sequence[Direction]) -> Sequence[Footprint]:
         xs, ys = [x, *(x + self._longest_m * dx for dx, _ in rays)], [y, *(y + self._longest_m * dy for _, dy in rays)]
         box = (min(xs), min(ys), max(xs), max(ys))
         if self._other_robots is None:

@@ -1,7 +1,7 @@
 """The other robots of a world, as one of them meets them: hulls that stand where they were last seen.
 
 To another robot a robot is an upright box: the hull of its model, from its underside to its
-top. Nothing here moves anybody; `multi_robot_world` says where everyone stands.
+top. Nothing here moves a robot; `multi_robot_world` knows where each stands.
 """
 
 import math
@@ -51,17 +51,17 @@ class OtherRobot:
         self.reach_m = self._outline.reach_m + abs(self._ahead_m)
         self._shapes: dict[StandingPose, Footprint] = {}
         #: Where it was seen last, and where it stood at the last boundary of the multi-robot world.
-        self.live = StandingPose(0.0, 0.0, 0.0)
+        self.current = StandingPose(0.0, 0.0, 0.0)
         self.at_boundary = self.look()
 
     def look(self) -> StandingPose:
         """Take where it stands now from its body; return it."""
         if self._sees_others is not None:
-            self.live = self._sees_others.standing_pose
+            self.current = self._sees_others.standing_pose
         else:
             state = self.body.state
-            self.live = StandingPose(state.x_m, state.y_m, state.heading_rad)
-        return self.live
+            self.current = StandingPose(state.x_m, state.y_m, state.heading_rad)
+        return self.current
 
     def obstacle(self, standing_pose: StandingPose) -> Obstacle:
         """Return the robot as a thing that stands somewhere."""
@@ -78,7 +78,7 @@ class OtherRobot:
         return shape
 
     def bump(self) -> None:
-        """Let it feel that another robot has driven against it."""
+        """Report a contact: another robot has driven against it."""
         if self._sees_others is not None:
             self._sees_others.bump()
 
@@ -97,30 +97,30 @@ class OtherRobots:
     def __init__(self, others: Sequence[OtherRobot], parameters: RobotParameters) -> None:
         bands = Bands(parameters)
         self.others = tuple(others)
-        seen_as = [(other, other.obstacle(other.live)) for other in others]
-        self._heard = tuple(other for other, shape in seen_as if bands.echoes(shape))
+        seen_as = [(other, other.obstacle(other.current)) for other in others]
+        self._echoing = tuple(other for other, shape in seen_as if bands.echoes(shape))
         self._touched = frozenset(other.name for other, shape in seen_as if bands.is_touched(shape))
-        #: Those with whom it lives step by step until the next boundary, and those of them that its hull could meet.
+        #: Those with which it runs step by step until the next boundary, and those of them that its hull could meet.
         self.close_to: tuple[OtherRobot, ...] = ()
         self.near: tuple[OtherRobot, ...] = ()
 
     @property
     def is_close(self) -> bool:
-        """Whether it lives step by step with others."""
+        """Whether it runs step by step with others."""
         return bool(self.close_to)
 
     def come_near(self, near: Iterable[OtherRobot]) -> None:
-        """Note who is near until the next boundary; nobody: it lives by itself."""
+        """Note who is near until the next boundary; none: it runs by itself."""
         self.close_to = tuple(near)
         self.near = tuple(other for other in self.close_to if other.name in self._touched)
 
     def standing_pose_of(self, other: OtherRobot) -> StandingPose:
         """Return where this robot sees another one."""
-        return other.live if self.is_close else other.at_boundary
+        return other.current if self.is_close else other.at_boundary
 
     def echoing_within(self, x0: float, y0: float, x1: float, y1: float) -> Iterator[Footprint]:
-        """Return the others whose hulls may reach into a rectangle and are heard by this robot's sonar."""
-        for other in self._heard:
+        """Return the others whose hulls may reach into a rectangle and echo this robot's sonar."""
+        for other in self._echoing:
             standing_pose, reach = self.standing_pose_of(other), other.reach_m
             if x0 - reach <= standing_pose[0] <= x1 + reach and y0 - reach <= standing_pose[1] <= y1 + reach:
                 yield other.footprint(standing_pose)
@@ -132,7 +132,7 @@ class OtherRobots:
 
 @runtime_checkable
 class SeesOtherRobots(Protocol):
-    """A body that looks for the others itself, when it needs to; all others keep copies of them in their worlds."""
+    """A body that looks for the others itself, when it needs to; other bodies keep copies of them in their worlds."""
 
     @property
     def standing_pose(self) -> StandingPose:
@@ -140,11 +140,11 @@ class SeesOtherRobots(Protocol):
         ...
 
     def join(self, other_robots: OtherRobots | None) -> None:
-        """Meet others from now on, also after a reset."""
+        """Share the world with others from now on, also after a reset."""
         ...
 
     def bump(self) -> None:
-        """Feel that another robot has driven against the hull."""
+        """Take a contact: another robot has driven against the hull."""
         ...
 
 

@@ -257,7 +257,7 @@ def _signed16(command: Command) -> int | None:
     """Return a command's number as the robot reads it, or None when it has none.
 
     A positive argument from 32768 up is a negative number that a client has
-    packed itself: no robot is told to drive at 32 m/s.
+    packed itself: no robot is commanded to drive at 32 m/s.
     """
     value = command.argument
     if not isinstance(value, int):

@@ -28,7 +28,7 @@ Source: Pioneer 2 and Pioneer 2/3 H8 manuals, chapters on client commands, packe
 and the watchdog.
 
 Invariant: at time t the body stands at its first step boundary at or after t, so
-the result does not depend on how often anybody calls `advance_to`.
+the result does not depend on how often a caller calls `advance_to`.
 """
 
 from collections.abc import Callable

@@ -17,7 +17,7 @@ class FaultTarget:
     """What faults act on."""
 
     context: Context
-    #: Starts the controller anew; the argument says why.
+    #: Starts the controller anew; the argument is the reason.
     restart: Callable[[str], None]
 
 

@@ -90,8 +90,8 @@ def read_fault(text: str, *, sonar: int, complete: bool = True) -> Fault:
     usage = " ".join([name, *words])
     optional = {"METRES", "RATE", "VOLTS"} if not complete else set()
     if len(rest) > len(words) or len(rest) < len([word for word in words if word not in optional]):
-        what = "says too much" if len(rest) > len(words) else "is not all of it"
-        raise UsageError(f"{text!r} {what}", hint=f"say {usage}")
+        what = "has too many words" if len(rest) > len(words) else "is incomplete"
+        raise UsageError(f"{text!r} {what}", hint=f"usage: {usage}")
     found = Fault(name)
     for word, given in zip(words, rest, strict=False):
         found = _with(found, word, given, usage, sonar)
@@ -102,13 +102,13 @@ def _with(fault: Fault, word: str, given: str, usage: str, sonar: int) -> Fault:
     side, number, value = fault.side, fault.number, fault.value
     if word == "SIDE":
         if given not in SIDES[fault.name]:
-            raise UsageError(f"{given!r} is none of {', '.join(SIDES[fault.name])}", hint=f"say {usage}")
+            raise UsageError(f"{given!r} is none of {', '.join(SIDES[fault.name])}", hint=f"usage: {usage}")
         side = given
     elif word in {"NUMBER", "SEGMENT"}:
         most = sonar if word == "NUMBER" else 7
         number = int(given) if given.isdecimal() else 0
         if not 1 <= number <= most:
-            raise UsageError(f"{fault.name}: {given!r} is no number of 1 to {most}", hint=f"say {usage}")
+            raise UsageError(f"{fault.name}: {given!r} is no number of 1 to {most}", hint=f"usage: {usage}")
     else:
         most_value = {"METRES": 100.0, "RATE": 0.5, "VOLTS": 25.5}[word]
         try:
@@ -116,7 +116,7 @@ def _with(fault: Fault, word: str, given: str, usage: str, sonar: int) -> Fault:
         except ValueError:
             value = -1.0
         if not 0 <= value <= most_value:
-            raise UsageError(f"{fault.name}: {given!r} is no number of 0 to {most_value:g}", hint=f"say {usage}")
+            raise UsageError(f"{fault.name}: {given!r} is no number of 0 to {most_value:g}", hint=f"usage: {usage}")
     return Fault(fault.name, side, number, value)
 
 

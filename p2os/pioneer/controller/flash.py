@@ -25,7 +25,7 @@ from p2os.robots.parameters import RobotParameters
 
 #: HOSTBAUD and its like: code → bit/s.
 BAUD_RATES = (9600, 19200, 38400, 57600, 115200)
-#: What the robot file says; a FLASH file cannot make another robot of it.
+#: What the robot file sets; a FLASH file cannot make another robot of it.
 FIXED = frozenset({"robot_class", "subclass", "four_motors", "frontsonar", "rearsonar"})
 FIELDS_OF_PROFILE = {Profile.P2OS: P2OS_FIELDS, Profile.AROS: AROS_1_8_FIELDS, Profile.ARCOS: ARCOS_FIELDS}
 #: chosen: the version of each family's firmware that this robot reports.

@@ -39,7 +39,7 @@ def apply_input(context: Context, text: str) -> None:
     if name not in INPUTS:
         raise UsageError(f"no input {name!r}", hint=f"inputs: {', '.join(INPUTS)}")
     words = INPUTS[name][0]
-    usage = f"say {' '.join([name, *words])}"
+    usage = f"usage: {' '.join([name, *words])}"
     if len(rest) != len(words):
         raise UsageError(f"{text!r} is no input", hint=usage)
     _ACTS[name](context, [_number(word, given, usage) for word, given in zip(words, rest, strict=True)])

@@ -48,7 +48,7 @@ class Requests:
     dropped: int = 0
 
     def set(self, extra: Extra, value: int) -> None:
-        """Do as the argument says: 0 stops, 1 asks for one, 2 and more for one a cycle."""
+        """Take the argument of a request: 0 stops, 1 asks for one, 2 and more for one a cycle."""
         self.continuous = self.continuous | {extra} if value > 1 else self.continuous - {extra}
         self.once = self.once | {extra} if value == 1 else self.once - {extra}
 

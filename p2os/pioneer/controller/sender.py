@@ -9,7 +9,7 @@ small buffer.
 
 The line is a UART that sends one character after the other, 8N1: 9600 bit/s carry 96
 characters in 100 ms. `TransmitLine` counts when the last character will have left;
-what is sent still goes out as whole frames, and whoever carries them spreads the
+what is sent still goes out as whole frames, and the host that carries them spreads the
 characters. Without a speed the line takes no time.
 
 Invariants: no more than `MOST_ANSWERS` frames wait, whatever a client asks for; and

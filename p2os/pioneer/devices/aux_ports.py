@@ -1,4 +1,4 @@
-"""The AUX serial ports: bytes of a client pass through the robot to whatever hangs there.
+"""The AUX serial ports: bytes of a client pass through the robot to the device there.
 
 Source: Pioneer 2/3 H8 manual (TTY2, GETAUX, SERAUXpac): GETAUX waits until so
 many bytes have come, and 0 flushes what waits.

@@ -23,7 +23,7 @@ CHARGING_A = 2.0
 
 @dataclass(slots=True)
 class Battery:
-    """The charge that is left, and what the voltmeter says."""
+    """The charge that is left, and what the voltmeter shows."""
 
     charge_c: float = CAPACITY_C
     #: Ohms between the cells and the voltmeter; 0 hides the load.
@@ -68,7 +68,7 @@ class Battery:
 
     @property
     def decivolts(self) -> int:
-        """What the packet says, 0.1 V."""
+        """What the packet carries, 0.1 V."""
         shown = round(self.volts * 10) if self.pretended_decivolts is None else self.pretended_decivolts
         return min(max(shown, 0), 0xFF)
 

@@ -1,4 +1,4 @@
-"""All devices of one robot, saved and restored together."""
+"""All devices that are fitted to one robot, saved and restored together."""
 
 from dataclasses import dataclass, field, replace
 from typing import cast
@@ -23,7 +23,7 @@ class Switches:
     #: The red button is pressed.
     stop_button: bool = False
     buzzer: bool = True
-    #: Somebody has said the battery is low, once a session.
+    #: The low battery has been reported, once a session.
     battery_reported: bool = False
 
 

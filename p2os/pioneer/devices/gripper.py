@@ -66,7 +66,7 @@ class Gripper:
     kind: int = 0
     paddles: tuple[Nanos, int, Nanos, Nanos | None] = (0, 0, 0, None)
     lift: tuple[Nanos, int, Nanos, Nanos | None] = (0, 0, 0, None)
-    #: What GRIPPERVAL said last.
+    #: The last GRIPPERVAL.
     value: int = 0
     #: Grasp pressure, 20 ms units.
     pressure: int = 0
@@ -74,7 +74,7 @@ class Gripper:
     has_thing: bool = False
 
     def command(self, number: int, now: Nanos) -> None:
-        """Do what GRIPPER says; numbers that the manual does not list do nothing."""
+        """Take GRIPPER's number; those that the manual does not list do nothing."""
         if number == PRESSURE:
             self.pressure = self.value
         if number == CARRY:

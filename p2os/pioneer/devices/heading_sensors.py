@@ -44,7 +44,7 @@ class Compass:
 
     is_fitted: bool = True
     mode: CompassMode = CompassMode.OFF
-    #: When the last reading was taken, and what it said; clockwise from north, degrees.
+    #: When the last reading was taken, and its heading; clockwise from north, degrees.
     read_ns: Nanos = -COMPASS_NS
     heading_deg: float = 0.0
     pitch_deg: float = 0.0

@@ -11,7 +11,7 @@ from p2os.protocol.packets import IoPacket
 #: Digital inputs and outputs of the captured P2-DX.
 CAPTURED_IN, CAPTURED_OUT = 0x30, 0xF0
 ANALOG_PORTS = 9
-#: Selected when nobody has selected another (Pioneer 2 manual, ADSEL).
+#: Selected until a client selects another (Pioneer 2 manual, ADSEL).
 ANALOG_PORT = 5
 #: Analog full scale, 5 V.
 FULL_SCALE = 1023
@@ -31,7 +31,7 @@ class Pins:
     selected: int = ANALOG_PORT
     #: Widths of the servo pulses, ports 1 to 4, 10 us.
     servos: tuple[int, ...] = (0,) * SERVOS
-    #: Pressed segments, bit 0 is segment 1, by what live inputs and faults say.
+    #: Pressed segments, bit 0 is segment 1, by live inputs and faults.
     front_pressed: int = 0
     rear_pressed: int = 0
 

@@ -1,4 +1,4 @@
-"""Whoever hangs at a robot's AUX port: a program at a pseudo-terminal or a socket.
+"""The device at a robot's AUX port: a program at a pseudo-terminal or a socket.
 
 Bytes pass between it and the controller; AUX lines are not paced.
 """
@@ -12,7 +12,7 @@ from p2os.transport.ports import Listener, Transport
 
 
 class AuxEndpoint:
-    """Joins an AUX port, 1 to 3, to whoever comes to a listener; one device at a time."""
+    """Joins an AUX port, 1 to 3, to what connects to a listener; one device at a time."""
 
     def __init__(self, port: int, listener: Listener) -> None:
         self.port = port
@@ -21,18 +21,18 @@ class AuxEndpoint:
 
     @property
     def poll_s(self) -> float | None:
-        """Return how often somebody has to look whether a device has come; None where a descriptor tells."""
+        """Return how often to poll for a device; None where a descriptor shows it."""
         return self.listener.poll_s if self._device is None else None
 
     def descriptors(self) -> list[int]:
-        """Return what tells that there is something to do."""
+        """Return the descriptors that become readable when there is something to do."""
         if self._device is not None:
             return [self._device.fileno()]
         listening = self.listener.fileno()
         return [] if listening is None else [listening]
 
     def move_bytes(self, pioneer: Pioneer, now: Nanos) -> None:
-        """Take a device that has come, and carry bytes both ways; what nobody takes is lost."""
+        """Take a device that has come, and carry bytes both ways; what no device takes is lost."""
         outgoing = pioneer.take_aux_output(self.port)
         if self._device is None:
             self._device = self.listener.accept()
@@ -43,17 +43,17 @@ class AuxEndpoint:
                 self._device.write(outgoing)
             data = self._device.read()
         except TransportError:
-            self._leave()
+            self._close_line()
             return
         if data:
             pioneer.receive_aux(self.port, data, now)
 
     def close(self) -> None:
-        """Let the device go and give the place back."""
-        self._leave()
+        """Close the device's line and give the place back."""
+        self._close_line()
         self.listener.close()
 
-    def _leave(self) -> None:
+    def _close_line(self) -> None:
         if self._device is not None:
             with contextlib.suppress(TransportError):
                 self._device.close()

@@ -1,4 +1,4 @@
-"""A virtual robot in the background of a program: for trying a client out, and for its tests.
+"""A host in a background thread of a program: a virtual robot to try a client out, and for its tests.
 
     with served_pioneer(world="room") as url:
         with Robot(url) as robot:
@@ -44,7 +44,7 @@ def served_pioneer(
         body: `kinematic`, `bullet` or `mujoco`.
         seed: Of everything random.
         settings: How the robot's firmware behaves.
-        on_event: Told (nanoseconds, what, detail) from the robot's thread.
+        on_event: Called with (nanoseconds, what, detail) from the robot's thread.
 
     Raises:
         P2osError: There is no such robot, world or body, or the place is taken.

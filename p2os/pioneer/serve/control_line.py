@@ -1,4 +1,7 @@
-"""Where a person gives orders to robots that run: the terminal, or a line that programs open."""
+"""Where an operator gives orders to running robots: the terminal, or a line that programs open.
+
+What the orders mean is in `orders`; one operator at a time is served.
+"""
 
 import contextlib
 import os
@@ -22,13 +25,13 @@ class Terminal:
     """Standard input as a line: orders are typed, answers go to standard error.
 
     Args:
-        say: Takes the answers' text; an OSError of it ends the line.
+        write: Takes the answers' text; an OSError of it ends the line.
     """
 
     description = "the terminal"
 
-    def __init__(self, say: Callable[[str], object] = write_stderr) -> None:
-        self._say = say
+    def __init__(self, write: Callable[[str], object] = write_stderr) -> None:
+        self._write = write
 
     def read(self) -> bytes:
         """Return what was typed."""
@@ -45,7 +48,7 @@ class Terminal:
     def write(self, data: bytes) -> None:
         """Show an answer."""
         try:
-            self._say(data.decode())
+            self._write(data.decode())
         except OSError as error:
             raise HungUpError(f"the terminal is gone: {error.strerror}") from error
 
@@ -69,25 +72,25 @@ class Terminal:
 
 
 class ControlLine:
-    """Takes orders, one a line, from one person at a time.
+    """Takes orders, one a line, from one operator at a time.
 
     Args:
-        listener: Where that person comes; None takes standard input.
-        say: Takes the answers where standard input is taken.
+        listener: Where the operator connects; None takes standard input.
+        write: Takes the answers where standard input is taken.
     """
 
-    def __init__(self, listener: Listener | None, say: Callable[[str], object] = write_stderr) -> None:
+    def __init__(self, listener: Listener | None, write: Callable[[str], object] = write_stderr) -> None:
         self._listener = listener
-        self._operator: Transport | None = Terminal(say) if listener is None else None
-        self._typed = b""
+        self._operator: Transport | None = Terminal(write) if listener is None else None
+        self._buffer = b""
 
     @property
     def poll_s(self) -> float | None:
-        """Return how often somebody has to look whether a person has come; None where a descriptor tells."""
+        """Return how often to poll for an operator; None where a descriptor shows it."""
         return None if self._operator is not None or self._listener is None else self._listener.poll_s
 
     def descriptors(self) -> list[int]:
-        """Return what tells that there is something to do."""
+        """Return the descriptors that become readable when there is something to do."""
         if isinstance(self._operator, Terminal) and not self._operator.is_ours():
             return []
         found = None
@@ -98,30 +101,30 @@ class ControlLine:
         return [] if found is None else [found]
 
     def serve(self, hosts: Sequence[Host]) -> bool:
-        """Take what has been said and answer it; return whether there was anything."""
+        """Take the lines that have come and answer them; return whether there were any."""
         if self._operator is None and self._listener is not None:
-            self._operator, self._typed = self._listener.accept(), b""
+            self._operator, self._buffer = self._listener.accept(), b""
         if self._operator is None:
             return False
         try:
             data = self._operator.read()
-            *lines, self._typed = (self._typed + data).replace(b"\r", b"\n").split(b"\n")
-            self._typed = self._typed[-LONGEST_LINE:]
-            told = [line[:LONGEST_LINE].decode(errors="replace") for line in lines if line.strip()]
-            for line in told:
+            *lines, self._buffer = (self._buffer + data).replace(b"\r", b"\n").split(b"\n")
+            self._buffer = self._buffer[-LONGEST_LINE:]
+            orders = [line[:LONGEST_LINE].decode(errors="replace") for line in lines if line.strip()]
+            for line in orders:
                 self._operator.write("".join(f"{row}\n" for row in execute(hosts, line)).encode())
         except TransportError:
-            self._leave()
+            self._close_line()
             return False
-        return bool(told)
+        return bool(orders)
 
     def close(self) -> None:
-        """Let the person go and give the place back."""
-        self._leave()
+        """Close the operator's line and give the place back."""
+        self._close_line()
         if self._listener is not None:
             self._listener.close()
 
-    def _leave(self) -> None:
+    def _close_line(self) -> None:
         if self._operator is not None:
             with contextlib.suppress(TransportError):
                 self._operator.close()

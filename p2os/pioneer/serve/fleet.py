@@ -1,4 +1,4 @@
-"""Many hosts in one thread: each lives when it is due, and one wait serves them all.
+"""Many hosts in one thread: each runs when it is due, and one wait serves them all.
 
 Invariant: a host that has nothing due and nothing to read costs a comparison a round.
 """
@@ -17,7 +17,7 @@ class Fleet:
 
     Args:
         hosts: One a robot.
-        control: Where a person gives orders, or None.
+        control: Where an operator gives orders, or None.
         on_tick: Called so often, in seconds, if given.
     """
 
@@ -32,12 +32,12 @@ class Fleet:
         self.control = control
         self._on_tick = on_tick
         self._next_tick_s = _now_s() + on_tick[0] if on_tick else float("inf")
-        #: When each is to live next, by the clock, and what it listens to.
+        #: When each is due next, by the clock, and the descriptors that it waits for.
         self._due_s = [0.0] * len(self.hosts)
-        self._listening: list[list[int]] = [[] for _ in self.hosts]
+        self._descriptors: list[list[int]] = [[] for _ in self.hosts]
 
     def run(self, *, until: Callable[[], bool] = lambda: False) -> None:
-        """Serve until `until` says so or an exception (Ctrl-C) ends it; then let every client go."""
+        """Serve until `until` is true or an exception (Ctrl-C) ends it; then close every client's line."""
         try:
             while not until():
                 self.turn(IDLE_WAIT_S)
@@ -48,11 +48,11 @@ class Fleet:
                 self.control.close()
 
     def turn(self, longest_wait_s: float) -> None:
-        """Let everyone live who is due, wait for the next deadline or bytes, and listen to those who have some."""
+        """Run every host that is due, wait for the next deadline or bytes, and read where there are some."""
         now_s = _now_s()
         for index, host in enumerate(self.hosts):
             if self._due_s[index] <= now_s:
-                host.live()
+                host.run_due()
                 self._schedule(index)
         if now_s >= self._next_tick_s and self._on_tick is not None:
             self._next_tick_s = now_s + self._on_tick[0]
@@ -61,9 +61,9 @@ class Fleet:
         ready = self._wait(wait_s)
         now_s = _now_s()
         for index, host in enumerate(self.hosts):
-            is_due = self._due_s[index] <= now_s  # it lives in the next turn: looking ahead here would put that off
-            if is_due or not ready.isdisjoint(self._listening[index]):
-                host.listen()
+            is_due = self._due_s[index] <= now_s  # it runs in the next turn: scheduling it here would put that off
+            if is_due or not ready.isdisjoint(self._descriptors[index]):
+                host.read_lines()
                 if not is_due:
                     self._schedule(index)
         if self.control is not None and self.control.serve(self.hosts):
@@ -72,10 +72,10 @@ class Fleet:
     def _schedule(self, index: int) -> None:
         host = self.hosts[index]
         self._due_s[index] = _now_s() + host.wait_s()
-        self._listening[index] = host.descriptors()
+        self._descriptors[index] = host.descriptors()
 
     def _wait(self, wait_s: float) -> set[int]:
-        descriptors = [descriptor for found in self._listening for descriptor in found]
+        descriptors = [descriptor for found in self._descriptors for descriptor in found]
         if self.control is not None:
             descriptors += self.control.descriptors()
             wait_s = min(wait_s, self.control.poll_s or wait_s)

@@ -38,7 +38,7 @@ class FleetError(FileError):
 
 
 Table = Mapping[str, object]
-#: Key → what its value has to be, and how that is said.
+#: Key → the types that its value may have, and their words in a message.
 KINDS: Mapping[str, tuple[tuple[type, ...], str]] = {
     "world": ((str,), "a text"),
     "body": ((str,), "a text"),

@@ -20,11 +20,11 @@ from p2os.robots.parameters import RobotParameters, load_parameters
 from p2os.timing import Nanos
 from p2os.transport import PtyUrl, SerialUrl, TcpUrl, parse_url
 
-#: Where the first robot is found when nothing else is said.
+#: Where the first robot is found when nothing else is given.
 DEFAULT_PORT = "tcp:127.0.0.1:8101"
 #: The AUX ports (H8 manual: AUX1 to AUX3).
 AUX_PORTS = (1, 2, 3)
-#: chosen: more than two cores carry, and few enough to be a slip of the finger no longer.
+#: chosen: more than two cores carry; a larger number is a typing error.
 MOST_ROBOTS = 256
 
 
@@ -37,7 +37,7 @@ class RobotOrder:
         model: Name or file.
         at: Where it begins; None: beside the others. Its height is the floor's.
         settings: How its firmware behaves; a line without a speed takes that of a real serial port.
-        faults: What is broken from the start, in the words of `faults`.
+        faults: What is injected from the start, in the words of `faults`.
         aux: (AUX port, URL) of what hangs there.
         sync_limit_ns: A client without an open session for so many nanoseconds is let go; None: never.
 
@@ -70,7 +70,7 @@ class FleetOrder:
         world: Name or file.
         body: `kinematic` or `bullet`.
         seed: Of a scattered world; robot N errs by this and N - 1 more.
-        apart: Each has a copy of the world and meets nobody.
+        apart: Each has a copy of the world, without the others.
 
     Raises:
         UsageError: There is no robot, or there are too many; two share a port, or a port is no URL.
@@ -177,9 +177,9 @@ def read_aux(text: str) -> tuple[int, str]:
 
 
 def _starts(order: FleetOrder, world: World, models: Sequence[RobotParameters]) -> tuple[Pose, ...]:
-    told = [robot.at for robot in order.robots]
+    given = [robot.at for robot in order.robots]
     if order.apart or len(models) == 1:
         return tuple(
-            start for model, pose in zip(models, told, strict=True) for start in start_places(world, [model], [pose])
+            start for model, pose in zip(models, given, strict=True) for start in start_places(world, [model], [pose])
         )
-    return start_places(world, models, told)
+    return start_places(world, models, given)

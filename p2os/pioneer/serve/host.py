@@ -2,16 +2,16 @@
 
 This is the I/O layer around `Pioneer`: it reads the clock, waits on descriptors and
 moves bytes; every decision is the controller's. It serves one client at a time.
-A second one is let in, told so in a line and let go, since a robot has one host. A client
+A second one is accepted, sent the reason in a line and closed, since a robot has one host. A client
 that vanishes stops the robot at once and frees it for the next; so does one that has no open
 session for longer than `sync_limit_ns`, if there is such a limit.
 
-A robot with a speed of its line (`settings.baud`) is heard and spoken to at that
+A robot with a speed of its line (`settings.baud`) is read and written at that
 speed, whatever the medium; a real serial port paces itself. HOSTBAUD changes both.
 
-Its time is a `RobotTime`: the robot does not live while nobody is connected and it stands
+Its time is a `RobotTime`: the robot does not run while no client is connected and it stands
 still, nor through a pause of the machine, which is reported, and which is silence for its
-watchdog: a real robot would have heard nothing either. Robots of one world (`multi_robot_world`)
+watchdog: a real robot would have received nothing either. Robots of one world (`multi_robot_world`)
 share theirs; one that has no client is then carried along by the others.
 """
 
@@ -40,9 +40,9 @@ HostEvent = Callable[[Nanos, str, str], None]
 ACTIVE_WAIT_S = 0.1
 #: chosen: how soon `run` notices that it should end.
 IDLE_WAIT_S = 0.5
-#: chosen: no P2OS client says more than its line carries for so long; one that does, or that has left as much, goes.
+#: chosen: no P2OS client sends more than its line carries for so long; one that does, or has left as much, is dropped.
 LONGEST_BEHIND_NS: Nanos = 5 * NS_PER_S
-#: chosen: 4 MB of a client that is dropped are read away, so that a terminal is clean for the next.
+#: chosen: 4 MB of a client that is dropped are discarded, so that a terminal is clean for the next.
 MOST_READS_LOST = 1024
 #: chosen: a second of a 9600 baud line; a client that sends faster finds its own medium full.
 MOST_WAITING = 960
@@ -53,15 +53,15 @@ class Host:
 
     Args:
         pioneer: The robot.
-        listener: Where its clients come.
-        on_event: Told of clients that come and go, and of pauses.
+        listener: Where its clients connect.
+        on_event: Notified of clients that come and go, and of pauses.
         clock: Nanoseconds; never goes back.
         speed: Robot seconds a second of the clock.
         shared: The time and the multi-robot world of robots that share a world, with this one's number there, from 0;
             the time then knows the clock and the speed.
         paced: Whether bytes take the time that `settings.baud` gives them; False where the medium does it itself.
-        aux: Who hangs at the AUX ports.
-        sync_limit_ns: A client that has no open session for so many nanoseconds of the clock is let go; None: never.
+        aux: What is at the AUX ports.
+        sync_limit_ns: A client that has no open session for so many nanoseconds of the clock is dropped; None: never.
             Without effect on a terminal or serial port, which cannot be closed on who has it open.
     """
 
@@ -84,7 +84,7 @@ class Host:
         self._on_event = on_event
         self._time = RobotTime(clock, speed) if shared is None else shared[0]
         self._bring: Callable[[Nanos], object] = self._advance_to
-        #: Who shares the robot's world, if anybody does.
+        #: Of the robots that share the world, if others do.
         self.multi_robot_world: MultiRobotWorld | None = None
         if shared is not None:
             _, multi_robot_world, number = shared
@@ -101,7 +101,7 @@ class Host:
         self._left_out: Nanos = self._time.left_out
         self._settled_at: Nanos = 0
         self._baud = pioneer.baud
-        #: Since when more waits than could be heard at once.
+        #: Since when more waits than could be read at once.
         self._behind_since: Nanos | None = None
         #: To the robot and from it.
         self._lines: tuple[PacedLine, PacedLine] | None = None
@@ -119,7 +119,7 @@ class Host:
         return None if self._client is None else self._client.description
 
     def run(self, *, until: Callable[[], bool] = lambda: False) -> None:
-        """Serve until `until` says so or an exception (Ctrl-C) ends it; then let the client go.
+        """Serve until `until` is true or an exception (Ctrl-C) ends it; then close the client's line.
 
         `until` is asked after every round: at least twice a second.
         """
@@ -131,11 +131,11 @@ class Host:
 
     def turn(self, longest_wait_s: float) -> None:
         """Do what is due, then wait for the next deadline, bytes or client, at most so long."""
-        self.live()
+        self.run_due()
         wait_readable(self.descriptors(), min(self.wait_s(), longest_wait_s))
-        self.listen()
+        self.read_lines()
 
-    def live(self) -> None:
+    def run_due(self) -> None:
         """Do what is due by the clock."""
         self._read_clock()
         self._closing_lines.poll()
@@ -146,7 +146,7 @@ class Host:
         self._serve_aux()
         self._check_session()
 
-    def listen(self) -> None:
+    def read_lines(self) -> None:
         """Take clients that have come and bytes that have arrived."""
         self._read_clock()
         self._accept_client()
@@ -155,7 +155,7 @@ class Host:
             self._serve_aux()
 
     def descriptors(self) -> list[int]:
-        """Return what tells by becoming readable that there is something to listen to."""
+        """Return the descriptors that become readable when there is something to read."""
         found = []
         if (listening := self.listener.fileno()) is not None:
             found.append(listening)
@@ -185,7 +185,7 @@ class Host:
         return min(waits)
 
     def close(self) -> None:
-        """Stop the robot, let the client go and give the ports back."""
+        """Stop the robot, close the client's line and give the ports back."""
         self._drop_client("the host ends")
         self._closing_lines.close()
         self.listener.close()
@@ -215,10 +215,10 @@ class Host:
         return change_world([cast("RobotBody", self.pioneer.body)], words)
 
     def _advance_to(self, limit: Nanos) -> None:
-        """Let the robot live until `limit`, and hear what arrives by then on a line that takes its time."""
+        """Run the robot until `limit`, with what arrives by then on a line that takes its time."""
         if self._lines is not None:
             for at, data in self._lines[0].take(limit):
-                self._deliver(data, at)
+                self._receive(data, at)
         self.pioneer.advance_to(limit)
 
     def _deadlines(self) -> list[Nanos]:
@@ -244,8 +244,8 @@ class Host:
         except TransportError as error:
             self._drop_client(str(error))
 
-    def _deliver(self, data: bytes, at: Nanos) -> None:
-        """Let the robot hear bytes, and follow it to another speed (HOSTBAUD, and back at CLOSE)."""
+    def _receive(self, data: bytes, at: Nanos) -> None:
+        """Give the robot bytes, and follow it to another speed (HOSTBAUD, and back at CLOSE)."""
         self.pioneer.receive(data, at)
         self._follow_speed()
 
@@ -267,7 +267,7 @@ class Host:
             member.move_bytes(self.pioneer, self.now)
 
     def _accept_client(self) -> None:
-        """Take a client that has come, or send it away when there is one."""
+        """Accept a client, or refuse it when there is one."""
         if self._client is not None and self.listener.fileno() is None:
             return
         transport = self.listener.accept()
@@ -277,18 +277,18 @@ class Host:
             pass
         if self._client is not None:
             first = self._client.description
-            self._tell("client refused", f"{transport.description}: {first} is connected")
+            self._notify("client refused", f"{transport.description}: {first} is connected")
             connected_s = (self.now - self._came_at) / self._time.speed / NS_PER_S
             peer = first.removeprefix("tcp:")
             self._closing_lines.add(transport, f"busy: {peer} is connected for {connected_s:.0f} s")
             return
-        self.pioneer.take_output()  # what it said to nobody
+        self.pioneer.take_output()  # what it sent while no client was there
         self._client, self._came_at, self._open_at = transport, self.now, self.now
         self._time.client_came()
-        self._tell("client connected", transport.description)
+        self._notify("client connected", transport.description)
 
     def _read_client(self) -> bool:
-        """Take what the client says; return whether it said something."""
+        """Read the client's bytes; return whether there were any."""
         if self._client is None:
             return False
         if not self._may_receive():
@@ -303,7 +303,7 @@ class Host:
             self._lines[0].put(data, self.now)
         elif data:
             self._bring(self.now)
-            self._deliver(data, self.now)
+            self._receive(data, self.now)
             self._send_output()
         if len(data) < READ_BYTES:
             self._behind_since = None
@@ -312,20 +312,20 @@ class Host:
         return bool(data)
 
     def _check_session(self) -> None:
-        """Let a client go that has had no open session for too long."""
+        """Drop a client that has had no open session for too long."""
         if self._client is None or self._sync_limit_ns is None or self.listener.fileno() is None:
             return
         if self.pioneer.state.open:
             self._open_at = self.now
         elif self.now - self._open_at >= self._sync_limit_ns * self._time.speed:
             limit_s = self._sync_limit_ns / NS_PER_S
-            self._drop_client(f"{self._client.description} had no open session for {limit_s:g} s", tell=True)
+            self._drop_client(f"{self._client.description} had no open session for {limit_s:g} s", send_reason=True)
 
     def _check_backlog(self, client: Transport) -> None:
-        """Drop a client that has left more than could be heard so far, or that shouts for too long.
+        """Drop a client that has left more than could be read so far, or that floods the line for too long.
 
         What a client has closed may still wait in its own machine, behind what it
-        had to say: then only its shouting tells. What it has said is lost.
+        has sent: then only the flood shows it. What it has sent is lost.
         """
         if self._behind_since is None:
             self._behind_since = self.now
@@ -335,20 +335,20 @@ class Host:
                 if self.now - self._behind_since < LONGEST_BEHIND_NS:
                     return
                 limit_s = LONGEST_BEHIND_NS // NS_PER_S
-                reason = f"{client.description} said more than can be heard for {limit_s} s"
+                reason = f"{client.description} sent more than can be read for {limit_s} s"
             for _ in range(MOST_READS_LOST):
                 if not client.read():
                     break
         self._drop_client(reason)
 
-    def _drop_client(self, reason: str, *, tell: bool = False) -> None:
-        """Stop the robot and let its client go; `tell` sends the reason."""
+    def _drop_client(self, reason: str, *, send_reason: bool = False) -> None:
+        """Stop the robot and close its client's line; `send_reason` sends it to the client."""
         if self._client is None:
             return
         client, self._client, self._behind_since = self._client, None, None
         self._time.client_left()
         self._bring(self.now)
-        if self._lines is not None:  # its last words still come
+        if self._lines is not None:  # what is still on the line arrives
             self.pioneer.receive(self._lines[0].take_all(), self.now)
         self.pioneer.hang_up(self.now)
         self.pioneer.take_output()
@@ -356,26 +356,26 @@ class Host:
         for line in self._lines or ():
             line.clear()
             line.set_baud(self._baud or line.baud)
-        if tell:
+        if send_reason:
             self._closing_lines.add(client, reason)
         else:
             with contextlib.suppress(TransportError):
                 client.close()
         self._settled_at = self.now + SETTLE_NS
-        self._tell("client gone", reason)
+        self._notify("client gone", reason)
 
     def _is_idle(self) -> bool:
         return self._client is None and self.now >= self._settled_at
 
     def _read_clock(self) -> None:
-        """Bring the robot's time up to the clock's, leaving out what the robot need not live."""
+        """Bring the robot's time up to the clock's, leaving out what the robot need not run through."""
         if pause := self._time.read():
-            self._tell("lag", f"the machine paused for {pause / NS_PER_S:.1f} s; the robot's time leaves it out")
+            self._notify("lag", f"the machine paused for {pause / NS_PER_S:.1f} s; the robot's time leaves it out")
         if silence := self._time.left_out - self._left_out:
             self._left_out += silence
             self._bring(self.now)
             self.pioneer.count_silence(silence, self.now)
 
-    def _tell(self, what: str, detail: str) -> None:
+    def _notify(self, what: str, detail: str) -> None:
         if self._on_event is not None:
             self._on_event(self.now, what, detail)

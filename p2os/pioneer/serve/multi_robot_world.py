@@ -1,25 +1,25 @@
-"""Robots that share one world: they see each other with their sonar and stop each other.
+"""Robots that share one world: they sense each other with their sonar and stop each other.
 
 Theory of operation
 -------------------
 Every robot has a body of its own with its own copy of the world; the multi-robot world shows each of
-them where the others stand. Time is cut at boundaries, 10 ms apart. At a boundary everybody's
-place is taken, and who could touch whom before the next boundary is worked out from circles
-around the hulls. A robot that nobody is near lives the 10 ms by itself: whom it hears with
-its sonar stands where it stood at the boundary. Robots that are near to each other live step by
+them where the others stand. Time is cut at boundaries, 10 ms apart. At a boundary every
+robot's place is taken, and who could touch whom before the next boundary is worked out from circles
+around the hulls. A robot that is near no other runs the 10 ms by itself: what its sonar
+measures stands where it stood at the boundary. Robots that are near to each other run step by
 step (1 ms), the first robot first: when it is a robot's turn, those before it have made this
 step and those after it have not. So two hulls never come to overlap. Between two steps, what
 is due (packets, pings, commands) happens with every one of these bodies at the same time.
 
 A thing that one robot has pushed is moved in the others' copies: after its step for those
-that are near, at the boundary for all. Where several have pushed it at once, the nearest is
-believed.
+that are near, at the boundary for all. Where several have pushed it at once, the nearest
+one's report counts.
 
 Invariant: what happens depends on the order of the robots and on the bytes and their times,
-not on how often anybody calls `advance_to`, nor for which robot first.
+not on how often a caller calls `advance_to`, nor for which robot first.
 
 Not modelled: a robot that is driven against does not give way, whatever the masses; one that
-hears another's ping.
+receives another's ping.
 """
 
 import math
@@ -60,7 +60,7 @@ class Member:
     body: RobotBody
     as_other: OtherRobot
     other_robots: OtherRobots
-    #: Brings the robot to a time: with what its line delivers until then, if somebody delivers.
+    #: Brings the robot to a time: with what its line delivers until then, if it has one.
     advance_to: Callable[[Nanos], object]
     #: Where it was shown the others last; None where its body looks for them itself.
     shown: dict[str, StandingPose] | None = None
@@ -68,9 +68,9 @@ class Member:
 
 @dataclass(slots=True)
 class _Times:
-    #: Up to here everybody lives by what was seen at the boundary before.
+    #: Up to here every robot runs by what was seen at the boundary before.
     slice_end: Nanos = SLICE_NS
-    #: The bodies of all that are near to somebody stand at this step.
+    #: The bodies of all that are near to another stand at this step.
     step_boundary: Nanos = 0
 
 
@@ -117,8 +117,8 @@ class MultiRobotWorld:
             else:
                 member.shown = {}
                 for other in member.other_robots.others:
-                    member.body.place(other.obstacle(other.live))
-                    member.shown[other.name] = other.live
+                    member.body.place(other.obstacle(other.current))
+                    member.shown[other.name] = other.current
         #: Those who keep copies of the others in their worlds.
         self._copying = tuple(member for member in self.members if member.shown is not None)
         #: Where all stood at the last sweep, and how much two of them at least were farther apart than near.
@@ -174,7 +174,7 @@ class MultiRobotWorld:
             "robots": tuple(member.pioneer.snapshot() for member in self.members),
             "times": (self._times.slice_end, self._times.step_boundary),
             "standing_poses": tuple(
-                (tuple(member.as_other.live), tuple(member.as_other.at_boundary)) for member in self.members
+                (tuple(member.as_other.current), tuple(member.as_other.at_boundary)) for member in self.members
             ),
             "near": tuple(tuple(self._numbers_near(member)) for member in self.members),
             "shown": tuple(
@@ -199,9 +199,9 @@ class MultiRobotWorld:
             snapshot["shown"],
             strict=True,
         )
-        for member, robot, (live, at_boundary), near, shown in rows:
+        for member, robot, (current, at_boundary), near, shown in rows:
             member.pioneer.restore(robot)
-            member.as_other.live, member.as_other.at_boundary = StandingPose(*live), StandingPose(*at_boundary)
+            member.as_other.current, member.as_other.at_boundary = StandingPose(*current), StandingPose(*at_boundary)
             member.other_robots.come_near(self.members[number].as_other for number in near)
             member.shown = (
                 None if shown is None else {name: StandingPose(*standing_pose) for name, standing_pose in shown}
@@ -212,7 +212,7 @@ class MultiRobotWorld:
     # Within a slice ------------------------------------------------------------------
 
     def _pass_boundaries(self, limit: Nanos) -> None:
-        """Bring everybody past every boundary before a time."""
+        """Bring every robot past every boundary before a time."""
         while (end := self._times.slice_end) < limit:
             self._step_close(end)
             for member in self._alone:
@@ -222,7 +222,7 @@ class MultiRobotWorld:
             self._exchange_poses()
 
     def _step_close(self, limit: Nanos) -> None:
-        """Bring those that are near to somebody to a time of this slice, step by step together."""
+        """Bring those that are near to another to a time of this slice, step by step together."""
         close, times = self._close, self._times
         while close and times.step_boundary < limit:
             start = times.step_boundary
@@ -232,13 +232,13 @@ class MultiRobotWorld:
                 member.advance_to(start + 1)  # the least time that takes the body to its next step
                 member.as_other.look()
                 self._take_pushed(member)
-                self._show(member.as_other, member.as_other.live, only_close=True)
+                self._show(member.as_other, member.as_other.current, only_close=True)
             times.step_boundary = start + self._step_ns
         for member in close:
             member.advance_to(limit)
 
     def _take_pushed(self, member: Member) -> None:
-        """Note what a robot has pushed; those that live with it step by step see it at once."""
+        """Note what a robot has pushed; those that run with it step by step see it at once."""
         for item in member.body.take_moved():
             if item.walk is not None:
                 continue
@@ -263,14 +263,14 @@ class MultiRobotWorld:
     # At a boundary ---------------------------------------------------------------------
 
     def _exchange_poses(self) -> None:
-        """Show everybody where all the others and the pushed things are now."""
+        """Show every robot where all the others and the pushed things are now."""
         for member in self._alone:
             member.as_other.look()
             self._take_pushed(member)
         self._spread_pushed()
         for member in self.members:
-            member.as_other.at_boundary = member.as_other.live
-            self._show(member.as_other, member.as_other.live)
+            member.as_other.at_boundary = member.as_other.current
+            self._show(member.as_other, member.as_other.current)
         self._find_close()
 
     def _spread_pushed(self) -> None:
@@ -283,7 +283,7 @@ class MultiRobotWorld:
         self._pushed.reports.clear()
 
     def _distance(self, number: int, item: Obstacle) -> float:
-        standing_pose = self.members[number].as_other.live
+        standing_pose = self.members[number].as_other.current
         return math.dist((standing_pose.x_m, standing_pose.y_m), (item.x_m, item.y_m))
 
     def _find_close(self) -> None:
@@ -291,7 +291,7 @@ class MultiRobotWorld:
         if not self._close and self._is_sweep_valid():
             return
         near: dict[int, list[int]] = {}
-        row = sorted((*member.as_other.live[:2], member.as_other.reach_m, member.number) for member in self.members)
+        row = sorted((*member.as_other.current[:2], member.as_other.reach_m, member.number) for member in self.members)
         farthest = max(reach for _, _, reach, _ in row) + self._margin_m + SPARE_M
         self._spare_m = SPARE_M
         for place, (x, y, reach, number) in enumerate(row):
@@ -304,7 +304,7 @@ class MultiRobotWorld:
                     near.setdefault(number, []).append(other_number)
                     near.setdefault(other_number, []).append(number)
                 self._spare_m = min(self._spare_m, between_m)
-        self._swept = [member.as_other.live for member in self.members]
+        self._swept = [member.as_other.current for member in self.members]
         if not near and not self._close:
             return
         for member in self.members:
@@ -313,10 +313,10 @@ class MultiRobotWorld:
         self._regroup()
 
     def _is_sweep_valid(self) -> bool:
-        """Tell whether nobody has moved so far since the last sweep that two could be near to each other now."""
+        """Tell whether no robot has moved so far since the last sweep that two could be near to each other now."""
         allowed_m = self._spare_m / 2
         return allowed_m > 0 and all(
-            math.hypot(member.as_other.live[0] - before[0], member.as_other.live[1] - before[1]) < allowed_m
+            math.hypot(member.as_other.current[0] - before[0], member.as_other.current[1] - before[1]) < allowed_m
             for member, before in zip(self.members, self._swept, strict=True)
         )
 

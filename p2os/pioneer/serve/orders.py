@@ -1,12 +1,13 @@
-"""What a person says to a robot that runs, line by line, and what it answers.
+"""The orders of an operator to running robots, line by line, and their answers.
 
 fault sonar-stuck 3 1.2       inject a fault; `clear sonar-stuck 3` clears it, `clear all` everything
 place box 1 0 0.3 0.3         a thing comes into the world (`world_orders`)
 joystick 512 1023 1           one of the live inputs
 status                        where it is, what it does, how full its line is
-2: fault reboot               the same to the second robot alone; without a number all hear it
+2: fault reboot               the same to the second robot alone; without a number it is for all
 
 Each line is answered with one line a robot, or with "error: what" and a hint.
+Where the lines come from is `control_line`'s matter.
 """
 
 import math
@@ -14,7 +15,7 @@ from collections.abc import Sequence
 from difflib import get_close_matches
 
 from p2os.errors import UsageError, WorldError
-from p2os.pioneer.controller.faults import FAULTS
+from p2os.pioneer.controller.faults import FAULTS, refuse_renamed_word
 from p2os.pioneer.controller.live_inputs import INPUTS
 from p2os.pioneer.serve.host import Host
 from p2os.pioneer.serve.multi_robot_world import MultiRobotWorld
@@ -27,7 +28,7 @@ FIRST_WORDS = ("status", "fault", "clear", "place", "move", "remove", *INPUTS, "
 
 
 def execute(hosts: Sequence[Host], text: str) -> list[str]:
-    """Do what a line says, and return the answer's lines."""
+    """Execute a line, and return the answer's lines."""
     try:
         numbers, words = _addressed(text.strip(), len(hosts))
         if words.split()[:1] == ["help"]:
@@ -74,6 +75,7 @@ def _speed(speed_mps: float) -> str:
 
 def _check_first_word(words: str) -> None:
     first = words.split(maxsplit=1)[0] if words else ""
+    refuse_renamed_word(first)
     if first not in FIRST_WORDS:
         close = get_close_matches(first, FIRST_WORDS, n=1)
         hint = f"did you mean {close[0]}?" if close else f"orders: {', '.join(FIRST_WORDS)}"

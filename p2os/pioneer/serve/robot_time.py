@@ -1,6 +1,6 @@
 """Robots' time: the clock's, times a factor, less what was left out.
 
-Robots do not live while nobody is connected and they have come to rest, nor through a pause of
+Robots do not run while no client is connected and they have come to rest, nor through a pause of
 the machine longer than `LONGEST_PAUSE_NS`. So waiting costs no processor time and a long wait no
 burst of steps. What pauses have left out is counted: for a robot's watchdog it is silence. Robots
 that share a world share their time: it goes on while any of them has a client.
@@ -12,7 +12,7 @@ from p2os.timing import NS_PER_MS, NS_PER_S, Nanos
 
 #: chosen: three SIP cycles; a machine that lags more is reported rather than chased.
 LONGEST_PAUSE_NS: Nanos = 300 * NS_PER_MS
-#: chosen: how long the bodies live on after the last client has left, to come to rest.
+#: chosen: how long the bodies run on after the last client has left, to come to rest.
 SETTLE_NS: Nanos = 1 * NS_PER_S
 
 
@@ -36,7 +36,7 @@ class RobotTime:
         self._settled_at: Nanos = 0
 
     def client_came(self) -> None:
-        """Note that somebody is connected from now on."""
+        """Note that a client is connected from now on."""
         self._clients += 1
 
     def client_left(self) -> None:
@@ -50,9 +50,9 @@ class RobotTime:
         passed, self._clock_read = read - self._clock_read, read
         if not self._clients and self.now >= self._settled_at:
             return 0
-        lived = passed if self.speed == 1.0 else round(passed * self.speed)
+        counted = passed if self.speed == 1.0 else round(passed * self.speed)
         if passed > LONGEST_PAUSE_NS:
-            self.left_out += lived
+            self.left_out += counted
             return passed
-        self.now += lived
+        self.now += counted
         return 0

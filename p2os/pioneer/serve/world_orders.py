@@ -1,9 +1,9 @@
-"""Orders that change the world of robots that run: things come, move and go.
+"""Orders that change the world of running robots: things are placed, moved and removed.
 
 place box 1 0.5 0.3 0.2         a box, its middle at x and y, so long and so wide; a heading may follow
 place post 2 0 0.05             a post, so thick from its middle
 move box-1 1 1 90               a thing somewhere else; names with spaces stand in quotes
-remove box-1                    and away
+remove box-1                    the thing is gone
 
 Metres and degrees. A thing that an order places is called by its shape and a number.
 """
@@ -23,7 +23,7 @@ WORLD_ORDERS: Mapping[str, tuple[tuple[str, ...], str]] = {
     "place box": (("X", "Y", "LENGTH", "WIDTH", "[HEADING]"), "a box comes into the world, metres and degrees"),
     "place post": (("X", "Y", "RADIUS"), "a post comes into the world"),
     "move": (("NAME", "X", "Y", "[HEADING]"), "a thing that is not part of the building goes elsewhere"),
-    "remove": (("NAME",), "and away"),
+    "remove": (("NAME",), "takes the thing out of the world"),
 }
 #: chosen: as high as a person's hip, above every sonar ring.
 HEIGHT_M = 1.0
@@ -40,7 +40,7 @@ def is_world_order(text: str) -> bool:
 
 
 def change_world(bodies: Sequence[RobotBody], text: str, robots: Collection[str] = ()) -> str:
-    """Do what the words say, in every body's copy of the world; return what was done.
+    """Execute an order in every body's copy of the world; return what was done.
 
     Args:
         bodies: All that share the world, brought to one time.
@@ -88,17 +88,19 @@ def _placed(body: RobotBody, thing: Obstacle, shape: str) -> Obstacle:
 def _read(text: str) -> tuple[str, dict[str, str | float]]:
     """Return which order it is and the value of each of its words."""
     try:
-        said = shlex.split(text)
+        words_given = shlex.split(text)
     except ValueError:
         raise UsageError(f"{text!r}: a quote is open", hint="""move "thing 3" 1 1""") from None
-    order = next((name for name in WORLD_ORDERS if said[: len(name.split())] == name.split()), None)
+    order = next((name for name in WORLD_ORDERS if words_given[: len(name.split())] == name.split()), None)
     if order is None:
-        raise UsageError(f"{text!r} is no order", hint="say place box …, or place post …")
+        raise UsageError(f"{text!r} is no order", hint="orders: place box …, place post …")
     words = WORLD_ORDERS[order][0]
-    usage, given = f"say {' '.join([order, *words])}", said[len(order.split()) :]
+    usage, given = f"usage: {' '.join([order, *words])}", words_given[len(order.split()) :]
     least = len([word for word in words if not word.startswith("[")])
     if not least <= len(given) <= len(words):
-        raise UsageError(f"{text!r} is not all of it" if len(given) < least else f"{text!r} says too much", hint=usage)
+        raise UsageError(
+            f"{text!r} is incomplete" if len(given) < least else f"{text!r} has too many words", hint=usage
+        )
     return order, {word.strip("[]"): _value(word, value, usage) for word, value in zip(words, given, strict=False)}
 
 

@@ -1,7 +1,7 @@
 """What a sonar makes of the echoes that the body gives: specular loss, crosstalk, noise, dropout, faults.
 
-A ping is nine rays. A ray that meets its surface too far from the square comes
-back to nobody; the nearest of those that do come back is the range. Then, each
+A ping is nine rays. A ray that meets its surface too far from the square does not
+come back; the nearest of those that do come back is the range. Then, each
 by its own random stream: crosstalk (another sonar's ping received: nearer), dropout
 (no echo), noise. A stuck or noisy sonar errs on top.
 

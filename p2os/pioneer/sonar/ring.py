@@ -39,5 +39,5 @@ def cones(parameters: RobotParameters) -> tuple[Cone, ...]:
 
 
 def reading(nearest_m: float, parameters: RobotParameters) -> float:
-    """Return what a sonar says of its nearest echo: no less than its least range, no more than its longest."""
+    """Return what a sonar reports of its nearest echo: no less than its least range, no more than its longest."""
     return min(max(nearest_m, parameters.sonar_min_range_m), parameters.sonar_range_m)

@@ -5,7 +5,7 @@ readings a cycle on a P2-DX (the SIP captured from one carries two). The real
 order of firing is settable (POLLING); the default here is the ring's.
 
 Pings stand a half and a whole cycle after the last packet, or as SONARCYCLE
-says; a bank that reports every sonar in every packet takes all readings at the
+sets; a bank that reports every sonar in every packet takes all readings at the
 end of the cycle.
 """
 
@@ -17,7 +17,7 @@ from p2os.protocol.profiles import Profile
 from p2os.robots.parameters import RobotParameters
 from p2os.timing import Nanos
 
-#: What a Pioneer 2 says when no echo came, in counts: 8,576 mm at 0.268 mm a count (a P2-DX's captured SIP).
+#: What a Pioneer 2 reports when no echo came, in counts: 8,576 mm at 0.268 mm a count (a P2-DX's captured SIP).
 NO_ECHO_COUNTS = 32_000
 #: The packet has 16 bits for a range.
 LARGEST_COUNTS = 0xFFFF
@@ -106,7 +106,7 @@ class SonarSchedule:
         return Ping(at, (self.order[self._next_index % len(self.order)],))
 
     def take_ping(self, raw_ranges: Sequence[tuple[int, int]]) -> None:
-        """Keep the readings of the ping that `next_ping` told, as (number, counts)."""
+        """Keep the readings of the ping that `next_ping` returned, as (number, counts)."""
         self._readings += raw_ranges
         self._pings_done += 1
         self._next_index = (self._next_index + len(raw_ranges)) % len(self.order)
@@ -153,7 +153,7 @@ def raw_range(range_m: float, parameters: RobotParameters, profile: Profile) -> 
     """Return a range in the packet's counts.
 
     Nearer than the shortest range reads as the shortest. Without an echo a P2OS
-    robot says `NO_ECHO_COUNTS` (captured), later firmware its longest range (assumed).
+    robot reports `NO_ECHO_COUNTS` (captured), later firmware its longest range (assumed).
     """
     if range_m >= parameters.sonar_range_m:
         if profile is Profile.P2OS:

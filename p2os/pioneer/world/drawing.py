@@ -1,8 +1,10 @@
-"""A world as shapes to draw: the one list that the pictures and the terminal share.
+"""A world as a drawing: the shapes that all pictures share, an SVG picture, and characters for a terminal.
 
-A world as an SVG picture; no dependency.
+`shapes` is the one list; `svg` and `text` draw it without any dependency, and
+`p2os.cli.virtual.world_picture` draws it as a PNG. A character of `text` is two square
+points, one above the other.
 
-A world as characters for a terminal: two square points in each, one above the other.
+Invariant: what is drawn depends on the world alone, so that pictures can be compared.
 """
 
 import math
@@ -12,9 +14,7 @@ from enum import Enum
 from html import escape
 
 from p2os.pioneer.world.geometry import Footprint
-from p2os.pioneer.world.model import CUT_M, Kind, Obstacle, World, cut, shadow
-
-Point = tuple[float, float]
+from p2os.pioneer.world.model import CUT_M, Kind, Obstacle, Point, World, cut, shadow
 
 
 class Look(Enum):
@@ -100,6 +100,8 @@ def _look(item: Obstacle) -> Look:
     return Look.PUSHED if item.mass_kg else Look.THING
 
 
+# SVG ------------------------------------------------------------------------------------
+
 #: The longer side of the plan, in pixels.
 SIDE_PX = 760
 EDGE_PX = 44
@@ -166,6 +168,8 @@ def arrow_length(world: World) -> float:
     return max(0.22, max(x1 - x0, y1 - y0) / 60)
 
 
+# Characters -----------------------------------------------------------------------------
+
 #: Which looks are drawn in characters; what is driven on or beneath would hide the rest.
 SOLID = (Look.THING, Look.PUSHED, Look.WALL, Look.WALKING)
 #: Upper and lower point taken → character.
@@ -224,7 +228,7 @@ def _covers(shape: Shape, x: float, y: float, slack_m: float) -> bool:
     return any(_distance(x, y, a, b) <= slack_m for a, b in zip(points, ends, strict=False))
 
 
-def _is_inside(points: tuple[tuple[float, float], ...], x: float, y: float) -> bool:
+def _is_inside(points: tuple[Point, ...], x: float, y: float) -> bool:
     """Tell whether a point is on the left of every edge of a convex counter-clockwise outline."""
     return all(
         (bx - ax) * (y - ay) - (by - ay) * (x - ax) >= 0
@@ -232,7 +236,7 @@ def _is_inside(points: tuple[tuple[float, float], ...], x: float, y: float) -> b
     )
 
 
-def _distance(x: float, y: float, a: tuple[float, float], b: tuple[float, float]) -> float:
+def _distance(x: float, y: float, a: Point, b: Point) -> float:
     ex, ey = b[0] - a[0], b[1] - a[1]
     length = ex * ex + ey * ey
     share = 0.0 if length == 0 else min(1.0, max(0.0, ((x - a[0]) * ex + (y - a[1]) * ey) / length))

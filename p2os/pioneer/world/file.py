@@ -1,6 +1,6 @@
 """The world file: TOML, every key checked, every error with its line.
 
-Lengths are in metres and headings in degrees, as the keys say. `writer`
+Lengths are in metres and headings in degrees, as the keys name them. `writer`
 writes what this reads.
 """
 
@@ -59,7 +59,7 @@ _LISTS = {"path_m": 2, "points_m": 2, "vertices_m": 3, "triangles": 3}
 
 @dataclass(frozen=True, slots=True)
 class Section:
-    """One table of the file, for its checks: where it stands and what it says."""
+    """One table of the file, for its checks: where it stands and what it holds."""
 
     source: str
     places: TomlPlaces

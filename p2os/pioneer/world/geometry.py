@@ -8,11 +8,8 @@ import math
 from collections.abc import Sequence
 from itertools import pairwise
 
-from p2os.pioneer.world.model import Obstacle
+from p2os.pioneer.world.model import Obstacle, Point, Polygon
 from p2os.robots.parameters import BodyParameters, RobotParameters
-
-Point = tuple[float, float]
-Polygon = tuple[Point, ...]
 
 #: No echo, nothing near.
 INFINITY = math.inf

@@ -1,19 +1,18 @@
-"""What a plan view sees of a mesh: its cut at one height, and its shadow within a band of heights.
+"""A world as plain values: a start, the things that stand in it, their paths, its meshes and marks.
 
-A cut is a set of segments, a shadow a set of convex polygons (two points where a
-face stands upright). Faces come as triangles, so that one wall gives many pieces
-on one line: these are joined.
+A world knows nothing of engines and files: `loader` reads one by its name, `file` from
+TOML, `formats` from other programs' files, and `makers` make some from a seed.
 
-A scripted path: where a thing that moves by itself is at a given time.
-
-The place is a function of the time alone, so a walk goes on exactly after a
-restore, and no step length changes it. The thing does not look where it goes:
+A thing may follow a path. Its place is then a function of the time alone, so that a walk
+goes on exactly after a restore and no step length changes it. The thing has no sensors:
 it walks through other things, and into the robot.
 
-A world: a start and the things that stand in it, as plain values.
+A mesh has any shape, and two plans: its `cut` at one height is a set of segments, its
+`shadow` within a band of heights a set of convex polygons (two points where a face
+stands upright). Faces come as triangles, so that one wall gives many pieces on one
+line: these are joined.
 
-A world knows nothing of engines; `p2os.pioneer.world.loader` reads it from TOML and `arena`
-makes one from a seed.
+Invariant: an invalid world cannot exist; every constructor refuses by a `WorldError`.
 """
 
 import math
@@ -26,6 +25,51 @@ from itertools import accumulate, pairwise
 from p2os.errors import WorldError
 
 Point = tuple[float, float]
+Segment = tuple[Point, Point]
+Polygon = tuple[Point, ...]
+Vertex = tuple[float, float, float]
+Triangle = tuple[int, int, int]
+
+#: Where a mesh is cut for a picture: at the height of the Pioneer's sonar ring; and how thick its walls are drawn, m.
+CUT_M, CUT_THICK_M = 0.2, 0.02
+MARK_KINDS = ("goal", "dock", "home", "forbidden")
+#: The tables of a world file, in the order in which a world keeps its obstacles.
+SECTIONS = ("box", "cylinder", "floor", "ramp")
+#: Pieces on lines that differ by less are one, m; and the grain to which lines are compared.
+GRAIN_M = 1e-4
+#: A shadow of less area is an upright face, m².
+UPRIGHT_M2 = 1e-8
+_LINE_ANGLE_STEPS = 1e4
+
+
+class Kind(Enum):
+    """What an obstacle is; walls and rails are drawn darker, floors and ramps are driven on."""
+
+    WALL = "wall"
+    RAIL = "rail"
+    OBSTACLE = "obstacle"
+    #: A raised, level floor.
+    FLOOR = "floor"
+    #: An inclined floor; its length is measured along the ground.
+    RAMP = "ramp"
+
+    @property
+    def is_driven_on(self) -> bool:
+        """Whether touching it is no collision."""
+        return self in {Kind.FLOOR, Kind.RAMP}
+
+
+@dataclass(frozen=True, slots=True)
+class Pose:
+    """A place and a heading: metres, radians counter-clockwise, and the floor's height."""
+
+    x_m: float
+    y_m: float
+    heading_rad: float
+    z_m: float = 0.0
+
+
+# Paths ----------------------------------------------------------------------------------
 
 
 class Repeat(Enum):
@@ -106,41 +150,7 @@ class Walker:
         return ax + (bx - ax) * share, ay + (by - ay) * share, self._headings[leg]
 
 
-Vertex = tuple[float, float, float]
-Triangle = tuple[int, int, int]
-
-#: Where a mesh is cut for a picture: at the height of the Pioneer's sonar ring; and how thick its walls are drawn, m.
-CUT_M, CUT_THICK_M = 0.2, 0.02
-MARK_KINDS = ("goal", "dock", "home", "forbidden")
-#: The tables of a world file, in the order in which a world keeps its obstacles.
-SECTIONS = ("box", "cylinder", "floor", "ramp")
-
-
-class Kind(Enum):
-    """What an obstacle is; walls and rails are drawn darker, floors and ramps are driven on."""
-
-    WALL = "wall"
-    RAIL = "rail"
-    OBSTACLE = "obstacle"
-    #: A raised, level floor.
-    FLOOR = "floor"
-    #: An inclined floor; its length is measured along the ground.
-    RAMP = "ramp"
-
-    @property
-    def is_driven_on(self) -> bool:
-        """Whether touching it is no collision."""
-        return self in {Kind.FLOOR, Kind.RAMP}
-
-
-@dataclass(frozen=True, slots=True)
-class Pose:
-    """A place and a heading: metres, radians counter-clockwise, and the floor's height."""
-
-    x_m: float
-    y_m: float
-    heading_rad: float
-    z_m: float = 0.0
+# Things, meshes and marks ---------------------------------------------------------------
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -158,7 +168,7 @@ class Obstacle:
         fixed: Part of the building: never moved or taken out, so that a body may merge all such into one.
         mass_kg: Of a thing that the robot can push; 0 stands fast.
         friction: Of a thing that can be pushed, against the floor.
-        walk: How it moves by itself; it then stands at the walk's first point, whatever x_m and y_m say.
+        walk: How it moves by itself; it then stands at the walk's first point, whatever x_m and y_m are.
     """
 
     name: str
@@ -240,7 +250,7 @@ class Mesh:
     Args:
         name: Unique in its world.
         vertices: x, y, z of each corner.
-        triangles: Three indices into `vertices` each; their winding is of no account.
+        triangles: Three indices into `vertices` each; their winding does not matter.
     """
 
     name: str
@@ -265,7 +275,7 @@ class Mesh:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Mark:
-    """A place on the plan that is no thing: drawn, and felt by nobody.
+    """A place on the plan that is no thing: drawn, and nothing meets it.
 
     Args:
         name: What is written beside it; need not be unique.
@@ -282,6 +292,9 @@ class Mark:
             raise WorldError(f"kind {self.kind!r} is unknown", hint=f"one of {', '.join(MARK_KINDS)}")
         if not self.points_m or not all(math.isfinite(value) for point in self.points_m for value in point):
             raise WorldError("a mark needs a point, or several")
+
+
+# The world ------------------------------------------------------------------------------
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -340,14 +353,7 @@ class World:
         }
 
 
-Segment = tuple[Point, Point]
-Polygon = tuple[Point, ...]
-
-#: Pieces on lines that differ by less are one, m; and the grain to which lines are compared.
-GRAIN_M = 1e-4
-#: A shadow of less area is an upright face, m².
-UPRIGHT_M2 = 1e-8
-_LINE_ANGLE_STEPS = 1e4
+# The plans of a mesh --------------------------------------------------------------------
 
 
 def cut(mesh: Mesh, height_m: float) -> list[Segment]:

@@ -1,15 +1,15 @@
 """The plan of a world that changes: what stands where, by name.
 
-Both bodies keep one: it answers what is nearest to the hull and what the sonar
-can hear, and it refuses what cannot be (a second obstacle of the same name,
-moving one that is not there or that is part of the building).
+Each body keeps a `Plan`: it answers what is nearest to the hull and what the sonar
+may meet, and it refuses what cannot be (a second obstacle of the same name, moving
+one that is not there or that is part of the building). It moves nothing by itself.
 
-Footprints that never move, found by where they are.
+Three parts: `Bands` decides by heights what hull, wheels and sonar meet of a thing;
+`StaticPlan` holds all that never moves (fixed obstacles, and meshes cut once);
+`FootprintGrid` finds footprints by their place, since a map has thousands of walls
+and a question concerns a few square metres.
 
-A map has thousands of walls; a question concerns a few square metres. The plan
-is cut in square cells, each with the footprints that reach into it.
-
-The plan of all that never moves: fixed obstacles and meshes, cut once and kept by place.
+Invariant: the order of what is found depends on the world alone.
 """
 
 import math
@@ -19,118 +19,9 @@ from difflib import get_close_matches
 from operator import itemgetter
 
 from p2os.errors import WorldError
-from p2os.pioneer.world.geometry import INFINITY, Footprint, Polygon, hull_polygon, placed, wheel_polygons
-from p2os.pioneer.world.model import Mesh, Obstacle, World, cut, shadow
+from p2os.pioneer.world.geometry import INFINITY, Footprint, hull_polygon, placed, wheel_polygons
+from p2os.pioneer.world.model import Mesh, Obstacle, Polygon, World, cut, shadow
 from p2os.robots.parameters import RobotParameters
-
-#: chosen: a sonar's cone touches some twenty cells.
-CELL_M = 1.0
-#: A footprint that would fill more cells than this is looked at always.
-MOST_CELLS = 4096
-
-
-class FootprintGrid:
-    """An index of footprints."""
-
-    def __init__(self, footprints: Iterable[Footprint]) -> None:
-        self.footprints = tuple(footprints)
-        self._cells: dict[tuple[int, int], list[int]] = {}
-        self._always: list[int] = []
-        for number, thing in enumerate(self.footprints):
-            x0, y0, x1, y1 = (math.floor(value / CELL_M) for value in thing.bounds)
-            if (x1 - x0 + 1) * (y1 - y0 + 1) > MOST_CELLS:
-                self._always.append(number)
-                continue
-            for column in range(x0, x1 + 1):
-                for row in range(y0, y1 + 1):
-                    self._cells.setdefault((column, row), []).append(number)
-        columns, rows = [c for c, _ in self._cells], [r for _, r in self._cells]
-        #: First and last column and row that hold anything.
-        self._span = (min(columns), min(rows), max(columns), max(rows)) if self._cells else None
-
-    def near(self, x0: float, y0: float, x1: float, y1: float) -> list[Footprint]:
-        """Return what may reach into a rectangle, each once, in one fixed order."""
-        if not self.footprints:
-            return []
-        found = set(self._always)
-        if self._span is not None:
-            cells = self._cells
-            first_column, first_row, last_column, last_row = self._span
-            for column in range(
-                max(first_column, math.floor(x0 / CELL_M)), min(last_column, math.floor(x1 / CELL_M)) + 1
-            ):
-                for row in range(max(first_row, math.floor(y0 / CELL_M)), min(last_row, math.floor(y1 / CELL_M)) + 1):
-                    found.update(cells.get((column, row), ()))
-        return [self.footprints[number] for number in sorted(found)]
-
-    def covers(self, x0: float, y0: float, x1: float, y1: float) -> bool:
-        """Tell whether nothing lies outside a rectangle: a wider search would find no more."""
-        if self._span is None:
-            return True
-        c0, r0, c1, r1 = (value * CELL_M for value in self._span)
-        return x0 <= c0 and y0 <= r0 and x1 >= c1 + CELL_M and y1 >= r1 + CELL_M
-
-
-#: chosen: wheels of 165 mm roll over what is lower, and a robot's maker calls it a sill.
-SILL_M = 0.02
-
-
-class Bands:
-    """The heights at which a robot meets things.
-
-    `touch`: what the hull meets; `ring`: where its sonar look; `low`: what passes under the
-    hull and stops its wheels.
-    """
-
-    __slots__ = ("low", "ring", "touch")
-
-    def __init__(self, parameters: RobotParameters) -> None:
-        body = parameters.body
-        self.touch = (body.ground_clearance_m, body.hull_height_m)
-        self.ring = parameters.sonar_height_m
-        self.low = (min(SILL_M, body.ground_clearance_m), body.ground_clearance_m)
-
-    def is_touched(self, item: Obstacle) -> bool:
-        """Tell whether the hull can meet it."""
-        return item.stands_in(*self.touch)
-
-    def echoes(self, item: Obstacle) -> bool:
-        """Tell whether the sonar hear it."""
-        return item.stands_in(self.ring, self.ring)
-
-    def stops_wheels(self, item: Obstacle) -> bool:
-        """Tell whether it passes under the hull and is too high to be driven over."""
-        return item.stands_in(*self.low) and not self.is_touched(item)
-
-    def is_sill(self, item: Obstacle) -> bool:
-        """Tell whether wheels drive over it."""
-        stands_on_floor = item.base_m - item.floor_m <= self.low[0]
-        return not item.kind.is_driven_on and stands_on_floor and not item.stands_in(self.low[0], math.inf)
-
-
-class StaticPlan:
-    """What is fixed in a world, for one model of robot."""
-
-    def __init__(self, world: World, parameters: RobotParameters) -> None:
-        bands = Bands(parameters)
-        self.obstacles = tuple(item for item in world.obstacles if item.fixed)
-        self.names = frozenset(item.name for item in self.obstacles) | {mesh.name for mesh in world.meshes}
-        footprints = [(item, Footprint(item)) for item in self.obstacles]
-        touched = [shape for item, shape in footprints if bands.is_touched(item)]
-        heard = [shape for item, shape in footprints if bands.echoes(item)]
-        low = [shape for item, shape in footprints if bands.stops_wheels(item)]
-        self.touched = FootprintGrid([*touched, *_shadows(world.meshes, *bands.touch)])
-        self.heard = FootprintGrid([*heard, *_cuts(world.meshes, bands.ring)])
-        self.low = FootprintGrid(low)
-
-
-def _shadows(meshes: Iterable[Mesh], low_m: float, high_m: float) -> list[Footprint]:
-    return [Footprint.of_polygon(mesh.name, polygon) for mesh in meshes for polygon in shadow(mesh, low_m, high_m)]
-
-
-def _cuts(meshes: Iterable[Mesh], height_m: float) -> list[Footprint]:
-    return [Footprint.of_polygon(mesh.name, segment) for mesh in meshes for segment in cut(mesh, height_m)]
-
 
 #: The first ring of a search for the nearest wall beyond the hull; it is doubled until something is found, m.
 FIRST_RING_M = 2.0
@@ -138,12 +29,18 @@ FIRST_RING_M = 2.0
 NAMED = 12
 #: How far a pushed thing is kept from what pushes it, m.
 APART_M = 1e-6
+#: chosen: wheels of 165 mm roll over what is lower, and a robot's maker calls it a sill.
+SILL_M = 0.02
+#: chosen: a sonar's cone touches some twenty cells.
+CELL_M = 1.0
+#: A footprint that would fill more cells than this is looked at always.
+MOST_CELLS = 4096
 
 
 class Plan:
     """Obstacles by name, cut where they could touch the hull."""
 
-    def __init__(self, obstacles: Iterable[Obstacle], parameters: RobotParameters, static: StaticPlan) -> None:
+    def __init__(self, obstacles: Iterable[Obstacle], parameters: RobotParameters, static: "StaticPlan") -> None:
         body = parameters.body
         self._bands = Bands(parameters)
         self._static = static
@@ -152,7 +49,7 @@ class Plan:
         self._hull_reach = max(math.hypot(x, y) for x, y in self._hull)
         self._obstacles: dict[str, Obstacle] = {}
         self._touchable: dict[str, Footprint] = {}
-        self._heard: dict[str, Footprint] = {}
+        self._echoing: dict[str, Footprint] = {}
         self._low: dict[str, Footprint] = {}
         for obstacle in obstacles:
             self.place(obstacle)
@@ -200,7 +97,7 @@ class Plan:
             WorldError: There is none of that name, or it is part of the building.
         """
         self.find(name)
-        for table in (self._obstacles, self._touchable, self._heard, self._low):
+        for table in (self._obstacles, self._touchable, self._echoing, self._low):
             table.pop(name, None)
 
     def find(self, name: str) -> Obstacle:
@@ -248,9 +145,9 @@ class Plan:
         return nearest
 
     def echoing_within(self, x0: float, y0: float, x1: float, y1: float) -> Sequence[Footprint]:
-        """Return what the sonar could hear in a rectangle, and perhaps some more."""
-        movable = self._heard.values()
-        return [*movable, *self._static.heard.near(x0, y0, x1, y1)] if self._static.heard.footprints else [*movable]
+        """Return what may echo the sonar in a rectangle, and perhaps some more."""
+        movable = self._echoing.values()
+        return [*movable, *self._static.echoing.near(x0, y0, x1, y1)] if self._static.echoing.footprints else [*movable]
 
     def touched(self, x_m: float, y_m: float, heading_rad: float) -> list[str]:
         """Return the names of the things that the hull overlaps at a pose; of the building, one name is enough."""
@@ -298,10 +195,10 @@ class Plan:
     def _keep(self, obstacle: Obstacle) -> None:
         name, bands = obstacle.name, self._bands
         self._obstacles[name] = obstacle
-        touched, heard, low = bands.is_touched(obstacle), bands.echoes(obstacle), bands.stops_wheels(obstacle)
-        if touched or heard or low:
+        touched, echoing, low = bands.is_touched(obstacle), bands.echoes(obstacle), bands.stops_wheels(obstacle)
+        if touched or echoing or low:
             shape = Footprint(obstacle)
-            for table, belongs in ((self._touchable, touched), (self._heard, heard), (self._low, low)):
+            for table, belongs in ((self._touchable, touched), (self._echoing, echoing), (self._low, low)):
                 if belongs:
                     table[name] = shape
 
@@ -315,3 +212,102 @@ def _overlap(one: Footprint, other: Footprint) -> bool:
     if other.polygon:
         return one.distance(other.polygon) == 0.0
     return math.dist((one.x, one.y), (other.x, other.y)) < one.radius + other.radius
+
+
+class Bands:
+    """The heights at which a robot meets things.
+
+    `touch`: what the hull meets; `ring`: the plane of its sonar; `low`: what passes under the
+    hull and stops its wheels.
+    """
+
+    __slots__ = ("low", "ring", "touch")
+
+    def __init__(self, parameters: RobotParameters) -> None:
+        body = parameters.body
+        self.touch = (body.ground_clearance_m, body.hull_height_m)
+        self.ring = parameters.sonar_height_m
+        self.low = (min(SILL_M, body.ground_clearance_m), body.ground_clearance_m)
+
+    def is_touched(self, item: Obstacle) -> bool:
+        """Tell whether the hull can meet it."""
+        return item.stands_in(*self.touch)
+
+    def echoes(self, item: Obstacle) -> bool:
+        """Tell whether it echoes the sonar."""
+        return item.stands_in(self.ring, self.ring)
+
+    def stops_wheels(self, item: Obstacle) -> bool:
+        """Tell whether it passes under the hull and is too high to be driven over."""
+        return item.stands_in(*self.low) and not self.is_touched(item)
+
+    def is_sill(self, item: Obstacle) -> bool:
+        """Tell whether wheels drive over it."""
+        stands_on_floor = item.base_m - item.floor_m <= self.low[0]
+        return not item.kind.is_driven_on and stands_on_floor and not item.stands_in(self.low[0], math.inf)
+
+
+class StaticPlan:
+    """What is fixed in a world, for one model of robot."""
+
+    def __init__(self, world: World, parameters: RobotParameters) -> None:
+        bands = Bands(parameters)
+        self.obstacles = tuple(item for item in world.obstacles if item.fixed)
+        self.names = frozenset(item.name for item in self.obstacles) | {mesh.name for mesh in world.meshes}
+        footprints = [(item, Footprint(item)) for item in self.obstacles]
+        touched = [shape for item, shape in footprints if bands.is_touched(item)]
+        echoing = [shape for item, shape in footprints if bands.echoes(item)]
+        low = [shape for item, shape in footprints if bands.stops_wheels(item)]
+        self.touched = FootprintGrid([*touched, *_shadows(world.meshes, *bands.touch)])
+        self.echoing = FootprintGrid([*echoing, *_cuts(world.meshes, bands.ring)])
+        self.low = FootprintGrid(low)
+
+
+def _shadows(meshes: Iterable[Mesh], low_m: float, high_m: float) -> list[Footprint]:
+    return [Footprint.of_polygon(mesh.name, polygon) for mesh in meshes for polygon in shadow(mesh, low_m, high_m)]
+
+
+def _cuts(meshes: Iterable[Mesh], height_m: float) -> list[Footprint]:
+    return [Footprint.of_polygon(mesh.name, segment) for mesh in meshes for segment in cut(mesh, height_m)]
+
+
+class FootprintGrid:
+    """Footprints that never move, kept in the square cells that they reach into."""
+
+    def __init__(self, footprints: Iterable[Footprint]) -> None:
+        self.footprints = tuple(footprints)
+        self._cells: dict[tuple[int, int], list[int]] = {}
+        self._always: list[int] = []
+        for number, thing in enumerate(self.footprints):
+            x0, y0, x1, y1 = (math.floor(value / CELL_M) for value in thing.bounds)
+            if (x1 - x0 + 1) * (y1 - y0 + 1) > MOST_CELLS:
+                self._always.append(number)
+                continue
+            for column in range(x0, x1 + 1):
+                for row in range(y0, y1 + 1):
+                    self._cells.setdefault((column, row), []).append(number)
+        columns, rows = [c for c, _ in self._cells], [r for _, r in self._cells]
+        #: First and last column and row that hold anything.
+        self._span = (min(columns), min(rows), max(columns), max(rows)) if self._cells else None
+
+    def near(self, x0: float, y0: float, x1: float, y1: float) -> list[Footprint]:
+        """Return what may reach into a rectangle, each once, in one fixed order."""
+        if not self.footprints:
+            return []
+        found = set(self._always)
+        if self._span is not None:
+            cells = self._cells
+            first_column, first_row, last_column, last_row = self._span
+            for column in range(
+                max(first_column, math.floor(x0 / CELL_M)), min(last_column, math.floor(x1 / CELL_M)) + 1
+            ):
+                for row in range(max(first_row, math.floor(y0 / CELL_M)), min(last_row, math.floor(y1 / CELL_M)) + 1):
+                    found.update(cells.get((column, row), ()))
+        return [self.footprints[number] for number in sorted(found)]
+
+    def covers(self, x0: float, y0: float, x1: float, y1: float) -> bool:
+        """Tell whether nothing lies outside a rectangle: a wider search would find no more."""
+        if self._span is None:
+            return True
+        c0, r0, c1, r1 = (value * CELL_M for value in self._span)
+        return x0 <= c0 and y0 <= r0 and x1 >= c1 + CELL_M and y1 >= r1 + CELL_M

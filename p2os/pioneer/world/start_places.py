@@ -1,4 +1,4 @@
-"""Where the robots of one world begin: where they are told to, or beside the world's start.
+"""Where the robots of one world begin: at their given places, or beside the world's start.
 
 A robot without a place of its own gets the free one that is nearest to the world's start and
 that a robot can drive to from there: level, clear of all things and of the other robots.
@@ -23,20 +23,20 @@ BETWEEN_M = 0.2
 Standing = tuple[Pose, RobotParameters]
 
 
-def start_places(world: World, models: Sequence[RobotParameters], told: Sequence[Pose | None]) -> tuple[Pose, ...]:
+def start_places(world: World, models: Sequence[RobotParameters], given: Sequence[Pose | None]) -> tuple[Pose, ...]:
     """Return where each robot begins.
 
     Args:
         world: Where they are.
         models: What each robot is.
-        told: Where each is told to begin; None: wherever there is room. z_m is found here.
+        given: Where each is to begin; None: wherever there is room. z_m is found here.
 
     Raises:
-        UsageError: A place that was told is not free, or there is no room for all.
+        UsageError: A given place is not free, or there is no room for all.
     """
     plans = {id(model): Plan.of_world(world, model) for model in models}
     standing: dict[int, Standing] = {}
-    for number, (pose, model) in enumerate(zip(told, models, strict=True)):
+    for number, (pose, model) in enumerate(zip(given, models, strict=True)):
         if pose is not None:
             standing[number] = (_checked(number, pose, world, model, plans[id(model)], standing), model)
     places = {key: _free_places(world, plan) for key, plan in plans.items()}
@@ -55,7 +55,7 @@ def start_places(world: World, models: Sequence[RobotParameters], told: Sequence
 def _checked(
     number: int, pose: Pose, world: World, model: RobotParameters, plan: Plan, standing: dict[int, Standing]
 ) -> Pose:
-    """Return a place that was told, with its floor's height."""
+    """Return a given place, with its floor's height."""
     where = f"robot {number + 1} at {pose.x_m:g}, {pose.y_m:g}"
     x0, y0, x1, y1 = world.extent
     if not (x0 <= pose.x_m <= x1 and y0 <= pose.y_m <= y1):

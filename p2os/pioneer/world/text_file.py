@@ -1,4 +1,4 @@
-"""The text of a file that a person names: bounded, and every error a `WorldError`."""
+"""The text of a file that a user names: bounded, and every error a `WorldError`."""
 
 from pathlib import Path
 

@@ -266,7 +266,7 @@ class BulletBody:
         ]
 
     def _cast(self, numbers: Sequence[int]) -> list[tuple[Any, ...]]:
-        """Return what the engine says of each ray of some sonar."""
+        """Return what the engine returns for each ray of some sonar."""
         if not numbers:
             return []
         _ = self.state  # reads the robot's frame

@@ -23,7 +23,7 @@ def _silence(descriptor: int) -> Iterator[None]:
     """Turn a stream of the process away for a moment; what its C library holds back goes the same way."""
     try:
         kept = os.dup(descriptor)
-    except OSError:  # closed: nothing can be heard anyway
+    except OSError:  # closed: nothing can be shown anyway
         yield
         return
     flush = ctypes.CDLL(None).fflush
@@ -41,7 +41,7 @@ def _silence(descriptor: int) -> Iterator[None]:
 
 def _load() -> ModuleType:
     """Import PyBullet with the process's standard error turned away for that moment."""
-    # PyBullet needs NumPy and does not say so: a missing one is named first, aloud.
+    # PyBullet needs NumPy and does not report it: a missing one is named first.
     importlib.import_module("numpy")
     with _silence(_STANDARD_ERROR):
         return importlib.import_module("pybullet")

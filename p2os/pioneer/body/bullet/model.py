@@ -1,16 +1,14 @@
-"""Robot, floors and obstacles as PyBullet bodies, made from parameters and plans.
+"""Robot, floors, obstacles and the building as PyBullet bodies, made from parameters and plans.
 
-Shapes are made by calls, not from a URDF file: nothing is written to disk and
-nothing is cached. Collision groups keep wheels off walls (see `bullet`).
+Shapes are made by calls, not from a URDF file: nothing is written to disk and nothing is
+cached. Collision groups keep wheels off walls (see `body`). Nothing here is stepped.
 
-What never moves in a world, as few PyBullet bodies: fixed boxes and meshes merged into one.
-
-Each static body costs the engine a third of a microsecond in every step, so that
-a map of a thousand walls as bodies of their own would halve the speed tenfold.
-
-Faces that are nearly level can be driven on and belong to the floor; all others
-are what the hull meets. Level faces on the ground are left out: the floor is
-there, and the seams of triangles would shake the wheels.
+What never moves in a world is as few bodies as possible: fixed boxes and meshes are
+merged into one. Each static body costs the engine a third of a microsecond in every step,
+so that a map of a thousand walls as bodies of their own would halve the speed tenfold.
+Faces that are nearly level can be driven on and belong to the floor; all others are what
+the hull meets. Level faces on the ground are left out: the floor is there, and the seams
+of triangles would shake the wheels.
 """
 
 import math
@@ -46,7 +44,7 @@ from p2os.robots.parameters import RobotParameters
 
 #: Links of the robot.
 LEFT, RIGHT, CASTER = 0, 1, 2
-#: What a ray may meet.
+#: What a sonar's ray may meet.
 ECHOING = OBSTACLE_GROUP | FLOOR_GROUP | PUSHED_GROUP | LOW_GROUP
 #: The group that Bullet gives its rays.
 RAY_GROUP = 1
@@ -56,6 +54,17 @@ STATIC_FRICTION = 1.0
 PARKED_M = -100.0
 
 LEVEL = (0.0, 0.0, 0.0, 1.0)
+#: chosen: so few fixed boxes stay bodies of their own, which meet a hull more exactly than triangles.
+FEW_BOXES = 12
+#: The engine takes no more corners in one shape.
+MOST_TRIANGLES = 30_000
+#: Corners of a box as made below: bottom ring, top ring; counter-clockwise.
+BOX_FACES: tuple[Triangle, ...] = (
+    (0, 2, 1), (0, 3, 2), (4, 5, 6), (4, 6, 7), (0, 1, 5), (0, 5, 4),
+    (1, 2, 6), (1, 6, 5), (2, 3, 7), (2, 7, 6), (3, 0, 4), (3, 4, 7),
+)  # fmt: skip
+
+Corners = tuple[Vertex, Vertex, Vertex]
 
 
 def add_floor(world: World, client: int) -> int:
@@ -197,17 +206,7 @@ def add_robot(parameters: RobotParameters, pose: Pose, client: int) -> tuple[int
     return int(robot), centre
 
 
-#: chosen: so few fixed boxes stay bodies of their own, which meet a hull more exactly than triangles.
-FEW_BOXES = 12
-#: The engine takes no more corners in one shape.
-MOST_TRIANGLES = 30_000
-#: Corners of a box as made below: bottom ring, top ring; counter-clockwise.
-BOX_FACES: tuple[Triangle, ...] = (
-    (0, 2, 1), (0, 3, 2), (4, 5, 6), (4, 6, 7), (0, 1, 5), (0, 5, 4),
-    (1, 2, 6), (1, 6, 5), (2, 3, 7), (2, 7, 6), (3, 0, 4), (3, 4, 7),
-)  # fmt: skip
-
-Corners = tuple[Vertex, Vertex, Vertex]
+# The building ---------------------------------------------------------------------------
 
 
 def merged(world: World) -> list[Obstacle]:

@@ -54,7 +54,7 @@ class SonarRays:
         return _placed(starts, origin, matrix), _placed(ends, origin, matrix)
 
     def echoes(self, number: int, hits: Sequence[tuple[Any, ...]], matrix: Sequence[float]) -> list[Echo]:
-        """Return the echoes of one sonar's rays from what the engine says of each: fraction and normal."""
+        """Return the echoes of one sonar's rays from what the engine returns for each: fraction and normal."""
         found = []
         for heading, hit in zip(self._cones[number].headings_rad, hits, strict=True):
             if hit[0] < 0:

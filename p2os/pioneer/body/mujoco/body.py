@@ -6,7 +6,7 @@ engine: contacts are the solution of one convex problem in each step, not of an
 iteration that is cut short, so that hardly anything slips that need not.
 
 Not modelled: tyre scrub and wheel-size errors, battery sag; floors of meshes
-(refused, see `meshes`).
+(refused, see `model`).
 """
 
 import math
@@ -72,7 +72,7 @@ class MujocoBody:
 
     @property
     def note(self) -> str | None:
-        """Say what a mesh is to it where the world has some."""
+        """How it takes meshes, where the world has some."""
         if not self._world.meshes:
             return None
         return "the mujoco body touches a mesh as upright walls over its plan, at the height of the hull"

@@ -1,20 +1,16 @@
 """A robot, its floor and the things around it as a MuJoCo model.
 
-A model is a function of the things that stand in the world, not of where they
-stand: whatever can move has its place in the state. So a state goes back into a
-model that was made anew.
+A model is a function of the things that stand in the world, not of where they stand:
+whatever can move has its place in the state. So a state goes back into a model that was
+made anew.
 
-The motors are frictions: MuJoCo's dry friction between a wheel and a rotor that is
-turned at the set-point pulls the wheel along with no more than the motor's torque.
+The motors are frictions: MuJoCo's dry friction between a wheel and a rotor that is turned
+at the set-point pulls the wheel along with no more than the motor's torque.
 
-Quaternions as MuJoCo writes them: w, x, y, z.
-
-Static meshes in MuJoCo, which takes every mesh for its convex hull.
-
-So a mesh is two things here: its own triangles, which the rays meet and nothing
-touches; and upright pieces over the plan of all that stands between the hull's
-underside and its top, which the hull touches and no ray meets. A mesh with faces
-that the wheels would climb is refused.
+MuJoCo takes every mesh for its convex hull. So a static mesh is two things here: its own
+triangles, which the rays meet and nothing touches; and upright pieces over the plan of
+all that stands between the hull's underside and its top, which the hull touches and no
+ray meets. A mesh with faces that the wheels would climb is refused.
 """
 
 import math
@@ -48,38 +44,133 @@ from p2os.pioneer.world.model import Mesh, Obstacle, Polygon, World, shadow
 from p2os.pioneer.world.plan import Bands
 from p2os.robots.parameters import RobotParameters
 
+#: As MuJoCo writes it: w, x, y, z.
 Quaternion = tuple[float, float, float, float]
-
-
-def quaternion(heading_rad: float, slope_rad: float = 0.0) -> Quaternion:
-    """Return the turn of a thing whose length rises by a slope and then looks along a heading."""
-    ch, sh = math.cos(heading_rad / 2), math.sin(heading_rad / 2)
-    cs, ss = math.cos(slope_rad / 2), math.sin(slope_rad / 2)
-    return ch * cs, sh * ss, -ch * ss, sh * cs
-
-
-def matrix(turn: Sequence[float]) -> tuple[float, ...]:
-    """Return the same turn as nine numbers, row by row."""
-    w, x, y, z = turn
-    return (
-        1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y),
-        2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x),
-        2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y),
-    )  # fmt: skip
-
-
+#: Groups of geometry as MuJoCo's rays choose them: what they meet, and what they pass through.
+ECHOING, SILENT = 0, 1
+WHEELS = ("left wheel", "right wheel")
+ROTORS = ("left rotor", "right rotor")
+ROBOT, HULL = "robot", "hull"
+#: An obstacle's body and joint; with the prefix no name of a world file is one of the robot's.
+THING = "thing: "
+#: A rotor is not held back by what it pulls, kg m².
+ROTOR_INERTIA = 1e6
+#: Where the rotors turn, far from all that could be met, m.
+ROTORS_AT_M = -50.0
 #: How thick an upright face is to the hull, m; chosen: more than the fastest robot drives in a step.
 WALL_THICK_M = 4e-3
 #: chosen: of so many pieces the model is made within a second or two.
 MOST_PIECES = 5000
 #: MuJoCo's meshes have four corners at least.
 LEAST_CORNERS = 4
-#: As in `model`, which imports this.
-_ECHOING, _SILENT = 0, 1
-_BOX, _MESH = mujoco.mjtGeom.mjGEOM_BOX, mujoco.mjtGeom.mjGEOM_MESH
+
+_BOX, _CYLINDER, _MESH = mujoco.mjtGeom.mjGEOM_BOX, mujoco.mjtGeom.mjGEOM_CYLINDER, mujoco.mjtGeom.mjGEOM_MESH
+_SPHERE = mujoco.mjtGeom.mjGEOM_SPHERE
+_HINGE = mujoco.mjtJoint.mjJNT_HINGE
 
 
-def add_mesh(spec: mujoco.MjSpec, mesh: Mesh, name: str, bands: Bands) -> None:
+def make_model(world: World, parameters: RobotParameters, things: Iterable[Obstacle]) -> mujoco.MjModel:
+    """Return a model of a world's building, a robot, and what stands around it.
+
+    Args:
+        world: Its fixed obstacles and meshes are the building.
+        parameters: Of the robot.
+        things: All that is not fixed; their places go into the state (`body`).
+
+    Raises:
+        WorldError: A mesh cannot be met as this body meets meshes.
+    """
+    spec, bands = new_spec(), Bands(parameters)
+    root = spec.worldbody
+    half, place = floor_box(world)
+    root.add_geom(name="floor", type=_BOX, size=half, pos=place, **_collision(FLOOR_GROUP, 0, 0.0))
+    for item in world.obstacles:
+        if item.fixed:
+            place, slope = middle_and_slope(item)
+            turn = quaternion(item.heading_rad, slope)
+            root.add_geom(pos=place, quat=turn, **_shape(item), **_collision(group_of(item, bands), 0, 0.0))
+    for number, mesh in enumerate(world.meshes):
+        _add_mesh(spec, mesh, f"mesh {number}", bands)
+    _add_robot(spec, parameters)
+    for item in things:
+        _add_thing(root, item, group_of(item, bands))
+    return spec.compile()
+
+
+def floor_geometries(model: mujoco.MjModel) -> frozenset[int]:
+    """Return the numbers of all geometry that the robot drives on."""
+    return _of_group(model, FLOOR_GROUP)
+
+
+def low_geometries(model: mujoco.MjModel) -> frozenset[int]:
+    """Return the numbers of all geometry that passes under the hull and stops wheels."""
+    return _of_group(model, LOW_GROUP)
+
+
+def _of_group(model: mujoco.MjModel, group: int) -> frozenset[int]:
+    return frozenset(number for number, own in enumerate(model.geom_contype) if own == group)
+
+
+def _collision(group: int, meets: int, friction: float) -> dict[str, object]:
+    """Return what a piece of geometry meets; of two that meet, the greater friction counts."""
+    return {"contype": group, "conaffinity": meets, "friction": [friction, 0.0, 0.0], "condim": 3, "group": ECHOING}
+
+
+def _shape(item: Obstacle) -> dict[str, object]:
+    if item.is_cylinder:
+        return {"type": _CYLINDER, "size": (item.radius_m, item.height_m / 2, 0.0)}
+    return {"type": _BOX, "size": half_sizes(item)}
+
+
+def _add_thing(root: mujoco.MjsBody, item: Obstacle, group: int) -> None:
+    """Add a thing at the world's middle; where it stands is a matter of the state."""
+    if group == PUSHED_GROUP:
+        body = root.add_body(name=THING + item.name)
+        body.add_freejoint(name=THING + item.name)
+        body.add_geom(mass=item.mass_kg, **_shape(item), **_collision(PUSHED_GROUP, PUSHED_MEETS, item.friction))
+    else:
+        body = root.add_body(name=THING + item.name, mocap=True)
+        body.add_geom(**_shape(item), **_collision(group, 0, 0.0))
+
+
+def _add_robot(spec: mujoco.MjSpec, parameters: RobotParameters) -> None:
+    """Add the robot: its body's frame is the robot frame of `body`, the middle of the axle on the floor."""
+    own, chassis = parameters.body, Chassis.of(parameters)
+    length, width, height, mass = chassis.length_m, chassis.width_m, chassis.height_m, chassis.mass_kg
+    radius = own.wheel_diameter_m / 2
+    robot = spec.worldbody.add_body(name=ROBOT)
+    robot.add_freejoint(name=ROBOT)
+    hull = _collision(HULL_GROUP, HULL_MEETS, HULL_FRICTION) | {"group": SILENT, "priority": 1}
+    wheel = _collision(0, WHEEL_MEETS, WHEEL_FRICTION) | {"group": SILENT}
+    caster = _collision(0, WHEEL_MEETS, 0.0) | {"group": SILENT, "priority": 1, "condim": 1}
+    # The hull's mass is a box about the chassis' own centre, lower than the geometry's middle on a tall robot.
+    inertia = [mass / 12 * (a * a + b * b) for a, b in ((width, height), (length, height), (length, width))]
+    solid = robot.add_body(name=HULL, pos=chassis.centre, mass=mass, inertia=inertia, explicitinertial=True)
+    above = (0.0, 0.0, chassis.middle_m - chassis.centre[2])
+    solid.add_geom(name=HULL, type=_BOX, size=(length / 2, width / 2, height / 2), pos=above, mass=0.0, **hull)
+    robot.add_geom(
+        type=_SPHERE, size=(own.caster_radius_m, 0.0, 0.0), pos=(own.caster_x_m, 0.0, own.caster_radius_m),
+        mass=CASTER_MASS_KG, **caster,
+    )  # fmt: skip
+    for name, rotor_name, side in zip(WHEELS, ROTORS, (1, -1), strict=True):
+        body = robot.add_body(name=name, pos=(0.0, side * parameters.track_mm / 2000, radius))
+        body.add_joint(name=name, type=_HINGE, axis=(0.0, 1.0, 0.0))
+        body.add_geom(type=_SPHERE, size=(radius, 0.0, 0.0), mass=own.wheel_mass_kg, **wheel)
+        rotor = spec.worldbody.add_body(name=rotor_name, pos=(0.0, 0.0, ROTORS_AT_M))
+        rotor.add_joint(name=rotor_name, type=_HINGE, axis=(0.0, 1.0, 0.0), armature=ROTOR_INERTIA)
+        rotor.add_geom(type=_SPHERE, size=(0.01, 0.0, 0.0), contype=0, conaffinity=0, group=SILENT)
+        motor = spec.add_tendon(
+            name=name, frictionloss=own.motor_torque_nm, solref_friction=list(MOTOR_SOLREF),
+            solimp_friction=list(RIGID_SOLIMP),
+        )  # fmt: skip
+        motor.wrap_joint(name, 1.0)
+        motor.wrap_joint(rotor_name, -1.0)
+
+
+# Meshes ---------------------------------------------------------------------------------
+
+
+def _add_mesh(spec: mujoco.MjSpec, mesh: Mesh, name: str, bands: Bands) -> None:
     """Add a mesh to a model under a name of its own.
 
     Raises:
@@ -95,8 +186,8 @@ def add_mesh(spec: mujoco.MjSpec, mesh: Mesh, name: str, bands: Bands) -> None:
             hint="--body bullet or --body kinematic",
         )
     _asset(spec, name, [value for vertex in mesh.vertices for value in vertex], mesh.triangles)
-    spec.worldbody.add_geom(type=_MESH, meshname=name, contype=0, conaffinity=0, group=_ECHOING)
-    met = {"contype": OBSTACLE_GROUP, "conaffinity": 0, "friction": [0.0, 0.0, 0.0], "group": _SILENT}
+    spec.worldbody.add_geom(type=_MESH, meshname=name, contype=0, conaffinity=0, group=ECHOING)
+    met = {"contype": OBSTACLE_GROUP, "conaffinity": 0, "friction": [0.0, 0.0, 0.0], "group": SILENT}
     for number, outline in enumerate(pieces):
         if len(outline) == 2:
             (ax, ay), (bx, by) = outline
@@ -151,115 +242,21 @@ def _asset(
     mesh.inertia = mujoco.mjtMeshInertia.mjMESH_INERTIA_SHELL
 
 
-#: Groups of geometry as MuJoCo's rays choose them: what they meet, and what they pass through.
-ECHOING, SILENT = 0, 1
-WHEELS = ("left wheel", "right wheel")
-ROTORS = ("left rotor", "right rotor")
-ROBOT, HULL = "robot", "hull"
-#: An obstacle's body and joint; with the prefix no name of a world file is one of the robot's.
-THING = "thing: "
-#: A rotor is not held back by what it pulls, kg m².
-ROTOR_INERTIA = 1e6
-#: Where the rotors turn, far from all that could be met, m.
-ROTORS_AT_M = -50.0
-
-_MODEL_BOX, _CYLINDER, _SPHERE = mujoco.mjtGeom.mjGEOM_BOX, mujoco.mjtGeom.mjGEOM_CYLINDER, mujoco.mjtGeom.mjGEOM_SPHERE
-_HINGE = mujoco.mjtJoint.mjJNT_HINGE
+# Turns ----------------------------------------------------------------------------------
 
 
-def make_model(world: World, parameters: RobotParameters, things: Iterable[Obstacle]) -> mujoco.MjModel:
-    """Return a model of a world's building, a robot, and what stands around it.
-
-    Args:
-        world: Its fixed obstacles and meshes are the building.
-        parameters: Of the robot.
-        things: All that is not fixed; their places go into the state (`body`).
-
-    Raises:
-        WorldError: A mesh cannot be met as this body meets meshes.
-    """
-    spec, bands = new_spec(), Bands(parameters)
-    root = spec.worldbody
-    half, place = floor_box(world)
-    root.add_geom(name="floor", type=_MODEL_BOX, size=half, pos=place, **_collision(FLOOR_GROUP, 0, 0.0))
-    for item in world.obstacles:
-        if item.fixed:
-            place, slope = middle_and_slope(item)
-            turn = quaternion(item.heading_rad, slope)
-            root.add_geom(pos=place, quat=turn, **_shape(item), **_collision(group_of(item, bands), 0, 0.0))
-    for number, mesh in enumerate(world.meshes):
-        add_mesh(spec, mesh, f"mesh {number}", bands)
-    _add_robot(spec, parameters)
-    for item in things:
-        _add_thing(root, item, group_of(item, bands))
-    return spec.compile()
+def quaternion(heading_rad: float, slope_rad: float = 0.0) -> Quaternion:
+    """Return the turn of a thing whose length rises by a slope and then looks along a heading."""
+    ch, sh = math.cos(heading_rad / 2), math.sin(heading_rad / 2)
+    cs, ss = math.cos(slope_rad / 2), math.sin(slope_rad / 2)
+    return ch * cs, sh * ss, -ch * ss, sh * cs
 
 
-def floor_geometries(model: mujoco.MjModel) -> frozenset[int]:
-    """Return the numbers of all geometry that the robot drives on."""
-    return _of_group(model, FLOOR_GROUP)
-
-
-def low_geometries(model: mujoco.MjModel) -> frozenset[int]:
-    """Return the numbers of all geometry that passes under the hull and stops wheels."""
-    return _of_group(model, LOW_GROUP)
-
-
-def _of_group(model: mujoco.MjModel, group: int) -> frozenset[int]:
-    return frozenset(number for number, own in enumerate(model.geom_contype) if own == group)
-
-
-def _collision(group: int, meets: int, friction: float) -> dict[str, object]:
-    """Return what a piece of geometry meets; of two that meet, the greater friction counts."""
-    return {"contype": group, "conaffinity": meets, "friction": [friction, 0.0, 0.0], "condim": 3, "group": ECHOING}
-
-
-def _shape(item: Obstacle) -> dict[str, object]:
-    if item.is_cylinder:
-        return {"type": _CYLINDER, "size": (item.radius_m, item.height_m / 2, 0.0)}
-    return {"type": _MODEL_BOX, "size": half_sizes(item)}
-
-
-def _add_thing(root: mujoco.MjsBody, item: Obstacle, group: int) -> None:
-    """Add a thing at the world's middle; where it stands is a matter of the state."""
-    if group == PUSHED_GROUP:
-        body = root.add_body(name=THING + item.name)
-        body.add_freejoint(name=THING + item.name)
-        body.add_geom(mass=item.mass_kg, **_shape(item), **_collision(PUSHED_GROUP, PUSHED_MEETS, item.friction))
-    else:
-        body = root.add_body(name=THING + item.name, mocap=True)
-        body.add_geom(**_shape(item), **_collision(group, 0, 0.0))
-
-
-def _add_robot(spec: mujoco.MjSpec, parameters: RobotParameters) -> None:
-    """Add the robot: its body's frame is the robot frame of `body`, the middle of the axle on the floor."""
-    own, chassis = parameters.body, Chassis.of(parameters)
-    length, width, height, mass = chassis.length_m, chassis.width_m, chassis.height_m, chassis.mass_kg
-    radius = own.wheel_diameter_m / 2
-    robot = spec.worldbody.add_body(name=ROBOT)
-    robot.add_freejoint(name=ROBOT)
-    hull = _collision(HULL_GROUP, HULL_MEETS, HULL_FRICTION) | {"group": SILENT, "priority": 1}
-    wheel = _collision(0, WHEEL_MEETS, WHEEL_FRICTION) | {"group": SILENT}
-    caster = _collision(0, WHEEL_MEETS, 0.0) | {"group": SILENT, "priority": 1, "condim": 1}
-    # The hull's mass is a box about the chassis' own centre, lower than the geometry's middle on a tall robot.
-    inertia = [mass / 12 * (a * a + b * b) for a, b in ((width, height), (length, height), (length, width))]
-    solid = robot.add_body(name=HULL, pos=chassis.centre, mass=mass, inertia=inertia, explicitinertial=True)
-    above = (0.0, 0.0, chassis.middle_m - chassis.centre[2])
-    solid.add_geom(name=HULL, type=_MODEL_BOX, size=(length / 2, width / 2, height / 2), pos=above, mass=0.0, **hull)
-    robot.add_geom(
-        type=_SPHERE, size=(own.caster_radius_m, 0.0, 0.0), pos=(own.caster_x_m, 0.0, own.caster_radius_m),
-        mass=CASTER_MASS_KG, **caster,
+def matrix(turn: Sequence[float]) -> tuple[float, ...]:
+    """Return the same turn as nine numbers, row by row."""
+    w, x, y, z = turn
+    return (
+        1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y),
+        2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x),
+        2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y),
     )  # fmt: skip
-    for name, rotor_name, side in zip(WHEELS, ROTORS, (1, -1), strict=True):
-        body = robot.add_body(name=name, pos=(0.0, side * parameters.track_mm / 2000, radius))
-        body.add_joint(name=name, type=_HINGE, axis=(0.0, 1.0, 0.0))
-        body.add_geom(type=_SPHERE, size=(radius, 0.0, 0.0), mass=own.wheel_mass_kg, **wheel)
-        rotor = spec.worldbody.add_body(name=rotor_name, pos=(0.0, 0.0, ROTORS_AT_M))
-        rotor.add_joint(name=rotor_name, type=_HINGE, axis=(0.0, 1.0, 0.0), armature=ROTOR_INERTIA)
-        rotor.add_geom(type=_SPHERE, size=(0.01, 0.0, 0.0), contype=0, conaffinity=0, group=SILENT)
-        motor = spec.add_tendon(
-            name=name, frictionloss=own.motor_torque_nm, solref_friction=list(MOTOR_SOLREF),
-            solimp_friction=list(RIGID_SOLIMP),
-        )  # fmt: skip
-        motor.wrap_joint(name, 1.0)
-        motor.wrap_joint(rotor_name, -1.0)

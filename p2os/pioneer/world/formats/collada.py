@@ -2,7 +2,7 @@
 
 Taken: `triangles`, `polylist`, `polygons` of every geometry that the scene shows,
 node transforms (`matrix`, `translate`, `rotate`, `scale`), instances of nodes.
-Left out, and said: lines, strips and fans, polygons with holes, skins and morphs,
+Left out, and reported: lines, strips and fans, polygons with holes, skins and morphs,
 cameras, lights, `lookat` and `skew`. Materials and animation need no word.
 """
 

@@ -1,8 +1,8 @@
-"""Read the triangles of an OBJ, STL or COLLADA file.
+"""Read an OBJ, STL or COLLADA file: its triangles, or a world of its own.
 
-What comes out is in metres with Z up. OBJ and STL say neither their unit (taken
+What comes out is in metres with Z up. OBJ and STL have neither their unit (taken
 as metres) nor their up axis: an OBJ is taken as Y up, as its exporters write
-it, an STL as Z up; COLLADA says both.
+it, an STL as Z up; COLLADA has both.
 """
 
 import struct
@@ -11,9 +11,10 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from p2os.errors import WorldError
+from p2os.pioneer.world.formats.collection import Collection
 from p2os.pioneer.world.formats.placing import with_z_up
 from p2os.pioneer.world.formats.polygon import triangulated
-from p2os.pioneer.world.model import Triangle, Vertex
+from p2os.pioneer.world.model import Triangle, Vertex, World
 
 #: Of a binary STL: a header of 80 bytes, a count, then 50 bytes a triangle.
 STL_HEADER, STL_TRIANGLE = 84, 50
@@ -30,6 +31,19 @@ class Triangles:
     skipped: list[str] = field(default_factory=list)
 
 
+def read(path: Path, up: str) -> World:
+    """Return the world of an OBJ, STL or COLLADA file.
+
+    Raises:
+        WorldError: The file is not what its ending names, or holds no triangles.
+    """
+    found, collection = read_triangles(path, up), Collection(path)
+    for what in found.skipped:
+        collection.skip(what)
+    collection.add_mesh(path.stem, found.vertices, found.triangles)
+    return collection.world()
+
+
 def read_triangles(path: Path, up: str = "auto") -> Triangles:
     """Return the triangles of a mesh file: metres, Z up.
 
@@ -38,7 +52,7 @@ def read_triangles(path: Path, up: str = "auto") -> Triangles:
         up: `auto`, or the axis that is up in the file.
 
     Raises:
-        WorldError: The file is not what its ending says, or the ending is another.
+        WorldError: The file is not what its ending names, or the ending is another.
     """
     reader = _READERS.get(path.suffix.lower())
     if reader is None:

@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 from p2os.errors import WorldError
 from p2os.pioneer.world.model import Obstacle, Pose, Vertex, World
 
-#: Which axis of a file is up: `auto` is what its format says or is used to.
+#: Which axis of a file is up: `auto` is what its format states or usually has.
 UP_AXES = ("auto", "x", "y", "z")
 
 

@@ -21,9 +21,9 @@ FORMATS: Mapping[str, str] = {
     ".sdf": "sdf",
     ".world": "sdf",
     ".urdf": "urdf",
-    ".obj": "mesh_world",
-    ".stl": "mesh_world",
-    ".dae": "mesh_world",
+    ".obj": "mesh_file",
+    ".stl": "mesh_file",
+    ".dae": "mesh_file",
 }
 
 
@@ -38,7 +38,7 @@ class Reader(Protocol):
             up: `auto`, or the axis that is up in the file; maps have none and refuse it.
 
         Raises:
-            WorldError: The file is not what its ending says.
+            WorldError: The file is not what its ending names.
         """
         ...
 
@@ -82,7 +82,7 @@ def read_placed(path: Path, placing: Placing) -> World:
 
 
 def _load(module: str) -> object:
-    """Import a reader, or say which package it lacks."""
+    """Import a reader, or name the package that it lacks."""
     try:
         return import_module(f"p2os.pioneer.world.formats.{module}")
     except ModuleNotFoundError as error:

@@ -4,8 +4,8 @@ Taken: worlds, models within each other, links, collisions with box, cylinder,
 sphere, mesh; poses, nested, in radians or with degrees="true"; `include` of
 files that are here. A model that could move stands still.
 
-Left out, and said: poses relative to a named frame, other geometry, lights,
-plugins, sensors. Joints need nothing: each link says where it is.
+Left out, and reported: poses relative to a named frame, other geometry, lights,
+plugins, sensors. Joints need nothing: each link has its place.
 """
 
 import math

@@ -55,7 +55,7 @@ def _take_mesh(
     if not file_name.strip():
         raise WorldError(f"{path}:{shape.line}: <mesh> names no file")
     mesh_path = find_local(file_name, path)
-    # These formats take a mesh's axes as they are, but for what COLLADA says of itself.
+    # These formats take a mesh's axes as they are, but for what COLLADA states of its own.
     found = read_triangles(mesh_path, "auto" if mesh_path.suffix.lower() == ".dae" else "z")
     for what in found.skipped:
         collection.skip(what)

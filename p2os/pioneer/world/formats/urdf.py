@@ -3,7 +3,7 @@
 Taken: links with `collision` (with `visual` where a link has no collision) of
 box, cylinder, sphere, mesh; joints of every kind at their zero.
 
-Left out, and said: movement, masses, transmissions, sensors. Xacro files must
+Left out, and reported: movement, masses, transmissions, sensors. Xacro files must
 be expanded first.
 """
 

@@ -16,7 +16,7 @@ DEEPEST = 64
 
 @dataclass(slots=True)
 class Element:
-    """One element: its name without a namespace, what it says, and its line."""
+    """One element: its name without a namespace, its text, and its line."""
 
     tag: str
     attributes: dict[str, str]

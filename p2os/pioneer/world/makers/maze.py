@@ -38,11 +38,11 @@ def _carve(random_source: random.Random) -> set[tuple[Cell, Cell]]:
     while way:
         x, y = way[-1]
         near = [(x + 1, y), (x - 1, y), (x, y + 1), (x, y - 1)]
-        fresh = [cell for cell in near if cell not in seen and 0 <= cell[0] < CELLS and 0 <= cell[1] < CELLS]
-        if not fresh:
+        unvisited = [cell for cell in near if cell not in seen and 0 <= cell[0] < CELLS and 0 <= cell[1] < CELLS]
+        if not unvisited:
             way.pop()
             continue
-        cell = random_source.choice(fresh)
+        cell = random_source.choice(unvisited)
         passages.add((min(cell, (x, y)), max(cell, (x, y))))
         seen.add(cell)
         way.append(cell)

@@ -32,7 +32,7 @@ def test_a_robot_that_is_squeezed_gains_no_energy_to_speak_of() -> None:
     assert body.state.collisions >= 1
 
 
-def test_one_upright_triangle_is_met_and_heard() -> None:
+def test_one_upright_triangle_is_met_and_echoes() -> None:
     body = make_body("mujoco", world_of(meshes=(mesh((1, -1, 0), (1, 1, 0), (1, 0, 1)),)), P2DX)
     assert "upright walls" in str(body.note)
     assert body.ranges([3])[0] == pytest.approx(0.834, abs=0.001)

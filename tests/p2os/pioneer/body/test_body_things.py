@@ -70,7 +70,7 @@ def test_a_pushed_thing_stops_at_a_wall(make: Maker) -> None:
     assert state.stalled_left
 
 
-def test_what_walks_is_where_its_path_says_and_is_heard(make: Maker) -> None:
+def test_what_walks_is_where_its_path_leads_and_echoes(make: Maker) -> None:
     walk = Walk(points_m=((1.5, 0.0), (2.5, 0.0)), speed_mps=0.5, start_s=0.2, repeat=Repeat.ONCE)
     body = make(world_of(Obstacle(name="visitor", x_m=0, y_m=0, radius_m=0.2, walk=walk)))
     near = body.ranges([3])[0]

@@ -2,6 +2,7 @@
 
 import pytest
 
+from p2os.errors import UsageError
 from p2os.pioneer.controller.faults import FAULTS
 from p2os.pioneer.serve.fleet_order import FleetOrder, RobotOrder, make_fleet
 from p2os.pioneer.serve.host import Host
@@ -52,12 +53,12 @@ def test_things_come_move_and_go_for_all_robots_of_a_world(engine: str) -> None:
     [
         ("place", "error: 'place' is no order"),
         ("place ball 1 1 1", "error: 'place ball 1 1 1' is no order"),
-        ("place box 1 1", "error: 'place box 1 1' is not all of it"),
-        ("place post 1 1 1 1", "error: 'place post 1 1 1 1' says too much"),
+        ("place box 1 1", "error: 'place box 1 1' is incomplete"),
+        ("place post 1 1 1 1", "error: 'place post 1 1 1 1' has too many words"),
         ("place post 1 here 1", "error: 'here' is no number of -1000 to 1000"),
         ("place post 1 nan 1", "error: 'nan' is no number"),
         ("place box 1 1 0 1", "error: '0' is no number of 0.001 to 1000"),
-        ("move crate", "error: 'move crate' is not all of it"),
+        ("move crate", "error: 'move crate' is incomplete"),
         ("move crat 1 1", "error: no obstacle 'crat'"),
         ("remove 'crate", 'error: "remove \'crate": a quote is open'),
         ('remove "robot 2"', "error: 'robot 2' is a robot"),
@@ -120,8 +121,8 @@ def test_each_fault_is_injected_reported_and_cleared_live(name: str) -> None:
     [
         ("fault", ["error: which fault?", "hint: faults: sonar-stuck"]),
         ("fault sonar-stuk 3 1", ["error: no fault 'sonar-stuk'", "hint: did you mean sonar-stuck?"]),
-        ("fault sonar-stuck 3", ["error: 'sonar-stuck 3' is not all of it", "hint: say sonar-stuck NUMBER METRES"]),
-        ("fault reboot now", ["error: 'reboot now' says too much", "hint: say reboot"]),
+        ("fault sonar-stuck 3", ["error: 'sonar-stuck 3' is incomplete", "hint: usage: sonar-stuck NUMBER METRES"]),
+        ("fault reboot now", ["error: 'reboot now' has too many words", "hint: usage: reboot"]),
         ("faults", ["error: no order 'faults'", "hint: did you mean fault?"]),
         ("quit", ["error: no order 'quit'", "hint: orders: status, fault"]),
         ("1:", ["error: no order ''", "hint: orders: "]),
@@ -131,6 +132,16 @@ def test_words_that_mean_nothing_are_answered_with_what_would(words: str, answer
     hosts, _ = hosts_of("kinematic", robots=1)
     for line, expected in zip(execute(hosts, words), answer, strict=True):
         assert line.startswith(expected)
+
+
+@pytest.mark.parametrize("line", ["mend all", "mend sonar-stuck 3", "1: mend bumper front 1", "mend"])
+def test_the_word_of_earlier_releases_is_refused_with_the_word_of_today(line: str) -> None:
+    hosts, _ = hosts_of("kinematic", robots=1)
+    execute(hosts, "fault sonar-stuck 3 1.2")
+    assert execute(hosts, line) == ["error: mend is called clear: clear all"]
+    assert hosts[0].pioneer.state.injected == ("sonar-stuck 3 1.2",)
+    with pytest.raises(UsageError, match=r"^mend is called clear: clear all$"):
+        hosts[0].do("mend all")
 
 
 def test_help_tells_every_order() -> None:
