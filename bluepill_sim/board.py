@@ -1,12 +1,10 @@
 """The BluePill: a board with an STM32F103C8 that runs one firmware.
 
-This is the package's face. It loads the image, hands out pins and serial
-ports, and tells of faults and warnings. The board itself: 8 MHz crystal,
-32 kHz crystal, an LED on PC13 with its resistor to 3.3 V, BOOT0 low, BOOT1 (PB2) pulled low: both are jumpers.
-
-Invariant: results do not depend on how the caller cuts time into slices.
-
-Running a board until something is so.
+The main class of the package: it loads the image, hands out pins and serial
+ports, runs until something is so, and reports faults and warnings. What the
+chip does is `chip.py`. The board itself: 8 MHz crystal, 32 kHz crystal, an LED
+on PC13 with its resistor to 3.3 V, BOOT0 low, BOOT1 (PB2) pulled low: both are
+jumpers.
 
 A condition in words is met at the boundary of the very block that makes it true,
 whatever the caller's slices; a condition in Python is looked at in steps.
@@ -15,7 +13,8 @@ whatever the caller's slices; a condition in Python is looked at in steps.
     usart1 sends TEXT                                characters that go out from now on
     asleep | awake | fault                           what the core is doing
 
-Invariant: a wait leaves the board's watches and listeners as it found them.
+Invariant: results do not depend on how the caller cuts time into slices; a wait
+leaves the board's watches and listeners as it found them.
 """
 
 from collections.abc import Callable, Iterator, Mapping
@@ -37,14 +36,14 @@ from bluepill_sim.serial_port import Activity, SerialPort
 from bluepill_sim.stm32f103 import FLASH_BASE, SRAM_BASE
 from bluepill_sim.timing import NS_PER_MS, NS_PER_S, Nanos, Reached, Reason, Span, to_nanos
 
-#: How often a condition without an event of its own is looked at. chosen: finer than anything a person waits for.
-STEP_NS: Nanos = 1 * NS_PER_MS
-#: Characters of a port's last words that a message shows.
-_SHOWN = 60
-
 #: Tells whether the board is where one wants it.
 Predicate = Callable[["BluePill"], bool]
 Condition = str | Predicate
+
+#: How often a condition without an event of its own is looked at. chosen: finer than anything a person waits for.
+STEP_NS: Nanos = 1 * NS_PER_MS
+#: How many of the last characters of a port a message shows.
+_SHOWN_CHARACTERS = 60
 
 _HINT = 'such as "pin PA4 high", "usart1 sends ready", "asleep", "fault", or a function of the board'
 
@@ -53,156 +52,6 @@ class WaitError(BluePillError):
     """What was waited for did not come."""
 
     exit_code = 1
-
-
-def run_for(board: "BluePill", span: Span) -> Reached:
-    """Run for a span of virtual time, past the edges of watched pins; a halt ends it."""
-    return run_to(board, board.now_ns + to_nanos(span))
-
-
-def run_to(board: "BluePill", end_ns: Nanos) -> Reached:
-    """Run to a point in virtual time, past the edges of watched pins; a halt ends it."""
-    while True:
-        reached = board.advance_to(end_ns)
-        if reached.reason is not Reason.EDGE:
-            return reached
-
-
-def until(
-    board: "BluePill", condition: Condition, timeout: Span, advance: Callable[[Nanos], Reached] | None = None
-) -> Nanos:
-    """Run until a condition holds; return when that was.
-
-    Args:
-        board: what runs.
-        condition: words of this module's text, or a function of the board, looked at each millisecond.
-        timeout: the longest wait, in virtual time.
-        advance: brings the board to a time, or less far; None is the board's own.
-
-    Raises:
-        WaitError: the time is over, or the core halted for good; its notes show what ran last.
-        BluePillError: the words are not understood.
-    """
-    advance = advance or board.advance_to
-    end_ns = board.now_ns + to_nanos(timeout)
-    with _watch(board, condition) as (holds, step_ns):
-        while not holds():
-            if board.now_ns >= end_ns:
-                raise _given_up(
-                    board, f"not seen within {to_nanos(timeout) / NS_PER_S:g} s: {_name(condition)}; {_state(board)}"
-                )
-            limit = end_ns if step_ns is None else min(end_ns, board.now_ns + step_ns)
-            if advance(limit).reason is Reason.HALT and not holds():
-                raise _given_up(board, f"the core halted before: {_name(condition)}; {_state(board)}")
-        return board.now_ns
-
-
-def wait_for_bytes(board: "BluePill", port: SerialPort, pattern: bytes, within: Span) -> None:
-    """Run until `pattern` is in what `port` has sent and nobody has taken.
-
-    Raises:
-        WaitError: it did not come in time.
-        BluePillError: the pattern is empty.
-    """
-    if not pattern:
-        raise BluePillError("an empty pattern is always there", hint="expect at least one byte")
-    end_ns = board.now_ns + to_nanos(within)
-    with _stop_at_words(board, port):
-        while pattern not in port.unread:
-            reached = board.advance_to(end_ns)
-            if reached.reason is Reason.HALT or (board.now_ns >= end_ns and pattern not in port.unread):
-                last = bytes(port.unread[-_SHOWN:])
-                raise _given_up(
-                    board,
-                    f"{port.name} did not send {pattern!r} within {to_nanos(within) / NS_PER_S:g} s; "
-                    f"it sent {last!r}; {_state(board)}",
-                )
-
-
-@contextmanager
-def _watch(board: "BluePill", condition: Condition) -> "Iterator[tuple[Callable[[], bool], Nanos | None]]":
-    """Have the board stop where a condition may have become true; yields (holds, step)."""
-    if callable(condition):
-        yield (lambda: condition(board)), STEP_NS
-        return
-    words = condition.split(maxsplit=2)
-    match [word.lower() for word in words[:2]]:
-        case ["pin", name] if len(words) == 3:
-            with _stop_at_pin(board, name.upper(), words[2].lower()) as holds:
-                yield holds, None
-        case [port, "sends"] if len(words) == 3 and port in board.serial_ports:
-            sent, text = bytearray(), words[2].encode()
-            with _stop_at_words(board, board.serial_ports[port], sent):
-                yield (lambda: text in sent), None
-        case [state] if state in _STATES:
-            yield (lambda: _STATES[state](board)), STEP_NS
-        case _:
-            raise BluePillError(f"{condition!r} is not understood", hint=_HINT)
-
-
-_STATES: dict[str, Predicate] = {
-    "asleep": lambda board: board.is_asleep,
-    "awake": lambda board: not board.is_asleep,
-    "fault": lambda board: board.fault is not None,
-}
-
-
-@contextmanager
-def _stop_at_pin(board: "BluePill", name: str, what: str) -> Iterator[Callable[[], bool]]:
-    try:
-        pin = board.pin(name)
-    except KeyError:
-        raise BluePillError(f"no such pin: {name}", hint="PA0 to PA15, PB0 to PB15, PC13 to PC15") from None
-    before = pin.level
-    tests: dict[str, Callable[[], bool]] = {
-        "high": lambda: pin.level,
-        "low": lambda: not pin.level,
-        "changes": lambda: pin.level is not before,
-    }
-    if what not in tests:
-        raise BluePillError(f"a pin is high, low, or changes; it cannot be {what!r}", hint=_HINT)
-    was_watched = pin.is_watched
-    pin.watch(True)
-    try:
-        yield tests[what]
-    finally:
-        pin.watch(was_watched)
-
-
-@contextmanager
-def _stop_at_words(board: "BluePill", port: SerialPort, sent: bytearray | None = None) -> Iterator[None]:
-    """End the board's slice after each word that a port sends, and note the words in `sent`."""
-
-    def stop(word: int, _at_ns: Nanos) -> None:
-        if sent is not None:
-            sent.append(word & 0xFF)
-        board.request_stop()
-
-    port.listeners.append(stop)
-    try:
-        yield
-    finally:
-        port.listeners.remove(stop)
-
-
-def _name(condition: Condition) -> str:
-    return condition if isinstance(condition, str) else getattr(condition, "__name__", "the condition")
-
-
-def _given_up(board: "BluePill", message: str) -> WaitError:
-    """Return the error of a wait; pytest and tracebacks show its note, one line for a person does not."""
-    error = WaitError(message)
-    lines = board.last_blocks()
-    if lines:
-        error.add_note("\n".join([title_of(len(lines)), *lines]))
-    return error
-
-
-def _state(board: "BluePill") -> str:
-    if board.fault is not None:
-        return f"{board.fault}"
-    doing = "asleep at" if board.is_asleep else "at"
-    return f"t = {board.now_ns / NS_PER_S:.6f} s, {doing} {board.where()}"
 
 
 @dataclass(frozen=True, slots=True)
@@ -257,13 +106,13 @@ class BluePill:
         self._chip: Chip | None = None
         self._chip = chip = Chip(memory, self.image.vector_table, self._warn, self._fault)
         self._activity = Activity()
-        #: More of the same: tools that look on.
+        #: More of the same, for tools.
         self.pin_listeners: list[Callable[[str, PinDrive, Nanos], None]] = []
-        self._usarts = tuple(SerialPort(chip.parts.usart(n), self._activity, self._wait) for n in (1, 2, 3))
+        self._usarts = tuple(SerialPort(chip.parts.usart(n), self._activity, self._wait_for_bytes) for n in (1, 2, 3))
         chip.boot_address = self._boot_address
         chip.pins.on_output = self._pin_changed
         chip.pins.is_subscribed = lambda: self.on_pin is not None or bool(self.pin_listeners)
-        chip.pins.is_fed = lambda pin: any(port.listens_at(pin.name) for port in self._usarts)
+        chip.pins.is_serial_input = lambda pin: any(port.receives_at(pin.name) for port in self._usarts)
         chip.pins.on_silent_output = self._pins_changed_silently
         chip.pins["PC13"].board_pull = PinDrive.PULL_UP
         chip.pins["PB2"].board_pull = PinDrive.PULL_DOWN
@@ -273,21 +122,21 @@ class BluePill:
     @property
     def now_ns(self) -> Nanos:
         """The time reached."""
-        return self._live.now_ns
+        return self.chip.now_ns
 
     @property
     def hclk_hz(self) -> int:
         """The core's frequency."""
-        return self._live.clocks.hclk_hz
+        return self.chip.clocks.hclk_hz
 
     @property
     def cycle(self) -> int:
         """Core cycles since power-on."""
-        return self._live.engine.cycle
+        return self.chip.engine.cycle
 
     def next_deadline(self) -> Nanos | None:
         """Return when a peripheral next acts by itself; None for never. The core may act at any time."""
-        return self._live.next_deadline()
+        return self.chip.next_deadline()
 
     def advance_to(self, limit_ns: Nanos) -> Reached:
         """Run to the first block boundary at or after a time.
@@ -299,11 +148,15 @@ class BluePill:
         Raises:
             UnmodelledError: in strict mode, something was warned of.
         """
-        return self._live.advance_to(limit_ns)
+        return self.chip.advance_to(limit_ns)
 
     def run_for(self, span: Span) -> Reached:
-        """Run for a span of virtual time, such as "10 ms" or nanoseconds; a halt ends it early."""
-        return run_for(self, span)
+        """Run for a span of virtual time, such as "10 ms" or nanoseconds, past watched edges; a halt ends it early."""
+        end_ns = self.now_ns + to_nanos(span)
+        while True:
+            reached = self.advance_to(end_ns)
+            if reached.reason is not Reason.EDGE:
+                return reached
 
     def until(self, condition: Condition, timeout: Span = "1 s") -> Nanos:
         """Run until a condition holds; return when that was.
@@ -317,15 +170,15 @@ class BluePill:
             WaitError: the time is over, or the core halted for good.
             BluePillError: the words are not understood.
         """
-        return until(self, condition, timeout)
+        return run_until(self, condition, timeout)
 
     def request_stop(self) -> None:
         """End the running `advance_to` at the boundary of the running block."""
-        self._live.request_stop()
+        self.chip.request_stop()
 
     def reset(self) -> None:
         """Press the reset button: time and the outside of the pins stay as they are."""
-        self._live.reset(ResetCause.PIN)
+        self.chip.reset(ResetCause.PIN)
         self.fault = None
 
     # What is on the board.
@@ -339,12 +192,12 @@ class BluePill:
         Raises:
             KeyError: the chip has no such pin.
         """
-        return self._live.pins[name]
+        return self.chip.pins[name]
 
     @property
     def pins(self) -> tuple[Pin, ...]:
         """Every pin that has a leg, in the order of the ports."""
-        return tuple(pin for pin in self._live.pins if pin.is_bonded)
+        return tuple(pin for pin in self.chip.pins if pin.is_bonded)
 
     @property
     def led_is_on(self) -> bool:
@@ -373,10 +226,12 @@ class BluePill:
 
     @property
     def chip(self) -> Chip:
-        """The chip itself, for tools that look on."""
-        return self._live
+        """The chip itself, for tools."""
+        if self._chip is None:
+            raise RuntimeError("the chip is still being made")
+        return self._chip
 
-    # What the firmware is up to.
+    # What the firmware does.
 
     @property
     def warnings(self) -> list[str]:
@@ -385,21 +240,21 @@ class BluePill:
 
     @property
     def activity(self) -> Activity:
-        """When the firmware was last seen alive."""
-        slept = self._live.processor.last_sleep_cycle
+        """When the firmware last did something that shows outside."""
+        slept = self.chip.processor.last_sleep_cycle
         if slept is not None:
-            self._activity.last_wfi_ns = self._live.ns_of(slept)
+            self._activity.last_wfi_ns = self.chip.ns_of(slept)
         return self._activity
 
     @property
     def is_asleep(self) -> bool:
         """Whether the core is waiting in WFI or WFE."""
-        return self._live.processor.is_asleep
+        return self.chip.processor.is_asleep
 
     @property
     def pc(self) -> int:
         """The address of the next instruction."""
-        return self._live.engine.pc
+        return self.chip.engine.pc
 
     def where(self) -> str:
         """Return where the program is: "symbol+0x12 (0x08000123)"."""
@@ -408,7 +263,7 @@ class BluePill:
     @property
     def last_rows(self) -> tuple[BlockRow, ...]:
         """What ran last, oldest first: up to the fault, if there was one, else up to now (rows of `BlockRecorder`)."""
-        return self._live.engine.log.rows() if self.fault is None else self.fault.last_rows
+        return self.chip.engine.log.rows() if self.fault is None else self.fault.last_rows
 
     def last_blocks(self) -> list[str]:
         """Return what ran last as lines for a person: the last 32 blocks and exceptions, with symbol and line."""
@@ -420,17 +275,17 @@ class BluePill:
 
     def register(self, name: str) -> int:
         """Return a register by its name, such as "R0", "SP" or "XPSR"."""
-        return self._live.engine.registers[Register[name.upper()]]
+        return self.chip.engine.registers[Register[name.upper()]]
 
     def read_memory(self, address: int, size: int) -> bytes | None:
         """Return bytes of flash or SRAM; None where there is no memory."""
-        return self._live.memory.read(address, size)
+        return self.chip.memory.read(address, size)
 
     def snapshot(self) -> BoardSnapshot:
         """Return all that decides the board's future; it can be pickled."""
         activity = self.activity
         return BoardSnapshot(
-            self._live.snapshot(),
+            self.chip.snapshot(),
             self.fault,
             (activity.last_pin_ns, activity.last_usart_ns, activity.last_wfi_ns),
             tuple(self._warned.items()),
@@ -439,14 +294,14 @@ class BluePill:
         )
 
     def restore(self, snapshot: object) -> None:
-        """Put back what `snapshot` returned; tells nobody.
+        """Put back what `snapshot` returned; no listener is called.
 
         Raises:
             TypeError: it is not a board's snapshot.
         """
         if not isinstance(snapshot, BoardSnapshot):
             raise TypeError(f"not a BluePill's snapshot: {type(snapshot).__name__}")
-        self._live.restore(snapshot.chip)
+        self.chip.restore(snapshot.chip)
         self.fault = snapshot.fault
         self.boot0 = snapshot.boot0
         self._activity.last_pin_ns, self._activity.last_usart_ns, self._activity.last_wfi_ns = snapshot.activity
@@ -454,13 +309,7 @@ class BluePill:
         for port, unread in zip(self._usarts, snapshot.unread, strict=True):
             port.unread[:] = unread
 
-    # What the chip tells.
-
-    @property
-    def _live(self) -> Chip:
-        if self._chip is None:
-            raise RuntimeError("the chip is still being made")
-        return self._chip
+    # Callbacks of the chip.
 
     def _boot_address(self) -> int:
         """Return where the BOOT pins have a reset start (RM0008 3.4, table 9)."""
@@ -483,8 +332,21 @@ class BluePill:
     def _pins_changed_silently(self, at_ns: Nanos) -> None:
         self._activity.last_pin_ns = at_ns
 
-    def _wait(self, port: SerialPort, pattern: bytes, within: Span) -> None:
-        wait_for_bytes(self, port, pattern, within)
+    def _wait_for_bytes(self, port: SerialPort, pattern: bytes, within: Span) -> None:
+        """Run until `pattern` is in what `port` has sent and nobody has taken (`SerialPort.expect`)."""
+        if not pattern:
+            raise BluePillError("an empty pattern is always there", hint="expect at least one byte")
+        end_ns = self.now_ns + to_nanos(within)
+        with _stop_at_characters(self, port):
+            while pattern not in port.unread:
+                reached = self.advance_to(end_ns)
+                if reached.reason is Reason.HALT or (self.now_ns >= end_ns and pattern not in port.unread):
+                    last = bytes(port.unread[-_SHOWN_CHARACTERS:])
+                    raise _wait_error(
+                        self,
+                        f"{port.name} did not send {pattern!r} within {to_nanos(within) / NS_PER_S:g} s; "
+                        f"it sent {last!r}; {_state_of(self)}",
+                    )
 
     def _warn(self, message: str, once: str, pc: int) -> None:
         if once in self._warned:
@@ -504,9 +366,8 @@ class BluePill:
         if self.fault is not None:
             self.fault = replace(self.fault, is_lockup=self.fault.is_lockup or is_lockup)
             return
-        if self._chip is None:
-            raise RuntimeError("the chip is still being made")
-        values = self._chip.engine.registers
+        chip = self.chip
+        values = chip.engine.registers
         names = [*GENERAL[:15], Register.XPSR]
         registers = [(register.name, values[register]) for register in names]
         registers.insert(15, ("PC", pc))
@@ -517,7 +378,123 @@ class BluePill:
             where=self.image.symbols.where(pc),
             address=address,
             registers=tuple(registers),
-            at_ns=self._chip.now_ns,
+            at_ns=chip.now_ns,
             is_lockup=is_lockup,
-            last_rows=self._chip.engine.log.rows(),
+            last_rows=chip.engine.log.rows(),
         )
+
+
+def run_until(
+    board: BluePill, condition: Condition, timeout: Span, advance: Callable[[Nanos], Reached] | None = None
+) -> Nanos:
+    """Run until a condition holds; return when that was.
+
+    Args:
+        board: what runs.
+        condition: words as in `BluePill.until`, or a function of the board, looked at each millisecond.
+        timeout: the longest wait, in virtual time.
+        advance: brings the board to a time, or less far; None is the board's own.
+
+    Raises:
+        WaitError: the time is over, or the core halted for good; its notes show what ran last.
+        BluePillError: the words are not understood.
+    """
+    advance = advance or board.advance_to
+    end_ns = board.now_ns + to_nanos(timeout)
+    with _watch(board, condition) as (holds, step_ns):
+        while not holds():
+            if board.now_ns >= end_ns:
+                raise _wait_error(
+                    board,
+                    f"not seen within {to_nanos(timeout) / NS_PER_S:g} s: {_words_of(condition)}; {_state_of(board)}",
+                )
+            limit = end_ns if step_ns is None else min(end_ns, board.now_ns + step_ns)
+            if advance(limit).reason is Reason.HALT and not holds():
+                raise _wait_error(board, f"the core halted before: {_words_of(condition)}; {_state_of(board)}")
+        return board.now_ns
+
+
+@contextmanager
+def _watch(board: BluePill, condition: Condition) -> Iterator[tuple[Callable[[], bool], Nanos | None]]:
+    """Make the board stop where a condition may have become true; yields (holds, step)."""
+    if callable(condition):
+        yield (lambda: condition(board)), STEP_NS
+        return
+    words = condition.split(maxsplit=2)
+    match [word.lower() for word in words[:2]]:
+        case ["pin", name] if len(words) == 3:
+            with _stop_at_pin(board, name.upper(), words[2].lower()) as holds:
+                yield holds, None
+        case [port, "sends"] if len(words) == 3 and port in board.serial_ports:
+            sent, text = bytearray(), words[2].encode()
+            with _stop_at_characters(board, board.serial_ports[port], sent):
+                yield (lambda: text in sent), None
+        case [state] if state in _STATES:
+            yield (lambda: _STATES[state](board)), STEP_NS
+        case _:
+            raise BluePillError(f"{condition!r} is not understood", hint=_HINT)
+
+
+_STATES: dict[str, Predicate] = {
+    "asleep": lambda board: board.is_asleep,
+    "awake": lambda board: not board.is_asleep,
+    "fault": lambda board: board.fault is not None,
+}
+
+
+@contextmanager
+def _stop_at_pin(board: BluePill, name: str, what: str) -> Iterator[Callable[[], bool]]:
+    try:
+        pin = board.pin(name)
+    except KeyError:
+        raise BluePillError(f"no such pin: {name}", hint="PA0 to PA15, PB0 to PB15, PC13 to PC15") from None
+    before = pin.level
+    tests: dict[str, Callable[[], bool]] = {
+        "high": lambda: pin.level,
+        "low": lambda: not pin.level,
+        "changes": lambda: pin.level is not before,
+    }
+    if what not in tests:
+        raise BluePillError(f"a pin is high, low, or changes; it cannot be {what!r}", hint=_HINT)
+    was_watched = pin.is_watched
+    pin.watch(True)
+    try:
+        yield tests[what]
+    finally:
+        pin.watch(was_watched)
+
+
+@contextmanager
+def _stop_at_characters(board: BluePill, port: SerialPort, sent: bytearray | None = None) -> Iterator[None]:
+    """End the board's slice after each character that a port sends; collect them in `sent`."""
+
+    def stop(word: int, _at_ns: Nanos) -> None:
+        if sent is not None:
+            sent.append(word & 0xFF)
+        board.request_stop()
+
+    port.listeners.append(stop)
+    try:
+        yield
+    finally:
+        port.listeners.remove(stop)
+
+
+def _words_of(condition: Condition) -> str:
+    return condition if isinstance(condition, str) else getattr(condition, "__name__", "the condition")
+
+
+def _wait_error(board: BluePill, message: str) -> WaitError:
+    """Return the error of a wait that failed; its note, the last blocks, shows in pytest and tracebacks only."""
+    error = WaitError(message)
+    lines = board.last_blocks()
+    if lines:
+        error.add_note("\n".join([title_of(len(lines)), *lines]))
+    return error
+
+
+def _state_of(board: BluePill) -> str:
+    if board.fault is not None:
+        return f"{board.fault}"
+    doing = "asleep at" if board.is_asleep else "at"
+    return f"t = {board.now_ns / NS_PER_S:.6f} s, {doing} {board.where()}"

@@ -1,25 +1,22 @@
 """The whole chip: core, memories, bus and peripherals, brought forward together.
 
+This is not the board: pins are handed out and images are loaded by `board.py`;
+the tables of the chip are `stm32f103.py`.
+
 Theory of operation. At each block boundary: peripherals and SysTick act on what
 is due, a requested reset is done, then the core goes on to the earliest of the
 limit and the next deadline. A peripheral that moves a deadline or an interrupt
 line inside an access ends the core's slice at the boundary of the running block,
 so that what happens never depends on where the caller's slices end.
 
-This is not the board: pins are handed out and images are loaded by `board.py`.
-
+Source: RM0008 sections 3.1, 3.3.2 (bit-band) and 7.3 (clock gates).
 Invariant: time never goes back; `now_ns` inside a peripheral's access is the
 time of the accessing instruction.
-
-The bus between the core and the peripherals: routing, clock gates, bit-band.
-
-Source: RM0008 sections 3.1, 3.3.2 (bit-band) and 7.3 (clock gates).
-Invariant: a peripheral sees an access only while its clock is on.
 """
 
 import ctypes
 from collections.abc import Callable
-from typing import Protocol, cast
+from typing import cast
 
 from bluepill_sim.core import GENERAL, BlockRecorder
 from bluepill_sim.core.block_cost import NO_BLOCK, Block, measure_block
@@ -50,90 +47,6 @@ from bluepill_sim.timing import CycleClock, Nanos, Reached, Reason
 PERIPHERAL_BYTES = 0x2_4000
 _PAGE_SHIFT = 10
 
-
-class Surroundings(Protocol):
-    """What the bus needs of the chip."""
-
-    def warn(self, message: str, *, once: str) -> None:
-        """Warn of what the firmware does wrong, or of what is not modelled."""
-        ...
-
-
-class PeripheralBus:
-    """Reads and writes of the peripheral region; offsets count from PERIPHERAL_BASE."""
-
-    def __init__(self, parts: dict[str, Peripheral], rcc: Rcc, chip: Surroundings) -> None:
-        self._pages = {
-            (part.base - PERIPHERAL_BASE >> _PAGE_SHIFT) + page: part
-            for part in parts.values()
-            for page in range(part.place.size >> _PAGE_SHIFT)
-        }
-        self._rcc = rcc
-        self._chip = chip
-
-    def read(self, offset: int, size: int) -> int:
-        """Return what the core reads."""
-        part = self._pages.get(offset >> _PAGE_SHIFT)
-        if part is None or not self._rcc.is_clocked(part.name):
-            self._refuse(part, offset, "read of")
-            return 0
-        return part.read(PERIPHERAL_BASE + offset - part.base, size)
-
-    def write(self, offset: int, size: int, value: int) -> None:
-        """Take what the core writes."""
-        part = self._pages.get(offset >> _PAGE_SHIFT)
-        if part is None or not self._rcc.is_clocked(part.name):
-            self._refuse(part, offset, f"write of {value:#x} to")
-            return
-        part.write(PERIPHERAL_BASE + offset - part.base, size, value)
-
-    def read_bit(self, offset: int, size: int) -> int:
-        """Return a bit through its alias; `offset` counts from the alias region."""
-        del size  # a narrow access reads the same bit
-        bit = offset >> 2 & 31
-        return self.read(offset >> 5 & ~3, 4) >> bit & 1
-
-    def write_bit(self, offset: int, size: int, value: int) -> None:
-        """Set a bit through its alias: the bus matrix reads the word, changes the bit, writes the word."""
-        del size
-        bit = 1 << (offset >> 2 & 31)
-        word = self.read(offset >> 5 & ~3, 4)
-        self.write(offset >> 5 & ~3, 4, word | bit if value & 1 else word & ~bit)
-
-    def _refuse(self, part: Peripheral | None, offset: int, what: str) -> None:
-        """Warn of an access to nothing: it reads 0, and a write is lost."""
-        address = PERIPHERAL_BASE + offset
-        if part is None:
-            name = name_at(address)
-            text = f"{name} is not modelled" if name else "no peripheral is here"
-            self._chip.warn(f"{text} ({what} {address:#010x})", once=f"unmodelled:{name or address & ~0x3FF:}")
-            return
-        gate = CLOCK_GATES[part.name]
-        self._chip.warn(
-            f"{part.name} has no clock: RCC_{gate.register} bit {gate.bit} is 0 ({what} {address:#010x})",
-            once=f"clock:{part.name}",
-        )
-
-
-class SramBitBand:
-    """The alias region of the SRAM's bits."""
-
-    def __init__(self, sram: "ctypes.Array[ctypes.c_char]") -> None:
-        self._bytes = (ctypes.c_ubyte * len(sram)).from_buffer(sram)
-
-    def read_bit(self, offset: int, size: int) -> int:
-        """Return a bit through its alias."""
-        del size
-        return self._bytes[offset >> 5] >> (offset >> 2 & 7) & 1
-
-    def write_bit(self, offset: int, size: int, value: int) -> None:
-        """Set a bit through its alias."""
-        del size
-        bit = 1 << (offset >> 2 & 7)
-        at = offset >> 5
-        self._bytes[at] = self._bytes[at] | bit if value & 1 else self._bytes[at] & ~bit
-
-
 #: Bit-band alias regions (RM0008 3.3.2) and how many alias bytes there are for each byte.
 SRAM_ALIAS, PERIPHERAL_ALIAS = 0x2200_0000, 0x4200_0000
 _ALIAS_BYTES = 32
@@ -153,8 +66,8 @@ class Chip:
         Args:
             memory: its memories.
             vector_table: where the program's vectors are.
-            on_warning: notified of each warning.
-            on_fault: notified of each HardFault and lockup.
+            on_warning: called with each warning.
+            on_fault: called with each HardFault and lockup.
         """
         self.memory = memory
         #: Returns where the vectors are that a reset starts at: what the BOOT pins say.
@@ -162,7 +75,7 @@ class Chip:
         self._on_warning = on_warning
         self.clocks = Clocks()
         self._clock = CycleClock(self.clocks.hclk_hz)
-        #: Called with (line, level, ns) at every change of an interrupt line; tools look on.
+        #: Called with (line, level, ns) at every change of an interrupt line, for tools.
         self.irq_listeners: list[Callable[[int, bool, Nanos], None]] = []
         #: Time of the event that a peripheral is acting on, while it does.
         self._event_ns: Nanos | None = None
@@ -386,7 +299,7 @@ class Chip:
         self._flash_repairs.clear()
         self._deadlines_moved = True
 
-    # Plumbing.
+    # Internals.
 
     def _act(self) -> None:
         """At a boundary: do what was left for it, and what is due."""
@@ -473,6 +386,84 @@ class Chip:
             self.engine.drop_code(FLASH_BASE + offset, len(data))
             self.engine.drop_code(offset, len(data))
         self._flash_repairs.clear()
+
+
+class PeripheralBus:
+    """Reads and writes of the peripheral region; offsets count from PERIPHERAL_BASE.
+
+    A peripheral sees an access only while its clock is on.
+    """
+
+    def __init__(self, parts: dict[str, Peripheral], rcc: Rcc, chip: Chip) -> None:
+        self._pages = {
+            (part.base - PERIPHERAL_BASE >> _PAGE_SHIFT) + page: part
+            for part in parts.values()
+            for page in range(part.place.size >> _PAGE_SHIFT)
+        }
+        self._rcc = rcc
+        self._chip = chip
+
+    def read(self, offset: int, size: int) -> int:
+        """Return what the core reads."""
+        part = self._pages.get(offset >> _PAGE_SHIFT)
+        if part is None or not self._rcc.is_clocked(part.name):
+            self._refuse(part, offset, "read of")
+            return 0
+        return part.read(PERIPHERAL_BASE + offset - part.base, size)
+
+    def write(self, offset: int, size: int, value: int) -> None:
+        """Take what the core writes."""
+        part = self._pages.get(offset >> _PAGE_SHIFT)
+        if part is None or not self._rcc.is_clocked(part.name):
+            self._refuse(part, offset, f"write of {value:#x} to")
+            return
+        part.write(PERIPHERAL_BASE + offset - part.base, size, value)
+
+    def read_bit(self, offset: int, size: int) -> int:
+        """Return a bit through its alias; `offset` counts from the alias region."""
+        del size  # a narrow access reads the same bit
+        bit = offset >> 2 & 31
+        return self.read(offset >> 5 & ~3, 4) >> bit & 1
+
+    def write_bit(self, offset: int, size: int, value: int) -> None:
+        """Set a bit through its alias: the bus matrix reads the word, changes the bit, writes the word."""
+        del size
+        bit = 1 << (offset >> 2 & 31)
+        word = self.read(offset >> 5 & ~3, 4)
+        self.write(offset >> 5 & ~3, 4, word | bit if value & 1 else word & ~bit)
+
+    def _refuse(self, part: Peripheral | None, offset: int, what: str) -> None:
+        """Warn of an access to nothing: it reads 0, and a write is lost."""
+        address = PERIPHERAL_BASE + offset
+        if part is None:
+            name = name_at(address)
+            text = f"{name} is not modelled" if name else "no peripheral is here"
+            self._chip.warn(f"{text} ({what} {address:#010x})", once=f"unmodelled:{name or address & ~0x3FF:}")
+            return
+        gate = CLOCK_GATES[part.name]
+        self._chip.warn(
+            f"{part.name} has no clock: RCC_{gate.register} bit {gate.bit} is 0 ({what} {address:#010x})",
+            once=f"clock:{part.name}",
+        )
+
+
+class SramBitBand:
+    """The alias region of the SRAM's bits."""
+
+    def __init__(self, sram: "ctypes.Array[ctypes.c_char]") -> None:
+        self._bytes = (ctypes.c_ubyte * len(sram)).from_buffer(sram)
+
+    def read_bit(self, offset: int, size: int) -> int:
+        """Return a bit through its alias."""
+        del size
+        return self._bytes[offset >> 5] >> (offset >> 2 & 7) & 1
+
+    def write_bit(self, offset: int, size: int, value: int) -> None:
+        """Set a bit through its alias."""
+        del size
+        bit = 1 << (offset >> 2 & 7)
+        at = offset >> 5
+        self._bytes[at] = self._bytes[at] | bit if value & 1 else self._bytes[at] & ~bit
 
 
 class _FlashArray:

@@ -1,4 +1,4 @@
-"""A USART of the board, seen from outside: what it sent, and how to talk to it.
+"""A USART of the board, seen from outside: what it has sent, and characters for it.
 
 Not the line itself: characters go at the speed that the USART is set to.
 Invariant: `unread` holds what was sent and no `expect` or `read` has taken yet, at most twice `KEPT_BYTES`.
@@ -20,7 +20,7 @@ WordListener = Callable[[int, Nanos], None]
 
 @dataclass(slots=True)
 class Activity:
-    """When the firmware was last seen alive, in ns; 0 before the first time."""
+    """When the firmware last did something that shows outside, in ns; 0 before the first time."""
 
     #: The last change of what the chip puts on any pin.
     last_pin_ns: Nanos = 0
@@ -30,8 +30,8 @@ class Activity:
     last_wfi_ns: Nanos = 0
 
 
-class Waits(Protocol):
-    """Who can run the chip until a port has sent something."""
+class WaitForBytes(Protocol):
+    """Runs the chip until a port has sent something."""
 
     def __call__(self, port: "SerialPort", pattern: bytes, within: Span) -> None:
         """Run until `pattern` is in `port.unread`.
@@ -45,7 +45,7 @@ class Waits(Protocol):
 class SerialPort:
     """A USART of the board, seen from outside."""
 
-    def __init__(self, usart: Usart, activity: Activity, wait: Waits) -> None:
+    def __init__(self, usart: Usart, activity: Activity, wait: WaitForBytes) -> None:
         self._usart = usart
         self._activity = activity
         self._wait = wait
@@ -54,7 +54,7 @@ class SerialPort:
         self.on_transmit: WordListener | None = None
         #: Whether `on_transmit` may be called later than that, for several characters together: cheaper.
         self.is_notified_late = False
-        #: More of the same: tools that look on.
+        #: More of the same, for tools.
         self.listeners: list[WordListener] = []
         #: What was sent and not yet taken.
         self.unread = bytearray()
@@ -65,7 +65,7 @@ class SerialPort:
         """Send characters to the RX pin, at the speed of the line."""
         self._usart.receive(data)
 
-    def listens_at(self, pin: str) -> bool:
+    def receives_at(self, pin: str) -> bool:
         """Tell whether the receiver is on and takes its characters from a pin: those of `receive`, or its level."""
         usart = self._usart
         is_on = usart.words[CR1] & (UE | RE) == UE | RE

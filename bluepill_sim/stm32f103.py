@@ -3,7 +3,7 @@
 Source: RM0008 sections 3.1 (memory map), 7.3 (enable registers) and 10.1.2
 (vector table), data sheet DS5319 tables 3 and 5 (LQFP48).
 Invariant: every modelled peripheral stands in `PERIPHERALS`; what is only
-named stands in `BASES`, so that a warning can say what was touched.
+named stands in `BASES`, so that a warning can name what was touched.
 """
 
 from bisect import bisect_right
@@ -190,7 +190,7 @@ class ChipParts:
 
     @property
     def has_running_watchdog(self) -> bool:
-        """Whether a watchdog will reset the chip if nobody feeds it."""
+        """Whether a watchdog will reset the chip unless it is fed."""
         iwdg, wwdg = cast("Iwdg", self.by_name["IWDG"]), cast("Wwdg", self.by_name["WWDG"])
         return iwdg.is_running or wwdg.is_running
 
@@ -199,14 +199,14 @@ class ChipParts:
         return cast("Usart", self.by_name[f"USART{number}"])
 
     def reset(self, cause: ResetCause) -> None:
-        """Reset every peripheral; the clocks first, so that nobody takes the old ones for too fast."""
+        """Reset every peripheral; the clocks first, so that the old ones are not taken for too fast."""
         self.rcc.reset(cause)
         for part in self.by_name.values():
             if part is not self.rcc:
                 part.reset()
 
     def clock_changed(self) -> None:
-        """Tell every peripheral that the frequencies have changed."""
+        """Notify every peripheral that the frequencies have changed."""
         for part in self.by_name.values():
             part.clock_changed()
 
@@ -239,7 +239,7 @@ class ChipParts:
         return {name: part.snapshot() for name, part in self.by_name.items()}
 
     def restore(self, snapshot: dict[str, PeripheralSnapshot]) -> None:
-        """Put back what `snapshot` returned; tells nobody."""
+        """Put back what `snapshot` returned; no listener is called."""
         for name, part in self.by_name.items():
             part.restore(snapshot[name])
 

@@ -41,7 +41,7 @@ class HaltKind(Enum):
     WRITE_ERROR = "write to nothing"
     FETCH_ERROR = "fetch from nothing"
     EXECUTE_NEVER = "fetch from a region that must not be executed"
-    #: The engine's own: before a write to read-only memory that somebody takes.
+    #: The engine's own: before a write to read-only memory that `on_read_only_write` takes.
     TAKEN_WRITE = "write to flash"
     DIVIDE_BY_ZERO = "division by zero"
     UNALIGNED = "unaligned access"

@@ -1,4 +1,4 @@
-"""What can be seen of a running firmware: coverage, profile, trace, stack, latency, waveforms.
+"""Analysis of a running firmware: coverage, profile, trace, stack, latency, waveforms.
 
-Everything here looks on: with or without it a program runs the same cycles.
+Nothing here disturbs the run: with or without it a program takes the same cycles.
 """

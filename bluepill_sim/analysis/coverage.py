@@ -5,7 +5,7 @@ an instruction that leaves under a condition; its two ways are "taken" and
 "fell through". What the compiler made conditional without a branch (IT blocks)
 counts as one way.
 
-Not told: lines that gave no code, and branches of a jump table that nothing reached.
+Not shown: lines that gave no code, and branches of a jump table that nothing reached.
 Invariant: counts only grow; watching changes nothing.
 """
 
@@ -56,7 +56,7 @@ class FileCoverage:
 
 
 class Coverage:
-    """Counts what runs; a listener of a walk."""
+    """Counts what runs; a `BlockListener`."""
 
     def __init__(self, image: Image, lines: LineTable, code: StaticCode) -> None:
         self._table = lines
@@ -65,7 +65,7 @@ class Coverage:
         #: How often each block was followed by each other.
         self._edges: Counter[tuple[int, int | None]] = Counter()
 
-    # As a listener.
+    # As a `BlockListener`.
 
     def block(self, address: int, following: int | None, cycle: int, cycles: int) -> None:  # noqa: ARG002 - a listener
         """Count a block."""

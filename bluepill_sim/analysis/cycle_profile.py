@@ -4,7 +4,7 @@ Theory of operation. BL and BLX open a frame that remembers where the call
 comes back to; a block that begins there closes it. A jump from one function
 into another without a link is a tail call: the frame changes its name. An
 exception opens a stack of its own, which also pays for its entry and exit.
-Sleep is told apart: the block of a WFI or WFE costs a cycle an instruction, and
+Sleep is kept apart: the block of a WFI or WFE costs a cycle an instruction, and
 the rest of its time is "(asleep)".
 
 An operating system that switches stacks makes a thread come back on another
@@ -49,7 +49,7 @@ class _Frame:
 
 @dataclass(slots=True)
 class _Stack:
-    """Frames of one thread of execution, and what its last block said of what comes next."""
+    """Frames of one thread of execution, and what its last block announced."""
 
     root: tuple[str, ...]
     frames: list[_Frame] = field(default_factory=list)
@@ -61,13 +61,13 @@ class _Stack:
 
 
 class CycleProfile:
-    """Adds up cycles; a listener of a walk."""
+    """Adds up cycles; a `BlockListener`."""
 
     def __init__(self, functions: FunctionTable, code: StaticCode) -> None:
         self._functions = functions
         self._code = code
         self._stacks = [_Stack(())]
-        #: Where what was told ends; before the first block nowhere.
+        #: The cycle at which what was charged ends; None before the first block.
         self._end: int | None = None
         #: Who pays for what passes until the next block.
         self._gap_names: tuple[str, ...] = ()
@@ -75,7 +75,7 @@ class CycleProfile:
         self.stacks: Counter[tuple[str, ...]] = Counter()
         self.calls: Counter[str] = Counter()
 
-    # As a listener.
+    # As a `BlockListener`.
 
     def block(self, address: int, following: int | None, cycle: int, cycles: int) -> None:
         """Charge a block to the function that it is in."""

@@ -1,6 +1,6 @@
 """How long interrupts wait: from the moment that one is due to the first instruction of its handler.
 
-Told of the interrupt lines, and of how SysTick is set while it is watched. What a program makes pending by
+It listens to the interrupt lines, and to how SysTick is set. What a program makes pending by
 itself (PendSV, a write to NVIC_ISPR) and a line that is still high when its
 handler returns are entries without a wait of their own.
 
@@ -50,11 +50,11 @@ class ExceptionCost:
 
 
 class Latency:
-    """Measures waits; a listener of a walk, which must be fed in the run's own order of time."""
+    """Measures waits; a `BlockListener`, which must be fed in the run's own order of time."""
 
     def __init__(self, board: BluePill) -> None:
         self._board = board
-        #: Cycles at which each exception fell due, oldest first, until its entry is told of.
+        #: Cycles at which each exception fell due, oldest first, until its entry is recorded.
         self._due: dict[int, list[int]] = {}
         #: (from which cycle on, first exception, cycles between two) of SysTick, oldest first.
         self._ticks: list[tuple[int, int | None, int]] = []
@@ -69,7 +69,7 @@ class Latency:
         board.chip.processor.systick.schedule_listeners.append(self._tick_set)
 
     def detach(self) -> None:
-        """Look on no more."""
+        """Stop listening."""
         self._board.chip.irq_listeners.remove(self._irq_changed)
         self._board.chip.processor.systick.schedule_listeners.remove(self._tick_set)
 
@@ -78,7 +78,7 @@ class Latency:
         """What each exception that was entered has cost, by number."""
         return [self.costs[number] for number in sorted(self.costs)]
 
-    # As a listener.
+    # As a `BlockListener`.
 
     def block(self, address: int, following: int | None, cycle: int, cycles: int) -> None:  # noqa: ARG002 - a listener
         """Take the first block of a handler."""

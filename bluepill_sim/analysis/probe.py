@@ -1,6 +1,6 @@
 """A logic analyser on a board: every change of its pins and of some signals inside.
 
-    PA0 … PC15            the wire: 0, 1, or z while nobody drives or pulls it
+    PA0 … PC15            the wire: 0, 1, or z while it is not driven or pulled
     irq.NAME              the interrupt line of a peripheral
     usart1.tx             the bits that go out, rebuilt from the characters and the baud rate
     usart1.word           the characters themselves (VCD only), at the end of their stop bit
@@ -9,7 +9,7 @@ Not seen: edges inside the chip that no pin or line shows, such as a timer's
 internal compare. The TX *pin* stays high in this emulator; `usart1.tx` is what
 a probe on a real one would show, without breaks and idle characters.
 
-Invariant: looking on changes nothing; edges of one signal are in order of time
+Invariant: probing changes nothing; edges of one signal are in order of time
 and differ from one to the next.
 """
 
@@ -24,7 +24,7 @@ from bluepill_sim.fabric.pins import Pin, PinBank
 from bluepill_sim.native.engine import NativeEngine
 from bluepill_sim.timing import Nanos
 
-#: Nobody drives.
+#: The value of a wire that is not driven.
 FLOATING = 2
 #: (ns, 0 or 1, or FLOATING).
 Edge = tuple[Nanos, int]
@@ -60,7 +60,7 @@ class Probe:
             log = NativeEdgeLog(bonded, levels)
             self._levels: MutableSequence[int] | ctypes.Array[ctypes.c_uint8] = log.last
             self.log: EdgeLog = log
-            self._listen(board.chip.pins.bulk_takers, lambda: log.take(engine.state, board.chip.time_base))
+            self._listen(board.chip.pins.bulk_listeners, lambda: log.take(engine.state, board.chip.time_base))
         else:
             self._levels = levels
             self.log = PythonEdgeLog()

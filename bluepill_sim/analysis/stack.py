@@ -4,7 +4,7 @@ The paint lies between the last variable and the top of the stack. What lies
 above the widest stretch that is still painted has been stack; what lies below
 it, heap. A real chip's SRAM holds anything at power-on, so no program may mind.
 
-Not told: threads' own stacks, which are variables, and a program whose stack
+Not measured: threads' own stacks, which are variables, and a program whose stack
 holds arrays that are wider than all the room that is left and never written.
 
 Source: the method is that of every RTOS's stack check.

@@ -7,7 +7,7 @@ from bluepill_sim.cli import coverage, debug, info, pins, profile, run, trace
 HELP = """Run, look into and debug a BluePill program, without a robot.
 
 FIRMWARE is an ELF, HEX or BIN file for an STM32F103C8; with debug information
-in the ELF, places are told by symbol and line.
+in the ELF, places are shown by symbol and line.
 """
 
 

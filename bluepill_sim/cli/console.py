@@ -5,7 +5,7 @@ virtual time and the console in none: what the chip sends is written as it
 comes out, what a person types is given to the chip when `poll` is called.
 
 Invariant: a console never makes the emulator wait; what cannot be written at
-once to a pseudo-terminal that nobody reads is dropped and counted.
+once to a pseudo-terminal that is not read is dropped and counted.
 """
 
 import os
@@ -104,7 +104,7 @@ class PtyConsole:
         tty.setraw(self._slave)
         os.set_blocking(self._master, False)
         self.description = os.ttyname(self._slave)
-        #: Characters that nobody has read in time.
+        #: Characters that were not read in time.
         self.dropped = 0
 
     def write(self, word: int, at_ns: int) -> None:  # noqa: ARG002 - the signature of `on_transmit`

@@ -11,13 +11,13 @@ from bluepill_sim.analysis.lcov import write_lcov
 from bluepill_sim.analysis.observation import Observation
 from bluepill_sim.board import BluePill
 from bluepill_sim.cli.columns import print_columns
-from bluepill_sim.cli.driving import parse_changes, run_driven, say, summary, tell_fault, warn_on_stderr
+from bluepill_sim.cli.driving import parse_changes, print_fault, print_status, run_driven, summary, warn_on_stderr
 from bluepill_sim.errors import BluePillError
 from bluepill_sim.program.line_table import read_lines
 from bluepill_sim.program.static_code import StaticCode
 from bluepill_sim.timing import to_nanos
 
-HELP = """Run a firmware for a while and tell which of its lines and branches ran.
+HELP = """Run a firmware for a while and show which of its lines and branches ran.
 
 The ELF must have debug information (gcc -g). With --lcov the result is also
 written as an lcov tracefile, which genhtml, editors and CI services read.
@@ -69,11 +69,11 @@ def coverage(
         typer.echo(json.dumps([_facts(file) for file in files], sort_keys=True))
     else:
         _print(files, missed=missed)
-    say(summary(board))
-    has_died = tell_fault(board)
+    print_status(summary(board))
+    has_died = print_fault(board)
     share = 100 * sum(f.lines_hit for f in files) / sum(len(f.lines) for f in files)
     if share < fail_under:
-        say(f"coverage: {share:.1f} % of the lines are less than {fail_under:g} %")
+        print_status(f"coverage: {share:.1f} % of the lines are less than {fail_under:g} %")
     if has_died or share < fail_under:
         raise typer.Exit(1)
 

@@ -7,7 +7,7 @@ import typer
 
 from bluepill_sim.board import BluePill
 from bluepill_sim.cli.console import connect, open_console
-from bluepill_sim.cli.driving import say, summary, warn_on_stderr
+from bluepill_sim.cli.driving import print_status, summary, warn_on_stderr
 from bluepill_sim.cli.gdb_server import GdbServer
 from bluepill_sim.debug.machine import LoneChip
 
@@ -48,10 +48,10 @@ def debug(
     server = GdbServer(LoneChip(board), port, is_paced=not fast)
     console = open_console(uart)
     connect(console, board.usart1)
-    say(f"waiting for GDB on port {server.port}: gdb-multiarch {firmware} -ex 'target remote :{server.port}'")
+    print_status(f"waiting for GDB on port {server.port}: gdb-multiarch {firmware} -ex 'target remote :{server.port}'")
     try:
         server.serve(once=once)
     finally:
         server.close()
         console.close()
-        say(summary(board))
+        print_status(summary(board))

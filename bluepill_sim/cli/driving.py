@@ -1,4 +1,4 @@
-"""What several commands do alike: load a firmware, drive its pins by a list, run it.
+"""A run with pins driven by a list (`--drive`), and what the commands print of a run on stderr.
 
 Invariant: the same list gives the same run, whatever the slices.
 """
@@ -114,27 +114,27 @@ def run_driven(board: BluePill, end_ns: Nanos, changes: Sequence[Change]) -> Rea
 
 @contextmanager
 def showing_where_it_hangs(board: BluePill) -> Iterator[None]:
-    """Tell what ran last when a person, the clock or a wait gives a run up."""
+    """Print what ran last when Ctrl-C, the clock or a wait ends a run."""
     try:
         yield
     except (KeyboardInterrupt, OverBudgetError, WaitError):
-        say(f"given up at {summary(board)}")
+        print_status(f"given up at {summary(board)}")
         if board.fault is None:
-            tell_last_blocks(board)
+            print_last_blocks(board)
         else:
-            tell_fault(board)
+            print_fault(board)
         raise
 
 
-def say(line: str) -> None:
-    """Tell a person something that is not the result."""
+def print_status(line: str) -> None:
+    """Print a line that is not the result, on stderr."""
     sys.stderr.write(f"{line}\n")
     sys.stderr.flush()
 
 
 def warn_on_stderr(board: BluePill) -> None:
-    """Have each warning told as it comes."""
-    board.on_warning = lambda text: say(f"warning: {text} (t = {board.now_ns / NS_PER_S:.6f} s)")
+    """Print each warning as it comes."""
+    board.on_warning = lambda text: print_status(f"warning: {text} (t = {board.now_ns / NS_PER_S:.6f} s)")
 
 
 def summary(board: BluePill) -> str:
@@ -147,20 +147,20 @@ def summary(board: BluePill) -> str:
     return f"{board.now_ns / NS_PER_S:.6f} s of virtual time, {board.cycle} cycles, {doing} {board.where()}{warned}"
 
 
-def tell_fault(board: BluePill) -> bool:
-    """Tell of a fault, if there is one, with the registers and the last blocks; return whether there is."""
+def print_fault(board: BluePill) -> bool:
+    """Print the fault, if there is one, with the registers and the last blocks; return whether there is."""
     if board.fault is None:
         return False
-    say(f"fault: {board.fault}")
+    print_status(f"fault: {board.fault}")
     for line in board.fault.register_dump.splitlines():
-        say(f"  {line}")
-    tell_last_blocks(board)
+        print_status(f"  {line}")
+    print_last_blocks(board)
     return True
 
 
-def tell_last_blocks(board: BluePill) -> None:
-    """Tell what a board ran last."""
+def print_last_blocks(board: BluePill) -> None:
+    """Print what a board ran last."""
     lines = board.last_blocks()
-    say(title_of(len(lines)))
+    print_status(title_of(len(lines)))
     for line in lines:
-        say(line)
+        print_status(line)

@@ -2,8 +2,8 @@
 
 This is the I/O layer: it owns the socket and the pace; `bluepill_sim.debug` does the rest.
 
-Invariant: the machine runs only while GDB wants it to; whoever leaves without a
-word leaves it standing still.
+Invariant: the machine runs only while GDB wants it to; a debugger that disconnects
+without detaching leaves it halted.
 """
 
 import select
@@ -59,14 +59,14 @@ class GdbServer:
         self.on_print: Callable[[bytes], None] | None = None
 
     def close(self) -> None:
-        """Give the port back."""
+        """Close the port."""
         self._listener.close()
 
     def serve(self, *, once: bool = False) -> bool:
         """Serve debuggers until one kills the program, or detaches.
 
         Args:
-            once: come back as well when one leaves without a word.
+            once: return as well when one disconnects without detaching.
 
         Returns:
             Whether the program is to run on: it was detached from, not killed.
@@ -77,7 +77,7 @@ class GdbServer:
             connection = _Connection(self._listener.accept()[0], self._on_wait)
             self._connection = connection
             try:
-                session = self._talk(connection)
+                session = self._serve_session(connection)
             finally:
                 self._connection = None
                 connection.close()
@@ -85,7 +85,7 @@ class GdbServer:
                 self._execution.detach()
                 return not session.state.was_killed
 
-    def _talk(self, connection: "_Connection") -> GdbSession:
+    def _serve_session(self, connection: "_Connection") -> GdbSession:
         session = GdbSession(self._execution)
         self._execution.wants_stop = self._make_watch(connection)
         while not session.state.is_over:
@@ -122,7 +122,7 @@ _RESUMES = {b"c", b"s", b"C", b"S"}
 
 
 class _Connection:
-    """One debugger's end of the line."""
+    """The connection of one debugger."""
 
     def __init__(self, line: socket.socket, on_wait: Callable[[], None]) -> None:
         self._line = line

@@ -14,7 +14,7 @@ from bluepill_sim.program.image import Image
 from bluepill_sim.stm32f103 import FLASH_BYTES, SRAM_BYTES
 from bluepill_sim.timing import NS_PER_S, to_nanos
 
-HELP = """Tell what a firmware is: sections, sizes, vectors, largest symbols, stack.
+HELP = """Show what a firmware is: sections, sizes, vectors, largest symbols, stack.
 
 It is also run for a moment, to see which things it uses that are not modelled.
 
@@ -39,10 +39,10 @@ def info(
     span: Annotated[str, typer.Option("--for", help="How long it is run; 0s: not at all.", metavar="TIME")] = "500ms",
     json_output: Annotated[bool, typer.Option("--json", help="Print one JSON object.")] = False,
 ) -> None:
-    """Tell what a firmware is."""
+    """Show what a firmware is."""
     end_ns = to_nanos(span)
     board = BluePill(firmware)
-    board.chip.pins.is_fed = lambda _pin: True  # it lies on the table: no wire is missing
+    board.chip.pins.is_serial_input = lambda _pin: True  # nothing is wired here: no wire is missing
     run_driven(board, end_ns, ())
     found = facts(board)
     if json_output:
@@ -52,7 +52,7 @@ def info(
 
 
 def facts(board: BluePill) -> dict[str, object]:
-    """Return everything that `info` tells, as plain values."""
+    """Return everything that `info` shows, as plain values."""
     image = board.image
     lies = layout(image)
     symbols = sorted((s for s in image.symbols.symbols if s.size), key=lambda s: (-s.size, s.address))

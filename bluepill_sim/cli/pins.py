@@ -11,7 +11,7 @@ from bluepill_sim.analysis.sigrok import write_sigrok
 from bluepill_sim.analysis.vcd import write_vcd
 from bluepill_sim.board import BluePill
 from bluepill_sim.cli.columns import print_columns
-from bluepill_sim.cli.driving import parse_changes, run_driven, say, summary, tell_fault, warn_on_stderr
+from bluepill_sim.cli.driving import parse_changes, print_fault, print_status, run_driven, summary, warn_on_stderr
 from bluepill_sim.timing import NS_PER_S, to_nanos
 
 HELP = """Run a firmware for a while, then show each pin: mode, level, who drives it, edges.
@@ -61,13 +61,13 @@ def pins(
         typer.echo(json.dumps({"at_s": board.now_ns / NS_PER_S, "pins": rows}, sort_keys=True))
     else:
         _print(rows)
-    say(summary(board))
-    if tell_fault(board):
+    print_status(summary(board))
+    if print_fault(board):
         raise typer.Exit(1)
 
 
 def pin_rows(board: BluePill, probe: Probe) -> list[dict[str, object]]:
-    """Return what is to be told of each pin that has a leg."""
+    """Return what is shown of each pin that has a leg."""
     rows: list[dict[str, object]] = []
     all_edges = probe.edges
     for pin in board.pins:

@@ -7,20 +7,20 @@ from typing import Annotated
 import typer
 
 from bluepill_sim.analysis.cycle_profile import ASLEEP, CycleProfile, FunctionCost
-from bluepill_sim.analysis.flame import flame_svg
+from bluepill_sim.analysis.flame_graph import flame_svg
 from bluepill_sim.analysis.latency import ExceptionCost, Latency
 from bluepill_sim.analysis.observation import Observation
 from bluepill_sim.analysis.stack import StackGauge
 from bluepill_sim.board import BluePill
 from bluepill_sim.cli.columns import print_columns
-from bluepill_sim.cli.driving import parse_changes, run_driven, say, summary, tell_fault, warn_on_stderr
+from bluepill_sim.cli.driving import parse_changes, print_fault, print_status, run_driven, summary, warn_on_stderr
 from bluepill_sim.core.nvic import exception_name
 from bluepill_sim.errors import BluePillError
 from bluepill_sim.program.functions import FunctionTable
 from bluepill_sim.program.static_code import StaticCode
 from bluepill_sim.timing import to_nanos
 
-HELP = """Run a firmware for a while and tell where its cycles go.
+HELP = """Run a firmware for a while and show where its cycles go.
 
 By function: calls, cycles of its own, cycles with what it calls. Then how deep
 the stack went, how long each interrupt waited and ran, and what the firmware
@@ -84,8 +84,8 @@ def profile(
         typer.echo(str(use))
         for warning in board.warnings:
             typer.echo(f"not modelled, or odd: {warning}")
-    say(summary(board))
-    if tell_fault(board):
+    print_status(summary(board))
+    if print_fault(board):
         raise typer.Exit(1)
 
 

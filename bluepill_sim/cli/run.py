@@ -7,17 +7,16 @@ from typing import Annotated
 
 import typer
 
-from bluepill_sim.board import BluePill
-from bluepill_sim.board import until as wait_until
+from bluepill_sim.board import BluePill, run_until
 from bluepill_sim.cli.console import connect, open_console
 from bluepill_sim.cli.driving import (
     OverBudgetError,
     Schedule,
     parse_changes,
-    say,
+    print_fault,
+    print_status,
     showing_where_it_hangs,
     summary,
-    tell_fault,
     warn_on_stderr,
 )
 from bluepill_sim.timing import NS_PER_MS, NS_PER_S, Nanos, Reached, Reason, to_nanos
@@ -37,12 +36,12 @@ Examples:
   p2os mcu run mine.elf --until "pin PC13 low"   up to an event
 """
 
-#: chosen: how often a running program is given to whoever types, and held back to the clock.
+#: chosen: how often typed input reaches a running program, and its time is held back to the clock.
 SLICE_NS: Nanos = 2 * NS_PER_MS
 DEFAULT_SPAN = "1s"
 #: chosen: so often the wall clock is looked at.
 STRIDE_NS: Nanos = 20 * NS_PER_MS
-#: chosen: longer than any run that somebody waits for.
+#: chosen: longer than anybody waits for a run.
 _BUDGET_S = 600.0
 #: Without an end: until Ctrl-C.
 _FOR_EVER = "31536000s"
@@ -77,7 +76,7 @@ def run(
     console = open_console(uart)
     carry = connect(console, board.usart1)
     if uart == "pty:":
-        say(f"USART1 is at {console.description}")
+        print_status(f"USART1 is at {console.description}")
     advance = _paced(board, carry) if realtime or uart == "pty:" else _bounded(board, budget_s)
     schedule = Schedule(board, changes, advance)
     try:
@@ -85,13 +84,13 @@ def run(
             if until is None:
                 schedule.run_to(end_ns)
             else:
-                wait_until(board, until, end_ns, schedule.advance_to)
+                run_until(board, until, end_ns, schedule.advance_to)
     finally:
         console.close()
         if uart == "-" and board.usart1.unread and not board.usart1.unread.endswith(b"\n"):
             typer.echo("")
-        say(summary(board))
-    if tell_fault(board):
+        print_status(summary(board))
+    if print_fault(board):
         raise typer.Exit(1)
 
 

@@ -9,7 +9,7 @@ from typing import Annotated, TextIO
 import typer
 
 from bluepill_sim.board import BluePill
-from bluepill_sim.cli.driving import parse_changes, run_driven, say, summary, tell_fault, warn_on_stderr
+from bluepill_sim.cli.driving import parse_changes, print_fault, print_status, run_driven, summary, warn_on_stderr
 from bluepill_sim.core import BlockRecorder
 from bluepill_sim.errors import BluePillError
 from bluepill_sim.program.functions import FunctionTable
@@ -79,8 +79,8 @@ def trace(
         recorder = board.chip.record_blocks(_CAPACITY, write)
         run_driven(board, end_ns, [change for change in changes if change.at_ns >= begin_ns])
         write(recorder)
-    say(f"{count} lines; {summary(board)}")
-    if tell_fault(board):
+    print_status(f"{count} lines; {summary(board)}")
+    if print_fault(board):
         raise typer.Exit(1)
 
 

@@ -6,7 +6,7 @@ underscore, which is all that `processor.py`, `chip.py` and `board.py` use.
     run(stop_at)          to the first block boundary at or after a cycle, or to what ends the run before: a `Halt`
     step(stop_at)         one instruction
     cycle, pc, is_thumb   the state between runs; `jump` sets the last two; `it_state` is ITSTATE where it matters
-    stop_at               moved by whoever is called from inside a run: 0 ends it at the next boundary
+    stop_at               moved by callbacks from inside a run: 0 ends it at the next boundary
     block, access_cycle, access_pc   inside an access: the block that runs, the accessing instruction and its time
     registers             `RegisterFile`
     map_memory, map_io, drop_code, forget_costs, on_read_only_write, on_read_only_written

@@ -129,7 +129,7 @@ def may_write(code: bytes, at: int) -> int:
 
 
 def only_reads(code: bytes) -> bool:
-    """Tell whether a straight run of code stores nothing and speaks to no coprocessor: rather no than a wrong yes."""
+    """Tell whether a straight run of code stores nothing and uses no coprocessor: in doubt, no."""
     at = 0
     while at + 2 <= len(code):
         first = code[at] | code[at + 1] << 8

@@ -26,7 +26,7 @@ ReadMemory = Callable[[int, int], bytes | None]
 
 @dataclass(frozen=True, slots=True)
 class Step:
-    """One instruction: `target` becomes `name` of the sources; None: a register or more that nobody knows."""
+    """One instruction: `target` becomes `name` of the sources; None: one or more unknown registers."""
 
     name: str
     target: int | None = None

@@ -7,7 +7,7 @@ rest of the architecture is done by hand, always at a block boundary:
     branch to EXC_RETURN  -> tail-chain if something is pending, else unstack
     SVC, fault            -> enter at once, escalated to HardFault if it may not
     HardFault that faults -> lockup: only a reset helps
-    WFI, WFE              -> asleep: time jumps to whoever wakes the core
+    WFI, WFE              -> asleep: time jumps to what wakes the core
 
 Not modelled: the MPU, late arrival, lazy stacking (no FPU), the privilege
 check of the system control space, DebugMonitor.
@@ -68,7 +68,7 @@ FaultListener = Callable[[FaultKind, int, int | None, bool], None]
 class Processor:
     """One core; `cycle` is its time."""
 
-    #: Whether SysTick's wraps are acted on within `run`; else whoever runs stops at each.
+    #: Whether SysTick's wraps are acted on within `run`; else the caller stops at each.
     ticks_alone = False
 
     def __init__(self, engine: Engine, memory: Memory) -> None:

@@ -42,7 +42,7 @@ _IRQS = (1 << IRQ_COUNT) - 1
 _WORD = 0xFFFF_FFFF
 
 
-class Surroundings(Protocol):
+class SystemControlPorts(Protocol):
     """What these registers need of the chip."""
 
     @property
@@ -67,7 +67,7 @@ _Write = Callable[[int, int], None]
 class SystemControl:
     """Reads and writes of the private peripheral bus."""
 
-    def __init__(self, processor: Processor, chip: Surroundings) -> None:
+    def __init__(self, processor: Processor, chip: SystemControlPorts) -> None:
         self._core = core = processor
         self._nvic = processor.nvic
         self._chip = chip

@@ -3,10 +3,10 @@
 Theory of operation. Forwards the machine runs to what halts its chip; calls of
 semihosting are served on the way. Backwards it is put to an older state and run
 forward again, once to learn what stops lie on the way, and once to the last of
-them. A run is repeatable, so it comes by the same states; nobody is told of
-anything twice.
+them. A run is repeatable, so it comes by the same states; nothing is printed
+twice.
 
-Invariant: outside of its methods the machine stands still.
+Invariant: outside of its methods the machine is halted.
 """
 
 from collections.abc import Callable
@@ -19,12 +19,12 @@ from bluepill_sim.debug.machine import Machine, Stop, StopKind
 from bluepill_sim.debug.semihosting import Semihosting
 from bluepill_sim.timing import NS_PER_MS, NS_PER_S, Nanos, Reason
 
-#: chosen: so often a running machine looks whether somebody wants it to stop.
+#: chosen: how often a running machine checks for a request to stop.
 SLICE_NS: Nanos = 2 * NS_PER_MS
 #: chosen: so far before a state, in cycles, single steps towards it begin.
 _MARGINS = (64, 512, 8192, 1 << 20)
 #: Bounds the steps of one way back: a program asleep or in a loop to itself takes one step for a long time.
-_MOST_STEPS = 20_000
+_MAX_STEPS = 20_000
 
 _STOP_OF_HALT = {
     HaltKind.BREAKPOINT: StopKind.BREAKPOINT,
@@ -73,7 +73,7 @@ class Execution:
         chip.processor.on_fault = self._report
 
     def changed(self) -> None:
-        """Begin the history anew: somebody has written to the machine."""
+        """Begin the history anew: the machine has been written to."""
         self.history.begin()
         self._bkpt_at = None
         self._reported_fault = self.machine.board.fault is not None
@@ -120,7 +120,7 @@ class Execution:
                 return Stop(StopKind.INTERRUPT)
 
     def _step_once(self) -> Stop | None:
-        """Run one instruction; None where the chip sleeps until somebody wants it to stop."""
+        """Run one instruction; None where the chip sleeps until a stop is requested."""
         while True:
             if self._has_ended():
                 return Stop(StopKind.END)
@@ -146,7 +146,7 @@ class Execution:
         return Stop(_STOP_OF_HALT[kind], address)
 
     def _pass_bkpt(self) -> None:
-        """Go past the BKPT that the debugger has been told of."""
+        """Go past the BKPT that was reported to the debugger."""
         board = self.machine.board
         if self._bkpt_at == board.pc:
             board.chip.engine.jump(board.pc + 2 | 1)
@@ -230,7 +230,7 @@ class Execution:
     def _count_steps(self, here: _Place) -> int | None:
         """Return how many steps it is to a state; None where steps do not come by it."""
         board = self.machine.board
-        for count in range(1, _MOST_STEPS):
+        for count in range(1, _MAX_STEPS):
             self._pass_bkpt()
             self._step_once()
             if (board.cycle, board.pc) == (here.cycle, here.pc):

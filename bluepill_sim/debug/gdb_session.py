@@ -1,7 +1,7 @@
 """What each packet of GDB asks for, and the answer to it.
 
-Sans I/O: payloads go in, payloads come out; whoever owns the connection frames
-them. Commands that run the machine come back when it stands still.
+Sans I/O: payloads go in, payloads come out; the owner of the connection frames
+them. Commands that run the machine return when it is halted.
 
 Source: Debugging with GDB, appendix E "GDB Remote Serial Protocol".
 Invariant: any payload at all gives an answer (empty: not supported), never an exception.
@@ -16,7 +16,7 @@ from bluepill_sim.debug.execution import Execution
 from bluepill_sim.debug.inspector import Inspector
 from bluepill_sim.debug.machine import Stop, StopKind
 from bluepill_sim.debug.monitor import Monitor
-from bluepill_sim.debug.packets import MOST_BYTES
+from bluepill_sim.debug.packets import MAX_BYTES
 from bluepill_sim.debug.target_description import FLASH_PAGE_BYTES, memory_map_xml, target_xml
 from bluepill_sim.errors import BluePillError
 from bluepill_sim.stm32f103 import FLASH_BASE, FLASH_BYTES_FITTED
@@ -28,13 +28,13 @@ _BAD, _NO_MEMORY, _NO_REGISTER = b"E01", b"E0e", b"E16"
 _SIGNALS = {StopKind.INTERRUPT: 2, StopKind.FAULT: 11}
 _SIGTRAP = 5
 #: A reply's bytes stand as two digits each.
-_MOST_READ = MOST_BYTES // 2 - 16
+_MAX_READ = MAX_BYTES // 2 - 16
 #: The instruction set never needs longer watches; bounds the hooks.
 _LONGEST_WATCH = 4096
 _WATCH_KINDS = {b"2": WatchKind.WRITE, b"3": WatchKind.READ, b"4": WatchKind.ACCESS}
 _WATCH_WORDS = {WatchKind.WRITE: b"watch", WatchKind.READ: b"rwatch", WatchKind.ACCESS: b"awatch"}
 _FEATURES = (
-    f"PacketSize={MOST_BYTES:x};qXfer:features:read+;qXfer:memory-map:read+;QStartNoAckMode+;vContSupported+;"
+    f"PacketSize={MAX_BYTES:x};qXfer:features:read+;qXfer:memory-map:read+;QStartNoAckMode+;vContSupported+;"
     "hwbreak+;ReverseStep+;ReverseContinue+"
 ).encode()
 
@@ -132,7 +132,7 @@ class GdbSession:
 
     def _read_memory(self, rest: bytes) -> bytes:
         address, size = _numbers(rest)
-        data = self._inspector.read_memory(address, min(size, _MOST_READ)) if size else b""
+        data = self._inspector.read_memory(address, min(size, _MAX_READ)) if size else b""
         return _NO_MEMORY if data is None else _hex(data)
 
     def _write_memory(self, rest: bytes) -> bytes:
@@ -214,7 +214,7 @@ class GdbSession:
             return _transfer(argument)
         if name == b"Rcmd":
             text = self._monitor.run(binascii.unhexlify(argument).decode("utf-8", "replace"))
-            return _hex(text.encode()[:_MOST_READ])
+            return _hex(text.encode()[:_MAX_READ])
         return _ANSWERS.get(name, _NOT_SUPPORTED)
 
     def _set(self, rest: bytes) -> bytes:
@@ -275,7 +275,7 @@ def _transfer(argument: bytes) -> bytes:
         return b"E00"
     offset, size = _numbers(where)
     text = make().encode()
-    part = text[offset : offset + min(size, _MOST_READ)]
+    part = text[offset : offset + min(size, _MAX_READ)]
     return (b"l" if offset + len(part) >= len(text) else b"m") + part
 
 

@@ -173,7 +173,7 @@ class Inspector:
 
 @dataclass
 class _silence:  # noqa: N801 - a context manager
-    """Keeps the warnings of a look from being told."""
+    """Suppresses the warnings that a debugger's read would cause."""
 
     board: BluePill
 

@@ -1,10 +1,10 @@
-"""What the debugger needs of whoever runs the chip, and why it stands still.
+"""The machine as the debugger sees it: what runs the chip, and why it is halted.
 
 `bluepill_sim` alone runs a lone chip; a bench runs the chip with a robot. The
 debugger does not see the difference: it asks for time to go on, and for
 snapshots.
 
-Invariant: a machine that stands still stands still as a whole.
+Invariant: a machine is halted as a whole.
 """
 
 from dataclasses import dataclass
@@ -16,7 +16,7 @@ from bluepill_sim.timing import Nanos, Reached
 
 
 class StopKind(Enum):
-    """Why the chip stands still."""
+    """Why the chip is halted."""
 
     #: Before the instruction at a breakpoint.
     BREAKPOINT = "breakpoint"
@@ -49,7 +49,7 @@ class Stop:
 
 
 class Machine(Protocol):
-    """Who runs the chip and everything that hangs on it."""
+    """What runs the chip and everything connected to it."""
 
     @property
     def board(self) -> BluePill:
@@ -79,7 +79,7 @@ class Machine(Protocol):
         ...
 
     def halted(self) -> None:
-        """Be told that the chip stands still: a real robot is stopped here."""
+        """Act on a halt of the chip: a real robot is stopped here."""
         ...
 
 
@@ -105,4 +105,4 @@ class LoneChip:
         self.board.restore(snapshot)
 
     def halted(self) -> None:
-        """Nobody else has to know."""
+        """Nothing else is connected."""

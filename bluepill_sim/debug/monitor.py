@@ -47,7 +47,7 @@ class Monitor:
         self._snapshots: dict[str, object] = {}
 
     def run(self, line: str) -> str:
-        """Return what a command has to say."""
+        """Return the output of a command."""
         words = line.split()
         if not words:
             words = ["help"]

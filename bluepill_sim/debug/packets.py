@@ -3,14 +3,14 @@
 Bytes go in as they come; events come out. Nothing here knows what a payload means.
 
 Source: Debugging with GDB, appendix E.1 "Overview" of the remote protocol.
-Invariant: any bytes at all give events, never an exception, and never hold more than `MOST_BYTES`.
+Invariant: any bytes at all give events, never an exception, and never hold more than `MAX_BYTES`.
 """
 
 from dataclasses import dataclass
 from enum import Enum
 
-#: Longest payload taken, and told to GDB as PacketSize (it counts the frame too).
-MOST_BYTES = 0x4000
+#: Longest payload taken, and reported to GDB as PacketSize (it counts the frame too).
+MAX_BYTES = 0x4000
 _START, _END, _ESCAPE = b"$#}"
 _INTERRUPT = 0x03
 _ESCAPED = frozenset(b"#$}*")
@@ -69,7 +69,7 @@ class PacketReader:
             self._payload, self._is_too_long = bytearray(), False
         elif byte == _END:
             self._digits = bytearray()
-        elif len(self._payload) >= MOST_BYTES:
+        elif len(self._payload) >= MAX_BYTES:
             self._is_too_long = True
         else:
             self._payload.append(byte)

@@ -1,7 +1,7 @@
 """The clocks of the chip as every part sees them: frequencies, and the flash wait states set for them.
 
-This is the common point only. RCC decides the frequencies and FLASH the wait
-states (each tells `ChipPorts.clock_changed`); USARTs, timers and the CPU read
+This holds them only. RCC decides the frequencies and FLASH the wait
+states (each calls `ChipPorts.clock_changed`); USARTs, timers and the CPU read
 them. Sources: RM0008 sections 3.3.3 and 7.2, data sheet DS5319 table 9.
 Invariant: every frequency is a whole number of hertz, and `hclk_hz` > 0.
 """

@@ -1,27 +1,17 @@
 """The pins of the chip: where its parts and the outside world meet.
 
 A pin has one driver inside (GPIO, an alternate function, or the debug port)
-and one outside. What is not modelled: volts, currents, slew rates, and the
-two clocks of the input synchroniser.
+and one outside. The pins know levels, not currents; what is electrically wrong
+(drivers against each other, shorts, overvoltage, inputs that float) is a
+warning, once a pin, with the program's place.
 
-Source: RM0008 sections 9.1 and 9.3.5.
+Not modelled: volts, currents through clamp diodes, the total current of the
+supply pins, slew rates, and the two clocks of the input synchroniser.
+
+Source: RM0008 sections 9.1 (table 20) and 9.3.5; data sheet DS5319 tables 5 and
+6 (pin definitions, absolute maximum ratings).
 Invariant: `output` and `level` follow from the other attributes alone; every
-change of `output` is told to `PinBank.on_output` once, with its exact time.
-
-What a pin can do to its wire, and what GPIO can make of a pin.
-
-Source: RM0008 9.1, table 20.
-Invariant: these are plain values; `pins.py` has the pins.
-
-What is wrong with a wire, in words: drivers that fight, shorts, too many volts, inputs that float.
-
-The pins know levels, not currents; what they can tell is told here. Each
-complaint is a warning, once a pin, with the program's place.
-
-Not modelled: currents through clamp diodes, the total current of the supply
-pins, and slew rates.
-Source: data sheet DS5319 tables 5 and 6 (pin definitions, absolute maximum ratings).
-Invariant: these functions only read.
+change of `output` is notified to `PinBank.on_output` once, with its exact time.
 """
 
 from collections.abc import Callable, Iterator, Sequence
@@ -32,7 +22,7 @@ from typing import Protocol, Self, TypeAlias
 class PinDrive(Enum):
     """What the chip itself puts on a wire."""
 
-    #: The level that it makes when nobody stronger drives; None: none.
+    #: The level that it makes when nothing stronger drives; None: none.
     level: bool | None
     #: Whether it is stronger than any pull.
     is_strong: bool
@@ -44,7 +34,7 @@ class PinDrive(Enum):
         member.level, member.is_strong = level, is_strong
         return member
 
-    #: Nothing: the chip listens, or has the pin in analog mode.
+    #: Nothing: the pin is an input, or in analog mode.
     NONE = "none", None, False
     #: Strong 0.
     LOW = "low", False, True
@@ -85,47 +75,10 @@ INPUT_MODES = (PinMode.FLOATING, PinMode.PULLED)
 DRIVES_BY_VALUE = {drive.value: drive for drive in PinDrive}
 MODES_BY_VALUE = {mode.value: mode for mode in PinMode}
 
-
 #: What a wire can be shorted to, and the level that it then has.
 RAILS = {"GND": False, "3V3": True}
 #: An input that is not 5 V-tolerant bears VDD + 0.3 V (DS5319 table 6); chosen: what counts as more than that.
-MOST_VOLTS = 3.65
-
-
-def overvoltage(pin: "Pin", volts: float) -> str | None:
-    """Return what is wrong with so many volts on a pin; None when it bears them."""
-    if volts <= MOST_VOLTS:
-        return None
-    if not pin.is_five_volt_tolerant:
-        reason = "it bears 3.6 V at most"
-    elif pin.output.is_strong:
-        reason = "it bears 5 V only as an input"
-    elif pin.output.level is not None:
-        reason = "it bears 5 V only without its pull"
-    else:
-        return None
-    return f"{volts:g} V on {pin.name}: {reason}"
-
-
-def contention(pin: "Pin") -> str:
-    """Return what to say of two drivers that fight."""
-    outside = "high" if pin.driven else "low"
-    return f"{pin.name}: two drivers fight: the chip drives it {pin.output.value}, the other end {outside}"
-
-
-def floating_inputs(names: Sequence[str]) -> str:
-    """Return what to say of inputs that nobody drives."""
-    one = len(names) == 1
-    what, they = ("floating input", "it reads") if one else ("floating inputs", "they read")
-    return f"{', '.join(names)}: {what} that nobody drives: {they} 0 here and anything on a board; configured"
-
-
-def short_circuit(pin: "Pin", rail: str) -> str:
-    """Return what to say of an output that works against a supply rail."""
-    return f"{pin.name}: output {pin.output.value} is shorted to {rail}"
-
-
-__all__ = ["ALTERNATE_MODES", "INPUT_MODES", "Pin", "PinBank", "PinDrive", "PinMode", "PinPorts", "PinSnapshot"]
+MAX_VOLTS = 3.65
 
 #: Level of the outside driver, mode, ODR bit, holder (owner, drive), connections, watched, output, level, rail.
 PinSnapshot: TypeAlias = tuple[
@@ -265,7 +218,7 @@ class Pin:
 
     @property
     def holder(self) -> str | None:
-        """Who keeps GPIO off the pin, such as "JTDO"; None for nobody."""
+        """What keeps GPIO off the pin, such as "JTDO"; None for nothing."""
         return None if self._holder is None else self._holder[0]
 
     def configure(self, mode: PinMode, output_bit: bool) -> None:
@@ -314,7 +267,7 @@ class Pin:
         return is_input and self._holder is None and self.is_bonded
 
     def is_simple(self) -> bool:
-        """Whether a change of the ODR bit changes nothing but the level on the wire, and nobody is to be told."""
+        """Whether a change of the ODR bit changes nothing but the level on the wire, and has no listener."""
         bank = self._bank
         return (
             self._drives == PinMode.PUSH_PULL.drives
@@ -341,7 +294,7 @@ class Pin:
         )
 
     def restore(self, snapshot: PinSnapshot) -> None:
-        """Put back what `snapshot` returned; tells nobody."""
+        """Put back what `snapshot` returned; no listener is called."""
         self._outside, mode, self._output_bit, holder, sources, self.is_watched, output, self.level, rail = snapshot
         self._rail = rail
         self._mode = MODES_BY_VALUE[mode]
@@ -378,7 +331,7 @@ class Pin:
         self._resolve()
 
     def _resolve(self) -> None:
-        """Bring `level` and `input` up to date and tell the listeners of a change of the input."""
+        """Bring `level` and `input` up to date; notify the listeners of a change of the input."""
         output, outside = self.output, self._outside
         level: bool
         if self._rail is not None:
@@ -423,21 +376,21 @@ class PinBank:
         self._ports = ports
         #: EXTI lines on which an edge makes a request, as a mask.
         self.edge_lines = 0
-        #: Whether no pin has changed in what `Pin.is_simple` looks at, since whoever sets this looked.
+        #: Whether no pin has changed in what `Pin.is_simple` looks at, since it was set.
         self.simple_is_known = False
-        #: Called with (pin, time in ns) whenever something on a wire may have changed; tools look on.
+        #: Called with (pin, time in ns) whenever something on a wire may have changed, for tools.
         self.wire_listeners: list[Callable[[Pin, int], None]] = []
-        #: Those of them who take changes of simple pins in bulk where a core keeps them: called to do so.
-        self.bulk_takers: list[Callable[[], None]] = []
+        #: Tools that take changes of simple pins in bulk, where the native core keeps them: called to do so.
+        self.bulk_listeners: list[Callable[[], None]] = []
         self._pins = {
             port: tuple(self._make(port, n, bonded, five_volt_tolerant) for n in range(16)) for port in self.PORTS
         }
         self._by_name = {pin.name: pin for pins in self._pins.values() for pin in pins}
         #: Called with (pin name, drive, time in ns) at every change of the chip's own drive.
         self.on_output: Callable[[str, PinDrive, int], None] | None = None
-        #: Tells whether anybody beyond `on_silent_output` wants to hear of each output.
+        #: Whether anything beyond `on_silent_output` subscribes to each output.
         self.is_subscribed: Callable[[], bool] = lambda: self.on_output is not None
-        #: Called with the time in ns of the last output that was not told one by one.
+        #: Called with the time in ns of the last output of those that were not notified one by one.
         self.on_silent_output: Callable[[int], None] | None = None
         #: Called when AFIO has changed `remaps` or `exti_ports`.
         self.route_listeners: list[Callable[[], None]] = []
@@ -447,8 +400,8 @@ class PinBank:
         self.release_listeners: list[Callable[[Pin], None]] = []
         #: Returns which bits of a register's word the running store means, and where it stands.
         self.written_by: Callable[[int], tuple[int, int]] = lambda _address: (0, 0)
-        #: Tells whether somebody speaks to a pin in characters, not in levels.
-        self.is_fed: Callable[[Pin], bool] = lambda _pin: False
+        #: Whether a pin gets characters from a serial port, not levels.
+        self.is_serial_input: Callable[[Pin], bool] = lambda _pin: False
         #: The port that feeds each EXTI line 0 to 15 (AFIO_EXTICR); the list stays the same for ever.
         self.exti_ports: list[str] = ["A"] * 16
 
@@ -469,7 +422,7 @@ class PinBank:
         return self._pins[letter]
 
     def route_changed(self) -> None:
-        """Tell the listeners that AFIO has changed `remaps` or `exti_ports`."""
+        """Notify the listeners that AFIO has changed `remaps` or `exti_ports`."""
         for listener in self.route_listeners:
             listener()
 
@@ -481,7 +434,7 @@ class PinBank:
             self._ports.request_stop()
 
     def wire_changed(self, pin: Pin) -> None:
-        """Tell the tools that a pin's wire may have changed (called by the pin)."""
+        """Notify the tools that a pin's wire may have changed (called by the pin)."""
         now_ns = self._ports.now_ns
         for listener in self.wire_listeners:
             listener(pin, now_ns)
@@ -499,9 +452,42 @@ class PinBank:
         return tuple(p.snapshot() for p in self), tuple(self.remaps.items()), tuple(self.exti_ports)
 
     def restore(self, snapshot: tuple[tuple[PinSnapshot, ...], tuple[tuple[str, int], ...], tuple[str, ...]]) -> None:
-        """Put back what `snapshot` returned; tells nobody."""
+        """Put back what `snapshot` returned; no listener is called."""
         pins, remaps, exti_ports = snapshot
         for pin, state in zip(self, pins, strict=True):
             pin.restore(state)
         self.remaps = dict(remaps)
         self.exti_ports[:] = exti_ports
+
+
+def overvoltage(pin: "Pin", volts: float) -> str | None:
+    """Return what is wrong with a voltage on a pin; None when the pin tolerates it."""
+    if volts <= MAX_VOLTS:
+        return None
+    if not pin.is_five_volt_tolerant:
+        reason = "it bears 3.6 V at most"
+    elif pin.output.is_strong:
+        reason = "it bears 5 V only as an input"
+    elif pin.output.level is not None:
+        reason = "it bears 5 V only without its pull"
+    else:
+        return None
+    return f"{volts:g} V on {pin.name}: {reason}"
+
+
+def contention(pin: "Pin") -> str:
+    """Return the warning of two drivers against each other."""
+    outside = "high" if pin.driven else "low"
+    return f"{pin.name}: two drivers fight: the chip drives it {pin.output.value}, the other end {outside}"
+
+
+def floating_inputs(names: Sequence[str]) -> str:
+    """Return the warning of inputs that are not driven."""
+    one = len(names) == 1
+    what, they = ("floating input", "it reads") if one else ("floating inputs", "they read")
+    return f"{', '.join(names)}: {what} that nobody drives: {they} 0 here and anything on a board; configured"
+
+
+def short_circuit(pin: "Pin", rail: str) -> str:
+    """Return the warning of an output that drives against a supply rail."""
+    return f"{pin.name}: output {pin.output.value} is shorted to {rail}"

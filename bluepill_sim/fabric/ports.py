@@ -1,7 +1,7 @@
 """What a peripheral needs of the chip around it.
 
 Peripherals never import each other: they meet at pins, at IRQ lines, at the
-clocks, and at nothing else. The chip (`board.py`) implements this protocol;
+clocks, and at nothing else. The chip (`chip.py`) implements this protocol;
 the tests have a fake that passes the same contract test.
 """
 
@@ -38,7 +38,7 @@ class ChipPorts(Protocol):
         ...
 
     def clock_changed(self) -> None:
-        """Tell that `clocks` has new values: re-base cycles, and tell each peripheral's `clock_changed`."""
+        """Notify that `clocks` has new values: re-base cycles, and call each peripheral's `clock_changed`."""
         ...
 
     def request_stop(self) -> None:
@@ -46,7 +46,7 @@ class ChipPorts(Protocol):
         ...
 
     def deadline_changed(self) -> None:
-        """Tell that this peripheral's `next_deadline` may be earlier than before."""
+        """Notify that this peripheral's `next_deadline` may be earlier than before."""
         ...
 
     def reset_peripheral(self, name: str) -> None:
@@ -58,7 +58,7 @@ class ChipPorts(Protocol):
         ...
 
     def signal(self, name: str) -> None:
-        """Tell the core of a happening by name: "event" sets the event register that WFE waits for."""
+        """Signal an event to the core by name: "event" sets the event register that WFE waits for."""
         ...
 
     def warn(self, message: str, *, once: str, pc: int | None = None) -> None:

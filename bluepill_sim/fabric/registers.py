@@ -1,28 +1,22 @@
-"""The base of every peripheral: a table of registers, executed.
+"""Registers as declarations, and the base of every peripheral: a table of them, executed.
 
 This is not a bus: whether a peripheral's clock is on, bit-band, and addresses
-outside the peripherals are the business of `chip.py`. A peripheral declares
-`REGISTERS`, names in `STATE` its plain attributes beyond the registers, and
-writes methods for what a read or write *causes*.
+outside the peripherals are the business of `chip.py`.
 
-A peripheral that acts by itself keeps the time of its next action in
-`due_ns`; accesses catch up to that time first, so that a register never reads
-older than the instruction that asks.
+Theory of operation. A `Register` says which bits store, which clear, and which
+method a read or write calls. A `Peripheral` declares `REGISTERS`, names in
+`STATE` its plain attributes beyond the registers, and writes methods for what a
+read or write *causes*. The table may be executed by any other executor: nothing
+in it is Python-specific (`native/registers.py` hands it to C). A peripheral
+that acts by itself keeps the time of its next action in `due_ns`; accesses catch
+up to that time first, so that a register never reads older than the instruction
+that asks.
 
-Access width: RM0008 section 3.1: an APB bridge turns a byte or halfword write
-into a word by duplicating the data; AHB peripherals have byte lanes.
-Invariant: `words[offset // 4]` of a register without `on_read` is what reads return.
-
-A hardware register as a declaration: which bits store, which clear, which call code.
-
-This is not a register's behaviour beyond its bits: what a write *causes* is a
-method of the peripheral, named here by `on_read` and `on_write`. The table
-that a peripheral makes of these declarations is executed by `Peripheral`
-(and may be executed by any other executor: nothing here is Python-specific).
-
-Source: RM0008 section 2.1 (list of abbreviations for registers).
-Invariant: a stored word never holds a bit outside `readable`, so that the
-store of a register without `on_read` *is* what a read returns.
+Source: RM0008 section 2.1 (abbreviations for registers); 3.1: an APB bridge
+turns a byte or halfword write into a word by duplicating the data, AHB
+peripherals have byte lanes.
+Invariant: a stored word never holds a bit outside `readable`, so that
+`words[offset // 4]` of a register without `on_read` is what a read returns.
 """
 
 from array import array
@@ -117,10 +111,6 @@ def bits(*positions: int | tuple[int, int]) -> int:
     return mask
 
 
-#: A peripheral's registers and its `STATE` attributes, in declared order.
-PeripheralSnapshot: TypeAlias = tuple[tuple[int, ...], tuple[object, ...]]
-
-
 @dataclass(frozen=True, slots=True)
 class ClockBit:
     """The bit of an RCC enable register that clocks a peripheral; the reset bit has the same place."""
@@ -141,6 +131,10 @@ class Place:
     #: Interrupt lines, in the order that the peripheral's class says.
     irqs: tuple[int, ...] = ()
     size: int = 0x400
+
+
+#: A peripheral's registers and its `STATE` attributes, in declared order.
+PeripheralSnapshot: TypeAlias = tuple[tuple[int, ...], tuple[object, ...]]
 
 
 class Peripheral:
@@ -250,14 +244,14 @@ class Peripheral:
         """Act on everything due up to and including `now_ns`, in order of its time."""
 
     def clock_changed(self) -> None:
-        """Learn that the frequencies in `chip.clocks` have changed just now."""
+        """Act on a change of the frequencies in `chip.clocks`, which has just happened."""
 
     def snapshot(self) -> PeripheralSnapshot:
         """Return all that decides this peripheral's future, as plain values."""
         return tuple(self.words), (self.due_ns, *(getattr(self, name) for name in self.STATE))
 
     def restore(self, snapshot: PeripheralSnapshot) -> None:
-        """Put back what `snapshot` returned; tells nobody."""
+        """Put back what `snapshot` returned; no listener is called."""
         words, (due_ns, *state) = snapshot
         self.words[:] = array("I", words)
         self.due_ns = cast("int | None", due_ns)

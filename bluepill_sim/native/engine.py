@@ -10,7 +10,7 @@ A debugger's watchpoints and steps, and the rest of a block after a halt, are
 Python's business: for those runs the hooks are exchanged, and this is `Engine`.
 
 Invariant: `shared.is_python` tells whose hooks are in place; between runs all
-state is in `shared`, whoever ran last.
+state is in `shared`, whichever of them ran last.
 """
 
 import ctypes

@@ -75,7 +75,7 @@ class SharedPorts:
 
     def _take_pins_over(self) -> None:
         bank = self._bank
-        for take in bank.bulk_takers:
+        for take in bank.bulk_listeners:
             take()
         library().core_drop_pins(self._engine.state)
         on_output, bank.on_output = bank.on_output, None
@@ -94,12 +94,12 @@ class SharedPorts:
         if len(self._irq_listeners) != self._listener_count:
             self._listener_count = len(self._irq_listeners)
             self._engine.shared.has_irq_listeners = self._listener_count != 0
-        is_recording = bool(bank.bulk_takers)
+        is_recording = bool(bank.bulk_listeners)
         if is_recording is not self._is_recording:
             self._is_recording = is_recording
             if not library().core_record_pins(self._engine.state, is_recording):
                 raise MemoryError("no memory for a record of pins")
-        is_subscribed = bank.is_subscribed() or len(bank.wire_listeners) > len(bank.bulk_takers)
+        is_subscribed = bank.is_subscribed() or len(bank.wire_listeners) > len(bank.bulk_listeners)
         if bank.simple_is_known and is_subscribed is self._was_subscribed:
             return
         bank.simple_is_known, self._was_subscribed = True, is_subscribed

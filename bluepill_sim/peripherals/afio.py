@@ -1,7 +1,7 @@
 """AFIO: which function has which pin, and which port feeds each EXTI line.
 
 Modelled: SWJ_CFG (the debug port keeps PA13, PA14, PA15, PB3 and PB4 until it
-is told to let go), PD01_REMAP, the EXTI multiplexers; every remap field is
+is released), PD01_REMAP, the EXTI multiplexers; every remap field is
 published in `PinBank.remaps`, and honoured by the peripherals that are
 modelled. Not modelled: EVCR's event output.
 
@@ -122,7 +122,7 @@ class Afio(Peripheral):
                 pins[name].release()
 
     def _publish(self) -> None:
-        """Tell the routes to whoever uses them."""
+        """Publish the routes, and notify the peripherals that use them."""
         pins = self.chip.pins
         mapr = self.words[MAPR]
         pins.remaps = {name: mapr >> shift & mask for name, (shift, mask) in REMAP_FIELDS.items()}

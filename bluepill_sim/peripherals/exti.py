@@ -3,7 +3,7 @@
 Modelled: lines 0 to 18, both edges, software triggers, events (they set the
 event register that WFE waits for). An edge is seen without any clock, as on
 silicon. Lines 16 (PVD), 17 (RTC alarm) and 18 (USB wake-up) are driven
-through `set_line` by whoever models their source.
+through `set_line` by the model of their source.
 
 Source: RM0008 section 10.
 Invariant: an IRQ is raised exactly while one of its lines is pending and unmasked.
@@ -46,7 +46,7 @@ class Exti(Peripheral):
     def on_reset(self) -> None:
         """Drop every request."""
         self._levels = (self._levels & ~bits((15, 0))) | self._pin_levels()
-        self._tell_edges()
+        self._publish_edges()
         self._update_irqs()
 
     def set_line(self, line: int, level: bool) -> None:
@@ -78,9 +78,9 @@ class Exti(Peripheral):
             self.chip.signal("event")
 
     def _write_edges(self, _written: int, _previous: int) -> None:
-        self._tell_edges()
+        self._publish_edges()
 
-    def _tell_edges(self) -> None:
+    def _publish_edges(self) -> None:
         self.chip.pins.edge_lines = self.words[RTSR] | self.words[FTSR]
         self.chip.pins.simple_is_known = False
 

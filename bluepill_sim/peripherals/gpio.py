@@ -4,12 +4,12 @@ Modelled: all modes of CRL/CRH, pulls by ODR, open drain, atomic set/reset,
 the key sequence of LCKR. Not modelled: output speed, the two APB2 clocks of
 the input synchroniser. IDR is kept up to date by the pins, so that reading it is plain.
 
-Source: RM0008 sections 9.1 and 9.2.
-A pin that the program configures as a floating input is looked at a little
-later: somebody should drive it by then. What a program never configures floats
+A pin that the program configures as a floating input is checked a little
+later: it should be driven by then. What a program never configures floats
 unnoticed, as does what it configures by writing the reset value over a whole
-register: nothing tells whether that pin was meant.
+register: nothing shows whether that pin was intended.
 
+Source: RM0008 sections 9.1 and 9.2.
 Invariant: bit n of the stored IDR is `pins[n].input`.
 """
 
@@ -26,7 +26,7 @@ _CR_RESET = 0x4444_4444
 #: CNF[1:0] MODE[1:0] of a pin after reset.
 _FLOATING_NIBBLE = 0x4
 
-#: chosen: so long after its configuration a wire may still come.
+#: chosen: how long after its configuration a wire may still come.
 SETTLING_NS = 1_000_000
 
 _INPUT_MODES = (PinMode.ANALOG, PinMode.FLOATING, PinMode.PULLED, PinMode.FLOATING)
@@ -38,7 +38,7 @@ PIN_MODES = tuple((_OUTPUT_MODES if nibble & 3 else _INPUT_MODES)[nibble >> 2] f
 class Gpio(Peripheral):
     """One general-purpose I/O port; the last letter of its name is the port's."""
 
-    STATE = ("_lock_writes", "_locked", "_meant", "_warned")
+    STATE = ("_lock_writes", "_locked", "_intended", "_warned")
     REGISTERS = (
         Register(name="CRL", offset=0x00, reset=_CR_RESET, on_write="_write_crl"),
         Register(name="CRH", offset=0x04, reset=_CR_RESET, on_write="_write_crh"),
@@ -59,8 +59,8 @@ class Gpio(Peripheral):
         #: Pins whose configuration is frozen until reset.
         self._locked = 0
         #: Pins that the program has made floating inputs on purpose, and where: (number, address of the store).
-        self._meant: tuple[tuple[int, int], ...] = ()
-        #: Pins that were told of as floating.
+        self._intended: tuple[tuple[int, int], ...] = ()
+        #: Pins that were warned of as floating.
         self._warned = 0
         chip.pins.release_listeners.append(self._released)
         for pin in self._pins:
@@ -71,7 +71,7 @@ class Gpio(Peripheral):
         """Make every pin a floating input and undo the lock."""
         self._lock_writes = ()
         self._locked = 0
-        self._meant = ()
+        self._intended = ()
         for pin in self._pins:
             pin.configure(PinMode.FLOATING, output_bit=False)
             self._input_changed(pin)
@@ -98,7 +98,7 @@ class Gpio(Peripheral):
             number = first + position
             nibble = self.words[register] >> (4 * position) & 0xF
             if (changed | forced) & nibble_mask:
-                self._mean(number, pc, is_floating=nibble == _FLOATING_NIBBLE)
+                self._note_intent(number, pc, is_floating=nibble == _FLOATING_NIBBLE)
             if not changed & nibble_mask:
                 continue
             if self._locked >> number & 1:
@@ -113,31 +113,31 @@ class Gpio(Peripheral):
                 )
             pin.configure(PIN_MODES[nibble], bool(self.words[ODR] >> number & 1))
 
-    def _mean(self, number: int, pc: int, *, is_floating: bool) -> None:
-        """Note whether a pin is meant as a floating input."""
-        others = tuple(pair for pair in self._meant if pair[0] != number)
+    def _note_intent(self, number: int, pc: int, *, is_floating: bool) -> None:
+        """Note whether a pin is intended as a floating input."""
+        others = tuple(pair for pair in self._intended if pair[0] != number)
         if is_floating and not self._locked >> number & 1:
-            self._meant = (*others, (number, pc))
-            self._look_later()
+            self._intended = (*others, (number, pc))
+            self._check_later()
         else:
-            self._meant = others
+            self._intended = others
 
     def _released(self, pin: Pin) -> None:
-        """Look again at an input that nobody drives any more."""
-        if pin.port == self.name[-1] and any(number == pin.number for number, _ in self._meant):
-            self._look_later()
+        """Check again an input that is no longer driven."""
+        if pin.port == self.name[-1] and any(number == pin.number for number, _ in self._intended):
+            self._check_later()
 
-    def _look_later(self) -> None:
+    def _check_later(self) -> None:
         self.due_ns = self.chip.now_ns + SETTLING_NS
         self.chip.deadline_changed()
 
     def advance_to(self, now_ns: int) -> None:
-        """Warn of the inputs that are meant and float."""
+        """Warn of the intended inputs that float."""
         if self.due_ns is None or now_ns < self.due_ns:
             return
         self.due_ns = None
-        floating = [(self._pins[n], pc) for n, pc in sorted(self._meant) if not self._warned >> n & 1]
-        floating = [(p, pc) for p, pc in floating if _is_lost(p) and not self.chip.pins.is_fed(p)]
+        floating = [(self._pins[n], pc) for n, pc in sorted(self._intended) if not self._warned >> n & 1]
+        floating = [(p, pc) for p, pc in floating if _is_lost(p) and not self.chip.pins.is_serial_input(p)]
         if floating:
             self._warned |= sum(1 << pin.number for pin, _ in floating)
             names = [pin.name for pin, _ in floating]

@@ -3,7 +3,7 @@
 Theory of operation. DR hides two registers each way. A write fills TDR
 (TXE falls); as soon as the shift register is free it takes TDR over (TXE
 rises) and sends start, data, stop; at the end of the stop bit the character is
-told to `on_transmit`, and the next one follows without a gap, or TC rises.
+notified to `on_transmit`, and the next one follows without a gap, or TC rises.
 Switching TE on sends one idle character first. A received character is in DR
 when its stop bit has ended; one that finds RXNE still set is lost and raises
 ORE; a line that then stays idle for one character raises IDLE.
@@ -117,7 +117,7 @@ class Usart(Peripheral):
         super().__init__(chip, place)
         #: Called with (word, time in ns) at the end of each stop bit that goes out.
         self.on_transmit: Callable[[int, int], None] | None = None
-        #: Tells whether anybody wants each of these calls at its own time; else they may come later, together.
+        #: Whether a listener needs each of these calls at its own time; else they may come later, together.
         self.is_subscribed: Callable[[], bool] = lambda: self.on_transmit is not None
         self._source = f"{place.name}_TX"
         self._pins = PINS[place.name]
@@ -144,10 +144,10 @@ class Usart(Peripheral):
         self._idle_due_ns = None
         self._schedule()
 
-    # For a core that ends the characters of a transmission by itself.
+    # For the native core, which ends the characters of a transmission by itself.
 
     def can_stream(self) -> bool:
-        """Whether all that goes on here is characters going out, heard by nobody at their own time."""
+        """Whether all that goes on here is characters going out, with no listener that needs each at its time."""
         words = self.words
         return (
             self._tx_due_ns is not None
@@ -161,7 +161,7 @@ class Usart(Peripheral):
         )
 
     def give_stream(self) -> tuple[int, int, int, int]:
-        """Give the transmission away; `due_ns` is None until it comes back.
+        """Hand the transmission over; `due_ns` is None until it comes back.
 
         Returns:
             Start of the run of characters in ns, half-bits from there to the
@@ -176,7 +176,7 @@ class Usart(Peripheral):
         self._schedule()
 
     def report_sent(self, words: list[tuple[int, int]]) -> None:
-        """Tell of characters (word, ns) that have gone out meanwhile."""
+        """Notify characters (word, ns) that have gone out meanwhile."""
         for word, at_ns in words:
             self._emit(word, at_ns)
 

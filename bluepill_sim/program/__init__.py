@@ -1,1 +1,1 @@
-"""What a firmware file says of itself: image, symbols, lines, functions, basic blocks."""
+"""What a firmware file contains: image, symbols, lines, functions, basic blocks."""

@@ -1,4 +1,4 @@
-"""What a firmware's ELF file says of itself: sections, symbols, vectors, stack.
+"""What a firmware's ELF file contains: sections, symbols, vectors, stack.
 
 Not what is loaded (`image.py`) and not its lines (`line_table.py`).
 Invariant: works on any image; what its file does not tell is simply missing.

@@ -10,7 +10,7 @@ from bluepill_sim.stm32f103 import FLASH_BASE, FLASH_BYTES_FITTED, SRAM_BASE, SR
 
 #: chosen: so far the last symbol reaches, where the file does not say.
 _LAST_REACH_BYTES = 0x1000
-#: What is said of code that no symbol covers.
+#: The name of code that no symbol covers.
 UNKNOWN = "(unknown)"
 
 

@@ -20,7 +20,7 @@ _LEAVING = frozenset({
 #: Instructions that end a block and go on after it.
 _SLEEPING = frozenset({Kind.WAIT_INTERRUPT, Kind.WAIT_EVENT})
 #: chosen: longer than any real block; code that never branches is no code.
-_MOST_INSTRUCTIONS = 1024
+_MAX_INSTRUCTIONS = 1024
 _FIRST_WIDE = 0xE800
 
 
@@ -100,7 +100,7 @@ class StaticCode:
         last = Instruction(start, 2, Kind.PLAIN)
         word = 0
         is_in_it = False
-        for _ in range(_MOST_INSTRUCTIONS):
+        for _ in range(_MAX_INSTRUCTIONS):
             code = self._memory.read(at, 4) or self._memory.read(at, 2)
             if code is None:
                 break

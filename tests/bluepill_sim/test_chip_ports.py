@@ -96,7 +96,7 @@ def test_a_deadline_that_moves_is_met_to_the_nanosecond(ports: Ports) -> None:
     assert seen[0] == start_ns + 85_000
 
 
-def test_a_changed_clock_is_told_to_every_peripheral(ports: Ports) -> None:
+def test_a_changed_clock_is_notified_to_every_peripheral(ports: Ports) -> None:
     chip = ports.chip
     told: list[str] = []
     for part in chip.parts.by_name.values():

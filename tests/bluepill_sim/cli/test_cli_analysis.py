@@ -128,7 +128,7 @@ def test_a_program_that_takes_too_long_is_given_up(tmp_path: Path, capfd: pytest
     assert "the last 32 blocks" in error
 
 
-def test_a_program_that_sleeps_for_good_is_told_of(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+def test_a_program_that_sleeps_for_good_is_reported(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
     image = tmp_path / "sleeps.bin"
     image.write_bytes(bytes.fromhex("00500020 09000008 72b630bffde7"))  # cpsid i; wfi; b back to it
     assert run(["mcu", "run", str(image), "--for", "1s"]) == 0

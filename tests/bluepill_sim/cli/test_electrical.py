@@ -30,7 +30,7 @@ def ports() -> Ports:
     return Ports()
 
 
-def test_two_drivers_that_differ_are_told_of(ports: Ports) -> None:
+def test_two_drivers_that_differ_are_reported(ports: Ports) -> None:
     pin = make_pins(ports)["PB12"]
     pin.drive(0)
     pin.configure(PinMode.PUSH_PULL, output_bit=False)
@@ -49,7 +49,7 @@ def test_an_open_drain_and_a_pull_fight_nobody(ports: Ports) -> None:
 
 
 @pytest.mark.parametrize(("rail", "bit", "word"), [("GND", True, "high"), ("3V3", False, "low")])
-def test_a_shorted_output_is_told_of(ports: Ports, rail: str, bit: bool, word: str) -> None:
+def test_a_shorted_output_is_reported(ports: Ports, rail: str, bit: bool, word: str) -> None:
     pin = make_pins(ports)["PA4"]
     pin.configure(PinMode.PUSH_PULL, output_bit=not bit)
     pin.short(rail)
@@ -79,7 +79,7 @@ def test_a_rail_that_is_not_there_is_refused(ports: Ports) -> None:
         ("PB10", PinMode.PUSH_PULL, True, "5 V on PB10: it bears 5 V only as an input"),
     ],
 )
-def test_five_volts_are_told_of_where_they_hurt(
+def test_five_volts_are_reported_where_they_hurt(
     ports: Ports, name: str, mode: PinMode, bit: bool, complaint: str | None
 ) -> None:
     pin = make_pins(ports)[name]
@@ -145,7 +145,7 @@ b sleep
 """
 
 
-def test_a_pin_that_still_belongs_to_jtag_is_told_of_on_the_command_line(
+def test_a_pin_that_still_belongs_to_jtag_is_reported_on_the_command_line(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     image = tmp_path / "jtag.bin"

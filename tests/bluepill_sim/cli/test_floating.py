@@ -37,12 +37,12 @@ def wired(program: str, wires: Iterable[str], *, until_ms: int = 60) -> BluePill
 
 
 @pytest.mark.parametrize("program", PROGRAMS)
-def test_a_program_whose_inputs_are_wired_is_not_told_of(program: str) -> None:
+def test_a_program_whose_inputs_are_wired_is_not_warned_of(program: str) -> None:
     assert wired(program, INPUTS).warnings == []
 
 
 @pytest.mark.parametrize("program", ["motors", "sensors", "encoders", "dodge"])
-def test_a_forgotten_wire_is_told_of_once_with_its_place(program: str) -> None:
+def test_a_forgotten_wire_is_reported_once_with_its_place(program: str) -> None:
     board = wired(program, [pin for pin in INPUTS if pin != "PA6"])
     (text,) = board.warnings
     assert text.startswith("PA6: floating input that nobody drives: it reads 0 here and anything on a board; ")
@@ -56,7 +56,7 @@ def test_pins_that_float_together_share_a_line() -> None:
     ]  # fmt: skip
 
 
-def test_a_wire_that_goes_away_is_told_of_a_millisecond_later() -> None:
+def test_a_wire_that_goes_away_is_reported_a_millisecond_later() -> None:
     board = wired("sensors", INPUTS)
     board.pin("PA6").drive(1)
     board.pin("PA6").drive(None)
@@ -78,7 +78,7 @@ def test_a_wire_that_comes_in_time_is_enough() -> None:
     assert board.warnings == []
 
 
-def test_a_forked_board_is_told_what_the_whole_run_is_told() -> None:
+def test_a_forked_board_warns_of_what_the_whole_run_warns_of() -> None:
     half, whole = wired("sensors", [], until_ms=1), wired("sensors", [])
     other = BluePill(PROGRAMS["sensors"])
     other.restore(half.snapshot())

@@ -62,7 +62,7 @@ def test_expect_ends_at_the_stop_bit_of_the_last_character(board: BluePill) -> N
     assert board.now_ns - sent[-1][1] < 10_000
 
 
-def test_what_does_not_come_is_told_with_the_place(board: BluePill) -> None:
+def test_what_does_not_come_is_reported_with_the_place(board: BluePill) -> None:
     with pytest.raises(
         WaitError, match=r"did not send b'nothing' within 0.01 s; it sent b'.*ready\\n'; t = 0.01.* asleep"
     ):

@@ -74,7 +74,7 @@ def test_a_branch_to_itself_is_kept_once_and_again_after_an_interrupt(core: str,
     ]
 
 
-def test_who_records_from_the_middle_of_a_branch_to_itself_is_told_of_it(core: str, boot) -> None:
+def test_a_recorder_attached_within_a_branch_to_itself_gets_its_row(core: str, boot) -> None:
     machine = boot("spin: b spin").run(50)
     before = machine.board.last_rows
     recorder = machine.board.chip.record_blocks(100)

@@ -101,9 +101,9 @@ def test_a_snapshot_keeps_programs_in_sram_and_in_flash(boot) -> None:
     ).run(50)  # fmt: skip
     snapshot = machine.board.snapshot()
     for _ in range(2):
-        machine.board._live.signal("event")
+        machine.board.chip.signal("event")
         assert machine.run(50).log == [1, 2]
-        machine.board._live.memory.load_flash(0x9000, b"\0\0")
+        machine.board.chip.memory.load_flash(0x9000, b"\0\0")
         machine.board.restore(snapshot)
         assert machine.log == [1]
     assert machine.board.read_memory(0x0800_9000, 2) == b"\xff\xff"
@@ -134,7 +134,7 @@ def test_strict_mode_raises_at_the_first_warning(boot, access: str) -> None:
     assert error.value.exit_code == 1
 
 
-def test_warnings_are_told_once_as_they_come(boot) -> None:
+def test_warnings_are_reported_once_as_they_come(boot) -> None:
     machine = boot("movs r4, #3\nloop: " + store(0x40012C00, 1) + "subs r4, #1\nbne loop")
     told = []
     machine.board.on_warning = told.append

@@ -208,7 +208,7 @@ def test_a_step_over_a_watched_access_tells_of_it(boot) -> None:
     assert machine.board.chip.step(MS).halt == Halt(HaltKind.STEP, machine.label("w") + 4)
 
 
-def test_a_watched_access_that_ends_the_block_by_itself_is_told_of_too(boot) -> None:
+def test_a_watched_access_that_ends_the_block_by_itself_is_reported_too(boot) -> None:
     """POP {PC} of an exception return reads the watched word, then leaves the handler."""
     machine = boot("svc #0\nback: nop\nb stop\ncall: push {lr}\nnop\npop {pc}", {11: "call"})
     board = machine.board

@@ -199,7 +199,7 @@ def test_an_it_block_across_a_page_boundary_survives_stops_and_interrupts(boot, 
 
 def test_an_interrupt_line_that_stays_high_interrupts_again(boot) -> None:
     machine = boot(store(ISER0, 1 << 6) + "loop: b loop\nirq: log #1\nbx lr", {16 + 6: "irq"})
-    chip = machine.board._live
+    chip = machine.board.chip
     machine.run(10)
     chip.set_irq(6, True)
     machine.run(30)

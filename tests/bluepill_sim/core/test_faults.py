@@ -61,7 +61,7 @@ def test_a_fault_without_a_handler_is_a_hard_fault_that_names_its_place(
     assert not report.is_lockup
     assert dict(report.registers)["PC"] == expected_pc
     row = FAULT_ROWS[kind]
-    core = machine.board._live.processor
+    core = machine.board.chip.processor
     assert core.cfsr == row.cfsr
     assert core.hfsr == (row.hfsr or FORCED)
 
@@ -205,7 +205,7 @@ def test_an_enabled_bus_fault_handler_gets_a_stacking_error(boot) -> None:
 def test_a_return_from_a_stack_outside_memory_faults(boot) -> None:
     machine = boot("svc #0\nb stop\nhandler: mov32 r1, #0x20004FF8\nmov sp, r1\nbx lr", {11: "handler"}).run(100)
     assert (machine.board.fault.kind, machine.board.fault.address) == (FaultKind.UNSTACKING, 0x20004FF8)
-    core = machine.board._live.processor
+    core = machine.board.chip.processor
     assert core.cfsr & FAULT_ROWS[FaultKind.UNSTACKING].cfsr
 
 

@@ -7,9 +7,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from bluepill_sim.debug.machine import LoneChip, StopKind
 from bluepill_sim.debug.execution import Execution
 from bluepill_sim.debug.gdb_session import GdbSession
+from bluepill_sim.debug.machine import LoneChip, StopKind
 
 LOOP = (
     "movs r0, #0\nloop: adds r0, #1\nbl work\ncmp r0, #50\nbne loop\nb stop\nwork: adds r6, #2\nstr r0, [r7, #0]\nbx lr"
@@ -253,7 +253,7 @@ def test_a_fault_stops_in_its_handler(debug) -> None:
     assert gdb.monitor("fault") == "no fault\n"
 
 
-def test_a_lockup_is_told_of_each_time(debug) -> None:
+def test_a_lockup_is_reported_each_time(debug) -> None:
     gdb = debug("mov32 r1, #0x60000000\nldr r0, [r1, #0]", {3: 0x1000_0001})
     assert gdb("c") == "T0bthread:1;"
     assert gdb("c") == "T0bthread:1;"
@@ -330,7 +330,7 @@ def test_any_payload_is_answered(debug) -> None:
     ask()
 
 
-def test_the_kinds_of_stops_are_all_told_of() -> None:
+def test_the_kinds_of_stops_are_all_reported() -> None:
     assert {kind.value for kind in StopKind} == {
         "breakpoint", "watchpoint", "step", "interrupt", "bkpt", "fault", "exit", "end", "begin",
     }  # fmt: skip

@@ -9,7 +9,7 @@ CALLS = "movs r5, #3\nloop: bl work\nsubs r5, #1\nbne loop\nb stop\nwork: bx lr"
 MS = 1_000_000
 
 
-def test_each_block_is_told_of_with_the_cycle_of_its_start(boot) -> None:
+def test_each_block_is_reported_with_the_cycle_of_its_start(boot) -> None:
     machine = boot(CALLS)
     recorder = machine.board.chip.record_blocks(100)
     machine.board.advance_to(MS)
@@ -24,7 +24,7 @@ def test_each_block_is_told_of_with_the_cycle_of_its_start(boot) -> None:
     assert recorder.drain() == []
 
 
-def test_exceptions_are_told_of_with_the_place_they_interrupt(boot) -> None:
+def test_exceptions_are_reported_with_the_place_they_interrupt(boot) -> None:
     machine = boot(SYSTICK + "movs r3, #0\nloop: adds r3, #1\nb loop\ntick: adds r6, #1\nbx lr", {15: "tick"})
     recorder = machine.board.chip.record_blocks(10_000)
     machine.run(120)

@@ -20,7 +20,7 @@ def store(address: int, value: int) -> str:
 
 def test_a_reset_at_full_speed_is_nothing_to_warn_of() -> None:
     board = BluePill(str(files("robot_bench.firmware") / "dodge.elf"))
-    board.chip.pins.is_fed = lambda _pin: True
+    board.chip.pins.is_serial_input = lambda _pin: True
     board.run_for("10 ms")
     assert board.hclk_hz == 72_000_000
     board.reset()

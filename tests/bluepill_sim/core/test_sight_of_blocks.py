@@ -6,6 +6,12 @@ from xml.etree import ElementTree as ET
 
 import pytest
 
+from bluepill_sim.analysis.coverage import Coverage
+from bluepill_sim.analysis.cycle_profile import ASLEEP, CycleProfile
+from bluepill_sim.analysis.flame_graph import flame_svg
+from bluepill_sim.analysis.latency import Latency
+from bluepill_sim.analysis.observation import BlockWalk, Observation
+from bluepill_sim.analysis.stack import StackGauge
 from bluepill_sim.board import BluePill
 from bluepill_sim.core import BLOCK, EXCEPTION_RETURN
 from bluepill_sim.program.functions import UNKNOWN, FunctionTable
@@ -13,13 +19,6 @@ from bluepill_sim.program.image import SymbolTable
 from bluepill_sim.program.last_blocks import lines_of
 from bluepill_sim.program.line_table import LineTable
 from bluepill_sim.program.static_code import StaticCode
-from bluepill_sim.analysis.coverage import Coverage
-from bluepill_sim.analysis.cycle_profile import ASLEEP, CycleProfile
-from bluepill_sim.analysis.flame import flame_svg
-from bluepill_sim.analysis.latency import Latency
-from bluepill_sim.analysis.observation import Observation
-from bluepill_sim.analysis.stack import StackGauge
-from bluepill_sim.analysis.walk import Walk
 from bluepill_sim.timing import NS_PER_MS
 
 SYSTICK = "mov32 r1, #0xE000E010\nmov32 r2, #799\nstr r2, [r1, #4]\nstr r2, [r1, #8]\nmovs r2, #7\nstr r2, [r1, #0]\n"
@@ -133,7 +132,7 @@ def test_a_walk_tells_blocks_with_what_follows() -> None:
         def leave(self, *words) -> None:
             told.append(("leave", *words))
 
-    walk = Walk([Ear()])
+    walk = BlockWalk([Ear()])
     walk.take([(0, 10, BLOCK), (5, 20, BLOCK), (9, 24, 15), (21, 50, BLOCK), (30, 24, EXCEPTION_RETURN)])
     walk.take([(42, 24, BLOCK)])
     walk.finish(50)

@@ -56,7 +56,7 @@ def test_basepri_holds_back_the_wakening_by_wfi(boot) -> None:
 
 def test_a_disabled_interrupt_does_not_wake_wfi(boot) -> None:
     machine = boot("wfi\nlog #1\nb stop").run(50)
-    machine.board._live.set_irq(6, True)
+    machine.board.chip.set_irq(6, True)
     assert machine.run(50).log == []
 
 
@@ -76,8 +76,8 @@ def test_wfe_falls_through_once_after_sev(boot) -> None:
     machine = boot("sev\nwfe\nlog #1\nwfe\nlog #2\nb stop").run(50)
     assert machine.log == [1]
     assert machine.board.is_asleep
-    machine.board._live.signal("event")
-    machine.board._live.signal("something else")
+    machine.board.chip.signal("event")
+    machine.board.chip.signal("something else")
     assert machine.run(50).log == [1, 2]
 
 

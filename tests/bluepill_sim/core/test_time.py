@@ -134,7 +134,7 @@ def test_an_edge_is_stamped_with_the_time_of_its_instruction(boot) -> None:
     assert low - high == 6 * CYCLE_NS
 
 
-def test_the_first_handler_instruction_comes_twelve_cycles_after_the_border(boot) -> None:
+def test_the_first_handler_instruction_comes_twelve_cycles_after_the_boundary(boot) -> None:
     """SysTick wraps at a known cycle while the core sleeps: entry takes 12 cycles, movs 1, then the edge."""
     machine = boot(
         PORT_A + "mov32 r1, #0x40010810\nmovs r2, #1\n" + "mov32 r4, #0xE000E010\nmov32 r5, #999\nstr r5, [r4, #4]\n"
@@ -142,7 +142,7 @@ def test_the_first_handler_instruction_comes_twelve_cycles_after_the_border(boot
         {15: "tick"},
     ).run(10)  # fmt: skip
     assert machine.board.is_asleep
-    tick = machine.board._live.processor.systick.next_cycle
+    tick = machine.board.chip.processor.systick.next_cycle
     machine.run(500)
     (edge,) = [at for name, drive, at in machine.edges if drive == "high"]
     assert edge == (tick + 12 + 1) * CYCLE_NS

@@ -3,7 +3,7 @@
 from hypothesis import given
 from hypothesis import strategies as st
 
-from bluepill_sim.debug.packets import MOST_BYTES, Mark, Packet, PacketReader, checksum, frame, unescape
+from bluepill_sim.debug.packets import MAX_BYTES, Mark, Packet, PacketReader, checksum, frame, unescape
 
 
 @given(st.lists(st.binary(max_size=40), max_size=6), st.data())
@@ -43,7 +43,7 @@ def test_marks_stand_between_packets() -> None:
 
 
 def test_a_packet_that_is_too_long_is_refused_and_takes_no_memory() -> None:
-    payload = b"A" * (MOST_BYTES + 1)
+    payload = b"A" * (MAX_BYTES + 1)
     assert PacketReader().receive(b"$" + payload + b"#%02x" % checksum(payload)) == [Mark.DAMAGED]
 
 

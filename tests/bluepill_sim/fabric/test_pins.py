@@ -138,7 +138,7 @@ def test_an_alternate_function_drives_only_in_alternate_mode(bank: PinBank) -> N
     assert pin.carries("TIM")
 
 
-def test_every_change_of_the_own_drive_is_told_once_with_its_time(bank: PinBank, ports: Ports) -> None:
+def test_every_change_of_the_own_drive_is_notified_once_with_its_time(bank: PinBank, ports: Ports) -> None:
     told: list[tuple[str, PinDrive, int]] = []
     bank.on_output = lambda *change: told.append(change)
     pin = bank["PA1"]

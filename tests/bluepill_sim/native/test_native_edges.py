@@ -7,11 +7,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from bluepill_sim.errors import BluePillError
-from bluepill_sim.native.library import library_path
 from bluepill_sim.analysis.edge_log import NativeEdgeLog, PythonEdgeLog
 from bluepill_sim.analysis.probe import Probe
 from bluepill_sim.analysis.vcd import write_vcd
+from bluepill_sim.errors import BluePillError
+from bluepill_sim.native.library import library_path
 from tests.bluepill_sim.core.conftest import Machine
 
 pytestmark = pytest.mark.skipif(library_path() is None, reason="the native core is not built: no C compiler")
@@ -124,7 +124,7 @@ def test_a_dump_that_cannot_be_written_is_one_line(core: str, tmp_path: Path) ->
 
 
 @pytest.mark.skipif(not os.access("/dev/full", os.W_OK), reason="no /dev/full here")
-def test_a_full_disk_is_told_from_c_too() -> None:
+def test_a_full_disk_is_reported_from_c_too() -> None:
     probe, _ = recording(program([(BSRR, 1, "r6"), (BRR, 1, "r6")], 200), "native")
     with pytest.raises(BluePillError, match="No space left on device"):
         write_vcd(probe, Path("/dev/full"))

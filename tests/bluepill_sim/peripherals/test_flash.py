@@ -39,7 +39,7 @@ def unlocked(fake_chip: Any) -> Any:
     return fake_chip
 
 
-def test_wait_states_and_prefetch_are_told_to_the_cpu(fake_chip: Any) -> None:
+def test_wait_states_and_prefetch_are_notified_to_the_cpu(fake_chip: Any) -> None:
     assert fake_chip.read("FLASH.ACR") == 0x30
     changes = fake_chip.clock_changes
     fake_chip.write("FLASH.ACR", 0x02)
