@@ -124,7 +124,7 @@ def test_the_same_wall_stalls_it_at_the_same_place(engine: str) -> None:
 
 
 @pytest.mark.parametrize("engine", each_body("kinematic"))
-def test_the_sonar_hear_the_same_after_a_way_through_the_room(engine: str) -> None:
+def test_the_sonar_measure_the_same_after_a_way_through_the_room(engine: str) -> None:
     exact, body = (make_body(name, load_world("room"), P2DX) for name in ("kinematic", engine))
     for each in (exact, body):
         each.reset(Pose(-1.0, 0.0, 0.4), 0)

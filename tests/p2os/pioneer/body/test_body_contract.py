@@ -145,7 +145,7 @@ def test_an_obstacle_below_the_ring_gives_no_echo(make: Maker) -> None:
 
 @pytest.mark.parametrize("engine", each_body("kinematic"))
 @pytest.mark.parametrize("name", ["room", "corridor", "arena"])
-def test_the_bodies_agree_on_what_the_ring_hears_and_what_is_near(name: str, engine: str) -> None:
+def test_the_bodies_agree_on_what_the_ring_measures_and_what_is_near(name: str, engine: str) -> None:
     bodies = [make_body(one, load_world(name, 5), P2DX) for one in ("kinematic", engine)]
     for turn in range(6):
         for body in bodies:
@@ -177,7 +177,7 @@ def test_to_look_changes_nothing(make: Maker) -> None:
     assert seen.state == unseen.state
 
 
-def test_the_plan_view_says_what_it_leaves_out() -> None:
+def test_the_plan_view_notes_what_it_leaves_out() -> None:
     assert "slopes are flat" in str(make_body("kinematic", load_world("ramp"), P2DX).note)
     assert make_body("kinematic", load_world("room"), P2DX).note is None
 

@@ -42,7 +42,7 @@ def box(name: str = "box", x: float = 1.0, **fields: float | bool) -> Obstacle:
     return Obstacle(name=name, x_m=x, y_m=0.0, length_m=0.3, width_m=0.3, **fields)  # type: ignore[arg-type]  # mixed fields
 
 
-def test_a_light_thing_is_pushed_and_says_where_it_is(make: Maker) -> None:
+def test_a_light_thing_is_pushed_and_reports_where_it_is(make: Maker) -> None:
     body = make(world_of(box(mass_kg=1.0, friction=0.3)))
     assert body.take_moved() == []
     state = drive(body, 0.2, 0.2, 6.0)
@@ -110,7 +110,7 @@ def test_a_low_thing_between_the_wheels_is_driven_over(make: Maker) -> None:
     assert drive(body, 0.3, 0.3, 2.0).x_m == pytest.approx(0.6, abs=0.06)
 
 
-def test_a_mesh_is_met_and_heard_and_its_floor_is_not(make: Maker) -> None:
+def test_a_mesh_is_met_and_echoes_and_its_floor_does_not(make: Maker) -> None:
     body = make(world_of(meshes=(ROOM,)))
     assert body.clearance() == pytest.approx(2.0 - 0.26, abs=0.002)
     # The ray nearest to the axis of sonar 0 (90 degrees) meets the wall squarely.
@@ -126,7 +126,7 @@ def test_a_mesh_is_met_and_heard_and_its_floor_is_not(make: Maker) -> None:
         body.place(Obstacle(name="room", x_m=1, y_m=1, radius_m=0.1))
 
 
-def test_many_fixed_boxes_are_met_and_heard_as_single_ones_are(make: Maker) -> None:
+def test_many_fixed_boxes_are_met_and_echo_as_single_ones_are(make: Maker) -> None:
     def ring(fixed: bool) -> list[Obstacle]:
         return [
             Obstacle(
@@ -181,7 +181,7 @@ def test_a_reset_puts_walkers_and_pushed_things_back(make: Maker) -> None:
     assert body.clearance() == pytest.approx(0.85 - FRONT_M, abs=0.002)
 
 
-def test_an_echo_tells_how_squarely_it_was_met(make: Maker) -> None:
+def test_an_echo_has_how_squarely_it_was_met(make: Maker) -> None:
     turned = Obstacle(name="w", x_m=2.0, y_m=0.0, heading_rad=math.pi / 3, length_m=3.0, width_m=0.1)
     body = make(world_of(turned))
     (rays,) = body.echoes([3])

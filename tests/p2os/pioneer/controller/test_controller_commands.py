@@ -233,7 +233,7 @@ def test_a_compass_reads_clockwise_from_the_worlds_x_axis(robot: Any) -> None:
     assert [frame.kind for frame in robot.frames()].count(0xC0) == 1
 
 
-def test_a_reset_leaves_the_robot_deaf_until_it_says_so(make_robot: MakeRobot) -> None:
+def test_after_a_reset_the_robot_receives_nothing_until_its_notice(make_robot: MakeRobot) -> None:
     robot = make_robot(lenient=True).open()
     robot.say(C.VEL, 200)
     robot.run(500)

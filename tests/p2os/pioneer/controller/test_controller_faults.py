@@ -64,7 +64,7 @@ def test_words_that_mean_nothing_change_nothing(robot: Any, text: str) -> None:
 
 
 @pytest.mark.parametrize(("fault", "expected"), [("stuck", (1.2, 1.2)), ("dead", (5.0, 5.0)), ("noisy", (0.1, 5.0))])
-def test_a_broken_sonar_says_so_and_the_others_do_not(fault: str, expected: tuple[float, float]) -> None:
+def test_an_injected_sonar_fault_shows_and_the_others_do_not_err(fault: str, expected: tuple[float, float]) -> None:
     value = {"stuck": 1.2, "dead": 0.0, "noisy": 0.3}[fault]
     heard = [
         measure_ranges(Walls(), (0, 1), P2DX, IDEAL.sonar, {1: (fault, value)}, RandomSource(seed))
@@ -121,7 +121,7 @@ def test_wheels_of_another_size_and_drift_show_in_the_odometry_alone(make_robot:
     assert drive(errors=REALISTIC, seed=4) != (believed_mm, heading)
 
 
-def test_the_battery_drains_sags_and_is_told_low(make_robot: MakeRobot) -> None:
+def test_the_battery_drains_sags_and_is_reported_low(make_robot: MakeRobot) -> None:
     robot = make_robot(battery_decivolts=112, errors=REALISTIC).open()
     assert "battery low" not in robot.told()
     robot.say(C.VEL, 500)
@@ -185,7 +185,7 @@ def test_a_robot_with_every_error_goes_on_from_a_snapshot_byte_for_byte(make_rob
 # Files ------------------------------------------------------------------------------------
 
 
-def test_a_flash_file_sets_what_config_tells_and_the_robot_does(make_robot: MakeRobot, tmp_path: Path) -> None:
+def test_a_flash_file_sets_what_config_reports_and_the_robot_does(make_robot: MakeRobot, tmp_path: Path) -> None:
     path = tmp_path / "wilma.toml"
     path.write_text('[flash]\nname = "Wilma"\nsipcycle = 50\nwatchdog = 500\ntransvelmax = 300\n')
     settings = make_robot().pioneer.settings.with_flash(load_flash(path))
@@ -229,7 +229,7 @@ def test_a_wrong_flash_file_is_refused_with_its_name(tmp_path: Path, text: str, 
     assert "wrong.toml" in str(caught.value)
 
 
-def test_a_flash_file_that_is_not_there_is_told(tmp_path: Path) -> None:
+def test_a_flash_file_that_is_not_there_is_reported(tmp_path: Path) -> None:
     with pytest.raises(FlashError, match="cannot read"):
         load_flash(tmp_path / "none.toml")
     assert Flash().baud() == 9600

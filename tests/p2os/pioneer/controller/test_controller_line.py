@@ -33,7 +33,7 @@ def gaps(times: list[int]) -> set[int]:
     return {later - earlier for earlier, later in pairwise(times)}
 
 
-def test_a_line_that_keeps_up_carries_a_packet_a_cycle_and_tells_its_load(make_robot: MakeRobot) -> None:
+def test_a_line_that_keeps_up_carries_a_packet_a_cycle_and_reports_its_load(make_robot: MakeRobot) -> None:
     robot = make_robot(baud=9600).open()
     robot.run(500)
     assert gaps(sip_times(robot, 1000)) == {100}

@@ -22,7 +22,7 @@ def test_a_standing_robots_packet_has_the_shape_of_the_captured_one(robot: Any) 
     assert different <= {11, 20, 23, 28, 29, 30}
 
 
-def test_a_moving_robot_says_so(robot: Any) -> None:
+def test_a_moving_robot_reports_it(robot: Any) -> None:
     robot.open()
     assert robot.sip().kind == STANDING
     robot.say(C.RVEL, 10)

@@ -18,7 +18,7 @@ from p2os.timing import NS_PER_MS, NS_PER_S, NS_PER_US
 MakeRobot = Callable[..., Any]
 
 
-def test_a_robot_answers_the_three_syncs_and_says_who_it_is(robot: Any) -> None:
+def test_a_robot_answers_the_three_syncs_and_identifies_itself(robot: Any) -> None:
     for number in (0, 1):
         robot.say(number)
         assert [frame.payload for frame in robot.frames()] == [bytes([number])]
@@ -53,7 +53,7 @@ def test_packets_flow_every_cycle_from_open(robot: Any, argument: int | None) ->
     assert robot.told() == ["synchronised", "opened"]
 
 
-def test_motors_are_off_on_a_new_connection_and_who_drives_is_told(robot: Any) -> None:
+def test_motors_are_off_on_a_new_connection_and_who_drives_is_notified(robot: Any) -> None:
     robot.open(motors=False)
     for _ in range(3):
         robot.say(C.VEL, 200)
@@ -232,7 +232,7 @@ def test_a_position_reset_with_a_lone_type_byte_works(robot: Any) -> None:
 
 
 @pytest.mark.parametrize("argument", [None, 1])
-def test_a_robot_tells_its_configuration(make_robot: MakeRobot, profile: Profile, argument: int | None) -> None:
+def test_a_robot_reports_its_configuration(make_robot: MakeRobot, profile: Profile, argument: int | None) -> None:
     robot = make_robot(profile=profile, name="Wilma").open()
     robot.say(C.SETV, 400)
     robot.say(C.CONFIG, argument)

@@ -163,7 +163,7 @@ def test_a_place_that_is_not_free_is_refused(places: list[Pose | None], message:
         start_places(load_world("room"), [P2DX] * len(places), places)
 
 
-def test_a_fleet_stands_where_it_is_told_in_one_world_or_apart() -> None:
+def test_a_fleet_stands_where_it_is_placed_in_one_world_or_apart() -> None:
     robots = (
         RobotOrder(port="pty:", faults=("wheel-blocked left",)),
         RobotOrder(port="pty:", at=Pose(1.5, 0, math.pi)),

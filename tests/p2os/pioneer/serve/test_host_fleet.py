@@ -30,7 +30,7 @@ pytestmark = pytest.mark.skipif(os.name != "posix", reason="pseudo-terminals are
 
 
 class Clock:
-    """A clock that stands until it is told."""
+    """A clock that stands until it is set."""
 
     now = 0
 
@@ -55,19 +55,19 @@ class Looped:
     """A host on a line inside this process, with a clock that the test holds."""
 
     def __init__(self, robot: Any, *, listener: Listener | None = None, **host: Any) -> None:
-        self.loops, self.clock, self.told = Loops(), Clock(), list[str]()
+        self.loops, self.clock, self.events = Loops(), Clock(), list[str]()
         self.robot = robot
         self.url = "loop:robot" if listener is None else listener.description
         self.host = Host(
             robot.pioneer, listener or self.loops.listen("robot"), clock=self.clock,
-            on_event=lambda _now, what, detail: self.told.append(f"{what}: {detail}"), **host,
+            on_event=lambda _now, what, detail: self.events.append(f"{what}: {detail}"), **host,
         )  # fmt: skip
         self.line = self.reopen()
         self.decoder = Decoder()
         self.host.turn(0)
 
-    def live(self, milliseconds: int) -> None:
-        """Let the host live while nobody listens."""
+    def run_unread(self, milliseconds: int) -> None:
+        """Run the host while no client reads."""
         for _ in range(milliseconds):
             self.clock.now += NS_PER_MS
             self.host.turn(0)
@@ -141,8 +141,8 @@ def test_who_floods_a_paced_line_and_vanishes_leaves_it_free_at_once(make_robot:
         made.line.write(Command(C.VEL, 200).to_frame().to_bytes() * 100)
         made.run(1)
     made.line.close()
-    made.live(50)
-    assert any("left while its bytes waited" in told for told in made.told)
+    made.run_unread(50)
+    assert any("left while its bytes waited" in event for event in made.events)
     assert not made.robot.pioneer.state.motors_enabled
     made.line = made.reopen()
     made.decoder = Decoder()
@@ -160,8 +160,8 @@ def test_who_floods_and_vanishes_is_not_obeyed_to_the_last_frame(make_robot: Cal
     for _ in range(40):
         made.line.write(Command(C.VEL, 200).to_frame().to_bytes() * 100)
     made.line.close()
-    made.live(2)
-    assert any("client gone" in told for told in made.told)
+    made.run_unread(2)
+    assert any("client gone" in event for event in made.events)
     made.host.close()
 
 
@@ -171,16 +171,16 @@ def test_who_shouts_for_five_seconds_is_dropped_and_a_burst_is_not(make_robot: C
     made.open()
     shout = Command(C.VEL, 200).to_frame().to_bytes() * 400
     made.line.write(shout)  # 3600 bytes
-    made.live(4500)
+    made.run_unread(4500)
     made.line.write(shout * 5)
-    made.live(LONGEST_BEHIND_NS // NS_PER_MS - 100)
-    assert not any("client gone" in told for told in made.told)
-    made.live(200)
-    assert any("sent more than can be read" in told for told in made.told)
+    made.run_unread(LONGEST_BEHIND_NS // NS_PER_MS - 100)
+    assert not any("client gone" in event for event in made.events)
+    made.run_unread(200)
+    assert any("sent more than can be read" in event for event in made.events)
     made.host.close()
 
 
-def test_a_robot_lives_faster_than_the_clock_when_asked(make_robot: Callable[..., Any]) -> None:
+def test_a_robot_runs_faster_than_the_clock_when_asked(make_robot: Callable[..., Any]) -> None:
     looped = Looped(make_robot(), speed=4.0)
     looped.open()
     before = looped.host.now
@@ -231,11 +231,11 @@ class Serving:
     """A fleet in a thread."""
 
     def __init__(self, robots: Sequence[Any]) -> None:
-        self.robots, self.told = robots, list[str]()
+        self.robots, self.events = robots, list[str]()
         hosts = [
             Host(
                 robot.pioneer, listen_url("tcp:127.0.0.1:0"),
-                on_event=lambda _now, what, detail: self.told.append(f"{what}: {detail}"),
+                on_event=lambda _now, what, detail: self.events.append(f"{what}: {detail}"),
             )
             for robot in robots
         ]  # fmt: skip
@@ -253,7 +253,7 @@ class Serving:
     def wait_for(self, is_so: Callable[[], object]) -> None:
         end = time.monotonic() + PATIENCE_S
         while not is_so():
-            assert time.monotonic() < end, self.told
+            assert time.monotonic() < end, self.events
             time.sleep(0.002)
 
     def close(self) -> None:
@@ -295,11 +295,11 @@ def test_a_fleet_serves_each_of_its_robots_and_takes_orders(serving: Serving) ->
     orders.write(b"tus\n")
     heard = bytearray()
 
-    def all_told() -> bool:
+    def all_notified() -> bool:
         heard.extend(orders.read())
         return heard.count(b"robot") >= 4
 
-    serving.wait_for(all_told)
+    serving.wait_for(all_notified)
     assert serving.robots[0].pioneer.state.motors_enabled
     orders.close()
     again = open_url(serving.orders)
@@ -310,10 +310,10 @@ def test_a_fleet_serves_each_of_its_robots_and_takes_orders(serving: Serving) ->
         line.close()
 
 
-def test_a_robot_whose_client_vanishes_in_motion_lives_on_to_a_stand(serving: Serving) -> None:
+def test_a_robot_whose_client_vanishes_in_motion_runs_on_to_a_stand(serving: Serving) -> None:
     drive(serving, 0).close()
     body = serving.robots[0].body
-    serving.wait_for(lambda: body.state.left_speed_mps == 0 and any("client gone" in told for told in serving.told))
+    serving.wait_for(lambda: body.state.left_speed_mps == 0 and any("client gone" in event for event in serving.events))
 
 
 def address(url: str) -> tuple[str, int]:
@@ -321,7 +321,7 @@ def address(url: str) -> tuple[str, int]:
 
 
 def open_descriptors() -> int:
-    """Return how many this process has; 0 where the system does not tell."""
+    """Return how many this process has; 0 where the system does not count them."""
     place = Path("/proc/self/fd")
     return len(list(place.iterdir())) if place.is_dir() else 0
 
@@ -355,7 +355,7 @@ def test_a_client_that_floods_and_never_reads_is_left_and_the_robot_stands(servi
         assert second.recv(5) == b"busy:", "refused while somebody drives"
     questions = Command(C.CONFIG).to_frame().to_bytes() * 100
     end = time.monotonic() + PATIENCE_S
-    while not any("client gone" in told for told in serving.told):
+    while not any("client gone" in event for event in serving.events):
         assert time.monotonic() < end
         try:
             line.write(questions)
@@ -400,7 +400,7 @@ def driving(make_robot: Callable[..., Any], **host: Any) -> Looped:
 def test_a_robot_whose_client_was_killed_behind_an_open_line_brakes_after_two_seconds(
     make_robot: Callable[..., Any],
 ) -> None:
-    """A terminal that another program has open, or a relay: nothing tells that the client is dead."""
+    """A terminal that another program has open, or a relay: nothing shows that the client is dead."""
     made = driving(make_robot)
     say(made.line, C.PULSE)
     made.run(1)
@@ -449,11 +449,11 @@ def test_a_client_that_never_reads_is_left_and_the_robot_stands(make_robot: Call
     made = driving(make_robot)
     for _ in range(4000):
         say(made.line, C.CONFIG)
-        made.live(50)
+        made.run_unread(50)
         if made.host.client is None:
             break
-    assert made.told[-1].startswith("client gone: loop:robot has stopped reading")
-    made.live(1000)
+    assert made.events[-1].startswith("client gone: loop:robot has stopped reading")
+    made.run_unread(1000)
     assert made.robot.body.state.left_speed_mps == 0
     made.line = made.reopen()
     made.decoder = Decoder()
@@ -466,37 +466,37 @@ def test_a_client_that_never_reads_is_left_and_the_robot_stands(make_robot: Call
 # Clients that do not synchronise ---------------------------------------------------------
 
 
-def test_a_silent_client_is_let_go_at_the_limit_and_told(make_robot: Callable[..., Any]) -> None:
+def test_a_silent_client_is_dropped_at_the_limit_and_sent_the_reason(make_robot: Callable[..., Any]) -> None:
     made = Looped(make_robot(), sync_limit_ns=10 * NS_PER_S)
     say(made.line, 0)  # to synchronise is no session yet
-    made.live(9_999)
+    made.run_unread(9_999)
     assert made.host.client is not None
-    made.live(1)
-    assert made.told[-1] == "client gone: loop:robot had no open session for 10 s"
+    made.run_unread(1)
+    assert made.events[-1] == "client gone: loop:robot had no open session for 10 s"
     assert made.line.read().endswith(b"loop:robot had no open session for 10 s\r\n")
     made.line = made.reopen()
-    made.live(1)
-    assert made.told[-1] == "client connected: loop:robot"
+    made.run_unread(1)
+    assert made.events[-1] == "client connected: loop:robot"
     made.host.close()
 
 
 def test_a_client_with_a_session_stays_and_its_time_begins_anew_with_close(make_robot: Callable[..., Any]) -> None:
     made = Looped(make_robot(), sync_limit_ns=NS_PER_S, speed=4.0)
     made.open()
-    made.live(5_000)
+    made.run_unread(5_000)
     assert made.host.client is not None, "silent, but the watchdog has stopped its robot"
     say(made.line, C.CLOSE)
-    made.live(990)
+    made.run_unread(990)
     assert made.host.client is not None
-    made.live(20)
+    made.run_unread(20)
     assert made.host.client is None
     made.host.close()
 
 
 def test_who_has_a_terminal_open_cannot_be_sent_away(make_robot: Callable[..., Any]) -> None:
     made = Looped(make_robot(), listener=listen_url("pty:"), sync_limit_ns=NS_PER_S)
-    made.live(3_000)
-    assert made.told == [f"client connected: {made.url}"]
+    made.run_unread(3_000)
+    assert made.events == [f"client connected: {made.url}"]
     made.line.close()
     made.host.close()
 

@@ -22,7 +22,7 @@ FACING = (Pose(-0.6, 0.3, 0.0), Pose(0.6, 0.3, math.pi))
 
 
 class Clock:
-    """A clock that stands until it is told."""
+    """A clock that stands until it is set."""
 
     now = 0
 
@@ -38,7 +38,7 @@ class Hall:
         robots = tuple(RobotOrder(port=f"loop:{n}", at=place, settings=settings) for n, place in enumerate(FACING))
         self.made = make_fleet(FleetOrder(robots=robots, body="kinematic"))
         assert self.made.multi_robot_world is not None
-        self.multi_robot_world, self.clock, self.loops, self.told = (
+        self.multi_robot_world, self.clock, self.loops, self.events = (
             self.made.multi_robot_world,
             Clock(),
             Loops(),
@@ -48,7 +48,7 @@ class Hall:
         self.hosts = [
             Host(
                 robot, self.loops.listen(str(number)), shared=(self.time, self.multi_robot_world, number),
-                on_event=lambda _now, what, detail, number=number: self.told.append(f"{number} {what}: {detail}"),
+                on_event=lambda _now, what, detail, number=number: self.events.append(f"{number} {what}: {detail}"),
             )
             for number, robot in enumerate(self.made.robots)
         ]  # fmt: skip
@@ -140,7 +140,7 @@ def test_time_stands_still_while_nobody_is_there_and_leaves_pauses_out() -> None
     hall.call(0, 1)
     hall.clock.now += LONGEST_PAUSE_NS + 1
     hall.turn()
-    assert [told for told in hall.told if "lag" in told] == [
+    assert [event for event in hall.events if "lag" in event] == [
         "0 lag: the machine paused for 0.3 s; the robot's time leaves it out"
     ]
     for line in hall.lines:
@@ -152,7 +152,7 @@ def test_time_stands_still_while_nobody_is_there_and_leaves_pauses_out() -> None
     hall.close()
 
 
-def test_what_a_robot_says_while_nobody_listens_is_not_told_to_the_next_client() -> None:
+def test_what_a_robot_sends_while_no_client_is_there_does_not_go_to_the_next() -> None:
     hall = Hall()
     hall.call(0)
     execute(hall.hosts, "2: fault reboot")

@@ -31,11 +31,11 @@ class Served:
 
     def __init__(self, robot: Any, url: str) -> None:
         self.robot = robot
-        self.told: list[str] = []
+        self.events: list[str] = []
         self.listener = listen_url(url)
         self.url = self.listener.description
         self.host = Host(
-            robot.pioneer, self.listener, on_event=lambda _now, what, detail: self.told.append(f"{what}: {detail}")
+            robot.pioneer, self.listener, on_event=lambda _now, what, detail: self.events.append(f"{what}: {detail}")
         )
         self._end = threading.Event()
         self._thread = threading.Thread(target=self.host.run, kwargs={"until": self._end.is_set}, daemon=True)
@@ -43,8 +43,8 @@ class Served:
 
     def wait_for(self, text: str, count: int = 1) -> None:
         end = time.monotonic() + PATIENCE_S
-        while sum(text in told for told in self.told) < count:
-            assert time.monotonic() < end, f"{text!r} was never told: {self.told}"
+        while sum(text in event for event in self.events) < count:
+            assert time.monotonic() < end, f"{text!r} never came: {self.events}"
             time.sleep(0.005)
 
     def close(self) -> None:
@@ -63,7 +63,7 @@ class Caller:
     def say(self, number: int, argument: int | None = None) -> None:
         self.line.write(Command(number, argument).to_frame().to_bytes())
 
-    def hear(self, wanted: Callable[[Frame], bool]) -> Frame:
+    def receive(self, wanted: Callable[[Frame], bool]) -> Frame:
         """Return the next frame that is wanted."""
         end = time.monotonic() + PATIENCE_S
         while time.monotonic() < end:
@@ -77,9 +77,9 @@ class Caller:
     def open(self) -> None:
         for number in (0, 1, 2):
             self.say(number)
-            self.hear(lambda frame, number=number: frame.kind == number)
+            self.receive(lambda frame, number=number: frame.kind == number)
         self.say(C.OPEN)
-        self.hear(lambda frame: frame.kind in SIP_KINDS)
+        self.receive(lambda frame: frame.kind in SIP_KINDS)
 
     def close(self) -> None:
         self.line.close()
@@ -97,7 +97,7 @@ def test_a_client_opens_drives_and_leaves(served: Served) -> None:
     caller.open()
     caller.say(C.ENABLE, 1)
     caller.say(C.VEL, 100)
-    caller.hear(lambda frame: frame.kind == 0x33)
+    caller.receive(lambda frame: frame.kind == 0x33)
     caller.say(C.CLOSE)
     caller.close()
     served.wait_for("client gone")
@@ -110,7 +110,7 @@ def test_a_client_that_vanishes_stops_the_robot_and_the_next_is_served(served: S
         caller.open()
         caller.say(C.ENABLE, 1)
         caller.say(C.VEL, 300)
-        caller.hear(lambda frame: frame.kind == 0x33)
+        caller.receive(lambda frame: frame.kind == 0x33)
         caller.close()
         served.wait_for("client gone", round_)
         state = served.robot.pioneer.state
@@ -122,7 +122,7 @@ def test_packets_come_every_hundred_milliseconds(served: Served) -> None:
     caller.open()
     start = time.monotonic()
     for _ in range(10):
-        caller.hear(lambda frame: frame.kind in SIP_KINDS)
+        caller.receive(lambda frame: frame.kind in SIP_KINDS)
     assert 0.8 < time.monotonic() - start < 2.5  # a loaded machine may lag, but not drift
     caller.close()
 
@@ -133,13 +133,13 @@ def test_a_captured_client_is_served(served: Served, name: str, request: pytest.
     caller = Caller(served.url)
     for number in (0, 1, 2):  # the handshake waits for its answers
         caller.say(number)
-        caller.hear(lambda frame, number=number: frame.kind == number)
+        caller.receive(lambda frame, number=number: frame.kind == number)
     last = 0.0
     for at, data in request.getfixturevalue(name)[3:-1]:
         time.sleep((at - last) / 20 if last else 0)
         last = at
         caller.line.write(data)
-    caller.hear(lambda frame: frame.kind == 0x33)
+    caller.receive(lambda frame: frame.kind == 0x33)
     caller.close()
     served.wait_for("client gone")
     assert "opened" in served.robot.told()
@@ -155,23 +155,23 @@ def test_a_second_tcp_client_is_refused_aloud(make_robot: Callable[..., Any]) ->
         heard = b"".join(iter(lambda: second.recv(100), b""))
     assert re.fullmatch(rb"busy: 127\.0\.0\.1:\d+ is connected for \d+ s\r\n", heard)
     served.wait_for("client refused")
-    first.hear(lambda frame: frame.kind in SIP_KINDS)
+    first.receive(lambda frame: frame.kind in SIP_KINDS)
     first.close()
     served.close()
 
 
-def test_our_own_client_says_why_it_was_refused(make_robot: Callable[..., Any]) -> None:
+def test_our_own_client_reports_why_it_was_refused(make_robot: Callable[..., Any]) -> None:
     served = Served(make_robot(), "tcp:127.0.0.1:0")
     first = Caller(served.url)
     first.open()
     with pytest.raises(HungUpError, match=r"closed the connection: busy: 127\.0\.0\.1:\d+ is connected for 0 s"):
-        Caller(served.url).hear(lambda _frame: False)
+        Caller(served.url).receive(lambda _frame: False)
     first.close()
     served.close()
 
 
-def test_a_client_that_only_ends_what_it_says_leaves_a_robot_that_stands(make_robot: Callable[..., Any]) -> None:
-    """Half-closed (shutdown): it could still hear, but nobody would stop the robot any more."""
+def test_a_client_that_only_closes_its_writing_side_leaves_a_robot_that_stands(make_robot: Callable[..., Any]) -> None:
+    """Half-closed (shutdown): it could still receive, but could not stop the robot any more."""
     served = Served(make_robot(), "tcp:127.0.0.1:0")
     with socket.create_connection(("127.0.0.1", int(served.url.rpartition(":")[2])), timeout=PATIENCE_S) as client:
         for number, argument in ((0, None), (1, None), (2, None), (C.OPEN, None), (C.ENABLE, 1), (C.VEL, 300)):
@@ -193,17 +193,17 @@ def test_a_host_that_ends_lets_its_client_go(make_robot: Callable[..., Any]) -> 
     caller.open()
     served.close()
     with pytest.raises(HungUpError):
-        caller.hear(lambda _frame: False)
+        caller.receive(lambda _frame: False)
     with pytest.raises(TransportError):
         open_url(served.url)
-    assert served.told[-1] == "client gone: the host ends"
+    assert served.events[-1] == "client gone: the host ends"
 
 
 # Rounds one by one, with a clock that the test holds --------------------------------------
 
 
 class Clock:
-    """A clock that stands until it is told."""
+    """A clock that stands until it is set."""
 
     now = 0
 
@@ -212,7 +212,7 @@ class Clock:
 
 
 class DeadLine:
-    """A line that fails in the way that it is told."""
+    """A line that fails in the way that it is set to."""
 
     description = "dead"
     failing = ""
@@ -253,14 +253,14 @@ class OneLine:
 
 
 def make_host(robot: Any, listener: Listener) -> tuple[Host, Clock, list[str]]:
-    clock, told = Clock(), []
+    clock, events = Clock(), []
     host = Host(
-        robot.pioneer, listener, clock=clock, on_event=lambda _now, what, detail: told.append(f"{what}: {detail}")
+        robot.pioneer, listener, clock=clock, on_event=lambda _now, what, detail: events.append(f"{what}: {detail}")
     )
-    return host, clock, told
+    return host, clock, events
 
 
-def test_a_robot_without_client_does_not_live_and_costs_nothing(robot: Any) -> None:
+def test_a_robot_without_client_does_not_run_and_costs_nothing(robot: Any) -> None:
     host, clock, _ = make_host(robot, listen_url("tcp:127.0.0.1:0"))
     for _ in range(5):
         clock.now += 3600 * 1000 * NS_PER_MS
@@ -273,13 +273,13 @@ def test_a_robot_without_client_does_not_live_and_costs_nothing(robot: Any) -> N
 
 def test_a_robot_comes_to_rest_after_its_client_has_left(robot: Any) -> None:
     loops = Loops()
-    host, clock, told = make_host(robot, loops.listen("robot"))
+    host, clock, events = make_host(robot, loops.listen("robot"))
     client = open_url("loop:robot", loops=loops)
     host.turn(0)
     assert host.client == "loop:robot"
     client.close()
     host.turn(0)
-    assert told == ["client connected: loop:robot", "client gone: loop:robot closed the connection"]
+    assert events == ["client connected: loop:robot", "client gone: loop:robot closed the connection"]
     for _ in range(20):
         clock.now += 100 * NS_PER_MS
         host.turn(0)
@@ -287,9 +287,9 @@ def test_a_robot_comes_to_rest_after_its_client_has_left(robot: Any) -> None:
     host.close()
 
 
-def test_a_pause_of_the_machine_is_told_and_left_out(robot: Any) -> None:
+def test_a_pause_of_the_machine_is_reported_and_left_out(robot: Any) -> None:
     loops = Loops()
-    host, clock, told = make_host(robot, loops.listen("robot"))
+    host, clock, events = make_host(robot, loops.listen("robot"))
     client = open_url("loop:robot", loops=loops)
     host.turn(0)
     clock.now += LONGEST_PAUSE_NS
@@ -298,7 +298,7 @@ def test_a_pause_of_the_machine_is_told_and_left_out(robot: Any) -> None:
     clock.now += LONGEST_PAUSE_NS + 1
     host.turn(0)
     assert host.now == LONGEST_PAUSE_NS
-    assert told[-1].startswith("lag: the machine paused for 0.3 s")
+    assert events[-1].startswith("lag: the machine paused for 0.3 s")
     client.close()
     host.close()
 
@@ -306,14 +306,14 @@ def test_a_pause_of_the_machine_is_told_and_left_out(robot: Any) -> None:
 @pytest.mark.parametrize("failing", ["read", "write"])
 def test_a_line_that_fails_frees_the_robot(robot: Any, failing: str) -> None:
     line = DeadLine()
-    host, clock, told = make_host(robot, OneLine(line))  # type: ignore[arg-type]
+    host, clock, events = make_host(robot, OneLine(line))  # type: ignore[arg-type]
     host.turn(0)
     robot.open()
     line.failing = failing
     for _ in range(3):
         clock.now += 100 * NS_PER_MS
         host.turn(0)
-    assert told[-1].startswith("client gone: the line")
+    assert events[-1].startswith("client gone: the line")
     assert not robot.pioneer.state.open
     assert host.client is None
     host.turn(0)  # nobody comes any more; the listener is asked all the same

@@ -162,7 +162,7 @@ def test_what_one_pushes_the_other_sees_and_is_stopped_by(meet: Meet) -> None:
     assert made.members[0].body.state.stalled_left
 
 
-def test_robots_far_from_each_other_live_alone_and_near_ones_step_by_step() -> None:
+def test_robots_far_from_each_other_run_alone_and_near_ones_step_by_step() -> None:
     made = multi_robot_world(((0.0, 0.0, 0.0), (0.0, 0.6, 0.0), (0.0, 3.0, 0.0)))
     assert [member.other_robots.is_close for member in made.members] == [True, True, False]
     assert made.next_deadline() is None

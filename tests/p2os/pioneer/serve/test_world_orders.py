@@ -144,6 +144,6 @@ def test_the_word_of_earlier_releases_is_refused_with_the_word_of_today(line: st
         hosts[0].do("mend all")
 
 
-def test_help_tells_every_order() -> None:
+def test_help_lists_every_order() -> None:
     text = "\n".join(execute([], "help"))
     assert all(word in text for word in ("place box X Y LENGTH WIDTH [HEADING]", "clear all", "fault reboot", "N: …"))

@@ -80,7 +80,7 @@ def test_a_map_without_a_home_starts_at_a_goal_or_at_a_free_place(tmp_path: Path
 
 
 @pytest.mark.parametrize(
-    ("old", "new", "said"),
+    ("old", "new", "message"),
     [
         ("2D-Map", "3D-Map", ":1: an ARIA map begins"),
         ("NumLines: 2", "NumLines: 5", "promises lines 5, and has 2"),
@@ -95,13 +95,13 @@ def test_a_map_without_a_home_starts_at_a_goal_or_at_a_free_place(tmp_path: Path
         ("2000 2000", "9000000 9000000", "too far apart"),
     ],
 )
-def test_a_broken_map_is_one_line_with_its_place(tmp_path: Path, old: str, new: str, said: str) -> None:
+def test_a_broken_map_is_one_line_with_its_place(tmp_path: Path, old: str, new: str, message: str) -> None:
     text = ARIA.replace(old, new, 1)
     if "Cairn:\n" in text or new == "Cairn:":
         text = ARIA.replace('Cairn: Goal 1000 500 0.000000 "" ICON "Goal 1"', "Cairn: ", 1)
     with pytest.raises(WorldError) as caught:
         aria(tmp_path, text)
-    assert said in str(caught.value)
+    assert message in str(caught.value)
     assert "\n" not in str(caught.value)
 
 
@@ -199,7 +199,7 @@ def test_colours_are_averaged_and_a_transparent_pixel_is_unknown(image_map: Path
 
 
 @pytest.mark.parametrize(
-    ("text", "said"),
+    ("text", "message"),
     [
         ("image: [", "map.yaml:"),
         ("- 3", "names no image"),
@@ -216,19 +216,19 @@ def test_colours_are_averaged_and_a_transparent_pixel_is_unknown(image_map: Path
         ("a: &a [x]\n" + "".join(f"b{n}: &b{n} [*a, *a]\n" for n in range(3)), "names no image"),
     ],
 )
-def test_a_broken_yaml_is_one_line(image_map: Path, text: str, said: str | None) -> None:
+def test_a_broken_yaml_is_one_line(image_map: Path, text: str, message: str | None) -> None:
     image_map.write_text(text)
-    if said is None:
+    if message is None:
         assert load_world(image_map).extent[2] > 5000
         return
     with pytest.raises(WorldError) as caught:
         load_world(image_map)
-    assert said in str(caught.value)
+    assert message in str(caught.value)
     assert "\n" not in str(caught.value)
 
 
 @pytest.mark.parametrize(
-    ("data", "said"),
+    ("data", "message"),
     [
         (b"P5\n60 60\n255\n" + bytes(100), "cannot be read"),
         (b"P5\n100000 100000\n255\n", "too many"),
@@ -236,11 +236,11 @@ def test_a_broken_yaml_is_one_line(image_map: Path, text: str, said: str | None)
         (b"P5\n10 10\n65535\n" + bytes(200), "8 bits"),
     ],
 )
-def test_a_broken_or_huge_image_is_refused(image_map: Path, data: bytes, said: str) -> None:
+def test_a_broken_or_huge_image_is_refused(image_map: Path, data: bytes, message: str) -> None:
     (image_map.parent / "map.pgm").write_bytes(data)
     with pytest.raises(WorldError) as caught:
         load_world(image_map)
-    assert said in f"{caught.value} {caught.value.hint}"
+    assert message in f"{caught.value} {caught.value.hint}"
 
 
 def test_an_image_cut_anywhere_is_refused_or_read(image_map: Path) -> None:

@@ -70,10 +70,10 @@ def rounded(mesh: Mesh) -> set[tuple[float, ...]]:
 
 CASES = {
     "an OBJ with Y up": ("a.obj", obj(WEDGE_Y_UP), "auto"),
-    "an OBJ with Z up, said so": ("a.obj", obj(WEDGE), "z"),
-    "an OBJ with X up, said so": ("a.obj", obj([(z, y, -x) for x, y, z in WEDGE]), "x"),
+    "an OBJ with Z up, as named": ("a.obj", obj(WEDGE), "z"),
+    "an OBJ with X up, as named": ("a.obj", obj([(z, y, -x) for x, y, z in WEDGE]), "x"),
     "a text STL": ("a.stl", stl_text(WEDGE), "auto"),
-    "a text STL with Y up, said so": ("a.stl", stl_text(WEDGE_Y_UP), "y"),
+    "a text STL with Y up, as named": ("a.stl", stl_text(WEDGE_Y_UP), "y"),
     "a binary STL": ("a.stl", stl_binary(WEDGE), "auto"),
     "a COLLADA with Y up": ("a.dae", dae(WEDGE_Y_UP), "auto"),
     "a COLLADA with Z up": ("a.dae", dae(WEDGE, "Z_UP"), "auto"),
@@ -133,7 +133,7 @@ def test_the_cut_and_the_shadow_are_those_of_the_solid(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("name", "data", "said"),
+    ("name", "data", "message"),
     [
         ("a.obj", "v 1 2\n", "a.obj:1: 'v 1 2' cannot be read"),
         ("a.obj", "v 1 2 x\n", "a.obj:1:"),
@@ -163,12 +163,12 @@ def test_the_cut_and_the_shadow_are_those_of_the_solid(tmp_path: Path) -> None:
         ("a.dae", dae(WEDGE, node="<matrix>1 2 3</matrix>"), "needs 16 numbers, got 3"),
     ],
 )  # fmt: skip
-def test_a_broken_mesh_is_one_line(tmp_path: Path, name: str, data: str | bytes, said: str | None) -> None:
+def test_a_broken_mesh_is_one_line(tmp_path: Path, name: str, data: str | bytes, message: str | None) -> None:
     path = tmp_path / name
     path.write_bytes(data if isinstance(data, bytes) else data.encode())
     with pytest.raises(WorldError) as caught:
         load_world(path)
-    assert (said or "") in str(caught.value)
+    assert (message or "") in str(caught.value)
     assert "\n" not in str(caught.value)
 
 
@@ -239,7 +239,7 @@ def test_a_mesh_cut_at_any_place_is_refused_or_read(case: str, tmp_path: Path) -
 
 
 @pytest.mark.parametrize(
-    ("text", "said"),
+    ("text", "message"),
     [
         ('file = "none.stl"', "w.toml:4: import: "),
         ('file = "a.txt"', "no reader for .txt"),
@@ -248,10 +248,10 @@ def test_a_mesh_cut_at_any_place_is_refused_or_read(case: str, tmp_path: Path) -
         ('file = "."', "no reader"),
     ],
 )
-def test_a_broken_import_names_its_line(tmp_path: Path, text: str, said: str) -> None:
+def test_a_broken_import_names_its_line(tmp_path: Path, text: str, message: str) -> None:
     (tmp_path / "a.stl").write_text(stl_text(WEDGE))
     (tmp_path / "a.txt").write_text("")
     (tmp_path / "w.toml").write_text(f'name = "w"\nextent_m = [-9, -9, 9, 9]\n[[import]]\n{text}\n')
     with pytest.raises(WorldError) as caught:
         load_world(tmp_path / "w.toml")
-    assert said in str(caught.value)
+    assert message in str(caught.value)

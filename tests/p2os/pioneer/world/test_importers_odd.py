@@ -24,7 +24,7 @@ def read(path: Path, text: str | bytes) -> World:
 
 
 def refusal(path: Path, text: str | bytes) -> str:
-    """Return what is said of a file: one line that names it."""
+    """Return the message about a file: one line that names it."""
     with pytest.raises(WorldError) as caught:
         read(path, text)
     assert "\n" not in str(caught.value)
@@ -106,7 +106,7 @@ def test_a_star_keeps_its_area_and_a_huge_polygon_is_a_fan() -> None:
 
 
 @pytest.mark.parametrize(
-    ("faces", "said"),
+    ("faces", "message"),
     [
         ("<polygons>{vertex}<p/></polygons>", "a face is cut short"),
         ("<polygons>{vertex}<p>0 1</p></polygons>", "a face is cut short"),
@@ -115,8 +115,8 @@ def test_a_star_keeps_its_area_and_a_huge_polygon_is_a_fan() -> None:
         ("<polylist>{vertex}<vcount>999999999</vcount><p>0 1 2</p></polylist>", "a face is cut short"),
     ],
 )
-def test_a_broken_collada_face_is_one_line(faces: str, said: str, tmp_path: Path) -> None:
-    assert said in refusal(tmp_path / "a.dae", dae(faces, DOORWAY))
+def test_a_broken_collada_face_is_one_line(faces: str, message: str, tmp_path: Path) -> None:
+    assert message in refusal(tmp_path / "a.dae", dae(faces, DOORWAY))
 
 
 # Lines as other systems end and continue them ----------------------------------------------
@@ -182,7 +182,7 @@ BOMB = "a: &a [x, x, x, x, x, x, x, x, x]\n" + "".join(
 
 
 @pytest.mark.parametrize(
-    ("resolution", "said"),
+    ("resolution", "message"),
     [
         ("*j", "resolution = a list must be"),
         ("0.05\nmode: *j", "mode = a list is unknown"),
@@ -196,11 +196,11 @@ BOMB = "a: &a [x, x, x, x, x, x, x, x, x]\n" + "".join(
         ("!!python/object/apply:os.getcwd []", "could not determine a constructor"),
     ],
 )
-def test_hostile_yaml_is_one_line(resolution: str, said: str, tmp_path: Path) -> None:
+def test_hostile_yaml_is_one_line(resolution: str, message: str, tmp_path: Path) -> None:
     pytest.importorskip("yaml")
     text = f"{BOMB}image: a.pgm\norigin: [0, 0, 0]\nresolution: {resolution}\n"
     (tmp_path / "a.pgm").write_bytes(b"P5 1 1 255\n\0")
-    assert said in refusal(tmp_path / "m.yaml", text)
+    assert message in refusal(tmp_path / "m.yaml", text)
 
 
 def urdf(geometry: str) -> str:

@@ -91,7 +91,7 @@ def test_a_urdf_stands_with_its_joints_at_zero(folder: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("name", "text", "said"),
+    ("name", "text", "message"),
     [
         ("a.sdf", CRATE.replace("2 1 1", "2 1"), "needs 3 numbers, got 2"),
         ("a.sdf", CRATE.replace("2 1 1", "2 1 -1"), "must be above 0"),
@@ -113,11 +113,11 @@ def test_a_urdf_stands_with_its_joints_at_zero(folder: Path) -> None:
         ("a.urdf", "<sdf/>", "expected <robot>, got <sdf>"),
     ],
 )
-def test_a_broken_description_is_one_line(folder: Path, name: str, text: str, said: str | None) -> None:
+def test_a_broken_description_is_one_line(folder: Path, name: str, text: str, message: str | None) -> None:
     (folder / name).write_text(text.replace("{turn}", "0"))
     with pytest.raises(WorldError) as caught:
         load_world(folder / name)
-    assert (said or "") in str(caught.value)
+    assert (message or "") in str(caught.value)
     assert "\n" not in str(caught.value)
 
 

@@ -58,7 +58,7 @@ def test_the_incline_is_no_wall_and_the_rails_are() -> None:
 
 
 @pytest.mark.parametrize(
-    ("old", "new", "said", "hint"),
+    ("old", "new", "message", "hint"),
     [
         ("length_m = 0.5", "lenght_m = 0.5", "unknown key box.lenght_m", "box.length_m"),
         ("length_m = 0.5", "", "box.length_m is missing", "has"),
@@ -78,13 +78,13 @@ def test_the_incline_is_no_wall_and_the_rails_are() -> None:
         ("extent_m = [-3.2, -3.2, 3.2, 3.2]", "", "extent_m must be a list", ""),
     ],
 )
-def test_what_is_wrong_is_named(tmp_path: Path, old: str, new: str, said: str, hint: str) -> None:
+def test_what_is_wrong_is_named(tmp_path: Path, old: str, new: str, message: str, hint: str) -> None:
     path = tmp_path / "mine.toml"
     assert old in ROOM
     path.write_text(ROOM.replace(old, new, 1), encoding="utf-8")
     with pytest.raises(WorldError) as caught:
         load_world(path)
-    assert said in str(caught.value) or "is not TOML" in str(caught.value.hint)
+    assert message in str(caught.value) or "is not TOML" in str(caught.value.hint)
     assert hint in (caught.value.hint or "")
 
 

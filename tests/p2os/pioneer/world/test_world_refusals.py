@@ -26,7 +26,7 @@ BOX = '[[box]]\nname = "b"\nx_m = 0\ny_m = 0\nlength_m = 1\nwidth_m = 1\n'
 def test_a_refusal_is_one_line_with_file_and_place(text: str, place: str) -> None:
     with pytest.raises(WorldError) as caught:
         parse_world(HEAD + text, "mine.toml")
-    said = str(caught.value)
-    assert re.match(r"mine\.toml:\d+: ", said)
-    assert place in said
-    assert "\n" not in said
+    message = str(caught.value)
+    assert re.match(r"mine\.toml:\d+: ", message)
+    assert place in message
+    assert "\n" not in message

@@ -119,7 +119,7 @@ HEAD = 'name = "a"\nextent_m = [0, 0, 1, 1]\n'
 
 
 @pytest.mark.parametrize(
-    ("more", "said"),
+    ("more", "message"),
     [
         ("fixed = 1", "mine.toml:9: box.fixed must be true or false"),
         ("mass_kg = -1", "mine.toml:3: box: obstacle 'b': mass and friction must be 0 or more"),
@@ -135,22 +135,22 @@ HEAD = 'name = "a"\nextent_m = [0, 0, 1, 1]\n'
         (f"base_m = {'9' * 400}", "must be a number"),
     ],
 )
-def test_what_moves_is_checked(more: str, said: str) -> None:
+def test_what_moves_is_checked(more: str, message: str) -> None:
     with pytest.raises(WorldError) as caught:
         parse_world(HEAD + BOX + more, "mine.toml")
-    assert said in str(caught.value)
+    assert message in str(caught.value)
 
 
 @pytest.mark.parametrize(
-    ("mesh", "said"),
+    ("mesh", "message"),
     [
         ("vertices_m = [[0, 0, 0]]\ntriangles = []", "no triangles"),
         ("vertices_m = [[0, 0, 0]]\ntriangles = [[0, 0, 1]]", "not there"),
         ("vertices_m = [[0, 0]]\ntriangles = [[0, 0, 0]]", "list of 3 numbers"),
     ],
 )
-def test_a_mesh_is_checked(mesh: str, said: str) -> None:
-    with pytest.raises(WorldError, match=said):
+def test_a_mesh_is_checked(mesh: str, message: str) -> None:
+    with pytest.raises(WorldError, match=message):
         parse_world(f'{HEAD}[[mesh]]\nname = "m"\n{mesh}', "mine.toml")
 
 
@@ -165,6 +165,6 @@ def test_a_mesh_is_checked(mesh: str, said: str) -> None:
         (Repeat.LOOP, 2.0 + 3.0 + math.sqrt(5), (1, 0, 0)),
     ],
 )
-def test_a_walk_is_where_its_time_says(repeat: Repeat, seconds: float, pose: tuple[float, float, float]) -> None:
+def test_a_walk_is_where_its_time_puts_it(repeat: Repeat, seconds: float, pose: tuple[float, float, float]) -> None:
     walk = Walk(points_m=((0, 0), (2, 0), (2, 1)), speed_mps=1.0, start_s=1.0, repeat=repeat)
     assert walk.pose_at(seconds) == pytest.approx(pose, abs=1e-9)
