@@ -7,8 +7,8 @@ from p2os.timing import NS_PER_S
 def test_a_robot_that_is_one_of_many_says_which() -> None:
     lines: list[str] = []
     events = EventLines(lines.append, "robot 2  ")
-    events.tell(1_500_000_000, "motors", "on")
-    events.tell(1_500_000_000, "opened", "")
+    events.write_event(1_500_000_000, "motors", "on")
+    events.write_event(1_500_000_000, "opened", "")
     assert lines == ["     1.500 s  robot 2  motors: on\n", "     1.500 s  robot 2  opened\n"]
 
 
@@ -16,14 +16,14 @@ def test_a_flood_is_cut_each_second_and_what_was_left_out_is_told() -> None:
     lines: list[str] = []
     events = EventLines(lines.append)
     for count in range(3 * MOST_LINES):
-        events.tell(count, "synchronised", "")
+        events.write_event(count, "synchronised", "")
     assert len(lines) == MOST_LINES
-    events.tell(NS_PER_S - 1, "synchronised", "")
+    events.write_event(NS_PER_S - 1, "synchronised", "")
     assert len(lines) == MOST_LINES
-    events.tell(NS_PER_S, "client gone", "it left")
+    events.write_event(NS_PER_S, "client gone", "it left")
     assert lines[MOST_LINES:] == [
         f"     1.000 s  left out: {2 * MOST_LINES + 1} lines like the last\n",
         "     1.000 s  client gone: it left\n",
     ]
-    events.tell(2 * NS_PER_S, "client connected", "x")
+    events.write_event(2 * NS_PER_S, "client connected", "x")
     assert len(lines) == MOST_LINES + 3
