@@ -26,7 +26,7 @@ needs_tshark = pytest.mark.skipif(
 def shown(capture: Path, *fields: str) -> list[list[str]]:
     """Return what tshark reads out of a capture with the dissector."""
     asked = [word for field in fields for word in ("-e", field)]
-    with as_file(files("p2os.trace") / "p2os.lua") as script:
+    with as_file(files("p2os.capture") / "p2os.lua") as script:
         done = subprocess.run(
             [str(TSHARK), "-n", "-X", f"lua_script:{script}", "-r", str(capture), "-T", "fields", *asked],
             capture_output=True, text=True, timeout=60, check=True,
@@ -36,7 +36,7 @@ def shown(capture: Path, *fields: str) -> list[list[str]]:
 
 
 def lua_table(name: str) -> dict[int, str]:
-    text = (files("p2os.trace") / "p2os.lua").read_text(encoding="utf-8")
+    text = (files("p2os.capture") / "p2os.lua").read_text(encoding="utf-8")
     body = re.search(rf"local {name} = {{(.*?)\n}}", text, re.DOTALL)
     assert body is not None
     return {int(number, 0): word for number, word in re.findall(r'\[(\w+)\] = "([^"]+)"', body[1])}
@@ -95,7 +95,7 @@ def test_the_dissector_is_put_where_wireshark_looks(
     assert run(["sniff", "--install-dissector"]) == 0
     target = tmp_path / ".local/lib/wireshark/plugins/p2os.lua"
     assert capsys.readouterr().out == f"installed {target}\n"
-    assert target.read_bytes() == (files("p2os.trace") / "p2os.lua").read_bytes()
+    assert target.read_bytes() == (files("p2os.capture") / "p2os.lua").read_bytes()
     (tmp_path / "file").write_text("")
     with pytest.raises(FileError, match="cannot write"):
         install(tmp_path / "file")

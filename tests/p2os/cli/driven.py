@@ -1,4 +1,4 @@
-"""A verb in a process of its own that drives a robot served here, and what the robot was told."""
+"""A verb in a process of its own that drives a robot served here, and what the robot received."""
 
 import os
 import pty
@@ -11,17 +11,17 @@ from pathlib import Path
 from p2os.protocol.commands import Command, CommandNumber
 from p2os.protocol.frames import Decoder, Frame
 from p2os.timing import Nanos
-from tests.p2os.client.served_robot import PATIENCE_S, ServedRobot, until
+from tests.p2os.client.served_robot import TIMEOUT_S, ServedRobot, until
 
 COMMAND = (sys.executable, "-m", "p2os")
 CLOSE, STOP, VEL = CommandNumber.CLOSE, CommandNumber.STOP, CommandNumber.VEL
 
 
-class HeardRobot(ServedRobot):
-    """A served robot that keeps what it was told."""
+class RecordingRobot(ServedRobot):
+    """A served robot that keeps what it received."""
 
     def __init__(self) -> None:
-        self.heard: list[tuple[float, Command]] = []
+        self.received: list[tuple[float, Command]] = []
         decoder = Decoder()
         super().__init__()
         receive = self.pioneer.receive
@@ -30,20 +30,20 @@ class HeardRobot(ServedRobot):
             decoder.receive(data, now)
             while (item := decoder.next_item()) is not None:
                 if isinstance(item, Frame):
-                    self.heard.append((time.monotonic(), Command.from_frame(item)))
+                    self.received.append((time.monotonic(), Command.from_frame(item)))
             return receive(data, now)
 
         self.pioneer.receive = hear  # type: ignore[method-assign,assignment]
 
     @property
     def numbers(self) -> list[int]:
-        return [int(command.number) for _, command in self.heard]
+        return [int(command.number) for _, command in self.received]
 
-    def when_heard(self, number: int, since: float) -> float:
+    def when_received(self, number: int, since: float) -> float:
         """Wait for a command that comes after a moment; return when it came."""
 
         def found() -> float:
-            return next((at for at, command in list(self.heard) if at >= since and command.number == number), 0.0)
+            return next((at for at, command in list(self.received) if at >= since and command.number == number), 0.0)
 
         until(found, f"command {number}")
         return found()
@@ -73,19 +73,19 @@ class Driver:
         """Wait for the end; return the exit code and what was said."""
         try:
             if self.keyboard < 0:
-                out, err = self.process.communicate(timeout=PATIENCE_S)
+                out, err = self.process.communicate(timeout=TIMEOUT_S)
                 return self.process.returncode, (out + err).decode()
-            return self.process.wait(PATIENCE_S), ""
+            return self.process.wait(TIMEOUT_S), ""
         finally:
             self.close()
 
     def close(self) -> None:
         if self.process.poll() is None:
             self.process.kill()
-            self.process.wait(PATIENCE_S)
+            self.process.wait(TIMEOUT_S)
         if self.keyboard >= 0:
             os.close(self.keyboard)
             self.keyboard = -1
 
 
-__all__ = ["CLOSE", "COMMAND", "PATIENCE_S", "STOP", "VEL", "Driver", "HeardRobot", "until"]
+__all__ = ["CLOSE", "COMMAND", "STOP", "TIMEOUT_S", "VEL", "Driver", "RecordingRobot", "until"]

@@ -26,7 +26,7 @@ from p2os.pioneer.serve.control_line import Terminal
 from p2os.protocol.commands import Command
 from p2os.transport import HungUpError
 
-PATIENCE_S = 30.0
+TIMEOUT_S = 30.0
 COMMAND = str(Path(sys.executable).parent / "p2os")
 Capture = pytest.CaptureFixture[str]
 
@@ -47,12 +47,12 @@ class Serving:
             text=True,
         )  # fmt: skip
         assert self.process.stdout is not None
-        assert select.select([self.process.stdout], [], [], PATIENCE_S)[0], "it never started"
+        assert select.select([self.process.stdout], [], [], TIMEOUT_S)[0], "it never started"
         self.start = json.loads(self.process.stdout.readline())
 
     def end(self, number: int = signal.SIGINT) -> tuple[int, str]:
         self.process.send_signal(number)
-        _, err = self.process.communicate(timeout=PATIENCE_S)
+        _, err = self.process.communicate(timeout=TIMEOUT_S)
         return self.process.returncode, err
 
 
@@ -68,7 +68,7 @@ def serving(tmp_path: Path) -> Iterator[Callable[..., Serving]]:
     for each in started:
         if each.process.poll() is None:
             each.process.kill()
-            each.process.communicate(timeout=PATIENCE_S)
+            each.process.communicate(timeout=TIMEOUT_S)
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
@@ -76,7 +76,7 @@ def test_serve_says_where_it_is_serves_and_ends_cleanly(serving: Callable[..., S
     served = serving("--port", "tcp:127.0.0.1:0", "--world", "arena", "--seed", "7", "--firmware", "ARCOS")
     assert served.start["world"] == "arena"
     asked = subprocess.run(
-        [COMMAND, "info", served.start["url"], "--json"], capture_output=True, text=True, timeout=PATIENCE_S, check=True
+        [COMMAND, "info", served.start["url"], "--json"], capture_output=True, text=True, timeout=TIMEOUT_S, check=True
     )
     assert json.loads(asked.stdout)["subclass"] == "p2dx"
     code, err = served.end(number)
@@ -92,7 +92,7 @@ def test_serve_on_a_terminal_removes_its_link(serving: Callable[..., Serving], t
     served = serving("--port", f"pty:{link}", "--all-sonar")
     assert link.is_symlink()
     asked = subprocess.run(
-        [COMMAND, "info", f"serial:{link}", "--json"], capture_output=True, text=True, timeout=PATIENCE_S, check=True
+        [COMMAND, "info", f"serial:{link}", "--json"], capture_output=True, text=True, timeout=TIMEOUT_S, check=True
     )
     assert len(json.loads(asked.stdout)["sip"]["sonar_m"]) == 8
     assert served.end()[0] == 130
@@ -165,7 +165,7 @@ def test_serve_puts_a_fleet_into_one_world(tmp_path: Path, serving: Callable[...
     served = serving("--fleet", str(tmp_path / "two.toml"), body=())
     assert served.start["at"] == [-1.0, 0.3, 0.0]
     scan = subprocess.run(
-        [COMMAND, "monitor", served.start["url"], "--for", "1s"], capture_output=True, text=True, timeout=PATIENCE_S,
+        [COMMAND, "monitor", served.start["url"], "--for", "1s"], capture_output=True, text=True, timeout=TIMEOUT_S,
         check=False,
     )  # fmt: skip
     assert scan.returncode == 0
@@ -177,9 +177,9 @@ def test_serve_puts_a_fleet_into_one_world(tmp_path: Path, serving: Callable[...
 
 def test_serve_lets_a_silent_client_go_at_its_limit(serving: Callable[..., Serving]) -> None:
     served = serving("--port", "tcp:127.0.0.1:0", "--sync-limit", "300ms")
-    with socket.create_connection(("127.0.0.1", int(served.start["url"].rpartition(":")[2])), PATIENCE_S) as silent:
-        heard = b"".join(iter(lambda: silent.recv(100), b""))
-    assert heard.endswith(b" had no open session for 0.3 s\r\n")
+    with socket.create_connection(("127.0.0.1", int(served.start["url"].rpartition(":")[2])), TIMEOUT_S) as silent:
+        received = b"".join(iter(lambda: silent.recv(100), b""))
+    assert received.endswith(b" had no open session for 0.3 s\r\n")
     code, err = served.end()
     assert code == 130
     assert "had no open session for 0.3 s" in err

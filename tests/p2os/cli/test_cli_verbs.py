@@ -21,7 +21,7 @@ from p2os.protocol.sip import SonarReading, StandardSip
 from p2os.timing import NS_PER_MS
 from p2os.transport import HungUpError
 
-PATIENCE_S = 30.0
+TIMEOUT_S = 30.0
 COMMAND = str(Path(sys.executable).parent / "p2os")
 Capture = pytest.CaptureFixture[str]
 

@@ -20,7 +20,7 @@ sys.path.insert(0, str(Path(__file__).parent))
 from p2os.cli import printing
 from p2os.cli.printing import MOST_CHARACTERS, QueuedStream, queue_output, restored_output
 from p2os.errors import FileError
-from tests.p2os.cli.driven import COMMAND, PATIENCE_S, STOP, VEL, Driver, HeardRobot, until
+from tests.p2os.cli.driven import COMMAND, STOP, TIMEOUT_S, VEL, Driver, RecordingRobot, until
 
 
 class Pipe:
@@ -33,7 +33,7 @@ class Pipe:
     def read_until(self, end: str) -> str:
         text = ""
         while not text.endswith(end):
-            assert select.select([self.reader], [], [], PATIENCE_S)[0], text[-300:]
+            assert select.select([self.reader], [], [], TIMEOUT_S)[0], text[-300:]
             text += os.read(self.reader, 1 << 16).decode()
         return text
 
@@ -91,7 +91,7 @@ def test_lines_left_out_of_standard_output_are_told_of_on_standard_error(pipe: P
         stream.write(line)
     read = 0
     while read < MOST_CHARACTERS:
-        assert select.select([pipe.reader], [], [], PATIENCE_S)[0]
+        assert select.select([pipe.reader], [], [], TIMEOUT_S)[0]
         read += len(os.read(pipe.reader, 1 << 16))
     until(lambda: stream._characters < MOST_CHARACTERS // 2, "room")
     stream.write("{}\n")
@@ -143,8 +143,8 @@ def test_the_streams_are_replaced_for_a_while_where_they_could_hold_anybody_up(
 
 
 @pytest.fixture
-def robot() -> Iterator[HeardRobot]:
-    robot = HeardRobot()
+def robot() -> Iterator[RecordingRobot]:
+    robot = RecordingRobot()
     yield robot
     robot.close()
 
@@ -160,7 +160,7 @@ def fill(descriptor: int) -> None:
 
 
 @pytest.mark.slow
-def test_sniff_passes_on_what_nobody_wants_to_see(robot: HeardRobot) -> None:
+def test_sniff_passes_on_what_nobody_wants_to_see(robot: RecordingRobot) -> None:
     with socket.socket() as probe:
         probe.bind(("127.0.0.1", 0))
         between = f"tcp:127.0.0.1:{probe.getsockname()[1]}"
@@ -179,11 +179,11 @@ def test_sniff_passes_on_what_nobody_wants_to_see(robot: HeardRobot) -> None:
         until(lambda: robot.numbers.count(VEL) > sent + 3, "more of the client's frames")
         asked_at = time.monotonic()
         client.process.terminate()
-        assert robot.when_heard(STOP, asked_at) - asked_at < 0.3
+        assert robot.when_received(STOP, asked_at) - asked_at < 0.3
         assert client.end()[0] == 130
         ended_at = time.monotonic()
         sniff.terminate()
-        assert sniff.wait(PATIENCE_S) == 130
+        assert sniff.wait(TIMEOUT_S) == 130
         assert time.monotonic() - ended_at < 2.5, "the flush at the end is bounded"
     finally:
         client.close()
@@ -192,7 +192,7 @@ def test_sniff_passes_on_what_nobody_wants_to_see(robot: HeardRobot) -> None:
         os.close(reader)
 
 
-def test_sniff_whose_reader_goes_sends_the_closing_frames(robot: HeardRobot) -> None:
+def test_sniff_whose_reader_goes_sends_the_closing_frames(robot: RecordingRobot) -> None:
     with socket.socket() as probe:
         probe.bind(("127.0.0.1", 0))
         between = f"tcp:127.0.0.1:{probe.getsockname()[1]}"
@@ -205,15 +205,15 @@ def test_sniff_whose_reader_goes_sends_the_closing_frames(robot: HeardRobot) -> 
         robot.wait_until_it_drives()
         gone_at = time.monotonic()
         sniff.process.stdout.close()
-        robot.when_heard(STOP, gone_at)
-        assert sniff.process.wait(PATIENCE_S) == 1
+        robot.when_received(STOP, gone_at)
+        assert sniff.process.wait(TIMEOUT_S) == 1
         assert client.end()[0] == 1
     finally:
         client.close()
         sniff.close()
 
 
-def test_a_signal_while_the_last_words_wait_for_a_reader_ends_at_once(robot: HeardRobot) -> None:
+def test_a_signal_while_the_last_words_wait_for_a_reader_ends_at_once(robot: RecordingRobot) -> None:
     reader, writer = os.pipe()
     fill(writer)
     process = subprocess.Popen([*COMMAND, "info", robot.url], stdout=writer, stderr=writer)
@@ -223,16 +223,16 @@ def test_a_signal_while_the_last_words_wait_for_a_reader_ends_at_once(robot: Hea
         until(lambda: "client gone" in robot.told, "the end")
         time.sleep(0.3)
         process.terminate()
-        assert process.wait(PATIENCE_S) == 130
-        assert time.monotonic() - began < PATIENCE_S
+        assert process.wait(TIMEOUT_S) == 130
+        assert time.monotonic() - began < TIMEOUT_S
     finally:
         process.kill()
-        process.wait(PATIENCE_S)
+        process.wait(TIMEOUT_S)
         os.close(reader)
 
 
 @pytest.mark.slow
-def test_a_key_let_go_stops_the_robot_though_the_terminal_is_held(robot: HeardRobot) -> None:
+def test_a_key_let_go_stops_the_robot_though_the_terminal_is_held(robot: RecordingRobot) -> None:
     keyboard, inside = pty.openpty()
     fill(inside)
     process = subprocess.Popen(
@@ -249,15 +249,15 @@ def test_a_key_let_go_stops_the_robot_though_the_terminal_is_held(robot: HeardRo
             os.write(keyboard, b"w")
         let_go_at = time.monotonic()
         zero_at = 0.0
-        while not zero_at and time.monotonic() < let_go_at + PATIENCE_S:
+        while not zero_at and time.monotonic() < let_go_at + TIMEOUT_S:
             zero_at = next(
-                (at for at, command in list(robot.heard)
+                (at for at, command in list(robot.received)
                  if at > let_go_at and command.number == VEL and command.integer == 0), 0.0,
             )  # fmt: skip
         assert 0.2 < zero_at - let_go_at < 0.8
         os.write(keyboard, b"q")
-        assert process.wait(PATIENCE_S) == 0
+        assert process.wait(TIMEOUT_S) == 0
     finally:
         process.kill()
-        process.wait(PATIENCE_S)
+        process.wait(TIMEOUT_S)
         os.close(keyboard)

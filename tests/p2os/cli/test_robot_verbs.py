@@ -32,7 +32,7 @@ from p2os.errors import RemoteProtocolError, TransportError, UsageError
 from p2os.protocol.commands import CommandNumber
 from p2os.timing import NS_PER_MS, NS_PER_S
 from p2os.transport import waiting
-from tests.p2os.cli.driven import PATIENCE_S, STOP, HeardRobot, until
+from tests.p2os.cli.driven import STOP, TIMEOUT_S, RecordingRobot, until
 
 Run = Callable[..., int]
 Capture = pytest.CaptureFixture[str]
@@ -58,7 +58,7 @@ def test_a_speed_is_held_for_a_time(served: object, run: Run, capsys: Capture) -
 
 
 def test_a_wall_ends_a_held_speed_with_its_reason(run: Run, capsys: Capture) -> None:
-    robot = HeardRobot()
+    robot = RecordingRobot()
     try:
         began = time.monotonic()
         assert run("drive", robot.url, "--vel", "-1.5m/s", "--for", "30s") == 1
@@ -66,17 +66,17 @@ def test_a_wall_ends_a_held_speed_with_its_reason(run: Run, capsys: Capture) -> 
         captured = capsys.readouterr()
         assert re.fullmatch(r"p2os: hold -1\.50 m/s, 0 deg/s: stalled, after \d\.\d s\n", captured.err)
         assert captured.out == ""
-        assert robot.when_heard(STOP, began)
+        assert robot.when_received(STOP, began)
     finally:
         robot.close()
 
 
 def test_a_robot_that_vanishes_ends_a_held_speed_and_a_wait_at_once(run: Run, capsys: Capture) -> None:
     for words in (("drive", "--vel", "100mm/s", "--for", "30s"), ("send", "VEL", "100", "--wait", "30s")):
-        robot = HeardRobot()
+        robot = RecordingRobot()
         gone_at: list[float] = []
 
-        def vanish(robot: HeardRobot = robot, gone_at: list[float] = gone_at) -> None:
+        def vanish(robot: RecordingRobot = robot, gone_at: list[float] = gone_at) -> None:
             until(lambda: CommandNumber.VEL in robot.numbers, "VEL")
             gone_at.append(time.monotonic())
             robot.close()
@@ -85,23 +85,23 @@ def test_a_robot_that_vanishes_ends_a_held_speed_and_a_wait_at_once(run: Run, ca
         thread.start()
         assert run(words[0], robot.url, *words[1:]) == 1
         assert time.monotonic() - gone_at[0] < 1.5
-        thread.join(PATIENCE_S)
+        thread.join(TIMEOUT_S)
         assert "the link was lost" in capsys.readouterr().err
 
 
 def test_motors_that_go_off_end_a_held_speed(run: Run, capsys: Capture) -> None:
-    robot = HeardRobot()
+    robot = RecordingRobot()
 
     def press() -> None:
         robot.wait_until_it_drives()
-        robot.connect_request(lambda pioneer, now: pioneer.do("fault stop-button", now))
+        robot.do_in_thread(lambda pioneer, now: pioneer.do("fault stop-button", now))
 
     thread = threading.Thread(target=press)
     thread.start()
     try:
         assert run("drive", robot.url, "--vel", "100mm/s", "--for", "30s") == 1
     finally:
-        thread.join(PATIENCE_S)
+        thread.join(TIMEOUT_S)
         robot.close()
     assert capsys.readouterr().err.startswith("p2os: hold 0.10 m/s, 0 deg/s: ")
 
@@ -225,13 +225,13 @@ def test_a_robot_that_does_not_answer_config_is_measured_without(make_robot: Cal
 def test_a_line_without_a_robot_cannot_be_measured(monkeypatch: pytest.MonkeyPatch) -> None:
     class Silent:
         description = "tcp:nowhere"
-        heard = b""
+        received = b""
 
         def read(self) -> bytes:
             return b""
 
         def write(self, data: bytes) -> None:
-            self.heard += data
+            self.received += data
 
         def fileno(self) -> int:
             raise TransportError("cannot be waited for")

@@ -17,7 +17,7 @@ from p2os.cli.main import run
 from p2os.cli.signals import ENDING_NS, FATAL, end_on_signals, end_on_suspension, postponed, restored_signals
 from p2os.protocol.commands import Command, CommandNumber
 from p2os.timing import NS_PER_S
-from tests.p2os.cli.driven import CLOSE, COMMAND, STOP, Driver, HeardRobot, until
+from tests.p2os.cli.driven import CLOSE, COMMAND, STOP, Driver, RecordingRobot, until
 
 NUMBERS = [signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT, signal.SIGUSR1, signal.SIGTSTP]
 IDENTITY = bytes.fromhex("fafb18025669727475616c0050696f6e6565720070326478002a13")
@@ -40,8 +40,8 @@ main(["teleop", sys.argv[1], "--pad"])
 
 
 @pytest.fixture
-def robot() -> Iterator[HeardRobot]:
-    robot = HeardRobot()
+def robot() -> Iterator[RecordingRobot]:
+    robot = RecordingRobot()
     yield robot
     robot.close()
 
@@ -111,7 +111,7 @@ VERBS: list[Callable[[str, Path], list[Driver]]] = [by_drive, by_way, by_keys, b
 @pytest.mark.parametrize("number", NUMBERS)
 @pytest.mark.parametrize("begin", VERBS)
 def test_a_signal_stops_the_robot_first(
-    begin: Callable[[str, Path], list[Driver]], number: signal.Signals, robot: HeardRobot, drivers: list[Driver],
+    begin: Callable[[str, Path], list[Driver]], number: signal.Signals, robot: RecordingRobot, drivers: list[Driver],
     tmp_path: Path,
 ) -> None:  # fmt: skip
     drivers += begin(robot.url, tmp_path)
@@ -122,9 +122,9 @@ def test_a_signal_stops_the_robot_first(
     robot.wait_until_it_drives()
     sent_at = time.monotonic()
     drivers[0].process.send_signal(number)
-    stopped_at = robot.when_heard(STOP, sent_at)
+    stopped_at = robot.when_received(STOP, sent_at)
     assert stopped_at - sent_at < 0.5
-    assert robot.when_heard(CLOSE, sent_at) >= stopped_at
+    assert robot.when_received(CLOSE, sent_at) >= stopped_at
     code, said = drivers[0].end()
     assert code == 130, said
     assert "Traceback" not in said
@@ -133,17 +133,19 @@ def test_a_signal_stops_the_robot_first(
 
 @pytest.mark.parametrize("number", NUMBERS)
 def test_a_command_that_was_sent_is_taken_back_by_a_signal(
-    number: signal.Signals, robot: HeardRobot, drivers: list[Driver]
+    number: signal.Signals, robot: RecordingRobot, drivers: list[Driver]
 ) -> None:
     drivers.append(Driver([*COMMAND, "send", robot.url, "VEL", "200", "--wait", "1min"]))
-    until(lambda: (CommandNumber.VEL, 200) in [(command.number, command.integer) for _, command in robot.heard], "VEL")
+    until(
+        lambda: (CommandNumber.VEL, 200) in [(command.number, command.integer) for _, command in robot.received], "VEL"
+    )
     sent_at = time.monotonic()
     drivers[0].process.send_signal(number)
     assert drivers[0].end()[0] == 130
-    assert robot.when_heard(STOP, sent_at) <= robot.when_heard(CLOSE, sent_at)
+    assert robot.when_received(STOP, sent_at) <= robot.when_received(CLOSE, sent_at)
 
 
-def test_many_signals_do_not_cut_the_stopping_short(robot: HeardRobot, drivers: list[Driver]) -> None:
+def test_many_signals_do_not_cut_the_stopping_short(robot: RecordingRobot, drivers: list[Driver]) -> None:
     drivers.append(Driver([*COMMAND, "drive", robot.url, "--vel", "100mm/s", "--for", "1min"]))
     robot.wait_until_it_drives()
     for number in (signal.SIGTERM, signal.SIGHUP, signal.SIGINT, signal.SIGQUIT) * 5:
@@ -156,20 +158,20 @@ def test_many_signals_do_not_cut_the_stopping_short(robot: HeardRobot, drivers: 
 
 @pytest.mark.parametrize(("begin", "code"), [(by_drive, 1), (by_replay, 1), (through_sniff, None)])
 def test_a_program_that_was_suspended_stops_the_robot_before_anything_else(
-    begin: Callable[[str, Path], list[Driver]], code: int | None, robot: HeardRobot, drivers: list[Driver],
+    begin: Callable[[str, Path], list[Driver]], code: int | None, robot: RecordingRobot, drivers: list[Driver],
     tmp_path: Path,
 ) -> None:  # fmt: skip
     drivers += begin(robot.url, tmp_path)
     robot.wait_until_it_drives()
     drivers[0].process.send_signal(signal.SIGSTOP)
     time.sleep(0.9)  # longer than a wait of 0.2 s and a gap of 0.35 s
-    heard = len(robot.heard)
+    received = len(robot.received)
     woken_at = time.monotonic()
     drivers[0].process.send_signal(signal.SIGCONT)
-    assert robot.when_heard(STOP, woken_at) - woken_at < 0.5
-    robot.when_heard(CLOSE, woken_at)
+    assert robot.when_received(STOP, woken_at) - woken_at < 0.5
+    robot.when_received(CLOSE, woken_at)
     if begin is not by_drive:  # whose own client stops it
-        assert robot.numbers[heard:] == [STOP, CommandNumber.VEL, CLOSE]
+        assert robot.numbers[received:] == [STOP, CommandNumber.VEL, CLOSE]
     if code is None:
         drivers[0].process.send_signal(signal.SIGINT)
     ended, said = drivers[0].end()

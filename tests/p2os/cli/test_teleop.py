@@ -16,7 +16,7 @@ from p2os.cli.robots.teleop import FIRST_HOLD_NS, KEYS, NEXT_HOLD_NS, QUIT_KEYS,
 from p2os.client import DeadmanStopped, GapStopped, Link, LinkLost, Notice
 from p2os.timing import NS_PER_MS
 
-PATIENCE_S = 60.0
+TIMEOUT_S = 60.0
 
 
 def teleop() -> Teleop:
@@ -157,7 +157,7 @@ class Terminal:
         self.seen = ""
 
     def wait_for(self, words: str) -> None:
-        ends = time.monotonic() + PATIENCE_S
+        ends = time.monotonic() + TIMEOUT_S
         while words not in self.seen and time.monotonic() < ends:
             if select.select([self.keyboard], [], [], 1.0)[0]:
                 try:
@@ -172,7 +172,7 @@ class Terminal:
 
     def end(self) -> int:
         try:
-            return self.process.wait(PATIENCE_S)
+            return self.process.wait(TIMEOUT_S)
         finally:
             self.process.kill()
             os.close(self.keyboard)

@@ -30,7 +30,7 @@ class Bench:
         self.reports = iter(reports)
         self.now = 0
         self.told: list[tuple[int, float, float]] = []
-        self.said: list[str] = []
+        self.lines: list[str] = []
         self.entered = self.left = 0
         self.link_fails_at = link_fails_at
         PadDriver(
@@ -39,7 +39,7 @@ class Bench:
             (PAD_MPS, PAD_RADPS),
             clock=lambda: self.now,
             wait=self.wait,
-            report=self.said.append,
+            report=self.lines.append,
         ).run()
 
     def wait(self, span_ns: int) -> None:
@@ -68,7 +68,7 @@ def test_up_connects_the_sticks_drive_and_down_lets_go() -> None:
     assert (bench.entered, bench.left) == (1, 1)
     speeds = [(forward, turn) for _, forward, turn in bench.told]
     assert speeds == [(PAD_MPS, -PAD_RADPS), (-PAD_MPS, 0), (0, PAD_RADPS), (0, 0)]
-    assert bench.said[-2:] == ["Down was pressed: the robot stands; Up connects again", "the pad is gone"]
+    assert bench.lines[-2:] == ["Down was pressed: the robot stands; Up connects again", "the pad is gone"]
 
 
 def test_a_button_that_is_down_at_the_start_means_nothing() -> None:
@@ -81,7 +81,7 @@ def test_a_pad_that_goes_stops_the_robot_in_200_ms_and_up_must_be_given_anew() -
     assert (bench.entered, bench.left) == (1, 1)
     lost_at = next(at for at, forward, _ in bench.told if forward == 0)
     assert lost_at - 2 * PAD_PERIOD_NS <= 200 * NS_PER_MS
-    assert "the pad is lost: the robot stands; Up connects again" in bench.said
+    assert "the pad is lost: the robot stands; Up connects again" in bench.lines
 
 
 class PausedBench(Bench):
@@ -99,7 +99,7 @@ def test_after_a_pause_up_must_be_given_anew() -> None:
     bench = PausedBench([NOTHING, UP, drive, drive, drive, drive])
     assert (bench.entered, bench.left) == (1, 1)
     assert [forward for _, forward, _ in bench.told] == [PAD_MPS, PAD_MPS, 0]
-    assert "paused for 0.5 s: the robot stands; Up connects again" in bench.said
+    assert "paused for 0.5 s: the robot stands; Up connects again" in bench.lines
 
 
 class StoppedBench(Bench):
@@ -115,13 +115,13 @@ def test_after_a_stop_of_the_client_up_must_be_given_anew() -> None:
     bench = StoppedBench([NOTHING, UP, *[PadReport(forward=1023)] * 4])
     assert bench.left == 1
     assert [forward for _, forward, _ in bench.told] == [PAD_MPS, PAD_MPS, 0]
-    assert "the client stopped the robot: the robot stands; Up connects again" in bench.said
+    assert "the client stopped the robot: the robot stands; Up connects again" in bench.lines
 
 
 def test_a_lost_link_ends_the_session() -> None:
     bench = Bench([NOTHING, UP, PadReport(forward=500), PadReport(forward=500)], link_fails_at=1)
     assert bench.left == 1
-    assert "the link is lost: the robot stands; Up connects again" in bench.said
+    assert "the link is lost: the robot stands; Up connects again" in bench.lines
 
 
 @given(forward=st.integers(0, 1023), backward=st.integers(0, 1023), turn=st.integers(-512, 511))

@@ -76,12 +76,12 @@ class Rig:
         self.is_cut = False
         self.is_open = False
         self.line_baud: int | None = None
-        self.said: list[tuple[int, Command]] = []
+        self.sent: list[tuple[int, Command]] = []
         self.news: list[RobotState | Notice] = []
         #: How long each search took.
         self.searches_ns: list[int] = []
         self._searching_since: int | None = None
-        #: How many commands had been said at each loss.
+        #: How many commands had been sent at each loss.
         self.losses: list[int] = []
         self._on_the_way: list[tuple[int, int, bool, bytes]] = []
         self._last: dict[bool, int] = {}
@@ -129,7 +129,7 @@ class Rig:
         self._exchange()
 
     def commands(self, since: int = 0) -> list[Command]:
-        return [command for at, command in self.said if at >= since]
+        return [command for at, command in self.sent if at >= since]
 
     def notices(self, kind: type | None = None) -> list[Notice]:
         found = [item for item in self.news if not isinstance(item, RobotState)]
@@ -179,7 +179,7 @@ class Rig:
         elif self._searching_since is not None:
             self.searches_ns.append(self.now - self._searching_since)
             self._searching_since = None
-        self.losses += [len(self.said) for item in self.core.news if isinstance(item, LinkLost)]
+        self.losses += [len(self.sent) for item in self.core.news if isinstance(item, LinkLost)]
         self.news += self.core.news
         self.core.news.clear()
 
@@ -199,7 +199,7 @@ class Rig:
                 self.line_baud = action.baud
             case Send():
                 assert self.is_open, "a frame on a closed line"
-                self.said.append((self.now, Command.from_frame(Frame.from_bytes(action.data))))
+                self.sent.append((self.now, Command.from_frame(Frame.from_bytes(action.data))))
                 self._carry(action.data, to_robot=True)
 
     def _deliver_last(self) -> None:

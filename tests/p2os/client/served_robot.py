@@ -1,4 +1,4 @@
-"""A virtual robot served on a real line in a thread, for tests of the client's skins; every wait is bounded."""
+"""A virtual robot served on a real line in a thread, for tests of the client's I/O layers; every wait is bounded."""
 
 import threading
 import time
@@ -15,14 +15,14 @@ from p2os.transport.ports import HungUpError, Transport
 from tests.p2os.client.client_rig import new_pioneer
 
 #: A bound on every wait; reached only when something is broken.
-PATIENCE_S = 30.0
+TIMEOUT_S = 30.0
 #: Robots of tests are never open already.
 QUICK = ClientSettings(listen_ns=NS_PER_MS)
 
 
 def until(is_so: Callable[[], object], what: str = "it") -> None:
     """Wait until something is so."""
-    end = time.monotonic() + PATIENCE_S
+    end = time.monotonic() + TIMEOUT_S
     while not is_so():
         assert time.monotonic() < end, f"{what} never came to be"
         time.sleep(0.002)
@@ -34,7 +34,7 @@ class ServedRobot:
     def __init__(self, url: str = "tcp:127.0.0.1:0", pioneer: Pioneer | None = None, *, speed: float = 1.0) -> None:
         self.pioneer = pioneer or new_pioneer()
         #: What the robot is to do between two turns of its host: called once, in the host's thread.
-        self.wishes: list[Callable[[Pioneer, Nanos], None]] = []
+        self.requests: list[Callable[[Pioneer, Nanos], None]] = []
         listener = listen_url(url)
         self.url = listener.description
         self.told: list[str] = []
@@ -49,8 +49,8 @@ class ServedRobot:
         try:
             while not self._end.is_set():
                 self._host.turn(0.02)
-                while self.wishes:
-                    self.wishes.pop(0)(self.pioneer, self._host.now)
+                while self.requests:
+                    self.requests.pop(0)(self.pioneer, self._host.now)
         finally:
             self._host.close()
 
@@ -63,14 +63,14 @@ class ServedRobot:
     def is_moving(self) -> bool:
         return self.wheels_mps != (0.0, 0.0)
 
-    def connect_request(self, call: Callable[[Pioneer, Nanos], None]) -> None:
+    def do_in_thread(self, call: Callable[[Pioneer, Nanos], None]) -> None:
         """Have something done to the robot, and wait until it is."""
-        self.wishes.append(call)
-        until(lambda: not self.wishes)
+        self.requests.append(call)
+        until(lambda: not self.requests)
 
     def close(self) -> None:
         self._end.set()
-        self._thread.join(PATIENCE_S)
+        self._thread.join(TIMEOUT_S)
         assert not self._thread.is_alive()
 
 
@@ -85,7 +85,7 @@ class Recorder:
         return self.lines[-1]
 
     @property
-    def said(self) -> list[Command]:
+    def sent(self) -> list[Command]:
         """All commands, on all lines."""
         decoder = Decoder()
         for line in self.lines:
@@ -104,9 +104,9 @@ class RecordedLine:
         self.inner = inner
         self.description = inner.description
         self.written = bytearray()
-        #: Nothing passes any more, and nobody is told.
+        #: Nothing passes any more, and nobody is notified.
         self.is_mute = False
-        #: The next read says that the line has gone.
+        #: The next read finds that the line has gone.
         self.is_broken = False
 
     def read(self) -> bytes:

@@ -28,7 +28,7 @@ from p2os.robots.parameters import ParametersError
 from p2os.timing import NS_PER_MS
 from tests.p2os.client.served_robot import QUICK, Recorder, ServedRobot, until
 
-LAST_WORDS = [stop(), vel(0), enable(False), Command(CommandNumber.CLOSE)]
+CLOSING_COMMANDS = [stop(), vel(0), enable(False), Command(CommandNumber.CLOSE)]
 
 
 @pytest.fixture
@@ -55,7 +55,7 @@ def test_a_block_opens_a_session_and_ends_it(served: ServedRobot) -> None:
         assert robot.next_state().number > first.number
         assert robot.stats.frames_received > 3
         assert robot.limits.forward_mps == pytest.approx(0.75)
-    assert recorder.said[-4:] == LAST_WORDS
+    assert recorder.sent[-4:] == CLOSING_COMMANDS
     until(lambda: not served.pioneer.state.open)
     robot.close()
     with pytest.raises(P2osError, match="this robot was closed"):
@@ -64,17 +64,17 @@ def test_a_block_opens_a_session_and_ends_it(served: ServedRobot) -> None:
 
 def test_states_and_events_can_be_iterated_and_listened_to(served: ServedRobot) -> None:
     with robot_on(served) as robot:
-        heard: list[RobotState] = []
-        end = robot.on_state(heard.append)
+        received: list[RobotState] = []
+        end = robot.on_state(received.append)
         numbers = [state.number for state, _ in zip(robot.states(), range(3), strict=False)]
         assert numbers == sorted(set(numbers))
-        assert heard
+        assert received
         end()
         end()
-        count = len(heard)
+        count = len(received)
         robot.next_state()
         robot.next_state()
-        assert len(heard) <= count + 1
+        assert len(received) <= count + 1
         notices: list[Notice] = []
         robot.on_event(notices.append)
         events = robot.events()
@@ -111,7 +111,7 @@ def test_the_robot_is_stopped_whatever_ends_the_block(served: ServedRobot, error
         robot.set_velocity(0.3)
         until(lambda: served.is_moving)
         raise error
-    assert recorder.said[-4:] == LAST_WORDS
+    assert recorder.sent[-4:] == CLOSING_COMMANDS
     until(lambda: not served.is_moving and not served.pioneer.state.motors_enabled)
 
 
@@ -127,7 +127,7 @@ def test_ctrl_c_ends_any_wait_and_stops_the_robot(served: ServedRobot, what: str
             robot.drive(5.0) if what == "drive" else robot.sleep(60)
     assert robot.link is Link.CLOSED
     if what != "connect":
-        assert recorder.said[-4:] == LAST_WORDS
+        assert recorder.sent[-4:] == CLOSING_COMMANDS
     until(lambda: not served.is_moving and not served.pioneer.state.open)
 
 
@@ -153,7 +153,7 @@ def test_an_error_in_a_callback_stops_the_robot_and_reaches_the_program(served: 
         robot.on_state(lambda _: 1 // 0)  # type: ignore[arg-type,return-value]
         with pytest.raises(P2osError, match=r"the client's thread failed: .*division"):
             robot.sleep(60)
-        assert stop() in recorder.said
+        assert stop() in recorder.sent
         until(lambda: not served.is_moving)
         with pytest.raises(P2osError, match="thread failed"):
             robot.set_velocity(0.3)
@@ -165,12 +165,12 @@ def test_an_error_in_a_callback_stops_the_robot_and_reaches_the_program(served: 
 def test_a_program_that_hangs_is_stopped_by_the_deadman(served: ServedRobot) -> None:
     settings = ClientSettings(listen_ns=NS_PER_MS, deadman_ns=1000 * NS_PER_MS)
     with robot_on(served, settings=settings) as robot:
-        heard: list[Notice] = []
-        robot.on_event(heard.append)
+        received: list[Notice] = []
+        robot.on_event(received.append)
         robot.set_velocity(0.3)
         until(lambda: served.is_moving)
         until(lambda: not served.is_moving)
-        assert [type(notice) for notice in heard] == [DeadmanStopped]
+        assert [type(notice) for notice in received] == [DeadmanStopped]
         robot.set_velocity(0.2)
         robot.sleep(1.3)
         assert served.is_moving, "a program that waits in sleep() is known to live"
@@ -268,22 +268,22 @@ def test_the_robots_own_serial_port_is_a_file(served: ServedRobot) -> None:
         assert port.readable()
         assert port.writable()
         assert port.write(b"x" * 200) == 200
-        until(lambda: [c.number for c in recorder.said].count(CommandNumber.TTY2) == 2)
-        served.connect_request(lambda pioneer, now: pioneer._connection.send(SerauxPacket(data=b"hello "), now))
+        until(lambda: [c.number for c in recorder.sent].count(CommandNumber.TTY2) == 2)
+        served.do_in_thread(lambda pioneer, now: pioneer._connection.send(SerauxPacket(data=b"hello "), now))
         threading.Timer(
             0.1,
-            served.connect_request,
+            served.do_in_thread,
             (lambda pioneer, now: pioneer._connection.send(SerauxPacket(data=b"world"), now),),
         ).start()
         port.timeout_s = None
         assert port.read(8) == b"hello wo"
-        assert Command(CommandNumber.GETAUX, 8) in recorder.said or Command(CommandNumber.GETAUX, 2) in recorder.said
+        assert Command(CommandNumber.GETAUX, 8) in recorder.sent or Command(CommandNumber.GETAUX, 2) in recorder.sent
         buffer = bytearray(2)
         assert port.readinto(memoryview(buffer)) == 2
         assert buffer == b"rl"
         assert port.read() == b"d"
         port.timeout_s = 0.05
         port.flush_input()
-        until(lambda: Command(CommandNumber.GETAUX, 0) in recorder.said)
+        until(lambda: Command(CommandNumber.GETAUX, 0) in recorder.sent)
     with pytest.raises(UsageError, match="no AUX port 4"):
         robot.aux(4)

@@ -13,9 +13,9 @@ from p2os.errors import P2osError
 from p2os.protocol.commands import Command, CommandNumber, enable, stop, vel
 from p2os.protocol.packets import EncoderPacket, IoPacket, SerauxPacket
 from p2os.timing import NS_PER_MS
-from tests.p2os.client.served_robot import PATIENCE_S, QUICK, Recorder, ServedRobot, until
+from tests.p2os.client.served_robot import QUICK, TIMEOUT_S, Recorder, ServedRobot, until
 
-LAST_WORDS = [stop(), vel(0), enable(False), Command(CommandNumber.CLOSE)]
+CLOSING_COMMANDS = [stop(), vel(0), enable(False), Command(CommandNumber.CLOSE)]
 
 
 @pytest.fixture
@@ -33,7 +33,7 @@ def run(story: Coroutine[Any, Any, None]) -> None:
     """Run a test's story, bounded."""
 
     async def bounded() -> None:
-        await asyncio.wait_for(story, PATIENCE_S)
+        await asyncio.wait_for(story, TIMEOUT_S)
 
     asyncio.run(bounded())
 
@@ -66,16 +66,16 @@ def test_a_block_opens_a_session_moves_and_ends_it(served: ServedRobot) -> None:
         assert robot.link is Link.CLOSED
 
     run(story())
-    assert recorder.said[-4:] == LAST_WORDS
+    assert recorder.sent[-4:] == CLOSING_COMMANDS
     until(lambda: not served.pioneer.state.open)
 
 
 def test_states_and_events_come_by_iteration_and_by_callback(served: ServedRobot) -> None:
     async def story() -> None:
-        heard: list[RobotState] = []
+        received: list[RobotState] = []
         notices: list[Notice] = []
         async with robot_on(served) as robot:
-            end_states, end_events = robot.on_state(heard.append), robot.on_event(notices.append)
+            end_states, end_events = robot.on_state(received.append), robot.on_event(notices.append)
             numbers = []
             async for state in robot.states():
                 numbers.append(state.number)
@@ -88,7 +88,7 @@ def test_states_and_events_come_by_iteration_and_by_callback(served: ServedRobot
             await robot.drive(0.0)
             assert isinstance(await waiting, MotionEnded)
             await events.aclose()  # type: ignore[attr-defined]  # a generator
-            assert heard
+            assert received
             assert notices
             for end in (end_states, end_events, end_states):
                 end()
@@ -113,7 +113,7 @@ def test_the_robot_is_stopped_whatever_ends_the_block(served: ServedRobot, error
 
     with pytest.raises(error):
         asyncio.run(story())
-    assert recorder.said[-4:] == LAST_WORDS
+    assert recorder.sent[-4:] == CLOSING_COMMANDS
     until(lambda: not served.is_moving and not served.pioneer.state.motors_enabled)
 
 
@@ -129,7 +129,7 @@ def test_a_task_that_is_cancelled_in_a_drive_stops_the_robot_and_the_block_goes_
                 await driving
             while served.is_moving:  # it stops in another thread
                 await robot.sleep(0.01)
-            assert stop() in recorder.said
+            assert stop() in recorder.sent
             assert robot.link is Link.OPEN
 
     run(story())
@@ -165,7 +165,7 @@ def test_a_program_that_is_cancelled_in_its_block_stops_the_robot(served: Served
             await task
 
     run(story())
-    assert recorder.said[-4:] == LAST_WORDS
+    assert recorder.sent[-4:] == CLOSING_COMMANDS
     until(lambda: not served.is_moving)
 
 
@@ -187,7 +187,7 @@ def test_a_program_that_is_cancelled_again_while_it_closes_has_said_stop_and_clo
             await task
 
     run(story())
-    assert recorder.said[-4:] == LAST_WORDS
+    assert recorder.sent[-4:] == CLOSING_COMMANDS
     until(lambda: not served.is_moving)
 
 
@@ -205,7 +205,7 @@ def test_an_error_in_a_callback_stops_the_robot_and_reaches_the_program(served: 
                 robot.set_velocity(0.3)
 
     run(story())
-    assert recorder.said[-4:] == LAST_WORDS
+    assert recorder.sent[-4:] == CLOSING_COMMANDS
     until(lambda: not served.is_moving)
 
 
@@ -257,17 +257,15 @@ def test_packets_are_fetched_and_the_robots_own_port_is_a_file(served: ServedRob
 
     async def story() -> None:
         async with robot_on(served, recorder) as robot:
-            asking = asyncio.ensure_future(robot.fetch(EncoderPacket, timeout_s=PATIENCE_S))
+            asking = asyncio.ensure_future(robot.fetch(EncoderPacket, timeout_s=TIMEOUT_S))
             await asyncio.sleep(0.01)
-            served.connect_request(
+            served.do_in_thread(
                 lambda pioneer, now: pioneer._connection.send(EncoderPacket(left_counts=1, right_counts=2), now)
             )
             assert isinstance(await asking, EncoderPacket)
             port = robot.aux()
             assert await port.write(b"x" * 200) == 200
-            served.connect_request(
-                lambda pioneer, now: pioneer._connection.send(SerauxPacket(data=b"hello world"), now)
-            )
+            served.do_in_thread(lambda pioneer, now: pioneer._connection.send(SerauxPacket(data=b"hello world"), now))
             port.timeout_s = None
             assert await port.read(8) == b"hello wo"
             assert await port.read(3) == b"rld"
@@ -279,8 +277,8 @@ def test_packets_are_fetched_and_the_robots_own_port_is_a_file(served: ServedRob
             port.close()
             with pytest.raises(P2osError, match=r"no IoPacket within 0\.1 s"):
                 await robot.fetch(IoPacket, timeout_s=0.1)
-        assert [command.number for command in recorder.said].count(CommandNumber.TTY2) == 2
-        assert Command(CommandNumber.GETAUX, 0) in recorder.said
+        assert [command.number for command in recorder.sent].count(CommandNumber.TTY2) == 2
+        assert Command(CommandNumber.GETAUX, 0) in recorder.sent
 
     run(story())
 

@@ -31,7 +31,7 @@ class Story(RuleBasedStateMachine):
         self.rig = Rig(wire=wire, baud=baud, robot_baud=9600, seed=seed)
         self.is_allowed = False
         self.unheard_since: int | None = None
-        self.seen_said = 0
+        self.seen_sent = 0
 
     def teardown(self) -> None:
         if hasattr(self, "rig"):
@@ -109,18 +109,18 @@ class Story(RuleBasedStateMachine):
             self.a_robot_that_hears_nothing_stands()
 
     def look(self) -> None:
-        """Go through what was said since the last look, in order."""
+        """Go through what was sent since the last look, in order."""
         rig = self.rig
         rig.run(0)
-        said, losses = rig.commands(), set(rig.losses)
-        for place in range(self.seen_said, len(said)):
+        sent, losses = rig.commands(), set(rig.losses)
+        for place in range(self.seen_sent, len(sent)):
             if place in losses:
                 self.is_allowed = False
-                assert said[place : place + 2] in ([stop()], [stop(), vel(0)]), said[place : place + 2]
-            if not self.is_allowed and said[place].number in MOVING:
-                assert not said[place].argument, said[place - 3 : place + 1]
-        self.seen_said = len(said)
-        if losses and max(losses) >= len(said):
+                assert sent[place : place + 2] in ([stop()], [stop(), vel(0)]), sent[place : place + 2]
+            if not self.is_allowed and sent[place].number in MOVING:
+                assert not sent[place].argument, sent[place - 3 : place + 1]
+        self.seen_sent = len(sent)
+        if losses and max(losses) >= len(sent):
             self.is_allowed = False
 
     def a_search_ends(self) -> None:

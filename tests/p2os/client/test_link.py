@@ -1,4 +1,4 @@
-"""The life of the link: finding a robot, losing it, finding it again; in virtual time."""
+"""The link: finding a robot, losing it, finding it again; in virtual time."""
 
 import pytest
 
@@ -40,11 +40,11 @@ def test_stop_goes_before_the_first_sync0_and_before_each_repeated_one(baud: int
     rig.is_cut = True
     rig.core.connect(0)
     rig.until(lambda: rig.core.link is Link.FAILED)
-    said = rig.commands()
-    for place, command in enumerate(said):
+    sent = rig.commands()
+    for place, command in enumerate(sent):
         if command == SYNC0:
-            assert said[place - 3 : place] == STOPS
-    assert said.count(SYNC0) == 11
+            assert sent[place - 3 : place] == STOPS
+    assert sent.count(SYNC0) == 11
 
 
 def test_a_fresh_line_without_a_rate_is_listened_to_and_then_gets_sync0_alone() -> None:
@@ -55,7 +55,7 @@ def test_a_fresh_line_without_a_rate_is_listened_to_and_then_gets_sync0_alone() 
     assert rig.commands() == []
     rig.until(lambda: rig.core.link is Link.FAILED)
     assert set(rig.commands()) == {SYNC0}
-    assert rig.said[0] == (250 * MS, SYNC0)
+    assert rig.sent[0] == (250 * MS, SYNC0)
     assert rig.commands().count(SYNC0) == 8
 
 
@@ -169,9 +169,9 @@ def test_a_robot_that_streams_at_another_rate_is_stopped_closed_and_opened() -> 
     second = Rig(baud=9600, robot_baud=38400, pioneer=first.pioneer, now=first.now)
     second.connect()
     assert second.core.baud == 38400
-    said = second.commands()
-    at = said.index(CLOSE)
-    assert said[at - 2 : at] == [stop(), vel(0)]
+    sent = second.commands()
+    at = sent.index(CLOSE)
+    assert sent[at - 2 : at] == [stop(), vel(0)]
     second.run(3)
     assert second.wheels == (0.0, 0.0)
 
@@ -222,7 +222,7 @@ def test_silence_is_a_loss_after_a_second_and_the_robot_is_looked_for() -> None:
     rig.living(1.1)
     assert rig.notices(LinkLost) == [LinkLost("no packet for 1000 ms")]
     assert rig.notices(ReconnectPlanned)[0].wait_ns == 250 * MS
-    after = [command for at, command in rig.said if at >= cut_at + NS_PER_S - 100 * MS]
+    after = [command for at, command in rig.sent if at >= cut_at + NS_PER_S - 100 * MS]
     assert after[-2:] == [stop(), vel(0)]
     rig.is_cut = False
     rig.until(lambda: rig.core.link is Link.OPEN)
@@ -359,7 +359,7 @@ def test_closing_stops_the_robot_whatever_is_under_way() -> None:
     rig = Rig().connect()
     rig.core.set_velocity(0.3, 0.0, rig.now)
     rig.living(1)
-    before = len(rig.said)
+    before = len(rig.sent)
     rig.core.close(rig.now)
     rig.run(1)
     assert rig.commands()[before:] == [stop(), vel(0), enable(False), CLOSE]
@@ -386,6 +386,6 @@ def test_two_rigs_with_one_seed_say_the_same() -> None:
         rig = Rig(wire="lossy", seed=7, pioneer=new_pioneer())
         rig.core.connect(0)
         rig.run(30)
-        return rig.said
+        return rig.sent
 
     assert story() == story()

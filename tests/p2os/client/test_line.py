@@ -28,19 +28,19 @@ STOPS = b"".join(command.to_frame().to_bytes() for command in (stop(), vel(0), r
 def test_a_serial_cable_is_pulled_and_put_back(tmp_path: Path) -> None:
     port = tmp_path / "ttyROBOT"
     served = ServedRobot(f"pty:{port}")
-    recorder, heard = Recorder(), list[Notice]()
+    recorder, received = Recorder(), list[Notice]()
     try:
         with Robot(f"serial:{port}", settings=QUICK, opener=recorder) as robot:
-            robot.on_event(heard.append)
+            robot.on_event(received.append)
             robot.set_velocity(0.3)
             until(lambda: served.is_moving)
             served.close()
-            until(lambda: any(isinstance(notice, LinkLost) for notice in heard), "the loss")
-            lost = next(notice for notice in heard if isinstance(notice, LinkLost))
+            until(lambda: any(isinstance(notice, LinkLost) for notice in received), "the loss")
+            lost = next(notice for notice in received if isinstance(notice, LinkLost))
             assert "vanished" in lost.reason
             with pytest.raises(LinkLostError, match="no robot is connected"):
                 robot.set_velocity(0.3)
-            until(lambda: sum(isinstance(notice, ReconnectPlanned) for notice in heard) >= 2, "another try")
+            until(lambda: sum(isinstance(notice, ReconnectPlanned) for notice in received) >= 2, "another try")
             served = ServedRobot(f"pty:{port}")
             robot.wait_open(timeout_s=30)
             assert recorder.lines[-1].written.startswith(STOPS)
@@ -49,7 +49,7 @@ def test_a_serial_cable_is_pulled_and_put_back(tmp_path: Path) -> None:
             robot.set_velocity(0.3)  # the program was told by the call before
             until(lambda: served.is_moving)
         until(lambda: not served.is_moving)
-        assert enable(False) in recorder.said
+        assert enable(False) in recorder.sent
     finally:
         served.close()
 

@@ -27,7 +27,7 @@ from p2os.transport import open_url
 from p2os.transport.ports import Transport
 from tests.p2os.client.served_robot import QUICK, Recorder, ServedRobot, until
 
-LAST_WORDS = [stop(), vel(0), enable(False), Command(CommandNumber.CLOSE)]
+CLOSING_COMMANDS = [stop(), vel(0), enable(False), Command(CommandNumber.CLOSE)]
 OURS = str(Path(p2os.__file__).parent)
 
 
@@ -39,11 +39,11 @@ def served() -> Iterator[ServedRobot]:
 
 
 def was_told(recorder: Recorder) -> bool:
-    """Tell whether STOP, VEL 0, ENABLE 0 and CLOSE were said, in this order, after the last speed."""
-    said = recorder.said
-    last_speed = max((place for place, command in enumerate(said) if command == vel(300)), default=-1)
-    left = iter(said[last_speed + 1 :])
-    return all(word in left for word in LAST_WORDS)
+    """Tell whether STOP, VEL 0, ENABLE 0 and CLOSE were sent, in this order, after the last speed."""
+    sent = recorder.sent
+    last_speed = max((place for place, command in enumerate(sent) if command == vel(300)), default=-1)
+    left = iter(sent[last_speed + 1 :])
+    return all(word in left for word in CLOSING_COMMANDS)
 
 
 class Interrupter:
@@ -102,7 +102,7 @@ def test_a_second_ctrl_c_at_any_line_of_closing_leaves_the_robot_told(hasty: Ser
         interrupter = Interrupter(place, files)
         robot = Robot(hasty.url, settings=QUICK, opener=recorder).connect()
         robot.set_velocity(0.3)
-        until(lambda: vel(300) in recorder.said)
+        until(lambda: vel(300) in recorder.sent)
         with contextlib.suppress(KeyboardInterrupt), interrupter:
             robot.close()
         return interrupter.lines, interrupter.at, recorder
@@ -153,7 +153,7 @@ def test_a_burst_of_interrupts_cannot_shorten_the_closing(served: ServedRobot) -
         signal.setitimer(signal.ITIMER_REAL, 0)
         signal.signal(signal.SIGALRM, before)
     assert len(interrupts) > 3
-    until(lambda: recorder.said[-4:] == LAST_WORDS)
+    until(lambda: recorder.sent[-4:] == CLOSING_COMMANDS)
     until(lambda: not served.is_moving and not served.pioneer.state.open)
 
 
@@ -183,7 +183,7 @@ def test_closing_inside_a_callback_says_everything(served: ServedRobot) -> None:
     robot.set_velocity(0.3)
     until(lambda: served.is_moving)
     robot.on_state(lambda _: robot.close())
-    until(lambda: recorder.said[-4:] == LAST_WORDS)
+    until(lambda: recorder.sent[-4:] == CLOSING_COMMANDS)
     until(lambda: not served.is_moving and not served.pioneer.state.open)
     with pytest.raises(LinkLostError):
         robot.set_velocity(0.3)
@@ -219,7 +219,7 @@ def test_an_asyncio_callback_may_have_the_robot_closed(served: ServedRobot) -> N
         await tasks[0]
 
     asyncio.run(story())
-    assert recorder.said[-4:] == LAST_WORDS
+    assert recorder.sent[-4:] == CLOSING_COMMANDS
 
 
 def test_an_asyncio_robot_that_is_forgotten_is_stopped(served: ServedRobot) -> None:
@@ -232,7 +232,7 @@ def test_an_asyncio_robot_that_is_forgotten_is_stopped(served: ServedRobot) -> N
         await asyncio.sleep(0.1)
         del robot
         gc.collect()
-        assert recorder.said[-4:] == LAST_WORDS
+        assert recorder.sent[-4:] == CLOSING_COMMANDS
 
     asyncio.run(story())
     until(lambda: not served.pioneer.state.open)
@@ -247,7 +247,7 @@ def test_an_asyncio_robot_whose_loop_has_ended_is_stopped(served: ServedRobot) -
         robot.set_velocity(0.3)
 
     asyncio.run(story())
-    assert recorder.said[-4:] == LAST_WORDS
+    assert recorder.sent[-4:] == CLOSING_COMMANDS
     until(lambda: not served.pioneer.state.open)
 
 

@@ -26,7 +26,7 @@ MOVE, HEAD, SETV = CommandNumber.MOVE, CommandNumber.HEAD, CommandNumber.SETV
 
 
 def of(rig: Rig, *numbers: int) -> list[tuple[int, Command]]:
-    return [(at, command) for at, command in rig.said if command.number in numbers]
+    return [(at, command) for at, command in rig.sent if command.number in numbers]
 
 
 def test_a_speed_goes_out_at_once_on_change_and_every_200_ms() -> None:
@@ -48,7 +48,7 @@ def test_a_flood_of_changes_is_thinned_to_the_newest() -> None:
     rig = Rig().connect()
     rig.core.set_velocity(0.1, 0.0, rig.now)
     rig.living(0.5)
-    before = len(rig.said)
+    before = len(rig.sent)
     for step in range(200):
         rig.core.set_velocity(0.1 + step / 1000, 0.0, rig.now)
         rig.run(0.001)
@@ -114,7 +114,7 @@ def test_motors_that_somebody_switches_off_stay_off_until_asked() -> None:
     rig.pioneer._context.motion.power(on=False)
     rig.living(0.3)
     assert rig.notices(MotorsDisabled) == [MotorsDisabled("motors are disabled: they were switched off at the robot")]
-    before = len(rig.said)
+    before = len(rig.sent)
     rig.living(1)
     assert vel(200) not in rig.commands()[before:]
     with pytest.raises(MotorsDisabledError, match="switched off at the robot"):
@@ -154,16 +154,16 @@ def test_stop_is_said_and_then_held() -> None:
     rig = Rig().connect()
     rig.core.set_velocity(0.3, 0.1, rig.now)
     rig.living(2)
-    before = len(rig.said)
+    before = len(rig.sent)
     rig.core.stop(rig.now)
     rig.living(2)
-    said = rig.commands()[before:]
-    assert said[:1] == [stop()]
-    assert said.count(vel(0)) >= 9
+    sent = rig.commands()[before:]
+    assert sent[:1] == [stop()]
+    assert sent.count(vel(0)) >= 9
     assert rig.wheels == (0.0, 0.0)
     rig.core.set_velocity(0.3, 0.0, rig.now)
     rig.living(1.5)
-    before = len(rig.said)
+    before = len(rig.sent)
     rig.core.stop(rig.now, at_once=True)
     rig.run(0.1)
     assert [command.number for command in rig.commands()[before:]][:2] == [CommandNumber.E_STOP, CommandNumber.STOP]
@@ -325,7 +325,7 @@ def test_a_raw_motion_takes_the_place_of_a_held_speed() -> None:
     rig.core.set_velocity(0.2, 0.0, rig.now)
     rig.living(1)
     rig.core.send(Command(CommandNumber.VEL2, 10 << 8 | 10), rig.now)
-    before = len(rig.said)
+    before = len(rig.sent)
     rig.living(1)
     assert vel(200) not in rig.commands()[before:]
     assert rig.wheels == pytest.approx((0.2, 0.2), abs=1e-6)
@@ -348,7 +348,7 @@ def test_after_a_loss_the_robot_began_to_stop_at_its_watchdog_or_earlier_and_sta
     rig.until(lambda: rig.core.link is Link.OPEN)
     assert rig.notices(LinkLost)
     rig.living(5)
-    speeds = [command.argument for said, command in rig.said
-              if said > at + 1100 * MS and command.number in {CommandNumber.VEL, CommandNumber.RVEL}]  # fmt: skip
+    speeds = [command.argument for sent_at, command in rig.sent
+              if sent_at > at + 1100 * MS and command.number in {CommandNumber.VEL, CommandNumber.RVEL}]  # fmt: skip
     assert set(speeds) <= {0}
     assert rig.wheels == (0.0, 0.0)

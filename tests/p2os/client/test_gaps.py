@@ -44,7 +44,7 @@ class Bench:
         self.clock_ns: Nanos = 5 * NS_PER_S
         self.pioneer = new_pioneer()
         self.core = RobotCore(QUICK)
-        self.said: list[Command] = []
+        self.sent: list[Command] = []
         self.notices: list[Notice] = []
         self.is_gone = False
         self._decoder = Decoder()
@@ -66,7 +66,7 @@ class Bench:
     def write(self, data: bytes) -> None:
         self._decoder.receive(data, 0)
         while isinstance(item := self._decoder.next_item(), Frame):
-            self.said.append(Command.from_frame(item))
+            self.sent.append(Command.from_frame(item))
         self.pioneer.receive(data, self._robot_ns)
 
     def fileno(self) -> int:
@@ -106,7 +106,7 @@ class Bench:
         self.core.set_velocity(0.3, 0.0, self.line.now())
         self.run(0.5)
         assert self.wheels[0] > 0
-        self.said.clear()
+        self.sent.clear()
         self.notices.clear()
 
     @property
@@ -117,7 +117,7 @@ class Bench:
         """End a wait so long after its deadline."""
         self.turn()
         wait_ns = round(self.line.wait_s() * NS_PER_S)
-        self.said.clear()
+        self.sent.clear()
         self.pass_by(wait_ns + gap_ns, robot_lives=robot_lives)
 
 
@@ -127,7 +127,7 @@ def test_a_wait_that_ends_350_ms_late_is_not_yet_a_gap(gap_ns: Nanos, stops: boo
     bench.drive()
     bench.late_by(gap_ns)
     bench.turn()
-    assert (bench.said[0] == stop()) is stops
+    assert (bench.sent[0] == stop()) is stops
     assert bench.core.commanded.are_zero is stops
     assert bench.core.link is Link.OPEN
 
@@ -138,12 +138,12 @@ def test_after_a_gap_in_which_packets_came_the_robot_stands_and_the_link_lives(g
     bench.drive()
     bench.late_by(gap_ms * NS_PER_MS)
     bench.turn()
-    assert bench.said[0] == stop()
+    assert bench.sent[0] == stop()
     assert [type(notice) for notice in bench.notices] == [GapStopped]
     bench.run(3.0)
     assert bench.core.link is Link.OPEN
     assert bench.wheels == (0.0, 0.0)
-    assert vel(300) not in bench.said
+    assert vel(300) not in bench.sent
     bench.core.set_velocity(0.2, 0.0, bench.line.now())
     bench.run(0.5)
     assert bench.wheels[0] > 0, "asked anew it moves"
@@ -154,7 +154,7 @@ def test_a_gap_in_which_nothing_came_is_silence_and_loses_the_link() -> None:
     bench.drive()
     bench.late_by(1100 * NS_PER_MS, robot_lives=False)
     bench.turn()
-    assert bench.said[0] == stop()
+    assert bench.sent[0] == stop()
     assert [type(notice) for notice in bench.notices][:2] == [GapStopped, LinkLost]
     assert bench.core.link is Link.WAITING
     with pytest.raises(LinkLostError):
@@ -167,7 +167,7 @@ def test_a_short_gap_without_a_packet_is_not_a_loss() -> None:
     bench.late_by(400 * NS_PER_MS, robot_lives=False)
     bench.turn()
     assert bench.core.link is Link.OPEN
-    assert bench.said[0] == stop()
+    assert bench.sent[0] == stop()
 
 
 def test_a_line_that_went_in_a_gap_is_lost_and_nothing_raises() -> None:
@@ -176,7 +176,7 @@ def test_a_line_that_went_in_a_gap_is_lost_and_nothing_raises() -> None:
     bench.late_by(5 * NS_PER_S)
     bench.is_gone = True
     bench.turn()
-    assert bench.said[0] == stop()
+    assert bench.sent[0] == stop()
     assert isinstance(bench.notices[-1], ReconnectPlanned)
     assert bench.core.link is not Link.OPEN
 
@@ -187,8 +187,8 @@ def test_a_call_after_a_gap_stops_the_robot_before_it_does_anything() -> None:
     bench.late_by(2 * NS_PER_S)
     bench.core.set_velocity(0.2, 0.0, bench.line.now())
     bench.turn()
-    assert bench.said[0] == stop()
-    assert vel(300) not in bench.said
+    assert bench.sent[0] == stop()
+    assert vel(300) not in bench.sent
 
 
 def test_a_machine_that_sleeps_in_the_middle_of_a_turn_sends_nothing_old() -> None:
@@ -208,11 +208,11 @@ def test_a_machine_that_sleeps_in_the_middle_of_a_turn_sends_nothing_old() -> No
     bench.core.advance_to = sleep_then  # type: ignore[method-assign,assignment]  # between the look and the writing
     bench.turn()
     assert slept
-    assert bench.said == []
+    assert bench.sent == []
     bench.line.wait_s()
     bench.turn()
-    assert bench.said[0] == stop()
-    assert vel(400) not in bench.said
+    assert bench.sent[0] == stop()
+    assert vel(400) not in bench.sent
 
 
 def test_a_gap_ends_a_drive() -> None:
@@ -222,7 +222,7 @@ def test_a_gap_ends_a_drive() -> None:
     assert bench.wheels[0] > 0
     bench.late_by(2 * NS_PER_S)
     bench.turn()
-    assert bench.said[0] == stop()
+    assert bench.sent[0] == stop()
     assert goal.ended is not None
     assert goal.ended.problem == "the program or its machine paused for 2.0 s"
     bench.run(3.0)
@@ -234,7 +234,7 @@ def test_a_gap_of_a_robot_that_stands_is_told_to_nobody() -> None:
     bench.notices.clear()
     bench.late_by(2 * NS_PER_S)
     bench.turn()
-    assert bench.said[0] == stop()
+    assert bench.sent[0] == stop()
     assert bench.notices == []
 
 
@@ -272,12 +272,12 @@ def test_a_blocking_robot_whose_machine_slept_stops_first_and_never_drives_on(se
     clock, recorder, told = SuspendingClock(), Recorder(), list[Notice]()
     with robot_with(clock, served, recorder) as robot:
         robot.on_event(told.append)
-        said: list[int] = []
+        sent: list[int] = []
 
         def fall_asleep() -> None:
             until(lambda: served.is_moving)
             time.sleep(0.2)
-            _suspend_in_callback(robot, clock, recorder, said)
+            _suspend_in_callback(robot, clock, recorder, sent)
 
         threading.Thread(target=fall_asleep, daemon=True).start()
         if what == "hold":
@@ -286,19 +286,19 @@ def test_a_blocking_robot_whose_machine_slept_stops_first_and_never_drives_on(se
         else:
             with pytest.raises((MotionError, LinkLostError), match="paused for"):
                 robot.drive(5.0)
-        until(lambda: said)
-        assert recorder.said[said[0]] == stop()
-        assert vel(300) not in recorder.said[said[0] :]
+        until(lambda: sent)
+        assert recorder.sent[sent[0]] == stop()
+        assert vel(300) not in recorder.sent[sent[0] :]
         until(lambda: not served.is_moving)
         assert any(isinstance(notice, GapStopped) for notice in told)
 
 
-def _suspend_in_callback(robot: Robot, clock: SuspendingClock, recorder: Recorder, said: list[int]) -> None:
+def _suspend_in_callback(robot: Robot, clock: SuspendingClock, recorder: Recorder, sent: list[int]) -> None:
     """Let the machine sleep in the thread that turns the line: nothing is written meanwhile."""
 
     def once(_: object) -> None:
-        if not said:
-            said.append(len(recorder.said))
+        if not sent:
+            sent.append(len(recorder.sent))
             clock.suspend(5.0)
 
     robot.on_state(once)
@@ -313,11 +313,11 @@ def test_an_asyncio_robot_whose_machine_slept_stops_first_and_never_drives_on(se
             robot.set_velocity(0.3)
             while not served.is_moving:  # noqa: ASYNC110  # it moves in another thread
                 await asyncio.sleep(0.005)
-            said = len(recorder.said)
+            sent = len(recorder.sent)
             clock.suspend(5.0)
             await asyncio.sleep(0.5)
-            assert recorder.said[said] == stop()
-            assert vel(300) not in recorder.said[said:]
+            assert recorder.sent[sent] == stop()
+            assert vel(300) not in recorder.sent[sent:]
             until(lambda: not served.is_moving)
 
     asyncio.run(story())
@@ -335,11 +335,11 @@ def test_an_asyncio_program_that_blocks_its_loop_keeps_a_sound_link_and_stops(
             robot.on_event(told.append)
             robot.set_velocity(0.3)
             await asyncio.sleep(0.3)
-            said = len(recorder.said)
+            sent = len(recorder.sent)
             time.sleep(pause_s)  # noqa: ASYNC251  # this is what is tried
             await asyncio.sleep(0.3)
             assert robot.link is Link.OPEN
-            assert recorder.said[said] == stop()
+            assert recorder.sent[sent] == stop()
             until(lambda: not served.is_moving)
 
     asyncio.run(story())

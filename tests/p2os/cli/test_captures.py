@@ -19,7 +19,7 @@ from p2os.timing import NS_PER_S
 from p2os.transport import HungUpError, Loops, listen_url, open_url, waiting
 
 TO, FROM = Direction.TO_ROBOT, Direction.FROM_ROBOT
-PATIENCE_S = 60.0
+TIMEOUT_S = 60.0
 Run = Callable[..., int]
 Capture = pytest.CaptureFixture[str]
 STOP_FIRST = b"".join(
@@ -48,7 +48,7 @@ def test_a_recorded_session_is_sniffed_while_it_is_replayed(
     talk = [(0, TO, sync[0]), (1, FROM, sync[0]), (2, TO, sync[1]), (3, FROM, sync[1]), (4, TO, sync[2]),
             (5, FROM, bytes.fromhex("fafb0802000000000200")), (6, TO, sync[1]),
             (300_000_000, TO, Command(CommandNumber.ENABLE, 1).to_frame().to_bytes())]  # fmt: skip
-    recording, heard = tmp_path / "talk.jsonl", tmp_path / "heard.jsonl"
+    recording, received = tmp_path / "talk.jsonl", tmp_path / "received.jsonl"
     recording.write_text(write_recording(capture_of(talk)))
     listener = listen_url("tcp:127.0.0.1:0")
     bridge_url, chunks, told = listener.description, [], []
@@ -58,15 +58,15 @@ def test_a_recorded_session_is_sniffed_while_it_is_replayed(
     thread.start()
     assert run("replay", recording, bridge_url, "--as", "client", "--speed", "3") == 0
     assert run("replay", recording, bridge_url, "--as", "client", "--speed", "3") == 0
-    thread.join(PATIENCE_S)
+    thread.join(TIMEOUT_S)
     assert not thread.is_alive()
     assert capsys.readouterr().err.endswith("5 frames sent\n")
     spoken = b"".join(chunk.data for chunk in chunks if chunk.direction is TO)
     session = b"".join(data for _, direction, data in talk if direction is TO) + STOP_FIRST
     assert spoken == session * 2
     assert sum(text.startswith("client gone") for text in told) == 2
-    heard.write_text(write_recording(capture_of([(chunk.at_ns, chunk.direction, chunk.data) for chunk in chunks])))
-    assert run("decode", heard, "--only", "IDENTITY,ENABLE,damaged") == 0
+    received.write_text(write_recording(capture_of([(chunk.at_ns, chunk.direction, chunk.data) for chunk in chunks])))
+    assert run("decode", received, "--only", "IDENTITY,ENABLE,damaged") == 0
     assert capsys.readouterr().out.count("IDENTITY  name Virtual") == 2
 
 
@@ -89,10 +89,10 @@ def test_sniff_shows_and_records_one_client(served: object, run: Run, tmp_path: 
     thread.start()
     watchdog = threading.Event()
     for _ in range(600):
-        if pty.is_symlink() or watchdog.wait(PATIENCE_S / 600):
+        if pty.is_symlink() or watchdog.wait(TIMEOUT_S / 600):
             break
     record_session(open_url(f"pty:{pty}"), lambda _chunk: None, lasts_ns=NS_PER_S // 5)
-    thread.join(PATIENCE_S)
+    thread.join(TIMEOUT_S)
     assert results == [0]
     rows = [json.loads(line) for line in capsys.readouterr().out.splitlines()]
     assert [row["name"] for row in rows[:6]] == ["SYNC0", "SYNC0", "SYNC1", "SYNC1", "SYNC2", "IDENTITY"]
@@ -105,7 +105,7 @@ class Line:
     description = "tcp:nowhere"
 
     def __init__(self, *says: bytes | BaseException) -> None:
-        self.says, self.heard = list(says), b""
+        self.says, self.received = list(says), b""
         self.near, self.far = Loops(), None
 
     def read(self) -> bytes:
@@ -115,13 +115,13 @@ class Line:
         return said
 
     def write(self, data: bytes) -> None:
-        self.heard += data
+        self.received += data
 
     def fileno(self) -> int:
         raise TransportError("cannot be waited for")
 
     def close(self) -> None:
-        self.heard += b"closed"
+        self.received += b"closed"
 
 
 class Clock:
@@ -161,7 +161,7 @@ def test_a_replay_that_is_interrupted_or_loses_its_line_stops_the_robot() -> Non
         line = Line(b"", sip, error)
         with pytest.raises(type(error)):
             play(Replay(drive, TO), line, TO, clock=Clock())
-        assert line.heard == Command(11, 200).to_frame().to_bytes() + STOP_FIRST
+        assert line.received == Command(11, 200).to_frame().to_bytes() + STOP_FIRST
     assert motions_of(drive) == 1
 
 
@@ -264,7 +264,7 @@ def test_a_replay_that_has_paused_stops_the_robot() -> None:
     line.read = read  # type: ignore[method-assign]
     with pytest.raises(RunFailedError, match=r"paused for 0\.4 s"):
         play(Replay(drive, TO), line, TO, clock=lambda: now[0])
-    assert line.heard == VEL_200 + STOP_FIRST
+    assert line.received == VEL_200 + STOP_FIRST
 
 
 @pytest.mark.usefixtures("no_waiting")
@@ -288,7 +288,7 @@ def test_a_replay_to_a_robot_that_has_fallen_silent_stops_it_and_ends(silence_ms
     else:
         with pytest.raises(RemoteProtocolError, match=r"no packet for 1\.0 s"):
             play(Replay(drive, TO), line, TO, clock=lambda: now[0])
-    assert line.heard.endswith(STOP_FIRST)
+    assert line.received.endswith(STOP_FIRST)
 
 
 @pytest.mark.skipif(not Path("/dev/full").exists(), reason="this system has no full disk at hand")

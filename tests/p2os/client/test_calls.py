@@ -33,7 +33,7 @@ def calls() -> Calls:
 
 def said_by(calls: Calls, call: Callable[[Calls], object]) -> list[Command]:
     calls.rig.run(0.2)
-    before = len(calls.rig.said)
+    before = len(calls.rig.sent)
     call(calls)
     calls.rig.run(0.1)
     return [command for command in calls.rig.commands()[before:] if command.number not in {C.PULSE, C.VEL, C.RVEL}]
@@ -80,14 +80,14 @@ def test_each_call_is_its_command(calls: Calls, row: int) -> None:
 
 
 def test_limits_are_set_in_the_robots_units_and_known_from_then_on(calls: Calls) -> None:
-    said = said_by(
+    sent = said_by(
         calls,
         lambda robot: robot.set_limits(
             forward_mps=0.5, turn_radps=1.0, accel_mps2=0.4, decel_mps2=0.3, turn_accel_radps2=2.0,
             turn_decel_radps2=3.0,
         ),
     )  # fmt: skip
-    assert said == [Command(C.SETV, 500), Command(C.SETRV, 57), Command(C.SETA, 400), Command(C.SETA, -300),
+    assert sent == [Command(C.SETV, 500), Command(C.SETRV, 57), Command(C.SETA, 400), Command(C.SETA, -300),
                     Command(C.SETRA, 115), Command(C.SETRA, -172)]  # fmt: skip
     assert calls.limits.forward_mps == 0.5
     assert calls.limits.turn_radps == pytest.approx(math.radians(57))
@@ -115,10 +115,10 @@ def test_limits_are_set_in_the_robots_units_and_known_from_then_on(calls: Calls)
 def test_a_value_that_the_robot_cannot_take_is_refused_by_name(
     calls: Calls, call: Callable[[Calls], object], text: str
 ) -> None:
-    before = len(calls.rig.said)
+    before = len(calls.rig.sent)
     with pytest.raises((UsageError, LocalProtocolError), match=text):
         call(calls)
-    assert len(calls.rig.said) == before
+    assert len(calls.rig.sent) == before
 
 
 @settings(max_examples=50, deadline=None)

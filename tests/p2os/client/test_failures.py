@@ -1,4 +1,4 @@
-"""What goes wrong in a robot's day: in each case what the program is told, and that the robot stops and stays.
+"""What goes wrong between a client and a robot: what the program learns, and that the robot stops and stays.
 
 Every story drives at 0.4 m/s, meets its mishap, and goes on for ten seconds in
 which the program asks for nothing. The robot has to begin to stop at its own
@@ -101,7 +101,7 @@ def driving(baud: int | None) -> Rig:
 @pytest.mark.parametrize("mishap", MISHAPS, ids=lambda mishap: mishap.name)
 def test_the_robot_stops_by_its_watchdog_and_stays_until_it_is_asked(mishap: Mishap) -> None:
     rig = driving(mishap.baud)
-    at, said = rig.now, len(rig.said)
+    at, sent = rig.now, len(rig.sent)
     mishap.happen(rig)
     watch = Watch(rig).living(mishap.mended_after_s)
     mishap.clear(rig)
@@ -115,7 +115,7 @@ def test_the_robot_stops_by_its_watchdog_and_stays_until_it_is_asked(mishap: Mis
     assert not watch.moves_again()
     assert rig.wheels == (0.0, 0.0)
     assert rig.core.link is Link.OPEN
-    after = [command for command in rig.commands()[said:] if command != vel(400)]
+    after = [command for command in rig.commands()[sent:] if command != vel(400)]
     first = after.index(stop())
     assert after[first : first + 2] == [stop(), vel(0)]
     assert not any(command.number in {CommandNumber.CLOSE, CommandNumber.OPEN} for command in after[:first])
