@@ -356,13 +356,13 @@ class Host:
         for line in self._lines or ():
             line.clear()
             line.set_baud(self._baud or line.baud)
+        self._settled_at = self.now + SETTLE_NS
+        self._notify("client gone", reason)  # before the client can know: whoever ends us then finds it written
         if send_reason:
             self._closing_lines.add(client, reason)
         else:
             with contextlib.suppress(TransportError):
                 client.close()
-        self._settled_at = self.now + SETTLE_NS
-        self._notify("client gone", reason)
 
     def _is_idle(self) -> bool:
         return self._client is None and self.now >= self._settled_at
