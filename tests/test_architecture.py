@@ -220,7 +220,7 @@ LONG_FOLDERS = {
     "robot_bench/firmware": "the sources and programs of the examples, built by one command",
     "docs": "one page a subject",
     "tests/adapter_fw": "one rig, many runs of the same firmware",
-    "tests/bluepill_sim/core": "one machine, made by the folder's conftest, for all of them",
+    "tests/bluepill_sim/core": "one assembled machine for all of them",
     "tests/golden": "recordings",
     "adapter_fw/fuzz": "inputs that were found",
     "hardware/pcb/generated": "files of the board, written by `make board`",

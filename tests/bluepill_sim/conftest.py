@@ -1,11 +1,16 @@
-"""A chip without a CPU: the ports that peripherals need, and the whole set of parts on them."""
+"""A chip without a CPU, with the ports that peripherals need; boards that run assembled programs."""
 
-from collections.abc import Callable
+import signal
+from collections.abc import Callable, Iterator
 
 import pytest
 
 from bluepill_sim.fabric.clocks import Clocks
 from bluepill_sim.stm32f103 import ChipParts, make_parts, make_pins
+from tests.bluepill_sim.machine import Assembler, Machine
+
+#: Longer than any test with an assembled program takes on a loaded machine.
+WALL_CLOCK_S = 60
 
 
 class FakeChip:
@@ -110,3 +115,44 @@ def fake_chip() -> FakeChip:
 def make_fake_chip() -> Callable[[], FakeChip]:
     """For hypothesis, which makes many."""
     return FakeChip
+
+
+@pytest.fixture
+def boot(watchdog: None) -> Callable[..., Machine]:
+    """Assemble a program and stand at its reset: boot(source, {number: "label"}, origin=, stack=)."""
+
+    def make(source: str, vectors: dict[int, str | int] | None = None, **options: int) -> Machine:
+        return Machine(source, vectors or {}, **options)
+
+    return make
+
+
+@pytest.fixture
+def run(boot: Callable[..., Machine]) -> Callable[..., Machine]:
+    """Assemble a program, run it for 1 ms of virtual time, and see that it came to its end."""
+
+    def make(source: str, vectors: dict[int, str | int] | None = None, us: float = 1000) -> Machine:
+        machine = boot(source, vectors).run(us)
+        assert machine.is_done, f"the program stands at {machine.board.where()}: {machine.board.fault}"
+        return machine
+
+    return make
+
+
+@pytest.fixture
+def assemble() -> type[Assembler]:
+    return Assembler
+
+
+@pytest.fixture
+def watchdog() -> Iterator[None]:
+    """Fail a test whose emulated program hangs the host."""
+
+    def bark(_number: int, _frame: object) -> None:
+        raise TimeoutError(f"the test took more than {WALL_CLOCK_S} s")
+
+    before = signal.signal(signal.SIGALRM, bark)
+    signal.alarm(WALL_CLOCK_S)
+    yield
+    signal.alarm(0)
+    signal.signal(signal.SIGALRM, before)

@@ -12,7 +12,7 @@ from bluepill_sim import BluePill
 from bluepill_sim.core import BlockRecorder
 from bluepill_sim.errors import BluePillError
 from bluepill_sim.native.library import library_path
-from tests.bluepill_sim.core.conftest import Machine
+from tests.bluepill_sim.machine import Machine
 
 pytestmark = pytest.mark.skipif(library_path() is None, reason="the native core is not built: no C compiler")
 

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from bluepill_sim import BluePill
 from bluepill_sim.native.library import library_path
-from tests.bluepill_sim.core.conftest import Machine
+from tests.bluepill_sim.machine import Machine
 from tests.bluepill_sim.native.test_native_core import state
 
 pytestmark = pytest.mark.skipif(library_path() is None, reason="the native core is not built: no C compiler")

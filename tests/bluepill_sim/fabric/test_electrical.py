@@ -9,7 +9,7 @@ import pytest
 from bluepill_sim.fabric.pins import PinDrive, PinMode
 from bluepill_sim.stm32f103 import make_pins
 from p2os.cli.main import run
-from tests.bluepill_sim.core.conftest import Machine
+from tests.bluepill_sim.machine import Machine
 
 
 class Ports:

@@ -9,7 +9,7 @@ import pytest
 from bluepill_sim import BluePill
 from bluepill_sim.native.library import library_path
 from p2os.cli.main import run
-from tests.bluepill_sim.core.conftest import Machine
+from tests.bluepill_sim.machine import Machine
 
 FIRMWARE = files("robot_bench.firmware")
 PROGRAMS = {name: Path(str(FIRMWARE / f"{name}.elf")) for name in ("motors", "sensors", "encoders", "dodge")}
