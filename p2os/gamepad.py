@@ -83,7 +83,7 @@ class Gamepad:
         self.turn = -_outside(report.turn, self._stick_dead, STICK_FULL)
 
     def forget_request(self) -> None:
-        """Forget the connect request: the session that it asked for has ended."""
+        """Drop the connect request: the session that it asked for has ended."""
         self.wants_robot = False
 
     def lose(self) -> None:

@@ -31,8 +31,8 @@ from p2os.client.notices import (
     RobotUnknown,
 )
 from p2os.client.robot import Robot
+from p2os.client.robot_state import Limits, Link, RobotPose, RobotState, SonarEcho
 from p2os.client.settings import ClientSettings
-from p2os.client.snapshots import Limits, Link, RobotPose, RobotState, SonarEcho
 
 __all__ = [
     "BaudKept",

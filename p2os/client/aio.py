@@ -5,7 +5,7 @@
 
 All decisions are `RobotCore`'s; the event loop's own readers and timers turn the
 line, so there is no thread. Lines are opened in the loop's executor. While the
-loop is blocked nothing is sent; when it goes on, the robot is told to stop first.
+loop is blocked nothing is sent; when it goes on, STOP is the first frame.
 
 The event loop refers to a `RobotLoop` only, never to the `Robot`: so a robot that the
 program drops is collected, and that stops it. The end of `asyncio.run` does too.
@@ -29,9 +29,9 @@ from p2os.client.goals import Axis, DriveAxis, MotionResult, TurnAxis
 from p2os.client.interrupts import exit_on_signals
 from p2os.client.line import Line, core_for, motion_result, no_answer, not_connected, not_found
 from p2os.client.notices import Notice
+from p2os.client.robot_state import Link, RobotState
 from p2os.client.robot_thread import CLOSING_S, MOST_NOTICES, TOUCH_S, Opener
 from p2os.client.settings import ClientSettings
-from p2os.client.snapshots import Link, RobotState
 from p2os.errors import P2osError, TransportError
 from p2os.robots.parameters import RobotParameters
 from p2os.timing import NS_PER_S, Nanos
@@ -87,7 +87,7 @@ class Robot(RobotCalls):
         return self
 
     async def close(self) -> None:
-        """Stop the robot, end the session, give the line back; twice is harmless."""
+        """Stop the robot, end the session, give the line back; a second call changes nothing."""
         await self._robot_loop.close()
 
     async def __aenter__(self) -> Self:

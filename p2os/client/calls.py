@@ -15,7 +15,7 @@ from typing import Protocol, TypeVar
 
 from p2os.client.core import PacketType, RobotCore
 from p2os.client.notices import LinkLostError
-from p2os.client.snapshots import Limits, Link, RobotPose, RobotState
+from p2os.client.robot_state import Limits, Link, RobotPose, RobotState
 from p2os.errors import UsageError
 from p2os.protocol.commands import Command, CommandNumber, sonar
 from p2os.protocol.config_packet import ConfigPacket

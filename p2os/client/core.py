@@ -35,8 +35,8 @@ from p2os.client.notices import (
 )
 from p2os.client.observer import Observer, bumpers_of, limits_of
 from p2os.client.outbox import Action
+from p2os.client.robot_state import Limits, Link, RobotPose, RobotState
 from p2os.client.settings import ClientSettings
-from p2os.client.snapshots import Limits, Link, RobotPose, RobotState
 from p2os.errors import UsageError
 from p2os.protocol.commands import Command, CommandNumber
 from p2os.protocol.config_packet import ConfigPacket

@@ -15,7 +15,7 @@ from dataclasses import dataclass, replace
 from typing import Protocol
 
 from p2os.client.notices import MotionEnded
-from p2os.client.snapshots import Limits, RobotPose, RobotState
+from p2os.client.robot_state import Limits, RobotPose, RobotState
 from p2os.protocol.commands import Command, CommandNumber
 from p2os.timing import NS_PER_MS, NS_PER_S, Nanos
 

@@ -1,4 +1,4 @@
-"""The client's core joined to a byte line and a clock, and what both robots say when that fails.
+"""The client's core joined to a byte line and a clock, and the errors that both robots raise.
 
 `Line` is what both I/O layers do each time they wake; nothing is waited for here. The
 functions below it make a core for a URL and turn its outcomes into errors.
@@ -19,8 +19,8 @@ from p2os.client.goals import Goal, MotionResult
 from p2os.client.interrupts import held_back
 from p2os.client.notices import ConnectError, GaveUp, LinkLostError, MotionError, NoAnswerError
 from p2os.client.outbox import CloseLine, OpenLine, Send, SetBaud
+from p2os.client.robot_state import Link
 from p2os.client.settings import ClientSettings
-from p2os.client.snapshots import Link
 from p2os.errors import P2osError, TransportError
 from p2os.protocol.commands import Command, CommandNumber, enable, stop, vel
 from p2os.robots.parameters import RobotParameters, load_parameters
@@ -135,7 +135,7 @@ class Line:
     def finish(self) -> None:
         """Stop the robot, close its session and give the line back, all at once: nobody is left to space the frames.
 
-        Interrupts (Ctrl-C) meanwhile are raised when that is done. Doing it twice is harmless.
+        Interrupts (Ctrl-C) meanwhile are raised when that is done. A second call changes nothing.
         """
         with contextlib.suppress(Exception):  # a line that fails sends no more; the robot's watchdog stops it
             held_back(self._finish)

@@ -38,8 +38,8 @@ from p2os.client.notices import (
     ReconnectPlanned,
 )
 from p2os.client.outbox import Action, CloseLine, OpenLine, Outbox, Send, SetBaud
+from p2os.client.robot_state import Link
 from p2os.client.settings import BAUD_CODES, ClientSettings
-from p2os.client.snapshots import Link
 from p2os.protocol.commands import Command, CommandNumber, pulse
 from p2os.protocol.config_packet import ConfigPacket
 from p2os.protocol.connection import (
@@ -468,7 +468,7 @@ def search_plan(
 
     Args:
         baud: The likeliest rate; None where the line has none.
-        bauds: All rates, in the order in which they are tried; repeats do no harm.
+        bauds: All rates, in the order in which they are tried; repeats are left out.
         settings: How long a try takes.
         is_known: The robot was open at `baud` before: it is tried again between all others.
     """

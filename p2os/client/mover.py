@@ -39,8 +39,8 @@ from p2os.client.notices import (
     Notice,
 )
 from p2os.client.observer import Observer
+from p2os.client.robot_state import Limits, RobotState
 from p2os.client.settings import ClientSettings
-from p2os.client.snapshots import Limits, RobotState
 from p2os.errors import LocalProtocolError, UsageError
 from p2os.protocol.commands import Command, CommandNumber, enable, rvel, stop, vel
 from p2os.timing import NS_PER_MS, NS_PER_S, Nanos
@@ -168,7 +168,7 @@ class Mover:
         """Switch the motors on, where the client may.
 
         Raises:
-            MotorsDisabledError: It may not: somebody switched them off, or the settings say so.
+            MotorsDisabledError: It may not: somebody switched them off, or the settings forbid it.
         """
         if self._motors.are_on:
             return

@@ -17,7 +17,7 @@ class ConnectError(TransportError):
 
 
 class LinkLostError(TransportError):
-    """The session is gone, or was gone since the last motion call; the robot was told to stop."""
+    """The session is gone, or was gone since the last motion call; STOP was sent."""
 
 
 class NoAnswerError(TransportError):
@@ -96,7 +96,7 @@ class DeadmanStopped:
 
 @dataclass(frozen=True, slots=True)
 class GapStopped:
-    """The program or its machine paused for so long while the robot was to move; it was told to stop."""
+    """The program or its machine paused for so long while the robot was to move; STOP was sent."""
 
     gap_ns: Nanos
 

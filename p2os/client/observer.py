@@ -13,7 +13,7 @@ turned by one fixed amount; nothing is accumulated but whole counts.
 import math
 from dataclasses import dataclass, replace
 
-from p2os.client.snapshots import Limits, RobotPose, RobotState, SonarEcho
+from p2os.client.robot_state import Limits, RobotPose, RobotState, SonarEcho
 from p2os.protocol.config_packet import AROS_1_6_FIELDS, ConfigPacket
 from p2os.protocol.odometry import POSITION_MODULUS, Odometry
 from p2os.protocol.profiles import Profile

@@ -22,9 +22,9 @@ from p2os.client.goals import Axis, DriveAxis, MotionResult, TurnAxis
 from p2os.client.interrupts import exit_on_signals
 from p2os.client.line import core_for, motion_result, no_answer, not_connected, not_found
 from p2os.client.notices import Notice
+from p2os.client.robot_state import Link, RobotState
 from p2os.client.robot_thread import Opener, RobotThread
 from p2os.client.settings import ClientSettings
-from p2os.client.snapshots import Link, RobotState
 from p2os.robots.parameters import RobotParameters
 from p2os.timing import NS_PER_S, Nanos
 from p2os.transport import open_url
@@ -91,7 +91,7 @@ class Robot(RobotCalls):
         return self
 
     def close(self) -> None:
-        """Stop the robot, end the session, give the line back; twice is harmless."""
+        """Stop the robot, end the session, give the line back; a second call changes nothing."""
         self._thread.shut_down()
 
     def __enter__(self) -> Self:

@@ -2,8 +2,8 @@
 
 One lock guards the core. Calls of the program act on the core under it and wake
 the thread; the thread notifies `changed` after each turn. The line is opened
-outside the lock, for that can take seconds. Its twin for asyncio is `RobotLoop`
-in `p2os.client.aio`.
+outside the lock, for that can take seconds. For asyncio, `RobotLoop`
+in `p2os.client.aio` stands in its place.
 
 Closing is the thread's work: signals interrupt the program's own thread only, so
 none of them can come between the frames that stop the robot. Where the thread is
@@ -26,7 +26,7 @@ from p2os.client.core import RobotCore
 from p2os.client.interrupts import held_back
 from p2os.client.line import Line
 from p2os.client.notices import Notice
-from p2os.client.snapshots import RobotState
+from p2os.client.robot_state import RobotState
 from p2os.errors import P2osError, TransportError
 from p2os.timing import NS_PER_S, Nanos
 from p2os.transport.ports import Transport
@@ -117,7 +117,7 @@ class RobotThread:
         return True
 
     def shut_down(self) -> None:
-        """Stop the robot, close the session and the line, end the thread; twice is harmless.
+        """Stop the robot, close the session and the line, end the thread; a second call changes nothing.
 
         Interrupts (Ctrl-C) meanwhile are raised when that is done. From a callback it returns at once, and the
         thread closes when the callback has returned.

@@ -1,7 +1,7 @@
 """Unwrap the counters of a SIP: positions of 15 bits, headings of 4096 counts.
 
 Any step smaller than half of the modulus is exact, whatever the gap between
-packets; a step of more than half cannot be told from one the other way round.
+packets; a step of more than half looks like one the other way round.
 """
 
 from dataclasses import dataclass

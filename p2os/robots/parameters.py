@@ -1,4 +1,4 @@
-"""Parameters of a robot: by its subclass, from a file of one's own, or for whatever a robot says it is.
+"""Parameters of a robot: by its subclass, from a file of one's own, or for the identity that a robot sends.
 
 One TOML file a model in `p2os/robots/`, each number with its source; a user's
 own file is TOML too, or one of ARIA's (`.p`).
@@ -25,7 +25,7 @@ __all__ = [
     "parameters_for",
 ]
 
-#: What an unknown robot is taken for when its name says nothing.
+#: What an unknown robot is taken for when its name has no known beginning.
 FALLBACK = "p2dx"
 #: Beginnings of names that belong to a shipped model, where no model's own name begins them.
 FAMILIES = {
@@ -37,7 +37,7 @@ FAMILIES = {
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class MatchedParameters:
-    """What is taken for a robot, and what a person should be told of it."""
+    """The parameters taken for a robot, and the warning that a person should get."""
 
     parameters: RobotParameters
     #: None where the model is known or parameters were given.
@@ -66,11 +66,11 @@ def load_parameters(name_or_path: str | Path) -> RobotParameters:
 
 
 def parameters_for(subclass: str, given: str | Path | RobotParameters | None = None) -> MatchedParameters:
-    """Return the parameters for what a robot says it is; an unknown subclass falls back with a warning.
+    """Return the parameters for a robot's identity; an unknown subclass falls back with a warning.
 
     Args:
         subclass: From the robot's identity, in any case.
-        given: Parameters, a model or a file that a person has named; they win whatever the robot says.
+        given: Parameters, a model or a file that a person has named; they win over the robot's identity.
 
     Raises:
         ParametersError: What was given is unknown, missing or breaks the schema.

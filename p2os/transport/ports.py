@@ -40,7 +40,7 @@ class Transport(Protocol):
         ...
 
     def fileno(self) -> int:
-        """Return the descriptor that `select` finds readable when `read` has something to say."""
+        """Return the descriptor that `select` finds readable when `read` has something to return or to raise."""
         ...
 
     def set_baud(self, baud: int) -> None:
@@ -48,7 +48,7 @@ class Transport(Protocol):
         ...
 
     def close(self) -> None:
-        """Give the line back; closing twice is harmless."""
+        """Give the line back; a second call changes nothing."""
         ...
 
 
@@ -57,7 +57,7 @@ class Listener(Protocol):
 
     #: The URL or path that a client opens.
     description: str
-    #: Seconds after which `accept` is worth asking again, or None when `fileno` tells.
+    #: Seconds after which `accept` is worth asking again, or None where `fileno` shows it.
     poll_s: float | None
 
     def accept(self) -> Transport | None:
@@ -65,9 +65,9 @@ class Listener(Protocol):
         ...
 
     def fileno(self) -> int | None:
-        """Return the descriptor that `select` finds readable when a peer has come, or None when only polling tells."""
+        """Return the descriptor that `select` finds readable when a peer has come; None where only polling shows it."""
         ...
 
     def close(self) -> None:
-        """Stop listening; closing twice is harmless."""
+        """Stop listening; a second call changes nothing."""
         ...

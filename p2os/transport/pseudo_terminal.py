@@ -1,7 +1,7 @@
 """Pseudo-terminals: a serial port without hardware, for clients that want a device path.
 
 The master end is ours; a client opens the slave's path, or a symbolic link to
-it. The system tells when the last client has closed the slave: reads on the
+it. The system shows when the last client has closed the slave: reads on the
 master then fail until somebody opens it again, and that is our `HungUpError`.
 
 Unix only; nothing here is imported, and `termios` and `pty` are not, until a

@@ -92,7 +92,7 @@ class SerialListener:
         return transport
 
     def fileno(self) -> int | None:
-        """Return None: no descriptor tells when a port comes back."""
+        """Return None: no descriptor shows when a port comes back."""
         return None
 
     def close(self) -> None:

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 from p2os.errors import UsageError
 
-#: The rate at which a Pioneer 2 listens unless told otherwise (Pioneer 2 manual, HOST serial port).
+#: The rate at which a Pioneer 2 listens unless set otherwise (Pioneer 2 manual, HOST serial port).
 DEFAULT_BAUD = 9600
 #: The port on which simulated Pioneers have always listened; ARIA tries it first.
 DEFAULT_TCP_PORT = 8101

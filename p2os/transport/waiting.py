@@ -58,7 +58,7 @@ def wait_for_bytes(transport: Transport, longest_s: float) -> None:
     """Wait until a line has something to read; one that cannot be waited for is to be asked often."""
     try:
         wait_readable((transport.fileno(),), longest_s)
-    except (TransportError, OSError, ValueError):  # no descriptor, or a line that was closed: its `read` tells
+    except (TransportError, OSError, ValueError):  # no descriptor, or a line that was closed: its `read` raises
         time.sleep(min(max(longest_s, 0.0), BLIND_POLL_S))
 
 
@@ -81,7 +81,7 @@ def has_hung_up(descriptor: int) -> bool:
     """Tell whether the other end is closed, though bytes may still wait; False where a system cannot tell."""
     if not hasattr(select, "poll"):
         return False
-    closed_for_writing: int = getattr(select, "POLLRDHUP", 0)  # Linux alone tells that of a socket
+    closed_for_writing: int = getattr(select, "POLLRDHUP", 0)  # Linux alone shows that of a socket
     poll = select.poll()
     poll.register(descriptor, closed_for_writing)
     gone = select.POLLHUP | select.POLLERR | closed_for_writing

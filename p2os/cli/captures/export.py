@@ -79,7 +79,7 @@ def _by_columns(capture: Capture, reading: Reading) -> Table | None:
     if sum(len(chunk.data) for chunk in capture.chunks) < LARGE_BYTES:
         return None
     try:
-        from p2os.capture.columns.captures import sip_table
+        from p2os.capture.columns.sip_table import sip_table
     except ImportError:
         return None
     return sip_table(capture, reading)

@@ -241,7 +241,7 @@ class Bridge:
         if self._baud_due is None:
             self._baud_due = self.now + BAUD_DELAY_NS
         elif self.now >= self._baud_due:
-            self._on_event(f"robot told to use {self._tap.new_baud} bit/s: following")
+            self._on_event(f"client switches the line to {self._tap.new_baud} bit/s: following")
             self._robot.set_baud(self._tap.new_baud)
             self._tap.new_baud, self._baud_due = None, None
 

@@ -14,8 +14,8 @@ from random import Random
 from p2os.client.core import RobotCore
 from p2os.client.notices import LinkLost, Notice
 from p2os.client.outbox import CloseLine, OpenLine, Send, SetBaud
+from p2os.client.robot_state import Link, RobotState
 from p2os.client.settings import ClientSettings
-from p2os.client.snapshots import Link, RobotState
 from p2os.pioneer.body.factory import make_body
 from p2os.pioneer.controller import ControllerSettings, Pioneer
 from p2os.pioneer.world import load_world

@@ -12,8 +12,8 @@ from p2os import Robot
 from p2os.client import ConnectError, LinkLost, LinkLostError, Notice, ReconnectPlanned
 from p2os.client.core import RobotCore
 from p2os.client.line import Line
+from p2os.client.robot_state import Link
 from p2os.client.settings import ClientSettings
-from p2os.client.snapshots import Link
 from p2os.errors import TransportError
 from p2os.protocol.commands import enable, rvel, stop, vel
 from p2os.timing import NS_PER_MS

@@ -12,8 +12,8 @@ from p2os.client.goals import TurnAxis
 from p2os.client.mover import Motors
 from p2os.client.notices import OdometryDoubtful, PacketArrived, RobotUnknown
 from p2os.client.observer import Observer, PoseKeeper, bumpers_of, limits_of
+from p2os.client.robot_state import RobotPose
 from p2os.client.settings import ClientSettings
-from p2os.client.snapshots import RobotPose
 from p2os.errors import UsageError
 from p2os.protocol.commands import Command, CommandNumber
 from p2os.protocol.config_packet import AROS_1_6_FIELDS, ConfigPacket

@@ -18,8 +18,8 @@ from p2os.client import (
     Notice,
     RobotState,
 )
+from p2os.client.robot_state import Link
 from p2os.client.settings import ClientSettings
-from p2os.client.snapshots import Link
 from p2os.errors import P2osError, UsageError
 from p2os.protocol.commands import Command, CommandNumber, enable, stop, vel
 from p2os.protocol.packets import EncoderPacket, IoPacket, RawPacket, SerauxPacket, StandardSip

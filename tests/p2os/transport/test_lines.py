@@ -18,13 +18,13 @@ from p2os.transport.url import SerialUrl
 from p2os.transport.waiting import LONGEST_CLOSING_NS, MOST_CLOSING, ClosingLines
 
 #: A bound on every wait of these tests; reached only when something is broken.
-PATIENCE_S = 5.0
+TIMEOUT_S = 5.0
 
 pytestmark = pytest.mark.skipif(os.name != "posix", reason="pseudo-terminals and descriptors are Unix's")
 
 
 def wait_for(condition: Callable[[], object]) -> object:
-    end = time.monotonic() + PATIENCE_S
+    end = time.monotonic() + TIMEOUT_S
     while time.monotonic() < end:
         if result := condition():
             return result
@@ -34,7 +34,7 @@ def wait_for(condition: Callable[[], object]) -> object:
 
 def read_all(transport: Transport, count: int) -> bytes:
     data = b""
-    end = time.monotonic() + PATIENCE_S
+    end = time.monotonic() + TIMEOUT_S
     while len(data) < count and time.monotonic() < end:
         data += transport.read()
     return data
@@ -96,7 +96,7 @@ def test_reading_an_idle_line_returns_nothing_at_once(line: Line) -> None:
 def test_a_descriptor_tells_when_bytes_have_come(line: Line) -> None:
     assert select.select([line.near.fileno()], [], [], 0)[0] == []
     line.far.write(b"x")
-    assert select.select([line.near.fileno()], [], [], PATIENCE_S)[0] == [line.near.fileno()]
+    assert select.select([line.near.fileno()], [], [], TIMEOUT_S)[0] == [line.near.fileno()]
 
 
 def test_a_far_end_that_closes_hangs_up_after_its_last_byte(line: Line) -> None:
@@ -321,7 +321,7 @@ def test_bytes_that_a_socket_does_not_take_go_first_next_time() -> None:
     sent = os.urandom(30_000)
     transport.write(sent)
     received = b""
-    end = time.monotonic() + PATIENCE_S
+    end = time.monotonic() + TIMEOUT_S
     while len(received) < len(sent) and time.monotonic() < end:
         received += reader.read()
         transport.write(b"")
@@ -439,7 +439,7 @@ def test_a_terminal_loses_what_nobody_reads_but_never_waits() -> None:
 
 def test_an_open_pty_without_a_path_is_a_terminal_for_somebody_else() -> None:
     near = open_url("pty:")
-    far = serial.Serial(near.description.removeprefix("pty:"), timeout=PATIENCE_S)
+    far = serial.Serial(near.description.removeprefix("pty:"), timeout=TIMEOUT_S)
     near.write(b"hello")
     assert far.read(5) == b"hello"
     far.close()

@@ -1,4 +1,4 @@
-"""The robot as a program sees it: frozen values in SI units, one a standard packet.
+"""The state of a robot as a program sees it: frozen values in SI units, one a standard packet.
 
 Frames: the robot's has x forward, y left, angles counter-clockwise. The pose's
 frame is where the robot stood when the first session opened, or what

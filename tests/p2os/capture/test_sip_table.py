@@ -14,7 +14,7 @@ pytest.importorskip("numpy")
 
 from p2os.capture import Reading, read_file, rows_of
 from p2os.capture.chunks import Capture, Chunk, Direction, capture_of
-from p2os.capture.columns.captures import sip_table
+from p2os.capture.columns.sip_table import sip_table
 from p2os.capture.table import Table, from_robot, table_of
 from p2os.cli.main import run
 from p2os.protocol.packets import EncoderPacket, SonarReading, StandardSip, packet_frame
@@ -112,7 +112,7 @@ def test_export_writes_the_same_file_by_columns_and_by_rows(tmp_path: Path, monk
 
 def test_export_of_a_large_capture_works_without_numpy(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("p2os.cli.captures.export.LARGE_BYTES", 0)
-    monkeypatch.setitem(sys.modules, "p2os.capture.columns.captures", None)
+    monkeypatch.setitem(sys.modules, "p2os.capture.columns.sip_table", None)
     assert exported(tmp_path / "rows.csv").count("\n") > 20
 
 
