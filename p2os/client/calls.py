@@ -102,7 +102,7 @@ class RobotCalls(ABC):
 
     @property
     def stats(self) -> ConnectionStats:
-        """Counters of the present connection: frames, noise, bad checksums, time-outs."""
+        """Counters of the present connection: frames, noise, bad checksums, timeouts."""
         return self._run(lambda core, _: core.stats)
 
     def newest(self, kind: type[PacketType]) -> PacketType | None:
