@@ -286,7 +286,7 @@ def make_adapter(scenario: Scenario, pins: PinBank, pinout: Pinout) -> AnyAdapte
     Raises:
         MissingDependencyError: The firmware's core is wanted and was not built.
     """
-    kind = {"model": Adapter, "firmware": FirmwareAdapter}[scenario.adapter_core]
+    kind: type[AnyAdapter] = {"model": Adapter, "firmware": FirmwareAdapter}[scenario.adapter_core]
     return kind(pins=pins, pinout=pinout, parameters=scenario.parameters, settings=scenario.adapter)
 
 
