@@ -8,14 +8,14 @@ import sys
 import tempfile
 from pathlib import Path
 
-from hardware.pcb.checks import checks
+from hardware.pcb.checks import suite
 from hardware.pcb.checks.kicad_checks import stitches_of
-from hardware.pcb.checks.report import Verdict, table
+from hardware.pcb.checks.results import Verdict, table
 from hardware.pcb.circuit.design import BOARD_VARIANTS, VARIANTS
 from hardware.pcb.circuit.design import build as design_of
 from hardware.pcb.circuit.netlist import DesignError
 from hardware.pcb.layout.routing import HERE, RoutingError, run_router
-from hardware.pcb.outputs import build, kicad, pictures
+from hardware.pcb.outputs import generated_files, kicad_cli, pictures
 from hardware.pcb.outputs.pours import KicadMissingError
 from hardware.pcb.spice.decks import decks
 from hardware.pcb.spice.page import page_text
@@ -43,7 +43,7 @@ def main(arguments: list[str] | None = None) -> int:
         DesignError,
         RoutingError,
         KicadMissingError,
-        kicad.KicadFailedError,
+        kicad_cli.KicadFailedError,
         NgspiceMissingError,
         SimulationError,
     ) as error:
@@ -52,17 +52,17 @@ def main(arguments: list[str] | None = None) -> int:
 
 
 def _build(_: argparse.Namespace) -> int:
-    written = build.write_sources()
+    written = generated_files.write_sources()
     print(f"{len(written)} generated files renewed")
-    if kicad.version() is None:
+    if kicad_cli.version() is None:
         print("KiCad 9 is not installed: gerbers and pictures stay as they are (hint: tools/install_board_tools.sh)")
         return 0
     with tempfile.TemporaryDirectory() as folder:
         for variant in BOARD_VARIANTS:
-            board = build.filled_project(variant, Path(folder))
-            files = build.fabrication_files(board, Path(folder) / f"{variant}-fabrication")
-            target = build.GENERATED / variant / f"{variant}-gerbers.zip"
-            target.write_bytes(build.archive(files))
+            board = generated_files.filled_project(variant, Path(folder))
+            files = generated_files.fabrication_files(board, Path(folder) / f"{variant}-fabrication")
+            target = generated_files.GENERATED / variant / f"{variant}-gerbers.zip"
+            target.write_bytes(generated_files.archive(files))
             print(f"{target.name}: {len(files)} files, {target.stat().st_size} bytes")
             _write_reports(variant, board)
             for path in pictures.board_pictures(variant, board):
@@ -76,13 +76,13 @@ def _build(_: argparse.Namespace) -> int:
 
 
 def _write_reports(variant: str, board: Path | None) -> None:
-    folder = build.GENERATED / variant
-    for name, text in kicad.reports(variant, folder / f"{variant}.kicad_sch", board).items():
+    folder = generated_files.GENERATED / variant
+    for name, text in kicad_cli.reports(variant, folder / f"{variant}.kicad_sch", board).items():
         (folder / name).write_text(text, encoding="utf-8", newline="\n")
 
 
 def _check(given: argparse.Namespace) -> int:
-    results = checks.run_all()
+    results = suite.run_all()
     print(table(results))
     bad = {Verdict.BAD, Verdict.SKIPPED} if given.strict else {Verdict.BAD}
     return 1 if any(result.verdict in bad for result in results) else 0
@@ -106,17 +106,17 @@ def _stitch(given: argparse.Namespace) -> int:
 
 def _simulate(_: argparse.Namespace) -> int:
     if not is_installed():
-        print(table(checks.simulations()))
+        print(table(suite.simulations()))
         return 0
     ran = [simulate(deck) for deck in decks()]
-    results = [checks.simulation(one) for one in ran]
+    results = [suite.simulation(one) for one in ran]
     print(table(results))
     for one in ran:
         path = pictures.plot(one)
         print(f"{path.name}: {path.stat().st_size} bytes")
     page = page_text(decks(), {one.deck.name: one.figures for one in ran})
-    build.SIMULATION_PAGE.write_text(page, encoding="utf-8", newline="\n")
-    print(f"{build.SIMULATION_PAGE.name}: {len(ran)} simulations")
+    generated_files.SIMULATION_PAGE.write_text(page, encoding="utf-8", newline="\n")
+    print(f"{generated_files.SIMULATION_PAGE.name}: {len(ran)} simulations")
     return 1 if any(result.verdict is Verdict.BAD for result in results) else 0
 
 

@@ -1,4 +1,4 @@
-"""The core on other machines: the same life gives the same hash under sanitizers, on a Cortex-M3 and on an Xtensa."""
+"""The core on other machines: the same run gives the same hash under sanitizers, on a Cortex-M3 and on an Xtensa."""
 
 import shutil
 import subprocess
@@ -10,7 +10,7 @@ from bluepill_sim import BluePill
 from tests.adapter_fw.budgets import ADAPTER_BYTES, documented, is_as_documented
 from tests.adapter_fw.builds import built
 
-#: Seconds of life on each machine, and what the host's program is asked for.
+#: Virtual seconds on each machine, and what the host's program is asked for.
 SPAN_S, SEED = 20, 1
 #: The core has no variables of its own.
 RAM_BYTES = 64
@@ -42,7 +42,7 @@ def test_ten_minutes_of_accidents_under_sanitizers_show_no_fault(host: Path, see
 
 
 @pytest.mark.slow
-def test_the_cortex_m3_of_our_emulator_lives_the_same_life(host: Path, tmp_path: Path) -> None:
+def test_the_cortex_m3_of_our_emulator_gives_the_same_run(host: Path, tmp_path: Path) -> None:
     program, size = built("cortex-m", tmp_path)
     chip, text = BluePill(program), bytearray()
     chip.usart1.on_transmit = lambda byte, _: text.append(byte)
@@ -58,7 +58,7 @@ def test_the_cortex_m3_of_our_emulator_lives_the_same_life(host: Path, tmp_path:
 
 
 @pytest.mark.slow
-def test_an_xtensa_in_qemu_lives_the_same_life(host: Path, tmp_path: Path) -> None:
+def test_an_xtensa_in_qemu_gives_the_same_run(host: Path, tmp_path: Path) -> None:
     program, size = built("xtensa", tmp_path)
     emulator = shutil.which("qemu-system-xtensa")
     if emulator is None:

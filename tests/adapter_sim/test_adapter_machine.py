@@ -33,7 +33,7 @@ class WatchedRig(Rig):
         self.last_sip = 0
         self.sips = 0
         self.checked = 0
-        self.checked = 0
+        self.checked_events = 0
         self.commanded = (0, 0)
         self.commanded_at = 0
         self.pair_at = -(10**12)
@@ -50,14 +50,14 @@ class WatchedRig(Rig):
         sips = self.adapter.status.sips
         if sips != self.sips:
             self.sips, self.last_sip = sips, self.now
-        for at, what, _ in self.events[self.checked :]:
+        for at, what, _ in self.events[self.checked_events :]:
             if what in {"lost", "implausible"}:
                 self.allowed = False
                 first = [name for _, name, _ in self.sent(at)][:3]
                 assert first == ["STOP", "VEL", "RVEL"], (what, first)
             elif what == "connecting":
                 self.allowed = True
-        self.checked = len(self.events)
+        self.checked_events = len(self.events)
         for at, name, argument in self.sent()[self.checked :]:
             self._check_frame(at, name, argument)
         self.checked = len(self.to_robot.log)

@@ -32,7 +32,7 @@ def build_foreign(output_folder: Path) -> Path:
 
 
 def main() -> int:
-    """Build, and say the size of the file."""
+    """Build, and print the size of the file."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0] if __doc__ else None)
     parser.add_argument("--out", type=Path, default=HERE, help="folder for the ELF (default: beside the sources)")
     elf = build_foreign(parser.parse_args().out)

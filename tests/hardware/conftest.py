@@ -45,7 +45,7 @@ _MODULE = """
 @pytest.fixture
 def fake_kicad(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[..., None]:
     """Put stand-ins in KiCad's place; returns a function that sets what they answer."""
-    from hardware.pcb.outputs import kicad, pours
+    from hardware.pcb.outputs import kicad_cli, pours
 
     folder = tmp_path / "bin"
     folder.mkdir()
@@ -61,8 +61,8 @@ def fake_kicad(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[...,
         monkeypatch.setenv("FAKE_ANSWER", text)
         monkeypatch.setenv("FAKE_VERSION", version)
         monkeypatch.setenv("FAKE_ERROR", error)
-        kicad.version.cache_clear()
+        kicad_cli.version.cache_clear()
 
     answer()
     yield answer
-    kicad.version.cache_clear()
+    kicad_cli.version.cache_clear()

@@ -5,11 +5,11 @@ from pathlib import Path
 import pytest
 
 from hardware.pcb import __main__ as command
-from hardware.pcb.checks import checks
-from hardware.pcb.checks.report import Verdict, judged, skipped
+from hardware.pcb.checks import suite
+from hardware.pcb.checks.results import Verdict, judged, skipped
 from hardware.pcb.circuit.design import VARIANTS
 from hardware.pcb.layout.routing import RoutingError
-from hardware.pcb.outputs import build, kicad, pictures
+from hardware.pcb.outputs import generated_files, kicad_cli, pictures
 from hardware.pcb.spice.deck import Deck, limits
 from hardware.pcb.spice.run import Result
 
@@ -17,7 +17,7 @@ RESULTS = [judged("ERC", "rev-b", True, "0 findings"), skipped("DRC", "rev-b", "
 
 
 def test_check_prints_the_table_and_forgives_what_is_not_installed(capsys, monkeypatch) -> None:
-    monkeypatch.setattr(checks, "run_all", lambda: RESULTS)
+    monkeypatch.setattr(suite, "run_all", lambda: RESULTS)
     assert command.main(["check"]) == 0
     assert capsys.readouterr().out == (
         "ok       ERC  rev-b  0 findings\nskipped  DRC  rev-b  KiCad 9 is not installed\n1 ok, 0 failed, 1 skipped\n"
@@ -26,20 +26,20 @@ def test_check_prints_the_table_and_forgives_what_is_not_installed(capsys, monke
 
 
 def test_check_fails_where_a_check_fails(monkeypatch) -> None:
-    monkeypatch.setattr(checks, "run_all", lambda: [judged("ERC", "rev-b", False, "1: error")])
+    monkeypatch.setattr(suite, "run_all", lambda: [judged("ERC", "rev-b", False, "1: error")])
     assert command.main(["check"]) == 1
 
 
 def test_run_all_joins_the_three_kinds(monkeypatch) -> None:
-    monkeypatch.setattr(checks, "plain", lambda: RESULTS[:1])
-    monkeypatch.setattr(checks.kicad_checks, "with_kicad", lambda: RESULTS[1:])
-    monkeypatch.setattr(checks, "simulations", list)
-    assert checks.run_all() == RESULTS
+    monkeypatch.setattr(suite, "plain", lambda: RESULTS[:1])
+    monkeypatch.setattr(suite.kicad_checks, "with_kicad", lambda: RESULTS[1:])
+    monkeypatch.setattr(suite, "simulations", list)
+    assert suite.run_all() == RESULTS
 
 
 def test_build_without_kicad_renews_the_sources_and_says_what_stays(capsys, monkeypatch) -> None:
-    monkeypatch.setattr(build, "write_sources", lambda: ["rev-b/rev-b.kicad_pcb"])
-    monkeypatch.setattr(kicad, "version", lambda: None)
+    monkeypatch.setattr(generated_files, "write_sources", lambda: ["rev-b/rev-b.kicad_pcb"])
+    monkeypatch.setattr(kicad_cli, "version", lambda: None)
     assert command.main(["build"]) == 0
     out = capsys.readouterr().out
     assert out.startswith("1 generated files renewed\nKiCad 9 is not installed: gerbers and pictures stay")
@@ -50,18 +50,20 @@ def test_build_with_kicad_writes_the_archives_and_pictures(capsys, monkeypatch, 
     picture.write_bytes(b"1234")
     for variant in VARIANTS:
         (tmp_path / variant).mkdir()
-    monkeypatch.setattr(build, "GENERATED", tmp_path)
-    monkeypatch.setattr(build, "write_sources", list)
-    monkeypatch.setattr(kicad, "version", lambda: "9.0.8")
-    monkeypatch.setattr(build, "filled_project", lambda variant, folder: Path(folder) / f"{variant}.kicad_pcb")
-    monkeypatch.setattr(build, "fabrication_files", lambda *_: {"a.gbr": "one"})
-    monkeypatch.setattr(kicad, "reports", lambda variant, *_: {f"{variant}-erc.rpt": "0"})
+    monkeypatch.setattr(generated_files, "GENERATED", tmp_path)
+    monkeypatch.setattr(generated_files, "write_sources", list)
+    monkeypatch.setattr(kicad_cli, "version", lambda: "9.0.8")
+    monkeypatch.setattr(
+        generated_files, "filled_project", lambda variant, folder: Path(folder) / f"{variant}.kicad_pcb"
+    )
+    monkeypatch.setattr(generated_files, "fabrication_files", lambda *_: {"a.gbr": "one"})
+    monkeypatch.setattr(kicad_cli, "reports", lambda variant, *_: {f"{variant}-erc.rpt": "0"})
     monkeypatch.setattr(pictures, "board_pictures", lambda *_: [picture])
     monkeypatch.setattr(pictures, "schematic_pictures", lambda _: [picture])
     assert command.main(["build"]) == 0
     assert "rev-b-gerbers.zip: 1 files" in capsys.readouterr().out
     assert (tmp_path / "rev-c" / "rev-c-erc.rpt").read_text(encoding="utf-8") == "0"
-    assert (tmp_path / "lm317" / "lm317-gerbers.zip").read_bytes() == build.archive({"a.gbr": "one"})
+    assert (tmp_path / "lm317" / "lm317-gerbers.zip").read_bytes() == generated_files.archive({"a.gbr": "one"})
 
 
 def test_route_and_stitch_write_their_data(capsys, monkeypatch, tmp_path) -> None:
@@ -87,7 +89,7 @@ def test_simulate_prints_figures_and_renews_plots_and_page(capsys, monkeypatch, 
     monkeypatch.setattr(command, "decks", lambda: (deck,))
     monkeypatch.setattr(command, "simulate", lambda _: Result(deck=deck, figures={"top": 2.5}, columns=[]))
     monkeypatch.setattr(pictures, "plot", lambda _: plot)
-    monkeypatch.setattr(build, "SIMULATION_PAGE", tmp_path / "page.md")
+    monkeypatch.setattr(generated_files, "SIMULATION_PAGE", tmp_path / "page.md")
     assert command.main(["simulate"]) == 1
     assert capsys.readouterr().out.splitlines() == [
         "FAIL  simulation  d  top 2.5 V", "0 ok, 1 failed, 0 skipped", "sim-d.png: 2 bytes", "page.md: 1 simulations",
@@ -97,7 +99,7 @@ def test_simulate_prints_figures_and_renews_plots_and_page(capsys, monkeypatch, 
 
 def test_simulate_without_ngspice_says_so_and_draws_nothing(capsys, monkeypatch) -> None:
     monkeypatch.setattr(command, "is_installed", lambda: False)
-    monkeypatch.setattr(checks, "simulations", lambda: [skipped("simulation", "all", "ngspice is not installed")])
+    monkeypatch.setattr(suite, "simulations", lambda: [skipped("simulation", "all", "ngspice is not installed")])
     monkeypatch.setattr(pictures, "plot", lambda _: pytest.fail("no plots without a simulator"))
     assert command.main(["simulate"]) == 0
     assert "ngspice is not installed" in capsys.readouterr().out
@@ -113,7 +115,7 @@ def test_an_error_is_one_line_and_no_traceback(capsys, monkeypatch) -> None:
     def broken() -> list[str]:
         raise RoutingError("routes of rev-b were made for another placement")
 
-    monkeypatch.setattr(build, "write_sources", broken)
+    monkeypatch.setattr(generated_files, "write_sources", broken)
     assert command.main(["build"]) == 1
     assert capsys.readouterr().err == "board: routes of rev-b were made for another placement\n"
 

@@ -23,7 +23,7 @@ from hardware.pcb.layout.routing import (
     turn,
 )
 from hardware.pcb.layout.shapes import PadKind
-from hardware.pcb.outputs import build
+from hardware.pcb.outputs import generated_files
 from hardware.pcb.outputs.pours import kept_stitches, load_stitches, stitch_at, stitches_text
 from hardware.pcb.outputs.sexp import node
 
@@ -31,12 +31,12 @@ from hardware.pcb.outputs.sexp import node
 @pytest.mark.parametrize("variant", BOARD_VARIANTS)
 def test_every_net_is_one_piece_of_copper_as_wide_as_its_class(variant: str) -> None:
     design = design_of(variant)
-    assert copper.faults(design, *build.copper_of(design)) == []
+    assert copper.faults(design, *generated_files.copper_of(design)) == []
 
 
 def test_a_lost_track_a_thin_track_and_an_unknown_net_are_found() -> None:
     design = design_of()
-    tracks, vias = build.copper_of(design)
+    tracks, vias = generated_files.copper_of(design)
     lost = next(track for track in tracks if track.net == "RS_DTR")
     thin = next(track for track in tracks if track.net == "+5V")
     changed = [track for track in tracks if track.net != "RS_DTR"]
@@ -49,7 +49,7 @@ def test_a_lost_track_a_thin_track_and_an_unknown_net_are_found() -> None:
 
 def test_no_track_runs_below_the_antenna_and_all_copper_keeps_off_the_edge() -> None:
     left, top, right, bottom = antenna_area()
-    tracks, vias = build.copper_of(design_of())
+    tracks, vias = generated_files.copper_of(design_of())
     points = [point for track in tracks for point in (track.start_mm, track.end_mm)] + [via.at_mm for via in vias]
     assert not [point for point in points if left < point[0] < right and top < point[1] < bottom]
     rim = rules.EDGE_CLEARANCE_MM
@@ -78,7 +78,7 @@ def test_routes_of_another_placement_are_refused(tmp_path) -> None:
 
 def test_broken_lines_of_routes_and_stitches_are_refused(tmp_path) -> None:
     broken = tmp_path / "rev-b.txt"
-    first = (build.HERE / "routes" / "rev-b.txt").read_text(encoding="utf-8").splitlines()[0]
+    first = (generated_files.HERE / "routes" / "rev-b.txt").read_text(encoding="utf-8").splitlines()[0]
     broken.write_text(f"{first}\nT GND zero\n", encoding="utf-8")
     with pytest.raises(RoutingError):
         load_routes(design_of(), broken)
@@ -131,7 +131,7 @@ def test_a_module_socket_has_the_pitch_and_drill_of_its_pins() -> None:
 def test_the_router_finds_the_committed_result_again() -> None:
     if shutil.which("g++") is None and shutil.which("clang++") is None:
         pytest.skip("no C++ compiler: the router is not run")
-    committed = (build.HERE / "routes" / "rev-b.txt").read_text(encoding="utf-8")
+    committed = (generated_files.HERE / "routes" / "rev-b.txt").read_text(encoding="utf-8")
     assert run_router(design_of()) == committed
 
 

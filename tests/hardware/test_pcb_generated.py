@@ -8,38 +8,38 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from hardware.pcb.checks import checks, gerbers
-from hardware.pcb.checks.report import Verdict, table
+from hardware.pcb.checks import gerbers, suite
+from hardware.pcb.checks.results import Verdict, table
 from hardware.pcb.circuit.design import BOARD_VARIANTS
 from hardware.pcb.circuit.design import build as design_of
 from hardware.pcb.layout.placement import place
-from hardware.pcb.outputs import build, project
+from hardware.pcb.outputs import generated_files, project
 from hardware.pcb.outputs.bom import rows
 from hardware.pcb.outputs.sexp import SexpError, Text, child, children, node, number, parse, render, word
 
 
 @pytest.fixture(scope="module")
 def sources() -> dict[str, str]:
-    return build.sources()
+    return generated_files.sources()
 
 
 def test_every_committed_file_is_what_the_design_gives_now(sources: dict[str, str]) -> None:
-    assert build.stale_files(sources) == []
+    assert generated_files.stale_files(sources) == []
 
 
 def test_a_second_build_gives_the_same_bytes(sources: dict[str, str]) -> None:
-    assert build.sources() == sources
+    assert generated_files.sources() == sources
 
 
 def test_missing_and_changed_files_are_written_and_others_left_alone(tmp_path, sources, monkeypatch) -> None:
-    monkeypatch.setattr(build, "sources", lambda: sources)
-    assert len(build.write_sources(tmp_path)) == len(sources)
+    monkeypatch.setattr(generated_files, "sources", lambda: sources)
+    assert len(generated_files.write_sources(tmp_path)) == len(sources)
     changed = tmp_path / "rev-b" / "rev-b-bom.csv"
     changed.write_text("stale", encoding="utf-8")
     (tmp_path / "rev-b" / "rev-b.kicad_pcb").unlink()
-    assert sorted(build.stale_files(sources, tmp_path)) == ["rev-b/rev-b-bom.csv", "rev-b/rev-b.kicad_pcb"]
-    assert sorted(build.write_sources(tmp_path)) == ["rev-b/rev-b-bom.csv", "rev-b/rev-b.kicad_pcb"]
-    assert build.write_sources(tmp_path) == []
+    assert sorted(generated_files.stale_files(sources, tmp_path)) == ["rev-b/rev-b-bom.csv", "rev-b/rev-b.kicad_pcb"]
+    assert sorted(generated_files.write_sources(tmp_path)) == ["rev-b/rev-b-bom.csv", "rev-b/rev-b.kicad_pcb"]
+    assert generated_files.write_sources(tmp_path) == []
 
 
 @pytest.mark.parametrize("variant", BOARD_VARIANTS)
@@ -112,14 +112,14 @@ def test_power_nets_have_wide_copper_and_severities_are_the_defaults() -> None:
 def test_committed_gerbers_are_read_back_by_another_library(variant: str) -> None:
     if not gerbers.is_installed():
         pytest.skip("gerbonara is not installed: the gerbers are not re-read (hint: pip install 'p2os[board]')")
-    result = checks.gerbers_reread(variant)
+    result = suite.gerbers_reread(variant)
     assert result.verdict is Verdict.GOOD, result.detail
 
 
 def test_gerbers_of_another_size_or_with_other_holes_are_found() -> None:
     reading = gerbers.Reading(width_mm=99.0, height_mm=100.0, layers=("top copper",), copper_layers=1, plated=3,
                               unplated=4, smallest_drill_mm=0.3)  # fmt: skip
-    found = gerbers.faults(design_of(), build.copper_of(design_of())[1], reading)
+    found = gerbers.faults(design_of(), generated_files.copper_of(design_of())[1], reading)
     assert found[:3] == ["width is 99, the design has 100", "copper layers is 1, the design has 2",
                          "plated holes is 3, the design has 324"]  # fmt: skip
     assert "layer bottom mask is missing" in found
@@ -127,17 +127,17 @@ def test_gerbers_of_another_size_or_with_other_holes_are_found() -> None:
 
 def test_a_board_without_gerbers_or_without_the_library_says_so(monkeypatch) -> None:
     monkeypatch.setattr(gerbers, "is_installed", lambda: False)
-    assert checks.gerbers_reread("rev-b").verdict is Verdict.SKIPPED
-    assert checks.gerbers_reread("rev-c").detail == "1: there is no archive (hint: make board)"
+    assert suite.gerbers_reread("rev-b").verdict is Verdict.SKIPPED
+    assert suite.gerbers_reread("rev-c").detail == "1: there is no archive (hint: make board)"
 
 
 def test_an_archive_of_the_same_files_is_the_same_and_says_no_date() -> None:
     files = {"b.gbr": "two", "a.gbr": "one"}
-    assert build.archive(files) == build.archive(dict(reversed(list(files.items()))))
+    assert generated_files.archive(files) == generated_files.archive(dict(reversed(list(files.items()))))
 
 
 def test_the_plain_checks_all_pass() -> None:
-    results = checks.plain()
+    results = suite.plain()
     assert [result for result in results if result.verdict is Verdict.BAD] == []
     assert {result.subject for result in results if result.name == "pin rules"} == {
         "rev-b", "rev-c", "thesis-table3", "thesis-board"}  # fmt: skip

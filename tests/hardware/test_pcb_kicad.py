@@ -6,16 +6,16 @@ import zipfile
 import pytest
 
 from hardware.pcb.checks import kicad_checks
-from hardware.pcb.checks.report import Verdict
+from hardware.pcb.checks.results import Verdict
 from hardware.pcb.circuit.design import BOARD_VARIANTS, VARIANTS
 from hardware.pcb.circuit.design import build as design_of
 from hardware.pcb.layout.footprints import FOOTPRINTS
 from hardware.pcb.layout.routing import RoutingError
-from hardware.pcb.outputs import build, kicad, pictures, pours
+from hardware.pcb.outputs import generated_files, kicad_cli, pictures, pours
 from hardware.pcb.outputs.pours import KicadMissingError, fill, kicad_python
 
 needs_kicad = pytest.mark.skipif(
-    kicad.version() is None,
+    kicad_cli.version() is None,
     reason="KiCad 9 is not installed: rule checks of the board are not run (hint: make board)",
 )
 
@@ -23,7 +23,7 @@ needs_kicad = pytest.mark.skipif(
 @needs_kicad
 @pytest.mark.parametrize("variant", VARIANTS)
 def test_the_electrical_rule_check_finds_nothing(variant: str) -> None:
-    assert kicad.erc(build.GENERATED / variant / f"{variant}.kicad_sch") == []
+    assert kicad_cli.erc(generated_files.GENERATED / variant / f"{variant}.kicad_sch") == []
 
 
 @needs_kicad
@@ -42,13 +42,13 @@ def test_rev_b_passes_the_design_rule_check_with_parity_and_gives_the_committed_
 
 @needs_kicad
 def test_the_rule_check_sees_a_part_that_the_schematic_lacks(tmp_path) -> None:
-    source = build.GENERATED / "rev-b"
+    source = generated_files.GENERATED / "rev-b"
     for file in source.iterdir():
         if file.suffix in {".kicad_sch", ".kicad_pro"} or "table" in file.name:
             (tmp_path / file.name).write_bytes(file.read_bytes())
     page = (tmp_path / "rev-b-serial.kicad_sch").read_text(encoding="utf-8")
     (tmp_path / "rev-b-serial.kicad_sch").write_text(page.replace('"RS_DTR"', '"RS_DTS"', 1), encoding="utf-8")
-    assert kicad.erc(tmp_path / "rev-b.kicad_sch")
+    assert kicad_cli.erc(tmp_path / "rev-b.kicad_sch")
 
 
 ERC = {"sheets": [{"violations": [{"type": "pin_not_driven", "severity": "error", "description": "Input not driven",
@@ -57,7 +57,7 @@ ERC = {"sheets": [{"violations": [{"type": "pin_not_driven", "severity": "error"
 
 def test_a_finding_is_read_with_its_severity_and_places(fake_kicad, tmp_path) -> None:
     fake_kicad(json.dumps(ERC))
-    found = kicad.erc(tmp_path / "x.kicad_sch")
+    found = kicad_cli.erc(tmp_path / "x.kicad_sch")
     assert [str(one) for one in found] == ["error pin_not_driven: Input not driven: U1 pin 3; U2 pin 4"]
 
 
@@ -67,12 +67,12 @@ def test_all_three_lists_of_the_design_rule_check_are_read(fake_kicad, tmp_path)
 
     lists = {"violations": [entry("a")], "unconnected_items": [entry("b")], "schematic_parity": [entry("c")]}
     fake_kicad(json.dumps(lists))
-    assert [one.kind for one in kicad.drc(tmp_path / "x.kicad_pcb")] == ["a", "b", "c"]
+    assert [one.kind for one in kicad_cli.drc(tmp_path / "x.kicad_pcb")] == ["a", "b", "c"]
 
 
 def test_the_netlist_is_read_by_net(fake_kicad, tmp_path) -> None:
     fake_kicad('(export (nets (net (code "1") (name "+5V") (node (ref "R1") (pin "2")) (node (ref "C1") (pin "1")))))')
-    assert kicad.netlist(tmp_path / "x.kicad_sch") == {"+5V": [("C1", "1"), ("R1", "2")]}
+    assert kicad_cli.netlist(tmp_path / "x.kicad_sch") == {"+5V": [("C1", "1"), ("R1", "2")]}
 
 
 def test_differences_of_the_netlist_are_named_on_both_sides(monkeypatch) -> None:
@@ -80,14 +80,14 @@ def test_differences_of_the_netlist_are_named_on_both_sides(monkeypatch) -> None
     nets["RS_DTR"].remove(("TP11", "1"))
     nets["+5V"].append(("R99", "1"))
     nets["unconnected-(U1-Pad3)"] = [("U1", "3")]
-    monkeypatch.setattr(kicad, "netlist", lambda _: nets)
+    monkeypatch.setattr(kicad_cli, "netlist", lambda _: nets)
     assert kicad_checks.netlist_differences("rev-b") == [
         "RS_DTR: TP11.1 is not in the schematic", "+5V: R99.1 is only in the schematic"]  # fmt: skip
 
 
 def test_fabrication_files_lose_their_dates(fake_kicad, tmp_path) -> None:
     fake_kicad("G04 Created by KiCad (9.0.8) date 2025-01-01*\nG01*\n; #@! TF.CreationDate,2025\n")
-    files = build.fabrication_files(tmp_path / "board.kicad_pcb", tmp_path / "out")
+    files = generated_files.fabrication_files(tmp_path / "board.kicad_pcb", tmp_path / "out")
     assert files == {"board-F_Cu.gtl": "G01*\n", "board-PTH.drl": "G01*\n"}
     monkeyed = kicad_checks.gerbers_up_to_date("rev-b", files)
     assert monkeyed.verdict is Verdict.BAD
@@ -96,14 +96,14 @@ def test_fabrication_files_lose_their_dates(fake_kicad, tmp_path) -> None:
 def test_reports_lose_their_dates_and_are_named_by_variant(fake_kicad, tmp_path) -> None:
     fake_kicad("ERC report (2025-01-01, Encoding UTF8)\n** Created on 2025-01-01 **\n** ERC messages: 0\n")
     board = tmp_path / "rev-b.kicad_pcb"
-    assert kicad.reports("rev-b", tmp_path / "rev-b.kicad_sch", board) == {
+    assert kicad_cli.reports("rev-b", tmp_path / "rev-b.kicad_sch", board) == {
         "rev-b-erc.rpt": "** ERC messages: 0\n", "rev-b-drc.rpt": "** ERC messages: 0\n"}  # fmt: skip
-    assert list(kicad.reports("rev-c", tmp_path / "rev-c.kicad_sch", None)) == ["rev-c-erc.rpt"]
+    assert list(kicad_cli.reports("rev-c", tmp_path / "rev-c.kicad_sch", None)) == ["rev-c-erc.rpt"]
 
 
 @pytest.mark.parametrize("variant", VARIANTS)
 def test_the_committed_reports_are_empty(variant: str) -> None:
-    folder = build.GENERATED / variant
+    folder = generated_files.GENERATED / variant
     assert "ERC messages: 0  Errors 0  Warnings 0" in (folder / f"{variant}-erc.rpt").read_text(encoding="utf-8")
     if variant in BOARD_VARIANTS:
         report = (folder / f"{variant}-drc.rpt").read_text(encoding="utf-8")
@@ -113,17 +113,17 @@ def test_the_committed_reports_are_empty(variant: str) -> None:
 
 def test_a_failing_kicad_is_quoted(fake_kicad, tmp_path) -> None:
     fake_kicad(error="cannot load board")
-    with pytest.raises(kicad.KicadFailedError, match="pcb drc --severity-all: cannot load board"):
-        kicad.drc(tmp_path / "x.kicad_pcb")
+    with pytest.raises(kicad_cli.KicadFailedError, match="pcb drc --severity-all: cannot load board"):
+        kicad_cli.drc(tmp_path / "x.kicad_pcb")
 
 
 def test_an_older_kicad_and_none_are_missing(fake_kicad, monkeypatch, tmp_path) -> None:
     fake_kicad(version="6.0.11")
     with pytest.raises(KicadMissingError, match="install_board_tools"):
-        kicad.erc(tmp_path / "x.kicad_sch")
-    kicad.version.cache_clear()
+        kicad_cli.erc(tmp_path / "x.kicad_sch")
+    kicad_cli.version.cache_clear()
     monkeypatch.setenv("PATH", str(tmp_path))
-    assert kicad.version() is None
+    assert kicad_cli.version() is None
     (result,) = kicad_checks.with_kicad()
     assert result.verdict is Verdict.SKIPPED
     assert "ERC, DRC, netlist, pours, gerbers not checked" in result.detail
@@ -146,7 +146,7 @@ def test_a_board_that_kicad_cannot_fill_and_a_python_without_kicad_are_errors(fa
 
 def test_a_filled_project_is_a_copy_with_its_library(fake_kicad, tmp_path) -> None:
     fake_kicad('(kicad_pcb (zone (net_name "GND") (filled_polygon (layer "B.Cu") (pts (xy 1 2) (xy 3 4) (xy 5 6)))))')
-    board = build.filled_project("rev-b", tmp_path)
+    board = generated_files.filled_project("rev-b", tmp_path)
     assert "filled_polygon" in board.read_text(encoding="utf-8")
     assert (tmp_path / "library" / "adapter.kicad_sym").exists()
     assert (tmp_path / "rev-b" / "rev-b.kicad_pro").exists()
@@ -155,11 +155,11 @@ def test_a_filled_project_is_a_copy_with_its_library(fake_kicad, tmp_path) -> No
 def test_board_checks_make_one_line_each(fake_kicad, monkeypatch) -> None:
     monkeypatch.setattr(kicad_checks, "VARIANTS", ("lm317",))
     monkeypatch.setattr(kicad_checks, "BOARD_VARIANTS", ("lm317",))
-    monkeypatch.setattr(kicad, "drc", lambda _: [])
-    monkeypatch.setattr(kicad, "erc", lambda _: [])
-    monkeypatch.setattr(kicad, "netlist", lambda path: design_of(path.stem).nets())
+    monkeypatch.setattr(kicad_cli, "drc", lambda _: [])
+    monkeypatch.setattr(kicad_cli, "erc", lambda _: [])
+    monkeypatch.setattr(kicad_cli, "netlist", lambda path: design_of(path.stem).nets())
     monkeypatch.setattr(kicad_checks, "fill", lambda _: {})
-    monkeypatch.setattr(build, "fill", lambda _: {})
+    monkeypatch.setattr(generated_files, "fill", lambda _: {})
     fake_kicad("G01*\n")
     results = kicad_checks.with_kicad()
     names = [result.name for result in results if result.subject == "lm317"]
@@ -172,17 +172,17 @@ def test_board_checks_make_one_line_each(fake_kicad, monkeypatch) -> None:
 def test_an_archive_is_read_back(tmp_path) -> None:
     folder = tmp_path / "rev-b"
     folder.mkdir()
-    assert build.fabrication_archive("rev-b", tmp_path) == {}
-    (folder / "rev-b-gerbers.zip").write_bytes(build.archive({"a.gbr": "one"}))
-    assert build.fabrication_archive("rev-b", tmp_path) == {"a.gbr": "one"}
+    assert generated_files.fabrication_archive("rev-b", tmp_path) == {}
+    (folder / "rev-b-gerbers.zip").write_bytes(generated_files.archive({"a.gbr": "one"}))
+    assert generated_files.fabrication_archive("rev-b", tmp_path) == {"a.gbr": "one"}
     with zipfile.ZipFile(folder / "rev-b-gerbers.zip") as kept:
         assert kept.infolist()[0].date_time == (1980, 1, 1, 0, 0, 0)
 
 
 def test_pictures_are_rendered_and_shrunk(tmp_path, monkeypatch) -> None:
     image = pytest.importorskip("PIL.Image", reason="Pillow is not installed")
-    monkeypatch.setattr(build, "PICTURES", tmp_path)
-    monkeypatch.setattr(kicad, "picture", lambda _, file, *__: image.new("RGB", (8, 8), "green").save(file))
+    monkeypatch.setattr(generated_files, "PICTURES", tmp_path)
+    monkeypatch.setattr(kicad_cli, "picture", lambda _, file, *__: image.new("RGB", (8, 8), "green").save(file))
     board = tmp_path / "rev-b.kicad_pcb"
     board.write_text("(kicad_pcb)", encoding="utf-8")
     names = [path.name for path in pictures.board_pictures("rev-b", board)]
@@ -198,8 +198,8 @@ def test_schematic_pages_are_drawn_by_number(tmp_path, monkeypatch) -> None:
         pages.append(command[command.index("-f") + 1])
         image.new("RGB", (8, 8), "white").save(f"{command[-1]}.png")
 
-    monkeypatch.setattr(build, "PICTURES", tmp_path)
-    monkeypatch.setattr(kicad, "schematic_pdf", lambda *_: None)
+    monkeypatch.setattr(generated_files, "PICTURES", tmp_path)
+    monkeypatch.setattr(kicad_cli, "schematic_pdf", lambda *_: None)
     monkeypatch.setattr(pictures.subprocess, "run", pdftoppm)
     monkeypatch.setattr(pictures.shutil, "which", lambda _: "/usr/bin/pdftoppm")
     names = [path.name for path in pictures.schematic_pictures("rev-c")]

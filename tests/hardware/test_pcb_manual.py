@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from adapter_sim.pinout import Pull, WireRole, load_pinout
-from hardware.pcb.checks import checks, kicad_checks
+from hardware.pcb.checks import kicad_checks, suite
 from hardware.pcb.checks.pin_checks import BOARDS, count_by_rule, findings
 from hardware.pcb.circuit.design import TEST_POINTS
 from hardware.pcb.circuit.design import build as design_of
@@ -50,7 +50,7 @@ def test_a_test_point_without_a_voltage_is_refused(monkeypatch) -> None:
 
 
 def test_each_proof_in_the_list_of_faults_exists() -> None:
-    source = "".join(Path(module.__file__ or "").read_text(encoding="utf-8") for module in (checks, kicad_checks))
+    source = "".join(Path(module.__file__ or "").read_text(encoding="utf-8") for module in (suite, kicad_checks))
     names = {deck.name for deck in decks()}
     proofs = re.findall(r"(check|sim): ([^,|(]+?)(?: \(([^)]+)\))?(?=[,|]| \|)", BOARD)
     assert len(proofs) > 20
@@ -65,7 +65,7 @@ def test_each_proof_in_the_list_of_faults_exists() -> None:
 
 def test_every_check_is_explained_on_the_page() -> None:
     explained = set(re.findall(r"^\| ([A-Za-z -]+?) \| ", BOARD, re.MULTILINE))
-    ran = {result.name for result in checks.plain()} | {"ERC", "DRC with parity", "netlist equals design", "stitching"}
+    ran = {result.name for result in suite.plain()} | {"ERC", "DRC with parity", "netlist equals design", "stitching"}
     assert ran | {"gerbers up to date", "simulation"} <= explained
 
 

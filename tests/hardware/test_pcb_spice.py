@@ -5,9 +5,9 @@ import sys
 
 import pytest
 
-from hardware.pcb.checks import checks
-from hardware.pcb.checks.report import Verdict
-from hardware.pcb.outputs import build
+from hardware.pcb.checks import suite
+from hardware.pcb.checks.results import Verdict
+from hardware.pcb.outputs import generated_files
 from hardware.pcb.spice import run
 from hardware.pcb.spice.deck import Deck, limits
 from hardware.pcb.spice.decks import decks
@@ -100,8 +100,8 @@ def test_a_missing_figure_quotes_the_simulator(fake_ngspice) -> None:
 def test_checks_of_decks_pass_and_fail_by_their_limits(fake_ngspice, monkeypatch) -> None:
     fake_ngspice("top = 1.75")
     low = dataclasses.replace(DECK, limits=limits(("top", 1.8, 2.0, "V", "m")))
-    monkeypatch.setattr(checks, "decks", lambda: (DECK, low))
-    results = checks.simulations()
+    monkeypatch.setattr(suite, "decks", lambda: (DECK, low))
+    results = suite.simulations()
     assert [result.verdict for result in results] == [Verdict.GOOD, Verdict.BAD]
     assert results[0].detail == "top 1.75 V"
 
@@ -110,7 +110,7 @@ def test_without_ngspice_it_is_said_and_skipped(monkeypatch, tmp_path) -> None:
     monkeypatch.setenv("PATH", str(tmp_path))
     with pytest.raises(run.NgspiceMissingError, match="not installed"):
         run.simulate(DECK)
-    (result,) = checks.simulations()
+    (result,) = suite.simulations()
     assert result.verdict is Verdict.SKIPPED
 
 
@@ -119,7 +119,7 @@ def test_a_plot_is_drawn_for_each_deck(fake_ngspice, monkeypatch, tmp_path) -> N
     from hardware.pcb.outputs import pictures
 
     fake_ngspice("top = 1.75")
-    monkeypatch.setattr(build, "PICTURES", tmp_path / "pictures")
+    monkeypatch.setattr(generated_files, "PICTURES", tmp_path / "pictures")
     file = pictures.plot(run.simulate(DECK))
     assert file.name == "sim-d.png"
     assert file.read_bytes().startswith(b"\x89PNG")
@@ -127,7 +127,7 @@ def test_a_plot_is_drawn_for_each_deck(fake_ngspice, monkeypatch, tmp_path) -> N
 
 def page_figures() -> dict[str, dict[str, float]]:
     """Return the figures that the committed page shows, by deck and measure."""
-    sections = build.SIMULATION_PAGE.read_text(encoding="utf-8").split("\n## ")[1:]
+    sections = generated_files.SIMULATION_PAGE.read_text(encoding="utf-8").split("\n## ")[1:]
     figures = {}
     for deck, section in zip(decks(), sections, strict=True):
         rows = [line.split(" | ")[1].split()[0] for line in section.splitlines() if line.startswith("| ")][2:]
@@ -136,7 +136,7 @@ def page_figures() -> dict[str, dict[str, float]]:
 
 
 def test_the_page_is_what_the_decks_give_with_its_own_figures() -> None:
-    assert page_text(decks(), page_figures()) == build.SIMULATION_PAGE.read_text(encoding="utf-8")
+    assert page_text(decks(), page_figures()) == generated_files.SIMULATION_PAGE.read_text(encoding="utf-8")
 
 
 @needs_ngspice

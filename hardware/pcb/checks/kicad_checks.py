@@ -6,11 +6,11 @@ Invariant: they work on a copy; the committed files are only read.
 import tempfile
 from pathlib import Path
 
-from hardware.pcb.checks.report import Result, judged, listed, skipped
+from hardware.pcb.checks.results import Result, judged, listed, skipped
 from hardware.pcb.circuit.design import BOARD_VARIANTS, VARIANTS
 from hardware.pcb.circuit.design import build as design_of
 from hardware.pcb.layout.routing import load_routes
-from hardware.pcb.outputs import build, kicad
+from hardware.pcb.outputs import generated_files, kicad_cli
 from hardware.pcb.outputs.board import board_text
 from hardware.pcb.outputs.pours import fill, kept_stitches, load_stitches, stitches_text
 from hardware.pcb.outputs.schematic import placed_pins
@@ -18,14 +18,14 @@ from hardware.pcb.outputs.schematic import placed_pins
 
 def with_kicad() -> list[Result]:
     """Run them all; without KiCad one line says so."""
-    version = kicad.version()
+    version = kicad_cli.version()
     if version is None:
         why = "KiCad 9 is not installed: ERC, DRC, netlist, pours, gerbers not checked"
         return [skipped("KiCad checks", "all", f"{why} (hint: tools/install_board_tools.sh)")]
     results = []
     for variant in VARIANTS:
-        schematic = build.GENERATED / variant / f"{variant}.kicad_sch"
-        found = [str(one) for one in kicad.erc(schematic)]
+        schematic = generated_files.GENERATED / variant / f"{variant}.kicad_sch"
+        found = [str(one) for one in kicad_cli.erc(schematic)]
         results.append(listed("ERC", variant, found, f"0 errors, 0 warnings (KiCad {version})"))
         results.append(listed("netlist equals design", variant, netlist_differences(variant), "same nets, same pins"))
     for variant in BOARD_VARIANTS:
@@ -36,9 +36,9 @@ def with_kicad() -> list[Result]:
 def board_checks(variant: str) -> list[Result]:
     """Check a board that is filled anew: rules and parity, stitching, gerbers."""
     with tempfile.TemporaryDirectory() as folder:
-        board = build.filled_project(variant, Path(folder))
-        found = [str(one) for one in kicad.drc(board)]
-        files = build.fabrication_files(board, Path(folder) / "fabrication")
+        board = generated_files.filled_project(variant, Path(folder))
+        found = [str(one) for one in kicad_cli.drc(board)]
+        files = generated_files.fabrication_files(board, Path(folder) / "fabrication")
     return [
         listed("DRC with parity", variant, found, "0 errors, 0 warnings, 0 unconnected"),
         _stitches(variant),
@@ -53,7 +53,7 @@ def netlist_differences(variant: str) -> list[str]:
     # Pins left open have nets of their own in KiCad.
     found = {
         (net, member)
-        for net, members in kicad.netlist(build.GENERATED / variant / f"{variant}.kicad_sch").items()
+        for net, members in kicad_cli.netlist(generated_files.GENERATED / variant / f"{variant}.kicad_sch").items()
         if not net.startswith("unconnected-")
         for member in members
     }
@@ -74,7 +74,7 @@ def stitches_of(variant: str) -> str:
 
 def gerbers_up_to_date(variant: str, files: dict[str, str]) -> Result:
     """Compare fabrication files with the committed archive."""
-    old = build.fabrication_archive(variant)
+    old = generated_files.fabrication_archive(variant)
     changed = sorted(name for name in {*files, *old} if files.get(name) != old.get(name))
     words = f"{len(files)} files, the same again"
     return listed("gerbers up to date", variant, [f"{name} differs" for name in changed], words)

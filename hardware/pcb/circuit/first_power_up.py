@@ -18,7 +18,7 @@ class Expected:
     bare_v: tuple[float, float]
     #: With both modules, no cable at J3.
     full_v: tuple[float, float]
-    #: What it tells, and where to look if it is wrong.
+    #: What it shows, and where to look if it is wrong.
     note: str
 
 

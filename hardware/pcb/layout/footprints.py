@@ -1,14 +1,15 @@
 """Every footprint of the board, drawn by functions of a few measures.
 
+The two plugged-in modules are one footprint each (adjacent sockets would overlap as parts
+of their own): sockets, pin names, the antenna's free area. Their origin is pin 1.
+
 Sources: IPC-7351B nominal land patterns for chips and SOIC; JEDEC outlines MS-012,
-TO-236, TO-261, DO-214; makers' drawings for connectors (memory). tests/hardware
-compares pad centres and drills with KiCad's own library where that is installed.
+TO-236, TO-261, DO-214; makers' drawings for connectors (memory). Row distances are the
+modules' own; the BluePill's 15.24 mm is that of a DIP-40, the D1 mini's inner rows stand
+22.86 mm apart (measured on the thesis's drawing). tests/hardware compares pad centres and
+drills with KiCad's own library where that is installed.
 
-Footprints of the two plugged-in modules: sockets, pin names, the antenna's free area.
-
-Both are one footprint each (adjacent sockets would overlap as parts of their own).
-Origin: pin 1. Row distances are the modules' own; the BluePill's 15.24 mm is that of
-a DIP-40, the D1 mini's inner rows stand 22.86 mm apart (measured on the thesis's drawing).
+Invariant: a footprint's pads have the numbers of its symbol's pins.
 """
 
 from collections.abc import Mapping

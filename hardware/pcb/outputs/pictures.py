@@ -9,7 +9,7 @@ import subprocess
 import tempfile
 from pathlib import Path
 
-from hardware.pcb.outputs import build, kicad
+from hardware.pcb.outputs import generated_files, kicad_cli
 from hardware.pcb.outputs.schematic import PAGES
 from hardware.pcb.spice.run import Result
 
@@ -27,12 +27,12 @@ _CROP = (60, 190, 920, 790)
 def board_pictures(variant: str, board: Path) -> list[Path]:
     """Render a filled board from both sides and at an angle; of the other variants the top alone."""
     files = []
-    build.PICTURES.mkdir(parents=True, exist_ok=True)
+    generated_files.PICTURES.mkdir(parents=True, exist_ok=True)
     for side, arguments in _SIDES.items():
         if variant != "rev-b" and side != "top":
             continue
-        file = build.PICTURES / f"{variant}-{side}.png"
-        kicad.picture(board, file, *arguments, "--width", "1000", "--height", "1000", "--background", "opaque")
+        file = generated_files.PICTURES / f"{variant}-{side}.png"
+        kicad_cli.picture(board, file, *arguments, "--width", "1000", "--height", "1000", "--background", "opaque")
         _shrink(file, _CROP if side == "view" else None)
         files.append(file)
     if variant == "rev-b":
@@ -48,10 +48,10 @@ def schematic_pictures(variant: str) -> list[Path]:
     files = []
     with tempfile.TemporaryDirectory() as folder:
         pdf = Path(folder) / "pages.pdf"
-        kicad.schematic_pdf(build.GENERATED / variant / f"{variant}.kicad_sch", pdf)
+        kicad_cli.schematic_pdf(generated_files.GENERATED / variant / f"{variant}.kicad_sch", pdf)
         for page in wanted:
             number = str(PAGES.index(page) + 2)
-            target = build.PICTURES / f"{variant}-{page}"
+            target = generated_files.PICTURES / f"{variant}-{page}"
             subprocess.run(["pdftoppm", "-r", str(_PAGE_DPI), "-f", number, "-l", number, "-singlefile", "-png",
                             str(pdf),
                             str(target)], check=True)  # fmt: skip
@@ -65,8 +65,8 @@ def _bare_picture(board: Path) -> Path:
     """Render the board without its parts, for the names that the modules hide."""
     bare = board.with_name("bare.kicad_pcb")
     bare.write_text(board.read_text(encoding="utf-8").replace("/library/models/", "/no-models/"), encoding="utf-8")
-    file = build.PICTURES / "rev-b-bare.png"
-    kicad.picture(bare, file, "--side", "top", "--width", "1000", "--height", "1000", "--background", "opaque")
+    file = generated_files.PICTURES / "rev-b-bare.png"
+    kicad_cli.picture(bare, file, "--side", "top", "--width", "1000", "--height", "1000", "--background", "opaque")
     _shrink(file)
     return file
 
@@ -79,7 +79,7 @@ def plot(result: Result) -> Path:
     import matplotlib.pyplot as plt
 
     deck = result.deck
-    build.PICTURES.mkdir(parents=True, exist_ok=True)
+    generated_files.PICTURES.mkdir(parents=True, exist_ok=True)
     figure, axes = plt.subplots(figsize=(5.6, 3.0), dpi=90, layout="constrained")
     x = [value * deck.x_scale for value in result.columns[0]]
     for column, (_, legend) in zip(result.columns[1:], deck.traces, strict=True):
@@ -90,7 +90,7 @@ def plot(result: Result) -> Path:
     axes.tick_params(labelsize=8)
     axes.grid(visible=True, alpha=0.3)
     axes.legend(fontsize=7)
-    file = build.PICTURES / f"sim-{deck.name}.png"
+    file = generated_files.PICTURES / f"sim-{deck.name}.png"
     figure.savefig(file, metadata={"Software": None})
     plt.close(figure)
     _shrink(file)

@@ -1,10 +1,10 @@
-"""Project files around schematic and board: design rules, net classes, library tables.
+"""Files around schematic and board: design rules, net classes, library tables, and bodies for the 3D picture.
 
-Every severity that is not KiCad's default has its reason beside it.
+Every severity that is not KiCad's default has its reason beside it. Bodies are boxes in
+VRML, drawn from the footprints' own measures: no mechanical models to build a case by,
+for the heights are nominal.
 
-Bodies for the 3D picture: boxes in VRML, drawn from the footprints' own measures.
-
-Not here: mechanical models to build a case by; the heights are nominal.
+Invariant: same design, same bytes.
 """
 
 import json
@@ -13,31 +13,11 @@ from hardware.pcb.circuit.netlist import POWER_NETS, Design
 from hardware.pcb.layout import rules
 from hardware.pcb.layout.shapes import Box, Footprint
 
-#: KiCad's VRML unit: a tenth of an inch.
-_UNIT_MM = 2.54
-
-
-def model_text(footprint: Footprint) -> str:
-    """Return the .wrl file of a footprint; y points up there."""
-    return "#VRML V2.0 utf8\n" + "".join(_box(box) for box in footprint.boxes)
-
-
-def _box(box: Box) -> str:
-    low, high = box.z_mm
-    x, y = box.center_mm
-    centre = " ".join(f"{value / _UNIT_MM:.4f}" for value in (x, -y, (low + high) / 2))
-    size = " ".join(f"{value / _UNIT_MM:.4f}" for value in (*box.size_mm, high - low))
-    colour = " ".join(f"{value:g}" for value in box.colour)
-    return (
-        f"Transform {{ translation {centre} children Shape {{\n"
-        f"  appearance Appearance {{ material Material {{ diffuseColor {colour} specularColor 0.1 0.1 0.1 }} }}\n"
-        f"  geometry Box {{ size {size} }} }} }}\n"
-    )
-
-
 #: Checks that cannot apply, with the reason.
 DRC_IGNORED: dict[str, str] = {}
 ERC_IGNORED: dict[str, str] = {}
+#: KiCad's VRML unit: a tenth of an inch.
+_UNIT_MM = 2.54
 
 
 def project_text(design: Design) -> str:
@@ -90,6 +70,11 @@ def library_tables() -> dict[str, str]:
     }  # fmt: skip
 
 
+def model_text(footprint: Footprint) -> str:
+    """Return the .wrl file of a footprint; y points up there."""
+    return "#VRML V2.0 utf8\n" + "".join(_box(box) for box in footprint.boxes)
+
+
 def _class(entry: rules.NetClass, priority: int) -> dict[str, object]:
     return {
         "name": entry.name, "clearance": entry.clearance_mm, "track_width": entry.track_mm,
@@ -98,3 +83,16 @@ def _class(entry: rules.NetClass, priority: int) -> dict[str, object]:
         "pcb_color": "rgba(0, 0, 0, 0.000)", "schematic_color": "rgba(0, 0, 0, 0.000)",
         "priority": 2147483647 if entry is rules.SIGNAL else priority,
     }  # fmt: skip
+
+
+def _box(box: Box) -> str:
+    low, high = box.z_mm
+    x, y = box.center_mm
+    centre = " ".join(f"{value / _UNIT_MM:.4f}" for value in (x, -y, (low + high) / 2))
+    size = " ".join(f"{value / _UNIT_MM:.4f}" for value in (*box.size_mm, high - low))
+    colour = " ".join(f"{value:g}" for value in box.colour)
+    return (
+        f"Transform {{ translation {centre} children Shape {{\n"
+        f"  appearance Appearance {{ material Material {{ diffuseColor {colour} specularColor 0.1 0.1 0.1 }} }}\n"
+        f"  geometry Box {{ size {size} }} }} }}\n"
+    )

@@ -1,12 +1,11 @@
-"""The schematic as .kicad_sch files: a root sheet and one file a page.
+"""The schematic as .kicad_sch files: a root sheet and one file a page, and which part stands where on it.
 
-Nets are told by global labels and power symbols; two facing pins of one net on one
-line get a wire between them. Invariant: same design, same bytes.
+Each page is a set of framed groups; a frame has a title and words for the reader. Places
+are in steps of 1.27 mm. Nets are named by global labels and power symbols; two facing
+pins of one net on one line get a wire between them.
 
-Which part stands where on the schematic's pages, in steps of 1.27 mm.
-
-Each page is a set of framed groups; a frame has a title and words for the reader.
-Invariant: every component of every variant has a page and a place on it.
+Invariant: every component of every variant has a page and a place on it; same design,
+same bytes.
 """
 
 from dataclasses import dataclass, field

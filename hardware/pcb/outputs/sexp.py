@@ -1,12 +1,10 @@
-"""S-expressions as KiCad writes them: a writer and a reader.
-
-Not here: what any list means. Invariant: `parse(render(tree)) == tree` for trees
-of lists, bare words (`str`) and quoted strings (`Text`).
-
-Identifiers that never change from build to build.
+"""KiCad's file syntax: S-expressions, a writer and a reader, and identifiers that never change from build to build.
 
 KiCad names every object by a UUID. Ours are UUIDs of version 5 over a readable path
 (`rev-b/U5/pad 3`), so that two builds write the same bytes.
+
+Not here: what any list means. Invariant: `parse(render(tree)) == tree` for trees
+of lists, bare words (`str`) and quoted strings (`Text`).
 """
 
 import uuid
@@ -15,6 +13,11 @@ from typing import TypeAlias
 
 #: A list whose first element names it; elements are words, texts or lists.
 Node: TypeAlias = "list[str | Node]"
+#: Longest list that stays on one line. chosen: a stroke, a track or a pad's properties fit, so that a change of one
+#: of them is a change of one line.
+_LINE_LENGTH = 200
+#: chosen: any fixed UUID; another one would rename every object.
+_SPACE = uuid.UUID("6f2d6a53-77d5-5f0b-9a3c-0b5a5d1c9e11")
 
 
 class Text(str):
@@ -103,9 +106,19 @@ def word(tree: Node, index: int = 1) -> str:
     return item
 
 
-#: Longest list that stays on one line. chosen: a stroke, a track or a pad's properties fit, so that a change of one
-#: of them is a change of one line.
-_LINE_LENGTH = 200
+def uid(*path: object) -> str:
+    """Return the identifier of a path."""
+    return str(uuid.uuid5(_SPACE, "/".join(str(part) for part in path)))
+
+
+def uuid_node(*path: object) -> Node:
+    """Return `(uuid "...")` of a path."""
+    return node("uuid", Text(uid(*path)))
+
+
+def sheet_path(variant: str, page: str) -> str:
+    """Return the path of a page below the root sheet, as symbols' instances name it."""
+    return f"/{uid(variant, 'root')}/{uid(variant, 'sheet', page)}"
 
 
 def _word(item: str) -> str:
@@ -140,21 +153,3 @@ def _tokens(text: str) -> Iterator[str]:
             while index < end and text[index] not in '()"' and not text[index].isspace():
                 index += 1
             yield text[start:index]
-
-
-_SPACE = uuid.UUID("6f2d6a53-77d5-5f0b-9a3c-0b5a5d1c9e11")
-
-
-def uid(*path: object) -> str:
-    """Return the identifier of a path."""
-    return str(uuid.uuid5(_SPACE, "/".join(str(part) for part in path)))
-
-
-def uuid_node(*path: object) -> Node:
-    """Return `(uuid "...")` of a path."""
-    return node("uuid", Text(uid(*path)))
-
-
-def sheet_path(variant: str, page: str) -> str:
-    """Return the path of a page below the root sheet, as symbols' instances name it."""
-    return f"/{uid(variant, 'root')}/{uid(variant, 'sheet', page)}"

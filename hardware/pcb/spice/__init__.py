@@ -1,5 +1,5 @@
 """Circuit simulation of the board with ngspice: decks, limits, plots.
 
-The models are ours, behavioural and documented (models.py): they say what the circuit's
+The models are ours, behavioural and documented (deck.py): they show what the circuit's
 values make of the data sheets' figures, not how a given chip behaves beyond them.
 """

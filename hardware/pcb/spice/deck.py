@@ -1,9 +1,10 @@
-"""A question to the circuit simulator: circuit, measures, limits, and what the answer cannot say.
+"""A question to the circuit simulator: circuit, measures, limits, and what the answer cannot show.
 
-Our models of the board's parts, as ngspice subcircuits.
+Below stand our models of the board's parts, as ngspice subcircuits. Each states where its
+figures come from. None comes from a manufacturer, and none knows about temperature,
+ageing or spread unless a deck sweeps it.
 
-Each states where its figures come from. None comes from a manufacturer, and none knows
-about temperature, ageing or spread unless a deck sweeps it.
+Invariant: a deck's figures are judged by its limits alone.
 """
 
 from dataclasses import dataclass

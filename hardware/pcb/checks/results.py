@@ -1,4 +1,4 @@
-"""One line of the table that `make board` prints, and the table."""
+"""The result of one check, and the table of results that `make board` prints."""
 
 from collections.abc import Iterable
 from dataclasses import dataclass

@@ -9,11 +9,11 @@ from collections import Counter
 from adapter_sim.pinout import load_pinout
 from hardware.pcb.checks import copper, gerbers, kicad_checks
 from hardware.pcb.checks.pin_checks import BOARDS, count_by_rule, findings
-from hardware.pcb.checks.report import Result, judged, listed, skipped
+from hardware.pcb.checks.results import Result, judged, listed, skipped
 from hardware.pcb.circuit.design import BOARD_VARIANTS, VARIANTS
 from hardware.pcb.circuit.design import build as design_of
 from hardware.pcb.circuit.electrical import all_checks, bom_faults, netlist_faults
-from hardware.pcb.outputs import build
+from hardware.pcb.outputs import generated_files
 from hardware.pcb.spice import run
 from hardware.pcb.spice.decks import decks
 from hardware.pcb.spice.run import is_installed, simulate
@@ -43,19 +43,19 @@ def plain() -> list[Result]:
         results.append(listed("electrical", variant, outside, f"{len(figures)} figures within their limits"))
     for variant in BOARD_VARIANTS:
         design = design_of(variant)
-        tracks, vias = build.copper_of(design)
+        tracks, vias = generated_files.copper_of(design)
         words = f"{len(tracks)} tracks, {len(vias)} vias"
         results.append(listed("copper connected", variant, copper.faults(design, tracks, vias), words))
         results.append(gerbers_reread(variant))
-    sources = build.sources()
-    stale = [f"{name} is stale" for name in build.stale_files(sources)]
+    sources = generated_files.sources()
+    stale = [f"{name} is stale" for name in generated_files.stale_files(sources)]
     results.append(listed("generated files", "all", stale, f"{len(sources)} files up to date"))
     return results
 
 
 def gerbers_reread(variant: str) -> Result:
     """Read the committed gerbers with a library that is not KiCad's, and hold them against the design."""
-    files = build.fabrication_archive(variant)
+    files = generated_files.fabrication_archive(variant)
     if not files:
         return listed("gerbers re-read", variant, ["there is no archive (hint: make board)"], "")
     if not gerbers.is_installed():
@@ -66,7 +66,7 @@ def gerbers_reread(variant: str) -> Result:
         f"{reading.plated} + {reading.unplated} holes"
     )
     design = design_of(variant)
-    _, vias = build.copper_of(design)
+    _, vias = generated_files.copper_of(design)
     return listed("gerbers re-read", variant, gerbers.faults(design, vias, reading), words)
 
 

@@ -17,7 +17,7 @@ from p2os.protocol.profiles import Profile
 from p2os.protocol.sip import SonarReading, StandardSip
 from p2os.timing import NS_PER_MS, NS_PER_S
 from robot_bench.adapter import is_available
-from tests.adapter_fw.hard_life import BITS_PER_CHARACTER, HardLife
+from tests.adapter_fw.hard_conditions import BITS_PER_CHARACTER, HardConditions
 
 pytestmark = pytest.mark.skipif(not is_available(), reason="the firmware core is not built: no C++17 compiler")
 
@@ -63,10 +63,10 @@ def test_five_percent_of_packets_are_damaged_and_about_one_an_hour_passes_its_su
     assert 0.5 < pairs * BIT_ERROR_RATE**2 * PACKETS_AN_HOUR < 2
 
 
-def lives_well(life: HardLife, span_ns: int, *, unplug: int, reboot: int, fool: int) -> None:
-    life.live(span_ns, unplug=unplug, reboot=reboot, fool=fool)
-    life.drain()
-    counts, back = life.counts, life.back
+def keeps_its_promises(case: HardConditions, span_ns: int, *, unplug: int, reboot: int, forge: int) -> None:
+    case.run(span_ns, unplug=unplug, reboot=reboot, forge=forge)
+    case.drain()
+    counts, back = case.counts, case.back
     assert (counts["unplugged"], counts["reboots"]) == (unplug, reboot)
     assert counts["losses"] >= (unplug + reboot) // 4
     assert counts["sessions"] > counts["losses"] // 2
@@ -76,12 +76,12 @@ def lives_well(life: HardLife, span_ns: int, *, unplug: int, reboot: int, fool: 
     room = 4 * sqrt(share * (1 - share) / back.frames)
     assert abs(back.damaged / back.frames - share) < room + 0.003, "short frames of the handshake are among them"
     # Two refreshes may be damaged in a row: 0.9 % each; three are a matter of days.
-    assert life.longest_wrong_ns <= 3 * REFRESH_MS * NS_PER_MS
+    assert case.longest_wrong_ns <= 3 * REFRESH_MS * NS_PER_MS
     # A count that grew by a flip takes the frames behind it for its own, in the robot's decoder. Wheels that do not
-    # follow for a second are not believed: a SIP later at the latest the robot is stopped.
-    assert life.longest_hidden_ns <= 1_000 * NS_PER_MS + 100 * NS_PER_MS + REFRESH_MS * NS_PER_MS
+    # follow for a second are implausible: a SIP later at the latest the robot is stopped.
+    assert case.longest_hidden_ns <= 1_000 * NS_PER_MS + 100 * NS_PER_MS + REFRESH_MS * NS_PER_MS
     # Each frame is either taken or counted as rejected; one an hour passes that should not.
-    numbers = life.rig.adapter.numbers
+    numbers = case.rig.adapter.numbers
     whole = back.frames - back.damaged
     assert 0 <= numbers["frames"] - whole <= 10
     rejected = numbers["bad_checksums"] + numbers["bad_counts"] + numbers["stalled"]
@@ -92,24 +92,26 @@ def lives_well(life: HardLife, span_ns: int, *, unplug: int, reboot: int, fool: 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("seed", [1])
-def test_a_minute_of_hard_life(seed: int) -> None:
-    lives_well(HardLife(seed, bit_error_rate=BIT_ERROR_RATE), 60 * NS_PER_S, unplug=3, reboot=3, fool=3)
+def test_a_minute_of_hard_conditions(seed: int) -> None:
+    keeps_its_promises(HardConditions(seed, bit_error_rate=BIT_ERROR_RATE), 60 * NS_PER_S, unplug=3, reboot=3, forge=3)
 
 
 @pytest.mark.soak
 @pytest.mark.parametrize("seed", [2, 3])
-def test_an_hour_of_hard_life_with_a_hundred_unplugged_cables_and_a_hundred_reboots(seed: int) -> None:
-    lives_well(HardLife(seed, bit_error_rate=BIT_ERROR_RATE), 3_600 * NS_PER_S, unplug=100, reboot=100, fool=60)
+def test_an_hour_of_hard_conditions_with_a_hundred_unplugged_cables_and_a_hundred_reboots(seed: int) -> None:
+    keeps_its_promises(
+        HardConditions(seed, bit_error_rate=BIT_ERROR_RATE), 3_600 * NS_PER_S, unplug=100, reboot=100, forge=60
+    )
 
 
 def test_a_wrong_speed_that_passes_is_overwritten_by_the_next_refresh() -> None:
-    life = HardLife(5, bit_error_rate=0.0)
-    life.live(2 * NS_PER_S, unplug=0, reboot=0)
-    life._motors_at = 1 << 62
-    life.rig.pins.motors(2, 2, life.rig.now)
-    life.live(NS_PER_S, unplug=0, reboot=0)
-    assert life.heard.speeds["VEL"] == 125
-    life._fool()
-    assert life.heard.speeds["VEL"] == 200
-    life.live(200 * NS_PER_MS + 25 * NS_PER_MS, unplug=0, reboot=0)
-    assert life.heard.speeds["VEL"] == 125
+    case = HardConditions(5, bit_error_rate=0.0)
+    case.run(2 * NS_PER_S, unplug=0, reboot=0)
+    case._motors_at = 1 << 62
+    case.rig.pins.motors(2, 2, case.rig.now)
+    case.run(NS_PER_S, unplug=0, reboot=0)
+    assert case.received.speeds["VEL"] == 125
+    case._forge()
+    assert case.received.speeds["VEL"] == 200
+    case.run(200 * NS_PER_MS + 25 * NS_PER_MS, unplug=0, reboot=0)
+    assert case.received.speeds["VEL"] == 125

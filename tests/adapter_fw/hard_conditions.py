@@ -2,8 +2,7 @@
 
     adapter core (C++) ── line with bit errors, unplugged now and then ── p2os.pioneer ── kinematic body
 
-The BluePill of this life changes its motor values every few seconds, and gives its
-ask anew when the adapter has lost the robot.
+The BluePill here changes its motor values every few seconds, and asks anew when the adapter has lost the robot.
 """
 
 import random
@@ -51,7 +50,7 @@ class BadLine:
 
 
 @dataclass
-class Heard:
+class Received:
     """What the robot takes out of its line: each speed with its time."""
 
     decoder: Decoder = field(default_factory=Decoder)
@@ -64,14 +63,14 @@ class Heard:
             if isinstance(item, Frame):
                 try:
                     command = Command.from_frame(item)
-                except RemoteProtocolError:  # the sum was fooled
+                except RemoteProtocolError:  # a wrong frame whose sum fits
                     continue
                 if command.name in {"VEL", "RVEL"}:
                     self.speeds[command.name], self.at[command.name] = command.integer or 0, now
 
 
-class HardLife:
-    """The life of one adapter; `live` runs it, every promise is checked on the way."""
+class HardConditions:
+    """One adapter under them; `run` runs it, every promise is checked on the way."""
 
     def __init__(self, seed: int, *, bit_error_rate: float) -> None:
         self.random_source = random_source = random.Random(seed)
@@ -82,19 +81,19 @@ class HardLife:
         settings = ControllerSettings(sonar_per_sip=SonarPerSip.ALL)
         self.robot = Pioneer(parameters=parameters, body=body, settings=settings)
         self.rig = rig = Rig(robot=self.robot, kind=FirmwareAdapter)
-        self.heard = Heard()
+        self.received = Received()
         self.forth, self.back = BadLine(bit_error_rate, random_source), BadLine(bit_error_rate, random_source)
         rig.to_robot.damage, rig.to_adapter.damage = self.forth.damage, self.back.damage
         receive = self.robot.receive
 
-        def listen(data: bytes, now: Nanos) -> None:
-            self.heard.take(data, now)
+        def note(data: bytes, now: Nanos) -> None:
+            self.received.take(data, now)
             receive(data, now)
 
-        self.robot.receive = listen
+        self.robot.receive = note
         self.codes = dict.fromkeys(ENCODERS, 0)
-        self.counts = {"unplugged": 0, "reboots": 0, "sessions": 0, "losses": 0, "code_steps": 0, "fooled": 0}
-        #: The longest that the robot held a wrong speed: heard all along, and while a damaged count hid what came.
+        self.counts = {"unplugged": 0, "reboots": 0, "sessions": 0, "losses": 0, "code_steps": 0, "forged": 0}
+        #: The longest that the robot held a wrong speed: received all along, and while a damaged count hid what came.
         self.longest_wrong_ns = self.longest_hidden_ns = 0
         self._wrong_since: Nanos | None = None
         self._was_hidden = False
@@ -102,9 +101,9 @@ class HardLife:
         self._request_at: Nanos = 0
         self._motors_at: Nanos = 0
 
-    def live(self, span: Nanos, *, unplug: int, reboot: int, fool: int = 0) -> None:
-        """Live for a span with so many accidents at random times."""
-        kinds = ["unplug"] * unplug + ["reboot"] * reboot + ["fool"] * fool
+    def run(self, span: Nanos, *, unplug: int, reboot: int, forge: int = 0) -> None:
+        """Run for a span with so many accidents at random times."""
+        kinds = ["unplug"] * unplug + ["reboot"] * reboot + ["forge"] * forge
         end = self.rig.now + span
         accidents = sorted((self.random_source.randrange(self.rig.now, end), kind) for kind in kinds)
         self.rig.pins.set("p2dx_con", True, self.rig.now)
@@ -130,10 +129,10 @@ class HardLife:
         self.counts["reboots"] += 1
         self.robot.hang_up(self.rig.now)
 
-    def _fool(self) -> None:
-        """Let the robot hear a speed that nobody sent, with a right sum."""
+    def _forge(self) -> None:
+        """Give the robot a speed that nobody sent, with a right sum."""
         if self.rig.adapter.state == "driving" and not self.rig.to_robot.cut:
-            self.counts["fooled"] += 1
+            self.counts["forged"] += 1
             wrong = Command.from_frame(Frame(bytes((11, 0x3B, 0xC8, 0)))).to_frame().to_bytes()
             self.robot.receive(wrong, self.rig.now)
 
@@ -176,12 +175,12 @@ class HardLife:
         speeds = self.rig.adapter.status.speeds
         wanted = {"VEL": speeds.forward_mm_s, "RVEL": speeds.turn_deg_s}
         is_whole = self.rig.adapter.state == "driving" and not self.rig.to_robot.cut
-        if not is_whole or self.heard.speeds == wanted:
+        if not is_whole or self.received.speeds == wanted:
             self._wrong_since, self._was_hidden = None, False
             return
         self._wrong_since = self._wrong_since or self.rig.now
         # The line delivers whole frames: a frame that has begun waits for bytes that its count only claims.
-        self._was_hidden = self._was_hidden or self.heard.decoder.next_deadline() is not None
+        self._was_hidden = self._was_hidden or self.received.decoder.next_deadline() is not None
         span = self.rig.now - self._wrong_since
         if self._was_hidden:
             self.longest_hidden_ns = max(self.longest_hidden_ns, span)

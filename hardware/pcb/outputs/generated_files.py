@@ -15,7 +15,7 @@ from hardware.pcb.circuit.netlist import Design
 from hardware.pcb.circuit.parts import PARTS
 from hardware.pcb.layout.footprints import FOOTPRINTS
 from hardware.pcb.layout.routing import HERE, Track, Via, load_routes
-from hardware.pcb.outputs import bom, kicad, project
+from hardware.pcb.outputs import bom, kicad_cli, project
 from hardware.pcb.outputs.assembly import assembly_svg
 from hardware.pcb.outputs.board import board_text, footprint_file
 from hardware.pcb.outputs.pours import fill, load_stitches
@@ -115,7 +115,7 @@ def fabrication_files(board: Path, work: Path) -> dict[str, str]:
         work: A folder to write into.
     """
     work.mkdir(parents=True, exist_ok=True)
-    kicad.fabrication(board, work)
+    kicad_cli.fabrication(board, work)
     return {path.name: path.read_text(encoding="utf-8") for path in sorted(work.iterdir())}
 
 

@@ -122,7 +122,7 @@ def fabrication(board: Path, folder: Path) -> None:
 
 
 def without_dates(text: str) -> str:
-    """Return a fabrication file without the lines that tell when and by which program it was written."""
+    """Return a fabrication file without the lines that hold when and by which program it was written."""
     return "\n".join(line for line in text.splitlines() if not _DATED.search(line)) + "\n"
 
 
