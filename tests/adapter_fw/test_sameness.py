@@ -1,6 +1,6 @@
 """The firmware core and the model are the same machine: equal frames, pins, states and counters, step by step.
 
-Each example is a life of some fifty steps; a step changes pins, brings bytes
+Each example is a sequence of some fifty steps; a step changes pins, brings bytes
 (sound, damaged or noise), pad reports, a change of masters, a shutdown, a saved
 and restored state, and lets time pass. Both are asked for their deadlines, too.
 """
@@ -69,7 +69,7 @@ SETTINGS = st.builds(
 )
 
 
-class Life:
+class Sequence:
     """What a step does to both."""
 
     def __init__(self, adapter_settings: AdapterSettings, *, has_four_bits: bool) -> None:
@@ -133,10 +133,10 @@ class Life:
     def _time(self, span: int) -> None:
         self.twins.pass_time(span)
 
-    def _connect(self, in_peace: bool) -> None:
+    def _connect(self, on_request: bool) -> None:
         """All the way to driving, unless something is in the way."""
         self.twins.pin("rst", False)
-        if in_peace:
+        if on_request:
             self.twins.pin("p2dx_con", False)
             self.twins.pass_time(400 * MS)
         self.twins.master(Master.BLUEPILL)
@@ -184,37 +184,37 @@ class Life:
             self.twins.receive(Frame(b"\x32" + bytes(40)).to_bytes()[:17])
 
 
-def live(steps: list[tuple[object, ...]], adapter_settings: AdapterSettings, *, has_four_bits: bool) -> int:
-    life = Life(adapter_settings, has_four_bits=has_four_bits)
+def run_both(steps: list[tuple[object, ...]], adapter_settings: AdapterSettings, *, has_four_bits: bool) -> int:
+    sequence = Sequence(adapter_settings, has_four_bits=has_four_bits)
     for kind, *values in steps:
-        life.step(str(kind), *values)
-    return life.twins.steps
+        sequence.step(str(kind), *values)
+    return sequence.twins.steps
 
 
-LIVES = given(st.lists(STEPS, min_size=30, max_size=60), SETTINGS, st.booleans())
+SEQUENCES = given(st.lists(STEPS, min_size=30, max_size=60), SETTINGS, st.booleans())
 QUIET = [HealthCheck.too_slow, HealthCheck.data_too_large, HealthCheck.large_base_example]
 
 
 @pytest.mark.slow
 @settings(max_examples=12, deadline=None, suppress_health_check=QUIET)
-@LIVES
-def test_firmware_and_model_do_the_same_in_any_life(steps: list, adapter_settings: AdapterSettings, four: bool) -> None:
-    live(steps, adapter_settings, has_four_bits=four)
+@SEQUENCES
+def test_firmware_and_model_agree_in_any_sequence(steps: list, adapter_settings: AdapterSettings, four: bool) -> None:
+    run_both(steps, adapter_settings, has_four_bits=four)
 
 
 @pytest.mark.slow
 @settings(max_examples=115, deadline=None, suppress_health_check=QUIET)
-@LIVES
+@SEQUENCES
 def test_firmware_and_model_do_the_same_over_five_thousand_steps(
     steps: list, adapter_settings: AdapterSettings, four: bool
 ) -> None:
-    live(steps, adapter_settings, has_four_bits=four)
+    run_both(steps, adapter_settings, has_four_bits=four)
 
 
 @pytest.mark.soak
 @settings(max_examples=2_500, deadline=None, suppress_health_check=QUIET)
-@LIVES
-def test_firmware_and_model_do_the_same_in_thousands_of_lives(
+@SEQUENCES
+def test_firmware_and_model_agree_in_thousands_of_sequences(
     steps: list, adapter_settings: AdapterSettings, four: bool
 ) -> None:
-    live(steps, adapter_settings, has_four_bits=four)
+    run_both(steps, adapter_settings, has_four_bits=four)
