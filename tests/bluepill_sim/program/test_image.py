@@ -81,6 +81,13 @@ def bad_elf(**changes: int) -> bytes:
     return bytes(data)
 
 
+def elf_of_type(number: int) -> bytes:
+    """The real ELF saying that it is something else than a program."""
+    data = bytearray(FIRMWARE.read_bytes())
+    data[16] = number
+    return bytes(data)
+
+
 HOST_ELF = Path(sys.executable).resolve()
 BAD_FILES = [
     (b"", "the file is empty"),
@@ -102,6 +109,15 @@ BAD_FILES = [
     (FIRMWARE.read_bytes()[:64], "the ELF file is damaged"),
     (FIRMWARE.read_bytes()[:0x200], "damaged"),
     (b"\x7fELF", "the ELF file is damaged"),
+    (b"root:x:0:0:root:/root:/bin/bash\n" * 4, "a text file, no firmware"),
+    ("#!/bin/sh\necho Grüße\n".encode() * 4, "a text file, no firmware"),
+    (b"int main(void) { return 0; }\n", "a text file, no firmware"),
+    (b"S00600004844521B\nS1130000285F245F2212226A000424290008237C2A\n", "Motorola S-record"),
+    (b"!<arch>\n" + bytes(80), "a library (ar archive)"),
+    (b"UF2\n\x57\x51\x5d\x9e" + bytes(504), "a UF2 file"),
+    (b"\x1f\x8b\x08\0" + bytes(60), "a gzip file"),
+    (b"PK\x03\x04" + bytes(60), "a ZIP archive"),
+    (elf_of_type(1), "a compiled source that is not linked (object file)"),
 ]
 
 
