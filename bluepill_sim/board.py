@@ -25,6 +25,7 @@ from pathlib import Path
 from bluepill_sim.chip import Chip
 from bluepill_sim.core import GENERAL, BlockRow, Register
 from bluepill_sim.core.faults import FAULT_ROWS, FaultKind, FaultReport
+from bluepill_sim.core.nvic import exception_name
 from bluepill_sim.errors import BluePillError, ImageError, UnmodelledError
 from bluepill_sim.fabric.pins import Pin, PinDrive
 from bluepill_sim.memory import Memory
@@ -45,6 +46,7 @@ STEP_NS: Nanos = 1 * NS_PER_MS
 #: How many of the last characters of a port a message shows.
 _SHOWN_CHARACTERS = 60
 
+_ERASED_WORD = 0xFFFF_FFFF
 _HINT = 'such as "pin PA4 high", "usart1 sends ready", "asleep", "fault", or a function of the board'
 
 
@@ -380,8 +382,21 @@ class BluePill:
             registers=tuple(registers),
             at_ns=chip.now_ns,
             is_lockup=is_lockup,
+            vector=self._vector_of(pc),
             last_rows=chip.engine.log.rows(),
         )
+
+    def _vector_of(self, pc: int) -> str:
+        """Return what the vector of the running handler is, where it has just led to `pc`; empty where it has not."""
+        processor = self.chip.processor
+        number = processor.exception_number
+        rows = self.chip.engine.log.rows()
+        at = processor.vector_table + 4 * number
+        vector = self.chip.memory.read_word(at)
+        if not number or vector is None or vector & ~1 != pc or not rows or rows[-1][2] != number:
+            return ""
+        erased = ": erased flash" if vector == _ERASED_WORD else ""
+        return f"the vector of {exception_name(number)} at {at:#010x} is {vector:#010x}{erased}"
 
 
 def run_until(

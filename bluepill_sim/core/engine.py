@@ -66,7 +66,7 @@ EngineSnapshot = tuple[CoreSnapshot, int, int, bool, bool, RestSnapshot | None, 
 _LAST_NORMAL_ADDRESS = 0x21FF_FFFF
 
 #: Branches to these addresses are exception returns in handler mode (ARMv7-M B1.5.8).
-_FIRST_EXCEPTION_RETURN = 0xFFFF_FFE0
+FIRST_EXCEPTION_RETURN = 0xFFFF_FFE0
 
 #: The scratch page as a block: it costs nothing.
 _SCRATCH_BLOCK = Block(SCRATCH_BASE, SCRATCH_END, 0, 0, {})
@@ -491,7 +491,7 @@ class Engine:
         """Charge what of the running block has been run when the core stands at `pc`."""
         block, self.block = self.block, NO_BLOCK
         if block is not NO_BLOCK:
-            is_return = pc >= _FIRST_EXCEPTION_RETURN  # the refill is part of the exception's exit
+            is_return = pc >= FIRST_EXCEPTION_RETURN  # the refill is part of the exception's exit
             self.cycle += block.straight if is_return else block.cycles_until(pc)
         self.pc = pc
         self.is_thumb = bool(self.registers[Register.XPSR] & _T_BIT)
@@ -500,7 +500,7 @@ class Engine:
 def _kind_of_interrupt(number: int, pc: int) -> HaltKind:
     """Return what an exception of Unicorn's own numbering is."""
     kind = _INTERRUPTS.get(number, HaltKind.UNDEFINED)
-    if kind is HaltKind.EXECUTE_NEVER and pc >= _FIRST_EXCEPTION_RETURN:
+    if kind is HaltKind.EXECUTE_NEVER and pc >= FIRST_EXCEPTION_RETURN:
         return HaltKind.EXCEPTION_RETURN
     return kind
 

@@ -85,6 +85,8 @@ class FaultReport:
     at_ns: Nanos
     #: Whether the core has locked up: nothing but a reset moves it.
     is_lockup: bool = False
+    #: What the vector table has to do with it; empty where nothing.
+    vector: str = ""
     #: What ran up to the fault, oldest first: rows of `BlockRecorder`, at most 32.
     last_rows: tuple[BlockRow, ...] = ()
 
@@ -93,7 +95,8 @@ class FaultReport:
         access = "" if self.address is None else f", address {self.address:#010x}"
         end = "; the core is locked up" if self.is_lockup else ""
         name = _EXCEPTION_NAMES.get(self.exception, f"exception {self.exception}")
-        return f"{name}: {self.kind.value} at {self.where}{access}, t = {self.at_ns / 1e9:.6f} s{end}"
+        vector = f" ({self.vector})" if self.vector else ""
+        return f"{name}: {self.kind.value} at {self.where}{access}{vector}, t = {self.at_ns / 1e9:.6f} s{end}"
 
     @property
     def register_dump(self) -> str:

@@ -21,7 +21,7 @@ from collections.abc import Callable
 from enum import Enum
 
 from bluepill_sim.core.blocks import it_state_of
-from bluepill_sim.core.engine import Engine
+from bluepill_sim.core.engine import FIRST_EXCEPTION_RETURN, Engine
 from bluepill_sim.core.faults import FAULT_OF_HALT, FAULT_ROWS, HFSR_FORCED, FaultKind
 from bluepill_sim.core.nvic import BUS_FAULT, HARD_FAULT, NMI, SVCALL, SYSTICK, Nvic
 from bluepill_sim.core.recorder import EXCEPTION_RETURN
@@ -163,6 +163,8 @@ class Processor:
             self.engine.stops_after_mask_change = self.nvic.deliverable() != 0
         else:
             self.engine.stops_after_mask_change = False
+        if self._stands_at_return():
+            return
         halt = self.engine.run(stop_at)
         if halt.kind is not HaltKind.BOUNDARY:
             self._act_on(halt)
@@ -179,7 +181,8 @@ class Processor:
             self.halt = Halt(HaltKind.STEP, self.engine.pc)
             return
         self.engine.stops_after_mask_change = self.nvic.deliverable() != 0
-        self._act_on(self.engine.step(stop_at))
+        if not self._stands_at_return():
+            self._act_on(self.engine.step(stop_at))
         if self.halt is None:
             self.halt = Halt(HaltKind.STEP, self.engine.pc)
 
@@ -253,6 +256,13 @@ class Processor:
         if number is None or not self.nvic.can_preempt(number, self.execution_priority()):
             return False
         self._enter(number, self.engine.pc)
+        return True
+
+    def _stands_at_return(self) -> bool:
+        """Fault where a vector or a stacked PC, not a branch, led to an EXC_RETURN value: it is an address there."""
+        if self.engine.pc < FIRST_EXCEPTION_RETURN:
+            return False
+        self._fault(FaultKind.EXECUTE_NEVER, self.engine.pc)
         return True
 
     def _act_on(self, halt: Halt) -> None:

@@ -25,6 +25,7 @@ VECTOR_ALIGNMENT = 0x200
 #: chosen: a stack pointer and a reset vector are the least that a program can have.
 _SMALLEST_BYTES = 8
 _SHF_ALLOC = 2
+_ERASED_WORD = 0xFFFF_FFFF
 _ELF_MAGIC = b"\x7fELF"
 #: Types of ELF files that are no programs.
 _NOT_LINKED = {
@@ -107,7 +108,20 @@ class Image:
                     hint="check the linker script: FLASH is at 0x08000000, 64 KiB",
                 )
         stack, entry = self.word(self.vector_table), self.word(self.vector_table + 4)
-        if not SRAM_BASE < stack <= _STACK_END or stack % 4:
+        erased = [name for name, word in (("stack pointer", stack), ("reset vector", entry)) if word == _ERASED_WORD]
+        if erased:
+            raise ImageError(
+                f"{self.name}: no {' and no '.join(erased)} at {self.vector_table:#010x}: "
+                f"{_ERASED_WORD:#010x} is erased flash",
+                hint="a program begins with its vector table: check the linker script, and where the file is put",
+            )
+        if SRAM_BASE < stack <= _STACK_END and stack % 4:
+            raise ImageError(
+                f"{self.name}: the initial stack pointer {stack:#010x} at {self.vector_table:#010x} "
+                "is no multiple of 4",
+                hint="the core would drop its two lowest bits; let the linker script align the top of the stack to 8",
+            )
+        if not SRAM_BASE < stack <= _STACK_END:
             raise ImageError(
                 f"{self.name}: the initial stack pointer {stack:#010x} at {self.vector_table:#010x} "
                 f"is not in the SRAM ({SRAM_BASE:#010x} to {_STACK_END:#010x})",

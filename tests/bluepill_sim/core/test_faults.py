@@ -245,3 +245,18 @@ def test_running_off_the_end_of_the_code_faults(boot) -> None:
 def test_an_ldm_fault_leaves_its_base_register_alone(boot) -> None:
     machine = boot("mov32 r1, #0x20004FFC\nldmia r1!, {r2-r4}").run(100)
     assert dict(machine.board.fault.registers)["R1"] == 0x20004FFC
+
+
+@pytest.mark.parametrize("core", ["python", "native"])
+@pytest.mark.parametrize("vector", [0xFFFF_FFFF, 0xFFFF_FFF9, 0xFFFF_FFF1, 0xFFFF_FFFD])
+def test_a_vector_that_looks_like_a_return_is_an_address(boot, vector, core, monkeypatch) -> None:
+    # Only a branch in a handler returns (ARM B1.5.8); a vector is fetched from, and nothing executes up there.
+    monkeypatch.setenv("P2OS_CORE", core)
+    machine = boot("svc #0\nlog #1", {11: vector})
+    machine.run(100)
+    assert machine.board.chip.processor.cfsr == 1
+    fault = str(machine.board.fault)
+    assert fault.startswith(f"MemManage: instruction fetch from a region that must not be executed at {vector & ~1:#x}")
+    assert f"(the vector of SVCall at 0x0000002c is {vector:#010x}" in fault
+    assert ("erased flash" in fault) is (vector == 0xFFFF_FFFF)
+    assert machine.log == []

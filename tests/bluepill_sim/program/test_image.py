@@ -52,6 +52,12 @@ def test_an_intel_hex_file_may_start_behind_a_boot_loader() -> None:
     assert image.vector_table == 0x0800_2000
 
 
+def test_a_hex_file_linked_at_zero_stands_in_the_flash() -> None:
+    program = struct.pack("<II", 0x2000_5000, 9) + b"\xfe\xe7" * 4
+    image = parse_image(hex_file(0, program), "a.hex")
+    assert (image.segments, image.vector_table, image.linked_at) == (((0x0800_0000, program),), 0x0800_0000, 0)
+
+
 def test_the_same_program_runs_from_every_format(tmp_path: Path) -> None:
     image = load_image(FIRMWARE)
     base = image.segments[0][0]
@@ -93,7 +99,9 @@ BAD_FILES = [
     (b"", "the file is empty"),
     (b"abc", "3 bytes are too few"),
     (bytes(range(256)) * 16, "the initial stack pointer 0x03020100 at 0x08000000 is not in the SRAM"),
-    (b"\xff" * 1024, "the initial stack pointer 0xffffffff"),
+    (b"\xff" * 1024, "no stack pointer and no reset vector at 0x08000000: 0xffffffff is erased flash"),
+    (struct.pack("<II", 0x2000_5000, 0xFFFF_FFFF) * 8, "no reset vector at 0x08000000: 0xffffffff is erased flash"),
+    (struct.pack("<II", 0x2000_4FFE, 0x0800_0009) * 8, "stack pointer 0x20004ffe at 0x08000000 is no multiple of 4"),
     (b"\0" * 1024, "the initial stack pointer 0x00000000"),
     (struct.pack("<II", 0x2000_5000, 0x0800_0008) * 8, "the reset vector 0x08000008 is not a Thumb address"),
     (struct.pack("<II", 0x2000_5000, 0x2000_0001) * 8, "the reset vector 0x20000001 is not a Thumb address"),
