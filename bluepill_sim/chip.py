@@ -72,6 +72,8 @@ class Chip:
         self.memory = memory
         #: Returns where the vectors are that a reset starts at: what the BOOT pins say.
         self.boot_address: Callable[[], int] = lambda: vector_table
+        #: Called with the cause before each reset.
+        self.on_reset: Callable[[ResetCause], None] | None = None
         self._on_warning = on_warning
         self.clocks = Clocks()
         self._clock = CycleClock(self.clocks.hclk_hz)
@@ -188,6 +190,8 @@ class Chip:
     def reset(self, cause: ResetCause) -> None:
         """Reset core and peripherals; time goes on. A power cut clears the SRAM too."""
         self._requested_reset = None
+        if self.on_reset is not None:
+            self.on_reset(cause)
         vectors = self.boot_address()
         if cause is ResetCause.POWER:
             self.memory.lose_power()

@@ -147,7 +147,9 @@ class Bench:
     def end(self) -> Nanos:
         """Return when the run ends, as far as is known now."""
         fault, duration_ns = self.chip.fault, self.scenario.duration_ns
-        return duration_ns if fault is None else min(duration_ns, fault.at_ns + AFTER_FAULT_NS)
+        return (
+            duration_ns if fault is None or not self.chip.has_died else min(duration_ns, fault.at_ns + AFTER_FAULT_NS)
+        )
 
     @property
     def now(self) -> Nanos:

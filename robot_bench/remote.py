@@ -150,7 +150,7 @@ class RemoteBench:
                 f"the adapter lost the robot at {now / NS_PER_S:.3f} s: {self.adapter.status.reason}",
                 hint="p2os info URL",
             )
-        if self.chip.fault is not None:
+        if self.chip.has_died:
             self.loop.end_at(now)
         if self.on_slice is not None:
             self.on_slice(now)

@@ -60,7 +60,17 @@ class Chip(Protocol):
 
     @property
     def fault(self) -> ChipFault | None:
-        """The fault that ended the firmware; None while it runs."""
+        """The fault that ended the firmware, or that it came back from; None while there is none."""
+        ...
+
+    @property
+    def has_died(self) -> bool:
+        """Whether the fault ended the firmware."""
+        ...
+
+    @property
+    def verdict(self) -> str:
+        """What became of the firmware: its fault, its resets; empty where it just ran."""
         ...
 
     def last_blocks(self) -> Sequence[str]:
