@@ -53,6 +53,9 @@ _ALIAS_BYTES = 32
 #: The upper byte of the first halfword of a 32-bit instruction is this or more.
 _FIRST_WIDE_BYTE = 0xE8
 
+#: chosen: reading a peripheral without its clock for so long is no de-initialization that passes by.
+UNCLOCKED_NS: Nanos = 1_000_000
+
 #: Takes a message, its key, and the address of the instruction that caused it.
 WarningListener = Callable[[str, str, int], None]
 
@@ -112,6 +115,11 @@ class Chip:
     def access_cycle(self) -> int:
         """The time of the accessing instruction, in cycles."""
         return self.engine.access_cycle
+
+    @property
+    def access_pc(self) -> int:
+        """The accessing instruction, else the next one."""
+        return self.engine.access_pc
 
     @property
     def time_base(self) -> tuple[int, Nanos, int]:
@@ -281,7 +289,11 @@ class Chip:
             self.pins.snapshot(),
             self.clocks.snapshot(),
             self._clock.snapshot(),
-            (self._stop_requested, self._requested_reset and self._requested_reset.name),
+            (
+                self._stop_requested,
+                self._requested_reset and self._requested_reset.name,
+                tuple(self._bus.read_unclocked_ns.items()),
+            ),
         )
 
     def restore(self, snapshot: tuple[object, ...]) -> None:
@@ -296,7 +308,8 @@ class Chip:
         self.parts.restore(parts)  # type: ignore[arg-type]  # as above
         self.clocks.restore(clocks)  # type: ignore[arg-type]  # as above
         self._clock.restore(clock)  # type: ignore[arg-type]  # as above
-        self._stop_requested, cause = cast("tuple[bool, str | None]", requests)
+        self._stop_requested, cause, unclocked = cast("tuple[bool, str | None, tuple[tuple[str, int], ...]]", requests)
+        self._bus.read_unclocked_ns = dict(unclocked)
         self._requested_reset = None if cause is None else ResetCause[cause]
         self._flash_access = self.clocks.flash_wait_states, self.clocks.flash_prefetch
         self.engine.forget_costs()
@@ -352,7 +365,7 @@ class Chip:
         engine = self.engine
         for region in self.memory.regions:
             engine.map_memory(region.base, region.buffer, is_writable=region.is_writable)
-        bus = PeripheralBus(self.parts.by_name, self.parts.rcc, self)
+        self._bus = bus = PeripheralBus(self.parts.by_name, self.parts.rcc, self)
         engine.map_io(PERIPHERAL_BASE, PERIPHERAL_BYTES, bus.read, bus.write)
         engine.map_io(PERIPHERAL_ALIAS, PERIPHERAL_BYTES * _ALIAS_BYTES, bus.read_bit, bus.write_bit)
         bits = SramBitBand(self.memory.sram)
@@ -395,7 +408,8 @@ class Chip:
 class PeripheralBus:
     """Reads and writes of the peripheral region; offsets count from PERIPHERAL_BASE.
 
-    A peripheral sees an access only while its clock is on.
+    A peripheral sees an access only while its clock is on. Accesses without one are warned of where they matter: a
+    write that sets what a reset would not leave, and reading on for a while; ST's de-initializations do neither.
     """
 
     def __init__(self, parts: dict[str, Peripheral], rcc: Rcc, chip: Chip) -> None:
@@ -406,20 +420,31 @@ class PeripheralBus:
         }
         self._rcc = rcc
         self._chip = chip
+        #: When each peripheral was first read without its clock, in ns.
+        self.read_unclocked_ns: dict[str, Nanos] = {}
 
     def read(self, offset: int, size: int) -> int:
         """Return what the core reads."""
         part = self._pages.get(offset >> _PAGE_SHIFT)
-        if part is None or not self._rcc.is_clocked(part.name):
-            self._refuse(part, offset, "read of")
+        if part is None:
+            self._refuse(None, offset, "read of")
+            return 0
+        if not self._rcc.is_clocked(part.name):
+            now_ns = self._chip.now_ns
+            if now_ns - self.read_unclocked_ns.setdefault(part.name, now_ns) >= UNCLOCKED_NS:
+                self._refuse(part, offset, "read of")
             return 0
         return part.read(PERIPHERAL_BASE + offset - part.base, size)
 
     def write(self, offset: int, size: int, value: int) -> None:
         """Take what the core writes."""
         part = self._pages.get(offset >> _PAGE_SHIFT)
-        if part is None or not self._rcc.is_clocked(part.name):
-            self._refuse(part, offset, f"write of {value:#x} to")
+        if part is None:
+            self._refuse(None, offset, f"write of {value:#x} to")
+            return
+        if not self._rcc.is_clocked(part.name):
+            if part.changes_reset_value(PERIPHERAL_BASE + offset - part.base, value):
+                self._refuse(part, offset, f"write of {value:#x} to")
             return
         part.write(PERIPHERAL_BASE + offset - part.base, size, value)
 

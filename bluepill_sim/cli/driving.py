@@ -138,14 +138,15 @@ def warn_on_stderr(board: BluePill) -> None:
 
 
 def summary(board: BluePill) -> str:
-    """Return where a run has come to, in one line, and what became of the firmware in another where it faulted or was reset."""
+    """Return where a run has come to, in one line; a second one tells of faults and resets."""
     doing = "asleep at" if board.is_asleep else "at"
     if board.is_asleep and board.next_deadline() is None:
         doing = "asleep, and nothing on the chip is due to wake it, at"
     count = len(board.warnings)
     warned = f", {count} warning{'s' if count != 1 else ''}" if count else ""
     verdict = f"\n{board.verdict}" if board.verdict and (board.resets or not board.has_died) else ""
-    return f"{board.now_ns / NS_PER_S:.6f} s of virtual time, {board.cycle} cycles, {doing} {board.where()}{warned}{verdict}"
+    reached = f"{board.now_ns / NS_PER_S:.6f} s of virtual time, {board.cycle} cycles, {doing} {board.where()}"
+    return f"{reached}{warned}{verdict}"
 
 
 def print_fault(board: BluePill) -> bool:

@@ -59,6 +59,9 @@ class SystemControlPorts(Protocol):
         ...
 
 
+#: ISER, ICER, ISPR, ICPR, IABR.
+_LINE_BASES = (0xE000E100, 0xE000E180, 0xE000E200, 0xE000E280, 0xE000E300)
+
 _Read = Callable[[], int]
 #: Takes the word written and the mask of the bytes written.
 _Write = Callable[[int, int], None]
@@ -172,6 +175,12 @@ class SystemControl:
         """Put the arrays of registers into the tables: words of lines, and a byte of priority each."""
         for word in range(2):
             self._add_lines(4 * word, 32 * word)
+        # What is there for more lines than the chip has reads 0 and ignores writes (ARM B3.4.3); ST's code writes it.
+        beyond = [base + 4 * word for base in _LINE_BASES for word in range(2, 8)]
+        beyond += range(0xE000E400 + (IRQ_COUNT + 3) // 4 * 4, 0xE000E4F0, 4)
+        for address in beyond:
+            self._readers[address] = lambda: 0
+            self._writers[address] = lambda _value, _mask: None
         for first in range(0, IRQ_COUNT, 4):
             self._add_priorities(0xE000E400 + first, FIRST_IRQ + first)
         for first in range(MEM_MANAGE, FIRST_IRQ, 4):

@@ -50,6 +50,8 @@ REMAP_FIELDS = {
 }
 _PD01_REMAP = 1 << 15
 _SWJ_SHIFT, _SWJ_MASK = 24, bits((26, 24))
+#: What ST's own code writes to leave the debug port as it is (RM0008 9.4.2: other combinations have no effect).
+_SWJ_UNCHANGED = 0b111
 _CRYSTAL_PINS = {"PD0": "OSC_IN", "PD1": "OSC_OUT"}
 
 
@@ -90,7 +92,8 @@ class Afio(Peripheral):
     def _route(self, written: int, _previous: int) -> None:
         swj_cfg = (written & _SWJ_MASK) >> _SWJ_SHIFT
         if swj_cfg not in KEPT_BY_SWJ_CFG:
-            self.chip.warn(f"AFIO_MAPR: SWJ_CFG = {swj_cfg:03b} has no meaning: ignored", once="AFIO:swj")
+            if swj_cfg != _SWJ_UNCHANGED:
+                self.chip.warn(f"AFIO_MAPR: SWJ_CFG = {swj_cfg:03b} has no meaning: ignored", once="AFIO:swj")
             swj_cfg = self._swj_cfg
         taken_back = KEPT_BY_SWJ_CFG[swj_cfg] - KEPT_BY_SWJ_CFG[self._swj_cfg]
         if taken_back:

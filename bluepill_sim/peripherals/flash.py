@@ -12,7 +12,6 @@ Invariant: the memory changes only while CR is unlocked and PG, PER or MER says 
 
 from typing import Protocol
 
-from bluepill_sim.fabric.clocks import illegal_settings
 from bluepill_sim.fabric.ports import ChipPorts
 from bluepill_sim.fabric.registers import Peripheral, Place, Register, bits
 
@@ -146,8 +145,6 @@ class Flash(Peripheral):
             return
         clocks.flash_wait_states, clocks.flash_prefetch = latency, has_prefetch
         self.chip.clock_changed()
-        for key, message in illegal_settings(clocks):
-            self.chip.warn(message, once=key)
 
     def _write_keyr(self, written: int, _previous: int) -> None:
         if self._key_step < 0 or not self.words[CR] & LOCK:
