@@ -69,6 +69,8 @@ class BoardSnapshot:
     unread: tuple[bytes, ...]
     boot0: bool = False
     resets: tuple[tuple[ResetCause, int], ...] = ()
+    #: Characters sent by each USART, by (PCLK, BRR).
+    sent_at: tuple[tuple[tuple[tuple[int, int], int], ...], ...] = ((), (), ())
 
 
 class BluePill:
@@ -323,6 +325,7 @@ class BluePill:
             tuple(bytes(port.unread) for port in self._usarts),
             self.boot0,
             tuple(self.resets.items()),
+            tuple(tuple(self.chip.parts.usart(n).sent_at.items()) for n in (1, 2, 3)),
         )
 
     def restore(self, snapshot: object) -> None:
@@ -337,6 +340,8 @@ class BluePill:
         self.fault = snapshot.fault
         self.boot0 = snapshot.boot0
         self.resets = Counter(dict(snapshot.resets))
+        for number, sent_at in enumerate(snapshot.sent_at, start=1):
+            self.chip.parts.usart(number).sent_at = Counter(dict(sent_at))
         self._activity.last_pin_ns, self._activity.last_usart_ns, self._activity.last_wfi_ns = snapshot.activity
         self._warned = dict(snapshot.warned)
         for port, unread in zip(self._usarts, snapshot.unread, strict=True):

@@ -120,6 +120,7 @@ class Bench:
         for wire in pinout.with_role(WireRole.RESET):
             pins.watch(wire.name)
         self._bring_adapter_to_edges(pins, harness)
+        chip.usart1.far_baud = scenario.usart_baud
         chip.usart1.on_transmit = lambda byte, at: self.recorder.usart(bytes([byte]), at)
         chip.on_warning = lambda text: self.recorder.event("chip", chip.now_ns, "warning", text)
         self.recorder.start()

@@ -88,6 +88,7 @@ class RemoteBench:
         )
         for wire in pinout.with_role(WireRole.RESET):
             pins.watch(wire.name)
+        chip.usart1.far_baud = scenario.usart_baud
         chip.usart1.on_transmit = lambda byte, at: recorder.usart(bytes([byte]), at)
         chip.on_warning = lambda text: recorder.event("chip", chip.now_ns, "warning", text)
         recorder.start()

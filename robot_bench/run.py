@@ -260,6 +260,7 @@ def _figures(bench: Bench | RemoteBench, end: Nanos, wall_s: float) -> Json:
         "wall_s": round(wall_s, 3),
         "real_time_factor": round(virtual_s / wall_s, 2) if wall_s > 0 else None,
         "distance_m": round(recorder.distance_m, 6),
+        "usart_baud": bench.chip.usart1.measured_baud,
         "collisions": None if recorder.last_state is None else recorder.last_state.collisions,
         "min_clearance_m": None if clearance is None else round(clearance, 6),
     }

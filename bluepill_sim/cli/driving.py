@@ -146,7 +146,18 @@ def summary(board: BluePill) -> str:
     warned = f", {count} warning{'s' if count != 1 else ''}" if count else ""
     verdict = f"\n{board.verdict}" if board.verdict and (board.resets or not board.has_died) else ""
     reached = f"{board.now_ns / NS_PER_S:.6f} s of virtual time, {board.cycle} cycles, {doing} {board.where()}"
-    return f"{reached}{warned}{verdict}"
+    return f"{reached}{warned}{_line_speeds(board)}{verdict}"
+
+
+def _line_speeds(board: BluePill) -> str:
+    """Return a line for each USART that has sent: how much, and how fast."""
+    lines = []
+    for name, port in board.serial_ports.items():
+        speeds = [f"{count} characters at {baud} bit/s" for baud, count in port.speeds.items()]
+        far = "" if port.far_baud is None else f"; the far end is at {port.far_baud} bit/s"
+        if speeds:
+            lines.append(f"\n{name} sent {', '.join(speeds)}{far}")
+    return "".join(lines)
 
 
 def print_fault(board: BluePill) -> bool:

@@ -67,11 +67,15 @@ def run(
     budget_s: Annotated[
         float, typer.Option("--budget", help="Most seconds of wall clock, unless --realtime.", metavar="S", min=0)
     ] = _BUDGET_S,
+    usart_baud: Annotated[
+        int | None, typer.Option(help="Speed of USART1's far end; unset follows the program.", metavar="BAUD", min=1)
+    ] = None,
     strict: Annotated[bool, typer.Option("--strict", help="The first warning ends the run.")] = False,
 ) -> None:
     """Boot a firmware."""
     end_ns = to_nanos(span or (_FOR_EVER if realtime else DEFAULT_SPAN))
     board = BluePill(firmware, strict=strict)
+    board.usart1.far_baud = usart_baud
     changes = parse_changes(drive or [], board)
     warn_on_stderr(board)
     console = open_console(uart)

@@ -135,7 +135,7 @@ class Image:
 
     @property
     def vector_table(self) -> int:
-        """Where in the flash the vectors are: at the program's lowest address, which a boot loader may have moved up."""
+        """Where in the flash the vectors are: at its lowest address, which a boot loader may have moved up."""
         lowest = min(address for address, data in self.segments if data)
         return lowest // VECTOR_ALIGNMENT * VECTOR_ALIGNMENT
 

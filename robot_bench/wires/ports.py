@@ -16,6 +16,13 @@ class Usart(Protocol):
 
     #: Called with each byte that the chip has sent, and when its stop bit ended, in ns.
     on_transmit: Callable[[int, int], None] | None
+    #: The far end's speed in bit/s; None follows the firmware.
+    far_baud: int | None
+
+    @property
+    def measured_baud(self) -> int | None:
+        """The speed at which most characters were sent, in bit/s; None before the first."""
+        ...
 
 
 class ChipActivity(Protocol):

@@ -61,7 +61,7 @@ class FakeChip:
         self.inputs: list[tuple[int, str, bool | None]] = []
         self.on_pin: Callable[[str, PinDrive, int], None] | None = None
         self.on_warning: Callable[[str], None] | None = None
-        self.usart1 = SimpleNamespace(on_transmit=None)
+        self.usart1 = SimpleNamespace(on_transmit=None, far_baud=None, measured_baud=None)
         self.warnings: list[str] = []
         self.fault: FakeFault | None = None
         #: When the firmware comes back from its fault; None for never.
