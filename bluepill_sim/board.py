@@ -406,7 +406,9 @@ class BluePill:
             # Some systems live on it (NuttX): its HardFault handler serves the call.
             self._warn("SVC while its priority is masked becomes a HardFault", "masked SVC", pc)
             return
-        if self.fault is not None and (self.fault.ended_in_reset or self._handles_hard_fault()):
+        # A lockup in the same moment is that of a HardFault that could not even be entered.
+        is_same = self.fault is not None and is_lockup and self.fault.at_ns == self.chip.now_ns
+        if self.fault is not None and (is_same or self.fault.ended_in_reset or self._handles_hard_fault()):
             self.fault = replace(self.fault, is_lockup=self.fault.is_lockup or is_lockup)
             return
         chip = self.chip

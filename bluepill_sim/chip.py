@@ -388,11 +388,12 @@ class Chip:
         return forced_bits(code, registers, address, memory.read), pc
 
     def _write_flash(self, address: int, size: int, value: int) -> bool:
-        """Take a write of the core to the flash array: its controller decides; False: no flash is there."""
+        """Take a write of the core to the flash array: its controller decides; False: a bus error."""
         offset = address - FLASH_BASE if address >= FLASH_BASE else address
         if not 0 <= offset <= FLASH_BYTES_FITTED - size:
             return False
-        self.parts.flash.program(offset, size, value)
+        if not self.parts.flash.program(offset, size, value):
+            return False
         # The engine stores the value whatever the controller says: put back what should be there.
         self._flash_repairs.append((offset, self.memory.read_flash(offset, size)))
         return True

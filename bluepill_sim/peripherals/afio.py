@@ -5,7 +5,8 @@ is released), PD01_REMAP, the EXTI multiplexers; every remap field is
 published in `PinBank.remaps`, and honoured by the peripherals that are
 modelled. Not modelled: EVCR's event output.
 
-Chosen: GPIO does not read a pin that the debug port has (IDR and EXTI see 0).
+The debug port's inputs can be read by GPIO, with their pulls: PB4 (NJTRST) reads 1 until something pulls it low.
+Chosen: its output PB3 (JTDO) cannot, as long as the port has it (IDR and EXTI see 0).
 Chosen: SWJ_CFG, whose value is undefined when read, reads 0; so a
 read-modify-write of MAPR gives the pins back to the debug port, as it may on silicon.
 

@@ -32,6 +32,8 @@ ILLEGAL_NS = 1_000_000
 PLLSRC, PLLXTPRE = 1 << 16, 1 << 17
 _PLL_SETTINGS = bits((21, 16))
 _SW = bits((1, 0))
+#: MCO: 0xx is no clock.
+_MCO_ON = 1 << 26
 _BDRST = 1 << 16
 _RMVF = 1 << 24
 _CSR_FLAGS = bits((31, 26))
@@ -208,6 +210,8 @@ class Rcc(Peripheral):
         self._settle()
 
     def _write_cfgr(self, written: int, previous: int) -> None:
+        if written & _MCO_ON:
+            self.chip.warn("RCC_CFGR: MCO, the clock on PA8, is not modelled", once="RCC:mco")
         changed = (written ^ previous) & _PLL_SETTINGS
         if changed and self.words[CR] & PLLON:
             self.words[CFGR] ^= changed

@@ -27,7 +27,7 @@ EXPECTED = """\
 unclocked 00000000
 unmodelled 00000000
 clocked 44444444
-pb4-jtag 00000000
+pb4-jtag 00000010
 pb4-free 00000010
 bit-band 00000080
 locked 44444444

@@ -260,3 +260,20 @@ def test_a_vector_that_looks_like_a_return_is_an_address(boot, vector, core, mon
     assert f"(the vector of SVCall at 0x0000002c is {vector:#010x}" in fault
     assert ("erased flash" in fault) is (vector == 0xFFFF_FFFF)
     assert machine.log == []
+
+
+@pytest.mark.parametrize("core", ["python", "native"])
+@pytest.mark.parametrize("store", ["str r2, [r1, #0]", "strb r2, [r1, #0]", "strh r2, [r1, #0]"])
+def test_flash_is_programmed_by_halfwords_and_the_rest_is_a_bus_error(boot, store, core, monkeypatch) -> None:
+    monkeypatch.setenv("P2OS_CORE", core)
+    machine = boot(
+        "mov32 r1, #0x40022000\nmov32 r2, #0x45670123\nstr r2, [r1, #4]\nmov32 r2, #0xCDEF89AB\nstr r2, [r1, #4]\n"
+        f"movs r2, #1\nstr r2, [r1, #16]\nmov32 r1, #0x08010000\nmov32 r2, #0x1234\n{store}\nlog #1"
+    )
+    machine.run(300)
+    is_halfword = store.startswith("strh")
+    assert machine.log == ([1] if is_halfword else [])
+    assert machine.board.read_memory(0x0801_0000, 4) == (b"\x34\x12\xff\xff" if is_halfword else b"\xff" * 4)
+    fault = machine.board.fault
+    assert (fault is None) is is_halfword
+    assert fault is None or (fault.kind.name, fault.address) == ("WRITE_ERROR", 0x0801_0000)

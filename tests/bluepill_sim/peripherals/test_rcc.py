@@ -169,6 +169,13 @@ def test_too_few_wait_states_are_warned_of(fake_chip: Any) -> None:
     }
 
 
+def test_a_clock_on_pa8_is_warned_of(fake_chip: Any) -> None:
+    fake_chip.write("RCC.CFGR", 3 << 24)
+    assert fake_chip.warnings == {}
+    fake_chip.write("RCC.CFGR", 4 << 24)
+    assert list(fake_chip.warnings) == ["RCC:mco"]
+
+
 def test_a_forbidden_setting_that_passes_at_once_is_none(fake_chip: Any) -> None:
     fake_chip.run_at_72_mhz()
     for _ in range(3):
