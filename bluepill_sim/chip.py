@@ -41,7 +41,7 @@ from bluepill_sim.stm32f103 import (
     make_pins,
     name_at,
 )
-from bluepill_sim.timing import CycleClock, Nanos, Reached, Reason
+from bluepill_sim.timing import CycleClock, HaltKind, Nanos, Reached, Reason
 
 #: What is mapped as peripherals: APB1, APB2 and AHB up to the end of CRC and reserved pages.
 PERIPHERAL_BYTES = 0x2_4000
@@ -370,11 +370,25 @@ class Chip:
         engine.map_io(PERIPHERAL_ALIAS, PERIPHERAL_BYTES * _ALIAS_BYTES, bus.read_bit, bus.write_bit)
         bits = SramBitBand(self.memory.sram)
         engine.map_io(SRAM_ALIAS, SRAM_BYTES * _ALIAS_BYTES, bits.read_bit, bits.write_bit)
-        engine.map_io(PPB_BASE, PPB_BYTES, self.system.read, self.system.write)
+        engine.map_io(PPB_BASE, PPB_BYTES, self._read_system, self._write_system)
         self._streams = share_registers(self, self.parts.by_name.values(), self.parts.rcc)
         self.pins.written_by = self._written_by
         engine.on_read_only_write = self._write_flash
         engine.on_read_only_written = self._repair_flash
+
+    def _read_system(self, offset: int, size: int) -> int:
+        """Read the private peripheral bus; a thread without privilege faults (ARM B3.1.1)."""
+        if not self.processor.is_privileged:
+            self.engine.stop_before(HaltKind.READ_ERROR, self.engine.access_pc, PPB_BASE + offset)
+            return 0
+        return self.system.read(offset, size)
+
+    def _write_system(self, offset: int, size: int, value: int) -> None:
+        """Write to the private peripheral bus, as `_read_system`; STIR may be opened by CCR.USERSETMPEND."""
+        if not self.processor.is_privileged and not self.system.is_open_to_all(offset):
+            self.engine.stop_before(HaltKind.WRITE_ERROR, self.engine.access_pc, PPB_BASE + offset)
+            return
+        self.system.write(offset, size, value)
 
     def _written_by(self, address: int) -> tuple[int, int]:
         """Return which bits of the word at an address the running store means, and where it stands."""

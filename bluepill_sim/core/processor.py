@@ -213,6 +213,11 @@ class Processor:
         self.ccr = value
         self.engine.set_traps(division=bool(value & DIV_0_TRP), unaligned=bool(value & UNALIGN_TRP))
 
+    @property
+    def is_privileged(self) -> bool:
+        """Whether what runs is a handler, or a thread with CONTROL.nPRIV clear."""
+        return bool(self.exception_number) or not self.engine.registers[Register.CONTROL] & _NPRIV
+
     def execution_priority(self, *, ignores_primask: bool = False) -> int:
         """Return the priority of what runs, masks included."""
         primask, basepri, faultmask = self._masks.read()

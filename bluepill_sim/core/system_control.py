@@ -30,6 +30,7 @@ _SYSRESETREQ, _VECTCLRACTIVE, _VECTRESET = 1 << 2, 1 << 1, 1 << 0
 _NMIPENDSET, _PENDSVSET, _PENDSVCLR, _PENDSTSET, _PENDSTCLR = (1 << n for n in (31, 28, 27, 26, 25))
 _RETTOBASE, _ISRPENDING = 1 << 11, 1 << 22
 _CCR_BITS, _SCR_BITS, _SHCSR_ENABLE_BITS = 0x31B, 0x16, 0x7 << 16
+_STIR, _USERSETMPEND = 0xE000_EF00, 1 << 1
 #: VTOR bits that exist (PM0056 4.4.4).
 _VTOR_BITS = 0x3FFF_FF80
 _TRCENA, _CYCCNTENA = 1 << 24, 1
@@ -160,6 +161,10 @@ class SystemControl:
         writer(value, mask)
         self._core.pending_changed()
         self._core.stop_at_boundary()
+
+    def is_open_to_all(self, offset: int) -> bool:
+        """Tell whether a thread without privilege may write there: STIR, if CCR.USERSETMPEND is set (ARM B3.2.26)."""
+        return PPB_BASE + (offset & ~3) == _STIR and bool(self._core.ccr & _USERSETMPEND)
 
     def snapshot(self) -> tuple[int, int, bool, int]:
         """Return the state that is not the processor's."""

@@ -277,3 +277,33 @@ def test_flash_is_programmed_by_halfwords_and_the_rest_is_a_bus_error(boot, stor
     fault = machine.board.fault
     assert (fault is None) is is_halfword
     assert fault is None or (fault.kind.name, fault.address) == ("WRITE_ERROR", 0x0801_0000)
+
+
+@pytest.mark.parametrize("core", ["python", "native"])
+@pytest.mark.parametrize("access", ["ldr r2, [r1, #0]", "str r2, [r1, #0]", "strb r2, [r1, #0]"])
+def test_a_thread_without_privilege_faults_in_the_system_control_space(boot, access, core, monkeypatch) -> None:
+    monkeypatch.setenv("P2OS_CORE", core)
+    machine = boot(
+        "mov32 r1, #0xE000E014\nmov32 r2, #0x1234\nstr r2, [r1, #0]\nmovs r4, #1\nmsr control, r4\nisb\n"
+        f"movs r2, #9\nmovs r5, #5\nwrong: {access}\nmovs r5, #6\nlog #1"
+    ).run(300)
+    board = machine.board
+    assert machine.log == []
+    assert (board.fault.pc, board.fault.address) == (machine.label("wrong"), 0xE000_E014)
+    assert board.fault.kind.name == ("READ_ERROR" if access.startswith("ldr") else "WRITE_ERROR")
+    assert board.register("R5") == 5
+    assert board.register("R2") == 9
+    assert board.chip.processor.systick.read_reload() == 0x1234
+    assert board.chip.processor.exception_number == 3
+
+
+@pytest.mark.parametrize("core", ["python", "native"])
+def test_a_handler_of_a_thread_without_privilege_has_it(boot, core, monkeypatch) -> None:
+    monkeypatch.setenv("P2OS_CORE", core)
+    machine = boot(
+        "movs r4, #1\nmsr control, r4\nisb\nsvc #0\nlog #2\nb stop\n"
+        "svc: mov32 r1, #0xE000E014\nldr r0, [r1, #0]\nlog #1\nbx lr",
+        {11: "svc"},
+    ).run(300)
+    assert machine.log == [1, 2]
+    assert machine.board.fault is None
