@@ -65,6 +65,8 @@ EngineSnapshot = tuple[CoreSnapshot, int, int, bool, bool, RestSnapshot | None, 
 #: Flash and SRAM lie below; peripherals above have rules of their own.
 _LAST_NORMAL_ADDRESS = 0x21FF_FFFF
 
+#: BASEPRI has its upper four bits (PM0056 2.1.3), a stack pointer is a multiple of 4 (ARM B1.4.1).
+_KEPT_BITS = ((Register.BASEPRI, 0xF0), (Register.MSP, 0xFFFF_FFFC), (Register.PSP, 0xFFFF_FFFC))
 #: Branches to these addresses are exception returns in handler mode (ARMv7-M B1.5.8).
 FIRST_EXCEPTION_RETURN = 0xFFFF_FFE0
 
@@ -211,6 +213,7 @@ class Engine:
             halt = self._step_over_write(stop_at)
         elif halt.kind is HaltKind.WATCHPOINT:
             halt = self._step_over_access(halt, stop_at)
+        self._trim_registers()
         return Halt(HaltKind.STEP, halt.pc) if halt.kind is HaltKind.BOUNDARY else halt
 
     def jump(self, target: int) -> None:
@@ -350,6 +353,8 @@ class Engine:
             block = self.block
             cycle = self.cycle + (block.straight if address == block.end else block.taken)
             self.cycle = cycle
+            if block.changes_masks:
+                self._trim_registers()
             if cycle >= self.stop_at:
                 self._stop_at_boundary(address)
                 return
@@ -362,6 +367,13 @@ class Engine:
         except BaseException as error:  # noqa: BLE001 - C stands between here and the caller; Ctrl-C arrives here
             self._fail(error)
             self._stop_at_boundary(address)
+
+    def _trim_registers(self) -> None:
+        """After an MSR, which ends its block: clear what Unicorn keeps of it and the chip does not have."""
+        for register, kept in _KEPT_BITS:
+            value = self.registers[register]
+            if value & ~kept:
+                self.registers[register] = value & kept
 
     def _enter_special(self, address: int, size: int) -> None:
         """Enter a block that is new, stands in writable memory, or needs attention."""

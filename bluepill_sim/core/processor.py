@@ -222,7 +222,7 @@ class Processor:
         """Return the priority of what runs, masks included."""
         primask, basepri, faultmask = self._masks.read()
         priority = self.nvic.active_priority()
-        basepri &= 0xF0  # the engine keeps the low bits that an STM32F103 does not have
+        basepri &= 0xF0  # the engine keeps the low bits until the block has ended
         if basepri:
             priority = min(priority, self.nvic.group_priority(basepri))
         if primask & 1 and not ignores_primask:
