@@ -132,6 +132,8 @@ class Engine:
         self._halt: Halt | None = None
         #: Where the run started: its first block may start inside an IT block.
         self._run_from = 0
+        #: Whether a run that failed ended in a branch to an EXC_RETURN value: the next one acts on it.
+        self.has_branched_to_return = False
         self._failure: BaseException | None = None
         #: ITSTATE at the start of the next run.
         self.it_state = 0
@@ -260,6 +262,7 @@ class Engine:
                 failure, self._failure = self._failure, None
                 self._frozen = None
                 self._settle(self.registers[Register.PC])
+                self.has_branched_to_return = self.pc >= FIRST_EXCEPTION_RETURN
                 raise failure
             if not traps.stale:
                 break

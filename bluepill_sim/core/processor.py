@@ -265,7 +265,9 @@ class Processor:
 
     def _stands_at_return(self) -> bool:
         """Fault where a vector or a stacked PC, not a branch, led to an EXC_RETURN value: it is an address there."""
-        if self.engine.pc < FIRST_EXCEPTION_RETURN:
+        engine = self.engine
+        if engine.pc < FIRST_EXCEPTION_RETURN or engine.has_branched_to_return:
+            engine.has_branched_to_return = False
             return False
         self._fault(FaultKind.EXECUTE_NEVER, self.engine.pc)
         return True
