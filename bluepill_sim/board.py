@@ -17,6 +17,7 @@ Invariant: results do not depend on how the caller cuts time into slices; a wait
 leaves the board's watches and listeners as it found them.
 """
 
+from collections import Counter
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
@@ -25,6 +26,7 @@ from pathlib import Path
 from bluepill_sim.chip import Chip
 from bluepill_sim.core import GENERAL, BlockRow, Register
 from bluepill_sim.core.faults import FAULT_ROWS, FaultKind, FaultReport
+from bluepill_sim.core.nvic import HARD_FAULT, exception_name
 from bluepill_sim.errors import BluePillError, ImageError, UnmodelledError
 from bluepill_sim.fabric.pins import Pin, PinDrive
 from bluepill_sim.memory import Memory
@@ -45,6 +47,7 @@ STEP_NS: Nanos = 1 * NS_PER_MS
 #: How many of the last characters of a port a message shows.
 _SHOWN_CHARACTERS = 60
 
+_ERASED_WORD = 0xFFFF_FFFF
 _HINT = 'such as "pin PA4 high", "usart1 sends ready", "asleep", "fault", or a function of the board'
 
 
@@ -65,6 +68,9 @@ class BoardSnapshot:
     #: What each USART has sent and nobody has taken.
     unread: tuple[bytes, ...]
     boot0: bool = False
+    resets: tuple[tuple[ResetCause, int], ...] = ()
+    #: Characters sent by each USART, by (PCLK, BRR).
+    sent_at: tuple[tuple[tuple[tuple[int, int], int], ...], ...] = ((), (), ())
 
 
 class BluePill:
@@ -97,7 +103,7 @@ class BluePill:
         self.on_warning: Callable[[str], None] | None = None
         #: Called with (pin, drive, ns) at every change of what the chip itself puts on a pin.
         self.on_pin: Callable[[str, PinDrive, Nanos], None] | None = None
-        #: The first fault that the firmware did not handle; None while there is none.
+        #: The first HardFault or lockup; a later one, where the firmware came back from those before. None: none yet.
         self.fault: FaultReport | None = None
         memory = Memory()
         for address, data in self.image.segments:
@@ -109,6 +115,9 @@ class BluePill:
         #: More of the same, for tools.
         self.pin_listeners: list[Callable[[str, PinDrive, Nanos], None]] = []
         self._usarts = tuple(SerialPort(chip.parts.usart(n), self._activity, self._wait_for_bytes) for n in (1, 2, 3))
+        #: How often it was reset since power came up, by cause.
+        self.resets: Counter[ResetCause] = Counter()
+        chip.on_reset = self._reset_begins
         chip.boot_address = self._boot_address
         chip.pins.on_output = self._pin_changed
         chip.pins.is_subscribed = lambda: self.on_pin is not None or bool(self.pin_listeners)
@@ -247,6 +256,30 @@ class BluePill:
         return self._activity
 
     @property
+    def has_died(self) -> bool:
+        """Whether the firmware is in its HardFault handler, is locked up, or was reset out of either."""
+        return self.fault is not None and (self.fault.ended_in_reset or self._is_in_fault())
+
+    @property
+    def verdict(self) -> str:
+        """What became of the firmware, where that is worth a word: faults and resets; empty where it just ran."""
+        parts = []
+        if self.fault is not None:
+            what = "firmware fault" if self.has_died else "the firmware came back from a HardFault"
+            parts.append(f"{what}: {self.fault}")
+        if self.resets:
+            causes = ", ".join(f"{cause.name} {count}" for cause, count in self.resets.items())
+            times = self.resets.total()
+            parts.append(f"{times} reset{'s' if times != 1 else ''} ({causes})")
+        return "; ".join(parts)
+
+    def _is_in_fault(self) -> bool:
+        return self.chip.processor.is_locked_up or self._handles_hard_fault()
+
+    def _handles_hard_fault(self) -> bool:
+        return bool(self.chip.processor.nvic.active >> HARD_FAULT & 1)
+
+    @property
     def is_asleep(self) -> bool:
         """Whether the core is waiting in WFI or WFE."""
         return self.chip.processor.is_asleep
@@ -291,6 +324,8 @@ class BluePill:
             tuple(self._warned.items()),
             tuple(bytes(port.unread) for port in self._usarts),
             self.boot0,
+            tuple(self.resets.items()),
+            tuple(tuple(self.chip.parts.usart(n).sent_at.items()) for n in (1, 2, 3)),
         )
 
     def restore(self, snapshot: object) -> None:
@@ -304,12 +339,20 @@ class BluePill:
         self.chip.restore(snapshot.chip)
         self.fault = snapshot.fault
         self.boot0 = snapshot.boot0
+        self.resets = Counter(dict(snapshot.resets))
+        for number, sent_at in enumerate(snapshot.sent_at, start=1):
+            self.chip.parts.usart(number).sent_at = Counter(dict(sent_at))
         self._activity.last_pin_ns, self._activity.last_usart_ns, self._activity.last_wfi_ns = snapshot.activity
         self._warned = dict(snapshot.warned)
         for port, unread in zip(self._usarts, snapshot.unread, strict=True):
             port.unread[:] = unread
 
     # Callbacks of the chip.
+
+    def _reset_begins(self, cause: ResetCause) -> None:
+        if self.fault is not None and self._is_in_fault():
+            self.fault = replace(self.fault, ended_in_reset=True)
+        self.resets[cause] += 1
 
     def _boot_address(self) -> int:
         """Return where the BOOT pins have a reset start (RM0008 3.4, table 9)."""
@@ -363,7 +406,9 @@ class BluePill:
             # Some systems live on it (NuttX): its HardFault handler serves the call.
             self._warn("SVC while its priority is masked becomes a HardFault", "masked SVC", pc)
             return
-        if self.fault is not None:
+        # A lockup in the same moment is that of a HardFault that could not even be entered.
+        is_same = self.fault is not None and is_lockup and self.fault.at_ns == self.chip.now_ns
+        if self.fault is not None and (is_same or self.fault.ended_in_reset or self._handles_hard_fault()):
             self.fault = replace(self.fault, is_lockup=self.fault.is_lockup or is_lockup)
             return
         chip = self.chip
@@ -380,8 +425,21 @@ class BluePill:
             registers=tuple(registers),
             at_ns=chip.now_ns,
             is_lockup=is_lockup,
+            vector=self._vector_of(pc),
             last_rows=chip.engine.log.rows(),
         )
+
+    def _vector_of(self, pc: int) -> str:
+        """Return what the vector of the running handler is, where it has just led to `pc`; empty where it has not."""
+        processor = self.chip.processor
+        number = processor.exception_number
+        rows = self.chip.engine.log.rows()
+        at = processor.vector_table + 4 * number
+        vector = self.chip.memory.read_word(at)
+        if not number or vector is None or vector & ~1 != pc or not rows or rows[-1][2] != number:
+            return ""
+        erased = ": erased flash" if vector == _ERASED_WORD else ""
+        return f"the vector of {exception_name(number)} at {at:#010x} is {vector:#010x}{erased}"
 
 
 def run_until(

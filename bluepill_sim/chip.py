@@ -41,7 +41,7 @@ from bluepill_sim.stm32f103 import (
     make_pins,
     name_at,
 )
-from bluepill_sim.timing import CycleClock, Nanos, Reached, Reason
+from bluepill_sim.timing import CycleClock, HaltKind, Nanos, Reached, Reason
 
 #: What is mapped as peripherals: APB1, APB2 and AHB up to the end of CRC and reserved pages.
 PERIPHERAL_BYTES = 0x2_4000
@@ -52,6 +52,9 @@ SRAM_ALIAS, PERIPHERAL_ALIAS = 0x2200_0000, 0x4200_0000
 _ALIAS_BYTES = 32
 #: The upper byte of the first halfword of a 32-bit instruction is this or more.
 _FIRST_WIDE_BYTE = 0xE8
+
+#: chosen: reading a peripheral without its clock for so long is no de-initialization that passes by.
+UNCLOCKED_NS: Nanos = 1_000_000
 
 #: Takes a message, its key, and the address of the instruction that caused it.
 WarningListener = Callable[[str, str, int], None]
@@ -72,6 +75,8 @@ class Chip:
         self.memory = memory
         #: Returns where the vectors are that a reset starts at: what the BOOT pins say.
         self.boot_address: Callable[[], int] = lambda: vector_table
+        #: Called with the cause before each reset.
+        self.on_reset: Callable[[ResetCause], None] | None = None
         self._on_warning = on_warning
         self.clocks = Clocks()
         self._clock = CycleClock(self.clocks.hclk_hz)
@@ -110,6 +115,11 @@ class Chip:
     def access_cycle(self) -> int:
         """The time of the accessing instruction, in cycles."""
         return self.engine.access_cycle
+
+    @property
+    def access_pc(self) -> int:
+        """The accessing instruction, else the next one."""
+        return self.engine.access_pc
 
     @property
     def time_base(self) -> tuple[int, Nanos, int]:
@@ -188,6 +198,8 @@ class Chip:
     def reset(self, cause: ResetCause) -> None:
         """Reset core and peripherals; time goes on. A power cut clears the SRAM too."""
         self._requested_reset = None
+        if self.on_reset is not None:
+            self.on_reset(cause)
         vectors = self.boot_address()
         if cause is ResetCause.POWER:
             self.memory.lose_power()
@@ -277,7 +289,11 @@ class Chip:
             self.pins.snapshot(),
             self.clocks.snapshot(),
             self._clock.snapshot(),
-            (self._stop_requested, self._requested_reset and self._requested_reset.name),
+            (
+                self._stop_requested,
+                self._requested_reset and self._requested_reset.name,
+                tuple(self._bus.read_unclocked_ns.items()),
+            ),
         )
 
     def restore(self, snapshot: tuple[object, ...]) -> None:
@@ -292,7 +308,8 @@ class Chip:
         self.parts.restore(parts)  # type: ignore[arg-type]  # as above
         self.clocks.restore(clocks)  # type: ignore[arg-type]  # as above
         self._clock.restore(clock)  # type: ignore[arg-type]  # as above
-        self._stop_requested, cause = cast("tuple[bool, str | None]", requests)
+        self._stop_requested, cause, unclocked = cast("tuple[bool, str | None, tuple[tuple[str, int], ...]]", requests)
+        self._bus.read_unclocked_ns = dict(unclocked)
         self._requested_reset = None if cause is None else ResetCause[cause]
         self._flash_access = self.clocks.flash_wait_states, self.clocks.flash_prefetch
         self.engine.forget_costs()
@@ -348,16 +365,30 @@ class Chip:
         engine = self.engine
         for region in self.memory.regions:
             engine.map_memory(region.base, region.buffer, is_writable=region.is_writable)
-        bus = PeripheralBus(self.parts.by_name, self.parts.rcc, self)
+        self._bus = bus = PeripheralBus(self.parts.by_name, self.parts.rcc, self)
         engine.map_io(PERIPHERAL_BASE, PERIPHERAL_BYTES, bus.read, bus.write)
         engine.map_io(PERIPHERAL_ALIAS, PERIPHERAL_BYTES * _ALIAS_BYTES, bus.read_bit, bus.write_bit)
         bits = SramBitBand(self.memory.sram)
         engine.map_io(SRAM_ALIAS, SRAM_BYTES * _ALIAS_BYTES, bits.read_bit, bits.write_bit)
-        engine.map_io(PPB_BASE, PPB_BYTES, self.system.read, self.system.write)
+        engine.map_io(PPB_BASE, PPB_BYTES, self._read_system, self._write_system)
         self._streams = share_registers(self, self.parts.by_name.values(), self.parts.rcc)
         self.pins.written_by = self._written_by
         engine.on_read_only_write = self._write_flash
         engine.on_read_only_written = self._repair_flash
+
+    def _read_system(self, offset: int, size: int) -> int:
+        """Read the private peripheral bus; a thread without privilege faults (ARM B3.1.1)."""
+        if not self.processor.is_privileged:
+            self.engine.stop_before(HaltKind.READ_ERROR, self.engine.access_pc, PPB_BASE + offset)
+            return 0
+        return self.system.read(offset, size)
+
+    def _write_system(self, offset: int, size: int, value: int) -> None:
+        """Write to the private peripheral bus, as `_read_system`; STIR may be opened by CCR.USERSETMPEND."""
+        if not self.processor.is_privileged and not self.system.is_open_to_all(offset):
+            self.engine.stop_before(HaltKind.WRITE_ERROR, self.engine.access_pc, PPB_BASE + offset)
+            return
+        self.system.write(offset, size, value)
 
     def _written_by(self, address: int) -> tuple[int, int]:
         """Return which bits of the word at an address the running store means, and where it stands."""
@@ -371,11 +402,12 @@ class Chip:
         return forced_bits(code, registers, address, memory.read), pc
 
     def _write_flash(self, address: int, size: int, value: int) -> bool:
-        """Take a write of the core to the flash array: its controller decides; False: no flash is there."""
+        """Take a write of the core to the flash array: its controller decides; False: a bus error."""
         offset = address - FLASH_BASE if address >= FLASH_BASE else address
         if not 0 <= offset <= FLASH_BYTES_FITTED - size:
             return False
-        self.parts.flash.program(offset, size, value)
+        if not self.parts.flash.program(offset, size, value):
+            return False
         # The engine stores the value whatever the controller says: put back what should be there.
         self._flash_repairs.append((offset, self.memory.read_flash(offset, size)))
         return True
@@ -391,7 +423,8 @@ class Chip:
 class PeripheralBus:
     """Reads and writes of the peripheral region; offsets count from PERIPHERAL_BASE.
 
-    A peripheral sees an access only while its clock is on.
+    A peripheral sees an access only while its clock is on. Accesses without one are warned of where they matter: a
+    write that sets what a reset would not leave, and reading on for a while; ST's de-initializations do neither.
     """
 
     def __init__(self, parts: dict[str, Peripheral], rcc: Rcc, chip: Chip) -> None:
@@ -402,20 +435,31 @@ class PeripheralBus:
         }
         self._rcc = rcc
         self._chip = chip
+        #: When each peripheral was first read without its clock, in ns.
+        self.read_unclocked_ns: dict[str, Nanos] = {}
 
     def read(self, offset: int, size: int) -> int:
         """Return what the core reads."""
         part = self._pages.get(offset >> _PAGE_SHIFT)
-        if part is None or not self._rcc.is_clocked(part.name):
-            self._refuse(part, offset, "read of")
+        if part is None:
+            self._refuse(None, offset, "read of")
+            return 0
+        if not self._rcc.is_clocked(part.name):
+            now_ns = self._chip.now_ns
+            if now_ns - self.read_unclocked_ns.setdefault(part.name, now_ns) >= UNCLOCKED_NS:
+                self._refuse(part, offset, "read of")
             return 0
         return part.read(PERIPHERAL_BASE + offset - part.base, size)
 
     def write(self, offset: int, size: int, value: int) -> None:
         """Take what the core writes."""
         part = self._pages.get(offset >> _PAGE_SHIFT)
-        if part is None or not self._rcc.is_clocked(part.name):
-            self._refuse(part, offset, f"write of {value:#x} to")
+        if part is None:
+            self._refuse(None, offset, f"write of {value:#x} to")
+            return
+        if not self._rcc.is_clocked(part.name):
+            if part.changes_reset_value(PERIPHERAL_BASE + offset - part.base, value):
+                self._refuse(part, offset, f"write of {value:#x} to")
             return
         part.write(PERIPHERAL_BASE + offset - part.base, size, value)
 

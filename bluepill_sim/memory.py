@@ -121,7 +121,7 @@ class Memory:
 
     def _region(self, address: int, size: int) -> Region | None:
         for region in self.regions:
-            if region.base <= address and address + size <= region.end:
+            if region.base <= address <= address + size <= region.end:
                 return region
         return None
 

@@ -8,11 +8,15 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Protocol
 
+from bluepill_sim.errors import BluePillError
 from bluepill_sim.peripherals.usart import CR1, PINS, RE, UE, Usart
 from bluepill_sim.timing import Nanos, Span
 
 #: chosen: six seconds of a line at 115200; older ones are forgotten.
 KEPT_BYTES = 64 * 1024
+
+#: RM0008 27.3.4: PCLK2 / 16.
+HIGHEST_BAUD = 4_500_000
 
 #: Takes (word, ns at the end of its stop bit).
 WordListener = Callable[[int, Nanos], None]
@@ -71,6 +75,32 @@ class SerialPort:
         is_on = usart.words[CR1] & (UE | RE) == UE | RE
         pins = PINS[usart.name].get(usart.chip.pins.remaps.get(usart.name, 0))
         return is_on and pins is not None and pins[1] == pin
+
+    @property
+    def far_baud(self) -> int | None:
+        """The far end's speed in bit/s; None, the default, follows whatever the firmware sets."""
+        return self._usart.far_baud
+
+    @far_baud.setter
+    def far_baud(self, baud: int | None) -> None:
+        if baud is not None and not 1 <= baud <= HIGHEST_BAUD:
+            raise BluePillError(f"a line of {baud} bit/s cannot be", hint=f"1 to {HIGHEST_BAUD}, such as 115200")
+        self._usart.far_baud = baud
+
+    @property
+    def measured_baud(self) -> int | None:
+        """The speed at which most characters were sent, in bit/s; None before the first."""
+        most = self._usart.sent_at.most_common(1)
+        return round(most[0][0][0] / most[0][0][1]) if most else None
+
+    @property
+    def speeds(self) -> dict[int, int]:
+        """How many characters were sent at each speed in bit/s."""
+        found: dict[int, int] = {}
+        for (clock_hz, brr), count in self._usart.sent_at.items():
+            baud = round(clock_hz / brr)
+            found[baud] = found.get(baud, 0) + count
+        return found
 
     def read(self) -> bytes:
         """Return what was sent and not yet taken, and take it."""

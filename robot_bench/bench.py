@@ -120,6 +120,7 @@ class Bench:
         for wire in pinout.with_role(WireRole.RESET):
             pins.watch(wire.name)
         self._bring_adapter_to_edges(pins, harness)
+        chip.usart1.far_baud = scenario.usart_baud
         chip.usart1.on_transmit = lambda byte, at: self.recorder.usart(bytes([byte]), at)
         chip.on_warning = lambda text: self.recorder.event("chip", chip.now_ns, "warning", text)
         self.recorder.start()
@@ -147,7 +148,9 @@ class Bench:
     def end(self) -> Nanos:
         """Return when the run ends, as far as is known now."""
         fault, duration_ns = self.chip.fault, self.scenario.duration_ns
-        return duration_ns if fault is None else min(duration_ns, fault.at_ns + AFTER_FAULT_NS)
+        return (
+            duration_ns if fault is None or not self.chip.has_died else min(duration_ns, fault.at_ns + AFTER_FAULT_NS)
+        )
 
     @property
     def now(self) -> Nanos:

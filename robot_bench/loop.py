@@ -91,6 +91,7 @@ class RunLoop:
         #: The last instant that all followers were brought to.
         self.now: Nanos = 0
         self._end: Nanos = 0
+        self._wanted_end: Nanos = 0
         self._edges: list[Nanos] = []
         self._rounds = 0
         self._advance: Callable[[int], LeaderReached] = leader.advance_to
@@ -109,8 +110,8 @@ class RunLoop:
         self._is_halted, self._is_inside_block = True, is_inside_block
 
     def end_at(self, end: Nanos) -> None:
-        """End the present `run_until` earlier; what was brought beyond stays there."""
-        self._end = min(self._end, end)
+        """End the present `run_until` earlier, or not earlier after all; what was brought beyond stays there."""
+        self._end = min(self._wanted_end, end)
 
     def run_until(self, end: Nanos, advance: Callable[[int], LeaderReached] | None = None) -> None:
         """Run to `end` in nanoseconds, to what `end_at` sets in the meantime, or to a halt.
@@ -124,7 +125,7 @@ class RunLoop:
         Raises:
             StuckError: Two parts make each other due without end.
         """
-        self._end = end
+        self._end = self._wanted_end = end
         self._advance = advance or self.leader.advance_to
         self._is_halted = False
         led = self.leader.now_ns

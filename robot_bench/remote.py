@@ -88,6 +88,7 @@ class RemoteBench:
         )
         for wire in pinout.with_role(WireRole.RESET):
             pins.watch(wire.name)
+        chip.usart1.far_baud = scenario.usart_baud
         chip.usart1.on_transmit = lambda byte, at: recorder.usart(bytes([byte]), at)
         chip.on_warning = lambda text: recorder.event("chip", chip.now_ns, "warning", text)
         recorder.start()
@@ -150,7 +151,7 @@ class RemoteBench:
                 f"the adapter lost the robot at {now / NS_PER_S:.3f} s: {self.adapter.status.reason}",
                 hint="p2os info URL",
             )
-        if self.chip.fault is not None:
+        if self.chip.has_died:
             self.loop.end_at(now)
         if self.on_slice is not None:
             self.on_slice(now)

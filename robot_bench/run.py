@@ -232,8 +232,8 @@ def _record(
         failures.append(str(error))
     end = bench.finish()
     wall_s = (clock() - began) / NS_PER_S
-    if bench.chip.fault is not None:
-        failures.append(f"firmware fault: {bench.chip.fault}")
+    if bench.chip.has_died:
+        failures.append(bench.chip.verdict)
     record = read_run(folder)
     met, missed = judge(record, bench.scenario.goals)
     trace.end(
@@ -260,6 +260,7 @@ def _figures(bench: Bench | RemoteBench, end: Nanos, wall_s: float) -> Json:
         "wall_s": round(wall_s, 3),
         "real_time_factor": round(virtual_s / wall_s, 2) if wall_s > 0 else None,
         "distance_m": round(recorder.distance_m, 6),
+        "usart_baud": bench.chip.usart1.measured_baud,
         "collisions": None if recorder.last_state is None else recorder.last_state.collisions,
         "min_clearance_m": None if clearance is None else round(clearance, 6),
     }
@@ -269,6 +270,8 @@ def notes(bench: Bench | RemoteBench, end: Nanos, pacer: RealTimePacer | None) -
     """Return what a reader of the result should know besides the verdict."""
     chip = bench.chip
     result = [note for note in (bench.note,) if note]
+    if chip.verdict and not chip.has_died:
+        result.append(chip.verdict)
     result += chip.warnings
     if is_quiet(bench, end):
         seen = _last_seen_ns(bench)
@@ -280,13 +283,13 @@ def notes(bench: Bench | RemoteBench, end: Nanos, pacer: RealTimePacer | None) -
 
 def last_blocks(bench: Bench | RemoteBench, end: Nanos, *, was_interrupted: bool) -> list[str]:
     """Return what the program ran last, where that shows why it ended: a fault, a hang, or an interruption."""
-    wanted = was_interrupted or bench.chip.fault is not None or is_quiet(bench, end)
+    wanted = was_interrupted or bench.chip.has_died or is_quiet(bench, end)
     return list(bench.chip.last_blocks()) if wanted else []
 
 
 def is_quiet(bench: Bench | RemoteBench, end: Nanos) -> bool:
     """Tell whether a program without a fault shows no activity."""
-    return bench.chip.fault is None and end - _last_seen_ns(bench) >= QUIET_NS
+    return not bench.chip.has_died and end - _last_seen_ns(bench) >= QUIET_NS
 
 
 def _last_seen_ns(bench: Bench | RemoteBench) -> Nanos:

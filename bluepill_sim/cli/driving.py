@@ -119,7 +119,7 @@ def showing_where_it_hangs(board: BluePill) -> Iterator[None]:
         yield
     except (KeyboardInterrupt, OverBudgetError, WaitError):
         print_status(f"given up at {summary(board)}")
-        if board.fault is None:
+        if not board.has_died:
             print_last_blocks(board)
         else:
             print_fault(board)
@@ -138,18 +138,31 @@ def warn_on_stderr(board: BluePill) -> None:
 
 
 def summary(board: BluePill) -> str:
-    """Return where a run has come to, in one line."""
+    """Return where a run has come to, in one line; a second one tells of faults and resets."""
     doing = "asleep at" if board.is_asleep else "at"
     if board.is_asleep and board.next_deadline() is None:
         doing = "asleep, and nothing on the chip is due to wake it, at"
     count = len(board.warnings)
     warned = f", {count} warning{'s' if count != 1 else ''}" if count else ""
-    return f"{board.now_ns / NS_PER_S:.6f} s of virtual time, {board.cycle} cycles, {doing} {board.where()}{warned}"
+    verdict = f"\n{board.verdict}" if board.verdict and (board.resets or not board.has_died) else ""
+    reached = f"{board.now_ns / NS_PER_S:.6f} s of virtual time, {board.cycle} cycles, {doing} {board.where()}"
+    return f"{reached}{warned}{_line_speeds(board)}{verdict}"
+
+
+def _line_speeds(board: BluePill) -> str:
+    """Return a line for each USART that has sent: how much, and how fast."""
+    lines = []
+    for name, port in board.serial_ports.items():
+        speeds = [f"{count} characters at {baud} bit/s" for baud, count in port.speeds.items()]
+        far = "" if port.far_baud is None else f"; the far end is at {port.far_baud} bit/s"
+        if speeds:
+            lines.append(f"\n{name} sent {', '.join(speeds)}{far}")
+    return "".join(lines)
 
 
 def print_fault(board: BluePill) -> bool:
-    """Print the fault, if there is one, with the registers and the last blocks; return whether there is."""
-    if board.fault is None:
+    """Print the fault of a firmware that died, with registers and last blocks; return whether it did."""
+    if board.fault is None or not board.has_died:
         return False
     print_status(f"fault: {board.fault}")
     for line in board.fault.register_dump.splitlines():

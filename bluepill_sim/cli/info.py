@@ -73,6 +73,8 @@ def facts(board: BluePill) -> dict[str, object]:
         "ran_s": board.now_ns / NS_PER_S,
         "warnings": board.warnings,
         "fault": None if board.fault is None else str(board.fault),
+        "has_died": board.has_died,
+        "resets": {cause.name: count for cause, count in board.resets.items()},
     }
 
 
@@ -93,8 +95,10 @@ def _print(board: BluePill, found: dict[str, object]) -> None:
         print_columns(("largest symbols", "bytes", "address"), rows, right=(1,))
         typer.echo("")
     ran = f"in {board.now_ns / NS_PER_S:g} s of virtual time"
-    if board.fault is not None:
+    if board.has_died:
         typer.echo(f"it dies {ran}: {board.fault}")
+    elif board.verdict:
+        typer.echo(f"{ran}: {board.verdict}")
     for warning in board.warnings:
         typer.echo(f"not modelled, or odd: {warning}")
     if not board.warnings and board.fault is None:

@@ -39,8 +39,9 @@ Examples:
 #: chosen: how often typed input reaches a running program, and its time is held back to the clock.
 SLICE_NS: Nanos = 2 * NS_PER_MS
 DEFAULT_SPAN = "1s"
-#: chosen: so often the wall clock is looked at.
-STRIDE_NS: Nanos = 20 * NS_PER_MS
+#: chosen: so often the wall clock is looked at, and how far a program runs between two looks, at first and at most.
+LOOK_S = 0.05
+_STRIDES_NS: tuple[Nanos, Nanos] = NS_PER_MS // 10, 20 * NS_PER_MS
 #: chosen: longer than anybody waits for a run.
 _BUDGET_S = 600.0
 #: Without an end: until Ctrl-C.
@@ -66,11 +67,15 @@ def run(
     budget_s: Annotated[
         float, typer.Option("--budget", help="Most seconds of wall clock, unless --realtime.", metavar="S", min=0)
     ] = _BUDGET_S,
+    usart_baud: Annotated[
+        int | None, typer.Option(help="Speed of USART1's far end; unset follows the program.", metavar="BAUD", min=1)
+    ] = None,
     strict: Annotated[bool, typer.Option("--strict", help="The first warning ends the run.")] = False,
 ) -> None:
     """Boot a firmware."""
     end_ns = to_nanos(span or (_FOR_EVER if realtime else DEFAULT_SPAN))
     board = BluePill(firmware, strict=strict)
+    board.usart1.far_baud = usart_baud
     changes = parse_changes(drive or [], board)
     warn_on_stderr(board)
     console = open_console(uart)
@@ -95,12 +100,21 @@ def run(
 
 
 def _bounded(board: BluePill, budget_s: float) -> Callable[[Nanos], Reached]:
-    """Return a way to advance that ends with the wall clock's budget, however a program spins."""
+    """Return a way to advance that ends with the wall clock's budget, however a program spins.
+
+    A program may cost a thousand times as much as another for the same virtual time, such as one that resets itself
+    over and over: the stride follows what the last one cost.
+    """
+    stride_ns, most_ns = _STRIDES_NS
     end_ns = time.monotonic_ns() + int(budget_s * NS_PER_S)
 
     def advance(limit_ns: Nanos) -> Reached:
+        nonlocal stride_ns
         while True:
-            reached = board.advance_to(min(limit_ns, board.now_ns + STRIDE_NS))
+            began_ns = time.monotonic_ns()
+            reached = board.advance_to(min(limit_ns, board.now_ns + stride_ns))
+            took_s = (time.monotonic_ns() - began_ns) / NS_PER_S
+            stride_ns = max(1, min(most_ns, 2 * stride_ns, int(stride_ns * LOOK_S / max(took_s, 1e-6))))
             if reached.reason is not Reason.DEADLINE or reached.now >= limit_ns:
                 return reached
             if time.monotonic_ns() > end_ns:

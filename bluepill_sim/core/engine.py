@@ -65,8 +65,10 @@ EngineSnapshot = tuple[CoreSnapshot, int, int, bool, bool, RestSnapshot | None, 
 #: Flash and SRAM lie below; peripherals above have rules of their own.
 _LAST_NORMAL_ADDRESS = 0x21FF_FFFF
 
+#: BASEPRI has its upper four bits (PM0056 2.1.3), a stack pointer is a multiple of 4 (ARM B1.4.1).
+_KEPT_BITS = ((Register.BASEPRI, 0xF0), (Register.MSP, 0xFFFF_FFFC), (Register.PSP, 0xFFFF_FFFC))
 #: Branches to these addresses are exception returns in handler mode (ARMv7-M B1.5.8).
-_FIRST_EXCEPTION_RETURN = 0xFFFF_FFE0
+FIRST_EXCEPTION_RETURN = 0xFFFF_FFE0
 
 #: The scratch page as a block: it costs nothing.
 _SCRATCH_BLOCK = Block(SCRATCH_BASE, SCRATCH_END, 0, 0, {})
@@ -130,6 +132,8 @@ class Engine:
         self._halt: Halt | None = None
         #: Where the run started: its first block may start inside an IT block.
         self._run_from = 0
+        #: Whether a run that failed ended in a branch to an EXC_RETURN value: the next one acts on it.
+        self.has_branched_to_return = False
         self._failure: BaseException | None = None
         #: ITSTATE at the start of the next run.
         self.it_state = 0
@@ -211,6 +215,7 @@ class Engine:
             halt = self._step_over_write(stop_at)
         elif halt.kind is HaltKind.WATCHPOINT:
             halt = self._step_over_access(halt, stop_at)
+        self._trim_registers()
         return Halt(HaltKind.STEP, halt.pc) if halt.kind is HaltKind.BOUNDARY else halt
 
     def jump(self, target: int) -> None:
@@ -257,6 +262,7 @@ class Engine:
                 failure, self._failure = self._failure, None
                 self._frozen = None
                 self._settle(self.registers[Register.PC])
+                self.has_branched_to_return = self.pc >= FIRST_EXCEPTION_RETURN
                 raise failure
             if not traps.stale:
                 break
@@ -350,6 +356,8 @@ class Engine:
             block = self.block
             cycle = self.cycle + (block.straight if address == block.end else block.taken)
             self.cycle = cycle
+            if block.changes_masks:
+                self._trim_registers()
             if cycle >= self.stop_at:
                 self._stop_at_boundary(address)
                 return
@@ -362,6 +370,13 @@ class Engine:
         except BaseException as error:  # noqa: BLE001 - C stands between here and the caller; Ctrl-C arrives here
             self._fail(error)
             self._stop_at_boundary(address)
+
+    def _trim_registers(self) -> None:
+        """After an MSR, which ends its block: clear what Unicorn keeps of it and the chip does not have."""
+        for register, kept in _KEPT_BITS:
+            value = self.registers[register]
+            if value & ~kept:
+                self.registers[register] = value & kept
 
     def _enter_special(self, address: int, size: int) -> None:
         """Enter a block that is new, stands in writable memory, or needs attention."""
@@ -491,7 +506,7 @@ class Engine:
         """Charge what of the running block has been run when the core stands at `pc`."""
         block, self.block = self.block, NO_BLOCK
         if block is not NO_BLOCK:
-            is_return = pc >= _FIRST_EXCEPTION_RETURN  # the refill is part of the exception's exit
+            is_return = pc >= FIRST_EXCEPTION_RETURN  # the refill is part of the exception's exit
             self.cycle += block.straight if is_return else block.cycles_until(pc)
         self.pc = pc
         self.is_thumb = bool(self.registers[Register.XPSR] & _T_BIT)
@@ -500,7 +515,7 @@ class Engine:
 def _kind_of_interrupt(number: int, pc: int) -> HaltKind:
     """Return what an exception of Unicorn's own numbering is."""
     kind = _INTERRUPTS.get(number, HaltKind.UNDEFINED)
-    if kind is HaltKind.EXECUTE_NEVER and pc >= _FIRST_EXCEPTION_RETURN:
+    if kind is HaltKind.EXECUTE_NEVER and pc >= FIRST_EXCEPTION_RETURN:
         return HaltKind.EXCEPTION_RETURN
     return kind
 

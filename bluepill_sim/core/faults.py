@@ -85,15 +85,22 @@ class FaultReport:
     at_ns: Nanos
     #: Whether the core has locked up: nothing but a reset moves it.
     is_lockup: bool = False
+    #: Whether a reset has ended it: the firmware did not come back from it by itself.
+    ended_in_reset: bool = False
+    #: What the vector table has to do with it; empty where nothing.
+    vector: str = ""
     #: What ran up to the fault, oldest first: rows of `BlockRecorder`, at most 32.
     last_rows: tuple[BlockRow, ...] = ()
 
     def __str__(self) -> str:
         """Return one line for a person."""
         access = "" if self.address is None else f", address {self.address:#010x}"
-        end = "; the core is locked up" if self.is_lockup else ""
+        end = "; the core locked up" if self.is_lockup and self.ended_in_reset else ""
+        end = "; the core is locked up" if self.is_lockup and not self.ended_in_reset else end
+        end += "; a reset ended it" if self.ended_in_reset else ""
         name = _EXCEPTION_NAMES.get(self.exception, f"exception {self.exception}")
-        return f"{name}: {self.kind.value} at {self.where}{access}, t = {self.at_ns / 1e9:.6f} s{end}"
+        vector = f" ({self.vector})" if self.vector else ""
+        return f"{name}: {self.kind.value} at {self.where}{access}{vector}, t = {self.at_ns / 1e9:.6f} s{end}"
 
     @property
     def register_dump(self) -> str:

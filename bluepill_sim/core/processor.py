@@ -21,7 +21,7 @@ from collections.abc import Callable
 from enum import Enum
 
 from bluepill_sim.core.blocks import it_state_of
-from bluepill_sim.core.engine import Engine
+from bluepill_sim.core.engine import FIRST_EXCEPTION_RETURN, Engine
 from bluepill_sim.core.faults import FAULT_OF_HALT, FAULT_ROWS, HFSR_FORCED, FaultKind
 from bluepill_sim.core.nvic import BUS_FAULT, HARD_FAULT, NMI, SVCALL, SYSTICK, Nvic
 from bluepill_sim.core.recorder import EXCEPTION_RETURN
@@ -163,6 +163,8 @@ class Processor:
             self.engine.stops_after_mask_change = self.nvic.deliverable() != 0
         else:
             self.engine.stops_after_mask_change = False
+        if self._stands_at_return():
+            return
         halt = self.engine.run(stop_at)
         if halt.kind is not HaltKind.BOUNDARY:
             self._act_on(halt)
@@ -179,7 +181,8 @@ class Processor:
             self.halt = Halt(HaltKind.STEP, self.engine.pc)
             return
         self.engine.stops_after_mask_change = self.nvic.deliverable() != 0
-        self._act_on(self.engine.step(stop_at))
+        if not self._stands_at_return():
+            self._act_on(self.engine.step(stop_at))
         if self.halt is None:
             self.halt = Halt(HaltKind.STEP, self.engine.pc)
 
@@ -210,11 +213,16 @@ class Processor:
         self.ccr = value
         self.engine.set_traps(division=bool(value & DIV_0_TRP), unaligned=bool(value & UNALIGN_TRP))
 
+    @property
+    def is_privileged(self) -> bool:
+        """Whether what runs is a handler, or a thread with CONTROL.nPRIV clear."""
+        return bool(self.exception_number) or not self.engine.registers[Register.CONTROL] & _NPRIV
+
     def execution_priority(self, *, ignores_primask: bool = False) -> int:
         """Return the priority of what runs, masks included."""
         primask, basepri, faultmask = self._masks.read()
         priority = self.nvic.active_priority()
-        basepri &= 0xF0  # the engine keeps the low bits that an STM32F103 does not have
+        basepri &= 0xF0  # the engine keeps the low bits until the block has ended
         if basepri:
             priority = min(priority, self.nvic.group_priority(basepri))
         if primask & 1 and not ignores_primask:
@@ -253,6 +261,15 @@ class Processor:
         if number is None or not self.nvic.can_preempt(number, self.execution_priority()):
             return False
         self._enter(number, self.engine.pc)
+        return True
+
+    def _stands_at_return(self) -> bool:
+        """Fault where a vector or a stacked PC, not a branch, led to an EXC_RETURN value: it is an address there."""
+        engine = self.engine
+        if engine.pc < FIRST_EXCEPTION_RETURN or engine.has_branched_to_return:
+            engine.has_branched_to_return = False
+            return False
+        self._fault(FaultKind.EXECUTE_NEVER, self.engine.pc)
         return True
 
     def _act_on(self, halt: Halt) -> None:

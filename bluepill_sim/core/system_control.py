@@ -30,6 +30,7 @@ _SYSRESETREQ, _VECTCLRACTIVE, _VECTRESET = 1 << 2, 1 << 1, 1 << 0
 _NMIPENDSET, _PENDSVSET, _PENDSVCLR, _PENDSTSET, _PENDSTCLR = (1 << n for n in (31, 28, 27, 26, 25))
 _RETTOBASE, _ISRPENDING = 1 << 11, 1 << 22
 _CCR_BITS, _SCR_BITS, _SHCSR_ENABLE_BITS = 0x31B, 0x16, 0x7 << 16
+_STIR, _USERSETMPEND = 0xE000_EF00, 1 << 1
 #: VTOR bits that exist (PM0056 4.4.4).
 _VTOR_BITS = 0x3FFF_FF80
 _TRCENA, _CYCCNTENA = 1 << 24, 1
@@ -58,6 +59,9 @@ class SystemControlPorts(Protocol):
         """Warn of what is not modelled."""
         ...
 
+
+#: ISER, ICER, ISPR, ICPR, IABR.
+_LINE_BASES = (0xE000E100, 0xE000E180, 0xE000E200, 0xE000E280, 0xE000E300)
 
 _Read = Callable[[], int]
 #: Takes the word written and the mask of the bytes written.
@@ -158,6 +162,10 @@ class SystemControl:
         self._core.pending_changed()
         self._core.stop_at_boundary()
 
+    def is_open_to_all(self, offset: int) -> bool:
+        """Tell whether a thread without privilege may write there: STIR, if CCR.USERSETMPEND is set (ARM B3.2.26)."""
+        return PPB_BASE + (offset & ~3) == _STIR and bool(self._core.ccr & _USERSETMPEND)
+
     def snapshot(self) -> tuple[int, int, bool, int]:
         """Return the state that is not the processor's."""
         return self._demcr, self._dbgmcu_cr, self._counts_cycles, self._cycle_base
@@ -172,6 +180,12 @@ class SystemControl:
         """Put the arrays of registers into the tables: words of lines, and a byte of priority each."""
         for word in range(2):
             self._add_lines(4 * word, 32 * word)
+        # What is there for more lines than the chip has reads 0 and ignores writes (ARM B3.4.3); ST's code writes it.
+        beyond = [base + 4 * word for base in _LINE_BASES for word in range(2, 8)]
+        beyond += range(0xE000E400 + (IRQ_COUNT + 3) // 4 * 4, 0xE000E4F0, 4)
+        for address in beyond:
+            self._readers[address] = lambda: 0
+            self._writers[address] = lambda _value, _mask: None
         for first in range(0, IRQ_COUNT, 4):
             self._add_priorities(0xE000E400 + first, FIRST_IRQ + first)
         for first in range(MEM_MANAGE, FIRST_IRQ, 4):

@@ -31,6 +31,8 @@ _SIGTRAP = 5
 _MAX_READ = MAX_BYTES // 2 - 16
 #: The instruction set never needs longer watches; bounds the hooks.
 _LONGEST_WATCH = 4096
+_HEX_DIGITS = b"0123456789abcdefABCDEF"
+_MOST_DIGITS = 16
 _WATCH_KINDS = {b"2": WatchKind.WRITE, b"3": WatchKind.READ, b"4": WatchKind.ACCESS}
 _WATCH_WORDS = {WatchKind.WRITE: b"watch", WatchKind.READ: b"rwatch", WatchKind.ACCESS: b"awatch"}
 _FEATURES = (
@@ -119,14 +121,14 @@ class GdbSession:
         return _OK
 
     def _read_register(self, digits: bytes) -> bytes:
-        number = int(digits, 16)
+        number = _number(digits)
         if number >= len(self._inspector.layout):
             return _NO_REGISTER
         return _hex(self._inspector.read_register(number))
 
     def _write_register(self, rest: bytes) -> bytes:
         number, _, digits = rest.partition(b"=")
-        self._inspector.write_register(int(number, 16), binascii.unhexlify(digits))
+        self._inspector.write_register(_number(number), binascii.unhexlify(digits))
         self._execution.changed()
         return _OK
 
@@ -156,7 +158,7 @@ class GdbSession:
 
     def _resume(self, address: bytes, run: Callable[[], Stop]) -> bytes:
         if address:
-            self._inspector.set_register("pc", int(address, 16))
+            self._inspector.set_register("pc", _address(address))
             self._execution.changed()
         self._stop = run()
         return self._stop_reply(self._stop)
@@ -189,7 +191,7 @@ class GdbSession:
 
     def _point(self, rest: bytes, *, is_set: bool) -> bytes:
         kind, where, size, *_ = rest.split(b";")[0].split(b",")
-        address, length = int(where, 16), int(size, 16)
+        address, length = _address(where), _number(size)
         engine = self._execution.machine.board.chip.engine
         if kind in {b"0", b"1"}:
             (engine.breakpoints.add if is_set else engine.breakpoints.discard)(address & ~1)
@@ -236,7 +238,7 @@ class GdbSession:
 
     def _write_flash(self, rest: bytes) -> bytes:
         where, _, data = rest.partition(b":")
-        self._flash[int(where, 16)] = data
+        self._flash[_number(where)] = data
         return _OK
 
     def _erase_flash(self, address: int, size: int) -> bytes:
@@ -281,7 +283,30 @@ def _transfer(argument: bytes) -> bytes:
 
 def _numbers(text: bytes) -> tuple[int, int]:
     first, _, second = text.partition(b",")
-    return int(first, 16), int(second, 16)
+    return _number(first), _number(second)
+
+
+def _number(digits: bytes) -> int:
+    """Return a number as GDB writes it: plain hexadecimal digits, of at most 64 bits, without a sign.
+
+    Raises:
+        ValueError: these are others; `int` alone would take signs, spaces, underscores and 0x.
+    """
+    if not 0 < len(digits) <= _MOST_DIGITS or digits.strip(_HEX_DIGITS):
+        raise ValueError(f"{digits!r} is no hexadecimal number")
+    return int(digits, 16)
+
+
+def _address(digits: bytes) -> int:
+    """Return an address of this chip.
+
+    Raises:
+        ValueError: it is none.
+    """
+    address = _number(digits)
+    if address >> 32:
+        raise ValueError(f"{address:#x} is beyond the address space")
+    return address
 
 
 def _hex(data: bytes) -> bytes:

@@ -309,6 +309,8 @@ class Pin:
         self._bank.simple_is_known, mode = False, self._mode
         self._reads = mode is not PinMode.ANALOG and self._holder is None
         if self._holder is not None:
+            # The debug port's inputs have their pulls, and GPIO's input reads what stands there.
+            self._reads = self._holder[1] in {PinDrive.PULL_UP, PinDrive.PULL_DOWN}
             self._drives = (self._holder[1],) * 2
         elif mode not in ALTERNATE_MODES:
             self._drives = mode.drives

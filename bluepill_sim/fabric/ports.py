@@ -20,6 +20,11 @@ class ChipPorts(Protocol):
         ...
 
     @property
+    def access_pc(self) -> int:
+        """The accessing instruction inside `read`/`write`, else the next one."""
+        ...
+
+    @property
     def clocks(self) -> Clocks:
         """The one shared object of frequencies; RCC and FLASH write it."""
         ...

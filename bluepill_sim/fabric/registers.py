@@ -180,6 +180,11 @@ class Peripheral:
                 self._write_hooks[index] = cast("Callable[[int, int], None]", getattr(self, register.on_write))
             self.words[index] = register.reset
 
+    def changes_reset_value(self, offset: int, value: int) -> bool:
+        """Tell whether a write would set a bit that is 0 after a reset: more than a de-initialization does."""
+        register = self._registers[offset >> 2]
+        return register is None or bool(value << 8 * (offset & 3) & ~register.reset)
+
     def read(self, offset: int, size: int) -> int:
         """Return what the bus reads.
 

@@ -5,7 +5,8 @@ is released), PD01_REMAP, the EXTI multiplexers; every remap field is
 published in `PinBank.remaps`, and honoured by the peripherals that are
 modelled. Not modelled: EVCR's event output.
 
-Chosen: GPIO does not read a pin that the debug port has (IDR and EXTI see 0).
+The debug port's inputs can be read by GPIO, with their pulls: PB4 (NJTRST) reads 1 until something pulls it low.
+Chosen: its output PB3 (JTDO) cannot, as long as the port has it (IDR and EXTI see 0).
 Chosen: SWJ_CFG, whose value is undefined when read, reads 0; so a
 read-modify-write of MAPR gives the pins back to the debug port, as it may on silicon.
 
@@ -50,6 +51,8 @@ REMAP_FIELDS = {
 }
 _PD01_REMAP = 1 << 15
 _SWJ_SHIFT, _SWJ_MASK = 24, bits((26, 24))
+#: What ST's own code writes to leave the debug port as it is (RM0008 9.4.2: other combinations have no effect).
+_SWJ_UNCHANGED = 0b111
 _CRYSTAL_PINS = {"PD0": "OSC_IN", "PD1": "OSC_OUT"}
 
 
@@ -90,7 +93,8 @@ class Afio(Peripheral):
     def _route(self, written: int, _previous: int) -> None:
         swj_cfg = (written & _SWJ_MASK) >> _SWJ_SHIFT
         if swj_cfg not in KEPT_BY_SWJ_CFG:
-            self.chip.warn(f"AFIO_MAPR: SWJ_CFG = {swj_cfg:03b} has no meaning: ignored", once="AFIO:swj")
+            if swj_cfg != _SWJ_UNCHANGED:
+                self.chip.warn(f"AFIO_MAPR: SWJ_CFG = {swj_cfg:03b} has no meaning: ignored", once="AFIO:swj")
             swj_cfg = self._swj_cfg
         taken_back = KEPT_BY_SWJ_CFG[swj_cfg] - KEPT_BY_SWJ_CFG[self._swj_cfg]
         if taken_back:

@@ -12,7 +12,6 @@ Invariant: the memory changes only while CR is unlocked and PG, PER or MER says 
 
 from typing import Protocol
 
-from bluepill_sim.fabric.clocks import illegal_settings
 from bluepill_sim.fabric.ports import ChipPorts
 from bluepill_sim.fabric.registers import Peripheral, Place, Register, bits
 
@@ -94,18 +93,24 @@ class Flash(Peripheral):
         self._key_step = 0
         self._address = 0
 
-    def program(self, offset: int, size: int, value: int) -> None:
-        """Take a write by the CPU to the flash array itself.
+    def program(self, offset: int, size: int, value: int) -> bool:
+        """Take a write by the CPU to the flash array itself; False: the bus answers with an error.
 
         Args:
             offset: Byte offset from the start of the array.
-            size: 1, 2 or 4 bytes; only halfwords can be programmed.
+            size: 1, 2 or 4 bytes; only halfwords can be programmed: the rest is a bus error (PM0075 2.3.3).
             value: The data.
         """
+        if size != 2 and self.words[CR] & PG and not self.words[CR] & LOCK:
+            return False
+        self._program(offset, value)
+        return True
+
+    def _program(self, offset: int, value: int) -> None:
         if not self.words[CR] & PG or self.words[CR] & LOCK:
             self.chip.warn("write to flash without FLASH_CR PG: ignored", once="FLASH:write")
             return
-        if size != 2 or self._is_busy():
+        if self._is_busy():
             self._finish(PGERR)
             return
         memory = self._array()
@@ -146,8 +151,6 @@ class Flash(Peripheral):
             return
         clocks.flash_wait_states, clocks.flash_prefetch = latency, has_prefetch
         self.chip.clock_changed()
-        for key, message in illegal_settings(clocks):
-            self.chip.warn(message, once=key)
 
     def _write_keyr(self, written: int, _previous: int) -> None:
         if self._key_step < 0 or not self.words[CR] & LOCK:

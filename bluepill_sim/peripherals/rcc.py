@@ -26,10 +26,14 @@ _APB2_GATES = bits(0, (6, 2), (12, 9), 14)
 _APB1_GATES = bits((2, 0), 11, 14, 17, 18, (23, 21), 25, 27, 28)
 
 HSION, HSIRDY, HSEON, HSERDY, HSEBYP, PLLON, PLLRDY = (1 << n for n in (0, 1, 16, 17, 18, 24, 25))
+#: chosen: so long a forbidden setting must last to be warned of; ST's own code passes through some.
+ILLEGAL_NS = 1_000_000
 #: CFGR's PLLSRC, PLLXTPRE and PLLMUL: fixed while the PLL is on.
 PLLSRC, PLLXTPRE = 1 << 16, 1 << 17
 _PLL_SETTINGS = bits((21, 16))
 _SW = bits((1, 0))
+#: MCO: 0xx is no clock.
+_MCO_ON = 1 << 26
 _BDRST = 1 << 16
 _RMVF = 1 << 24
 _CSR_FLAGS = bits((31, 26))
@@ -88,7 +92,7 @@ class Rcc(Peripheral):
     """Reset and clock control."""
 
     HAS_BYTE_LANES = True
-    STATE = ("_ready_at",)
+    STATE = ("_ready_at", "_illegal")
     REGISTERS = (
         Register(
             name="CR",
@@ -151,6 +155,8 @@ class Rcc(Peripheral):
         self._gates = {name: (register_index[gate.register], 1 << gate.bit) for name, gate in gates.items()}
         #: When each oscillator that is starting gets ready, in the order of `OSCILLATORS`.
         self._ready_at: tuple[int | None, ...] = (None,) * len(OSCILLATORS)
+        #: What the data sheet forbids and the clocks now are: key, when it is warned of (None: it was), and by whom.
+        self._illegal: tuple[tuple[str, int | None, int], ...] = ()
 
     def is_clocked(self, name: str) -> bool:
         """Return whether the peripheral `name` has its clock (True where it has no gate)."""
@@ -175,12 +181,17 @@ class Rcc(Peripheral):
     def on_reset(self) -> None:
         """Stop every oscillator but HSI."""
         self._ready_at = (None,) * len(OSCILLATORS)
+        self._illegal = ()
         self.chip.set_irq(self.place.irqs[0], False)
 
     def advance_to(self, now_ns: int) -> None:
         """Raise the ready flags that are due."""
         while self.due_ns is not None and self.due_ns <= now_ns:
             at_ns = self.due_ns
+            if at_ns not in self._ready_at:
+                self._warn_of_settings(at_ns)
+                self._schedule()
+                continue
             index = self._ready_at.index(at_ns)
             oscillator = OSCILLATORS[index]
             self.words[oscillator.register] |= oscillator.ready
@@ -199,6 +210,8 @@ class Rcc(Peripheral):
         self._settle()
 
     def _write_cfgr(self, written: int, previous: int) -> None:
+        if written & _MCO_ON:
+            self.chip.warn("RCC_CFGR: MCO, the clock on PA8, is not modelled", once="RCC:mco")
         changed = (written ^ previous) & _PLL_SETTINGS
         if changed and self.words[CR] & PLLON:
             self.words[CFGR] ^= changed
@@ -275,7 +288,28 @@ class Rcc(Peripheral):
         if self.words[CR] & _SOURCE_READY[wanted]:
             self.words[CFGR] = (self.words[CFGR] & ~(_SW << 2)) | (wanted << 2)
         self._update_frequencies()
-        due_ns = min((at for at in self._ready_at if at is not None), default=None)
+        self._schedule()
+
+    def clock_changed(self) -> None:
+        """Look at what the data sheet forbids: it is warned of only where it lasts."""
+        before = {key: (due_ns, pc) for key, due_ns, pc in self._illegal}
+        new = self.chip.now_ns + ILLEGAL_NS, self.chip.access_pc
+        self._illegal = tuple((key, *before.get(key, new)) for key, _ in illegal_settings(self.chip.clocks))
+        self._schedule()
+
+    def _warn_of_settings(self, now_ns: int) -> None:
+        messages = dict(illegal_settings(self.chip.clocks))
+        for key, due_ns, pc in self._illegal:
+            if due_ns is not None and due_ns <= now_ns:
+                self.chip.warn(messages[key], once=key, pc=pc)
+        self._illegal = tuple(
+            (key, None if due_ns is not None and due_ns <= now_ns else due_ns, pc) for key, due_ns, pc in self._illegal
+        )
+
+    def _schedule(self) -> None:
+        """Work out when something is next due."""
+        times = (*self._ready_at, *(due_ns for _, due_ns, _ in self._illegal))
+        due_ns = min((at for at in times if at is not None), default=None)
         if due_ns != self.due_ns:
             self.due_ns = due_ns
             self.chip.deadline_changed()
@@ -311,5 +345,3 @@ class Rcc(Peripheral):
         clocks.timer2_hz = clocks.pclk2_hz * (1 if divider2 == 1 else 2)
         if clocks.snapshot() != before:
             self.chip.clock_changed()
-            for key, message in illegal_settings(clocks):
-                self.chip.warn(message, once=key)

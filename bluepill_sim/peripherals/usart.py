@@ -9,8 +9,9 @@ when its stop bit has ended; one that finds RXNE still set is lost and raises
 ORE; a line that then stays idle for one character raises IDLE.
 
 Modelled: 8 and 9 bits, parity, 0.5 to 2 stop bits, breaks (sent as silence),
-all of these flags and their interrupts. The line from outside sends at our
-own baud rate, without errors. Not modelled, and warned of: synchronous, LIN,
+all of these flags and their interrupts. The far end sends and listens at our
+own baud rate, without errors, unless it has one of its own (`far_baud`): then
+characters too far off arrive damaged, both ways, without FE. Not modelled, and warned of: synchronous, LIN,
 IrDA, smartcard and half-duplex modes, hardware flow control, mute mode, DMA
 requests. The levels of single bits do not show on the TX pin: it stays high.
 
@@ -19,8 +20,10 @@ Invariant: a character ends floor(frame half-bits * BRR * 10**9 / (2 * PCLK)) ns
 after the point from which its run of characters is counted, never later than `due_ns` says.
 """
 
+from collections import Counter
 from collections.abc import Callable
 
+from bluepill_sim.fabric.line_speed import TOLERANCE_PERCENT, heard, is_usual, nearest_usual
 from bluepill_sim.fabric.ports import ChipPorts
 from bluepill_sim.fabric.registers import Peripheral, Place, Register, bits
 
@@ -72,6 +75,7 @@ class Usart(Peripheral):
         "_idle_due_ns",
         "_clock_hz",
         "_is_enabled_before",
+        "_rate_pc",
     )
     REGISTERS = (
         Register(
@@ -112,6 +116,8 @@ class Usart(Peripheral):
     _clock_hz: int
     #: Whether transmission was on at the last write of a control register.
     _is_enabled_before: bool
+    #: The instruction that has set the speed.
+    _rate_pc: int
 
     def __init__(self, chip: ChipPorts, place: Place) -> None:
         super().__init__(chip, place)
@@ -119,6 +125,10 @@ class Usart(Peripheral):
         self.on_transmit: Callable[[int, int], None] | None = None
         #: Whether a listener needs each of these calls at its own time; else they may come later, together.
         self.is_subscribed: Callable[[], bool] = lambda: self.on_transmit is not None
+        #: The far end's speed in bit/s; None follows whatever the firmware sets.
+        self.far_baud: int | None = None
+        #: How many characters were sent at each divider: (PCLK in Hz, BRR).
+        self.sent_at: Counter[tuple[int, int]] = Counter()
         self._source = f"{place.name}_TX"
         self._pins = PINS[place.name]
         self._tx_pin, self._rx_pin = (chip.pins[name] for name in self._pins[0])
@@ -140,6 +150,13 @@ class Usart(Peripheral):
         if not self._rx_queue:
             self._rx_base_ns = self.chip.now_ns
             self._rx_half_bits = self._frame_half_bits()
+        if self.far_baud is not None:
+            self._judge_speed()
+            bits, brr = self._data_bits(), self.words[BRR]
+            ratio = self.far_baud * brr, self._clock_hz
+            data = bytes(w & 0xFF for byte in data for w in heard(self._with_parity(byte), bits, *ratio))
+            if not data:
+                return
         self._rx_queue += bytes(data)
         self._idle_due_ns = None
         self._schedule()
@@ -157,6 +174,7 @@ class Usart(Peripheral):
             and words[_SHIFT] != _BREAK
             and words[CR1] & (UE | TE | SBK) == UE | TE
             and not self.is_subscribed()
+            and (self._clock_hz, words[BRR]) in self.sent_at  # the first one is judged at its own time
             and self._tx_pin.carries(self._source)
         )
 
@@ -223,6 +241,7 @@ class Usart(Peripheral):
         self._rx_queue = b""
         self._rx_base_ns = self._rx_half_bits = 0
         self._is_enabled_before = False
+        self._rate_pc = 0
         self._clock_hz = self._pclk_hz()
 
     def _pclk_hz(self) -> int:
@@ -292,10 +311,49 @@ class Usart(Peripheral):
                 f"{self.name}: nothing comes out, {pin.name} is no alternate-function output ({pin.mode.value})",
                 once=f"{self.name}:tx-pin",
             )
-        elif self.on_transmit is not None:
-            control = self.words[CR1]
-            data_bits = (9 if control & M else 8) - (1 if control & PCE else 0)
-            self.on_transmit(word & ((1 << data_bits) - 1), at_ns)
+            return
+        divider = self._clock_hz, self.words[BRR]
+        if divider not in self.sent_at:
+            self._judge_speed()
+        self.sent_at[divider] += 1
+        if self.on_transmit is None:
+            return
+        bits = self._data_bits()
+        mask = (1 << bits - bool(self.words[CR1] & PCE)) - 1
+        if self.far_baud is None or not divider[1]:
+            self.on_transmit(word & mask, at_ns)
+            return
+        ratio = divider[0], self.far_baud * divider[1]
+        for one in heard(self._with_parity(word), bits, *ratio):
+            self.on_transmit(one & mask, at_ns)
+
+    def _data_bits(self) -> int:
+        """Return how many bits stand between start and stop, a parity among them."""
+        return 9 if self.words[CR1] & M else 8
+
+    def _judge_speed(self) -> None:
+        """Warn of a speed that the far end does not have, or, where none is set, that hardly any has."""
+        brr = self.words[BRR]
+        baud = round(self._clock_hz / brr) if brr else 0
+        far = self.far_baud
+        if far is not None:
+            if brr and any(
+                list(heard(word, 8, *ratio)) != [word]
+                for word in (0, 0x55, 0x7F, 0x80, 0xFF)
+                for ratio in ((self._clock_hz, far * brr), (far * brr, self._clock_hz))
+            ):
+                self.chip.warn(
+                    f"{self.name} is at {baud} bit/s and the far end at {far}: characters arrive damaged",
+                    once=f"{self.name}:far:{baud}",
+                    pc=self._rate_pc,
+                )
+        elif baud and not is_usual(baud):
+            self.chip.warn(
+                f"{self.name} is at {baud} bit/s, more than {TOLERANCE_PERCENT} % from every usual speed "
+                f"(nearest: {nearest_usual(baud)}): PCLK is {self._clock_hz} Hz and BRR {brr}",
+                once=f"{self.name}:baud:{baud}",
+                pc=self._rate_pc,
+            )
 
     # Reception.
 
@@ -387,6 +445,7 @@ class Usart(Peripheral):
 
     def _write_brr(self, _written: int, _previous: int) -> None:
         """Use the new rate from the next character on."""
+        self._rate_pc = self.chip.access_pc
         if self._tx_due_ns is not None:
             self._rebase_transmission(self._tx_due_ns)
         if self._rx_due_ns is not None:

@@ -14,6 +14,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from bluepill_sim.errors import ImageError, MissingDependencyError
+from bluepill_sim.program.wrong_files import wrong_kind
 from bluepill_sim.stm32f103 import FLASH_BASE, FLASH_BYTES_FITTED, SRAM_BASE, SRAM_BYTES
 
 FLASH_END = FLASH_BASE + FLASH_BYTES_FITTED
@@ -24,7 +25,14 @@ VECTOR_ALIGNMENT = 0x200
 #: chosen: a stack pointer and a reset vector are the least that a program can have.
 _SMALLEST_BYTES = 8
 _SHF_ALLOC = 2
+_ERASED_WORD = 0xFFFF_FFFF
 _ELF_MAGIC = b"\x7fELF"
+#: Types of ELF files that are no programs.
+_NOT_LINKED = {
+    "ET_REL": "a compiled source that is not linked (object file)",
+    "ET_DYN": "a shared object or a position-independent program",
+    "ET_CORE": "a core dump",
+}
 _HINT = "an ELF, HEX or BIN file built for an STM32F103 at 0x08000000 is needed"
 #: chosen: so far a symbol without a size reaches; longer than any function that assembly holds.
 _UNSIZED_REACH_BYTES = 0x1_0000
@@ -81,6 +89,8 @@ class Image:
     symbols: SymbolTable = field(default_factory=SymbolTable)
     #: SHA-256 of the file.
     sha256: str = ""
+    #: Where the file has the flash: 0x08000000, or 0, where the chip shows it again.
+    linked_at: int = FLASH_BASE
 
     def __post_init__(self) -> None:
         """Check that this can be a program for the chip.
@@ -98,7 +108,20 @@ class Image:
                     hint="check the linker script: FLASH is at 0x08000000, 64 KiB",
                 )
         stack, entry = self.word(self.vector_table), self.word(self.vector_table + 4)
-        if not SRAM_BASE < stack <= _STACK_END or stack % 4:
+        erased = [name for name, word in (("stack pointer", stack), ("reset vector", entry)) if word == _ERASED_WORD]
+        if erased:
+            raise ImageError(
+                f"{self.name}: no {' and no '.join(erased)} at {self.vector_table:#010x}: "
+                f"{_ERASED_WORD:#010x} is erased flash",
+                hint="a program begins with its vector table: check the linker script, and where the file is put",
+            )
+        if SRAM_BASE < stack <= _STACK_END and stack % 4:
+            raise ImageError(
+                f"{self.name}: the initial stack pointer {stack:#010x} at {self.vector_table:#010x} "
+                "is no multiple of 4",
+                hint="the core would drop its two lowest bits; let the linker script align the top of the stack to 8",
+            )
+        if not SRAM_BASE < stack <= _STACK_END:
             raise ImageError(
                 f"{self.name}: the initial stack pointer {stack:#010x} at {self.vector_table:#010x} "
                 f"is not in the SRAM ({SRAM_BASE:#010x} to {_STACK_END:#010x})",
@@ -112,7 +135,7 @@ class Image:
 
     @property
     def vector_table(self) -> int:
-        """Where the program's vectors are: at its lowest flash address, which a boot loader may have moved up."""
+        """Where in the flash the vectors are: at its lowest address, which a boot loader may have moved up."""
         lowest = min(address for address, data in self.segments if data)
         return lowest // VECTOR_ALIGNMENT * VECTOR_ALIGNMENT
 
@@ -161,6 +184,10 @@ def parse_image(data: bytes, name: str) -> Image:
         return _parse_hex(data, name, digest)
     if len(data) < _SMALLEST_BYTES:
         raise ImageError(f"{name}: {len(data)} bytes are too few for a program", hint=_HINT)
+    wrong = wrong_kind(data)
+    if wrong is not None:
+        what, hint = wrong
+        raise ImageError(f"{name}: {what}", hint=hint)
     return Image(name, ((FLASH_BASE, data),), sha256=digest)
 
 
@@ -185,6 +212,9 @@ def _parse_elf(data: bytes, name: str, digest: str) -> Image:
                 f"{name}: built for {_machine_name(machine)}, not for a 32-bit little-endian ARM",
                 hint="build with arm-none-eabi-gcc -mcpu=cortex-m3 -mthumb",
             )
+        if elf["e_type"] != "ET_EXEC":
+            what = _NOT_LINKED.get(elf["e_type"], f"an ELF of type {elf['e_type']}")
+            raise ImageError(f"{name}: {what}, no program", hint="link it for 0x08000000 and give the result")
         segments = []
         for segment in elf.iter_segments():
             if segment["p_type"] == "PT_LOAD" and segment["p_filesz"]:
@@ -193,7 +223,7 @@ def _parse_elf(data: bytes, name: str, digest: str) -> Image:
                     raise ImageError(f"{name}: the file is cut off at {len(data)} bytes", hint="build or copy it again")
                 skipped = _header_bytes(elf, segment["p_offset"], segment["p_filesz"])
                 segments.append((segment["p_paddr"] + skipped, content[skipped:]))
-        return Image(name, tuple(segments), _symbols(elf), digest)
+        return _image_at(name, segments, _symbols(elf), digest)
     except (ELFError, ConstructError, KeyError, ValueError, IndexError, AttributeError, TypeError) as error:
         # pyelftools has no one error for a damaged file.
         raise ImageError(f"{name}: the ELF file is damaged: {error}", hint="build or copy it again") from error
@@ -242,5 +272,13 @@ def _parse_hex(data: bytes, name: str, digest: str) -> Image:
         raise ImageError(f"{name}: the Intel HEX file is damaged: {error}", hint="build or copy it again") from error
     if not data.rstrip().upper().endswith(b":00000001FF"):
         raise ImageError(f"{name}: the Intel HEX file has no end record: cut off?", hint="build or copy it again")
-    segments = tuple((start, bytes(reader.tobinarray(start=start, end=end - 1))) for start, end in reader.segments())
-    return Image(name, segments, sha256=digest)
+    segments = [(start, bytes(reader.tobinarray(start=start, end=end - 1))) for start, end in reader.segments()]
+    return _image_at(name, segments, SymbolTable(), digest)
+
+
+def _image_at(name: str, segments: list[tuple[int, bytes]], symbols: SymbolTable, digest: str) -> Image:
+    """Return an image whose pieces may stand in the flash's alias at 0 (RM0008 3.4): the array is the same."""
+    lowest = min((address for address, data in segments if data), default=FLASH_BASE)
+    linked_at = 0 if lowest < FLASH_BYTES_FITTED else FLASH_BASE
+    moved = ((address + FLASH_BASE if address < FLASH_BYTES_FITTED else address, data) for address, data in segments)
+    return Image(name, tuple(moved), symbols, digest, linked_at)

@@ -16,7 +16,7 @@ from typing import Any
 from bluepill_sim.errors import ImageError, MissingDependencyError
 from bluepill_sim.program.elf_file import read_bytes
 from bluepill_sim.program.image import Image
-from bluepill_sim.stm32f103 import FLASH_BASE, FLASH_BYTES_FITTED
+from bluepill_sim.stm32f103 import FLASH_BYTES_FITTED
 
 _ELF_MAGIC = b"\x7fELF"
 
@@ -82,7 +82,7 @@ def read_lines(image: Image) -> LineTable:
         for unit in dwarf.iter_CUs():
             program = dwarf.line_program_for_CU(unit)
             if program is not None:
-                rows += _rows_of(program, _Files(program, unit))
+                rows += _rows_of(program, _Files(program, unit), image.linked_at)
     except (ELFError, DWARFError, ConstructError, KeyError, ValueError, IndexError, AttributeError, TypeError) as error:
         # pyelftools has no one error for a damaged file.
         raise ImageError(f"{image.name}: the debug information is damaged: {error}", hint="build it again") from error
@@ -118,7 +118,7 @@ def _text(value: object) -> str:
     return value.decode("utf-8", "replace") if isinstance(value, bytes) else str(value)
 
 
-def _rows_of(program: Any, files: _Files) -> list[LineRow]:  # pyelftools has no types
+def _rows_of(program: Any, files: _Files, flash: int) -> list[LineRow]:  # pyelftools has no types
     rows = []
     last = None
     for entry in program.get_entries():
@@ -127,7 +127,7 @@ def _rows_of(program: Any, files: _Files) -> list[LineRow]:  # pyelftools has no
             continue
         if last is not None and state.address > last.address and last.line:
             row = LineRow(last.address, state.address, files.name(last.file), last.line)
-            if FLASH_BASE <= row.address < FLASH_BASE + FLASH_BYTES_FITTED:
+            if flash <= row.address < flash + FLASH_BYTES_FITTED:
                 rows.append(row)
         last = None if state.end_sequence else state
     return rows

@@ -70,6 +70,9 @@ def run(
     world: Annotated[str | None, typer.Option(help="World, or a TOML file.")] = None,
     seed: Annotated[int | None, typer.Option(help="Seed of everything random.", min=0)] = None,
     duration: Annotated[float | None, typer.Option(help="Seconds of virtual time.", metavar="S")] = None,
+    usart_baud: Annotated[
+        int | None, typer.Option(help="Speed of USART1's far end; unset follows the firmware.", metavar="BAUD", min=1)
+    ] = None,
     realtime: Annotated[
         float | None, typer.Option(help="Keep pace with the clock, SPEED times as fast.", metavar="[SPEED]")
     ] = None,
@@ -92,7 +95,14 @@ def run(
     elif yes or max_speed is not None:
         raise UsageError(f"{'--yes' if yes else '--max-speed'} goes with --port only")
     wanted = wanted.with_options(
-        firmware=firmware, mode=mode, adapter_core=adapter, body=body, world=world, seed=seed, duration_s=duration
+        firmware=firmware,
+        mode=mode,
+        adapter_core=adapter,
+        body=body,
+        world=world,
+        seed=seed,
+        duration_s=duration,
+        usart_baud=usart_baud,
     )
     folder = out or next_folder(wanted.name)
     if port is not None:

@@ -43,6 +43,7 @@ def rows(outcome: Mapping[str, object]) -> list[tuple[str, str]]:
         ("distance", _with_unit(outcome["distance_m"], ".2f", "m")),
         ("collisions", _with_unit(outcome["collisions"], "d", "")),
         ("least clearance", _with_unit(outcome["min_clearance_m"], ".3f", "m")),
+        ("USART1", _with_unit(outcome.get("usart_baud"), "d", "bit/s")),
         ("trace", str(outcome["trace_sha256"] or "")[:16]),
     ]  # fmt: skip
     return [(name, value) for name, value in found if value]

@@ -19,7 +19,8 @@ SUMMARY_NAME = "summary.json"
 
 _FROM_META = ("firmware_sha256", "scenario", "mode", "body", "world", "seed")
 _FROM_END = (
-    "virtual_s", "wall_s", "real_time_factor", "distance_m", "collisions", "min_clearance_m", "trace_sha256",
+    "virtual_s", "wall_s", "real_time_factor", "distance_m", "collisions", "min_clearance_m", "usart_baud",
+    "trace_sha256",
     "passed", "failures", "goals_met", "notes", "last_blocks",
 )  # fmt: skip
 

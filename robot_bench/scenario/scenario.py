@@ -46,6 +46,7 @@ _TOP = (
     Key(name="seed", kind="whole", least=0),
     Key(name="duration_s", kind="number", required=True, above=0),
     Key(name="threshold_m", kind="number", above=0),
+    Key(name="usart_baud", kind="whole", least=1),
     Key(name="start", kind="table"),
     Key(name="direct", kind="table"),
     Key(name="adapter", kind="table"),
@@ -108,6 +109,8 @@ class Scenario:
     seed: int = 0
     duration_ns: Nanos
     threshold_um: int
+    #: The speed of USART1's far end, bit/s; None follows the firmware.
+    usart_baud: int | None = None
     #: None starts at the world's own place.
     start: Pose | None = None
     direct: DirectSettings = field(default_factory=DirectSettings)
@@ -135,6 +138,7 @@ class Scenario:
         world: str | None = None,
         seed: int | None = None,
         duration_s: float | None = None,
+        usart_baud: int | None = None,
     ) -> "Scenario":
         """Return the scenario with what a command line sets otherwise; None keeps it as it is.
 
@@ -155,6 +159,7 @@ class Scenario:
             mode=mode or moved.mode,
             adapter_core=adapter_core or moved.adapter_core,
             body=body or moved.body,
+            usart_baud=moved.usart_baud if usart_baud is None else usart_baud,
             seed=moved.seed if seed is None else seed,
             duration_ns=moved.duration_ns if duration_s is None else round(duration_s * NS_PER_S),
         )
@@ -251,6 +256,7 @@ def _build(table: Table, text: str, path: Path) -> Scenario:
         seed=cast("int", table.get("seed", 0)),
         duration_ns=round(cast("float", table["duration_s"]) * NS_PER_S),
         threshold_um=round(threshold_m * 1e6),
+        usart_baud=cast("int | None", table.get("usart_baud")),
         start=_start(table, where),
         direct=_direct(cast("Table", table.get("direct", {})), where),
         adapter=_adapter(cast("Table", table.get("adapter", {})), round(threshold_m * 1e6), where),

@@ -16,6 +16,13 @@ class Usart(Protocol):
 
     #: Called with each byte that the chip has sent, and when its stop bit ended, in ns.
     on_transmit: Callable[[int, int], None] | None
+    #: The far end's speed in bit/s; None follows the firmware.
+    far_baud: int | None
+
+    @property
+    def measured_baud(self) -> int | None:
+        """The speed at which most characters were sent, in bit/s; None before the first."""
+        ...
 
 
 class ChipActivity(Protocol):
@@ -60,7 +67,17 @@ class Chip(Protocol):
 
     @property
     def fault(self) -> ChipFault | None:
-        """The fault that ended the firmware; None while it runs."""
+        """The fault that ended the firmware, or that it came back from; None while there is none."""
+        ...
+
+    @property
+    def has_died(self) -> bool:
+        """Whether the fault ended the firmware."""
+        ...
+
+    @property
+    def verdict(self) -> str:
+        """What became of the firmware: its fault, its resets; empty where it just ran."""
         ...
 
     def last_blocks(self) -> Sequence[str]:

@@ -18,6 +18,7 @@ class FakeChip:
 
     def __init__(self) -> None:
         self.now_ns = 0
+        self.access_pc = 0
         self.clocks = Clocks()
         self.pins = make_pins(self)
         self.irqs: dict[int, bool] = {}

@@ -10,8 +10,11 @@ import pytest
 
 pytest.importorskip("unicorn")
 
+from bluepill_sim.analysis.coverage import Coverage
 from bluepill_sim.board import BluePill, BoardSnapshot
 from bluepill_sim.fabric.pins import PinDrive
+from bluepill_sim.program.line_table import read_lines
+from bluepill_sim.program.static_code import StaticCode
 
 HERE = Path(__file__).resolve().parent / "firmware"
 COMPILER = "arm-none-eabi-gcc"
@@ -24,7 +27,7 @@ EXPECTED = """\
 unclocked 00000000
 unmodelled 00000000
 clocked 44444444
-pb4-jtag 00000000
+pb4-jtag 00000010
 pb4-free 00000010
 bit-band 00000080
 locked 44444444
@@ -55,6 +58,25 @@ def elf(tmp_path_factory: pytest.TempPathFactory) -> Path:
     link = ["-Wl,--build-id=none", "-T", str(HERE / "exercise.ld"), str(HERE / "exercise.c"), "-lgcc", "-o", str(path)]
     subprocess.run([COMPILER, *flags, *link], check=True)
     return path
+
+
+@pytest.mark.parametrize("core", ["python", "native"])
+def test_a_program_linked_at_zero_runs_in_the_alias(
+    elf: Path, tmp_path: Path, core: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("P2OS_CORE", core)
+    script = (HERE / "exercise.ld").read_text().replace("0x08000000", "0x0")
+    (tmp_path / "zero.ld").write_text(script)
+    path = tmp_path / "zero.elf"
+    flags = ["-mcpu=cortex-m3", "-mthumb", "-Og", "-g", "-ffreestanding", "-nostdlib", "-Wl,--build-id=none"]
+    sources = ["-T", str(tmp_path / "zero.ld"), str(HERE / "exercise.c"), "-lgcc", "-o", str(path)]
+    subprocess.run([COMPILER, *flags, *sources], check=True)
+    session = Session(path)
+    assert session.run(50 * MS) == EXPECTED
+    assert session.board.pc < 0x2_0000
+    assert "exercise.c:" in "".join(session.board.last_blocks())
+    code = Coverage(session.board.image, read_lines(session.board.image), StaticCode(session.board.chip.memory))
+    assert any("exercise.c" in file.name and file.functions for file in code.files())
 
 
 class Session:
@@ -100,7 +122,7 @@ def session(elf: Path, ready: tuple[BoardSnapshot, list[str]]) -> Session:
 
 def test_warnings_name_what_the_program_did_wrong(session: Session) -> None:
     beginnings = (
-        "GPIOC has no clock: RCC_APB2ENR bit 4 is 0 (read of 0x40011000) at meet_gpio+0x",
+        "GPIOC has no clock: RCC_APB2ENR bit 4 is 0 (write of 0x44344444 to 0x40011000) at meet_gpio+0x",
         "TIM2 is not modelled (read of 0x40000000) at meet_gpio+0x",
         "PC13: configured while locked: ignored at meet_gpio+0x",
         "write to flash without FLASH_CR PG: ignored at program_flash+0x",

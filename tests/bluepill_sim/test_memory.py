@@ -112,6 +112,28 @@ def test_a_peripheral_without_its_clock_reads_zero_and_is_named_once(run) -> Non
     assert "GPIOA has no clock: RCC_APB2ENR bit 2 is 0 (write of 0x1 to 0x4001080c) at start+" in warning
 
 
+def test_a_de_initialization_without_a_clock_is_nothing_to_warn_of(run) -> None:
+    # As HAL_GPIO_DeInit and HAL_UART_DeInit do it: fields back to their reset values, the rest as it was read, 0.
+    text = "".join(load(0x40010800) + store(0x40010800, 4 << 4 * n) + store(GPIOA_ODR, 0) for n in range(8))
+    text += load(0x4001380C) + store(0x4001380C, 0) + store(0x40013810, 0)
+    assert run(text).board.warnings == []
+
+
+def test_reading_on_without_a_clock_is_named(boot) -> None:
+    board = boot("mov32 r1, #0x40013800\nloop: ldr r0, [r1, #0]\ncmp r0, #0\nbeq loop\n").run(999).board
+    assert board.warnings == []
+    board.run_for("3 us")
+    assert "USART1 has no clock: RCC_APB2ENR bit 14 is 0 (read of 0x40013800)" in board.warnings[0]
+
+
+def test_priorities_and_lines_beyond_the_chip_are_nothing_to_warn_of(run) -> None:
+    addresses = [0xE000E400 + 4 * n for n in range(11, 60)]
+    addresses += [base + 4 * n for base in (0xE000E100, 0xE000E180, 0xE000E280) for n in range(2, 8)]
+    machine = run("".join(store(at, 0xFFFFFFFF) + load(at) for at in addresses))
+    assert set(machine.log) == {0}
+    assert machine.board.warnings == []
+
+
 def test_what_is_not_modelled_is_named_once_and_reads_zero(run) -> None:
     machine = run(store(0x40012C00, 1) + load(0x40012C00) + load(0x40023C00) + load(0xE0000000) + store(0xE0000E00, 1))
     assert machine.log == [0, 0, 0]

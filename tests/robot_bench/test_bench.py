@@ -140,3 +140,12 @@ def test_a_run_ends_a_second_after_the_firmware_has_died(slice_ns: int) -> None:
     made = finished(Bench(scenario("direct"), chip=chip, slice_ns=slice_ns))
     assert entries(made, "pose")[-1]["t"] == S + S // 2
     assert made.finish() == S + S // 2
+
+
+@pytest.mark.parametrize("slice_ns", [100_000, MS, 10 * MS])
+def test_a_run_goes_on_when_the_firmware_comes_back_from_a_fault(slice_ns: int) -> None:
+    chip = FakeChip(drives((0, 0, 0), (0.2, 3, 3)), halts_at=S // 2)
+    chip.recovers_at = S
+    made = finished(Bench(scenario("direct", duration_s=2), chip=chip, slice_ns=slice_ns))
+    assert chip.fault is not None
+    assert made.finish() == 2 * S

@@ -137,6 +137,21 @@ bool core_start_recording(struct core *core, uint32_t room)
     return !room || core->records != NULL;
 }
 
+/* After an MSR, which ends its block: clears what Unicorn keeps of it and the chip does not have. */
+static RARELY void trim_registers(struct core *core)
+{
+    static const int numbers[3] = {REG_BASEPRI, REG_MSP, REG_PSP};
+    static const uint32_t kept[3] = {0xF0, ~3u, ~3u};
+    for (int n = 0; n < 3; ++n) {
+        uint32_t value = read_register(core, numbers[n]);
+        if (value & ~kept[n]) {
+            value &= kept[n];
+            void *const at = &value;
+            core->api.write_registers(core->unicorn, &numbers[n], &at, 1);
+        }
+    }
+}
+
 void core_on_block(void *unicorn, uint64_t at, uint32_t size, void *user)
 {
     (void)unicorn;
@@ -145,6 +160,9 @@ void core_on_block(void *unicorn, uint64_t at, uint32_t size, void *user)
     const uint32_t address = (uint32_t)at;
     const uint64_t cycle = core->shared.cycle + (address == before->end ? before->straight : before->taken);
     core->shared.cycle = cycle;
+    if (UNLIKELY(before->flags & ROW_CHANGES_MASKS)) {
+        trim_registers(core);
+    }
     if (UNLIKELY(cycle >= core->shared.stop_at)) {
         stop_at_boundary(core, address);
         return;

@@ -191,6 +191,10 @@ static uint32_t run_slice(struct core *core)
     s->halt_kind = HALT_NONE;
     s->halt_has_address = 0;
     s->run_from = s->pc;
+    if (s->pc >= FIRST_EXCEPTION_RETURN) { /* from a vector or a stacked PC: an address, and nothing executes there */
+        s->halt_pc = s->pc;
+        return s->halt_kind = HALT_EXECUTE_NEVER;
+    }
     core->io_next = core->skipped_count = 0;
     const int error = core->api.start(core->unicorn, s->pc | s->is_thumb, NOWHERE, 0, 0);
     if (s->halt_kind == HALT_NONE) {

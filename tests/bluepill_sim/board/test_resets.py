@@ -178,3 +178,42 @@ def test_a_program_that_feeds_its_watchdog_in_time_lives(boot, rounds: int, coun
     feed = f"mov32 r2, #0xAAAA\nfeed: str r2, [r1, #0]\nmov32 r3, #{rounds}\nd: subs r3, #1\nbne d\nb feed"
     machine = boot(TELL + ten_ms + START_IWDG + feed).run(60_000)
     assert len(starts(machine)) == count
+
+
+SKIP_TWO_BYTES = "hard: ldr r0, [sp, #24]\nadds r0, #2\nstr r0, [sp, #24]\nbx lr\n"
+
+
+@pytest.mark.parametrize("core", ["python", "native"])
+def test_a_firmware_that_comes_back_from_a_hard_fault_has_not_died(boot, core, monkeypatch) -> None:
+    monkeypatch.setenv("P2OS_CORE", core)
+    machine = boot("udf\nlog #1\nb stop\n" + SKIP_TWO_BYTES, {3: "hard"}).run(100)
+    board = machine.board
+    assert machine.log == [1]
+    assert (board.has_died, board.fault is not None) == (False, True)
+    assert board.verdict.startswith(
+        "the firmware came back from a HardFault: UsageFault: undefined instruction at start"
+    )
+
+
+def test_the_fault_that_kills_is_shown_in_place_of_one_that_was_survived(boot) -> None:
+    text = "udf\nmovs r4, #1\nmovs r3, #0\nldr r3, [r3, #0]\nmov32 r3, #0x60000000\nldr r3, [r3, #0]\nb stop\n"
+    again = "hard: cmp r4, #1\nbeq here\n" + SKIP_TWO_BYTES.removeprefix("hard: ") + "here: b here\n"
+    board = boot(text + again, {3: "hard"}).run(100).board
+    assert board.has_died
+    assert "read of nothing" in board.verdict
+
+
+def test_a_reset_out_of_a_fault_is_a_death_and_is_counted(boot) -> None:
+    text = "mov32 r3, #0x20001000\nldr r0, [r3, #0]\nadds r0, #1\nstr r0, [r3, #0]\ncmp r0, #4\nbeq stop\nudf\nb stop\n"
+    machine = boot(text + "hard: " + store(AIRCR, 0x05FA0004) + "here: b here", {3: "hard"}).run(500)
+    board = machine.board
+    assert machine.is_done
+    assert board.has_died
+    assert dict(board.resets) == {ResetCause.SOFTWARE: 3}
+    assert "firmware fault: UsageFault" in board.verdict
+    assert board.verdict.endswith("a reset ended it; 3 resets (SOFTWARE 3)")
+    other = BluePill(machine.image)
+    other.restore(board.snapshot())
+    assert other.verdict == board.verdict
+    other.reset()
+    assert (other.has_died, other.verdict) == (False, "4 resets (SOFTWARE 3, PIN 1)")

@@ -245,3 +245,65 @@ def test_running_off_the_end_of_the_code_faults(boot) -> None:
 def test_an_ldm_fault_leaves_its_base_register_alone(boot) -> None:
     machine = boot("mov32 r1, #0x20004FFC\nldmia r1!, {r2-r4}").run(100)
     assert dict(machine.board.fault.registers)["R1"] == 0x20004FFC
+
+
+@pytest.mark.parametrize("core", ["python", "native"])
+@pytest.mark.parametrize("vector", [0xFFFF_FFFF, 0xFFFF_FFF9, 0xFFFF_FFF1, 0xFFFF_FFFD])
+def test_a_vector_that_looks_like_a_return_is_an_address(boot, vector, core, monkeypatch) -> None:
+    # Only a branch in a handler returns (ARM B1.5.8); a vector is fetched from, and nothing executes up there.
+    monkeypatch.setenv("P2OS_CORE", core)
+    machine = boot("svc #0\nlog #1", {11: vector})
+    machine.run(100)
+    assert machine.board.chip.processor.cfsr == 1
+    fault = str(machine.board.fault)
+    assert fault.startswith(f"MemManage: instruction fetch from a region that must not be executed at {vector & ~1:#x}")
+    assert f"(the vector of SVCall at 0x0000002c is {vector:#010x}" in fault
+    assert ("erased flash" in fault) is (vector == 0xFFFF_FFFF)
+    assert machine.log == []
+
+
+@pytest.mark.parametrize("core", ["python", "native"])
+@pytest.mark.parametrize("store", ["str r2, [r1, #0]", "strb r2, [r1, #0]", "strh r2, [r1, #0]"])
+def test_flash_is_programmed_by_halfwords_and_the_rest_is_a_bus_error(boot, store, core, monkeypatch) -> None:
+    monkeypatch.setenv("P2OS_CORE", core)
+    machine = boot(
+        "mov32 r1, #0x40022000\nmov32 r2, #0x45670123\nstr r2, [r1, #4]\nmov32 r2, #0xCDEF89AB\nstr r2, [r1, #4]\n"
+        f"movs r2, #1\nstr r2, [r1, #16]\nmov32 r1, #0x08010000\nmov32 r2, #0x1234\n{store}\nlog #1"
+    )
+    machine.run(300)
+    is_halfword = store.startswith("strh")
+    assert machine.log == ([1] if is_halfword else [])
+    assert machine.board.read_memory(0x0801_0000, 4) == (b"\x34\x12\xff\xff" if is_halfword else b"\xff" * 4)
+    fault = machine.board.fault
+    assert (fault is None) is is_halfword
+    assert fault is None or (fault.kind.name, fault.address) == ("WRITE_ERROR", 0x0801_0000)
+
+
+@pytest.mark.parametrize("core", ["python", "native"])
+@pytest.mark.parametrize("access", ["ldr r2, [r1, #0]", "str r2, [r1, #0]", "strb r2, [r1, #0]"])
+def test_a_thread_without_privilege_faults_in_the_system_control_space(boot, access, core, monkeypatch) -> None:
+    monkeypatch.setenv("P2OS_CORE", core)
+    machine = boot(
+        "mov32 r1, #0xE000E014\nmov32 r2, #0x1234\nstr r2, [r1, #0]\nmovs r4, #1\nmsr control, r4\nisb\n"
+        f"movs r2, #9\nmovs r5, #5\nwrong: {access}\nmovs r5, #6\nlog #1"
+    ).run(300)
+    board = machine.board
+    assert machine.log == []
+    assert (board.fault.pc, board.fault.address) == (machine.label("wrong"), 0xE000_E014)
+    assert board.fault.kind.name == ("READ_ERROR" if access.startswith("ldr") else "WRITE_ERROR")
+    assert board.register("R5") == 5
+    assert board.register("R2") == 9
+    assert board.chip.processor.systick.read_reload() == 0x1234
+    assert board.chip.processor.exception_number == 3
+
+
+@pytest.mark.parametrize("core", ["python", "native"])
+def test_a_handler_of_a_thread_without_privilege_has_it(boot, core, monkeypatch) -> None:
+    monkeypatch.setenv("P2OS_CORE", core)
+    machine = boot(
+        "movs r4, #1\nmsr control, r4\nisb\nsvc #0\nlog #2\nb stop\n"
+        "svc: mov32 r1, #0xE000E014\nldr r0, [r1, #0]\nlog #1\nbx lr",
+        {11: "svc"},
+    ).run(300)
+    assert machine.log == [1, 2]
+    assert machine.board.fault is None

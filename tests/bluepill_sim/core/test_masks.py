@@ -1,5 +1,7 @@
 """PRIMASK, BASEPRI and FAULTMASK: what they hold back, and what an SVC becomes under them."""
 
+import pytest
+
 ICSR, SHPR2 = 0xE000ED04, 0xE000ED1C
 PENDSV, NMI = 1 << 28, 1 << 31
 
@@ -63,3 +65,24 @@ def test_faultmask_holds_back_all_but_nmi(run) -> None:
 def test_faultmask_is_cleared_by_the_return_from_a_handler(run) -> None:
     machine = run("svc #0\nmrs r0, faultmask\nlog r0\nb stop\nhandler: cpsid f\nbx lr", {11: "handler"})
     assert machine.log == [0]
+
+
+@pytest.mark.parametrize("core", ["python", "native"])
+def test_bits_that_do_not_exist_are_not_kept_by_msr(run, core, monkeypatch) -> None:
+    monkeypatch.setenv("P2OS_CORE", core)
+    machine = run(
+        "mov32 r1, #0xFF\nmsr basepri, r1\nmrs r0, basepri\nlog r0\nmovs r1, #0\nmsr basepri, r1\n"
+        "mov32 r1, #0x20003003\nmsr psp, r1\nmrs r0, psp\nlog r0\n"
+        "mov32 r1, #0x20004ffe\nmsr msp, r1\nmrs r0, msp\nlog r0\nmov r0, sp\nlog r0\n"
+        "movs r1, #2\nmsr control, r1\nisb\nmov r0, sp\nlog r0\nmov32 r1, #0x20002001\nmsr psp, r1\nmov r0, sp\nlog r0"
+    )
+    assert machine.log == [0xF0, 0x2000_3000, 0x2000_4FFC, 0x2000_4FFC, 0x2000_3000, 0x2000_2000]
+
+
+@pytest.mark.parametrize("core", ["python", "native"])
+def test_a_step_over_msr_keeps_no_more(boot, core, monkeypatch) -> None:
+    monkeypatch.setenv("P2OS_CORE", core)
+    machine = boot("mov32 r1, #0xFF\nmsr basepri, r1\nmrs r0, basepri\nlog r0")
+    while not machine.is_done:
+        machine.board.chip.step(machine.board.now_ns + 1000)
+    assert machine.log == [0xF0]

@@ -138,10 +138,11 @@ def test_a_refused_write_to_flash_is_never_seen(run, write: str, address: int) -
 def test_a_write_to_flash_of_the_wrong_width_is_an_error_and_never_seen(run) -> None:
     unlock = store(FLASH_KEYR, 0x45670123) + store(FLASH_KEYR, 0xCDEF89AB) + store(FLASH_CR, 1)
     machine = run(
-        unlock + "mov32 r1, #0x08008000\nmov32 r2, #0x1234\nstrb r2, [r1, #0]\nldr r0, [r1, #0]\nlog r0\n"
-        f"mov32 r1, #{FLASH_SR}\nldr r0, [r1, #0]\nlog r0"
+        unlock + "mov32 r1, #0x08008000\nmov32 r2, #0x1234\nstrb r2, [r1, #0]\nlog #1\nb stop\n"
+        f"hard: ldr r0, [r1, #0]\nlog r0\nmov32 r1, #{FLASH_SR}\nldr r0, [r1, #0]\nlog r0\nb stop",
+        {3: "hard"},
     )
-    assert machine.log == [0xFFFF_FFFF, 1 << 2]
+    assert machine.log == [0xFFFF_FFFF, 0]
 
 
 def test_a_programmed_halfword_is_seen_by_the_next_instruction_and_takes_its_time(run) -> None:
@@ -194,7 +195,7 @@ def test_several_words_of_a_peripheral_arrive_one_by_one(run) -> None:
 
 
 def test_a_warning_names_the_accessing_instruction(run) -> None:
-    machine = run(f"mov32 r1, #{GPIOA_CRL}\nnop\nhere: ldr r0, [r1, #0]\nnop")
+    machine = run(f"mov32 r1, #{GPIOA_CRL}\nnop\nhere: str r1, [r1, #0]\nnop")
     (warning,) = machine.board.warnings
     assert f"here+0x0 (0x{machine.label('here'):08x})" in warning
 

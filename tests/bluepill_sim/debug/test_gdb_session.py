@@ -330,6 +330,27 @@ def test_any_payload_is_answered(debug) -> None:
     ask()
 
 
+NUMBERS = ["0", "1", "-1", "+1", " 1", "1_0", "0x10", "4", "1000", "7fffffff", "-80000000", "80000000", "ffffffff",
+           "8000000", "20000000", "20004fff", "e000e010", "e00fffff", "100000000", "f" * 16, "f" * 60, "-" + "f" * 30,
+           "", "zz", "-"]  # fmt: skip
+SHAPES = ["m{},{}", "M{},{}:00", "X{},{}:a", "Z0,{},{}", "Z2,{},{}", "z2,{},{}", "Z4,{},{}", "vFlashErase:{},{}",
+          "vFlashWrite:{}:{}", "vFlashDone", "qXfer:features:read:target.xml:{},{}", "qXfer:memory-map:read::{},{}",
+          "p{}", "P{}={}", "Z1,{},{}"]  # fmt: skip
+
+
+@pytest.mark.parametrize("shape", SHAPES)
+def test_numbers_that_no_debugger_sends_are_answered(shape: str, debug) -> None:
+    gdb = debug(LOOP)
+    for first in NUMBERS:
+        for second in NUMBERS:
+            answer = gdb(shape.format(first, second))
+            assert len(answer) <= 0x4000
+            if {first[:1], second[:1]} & {"-", "+", " "} and shape.count("{}") == 2 and "P" not in shape:
+                assert answer == "E01" or shape.startswith("vFlashWrite"), (shape, first, second)
+    assert gdb("m7fffffff,-80000000") == "E01"
+    assert gdb("m20000000,4") != "E01"
+
+
 def test_the_kinds_of_stops_are_all_reported() -> None:
     assert {kind.value for kind in StopKind} == {
         "breakpoint", "watchpoint", "step", "interrupt", "bkpt", "fault", "exit", "end", "begin",

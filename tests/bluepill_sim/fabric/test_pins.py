@@ -170,6 +170,8 @@ def test_listeners_learn_of_changes_of_the_input_only(bank: PinBank) -> None:
     pin.drive(True)
     pin.hold("JTDI", PinDrive.PULL_UP)
     pin.drive(None)
+    assert seen == [("PA0", True)]
+    pin.hold("JTDO")
     assert seen == [("PA0", True), ("PA0", False)]
 
 

@@ -92,6 +92,7 @@ static void program_flash(void)
 static void meet_gpio(void)
 {
     report("unclocked", WORD(GPIOC));
+    WORD(GPIOC) = 0x44344444u;
     report("unmodelled", WORD(TIM2));
     WORD(RCC + 0x18) |= 1u << 4;
     report("clocked", WORD(GPIOC));

@@ -51,11 +51,14 @@ def test_a_configuration_of_a_debug_pin_waits_for_its_release_and_is_warned_of_o
     assert fake_chip.read("GPIOB.IDR") & 8
 
 
-def test_an_input_on_a_debug_pin_is_not_read_until_released(fake_chip: Any) -> None:
-    fake_chip.pins["PB4"].drive(True)
+def test_the_inputs_of_the_debug_port_read_as_pulled_and_its_output_not_until_released(fake_chip: Any) -> None:
+    assert fake_chip.read("GPIOA.IDR") == 1 << 13 | 1 << 15  # JTMS and JTDI pulled up, JTCK down (RM0008 31.4.4)
+    assert fake_chip.read("GPIOB.IDR") == 1 << 4
+    fake_chip.pins["PB4"].drive(False)
+    fake_chip.pins["PB3"].drive(True)
     assert fake_chip.read("GPIOB.IDR") == 0
     fake_chip.write("AFIO.MAPR", SWJ_NOJTAG)
-    assert fake_chip.read("GPIOB.IDR") == 1 << 4
+    assert fake_chip.read("GPIOB.IDR") == 1 << 3
 
 
 def test_a_read_modify_write_gives_the_pins_back_and_is_warned_of(fake_chip: Any) -> None:
@@ -68,6 +71,9 @@ def test_a_read_modify_write_gives_the_pins_back_and_is_warned_of(fake_chip: Any
 def test_a_meaningless_swj_cfg_changes_nothing(fake_chip: Any) -> None:
     fake_chip.write("AFIO.MAPR", SWJ_OFF)
     fake_chip.write("AFIO.MAPR", 0b111 << 24)
+    assert held(fake_chip) == set()
+    assert fake_chip.warnings == {}  # ST's own __HAL_AFIO_REMAP_… writes it
+    fake_chip.write("AFIO.MAPR", 0b011 << 24)
     assert held(fake_chip) == set()
     assert list(fake_chip.warnings) == ["AFIO:swj"]
 

@@ -17,6 +17,9 @@ LCKK = 1 << 16
 WORDS = st.integers(0, 0xFFFF_FFFF)
 HALFWORDS = st.integers(0, 0xFFFF)
 
+#: Without the pins of the debug port, whose pulls show.
+PARTLY = 0x1FFF
+
 
 @pytest.mark.parametrize(
     ("nibble", "mode"),
@@ -73,15 +76,15 @@ def test_brr_resets_by_its_low_half_only(make_fake_chip: Callable[[], Any], star
 
 def test_the_input_register_follows_the_wire_and_the_own_output(fake_chip: Any) -> None:
     fake_chip.pins["PA4"].drive(True)
-    assert fake_chip.read("GPIOA.IDR") == 1 << 4
+    assert fake_chip.read("GPIOA.IDR") & PARTLY == 1 << 4
     fake_chip.write("GPIOA.CRL", 0x4444_4442)
     fake_chip.write("GPIOA.BSRR", 1)
-    assert fake_chip.read("GPIOA.IDR") == 1 << 4 | 1
+    assert fake_chip.read("GPIOA.IDR") & PARTLY == 1 << 4 | 1
     fake_chip.pins["PA4"].drive(False)
     fake_chip.write("GPIOA.BRR", 1)
-    assert fake_chip.read("GPIOA.IDR") == 0
+    assert fake_chip.read("GPIOA.IDR") & PARTLY == 0
     fake_chip.write("GPIOA.IDR", 0xFFFF)
-    assert fake_chip.read("GPIOA.IDR") == 0
+    assert fake_chip.read("GPIOA.IDR") & PARTLY == 0
 
 
 def test_odr_chooses_the_pull_of_an_input(fake_chip: Any) -> None:
@@ -89,7 +92,7 @@ def test_odr_chooses_the_pull_of_an_input(fake_chip: Any) -> None:
     assert fake_chip.pins["PA0"].output is PinDrive.PULL_DOWN
     fake_chip.write("GPIOA.ODR", 1)
     assert fake_chip.pins["PA0"].output is PinDrive.PULL_UP
-    assert fake_chip.read("GPIOA.IDR") == 1
+    assert fake_chip.read("GPIOA.IDR") & PARTLY == 1
 
 
 def test_an_edge_has_the_time_of_the_write(fake_chip: Any) -> None:
@@ -107,7 +110,7 @@ def test_reset_lets_go_of_every_pin(fake_chip: Any) -> None:
     fake_chip.pins["PB6"].drive(True)
     fake_chip.parts.by_name["GPIOB"].reset()
     assert fake_chip.pins["PB7"].output is PinDrive.NONE
-    assert fake_chip.read("GPIOB.IDR") == 1 << 6
+    assert fake_chip.read("GPIOB.IDR") == 1 << 6 | 1 << 4  # NJTRST is pulled up
 
 
 def lock(chip: Any, pins: int) -> tuple[int, int]:

@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from bluepill_sim.fabric.clocks import Clocks, illegal_settings
-from bluepill_sim.peripherals.rcc import OSCILLATORS, Rcc, ResetCause
+from bluepill_sim.peripherals.rcc import ILLEGAL_NS, OSCILLATORS, Rcc, ResetCause
 from bluepill_sim.stm32f103 import BASES, CLOCK_GATES, Place
 
 QUICK = settings(max_examples=40, deadline=None)
@@ -83,6 +83,7 @@ def test_every_pll_factor_and_source_gives_its_frequency(
     set_bits(fake_chip, "RCC.CFGR", 2)
     fake_chip.advance(HSE_NS + PLL_NS)
     expected_hz = input_hz * FACTORS[number]
+    fake_chip.advance(HSE_NS + PLL_NS + ILLEGAL_NS)
     assert fake_chip.clocks.sysclk_hz == expected_hz
     assert ("clock:sysclk" in fake_chip.warnings) is (expected_hz > 72_000_000)
     assert ("clock:pclk1" in fake_chip.warnings) is (expected_hz > 36_000_000)
@@ -160,9 +161,30 @@ def test_the_fourth_clock_source_does_not_exist(fake_chip: Any) -> None:
 def test_too_few_wait_states_are_warned_of(fake_chip: Any) -> None:
     fake_chip.run_at_72_mhz()
     fake_chip.write("FLASH.ACR", 0x11)
+    fake_chip.advance(fake_chip.now_ns + ILLEGAL_NS - 1)
+    assert fake_chip.warnings == {}
+    fake_chip.advance(fake_chip.now_ns + 1)
     assert fake_chip.warnings == {
         "clock:latency": "FLASH_ACR LATENCY is 1 at a SYSCLK of 72000000 Hz: good up to 48000000 Hz"
     }
+
+
+def test_a_clock_on_pa8_is_warned_of(fake_chip: Any) -> None:
+    fake_chip.write("RCC.CFGR", 3 << 24)
+    assert fake_chip.warnings == {}
+    fake_chip.write("RCC.CFGR", 4 << 24)
+    assert list(fake_chip.warnings) == ["RCC:mco"]
+
+
+def test_a_forbidden_setting_that_passes_at_once_is_none(fake_chip: Any) -> None:
+    fake_chip.run_at_72_mhz()
+    for _ in range(3):
+        fake_chip.write("RCC.CFGR", fake_chip.read("RCC.CFGR") & ~(7 << 8))  # PCLK1 at 72 MHz, as HAL_RCC_ClockConfig
+        fake_chip.advance(fake_chip.now_ns + ILLEGAL_NS - 1)
+        fake_chip.write("RCC.CFGR", fake_chip.read("RCC.CFGR") | 4 << 8)
+        fake_chip.advance(fake_chip.now_ns + ILLEGAL_NS)
+    assert fake_chip.warnings == {}
+    assert fake_chip.parts.rcc.due_ns is None
 
 
 @pytest.mark.parametrize(("hz", "states", "is_good"), [
@@ -177,6 +199,7 @@ def test_prefetch_must_stay_on_with_an_ahb_prescaler(fake_chip: Any) -> None:
     fake_chip.write("FLASH.ACR", 0)
     assert fake_chip.warnings == {}
     fake_chip.write("RCC.CFGR", 8 << 4)
+    fake_chip.advance(ILLEGAL_NS)
     assert list(fake_chip.warnings) == ["clock:prefetch"]
 
 

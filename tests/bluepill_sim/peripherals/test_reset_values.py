@@ -17,7 +17,10 @@ PERIPHERALS = {
     "RCC": {"CR": 0x0000_0083, "AHBENR": 0x14, "CSR": 0x0C00_0000},
     "FLASH": {"ACR": 0x30, "CR": 0x80, "OBR": 0x03FF_FFFC, "WRPR": 0xFFFF_FFFF},
     "AFIO": {},
-    **{f"GPIO{port}": {"CRL": 0x4444_4444, "CRH": 0x4444_4444} for port in "ABCDE"},
+    **{f"GPIO{port}": {"CRL": 0x4444_4444, "CRH": 0x4444_4444} for port in "CDE"},
+    # The debug port's pulls show in IDR (RM0008 31.4.4).
+    "GPIOA": {"CRL": 0x4444_4444, "CRH": 0x4444_4444, "IDR": 0xA000},
+    "GPIOB": {"CRL": 0x4444_4444, "CRH": 0x4444_4444, "IDR": 0x0010},
     "EXTI": {},
     **{f"USART{number}": {"SR": 0xC0} for number in (1, 2, 3)},
     "IWDG": {"RLR": 0xFFF},

@@ -52,6 +52,12 @@ def test_an_intel_hex_file_may_start_behind_a_boot_loader() -> None:
     assert image.vector_table == 0x0800_2000
 
 
+def test_a_hex_file_linked_at_zero_stands_in_the_flash() -> None:
+    program = struct.pack("<II", 0x2000_5000, 9) + b"\xfe\xe7" * 4
+    image = parse_image(hex_file(0, program), "a.hex")
+    assert (image.segments, image.vector_table, image.linked_at) == (((0x0800_0000, program),), 0x0800_0000, 0)
+
+
 def test_the_same_program_runs_from_every_format(tmp_path: Path) -> None:
     image = load_image(FIRMWARE)
     base = image.segments[0][0]
@@ -81,12 +87,21 @@ def bad_elf(**changes: int) -> bytes:
     return bytes(data)
 
 
+def elf_of_type(number: int) -> bytes:
+    """The real ELF saying that it is something else than a program."""
+    data = bytearray(FIRMWARE.read_bytes())
+    data[16] = number
+    return bytes(data)
+
+
 HOST_ELF = Path(sys.executable).resolve()
 BAD_FILES = [
     (b"", "the file is empty"),
     (b"abc", "3 bytes are too few"),
     (bytes(range(256)) * 16, "the initial stack pointer 0x03020100 at 0x08000000 is not in the SRAM"),
-    (b"\xff" * 1024, "the initial stack pointer 0xffffffff"),
+    (b"\xff" * 1024, "no stack pointer and no reset vector at 0x08000000: 0xffffffff is erased flash"),
+    (struct.pack("<II", 0x2000_5000, 0xFFFF_FFFF) * 8, "no reset vector at 0x08000000: 0xffffffff is erased flash"),
+    (struct.pack("<II", 0x2000_4FFE, 0x0800_0009) * 8, "stack pointer 0x20004ffe at 0x08000000 is no multiple of 4"),
     (b"\0" * 1024, "the initial stack pointer 0x00000000"),
     (struct.pack("<II", 0x2000_5000, 0x0800_0008) * 8, "the reset vector 0x08000008 is not a Thumb address"),
     (struct.pack("<II", 0x2000_5000, 0x2000_0001) * 8, "the reset vector 0x20000001 is not a Thumb address"),
@@ -102,6 +117,15 @@ BAD_FILES = [
     (FIRMWARE.read_bytes()[:64], "the ELF file is damaged"),
     (FIRMWARE.read_bytes()[:0x200], "damaged"),
     (b"\x7fELF", "the ELF file is damaged"),
+    (b"root:x:0:0:root:/root:/bin/bash\n" * 4, "a text file, no firmware"),
+    ("#!/bin/sh\necho Grüße\n".encode() * 4, "a text file, no firmware"),
+    (b"int main(void) { return 0; }\n", "a text file, no firmware"),
+    (b"S00600004844521B\nS1130000285F245F2212226A000424290008237C2A\n", "Motorola S-record"),
+    (b"!<arch>\n" + bytes(80), "a library (ar archive)"),
+    (b"UF2\n\x57\x51\x5d\x9e" + bytes(504), "a UF2 file"),
+    (b"\x1f\x8b\x08\0" + bytes(60), "a gzip file"),
+    (b"PK\x03\x04" + bytes(60), "a ZIP archive"),
+    (elf_of_type(1), "a compiled source that is not linked (object file)"),
 ]
 
 

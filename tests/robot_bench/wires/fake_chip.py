@@ -61,9 +61,11 @@ class FakeChip:
         self.inputs: list[tuple[int, str, bool | None]] = []
         self.on_pin: Callable[[str, PinDrive, int], None] | None = None
         self.on_warning: Callable[[str], None] | None = None
-        self.usart1 = SimpleNamespace(on_transmit=None)
+        self.usart1 = SimpleNamespace(on_transmit=None, far_baud=None, measured_baud=None)
         self.warnings: list[str] = []
         self.fault: FakeFault | None = None
+        #: When the firmware comes back from its fault; None for never.
+        self.recovers_at: int | None = None
         self.activity = SimpleNamespace(last_pin_ns=0, last_usart_ns=0, last_wfi_ns=0)
         self._pins: dict[str, FakePin] = {}
         bytes_out = [(at + 87_000 * n, byte) for at, line in text for n, byte in enumerate(line)]
@@ -74,6 +76,14 @@ class FakeChip:
         self._done = 0
         self._block_ns = block_ns
         self._halts_at = halts_at
+
+    @property
+    def has_died(self) -> bool:
+        return self.fault is not None and not (self.recovers_at is not None and self.now_ns >= self.recovers_at)
+
+    @property
+    def verdict(self) -> str:
+        return "" if self.fault is None else f"firmware fault: {self.fault}"
 
     def pin(self, name: str) -> FakePin:
         return self._pins.setdefault(name, FakePin(self, name))
@@ -98,6 +108,9 @@ class FakeChip:
             if self._halts_at is not None and boundary >= self._halts_at:
                 self.fault = FakeFault(self._halts_at)
                 self.now_ns = limit
+                if not self.has_died:
+                    self._halts_at = None
+                    return Reached(self.now_ns, Reason.DEADLINE)
                 return Reached(self.now_ns, Reason.HALT)
             self.now_ns = boundary
         return Reached(self.now_ns, Reason.DEADLINE)
