@@ -13,7 +13,7 @@ from p2os.client.aio import Robot as AsyncRobot
 from p2os.client.core import RobotCore
 from p2os.client.goals import DriveAxis
 from p2os.client.line import Line
-from p2os.protocol.commands import Command, stop, vel
+from p2os.protocol.commands import Command, CommandNumber, stop, vel
 from p2os.protocol.frames import Decoder, Frame
 from p2os.timing import NS_PER_MS, NS_PER_S, Nanos
 from p2os.transport.ports import HungUpError
@@ -189,6 +189,27 @@ def test_a_call_after_a_gap_stops_the_robot_before_it_does_anything() -> None:
     bench.turn()
     assert bench.sent[0] == stop()
     assert vel(300) not in bench.sent
+
+
+def test_a_call_after_a_gap_of_silence_is_refused_at_once() -> None:
+    bench = Bench()
+    bench.drive()
+    bench.late_by(2 * NS_PER_S, robot_lives=False)
+    now = bench.line.now()
+    with pytest.raises(LinkLostError):
+        bench.core.set_velocity(0.2, 0.0, now)
+
+
+def test_stop_overtakes_what_has_waited_in_a_gap() -> None:
+    bench = Bench()
+    bench.drive()
+    for _ in range(5):
+        bench.core.send(Command(CommandNumber.DIGOUT, 0xFF01), bench.line.now())
+    bench.late_by(2 * NS_PER_S)
+    bench.turn()
+    bench.run(0.2)
+    assert bench.sent[0] == stop()
+    assert Command(CommandNumber.DIGOUT, 0xFF01) in bench.sent
 
 
 def test_a_machine_that_sleeps_in_the_middle_of_a_turn_sends_nothing_old() -> None:
