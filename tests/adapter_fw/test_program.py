@@ -196,9 +196,7 @@ def test_stored_settings_with_a_fault_are_left_out_and_said(adapter: Path, tcp: 
         program.event("booted")
 
 
-def test_a_value_stored_under_an_old_name_is_left_out_with_the_new_one(
-    adapter: Path, tcp: str, tmp_path: Path
-) -> None:
+def test_a_value_stored_under_an_old_name_is_left_out_with_the_new_one(adapter: Path, tcp: str, tmp_path: Path) -> None:
     stored = tmp_path / "settings"
     stored.write_text("disbelief_ns 7000000000\nmax_velocity_mm_s 300\n", encoding="utf-8")
     with running(adapter, tcp, "--settings", str(stored)) as program:

@@ -12,9 +12,9 @@ from hypothesis import strategies as st
 from adapter_sim import AdapterSettings
 from adapter_sim.codec import BitOrder
 from adapter_sim.masters import Master
-from p2os.gamepad import PadReport
 from adapter_sim.pinout import parse_pinout
 from adapter_sim.settings import EncoderAtOpen, MotorMeaning
+from p2os.gamepad import PadReport
 from p2os.protocol.frames import Frame
 from p2os.protocol.profiles import Profile
 from p2os.protocol.sip import SonarReading

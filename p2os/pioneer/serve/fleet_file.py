@@ -27,10 +27,10 @@ from p2os.pioneer.controller.flash import BAUD_RATES, load_flash
 from p2os.pioneer.controller.settings import ControllerSettings, SonarPerSip
 from p2os.pioneer.sensor_errors import load_sensor_errors
 from p2os.pioneer.serve.fleet_order import DEFAULT_PORT, FleetOrder, RobotOrder, following_ports, read_aux
-from p2os.pioneer.toml_places import TomlPlaces, read_toml
 from p2os.pioneer.world.model import Pose
 from p2os.protocol.profiles import Profile
 from p2os.timing import NS_PER_S, Nanos
+from p2os.toml_file import TomlPlaces, read_toml
 
 
 class FleetError(FileError):
