@@ -1,4 +1,4 @@
-"""Damaged files of every format: read, or refused in one line that names the file. The cases are `tools/fuzz_files.py`."""
+"""Damaged files of every format: read, or refused in one line that names the file; `tools/fuzz_files.py` damages."""
 
 import runpy
 from pathlib import Path

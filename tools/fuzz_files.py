@@ -43,7 +43,7 @@ from p2os.pioneer.serve.fleet_order import make_fleet
 from p2os.pioneer.world import load_world
 from p2os.pioneer.world.model import World
 from p2os.protocol.profiles import Profile
-from p2os.robots.parameters import RobotParameters, known_robots, load_parameters
+from p2os.robots.parameters import RobotParameters, load_parameters
 from p2os.timing import NS_PER_MS
 from robot_bench.recording.run_record import read_run
 from robot_bench.recording.summary import outcome_of
@@ -321,7 +321,8 @@ SDF = """<?xml version="1.0"?>
 <model name="m"><static>true</static><pose>2 0 0.5 0 0 0.3</pose>
 <link name="l"><pose degrees="true">0 0 0 0 0 45</pose>
 <collision name="a"><geometry><box><size>1 0.5 1</size></box></geometry></collision>
-<collision name="b"><pose>0 1 0 0.2 0 0</pose><geometry><cylinder><radius>0.2</radius><length>1</length></cylinder></geometry></collision>
+<collision name="b"><pose>0 1 0 0.2 0 0</pose><geometry>
+<cylinder><radius>0.2</radius><length>1</length></cylinder></geometry></collision>
 <collision name="c"><geometry><sphere><radius>0.3</radius></sphere></geometry></collision>
 <collision name="d"><geometry><mesh><uri>part.obj</uri><scale>0.2 0.2 0.2</scale></mesh></geometry></collision>
 <collision name="e"><geometry><plane><normal>0 0 1</normal></plane></geometry></collision>
@@ -334,7 +335,8 @@ OTHER_SDF = """<sdf version="1.6"><model name="n"><link name="l"><collision name
 """
 URDF = """<?xml version="1.0"?>
 <robot name="r">
-<link name="base"><collision><origin xyz="2 0 0.5" rpy="0 0 0.3"/><geometry><box size="1 0.5 1"/></geometry></collision></link>
+<link name="base"><collision><origin xyz="2 0 0.5" rpy="0 0 0.3"/><geometry>
+<box size="1 0.5 1"/></geometry></collision></link>
 <link name="arm"><visual><geometry><cylinder radius="0.2" length="1.0"/></geometry></visual></link>
 <link name="tip"><collision><geometry><sphere radius="0.1"/></geometry></collision>
 <collision><geometry><mesh filename="package://part.obj" scale="0.2 0.2 0.2"/></geometry></collision></link>

@@ -225,7 +225,8 @@ def _value(source: TomlSource, section: str, table: Table, key: str, kind: type)
     if kind is bool:
         return value
     if kind is str:
-        if not value.isprintable() or not value.isascii() or len(value) > LONGEST_TEXT:
+        text = str(value)
+        if not text.isprintable() or not text.isascii() or len(text) > LONGEST_TEXT:
             raise ParametersError(
                 f"{at}: {name} = {shown(value)} is no line of at most {LONGEST_TEXT} ASCII characters"
             )

@@ -121,3 +121,12 @@ def test_a_killed_process_leaves_everything_up_to_its_last_whole_second(tmp_path
     process.communicate(timeout=10)
     times = [json.loads(line).get("t", -1) for line in path.read_text().splitlines()]
     assert max(times) >= 2 * S
+
+
+@pytest.mark.parametrize(
+    "line", ['{"k":"sonar","t":1}', '{"k":"wire","t":1,"hex":"zz","dir":"c2r"}', '{"k":"obstacle","t":1}']
+)
+def test_a_damaged_line_is_named_by_its_number(tmp_path: Path, line: str) -> None:
+    (tmp_path / "trace.jsonl").write_text('{"k":"meta","scenario":"s"}\n' + line + "\n", encoding="utf-8")
+    with pytest.raises(TraceError, match=r"trace\.jsonl:2: a damaged line"):
+        read_run(tmp_path)
