@@ -13,6 +13,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from p2os.errors import FileError, LocalProtocolError, RunFailedError
+from robot_bench.recording.run_record import TraceError, read_run
 from robot_bench.recording.trace import RANKS, TraceWriter, canonical
 
 S = 10**9
