@@ -838,7 +838,7 @@ def run_case(name: str, seed: Seed, data: bytes, folder: Path, rng: random.Rando
         told = str(error)
         if "\n" in told or len(told) > LONGEST_MESSAGE or not told.isprintable():
             raise CaseFailedError(f"a refusal that is no single line: {told[:200]!r}") from error
-        if not any(file in told for file in (seed.name, *seed.beside)):
+        if not any(file in told for file in (str(folder), seed.name, *seed.beside)):
             raise CaseFailedError(f"a refusal that names no file: {told!r}") from error
         return False
     except CaseTimeoutError as error:
