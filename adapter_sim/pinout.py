@@ -12,7 +12,6 @@ a revision of the board can work is another question: `faults_of` answers it.
 """
 
 import re
-import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass
 from enum import StrEnum
@@ -20,7 +19,8 @@ from importlib import resources
 from pathlib import Path
 from typing import TypeVar
 
-from p2os.errors import FileError
+from p2os.errors import FileError, shown, shown_name
+from p2os.toml_file import TomlPlaces, read_toml, read_user_text
 
 
 class PinoutError(FileError):
@@ -157,6 +157,10 @@ class Pinout:
         return tuple(wire for wire in self.wires if wire.role is role)
 
 
+#: Key → least and most; more wires than this no ESP32 has pins for.
+RANGES: Mapping[str, tuple[int, int]] = {
+    "schema": (0, 1000), "idle": (0, 1), "bit": (0, 31), "number": (1, 32), "width": (1, 32),
+}  # fmt: skip
 #: Version of the file format.
 SCHEMA = 1
 #: The chip has ports A to E; the BluePill brings out A to C.
@@ -201,7 +205,7 @@ def load_pinout(path: str | Path | None = None) -> Pinout:
         if path is None:
             text = resources.files("adapter_sim").joinpath("pinout.toml").read_text(encoding="utf-8")
         else:
-            text = Path(path).read_text(encoding="utf-8")
+            text = read_user_text(Path(path), "a pin-out", PinoutError)
     except (OSError, UnicodeDecodeError) as error:
         raise PinoutError(f"cannot read pin-out {where}: {error}") from error
     return parse_pinout(text, where)
@@ -209,13 +213,10 @@ def load_pinout(path: str | Path | None = None) -> Pinout:
 
 def parse_pinout(text: str, where: str = "pinout") -> Pinout:
     """Check the text of a pin-out file; `where` names it in messages."""
-    try:
-        table = tomllib.loads(text)
-    except tomllib.TOMLDecodeError as error:
-        raise PinoutError(f"{where}: {error}") from error
-    top = _Row(where, table)
+    table, places = read_toml(text, where, "a pin-out", PinoutError)
+    top = _Row(where, table, places)
     if top.integer("schema") != SCHEMA:
-        raise PinoutError(f"{where}: schema is {table['schema']}, expected {SCHEMA}")
+        raise top.fault("schema", table["schema"], str(SCHEMA))
     default = top.text("default_revision")
     revisions = tuple(_revision(row) for row in top.rows("revision"))
     names = [revision.name for revision in revisions]
@@ -229,7 +230,7 @@ def parse_pinout(text: str, where: str = "pinout") -> Pinout:
     _refuse_duplicates(where, "value", [value.name for value in values])
     _refuse_duplicates(where, "auxiliary", [auxiliary.name for auxiliary in auxiliaries])
     if default not in names:
-        raise PinoutError(f"{where}: default_revision {default!r} is none of {', '.join(names)}")
+        raise PinoutError(f"{where}: default_revision {shown(default)} is none of {', '.join(names)}")
     _check_roles(where, wires, values)
     return Pinout(
         wires=wires, values=values, revisions=revisions, auxiliaries=auxiliaries, default_revision=default
@@ -291,10 +292,21 @@ _Kind = TypeVar("_Kind", bound=StrEnum)
 class _Row:
     """A table of the file, of which every key must be asked for."""
 
-    def __init__(self, where: str, table: Mapping[str, object]) -> None:
-        self.where = where
+    def __init__(
+        self, source: str, table: Mapping[str, object], places: TomlPlaces, name: str = "", number: int = 0
+    ) -> None:
+        self._source, self._places, self._name, self._number = source, places, name, number
         self._table = table
         self._asked: set[str] = set()
+
+    @property
+    def where(self) -> str:
+        """File and line of the table, and what it is."""
+        return self._at("")
+
+    def _at(self, key: str) -> str:
+        at = f"{self._source}:{self._places.line(self._name, self._number, key)}"
+        return f"{at}: {self._name} {shown(self._table.get('name', self._number))}" if self._name else at
 
     def get(self, key: str) -> object:
         self._asked.add(key)
@@ -308,8 +320,9 @@ class _Row:
 
     def integer(self, key: str) -> int:
         value = self.get(key)
-        if not isinstance(value, int) or isinstance(value, bool):
-            raise self.fault(key, value, "an integer")
+        least, most = RANGES[key]
+        if not isinstance(value, int) or isinstance(value, bool) or not least <= value <= most:
+            raise self.fault(key, value, f"an integer of {least} to {most}")
         return value
 
     def choice(self, key: str, kind: type[_Kind]) -> _Kind:
@@ -325,7 +338,7 @@ class _Row:
             return []
         if not isinstance(value, list) or not value or not all(isinstance(row, dict) for row in value):
             raise self.fault(key, value, f"one [[{key}]] or more")
-        return [_Row(f"{self.where}: {key} {row.get('name', index)!r}", row) for index, row in enumerate(value)]
+        return [_Row(self._source, row, self._places, key, index) for index, row in enumerate(value)]
 
     def pins(self, key: str, revisions: list[str]) -> dict[str, str]:
         value = self.get(key)
@@ -333,7 +346,7 @@ class _Row:
             raise self.fault(key, value, "a table of revision = pin")
         for revision, pin in value.items():
             if revision not in revisions:
-                raise PinoutError(f"{self.where}: {key} names the unknown revision {revision!r}")
+                raise PinoutError(f"{self.where}: {key} names the unknown revision {shown(revision)}")
             if not isinstance(pin, str) or not (pin == "NC" or _ESP32_PIN.fullmatch(pin)):
                 raise self.fault(f"{key}.{revision}", pin, "IO0..IO39, EN, HC595.QA..QH or NC")
         return value
@@ -341,13 +354,15 @@ class _Row:
     def fault(self, key: str, value: object, expected: str) -> PinoutError:
         if value is None:
             return PinoutError(f"{self.where}: key {key!r} is missing (expected {expected})")
-        return PinoutError(f"{self.where}: {key} = {value!r}, expected {expected}")
+        return PinoutError(
+            f"{self._at(key.split('.', maxsplit=1)[0])}: {shown_name(key)} = {shown(value)}, expected {expected}"
+        )
 
     def finish(self) -> None:
         unknown = sorted(set(self._table) - self._asked)
         if unknown:
             raise PinoutError(
-                f"{self.where}: unknown key {unknown[0]!r}", hint="known keys: " + ", ".join(sorted(self._asked))
+                f"{self.where}: unknown key {shown(unknown[0])}", hint="known keys: " + ", ".join(sorted(self._asked))
             )
 
 
@@ -362,7 +377,7 @@ def _wire(row: _Row, revisions: list[str]) -> Wire:
     pins = row.pins("esp32", revisions)
     missing = [revision for revision in revisions if revision not in pins]
     if missing:
-        raise PinoutError(f"{row.where}: esp32 has no pin for revision {missing[0]!r}", hint='write "NC" for none')
+        raise PinoutError(f"{row.where}: esp32 has no pin for revision {shown(missing[0])}", hint='write "NC" for none')
     bluepill = row.text("bluepill")
     if not _BLUEPILL_PIN.fullmatch(bluepill):
         raise row.fault("bluepill", bluepill, "PA0..PC15")
@@ -373,7 +388,7 @@ def _wire(row: _Row, revisions: list[str]) -> Wire:
     if direction is not _DRIVEN[role]:
         raise PinoutError(f"{row.where}: direction = {direction.value!r}, but a {role.value} wire is {_DRIVEN[role]}")
     safe = row.get("safe")
-    if safe not in (0, 1, "hold") or isinstance(safe, bool):
+    if safe not in (0, 1, "hold") or not isinstance(safe, (int, str)) or isinstance(safe, bool):
         raise row.fault("safe", safe, '0, 1 or "hold"')
     of_value = role in {WireRole.ENCODER, WireRole.MOTOR}
     result = Wire(
@@ -412,7 +427,7 @@ def _auxiliary(row: _Row, revisions: list[str], wires: tuple[Wire, ...]) -> Auxi
     if direction not in {"in", "out"}:
         raise row.fault("direction", direction, "in or out")
     shares = row.get("shares")
-    if shares is not None and shares not in {wire.name for wire in wires}:
+    if shares is not None and shares not in [wire.name for wire in wires]:
         raise row.fault("shares", shares, "the name of a wire")
     pins = row.pins("esp32", revisions)
     row.finish()
@@ -425,7 +440,7 @@ def _refuse_duplicates(where: str, what: str, names: list[str]) -> None:
     seen: set[str] = set()
     for name in names:
         if name in seen:
-            raise PinoutError(f"{where}: {what} {name!r} stands twice")
+            raise PinoutError(f"{where}: {what} {shown(name)} stands twice")
         seen.add(name)
 
 
@@ -439,13 +454,15 @@ def _check_roles(where: str, wires: tuple[Wire, ...], values: tuple[Value, ...])
         raise PinoutError(f"{where}: distance wires are numbered {numbers}, expected 1, 2, 3 ... in order")
     found = {value.name: (value.role, value.side) for value in values}
     if found != _NEEDED_VALUES:
-        raise PinoutError(f"{where}: values are {sorted(found)}, expected {sorted(_NEEDED_VALUES)} with their sides")
+        raise PinoutError(
+            f"{where}: values are {shown(sorted(found))}, expected {sorted(_NEEDED_VALUES)} with their sides"
+        )
     widths = {value.width for value in values if value.role is WireRole.ENCODER}
     if len(widths) != 1:
         raise PinoutError(f"{where}: the encoders have {sorted(widths)} wires, expected as many each")
     stray = [wire.name for wire in wires if wire.value is not None and wire.value not in found]
     if stray:
-        raise PinoutError(f"{where}: wire {stray[0]!r} belongs to no [[value]]")
+        raise PinoutError(f"{where}: wire {shown(stray[0])} belongs to no [[value]]")
 
 
 # Judging a revision, pin by pin.

@@ -61,3 +61,24 @@ class TransportError(P2osError):
 
 class RunFailedError(P2osError):
     """A run came to an end that its scenario does not want."""
+
+
+#: chosen: what still fits a line of a terminal beside the rest of a message.
+LONGEST_SHOWN = 60
+
+
+def shown(value: object) -> str:
+    """Return a value as a message shows it: as Python writes it, on one line, and cut where it is long."""
+    try:
+        text = repr(value)
+    except ValueError:  # a whole number of more digits than Python writes
+        return "a huge number"
+    return text if len(text) <= LONGEST_SHOWN else f"{text[: LONGEST_SHOWN - 3]}..."
+
+
+def shown_name(name: object) -> str:
+    """Return a key or the name of a file as a message shows it: as it is, but for what no line can hold."""
+    text = str(name)
+    if len(text) > 4 * LONGEST_SHOWN:
+        text = f"{text[:LONGEST_SHOWN]}...{text[-LONGEST_SHOWN:]}"
+    return text if text.isprintable() else ascii(text)[1:-1]

@@ -32,7 +32,7 @@ from robot_bench.recording.client_view import SipRanges
 from robot_bench.recording.recorder import Recorder
 from robot_bench.recording.trace import TraceWriter
 from robot_bench.scenario.fault_script import FaultScript
-from robot_bench.scenario.scenario import Scenario
+from robot_bench.scenario.scenario import Scenario, refuse_what_its_world_refuses
 from robot_bench.scenario.world_script import WorldScript
 from robot_bench.wires.chip_pins import ChipPins
 from robot_bench.wires.endpoints import Endpoint
@@ -99,6 +99,7 @@ class Bench:
         self.on_slice = on_slice
         pinout = load_pinout()
         world = load_world(scenario.world, seed=scenario.seed)
+        refuse_what_its_world_refuses(scenario, world)
         body = make_body(scenario.body, world, scenario.parameters)
         body.reset(scenario.start or world.start, scenario.seed)
         chip = chip or boot(scenario.firmware)

@@ -59,8 +59,8 @@ IO_LAYER = (
 #: The map of ARCHITECTURE.md, lowest first: a package imports none of its own row and none above it.
 LAYERS = {
     "p2os": (
-        ("timing", "errors"), ("robots", "gamepad"), ("protocol",), ("transport",), ("capture", "client", "pioneer"),
-        ("cli",), ("__main__",),
+        ("timing", "errors"), ("toml_file",), ("robots", "gamepad"), ("protocol",), ("transport",),
+        ("capture", "client", "pioneer"), ("cli",), ("__main__",),
     ),
     "bluepill_sim": (
         ("errors",), ("timing",), ("fabric",), ("peripherals",), ("stm32f103",), ("memory", "serial_port"), ("core",),

@@ -3,5 +3,5 @@
 `controller` is the robot's firmware, `devices` what is fitted to it, `body` its motion
 (three engines), `sonar` its ring, `world` the places it drives in, `serve` puts robots on
 real lines. `sensor_errors` holds every number of how the sensors err, `random_source` the
-seeded streams behind them, `toml_places` the lines of keys in the files read here.
+seeded streams behind them.
 """

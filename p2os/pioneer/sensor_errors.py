@@ -14,13 +14,13 @@ What acts where: `p2os.pioneer.sonar.errors` on the echoes, the odometer on the
 wheel angles, the devices on compass, gyro and battery.
 """
 
-import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass, fields, replace
 from difflib import get_close_matches
 from pathlib import Path
 
-from p2os.errors import FileError
+from p2os.errors import FileError, shown, shown_name
+from p2os.toml_file import TomlPlaces, is_file, read_toml, read_user_text
 
 
 class SensorErrorsError(FileError):
@@ -90,8 +90,10 @@ REALISTIC = SensorErrors(
     power=PowerErrors(battery_resistance_ohm=0.15),
 )
 SETS: Mapping[str, SensorErrors] = {"ideal": IDEAL, "realistic": REALISTIC}
-#: Key → least and most, where it is not "0 and more".
+#: Key → least and most; upper ends without another reason are chosen: what no sensor that works exceeds.
 RANGES: Mapping[str, tuple[float, float]] = {
+    "noise_m": (0, 10), "noise_part": (0, 10), "drift_deg": (0, 360), "compass_noise_deg": (0, 180),
+    "gyro_noise_counts": (0, 512), "battery_resistance_ohm": (0, 10),
     "dropout": (0, 1), "crosstalk": (0, 1), "specular_deg": (0, 90), "left_wheel": (0.5, 2), "right_wheel": (0.5, 2),
     "compass_bias_deg": (-180, 180), "gyro_bias_counts": (-512, 512),
 }  # fmt: skip
@@ -106,30 +108,33 @@ def load_sensor_errors(name_or_path: str) -> SensorErrors:
     if name_or_path in SETS:
         return SETS[name_or_path]
     path = Path(name_or_path)
-    if path.suffix != ".toml" and not path.is_file():
+    if path.suffix != ".toml" and not is_file(path):
         close = get_close_matches(name_or_path, SETS, n=1)
         hint = f"did you mean {close[0]}?" if close else f"sets: {', '.join(SETS)}, or a TOML file"
-        raise SensorErrorsError(f"no set of sensor errors {name_or_path!r}", hint=hint)
-    try:
-        table = tomllib.loads(path.read_text(encoding="utf-8"))
-    except OSError as error:
-        raise SensorErrorsError(f"cannot read {path}: {error.strerror}", hint=f"sets: {', '.join(SETS)}") from error
-    except UnicodeDecodeError as error:
-        raise SensorErrorsError(f"cannot read {path}: not a text file", hint="it is a TOML file") from error
-    except tomllib.TOMLDecodeError as error:
-        raise SensorErrorsError(f"{path.name}: {error}", hint="it is no TOML") from error
-    return parse_sensor_errors(table, path.name)
+        raise SensorErrorsError(f"no set of sensor errors {shown(name_or_path)}", hint=hint)
+    text = read_user_text(path, "a set of sensor errors", SensorErrorsError)
+    table, places = read_toml(text, shown_name(path), "a set of sensor errors", SensorErrorsError)
+    return parse_sensor_errors(table, shown_name(path), places)
 
 
-def parse_sensor_errors(table: Mapping[str, object], where: str) -> SensorErrors:
+def parse_sensor_errors(table: Mapping[str, object], where: str, places: TomlPlaces | None = None) -> SensorErrors:
     """Return the errors that a table names, from its `based_on`.
+
+    Args:
+        table: As TOML gives it.
+        where: What to call it in messages.
+        places: Its lines; None where it was never a file.
 
     Raises:
         SensorErrorsError: The table breaks the schema.
     """
+
+    def at(section: str = "", key: str = "") -> str:
+        return where if places is None else f"{where}:{places.line(section, 0, key)}"
+
     base = table.get("based_on", "ideal")
-    if base not in SETS:
-        raise SensorErrorsError(f"{where}: based_on = {base!r} is none of {', '.join(SETS)}")
+    if not isinstance(base, str) or base not in SETS:
+        raise SensorErrorsError(f"{at('', 'based_on')}: based_on = {shown(base)} is none of {', '.join(SETS)}")
     found = SETS[str(base)]
     sections = [part.name for part in fields(SensorErrors)]
     for section, values in table.items():
@@ -138,10 +143,11 @@ def parse_sensor_errors(table: Mapping[str, object], where: str) -> SensorErrors
         if section not in sections or not isinstance(values, dict):
             close = get_close_matches(section, sections, n=1)
             raise SensorErrorsError(
-                f"{where}: unknown table [{section}]", hint=f"did you mean [{close[0]}]?" if close else None
+                f"{at(section)}: unknown table [{shown_name(section)}]",
+                hint=f"did you mean [{close[0]}]?" if close else None,
             )
         part = getattr(found, section)
-        checked = {key: _value(where, section, key, value, part) for key, value in values.items()}
+        checked = {key: _value(at(section, key), section, key, value, part) for key, value in values.items()}
         found = replace(found, **{section: replace(part, **checked)})
     return found
 
@@ -151,9 +157,8 @@ def _value(where: str, section: str, key: str, value: object, part: object) -> f
     if key not in names:
         close = get_close_matches(key, names, n=1)
         hint = f"did you mean {close[0]}?" if close else f"[{section}] has {', '.join(names)}"
-        raise SensorErrorsError(f"{where}: unknown key {section}.{key}", hint=hint)
-    least, most = RANGES.get(key, (0.0, float("inf")))
+        raise SensorErrorsError(f"{where}: unknown key {shown_name(f'{section}.{key}')}", hint=hint)
+    least, most = RANGES[key]
     if isinstance(value, bool) or not isinstance(value, (int, float)) or not least <= value <= most:
-        span = f"{least:g} and more" if most == float("inf") else f"{least:g} to {most:g}"
-        raise SensorErrorsError(f"{where}: {section}.{key} = {value!r} is no number of {span}")
+        raise SensorErrorsError(f"{where}: {section}.{key} = {shown(value)} is no number of {least:g} to {most:g}")
     return float(value)

@@ -12,6 +12,7 @@ a front and rear length of 0 are half the length each, as ARIA itself reads them
 import math
 from collections.abc import Callable, Mapping
 
+from p2os.errors import shown
 from p2os.robots.model import ParametersError
 from p2os.robots.model_file import Table, merged, shipped_table
 
@@ -111,7 +112,7 @@ def _lines(source: str, text: str) -> tuple[dict[str, str], dict[int, tuple[floa
             continue
         numbers = [_number(source, "SonarUnit", word) for word in words[1:5]]
         if len(numbers) < 4:
-            raise ParametersError(f"{source}: SonarUnit needs a number, x, y and a heading: {line.strip()!r}")
+            raise ParametersError(f"{source}: SonarUnit needs a number, x, y and a heading: {shown(line.strip())}")
         sonar[int(numbers[0])] = (numbers[1], numbers[2], numbers[3])
     return values, sonar
 
@@ -145,9 +146,9 @@ def _number(source: str, key: str, word: str) -> float:
     try:
         number = float(word)
     except ValueError as error:
-        raise ParametersError(f"{source}: {key} = {word!r} is no number") from error
+        raise ParametersError(f"{source}: {key} = {shown(word)} is no number") from error
     if math.isnan(number):
-        raise ParametersError(f"{source}: {key} = {word!r} is no number")
+        raise ParametersError(f"{source}: {key} = {shown(word)} is no number")
     if number and not SMALLEST <= abs(number) <= LARGEST:
-        raise ParametersError(f"{source}: {key} = {word!r} is out of range")
+        raise ParametersError(f"{source}: {key} = {shown(word)} is out of range")
     return number

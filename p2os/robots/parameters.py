@@ -8,9 +8,11 @@ from dataclasses import dataclass
 from difflib import get_close_matches
 from pathlib import Path
 
+from p2os.errors import shown, shown_name
 from p2os.robots.aria_file import aria_table
 from p2os.robots.model import BodyParameters, Equipment, MotionDefaults, ParametersError, RobotParameters, SonarPose
-from p2os.robots.model_file import build_parameters, file_table, known_robots, shipped_table, text_of
+from p2os.robots.model_file import build_parameters, file_parameters, known_robots, shipped_table, text_of
+from p2os.toml_file import is_file
 
 __all__ = [
     "BodyParameters",
@@ -54,15 +56,15 @@ def load_parameters(name_or_path: str | Path) -> RobotParameters:
     if name.lower() in known_robots():
         return build_parameters(f"{name.lower()}.toml", shipped_table(name.lower()))
     path = Path(name)
-    if path.suffix == ".toml" and path.is_file():
-        return build_parameters(name, file_table(path))
-    if path.suffix == ".p" and path.is_file():
+    if path.suffix == ".toml" and is_file(path):
+        return file_parameters(path)
+    if path.suffix == ".p" and is_file(path):
         return build_parameters(name, aria_table(name, text_of(path), nearest_model))
     if path.suffix in {".toml", ".p"}:
-        raise ParametersError(f"no robot file {name}", hint=f"known models: {', '.join(known_robots())}")
+        raise ParametersError(f"no robot file {shown_name(name)}", hint=f"known models: {', '.join(known_robots())}")
     close = get_close_matches(name.lower(), known_robots(), n=1)
     hint = f"did you mean {close[0]}?" if close else f"known models: {', '.join(known_robots())}"
-    raise ParametersError(f"no robot model {name!r}", hint=hint)
+    raise ParametersError(f"no robot model {shown(name)}", hint=hint)
 
 
 def parameters_for(subclass: str, given: str | Path | RobotParameters | None = None) -> MatchedParameters:

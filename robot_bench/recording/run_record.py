@@ -111,8 +111,13 @@ def read_run(folder: Path) -> RunRecord:
     if not path.is_file():
         raise TraceError(f"{folder} holds no {TRACE_NAME}", hint="give the folder that `p2os run --out DIR` wrote")
     record = RunRecord()
-    for entry in _entries(path):
-        _file(record, entry)
+    for number, entry in enumerate(_entries(path), start=1):
+        try:
+            _file(record, entry)
+        except (KeyError, TypeError, ValueError, OverflowError) as error:
+            raise TraceError(
+                f"{path}:{number}: a damaged line", hint="cut the file before it: what stands above it is reported"
+            ) from error
     if not record.meta:
         raise TraceError(f"{path} does not start with a trace's meta line", hint="was it made by `p2os run`?")
     return record
@@ -126,7 +131,7 @@ def _entries(path: Path) -> Iterator[Json]:
                 return
             try:
                 entry = json.loads(line)
-            except json.JSONDecodeError:
+            except (ValueError, RecursionError):
                 return
             if not isinstance(entry, dict):
                 return
@@ -159,7 +164,15 @@ def _file(record: RunRecord, entry: Json) -> None:
         detail = str(entry.get("detail", ""))
         record.events.append(Event(t=t, who=str(entry["who"]), what=str(entry["what"]), detail=detail))
     elif kind == "obstacle":
-        record.obstacles.append(entry)
+        record.obstacles.append(_obstacle(t, entry))
+
+
+def _obstacle(t: int, entry: Json) -> Json:
+    """Return a change of the world whose numbers are numbers."""
+    sizes = ("length", "width") if entry.get("shape", "box") == "box" else ("radius",)
+    needed = {"place": ("x", "y", *sizes), "move": ("x", "y")}.get(str(entry.get("op")), ())
+    numbers = {key: float(cast("float", entry[key])) for key in (*needed, *(["heading"] if "heading" in entry else []))}
+    return {**entry, **numbers, "t": t, "name": str(entry["name"])}
 
 
 def _integer(entry: Json, key: str) -> int:

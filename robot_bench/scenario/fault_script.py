@@ -20,13 +20,13 @@ from p2os.errors import ScenarioError, UsageError
 from p2os.pioneer.controller.faults import MOMENTARY, read_fault
 from p2os.robots.parameters import RobotParameters
 from p2os.timing import NS_PER_S, Nanos
-from robot_bench.scenario.schema import Key, Table, check_table
+from robot_bench.scenario.schema import LONGEST_S, Key, Table, Where, check_table, within
 from robot_bench.scenario.timeline import Timeline
 
 _KEYS = (
-    Key(name="at_s", kind="number", required=True, least=0),
+    Key(name="at_s", kind="number", required=True, least=0, most=LONGEST_S),
     Key(name="fault", kind="text", required=True),
-    Key(name="for_s", kind="number", above=0),
+    Key(name="for_s", kind="number", above=0, most=LONGEST_S),
 )
 
 
@@ -38,15 +38,15 @@ class FaultChange:
     words: str
 
 
-def load_faults(tables: Sequence[Table], parameters: RobotParameters, where: str) -> tuple[FaultChange, ...]:
+def load_faults(tables: Sequence[Table], parameters: RobotParameters, where: Where) -> tuple[FaultChange, ...]:
     """Return what a scenario's `[[fault]]` tables ask for, in order of time.
 
     Raises:
         ScenarioError: A table breaks the schema, or names no fault.
     """
     found: list[FaultChange] = []
-    for number, table in enumerate(tables, start=1):
-        place = f"{where}: [[fault]] {number}"
+    for number, table in enumerate(tables):
+        place = within(where, "fault", number)
         check_table(table, _KEYS, place)
         words = str(table["fault"])
         try:

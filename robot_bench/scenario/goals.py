@@ -13,12 +13,12 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import cast
 
-from p2os.errors import ScenarioError
+from p2os.errors import ScenarioError, shown
 from p2os.timing import NS_PER_MS, NS_PER_S, Nanos
 from robot_bench.recording.run_record import PoseSample, RunRecord
 from robot_bench.recording.signals import motor_steps
 from robot_bench.recording.summary import cells_entered, distance_m
-from robot_bench.scenario.schema import Key, Table, check_table, nearest
+from robot_bench.scenario.schema import LONGEST_S, Key, Table, Where, check_table, nearest
 
 NS_PER_MINUTE = 60 * NS_PER_S
 #: chosen: two motor values that follow each other within this are one change (two ports are written in turn).
@@ -51,7 +51,7 @@ class _Kind:
     judge: Callable[[RunRecord, Table], str | None]
 
 
-def load_goal(table: Table, where: str) -> Goal:
+def load_goal(table: Table, where: Where) -> Goal:
     """Return the goal that a TOML table asks for.
 
     Raises:
@@ -60,10 +60,30 @@ def load_goal(table: Table, where: str) -> Goal:
     kind = table.get("kind")
     check_table({"kind": kind} if "kind" in table else {}, (Key(name="kind", kind="text", required=True),), where)
     if kind not in KINDS:
-        raise ScenarioError(f"{where}: there is no goal {kind!r}", hint=nearest(str(kind), KINDS))
+        raise ScenarioError(f"{where}: there is no goal {shown(kind)}", hint=nearest(str(kind), KINDS))
     arguments = {name: value for name, value in table.items() if name != "kind"}
-    check_table(arguments, KINDS[str(kind)].keys, f"{where} ({kind})")
+    check_table(arguments, KINDS[str(kind)].keys, f"{where} ({kind})" if isinstance(where, str) else where)
+    _check_lists(arguments, where)
     return Goal(kind=str(kind), arguments=arguments)
+
+
+def _check_lists(arguments: Table, where: Where) -> None:
+    """Check what is in the lists of a goal."""
+    pairs, texts = arguments.get("values", []), arguments.get("texts", [])
+    if not all(_is_pair(pair) for pair in cast("list[object]", pairs)):
+        raise ScenarioError(
+            f"{where}: values must be pairs of motor values, [[left, right], ...]", hint="of -128 to 127"
+        )
+    if not all(isinstance(text, str) for text in cast("list[object]", texts)):
+        raise ScenarioError(f"{where}: texts must be a list of texts in quotes")
+
+
+def _is_pair(pair: object) -> bool:
+    return (
+        isinstance(pair, list)
+        and len(pair) == 2
+        and all(isinstance(value, int) and not isinstance(value, bool) and -128 <= value <= 127 for value in pair)
+    )
 
 
 def judge(record: RunRecord, goals: tuple[Goal, ...]) -> tuple[list[str], list[str]]:
@@ -207,17 +227,20 @@ def _sensor_named(record: RunRecord, _arguments: Table) -> str | None:
 KINDS: Mapping[str, _Kind] = {
     "no_collision": _Kind((), lambda _: "touches nothing", _no_collision),
     "min_distance": _Kind(
-        (Key(name="distance_m", kind="number", above=0), Key(name="distance_m_a_minute", kind="number", above=0)),
+        (
+            Key(name="distance_m", kind="number", above=0, most=1e6),
+            Key(name="distance_m_a_minute", kind="number", above=0, most=1e6),
+        ),
         _wanted_distance,
         _min_distance,
     ),
     "cells": _Kind(
-        (Key(name="least", kind="whole", required=True, least=1),),
+        (Key(name="least", kind="whole", required=True, least=1, most=1_000_000),),
         lambda arguments: f"enters at least {arguments['least']} different cells of 0.5 m",
         _cells,
     ),
     "motor_sequence": _Kind(
-        (Key(name="values", kind="list", required=True), Key(name="held_s", kind="number", least=0)),
+        (Key(name="values", kind="list", required=True), Key(name="held_s", kind="number", least=0, most=LONGEST_S)),
         lambda arguments: f"sets the motors to {_shown(arguments['values'])}",
         _motor_sequence,
     ),
@@ -237,7 +260,7 @@ KINDS: Mapping[str, _Kind] = {
         _usart_in_order,
     ),
     "encoder_counts_match": _Kind(
-        (Key(name="steps", kind="whole", least=0),),
+        (Key(name="steps", kind="whole", least=0, most=1_000_000),),
         lambda arguments: f"counts the wheels' turns to {arguments.get('steps', 1)} step",
         _encoder_counts_match,
     ),

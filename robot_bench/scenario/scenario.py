@@ -9,7 +9,6 @@ there, and every value is in range.
 """
 
 import math
-import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from importlib.resources import as_file, files
@@ -18,19 +17,22 @@ from typing import cast
 
 from adapter_sim.codec import BitOrder
 from adapter_sim.settings import RENAMED_SETTINGS, AdapterSettings
-from p2os.errors import ScenarioError, UsageError
+from p2os.errors import FileError, ScenarioError, UsageError, shown, shown_name
 from p2os.pioneer.body.factory import BODY_NAMES
 from p2os.pioneer.controller import ControllerSettings, SonarPerSip
 from p2os.pioneer.controller.flash import load_flash
 from p2os.pioneer.sensor_errors import load_sensor_errors
-from p2os.pioneer.world import Pose, known_worlds, world_suffixes
+from p2os.pioneer.world import Pose, known_worlds, load_world, world_suffixes
+from p2os.pioneer.world.model import World
+from p2os.pioneer.world.start_places import thing_at
 from p2os.robots.parameters import RobotParameters, load_parameters
 from p2os.timing import NS_PER_MS, NS_PER_S, Nanos
+from p2os.toml_file import TomlSource, is_file, read_toml, read_user_text
 from robot_bench.direct.robot import DirectSettings
 from robot_bench.scenario.fault_script import FaultChange, load_faults
 from robot_bench.scenario.goals import Goal, load_goal
-from robot_bench.scenario.schema import Key, Table, check_table, nearest
-from robot_bench.scenario.world_script import Change, load_changes
+from robot_bench.scenario.schema import LONGEST_S, Key, Place, Table, Where, check_table, in_range, nearest, within
+from robot_bench.scenario.world_script import Change, load_changes, refuse_names
 
 MODES = ("direct", "adapter")
 #: What runs in the adapter's place: the Python model, or the firmware's C++ core.
@@ -43,10 +45,10 @@ _TOP = (
     Key(name="robot", kind="text"),
     Key(name="mode", kind="text", choices=MODES),
     Key(name="body", kind="text", choices=BODY_NAMES),
-    Key(name="seed", kind="whole", least=0),
-    Key(name="duration_s", kind="number", required=True, above=0),
-    Key(name="threshold_m", kind="number", above=0),
-    Key(name="usart_baud", kind="whole", least=1),
+    Key(name="seed", kind="whole", least=0, most=2**63 - 1),
+    Key(name="duration_s", kind="number", required=True, above=0, most=LONGEST_S),
+    Key(name="threshold_m", kind="number", above=0, most=100),
+    Key(name="usart_baud", kind="whole", least=1, most=4_500_000),
     Key(name="start", kind="table"),
     Key(name="direct", kind="table"),
     Key(name="adapter", kind="table"),
@@ -57,24 +59,24 @@ _TOP = (
     Key(name="goal", kind="tables"),
 )
 _START = (
-    Key(name="x_m", kind="number", required=True),
-    Key(name="y_m", kind="number", required=True),
-    Key(name="heading_deg", kind="number"),
+    in_range("x_m", required=True),
+    in_range("y_m", required=True),
+    in_range("heading_deg"),
 )
 _DIRECT = (
-    Key(name="step_mm_s", kind="number", above=0),
-    Key(name="ramp_mm_s2", kind="number", least=0),
-    Key(name="sensor_period_ms", kind="whole", least=1),
-    Key(name="encoder_period_ms", kind="whole", least=1),
+    Key(name="step_mm_s", kind="number", above=0, most=10_000),
+    Key(name="ramp_mm_s2", kind="number", least=0, most=1_000_000),
+    Key(name="sensor_period_ms", kind="whole", least=1, most=60_000),
+    Key(name="encoder_period_ms", kind="whole", least=1, most=60_000),
     Key(name="bit_order", kind="text", choices=tuple(BitOrder)),
 )
 _ADAPTER = (
     Key(name="core", kind="text", choices=ADAPTER_CORES),
-    Key(name="step_mm_s", kind="number", above=0),
+    Key(name="step_mm_s", kind="number", above=0, most=10_000),
     Key(name="bit_order", kind="text", choices=tuple(BitOrder)),
     Key(name="motor_meaning", kind="text", choices=("wheels", "linear_angular")),
-    Key(name="max_velocity_mm_s", kind="whole", least=0),
-    Key(name="max_rotation_deg_s", kind="whole", least=0),
+    Key(name="max_velocity_mm_s", kind="whole", least=0, most=32_767),
+    Key(name="max_rotation_deg_s", kind="whole", least=0, most=32_767),
     Key(name="encoder_at_open", kind="text", choices=("zero", "continue")),
 )
 _CONTROLLER = (
@@ -85,8 +87,8 @@ _CONTROLLER = (
 )
 #: What a scenario may set otherwise for one world.
 _IN_WORLD = (
-    Key(name="threshold_m", kind="number", above=0),
-    Key(name="duration_s", kind="number", above=0),
+    Key(name="threshold_m", kind="number", above=0, most=100),
+    Key(name="duration_s", kind="number", above=0, most=LONGEST_S),
     Key(name="start", kind="table"),
 )
 
@@ -199,14 +201,11 @@ def read_scenario(path: Path) -> Scenario:
     Raises:
         ScenarioError: The file cannot be read or breaks the schema.
     """
-    try:
-        text = path.read_text(encoding="utf-8")
-        table = tomllib.loads(text)
-    except (OSError, UnicodeDecodeError) as error:
-        raise ScenarioError(f"cannot read scenario {path}: {error}") from error
-    except tomllib.TOMLDecodeError as error:
-        raise ScenarioError(f"{path.name}: {error}", hint="it is no TOML") from error
-    return _build(table, text, path)
+    text = read_user_text(path, "a scenario", ScenarioError)
+    table, places = read_toml(text, shown_name(path.name), "a scenario", ScenarioError)
+    scenario = _build(table, text, path, Place(TomlSource(shown_name(path.name), places)))
+    refuse_what_its_world_refuses(scenario, load_world(scenario.world, seed=scenario.seed))
+    return scenario
 
 
 def resolve_world(
@@ -222,33 +221,55 @@ def resolve_world(
         return world
     if Path(world).suffix.lower() in world_suffixes():
         path = folder / world
-        if path.is_file():
+        if is_file(path):
             return str(path)
-        raise error(f"{where}: there is no world file {path}", hint=f"worlds that ship: {', '.join(known_worlds())}")
-    raise error(f"{where}: there is no world {world!r}", hint=nearest(world, known_worlds()))
+        raise error(
+            f"{where}: there is no world file {shown_name(path)}", hint=f"worlds that ship: {', '.join(known_worlds())}"
+        )
+    raise error(f"{where}: there is no world {shown(world)}", hint=nearest(world, known_worlds()))
 
 
-def _build(table: Table, text: str, path: Path) -> Scenario:
-    where = path.name
+def refuse_what_its_world_refuses(scenario: Scenario, world: World) -> None:
+    """Refuse a start inside a thing, and changes that the world's own things do not allow.
+
+    Raises:
+        ScenarioError: So it is; the message names the thing.
+    """
+    start = scenario.start or world.start
+    thing = thing_at(world, scenario.parameters, start)
+    if thing is not None:
+        raise ScenarioError(
+            f"{scenario.name}.toml: [start]: x {start.x_m:g}, y {start.y_m:g} in world {shown(world.name)} is inside"
+            f" {shown(thing)}",
+            hint="p2os world show FILE draws a world",
+        )
+    refuse_names(scenario.changes, world)
+
+
+def _build(table: Table, text: str, path: Path, where: Place) -> Scenario:
     check_table(table, _TOP, where)
     robot = str(table.get("robot", "p2dx"))
-    parameters = load_parameters(robot)
+    try:
+        parameters = load_parameters(robot)
+    except FileError as error:
+        raise ScenarioError(f"{where.at('robot')}: {error}", hint=error.hint) from error
     threshold_m = cast("float", table.get("threshold_m", parameters.sonar_range_m / 2))
     in_world = cast("Mapping[str, Table]", table.get("in_world", {}))
     for world, part in in_world.items():
-        check_table({world: part}, (Key(name=world, kind="table"),), f"{where}: [in_world]")
-        check_table(part, _IN_WORLD, f"{where}: [in_world.{world}]")
+        check_table({world: part}, (Key(name=world, kind="table"),), within(where, "in_world"))
+        check_table(part, _IN_WORLD, within(where, f"in_world.{world}"))
+        _start(part, within(where, f"in_world.{world}"))
     changes = load_changes(cast("list[Table]", table.get("obstacle", [])), parameters, where)
     goals = [
-        load_goal(goal, f"{where}: [[goal]] {number}")
-        for number, goal in enumerate(cast("list[Table]", table.get("goal", [])), start=1)
+        load_goal(goal, within(where, "goal", number))
+        for number, goal in enumerate(cast("list[Table]", table.get("goal", [])))
     ]
     scenario = Scenario(
         name=path.stem,
         description=str(table.get("description", "")),
         text=text,
-        firmware=_firmware(str(table["firmware"]), path),
-        world=resolve_world(str(table["world"]), path.parent, f"{where}: world"),
+        firmware=_firmware(str(table["firmware"]), path, where),
+        world=resolve_world(str(table["world"]), path.parent, f"{where.at('world')}: world"),
         parameters=parameters,
         robot=robot,
         mode=str(table.get("mode", "adapter")),
@@ -282,31 +303,32 @@ def _apply_in_world(scenario: Scenario, part: Table) -> Scenario:
     return scenario
 
 
-def _firmware(name: str, path: Path) -> Path:
+def _firmware(name: str, path: Path, where: Place) -> Path:
     """Return the file beside the scenario, or the shipped program of that name."""
     beside = path.parent / name
-    if beside.is_file():
+    if is_file(beside):
         return beside
     shipped = files("robot_bench.firmware").joinpath(name if name.endswith(".elf") else f"{name}.elf")
-    if shipped.is_file():
+    if is_file(Path(str(shipped))):
         return Path(str(shipped))
     raise ScenarioError(
-        f"{path.name}: firmware: there is no file {name!r} beside it, nor a program of that name that ships",
+        f"{where.at('firmware')}: firmware: there is no file {shown(name)} beside it, nor a program of that name that"
+        " ships",
         hint="the path is relative to the scenario file",
     )
 
 
-def _start(table: Table, where: str) -> Pose | None:
+def _start(table: Table, where: Where) -> Pose | None:
     if "start" not in table:
         return None
     part = cast("Table", table["start"])
-    check_table(part, _START, f"{where}: [start]")
+    check_table(part, _START, within(where, "start"))
     heading_rad = math.radians(cast("float", part.get("heading_deg", 0.0)))
     return Pose(x_m=cast("float", part["x_m"]), y_m=cast("float", part["y_m"]), heading_rad=heading_rad)
 
 
-def _direct(part: Table, where: str) -> DirectSettings:
-    check_table(part, _DIRECT, f"{where}: [direct]")
+def _direct(part: Table, where: Where) -> DirectSettings:
+    check_table(part, _DIRECT, within(where, "direct"))
     settings = DirectSettings()
     if "step_mm_s" in part:
         settings = replace(settings, step_um_per_s=round(cast("float", part["step_mm_s"]) * 1000))
@@ -322,27 +344,34 @@ def _direct(part: Table, where: str) -> DirectSettings:
     return settings
 
 
-def _adapter(part: Table, threshold_um: int, where: str) -> AdapterSettings:
+def _adapter(part: Table, threshold_um: int, where: Where) -> AdapterSettings:
     for old, new in RENAMED_SETTINGS.items():
         if old in part:
             raise ScenarioError(
-                f"{where}: [adapter]: {old} is called {new}", hint="only programs set it, as AdapterSettings"
+                f"{within(where, 'adapter')}: {old} is called {new}", hint="only programs set it, as AdapterSettings"
             )
-    check_table(part, _ADAPTER, f"{where}: [adapter]")
+    check_table(part, _ADAPTER, within(where, "adapter"))
     values = {name: value for name, value in part.items() if name not in {"step_mm_s", "core"}}
     if "step_mm_s" in part:
         values["step_um_per_s"] = round(cast("float", part["step_mm_s"]) * 1000)
     return AdapterSettings(threshold_um=threshold_um, **values)  # type: ignore[arg-type] # check_table has seen to it
 
 
-def _controller(part: Table, path: Path, where: str) -> ControllerSettings:
-    check_table(part, _CONTROLLER, f"{where}: [controller]")
+def _controller(part: Table, path: Path, where: Where) -> ControllerSettings:
+    check_table(part, _CONTROLLER, within(where, "controller"))
+    try:
+        return _settings(part, path)
+    except FileError as error:
+        raise ScenarioError(f"{within(where, 'controller')}: {error}", hint=error.hint) from error
+
+
+def _settings(part: Table, path: Path) -> ControllerSettings:
     settings = ControllerSettings()
     if "flash" in part:
         settings = settings.with_flash(load_flash(path.parent / str(part["flash"])))
     if "errors" in part:
         beside = path.parent / str(part["errors"])
-        settings = replace(settings, errors=load_sensor_errors(str(beside if beside.is_file() else part["errors"])))
+        settings = replace(settings, errors=load_sensor_errors(str(beside if is_file(beside) else part["errors"])))
     if "name" in part:
         settings = replace(settings, name=str(part["name"]))
     if "sonar_per_sip" in part:

@@ -10,7 +10,12 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
-from p2os.errors import ScenarioError
+from p2os.errors import ScenarioError, shown
+from p2os.pioneer.world.model import RANGES
+from p2os.toml_file import TomlSource
+
+#: chosen: eleven days; a larger number of seconds is a mistake of the unit.
+LONGEST_S = 1_000_000
 
 #: A parsed TOML table.
 Table = Mapping[str, object]
@@ -58,13 +63,49 @@ class Key:
     choices: tuple[str, ...] = ()
 
 
-def check_table(table: Table, keys: Sequence[Key], where: str) -> None:
+@dataclass(frozen=True, slots=True)
+class Place:
+    """Where a table stands, for messages: `dodge.toml:12: [[obstacle]] 2`."""
+
+    source: TomlSource
+    table: str = ""
+    number: int = 0
+    title: str = ""
+
+    def at(self, key: str = "") -> str:
+        """Return the place with the line of a key, or of the table's header."""
+        return self.source.at(self.table, key, self.number) + (f": {self.title}" if self.title else "")
+
+    def __str__(self) -> str:
+        """Return the place with the line of the table's header."""
+        return self.at()
+
+
+#: A place, or its words where there is no file.
+Where = str | Place
+
+
+def within(where: Where, table: str, number: int | None = None) -> Where:
+    """Return the place of a table of a file: `[table]`, or the number-th `[[table]]`, counted from 0."""
+    title = f"[{table}]" if number is None else f"[[{table}]] {number + 1}"
+    if isinstance(where, str):
+        return f"{where}: {title}"
+    return Place(where.source, table, number or 0, title)
+
+
+def in_range(name: str, *, required: bool = False) -> Key:
+    """Return the key for a number that has the same name and range in a world file."""
+    least, most = RANGES[name]
+    return Key(name=name, kind="number", required=required, least=least, most=most)
+
+
+def check_table(table: Table, keys: Sequence[Key], where: Where) -> None:
     """Check a table.
 
     Args:
         table: What was read.
         keys: What may stand in it.
-        where: File and place, for the message: `dodge.toml: [direct]`.
+        where: File and place, for the message.
 
     Raises:
         ScenarioError: A key is unknown, missing or has a value of the wrong kind or range.
@@ -72,10 +113,10 @@ def check_table(table: Table, keys: Sequence[Key], where: str) -> None:
     known = {key.name: key for key in keys}
     for name in table:
         if name not in known:
-            raise ScenarioError(f"{where}: unknown key {name!r}", hint=nearest(name, known))
+            raise ScenarioError(f"{_at(where, name)}: unknown key {shown(name)}", hint=nearest(name, known))
     for key in keys:
         if key.name in table:
-            _check_value(table[key.name], key, where)
+            _check_value(table[key.name], key, _at(where, key.name))
         elif key.required:
             raise ScenarioError(f"{where}: key {key.name!r} is missing", hint=_wanted(key))
 
@@ -95,7 +136,7 @@ def _check_value(value: object, key: Key, where: str) -> None:
     if isinstance(value, (int, float)) and not isinstance(value, bool):
         low = (key.least is not None and value < key.least) or (key.above is not None and value <= key.above)
         if low or (key.most is not None and value > key.most) or value != value:  # noqa: PLR0124 - not a number
-            raise ScenarioError(f"{where}: {key.name} = {value} is out of range", hint=f"it is {_wanted(key)}")
+            raise ScenarioError(f"{where}: {key.name} = {_shown(value)} is out of range", hint=f"it is {_wanted(key)}")
 
 
 def _fits(value: object, key: Key) -> bool:
@@ -129,4 +170,9 @@ def _hint(value: object, key: Key) -> str | None:
 
 
 def _shown(value: object) -> str:
-    return f'"{value}"' if isinstance(value, str) else str(value)
+    text = shown(value)
+    return f'"{text[1:-1]}"' if isinstance(value, str) and text[-1] == "'" else text
+
+
+def _at(where: Where, key: str) -> str:
+    return where if isinstance(where, str) else where.at(key)

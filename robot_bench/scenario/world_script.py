@@ -23,16 +23,16 @@ nothing that happened up to t.
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from enum import Enum
 from typing import cast
 
-from p2os.errors import ScenarioError, WorldError
+from p2os.errors import ScenarioError, WorldError, shown
 from p2os.pioneer.body.contract import RobotBody
-from p2os.pioneer.world.model import Obstacle, Repeat, Walk
+from p2os.pioneer.world.model import RANGES, Obstacle, Repeat, Walk, World
 from p2os.robots.parameters import RobotParameters
 from p2os.timing import NS_PER_MS, NS_PER_S, Nanos
-from robot_bench.scenario.schema import Key, Table, check_table
+from robot_bench.scenario.schema import LONGEST_S, Key, Table, Where, check_table, in_range, nearest, within
 from robot_bench.scenario.timeline import Timeline
 
 #: chosen: the robot moves 10 mm at most in between.
@@ -68,31 +68,35 @@ class Change:
     y_m: float = 0.0
     heading_rad: float = 0.0
     before: BeforeSonar | None = None
+    #: File and line of its table, for messages.
+    where: str = field(default="", compare=False)
 
 
 #: Called with each change: (operation, name, ns, fields of its line in the trace).
 ChangeListener = Callable[[str, str, Nanos, Mapping[str, object]], None]
 
 
+#: chosen: an hour is 72 000 placings.
+LONGEST_HOLD_S = 3600
 _KEYS = (
-    Key(name="at_s", kind="number", required=True, least=0),
+    Key(name="at_s", kind="number", required=True, least=0, most=LONGEST_S),
     Key(name="op", kind="text", choices=tuple(op.value for op in Op)),
     Key(name="name", kind="text", required=True),
     Key(name="shape", kind="text", choices=("box", "cylinder")),
-    Key(name="x_m", kind="number"),
-    Key(name="y_m", kind="number"),
-    Key(name="heading_deg", kind="number"),
-    Key(name="length_m", kind="number", above=0),
-    Key(name="width_m", kind="number", above=0),
-    Key(name="height_m", kind="number", above=0),
-    Key(name="radius_m", kind="number", above=0),
-    Key(name="before_sonar", kind="whole", least=1),
-    Key(name="distance_m", kind="number", above=0),
-    Key(name="hold_s", kind="number", above=0),
-    Key(name="mass_kg", kind="number", least=0),
-    Key(name="friction", kind="number", least=0),
+    in_range("x_m"),
+    in_range("y_m"),
+    in_range("heading_deg"),
+    in_range("length_m"),
+    in_range("width_m"),
+    in_range("height_m"),
+    in_range("radius_m"),
+    Key(name="before_sonar", kind="whole", least=1, most=256),
+    Key(name="distance_m", kind="number", above=0, most=100),
+    Key(name="hold_s", kind="number", above=0, most=LONGEST_HOLD_S),
+    in_range("mass_kg"),
+    in_range("friction"),
     Key(name="path_m", kind="list"),
-    Key(name="speed_mps", kind="number", above=0),
+    in_range("speed_mps"),
     Key(name="repeat", kind="text", choices=tuple(member.value for member in Repeat)),
 )
 #: Of a thing that is pushed, and of one that walks; the same as in a world file.
@@ -100,19 +104,19 @@ DEFAULT_FRICTION, DEFAULT_SPEED_MPS = 0.5, 0.5
 _SIZES = {"box": ("length_m", "width_m", "height_m"), "cylinder": ("radius_m", "height_m")}
 
 
-def load_changes(tables: list[Table], parameters: RobotParameters, where: str) -> tuple[Change, ...]:
+def load_changes(tables: list[Table], parameters: RobotParameters, where: Where) -> tuple[Change, ...]:
     """Return the changes that a scenario's `[[obstacle]]` tables ask for, in order of time.
 
     Raises:
         ScenarioError: A table breaks the schema, or asks for what cannot be.
     """
     changes: list[Change] = []
-    for number, table in enumerate(tables, start=1):
-        place = f"{where}: [[obstacle]] {number}"
+    for number, table in enumerate(tables):
+        place = within(where, "obstacle", number)
         check_table(table, _KEYS, place)
-        changes += _changes(table, parameters, place)
+        changes += _changes(table, parameters, str(place))
     changes.sort(key=lambda change: change.at)
-    _check_names(changes, where)
+    _check_names(changes)
     return tuple(changes)
 
 
@@ -178,7 +182,7 @@ def _changes(table: Table, parameters: RobotParameters, where: str) -> list[Chan
     name = str(table["name"])
     before = _before(table, parameters, where)
     if op is Op.REMOVE:
-        return [Change(at=at, op=op, name=name)]
+        return [Change(at=at, op=op, name=name, where=where)]
     if before is None and "path_m" not in table:
         _need(table, ("x_m", "y_m"), where)
     x_m, y_m = _number(table, "x_m"), _number(table, "y_m")
@@ -192,6 +196,7 @@ def _changes(table: Table, parameters: RobotParameters, where: str) -> list[Chan
         heading_rad=heading_rad,
         obstacle=_obstacle(table, where) if op is Op.PLACE else None,
         before=before,
+        where=where,
     )
     if "hold_s" not in table:
         return [first]
@@ -199,9 +204,10 @@ def _changes(table: Table, parameters: RobotParameters, where: str) -> list[Chan
         raise ScenarioError(f"{where}: hold_s without before_sonar", hint="only a thing placed before a sonar is held")
     end = at + _nanos(table, "hold_s")
     moves = [
-        Change(at=moment, op=Op.MOVE, name=name, before=before) for moment in range(at + FOLLOW_NS, end, FOLLOW_NS)
+        Change(at=moment, op=Op.MOVE, name=name, before=before, where=where)
+        for moment in range(at + FOLLOW_NS, end, FOLLOW_NS)
     ]
-    return [first, *moves, Change(at=end, op=Op.REMOVE, name=name)]
+    return [first, *moves, Change(at=end, op=Op.REMOVE, name=name, where=where)]
 
 
 def _before(table: Table, parameters: RobotParameters, where: str) -> BeforeSonar | None:
@@ -243,7 +249,12 @@ def _walk(table: Table, where: str) -> Walk | None:
     if "path_m" not in table:
         return None
     rows = cast("list[object]", table["path_m"])
-    points = [row for row in rows if isinstance(row, list) and len(row) == 2 and all(_is_number(v) for v in row)]
+    least, most = RANGES["path_m"]
+    points = [
+        row
+        for row in rows
+        if isinstance(row, list) and len(row) == 2 and all(_is_number(v) and least <= v <= most for v in row)
+    ]
     if len(points) < len(rows) or "before_sonar" in table or str(table.get("op", "place")) != Op.PLACE.value:
         raise ScenarioError(f"{where}: path_m must be a list of [x, y], for a thing that is placed in the world")
     return Walk(
@@ -257,12 +268,37 @@ def _is_number(value: object) -> bool:
     return isinstance(value, (int, float)) and not isinstance(value, bool)
 
 
-def _check_names(changes: list[Change], where: str) -> None:
+def refuse_names(changes: Sequence[Change], world: World) -> None:
+    """Refuse to place what the world has, and to move or take out what it has not or what is fixed.
+
+    Raises:
+        ScenarioError: So it is; the message names file, line and thing.
+    """
+    there = {item.name: item.fixed for item in world.obstacles} | {mesh.name: True for mesh in world.meshes}
+    for change in changes:
+        what = f"{change.where}: {shown(change.name)} at {_at(change)}"
+        if change.op is Op.PLACE and change.name in there:
+            raise ScenarioError(f"{what}: world {shown(world.name)} has a thing of that name", hint="choose another")
+        if change.op is not Op.PLACE and change.name not in there:
+            raise ScenarioError(
+                f"{what}: there is none of that name to {change.op.value} then", hint=nearest(change.name, list(there))
+            )
+        if change.op is not Op.PLACE and there[change.name]:
+            raise ScenarioError(
+                f"{what}: it is part of the building", hint="only what is not `fixed` and no mesh can change"
+            )
+        if change.op is Op.REMOVE:
+            del there[change.name]
+        else:
+            there[change.name] = False
+
+
+def _check_names(changes: list[Change]) -> None:
     """Refuse a thing that is placed twice, or moved while it is not there."""
     placed: set[str] = set()
     for change in changes:
         if change.op is Op.PLACE and change.name in placed:
-            raise ScenarioError(f"{where}: {change.name!r} is placed at {_at(change)} while it is there")
+            raise ScenarioError(f"{change.where}: {shown(change.name)} is placed at {_at(change)} while it is there")
         if change.op is Op.PLACE:
             placed.add(change.name)
         elif change.op is Op.REMOVE:

@@ -48,6 +48,8 @@ _LINKS: dict[int, tuple[int, int | None]] = {
     113: (16, 14),  # LINUX_SLL
     276: (20, 0),  # LINUX_SLL2
 }
+#: chosen: a year; a longer time is a damaged one.
+LONGEST_NS: Nanos = 366 * 86_400 * NS_PER_S
 #: chosen: more segments than this out of order, and the missing one was never captured.
 MOST_WAITING = 64
 
@@ -101,6 +103,8 @@ def read_pcap(data: bytes) -> Capture:
         for item in records:
             start = item.at_ns if start is None else start
             at_ns = max(0, item.at_ns - start)
+            if at_ns > LONGEST_NS:
+                raise FileError(f"a record {at_ns / NS_PER_S:.3g} s after the first: its time is damaged")
             if item.link == LINKTYPE_USER0:
                 if item.data[:1] not in (b"\0", b"\1"):
                     raise FileError("a record of link type USER0 that is not ours: its first byte gives no direction")

@@ -12,16 +12,16 @@ Values that no source gives for a Pioneer 2-DX are marked as chosen.
 Source: Pioneer 2/3 H8 manual and Pioneer 3 manual, CONFIGpac tables.
 """
 
-import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from difflib import get_close_matches
 from pathlib import Path
 
-from p2os.errors import FileError, LocalProtocolError
+from p2os.errors import FileError, LocalProtocolError, shown, shown_name
 from p2os.protocol.config_packet import ARCOS_FIELDS, AROS_1_8_FIELDS, FIELDS, P2OS_FIELDS, ConfigPacket
 from p2os.protocol.profiles import Profile
 from p2os.robots.parameters import RobotParameters
+from p2os.toml_file import read_toml, read_user_text
 
 #: HOSTBAUD and its like: code → bit/s.
 BAUD_RATES = (9600, 19200, 38400, 57600, 115200)
@@ -133,9 +133,9 @@ class Flash:
             if name not in names:
                 close = get_close_matches(name, names, n=1)
                 hint = f"did you mean {close[0]}?" if close else "the CONFIGpac's names, in docs/pioneer.md"
-                raise FlashError(f"FLASH has no parameter {name!r}", hint=hint)
+                raise FlashError(f"FLASH has no parameter {shown(name)}", hint=hint)
             if isinstance(value, bool) or not isinstance(value, (int, str)):
-                raise FlashError(f"FLASH: {name} = {value!r} is neither a whole number nor a text")
+                raise FlashError(f"FLASH: {name} = {shown(value)} is neither a whole number nor a text")
             _check(name, value)
         return replace(self, values={**self.values, **values})
 
@@ -146,30 +146,28 @@ def load_flash(path: Path) -> Flash:
     Raises:
         FlashError: The file cannot be read, or breaks the schema.
     """
-    try:
-        table = tomllib.loads(path.read_text(encoding="utf-8"))
-    except OSError as error:
-        raise FlashError(
-            f"cannot read FLASH file {path}: {error.strerror}", hint="docs/pioneer.md shows one"
-        ) from error
-    except UnicodeDecodeError as error:
-        raise FlashError(f"cannot read FLASH file {path}: not a text file", hint="it is a TOML file") from error
-    except tomllib.TOMLDecodeError as error:
-        raise FlashError(f"{path.name}: {error}", hint="it is no TOML") from error
+    source = shown_name(path)
+    table, places = read_toml(read_user_text(path, "a FLASH", FlashError), source, "a FLASH", FlashError)
     values = table.get("flash")
     if not isinstance(values, dict) or len(table) > 1:
-        raise FlashError(f"{path.name}: one table [flash] is wanted, and nothing else")
-    try:
-        return Flash().with_values(values)
-    except FlashError as error:
-        raise FlashError(f"{path.name}: {error}", hint=error.hint) from error
+        strange = next((key for key in table if key != "flash"), "flash")
+        line = places.line(strange)
+        raise FlashError(f"{source}:{line}: one table [flash] is wanted, and nothing else")
+    flash = Flash()
+    for name, value in values.items():
+        try:
+            flash = flash.with_values({name: value})
+        except FlashError as error:
+            line = places.line("flash", 0, name)
+            raise FlashError(f"{source}:{line}: {error}", hint=error.hint) from error
+    return flash
 
 
 def _check(name: str, value: int | str) -> None:
     try:
         ConfigPacket(**{name: value}, fields_sent=ARCOS_FIELDS).to_frame()  # type: ignore[arg-type]  # that is the test
     except (LocalProtocolError, AttributeError, TypeError) as error:
-        raise FlashError(f"FLASH: {name} = {value!r} does not fit its field") from error
+        raise FlashError(f"FLASH: {name} = {shown(value)} does not fit its field") from error
     bauds = {"hostbaud", "auxbaud", "aux2baud", "aux3baud"}
     if name in bauds and not 0 <= int(value) < len(BAUD_RATES):
         raise FlashError(f"FLASH: {name} = {value}, a baud code is 0 to {len(BAUD_RATES) - 1}")

@@ -22,15 +22,20 @@ from difflib import get_close_matches
 from pathlib import Path
 from typing import cast
 
-from p2os.errors import FileError, P2osError
+from p2os.errors import FileError, P2osError, shown, shown_name
+from p2os.pioneer.body.factory import BODY_NAMES
+from p2os.pioneer.controller.faults import read_fault
 from p2os.pioneer.controller.flash import BAUD_RATES, load_flash
 from p2os.pioneer.controller.settings import ControllerSettings, SonarPerSip
 from p2os.pioneer.sensor_errors import load_sensor_errors
-from p2os.pioneer.serve.fleet_order import DEFAULT_PORT, FleetOrder, RobotOrder, following_ports, read_aux
-from p2os.pioneer.toml_places import TomlPlaces, read_toml
+from p2os.pioneer.serve.fleet_order import DEFAULT_PORT, MOST_ROBOTS, FleetOrder, RobotOrder, following_ports, read_aux
+from p2os.pioneer.world import known_worlds
+from p2os.pioneer.world.model import RANGES as WORLD_RANGES
 from p2os.pioneer.world.model import Pose
 from p2os.protocol.profiles import Profile
+from p2os.robots.parameters import load_parameters
 from p2os.timing import NS_PER_S, Nanos
+from p2os.toml_file import TomlPlaces, is_file, read_toml, read_user_text
 
 
 class FleetError(FileError):
@@ -59,6 +64,12 @@ KINDS: Mapping[str, tuple[tuple[type, ...], str]] = {
     "faults": ((list,), "a list of texts"),
     "sync_limit_s": ((int, float), "a number of seconds, more than 0 and less than 1e9"),
 }
+#: Key → least and most; upper ends are chosen.
+RANGES: Mapping[str, tuple[float, float]] = {
+    "count": (1, MOST_ROBOTS), "seed": (0, 2**63 - 1), "baud": (1, 1_000_000), "sync_limit_s": (1e-3, 1e9),
+}  # fmt: skip
+#: A place: metres, metres, degrees.
+PLACE_RANGES = (WORLD_RANGES["x_m"], WORLD_RANGES["y_m"], WORLD_RANGES["heading_deg"])
 TOP_KEYS = ("world", "body", "seed", "apart", "robot")
 ROBOT_KEYS = tuple(key for key in KINDS if key not in TOP_KEYS)
 #: Keys whose value may be a file.
@@ -87,7 +98,10 @@ class _Section:
         value, (kinds, meaning) = self.row[key], KINDS[key]
         if not isinstance(value, kinds) or (isinstance(value, bool) and bool not in kinds):
             raise self.error(key, f"{key} must be {meaning}")
-        if key in FILES and (self.folder / str(value)).is_file():
+        if key in RANGES and not RANGES[key][0] <= cast("float", value) <= RANGES[key][1]:
+            least, most = RANGES[key]
+            raise self.error(key, f"{key} = {shown(value)} must be {least:g} to {most:g}")
+        if key in FILES and is_file(self.folder / str(value)):
             return str(self.folder / str(value))
         return value
 
@@ -104,7 +118,7 @@ class _Section:
             if key not in known:
                 close = get_close_matches(key, known, n=1)
                 hint = f"did you mean {close[0]}?" if close else f"known keys: {', '.join(known)}"
-                raise self.error(key, f"unknown key {key}", hint)
+                raise self.error(key, f"unknown key {shown_name(key)}", hint)
 
 
 def load_fleet(path: Path) -> FleetOrder:
@@ -113,15 +127,7 @@ def load_fleet(path: Path) -> FleetOrder:
     Raises:
         FleetError: The file cannot be read, or breaks the schema.
     """
-    try:
-        text = path.read_text(encoding="utf-8")
-    except OSError as error:
-        raise FleetError(
-            f"cannot read {path}: {error.strerror}", hint="docs/pioneer.md shows a fleet's file"
-        ) from error
-    except UnicodeDecodeError as error:
-        raise FleetError(f"{path}: not a text file", hint="a fleet is a TOML file") from error
-    return parse_fleet(text, str(path), path.parent)
+    return parse_fleet(read_user_text(path, "a fleet", FleetError), shown_name(path), path.parent)
 
 
 def parse_fleet(text: str, source: str, folder: Path) -> FleetOrder:
@@ -147,6 +153,10 @@ def parse_fleet(text: str, source: str, folder: Path) -> FleetOrder:
         section.check_keys(ROBOT_KEYS)
         robots += _robots(section, robots)
     world, body = str(top.get("world", "room")), str(top.get("body", "bullet"))
+    if world not in known_worlds() and not is_file(Path(world)):
+        raise top.error("world", f"no world {shown(world)}", f"shipped worlds: {', '.join(known_worlds())}, or a file")
+    if body not in BODY_NAMES:
+        raise top.error("body", f"no body {shown(body)}", f"bodies: {', '.join(BODY_NAMES)}")
     seed, apart = cast("int", top.get("seed", 0)), bool(top.get("apart", False))
     try:
         return FleetOrder(robots=tuple(robots), world=world, body=body, seed=seed, apart=apart)
@@ -157,8 +167,6 @@ def parse_fleet(text: str, source: str, folder: Path) -> FleetOrder:
 def _robots(section: _Section, before: list[RobotOrder]) -> list[RobotOrder]:
     """Return the robots of one table; those without a port follow the one before."""
     count = cast("int", section.get("count", 1))
-    if count < 1:
-        raise section.error("count", f"count = {count} must be 1 or more")
     if count > 1 and ("at" in section.row or "aux" in section.row):
         raise section.error("count", "several robots cannot have one place or one AUX port", "a table [[robot]] each")
     key = "port"
@@ -169,6 +177,11 @@ def _robots(section: _Section, before: list[RobotOrder]) -> list[RobotOrder]:
             ports = following_ports([before[-1].port], count + 1)[1:]
         else:
             ports = following_ports([DEFAULT_PORT], count)
+        key = "model"
+        sonar = load_parameters(str(section.get("model", "p2dx"))).sonar_fitted
+        key = "faults"
+        for words in section.texts("faults"):
+            read_fault(words, sonar=sonar)
         key = "aux"
         aux = tuple(read_aux(text) for text in section.texts("aux"))
         first = RobotOrder(
@@ -178,7 +191,7 @@ def _robots(section: _Section, before: list[RobotOrder]) -> list[RobotOrder]:
     except FleetError:
         raise
     except P2osError as error:
-        raise section.error(key, str(error), error.hint) from error
+        raise section.error(key, shown_name(error), error.hint) from error
     return [replace(first, port=port) for port in ports]
 
 
@@ -197,7 +210,10 @@ def _place(section: _Section) -> Pose | None:
         return None
     numbers = cast("list[object]", values)
     sound = all(isinstance(value, (int, float)) and not isinstance(value, bool) for value in numbers)
-    if len(numbers) not in {2, 3} or not sound or not all(math.isfinite(cast("float", value)) for value in numbers):
+    within = sound and all(
+        least <= cast("float", value) <= most for value, (least, most) in zip(numbers, PLACE_RANGES, strict=False)
+    )
+    if len(numbers) not in {2, 3} or not within:
         raise section.error("at", f"at must be {KINDS['at'][1]}")
     x, y, heading = (*(float(cast("float", value)) for value in numbers), 0.0)[:3]
     return Pose(x, y, math.radians(heading))
@@ -206,7 +222,9 @@ def _place(section: _Section) -> Pose | None:
 def _settings(section: _Section) -> ControllerSettings:
     profile, key = str(section.get("firmware", "P2OS")), "errors"
     if profile not in {member.value for member in Profile}:
-        raise section.error("firmware", f"no firmware {profile!r}", f"one of {', '.join(p.value for p in Profile)}")
+        raise section.error(
+            "firmware", f"no firmware {shown(profile)}", f"one of {', '.join(p.value for p in Profile)}"
+        )
     baud = section.get("baud", None)
     if baud is not None and baud not in BAUD_RATES:
         rates = ", ".join(str(rate) for rate in BAUD_RATES)

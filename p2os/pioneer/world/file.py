@@ -11,10 +11,10 @@ from difflib import get_close_matches
 from pathlib import Path
 from typing import Any
 
-from p2os.errors import WorldError
-from p2os.pioneer.toml_places import TomlPlaces, read_toml
+from p2os.errors import WorldError, shown, shown_name
 from p2os.pioneer.world.makers.arena import arena
-from p2os.pioneer.world.model import Kind, Mark, Mesh, Obstacle, Pose, Repeat, Walk, World
+from p2os.pioneer.world.model import LONGEST_NAME, RANGES, Kind, Mark, Mesh, Obstacle, Pose, Repeat, Walk, World
+from p2os.toml_file import TomlPlaces, read_toml
 
 Table = dict[str, Any]
 TOP_KEYS = (
@@ -52,6 +52,8 @@ MESH_KEYS: Mapping[str, object] = {"name": None, "vertices_m": None, "triangles"
 IMPORT_KEYS: Mapping[str, object] = {
     "file": None, "x_m": 0.0, "y_m": 0.0, "z_m": 0.0, "heading_deg": 0.0, "scale": 1.0, "up": "auto",
 }  # fmt: skip
+#: End of a key → its unit.
+UNITS = {"_deg": "degrees", "_m": "metres", "_kg": "kilograms", "_mps": "metres a second", "_s": "seconds"}
 _TEXTS = frozenset({"name", "kind", "file", "up", "repeat"})
 #: Keys whose value is a list of lists of so many numbers.
 _LISTS = {"path_m": 2, "points_m": 2, "vertices_m": 3, "triangles": 3}
@@ -234,7 +236,7 @@ def _walk(v: Table) -> Walk | None:
         return None
     if v["repeat"] not in {member.value for member in Repeat}:
         raise WorldError(
-            f"repeat {v['repeat']!r} is unknown", hint=f"one of {', '.join(member.value for member in Repeat)}"
+            f"repeat {shown(v['repeat'])} is unknown", hint=f"one of {', '.join(member.value for member in Repeat)}"
         )
     return Walk(points_m=v["path_m"], speed_mps=v["speed_mps"], start_s=v["start_s"], repeat=Repeat(v["repeat"]))
 
@@ -281,7 +283,7 @@ def _kind(text: str) -> Kind:
     try:
         return Kind(text)
     except ValueError:
-        raise WorldError(f"kind {text!r} is unknown", hint=f"one of {', '.join(k.value for k in Kind)}") from None
+        raise WorldError(f"kind {shown(text)} is unknown", hint=f"one of {', '.join(k.value for k in Kind)}") from None
 
 
 def _start(section: Section) -> Pose:
@@ -296,12 +298,16 @@ def _only(section: Section, keys: tuple[str, ...]) -> None:
             close = get_close_matches(key, keys, n=1)
             known = f"known keys: {', '.join(keys)}" if keys else f"[{section.name}] has no keys"
             hint = f"did you mean {section.label(close[0])}?" if close else known
-            raise WorldError(f"{section.at(key)}: unknown key {section.label(key)}", hint=hint)
+            raise WorldError(f"{section.at(key)}: unknown key {shown_name(section.label(key))}", hint=hint)
 
 
 def _text(section: Section, key: str, value: object) -> str:
     if not isinstance(value, str):
         raise WorldError(f"{section.at(key)}: {section.label(key)} must be a text")
+    if key == "name" and section.name and (not value.isprintable() or len(value) > LONGEST_NAME):
+        raise WorldError(
+            f"{section.at(key)}: {section.label(key)} = {shown(value)} is no line of at most {LONGEST_NAME} characters"
+        )
     return value
 
 
@@ -312,26 +318,20 @@ def _truth(section: Section, key: str, value: object) -> bool:
 
 
 def _number(section: Section, key: str, value: object) -> float:
-    if isinstance(value, bool) or not isinstance(value, (int, float)) or not _is_sane(value):
-        unit = "degrees" if key.endswith("_deg") else "metres"
+    at, label = section.at(key), section.label(key)
+    if isinstance(value, bool) or not isinstance(value, (int, float)) or value != value:  # noqa: PLR0124 - not a number
+        unit = next((unit for end, unit in UNITS.items() if key.endswith(end)), "")
         raise WorldError(
-            f"{section.at(key)}: {section.label(key)} = {_short(value)} must be a number",
-            hint=f"in {unit}, without a unit",
+            f"{at}: {label} = {shown(value)} must be a number", hint=f"in {unit}, without a unit" if unit else None
         )
-    return float(value)
-
-
-def _is_sane(value: float) -> bool:
-    """Tell a usable number from infinity, no number, and whole numbers that no float holds."""
-    try:
-        return math.isfinite(value)
-    except OverflowError:
-        return False
-
-
-def _short(value: object) -> str:
-    text = repr(value)
-    return text if len(text) <= 40 else f"{text[:37]}..."
+    least, most = RANGES[key]
+    if not least <= value <= most:
+        raise WorldError(f"{at}: {label} = {shown(value)} is out of range: {least:g} to {most:g}")
+    if key == "triangles" and not isinstance(value, int):
+        raise WorldError(
+            f"{at}: {label} = {shown(value)} must be a whole number", hint="the number of a vertex, from 0"
+        )
+    return value if key == "triangles" else float(value)
 
 
 def _numbers(section: Section, key: str, value: object, count: int) -> tuple[float, ...]:

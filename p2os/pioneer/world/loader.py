@@ -8,10 +8,11 @@ from difflib import get_close_matches
 from importlib.resources import files
 from pathlib import Path
 
-from p2os.errors import WorldError
+from p2os.errors import WorldError, shown
 from p2os.pioneer.world.file import parse_world
 from p2os.pioneer.world.model import World
 from p2os.pioneer.world.text_file import read_text
+from p2os.toml_file import is_file
 
 
 def known_worlds() -> tuple[str, ...]:
@@ -43,16 +44,23 @@ def load_world(name_or_path: str | Path, seed: int = 0) -> World:
         text = files("p2os.pioneer.world.worlds").joinpath(f"{name}.toml").read_text(encoding="utf-8")
         return parse_world(text, f"{name}.toml", seed)
     path = Path(name)
-    if not path.is_file():
+    if not is_file(path):
         if path.suffix.lower() in world_suffixes():
-            raise WorldError(f"no world {name!r}: there is no such file", hint="p2os world list names what ships")
-        if path.is_dir():
-            raise WorldError(f"no world {name!r}: that is a folder", hint="name a file in it")
+            raise WorldError(f"no world {shown(name)}: there is no such file", hint="p2os world list names what ships")
+        if _is_folder(path):
+            raise WorldError(f"no world {shown(name)}: that is a folder", hint="name a file in it")
         close = get_close_matches(name, known_worlds(), n=1)
         hint = f"did you mean {close[0]}?" if close else f"shipped worlds: {', '.join(known_worlds())}"
-        raise WorldError(f"no world {name!r}", hint=hint)
+        raise WorldError(f"no world {shown(name)}", hint=hint)
     if path.suffix.lower() != ".toml":
         from p2os.pioneer.world.formats import read_world
 
         return read_world(path)
     return parse_world(read_text(path), name, seed, path.parent)
+
+
+def _is_folder(path: Path) -> bool:
+    try:
+        return path.is_dir()
+    except (OSError, ValueError):  # no name that a folder can have
+        return False

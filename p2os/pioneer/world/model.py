@@ -17,12 +17,12 @@ Invariant: an invalid world cannot exist; every constructor refuses by a `WorldE
 
 import math
 from bisect import bisect_right
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from enum import Enum
 from itertools import accumulate, pairwise
 
-from p2os.errors import WorldError
+from p2os.errors import WorldError, shown
 
 Point = tuple[float, float]
 Segment = tuple[Point, Point]
@@ -30,6 +30,28 @@ Polygon = tuple[Point, ...]
 Vertex = tuple[float, float, float]
 Triangle = tuple[int, int, int]
 
+#: chosen: farther out is no building, m; and what is thinner is nothing.
+FARTHEST_M, LEAST_M = 10_000.0, 1e-6
+#: Measured: PyBullet flings away what is pushed and thinner, and lets a robot through what is heavier (100 t hold,
+#: 200 t do not); what is lighter weighs nothing to MuJoCo.
+LEAST_PUSHED_M, LEAST_PUSHED_KG, MOST_PUSHED_KG = 0.01, 1e-3, 10_000.0
+#: chosen: a longer name fits no line of a picture or a message.
+LONGEST_NAME = 200
+_PLACE = (-FARTHEST_M, FARTHEST_M)
+_SIZE = (LEAST_M, 2 * FARTHEST_M)
+#: Key of a world file, and of the constructors below → least and most.
+RANGES: Mapping[str, tuple[float, float]] = {
+    "x_m": _PLACE, "y_m": _PLACE, "z_m": _PLACE, "base_m": _PLACE, "floor_m": _PLACE, "extent_m": _PLACE,
+    "from_m": _PLACE, "to_m": _PLACE, "path_m": _PLACE, "points_m": _PLACE, "vertices_m": _PLACE,
+    "length_m": _SIZE, "width_m": _SIZE, "radius_m": (LEAST_M, FARTHEST_M), "height_m": _SIZE, "thickness_m": _SIZE,
+    "top_m": _SIZE, "rise_m": (0.0, FARTHEST_M),
+    # A hundred turns: more is no heading, and keeps no fraction.
+    "heading_deg": (-36_000.0, 36_000.0),
+    # 0 stands fast.
+    "mass_kg": (0.0, MOST_PUSHED_KG), "friction": (0.0, 10.0),
+    "speed_mps": (1e-3, 100.0), "start_s": (0.0, 1e6), "scale": (1e-6, 1e6),
+    "triangles": (0, 1_000_000),
+}  # fmt: skip
 #: Where a mesh is cut for a picture: at the height of the Pioneer's sonar ring; and how thick its walls are drawn, m.
 CUT_M, CUT_THICK_M = 0.2, 0.02
 MARK_KINDS = ("goal", "dock", "home", "forbidden")
@@ -102,11 +124,14 @@ class Walk:
     def __post_init__(self) -> None:
         if len(self.points_m) < 2 or not all(math.isfinite(value) for point in self.points_m for value in point):
             raise WorldError("a path needs two points or more")
-        if any(first == second for first, second in pairwise(self.points_m)):
+        if any(math.dist(first, second) < LEAST_M for first, second in pairwise(self.points_m)):
             raise WorldError("a path must not name the same point twice in a row")
-        if not 0 < self.speed_mps < math.inf or not 0 <= self.start_s < math.inf:
+        _refuse_outside("a path", "path_m", *(value for point in self.points_m for value in point))
+        if not self.speed_mps > 0 or not self.start_s >= 0:
             raise WorldError("a path needs a speed above 0 and a start of 0 s or later")
-        if self.repeat is Repeat.LOOP and self.points_m[0] == self.points_m[-1]:
+        _refuse_outside("a path", "speed_mps", self.speed_mps)
+        _refuse_outside("a path", "start_s", self.start_s)
+        if self.repeat is Repeat.LOOP and math.dist(self.points_m[0], self.points_m[-1]) < LEAST_M:
             raise WorldError("a path that loops must not name its first point again at its end")
 
     def pose_at(self, seconds: float) -> tuple[float, float, float]:
@@ -194,11 +219,27 @@ class Obstacle:
             raise WorldError(f"obstacle {self.name!r}: needs a length and a width, or a radius, and a height above 0")
         if not all(math.isfinite(value) for value in (self.x_m, self.y_m, self.heading_rad, self.base_m)):
             raise WorldError(f"obstacle {self.name!r}: its place must be finite")
-        if not 0 <= self.mass_kg < math.inf or not 0 <= self.friction < math.inf:
+        if not self.mass_kg >= 0 or not self.friction >= 0:
             raise WorldError(f"obstacle {self.name!r}: mass and friction must be 0 or more")
+        self._refuse_what_no_body_bears()
         if sum((self.fixed, self.mass_kg > 0, self.walk is not None, self.kind.is_driven_on)) > 1:
             raise WorldError(
                 f"obstacle {self.name!r}: it can be only one of fixed, pushed (mass_kg), walking (path_m) or a floor"
+            )
+
+    def _refuse_what_no_body_bears(self) -> None:
+        if not self.name.isprintable() or len(self.name) > LONGEST_NAME:
+            raise WorldError(f"obstacle {shown(self.name)}: its name is no line of at most {LONGEST_NAME} characters")
+        what = f"obstacle {shown(self.name)}"
+        for key in ("x_m", "y_m", "base_m", "floor_m", "mass_kg", "friction"):
+            _refuse_outside(what, key, getattr(self, key))
+        sizes = (self.radius_m,) if self.radius_m else (self.length_m, self.width_m)
+        _refuse_outside(what, "radius_m" if self.radius_m else "length_m", *sizes)
+        _refuse_outside(what, "rise_m" if self.kind is Kind.RAMP else "height_m", self.height_m)
+        if self.mass_kg and (self.mass_kg < LEAST_PUSHED_KG or min(*sizes, self.height_m) < LEAST_PUSHED_M):
+            raise WorldError(
+                f"{what}: what is pushed has {LEAST_PUSHED_KG:g} kg and is {LEAST_PUSHED_M:g} m thick at least",
+                hint="without mass_kg it stands fast",
             )
 
     @property
@@ -260,11 +301,15 @@ class Mesh:
     def __post_init__(self) -> None:
         if not self.triangles:
             raise WorldError(f"mesh {self.name!r}: it has no triangles")
-        if not all(math.isfinite(value) for vertex in self.vertices for value in vertex):
-            raise WorldError(f"mesh {self.name!r}: a vertex is not finite")
+        if not self.name.isprintable() or len(self.name) > LONGEST_NAME:
+            raise WorldError(f"mesh {shown(self.name)}: its name is no line of at most {LONGEST_NAME} characters")
+        if not all(-FARTHEST_M <= value <= FARTHEST_M for vertex in self.vertices for value in vertex):
+            raise WorldError(f"mesh {self.name!r}: a vertex is not finite, or farther out than {FARTHEST_M:g} m")
         count = len(self.vertices)
         if not all(0 <= index < count for triangle in self.triangles for index in triangle):
             raise WorldError(f"mesh {self.name!r}: a triangle names a vertex that is not there")
+        if not any(has_area(*(self.vertices[index] for index in triangle)) for triangle in self.triangles):
+            raise WorldError(f"mesh {self.name!r}: no triangle of it has an area")
 
     @property
     def bounds(self) -> tuple[Vertex, Vertex]:
@@ -289,9 +334,26 @@ class Mark:
 
     def __post_init__(self) -> None:
         if self.kind not in MARK_KINDS:
-            raise WorldError(f"kind {self.kind!r} is unknown", hint=f"one of {', '.join(MARK_KINDS)}")
-        if not self.points_m or not all(math.isfinite(value) for point in self.points_m for value in point):
+            raise WorldError(f"kind {shown(self.kind)} is unknown", hint=f"one of {', '.join(MARK_KINDS)}")
+        if not self.points_m:
             raise WorldError("a mark needs a point, or several")
+        _refuse_outside("a mark", "points_m", *(value for point in self.points_m for value in point))
+
+
+def has_area(a: Vertex, b: Vertex, c: Vertex) -> bool:
+    """Tell whether a triangle is more than a point or a line."""
+    (ux, uy, uz), (vx, vy, vz) = (tuple(q - p for p, q in zip(a, end, strict=True)) for end in (b, c))
+    area = math.hypot(uy * vz - uz * vy, uz * vx - ux * vz, ux * vy - uy * vx) / 2
+    longest = max(math.dist(a, b), math.dist(b, c), math.dist(c, a))
+    return area > LEAST_M * longest and longest > LEAST_M
+
+
+def _refuse_outside(what: str, key: str, *values: float) -> None:
+    """Refuse values outside the range of a key."""
+    least, most = RANGES[key]
+    for value in values:
+        if not least <= value <= most:
+            raise WorldError(f"{what}: {key} = {shown(value)} is out of range: {least:g} to {most:g}")
 
 
 # The world ------------------------------------------------------------------------------
@@ -316,6 +378,8 @@ class World:
     skipped: tuple[str, ...] = field(default=(), compare=False)
 
     def __post_init__(self) -> None:
+        _refuse_outside(f"world {shown(self.name)}", "extent_m", *self.extent)
+        _refuse_outside(f"the start of world {shown(self.name)}", "x_m", self.start.x_m, self.start.y_m, self.start.z_m)
         in_order = sorted(self.obstacles, key=lambda item: SECTIONS.index(item.section))
         object.__setattr__(self, "obstacles", tuple(in_order))
         seen: set[str] = set()

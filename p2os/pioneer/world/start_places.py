@@ -8,10 +8,10 @@ import heapq
 import math
 from collections.abc import Iterator, Sequence
 
-from p2os.errors import UsageError
+from p2os.errors import UsageError, shown
 from p2os.pioneer.world.geometry import Footprint, hull_polygon, placed
 from p2os.pioneer.world.model import Kind, Pose, World
-from p2os.pioneer.world.plan import Plan
+from p2os.pioneer.world.plan import Plan, StaticPlan
 from p2os.robots.parameters import RobotParameters
 
 #: chosen: finer than a hull is wide, so that the search passes no wall.
@@ -42,6 +42,12 @@ def start_places(world: World, models: Sequence[RobotParameters], given: Sequenc
     places = {key: _free_places(world, plan) for key, plan in plans.items()}
     for number, model in enumerate(models):
         if number not in standing:
+            taken = thing_at(world, model, world.start)
+            if taken is not None:
+                raise UsageError(
+                    f"the start of world {shown(world.name)} is inside {shown(taken)}",
+                    hint="its file sets another: [start] x_m, y_m",
+                )
             pose = next((pose for pose in places[id(model)] if _is_apart(pose, model, standing)), None)
             if pose is None:
                 raise UsageError(
@@ -50,6 +56,20 @@ def start_places(world: World, models: Sequence[RobotParameters], given: Sequenc
                 )
             standing[number] = (pose, model)
     return tuple(standing[number][0] for number in range(len(models)))
+
+
+def thing_at(world: World, model: RobotParameters, pose: Pose) -> str | None:
+    """Return the name of the thing that a robot would stand in, or None where the place is free.
+
+    What walks is passed over, and so is a place above the level floor: of what it stands on nothing is known here.
+    """
+    if abs(pose.z_m) > PASSED_M:
+        return None
+    standing = (item for item in world.obstacles if not item.fixed and item.walk is None)
+    plan = Plan(standing, model, StaticPlan(world, model))
+    if plan.clearance(pose.x_m, pose.y_m, pose.heading_rad, no_more_than=FREE_M) > 0.0:
+        return None
+    return plan.touched(pose.x_m, pose.y_m, pose.heading_rad)[0] or "a low thing"
 
 
 def _checked(

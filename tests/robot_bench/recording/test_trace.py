@@ -13,6 +13,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from p2os.errors import FileError, LocalProtocolError, RunFailedError
+from robot_bench.recording.run_record import TraceError, read_run
 from robot_bench.recording.trace import RANKS, TraceWriter, canonical
 
 S = 10**9
@@ -121,3 +122,12 @@ def test_a_killed_process_leaves_everything_up_to_its_last_whole_second(tmp_path
     process.communicate(timeout=10)
     times = [json.loads(line).get("t", -1) for line in path.read_text().splitlines()]
     assert max(times) >= 2 * S
+
+
+@pytest.mark.parametrize(
+    "line", ['{"k":"sonar","t":1}', '{"k":"wire","t":1,"hex":"zz","dir":"c2r"}', '{"k":"obstacle","t":1}']
+)
+def test_a_damaged_line_is_named_by_its_number(tmp_path: Path, line: str) -> None:
+    (tmp_path / "trace.jsonl").write_text('{"k":"meta","scenario":"s"}\n' + line + "\n", encoding="utf-8")
+    with pytest.raises(TraceError, match=r"trace\.jsonl:2: a damaged line"):
+        read_run(tmp_path)

@@ -1,5 +1,6 @@
 """Scenario files: what ships is right, and what is wrong is one line that says where."""
 
+import importlib
 from pathlib import Path
 
 import pytest
@@ -7,7 +8,11 @@ import pytest
 from adapter_sim.codec import BitOrder
 from p2os.errors import P2osError, ScenarioError, UsageError
 from p2os.pioneer.controller.settings import SonarPerSip
+from p2os.pioneer.world import load_world
+from robot_bench.bench import Bench
+from robot_bench.scenario.goals import KINDS
 from robot_bench.scenario.scenario import known_scenarios, load_scenario, read_scenario
+from robot_bench.scenario.schema import Key
 from robot_bench.scenario.world_script import Op
 
 LEAST = 'firmware = "dodge"\nworld = "room"\nduration_s = 10\n'
@@ -116,7 +121,7 @@ def test_a_thing_held_before_a_sonar_is_placed_moved_and_removed(tmp_path: Path)
         hold_s = 0.15
         [[obstacle]]
         at_s = 0.5
-        name = "crate"
+        name = "parcel"
         x_m = 1
         y_m = 2
         length_m = 0.3
@@ -125,7 +130,7 @@ def test_a_thing_held_before_a_sonar_is_placed_moved_and_removed(tmp_path: Path)
         [[obstacle]]
         at_s = 2
         op = "move"
-        name = "crate"
+        name = "parcel"
         x_m = 1
         y_m = 1
     """,
@@ -133,8 +138,8 @@ def test_a_thing_held_before_a_sonar_is_placed_moved_and_removed(tmp_path: Path)
     )
     steps = [(change.at / 1e9, change.op, change.name) for change in scenario.changes]
     assert steps == [
-        (0.5, Op.PLACE, "crate"), (1.0, Op.PLACE, "post"), (1.05, Op.MOVE, "post"), (1.1, Op.MOVE, "post"),
-        (1.15, Op.REMOVE, "post"), (2.0, Op.MOVE, "crate"),
+        (0.5, Op.PLACE, "parcel"), (1.0, Op.PLACE, "post"), (1.05, Op.MOVE, "post"), (1.1, Op.MOVE, "post"),
+        (1.15, Op.REMOVE, "post"), (2.0, Op.MOVE, "parcel"),
     ]  # fmt: skip
 
 
@@ -144,9 +149,9 @@ BOX = '[[obstacle]]\nat_s = 1\nname = "a"\nx_m = 0\ny_m = 0\nlength_m = 1\nwidth
 @pytest.mark.parametrize(
     ("text", "message", "hint"),
     [
-        ("=", "mine.toml: Invalid statement", "no TOML"),
-        (LEAST + "treshold_m = 1\n", "mine.toml: unknown key 'treshold_m'", "threshold_m"),
-        (LEAST + "threshold_cm = 60\n", "mine.toml: unknown key 'threshold_cm'", "threshold_m"),
+        ("=", "mine.toml:1: Invalid statement", "not TOML"),
+        (LEAST + "treshold_m = 1\n", "mine.toml:4: unknown key 'treshold_m'", "threshold_m"),
+        (LEAST + "threshold_cm = 60\n", "mine.toml:4: unknown key 'threshold_cm'", "threshold_m"),
         (LEAST + 'threshold_m = "60 cm"\n', 'threshold_m = "60 cm" is not a number of metres', "bare number"),
         (LEAST + "threshold_m = true\n", "threshold_m = True is not a number of metres", None),
         (LEAST + "threshold_m = nan\n", "threshold_m = nan is out of range", "above 0"),
@@ -215,3 +220,58 @@ def test_options_replace_what_the_scenario_says(tmp_path: Path) -> None:
     )
     assert (scenario.mode, scenario.body, scenario.world, scenario.seed) == ("direct", "kinematic", "arena", 7)
     assert (scenario.duration_ns, scenario.firmware) == (2_500_000_000, firmware)
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        (BOX.replace('"a"', '"crate"'), "mine.toml:4: [[obstacle]] 1: 'crate' at 1 s: world 'room' has a thing"),
+        (
+            '[[obstacle]]\nat_s = 1\nop = "remove"\nname = "a"\n',
+            "mine.toml:4: [[obstacle]] 1: 'a' at 1 s: there is none",
+        ),
+        (
+            BOX.replace("height_m = 1", "height_m = 1e300"),
+            "mine.toml:11: [[obstacle]] 1: height_m = 1e+300 is out of range",
+        ),
+        (
+            BOX.replace("x_m = 0\ny_m = 0", "before_sonar = 1\ndistance_m = 1\nhold_s = 1e30"),
+            "mine.toml:9: [[obstacle]] 1: hold_s = 1e+30 is out of range",
+        ),
+        ("start = { x_m = inf, y_m = 0 }\n", "mine.toml:4: [start]: x_m = inf is out of range"),
+    ],
+)
+def test_what_its_world_or_no_world_bears_is_refused_by_file_and_line(tmp_path: Path, text: str, message: str) -> None:
+    with pytest.raises(ScenarioError) as caught:
+        read_scenario(write(tmp_path, LEAST + text))
+    assert str(caught.value).startswith(message)
+
+
+def test_a_start_inside_a_thing_is_refused_by_its_name(tmp_path: Path) -> None:
+    thing = next(item for item in load_world("room").obstacles if item.name == "crate")
+    text = LEAST + f"start = {{ x_m = {thing.x_m}, y_m = {thing.y_m} }}\n"
+    with pytest.raises(ScenarioError, match=r"\[start\]: x .* in world 'room' is inside 'crate'"):
+        read_scenario(write(tmp_path, text))
+
+
+def test_a_program_that_moves_a_scenario_to_another_world_is_told_of_its_names_too(tmp_path: Path) -> None:
+    scenario = read_scenario(write(tmp_path, LEAST + BOX.replace('"a"', '"plant"')))
+    moved = scenario.with_options(world="corridor", body="kinematic")
+    with pytest.raises(ScenarioError, match="world 'corridor' has a thing of that name"):
+        Bench(moved)
+
+
+@pytest.mark.parametrize("module", ["scenario", "world_script", "fault_script"])
+def test_every_number_of_a_scenario_has_a_range(module: str) -> None:
+    tables = vars(importlib.import_module(f"robot_bench.scenario.{module}")).values()
+    keys = [key for table in tables if isinstance(table, tuple) for key in table if isinstance(key, Key)]
+    keys += [key for kind in KINDS.values() for key in kind.keys]
+    numbers = [key for key in keys if key.kind in {"number", "whole"}]
+    assert numbers
+    assert [key.name for key in numbers if key.most is None or (key.least is None and key.above is None)] == []
+
+
+def test_a_scenario_with_a_byte_order_mark_is_read(tmp_path: Path) -> None:
+    path = tmp_path / "mine.toml"
+    path.write_text(LEAST, encoding="utf-8-sig")
+    assert read_scenario(path).world == "room"

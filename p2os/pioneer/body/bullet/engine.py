@@ -15,7 +15,7 @@ _STANDARD_OUTPUT, _STANDARD_ERROR = 1, 2
 #: Added to the diagonal of the contact problem, which the direct solver needs.
 SOFTNESS = 1e-6
 #: The share of a depth that is taken back in a step: what was put into a robot does not fling it away.
-EASED_OUT = 0.003
+EASED_OUT = 0.0005
 
 
 @contextmanager

@@ -50,6 +50,8 @@ ECHOING = OBSTACLE_GROUP | FLOOR_GROUP | PUSHED_GROUP | LOW_GROUP
 RAY_GROUP = 1
 #: Of all that stands fast: Bullet multiplies the frictions of both sides.
 STATIC_FRICTION = 1.0
+#: Who moves → what it meets.
+MEETS = {WHEEL_GROUP: WHEEL_MEETS, HULL_GROUP: HULL_MEETS, PUSHED_GROUP: PUSHED_MEETS}
 #: Height at which things that were taken out are kept.
 PARKED_M = -100.0
 
@@ -150,10 +152,13 @@ def make_static(shape: int, place: Vector, turn: tuple[float, ...], group: int, 
         physicsClientId=client,
     )
     pybullet.changeDynamics(number, -1, lateralFriction=STATIC_FRICTION, physicsClientId=client)
-    pybullet.setCollisionFilterGroupMask(
-        number, -1, group, RAY_GROUP | WHEEL_GROUP | HULL_GROUP | PUSHED_GROUP, physicsClientId=client
-    )
+    pybullet.setCollisionFilterGroupMask(number, -1, group, RAY_GROUP | _met_by(group), physicsClientId=client)
     return int(number)
+
+
+def _met_by(group: int) -> int:
+    """Return what meets a group; both sides must leave a pair out, for Bullet lets two touch that one of them meets."""
+    return sum(who for who, meets in MEETS.items() if meets & group)
 
 
 def add_robot(parameters: RobotParameters, pose: Pose, client: int) -> tuple[int, Vector]:

@@ -90,11 +90,18 @@ def make_model(world: World, parameters: RobotParameters, things: Iterable[Obsta
             turn = quaternion(item.heading_rad, slope)
             root.add_geom(pos=place, quat=turn, **_shape(item), **_collision(group_of(item, bands), 0, 0.0))
     for number, mesh in enumerate(world.meshes):
-        _add_mesh(spec, mesh, f"mesh {number}", bands)
+        _add_mesh(spec, mesh, f"mesh {number}", bands, world.source)
     _add_robot(spec, parameters)
     for item in things:
         _add_thing(root, item, group_of(item, bands))
-    return spec.compile()
+    try:
+        return spec.compile()
+    except ValueError as error:  # the engine's own checks
+        reason = " ".join(str(error).split())
+        raise WorldError(
+            f"{world.source}: the mujoco body cannot take this world: {reason}",
+            hint="--body bullet or --body kinematic",
+        ) from error
 
 
 def floor_geometries(model: mujoco.MjModel) -> frozenset[int]:
@@ -170,19 +177,19 @@ def _add_robot(spec: mujoco.MjSpec, parameters: RobotParameters) -> None:
 # Meshes ---------------------------------------------------------------------------------
 
 
-def _add_mesh(spec: mujoco.MjSpec, mesh: Mesh, name: str, bands: Bands) -> None:
+def _add_mesh(spec: mujoco.MjSpec, mesh: Mesh, name: str, bands: Bands, source: str) -> None:
     """Add a mesh to a model under a name of its own.
 
     Raises:
         WorldError: It has faces that wheels would climb, or too many for this engine.
     """
-    _refuse_slopes(mesh, bands)
+    _refuse_slopes(mesh, bands, source)
     low, high = bands.touch
     pieces = shadow(mesh, low, high)
     if len(pieces) > MOST_PIECES:
         raise WorldError(
-            f"mesh {mesh.name!r}: {len(pieces)} pieces between {low:g} and {high:g} m of height; the mujoco body"
-            f" takes {MOST_PIECES}",
+            f"{source}: mesh {mesh.name!r}: {len(pieces)} pieces between {low:g} and {high:g} m of height;"
+            f" the mujoco body takes {MOST_PIECES}",
             hint="--body bullet or --body kinematic",
         )
     _asset(spec, name, [value for vertex in mesh.vertices for value in vertex], mesh.triangles)
@@ -202,7 +209,7 @@ def _add_mesh(spec: mujoco.MjSpec, mesh: Mesh, name: str, bands: Bands) -> None:
             spec.worldbody.add_geom(type=_MESH, meshname=piece, **met)
 
 
-def _refuse_slopes(mesh: Mesh, bands: Bands) -> None:
+def _refuse_slopes(mesh: Mesh, bands: Bands, source: str) -> None:
     """Refuse faces that are level enough to be climbed, lower than the hull at their lowest, and not the floor."""
     for first, second, third in mesh.triangles:
         corners = (mesh.vertices[first], mesh.vertices[second], mesh.vertices[third])
@@ -210,7 +217,7 @@ def _refuse_slopes(mesh: Mesh, bands: Bands) -> None:
         climbed = -bands.touch[0] < heights[0] < bands.touch[0] and max(map(abs, heights)) > ON_FLOOR_M
         if climbed and is_level(corners):
             raise WorldError(
-                f"mesh {mesh.name!r}: it has a floor that wheels would climb (a face from {heights[0]:.3f} to"
+                f"{source}: mesh {mesh.name!r}: it has a floor that wheels would climb (a face from {heights[0]:.3f} to"
                 f" {heights[-1]:.3f} m); the mujoco body drives on boxes and ramps alone",
                 hint="--body bullet",
             )

@@ -14,9 +14,9 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 
 from p2os.errors import WorldError
-from p2os.pioneer.world.formats.collection import FARTHEST_M, Collection
+from p2os.pioneer.world.formats.collection import Collection
 from p2os.pioneer.world.formats.rectangles import rectangles
-from p2os.pioneer.world.model import Kind, Mark, Obstacle, Pose, World
+from p2os.pioneer.world.model import FARTHEST_M, Kind, Mark, Obstacle, Pose, World
 from p2os.pioneer.world.text_file import read_text
 
 #: chosen: a line has no thickness; a wall needs one. Half of it stands on either side.

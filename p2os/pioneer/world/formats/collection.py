@@ -14,7 +14,20 @@ from pathlib import Path
 from p2os.errors import WorldError
 from p2os.pioneer.world.formats.transform import Transform, apply, upright_heading
 from p2os.pioneer.world.geometry import Footprint
-from p2os.pioneer.world.model import Kind, Mark, Mesh, Obstacle, Pose, Triangle, Vertex, World, shadow
+from p2os.pioneer.world.model import (
+    FARTHEST_M,
+    LONGEST_NAME,
+    Kind,
+    Mark,
+    Mesh,
+    Obstacle,
+    Pose,
+    Triangle,
+    Vertex,
+    World,
+    has_area,
+    shadow,
+)
 
 #: chosen: a Pioneer turns on the spot in it.
 FREE_M = 0.5
@@ -24,8 +37,6 @@ LOW_M, HIGH_M = 0.05, 0.5
 PLACES = 24
 MOST_TRIANGLES = 200_000
 MOST_THINGS = 20_000
-#: Farther out is no building, m.
-FARTHEST_M = 10_000.0
 #: The floor reaches so far beyond what stands on it, m.
 MARGIN_M = 0.5
 #: A sphere is made of so many bands and sectors.
@@ -121,7 +132,7 @@ class Collection:
         for triangle in triangles:
             if not all(0 <= index < count for index in triangle):
                 raise WorldError(f"{self.path}: {name!r}: a face names a vertex that is not there")
-            if len({corners[index] for index in triangle}) == 3:
+            if has_area(*(corners[index] for index in triangle)):
                 kept.append(triangle)
         self._triangles += len(kept)
         if self._triangles > MOST_TRIANGLES:
@@ -195,6 +206,8 @@ class Collection:
             raise WorldError(f"{self.path}: more than {MOST_THINGS} things", hint="make it simpler first")
 
     def _name(self, wanted: str) -> str:
+        # Room for the number, and for what an import puts before it.
+        wanted = "".join(letter if letter.isprintable() else "?" for letter in wanted[: LONGEST_NAME // 2])
         name, number = wanted, self._names.get(wanted, 0)
         while name in self._names:
             number += 1

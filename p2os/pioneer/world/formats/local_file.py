@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from p2os.errors import WorldError
+from p2os.errors import WorldError, shown
 
 #: chosen: the same bound as for the file that names it.
 LARGEST_FILE_BYTES = 64 * 1024 * 1024
@@ -20,7 +20,7 @@ def find_local(uri: str, beside: Path) -> Path:
     """
     scheme, separator, rest = uri.strip().partition("://")
     if separator and scheme not in {"file", "package", "model"}:
-        raise WorldError(f"{beside}: {uri!r} is not a local file", hint="fetch it first and name the copy")
+        raise WorldError(f"{beside}: {shown(uri)} is not a local file", hint="fetch it first and name the copy")
     name = rest if separator else uri.strip()
     tries = [name]
     if separator and scheme != "file" and "/" in name:
@@ -33,8 +33,8 @@ def find_local(uri: str, beside: Path) -> Path:
                 if text and path.exists():
                     return _sized(path)
             except (OSError, ValueError) as error:
-                raise WorldError(f"{beside}: {uri[:80]!r} is no path") from error
-    raise WorldError(f"{beside}: it names {uri!r}, which is not there", hint=f"put it beside {beside.name}")
+                raise WorldError(f"{beside}: {shown(uri)} is no path") from error
+    raise WorldError(f"{beside}: it names {shown(uri)}, which is not there", hint=f"put it beside {beside.name}")
 
 
 def _sized(path: Path) -> Path:

@@ -10,7 +10,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from p2os.errors import WorldError
+from p2os.errors import WorldError, shown
 from p2os.pioneer.world.formats.collection import Collection
 from p2os.pioneer.world.formats.placing import with_z_up
 from p2os.pioneer.world.formats.polygon import triangulated
@@ -83,7 +83,7 @@ def _read_obj(path: Path) -> tuple[Triangles, str]:
                 pieces = triangulated([found.vertices[corner] for corner in corners])
                 found.triangles += [(corners[a], corners[b], corners[c]) for a, b, c in pieces]
         except (ValueError, IndexError) as error:
-            raise WorldError(f"{path}:{number}: {' '.join(words[:6])!r} cannot be read") from error
+            raise WorldError(f"{path}:{number}: {shown(' '.join(words[:6]))} cannot be read") from error
         if len(found.triangles) > MOST_TRIANGLES or len(found.vertices) > MOST_VERTICES:
             raise WorldError(f"{path}:{number}: more than {MOST_TRIANGLES} triangles", hint="decimate it first")
         if words[0] in {"curv", "surf", "l", "p"}:

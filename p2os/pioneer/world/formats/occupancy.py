@@ -17,11 +17,11 @@ import yaml
 from PIL import Image
 
 from p2os.errors import WorldError
-from p2os.pioneer.world.formats.collection import FARTHEST_M, Collection
+from p2os.pioneer.world.formats.collection import Collection
 from p2os.pioneer.world.formats.local_file import find_local
 from p2os.pioneer.world.formats.placing import Placing, placed_points
 from p2os.pioneer.world.formats.rectangles import rectangles
-from p2os.pioneer.world.model import Kind, Obstacle, Pose, World
+from p2os.pioneer.world.model import FARTHEST_M, Kind, Obstacle, Pose, World
 from p2os.pioneer.world.text_file import read_text
 
 MODES = ("trinary", "scale", "raw")

@@ -6,7 +6,7 @@ from importlib import import_module
 from pathlib import Path
 from typing import Protocol, cast
 
-from p2os.errors import MissingDependencyError, WorldError
+from p2os.errors import MissingDependencyError, WorldError, shown_name
 from p2os.pioneer.world.formats.placing import Placing, placed_world
 from p2os.pioneer.world.model import World
 
@@ -62,11 +62,13 @@ def read_placed(path: Path, placing: Placing) -> World:
     """
     module = FORMATS.get(path.suffix.lower())
     if module is None:
-        raise WorldError(f"{path}: no reader for {path.suffix or 'a file without an ending'!s}", hint=_known())
+        raise WorldError(
+            f"{shown_name(path)}: no reader for {shown_name(path.suffix) or 'a file without an ending'}", hint=_known()
+        )
     try:
         size = path.stat().st_size
-    except OSError as error:
-        raise WorldError(f"{path}: {error.strerror}") from error
+    except (OSError, ValueError) as error:  # ValueError: a NUL in the name
+        raise WorldError(f"{shown_name(path)}: {getattr(error, 'strerror', None) or error}") from error
     if not path.is_file():
         raise WorldError(f"{path}: not a file")
     if size > LARGEST_FILE_BYTES:
@@ -75,6 +77,10 @@ def read_placed(path: Path, placing: Placing) -> World:
     try:
         world = reader.read(path, placing.up)
         return placed_world(replace(world, source=str(path)), placing)
+    except WorldError as error:
+        if str(path.parent) in str(error):
+            raise
+        raise WorldError(f"{path}: {error}", hint=error.hint) from error
     except OSError as error:
         raise WorldError(f"{path}: {error.strerror or error}") from error
     except (RecursionError, MemoryError, OverflowError) as error:

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from xml.parsers import expat  # declarations are refused below
 
-from p2os.errors import WorldError
+from p2os.errors import WorldError, shown, shown_name
 
 MOST_ELEMENTS = 200_000
 DEEPEST = 64
@@ -105,7 +105,7 @@ def read_xml(path: Path, *roots: str) -> Element:
         raise WorldError(f"{path}: {error}", hint="the file is not XML") from error
     root = builder.root
     if root is None or root.tag not in roots:
-        found = "nothing" if root is None else f"<{root.tag}>"
+        found = "nothing" if root is None else f"<{shown_name(root.tag)}>"
         raise WorldError(f"{path}: expected <{'> or <'.join(roots)}>, got {found}")
     return root
 
@@ -126,7 +126,9 @@ def numbers(element: Element, text: str, path: Path, count: int | None = None) -
     try:
         values = [float(word) for word in words]
     except ValueError as error:
-        raise WorldError(f"{path}:{element.line}: <{element.tag}>: {error}") from error
+        raise WorldError(
+            f"{path}:{element.line}: <{shown_name(element.tag)}>: {shown(text.strip())} is no number"
+        ) from error
     if count is not None and len(values) != count:
         raise WorldError(f"{path}:{element.line}: <{element.tag}> needs {count} numbers, got {len(values)}")
     if not all(-1e300 < value < 1e300 for value in values):

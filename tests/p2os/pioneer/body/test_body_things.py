@@ -70,6 +70,18 @@ def test_a_pushed_thing_stops_at_a_wall(make: Maker) -> None:
     assert state.stalled_left
 
 
+def test_a_corridor_a_millimetre_wider_than_the_robot_lets_it_through(make: Maker) -> None:
+    away = (P2DX.body.hull_width_m + 0.001 + 0.2) / 2
+    walls = [
+        Obstacle(name=f"wall {side}", x_m=1.0, y_m=side * away, length_m=1.0, width_m=0.2, fixed=True)
+        for side in (-1, 1)
+    ]
+    body = make(world_of(*walls))
+    state = drive(body, 0.3, 0.3, 3.0)
+    assert state.x_m > 0.85, "the wheels' spheres are wider than the hull, and meet no wall"
+    assert state.collisions == 0
+
+
 def test_what_walks_is_where_its_path_leads_and_echoes(make: Maker) -> None:
     walk = Walk(points_m=((1.5, 0.0), (2.5, 0.0)), speed_mps=0.5, start_s=0.2, repeat=Repeat.ONCE)
     body = make(world_of(Obstacle(name="visitor", x_m=0, y_m=0, radius_m=0.2, walk=walk)))

@@ -251,7 +251,7 @@ def test_a_file_of_errors_starts_from_a_set(tmp_path: Path) -> None:
         ("[sonr]\n", r"unknown table \[sonr\]"),
         ("[sonar]\nnoise = 1", "unknown key sonar.noise"),
         ("[sonar]\ndropout = 2", "0 to 1"),
-        ("[sonar]\nnoise_m = -1", "0 and more"),
+        ("[sonar]\nnoise_m = -1", "0 to 10"),
         ("[sonar]\nnoise_m = true", "is no number"),
         ("[sonar", "Expected"),
     ],

@@ -241,7 +241,7 @@ def test_a_thing_too_far_away_or_too_high_is_refused(pose: str, tmp_path: Path) 
         f'<sdf><model name="m"><pose>{pose}</pose><link name="l"><collision name="c"><geometry><box><size>1 1 1</size>'
         "</box></geometry></collision></link></model></sdf>"
     )
-    assert "farther out" in refusal(tmp_path / "a.sdf", text)
+    assert "out of range" in refusal(tmp_path / "a.sdf", text)
 
 
 def test_the_command_says_it_in_one_line_and_ends_with_2(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

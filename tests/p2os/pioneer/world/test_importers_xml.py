@@ -96,7 +96,7 @@ def test_a_urdf_stands_with_its_joints_at_zero(folder: Path) -> None:
         ("a.sdf", CRATE.replace("2 1 1", "2 1"), "needs 3 numbers, got 2"),
         ("a.sdf", CRATE.replace("2 1 1", "2 1 -1"), "must be above 0"),
         ("a.sdf", CRATE.replace("2 1 1", "2 1 nan"), "not finite"),
-        ("a.sdf", CRATE.replace("1 0 0 0 0 0", "1e9 0 0 0 0 0"), "farther out"),
+        ("a.sdf", CRATE.replace("1 0 0 0 0 0", "1e9 0 0 0 0 0"), "out of range"),
         ("a.sdf", "<sdf><include><uri>a.sdf</uri></include></sdf>", "include each other"),
         ("a.sdf", "<sdf><include/></sdf>", "without a <uri>"),
         ("a.sdf", "<sdf><include><uri>https://x/y</uri></include></sdf>", "not a local file"),

@@ -8,13 +8,13 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from p2os.errors import UsageError, WorldError
-from p2os.pioneer.toml_places import find_places, line_of_error
 from p2os.pioneer.world import known_worlds, load_world, parse_world
 from p2os.pioneer.world.makers import KINDS, make_world
 from p2os.pioneer.world.model import Kind, Mesh, Obstacle, Pose, Repeat, Walk, World
 from p2os.pioneer.world.plan import Plan
 from p2os.pioneer.world.writer import degrees, write_world
 from p2os.robots.parameters import load_parameters
+from p2os.toml_file import find_places, line_of_error
 
 P2DX = load_parameters("p2dx")
 
@@ -122,17 +122,17 @@ HEAD = 'name = "a"\nextent_m = [0, 0, 1, 1]\n'
     ("more", "message"),
     [
         ("fixed = 1", "mine.toml:9: box.fixed must be true or false"),
-        ("mass_kg = -1", "mine.toml:3: box: obstacle 'b': mass and friction must be 0 or more"),
+        ("mass_kg = -1", "mine.toml:9: box.mass_kg = -1 is out of range"),
         ("mass_kg = 1\nfixed = true", "only one of"),
         ("path_m = [[0, 0]]", "two points"),
         ("path_m = [[0, 0], [0, 0]]", "same point twice"),
         ("path_m = [[0, 0], [1]]", "mine.toml:9: box.path_m must be a list of 2 numbers"),
         ("path_m = 3", "list of lists"),
-        ("path_m = [[0, 0], [1, 1]]\nspeed_mps = 0", "speed above 0"),
+        ("path_m = [[0, 0], [1, 1]]\nspeed_mps = 0", "speed_mps = 0 is out of range"),
         ('path_m = [[0, 0], [1, 1]]\nrepeat = "never"', "repeat 'never' is unknown"),
         ('path_m = [[0, 0], [1, 1], [0, 0]]\nrepeat = "loop"', "first point again"),
         (f"x_mm = {'9' * 400}", "unknown key box.x_mm"),
-        (f"base_m = {'9' * 400}", "must be a number"),
+        (f"base_m = {'9' * 400}", "out of range"),
     ],
 )
 def test_what_moves_is_checked(more: str, message: str) -> None:

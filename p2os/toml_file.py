@@ -1,8 +1,8 @@
-"""Where in a TOML text each key stands, so that an error can name its line.
+"""TOML files of users: read within bounds, with the line of each key, so that an error can name it.
 
-`tomllib` gives values without places. This reads a text that `tomllib` has
+`tomllib` gives values without places. `find_places` reads a text that `tomllib` has
 accepted, so it need not check anything: it only tells tables, keys and the ends
-of values that run over several lines apart.
+of values that run over several lines apart. A byte order mark is passed over.
 
 Not found: keys inside inline tables, and quoted keys with dots or escapes in them; they get
 the line of what holds them.
@@ -11,14 +11,17 @@ the line of what holds them.
 import re
 import tomllib
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Any
 
-from p2os.errors import FileError
+from p2os.errors import FileError, shown_name
 
 _HEADER = re.compile(r"\s*(\[\[?)\s*([^\]]+?)\s*\]\]?\s*(?:#.*)?$")
 _KEY = re.compile(r"\s*([A-Za-z0-9_.\-\"']+)\s*=")
 #: What can begin or end inside a value: strings, comments, brackets.
 _TOKEN = re.compile(r'"""|\'\'\'|"(?:\\.|[^"\\\n])*"|\'[^\'\n]*\'|#[^\n]*|[\[\]{}]')
+#: chosen: a world of 100 000 things is below it; more is no file that a person wrote.
+LARGEST_FILE_BYTES = 64 * 1024 * 1024
 #: `tomllib` ends its messages so.
 _AT = re.compile(r"^(?P<what>.*) \(at (?:line (?P<line>\d+), column \d+|end of document)\)$", re.DOTALL)
 
@@ -34,6 +37,36 @@ class TomlPlaces:
         """Return the line of a key, or of its table's header where the key is not there, or 1."""
         lines = self.lines
         return lines.get((table, number, key)) or lines.get((table, number, "")) or lines.get(("", 0, table)) or 1
+
+
+def read_user_text(path: Path, what: str, error_type: type[FileError]) -> str:
+    """Return the text of a file that a user names, without a byte order mark.
+
+    Args:
+        path: The file.
+        what: What it should be, such as "a world".
+        error_type: What to raise.
+
+    Raises:
+        FileError: One of `error_type`: the file cannot be read, is too large or is no text.
+    """
+    try:
+        if path.stat().st_size > LARGEST_FILE_BYTES:
+            raise error_type(f"{shown_name(path)}: larger than {LARGEST_FILE_BYTES >> 20} MiB", hint=f"is it {what}?")
+        return path.read_text(encoding="utf-8-sig")
+    except UnicodeDecodeError as error:
+        raise error_type(f"{shown_name(path)}: not a text file", hint=f"{what} is a TOML file") from error
+    except (OSError, ValueError) as error:  # ValueError: a NUL in the name
+        why = getattr(error, "strerror", None) or error
+        raise error_type(f"cannot read {shown_name(path)}: {why}") from error
+
+
+def is_file(path: Path) -> bool:
+    """Tell whether a file is there; a name that no file can have is not."""
+    try:
+        return path.is_file()
+    except (OSError, ValueError):  # longer than the system allows, or with a NUL in it
+        return False
 
 
 def find_places(text: str) -> TomlPlaces:
@@ -62,6 +95,18 @@ def find_places(text: str) -> TomlPlaces:
     return found
 
 
+@dataclass(frozen=True, slots=True)
+class TomlSource:
+    """What a message calls a file, and the places in it; None where it was never a file."""
+
+    name: str
+    places: TomlPlaces | None = None
+
+    def at(self, table: str = "", key: str = "", number: int = 0) -> str:
+        """Return `file:line` of a key, or the name alone where there are no lines."""
+        return self.name if self.places is None else f"{self.name}:{self.places.line(table, number, key)}"
+
+
 def read_toml(text: str, source: str, what: str, error_type: type[FileError]) -> tuple[dict[str, Any], TomlPlaces]:
     """Return a text's table and the places of its keys.
 
@@ -74,11 +119,14 @@ def read_toml(text: str, source: str, what: str, error_type: type[FileError]) ->
     Raises:
         FileError: One of `error_type`: the text is no TOML; the message names the source and the line.
     """
+    text = text.removeprefix("\ufeff")
     try:
         return tomllib.loads(text), find_places(text)
     except tomllib.TOMLDecodeError as error:
         complaint, line = line_of_error(str(error), text)
         raise error_type(f"{source}:{line}: {complaint}", hint="the file is not TOML") from error
+    except ValueError as error:  # a number of more digits than Python reads
+        raise error_type(f"{source}:1: {error}", hint=f"the file is not {what}") from error
     except RecursionError as error:
         raise error_type(f"{source}:1: nested too deeply", hint=f"the file is not {what}") from error
 
