@@ -4,6 +4,9 @@ The recorder is the last follower of the loop. It samples the pose each 50 ms,
 hands the trace what has passed, and keeps the few figures that a summary needs
 and no trace holds (the clearance).
 
+Edges are written up to the instant before the one reached: at that one itself someone may
+still drive. So a wire's first level, too, is what it is when all of time 0 was driven.
+
 Invariant: it changes nothing that it watches.
 """
 
@@ -72,16 +75,16 @@ class Recorder:
         self._sample_ns = sample_ns
         self._next_sample: Nanos = 0
         self._changed: dict[str, None] = {}
+        #: Whether the levels at time 0 are written: not before everything of that instant was driven.
+        self._has_levels = False
         self._text = b""
         self._sonar_mm: list[int] | None = None
         for net in harness:
             net.watch(self._note_change)
 
     def start(self) -> None:
-        """Write every wire's level at time 0."""
-        for net in self._harness:
-            net.edges_until(0)
-            self.trace.add("pin", 0, {"net": net.name, "v": int(net.level(0))})
+        """Have every wire's level at time 0 written once nobody can drive at that instant any more."""
+        self._changed = dict.fromkeys(net.name for net in self._harness)
 
     def usart(self, data: bytes, at: Nanos) -> None:
         """Take characters that the chip has sent, their last one complete at `at`."""
@@ -143,6 +146,7 @@ class Recorder:
             "last_state": self.last_state,
             "next_sample": self._next_sample,
             "changed": tuple(self._changed),
+            "has_levels": self._has_levels,
             "text": self._text,
             "sonar_mm": None if self._sonar_mm is None else tuple(self._sonar_mm),
         }
@@ -156,6 +160,7 @@ class Recorder:
         self.last_state = cast("BodyState | None", state["last_state"])
         self._next_sample = cast("int", state["next_sample"])
         self._changed = dict.fromkeys(cast("tuple[str, ...]", state["changed"]))
+        self._has_levels = bool(state["has_levels"])
         self._text = cast("bytes", state["text"])
         sonar = cast("tuple[int, ...] | None", state["sonar_mm"])
         self._sonar_mm = None if sonar is None else list(sonar)
@@ -184,9 +189,17 @@ class Recorder:
 
     def _pass(self, limit: Nanos) -> None:
         """Write what is stamped at or before `limit`, and let the wires forget it."""
+        if not self._has_levels and limit >= 0:
+            self._has_levels = True
+            self._write_levels()
         if self._changed:
             self._write_edges(limit)
         self.trace.write_until(limit)
+
+    def _write_levels(self) -> None:
+        for net in self._harness:
+            net.edges_until(0)
+            self.trace.add("pin", 0, {"net": net.name, "v": int(net.level(0))})
 
     def _write_edges(self, limit: Nanos) -> None:
         changed, self._changed = self._changed, {}
