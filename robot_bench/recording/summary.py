@@ -65,7 +65,9 @@ def outcome_of(record: RunRecord) -> Json:
     result: Json = {key: record.meta.get(key) for key in _FROM_META}
     world = result["world"]
     result["world"] = world.get("name") if isinstance(world, Mapping) else world
-    end = _end_of_a_cut_run(record) if record.is_cut else record.end
+    end = record.end
+    if record.is_cut:
+        end = end_of_a_broken_run(record, f"the run was cut at {record.last_ns / NS_PER_S:.1f} s")
     result.update((key, end.get(key)) for key in _FROM_END)
     return result
 
@@ -77,13 +79,14 @@ def write_outcome(record: RunRecord, folder: Path) -> Json:
     return outcome
 
 
-def _end_of_a_cut_run(record: RunRecord) -> Json:
+def end_of_a_broken_run(record: RunRecord, reason: str) -> Json:
+    """Return the last line of a run that did not come to its end, as far as its trace tells."""
     return {
         "virtual_s": record.last_ns / NS_PER_S,
         "distance_m": round(distance_m(record), 6),
         "collisions": record.poses[-1].collisions if record.poses else None,
         "passed": False,
-        "failures": [f"the run was cut at {record.last_ns / NS_PER_S:.1f} s"],
+        "failures": [reason],
         "goals_met": [],
         "notes": [],
         "last_blocks": [],
