@@ -14,9 +14,10 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from typing import Protocol, cast
 
-from p2os.pioneer.body.contract import BodyState
+from p2os.pioneer.body.contract import BodyState, Hit
 from p2os.pioneer.world.model import Obstacle
 from p2os.timing import NS_PER_MS, Nanos, Reached
+from robot_bench.recording.run_record import COLLISION
 from robot_bench.recording.trace import TraceWriter
 from robot_bench.wires.nets import Harness, Net
 
@@ -40,6 +41,10 @@ class Observed(Protocol):
 
     def take_moved(self) -> Sequence[Obstacle]:
         """Return what has walked or was pushed since this was asked last."""
+        ...
+
+    def take_hits(self) -> Sequence[Hit]:
+        """Return the collisions since this was asked last."""
         ...
 
 
@@ -186,6 +191,9 @@ class Recorder:
         self.trace.add("pose", at, pose_entry(state))
         for item in self._body.take_moved():
             self.obstacle("move", item.name, at, moved_entry(item))
+        for hit in self._body.take_hits():
+            # The body may have made the step that ends just after `at` already.
+            self.event("body", min(hit.at_ns, at), COLLISION, hit_detail(hit))
 
     def _pass(self, limit: Nanos) -> None:
         """Write what is stamped at or before `limit`, and let the wires forget it."""
@@ -214,6 +222,12 @@ class Recorder:
                 )
             if net.forget_before(limit):
                 self._changed[net.name] = None
+
+
+def hit_detail(hit: Hit) -> str:
+    """Return what was hit, and where, in one line."""
+    what = repr(hit.name) if hit.name else "something"
+    return f"{what} at x {hit.x_m:.3f} m, y {hit.y_m:.3f} m"
 
 
 def moved_entry(item: Obstacle) -> dict[str, object]:

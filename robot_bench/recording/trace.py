@@ -8,7 +8,7 @@ only: no path, version, host or wall time. `t` is nanoseconds.
     {"k":"usart","hex"}                  a line (or 64 bytes) that the chip has printed
     {"k":"wire","dir","hex"}             bytes that have arrived: c2r client to robot, r2c back
     {"k":"obstacle","op","name",…}       something placed, moved or removed; lengths in metres
-    {"k":"event","who","what","detail"}  a state log: adapter, pioneer, chip, bench
+    {"k":"event","who","what","detail"}  a state log: adapter, pioneer, direct, body, chip, bench
     {"k":"sonar","mm":[…]}               ranges, all sonar, when new
     {"k":"pose","x","y","z","h","p","l","r","la","ra","c"}   µm, µrad, µm/s, collisions; each 50 ms
 
