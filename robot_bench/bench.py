@@ -244,11 +244,13 @@ class Bench:
             threshold_um=self.scenario.threshold_um, period_ns=settings.sensor_period_ns,
         )  # fmt: skip
         sensors.on_sample = self.recorder.sonar
-        return DirectRobot(
+        robot = DirectRobot(
             body, left=motor("motor1"), right=motor("motor2"),
             encoders=(WheelEncoder(nets("encoder1")), WheelEncoder(nets("encoder2"))),
             sensors=sensors, sonar_numbers=range(len(wires)), encoder_period_ns=settings.encoder_period_ns,
         )  # fmt: skip
+        robot.on_event = self.recorder.listener("direct")
+        return robot
 
     def _adapter_and_pioneer(self, pinout: Pinout, body: RobotBody, harness: Harness) -> tuple[AnyAdapter, Pioneer]:
         recorder, parameters = self.recorder, self.scenario.parameters

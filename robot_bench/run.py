@@ -4,27 +4,33 @@ The trace is written while the run goes on; when the run ends, however it ends,
 the goals are judged from it and everything else in the folder is made from it.
 What the folder holds is listed in `robot_bench.report.make`.
 
-Invariant: whatever raises in between, the trace is closed and readable.
+What the chip's package, the bench and the disk refuse in the midst of a run is a failure
+of that run. What keeps it from beginning, and a bug, is raised; the folder tells of it too.
+
+Invariant: whatever raises, the trace has its last line (unless the disk takes none), and
+a report can be made of the folder.
 """
 
 import contextlib
 import hashlib
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from importlib.metadata import version
 from pathlib import Path
 from typing import TypeVar
 
-from p2os.errors import P2osError, UsageError
+from bluepill_sim.errors import BluePillError
+from p2os.errors import P2osError
 from p2os.pioneer.world.model import Pose, World
 from p2os.timing import NS_PER_MS, NS_PER_S, Nanos
 from p2os.transport import Transport
 from p2os.transport.wall_clock import Clock, wall_clock
 from robot_bench.bench import Bench
 from robot_bench.pacer import PACED_SLICE_NS, RealTimePacer
+from robot_bench.recording.run_folder import reserved
 from robot_bench.recording.run_record import Json, read_run
-from robot_bench.recording.summary import SUMMARY_NAME
+from robot_bench.recording.summary import end_of_a_broken_run
 from robot_bench.recording.trace import TRACE_NAME, TraceWriter
 from robot_bench.remote import RemoteBench
 from robot_bench.report.make import make_artefacts
@@ -35,8 +41,12 @@ from robot_bench.scenario.scenario import Scenario
 UNPACED_SLICE_NS: Nanos = 10 * NS_PER_MS
 #: Nothing seen of the firmware for so long at the end of a run is worth a note: it spins, or hangs.
 QUIET_NS: Nanos = 1 * NS_PER_S
-#: What mode C records as the world, of which it knows nothing: 8 m of an empty plan.
-UNKNOWN_PLACE: Json = {"name": "the real one", "extent": [-4.0, -4.0, 4.0, 4.0], "obstacles": []}
+#: What is recorded as the world where nothing is known of it: 8 m of an empty plan.
+UNKNOWN_PLACE: Json = {"extent": [-4.0, -4.0, 4.0, 4.0], "obstacles": []}
+#: Exit code of errors that whoever types the command can mend.
+WRONG_USAGE = 2
+#: What the packages under the bench raise on purpose; neither knows the other.
+EXPECTED = (P2osError, BluePillError)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -81,6 +91,7 @@ def run_scenario(
     on_progress: ProgressListener | None = None,
     clock: Clock = wall_clock,
     drive: RunBench | None = None,
+    force: bool = False,
 ) -> RunResult:
     """Run a scenario in virtual time and make its run folder.
 
@@ -92,13 +103,14 @@ def run_scenario(
         on_progress: Called after each slice; a KeyboardInterrupt out of it ends the run in good order.
         clock: Wall clock in nanoseconds.
         drive: Runs the bench in place of its `run_until`; a debugger.
+        force: Overwrite the run that the folder holds.
 
     Raises:
-        P2osError: A file cannot be read, or a part is not installed.
+        P2osError: The folder is not free, a file cannot be read or written, or a part is not installed.
+        BluePillError: The firmware file cannot be read, or the emulator is not installed.
     """
-    prepare_folder(folder)
     pacer = None if speed is None else RealTimePacer(speed=speed, clock=clock)
-    with contextlib.closing(TraceWriter(folder / TRACE_NAME)) as trace:
+    with reserved(folder, force=force), _trace_of(scenario, folder, is_at_port=False) as trace:
         bench = Bench(scenario, trace=trace, slice_ns=slice_ns or (PACED_SLICE_NS if pacer else UNPACED_SLICE_NS))
 
         def after_slice(now: Nanos) -> None:
@@ -108,7 +120,7 @@ def run_scenario(
                 on_progress(Progress(now=now, duration_ns=scenario.duration_ns, doing=lambda: doing(bench)))
 
         bench.on_slice = after_slice
-        trace.meta(meta_of(scenario, bench.parts.world, bench.note))
+        trace.meta(meta_of(scenario, bench.parts.world, bench.note, is_at_port=False))
         return _record(bench, trace, folder, pacer, clock, drive)
 
 
@@ -120,21 +132,24 @@ def run_at_port(
     on_progress: ProgressListener | None = None,
     clock: Clock = wall_clock,
     drive: RunRemoteBench | None = None,
+    force: bool = False,
 ) -> RunResult:
     """Drive the robot at a transport in real time (mode C), stop it, and make the run folder.
 
     The transport is closed in any case. A lost line, lag and a signal are failures of the run.
 
-    With `drive`, a debugger runs the bench in place of its `run_until`.
+    With `drive`, a debugger runs the bench in place of its `run_until`; with `force`, the
+    run that the folder holds is overwritten.
 
     Raises:
-        P2osError: A file cannot be read, or a part is not installed.
+        P2osError: The folder is not free, a file cannot be read or written, or a part is not installed.
+        BluePillError: The firmware file cannot be read, or the emulator is not installed.
     """
     pacer = RealTimePacer(clock=clock)
     with contextlib.ExitStack() as stack:
         stack.callback(transport.close)
-        prepare_folder(folder)
-        trace = stack.enter_context(contextlib.closing(TraceWriter(folder / TRACE_NAME)))
+        stack.enter_context(reserved(folder, force=force))
+        trace = stack.enter_context(_trace_of(scenario, folder, is_at_port=True))
         bench = RemoteBench(scenario, transport, pacer, trace=trace)
 
         def after_slice(now: Nanos) -> None:
@@ -142,29 +157,14 @@ def run_at_port(
                 on_progress(Progress(now=now, duration_ns=scenario.duration_ns, doing=lambda: doing(bench)))
 
         bench.on_slice = after_slice
-        trace.meta(meta_of(scenario, None, bench.note))
+        trace.meta(meta_of(scenario, None, bench.note, is_at_port=True))
         return _record(bench, trace, folder, pacer, clock, drive)
 
 
-def prepare_folder(folder: Path) -> None:
-    """Make a run folder, or clear one of an earlier run.
-
-    Raises:
-        UsageError: The folder holds something else.
-    """
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise UsageError(f"cannot make the run folder {folder}: {error.strerror}") from error
-    if any(folder.iterdir()) and not (folder / TRACE_NAME).is_file():
-        raise UsageError(f"{folder} holds something that is no run", hint="--out takes a new or an empty folder")
-    for name in (TRACE_NAME, SUMMARY_NAME, "report.html", "pins.vcd", "pins.sr", "wire.jsonl", "usart.txt"):
-        (folder / name).unlink(missing_ok=True)
-
-
-def meta_of(scenario: Scenario, world: World | None, note: str | None) -> Json:
-    """Return the trace's first line: what was run, where, with what robot; no world is mode C."""
+def meta_of(scenario: Scenario, world: World | None, note: str | None, *, is_at_port: bool) -> Json:
+    """Return the trace's first line: what was run, where, with what robot; no world is one that is not known."""
     parameters = scenario.parameters
+    place = "the real one" if is_at_port else str(scenario.world)
     start = Pose(0.0, 0.0, 0.0) if world is None else scenario.start or world.start
     return {
         "version": version("p2os"),
@@ -172,16 +172,16 @@ def meta_of(scenario: Scenario, world: World | None, note: str | None) -> Json:
         "description": scenario.description,
         "text": scenario.text,
         "firmware": scenario.firmware.name,
-        "firmware_sha256": hashlib.sha256(scenario.firmware.read_bytes()).hexdigest(),
-        "mode": "port" if world is None else scenario.mode,
-        "body": "remote" if world is None else scenario.body,
-        "seed": None if world is None else scenario.seed,
+        "firmware_sha256": _sha256_of(scenario.firmware),
+        "mode": "port" if is_at_port else scenario.mode,
+        "body": "remote" if is_at_port else scenario.body,
+        "seed": None if is_at_port else scenario.seed,
         "duration_s": scenario.duration_ns / NS_PER_S,
         "threshold_m": scenario.threshold_m,
         "step_mps": (scenario.direct if scenario.mode == "direct" else scenario.adapter).step_um_per_s / 1e6,
         "note": note,
         "start": {"x": start.x_m, "y": start.y_m, "heading": start.heading_rad},
-        "world": UNKNOWN_PLACE if world is None else world.to_plain(),
+        "world": {"name": place, **UNKNOWN_PLACE} if world is None else world.to_plain(),
         "robot": {
             "name": scenario.robot,
             "front_m": parameters.body.hull_front_m,
@@ -197,6 +197,39 @@ def meta_of(scenario: Scenario, world: World | None, note: str | None) -> Json:
             "sonar_range_m": parameters.sonar_range_m,
         },
     }
+
+
+def _sha256_of(firmware: Path) -> str | None:
+    try:
+        return hashlib.sha256(firmware.read_bytes()).hexdigest()
+    except OSError:  # who needs the file says so
+        return None
+
+
+@contextlib.contextmanager
+def _trace_of(scenario: Scenario, folder: Path, *, is_at_port: bool) -> Iterator[TraceWriter]:
+    """Open a folder's trace for a block; what leaves the block as an error is told of in the folder first."""
+    with contextlib.closing(TraceWriter(folder / TRACE_NAME)) as trace:
+        try:
+            yield trace
+        except BaseException as error:
+            if not trace.has_end:
+                with contextlib.suppress(*EXPECTED):  # a disk that is full: the first failure is the one to be told
+                    if not trace.has_meta:
+                        trace.meta(meta_of(scenario, None, None, is_at_port=is_at_port))
+                    trace.flush()
+                    trace.end(end_of_a_broken_run(read_run(folder), _reason(error)))
+                    make_artefacts(folder)
+            raise
+
+
+def _reason(error: BaseException) -> str:
+    """Return why a run ended, in one line."""
+    if isinstance(error, KeyboardInterrupt):
+        return f"interrupted ({error})" if error.args else "interrupted"
+    if isinstance(error, (*EXPECTED, ModuleNotFoundError)):
+        return str(error)
+    return f"this is a bug: {type(error).__name__}: {error}"
 
 
 def doing(bench: Bench | RemoteBench) -> str:
@@ -227,13 +260,20 @@ def _record(
             drive(bench)
     except KeyboardInterrupt as interruption:
         was_interrupted = True
-        failures.append(f"interrupted ({interruption})" if interruption.args else "interrupted")
-    except P2osError as error:
-        failures.append(str(error))
+        failures.append(_reason(interruption))
+    except EXPECTED as error:
+        if bench.chip.now_ns == 0 and error.exit_code == WRONG_USAGE:
+            raise  # it has not begun: a port of GDB's that is taken
+        failures.append(_reason(error))
+    except Exception:
+        with contextlib.suppress(Exception):  # the bug that is on its way counts
+            bench.finish()
+        raise
     end = bench.finish()
     wall_s = (clock() - began) / NS_PER_S
     if bench.chip.has_died:
         failures.append(bench.chip.verdict)
+    trace.flush()
     record = read_run(folder)
     met, missed = judge(record, bench.scenario.goals)
     trace.end(

@@ -7,9 +7,9 @@ from typing import Annotated
 import typer
 
 from p2os.errors import MissingDependencyError
-from robot_bench.cli.folders import next_folder
 from robot_bench.cli.progress import RunDisplay
 from robot_bench.cli.run import end_with
+from robot_bench.recording.run_folder import make_next_folder
 from robot_bench.run import run_scenario
 from robot_bench.scenario.scenario import load_scenario
 
@@ -29,15 +29,16 @@ def register(app: typer.Typer) -> None:
 def demo(
     out: Annotated[Path | None, typer.Option(help="Run folder; default runs/demo-NNN.", metavar="DIR")] = None,
     duration: Annotated[float | None, typer.Option(help="Seconds of virtual time.", metavar="S")] = None,
+    force: Annotated[bool, typer.Option("--force", help="Overwrite the run that the --out folder holds.")] = False,
     json_output: Annotated[bool, typer.Option("--json", help="Print one JSON object.")] = False,
 ) -> None:
     """Run the demonstration."""
     scenario = load_scenario("dodge").with_options(
         mode="adapter", world="room", body=best_body(), duration_s=duration
     )  # fmt: skip
-    folder = out or next_folder("demo")
+    folder = out or make_next_folder("demo")
     with RunDisplay() as display:
-        result = run_scenario(scenario, folder, on_progress=display.update)
+        result = run_scenario(scenario, folder, on_progress=display.update, force=force)
     end_with(result, json_output=json_output)
 
 

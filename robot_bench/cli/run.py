@@ -12,10 +12,10 @@ from p2os.cli.held_robot import hold_robot
 from p2os.cli.main import EXIT_INTERRUPTED
 from p2os.errors import RunFailedError, UsageError
 from p2os.transport import open_url
-from robot_bench.cli.folders import next_folder
 from robot_bench.cli.gdb import debug_bench, debug_port
 from robot_bench.cli.progress import RunDisplay
 from robot_bench.cli.table import print_result
+from robot_bench.recording.run_folder import make_next_folder
 from robot_bench.remote import CAUTIOUS_ROTATION_DEG_S, CAUTIOUS_VELOCITY_MM_S
 from robot_bench.run import RunResult, run_at_port, run_scenario
 from robot_bench.scenario.scenario import Scenario, load_scenario
@@ -28,6 +28,7 @@ the trace, the pins as VCD and for PulseView, and report.html.
 
 Exit code: 0 all goals were met, 1 one was missed or the run failed, 2 wrong
 usage or file, 130 interrupted (the run folder is complete up to there).
+However a run ends, its folder says so; --out never overwrites a run without --force.
 
 \b
 Examples:
@@ -77,6 +78,7 @@ def run(
         float | None, typer.Option(help="Keep pace with the clock, SPEED times as fast.", metavar="[SPEED]")
     ] = None,
     out: Annotated[Path | None, typer.Option(help="Run folder; default runs/SCENARIO-NNN.", metavar="DIR")] = None,
+    force: Annotated[bool, typer.Option("--force", help="Overwrite the run that the --out folder holds.")] = False,
     json_output: Annotated[bool, typer.Option("--json", help="Print one JSON object.")] = False,
     gdb: Annotated[
         int | None, typer.Option(help="Wait for GDB on this TCP port; 0 takes a free one.", metavar="PORT", min=0)
@@ -104,21 +106,29 @@ def run(
         duration_s=duration,
         usart_baud=usart_baud,
     )
-    folder = out or next_folder(wanted.name)
     if port is not None:
-        end_with(drive_port(wanted, folder, port, yes=yes, max_speed=max_speed, gdb=gdb), json_output=json_output)
+        result = drive_port(wanted, out, port, yes=yes, max_speed=max_speed, gdb=gdb, force=force)
+        end_with(result, json_output=json_output)
         return
+    folder = out or make_next_folder(wanted.name)
     with RunDisplay() as display:
         if gdb is None:
-            result = run_scenario(wanted, folder, speed=realtime, on_progress=display.update)
+            result = run_scenario(wanted, folder, speed=realtime, on_progress=display.update, force=force)
         else:
             driver = debug_bench(gdb, is_paced=realtime is not None, on_wait=display.raise_if_interrupted)
-            result = run_scenario(wanted, folder, on_progress=display.update, drive=driver)
+            result = run_scenario(wanted, folder, on_progress=display.update, drive=driver, force=force)
     end_with(result, json_output=json_output)
 
 
 def drive_port(
-    scenario: Scenario, folder: Path, url: str, *, yes: bool, max_speed: int | None, gdb: int | None = None
+    scenario: Scenario,
+    out: Path | None,
+    url: str,
+    *,
+    yes: bool,
+    max_speed: int | None,
+    gdb: int | None = None,
+    force: bool = False,
 ) -> RunResult:
     """Drive the robot at a URL after asking a person.
 
@@ -134,7 +144,8 @@ def drive_port(
         hold_robot()
         with RunDisplay() as display:
             driver = None if gdb is None else debug_port(gdb, on_wait=display.raise_if_interrupted)
-            return run_at_port(scenario, folder, transport, on_progress=display.update, drive=driver)
+            folder = out or make_next_folder(scenario.name)
+            return run_at_port(scenario, folder, transport, on_progress=display.update, drive=driver, force=force)
     finally:
         transport.close()
 

@@ -7,6 +7,7 @@ from rich.console import Console
 from rich.table import Table
 
 from bluepill_sim.program.last_blocks import title_of
+from robot_bench.recording.summary import LISTED_HITS
 from robot_bench.run import RunResult
 
 
@@ -18,6 +19,12 @@ def print_result(result: RunResult, console: Console | None = None) -> None:
     for name, value in rows(outcome):
         table.add_row(name, value)
     console.print(table)
+    hits = cast("Sequence[Mapping[str, object]]", outcome["hits"])
+    for hit in hits[:LISTED_HITS]:
+        text = f"hit     {hit['what']} at {hit['t_s']:.3f} s, x {hit['x_m']:.2f} m, y {hit['y_m']:.2f} m"
+        console.print(text, markup=False, soft_wrap=True)
+    if len(hits) > LISTED_HITS:
+        console.print(f"hit     {len(hits) - LISTED_HITS} more, in the state log")
     for goal in cast("Sequence[str]", outcome["goals_met"]):
         console.print(f"[green]met[/]     {goal}", soft_wrap=True)
     for failure in cast("Sequence[str]", outcome["failures"]):

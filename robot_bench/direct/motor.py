@@ -45,6 +45,8 @@ class JointMotor:
             if rest or self._change <= 0:
                 raise LocalProtocolError(f"a ramp of {ramp_um_per_s2} µm/s² is no whole number of µm/s in {dt_ns} ns")
         self.speed_um_per_s = 0
+        #: The value that the wires had at the last step.
+        self.asked = 0
 
     def value(self, at: Nanos) -> int:
         """Return the signed value on the wires at the instant `at`."""
@@ -56,7 +58,8 @@ class JointMotor:
 
     def step(self, at: Nanos) -> int:
         """Return the rim speed in µm/s for the step of the body that starts at `at`."""
-        wanted = self.value(at) * self._step_um_per_s
+        self.asked = self.value(at)
+        wanted = self.asked * self._step_um_per_s
         if self._change is None:
             self.speed_um_per_s = wanted
         elif wanted > self.speed_um_per_s:

@@ -4,10 +4,13 @@ The body is stepped at multiples of its dt from time 0, lazily: a step is made
 when someone wants to know what is behind it. The motors' wires are read at the
 start of each step, from the nets' history.
 
+Its state log has what the motors are told, and when a wheel stalls or is free again (looked
+at with the encoders); the body itself tells of collisions.
+
 Invariant: at time t the body has made every step that ended at or before t.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import cast
 
@@ -20,6 +23,13 @@ from robot_bench.direct.encoder import WheelEncoder
 from robot_bench.direct.motor import JointMotor
 
 UM_PER_M = 1_000_000
+#: (left, right wheel stalled) → what the state log says.
+STALLS = {
+    (False, False): ("freed", "both wheels turn as they are told"),
+    (True, False): ("stalled", "left wheel"),
+    (False, True): ("stalled", "right wheel"),
+    (True, True): ("stalled", "both wheels"),
+}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -63,6 +73,10 @@ class DirectRobot:
         self._encoder_period_ns = encoder_period_ns
         self._next_encoder: Nanos = 0
         self._steps = 0
+        self._asked = (0, 0)
+        self._stalled = (False, False)
+        #: Takes a line of the state log: (ns, what, detail).
+        self.on_event: Callable[[Nanos, str, str], None] | None = None
 
     def next_deadline(self) -> Nanos:
         """Return when a wire may change next."""
@@ -87,6 +101,7 @@ class DirectRobot:
         return {
             "body": self.body.snapshot(),
             "steps": self._steps,
+            "told": (self._asked, self._stalled),
             "speeds": (self._left.speed_um_per_s, self._right.speed_um_per_s),
             "next_encoder": self._next_encoder,
             "sensors": self.sensors.snapshot(),
@@ -97,6 +112,7 @@ class DirectRobot:
         state = cast("Mapping[str, object]", snapshot)
         self.body.restore(state["body"])
         self._steps = cast("int", state["steps"])
+        self._asked, self._stalled = cast("tuple[tuple[int, int], tuple[bool, bool]]", state["told"])
         self._left.speed_um_per_s, self._right.speed_um_per_s = cast("tuple[int, int]", state["speeds"])
         self._next_encoder = cast("int", state["next_encoder"])
         self.sensors.restore(cast("dict[str, object]", state["sensors"]))
@@ -108,6 +124,9 @@ class DirectRobot:
         while (steps + 1) * dt_ns <= limit:
             start = steps * dt_ns
             body.step(left.step(start) / UM_PER_M, right.step(start) / UM_PER_M)
+            if (left.asked, right.asked) != self._asked:
+                self._asked = (left.asked, right.asked)
+                self._tell(start, "command", f"motors {left.asked}, {right.asked}")
             steps += 1
         self._steps = steps
 
@@ -116,3 +135,11 @@ class DirectRobot:
         self._left_encoder.show(state.left_angle_rad, now)
         self._right_encoder.show(state.right_angle_rad, now)
         self._next_encoder = now + self._encoder_period_ns
+        stalled = (state.stalled_left, state.stalled_right)
+        if stalled != self._stalled:
+            self._stalled = stalled
+            self._tell(now, *STALLS[stalled])
+
+    def _tell(self, at: Nanos, what: str, detail: str) -> None:
+        if self.on_event is not None:
+            self.on_event(at, what, detail)

@@ -4,6 +4,9 @@ The recorder is the last follower of the loop. It samples the pose each 50 ms,
 hands the trace what has passed, and keeps the few figures that a summary needs
 and no trace holds (the clearance).
 
+Edges are written up to the instant before the one reached: at that one itself someone may
+still drive. So a wire's first level, too, is what it is when all of time 0 was driven.
+
 Invariant: it changes nothing that it watches.
 """
 
@@ -11,9 +14,10 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from typing import Protocol, cast
 
-from p2os.pioneer.body.contract import BodyState
+from p2os.pioneer.body.contract import BodyState, Hit
 from p2os.pioneer.world.model import Obstacle
 from p2os.timing import NS_PER_MS, Nanos, Reached
+from robot_bench.recording.run_record import COLLISION
 from robot_bench.recording.trace import TraceWriter
 from robot_bench.wires.nets import Harness, Net
 
@@ -37,6 +41,10 @@ class Observed(Protocol):
 
     def take_moved(self) -> Sequence[Obstacle]:
         """Return what has walked or was pushed since this was asked last."""
+        ...
+
+    def take_hits(self) -> Sequence[Hit]:
+        """Return the collisions since this was asked last."""
         ...
 
 
@@ -72,16 +80,16 @@ class Recorder:
         self._sample_ns = sample_ns
         self._next_sample: Nanos = 0
         self._changed: dict[str, None] = {}
+        #: Whether the levels at time 0 are written: not before everything of that instant was driven.
+        self._has_levels = False
         self._text = b""
         self._sonar_mm: list[int] | None = None
         for net in harness:
             net.watch(self._note_change)
 
     def start(self) -> None:
-        """Write every wire's level at time 0."""
-        for net in self._harness:
-            net.edges_until(0)
-            self.trace.add("pin", 0, {"net": net.name, "v": int(net.level(0))})
+        """Have every wire's level at time 0 written once nobody can drive at that instant any more."""
+        self._changed = dict.fromkeys(net.name for net in self._harness)
 
     def usart(self, data: bytes, at: Nanos) -> None:
         """Take characters that the chip has sent, their last one complete at `at`."""
@@ -143,6 +151,7 @@ class Recorder:
             "last_state": self.last_state,
             "next_sample": self._next_sample,
             "changed": tuple(self._changed),
+            "has_levels": self._has_levels,
             "text": self._text,
             "sonar_mm": None if self._sonar_mm is None else tuple(self._sonar_mm),
         }
@@ -156,6 +165,7 @@ class Recorder:
         self.last_state = cast("BodyState | None", state["last_state"])
         self._next_sample = cast("int", state["next_sample"])
         self._changed = dict.fromkeys(cast("tuple[str, ...]", state["changed"]))
+        self._has_levels = bool(state["has_levels"])
         self._text = cast("bytes", state["text"])
         sonar = cast("tuple[int, ...] | None", state["sonar_mm"])
         self._sonar_mm = None if sonar is None else list(sonar)
@@ -181,12 +191,23 @@ class Recorder:
         self.trace.add("pose", at, pose_entry(state))
         for item in self._body.take_moved():
             self.obstacle("move", item.name, at, moved_entry(item))
+        for hit in self._body.take_hits():
+            # The body may have made the step that ends just after `at` already.
+            self.event("body", min(hit.at_ns, at), COLLISION, hit_detail(hit))
 
     def _pass(self, limit: Nanos) -> None:
         """Write what is stamped at or before `limit`, and let the wires forget it."""
+        if not self._has_levels and limit >= 0:
+            self._has_levels = True
+            self._write_levels()
         if self._changed:
             self._write_edges(limit)
         self.trace.write_until(limit)
+
+    def _write_levels(self) -> None:
+        for net in self._harness:
+            net.edges_until(0)
+            self.trace.add("pin", 0, {"net": net.name, "v": int(net.level(0))})
 
     def _write_edges(self, limit: Nanos) -> None:
         changed, self._changed = self._changed, {}
@@ -201,6 +222,12 @@ class Recorder:
                 )
             if net.forget_before(limit):
                 self._changed[net.name] = None
+
+
+def hit_detail(hit: Hit) -> str:
+    """Return what was hit, and where, in one line."""
+    what = repr(hit.name) if hit.name else "something"
+    return f"{what} at x {hit.x_m:.3f} m, y {hit.y_m:.3f} m"
 
 
 def moved_entry(item: Obstacle) -> dict[str, object]:

@@ -9,17 +9,22 @@ Invariant: reading never fails on a trace that ends early; it fails with
 """
 
 import json
+import re
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import cast
 
 from p2os.errors import FileError
+from p2os.timing import NS_PER_S
 
 #: A parsed JSON object.
 Json = dict[str, object]
 
 TRACE_NAME = "trace.jsonl"
+#: What the body notes when it comes to touch something.
+COLLISION = "collision"
+_PLACE = re.compile(r" at x (-?[\d.]+) m, y (-?[\d.]+) m$")
 
 
 class TraceError(FileError):
@@ -58,6 +63,19 @@ class Event:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class Collision:
+    """What the body came to touch, when (ns) and where in the plan (metres)."""
+
+    t: int
+    what: str
+    x: float
+    y: float
+
+    def __str__(self) -> str:
+        return f"{self.what} at {self.t / NS_PER_S:.3f} s, x {self.x:.2f} m, y {self.y:.2f} m"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class WireChunk:
     """Bytes that finished arriving at `t`: `c2r` from client to robot, `r2c` back."""
 
@@ -88,6 +106,15 @@ class RunRecord:
     def usart_text(self) -> str:
         """All that the firmware printed, undecodable bytes replaced."""
         return b"".join(data for _, data in self.usart).decode("utf-8", "replace")
+
+    def collisions(self) -> list[Collision]:
+        """Return what the body came to touch, in order; empty for a robot at a port, which cannot tell."""
+        found = []
+        for event in self.events:
+            if event.who == "body" and event.what == COLLISION and (place := _PLACE.search(event.detail)):
+                what = event.detail[: place.start()]
+                found.append(Collision(t=event.t, what=what, x=float(place[1]), y=float(place[2])))
+        return found
 
     def usart_lines(self) -> list[tuple[int, str]]:
         """Return (ns of its last character, text) for each printed line."""

@@ -15,6 +15,8 @@ from robot_bench.recording.run_record import Json, RunRecord
 
 #: Side of the cells that a run's coverage is counted in, metres.
 CELL_M = 0.5
+#: chosen: so many collisions are listed in the table; all stand in the state log.
+LISTED_HITS = 5
 SUMMARY_NAME = "summary.json"
 
 _FROM_META = ("firmware_sha256", "scenario", "mode", "body", "world", "seed")
@@ -50,6 +52,7 @@ def figures(record: RunRecord) -> list[tuple[str, str]]:
         ("distance", f"{distance_m(record):.2f} m"),
         ("cells of 0.5 m entered", f"{cells_entered(record)}"),
         ("collisions", f"{record.poses[-1].collisions if record.poses else 0}"),
+        *((f"collision {number}", str(hit)) for number, hit in enumerate(record.collisions()[:LISTED_HITS], 1)),
     ]
     clearance = record.end.get("min_clearance_m")
     if isinstance(clearance, (int, float)):
@@ -66,8 +69,13 @@ def outcome_of(record: RunRecord) -> Json:
     result: Json = {key: record.meta.get(key) for key in _FROM_META}
     world = result["world"]
     result["world"] = world.get("name") if isinstance(world, Mapping) else world
-    end = _end_of_a_cut_run(record) if record.is_cut else record.end
+    end = record.end
+    if record.is_cut:
+        end = end_of_a_broken_run(record, f"the run was cut at {record.last_ns / NS_PER_S:.1f} s")
     result.update((key, end.get(key)) for key in _FROM_END)
+    result["hits"] = [
+        {"t_s": hit.t / NS_PER_S, "what": hit.what, "x_m": hit.x, "y_m": hit.y} for hit in record.collisions()
+    ]
     return result
 
 
@@ -78,13 +86,14 @@ def write_outcome(record: RunRecord, folder: Path) -> Json:
     return outcome
 
 
-def _end_of_a_cut_run(record: RunRecord) -> Json:
+def end_of_a_broken_run(record: RunRecord, reason: str) -> Json:
+    """Return the last line of a run that did not come to its end, as far as its trace tells."""
     return {
         "virtual_s": record.last_ns / NS_PER_S,
         "distance_m": round(distance_m(record), 6),
         "collisions": record.poses[-1].collisions if record.poses else None,
         "passed": False,
-        "failures": [f"the run was cut at {record.last_ns / NS_PER_S:.1f} s"],
+        "failures": [reason],
         "goals_met": [],
         "notes": [],
         "last_blocks": [],

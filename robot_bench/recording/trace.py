@@ -8,7 +8,7 @@ only: no path, version, host or wall time. `t` is nanoseconds.
     {"k":"usart","hex"}                  a line (or 64 bytes) that the chip has printed
     {"k":"wire","dir","hex"}             bytes that have arrived: c2r client to robot, r2c back
     {"k":"obstacle","op","name",…}       something placed, moved or removed; lengths in metres
-    {"k":"event","who","what","detail"}  a state log: adapter, pioneer, chip, bench
+    {"k":"event","who","what","detail"}  a state log: adapter, pioneer, direct, body, chip, bench
     {"k":"sonar","mm":[…]}               ranges, all sonar, when new
     {"k":"pose","x","y","z","h","p","l","r","la","ra","c"}   µm, µrad, µm/s, collisions; each 50 ms
 
@@ -23,7 +23,7 @@ import contextlib
 import hashlib
 import io
 import json
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import IO, cast
@@ -74,6 +74,9 @@ class TraceWriter:
         self._sequence = 0
         self._written_until: Nanos = -1
         self._flushed_second = -1
+        #: Why nothing can be written any more.
+        self._failure: RunFailedError | None = None
+        self.has_meta = self.has_end = False
 
     @property
     def sha256(self) -> str:
@@ -86,9 +89,15 @@ class TraceWriter:
         return self._file.getvalue() if isinstance(self._file, io.StringIO) else ""
 
     def meta(self, entry: Entry) -> None:
-        """Write the first line and flush it."""
-        self._file.write(json.dumps({"k": "meta", **entry}) + "\n")
-        self._flush()
+        """Write the first line and flush it.
+
+        Raises:
+            RunFailedError: The disk is full or gone.
+        """
+        with self._writing() as file:
+            file.write(json.dumps({"k": "meta", **entry}) + "\n")
+            file.flush()
+        self.has_meta = True
 
     def add(self, kind: str, at: Nanos, entry: Entry) -> None:
         """Take an entry of `kind` stamped `at`.
@@ -102,28 +111,48 @@ class TraceWriter:
         self._pending.append((at, RANKS[kind], self._sequence, canonical({"k": kind, "t": at, **entry})))
 
     def write_until(self, limit: Nanos) -> None:
-        """Write everything stamped at or before `limit`; flush at each virtual second."""
-        if self._pending:
-            self._pending.sort()
-            count = 0
-            for at, _rank, _order, line in self._pending:
-                if at > limit:
-                    break
-                data = line + "\n"
-                self._file.write(data)
-                self._hash.update(data.encode("ascii"))
-                count += 1
-            del self._pending[:count]
-        self._written_until = max(self._written_until, limit)
-        second = limit // NS_PER_S
-        if second != self._flushed_second:
-            self._flushed_second = second
-            self._flush()
+        """Write everything stamped at or before `limit`; flush at each virtual second.
+
+        Raises:
+            RunFailedError: The disk is full or gone; so it is from then on.
+        """
+        with self._writing() as file:
+            if self._pending:
+                self._pending.sort()
+                count = 0
+                for at, _rank, _order, line in self._pending:
+                    if at > limit:
+                        break
+                    data = line + "\n"
+                    file.write(data)
+                    self._hash.update(data.encode("ascii"))
+                    count += 1
+                del self._pending[:count]
+            self._written_until = max(self._written_until, limit)
+            second = limit // NS_PER_S
+            if second != self._flushed_second:
+                self._flushed_second = second
+                file.flush()
+
+    def flush(self) -> None:
+        """Have all that was written so far in the file, for whoever reads it now.
+
+        Raises:
+            RunFailedError: The disk is full or gone.
+        """
+        with self._writing() as file:
+            file.flush()
 
     def end(self, entry: Entry) -> None:
-        """Write the last line and close the file; entries later than what was written are dropped."""
-        self._file.write(json.dumps({"k": "end", **entry}) + "\n")
-        self._flush()
+        """Write the last line and close the file; entries later than what was written are dropped.
+
+        Raises:
+            RunFailedError: The disk is full or gone.
+        """
+        with self._writing() as file:
+            file.write(json.dumps({"k": "end", **entry}) + "\n")
+            file.flush()
+        self.has_end = True
         self.close()
 
     def close(self) -> None:
@@ -132,16 +161,22 @@ class TraceWriter:
             with contextlib.suppress(OSError):  # a full disk was reported when it was first met
                 self._file.close()
 
-    def _flush(self) -> None:
-        """Hand what was written to the operating system, which keeps it when this process is killed.
+    @contextlib.contextmanager
+    def _writing(self) -> Iterator[IO[str]]:
+        """Lend the file; what was flushed is the operating system's, which keeps it when this process is killed.
 
         Raises:
-            RunFailedError: The disk is full or gone.
+            RunFailedError: The disk is full or gone. A line may be cut then, and nothing may follow it.
         """
+        if self._failure is not None:
+            raise self._failure
         try:
-            self._file.flush()
+            yield self._file
         except OSError as error:
-            raise RunFailedError(f"cannot write {self.path}: {error.strerror}") from error
+            self._failure = RunFailedError(
+                f"cannot write {self.path}: {error.strerror}", hint="p2os report on its folder shows what was written"
+            )
+            raise self._failure from error
 
     def mark(self) -> TraceMark:
         """Return where the trace stands, for `rewind`."""

@@ -15,6 +15,7 @@ import json
 from dataclasses import dataclass
 from pathlib import Path
 
+from p2os.errors import FileError
 from robot_bench.recording.run_record import Json, RunRecord, read_run
 from robot_bench.recording.summary import write_outcome
 from robot_bench.recording.waveforms import write_sigrok, write_vcd
@@ -61,14 +62,18 @@ def make_artefacts(folder: Path) -> Artefacts:
 
     Raises:
         TraceError: The folder holds no readable trace.
+        FileError: The disk is full, or the folder cannot be written.
     """
     record = read_run(folder)
-    outcome = write_outcome(record, folder)
-    write_vcd(record, folder / "pins.vcd")
-    write_sigrok(record, folder / "pins.sr")
-    write_wire(record, folder / "wire.jsonl")
-    (folder / "usart.txt").write_bytes(b"".join(data for _, data in record.usart))
-    report = make_report(folder)
+    try:
+        outcome = write_outcome(record, folder)
+        write_vcd(record, folder / "pins.vcd")
+        write_sigrok(record, folder / "pins.sr")
+        write_wire(record, folder / "wire.jsonl")
+        (folder / "usart.txt").write_bytes(b"".join(data for _, data in record.usart))
+        report = make_report(folder)
+    except OSError as error:
+        raise FileError(f"cannot write into {folder}: {error.strerror or error}") from error
     return Artefacts(outcome=outcome, report=report.page)
 
 

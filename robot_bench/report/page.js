@@ -2,6 +2,7 @@
 "use strict";
 const run = JSON.parse(document.getElementById("data").textContent);
 const end = Math.max(run.duration, 0.001);
+const nearest = run.sonar.map((row) => [row[0], Math.min(...row.slice(1))]);
 const view = { from: 0, to: end, at: 0, playing: false };
 const css = (name) => getComputedStyle(document.documentElement).getPropertyValue(name).trim();
 const byId = (id) => document.getElementById(id);
@@ -68,7 +69,12 @@ function drawMap() {
     for (const p of run.poses) { if (p[0] > limit) break; g.lineTo(X(p[1]), Y(p[2])); }
     g.stroke();
   }
-  g.globalAlpha = 1;
+  g.globalAlpha = 1; g.strokeStyle = g.fillStyle = css("--right"); g.lineWidth = 2.4; g.textAlign = "left";
+  for (const [t, x, y, what] of run.hits) {
+    if (t > view.at) break;
+    g.beginPath(); g.moveTo(X(x) - 6, Y(y) - 6); g.lineTo(X(x) + 6, Y(y) + 6); g.moveTo(X(x) + 6, Y(y) - 6); g.lineTo(X(x) - 6, Y(y) + 6); g.stroke();
+    if (run.hits.length <= 8 || view.at - t < 2) g.fillText(`${what}, ${t.toFixed(1)} s`, X(x) + 9, Y(y) - 7);
+  }
   const p = pose(view.at);
   if (!p) return;
   const robot = run.robot, echo = run.sonar[before(run.sonar, view.at)];
@@ -135,7 +141,7 @@ function drawSpeeds() {
 }
 function drawSonar() {
   const plot = axis("sonar", 0, 3, "m");
-  line(plot, run.nearest, 1, css("--left"), true);
+  line(plot, nearest, 1, css("--left"), true);
   plot.g.setLineDash([4, 4]); plot.g.strokeStyle = css("--right"); plot.g.beginPath();
   plot.g.moveTo(LEFT, plot.Y(run.threshold)); plot.g.lineTo(plot.width, plot.Y(run.threshold)); plot.g.stroke(); plot.g.setLineDash([]);
   cursor(plot);

@@ -6,15 +6,17 @@ artefact. All drawing happens in `page.js` from the JSON built here.
 
 import html
 import json
+from collections.abc import Mapping, Sequence
 from importlib.resources import files
 from string import Template
 from typing import cast
 
 from p2os.timing import NS_PER_S
-from robot_bench.recording.run_record import Json, RunRecord
+from robot_bench.recording.run_record import COLLISION, Json, RunRecord
 from robot_bench.recording.signals import grouped, motor_steps
 from robot_bench.recording.summary import figures, verdict
 from robot_bench.report.packets import describe
+from robot_bench.report.thinning import ends, extremes, pulses
 
 #: Speed of one motor step where a trace does not hold it: the adapter's default, m/s.
 DEFAULT_STEP_MPS = 0.0625
@@ -22,13 +24,21 @@ DEFAULT_STEP_MPS = 0.0625
 PIN_ROW_PX = 17
 GROUP_PX = 22
 AXIS_PX = 26
+#: chosen: of all rows of the page none makes it larger than 2 MB; what a list may take, in characters.
+LIST_BYTES, WIRE_BYTES = 120_000, 400_000
+#: What a row costs besides its text; a packet's name and meaning.
+ROW_BYTES, PACKET_BYTES = 24, 130
+PIN_BUCKETS = 500
+MOST_MOVES = 2000
+MOST_HITS = 500
 
 
 def render_page(record: RunRecord) -> str:
     """Return the report of a run as one HTML document."""
     source = files("robot_bench.report")
     result = verdict(record)
-    data = json.dumps(page_data(record), separators=(",", ":")).replace("</", "<\\/")
+    drawn = page_data(record)
+    data = json.dumps(drawn, separators=(",", ":")).replace("</", "<\\/")
     nets = grouped(sorted(record.pins))
     return Template(source.joinpath("page.html").read_text(encoding="utf-8")).substitute(
         title=html.escape(f"{record.meta.get('scenario', 'run')} · {result}"),
@@ -38,6 +48,7 @@ def render_page(record: RunRecord) -> str:
         lead=html.escape(_lead(record.meta)),
         figures="".join(f"<tr><td>{html.escape(k)}</td><td>{html.escape(v)}</td></tr>" for k, v in figures(record)),
         goals=_goals(record.end),
+        left_out=_left_out(cast("list[str]", drawn["left_out"])),
         pins_height=AXIS_PX + sum(GROUP_PX + PIN_ROW_PX * len(names) for _, names in nets),
         footer=html.escape(_footer(record)),
         style=source.joinpath("page.css").read_text(encoding="utf-8"),
@@ -47,7 +58,8 @@ def render_page(record: RunRecord) -> str:
 
 
 def page_data(record: RunRecord) -> Json:
-    """Return what the page's script draws: seconds, metres, radians and m/s."""
+    """Return what the page's script draws: seconds, metres, radians and m/s; of a long run as much as can be seen."""
+    left_out: list[str] = []
     world = cast("Json", record.meta.get("world") or {})
     step = float(cast("float", record.meta.get("step_mps") or DEFAULT_STEP_MPS))
     return {
@@ -58,28 +70,99 @@ def page_data(record: RunRecord) -> Json:
             "extent": world.get("extent") or [-3, -3, 3, 3],
         },
         "robot": _robot(cast("Json", record.meta.get("robot") or {})),
-        "changes": [_obstacle({**item, "t": _seconds(cast("int", item["t"]))}) for item in record.obstacles],
-        "poses": [
-            [_seconds(p.t), p.x / 1e6, p.y / 1e6, p.heading / 1e6, p.left / 1e6, p.right / 1e6] for p in record.poses
-        ],
-        "sonar": [[_seconds(t), *(mm / 1000 for mm in ranges)] for t, ranges in record.sonar],
-        "nearest": [[_seconds(t), min(ranges) / 1000] for t, ranges in record.sonar if ranges],
-        "motors": [
-            [[_seconds(t), value * step] for t, value in motor_steps(record.pins, motor)] or [[0, 0]]
-            for motor in (1, 2)
-        ],
-        "pins": [
-            [title, [[net, [[_seconds(t), level] for t, level in record.pins[net]]] for net in nets]]
-            for title, nets in grouped(sorted(record.pins))
-        ],
-        "events": [[_seconds(e.t), e.who, e.what, e.detail] for e in record.events],
-        "usart": [[_seconds(t), text] for t, text in record.usart_lines()],
-        "packets": [
-            [_seconds(chunk.t), chunk.direction, name, text, chunk.data.hex(" ")]
-            for chunk in record.wire
-            for name, text in describe(chunk)
-        ],
+        "changes": _changes(record, left_out),
+        "poses": _poses(record, left_out),
+        "sonar": _sonar(record, left_out),
+        "motors": [_motor(record, motor, step) for motor in (1, 2)],
+        "pins": _pins(record, left_out),
+        "hits": [[_seconds(hit.t), hit.x, hit.y, hit.what] for hit in record.collisions()[:MOST_HITS]],
+        "events": _events(record, left_out),
+        "usart": _usart(record, left_out),
+        "packets": _packets(record, left_out),
+        "left_out": left_out,
     }
+
+
+def _changes(record: RunRecord, left_out: list[str]) -> list[Json]:
+    """Return the changes of the world; of what walks or is pushed on and on, the last place in each bucket of time."""
+    moves = sum(item.get("op") == "move" for item in record.obstacles)
+    width = 0 if moves <= MOST_MOVES else record.last_ns * len({item["name"] for item in record.obstacles}) / MOST_MOVES
+    kept: dict[object, Json] = {}
+    for number, item in enumerate(record.obstacles):
+        at = cast("int", item["t"])
+        is_thinned = width and item.get("op") == "move"
+        kept[(item["name"], int(at / width)) if is_thinned else number] = item
+    _note(left_out, "moves of things", len(kept), len(record.obstacles), "in each")
+    ordered = sorted(kept.values(), key=lambda item: cast("int", item["t"]))
+    return [_obstacle({**item, "t": _seconds(cast("int", item["t"]))}) for item in ordered]
+
+
+def _poses(record: RunRecord, left_out: list[str]) -> list[list[float]]:
+    poses = record.poses
+    columns = [[getattr(pose, name) for pose in poses] for name in ("x", "y", "left", "right")]
+    kept = [poses[n] for n in extremes([pose.t for pose in poses], columns)]
+    _note(left_out, "poses", len(kept), len(poses), "the least and greatest of each")
+    return [[_seconds(p.t), *(round(value / 1e6, 4) for value in (p.x, p.y, p.heading, p.left, p.right))] for p in kept]
+
+
+def _sonar(record: RunRecord, left_out: list[str]) -> list[list[float]]:
+    rows = [row for row in record.sonar if row[1]]
+    kept = [rows[n] for n in extremes([t for t, _ in rows], [[min(ranges) for _, ranges in rows]])]
+    _note(left_out, "sonar", len(kept), len(rows), "the least and greatest of each")
+    return [[_seconds(t), *(mm / 1000 for mm in ranges)] for t, ranges in kept]
+
+
+def _motor(record: RunRecord, motor: int, step: float) -> list[list[float]]:
+    steps = motor_steps(record.pins, motor)
+    kept = [steps[n] for n in extremes([t for t, _ in steps], [[value for _, value in steps]])]
+    return [[_seconds(t), value * step] for t, value in kept] or [[0, 0]]
+
+
+def _pins(record: RunRecord, left_out: list[str]) -> list[Json | list[object]]:
+    kept = {net: pulses(edges, buckets=PIN_BUCKETS) for net, edges in record.pins.items()}
+    _note(left_out, "pins", _total(kept), _total(record.pins), "edges: the first two and the last of each")
+    return [
+        [title, [[net, [[_seconds(t), level] for t, level in kept[net]]] for net in nets]]
+        for title, nets in grouped(sorted(record.pins))
+    ]
+
+
+def _events(record: RunRecord, left_out: list[str]) -> list[list[object]]:
+    """Return the state log: its beginning, its end, and every collision of those shown on the map."""
+    events = record.events
+    head, tail = ends([len(e.who) + len(e.what) + len(e.detail) + ROW_BYTES for e in events], LIST_BYTES)
+    shown = {*range(head), *range(len(events) - tail, len(events))}
+    shown |= set([n for n, e in enumerate(events) if e.what == COLLISION][:MOST_HITS])
+    _note(left_out, "state log", len(shown), len(events), "lines, from the beginning and the end")
+    return [[_seconds(e.t), e.who, e.what, e.detail] for n, e in enumerate(events) if n in shown]
+
+
+def _usart(record: RunRecord, left_out: list[str]) -> list[list[object]]:
+    lines = record.usart_lines()
+    head, tail = ends([len(text) + ROW_BYTES for _, text in lines], LIST_BYTES)
+    _note(left_out, "lines of text", head + tail, len(lines), "from the beginning and the end (usart.txt has all)")
+    return [[_seconds(t), text] for t, text in (*lines[:head], *lines[len(lines) - tail :])]
+
+
+def _packets(record: RunRecord, left_out: list[str]) -> list[list[object]]:
+    wire = record.wire
+    head, tail = ends([4 * len(chunk.data) + PACKET_BYTES for chunk in wire], WIRE_BYTES)
+    _note(left_out, "packets", head + tail, len(wire), "from the beginning and the end (wire.jsonl has all)")
+    return [
+        [_seconds(chunk.t), chunk.direction, name, text, chunk.data.hex(" ")]
+        for chunk in (*wire[:head], *wire[len(wire) - tail :])
+        for name, text in describe(chunk)
+    ]
+
+
+def _note(left_out: list[str], what: str, shown: int, there: int, how: str) -> None:
+    """Add a line where not all of something is shown."""
+    if shown < there:
+        left_out.append(f"{what}: {shown} of {there}, {how}{' bucket of time' if how.endswith('each') else ''}")
+
+
+def _total(pins: Mapping[str, Sequence[object]]) -> int:
+    return sum(map(len, pins.values()))
 
 
 def _seconds(ns: int) -> float:
@@ -130,6 +213,17 @@ def _goals(end: Json) -> str:
         return goals
     text = html.escape("\n".join(blocks))
     return f"{goals}<details><summary>What ran last, by cycle</summary><pre>{text}</pre></details>"
+
+
+def _left_out(lines: list[str]) -> str:
+    """Return what a page of a long run does not show; nothing where it shows all."""
+    if not lines:
+        return ""
+    items = "".join(f"<li>{html.escape(line)}</li>" for line in lines)
+    return (
+        f'<details class="left-out" open><summary>A long run: this page shows a part of what was recorded; '
+        f"trace.jsonl holds all</summary><ul>{items}</ul></details>"
+    )
 
 
 def _footer(record: RunRecord) -> str:

@@ -17,7 +17,9 @@ from robot_bench.recording.run_record import Json, RunRecord
 from robot_bench.recording.signals import grouped, motor_steps
 from robot_bench.recording.summary import verdict
 
-LEFT, RIGHT, WALL, BOX, FLOOR = "#1b6ca8", "#c8553d", "#4a5560", "#b9a66b", "#dfe3d8"
+LEFT, RIGHT, WALL, BOX, FLOOR, HIT = "#1b6ca8", "#c8553d", "#4a5560", "#b9a66b", "#dfe3d8", "#b00020"
+#: chosen: more names than these would cover the plan; each collision has its mark.
+NAMED_HITS = 8
 DOTS_PER_INCH = 110
 DEFAULT_STEP_MPS = 0.0625
 
@@ -47,6 +49,12 @@ def _path_figure(record: RunRecord) -> Figure:
         axes.add_patch(_patch(obstacle, axes))
     xs, ys = [p.x / 1e6 for p in record.poses], [p.y / 1e6 for p in record.poses]
     axes.plot(xs, ys, color=LEFT, linewidth=1.6)
+    hits = record.collisions()
+    if hits:
+        axes.plot([hit.x for hit in hits], [hit.y for hit in hits], "X", color=HIT, markersize=9, zorder=4)
+        for hit in hits[:NAMED_HITS]:
+            text = f"{hit.what}, {hit.t / NS_PER_S:.1f} s"
+            axes.annotate(text, (hit.x, hit.y), (6, 6), textcoords="offset points", color=HIT, fontsize=8, zorder=4)
     if record.poses:
         axes.plot(xs[0], ys[0], "o", color=LEFT, markersize=7, markerfacecolor="white")
         axes.add_patch(_hull(record, axes))

@@ -23,6 +23,8 @@ from robot_bench.scenario.schema import LONGEST_S, Key, Table, Where, check_tabl
 NS_PER_MINUTE = 60 * NS_PER_S
 #: chosen: two motor values that follow each other within this are one change (two ports are written in turn).
 SKEW_NS: Nanos = 1 * NS_PER_MS
+#: chosen: so many collisions are named in one line; all stand in the state log.
+NAMED_HITS = 3
 #: What is unknown of a real robot, and what needs a world of ours.
 NOT_AT_A_PORT = frozenset({"no_collision", "encoder_counts_match", "sensor_named"})
 
@@ -106,6 +108,10 @@ def _number(arguments: Table, name: str, default: float = 0.0) -> float:
 
 def _no_collision(record: RunRecord, _arguments: Table) -> str | None:
     first = next((pose for pose in record.poses if pose.collisions), None)
+    hits = record.collisions()
+    if hits:
+        more = f", and {len(hits) - NAMED_HITS} more" if len(hits) > NAMED_HITS else ""
+        return f"{len(hits)} collision(s): {'; '.join(map(str, hits[:NAMED_HITS]))}{more}"
     if first is None:
         return None
     return f"{record.poses[-1].collisions} collision(s), the first at {_seconds(first.t)}, {_place(first)}"

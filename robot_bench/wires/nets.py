@@ -84,7 +84,7 @@ class Net:
         """Hold the wire from `now` on; it replaces what the same owner did before.
 
         Raises:
-            LocalProtocolError: `owner` has already reported something later.
+            LocalProtocolError: `owner` has already reported something later, or the edges of that instant were told.
         """
         history = self._drives.setdefault(owner, [])
         new = Drive(level, strength) if strength is not Strength.FLOATING else RELEASED
@@ -96,8 +96,12 @@ class Net:
                 )
             if last == new:
                 return
-            if last_at == now:
-                history.pop()
+        if now <= self._notified_until:
+            raise LocalProtocolError(
+                f"{owner} drives {self.name} at {now} ns after its edges up to {self._notified_until} ns were told"
+            )
+        if history and history[-1][0] == now:
+            history.pop()
         history.append((now, new))
         self.last_edge = max(self.last_edge, now)
         self._last_level = self._resolve(self.last_edge)

@@ -55,6 +55,16 @@ def test_the_slice_limit_changes_nothing(mode: str, body: str) -> None:
     assert len(hashes) == 1
 
 
+@pytest.mark.parametrize("mode", MODES)
+def test_the_first_level_of_every_wire_is_what_it_is_when_all_of_time_0_was_driven(mode: str) -> None:
+    made = bench(scenario(mode, duration_s=0.0001))
+    made.run_until(made.scenario.duration_ns)
+    levels = {net.name: int(net.level(0)) for net in made.parts.harness}
+    made.finish()
+    assert {entry["net"]: entry["v"] for entry in entries(made, "pin") if entry["t"] == 0} == levels
+    assert sum(entry["t"] == 0 for entry in entries(made, "pin")) == len(levels)
+
+
 @pytest.mark.parametrize("body", BODIES)
 @pytest.mark.parametrize("mode", MODES)
 @pytest.mark.parametrize("cut_ns", [1_234_567_890, 500_000_000 + 87_000 * 7])

@@ -12,6 +12,7 @@ import typer
 from p2os.capture import Chunk, Direction
 from p2os.cli.captures.capture_files import PcapFile, RecordingFile, Sink, Sinks
 from p2os.cli.held_robot import hold_robot
+from p2os.cli.kept_files import FORCE_HELP, refuse_to_overwrite
 from p2os.cli.quantities import parse_duration
 from p2os.cli.signals import postponed
 from p2os.errors import RemoteProtocolError, TransportError
@@ -102,9 +103,12 @@ def record(
     out: Annotated[Path, typer.Option(help="Recording to write.", metavar="FILE")] = DEFAULT_OUT,
     pcap: Annotated[Path | None, typer.Option(help="Write this too, for Wireshark.", metavar="FILE")] = None,
     duration: Annotated[str, typer.Option("--for", help="How long; without, until Ctrl-C.", metavar="TIME")] = "",
+    force: Annotated[bool, typer.Option("--force", help=FORCE_HELP)] = False,
 ) -> None:
     """Record a robot."""
     lasts_ns = parse_duration(duration, "--for") if duration else None
+    for path in (out, pcap):
+        refuse_to_overwrite(path, force=force)
     hold_robot()
     transport = open_url(url)
     sinks: list[Sink] = []

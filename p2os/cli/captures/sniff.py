@@ -26,6 +26,7 @@ from p2os.capture.tap import Tap
 from p2os.cli.captures.capture_files import PcapFile, RecordingFile, Sink, Sinks
 from p2os.cli.captures.reading import DEFAULT_ROBOT
 from p2os.cli.held_robot import hold_robot
+from p2os.cli.kept_files import FORCE_HELP, refuse_to_overwrite
 from p2os.cli.quantities import parse_duration
 from p2os.cli.signals import postponed
 from p2os.errors import TransportError
@@ -70,6 +71,7 @@ def sniff(
     listen: Annotated[str, typer.Option(help="Where the client connects.", metavar="URL")] = DEFAULT_LISTEN,
     out: Annotated[Path | None, typer.Option(help="Record here (JSON lines).", metavar="FILE")] = None,
     pcap: Annotated[Path | None, typer.Option(help="Record here, for Wireshark.", metavar="FILE")] = None,
+    force: Annotated[bool, typer.Option("--force", help=FORCE_HELP)] = False,
     json_output: Annotated[bool, typer.Option("--json", help="Print one JSON object a packet.")] = False,
     quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Print no packets.")] = False,
     once: Annotated[bool, typer.Option("--once", help="End when the first client has gone.")] = False,
@@ -90,6 +92,8 @@ def sniff(
     if url is None:
         raise typer.BadParameter("name the robot's URL", param_hint="URL")
     lasts_ns = parse_duration(duration, "--for") if duration else None
+    for path in (out, pcap):
+        refuse_to_overwrite(path, force=force)
     reading = Reading(profile=profile, parameters=load_parameters(robot))
     hold_robot()
     robot_line = open_url(url)

@@ -8,6 +8,7 @@ from typing import Annotated
 
 import typer
 
+from p2os.cli.kept_files import FORCE_HELP, refuse_to_overwrite
 from p2os.errors import FileError, MissingDependencyError, UsageError
 from p2os.pioneer.world import known_worlds, load_world
 from p2os.pioneer.world.drawing import svg, text
@@ -36,6 +37,7 @@ WIDEST_COLUMNS = 100
 MESH_SUFFIXES = (".obj", ".stl", ".dae")
 
 WORLD = Annotated[str, typer.Argument(help="A world that ships, or a file.", metavar="FILE|NAME")]
+FORCE = Annotated[bool, typer.Option("--force", help=FORCE_HELP)]
 SEED = Annotated[int, typer.Option(help="Seed of a world that is made from one.")]
 UP = Annotated[
     str, typer.Option(help="Which axis is up in a mesh file: x, y or z; auto is what its format states or usually has.")
@@ -110,9 +112,10 @@ def new(
     out: Annotated[Path | None, typer.Option(help="The file to write; without it the text is printed.")] = None,
     kind: Annotated[str, typer.Option(help=f"What to make: {', '.join(KINDS)}.")] = "arena",
     seed: Annotated[int, typer.Option(help="The same seed makes the same world.")] = 0,
+    force: FORCE = False,
 ) -> None:
     """Make a world from a seed."""
-    _write(make_world(kind, seed), out)
+    _write(make_world(kind, seed), out, force=force)
 
 
 def convert(
@@ -120,11 +123,12 @@ def convert(
     out: Annotated[Path | None, typer.Option(help="The file to write; without it the text is printed.")] = None,
     seed: SEED = 0,
     up: UP = "auto",
+    force: FORCE = False,
 ) -> None:
     """Write any readable world as a TOML file, to be changed by hand."""
     place = _load(world, seed, up)
     _print_skipped(place)
-    _write(place, out)
+    _write(place, out, force=force)
 
 
 def _load(world: str, seed: int, up: str) -> World:
@@ -137,12 +141,13 @@ def _load(world: str, seed: int, up: str) -> World:
     return read_placed(path, Placing(up=up))
 
 
-def _write(place: World, out: Path | None) -> None:
+def _write(place: World, out: Path | None, *, force: bool) -> None:
     if out is None:
         sys.stdout.write(write_world(place))
         return
     if out.suffix.lower() != ".toml":
         raise UsageError(f"a world cannot be written to {out}", hint="--out FILE.toml")
+    refuse_to_overwrite(out, force=force)
     try:
         out.write_text(write_world(place), encoding="utf-8")
     except OSError as error:

@@ -18,14 +18,16 @@ class ContactCounter:
         self.touching = False
         self._apart = APART_STEPS
 
-    def update(self, touching: bool, steps: int = 1) -> None:
-        """Take what was seen over the last `steps` steps."""
+    def update(self, touching: bool, steps: int = 1) -> bool:
+        """Take what was seen over the last `steps` steps; tell whether it is a new collision."""
+        is_new = touching and self._apart >= APART_STEPS
         if touching:
-            self.collisions += self._apart >= APART_STEPS
+            self.collisions += is_new
             self._apart = 0
         elif self._apart < APART_STEPS:
             self._apart = min(APART_STEPS, self._apart + steps)
         self.touching = touching
+        return is_new
 
     def snapshot(self) -> tuple[int, bool, int]:
         """Return all that decides the future."""

@@ -47,6 +47,23 @@ class BodyState:
     in_contact: bool = False
 
 
+#: chosen: so many hits are remembered until somebody takes them; collisions are 0.2 s apart at the least.
+MOST_HITS = 16
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Hit:
+    """A collision: what the robot has come to touch, where in the plan, and when, counted from the reset.
+
+    `name` is that of an obstacle, a mesh or another robot; empty where the body cannot tell.
+    """
+
+    at_ns: Nanos
+    name: str
+    x_m: float
+    y_m: float
+
+
 class WheelAngles(Protocol):
     """What a step tells at once; a `BodyState` is one too."""
 
@@ -109,6 +126,10 @@ class RobotBody(Protocol):
 
     def take_moved(self) -> list[Obstacle]:
         """Return what has walked or was pushed since this was asked last, where it is now."""
+        ...
+
+    def take_hits(self) -> list[Hit]:
+        """Return the collisions since this was asked last, the last 16 at the most."""
         ...
 
     def clearance(self) -> float:

@@ -13,10 +13,11 @@ It serves as the oracle for the other bodies, and where PyBullet is not to be ha
 """
 
 import math
+from collections import deque
 from collections.abc import Sequence
 
 from p2os.pioneer.body.contacts import ContactCounter
-from p2os.pioneer.body.contract import STEP_NS, BodyState, Turned
+from p2os.pioneer.body.contract import MOST_HITS, STEP_NS, BodyState, Hit, Turned
 from p2os.pioneer.body.other_robots import OtherRobots, StandingPose
 from p2os.pioneer.body.ray_cast import Direction, Echo, cast, echoes
 from p2os.pioneer.sonar.ring import cones, reading
@@ -116,6 +117,7 @@ class KinematicBody:
         #: The last set-points, where they would have brought the hull into a thing.
         self._blocked_at: tuple[float, float] | None = None
         self._contacts = ContactCounter()
+        self._hits: deque[Hit] = deque(maxlen=MOST_HITS)
         #: No thing is nearer to the hull than this; 0 only where the hull is inside one.
         self._free_m = 0.0
         self._changed()
@@ -128,11 +130,7 @@ class KinematicBody:
             self._walk()
         self._asked = asked = (left_mps, right_mps)
         if left_mps == 0.0 and right_mps == 0.0:
-            self._left = self._right = 0.0
-            self._stalled = False
-            self._contacts.update(touching=self._is_bumped or self._free_m == 0.0)
-            self._is_bumped = False
-            return Turned(self._left_angle, self._right_angle)
+            return self._stand()
         forward, turn = (left_mps + right_mps) / 2 * _DT_S, (right_mps - left_mps) / self._track_m * _DT_S
         c, s = self._cos, self._sin
         heading = self._heading + turn
@@ -160,7 +158,8 @@ class KinematicBody:
                     blocked = self._is_blocked(x, y, heading)
             self._blocked_at = asked if blocked else None
         self._stalled = blocked
-        self._contacts.update(touching=blocked or self._is_bumped or self._free_m == 0.0)
+        if self._contacts.update(touching=blocked or self._is_bumped or self._free_m == 0.0):
+            self._note_hit(x, y, heading)
         self._is_bumped = False
         if blocked:
             self._left = self._right = 0.0
@@ -169,6 +168,15 @@ class KinematicBody:
         self._left, self._right = left_mps, right_mps
         self._left_angle += left_mps * _DT_S / self._radius_m
         self._right_angle += right_mps * _DT_S / self._radius_m
+        return Turned(self._left_angle, self._right_angle)
+
+    def _stand(self) -> Turned:
+        """Stand for one step, and feel what has come to touch the hull."""
+        self._left = self._right = 0.0
+        self._stalled = False
+        if self._contacts.update(touching=self._is_bumped or self._free_m == 0.0):
+            self._note_hit(self._x, self._y, self._heading)
+        self._is_bumped = False
         return Turned(self._left_angle, self._right_angle)
 
     def _take_pose(self, x_m: float, y_m: float, heading_rad: float) -> None:
@@ -185,10 +193,17 @@ class KinematicBody:
         if free == 0.0 and self._free_m > 0.0:
             if not self._push(x, y, heading):
                 return True
-            self._contacts.update(touching=True, steps=0)
+            if self._contacts.update(touching=True, steps=0):
+                self._note_hit(x, y, heading)
             free = self._plan.clearance(x, y, heading, no_more_than=LOOK_AHEAD_M)
         self._free_m = free
         return False
+
+    def _note_hit(self, x: float, y: float, heading: float) -> None:
+        """Remember a collision at a pose, whether or not the robot may take it."""
+        robots = () if self._other_robots is None else self._other_robots.touchable()
+        name, x_m, y_m = self._plan.contact(x, y, heading, robots)
+        self._hits.append(Hit(at_ns=self._steps * STEP_NS, name=name, x_m=x_m, y_m=y_m))
 
     def _meets(self, other_robots: OtherRobots, x: float, y: float, heading: float) -> bool:
         """Tell whether another robot is in the way, and let it feel so; one that was put into another may move."""
@@ -308,6 +323,12 @@ class KinematicBody:
         moved, self._moved_things = self._moved_things, {}
         return [item for item in self._plan.obstacles if item.name in moved]
 
+    def take_hits(self) -> list[Hit]:
+        """Return the collisions since this was asked last."""
+        hits = list(self._hits)
+        self._hits.clear()
+        return hits
+
     def snapshot(self) -> object:
         """Return all that decides the future."""
         return {
@@ -317,6 +338,7 @@ class KinematicBody:
             "stalled": (self._stalled, self._is_bumped),
             "free_m": self._free_m,
             "contacts": self._contacts.snapshot(),
+            "hits": tuple(self._hits),
             "obstacles": self._plan.obstacles,
             "steps": self._steps,
             "walking": {name: since for name, (since, _) in self._walkers.items()},
@@ -336,5 +358,6 @@ class KinematicBody:
         self._asked = snapshot["asked"]
         self._stalled, self._is_bumped = snapshot["stalled"]
         self._contacts.restore(snapshot["contacts"])
+        self._hits = deque(snapshot["hits"], maxlen=MOST_HITS)
         self._changed()
         self._free_m = snapshot["free_m"]

@@ -13,20 +13,25 @@ Invariant: the order of what is found depends on the world alone.
 """
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
 from difflib import get_close_matches
+from itertools import pairwise
 from operator import itemgetter
 
 from p2os.errors import WorldError
 from p2os.pioneer.world.geometry import INFINITY, Footprint, hull_polygon, placed, wheel_polygons
-from p2os.pioneer.world.model import Mesh, Obstacle, Polygon, World, cut, shadow
+from p2os.pioneer.world.model import Mesh, Obstacle, Point, Polygon, World, cut, shadow
 from p2os.robots.parameters import RobotParameters
 
 #: The first ring of a search for the nearest wall beyond the hull; it is doubled until something is found, m.
 FIRST_RING_M = 2.0
 #: chosen: as many names as a line of help holds.
 NAMED = 12
+#: A thing farther than this from where the robot touches something is not what it touches, m.
+TOUCHED_WITHIN_M = 0.1
+#: How finely the hull's outline is looked along for the place of a contact, m.
+OUTLINE_STEP_M = 0.01
 #: How far a pushed thing is kept from what pushes it, m.
 APART_M = 1e-6
 #: chosen: wheels of 165 mm roll over what is lower, and a robot's maker calls it a sill.
@@ -161,6 +166,41 @@ class Plan:
             names.append("")
         return names
 
+    def thing_at(self, x_m: float, y_m: float) -> str:
+        """Return the name of what stands at a point where the robot touches something; empty where nothing does."""
+        reach = TOUCHED_WITHIN_M
+        near = self._meetable(x_m - reach, y_m - reach, x_m + reach, y_m + reach)
+        found = min(((thing.distance_to_point(x_m, y_m), thing.name) for thing in near), default=(INFINITY, ""))
+        return found[1] if found[0] <= reach else ""
+
+    def contact(
+        self, x_m: float, y_m: float, heading_rad: float, robots: Iterable[Footprint] = ()
+    ) -> tuple[str, float, float]:
+        """Return the name of what is nearest to the robot at a pose, and the point of its outline nearest to that."""
+        reach = self._hull_reach + TOUCHED_WITHIN_M
+        hull = placed(self._hull, x_m, y_m, heading_rad)
+        things = [(thing, hull) for thing in (*self._touchable.values(), *robots)]
+        box = (x_m - reach, y_m - reach, x_m + reach, y_m + reach)
+        things += [(thing, hull) for thing in self._static.touched.near(*box)]
+        for wheel in self._wheels:
+            outline = placed(wheel, x_m, y_m, heading_rad)
+            things += [(thing, outline) for thing in (*self._low.values(), *self._static.low.near(*box))]
+        if not things:
+            return "", x_m, y_m
+        thing, outline = min(things, key=lambda pair: pair[0].distance(pair[1]))
+        if thing.distance(outline) > TOUCHED_WITHIN_M:
+            return "", x_m, y_m
+        x, y = min(_along(outline), key=lambda point: thing.distance_to_point(*point))
+        return thing.name, x, y
+
+    def _meetable(self, x0: float, y0: float, x1: float, y1: float) -> list[Footprint]:
+        """Return what hull or wheels could meet in a rectangle, and perhaps some more."""
+        static = self._static
+        return [
+            *self._touchable.values(), *static.touched.near(x0, y0, x1, y1),
+            *self._low.values(), *static.low.near(x0, y0, x1, y1),
+        ]  # fmt: skip
+
     def push(self, name: str, x_m: float, y_m: float, heading_rad: float, robots: Iterable[Footprint] = ()) -> bool:
         """Push a thing out of the hull at a pose, the shortest way; tell whether there is room for it.
 
@@ -201,6 +241,14 @@ class Plan:
             for table, belongs in ((self._touchable, touched), (self._echoing, echoing), (self._low, low)):
                 if belongs:
                     table[name] = shape
+
+
+def _along(outline: Polygon) -> Iterator[Point]:
+    """Return points along an outline, near to each other."""
+    for (ax, ay), (bx, by) in pairwise((*outline, outline[0])):
+        count = max(1, math.ceil(math.dist((ax, ay), (bx, by)) / OUTLINE_STEP_M))
+        for number in range(count):
+            yield ax + (bx - ax) * number / count, ay + (by - ay) * number / count
 
 
 def _overlap(one: Footprint, other: Footprint) -> bool:

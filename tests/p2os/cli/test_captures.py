@@ -28,6 +28,20 @@ STOP_FIRST = b"".join(
 )
 
 
+@pytest.mark.parametrize("option", ["--out", "--pcap"])
+@pytest.mark.parametrize("verb", [["record"], ["sniff", "--listen", "tcp:127.0.0.1:0"]], ids=["record", "sniff"])
+def test_a_recording_is_overwritten_by_force_alone(
+    verb: list[str], option: str, run: Run, tmp_path: Path, capsys: Capture
+) -> None:
+    out = tmp_path / "floor"
+    out.write_bytes(b"what a robot said last week")
+    words = [*verb, "tcp:127.0.0.1:1", "--out", tmp_path / "new.jsonl", option, out]
+    assert run(*words) == 2
+    assert capsys.readouterr().err.startswith(f"p2os: {out} is there already\nhint: another name, or --force")
+    assert run(*words, "--force") == 1, "no robot is there; it was tried"
+    assert out.read_bytes() == b"what a robot said last week"
+
+
 def test_a_robot_is_recorded_and_left_closed(served: object, run: Run, tmp_path: Path, capsys: Capture) -> None:
     out, pcap = tmp_path / "floor.jsonl", tmp_path / "floor.pcap"
     assert run("record", served.url, "--for", "300ms", "--out", out, "--pcap", pcap) == 0

@@ -76,6 +76,21 @@ def test_a_png_without_matplotlib_points_to_svg(
     assert "room.svg" in capsys.readouterr().err
 
 
+@pytest.mark.parametrize("words", [["new", "--kind", "maze"], ["convert", "room"]], ids=["new", "convert"])
+def test_a_world_file_that_was_changed_by_hand_is_overwritten_by_force_alone(
+    words: list[str], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    mine = tmp_path / "mine.toml"
+    mine.write_text("# an evening's work\n", encoding="utf-8")
+    assert run(["world", *words, "--out", str(mine)]) == 2
+    assert capsys.readouterr().err.splitlines() == [
+        f"p2os: {mine} is there already", "hint: another name, or --force to overwrite it",
+    ]  # fmt: skip
+    assert mine.read_text(encoding="utf-8") == "# an evening's work\n"
+    assert run(["world", *words, "--out", str(mine), "--force"]) == 0
+    assert load_world(str(mine))
+
+
 def test_a_made_world_is_checked_and_converted_to_itself(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -12,8 +12,8 @@ import pytest
 
 from p2os.cli.main import run as p2os
 from robot_bench.cli.demo import best_body
-from robot_bench.cli.folders import next_folder
 from robot_bench.cli.run import capped
+from robot_bench.recording.run_folder import make_next_folder
 from robot_bench.recording.run_record import read_run
 from robot_bench.scenario.scenario import load_scenario
 from tests.robot_bench.firmware import thumb
@@ -183,15 +183,16 @@ def test_a_report_is_made_anew_from_the_trace_alone(capsys: pytest.CaptureFixtur
     assert json.loads(capsys.readouterr().out)["passed"] is True
 
 
-def test_a_run_folder_is_used_again_and_numbers_go_on() -> None:
+def test_a_run_is_overwritten_by_force_alone_and_numbers_go_on(capsys: pytest.CaptureFixture[str]) -> None:
     scenario = make(thumb.SLEEP)
-    for _ in range(2):
-        assert p2os(["run", scenario, "--out", "there"]) == 0
+    for words, code in (([], 0), ([], 2), (["--force"], 0)):
+        assert p2os(["run", scenario, "--out", "there", *words]) == code
+    assert "p2os: there holds a run already\nhint: --force overwrites it" in capsys.readouterr().err
     assert p2os(["run", scenario]) == 0
-    assert next_folder("mine").name == "mine-002"
+    assert make_next_folder("mine").name == "mine-002"
     Path("runs/mine-041").mkdir()
-    assert next_folder("mine").name == "mine-042"
-    assert next_folder("min").name == "min-001"
+    assert make_next_folder("mine").name == "mine-042"
+    assert make_next_folder("min").name == "min-001"
 
 
 def started(duration_s: float, *words: str) -> subprocess.Popen[str]:
@@ -234,6 +235,18 @@ def test_kill_9_leaves_a_trace_that_makes_a_report(capsys: pytest.CaptureFixture
     outcome = json.loads(capsys.readouterr().out)
     assert outcome["passed"] is False
     assert outcome["failures"][0].startswith("the run was cut at")
+
+
+def test_a_second_run_with_the_same_out_is_refused_while_the_first_lasts(capsys: pytest.CaptureFixture[str]) -> None:
+    process = started(10_000, "--json")
+    for words in ([], ["--force"]):
+        assert p2os(["run", "motors", *QUICK, "--out", "there", *words]) == 2
+        assert "p2os: another run is writing into there\nhint: " in capsys.readouterr().err
+    process.send_signal(signal.SIGINT)
+    out, err = process.communicate(timeout=60)
+    assert process.returncode == 130, err
+    assert read_run(Path("there")).end["trace_sha256"] == json.loads(out)["trace_sha256"]
+    assert read_run(Path("there")).meta["scenario"] == "mine"
 
 
 def test_demo_runs_dodge_in_the_room(capsys: pytest.CaptureFixture[str]) -> None:

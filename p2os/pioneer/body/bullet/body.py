@@ -15,8 +15,10 @@ Not modelled: tyre scrub and wheel-size errors, battery sag.
 
 import math
 import tempfile
+from collections import deque
 from collections.abc import Sequence
 from dataclasses import replace
+from operator import itemgetter
 from pathlib import Path
 from typing import Any, cast
 
@@ -35,7 +37,7 @@ from p2os.pioneer.body.bullet.model import (
 )
 from p2os.pioneer.body.bullet.rays import SonarRays
 from p2os.pioneer.body.contacts import ContactCounter
-from p2os.pioneer.body.contract import STEP_NS, BodyState, Turned
+from p2os.pioneer.body.contract import MOST_HITS, STEP_NS, BodyState, Hit, Turned
 from p2os.pioneer.body.physical import (
     FLOOR_GROUP,
     LOW_GROUP,
@@ -110,6 +112,7 @@ class BulletBody:
         joints = pybullet.getJointStates(self._robot, WHEELS, physicsClientId=self._client)
         self._zero = (joints[0][0], joints[1][0])
         self._contacts = ContactCounter()
+        self._hits: deque[Hit] = deque(maxlen=MOST_HITS)
         self._stalling = [0, 0]
         self._joints = joints
         self._state = None
@@ -162,7 +165,8 @@ class BulletBody:
             self._alone -= 1
             self._contacts.update(touching=False)
         else:
-            self._contacts.update(touching=self._is_touching())
+            if self._contacts.update(touching=self._is_touching()):
+                self._note_hit()
             self._exchange_poses()
         stalling = self._stalling
         stalling[0] = self._stalled_for(stalling[0], left) if abs(left[3]) > self._straining_nm else 0
@@ -206,13 +210,27 @@ class BulletBody:
             self._moved_things[name] = None
 
     def _is_touching(self) -> bool:
+        return bool(self._touching_points())
+
+    def _touching_points(self) -> list[tuple[Any, ...]]:
+        """Return the engine's contacts of the hull with anything but a floor, else of the wheels with low things."""
         points = pybullet.getContactPoints(bodyA=self._robot, linkIndexA=-1, physicsClientId=self._client)
-        if any(point[8] <= TOUCH_M and point[2] not in self._floors for point in points):
-            return True
-        if not self._low:
-            return False
+        found = [point for point in points if point[8] <= TOUCH_M and point[2] not in self._floors]
+        if found or not self._low:
+            return found
         points = pybullet.getContactPoints(bodyA=self._robot, physicsClientId=self._client)
-        return any(point[8] <= TOUCH_M and point[2] in self._low for point in points)
+        return [point for point in points if point[8] <= TOUCH_M and point[2] in self._low]
+
+    def _note_hit(self) -> None:
+        """Remember a collision, at the deepest of its points; what is merged into one body is found by its place."""
+        point = min(self._touching_points(), key=itemgetter(8))
+        number, (x, y, _) = point[2], point[6]
+        if number in self._made:
+            name = self._made[number][0].name
+        else:
+            self._tell_plan()
+            name = self._plan.thing_at(x, y)
+        self._hits.append(Hit(at_ns=self._steps * STEP_NS, name=name, x_m=x, y_m=y))
 
     def _read(self) -> BodyState:
         """Return the engine's state as ours, and keep the robot's frame for the rays."""
@@ -285,6 +303,12 @@ class BulletBody:
         self._tell_plan()
         moved, self._moved_things = self._moved_things, {}
         return [item for item in self._plan.obstacles if item.name in moved]
+
+    def take_hits(self) -> list[Hit]:
+        """Return the collisions since this was asked last."""
+        hits = list(self._hits)
+        self._hits.clear()
+        return hits
 
     def _tell_plan(self) -> None:
         """Let the plan know where things are that the engine moves."""
@@ -362,6 +386,7 @@ class BulletBody:
             "targets": self._targets,
             "zero": self._zero,
             "contacts": self._contacts.snapshot(),
+            "hits": tuple(self._hits),
             "stalling": tuple(self._stalling),
             "state": self.state,
             "steps": self._steps,
@@ -390,6 +415,7 @@ class BulletBody:
         self._command()
         self._zero = saved["zero"]
         self._contacts.restore(saved["contacts"])
+        self._hits = deque(saved["hits"], maxlen=MOST_HITS)
         self._stalling = list(saved["stalling"])
         self._joints = pybullet.getJointStates(self._robot, WHEELS, physicsClientId=self._client)
         self._read()

@@ -10,6 +10,7 @@ Not modelled: tyre scrub and wheel-size errors, battery sag; floors of meshes
 """
 
 import math
+from collections import deque
 from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any, cast
@@ -19,7 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from p2os.pioneer.body.contacts import ContactCounter
-from p2os.pioneer.body.contract import STEP_NS, BodyState, Turned
+from p2os.pioneer.body.contract import MOST_HITS, STEP_NS, BodyState, Hit, Turned
 from p2os.pioneer.body.mujoco.model import (
     HULL,
     ROBOT,
@@ -100,6 +101,7 @@ class MujocoBody:
             mujoco.mj_step(self._model, self._data)
         self._zero = tuple(float(self._qpos[place]) for place in self._wheel_places)
         self._contacts = ContactCounter()
+        self._hits: deque[Hit] = deque(maxlen=MOST_HITS)
         self._stalling = [0, 0]
         self._state = None
         return self.state
@@ -142,7 +144,8 @@ class MujocoBody:
         left, right = self._rotors
         qvel[left], qvel[right] = left_mps / self._radius_m, right_mps / self._radius_m
         mujoco.mj_step(model, data)
-        self._contacts.update(touching=self._is_touching())
+        if self._contacts.update(touching=self._is_touching()):
+            self._note_hit()
         # The motors are the only frictions of joints, and the engine lists those first.
         for wheel, effort in enumerate(data.efc_force[:2].tolist()):
             strains = abs(effort) > self._straining_nm and abs(qvel[self._wheel_speeds[wheel]]) < self._slow_radps
@@ -169,14 +172,35 @@ class MujocoBody:
             self._data.mocap_pos[number], self._data.mocap_quat[number] = place, turn
 
     def _is_touching(self) -> bool:
-        """Tell whether the hull meets anything but a floor, or the wheels a low thing."""
-        for one, other in self._data.contact.geom.tolist():
+        return self._touched() is not None
+
+    def _touched(self) -> tuple[int, int] | None:
+        """Return the first contact of the hull with anything but a floor, or of the wheels with a low thing.
+
+        As its number and that of the geometry that is touched; None where there is none.
+        """
+        for number, (one, other) in enumerate(self._data.contact.geom.tolist()):
             if self._hull in {one, other}:
                 if one not in self._floors and other not in self._floors:
-                    return True
+                    return number, other if one == self._hull else one
             elif one in self._low or other in self._low:
-                return True
-        return False
+                return number, one if one in self._low else other
+        return None
+
+    def _note_hit(self) -> None:
+        """Remember a collision; the building has no names in the engine and is found by its place."""
+        touched = self._touched()
+        if touched is None:
+            return
+        number, geometry = touched
+        x, y, _ = self._data.contact.pos[number].tolist()
+        name = self._model.body(int(self._model.geom_bodyid[geometry])).name
+        if name.startswith(THING):
+            name = name.removeprefix(THING)
+        else:
+            self._tell_plan()
+            name = self._plan.thing_at(x, y)
+        self._hits.append(Hit(at_ns=self._steps * STEP_NS, name=name, x_m=x, y_m=y))
 
     def _read(self) -> BodyState:
         qpos, qvel = self._qpos, self._qvel
@@ -237,6 +261,12 @@ class MujocoBody:
         moved, self._moved_things = self._moved_things, {}
         return [item for item in self._plan.obstacles if item.name in moved]
 
+    def take_hits(self) -> list[Hit]:
+        """Return the collisions since this was asked last."""
+        hits = list(self._hits)
+        self._hits.clear()
+        return hits
+
     def _tell_plan(self) -> None:
         """Let the plan know where things are that the engine moves."""
         for name, (since, walker) in self._walkers.items():
@@ -286,6 +316,7 @@ class MujocoBody:
             "moved": tuple(self._moved_things),
             "zero": self._zero,
             "contacts": self._contacts.snapshot(),
+            "hits": tuple(self._hits),
             "stalling": tuple(self._stalling),
             "steps": self._steps,
         }
@@ -302,5 +333,6 @@ class MujocoBody:
         mujoco.mj_setState(self._model, self._data, np.frombuffer(saved["engine"]), _STATE)
         self._zero = saved["zero"]
         self._contacts.restore(saved["contacts"])
+        self._hits = deque(saved["hits"], maxlen=MOST_HITS)
         self._stalling = list(saved["stalling"])
         self._state = None

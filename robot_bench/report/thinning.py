@@ -1,0 +1,74 @@
+"""Takes as much of a long recording as a page can show, without hiding what stands out.
+
+A curve has no more pixels than its canvas is wide: of the rows that fall into one
+bucket of time the first, the last, and the least and greatest of each value are
+kept, so that the curve looks as that of all rows. Of lists the beginning and the end are kept.
+
+Invariant: whatever is kept is a row of the recording, in its order; what fits is kept whole.
+"""
+
+from collections.abc import Sequence
+
+#: chosen: one a pixel of the page's charts.
+BUCKETS = 1200
+
+
+def extremes(times: Sequence[float], columns: Sequence[Sequence[float]], *, buckets: int = BUCKETS) -> list[int]:
+    """Return which rows show the least and the greatest of each column in each bucket of time.
+
+    Args:
+        times: Of the rows, ascending; no more than four rows a bucket are all returned.
+        columns: The values of the rows, one sequence a column.
+        buckets: Into how many equal times the whole is cut.
+    """
+    if len(times) <= 4 * buckets:
+        return list(range(len(times)))
+    kept: list[int] = []
+    for first, last in _buckets(times, buckets):
+        chosen = {first, last - 1}
+        for column in columns:
+            chosen.add(min(range(first, last), key=column.__getitem__))
+            chosen.add(max(range(first, last), key=column.__getitem__))
+        kept += sorted(chosen)
+    return kept
+
+
+def pulses(edges: Sequence[tuple[int, int]], *, buckets: int) -> list[tuple[int, int]]:
+    """Return edges (ns, level) that show in each bucket of time whether a wire changed, and how it was left.
+
+    Of more than three edges in a bucket the first two and the last are kept, so that both levels are seen.
+    """
+    if len(edges) <= 3 * buckets:
+        return list(edges)
+    kept = []
+    for first, last in _buckets([at for at, _ in edges], buckets):
+        kept += [edges[n] for n in sorted({first, min(first + 1, last - 1), last - 1})]
+    return kept
+
+
+def ends(sizes: Sequence[int], budget: int) -> tuple[int, int]:
+    """Return how many rows of some sizes to take from the beginning and from the end, so that they fit."""
+    if sum(sizes) <= budget:
+        return len(sizes), 0
+    head = tail = 0
+    while (size := sizes[head] if head <= tail else sizes[-1 - tail]) <= budget:
+        budget -= size
+        if head <= tail:
+            head += 1
+        else:
+            tail += 1
+    return head, tail
+
+
+def _buckets(times: Sequence[float], buckets: int) -> list[tuple[int, int]]:
+    """Return the first row and that after the last of each bucket of time that holds rows."""
+    begin, width = times[0], (times[-1] - times[0]) / buckets or 1.0
+    found, first, current = [], 0, 0
+    for n, at in enumerate(times):
+        bucket = int((at - begin) / width)
+        if bucket != current and n > first:
+            found.append((first, n))
+            first = n
+        current = bucket
+    found.append((first, len(times)))
+    return found

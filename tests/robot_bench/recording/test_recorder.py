@@ -1,0 +1,93 @@
+"""The recorder tells every wire's level at time 0 and each change of it once, whatever the order of telling."""
+
+import json
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from p2os.errors import LocalProtocolError
+from robot_bench.recording.recorder import Recorder
+from robot_bench.recording.trace import TraceWriter
+from robot_bench.wires.nets import Harness, Net, Strength
+
+NETS = ("DD1", "DD2")
+END = 12
+
+#: (ns, net, owner, level, strength): what one owner does to one wire.
+drives = st.tuples(
+    st.integers(0, 3) | st.integers(0, END),
+    st.sampled_from(NETS),
+    st.sampled_from(("board", "sensor", "bluepill")),
+    st.booleans(),
+    st.sampled_from(Strength),
+)
+Told = list[tuple[str, int, int]]
+
+
+def told(trace: TraceWriter) -> Told:
+    """Return (net, ns, level) of each pin entry, sorted by net and time."""
+    lines = [json.loads(line) for line in trace.text.splitlines()]
+    return sorted((line["net"], line["t"], line["v"]) for line in lines if line["k"] == "pin")
+
+
+def settled(idle: bool, wanted: list[tuple[int, str, str, bool, Strength]]) -> Told:
+    """Return what the wires do when every drive is known beforehand."""
+    harness = Harness(Net(name, idle=idle) for name in NETS)
+    for at, net, owner, level, strength in wanted:
+        harness[net].drive(owner, level, strength, at)
+    found: Told = []
+    for name in NETS:
+        levels = [int(harness[name].level(at)) for at in range(END + 1)]
+        found.append((name, 0, levels[0]))
+        found += [(name, at, levels[at]) for at in range(1, END + 1) if levels[at] != levels[at - 1]]
+    return sorted(found)
+
+
+@given(idle=st.booleans(), wanted=st.lists(drives, max_size=24), data=st.data())
+def test_every_wire_is_told_of_as_if_all_had_been_known_beforehand(
+    idle: bool, wanted: list[tuple[int, str, str, bool, Strength]], data: st.DataObject
+) -> None:
+    wanted.sort(key=lambda drive: drive[0])
+    before = data.draw(st.integers(0, sum(at == 0 for at, *_ in wanted)), label="driven before the recorder starts")
+    trace = TraceWriter()
+    harness = Harness(Net(name, idle=idle) for name in NETS)
+    recorder = Recorder(trace, harness, body=None, sample_ns=data.draw(st.integers(1, 5), label="sample_ns"))
+    for place, (at, net, owner, level, strength) in enumerate(wanted):
+        if place == before:
+            recorder.start()
+        if place >= before and data.draw(st.booleans(), label="pass"):
+            recorder.advance_to(at)
+        harness[net].drive(owner, level, strength, at)
+    if before == len(wanted):
+        recorder.start()
+    recorder.finish(END)
+    assert told(trace) == settled(idle, wanted)
+
+
+def test_a_sensor_that_first_drives_at_time_0_is_recorded_as_it_is_and_not_as_its_pull() -> None:
+    trace, harness = TraceWriter(), Harness([Net("DD3")])
+    harness["DD3"].drive("board", True, Strength.PULL, 0)
+    recorder = Recorder(trace, harness, body=None)
+    recorder.start()
+    recorder.advance_to(0)
+    harness["DD3"].drive("sensor", False, Strength.PUSH_PULL, 0)
+    recorder.finish(10)
+    assert told(trace) == [("DD3", 0, 0)]
+
+
+def test_a_run_that_ends_at_time_0_has_every_level() -> None:
+    trace, harness = TraceWriter(), Harness([Net("DD1"), Net("DD2", idle=True)])
+    recorder = Recorder(trace, harness, body=None)
+    recorder.start()
+    recorder.finish(0)
+    assert told(trace) == [("DD1", 0, 0), ("DD2", 0, 1)]
+
+
+def test_a_drive_at_an_instant_whose_edges_were_told_is_a_bug_and_not_lost() -> None:
+    net = Net("DD1")
+    net.edges_until(5)
+    with pytest.raises(LocalProtocolError, match="sensor drives DD1 at 5 ns after its edges up to 5 ns were told"):
+        net.drive("sensor", True, Strength.PUSH_PULL, 5)
+    net.drive("sensor", True, Strength.PUSH_PULL, 6)
+    assert net.edges_until(6) == [(6, True)]

@@ -1,0 +1,108 @@
+"""The page of an hour's run is of bounded size, keeps what stands out, and says what it leaves out."""
+
+import json
+from dataclasses import replace
+
+import pytest
+
+from p2os.protocol.packets import EncoderPacket
+from robot_bench.recording.run_record import Event, RunRecord, WireChunk
+from robot_bench.report.page import page_data, render_page
+from robot_bench.report.thinning import ends, extremes, pulses
+from tests.robot_bench.records import S, pose
+
+MS = 10**6
+PACKET = EncoderPacket(left_counts=5, right_counts=-7).to_frame().to_bytes()
+MOST_BYTES = 2_000_000
+
+
+def long_run(seconds: int) -> RunRecord:
+    """All that can grow with time, faster than in any shipped scenario, with one thing that stands out in each."""
+    poses = [
+        replace(pose(t=n * 50 * MS, x=n % 4000 * 1000, y=n % 3000 * 1000), left=187_500) for n in range(seconds * 20)
+    ]
+    poses[len(poses) // 2] = replace(poses[len(poses) // 2], left=999_000)
+    sonar = [(n * 100 * MS, [1500 + n % 700] * 16) for n in range(seconds * 10)]
+    sonar[len(sonar) // 3] = (sonar[len(sonar) // 3][0], [1500] * 15 + [123])
+    nets = [f"DD{n}" for n in range(1, 9)] + [f"motor{m}_comm{n}" for m in (1, 2) for n in (1, 2, 3)]
+    pins = {net: [(n * 20 * MS, n & 1) for n in range(seconds * 50)] for net in nets}
+    return RunRecord(
+        meta={"scenario": "long", "threshold_m": 0.6},
+        poses=poses,
+        sonar=sonar,
+        pins=pins,
+        usart=[(n * 100 * MS, f"line {n}\n".encode()) for n in range(seconds * 10)],
+        wire=[WireChunk(t=n * 50 * MS, direction="r2c", data=PACKET) for n in range(seconds * 20)],
+        events=[
+            Event(t=n * 500 * MS, who="adapter", what="command", detail="VEL 188, RVEL 0 (motors 3, 3)")
+            for n in range(seconds * 2)
+        ]
+        + [Event(t=seconds // 2 * S, who="body", what="collision", detail="'crate' at x 1.000 m, y 0.000 m")],
+        obstacles=[{"k": "obstacle", "op": "move", "name": "dog", "t": n * 50 * MS, "x": 1.0, "y": n * 1e-3,
+                    "heading": 0.0} for n in range(seconds * 20)],
+        last_ns=seconds * S,
+        is_cut=False,
+    )  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def hour() -> RunRecord:
+    return long_run(3600)
+
+
+def test_the_page_of_an_hour_is_bounded_and_says_what_it_leaves_out(hour: RunRecord) -> None:
+    page = render_page(hour)
+    assert len(page) < MOST_BYTES
+    for what in ("poses", "sonar", "pins", "packets", "lines of text", "log"):
+        assert f"{what}: " in page[: page.index("<script")], what
+    assert "trace.jsonl holds all" in page
+
+
+def test_what_stands_out_is_kept(hour: RunRecord) -> None:
+    data = json.loads(json.dumps(page_data(hour)))
+    assert max(row[4] for row in data["poses"]) == 0.999
+    assert min(min(row[1:]) for row in data["sonar"]) == 0.123
+    assert any(event[2] == "collision" for event in data["events"])
+    assert data["hits"] == [[1800.0, 1.0, 0.0, "'crate'"]]
+    assert data["poses"][-1][0] == hour.poses[-1].t / S
+    assert data["packets"][0][0] == 0.0
+    assert data["packets"][-1][0] == hour.wire[-1].t / S
+
+
+def test_a_minute_is_shown_whole() -> None:
+    run = long_run(60)
+    run.pins = {net: edges[:200] for net, edges in run.pins.items()}
+    data = json.loads(json.dumps(page_data(run)))
+    assert data["left_out"] == []
+    assert (len(data["poses"]), len(data["packets"]), len(data["usart"])) == (1200, 1200, 600)
+
+
+def test_extremes_keep_the_least_and_the_greatest_of_each_bucket_in_order() -> None:
+    rows = [(n, (n * 7919) % 1000) for n in range(10_000)]
+    chosen = extremes([at for at, _ in rows], [[value for _, value in rows]], buckets=100)
+    assert chosen == sorted(set(chosen))
+    assert len(chosen) <= 4 * 101
+    kept = [rows[n] for n in chosen]
+    for bucket in range(100):
+        here = [value for at, value in rows if int(at / 99.99) == bucket]
+        shown = [value for at, value in kept if int(at / 99.99) == bucket]
+        assert (min(shown), max(shown)) == (min(here), max(here))
+    assert extremes(range(50), [range(50)], buckets=100) == list(range(50))
+
+
+@pytest.mark.parametrize("first", [0, 1])
+@pytest.mark.parametrize("count", [4001, 4002])
+def test_pulses_keep_both_levels_of_every_bucket(count: int, first: int) -> None:
+    edges = [(n, (n + first) & 1) for n in range(count)]
+    kept = pulses(edges, buckets=40)
+    assert (kept[0], kept[-1]) == (edges[0], edges[-1])
+    assert len(kept) <= 3 * 41
+    for start in range(0, count - 101, 101):
+        assert {level for at, level in kept if start <= at < start + 101} == {0, 1}
+
+
+def test_ends_take_from_both_and_never_more_than_fits() -> None:
+    assert ends([3] * 10, 100) == (10, 0)
+    head, tail = ends([3] * 10, 12)
+    assert (head, tail) == (2, 2)
+    assert ends([], 5) == (0, 0)

@@ -1,0 +1,78 @@
+"""A failed run says what was hit, where and when: on the command line, in summary, trace, state log, page and plan."""
+
+import json
+from pathlib import Path
+
+import pytest
+
+from p2os.cli.main import run as p2os
+from robot_bench.recording.run_record import read_run
+from robot_bench.report.page import page_data
+from tests.p2os.pioneer.body.bodies import each_body
+
+#: A program that drives straight on, and a crate in its way.
+SCENARIO = """
+firmware = "motors.elf"
+world = "room"
+duration_s = {duration_s}
+threshold_m = 0.6
+start = {{ x_m = -1.5, y_m = 0.0, heading_deg = 0.0 }}
+[[obstacle]]
+at_s = 0.5
+name = "red box"
+shape = "box"
+x_m = -0.9
+y_m = 0.0
+length_m = 0.2
+width_m = 0.8
+height_m = 0.4
+[[goal]]
+kind = "no_collision"
+"""
+
+
+@pytest.fixture(autouse=True)
+def _in_an_empty_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+
+
+@pytest.mark.parametrize("mode", ["direct", "adapter"])
+@pytest.mark.parametrize("body", each_body())
+def test_what_was_hit_is_named_everywhere(body: str, mode: str, capsys: pytest.CaptureFixture[str]) -> None:
+    Path("crash.toml").write_text(SCENARIO.format(duration_s=8.9), encoding="utf-8")
+    assert p2os(["run", "crash.toml", "--body", body, "--mode", mode, "--out", "crash"]) == 1
+    out = capsys.readouterr().out
+    record = read_run(Path("crash"))
+    (hit, *_) = record.collisions()
+    assert hit.what == "'red box'"
+    assert hit.x == pytest.approx(-1.0, abs=0.02)
+    first = next(pose.t for pose in record.poses if pose.collisions)
+    assert first - 50_000_000 <= hit.t <= first
+    assert f"hit     {hit}" in out
+    assert f"failed  no_collision: {len(record.collisions())} collision(s): {hit}" in out
+    summary = json.loads(Path("crash/summary.json").read_text(encoding="utf-8"))
+    assert summary["hits"][0] == {"t_s": hit.t / 1e9, "what": "'red box'", "x_m": hit.x, "y_m": hit.y}
+    data = page_data(record)
+    assert [hit.t / 1e9, hit.x, hit.y, "'red box'"] in data["hits"]  # type: ignore[operator] # a list
+    log = [(event.who, event.what) for event in record.events]
+    assert ("body", "collision") in log
+    assert ("direct" if mode == "direct" else "adapter", "command") in log
+    capsys.readouterr()
+    assert p2os(["report", "crash"]) == 0
+    assert "red box" in capsys.readouterr().out
+
+
+def test_mode_direct_logs_commands_and_stalls(capsys: pytest.CaptureFixture[str]) -> None:
+    Path("crash.toml").write_text(SCENARIO.format(duration_s=8.9), encoding="utf-8")
+    assert p2os(["run", "crash.toml", "--body", "kinematic", "--mode", "direct", "--out", "crash"]) == 1
+    capsys.readouterr()
+    log = [(event.what, event.detail) for event in read_run(Path("crash")).events if event.who == "direct"]
+    assert ("command", "motors 3, 3") in log
+    assert ("stalled", "both wheels") in log
+
+
+def test_the_hash_of_a_run_that_hits_something_is_the_same_each_time() -> None:
+    Path("crash.toml").write_text(SCENARIO.format(duration_s=8.9), encoding="utf-8")
+    for folder in ("one", "two"):
+        p2os(["run", "crash.toml", "--body", "kinematic", "--mode", "direct", "--out", folder])
+    assert read_run(Path("one")).end["trace_sha256"] == read_run(Path("two")).end["trace_sha256"]
