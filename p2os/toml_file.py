@@ -39,13 +39,14 @@ class TomlPlaces:
         return lines.get((table, number, key)) or lines.get((table, number, "")) or lines.get(("", 0, table)) or 1
 
 
-def read_user_text(path: Path, what: str, error_type: type[FileError]) -> str:
+def read_user_text(path: Path, what: str, error_type: type[FileError], *, hint: str | None = None) -> str:
     """Return the text of a file that a user names, without a byte order mark.
 
     Args:
         path: The file.
         what: What it should be, such as "a world".
         error_type: What to raise.
+        hint: What to try where there is no such file.
 
     Raises:
         FileError: One of `error_type`: the file cannot be read, is too large or is no text.
@@ -58,7 +59,7 @@ def read_user_text(path: Path, what: str, error_type: type[FileError]) -> str:
         raise error_type(f"{shown_name(path)}: not a text file", hint=f"{what} is a TOML file") from error
     except (OSError, ValueError) as error:  # ValueError: a NUL in the name
         why = getattr(error, "strerror", None) or error
-        raise error_type(f"cannot read {shown_name(path)}: {why}") from error
+        raise error_type(f"cannot read {shown_name(path)}: {why}", hint=hint or f"{what} is a TOML file") from error
 
 
 def is_file(path: Path) -> bool:

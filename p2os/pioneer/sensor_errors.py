@@ -112,7 +112,7 @@ def load_sensor_errors(name_or_path: str) -> SensorErrors:
         close = get_close_matches(name_or_path, SETS, n=1)
         hint = f"did you mean {close[0]}?" if close else f"sets: {', '.join(SETS)}, or a TOML file"
         raise SensorErrorsError(f"no set of sensor errors {shown(name_or_path)}", hint=hint)
-    text = read_user_text(path, "a set of sensor errors", SensorErrorsError)
+    text = read_user_text(path, "a set of sensor errors", SensorErrorsError, hint=f"sets: {', '.join(SETS)}")
     table, places = read_toml(text, shown_name(path), "a set of sensor errors", SensorErrorsError)
     return parse_sensor_errors(table, shown_name(path), places)
 

@@ -147,7 +147,9 @@ def load_flash(path: Path) -> Flash:
         FlashError: The file cannot be read, or breaks the schema.
     """
     source = shown_name(path)
-    table, places = read_toml(read_user_text(path, "a FLASH", FlashError), source, "a FLASH", FlashError)
+    table, places = read_toml(
+        read_user_text(path, "a FLASH", FlashError, hint="docs/pioneer.md shows one"), source, "a FLASH", FlashError
+    )
     values = table.get("flash")
     if not isinstance(values, dict) or len(table) > 1:
         strange = next((key for key in table if key != "flash"), "flash")

@@ -127,7 +127,9 @@ def load_fleet(path: Path) -> FleetOrder:
     Raises:
         FleetError: The file cannot be read, or breaks the schema.
     """
-    return parse_fleet(read_user_text(path, "a fleet", FleetError), shown_name(path), path.parent)
+    return parse_fleet(
+        read_user_text(path, "a fleet", FleetError, hint="docs/pioneer.md shows one"), shown_name(path), path.parent
+    )
 
 
 def parse_fleet(text: str, source: str, folder: Path) -> FleetOrder:
