@@ -552,7 +552,7 @@ def free_port() -> int:
 
 
 def answers(url: str) -> bool:
-    """Tell whether somebody listens, by the system's table: a connection would take the one seat."""
+    """Tell whether somebody listens, by the system's table: a connection would be the one client."""
     port = int(url.rpartition(":")[2])
     return f":{port:04X} 00000000:0000 0A" in Path("/proc/net/tcp").read_text(encoding="ascii")
 

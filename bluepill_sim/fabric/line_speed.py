@@ -1,4 +1,4 @@
-"""Two ends of a serial line at different speeds: what the one hears of what the other sends.
+"""Two ends of a serial line at different speeds: what one receives of what the other sends.
 
 A receiver finds a start bit's edge and samples the middle of each bit at its own speed. Each character is judged
 alone, as if the line idled after it. Not modelled: sampling three times a bit, and the noise flag.

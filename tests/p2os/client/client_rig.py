@@ -25,7 +25,7 @@ from p2os.robots.parameters import RobotParameters, load_parameters
 from p2os.timing import NS_PER_MS, NS_PER_S
 
 MS, S = NS_PER_MS, NS_PER_S
-#: bytes and chance → pieces that arrive, each with its delay.
+#: bytes and random source → pieces that arrive, each with its delay.
 Wire = Callable[[bytes, Random], list[tuple[int, bytes]]]
 
 

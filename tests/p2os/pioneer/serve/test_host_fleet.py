@@ -1,4 +1,4 @@
-"""Many robots in one thread, orders, AUX ports, paced lines, and clients that mean harm."""
+"""Many robots in one thread, orders, AUX ports, paced lines, and hostile clients."""
 
 import os
 import random
