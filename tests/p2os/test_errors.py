@@ -1,0 +1,21 @@
+"""What messages show of values and names: one line, whatever is in them."""
+
+from p2os.errors import LONGEST_SHOWN, shown, shown_name
+
+
+def test_a_value_is_shown_as_python_writes_it_and_cut_where_it_is_long() -> None:
+    assert shown("a\nb") == r"'a\nb'"
+    assert shown("x" * (LONGEST_SHOWN - 2)) == repr("x" * (LONGEST_SHOWN - 2))
+    cut = shown("x" * (LONGEST_SHOWN - 1))
+    assert len(cut) == LONGEST_SHOWN
+    assert cut.endswith("...")
+
+
+def test_a_number_of_more_digits_than_python_writes_has_words() -> None:
+    assert shown(1 << 100_000) == "a huge number"
+
+
+def test_a_name_is_shown_as_it_is_unless_no_line_can_hold_it() -> None:
+    assert shown_name("room.toml") == "room.toml"
+    assert "\n" not in shown_name("a\nb")
+    assert "\0" not in shown_name("a\0b")
