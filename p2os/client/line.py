@@ -137,12 +137,12 @@ class Line:
 
         Interrupts (Ctrl-C) meanwhile are raised when that is done. A second call changes nothing.
         """
-        with contextlib.suppress(Exception):  # a line that fails sends no more; the robot's watchdog stops it
+        with contextlib.suppress(Exception):  # giving the line back may fail too; the robot has its watchdog
             held_back(self._finish)
 
     def _finish(self) -> None:
         if self._transport is not None:
-            with contextlib.suppress(TransportError):
+            with contextlib.suppress(Exception):  # it is given back all the same
                 self._transport.write(CLOSING_FRAMES)
         with contextlib.suppress(Exception):  # an interrupt can have left it in any state
             self.core.close(self._looked_at - self._left_out)

@@ -177,9 +177,9 @@ class RobotThread:
         while self._thread is not None and not self._is_closing and time.monotonic() < handover_s:
             time.sleep(LOOK_S)
         if not self._is_closing:
-            self._is_closing = True
             with self._locked():
                 self._line.finish()
+                self._is_closing = True  # only now: who is interrupted before comes here again
         while self._thread is not None and not self._has_ended and time.monotonic() < ends_s:
             time.sleep(LOOK_S)
         if not self._has_ended:

@@ -178,3 +178,18 @@ def test_the_rig_is_the_same_robot_as_the_served_one() -> None:
             assert robot.config == rig.core.config
     finally:
         served.close()
+
+
+def test_a_line_whose_last_write_fails_in_any_way_is_given_back_and_closed() -> None:
+    class Odd(BrokenLine):
+        def write(self, data: bytes) -> None:
+            raise OSError(f"{len(data)} bytes too many, and not an error of ours")
+
+    core, odd = RobotCore(ClientSettings()), Odd()
+    line = Line(core, None, lambda: 0)
+    core.connect(0)
+    line.turn()
+    line.opened(odd)
+    line.finish()
+    assert odd.is_closed
+    assert core.link is Link.CLOSED
