@@ -17,8 +17,8 @@ class P2osError(Exception):
     exit_code = 1
 
     def __init__(self, message: str, *, hint: str | None = None) -> None:
-        super().__init__(message)
-        self.hint = hint
+        super().__init__(one_line(message))
+        self.hint = None if hint is None else one_line(hint)
 
 
 class UsageError(P2osError):
@@ -61,6 +61,17 @@ class TransportError(P2osError):
 
 class RunFailedError(P2osError):
     """A run came to an end that its scenario does not want."""
+
+
+#: chosen: what a person still reads of one message.
+LONGEST_LINE = 500
+
+
+def one_line(text: str) -> str:
+    """Return a message on one line, without what no line can hold, and with its middle left out where it is long."""
+    if len(text) > LONGEST_LINE:
+        text = f"{text[: LONGEST_LINE - 150]} ... {text[-145:]}"
+    return text if text.isprintable() else "".join(c if c.isprintable() else ascii(c)[1:-1] for c in text)
 
 
 #: chosen: what still fits a line of a terminal beside the rest of a message.

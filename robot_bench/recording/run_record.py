@@ -150,6 +150,10 @@ def read_run(folder: Path) -> RunRecord:
     return record
 
 
+#: What any number of a trace stays within: 64 bits, as the parts that write it count.
+_MOST = 2**63 - 1
+
+
 def _entries(path: Path) -> Iterator[Json]:
     """Yield each complete line; stop quietly at the first that is cut or no object."""
     with path.open(encoding="utf-8", errors="replace") as lines:
@@ -182,7 +186,7 @@ def _file(record: RunRecord, entry: Json) -> None:
     elif kind == "pin":
         record.pins.setdefault(str(entry["net"]), []).append((t, _integer(entry, "v")))
     elif kind == "sonar":
-        record.sonar.append((t, [int(value) for value in cast("list[int]", entry["mm"])]))
+        record.sonar.append((t, [_whole(value) for value in cast("list[float]", entry["mm"])]))
     elif kind == "usart":
         record.usart.append((t, bytes.fromhex(str(entry["hex"]))))
     elif kind == "wire":
@@ -204,7 +208,13 @@ def _obstacle(t: int, entry: Json) -> Json:
 
 def _integer(entry: Json, key: str) -> int:
     value = entry.get(key, 0)
-    return int(value) if isinstance(value, (int, float)) else 0
+    return _whole(value) if isinstance(value, (int, float)) else 0
+
+
+def _whole(value: float) -> int:
+    if abs(value) > _MOST:
+        raise ValueError("a number beyond 64 bits")
+    return int(value)
 
 
 def _pose(t: int, entry: Json) -> PoseSample:

@@ -64,7 +64,7 @@ _START = (
     in_range("heading_deg"),
 )
 _DIRECT = (
-    Key(name="step_mm_s", kind="number", above=0, most=10_000),
+    Key(name="step_mm_s", kind="number", least=0.001, most=10_000),
     Key(name="ramp_mm_s2", kind="number", least=0, most=1_000_000),
     Key(name="sensor_period_ms", kind="whole", least=1, most=60_000),
     Key(name="encoder_period_ms", kind="whole", least=1, most=60_000),
@@ -72,7 +72,7 @@ _DIRECT = (
 )
 _ADAPTER = (
     Key(name="core", kind="text", choices=ADAPTER_CORES),
-    Key(name="step_mm_s", kind="number", above=0, most=10_000),
+    Key(name="step_mm_s", kind="number", least=0.001, most=10_000),
     Key(name="bit_order", kind="text", choices=tuple(BitOrder)),
     Key(name="motor_meaning", kind="text", choices=("wheels", "linear_angular")),
     Key(name="max_velocity_mm_s", kind="whole", least=0, most=32_767),

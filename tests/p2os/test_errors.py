@@ -1,6 +1,6 @@
 """What messages show of values and names: one line, whatever is in them."""
 
-from p2os.errors import LONGEST_SHOWN, shown, shown_name
+from p2os.errors import LONGEST_LINE, LONGEST_SHOWN, P2osError, one_line, shown, shown_name
 
 
 def test_a_value_is_shown_as_python_writes_it_and_cut_where_it_is_long() -> None:
@@ -19,3 +19,12 @@ def test_a_name_is_shown_as_it_is_unless_no_line_can_hold_it() -> None:
     assert shown_name("room.toml") == "room.toml"
     assert "\n" not in shown_name("a\nb")
     assert "\0" not in shown_name("a\0b")
+
+
+def test_an_error_is_one_line_whatever_a_file_put_into_it() -> None:
+    error = P2osError("no thing 'a\nb\x00c'", hint="x" * (LONGEST_LINE + 1))
+    assert str(error) == "no thing 'a\\nb\\x00c'"
+    assert error.hint is not None
+    assert len(error.hint) == LONGEST_LINE
+    assert one_line("µ" * LONGEST_LINE) == "µ" * LONGEST_LINE
+    assert one_line("a" * LONGEST_LINE + "b").endswith("ab")

@@ -124,8 +124,21 @@ def test_a_killed_process_leaves_everything_up_to_its_last_whole_second(tmp_path
     assert max(times) >= 2 * S
 
 
+def test_the_largest_time_that_64_bits_hold_is_read(tmp_path: Path) -> None:
+    line = f'{{"k":"pin","net":"a","t":{2**63 - 1},"v":1}}'
+    (tmp_path / "trace.jsonl").write_text('{"k":"meta","scenario":"s"}\n' + line + "\n", encoding="utf-8")
+    assert read_run(tmp_path).last_ns == 2**63 - 1
+
+
 @pytest.mark.parametrize(
-    "line", ['{"k":"sonar","t":1}', '{"k":"wire","t":1,"hex":"zz","dir":"c2r"}', '{"k":"obstacle","t":1}']
+    "line",
+    [
+        '{"k":"sonar","t":1}',
+        '{"k":"wire","t":1,"hex":"zz","dir":"c2r"}',
+        '{"k":"obstacle","t":1}',
+        f'{{"k":"pin","net":"a","t":{2**63},"v":1}}',
+        f'{{"k":"sonar","t":1,"mm":[{10**400}]}}',
+    ],
 )
 def test_a_damaged_line_is_named_by_its_number(tmp_path: Path, line: str) -> None:
     (tmp_path / "trace.jsonl").write_text('{"k":"meta","scenario":"s"}\n' + line + "\n", encoding="utf-8")
