@@ -48,9 +48,8 @@ a slice, where the bench's watched nets put it, and at each sample.
 Invariant: of the outputs, only SETTLING and DRIVING show what the robot reports.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from enum import StrEnum
-from typing import Any, Protocol, cast
 
 from adapter_sim.distances import Distances, threshold_um
 from adapter_sim.driver import Driver
@@ -66,6 +65,7 @@ from p2os.protocol.commands import set_origin, sonar
 from p2os.protocol.sip import StandardSip
 from p2os.robots.parameters import RobotParameters
 from p2os.timing import NS_PER_S, Nanos, Reached
+from simbase.state import Stateful
 
 
 class AdapterState(StrEnum):
@@ -136,14 +136,7 @@ class Agenda:
     sips: int = 0
 
 
-class _Saved(Protocol):
-    """A part with a state of its own."""
-
-    def snapshot(self) -> object: ...
-    def restore(self, snapshot: Any) -> None: ...
-
-
-class Adapter:
+class Adapter(Stateful):
     """The adapter as a passive part in virtual time.
 
     Args:
@@ -155,6 +148,12 @@ class Adapter:
         now: When power comes, in nanoseconds.
         master: Who commands; the board reads a jumper at boot.
     """
+
+    STATE = (
+        "_state", "_reason", "_now", "_baud_place", "_agenda", "samples", "_masters", "_stop_repeater", "_driver",
+        "distances", "_codes", "outputs", "session",
+    )  # fmt: skip
+    DERIVED = ("_deadline", "_other")
 
     def __init__(
         self,
@@ -184,11 +183,6 @@ class Adapter:
         self.inputs = Inputs(pins, pinout, settings)
         self._masters = Masters(self.inputs, self._driver.mixer, settings, master)
         self._stop_repeater = StopRepeater(settings)
-        #: The parts that a snapshot saves.
-        self._parts: dict[str, _Saved] = {
-            "masters": self._masters, "stop_repeater": self._stop_repeater, "driver": self._driver,
-            "distances": self.distances, "codes": self._codes, "outputs": self.outputs, "session": self.session,
-        }  # fmt: skip
         self._baud_place = 0
         self._now = now
         #: The earliest deadline, and the earliest that is no sample.
@@ -296,23 +290,7 @@ class Adapter:
                 self._run(limit)
         return Reached(limit)
 
-    def snapshot(self) -> dict[str, object]:
-        """Return all that decides the future, as plain values."""
-        return {
-            "adapter": (self._state.value, self._reason, self._now, self.samples.next, self._baud_place),
-            "agenda": replace(self._agenda),
-            **{name: part.snapshot() for name, part in self._parts.items()},
-        }
-
-    def restore(self, snapshot: object) -> None:
-        """Put back what `snapshot` returned."""
-        saved = cast("dict[str, Any]", snapshot)
-        state, self._reason, self._now, self.samples.next, self._baud_place = saved["adapter"]
-        self._state = AdapterState(state)
-        self._agenda = replace(saved["agenda"])
-        self.samples.is_suspended = False
-        for name, part in self._parts.items():
-            part.restore(saved[name])
+    def _restored(self) -> None:
         self._replan()
 
     def _run(self, limit: Nanos) -> Nanos | None:

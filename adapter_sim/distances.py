@@ -4,17 +4,13 @@ A level is high where the last reading is nearer than the threshold, and high
 where there is none or it has gone stale: what is not known is an obstacle.
 """
 
-from typing import TypeAlias
-
 from adapter_sim.codec import is_near
 from p2os.robots.parameters import RobotParameters
 from p2os.timing import Nanos
-
-#: Range in µm and time of each reading, None where there is none.
-DistanceSnapshot: TypeAlias = tuple[tuple[int, Nanos] | None, ...]
+from simbase.state import Stateful
 
 
-class Distances:
+class Distances(Stateful):
     """The newest reading of each sonar.
 
     Args:
@@ -22,6 +18,8 @@ class Distances:
         threshold_um: Nearer is an obstacle.
         stale_ns: A reading of this age is none any more.
     """
+
+    STATE = ("_readings",)
 
     def __init__(self, count: int, *, threshold_um: int, stale_ns: Nanos) -> None:
         self.threshold_um = threshold_um
@@ -58,14 +56,6 @@ class Distances:
     def ranges_um(self) -> tuple[int | None, ...]:
         """Return the range of each sonar in µm, None where it is not known."""
         return tuple(None if reading is None else reading[0] for reading in self._readings)
-
-    def snapshot(self) -> DistanceSnapshot:
-        """Return all of it as plain values."""
-        return tuple(self._readings)
-
-    def restore(self, snapshot: DistanceSnapshot) -> None:
-        """Put back what `snapshot` returned."""
-        self._readings = list(snapshot)
 
 
 def threshold_um(wanted_um: int | None, parameters: RobotParameters) -> int:

@@ -23,8 +23,6 @@ jitters does not pass for long.
 Invariant: a new command buys no time; only a SIP that passes extends the deadline.
 """
 
-from typing import TypeAlias
-
 from adapter_sim.codec import divide_half_away
 from adapter_sim.mixing import STILL, Mixer, Speeds
 from adapter_sim.session import Session
@@ -33,25 +31,21 @@ from p2os.protocol.commands import enable, rvel, vel
 from p2os.protocol.sip import StandardSip
 from p2os.robots.parameters import RobotParameters
 from p2os.timing import NS_PER_S, Nanos
+from simbase.state import Stateful
 
 #: ENABLE 1 goes out with this many pairs: one frame may be lost. # chosen: not more, a person may switch the motors off
 _ENABLES = 2
 
-#: Wheels of the command, wheels measured, least error, time of the last plausible packet.
-PlausibilitySnapshot: TypeAlias = tuple[tuple[int, int], tuple[int, int], int, Nanos]
-#: Forward and turn wanted, forward and turn sent, time of the last pair or None.
-PacerSnapshot: TypeAlias = tuple[int, int, int, int, Nanos | None]
-#: Plausibility check, pacer, pairs before which ENABLE 1 still goes out.
-DriverSnapshot: TypeAlias = tuple[PlausibilitySnapshot, PacerSnapshot, int]
 
-
-class Driver:
+class Driver(Stateful):
     """Commands the robot's speeds and watches its wheels.
 
     Args:
         settings: Times, limits and meanings.
         parameters: The robot's own limits and conversions.
     """
+
+    STATE = ("plausibility", "_pacer", "_enables_left")
 
     def __init__(self, settings: AdapterSettings, parameters: RobotParameters) -> None:
         self.mixer = Mixer(
@@ -119,19 +113,11 @@ class Driver:
             now=now,
         )
 
-    def snapshot(self) -> DriverSnapshot:
-        """Return all of it as plain values."""
-        return self.plausibility.snapshot(), self._pacer.snapshot(), self._enables_left
 
-    def restore(self, snapshot: DriverSnapshot) -> None:
-        """Put back what `snapshot` returned."""
-        self.plausibility.restore(snapshot[0])
-        self._pacer.restore(snapshot[1])
-        self._enables_left = snapshot[2]
-
-
-class CommandPacer:
+class CommandPacer(Stateful):
     """The newest speeds, and when to send them."""
+
+    STATE = ("wanted", "sent", "_sent_at")
 
     def __init__(self, *, spacing_ns: Nanos, refresh_ns: Nanos) -> None:
         self._spacing_ns = spacing_ns
@@ -160,22 +146,11 @@ class CommandPacer:
         self._sent_at = now
         return self.sent
 
-    def snapshot(self) -> PacerSnapshot:
-        """Return all of it as plain values."""
-        return (
-            self.wanted.forward_mm_s, self.wanted.turn_deg_s,
-            self.sent.forward_mm_s, self.sent.turn_deg_s, self._sent_at,
-        )  # fmt: skip
 
-    def restore(self, snapshot: PacerSnapshot) -> None:
-        """Put back what `snapshot` returned."""
-        self.wanted = Speeds(snapshot[0], snapshot[1])
-        self.sent = Speeds(snapshot[2], snapshot[3])
-        self._sent_at = snapshot[4]
-
-
-class PlausibilityCheck:
+class PlausibilityCheck(Stateful):
     """Compares the commanded wheel speeds with those of the SIPs, all in mm/s."""
+
+    STATE = ("command", "measured", "_least_error", "_passed_at")
 
     def __init__(self, *, timeout_ns: Nanos, tolerance_mm_s: int, progress_mm_s: int) -> None:
         self._timeout_ns = timeout_ns
@@ -226,14 +201,6 @@ class PlausibilityCheck:
             f"wheels at {self.measured[0]} and {self.measured[1]} mm/s for {self._timeout_ns / NS_PER_S:.1f} s, "
             f"commanded {self.command[0]} and {self.command[1]}, and no stall flag"
         )
-
-    def snapshot(self) -> PlausibilitySnapshot:
-        """Return all of it as plain values."""
-        return self.command, self.measured, self._least_error, self._passed_at
-
-    def restore(self, snapshot: PlausibilitySnapshot) -> None:
-        """Put back what `snapshot` returned."""
-        self.command, self.measured, self._least_error, self._passed_at = snapshot
 
     def _error(self) -> int:
         return max(abs(self.command[0] - self.measured[0]), abs(self.command[1] - self.measured[1]))

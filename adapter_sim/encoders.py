@@ -32,7 +32,6 @@ or less, so the C++ twin computes the same.
 
 import math
 from dataclasses import dataclass
-from typing import TypeAlias
 
 from adapter_sim.codec import divide_half_away, encoder_count
 from adapter_sim.settings import AdapterSettings, EncoderAtOpen
@@ -40,6 +39,7 @@ from p2os.protocol.odometry import Unwrapper
 from p2os.protocol.sip import StandardSip
 from p2os.robots.parameters import RobotParameters
 from p2os.timing import Nanos
+from simbase.state import Stateful
 
 #: x and y on the wire.
 POSITION_MODULUS = 1 << 15
@@ -61,15 +61,8 @@ PI_E9 = 3_141_592_654
 #: sin of a quarter turn in half counts, × 2^30, rounded; a test shows that no entry is near a tie.
 _SINE = tuple(round(math.sin(math.pi * k / (2 * _QUARTER)) * (1 << ONE_BITS)) for k in range(_QUARTER + 1))
 
-#: One counter of the odometry: total and last value.
-_Counter: TypeAlias = tuple[int, int | None]
-#: Odometry, heading and forward sums, offsets in nm, jumps.
-EncoderSnapshot: TypeAlias = tuple[tuple[_Counter, _Counter, _Counter, int | None], int, int, tuple[int, int], int]
-#: Count shown, time of the last step or None.
-WalkSnapshot: TypeAlias = tuple[int, Nanos | None]
 
-
-class WheelCodes:
+class WheelCodes(Stateful):
     """What both wheels have turned since OPEN, and what of it stands on the pins.
 
     Args:
@@ -77,6 +70,8 @@ class WheelCodes:
         parameters: The robot's lengths.
         width: Wires of an encoder.
     """
+
+    STATE = ("encoders", "_walks")
 
     def __init__(self, settings: AdapterSettings, parameters: RobotParameters, width: int) -> None:
         self.encoders = Encoders(EncoderGeometry.of(parameters, settings.liveness_ns), width)
@@ -124,16 +119,6 @@ class WheelCodes:
             walk.step(target, now)
         return self.shown
 
-    def snapshot(self) -> tuple[EncoderSnapshot, tuple[WalkSnapshot, ...]]:
-        """Return all of it as plain values."""
-        return self.encoders.snapshot(), tuple(walk.snapshot() for walk in self._walks)
-
-    def restore(self, snapshot: tuple[EncoderSnapshot, tuple[WalkSnapshot, ...]]) -> None:
-        """Put back what `snapshot` returned."""
-        self.encoders.restore(snapshot[0])
-        for walk, saved in zip(self._walks, snapshot[1], strict=True):
-            walk.restore(saved)
-
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class EncoderGeometry:
@@ -162,8 +147,10 @@ class EncoderGeometry:
         return divide_half_away(self.wheel_diameter_um * PI_E9, 10**6)
 
 
-class Encoders:
+class Encoders(Stateful):
     """Both wheels' travel since the reference was taken."""
+
+    STATE = ("_x", "_y", "_turn", "_raw_heading", "_heading", "_forward", "_offset_nm", "jumps")
 
     def __init__(self, geometry: EncoderGeometry, width: int) -> None:
         self.geometry = geometry
@@ -231,21 +218,11 @@ class Encoders:
         self._heading += turn
         return True
 
-    def snapshot(self) -> EncoderSnapshot:
-        """Return all of it as plain values."""
-        odometry = (self._x.snapshot(), self._y.snapshot(), self._turn.snapshot(), self._raw_heading)
-        return odometry, self._heading, self._forward, self._offset_nm, self.jumps
 
-    def restore(self, snapshot: EncoderSnapshot) -> None:
-        """Put back what `snapshot` returned."""
-        (x, y, turn, self._raw_heading), self._heading, self._forward, self._offset_nm, self.jumps = snapshot
-        self._x.restore(x)
-        self._y.restore(y)
-        self._turn.restore(turn)
-
-
-class CodeWalk:
+class CodeWalk(Stateful):
     """One encoder's count on its way to a target."""
+
+    STATE = ("shown", "_stepped_at")
 
     def __init__(self, dwell_ns: Nanos) -> None:
         self._dwell_ns = dwell_ns
@@ -272,14 +249,6 @@ class CodeWalk:
         """Stand at 0."""
         self.shown = 0
         self._stepped_at = None
-
-    def snapshot(self) -> WalkSnapshot:
-        """Return all of it as plain values."""
-        return self.shown, self._stepped_at
-
-    def restore(self, snapshot: WalkSnapshot) -> None:
-        """Put back what `snapshot` returned."""
-        self.shown, self._stepped_at = snapshot
 
 
 def sine(half_counts: int) -> int:

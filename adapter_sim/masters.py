@@ -5,14 +5,14 @@ stale after a change, but they move nothing.
 """
 
 from enum import StrEnum
-from typing import TypeAlias
 
 from adapter_sim.mixing import Mixer, Speeds
-from adapter_sim.pins import Inputs, InputSnapshot
+from adapter_sim.pins import Inputs
 from adapter_sim.settings import AdapterSettings
 from p2os.gamepad import Gamepad as AnyGamepad
-from p2os.gamepad import GamepadSnapshot, PadReport
+from p2os.gamepad import PadReport
 from p2os.timing import Nanos
+from simbase.state import Stateful
 
 
 class Master(StrEnum):
@@ -31,11 +31,7 @@ class Gamepad(AnyGamepad):
         )
 
 
-#: Master, inputs, pad.
-MastersSnapshot: TypeAlias = tuple[str, InputSnapshot, GamepadSnapshot]
-
-
-class Masters:
+class Masters(Stateful):
     """Both masters, and which of them commands.
 
     Args:
@@ -44,6 +40,8 @@ class Masters:
         settings: Dead zones and times of the pad.
         master: Who commands at first.
     """
+
+    STATE = ("master", "inputs", "_pad")
 
     def __init__(self, inputs: Inputs, mixer: Mixer, settings: AdapterSettings, master: Master) -> None:
         self.inputs = inputs
@@ -104,13 +102,3 @@ class Masters:
         """Forget everything but who is master."""
         self.inputs.reset()
         self._pad.lose()
-
-    def snapshot(self) -> MastersSnapshot:
-        """Return all of it as plain values."""
-        return self.master.value, self.inputs.snapshot(), self._pad.snapshot()
-
-    def restore(self, snapshot: MastersSnapshot) -> None:
-        """Put back what `snapshot` returned."""
-        self.master = Master(snapshot[0])
-        self.inputs.restore(snapshot[1])
-        self._pad.restore(snapshot[2])

@@ -35,18 +35,12 @@ from adapter_sim.codec import motor_value
 from adapter_sim.pinout import Pinout, Safe, WireRole
 from adapter_sim.settings import AdapterSettings
 from p2os.timing import Nanos
+from simbase.state import Stateful
 
 #: Called at each transition: (now in ns, what happened in a word or two, detail).
 EventCallback: TypeAlias = Callable[[Nanos, str, str], None]
 #: Values of the pin-out that the wheels' codes are, left first.
 ENCODER_VALUES = ("encoder1", "encoder2")
-
-#: Word taken, equal samples in a row, window.
-MajoritySnapshot: TypeAlias = tuple[int, int, tuple[int, ...]]
-#: Level that counts, level seen, since when.
-DebounceSnapshot: TypeAlias = tuple[bool, bool, Nanos]
-#: Last word, motor wires, p2dx_con.
-InputSnapshot: TypeAlias = tuple[int, MajoritySnapshot, DebounceSnapshot]
 
 
 class PinBank(Protocol):
@@ -61,8 +55,10 @@ class PinBank(Protocol):
         ...
 
 
-class Inputs:
+class Inputs(Stateful):
     """Motor values by majority, p2dx_con by time, rst as it stands."""
+
+    STATE = ("_majority", "_connect", "_word")
 
     def __init__(self, pins: PinBank, pinout: Pinout, settings: AdapterSettings) -> None:
         self._pins = pins
@@ -121,16 +117,6 @@ class Inputs:
         self._majority.reset()
         self._connect.reset()
 
-    def snapshot(self) -> InputSnapshot:
-        """Return all of it as plain values."""
-        return self._word, self._majority.snapshot(), self._connect.snapshot()
-
-    def restore(self, snapshot: InputSnapshot) -> None:
-        """Put back what `snapshot` returned."""
-        self._word, majority, connect = snapshot
-        self._majority.restore(majority)
-        self._connect.restore(connect)
-
     def _read(self, now: Nanos) -> int:
         read, word = self._pins.read, 0
         for name, weight in self._wires:
@@ -139,8 +125,10 @@ class Inputs:
         return word
 
 
-class Outputs:
+class Outputs(Stateful):
     """Writes levels to the pins, each change once."""
+
+    STATE = ("_shown",)
 
     def __init__(self, pins: PinBank, pinout: Pinout) -> None:
         self._pins = pins
@@ -178,22 +166,16 @@ class Outputs:
         """Return what each output shows; None is released."""
         return dict(self._shown)
 
-    def snapshot(self) -> tuple[tuple[str, bool | None], ...]:
-        """Return all of it as plain values."""
-        return tuple(self._shown.items())
-
-    def restore(self, snapshot: tuple[tuple[str, bool | None], ...]) -> None:
-        """Put back what `snapshot` returned; nothing is written, the wires have their own."""
-        self._shown = dict(snapshot)
-
     def _write(self, name: str, level: bool | None, now: Nanos) -> None:
         if self._shown[name] is not level:
             self._shown[name] = level
             self._pins.write(name, level, now)
 
 
-class SampleClock:
+class SampleClock(Stateful):
     """The next sample instant."""
+
+    STATE = ("next", "is_suspended")
 
     def __init__(self, period_ns: Nanos) -> None:
         self._period_ns = period_ns
@@ -223,8 +205,10 @@ class SampleClock:
         return other if self.is_suspended else min(self.next, other)
 
 
-class Majority:
+class Majority(Stateful):
     """A sliding window over words, with the word that holds its majority."""
+
+    STATE = ("_window", "_same", "word")
 
     def __init__(self, count: int, word: int = 0) -> None:
         self._count = count
@@ -255,23 +239,16 @@ class Majority:
         self._same = self._count
         self.word = word
 
-    def snapshot(self) -> MajoritySnapshot:
-        """Return all of it as plain values."""
-        return self.word, self._same, tuple(self._window)
 
-    def restore(self, snapshot: MajoritySnapshot) -> None:
-        """Put back what `snapshot` returned."""
-        self.word, self._same, window = snapshot
-        self._window = list(window)
-
-
-class Debounce:
+class Debounce(Stateful):
     """A level that must last before it counts.
 
     Args:
         high_after_ns: High counts once seen for MORE than this.
         low_after_ns: Low counts once seen for this long.
     """
+
+    STATE = ("level", "_raw", "_since")
 
     def __init__(self, high_after_ns: Nanos, low_after_ns: Nanos) -> None:
         self._high_after_ns = high_after_ns
@@ -305,11 +282,3 @@ class Debounce:
         self.level = False
         self._raw = False
         self._since = 0
-
-    def snapshot(self) -> DebounceSnapshot:
-        """Return all of it as plain values."""
-        return self.level, self._raw, self._since
-
-    def restore(self, snapshot: DebounceSnapshot) -> None:
-        """Put back what `snapshot` returned."""
-        self.level, self._raw, self._since = snapshot

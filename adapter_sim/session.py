@@ -19,7 +19,7 @@ Invariant: what `take_output` returns begins, after `abandon`, with STOP.
 """
 
 from dataclasses import dataclass
-from typing import TypeAlias, cast
+from typing import TypeAlias
 
 from adapter_sim.settings import AdapterSettings
 from p2os.protocol.commands import Command, CommandNumber, rvel, stop, vel
@@ -37,6 +37,7 @@ from p2os.protocol.connection import (
 )
 from p2os.protocol.sip import StandardSip
 from p2os.timing import NS_PER_MS, Nanos
+from simbase.state import Stateful
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,8 +63,10 @@ _CLOSE = Command(CommandNumber.CLOSE).to_frame().to_bytes()
 _SYNC0 = Command(CommandNumber.PULSE).to_frame().to_bytes()
 
 
-class Session:
+class Session(Stateful):
     """One robot's session after another."""
+
+    STATE = ("_connection", "_output", "_robot")
 
     def __init__(self, settings: AdapterSettings) -> None:
         self._settings = ConnectionSettings(
@@ -147,16 +150,6 @@ class Session:
         self._connection.advance_to(now)
         self._collect()
 
-    def snapshot(self) -> tuple[object, tuple[bytes, ...], str]:
-        """Return all that decides the future."""
-        return self._connection.snapshot(), tuple(self._output), self._robot
-
-    def restore(self, snapshot: object) -> None:
-        """Put back what `snapshot` returned."""
-        connection, output, self._robot = cast("tuple[object, tuple[bytes, ...], str]", snapshot)
-        self._connection.restore(connection)
-        self._output = list(output)
-
     def _collect(self) -> None:
         is_open = self._connection.state is ConnectionState.OPEN
         for frame in self._connection.take_output():
@@ -168,12 +161,11 @@ class Session:
 #: A robot whose bytes came so recently is still streaming: one SIP period.
 _STREAMING_NS: Nanos = 100 * NS_PER_MS
 
-#: Next repetition, how many are left, whether closed on request, when bytes of the robot came last.
-StopRepeaterSnapshot: TypeAlias = tuple[Nanos, int, bool, Nanos]
 
-
-class StopRepeater:
+class StopRepeater(Stateful):
     """How often the stop sequence still goes out, and when."""
+
+    STATE = ("_at", "_left", "_is_closed_on_request", "received_at")
 
     def __init__(self, settings: AdapterSettings) -> None:
         self._repeats = settings.stop_repeats
@@ -219,11 +211,3 @@ class StopRepeater:
             self._at = now + self._period_ns
             if not self._is_closed_on_request or now - self.received_at < _STREAMING_NS:
                 session.abandon(now)
-
-    def snapshot(self) -> StopRepeaterSnapshot:
-        """Return all of it as plain values."""
-        return self._at, self._left, self._is_closed_on_request, self.received_at
-
-    def restore(self, snapshot: StopRepeaterSnapshot) -> None:
-        """Put back what `snapshot` returned."""
-        self._at, self._left, self._is_closed_on_request, self.received_at = snapshot

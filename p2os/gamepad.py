@@ -11,9 +11,9 @@ teleop --pad`) brings its reports into this form.
 """
 
 from dataclasses import dataclass
-from typing import TypeAlias
 
 from p2os.timing import NS_PER_MS, Nanos
+from simbase.state import Stateful
 
 #: Full deflections: a trigger from 0, the stick from its middle.
 TRIGGER_FULL, STICK_FULL = 1023, 511
@@ -40,12 +40,10 @@ class PadReport:
     turn: int = 0
 
 
-#: Time of the last report or None, forward, turn, Up as last seen, connect request.
-GamepadSnapshot: TypeAlias = tuple[Nanos | None, int, int, bool, bool]
-
-
-class Gamepad:
+class Gamepad(Stateful):
     """What the newest report asks for."""
+
+    STATE = ("_reported_at", "forward", "turn", "_was_up", "wants_robot")
 
     def __init__(self, *, trigger_dead: int = 40, stick_dead: int = 40, loss_ns: Nanos = 150 * NS_PER_MS) -> None:
         """Make a pad that has not reported yet.
@@ -92,14 +90,6 @@ class Gamepad:
         self.wants_robot = False
         self._was_up = True
         self.forward = self.turn = 0
-
-    def snapshot(self) -> GamepadSnapshot:
-        """Return all of it as plain values."""
-        return self._reported_at, self.forward, self.turn, self._was_up, self.wants_robot
-
-    def restore(self, snapshot: GamepadSnapshot) -> None:
-        """Put back what `snapshot` returned."""
-        self._reported_at, self.forward, self.turn, self._was_up, self.wants_robot = snapshot
 
 
 def _outside(value: int, dead: int, full: int) -> int:

@@ -13,7 +13,7 @@ from pathlib import Path, PurePosixPath
 import pytest
 
 ROOT = Path(__file__).resolve().parent.parent
-PACKAGES = ("p2os", "bluepill_sim", "adapter_sim", "robot_bench")
+PACKAGES = ("simbase", "p2os", "bluepill_sim", "adapter_sim", "robot_bench")
 
 #: Modules that no model below the I/O layer may touch: time, ports and threads are passed in.
 FORBIDDEN_IN_CORE = {

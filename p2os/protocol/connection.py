@@ -30,7 +30,6 @@ from collections import deque
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from enum import Enum
-from typing import cast
 
 from p2os.errors import LocalProtocolError
 from p2os.protocol.commands import Command, CommandNumber, enable, pulse, rvel, stop, vel
@@ -56,6 +55,7 @@ from p2os.protocol.packets import RESET_KINDS, Identity, ServerPacket, packet_fr
 from p2os.protocol.profiles import Profile
 from p2os.protocol.sip import SIP_KINDS, StandardSip
 from p2os.timing import NS_PER_MS, NS_PER_S, Nanos, Reached
+from simbase.state import Stateful
 
 __all__ = [
     "Closed",
@@ -240,7 +240,7 @@ class ConnectionStats:
     wire: DecoderStats = field(default_factory=DecoderStats)
 
 
-class Connection:
+class Connection(Stateful):
     """One end of a P2OS line.
 
     Args:
@@ -250,6 +250,8 @@ class Connection:
         settings: The client's times, and the firmware family for both.
         lenient: Server: answers syncs in any order, as AMRISim does.
     """
+
+    STATE = ("_decoder", "_queues", "_side", "settings")
 
     def __init__(
         self,
@@ -361,28 +363,6 @@ class Connection:
             self._side.advance_to(due)
         return Reached(limit)
 
-    def snapshot(self) -> object:
-        """Return all that decides the future."""
-        queues = self._queues
-        return _Snapshot(
-            decoder=self._decoder.snapshot(),
-            side=self._side.snapshot(),
-            events=tuple(queues.events),
-            output=tuple(queues.output),
-            stats=replace(queues.stats),
-            last_sent_ns=queues.last_sent_ns,
-        )
-
-    def restore(self, snapshot: object) -> None:
-        """Put back what `snapshot` returned."""
-        saved = cast("_Snapshot", snapshot)
-        self._decoder.restore(saved.decoder)
-        self._side.restore(saved.side)
-        self._queues.events = deque(saved.events)
-        self._queues.output = list(saved.output)
-        self._queues.stats = replace(saved.stats)
-        self._queues.last_sent_ns = saved.last_sent_ns
-
     def _client(self, verb: str) -> "_ClientSide":
         if not isinstance(self._side, _ClientSide):
             raise LocalProtocolError(f"a server cannot {verb}: it waits for its client")
@@ -398,18 +378,10 @@ class Connection:
                 self._queues.events.append(NoiseReceived(item))
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class _Snapshot:
-    decoder: object
-    side: object
-    events: tuple[Event, ...]
-    output: tuple[bytes, ...]
-    stats: ConnectionStats
-    last_sent_ns: Nanos
-
-
-class _Queues:
+class _Queues(Stateful):
     """The queues between a connection's side and its owner."""
+
+    STATE = ("events", "output", "stats", "last_sent_ns")
 
     def __init__(self) -> None:
         self.events: deque[Event] = deque()
@@ -424,8 +396,10 @@ class _Queues:
         self.last_sent_ns = now
 
 
-class _ClientSide:
+class _ClientSide(Stateful):
     """What a client does with each frame and at its deadlines."""
+
+    STATE = ("state", "_due", "_attempts", "_open_due", "_opens", "_has_received", "_settings")
 
     def __init__(self, queues: _Queues, settings: ConnectionSettings) -> None:
         self._queues = queues
@@ -588,22 +562,15 @@ class _ClientSide:
     def _enter(self, state: ConnectionState, due: Nanos | None) -> None:
         self.state, self._due, self._open_due = state, due, None
 
-    def snapshot(self) -> object:
-        """Return all that decides the future."""
-        return self.state, self._due, self._attempts, self._open_due, self._opens, self._has_received, self._settings
 
-    def restore(self, snapshot: object) -> None:
-        """Put back what `snapshot` returned."""
-        saved = cast("tuple[ConnectionState, Nanos | None, int, Nanos | None, int, bool, ConnectionSettings]", snapshot)
-        self.state, self._due, self._attempts, self._open_due, self._opens, self._has_received, self._settings = saved
-
-
-class _ServerSide:
+class _ServerSide(Stateful):
     """What a server does with each frame and at its one deadline.
 
     The watchdog runs from OPEN. It expires once, and the first sound frame after
     that is reported before the command that the frame carries.
     """
+
+    STATE = ("state", "_last_frame_ns", "_expired")
 
     def __init__(self, queues: _Queues, identity: Identity, watchdog_ns: Nanos, *, lenient: bool = False) -> None:
         self._queues = queues
@@ -668,11 +635,3 @@ class _ServerSide:
     def count_silence(self, silence: Nanos, now: Nanos) -> None:
         """Let the watchdog count a time in which nothing came, and which `now` does not contain."""
         self._last_frame_ns = max(self._last_frame_ns - silence, now - self._watchdog_ns)
-
-    def snapshot(self) -> object:
-        """Return all that decides the future."""
-        return self.state, self._last_frame_ns, self._expired
-
-    def restore(self, snapshot: object) -> None:
-        """Put back what `snapshot` returned."""
-        self.state, self._last_frame_ns, self._expired = cast("tuple[ConnectionState, Nanos, bool]", snapshot)

@@ -20,11 +20,11 @@ between calls.
 """
 
 from collections import deque
-from dataclasses import dataclass, replace
-from typing import cast
+from dataclasses import dataclass
 
 from p2os.errors import LocalProtocolError
 from p2os.timing import NS_PER_MS, Nanos, Reached
+from simbase.state import Stateful
 
 HEADER = b"\xfa\xfb"
 #: Header and count.
@@ -157,8 +157,10 @@ class DecoderStats:
     last_stalled: bytes = b""
 
 
-class Decoder:
+class Decoder(Stateful):
     """Turn a stream of bytes into frames, whatever the stream holds."""
+
+    STATE = ("_buffer", "_noise", "_items", "_last_byte_ns", "_rescanned", "stats")
 
     def __init__(self) -> None:
         self._buffer = bytearray()
@@ -264,22 +266,3 @@ class Decoder:
             self.stats.last_noise = noise[:KEPT_BYTES]
             self._items.append(Noise(noise))
             self._noise.clear()
-
-    def snapshot(self) -> object:
-        """Return all that decides the future."""
-        return (
-            bytes(self._buffer),
-            bytes(self._noise),
-            tuple(self._items),
-            self._last_byte_ns,
-            self._rescanned,
-            replace(self.stats),
-        )
-
-    def restore(self, snapshot: object) -> None:
-        """Put back what `snapshot` returned."""
-        saved = cast("tuple[bytes, bytes, tuple[Item, ...], Nanos, int, DecoderStats]", snapshot)
-        buffer, noise, items, self._last_byte_ns, self._rescanned, stats = saved
-        self._buffer, self._noise = bytearray(buffer), bytearray(noise)
-        self._items = deque(items)
-        self.stats = replace(stats)

@@ -5,11 +5,11 @@ packets; a step of more than half looks like one the other way round.
 """
 
 from dataclasses import dataclass
-from typing import Any, cast
 
 from p2os.protocol.sip import POSITION_MASK, StandardSip
 from p2os.robots.parameters import RobotParameters
 from p2os.timing import NS_PER_S, Nanos
+from simbase.state import Stateful
 
 #: Positions are 15 bits wide in every firmware family (manuals, SIP table).
 POSITION_MODULUS = POSITION_MASK + 1
@@ -17,12 +17,14 @@ POSITION_MODULUS = POSITION_MASK + 1
 PLAYER_POSITION_MODULUS = 4096
 
 
-class Unwrapper:
+class Unwrapper(Stateful):
     """Follow a counter that wraps.
 
     Args:
         modulus: How many values the counter has; 32768 for positions (12-bit readers take 4096).
     """
+
+    STATE = ("total", "_last")
 
     __slots__ = ("_last", "modulus", "total")
 
@@ -50,14 +52,6 @@ class Unwrapper:
     def forget(self) -> None:
         """Take the next value as a new beginning; the total stays."""
         self._last = None
-
-    def snapshot(self) -> tuple[int, int | None]:
-        """Return all that decides the future."""
-        return self.total, self._last
-
-    def restore(self, snapshot: tuple[int, int | None]) -> None:
-        """Put back what `snapshot` returned."""
-        self.total, self._last = snapshot
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -87,7 +81,7 @@ class OdometryStep:
         return self.is_position_ambiguous or self.is_heading_ambiguous
 
 
-class Odometry:
+class Odometry(Stateful):
     """Follow a robot's position and heading over any number of wraps.
 
     Whole counts are kept and nothing else: a heading of ten thousand turns is as
@@ -97,6 +91,8 @@ class Odometry:
         parameters: The robot's conversions and the top speeds that decide what a gap makes ambiguous.
         position_modulus: 32768 (15 bits); 4096 for a robot that is read as player and ROS read it.
     """
+
+    STATE = ("_x", "_y", "_heading", "_last_ns", "ambiguous_steps")
 
     def __init__(self, parameters: RobotParameters, *, position_modulus: int = POSITION_MODULUS) -> None:
         self._parameters = parameters
@@ -144,13 +140,3 @@ class Odometry:
         )
         self.ambiguous_steps += step.is_ambiguous
         return step
-
-    def snapshot(self) -> object:
-        """Return all that decides the future."""
-        return self._x.snapshot(), self._y.snapshot(), self._heading.snapshot(), self._last_ns, self.ambiguous_steps
-
-    def restore(self, snapshot: object) -> None:
-        """Put back what `snapshot` returned."""
-        *counters, self._last_ns, self.ambiguous_steps = cast("tuple[Any, ...]", snapshot)
-        for unwrapper, saved in zip((self._x, self._y, self._heading), counters, strict=True):
-            unwrapper.restore(saved)
