@@ -1,7 +1,7 @@
 """The examples of the documentation run, as they stand there.
 
-Every fenced block of `python` is executed and every line `$ p2os …` of a
-`console` block must end with exit code 0, all blocks of one page in one folder.
+Every fenced block of `python` is executed and every line `$ p2os …` or `$ make -C …`
+of a `console` block must end with exit code 0, all blocks of one page in one folder.
 A block that cannot run here says why in the line before it:
 `<!-- not run: the reason -->`.
 """
@@ -9,11 +9,14 @@ A block that cannot run here says why in the line before it:
 import os
 import re
 import shlex
+import shutil
 import subprocess
 import sys
 from pathlib import Path
 
 import pytest
+
+from robot_bench.firmware.build import COMPILER
 
 ROOT = Path(__file__).resolve().parent.parent
 BLOCK = re.compile(r"(?P<before>[^\n]*)\n```(?P<language>python|console)\n(?P<text>.*?)```", re.DOTALL)
@@ -35,10 +38,11 @@ def commands(page: Path) -> list[list[str]]:
             found.append([sys.executable, "-c", block["text"]])
         else:
             lines = [line[2:] for line in block["text"].splitlines() if line.startswith("$ ")]
+            programs = {"p2os": str(Path(sys.executable).parent / "p2os"), "make": "make"}
             found += [
-                [str(Path(sys.executable).parent / "p2os"), *shlex.split(line)[1:]]
+                [programs[line.split()[0]], *shlex.split(line)[1:]]
                 for line in lines
-                if line.startswith("p2os ")
+                if line.startswith(("p2os ", "make -C "))
             ]
     return found
 
@@ -46,6 +50,8 @@ def commands(page: Path) -> list[list[str]]:
 @pytest.mark.parametrize("page", [page for page in pages() if commands(page)], ids=lambda page: page.name)
 def test_the_examples_of_a_page_run(page: Path, tmp_path: Path) -> None:
     environment = {**os.environ, "NO_COLOR": "1", "TERM": "dumb"}
+    if any(command[0] == "make" for command in commands(page)) and shutil.which(COMPILER) is None:
+        pytest.skip("no cross compiler")
     for command in commands(page):
         done = subprocess.run(
             command, cwd=tmp_path, capture_output=True, text=True, timeout=LIMIT_S, env=environment, check=False

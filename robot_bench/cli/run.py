@@ -22,8 +22,8 @@ from robot_bench.scenario.scenario import Scenario, load_scenario
 
 HELP = """Run a scenario: the firmware boots on an emulated BluePill and its pins drive a robot.
 
-SCENARIO is one of those that ship (motors, sensors, encoders, dodge) or a TOML
-file. What the options leave open is the scenario's. The run folder holds
+SCENARIO is one of those that ship (free-drive, motors, sensors, encoders, dodge)
+or a TOML file. What the options leave open is the scenario's. The run folder holds
 the trace, the pins as VCD and for PulseView, and report.html.
 
 Exit code: 0 all goals were met, 1 one was missed or the run failed, 2 wrong
@@ -34,7 +34,7 @@ However a run ends, its folder says so; --out never overwrites a run without --f
 Examples:
   p2os run dodge                                    120 s among obstacles, through adapter and P2OS
   p2os run dodge --mode direct --body kinematic     pins straight to the body, plan view
-  p2os run motors --firmware build/mine.elf         your program, judged by that scenario
+  p2os run free-drive --firmware build/mine.elf     your program among obstacles, without goals
   p2os run dodge --world arena --seed 7 --json      one JSON object for a script
   p2os run dodge --realtime                         at the speed of the clock
   p2os run dodge --gdb 3333                         under GDB; the robot stands still at a halt

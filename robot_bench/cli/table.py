@@ -7,6 +7,7 @@ from rich.console import Console
 from rich.table import Table
 
 from bluepill_sim.program.last_blocks import title_of
+from p2os.errors import shown
 from robot_bench.recording.summary import LISTED_HITS
 from robot_bench.run import RunResult
 
@@ -37,7 +38,7 @@ def print_result(result: RunResult, console: Console | None = None) -> None:
         console.print(title_of(len(blocks)))
     for line in blocks:
         console.print(line, markup=False, soft_wrap=True)
-    console.print(f"{'passed' if result.passed else 'FAILED'}; report: {result.report}", markup=False, soft_wrap=True)
+    console.print(f"{_verdict(result)}; report: {result.report}", markup=False, soft_wrap=True)
 
 
 def rows(outcome: Mapping[str, object]) -> list[tuple[str, str]]:
@@ -51,9 +52,21 @@ def rows(outcome: Mapping[str, object]) -> list[tuple[str, str]]:
         ("collisions", _with_unit(outcome["collisions"], "d", "")),
         ("least clearance", _with_unit(outcome["min_clearance_m"], ".3f", "m")),
         ("USART1", _with_unit(outcome.get("usart_baud"), "d", "bit/s")),
+        ("printed", _printed(outcome)),
         ("trace", str(outcome["trace_sha256"] or "")[:16]),
     ]  # fmt: skip
     return [(name, value) for name, value in found if value]
+
+
+def _verdict(result: RunResult) -> str:
+    if not result.passed:
+        return "FAILED"
+    return "passed" if result.outcome["goals_met"] else "ended well, no goals were set"
+
+
+def _printed(outcome: Mapping[str, object]) -> str:
+    lines = cast("int", outcome.get("usart_lines") or 0)
+    return f"{lines} line{'s' * (lines != 1)}, the last: {shown(outcome['usart_last'])}" if lines else ""
 
 
 def _with_unit(value: object, form: str, unit: str) -> str:

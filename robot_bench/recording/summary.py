@@ -76,6 +76,8 @@ def outcome_of(record: RunRecord) -> Json:
     result["hits"] = [
         {"t_s": hit.t / NS_PER_S, "what": hit.what, "x_m": hit.x, "y_m": hit.y} for hit in record.collisions()
     ]
+    lines = [line for _, line in record.usart_lines()]
+    result["usart_lines"], result["usart_last"] = len(lines), lines[-1] if lines else None
     return result
 
 

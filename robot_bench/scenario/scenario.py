@@ -185,7 +185,9 @@ def load_scenario(name_or_path: str) -> Scenario:
     if not path.is_file():
         if path.suffix == ".toml" or len(path.parts) > 1:
             raise ScenarioError(f"there is no scenario file {path}")
-        raise ScenarioError(f"there is no scenario {name_or_path!r}", hint=nearest(name_or_path, known_scenarios()))
+        beside = Path(f"{name_or_path}.toml")
+        hint = f"the file here is {beside}" if beside.is_file() else nearest(name_or_path, known_scenarios())
+        raise ScenarioError(f"there is no scenario {name_or_path!r}", hint=hint)
     return read_scenario(path)
 
 
@@ -314,7 +316,7 @@ def _firmware(name: str, path: Path, where: Place) -> Path:
     raise ScenarioError(
         f"{where.at('firmware')}: firmware: there is no file {shown(name)} beside it, nor a program of that name that"
         " ships",
-        hint="the path is relative to the scenario file",
+        hint="build it first, or name it as seen from the scenario file",
     )
 
 

@@ -43,7 +43,7 @@ def make(firmware: bytes, text: str = LEAST) -> str:
 def test_a_run_that_meets_its_goals_ends_with_0_and_its_report(capsys: pytest.CaptureFixture[str]) -> None:
     assert p2os(["run", make(thumb.SLEEP)]) == 0
     out, err = capsys.readouterr()
-    assert out.splitlines()[-1] == "passed; report: runs/mine-001/report.html"
+    assert out.splitlines()[-1] == "ended well, no goals were set; report: runs/mine-001/report.html"
     assert "virtual time" in out
     assert err == ""
     assert Path("runs/mine-001/report.html").is_file()

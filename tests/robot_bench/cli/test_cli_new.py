@@ -1,0 +1,223 @@
+"""`p2os new`: what it writes, what it refuses, and that a student gets from it to a robot that drives."""
+
+import json
+import os
+import re
+import shutil
+import subprocess
+import sys
+from importlib.resources import files
+from pathlib import Path
+
+import pytest
+
+from adapter_sim.pinout import load_pinout
+from p2os.cli.main import run as p2os
+from robot_bench.firmware.build import COMPILER
+from robot_bench.project import files as project
+from robot_bench.scenario.scenario import read_scenario
+
+NAMES = {
+    "main.c", "Makefile", "README.md", ".gitignore", "just-drive.toml",
+    "board/startup.c", "board/memory.c", "board/f103.h", "board/f103c8.ld", "board/wires.h",
+}  # fmt: skip
+PATROL = re.compile(r"```toml\n(# patrol\.toml\n.*?)```", re.DOTALL)
+
+needs_compiler = pytest.mark.skipif(
+    shutil.which(COMPILER) is None or shutil.which("make") is None, reason="no cross compiler, or no make"
+)
+
+
+@pytest.fixture(autouse=True)
+def _in_an_empty_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+
+
+def held(folder: Path) -> set[str]:
+    return {path.relative_to(folder).as_posix() for path in folder.rglob("*") if path.is_file()}
+
+
+def make(*words: str, folder: str = "mine") -> "subprocess.CompletedProcess[str]":
+    environment = {**os.environ, "LC_ALL": "C", "MAKEFLAGS": ""}
+    return subprocess.run(
+        ["make", "-C", folder, *words], capture_output=True, text=True, check=False, env=environment, timeout=120
+    )
+
+
+def test_a_project_is_written_and_the_next_command_is_named(capsys: pytest.CaptureFixture[str]) -> None:
+    assert p2os(["new", "mine"]) == 0
+    assert held(Path("mine")) == NAMES
+    said = capsys.readouterr().out.splitlines()
+    assert said[0].startswith("mine: 10 files")
+    assert said[-1] == "next: cd mine && make run"
+    assert max(map(len, said)) <= 80
+
+
+@pytest.mark.parametrize("before", [(), (".git",)], ids=["empty", "after git init"])
+def test_the_folder_one_is_in_will_do_when_it_is_empty(
+    before: tuple[str, ...], capsys: pytest.CaptureFixture[str]
+) -> None:
+    for name in before:
+        Path(name).mkdir()
+    assert p2os(["new", "."]) == 0
+    assert held(Path()) == NAMES
+    assert capsys.readouterr().out.splitlines()[-1] == "next: make run"
+
+
+def test_what_ships_is_copied_as_it_is_and_the_wires_are_those_of_the_pinout() -> None:
+    contents = project.project_files("kinematic")
+    for name in ("startup.c", "memory.c", "f103.h", "f103c8.ld"):
+        assert contents[f"board/{name}"] == files("robot_bench.firmware").joinpath(name).read_text(encoding="utf-8")
+    wires = re.findall(r"^#define (\w+) \{GPIO([A-C]), (\d+)u\}$", contents["board/wires.h"], re.MULTILINE)
+    assert {name: f"P{port}{bit}" for name, port, bit in wires} == {
+        wire.name.upper(): wire.bluepill for wire in load_pinout().wires
+    }
+
+
+def test_the_scenario_names_its_own_program_and_a_body_and_wants_nothing() -> None:
+    project.write_project(Path("mine"), project.project_files("kinematic"))
+    Path("mine/build").mkdir()
+    Path("mine/build/robot.elf").write_bytes(b"not looked at yet")
+    scenario = read_scenario(Path("mine/just-drive.toml"))
+    assert (scenario.firmware, scenario.body, scenario.goals) == (Path("mine/build/robot.elf"), "kinematic", ())
+
+
+@pytest.mark.parametrize(
+    ("missing", "body"),
+    [((), "bullet"), (("pybullet",), "mujoco"), (("pybullet", "mujoco"), "kinematic")],
+)
+def test_the_body_is_the_best_that_is_installed(
+    missing: tuple[str, ...], body: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(project, "find_spec", lambda name: None if name in missing else object())
+    assert project.installed_body() == body
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (["full"], "full is not empty (it holds theirs.c)\nhint: name a folder that is new or empty"),
+        (["."], ". is not empty (it holds"),
+        (["file"], "file is a file\nhint: name a folder"),
+        (["file/below"], "cannot write file/below: not a directory\n"),
+        (["two words"], "a folder called 'two words' is not made\nhint: make and shells take"),
+        (["a\nb"], "a folder called 'a\\nb' is not made\n"),
+        (["--", "-x"], "a folder called '-x' is not made\n"),
+        (["a" * 300], "file name too long\n"),
+        (["/proc/mine"], "cannot write /proc/mine: no such file or directory\n"),
+        ([], "Missing argument 'FOLDER'\nhint: p2os new --help\n"),
+    ],
+)
+def test_what_cannot_be_is_one_line_and_a_hint_and_leaves_all_as_it_was(
+    words: list[str], said: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    Path("full").mkdir()
+    Path("full/theirs.c").write_text("mine", encoding="utf-8")
+    Path("file").touch()
+    assert p2os(["new", *words]) == 2
+    out, err = capsys.readouterr()
+    assert (out, err.count("\n")) == ("", 2)
+    assert said in err
+    assert held(Path()) == {"full/theirs.c", "file"}
+    assert Path("full/theirs.c").read_text(encoding="utf-8") == "mine"
+
+
+@pytest.mark.parametrize("written", range(12))
+def test_a_disk_that_fills_up_leaves_nothing_behind(written: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    contents = project.project_files("kinematic")
+    left = [written]
+    real_open = Path.open
+
+    def fail_at_last(path: Path, *arguments: object, **options: object) -> object:
+        left[0] -= 1
+        if left[0] < 0:
+            raise OSError(28, "No space left on device", str(path))
+        return real_open(path, *arguments, **options)  # type: ignore[arg-type,call-overload] # passed on as they come
+
+    monkeypatch.setattr(Path, "open", fail_at_last)
+    if written >= len(contents):
+        project.write_project(Path("above/mine"), contents)
+        return
+    with pytest.raises(project.FileError, match="no space left on device"):
+        project.write_project(Path("above/mine"), contents)
+    assert list(Path().iterdir()) == []
+
+
+def test_a_missing_compiler_is_told_with_its_package(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr("robot_bench.cli.new.COMPILER", "no-such-compiler")
+    assert p2os(["new", "mine"]) == 0
+    assert capsys.readouterr().err == (
+        "no-such-compiler is not installed: sudo apt-get install gcc-arm-none-eabi make\n"
+    )
+
+
+@pytest.mark.skipif(shutil.which("make") is None, reason="no make")
+def test_make_without_the_compiler_is_one_line_with_its_package() -> None:
+    assert p2os(["new", "mine"]) == 0
+    done = make("CC=no-such-compiler")
+    assert done.returncode == 2
+    assert done.stderr == (
+        "Makefile:20: *** no-such-compiler is not installed (hint: sudo apt-get install gcc-arm-none-eabi).  Stop.\n"
+    )
+
+
+def test_a_scenario_in_this_folder_is_named_where_its_suffix_was_forgotten(capsys: pytest.CaptureFixture[str]) -> None:
+    project.write_project(Path("mine"), project.project_files("kinematic"))
+    os.chdir("mine")
+    assert p2os(["run", "just-drive"]) == 2
+    assert "hint: the file here is just-drive.toml" in capsys.readouterr().err
+    assert p2os(["run", "just-drive.toml"]) == 2
+    assert "hint: build it first" in capsys.readouterr().err
+
+
+@needs_compiler
+def test_the_project_builds_without_a_warning_and_again_only_when_something_changed() -> None:
+    project.write_project(Path("mine"), project.project_files("kinematic"))
+    done = make("WARN=-Wall -Wextra -Wshadow -Wconversion -Werror")
+    assert (done.returncode, done.stderr) == (0, "")
+    assert "Nothing to be done" in make().stdout
+    with Path("mine/board/wires.h").open("a", encoding="utf-8") as stream:
+        stream.write("#error noticed\n")
+    assert "noticed" in make().stderr
+
+
+@needs_compiler
+@pytest.mark.slow
+def test_a_student_gets_from_nothing_to_a_robot_that_drives() -> None:
+    assert p2os(["new", "mine"]) == 0
+    body = project.installed_body()
+    command = f'{sys.executable} -c "from p2os.cli.main import main; main()"'
+    done = make("run", f"P2OS={command}")
+    assert done.returncode == 0, done.stderr
+    assert "\nended well, no goals were set; report: runs/just-drive-001/report.html\n" in done.stdout
+    folder = Path("mine/runs/just-drive-001")
+    outcome = json.loads((folder / "summary.json").read_text(encoding="utf-8"))
+    assert (outcome["body"], outcome["passed"], outcome["collisions"]) == (body, True, 0)
+    assert outcome["distance_m"] > 4.0
+    printed = (folder / "usart.txt").read_text(encoding="utf-8").splitlines()
+    assert outcome["usart_lines"] == len(printed)
+    assert outcome["usart_last"] == printed[-1]
+    assert set(printed) == {"waiting for the robot", "forward", "turning left", "turning right"}
+
+
+@needs_compiler
+@pytest.mark.slow
+def test_the_scenario_with_goals_that_the_readme_shows_is_met() -> None:
+    project.write_project(Path("mine"), project.project_files("kinematic"))
+    assert make().returncode == 0
+    shown = PATROL.search(Path("mine/README.md").read_text(encoding="utf-8"))
+    assert shown is not None
+    Path("mine/patrol.toml").write_text(shown[1], encoding="utf-8")
+    assert p2os(["run", "mine/patrol.toml", "--out", "patrol"]) == 0
+
+
+@needs_compiler
+@pytest.mark.slow
+def test_a_program_from_elsewhere_drives_without_being_judged(capsys: pytest.CaptureFixture[str]) -> None:
+    project.write_project(Path("mine"), project.project_files("kinematic"))
+    assert make().returncode == 0
+    words = ["run", "free-drive", "--firmware", "mine/build/robot.elf", "--body", "kinematic", "--duration", "10"]
+    assert p2os(words) == 0
+    assert "ended well, no goals were set" in capsys.readouterr().out
