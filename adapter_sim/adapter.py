@@ -64,8 +64,8 @@ from p2os.gamepad import PadReport
 from p2os.protocol.commands import set_origin, sonar
 from p2os.protocol.sip import StandardSip
 from p2os.robots.parameters import RobotParameters
-from p2os.timing import NS_PER_S, Nanos, Reached
 from simbase.state import Stateful
+from simbase.timing import NS_PER_S, Nanos, Reached
 
 
 class AdapterState(StrEnum):

@@ -6,8 +6,8 @@ where there is none or it has gone stale: what is not known is an obstacle.
 
 from adapter_sim.codec import is_near
 from p2os.robots.parameters import RobotParameters
-from p2os.timing import Nanos
 from simbase.state import Stateful
+from simbase.timing import Nanos
 
 
 class Distances(Stateful):

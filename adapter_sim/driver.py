@@ -30,8 +30,8 @@ from adapter_sim.settings import AdapterSettings
 from p2os.protocol.commands import enable, rvel, vel
 from p2os.protocol.sip import StandardSip
 from p2os.robots.parameters import RobotParameters
-from p2os.timing import NS_PER_S, Nanos
 from simbase.state import Stateful
+from simbase.timing import NS_PER_S, Nanos
 
 #: ENABLE 1 goes out with this many pairs: one frame may be lost. # chosen: not more, a person may switch the motors off
 _ENABLES = 2

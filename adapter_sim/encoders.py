@@ -38,8 +38,8 @@ from adapter_sim.settings import AdapterSettings, EncoderAtOpen
 from p2os.protocol.odometry import Unwrapper
 from p2os.protocol.sip import StandardSip
 from p2os.robots.parameters import RobotParameters
-from p2os.timing import Nanos
 from simbase.state import Stateful
+from simbase.timing import Nanos
 
 #: x and y on the wire.
 POSITION_MODULUS = 1 << 15

@@ -21,7 +21,7 @@ from adapter_sim.adapter import AdapterState, AdapterStatus
 from adapter_sim.pinout import Direction, Pinout, WireRole
 from adapter_sim.pins import PinBank
 from p2os.errors import UsageError
-from p2os.timing import NS_PER_MS, Nanos, Reached
+from simbase.timing import NS_PER_MS, Nanos, Reached
 
 #: The detector resets the chip however short the dip; a reset is looked for every sample, so this long it lasts here.
 LEAST_BROWN_OUT_NS: Nanos = 4 * NS_PER_MS

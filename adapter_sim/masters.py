@@ -11,8 +11,8 @@ from adapter_sim.pins import Inputs
 from adapter_sim.settings import AdapterSettings
 from p2os.gamepad import Gamepad as AnyGamepad
 from p2os.gamepad import PadReport
-from p2os.timing import Nanos
 from simbase.state import Stateful
+from simbase.timing import Nanos
 
 
 class Master(StrEnum):

@@ -34,8 +34,8 @@ from typing import Protocol, TypeAlias
 from adapter_sim.codec import motor_value
 from adapter_sim.pinout import Pinout, Safe, WireRole
 from adapter_sim.settings import AdapterSettings
-from p2os.timing import Nanos
 from simbase.state import Stateful
+from simbase.timing import Nanos
 
 #: Called at each transition: (now in ns, what happened in a word or two, detail).
 EventCallback: TypeAlias = Callable[[Nanos, str, str], None]

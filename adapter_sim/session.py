@@ -36,8 +36,8 @@ from p2os.protocol.connection import (
     Synchronised,
 )
 from p2os.protocol.sip import StandardSip
-from p2os.timing import NS_PER_MS, Nanos
 from simbase.state import Stateful
+from simbase.timing import NS_PER_MS, Nanos
 
 
 @dataclass(frozen=True, slots=True)

@@ -8,7 +8,7 @@ from enum import StrEnum
 
 from adapter_sim.codec import BitOrder
 from p2os.errors import UsageError
-from p2os.timing import NS_PER_MS, NS_PER_S, Nanos
+from simbase.timing import NS_PER_MS, NS_PER_S, Nanos
 
 
 class MotorMeaning(StrEnum):

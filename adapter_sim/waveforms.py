@@ -10,7 +10,7 @@ from collections.abc import Sequence
 
 from adapter_sim.pins import PinBank
 from p2os.errors import UsageError
-from p2os.timing import NS_PER_MS, Nanos
+from simbase.timing import NS_PER_MS, Nanos
 
 #: Each change: from when on, and the level; None is released.
 Edges = list[tuple[Nanos, bool | None]]

@@ -6,13 +6,15 @@ from bluepill_sim.errors import BluePillError, ImageError, MissingDependencyErro
 from bluepill_sim.fabric.pins import Pin, PinDrive
 from bluepill_sim.program.image import Image, Symbol, SymbolTable, load_image
 from bluepill_sim.serial_port import Activity, SerialPort
-from bluepill_sim.timing import Nanos, Reached, Reason
+from bluepill_sim.timing import ChipReached
+from simbase.timing import Nanos, Reason
 
 __all__ = [
     "Activity",
     "BluePill",
     "BluePillError",
     "BoardSnapshot",
+    "ChipReached",
     "FaultKind",
     "FaultReport",
     "Image",
@@ -21,7 +23,6 @@ __all__ = [
     "Nanos",
     "Pin",
     "PinDrive",
-    "Reached",
     "Reason",
     "SerialPort",
     "Symbol",

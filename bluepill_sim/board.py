@@ -36,7 +36,8 @@ from bluepill_sim.program.last_blocks import lines_of, title_of
 from bluepill_sim.program.line_table import LineTable, read_lines
 from bluepill_sim.serial_port import Activity, SerialPort
 from bluepill_sim.stm32f103 import FLASH_BASE, SRAM_BASE
-from bluepill_sim.timing import NS_PER_MS, NS_PER_S, Nanos, Reached, Reason, Span, to_nanos
+from bluepill_sim.timing import ChipReached, Span, to_nanos
+from simbase.timing import NS_PER_MS, NS_PER_S, Nanos, Reason
 
 #: Tells whether the board is where one wants it.
 Predicate = Callable[["BluePill"], bool]
@@ -147,7 +148,7 @@ class BluePill:
         """Return when a peripheral next acts by itself; None for never. The core may act at any time."""
         return self.chip.next_deadline()
 
-    def advance_to(self, limit_ns: Nanos) -> Reached:
+    def advance_to(self, limit_ns: Nanos) -> ChipReached:
         """Run to the first block boundary at or after a time.
 
         Returns:
@@ -159,7 +160,7 @@ class BluePill:
         """
         return self.chip.advance_to(limit_ns)
 
-    def run_for(self, span: Span) -> Reached:
+    def run_for(self, span: Span) -> ChipReached:
         """Run for a span of virtual time, such as "10 ms" or nanoseconds, past watched edges; a halt ends it early."""
         end_ns = self.now_ns + to_nanos(span)
         while True:
@@ -443,7 +444,7 @@ class BluePill:
 
 
 def run_until(
-    board: BluePill, condition: Condition, timeout: Span, advance: Callable[[Nanos], Reached] | None = None
+    board: BluePill, condition: Condition, timeout: Span, advance: Callable[[Nanos], ChipReached] | None = None
 ) -> Nanos:
     """Run until a condition holds; return when that was.
 

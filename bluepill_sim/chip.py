@@ -41,7 +41,8 @@ from bluepill_sim.stm32f103 import (
     make_pins,
     name_at,
 )
-from bluepill_sim.timing import CycleClock, HaltKind, Nanos, Reached, Reason
+from bluepill_sim.timing import ChipReached, CycleClock, HaltKind
+from simbase.timing import Nanos, Reason
 
 #: What is mapped as peripherals: APB1, APB2 and AHB up to the end of CRC and reserved pages.
 PERIPHERAL_BYTES = 0x2_4000
@@ -143,11 +144,11 @@ class Chip:
         tick_ns = self._clock.ns_of(tick)
         return tick_ns if due is None else min(due, tick_ns)
 
-    def advance_to(self, limit_ns: Nanos) -> Reached:
+    def advance_to(self, limit_ns: Nanos) -> ChipReached:
         """Run to the first block boundary at or after a time, or to what stops the chip before."""
         return self._advance(limit_ns, self.processor.run, self._streams)
 
-    def step(self, limit_ns: Nanos) -> Reached:
+    def step(self, limit_ns: Nanos) -> ChipReached:
         """Run one instruction, or the entry of the exception that comes before it: HALT with a STEP.
 
         A core that sleeps first goes on to what wakes it; DEADLINE where that comes after `limit_ns`.
@@ -171,7 +172,7 @@ class Chip:
         """Record no more."""
         self.engine.recorder = None
 
-    def _advance(self, limit_ns: Nanos, go_on: Callable[[int], None], streams: SharedStreams | None) -> Reached:
+    def _advance(self, limit_ns: Nanos, go_on: Callable[[int], None], streams: SharedStreams | None) -> ChipReached:
         processor, engine, clock = self.processor, self.engine, self._clock
         while True:
             if not engine.is_inside_block:
@@ -179,12 +180,12 @@ class Chip:
             now = clock.ns_of(engine.cycle)
             if self._stop_requested and not engine.is_inside_block:
                 self._stop_requested = False
-                return Reached(now, Reason.EDGE)
+                return ChipReached(now, Reason.EDGE)
             if processor.is_locked_up and not self.parts.has_running_watchdog:
                 engine.cycle = max(engine.cycle, clock.cycle_at(limit_ns))
-                return Reached(clock.ns_of(engine.cycle), Reason.HALT)
+                return ChipReached(clock.ns_of(engine.cycle), Reason.HALT)
             if now >= limit_ns and not engine.is_inside_block:
-                return Reached(now, Reason.DEADLINE)
+                return ChipReached(now, Reason.DEADLINE)
             if processor.is_locked_up:
                 engine.cycle = self._stop_cycle(limit_ns)
                 continue
@@ -193,7 +194,7 @@ class Chip:
             go_on(self._stop_cycle(limit_ns))
             if processor.halt is not None:
                 halt, processor.halt = processor.halt, None
-                return Reached(clock.ns_of(engine.cycle), Reason.HALT, halt)
+                return ChipReached(clock.ns_of(engine.cycle), Reason.HALT, halt)
 
     def reset(self, cause: ResetCause) -> None:
         """Reset core and peripherals; time goes on. A power cut clears the SRAM too."""

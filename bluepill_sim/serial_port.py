@@ -10,7 +10,8 @@ from typing import Protocol
 
 from bluepill_sim.errors import BluePillError
 from bluepill_sim.peripherals.usart import CR1, PINS, RE, UE, Usart
-from bluepill_sim.timing import Nanos, Span
+from bluepill_sim.timing import Span
+from simbase.timing import Nanos
 
 #: chosen: six seconds of a line at 115200; older ones are forgotten.
 KEPT_BYTES = 64 * 1024

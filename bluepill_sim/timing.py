@@ -1,9 +1,7 @@
-"""Time of the emulated chip: nanoseconds, spans in words, core cycles, and why a run stopped.
+"""Time of the emulated chip: spans in words, core cycles, and why a run stopped.
 
 Nothing here keeps time; the chip (`chip.py`) and the engine (`core/engine.py`)
-do. The shapes of `Nanos`, `Reason` and `Reached` are those of the rest of the
-project, defined here once more because this package knows nothing of robots or
-their protocol and imports none of it.
+do.
 
 Invariant: all times are integers, and nothing is accumulated; `advance_to(limit)`
 of the chip leaves it with every deadline at or before the time reached acted on.
@@ -13,15 +11,9 @@ import re
 from dataclasses import dataclass
 from decimal import Decimal
 from enum import Enum
-from typing import TypeAlias
 
 from bluepill_sim.errors import BluePillError
-
-#: A point in virtual time, or a span of it, in nanoseconds.
-Nanos: TypeAlias = int
-NS_PER_US = 1_000
-NS_PER_MS = 1_000_000
-NS_PER_S = 1_000_000_000
+from simbase.timing import NS_PER_MS, NS_PER_S, NS_PER_US, Nanos, Reached
 
 
 class HaltKind(Enum):
@@ -70,25 +62,10 @@ class Halt:
     watched: int | None = None
 
 
-class Reason(Enum):
-    """Why the chip stopped where it did."""
-
-    #: The limit was reached.
-    DEADLINE = "deadline"
-    #: A watched pin changed.
-    EDGE = "edge"
-    #: The firmware is locked up, or a debugger has halted the chip: `Reached.halt` tells which.
-    HALT = "halt"
-    #: The outcome of the run is decided; the chip itself never says so.
-    VERDICT = "verdict"
-
-
 @dataclass(frozen=True, slots=True)
-class Reached:
+class ChipReached(Reached):
     """How far the chip came, and why it stopped there."""
 
-    now: Nanos
-    reason: Reason = Reason.DEADLINE
     #: What a debugger asked for: BREAKPOINT, WATCHPOINT, STEP or BKPT; None for all else.
     halt: Halt | None = None
 

@@ -12,8 +12,8 @@ teleop --pad`) brings its reports into this form.
 
 from dataclasses import dataclass
 
-from p2os.timing import NS_PER_MS, Nanos
 from simbase.state import Stateful
+from simbase.timing import NS_PER_MS, Nanos
 
 #: Full deflections: a trigger from 0, the stick from its middle.
 TRIGGER_FULL, STICK_FULL = 1023, 511

@@ -26,8 +26,8 @@ from adapter_sim.settings import AdapterSettings, EncoderAtOpen, MotorMeaning
 from p2os.errors import MissingDependencyError, UsageError
 from p2os.gamepad import PadReport
 from p2os.robots.parameters import RobotParameters
-from p2os.timing import NS_PER_S, Nanos, Reached
 from robot_bench.scenario.scenario import Scenario
+from simbase.timing import NS_PER_S, Nanos, Reached
 
 #: Of adapter_capi.h.
 VERSION = 1

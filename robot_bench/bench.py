@@ -24,7 +24,6 @@ from p2os.pioneer.body.factory import make_body
 from p2os.pioneer.controller import Pioneer
 from p2os.pioneer.world import load_world
 from p2os.pioneer.world.model import World
-from p2os.timing import NS_PER_S, Nanos
 from robot_bench.adapter import AnyAdapter, make_adapter
 from robot_bench.direct import DirectRobot, DistanceSensors, JointMotor, WheelEncoder
 from robot_bench.loop import DEFAULT_SLICE_NS, Follower, LeaderReached, RunLoop
@@ -39,6 +38,7 @@ from robot_bench.wires.endpoints import Endpoint
 from robot_bench.wires.nets import Harness, Net, OwnedPins, Strength
 from robot_bench.wires.ports import Chip
 from robot_bench.wires.serial_line import SerialLine
+from simbase.timing import NS_PER_S, Nanos
 
 #: chosen: so long a run goes on after a fault of the firmware, to show what the robot does then.
 AFTER_FAULT_NS: Nanos = 1 * NS_PER_S

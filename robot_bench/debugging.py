@@ -13,10 +13,11 @@ from typing import cast
 
 from bluepill_sim.board import BluePill
 from bluepill_sim.errors import BluePillError
-from bluepill_sim.timing import Nanos, Reached, Reason
+from bluepill_sim.timing import ChipReached
 from robot_bench.bench import Bench
 from robot_bench.recording.trace import TraceMark
 from robot_bench.remote import RemoteBench
+from simbase.timing import Nanos, Reason
 
 _Snapshot = tuple[dict[str, object], TraceMark]
 
@@ -40,20 +41,20 @@ class BenchMachine:
     def __init__(self, bench: Bench) -> None:
         self.board = board_of(bench)
         self._bench = bench
-        self._halt: Reached | None = None
+        self._halt: ChipReached | None = None
 
     @property
     def end_ns(self) -> Nanos | None:
         """When the scenario's time is up, or the firmware had its fault a while ago."""
         return self._bench.end
 
-    def advance_to(self, limit_ns: Nanos, *, by_step: bool = False) -> Reached:
+    def advance_to(self, limit_ns: Nanos, *, by_step: bool = False) -> ChipReached:
         """Bring the bench to a time; less far where the chip halts, or by one instruction of the chip."""
         chip = self.board.chip
         run = chip.step if by_step else chip.advance_to
         self._halt = None
 
-        def advance(limit: Nanos) -> Reached:
+        def advance(limit: Nanos) -> ChipReached:
             reached = run(limit)
             if reached.halt is not None:
                 self._halt = reached
@@ -63,7 +64,7 @@ class BenchMachine:
         self._bench.run_until(limit_ns, advance)
         if self._halt is not None:
             return self._halt
-        return Reached(self.board.now_ns, Reason.DEADLINE)
+        return ChipReached(self.board.now_ns, Reason.DEADLINE)
 
     def snapshot(self) -> object:
         """Return all that decides the bench's future, and where its trace stands."""
@@ -94,16 +95,16 @@ class RemoteMachine:
         """When the scenario's time is up; at once after a halt."""
         return self.board.now_ns if self._is_over else self._bench.scenario.duration_ns
 
-    def advance_to(self, limit_ns: Nanos, *, by_step: bool = False) -> Reached:
+    def advance_to(self, limit_ns: Nanos, *, by_step: bool = False) -> ChipReached:
         """Bring the bench to a time, at the speed of the clock; less far where the chip halts."""
         chip = self.board.chip
         run = chip.step if by_step else chip.advance_to
-        halt: list[Reached] = []
+        halt: list[ChipReached] = []
         if not self._has_begun:
             self._has_begun = True
             self._bench.start_clock()
 
-        def advance(limit: Nanos) -> Reached:
+        def advance(limit: Nanos) -> ChipReached:
             reached = run(limit)
             if reached.halt is not None:
                 halt.append(reached)
@@ -111,7 +112,7 @@ class RemoteMachine:
             return reached
 
         self._bench.loop.run_until(limit_ns, advance)
-        return halt[0] if halt else Reached(self.board.now_ns, Reason.DEADLINE)
+        return halt[0] if halt else ChipReached(self.board.now_ns, Reason.DEADLINE)
 
     def snapshot(self) -> object:
         """A real robot has no snapshot."""

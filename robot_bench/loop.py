@@ -24,7 +24,7 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import Protocol, cast
 
 from p2os.errors import P2osError
-from p2os.timing import NS_PER_MS, Nanos, Reached
+from simbase.timing import NS_PER_MS, Nanos, Reached
 
 #: chosen: the pacer's grain; small enough for a live view, large enough to cost nothing.
 DEFAULT_SLICE_NS: Nanos = 1 * NS_PER_MS

@@ -10,8 +10,8 @@ import time
 from collections.abc import Callable
 
 from p2os.errors import LocalProtocolError
-from p2os.timing import NS_PER_MS, NS_PER_S, Nanos
 from p2os.transport.wall_clock import Clock, wall_clock
+from simbase.timing import NS_PER_MS, NS_PER_S, Nanos
 
 #: chosen: the grain of pacing, fine enough for a line of 9600 bit/s.
 PACED_SLICE_NS: Nanos = 2 * NS_PER_MS

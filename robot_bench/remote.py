@@ -18,7 +18,6 @@ from p2os.client.interrupts import held_back
 from p2os.errors import RemoteProtocolError, RunFailedError, TransportError
 from p2os.protocol.frames import Decoder, Frame
 from p2os.protocol.sip import SIP_KINDS, StandardSip
-from p2os.timing import NS_PER_MS, NS_PER_S, Nanos
 from p2os.transport import Transport
 from robot_bench.adapter import make_adapter
 from robot_bench.bench import boot, make_harness
@@ -32,6 +31,7 @@ from robot_bench.wires.chip_pins import ChipPins
 from robot_bench.wires.nets import OwnedPins
 from robot_bench.wires.port_endpoint import PortEndpoint, stop_robot
 from robot_bench.wires.ports import Chip
+from simbase.timing import NS_PER_MS, NS_PER_S, Nanos
 
 #: More than this behind the wall clock, and the robot is stopped.
 MOST_LAG_NS: Nanos = 100 * NS_PER_MS

@@ -23,7 +23,6 @@ from typing import TypeVar
 from bluepill_sim.errors import BluePillError
 from p2os.errors import P2osError
 from p2os.pioneer.world.model import Pose, World
-from p2os.timing import NS_PER_MS, NS_PER_S, Nanos
 from p2os.transport import Transport
 from p2os.transport.wall_clock import Clock, wall_clock
 from robot_bench.bench import Bench
@@ -36,6 +35,7 @@ from robot_bench.remote import RemoteBench
 from robot_bench.report.make import make_artefacts
 from robot_bench.scenario.goals import judge
 from robot_bench.scenario.scenario import Scenario
+from simbase.timing import NS_PER_MS, NS_PER_S, Nanos
 
 #: chosen: without pacing, control comes back often enough for progress and signals.
 UNPACED_SLICE_NS: Nanos = 10 * NS_PER_MS

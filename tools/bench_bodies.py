@@ -17,7 +17,7 @@ from p2os.pioneer.world.model import Pose
 from p2os.protocol.commands import Command
 from p2os.protocol.commands import CommandNumber as C
 from p2os.robots.parameters import load_parameters
-from p2os.timing import NS_PER_MS, NS_PER_S
+from simbase.timing import NS_PER_MS, NS_PER_S
 
 P2DX = load_parameters("p2dx")
 EMPTY = parse_world('name = "empty"\nextent_m = [-4, -4, 4, 4]', "empty")

@@ -18,8 +18,8 @@ from p2os.pioneer.world.model import Pose
 from p2os.protocol.commands import Command
 from p2os.protocol.commands import CommandNumber as C
 from p2os.robots.parameters import load_parameters
-from p2os.timing import NS_PER_MS, NS_PER_S
 from p2os.transport import open_url
+from simbase.timing import NS_PER_MS, NS_PER_S
 
 ROBOTS = int(sys.argv[1]) if len(sys.argv) > 1 else 64
 #: Robot seconds of the first figure, seconds of the others.

@@ -12,7 +12,7 @@ CORE = (
     "p2os/errors.py",
     "p2os/protocol/",
     "p2os/robots/parameters.py",
-    "p2os/timing.py",
+    "simbase/timing.py",
 )
 CORE_PERCENT = 100.0
 REST_PERCENT = 90.0

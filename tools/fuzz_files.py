@@ -44,13 +44,13 @@ from p2os.pioneer.world import load_world
 from p2os.pioneer.world.model import World
 from p2os.protocol.profiles import Profile
 from p2os.robots.parameters import RobotParameters, load_parameters
-from p2os.timing import NS_PER_MS
 from robot_bench.recording.run_record import read_run
 from robot_bench.recording.summary import outcome_of
 from robot_bench.report.page import render_page
 from robot_bench.scenario.goals import judge
 from robot_bench.scenario.scenario import Scenario, known_scenarios, read_scenario
 from robot_bench.scenario.world_script import WorldScript
+from simbase.timing import NS_PER_MS
 
 ROOT = Path(__file__).resolve().parents[1]
 GOLDEN = ROOT / "tests" / "golden"

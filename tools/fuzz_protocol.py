@@ -29,7 +29,7 @@ from p2os.protocol.profiles import Profile
 from p2os.robots.aria_file import aria_table
 from p2os.robots.model_file import build_parameters, table_of
 from p2os.robots.parameters import known_robots, load_parameters, nearest_model
-from p2os.timing import NS_PER_MS, Nanos
+from simbase.timing import NS_PER_MS, Nanos
 
 ROOT = Path(__file__).resolve().parent.parent
 GOLDEN = ROOT / "tests" / "golden"

@@ -46,7 +46,7 @@ from p2os.protocol.packets import (
 )
 from p2os.protocol.profiles import Profile
 from p2os.robots.parameters import known_robots, load_parameters
-from p2os.timing import NS_PER_MS
+from simbase.timing import NS_PER_MS
 
 PAGE = Path(__file__).resolve().parent.parent / "PROTOCOL.md"
 BLOCK = re.compile(r"(<!-- table: (?P<name>[a-z ]+) -->\n)(?P<body>.*?)(<!-- end -->)", re.DOTALL)

@@ -16,7 +16,7 @@ from collections.abc import Iterator
 from typing import Protocol
 
 from bluepill_sim.native.library import library
-from bluepill_sim.timing import Nanos
+from simbase.timing import Nanos
 
 #: (ns, number of the signal, value).
 Row = tuple[Nanos, int, int]

@@ -14,7 +14,7 @@ from dataclasses import dataclass, field
 
 from bluepill_sim.board import BluePill
 from bluepill_sim.core.nvic import FIRST_IRQ, SYSTICK
-from bluepill_sim.timing import Nanos
+from simbase.timing import Nanos
 
 
 @dataclass(slots=True)

@@ -22,7 +22,7 @@ from bluepill_sim.board import BluePill
 from bluepill_sim.core.nvic import IRQ_NAMES
 from bluepill_sim.fabric.pins import Pin, PinBank
 from bluepill_sim.native.engine import NativeEngine
-from bluepill_sim.timing import Nanos
+from simbase.timing import Nanos
 
 #: The value of a wire that is not driven.
 FLOATING = 2

@@ -15,7 +15,7 @@ from pathlib import Path
 
 from bluepill_sim.analysis.probe import Probe, signals_in_order
 from bluepill_sim.errors import BluePillError
-from bluepill_sim.timing import NS_PER_S, Nanos
+from simbase.timing import NS_PER_S, Nanos
 
 #: Sample rates in Hz and as the file names them, the finest first.
 RATE_NAMES = {20_000_000: "20 MHz", 1_000_000: "1 MHz", 100_000: "100 kHz", 10_000: "10 kHz"}

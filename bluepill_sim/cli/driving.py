@@ -12,7 +12,8 @@ from bluepill_sim.board import BluePill, WaitError
 from bluepill_sim.errors import BluePillError
 from bluepill_sim.fabric.pins import Pin
 from bluepill_sim.program.last_blocks import title_of
-from bluepill_sim.timing import NS_PER_S, Nanos, Reached, Reason, to_nanos
+from bluepill_sim.timing import ChipReached, to_nanos
+from simbase.timing import NS_PER_S, Nanos, Reason
 
 #: What a level's word does to a pin; "gnd" and "3v3" are solder bridges.
 _LEVELS: dict[str, Callable[[Pin], None]] = {
@@ -70,7 +71,7 @@ class Schedule:
     """A board, and what happens at its pins."""
 
     def __init__(
-        self, board: BluePill, changes: Sequence[Change], advance: Callable[[Nanos], Reached] | None = None
+        self, board: BluePill, changes: Sequence[Change], advance: Callable[[Nanos], ChipReached] | None = None
     ) -> None:
         """Plan changes.
 
@@ -83,7 +84,7 @@ class Schedule:
         self._left = list(reversed(changes))
         self._advance = advance or board.advance_to
 
-    def advance_to(self, limit_ns: Nanos) -> Reached:
+    def advance_to(self, limit_ns: Nanos) -> ChipReached:
         """Bring the board to a time, or less far, and put what is due by then on its pins."""
         self._act(self._board.now_ns)
         due_ns = self._left[-1].at_ns if self._left else limit_ns
@@ -91,14 +92,14 @@ class Schedule:
         self._act(self._board.now_ns)
         return reached
 
-    def run_to(self, end_ns: Nanos) -> Reached:
+    def run_to(self, end_ns: Nanos) -> ChipReached:
         """Run to a time, past edges; a halt for good ends it."""
         self._act(self._board.now_ns)
         while self._board.now_ns < end_ns:
             reached = self.advance_to(end_ns)
             if reached.reason is Reason.HALT:
                 return reached
-        return Reached(self._board.now_ns)
+        return ChipReached(self._board.now_ns)
 
     def _act(self, now_ns: Nanos) -> None:
         while self._left and self._left[-1].at_ns <= now_ns:
@@ -106,7 +107,7 @@ class Schedule:
             _LEVELS[change.level](self._board.pin(change.pin))
 
 
-def run_driven(board: BluePill, end_ns: Nanos, changes: Sequence[Change]) -> Reached:
+def run_driven(board: BluePill, end_ns: Nanos, changes: Sequence[Change]) -> ChipReached:
     """Run to a time and put the changes on the pins at theirs; a halt for good ends it."""
     with showing_where_it_hangs(board):
         return Schedule(board, changes).run_to(end_ns)

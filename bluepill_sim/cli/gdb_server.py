@@ -16,7 +16,7 @@ from bluepill_sim.debug.gdb_session import GdbSession
 from bluepill_sim.debug.machine import Machine
 from bluepill_sim.debug.packets import Mark, Packet, PacketReader, frame
 from bluepill_sim.errors import BluePillError
-from bluepill_sim.timing import NS_PER_S, Nanos
+from simbase.timing import NS_PER_S, Nanos
 
 _READ_BYTES = 4096
 #: How often a waiting server looks at Ctrl-C of its own terminal.

@@ -12,7 +12,8 @@ from bluepill_sim.cli.driving import run_driven
 from bluepill_sim.program.elf_file import Layout, layout, stack_top, variables_end, vectors
 from bluepill_sim.program.image import Image
 from bluepill_sim.stm32f103 import FLASH_BYTES, SRAM_BYTES
-from bluepill_sim.timing import NS_PER_S, to_nanos
+from bluepill_sim.timing import to_nanos
+from simbase.timing import NS_PER_S
 
 HELP = """Show what a firmware is: sections, sizes, vectors, largest symbols, stack.
 

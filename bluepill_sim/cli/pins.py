@@ -12,7 +12,8 @@ from bluepill_sim.analysis.vcd import write_vcd
 from bluepill_sim.board import BluePill
 from bluepill_sim.cli.columns import print_columns
 from bluepill_sim.cli.driving import parse_changes, print_fault, print_status, run_driven, summary, warn_on_stderr
-from bluepill_sim.timing import NS_PER_S, to_nanos
+from bluepill_sim.timing import to_nanos
+from simbase.timing import NS_PER_S
 
 HELP = """Run a firmware for a while, then show each pin: mode, level, who drives it, edges.
 

@@ -19,7 +19,8 @@ from bluepill_sim.cli.driving import (
     summary,
     warn_on_stderr,
 )
-from bluepill_sim.timing import NS_PER_MS, NS_PER_S, Nanos, Reached, Reason, to_nanos
+from bluepill_sim.timing import ChipReached, to_nanos
+from simbase.timing import NS_PER_MS, NS_PER_S, Nanos, Reason
 
 HELP = """Boot a firmware on an emulated BluePill; what it sends on USART1 goes to stdout.
 
@@ -99,7 +100,7 @@ def run(
         raise typer.Exit(1)
 
 
-def _bounded(board: BluePill, budget_s: float) -> Callable[[Nanos], Reached]:
+def _bounded(board: BluePill, budget_s: float) -> Callable[[Nanos], ChipReached]:
     """Return a way to advance that ends with the wall clock's budget, however a program spins.
 
     A program may cost a thousand times as much as another for the same virtual time, such as one that resets itself
@@ -108,7 +109,7 @@ def _bounded(board: BluePill, budget_s: float) -> Callable[[Nanos], Reached]:
     stride_ns, most_ns = _STRIDES_NS
     end_ns = time.monotonic_ns() + int(budget_s * NS_PER_S)
 
-    def advance(limit_ns: Nanos) -> Reached:
+    def advance(limit_ns: Nanos) -> ChipReached:
         nonlocal stride_ns
         while True:
             began_ns = time.monotonic_ns()
@@ -126,11 +127,11 @@ def _bounded(board: BluePill, budget_s: float) -> Callable[[Nanos], Reached]:
     return advance
 
 
-def _paced(board: BluePill, carry: Callable[[], None]) -> Callable[[Nanos], Reached]:
+def _paced(board: BluePill, carry: Callable[[], None]) -> Callable[[Nanos], ChipReached]:
     """Return a way to advance in short slices that keep to the wall clock, with the console served between them."""
     start_ns = time.monotonic_ns() - board.now_ns
 
-    def advance(limit_ns: Nanos) -> Reached:
+    def advance(limit_ns: Nanos) -> ChipReached:
         carry()
         reached = board.advance_to(min(limit_ns, board.now_ns + SLICE_NS))
         ahead_ns = start_ns + board.now_ns - time.monotonic_ns()

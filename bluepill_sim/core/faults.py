@@ -9,7 +9,8 @@ from enum import Enum
 
 from bluepill_sim.core.nvic import BUS_FAULT, HARD_FAULT, MEM_MANAGE, USAGE_FAULT
 from bluepill_sim.core.recorder import BlockRow
-from bluepill_sim.timing import HaltKind, Nanos
+from bluepill_sim.timing import HaltKind
+from simbase.timing import Nanos
 
 #: HFSR bits.
 HFSR_VECTTBL, HFSR_FORCED, HFSR_DEBUGEVT = 1 << 1, 1 << 30, 1 << 31

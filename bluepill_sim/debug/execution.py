@@ -17,7 +17,7 @@ from bluepill_sim.core.faults import FaultKind
 from bluepill_sim.debug.history import History, Point
 from bluepill_sim.debug.machine import Machine, Stop, StopKind
 from bluepill_sim.debug.semihosting import Semihosting
-from bluepill_sim.timing import NS_PER_MS, NS_PER_S, Nanos, Reason
+from simbase.timing import NS_PER_MS, NS_PER_S, Nanos, Reason
 
 #: chosen: how often a running machine checks for a request to stop.
 SLICE_NS: Nanos = 2 * NS_PER_MS

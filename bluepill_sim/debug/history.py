@@ -10,7 +10,7 @@ the history begins.
 from dataclasses import dataclass
 
 from bluepill_sim.debug.machine import Machine
-from bluepill_sim.timing import NS_PER_MS, Nanos
+from simbase.timing import NS_PER_MS, Nanos
 
 #: chosen: 64 snapshots are a few megabytes.
 _MOST = 64

@@ -12,7 +12,8 @@ from enum import Enum
 from typing import Protocol
 
 from bluepill_sim.board import BluePill
-from bluepill_sim.timing import Nanos, Reached
+from bluepill_sim.timing import ChipReached
+from simbase.timing import Nanos
 
 
 class StopKind(Enum):
@@ -66,7 +67,7 @@ class Machine(Protocol):
         """Whether `restore` is possible: not with a real robot."""
         ...
 
-    def advance_to(self, limit_ns: Nanos, *, by_step: bool = False) -> Reached:
+    def advance_to(self, limit_ns: Nanos, *, by_step: bool = False) -> ChipReached:
         """Bring everything to a time; less far where the chip halts, or by one instruction of the chip."""
         ...
 
@@ -92,7 +93,7 @@ class LoneChip:
     def __init__(self, board: BluePill) -> None:
         self.board = board
 
-    def advance_to(self, limit_ns: Nanos, *, by_step: bool = False) -> Reached:
+    def advance_to(self, limit_ns: Nanos, *, by_step: bool = False) -> ChipReached:
         """Bring the board to a time, or one instruction on."""
         return self.board.chip.step(limit_ns) if by_step else self.board.advance_to(limit_ns)
 

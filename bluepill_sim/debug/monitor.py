@@ -7,7 +7,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from bluepill_sim.debug.execution import Execution
-from bluepill_sim.timing import NS_PER_S
+from simbase.timing import NS_PER_S
 
 _LEVELS = {"0": False, "1": True, "low": False, "high": True, "z": None}
 _UNKNOWN = "not understood; monitor help lists the commands"

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 
 from bluepill_sim.board import BluePill
 from bluepill_sim.core import Register
-from bluepill_sim.timing import NS_PER_S
+from simbase.timing import NS_PER_S
 
 #: The encoding of BKPT 0xAB.
 SEMIHOSTING_BKPT = 0xBEAB

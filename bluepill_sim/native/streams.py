@@ -16,7 +16,7 @@ from bluepill_sim.core import Engine
 from bluepill_sim.fabric.pins import PinBank
 from bluepill_sim.native.library import library
 from bluepill_sim.peripherals.usart import Usart
-from bluepill_sim.timing import Nanos
+from simbase.timing import Nanos
 
 if TYPE_CHECKING:
     from bluepill_sim.native.engine import NativeEngine

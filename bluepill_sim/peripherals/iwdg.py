@@ -10,7 +10,7 @@ Invariant: while it runs, `due_ns` is when the chip is reset.
 """
 
 from bluepill_sim.fabric.registers import Peripheral, Register, bits
-from bluepill_sim.timing import Nanos
+from simbase.timing import Nanos
 
 KR, PR, RLR, SR = range(4)
 

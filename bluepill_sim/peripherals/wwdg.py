@@ -11,7 +11,7 @@ Invariant: while it is active, `due_ns` is the earlier of the early wake-up and 
 """
 
 from bluepill_sim.fabric.registers import Peripheral, Register, bits
-from bluepill_sim.timing import NS_PER_S, Nanos
+from simbase.timing import NS_PER_S, Nanos
 
 CR, CFR, SR = range(3)
 

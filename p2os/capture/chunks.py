@@ -12,7 +12,7 @@ from dataclasses import dataclass, field
 from enum import Enum
 
 from p2os.errors import LocalProtocolError
-from p2os.timing import Nanos
+from simbase.timing import Nanos
 
 
 class Direction(Enum):

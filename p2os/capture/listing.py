@@ -40,7 +40,7 @@ from p2os.protocol.packets import IDENTITY_KIND, RESET_KINDS
 from p2os.protocol.profiles import Profile
 from p2os.protocol.sip import HEAD_BYTES, READING_BYTES, SIP_KINDS
 from p2os.robots.parameters import RobotParameters
-from p2os.timing import NS_PER_MS, NS_PER_S, Nanos
+from simbase.timing import NS_PER_MS, NS_PER_S, Nanos
 
 SYNC_NAMES = ("SYNC0", "SYNC1", "SYNC2")
 COMMAND_NAMES = ("PULSE", "OPEN", "CLOSE")

@@ -18,7 +18,7 @@ from p2os.capture.chunks import Capture, Chunk, Direction
 from p2os.capture.listing import SYNC_NAMES, FrameCutter, frame_chunks, frame_of
 from p2os.protocol.commands import CommandNumber
 from p2os.protocol.packets import IDENTITY_KIND
-from p2os.timing import Nanos, Reached
+from simbase.timing import Nanos, Reached
 
 
 class Replay:

@@ -17,7 +17,7 @@ from p2os.capture.listing import ListingRow
 from p2os.protocol.odometry import Unwrapper
 from p2os.protocol.sip import POSITION_MASK
 from p2os.robots.parameters import RobotParameters
-from p2os.timing import NS_PER_S
+from simbase.timing import NS_PER_S
 
 Cell: TypeAlias = "bool | int | float | str | None"
 #: Columns that every table begins with.

@@ -11,7 +11,7 @@ one: closing frames that were not needed change nothing.
 from p2os.capture.chunks import Chunk, Direction
 from p2os.capture.listing import FrameCutter, RecordedSession, frame_of
 from p2os.protocol.commands import Command, CommandNumber, stop, vel
-from p2os.timing import Nanos
+from simbase.timing import Nanos
 
 #: Argument of HOSTBAUD → bit/s (Pioneer 3 manual, client commands).
 HOST_BAUDS = {0: 9600, 1: 19200, 2: 38400, 3: 57600, 4: 115200}

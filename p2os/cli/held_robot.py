@@ -30,8 +30,8 @@ from p2os.client import (
     RobotState,
 )
 from p2os.client.goals import STALL_LIMIT_NS
-from p2os.timing import NS_PER_MS, NS_PER_S, Nanos
 from p2os.transport.wall_clock import Clock, GapWatch, wall_clock
+from simbase.timing import NS_PER_MS, NS_PER_S, Nanos
 
 #: chosen: how soon a notice is seen; packets come every 100 ms.
 LOOK_NS: Nanos = 50 * NS_PER_MS

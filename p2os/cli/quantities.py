@@ -10,7 +10,7 @@ from collections.abc import Mapping
 from enum import Enum
 
 from p2os.errors import UsageError
-from p2os.timing import NS_PER_S, Nanos
+from simbase.timing import NS_PER_S, Nanos
 
 _NUMBER = re.compile(r"(?P<number>[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*(?P<unit>\S*)")
 

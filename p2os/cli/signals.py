@@ -24,8 +24,8 @@ from types import FrameType, TracebackType
 from typing import Self
 
 from p2os.client.interrupts import FATAL, signal_numbers
-from p2os.timing import NS_PER_S, Nanos
 from p2os.transport.wall_clock import wall_clock
+from simbase.timing import NS_PER_S, Nanos
 
 #: Caught even where they are ignored: shells start background programs with the keyboard's two ignored.
 ALWAYS_CAUGHT = frozenset({"SIGINT", "SIGQUIT", "SIGTERM"})

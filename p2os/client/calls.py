@@ -23,7 +23,7 @@ from p2os.protocol.connection import ConnectionStats
 from p2os.protocol.packets import Identity
 from p2os.protocol.profiles import Profile
 from p2os.robots.parameters import RobotParameters
-from p2os.timing import Nanos
+from simbase.timing import Nanos
 
 Result = TypeVar("Result")
 #: What the argument of a request means: one packet, or one a cycle.

@@ -58,7 +58,7 @@ from p2os.protocol.packets import (
 from p2os.protocol.profiles import Profile
 from p2os.protocol.sip import StandardSip
 from p2os.robots.parameters import ParametersError, RobotParameters, load_parameters
-from p2os.timing import Nanos, Reached
+from simbase.timing import Nanos, Reached
 
 #: Any type of packet, for calls that return the type that they were given.
 PacketType = TypeVar("PacketType", bound=ServerPacket)

@@ -17,7 +17,7 @@ from typing import Protocol
 from p2os.client.notices import MotionEnded
 from p2os.client.robot_state import Limits, RobotPose, RobotState
 from p2os.protocol.commands import Command, CommandNumber
-from p2os.timing import NS_PER_MS, NS_PER_S, Nanos
+from simbase.timing import NS_PER_MS, NS_PER_S, Nanos
 
 #: ARIA's documentation advises no MOVE beyond 5 m.
 LEG_M = 5.0

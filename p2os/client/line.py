@@ -24,10 +24,10 @@ from p2os.client.settings import ClientSettings
 from p2os.errors import P2osError, TransportError
 from p2os.protocol.commands import Command, CommandNumber, enable, stop, vel
 from p2os.robots.parameters import RobotParameters, load_parameters
-from p2os.timing import NS_PER_S, Nanos
 from p2os.transport.ports import Transport
 from p2os.transport.url import SerialUrl, parse_url
 from p2os.transport.wall_clock import GAP_NS, Clock, GapWatch, wall_clock
+from simbase.timing import NS_PER_S, Nanos
 
 #: chosen: more reads a turn than any line fills between two wakes; a flood must not starve the clock.
 MOST_READS = 16

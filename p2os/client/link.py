@@ -62,7 +62,7 @@ from p2os.protocol.events import Event
 from p2os.protocol.packets import Identity
 from p2os.protocol.profiles import Profile
 from p2os.protocol.sip import StandardSip
-from p2os.timing import NS_PER_MS, NS_PER_S, Nanos
+from simbase.timing import NS_PER_MS, NS_PER_S, Nanos
 
 #: A try to open a session ends within this, whatever the line does.
 TRY_LIMIT_NS: Nanos = 20 * NS_PER_S

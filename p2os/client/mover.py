@@ -43,7 +43,7 @@ from p2os.client.robot_state import Limits, RobotState
 from p2os.client.settings import ClientSettings
 from p2os.errors import LocalProtocolError, UsageError
 from p2os.protocol.commands import Command, CommandNumber, enable, rvel, stop, vel
-from p2os.timing import NS_PER_MS, NS_PER_S, Nanos
+from simbase.timing import NS_PER_MS, NS_PER_S, Nanos
 
 #: What moves a robot: sent raw, it takes the place of held speeds.
 MOTION_NUMBERS = frozenset(

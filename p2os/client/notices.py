@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from p2os.errors import LocalProtocolError, TransportError
 from p2os.protocol.config_packet import ConfigPacket
 from p2os.protocol.packets import Identity, ServerPacket
-from p2os.timing import Nanos
+from simbase.timing import Nanos
 
 
 class ConnectError(TransportError):

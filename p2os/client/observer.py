@@ -20,7 +20,7 @@ from p2os.protocol.profiles import Profile
 from p2os.protocol.sip import StandardSip
 from p2os.protocol.units import in_units
 from p2os.robots.parameters import RobotParameters
-from p2os.timing import NS_PER_S, Nanos
+from simbase.timing import NS_PER_S, Nanos
 
 #: Flag bits of AROS and ARCOS packets (Pioneer 2/3 H8 manual, FLAGS): motors, STOP button.
 MOTORS_FLAG, STOP_BUTTON_FLAG = 1 << 0, 1 << 5

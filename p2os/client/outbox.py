@@ -10,7 +10,7 @@ from collections.abc import Container, Iterable
 from dataclasses import dataclass
 
 from p2os.protocol.frames import PREFIX_BYTES
-from p2os.timing import NS_PER_S, Nanos
+from simbase.timing import NS_PER_S, Nanos
 
 #: Bits of a byte on a serial line: start, eight, stop.
 BITS_PER_BYTE = 10

@@ -26,9 +26,9 @@ from p2os.client.robot_state import Link, RobotState
 from p2os.client.robot_thread import Opener, RobotThread
 from p2os.client.settings import ClientSettings
 from p2os.robots.parameters import RobotParameters
-from p2os.timing import NS_PER_S, Nanos
 from p2os.transport import open_url
 from p2os.transport.wall_clock import Clock, wall_clock
+from simbase.timing import NS_PER_S, Nanos
 
 
 class Robot(RobotCalls):

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from enum import Enum
 
 from p2os.protocol.sip import StandardSip
-from p2os.timing import Nanos
+from simbase.timing import Nanos
 
 
 class Link(Enum):

@@ -54,8 +54,8 @@ from p2os.protocol.frames import Decoder, DecoderStats, Frame
 from p2os.protocol.packets import RESET_KINDS, Identity, ServerPacket, packet_frame, read_packet
 from p2os.protocol.profiles import Profile
 from p2os.protocol.sip import SIP_KINDS, StandardSip
-from p2os.timing import NS_PER_MS, NS_PER_S, Nanos, Reached
 from simbase.state import Stateful
+from simbase.timing import NS_PER_MS, NS_PER_S, Nanos, Reached
 
 __all__ = [
     "Closed",

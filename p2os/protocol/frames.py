@@ -23,8 +23,8 @@ from collections import deque
 from dataclasses import dataclass
 
 from p2os.errors import LocalProtocolError
-from p2os.timing import NS_PER_MS, Nanos, Reached
 from simbase.state import Stateful
+from simbase.timing import NS_PER_MS, Nanos, Reached
 
 HEADER = b"\xfa\xfb"
 #: Header and count.

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 
 from p2os.protocol.sip import POSITION_MASK, StandardSip
 from p2os.robots.parameters import RobotParameters
-from p2os.timing import NS_PER_S, Nanos
 from simbase.state import Stateful
+from simbase.timing import NS_PER_S, Nanos
 
 #: Positions are 15 bits wide in every firmware family (manuals, SIP table).
 POSITION_MODULUS = POSITION_MASK + 1

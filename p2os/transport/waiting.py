@@ -15,10 +15,10 @@ import time
 from collections.abc import Iterable
 
 from p2os.errors import TransportError
-from p2os.timing import NS_PER_MS, NS_PER_S, Nanos
 from p2os.transport.ports import READ_BYTES, Transport
 from p2os.transport.sockets import SocketTransport
 from p2os.transport.wall_clock import Clock, GapWatch
+from simbase.timing import NS_PER_MS, NS_PER_S, Nanos
 
 #: chosen: how often a line without a descriptor is asked for bytes; a millisecond is a character at 9600 bit/s.
 BLIND_POLL_S = 0.001

@@ -13,7 +13,7 @@ it STOP before anything else then: what was asked before the gap is out of date.
 import time
 from collections.abc import Callable
 
-from p2os.timing import NS_PER_MS, Nanos
+from simbase.timing import NS_PER_MS, Nanos
 
 #: Nanoseconds that never go back, and go on while the machine sleeps.
 Clock = Callable[[], Nanos]

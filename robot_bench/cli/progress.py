@@ -14,9 +14,9 @@ from rich.progress import BarColumn, Progress, ProgressColumn, Task, TextColumn
 from rich.text import Text
 
 from p2os.cli.signals import postponed
-from p2os.timing import NS_PER_MS, NS_PER_S, Nanos
 from p2os.transport.wall_clock import wall_clock
 from robot_bench import run
+from simbase.timing import NS_PER_MS, NS_PER_S, Nanos
 
 #: chosen: smooth to the eye, and no load.
 REFRESH_NS: Nanos = 100 * NS_PER_MS

@@ -8,8 +8,8 @@ Not modelled: noise, crosstalk and the time that sound takes.
 from collections.abc import Callable, Sequence
 
 from adapter_sim.codec import is_near
-from p2os.timing import Nanos
 from robot_bench.wires.nets import Net, Strength
+from simbase.timing import Nanos
 
 #: The name under which the plug-ins drive wires.
 OWNER = "sensor"

@@ -8,9 +8,9 @@ import math
 from collections.abc import Sequence
 
 from adapter_sim.codec import encoder_code
-from p2os.timing import Nanos
 from robot_bench.direct.distance import OWNER
 from robot_bench.wires.nets import Net, Strength
+from simbase.timing import Nanos
 
 #: One turn in units of a nanoradian: the sectors' boundaries are off by less than 1e-9 rad.
 NRAD_PER_TURN = round(2 * math.pi * 1e9)

@@ -13,8 +13,8 @@ from collections.abc import Sequence
 
 from adapter_sim.codec import BitOrder, motor_value
 from p2os.errors import LocalProtocolError
-from p2os.timing import NS_PER_S, Nanos
 from robot_bench.wires.nets import Net
+from simbase.timing import NS_PER_S, Nanos
 
 
 class JointMotor:

@@ -17,7 +17,7 @@ from p2os.protocol.odometry import Unwrapper
 from p2os.protocol.profiles import Profile
 from p2os.protocol.sip import POSITION_MASK, SIP_KINDS, StandardSip
 from p2os.robots.parameters import RobotParameters
-from p2os.timing import Nanos
+from simbase.timing import Nanos
 
 UM_PER_M = 1_000_000
 NM_PER_UM = 1_000

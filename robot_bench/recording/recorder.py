@@ -16,10 +16,10 @@ from typing import Protocol, cast
 
 from p2os.pioneer.body.contract import BodyState, Hit
 from p2os.pioneer.world.model import Obstacle
-from p2os.timing import NS_PER_MS, Nanos, Reached
 from robot_bench.recording.run_record import COLLISION
 from robot_bench.recording.trace import TraceWriter
 from robot_bench.wires.nets import Harness, Net
+from simbase.timing import NS_PER_MS, Nanos, Reached
 
 SAMPLE_NS: Nanos = 50 * NS_PER_MS
 #: A line of text longer than this is written in pieces.

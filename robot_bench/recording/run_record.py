@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import cast
 
 from p2os.errors import FileError
-from p2os.timing import NS_PER_S
+from simbase.timing import NS_PER_S
 
 #: A parsed JSON object.
 Json = dict[str, object]

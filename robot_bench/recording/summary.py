@@ -10,8 +10,8 @@ from collections.abc import Mapping
 from itertools import pairwise
 from pathlib import Path
 
-from p2os.timing import NS_PER_S
 from robot_bench.recording.run_record import Json, RunRecord
+from simbase.timing import NS_PER_S
 
 #: Side of the cells that a run's coverage is counted in, metres.
 CELL_M = 0.5

@@ -29,7 +29,7 @@ from pathlib import Path
 from typing import IO, cast
 
 from p2os.errors import FileError, LocalProtocolError, RunFailedError
-from p2os.timing import NS_PER_S, Nanos
+from simbase.timing import NS_PER_S, Nanos
 
 TRACE_NAME = "trace.jsonl"
 

@@ -11,12 +11,12 @@ from importlib.resources import files
 from string import Template
 from typing import cast
 
-from p2os.timing import NS_PER_S
 from robot_bench.recording.run_record import COLLISION, Json, RunRecord
 from robot_bench.recording.signals import grouped, motor_steps
 from robot_bench.recording.summary import figures, verdict
 from robot_bench.report.packets import describe
 from robot_bench.report.thinning import ends, extremes, pulses
+from simbase.timing import NS_PER_S
 
 #: Speed of one motor step where a trace does not hold it: the adapter's default, m/s.
 DEFAULT_STEP_MPS = 0.0625

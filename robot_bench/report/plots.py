@@ -12,10 +12,10 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Circle, Patch, Rectangle
 from matplotlib.transforms import Affine2D
 
-from p2os.timing import NS_PER_S
 from robot_bench.recording.run_record import Json, RunRecord
 from robot_bench.recording.signals import grouped, motor_steps
 from robot_bench.recording.summary import verdict
+from simbase.timing import NS_PER_S
 
 LEFT, RIGHT, WALL, BOX, FLOOR, HIT = "#1b6ca8", "#c8553d", "#4a5560", "#b9a66b", "#dfe3d8", "#b00020"
 #: chosen: more names than these would cover the plan; each collision has its mark.

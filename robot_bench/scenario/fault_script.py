@@ -19,9 +19,9 @@ from typing import cast
 from p2os.errors import ScenarioError, UsageError
 from p2os.pioneer.controller.faults import MOMENTARY, read_fault
 from p2os.robots.parameters import RobotParameters
-from p2os.timing import NS_PER_S, Nanos
 from robot_bench.scenario.schema import LONGEST_S, Key, Table, Where, check_table, within
 from robot_bench.scenario.timeline import Timeline
+from simbase.timing import NS_PER_S, Nanos
 
 _KEYS = (
     Key(name="at_s", kind="number", required=True, least=0, most=LONGEST_S),

@@ -26,13 +26,13 @@ from p2os.pioneer.world import Pose, known_worlds, load_world, world_suffixes
 from p2os.pioneer.world.model import World
 from p2os.pioneer.world.start_places import thing_at
 from p2os.robots.parameters import RobotParameters, load_parameters
-from p2os.timing import NS_PER_MS, NS_PER_S, Nanos
 from p2os.toml_file import TomlSource, is_file, read_toml, read_user_text
 from robot_bench.direct.robot import DirectSettings
 from robot_bench.scenario.fault_script import FaultChange, load_faults
 from robot_bench.scenario.goals import Goal, load_goal
 from robot_bench.scenario.schema import LONGEST_S, Key, Place, Table, Where, check_table, in_range, nearest, within
 from robot_bench.scenario.world_script import Change, load_changes, refuse_names
+from simbase.timing import NS_PER_MS, NS_PER_S, Nanos
 
 MODES = ("direct", "adapter")
 #: What runs in the adapter's place: the Python model, or the firmware's C++ core.

@@ -6,7 +6,7 @@ Invariant: each change is applied once, in order of time, and saving and restori
 from collections.abc import Callable, Mapping, Sequence
 from typing import Generic, Protocol, TypeVar, cast
 
-from p2os.timing import Nanos, Reached
+from simbase.timing import Nanos, Reached
 
 
 class Timed(Protocol):

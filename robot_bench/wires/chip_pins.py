@@ -13,8 +13,8 @@ from collections.abc import Callable, Mapping
 from typing import Protocol
 
 from bluepill_sim.fabric.pins import PinDrive
-from p2os.timing import Nanos
 from robot_bench.wires.nets import Harness, Net, Strength
+from simbase.timing import Nanos
 
 #: The name under which the chip drives wires.
 OWNER = "bluepill"

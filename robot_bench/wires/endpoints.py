@@ -10,8 +10,8 @@ and leave it at the time at which the part acted.
 from collections.abc import Callable, Mapping
 from typing import Protocol, cast
 
-from p2os.timing import Nanos, Reached
 from robot_bench.wires.serial_line import SerialLine
+from simbase.timing import Nanos, Reached
 
 
 class EndpointPart(Protocol):

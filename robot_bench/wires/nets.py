@@ -19,7 +19,7 @@ from enum import Enum
 from typing import cast
 
 from p2os.errors import LocalProtocolError
-from p2os.timing import Nanos
+from simbase.timing import Nanos
 
 
 class Strength(Enum):

@@ -11,9 +11,9 @@ and only ever stops.
 from collections.abc import Callable
 
 from p2os.protocol.commands import Command, CommandNumber, rvel, stop, vel
-from p2os.timing import NS_PER_MS, Nanos, Reached
 from p2os.transport import Transport
 from robot_bench.wires.endpoints import EndpointPart
+from simbase.timing import NS_PER_MS, Nanos, Reached
 
 #: chosen: a tenth of a standard packet's time on a line of 9600 bit/s.
 POLL_NS: Nanos = 2 * NS_PER_MS

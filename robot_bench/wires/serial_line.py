@@ -17,7 +17,7 @@ from dataclasses import dataclass
 from typing import cast
 
 from p2os.errors import LocalProtocolError
-from p2os.timing import NS_PER_S, Nanos, Reached
+from simbase.timing import NS_PER_S, Nanos, Reached
 
 #: Start bit, eight data bits, stop bit: 8N1.
 BITS_PER_CHARACTER = 10

@@ -15,8 +15,8 @@ from p2os.pioneer.world import load_world
 from p2os.protocol.commands import Command
 from p2os.protocol.frames import Decoder, Frame
 from p2os.robots.parameters import load_parameters
-from p2os.timing import NS_PER_MS, NS_PER_S, Nanos
 from robot_bench.adapter import FirmwareAdapter
+from simbase.timing import NS_PER_MS, NS_PER_S, Nanos
 from tests.adapter_sim.conftest import Rig
 
 MS = NS_PER_MS

@@ -15,10 +15,10 @@ from adapter_sim.pinout import Pinout, WireRole
 from bluepill_sim import BluePill
 from bluepill_sim.fabric.pins import PinDrive
 from p2os.pioneer.controller import Pioneer
-from p2os.timing import NS_PER_MS, Nanos, Reached
 from robot_bench.bench import Bench
 from robot_bench.recording.client_view import SipRanges
 from robot_bench.wires.nets import OwnedPins
+from simbase.timing import NS_PER_MS, Nanos, Reached
 
 #: A quarter of what the adapter samples with.
 STEP_NS: Nanos = NS_PER_MS // 2

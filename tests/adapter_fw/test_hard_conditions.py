@@ -15,8 +15,8 @@ import pytest
 from p2os.protocol.frames import checksum
 from p2os.protocol.profiles import Profile
 from p2os.protocol.sip import SonarReading, StandardSip
-from p2os.timing import NS_PER_MS, NS_PER_S
 from robot_bench.adapter import is_available
+from simbase.timing import NS_PER_MS, NS_PER_S
 from tests.adapter_fw.hard_conditions import BITS_PER_CHARACTER, HardConditions
 
 pytestmark = pytest.mark.skipif(not is_available(), reason="the firmware core is not built: no C++17 compiler")

@@ -10,8 +10,8 @@ from p2os.protocol.packets import Identity
 from p2os.protocol.profiles import Profile
 from p2os.protocol.sip import SonarReading, StandardSip
 from p2os.robots.parameters import load_parameters
-from p2os.timing import NS_PER_MS, Nanos
 from robot_bench.adapter import FirmwareAdapter
+from simbase.timing import NS_PER_MS, Nanos
 from tests.adapter_sim.conftest import FakePins
 
 PARAMETERS = load_parameters("p2dx")

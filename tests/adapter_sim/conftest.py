@@ -13,7 +13,7 @@ from p2os.protocol.frames import Frame
 from p2os.protocol.packets import Identity
 from p2os.protocol.sip import SonarReading, StandardSip
 from p2os.robots.parameters import load_parameters
-from p2os.timing import NS_PER_MS, Nanos
+from simbase.timing import NS_PER_MS, Nanos
 
 PARAMETERS = load_parameters("p2dx")
 PINOUT = load_pinout()

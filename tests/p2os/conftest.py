@@ -13,7 +13,7 @@ from p2os.protocol.frames import Decoder, Frame
 from p2os.protocol.profiles import Profile
 from p2os.protocol.sip import SIP_KINDS, StandardSip
 from p2os.robots.parameters import RobotParameters, load_parameters
-from p2os.timing import NS_PER_MS
+from simbase.timing import NS_PER_MS
 
 
 @dataclass(frozen=True)

@@ -2,8 +2,8 @@
 
 import pytest
 
-from p2os.timing import Reached
 from robot_bench.loop import RunLoop, StuckError
+from simbase.timing import Reached
 from tests.robot_bench.wires.fake_chip import FakeChip, PinDrive
 
 

@@ -20,7 +20,7 @@ from p2os.capture.table import LEADING, Cell, Table
 from p2os.protocol.frames import GIVE_UP_NS
 from p2os.protocol.packets import packet_name
 from p2os.protocol.sip import MOVING, POSITION_MASK, TAIL, SonarReading, StandardSip
-from p2os.timing import NS_PER_S
+from simbase.timing import NS_PER_S
 
 #: A field in SI units → the raw field that alone decides it.
 RAW_OF = {

@@ -12,7 +12,7 @@ from p2os.capture.chunks import Direction
 from p2os.capture.describe import Plain
 from p2os.capture.listing import ListingRow
 from p2os.errors import MissingDependencyError
-from p2os.timing import Nanos
+from simbase.timing import Nanos
 
 #: Type of a plain value → its name in JSON Schema.
 _SCHEMA_TYPES = {bool: "boolean", int: "number", float: "number", str: "string", dict: "object", list: "array"}

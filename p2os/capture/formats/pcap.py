@@ -20,7 +20,7 @@ from dataclasses import dataclass, field
 
 from p2os.capture.chunks import Capture, CaptureBuilder, Chunk, Direction
 from p2os.errors import FileError
-from p2os.timing import NS_PER_S, NS_PER_US, Nanos
+from simbase.timing import NS_PER_S, NS_PER_US, Nanos
 
 LINKTYPE_USER0 = 147
 MAGIC_US, MAGIC_NS = 0xA1B2C3D4, 0xA1B23C4D

@@ -12,7 +12,7 @@ from collections.abc import Mapping
 
 from p2os.capture.chunks import Capture, CaptureBuilder, Chunk, Direction
 from p2os.errors import FileError
-from p2os.timing import NS_PER_S, Nanos
+from simbase.timing import NS_PER_S, Nanos
 
 FORMAT = "p2os-recording"
 VERSION = 1

@@ -14,7 +14,7 @@ from p2os.capture.formats.pcap import file_header, record
 from p2os.capture.formats.recording import chunk_line, header_line
 from p2os.capture.listing import FrameCutter
 from p2os.errors import FileError
-from p2os.timing import Nanos
+from simbase.timing import Nanos
 
 
 class Sink(Protocol):

@@ -13,7 +13,7 @@ from p2os.capture.listing import line_of, summary_of
 from p2os.cli.captures.reading import DIRECTION_HELP, PROFILE_HELP, ROBOT_HELP, direction_of, reading_of
 from p2os.errors import UsageError
 from p2os.protocol.profiles import Profile
-from p2os.timing import NS_PER_S
+from simbase.timing import NS_PER_S
 
 HELP = """Show what stands in P2OS bytes.
 

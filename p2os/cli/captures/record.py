@@ -17,10 +17,10 @@ from p2os.cli.quantities import parse_duration
 from p2os.cli.signals import postponed
 from p2os.errors import RemoteProtocolError, TransportError
 from p2os.protocol.connection import ConnectFailed, Connection, ConnectionLost, ConnectionRole, SipReceived
-from p2os.timing import NS_PER_S, Nanos
 from p2os.transport import Transport, open_url
 from p2os.transport.waiting import wait_for_line
 from p2os.transport.wall_clock import Clock, wall_clock
+from simbase.timing import NS_PER_S, Nanos
 
 HELP = """Connect to a robot, keep its motors off, and record all that both sides send.
 

@@ -32,11 +32,11 @@ from p2os.cli.signals import postponed
 from p2os.errors import TransportError
 from p2os.protocol.profiles import Profile
 from p2os.robots.parameters import load_parameters
-from p2os.timing import NS_PER_MS, NS_PER_S, Nanos
 from p2os.transport import listen_url, open_url
 from p2os.transport.ports import Listener, Transport
 from p2os.transport.waiting import BLIND_POLL_S, wait_readable
 from p2os.transport.wall_clock import Clock, GapWatch, wall_clock
+from simbase.timing import NS_PER_MS, NS_PER_S, Nanos
 
 DEFAULT_LISTEN = "tcp:127.0.0.1:8102"
 

@@ -22,10 +22,10 @@ from p2os.protocol.connection import (
     ConnectionRole,
     SipReceived,
 )
-from p2os.timing import NS_PER_MS, NS_PER_S, Nanos
 from p2os.transport import Transport, open_url
 from p2os.transport.waiting import wait_for_line
 from p2os.transport.wall_clock import Clock, wall_clock
+from simbase.timing import NS_PER_MS, NS_PER_S, Nanos
 
 HELP = """Measure a link to a robot, without moving it.
 

@@ -12,8 +12,8 @@ from p2os.client import ClientSettings, Connected, ConnectError, Robot
 from p2os.client.settings import BAUDS
 from p2os.errors import P2osError, TransportError, UsageError
 from p2os.robots.parameters import ParametersError, load_parameters
-from p2os.timing import NS_PER_MS, NS_PER_S
 from p2os.transport.serial_port import list_serial_ports
+from simbase.timing import NS_PER_MS, NS_PER_S
 
 #: Where simulated Pioneers listen.
 SIMULATOR = "tcp:127.0.0.1:8101"

@@ -27,11 +27,11 @@ from p2os.protocol.packets import Identity
 from p2os.protocol.sip import POSITION_MASK, StandardSip
 from p2os.protocol.units import in_units
 from p2os.robots.parameters import ParametersError, RobotParameters, load_parameters
-from p2os.timing import NS_PER_S, Nanos
 from p2os.transport import Transport, open_url
 from p2os.transport.ports import HungUpError
 from p2os.transport.waiting import wait_for_line
 from p2os.transport.wall_clock import Clock, wall_clock
+from simbase.timing import NS_PER_S, Nanos
 
 HELP = """Connect to a robot, print who it is, how it is set and what it senses, and leave.
 

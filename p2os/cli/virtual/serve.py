@@ -46,9 +46,9 @@ from p2os.pioneer.serve.orders import status_line
 from p2os.pioneer.serve.robot_time import RobotTime
 from p2os.pioneer.world.model import Pose
 from p2os.protocol.profiles import Profile
-from p2os.timing import NS_PER_S, Nanos
 from p2os.transport import listen_url
 from p2os.transport.wall_clock import wall_clock
+from simbase.timing import NS_PER_S, Nanos
 
 #: chosen: several times what an eager client causes, and still readable.
 MOST_LINES = 50

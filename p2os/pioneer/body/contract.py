@@ -14,7 +14,7 @@ from typing import NamedTuple, Protocol
 
 from p2os.pioneer.body.ray_cast import Echo
 from p2os.pioneer.world.model import Obstacle, Pose
-from p2os.timing import NS_PER_MS, Nanos
+from simbase.timing import NS_PER_MS, Nanos
 
 #: One step of every body: 1 kHz.
 STEP_NS: Nanos = NS_PER_MS

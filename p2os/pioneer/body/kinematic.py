@@ -25,7 +25,7 @@ from p2os.pioneer.world.geometry import Footprint, hull_polygon, placed
 from p2os.pioneer.world.model import Obstacle, Pose, Walker, World
 from p2os.pioneer.world.plan import Plan, StaticPlan
 from p2os.robots.parameters import RobotParameters
-from p2os.timing import NS_PER_S, Nanos
+from simbase.timing import NS_PER_S, Nanos
 
 #: Below this turn in one step the arc is a straight line to double precision, rad.
 STRAIGHT_RAD = 1e-9

@@ -11,7 +11,7 @@ ring on the side of the way is pressed.
 from p2os.pioneer.controller.context import Context
 from p2os.pioneer.controller.flash import Flash
 from p2os.pioneer.controller.ports import SensedState
-from p2os.timing import NS_PER_MS, Nanos
+from simbase.timing import NS_PER_MS, Nanos
 
 #: chosen: the bumpers are looked at so often while BUMPSTALL is on.
 BUMPER_WATCH_NS: Nanos = 20 * NS_PER_MS

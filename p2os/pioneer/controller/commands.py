@@ -26,7 +26,7 @@ from p2os.pioneer.devices.heading_sensors import CompassMode
 from p2os.protocol.command_table import BY_NUMBER
 from p2os.protocol.commands import Command, CommandNumber
 from p2os.protocol.profiles import Profile
-from p2os.timing import NS_PER_MS, Nanos
+from simbase.timing import NS_PER_MS, Nanos
 
 Handler = Callable[[Context, Command, Nanos], bool]
 

@@ -14,7 +14,7 @@ from p2os.pioneer.devices.fitted import Devices
 from p2os.pioneer.random_source import RandomSource
 from p2os.pioneer.sonar.schedule import SonarSchedule
 from p2os.protocol.profiles import Profile
-from p2os.timing import Nanos
+from simbase.timing import Nanos
 
 
 @dataclass(slots=True)

@@ -70,7 +70,7 @@ from p2os.protocol.connection import (
 from p2os.protocol.packets import Identity, ResetNotice
 from p2os.protocol.profiles import Profile
 from p2os.robots.parameters import RobotParameters
-from p2os.timing import NS_PER_MS, NS_PER_S, Nanos, Reached
+from simbase.timing import NS_PER_MS, NS_PER_S, Nanos, Reached
 
 #: (now in ns, what happened in a word or two, detail).
 EventCallback = Callable[[Nanos, str, str], None]

@@ -32,7 +32,7 @@ from enum import Enum
 from typing import cast
 
 from p2os.robots.parameters import RobotParameters
-from p2os.timing import Nanos
+from simbase.timing import Nanos
 
 NM_PER_MM = 1_000_000
 NM_PER_M = 1_000_000_000

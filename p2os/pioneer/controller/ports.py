@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from typing import Protocol
 
-from p2os.timing import Nanos
+from simbase.timing import Nanos
 
 
 class WheelAngles(Protocol):

@@ -45,7 +45,7 @@ from p2os.protocol.packets import (
 from p2os.protocol.profiles import Profile
 from p2os.protocol.sip import MOVING, STANDING, SonarReading, StandardSip
 from p2os.robots.parameters import RobotParameters
-from p2os.timing import NS_PER_MS, Nanos
+from simbase.timing import NS_PER_MS, Nanos
 
 RAD_PER_DEG = math.pi / 180
 

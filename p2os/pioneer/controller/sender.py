@@ -20,7 +20,7 @@ in it, never by adding rounded times.
 from collections import deque
 from dataclasses import dataclass, field, replace
 
-from p2os.timing import NS_PER_S, Nanos
+from simbase.timing import NS_PER_S, Nanos
 
 #: Start bit, eight data bits, stop bit.
 BITS_PER_CHARACTER = 10

@@ -7,7 +7,7 @@ from p2os.errors import UsageError
 from p2os.pioneer.controller.flash import BAUD_RATES, Flash
 from p2os.pioneer.sensor_errors import IDEAL, SensorErrors
 from p2os.protocol.profiles import Profile
-from p2os.timing import NS_PER_MS, NS_PER_S, Nanos
+from simbase.timing import NS_PER_MS, NS_PER_S, Nanos
 
 #: The CONFIGpac has one byte for the cycle.
 LONGEST_SIP_PERIOD_MS = 255

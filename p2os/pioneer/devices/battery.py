@@ -7,7 +7,7 @@ temperature, ageing, the recovery of a rested battery.
 
 from dataclasses import dataclass
 
-from p2os.timing import NS_PER_S, Nanos
+from simbase.timing import NS_PER_S, Nanos
 
 #: chosen: resting volts of a full and of an empty lead-acid battery of six cells.
 FULL_V, EMPTY_V = 12.9, 11.1

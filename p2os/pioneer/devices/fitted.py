@@ -9,7 +9,7 @@ from p2os.pioneer.devices.gripper import ON_USER_IO, SWITCHES, Gripper
 from p2os.pioneer.devices.heading_sensors import Compass, Gyro
 from p2os.pioneer.devices.joystick import Joystick
 from p2os.pioneer.devices.pins import Pins
-from p2os.timing import Nanos
+from simbase.timing import Nanos
 
 
 @dataclass(slots=True)

@@ -7,7 +7,7 @@ long the paddles and the lift take is chosen; nothing is ever dropped.
 from dataclasses import dataclass
 
 from p2os.protocol.packets import GripperPacket, GripperState
-from p2os.timing import NS_PER_MS, NS_PER_S, Nanos
+from simbase.timing import NS_PER_MS, NS_PER_S, Nanos
 
 #: chosen: full way of the paddles and of the lift.
 PADDLES_NS: Nanos = 1_500 * NS_PER_MS

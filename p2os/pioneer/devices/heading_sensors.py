@@ -10,7 +10,7 @@ from enum import IntEnum
 
 from p2os.protocol.packets import CompassPacket, GyroPacket, GyroReading
 from p2os.protocol.packets.sensors import GYRO_CENTRE, GYRO_DEG_S_PER_COUNT
-from p2os.timing import NS_PER_MS, Nanos
+from simbase.timing import NS_PER_MS, Nanos
 
 GYRO_SAMPLE_NS: Nanos = 25 * NS_PER_MS
 #: ARIA's GyroScaler of every model.

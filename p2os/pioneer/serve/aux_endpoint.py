@@ -7,8 +7,8 @@ import contextlib
 
 from p2os.errors import TransportError
 from p2os.pioneer.controller import Pioneer
-from p2os.timing import Nanos
 from p2os.transport.ports import Listener, Transport
+from simbase.timing import Nanos
 
 
 class AuxEndpoint:

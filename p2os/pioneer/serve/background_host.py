@@ -17,8 +17,8 @@ from p2os.pioneer.controller import ControllerSettings, Pioneer
 from p2os.pioneer.serve.host import Host
 from p2os.pioneer.world import load_world
 from p2os.robots.parameters import load_parameters
-from p2os.timing import Nanos
 from p2os.transport import listen_url
+from simbase.timing import Nanos
 
 #: chosen: the host looks up twice a second; on a busy machine it may take longer.
 ENDING_S = 30.0

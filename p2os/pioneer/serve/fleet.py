@@ -7,9 +7,9 @@ from collections.abc import Callable, Sequence
 
 from p2os.pioneer.serve.control_line import ControlLine
 from p2os.pioneer.serve.host import IDLE_WAIT_S, Host
-from p2os.timing import NS_PER_S
 from p2os.transport.waiting import wait_readable
 from p2os.transport.wall_clock import wall_clock
+from simbase.timing import NS_PER_S
 
 
 class Fleet:

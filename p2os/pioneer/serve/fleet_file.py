@@ -34,8 +34,8 @@ from p2os.pioneer.world.model import RANGES as WORLD_RANGES
 from p2os.pioneer.world.model import Pose
 from p2os.protocol.profiles import Profile
 from p2os.robots.parameters import load_parameters
-from p2os.timing import NS_PER_S, Nanos
 from p2os.toml_file import TomlPlaces, is_file, read_toml, read_user_text
+from simbase.timing import NS_PER_S, Nanos
 
 
 class FleetError(FileError):

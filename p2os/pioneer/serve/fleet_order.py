@@ -17,8 +17,8 @@ from p2os.pioneer.world import load_world
 from p2os.pioneer.world.model import Pose, World
 from p2os.pioneer.world.start_places import start_places
 from p2os.robots.parameters import RobotParameters, load_parameters
-from p2os.timing import Nanos
 from p2os.transport import PtyUrl, SerialUrl, TcpUrl, parse_url
+from simbase.timing import Nanos
 
 #: Where the first robot is found when nothing else is given.
 DEFAULT_PORT = "tcp:127.0.0.1:8101"

@@ -28,10 +28,10 @@ from p2os.pioneer.serve.multi_robot_world import MultiRobotWorld
 from p2os.pioneer.serve.paced_line import PacedLine
 from p2os.pioneer.serve.robot_time import SETTLE_NS, RobotTime
 from p2os.pioneer.serve.world_orders import change_world
-from p2os.timing import NS_PER_S, Nanos
 from p2os.transport.ports import READ_BYTES, Listener, Transport
 from p2os.transport.waiting import BLIND_POLL_S, ClosingLines, has_hung_up, wait_readable
 from p2os.transport.wall_clock import wall_clock
+from simbase.timing import NS_PER_S, Nanos
 
 #: (robot's time in ns, what happened in a word or two, detail).
 HostEvent = Callable[[Nanos, str, str], None]

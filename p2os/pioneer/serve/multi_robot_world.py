@@ -38,7 +38,7 @@ from p2os.pioneer.body.other_robots import (
 )
 from p2os.pioneer.controller import Pioneer
 from p2os.pioneer.world.model import Obstacle, World
-from p2os.timing import NS_PER_MS, NS_PER_S, Nanos, Reached
+from simbase.timing import NS_PER_MS, NS_PER_S, Nanos, Reached
 
 #: chosen: 5 mm at half a metre a second, which is less than what a sonar's own noise is.
 SLICE_NS: Nanos = 10 * NS_PER_MS

@@ -10,7 +10,7 @@ of characters in it, never by adding rounded times.
 from collections import deque
 
 from p2os.pioneer.controller.sender import BITS_PER_CHARACTER
-from p2os.timing import NS_PER_S, Nanos
+from simbase.timing import NS_PER_S, Nanos
 
 #: The receive FIFO of the common UARTs (16550 and its kin), characters.
 LUMP = 16

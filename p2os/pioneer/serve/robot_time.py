@@ -8,7 +8,7 @@ that share a world share their time: it goes on while any of them has a client.
 
 from collections.abc import Callable
 
-from p2os.timing import NS_PER_MS, NS_PER_S, Nanos
+from simbase.timing import NS_PER_MS, NS_PER_S, Nanos
 
 #: chosen: three SIP cycles; a machine that lags more is reported rather than chased.
 LONGEST_PAUSE_NS: Nanos = 300 * NS_PER_MS

@@ -15,7 +15,7 @@ from typing import cast
 
 from p2os.protocol.profiles import Profile
 from p2os.robots.parameters import RobotParameters
-from p2os.timing import Nanos
+from simbase.timing import Nanos
 
 #: What a Pioneer 2 reports when no echo came, in counts: 8,576 mm at 0.268 mm a count (a P2-DX's captured SIP).
 NO_ECHO_COUNTS = 32_000

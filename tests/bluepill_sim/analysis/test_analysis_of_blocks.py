@@ -19,7 +19,7 @@ from bluepill_sim.program.image import SymbolTable
 from bluepill_sim.program.last_blocks import lines_of
 from bluepill_sim.program.line_table import LineTable
 from bluepill_sim.program.static_code import StaticCode
-from bluepill_sim.timing import NS_PER_MS
+from simbase.timing import NS_PER_MS
 
 SYSTICK = "mov32 r1, #0xE000E010\nmov32 r2, #799\nstr r2, [r1, #4]\nstr r2, [r1, #8]\nmovs r2, #7\nstr r2, [r1, #0]\n"
 CALLS = "movs r5, #3\nloop: bl work\nsubs r5, #1\nbne loop\nb stop\nwork: cmp r5, #2\nbne out\nadds r6, #1\nout: bx lr"

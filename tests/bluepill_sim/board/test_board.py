@@ -12,7 +12,7 @@ import bluepill_sim
 from bluepill_sim.board import BluePill
 from bluepill_sim.errors import UnmodelledError
 from bluepill_sim.fabric.pins import PinDrive
-from bluepill_sim.timing import Reason
+from simbase.timing import Reason
 
 FOLDER = Path(__file__).resolve().parents[3] / "robot_bench" / "firmware"
 SYSTICK_CTRL, SYSTICK_LOAD, SYSTICK_VAL = 0xE000E010, 0xE000E014, 0xE000E018

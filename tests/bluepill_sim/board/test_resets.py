@@ -6,7 +6,7 @@ import pytest
 
 from bluepill_sim.board import BluePill
 from bluepill_sim.peripherals.rcc import ResetCause
-from bluepill_sim.timing import Reason
+from simbase.timing import Reason
 
 AIRCR = 0xE000ED0C
 RCC_CSR, RCC_APB1ENR = 0x40021024, 0x4002101C

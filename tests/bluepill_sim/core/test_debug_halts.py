@@ -5,7 +5,7 @@ import hashlib
 import pytest
 
 from bluepill_sim.core import Halt, HaltKind, WatchKind, Watchpoint
-from bluepill_sim.timing import Reason
+from simbase.timing import Reason
 
 GPIOA_CRL, GPIOA_BSRR, RCC_APB2ENR = 0x40010800, 0x40010810, 0x40021018
 SYSTICK_CTRL, SYSTICK_LOAD, SYSTICK_VAL = 0xE000E010, 0xE000E014, 0xE000E018

@@ -3,7 +3,7 @@
 import pytest
 
 from bluepill_sim.core.faults import FAULT_ROWS, FaultKind
-from bluepill_sim.timing import Reason
+from simbase.timing import Reason
 
 CCR, SHCSR, CFSR, HFSR, BFAR = 0xE000ED14, 0xE000ED24, 0xE000ED28, 0xE000ED2C, 0xE000ED38
 SYSTICK_LOAD = 0xE000E014

@@ -35,7 +35,7 @@ from p2os.protocol.packets import (  # noqa: E402
 from p2os.protocol.packets.registry import IDENTITY_KIND  # noqa: E402
 from p2os.protocol.profiles import Profile  # noqa: E402
 from p2os.protocol.sip import SIP_KINDS  # noqa: E402
-from p2os.timing import NS_PER_MS, Nanos  # noqa: E402
+from simbase.timing import NS_PER_MS, Nanos  # noqa: E402
 from tests.p2os.protocol.packet_strategies import ANY, PACKETS  # noqa: E402
 
 GOLDEN = Path(__file__).parents[2] / "golden"

@@ -14,7 +14,7 @@ from p2os.protocol.packets import packet_frame
 from p2os.protocol.profiles import Profile
 from p2os.protocol.sip import SonarReading, StandardSip
 from p2os.robots.parameters import load_parameters
-from p2os.timing import NS_PER_S
+from simbase.timing import NS_PER_S
 
 GOLDEN = Path(__file__).resolve().parents[2] / "golden" / "captures" / "player_p2de.jsonl"
 P2OS = Reading(profile=Profile.P2OS, parameters=load_parameters("p2dx"))

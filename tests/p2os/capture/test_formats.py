@@ -24,7 +24,7 @@ from p2os.capture import (
 from p2os.capture.formats.hex_text import read_hex, write_hex
 from p2os.capture.formats.pcap import PCAPNG_MAGIC
 from p2os.errors import FileError, LocalProtocolError
-from p2os.timing import NS_PER_S
+from simbase.timing import NS_PER_S
 
 TO, FROM = Direction.TO_ROBOT, Direction.FROM_ROBOT
 SYNC0 = bytes.fromhex("fafb03000000")

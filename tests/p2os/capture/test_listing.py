@@ -16,7 +16,7 @@ from p2os.protocol.frames import Frame
 from p2os.protocol.packets import RawPacket
 from p2os.protocol.profiles import Profile
 from p2os.robots.parameters import load_parameters
-from p2os.timing import NS_PER_MS, NS_PER_S
+from simbase.timing import NS_PER_MS, NS_PER_S
 
 GOLDEN = Path(__file__).resolve().parents[2] / "golden"
 VECTORS = json.loads((GOLDEN / "p2os_vectors.json").read_text())

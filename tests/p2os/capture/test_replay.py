@@ -10,7 +10,7 @@ from p2os.capture.replay import Replay
 from p2os.capture.tap import Tap
 from p2os.protocol.commands import Command, CommandNumber
 from p2os.protocol.connection import Connection, ConnectionRole, ConnectionState, SipReceived
-from p2os.timing import NS_PER_MS, NS_PER_S
+from simbase.timing import NS_PER_MS, NS_PER_S
 
 GOLDEN = Path(__file__).resolve().parents[2] / "golden" / "captures"
 TO, FROM = Direction.TO_ROBOT, Direction.FROM_ROBOT

@@ -20,7 +20,7 @@ from p2os.cli.main import run
 from p2os.protocol.packets import EncoderPacket, SonarReading, StandardSip, packet_frame
 from p2os.protocol.profiles import Profile
 from p2os.robots.parameters import load_parameters
-from p2os.timing import NS_PER_MS, Nanos
+from simbase.timing import NS_PER_MS, Nanos
 from tests.p2os.protocol.packet_strategies import PACKETS, SIPS
 
 GOLDEN = Path(__file__).parents[2] / "golden"

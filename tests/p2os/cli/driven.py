@@ -10,7 +10,7 @@ from pathlib import Path
 
 from p2os.protocol.commands import Command, CommandNumber
 from p2os.protocol.frames import Decoder, Frame
-from p2os.timing import Nanos
+from simbase.timing import Nanos
 from tests.p2os.client.served_robot import TIMEOUT_S, ServedRobot, until
 
 COMMAND = (sys.executable, "-m", "p2os")

@@ -18,8 +18,8 @@ from p2os.pioneer.controller.commands import Effect
 from p2os.protocol.config_packet import ConfigPacket
 from p2os.protocol.packets import Identity
 from p2os.protocol.sip import SonarReading, StandardSip
-from p2os.timing import NS_PER_MS
 from p2os.transport import HungUpError
+from simbase.timing import NS_PER_MS
 
 TIMEOUT_S = 30.0
 COMMAND = str(Path(sys.executable).parent / "p2os")

@@ -13,7 +13,7 @@ from p2os.client import Limits, Link, RobotPose, RobotState, SonarEcho
 from p2os.protocol.connection import ConnectionStats
 from p2os.protocol.sip import StandardSip
 from p2os.robots.parameters import load_parameters
-from p2os.timing import NS_PER_MS
+from simbase.timing import NS_PER_MS
 
 LIMITS = Limits(1.5, 3.0, 0.3, 0.3, 1.0, 1.0)
 

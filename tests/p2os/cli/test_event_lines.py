@@ -1,7 +1,7 @@
 """The lines that `p2os serve` prints."""
 
 from p2os.cli.virtual.serve import MOST_LINES, EventLines
-from p2os.timing import NS_PER_S
+from simbase.timing import NS_PER_S
 
 
 def test_a_robot_that_is_one_of_many_says_which() -> None:

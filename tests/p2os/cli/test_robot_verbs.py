@@ -30,8 +30,8 @@ from p2os.client import (
 )
 from p2os.errors import RemoteProtocolError, TransportError, UsageError
 from p2os.protocol.commands import CommandNumber
-from p2os.timing import NS_PER_MS, NS_PER_S
 from p2os.transport import waiting
+from simbase.timing import NS_PER_MS, NS_PER_S
 from tests.p2os.cli.driven import STOP, TIMEOUT_S, RecordingRobot, until
 
 Run = Callable[..., int]

@@ -16,7 +16,7 @@ from p2os.cli import signals
 from p2os.cli.main import run
 from p2os.cli.signals import ENDING_NS, FATAL, end_on_signals, end_on_suspension, postponed, restored_signals
 from p2os.protocol.commands import Command, CommandNumber
-from p2os.timing import NS_PER_S
+from simbase.timing import NS_PER_S
 from tests.p2os.cli.driven import CLOSE, COMMAND, STOP, Driver, RecordingRobot, until
 
 NUMBERS = [signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT, signal.SIGUSR1, signal.SIGTSTP]

@@ -14,7 +14,7 @@ import pytest
 
 from p2os.cli.robots.teleop import FIRST_HOLD_NS, KEYS, NEXT_HOLD_NS, QUIT_KEYS, STOP_KEYS, KeyLoop, Teleop, split_keys
 from p2os.client import DeadmanStopped, GapStopped, Link, LinkLost, Notice
-from p2os.timing import NS_PER_MS
+from simbase.timing import NS_PER_MS
 
 TIMEOUT_S = 60.0
 

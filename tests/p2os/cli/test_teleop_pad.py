@@ -18,7 +18,7 @@ from p2os.client import GapStopped, Notice
 from p2os.client.notices import LinkLostError
 from p2os.errors import MissingDependencyError, UsageError
 from p2os.gamepad import PAD_MPS, PAD_RADPS, Gamepad, PadReport
-from p2os.timing import NS_PER_MS
+from simbase.timing import NS_PER_MS
 
 UP, NOTHING, DOWN = PadReport(up=True), PadReport(), PadReport(down=True)
 

@@ -22,7 +22,7 @@ from p2os.pioneer.world import load_world
 from p2os.protocol.commands import Command
 from p2os.protocol.frames import Frame
 from p2os.robots.parameters import RobotParameters, load_parameters
-from p2os.timing import NS_PER_MS, NS_PER_S
+from simbase.timing import NS_PER_MS, NS_PER_S
 
 MS, S = NS_PER_MS, NS_PER_S
 #: bytes and random source → pieces that arrive, each with its delay.

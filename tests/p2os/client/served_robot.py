@@ -9,9 +9,9 @@ from p2os.pioneer.controller import Pioneer
 from p2os.pioneer.serve.host import Host
 from p2os.protocol.commands import Command
 from p2os.protocol.frames import Decoder, Frame
-from p2os.timing import NS_PER_MS, Nanos
 from p2os.transport import listen_url, open_url
 from p2os.transport.ports import HungUpError, Transport
+from simbase.timing import NS_PER_MS, Nanos
 from tests.p2os.client.client_rig import new_pioneer
 
 #: A bound on every wait; reached only when something is broken.

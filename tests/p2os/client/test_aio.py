@@ -12,7 +12,7 @@ from p2os.client.aio import Robot
 from p2os.errors import P2osError
 from p2os.protocol.commands import Command, CommandNumber, enable, stop, vel
 from p2os.protocol.packets import EncoderPacket, IoPacket, SerauxPacket
-from p2os.timing import NS_PER_MS
+from simbase.timing import NS_PER_MS
 from tests.p2os.client.served_robot import QUICK, TIMEOUT_S, Recorder, ServedRobot, until
 
 CLOSING_COMMANDS = [stop(), vel(0), enable(False), Command(CommandNumber.CLOSE)]

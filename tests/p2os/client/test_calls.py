@@ -12,7 +12,7 @@ from p2os.client.core import RobotCore
 from p2os.errors import LocalProtocolError, UsageError
 from p2os.protocol.commands import Command
 from p2os.protocol.commands import CommandNumber as C
-from p2os.timing import Nanos
+from simbase.timing import Nanos
 from tests.p2os.client.client_rig import Rig
 
 

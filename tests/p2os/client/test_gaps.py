@@ -15,9 +15,9 @@ from p2os.client.goals import DriveAxis
 from p2os.client.line import Line
 from p2os.protocol.commands import Command, CommandNumber, stop, vel
 from p2os.protocol.frames import Decoder, Frame
-from p2os.timing import NS_PER_MS, NS_PER_S, Nanos
 from p2os.transport.ports import HungUpError
 from p2os.transport.wall_clock import GAP_NS, wall_clock
+from simbase.timing import NS_PER_MS, NS_PER_S, Nanos
 from tests.p2os.client.client_rig import new_pioneer
 from tests.p2os.client.served_robot import QUICK, Recorder, ServedRobot, until
 

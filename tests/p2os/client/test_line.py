@@ -16,8 +16,8 @@ from p2os.client.robot_state import Link
 from p2os.client.settings import ClientSettings
 from p2os.errors import TransportError
 from p2os.protocol.commands import enable, rvel, stop, vel
-from p2os.timing import NS_PER_MS
 from p2os.transport.ports import Transport
+from simbase.timing import NS_PER_MS
 from tests.p2os.client.client_rig import Rig
 from tests.p2os.client.served_robot import QUICK, Recorder, ServedRobot, until
 

@@ -16,7 +16,7 @@ from p2os.client.notices import (
 from p2os.client.settings import BAUDS, ClientSettings
 from p2os.protocol.commands import Command, CommandNumber, enable, rvel, stop, vel
 from p2os.protocol.frames import Decoder, Frame
-from p2os.timing import NS_PER_S
+from simbase.timing import NS_PER_S
 from tests.p2os.client.client_rig import MS, WIRES, Link, Rig, S, new_pioneer
 
 STOPS = [stop(), vel(0), rvel(0)]

@@ -21,7 +21,7 @@ from p2os.protocol.packets import RawPacket
 from p2os.protocol.profiles import Profile
 from p2os.protocol.sip import SonarReading, StandardSip
 from p2os.robots.parameters import ParametersError, RobotParameters
-from p2os.timing import NS_PER_S
+from simbase.timing import NS_PER_S
 from tests.p2os.client.client_rig import Rig, new_pioneer, parameters
 
 P2DX = parameters()

@@ -25,7 +25,7 @@ from p2os.protocol.commands import Command, CommandNumber, enable, stop, vel
 from p2os.protocol.packets import EncoderPacket, IoPacket, RawPacket, SerauxPacket, StandardSip
 from p2os.protocol.profiles import Profile
 from p2os.robots.parameters import ParametersError
-from p2os.timing import NS_PER_MS
+from simbase.timing import NS_PER_MS
 from tests.p2os.client.served_robot import QUICK, Recorder, ServedRobot, until
 
 CLOSING_COMMANDS = [stop(), vel(0), enable(False), Command(CommandNumber.CLOSE)]

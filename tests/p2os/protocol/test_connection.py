@@ -36,7 +36,7 @@ from p2os.protocol.frames import Decoder, Frame
 from p2os.protocol.packets import Identity, RawPacket
 from p2os.protocol.profiles import Profile
 from p2os.protocol.sip import StandardSip
-from p2os.timing import NS_PER_MS, NS_PER_S
+from simbase.timing import NS_PER_MS, NS_PER_S
 
 MS = NS_PER_MS
 WILMA = Identity("Wilma", "Pioneer", "p2dx")

@@ -23,7 +23,7 @@ from p2os.protocol.connection import (
     Event,
     WatchdogExpired,
 )
-from p2os.timing import NS_PER_S, Nanos
+from simbase.timing import NS_PER_S, Nanos
 
 CAPTURES = Path(__file__).resolve().parents[2] / "golden" / "captures"
 NAMES = ["aria_p2de", "player_p2de"]

@@ -19,7 +19,7 @@ from p2os.protocol.frames import (
     Stalled,
     checksum,
 )
-from p2os.timing import NS_PER_MS
+from simbase.timing import NS_PER_MS
 
 GOLDEN = Path(__file__).parents[2] / "golden"
 VECTORS = json.loads((GOLDEN / "p2os_vectors.json").read_text(encoding="utf-8"))

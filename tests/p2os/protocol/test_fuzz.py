@@ -23,7 +23,7 @@ from p2os.protocol.connection import Connection, ConnectionRole
 from p2os.protocol.frames import MAX_COUNT, PREFIX_BYTES, BadChecksum, Decoder, Frame
 from p2os.protocol.packets import packet_frame, read_packet
 from p2os.protocol.profiles import Profile
-from p2os.timing import NS_PER_MS
+from simbase.timing import NS_PER_MS
 
 ROOT = Path(__file__).resolve().parents[3]
 CAPTURES = ROOT / "tests" / "golden" / "captures"

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from p2os.protocol.odometry import PLAYER_POSITION_MODULUS, POSITION_MODULUS, Odometry
 from p2os.protocol.sip import StandardSip
 from p2os.robots.parameters import load_parameters
-from p2os.timing import NS_PER_MS, NS_PER_S
+from simbase.timing import NS_PER_MS, NS_PER_S
 
 P2DX = load_parameters("p2dx")
 CYCLE_NS = 100 * NS_PER_MS

@@ -53,7 +53,7 @@ from p2os.pioneer.sonar.ring import cones, reading
 from p2os.pioneer.world.model import Obstacle, Pose, Walker, World
 from p2os.pioneer.world.plan import Bands, Plan, StaticPlan
 from p2os.robots.parameters import RobotParameters
-from p2os.timing import NS_PER_S, Nanos
+from simbase.timing import NS_PER_S, Nanos
 
 #: Bullet keeps contact points a little apart; touching is no farther than this, m.
 TOUCH_M = 1e-4

@@ -9,7 +9,7 @@ from types import ModuleType
 
 from p2os.pioneer.body.contract import STEP_NS
 from p2os.pioneer.body.physical import GRAVITY_MPS2
-from p2os.timing import NS_PER_S
+from simbase.timing import NS_PER_S
 
 _STANDARD_OUTPUT, _STANDARD_ERROR = 1, 2
 #: Added to the diagonal of the contact problem, which the direct solver needs.

@@ -47,7 +47,7 @@ from p2os.pioneer.sonar.ring import cones, reading
 from p2os.pioneer.world.model import Obstacle, Pose, Walker, World
 from p2os.pioneer.world.plan import Plan, StaticPlan
 from p2os.robots.parameters import RobotParameters
-from p2os.timing import NS_PER_S, Nanos
+from simbase.timing import NS_PER_S, Nanos
 
 #: All that MuJoCo needs to go on alike.
 _STATE = mujoco.mjtState.mjSTATE_INTEGRATION

@@ -10,7 +10,7 @@ import mujoco
 
 from p2os.pioneer.body.contract import STEP_NS
 from p2os.pioneer.body.physical import GRAVITY_MPS2
-from p2os.timing import NS_PER_S
+from simbase.timing import NS_PER_S
 
 #: Stiffness and damping of a contact, 1/s² and 1/s, in MuJoCo's direct form (negative). What has come into another
 #: is eased out at 10 /s. Stiffer (measured: ten times) flings a robot away that was put into a thing, and with twice

@@ -10,7 +10,7 @@ from p2os.protocol.commands import CommandNumber as C
 from p2os.protocol.frames import Decoder, Frame
 from p2os.protocol.profiles import Profile
 from p2os.protocol.sip import SIP_KINDS, StandardSip
-from p2os.timing import NS_PER_MS, NS_PER_S
+from simbase.timing import NS_PER_MS, NS_PER_S
 
 MakeRobot = Callable[..., Any]
 Said = Sequence[tuple[float, bytes]]

@@ -26,7 +26,7 @@ from p2os.protocol.connection import (
     SipReceived,
     Synchronised,
 )
-from p2os.timing import NS_PER_MS, NS_PER_S
+from simbase.timing import NS_PER_MS, NS_PER_S
 
 MakeRobot = Callable[..., Any]
 Capture = list[tuple[float, bytes]]

@@ -18,7 +18,7 @@ from p2os.pioneer.sonar.errors import measure_ranges
 from p2os.protocol.commands import CommandNumber as C
 from p2os.protocol.profiles import Profile
 from p2os.robots.parameters import load_parameters
-from p2os.timing import NS_PER_MS
+from simbase.timing import NS_PER_MS
 
 MakeRobot = Callable[..., Any]
 P2DX = load_parameters("p2dx")

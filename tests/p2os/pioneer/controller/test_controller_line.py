@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from p2os.pioneer.serve.paced_line import LUMP, PacedLine
 from p2os.protocol.commands import CommandNumber as C
 from p2os.protocol.profiles import Profile
-from p2os.timing import NS_PER_MS, NS_PER_S
+from simbase.timing import NS_PER_MS, NS_PER_S
 
 MakeRobot = Callable[..., Any]
 #: One character, 8N1, at 9600 bit/s.

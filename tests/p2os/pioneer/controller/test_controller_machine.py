@@ -13,7 +13,7 @@ from p2os.pioneer.sensor_errors import REALISTIC
 from p2os.protocol.commands import CommandNumber as C
 from p2os.protocol.profiles import Profile
 from p2os.robots.parameters import load_parameters
-from p2os.timing import NS_PER_MS, NS_PER_S
+from simbase.timing import NS_PER_MS, NS_PER_S
 from tests.p2os.conftest import Robot
 
 P2DX = load_parameters("p2dx")

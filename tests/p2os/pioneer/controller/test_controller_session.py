@@ -13,7 +13,7 @@ from p2os.protocol.frames import Frame
 from p2os.protocol.packets import Identity
 from p2os.protocol.profiles import Profile
 from p2os.protocol.sip import STANDING
-from p2os.timing import NS_PER_MS, NS_PER_S, NS_PER_US
+from simbase.timing import NS_PER_MS, NS_PER_S, NS_PER_US
 
 MakeRobot = Callable[..., Any]
 

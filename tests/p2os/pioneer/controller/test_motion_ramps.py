@@ -5,7 +5,7 @@ from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, initialize, invariant, rule
 
 from p2os.pioneer.controller.motion import Mode, Motion, MotionLimits
-from p2os.timing import NS_PER_MS
+from simbase.timing import NS_PER_MS
 
 LIMITS = MotionLimits(
     top_velocity_mm_s=2200,

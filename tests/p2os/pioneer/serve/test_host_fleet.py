@@ -21,8 +21,8 @@ from p2os.protocol.commands import Command
 from p2os.protocol.commands import CommandNumber as C
 from p2os.protocol.frames import Decoder, Frame
 from p2os.protocol.sip import SIP_KINDS
-from p2os.timing import NS_PER_MS, NS_PER_S
 from p2os.transport import Listener, Loops, Transport, listen_url, open_url
+from simbase.timing import NS_PER_MS, NS_PER_S
 
 #: A bound on every wait; reached only when something is broken.
 PATIENCE_S = 30.0

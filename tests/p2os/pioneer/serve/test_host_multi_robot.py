@@ -14,8 +14,8 @@ from p2os.pioneer.world.model import Pose
 from p2os.protocol.commands import Command
 from p2os.protocol.commands import CommandNumber as C
 from p2os.robots.parameters import load_parameters
-from p2os.timing import NS_PER_MS
 from p2os.transport import Loops, Transport, open_url
+from simbase.timing import NS_PER_MS
 
 P2DX = load_parameters("p2dx")
 FACING = (Pose(-0.6, 0.3, 0.0), Pose(0.6, 0.3, math.pi))

@@ -17,8 +17,8 @@ from p2os.protocol.commands import Command
 from p2os.protocol.commands import CommandNumber as C
 from p2os.protocol.frames import Decoder, Frame
 from p2os.protocol.sip import SIP_KINDS
-from p2os.timing import NS_PER_MS
 from p2os.transport import HungUpError, Listener, Loops, Transport, listen_url, open_url
+from simbase.timing import NS_PER_MS
 
 #: A bound on every wait; reached only when something is broken.
 PATIENCE_S = 10.0

@@ -19,7 +19,7 @@ from p2os.pioneer.world.model import Pose, World
 from p2os.protocol.commands import Command
 from p2os.protocol.commands import CommandNumber as C
 from p2os.robots.parameters import load_parameters
-from p2os.timing import NS_PER_MS
+from simbase.timing import NS_PER_MS
 
 P2DX = load_parameters("p2dx")
 HALL = parse_world('name = "hall"\nextent_m = [-4, -4, 4, 4]', "hall")
