@@ -24,6 +24,7 @@ FORBIDDEN_IN_CORE = {
 #: Longest matching prefix wins. Values: what may be imported beside the standard library and the package itself.
 ALLOWED = {
     "p2os": {"construct"},
+    "p2os.installation": {"packaging"},
     "p2os.transport": {"construct", "serial"},
     "p2os.cli": {"construct", "typer", "rich", "click", "serial"},
     "p2os.capture.formats.arrow_files": {"pyarrow"},
@@ -59,7 +60,7 @@ IO_LAYER = (
 #: The map of ARCHITECTURE.md, lowest first: a package imports none of its own row and none above it.
 LAYERS = {
     "p2os": (
-        ("timing", "errors"), ("toml_file",), ("robots", "gamepad"), ("protocol",), ("transport",),
+        ("installation",), ("timing", "errors"), ("toml_file",), ("robots", "gamepad"), ("protocol",), ("transport",),
         ("capture", "client", "pioneer"), ("cli",), ("__main__",),
     ),
     "bluepill_sim": (
