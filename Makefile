@@ -27,7 +27,9 @@ $(STAMP): pyproject.toml setup.py constraints.txt $(COMPILED)
 	@touch $@
 
 demo: setup
-	$(BIN)/p2os demo
+	@$(BIN)/p2os demo; status=$$?; \
+	    echo; echo "type next:  . $(BIN)/activate    (p2os is then on your PATH in this terminal)"; \
+	    echo "then:       p2os doctor"; exit $$status
 
 test: lint type unit
 
