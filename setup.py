@@ -28,6 +28,7 @@ class BuildParts(build_ext):
             note = self._note(part.name)
             note.unlink(missing_ok=True)
             if part.name in self.left_out:
+                self._remove(part.name)
                 note.parent.mkdir(parents=True, exist_ok=True)
                 note.write_text(f"{self.left_out[part.name]}\n", encoding="utf-8")
 
@@ -37,6 +38,7 @@ class BuildParts(build_ext):
             reason = self._reason_against(part)
             if reason:
                 self.left_out[part.name] = reason
+                self._remove(part.name)
                 self.warn(f"{part.name} is left out: {reason}")
         self.extensions = [part for part in self.extensions if part.name not in self.left_out]
         super().build_extensions()
@@ -71,6 +73,10 @@ class BuildParts(build_ext):
             pass
         command = getattr(self.compiler, attribute, None)
         return f"no {language} compiler was found" if command and shutil.which(command[0]) is None else ""
+
+    def _remove(self, name: str) -> None:
+        """Remove what an earlier build has left, or it would be installed."""
+        Path(self.get_ext_fullpath(name)).unlink(missing_ok=True)
 
     def _note(self, name: str) -> Path:
         return Path(self.get_ext_fullpath(name)).with_name(f"{name.rpartition('.')[2]}.left_out")

@@ -38,7 +38,7 @@ def install_command(extra: str = "", *, python: str = "") -> str:
     environment = {"extra": extra} | ({"python_version": python} if python else {})
     for one in named:
         if one.marker and not one.marker.evaluate(environment):
-            return f"{one.name} is to be had only where {str(one.marker).removesuffix(f' and {condition}')}"
+            return f"{one.name} needs {str(one.marker).removesuffix(f' and {condition}')}"
     return f"{_pip_install()} {' '.join(one.name for one in named)}"
 
 

@@ -9,6 +9,8 @@ import os
 import re
 import shutil
 import subprocess
+import sys
+import sysconfig
 import tarfile
 import tomllib
 import venv
@@ -230,6 +232,9 @@ def test_a_part_that_does_not_compile_fails_the_build(builder: Path, unpacked: P
 def test_a_part_that_is_left_out_leaves_its_reason(
     builder: Path, unpacked: Path, tmp_path: Path, environment: dict[str, str], reason: str
 ) -> None:
+    folder = unpacked / "build" / f"lib.{sysconfig.get_platform()}-{sys.implementation.cache_tag}" / "bluepill_sim"
+    folder.mkdir(parents=True)
+    (folder / f"_native{sysconfig.get_config_var('EXT_SUFFIX')}").write_text("of an earlier build")
     done = build(builder, unpacked, "wheel", tmp_path / "out", **environment)
     with zipfile.ZipFile(built(done, tmp_path / "out")) as archive:
         assert not [name for name in archive.namelist() if name.endswith(".so")]

@@ -39,7 +39,7 @@ def pip_is_this_pythons(monkeypatch: pytest.MonkeyPatch) -> None:
         ("", "", "pip install pyserial"),
         ("sim", "", "pip install unicorn pyelftools"),
         ("bullet", "3.11", "pip install pybullet numpy"),
-        ("bullet", "3.13", 'pybullet is to be had only where python_version < "3.12"'),
+        ("bullet", "3.13", 'pybullet needs python_version < "3.12"'),
     ],
 )
 def test_the_packages_of_an_extra_are_named_for_p2os_is_on_no_index(extra: str, python: str, command: str) -> None:

@@ -124,7 +124,7 @@ def test_doctor_says_why_a_part_was_not_compiled(
 
 def test_doctor_knows_which_pythons_have_no_bullet() -> None:
     findings = {finding.name: finding for finding in doctor.examine(python=(3, 13))}
-    assert findings["pybullet"].get == 'pybullet is to be had only where python_version < "3.12"'
+    assert findings["pybullet"].get == 'pybullet needs python_version < "3.12"'
     assert "install numpy" in findings["numpy"].get
     findings = {finding.name: finding for finding in doctor.examine(python=(3, 10))}
     assert findings["python"].found is None
