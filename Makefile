@@ -18,7 +18,7 @@ setup: $(STAMP)
 
 # PyBullet has no wheels beyond Python 3.11: elsewhere the extra installs NumPy
 # alone, and everything but the `bullet` body works.
-$(STAMP): pyproject.toml constraints.txt $(COMPILED)
+$(STAMP): pyproject.toml setup.py constraints.txt $(COMPILED)
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || \
 	    { echo "make: Python 3.11 or newer is needed (hint: make PYTHON=/path/to/python3.11)"; exit 2; }
 	@test -x $(BIN)/python || $(PYTHON) -m venv $(VENV) || \
@@ -27,7 +27,9 @@ $(STAMP): pyproject.toml constraints.txt $(COMPILED)
 	@touch $@
 
 demo: setup
-	$(BIN)/p2os demo
+	@$(BIN)/p2os demo; status=$$?; \
+	    echo; echo "type next:  . $(BIN)/activate    (p2os is then on your PATH in this terminal)"; \
+	    echo "then:       p2os doctor"; exit $$status
 
 test: lint type unit
 

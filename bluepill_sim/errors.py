@@ -26,7 +26,17 @@ class ImageError(BluePillError):
 
 
 class MissingDependencyError(BluePillError):
-    """A library that the emulator needs is not installed."""
+    """A library that the emulator needs is not installed.
+
+    Args:
+        message: one line: what needs it.
+        extra: the extra that brings it; a command line says how that is installed.
+        hint: one line: what to try, or None.
+    """
+
+    def __init__(self, message: str, *, extra: str | None = None, hint: str | None = None) -> None:
+        super().__init__(message, hint=hint)
+        self.extra = extra
 
 
 class UnmodelledError(BluePillError):

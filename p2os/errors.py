@@ -4,6 +4,8 @@ Line noise, lost bytes and unknown packet types are events and counters, never
 errors. Whatever is raised here reaches a person as one line and one hint.
 """
 
+from p2os.installation import install_command
+
 
 class P2osError(Exception):
     """The root of the tree.
@@ -42,9 +44,20 @@ class ScenarioError(FileError):
 
 
 class MissingDependencyError(P2osError):
-    """An optional extra is not installed."""
+    """Something is not installed.
+
+    Args:
+        message: What needs it.
+        extra: The extra of pyproject.toml that brings it, "" for what every verb needs; the hint then is the command
+            that installs its packages.
+        hint: What else to try.
+    """
 
     exit_code = 2
+
+    def __init__(self, message: str, *, extra: str | None = None, hint: str | None = None) -> None:
+        ways = [] if extra is None else [install_command(extra)]
+        super().__init__(message, hint=", or ".join([*ways, *([hint] if hint else [])]) or None)
 
 
 class LocalProtocolError(P2osError):

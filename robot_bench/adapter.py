@@ -353,7 +353,7 @@ def _library() -> Any:
     if spec is None or spec.origin is None:
         raise MissingDependencyError(
             "the adapter's firmware core is not built",
-            hint="install a C++17 compiler (apt-get install g++) and the package again",
+            hint="p2os doctor says why",
         )
     library = ctypes.CDLL(spec.origin)
     for name, kinds in _FUNCTIONS.items():

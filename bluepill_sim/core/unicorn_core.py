@@ -494,9 +494,7 @@ def load_library() -> UnicornLibrary:
         import unicorn
         from unicorn.unicorn_py3.unicorn import uclib
     except ImportError as error:
-        raise MissingDependencyError(
-            f"the BluePill needs the unicorn library: {error}", hint="pip install 'p2os[sim]'"
-        ) from error
+        raise MissingDependencyError(f"the BluePill needs the unicorn library: {error}", extra="sim") from error
     # PyDLL keeps the interpreter lock: the engine calls back into Python at each
     # block, and taking the lock there costs as much as the callback.
     library = ctypes.PyDLL(uclib._name)  # noqa: SLF001 - the only place where the binding keeps the path

@@ -1,7 +1,7 @@
 """The native core's shared library: found next to the package, loaded by ctypes.
 
-It is built with the package where there is a C compiler (`pip install` does not
-mention it if not). `P2OS_CORE=python` in the environment chooses the Python
+It is built with the package where there is a C compiler (`p2os doctor` says why it
+is not there). `P2OS_CORE=python` in the environment chooses the Python
 executor, `P2OS_CORE=native` insists on this one.
 """
 
@@ -16,7 +16,6 @@ from bluepill_sim.native.state import Shared
 
 #: The name of the environment variable, and what it may hold.
 CORE_VARIABLE, CORE_CHOICES = "P2OS_CORE", ("native", "python")
-_HINT = "install a C compiler, then the package again"
 
 UNKNOWN_BLOCK = ctypes.CFUNCTYPE(None, ctypes.c_uint32, ctypes.c_uint32)
 READ = ctypes.CFUNCTYPE(ctypes.c_uint32, ctypes.c_uint32, ctypes.c_uint32, ctypes.c_uint32)
@@ -98,7 +97,7 @@ def is_native_wanted() -> bool:
             hint=f"{CORE_VARIABLE} is {' or '.join(CORE_CHOICES)}, or not set",
         )
     if choice == "native" and library_path() is None:
-        raise MissingDependencyError("the native core is not built", hint=_HINT)
+        raise MissingDependencyError("the native core is not built", hint="p2os doctor says why")
     return choice != "python" and library_path() is not None
 
 
@@ -118,7 +117,7 @@ def library() -> ctypes.PyDLL:
     """
     where = library_path()
     if where is None:
-        raise MissingDependencyError("the native core is not built", hint=_HINT)
+        raise MissingDependencyError("the native core is not built", hint="p2os doctor says why")
     loaded = ctypes.PyDLL(where)  # keeps the interpreter's lock: callbacks come often
     for name, signature in _FUNCTIONS.items():
         function = getattr(loaded, name)

@@ -201,9 +201,7 @@ def _parse_elf(data: bytes, name: str, digest: str) -> Image:
         from elftools.construct.core import ConstructError
         from elftools.elf.elffile import ELFFile
     except ImportError as error:
-        raise MissingDependencyError(
-            f"{name}: reading ELF needs pyelftools: {error}", hint="pip install 'p2os[sim]'"
-        ) from error
+        raise MissingDependencyError(f"{name}: reading ELF needs pyelftools: {error}", extra="sim") from error
     try:
         elf = ELFFile(io.BytesIO(data))
         machine = elf["e_machine"]
@@ -262,9 +260,7 @@ def _parse_hex(data: bytes, name: str, digest: str) -> Image:
     try:
         from intelhex import IntelHex, IntelHexError
     except ImportError as error:
-        raise MissingDependencyError(
-            f"{name}: reading Intel HEX needs intelhex: {error}", hint="pip install 'p2os[sim]'"
-        ) from error
+        raise MissingDependencyError(f"{name}: reading Intel HEX needs intelhex: {error}", extra="sim") from error
     reader = IntelHex()
     try:
         reader.loadhex(io.StringIO(data.decode("ascii")))

@@ -70,9 +70,7 @@ def read_lines(image: Image) -> LineTable:
         from elftools.construct.core import ConstructError
         from elftools.elf.elffile import ELFFile
     except ImportError as error:
-        raise MissingDependencyError(
-            f"source lines need pyelftools: {error}", hint="pip install 'p2os[sim]'"
-        ) from error
+        raise MissingDependencyError(f"source lines need pyelftools: {error}", extra="sim") from error
     try:
         elf = ELFFile(io.BytesIO(data))
         if not elf.has_dwarf_info():

@@ -11,10 +11,14 @@ import sys
 from collections.abc import Callable
 from dataclasses import asdict, dataclass
 from importlib.metadata import PackageNotFoundError, version
+from importlib.resources import files
 from importlib.util import find_spec
+from pathlib import Path
 from typing import Annotated
 
 import typer
+
+from p2os.installation import install_command, reinstall_command
 
 HELP = """Show what is installed, what is missing and how to get it.
 
@@ -26,20 +30,18 @@ Examples:
 Ends with exit code 1 when something is missing that every verb needs.
 """
 
-#: PyBullet has no wheels for later versions than 3.11.
 LOWEST_PYTHON = (3, 11)
-FIRST_PYTHON_WITHOUT_BULLET = (3, 12)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Need:
-    """Something that a feature needs."""
+    """Something that a feature needs; a package is of an extra, or, with "", needed by every verb."""
 
     name: str
     kind: str
     feature: str
-    get: str
-    required: bool = False
+    extra: str = ""
+    get: str = ""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -54,30 +56,27 @@ class Finding:
     required: bool
 
 
-_COMPILER = "install g++ (sudo apt-get install g++), then the package again"
-_BASE, _SIM, _BULLET = "pip install p2os", "pip install 'p2os[sim]'", "pip install 'p2os[bullet]'"
-_EXPORT = "pip install 'p2os[export]'"
-
 NEEDS = (
-    Need(name="pyserial", kind="package", feature="serial ports", get=_BASE, required=True),
-    Need(name="construct", kind="package", feature="the P2OS protocol", get=_BASE, required=True),
-    Need(name="typer", kind="package", feature="this command", get=_BASE, required=True),
-    Need(name="rich", kind="package", feature="tables and progress bars", get=_BASE, required=True),
-    Need(name="unicorn", kind="package", feature="the emulated BluePill", get=_SIM),
-    Need(name="pyelftools", kind="package", feature="ELF programs and their symbols", get=_SIM),
-    Need(name="intelhex", kind="package", feature="Intel HEX programs", get=_SIM),
-    Need(name="matplotlib", kind="package", feature="plots of a run", get=_SIM),
-    Need(name="pybullet", kind="package", feature="--body bullet", get=_BULLET),
-    Need(name="mujoco", kind="package", feature="--body mujoco", get="pip install 'p2os[mujoco]'"),
-    Need(name="numpy", kind="package", feature="--body bullet, --body mujoco", get=_BULLET),
-    Need(name="pyarrow", kind="package", feature="export to Parquet and Arrow", get=_EXPORT),
-    Need(name="mcap", kind="package", feature="export to MCAP", get=_EXPORT),
+    Need(name="pyserial", kind="package", feature="serial ports"),
+    Need(name="construct", kind="package", feature="the P2OS protocol"),
+    Need(name="typer", kind="package", feature="this command"),
+    Need(name="rich", kind="package", feature="tables and progress bars"),
+    Need(name="packaging", kind="package", feature="hints like those of this table"),
+    Need(name="unicorn", kind="package", feature="the emulated BluePill", extra="sim"),
+    Need(name="pyelftools", kind="package", feature="ELF programs and their symbols", extra="sim"),
+    Need(name="intelhex", kind="package", feature="Intel HEX programs", extra="sim"),
+    Need(name="matplotlib", kind="package", feature="plots of a run", extra="sim"),
+    Need(name="pybullet", kind="package", feature="--body bullet", extra="bullet"),
+    Need(name="mujoco", kind="package", feature="--body mujoco", extra="mujoco"),
+    Need(name="numpy", kind="package", feature="--body bullet, --body mujoco", extra="columns"),
+    Need(name="pyarrow", kind="package", feature="export to Parquet and Arrow", extra="export"),
+    Need(name="mcap", kind="package", feature="export to MCAP", extra="export"),
     Need(name="tshark", kind="program", feature="captures on the command line", get="sudo apt-get install tshark"),
     Need(
-        name="bluepill_sim._native", kind="built", feature="the emulated BluePill at full speed", get=_COMPILER,
+        name="bluepill_sim._native", kind="built", feature="the emulated BluePill at full speed",
     ),
     Need(
-        name="robot_bench._adapter_firmware", kind="built", feature="--adapter firmware", get=_COMPILER,
+        name="robot_bench._adapter_firmware", kind="built", feature="--adapter firmware",
     ),
     Need(
         name="arm-none-eabi-gcc", kind="program", feature="building BluePill programs",
@@ -109,13 +108,14 @@ def examine(
     ]  # fmt: skip
     finders = {"program": find_program, "package": package_version, "built": built_part}
     for need in NEEDS:
-        found = finders[need.kind](need.name)
-        get = need.get
-        if need.name == "pybullet" and python >= FIRST_PYTHON_WITHOUT_BULLET:
-            get = "use Python 3.11: PyBullet has no wheels for later ones"
+        if need.kind == "package":
+            get = install_command(need.extra, python=".".join(map(str, python)))
+        else:
+            get = need.get or way_to_build(need.name, find_program)
         findings.append(
             Finding(
-                name=need.name, kind=need.kind, found=found, feature=need.feature, get=get, required=need.required
+                name=need.name, kind=need.kind, found=finders[need.kind](need.name), feature=need.feature,
+                get=get, required=need.kind == "package" and not need.extra,
             )
         )  # fmt: skip
     return findings
@@ -130,6 +130,21 @@ def built_part(name: str) -> str | None:
         return None
     is_left_out = name.endswith("._native") and os.environ.get("P2OS_CORE") == "python"
     return "built, not used: P2OS_CORE=python" if is_left_out else "built"
+
+
+def way_to_build(name: str, find_program: Callable[[str], str | None] = shutil.which) -> str:
+    """Return how a part that is compiled with the package is got, and why it was not built when that is known."""
+    package, _, part = name.rpartition(".")
+    folder = Path(str(files(package)))
+    note = folder / f"{part}.left_out"
+    if note.is_file():
+        reason = note.read_text(encoding="utf-8").strip()
+    elif any(folder.glob(f"{part}.*.so")):
+        reason = "it was built for another Python"
+    else:
+        reason = "nothing was built in this folder"
+    compiler = "" if find_program("g++") or find_program("c++") else "sudo apt-get install g++ && "
+    return f"{compiler}{reinstall_command()} ({reason})"
 
 
 def package_version(name: str) -> str | None:
@@ -160,7 +175,7 @@ def doctor(json_output: Annotated[bool, typer.Option("--json", help="Print a JSO
 
 
 def line_of(finding: Finding) -> str:
-    """Return one line of the table."""
+    """Return a line of the table, and of what is missing a second one with the way to get it."""
     state = "ok     " if finding.found is not None else "missing"
-    known = finding.found if finding.found is not None else f"get it: {finding.get}"
-    return f"{state}  {finding.name:<18}  {finding.feature:<31}  {known}"
+    line = f"{state}  {finding.name:<18}  {finding.feature:<31}  {finding.found or ''}".rstrip()
+    return line if finding.found is not None else f"{line}\n         get it: {finding.get}"

@@ -22,6 +22,7 @@ import p2os
 from p2os.cli.printing import restored_output
 from p2os.cli.signals import end_on_signals, ignore_signals, restored_signals
 from p2os.errors import MissingDependencyError
+from p2os.installation import install_command
 
 GROUP = "p2os.verbs"
 EXIT_FAILED = 1
@@ -103,7 +104,8 @@ def report(error: Exception, words: Sequence[str], *, trace: bool = False) -> in
         _print_error(f"hint: p2os {verb} --help" if known else "hint: p2os --help")
         return code
     _print_error(f"p2os: {_one_line(str(error))}")
-    hint = getattr(error, "hint", None)
+    extra = getattr(error, "extra", None)
+    hint = getattr(error, "hint", None) or (install_command(extra) if extra else None)
     if hint:
         _print_error(f"hint: {_one_line(hint)}")
     return code
@@ -156,7 +158,7 @@ def _run(words: list[str], *, trace: bool) -> int:
 def _add_missing(app: typer.Typer, name: str, error: ImportError) -> None:
     lacking = error.name or str(error)
     extra = _EXTRAS.get(lacking.split(".", maxsplit=1)[0])
-    hint = f"pip install 'p2os[{extra}]'" if extra else "p2os doctor"
+    hint = install_command(extra) if extra else "p2os doctor"
 
     @app.command(
         name, help=f"(missing: needs {lacking}; {hint})",

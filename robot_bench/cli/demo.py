@@ -7,6 +7,7 @@ from typing import Annotated
 import typer
 
 from p2os.errors import MissingDependencyError
+from p2os.installation import install_command
 from robot_bench.cli.progress import RunDisplay
 from robot_bench.cli.run import end_with
 from robot_bench.recording.run_folder import make_next_folder
@@ -48,6 +49,6 @@ def best_body() -> str:
         import p2os.pioneer.body.bullet  # noqa: F401 - to see whether it can be
     except (ModuleNotFoundError, MissingDependencyError) as error:
         sys.stderr.write(f"PyBullet is not here ({error}): the robot moves in the plan view (kinematic) instead\n")
-        sys.stderr.write("hint: pip install 'p2os[bullet]' (Python 3.11)\n")
+        sys.stderr.write(f"hint: {install_command('bullet')}\n")
         return "kinematic"
     return "bullet"

@@ -111,7 +111,7 @@ def test_power_nets_have_wide_copper_and_severities_are_the_defaults() -> None:
 @pytest.mark.parametrize("variant", BOARD_VARIANTS)
 def test_committed_gerbers_are_read_back_by_another_library(variant: str) -> None:
     if not gerbers.is_installed():
-        pytest.skip("gerbonara is not installed: the gerbers are not re-read (hint: pip install 'p2os[board]')")
+        pytest.skip("gerbonara is not installed: the gerbers are not re-read (hint: make board-tools)")
     result = suite.gerbers_reread(variant)
     assert result.verdict is Verdict.GOOD, result.detail
 

@@ -59,7 +59,7 @@ def gerbers_reread(variant: str) -> Result:
     if not files:
         return listed("gerbers re-read", variant, ["there is no archive (hint: make board)"], "")
     if not gerbers.is_installed():
-        return skipped("gerbers re-read", variant, "gerbonara is not installed (hint: pip install 'p2os[board]')")
+        return skipped("gerbers re-read", variant, "gerbonara is not installed (hint: make board-tools)")
     reading = gerbers.read(files)
     words = (
         f"{reading.width_mm:g} x {reading.height_mm:g} mm, {reading.copper_layers} copper layers, "

@@ -9,7 +9,7 @@ sip = capture.tables["sip"]
 sip["raw_x"], sip.structured(), sip.ragged["sonar"].columns["raw_range"]
 ```
 
-Needs NumPy (`pip install "p2os[columns]"`).
+Needs NumPy (`pip install numpy`).
 """
 
 from p2os.capture.columns.framing import Damage, find_frames

@@ -14,8 +14,6 @@ from p2os.errors import MissingDependencyError
 ArrowTable: TypeAlias = Any
 ArrowArray: TypeAlias = Any
 
-HINT = "pip install 'p2os[export]'"
-
 
 def to_arrow(table: Table) -> ArrowTable:
     """Return a table as `pyarrow.Table`, the number of each packet in the capture as its first column.
@@ -26,7 +24,7 @@ def to_arrow(table: Table) -> ArrowTable:
     try:
         import pyarrow as pa
     except ImportError as error:
-        raise MissingDependencyError("Arrow tables need pyarrow", hint=HINT) from error
+        raise MissingDependencyError("Arrow tables need pyarrow", extra="export") from error
     found: dict[str, ArrowArray] = {"packet": pa.array(table.packets)}
     found |= _arrays(table.data, table.columns, table.texts)
     for name, ragged in table.ragged.items():

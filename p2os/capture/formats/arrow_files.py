@@ -6,8 +6,6 @@ from typing import Any
 from p2os.capture.table import Table
 from p2os.errors import MissingDependencyError
 
-HINT = "pip install 'p2os[export]', or export to .csv"
-
 
 def write_parquet(table: Table, path: Path) -> None:
     """Write a table as a Parquet file.
@@ -41,5 +39,7 @@ def _columns(table: Table, path: Path) -> Any:
     try:
         import pyarrow as pa
     except ImportError as error:
-        raise MissingDependencyError(f"{path.suffix} files need pyarrow", hint=HINT) from error
+        raise MissingDependencyError(
+            f"{path.suffix} files need pyarrow", extra="export", hint="export to .csv"
+        ) from error
     return pa.table(dict(table.columns))

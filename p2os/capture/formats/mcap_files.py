@@ -33,9 +33,7 @@ def write_mcap(rows: Iterable[ListingRow], path: Path, base_ns: Nanos = 0) -> in
     try:
         from mcap.writer import CompressionType, Writer
     except ImportError as error:
-        raise MissingDependencyError(
-            ".mcap files need mcap", hint="pip install 'p2os[export]', or export to .csv"
-        ) from error
+        raise MissingDependencyError(".mcap files need mcap", extra="export", hint="export to .csv") from error
     channels: dict[str, int] = {}
     count = 0
     with path.open("wb") as file:

@@ -25,8 +25,8 @@ packet, one channel a name, and opens in Foxglove.
 Examples:
   p2os export talk.jsonl talk.csv                    SIPs as CSV
   p2os export talk.jsonl - | head -3                 the same on stdout
-  p2os export talk.jsonl talk.parquet                needs p2os[export]
-  p2os export talk.pcap talk.mcap                    needs p2os[export]
+  p2os export talk.jsonl talk.parquet                needs pyarrow
+  p2os export talk.pcap talk.mcap                    needs mcap
   p2os export runs/dodge-001 vel.csv --only VEL,RVEL what the client of a run sent
 """
 

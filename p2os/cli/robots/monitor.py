@@ -89,7 +89,7 @@ def _show(client: Robot, url: str, lasts_ns: Nanos | None) -> None:
         from rich.console import Console
         from rich.live import Live
     except ImportError as error:  # pragma: no cover - rich comes with every installation
-        raise MissingDependencyError("the dashboard needs rich", hint="pip install rich, or --json") from error
+        raise MissingDependencyError("the dashboard needs rich", extra="", hint="--json") from error
     news: deque[str] = deque(maxlen=NEWS_LINES)
     config = client.config
     quality = LinkQuality(config.sipcycle * NS_PER_MS if config is not None and config.sipcycle else None)

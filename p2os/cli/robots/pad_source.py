@@ -30,9 +30,7 @@ class SdlPad:
             import pygame
             from pygame._sdl2 import controller
         except ImportError as error:
-            raise MissingDependencyError(
-                f"a game pad needs pygame-ce: {error}", hint="pip install 'p2os[pad]'"
-            ) from error
+            raise MissingDependencyError(f"a game pad needs pygame-ce: {error}", extra="pad") from error
         self._pygame: Any = pygame
         pygame.display.init()
         pygame.joystick.init()

@@ -162,7 +162,7 @@ def _write_png(place: World, out: Path) -> None:
         write_png(place, out)
     except ModuleNotFoundError as error:
         raise MissingDependencyError(
-            f"a PNG needs {error.name}", hint=f"--out {out.with_suffix('.svg')}, or pip install 'p2os[sim]'"
+            f"a PNG needs {error.name}", extra="sim", hint=f"--out {out.with_suffix('.svg')}"
         ) from error
 
 

@@ -8,11 +8,8 @@ from p2os.robots.parameters import RobotParameters
 BODY_NAMES = ("kinematic", "bullet", "mujoco")
 
 
-#: How a package that is missing is got, by the body that needs it.
-_HINTS = {
-    "bullet": "pip install 'p2os[bullet]' (Python 3.11), or --body mujoco or kinematic",
-    "mujoco": "pip install 'p2os[mujoco]', or --body kinematic",
-}
+#: What else is there, by the body whose engine is missing; its extra has its name.
+_OTHERS = {"bullet": "--body mujoco or kinematic", "mujoco": "--body kinematic"}
 
 
 def make_body(name: str, world: World, parameters: RobotParameters) -> RobotBody:
@@ -43,4 +40,4 @@ def make_body(name: str, world: World, parameters: RobotParameters) -> RobotBody
 
         return MujocoBody(world, parameters)
     except ModuleNotFoundError as error:
-        raise MissingDependencyError(f"the {name} body needs {error.name}", hint=_HINTS[name]) from error
+        raise MissingDependencyError(f"the {name} body needs {error.name}", extra=name, hint=_OTHERS[name]) from error

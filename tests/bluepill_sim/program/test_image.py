@@ -187,7 +187,7 @@ def test_a_missing_library_is_named_with_its_remedy(module: str, monkeypatch: py
     data = hex_file(0x0800_0000, PROGRAM) if module == "intelhex" else FIRMWARE.read_bytes()
     with pytest.raises(MissingDependencyError) as error:
         BluePill(parse_image(data, "a"))
-    assert error.value.hint == "pip install 'p2os[sim]'"
+    assert error.value.extra == "sim"
     assert error.value.exit_code == 2
 
 

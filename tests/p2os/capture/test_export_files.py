@@ -10,6 +10,7 @@ import pytest
 from p2os.capture import Direction, Reading, capture_of, read_file, rows_of, write_recording
 from p2os.capture.table import from_robot, table_of, write_csv
 from p2os.cli.main import run
+from p2os.installation import install_command
 from p2os.protocol.packets import packet_frame
 from p2os.protocol.profiles import Profile
 from p2os.protocol.sip import SonarReading, StandardSip
@@ -90,7 +91,7 @@ def test_a_missing_package_is_one_line_with_the_way_to_get_it(
     assert run(["export", str(GOLDEN), str(tmp_path / f"talk.{ending}")]) == 2
     said = capsys.readouterr().err.splitlines()
     assert said[0] == f"p2os: .{ending} files need {package.split('.', maxsplit=1)[0]}"
-    assert said[1] == "hint: pip install 'p2os[export]', or export to .csv"
+    assert said[1] == f"hint: {install_command('export')}, or export to .csv"
 
 
 def test_csv_goes_to_stdout_and_names_choose_packets(capsys: Capture) -> None:

@@ -220,11 +220,11 @@ def test_a_terminal_that_is_gone_is_left_and_keeps_nothing_from_stopping(monkeyp
 
 def test_serve_without_pybullet_says_how_to_get_it(monkeypatch: pytest.MonkeyPatch, capsys: Capture) -> None:
     def missing(*_: object) -> None:
-        raise MissingDependencyError("the bullet body needs pybullet", hint="pip install 'p2os[bullet]'")
+        raise MissingDependencyError("the bullet body needs pybullet", hint="go and get it")
 
     monkeypatch.setattr(fleet_order, "make_body", missing)
     assert run(["serve"]) == 2
-    assert capsys.readouterr().err == "p2os: the bullet body needs pybullet\nhint: pip install 'p2os[bullet]'\n"
+    assert capsys.readouterr().err == "p2os: the bullet body needs pybullet\nhint: go and get it\n"
 
 
 def test_a_served_robot_tells_its_host_in_the_same_process(monkeypatch: pytest.MonkeyPatch, capsys: Capture) -> None:

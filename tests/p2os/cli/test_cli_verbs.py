@@ -97,9 +97,35 @@ def test_doctor_tells_what_was_compiled(monkeypatch: pytest.MonkeyPatch) -> None
     assert doctor.built_part("bluepill_sim._native") == "built, not used: P2OS_CORE=python"
 
 
+@pytest.mark.parametrize(
+    ("file", "program", "told"),
+    [
+        ("_part.left_out", "/usr/bin/g++", "pip install --force-reinstall --no-deps -e /src (no C compiler was found)"),
+        (
+            "_part.left_out",
+            None,
+            "sudo apt-get install g++ && pip install --force-reinstall --no-deps -e /src (no",
+        ),
+        ("_part.cpython-27-x86.so", "/usr/bin/g++", "(it was built for another Python)"),
+        ("something.else", "/usr/bin/g++", "(nothing was built in this folder)"),
+    ],
+)
+def test_doctor_says_why_a_part_was_not_compiled(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path, file: str, program: str | None, told: str
+) -> None:
+    (tmp_path / "package").mkdir()
+    (tmp_path / "package" / "__init__.py").touch()
+    (tmp_path / "package" / file).write_text("no C compiler was found\n", encoding="utf-8")
+    monkeypatch.syspath_prepend(str(tmp_path))
+    monkeypatch.setattr(doctor, "reinstall_command", lambda: "pip install --force-reinstall --no-deps -e /src")
+    assert told in doctor.way_to_build("package._part", lambda _name: program)
+    sys.modules.pop("package")
+
+
 def test_doctor_knows_which_pythons_have_no_bullet() -> None:
     findings = {finding.name: finding for finding in doctor.examine(python=(3, 13))}
-    assert "Python 3.11" in findings["pybullet"].get
+    assert findings["pybullet"].get == 'pybullet needs python_version < "3.12"'
+    assert "install numpy" in findings["numpy"].get
     findings = {finding.name: finding for finding in doctor.examine(python=(3, 10))}
     assert findings["python"].found is None
 

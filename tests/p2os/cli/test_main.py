@@ -14,6 +14,7 @@ import typer
 from p2os.cli import main as cli
 from p2os.cli.signals import restored_signals
 from p2os.errors import FileError, TransportError
+from p2os.installation import install_command
 
 GROUP = "p2os.verbs"
 
@@ -148,7 +149,7 @@ sys.exit("p2os.cli.virtual.serve" in sys.modules)
     [
         ("p2os.no_such_module", "p2os.no_such_module", "p2os doctor"),
         ("lacks_unicorn", "unicorn_engine_missing", "p2os doctor"),
-        ("lacks_pybullet", "pybullet", "pip install 'p2os[bullet]'"),
+        ("lacks_pybullet", "pybullet", install_command("bullet")),
     ],
 )
 def test_a_verb_that_cannot_be_imported_says_what_it_lacks_and_others_work(

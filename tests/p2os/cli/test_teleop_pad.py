@@ -140,7 +140,7 @@ def virtual(monkeypatch: pytest.MonkeyPatch) -> Iterator[Callable[[str, int, int
     """Attach SDL's virtual game pad; set("axis", number, value) or set("button", number, value) moves it."""
     monkeypatch.setenv("SDL_VIDEODRIVER", "dummy")
     monkeypatch.setenv("PYGAME_HIDE_SUPPORT_PROMPT", "1")
-    pygame = pytest.importorskip("pygame", reason="pygame-ce is not installed: pip install 'p2os[pad]'")
+    pygame = pytest.importorskip("pygame", reason="pygame-ce is not installed")
     found = list((Path(pygame.__file__).parents[1] / "pygame_ce.libs").glob("libSDL2-2*"))
     if not found:
         pytest.skip("this pygame-ce comes without its own SDL 2")

@@ -11,6 +11,7 @@ from pathlib import Path
 import pytest
 
 from p2os.cli.main import run as p2os
+from p2os.installation import install_command
 from robot_bench.cli.demo import best_body
 from robot_bench.cli.run import capped
 from robot_bench.recording.run_folder import make_next_folder
@@ -265,7 +266,7 @@ def test_demo_without_pybullet_says_so_and_goes_on(
     assert best_body() == "kinematic"
     assert "PyBullet is not here" in capsys.readouterr().err
     assert p2os(["run", "dodge", "--body", "bullet", "--duration", "0.1"]) == 2
-    assert "hint: pip install 'p2os[bullet]'" in capsys.readouterr().err
+    assert f"hint: {install_command('bullet')}" in capsys.readouterr().err
 
 
 def test_an_untried_program_is_capped_unless_told() -> None:

@@ -50,7 +50,7 @@ def told(folder: Path) -> list[object]:
     ("part", "error"),
     [
         ("boot", ChipLacks("the emulator needs unicorn", hint="pip install unicorn")),
-        ("make_body", MissingDependencyError("the bullet body needs PyBullet", hint="pip install 'p2os[bullet]'")),
+        ("make_body", MissingDependencyError("the bullet body needs PyBullet", extra="bullet")),
         ("load_world", ModuleNotFoundError("No module named numpy", name="numpy")),
         ("boot", KeyboardInterrupt()),
         ("boot", ZeroDivisionError("integer modulo by zero")),

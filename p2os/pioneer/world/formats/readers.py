@@ -92,9 +92,7 @@ def _load(module: str) -> object:
     try:
         return import_module(f"p2os.pioneer.world.formats.{module}")
     except ModuleNotFoundError as error:
-        raise MissingDependencyError(
-            f"reading this file needs {error.name}", hint="pip install 'p2os[worlds]'"
-        ) from error
+        raise MissingDependencyError(f"reading this file needs {error.name}", extra="worlds") from error
 
 
 def _known() -> str:

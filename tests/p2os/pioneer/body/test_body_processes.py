@@ -9,6 +9,7 @@ from pathlib import Path
 
 import pytest
 
+from p2os.installation import install_command
 from p2os.pioneer.body.contract import RobotBody
 from p2os.pioneer.body.factory import make_body
 from p2os.pioneer.world import load_world
@@ -118,7 +119,7 @@ def test_the_engine_comes_where_standard_error_is_closed() -> None:
 def test_a_missing_engine_is_named_with_the_way_to_get_it(body: str, missing: str) -> None:
     done = run("-c", MISSING, missing, body)
     assert f"the {body} body needs {missing}" in done.stdout
-    assert f"pip install 'p2os[{body}]'" in done.stdout
+    assert f"{install_command(body)}, or --body" in done.stdout
 
 
 def test_a_blocked_robot_goes_on_when_the_thing_is_taken_away() -> None:

@@ -1,0 +1,94 @@
+"""What pyproject.toml cannot say: how the two parts in C and C++ are built, and the page of the package.
+
+A part that does not compile fails the build. Where there is no compiler, or `P2OS_NATIVE=0` says so, it is left out,
+and a file beside it holds the reason, which `p2os doctor` tells (pip shows nothing of a build that succeeds).
+"""
+
+import os
+import re
+import shutil
+from pathlib import Path
+
+from setuptools import Extension, setup
+from setuptools.command.build_ext import build_ext
+from setuptools.errors import CompileError, PlatformError
+
+README_LINK = re.compile(r"(!?)\[([^]]*)\]\((?!https?:)([^)#]*)[^)]*\)")
+
+
+class BuildParts(build_ext):
+    """Builds the parts that a compiler is there for."""
+
+    def run(self) -> None:
+        """Build, and write down what was left out and why."""
+        self.left_out: dict[str, str] = {}
+        parts = list(self.extensions)
+        super().run()
+        for part in parts:
+            note = self._note(part.name)
+            note.unlink(missing_ok=True)
+            if part.name in self.left_out:
+                self._remove(part.name)
+                note.parent.mkdir(parents=True, exist_ok=True)
+                note.write_text(f"{self.left_out[part.name]}\n", encoding="utf-8")
+
+    def build_extensions(self) -> None:
+        """Build each part, or say on one line why not."""
+        for part in self.extensions:
+            reason = self._reason_against(part)
+            if reason:
+                self.left_out[part.name] = reason
+                self._remove(part.name)
+                self.warn(f"{part.name} is left out: {reason}")
+        self.extensions = [part for part in self.extensions if part.name not in self.left_out]
+        super().build_extensions()
+
+    def build_extension(self, ext: Extension) -> None:
+        """Build a part.
+
+        Raises:
+            CompileError: It does not compile.
+        """
+        try:
+            super().build_extension(ext)
+        except CompileError as error:
+            raise CompileError(
+                f"{ext.name} does not compile: {error} (the compiler's words stand above; "
+                "with P2OS_NATIVE=0 in the environment p2os is installed without it)"
+            ) from error
+
+    def get_outputs(self) -> list[str]:
+        """Return the files that are installed, the notes among them."""
+        return [*super().get_outputs(), *(str(self._note(name)) for name in getattr(self, "left_out", {}))]
+
+    def _reason_against(self, part: Extension) -> str:
+        language, attribute = ("C++", "compiler_cxx") if part.language == "c++" else ("C", "compiler")
+        if os.environ.get("P2OS_NATIVE") == "0":
+            return "P2OS_NATIVE=0 was set"
+        try:
+            self.compiler.initialize()  # Microsoft's is looked for here
+        except PlatformError:
+            return f"no {language} compiler was found"
+        except AttributeError:
+            pass
+        command = getattr(self.compiler, attribute, None)
+        return f"no {language} compiler was found" if command and shutil.which(command[0]) is None else ""
+
+    def _remove(self, name: str) -> None:
+        """Remove what an earlier build has left, or it would be installed."""
+        Path(self.get_ext_fullpath(name)).unlink(missing_ok=True)
+
+    def _note(self, name: str) -> Path:
+        return Path(self.get_ext_fullpath(name)).with_name(f"{name.rpartition('.')[2]}.left_out")
+
+
+def page() -> str:
+    """Return README.md for a page outside the repository: relative links become words, pictures go."""
+    text = README_LINK.sub(
+        lambda found: "" if found[1] else found[2] if found[2] == found[3] else f"{found[2]} (`{found[3]}`)",
+        Path("README.md").read_text(encoding="utf-8"),
+    )
+    return f"{text}\nThe files named here are in the source distribution.\n"
+
+
+setup(cmdclass={"build_ext": BuildParts}, long_description=page(), long_description_content_type="text/markdown")
