@@ -20,7 +20,7 @@ from typing import Protocol, TypeAlias
 from adapter_sim.adapter import AdapterState, AdapterStatus
 from adapter_sim.pinout import Direction, Pinout, WireRole
 from adapter_sim.pins import PinBank
-from p2os.errors import UsageError
+from simbase.errors import UsageError
 from simbase.timing import NS_PER_MS, Nanos, Reached
 
 #: The detector resets the chip however short the dip; a reset is looked for every sample, so this long it lasts here.

@@ -19,8 +19,8 @@ from importlib import resources
 from pathlib import Path
 from typing import TypeVar
 
-from p2os.errors import FileError, shown, shown_name
 from p2os.toml_file import TomlPlaces, read_toml, read_user_text
+from simbase.errors import FileError, shown, shown_name
 
 
 class PinoutError(FileError):

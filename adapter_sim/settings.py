@@ -7,7 +7,7 @@ from dataclasses import dataclass, fields
 from enum import StrEnum
 
 from adapter_sim.codec import BitOrder
-from p2os.errors import UsageError
+from simbase.errors import UsageError
 from simbase.timing import NS_PER_MS, NS_PER_S, Nanos
 
 

@@ -9,7 +9,7 @@ from bisect import bisect_right
 from collections.abc import Sequence
 
 from adapter_sim.pins import PinBank
-from p2os.errors import UsageError
+from simbase.errors import UsageError
 from simbase.timing import NS_PER_MS, Nanos
 
 #: Each change: from when on, and the level; None is released.

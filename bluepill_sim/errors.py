@@ -1,42 +1,20 @@
 """What this package raises, sorted by who can act on it.
 
 Firmware that misbehaves is not an error here: it is a fault report of the
-emulated chip. Any exception that is not a `BluePillError` is a bug in this package.
+emulated chip. Any exception that is not a `P2osError` is a bug in this package.
 """
 
+from simbase.errors import P2osError
 
-class BluePillError(Exception):
-    """The emulator cannot do what was asked.
 
-    Args:
-        message: one line: what failed, with which values, where.
-        hint: one line: what to try, or None.
-    """
+class BluePillError(P2osError):
+    """The emulator cannot do what was asked."""
 
-    #: Exit code of a command that ends with this error.
     exit_code = 2
-
-    def __init__(self, message: str, *, hint: str | None = None) -> None:
-        super().__init__(message)
-        self.hint = hint
 
 
 class ImageError(BluePillError):
     """A firmware file is missing, damaged, or not for this chip."""
-
-
-class MissingDependencyError(BluePillError):
-    """A library that the emulator needs is not installed.
-
-    Args:
-        message: one line: what needs it.
-        extra: the extra that brings it; a command line says how that is installed.
-        hint: one line: what to try, or None.
-    """
-
-    def __init__(self, message: str, *, extra: str | None = None, hint: str | None = None) -> None:
-        super().__init__(message, hint=hint)
-        self.extra = extra
 
 
 class UnmodelledError(BluePillError):

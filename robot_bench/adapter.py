@@ -23,10 +23,10 @@ from adapter_sim.mixing import Speeds
 from adapter_sim.pinout import Pinout, Safe, WireRole
 from adapter_sim.pins import EventCallback, PinBank
 from adapter_sim.settings import AdapterSettings, EncoderAtOpen, MotorMeaning
-from p2os.errors import MissingDependencyError, UsageError
 from p2os.gamepad import PadReport
 from p2os.robots.parameters import RobotParameters
 from robot_bench.scenario.scenario import Scenario
+from simbase.errors import MissingDependencyError, UsageError
 from simbase.timing import NS_PER_S, Nanos, Reached
 
 #: Of adapter_capi.h.

@@ -23,7 +23,7 @@ reached has been acted on by all, in order of time.
 from collections.abc import Callable, Mapping, Sequence
 from typing import Protocol, cast
 
-from p2os.errors import P2osError
+from simbase.errors import P2osError
 from simbase.timing import NS_PER_MS, Nanos, Reached
 
 #: chosen: the pacer's grain; small enough for a live view, large enough to cost nothing.

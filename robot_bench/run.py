@@ -20,8 +20,6 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import TypeVar
 
-from bluepill_sim.errors import BluePillError
-from p2os.errors import P2osError
 from p2os.pioneer.world.model import Pose, World
 from p2os.transport import Transport
 from p2os.transport.wall_clock import Clock, wall_clock
@@ -35,6 +33,7 @@ from robot_bench.remote import RemoteBench
 from robot_bench.report.make import make_artefacts
 from robot_bench.scenario.goals import judge
 from robot_bench.scenario.scenario import Scenario
+from simbase.errors import P2osError
 from simbase.timing import NS_PER_MS, NS_PER_S, Nanos
 
 #: chosen: without pacing, control comes back often enough for progress and signals.
@@ -46,7 +45,6 @@ UNKNOWN_PLACE: Json = {"extent": [-4.0, -4.0, 4.0, 4.0], "obstacles": []}
 #: Exit code of errors that whoever types the command can mend.
 WRONG_USAGE = 2
 #: What the packages under the bench raise on purpose; neither knows the other.
-EXPECTED = (P2osError, BluePillError)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -214,7 +212,7 @@ def _trace_of(scenario: Scenario, folder: Path, *, is_at_port: bool) -> Iterator
             yield trace
         except BaseException as error:
             if not trace.has_end:
-                with contextlib.suppress(*EXPECTED):  # a disk that is full: the first failure is the one to be told
+                with contextlib.suppress(P2osError):  # a disk that is full: the first failure is the one to be told
                     if not trace.has_meta:
                         trace.meta(meta_of(scenario, None, None, is_at_port=is_at_port))
                     trace.flush()
@@ -227,7 +225,7 @@ def _reason(error: BaseException) -> str:
     """Return why a run ended, in one line."""
     if isinstance(error, KeyboardInterrupt):
         return f"interrupted ({error})" if error.args else "interrupted"
-    if isinstance(error, (*EXPECTED, ModuleNotFoundError)):
+    if isinstance(error, (P2osError, ModuleNotFoundError)):
         return str(error)
     return f"this is a bug: {type(error).__name__}: {error}"
 
@@ -261,7 +259,7 @@ def _record(
     except KeyboardInterrupt as interruption:
         was_interrupted = True
         failures.append(_reason(interruption))
-    except EXPECTED as error:
+    except P2osError as error:
         if bench.chip.now_ns == 0 and error.exit_code == WRONG_USAGE:
             raise  # it has not begun: a port of GDB's that is taken
         failures.append(_reason(error))

@@ -9,7 +9,6 @@ import statistics
 import sys
 import time
 
-from p2os.errors import MissingDependencyError
 from p2os.pioneer.body.factory import BODY_NAMES, make_body
 from p2os.pioneer.controller import Pioneer
 from p2os.pioneer.world import load_world, parse_world
@@ -17,6 +16,7 @@ from p2os.pioneer.world.model import Pose
 from p2os.protocol.commands import Command
 from p2os.protocol.commands import CommandNumber as C
 from p2os.robots.parameters import load_parameters
+from simbase.errors import MissingDependencyError
 from simbase.timing import NS_PER_MS, NS_PER_S
 
 P2DX = load_parameters("p2dx")

@@ -33,7 +33,6 @@ from p2os.capture.formats.hex_text import write_hex
 from p2os.capture.formats.pcap import write_pcap
 from p2os.capture.formats.recording import write_recording
 from p2os.capture.formats.sources import read_file
-from p2os.errors import P2osError
 from p2os.pioneer.body.factory import make_body
 from p2os.pioneer.controller import ControllerSettings, Pioneer
 from p2os.pioneer.controller.flash import load_flash
@@ -50,6 +49,7 @@ from robot_bench.report.page import render_page
 from robot_bench.scenario.goals import judge
 from robot_bench.scenario.scenario import Scenario, known_scenarios, read_scenario
 from robot_bench.scenario.world_script import WorldScript
+from simbase.errors import P2osError
 from simbase.timing import NS_PER_MS
 
 ROOT = Path(__file__).resolve().parents[1]

@@ -17,7 +17,6 @@ from pathlib import Path
 
 from p2os.capture import Direction, Reading, capture_of, read_capture, rows_of
 from p2os.capture.explain import explain
-from p2os.errors import FileError, P2osError
 from p2os.pioneer.body.factory import make_body
 from p2os.pioneer.controller import Pioneer
 from p2os.pioneer.world import parse_world
@@ -29,6 +28,7 @@ from p2os.protocol.profiles import Profile
 from p2os.robots.aria_file import aria_table
 from p2os.robots.model_file import build_parameters, table_of
 from p2os.robots.parameters import known_robots, load_parameters, nearest_model
+from simbase.errors import FileError, P2osError
 from simbase.timing import NS_PER_MS, Nanos
 
 ROOT = Path(__file__).resolve().parent.parent

@@ -27,7 +27,7 @@ from dataclasses import dataclass
 from enum import Enum
 from typing import TypeVar, cast
 
-from bluepill_sim.errors import MissingDependencyError
+from simbase.errors import MissingDependencyError
 
 
 class Register(Enum):

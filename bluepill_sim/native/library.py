@@ -11,8 +11,9 @@ from functools import cache
 from importlib.util import find_spec
 from typing import Any
 
-from bluepill_sim.errors import BluePillError, MissingDependencyError
+from bluepill_sim.errors import BluePillError
 from bluepill_sim.native.state import Shared
+from simbase.errors import MissingDependencyError
 
 #: The name of the environment variable, and what it may hold.
 CORE_VARIABLE, CORE_CHOICES = "P2OS_CORE", ("native", "python")

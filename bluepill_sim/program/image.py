@@ -13,9 +13,10 @@ from bisect import bisect_right
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from bluepill_sim.errors import ImageError, MissingDependencyError
+from bluepill_sim.errors import ImageError
 from bluepill_sim.program.wrong_files import wrong_kind
 from bluepill_sim.stm32f103 import FLASH_BASE, FLASH_BYTES_FITTED, SRAM_BASE, SRAM_BYTES
+from simbase.errors import MissingDependencyError
 
 FLASH_END = FLASH_BASE + FLASH_BYTES_FITTED
 #: The stack may start at the very end of the SRAM, not beyond.

@@ -13,10 +13,11 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
-from bluepill_sim.errors import ImageError, MissingDependencyError
+from bluepill_sim.errors import ImageError
 from bluepill_sim.program.elf_file import read_bytes
 from bluepill_sim.program.image import Image
 from bluepill_sim.stm32f103 import FLASH_BYTES_FITTED
+from simbase.errors import MissingDependencyError
 
 _ELF_MAGIC = b"\x7fELF"
 

@@ -6,7 +6,7 @@ import sys
 from importlib.resources import as_file, files
 from pathlib import Path
 
-from p2os.errors import FileError
+from simbase.errors import FileError
 
 NAME = "p2os.lua"
 

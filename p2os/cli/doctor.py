@@ -18,7 +18,7 @@ from typing import Annotated
 
 import typer
 
-from p2os.installation import install_command, reinstall_command
+from simbase.installation import install_command, reinstall_command
 
 HELP = """Show what is installed, what is missing and how to get it.
 

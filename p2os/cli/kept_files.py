@@ -6,7 +6,7 @@ is made of another file (exports, pictures, reports) is made anew.
 
 from pathlib import Path
 
-from p2os.errors import UsageError
+from simbase.errors import UsageError
 
 FORCE_HELP = "Overwrite a file that is there."
 

@@ -21,8 +21,8 @@ import typer
 import p2os
 from p2os.cli.printing import restored_output
 from p2os.cli.signals import end_on_signals, ignore_signals, restored_signals
-from p2os.errors import MissingDependencyError
-from p2os.installation import install_command
+from simbase.errors import MissingDependencyError
+from simbase.installation import install_command
 
 GROUP = "p2os.verbs"
 EXIT_FAILED = 1
@@ -104,9 +104,7 @@ def report(error: Exception, words: Sequence[str], *, trace: bool = False) -> in
         _print_error(f"hint: p2os {verb} --help" if known else "hint: p2os --help")
         return code
     _print_error(f"p2os: {_one_line(str(error))}")
-    extra = getattr(error, "extra", None)
-    hint = getattr(error, "hint", None) or (install_command(extra) if extra else None)
-    if hint:
+    if hint := getattr(error, "hint", None):
         _print_error(f"hint: {_one_line(hint)}")
     return code
 

@@ -24,8 +24,8 @@ from collections import deque
 from collections.abc import Iterator
 from typing import TextIO
 
-from p2os.errors import FileError
 from p2os.transport.wall_clock import wall_clock
+from simbase.errors import FileError
 from simbase.timing import NS_PER_S
 
 #: chosen: some ten thousand lines; minutes of a robot's packets.

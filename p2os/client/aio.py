@@ -32,12 +32,13 @@ from p2os.client.notices import Notice
 from p2os.client.robot_state import Link, RobotState
 from p2os.client.robot_thread import CLOSING_S, MOST_NOTICES, TOUCH_S, Opener
 from p2os.client.settings import ClientSettings
-from p2os.errors import P2osError, TransportError
+from p2os.errors import TransportError
 from p2os.robots.parameters import RobotParameters
 from p2os.transport import open_url
 from p2os.transport.ports import Transport
 from p2os.transport.waiting import BLIND_POLL_S
 from p2os.transport.wall_clock import Clock, wall_clock
+from simbase.errors import P2osError
 from simbase.timing import NS_PER_S, Nanos
 
 __all__ = ["Robot"]

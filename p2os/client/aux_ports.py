@@ -15,9 +15,9 @@ from dataclasses import dataclass
 from p2os.client.core import RobotCore
 from p2os.client.notices import Notice, PacketArrived
 from p2os.client.robot_thread import RobotThread
-from p2os.errors import UsageError
 from p2os.protocol.commands import Command, CommandNumber
 from p2os.protocol.packets import SerauxPacket
+from simbase.errors import UsageError
 
 #: The most bytes that one GETAUX may ask for, and that one TTY2 carries here.
 MOST_WANTED, MOST_WRITTEN = 200, 190

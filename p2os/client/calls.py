@@ -16,13 +16,13 @@ from typing import Protocol, TypeVar
 from p2os.client.core import PacketType, RobotCore
 from p2os.client.notices import LinkLostError
 from p2os.client.robot_state import Limits, Link, RobotPose, RobotState
-from p2os.errors import UsageError
 from p2os.protocol.commands import Command, CommandNumber, sonar
 from p2os.protocol.config_packet import ConfigPacket
 from p2os.protocol.connection import ConnectionStats
 from p2os.protocol.packets import Identity
 from p2os.protocol.profiles import Profile
 from p2os.robots.parameters import RobotParameters
+from simbase.errors import UsageError
 from simbase.timing import Nanos
 
 Result = TypeVar("Result")

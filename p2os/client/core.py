@@ -37,7 +37,6 @@ from p2os.client.observer import Observer, bumpers_of, limits_of
 from p2os.client.outbox import Action
 from p2os.client.robot_state import Limits, Link, RobotPose, RobotState
 from p2os.client.settings import ClientSettings
-from p2os.errors import UsageError
 from p2os.protocol.commands import Command, CommandNumber
 from p2os.protocol.config_packet import ConfigPacket
 from p2os.protocol.connection import ConnectionStats
@@ -58,6 +57,7 @@ from p2os.protocol.packets import (
 from p2os.protocol.profiles import Profile
 from p2os.protocol.sip import StandardSip
 from p2os.robots.parameters import ParametersError, RobotParameters, load_parameters
+from simbase.errors import UsageError
 from simbase.timing import Nanos, Reached
 
 #: Any type of packet, for calls that return the type that they were given.

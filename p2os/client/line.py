@@ -21,12 +21,13 @@ from p2os.client.notices import ConnectError, GaveUp, LinkLostError, MotionError
 from p2os.client.outbox import CloseLine, OpenLine, Send, SetBaud
 from p2os.client.robot_state import Link
 from p2os.client.settings import ClientSettings
-from p2os.errors import P2osError, TransportError
+from p2os.errors import TransportError
 from p2os.protocol.commands import Command, CommandNumber, enable, stop, vel
 from p2os.robots.parameters import RobotParameters, load_parameters
 from p2os.transport.ports import Transport
 from p2os.transport.url import SerialUrl, parse_url
 from p2os.transport.wall_clock import GAP_NS, Clock, GapWatch, wall_clock
+from simbase.errors import P2osError
 from simbase.timing import NS_PER_S, Nanos
 
 #: chosen: more reads a turn than any line fills between two wakes; a flood must not starve the clock.

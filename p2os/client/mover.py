@@ -41,8 +41,9 @@ from p2os.client.notices import (
 from p2os.client.observer import Observer
 from p2os.client.robot_state import Limits, RobotState
 from p2os.client.settings import ClientSettings
-from p2os.errors import LocalProtocolError, UsageError
+from p2os.errors import LocalProtocolError
 from p2os.protocol.commands import Command, CommandNumber, enable, rvel, stop, vel
+from simbase.errors import UsageError
 from simbase.timing import NS_PER_MS, NS_PER_S, Nanos
 
 #: What moves a robot: sent raw, it takes the place of held speeds.

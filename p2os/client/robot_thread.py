@@ -27,10 +27,11 @@ from p2os.client.interrupts import held_back
 from p2os.client.line import Line
 from p2os.client.notices import Notice
 from p2os.client.robot_state import RobotState
-from p2os.errors import P2osError, TransportError
+from p2os.errors import TransportError
 from p2os.transport.ports import Transport
 from p2os.transport.waiting import BLIND_POLL_S, wait_readable
 from p2os.transport.wall_clock import Clock, wall_clock
+from simbase.errors import P2osError
 from simbase.timing import NS_PER_S, Nanos
 
 #: Opens the line that a URL names.

@@ -2,8 +2,8 @@
 
 from dataclasses import dataclass
 
-from p2os.errors import UsageError
 from p2os.protocol.profiles import Profile
+from simbase.errors import UsageError
 from simbase.timing import NS_PER_MS, NS_PER_S, Nanos
 
 #: Baud rates of a Pioneer's HOST port, the likeliest first (Pioneer 3 manual, HOSTBAUD; 9600 is the default).

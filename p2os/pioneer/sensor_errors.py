@@ -19,8 +19,8 @@ from dataclasses import dataclass, fields, replace
 from difflib import get_close_matches
 from pathlib import Path
 
-from p2os.errors import FileError, shown, shown_name
 from p2os.toml_file import TomlPlaces, is_file, read_toml, read_user_text
+from simbase.errors import FileError, shown, shown_name
 
 
 class SensorErrorsError(FileError):

@@ -12,9 +12,9 @@ a front and rear length of 0 are half the length each, as ARIA itself reads them
 import math
 from collections.abc import Callable, Mapping
 
-from p2os.errors import shown
 from p2os.robots.model import ParametersError
 from p2os.robots.model_file import Table, merged, shipped_table
+from simbase.errors import shown
 
 #: How far an angle factor may lie from a power of two a turn and still be meant as it: 0.00153 is 0.26 % off.
 ANGLE_TOLERANCE = 0.005

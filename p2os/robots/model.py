@@ -7,7 +7,7 @@ number; `p2os.robots.parameters` loads them.
 import math
 from dataclasses import dataclass
 
-from p2os.errors import FileError
+from simbase.errors import FileError
 
 
 class ParametersError(FileError):

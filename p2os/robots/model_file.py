@@ -10,9 +10,9 @@ from importlib.resources import files
 from pathlib import Path
 from typing import Any, cast
 
-from p2os.errors import shown, shown_name
 from p2os.robots.model import BodyParameters, Equipment, MotionDefaults, ParametersError, RobotParameters, SonarPose
 from p2os.toml_file import TomlPlaces, TomlSource, find_places, read_toml
+from simbase.errors import shown, shown_name
 
 #: A TOML table.
 Table = dict[str, Any]

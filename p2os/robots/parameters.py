@@ -8,11 +8,11 @@ from dataclasses import dataclass
 from difflib import get_close_matches
 from pathlib import Path
 
-from p2os.errors import shown, shown_name
 from p2os.robots.aria_file import aria_table
 from p2os.robots.model import BodyParameters, Equipment, MotionDefaults, ParametersError, RobotParameters, SonarPose
 from p2os.robots.model_file import build_parameters, file_parameters, known_robots, shipped_table, text_of
 from p2os.toml_file import is_file
+from simbase.errors import shown, shown_name
 
 __all__ = [
     "BodyParameters",

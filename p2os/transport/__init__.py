@@ -5,10 +5,10 @@ Nothing here knows of frames or robots, and nothing below the I/O layer imports 
 
 from pathlib import Path
 
-from p2os.errors import UsageError
 from p2os.transport.loops import Loops
 from p2os.transport.ports import HungUpError, Listener, Transport
 from p2os.transport.url import LoopUrl, PortUrl, PtyUrl, SerialUrl, TcpUrl, parse_url
+from simbase.errors import UsageError
 
 __all__ = [
     "HungUpError",

@@ -7,7 +7,7 @@ everywhere (it is untried on Windows).
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from p2os.errors import UsageError
+from simbase.errors import UsageError
 
 #: The rate at which a Pioneer 2 listens unless set otherwise (Pioneer 2 manual, HOST serial port).
 DEFAULT_BAUD = 9600

@@ -6,13 +6,13 @@ from typing import Annotated
 
 import typer
 
-from p2os.errors import MissingDependencyError
-from p2os.installation import install_command
 from robot_bench.cli.progress import RunDisplay
 from robot_bench.cli.run import end_with
 from robot_bench.recording.run_folder import make_next_folder
 from robot_bench.run import run_scenario
 from robot_bench.scenario.scenario import load_scenario
+from simbase.errors import MissingDependencyError
+from simbase.installation import install_command
 
 HELP = """Watch a BluePill program drive a Pioneer around obstacles, then read what happened.
 

@@ -10,7 +10,7 @@ from typer.core import TyperCommand
 
 from p2os.cli.held_robot import hold_robot
 from p2os.cli.main import EXIT_INTERRUPTED
-from p2os.errors import RunFailedError, UsageError
+from p2os.errors import RunFailedError
 from p2os.transport import open_url
 from robot_bench.cli.gdb import debug_bench, debug_port
 from robot_bench.cli.progress import RunDisplay
@@ -19,6 +19,7 @@ from robot_bench.recording.run_folder import make_next_folder
 from robot_bench.remote import CAUTIOUS_ROTATION_DEG_S, CAUTIOUS_VELOCITY_MM_S
 from robot_bench.run import RunResult, run_at_port, run_scenario
 from robot_bench.scenario.scenario import Scenario, load_scenario
+from simbase.errors import UsageError
 
 HELP = """Run a scenario: the firmware boots on an emulated BluePill and its pins drive a robot.
 

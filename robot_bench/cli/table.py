@@ -7,9 +7,9 @@ from rich.console import Console
 from rich.table import Table
 
 from bluepill_sim.program.last_blocks import title_of
-from p2os.errors import shown
 from robot_bench.recording.summary import LISTED_HITS
 from robot_bench.run import RunResult
+from simbase.errors import shown
 
 
 def print_result(result: RunResult, console: Console | None = None) -> None:

@@ -15,11 +15,11 @@ from dataclasses import dataclass
 from typing import cast
 
 from adapter_sim.codec import BitOrder
-from p2os.errors import UsageError
 from p2os.pioneer.body.contract import BodyState, RobotBody
 from robot_bench.direct.distance import DistanceSensors
 from robot_bench.direct.encoder import WheelEncoder
 from robot_bench.direct.motor import JointMotor
+from simbase.errors import UsageError
 from simbase.timing import NS_PER_MS, Nanos, Reached
 
 UM_PER_M = 1_000_000

@@ -15,7 +15,7 @@ from importlib.util import find_spec
 from pathlib import Path
 
 from adapter_sim.pinout import Pinout, Wire, WireRole, load_pinout
-from p2os.errors import FileError, UsageError, shown, shown_name
+from simbase.errors import FileError, UsageError, shown, shown_name
 
 FIRMWARE = "build/robot.elf"
 SCENARIO = "just-drive.toml"

@@ -17,9 +17,9 @@ import re
 from collections.abc import Iterator
 from pathlib import Path
 
-from p2os.errors import UsageError
 from robot_bench.recording.run_record import TRACE_NAME
 from robot_bench.recording.summary import SUMMARY_NAME
+from simbase.errors import UsageError
 
 #: Where run folders go by default, in the current directory.
 RUNS = Path("runs")

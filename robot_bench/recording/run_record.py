@@ -15,7 +15,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import cast
 
-from p2os.errors import FileError
+from simbase.errors import FileError
 from simbase.timing import NS_PER_S
 
 #: A parsed JSON object.

@@ -28,7 +28,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import IO, cast
 
-from p2os.errors import FileError, LocalProtocolError, RunFailedError
+from p2os.errors import LocalProtocolError, RunFailedError
+from simbase.errors import FileError
 from simbase.timing import NS_PER_S, Nanos
 
 TRACE_NAME = "trace.jsonl"

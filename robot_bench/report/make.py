@@ -15,11 +15,11 @@ import json
 from dataclasses import dataclass
 from pathlib import Path
 
-from p2os.errors import FileError
 from robot_bench.recording.run_record import Json, RunRecord, read_run
 from robot_bench.recording.summary import write_outcome
 from robot_bench.recording.waveforms import write_sigrok, write_vcd
 from robot_bench.report.page import render_page
+from simbase.errors import FileError
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -13,11 +13,12 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import cast
 
-from p2os.errors import ScenarioError, shown
+from p2os.errors import ScenarioError
 from robot_bench.recording.run_record import PoseSample, RunRecord
 from robot_bench.recording.signals import motor_steps
 from robot_bench.recording.summary import cells_entered, distance_m
 from robot_bench.scenario.schema import LONGEST_S, Key, Table, Where, check_table, nearest
+from simbase.errors import shown
 from simbase.timing import NS_PER_MS, NS_PER_S, Nanos
 
 NS_PER_MINUTE = 60 * NS_PER_S

@@ -17,7 +17,7 @@ from typing import cast
 
 from adapter_sim.codec import BitOrder
 from adapter_sim.settings import RENAMED_SETTINGS, AdapterSettings
-from p2os.errors import FileError, ScenarioError, UsageError, shown, shown_name
+from p2os.errors import ScenarioError
 from p2os.pioneer.body.factory import BODY_NAMES
 from p2os.pioneer.controller import ControllerSettings, SonarPerSip
 from p2os.pioneer.controller.flash import load_flash
@@ -32,6 +32,7 @@ from robot_bench.scenario.fault_script import FaultChange, load_faults
 from robot_bench.scenario.goals import Goal, load_goal
 from robot_bench.scenario.schema import LONGEST_S, Key, Place, Table, Where, check_table, in_range, nearest, within
 from robot_bench.scenario.world_script import Change, load_changes, refuse_names
+from simbase.errors import FileError, UsageError, shown, shown_name
 from simbase.timing import NS_PER_MS, NS_PER_S, Nanos
 
 MODES = ("direct", "adapter")

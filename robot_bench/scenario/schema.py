@@ -10,9 +10,10 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
-from p2os.errors import ScenarioError, shown
+from p2os.errors import ScenarioError
 from p2os.pioneer.world.model import RANGES
 from p2os.toml_file import TomlSource
+from simbase.errors import shown
 
 #: chosen: eleven days; a larger number of seconds is a mistake of the unit.
 LONGEST_S = 1_000_000

@@ -27,12 +27,13 @@ from dataclasses import dataclass, field, replace
 from enum import Enum
 from typing import cast
 
-from p2os.errors import ScenarioError, WorldError, shown
+from p2os.errors import ScenarioError, WorldError
 from p2os.pioneer.body.contract import RobotBody
 from p2os.pioneer.world.model import RANGES, Obstacle, Repeat, Walk, World
 from p2os.robots.parameters import RobotParameters
 from robot_bench.scenario.schema import LONGEST_S, Key, Table, Where, check_table, in_range, nearest, within
 from robot_bench.scenario.timeline import Timeline
+from simbase.errors import shown
 from simbase.timing import NS_PER_MS, NS_PER_S, Nanos
 
 #: chosen: the robot moves 10 mm at most in between.

@@ -4,10 +4,10 @@ from dataclasses import replace
 
 import pytest
 
-from p2os.errors import UsageError
 from robot_bench.adapter import FirmwareAdapter, default_settings, is_available, setting_numbers
 from robot_bench.bench import Bench
 from robot_bench.scenario.scenario import Scenario, load_scenario
+from simbase.errors import UsageError
 from simbase.timing import NS_PER_S
 from tests.adapter_fw.builds import load_script
 from tests.adapter_fw.twins import PARAMETERS, PINOUT, AdapterSettings, FakePins

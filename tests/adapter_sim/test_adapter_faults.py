@@ -7,7 +7,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from adapter_sim import Adapter, BrownOut, FaultyPins, Glitch, SlowLoop, StuckPin, Waveforms
-from p2os.errors import UsageError
+from simbase.errors import UsageError
 from tests.adapter_sim.conftest import MS, PINOUT, FakePins, Rig
 
 QUIET = {"deadline": None, "suppress_health_check": [HealthCheck.too_slow]}

@@ -7,8 +7,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from adapter_sim import AdapterSettings, Mixer, MotorMeaning, Speeds, threshold_um
-from p2os.errors import UsageError
 from p2os.robots.parameters import load_parameters
+from simbase.errors import UsageError
 
 STEPS = st.integers(-8, 7)
 

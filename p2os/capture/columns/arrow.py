@@ -8,7 +8,7 @@ import numpy as np
 from p2os.capture.columns.framing import Bytes
 from p2os.capture.columns.table import Table
 from p2os.capture.columns.walker import Column, Ragged, Spans
-from p2os.errors import MissingDependencyError
+from simbase.errors import MissingDependencyError
 
 #: pyarrow has no types of its own that a checker could read.
 ArrowTable: TypeAlias = Any

@@ -4,7 +4,7 @@ from pathlib import Path
 from typing import Any
 
 from p2os.capture.table import Table
-from p2os.errors import MissingDependencyError
+from simbase.errors import MissingDependencyError
 
 
 def write_parquet(table: Table, path: Path) -> None:

@@ -7,7 +7,7 @@ Lines without either belong to one stream whose direction is not given.
 import re
 
 from p2os.capture.chunks import Capture, CaptureBuilder, Direction
-from p2os.errors import FileError
+from simbase.errors import FileError
 
 #: `00000010: fafb 0300 0000 …  text` (xxd) and `00000010  fa fb 03 |text|` (hexdump -C).
 _XXD = re.compile(r"^[0-9a-fA-F]{4,16}:\s(?P<bytes>(?:[0-9a-fA-F]{2,4} ?)+)(?:\s.*)?$")

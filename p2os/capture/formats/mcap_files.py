@@ -11,7 +11,7 @@ from pathlib import Path
 from p2os.capture.chunks import Direction
 from p2os.capture.describe import Plain
 from p2os.capture.listing import ListingRow
-from p2os.errors import MissingDependencyError
+from simbase.errors import MissingDependencyError
 from simbase.timing import Nanos
 
 #: Type of a plain value → its name in JSON Schema.

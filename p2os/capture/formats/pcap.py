@@ -19,7 +19,7 @@ from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
 
 from p2os.capture.chunks import Capture, CaptureBuilder, Chunk, Direction
-from p2os.errors import FileError
+from simbase.errors import FileError
 from simbase.timing import NS_PER_S, NS_PER_US, Nanos
 
 LINKTYPE_USER0 = 147

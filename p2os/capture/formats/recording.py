@@ -11,7 +11,7 @@ import json
 from collections.abc import Mapping
 
 from p2os.capture.chunks import Capture, CaptureBuilder, Chunk, Direction
-from p2os.errors import FileError
+from simbase.errors import FileError
 from simbase.timing import NS_PER_S, Nanos
 
 FORMAT = "p2os-recording"

@@ -6,7 +6,7 @@ from p2os.capture.chunks import Capture, Direction, capture_of
 from p2os.capture.formats.hex_text import looks_like_hex, read_hex
 from p2os.capture.formats.pcap import is_pcap, read_pcap
 from p2os.capture.formats.recording import read_recording
-from p2os.errors import FileError
+from simbase.errors import FileError
 
 #: The P2OS bytes in the folder that `p2os run` makes.
 RUN_WIRE = "wire.jsonl"

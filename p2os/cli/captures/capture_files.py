@@ -13,7 +13,7 @@ from p2os.capture import Chunk
 from p2os.capture.formats.pcap import file_header, record
 from p2os.capture.formats.recording import chunk_line, header_line
 from p2os.capture.listing import FrameCutter
-from p2os.errors import FileError
+from simbase.errors import FileError
 from simbase.timing import Nanos
 
 

@@ -11,8 +11,8 @@ from p2os.capture import Capture, ListingRow, Reading, explain, read_argument, r
 from p2os.capture.explain import lines_of
 from p2os.capture.listing import line_of, summary_of
 from p2os.cli.captures.reading import DIRECTION_HELP, PROFILE_HELP, ROBOT_HELP, direction_of, reading_of
-from p2os.errors import UsageError
 from p2os.protocol.profiles import Profile
+from simbase.errors import UsageError
 from simbase.timing import NS_PER_S
 
 HELP = """Show what stands in P2OS bytes.

@@ -12,8 +12,8 @@ from p2os.capture.formats.arrow_files import write_arrow, write_parquet
 from p2os.capture.formats.mcap_files import write_mcap
 from p2os.capture.table import Table, from_robot, table_of, write_csv
 from p2os.cli.captures.reading import PROFILE_HELP, ROBOT_HELP, reading_of
-from p2os.errors import FileError, UsageError
 from p2os.protocol.profiles import Profile
+from simbase.errors import FileError, UsageError
 
 HELP = """Write a capture as CSV, Parquet, Arrow or MCAP; the file's ending decides.
 

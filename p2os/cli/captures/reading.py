@@ -5,12 +5,12 @@ answer to SYNC2, and the model implies which firmware family it runs.
 """
 
 from p2os.capture import Capture, Direction, Reading, frame_chunks
-from p2os.errors import UsageError
 from p2os.protocol.frames import Frame
 from p2os.protocol.packets import IDENTITY_KIND, Identity
 from p2os.protocol.profiles import Profile
 from p2os.protocol.sip import HEAD_BYTES, READING_BYTES, SIP_KINDS
 from p2os.robots.parameters import ParametersError, RobotParameters, load_parameters
+from simbase.errors import UsageError
 
 ROBOT_HELP = "Robot model, or a TOML file, for units; default: by the capture, else p2dx."
 PROFILE_HELP = "Firmware family, for layouts; default: as the packets look."

@@ -15,12 +15,13 @@ from p2os.capture.tap import Tap
 from p2os.cli.held_robot import hold_robot
 from p2os.cli.signals import postponed
 from p2os.client import ClientSettings
-from p2os.errors import FileError, RemoteProtocolError, RunFailedError, TransportError, UsageError
+from p2os.errors import RemoteProtocolError, RunFailedError, TransportError
 from p2os.protocol.commands import CommandNumber
 from p2os.transport import listen_url, open_url
 from p2os.transport.ports import HungUpError, Listener, Transport
 from p2os.transport.waiting import LONGEST_WAIT_NS, wait_for_line, wait_readable
 from p2os.transport.wall_clock import Clock, GapWatch, wall_clock
+from simbase.errors import FileError, UsageError
 from simbase.timing import NS_PER_S, Nanos
 
 HELP = """Play a recorded conversation again.

@@ -10,9 +10,10 @@ import typer
 from p2os.cli.held_robot import held, hold_robot
 from p2os.client import ClientSettings, Connected, ConnectError, Robot
 from p2os.client.settings import BAUDS
-from p2os.errors import P2osError, TransportError, UsageError
+from p2os.errors import TransportError
 from p2os.robots.parameters import ParametersError, load_parameters
 from p2os.transport.serial_port import list_serial_ports
+from simbase.errors import P2osError, UsageError
 from simbase.timing import NS_PER_MS, NS_PER_S
 
 #: Where simulated Pioneers listen.

@@ -11,7 +11,7 @@ import typer
 from p2os.cli.held_robot import RobotWatch, held
 from p2os.cli.quantities import Quantity, parse_duration, parse_quantity
 from p2os.client import MotionResult, Robot
-from p2os.errors import UsageError
+from simbase.errors import UsageError
 from simbase.timing import NS_PER_S, Nanos
 
 HELP = """Move a robot, and leave it standing.

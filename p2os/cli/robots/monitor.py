@@ -13,8 +13,8 @@ from p2os.cli.links.link_quality import LinkQuality
 from p2os.cli.quantities import parse_duration
 from p2os.cli.robots.dashboard import Dashboard, draw, line_of
 from p2os.client import Notice, PacketArrived, Robot, RobotState
-from p2os.errors import MissingDependencyError
 from p2os.transport.wall_clock import wall_clock
+from simbase.errors import MissingDependencyError
 from simbase.timing import NS_PER_MS, NS_PER_S, Nanos
 
 HELP = """Show a robot's state as it comes, without moving it: pose, speeds, a ring of its

@@ -8,8 +8,8 @@ import os
 from types import TracebackType
 from typing import Any, Self
 
-from p2os.errors import MissingDependencyError, UsageError
 from p2os.gamepad import STICK_FULL, TRIGGER_FULL, PadReport
+from simbase.errors import MissingDependencyError, UsageError
 
 #: SDL's full deflection.
 _AXIS_FULL = 32767

@@ -10,11 +10,12 @@ from p2os.capture.describe import describe_packet
 from p2os.cli.held_robot import RobotWatch, held
 from p2os.cli.quantities import parse_duration
 from p2os.client import ConfigurationKnown, Notice, PacketArrived, Robot
-from p2os.errors import LocalProtocolError, UsageError
+from p2os.errors import LocalProtocolError
 from p2os.protocol.command_table import ROWS, Argument, CommandRow, command_row
 from p2os.protocol.commands import Command, command
 from p2os.protocol.packets import ServerPacket, packet_frame
 from p2os.protocol.profiles import Profile
+from simbase.errors import UsageError
 
 HELP = """Send one command to a robot, and show what it answers.
 

@@ -30,10 +30,10 @@ from p2os.cli.quantities import Quantity, parse_quantity
 from p2os.cli.robots.pad_source import SdlPad
 from p2os.client import Link, Robot
 from p2os.client.notices import DeadmanStopped, GapStopped, LinkLostError, Notice
-from p2os.errors import MissingDependencyError, UsageError
 from p2os.gamepad import PAD_MPS, PAD_RADPS, STICK_FULL, TRIGGER_FULL, Gamepad, PadReport
 from p2os.transport.waiting import wait_readable
 from p2os.transport.wall_clock import Clock, GapWatch, wall_clock
+from simbase.errors import MissingDependencyError, UsageError
 from simbase.timing import NS_PER_MS, NS_PER_S, Nanos
 
 HELP = """Drive a robot with the keyboard, or with a game pad.

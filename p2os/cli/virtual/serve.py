@@ -23,7 +23,6 @@ import typer
 
 from p2os.cli.printing import queue_output
 from p2os.cli.quantities import parse_duration
-from p2os.errors import UsageError
 from p2os.pioneer.controller import ControllerSettings, SonarPerSip
 from p2os.pioneer.controller.flash import load_flash
 from p2os.pioneer.sensor_errors import load_sensor_errors
@@ -48,6 +47,7 @@ from p2os.pioneer.world.model import Pose
 from p2os.protocol.profiles import Profile
 from p2os.transport import listen_url
 from p2os.transport.wall_clock import wall_clock
+from simbase.errors import UsageError
 from simbase.timing import NS_PER_S, Nanos
 
 #: chosen: several times what an eager client causes, and still readable.

@@ -9,13 +9,13 @@ from typing import Annotated
 import typer
 
 from p2os.cli.kept_files import FORCE_HELP, refuse_to_overwrite
-from p2os.errors import FileError, MissingDependencyError, UsageError
 from p2os.pioneer.world import known_worlds, load_world
 from p2os.pioneer.world.drawing import svg, text
 from p2os.pioneer.world.formats import Placing, read_placed
 from p2os.pioneer.world.makers import KINDS, make_world
 from p2os.pioneer.world.model import World
 from p2os.pioneer.world.writer import write_world
+from simbase.errors import FileError, MissingDependencyError, UsageError
 
 HELP = """List, draw, check, make and convert worlds.
 

@@ -1,9 +1,9 @@
 """Make a body by its name; each engine is imported only when it is asked for."""
 
-from p2os.errors import MissingDependencyError, UsageError
 from p2os.pioneer.body.contract import RobotBody
 from p2os.pioneer.world.model import World
 from p2os.robots.parameters import RobotParameters
+from simbase.errors import MissingDependencyError, UsageError
 
 BODY_NAMES = ("kinematic", "bullet", "mujoco")
 

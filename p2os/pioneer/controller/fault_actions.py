@@ -7,9 +7,9 @@ bumper, stop button) is kept in the device's own state.
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
-from p2os.errors import UsageError
 from p2os.pioneer.controller.context import Context
 from p2os.pioneer.controller.faults import MOMENTARY, Fault
+from simbase.errors import UsageError
 
 
 @dataclass(frozen=True, slots=True)

@@ -15,8 +15,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from difflib import get_close_matches
 
-from p2os.errors import UsageError
 from p2os.pioneer.random_source import RandomSource
+from simbase.errors import UsageError
 
 #: chosen: a loose contact swallows 1 to so many bytes at a time.
 LONGEST_GAP_BYTES = 40

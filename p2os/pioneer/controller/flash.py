@@ -17,11 +17,12 @@ from dataclasses import dataclass, field, replace
 from difflib import get_close_matches
 from pathlib import Path
 
-from p2os.errors import FileError, LocalProtocolError, shown, shown_name
+from p2os.errors import LocalProtocolError
 from p2os.protocol.config_packet import ARCOS_FIELDS, AROS_1_8_FIELDS, FIELDS, P2OS_FIELDS, ConfigPacket
 from p2os.protocol.profiles import Profile
 from p2os.robots.parameters import RobotParameters
 from p2os.toml_file import read_toml, read_user_text
+from simbase.errors import FileError, shown, shown_name
 
 #: HOSTBAUD and its like: code → bit/s.
 BAUD_RATES = (9600, 19200, 38400, 57600, 115200)

@@ -11,9 +11,9 @@ Faults are injected and cleared by lines of their own (`faults`).
 
 from collections.abc import Callable, Mapping
 
-from p2os.errors import UsageError
 from p2os.pioneer.controller.context import Context
 from p2os.pioneer.controller.faults import refuse_renamed_word
+from simbase.errors import UsageError
 
 #: First word → (the others, what it means).
 INPUTS: Mapping[str, tuple[tuple[str, ...], str]] = {

@@ -3,10 +3,10 @@
 from dataclasses import dataclass, field, replace
 from enum import Enum
 
-from p2os.errors import UsageError
 from p2os.pioneer.controller.flash import BAUD_RATES, Flash
 from p2os.pioneer.sensor_errors import IDEAL, SensorErrors
 from p2os.protocol.profiles import Profile
+from simbase.errors import UsageError
 from simbase.timing import NS_PER_MS, NS_PER_S, Nanos
 
 #: The CONFIGpac has one byte for the cycle.

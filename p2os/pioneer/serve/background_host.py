@@ -11,13 +11,13 @@ import contextlib
 import threading
 from collections.abc import Callable, Iterator
 
-from p2os.errors import P2osError
 from p2os.pioneer.body.factory import make_body
 from p2os.pioneer.controller import ControllerSettings, Pioneer
 from p2os.pioneer.serve.host import Host
 from p2os.pioneer.world import load_world
 from p2os.robots.parameters import load_parameters
 from p2os.transport import listen_url
+from simbase.errors import P2osError
 from simbase.timing import Nanos
 
 #: chosen: the host looks up twice a second; on a busy machine it may take longer.

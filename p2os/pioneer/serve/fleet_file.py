@@ -22,7 +22,6 @@ from difflib import get_close_matches
 from pathlib import Path
 from typing import cast
 
-from p2os.errors import FileError, P2osError, shown, shown_name
 from p2os.pioneer.body.factory import BODY_NAMES
 from p2os.pioneer.controller.faults import read_fault
 from p2os.pioneer.controller.flash import BAUD_RATES, load_flash
@@ -35,6 +34,7 @@ from p2os.pioneer.world.model import Pose
 from p2os.protocol.profiles import Profile
 from p2os.robots.parameters import load_parameters
 from p2os.toml_file import TomlPlaces, is_file, read_toml, read_user_text
+from simbase.errors import FileError, P2osError, shown, shown_name
 from simbase.timing import NS_PER_S, Nanos
 
 

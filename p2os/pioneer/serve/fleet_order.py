@@ -6,7 +6,6 @@ An order comes from the options of `p2os serve`, from a file (`fleet_file`), or 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
-from p2os.errors import UsageError
 from p2os.pioneer.body.contract import RobotBody
 from p2os.pioneer.body.factory import make_body
 from p2os.pioneer.controller import Pioneer
@@ -18,6 +17,7 @@ from p2os.pioneer.world.model import Pose, World
 from p2os.pioneer.world.start_places import start_places
 from p2os.robots.parameters import RobotParameters, load_parameters
 from p2os.transport import PtyUrl, SerialUrl, TcpUrl, parse_url
+from simbase.errors import UsageError
 from simbase.timing import Nanos
 
 #: Where the first robot is found when nothing else is given.

@@ -26,7 +26,6 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 
-from p2os.errors import UsageError
 from p2os.pioneer.body.contract import RobotBody
 from p2os.pioneer.body.other_robots import (
     OtherRobot,
@@ -38,6 +37,7 @@ from p2os.pioneer.body.other_robots import (
 )
 from p2os.pioneer.controller import Pioneer
 from p2os.pioneer.world.model import Obstacle, World
+from simbase.errors import UsageError
 from simbase.timing import NS_PER_MS, NS_PER_S, Nanos, Reached
 
 #: chosen: 5 mm at half a metre a second, which is less than what a sonar's own noise is.

@@ -14,12 +14,13 @@ import math
 from collections.abc import Sequence
 from difflib import get_close_matches
 
-from p2os.errors import UsageError, WorldError
+from p2os.errors import WorldError
 from p2os.pioneer.controller.faults import FAULTS, refuse_renamed_word
 from p2os.pioneer.controller.live_inputs import INPUTS
 from p2os.pioneer.serve.host import Host
 from p2os.pioneer.serve.multi_robot_world import MultiRobotWorld
 from p2os.pioneer.serve.world_orders import WORLD_ORDERS, is_world_order
+from simbase.errors import UsageError
 
 #: A longer line is cut.
 LONGEST_LINE = 200

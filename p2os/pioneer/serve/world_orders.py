@@ -14,9 +14,10 @@ import shlex
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
 
-from p2os.errors import UsageError, WorldError
+from p2os.errors import WorldError
 from p2os.pioneer.body.contract import RobotBody
 from p2os.pioneer.world.model import Obstacle
+from simbase.errors import UsageError
 
 #: First words → (the others, what it means); a word in brackets may be left out.
 WORLD_ORDERS: Mapping[str, tuple[tuple[str, ...], str]] = {

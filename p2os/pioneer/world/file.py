@@ -11,10 +11,11 @@ from difflib import get_close_matches
 from pathlib import Path
 from typing import Any
 
-from p2os.errors import WorldError, shown, shown_name
+from p2os.errors import WorldError
 from p2os.pioneer.world.makers.arena import arena
 from p2os.pioneer.world.model import LONGEST_NAME, RANGES, Kind, Mark, Mesh, Obstacle, Pose, Repeat, Walk, World
 from p2os.toml_file import TomlPlaces, read_toml
+from simbase.errors import shown, shown_name
 
 Table = dict[str, Any]
 TOP_KEYS = (

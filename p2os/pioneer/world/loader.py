@@ -8,11 +8,12 @@ from difflib import get_close_matches
 from importlib.resources import files
 from pathlib import Path
 
-from p2os.errors import WorldError, shown
+from p2os.errors import WorldError
 from p2os.pioneer.world.file import parse_world
 from p2os.pioneer.world.model import World
 from p2os.pioneer.world.text_file import read_text
 from p2os.toml_file import is_file
+from simbase.errors import shown
 
 
 def known_worlds() -> tuple[str, ...]:

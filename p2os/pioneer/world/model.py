@@ -22,7 +22,8 @@ from dataclasses import dataclass, field
 from enum import Enum
 from itertools import accumulate, pairwise
 
-from p2os.errors import WorldError, shown
+from p2os.errors import WorldError
+from simbase.errors import shown
 
 Point = tuple[float, float]
 Segment = tuple[Point, Point]

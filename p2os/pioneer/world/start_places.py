@@ -8,11 +8,11 @@ import heapq
 import math
 from collections.abc import Iterator, Sequence
 
-from p2os.errors import UsageError, shown
 from p2os.pioneer.world.geometry import Footprint, hull_polygon, placed
 from p2os.pioneer.world.model import Kind, Pose, World
 from p2os.pioneer.world.plan import Plan, StaticPlan
 from p2os.robots.parameters import RobotParameters
+from simbase.errors import UsageError, shown
 
 #: chosen: finer than a hull is wide, so that the search passes no wall.
 LATTICE_M = 0.2

@@ -12,8 +12,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from bluepill_sim.board import BluePill
-from bluepill_sim.errors import BluePillError, ImageError, MissingDependencyError
+from bluepill_sim.errors import BluePillError, ImageError
 from bluepill_sim.program.image import Image, Symbol, SymbolTable, load_image, parse_image
+from simbase.errors import MissingDependencyError
 
 FIRMWARE = Path(__file__).resolve().parents[3] / "robot_bench" / "firmware" / "motors.elf"
 PROGRAM = struct.pack("<II", 0x2000_5000, 0x0800_0009) + b"\xfe\xe7" * 4
@@ -187,7 +188,7 @@ def test_a_missing_library_is_named_with_its_remedy(module: str, monkeypatch: py
     data = hex_file(0x0800_0000, PROGRAM) if module == "intelhex" else FIRMWARE.read_bytes()
     with pytest.raises(MissingDependencyError) as error:
         BluePill(parse_image(data, "a"))
-    assert error.value.extra == "sim"
+    assert "unicorn" in str(error.value.hint)
     assert error.value.exit_code == 2
 
 

@@ -16,7 +16,6 @@ from p2os.capture.columns import Columns, Damage, decode, find_frames  # noqa: E
 from p2os.capture.columns.arrow import to_arrow  # noqa: E402
 from p2os.capture.columns.objects import rows_by_objects  # noqa: E402
 from p2os.capture.columns.tables import KINDS  # noqa: E402
-from p2os.errors import MissingDependencyError  # noqa: E402
 from p2os.protocol.frames import (  # noqa: E402
     Decoder,
     DecoderStats,
@@ -35,6 +34,7 @@ from p2os.protocol.packets import (  # noqa: E402
 from p2os.protocol.packets.registry import IDENTITY_KIND  # noqa: E402
 from p2os.protocol.profiles import Profile  # noqa: E402
 from p2os.protocol.sip import SIP_KINDS  # noqa: E402
+from simbase.errors import MissingDependencyError  # noqa: E402
 from simbase.timing import NS_PER_MS, Nanos  # noqa: E402
 from tests.p2os.protocol.packet_strategies import ANY, PACKETS  # noqa: E402
 

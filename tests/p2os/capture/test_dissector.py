@@ -12,9 +12,9 @@ import pytest
 from p2os.capture import Direction, capture_of, frame_chunks, read_file, write_pcap
 from p2os.capture.dissector import install
 from p2os.cli.main import run
-from p2os.errors import FileError
 from p2os.protocol.commands import CommandNumber
 from p2os.protocol.packets import PACKET_NAMES
+from simbase.errors import FileError
 
 GOLDEN = Path(__file__).resolve().parents[2] / "golden" / "captures" / "aria_p2de.jsonl"
 TSHARK = shutil.which("tshark")

@@ -10,11 +10,11 @@ import pytest
 from p2os.capture import Direction, Reading, capture_of, read_file, rows_of, write_recording
 from p2os.capture.table import from_robot, table_of, write_csv
 from p2os.cli.main import run
-from p2os.installation import install_command
 from p2os.protocol.packets import packet_frame
 from p2os.protocol.profiles import Profile
 from p2os.protocol.sip import SonarReading, StandardSip
 from p2os.robots.parameters import load_parameters
+from simbase.installation import install_command
 from simbase.timing import NS_PER_S
 
 GOLDEN = Path(__file__).resolve().parents[2] / "golden" / "captures" / "player_p2de.jsonl"

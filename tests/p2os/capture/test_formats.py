@@ -23,7 +23,8 @@ from p2os.capture import (
 )
 from p2os.capture.formats.hex_text import read_hex, write_hex
 from p2os.capture.formats.pcap import PCAPNG_MAGIC
-from p2os.errors import FileError, LocalProtocolError
+from p2os.errors import LocalProtocolError
+from simbase.errors import FileError
 from simbase.timing import NS_PER_S
 
 TO, FROM = Direction.TO_ROBOT, Direction.FROM_ROBOT

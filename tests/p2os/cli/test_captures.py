@@ -13,9 +13,10 @@ from p2os.cli.captures.record import record_session
 from p2os.cli.captures.replay import motions_of, play
 from p2os.cli.captures.sniff import Bridge
 from p2os.cli.quantities import Quantity, parse_duration, parse_quantity
-from p2os.errors import FileError, RemoteProtocolError, RunFailedError, TransportError, UsageError
+from p2os.errors import RemoteProtocolError, RunFailedError, TransportError
 from p2os.protocol.commands import Command, CommandNumber
 from p2os.transport import HungUpError, Loops, listen_url, open_url, waiting
+from simbase.errors import FileError, UsageError
 from simbase.timing import NS_PER_S
 
 TO, FROM = Direction.TO_ROBOT, Direction.FROM_ROBOT

@@ -20,11 +20,11 @@ from p2os.cli import main
 from p2os.cli.main import run
 from p2os.cli.signals import restored_signals
 from p2os.cli.virtual import serve
-from p2os.errors import MissingDependencyError
 from p2os.pioneer.serve import fleet_order
 from p2os.pioneer.serve.control_line import Terminal
 from p2os.protocol.commands import Command
 from p2os.transport import HungUpError
+from simbase.errors import MissingDependencyError
 
 TIMEOUT_S = 30.0
 COMMAND = str(Path(sys.executable).parent / "p2os")

@@ -13,8 +13,9 @@ import typer
 
 from p2os.cli import main as cli
 from p2os.cli.signals import restored_signals
-from p2os.errors import FileError, TransportError
-from p2os.installation import install_command
+from p2os.errors import TransportError
+from simbase.errors import FileError
+from simbase.installation import install_command
 
 GROUP = "p2os.verbs"
 

@@ -19,7 +19,7 @@ sys.path.insert(0, str(Path(__file__).parent))
 
 from p2os.cli import printing
 from p2os.cli.printing import MOST_CHARACTERS, QueuedStream, queue_output, restored_output
-from p2os.errors import FileError
+from simbase.errors import FileError
 from tests.p2os.cli.driven import COMMAND, STOP, TIMEOUT_S, VEL, Driver, RecordingRobot, until
 
 

@@ -28,9 +28,10 @@ from p2os.client import (
     ReconnectPlanned,
     Robot,
 )
-from p2os.errors import RemoteProtocolError, TransportError, UsageError
+from p2os.errors import RemoteProtocolError, TransportError
 from p2os.protocol.commands import CommandNumber
 from p2os.transport import waiting
+from simbase.errors import UsageError
 from simbase.timing import NS_PER_MS, NS_PER_S
 from tests.p2os.cli.driven import STOP, TIMEOUT_S, RecordingRobot, until
 

@@ -16,8 +16,8 @@ from p2os.cli.robots.pad_source import SdlPad
 from p2os.cli.robots.teleop import PAD_PERIOD_NS, PadDriver
 from p2os.client import GapStopped, Notice
 from p2os.client.notices import LinkLostError
-from p2os.errors import MissingDependencyError, UsageError
 from p2os.gamepad import PAD_MPS, PAD_RADPS, Gamepad, PadReport
+from simbase.errors import MissingDependencyError, UsageError
 from simbase.timing import NS_PER_MS
 
 UP, NOTHING, DOWN = PadReport(up=True), PadReport(), PadReport(down=True)

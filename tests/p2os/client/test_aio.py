@@ -9,9 +9,9 @@ import pytest
 
 from p2os.client import ClientSettings, ConnectError, Link, LinkLostError, MotionEnded, MotionError, Notice, RobotState
 from p2os.client.aio import Robot
-from p2os.errors import P2osError
 from p2os.protocol.commands import Command, CommandNumber, enable, stop, vel
 from p2os.protocol.packets import EncoderPacket, IoPacket, SerauxPacket
+from simbase.errors import P2osError
 from simbase.timing import NS_PER_MS
 from tests.p2os.client.served_robot import QUICK, TIMEOUT_S, Recorder, ServedRobot, until
 

@@ -9,9 +9,10 @@ from hypothesis import strategies as st
 
 from p2os.client.calls import GripperAction, Result, RobotCalls
 from p2os.client.core import RobotCore
-from p2os.errors import LocalProtocolError, UsageError
+from p2os.errors import LocalProtocolError
 from p2os.protocol.commands import Command
 from p2os.protocol.commands import CommandNumber as C
+from simbase.errors import UsageError
 from simbase.timing import Nanos
 from tests.p2os.client.client_rig import Rig
 

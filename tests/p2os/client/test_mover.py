@@ -17,9 +17,9 @@ from p2os.client.notices import (
     MotorsDisabledError,
 )
 from p2os.client.settings import ClientSettings
-from p2os.errors import UsageError
 from p2os.protocol.commands import Command, CommandNumber, enable, rvel, stop, vel
 from p2os.protocol.profiles import Profile
+from simbase.errors import UsageError
 from tests.p2os.client.client_rig import MS, Link, Rig, S, new_pioneer
 
 MOVE, HEAD, SETV = CommandNumber.MOVE, CommandNumber.HEAD, CommandNumber.SETV

@@ -14,13 +14,13 @@ from p2os.client.notices import OdometryDoubtful, PacketArrived, RobotUnknown
 from p2os.client.observer import Observer, PoseKeeper, bumpers_of, limits_of
 from p2os.client.robot_state import RobotPose
 from p2os.client.settings import ClientSettings
-from p2os.errors import UsageError
 from p2os.protocol.commands import Command, CommandNumber
 from p2os.protocol.config_packet import AROS_1_6_FIELDS, ConfigPacket
 from p2os.protocol.packets import RawPacket
 from p2os.protocol.profiles import Profile
 from p2os.protocol.sip import SonarReading, StandardSip
 from p2os.robots.parameters import ParametersError, RobotParameters
+from simbase.errors import UsageError
 from simbase.timing import NS_PER_S
 from tests.p2os.client.client_rig import Rig, new_pioneer, parameters
 

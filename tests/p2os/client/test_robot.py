@@ -20,11 +20,11 @@ from p2os.client import (
 )
 from p2os.client.robot_state import Link
 from p2os.client.settings import ClientSettings
-from p2os.errors import P2osError, UsageError
 from p2os.protocol.commands import Command, CommandNumber, enable, stop, vel
 from p2os.protocol.packets import EncoderPacket, IoPacket, RawPacket, SerauxPacket, StandardSip
 from p2os.protocol.profiles import Profile
 from p2os.robots.parameters import ParametersError
+from simbase.errors import P2osError, UsageError
 from simbase.timing import NS_PER_MS
 from tests.p2os.client.served_robot import QUICK, Recorder, ServedRobot, until
 

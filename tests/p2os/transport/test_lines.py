@@ -10,12 +10,13 @@ from pathlib import Path
 import pytest
 import serial
 
-from p2os.errors import TransportError, UsageError
+from p2os.errors import TransportError
 from p2os.transport import HungUpError, Listener, Loops, Transport, listen_url, open_url, sockets
 from p2os.transport.serial_port import SerialListener, SerialTransport, list_serial_ports
 from p2os.transport.sockets import BACKLOG_BYTES, SocketTransport
 from p2os.transport.url import SerialUrl
 from p2os.transport.waiting import LONGEST_CLOSING_NS, MOST_CLOSING, ClosingLines
+from simbase.errors import UsageError
 
 #: A bound on every wait of these tests; reached only when something is broken.
 TIMEOUT_S = 5.0

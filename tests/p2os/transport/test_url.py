@@ -7,8 +7,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from p2os.errors import P2osError, UsageError
 from p2os.transport.url import LoopUrl, PtyUrl, SerialUrl, TcpUrl, parse_url
+from simbase.errors import P2osError, UsageError
 
 
 @pytest.mark.parametrize(

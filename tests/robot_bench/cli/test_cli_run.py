@@ -11,12 +11,12 @@ from pathlib import Path
 import pytest
 
 from p2os.cli.main import run as p2os
-from p2os.installation import install_command
 from robot_bench.cli.demo import best_body
 from robot_bench.cli.run import capped
 from robot_bench.recording.run_folder import make_next_folder
 from robot_bench.recording.run_record import read_run
 from robot_bench.scenario.scenario import load_scenario
+from simbase.installation import install_command
 from tests.robot_bench.firmware import thumb
 
 COMMAND = [sys.executable, "-c", "from p2os.cli.main import main; main()"]

@@ -9,12 +9,13 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from adapter_sim.codec import BitOrder, motor_code
-from p2os.errors import LocalProtocolError, UsageError
+from p2os.errors import LocalProtocolError
 from p2os.pioneer.body.factory import make_body
 from p2os.pioneer.world import load_world
 from p2os.robots.parameters import load_parameters
 from robot_bench.direct import DirectRobot, DirectSettings, DistanceSensors, JointMotor, WheelEncoder
 from robot_bench.wires.nets import Net, Strength
+from simbase.errors import UsageError
 
 MS = 1_000_000
 

@@ -9,8 +9,8 @@ from pathlib import Path
 
 import pytest
 
-from p2os.errors import UsageError
 from robot_bench.recording.run_folder import make_next_folder, reserved
+from simbase.errors import UsageError
 
 HOLDER = """
 import sys

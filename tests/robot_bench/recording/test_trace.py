@@ -12,9 +12,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from p2os.errors import FileError, LocalProtocolError, RunFailedError
+from p2os.errors import LocalProtocolError, RunFailedError
 from robot_bench.recording.run_record import TraceError, read_run
 from robot_bench.recording.trace import RANKS, TraceWriter, canonical
+from simbase.errors import FileError
 
 S = 10**9
 

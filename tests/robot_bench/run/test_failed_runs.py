@@ -9,15 +9,14 @@ from pathlib import Path
 
 import pytest
 
-from bluepill_sim.errors import MissingDependencyError as ChipLacks
 from bluepill_sim.errors import UnmodelledError
 from p2os.cli.main import run as p2os
-from p2os.errors import MissingDependencyError, P2osError
 from robot_bench import bench, run
 from robot_bench.recording.run_record import RunRecord, read_run
 from robot_bench.recording.summary import outcome_of, verdict
 from robot_bench.report.make import make_artefacts
 from robot_bench.scenario.scenario import Scenario, load_scenario
+from simbase.errors import MissingDependencyError, P2osError
 
 
 def wanted(duration_s: float = 0.5) -> Scenario:
@@ -49,7 +48,7 @@ def told(folder: Path) -> list[object]:
 @pytest.mark.parametrize(
     ("part", "error"),
     [
-        ("boot", ChipLacks("the emulator needs unicorn", hint="pip install unicorn")),
+        ("boot", MissingDependencyError("the emulator needs unicorn", hint="pip install unicorn")),
         ("make_body", MissingDependencyError("the bullet body needs PyBullet", extra="bullet")),
         ("load_world", ModuleNotFoundError("No module named numpy", name="numpy")),
         ("boot", KeyboardInterrupt()),

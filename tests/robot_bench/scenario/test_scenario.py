@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from adapter_sim.codec import BitOrder
-from p2os.errors import P2osError, ScenarioError, UsageError
+from p2os.errors import ScenarioError
 from p2os.pioneer.controller.settings import SonarPerSip
 from p2os.pioneer.world import load_world
 from robot_bench.bench import Bench
@@ -14,6 +14,7 @@ from robot_bench.scenario.goals import KINDS
 from robot_bench.scenario.scenario import known_scenarios, load_scenario, read_scenario
 from robot_bench.scenario.schema import Key
 from robot_bench.scenario.world_script import Op
+from simbase.errors import P2osError, UsageError
 
 LEAST = 'firmware = "dodge"\nworld = "room"\nduration_s = 10\n'
 

@@ -2,7 +2,8 @@
 
 from pathlib import Path
 
-from p2os.errors import WorldError, shown
+from p2os.errors import WorldError
+from simbase.errors import shown
 
 #: chosen: the same bound as for the file that names it.
 LARGEST_FILE_BYTES = 64 * 1024 * 1024

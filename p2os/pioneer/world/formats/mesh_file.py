@@ -10,11 +10,12 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from p2os.errors import WorldError, shown
+from p2os.errors import WorldError
 from p2os.pioneer.world.formats.collection import Collection
 from p2os.pioneer.world.formats.placing import with_z_up
 from p2os.pioneer.world.formats.polygon import triangulated
 from p2os.pioneer.world.model import Triangle, Vertex, World
+from simbase.errors import shown
 
 #: Of a binary STL: a header of 80 bytes, a count, then 50 bytes a triangle.
 STL_HEADER, STL_TRIANGLE = 84, 50

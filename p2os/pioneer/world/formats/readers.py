@@ -6,9 +6,10 @@ from importlib import import_module
 from pathlib import Path
 from typing import Protocol, cast
 
-from p2os.errors import MissingDependencyError, WorldError, shown_name
+from p2os.errors import WorldError
 from p2os.pioneer.world.formats.placing import Placing, placed_world
 from p2os.pioneer.world.model import World
+from simbase.errors import MissingDependencyError, shown_name
 
 #: chosen: a mesh of 200 000 triangles in text is below it.
 LARGEST_FILE_BYTES = 64 * 1024 * 1024

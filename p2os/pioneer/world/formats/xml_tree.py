@@ -8,7 +8,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from xml.parsers import expat  # declarations are refused below
 
-from p2os.errors import WorldError, shown, shown_name
+from p2os.errors import WorldError
+from simbase.errors import shown, shown_name
 
 MOST_ELEMENTS = 200_000
 DEEPEST = 64

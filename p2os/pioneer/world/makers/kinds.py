@@ -4,10 +4,10 @@ import math
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 
-from p2os.errors import UsageError
 from p2os.pioneer.world.makers import arena as arena_maker
 from p2os.pioneer.world.makers import doorway, maze, office, slalom
 from p2os.pioneer.world.model import Pose, World
+from simbase.errors import UsageError
 
 #: The floor's edge lies so far outside the arena's walls.
 _ARENA_HALF_M = arena_maker.SIDE_M / 2 + 0.2

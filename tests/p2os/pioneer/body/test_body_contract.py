@@ -5,12 +5,13 @@ import pickle
 
 import pytest
 
-from p2os.errors import UsageError, WorldError
+from p2os.errors import WorldError
 from p2os.pioneer.body.contract import BodyState, RobotBody
 from p2os.pioneer.body.factory import make_body
 from p2os.pioneer.world import load_world, parse_world
 from p2os.pioneer.world.model import Obstacle, Pose, World
 from p2os.robots.parameters import load_parameters
+from simbase.errors import UsageError
 from tests.p2os.pioneer.body.bodies import Maker, drive, each_body, ramped
 
 P2DX = load_parameters("p2dx")

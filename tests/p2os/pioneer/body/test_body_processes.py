@@ -9,12 +9,12 @@ from pathlib import Path
 
 import pytest
 
-from p2os.installation import install_command
 from p2os.pioneer.body.contract import RobotBody
 from p2os.pioneer.body.factory import make_body
 from p2os.pioneer.world import load_world
 from p2os.pioneer.world.model import Obstacle
 from p2os.robots.parameters import load_parameters
+from simbase.installation import install_command
 from tests.p2os.pioneer.body.bodies import each_body, marks_of
 
 P2DX = load_parameters("p2dx")
@@ -34,7 +34,7 @@ print(module.digest_of_the_rest(body))
 MISSING = """
 import sys
 sys.modules[sys.argv[1]] = None
-from p2os.errors import MissingDependencyError
+from simbase.errors import MissingDependencyError
 from p2os.robots.parameters import load_parameters
 from p2os.pioneer.body.factory import make_body
 from p2os.pioneer.world import load_world

@@ -7,7 +7,6 @@ from typing import Any
 
 import pytest
 
-from p2os.errors import UsageError
 from p2os.pioneer.body.ray_cast import Echo
 from p2os.pioneer.controller.faults import FAULTS, MOMENTARY, read_fault
 from p2os.pioneer.controller.flash import Flash, FlashError, load_flash
@@ -18,6 +17,7 @@ from p2os.pioneer.sonar.errors import measure_ranges
 from p2os.protocol.commands import CommandNumber as C
 from p2os.protocol.profiles import Profile
 from p2os.robots.parameters import load_parameters
+from simbase.errors import UsageError
 from simbase.timing import NS_PER_MS
 
 MakeRobot = Callable[..., Any]

@@ -6,13 +6,13 @@ from typing import Any
 
 import pytest
 
-from p2os.errors import UsageError
 from p2os.protocol.commands import CommandNumber as C
 from p2os.protocol.config_packet import ConfigPacket
 from p2os.protocol.frames import Frame
 from p2os.protocol.packets import Identity
 from p2os.protocol.profiles import Profile
 from p2os.protocol.sip import STANDING
+from simbase.errors import UsageError
 from simbase.timing import NS_PER_MS, NS_PER_S, NS_PER_US
 
 MakeRobot = Callable[..., Any]

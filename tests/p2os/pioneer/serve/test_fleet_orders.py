@@ -8,7 +8,6 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from p2os.errors import UsageError
 from p2os.pioneer.serve.fleet_file import FleetError, load_fleet, parse_fleet
 from p2os.pioneer.serve.fleet_order import FleetOrder, RobotOrder, following_ports, make_fleet
 from p2os.pioneer.world import load_world
@@ -18,6 +17,7 @@ from p2os.pioneer.world.plan import Plan
 from p2os.pioneer.world.start_places import start_places
 from p2os.protocol.profiles import Profile
 from p2os.robots.parameters import load_parameters
+from simbase.errors import UsageError
 
 P2DX, P3AT = load_parameters("p2dx"), load_parameters("p3at-sh")
 FULL = """

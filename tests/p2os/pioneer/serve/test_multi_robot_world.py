@@ -9,7 +9,6 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from p2os.errors import UsageError
 from p2os.pioneer.body.factory import make_body
 from p2os.pioneer.body.kinematic import KinematicBody
 from p2os.pioneer.controller import ControllerSettings, Pioneer
@@ -19,6 +18,7 @@ from p2os.pioneer.world.model import Pose, World
 from p2os.protocol.commands import Command
 from p2os.protocol.commands import CommandNumber as C
 from p2os.robots.parameters import load_parameters
+from simbase.errors import UsageError
 from simbase.timing import NS_PER_MS
 
 P2DX = load_parameters("p2dx")

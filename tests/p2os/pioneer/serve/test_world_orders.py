@@ -2,7 +2,6 @@
 
 import pytest
 
-from p2os.errors import UsageError
 from p2os.pioneer.controller.faults import FAULTS
 from p2os.pioneer.serve.fleet_order import FleetOrder, RobotOrder, make_fleet
 from p2os.pioneer.serve.host import Host
@@ -10,6 +9,7 @@ from p2os.pioneer.serve.multi_robot_world import MultiRobotWorld
 from p2os.pioneer.serve.orders import execute
 from p2os.pioneer.serve.robot_time import RobotTime
 from p2os.transport import Loops
+from simbase.errors import UsageError
 
 ENGINES = ["kinematic", pytest.param("bullet", marks=pytest.mark.bullet)]
 

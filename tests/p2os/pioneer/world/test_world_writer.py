@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from p2os.errors import UsageError, WorldError
+from p2os.errors import WorldError
 from p2os.pioneer.world import known_worlds, load_world, parse_world
 from p2os.pioneer.world.makers import KINDS, make_world
 from p2os.pioneer.world.model import Kind, Mesh, Obstacle, Pose, Repeat, Walk, World
@@ -15,6 +15,7 @@ from p2os.pioneer.world.plan import Plan
 from p2os.pioneer.world.writer import degrees, write_world
 from p2os.robots.parameters import load_parameters
 from p2os.toml_file import find_places, line_of_error
+from simbase.errors import UsageError
 
 P2DX = load_parameters("p2dx")
 

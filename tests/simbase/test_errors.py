@@ -1,6 +1,6 @@
 """What messages show of values and names: one line, whatever is in them."""
 
-from p2os.errors import LONGEST_LINE, LONGEST_SHOWN, P2osError, one_line, shown, shown_name
+from simbase.errors import LONGEST_LINE, LONGEST_SHOWN, P2osError, one_line, shown, shown_name
 
 
 def test_a_value_is_shown_as_python_writes_it_and_cut_where_it_is_long() -> None:

@@ -9,11 +9,10 @@ from pathlib import Path
 
 import pytest
 
-from bluepill_sim.errors import MissingDependencyError as ChipLacks
-from p2os import installation
 from p2os.cli.main import report
-from p2os.errors import MissingDependencyError
-from p2os.installation import install_command, reinstall_command
+from simbase import installation
+from simbase.errors import MissingDependencyError
+from simbase.installation import install_command, reinstall_command
 
 ROOT = Path(__file__).resolve().parents[2]
 EXTRAS = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]["optional-dependencies"]
@@ -88,7 +87,6 @@ def test_an_error_that_names_an_extra_hints_at_its_packages(capsys: pytest.Captu
     for error, hint in (
         (MissingDependencyError("no", extra="sim", hint="export to .csv"), "unicorn pyelftools, or export to .csv"),
         (MissingDependencyError("no", extra="sim"), "unicorn pyelftools"),
-        (ChipLacks("no", extra="sim"), "unicorn pyelftools"),
     ):
         assert report(error, []) == 2
         assert capsys.readouterr().err == f"p2os: no\nhint: pip install {hint}\n"
