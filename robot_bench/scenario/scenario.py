@@ -29,8 +29,9 @@ from p2os.robots.parameters import RobotParameters, load_parameters
 from p2os.timing import NS_PER_MS, NS_PER_S, Nanos
 from p2os.toml_file import TomlSource, is_file, read_toml, read_user_text
 from robot_bench.direct.robot import DirectSettings
+from robot_bench.scenario import fault_script, world_script
 from robot_bench.scenario.fault_script import FaultChange, load_faults
-from robot_bench.scenario.goals import Goal, load_goal
+from robot_bench.scenario.goals import KINDS, Goal, load_goal
 from robot_bench.scenario.schema import LONGEST_S, Key, Place, Table, Where, check_table, in_range, nearest, within
 from robot_bench.scenario.world_script import Change, load_changes, refuse_names
 
@@ -91,6 +92,18 @@ _IN_WORLD = (
     Key(name="duration_s", kind="number", above=0, most=LONGEST_S),
     Key(name="start", kind="table"),
 )
+#: Every table of a scenario file and its keys.
+TABLES: Mapping[str, tuple[Key, ...]] = {
+    "": _TOP,
+    "[start]": _START,
+    "[direct]": _DIRECT,
+    "[adapter]": _ADAPTER,
+    "[controller]": _CONTROLLER,
+    "[in_world.NAME]": _IN_WORLD,
+    "[[obstacle]]": world_script.KEYS,
+    "[[fault]]": fault_script.KEYS,
+    "[[goal]]": tuple(key for kind in KINDS.values() for key in kind.keys),
+}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
