@@ -503,7 +503,8 @@ class Engine:
         if self.block is NO_BLOCK or self._frozen is not None or not self.is_interrupted():
             return False
         pc = self.access_pc
-        if pc in (self.raised_by_pc, self.block.start):
+        is_at_boundary = pc == self.block.start and self.block is not self._rest.resumed
+        if pc == self.raised_by_pc or is_at_boundary:
             return False
         self.stop_before(HaltKind.BOUNDARY, pc)
         return True

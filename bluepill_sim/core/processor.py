@@ -183,7 +183,10 @@ class Processor:
             return
         self.engine.stops_after_mask_change = self.nvic.deliverable() != 0
         if not self._stands_at_return():
+            before = self.engine.pc, self.engine.cycle
             self._act_on(self.engine.step(stop_at))
+            if before == (self.engine.pc, self.engine.cycle) and not self.engine.is_inside_block and self._deliver():
+                self.halt = None  # the instruction waits for the exception, and that is the step
         if self.halt is None:
             self.halt = Halt(HaltKind.STEP, self.engine.pc)
 

@@ -226,6 +226,35 @@ def test_each_request_of_one_block_is_served_before_the_next_is_raised(
     assert machine.board.chip.engine.registers.general(5) == 3
 
 
+@pytest.mark.parametrize("core", CORES)
+def test_a_debugger_changes_nothing_where_a_request_ends_a_block(
+    core: str, boot, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("P2OS_CORE", core)
+    source = (
+        f"{store(ISER0, 1 << 6)}mov32 r1, #{STIR}\nmovs r2, #6\ncmp r2, #6\nb go\n"
+        f"go: {BLOCKS['an IT block with an else']}b stop\nhandler: adds r5, #1\nbx lr\n"
+    )
+    ends = []
+    for way in ("free", "breakpoints", "steps"):
+        machine = boot(source, {16 + 6: "handler"})
+        chip, go, stop = machine.board.chip, machine.label("go"), machine.label("stop")
+        if way == "breakpoints":
+            chip.engine.breakpoints.update(range(go, stop, 2))
+        chip.engine.breakpoints.add(stop)
+        seen: list[tuple[int, int]] = []
+        for _ in range(200):
+            (chip.step if way == "steps" else chip.advance_to)(1_000_000)
+            seen.append((chip.engine.pc, chip.engine.cycle))
+            if chip.engine.pc == stop and not chip.processor.nvic.pending:
+                break
+        general = chip.engine.registers.general
+        ends.append((chip.engine.pc == stop, chip.engine.cycle, general(5), general(6)))
+        assert len(seen) == len(set(seen)), "each step gets somewhere"
+    assert ends[0] == ends[1] == ends[2]
+    assert ends[0][2:] == (3, 3)
+
+
 @pytest.mark.parametrize("pad", range(58, 68))
 def test_an_it_block_across_a_page_boundary_survives_stops_and_interrupts(boot, pad: int) -> None:
     """Unicorn cuts blocks at 1 KiB, maybe inside an IT block: stop at every boundary, with a tick each 7 µs."""
