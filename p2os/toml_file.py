@@ -34,9 +34,12 @@ class TomlPlaces:
     lines: dict[tuple[str, int, str], int] = field(default_factory=dict)
 
     def line(self, table: str = "", number: int = 0, key: str = "") -> int:
-        """Return the line of a key, or of its table's header where the key is not there, or 1."""
-        lines = self.lines
-        return lines.get((table, number, key)) or lines.get((table, number, "")) or lines.get(("", 0, table)) or 1
+        """Return the line of a key, or of what holds it: its table's header, or the key of an inline table; or 1."""
+        line = self.lines.get((table, number, key)) or self.lines.get((table, number, ""))
+        if line or not table:
+            return line or 1
+        parent, _, name = table.rpartition(".")
+        return self.line(parent, 0, name)
 
 
 def read_user_text(path: Path, what: str, error_type: type[FileError], *, hint: str | None = None) -> str:

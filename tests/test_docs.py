@@ -8,6 +8,7 @@ A block that cannot run here says why in the line before it:
 
 import os
 import re
+import runpy
 import shlex
 import shutil
 import subprocess
@@ -71,3 +72,10 @@ def test_the_api_reference_is_up_to_date() -> None:
         capture_output=True, text=True, timeout=LIMIT_S, check=False,
     )  # fmt: skip
     assert done.returncode == 0, done.stdout + done.stderr
+
+
+def test_the_ranges_in_the_pages_are_those_that_the_readers_check_by() -> None:
+    generator = runpy.run_path(str(ROOT / "tools" / "generate_ranges.py"))
+    texts = [path.read_text(encoding="utf-8") for path in generator["PAGES"]]
+    assert sorted(re.findall(r"<!-- ranges: ([a-z ]+) -->", "".join(texts))) == sorted(generator["tables"]())
+    assert [generator["page"](text) for text in texts] == texts, "run tools/generate_ranges.py"

@@ -121,6 +121,9 @@ class Engine:
         self.block = NO_BLOCK
         #: Whether a block that may unmask an interrupt ends the run at its boundary.
         self.stops_after_mask_change = False
+        #: Tells whether an exception may interrupt now, and the access that raised the last one.
+        self.is_interrupted: Callable[[], bool] = lambda: False
+        self.raised_by_pc = 0
         #: Called when the firmware executes SEV.
         self.on_event: Callable[[], None] | None = None
         #: Called with writes to read-only memory, and after the instruction that made them.
@@ -488,7 +491,23 @@ class Engine:
 
     def _is_denied(self) -> bool:
         """Prepare an access to a peripheral; return whether it is not to be made."""
-        return (self.block.has_it or self.block.start == self._run_from) and self._leave_it_block()
+        if (self.block.has_it or self.block.start == self._run_from) and self._leave_it_block():
+            return True
+        return not self.stop_at and self._is_interrupted_here()
+
+    def _is_interrupted_here(self) -> bool:
+        """End the run before an access, as at a boundary, where an exception comes before it.
+
+        Else what one block raises several times would be served once. The words of one instruction stay together.
+        """
+        if self.block is NO_BLOCK or self._frozen is not None or not self.is_interrupted():
+            return False
+        pc = self.access_pc
+        is_at_boundary = pc == self.block.start and self.block is not self._rest.resumed
+        if pc == self.raised_by_pc or is_at_boundary:
+            return False
+        self.stop_before(HaltKind.BOUNDARY, pc)
+        return True
 
     def _leave_it_block(self) -> bool:
         """Put right what a memory hook does to ITSTATE; return whether the run has ended and access is to be denied.

@@ -97,6 +97,7 @@ class Processor:
         self.mmfar = 0
         self._memory = memory
         engine.on_event = self.send_event
+        engine.is_interrupted = self.is_interrupted
         r = Register
         file = engine.registers
         self._masks = file.batch(r.PRIMASK, r.BASEPRI, r.FAULTMASK)
@@ -182,7 +183,10 @@ class Processor:
             return
         self.engine.stops_after_mask_change = self.nvic.deliverable() != 0
         if not self._stands_at_return():
+            before = self.engine.pc, self.engine.cycle
             self._act_on(self.engine.step(stop_at))
+            if before == (self.engine.pc, self.engine.cycle) and not self.engine.is_inside_block and self._deliver():
+                self.halt = None  # the instruction waits for the exception, and that is the step
         if self.halt is None:
             self.halt = Halt(HaltKind.STEP, self.engine.pc)
 
@@ -202,7 +206,13 @@ class Processor:
         if self.scr & SEVONPEND and self.nvic.pending:
             self.event_register = True
         if self.nvic.deliverable():
+            self.engine.raised_by_pc = self.engine.access_pc
             self.stop_at_boundary()
+
+    def is_interrupted(self) -> bool:
+        """Tell whether an exception is pending that may interrupt what runs."""
+        number = self.nvic.first_pending()
+        return number is not None and self.nvic.can_preempt(number, self.execution_priority())
 
     def send_event(self) -> None:
         """Set the event register that WFE waits for."""
@@ -258,7 +268,7 @@ class Processor:
     def _deliver(self) -> bool:
         """Enter the pending exception that may interrupt, if there is one."""
         number = self.nvic.first_pending()
-        if number is None or not self.nvic.can_preempt(number, self.execution_priority()):
+        if number is None or not self.is_interrupted():
             return False
         self._enter(number, self.engine.pc)
         return True

@@ -228,7 +228,8 @@ class NativeEngine(Engine):
         if kind in (BOUNDARY, DELIVER):
             return None
         if kind == FROZEN and self._frozen is not None:
-            return self._thaw(self._frozen)
+            halt = self._thaw(self._frozen)
+            return None if halt.kind is HaltKind.BOUNDARY else halt
         if kind == UNEXPLAINED:
             raise RuntimeError(f"Unicorn stopped at {shared.halt_pc:#010x} with error {shared.halt_address}")
         return Halt(HALT_KINDS[kind], shared.halt_pc, shared.halt_address if shared.halt_has_address else None)
@@ -380,7 +381,9 @@ class NativeEngine(Engine):
         shared = self.shared
         if shared.dirty and self.before_access is not None:
             self.before_access()
-        return super()._is_denied() if shared.is_python else self._frozen is not None
+        if shared.is_python:
+            return super()._is_denied()
+        return self._frozen is not None or (not shared.stop_at and self._is_interrupted_here())
 
     def _trapped(self, kind: int, pc: int, value: int) -> None:
         try:

@@ -11,8 +11,10 @@ ORE; a line that then stays idle for one character raises IDLE.
 Modelled: 8 and 9 bits, parity, 0.5 to 2 stop bits, breaks (sent as silence),
 all of these flags and their interrupts. The far end sends and listens at our
 own baud rate, without errors, unless it has one of its own (`far_baud`): then
-characters too far off arrive damaged, both ways, without FE. Not modelled, and warned of: synchronous, LIN,
-IrDA, smartcard and half-duplex modes, hardware flow control, mute mode, DMA
+characters too far off arrive damaged, both ways, and what comes in raises the
+FE, NE and PE that the samples of the line give (`fabric/line_speed.py`), at the
+times of our own frames. Not modelled, and warned of: synchronous, LIN, IrDA,
+smartcard and half-duplex modes, hardware flow control, mute mode, DMA
 requests. The levels of single bits do not show on the TX pin: it stays high.
 
 Source: RM0008 section 27.
@@ -23,7 +25,7 @@ after the point from which its run of characters is counted, never later than `d
 from collections import Counter
 from collections.abc import Callable
 
-from bluepill_sim.fabric.line_speed import TOLERANCE_PERCENT, heard, is_usual, nearest_usual
+from bluepill_sim.fabric.line_speed import TOLERANCE_PERCENT, Heard, heard, is_usual, nearest_usual
 from bluepill_sim.fabric.ports import ChipPorts
 from bluepill_sim.fabric.registers import Peripheral, Place, Register, bits
 
@@ -34,9 +36,11 @@ _SEEN, _TDR, _SHIFT, _RDR = range(7, 11)
 #: Marks a data word in `_TDR` and `_SHIFT`; what the shift register holds besides.
 _HELD, _PREAMBLE, _BREAK = 1 << 16, 1 << 17, 1 << 18
 
-ORE, IDLE, RXNE, TC, TXE = (1 << n for n in (3, 4, 5, 6, 7))
+PE, FE, NE, ORE, IDLE, RXNE, TC, TXE = (1 << n for n in range(8))
 _READ_SEQUENCE_FLAGS = bits((4, 0))
 _WORD_BITS = bits((8, 0))
+#: Where `_rx_queue` has the flags of SR that a character brings.
+_FLAGS_AT = 16
 _CTS_LBD = bits(9, 8)
 SBK, RWU, RE, TE, IDLEIE, RXNEIE, TCIE, TXEIE, PEIE, PS, PCE, _WAKE, M, UE = (1 << n for n in range(14))
 #: What each bit of the control registers would ask for that is not modelled.
@@ -106,8 +110,8 @@ class Usart(Peripheral):
     _tx_base_ns: int
     _tx_half_bits: int
     _tx_due_ns: int | None
-    #: The characters from outside that have not fully arrived.
-    _rx_queue: bytes
+    #: The characters from outside that have not fully arrived: what DR will read, and above it the flags of SR.
+    _rx_queue: tuple[int, ...]
     _rx_base_ns: int
     _rx_half_bits: int
     _rx_due_ns: int | None
@@ -150,14 +154,9 @@ class Usart(Peripheral):
         if not self._rx_queue:
             self._rx_base_ns = self.chip.now_ns
             self._rx_half_bits = self._frame_half_bits()
-        if self.far_baud is not None:
-            self._judge_speed()
-            bits, brr = self._data_bits(), self.words[BRR]
-            ratio = self.far_baud * brr, self._clock_hz
-            data = bytes(w & 0xFF for byte in data for w in heard(self._with_parity(byte), bits, *ratio))
-            if not data:
-                return
-        self._rx_queue += bytes(data)
+        self._rx_queue += self._arriving([self._with_parity(byte) for byte in data])
+        if not self._rx_queue:
+            return
         self._idle_due_ns = None
         self._schedule()
 
@@ -238,7 +237,7 @@ class Usart(Peripheral):
         self._tx_base_ns = self._tx_half_bits = 0
         self._tx_due_ns = self._rx_due_ns = self._idle_due_ns = None
         self.words[_RDR] = self.words[_SEEN] = 0
-        self._rx_queue = b""
+        self._rx_queue = ()
         self._rx_base_ns = self._rx_half_bits = 0
         self._is_enabled_before = False
         self._rate_pc = 0
@@ -250,7 +249,10 @@ class Usart(Peripheral):
 
     def _frame_half_bits(self) -> int:
         data_bits = 9 if self.words[CR1] & M else 8
-        return 2 * (1 + data_bits) + _STOP_HALF_BITS[self.words[CR2] >> 12 & 3]
+        return 2 * (1 + data_bits) + self._stop_half_bits()
+
+    def _stop_half_bits(self) -> int:
+        return _STOP_HALF_BITS[self.words[CR2] >> 12 & 3]
 
     def _span_ns(self, half_bits: int) -> int:
         return half_bits * self.words[BRR] * 1_000_000_000 // (2 * self._clock_hz)
@@ -324,8 +326,8 @@ class Usart(Peripheral):
             self.on_transmit(word & mask, at_ns)
             return
         ratio = divider[0], self.far_baud * divider[1]
-        for one in heard(self._with_parity(word), bits, *ratio):
-            self.on_transmit(one & mask, at_ns)
+        for one in heard([self._with_parity(word)], bits, *ratio, self._stop_half_bits()):
+            self.on_transmit(one.word & mask, at_ns)
 
     def _data_bits(self) -> int:
         """Return how many bits stand between start and stop, a parity among them."""
@@ -338,7 +340,7 @@ class Usart(Peripheral):
         far = self.far_baud
         if far is not None:
             if brr and any(
-                list(heard(word, 8, *ratio)) != [word]
+                [(one.word, one.has_framing_error) for one in heard([word] * 2, 8, *ratio)] != [(word, False)] * 2
                 for word in (0, 0x55, 0x7F, 0x80, 0xFF)
                 for ratio in ((self._clock_hz, far * brr), (far * brr, self._clock_hz))
             ):
@@ -362,7 +364,7 @@ class Usart(Peripheral):
         return is_on and self._rx_pin.is_listening()
 
     def _end_reception(self, at_ns: int) -> None:
-        word, self._rx_queue = self._rx_queue[0], self._rx_queue[1:]
+        arrived, self._rx_queue = self._rx_queue[0], self._rx_queue[1:]
         self._rx_half_bits += self._frame_half_bits()
         if not self._can_receive():
             self.chip.warn(f"{self.name}: characters lost, the receiver is not set up", once=f"{self.name}:rx-off")
@@ -370,10 +372,24 @@ class Usart(Peripheral):
         if self.words[SR] & RXNE:
             self.words[SR] |= ORE
         else:
-            self.words[_RDR] = self._with_parity(word)
-            self.words[SR] |= RXNE
+            self.words[_RDR] = arrived & _WORD_BITS
+            self.words[SR] |= RXNE | arrived >> _FLAGS_AT
         if not self._rx_queue:
             self._idle_due_ns = at_ns + self._span_ns(self._frame_half_bits())
+
+    def _arriving(self, words: list[int]) -> tuple[int, ...]:
+        """Return what the receiver makes of characters that the far end sends, for `_rx_queue`."""
+        if self.far_baud is None:
+            return tuple(words)
+        self._judge_speed()
+        ratio = self.far_baud * self.words[BRR], self._clock_hz
+        found = heard(words, self._data_bits(), *ratio, self._stop_half_bits())
+        return tuple(one.word | self._flags(one) << _FLAGS_AT for one in found)
+
+    def _flags(self, one: Heard) -> int:
+        """Return the flags of SR that rise with a character."""
+        is_wrong = one.word != self._with_parity(one.word)
+        return (FE if one.has_framing_error else 0) | (NE if one.has_noise else 0) | (PE if is_wrong else 0)
 
     def _with_parity(self, word: int) -> int:
         """Return what DR reads: with PCE the top bit is the parity that the far end has put there."""
@@ -466,4 +482,5 @@ class Usart(Peripheral):
         status, control = self.words[SR], self.words[CR1]
         # TXEIE, TCIE and IDLEIE sit at the places of their flags; ORE shares RXNEIE.
         asks = status & control & (TXE | TC | RXNE | IDLE) or (status & ORE and control & RXNEIE)
+        asks = asks or (status & PE and control & PEIE)
         self.chip.set_irq(self.place.irqs[0], bool(asks))

@@ -9,7 +9,18 @@ Invariant: `ConfigPacket.from_frame(packet.to_frame()) == packet`.
 
 from dataclasses import dataclass
 
-from construct import ConstructError, GreedyBytes, Int8sl, Int8ul, Int16sl, Int16ul, Int32ul, NullTerminated, Struct
+from construct import (
+    ConstructError,
+    FormatField,
+    GreedyBytes,
+    Int8sl,
+    Int8ul,
+    Int16sl,
+    Int16ul,
+    Int32ul,
+    NullTerminated,
+    Struct,
+)
 
 from p2os.errors import LocalProtocolError
 from p2os.protocol.frames import Frame
@@ -37,6 +48,13 @@ FIELDS = (
     ("configflags", Int32ul), ("gyrofw", Int16sl),
 )  # fmt: skip
 
+#: Field that is a number → least and most that it holds.
+NUMBERS = {
+    name: (-(1 << bits - 1), (1 << bits - 1) - 1) if kind.fmtstr[-1].islower() else (0, (1 << bits) - 1)
+    for name, kind in FIELDS
+    if isinstance(kind, FormatField)
+    for bits in (8 * kind.sizeof(),)
+}
 #: Field counts at which known firmware stops: P2OS and AROS before 1.6, AROS 1.6, 1.7 and 1.8, AMRISim, ARCOS.
 P2OS_FIELDS, AROS_1_6_FIELDS, AROS_1_7_FIELDS, AROS_1_8_FIELDS = 36, 38, 39, 42
 AMRISIM_FIELDS, ARCOS_FIELDS = 57, len(FIELDS)

@@ -24,7 +24,7 @@ from robot_bench.scenario.timeline import Timeline
 from simbase.errors import UsageError
 from simbase.timing import NS_PER_S, Nanos
 
-_KEYS = (
+KEYS = (
     Key(name="at_s", kind="number", required=True, least=0, most=LONGEST_S),
     Key(name="fault", kind="text", required=True),
     Key(name="for_s", kind="number", above=0, most=LONGEST_S),
@@ -48,7 +48,7 @@ def load_faults(tables: Sequence[Table], parameters: RobotParameters, where: Whe
     found: list[FaultChange] = []
     for number, table in enumerate(tables):
         place = within(where, "fault", number)
-        check_table(table, _KEYS, place)
+        check_table(table, KEYS, place)
         words = str(table["fault"])
         try:
             fault = read_fault(words, sonar=parameters.sonar_fitted)

@@ -24,12 +24,13 @@ from p2os.pioneer.controller.flash import load_flash
 from p2os.pioneer.sensor_errors import load_sensor_errors
 from p2os.pioneer.world import Pose, known_worlds, load_world, world_suffixes
 from p2os.pioneer.world.model import World
-from p2os.pioneer.world.start_places import thing_at
+from p2os.pioneer.world.start_places import refuse_start
 from p2os.robots.parameters import RobotParameters, load_parameters
 from p2os.toml_file import TomlSource, is_file, read_toml, read_user_text
 from robot_bench.direct.robot import DirectSettings
+from robot_bench.scenario import fault_script, world_script
 from robot_bench.scenario.fault_script import FaultChange, load_faults
-from robot_bench.scenario.goals import Goal, load_goal
+from robot_bench.scenario.goals import KINDS, Goal, load_goal
 from robot_bench.scenario.schema import LONGEST_S, Key, Place, Table, Where, check_table, in_range, nearest, within
 from robot_bench.scenario.world_script import Change, load_changes, refuse_names
 from simbase.errors import FileError, UsageError, shown, shown_name
@@ -92,6 +93,18 @@ _IN_WORLD = (
     Key(name="duration_s", kind="number", above=0, most=LONGEST_S),
     Key(name="start", kind="table"),
 )
+#: Every table of a scenario file and its keys.
+TABLES: Mapping[str, tuple[Key, ...]] = {
+    "": _TOP,
+    "[start]": _START,
+    "[direct]": _DIRECT,
+    "[adapter]": _ADAPTER,
+    "[controller]": _CONTROLLER,
+    "[in_world.NAME]": _IN_WORLD,
+    "[[obstacle]]": world_script.KEYS,
+    "[[fault]]": fault_script.KEYS,
+    "[[goal]]": tuple(key for kind in KINDS.values() for key in kind.keys),
+}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -116,6 +129,8 @@ class Scenario:
     usart_baud: int | None = None
     #: None starts at the world's own place.
     start: Pose | None = None
+    #: What a message calls the start: file, line and key.
+    start_at: str = field(default="[start]", compare=False)
     direct: DirectSettings = field(default_factory=DirectSettings)
     adapter: AdapterSettings = field(default_factory=AdapterSettings)
     adapter_core: str = "model"
@@ -125,6 +140,8 @@ class Scenario:
     goals: tuple[Goal, ...] = ()
     #: World → what is otherwise there.
     in_world: Mapping[str, Table] = field(default_factory=dict)
+    #: The file's own place, for messages.
+    where: Where = field(default="", compare=False, repr=False)
 
     @property
     def threshold_m(self) -> float:
@@ -233,19 +250,13 @@ def resolve_world(
 
 
 def refuse_what_its_world_refuses(scenario: Scenario, world: World) -> None:
-    """Refuse a start inside a thing, and changes that the world's own things do not allow.
+    """Refuse a start beyond the floor or inside a thing, and changes that the world's own things do not allow.
 
     Raises:
         ScenarioError: So it is; the message names the thing.
     """
-    start = scenario.start or world.start
-    thing = thing_at(world, scenario.parameters, start)
-    if thing is not None:
-        raise ScenarioError(
-            f"{scenario.name}.toml: [start]: x {start.x_m:g}, y {start.y_m:g} in world {shown(world.name)} is inside"
-            f" {shown(thing)}",
-            hint="p2os world show FILE draws a world",
-        )
+    start, at = (scenario.start, scenario.start_at) if scenario.start else (world.start, world.start_at)
+    refuse_start(world, scenario.parameters, start, at, error=ScenarioError)
     refuse_names(scenario.changes, world)
 
 
@@ -261,7 +272,7 @@ def _build(table: Table, text: str, path: Path, where: Place) -> Scenario:
     for world, part in in_world.items():
         check_table({world: part}, (Key(name=world, kind="table"),), within(where, "in_world"))
         check_table(part, _IN_WORLD, within(where, f"in_world.{world}"))
-        _start(part, within(where, f"in_world.{world}"))
+        _start(part, where, f"in_world.{world}.start")
     changes = load_changes(cast("list[Table]", table.get("obstacle", [])), parameters, where)
     goals = [
         load_goal(goal, within(where, "goal", number))
@@ -282,6 +293,7 @@ def _build(table: Table, text: str, path: Path, where: Place) -> Scenario:
         threshold_um=round(threshold_m * 1e6),
         usart_baud=cast("int | None", table.get("usart_baud")),
         start=_start(table, where),
+        start_at=str(within(where, "start")),
         direct=_direct(cast("Table", table.get("direct", {})), where),
         adapter=_adapter(cast("Table", table.get("adapter", {})), round(threshold_m * 1e6), where),
         adapter_core=str(cast("Table", table.get("adapter", {})).get("core", "model")),
@@ -290,6 +302,7 @@ def _build(table: Table, text: str, path: Path, where: Place) -> Scenario:
         faults=load_faults(cast("list[Table]", table.get("fault", [])), parameters, where),
         goals=tuple(goals),
         in_world=in_world,
+        where=where,
     )
     return _apply_in_world(scenario, in_world.get(scenario.world, {}))
 
@@ -302,7 +315,9 @@ def _apply_in_world(scenario: Scenario, part: Table) -> Scenario:
     if "duration_s" in part:
         scenario = replace(scenario, duration_ns=round(cast("float", part["duration_s"]) * NS_PER_S))
     if "start" in part:
-        scenario = replace(scenario, start=_start(part, f"{scenario.name}.toml: [in_world]"))
+        key = f"in_world.{scenario.world}.start"
+        start = _start(part, scenario.where, key)
+        scenario = replace(scenario, start=start, start_at=str(within(scenario.where, key)))
     return scenario
 
 
@@ -321,11 +336,11 @@ def _firmware(name: str, path: Path, where: Place) -> Path:
     )
 
 
-def _start(table: Table, where: Where) -> Pose | None:
+def _start(table: Table, where: Where, key: str = "start") -> Pose | None:
     if "start" not in table:
         return None
     part = cast("Table", table["start"])
-    check_table(part, _START, within(where, "start"))
+    check_table(part, _START, within(where, key))
     heading_rad = math.radians(cast("float", part.get("heading_deg", 0.0)))
     return Pose(x_m=cast("float", part["x_m"]), y_m=cast("float", part["y_m"]), heading_rad=heading_rad)
 

@@ -79,7 +79,7 @@ ChangeListener = Callable[[str, str, Nanos, Mapping[str, object]], None]
 
 #: chosen: an hour is 72 000 placings.
 LONGEST_HOLD_S = 3600
-_KEYS = (
+KEYS = (
     Key(name="at_s", kind="number", required=True, least=0, most=LONGEST_S),
     Key(name="op", kind="text", choices=tuple(op.value for op in Op)),
     Key(name="name", kind="text", required=True),
@@ -114,7 +114,7 @@ def load_changes(tables: list[Table], parameters: RobotParameters, where: Where)
     changes: list[Change] = []
     for number, table in enumerate(tables):
         place = within(where, "obstacle", number)
-        check_table(table, _KEYS, place)
+        check_table(table, KEYS, place)
         changes += _changes(table, parameters, str(place))
     changes.sort(key=lambda change: change.at)
     _check_names(changes)

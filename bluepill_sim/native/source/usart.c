@@ -10,7 +10,7 @@
 static void update_irq(struct core *core, const struct page *page)
 {
     const uint32_t status = page->words[SR], control = page->words[CR1];
-    const bool asks = status & control & ASKING || (status & ORE && control & RXNEIE);
+    const bool asks = status & control & ASKING || (status & ORE && control & RXNEIE) || (status & PE && control & PEIE);
     if (!asks) {
         core->shared.levels &= ~(UINT64_C(1) << page->irq);
     }

@@ -1,18 +1,20 @@
 """Files that a capture is written to while it goes on.
 
-Each chunk is flushed, so that a program that is killed leaves a file that can be read.
+Each chunk is written at once and whole, so that a program that is killed, or a disk that
+fills up, leaves a file that can be read.
 """
 
 import contextlib
-from collections.abc import Iterator
+from collections.abc import Callable
 from pathlib import Path
 from types import TracebackType
-from typing import IO, Protocol, Self
+from typing import Protocol, Self
 
 from p2os.capture import Chunk
 from p2os.capture.formats.pcap import file_header, record
 from p2os.capture.formats.recording import chunk_line, header_line
 from p2os.capture.listing import FrameCutter
+from p2os.errors import RunFailedError
 from simbase.errors import FileError
 from simbase.timing import Nanos
 
@@ -33,27 +35,21 @@ class RecordingFile:
     """A recording of ours, written as it happens.
 
     Raises:
-        FileError: The file cannot be written, now or later.
+        FileError: The file cannot be opened.
+        RunFailedError: It cannot be written, now or later.
     """
 
     def __init__(self, path: Path, note: str = "") -> None:
-        self._path = path
-        self._file = _open(path)
-        self._write(header_line(note))
+        self._file = _GrowingFile(path)
+        self._file.add(header_line(note).encode("ascii"))
 
     def take(self, chunk: Chunk) -> None:
         """Write a chunk."""
-        self._write(chunk_line(chunk))
+        self._file.add(chunk_line(chunk).encode("ascii"))
 
     def close(self) -> None:
         """End the file."""
-        with _naming(self._path):
-            self._file.close()
-
-    def _write(self, line: str) -> None:
-        with _naming(self._path):
-            self._file.write(line.encode("ascii"))
-            self._file.flush()
+        self._file.close()
 
 
 class PcapFile:
@@ -64,32 +60,26 @@ class PcapFile:
         base_ns: When the capture began, in nanoseconds since 1970.
 
     Raises:
-        FileError: The file cannot be written, now or later.
+        FileError: The file cannot be opened.
+        RunFailedError: It cannot be written, now or later.
     """
 
     def __init__(self, path: Path, base_ns: Nanos) -> None:
-        self._path = path
-        self._file = _open(path)
+        self._file = _GrowingFile(path)
         self._base_ns = base_ns
         self._cutter = FrameCutter()
-        with _naming(path):
-            self._file.write(file_header())
-            self._file.flush()
+        self._file.add(file_header())
 
     def take(self, chunk: Chunk) -> None:
         """Write the frames that a chunk completes."""
-        with _naming(self._path):
-            for piece in self._cutter.take(chunk):
-                self._file.write(record(piece, self._base_ns))
-            self._file.flush()
+        for piece in self._cutter.take(chunk):
+            self._file.add(record(piece, self._base_ns))
 
     def close(self) -> None:
         """Write what is left of broken frames, and end the file."""
-        with _naming(self._path):
-            if not self._file.closed:
-                for piece in self._cutter.finish():
-                    self._file.write(record(piece, self._base_ns))
-            self._file.close()
+        for piece in self._cutter.finish():
+            self._file.add(record(piece, self._base_ns))
+        self._file.close()
 
 
 class Sinks:
@@ -110,27 +100,62 @@ class Sinks:
         """Close each, whatever becomes of the others.
 
         Raises:
-            FileError: A file cannot be written.
+            RunFailedError: A file cannot be written.
         """
-        with contextlib.ExitStack() as closing:
-            for sink in reversed(self._sinks):
-                closing.callback(sink.close)
+        self._each(lambda sink: sink.close())
 
     def take(self, chunk: Chunk) -> None:
-        """Hand a chunk to each."""
-        for sink in self._sinks:
-            sink.take(chunk)
+        """Hand a chunk to each, whatever becomes of the others.
+
+        Raises:
+            RunFailedError: A file cannot be written.
+        """
+        self._each(lambda sink: sink.take(chunk))
+
+    def _each(self, call: Callable[[Sink], None]) -> None:
+        with contextlib.ExitStack() as calls:
+            for sink in reversed(self._sinks):
+                calls.callback(call, sink)
 
 
-def _open(path: Path) -> IO[bytes]:
-    with _naming(path):
-        return path.open("wb")
+class _GrowingFile:
+    """A file to which whole pieces are added: one for which there is no room leaves no part of itself.
+
+    What is added after that, or after the end, is dropped.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self._path = path
+        try:
+            self._file = path.open("wb", buffering=0)
+        except OSError as error:
+            raise FileError(_refusal(path, error)) from error
+        self._size = 0
+
+    def add(self, piece: bytes) -> None:
+        if self._file.closed:
+            return
+        rest = memoryview(piece)
+        try:
+            while rest:
+                rest = rest[self._file.write(rest) :]
+        except OSError as error:
+            with contextlib.suppress(OSError):  # a device has no length
+                self._file.truncate(self._size)
+            with contextlib.suppress(OSError):
+                self._file.close()
+            raise RunFailedError(_refusal(self._path, error), hint=self._hint()) from error
+        self._size += len(piece)
+
+    def close(self) -> None:
+        try:
+            self._file.close()
+        except OSError as error:
+            raise RunFailedError(_refusal(self._path, error)) from error
+
+    def _hint(self) -> str | None:
+        return f"what it held before is whole: p2os decode {self._path}" if self._size else None
 
 
-@contextlib.contextmanager
-def _naming(path: Path) -> Iterator[None]:
-    """Raise what the system refuses as an error that names the file."""
-    try:
-        yield
-    except OSError as error:
-        raise FileError(f"cannot write {path}: {(error.strerror or str(error)).lower()}") from error
+def _refusal(path: Path, error: OSError) -> str:
+    return f"cannot write {path}: {(error.strerror or str(error)).lower()}"

@@ -14,7 +14,9 @@ from p2os.pioneer.world.drawing import svg, text
 from p2os.pioneer.world.formats import Placing, read_placed
 from p2os.pioneer.world.makers import KINDS, make_world
 from p2os.pioneer.world.model import World
+from p2os.pioneer.world.start_places import refuse_start
 from p2os.pioneer.world.writer import write_world
+from p2os.robots.parameters import load_parameters
 from simbase.errors import FileError, MissingDependencyError, UsageError
 
 HELP = """List, draw, check, make and convert worlds.
@@ -102,9 +104,10 @@ def show(
 
 
 def check(world: WORLD, seed: SEED = 0, up: UP = "auto") -> None:
-    """Read a world and print what is in it; an error names its line."""
+    """Read a world and print what is in it; an error names its line, a start where no p2dx can stand too."""
     place = _load(world, seed, up)
     _print_skipped(place)
+    refuse_start(place, load_parameters("p2dx"), place.start, place.start_at)
     typer.echo(f"{place.source}: {_summary(place)}")
 
 

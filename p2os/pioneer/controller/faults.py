@@ -42,6 +42,8 @@ SIDES = {"wheel-blocked": ("left", "right"), "bumper": ("front", "rear")}
 MOMENTARY = frozenset({"brown-out", "reboot"})
 #: First words of a line in earlier releases → today's.
 RENAMED_WORDS = {"mend": "clear"}
+#: Word of a fault → the most that it may be; none is below 0.
+MOST: Mapping[str, float] = {"METRES": 100.0, "RATE": 0.5, "VOLTS": 25.5}
 
 
 @dataclass(frozen=True, slots=True)
@@ -110,7 +112,7 @@ def _with(fault: Fault, word: str, given: str, usage: str, sonar: int) -> Fault:
         if not 1 <= number <= most:
             raise UsageError(f"{fault.name}: {given!r} is no number of 1 to {most}", hint=f"usage: {usage}")
     else:
-        most_value = {"METRES": 100.0, "RATE": 0.5, "VOLTS": 25.5}[word]
+        most_value = MOST[word]
         try:
             value = float(given)
         except ValueError:

@@ -18,7 +18,7 @@ from difflib import get_close_matches
 from pathlib import Path
 
 from p2os.errors import LocalProtocolError
-from p2os.protocol.config_packet import ARCOS_FIELDS, AROS_1_8_FIELDS, FIELDS, P2OS_FIELDS, ConfigPacket
+from p2os.protocol.config_packet import ARCOS_FIELDS, AROS_1_8_FIELDS, FIELDS, NUMBERS, P2OS_FIELDS, ConfigPacket
 from p2os.protocol.profiles import Profile
 from p2os.robots.parameters import RobotParameters
 from p2os.toml_file import read_toml, read_user_text
@@ -73,6 +73,18 @@ DEFAULTS: Mapping[str, int | str] = {
     "autobaud": 1,
     "hasgyro": 1,
     "batterytype": 0,
+}
+
+
+#: What a field cannot be though it fits: a baud code, segments that the packet tells, what something is divided by.
+NARROWER: Mapping[str, tuple[int, int]] = {
+    **dict.fromkeys(("hostbaud", "auxbaud", "aux2baud", "aux3baud"), (0, len(BAUD_RATES) - 1)),
+    **dict.fromkeys(("frontbumps", "rearbumps"), (0, MOST_SEGMENTS)),
+    "sipcycle": (1, 255), "sonarcycle": (1, 255), "watchdog": (1, 65_535), "ticksmm": (1, 65_535),
+}  # fmt: skip
+#: Parameter → least and most of those that are numbers: what its field on the wire holds, or less.
+RANGES: Mapping[str, tuple[int, int]] = {
+    name: NARROWER.get(name, limits) for name, limits in NUMBERS.items() if name not in FIXED
 }
 
 
@@ -170,11 +182,10 @@ def _check(name: str, value: int | str) -> None:
     try:
         ConfigPacket(**{name: value}, fields_sent=ARCOS_FIELDS).to_frame()  # type: ignore[arg-type]  # that is the test
     except (LocalProtocolError, AttributeError, TypeError) as error:
-        raise FlashError(f"FLASH: {name} = {shown(value)} does not fit its field") from error
-    bauds = {"hostbaud", "auxbaud", "aux2baud", "aux3baud"}
-    if name in bauds and not 0 <= int(value) < len(BAUD_RATES):
-        raise FlashError(f"FLASH: {name} = {value}, a baud code is 0 to {len(BAUD_RATES) - 1}")
-    if name in {"frontbumps", "rearbumps"} and int(value) > MOST_SEGMENTS:
-        raise FlashError(f"FLASH: {name} = {value}, the packet tells {MOST_SEGMENTS} segments at most")
-    if name in {"sipcycle", "watchdog", "sonarcycle", "ticksmm"} and int(value) < 1:
-        raise FlashError(f"FLASH: {name} = {value} must be positive")
+        least, most = RANGES.get(name, (0, 0))
+        hint = f"a number of {least} to {most}" if name in RANGES else "a text"
+        raise FlashError(f"FLASH: {name} = {shown(value)} does not fit its field", hint=hint) from error
+    if name in RANGES:
+        least, most = RANGES[name]
+        if not least <= int(value) <= most:
+            raise FlashError(f"FLASH: {name} = {value} is out of range: {least} to {most}")

@@ -95,7 +95,8 @@ def parse_world(text: str, source: str, seed: int = 0, folder: Path | None = Non
     table, places = read_toml(text, source, "a world", WorldError)
     top = Section(source, places, "", 0, table)
     _only(top, TOP_KEYS)
-    start = _start(Section(source, places, "start", 0, _table(top, "start")))
+    begins = Section(source, places, "start", 0, _table(top, "start"))
+    start = _start(begins)
     obstacles: list[Obstacle] = []
     named: dict[str, str] = {}
     for name, keys in SHAPES.items():
@@ -132,6 +133,7 @@ def parse_world(text: str, source: str, seed: int = 0, folder: Path | None = Non
         meshes=tuple(meshes),
         marks=tuple(marks),
         skipped=tuple(skipped),
+        start_at=f"{begins.at()}: [start]",
     )
 
 

@@ -377,6 +377,8 @@ class World:
     marks: tuple[Mark, ...] = ()
     #: What a reader of the file left out, one line each.
     skipped: tuple[str, ...] = field(default=(), compare=False)
+    #: What a message calls the start: file, line and key.
+    start_at: str = field(default="its start", compare=False)
 
     def __post_init__(self) -> None:
         _refuse_outside(f"world {shown(self.name)}", "extent_m", *self.extent)

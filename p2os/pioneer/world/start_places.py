@@ -8,11 +8,12 @@ import heapq
 import math
 from collections.abc import Iterator, Sequence
 
+from p2os.errors import WorldError
 from p2os.pioneer.world.geometry import Footprint, hull_polygon, placed
 from p2os.pioneer.world.model import Kind, Pose, World
 from p2os.pioneer.world.plan import Plan, StaticPlan
 from p2os.robots.parameters import RobotParameters
-from simbase.errors import UsageError, shown
+from simbase.errors import FileError, UsageError, shown
 
 #: chosen: finer than a hull is wide, so that the search passes no wall.
 LATTICE_M = 0.2
@@ -33,6 +34,7 @@ def start_places(world: World, models: Sequence[RobotParameters], given: Sequenc
 
     Raises:
         UsageError: A given place is not free, or there is no room for all.
+        WorldError: A robot could not stand at the world's own start.
     """
     plans = {id(model): Plan.of_world(world, model) for model in models}
     standing: dict[int, Standing] = {}
@@ -42,12 +44,7 @@ def start_places(world: World, models: Sequence[RobotParameters], given: Sequenc
     places = {key: _free_places(world, plan) for key, plan in plans.items()}
     for number, model in enumerate(models):
         if number not in standing:
-            taken = thing_at(world, model, world.start)
-            if taken is not None:
-                raise UsageError(
-                    f"the start of world {shown(world.name)} is inside {shown(taken)}",
-                    hint="its file sets another: [start] x_m, y_m",
-                )
+            refuse_start(world, model, world.start, world.start_at)
             pose = next((pose for pose in places[id(model)] if _is_apart(pose, model, standing)), None)
             if pose is None:
                 raise UsageError(
@@ -56,6 +53,29 @@ def start_places(world: World, models: Sequence[RobotParameters], given: Sequenc
                 )
             standing[number] = (pose, model)
     return tuple(standing[number][0] for number in range(len(models)))
+
+
+def refuse_start(
+    world: World, model: RobotParameters, start: Pose, at: str, *, error: type[FileError] = WorldError
+) -> None:
+    """Refuse a start beyond the floor, or inside a thing.
+
+    Args:
+        world: Where it is.
+        model: What would stand there.
+        start: The place.
+        at: What a message calls it: file, line and key.
+        error: What to raise.
+
+    Raises:
+        FileError: One of `error`.
+    """
+    where, name = f"{at}: x {start.x_m:g}, y {start.y_m:g}", shown(world.name)
+    if not _is_on_floor(world, start):
+        raise error(f"{where} is not in world {name}", hint=_extent_of(world))
+    thing = thing_at(world, model, start)
+    if thing is not None:
+        raise error(f"{where} in world {name} is inside {shown(thing)}", hint="p2os world show FILE draws a world")
 
 
 def thing_at(world: World, model: RobotParameters, pose: Pose) -> str | None:
@@ -72,16 +92,25 @@ def thing_at(world: World, model: RobotParameters, pose: Pose) -> str | None:
     return plan.touched(pose.x_m, pose.y_m, pose.heading_rad)[0] or "a low thing"
 
 
+def _is_on_floor(world: World, pose: Pose) -> bool:
+    """Tell whether a place is within a world's extent."""
+    x0, y0, x1, y1 = world.extent
+    return x0 <= pose.x_m <= x1 and y0 <= pose.y_m <= y1
+
+
+def _extent_of(world: World) -> str:
+    """Return a world's extent in words, for a hint."""
+    x0, y0, x1, y1 = world.extent
+    return f"x is {x0:g} to {x1:g} m there, and y {y0:g} to {y1:g} m"
+
+
 def _checked(
     number: int, pose: Pose, world: World, model: RobotParameters, plan: Plan, standing: dict[int, Standing]
 ) -> Pose:
     """Return a given place, with its floor's height."""
     where = f"robot {number + 1} at {pose.x_m:g}, {pose.y_m:g}"
-    x0, y0, x1, y1 = world.extent
-    if not (x0 <= pose.x_m <= x1 and y0 <= pose.y_m <= y1):
-        raise UsageError(
-            f"{where} is not in {world.name!r}", hint=f"x is {x0:g} to {x1:g} m there, and y {y0:g} to {y1:g} m"
-        )
+    if not _is_on_floor(world, pose):
+        raise UsageError(f"{where} is not in {world.name!r}", hint=_extent_of(world))
     if plan.clearance(pose.x_m, pose.y_m, pose.heading_rad) == 0.0:
         name = plan.touched(pose.x_m, pose.y_m, pose.heading_rad)[0]
         raise UsageError(f"{where} would stand in {name or 'a low thing'!r}", hint="p2os world show FILE draws a world")

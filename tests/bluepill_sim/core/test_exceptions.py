@@ -2,6 +2,8 @@
 
 import pytest
 
+from bluepill_sim.native.library import library_path
+
 ICSR, AIRCR, SHPR3, ISER0, ISPR0, IPR0, STIR = (
     0xE000ED04,
     0xE000ED0C,
@@ -12,6 +14,7 @@ ICSR, AIRCR, SHPR3, ISER0, ISPR0, IPR0, STIR = (
     0xE000EF00,
 )
 PENDSV = 1 << 28
+CORES = ["python", pytest.param("native", marks=pytest.mark.skipif(library_path() is None, reason="not built"))]
 
 
 def store(address: int, value: int) -> str:
@@ -178,6 +181,78 @@ pendsv: log #1
         {14: "pendsv"},
     )
     assert machine.log == [1, 2, 0]
+
+
+#: Who raises a request by one store of a word, and what to set up before: (address, word, exception, set-up).
+SOURCES = {
+    "PendSV": (ICSR, PENDSV, 14, ""),
+    "STIR": (STIR, 6, 16 + 6, store(ISER0, 1 << 6)),
+    "ISPR": (ISPR0, 1 << 6, 16 + 6, store(ISER0, 1 << 6)),
+    # SWIER sets its bit again only after PR has been cleared, which the handler does.
+    "EXTI": (0x40010410, 1, 16 + 6, store(ISER0, 1 << 6) + store(0x40010400, 1)),
+    # TXEIE while TXE is set; the handler clears it.
+    "USART": (
+        0x4001380C, 0x2080, 16 + 37, store(0x40021018, 0x4000) + store(0x40013808, 69) + store(0xE000E104, 1 << 5),
+    ),
+}  # fmt: skip
+QUENCH = {"EXTI": "mov32 r3, #0x40010414\nmovs r0, #1\nstr r0, [r3, #0]\n",
+          "USART": "mov32 r3, #0x4001380c\nmov32 r0, #0x2000\nstr r0, [r3, #0]\n"
+    "mov32 r3, #0xe000e284\nmovs r0, #32\nstr r0, [r3, #0]\n"}  # fmt: skip
+#: r1 is the address and r2 the word; r6 counts the stores, r5 the handler's runs.
+BLOCKS = {
+    "three stores under IT": "itttt eq\n.half 0x600A, 0x3601, 0x600A, 0x3601\nitt eq\n.half 0x600A, 0x3601\n",
+    "an IT block with an else": (
+        "ittet eq\n.half 0x600A, 0x3601, 0x3610, 0x600A\nittet eq\n.half 0x3601, 0x600A, 0x3610, 0x3601\n"
+    ),
+    "three stores in a row": "str r2, [r1, #0]\nadds r6, #1\n" * 3,
+}
+
+
+@pytest.mark.parametrize("core", CORES)
+@pytest.mark.parametrize("source", SOURCES)
+@pytest.mark.parametrize("block", BLOCKS)
+def test_each_request_of_one_block_is_served_before_the_next_is_raised(
+    core: str, source: str, block: str, boot, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("P2OS_CORE", core)
+    address, word, number, set_up = SOURCES[source]
+    machine = boot(
+        f"{set_up}mov32 r1, #{address}\nmov32 r2, #{word}\nmovs r6, #0\ncmp r6, #0\nb go\ngo: {BLOCKS[block]}"
+        "mov r0, r6\nlog r0\nb stop\n"
+        f"handler: adds r5, #1\n{QUENCH.get(source, '')}bx lr\n",
+        {number: "handler"},
+    ).run(200)
+    assert machine.log == [3]
+    assert machine.board.chip.engine.registers.general(5) == 3
+
+
+@pytest.mark.parametrize("core", CORES)
+def test_a_debugger_changes_nothing_where_a_request_ends_a_block(
+    core: str, boot, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("P2OS_CORE", core)
+    source = (
+        f"{store(ISER0, 1 << 6)}mov32 r1, #{STIR}\nmovs r2, #6\ncmp r2, #6\nb go\n"
+        f"go: {BLOCKS['an IT block with an else']}b stop\nhandler: adds r5, #1\nbx lr\n"
+    )
+    ends = []
+    for way in ("free", "breakpoints", "steps"):
+        machine = boot(source, {16 + 6: "handler"})
+        chip, go, stop = machine.board.chip, machine.label("go"), machine.label("stop")
+        if way == "breakpoints":
+            chip.engine.breakpoints.update(range(go, stop, 2))
+        chip.engine.breakpoints.add(stop)
+        seen: list[tuple[int, int]] = []
+        for _ in range(200):
+            (chip.step if way == "steps" else chip.advance_to)(1_000_000)
+            seen.append((chip.engine.pc, chip.engine.cycle))
+            if chip.engine.pc == stop and not chip.processor.nvic.pending:
+                break
+        general = chip.engine.registers.general
+        ends.append((chip.engine.pc == stop, chip.engine.cycle, general(5), general(6)))
+        assert len(seen) == len(set(seen)), "each step gets somewhere"
+    assert ends[0] == ends[1] == ends[2]
+    assert ends[0][2:] == (3, 3)
 
 
 @pytest.mark.parametrize("pad", range(58, 68))

@@ -1,6 +1,9 @@
 """The verbs that sit on lines: sniff, record and replay against a served robot."""
 
+import contextlib
 import json
+import subprocess
+import sys
 import threading
 from collections.abc import Callable
 from pathlib import Path
@@ -9,6 +12,7 @@ import pytest
 
 from p2os.capture import Chunk, Direction, capture_of, read_file, read_pcap, write_recording
 from p2os.capture.replay import Replay
+from p2os.cli.captures.capture_files import RecordingFile, Sinks
 from p2os.cli.captures.record import record_session
 from p2os.cli.captures.replay import motions_of, play
 from p2os.cli.captures.sniff import Bridge
@@ -307,11 +311,75 @@ def test_a_replay_to_a_robot_that_has_fallen_silent_stops_it_and_ends(silence_ms
 
 
 @pytest.mark.skipif(not Path("/dev/full").exists(), reason="this system has no full disk at hand")
-def test_a_disk_that_is_full_is_named(served: object, run: Run, capsys: Capture) -> None:
-    for words in (["record", served.url, "--out", "/dev/full"], ["sniff", served.url, "--listen", "tcp:127.0.0.1:0",
-                  "--pcap", "/dev/full"]):  # fmt: skip
-        assert run(*words) == 2
-        assert "p2os: cannot write /dev/full: no space left on device\n" in capsys.readouterr().err
+@pytest.mark.parametrize("option", ["--out", "--pcap"])
+@pytest.mark.parametrize("verb", ["record", "sniff"])
+def test_a_disk_that_is_full_from_the_start_is_one_line(
+    verb: str, option: str, served: object, run: Run, tmp_path: Path, capsys: Capture
+) -> None:
+    more = ["--listen", "tcp:127.0.0.1:0"] if verb == "sniff" else []
+    more += [] if option == "--out" or verb == "sniff" else ["--out", tmp_path / "floor.jsonl"]
+    assert run(verb, served.url, *more, option, "/dev/full") == 1
+    err = capsys.readouterr().err
+    assert [line for line in err.splitlines() if line.startswith(("p2os:", "hint:"))] == [
+        "p2os: cannot write /dev/full: no space left on device"
+    ]
+
+
+LIMITED = """
+import resource, sys
+from p2os.cli.main import main
+resource.setrlimit(resource.RLIMIT_FSIZE, (1_500, 1_500))
+main(sys.argv[1:])
+"""
+
+
+@pytest.mark.parametrize(("verb", "option"), [("record", "--pcap"), ("sniff", "--out")])
+def test_a_disk_that_fills_up_is_one_line_and_what_was_written_can_be_read(
+    verb: str, option: str, served: object, tmp_path: Path
+) -> None:
+    full = tmp_path / ("floor.jsonl" if option == "--out" else "floor.pcap")
+    other = ["--out", "/dev/null"] if (verb, option) == ("record", "--pcap") else []
+    more = ["--listen", "tcp:127.0.0.1:0", "--quiet"] if verb == "sniff" else ["--for", "20s"]
+    with subprocess.Popen(
+        [sys.executable, "-c", LIMITED, verb, served.url, *more, *other, option, str(full)],
+        stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, cwd=tmp_path,
+    ) as process:  # fmt: skip
+        try:
+            assert process.stderr is not None
+            said = process.stderr.readline()
+            if verb == "sniff":
+                with contextlib.suppress(RemoteProtocolError, TransportError):
+                    record_session(open_url(said.split()[2]), lambda _chunk: None, lasts_ns=20 * NS_PER_S)
+            said += process.communicate(timeout=30)[1]
+        finally:
+            process.kill()
+    assert process.returncode == 1, said
+    lines = [line for line in said.splitlines() if line.startswith(("p2os:", "hint:", "Traceback"))]
+    assert lines == [
+        f"p2os: cannot write {full}: file too large",
+        f"hint: what it held before is whole: p2os decode {full}",
+    ]
+    assert "session was open: sent STOP" in said or verb == "record"
+    assert 1_000 < full.stat().st_size <= 1_500
+    capture = read_file(full)
+    assert len(capture.bytes_of(FROM)) > 200
+    if option == "--out":
+        assert full.read_text().endswith("}\n")
+
+
+def test_what_one_file_refuses_the_others_still_take(tmp_path: Path) -> None:
+    class Refusing:
+        def take(self, _chunk: Chunk) -> None:
+            raise RunFailedError("full")
+
+        def close(self) -> None: ...
+
+    kept = RecordingFile(tmp_path / "kept.jsonl")
+    both = Sinks([Refusing(), kept])
+    with pytest.raises(RunFailedError, match="full"):
+        both.take(Chunk(at_ns=0, direction=TO, data=b"x"))
+    both.close()
+    assert read_file(tmp_path / "kept.jsonl").bytes_of(TO) == b"x"
 
 
 def test_a_bridge_whose_robot_is_gone_refuses_its_client() -> None:

@@ -113,3 +113,15 @@ def test_a_broken_world_is_named_with_its_line(
     Path("bad.toml").write_text('name = "x"\nextent_m = [0, 0, 1, 1]\n\n[start]\nx_mm = 3\n')
     assert run(["world", "check", "bad.toml"]) == 2
     assert capsys.readouterr().err == "p2os: bad.toml:5: unknown key start.x_mm\nhint: did you mean start.x_m?\n"
+
+
+def test_a_start_where_no_robot_can_stand_is_named_with_its_line(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    post = '[[cylinder]]\nname = "post"\nx_m = 1\ny_m = 0\nradius_m = 0.1\n'
+    for x_m, said in ((1, "in world 'yard' is inside 'post'"), (4, "is not in world 'yard'")):
+        Path("yard.toml").write_text(f'name = "yard"\nextent_m = [-3, -3, 3, 3]\n[start]\nx_m = {x_m}\n{post}')
+        for words in (["world", "check", "yard.toml"], ["serve", "--world", "yard.toml", "--port", "tcp:127.0.0.1:0"]):
+            assert run(words) == 2
+            assert f"p2os: yard.toml:3: [start]: x {x_m}, y 0 {said}\n" in capsys.readouterr().err

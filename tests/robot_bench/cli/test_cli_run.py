@@ -58,6 +58,20 @@ def test_json_is_one_object_with_all_that_was_promised(capsys: pytest.CaptureFix
     assert read_run(Path("there")).end["trace_sha256"] == outcome["trace_sha256"]
 
 
+def test_the_speed_of_the_usarts_far_end_is_a_key_and_an_option(capsys: pytest.CaptureFixture[str]) -> None:
+    Path("slow.toml").write_text(
+        LEAST.replace("x.bin", "motors.elf")
+        + 'usart_baud = 9600\n[[goal]]\nkind = "usart_contains"\ntext = "motors"\n',
+        encoding="utf-8",
+    )
+    assert p2os(["run", "slow.toml", "--json"]) == 1
+    outcome = json.loads(capsys.readouterr().out)
+    assert outcome["usart_baud"] == 115200  # the firmware's own; the far end is at 9600
+    assert [note for note in outcome["notes"] if "and the far end at 9600: characters arrive damaged" in note]
+    assert outcome["failures"][0].startswith("usart_contains: 'motors' was not printed")
+    assert p2os(["run", "slow.toml", "--usart-baud", "115200"]) == 0
+
+
 def test_a_goal_that_is_missed_ends_with_1_and_is_named(capsys: pytest.CaptureFixture[str]) -> None:
     scenario = make(thumb.SLEEP, LEAST + '[[goal]]\nkind = "min_distance"\ndistance_m = 1\n')
     assert p2os(["run", scenario]) == 1

@@ -250,9 +250,48 @@ def test_what_its_world_or_no_world_bears_is_refused_by_file_and_line(tmp_path: 
 
 def test_a_start_inside_a_thing_is_refused_by_its_name(tmp_path: Path) -> None:
     thing = next(item for item in load_world("room").obstacles if item.name == "crate")
-    text = LEAST + f"start = {{ x_m = {thing.x_m}, y_m = {thing.y_m} }}\n"
-    with pytest.raises(ScenarioError, match=r"\[start\]: x .* in world 'room' is inside 'crate'"):
-        read_scenario(write(tmp_path, text))
+    place = f"x_m = {thing.x_m}\ny_m = {thing.y_m}\n"
+    inline = f"start = {{ {place.replace(chr(10), ', ', 1).strip()} }}\n"
+    for text, at in (
+        (inline, "mine.toml:4: [start]"),
+        (f"[start]\n{place}", "mine.toml:4: [start]"),
+        (f"[in_world.room]\nthreshold_m = 1\n{inline}", "mine.toml:6: [in_world.room.start]"),
+        (f"[in_world.room.start]\n{place}", "mine.toml:4: [in_world.room.start]"),
+    ):
+        with pytest.raises(ScenarioError) as caught:
+            read_scenario(write(tmp_path, LEAST + text))
+        where = f"x {thing.x_m:g}, y {thing.y_m:g} in world 'room'"
+        assert str(caught.value) == f"{at}: {where} is inside 'crate'"
+
+
+def test_a_worlds_own_start_inside_a_thing_is_refused_by_the_worlds_file_and_line(tmp_path: Path) -> None:
+    (tmp_path / "yard.toml").write_text(
+        'name = "yard"\nextent_m = [-3, -3, 3, 3]\n[start]\nx_m = 1\n'
+        '[[cylinder]]\nname = "post"\nx_m = 1\ny_m = 0\nradius_m = 0.1\n'
+    )
+    with pytest.raises(ScenarioError) as caught:
+        read_scenario(write(tmp_path, LEAST.replace("room", "yard.toml")))
+    assert str(caught.value) == f"{tmp_path / 'yard.toml'}:3: [start]: x 1, y 0 in world 'yard' is inside 'post'"
+
+
+@pytest.mark.parametrize(("x_m", "is_in"), [(2.999, True), (3.001, False), (-3.001, False)])
+def test_a_start_beyond_the_floor_is_refused_with_its_extent(tmp_path: Path, x_m: float, is_in: bool) -> None:
+    (tmp_path / "yard.toml").write_text('name = "yard"\nextent_m = [-3, -2, 3, 2]\n')
+    path = write(tmp_path, LEAST.replace("room", "yard.toml") + f"[start]\nx_m = {x_m}\ny_m = 0\n")
+    if is_in:
+        assert read_scenario(path).start is not None
+        return
+    with pytest.raises(ScenarioError) as caught:
+        read_scenario(path)
+    assert str(caught.value) == f"mine.toml:4: [start]: x {x_m:g}, y 0 is not in world 'yard'"
+    assert caught.value.hint == "x is -3 to 3 m there, and y -2 to 2 m"
+
+
+def test_a_start_of_a_world_that_an_option_moves_to_has_its_line_too(tmp_path: Path) -> None:
+    text = LEAST + "[in_world.corridor]\nstart = { x_m = 900, y_m = 0 }\n"
+    moved = read_scenario(write(tmp_path, text)).with_options(world="corridor", body="kinematic")
+    with pytest.raises(ScenarioError, match=r"^mine.toml:5: \[in_world.corridor.start\]: x 900, y 0 is not in world"):
+        Bench(moved)
 
 
 def test_a_program_that_moves_a_scenario_to_another_world_is_told_of_its_names_too(tmp_path: Path) -> None:
