@@ -72,7 +72,7 @@ LAYERS = {
     ),
     "robot_bench": (
         ("loop", "pacer", "firmware", "scenarios"), ("wires",), ("direct",), ("recording",), ("scenario", "report"),
-        ("adapter",), ("bench",), ("remote",), ("run", "debugging"), ("cli",),
+        ("adapter", "measurement"), ("bench",), ("remote",), ("run", "debugging"), ("cli",),
     ),
 }  # fmt: skip
 
