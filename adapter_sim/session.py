@@ -36,7 +36,8 @@ from p2os.protocol.connection import (
     Synchronised,
 )
 from p2os.protocol.sip import StandardSip
-from p2os.timing import NS_PER_MS, Nanos
+from p2os.protocol.times import CYCLE_NS
+from p2os.timing import Nanos
 
 
 @dataclass(frozen=True, slots=True)
@@ -166,7 +167,7 @@ class Session:
 
 
 #: A robot whose bytes came so recently is still streaming: one SIP period.
-_STREAMING_NS: Nanos = 100 * NS_PER_MS
+_STREAMING_NS: Nanos = CYCLE_NS
 
 #: Next repetition, how many are left, whether closed on request, when bytes of the robot came last.
 StopRepeaterSnapshot: TypeAlias = tuple[Nanos, int, bool, Nanos]
