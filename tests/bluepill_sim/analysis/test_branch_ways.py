@@ -110,6 +110,14 @@ def test_a_fault_at_the_first_instruction_of_a_block_goes_no_way(boot) -> None:
     assert coverage.instructions().get(machine.label("way"), 0) == 0
 
 
+def test_what_follows_a_branch_but_is_neither_of_its_ways_is_no_way(boot) -> None:
+    machine = boot("cmp r5, #0\nway: bne stop\nb stop")
+    coverage = Coverage(machine.image, LineTable(), StaticCode(machine.board.chip.memory))
+    for following in (machine.label("start"), 0x0800_4000):  # a debugger has set the PC
+        coverage.block(machine.label("way"), following, 0, 1)
+    assert coverage.branches()[machine.label("way")] == (0, 0)
+
+
 def test_counts_of_several_resets_add_up_and_a_reset_is_no_way(boot) -> None:
     machine = boot(RESETS)
     profile = CycleProfile(FunctionTable(machine.image), StaticCode(machine.board.chip.memory))
