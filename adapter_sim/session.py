@@ -36,8 +36,9 @@ from p2os.protocol.connection import (
     Synchronised,
 )
 from p2os.protocol.sip import StandardSip
+from p2os.protocol.times import CYCLE_NS
 from simbase.state import Stateful
-from simbase.timing import NS_PER_MS, Nanos
+from simbase.timing import Nanos
 
 
 @dataclass(frozen=True, slots=True)
@@ -159,7 +160,7 @@ class Session(Stateful):
 
 
 #: A robot whose bytes came so recently is still streaming: one SIP period.
-_STREAMING_NS: Nanos = 100 * NS_PER_MS
+_STREAMING_NS: Nanos = CYCLE_NS
 
 
 class StopRepeater(Stateful):

@@ -7,6 +7,7 @@ from dataclasses import dataclass, fields
 from enum import StrEnum
 
 from adapter_sim.codec import BitOrder
+from p2os.protocol.times import LIVENESS_NS, PULSE_NS
 from simbase.errors import UsageError
 from simbase.timing import NS_PER_MS, NS_PER_S, Nanos
 
@@ -74,10 +75,10 @@ class AdapterSettings:
     #: An unchanged pair is sent again after this long.
     refresh_ns: Nanos = 200 * NS_PER_MS
     #: PULSE after this long without any frame, while no pairs are sent.
-    pulse_ns: Nanos = 500 * NS_PER_MS
+    pulse_ns: Nanos = PULSE_NS
 
-    #: No valid SIP for this long is a loss: three periods of 100 ms and a frame.
-    liveness_ns: Nanos = 350 * NS_PER_MS
+    #: No valid SIP for this long is a loss.
+    liveness_ns: Nanos = LIVENESS_NS
     #: After OPEN the first SIP may take this long.
     first_sip_ns: Nanos = 1 * NS_PER_S
     #: After a connection that failed, the next try begins this much later.

@@ -83,6 +83,8 @@ class Chip:
         self._clock = CycleClock(self.clocks.hclk_hz)
         #: Called with (line, level, ns) at every change of an interrupt line, for tools.
         self.irq_listeners: list[Callable[[int, bool, Nanos], None]] = []
+        #: Called before each reset, for tools.
+        self.reset_listeners: list[Callable[[], None]] = []
         #: Time of the event that a peripheral is acting on, while it does.
         self._event_ns: Nanos | None = None
         self._stop_requested = False
@@ -201,6 +203,8 @@ class Chip:
         self._requested_reset = None
         if self.on_reset is not None:
             self.on_reset(cause)
+        for listener in self.reset_listeners:
+            listener()
         vectors = self.boot_address()
         if cause is ResetCause.POWER:
             self.memory.lose_power()

@@ -18,7 +18,7 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from importlib.metadata import version
 from pathlib import Path
-from typing import TypeVar
+from typing import TYPE_CHECKING, TypeVar
 
 from p2os.pioneer.world.model import Pose, World
 from p2os.transport import Transport
@@ -33,8 +33,12 @@ from robot_bench.remote import RemoteBench
 from robot_bench.report.make import make_artefacts
 from robot_bench.scenario.goals import judge
 from robot_bench.scenario.scenario import Scenario
+from robot_bench.wires.ports import Chip
 from simbase.errors import P2osError
 from simbase.timing import NS_PER_MS, NS_PER_S, Nanos
+
+if TYPE_CHECKING:
+    from robot_bench.measurement import Measurement
 
 #: chosen: without pacing, control comes back often enough for progress and signals.
 UNPACED_SLICE_NS: Nanos = 10 * NS_PER_MS
@@ -90,6 +94,8 @@ def run_scenario(
     clock: Clock = wall_clock,
     drive: RunBench | None = None,
     force: bool = False,
+    coverage: bool = False,
+    profile: bool = False,
 ) -> RunResult:
     """Run a scenario in virtual time and make its run folder.
 
@@ -102,6 +108,8 @@ def run_scenario(
         clock: Wall clock in nanoseconds.
         drive: Runs the bench in place of its `run_until`; a debugger.
         force: Overwrite the run that the folder holds.
+        coverage: Write which lines and branches of the firmware ran; not with a `drive` that goes back.
+        profile: Write where its cycles went; likewise.
 
     Raises:
         P2osError: The folder is not free, a file cannot be read or written, or a part is not installed.
@@ -119,7 +127,8 @@ def run_scenario(
 
         bench.on_slice = after_slice
         trace.meta(meta_of(scenario, bench.parts.world, bench.note, is_at_port=False))
-        return _record(bench, trace, folder, pacer, clock, drive)
+        with _measured(bench.chip, coverage=coverage, profile=profile) as measurement:
+            return _record(bench, trace, folder, pacer, clock, drive, measurement)
 
 
 def run_at_port(
@@ -197,6 +206,18 @@ def meta_of(scenario: Scenario, world: World | None, note: str | None, *, is_at_
     }
 
 
+def _measured(chip: Chip, *, coverage: bool, profile: bool) -> "contextlib.AbstractContextManager[Measurement | None]":
+    """Return a block in which coverage and profile of a chip are measured; nothing is where neither is wanted."""
+    if not coverage and not profile:
+        return contextlib.nullcontext()
+    from bluepill_sim.board import BluePill
+    from robot_bench.measurement import measuring
+
+    if not isinstance(chip, BluePill):
+        raise TypeError(f"a {type(chip).__name__} cannot be measured: an emulated BluePill can")
+    return measuring(chip, coverage=coverage, profile=profile)
+
+
 def _sha256_of(firmware: Path) -> str | None:
     try:
         return hashlib.sha256(firmware.read_bytes()).hexdigest()
@@ -244,6 +265,7 @@ def _record(
     pacer: RealTimePacer | None,
     clock: Clock,
     drive: Callable[[_AnyBench], None] | None,
+    measurement: "Measurement | None" = None,
 ) -> RunResult:
     """Run to the end, judge the goals, write the trace's last line, and make the rest of the folder."""
     failures: list[str] = []
@@ -285,6 +307,7 @@ def _record(
             "last_blocks": last_blocks(bench, end, was_interrupted=was_interrupted),
             "worst_lag_ms": None if pacer is None else round(pacer.worst_lag_ns / NS_PER_MS, 1),
         }
+        | ({} if measurement is None else measurement.write(folder, bench.scenario.firmware.parent))
     )
     made = make_artefacts(folder)
     return RunResult(folder=folder, outcome=made.outcome, report=made.report, was_interrupted=was_interrupted)

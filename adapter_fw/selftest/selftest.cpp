@@ -19,7 +19,7 @@ namespace {
 constexpr std::int32_t MOST_MM_S = 400, MOST_DEG_S = 100;
 constexpr Nanos STEP_NS = 1 * NS_PER_MS;
 //: A SIP's age beyond which nothing but zero may stand on the wire.
-constexpr Nanos LIVENESS_NS = 350 * NS_PER_MS;
+using p2os::LIVENESS_NS;
 
 //: Numerical Recipes' generator: the same numbers on every machine.
 class RandomSource {

@@ -1,11 +1,12 @@
-"""Which lines and branches of a firmware have run, from its blocks and its DWARF.
+"""Which lines, functions and branches of a firmware have run, from its blocks, its symbols and its DWARF.
 
 A line has run when the first instruction of any of its rows has. A branch is
 an instruction that leaves under a condition; its two ways are "taken" and
 "fell through". What the compiler made conditional without a branch (IT blocks)
-counts as one way.
+counts as one way. Branches are those of the machine: a `&&` of C is two of them.
 
 Not shown: lines that gave no code, and branches of a jump table that nothing reached.
+Code in SRAM is read when the counts are asked for, so what was written over since is not told apart.
 Invariant: counts only grow; watching changes nothing.
 """
 
@@ -15,7 +16,7 @@ from dataclasses import dataclass, field
 from bluepill_sim.program.functions import FunctionTable
 from bluepill_sim.program.image import Image
 from bluepill_sim.program.line_table import LineTable
-from bluepill_sim.program.static_code import StaticCode
+from bluepill_sim.program.static_code import StaticBlock, StaticCode
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,20 +51,54 @@ class FileCoverage:
         return [count for rows in self.branches.values() for row in rows for count in (row.taken, row.not_taken)]
 
     @property
+    def one_way(self) -> list[tuple[int, BranchCount]]:
+        """(line, branch) of what has run and always gone the same way."""
+        rows = [(line, row) for line, found in sorted(self.branches.items()) for row in found]
+        return [(line, row) for line, row in rows if bool(row.taken) is not bool(row.not_taken)]
+
+    @property
     def missed_lines(self) -> list[int]:
         """Lines that have code and did not run."""
         return sorted(line for line, count in self.lines.items() if not count)
+
+
+@dataclass(frozen=True, slots=True)
+class OneWayBranch:
+    """A conditional branch that has run and always gone the same way."""
+
+    address: int
+    times: int
+    #: Where it went on; None through a register or the stack: a return.
+    gone: int | None
+    #: Where it never went on; None likewise.
+    missed: int | None
+
+
+@dataclass(frozen=True, slots=True)
+class FunctionCoverage:
+    """What has run of one function."""
+
+    name: str
+    address: int
+    instructions: int
+    instructions_hit: int
+    calls: int
+    ways: int
+    ways_hit: int
 
 
 class Coverage:
     """Counts what runs; a `BlockListener`."""
 
     def __init__(self, image: Image, lines: LineTable, code: StaticCode) -> None:
+        self._image = image
         self._table = lines
         self._code = code
         self._functions = FunctionTable(image)
         #: How often each block was followed by each other.
         self._edges: Counter[tuple[int, int | None]] = Counter()
+        #: The block that ends with each conditional branch.
+        self._conditional: dict[int, StaticBlock] = {}
 
     # As a `BlockListener`.
 
@@ -76,6 +111,9 @@ class Coverage:
 
     def leave(self, cycle: int) -> None:
         """Exceptions count for nothing here."""
+
+    def reset(self, cycle: int) -> None:
+        """A reset goes on counting."""
 
     # The result.
 
@@ -90,21 +128,82 @@ class Coverage:
     def branches(self) -> dict[int, tuple[int, int]]:
         """Return (taken, not taken) of every conditional branch, by address."""
         counts: dict[int, tuple[int, int]] = {}
-        entries = [function.address for function in self._functions.functions]
-        entries += [start for start, _ in self._edges]
-        for block in self._code.reachable(entries, self._functions.end_of).values():
+        for block in self._reachable().values():
             if block.is_conditional:
                 counts[block.last.address] = (0, 0)
+                self._conditional[block.last.address] = block
         for (start, following), times in self._edges.items():
             block = self._code.block(start)
             if not block.is_conditional or following is None or block.ends_before(following):
                 continue
             taken, not_taken = counts.get(block.last.address, (0, 0))
+            self._conditional[block.last.address] = block
             if following == block.end:
                 counts[block.last.address] = taken, not_taken + times
-            else:
+            elif block.last.destination in (None, following):
                 counts[block.last.address] = taken + times, not_taken
         return counts
+
+    def one_way(self) -> list[OneWayBranch]:
+        """Return the conditional branches that have run and gone one way only, by address."""
+        found = []
+        for address, (taken, not_taken) in sorted(self.branches().items()):
+            if bool(taken) is not bool(not_taken):
+                block = self._conditional[address]
+                ways = (block.last.destination, block.end) if taken else (block.end, block.last.destination)
+                found.append(OneWayBranch(address, taken + not_taken, *ways))
+        return found
+
+    @property
+    def unreached(self) -> int:
+        """How many conditional branches have not run at all."""
+        return sum(1 for ways in self.branches().values() if not any(ways))
+
+    def place(self, address: int) -> str:
+        """Return "file.c:12", as far as is known: else "symbol+0x4 (0x08000100)", else the address alone."""
+        return self._table.place(address) or self._image.symbols.where(address)
+
+    def function_name(self, address: int) -> str:
+        """Return the name of the function that an address is in."""
+        return self._functions.name(address)
+
+    @property
+    def has_lines(self) -> bool:
+        """Whether the program has debug information."""
+        return bool(self._table.rows)
+
+    def functions(self) -> list[FunctionCoverage]:
+        """Return what has run of each function, by address; nothing where the file has no symbols."""
+        counts, branches = self.instructions(), self.branches()
+        there = {address for block in self._reachable().values() for address in block.addresses} | set(counts)
+        inside: dict[int, list[int]] = {}
+        for address in there:
+            inside.setdefault(self._functions.start_of(address), []).append(address)
+        found = []
+        for function in self._functions.functions:
+            own = inside.get(function.address, [])
+            ways = [count for address in own for count in branches.get(address, ())]
+            hit, ways_hit = (sum(1 for n in some if n) for some in ([counts.get(a, 0) for a in own], ways))
+            calls = counts.get(function.address, 0)
+            found.append(FunctionCoverage(function.name, function.address, len(own), hit, calls, len(ways), ways_hit))
+        return found
+
+    def pieces(self) -> list[tuple[int, int]]:
+        """Return (first, address after) of each stretch of instructions that ran without a gap, by address."""
+        found: list[tuple[int, int]] = []
+        for start, following in sorted(self._edges, key=lambda edge: edge[0]):
+            block = self._code.block(start)
+            end = following if following is not None and block.ends_before(following) else block.end
+            if found and start <= found[-1][1]:
+                found[-1] = found[-1][0], max(end, found[-1][1])
+            else:
+                found.append((start, end))
+        return found
+
+    def _reachable(self) -> dict[int, StaticBlock]:
+        entries = [function.address for function in self._functions.functions]
+        entries += [start for start, _ in self._edges]
+        return self._code.reachable(entries, self._functions.end_of)
 
     def files(self) -> list[FileCoverage]:
         """Return what has run of each source file, by name."""

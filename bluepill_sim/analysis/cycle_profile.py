@@ -21,7 +21,7 @@ from bluepill_sim.core.nvic import exception_name
 from bluepill_sim.core.processor import ENTRY_CYCLES, EXIT_CYCLES
 from bluepill_sim.core.thumb import Kind
 from bluepill_sim.program.functions import FunctionTable
-from bluepill_sim.program.static_code import StaticCode
+from bluepill_sim.program.static_code import StaticBlock, StaticCode
 
 ASLEEP = "(asleep)"
 _SLEEPS = frozenset({Kind.WAIT_INTERRUPT, Kind.WAIT_EVENT})
@@ -54,10 +54,14 @@ class _Stack:
     root: tuple[str, ...]
     frames: list[_Frame] = field(default_factory=list)
     called_from: int | None = None
+    #: Names of root and frames; None when the frames have changed since.
+    known_names: tuple[str, ...] | None = None
 
     @property
     def names(self) -> tuple[str, ...]:
-        return (*self.root, *(frame.name for frame in self.frames))
+        if self.known_names is None:
+            self.known_names = (*self.root, *(frame.name for frame in self.frames))
+        return self.known_names
 
 
 class CycleProfile:
@@ -66,6 +70,8 @@ class CycleProfile:
     def __init__(self, functions: FunctionTable, code: StaticCode) -> None:
         self._functions = functions
         self._code = code
+        #: By where a block begins: its function's name, whether it is that one's first, and what stands there.
+        self._places: dict[int, tuple[str, bool, StaticBlock]] = {}
         self._stacks = [_Stack(())]
         #: The cycle at which what was charged ends; None before the first block.
         self._end: int | None = None
@@ -82,15 +88,16 @@ class CycleProfile:
         self._charge_gap(cycle)
         self._end = cycle + cycles
         stack = self._stacks[-1]
-        self._arrive(stack, address)
-        block = self._code.block(address)
-        ends_early = block.ends_before(following)
-        if block.last.kind in _SLEEPS and not ends_early:
+        place = self._places.get(address) or self._look_at(address)
+        self._arrive(stack, address, place[0], is_entry=place[1])
+        block = place[2]
+        if block.last.kind in _SLEEPS and not block.ends_before(following):
             awake = min(cycles, len(block.addresses))
             self.stacks[*stack.names, ASLEEP] += cycles - awake
             cycles = awake
         self.stacks[stack.names] += cycles
-        stack.called_from = block.end if block.is_call and not ends_early and following != block.end else None
+        is_call = block.is_call and following != block.end and not block.ends_before(following)
+        stack.called_from = block.end if is_call else None
 
     def enter(self, number: int, cycle: int) -> None:
         """Open the stack of an exception."""
@@ -104,6 +111,12 @@ class CycleProfile:
         self._end = cycle
         if len(self._stacks) > 1:
             self._gap_names = self._stacks.pop().root
+
+    def reset(self, cycle: int) -> None:
+        """Begin anew on an empty stack; what was charged stays."""
+        self._charge_gap(cycle)
+        self._stacks = [_Stack(())]
+        self._end, self._gap_names = cycle, ()
 
     # The result.
 
@@ -137,23 +150,30 @@ class CycleProfile:
             self.stacks[self._gap_names] += awake
             self.stacks[ASLEEP,] += cycle - self._end - awake
 
-    def _arrive(self, stack: _Stack, address: int) -> None:
-        """Bring the frames to the function that a block is in."""
-        name = self._functions.name(address)
+    def _look_at(self, address: int) -> tuple[str, bool, StaticBlock]:
         is_entry = self._functions.start_of(address) == address
+        place = self._places[address] = self._functions.name(address), is_entry, self._code.block(address)
+        return place
+
+    def _arrive(self, stack: _Stack, address: int, name: str, *, is_entry: bool) -> None:
+        """Bring the frames to the function that a block is in."""
         if stack.called_from is not None and len(stack.frames) < _DEEPEST:
             stack.frames.append(_Frame(name, stack.called_from))
+            stack.known_names = None
             self.calls[name] += 1
             return
         for depth in range(len(stack.frames) - 1, -1, -1):
             frame = stack.frames[depth]
             if frame.comes_back_to == address and (depth == 0 or stack.frames[depth - 1].name == name):
                 del stack.frames[depth:]
+                stack.known_names = None
                 break
         if not stack.frames:
+            stack.known_names = None
             stack.frames.append(_Frame(name, None))
             self.calls[name] += is_entry
         elif stack.frames[-1].name != name:
+            stack.known_names = None
             if is_entry:  # a tail call: what it returns to stays
                 stack.frames[-1].name = name
                 self.calls[name] += 1

@@ -110,6 +110,12 @@ class Latency:
             number, began = self._running.pop()
             self.costs[number].durations.append(cycle - began)
 
+    def reset(self, cycle: int) -> None:  # noqa: ARG002 - a listener
+        """Forget what was due or ran: it never will be served, nor return."""
+        self._entered = None
+        self._running.clear()
+        self._due.clear()
+
     # What makes exceptions pending.
 
     def _irq_changed(self, irq: int, level: bool, at_ns: Nanos) -> None:

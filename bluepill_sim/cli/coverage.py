@@ -7,10 +7,10 @@ from typing import Annotated
 import typer
 
 from bluepill_sim.analysis.coverage import Coverage, FileCoverage
+from bluepill_sim.analysis.coverage_text import coverage_lines
 from bluepill_sim.analysis.lcov import write_lcov
 from bluepill_sim.analysis.observation import Observation
 from bluepill_sim.board import BluePill
-from bluepill_sim.cli.columns import print_columns
 from bluepill_sim.cli.driving import parse_changes, print_fault, print_status, run_driven, summary, warn_on_stderr
 from bluepill_sim.errors import BluePillError
 from bluepill_sim.program.line_table import read_lines
@@ -19,14 +19,15 @@ from bluepill_sim.timing import to_nanos
 
 HELP = """Run a firmware for a while and show which of its lines and branches ran.
 
-The ELF must have debug information (gcc -g). With --lcov the result is also
+Compile with -Og -g: lines come from the ELF's debug information. Without it the
+table is by function, without symbols by address. With --lcov the result is also
 written as an lcov tracefile, which genhtml, editors and CI services read.
 
 \b
 Examples:
   p2os mcu coverage mine.elf --for 5s                     a summary by file
   p2os mcu coverage mine.elf --lcov mine.info             for genhtml mine.info -o html
-  p2os mcu coverage mine.elf --drive PA6=1@3.5s --missed  the lines that nothing reached
+  p2os mcu coverage mine.elf --drive PA6=1@3.5s --missed  what nothing reached
   p2os mcu coverage mine.elf --fail-under 80              exit code 1 below 80 % of the lines
 """
 
@@ -46,7 +47,9 @@ def coverage(
     sources: Annotated[
         Path | None, typer.Option(help="Where relative names of source files start from.", metavar="FOLDER")
     ] = None,
-    missed: Annotated[bool, typer.Option("--missed", help="Name the lines that did not run.")] = False,
+    missed: Annotated[
+        bool, typer.Option("--missed", help="Name lines that did not run, and branches that went one way.")
+    ] = False,
     fail_under: Annotated[
         float, typer.Option(help="Least share of lines, in %.", metavar="PERCENT", min=0, max=100)
     ] = 0.0,
@@ -55,7 +58,7 @@ def coverage(
     """Measure coverage."""
     board = BluePill(firmware)
     table = read_lines(board.image)
-    if not table.rows:
+    if not table.rows and (lcov is not None or fail_under or json_output):
         raise BluePillError(f"{firmware}: no debug information in it", hint="build with -g, and give the ELF itself")
     changes = parse_changes(drive or [], board)
     warn_on_stderr(board)
@@ -68,10 +71,10 @@ def coverage(
     if json_output:
         typer.echo(json.dumps([_facts(file) for file in files], sort_keys=True))
     else:
-        _print(files, missed=missed)
+        typer.echo("\n".join(coverage_lines(listener, missed=missed)))
     print_status(summary(board))
     has_died = print_fault(board)
-    share = 100 * sum(f.lines_hit for f in files) / sum(len(f.lines) for f in files)
+    share = 100 * sum(f.lines_hit for f in files) / max(1, sum(len(f.lines) for f in files))
     if share < fail_under:
         print_status(f"coverage: {share:.1f} % of the lines are less than {fail_under:g} %")
     if has_died or share < fail_under:
@@ -89,42 +92,8 @@ def _facts(file: FileCoverage) -> dict[str, object]:
         "functions": len(file.functions),
         "functions_hit": sum(1 for _, _, calls in file.functions if calls),
         "missed_lines": file.missed_lines,
+        "one_way_branches": [
+            {"line": line, "address": row.address, "taken": row.taken, "not_taken": row.not_taken}
+            for line, row in file.one_way
+        ],
     }
-
-
-def _print(files: list[FileCoverage], *, missed: bool) -> None:
-    facts = [_facts(file) for file in files]
-    pairs = (("lines_hit", "lines"), ("branches_hit", "branches"), ("functions_hit", "functions"))
-
-    def row(name: str, counts: list[tuple[int, int]]) -> list[str]:
-        cells = [name]
-        for hit, whole in counts:
-            cells += [f"{hit}/{whole}", f"{hit / whole:.1%}" if whole else ""]
-        return cells
-
-    rows = [
-        row(_short(str(fact["file"])), [(int(str(fact[a])), int(str(fact[b]))) for a, b in pairs]) for fact in facts
-    ]
-    sums = [(sum(int(str(fact[a])) for fact in facts), sum(int(str(fact[b])) for fact in facts)) for a, b in pairs]
-    print_columns(
-        ("file", "lines", "", "branch ways", "", "functions", ""), [*rows, row("all", sums)], right=(1, 2, 3, 4, 5, 6)
-    )
-    if missed:
-        for file in files:
-            if file.missed_lines:
-                typer.echo(f"{_short(file.name)}: {_ranges(file.missed_lines)}")
-
-
-def _short(name: str) -> str:
-    return name.rsplit("/", 1)[-1]
-
-
-def _ranges(lines: list[int]) -> str:
-    """Return "3-5, 9"."""
-    found: list[list[int]] = []
-    for line in lines:
-        if found and line == found[-1][1] + 1:
-            found[-1][1] = line
-        else:
-            found.append([line, line])
-    return ", ".join(str(a) if a == b else f"{a}-{b}" for a, b in found)

@@ -6,8 +6,8 @@ from typing import Annotated
 
 import typer
 
+from bluepill_sim.analysis.columns import in_columns
 from bluepill_sim.board import BluePill
-from bluepill_sim.cli.columns import print_columns
 from bluepill_sim.cli.driving import run_driven
 from bluepill_sim.program.elf_file import Layout, layout, stack_top, variables_end, vectors
 from bluepill_sim.program.image import Image
@@ -93,7 +93,7 @@ def _print(board: BluePill, found: dict[str, object]) -> None:
     sized = sorted((s for s in image.symbols.symbols if s.size), key=lambda s: (-s.size, s.address))
     if sized:
         rows = [(s.name, str(s.size), f"{s.address:#010x}") for s in sized[:_SHOWN_SYMBOLS]]
-        print_columns(("largest symbols", "bytes", "address"), rows, right=(1,))
+        typer.echo("\n".join(in_columns(("largest symbols", "bytes", "address"), rows, right=(1,))))
         typer.echo("")
     ran = f"in {board.now_ns / NS_PER_S:g} s of virtual time"
     if board.has_died:
@@ -117,7 +117,7 @@ def _print_sections(lies: Layout) -> None:
         for s in lies.sections
     ]
     if rows:
-        print_columns(("section", "address", "bytes", "in"), rows, right=(2,))
+        typer.echo("\n".join(in_columns(("section", "address", "bytes", "in"), rows, right=(2,))))
         typer.echo("")
 
 
@@ -128,7 +128,7 @@ def _print_vectors(image: Image) -> None:
         for v in vectors(image)
         if v.target != ordinary
     ]
-    print_columns(("exception", "", "address", "handler"), rows, right=(0,))
+    typer.echo("\n".join(in_columns(("exception", "", "address", "handler"), rows, right=(0,))))
     if ordinary is not None:
         others = [v.name for v in vectors(image) if v.target == ordinary]
         typer.echo(f"the other {len(others)} share {_handler(image, ordinary)} at {ordinary:#010x}")

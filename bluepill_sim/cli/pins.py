@@ -6,11 +6,11 @@ from typing import Annotated
 
 import typer
 
+from bluepill_sim.analysis.columns import in_columns
 from bluepill_sim.analysis.probe import Probe
 from bluepill_sim.analysis.sigrok import write_sigrok
 from bluepill_sim.analysis.vcd import write_vcd
 from bluepill_sim.board import BluePill
-from bluepill_sim.cli.columns import print_columns
 from bluepill_sim.cli.driving import parse_changes, print_fault, print_status, run_driven, summary, warn_on_stderr
 from bluepill_sim.timing import to_nanos
 from simbase.timing import NS_PER_S
@@ -105,4 +105,4 @@ def _print(rows: list[dict[str, object]]) -> None:
                 "yes" if row["five_volt"] else "no",
             )
         )
-    print_columns(headers, table, right=(6, 7))
+    typer.echo("\n".join(in_columns(headers, table, right=(6, 7))))

@@ -6,13 +6,13 @@ from typing import Annotated
 
 import typer
 
-from bluepill_sim.analysis.cycle_profile import ASLEEP, CycleProfile, FunctionCost
+from bluepill_sim.analysis.cycle_profile import CycleProfile, FunctionCost
 from bluepill_sim.analysis.flame_graph import flame_svg
 from bluepill_sim.analysis.latency import ExceptionCost, Latency
 from bluepill_sim.analysis.observation import Observation
+from bluepill_sim.analysis.profile_text import exception_lines, function_lines
 from bluepill_sim.analysis.stack import StackGauge
 from bluepill_sim.board import BluePill
-from bluepill_sim.cli.columns import print_columns
 from bluepill_sim.cli.driving import parse_changes, print_fault, print_status, run_driven, summary, warn_on_stderr
 from bluepill_sim.core.nvic import exception_name
 from bluepill_sim.errors import BluePillError
@@ -68,20 +68,19 @@ def profile(
         _write(flame, flame_svg(costs.stacks, title=title, hz=board.hclk_hz))
     if folded is not None:
         _write(folded, "\n".join(costs.folded()) + "\n")
-    functions = costs.functions()
     if json_output:
         facts = {
             "cycles": costs.total_cycles,
-            "functions": [_function_facts(f) for f in functions],
+            "functions": [_function_facts(f) for f in costs.functions()],
             "stack": {"top": use.top, "room_bytes": use.room_bytes, "used_bytes": use.used_bytes},
             "exceptions": [_exception_facts(cost) for cost in latency.by_name],
             "warnings": board.warnings,
         }
         typer.echo(json.dumps(facts, sort_keys=True))
     else:
-        _print_functions(functions if every else functions[:_SHOWN_FUNCTIONS], costs.total_cycles)
-        _print_exceptions(latency.by_name, board.hclk_hz)
-        typer.echo(str(use))
+        lines = function_lines(costs, most=None if every else _SHOWN_FUNCTIONS)
+        lines += [*exception_lines(latency.by_name, board.hclk_hz), "", str(use)]
+        typer.echo("\n".join(lines))
         for warning in board.warnings:
             typer.echo(f"not modelled, or odd: {warning}")
     print_status(summary(board))
@@ -116,33 +115,3 @@ def _exception_facts(cost: ExceptionCost) -> dict[str, object]:
         "worst_wait_cycles": cost.worst_wait,
         "worst_duration_cycles": cost.worst_duration,
     }
-
-
-def _print_functions(functions: list[FunctionCost], total: int) -> None:
-    awake = total - sum(f.exclusive_cycles for f in functions if f.name == ASLEEP)
-    rows = []
-    for f in functions:
-        share = f"{f.exclusive_cycles / awake:.1%}" if f.name != ASLEEP and awake else ""
-        calls = str(f.calls) if f.calls else ""
-        rows.append((f.name, calls, str(f.exclusive_cycles), share, str(f.inclusive_cycles)))
-    print_columns(("function", "calls", "cycles", "awake", "with callees"), rows, right=(1, 2, 3, 4))
-    if total:
-        typer.echo(f"{total} cycles, {awake / total:.2%} of them awake\n")
-
-
-def _print_exceptions(costs: list[ExceptionCost], hz: int) -> None:
-    def cycles(value: float | None) -> str:
-        return "" if value is None else f"{value:.0f} ({value * 1e6 / hz:.2f} µs)"
-
-    rows = [
-        (
-            exception_name(cost.number),
-            str(cost.entries),
-            *(cycles(value) for value in (cost.least_wait, cost.mean_wait, cost.worst_wait, cost.worst_duration)),
-        )
-        for cost in costs
-    ]
-    if rows:
-        headers = ("exception", "entries", "least wait", "mean", "worst", "longest run")
-        print_columns(headers, rows, right=(1, 2, 3, 4, 5))
-        typer.echo("")

@@ -1,7 +1,7 @@
 """Which source line an instruction comes from: the DWARF line programs of an ELF.
 
 Versions 2 to 5 are read. Code that the linker has thrown away is left out: its
-addresses are not in the flash. Without debug information the table is empty.
+addresses are neither in the flash nor in the SRAM. Without debug information the table is empty.
 
 Source: DWARF Debugging Information Format 5, section 6.2.
 Invariant: rows are sorted by address and do not overlap.
@@ -16,7 +16,7 @@ from typing import Any
 from bluepill_sim.errors import ImageError
 from bluepill_sim.program.elf_file import read_bytes
 from bluepill_sim.program.image import Image
-from bluepill_sim.stm32f103 import FLASH_BYTES_FITTED
+from bluepill_sim.stm32f103 import FLASH_BYTES_FITTED, SRAM_BASE, SRAM_BYTES
 from simbase.errors import MissingDependencyError
 
 _ELF_MAGIC = b"\x7fELF"
@@ -126,7 +126,8 @@ def _rows_of(program: Any, files: _Files, flash: int) -> list[LineRow]:  # pyelf
             continue
         if last is not None and state.address > last.address and last.line:
             row = LineRow(last.address, state.address, files.name(last.file), last.line)
-            if flash <= row.address < flash + FLASH_BYTES_FITTED:
+            is_in_flash = flash <= row.address < flash + FLASH_BYTES_FITTED
+            if is_in_flash or SRAM_BASE <= row.address < SRAM_BASE + SRAM_BYTES:
                 rows.append(row)
         last = None if state.end_sequence else state
     return rows

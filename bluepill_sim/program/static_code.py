@@ -45,11 +45,18 @@ class StaticBlock:
         return self.is_conditional or self.last.kind not in _LEAVING or self.last.kind is Kind.SUPERVISOR_CALL
 
     def ends_before(self, following: int | None) -> bool:
-        """Tell whether the block was left before its last instruction, when `following` ran next; None: not known.
+        """Tell whether the block was left before its last instruction had run, when `following` ran next.
 
         The engine ends a translation at pages and after instructions that change its state; a fault ends it anywhere.
+        Where the block could have gone there by itself, it has. None is not known: False.
         """
-        return following in self.addresses[1:] and self.last.destination != following
+        if following not in self.addresses or self.last.destination == following:
+            return False
+        return following != self.start or not self._leaves_indirectly
+
+    @property
+    def _leaves_indirectly(self) -> bool:
+        return self.last.destination is None and (self.last.kind in _LEAVING or self.last.loads_pc)
 
     def executed(self, following: int | None) -> tuple[int, ...]:
         """Return the instructions that ran, when the next one that ran was `following`; None: not known."""

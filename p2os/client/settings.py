@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 
 from p2os.protocol.profiles import Profile
+from p2os.protocol.times import WATCHDOG_NS
 from simbase.errors import UsageError
 from simbase.timing import NS_PER_MS, NS_PER_S, Nanos
 
@@ -29,7 +30,7 @@ class ClientSettings:
     #: A speed is taken back when the program has made no call for so long; None: never.
     deadman_ns: Nanos | None = 2 * NS_PER_S
     #: A session without a sound packet for so long is lost; half of the robot's own watchdog.
-    liveness_ns: Nanos = 1 * NS_PER_S
+    liveness_ns: Nanos = WATCHDOG_NS // 2
     #: The present speed goes out again after so long, for P2OS acknowledges nothing: 200 ms less what frames queue for.
     refresh_ns: Nanos = 180 * NS_PER_MS
     #: chosen: two frames of a speed take 19 ms at 9600 baud; nearer ones would queue up.

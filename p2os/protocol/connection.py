@@ -54,6 +54,7 @@ from p2os.protocol.frames import Decoder, DecoderStats, Frame
 from p2os.protocol.packets import RESET_KINDS, Identity, ServerPacket, packet_frame, read_packet
 from p2os.protocol.profiles import Profile
 from p2os.protocol.sip import SIP_KINDS, StandardSip
+from p2os.protocol.times import CYCLE_NS, LIVENESS_NS, PULSE_NS, WATCHDOG_NS
 from simbase.state import Stateful
 from simbase.timing import NS_PER_MS, NS_PER_S, Nanos, Reached
 
@@ -181,8 +182,6 @@ SYNC_OF_STATE: Mapping[ConnectionState, int] = {_S.SYNC0: SYNC0, _S.SYNC1: SYNC1
 IDLE = (_S.CLOSED, _S.LOST, _S.FAILED)
 #: Frames that a robot sends back as they came, while it is not open.
 ECHOES = (SYNC0, SYNC1)
-#: The robot's watchdog timeout, as shipped (CONFIGpac watchdog).
-WATCHDOG_NS: Nanos = 2 * NS_PER_S
 
 Message = Command | ServerPacket | Frame
 
@@ -200,19 +199,19 @@ class ConnectionSettings:
     #: How often SYNC0 is tried before the client gives up.
     sync_attempts: int = 6
     #: From CLOSE to SYNC0, for a robot that was streaming: two of its cycles.
-    close_wait_ns: Nanos = 200 * NS_PER_MS
+    close_wait_ns: Nanos = 2 * CYCLE_NS
     #: From the identity to OPEN; ARIA waits one cycle.
-    open_delay_ns: Nanos = 100 * NS_PER_MS
-    #: A PULSE goes out when nothing else did for so long; the robot's watchdog expires after 2 s.
-    pulse_ns: Nanos = 500 * NS_PER_MS
+    open_delay_ns: Nanos = CYCLE_NS
+    #: A PULSE goes out when nothing else did for so long.
+    pulse_ns: Nanos = PULSE_NS
     #: From OPEN to the first packet.
     first_packet_ns: Nanos = NS_PER_S
     #: OPEN is sent again when no packet has followed it for so long: one that was lost must not cost the session.
     open_retry_ns: Nanos = 300 * NS_PER_MS
     #: How often OPEN is sent; the time to the first packet bounds it too.
     open_attempts: int = 1
-    #: An open session without a sound packet for so long is lost: three cycles and a frame.
-    liveness_ns: Nanos = 350 * NS_PER_MS
+    #: An open session without a sound packet for so long is lost.
+    liveness_ns: Nanos = LIVENESS_NS
     profile: Profile = Profile.P2OS
     #: Whether STOP, VEL 0 and RVEL 0 go out before each SYNC0: to a robot that is still open SYNC0 is a PULSE.
     stop_first: bool = False

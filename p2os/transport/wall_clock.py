@@ -13,13 +13,14 @@ it STOP before anything else then: what was asked before the gap is out of date.
 import time
 from collections.abc import Callable
 
-from simbase.timing import NS_PER_MS, Nanos
+from p2os.protocol.times import LIVENESS_NS
+from simbase.timing import Nanos
 
 #: Nanoseconds that never go back, and go on while the machine sleeps.
 Clock = Callable[[], Nanos]
 
-#: chosen: the adapter's liveness, three SIP cycles and a frame: as long as silence of the robot is tolerated.
-GAP_NS: Nanos = 350 * NS_PER_MS
+#: chosen: as long as silence of the robot is tolerated.
+GAP_NS: Nanos = LIVENESS_NS
 
 if hasattr(time, "CLOCK_BOOTTIME"):
 

@@ -38,6 +38,7 @@ Examples:
   p2os run free-drive --firmware build/mine.elf     your program among obstacles, without goals
   p2os run dodge --world arena --seed 7 --json      one JSON object for a script
   p2os run dodge --realtime                         at the speed of the clock
+  p2os run dodge --coverage --profile               lines, branches, cycles of the whole run
   p2os run dodge --gdb 3333                         under GDB; the robot stands still at a halt
   p2os run dodge --port serial:/dev/ttyUSB0         drive a real Pioneer; asks first
 """
@@ -81,6 +82,8 @@ def run(
     out: Annotated[Path | None, typer.Option(help="Run folder; default runs/SCENARIO-NNN.", metavar="DIR")] = None,
     force: Annotated[bool, typer.Option("--force", help="Overwrite the run that the --out folder holds.")] = False,
     json_output: Annotated[bool, typer.Option("--json", help="Print one JSON object.")] = False,
+    coverage: Annotated[bool, typer.Option("--coverage", help="Write which lines and branches ran.")] = False,
+    profile: Annotated[bool, typer.Option("--profile", help="Write where the cycles went.")] = False,
     gdb: Annotated[
         int | None, typer.Option(help="Wait for GDB on this TCP port; 0 takes a free one.", metavar="PORT", min=0)
     ] = None,
@@ -93,6 +96,8 @@ def run(
     if realtime is not None and realtime <= 0:
         raise UsageError(f"--realtime {realtime:g} cannot be", hint="a speed is above 0; 1 is real time")
     wanted = load_scenario(scenario)
+    if coverage or profile:
+        refuse_to_measure(port=port, gdb=gdb)
     if port is not None:
         refuse_beside_port(mode=mode, body=body, world=world, seed=seed, realtime=realtime)
     elif yes or max_speed is not None:
@@ -114,7 +119,10 @@ def run(
     folder = out or make_next_folder(wanted.name)
     with RunDisplay() as display:
         if gdb is None:
-            result = run_scenario(wanted, folder, speed=realtime, on_progress=display.update, force=force)
+            result = run_scenario(
+                wanted, folder, speed=realtime, on_progress=display.update, force=force,
+                coverage=coverage, profile=profile,
+            )  # fmt: skip
         else:
             driver = debug_bench(gdb, is_paced=realtime is not None, on_wait=display.raise_if_interrupted)
             result = run_scenario(wanted, folder, on_progress=display.update, drive=driver, force=force)
@@ -188,6 +196,24 @@ def end_with(result: RunResult, *, json_output: bool) -> None:
         raise typer.Exit(EXIT_INTERRUPTED)
     if not result.passed:
         raise typer.Exit(1)
+
+
+def refuse_to_measure(*, port: str | None, gdb: int | None) -> None:
+    """Refuse to measure a run that has no virtual time, or may go back.
+
+    Raises:
+        UsageError: `port` or `gdb` is given.
+    """
+    if port is not None:
+        raise UsageError(
+            "--coverage and --profile cannot stand beside --port: they cost more time than a real robot gives",
+            hint="run the same firmware without --port",
+        )
+    if gdb is not None:
+        raise UsageError(
+            "--coverage and --profile cannot stand beside --gdb: what a debugger steps back over would count twice",
+            hint="leave one of the two out",
+        )
 
 
 def refuse_beside_port(**options: object) -> None:

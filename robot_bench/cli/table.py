@@ -11,6 +11,9 @@ from robot_bench.recording.summary import LISTED_HITS
 from robot_bench.run import RunResult
 from simbase.errors import shown
 
+#: What coverage counts, and its name for a person.
+_COUNTED = (("lines", "lines"), ("branch_ways", "ways of branches"))
+
 
 def print_result(result: RunResult, console: Console | None = None) -> None:
     """Print what a run came to, on stdout."""
@@ -53,6 +56,7 @@ def rows(outcome: Mapping[str, object]) -> list[tuple[str, str]]:
         ("least clearance", _with_unit(outcome["min_clearance_m"], ".3f", "m")),
         ("USART1", _with_unit(outcome.get("usart_baud"), "d", "bit/s")),
         ("printed", _printed(outcome)),
+        ("coverage", _coverage(outcome.get("coverage"))),
         ("trace", str(outcome["trace_sha256"] or "")[:16]),
     ]  # fmt: skip
     return [(name, value) for name, value in found if value]
@@ -67,6 +71,13 @@ def _verdict(result: RunResult) -> str:
 def _printed(outcome: Mapping[str, object]) -> str:
     lines = cast("int", outcome.get("usart_lines") or 0)
     return f"{lines} line{'s' * (lines != 1)}, the last: {shown(outcome['usart_last'])}" if lines else ""
+
+
+def _coverage(facts: object) -> str:
+    if not isinstance(facts, Mapping):
+        return ""
+    pairs = [(f"{facts[f'{key}_hit']} of {facts[key]} {word}", facts[key]) for key, word in _COUNTED]
+    return ", ".join(text for text, whole in pairs if whole)
 
 
 def _with_unit(value: object, form: str, unit: str) -> str:

@@ -27,6 +27,7 @@ RUNS = Path("runs")
 FILES = (
     TRACE_NAME, SUMMARY_NAME, "report.html", "pins.vcd", "pins.sr", "wire.jsonl", "usart.txt",
     "path.png", "speeds.png", "pins.png",
+    "coverage.txt", "coverage.html", "coverage.info", "profile.txt", "profile.folded", "profile.svg",
 )  # fmt: skip
 
 

@@ -25,6 +25,8 @@ _FROM_END = (
     "trace_sha256",
     "passed", "failures", "goals_met", "notes", "last_blocks",
 )  # fmt: skip
+#: What a run holds that was measured with `--coverage` or `--profile`.
+MEASURED = ("coverage", "profile")
 
 
 def verdict(record: RunRecord) -> str:
@@ -73,6 +75,7 @@ def outcome_of(record: RunRecord) -> Json:
     if record.is_cut:
         end = end_of_a_broken_run(record, f"the run was cut at {record.last_ns / NS_PER_S:.1f} s")
     result.update((key, end.get(key)) for key in _FROM_END)
+    result.update((key, end[key]) for key in MEASURED if key in end)
     result["hits"] = [
         {"t_s": hit.t / NS_PER_S, "what": hit.what, "x_m": hit.x, "y_m": hit.y} for hit in record.collisions()
     ]

@@ -13,7 +13,7 @@ from typing import cast
 
 from robot_bench.recording.run_record import COLLISION, Json, RunRecord
 from robot_bench.recording.signals import grouped, motor_steps
-from robot_bench.recording.summary import figures, verdict
+from robot_bench.recording.summary import MEASURED, figures, verdict
 from robot_bench.report.packets import describe
 from robot_bench.report.thinning import ends, extremes, pulses
 from simbase.timing import NS_PER_S
@@ -48,6 +48,7 @@ def render_page(record: RunRecord) -> str:
         lead=html.escape(_lead(record.meta)),
         figures="".join(f"<tr><td>{html.escape(k)}</td><td>{html.escape(v)}</td></tr>" for k, v in figures(record)),
         goals=_goals(record.end),
+        measured=_measured(record.end),
         left_out=_left_out(cast("list[str]", drawn["left_out"])),
         pins_height=AXIS_PX + sum(GROUP_PX + PIN_ROW_PX * len(names) for _, names in nets),
         footer=html.escape(_footer(record)),
@@ -213,6 +214,19 @@ def _goals(end: Json) -> str:
         return goals
     text = html.escape("\n".join(blocks))
     return f"{goals}<details><summary>What ran last, by cycle</summary><pre>{text}</pre></details>"
+
+
+def _measured(end: Json) -> str:
+    """Return a section for coverage and one for the profile, where the run measured them."""
+    found = []
+    for key in MEASURED:
+        facts = cast("Json", end.get(key) or {})
+        if facts:
+            files = cast("list[str]", facts["files"])
+            links = " · ".join(f'<a href="{html.escape(name)}">{html.escape(name)}</a>' for name in files)
+            table = html.escape("\n".join(cast("list[str]", facts["table"])))
+            found.append(f"<section><h2>{key.title()} <small>{links}</small></h2><pre>{table}</pre></section>")
+    return "\n  ".join(found)
 
 
 def _left_out(lines: list[str]) -> str:

@@ -7,8 +7,7 @@ line between two busy moments costs nothing.
 Not modelled: levels, framing errors and noise (a later issue's fault injector
 stands between two lines).
 
-Invariant: arrivals are computed from the start of a busy stretch and the number
-of characters in it, never by adding rounded times.
+Invariant: arrivals are those of `LineTime`, in the order of sending.
 """
 
 from collections import deque
@@ -17,10 +16,9 @@ from dataclasses import dataclass
 from typing import cast
 
 from p2os.errors import LocalProtocolError
-from simbase.timing import NS_PER_S, Nanos, Reached
+from p2os.protocol.line_time import LineTime
+from simbase.timing import Nanos, Reached
 
-#: Start bit, eight data bits, stop bit: 8N1.
-BITS_PER_CHARACTER = 10
 #: What P2OS speaks at power-on, bit/s.
 P2OS_BAUD = 9600
 
@@ -40,23 +38,20 @@ class SerialLine:
         if baud <= 0:
             raise LocalProtocolError(f"a serial line needs a positive speed, got {baud} bit/s")
         self.baud = baud
-        self._busy_since: Nanos = 0
-        self._characters = 0
+        self._time = LineTime(baud)
         self._under_way: deque[Arrival] = deque()
         self._arrived: list[Arrival] = []
 
     @property
     def free_at(self) -> Nanos:
         """Return when the last character sent so far has arrived."""
-        return self._busy_since + -(-self._characters * BITS_PER_CHARACTER * NS_PER_S // self.baud)
+        return self._time.free_at
 
     def send(self, data: bytes, now: Nanos) -> None:
         """Send bytes as one message, behind what is still going out."""
         if not data:
             return
-        if now >= self.free_at:
-            self._busy_since, self._characters = now, 0
-        self._characters += len(data)
+        self._time = self._time.sent(len(data), now)
         self._under_way.append(Arrival(self.free_at, bytes(data)))
 
     def take_arrived(self) -> list[Arrival]:
@@ -77,8 +72,7 @@ class SerialLine:
     def snapshot(self) -> dict[str, object]:
         """Return the bytes in flight and when they arrive."""
         return {
-            "busy_since": self._busy_since,
-            "characters": self._characters,
+            "time": self._time,
             "under_way": tuple((item.at, item.data) for item in self._under_way),
             "arrived": tuple((item.at, item.data) for item in self._arrived),
         }
@@ -86,8 +80,7 @@ class SerialLine:
     def restore(self, snapshot: object) -> None:
         """Put back what `snapshot` returned."""
         state = cast("Mapping[str, object]", snapshot)
-        self._busy_since = cast("int", state["busy_since"])
-        self._characters = cast("int", state["characters"])
+        self._time = cast("LineTime", state["time"])
         self._under_way = deque(
             Arrival(at, data) for at, data in cast("tuple[tuple[int, bytes], ...]", state["under_way"])
         )

@@ -8,6 +8,7 @@
 #include <cstdint>
 
 #include "../p2os/time.hpp"
+#include "../p2os/times.hpp"
 
 namespace adapter {
 
@@ -74,9 +75,9 @@ struct Settings {
 
   Nanos pair_spacing_ns = 25 * NS_PER_MS;
   Nanos refresh_ns = 200 * NS_PER_MS;
-  Nanos pulse_ns = 500 * NS_PER_MS;
+  Nanos pulse_ns = p2os::PULSE_NS;
 
-  Nanos liveness_ns = 350 * NS_PER_MS;
+  Nanos liveness_ns = p2os::LIVENESS_NS;
   Nanos first_sip_ns = 1 * NS_PER_S;
   Nanos retry_ns = 1 * NS_PER_S;
   Nanos plausibility_ns = 1 * NS_PER_S;

@@ -26,21 +26,19 @@
 #include "uncopied_pointer.hpp"
 #include "sip.hpp"
 #include "time.hpp"
+#include "times.hpp"
 
 namespace p2os {
 
 //: The client's times; those of the robot are in the manuals.
 struct ClientSettings {
-  Nanos sync_timeout_ns = NS_PER_S;
+  Nanos sync_timeout_ns = SYNC_TIMEOUT_NS;
   std::int32_t sync_attempts = 6;
-  //: From CLOSE to SYNC0, for a robot that was streaming: two of its cycles.
-  Nanos close_wait_ns = 200 * NS_PER_MS;
-  //: From the robot's name to OPEN; ARIA waits one cycle.
-  Nanos open_delay_ns = 100 * NS_PER_MS;
-  Nanos pulse_ns = 500 * NS_PER_MS;
-  Nanos first_packet_ns = NS_PER_S;
-  //: Three cycles and a frame.
-  Nanos liveness_ns = 350 * NS_PER_MS;
+  Nanos close_wait_ns = CLOSE_WAIT_NS;
+  Nanos open_delay_ns = OPEN_DELAY_NS;
+  Nanos pulse_ns = PULSE_NS;
+  Nanos first_packet_ns = FIRST_PACKET_NS;
+  Nanos liveness_ns = LIVENESS_NS;
   bool stops_unknown_robot = true;
 };
 

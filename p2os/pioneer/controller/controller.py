@@ -175,7 +175,7 @@ class Pioneer:
             ignored_commands=self._ignored,
             battery_v=context.devices.battery.decivolts / 10,
             line_load_percent=self._sender.line.load_percent,
-            baud=self._sender.line.baud,
+            baud=self._sender.line.time.baud,
             packets_dropped=context.requests.dropped + self._sender.lost,
             injected=injected_now(context),
         )
@@ -183,7 +183,7 @@ class Pioneer:
     @property
     def baud(self) -> int | None:
         """Return the speed of the host's line now, bit/s; None on a line that takes no time."""
-        return self._sender.line.baud
+        return self._sender.line.time.baud
 
     @property
     def stats(self) -> ConnectionStats:

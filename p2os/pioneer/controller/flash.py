@@ -20,9 +20,11 @@ from pathlib import Path
 from p2os.errors import LocalProtocolError
 from p2os.protocol.config_packet import ARCOS_FIELDS, AROS_1_8_FIELDS, FIELDS, NUMBERS, P2OS_FIELDS, ConfigPacket
 from p2os.protocol.profiles import Profile
+from p2os.protocol.times import CYCLE_NS, WATCHDOG_NS
 from p2os.robots.parameters import RobotParameters
 from p2os.toml_file import read_toml, read_user_text
 from simbase.errors import FileError, shown, shown_name
+from simbase.timing import NS_PER_MS
 
 #: HOSTBAUD and its like: code → bit/s.
 BAUD_RATES = (9600, 19200, 38400, 57600, 115200)
@@ -37,8 +39,8 @@ MOST_SEGMENTS = 7
 DEFAULTS: Mapping[str, int | str] = {
     "serial": "VIRTUAL",
     "name": "Virtual",
-    "sipcycle": 100,
-    "watchdog": 2000,
+    "sipcycle": CYCLE_NS // NS_PER_MS,
+    "watchdog": WATCHDOG_NS // NS_PER_MS,
     "hostbaud": 0,
     "auxbaud": 0,
     "gripper": 0,

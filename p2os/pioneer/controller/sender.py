@@ -12,18 +12,15 @@ characters in 100 ms. `TransmitLine` counts when the last character will have le
 what is sent still goes out as whole frames, and the host that carries them spreads the
 characters. Without a speed the line takes no time.
 
-Invariants: no more than `MOST_ANSWERS` frames wait, whatever a client asks for; and
-`free_at` is computed from the start of a busy stretch and the number of characters
-in it, never by adding rounded times.
+Invariant: no more than `MOST_ANSWERS` frames wait, whatever a client asks for.
 """
 
 from collections import deque
 from dataclasses import dataclass, field, replace
 
-from simbase.timing import NS_PER_S, Nanos
+from p2os.protocol.line_time import LineTime
+from simbase.timing import Nanos
 
-#: Start bit, eight data bits, stop bit.
-BITS_PER_CHARACTER = 10
 #: chosen: the load is averaged over so many cycles, a second at the usual rate.
 LOAD_CYCLES = 10
 #: chosen: three syncs, a CONFIGpac and as much again.
@@ -34,7 +31,7 @@ class Sender:
     """The transmit side of one robot."""
 
     def __init__(self, baud: int | None) -> None:
-        self.line = TransmitLine(baud)
+        self.line = TransmitLine(LineTime(baud))
         #: Answers that found no place.
         self.lost = 0
         self._answers: deque[bytes] = deque()
@@ -103,9 +100,7 @@ class Sender:
 class TransmitLine:
     """The robot's end of its serial line: what fits, and how full it is."""
 
-    baud: int | None = None
-    busy_since: Nanos = 0
-    characters: int = 0
+    time: LineTime
     #: Characters since the last cycle ended, and (characters, ns) of the cycles before.
     this_cycle: int = 0
     cycle_began: Nanos = 0
@@ -114,24 +109,21 @@ class TransmitLine:
     @property
     def free_at(self) -> Nanos:
         """When the last character sent so far has left."""
-        return self.busy_since + self._time_of(self.characters)
+        return self.time.free_at
 
     def put(self, size: int, now: Nanos) -> None:
         """Send so many characters, behind what is still going out."""
-        if now >= self.free_at:
-            self.busy_since, self.characters = now, 0
-        self.characters += size
+        self.time = self.time.sent(size, now)
         self.this_cycle += size
 
     def fits(self, size: int, now: Nanos, until: Nanos) -> bool:
         """Tell whether so many more characters will have left by `until`."""
-        return max(self.free_at, now) + self._time_of(size) <= until
+        return max(self.free_at, now) + self.time.time_of(size) <= until
 
     def set_baud(self, baud: int) -> None:
         """Change the speed (HOSTBAUD); what is still going out goes at the old one."""
-        if self.baud is None:
-            return
-        self.busy_since, self.characters, self.baud = self.free_at, 0, baud
+        if self.time.baud is not None:
+            self.time = self.time.at_baud(baud)
 
     def end_cycle(self, now: Nanos) -> None:
         """Begin a new cycle of the load."""
@@ -145,10 +137,7 @@ class TransmitLine:
     @property
     def load_percent(self) -> int | None:
         """How much of the line the last cycles took; None without a speed or a cycle."""
-        if self.baud is None:
+        if self.time.baud is None:
             return None
         span = sum(ns for _, ns in self.cycles)
-        return round(100 * self._time_of(sum(size for size, _ in self.cycles)) / span) if span else None
-
-    def _time_of(self, characters: int) -> Nanos:
-        return 0 if self.baud is None else -(-characters * BITS_PER_CHARACTER * NS_PER_S // self.baud)
+        return round(100 * self.time.time_of(sum(size for size, _ in self.cycles)) / span) if span else None

@@ -6,8 +6,9 @@ from enum import Enum
 from p2os.pioneer.controller.flash import BAUD_RATES, Flash
 from p2os.pioneer.sensor_errors import IDEAL, SensorErrors
 from p2os.protocol.profiles import Profile
+from p2os.protocol.times import CYCLE_NS, WATCHDOG_NS
 from simbase.errors import UsageError
-from simbase.timing import NS_PER_MS, NS_PER_S, Nanos
+from simbase.timing import NS_PER_MS, Nanos
 
 #: The CONFIGpac has one byte for the cycle.
 LONGEST_SIP_PERIOD_MS = 255
@@ -41,8 +42,8 @@ class ControllerSettings:
     profile: Profile = Profile.P2OS
     #: Answers syncs out of order and executes what any family knows, as AMRISim does.
     lenient: bool = False
-    sip_period_ns: Nanos = 100 * NS_PER_MS
-    watchdog_ns: Nanos = 2 * NS_PER_S
+    sip_period_ns: Nanos = CYCLE_NS
+    watchdog_ns: Nanos = WATCHDOG_NS
     sonar_per_sip: SonarPerSip = SonarPerSip.TWO
     #: The battery's resting voltage at the start; it drains from there.
     battery_decivolts: int = 126

@@ -355,7 +355,8 @@ class Host:
         self._baud = self.pioneer.baud
         for line in self._lines or ():
             line.clear()
-            line.set_baud(self._baud or line.baud)
+            if self._baud is not None:
+                line.set_baud(self._baud)
         self._settled_at = self.now + SETTLE_NS
         self._notify("client gone", reason)  # before the client can know: whoever ends us then finds it written
         if send_reason:

@@ -3,14 +3,14 @@
 Bytes arrive in lumps of up to 16 characters, each at the time of its last one,
 as a UART with a FIFO hands them to its driver.
 
-Invariant: arrivals are computed from the start of a busy stretch and the number
-of characters in it, never by adding rounded times.
+Invariant: arrivals are those of `LineTime`; none is before the one that was put before it.
 """
 
 from collections import deque
+from dataclasses import replace
 
-from p2os.pioneer.controller.sender import BITS_PER_CHARACTER
-from simbase.timing import NS_PER_S, Nanos
+from p2os.protocol.line_time import LineTime
+from simbase.timing import Nanos
 
 #: The receive FIFO of the common UARTs (16550 and its kin), characters.
 LUMP = 16
@@ -20,9 +20,7 @@ class PacedLine:
     """One direction of a line, in the robot's time."""
 
     def __init__(self, baud: int) -> None:
-        self.baud = baud
-        self._busy_since: Nanos = 0
-        self._characters = 0
+        self._time = LineTime(baud)
         self._lumps: deque[tuple[Nanos, bytes]] = deque()
         #: Bytes that are still under way.
         self.waiting = 0
@@ -30,15 +28,13 @@ class PacedLine:
     @property
     def free_at(self) -> Nanos:
         """Return when the last byte put so far has arrived."""
-        return self._busy_since + -(-self._characters * BITS_PER_CHARACTER * NS_PER_S // self.baud)
+        return self._time.free_at
 
     def put(self, data: bytes, now: Nanos) -> None:
         """Send bytes behind what is still under way."""
-        if now >= self.free_at:
-            self._busy_since, self._characters = now, 0
         for start in range(0, len(data), LUMP):
             lump = data[start : start + LUMP]
-            self._characters += len(lump)
+            self._time = self._time.sent(len(lump), now)
             self._lumps.append((self.free_at, lump))
         self.waiting += len(data)
 
@@ -62,9 +58,10 @@ class PacedLine:
 
     def set_baud(self, baud: int) -> None:
         """Change the speed; what is still under way goes at the old one."""
-        self._busy_since, self._characters, self.baud = self.free_at, 0, baud
+        self._time = self._time.at_baud(baud)
 
     def clear(self) -> None:
         """Forget what is under way."""
         self._lumps.clear()
-        self._characters = self.waiting = 0
+        self.waiting = 0
+        self._time = replace(self._time, characters=0)

@@ -10,7 +10,7 @@ from bluepill_sim.analysis.coverage import Coverage
 from bluepill_sim.analysis.cycle_profile import ASLEEP, CycleProfile
 from bluepill_sim.analysis.flame_graph import flame_svg
 from bluepill_sim.analysis.latency import Latency
-from bluepill_sim.analysis.observation import BlockWalk, Observation
+from bluepill_sim.analysis.observation import HANDLER_LEFT, BlockWalk, Observation
 from bluepill_sim.analysis.stack import StackGauge
 from bluepill_sim.board import BluePill
 from bluepill_sim.core import BLOCK, EXCEPTION_RETURN
@@ -137,7 +137,7 @@ def test_a_walk_tells_blocks_with_what_follows() -> None:
     walk.take([(42, 24, BLOCK)])
     walk.finish(50)
     assert told == [
-        (10, 20, 0, 5), (20, 24, 5, 4), ("enter", 15, 9), (50, None, 21, 9), ("leave", 30), (24, None, 42, 8),
+        (10, 20, 0, 5), (20, 24, 5, 4), ("enter", 15, 9), (50, HANDLER_LEFT, 21, 9), ("leave", 30), (24, None, 42, 8),
     ]  # fmt: skip
 
 

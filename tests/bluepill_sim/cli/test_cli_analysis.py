@@ -27,7 +27,11 @@ def test_coverage_tells_lines_branches_and_functions(tmp_path: Path, capfd: pyte
     assert 0 < found["sensors.c"]["branches_hit"] <= found["sensors.c"]["branches"]
     assert found["startup.c"]["missed_lines"]  # its default handler does not run
     assert run([*words, "--missed", "--sources", "/src"]) == 0
-    assert "startup.c: " in capfd.readouterr().out
+    out = capfd.readouterr().out
+    assert "startup.c: " in out
+    assert "branches that went one way only:\nat " in out
+    (branch,) = (row for row in found["board.c"]["one_way_branches"] if row["taken"] + row["not_taken"] == 1)
+    assert f"board.c:{branch['line']} " in out
     records = lcov.read_text().split("end_of_record\n")[:-1]
     assert len(records) == len(found)
     for record in records:
@@ -60,10 +64,16 @@ def test_lines_agree_with_the_symbols_of_their_file() -> None:
     assert all(a.end <= b.address for a, b in zip(table.rows, table.rows[1:], strict=False))
 
 
-def test_an_image_without_debug_information_has_no_coverage(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+def test_an_image_without_debug_information_has_coverage_by_address(
+    tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
     image = tmp_path / "bare.bin"
     image.write_bytes(DEAD)
-    assert run(["mcu", "coverage", str(image)]) == 2
+    assert run(["mcu", "coverage", str(image), "--missed"]) == 1  # it dies
+    out = capfd.readouterr().out
+    assert out.startswith("no debug information and no symbols: by address (give the ELF, compiled with -Og -g)\n")
+    assert "0x08000008 to 0x08000013 ran\n" in out
+    assert run(["mcu", "coverage", str(image), "--lcov", str(tmp_path / "a.info")]) == 2
     assert "no debug information" in capfd.readouterr().err
     assert read_lines(parse_image(DEAD, str(image))).rows == ()
 

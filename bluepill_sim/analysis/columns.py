@@ -1,12 +1,10 @@
-"""Plain columns on stdout: no frames, no wrapping, the same on a terminal and in a file."""
+"""Plain columns of text: no frames, no wrapping, the same on a terminal and in a file."""
 
 from collections.abc import Iterable, Sequence
 
-import typer
 
-
-def print_columns(headers: Sequence[str], rows: Iterable[Sequence[str]], *, right: Sequence[int] = ()) -> None:
-    """Print rows below their headers.
+def in_columns(headers: Sequence[str], rows: Iterable[Sequence[str]], *, right: Sequence[int] = ()) -> list[str]:
+    """Return lines with rows below their headers.
 
     Args:
         headers: one text a column.
@@ -15,9 +13,10 @@ def print_columns(headers: Sequence[str], rows: Iterable[Sequence[str]], *, righ
     """
     lines = [list(headers), *([str(cell) for cell in row] for row in rows)]
     widths = [max(len(line[n]) for line in lines) for n in range(len(headers))]
-    for line in lines:
-        cells = [
+    return [
+        "  ".join(
             cell.rjust(width) if n in right else cell.ljust(width)
             for n, (cell, width) in enumerate(zip(line, widths, strict=True))
-        ]
-        typer.echo("  ".join(cells).rstrip())
+        ).rstrip()
+        for line in lines
+    ]
