@@ -9,7 +9,9 @@ from typing import Annotated
 import typer
 
 from p2os.cli.held_robot import RobotWatch, held
-from p2os.cli.quantities import Quantity, parse_duration, parse_quantity
+from p2os.cli.help_pages import ROBOTS
+from p2os.cli.names import ReportedModel, RobotUrl
+from p2os.cli.quantities import ANGLE, LENGTH, SPEED, TIME, TURN_RATE
 from p2os.client import MotionResult, Robot
 from p2os.errors import UsageError
 from p2os.timing import NS_PER_S, Nanos
@@ -61,27 +63,25 @@ class Plan:
 
 def register(app: typer.Typer) -> None:
     """Add the verb."""
-    app.command("drive", help=HELP)(drive)
+    app.command("drive", help=HELP, rich_help_panel=ROBOTS)(drive)
 
 
 def drive(
-    url: Annotated[str, typer.Argument(help="Where the robot is.", metavar="URL")],
-    forward: Annotated[str, typer.Option(help="How far, negative backwards.", metavar="LENGTH")] = "",
-    turn: Annotated[str, typer.Option(help="How far round, positive to the left.", metavar="ANGLE")] = "",
-    vel: Annotated[str, typer.Option(help="Speed: held with --for, else the most.", metavar="SPEED")] = "",
-    turn_rate: Annotated[str, typer.Option(help="Turning speed, likewise.", metavar="RATE")] = "",
-    duration: Annotated[str, typer.Option("--for", help="How long the speeds are held.", metavar="TIME")] = "",
-    robot: Annotated[str, typer.Option(help="Robot model or TOML file, if it is not what the robot reports.")] = "",
+    url: RobotUrl,
+    forward_m: Annotated[float | None, LENGTH.option("--forward", purpose="How far, negative backwards.")] = None,
+    turn_rad: Annotated[float | None, ANGLE.option("--turn", purpose="How far round, positive to the left.")] = None,
+    speed_mps: Annotated[float | None, SPEED.option("--vel", purpose="Speed: held with --for, else the most.")] = None,
+    rate_radps: Annotated[float | None, TURN_RATE.option("--turn-rate", purpose="Turning speed, likewise.")] = None,
+    lasts_ns: Annotated[
+        Nanos | None, TIME.option("--for", purpose="How long the speeds are held.", above_zero=True)
+    ] = None,
+    robot: ReportedModel = "",
     json_output: Annotated[bool, typer.Option("--json", help="Print a JSON object.")] = False,
 ) -> None:
     """Move a robot."""
     plan = Plan(
-        forward_m=parse_quantity(forward, Quantity.LENGTH, "--forward") if forward else None,
-        turn_rad=parse_quantity(turn, Quantity.ANGLE, "--turn") if turn else None,
-        speed_mps=parse_quantity(vel, Quantity.SPEED, "--vel") if vel else None,
-        rate_radps=parse_quantity(turn_rate, Quantity.TURN_RATE, "--turn-rate") if turn_rate else None,
-        lasts_ns=parse_duration(duration, "--for") if duration else None,
-    )
+        forward_m=forward_m, turn_rad=turn_rad, speed_mps=speed_mps, rate_radps=rate_radps, lasts_ns=lasts_ns,
+    )  # fmt: skip
     with held(Robot(url, model=robot or None, reconnect=False)) as client:
         steps = carry_out(plan, client)
         pose = client.pose

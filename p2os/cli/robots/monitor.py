@@ -9,17 +9,19 @@ import typer
 
 from p2os.capture.describe import plain
 from p2os.cli.held_robot import held
+from p2os.cli.help_pages import ROBOTS
 from p2os.cli.links.link_quality import LinkQuality
-from p2os.cli.quantities import parse_duration
+from p2os.cli.names import ReportedModel, RobotUrl
+from p2os.cli.quantities import TIME
 from p2os.cli.robots.dashboard import Dashboard, draw, line_of
 from p2os.client import Notice, PacketArrived, Robot, RobotState
 from p2os.errors import MissingDependencyError
 from p2os.timing import NS_PER_MS, NS_PER_S, Nanos
 from p2os.transport.wall_clock import wall_clock
 
-HELP = """Show a robot's state as it comes, without moving it: pose, speeds, a ring of its
-sonar, battery, bumpers, flags, and how good the link is.
+HELP = """Show a robot's state as it comes, without moving it.
 
+Pose, speeds, a ring of its sonar, battery, bumpers, flags, and how good the link is.
 Ctrl-C ends. A lost robot is looked for again. Without a terminal one line a
 packet is printed.
 
@@ -36,17 +38,16 @@ NEWS_LINES = 4
 
 def register(app: typer.Typer) -> None:
     """Add the verb."""
-    app.command("monitor", help=HELP)(monitor)
+    app.command("monitor", help=HELP, rich_help_panel=ROBOTS)(monitor)
 
 
 def monitor(
-    url: Annotated[str, typer.Argument(help="Where the robot is.", metavar="URL")],
-    duration: Annotated[str, typer.Option("--for", help="End after so long.", metavar="TIME")] = "",
-    robot: Annotated[str, typer.Option(help="Robot model or TOML file, if it is not what the robot reports.")] = "",
+    url: RobotUrl,
+    lasts_ns: Annotated[Nanos | None, TIME.option("--for", purpose="End after so long.", above_zero=True)] = None,
+    robot: ReportedModel = "",
     json_output: Annotated[bool, typer.Option("--json", help="Print one JSON object a packet.")] = False,
 ) -> None:
     """Show a robot."""
-    lasts_ns = parse_duration(duration, "--for") if duration else None
     with held(Robot(url, model=robot or None, auto_enable=False)) as client:
         if json_output or not sys.stdout.isatty():
             _print_states(client, lasts_ns, as_json=json_output)
