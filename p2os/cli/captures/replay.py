@@ -155,6 +155,9 @@ def replay(
             play(player, transport, side.role)
         except HungUpError as error:
             sent = frames - player.frames_left
+            if side is Side.ROBOT and player.is_closed:
+                sys.stderr.write(f"the client closed the session after {sent} of {frames} frames\n")
+                return
             raise TransportError(f"after {sent} of {frames} frames: {error}", hint=error.hint) from error
     sys.stderr.write(f"{frames} frames sent\n")
 

@@ -55,14 +55,19 @@ def monitor(
             _show(client, url, lasts_ns)
 
 
-def state_as_plain(state: RobotState) -> dict[str, object]:
-    """Return a state for JSON: SI units, sonar by number, None where there is no echo."""
+def state_as_plain(state: RobotState, start_ns: Nanos = 0) -> dict[str, object]:
+    """Return a state for JSON: SI units, time from `start_ns` on, sonar by number, None where there is no echo."""
     names = ("forward_mps", "turn_radps", "left_mps", "right_mps", "is_moving", "motors_enabled", "battery_v",
              "stall_left", "stall_right", "front_bumpers", "rear_bumpers", "compass_rad", "analog_v", "digital_in",
              "digital_out", "stop_button", "state_of_charge", "temperature_c")  # fmt: skip
     pose = {"x_m": state.pose.x_m, "y_m": state.pose.y_m, "heading_rad": state.pose.heading_rad}
     sonar = {str(echo.number): echo.range_m if echo.is_echo else None for echo in state.sonar}
-    fields = {"t": state.at_ns / NS_PER_S, **pose, **{name: getattr(state, name) for name in names}, "sonar_m": sonar}
+    fields = {
+        "t": (state.at_ns - start_ns) / NS_PER_S,
+        **pose,
+        **{name: getattr(state, name) for name in names},
+        "sonar_m": sonar,
+    }
     return {name: plain(value) for name, value in fields.items()}
 
 
@@ -75,9 +80,10 @@ def words_of(notice: Notice) -> str:
 
 def _print_states(client: Robot, lasts_ns: Nanos | None, *, as_json: bool) -> None:
     ends = None if lasts_ns is None else wall_clock() + lasts_ns
-    count = 0
+    count, start_ns = 0, None
     for state in client.states():
-        typer.echo(json.dumps(state_as_plain(state)) if as_json else line_of(state))
+        start_ns = state.at_ns if start_ns is None else start_ns
+        typer.echo(json.dumps(state_as_plain(state, start_ns)) if as_json else line_of(state))
         count += 1
         if ends is not None and wall_clock() >= ends:
             break
@@ -106,5 +112,5 @@ def _show(client: Robot, url: str, lasts_ns: Nanos | None) -> None:
                 title=title, link=client.link, state=client.state, limits=client.limits, parameters=client.parameters,
                 stats=client.stats, quality=quality, news=tuple(news),
             )  # fmt: skip
-            live.update(draw(dashboard, console.width), refresh=True)
+            live.update(draw(dashboard, console.width, console.height), refresh=True)
             client.sleep(1 / PICTURES_PER_S)

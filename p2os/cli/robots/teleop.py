@@ -134,7 +134,7 @@ def teleop(
         return
     if not sys.stdin.isatty():
         raise UsageError("there is no keyboard: stdin is not a terminal", hint="p2os drive URL --vel 0.2m/s --for 2s")
-    with held(Robot(url, model=robot or None)) as client, raw_keyboard():
+    with held(Robot(url, model=robot or None), moves=True) as client, raw_keyboard():
         sys.stderr.write("hold arrows or w a s d to drive, space stops, + - change the speed, q ends\r\n")
         loop = KeyLoop(Teleop(forward_mps, turn_radps), client)
         try:
@@ -151,7 +151,7 @@ def drive_by_pad(url: str, model: str | None, fastest: tuple[float, float]) -> N
         sys.stderr.write(f"game pad: {pad.name}\n")
         PadDriver(
             pad.report,
-            lambda: held(Robot(url, model=model)),
+            lambda: held(Robot(url, model=model), moves=True),
             fastest,
             clock=wall_clock,
             wait=lambda span_ns: time.sleep(span_ns / NS_PER_S),
@@ -264,15 +264,15 @@ class KeyLoop:
 
 
 def status(keys: Teleop, client: Robot) -> str:
-    """Return one line about the robot."""
+    """Return one line about the robot, of 78 characters at most: a longer one would wrap and not be drawn over."""
     if client.link is not Link.OPEN:
         return f"link: {client.link.value}"
     state, (forward_mps, turn_radps) = client.state, keys.speeds
+    doing = "STALL" if state.is_stalled else "DRIVE" if keys.is_driving else "stand"
     return (
-        f"{'DRIVE' if keys.is_driving else 'stand'} {forward_mps:+.2f} m/s {math.degrees(turn_radps):+.0f} deg/s "
+        f"{doing} {forward_mps:+.2f} m/s {math.degrees(turn_radps):+.0f} deg/s "
         f"({keys.share:.0%})  x {state.pose.x_m:.2f} m  y {state.pose.y_m:.2f} m  "
-        f"heading {math.degrees(state.pose.heading_rad):.0f} deg  {state.battery_v:.1f} V"
-        + ("  STALLED" if state.is_stalled else "")
+        f"{math.degrees(state.pose.heading_rad):.0f} deg  {state.battery_v:.1f} V"
     )
 
 

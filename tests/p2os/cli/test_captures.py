@@ -360,3 +360,21 @@ def test_bad_input_is_one_line_and_a_hint(
 def test_a_capture_file_that_cannot_be_written_is_named(served: object, run: Run, capsys: Capture) -> None:
     assert run("record", served.url, "--out", "/nowhere/floor.jsonl", "--for", "1s") == 2
     assert capsys.readouterr().err == "p2os: cannot write /nowhere/floor.jsonl: no such file or directory\n"
+
+
+@pytest.mark.usefixtures("no_waiting")
+@pytest.mark.parametrize(("said", "code", "told"), [
+    (Command(2).to_frame().to_bytes(), 0, "the client closed the session after 1 of 2 frames\n"),
+    (b"", 1, "p2os: after 1 of 2 frames: gone\n"),
+])  # fmt: skip
+def test_a_client_that_closes_its_session_and_goes_is_no_error(
+    run: Run, tmp_path: Path, capsys: Capture, monkeypatch: pytest.MonkeyPatch, said: bytes, code: int, told: str
+) -> None:
+    recording = tmp_path / "talk.jsonl"
+    sync = Command(0).to_frame().to_bytes()
+    talk = [(0, TO, sync), (1, FROM, sync), (100 * NS_PER_S, FROM, SIP)]
+    recording.write_text(write_recording(capture_of(talk)))
+    line = Line(sync, said, HungUpError("gone"))
+    monkeypatch.setattr("p2os.cli.captures.replay._first", lambda _listener: line)
+    assert run("replay", recording, "tcp:127.0.0.1:0") == code
+    assert told in capsys.readouterr().err

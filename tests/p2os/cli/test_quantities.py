@@ -10,7 +10,7 @@ import typer
 from bluepill_sim.cli.quantities import BAUDS
 from bluepill_sim.timing import to_nanos
 from p2os.cli.help_pages import GROUPS, OTHERS, VerbList, first_sentence
-from p2os.cli.main import make_app, run
+from p2os.cli.main import completed_words, make_app, run
 from p2os.cli.quantities import ANGLE, BAUD, COUNT, FACTOR, LENGTH, SPEED, TIME, TURN_RATE, Quantity
 
 #: One style: what is typed as it is in small letters, what stands for something in capitals.
@@ -118,3 +118,45 @@ def test_no_page_of_help_is_wider_than_a_terminal(
         assert run([*path.split()[1:], "--help"]) == 0
         too_wide += [line for line in capsys.readouterr().out.splitlines() if len(line) > 80]
     assert too_wide == []
+
+
+@pytest.mark.parametrize(
+    ("line", "offered"),
+    [
+        ("p2os dri", ["drive"]),
+        ("p2os drive --forw", ["--forward"]),
+        ("p2os run do", ["dodge"]),
+        ("p2os run dodge --world maz", ["maze"]),
+        ("p2os run dodge --body kin", ["kinematic"]),
+        ("p2os serve --robot p3dx-", ["p3dx-sh"]),
+        ("p2os world sh", ["show"]),
+        ("p2os mcu cov", ["coverage"]),
+        ("p2os info tcp:1", ["tcp:127.0.0.1:8101"]),
+    ],
+)
+def test_a_shell_is_offered_verbs_options_and_names(
+    line: str, offered: list[str], monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setenv("COMP_WORDS", line)
+    monkeypatch.setenv("COMP_CWORD", str(len(line.split()) - 1))
+    monkeypatch.setenv("_P2OS_COMPLETE", "complete_bash")
+    with pytest.raises(SystemExit) as end:
+        run([])
+    assert end.value.code == 0
+    assert capsys.readouterr().out.split() == offered
+
+
+@pytest.mark.parametrize(
+    ("environment", "words"),
+    [
+        ({}, None),
+        ({"_P2OS_COMPLETE": "complete_bash", "COMP_WORDS": "p2os run do", "COMP_CWORD": "2"}, ["run"]),
+        ({"_P2OS_COMPLETE": "complete_zsh", "_TYPER_COMPLETE_ARGS": "p2os run do"}, ["run"]),
+        ({"_P2OS_COMPLETE": "complete_fish", "_TYPER_COMPLETE_ARGS": "p2os run "}, ["run"]),
+        ({"_P2OS_COMPLETE": "source_bash"}, None),
+    ],
+)
+def test_the_verb_that_is_typed_is_found_in_what_each_shell_tells(
+    environment: dict[str, str], words: list[str] | None
+) -> None:
+    assert completed_words(environment) == words
