@@ -107,7 +107,15 @@ class CycleClock:
 
 #: A span: nanoseconds, or a number with its unit.
 Span = int | str
-_UNITS = {"ns": 1, "us": NS_PER_US, "µs": NS_PER_US, "ms": NS_PER_MS, "s": NS_PER_S, "min": 60 * NS_PER_S}
+_UNITS = {
+    "ns": 1,
+    "us": NS_PER_US,
+    "µs": NS_PER_US,
+    "ms": NS_PER_MS,
+    "s": NS_PER_S,
+    "min": 60 * NS_PER_S,
+    "h": 3600 * NS_PER_S,
+}
 _TEXT = re.compile(r"(?P<number>\d+\.?\d*|\.\d+)\s*(?P<unit>[a-zµ]+)", re.ASCII | re.IGNORECASE)
 _MICRO = "\N{GREEK SMALL LETTER MU}s"
 #: chosen: longer than anybody waits, and far inside what the chip counts.
@@ -118,7 +126,7 @@ def to_nanos(span: Span) -> Nanos:
     """Return a span in nanoseconds: exactly, for no binary fraction stands between the text and its value.
 
     Args:
-        span: nanoseconds as an integer, or a number with one of ns, us, ms, s, min.
+        span: nanoseconds as an integer, or a number with one of ns, us, ms, s, min, h.
 
     Raises:
         BluePillError: it has no unit, a negative or absurd length, or is no span at all.
@@ -131,7 +139,9 @@ def to_nanos(span: Span) -> Nanos:
         found = _TEXT.fullmatch(span.strip().replace("\N{MICRO SIGN}", "u").replace(_MICRO, "us"))
         unit = None if found is None else _UNITS.get(found["unit"].lower())
         if found is None or unit is None:
-            raise BluePillError(f"{span!r} is no span of time", hint="a number with ns, us, ms, s or min, such as 10ms")
+            raise BluePillError(
+                f"{span!r} is no span of time", hint="a number with ns, us, ms, s, min or h, such as 10ms"
+            )
         nanos = int(Decimal(found["number"]) * unit)
     if not 0 <= nanos <= _LONGEST_NS:
         raise BluePillError(f"{span!r} is negative or longer than a year", hint="give a span such as 10ms")

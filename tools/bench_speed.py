@@ -53,7 +53,7 @@ def chain() -> None:
     import json
     import subprocess
 
-    command = [str(Path(sys.executable).parent / "p2os"), "run", "dodge", "--duration", "30", "--json"]
+    command = [str(Path(sys.executable).parent / "p2os"), "run", "dodge", "--duration", "30s", "--json"]
     for mode in ("direct", "adapter"):
         for body in ("kinematic", "bullet"):
             factors = []

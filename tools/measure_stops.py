@@ -252,7 +252,7 @@ WAYS = (
     Way("replay", (*P2OS, "replay", "{recording}", "{url}", "--as", "client", "--yes")),
     Way("sniff", (*P2OS, "sniff", "{url}", "--listen", "{listen}"),
         client=(*DRIVE, "{listen}", "--vel", "0.3m/s", "--for", "60s")),
-    Way("run --port", (*P2OS, "run", "motors", "--port", "{url}", "--yes", "--duration", "60", "--out", "{folder}")),
+    Way("run --port", (*P2OS, "run", "motors", "--port", "{url}", "--yes", "--duration", "60s", "--out", "{folder}")),
     Way("p2os-adapter", ("{adapter}", "--line", "{url}", "--wires", "{wires}"), has_wires=True),
 )  # fmt: skip
 

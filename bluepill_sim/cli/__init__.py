@@ -13,7 +13,14 @@ in the ELF, places are shown by symbol and line.
 
 def register(app: typer.Typer) -> None:
     """Add the verb and what is below it."""
-    mcu = typer.Typer(help=HELP, no_args_is_help=True, rich_markup_mode=None)
+    mcu = typer.Typer(help=HELP, rich_markup_mode=None, invoke_without_command=True)
+    mcu.callback()(_without_command)
     for module in (run, debug, info, pins, trace, coverage, profile):
         module.register(mcu)
-    app.add_typer(mcu, name="mcu")
+    app.add_typer(mcu, name="mcu", rich_help_panel="BluePill")
+
+
+def _without_command(context: typer.Context) -> None:
+    """Show what there is where nothing is asked for."""
+    if context.invoked_subcommand is None:
+        typer.echo(context.get_help())

@@ -12,12 +12,13 @@ from bluepill_sim.analysis.lcov import write_lcov
 from bluepill_sim.analysis.observation import Observation
 from bluepill_sim.board import BluePill
 from bluepill_sim.cli.driving import parse_changes, print_fault, print_status, run_driven, summary, warn_on_stderr
+from bluepill_sim.cli.quantities import percent_option, time_option
 from bluepill_sim.errors import BluePillError
 from bluepill_sim.program.line_table import read_lines
 from bluepill_sim.program.static_code import StaticCode
-from bluepill_sim.timing import to_nanos
+from simbase.timing import NS_PER_S, Nanos
 
-HELP = """Run a firmware for a while and show which of its lines and branches ran.
+HELP = """Show which lines and branches of a firmware run.
 
 Compile with -Og -g: lines come from the ELF's debug information. Without it the
 table is by function, without symbols by address. With --lcov the result is also
@@ -39,7 +40,7 @@ def register(app: typer.Typer) -> None:
 
 def coverage(
     firmware: Annotated[Path, typer.Argument(help="ELF with debug information.", metavar="FIRMWARE")],
-    span: Annotated[str, typer.Option("--for", help="Virtual time, such as 2s or 10ms.", metavar="TIME")] = "1s",
+    span_ns: Annotated[Nanos, time_option("--for", purpose="How much virtual time.", shown="1s")] = NS_PER_S,
     drive: Annotated[
         list[str] | None, typer.Option(help="Put a level on a pin at a time; repeatable.", metavar="PIN=LEVEL@TIME")
     ] = None,
@@ -50,9 +51,7 @@ def coverage(
     missed: Annotated[
         bool, typer.Option("--missed", help="Name lines that did not run, and branches that went one way.")
     ] = False,
-    fail_under: Annotated[
-        float, typer.Option(help="Least share of lines, in %.", metavar="PERCENT", min=0, max=100)
-    ] = 0.0,
+    fail_under: Annotated[float, percent_option("--fail-under", purpose="Least share of lines.", shown="0%")] = 0.0,
     json_output: Annotated[bool, typer.Option("--json", help="Print one JSON object.")] = False,
 ) -> None:
     """Measure coverage."""
@@ -64,7 +63,7 @@ def coverage(
     warn_on_stderr(board)
     listener = Coverage(board.image, table, StaticCode(board.chip.memory))
     with Observation(board, [listener]):
-        run_driven(board, to_nanos(span), changes)
+        run_driven(board, span_ns, changes)
     files = listener.files()
     if lcov is not None:
         write_lcov(files, lcov, sources=sources)

@@ -9,15 +9,15 @@ import typer
 from bluepill_sim.analysis.columns import in_columns
 from bluepill_sim.board import BluePill
 from bluepill_sim.cli.driving import run_driven
+from bluepill_sim.cli.quantities import time_option
 from bluepill_sim.program.elf_file import Layout, layout, stack_top, variables_end, vectors
 from bluepill_sim.program.image import Image
 from bluepill_sim.stm32f103 import FLASH_BYTES, SRAM_BYTES
-from bluepill_sim.timing import to_nanos
-from simbase.timing import NS_PER_S
+from simbase.timing import NS_PER_S, Nanos
 
-HELP = """Show what a firmware is: sections, sizes, vectors, largest symbols, stack.
+HELP = """Show what a firmware is, and what it uses that is not modelled.
 
-It is also run for a moment, to see which things it uses that are not modelled.
+Sections, sizes, vectors, largest symbols, stack. It is also run for a moment.
 
 \b
 Examples:
@@ -37,14 +37,15 @@ def register(app: typer.Typer) -> None:
 
 def info(
     firmware: Annotated[Path, typer.Argument(help="ELF, HEX or BIN.", metavar="FIRMWARE")],
-    span: Annotated[str, typer.Option("--for", help="How long it is run; 0s: not at all.", metavar="TIME")] = "500ms",
+    span_ns: Annotated[
+        Nanos, time_option("--for", purpose="How long it is run; 0: not at all.", shown="500ms")
+    ] = NS_PER_S // 2,
     json_output: Annotated[bool, typer.Option("--json", help="Print one JSON object.")] = False,
 ) -> None:
     """Show what a firmware is."""
-    end_ns = to_nanos(span)
     board = BluePill(firmware)
     board.chip.pins.is_serial_input = lambda _pin: True  # nothing is wired here: no wire is missing
-    run_driven(board, end_ns, ())
+    run_driven(board, span_ns, ())
     found = facts(board)
     if json_output:
         typer.echo(json.dumps(found, sort_keys=True))

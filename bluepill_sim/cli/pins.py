@@ -12,10 +12,12 @@ from bluepill_sim.analysis.sigrok import write_sigrok
 from bluepill_sim.analysis.vcd import write_vcd
 from bluepill_sim.board import BluePill
 from bluepill_sim.cli.driving import parse_changes, print_fault, print_status, run_driven, summary, warn_on_stderr
-from bluepill_sim.timing import to_nanos
-from simbase.timing import NS_PER_S
+from bluepill_sim.cli.quantities import time_option
+from simbase.timing import NS_PER_S, Nanos
 
-HELP = """Run a firmware for a while, then show each pin: mode, level, who drives it, edges.
+HELP = """Run a firmware for a while, then show what each pin is and did.
+
+Mode, level, who drives it, edges.
 
 With --vcd or --sr the pins are also written as waveforms, with the interrupt
 lines and what the USARTs send beside them.
@@ -36,7 +38,7 @@ def register(app: typer.Typer) -> None:
 
 def pins(
     firmware: Annotated[Path, typer.Argument(help="ELF, HEX or BIN.", metavar="FIRMWARE")],
-    span: Annotated[str, typer.Option("--for", help="Virtual time, such as 2s or 10ms.", metavar="TIME")] = "1s",
+    span_ns: Annotated[Nanos, time_option("--for", purpose="How much virtual time.", shown="1s")] = NS_PER_S,
     drive: Annotated[
         list[str] | None, typer.Option(help="Put a level on a pin at a time; repeatable.", metavar="PIN=LEVEL@TIME")
     ] = None,
@@ -46,12 +48,11 @@ def pins(
     json_output: Annotated[bool, typer.Option("--json", help="Print one JSON object.")] = False,
 ) -> None:
     """Show the pins."""
-    end_ns = to_nanos(span)
     board = BluePill(firmware)
     changes = parse_changes(drive or [], board)
     warn_on_stderr(board)
     probe = Probe(board, with_signals=vcd is not None or sr is not None)
-    run_driven(board, end_ns, changes)
+    run_driven(board, span_ns, changes)
     probe.finish()
     if vcd is not None:
         write_vcd(probe, vcd)

@@ -14,11 +14,12 @@ from bluepill_sim.analysis.profile_text import exception_lines, function_lines
 from bluepill_sim.analysis.stack import StackGauge
 from bluepill_sim.board import BluePill
 from bluepill_sim.cli.driving import parse_changes, print_fault, print_status, run_driven, summary, warn_on_stderr
+from bluepill_sim.cli.quantities import time_option
 from bluepill_sim.core.nvic import exception_name
 from bluepill_sim.errors import BluePillError
 from bluepill_sim.program.functions import FunctionTable
 from bluepill_sim.program.static_code import StaticCode
-from bluepill_sim.timing import to_nanos
+from simbase.timing import NS_PER_S, Nanos
 
 HELP = """Run a firmware for a while and show where its cycles go.
 
@@ -44,11 +45,11 @@ def register(app: typer.Typer) -> None:
 
 def profile(
     firmware: Annotated[Path, typer.Argument(help="ELF, HEX or BIN.", metavar="FIRMWARE")],
-    span: Annotated[str, typer.Option("--for", help="Virtual time, such as 2s or 10ms.", metavar="TIME")] = "1s",
+    span_ns: Annotated[Nanos, time_option("--for", purpose="How much virtual time.", shown="1s")] = NS_PER_S,
     drive: Annotated[
         list[str] | None, typer.Option(help="Put a level on a pin at a time; repeatable.", metavar="PIN=LEVEL@TIME")
     ] = None,
-    flame: Annotated[Path | None, typer.Option(help="Write a flame graph.", metavar="FILE.svg")] = None,
+    flame: Annotated[Path | None, typer.Option(help="Write a flame graph (.svg).", metavar="FILE")] = None,
     folded: Annotated[Path | None, typer.Option(help="Write folded stacks.", metavar="FILE")] = None,
     every: Annotated[bool, typer.Option("--all", help="Every function that ran.")] = False,
     json_output: Annotated[bool, typer.Option("--json", help="Print one JSON object.")] = False,
@@ -61,7 +62,7 @@ def profile(
     costs = CycleProfile(FunctionTable(board.image), StaticCode(board.chip.memory))
     latency = Latency(board)
     with Observation(board, [costs, latency]):
-        run_driven(board, to_nanos(span), changes)
+        run_driven(board, span_ns, changes)
     use = stack.measure()
     if flame is not None:
         title = f"{firmware.name}: {board.now_ns / 1e9:g} s"

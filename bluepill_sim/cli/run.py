@@ -19,12 +19,13 @@ from bluepill_sim.cli.driving import (
     summary,
     warn_on_stderr,
 )
-from bluepill_sim.timing import ChipReached, to_nanos
+from bluepill_sim.cli.quantities import baud_option, time_option
+from bluepill_sim.timing import ChipReached
 from simbase.timing import NS_PER_MS, NS_PER_S, Nanos, Reason
 
-HELP = """Boot a firmware on an emulated BluePill; what it sends on USART1 goes to stdout.
+HELP = """Boot a firmware on an emulated BluePill.
 
-Time is virtual: a program that sleeps runs much faster than real time. Exit
+What it sends on USART1 goes to stdout. Time is virtual: a program that sleeps runs much faster than real time. Exit
 code 1: the firmware died of a fault, or the wall clock's budget was used up;
 then the last blocks that it ran are shown.
 
@@ -39,14 +40,13 @@ Examples:
 
 #: chosen: how often typed input reaches a running program, and its time is held back to the clock.
 SLICE_NS: Nanos = 2 * NS_PER_MS
-DEFAULT_SPAN = "1s"
 #: chosen: so often the wall clock is looked at, and how far a program runs between two looks, at first and at most.
 LOOK_S = 0.05
 _STRIDES_NS: tuple[Nanos, Nanos] = NS_PER_MS // 10, 20 * NS_PER_MS
 #: chosen: longer than anybody waits for a run.
-_BUDGET_S = 600.0
+_BUDGET_NS: Nanos = 600 * NS_PER_S
 #: Without an end: until Ctrl-C.
-_FOR_EVER = "31536000s"
+_FOR_EVER_NS: Nanos = 365 * 24 * 3600 * NS_PER_S
 
 
 def register(app: typer.Typer) -> None:
@@ -56,7 +56,9 @@ def register(app: typer.Typer) -> None:
 
 def run(
     firmware: Annotated[Path, typer.Argument(help="ELF, HEX or BIN.", metavar="FIRMWARE")],
-    span: Annotated[str | None, typer.Option("--for", help="Virtual time, such as 2s or 10ms.", metavar="TIME")] = None,
+    span_ns: Annotated[
+        Nanos | None, time_option("--for", purpose="How much virtual time.", shown="1s, with --realtime without end")
+    ] = None,
     uart: Annotated[str, typer.Option(help="Where USART1 goes: - (stdout), pty:, or a file.", metavar="WHERE")] = "-",
     realtime: Annotated[bool, typer.Option("--realtime", help="At the speed of the clock, until Ctrl-C.")] = False,
     drive: Annotated[
@@ -65,16 +67,16 @@ def run(
     until: Annotated[
         str | None, typer.Option(help='End earlier: "pin PA4 high", "usart1 sends ready", "fault".', metavar="EVENT")
     ] = None,
-    budget_s: Annotated[
-        float, typer.Option("--budget", help="Most seconds of wall clock, unless --realtime.", metavar="S", min=0)
-    ] = _BUDGET_S,
+    budget_ns: Annotated[
+        Nanos, time_option("--budget", purpose="Most time of the wall clock, unless --realtime.", shown="10min")
+    ] = _BUDGET_NS,
     usart_baud: Annotated[
-        int | None, typer.Option(help="Speed of USART1's far end; unset follows the program.", metavar="BAUD", min=1)
+        int | None, baud_option("--usart-baud", purpose="Speed of USART1's far end; unset follows the program.")
     ] = None,
     strict: Annotated[bool, typer.Option("--strict", help="The first warning ends the run.")] = False,
 ) -> None:
     """Boot a firmware."""
-    end_ns = to_nanos(span or (_FOR_EVER if realtime else DEFAULT_SPAN))
+    end_ns = span_ns if span_ns is not None else _FOR_EVER_NS if realtime else NS_PER_S
     board = BluePill(firmware, strict=strict)
     board.usart1.far_baud = usart_baud
     changes = parse_changes(drive or [], board)
@@ -83,7 +85,7 @@ def run(
     carry = connect(console, board.usart1)
     if uart == "pty:":
         print_status(f"USART1 is at {console.description}")
-    advance = _paced(board, carry) if realtime or uart == "pty:" else _bounded(board, budget_s)
+    advance = _paced(board, carry) if realtime or uart == "pty:" else _bounded(board, budget_ns)
     schedule = Schedule(board, changes, advance)
     try:
         with showing_where_it_hangs(board):
@@ -100,14 +102,14 @@ def run(
         raise typer.Exit(1)
 
 
-def _bounded(board: BluePill, budget_s: float) -> Callable[[Nanos], ChipReached]:
+def _bounded(board: BluePill, budget_ns: Nanos) -> Callable[[Nanos], ChipReached]:
     """Return a way to advance that ends with the wall clock's budget, however a program spins.
 
     A program may cost a thousand times as much as another for the same virtual time, such as one that resets itself
     over and over: the stride follows what the last one cost.
     """
     stride_ns, most_ns = _STRIDES_NS
-    end_ns = time.monotonic_ns() + int(budget_s * NS_PER_S)
+    end_ns = time.monotonic_ns() + budget_ns
 
     def advance(limit_ns: Nanos) -> ChipReached:
         nonlocal stride_ns
@@ -120,7 +122,8 @@ def _bounded(board: BluePill, budget_s: float) -> Callable[[Nanos], ChipReached]
                 return reached
             if time.monotonic_ns() > end_ns:
                 raise OverBudgetError(
-                    f"{budget_s:g} s of wall clock are used up at {board.now_ns / NS_PER_S:.6f} s of virtual time",
+                    f"{budget_ns / NS_PER_S:g} s of wall clock are used up at "
+                    f"{board.now_ns / NS_PER_S:.6f} s of virtual time",
                     hint="--budget gives more, --for asks for less",
                 )
 

@@ -10,16 +10,17 @@ import typer
 
 from bluepill_sim.board import BluePill
 from bluepill_sim.cli.driving import parse_changes, print_fault, print_status, run_driven, summary, warn_on_stderr
+from bluepill_sim.cli.quantities import time_option
 from bluepill_sim.core import BlockRecorder
 from bluepill_sim.errors import BluePillError
 from bluepill_sim.program.functions import FunctionTable
 from bluepill_sim.program.last_blocks import lines_of
 from bluepill_sim.program.line_table import read_lines
-from bluepill_sim.timing import to_nanos
+from simbase.timing import NS_PER_MS, Nanos
 
-HELP = """Run a firmware and write what it executes: cycle, symbol, source line.
+HELP = """Run a firmware and write what it executes.
 
-A line is a basic block, or the entry of or return from an exception; with
+Cycle, symbol, source line. A line is a basic block, or the entry of or return from an exception; with
 --calls only where another function begins. A loop to itself is one line.
 
 \b
@@ -40,8 +41,8 @@ def register(app: typer.Typer) -> None:
 
 def trace(
     firmware: Annotated[Path, typer.Argument(help="ELF, HEX or BIN.", metavar="FIRMWARE")],
-    span: Annotated[str, typer.Option("--for", help="How long it is traced.", metavar="TIME")] = "1ms",
-    start: Annotated[str, typer.Option("--from", help="When the trace begins.", metavar="TIME")] = "0s",
+    span_ns: Annotated[Nanos, time_option("--for", purpose="How long it is traced.", shown="1ms")] = NS_PER_MS,
+    begin_ns: Annotated[Nanos, time_option("--from", purpose="When the trace begins.", shown="0s")] = 0,
     drive: Annotated[
         list[str] | None, typer.Option(help="Put a level on a pin at a time; repeatable.", metavar="PIN=LEVEL@TIME")
     ] = None,
@@ -55,8 +56,7 @@ def trace(
     functions = FunctionTable(board.image)
     changes = parse_changes(drive or [], board)
     warn_on_stderr(board)
-    begin_ns = to_nanos(start)
-    end_ns = begin_ns + to_nanos(span)
+    end_ns = begin_ns + span_ns
     run_driven(board, begin_ns, [change for change in changes if change.at_ns < begin_ns])
     count, last = 0, ""
     with ExitStack() as stack:

@@ -66,6 +66,11 @@ class Replay:
             if frame is not None:
                 self._came[frame.kind] += 1
 
+    @property
+    def is_closed(self) -> bool:
+        """Whether the far side has said CLOSE: a client that goes after that has left in good order."""
+        return self._came[CommandNumber.CLOSE] > 0
+
     def waited(self, now: Nanos) -> Nanos:
         """Return for how long the next frame has waited for the far side, in nanoseconds."""
         return 0 if self._waits_since is None else now - self._waits_since

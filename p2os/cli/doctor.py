@@ -18,6 +18,7 @@ from typing import Annotated
 
 import typer
 
+from p2os.cli.help_pages import BENCH
 from simbase.installation import install_command, reinstall_command
 
 HELP = """Show what is installed, what is missing and how to get it.
@@ -157,7 +158,7 @@ def package_version(name: str) -> str | None:
 
 def register(app: typer.Typer) -> None:
     """Add the verb."""
-    app.command("doctor", help=HELP)(doctor)
+    app.command("doctor", help=HELP, rich_help_panel=BENCH)(doctor)
 
 
 def doctor(json_output: Annotated[bool, typer.Option("--json", help="Print a JSON list.")] = False) -> None:

@@ -46,15 +46,22 @@ def hold_robot() -> None:
 
 
 @contextlib.contextmanager
-def held(robot: AbstractContextManager[Held]) -> Iterator[Held]:
-    """Connect a robot for a block, and release it undisturbed by signals when the block is left."""
+def held(robot: AbstractContextManager[Held], *, moves: bool = False) -> Iterator[Held]:
+    """Connect a robot for a block, and release it undisturbed by signals when the block is left.
+
+    Args:
+        robot: The robot.
+        moves: Whether the block moves it: an interruption says that it was stopped.
+    """
     hold_robot()
     client = robot.__enter__()
     try:
         yield client
-    except BaseException:
+    except BaseException as error:
         with postponed():
             if not robot.__exit__(*sys.exc_info()):
+                if moves and isinstance(error, KeyboardInterrupt):
+                    sys.stderr.write("\ninterrupted: the robot was stopped and let go\n")
                 raise
     else:
         with postponed():

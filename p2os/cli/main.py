@@ -9,16 +9,17 @@ Exit codes: 0 done, 1 the operation failed, 2 wrong usage, 130 interrupted, by w
 """
 
 import contextlib
+import difflib
 import os
 import sys
 import traceback
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from importlib.metadata import EntryPoint, entry_points, version
 from typing import Annotated
 
 import typer
 
-import p2os
+from p2os.cli.help_pages import VerbList, dress
 from p2os.cli.printing import restored_output
 from p2os.cli.signals import end_on_signals, ignore_signals, restored_signals
 from simbase.errors import MissingDependencyError
@@ -29,17 +30,26 @@ EXIT_FAILED = 1
 EXIT_USAGE = 2
 EXIT_INTERRUPTED = 130
 
+#: What the scripts of `--install-completion` set, and why this program was called then.
+COMPLETE_VARIABLE = "_P2OS_COMPLETE"
+
+HELP = """A test bench for the firmware of mobile robots, and tools for Pioneers that speak P2OS.
+
+It runs BluePill programs on an emulated board that drives a virtual or a real robot, serves virtual
+Pioneers to other programs, drives, watches and records robots, and reads recordings.
+"""
+
 EPILOG = """Examples:
 
 \b
-  p2os demo                             watch a BluePill program drive a Pioneer
-  p2os run dodge --world arena          run one scenario and write a report
-  p2os serve                            be a Pioneer on tcp:127.0.0.1:8101
-  p2os scan                             find a robot, and identify it
-  p2os monitor tcp:127.0.0.1:8101       watch it
-  p2os drive URL --forward 0.5m         move it
-  p2os decode --explain fafb03000000    what bytes mean, one by one
-  p2os doctor                           show what is installed and what is missing
+  p2os demo                         watch a BluePill program drive a Pioneer
+  p2os run dodge --world arena      run one scenario and write a report
+  p2os serve                        be a Pioneer on tcp:127.0.0.1:8101
+  p2os scan                         find a robot, and identify it
+  p2os monitor tcp:127.0.0.1:8101   watch it
+  p2os drive URL --forward 0.5m     move it
+  p2os decode --explain fafb03000000what bytes mean, one by one
+  p2os doctor                       show what is installed and what is missing
 
 With --trace anywhere, an error shows where in the program it arose.
 """
@@ -83,7 +93,7 @@ def run(words: list[str], *, trace: bool = False) -> int:
         return EXIT_INTERRUPTED
 
 
-def report(error: Exception, words: Sequence[str], *, trace: bool = False) -> int:
+def report(error: Exception, *, trace: bool = False) -> int:
     """Print on stderr what went wrong and what to try, and return the exit code.
 
     Our own errors, those of the emulator and those of the option parser carry
@@ -98,10 +108,9 @@ def report(error: Exception, words: Sequence[str], *, trace: bool = False) -> in
         return EXIT_FAILED
     format_message = getattr(error, "format_message", None)
     if callable(format_message):  # the option parser's
-        _print_error(f"p2os: {_one_line(format_message()).removesuffix('.')}")
-        verb = next((word for word in words if not word.startswith("-")), "")
-        known = verb in {entry.name for entry in verbs()}
-        _print_error(f"hint: p2os {verb} --help" if known else "hint: p2os --help")
+        _print_error(f"p2os: {_usage_message(error, _one_line(format_message())).removesuffix('.')}")
+        path = getattr(getattr(error, "ctx", None), "command_path", None)
+        _print_error(f"hint: {path or 'p2os'} --help")
         return code
     _print_error(f"p2os: {_one_line(str(error))}")
     if hint := getattr(error, "hint", None):
@@ -117,15 +126,36 @@ def verbs() -> list[EntryPoint]:
 def make_app(words: Sequence[str] = ()) -> typer.Typer:
     """Return the application with the verb that `words` name, or with all when they name none."""
     app = typer.Typer(
-        help=(p2os.__doc__ or "").strip(), epilog=EPILOG, rich_markup_mode=None, add_completion=False,
+        help=HELP, epilog=EPILOG, rich_markup_mode=None, cls=VerbList,
         pretty_exceptions_enable=False, context_settings={"help_option_names": ["-h", "--help"]},
     )  # fmt: skip
     app.callback()(_options)
     found = verbs()
-    first = next((word for word in words if not word.startswith("-")), None)
-    wanted = [entry for entry in found if entry.name == first] or found
-    add_verbs(app, wanted)
+    completed = completed_words(os.environ)
+    first = next((word for word in (words if completed is None else completed) if not word.startswith("-")), None)
+    wanted = [entry for entry in found if entry.name == first]
+    if completed is not None and not wanted:
+        for entry in found:  # only their names are wanted: a TAB is to be quick
+            app.command(entry.name)(lambda: None)
+        return app
+    add_verbs(app, wanted or found)
+    dress(app)
     return app
+
+
+def completed_words(environment: Mapping[str, str]) -> list[str] | None:
+    """Return the whole words that stand before the one that a shell wants completed; None when none asks.
+
+    Args:
+        environment: What the scripts of `--install-completion` set.
+    """
+    if not environment.get(COMPLETE_VARIABLE, "").startswith("complete"):
+        return None
+    if "COMP_WORDS" in environment:  # bash
+        return environment["COMP_WORDS"].split()[1 : int(environment.get("COMP_CWORD", "1"))]
+    line = environment.get("_TYPER_COMPLETE_ARGS", "")
+    words = line.split()[1:]
+    return words if line.endswith(" ") else words[:-1]
 
 
 def add_verbs(app: typer.Typer, entries: Iterable[EntryPoint]) -> None:
@@ -149,7 +179,7 @@ def _run(words: list[str], *, trace: bool) -> int:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return EXIT_FAILED
     except Exception as error:  # noqa: BLE001 - the one place where every error becomes a line
-        return report(error, words, trace=trace)
+        return report(error, trace=trace)
     return result if isinstance(result, int) else 0
 
 
@@ -178,6 +208,24 @@ def _options(
     ] = False,
 ) -> None:
     """Take the options that stand before the verb."""
+
+
+def _usage_message(error: Exception, message: str) -> str:
+    """Return what the option parser complains of, beginning with the option or argument that it is about."""
+    name = getattr(error, "option_name", None)
+    context = getattr(error, "ctx", None)
+    if name is not None and context is not None and message.startswith("No such option"):
+        options = [
+            option for parameter in context.command.params for option in (*parameter.opts, *parameter.secondary_opts)
+        ]
+        near = difflib.get_close_matches(name, [option for option in options if option.startswith("--")], n=1)
+        return f"No such option: {name}" + (f". Did you mean {near[0]}?" if near else "")
+    parameter = getattr(error, "param", None)
+    if parameter is None or not isinstance(error, typer.BadParameter) or message.startswith("Missing"):
+        return message
+    is_option = parameter.param_type_name == "option"
+    name = max(parameter.opts, key=len) if is_option else parameter.metavar or parameter.name.upper()
+    return f"{name} {_one_line(error.message).removeprefix('Value error, ')}"
 
 
 def _one_line(text: str) -> str:

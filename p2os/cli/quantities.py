@@ -1,71 +1,147 @@
 """Numbers with units on the command line: `0.5m`, `-90deg`, `200mm/s`, `2s`.
 
 A number without its unit is refused: 500 may be metres or millimetres, and the
-robot would drive either.
+robot would drive either. Only 0 is the same in all of them. What is counted, and what has one unit
+only (a line's speed, a factor), may stand bare.
+
+Each row of the table at the end is a quantity; `option` makes an option of one.
 """
 
 import math
 import re
-from collections.abc import Mapping
-from enum import Enum
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any
 
-from simbase.errors import UsageError
-from simbase.timing import NS_PER_S, Nanos
+import typer
+
+from simbase.timing import NS_PER_MS, NS_PER_S, NS_PER_US
 
 _NUMBER = re.compile(r"(?P<number>[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*(?P<unit>\S*)")
 
 
-class Quantity(Enum):
-    """What is measured: the units that are taken, and an example."""
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Quantity:
+    """What is measured."""
 
-    LENGTH = ({"m": 1.0, "cm": 0.01, "mm": 0.001}, "0.5m")
-    ANGLE = ({"deg": math.pi / 180, "°": math.pi / 180, "rad": 1.0}, "90deg")
-    SPEED = ({"m/s": 1.0, "cm/s": 0.01, "mm/s": 0.001}, "0.2m/s")
-    TURN_RATE = ({"deg/s": math.pi / 180, "°/s": math.pi / 180, "rad/s": 1.0}, "30deg/s")
-    TIME = ({"s": 1.0, "ms": 0.001, "min": 60.0, "h": 3600.0}, "2s")
+    #: As a message calls it, with its article's noun: "length".
+    name: str
+    #: As help shows its values: "LENGTH".
+    metavar: str
+    #: Unit → how many of the unit in which the value is handed on it is.
+    units: Mapping[str, float]
+    #: A value as one would type it.
+    example: str
+    #: Whether the value is handed on as a whole number.
+    is_whole: bool = False
 
-    @property
-    def units(self) -> Mapping[str, float]:
-        """Unit → how many of the SI unit (metres, radians, seconds) it is."""
-        return self.value[0]
+    def option(
+        self,
+        *flags: str,
+        purpose: str,
+        least: str = "",
+        most: str = "",
+        above_zero: bool = False,
+        shown: str = "",
+        metavar: str = "",
+    ) -> Any:
+        """Return an option that takes this quantity, for an `Annotated`.
 
-    @property
-    def example(self) -> str:
-        """A value as one would type it."""
-        return self.value[1]
+        Args:
+            flags: Its names; none: from the parameter's.
+            purpose: What it is for.
+            least: The least value, as typed; empty: none.
+            most: The greatest, likewise.
+            above_zero: Refuse 0 and less.
+            shown: The default as help shows it; empty where there is none.
+            metavar: In place of the quantity's own.
+        """
+        bounds = range_words(least, most, above_zero=above_zero) if least or most else ""
+        notes = "; ".join(note for note in (bounds, f"default: {shown}" if shown else "") if note)
+        return typer.Option(
+            *flags, help=f"{purpose}  [{notes}]" if notes else purpose,
+            metavar=metavar or self.metavar, show_default=False,
+            parser=self.parser(least=least, most=most, above_zero=above_zero),
+        )  # fmt: skip
+
+    def parser(self, *, least: str = "", most: str = "", above_zero: bool = False) -> Callable[[str], float]:
+        """Return what reads a value of this quantity; arguments as of `option`."""
+        lowest = self.read(least) if least else -math.inf
+        highest = self.read(most) if most else math.inf
+        words = range_words(least, most, above_zero=above_zero)
+
+        def parse(text: str) -> float:
+            if not isinstance(text, str):  # a default that is in its unit already
+                return text
+            value = self.read(text, words)
+            if not lowest <= value <= highest or (above_zero and value <= 0):
+                raise typer.BadParameter(f"{text!r} is out of range: {self._takes(words)}")
+            return value
+
+        parse.__name__ = self.metavar
+        return parse
+
+    def read(self, text: str, words: str = "") -> float:
+        """Return a value, in the unit that counts 1.
+
+        Args:
+            text: As typed.
+            words: The range, for the message.
+
+        Raises:
+            typer.BadParameter: It is no number, or has no unit or another one.
+        """
+        found = _NUMBER.fullmatch(text.strip())
+        if found is None:
+            raise typer.BadParameter(f"{text!r} is no {self.name}: {self._takes(words)}")
+        number, unit = float(found["number"]), found["unit"]
+        if unit not in self.units and not (number == 0 and not unit):
+            what = f"has the unit {unit!r}" if unit else "has no unit"
+            raise typer.BadParameter(f"{text!r} {what}: {self._takes(words)}")
+        value = number * self.units.get(unit, 1.0)
+        if not math.isfinite(value):
+            raise typer.BadParameter(f"{text!r} is too large: {self._takes(words)}")
+        if not self.is_whole:
+            return value
+        if "" in self.units and value != round(value):
+            raise typer.BadParameter(f"{text!r} is no {self.name}: {self._takes(words)}")
+        return round(value)
+
+    def _takes(self, words: str) -> str:
+        """Return what is taken, in words: range, units, an example."""
+        *others, last = [unit for unit in self.units if unit] or [""]
+        units = f"in {', '.join(others)} or {last}" if others else ""
+        return ", ".join(text for text in (words, units, f"such as {self.example}") if text)
 
 
-def parse_quantity(text: str, quantity: Quantity, option: str) -> float:
-    """Return a value in SI units.
-
-    Args:
-        text: As typed.
-        quantity: What is measured.
-        option: Where it was typed, for the message.
-
-    Raises:
-        UsageError: It is no number, or has no unit or another one.
-    """
-    found = _NUMBER.fullmatch(text.strip())
-    units = ", ".join(quantity.units)
-    if found is None:
-        raise UsageError(f"{option} {text!r} is no number with a unit", hint=f"{option} {quantity.example}")
-    if found["unit"] not in quantity.units:
-        what = f"has the unit {found['unit']!r}" if found["unit"] else "has no unit"
-        raise UsageError(f"{option} {text!r} {what}; take {units}", hint=f"{option} {quantity.example}")
-    value = float(found["number"]) * quantity.units[found["unit"]]
-    if not math.isfinite(value):
-        raise UsageError(f"{option} {text!r} is too large", hint=f"{option} {quantity.example}")
-    return value
+def range_words(least: str, most: str, *, above_zero: bool = False) -> str:
+    """Return a range in words: "0.1s to 10s"; empty where there is none."""
+    if above_zero:
+        return f"more than 0, {most} at most" if most else "more than 0"
+    if least and most:
+        return f"{least} to {most}"
+    return f"{least} or more" if least else f"{most} or less" if most else ""
 
 
-def parse_duration(text: str, option: str) -> Nanos:
-    """Return a duration in nanoseconds.
+_DEGREE = math.pi / 180
 
-    Raises:
-        UsageError: It is no time, or not positive.
-    """
-    seconds = parse_quantity(text, Quantity.TIME, option)
-    if not 0 < seconds < 1e9:
-        raise UsageError(f"{option} {text!r} must be more than 0", hint=f"{option} 10s")
-    return round(seconds * NS_PER_S)
+LENGTH = Quantity(name="length", metavar="LENGTH", units={"m": 1.0, "cm": 0.01, "mm": 0.001}, example="0.5m")
+ANGLE = Quantity(name="angle", metavar="ANGLE", units={"deg": _DEGREE, "°": _DEGREE, "rad": 1.0}, example="90deg")
+SPEED = Quantity(name="speed", metavar="SPEED", units={"m/s": 1.0, "cm/s": 0.01, "mm/s": 0.001}, example="0.2m/s")
+TURN_RATE = Quantity(
+    name="turning speed", metavar="RATE", units={"deg/s": _DEGREE, "°/s": _DEGREE, "rad/s": 1.0}, example="30deg/s"
+)
+#: Nanoseconds.
+TIME = Quantity(
+    name="time", metavar="TIME", example="2s", is_whole=True,
+    units={"ns": 1, "us": NS_PER_US, "ms": NS_PER_MS, "s": NS_PER_S, "min": 60 * NS_PER_S, "h": 3600 * NS_PER_S},
+)  # fmt: skip
+#: Bits a second.
+BAUD = Quantity(
+    name="speed of a line", metavar="BAUD", units={"": 1, "baud": 1, "kbaud": 1000}, example="9600", is_whole=True
+)
+#: How many times as fast.
+FACTOR = Quantity(name="factor", metavar="FACTOR", units={"": 1.0, "x": 1.0, "×": 1.0}, example="2")
+COUNT = Quantity(name="whole number", metavar="N", units={"": 1}, example="3", is_whole=True)
+SEED = Quantity(name="whole number", metavar="SEED", units={"": 1}, example="7", is_whole=True)
+PORT = Quantity(name="number of a TCP port", metavar="PORT", units={"": 1}, example="3333", is_whole=True)

@@ -25,7 +25,7 @@ from typing import Self
 from p2os.client.aux_ports import AsyncAux
 from p2os.client.calls import Result, RobotCalls
 from p2os.client.core import PacketType, RobotCore, request_for
-from p2os.client.goals import Axis, DriveAxis, MotionResult, TurnAxis
+from p2os.client.goals import Axis, DriveAxis, MotionResult, TurnAxis, as_number
 from p2os.client.interrupts import exit_on_signals
 from p2os.client.line import Line, core_for, motion_result, no_answer, not_connected, not_found
 from p2os.client.notices import Notice
@@ -105,7 +105,7 @@ class Robot(RobotCalls):
 
     async def sleep(self, duration_s: float) -> None:
         """Do nothing for so long, without tripping the deadman: held speeds go on."""
-        await self._wait_for(lambda _: False, duration_s)
+        await self._wait_for(lambda _: False, as_number(duration_s, "sleep", "seconds"))
 
     async def next_state(self, timeout_s: float = 2.0) -> RobotState:
         """Wait for the next packet and return its state.
@@ -201,11 +201,11 @@ class Robot(RobotCalls):
         self, heading_rad: float, *, speed_radps: float | None = None, timeout_s: float | None = None
     ) -> MotionResult:
         """Turn the shorter way to a heading of the pose's frame."""
-        angle_rad = math.remainder(heading_rad - self.pose.heading_rad, 2 * math.pi)
+        angle_rad = math.remainder(as_number(heading_rad, "turn_to", "radians") - self.pose.heading_rad, 2 * math.pi)
         return await self.turn(angle_rad, speed_radps=speed_radps, timeout_s=timeout_s)
 
     async def _reach(self, axis: Axis, speed: float | None, timeout_s: float | None) -> MotionResult:
-        limit_ns = None if timeout_s is None else round(timeout_s * NS_PER_S)
+        limit_ns = None if timeout_s is None else round(as_number(timeout_s, "timeout_s", "seconds") * NS_PER_S)
         goal = self._run(lambda core, now: core.begin_goal(axis, limit_ns, speed, now))
         try:
             await self._wait_for(lambda _: goal.ended is not None, None)

@@ -14,6 +14,7 @@ from enum import IntEnum
 from typing import Protocol, TypeVar
 
 from p2os.client.core import PacketType, RobotCore
+from p2os.client.goals import as_number
 from p2os.client.notices import LinkLostError
 from p2os.client.robot_state import Limits, Link, RobotPose, RobotState
 from p2os.protocol.commands import Command, CommandNumber, sonar
@@ -165,13 +166,16 @@ class RobotCalls(ABC):
         for number, value, factor in rows:
             if value is None:
                 continue
+            value = as_number(value, "set_limits", "SI units")  # noqa: PLW2901 - checked
             if not (math.isfinite(value) and value > 0):
                 raise UsageError(f"a limit of {value} is not positive")
             self.send(number, round(value * factor))
 
     def set_pose(self, x_m: float = 0.0, y_m: float = 0.0, heading_rad: float = 0.0) -> None:
         """Set where the robot is; states from now on count from there. Nothing is sent."""
-        self._run(lambda core, _: core.set_pose(RobotPose(x_m, y_m, heading_rad)))
+        x_m, y_m = as_number(x_m, "set_pose", "metres"), as_number(y_m, "set_pose", "metres")
+        pose = RobotPose(x_m, y_m, as_number(heading_rad, "set_pose", "radians"))
+        self._run(lambda core, _: core.set_pose(pose))
 
     # Anything -----------------------------------------------------------------------------
 

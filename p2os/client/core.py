@@ -19,7 +19,7 @@ from collections import deque
 from collections.abc import Callable, Mapping
 from typing import TypeVar
 
-from p2os.client.goals import Axis, Goal
+from p2os.client.goals import Axis, Goal, as_number
 from p2os.client.link import LinkSupervisor
 from p2os.client.mover import Mover, Speeds
 from p2os.client.notices import (
@@ -219,6 +219,8 @@ class RobotCore:
             MotorsDisabledError: the motors are off and are not switched on by themselves.
             UsageError: a speed is no number.
         """
+        forward_mps = as_number(forward_mps, "set_velocity", "m/s")
+        turn_radps = as_number(turn_radps, "set_velocity", "rad/s")
         if not (math.isfinite(forward_mps) and math.isfinite(turn_radps)):
             raise UsageError(f"a speed of {forward_mps} m/s and {turn_radps} rad/s is no speed")
         self.touch(now)

@@ -12,11 +12,13 @@ way round, so a goal of more than half a turn runs ahead of the robot in steps.
 
 import math
 from dataclasses import dataclass, replace
+from numbers import Real
 from typing import Protocol
 
 from p2os.client.notices import MotionEnded
 from p2os.client.robot_state import Limits, RobotPose, RobotState
 from p2os.protocol.commands import Command, CommandNumber
+from simbase.errors import UsageError, shown
 from simbase.timing import NS_PER_MS, NS_PER_S, Nanos
 
 #: ARIA's documentation advises no MOVE beyond 5 m.
@@ -50,6 +52,22 @@ class MotionResult:
     asked: float
     reached: float
     took_ns: Nanos
+
+
+def as_number(value: object, call: str, unit: str) -> float:
+    """Return a number that a program gave.
+
+    Args:
+        value: What it gave.
+        call: What it was given to: "drive".
+        unit: What is taken there: "metres".
+
+    Raises:
+        UsageError: It is no number, such as a text with a unit.
+    """
+    if isinstance(value, bool) or not isinstance(value, Real):
+        raise UsageError(f"{call} takes {unit} as a number, not {shown(value)}", hint="0.5, for example")
+    return float(value)
 
 
 class Axis(Protocol):
@@ -90,8 +108,8 @@ class DriveAxis:
     """Along the heading at which it began."""
 
     def __init__(self, distance_m: float) -> None:
-        self.asked = distance_m
-        self.what = f"drive {distance_m:.3f} m"
+        self.asked = as_number(distance_m, "drive", "metres")
+        self.what = f"drive {self.asked:.3f} m"
         self._start = RobotPose()
         self._leg_ends_m: float | None = None
 
@@ -148,8 +166,8 @@ class TurnAxis:
     """About the robot's centre, counter-clockwise positive."""
 
     def __init__(self, angle_rad: float) -> None:
-        self.asked = angle_rad
-        self.what = f"turn {math.degrees(angle_rad):.1f} deg"
+        self.asked = as_number(angle_rad, "turn", "radians")
+        self.what = f"turn {math.degrees(self.asked):.1f} deg"
         self._start_rad = 0.0
 
     def begin(self, state: RobotState) -> None:

@@ -28,7 +28,7 @@ import math
 from collections.abc import Callable, Container, Mapping
 from dataclasses import dataclass, replace
 
-from p2os.client.goals import Axis, Goal
+from p2os.client.goals import Axis, Goal, as_number
 from p2os.client.notices import (
     DeadmanStopped,
     Disobeyed,
@@ -218,6 +218,8 @@ class Mover:
             UsageError: The way, angle or speed is no number, or the speed is not positive.
             LocalProtocolError: No packet has shown where the robot is.
         """
+        if speed is not None:
+            speed = as_number(speed, "a motion's speed", "m/s or rad/s")
         if not math.isfinite(axis.asked) or (speed is not None and not (math.isfinite(speed) and speed > 0)):
             raise UsageError(f"{axis.what} at {speed} is no motion")
         state = self._observer.state

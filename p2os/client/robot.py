@@ -18,7 +18,7 @@ from typing import Self
 from p2os.client.aux_ports import AuxStream
 from p2os.client.calls import Result, RobotCalls
 from p2os.client.core import PacketType, RobotCore, request_for
-from p2os.client.goals import Axis, DriveAxis, MotionResult, TurnAxis
+from p2os.client.goals import Axis, DriveAxis, MotionResult, TurnAxis, as_number
 from p2os.client.interrupts import exit_on_signals
 from p2os.client.line import core_for, motion_result, no_answer, not_connected, not_found
 from p2os.client.notices import Notice
@@ -110,7 +110,7 @@ class Robot(RobotCalls):
             P2osError: the client's thread failed meanwhile.
         """
         with self._thread.changed:
-            self._thread.wait_for(lambda _: False, duration_s)
+            self._thread.wait_for(lambda _: False, as_number(duration_s, "sleep", "seconds"))
 
     def next_state(self, timeout_s: float = 2.0) -> RobotState:
         """Wait for the next packet and return its state.
@@ -239,7 +239,7 @@ class Robot(RobotCalls):
     ) -> MotionResult:
         """Turn the shorter way to a heading of the pose's frame; otherwise as `turn`."""
         return self.turn(
-            math.remainder(heading_rad - self.pose.heading_rad, 2 * math.pi),
+            math.remainder(as_number(heading_rad, "turn_to", "radians") - self.pose.heading_rad, 2 * math.pi),
             speed_radps=speed_radps,
             timeout_s=timeout_s,
         )
@@ -250,7 +250,7 @@ class Robot(RobotCalls):
 
     def _reach(self, axis: Axis, speed: float | None, timeout_s: float | None) -> MotionResult:
         thread = self._thread
-        limit_ns = None if timeout_s is None else round(timeout_s * NS_PER_S)
+        limit_ns = None if timeout_s is None else round(as_number(timeout_s, "timeout_s", "seconds") * NS_PER_S)
         with thread.changed:
             goal = thread.call(lambda core, now: core.begin_goal(axis, limit_ns, speed, now))
             try:

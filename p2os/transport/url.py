@@ -4,6 +4,8 @@ Reading a URL opens nothing and needs no operating system: `serial:COM3` is read
 everywhere (it is untried on Windows).
 """
 
+import difflib
+import re
 from collections.abc import Callable
 from dataclasses import dataclass
 
@@ -15,6 +17,8 @@ DEFAULT_BAUD = 9600
 DEFAULT_TCP_PORT = 8101
 LOOPBACK = "127.0.0.1"
 
+#: "10.0.0.5:8101", "robot.local:8101"; a word alone may be anything.
+_HOST_AND_PORT = re.compile(r"[\w.-]+:\d{1,5}|\d{1,3}(?:\.\d{1,3}){3}|localhost")
 _HINT = "use serial:/dev/ttyUSB0?baud=9600, serial:COM3, tcp:127.0.0.1:8101 or pty:"
 
 
@@ -73,10 +77,20 @@ def parse_url(text: str) -> PortUrl:
     scheme, colon, rest = text.partition(":")
     reader = _READERS.get(scheme) if colon else None
     if reader is None:
-        path = text.startswith("/") or text.upper().startswith("COM")
-        hint = f"did you mean serial:{text}?" if path else _HINT
-        raise UsageError(f"{text!r} is not a port URL", hint=hint)
+        meant = _meant(text)
+        raise UsageError(f"{text!r} is not a port URL", hint=f"did you mean {meant}?" if meant else _HINT)
     return reader(text, rest)
+
+
+def _meant(text: str) -> str:
+    """Return the URL that somebody meant who left the scheme out or misspelt it; empty where nobody can tell."""
+    if text.startswith("/") or text.upper().startswith("COM"):
+        return f"serial:{text}"
+    if _HOST_AND_PORT.fullmatch(text):
+        return f"tcp:{text}"
+    scheme, colon, rest = text.partition(":")
+    near = difflib.get_close_matches(scheme, _READERS, n=1) if colon else []
+    return f"{near[0]}:{rest}" if near else ""
 
 
 def _serial(text: str, rest: str) -> SerialUrl:

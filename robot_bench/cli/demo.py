@@ -6,6 +6,8 @@ from typing import Annotated
 
 import typer
 
+from p2os.cli.help_pages import BENCH
+from p2os.cli.quantities import TIME
 from robot_bench.cli.progress import RunDisplay
 from robot_bench.cli.run import end_with
 from robot_bench.recording.run_folder import make_next_folder
@@ -13,8 +15,9 @@ from robot_bench.run import run_scenario
 from robot_bench.scenario.scenario import load_scenario
 from simbase.errors import MissingDependencyError
 from simbase.installation import install_command
+from simbase.timing import NS_PER_S, Nanos
 
-HELP = """Watch a BluePill program drive a Pioneer around obstacles, then read what happened.
+HELP = """Watch a BluePill program drive a Pioneer around obstacles.
 
 The shipped program `dodge`, unmodified, for 120 s of virtual time: emulated
 BluePill, adapter, P2OS line, virtual Pioneer in PyBullet. Without PyBullet the
@@ -24,18 +27,21 @@ plan view takes its place.
 
 def register(app: typer.Typer) -> None:
     """Add the verb."""
-    app.command("demo", help=HELP)(demo)
+    app.command("demo", help=HELP, rich_help_panel=BENCH)(demo)
 
 
 def demo(
-    out: Annotated[Path | None, typer.Option(help="Run folder; default runs/demo-NNN.", metavar="DIR")] = None,
-    duration: Annotated[float | None, typer.Option(help="Seconds of virtual time.", metavar="S")] = None,
+    out: Annotated[Path | None, typer.Option(help="Run folder; default runs/demo-NNN.", metavar="FOLDER")] = None,
+    duration_ns: Annotated[
+        Nanos | None, TIME.option("--duration", purpose="How much virtual time.", above_zero=True)
+    ] = None,
     force: Annotated[bool, typer.Option("--force", help="Overwrite the run that the --out folder holds.")] = False,
     json_output: Annotated[bool, typer.Option("--json", help="Print one JSON object.")] = False,
 ) -> None:
     """Run the demonstration."""
     scenario = load_scenario("dodge").with_options(
-        mode="adapter", world="room", body=best_body(), duration_s=duration
+        mode="adapter", world="room", body=best_body(),
+        duration_s=None if duration_ns is None else duration_ns / NS_PER_S,
     )  # fmt: skip
     folder = out or make_next_folder("demo")
     with RunDisplay() as display:

@@ -6,9 +6,12 @@ from typing import Annotated, cast
 
 import typer
 
+from p2os.cli.help_pages import BENCH
 from robot_bench.report.make import make_artefacts
 
-HELP = """Make the report of a run, and all else in its folder, anew from trace.jsonl.
+HELP = """Make the report of a run anew, and all else in its folder.
+
+All of it is made from trace.jsonl.
 
 A run that was killed has its trace up to the last virtual second: this makes
 the rest.
@@ -22,11 +25,11 @@ Examples:
 
 def register(app: typer.Typer) -> None:
     """Add the verb."""
-    app.command("report", help=HELP)(report)
+    app.command("report", help=HELP, rich_help_panel=BENCH)(report)
 
 
 def report(
-    folder: Annotated[Path, typer.Argument(help="A run folder.", metavar="DIR")],
+    folder: Annotated[Path, typer.Argument(help="A run folder.", metavar="FOLDER")],
     json_output: Annotated[bool, typer.Option("--json", help="Print the summary as one JSON object.")] = False,
 ) -> None:
     """Make a run's report."""

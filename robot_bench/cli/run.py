@@ -6,10 +6,12 @@ from pathlib import Path
 from typing import Annotated
 
 import typer
-from typer.core import TyperCommand
 
 from p2os.cli.held_robot import hold_robot
+from p2os.cli.help_pages import BENCH, VerbPage
 from p2os.cli.main import EXIT_INTERRUPTED
+from p2os.cli.names import bodies, urls, worlds
+from p2os.cli.quantities import BAUD, FACTOR, PORT, SEED, SPEED, TIME
 from p2os.errors import RunFailedError
 from p2os.transport import open_url
 from robot_bench.cli.gdb import debug_bench, debug_port
@@ -18,10 +20,13 @@ from robot_bench.cli.table import print_result
 from robot_bench.recording.run_folder import make_next_folder
 from robot_bench.remote import CAUTIOUS_ROTATION_DEG_S, CAUTIOUS_VELOCITY_MM_S
 from robot_bench.run import RunResult, run_at_port, run_scenario
-from robot_bench.scenario.scenario import Scenario, load_scenario
+from robot_bench.scenario.scenario import Scenario, known_scenarios, load_scenario
 from simbase.errors import UsageError
+from simbase.timing import NS_PER_S, Nanos
 
-HELP = """Run a scenario: the firmware boots on an emulated BluePill and its pins drive a robot.
+HELP = """Run a scenario: a BluePill program drives a robot.
+
+The firmware boots on an emulated board, and its pins drive the robot.
 
 SCENARIO is one of those that ship (free-drive, motors, sensors, encoders, dodge)
 or a TOML file. What the options leave open is the scenario's. The run folder holds
@@ -44,10 +49,10 @@ Examples:
 """
 
 
-class RealtimeCommand(TyperCommand):
+class RealtimeCommand(VerbPage):
     """Lets `--realtime` stand without its number, which then is 1."""
 
-    def parse_args(self, ctx: typer.Context, args: list[str]) -> list[str]:  # type: ignore[override] # typer's own class
+    def parse_args(self, ctx: typer.Context, args: list[str]) -> list[str]:  # type: ignore[override]  # typer's own class
         """Insert the number where it is missing."""
         filled = []
         for place, word in enumerate(args):
@@ -58,43 +63,64 @@ class RealtimeCommand(TyperCommand):
         return super().parse_args(ctx, filled)
 
 
+def scenarios(incomplete: str) -> list[str]:
+    """Return the scenarios that ship, for a shell."""
+    return [name for name in known_scenarios() if name.startswith(incomplete)]
+
+
 def register(app: typer.Typer) -> None:
     """Add the verb."""
-    app.command("run", help=HELP, cls=RealtimeCommand)(run)
+    app.command("run", help=HELP, rich_help_panel=BENCH, cls=RealtimeCommand)(run)
 
 
 def run(
-    scenario: Annotated[str, typer.Argument(help="Name or TOML file.", metavar="SCENARIO")],
-    firmware: Annotated[Path | None, typer.Option(help="ELF, HEX or BIN in place of the scenario's.")] = None,
-    mode: Annotated[str | None, typer.Option(help="direct or adapter.")] = None,
-    adapter: Annotated[str | None, typer.Option(help="model or firmware: what stands in the adapter's place.")] = None,
-    port: Annotated[str | None, typer.Option(help="Drive the robot at this URL, in real time.", metavar="URL")] = None,
-    body: Annotated[str | None, typer.Option(help="kinematic, bullet or mujoco.")] = None,
-    world: Annotated[str | None, typer.Option(help="World, or a TOML file.")] = None,
-    seed: Annotated[int | None, typer.Option(help="Seed of everything random.", min=0)] = None,
-    duration: Annotated[float | None, typer.Option(help="Seconds of virtual time.", metavar="S")] = None,
+    scenario: Annotated[str, typer.Argument(help="Name or TOML file.", metavar="SCENARIO", autocompletion=scenarios)],
+    firmware: Annotated[
+        Path | None, typer.Option(help="ELF, HEX or BIN in place of the scenario's.", metavar="FILE")
+    ] = None,
+    mode: Annotated[str | None, typer.Option(help="How the pins reach the robot.", metavar="direct|adapter")] = None,
+    adapter: Annotated[
+        str | None, typer.Option(help="What stands in the adapter's place.", metavar="model|firmware")
+    ] = None,
+    port: Annotated[
+        str | None, typer.Option(help="Drive the robot at this URL, in real time.", metavar="URL", autocompletion=urls)
+    ] = None,
+    body: Annotated[
+        str | None,
+        typer.Option(help="Physics: bullet, mujoco, or kinematic (plan view).", metavar="BODY", autocompletion=bodies),
+    ] = None,
+    world: Annotated[
+        str | None, typer.Option(help="World, or a TOML file.", metavar="WORLD|FILE", autocompletion=worlds)
+    ] = None,
+    seed: Annotated[int | None, SEED.option("--seed", purpose="Of everything random.", least="0")] = None,
+    duration_ns: Annotated[
+        Nanos | None, TIME.option("--duration", purpose="How much virtual time.", above_zero=True)
+    ] = None,
     usart_baud: Annotated[
-        int | None, typer.Option(help="Speed of USART1's far end; unset follows the firmware.", metavar="BAUD", min=1)
+        int | None,
+        BAUD.option("--usart-baud", purpose="Speed of USART1's far end; unset follows the firmware.", above_zero=True),
     ] = None,
     realtime: Annotated[
-        float | None, typer.Option(help="Keep pace with the clock, SPEED times as fast.", metavar="[SPEED]")
+        float | None,
+        FACTOR.option(
+            "--realtime", purpose="Keep pace with the clock, FACTOR times as fast.", above_zero=True, metavar="[FACTOR]"
+        ),
     ] = None,
-    out: Annotated[Path | None, typer.Option(help="Run folder; default runs/SCENARIO-NNN.", metavar="DIR")] = None,
+    out: Annotated[Path | None, typer.Option(help="Run folder; default runs/SCENARIO-NNN.", metavar="FOLDER")] = None,
     force: Annotated[bool, typer.Option("--force", help="Overwrite the run that the --out folder holds.")] = False,
     json_output: Annotated[bool, typer.Option("--json", help="Print one JSON object.")] = False,
     coverage: Annotated[bool, typer.Option("--coverage", help="Write which lines and branches ran.")] = False,
     profile: Annotated[bool, typer.Option("--profile", help="Write where the cycles went.")] = False,
     gdb: Annotated[
-        int | None, typer.Option(help="Wait for GDB on this TCP port; 0 takes a free one.", metavar="PORT", min=0)
+        int | None,
+        PORT.option("--gdb", purpose="Wait for GDB on this TCP port; 0 takes a free one.", least="0", most="65535"),
     ] = None,
     yes: Annotated[bool, typer.Option("--yes", help="With --port: do not ask before the first motion.")] = False,
     max_speed: Annotated[
-        int | None, typer.Option(help="With --port: cap of the forward speed, mm/s.", metavar="MM_S", min=1)
+        float | None, SPEED.option("--max-speed", purpose="With --port: cap of the forward speed.", least="1mm/s")
     ] = None,
 ) -> None:
     """Run a scenario."""
-    if realtime is not None and realtime <= 0:
-        raise UsageError(f"--realtime {realtime:g} cannot be", hint="a speed is above 0; 1 is real time")
     wanted = load_scenario(scenario)
     if coverage or profile:
         refuse_to_measure(port=port, gdb=gdb)
@@ -109,11 +135,11 @@ def run(
         body=body,
         world=world,
         seed=seed,
-        duration_s=duration,
+        duration_s=None if duration_ns is None else duration_ns / NS_PER_S,
         usart_baud=usart_baud,
     )
     if port is not None:
-        result = drive_port(wanted, out, port, yes=yes, max_speed=max_speed, gdb=gdb, force=force)
+        result = drive_port(wanted, out, port, yes=yes, max_speed_mps=max_speed, gdb=gdb, force=force)
         end_with(result, json_output=json_output)
         return
     folder = out or make_next_folder(wanted.name)
@@ -135,7 +161,7 @@ def drive_port(
     url: str,
     *,
     yes: bool,
-    max_speed: int | None,
+    max_speed_mps: float | None,
     gdb: int | None = None,
     force: bool = False,
 ) -> RunResult:
@@ -145,7 +171,7 @@ def drive_port(
         TransportError: The port cannot be opened.
         RunFailedError: The person declined.
     """
-    scenario = capped(scenario, max_speed)
+    scenario = capped(scenario, max_speed_mps)
     transport = open_url(url)
     try:
         if not yes:
@@ -159,10 +185,11 @@ def drive_port(
         transport.close()
 
 
-def capped(scenario: Scenario, max_speed: int | None) -> Scenario:
+def capped(scenario: Scenario, max_speed_mps: float | None) -> Scenario:
     """Return the scenario with the caps of an untried program, where neither it nor the command line sets any."""
     adapter = scenario.adapter
-    velocity = max_speed or adapter.max_velocity_mm_s or CAUTIOUS_VELOCITY_MM_S
+    asked_mm_s = None if max_speed_mps is None else round(max_speed_mps * 1000)
+    velocity = asked_mm_s or adapter.max_velocity_mm_s or CAUTIOUS_VELOCITY_MM_S
     rotation = adapter.max_rotation_deg_s or CAUTIOUS_ROTATION_DEG_S
     return replace(scenario, adapter=replace(adapter, max_velocity_mm_s=velocity, max_rotation_deg_s=rotation))
 

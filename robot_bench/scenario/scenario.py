@@ -169,7 +169,7 @@ class Scenario:
         _refuse_unknown("adapter", adapter_core, ADAPTER_CORES)
         _refuse_unknown("body", body, BODY_NAMES)
         if duration_s is not None and not 0 < duration_s < math.inf:
-            raise UsageError(f"a run of {duration_s:g} s cannot be", hint="--duration takes seconds above 0")
+            raise UsageError(f"a run of {duration_s:g} s cannot be", hint="--duration takes more than 0, such as 10s")
         if firmware is not None and not firmware.is_file():
             raise UsageError(f"there is no firmware file {firmware}", hint="give an ELF, HEX or BIN file")
         moved = self if world is None else self._moved_to(world)

@@ -147,12 +147,12 @@ def test_p2os_run_waits_for_gdb_and_goes_on_when_it_detaches(
 ) -> None:
     where = address(Bench(scenario()), "SysTick_Handler")
     gdb += [b"Z0,%x,2" % where, b"c", b"c", b"bc", b"D"]
-    words = ["run", "dodge", "--body", "kinematic", "--duration", "1", "--out", str(tmp_path / "run")]
+    words = ["run", "dodge", "--body", "kinematic", "--duration", "1s", "--out", str(tmp_path / "run")]
     assert run([*words, "--gdb", "0"]) in {0, 1}
     assert Gdb.answers == [b"OK", b"T05thread:1;", b"T05thread:1;", b"T05thread:1;", b"OK"]
     assert "waiting for GDB on port" in capfd.readouterr().err
     trace = (tmp_path / "run" / "trace.jsonl").read_text().splitlines()
-    assert run(["run", "dodge", "--body", "kinematic", "--duration", "1", "--out", str(tmp_path / "plain")]) in {0, 1}
+    assert run(["run", "dodge", "--body", "kinematic", "--duration", "1s", "--out", str(tmp_path / "plain")]) in {0, 1}
     assert trace[1:-1] == (tmp_path / "plain" / "trace.jsonl").read_text().splitlines()[1:-1]
 
 

@@ -225,7 +225,7 @@ def robot(request: pytest.FixtureRequest, tmp_path: Path) -> Iterator[tuple[str,
 def test_the_emulated_bluepill_drives_a_served_robot(
     robot: tuple[str, subprocess.Popen[str]], tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    words = ["run", "motors", "--port", robot[0], "--yes", "--duration", "8", "--out", str(tmp_path / "run"), "--json"]
+    words = ["run", "motors", "--port", robot[0], "--yes", "--duration", "8s", "--out", str(tmp_path / "run"), "--json"]
     for _attempt in range(3):
         code = p2os(words)
         outcome = json.loads(capsys.readouterr().out)

@@ -73,7 +73,7 @@ def test_process_hash_seed_and_folder_change_nothing(mode: str, body: str, tmp_p
     for seed in ("1", "2"):
         folder = tmp_path / seed
         folder.mkdir()
-        words = ["run", "dodge", "--mode", mode, "--body", body, "--duration", "5", "--out", "there", "--json"]
+        words = ["run", "dodge", "--mode", mode, "--body", body, "--duration", "5s", "--out", "there", "--json"]
         done = subprocess.run(
             [sys.executable, "-c", "from p2os.cli.main import main; main()", *words],
             cwd=folder, env={**os.environ, "PYTHONHASHSEED": seed}, capture_output=True, text=True, check=False,

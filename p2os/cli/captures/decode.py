@@ -10,8 +10,13 @@ import typer
 from p2os.capture import Capture, ListingRow, Reading, explain, read_argument, read_capture, rows_of
 from p2os.capture.explain import lines_of
 from p2os.capture.listing import line_of, summary_of
-from p2os.cli.captures.reading import DIRECTION_HELP, PROFILE_HELP, ROBOT_HELP, direction_of, reading_of
-from p2os.protocol.profiles import Profile
+from p2os.cli.captures.reading import (
+    ProfileForLayouts,
+    RobotForUnits,
+    direction_of,
+    reading_of,
+)
+from p2os.cli.help_pages import CAPTURES
 from simbase.errors import UsageError
 from simbase.timing import NS_PER_S
 
@@ -37,19 +42,21 @@ frames are damaged: that is a result.
 
 def register(app: typer.Typer) -> None:
     """Add the verb."""
-    app.command("decode", help=HELP)(decode)
+    app.command("decode", help=HELP, rich_help_panel=CAPTURES)(decode)
 
 
 def decode(
-    source: Annotated[list[str], typer.Argument(help="File, folder, hex text, or - for stdin.", metavar="SOURCE")],
+    source: Annotated[list[str], typer.Argument(help="File, folder, hex text, or - for stdin.", metavar="SOURCE...")],
     json_output: Annotated[bool, typer.Option("--json", help="Print one JSON object a packet.")] = False,
     explained: Annotated[bool, typer.Option("--explain", help="Show what every byte means.")] = False,
     only: Annotated[
         str, typer.Option("--only", help="Names to show, comma-separated, such as SIP,VEL or damaged.", metavar="NAMES")
     ] = "",
-    direction: Annotated[str, typer.Option("--dir", help=DIRECTION_HELP)] = "auto",
-    robot: Annotated[str, typer.Option(help=ROBOT_HELP)] = "",
-    profile: Annotated[Profile | None, typer.Option(help=PROFILE_HELP)] = None,
+    direction: Annotated[
+        str, typer.Option("--dir", help="Who sent bytes of unknown origin: client or robot.", metavar="auto|c2r|r2c")
+    ] = "auto",
+    robot: RobotForUnits = "",
+    profile: ProfileForLayouts = None,
 ) -> None:
     """Print what stands in a capture."""
     if json_output and explained:

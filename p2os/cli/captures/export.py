@@ -11,13 +11,13 @@ from p2os.capture import Capture, ListingRow, Reading, read_file, rows_of
 from p2os.capture.formats.arrow_files import write_arrow, write_parquet
 from p2os.capture.formats.mcap_files import write_mcap
 from p2os.capture.table import Table, from_robot, table_of, write_csv
-from p2os.cli.captures.reading import PROFILE_HELP, ROBOT_HELP, reading_of
-from p2os.protocol.profiles import Profile
+from p2os.cli.captures.reading import ProfileForLayouts, RobotForUnits, reading_of
+from p2os.cli.help_pages import CAPTURES
 from simbase.errors import FileError, UsageError
 
-HELP = """Write a capture as CSV, Parquet, Arrow or MCAP; the file's ending decides.
+HELP = """Write a capture as CSV, Parquet, Arrow or MCAP.
 
-Tables hold the robot's SIPs, one a line, with positions in metres that go on
+The file's ending decides. Tables hold the robot's SIPs, one a line, with positions in metres that go on
 where the robot's counters wrap; --only chooses other packets. MCAP holds every
 packet, one channel a name, and opens in Foxglove.
 
@@ -27,7 +27,7 @@ Examples:
   p2os export talk.jsonl - | head -3                 the same on stdout
   p2os export talk.jsonl talk.parquet                needs pyarrow
   p2os export talk.pcap talk.mcap                    needs mcap
-  p2os export runs/dodge-001 vel.csv --only VEL,RVEL what the client of a run sent
+  p2os export runs/dodge-001 vel.csv --only VEL,RVEL  what the client of a run sent
 """
 
 #: chosen: some twenty minutes of SIPs; below, NumPy takes longer to load than the rows take to read.
@@ -36,7 +36,7 @@ LARGE_BYTES = 500_000
 
 def register(app: typer.Typer) -> None:
     """Add the verb."""
-    app.command("export", help=HELP)(export)
+    app.command("export", help=HELP, rich_help_panel=CAPTURES)(export)
 
 
 def export(
@@ -45,8 +45,8 @@ def export(
     only: Annotated[
         str, typer.Option("--only", help="Names of packets, comma-separated, or all.", metavar="NAMES")
     ] = "",
-    robot: Annotated[str, typer.Option(help=ROBOT_HELP)] = "",
-    profile: Annotated[Profile | None, typer.Option(help=PROFILE_HELP)] = None,
+    robot: RobotForUnits = "",
+    profile: ProfileForLayouts = None,
 ) -> None:
     """Write a capture in another format."""
     ending = ".csv" if str(target) == "-" else target.suffix.lower()

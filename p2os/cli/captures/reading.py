@@ -4,7 +4,12 @@ Left open, both are found in the capture itself: the robot gives its model in
 answer to SYNC2, and the model implies which firmware family it runs.
 """
 
+from typing import Annotated
+
+import typer
+
 from p2os.capture import Capture, Direction, Reading, frame_chunks
+from p2os.cli.names import robots
 from p2os.protocol.frames import Frame
 from p2os.protocol.packets import IDENTITY_KIND, Identity
 from p2os.protocol.profiles import Profile
@@ -12,9 +17,18 @@ from p2os.protocol.sip import HEAD_BYTES, READING_BYTES, SIP_KINDS
 from p2os.robots.parameters import ParametersError, RobotParameters, load_parameters
 from simbase.errors import UsageError
 
-ROBOT_HELP = "Robot model, or a TOML file, for units; default: by the capture, else p2dx."
-PROFILE_HELP = "Firmware family, for layouts; default: as the packets look."
-DIRECTION_HELP = "Who sent bytes of unknown origin: c2r (client), r2c (robot) or auto."
+RobotForUnits = Annotated[
+    str,
+    typer.Option(
+        "--robot", help="Robot model, or a TOML file, for units; default: by the capture, else p2dx.",
+        metavar="MODEL|FILE", autocompletion=robots, show_default=False,
+    ),
+]  # fmt: skip
+FAMILIES = "|".join(profile.value for profile in Profile)
+ProfileForLayouts = Annotated[
+    Profile | None,
+    typer.Option("--profile", help="Firmware family, for layouts; default: as the packets look.", metavar=FAMILIES),
+]
 DEFAULT_ROBOT = "p2dx"
 
 

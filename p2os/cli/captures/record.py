@@ -12,8 +12,10 @@ import typer
 from p2os.capture import Chunk, Direction
 from p2os.cli.captures.capture_files import PcapFile, RecordingFile, Sink, Sinks
 from p2os.cli.held_robot import hold_robot
+from p2os.cli.help_pages import CAPTURES
 from p2os.cli.kept_files import FORCE_HELP, refuse_to_overwrite
-from p2os.cli.quantities import parse_duration
+from p2os.cli.names import RobotUrl
+from p2os.cli.quantities import TIME
 from p2os.cli.signals import postponed
 from p2os.errors import RemoteProtocolError, TransportError
 from p2os.protocol.connection import ConnectFailed, Connection, ConnectionLost, ConnectionRole, SipReceived
@@ -22,7 +24,7 @@ from p2os.transport.waiting import wait_for_line
 from p2os.transport.wall_clock import Clock, wall_clock
 from simbase.timing import NS_PER_S, Nanos
 
-HELP = """Connect to a robot, keep its motors off, and record all that both sides send.
+HELP = """Record all that a robot and this program send, motors off.
 
 \b
 Examples:
@@ -95,18 +97,19 @@ def record_session(
 
 def register(app: typer.Typer) -> None:
     """Add the verb."""
-    app.command("record", help=HELP)(record)
+    app.command("record", help=HELP, rich_help_panel=CAPTURES)(record)
 
 
 def record(
-    url: Annotated[str, typer.Argument(help="Where the robot is.", metavar="URL")],
+    url: RobotUrl,
     out: Annotated[Path, typer.Option(help="Recording to write.", metavar="FILE")] = DEFAULT_OUT,
     pcap: Annotated[Path | None, typer.Option(help="Write this too, for Wireshark.", metavar="FILE")] = None,
-    duration: Annotated[str, typer.Option("--for", help="How long; without, until Ctrl-C.", metavar="TIME")] = "",
+    lasts_ns: Annotated[
+        Nanos | None, TIME.option("--for", purpose="How long; without, until Ctrl-C.", above_zero=True)
+    ] = None,
     force: Annotated[bool, typer.Option("--force", help=FORCE_HELP)] = False,
 ) -> None:
     """Record a robot."""
-    lasts_ns = parse_duration(duration, "--for") if duration else None
     for path in (out, pcap):
         refuse_to_overwrite(path, force=force)
     hold_robot()

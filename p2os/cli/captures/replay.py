@@ -13,6 +13,9 @@ from p2os.capture.listing import frame_of
 from p2os.capture.replay import Replay
 from p2os.capture.tap import Tap
 from p2os.cli.held_robot import hold_robot
+from p2os.cli.help_pages import CAPTURES
+from p2os.cli.names import urls
+from p2os.cli.quantities import FACTOR
 from p2os.cli.signals import postponed
 from p2os.client import ClientSettings
 from p2os.errors import RemoteProtocolError, RunFailedError, TransportError
@@ -120,14 +123,17 @@ def motions_of(capture: Capture) -> int:
 
 def register(app: typer.Typer) -> None:
     """Add the verb."""
-    app.command("replay", help=HELP)(replay)
+    app.command("replay", help=HELP, rich_help_panel=CAPTURES)(replay)
 
 
 def replay(
     file: Annotated[Path, typer.Argument(help="Recording, JSON lines, pcap, or a run's folder.", metavar="FILE")],
-    url: Annotated[str, typer.Argument(help="Where the far side is, or comes.", metavar="URL")],
-    side: Annotated[Side, typer.Option("--as", help="Whom to be.")] = Side.ROBOT,
-    speed: Annotated[float, typer.Option(help="2: twice as fast.", min=SLOWEST, max=FASTEST)] = 1.0,
+    url: Annotated[str, typer.Argument(help="Where the far side is, or comes.", metavar="URL", autocompletion=urls)],
+    side: Annotated[Side, typer.Option("--as", help="Whom to be.", metavar="robot|client")] = Side.ROBOT,
+    speed: Annotated[
+        float,
+        FACTOR.option("--speed", purpose="2: twice as fast.", least=f"{SLOWEST:g}", most=f"{FASTEST:g}", shown="1"),
+    ] = 1.0,
     yes: Annotated[bool, typer.Option("--yes", help="Do not ask before moving a robot on a serial port.")] = False,
 ) -> None:
     """Play a recording."""
@@ -150,6 +156,9 @@ def replay(
             play(player, transport, side.role)
         except HungUpError as error:
             sent = frames - player.frames_left
+            if side is Side.ROBOT and player.is_closed:
+                sys.stderr.write(f"the client closed the session after {sent} of {frames} frames\n")
+                return
             raise TransportError(f"after {sent} of {frames} frames: {error}", hint=error.hint) from error
     sys.stderr.write(f"{frames} frames sent\n")
 

@@ -24,10 +24,12 @@ from p2os.capture import Chunk, Direction, Lister, ListingRow, Reading
 from p2os.capture.listing import line_of, summary_of
 from p2os.capture.tap import Tap
 from p2os.cli.captures.capture_files import PcapFile, RecordingFile, Sink, Sinks
-from p2os.cli.captures.reading import DEFAULT_ROBOT
+from p2os.cli.captures.reading import DEFAULT_ROBOT, FAMILIES
 from p2os.cli.held_robot import hold_robot
+from p2os.cli.help_pages import CAPTURES
 from p2os.cli.kept_files import FORCE_HELP, refuse_to_overwrite
-from p2os.cli.quantities import parse_duration
+from p2os.cli.names import robots, urls
+from p2os.cli.quantities import TIME
 from p2os.cli.signals import postponed
 from p2os.errors import TransportError
 from p2os.protocol.profiles import Profile
@@ -40,9 +42,10 @@ from simbase.timing import NS_PER_MS, NS_PER_S, Nanos
 
 DEFAULT_LISTEN = "tcp:127.0.0.1:8102"
 
-HELP = f"""Stand between a client and a robot, pass everything on, and show or record it.
+HELP = f"""Show or record what a client and a robot send each other.
 
-Let the client connect to the URL of --listen instead of the robot's. When the
+It stands between the two and passes everything on. Let the client
+connect to the URL of --listen instead of the robot's. When the
 client goes, Ctrl-C ends it or a file cannot be written while a session is open, the
 robot is sent STOP, VEL 0 and CLOSE. What is printed never holds the two up: a
 reader that does not read misses lines, and gets their number.
@@ -63,11 +66,14 @@ BAUD_DELAY_NS: Nanos = 20 * NS_PER_MS
 
 def register(app: typer.Typer) -> None:
     """Add the verb."""
-    app.command("sniff", help=HELP)(sniff)
+    app.command("sniff", help=HELP, rich_help_panel=CAPTURES)(sniff)
 
 
 def sniff(
-    url: Annotated[str | None, typer.Argument(help="Where the robot is.", metavar="URL", show_default=False)] = None,
+    url: Annotated[
+        str | None,
+        typer.Argument(help="Where the robot is.", metavar="URL", show_default=False, autocompletion=urls),
+    ] = None,
     listen: Annotated[str, typer.Option(help="Where the client connects.", metavar="URL")] = DEFAULT_LISTEN,
     out: Annotated[Path | None, typer.Option(help="Record here (JSON lines).", metavar="FILE")] = None,
     pcap: Annotated[Path | None, typer.Option(help="Record here, for Wireshark.", metavar="FILE")] = None,
@@ -75,9 +81,11 @@ def sniff(
     json_output: Annotated[bool, typer.Option("--json", help="Print one JSON object a packet.")] = False,
     quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Print no packets.")] = False,
     once: Annotated[bool, typer.Option("--once", help="End when the first client has gone.")] = False,
-    duration: Annotated[str, typer.Option("--for", help="End after so long.", metavar="TIME")] = "",
-    robot: Annotated[str, typer.Option(help="Robot model, or a TOML file, for units.")] = DEFAULT_ROBOT,
-    profile: Annotated[Profile, typer.Option(help="Firmware family, for layouts.")] = Profile.P2OS,
+    lasts_ns: Annotated[Nanos | None, TIME.option("--for", purpose="End after so long.", above_zero=True)] = None,
+    robot: Annotated[
+        str, typer.Option(help="Robot model, or a TOML file, for units.", metavar="MODEL|FILE", autocompletion=robots)
+    ] = DEFAULT_ROBOT,
+    profile: Annotated[Profile, typer.Option(help="Firmware family, for layouts.", metavar=FAMILIES)] = Profile.P2OS,
     install_dissector: Annotated[
         bool,
         typer.Option("--install-dissector", help="Copy the dissector into Wireshark's folder of plug-ins, and end."),
@@ -91,7 +99,6 @@ def sniff(
         return
     if url is None:
         raise typer.BadParameter("name the robot's URL", param_hint="URL")
-    lasts_ns = parse_duration(duration, "--for") if duration else None
     for path in (out, pcap):
         refuse_to_overwrite(path, force=force)
     reading = Reading(profile=profile, parameters=load_parameters(robot))

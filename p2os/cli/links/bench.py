@@ -9,8 +9,10 @@ from typing import Annotated
 import typer
 
 from p2os.cli.held_robot import hold_robot
+from p2os.cli.help_pages import LINKS
 from p2os.cli.links.link_quality import LinkQuality, Spread, spread_of
-from p2os.cli.quantities import parse_duration
+from p2os.cli.names import RobotUrl
+from p2os.cli.quantities import TIME
 from p2os.cli.signals import postponed
 from p2os.errors import RemoteProtocolError, TransportError
 from p2os.protocol.commands import Command, CommandNumber
@@ -149,16 +151,15 @@ def measure(transport: Transport, lasts_ns: Nanos, clock: Clock = wall_clock) ->
 
 def register(app: typer.Typer) -> None:
     """Add the verb."""
-    app.command("bench", help=HELP)(bench)
+    app.command("bench", help=HELP, rich_help_panel=LINKS)(bench)
 
 
 def bench(
-    url: Annotated[str, typer.Argument(help="Where the robot is.", metavar="URL")],
-    duration: Annotated[str, typer.Option("--for", help="How long.", metavar="TIME")] = "10s",
+    url: RobotUrl,
+    lasts_ns: Annotated[Nanos, TIME.option("--for", purpose="How long.", above_zero=True, shown="10s")] = 10 * NS_PER_S,
     json_output: Annotated[bool, typer.Option("--json", help="Print a JSON object.")] = False,
 ) -> None:
     """Measure a link."""
-    lasts_ns = parse_duration(duration, "--for")
     hold_robot()
     with contextlib.closing(open_url(url)) as transport:
         measured = measure(transport, lasts_ns)

@@ -9,9 +9,10 @@ from typing import Annotated
 
 import typer
 
+from p2os.cli.help_pages import LINKS
 from p2os.transport.serial_port import list_serial_ports
 
-HELP = """List the serial ports of this machine, with a guess of what is there.
+HELP = """List the serial ports of this machine, and what may be there.
 
 Nothing is opened or sent: the guess is by the description of the USB device. To
 ask the ports themselves, use `p2os scan`.
@@ -49,7 +50,7 @@ LATENCY_MS = 2
 
 def register(app: typer.Typer) -> None:
     """Add the verb."""
-    app.command("ports", help=HELP)(ports)
+    app.command("ports", help=HELP, rich_help_panel=LINKS)(ports)
 
 
 def ports(json_output: Annotated[bool, typer.Option("--json", help="Print a JSON list.")] = False) -> None:

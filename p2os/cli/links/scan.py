@@ -8,6 +8,9 @@ from typing import Annotated
 import typer
 
 from p2os.cli.held_robot import held, hold_robot
+from p2os.cli.help_pages import LINKS
+from p2os.cli.names import urls
+from p2os.cli.quantities import BAUD
 from p2os.client import ClientSettings, Connected, ConnectError, Robot
 from p2os.client.settings import BAUDS
 from p2os.errors import TransportError
@@ -56,18 +59,20 @@ class Found:
 
 def register(app: typer.Typer) -> None:
     """Add the verb."""
-    app.command("scan", help=HELP)(scan)
+    app.command("scan", help=HELP, rich_help_panel=LINKS)(scan)
 
 
 def scan(
-    urls: Annotated[list[str] | None, typer.Argument(help="Where to look.", metavar="[URL…]")] = None,
-    baud: Annotated[list[int] | None, typer.Option(help="Try this speed only; may be repeated.", metavar="N")] = None,
+    urls: Annotated[
+        list[str] | None, typer.Argument(help="Where to look.", metavar="[URL...]", autocompletion=urls)
+    ] = None,
+    baud: Annotated[
+        list[int] | None,
+        BAUD.option("--baud", purpose="Try this speed only; may be repeated.", least="300", most="4000000"),
+    ] = None,
     json_output: Annotated[bool, typer.Option("--json", help="Print a JSON list.")] = False,
 ) -> None:
     """Look for robots."""
-    wrong = [rate for rate in baud or [] if not 300 <= rate <= 4_000_000]
-    if wrong:
-        raise UsageError(f"--baud {wrong[0]} is no speed of a serial line", hint=f"one of {', '.join(map(str, BAUDS))}")
     places = urls or [*(port["url"] for port in list_serial_ports()), SIMULATOR]
     hold_robot()
     found = []

@@ -31,6 +31,10 @@ NEAR_M = 0.35
 BAR_CHARACTERS = 20
 #: The motion panel beside the ring; the panels on the left.
 PANEL_COLUMNS, WIDE_COLUMNS = 54, 112
+#: Every panel needs as many rows.
+WIDE_ROWS = 34
+#: chosen: below this a ring shows nothing.
+LEAST_RING_ROWS = 8
 #: chosen: lead batteries of 12 V: full, and where a Pioneer's own warning begins (LowBattery of the manuals).
 FULL_V, LOW_V = 13.0, 11.5
 
@@ -56,22 +60,26 @@ class Dashboard:
     news: tuple[str, ...] = ()
 
 
-def draw(dashboard: Dashboard, columns: int = WIDE_COLUMNS) -> RenderableType:
+def draw(dashboard: Dashboard, columns: int = WIDE_COLUMNS, rows: int = WIDE_ROWS) -> RenderableType:
     """Return the whole dashboard.
 
     Args:
         dashboard: What is to be seen.
-        columns: Width of the terminal; in a narrow one the ring and two lines have to do.
+        columns: Width of the terminal.
+        rows: Its height. In one that is narrow or low, the ring and some lines have to do; 78 by 24 is enough.
     """
     style = {Link.OPEN: "green", Link.WAITING: "yellow", Link.FAILED: "red"}.get(dashboard.link, "yellow")
     heading = Text.assemble((f" {dashboard.title} ", "bold"), "  ", (dashboard.link.value, style))
     if dashboard.state is None:
         return Group(heading, Text("no packet yet"), news_panel(dashboard.news))
+    if columns < WIDE_COLUMNS or rows < WIDE_ROWS:
+        lines = [f" {words}" for words in _two_lines(dashboard.state)] + [f" {news}" for news in dashboard.news[-1:]]
+        # A heading, two lines, one of news, two of the frame, and none left below: a terminal scrolls at its end.
+        ring = ring_panel(dashboard.state, dashboard.parameters, rows=max(LEAST_RING_ROWS, min(RING_ROWS, rows - 7)))
+        heading.no_wrap, heading.overflow = True, "ellipsis"
+        texts = [Text(words, no_wrap=True, overflow="ellipsis") for words in lines]
+        return Group(heading, *texts[:2], ring, *texts[2:])
     ring = ring_panel(dashboard.state, dashboard.parameters)
-    if columns < WIDE_COLUMNS:
-        return Group(
-            heading, Text(f" {line_of(dashboard.state)}"), ring, *(Text(f" {news}") for news in dashboard.news[-1:])
-        )
     left = Group(motion_panel(dashboard.state, dashboard.limits), health_panel(dashboard.state), link_panel(dashboard))
     return Group(heading, Columns([left, ring]), news_panel(dashboard.news))
 
@@ -85,6 +93,12 @@ def line_of(state: RobotState) -> str:
         + (f"nearest {nearest.range_m:.3f} m" if nearest else "no echo")
         + (", STALLED" if state.is_stalled else "")
     )
+
+
+def _two_lines(state: RobotState) -> tuple[str, str]:
+    """Return a state as two lines that fit a narrow terminal."""
+    place, sep, rest = line_of(state).partition(" deg, ")
+    return place + sep.rstrip(", "), rest
 
 
 def motion_panel(state: RobotState, limits: Limits) -> Panel:
@@ -138,9 +152,9 @@ def link_panel(dashboard: Dashboard) -> Panel:
     return Panel(table, title="link", width=PANEL_COLUMNS)
 
 
-def ring_panel(state: RobotState, parameters: RobotParameters) -> Panel:
-    """Return the robot from above, forward upwards, and the echoes of its sonar."""
-    canvas = Canvas(RING_COLUMNS, RING_ROWS)
+def ring_panel(state: RobotState, parameters: RobotParameters, rows: int = RING_ROWS) -> Panel:
+    """Return the robot from above, forward upwards, and the echoes of its sonar, so many characters high."""
+    canvas = Canvas(RING_COLUMNS, rows)
     scale = min(canvas.width, canvas.height) / 2 / RING_METRES
     middle = canvas.width / 2, canvas.height / 2
 
@@ -158,8 +172,8 @@ def ring_panel(state: RobotState, parameters: RobotParameters) -> Panel:
         _draw_echo(canvas, place, echo)
     nearest = state.nearest()
     subtitle = f"nearest {nearest.range_m:.2f} m (sonar {nearest.number})" if nearest else "no echo"
-    rows = [Text.assemble(*runs) for runs in canvas.lines()]
-    return Panel(Group(*rows), title="sonar", subtitle=subtitle, width=RING_COLUMNS + 4)
+    lines = [Text.assemble(*runs) for runs in canvas.lines()]
+    return Panel(Group(*lines), title="sonar", subtitle=subtitle, width=RING_COLUMNS + 4)
 
 
 def news_panel(news: Iterable[str]) -> Panel:

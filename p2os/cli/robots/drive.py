@@ -1,16 +1,20 @@
 """`p2os drive`: move a robot a way, an angle, or at a speed for a time, and stop it."""
 
+import contextlib
 import json
 import math
 import sys
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Annotated
 
 import typer
 
 from p2os.cli.held_robot import RobotWatch, held
-from p2os.cli.quantities import Quantity, parse_duration, parse_quantity
-from p2os.client import MotionResult, Robot
+from p2os.cli.help_pages import ROBOTS
+from p2os.cli.names import ReportedModel, RobotUrl
+from p2os.cli.quantities import ANGLE, LENGTH, SPEED, TIME, TURN_RATE
+from p2os.client import Limits, MotionResult, Robot, RobotState
 from simbase.errors import UsageError
 from simbase.timing import NS_PER_S, Nanos
 
@@ -61,28 +65,28 @@ class Plan:
 
 def register(app: typer.Typer) -> None:
     """Add the verb."""
-    app.command("drive", help=HELP)(drive)
+    app.command("drive", help=HELP, rich_help_panel=ROBOTS)(drive)
 
 
 def drive(
-    url: Annotated[str, typer.Argument(help="Where the robot is.", metavar="URL")],
-    forward: Annotated[str, typer.Option(help="How far, negative backwards.", metavar="LENGTH")] = "",
-    turn: Annotated[str, typer.Option(help="How far round, positive to the left.", metavar="ANGLE")] = "",
-    vel: Annotated[str, typer.Option(help="Speed: held with --for, else the most.", metavar="SPEED")] = "",
-    turn_rate: Annotated[str, typer.Option(help="Turning speed, likewise.", metavar="RATE")] = "",
-    duration: Annotated[str, typer.Option("--for", help="How long the speeds are held.", metavar="TIME")] = "",
-    robot: Annotated[str, typer.Option(help="Robot model or TOML file, if it is not what the robot reports.")] = "",
+    url: RobotUrl,
+    forward_m: Annotated[float | None, LENGTH.option("--forward", purpose="How far, negative backwards.")] = None,
+    turn_rad: Annotated[float | None, ANGLE.option("--turn", purpose="How far round, positive to the left.")] = None,
+    speed_mps: Annotated[float | None, SPEED.option("--vel", purpose="Speed: held with --for, else the most.")] = None,
+    rate_radps: Annotated[float | None, TURN_RATE.option("--turn-rate", purpose="Turning speed, likewise.")] = None,
+    lasts_ns: Annotated[
+        Nanos | None, TIME.option("--for", purpose="How long the speeds are held.", above_zero=True)
+    ] = None,
+    robot: ReportedModel = "",
     json_output: Annotated[bool, typer.Option("--json", help="Print a JSON object.")] = False,
 ) -> None:
     """Move a robot."""
     plan = Plan(
-        forward_m=parse_quantity(forward, Quantity.LENGTH, "--forward") if forward else None,
-        turn_rad=parse_quantity(turn, Quantity.ANGLE, "--turn") if turn else None,
-        speed_mps=parse_quantity(vel, Quantity.SPEED, "--vel") if vel else None,
-        rate_radps=parse_quantity(turn_rate, Quantity.TURN_RATE, "--turn-rate") if turn_rate else None,
-        lasts_ns=parse_duration(duration, "--for") if duration else None,
-    )
-    with held(Robot(url, model=robot or None, reconnect=False)) as client:
+        forward_m=forward_m, turn_rad=turn_rad, speed_mps=speed_mps, rate_radps=rate_radps, lasts_ns=lasts_ns,
+    )  # fmt: skip
+    with held(Robot(url, model=robot or None, reconnect=False), moves=True) as client:
+        for note in beyond(plan, client.limits):
+            sys.stderr.write(f"note: {note}\n")
         steps = carry_out(plan, client)
         pose = client.pose
     if json_output:
@@ -104,23 +108,62 @@ def carry_out(plan: Plan, robot: Robot) -> list[dict[str, object]]:
         what = f"hold {forward_mps:.2f} m/s, {math.degrees(turn_radps):.0f} deg/s"
         watch = RobotWatch(robot, what, moves=bool(forward_mps or turn_radps))
         robot.set_velocity(forward_mps, turn_radps)
-        watch.wait(plan.lasts_ns)
+        with progress(robot, "holding"):
+            watch.wait(plan.lasts_ns)
         robot.stop()
         steps.append({"what": "hold", "forward_mps": forward_mps, "turn_radps": turn_radps,
                       "took_s": plan.lasts_ns / NS_PER_S})  # fmt: skip
         _wait_until_it_stands(robot)
     if plan.forward_m is not None:
-        result = robot.drive(plan.forward_m, speed_mps=plan.speed_mps)
+        with progress(robot, f"driving {plan.forward_m:.3f} m:"):
+            result = robot.drive(plan.forward_m, speed_mps=plan.speed_mps)
         steps.append(_step("drive", "m", result))
         sys.stderr.write(f"drove {result.reached:.3f} m of {result.asked:.3f} m in {result.took_ns / NS_PER_S:.1f} s\n")
     if plan.turn_rad is not None:
-        result = robot.turn(plan.turn_rad, speed_radps=plan.rate_radps)
+        with progress(robot, f"turning {math.degrees(plan.turn_rad):.1f} deg:"):
+            result = robot.turn(plan.turn_rad, speed_radps=plan.rate_radps)
         steps.append(_step("turn", "rad", result))
         sys.stderr.write(
             f"turned {math.degrees(result.reached):.1f} deg of {math.degrees(result.asked):.1f} deg "
             f"in {result.took_ns / NS_PER_S:.1f} s\n"
         )
     return steps
+
+
+def beyond(plan: Plan, limits: Limits) -> list[str]:
+    """Return which speeds of a plan are above the robot's own, which they are cut to."""
+    notes = []
+    if plan.speed_mps is not None and abs(plan.speed_mps) > limits.forward_mps:
+        notes.append(f"--vel {abs(plan.speed_mps):.2f} m/s is above this robot's limit, {limits.forward_mps:.2f} m/s")
+    if plan.rate_radps is not None and abs(plan.rate_radps) > limits.turn_radps:
+        asked, most = math.degrees(abs(plan.rate_radps)), math.degrees(limits.turn_radps)
+        notes.append(f"--turn-rate {asked:.0f} deg/s is above this robot's limit, {most:.0f} deg/s")
+    return [f"{note}: it takes that" for note in notes]
+
+
+@contextlib.contextmanager
+def progress(robot: Robot, what: str) -> Iterator[None]:
+    """Draw where the robot is on a terminal, a line over itself, while it moves; elsewhere nothing."""
+    if not sys.stderr.isatty():
+        yield
+        return
+    start = robot.pose
+
+    def show(state: RobotState) -> None:
+        pose = state.pose
+        way_m, turned = (
+            math.hypot(pose.x_m - start.x_m, pose.y_m - start.y_m),
+            math.degrees(pose.heading_rad - start.heading_rad),
+        )
+        speeds = f"{state.forward_mps:+.2f} m/s {math.degrees(state.turn_radps):+.0f} deg/s"
+        sys.stderr.write(f"\r\x1b[K{what} {way_m:.3f} m, {turned:+.1f} deg  {speeds}")
+
+    unsubscribe = robot.on_state(show)
+    try:
+        yield
+    finally:
+        unsubscribe()
+        sys.stderr.write("\r\x1b[K")
 
 
 def _step(what: str, unit: str, result: MotionResult) -> dict[str, object]:

@@ -9,6 +9,8 @@ from typing import Annotated
 import typer
 
 from p2os.cli.held_robot import hold_robot
+from p2os.cli.help_pages import ROBOTS
+from p2os.cli.names import RobotUrl
 from p2os.cli.signals import postponed
 from p2os.errors import RemoteProtocolError, TransportError
 from p2os.protocol.commands import Command, CommandNumber
@@ -33,7 +35,7 @@ from p2os.transport.waiting import wait_for_line
 from p2os.transport.wall_clock import Clock, wall_clock
 from simbase.timing import NS_PER_S, Nanos
 
-HELP = """Connect to a robot, print who it is, how it is set and what it senses, and leave.
+HELP = """Print who a robot is, how it is set and what it senses.
 
 A robot that is still streaming to an earlier program is stopped first. The
 motors stay off.
@@ -137,11 +139,11 @@ def _hint(transport: Transport) -> str:
 
 def register(app: typer.Typer) -> None:
     """Add the verb."""
-    app.command("info", help=HELP)(info)
+    app.command("info", help=HELP, rich_help_panel=ROBOTS)(info)
 
 
 def info(
-    url: Annotated[str, typer.Argument(help="Where the robot is.", metavar="URL")],
+    url: RobotUrl,
     json_output: Annotated[bool, typer.Option("--json", help="Print a JSON object.")] = False,
 ) -> None:
     """Print what a robot reports of itself."""

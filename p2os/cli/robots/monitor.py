@@ -9,17 +9,19 @@ import typer
 
 from p2os.capture.describe import plain
 from p2os.cli.held_robot import held
+from p2os.cli.help_pages import ROBOTS
 from p2os.cli.links.link_quality import LinkQuality
-from p2os.cli.quantities import parse_duration
+from p2os.cli.names import ReportedModel, RobotUrl
+from p2os.cli.quantities import TIME
 from p2os.cli.robots.dashboard import Dashboard, draw, line_of
 from p2os.client import Notice, PacketArrived, Robot, RobotState
 from p2os.transport.wall_clock import wall_clock
 from simbase.errors import MissingDependencyError
 from simbase.timing import NS_PER_MS, NS_PER_S, Nanos
 
-HELP = """Show a robot's state as it comes, without moving it: pose, speeds, a ring of its
-sonar, battery, bumpers, flags, and how good the link is.
+HELP = """Show a robot's state as it comes, without moving it.
 
+Pose, speeds, a ring of its sonar, battery, bumpers, flags, and how good the link is.
 Ctrl-C ends. A lost robot is looked for again. Without a terminal one line a
 packet is printed.
 
@@ -36,17 +38,16 @@ NEWS_LINES = 4
 
 def register(app: typer.Typer) -> None:
     """Add the verb."""
-    app.command("monitor", help=HELP)(monitor)
+    app.command("monitor", help=HELP, rich_help_panel=ROBOTS)(monitor)
 
 
 def monitor(
-    url: Annotated[str, typer.Argument(help="Where the robot is.", metavar="URL")],
-    duration: Annotated[str, typer.Option("--for", help="End after so long.", metavar="TIME")] = "",
-    robot: Annotated[str, typer.Option(help="Robot model or TOML file, if it is not what the robot reports.")] = "",
+    url: RobotUrl,
+    lasts_ns: Annotated[Nanos | None, TIME.option("--for", purpose="End after so long.", above_zero=True)] = None,
+    robot: ReportedModel = "",
     json_output: Annotated[bool, typer.Option("--json", help="Print one JSON object a packet.")] = False,
 ) -> None:
     """Show a robot."""
-    lasts_ns = parse_duration(duration, "--for") if duration else None
     with held(Robot(url, model=robot or None, auto_enable=False)) as client:
         if json_output or not sys.stdout.isatty():
             _print_states(client, lasts_ns, as_json=json_output)
@@ -54,14 +55,19 @@ def monitor(
             _show(client, url, lasts_ns)
 
 
-def state_as_plain(state: RobotState) -> dict[str, object]:
-    """Return a state for JSON: SI units, sonar by number, None where there is no echo."""
+def state_as_plain(state: RobotState, start_ns: Nanos = 0) -> dict[str, object]:
+    """Return a state for JSON: SI units, time from `start_ns` on, sonar by number, None where there is no echo."""
     names = ("forward_mps", "turn_radps", "left_mps", "right_mps", "is_moving", "motors_enabled", "battery_v",
              "stall_left", "stall_right", "front_bumpers", "rear_bumpers", "compass_rad", "analog_v", "digital_in",
              "digital_out", "stop_button", "state_of_charge", "temperature_c")  # fmt: skip
     pose = {"x_m": state.pose.x_m, "y_m": state.pose.y_m, "heading_rad": state.pose.heading_rad}
     sonar = {str(echo.number): echo.range_m if echo.is_echo else None for echo in state.sonar}
-    fields = {"t": state.at_ns / NS_PER_S, **pose, **{name: getattr(state, name) for name in names}, "sonar_m": sonar}
+    fields = {
+        "t": (state.at_ns - start_ns) / NS_PER_S,
+        **pose,
+        **{name: getattr(state, name) for name in names},
+        "sonar_m": sonar,
+    }
     return {name: plain(value) for name, value in fields.items()}
 
 
@@ -74,9 +80,10 @@ def words_of(notice: Notice) -> str:
 
 def _print_states(client: Robot, lasts_ns: Nanos | None, *, as_json: bool) -> None:
     ends = None if lasts_ns is None else wall_clock() + lasts_ns
-    count = 0
+    count, start_ns = 0, None
     for state in client.states():
-        typer.echo(json.dumps(state_as_plain(state)) if as_json else line_of(state))
+        start_ns = state.at_ns if start_ns is None else start_ns
+        typer.echo(json.dumps(state_as_plain(state, start_ns)) if as_json else line_of(state))
         count += 1
         if ends is not None and wall_clock() >= ends:
             break
@@ -105,5 +112,5 @@ def _show(client: Robot, url: str, lasts_ns: Nanos | None) -> None:
                 title=title, link=client.link, state=client.state, limits=client.limits, parameters=client.parameters,
                 stats=client.stats, quality=quality, news=tuple(news),
             )  # fmt: skip
-            live.update(draw(dashboard, console.width), refresh=True)
+            live.update(draw(dashboard, console.width, console.height), refresh=True)
             client.sleep(1 / PICTURES_PER_S)

@@ -8,14 +8,16 @@ import typer
 
 from p2os.capture.describe import describe_packet
 from p2os.cli.held_robot import RobotWatch, held
-from p2os.cli.quantities import parse_duration
+from p2os.cli.help_pages import ROBOTS
+from p2os.cli.quantities import TIME
 from p2os.client import ConfigurationKnown, Notice, PacketArrived, Robot
 from p2os.errors import LocalProtocolError
 from p2os.protocol.command_table import ROWS, Argument, CommandRow, command_row
-from p2os.protocol.commands import Command, command
+from p2os.protocol.commands import Command, CommandNumber, command
 from p2os.protocol.packets import ServerPacket, packet_frame
 from p2os.protocol.profiles import Profile
 from simbase.errors import UsageError
+from simbase.timing import NS_PER_MS, Nanos
 
 HELP = """Send one command to a robot, and show what it answers.
 
@@ -34,21 +36,23 @@ Examples:
   p2os send URL 250 126                      a number that may mean anything
 """
 #: chosen: an answer comes with the next cycle of 100 ms, or the one after it.
-DEFAULT_WAIT = "0.5s"
+DEFAULT_WAIT_NS: Nanos = 500 * NS_PER_MS
 
 
 def register(app: typer.Typer) -> None:
     """Add the verb."""
     # A negative argument is no option.
-    app.command("send", help=HELP, context_settings={"ignore_unknown_options": True})(send)
+    app.command("send", help=HELP, rich_help_panel=ROBOTS, context_settings={"ignore_unknown_options": True})(send)
 
 
 def send(
     words: Annotated[
-        list[str] | None, typer.Argument(help="URL, command, arguments.", metavar="URL COMMAND [ARG…]")
+        list[str] | None, typer.Argument(help="URL, command, arguments.", metavar="URL COMMAND [ARG...]")
     ] = None,
     list_all: Annotated[bool, typer.Option("--list", help="List the commands; a word chooses.")] = False,
-    wait: Annotated[str, typer.Option(help="How long to listen for answers.", metavar="TIME")] = DEFAULT_WAIT,
+    waits_ns: Annotated[
+        Nanos, TIME.option("--wait", purpose="How long to listen for answers.", above_zero=True, shown="0.5s")
+    ] = DEFAULT_WAIT_NS,
     json_output: Annotated[bool, typer.Option("--json", help="Print JSON.")] = False,
 ) -> None:
     """Send one command."""
@@ -58,8 +62,9 @@ def send(
         return
     if len(words) < 2:
         raise UsageError("name the robot's URL and a command", hint="p2os send tcp:127.0.0.1:8101 SONAR 0")
-    waits_ns = parse_duration(wait, "--wait")
     wanted = make_command(words[1], words[2:])
+    if changes_nothing(wanted):
+        sys.stderr.write("note: DIGOUT with mask 0 changes no output: DIGOUT STATES MASK, as DIGOUT 0x01 0xff\n")
     answers: list[ServerPacket] = []
     with held(Robot(words[0], reconnect=False)) as robot:
         profile = robot.profile
@@ -116,6 +121,13 @@ def unknown_to(wanted: Command, profile: Profile) -> str:
     if wanted.row.is_known_to(profile) is False:
         return f"{wanted.name} is not in the manual of {profile.value} robots; it will probably be ignored"
     return ""
+
+
+def changes_nothing(wanted: Command) -> bool:
+    """Tell whether a command is a DIGOUT whose mask, the high byte, names no output."""
+    if wanted.number != CommandNumber.DIGOUT or isinstance(wanted.argument, bytes):
+        return False
+    return not (wanted.argument or 0) & 0xFF00
 
 
 def _by_number(number: int, arguments: list[str]) -> Command:

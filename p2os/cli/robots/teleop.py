@@ -26,7 +26,9 @@ from typing import Annotated, Protocol
 import typer
 
 from p2os.cli.held_robot import held, hold_robot
-from p2os.cli.quantities import Quantity, parse_quantity
+from p2os.cli.help_pages import ROBOTS
+from p2os.cli.names import ReportedModel, RobotUrl
+from p2os.cli.quantities import SPEED, TURN_RATE
 from p2os.cli.robots.pad_source import SdlPad
 from p2os.client import Link, Robot
 from p2os.client.notices import DeadmanStopped, GapStopped, LinkLostError, Notice
@@ -59,7 +61,8 @@ Examples:
 With --pad: Up connects, Down releases it, R2 drives ahead, L2 back, the right stick
 turns; a pad that goes away stops the robot within 200 ms.
 """
-DEFAULT_VEL, DEFAULT_RATE = "0.3m/s", "45deg/s"
+#: Speeds of a held key.
+KEY_MPS, KEY_RADPS = 0.3, math.radians(45)
 #: chosen: how often keys are looked for and the line is renewed.
 TURN_NS: Nanos = 50 * NS_PER_MS
 #: chosen: a lone Esc and an arrow key begin alike; the rest of an arrow follows at once.
@@ -97,36 +100,41 @@ Reports = Callable[[], PadReport | None]
 
 def register(app: typer.Typer) -> None:
     """Add the verb."""
-    app.command("teleop", help=HELP)(teleop)
+    app.command("teleop", help=HELP, rich_help_panel=ROBOTS)(teleop)
 
 
 def teleop(
-    url: Annotated[str, typer.Argument(help="Where the robot is.", metavar="URL")],
+    url: RobotUrl,
     vel: Annotated[
-        str, typer.Option(help=f"Speed of a held key or a full trigger; {DEFAULT_VEL}, pad 0.4m/s.", metavar="SPEED")
-    ] = "",
-    turn_rate: Annotated[
-        str,
-        typer.Option(
-            help=f"Turning speed of a held key or a full stick; {DEFAULT_RATE}, pad 1.7rad/s.", metavar="RATE"
+        float | None,
+        SPEED.option(
+            "--vel",
+            purpose="Speed of a held key or a full trigger.",
+            above_zero=True,
+            shown=f"{KEY_MPS:g}m/s, pad {PAD_MPS:g}m/s",
         ),
-    ] = "",
+    ] = None,
+    turn_rate: Annotated[
+        float | None,
+        TURN_RATE.option(
+            "--turn-rate",
+            purpose="Turning speed of a held key or a full stick.",
+            above_zero=True,
+            shown=f"{math.degrees(KEY_RADPS):.0f}deg/s, pad {PAD_RADPS:g}rad/s",
+        ),
+    ] = None,
     pad: Annotated[bool, typer.Option("--pad", help="Drive by game pad instead of keys.")] = False,
-    robot: Annotated[str, typer.Option(help="Robot model or TOML file, if it is not what the robot reports.")] = "",
+    robot: ReportedModel = "",
 ) -> None:
     """Drive by keyboard or pad."""
-    forward_mps = parse_quantity(vel or (f"{PAD_MPS}m/s" if pad else DEFAULT_VEL), Quantity.SPEED, "--vel")
-    turn_radps = parse_quantity(
-        turn_rate or (f"{PAD_RADPS}rad/s" if pad else DEFAULT_RATE), Quantity.TURN_RATE, "--turn-rate"
-    )
-    if forward_mps <= 0 or turn_radps <= 0:
-        raise UsageError("--vel and --turn-rate must be positive", hint="p2os teleop --help")
+    forward_mps = vel or (PAD_MPS if pad else KEY_MPS)
+    turn_radps = turn_rate or (PAD_RADPS if pad else KEY_RADPS)
     if pad:
         drive_by_pad(url, robot or None, (forward_mps, turn_radps))
         return
     if not sys.stdin.isatty():
         raise UsageError("there is no keyboard: stdin is not a terminal", hint="p2os drive URL --vel 0.2m/s --for 2s")
-    with held(Robot(url, model=robot or None)) as client, raw_keyboard():
+    with held(Robot(url, model=robot or None), moves=True) as client, raw_keyboard():
         sys.stderr.write("hold arrows or w a s d to drive, space stops, + - change the speed, q ends\r\n")
         loop = KeyLoop(Teleop(forward_mps, turn_radps), client)
         try:
@@ -143,7 +151,7 @@ def drive_by_pad(url: str, model: str | None, fastest: tuple[float, float]) -> N
         sys.stderr.write(f"game pad: {pad.name}\n")
         PadDriver(
             pad.report,
-            lambda: held(Robot(url, model=model)),
+            lambda: held(Robot(url, model=model), moves=True),
             fastest,
             clock=wall_clock,
             wait=lambda span_ns: time.sleep(span_ns / NS_PER_S),
@@ -256,15 +264,15 @@ class KeyLoop:
 
 
 def status(keys: Teleop, client: Robot) -> str:
-    """Return one line about the robot."""
+    """Return one line about the robot, of 78 characters at most: a longer one would wrap and not be drawn over."""
     if client.link is not Link.OPEN:
         return f"link: {client.link.value}"
     state, (forward_mps, turn_radps) = client.state, keys.speeds
+    doing = "STALL" if state.is_stalled else "DRIVE" if keys.is_driving else "stand"
     return (
-        f"{'DRIVE' if keys.is_driving else 'stand'} {forward_mps:+.2f} m/s {math.degrees(turn_radps):+.0f} deg/s "
+        f"{doing} {forward_mps:+.2f} m/s {math.degrees(turn_radps):+.0f} deg/s "
         f"({keys.share:.0%})  x {state.pose.x_m:.2f} m  y {state.pose.y_m:.2f} m  "
-        f"heading {math.degrees(state.pose.heading_rad):.0f} deg  {state.battery_v:.1f} V"
-        + ("  STALLED" if state.is_stalled else "")
+        f"{math.degrees(state.pose.heading_rad):.0f} deg  {state.battery_v:.1f} V"
     )
 
 

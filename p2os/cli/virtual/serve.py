@@ -21,8 +21,11 @@ from typing import Annotated
 
 import typer
 
+from p2os.cli.help_pages import ROBOTS
+from p2os.cli.names import bodies, worlds
+from p2os.cli.names import robots as robot_names
 from p2os.cli.printing import queue_output
-from p2os.cli.quantities import parse_duration
+from p2os.cli.quantities import ANGLE, BAUD, COUNT, FACTOR, LENGTH, SEED, TIME
 from p2os.pioneer.controller import ControllerSettings, SonarPerSip
 from p2os.pioneer.controller.flash import load_flash
 from p2os.pioneer.sensor_errors import load_sensor_errors
@@ -59,7 +62,7 @@ SLOWEST, FASTEST = 0.01, 100.0
 #: Options that a fleet's file takes the place of.
 IN_FLEET_FILE = (
     "port", "robot", "world", "body", "seed", "firmware", "lenient", "all_sonar", "flash", "errors", "baud", "robots",
-    "at", "apart", "aux", "fault", "sync_limit",
+    "at", "apart", "aux", "fault", "sync_limit_ns",
 )  # fmt: skip
 
 HELP = f"""Be a Pioneer robot on a line, in real time, until Ctrl-C.
@@ -79,7 +82,7 @@ Examples:
   p2os serve --baud 9600              bytes take the time of a real line
   p2os serve --errors realistic       sonar, odometry and compass err as real ones
   p2os serve --robots 3               three of them in one room, on ports 8101 to 8103
-  p2os serve --robots 2 --at 0,0 --at 1.5,0,180   face to face
+  p2os serve --robots 2 --at 0,0 --at 1.5m,0,180deg   face to face
   p2os serve --fleet fleet.toml       robots of all kinds from a file
   p2os serve --sync-limit 10s         a client that does not open a session within 10 s is dropped
   p2os serve --fault "sonar-stuck 3 1.2"   sonar 3 gives 1.2 m whatever is there
@@ -88,7 +91,7 @@ Examples:
 
 def register(app: typer.Typer) -> None:
     """Add the verb."""
-    app.command("serve", help=HELP)(serve)
+    app.command("serve", help=HELP, rich_help_panel=ROBOTS)(serve)
 
 
 def serve(
@@ -96,12 +99,25 @@ def serve(
     port: Annotated[
         list[str] | None, typer.Option(help="Where clients find the robot; again for one more.", metavar="URL")
     ] = None,
-    robot: Annotated[str, typer.Option(help="Robot model, or a TOML file.")] = "p2dx",
-    world: Annotated[str, typer.Option(help="World, or a TOML file.")] = "room",
-    body: Annotated[str, typer.Option(help="Physics: bullet, mujoco, or kinematic (plan view).")] = "bullet",
-    seed: Annotated[int, typer.Option(help="Seed of a scattered world and of every sensor's error.")] = 0,
+    robot: Annotated[
+        str, typer.Option(help="Robot model, or a TOML file.", metavar="MODEL|FILE", autocompletion=robot_names)
+    ] = "p2dx",
+    world: Annotated[
+        str, typer.Option(help="World, or a TOML file.", metavar="WORLD|FILE", autocompletion=worlds)
+    ] = "room",
+    body: Annotated[
+        str,
+        typer.Option(help="Physics: bullet, mujoco, or kinematic (plan view).", metavar="BODY", autocompletion=bodies),
+    ] = "bullet",
+    seed: Annotated[
+        int, SEED.option("--seed", purpose="Of a scattered world and of every sensor's error.", least="0", shown="0")
+    ] = 0,
     firmware: Annotated[
-        Profile, typer.Option(help="Whose packets it sends; some clients of newer robots need ARCOS.")
+        Profile,
+        typer.Option(
+            help="Whose packets it sends; some clients of newer robots need ARCOS.",
+            metavar="|".join(profile.value for profile in Profile),
+        ),
     ] = Profile.P2OS,
     lenient: Annotated[
         bool, typer.Option("--lenient", help="Answer syncs in any order and execute any family's commands, as AMRISim.")
@@ -109,17 +125,25 @@ def serve(
     all_sonar: Annotated[
         bool, typer.Option("--all-sonar", help="Send every sonar in every packet, not two as a Pioneer 2 does.")
     ] = False,
-    flash: Annotated[Path | None, typer.Option(help="TOML file with the robot's FLASH parameters.")] = None,
+    flash: Annotated[
+        Path | None, typer.Option(help="TOML file with the robot's FLASH parameters.", metavar="FILE")
+    ] = None,
     errors: Annotated[
-        str, typer.Option(help="Sensors' errors: ideal, realistic, or a TOML file.", metavar="NAME")
+        str, typer.Option(help="Sensors' errors: ideal, realistic, or a TOML file.", metavar="ideal|realistic|FILE")
     ] = "ideal",
     baud: Annotated[
-        int | None, typer.Option(help="Speed of the line, bit/s: bytes take that time on pty: and tcp: too.")
+        int | None,
+        BAUD.option("--baud", purpose="Speed of the line: bytes take that time on pty: and tcp: too.", above_zero=True),
     ] = None,
-    robots: Annotated[int, typer.Option(help="How many, on the ports that follow.", min=1, max=MOST_ROBOTS)] = 1,
+    robots: Annotated[
+        int,
+        COUNT.option(
+            "--robots", purpose="How many, on the ports that follow.", least="1", most=f"{MOST_ROBOTS}", shown="1"
+        ),
+    ] = 1,
     at: Annotated[
         list[str] | None,
-        typer.Option(help="Where a robot begins; again for the next. Metres, degrees.", metavar="X,Y[,HEADING]"),
+        typer.Option(help="Where a robot begins, as 1.5m,0m,90deg; again for the next.", metavar="X,Y[,HEADING]"),
     ] = None,
     apart: Annotated[
         bool, typer.Option("--apart", help="A copy of the world for each robot, without the others.")
@@ -128,7 +152,10 @@ def serve(
         Path | None, typer.Option(help="TOML file with the world and every robot.", metavar="FILE")
     ] = None,
     speed: Annotated[
-        float, typer.Option(help="Robot seconds a second.", min=SLOWEST, max=FASTEST, metavar="FACTOR")
+        float,
+        FACTOR.option(
+            "--speed", purpose="Robot seconds a second.", least=f"{SLOWEST:g}", most=f"{FASTEST:g}", shown="1"
+        ),
     ] = 1.0,
     aux: Annotated[
         list[str] | None, typer.Option(help="A line at an AUX port: 1=pty:/tmp/aux1.", metavar="N=URL")
@@ -136,17 +163,15 @@ def serve(
     fault: Annotated[
         list[str] | None, typer.Option(help='Injected from the start: "sonar-stuck 3 1.2".', metavar="WORDS")
     ] = None,
-    sync_limit: Annotated[
-        str | None,
-        typer.Option(
-            help="Drop a client that has no open session for so long, as 10s. Default: never.", metavar="TIME"
-        ),
+    sync_limit_ns: Annotated[
+        Nanos | None,
+        TIME.option("--sync-limit", purpose="Drop a client that has no open session for so long.", above_zero=True),
     ] = None,
     control: Annotated[
         str | None, typer.Option(help="Where orders come from: a URL, or - for standard input.", metavar="URL")
     ] = None,
-    status: Annotated[
-        float | None, typer.Option(help="Print each robot's state so often, seconds.", min=0.1, metavar="S")
+    status_ns: Annotated[
+        Nanos | None, TIME.option("--status", purpose="Print each robot's state so often.", least="100ms")
     ] = None,
     json_output: Annotated[bool, typer.Option("--json", help="Print the start line as JSON.")] = False,
 ) -> None:
@@ -169,7 +194,7 @@ def serve(
             raise UsageError(f"{len(places)} places for {len(ports)} robots", hint=f"--robots {len(places)}")
         first = RobotOrder(
             model=robot, settings=settings, faults=tuple(fault or ()), aux=tuple(read_aux(text) for text in aux or ()),
-            sync_limit_ns=None if sync_limit is None else parse_duration(sync_limit, "--sync-limit"),
+            sync_limit_ns=sync_limit_ns,
         )  # fmt: skip
         order = FleetOrder(
             robots=tuple(
@@ -192,7 +217,7 @@ def serve(
         sys.stdout.flush()
         if made.note:
             _write(f"note: {made.note}\n")
-        tick = None if status is None else (status, partial(_show_status, hosts))
+        tick = None if status_ns is None else (status_ns / NS_PER_S, partial(_show_status, hosts))
         Fleet(hosts, control=orders, on_tick=tick).run()
 
 
@@ -224,26 +249,29 @@ def open_hosts(order: FleetOrder, made: MadeFleet, *, speed: float = 1.0) -> lis
 
 
 def _place(text: str) -> Pose:
-    """Return the place that a text as `1.5,0,90` names.
+    """Return the place that a text as `1.5m,0m,90deg` names.
 
     Raises:
         UsageError: It names none.
     """
-    hint = "metres and degrees: --at 1.5,0,90 or --at 1.5,0"
-    try:
-        values = [float(part) for part in text.split(",")]
-    except ValueError:
-        values = []
-    if len(values) not in {2, 3} or not all(math.isfinite(value) for value in values):
+    hint = "--at 1.5m,0m,90deg or --at 1.5m,0m"
+    parts = text.split(",")
+    if len(parts) not in {2, 3}:
         raise UsageError(f"--at {text!r} is no place", hint=hint)
-    return Pose(values[0], values[1], math.radians(values[2]) if len(values) > 2 else 0.0)
+    try:
+        x_m, y_m, heading_rad = LENGTH.read(parts[0]), LENGTH.read(parts[1]), ANGLE.read((*parts, "0")[2])
+    except typer.BadParameter as error:
+        raise UsageError(f"--at {text!r} is no place: {error.message}", hint=hint) from error
+    return Pose(x_m, y_m, heading_rad)
 
 
 def _refuse_beside_fleet(context: typer.Context) -> None:
     for name in IN_FLEET_FILE:
         source = context.get_parameter_source(name)
         if source is not None and source.name == "COMMANDLINE":
-            raise UsageError(f"--{name.replace('_', '-')} beside --fleet", hint="the fleet's file sets that")
+            raise UsageError(
+                f"--{name.removesuffix('_ns').replace('_', '-')} beside --fleet", hint="the fleet's file sets that"
+            )
 
 
 def _print_start(order: FleetOrder, start: Pose, number: int, host: Host, *, as_json: bool) -> None:

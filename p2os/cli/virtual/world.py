@@ -8,7 +8,10 @@ from typing import Annotated
 
 import typer
 
+from p2os.cli.help_pages import ROBOTS
 from p2os.cli.kept_files import FORCE_HELP, refuse_to_overwrite
+from p2os.cli.names import worlds
+from p2os.cli.quantities import SEED
 from p2os.pioneer.world import known_worlds, load_world
 from p2os.pioneer.world.drawing import svg, text
 from p2os.pioneer.world.formats import Placing, read_placed
@@ -38,11 +41,16 @@ WIDEST_COLUMNS = 100
 #: Files whose up axis may be named.
 MESH_SUFFIXES = (".obj", ".stl", ".dae")
 
-WORLD = Annotated[str, typer.Argument(help="A world that ships, or a file.", metavar="FILE|NAME")]
+WORLD = Annotated[
+    str, typer.Argument(help="A world that ships, or a file.", metavar="WORLD|FILE", autocompletion=worlds)
+]
 FORCE = Annotated[bool, typer.Option("--force", help=FORCE_HELP)]
-SEED = Annotated[int, typer.Option(help="Seed of a world that is made from one.")]
+WORLD_SEED = Annotated[int, SEED.option("--seed", purpose="Of a world that is made from one.", least="0", shown="0")]
 UP = Annotated[
-    str, typer.Option(help="Which axis is up in a mesh file: x, y or z; auto is what its format states or usually has.")
+    str,
+    typer.Option(
+        help="Which axis is up in a mesh file; auto is what its format states or usually has.", metavar="auto|x|y|z"
+    ),
 ]
 
 
@@ -55,7 +63,7 @@ def register(app: typer.Typer) -> None:
     world.command("check")(check)
     world.command("new")(new)
     world.command("convert")(convert)
-    app.add_typer(world, name="world", help=HELP)
+    app.add_typer(world, name="world", help=HELP, rich_help_panel=ROBOTS)
 
 
 def _without_verb(context: typer.Context) -> None:
@@ -78,8 +86,8 @@ def list_worlds(
 
 def show(
     world: WORLD,
-    out: Annotated[Path | None, typer.Option(help="Write a picture: .png or .svg.")] = None,
-    seed: SEED = 0,
+    out: Annotated[Path | None, typer.Option(help="Write a picture: .png or .svg.", metavar="FILE")] = None,
+    seed: WORLD_SEED = 0,
     up: UP = "auto",
 ) -> None:
     """Draw a world in the terminal, or into a file."""
@@ -103,7 +111,7 @@ def show(
     typer.echo(f"{out}: {_summary(place)}")
 
 
-def check(world: WORLD, seed: SEED = 0, up: UP = "auto") -> None:
+def check(world: WORLD, seed: WORLD_SEED = 0, up: UP = "auto") -> None:
     """Read a world and print what is in it; an error names its line, a start where no p2dx can stand too."""
     place = _load(world, seed, up)
     _print_skipped(place)
@@ -112,9 +120,13 @@ def check(world: WORLD, seed: SEED = 0, up: UP = "auto") -> None:
 
 
 def new(
-    out: Annotated[Path | None, typer.Option(help="The file to write; without it the text is printed.")] = None,
-    kind: Annotated[str, typer.Option(help=f"What to make: {', '.join(KINDS)}.")] = "arena",
-    seed: Annotated[int, typer.Option(help="The same seed makes the same world.")] = 0,
+    out: Annotated[
+        Path | None, typer.Option(help="The file to write; without it the text is printed.", metavar="FILE")
+    ] = None,
+    kind: Annotated[str, typer.Option(help="What to make.", metavar="|".join(KINDS))] = "arena",
+    seed: Annotated[
+        int, SEED.option("--seed", purpose="The same seed makes the same world.", least="0", shown="0")
+    ] = 0,
     force: FORCE = False,
 ) -> None:
     """Make a world from a seed."""
@@ -123,8 +135,10 @@ def new(
 
 def convert(
     world: WORLD,
-    out: Annotated[Path | None, typer.Option(help="The file to write; without it the text is printed.")] = None,
-    seed: SEED = 0,
+    out: Annotated[
+        Path | None, typer.Option(help="The file to write; without it the text is printed.", metavar="FILE")
+    ] = None,
+    seed: WORLD_SEED = 0,
     up: UP = "auto",
     force: FORCE = False,
 ) -> None:

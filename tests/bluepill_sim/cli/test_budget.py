@@ -19,7 +19,7 @@ def test_a_program_that_resets_itself_over_and_over_keeps_to_the_budget(
     path.write_bytes(program)
     assert struct.unpack_from("<I", program)[0] == 0x2000_5000
     began_s = time.monotonic()
-    assert run(["mcu", "run", str(path), "--for", "10s", "--budget", "0.5"]) == 1
+    assert run(["mcu", "run", str(path), "--for", "10s", "--budget", "0.5s"]) == 1
     assert time.monotonic() - began_s < 3
     error = capfd.readouterr().err
     assert "0.5 s of wall clock are used up" in error

@@ -132,7 +132,7 @@ def test_a_dead_program_shows_its_last_blocks(tmp_path: Path, capfd: pytest.Capt
 def test_a_program_that_takes_too_long_is_given_up(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
     image = tmp_path / "spins.bin"
     image.write_bytes(SPINS)
-    assert run(["mcu", "run", str(image), "--for", "1000s", "--budget", "0.1"]) == 1
+    assert run(["mcu", "run", str(image), "--for", "1000s", "--budget", "0.1s"]) == 1
     error = capfd.readouterr().err
     assert "are used up at" in error
     assert "the last 32 blocks" in error

@@ -16,11 +16,10 @@ from p2os.cli.captures.capture_files import RecordingFile, Sinks
 from p2os.cli.captures.record import record_session
 from p2os.cli.captures.replay import motions_of, play
 from p2os.cli.captures.sniff import Bridge
-from p2os.cli.quantities import Quantity, parse_duration, parse_quantity
 from p2os.errors import RemoteProtocolError, RunFailedError, TransportError
 from p2os.protocol.commands import Command, CommandNumber
 from p2os.transport import HungUpError, Loops, listen_url, open_url, waiting
-from simbase.errors import FileError, UsageError
+from simbase.errors import FileError
 from simbase.timing import NS_PER_S
 
 TO, FROM = Direction.TO_ROBOT, Direction.FROM_ROBOT
@@ -401,17 +400,17 @@ def test_a_bridge_whose_robot_is_gone_refuses_its_client() -> None:
     ("words", "code", "said"),
     [
         (["record", "tcp:127.0.0.1:1"], 1, "p2os: cannot connect to tcp:127.0.0.1:1"),
-        (["record", "tcp:x", "--for", "10"], 2, "p2os: --for '10' has no unit; take s, ms, min, h"),
-        (["record", "tcp:x", "--for", "0s"], 2, "p2os: --for '0s' must be more than 0"),
+        (["record", "tcp:x", "--for", "10"], 2, "p2os: --for '10' has no unit: more than 0, in ns"),
+        (["record", "tcp:x", "--for", "0s"], 2, "p2os: --for '0s' is out of range: more than 0"),
         (["sniff"], 2, "p2os: Invalid value for URL: name the robot's URL"),
         (["sniff", "nowhere"], 2, "p2os: 'nowhere' is not a port URL"),
-        (["sniff", "tcp:127.0.0.1:1", "--for", "x"], 2, "p2os: --for 'x' is no number with a unit"),
+        (["sniff", "tcp:127.0.0.1:1", "--for", "x"], 2, "p2os: --for 'x' is no time: more than 0"),
         (["replay", "gone.jsonl", "tcp:x"], 2, "p2os: cannot read gone.jsonl"),
         (["replay", "FILE", "tcp:127.0.0.1:1", "--as", "client"], 1, "p2os: cannot connect"),
         (["replay", "FILE", "serial:/dev/ttyUSB99", "--as", "client"], 2, "p2os: the recording holds 1 motion"),
         (["replay", "FILE", "pty:"], 2, "p2os: FILE holds nothing that a robot sent"),
-        (["replay", "FILE", "tcp:x", "--speed", "0"], 2, "p2os: Invalid value"),
-        (["replay", "FILE", "tcp:x", "--as", "dog"], 2, "p2os: Invalid value"),
+        (["replay", "FILE", "tcp:x", "--speed", "0"], 2, "p2os: --speed '0' is out of range: 0.01 to 100"),
+        (["replay", "FILE", "tcp:x", "--as", "dog"], 2, "p2os: --as 'dog' is not one of 'robot', 'client'"),
     ],
 )  # fmt: skip
 def test_bad_input_is_one_line_and_a_hint(
@@ -432,19 +431,19 @@ def test_a_capture_file_that_cannot_be_written_is_named(served: object, run: Run
     assert capsys.readouterr().err == "p2os: cannot write /nowhere/floor.jsonl: no such file or directory\n"
 
 
-@pytest.mark.parametrize(
-    ("text", "quantity", "value"),
-    [("0.5m", Quantity.LENGTH, 0.5), ("-20 cm", Quantity.LENGTH, -0.2), ("180deg", Quantity.ANGLE, 3.141592653589793),
-     (".2m/s", Quantity.SPEED, 0.2), ("1e2mm/s", Quantity.SPEED, 0.1), ("+2min", Quantity.TIME, 120.0)],
-)  # fmt: skip
-def test_quantities_have_units(text: str, quantity: Quantity, value: float) -> None:
-    assert parse_quantity(text, quantity, "--x") == pytest.approx(value, rel=1e-15)
-
-
-@pytest.mark.parametrize("text", ["", "m", "5", "5km", "five m", "nan m", "1e999m", "5 5m"])
-def test_what_is_no_length_is_refused_with_an_example(text: str) -> None:
-    with pytest.raises(UsageError) as caught:
-        parse_quantity(text, Quantity.LENGTH, "--forward")
-    assert caught.value.hint == "--forward 0.5m"
-    assert parse_duration("1.5s", "--for") == 1_500_000_000
-    assert Chunk(at_ns=0, direction=TO, data=b"").data == b""
+@pytest.mark.usefixtures("no_waiting")
+@pytest.mark.parametrize(("said", "code", "told"), [
+    (Command(2).to_frame().to_bytes(), 0, "the client closed the session after 1 of 2 frames\n"),
+    (b"", 1, "p2os: after 1 of 2 frames: gone\n"),
+])  # fmt: skip
+def test_a_client_that_closes_its_session_and_goes_is_no_error(
+    run: Run, tmp_path: Path, capsys: Capture, monkeypatch: pytest.MonkeyPatch, said: bytes, code: int, told: str
+) -> None:
+    recording = tmp_path / "talk.jsonl"
+    sync = Command(0).to_frame().to_bytes()
+    talk = [(0, TO, sync), (1, FROM, sync), (100 * NS_PER_S, FROM, SIP)]
+    recording.write_text(write_recording(capture_of(talk)))
+    line = Line(sync, said, HungUpError("gone"))
+    monkeypatch.setattr("p2os.cli.captures.replay._first", lambda _listener: line)
+    assert run("replay", recording, "tcp:127.0.0.1:0") == code
+    assert told in capsys.readouterr().err

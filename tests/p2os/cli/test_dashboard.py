@@ -103,3 +103,15 @@ def test_the_spread_of_times() -> None:
     assert spread_of([]) is None
     assert LinkQuality().spread is None
     assert LinkQuality().cycle_ns == 0
+
+
+@pytest.mark.parametrize(("columns", "rows"), [(78, 24), (80, 24), (78, 16), (200, 24)])
+def test_the_picture_fits_a_small_terminal(columns: int, rows: int) -> None:
+    console = Console(width=columns, height=rows, record=True, file=io.StringIO())
+    console.print(draw(dashboard(), columns, rows))
+    lines = console.export_text().splitlines()
+    assert len(lines) < rows
+    assert max(map(len, lines)) <= columns
+    text = "\n".join(lines)
+    for words in ("Wilma", "x 1.250 m", "0.750 m/s", "11.2 V", "STALLED", "─ sonar ─", "nearest 0.30 m", "link lost"):
+        assert words in text, words

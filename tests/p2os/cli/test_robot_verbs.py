@@ -1,8 +1,12 @@
 """The verbs that use a robot: drive, send, scan, monitor and bench, against a served one."""
 
+import contextlib
 import json
 import math
+import os
 import re
+import select
+import signal
 import sys
 import threading
 import time
@@ -33,7 +37,7 @@ from p2os.protocol.commands import CommandNumber
 from p2os.transport import waiting
 from simbase.errors import UsageError
 from simbase.timing import NS_PER_MS, NS_PER_S
-from tests.p2os.cli.driven import STOP, TIMEOUT_S, RecordingRobot, until
+from tests.p2os.cli.driven import COMMAND, STOP, TIMEOUT_S, Driver, RecordingRobot, until
 
 Run = Callable[..., int]
 Capture = pytest.CaptureFixture[str]
@@ -65,7 +69,8 @@ def test_a_wall_ends_a_held_speed_with_its_reason(run: Run, capsys: Capture) -> 
         assert run("drive", robot.url, "--vel", "-1.5m/s", "--for", "30s") == 1
         assert time.monotonic() - began < 15
         captured = capsys.readouterr()
-        assert re.fullmatch(r"p2os: hold -1\.50 m/s, 0 deg/s: stalled, after \d\.\d s\n", captured.err)
+        note = r"note: --vel 1\.50 m/s is above this robot's limit, 0\.75 m/s: it takes that\n"
+        assert re.fullmatch(note + r"p2os: hold -1\.50 m/s, 0 deg/s: stalled, after \d\.\d s\n", captured.err)
         assert captured.out == ""
         assert robot.when_received(STOP, began)
     finally:
@@ -247,8 +252,8 @@ def test_a_line_without_a_robot_cannot_be_measured(monkeypatch: pytest.MonkeyPat
     ("words", "code", "said"),
     [
         (["drive", "tcp:x"], 2, "p2os: nothing to do"),
-        (["drive", "tcp:x", "--forward", "500"], 2, "p2os: --forward '500' has no unit; take m, cm, mm"),
-        (["drive", "tcp:x", "--turn", "1m"], 2, "p2os: --turn '1m' has the unit 'm'; take deg, °, rad"),
+        (["drive", "tcp:x", "--forward", "500"], 2, "p2os: --forward '500' has no unit: in m, cm or mm, such as 0.5m"),
+        (["drive", "tcp:x", "--turn", "1m"], 2, "p2os: --turn '1m' has the unit 'm': in deg, ° or rad, such as 90deg"),
         (["drive", "tcp:x", "--vel", "1m/s"], 2, "p2os: a speed without an end"),
         (["drive", "tcp:x", "--forward", "1m", "--for", "1s"], 2, "p2os: --for goes with speeds only"),
         (["drive", "tcp:x", "--forward", "1m", "--turn-rate", "1deg/s"], 2, "p2os: --turn-rate has nothing to limit"),
@@ -265,11 +270,11 @@ def test_a_line_without_a_robot_cannot_be_measured(monkeypatch: pytest.MonkeyPat
         (["send", "tcp:x", "30", "1", "2"], 2, "p2os: command 30: one argument at most"),
         (["send", "--list", "zebra"], 2, "p2os: no command has 'zebra' in it"),
         (["scan", "tcp:127.0.0.1:1"], 1, "tcp:127.0.0.1:1: no (cannot connect"),
-        (["scan", "x", "--baud", "5"], 2, "p2os: --baud 5 is no speed of a serial line"),
+        (["scan", "x", "--baud", "5"], 2, "p2os: --baud '5' is out of range: 300 to 4000000"),
         (["monitor", "tcp:127.0.0.1:1"], 1, "p2os: cannot connect"),
-        (["monitor", "tcp:x", "--for", "-1s"], 2, "p2os: --for '-1s' must be more than 0"),
+        (["monitor", "tcp:x", "--for", "-1s"], 2, "p2os: --for '-1s' is out of range: more than 0"),
         (["bench", "tcp:127.0.0.1:1"], 1, "p2os: cannot connect"),
-        (["teleop", "tcp:x", "--vel", "0m/s"], 2, "p2os: --vel and --turn-rate must be positive"),
+        (["teleop", "tcp:x", "--vel", "0m/s"], 2, "p2os: --vel '0m/s' is out of range: more than 0"),
         (["teleop", "tcp:x"], 2, "p2os: there is no keyboard: stdin is not a terminal"),
     ],
 )  # fmt: skip
@@ -313,3 +318,51 @@ def test_a_slow_latency_timer_is_told(timer: str, is_reported: bool, tmp_path: o
     (tmp_path / "ttyUSB0" / "latency_timer").write_text(timer)
     port = {"url": "serial:/dev/ttyUSB0", "description": "FT232R", "hardware": "USB VID:PID=0403:6001"}
     assert ("latency timer of 16 ms" in guess(port, tmp_path)) is is_reported
+
+
+def test_time_counts_from_the_first_packet(served: object, run: Run, capsys: Capture) -> None:
+    assert run("monitor", served.url, "--for", "250ms", "--json") == 0
+    times = [json.loads(line)["t"] for line in capsys.readouterr().out.splitlines()]
+    assert times[0] == 0
+    assert 0 < times[-1] < 2
+
+
+@pytest.mark.parametrize(
+    ("arguments", "is_said"), [(["1"], True), (["1", "0"], True), (["0", "1"], False), (["0x09", "0x19"], False)]
+)
+def test_a_digital_output_without_a_mask_says_that_nothing_changes(
+    served: object, run: Run, capsys: Capture, arguments: list[str], is_said: bool
+) -> None:
+    assert run("send", served.url, "DIGOUT", *arguments, "--wait", "50ms") == 0
+    assert ("DIGOUT with mask 0 changes no output" in capsys.readouterr().err) is is_said
+
+
+def test_a_speed_above_the_robots_own_is_said(served: object, run: Run, capsys: Capture) -> None:
+    words = ("--vel", "9m/s", "--turn-rate", "2000deg/s", "--for", "50ms")
+    assert run("drive", served.url, *words) == 0
+    err = capsys.readouterr().err
+    assert "note: --vel 9.00 m/s is above this robot's limit, " in err
+    assert "note: --turn-rate 2000 deg/s is above this robot's limit, " in err
+    assert "\x1b[K" not in err, "no live line where there is no terminal"
+
+
+def test_a_robot_on_its_way_shows_where_it_is_and_an_interruption_says_that_it_stopped() -> None:
+    with contextlib.closing(RecordingRobot()) as robot:
+        driver = Driver((*COMMAND, "drive", robot.url, "--forward", "3m"), on_terminal=True)
+        robot.wait_until_it_drives()
+        shown = seen_until(driver, "m/s")
+        driver.process.send_signal(signal.SIGINT)
+        shown += seen_until(driver, "let go")
+        assert driver.end()[0] == 130
+        assert STOP in robot.numbers
+    assert "driving 3.000 m: 0." in shown
+    assert "interrupted: the robot was stopped and let go" in shown
+
+
+def seen_until(driver: Driver, words: str) -> str:
+    """Return what a verb wrote on its terminal, up to some words."""
+    seen, ends = "", time.monotonic() + TIMEOUT_S
+    while words not in seen and time.monotonic() < ends:
+        if select.select([driver.keyboard], [], [], 1.0)[0]:
+            seen += os.read(driver.keyboard, 4096).decode("utf-8", "replace")
+    return seen

@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 
 from p2os.client.calls import GripperAction, Result, RobotCalls
 from p2os.client.core import RobotCore
+from p2os.client.goals import DriveAxis, TurnAxis
 from p2os.errors import LocalProtocolError
 from p2os.protocol.commands import Command
 from p2os.protocol.commands import CommandNumber as C
@@ -132,3 +133,22 @@ def test_any_command_leaves_as_it_is(number: int, argument: int | bytes | None) 
     Calls(rig).send(number, argument)
     rig.run(0.01)
     assert Command(number, argument) in rig.commands()
+
+
+@pytest.mark.parametrize(
+    ("call", "wants"),
+    [
+        (lambda robot: robot.set_velocity("0.2m/s"), "set_velocity takes m/s as a number, not '0.2m/s'"),
+        (lambda robot: robot.set_velocity(0.1, "9deg/s"), "set_velocity takes rad/s as a number, not '9deg/s'"),
+        (lambda robot: robot.set_pose("1m"), "set_pose takes metres as a number, not '1m'"),
+        (lambda robot: robot.set_limits(forward_mps="1m/s"), "set_limits takes SI units as a number, not '1m/s'"),
+        (lambda _: DriveAxis("1m"), "drive takes metres as a number, not '1m'"),  # type: ignore[arg-type]  # on purpose
+        (lambda _: TurnAxis("90deg"), "turn takes radians as a number, not '90deg'"),  # type: ignore[arg-type]  # as above
+    ],
+)
+def test_a_text_in_place_of_a_number_is_refused_with_the_unit_that_is_taken(
+    calls: Calls, call: Callable[[Calls], object], wants: str
+) -> None:
+    with pytest.raises(UsageError) as caught:
+        call(calls)
+    assert str(caught.value) == wants

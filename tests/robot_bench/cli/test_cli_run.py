@@ -20,7 +20,7 @@ from simbase.installation import install_command
 from tests.robot_bench.firmware import thumb
 
 COMMAND = [sys.executable, "-c", "from p2os.cli.main import main; main()"]
-QUICK = ["--mode", "direct", "--body", "kinematic", "--duration", "0.2"]
+QUICK = ["--mode", "direct", "--body", "kinematic", "--duration", "0.2s"]
 #: What `run --json` prints at the least.
 KEYS = {
     "firmware_sha256", "scenario", "mode", "body", "seed", "virtual_s", "wall_s", "real_time_factor", "distance_m",
@@ -149,11 +149,11 @@ def test_a_firmware_that_is_none_is_one_line_and_2(
         (["run", "dodge", "--mode", "dirct"], "there is no mode 'dirct'"),
         (["run", "dodge", "--body", "box"], "there is no body 'box'"),
         (["run", "dodge", "--world", "moon"], "there is no world 'moon'"),
-        (["run", "dodge", "--duration", "0"], "a run of 0 s cannot be"),
-        (["run", "dodge", "--duration", "nan"], "a run of nan s cannot be"),
-        (["run", "dodge", "--realtime", "-1"], "--realtime -1 cannot be"),
+        (["run", "dodge", "--duration", "0s"], "--duration '0s' is out of range: more than 0"),
+        (["run", "dodge", "--duration", "nan"], "--duration 'nan' is no time: more than 0"),
+        (["run", "dodge", "--realtime", "-1"], "--realtime '-1' is out of range: more than 0"),
         (["run", "dodge", "--yes"], "--yes goes with --port only"),
-        (["run", "dodge", "--max-speed", "100"], "--max-speed goes with --port only"),
+        (["run", "dodge", "--max-speed", "300mm/s"], "--max-speed goes with --port only"),
         (["run", "dodge", "--port", "tcp:127.0.0.1:1", "--mode", "direct"], "--mode cannot stand beside --port"),
         (["run", "dodge", "--port", "tcp:127.0.0.1:1", "--body", "bullet"], "--body cannot stand beside --port"),
         (["run", "dodge", "--port", "tcp:127.0.0.1:1", "--world", "room"], "--world cannot stand beside --port"),
@@ -265,7 +265,7 @@ def test_a_second_run_with_the_same_out_is_refused_while_the_first_lasts(capsys:
 
 
 def test_demo_runs_dodge_in_the_room(capsys: pytest.CaptureFixture[str]) -> None:
-    assert p2os(["demo", "--duration", "0.1", "--json"]) == 1, "nothing is reached in 0.1 s"
+    assert p2os(["demo", "--duration", "0.1s", "--json"]) == 1, "nothing is reached in 0.1 s"
     outcome = json.loads(capsys.readouterr().out)
     assert (outcome["scenario"], outcome["mode"], outcome["world"]) == ("dodge", "adapter", "room")
     assert Path("runs/demo-001/report.html").is_file()
@@ -279,7 +279,7 @@ def test_demo_without_pybullet_says_so_and_goes_on(
     monkeypatch.setitem(sys.modules, "pybullet", None)
     assert best_body() == "kinematic"
     assert "PyBullet is not here" in capsys.readouterr().err
-    assert p2os(["run", "dodge", "--body", "bullet", "--duration", "0.1"]) == 2
+    assert p2os(["run", "dodge", "--body", "bullet", "--duration", "0.1s"]) == 2
     assert f"hint: {install_command('bullet')}" in capsys.readouterr().err
 
 
@@ -287,4 +287,4 @@ def test_an_untried_program_is_capped_unless_told() -> None:
     scenario = load_scenario("dodge")
     assert capped(scenario, None).adapter.max_velocity_mm_s == 200
     assert capped(scenario, None).adapter.max_rotation_deg_s == 45
-    assert capped(scenario, 350).adapter.max_velocity_mm_s == 350
+    assert capped(scenario, 0.35).adapter.max_velocity_mm_s == 350

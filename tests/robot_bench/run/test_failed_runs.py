@@ -108,7 +108,7 @@ LIMITED = """
 import resource, sys
 resource.setrlimit(resource.RLIMIT_FSIZE, (30_000, 30_000))
 from p2os.cli.main import main
-main(["run", "dodge", "--mode", "adapter", "--body", "kinematic", "--duration", "20", "--out", sys.argv[1]])
+main(["run", "dodge", "--mode", "adapter", "--body", "kinematic", "--duration", "20s", "--out", sys.argv[1]])
 """
 
 
