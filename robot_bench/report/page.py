@@ -60,7 +60,7 @@ def page_data(record: RunRecord) -> Json:
     changes, poses = _changes(record, left_out), _poses(record, left_out)
     hits = [(_seconds(hit.t), hit.x, hit.y, hit.what) for hit in record.collisions()[:MOST_HITS]]
     extent = cast("list[float]", world.get("extent") or [-3, -3, 3, 3])
-    duration = _seconds(max(record.last_ns, 1))
+    duration = max(_seconds(record.last_ns), 1e-6)
     return {
         "title": f"{record.meta.get('scenario', 'run')} in {world.get('name', '?')}: {verdict(record)}",
         "duration": duration,
