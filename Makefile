@@ -12,7 +12,7 @@ JOBS   ?= 2
 # What is built with the package: set up again when it has changed.
 COMPILED := $(wildcard bluepill_sim/native/source/*) $(shell find adapter_fw/core adapter_fw/capi -type f)
 
-.PHONY: setup demo test lint type unit bench soak clean firmware board board-check board-tools
+.PHONY: setup demo test lint type unit bench soak clean firmware board board-check board-tools pictures
 
 setup: $(STAMP)
 
@@ -67,6 +67,7 @@ board: board-tools
 	$(BIN)/python -m hardware.pcb build
 	$(BIN)/python -m hardware.pcb simulate
 	$(BIN)/python -m hardware.pcb check
+	$(BIN)/python tools/make_pictures.py
 
 board-check: board-tools
 	$(BIN)/python -m hardware.pcb check $(BOARD_CHECK)
@@ -74,6 +75,10 @@ board-check: board-tools
 board-tools: setup
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt -e '.[board]'
 	tools/install_board_tools.sh
+
+# Every picture of docs/ whose inputs have changed, made anew; `make test` names those that are out of date.
+pictures: board-tools
+	$(BIN)/python tools/make_pictures.py
 
 clean:
 	rm -rf $(VENV) build dist *.egg-info .pytest_cache .mypy_cache .ruff_cache .hypothesis .coverage .coverage.* runs

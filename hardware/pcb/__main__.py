@@ -1,5 +1,6 @@
 """`python -m hardware.pcb VERB`: builds, checks, routes, fills and simulates the board.
 
+Its pictures are made by tools/make_pictures.py.
 Exit codes: 0 done, 1 something failed, 2 wrong usage.
 """
 
@@ -15,7 +16,7 @@ from hardware.pcb.circuit.design import BOARD_VARIANTS, VARIANTS
 from hardware.pcb.circuit.design import build as design_of
 from hardware.pcb.circuit.netlist import DesignError
 from hardware.pcb.layout.routing import HERE, RoutingError, run_router
-from hardware.pcb.outputs import generated_files, kicad_cli, pictures
+from hardware.pcb.outputs import generated_files, kicad_cli
 from hardware.pcb.outputs.pours import KicadMissingError
 from hardware.pcb.spice.decks import decks
 from hardware.pcb.spice.page import page_text
@@ -35,7 +36,7 @@ def main(arguments: list[str] | None = None) -> int:
     ):
         one = verbs.add_parser(name, help=words)
         one.add_argument("variant", nargs="*", help=f"one of {', '.join(BOARD_VARIANTS)}; none for all")
-    verbs.add_parser("simulate", help="run every circuit simulation and renew its plots")
+    verbs.add_parser("simulate", help="run every circuit simulation and renew the page of their figures")
     given = parser.parse_args(arguments)
     try:
         return _VERBS[given.verb](given)
@@ -55,7 +56,7 @@ def _build(_: argparse.Namespace) -> int:
     written = generated_files.write_sources()
     print(f"{len(written)} generated files renewed")
     if kicad_cli.version() is None:
-        print("KiCad 9 is not installed: gerbers and pictures stay as they are (hint: tools/install_board_tools.sh)")
+        print("KiCad 9 is not installed: gerbers stay as they are (hint: tools/install_board_tools.sh)")
         return 0
     with tempfile.TemporaryDirectory() as folder:
         for variant in BOARD_VARIANTS:
@@ -65,13 +66,9 @@ def _build(_: argparse.Namespace) -> int:
             target.write_bytes(generated_files.archive(files))
             print(f"{target.name}: {len(files)} files, {target.stat().st_size} bytes")
             _write_reports(variant, board)
-            for path in pictures.board_pictures(variant, board):
-                print(f"{path.name}: {path.stat().st_size} bytes")
     for variant in VARIANTS:
         if variant not in BOARD_VARIANTS:
             _write_reports(variant, None)
-        for path in pictures.schematic_pictures(variant):
-            print(f"{path.name}: {path.stat().st_size} bytes")
     return 0
 
 
@@ -111,9 +108,6 @@ def _simulate(_: argparse.Namespace) -> int:
     ran = [simulate(deck) for deck in decks()]
     results = [suite.simulation(one) for one in ran]
     print(table(results))
-    for one in ran:
-        path = pictures.plot(one)
-        print(f"{path.name}: {path.stat().st_size} bytes")
     page = page_text(decks(), {one.deck.name: one.figures for one in ran})
     generated_files.SIMULATION_PAGE.write_text(page, encoding="utf-8", newline="\n")
     print(f"{generated_files.SIMULATION_PAGE.name}: {len(ran)} simulations")

@@ -6,6 +6,8 @@ other nets shows them last, in their own group.
 
 from collections.abc import Mapping, Sequence
 
+from adapter_sim.pinout import load_pinout
+
 #: Group title → nets, least significant bit first.
 GROUPS: Mapping[str, tuple[str, ...]] = {
     "distance": tuple(f"DD{n}" for n in range(1, 9)),
@@ -26,6 +28,13 @@ def grouped(names: Sequence[str]) -> list[tuple[str, list[str]]]:
     groups = [(title, [net for net in nets if net in names]) for title, nets in GROUPS.items()]
     groups.append(("other", [net for net in names if net not in known]))
     return [(title, nets) for title, nets in groups if nets]
+
+
+def pin_labels() -> dict[str, str]:
+    """Return what a person reads beside each net's waveform: the BluePill's pin, and the signal ("PB7 comm1")."""
+    wires = load_pinout().wires
+    signals = {wire.name: wire.name.rpartition("_")[2] if wire.value else wire.name for wire in wires}
+    return {wire.name: f"{wire.bluepill} {signals[wire.name]}" for wire in wires}
 
 
 def motor_steps(pins: Mapping[str, Edges], motor: int) -> list[tuple[int, int]]:

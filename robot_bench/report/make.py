@@ -21,7 +21,7 @@ from pathlib import Path
 from robot_bench.recording.run_record import Json, RunRecord, read_run
 from robot_bench.recording.summary import write_outcome
 from robot_bench.recording.waveforms import write_sigrok, write_vcd
-from robot_bench.report.page import render_page
+from robot_bench.report.page import page_data, render_page
 from simbase.errors import FileError
 
 
@@ -44,12 +44,13 @@ def make_report(folder: Path) -> ReportFiles:
     """
     record = read_run(folder)
     page = folder / "report.html"
-    page.write_text(render_page(record), encoding="utf-8")
+    drawn = page_data(record)
+    page.write_text(render_page(record, drawn), encoding="utf-8")
     try:
         from robot_bench.report.plots import write_plots
     except ModuleNotFoundError:
         return ReportFiles(page=page, plots=())
-    return ReportFiles(page=page, plots=write_plots(record, folder))
+    return ReportFiles(page=page, plots=write_plots(drawn, folder))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -12,20 +12,17 @@ from string import Template
 from typing import cast
 
 from robot_bench.recording.run_record import COLLISION, Json, RunRecord
-from robot_bench.recording.signals import grouped, motor_steps
+from robot_bench.recording.signals import grouped, motor_steps, pin_labels
 from robot_bench.recording.summary import MEASURED, figures, verdict
 from robot_bench.report.packets import describe
+from robot_bench.report.plan import plan
 from robot_bench.report.thinning import ends, extremes, pulses
 from simbase.timing import NS_PER_S
 
 #: Speed of one motor step where a trace does not hold it: the adapter's default, m/s.
 DEFAULT_STEP_MPS = 0.0625
-#: Height of one pin's row and of a group's title in page.js, pixels.
-PIN_ROW_PX = 17
-GROUP_PX = 22
-AXIS_PX = 26
 #: chosen: of all rows of the page none makes it larger than 2 MB; what a list may take, in characters.
-LIST_BYTES, WIRE_BYTES = 120_000, 400_000
+LIST_BYTES, WIRE_BYTES = 120_000, 500_000
 #: What a row costs besides its text; a packet's name and meaning.
 ROW_BYTES, PACKET_BYTES = 24, 130
 PIN_BUCKETS = 500
@@ -33,13 +30,11 @@ MOST_MOVES = 2000
 MOST_HITS = 500
 
 
-def render_page(record: RunRecord) -> str:
-    """Return the report of a run as one HTML document."""
+def render_page(record: RunRecord, drawn: Json) -> str:
+    """Return the report of a run as one HTML document; `drawn` is what `page_data` returned."""
     source = files("robot_bench.report")
     result = verdict(record)
-    drawn = page_data(record)
     data = json.dumps(drawn, separators=(",", ":")).replace("</", "<\\/")
-    nets = grouped(sorted(record.pins))
     return Template(source.joinpath("page.html").read_text(encoding="utf-8")).substitute(
         title=html.escape(f"{record.meta.get('scenario', 'run')} · {result}"),
         heading=html.escape(str(record.meta.get("scenario", "run"))),
@@ -50,7 +45,6 @@ def render_page(record: RunRecord) -> str:
         goals=_goals(record.end),
         measured=_measured(record.end),
         left_out=_left_out(cast("list[str]", drawn["left_out"])),
-        pins_height=AXIS_PX + sum(GROUP_PX + PIN_ROW_PX * len(names) for _, names in nets),
         footer=html.escape(_footer(record)),
         style=source.joinpath("page.css").read_text(encoding="utf-8"),
         script=source.joinpath("page.js").read_text(encoding="utf-8"),
@@ -63,20 +57,24 @@ def page_data(record: RunRecord) -> Json:
     left_out: list[str] = []
     world = cast("Json", record.meta.get("world") or {})
     step = float(cast("float", record.meta.get("step_mps") or DEFAULT_STEP_MPS))
+    obstacles = [_obstacle(item) for item in cast("list[Json]", world.get("obstacles") or [])]
+    changes, poses = _changes(record, left_out), _poses(record, left_out)
+    hits = [(_seconds(hit.t), hit.x, hit.y, hit.what) for hit in record.collisions()[:MOST_HITS]]
+    extent = cast("list[float]", world.get("extent") or [-3, -3, 3, 3])
+    duration = max(_seconds(record.last_ns), 1e-6)
     return {
-        "duration": _seconds(max(record.last_ns, 1)),
+        "title": f"{record.meta.get('scenario', 'run')} in {world.get('name', '?')}: {verdict(record)}",
+        "duration": duration,
         "threshold": record.meta.get("threshold_m") or 0.0,
-        "world": {
-            "obstacles": [_obstacle(item) for item in cast("list[Json]", world.get("obstacles") or [])],
-            "extent": world.get("extent") or [-3, -3, 3, 3],
-        },
+        "obstacles": obstacles,
+        "plan": plan(extent=extent, poses=poses, obstacles=obstacles, changes=changes, hits=hits, duration_s=duration),
         "robot": _robot(cast("Json", record.meta.get("robot") or {})),
-        "changes": _changes(record, left_out),
-        "poses": _poses(record, left_out),
+        "changes": changes,
+        "poses": poses,
         "sonar": _sonar(record, left_out),
         "motors": [_motor(record, motor, step) for motor in (1, 2)],
         "pins": _pins(record, left_out),
-        "hits": [[_seconds(hit.t), hit.x, hit.y, hit.what] for hit in record.collisions()[:MOST_HITS]],
+        "hits": hits,
         "events": _events(record, left_out),
         "usart": _usart(record, left_out),
         "packets": _packets(record, left_out),
@@ -107,10 +105,11 @@ def _poses(record: RunRecord, left_out: list[str]) -> list[list[float]]:
 
 
 def _sonar(record: RunRecord, left_out: list[str]) -> list[list[float]]:
+    """Return the ranges as recorded: millimetres."""
     rows = [row for row in record.sonar if row[1]]
     kept = [rows[n] for n in extremes([t for t, _ in rows], [[min(ranges) for _, ranges in rows]])]
     _note(left_out, "sonar", len(kept), len(rows), "the least and greatest of each")
-    return [[_seconds(t), *(mm / 1000 for mm in ranges)] for t, ranges in kept]
+    return [[_seconds(t), *ranges] for t, ranges in kept]
 
 
 def _motor(record: RunRecord, motor: int, step: float) -> list[list[float]]:
@@ -122,8 +121,9 @@ def _motor(record: RunRecord, motor: int, step: float) -> list[list[float]]:
 def _pins(record: RunRecord, left_out: list[str]) -> list[Json | list[object]]:
     kept = {net: pulses(edges, buckets=PIN_BUCKETS) for net, edges in record.pins.items()}
     _note(left_out, "pins", _total(kept), _total(record.pins), "edges: the first two and the last of each")
+    labels = pin_labels()
     return [
-        [title, [[net, [[_seconds(t), level] for t, level in kept[net]]] for net in nets]]
+        [title, [[labels.get(net, net), [[_seconds(t), level] for t, level in kept[net]]] for net in nets]]
         for title, nets in grouped(sorted(record.pins))
     ]
 
@@ -142,18 +142,36 @@ def _usart(record: RunRecord, left_out: list[str]) -> list[list[object]]:
     lines = record.usart_lines()
     head, tail = ends([len(text) + ROW_BYTES for _, text in lines], LIST_BYTES)
     _note(left_out, "lines of text", head + tail, len(lines), "from the beginning and the end (usart.txt has all)")
-    return [[_seconds(t), text] for t, text in (*lines[:head], *lines[len(lines) - tail :])]
-
-
-def _packets(record: RunRecord, left_out: list[str]) -> list[list[object]]:
-    wire = record.wire
-    head, tail = ends([4 * len(chunk.data) + PACKET_BYTES for chunk in wire], WIRE_BYTES)
-    _note(left_out, "packets", head + tail, len(wire), "from the beginning and the end (wire.jsonl has all)")
+    gap = _gap(len(lines) - head - tail, "lines: usart.txt has all", lines[head - 1][0] if head else 0)
     return [
-        [_seconds(chunk.t), chunk.direction, name, text, chunk.data.hex(" ")]
-        for chunk in (*wire[:head], *wire[len(wire) - tail :])
-        for name, text in describe(chunk)
-    ]
+        *([_seconds(t), text] for t, text in lines[:head]), *gap,
+        *([_seconds(t), text] for t, text in lines[len(lines) - tail :]),
+    ]  # fmt: skip
+
+
+def _packets(record: RunRecord, left_out: list[str]) -> Json:
+    """Return the packets as rows of time and the index of a kind, and each kind once: direction, name, meaning, bytes.
+
+    Most commands and idle packets are said again and again.
+    """
+    wire = record.wire
+    head, tail = ends([2 * len(chunk.data) + PACKET_BYTES for chunk in wire], WIRE_BYTES)
+    _note(left_out, "packets", head + tail, len(wire), "from the beginning and the end (wire.jsonl has all)")
+    kinds: dict[tuple[str, str, str, str], int] = {}
+    rows: list[list[object]] = []
+    for number in (*range(head), *range(len(wire) - tail, len(wire))):
+        chunk = wire[number]
+        if number == len(wire) - tail:
+            rows += _gap(len(wire) - head - tail, "packets: wire.jsonl has all", wire[head - 1].t)
+        for name, text in describe(chunk):
+            kind = (chunk.direction, name, text, chunk.data.hex())
+            rows.append([_seconds(chunk.t), kinds.setdefault(kind, len(kinds))])
+    return {"rows": rows, "kinds": list(kinds)}
+
+
+def _gap(count: int, where: str, t: int) -> list[list[object]]:
+    """Return the row that stands for what a list leaves out after time t; none where it leaves out nothing."""
+    return [[_seconds(t), f"… {count} {where}", "gap"]] if count else []
 
 
 def _note(left_out: list[str], what: str, shown: int, there: int, how: str) -> None:

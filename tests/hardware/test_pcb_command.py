@@ -9,7 +9,7 @@ from hardware.pcb.checks import suite
 from hardware.pcb.checks.results import Verdict, judged, skipped
 from hardware.pcb.circuit.design import VARIANTS
 from hardware.pcb.layout.routing import RoutingError
-from hardware.pcb.outputs import generated_files, kicad_cli, pictures
+from hardware.pcb.outputs import generated_files, kicad_cli
 from hardware.pcb.spice.deck import Deck, limits
 from hardware.pcb.spice.run import Result
 
@@ -42,12 +42,10 @@ def test_build_without_kicad_renews_the_sources_and_says_what_stays(capsys, monk
     monkeypatch.setattr(kicad_cli, "version", lambda: None)
     assert command.main(["build"]) == 0
     out = capsys.readouterr().out
-    assert out.startswith("1 generated files renewed\nKiCad 9 is not installed: gerbers and pictures stay")
+    assert out.startswith("1 generated files renewed\nKiCad 9 is not installed: gerbers stay")
 
 
-def test_build_with_kicad_writes_the_archives_and_pictures(capsys, monkeypatch, tmp_path) -> None:
-    picture = tmp_path / "top.png"
-    picture.write_bytes(b"1234")
+def test_build_with_kicad_writes_the_archives(capsys, monkeypatch, tmp_path) -> None:
     for variant in VARIANTS:
         (tmp_path / variant).mkdir()
     monkeypatch.setattr(generated_files, "GENERATED", tmp_path)
@@ -58,8 +56,6 @@ def test_build_with_kicad_writes_the_archives_and_pictures(capsys, monkeypatch, 
     )
     monkeypatch.setattr(generated_files, "fabrication_files", lambda *_: {"a.gbr": "one"})
     monkeypatch.setattr(kicad_cli, "reports", lambda variant, *_: {f"{variant}-erc.rpt": "0"})
-    monkeypatch.setattr(pictures, "board_pictures", lambda *_: [picture])
-    monkeypatch.setattr(pictures, "schematic_pictures", lambda _: [picture])
     assert command.main(["build"]) == 0
     assert "rev-b-gerbers.zip: 1 files" in capsys.readouterr().out
     assert (tmp_path / "rev-c" / "rev-c-erc.rpt").read_text(encoding="utf-8") == "0"
@@ -80,27 +76,23 @@ def test_route_and_stitch_write_their_data(capsys, monkeypatch, tmp_path) -> Non
     assert (tmp_path / "stitches" / "lm317.txt").read_text(encoding="utf-8") == "1,2\n3,4\n"
 
 
-def test_simulate_prints_figures_and_renews_plots_and_page(capsys, monkeypatch, tmp_path) -> None:
+def test_simulate_prints_figures_and_renews_the_page(capsys, monkeypatch, tmp_path) -> None:
     deck = Deck(name="d", title="Deck", circuit="", measures=(), limits=limits(("top", 1.0, 2.0, "V", "highest")),
                 traces=(), x_label="", y_label="", cannot_say="Nothing.")  # fmt: skip
-    plot = tmp_path / "sim-d.png"
-    plot.write_bytes(b"12")
     monkeypatch.setattr(command, "is_installed", lambda: True)
     monkeypatch.setattr(command, "decks", lambda: (deck,))
     monkeypatch.setattr(command, "simulate", lambda _: Result(deck=deck, figures={"top": 2.5}, columns=[]))
-    monkeypatch.setattr(pictures, "plot", lambda _: plot)
     monkeypatch.setattr(generated_files, "SIMULATION_PAGE", tmp_path / "page.md")
     assert command.main(["simulate"]) == 1
     assert capsys.readouterr().out.splitlines() == [
-        "FAIL  simulation  d  top 2.5 V", "0 ok, 1 failed, 0 skipped", "sim-d.png: 2 bytes", "page.md: 1 simulations",
+        "FAIL  simulation  d  top 2.5 V", "0 ok, 1 failed, 0 skipped", "page.md: 1 simulations",
     ]  # fmt: skip
     assert "| highest | 2.5 V | 1 to 2 |" in (tmp_path / "page.md").read_text(encoding="utf-8")
 
 
-def test_simulate_without_ngspice_says_so_and_draws_nothing(capsys, monkeypatch) -> None:
+def test_simulate_without_ngspice_says_so(capsys, monkeypatch) -> None:
     monkeypatch.setattr(command, "is_installed", lambda: False)
     monkeypatch.setattr(suite, "simulations", lambda: [skipped("simulation", "all", "ngspice is not installed")])
-    monkeypatch.setattr(pictures, "plot", lambda _: pytest.fail("no plots without a simulator"))
     assert command.main(["simulate"]) == 0
     assert "ngspice is not installed" in capsys.readouterr().out
 

@@ -13,7 +13,7 @@ from p2os.cli.kept_files import FORCE_HELP, refuse_to_overwrite
 from p2os.cli.names import worlds
 from p2os.cli.quantities import SEED
 from p2os.pioneer.world import known_worlds, load_world
-from p2os.pioneer.world.drawing import svg, text
+from p2os.pioneer.world.drawing import svg, text, text_key
 from p2os.pioneer.world.formats import Placing, read_placed
 from p2os.pioneer.world.makers import KINDS, make_world
 from p2os.pioneer.world.model import World
@@ -95,7 +95,7 @@ def show(
     _print_skipped(place)
     if out is None:
         columns = min(shutil.get_terminal_size((80, 24)).columns, WIDEST_COLUMNS)
-        typer.echo("\n".join(text(place, columns)))
+        typer.echo("\n".join([*text(place, columns), text_key(place, columns)]))
         typer.echo(_summary(place))
         return
     suffix = out.suffix.lower()

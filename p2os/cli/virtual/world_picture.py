@@ -2,7 +2,19 @@
 
 from pathlib import Path
 
-from p2os.pioneer.world.drawing import GRID, START, Look, arrow_length, grid_step, shapes, start_arrow, ticks
+from p2os.pioneer.world.drawing import (
+    GRID,
+    START,
+    X_AXIS,
+    Y_AXIS,
+    Look,
+    arrow_length,
+    grid_step,
+    shapes,
+    start_arrow,
+    start_label,
+    ticks,
+)  # fmt: skip
 from p2os.pioneer.world.model import World
 
 LONGER_SIDE_INCHES = 6.0
@@ -20,10 +32,12 @@ def write_png(world: World, path: Path) -> None:
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
     from matplotlib.patches import Circle, Polygon
+    from matplotlib.patheffects import withStroke
 
     x0, y0, x1, y1 = world.extent
     scale = LONGER_SIDE_INCHES / max(x1 - x0, y1 - y0)
     size = ((x1 - x0) * scale + 0.6, max((y1 - y0) * scale, SHORTEST_SIDE_INCHES) + 0.7)
+    white = [withStroke(linewidth=2.5, foreground="white")]
     figure = Figure(figsize=size, layout="constrained")
     FigureCanvasAgg(figure)
     axes = figure.add_subplot(aspect="equal")
@@ -38,10 +52,15 @@ def write_png(world: World, path: Path) -> None:
             axes.add_patch(Polygon(shape.points, closed=True, color=colour, linewidth=0, zorder=order))
     arrow = start_arrow(world, arrow_length(world))
     axes.add_patch(Polygon(arrow, closed=True, color=START, zorder=1_000_000))
+    at, below = (world.start.x_m, world.start.y_m), -arrow_length(world) * scale * 72 - 4
+    axes.annotate(
+        start_label(world), at, (0, below), textcoords="offset points", ha="center", va="top", color=START, fontsize=9,
+        zorder=1_000_001, path_effects=white,
+    )  # fmt: skip
     step = grid_step(max(x1 - x0, y1 - y0))
     axes.set(
-        xlim=(x0, x1), ylim=(y0, y1), xticks=ticks(x0, x1, step), yticks=ticks(y0, y1, step), xlabel="x, m",
-        ylabel="y, m",
+        xlim=(x0, x1), ylim=(y0, y1), xticks=ticks(x0, x1, step), yticks=ticks(y0, y1, step), xlabel=X_AXIS,
+        ylabel=Y_AXIS,
     )  # fmt: skip
     axes.set_title(world.name, loc="left", fontweight="bold")
     axes.grid(color=GRID, zorder=0)

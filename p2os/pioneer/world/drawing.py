@@ -74,6 +74,15 @@ def shapes(world: World) -> list[Shape]:
     return sorted(found, key=lambda shape: ORDER.index(shape.look))
 
 
+def start_label(world: World) -> str:
+    """Return what is written beside the start's arrow."""
+    return f"start, heading {_degrees(world):g}°"
+
+
+def _degrees(world: World) -> int:
+    return round(math.degrees(world.start.heading_rad))
+
+
 def start_arrow(world: World, length_m: float) -> tuple[Point, ...]:
     """Return an arrowhead at the start that looks where the robot looks."""
     start, outline = world.start, ((1.0, 0.0), (-0.7, 0.6), (-0.4, 0.0), (-0.7, -0.6))
@@ -106,10 +115,12 @@ def _look(item: Obstacle) -> Look:
 SIDE_PX = 760
 EDGE_PX = 44
 INK, GRID, START = "#22303c", "#e3e6ea", "#c8553d"
+#: The names of the axes: of a world x is to the right and y is up, and headings count from x towards y.
+X_AXIS, Y_AXIS = "x, m →  (heading 0°)", "y, m →  (heading 90°)"
 
 
 def svg(world: World) -> str:
-    """Return the picture: plan, start, a grid of metres and the world's name."""
+    """Return the picture: plan, start with its heading, axes in metres, a scale bar and the world's name."""
     x0, y0, x1, y1 = world.extent
     scale = SIDE_PX / max(x1 - x0, y1 - y0)
     width, height = (x1 - x0) * scale + 2 * EDGE_PX, (y1 - y0) * scale + 2 * EDGE_PX
@@ -147,7 +158,16 @@ def svg(world: World) -> str:
     arrow = " ".join(at(*point) for point in start_arrow(world, arrow_length(world)))
     lines.append(f'<polygon points="{arrow}" fill="{START}"><title>start</title></polygon>')
     lines.append(f'<text x="{EDGE_PX}" y="26" font-size="16" font-weight="bold">{escape(world.name)}</text>')
-    lines.append(f'<text x="{width - EDGE_PX:.0f}" y="26" text-anchor="end">metres</text></svg>')
+    start_x, start_y = map(float, at(world.start.x_m, world.start.y_m).split(","))
+    halo = 'stroke="white" stroke-width="3" paint-order="stroke"'
+    below = start_y + arrow_length(world) * scale + 14
+    lines.append(f'<text x="{start_x:.1f}" y="{below:.1f}" text-anchor="middle" {halo}>{start_label(world)}</text>')
+    lines.append(f'<text x="{EDGE_PX}" y="{height - 8:.0f}">{X_AXIS}</text>')
+    turn = f'transform="translate(14,{height - EDGE_PX:.0f}) rotate(-90)"'
+    lines.append(f"<text {turn}>{Y_AXIS}</text>")
+    bar_px, end_px = step * scale, width - EDGE_PX
+    lines.append(f'<rect x="{end_px - bar_px:.1f}" y="{height - 14:.0f}" width="{bar_px:.1f}" height="3"/>')
+    lines.append(f'<text x="{end_px - bar_px - 6:.1f}" y="{height - 8:.0f}" text-anchor="end">{step:g} m</text></svg>')
     return "\n".join(lines) + "\n"
 
 
@@ -204,6 +224,16 @@ def text(world: World, columns: int) -> list[str]:
         arrow = ARROWS[round(world.start.heading_rad / (math.pi / 4)) % 8]
         lines[row] = lines[row][:column] + arrow + lines[row][column + 1 :]
     return [line.rstrip() for line in lines]
+
+
+def text_key(world: World, columns: int) -> str:
+    """Return the line that says how to read `text`: directions, scale, start."""
+    x0, _, x1, _ = world.extent
+    wide_m, start = (x1 - x0) / max(8, columns), world.start
+    return (
+        f"x → right, y ↑ up; a character is {wide_m:.2g} m wide, {2 * wide_m:.2g} m high; "
+        f"start {start.x_m:g}, {start.y_m:g}, {_degrees(world)}°"
+    )
 
 
 def _points(shape: Shape, x0: float, y1: float, point_m: float) -> Iterator[tuple[int, int]]:

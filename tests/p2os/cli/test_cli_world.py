@@ -55,6 +55,17 @@ def test_a_world_is_drawn_in_the_terminal(name: str, capsys: pytest.CaptureFixtu
     assert sum(character in "▀▄█" for line in drawing for character in line) > 50
 
 
+def test_a_drawing_in_the_terminal_says_which_way_is_up_and_how_large_it_is(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setenv("COLUMNS", "80")
+    assert run(["world", "show", "corridor"]) == 0
+    # 13 m on 80 characters: 0.1625 m each.
+    assert capsys.readouterr().out.splitlines()[-2] == (
+        "x → right, y ↑ up; a character is 0.16 m wide, 0.33 m high; start 0, 0, 0°"
+    )
+
+
 @pytest.mark.parametrize("suffix", [".png", ".svg"])
 def test_a_world_is_drawn_into_a_file(suffix: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     if suffix == ".png":
@@ -66,6 +77,8 @@ def test_a_world_is_drawn_into_a_file(suffix: str, tmp_path: Path, capsys: pytes
     assert "1 that walks, 6 that can be pushed" in capsys.readouterr().out
     if suffix == ".svg":
         assert "<title>visitor</title>" in data.decode()
+        for words in ("start, heading 0°", "x, m →  (heading 0°)", "y, m →  (heading 90°)", ">2 m</text>"):
+            assert words in data.decode()
 
 
 def test_a_png_without_matplotlib_points_to_svg(

@@ -109,9 +109,10 @@ def test_a_trace_cut_at_any_byte_still_has_its_report(run: Path) -> None:
 
 
 def make_page_only(folder: Path) -> None:
-    from robot_bench.report.page import render_page
+    from robot_bench.report.page import page_data, render_page
 
-    assert "cut at" in render_page(read_run(folder))
+    record = read_run(folder)
+    assert "cut at" in render_page(record, page_data(record))
 
 
 def test_a_folder_without_a_trace_is_refused_with_a_hint(tmp_path: Path) -> None:

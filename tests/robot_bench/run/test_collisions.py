@@ -53,7 +53,7 @@ def test_what_was_hit_is_named_everywhere(body: str, mode: str, capsys: pytest.C
     summary = json.loads(Path("crash/summary.json").read_text(encoding="utf-8"))
     assert summary["hits"][0] == {"t_s": hit.t / 1e9, "what": "'red box'", "x_m": hit.x, "y_m": hit.y}
     data = page_data(record)
-    assert [hit.t / 1e9, hit.x, hit.y, "'red box'"] in data["hits"]  # type: ignore[operator] # a list
+    assert (hit.t / 1e9, hit.x, hit.y, "'red box'") in data["hits"]  # type: ignore[operator] # a list
     log = [(event.who, event.what) for event in record.events]
     assert ("body", "collision") in log
     assert ("direct" if mode == "direct" else "adapter", "command") in log

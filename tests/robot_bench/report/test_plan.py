@@ -1,0 +1,104 @@
+"""What is written on the plan of a run, on charts and in lists: once, for the page and the plots."""
+
+import json
+import re
+
+import pytest
+
+from adapter_sim.pinout import load_pinout
+from robot_bench.recording.run_record import Event, Json, RunRecord, WireChunk
+from robot_bench.recording.signals import pin_labels
+from robot_bench.report.page import page_data, render_page
+from robot_bench.report.plan import LETTER_PX, LINE_PX, NARROW_PX, WIDE_PX, plan
+from tests.robot_bench.records import S, pose
+
+EXTENT = (-3.0, -3.0, 3.0, 3.0)
+CRATE: Json = {"name": "crate", "shape": "box", "x": 1.0, "y": 1.0, "length": 0.8, "width": 0.4, "heading": 0.0}
+
+
+def drawn(**changes: object) -> Json:
+    """A plan of a robot that stands for 4 s, drives 2 m along x, and stands again to 16 s."""
+    poses = [[t / 10, min(2.0, max(0.0, t / 40 - 1)), 0.0, 0.0] for t in range(161)]
+    given = {"extent": EXTENT, "poses": poses, "obstacles": [CRATE], "changes": [], "hits": [], "duration_s": 16.0}
+    return plan(**{**given, **changes})  # type: ignore[arg-type]
+
+
+def texts(made: Json, size: str = "wide") -> list[str]:
+    return [label["text"] for label in made["labels"][size]]  # type: ignore[index]
+
+
+def test_a_robot_that_stands_has_one_mark_with_the_times_of_its_stay() -> None:
+    made = drawn()
+    assert made["times"] == [[2, 0.0, 0.0, 0.0, 4], [6, 0.5, 0.0, 0.0, 6], [8, 1.0, 0.0, 0.0, 8],
+                             [10, 1.5, 0.0, 0.0, 10], [12, 2.0, 0.0, 0.0, 16]]  # fmt: skip
+    assert texts(made)[:3] == ["start", "2–4 s", "6 s"]
+
+
+def test_a_collision_is_named_with_its_time() -> None:
+    assert "'crate', 8.7 s" in texts(drawn(hits=[(8.717, 1.35, -1.38, "'crate'")]))
+
+
+@pytest.mark.parametrize(("size", "width_px"), [("wide", WIDE_PX), ("narrow", NARROW_PX)])
+def test_no_label_covers_another_or_leaves_the_plan(size: str, width_px: float) -> None:
+    crowd = [{**CRATE, "name": f"crate {n}", "x": n % 7 * 0.5 - 1.5, "y": n // 7 * 0.3 - 1.5} for n in range(60)]
+    scale, boxes = width_px / 6, []
+    for label in drawn(obstacles=crowd, hits=[(n / 10, 0.02 * n, 0, "'wall'") for n in range(30)])["labels"][size]:  # type: ignore[index]
+        width = LETTER_PX * len(label["text"])
+        left = (label["x"] + 3) * scale + label["dx"] - {"left": 0, "center": width / 2, "right": width}[label["align"]]
+        top = (3 - label["y"]) * scale + label["dy"] - LINE_PX / 2
+        boxes.append((left, top, left + width, top + LINE_PX))
+    assert len(boxes) > 10
+    slack = 1.0  # offsets are rounded to pixels
+    for n, (x0, y0, x1, y1) in enumerate(boxes):
+        assert x0 > -slack < y0
+        assert max(x1, y1) < width_px + slack
+        for a0, b0, a1, b1 in boxes[:n]:
+            assert x1 <= a0 + slack or a1 <= x0 + slack or y1 <= b0 + slack or b1 <= y0 + slack
+
+
+def test_what_comes_and_goes_is_always_named_since_it_is_not_there_together() -> None:
+    posts = [{"op": "place", "name": f"post {n}", "shape": "cylinder", "x": 0.5, "y": 0.5, "radius": 0.02, "t": n}
+             for n in range(8)]  # fmt: skip
+    assert {f"post {n}" for n in range(8)} < set(texts(drawn(changes=posts)))
+
+
+def test_a_robot_that_leaves_the_extent_is_on_the_plan() -> None:
+    assert drawn(poses=[[0.0, 0.0, 0.0, 0.0], [1.0, 5.0, -4.0, 0.0]])["bounds"] == (-3.0, -4.3, 5.3, 3.0)
+
+
+def test_each_wire_is_labelled_with_its_pin_and_its_signal() -> None:
+    labels = pin_labels()
+    assert (labels["motor1_comm1"], labels["DD1"], labels["p2dx_con"]) == ("PB7 comm1", "PA4 DD1", "PB12 p2dx_con")
+    assert set(labels) == {wire.name for wire in load_pinout().wires}
+
+
+def hits(seconds: int) -> RunRecord:
+    detail = "'crate' at x 1.000 m, y 0.000 m"
+    return RunRecord(
+        meta={"scenario": "hit"}, poses=[pose(t=n * S) for n in range(seconds)], is_cut=False, last_ns=seconds * S,
+        pins={"motor1_comm1": [(0, 1)]}, events=[Event(t=S, who="body", what="collision", detail=detail)],
+        wire=[WireChunk(t=n * S, direction="c2r", data=bytes.fromhex("fafb03000000")) for n in range(seconds)],
+    )  # fmt: skip
+
+
+def test_the_plots_are_drawn_from_the_data_that_the_page_holds() -> None:
+    pytest.importorskip("matplotlib")
+    from robot_bench.report.plots import _path_figure, _pins_figure
+
+    data = page_data(hits(9))
+    page = render_page(hits(9), data)
+    held = json.loads(re.search(r'application/json">(.*?)</script>', page, re.DOTALL)[1])  # type: ignore[index]
+    assert held == json.loads(json.dumps(data))
+    written = {text.get_text() for text in _path_figure(held).axes[0].texts}
+    assert written == {"1 m", *texts(held["plan"])}
+    assert [label.get_text() for label in _pins_figure(held).axes[0].get_yticklabels()] == [
+        "PB7 comm1", "motor 1 (left)"
+    ]  # fmt: skip
+
+
+def test_a_packet_that_is_said_again_is_held_once_and_what_is_left_out_is_a_row() -> None:
+    few, many = page_data(hits(9))["packets"], page_data(hits(9000))["packets"]
+    assert (len(few["rows"]), few["kinds"]) == (9, [("c2r", "SYNC0 / PULSE", "", "fafb03000000")])  # type: ignore[index]
+    gaps = [row for row in many["rows"] if row[-1] == "gap"]  # type: ignore[index]
+    left = 9000 - len(many["rows"]) + 1  # type: ignore[index]
+    assert [row[1] for row in gaps] == [f"… {left} packets: wire.jsonl has all"]

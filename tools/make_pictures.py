@@ -1,0 +1,186 @@
+"""Makes the pictures of docs/pictures, and tells which are older than what they show.
+
+Usage: python tools/make_pictures.py [--check] [--all] [--folder DIR]
+
+Each picture carries a hash of its inputs (world, scenario and firmware, the board's files,
+and the code that draws) as a PNG text chunk. Without options the pictures whose inputs have
+changed are made anew. `--check` makes none, names them, and ends with 1 where there are any.
+
+Not an input: how chip and robot are simulated. The demo's path is one that the bench drove.
+Pictures of the board need KiCad 9, pdftoppm, and ngspice (tools/install_board_tools.sh).
+"""
+
+import argparse
+import contextlib
+import hashlib
+import os
+import struct
+import sys
+import tempfile
+import zlib
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+from hardware.pcb.circuit.design import BOARD_VARIANTS, VARIANTS
+from hardware.pcb.outputs import generated_files, pictures
+from hardware.pcb.spice.decks import decks
+from p2os.pioneer.world import known_worlds, load_world
+
+ROOT = Path(__file__).resolve().parent.parent
+PICTURES = ROOT / "docs" / "pictures"
+#: The text chunk's keyword.
+KEYWORD = b"inputs"
+SIGNATURE = b"\x89PNG\r\n\x1a\n"
+WORLDS = "p2os/pioneer/world/worlds"
+DRAWING = ("p2os/pioneer/world/drawing.py", "p2os/cli/virtual/world_picture.py")
+REPORT = tuple(f"robot_bench/report/{name}.py" for name in ("page", "plan", "plots", "thinning"))
+BOARD = "hardware/pcb/outputs/pictures.py"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Group:
+    """Pictures that are made in one go, from the same inputs."""
+
+    #: Files below docs/pictures.
+    names: tuple[str, ...]
+    #: Patterns of files below the checkout; each matches at least one.
+    files: tuple[str, ...]
+    make: Callable[[], object]
+    #: What decides besides files.
+    text: str = ""
+
+    def inputs(self) -> str:
+        """Return the hash of the inputs, in hexadecimal."""
+        digest = hashlib.sha256(self.text.encode())
+        for pattern in self.files:
+            found = sorted(ROOT.glob(pattern))
+            if not found:
+                raise SystemExit(f"make_pictures: no file matches {pattern}")
+            for path in found:
+                digest.update(path.relative_to(ROOT).as_posix().encode() + b"\0" + path.read_bytes())
+        return digest.hexdigest()
+
+
+def groups() -> Iterator[Group]:
+    """Yield all that docs/pictures holds."""
+    for world in known_worlds():
+        yield Group(names=(f"world-{world}.png",), files=(f"{WORLDS}/{world}.toml", *DRAWING),
+                    make=lambda world=world: make_world(world))  # fmt: skip
+    files = ("robot_bench/scenarios/dodge.toml", f"{WORLDS}/room.toml", "robot_bench/firmware/dodge.elf", *REPORT)
+    yield Group(names=("demo.png",), files=files, make=make_demo)
+    for variant in BOARD_VARIANTS:
+        sides = ("top", "bottom", "view", "bare") if variant == "rev-b" else ("top",)
+        yield Group(names=tuple(f"board/{variant}-{side}.png" for side in sides),
+                    files=(f"hardware/pcb/generated/{variant}/{variant}.kicad_pcb",
+                           "hardware/pcb/generated/library/models/*.wrl", BOARD),
+                    make=lambda variant=variant: make_board(variant))  # fmt: skip
+    for variant in VARIANTS:
+        yield Group(names=tuple(f"board/{variant}-{page}.png" for page in pictures.pages_shown(variant)),
+                    files=(f"hardware/pcb/generated/{variant}/*.kicad_sch", BOARD),
+                    make=lambda variant=variant: pictures.schematic_pictures(variant))  # fmt: skip
+    for deck in decks():
+        yield Group(names=(f"board/sim-{deck.name}.png",), files=(BOARD,), text=repr(deck),
+                    make=lambda deck=deck: make_plot(deck))  # fmt: skip
+
+
+def make_world(name: str) -> None:
+    """Draw a world that ships."""
+    from p2os.cli.virtual.world_picture import write_png
+
+    write_png(load_world(name), PICTURES / f"world-{name}.png")
+
+
+def make_demo() -> None:
+    """Run the demonstration and keep its path."""
+    from p2os.cli.main import run
+
+    with tempfile.TemporaryDirectory() as folder, Path(os.devnull).open("w") as null, contextlib.redirect_stdout(null):
+        target = Path(folder) / "demo"
+        if run(["run", "dodge", "--out", str(target)]):
+            raise SystemExit("make_pictures: the demonstration failed")
+        (PICTURES / "demo.png").write_bytes((target / "path.png").read_bytes())
+
+
+def make_board(variant: str) -> None:
+    """Render a board with its pours filled."""
+    with tempfile.TemporaryDirectory() as folder:
+        pictures.board_pictures(variant, generated_files.filled_project(variant, Path(folder)))
+
+
+def make_plot(deck: object) -> None:
+    """Simulate a circuit and plot it."""
+    from hardware.pcb.spice.run import simulate
+
+    pictures.plot(simulate(deck))
+
+
+def stamp_of(picture: bytes) -> str:
+    """Return the hash that a PNG carries; empty where it carries none."""
+    at = len(SIGNATURE)
+    while at < len(picture):
+        (length,) = struct.unpack_from(">I", picture, at)
+        kind, data = picture[at + 4 : at + 8], picture[at + 8 : at + 8 + length]
+        if kind == b"tEXt" and data.startswith(KEYWORD + b"\0"):
+            return data[len(KEYWORD) + 1 :].decode("latin-1")
+        at += 12 + length
+    return ""
+
+
+def stamped(picture: bytes, inputs: str) -> bytes:
+    """Return a PNG with the hash of its inputs after its header."""
+    data = b"tEXt" + KEYWORD + b"\0" + inputs.encode()
+    chunk = struct.pack(">I", len(data) - 4) + data + struct.pack(">I", zlib.crc32(data))
+    header = len(SIGNATURE) + 12 + 13
+    return picture[:header] + chunk + picture[header:]
+
+
+def main(arguments: list[str] | None = None) -> int:
+    """Make or check the pictures; return the exit code."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--check", action="store_true", help="make nothing; name what is out of date")
+    parser.add_argument("--all", action="store_true", help="make all of them anew")
+    parser.add_argument("--folder", type=Path, default=PICTURES, help="what --check looks at")
+    given = parser.parse_args(arguments)
+    known = list(groups())
+    if given.check:
+        return check(known, given.folder)
+    for group in known:
+        inputs = group.inputs()
+        files = [PICTURES / name for name in group.names]
+        if not given.all and all(file.is_file() and stamp_of(file.read_bytes()) == inputs for file in files):
+            continue
+        for file in files:
+            file.unlink(missing_ok=True)
+        group.make()
+        for file in files:
+            if not file.is_file():
+                print(f"make_pictures: {file.name} was not made (hint: tools/install_board_tools.sh)", file=sys.stderr)
+                return 1
+            file.write_bytes(stamped(file.read_bytes(), inputs))
+            print(f"{file.relative_to(PICTURES)}: {file.stat().st_size} bytes")
+    return 0
+
+
+def check(known: list[Group], folder: Path) -> int:
+    """Print the pictures that are out of date, missing, or made by nothing; return 1 where there are any."""
+    there = {path.relative_to(folder).as_posix(): path.read_bytes() for path in folder.rglob("*.png")}
+    said = []
+    for group in known:
+        inputs = group.inputs()
+        for name in group.names:
+            picture = there.pop(name, None)
+            if picture is None:
+                said.append(f"{name}: missing")
+            elif stamp_of(picture) != inputs:
+                said.append(f"{name}: its inputs have changed")
+    said += [f"{name}: no command makes it" for name in there]
+    for line in said:
+        print(line)
+    if said:
+        print("hint: make pictures", file=sys.stderr)
+    return 1 if said else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
