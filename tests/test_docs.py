@@ -14,10 +14,9 @@ import pytest
 
 from tests.documentation import command_lines
 from tests.documentation.page import ROOT, Page, pages
-from tests.documentation.session import Session
+from tests.documentation.session import RUN, run_blocks
 
 LIMIT_S = 240
-RUN = {"python", "console", "sh", "c", "toml"}
 KEPT = {"", "text"}  # drawings, and what is no program
 PAGES = pages()
 #: What a fresh machine has not, so that a block may stand unexecuted.
@@ -31,15 +30,10 @@ def extras() -> set[str]:
     return set(project["optional-dependencies"])
 
 
-def run_blocks(page: Page, *, slow: bool) -> None:
-    with Session() as session:
-        for block in page.blocks:
-            is_run = block.language in RUN and block.note("not run") is None
-            if is_run and (slow or block.note("slow") is None):
-                session.take(block)
-        session.end_terminals()
-    if session.missing:
-        pytest.skip(f"all ran but what needs a program that is not installed: {session.missing}")
+def run(page: Page, *, slow: bool) -> None:
+    missing = run_blocks(page, slow=slow)
+    if missing:
+        pytest.skip(f"all ran but what needs a program that is not installed: {missing}")
 
 
 def runnable(*, slow: bool) -> list[Page]:
@@ -54,13 +48,13 @@ def runnable(*, slow: bool) -> list[Page]:
 
 @pytest.mark.parametrize("page", runnable(slow=False), ids=str)
 def test_the_examples_of_a_page_run(page: Page) -> None:
-    run_blocks(page, slow=False)
+    run(page, slow=False)
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("page", runnable(slow=True), ids=str)
 def test_the_long_examples_of_a_page_run_among_the_others(page: Page) -> None:
-    run_blocks(page, slow=True)
+    run(page, slow=True)
 
 
 @pytest.mark.parametrize("page", PAGES, ids=str)

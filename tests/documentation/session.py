@@ -33,12 +33,13 @@ from types import TracebackType
 from typing import ClassVar, Self
 
 from p2os.pioneer.serve import served_pioneer
-from tests.documentation.page import ROOT, Block
+from tests.documentation.page import ROOT, Block, Page
 
 LIMIT_S = 240.0
 READY_S = 60.0
 ENDING_S = 15.0
 PORTS = 24
+RUN = {"python", "console", "sh", "c", "toml"}  # languages of blocks that are run
 FAILURES = ("p2os: ", "fault: ")
 NAMED_FILE = re.compile(r"^(?:/\*|//|#)\s*(?P<name>[\w./-]+\.(?:c|h|ld|toml|py|yml|yaml))\b")
 TCP = re.compile(r"(?<=tcp:127\.0\.0\.1:)\d+|(?<=--gdb )\d+|(?<=remote :)\d+")
@@ -360,6 +361,16 @@ class Session:
                 first = {self._port(8101)}
             serving |= {f"tcp:127.0.0.1:{port + n}" for port in first for n in range(4)}
         return clients, serving
+
+
+def run_blocks(page: Page, *, slow: bool) -> list[str]:
+    """Do what a page says, with its slow blocks or without; return what was left out for want of a program."""
+    with Session() as session:
+        for block in page.blocks:
+            if block.language in RUN and block.note("not run") is None and (slow or block.note("slow") is None):
+                session.take(block)
+        session.end_terminals()
+    return session.missing
 
 
 def in_checkout(line: str, words: list[str]) -> str:
