@@ -1,69 +1,143 @@
-"""The examples of the documentation run, as they stand there.
+"""The documentation is true: its examples run, its command lines exist, its links lead somewhere.
 
-Every fenced block of `python` is executed and every line `$ p2os …` or `$ make -C …`
-of a `console` block must end with exit code 0, all blocks of one page in one folder.
-A block that cannot run here says why in the line before it:
-`<!-- not run: the reason -->`.
+tests/documentation/session.py says how the blocks of a page are run, tests/documentation/page.py how a block
+that cannot run here says so.
 """
 
-import os
 import re
 import runpy
-import shlex
-import shutil
 import subprocess
 import sys
-from pathlib import Path
+import tomllib
+from functools import cache
 
 import pytest
 
-from robot_bench.firmware.build import COMPILER
+from tests.documentation import command_lines
+from tests.documentation.page import ROOT, Page, pages
+from tests.documentation.session import RUN, run_blocks
 
-ROOT = Path(__file__).resolve().parent.parent
-BLOCK = re.compile(r"(?P<before>[^\n]*)\n```(?P<language>python|console)\n(?P<text>.*?)```", re.DOTALL)
 LIMIT_S = 240
+KEPT = {"", "text"}  # drawings, and what is no program
+PAGES = pages()
+#: What a fresh machine has not, so that a block may stand unexecuted.
+REASONS = re.compile(r"needs (hardware|the network|an ESP32|an FTDI adapter|a game pad)\b")
+CHECKOUT = re.compile(r"(?:p2os|robot_bench|bluepill_sim|adapter_sim|adapter_fw|hardware|tests|tools|docs)/[\w./-]+")
 
 
-def pages() -> list[Path]:
-    """Return the README and every page of docs/."""
-    return [ROOT / "README.md", *sorted((ROOT / "docs").rglob("*.md"))]
+@cache
+def extras() -> set[str]:
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+    return set(project["optional-dependencies"])
 
 
-def commands(page: Path) -> list[list[str]]:
-    """Return the argument lists that a page's blocks amount to."""
-    found = []
-    for block in BLOCK.finditer(page.read_text(encoding="utf-8")):
-        if block["before"].startswith("<!-- not run:"):
-            continue
-        if block["language"] == "python":
-            found.append([sys.executable, "-c", block["text"]])
-        else:
-            lines = [line[2:] for line in block["text"].splitlines() if line.startswith("$ ")]
-            programs = {"p2os": str(Path(sys.executable).parent / "p2os"), "make": "make"}
-            found += [
-                [programs[line.split()[0]], *shlex.split(line)[1:]]
-                for line in lines
-                if line.startswith(("p2os ", "make -C "))
-            ]
-    return found
+def run(page: Page, *, slow: bool) -> None:
+    missing = run_blocks(page, slow=slow)
+    if missing:
+        pytest.skip(f"all ran but what needs a program that is not installed: {missing}")
 
 
-@pytest.mark.parametrize("page", [page for page in pages() if commands(page)], ids=lambda page: page.name)
-def test_the_examples_of_a_page_run(page: Path, tmp_path: Path) -> None:
-    environment = {**os.environ, "NO_COLOR": "1", "TERM": "dumb"}
-    if any(command[0] == "make" for command in commands(page)) and shutil.which(COMPILER) is None:
-        pytest.skip("no cross compiler")
-    for command in commands(page):
-        done = subprocess.run(
-            command, cwd=tmp_path, capture_output=True, text=True, timeout=LIMIT_S, env=environment, check=False
+def runnable(*, slow: bool) -> list[Page]:
+    return [
+        page for page in PAGES
+        if any(
+            block.language in RUN and block.note("not run") is None and (block.note("slow") is not None) == slow
+            for block in page.blocks
         )
-        assert done.returncode == 0, f"{page.name}: {command}\n{done.stdout}\n{done.stderr}"
+    ]  # fmt: skip
 
 
-def test_links_between_pages_lead_somewhere() -> None:
-    for page in pages():
-        for target in re.findall(r"\]\(([^)#:]+)(?:#[^)]*)?\)", page.read_text(encoding="utf-8")):
-            assert (page.parent / target).exists(), f"{page.name} points to {target}"
+@pytest.mark.parametrize("page", runnable(slow=False), ids=str)
+def test_the_examples_of_a_page_run(page: Page) -> None:
+    run(page, slow=False)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("page", runnable(slow=True), ids=str)
+def test_the_long_examples_of_a_page_run_among_the_others(page: Page) -> None:
+    run(page, slow=True)
+
+
+@pytest.mark.parametrize("page", PAGES, ids=str)
+def test_a_block_has_a_language_that_is_run_and_only_hardware_or_the_network_keeps_it_from_running(page: Page) -> None:
+    for block in page.blocks:
+        place = f"{page}:{block.line}"
+        assert block.language in RUN | KEPT, f"{place}: nothing runs a block of {block.language}"
+        if block.language in KEPT:
+            assert not re.search(r"(?m)^(\$ )?(p2os|python3?|make|pip|pytest) ", block.text), f"{place}: make it `sh`"
+        reason = block.note("not run")
+        assert reason is None or REASONS.match(reason), f"{place}: not run, and {reason!r} names no hardware or network"
+
+
+def test_the_command_lines_of_all_pages_name_verbs_and_options_that_exist() -> None:
+    group = command_lines.command_line()
+    found = []
+    for page in PAGES:
+        blocks = [
+            (block.line, line)
+            for block in page.blocks if block.language in {"console", "sh"} for line, _ in block.entries
+        ]  # fmt: skip
+        for number, line in [*page.spans(), *blocks]:
+            if line.startswith("p2os "):
+                found += [f"{page}:{number}: {fault}" for fault in command_lines.faults(line, group)]
+    assert not found, "\n".join(found)
+
+
+def test_the_examples_in_the_help_of_each_verb_name_verbs_and_options_that_exist() -> None:
+    group = command_lines.command_line()
+    found = []
+    for name, command in sorted(group.commands.items()):
+        below = getattr(command, "commands", {}).values()
+        for each in (command, *below):
+            for line in re.findall(r"(?m)^ *(p2os .*?)(?: {2,}|$)", f"{each.help}\n{each.epilog}"):
+                found += [f"{name}: {fault}" for fault in command_lines.faults(line, group)]
+    assert not found, "\n".join(found)
+
+
+def test_options_files_and_targets_that_pages_name_exist() -> None:
+    known = command_lines.all_options(command_lines.command_line())
+    sources = "".join(
+        path.read_text(encoding="utf-8")
+        for folder in ("tools", "hardware", "adapter_fw") for suffix in ("*.py", "*.cpp")
+        for path in (ROOT / folder).rglob(suffix)
+    )  # fmt: skip
+    targets = set(re.findall(r"(?m)^([a-z-]+):", (ROOT / "Makefile").read_text(encoding="utf-8")))
+    ignored = (ROOT / ".gitignore").read_text(encoding="utf-8").split()
+    found = []
+    for page in PAGES:
+        for number, span in page.spans():
+            place = f"{page}:{number}: `{span}`"
+            option = re.match(r"--[a-z-]+", span)
+            if option and option[0] not in known and f'"{option[0]}' not in sources:
+                found.append(f"{place}: no such option")
+            target = re.fullmatch(r"make ([a-z-]+)", span)
+            if target and target[1] not in targets:
+                found.append(f"{place}: no such target")
+            found += [f"{place}: no such extra" for extra in re.findall(r"\[(\w+)\]['\"]?$", span)
+                      if span.startswith("pip ") and extra not in extras()]  # fmt: skip
+            for path in re.findall(r"^\S+$|(?<=^python )\S+|(?<=^pytest )\S+", span):
+                if CHECKOUT.fullmatch(path) and not (ROOT / path).exists() and path not in ignored:
+                    found.append(f"{place}: no such file")
+    assert not found, "\n".join(found)
+
+
+def test_links_lead_to_files_and_headings_that_exist() -> None:
+    anchors = {page.path: page.anchors for page in PAGES}
+    found = []
+    for page in PAGES:
+        for number, name, anchor in page.links():
+            target = (page.path.parent / name).resolve() if name else page.path
+            if not target.exists():
+                found.append(f"{page}:{number}: no {name}")
+            elif anchor and anchor not in anchors.get(target, set()):
+                found.append(f"{page}:{number}: no heading #{anchor} in {target.name}")
+    assert not found, "\n".join(found)
+
+
+def test_the_table_of_verbs_has_every_verb() -> None:
+    table = (ROOT / "docs" / "cli.md").read_text(encoding="utf-8").partition("\n## ")[0]
+    rows = " ".join(line.split("|")[1] for line in table.splitlines() if line.startswith("| "))
+    assert set(re.findall(r"`([a-z]+)`", rows)) == set(command_lines.command_line().commands)
 
 
 def test_the_api_reference_is_up_to_date() -> None:
