@@ -22,6 +22,7 @@ from typing import TypeVar
 
 from bluepill_sim.errors import BluePillError
 from p2os.errors import P2osError
+from p2os.pioneer.body.factory import resolve_body
 from p2os.pioneer.world.model import Pose, World
 from p2os.timing import NS_PER_MS, NS_PER_S, Nanos
 from p2os.transport import Transport
@@ -174,7 +175,7 @@ def meta_of(scenario: Scenario, world: World | None, note: str | None, *, is_at_
         "firmware": scenario.firmware.name,
         "firmware_sha256": _sha256_of(scenario.firmware),
         "mode": "port" if is_at_port else scenario.mode,
-        "body": "remote" if is_at_port else scenario.body,
+        "body": "remote" if is_at_port else resolve_body(scenario.body),
         "seed": None if is_at_port else scenario.seed,
         "duration_s": scenario.duration_ns / NS_PER_S,
         "threshold_m": scenario.threshold_m,

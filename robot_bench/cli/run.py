@@ -67,7 +67,7 @@ def run(
     mode: Annotated[str | None, typer.Option(help="direct or adapter.")] = None,
     adapter: Annotated[str | None, typer.Option(help="model or firmware: what stands in the adapter's place.")] = None,
     port: Annotated[str | None, typer.Option(help="Drive the robot at this URL, in real time.", metavar="URL")] = None,
-    body: Annotated[str | None, typer.Option(help="kinematic, bullet or mujoco.")] = None,
+    body: Annotated[str | None, typer.Option(help="kinematic, bullet, mujoco, or best installed.")] = None,
     world: Annotated[str | None, typer.Option(help="World, or a TOML file.")] = None,
     seed: Annotated[int | None, typer.Option(help="Seed of everything random.", min=0)] = None,
     duration: Annotated[float | None, typer.Option(help="Seconds of virtual time.", metavar="S")] = None,

@@ -18,7 +18,7 @@ from typing import cast
 from adapter_sim.codec import BitOrder
 from adapter_sim.settings import RENAMED_SETTINGS, AdapterSettings
 from p2os.errors import FileError, ScenarioError, UsageError, shown, shown_name
-from p2os.pioneer.body.factory import BODY_NAMES
+from p2os.pioneer.body.factory import BEST, BODY_CHOICES
 from p2os.pioneer.controller import ControllerSettings, SonarPerSip
 from p2os.pioneer.controller.flash import load_flash
 from p2os.pioneer.sensor_errors import load_sensor_errors
@@ -44,7 +44,7 @@ _TOP = (
     Key(name="world", kind="text", required=True),
     Key(name="robot", kind="text"),
     Key(name="mode", kind="text", choices=MODES),
-    Key(name="body", kind="text", choices=BODY_NAMES),
+    Key(name="body", kind="text", choices=BODY_CHOICES),
     Key(name="seed", kind="whole", least=0, most=2**63 - 1),
     Key(name="duration_s", kind="number", required=True, above=0, most=LONGEST_S),
     Key(name="threshold_m", kind="number", above=0, most=100),
@@ -107,7 +107,7 @@ class Scenario:
     parameters: RobotParameters
     robot: str
     mode: str = "adapter"
-    body: str = "bullet"
+    body: str = BEST
     seed: int = 0
     duration_ns: Nanos
     threshold_um: int
@@ -149,7 +149,7 @@ class Scenario:
         """
         _refuse_unknown("mode", mode, MODES)
         _refuse_unknown("adapter", adapter_core, ADAPTER_CORES)
-        _refuse_unknown("body", body, BODY_NAMES)
+        _refuse_unknown("body", body, BODY_CHOICES)
         if duration_s is not None and not 0 < duration_s < math.inf:
             raise UsageError(f"a run of {duration_s:g} s cannot be", hint="--duration takes seconds above 0")
         if firmware is not None and not firmware.is_file():
@@ -273,7 +273,7 @@ def _build(table: Table, text: str, path: Path, where: Place) -> Scenario:
         parameters=parameters,
         robot=robot,
         mode=str(table.get("mode", "adapter")),
-        body=str(table.get("body", "bullet")),
+        body=str(table.get("body", BEST)),
         seed=cast("int", table.get("seed", 0)),
         duration_ns=round(cast("float", table["duration_s"]) * NS_PER_S),
         threshold_um=round(threshold_m * 1e6),

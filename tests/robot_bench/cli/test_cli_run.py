@@ -11,7 +11,6 @@ from pathlib import Path
 import pytest
 
 from p2os.cli.main import run as p2os
-from robot_bench.cli.demo import best_body
 from robot_bench.cli.run import capped
 from robot_bench.recording.run_folder import make_next_folder
 from robot_bench.recording.run_record import read_run
@@ -254,18 +253,6 @@ def test_demo_runs_dodge_in_the_room(capsys: pytest.CaptureFixture[str]) -> None
     outcome = json.loads(capsys.readouterr().out)
     assert (outcome["scenario"], outcome["mode"], outcome["world"]) == ("dodge", "adapter", "room")
     assert Path("runs/demo-001/report.html").is_file()
-
-
-def test_demo_without_pybullet_says_so_and_goes_on(
-    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    for name in [name for name in sys.modules if name.startswith(("pybullet", "p2os.pioneer.body.bullet"))]:
-        monkeypatch.delitem(sys.modules, name)
-    monkeypatch.setitem(sys.modules, "pybullet", None)
-    assert best_body() == "kinematic"
-    assert "PyBullet is not here" in capsys.readouterr().err
-    assert p2os(["run", "dodge", "--body", "bullet", "--duration", "0.1"]) == 2
-    assert "hint: pip install 'p2os[bullet]'" in capsys.readouterr().err
 
 
 def test_an_untried_program_is_capped_unless_told() -> None:
