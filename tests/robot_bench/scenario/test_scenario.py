@@ -41,7 +41,7 @@ def test_the_four_programs_ship() -> None:
 
 def test_what_a_scenario_leaves_out_has_its_default(tmp_path: Path) -> None:
     scenario = read_scenario(write(tmp_path, LEAST))
-    assert (scenario.mode, scenario.body, scenario.seed, scenario.duration_ns) == ("adapter", "bullet", 0, 10**10)
+    assert (scenario.mode, scenario.body, scenario.seed, scenario.duration_ns) == ("adapter", "best", 0, 10**10)
     assert scenario.threshold_um == 2_500_000, "half of the robot file's sonar range of 5 m"
     assert scenario.start is None
 
