@@ -32,7 +32,7 @@ from bluepill_sim.fabric.pins import Pin, PinDrive
 from bluepill_sim.memory import Memory
 from bluepill_sim.peripherals.rcc import ResetCause
 from bluepill_sim.program.image import Image, load_image
-from bluepill_sim.program.last_blocks import lines_of, title_of
+from bluepill_sim.program.last_blocks import TITLE, shortened
 from bluepill_sim.program.line_table import LineTable, read_lines
 from bluepill_sim.serial_port import Activity, SerialPort
 from bluepill_sim.stm32f103 import FLASH_BASE, SRAM_BASE
@@ -300,12 +300,15 @@ class BluePill:
         return self.chip.engine.log.rows() if self.fault is None else self.fault.last_rows
 
     def last_blocks(self) -> list[str]:
-        """Return what ran last as lines for a person: the last 32 blocks and exceptions, with symbol and line."""
+        """Return what ran last as lines for a person: the last 32 blocks and exceptions, with symbol and line.
+
+        A loop is one line with a count; `last_rows` has every turn.
+        """
         try:
             table = read_lines(self.image)
         except ImageError:  # the file has been built anew meanwhile, or never had lines
             table = LineTable()
-        return lines_of(self.last_rows, self.image.symbols, table)
+        return shortened(self.last_rows, self.image.symbols, table)
 
     def register(self, name: str) -> int:
         """Return a register by its name, such as "R0", "SP" or "XPSR"."""
@@ -548,7 +551,7 @@ def _wait_error(board: BluePill, message: str) -> WaitError:
     error = WaitError(message)
     lines = board.last_blocks()
     if lines:
-        error.add_note("\n".join([title_of(len(lines)), *lines]))
+        error.add_note("\n".join([TITLE, *lines]))
     return error
 
 

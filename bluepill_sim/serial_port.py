@@ -16,6 +16,9 @@ from simbase.timing import Nanos
 #: chosen: six seconds of a line at 115200; older ones are forgotten.
 KEPT_BYTES = 64 * 1024
 
+#: chosen: nothing seen of a firmware for so long means that it computes, spins or hangs.
+QUIET_NS: Nanos = 1_000_000_000
+
 #: RM0008 27.3.4: PCLK2 / 16.
 HIGHEST_BAUD = 4_500_000
 
@@ -33,6 +36,10 @@ class Activity:
     last_usart_ns: Nanos = 0
     #: The last time the core went to sleep.
     last_wfi_ns: Nanos = 0
+
+    def is_quiet(self, now_ns: Nanos) -> bool:
+        """Tell whether nothing was seen for so long that the program spins or hangs."""
+        return now_ns - max(self.last_pin_ns, self.last_usart_ns, self.last_wfi_ns) >= QUIET_NS
 
 
 class WaitForBytes(Protocol):

@@ -20,7 +20,7 @@ from adapter_sim import Adapter
 from adapter_sim.pinout import Pinout, Pull, WireRole, load_pinout
 from p2os.errors import ScenarioError
 from p2os.pioneer.body.contract import RobotBody
-from p2os.pioneer.body.factory import make_body
+from p2os.pioneer.body.factory import body_note, make_body
 from p2os.pioneer.controller import Pioneer
 from p2os.pioneer.world import load_world
 from p2os.pioneer.world.model import World
@@ -143,7 +143,7 @@ class Bench:
     @property
     def note(self) -> str | None:
         """Return what a reader of the result has to know of the body."""
-        return self.parts.body.note
+        return "; ".join(filter(None, (body_note(self.scenario.body), self.parts.body.note))) or None
 
     @property
     def end(self) -> Nanos:

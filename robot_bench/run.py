@@ -20,6 +20,8 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import TYPE_CHECKING, TypeVar
 
+from bluepill_sim.serial_port import QUIET_NS
+from p2os.pioneer.body.factory import resolve_body
 from p2os.pioneer.world.model import Pose, World
 from p2os.transport import Transport
 from p2os.transport.wall_clock import Clock, wall_clock
@@ -42,8 +44,6 @@ if TYPE_CHECKING:
 
 #: chosen: without pacing, control comes back often enough for progress and signals.
 UNPACED_SLICE_NS: Nanos = 10 * NS_PER_MS
-#: Nothing seen of the firmware for so long at the end of a run is worth a note: it spins, or hangs.
-QUIET_NS: Nanos = 1 * NS_PER_S
 #: What is recorded as the world where nothing is known of it: 8 m of an empty plan.
 UNKNOWN_PLACE: Json = {"extent": [-4.0, -4.0, 4.0, 4.0], "obstacles": []}
 #: Exit code of errors that whoever types the command can mend.
@@ -181,7 +181,7 @@ def meta_of(scenario: Scenario, world: World | None, note: str | None, *, is_at_
         "firmware": scenario.firmware.name,
         "firmware_sha256": _sha256_of(scenario.firmware),
         "mode": "port" if is_at_port else scenario.mode,
-        "body": "remote" if is_at_port else scenario.body,
+        "body": "remote" if is_at_port else resolve_body(scenario.body),
         "seed": None if is_at_port else scenario.seed,
         "duration_s": scenario.duration_ns / NS_PER_S,
         "threshold_m": scenario.threshold_m,
@@ -295,16 +295,18 @@ def _record(
         failures.append(bench.chip.verdict)
     trace.flush()
     record = read_run(folder)
-    met, missed = judge(record, bench.scenario.goals)
+    judged = judge(record, bench.scenario.goals, end_ns=end, planned_ns=bench.scenario.planned_ns)
+    passed = not failures and not judged.missed
     trace.end(
         _figures(bench, end, wall_s)
         | {
             "trace_sha256": trace.sha256,
-            "passed": not failures and not missed,
-            "failures": failures + missed,
-            "goals_met": met,
+            "passed": passed,
+            "failures": failures + judged.missed,
+            "goals_met": judged.met,
+            "goals_not_judged": judged.not_judged,
             "notes": notes(bench, end, pacer),
-            "last_blocks": last_blocks(bench, end, was_interrupted=was_interrupted),
+            "last_blocks": last_blocks(bench, end, passed=passed),
             "worst_lag_ms": None if pacer is None else round(pacer.worst_lag_ns / NS_PER_MS, 1),
         }
         | ({} if measurement is None else measurement.write(folder, bench.scenario.firmware.parent))
@@ -342,9 +344,9 @@ def notes(bench: Bench | RemoteBench, end: Nanos, pacer: RealTimePacer | None) -
     return result
 
 
-def last_blocks(bench: Bench | RemoteBench, end: Nanos, *, was_interrupted: bool) -> list[str]:
-    """Return what the program ran last, where that shows why it ended: a fault, a hang, or an interruption."""
-    wanted = was_interrupted or bench.chip.has_died or is_quiet(bench, end)
+def last_blocks(bench: Bench | RemoteBench, end: Nanos, *, passed: bool) -> list[str]:
+    """Return what the program ran last, where that may show why a run failed: at a fault, or where it hangs."""
+    wanted = bench.chip.has_died or (is_quiet(bench, end) and not passed)
     return list(bench.chip.last_blocks()) if wanted else []
 
 

@@ -186,7 +186,7 @@ def use_trace(path: Path, _rng: random.Random) -> None:
     record = read_run(path.parent)
     json.dumps(outcome_of(record))
     render_page(record)
-    judge(record, read_scenario(_shipped_scenario("dodge")).goals)
+    judge(record, read_scenario(_shipped_scenario("dodge")).goals, end_ns=record.last_ns)
 
 
 # What is right ------------------------------------------------------------------------------

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from bluepill_sim.board import BluePill, WaitError
 from bluepill_sim.errors import BluePillError
 from bluepill_sim.fabric.pins import Pin
-from bluepill_sim.program.last_blocks import title_of
+from bluepill_sim.program.last_blocks import TITLE
 from bluepill_sim.timing import ChipReached, to_nanos
 from simbase.timing import NS_PER_S, Nanos, Reason
 
@@ -115,15 +115,14 @@ def run_driven(board: BluePill, end_ns: Nanos, changes: Sequence[Change]) -> Chi
 
 @contextmanager
 def showing_where_it_hangs(board: BluePill) -> Iterator[None]:
-    """Print what ran last when Ctrl-C, the clock or a wait ends a run."""
+    """Print where a run had come to when Ctrl-C or an error ends it; what ran last, where that may be the cause."""
     try:
         yield
-    except (KeyboardInterrupt, OverBudgetError, WaitError):
-        print_status(f"given up at {summary(board)}")
-        if not board.has_died:
+    except (KeyboardInterrupt, BluePillError) as error:
+        is_given_up = isinstance(error, (OverBudgetError, WaitError))
+        if not print_fault(board) and (is_given_up or board.activity.is_quiet(board.now_ns)):
             print_last_blocks(board)
-        else:
-            print_fault(board)
+        print_status(f"ended at {summary(board)}")
         raise
 
 
@@ -162,19 +161,17 @@ def _line_speeds(board: BluePill) -> str:
 
 
 def print_fault(board: BluePill) -> bool:
-    """Print the fault of a firmware that died, with registers and last blocks; return whether it did."""
+    """Print last blocks, registers and, as the last line, the fault of a firmware that died; return whether it did."""
     if board.fault is None or not board.has_died:
         return False
-    print_status(f"fault: {board.fault}")
+    print_last_blocks(board)
     for line in board.fault.register_dump.splitlines():
         print_status(f"  {line}")
-    print_last_blocks(board)
+    print_status(f"fault: {board.fault}")
     return True
 
 
 def print_last_blocks(board: BluePill) -> None:
     """Print what a board ran last."""
-    lines = board.last_blocks()
-    print_status(title_of(len(lines)))
-    for line in lines:
+    for line in (TITLE, *board.last_blocks()):
         print_status(line)

@@ -87,17 +87,17 @@ def run(
         print_status(f"USART1 is at {console.description}")
     advance = _paced(board, carry) if realtime or uart == "pty:" else _bounded(board, budget_ns)
     schedule = Schedule(board, changes, advance)
-    try:
-        with showing_where_it_hangs(board):
+    with showing_where_it_hangs(board):
+        try:
             if until is None:
                 schedule.run_to(end_ns)
             else:
                 run_until(board, until, end_ns, schedule.advance_to)
-    finally:
-        console.close()
-        if uart == "-" and board.usart1.unread and not board.usart1.unread.endswith(b"\n"):
-            typer.echo("")
-        print_status(summary(board))
+        finally:
+            console.close()
+            if uart == "-" and board.usart1.unread and not board.usart1.unread.endswith(b"\n"):
+                typer.echo("")
+    print_status(summary(board))
     if print_fault(board):
         raise typer.Exit(1)
 

@@ -26,9 +26,9 @@ def worlds(incomplete: str) -> list[str]:
 
 def bodies(incomplete: str) -> list[str]:
     """Return the bodies."""
-    from p2os.pioneer.body.factory import BODY_NAMES
+    from p2os.pioneer.body.factory import BODY_CHOICES
 
-    return [name for name in BODY_NAMES if name.startswith(incomplete)]
+    return [name for name in BODY_CHOICES if name.startswith(incomplete)]
 
 
 def urls(incomplete: str) -> list[str]:

@@ -1,6 +1,5 @@
 """`p2os demo`: the most useful thing to see first."""
 
-import sys
 from pathlib import Path
 from typing import Annotated
 
@@ -8,20 +7,19 @@ import typer
 
 from p2os.cli.help_pages import BENCH
 from p2os.cli.quantities import TIME
+from p2os.pioneer.body.factory import BEST
 from robot_bench.cli.progress import RunDisplay
 from robot_bench.cli.run import end_with
 from robot_bench.recording.run_folder import make_next_folder
 from robot_bench.run import run_scenario
 from robot_bench.scenario.scenario import load_scenario
-from simbase.errors import MissingDependencyError
-from simbase.installation import install_command
 from simbase.timing import NS_PER_S, Nanos
 
 HELP = """Watch a BluePill program drive a Pioneer around obstacles.
 
 The shipped program `dodge`, unmodified, for 120 s of virtual time: emulated
-BluePill, adapter, P2OS line, virtual Pioneer in PyBullet. Without PyBullet the
-plan view takes its place.
+BluePill, adapter, P2OS line, virtual Pioneer with the best body that is installed:
+PyBullet, else MuJoCo, else the plan view.
 """
 
 
@@ -40,21 +38,10 @@ def demo(
 ) -> None:
     """Run the demonstration."""
     scenario = load_scenario("dodge").with_options(
-        mode="adapter", world="room", body=best_body(),
+        mode="adapter", world="room", body=BEST,
         duration_s=None if duration_ns is None else duration_ns / NS_PER_S,
     )  # fmt: skip
     folder = out or make_next_folder("demo")
     with RunDisplay() as display:
         result = run_scenario(scenario, folder, on_progress=display.update, force=force)
     end_with(result, json_output=json_output)
-
-
-def best_body() -> str:
-    """Return bullet, or kinematic with a word about it where PyBullet is missing."""
-    try:
-        import p2os.pioneer.body.bullet  # noqa: F401 - to see whether it can be
-    except (ModuleNotFoundError, MissingDependencyError) as error:
-        sys.stderr.write(f"PyBullet is not here ({error}): the robot moves in the plan view (kinematic) instead\n")
-        sys.stderr.write(f"hint: {install_command('bullet')}\n")
-        return "kinematic"
-    return "bullet"

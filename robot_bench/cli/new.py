@@ -6,8 +6,9 @@ from typing import Annotated
 
 import typer
 
+from p2os.pioneer.body.factory import BEST, resolve_body
 from robot_bench.firmware.build import COMPILER
-from robot_bench.project.files import installed_body, project_files, write_project
+from robot_bench.project.files import project_files, write_project
 
 HELP = """Write a small project of your own: a program for the BluePill that drives at once.
 
@@ -28,7 +29,7 @@ def register(app: typer.Typer) -> None:
 
 def new(folder: Annotated[Path, typer.Argument(help="A folder that is new or empty.", metavar="FOLDER")]) -> None:
     """Write a project."""
-    body = installed_body()
+    body = resolve_body(BEST)
     contents = project_files(body)
     write_project(folder, contents)
     typer.echo(f"{folder}: {len(contents)} files; main.c is yours, README.md says the rest (body {body})")

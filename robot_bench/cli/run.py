@@ -87,7 +87,9 @@ def run(
     ] = None,
     body: Annotated[
         str | None,
-        typer.Option(help="Physics: bullet, mujoco, or kinematic (plan view).", metavar="BODY", autocompletion=bodies),
+        typer.Option(
+            help="bullet, mujoco, kinematic (plan view), or best installed.", metavar="BODY", autocompletion=bodies
+        ),
     ] = None,
     world: Annotated[
         str | None, typer.Option(help="World, or a TOML file.", metavar="WORLD|FILE", autocompletion=worlds)

@@ -1,4 +1,7 @@
-"""The summary of a run for a person: a table, the notes, and one last line."""
+"""The summary of a run for a person: a table, what ran last where it helps, the notes, and at the end the verdict.
+
+Why a run failed stands right above its last line, where a person looks first.
+"""
 
 from collections.abc import Mapping, Sequence
 from typing import cast
@@ -6,13 +9,18 @@ from typing import cast
 from rich.console import Console
 from rich.table import Table
 
-from bluepill_sim.program.last_blocks import title_of
+from bluepill_sim.program.last_blocks import TITLE
 from robot_bench.recording.summary import LISTED_HITS
 from robot_bench.run import RunResult
 from simbase.errors import shown
 
 #: What coverage counts, and its name for a person.
 _COUNTED = (("lines", "lines"), ("branch_ways", "ways of branches"))
+
+#: What stands before a goal, and the goals' place in the outcome; what failed is last.
+LABELS = (
+    ("[green]met[/]     ", "goals_met"), ("[yellow]open[/]    ", "goals_not_judged"), ("[red]failed[/]  ", "failures"),
+)  # fmt: skip
 
 
 def print_result(result: RunResult, console: Console | None = None) -> None:
@@ -23,24 +31,21 @@ def print_result(result: RunResult, console: Console | None = None) -> None:
     for name, value in rows(outcome):
         table.add_row(name, value)
     console.print(table)
+    blocks = cast("Sequence[str]", outcome["last_blocks"] or ())
+    for line in (TITLE, *blocks) if blocks else ():
+        console.print(line, markup=False, soft_wrap=True)
+    for note in cast("Sequence[str]", outcome["notes"]):
+        console.print(f"note    {note}", markup=False, soft_wrap=True)
     hits = cast("Sequence[Mapping[str, object]]", outcome["hits"])
     for hit in hits[:LISTED_HITS]:
         text = f"hit     {hit['what']} at {hit['t_s']:.3f} s, x {hit['x_m']:.2f} m, y {hit['y_m']:.2f} m"
         console.print(text, markup=False, soft_wrap=True)
     if len(hits) > LISTED_HITS:
         console.print(f"hit     {len(hits) - LISTED_HITS} more, in the state log")
-    for goal in cast("Sequence[str]", outcome["goals_met"]):
-        console.print(f"[green]met[/]     {goal}", soft_wrap=True)
-    for failure in cast("Sequence[str]", outcome["failures"]):
-        console.print("[red]failed[/]  ", end="")
-        console.print(failure, markup=False, soft_wrap=True)
-    for note in cast("Sequence[str]", outcome["notes"]):
-        console.print(f"note    {note}", markup=False, soft_wrap=True)
-    blocks = cast("Sequence[str]", outcome["last_blocks"] or ())
-    if blocks:
-        console.print(title_of(len(blocks)))
-    for line in blocks:
-        console.print(line, markup=False, soft_wrap=True)
+    for label, key in LABELS:
+        for goal in cast("Sequence[str]", outcome[key] or ()):
+            console.print(label, end="")
+            console.print(goal, markup=False, soft_wrap=True)
     console.print(f"{_verdict(result)}; report: {result.report}", markup=False, soft_wrap=True)
 
 
@@ -63,8 +68,11 @@ def rows(outcome: Mapping[str, object]) -> list[tuple[str, str]]:
 
 
 def _verdict(result: RunResult) -> str:
+    left = len(cast("Sequence[str]", result.outcome["goals_not_judged"] or ()))
     if not result.passed:
-        return "FAILED"
+        return "INTERRUPTED" if result.was_interrupted else "FAILED"
+    if left:
+        return f"passed, {left} goal{'s' if left > 1 else ''} not judged"
     return "passed" if result.outcome["goals_met"] else "ended well, no goals were set"
 
 

@@ -11,7 +11,6 @@ import os
 import re
 from collections.abc import Iterator
 from importlib.resources import files
-from importlib.util import find_spec
 from pathlib import Path
 
 from adapter_sim.pinout import Pinout, Wire, WireRole, load_pinout
@@ -28,8 +27,6 @@ _NAME = re.compile(r"[A-Za-z0-9_][A-Za-z0-9._-]*")
 _TEMPLATES = {"main.c": "main.c", "Makefile": "Makefile", "README.md": "README.md", ".gitignore": "gitignore"}
 #: Files of the example programs, for `board/`.
 _SHIPPED = ("startup.c", "memory.c", "f103.h", "f103c8.ld")
-#: The best body first, with the package that it needs; the last needs none.
-_BODIES = (("bullet", "pybullet"), ("mujoco", "mujoco"), ("kinematic", "math"))
 _HEADER = """\
 /* The wires between BluePill and adapter, written by `p2os new` from the adapter's pin-out.
  *
@@ -72,11 +69,6 @@ def wires_header(pinout: Pinout) -> str:
     """Return a C header that names the BluePill's side of a pin-out."""
     groups = (f"\n/* {text} */\n{''.join(map(_define, pinout.with_role(role)))}" for role, text in _ROLES.items())
     return f"{_HEADER}{''.join(groups)}\n#endif\n"
-
-
-def installed_body() -> str:
-    """Return the best body that is installed."""
-    return next(body for body, package in _BODIES if find_spec(package) is not None)
 
 
 def write_project(folder: Path, contents: dict[str, str]) -> None:

@@ -23,7 +23,7 @@ _FROM_META = ("firmware_sha256", "scenario", "mode", "body", "world", "seed")
 _FROM_END = (
     "virtual_s", "wall_s", "real_time_factor", "distance_m", "collisions", "min_clearance_m", "usart_baud",
     "trace_sha256",
-    "passed", "failures", "goals_met", "notes", "last_blocks",
+    "passed", "failures", "goals_met", "goals_not_judged", "notes", "last_blocks",
 )  # fmt: skip
 #: What a run holds that was measured with `--coverage` or `--profile`.
 MEASURED = ("coverage", "profile")
@@ -100,6 +100,7 @@ def end_of_a_broken_run(record: RunRecord, reason: str) -> Json:
         "passed": False,
         "failures": [reason],
         "goals_met": [],
+        "goals_not_judged": [],
         "notes": [],
         "last_blocks": [],
     }

@@ -225,6 +225,9 @@ def _goals(end: Json) -> str:
     failures = cast("list[str]", end.get("failures") or [])
     met = cast("list[str]", end.get("goals_met") or [])
     items = [f'<li class="passed">{html.escape(text)}</li>' for text in met]
+    items += [
+        f'<li class="open">{html.escape(text)}</li>' for text in cast("list[str]", end.get("goals_not_judged") or [])
+    ]
     items += [f"<li>{html.escape(text)}</li>" for text in failures]
     goals = f'<ul class="goals">{"".join(items)}</ul>' if items else ""
     blocks = cast("list[str]", end.get("last_blocks") or [])

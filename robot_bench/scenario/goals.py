@@ -4,7 +4,9 @@ Each kind is a row of `KINDS`: the keys that its table may have, a sentence that
 says what is wanted, and a judge that returns what is wrong or None. `p2os
 report` can judge again, since nothing but the trace is asked.
 
-A goal that is unknown of a real robot (a collision) is not judged there.
+A goal that is unknown of a real robot (a collision) is not judged there. What wants
+something to be reached is missed only by a run that was as long as the scenario plans:
+a shorter one meets it or leaves it open. What forbids is judged from the start.
 """
 
 import math
@@ -42,6 +44,10 @@ class Goal:
         """Return the goal as a sentence."""
         return KINDS[self.kind].wanted(self.arguments)
 
+    def judged_from(self, planned_ns: Nanos) -> Nanos:
+        """Return from when on a run can miss the goal, if the scenario plans to last so long."""
+        return 0 if KINDS[self.kind].forbids else planned_ns
+
     def failure(self, record: RunRecord) -> str | None:
         """Return what a run lacks, or None when it meets the goal."""
         return KINDS[self.kind].judge(record, self.arguments)
@@ -52,6 +58,18 @@ class _Kind:
     keys: tuple[Key, ...]
     wanted: Callable[[Table], str]
     judge: Callable[[RunRecord, Table], str | None]
+    #: It forbids something, and does not want anything to be reached.
+    forbids: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class Judgement:
+    """What became of a run's goals, each as a sentence."""
+
+    met: list[str]
+    missed: list[str]
+    #: The run was too short to miss them, and has not met them.
+    not_judged: list[str]
 
 
 def load_goal(table: Table, where: Where) -> Goal:
@@ -89,18 +107,28 @@ def _is_pair(pair: object) -> bool:
     )
 
 
-def judge(record: RunRecord, goals: tuple[Goal, ...]) -> tuple[list[str], list[str]]:
-    """Return (goals met as sentences, failures as sentences)."""
-    met, failures = [], []
+def judge(record: RunRecord, goals: tuple[Goal, ...], *, end_ns: Nanos, planned_ns: Nanos = 0) -> Judgement:
+    """Judge a run's goals.
+
+    Args:
+        record: The run.
+        goals: What it has to show.
+        end_ns: When it ended.
+        planned_ns: How long the scenario plans it to be; 0 judges all.
+    """
+    found = Judgement([], [], [])
     for goal in goals:
         if record.meta.get("mode") == "port" and goal.kind in NOT_AT_A_PORT:
             continue
         failure = goal.failure(record)
+        judged_from = goal.judged_from(planned_ns)
         if failure is None:
-            met.append(goal.wanted)
+            found.met.append(goal.wanted)
+        elif end_ns < judged_from:
+            found.not_judged.append(f"{goal.wanted}: not judged before {judged_from / NS_PER_S:g} s")
         else:
-            failures.append(f"{goal.kind}: {failure}")
-    return met, failures
+            found.missed.append(f"{goal.kind}: {failure}")
+    return found
 
 
 def _number(arguments: Table, name: str, default: float = 0.0) -> float:
@@ -232,7 +260,7 @@ def _sensor_named(record: RunRecord, _arguments: Table) -> str | None:
 
 
 KINDS: Mapping[str, _Kind] = {
-    "no_collision": _Kind((), lambda _: "touches nothing", _no_collision),
+    "no_collision": _Kind((), lambda _: "touches nothing", _no_collision, forbids=True),
     "min_distance": _Kind(
         (
             Key(name="distance_m", kind="number", above=0, most=1e6),
@@ -260,6 +288,7 @@ KINDS: Mapping[str, _Kind] = {
         (Key(name="text", kind="text", required=True),),
         lambda arguments: f"never prints {arguments['text']!r}",
         _usart_lacks,
+        forbids=True,
     ),
     "usart_in_order": _Kind(
         (Key(name="texts", kind="list", required=True),),

@@ -18,7 +18,7 @@ from typing import cast
 from adapter_sim.codec import BitOrder
 from adapter_sim.settings import RENAMED_SETTINGS, AdapterSettings
 from p2os.errors import ScenarioError
-from p2os.pioneer.body.factory import BODY_NAMES
+from p2os.pioneer.body.factory import BEST, BODY_CHOICES
 from p2os.pioneer.controller import ControllerSettings, SonarPerSip
 from p2os.pioneer.controller.flash import load_flash
 from p2os.pioneer.sensor_errors import load_sensor_errors
@@ -46,7 +46,7 @@ _TOP = (
     Key(name="world", kind="text", required=True),
     Key(name="robot", kind="text"),
     Key(name="mode", kind="text", choices=MODES),
-    Key(name="body", kind="text", choices=BODY_NAMES),
+    Key(name="body", kind="text", choices=BODY_CHOICES),
     Key(name="seed", kind="whole", least=0, most=2**63 - 1),
     Key(name="duration_s", kind="number", required=True, above=0, most=LONGEST_S),
     Key(name="threshold_m", kind="number", above=0, most=100),
@@ -121,9 +121,11 @@ class Scenario:
     parameters: RobotParameters
     robot: str
     mode: str = "adapter"
-    body: str = "bullet"
+    body: str = BEST
     seed: int = 0
     duration_ns: Nanos
+    #: How long the file says; a run that is asked to be shorter leaves goals open.
+    planned_ns: Nanos = 0
     threshold_um: int
     #: The speed of USART1's far end, bit/s; None follows the firmware.
     usart_baud: int | None = None
@@ -167,7 +169,7 @@ class Scenario:
         """
         _refuse_unknown("mode", mode, MODES)
         _refuse_unknown("adapter", adapter_core, ADAPTER_CORES)
-        _refuse_unknown("body", body, BODY_NAMES)
+        _refuse_unknown("body", body, BODY_CHOICES)
         if duration_s is not None and not 0 < duration_s < math.inf:
             raise UsageError(f"a run of {duration_s:g} s cannot be", hint="--duration takes more than 0, such as 10s")
         if firmware is not None and not firmware.is_file():
@@ -287,9 +289,10 @@ def _build(table: Table, text: str, path: Path, where: Place) -> Scenario:
         parameters=parameters,
         robot=robot,
         mode=str(table.get("mode", "adapter")),
-        body=str(table.get("body", "bullet")),
+        body=str(table.get("body", BEST)),
         seed=cast("int", table.get("seed", 0)),
-        duration_ns=round(cast("float", table["duration_s"]) * NS_PER_S),
+        duration_ns=(planned_ns := round(cast("float", table["duration_s"]) * NS_PER_S)),
+        planned_ns=planned_ns,
         threshold_um=round(threshold_m * 1e6),
         usart_baud=cast("int | None", table.get("usart_baud")),
         start=_start(table, where),
@@ -313,7 +316,8 @@ def _apply_in_world(scenario: Scenario, part: Table) -> Scenario:
         adapter = replace(scenario.adapter, threshold_um=threshold_um)
         scenario = replace(scenario, threshold_um=threshold_um, adapter=adapter)
     if "duration_s" in part:
-        scenario = replace(scenario, duration_ns=round(cast("float", part["duration_s"]) * NS_PER_S))
+        planned_ns = round(cast("float", part["duration_s"]) * NS_PER_S)
+        scenario = replace(scenario, duration_ns=planned_ns, planned_ns=planned_ns)
     if "start" in part:
         key = f"in_world.{scenario.world}.start"
         start = _start(part, scenario.where, key)

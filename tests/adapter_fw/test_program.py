@@ -45,13 +45,13 @@ def robot() -> Robot:
 @pytest.fixture(params=["tcp", "pty"])
 def line(request: pytest.FixtureRequest, robot: Robot, tmp_path: Path) -> Iterator[str]:
     url = "tcp:127.0.0.1:0" if request.param == "tcp" else f"pty:{tmp_path / 'robot'}"
-    with served_pioneer(url=url, on_event=robot.happened) as served:
+    with served_pioneer(url=url, body="kinematic", on_event=robot.happened) as served:
         yield served
 
 
 @pytest.fixture
 def tcp(robot: Robot) -> Iterator[str]:
-    with served_pioneer(on_event=robot.happened) as served:
+    with served_pioneer(body="kinematic", on_event=robot.happened) as served:
         yield served
 
 
@@ -175,7 +175,7 @@ def test_a_pad_on_the_wires_socket_drives_and_its_silence_stops(adapter: Path, t
 
 
 def test_a_robot_that_goes_away_ends_the_program_with_one_line(adapter: Path) -> None:
-    with served_pioneer() as url:
+    with served_pioneer(body="kinematic") as url:
         keeper = running(adapter, url)
         program = keeper.__enter__()
         program.wires(CONNECT)
@@ -264,7 +264,7 @@ PAUSE_S = 0.6
 
 @pytest.fixture
 def relay(robot: Robot) -> Iterator[Relay]:
-    with served_pioneer(on_event=robot.happened) as served:
+    with served_pioneer(body="kinematic", on_event=robot.happened) as served:
         made = Relay(served)
         yield made
         made.close()

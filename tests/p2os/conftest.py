@@ -41,6 +41,9 @@ class PerfectBody:
     steps: int = 0
     asked: list[tuple[int, ...]] = field(default_factory=list)
 
+    def put_back(self) -> None:
+        self.state = WheelAngles()
+
     def step(self, left_mps: float, right_mps: float) -> WheelAngles:
         self.steps += 1
         turn = self.dt_ns / 1e9 / self.radius_m

@@ -26,6 +26,7 @@ from p2os.cli.names import bodies, worlds
 from p2os.cli.names import robots as robot_names
 from p2os.cli.printing import queue_output
 from p2os.cli.quantities import ANGLE, BAUD, COUNT, FACTOR, LENGTH, SEED, TIME
+from p2os.pioneer.body.factory import BEST
 from p2os.pioneer.controller import ControllerSettings, SonarPerSip
 from p2os.pioneer.controller.flash import load_flash
 from p2os.pioneer.sensor_errors import load_sensor_errors
@@ -107,8 +108,10 @@ def serve(
     ] = "room",
     body: Annotated[
         str,
-        typer.Option(help="Physics: bullet, mujoco, or kinematic (plan view).", metavar="BODY", autocompletion=bodies),
-    ] = "bullet",
+        typer.Option(
+            help="bullet, mujoco, kinematic (plan view), or best installed.", metavar="BODY", autocompletion=bodies
+        ),
+    ] = BEST,
     seed: Annotated[
         int, SEED.option("--seed", purpose="Of a scattered world and of every sensor's error.", least="0", shown="0")
     ] = 0,
@@ -213,10 +216,10 @@ def serve(
         for host in hosts:
             opened.callback(host.close)
         for number, host in enumerate(hosts):
-            _print_start(order, made.starts[number], number, host, as_json=json_output)
+            _print_start(order, made, number, host, as_json=json_output)
         sys.stdout.flush()
-        if made.note:
-            _write(f"note: {made.note}\n")
+        for note in made.notes:
+            _write(f"note: {note}\n")
         tick = None if status_ns is None else (status_ns / NS_PER_S, partial(_show_status, hosts))
         Fleet(hosts, control=orders, on_tick=tick).run()
 
@@ -274,15 +277,15 @@ def _refuse_beside_fleet(context: typer.Context) -> None:
             )
 
 
-def _print_start(order: FleetOrder, start: Pose, number: int, host: Host, *, as_json: bool) -> None:
-    where, model = host.listener.description, order.robots[number].model
+def _print_start(order: FleetOrder, made: MadeFleet, number: int, host: Host, *, as_json: bool) -> None:
+    where, model, start = host.listener.description, order.robots[number].model, made.starts[number]
     place = start.x_m, start.y_m, math.degrees(start.heading_rad)
     if as_json:
-        row = {"url": where, "robot": model, "world": order.world, "body": order.body, "seed": order.seed}
+        row = {"url": where, "robot": model, "world": order.world, "body": made.body, "seed": order.seed}
         typer.echo(json.dumps(row | {"at": [round(value, 6) for value in place]}))
     else:
         at = " at {:.2f}, {:.2f} m, {:.0f}°".format(*place) if len(order.robots) > 1 else ""
-        typer.echo(f"{where}  {model} in {order.world}{at}, {order.body} body; Ctrl-C ends")
+        typer.echo(f"{where}  {model} in {order.world}{at}, {made.body} body; Ctrl-C ends")
     for endpoint in host.aux:
         who = f"robot {number + 1}" if len(order.robots) > 1 else "the robot"
         typer.echo(f"AUX{endpoint.port} of {who}: {endpoint.listener.description}", err=as_json)

@@ -112,6 +112,13 @@ class RobotBody(Protocol):
         """Stand still at a pose, wheels at angle 0, collisions at 0."""
         ...
 
+    def put_back(self) -> None:
+        """Stand still where the last `reset` put it, wheels at angle 0, collisions at 0; the world goes on.
+
+        What can be pushed goes back to where the world has it; `take_moved` then tells of it.
+        """
+        ...
+
     def step(self, left_mps: float, right_mps: float) -> WheelAngles:
         """Move on by `dt_ns` with these rim-speed set-points; `state` has the rest."""
         ...

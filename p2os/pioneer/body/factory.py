@@ -1,4 +1,10 @@
-"""Make a body by its name; each engine is imported only when it is asked for."""
+"""Make a body by its name, and know which is the best that is installed.
+
+Invariant: an engine is imported only when it is asked for; whether one is installed is looked up, not tried.
+"""
+
+from collections.abc import Mapping
+from importlib.util import find_spec
 
 from p2os.pioneer.body.contract import RobotBody
 from p2os.pioneer.world.model import World
@@ -6,17 +12,20 @@ from p2os.robots.parameters import RobotParameters
 from simbase.errors import MissingDependencyError, UsageError
 
 BODY_NAMES = ("kinematic", "bullet", "mujoco")
-
-
-#: What else is there, by the body whose engine is missing; its extra has its name.
-_OTHERS = {"bullet": "--body mujoco or kinematic", "mujoco": "--body kinematic"}
+#: The body of who names none: the first of `NEEDS` that is installed.
+BEST = "best"
+BODY_CHOICES = (BEST, *BODY_NAMES)
+#: Body → the packages that it needs, the best body first; the last needs none.
+NEEDS: Mapping[str, tuple[str, ...]] = {
+    "bullet": ("pybullet", "numpy"), "mujoco": ("mujoco", "numpy"), "kinematic": (),
+}  # fmt: skip
 
 
 def make_body(name: str, world: World, parameters: RobotParameters) -> RobotBody:
     """Return a body that stands at the world's start.
 
     Args:
-        name: `kinematic` (exact, no dependency), `bullet` (PyBullet) or `mujoco` (MuJoCo).
+        name: `kinematic` (exact, no dependency), `bullet` (PyBullet), `mujoco` (MuJoCo), or `best`.
         world: Where it is.
         parameters: What it is.
 
@@ -25,12 +34,11 @@ def make_body(name: str, world: World, parameters: RobotParameters) -> RobotBody
         MissingDependencyError: The engine or NumPy is not installed.
         WorldError: The world has something that this body cannot take.
     """
+    name = resolve_body(name)
     if name == "kinematic":
         from p2os.pioneer.body.kinematic import KinematicBody
 
         return KinematicBody(world, parameters)
-    if name not in BODY_NAMES:
-        raise UsageError(f"no body {name!r}", hint=f"bodies: {', '.join(BODY_NAMES)}")
     try:
         if name == "bullet":
             from p2os.pioneer.body.bullet import BulletBody
@@ -40,4 +48,36 @@ def make_body(name: str, world: World, parameters: RobotParameters) -> RobotBody
 
         return MujocoBody(world, parameters)
     except ModuleNotFoundError as error:
-        raise MissingDependencyError(f"the {name} body needs {error.name}", extra=name, hint=_OTHERS[name]) from error
+        raise MissingDependencyError(f"the {name} body needs {error.name}", extra=name, hint="--body best") from error
+
+
+def resolve_body(name: str) -> str:
+    """Return the name of the body that `make_body` makes: `best` is the best that is installed.
+
+    Raises:
+        UsageError: There is no body of that name.
+    """
+    if name not in BODY_CHOICES:
+        raise UsageError(f"no body {name!r}", hint=f"bodies: {', '.join(BODY_CHOICES)}")
+    return next(body for body in NEEDS if not _missing(body)) if name == BEST else name
+
+
+def body_note(name: str) -> str | None:
+    """Return the line that says which body the best one is, and what better ones lack; None where one was named."""
+    if name != BEST:
+        return None
+    best = resolve_body(name)
+    better = list(NEEDS)[: list(NEEDS).index(best)]
+    lacking = ", ".join(f"{body} needs {' and '.join(_missing(body))}" for body in better)
+    return f"body {best}: the best that is installed{f' ({lacking})' if lacking else ''}"
+
+
+def _missing(body: str) -> list[str]:
+    return [package for package in NEEDS[body] if not _is_installed(package)]
+
+
+def _is_installed(package: str) -> bool:
+    try:
+        return find_spec(package) is not None
+    except (ImportError, ValueError):  # someone forbids its import, or has half of it loaded
+        return False

@@ -108,6 +108,19 @@ class KinematicBody:
         for item in self._world.obstacles:
             if not item.fixed:
                 self._put(item)
+        self._start = pose
+        self._stand_at(pose)
+        return self.state
+
+    def put_back(self) -> None:
+        """Stand still where the last `reset` put it, and what was pushed where the world has it."""
+        for item in self._plan.pushable(self._world):
+            self.move(item.name, item.x_m, item.y_m, item.heading_rad)
+            self._moved_things[item.name] = None
+        self._stand_at(self._start)
+
+    def _stand_at(self, pose: Pose) -> None:
+        """Stand still at a pose, wheels at angle 0, collisions at 0."""
         self._take_pose(pose.x_m, pose.y_m, pose.heading_rad)
         self._left_angle = self._right_angle = self._left = self._right = 0.0
         self._asked = (0.0, 0.0)
@@ -121,7 +134,6 @@ class KinematicBody:
         #: No thing is nearer to the hull than this; 0 only where the hull is inside one.
         self._free_m = 0.0
         self._changed()
-        return self.state
 
     def step(self, left_mps: float, right_mps: float) -> Turned:
         """Move on by one step along the exact arc, or stall."""
@@ -343,6 +355,7 @@ class KinematicBody:
             "steps": self._steps,
             "walking": {name: since for name, (since, _) in self._walkers.items()},
             "moved": tuple(self._moved_things),
+            "start": self._start,
         }
 
     def restore(self, snapshot: object) -> None:
@@ -351,6 +364,7 @@ class KinematicBody:
         self._plan = Plan(snapshot["obstacles"], self._parameters, self._static)
         self._steps = snapshot["steps"]
         self._moved_things = dict.fromkeys(snapshot["moved"])
+        self._start = snapshot["start"]
         walks = {item.name: item.walk for item in self._plan.obstacles if item.walk is not None}
         self._walkers = {name: (since, Walker(walks[name])) for name, since in snapshot["walking"].items()}
         self._take_pose(*snapshot["pose"])

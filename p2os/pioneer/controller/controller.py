@@ -31,7 +31,7 @@ Invariant: at time t the body stands at its first step boundary at or after t, s
 the result does not depend on how often a caller calls `advance_to`.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import cast
 
@@ -116,7 +116,18 @@ class ControllerState:
 
 
 class Pioneer:
-    """A P2OS robot: its controller and its body."""
+    """A P2OS robot: its controller and its body.
+
+    Args:
+        parameters: What it is.
+        body: Stands where the robot starts.
+        settings: How its firmware behaves.
+        on_event: Called with what happens.
+        faults: Injected from the start, in the words of `faults`.
+
+    Raises:
+        UsageError: Words of a fault mean nothing.
+    """
 
     def __init__(
         self,
@@ -125,11 +136,18 @@ class Pioneer:
         body: Body,
         settings: ControllerSettings | None = None,
         on_event: EventCallback | None = None,
+        faults: Sequence[str] = (),
     ) -> None:
         self.parameters, self.body = parameters, body
         self.settings = settings or ControllerSettings()
         self.on_event = on_event
+        self._faults = tuple(faults)
         self._body_now: Nanos = 0
+        self._switch_on(0)
+
+    def _switch_on(self, now: Nanos) -> None:
+        """Make every part as it is when the robot is switched on, and inject the faults that it starts with."""
+        parameters, body = self.parameters, self.body
         self._sip_due: Nanos | None = None
         #: When the controller is there again after a reset; -1: it waits in maintenance for a reboot.
         self._boot_at: Nanos | None = None
@@ -156,6 +174,8 @@ class Pioneer:
         )  # fmt: skip
         self._reporter = Reporter(self._context, body, self._sender, parameters, self.settings, self._notify)
         self._context.reckoning.begin(body.state.left_angle_rad, body.state.right_angle_rad)
+        for words in self._faults:
+            self.do(f"fault {words}", now)
 
     @property
     def state(self) -> ControllerState:
@@ -259,6 +279,18 @@ class Pioneer:
         """Start the controller anew, as after a dip of its supply: motors off, session gone, odometry at 0."""
         self.advance_to(now)
         self._restart(now, notice, boot_ns=BOOT_NS)
+
+    def start_over(self, now: Nanos) -> None:
+        """Put the robot back at its start: body, odometry, devices and random draws as when it was made.
+
+        What could be pushed is back in its place. The session is gone and the controller is not there for its boot
+        time, as after `reboot`; faults are those of the start.
+        """
+        self.advance_to(now)
+        self.body.put_back()
+        self._switch_on(now)
+        self._boot_at = now + BOOT_NS
+        self._notify(now, "started over", "at its start, as just switched on")
 
     def next_deadline(self) -> Nanos | None:
         """Return when bytes will come out or the watchdog will expire; None when neither ever will."""

@@ -81,6 +81,10 @@ class Body(Protocol):
         """What the sensors know now."""
         ...
 
+    def put_back(self) -> None:
+        """Stand still where it began, wheels at angle 0, and what was pushed where it was."""
+        ...
+
     def step(self, left_mps: float, right_mps: float) -> WheelAngles:
         """Make one step with these rim-speed set-points."""
         ...

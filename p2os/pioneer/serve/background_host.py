@@ -1,19 +1,25 @@
 """A host in a background thread of a program: a virtual robot to try a client out, and for its tests.
 
-    with served_pioneer(world="room") as url:
-        with Robot(url) as robot:
+    with served_pioneer(world="room") as served:
+        with Robot(served) as robot:
             robot.drive(0.5)
+        served.reset()
 
 It is `p2os serve` in a thread: real time, one client at a time.
 """
 
 import contextlib
+import queue
 import threading
 from collections.abc import Callable, Iterator
+from concurrent.futures import Future
+from concurrent.futures import TimeoutError as NotInTimeError
+from typing import Self
 
-from p2os.pioneer.body.factory import make_body
+from p2os.pioneer.body.factory import BEST, make_body
 from p2os.pioneer.controller import ControllerSettings, Pioneer
 from p2os.pioneer.serve.host import Host
+from p2os.pioneer.serve.orders import carry_out
 from p2os.pioneer.world import load_world
 from p2os.robots.parameters import load_parameters
 from p2os.transport import listen_url
@@ -22,6 +28,79 @@ from simbase.timing import Nanos
 
 #: chosen: the host looks up twice a second; on a busy machine it may take longer.
 ENDING_S = 30.0
+#: chosen: how soon a thread that waits for an answer learns that there will be none.
+LOOK_S = 1.0
+
+
+class ServedPioneer(str):
+    """The URL of a robot that is served in the background, and orders to it.
+
+    It is a text, so that it stands wherever a URL is wanted; `served_pioneer` makes it.
+    """
+
+    __slots__ = ("_orders", "body")
+
+    #: Which body it has: `kinematic`, `bullet` or `mujoco`.
+    body: str
+    _orders: "_Orders"
+
+    def __new__(cls, url: str, body: str, orders: "_Orders") -> Self:
+        """Return the handle of a robot that takes its orders from `orders`."""
+        made = super().__new__(cls, url)
+        made.body, made._orders = body, orders
+        return made
+
+    def reset(self) -> None:
+        """Put the robot back at its start, as just switched on, and what could be pushed in its place.
+
+        The session of a client ends, its connection stays: half a second later the robot says packet 0xFF and waits
+        for SYNC0.
+
+        Raises:
+            P2osError: It is served no more.
+        """
+        self.order("reset")
+
+    def order(self, words: str) -> list[str]:
+        """Execute an order of `p2os serve`'s operator within half a second, and return the answer's lines.
+
+        Raises:
+            UsageError: The words mean nothing; `help` returns what there is.
+            WorldError: There is no such thing, or it is part of the building.
+            P2osError: It is served no more.
+        """
+        return self._orders.give(words)
+
+
+class _Orders:
+    """Orders on their way from a program's threads to the robot's."""
+
+    def __init__(self) -> None:
+        self._waiting: queue.SimpleQueue[tuple[str, Future[list[str]]]] = queue.SimpleQueue()
+        self._is_over = threading.Event()
+
+    def give(self, words: str) -> list[str]:
+        """Wait until an order is carried out."""
+        answer: Future[list[str]] = Future()
+        self._waiting.put((words, answer))
+        while not self._is_over.is_set():
+            with contextlib.suppress(NotInTimeError):
+                return answer.result(LOOK_S)
+        raise P2osError("the virtual robot is served no more")
+
+    def carry_out(self, host: Host) -> bool:
+        """Carry out what was given, in the robot's thread; return whether serving is to end."""
+        while not self._waiting.empty():
+            words, answer = self._waiting.get()
+            try:
+                answer.set_result(carry_out([host], words))
+            except P2osError as error:
+                answer.set_exception(error)
+        return self._is_over.is_set()
+
+    def end(self) -> None:
+        """Let serving end."""
+        self._is_over.set()
 
 
 @contextlib.contextmanager
@@ -30,18 +109,18 @@ def served_pioneer(
     url: str = "tcp:127.0.0.1:0",
     robot: str = "p2dx",
     world: str = "room",
-    body: str = "kinematic",
+    body: str = BEST,
     seed: int = 0,
     settings: ControllerSettings | None = None,
     on_event: Callable[[Nanos, str, str], None] | None = None,
-) -> Iterator[str]:
+) -> Iterator[ServedPioneer]:
     """Serve a virtual robot while the block runs, and give the URL that clients connect to.
 
     Args:
         url: Where to listen; port 0 takes any free one, `pty:PATH` is a serial port.
         robot: Model, or a file of parameters.
         world: World, or a file of one.
-        body: `kinematic`, `bullet` or `mujoco`.
+        body: `kinematic`, `bullet`, `mujoco`, or `best`: the best that is installed.
         seed: Of everything random.
         settings: How the robot's firmware behaves.
         on_event: Called with (nanoseconds, what, detail) from the robot's thread.
@@ -55,13 +134,15 @@ def served_pioneer(
     pioneer = Pioneer(parameters=parameters, body=physical, settings=settings, on_event=on_event)
     listener = listen_url(url)
     host = Host(pioneer, listener, on_event=on_event)
-    over = threading.Event()
-    thread = threading.Thread(target=lambda: host.run(until=over.is_set), name="p2os-pioneer", daemon=True)
+    orders = _Orders()
+    thread = threading.Thread(
+        target=lambda: host.run(until=lambda: orders.carry_out(host)), name="p2os-pioneer", daemon=True
+    )
     thread.start()
     try:
-        yield listener.description
+        yield ServedPioneer(listener.description, physical.name, orders)
     finally:
-        over.set()
+        orders.end()
         thread.join(ENDING_S)
         if thread.is_alive():
             raise P2osError("the virtual robot's thread does not end")

@@ -22,7 +22,7 @@ from difflib import get_close_matches
 from pathlib import Path
 from typing import cast
 
-from p2os.pioneer.body.factory import BODY_NAMES
+from p2os.pioneer.body.factory import BEST, BODY_CHOICES
 from p2os.pioneer.controller.faults import read_fault
 from p2os.pioneer.controller.flash import BAUD_RATES, load_flash
 from p2os.pioneer.controller.settings import ControllerSettings, SonarPerSip
@@ -154,11 +154,11 @@ def parse_fleet(text: str, source: str, folder: Path) -> FleetOrder:
         section = _Section(source, places, folder, "robot", number, cast("Table", row))
         section.check_keys(ROBOT_KEYS)
         robots += _robots(section, robots)
-    world, body = str(top.get("world", "room")), str(top.get("body", "bullet"))
+    world, body = str(top.get("world", "room")), str(top.get("body", BEST))
     if world not in known_worlds() and not is_file(Path(world)):
         raise top.error("world", f"no world {shown(world)}", f"shipped worlds: {', '.join(known_worlds())}, or a file")
-    if body not in BODY_NAMES:
-        raise top.error("body", f"no body {shown(body)}", f"bodies: {', '.join(BODY_NAMES)}")
+    if body not in BODY_CHOICES:
+        raise top.error("body", f"no body {shown(body)}", f"bodies: {', '.join(BODY_CHOICES)}")
     seed, apart = cast("int", top.get("seed", 0)), bool(top.get("apart", False))
     try:
         return FleetOrder(robots=tuple(robots), world=world, body=body, seed=seed, apart=apart)

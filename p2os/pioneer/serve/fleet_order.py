@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
 from p2os.pioneer.body.contract import RobotBody
-from p2os.pioneer.body.factory import make_body
+from p2os.pioneer.body.factory import BEST, body_note, make_body, resolve_body
 from p2os.pioneer.controller import Pioneer
 from p2os.pioneer.controller.flash import BAUD_RATES
 from p2os.pioneer.controller.settings import ControllerSettings
@@ -68,7 +68,7 @@ class FleetOrder:
     Args:
         robots: At least one, the first first: the order in which they move.
         world: Name or file.
-        body: `kinematic` or `bullet`.
+        body: `kinematic`, `bullet`, `mujoco`, or `best`: the best that is installed.
         seed: Of a scattered world; robot N errs by this and N - 1 more.
         apart: Each has a copy of the world, without the others.
 
@@ -78,7 +78,7 @@ class FleetOrder:
 
     robots: tuple[RobotOrder, ...]
     world: str = "room"
-    body: str = "bullet"
+    body: str = BEST
     seed: int = 0
     apart: bool = False
 
@@ -98,8 +98,10 @@ class MadeFleet:
 
     robots: tuple[Pioneer, ...]
     starts: tuple[Pose, ...]
-    #: What a reader of a result has to know of the engine, or None.
-    note: str | None
+    #: Which body all of them have, by name.
+    body: str
+    #: What a reader of a result has to know of it.
+    notes: tuple[str, ...]
     #: Brings robots that share a world through time; None where each is alone in its own.
     multi_robot_world: MultiRobotWorld | None
 
@@ -119,20 +121,19 @@ def make_fleet(order: FleetOrder) -> MadeFleet:
             known[robot.model] = load_parameters(robot.model)
     world, models = load_world(order.world, seed=order.seed), [known[robot.model] for robot in order.robots]
     starts = _starts(order, world, models)
+    name = resolve_body(order.body)
     made: list[tuple[Pioneer, RobotBody]] = []
     for number, (robot, model, start) in enumerate(zip(order.robots, models, starts, strict=True)):
-        body = make_body(order.body, world, model)
+        body = make_body(name, world, model)
         body.reset(start, order.seed)
         settings = replace(robot.settings, seed=order.seed + number)
         if settings.baud is None:
             settings = replace(settings, baud=serial_baud(robot.port))
-        made.append((Pioneer(parameters=model, body=body, settings=settings), body))
+        made.append((Pioneer(parameters=model, body=body, settings=settings, faults=robot.faults), body))
     multi_robot_world = MultiRobotWorld(made, world) if len(made) > 1 and not order.apart else None
     robots = tuple(pioneer for pioneer, _ in made)
-    for robot, pioneer in zip(order.robots, robots, strict=True):
-        for words in robot.faults:
-            pioneer.do(f"fault {words}", 0)
-    return MadeFleet(robots, starts, made[0][1].note, multi_robot_world)
+    notes = tuple(note for note in (body_note(order.body), made[0][1].note) if note)
+    return MadeFleet(robots, starts, name, notes, multi_robot_world)
 
 
 def following_ports(given: Sequence[str], robots: int) -> list[str]:

@@ -86,8 +86,11 @@ class Host:
         self._bring: Callable[[Nanos], object] = self._advance_to
         #: Of the robots that share the world, if others do.
         self.multi_robot_world: MultiRobotWorld | None = None
+        #: Which it is among those, from 0.
+        self.number = 0
         if shared is not None:
             _, multi_robot_world, number = shared
+            self.number = number
             self.multi_robot_world = multi_robot_world
             multi_robot_world.members[number].advance_to = self._advance_to
             self._bring = partial(multi_robot_world.bring, number)
@@ -142,6 +145,7 @@ class Host:
         if self._is_idle():
             return
         self._bring(self.now)
+        self._follow_speed()
         self._send_output()
         self._serve_aux()
         self._check_session()
@@ -201,6 +205,24 @@ class Host:
         self._bring(self.now)
         self.pioneer.do(words, self.now)
 
+    def start_over(self) -> None:
+        """Put the robot back at its start; its client's line stays, the session does not.
+
+        Raises:
+            UsageError: Another robot stands there; nothing has changed then.
+        """
+        if self.multi_robot_world is not None:
+            self.multi_robot_world.start_over([self.number], self.now)
+        else:
+            self._bring(self.now)
+            self.pioneer.start_over(self.now)
+        self.go_on()
+
+    def go_on(self) -> None:
+        """Run on for as long as a boot takes, also without a client."""
+        self._time.go_on()
+        self._settled_at = self.now + SETTLE_NS
+
     def change_world(self, words: str) -> str:
         """Change the world of the robot and of all that share it: an order of `world_orders`; return what was done.
 
@@ -245,11 +267,12 @@ class Host:
             self._drop_client(str(error))
 
     def _receive(self, data: bytes, at: Nanos) -> None:
-        """Give the robot bytes, and follow it to another speed (HOSTBAUD, and back at CLOSE)."""
+        """Give the robot bytes, and follow it to another speed."""
         self.pioneer.receive(data, at)
         self._follow_speed()
 
     def _follow_speed(self) -> None:
+        """Give the line the robot's speed: HOSTBAUD changes it; CLOSE, a reboot and a new start change it back."""
         baud = self.pioneer.baud
         if baud is None or baud == self._baud:
             return

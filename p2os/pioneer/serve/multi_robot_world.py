@@ -23,8 +23,9 @@ receives another's ping.
 """
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass, field
+from itertools import product
 
 from p2os.pioneer.body.contract import RobotBody
 from p2os.pioneer.body.other_robots import (
@@ -62,6 +63,8 @@ class Member:
     other_robots: OtherRobots
     #: Brings the robot to a time: with what its line delivers until then, if it has one.
     advance_to: Callable[[Nanos], object]
+    #: Where it stood at first.
+    start: StandingPose
     #: Where it was shown the others last; None where its body looks for them itself.
     shown: dict[str, StandingPose] | None = None
 
@@ -105,6 +108,7 @@ class MultiRobotWorld:
             Member(
                 index, pioneer, body, as_others[index],
                 OtherRobots([*as_others[:index], *as_others[index + 1 :]], pioneer.parameters), pioneer.advance_to,
+                as_others[index].current,
             )
             for index, (pioneer, body) in enumerate(robots)
         )  # fmt: skip
@@ -140,6 +144,35 @@ class MultiRobotWorld:
         """
         self.advance_to(now)
         return [member.body for member in self.members]
+
+    def start_over(self, numbers: Collection[int], now: Nanos) -> None:
+        """Put some robots back at their starts (`Pioneer.start_over`), and what was pushed for all of them.
+
+        Args:
+            numbers: Which, from 0.
+            now: When, nanoseconds.
+
+        Raises:
+            UsageError: Another robot stands where one of them starts; nothing has changed then.
+        """
+        self.advance_to(now)
+        chosen = [self.members[number] for number in sorted(set(numbers))]
+        for member, other in product(chosen, self.members):
+            start = member.as_other.footprint(member.start)
+            if other not in chosen and start.overlaps(other.as_other.footprint(other.as_other.look()).polygon):
+                raise UsageError(
+                    f"{other.as_other.name} stands where {member.as_other.name} starts",
+                    hint="drive it away, or put all back: reset",
+                )
+        for member in chosen:
+            member.pioneer.start_over(now)
+            member.as_other.at_boundary = member.as_other.look()
+            self._take_pushed(member)
+        for member in chosen:
+            self._show(member.as_other, member.as_other.current)
+        self._spread_pushed()
+        self._spare_m = 0.0  # sweep anew
+        self._find_close()
 
     def next_deadline(self) -> Nanos | None:
         """Return when bytes of any robot will come out; None when never."""

@@ -3,6 +3,7 @@
 fault sonar-stuck 3 1.2       inject a fault; `clear sonar-stuck 3` clears it, `clear all` everything
 place box 1 0 0.3 0.3         a thing comes into the world (`world_orders`)
 joystick 512 1023 1           one of the live inputs
+reset                         back at its start, as just switched on; what was pushed, too
 status                        where it is, what it does, how full its line is
 2: fault reboot               the same to the second robot alone; without a number it is for all
 
@@ -25,26 +26,39 @@ from simbase.errors import UsageError
 #: A longer line is cut.
 LONGEST_LINE = 200
 #: What a line can begin with, after the robot's number.
-FIRST_WORDS = ("status", "fault", "clear", "place", "move", "remove", *INPUTS, "help")
+FIRST_WORDS = ("status", "fault", "clear", "reset", "place", "move", "remove", *INPUTS, "help")
 
 
 def execute(hosts: Sequence[Host], text: str) -> list[str]:
     """Execute a line, and return the answer's lines."""
     try:
-        numbers, words = _addressed(text.strip(), len(hosts))
-        if words.split()[:1] == ["help"]:
-            return help_lines()
-        _check_first_word(words)
-        if is_world_order(words):
-            return _change_worlds([(number, hosts[number - 1]) for number in numbers], words)
-        return [_one(number, hosts[number - 1], words) for number in numbers]
+        return carry_out(hosts, text)
     except (UsageError, WorldError) as error:
         return [f"error: {error}", *([f"hint: {error.hint}"] if error.hint else [])]
+
+
+def carry_out(hosts: Sequence[Host], text: str) -> list[str]:
+    """Execute a line, and return the answer's lines but for errors.
+
+    Raises:
+        UsageError: The words mean nothing, or what they ask for cannot be.
+        WorldError: There is no such thing, or it is part of the building.
+    """
+    numbers, words = _addressed(text.strip(), len(hosts))
+    if words.split()[:1] == ["help"]:
+        return help_lines()
+    _check_first_word(words)
+    if words == "reset":
+        return _start_over([(number, hosts[number - 1]) for number in numbers])
+    if is_world_order(words):
+        return _change_worlds([(number, hosts[number - 1]) for number in numbers], words)
+    return [_one(number, hosts[number - 1], words) for number in numbers]
 
 
 def help_lines() -> list[str]:
     """Return every line that a robot understands, with its meaning."""
     rows = [("status", "where it is, what it does, how full its line is")]
+    rows += [("reset", "back at its start, as just switched on; what was pushed, too; the session ends")]
     rows += [(" ".join(["fault", name, *words]), meaning) for name, (words, meaning) in FAULTS.items()]
     rows += [("clear NAME …", "ends a fault; the same first words"), ("clear all", "ends every fault")]
     rows += [(" ".join([name, *words]), meaning) for name, (words, meaning) in INPUTS.items()]
@@ -104,6 +118,21 @@ def _change_worlds(named: Sequence[tuple[int, Host]], words: str) -> list[str]:
             changed.append(host.multi_robot_world)
             answers.append(f"world: {host.change_world(words)}")
     return answers
+
+
+def _start_over(named: Sequence[tuple[int, Host]]) -> list[str]:
+    """Put robots back at their starts, those of one world together; return an answer for each."""
+    together: dict[MultiRobotWorld, list[Host]] = {}
+    for _, host in named:
+        if host.multi_robot_world is None:
+            host.start_over()
+        else:
+            together.setdefault(host.multi_robot_world, []).append(host)
+    for world, hosts in together.items():
+        world.start_over([host.number for host in hosts], hosts[0].now)
+        for host in hosts:
+            host.go_on()
+    return [f"robot {number}: at its start, as just switched on" for number, _ in named]
 
 
 def _one(number: int, host: Host, words: str) -> str:

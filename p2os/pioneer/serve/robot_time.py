@@ -42,6 +42,10 @@ class RobotTime:
     def client_left(self) -> None:
         """Note that one of them is gone."""
         self._clients -= 1
+        self.go_on()
+
+    def go_on(self) -> None:
+        """Run on for `SETTLE_NS`, also without a client."""
         self._settled_at = self.now + SETTLE_NS
 
     def read(self) -> Nanos:

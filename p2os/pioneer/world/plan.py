@@ -75,6 +75,11 @@ class Plan:
         """All that is not part of the building, in the order of its placing."""
         return tuple(self._obstacles.values())
 
+    def pushable(self, world: World) -> list[Obstacle]:
+        """Return what of a world can be pushed and has not been taken out since, where the world has it."""
+        there = self._obstacles
+        return [item for item in world.obstacles if item.name in there and there[item.name].mass_kg > 0]
+
     def place(self, obstacle: Obstacle) -> None:
         """Put an obstacle with a new name into the plan.
 

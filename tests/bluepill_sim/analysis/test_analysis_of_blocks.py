@@ -16,7 +16,7 @@ from bluepill_sim.board import BluePill
 from bluepill_sim.core import BLOCK, EXCEPTION_RETURN
 from bluepill_sim.program.functions import UNKNOWN, FunctionTable
 from bluepill_sim.program.image import SymbolTable
-from bluepill_sim.program.last_blocks import lines_of
+from bluepill_sim.program.last_blocks import lines_of, shortened
 from bluepill_sim.program.line_table import LineTable
 from bluepill_sim.program.static_code import StaticCode
 from simbase.timing import NS_PER_MS
@@ -168,7 +168,10 @@ def test_the_last_blocks_of_a_fault_are_those_before_it(boot) -> None:
     before = [row for row in recorder.drain() if row[0] < at_fault]
     assert machine.board.last_rows == tuple(before[-32:])
     assert machine.label("loop") in {row[1] for row in machine.board.last_rows}
-    assert len(machine.board.last_blocks()) == 32
+    # The loop's 31 turns are one line.
+    loop, after = machine.board.last_blocks()
+    assert f"31 x {machine.board.image.symbols.where(machine.label('loop'))}" in loop
+    assert " x " not in after
 
 
 def test_the_last_blocks_of_a_spinning_program_are_those_up_to_now(boot) -> None:
@@ -178,7 +181,24 @@ def test_the_last_blocks_of_a_spinning_program_are_those_up_to_now(boot) -> None
     machine.run(500)
     assert machine.board.last_rows == tuple(recorder.last(32))
     cycle, _, _ = recorder.last(1)[0]
-    assert machine.board.last_blocks()[-1] == f"{cycle:>12}  {machine.board.where()}"
+    assert machine.board.last_blocks()[-1].endswith(f" x {machine.board.where()}")
+    assert int(machine.board.last_blocks()[-1].split()[0]) <= cycle
+
+
+def test_a_loop_of_several_blocks_is_one_line_with_a_count() -> None:
+    def addresses(text: str) -> list[tuple[int, int, int]]:
+        return [(10 * n, 0x0800_0000 + ord(letter), BLOCK) for n, letter in enumerate(text)]
+
+    def short(text: str) -> list[str]:
+        return [" ".join(line.split()[1:]) for line in shortened(addresses(text), SymbolTable(()), LineTable())]
+
+    a, b, c, x = (f"0x{0x0800_0000 + ord(letter):08x}" for letter in "abcx")
+    assert short("") == []
+    assert short("abc") == [a, b, c]
+    assert short("xaab") == [x, f"2 x {a}", b]
+    assert short("xabcabcabcx") == [x, f"3 x 3 blocks from {a}", x]
+    assert short("abbbcabbbc") == [f"2 x 5 blocks from {a}"], "the loop that covers most"
+    assert short("aaaaaa") == [f"6 x {a}"], "the shortest that covers as much"
 
 
 def test_rows_read_as_sentences() -> None:

@@ -9,6 +9,7 @@ from xml.etree import ElementTree as ET
 import pytest
 
 from bluepill_sim.program.image import load_image, parse_image
+from bluepill_sim.program.last_blocks import TITLE
 from bluepill_sim.program.line_table import read_lines
 from p2os.cli.main import run
 
@@ -125,8 +126,11 @@ def test_a_dead_program_shows_its_last_blocks(tmp_path: Path, capfd: pytest.Capt
     assert run(["mcu", "run", str(image), "--for", "1ms"]) == 1
     error = capfd.readouterr().err
     assert "fault: " in error
-    # 1 of the start, 4 turns, 1 after them.
-    assert "the last 6 blocks" in error
+    lines = error.splitlines()
+    blocks = lines[lines.index(TITLE) + 1 :]
+    # 1 of the start, 4 turns in one line, 1 after them.
+    assert [" x " in line for line in blocks[:3]] == [False, True, False]
+    assert lines[-1].startswith("fault: "), "the cause stands at the end"
 
 
 def test_a_program_that_takes_too_long_is_given_up(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
@@ -135,7 +139,8 @@ def test_a_program_that_takes_too_long_is_given_up(tmp_path: Path, capfd: pytest
     assert run(["mcu", "run", str(image), "--for", "1000s", "--budget", "0.1s"]) == 1
     error = capfd.readouterr().err
     assert "are used up at" in error
-    assert "the last 32 blocks" in error
+    assert "32 x 0x08000008" in error
+    assert error.splitlines()[-2].startswith("p2os: 0.1 s of wall clock are used up")
 
 
 def test_a_program_that_sleeps_for_good_is_reported(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:

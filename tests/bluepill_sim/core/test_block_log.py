@@ -9,6 +9,7 @@ from bluepill_sim.core import BLOCK, EXCEPTION_RETURN, BlockRecorder, BlockRow
 from bluepill_sim.core.recorder import LAST_ROWS
 from bluepill_sim.native.library import library_path
 from bluepill_sim.program.image import Image, SymbolTable
+from bluepill_sim.program.last_blocks import TITLE
 from tests.bluepill_sim.core.thumb_streams import Program, program
 
 CORES = [
@@ -142,7 +143,7 @@ def test_a_wait_that_timed_out_has_the_last_blocks_in_its_notes(core: str, boot)
     with pytest.raises(WaitError) as caught:
         machine.board.usart1.expect(b"ready", within="1 ms")
     (note,) = caught.value.__notes__
-    assert note.splitlines() == [f"the last {LAST_ROWS} blocks, by cycle:", *machine.board.last_blocks()]
+    assert note.splitlines() == [TITLE, *machine.board.last_blocks()]
     assert "-> SysTick, interrupts spin+0x0" in note
     assert "\n" not in str(caught.value)
 

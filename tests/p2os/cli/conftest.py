@@ -33,7 +33,7 @@ def served() -> Iterator[Served]:
     def tell(_now: int, what: str, detail: str) -> None:
         served.events.append(f"{what}: {detail}")
 
-    with served_pioneer(on_event=tell) as served.url:
+    with served_pioneer(body="kinematic", on_event=tell) as served.url:
         yield served
 
 

@@ -108,9 +108,12 @@ def test_trace_shows_where_an_error_arose(offer: Callable[[object], None], capsy
 
 
 @pytest.mark.parametrize("interruption", [KeyboardInterrupt(), typer.Abort()])
-def test_an_interruption_ends_with_130(offer: Callable[[object], None], interruption: BaseException) -> None:
+def test_an_interruption_ends_with_130_and_says_so(
+    offer: Callable[[object], None], interruption: BaseException, capsys: pytest.CaptureFixture[str]
+) -> None:
     offer(raising(interruption))
     assert cli.run(["act"]) == 130
+    assert capsys.readouterr().err.endswith("p2os: interrupted\n")
 
 
 def test_a_verb_can_choose_its_exit_code(offer: Callable[[object], None]) -> None:

@@ -214,7 +214,7 @@ def test_the_verb_drives_by_pad(monkeypatch: pytest.MonkeyPatch, capsys: pytest.
     from p2os.pioneer.serve import served_pioneer
 
     monkeypatch.setattr(teleop, "SdlPad", Scripted)
-    with served_pioneer() as url:
+    with served_pioneer(body="kinematic") as url:
         assert run(["teleop", url, "--pad"]) == 0
     assert "connected: R2 ahead" in capsys.readouterr().err
     assert pad_source.SdlPad is SdlPad

@@ -13,6 +13,7 @@ import pytest
 
 from adapter_sim.pinout import load_pinout
 from p2os.cli.main import run as p2os
+from p2os.pioneer.body.factory import BEST, resolve_body
 from robot_bench.firmware.build import COMPILER
 from robot_bench.project import files as project
 from robot_bench.scenario.scenario import read_scenario
@@ -80,17 +81,6 @@ def test_the_scenario_names_its_own_program_and_a_body_and_wants_nothing() -> No
     Path("mine/build/robot.elf").write_bytes(b"not looked at yet")
     scenario = read_scenario(Path("mine/just-drive.toml"))
     assert (scenario.firmware, scenario.body, scenario.goals) == (Path("mine/build/robot.elf"), "kinematic", ())
-
-
-@pytest.mark.parametrize(
-    ("missing", "body"),
-    [((), "bullet"), (("pybullet",), "mujoco"), (("pybullet", "mujoco"), "kinematic")],
-)
-def test_the_body_is_the_best_that_is_installed(
-    missing: tuple[str, ...], body: str, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(project, "find_spec", lambda name: None if name in missing else object())
-    assert project.installed_body() == body
 
 
 @pytest.mark.parametrize(
@@ -187,7 +177,7 @@ def test_the_project_builds_without_a_warning_and_again_only_when_something_chan
 @pytest.mark.slow
 def test_a_student_gets_from_nothing_to_a_robot_that_drives() -> None:
     assert p2os(["new", "mine"]) == 0
-    body = project.installed_body()
+    body = resolve_body(BEST)
     command = f'{sys.executable} -c "from p2os.cli.main import main; main()"'
     done = make("run", f"P2OS={command}")
     assert done.returncode == 0, done.stderr

@@ -10,13 +10,12 @@ from pathlib import Path
 
 import pytest
 
+from bluepill_sim.program.last_blocks import TITLE
 from p2os.cli.main import run as p2os
-from robot_bench.cli.demo import best_body
 from robot_bench.cli.run import capped
 from robot_bench.recording.run_folder import make_next_folder
 from robot_bench.recording.run_record import read_run
 from robot_bench.scenario.scenario import load_scenario
-from simbase.installation import install_command
 from tests.robot_bench.firmware import thumb
 
 COMMAND = [sys.executable, "-c", "from p2os.cli.main import main; main()"]
@@ -87,7 +86,10 @@ def test_a_program_that_spins_is_legal_and_is_told_of(capsys: pytest.CaptureFixt
     assert outcome["virtual_s"] == 1.2
     assert any("no pin, USART or WFI was seen since 0.000 s; the program is at" in note for note in outcome["notes"])
     assert "0x08000042" in str(outcome["notes"])
-    assert "0x08000042" in outcome["last_blocks"][-1]
+    assert outcome["last_blocks"] == [], "it has passed: there is nothing to explain"
+    goal = '[[goal]]\nkind = "usart_contains"\ntext = "ready"\n'
+    assert p2os(["run", make(thumb.SPIN, text + goal), "--json"]) == 1
+    assert "0x08000042" in json.loads(capsys.readouterr().out)["last_blocks"][-1]
 
 
 def test_a_program_that_is_alive_needs_no_last_blocks(capsys: pytest.CaptureFixture[str]) -> None:
@@ -113,7 +115,7 @@ def test_a_firmware_that_dies_ends_with_1_and_says_where(
 def test_what_a_dead_program_ran_last_is_in_the_table_and_in_the_report(capsys: pytest.CaptureFixture[str]) -> None:
     assert p2os(["run", make(thumb.NOWHERE), "--out", "dead"]) == 1
     out = capsys.readouterr().out.splitlines()
-    block = out[out.index("the last block, by cycle:") + 1]
+    block = out[out.index(TITLE) + 1]
     assert block.split() == ["0", "0x08000042"]
     assert block in Path("dead/report.html").read_text(encoding="utf-8")
 
@@ -265,22 +267,32 @@ def test_a_second_run_with_the_same_out_is_refused_while_the_first_lasts(capsys:
 
 
 def test_demo_runs_dodge_in_the_room(capsys: pytest.CaptureFixture[str]) -> None:
-    assert p2os(["demo", "--duration", "0.1s", "--json"]) == 1, "nothing is reached in 0.1 s"
+    assert p2os(["demo", "--duration", "0.1s", "--json"]) == 0, "nothing can be missed in 0.1 s"
     outcome = json.loads(capsys.readouterr().out)
+    assert outcome["goals_met"] == ["touches nothing"]
+    assert [goal.rpartition(": ")[2] for goal in outcome["goals_not_judged"]] == ["not judged before 120 s"] * 3
     assert (outcome["scenario"], outcome["mode"], outcome["world"]) == ("dodge", "adapter", "room")
     assert Path("runs/demo-001/report.html").is_file()
 
 
-def test_demo_without_pybullet_says_so_and_goes_on(
-    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    for name in [name for name in sys.modules if name.startswith(("pybullet", "p2os.pioneer.body.bullet"))]:
-        monkeypatch.delitem(sys.modules, name)
-    monkeypatch.setitem(sys.modules, "pybullet", None)
-    assert best_body() == "kinematic"
-    assert "PyBullet is not here" in capsys.readouterr().err
-    assert p2os(["run", "dodge", "--body", "bullet", "--duration", "0.1s"]) == 2
-    assert f"hint: {install_command('bullet')}" in capsys.readouterr().err
+def test_a_run_shorter_than_its_scenario_names_what_it_left_open(capsys: pytest.CaptureFixture[str]) -> None:
+    scenario = make(thumb.SLEEP, LEAST + '[[goal]]\nkind = "min_distance"\ndistance_m = 1\n')
+    assert p2os(["run", scenario, "--duration", "0.1s", "--out", "short"]) == 0
+    out = capsys.readouterr().out.splitlines()
+    assert out[-2:] == [
+        "open    drives at least 1 m: not judged before 0.2 s",
+        "passed, 1 goal not judged; report: short/report.html",
+    ]
+    assert "drives at least 1 m: not judged before 0.2 s" in Path("short/report.html").read_text(encoding="utf-8")
+
+
+def test_why_a_run_failed_stands_right_above_its_last_line(capsys: pytest.CaptureFixture[str]) -> None:
+    goal = '[[goal]]\nkind = "min_distance"\ndistance_m = 1\n'
+    assert p2os(["run", make(thumb.NOWHERE, LEAST.replace("0.2", "5.0") + goal), "--out", "dead"]) == 1
+    *_, is_open, cause, last = capsys.readouterr().out.splitlines()
+    assert cause.startswith("failed  firmware fault: ")
+    assert last == "FAILED; report: dead/report.html"
+    assert is_open.startswith("open    drives at least 1 m"), "what the fault has prevented is no second cause"
 
 
 def test_an_untried_program_is_capped_unless_told() -> None:

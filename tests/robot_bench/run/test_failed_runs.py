@@ -15,6 +15,7 @@ from robot_bench import bench, run
 from robot_bench.recording.run_record import RunRecord, read_run
 from robot_bench.recording.summary import outcome_of, verdict
 from robot_bench.report.make import make_artefacts
+from robot_bench.scenario.goals import Judgement
 from robot_bench.scenario.scenario import Scenario, load_scenario
 from simbase.errors import MissingDependencyError, P2osError
 
@@ -139,9 +140,9 @@ def test_a_report_that_cannot_be_written_is_one_line(
 def test_goals_are_judged_from_all_of_the_trace(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     seen: list[int] = []
 
-    def judge(record: RunRecord, _: object) -> tuple[list[str], list[str]]:
+    def judge(record: RunRecord, _goals: object, **_times: int) -> Judgement:
         seen.append(record.poses[-1].t)
-        return [], []
+        return Judgement([], [], [])
 
     monkeypatch.setattr(run, "judge", judge)
     run.run_scenario(wanted(1.95), tmp_path / "run")

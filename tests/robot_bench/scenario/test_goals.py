@@ -110,15 +110,30 @@ def test_goal_sensor_named() -> None:
 def test_a_real_robot_is_not_asked_what_it_cannot_tell() -> None:
     run = record(poses=[pose(collisions=1)])
     goals = (Goal(kind="no_collision", arguments={}), Goal(kind="min_distance", arguments={"distance_m": 1}))
-    assert [line.split(":")[0] for line in judge(run, goals)[1]] == ["no_collision", "min_distance"]
+    assert [line.split(":")[0] for line in judge(run, goals, end_ns=S).missed] == ["no_collision", "min_distance"]
     run.meta["mode"] = "port"
-    assert [line.split(":")[0] for line in judge(run, goals)[1]] == ["min_distance"]
+    assert [line.split(":")[0] for line in judge(run, goals, end_ns=S).missed] == ["min_distance"]
 
 
 def test_what_is_met_is_told_as_it_was_wanted() -> None:
     run = record(poses=[pose()], usart=text((1, "x")))
-    met, failures = judge(
-        run, (Goal(kind="no_collision", arguments={}), Goal(kind="usart_lacks", arguments={"text": "x"}))
-    )
-    assert met == ["touches nothing"]
-    assert failures == ["usart_lacks: 'x' was printed at 1.000 s"]
+    goals = (Goal(kind="no_collision", arguments={}), Goal(kind="usart_lacks", arguments={"text": "x"}))
+    judged = judge(run, goals, end_ns=S, planned_ns=9 * S)
+    assert judged.met == ["touches nothing"]
+    assert judged.missed == ["usart_lacks: 'x' was printed at 1.000 s"], "what forbids is judged from the start"
+
+
+@pytest.mark.parametrize("kind", sorted(KINDS))
+def test_a_goal_is_missed_from_the_planned_end_on_and_not_before_unless_it_forbids(kind: str) -> None:
+    arguments = {
+        "min_distance": {"distance_m": 1}, "cells": {"least": 2}, "motor_sequence": {"values": [[1, 1]]},
+        "usart_contains": {"text": "ready"}, "usart_lacks": {"text": "panic"}, "usart_in_order": {"texts": ["ready"]},
+    }  # fmt: skip
+    run = record(poses=[pose(collisions=1)], usart=text((1, "panic")))
+    goal = Goal(kind=kind, arguments=arguments.get(kind, {}))
+    early, late = (judge(run, (goal,), end_ns=end_ns, planned_ns=9 * S) for end_ns in (9 * S - 1, 9 * S))
+    assert (len(late.missed), late.not_judged) == (1, [])
+    if kind in {"no_collision", "usart_lacks"}:
+        assert early == late
+    else:
+        assert (early.missed, early.not_judged) == ([], [f"{goal.wanted}: not judged before 9 s"])

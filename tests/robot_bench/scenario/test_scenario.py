@@ -42,7 +42,7 @@ def test_the_four_programs_and_a_scenario_without_goals_ship() -> None:
 
 def test_what_a_scenario_leaves_out_has_its_default(tmp_path: Path) -> None:
     scenario = read_scenario(write(tmp_path, LEAST))
-    assert (scenario.mode, scenario.body, scenario.seed, scenario.duration_ns) == ("adapter", "bullet", 0, 10**10)
+    assert (scenario.mode, scenario.body, scenario.seed, scenario.duration_ns) == ("adapter", "best", 0, 10**10)
     assert scenario.threshold_um == 2_500_000, "half of the robot file's sonar range of 5 m"
     assert scenario.start is None
 
@@ -158,7 +158,7 @@ BOX = '[[obstacle]]\nat_s = 1\nname = "a"\nx_m = 0\ny_m = 0\nlength_m = 1\nwidth
         (LEAST + "threshold_m = nan\n", "threshold_m = nan is out of range", "above 0"),
         (LEAST + "seed = 1.5\n", "seed = 1.5 is not a whole number", None),
         (LEAST + "seed = -1\n", "seed = -1 is out of range", "at least 0"),
-        (LEAST + 'body = "bulet"\n', 'body = "bulet" is none of kinematic, bullet, mujoco', "bullet"),
+        (LEAST + 'body = "bulet"\n', 'body = "bulet" is none of best, kinematic, bullet, mujoco', "bullet"),
         ('firmware = "dodge"\nworld = "room"\n', "key 'duration_s' is missing", "seconds above 0"),
         (LEAST.replace("room", "rom"), "world: there is no world 'rom'", "room"),
         (LEAST.replace("room", "my.toml"), "there is no world file", "worlds that ship"),

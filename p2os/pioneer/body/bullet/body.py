@@ -111,12 +111,33 @@ class BulletBody:
             pybullet.stepSimulation(physicsClientId=self._client)
         joints = pybullet.getJointStates(self._robot, WHEELS, physicsClientId=self._client)
         self._zero = (joints[0][0], joints[1][0])
+        #: Where the engine's base came to rest: place and turn.
+        self._start = pybullet.getBasePositionAndOrientation(self._robot, physicsClientId=self._client)
+        self._count_anew()
+        return self.state
+
+    def put_back(self) -> None:
+        """Stand still where the last `reset` put it, and what was pushed where the world has it."""
+        client = self._client
+        for item in self._plan.pushable(self._world):
+            self.move(item.name, item.x_m, item.y_m, item.heading_rad)
+            self._moved_things[item.name] = None
+        pybullet.resetBasePositionAndOrientation(self._robot, *self._start, physicsClientId=client)
+        pybullet.resetBaseVelocity(self._robot, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0), physicsClientId=client)
+        for wheel, angle in zip(WHEELS, self._zero, strict=True):
+            pybullet.resetJointState(self._robot, wheel, angle, 0.0, physicsClientId=client)
+        self._targets = (0.0, 0.0)
+        self._command()
+        self._count_anew()
+        self._changed()
+
+    def _count_anew(self) -> None:
+        """Begin to count contacts and stalls, with what the wheels show now."""
         self._contacts = ContactCounter()
         self._hits: deque[Hit] = deque(maxlen=MOST_HITS)
         self._stalling = [0, 0]
-        self._joints = joints
+        self._joints = pybullet.getJointStates(self._robot, WHEELS, physicsClientId=self._client)
         self._state = None
-        return self.state
 
     def _build(self, made: Sequence[tuple[Obstacle, bool]], pose: Pose) -> None:
         """Make the engine's world anew.
@@ -393,6 +414,7 @@ class BulletBody:
             "walking": {name: since for name, (_, since, _) in self._walkers.items()},
             "obstacles": self._plan.obstacles,
             "moved": tuple(self._moved_things),
+            "start": self._start,
         }
 
     def restore(self, snapshot: object) -> None:
@@ -413,7 +435,7 @@ class BulletBody:
             pybullet.restoreState(fileName=str(path), physicsClientId=self._client)
         self._targets = saved["targets"]
         self._command()
-        self._zero = saved["zero"]
+        self._zero, self._start = saved["zero"], saved["start"]
         self._contacts.restore(saved["contacts"])
         self._hits = deque(saved["hits"], maxlen=MOST_HITS)
         self._stalling = list(saved["stalling"])

@@ -52,6 +52,8 @@ from simbase.timing import NS_PER_S, Nanos
 #: All that MuJoCo needs to go on alike.
 _STATE = mujoco.mjtState.mjSTATE_INTEGRATION
 _DT_S = STEP_NS / NS_PER_S
+#: The joints of the robot: its place in the world, its wheels, and what drives them.
+ROBOT_JOINTS = (ROBOT, *WHEELS, *ROTORS)
 
 
 class MujocoBody:
@@ -100,11 +102,26 @@ class MujocoBody:
         for _ in range(SETTLE_STEPS):
             mujoco.mj_step(self._model, self._data)
         self._zero = tuple(float(self._qpos[place]) for place in self._wheel_places)
+        #: How the robot came to rest: each of its joints.
+        self._start = {name: tuple(self._data.joint(name).qpos.tolist()) for name in ROBOT_JOINTS}
+        self._count_anew()
+        return self.state
+
+    def put_back(self) -> None:
+        """Stand still where the last `reset` put it, and what was pushed where the world has it."""
+        for item in self._plan.pushable(self._world):
+            self.move(item.name, item.x_m, item.y_m, item.heading_rad)
+            self._moved_things[item.name] = None
+        for name, place in self._start.items():
+            self._data.joint(name).qpos, self._data.joint(name).qvel = place, 0.0
+        self._count_anew()
+
+    def _count_anew(self) -> None:
+        """Begin to count contacts and stalls."""
         self._contacts = ContactCounter()
         self._hits: deque[Hit] = deque(maxlen=MOST_HITS)
         self._stalling = [0, 0]
         self._state = None
-        return self.state
 
     def _build(self) -> None:
         """Make the engine's model of what stands in the world now; all rests, the robot at the world's middle."""
@@ -319,6 +336,7 @@ class MujocoBody:
             "hits": tuple(self._hits),
             "stalling": tuple(self._stalling),
             "steps": self._steps,
+            "start": dict(self._start),
         }
 
     def restore(self, snapshot: object) -> None:
@@ -331,7 +349,7 @@ class MujocoBody:
         self._walkers = {name: (since, Walker(walks[name])) for name, since in saved["walking"].items()}
         self._build()
         mujoco.mj_setState(self._model, self._data, np.frombuffer(saved["engine"]), _STATE)
-        self._zero = saved["zero"]
+        self._zero, self._start = saved["zero"], dict(saved["start"])
         self._contacts.restore(saved["contacts"])
         self._hits = deque(saved["hits"], maxlen=MOST_HITS)
         self._stalling = list(saved["stalling"])
