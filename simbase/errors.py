@@ -3,6 +3,8 @@
 Whatever is raised here reaches a person as one line and one hint.
 """
 
+import re
+
 from simbase.installation import install_command
 
 
@@ -57,6 +59,7 @@ LONGEST_LINE = 500
 
 def one_line(text: str) -> str:
     """Return a message on one line, without what no line can hold, and with its middle left out where it is long."""
+    text = re.sub(r"\s*\n\s*", " ", text)
     if len(text) > LONGEST_LINE:
         text = f"{text[: LONGEST_LINE - 150]} ... {text[-145:]}"
     return text if text.isprintable() else "".join(c if c.isprintable() else ascii(c)[1:-1] for c in text)

@@ -209,8 +209,8 @@ def test_the_wheel_drives_the_demo_in_an_empty_environment(wheel: Path, tmp_path
 
     found = {finding["name"]: finding["found"] for finding in json.loads(said_by("doctor", "--json"))}
     assert [found[part] for part in PARTS] == ["built", "built"]
-    assert json.loads(said_by("demo", "--duration", "1", "--json"))["scenario"] == "dodge"
-    driven = said_by("run", "motors", "--body", "kinematic", "--adapter", "firmware", "--duration", "1", "--json")
+    assert json.loads(said_by("demo", "--duration", "1s", "--json"))["scenario"] == "dodge"
+    driven = said_by("run", "motors", "--body", "kinematic", "--adapter", "firmware", "--duration", "1s", "--json")
     assert json.loads(driven)["scenario"] == "motors"
 
 

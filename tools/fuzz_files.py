@@ -45,7 +45,7 @@ from p2os.protocol.profiles import Profile
 from p2os.robots.parameters import RobotParameters, load_parameters
 from robot_bench.recording.run_record import read_run
 from robot_bench.recording.summary import outcome_of
-from robot_bench.report.page import render_page
+from robot_bench.report.page import page_data, render_page
 from robot_bench.scenario.goals import judge
 from robot_bench.scenario.scenario import Scenario, known_scenarios, read_scenario
 from robot_bench.scenario.world_script import WorldScript
@@ -185,7 +185,7 @@ def use_trace(path: Path, _rng: random.Random) -> None:
     """Read a run folder's trace, judge it and write its page."""
     record = read_run(path.parent)
     json.dumps(outcome_of(record))
-    render_page(record)
+    render_page(record, page_data(record))
     judge(record, read_scenario(_shipped_scenario("dodge")).goals, end_ns=record.last_ns)
 
 

@@ -12,7 +12,7 @@ from typer.core import TyperCommand, TyperGroup, TyperOption
 
 from tests.documentation.page import ROOT
 
-EVERYWHERE = {"-h", "--help", "--trace"}
+EVERYWHERE = {"-h", "--help", "--trace", "--install-completion", "--show-completion"}
 PLACEHOLDER = re.compile(r"…|[^a-z-]*[A-Z…]")
 
 

@@ -53,7 +53,8 @@ SHIMS = {
     "python3": 'case "$1 $2" in "-m venv") exit 0;; esac; exec {python} "$@"',
     "pip": 'case "$*" in "install "*) exit 0;; esac; exit 2',  # the network; test_docs.py looks at the extras
     "pytest": 'cd {root} && exec {python} -m pytest --collect-only -q -p no:cacheprovider "$@"',
-    "make": 'if [ -e Makefile ]; then exec {make} "$@"; else exec {make} -n -C {root} "$@"; fi',
+    "sudo": "exit 0",  # what a machine needs once
+    "make": 'if [ -e Makefile ] || [ "$1" = -C ]; then exec {make} "$@"; else exec {make} -n -C {root} "$@"; fi',
 }
 
 

@@ -88,7 +88,7 @@ def test_an_error_that_names_an_extra_hints_at_its_packages(capsys: pytest.Captu
         (MissingDependencyError("no", extra="sim", hint="export to .csv"), "unicorn pyelftools, or export to .csv"),
         (MissingDependencyError("no", extra="sim"), "unicorn pyelftools"),
     ):
-        assert report(error, []) == 2
+        assert report(error) == 2
         assert capsys.readouterr().err == f"p2os: no\nhint: pip install {hint}\n"
 
 

@@ -208,6 +208,6 @@ def test_the_scenario_with_goals_that_the_readme_shows_is_met() -> None:
 def test_a_program_from_elsewhere_drives_without_being_judged(capsys: pytest.CaptureFixture[str]) -> None:
     project.write_project(Path("mine"), project.project_files("kinematic"))
     assert make().returncode == 0
-    words = ["run", "free-drive", "--firmware", "mine/build/robot.elf", "--body", "kinematic", "--duration", "10"]
+    words = ["run", "free-drive", "--firmware", "mine/build/robot.elf", "--body", "kinematic", "--duration", "10s"]
     assert p2os(words) == 0
     assert "ended well, no goals were set" in capsys.readouterr().out

@@ -60,7 +60,7 @@ def test_a_scenario_without_a_body_takes_the_best_that_is_left_and_says_so(
 
 @pytest.mark.parametrize(("missing", "body", "note"), LEFT)
 def test_serve_demo_and_programs_take_the_same_body(missing: list[str], body: str, note: str, tmp_path: Path) -> None:
-    demo = p2os(missing, ["demo", "--duration", "0.05", "--out", "run", "--json"], tmp_path)
+    demo = p2os(missing, ["demo", "--duration", "0.05s", "--out", "run", "--json"], tmp_path)
     outcome = json.loads(demo.stdout)
     assert (outcome["body"], note in outcome["notes"]) == (body, True)
     code = WITHOUT.format(missing=missing, words=[]).replace("main([])", "") + (
@@ -77,7 +77,7 @@ def test_serve_demo_and_programs_take_the_same_body(missing: list[str], body: st
 
 
 def test_a_body_that_is_named_and_not_installed_is_refused_with_what_to_do(tmp_path: Path) -> None:
-    done = p2os(["pybullet"], ["run", "dodge", "--duration", "0.1"], tmp_path)
+    done = p2os(["pybullet"], ["run", "dodge", "--duration", "0.1s"], tmp_path)
     assert done.returncode == 2
     assert "p2os: the bullet body needs pybullet" in done.stderr
     assert "--body best" in done.stderr
