@@ -173,6 +173,8 @@ def _file(record: RunRecord, entry: Json) -> None:
     """Put one entry where it belongs; kinds that a later version adds are passed over."""
     kind = entry.get("k")
     if kind == "meta":
+        for item in cast("list[Json]", cast("Json", entry.get("world") or {}).get("obstacles") or []):
+            _ = str(item["name"]), *(float(cast("float", item[key])) for key in ("x", "y") if "mesh" not in item)
         record.meta = entry
         return
     if kind == "end":
@@ -194,14 +196,18 @@ def _file(record: RunRecord, entry: Json) -> None:
     elif kind == "event":
         detail = str(entry.get("detail", ""))
         record.events.append(Event(t=t, who=str(entry["who"]), what=str(entry["what"]), detail=detail))
-    elif kind == "obstacle":
+    elif kind == "obstacle" and str(entry.get("op")) in _NUMBERS:
         record.obstacles.append(_obstacle(t, entry))
+
+
+#: What a change of the world has to say in numbers.
+_NUMBERS: dict[object, tuple[str, ...]] = {"place": ("x", "y"), "move": ("x", "y"), "remove": ()}
 
 
 def _obstacle(t: int, entry: Json) -> Json:
     """Return a change of the world whose numbers are numbers."""
     sizes = ("length", "width") if entry.get("shape", "box") == "box" else ("radius",)
-    needed = {"place": ("x", "y", *sizes), "move": ("x", "y")}.get(str(entry.get("op")), ())
+    needed = (*_NUMBERS[entry["op"]], *(sizes if entry["op"] == "place" else ()))
     numbers = {key: float(cast("float", entry[key])) for key in (*needed, *(["heading"] if "heading" in entry else []))}
     return {**entry, **numbers, "t": t, "name": str(entry["name"])}
 

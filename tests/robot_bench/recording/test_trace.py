@@ -136,7 +136,7 @@ def test_the_largest_time_that_64_bits_hold_is_read(tmp_path: Path) -> None:
     [
         '{"k":"sonar","t":1}',
         '{"k":"wire","t":1,"hex":"zz","dir":"c2r"}',
-        '{"k":"obstacle","t":1}',
+        '{"k":"obstacle","t":1,"op":"place"}',
         f'{{"k":"pin","net":"a","t":{2**63},"v":1}}',
         f'{{"k":"sonar","t":1,"mm":[{10**400}]}}',
     ],
