@@ -27,7 +27,7 @@ from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass
 from itertools import product
 
-from p2os.pioneer.body.contract import RobotBody
+from p2os.pioneer.body.contract import FASTEST_MPS, RobotBody
 from p2os.pioneer.body.other_robots import (
     OtherRobot,
     OtherRobots,
@@ -44,8 +44,6 @@ from simbase.timing import NS_PER_MS, NS_PER_S, Nanos, Reached
 
 #: chosen: 5 mm at half a metre a second, which is less than what a sonar's own noise is.
 SLICE_NS: Nanos = 10 * NS_PER_MS
-#: No point of a hull is faster: both rims at the highest ceiling of any model, against each other, m/s.
-FASTEST_MPS = 8.0
 #: How much nearer two hulls can come within a slice, m.
 CLOSING_M = 2 * FASTEST_MPS * SLICE_NS / NS_PER_S
 

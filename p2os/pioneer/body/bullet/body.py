@@ -33,7 +33,7 @@ from p2os.pioneer.body.bullet.model import (
     park_obstacle,
 )
 from p2os.pioneer.body.bullet.rays import SonarRays
-from p2os.pioneer.body.contract import BodyState, Turned
+from p2os.pioneer.body.contract import FASTEST_MPS, BodyState, Turned
 from p2os.pioneer.body.engine_body import EngineBody
 from p2os.pioneer.body.in_world import DT_S
 from p2os.pioneer.body.physical import (
@@ -50,8 +50,6 @@ from p2os.robots.parameters import RobotParameters
 
 #: Bullet keeps contact points a little apart; touching is no farther than this, m.
 TOUCH_M = 1e-4
-#: No point of the hull is faster than this: both rims at the highest ceiling of any model, against each other, m/s.
-FASTEST_MPS = 8.0
 #: Farther than this from everything, contacts need not be looked for; looked again after so many steps otherwise.
 FAR_M, LOOK_STEPS = 0.1, 50
 WHEELS = (LEFT, RIGHT)
