@@ -195,8 +195,20 @@ def _like(value: Any, items: Iterable[object]) -> object:
     return kind(*items) if hasattr(kind, "_fields") else tuple(items)
 
 
+class _Generator(tuple[object, ...]):
+    """The saved state of a random generator, from which one is made where none stands yet."""
+
+    __slots__ = ()
+
+    def made(self) -> random.Random:
+        source = random.Random()
+        source.setstate(self)
+        return source
+
+
 #: How a value is copied: of what kind, and how, with a function for what it holds.
 _REBUILD: tuple[tuple[type, Callable[[Any, Callable[[Any], object]], object]], ...] = (
+    (_Generator, lambda saved, _: saved.made()),
     (tuple, lambda value, inner: _like(value, map(inner, value))),
     (deque, lambda value, inner: deque(map(inner, value), value.maxlen)),
     (list, lambda value, inner: [inner(item) for item in value]),
@@ -204,7 +216,7 @@ _REBUILD: tuple[tuple[type, Callable[[Any, Callable[[Any], object]], object]], .
     (set, lambda value, _: value.copy()),
     (bytearray, lambda value, _: value.copy()),
     (ctypes.Array, lambda value, _: bytes(value)),
-    (random.Random, lambda value, _: value.getstate()),
+    (random.Random, lambda value, _: _Generator(value.getstate())),
 )
 
 #: What is always restored in place, from a snapshot of another kind than itself.

@@ -19,15 +19,3 @@ class RandomSource:
         if name not in self.streams:
             self.streams[name] = random.Random(f"{self.seed} {name}")
         return self.streams[name]
-
-    def snapshot(self) -> object:
-        """Return all that decides the future."""
-        return self.seed, tuple((name, stream.getstate()) for name, stream in sorted(self.streams.items()))
-
-    def restore(self, snapshot: object) -> None:
-        """Put back what `snapshot` returned."""
-        assert isinstance(snapshot, tuple)  # noqa: S101  # our own value
-        self.seed, saved = snapshot
-        self.streams = {}
-        for name, state in saved:
-            self.of(name).setstate(state)

@@ -4,6 +4,7 @@ import json
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -13,6 +14,7 @@ from p2os.protocol.frames import Decoder, Frame
 from p2os.protocol.profiles import Profile
 from p2os.protocol.sip import SIP_KINDS, StandardSip
 from p2os.robots.parameters import RobotParameters, load_parameters
+from simbase.state import Stateful
 from simbase.timing import NS_PER_MS
 
 
@@ -31,8 +33,10 @@ class WheelAngles:
 
 
 @dataclass
-class PerfectBody:
+class PerfectBody(Stateful):
     """Wheels that do what they are told, and sonar that read what the test says."""
+
+    STATE = ("state", "range_m", "steps")
 
     dt_ns: int = NS_PER_MS
     radius_m: float = 0.0825
@@ -61,11 +65,10 @@ class PerfectBody:
         self.asked.append(tuple(numbers))
         return [self.range_m.get(number, 5.0) for number in numbers]
 
-    def snapshot(self) -> object:
-        return self.state, self.steps, dict(self.range_m)
 
-    def restore(self, snapshot: object) -> None:
-        self.state, self.steps, self.range_m = snapshot  # type: ignore[misc]
+def context_of(pioneer: Pioneer) -> Any:
+    """Return what a snapshot holds of the parts that commands act on."""
+    return pioneer.snapshot()["_context"]
 
 
 class Robot:

@@ -147,6 +147,13 @@ def test_a_snapshot_stays_as_it_is_however_often_it_is_restored() -> None:
     assert pickle.dumps(saved) == kept
 
 
+def test_a_random_generator_that_is_not_there_yet_is_made_anew() -> None:
+    saved = Holder({"noise": random.Random(3)}).snapshot()
+    for other in (Holder({}), Holder({"noise": random.Random(4), "later": random.Random(5)})):
+        other.restore(reloaded(pickle.dumps(saved)))
+        assert [source.random() for source in other.held.values()] == [random.Random(3).random()]
+
+
 def test_an_order_of_keys_that_has_changed_is_put_back() -> None:
     part = Part()
     part.table = {"a": [], "b": []}

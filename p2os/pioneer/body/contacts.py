@@ -4,19 +4,26 @@ A collision is a new contact of the hull with anything but the floor; contacts
 that follow each other within 0.2 s are one.
 """
 
+from collections import deque
+
+from p2os.pioneer.body.contract import MOST_HITS, Hit
+from simbase.state import Stateful
+
 #: Steps of 1 ms without contact after which a contact is a new one (chosen: longer than a bounce).
 APART_STEPS = 200
 
 
-class ContactCounter:
-    """Turn a stream of touching/not touching into a count."""
+class ContactCounter(Stateful):
+    """Turn a stream of touching/not touching into a count, and remember the collisions."""
 
-    __slots__ = ("_apart", "collisions", "touching")
+    __slots__ = ("_apart", "_hits", "collisions", "touching")
+    STATE = ("_apart", "_hits", "collisions", "touching")
 
     def __init__(self) -> None:
         self.collisions = 0
         self.touching = False
         self._apart = APART_STEPS
+        self._hits: deque[Hit] = deque(maxlen=MOST_HITS)
 
     def update(self, touching: bool, steps: int = 1) -> bool:
         """Take what was seen over the last `steps` steps; tell whether it is a new collision."""
@@ -29,10 +36,12 @@ class ContactCounter:
         self.touching = touching
         return is_new
 
-    def snapshot(self) -> tuple[int, bool, int]:
-        """Return all that decides the future."""
-        return self.collisions, self.touching, self._apart
+    def note(self, hit: Hit) -> None:
+        """Remember what a new collision was."""
+        self._hits.append(hit)
 
-    def restore(self, snapshot: tuple[int, bool, int]) -> None:
-        """Put back what `snapshot` returned."""
-        self.collisions, self.touching, self._apart = snapshot
+    def take_hits(self) -> list[Hit]:
+        """Return the collisions that were noted since this was asked last, the last 16 at the most."""
+        hits = list(self._hits)
+        self._hits.clear()
+        return hits

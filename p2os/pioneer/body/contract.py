@@ -18,6 +18,8 @@ from simbase.timing import NS_PER_MS, Nanos
 
 #: One step of every body: 1 kHz.
 STEP_NS: Nanos = NS_PER_MS
+#: No point of a hull is faster: both rims at the highest ceiling of any model, against each other, m/s.
+FASTEST_MPS = 8.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -13,19 +13,17 @@ It serves as the oracle for the other bodies, and where PyBullet is not to be ha
 """
 
 import math
-from collections import deque
 from collections.abc import Sequence
 
 from p2os.pioneer.body.contacts import ContactCounter
-from p2os.pioneer.body.contract import MOST_HITS, STEP_NS, BodyState, Hit, Turned
+from p2os.pioneer.body.contract import BodyState, Turned
+from p2os.pioneer.body.in_world import DT_S, BodyInWorld
 from p2os.pioneer.body.other_robots import OtherRobots, StandingPose
 from p2os.pioneer.body.ray_cast import Direction, Echo, cast, echoes
 from p2os.pioneer.sonar.ring import cones, reading
 from p2os.pioneer.world.geometry import Footprint, hull_polygon, placed
-from p2os.pioneer.world.model import Obstacle, Pose, Walker, World
-from p2os.pioneer.world.plan import Plan, StaticPlan
+from p2os.pioneer.world.model import Pose, World
 from p2os.robots.parameters import RobotParameters
-from simbase.timing import NS_PER_S, Nanos
 
 #: Below this turn in one step the arc is a straight line to double precision, rad.
 STRAIGHT_RAD = 1e-9
@@ -34,23 +32,24 @@ LOOK_AHEAD_M = 2.0
 #: What walks is moved each 10 ms (chosen: 8 mm at a walker's pace).
 WALK_STEPS = 10
 GRAVITY_MPS2 = 9.81
-_DT_S = STEP_NS / NS_PER_S
 
 
-class KinematicBody:
+class KinematicBody(BodyInWorld):
     """A differential drive on a plan."""
 
+    STATE = ("_start", "_x", "_y", "_heading", "_left_angle", "_right_angle", "_left", "_right", "_asked", "_stalled",
+             "_is_bumped", "_blocked_at", "_free_m")  # fmt: skip
+    #: The other robots of a world are made known by `join`.
+    DERIVED = ("_cos", "_sin", "_other_robots")
+
     name = "kinematic"
-    dt_ns: Nanos = STEP_NS
 
     def __init__(self, world: World, parameters: RobotParameters) -> None:
-        self._world = world
-        self._parameters = parameters
+        super().__init__(world, parameters)
         self._cones = cones(parameters)
         self._track_m = parameters.track_mm / 1000
         self._radius_m = parameters.body.wheel_diameter_m / 2
         body = parameters.body
-        self._static = StaticPlan(world, parameters)
         self._hull = hull_polygon(body)
         self._other_robots: OtherRobots | None = None
         #: The greatest force of both motors together, N.
@@ -60,6 +59,10 @@ class KinematicBody:
         self._hull_reach = math.hypot(max(body.hull_front_m, body.hull_rear_m), body.hull_width_m / 2)
         self._x, self._y, self._heading, self._cos, self._sin = 0.0, 0.0, 0.0, 1.0, 0.0
         self.reset(world.start, 0)
+
+    def _restored(self) -> None:
+        super()._restored()
+        self._take_pose(self._x, self._y, self._heading)
 
     @property
     def note(self) -> str | None:
@@ -101,22 +104,14 @@ class KinematicBody:
     def reset(self, pose: Pose, seed: int) -> BodyState:
         """Stand still at a pose in the world as it was made; nothing here is random."""
         del seed
-        self._steps = 0
-        self._walkers: dict[str, tuple[int, Walker]] = {}
-        self._plan = Plan((), self._parameters, self._static)
-        self._moved_things: dict[str, None] = {}
-        for item in self._world.obstacles:
-            if not item.fixed:
-                self._put(item)
+        self._begin()
         self._start = pose
         self._stand_at(pose)
         return self.state
 
     def put_back(self) -> None:
         """Stand still where the last `reset` put it, and what was pushed where the world has it."""
-        for item in self._plan.pushable(self._world):
-            self.move(item.name, item.x_m, item.y_m, item.heading_rad)
-            self._moved_things[item.name] = None
+        super().put_back()
         self._stand_at(self._start)
 
     def _stand_at(self, pose: Pose) -> None:
@@ -130,7 +125,6 @@ class KinematicBody:
         #: The last set-points, where they would have brought the hull into a thing.
         self._blocked_at: tuple[float, float] | None = None
         self._contacts = ContactCounter()
-        self._hits: deque[Hit] = deque(maxlen=MOST_HITS)
         #: No thing is nearer to the hull than this; 0 only where the hull is inside one.
         self._free_m = 0.0
         self._changed()
@@ -138,12 +132,12 @@ class KinematicBody:
     def step(self, left_mps: float, right_mps: float) -> Turned:
         """Move on by one step along the exact arc, or stall."""
         self._steps += 1
-        if self._walkers and self._steps % WALK_STEPS == 0:
+        if self._walking and self._steps % WALK_STEPS == 0:
             self._walk()
         self._asked = asked = (left_mps, right_mps)
         if left_mps == 0.0 and right_mps == 0.0:
             return self._stand()
-        forward, turn = (left_mps + right_mps) / 2 * _DT_S, (right_mps - left_mps) / self._track_m * _DT_S
+        forward, turn = (left_mps + right_mps) / 2 * DT_S, (right_mps - left_mps) / self._track_m * DT_S
         c, s = self._cos, self._sin
         heading = self._heading + turn
         if abs(turn) < STRAIGHT_RAD:
@@ -171,15 +165,15 @@ class KinematicBody:
             self._blocked_at = asked if blocked else None
         self._stalled = blocked
         if self._contacts.update(touching=blocked or self._is_bumped or self._free_m == 0.0):
-            self._note_hit(x, y, heading)
+            self._note_contact(x, y, heading)
         self._is_bumped = False
         if blocked:
             self._left = self._right = 0.0
             return Turned(self._left_angle, self._right_angle)
         self._x, self._y, self._heading, self._cos, self._sin = x, y, heading, c, s
         self._left, self._right = left_mps, right_mps
-        self._left_angle += left_mps * _DT_S / self._radius_m
-        self._right_angle += right_mps * _DT_S / self._radius_m
+        self._left_angle += left_mps * DT_S / self._radius_m
+        self._right_angle += right_mps * DT_S / self._radius_m
         return Turned(self._left_angle, self._right_angle)
 
     def _stand(self) -> Turned:
@@ -187,7 +181,7 @@ class KinematicBody:
         self._left = self._right = 0.0
         self._stalled = False
         if self._contacts.update(touching=self._is_bumped or self._free_m == 0.0):
-            self._note_hit(self._x, self._y, self._heading)
+            self._note_contact(self._x, self._y, self._heading)
         self._is_bumped = False
         return Turned(self._left_angle, self._right_angle)
 
@@ -206,16 +200,15 @@ class KinematicBody:
             if not self._push(x, y, heading):
                 return True
             if self._contacts.update(touching=True, steps=0):
-                self._note_hit(x, y, heading)
+                self._note_contact(x, y, heading)
             free = self._plan.clearance(x, y, heading, no_more_than=LOOK_AHEAD_M)
         self._free_m = free
         return False
 
-    def _note_hit(self, x: float, y: float, heading: float) -> None:
+    def _note_contact(self, x: float, y: float, heading: float) -> None:
         """Remember a collision at a pose, whether or not the robot may take it."""
         robots = () if self._other_robots is None else self._other_robots.touchable()
-        name, x_m, y_m = self._plan.contact(x, y, heading, robots)
-        self._hits.append(Hit(at_ns=self._steps * STEP_NS, name=name, x_m=x_m, y_m=y_m))
+        self._note_hit(*self._plan.contact(x, y, heading, robots))
 
     def _meets(self, other_robots: OtherRobots, x: float, y: float, heading: float) -> bool:
         """Tell whether another robot is in the way, and let it feel so; one that was put into another may move."""
@@ -255,19 +248,10 @@ class KinematicBody:
 
     def _walk(self) -> None:
         """Put everything that walks where it is by now."""
-        for name, (since, walker) in self._walkers.items():
-            x, y, heading = walker.pose_at((self._steps - since) * _DT_S)
-            self._plan.move(name, x, y, heading)
+        for name, pose in self._walked():
+            self._plan.move(name, *pose)
             self._moved_things[name] = None
         self._changed()
-
-    def _put(self, obstacle: Obstacle) -> None:
-        """Put a thing into the plan; one that walks begins at its first point, now."""
-        self._plan.place(obstacle)
-        if obstacle.walk is not None:
-            walker = Walker(obstacle.walk)
-            self._walkers[obstacle.name] = (self._steps, walker)
-            self._plan.move(obstacle.name, *walker.pose_at(0.0))
 
     def _changed(self) -> None:
         """Prepare for a plan that is another one now."""
@@ -310,68 +294,3 @@ class KinematicBody:
             return free
         hull = placed(self._hull, self._x, self._y, self._heading)
         return min([free, *(shape.distance(hull) for shape in self._other_robots.touchable())])
-
-    def place(self, obstacle: Obstacle) -> None:
-        """Put an obstacle with a new name into the world."""
-        self._put(obstacle)
-        self._changed()
-
-    def move(self, name: str, x_m: float, y_m: float, heading_rad: float) -> None:
-        """Put an obstacle somewhere else; one that walks stays there."""
-        self._walkers.pop(name, None)
-        self._plan.move(name, x_m, y_m, heading_rad)
-        self._changed()
-
-    def remove(self, name: str) -> None:
-        """Take an obstacle out of the world."""
-        self._plan.remove(name)
-        self._walkers.pop(name, None)
-        self._changed()
-
-    def take_moved(self) -> list[Obstacle]:
-        """Return what has walked or was pushed since this was asked last, where it is now."""
-        if not self._moved_things:
-            return []
-        moved, self._moved_things = self._moved_things, {}
-        return [item for item in self._plan.obstacles if item.name in moved]
-
-    def take_hits(self) -> list[Hit]:
-        """Return the collisions since this was asked last."""
-        hits = list(self._hits)
-        self._hits.clear()
-        return hits
-
-    def snapshot(self) -> object:
-        """Return all that decides the future."""
-        return {
-            "pose": (self._x, self._y, self._heading),
-            "wheels": (self._left_angle, self._right_angle, self._left, self._right),
-            "asked": self._asked,
-            "stalled": (self._stalled, self._is_bumped),
-            "free_m": self._free_m,
-            "contacts": self._contacts.snapshot(),
-            "hits": tuple(self._hits),
-            "obstacles": self._plan.obstacles,
-            "steps": self._steps,
-            "walking": {name: since for name, (since, _) in self._walkers.items()},
-            "moved": tuple(self._moved_things),
-            "start": self._start,
-        }
-
-    def restore(self, snapshot: object) -> None:
-        """Put back what `snapshot` returned."""
-        assert isinstance(snapshot, dict)  # noqa: S101  # our own value
-        self._plan = Plan(snapshot["obstacles"], self._parameters, self._static)
-        self._steps = snapshot["steps"]
-        self._moved_things = dict.fromkeys(snapshot["moved"])
-        self._start = snapshot["start"]
-        walks = {item.name: item.walk for item in self._plan.obstacles if item.walk is not None}
-        self._walkers = {name: (since, Walker(walks[name])) for name, since in snapshot["walking"].items()}
-        self._take_pose(*snapshot["pose"])
-        self._left_angle, self._right_angle, self._left, self._right = snapshot["wheels"]
-        self._asked = snapshot["asked"]
-        self._stalled, self._is_bumped = snapshot["stalled"]
-        self._contacts.restore(snapshot["contacts"])
-        self._hits = deque(snapshot["hits"], maxlen=MOST_HITS)
-        self._changed()
-        self._free_m = snapshot["free_m"]

@@ -14,6 +14,7 @@ from p2os.pioneer.world.geometry import Footprint, hull_polygon, placed
 from p2os.pioneer.world.model import Obstacle, World
 from p2os.pioneer.world.plan import Bands
 from p2os.robots.parameters import RobotParameters
+from simbase.state import Stateful
 
 #: Footprints kept of one robot: where it stands now, and where it stood at the last boundary.
 KEPT = 2
@@ -27,7 +28,7 @@ class StandingPose(NamedTuple):
     heading_rad: float
 
 
-class OtherRobot:
+class OtherRobot(Stateful):
     """One robot as the others meet it.
 
     Args:
@@ -36,6 +37,10 @@ class OtherRobot:
         body: Itself.
         rise_m: How much taller it is taken for, so that it stands on every floor of the world at once.
     """
+
+    STATE = ("current", "at_boundary")
+    #: Footprints that were asked for.
+    DERIVED = ("_shapes",)
 
     def __init__(self, name: str, parameters: RobotParameters, body: RobotBody, rise_m: float = 0.0) -> None:
         shape = parameters.body

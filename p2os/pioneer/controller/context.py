@@ -4,7 +4,7 @@ No command is carried out here (`commands`), and nothing is sent (`reporter`).
 """
 
 import math
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 
 from p2os.pioneer.controller.dead_reckoning import DeadReckoning
 from p2os.pioneer.controller.faults import Faults
@@ -14,6 +14,7 @@ from p2os.pioneer.devices.fitted import Devices
 from p2os.pioneer.random_source import RandomSource
 from p2os.pioneer.sonar.schedule import SonarSchedule
 from p2os.protocol.profiles import Profile
+from simbase.state import Stateful
 from simbase.timing import Nanos
 
 
@@ -28,7 +29,7 @@ class BumperWatch:
 
 
 @dataclass(slots=True, kw_only=True)
-class Context:
+class Context(Stateful):
     """The parts of a robot that commands act on."""
 
     motion: Motion
@@ -87,31 +88,3 @@ class Context:
         elif stick.drives:
             stick.drives = False
             self.motion.stop()
-
-    def snapshot(self) -> object:
-        """Return all that decides the future; what a command leaves to be done is done by then."""
-        return {
-            "motion": self.motion.snapshot(),
-            "reckoning": self.reckoning.snapshot(),
-            "sonar": self.sonar.snapshot(),
-            "devices": self.devices.snapshot(),
-            "requests": self.requests.snapshot(),
-            "kept": tuple(sorted(self.kept.items())),
-            "faults": self.faults.copy(),
-            "bumper_watch": replace(self.bumper_watch),
-            "random_source": self.random_source.snapshot(),
-            "drifted_at_mm": self.drifted_at_mm,
-        }
-
-    def restore(self, snapshot: object) -> None:
-        """Put back what `snapshot` returned."""
-        assert isinstance(snapshot, dict)  # noqa: S101  # our own value
-        self.motion.restore(snapshot["motion"])
-        self.reckoning.restore(snapshot["reckoning"])
-        self.sonar.restore(snapshot["sonar"])
-        self.devices.restore(snapshot["devices"])
-        self.requests.restore(snapshot["requests"])
-        self.kept = dict(snapshot["kept"])
-        self.faults, self.bumper_watch = snapshot["faults"].copy(), replace(snapshot["bumper_watch"])
-        self.random_source.restore(snapshot["random_source"])
-        self.drifted_at_mm = snapshot["drifted_at_mm"]

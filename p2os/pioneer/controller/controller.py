@@ -33,7 +33,6 @@ the result does not depend on how often a caller calls `advance_to`.
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from typing import cast
 
 from p2os.pioneer.controller.bumper_watch import check_bumpers, is_watching
 from p2os.pioneer.controller.commands import IGNORED, Effect, apply
@@ -70,6 +69,7 @@ from p2os.protocol.connection import (
 from p2os.protocol.packets import Identity, ResetNotice
 from p2os.protocol.profiles import Profile
 from p2os.robots.parameters import RobotParameters
+from simbase.state import Stateful
 from simbase.timing import NS_PER_MS, NS_PER_S, Nanos, Reached
 
 #: (now in ns, what happened in a word or two, detail).
@@ -115,7 +115,7 @@ class ControllerState:
     injected: tuple[str, ...] = ()
 
 
-class Pioneer:
+class Pioneer(Stateful):
     """A P2OS robot: its controller and its body.
 
     Args:
@@ -128,6 +128,11 @@ class Pioneer:
     Raises:
         UsageError: Words of a fault mean nothing.
     """
+
+    STATE = ("body", "_body_now", "_sip_due", "_boot_at", "_ignored", "_complaints", "_connection", "_sender",
+             "_context")  # fmt: skip
+    #: Holds no state of its own.
+    DERIVED = ("_reporter",)
 
     def __init__(
         self,
@@ -307,30 +312,6 @@ class Pioneer:
             self._act(due)
         self._step_body_to(limit)
         return Reached(limit)
-
-    def snapshot(self) -> object:
-        """Return all that decides the future, body included, as a plain value."""
-        return _Snapshot(
-            body=self.body.snapshot(),
-            body_now=self._body_now,
-            sip_due=self._sip_due,
-            boot_at=self._boot_at,
-            ignored=self._ignored,
-            complaints=self._complaints,
-            connection=self._connection.snapshot(),
-            sender=self._sender.snapshot(),
-            context=self._context.snapshot(),
-        )
-
-    def restore(self, snapshot: object) -> None:
-        """Put back what `snapshot` returned."""
-        saved = cast("_Snapshot", snapshot)
-        self.body.restore(saved.body)
-        self._body_now, self._sip_due, self._boot_at = saved.body_now, saved.sip_due, saved.boot_at
-        self._ignored, self._complaints = saved.ignored, saved.complaints
-        self._connection.restore(saved.connection)
-        self._sender.restore(saved.sender)
-        self._context.restore(saved.context)
 
     # Time ----------------------------------------------------------------------------
 
@@ -533,21 +514,6 @@ class Pioneer:
     def _notify(self, now: Nanos, what: str, detail: str) -> None:
         if self.on_event is not None:
             self.on_event(now, what, detail)
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class _Snapshot:
-    """All that decides a controller's future."""
-
-    body: object
-    body_now: Nanos
-    sip_due: Nanos | None
-    boot_at: Nanos | None
-    ignored: int
-    complaints: tuple[str, ...]
-    connection: object
-    sender: object
-    context: object
 
 
 def _new_devices(settings: ControllerSettings) -> Devices:

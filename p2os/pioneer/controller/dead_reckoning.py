@@ -8,31 +8,18 @@ Invariant: `turned_rad` and `travel_mm` never jump; SETO moves only the origin.
 """
 
 import math
-from dataclasses import dataclass
-from typing import cast
+
+from simbase.state import Stateful
 
 #: The packet carries 15 bits of position (Pioneer 2/3 manuals, standard SIP).
 POSITION_MODULUS = 1 << 15
 NM_PER_MM = 1_000_000
 
 
-@dataclass(frozen=True, slots=True)
-class _Snapshot:
-    """All that a `DeadReckoning` remembers."""
-
-    x_mm: float
-    y_mm: float
-    turned_rad: float
-    travel_mm: float
-    zero_rad: float
-    left_rad: float
-    right_rad: float
-    left_mm: float
-    right_mm: float
-
-
-class DeadReckoning:
+class DeadReckoning(Stateful):
     """The robot's odometer."""
+
+    STATE = ("x_mm", "y_mm", "turned_rad", "travel_mm", "_zero_rad", "_left_rad", "_right_rad", "left_mm", "right_mm")
 
     def __init__(
         self, *, wheel_diameter_m: float, track_mm: int, left_wheel: float = 1.0, right_wheel: float = 1.0
@@ -107,21 +94,6 @@ class DeadReckoning:
             round(self.x_mm * NM_PER_MM / distance_nm_per_count) % POSITION_MODULUS,
             round(self.y_mm * NM_PER_MM / distance_nm_per_count) % POSITION_MODULUS,
         )
-
-    def snapshot(self) -> object:
-        """Return all that decides the future."""
-        return _Snapshot(
-            self.x_mm, self.y_mm, self.turned_rad, self.travel_mm, self._zero_rad, self._left_rad, self._right_rad,
-            self.left_mm, self.right_mm,
-        )  # fmt: skip
-
-    def restore(self, snapshot: object) -> None:
-        """Put back what `snapshot` returned."""
-        saved = cast("_Snapshot", snapshot)
-        self.x_mm, self.y_mm, self._zero_rad = saved.x_mm, saved.y_mm, saved.zero_rad
-        self.turned_rad, self.travel_mm = saved.turned_rad, saved.travel_mm
-        self.left_mm, self.right_mm = saved.left_mm, saved.right_mm
-        self.begin(saved.left_rad, saved.right_rad)
 
 
 def raw_angle(angle_rad: float) -> int:

@@ -160,10 +160,3 @@ class Faults:
         else:
             self.gap_out = gap
         return bytes(found)
-
-    def copy(self) -> "Faults":
-        """Return a copy."""
-        return Faults(
-            dict(self.sonar), self.left_blocked, self.right_blocked, self.is_loose, self.bit_error_rate,
-            self.gap_in, self.gap_out,
-        )  # fmt: skip

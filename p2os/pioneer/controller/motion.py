@@ -29,9 +29,9 @@ so a ramp is exact for every step that is a whole number of microseconds.
 import math
 from dataclasses import dataclass, replace
 from enum import Enum
-from typing import cast
 
 from p2os.robots.parameters import RobotParameters
+from simbase.state import Stateful
 from simbase.timing import Nanos
 
 NM_PER_MM = 1_000_000
@@ -137,19 +137,10 @@ class _Axis:
             self.speed = max(speed - slower, target) if speed > 0 else min(speed + slower, target)
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class _Snapshot:
-    limits: MotionLimits
-    mode: Mode
-    is_held: bool
-    is_powered: bool
-    first: _Axis
-    second: _Axis
-    wheels: tuple[float, float]
-
-
-class Motion:
+class Motion(Stateful):
     """The motion commands of one robot, and the wheel speeds that they ask for."""
+
+    STATE = ("limits", "mode", "is_held", "is_powered", "_first", "_second", "_wheels")
 
     def __init__(self, limits: MotionLimits, *, track_mm: int, dt_ns: Nanos) -> None:
         self.limits = limits
@@ -295,26 +286,6 @@ class Motion:
         return self._wheels
 
     # Saving -----------------------------------------------------------------------
-
-    def snapshot(self) -> object:
-        """Return all that decides the future, as a plain value."""
-        return _Snapshot(
-            limits=self.limits,
-            mode=self.mode,
-            is_held=self.is_held,
-            is_powered=self.is_powered,
-            first=replace(self._first),
-            second=replace(self._second),
-            wheels=self._wheels,
-        )
-
-    def restore(self, snapshot: object) -> None:
-        """Put back what `snapshot` returned."""
-        saved = cast("_Snapshot", snapshot)
-        self.limits, self.mode = saved.limits, saved.mode
-        self.is_held, self.is_powered = saved.is_held, saved.is_powered
-        self._first, self._second = replace(saved.first), replace(saved.second)
-        self._wheels = saved.wheels
 
     # Helpers ----------------------------------------------------------------------
 

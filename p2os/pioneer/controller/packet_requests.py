@@ -73,18 +73,3 @@ class Requests:
     def must_go(self, extra: Extra) -> bool:
         """Tell whether a packet has waited long enough."""
         return extra in self.once and self.waited >= LONGEST_WAIT_CYCLES
-
-    def snapshot(self) -> object:
-        """Return all that decides the future."""
-        return _names(self.continuous), _names(self.once), self.waited, self.dropped
-
-    def restore(self, snapshot: object) -> None:
-        """Put back what `snapshot` returned."""
-        assert isinstance(snapshot, tuple)  # noqa: S101  # our own value
-        continuous, once, self.waited, self.dropped = snapshot
-        self.continuous = frozenset(Extra[name] for name in continuous)
-        self.once = frozenset(Extra[name] for name in once)
-
-
-def _names(extras: frozenset[Extra]) -> tuple[str, ...]:
-    return tuple(sorted(extra.name for extra in extras))

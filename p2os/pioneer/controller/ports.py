@@ -69,7 +69,7 @@ class SensedState(WheelState, Protocol):
 
 
 class Body(Protocol):
-    """A body that is stepped."""
+    """A body that is stepped; for a snapshot of the robot its state is declared (`simbase.state`)."""
 
     @property
     def dt_ns(self) -> Nanos:
@@ -91,12 +91,4 @@ class Body(Protocol):
 
     def ranges(self, numbers: Sequence[int]) -> Sequence[float]:
         """Return the range that each sonar measures now, in metres; the longest range where there is no echo."""
-        ...
-
-    def snapshot(self) -> object:
-        """Return all that decides the future."""
-        ...
-
-    def restore(self, snapshot: object) -> None:
-        """Put back what `snapshot` returned."""
         ...

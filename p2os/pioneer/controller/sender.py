@@ -16,9 +16,10 @@ Invariant: no more than `MOST_ANSWERS` frames wait, whatever a client asks for.
 """
 
 from collections import deque
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 
 from p2os.protocol.line_time import LineTime
+from simbase.state import Stateful
 from simbase.timing import Nanos
 
 #: chosen: the load is averaged over so many cycles, a second at the usual rate.
@@ -27,8 +28,10 @@ LOAD_CYCLES = 10
 MOST_ANSWERS = 8
 
 
-class Sender:
+class Sender(Stateful):
     """The transmit side of one robot."""
+
+    STATE = ("line", "lost", "_answers", "_output", "_answers_next")
 
     def __init__(self, baud: int | None) -> None:
         self.line = TransmitLine(LineTime(baud))
@@ -84,16 +87,6 @@ class Sender:
         """Forget what waits."""
         self._answers.clear()
         self._output.clear()
-
-    def snapshot(self) -> object:
-        """Return all that decides the future."""
-        return replace(self.line), self.lost, tuple(self._answers), tuple(self._output), self._answers_next
-
-    def restore(self, snapshot: object) -> None:
-        """Put back what `snapshot` returned."""
-        assert isinstance(snapshot, tuple)  # noqa: S101  # our own value
-        line, self.lost, answers, output, self._answers_next = snapshot
-        self.line, self._answers, self._output = replace(line), deque(answers), list(output)
 
 
 @dataclass(slots=True)

@@ -1,7 +1,6 @@
 """All devices that are fitted to one robot, saved and restored together."""
 
-from dataclasses import dataclass, field, replace
-from typing import cast
+from dataclasses import dataclass, field
 
 from p2os.pioneer.devices.aux_ports import PORTS, AuxPort
 from p2os.pioneer.devices.battery import Battery
@@ -49,21 +48,3 @@ class Devices:
         if self.gripper.kind != ON_USER_IO:
             return pins
         return pins & ~SWITCHES | int(self.gripper.state(now)) & SWITCHES
-
-    def snapshot(self) -> object:
-        """Return all that decides the future."""
-        return _copy(self)
-
-    def restore(self, snapshot: object) -> None:
-        """Put back what `snapshot` returned."""
-        saved = _copy(cast("Devices", snapshot))
-        self.battery, self.gripper, self.pins, self.joystick = saved.battery, saved.gripper, saved.pins, saved.joystick
-        self.compass, self.gyro, self.aux, self.switches = saved.compass, saved.gyro, saved.aux, saved.switches
-
-
-def _copy(devices: Devices) -> Devices:
-    return Devices(
-        battery=replace(devices.battery), gripper=replace(devices.gripper), pins=replace(devices.pins),
-        joystick=replace(devices.joystick), compass=replace(devices.compass), gyro=replace(devices.gyro),
-        aux=tuple(replace(port) for port in devices.aux), switches=replace(devices.switches),
-    )  # fmt: skip

@@ -24,10 +24,10 @@ receives another's ping.
 
 import math
 from collections.abc import Callable, Collection, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from itertools import product
 
-from p2os.pioneer.body.contract import RobotBody
+from p2os.pioneer.body.contract import FASTEST_MPS, RobotBody
 from p2os.pioneer.body.other_robots import (
     OtherRobot,
     OtherRobots,
@@ -39,12 +39,11 @@ from p2os.pioneer.body.other_robots import (
 from p2os.pioneer.controller import Pioneer
 from p2os.pioneer.world.model import Obstacle, World
 from simbase.errors import UsageError
+from simbase.state import Stateful
 from simbase.timing import NS_PER_MS, NS_PER_S, Nanos, Reached
 
 #: chosen: 5 mm at half a metre a second, which is less than what a sonar's own noise is.
 SLICE_NS: Nanos = 10 * NS_PER_MS
-#: No point of a hull is faster: both rims at the highest ceiling of any model, against each other, m/s.
-FASTEST_MPS = 8.0
 #: How much nearer two hulls can come within a slice, m.
 CLOSING_M = 2 * FASTEST_MPS * SLICE_NS / NS_PER_S
 
@@ -53,8 +52,10 @@ SPARE_M = 0.4
 
 
 @dataclass(slots=True)
-class Member:
+class Member(Stateful):
     """One robot of a multi-robot world."""
+
+    STATE = ("pioneer", "as_other", "near", "shown")
 
     number: int
     pioneer: Pioneer
@@ -65,25 +66,13 @@ class Member:
     advance_to: Callable[[Nanos], object]
     #: Where it stood at first.
     start: StandingPose
+    #: The numbers of those that it could touch before the next boundary.
+    near: tuple[int, ...] = ()
     #: Where it was shown the others last; None where its body looks for them itself.
     shown: dict[str, StandingPose] | None = None
 
 
-@dataclass(slots=True)
-class _Times:
-    #: Up to here every robot runs by what was seen at the boundary before.
-    slice_end: Nanos = SLICE_NS
-    #: The bodies of all that are near to another stand at this step.
-    step_boundary: Nanos = 0
-
-
-@dataclass(slots=True)
-class _Pushed:
-    #: Thing → who has moved it since the last boundary → where it is to him now.
-    reports: dict[str, dict[int, Obstacle]] = field(default_factory=dict)
-
-
-class MultiRobotWorld:
+class MultiRobotWorld(Stateful):
     """Robots in one world.
 
     Args:
@@ -93,6 +82,9 @@ class MultiRobotWorld:
     Raises:
         UsageError: A body's step does not fit, or the robots do not begin at time 0.
     """
+
+    STATE = ("members", "_slice_end", "_step_boundary", "_reports")
+    DERIVED = ("_swept", "_spare_m", "_close", "_alone")
 
     def __init__(self, robots: Sequence[tuple[Pioneer, RobotBody]], world: World) -> None:
         rise = highest_floor(world)
@@ -114,7 +106,12 @@ class MultiRobotWorld:
         )  # fmt: skip
         #: A robot that pushes a thing is near to whatever stands behind it.
         self._margin_m = CLOSING_M + 2 * max((item.reach_m for item in world.obstacles if item.mass_kg > 0), default=0)
-        self._times, self._pushed = _Times(), _Pushed()
+        #: Up to here every robot runs by what was seen at the boundary before.
+        self._slice_end: Nanos = SLICE_NS
+        #: The bodies of all that are near to another stand at this step.
+        self._step_boundary: Nanos = 0
+        #: Thing → who has moved it since the last boundary → where it is to him now.
+        self._reports: dict[str, dict[int, Obstacle]] = {}
         for member in self.members:
             if isinstance(member.body, SeesOtherRobots):
                 member.body.join(member.other_robots)
@@ -131,6 +128,10 @@ class MultiRobotWorld:
         self._close: tuple[Member, ...] = ()
         self._alone: tuple[Member, ...] = self.members
         self._find_close()
+
+    def _restored(self) -> None:
+        self._spare_m = 0.0  # sweep at the next boundary
+        self._regroup()
 
     @property
     def robots(self) -> tuple[Pioneer, ...]:
@@ -201,64 +202,23 @@ class MultiRobotWorld:
         else:
             member.advance_to(limit)
 
-    def snapshot(self) -> object:
-        """Return all that decides the future, every robot included, as a plain value."""
-        return {
-            "robots": tuple(member.pioneer.snapshot() for member in self.members),
-            "times": (self._times.slice_end, self._times.step_boundary),
-            "standing_poses": tuple(
-                (tuple(member.as_other.current), tuple(member.as_other.at_boundary)) for member in self.members
-            ),
-            "near": tuple(tuple(self._numbers_near(member)) for member in self.members),
-            "shown": tuple(
-                None
-                if member.shown is None
-                else tuple((name, tuple(standing_pose)) for name, standing_pose in member.shown.items())
-                for member in self.members
-            ),
-            "pushed": {name: dict(reports) for name, reports in self._pushed.reports.items()},
-        }
-
-    def restore(self, snapshot: object) -> None:
-        """Put back what `snapshot` returned, in this multi-robot world or in a new one of the same robots and world."""
-        assert isinstance(snapshot, dict)  # noqa: S101  # our own value
-        self._times = _Times(*snapshot["times"])
-        self._pushed = _Pushed({name: dict(reports) for name, reports in snapshot["pushed"].items()})
-        rows = zip(
-            self.members,
-            snapshot["robots"],
-            snapshot["standing_poses"],
-            snapshot["near"],
-            snapshot["shown"],
-            strict=True,
-        )
-        for member, robot, (current, at_boundary), near, shown in rows:
-            member.pioneer.restore(robot)
-            member.as_other.current, member.as_other.at_boundary = StandingPose(*current), StandingPose(*at_boundary)
-            member.other_robots.come_near(self.members[number].as_other for number in near)
-            member.shown = (
-                None if shown is None else {name: StandingPose(*standing_pose) for name, standing_pose in shown}
-            )
-        self._spare_m = 0.0  # sweep at the next boundary
-        self._regroup()
-
     # Within a slice ------------------------------------------------------------------
 
     def _pass_boundaries(self, limit: Nanos) -> None:
         """Bring every robot past every boundary before a time."""
-        while (end := self._times.slice_end) < limit:
+        while (end := self._slice_end) < limit:
             self._step_close(end)
             for member in self._alone:
                 member.advance_to(end)
-            self._times.slice_end += SLICE_NS
-            self._times.step_boundary = end
+            self._slice_end += SLICE_NS
+            self._step_boundary = end
             self._exchange_poses()
 
     def _step_close(self, limit: Nanos) -> None:
         """Bring those that are near to another to a time of this slice, step by step together."""
-        close, times = self._close, self._times
-        while close and times.step_boundary < limit:
-            start = times.step_boundary
+        close = self._close
+        while close and self._step_boundary < limit:
+            start = self._step_boundary
             for member in close:  # what is due until all have made the last step
                 member.advance_to(start)
             for member in close:
@@ -266,7 +226,7 @@ class MultiRobotWorld:
                 member.as_other.look()
                 self._take_pushed(member)
                 self._show(member.as_other, member.as_other.current, only_close=True)
-            times.step_boundary = start + self._step_ns
+            self._step_boundary = start + self._step_ns
         for member in close:
             member.advance_to(limit)
 
@@ -275,7 +235,7 @@ class MultiRobotWorld:
         for item in member.body.take_moved():
             if item.walk is not None:
                 continue
-            reports = self._pushed.reports.setdefault(item.name, {})
+            reports = self._reports.setdefault(item.name, {})
             if member.other_robots.is_close:
                 for other in self._close:
                     reports.pop(other.number, None)
@@ -307,13 +267,13 @@ class MultiRobotWorld:
         self._find_close()
 
     def _spread_pushed(self) -> None:
-        for name, reports in self._pushed.reports.items():
+        for name, reports in self._reports.items():
             chosen = min(reports, key=lambda number: (self._distance(number, reports[number]), number))
             item, is_close = reports[chosen], self.members[chosen].other_robots.is_close
             for member in self.members:
                 if member.number != chosen and not (is_close and member.other_robots.is_close):
                     member.body.move(name, item.x_m, item.y_m, item.heading_rad)
-        self._pushed.reports.clear()
+        self._reports.clear()
 
     def _distance(self, number: int, item: Obstacle) -> float:
         standing_pose = self.members[number].as_other.current
@@ -341,8 +301,7 @@ class MultiRobotWorld:
         if not near and not self._close:
             return
         for member in self.members:
-            numbers = sorted(near.get(member.number, ()))
-            member.other_robots.come_near(self.members[number].as_other for number in numbers)
+            member.near = tuple(sorted(near.get(member.number, ())))
         self._regroup()
 
     def _is_sweep_valid(self) -> bool:
@@ -354,8 +313,7 @@ class MultiRobotWorld:
         )
 
     def _regroup(self) -> None:
+        for member in self.members:
+            member.other_robots.come_near(self.members[number].as_other for number in member.near)
         self._close = tuple(member for member in self.members if member.other_robots.is_close)
         self._alone = tuple(member for member in self.members if not member.other_robots.is_close)
-
-    def _numbers_near(self, member: Member) -> list[int]:
-        return [other.number for other in self.members if other.as_other in member.other_robots.close_to]

@@ -11,10 +11,10 @@ end of the cycle.
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import cast
 
 from p2os.protocol.profiles import Profile
 from p2os.robots.parameters import RobotParameters
+from simbase.state import Stateful
 from simbase.timing import Nanos
 
 #: What a Pioneer 2 reports when no echo came, in counts: 8,576 mm at 0.268 mm a count (a P2-DX's captured SIP).
@@ -31,19 +31,10 @@ class Ping:
     numbers: tuple[int, ...]
 
 
-@dataclass(frozen=True, slots=True)
-class _Snapshot:
-    order: tuple[int, ...]
-    is_on: bool
-    next_index: int
-    cycle_start: Nanos
-    pings_done: int
-    readings: tuple[tuple[int, int], ...]
-    interval_ns: Nanos | None
-
-
-class SonarSchedule:
+class SonarSchedule(Stateful):
     """The firing order of a robot's sonar."""
+
+    STATE = ("order", "is_on", "_next_index", "_cycle_start", "_pings_done", "_readings", "_interval_ns")
 
     def __init__(self, fitted: int, *, pings_per_cycle: int | None, cycle_ns: Nanos) -> None:
         """Start with every fitted sonar on, in ring order.
@@ -116,22 +107,6 @@ class SonarSchedule:
         readings = tuple(self._readings) if self.is_on else ()
         self._readings.clear()
         return readings
-
-    def snapshot(self) -> object:
-        """Return all that decides the future."""
-        return _Snapshot(
-            self.order, self.is_on, self._next_index, self._cycle_start, self._pings_done, tuple(self._readings),
-            self._interval_ns,
-        )  # fmt: skip
-
-    def restore(self, snapshot: object) -> None:
-        """Put back what `snapshot` returned."""
-        saved = cast("_Snapshot", snapshot)
-        self.order, self.is_on = saved.order, saved.is_on
-        self._next_index, self._pings_done = saved.next_index, saved.pings_done
-        self._cycle_start = saved.cycle_start
-        self._readings = list(saved.readings)
-        self._interval_ns = saved.interval_ns
 
     @property
     def _per_cycle(self) -> int:

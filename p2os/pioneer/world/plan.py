@@ -23,6 +23,7 @@ from p2os.errors import WorldError
 from p2os.pioneer.world.geometry import INFINITY, Footprint, hull_polygon, placed, wheel_polygons
 from p2os.pioneer.world.model import Mesh, Obstacle, Point, Polygon, World, cut, shadow
 from p2os.robots.parameters import RobotParameters
+from simbase.state import Stateful
 
 #: The first ring of a search for the nearest wall beyond the hull; it is doubled until something is found, m.
 FIRST_RING_M = 2.0
@@ -42,8 +43,11 @@ CELL_M = 1.0
 MOST_CELLS = 4096
 
 
-class Plan:
+class Plan(Stateful):
     """Obstacles by name, cut where they could touch the hull."""
+
+    STATE = ("_obstacles",)
+    DERIVED = ("_touchable", "_echoing", "_low")
 
     def __init__(self, obstacles: Iterable[Obstacle], parameters: RobotParameters, static: "StaticPlan") -> None:
         body = parameters.body
@@ -53,11 +57,16 @@ class Plan:
         self._wheels = wheel_polygons(parameters)
         self._hull_reach = max(math.hypot(x, y) for x, y in self._hull)
         self._obstacles: dict[str, Obstacle] = {}
+        self._restored()
+        for obstacle in obstacles:
+            self.place(obstacle)
+
+    def _restored(self) -> None:
         self._touchable: dict[str, Footprint] = {}
         self._echoing: dict[str, Footprint] = {}
         self._low: dict[str, Footprint] = {}
-        for obstacle in obstacles:
-            self.place(obstacle)
+        for obstacle in self._obstacles.values():
+            self._keep(obstacle)
 
     @classmethod
     def of_world(cls, world: World, parameters: RobotParameters) -> "Plan":

@@ -9,18 +9,14 @@ Not modelled: tyre scrub and wheel-size errors, battery sag; floors of meshes
 (refused, see `model`).
 """
 
-import math
-from collections import deque
 from collections.abc import Sequence
-from dataclasses import replace
-from typing import Any, cast
 
 import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from p2os.pioneer.body.contacts import ContactCounter
-from p2os.pioneer.body.contract import MOST_HITS, STEP_NS, BodyState, Hit, Turned
+from p2os.pioneer.body.contract import BodyState, Turned
+from p2os.pioneer.body.engine_body import EngineBody
 from p2os.pioneer.body.mujoco.model import (
     HULL,
     ROBOT,
@@ -35,42 +31,33 @@ from p2os.pioneer.body.mujoco.model import (
 )
 from p2os.pioneer.body.mujoco.rays import SonarRays
 from p2os.pioneer.body.physical import (
-    PUSHED_M,
     SETTLE_STEPS,
-    STALL_RIM_MPS,
-    STALL_STEPS,
-    STALL_TORQUE_SHARE,
     middle_and_slope,
 )
 from p2os.pioneer.body.ray_cast import Echo
 from p2os.pioneer.sonar.ring import cones, reading
-from p2os.pioneer.world.model import Obstacle, Pose, Walker, World
-from p2os.pioneer.world.plan import Plan, StaticPlan
+from p2os.pioneer.world.model import Obstacle, Pose, World
 from p2os.robots.parameters import RobotParameters
-from simbase.timing import NS_PER_S, Nanos
 
 #: All that MuJoCo needs to go on alike.
 _STATE = mujoco.mjtState.mjSTATE_INTEGRATION
-_DT_S = STEP_NS / NS_PER_S
 #: The joints of the robot: its place in the world, its wheels, and what drives them.
 ROBOT_JOINTS = (ROBOT, *WHEELS, *ROTORS)
 
 
-class MujocoBody:
+class MujocoBody(EngineBody):
     """A differential drive with mass, torque limits and friction."""
 
+    STATE = ("_start", "engine_state")
+    #: The engine's own objects, and where in them things are: `engine_state` makes them anew.
+    DERIVED = ("_model", "_data", "_qpos", "_qvel", "_efforts", "_wheel_places", "_wheel_speeds", "_rotors",
+               "_robot_place", "_robot_speed", "_hull", "_floors", "_low")  # fmt: skip
+
     name = "mujoco"
-    dt_ns: Nanos = STEP_NS
 
     def __init__(self, world: World, parameters: RobotParameters) -> None:
-        self._world = world
-        self._parameters = parameters
-        self._static = StaticPlan(world, parameters)
+        super().__init__(world, parameters)
         self._sonar_rays = SonarRays(cones(parameters), parameters.sonar_height_m, parameters.sonar_range_m)
-        self._radius_m = parameters.body.wheel_diameter_m / 2
-        self._straining_nm = STALL_TORQUE_SHARE * parameters.body.motor_torque_nm
-        self._slow_radps = STALL_RIM_MPS / self._radius_m
-        self._state: BodyState | None = None
         self.reset(world.start, 0)
 
     @property
@@ -80,23 +67,10 @@ class MujocoBody:
             return None
         return "the mujoco body touches a mesh as upright walls over its plan, at the height of the hull"
 
-    @property
-    def state(self) -> BodyState:
-        """The state after the last step, read from the engine when it is asked for."""
-        if self._state is None:
-            self._state = self._read()
-        return self._state
-
     def reset(self, pose: Pose, seed: int) -> BodyState:
         """Stand still at a pose in the world as it was made; nothing here is random."""
         del seed
-        self._steps = 0
-        self._plan = Plan((), self._parameters, self._static)
-        self._walkers: dict[str, tuple[int, Walker]] = {}
-        self._moved_things: dict[str, None] = {}
-        for item in self._world.obstacles:
-            if not item.fixed:
-                self._keep(item)
+        self._begin()
         self._build()
         self._data.joint(ROBOT).qpos = (pose.x_m, pose.y_m, pose.z_m, *quaternion(pose.heading_rad))
         for _ in range(SETTLE_STEPS):
@@ -109,19 +83,10 @@ class MujocoBody:
 
     def put_back(self) -> None:
         """Stand still where the last `reset` put it, and what was pushed where the world has it."""
-        for item in self._plan.pushable(self._world):
-            self.move(item.name, item.x_m, item.y_m, item.heading_rad)
-            self._moved_things[item.name] = None
+        super().put_back()
         for name, place in self._start.items():
             self._data.joint(name).qpos, self._data.joint(name).qvel = place, 0.0
         self._count_anew()
-
-    def _count_anew(self) -> None:
-        """Begin to count contacts and stalls."""
-        self._contacts = ContactCounter()
-        self._hits: deque[Hit] = deque(maxlen=MOST_HITS)
-        self._stalling = [0, 0]
-        self._state = None
 
     def _build(self) -> None:
         """Make the engine's model of what stands in the world now; all rests, the robot at the world's middle."""
@@ -156,26 +121,18 @@ class MujocoBody:
         model, data, qvel = self._model, self._data, self._qvel
         self._state = None
         self._steps += 1
-        if self._walkers:
+        if self._walking:
             self._walk()
         left, right = self._rotors
         qvel[left], qvel[right] = left_mps / self._radius_m, right_mps / self._radius_m
         mujoco.mj_step(model, data)
         if self._contacts.update(touching=self._is_touching()):
-            self._note_hit()
+            self._note_contact()
         # The motors are the only frictions of joints, and the engine lists those first.
         for wheel, effort in enumerate(data.efc_force[:2].tolist()):
-            strains = abs(effort) > self._straining_nm and abs(qvel[self._wheel_speeds[wheel]]) < self._slow_radps
-            self._stalling[wheel] = min(STALL_STEPS, self._stalling[wheel] + 1) if strains else 0
+            self._watch_motor(wheel, effort, qvel[self._wheel_speeds[wheel]])
         left, right = self._wheel_places
         return Turned(float(self._qpos[left]) - self._zero[0], float(self._qpos[right]) - self._zero[1])
-
-    def _walk(self) -> None:
-        """Put everything that walks where it is by now; the plan learns of it when it is asked."""
-        for name, (since, walker) in self._walkers.items():
-            x, y, heading = walker.pose_at((self._steps - since) * _DT_S)
-            self._put(replace(self._plan.find(name), x_m=x, y_m=y, heading_rad=heading))
-            self._moved_things[name] = None
 
     def _put(self, item: Obstacle) -> None:
         """Put a thing of the model where it stands; one that can be pushed then rests."""
@@ -204,7 +161,7 @@ class MujocoBody:
                 return number, one if one in self._low else other
         return None
 
-    def _note_hit(self) -> None:
+    def _note_contact(self) -> None:
         """Remember a collision; the building has no names in the engine and is found by its place."""
         touched = self._touched()
         if touched is None:
@@ -212,12 +169,7 @@ class MujocoBody:
         number, geometry = touched
         x, y, _ = self._data.contact.pos[number].tolist()
         name = self._model.body(int(self._model.geom_bodyid[geometry])).name
-        if name.startswith(THING):
-            name = name.removeprefix(THING)
-        else:
-            self._tell_plan()
-            name = self._plan.thing_at(x, y)
-        self._hits.append(Hit(at_ns=self._steps * STEP_NS, name=name, x_m=x, y_m=y))
+        self._note_touched(name.removeprefix(THING) if name.startswith(THING) else None, x, y)
 
     def _read(self) -> BodyState:
         qpos, qvel = self._qpos, self._qvel
@@ -225,26 +177,12 @@ class MujocoBody:
         x, y, z = qpos[place : place + 3].tolist()
         m = matrix(qpos[place + 3 : place + 7].tolist())
         vx, vy, _, wx, wy, wz = qvel[speed : speed + 6].tolist()
-        heading = math.atan2(m[3], m[0])
-        (left, right), (left_rate, right_rate) = self._wheel_places, self._wheel_speeds
-        return BodyState(
-            x_m=x,
-            y_m=y,
-            z_m=z,
-            heading_rad=heading,
-            pitch_rad=math.asin(max(-1.0, min(1.0, m[6]))),
-            left_angle_rad=float(qpos[left]) - self._zero[0],
-            right_angle_rad=float(qpos[right]) - self._zero[1],
-            left_speed_mps=float(qvel[left_rate]) * self._radius_m,
-            right_speed_mps=float(qvel[right_rate]) * self._radius_m,
-            forward_mps=vx * math.cos(heading) + vy * math.sin(heading),
-            # The engine tells the rate of turn in the robot's own frame.
-            turn_radps=m[6] * wx + m[7] * wy + m[8] * wz,
-            stalled_left=self._stalling[0] >= STALL_STEPS,
-            stalled_right=self._stalling[1] >= STALL_STEPS,
-            collisions=self._contacts.collisions,
-            in_contact=self._contacts.touching,
-        )
+        wheels = [
+            (float(qpos[angle]), float(qvel[rate]))
+            for angle, rate in zip(self._wheel_places, self._wheel_speeds, strict=True)
+        ]
+        # The engine tells the rate of turn in the robot's own frame.
+        return self._state_of((x, y, z), m, wheels, (vx, vy), m[6] * wx + m[7] * wy + m[8] * wz)
 
     def ranges(self, numbers: Sequence[int]) -> list[float]:
         """Return the nearest echo of each cone, metres; the rays tilt with the body."""
@@ -266,91 +204,26 @@ class MujocoBody:
         turn = matrix(self._qpos[place + 3 : place + 7].tolist())
         return np.array(self._qpos[place : place + 3]), np.array(turn).reshape(3, 3)
 
-    def clearance(self) -> float:
-        """Return the plan-view distance from the hull to the nearest thing that it could touch, metres."""
-        state = self.state
-        self._tell_plan()
-        return self._plan.clearance(state.x_m, state.y_m, state.heading_rad)
+    def _where_is(self, name: str) -> tuple[float, float, Sequence[float]]:
+        x, y, _, *turn = self._data.joint(THING + name).qpos.tolist()
+        return x, y, matrix(turn)
 
-    def take_moved(self) -> list[Obstacle]:
-        """Return what has walked or was pushed since this was asked last, where it is now."""
-        self._tell_plan()
-        moved, self._moved_things = self._moved_things, {}
-        return [item for item in self._plan.obstacles if item.name in moved]
-
-    def take_hits(self) -> list[Hit]:
-        """Return the collisions since this was asked last."""
-        hits = list(self._hits)
-        self._hits.clear()
-        return hits
-
-    def _tell_plan(self) -> None:
-        """Let the plan know where things are that the engine moves."""
-        for name, (since, walker) in self._walkers.items():
-            self._plan.move(name, *walker.pose_at((self._steps - since) * _DT_S))
-        for item in self._plan.obstacles:
-            if item.mass_kg > 0:
-                x, y, _, *turn = self._data.joint(THING + item.name).qpos.tolist()
-                if math.dist((x, y), (item.x_m, item.y_m)) > PUSHED_M:
-                    m = matrix(turn)
-                    self._plan.move(item.name, x, y, math.atan2(m[3], m[0]))
-                    self._moved_things[item.name] = None
-
-    def place(self, obstacle: Obstacle) -> None:
-        """Put an obstacle with a new name into the world; one that walks begins at its first point, now."""
-        self._keep(obstacle)
+    def _placed(self, item: Obstacle) -> None:
+        del item
         self._rebuild()
 
-    def _keep(self, obstacle: Obstacle) -> None:
-        if obstacle.walk is not None:
-            walker = Walker(obstacle.walk)
-            x, y, heading = walker.pose_at(0.0)
-            obstacle = replace(obstacle, x_m=x, y_m=y, heading_rad=heading)
-        self._plan.place(obstacle)
-        if obstacle.walk is not None:
-            self._walkers[obstacle.name] = (self._steps, walker)
-
-    def move(self, name: str, x_m: float, y_m: float, heading_rad: float) -> None:
-        """Put an obstacle somewhere else; one that walks stays there."""
-        moved = self._plan.move(name, x_m, y_m, heading_rad)
-        self._walkers.pop(name, None)
-        self._put(moved)
-
-    def remove(self, name: str) -> None:
-        """Take an obstacle out of the world."""
-        self._plan.remove(name)
-        self._walkers.pop(name, None)
+    def _removed(self, name: str) -> None:
+        del name
         self._rebuild()
 
-    def snapshot(self) -> object:
-        """Return all that decides the future, as plain values."""
+    @property
+    def engine_state(self) -> bytes:
+        """All that MuJoCo needs to go on alike, for a model of what stands in the plan."""
         numbers = np.empty(mujoco.mj_stateSize(self._model, _STATE))
         mujoco.mj_getState(self._model, self._data, numbers, _STATE)
-        return {
-            "engine": numbers.tobytes(),
-            "obstacles": self._plan.obstacles,
-            "walking": {name: since for name, (since, _) in self._walkers.items()},
-            "moved": tuple(self._moved_things),
-            "zero": self._zero,
-            "contacts": self._contacts.snapshot(),
-            "hits": tuple(self._hits),
-            "stalling": tuple(self._stalling),
-            "steps": self._steps,
-            "start": dict(self._start),
-        }
+        return numbers.tobytes()
 
-    def restore(self, snapshot: object) -> None:
-        """Put back what `snapshot` returned, in this body or in a new one."""
-        saved = cast("dict[str, Any]", snapshot)
-        self._steps = saved["steps"]
-        self._plan = Plan(saved["obstacles"], self._parameters, self._static)
-        self._moved_things = dict.fromkeys(saved["moved"])
-        walks = {item.name: item.walk for item in self._plan.obstacles if item.walk is not None}
-        self._walkers = {name: (since, Walker(walks[name])) for name, since in saved["walking"].items()}
+    @engine_state.setter
+    def engine_state(self, saved: bytes) -> None:
         self._build()
-        mujoco.mj_setState(self._model, self._data, np.frombuffer(saved["engine"]), _STATE)
-        self._zero, self._start = saved["zero"], dict(saved["start"])
-        self._contacts.restore(saved["contacts"])
-        self._hits = deque(saved["hits"], maxlen=MOST_HITS)
-        self._stalling = list(saved["stalling"])
-        self._state = None
+        mujoco.mj_setState(self._model, self._data, np.frombuffer(saved), _STATE)

@@ -51,9 +51,11 @@ def test_a_snapshot_is_all_that_decides_the_future(make: Maker) -> None:
     body.move("bin", 0.2, 1.0, 0.3)
     drive(body, 0.2, 0.18, 1.5)
     saved = pickle.loads(pickle.dumps(body.snapshot()))  # noqa: S301  # our own bytes
+    seen = body.state, body.ranges(range(8)), body.clearance()
     here = [drive(body, 0.1, 0.2, 0.1) for _ in range(10)], body.ranges(range(8))
     for other in (body, make(world)):
         other.restore(saved)
+        assert (other.state, other.ranges(range(8)), other.clearance()) == seen
         assert ([drive(other, 0.1, 0.2, 0.1) for _ in range(10)], other.ranges(range(8))) == here
 
 

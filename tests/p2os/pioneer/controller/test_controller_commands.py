@@ -12,6 +12,7 @@ from p2os.protocol.command_table import ROWS, Argument, CommandRow
 from p2os.protocol.commands import CommandNumber as C
 from p2os.protocol.frames import Frame
 from p2os.protocol.profiles import Profile
+from tests.p2os.conftest import context_of
 
 MakeRobot = Callable[..., Any]
 
@@ -82,10 +83,10 @@ def test_no_command_kills_the_robot(
 @pytest.mark.parametrize("row", [row for row in ROWS if row.kind is not Argument.NONE and row.number in HANDLERS])
 def test_a_command_without_its_argument_has_no_effect(make_robot: MakeRobot, row: CommandRow) -> None:
     robot = make_robot(lenient=True).open()
-    before = robot.pioneer.snapshot().context
+    before = context_of(robot.pioneer)
     robot.say(row.number)
     if f"{row.name}: {'malformed'}" in told(robot, "command ignored"):
-        assert robot.pioneer.snapshot().context == before
+        assert context_of(robot.pioneer) == before
 
 
 EXTRAS = [

@@ -19,6 +19,7 @@ from p2os.protocol.profiles import Profile
 from p2os.robots.parameters import load_parameters
 from simbase.errors import UsageError
 from simbase.timing import NS_PER_MS
+from tests.p2os.conftest import context_of
 
 MakeRobot = Callable[..., Any]
 P2DX = load_parameters("p2dx")
@@ -44,9 +45,9 @@ def test_every_fault_can_be_said_read_back_and_cleared(robot: Any, name: str) ->
         with pytest.raises(UsageError, match="nothing to clear"):
             robot.pioneer.do(f"clear {name}", robot.now)
     else:
-        injected = robot.pioneer.snapshot().context["faults"], robot.pioneer.snapshot().context["devices"]
+        injected = context_of(robot.pioneer)["faults"], context_of(robot.pioneer)["devices"]
         robot.pioneer.do(f"clear {words_of(name)}", robot.now)
-        assert (robot.pioneer.snapshot().context["faults"], robot.pioneer.snapshot().context["devices"]) != injected
+        assert (context_of(robot.pioneer)["faults"], context_of(robot.pioneer)["devices"]) != injected
 
 
 @pytest.mark.parametrize(
@@ -273,7 +274,7 @@ def test_unknown_sets_of_errors_are_refused(tmp_path: Path) -> None:
 def test_every_live_input_acts(robot: Any) -> None:
     robot.open()
     for text in ("joystick 100 900 0", "analog 2 512", "digital 255", "thing on", "charger on"):
-        before = robot.pioneer.snapshot().context["devices"]
+        before = context_of(robot.pioneer)["devices"]
         robot.pioneer.do(text, robot.now)
-        assert robot.pioneer.snapshot().context["devices"] != before
+        assert context_of(robot.pioneer)["devices"] != before
     assert {text.split()[0] for text in ("joystick", "analog", "digital", "thing", "charger")} == set(INPUTS)

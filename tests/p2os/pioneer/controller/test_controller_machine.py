@@ -14,7 +14,7 @@ from p2os.protocol.commands import CommandNumber as C
 from p2os.protocol.profiles import Profile
 from p2os.robots.parameters import load_parameters
 from simbase.timing import NS_PER_MS, NS_PER_S
-from tests.p2os.conftest import Robot
+from tests.p2os.conftest import Robot, context_of
 
 P2DX = load_parameters("p2dx")
 FAULTS = ("line-noise 0.001", "loose-connector", "stop-button", "wheel-blocked left", "sonar-noisy 2 0.1")
@@ -76,7 +76,7 @@ class Controller(RuleBasedStateMachine):
         self.robot.pioneer.hang_up(self.robot.now)
         assert self.robot.pioneer.state.left_setpoint_mps == self.robot.pioneer.state.right_setpoint_mps == 0
 
-    @precondition(lambda self: not self.robot.pioneer.snapshot().context["faults"].corrupts_line)
+    @precondition(lambda self: not context_of(self.robot.pioneer)["faults"].corrupts_line)
     @rule()
     def close_and_find_it_standing(self) -> None:
         self.say(C.CLOSE)
@@ -98,8 +98,7 @@ class Controller(RuleBasedStateMachine):
 
     @invariant()
     def nothing_piles_up(self) -> None:
-        _, _, answers, _, _ = self.robot.pioneer.snapshot().sender
-        assert len(answers) <= MOST_ANSWERS
+        assert len(self.robot.pioneer.snapshot()["_sender"]["_answers"]) <= MOST_ANSWERS
 
     @invariant()
     def wheels_turn_only_with_power_and_within_the_ceiling(self) -> None:

@@ -306,7 +306,7 @@ def test_results_do_not_depend_on_the_slices(make_robot: MakeRobot, slice_ns: in
     assert sliced.body.state == reference.body.state
     assert sliced.events == reference.events
     assert {"watchdog expired", "watchdog revived"} <= set(sliced.told())
-    assert pickle.dumps(sliced.pioneer.snapshot()) == pickle.dumps(reference.pioneer.snapshot())
+    assert sliced.pioneer.snapshot() == reference.pioneer.snapshot()
 
 
 @pytest.mark.parametrize("cut", [1, 2_500_000, 49_000_000, 440_000_000, 1_100_000_000, 1_500_000_000])

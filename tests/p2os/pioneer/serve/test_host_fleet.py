@@ -23,6 +23,7 @@ from p2os.protocol.frames import Decoder, Frame
 from p2os.protocol.sip import SIP_KINDS
 from p2os.transport import Listener, Loops, Transport, listen_url, open_url
 from simbase.timing import NS_PER_MS, NS_PER_S
+from tests.p2os.conftest import context_of
 
 #: A bound on every wait; reached only when something is broken.
 PATIENCE_S = 30.0
@@ -217,7 +218,7 @@ def test_a_device_at_an_aux_port_talks_through_the_robot(make_robot: Callable[..
 def test_orders_go_to_one_robot_or_all_and_are_answered(make_robot: Callable[..., Any]) -> None:
     hosts = [Looped(make_robot(baud=rate)).host for rate in (None, 9600)]
     assert execute(hosts, "2: fault sonar-dead 1") == ["robot 2: fault sonar-dead 1"]
-    assert hosts[0].pioneer.snapshot().context["faults"].sonar == {}  # type: ignore[attr-defined]
+    assert context_of(hosts[0].pioneer)["faults"].sonar == {}
     assert len(execute(hosts, "thing on")) == 2
     first, second = execute(hosts, "status")
     assert first.startswith("robot 1 at 0.0 s: no session")

@@ -183,7 +183,7 @@ def test_one_robot_of_a_world_goes_back_the_others_go_on_and_see_it(fleet: Any) 
     assert hall.hosts[1].pioneer.state.open
     assert hall.at(1)[0] < moving - 0.03
     for body in bodies:  # every robot's copy of the world
-        (carton,) = [item for item in body.snapshot()["obstacles"] if item.name == "carton"]
+        (carton,) = [item for item in body.snapshot()["_plan"]["_obstacles"].values() if item.name == "carton"]
         assert (carton.x_m, carton.y_m) == pytest.approx((0, 0), abs=1e-3)
 
 

@@ -1,0 +1,130 @@
+"""What the bodies on a physics engine share: their state as it is read, stalls, and what the engine moves.
+
+The engine's own state is one value, `engine_state`, that any process can take up; all that is
+told of it here is worked out from poses and speeds that the engine gives.
+"""
+
+import math
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import ClassVar
+
+from p2os.pioneer.body.contacts import ContactCounter
+from p2os.pioneer.body.contract import BodyState
+from p2os.pioneer.body.in_world import BodyInWorld
+from p2os.pioneer.body.physical import PUSHED_M, STALL_RIM_MPS, STALL_STEPS, STALL_TORQUE_SHARE
+from p2os.pioneer.world.model import World
+from p2os.robots.parameters import RobotParameters
+
+
+class EngineBody(BodyInWorld):
+    """A differential drive with mass, torque limits and friction."""
+
+    STATE: ClassVar[tuple[str, ...]] = ("_zero", "_stalling")
+    DERIVED: ClassVar[tuple[str, ...]] = ("_state",)
+
+    #: Angles of the wheels when it was reset.
+    _zero: tuple[float, ...]
+
+    def __init__(self, world: World, parameters: RobotParameters) -> None:
+        super().__init__(world, parameters)
+        self._radius_m = parameters.body.wheel_diameter_m / 2
+        self._straining_nm = STALL_TORQUE_SHARE * parameters.body.motor_torque_nm
+        self._slow_radps = STALL_RIM_MPS / self._radius_m
+        self._state: BodyState | None = None
+        self._stalling = [0, 0]
+
+    def _restored(self) -> None:
+        super()._restored()
+        self._state = None
+
+    @property
+    def state(self) -> BodyState:
+        """The state after the last step, read from the engine when it is asked for."""
+        if self._state is None:
+            self._state = self._read()
+        return self._state
+
+    def clearance(self) -> float:
+        """Return the plan-view distance from the hull to the nearest thing that it could touch, metres."""
+        state = self.state
+        self._tell_plan()
+        return self._plan.clearance(state.x_m, state.y_m, state.heading_rad)
+
+    def _count_anew(self) -> None:
+        """Begin to count contacts and stalls."""
+        self._contacts = ContactCounter()
+        self._stalling = [0, 0]
+        self._state = None
+
+    def _watch_motor(self, wheel: int, effort_nm: float, rate_radps: float) -> None:
+        """Count for how many steps a wheel's motor has been stalled."""
+        is_stalled = abs(effort_nm) > self._straining_nm and abs(rate_radps) < self._slow_radps
+        self._stalling[wheel] = min(STALL_STEPS, self._stalling[wheel] + 1) if is_stalled else 0
+
+    def _walk(self) -> None:
+        """Put everything that walks where it is by now; the plan learns of it when it is asked."""
+        for name, (x, y, heading) in self._walked():
+            self._put(replace(self._plan.find(name), x_m=x, y_m=y, heading_rad=heading))
+            self._moved_things[name] = None
+
+    def _tell_plan(self) -> None:
+        for name, pose in self._walked():
+            self._plan.move(name, *pose)
+        for item in self._plan.obstacles:
+            if item.mass_kg > 0:
+                x, y, m = self._where_is(item.name)
+                if math.dist((x, y), (item.x_m, item.y_m)) > PUSHED_M:
+                    self._plan.move(item.name, x, y, math.atan2(m[3], m[0]))
+                    self._moved_things[item.name] = None
+
+    def _note_touched(self, name: str | None, x_m: float, y_m: float) -> None:
+        """Remember a collision; what the engine has no name for is found by its place."""
+        if name is None:
+            self._tell_plan()
+            name = self._plan.thing_at(x_m, y_m)
+        self._note_hit(name, x_m, y_m)
+
+    def _state_of(
+        self, place: tuple[float, float, float], turn: Sequence[float], wheels: Sequence[tuple[float, float]],
+        velocity: tuple[float, float], turn_radps: float,
+    ) -> BodyState:  # fmt: skip
+        """Return the engine's state as ours.
+
+        Args:
+            place: Of the robot's frame, metres.
+            turn: The same as nine numbers, row by row.
+            wheels: Angle and rate of the left and the right wheel, rad and rad/s.
+            velocity: Along x and y of the world, m/s.
+            turn_radps: Rate of turn, counter-clockwise.
+        """
+        x, y, z = place
+        (left, left_rate), (right, right_rate) = wheels
+        heading = math.atan2(turn[3], turn[0])
+        return BodyState(
+            x_m=x,
+            y_m=y,
+            z_m=z,
+            heading_rad=heading,
+            pitch_rad=math.asin(max(-1.0, min(1.0, turn[6]))),
+            left_angle_rad=left - self._zero[0],
+            right_angle_rad=right - self._zero[1],
+            left_speed_mps=left_rate * self._radius_m,
+            right_speed_mps=right_rate * self._radius_m,
+            forward_mps=velocity[0] * math.cos(heading) + velocity[1] * math.sin(heading),
+            turn_radps=turn_radps,
+            stalled_left=self._stalling[0] >= STALL_STEPS,
+            stalled_right=self._stalling[1] >= STALL_STEPS,
+            collisions=self._contacts.collisions,
+            in_contact=self._contacts.touching,
+        )
+
+    # What the engine tells -------------------------------------------------------------------
+
+    def _read(self) -> BodyState:
+        """Return the state as the engine has it now."""
+        raise NotImplementedError
+
+    def _where_is(self, name: str) -> tuple[float, float, Sequence[float]]:
+        """Return where a thing that can be pushed is: x, y, and its turn as nine numbers."""
+        raise NotImplementedError
