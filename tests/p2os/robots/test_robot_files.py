@@ -69,7 +69,6 @@ def test_a_file_of_arias_goes_over_the_shipped_model(tmp_path: Path) -> None:
     assert (robot.motion.max_velocity_mm_s, robot.motion.accel_mm_s2) == (900, shipped.motion.accel_mm_s2)
     assert (robot.equipment.front_bumpers, robot.equipment.rear_bumpers) == (7, 0)
     assert (robot.equipment.has_move, robot.equipment.sends_io_packets) == (False, True)
-    assert robot.equipment.highest_baud == 9600
     assert [(pose.x_mm, pose.heading_deg) for pose in robot.sonar] == [(69, 90), (114, 50)]
     assert robot.sonar_fitted == 2
     assert robot.body == shipped.body
