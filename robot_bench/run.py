@@ -40,7 +40,7 @@ from simbase.errors import P2osError
 from simbase.timing import NS_PER_MS, NS_PER_S, Nanos
 
 if TYPE_CHECKING:
-    from robot_bench.measurement import Measurement
+    from robot_bench.recording.measurement import Measurement
 
 #: chosen: without pacing, control comes back often enough for progress and signals.
 UNPACED_SLICE_NS: Nanos = 10 * NS_PER_MS
@@ -211,7 +211,7 @@ def _measured(chip: Chip, *, coverage: bool, profile: bool) -> "contextlib.Abstr
     if not coverage and not profile:
         return contextlib.nullcontext()
     from bluepill_sim.board import BluePill
-    from robot_bench.measurement import measuring
+    from robot_bench.recording.measurement import measuring
 
     if not isinstance(chip, BluePill):
         raise TypeError(f"a {type(chip).__name__} cannot be measured: an emulated BluePill can")

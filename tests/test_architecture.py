@@ -77,7 +77,7 @@ LAYERS = {
     ),
     "robot_bench": (
         ("loop", "pacer", "firmware", "scenarios"), ("wires",), ("direct",), ("recording",), ("scenario", "report"),
-        ("adapter", "measurement"), ("bench",), ("remote",), ("run", "debugging", "project"), ("cli",),
+        ("adapter",), ("bench",), ("remote",), ("run", "debugging", "project"), ("cli",),
     ),
 }  # fmt: skip
 

@@ -8,6 +8,8 @@ from p2os.protocol.times import WATCHDOG_NS
 from simbase.errors import UsageError
 from simbase.timing import NS_PER_MS, NS_PER_S, Nanos
 
+#: A program that holds a speed and makes no call for so long loses it; as long as the robot itself waits.
+DEADMAN_S = WATCHDOG_NS / NS_PER_S
 #: Where a robot is looked for, the likeliest first.
 SEARCHED_BAUDS = tuple(BAUDS[code] for code in (0, 2, 4, 1, 3))
 
@@ -27,7 +29,7 @@ class ClientSettings:
     #: After a loss the robot is looked for again; nothing moves until asked.
     reconnect: bool = True
     #: A speed is taken back when the program has made no call for so long; None: never.
-    deadman_ns: Nanos | None = 2 * NS_PER_S
+    deadman_ns: Nanos | None = WATCHDOG_NS
     #: A session without a sound packet for so long is lost; half of the robot's own watchdog.
     liveness_ns: Nanos = WATCHDOG_NS // 2
     #: The present speed goes out again after so long, for P2OS acknowledges nothing: 200 ms less what frames queue for.

@@ -7,7 +7,7 @@ wire.jsonl     P2OS bytes, one message a line
 usart.txt      what the firmware printed
 report.html    the report, and PNG plots beside it
 
-What `--coverage` and `--profile` leave is not made from the trace, but by `robot_bench.measurement`
+What `--coverage` and `--profile` leave is not made from the trace, but by `robot_bench.recording.measurement`
 while the run is there; the trace keeps their summary.
 
 Invariant: nothing but the trace is read; what is there already is written anew.
