@@ -34,6 +34,7 @@ ALLOWED = {
     "p2os.capture.formats.arrow_files": {"pyarrow"},
     "p2os.capture.formats.mcap_files": {"mcap"},
     "p2os.capture.columns": {"construct", "numpy"},
+    "p2os.capture.columns.arrow": {"numpy", "pyarrow"},
     "p2os.pioneer": set(),
     "p2os.pioneer.body.bullet": {"pybullet", "numpy"},
     "p2os.pioneer.world.formats": {"yaml", "PIL"},

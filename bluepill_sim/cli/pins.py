@@ -8,6 +8,7 @@ import typer
 
 from bluepill_sim.analysis.columns import in_columns
 from bluepill_sim.analysis.probe import Probe
+from bluepill_sim.analysis.sigrok import write_sigrok
 from bluepill_sim.analysis.vcd import write_vcd
 from bluepill_sim.board import BluePill
 from bluepill_sim.cli.driving import parse_changes, print_fault, print_status, run_driven, summary, warn_on_stderr
@@ -18,14 +19,14 @@ HELP = """Run a firmware for a while, then show what each pin is and did.
 
 Mode, level, who drives it, edges.
 
-With --vcd the pins are also written as waveforms, with the interrupt
+With --vcd or --sr the pins are also written as waveforms, with the interrupt
 lines and what the USARTs send beside them.
 
 \b
 Examples:
   p2os mcu pins mine.elf                                  pins in use after one second
   p2os mcu pins mine.elf --all                            every pin that has a leg
-  p2os mcu pins mine.elf --for 5s --vcd a.vcd                for GTKWave and PulseView
+  p2os mcu pins mine.elf --for 5s --vcd a.vcd --sr a.sr   for GTKWave and PulseView
   p2os mcu pins mine.elf --drive PA6=1@3.5s               with something on an input
 """
 
@@ -42,6 +43,7 @@ def pins(
         list[str] | None, typer.Option(help="Put a level on a pin at a time; repeatable.", metavar="PIN=LEVEL@TIME")
     ] = None,
     vcd: Annotated[Path | None, typer.Option(help="Write a value change dump.", metavar="FILE")] = None,
+    sr: Annotated[Path | None, typer.Option(help="Write a sigrok session.", metavar="FILE")] = None,
     every: Annotated[bool, typer.Option("--all", help="Untouched pins too.")] = False,
     json_output: Annotated[bool, typer.Option("--json", help="Print one JSON object.")] = False,
 ) -> None:
@@ -49,11 +51,13 @@ def pins(
     board = BluePill(firmware)
     changes = parse_changes(drive or [], board)
     warn_on_stderr(board)
-    probe = Probe(board, with_signals=vcd is not None)
+    probe = Probe(board, with_signals=vcd is not None or sr is not None)
     run_driven(board, span_ns, changes)
     probe.finish()
     if vcd is not None:
         write_vcd(probe, vcd)
+    if sr is not None:
+        write_sigrok(probe, sr)
     rows = [row for row in pin_rows(board, probe) if every or row["used"]]
     if json_output:
         typer.echo(json.dumps({"at_s": board.now_ns / NS_PER_S, "pins": rows}, sort_keys=True))

@@ -87,6 +87,10 @@ NEEDS = (
         name="gdb-multiarch", kind="program", feature="debugging BluePill programs",
         get="sudo apt-get install gdb-multiarch",
     ),
+    Need(
+        name="sigrok-cli", kind="program", feature="reading pins.sr of a run",
+        get="sudo apt-get install sigrok-cli",
+    ),
 )  # fmt: skip
 
 

@@ -18,7 +18,7 @@ the rest.
 
 \b
 Examples:
-  p2os report runs/dodge-001          report.html, plots, pins.vcd, summary.json
+  p2os report runs/dodge-001          report.html, plots, pins.vcd, pins.sr, summary.json
   p2os report runs/dodge-001 --json   print the summary as well
 """
 

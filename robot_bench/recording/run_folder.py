@@ -25,7 +25,7 @@ from simbase.errors import UsageError
 RUNS = Path("runs")
 #: All that a run leaves in its folder.
 FILES = (
-    TRACE_NAME, SUMMARY_NAME, "report.html", "pins.vcd", "wire.jsonl", "usart.txt",
+    TRACE_NAME, SUMMARY_NAME, "report.html", "pins.vcd", "pins.sr", "wire.jsonl", "usart.txt",
     "path.png", "speeds.png", "pins.png",
     "coverage.txt", "coverage.html", "coverage.info", "profile.txt", "profile.folded", "profile.svg",
 )  # fmt: skip

@@ -3,6 +3,7 @@
 trace.jsonl    the single source, written while the run goes on
 summary.json   figures and verdict
 pins.vcd       all wires, exact to the nanosecond
+pins.sr        all wires, sampled, for PulseView
 wire.jsonl     P2OS bytes, one message a line
 usart.txt      what the firmware printed
 report.html    the report, and PNG plots beside it
@@ -19,7 +20,7 @@ from pathlib import Path
 
 from robot_bench.recording.run_record import Json, RunRecord, read_run
 from robot_bench.recording.summary import write_outcome
-from robot_bench.recording.waveforms import write_vcd
+from robot_bench.recording.waveforms import write_sigrok, write_vcd
 from robot_bench.report.page import page_data, render_page
 from simbase.errors import FileError
 
@@ -71,6 +72,7 @@ def make_artefacts(folder: Path) -> Artefacts:
     try:
         outcome = write_outcome(record, folder)
         write_vcd(record, folder / "pins.vcd")
+        write_sigrok(record, folder / "pins.sr")
         write_wire(record, folder / "wire.jsonl")
         (folder / "usart.txt").write_bytes(b"".join(data for _, data in record.usart))
         report = make_report(folder)

@@ -41,6 +41,9 @@ class FakeChip:
     def set_irq(self, irq: int, level: bool) -> None:
         self.irqs[irq] = level
 
+    def pulse_irq(self, irq: int) -> None:
+        self.pulses.append(irq)
+
     def clock_changed(self) -> None:
         self.clock_changes += 1
         if self._parts is not None:

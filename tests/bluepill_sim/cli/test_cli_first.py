@@ -1,6 +1,7 @@
 """`p2os mcu run`, `info` and `pins`, as a person meets them."""
 
 import json
+import zipfile
 from importlib.resources import files
 from pathlib import Path
 
@@ -35,13 +36,14 @@ def test_run_in_real_time_serves_a_pseudo_terminal(capfd: pytest.CaptureFixture[
     ("words", "message"),
     [
         (["run", "nothing.elf"], "no such file"),
-        (["run", SENSORS, "--for", "10"], "has no unit"),
+        (["run", SENSORS, "--for", "10"], "is no span of time"),
         (["run", SENSORS, "--drive", "PA6"], "is not understood"),
         (["run", SENSORS, "--drive", "PE6=1"], "no leg PE6"),
         (["run", SENSORS, "--drive", "XY=1"], "no leg XY"),
         (["run", SENSORS, "--until", "tea"], "is not understood"),
         (["run", SENSORS, "--uart", "/nowhere/log"], "cannot write"),
         (["pins", SENSORS, "--for", "1ms", "--vcd", "/nowhere/a.vcd"], "cannot write"),
+        (["pins", SENSORS, "--for", "1ms", "--sr", "/nowhere/a.sr"], "cannot write"),
         (["info", "/dev/null"], "empty"),
     ],
 )
@@ -76,7 +78,8 @@ def test_info_of_an_image_without_sections(tmp_path: Path, capfd: pytest.Capture
 
 
 def test_pins_shows_modes_levels_and_edges(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
-    words = ["mcu", "pins", SENSORS, "--for", "10ms", "--vcd", str(tmp_path / "a.vcd"), "--drive", "PA6=1@5ms"]
+    vcd, sr = tmp_path / "a.vcd", tmp_path / "a.sr"
+    words = ["mcu", "pins", SENSORS, "--for", "10ms", "--vcd", str(vcd), "--sr", str(sr), "--drive", "PA6=1@5ms"]
     assert run([*words, "--json"]) == 0
     rows = {row["pin"]: row for row in json.loads(capfd.readouterr().out)["pins"]}
     assert rows["PB12"]["mode"] == "output"
@@ -86,6 +89,29 @@ def test_pins_shows_modes_levels_and_edges(tmp_path: Path, capfd: pytest.Capture
     assert rows["PA13"]["function"] == "JTMS/SWDIO"
     assert run([*words, "--all"]) == 0
     assert len(capfd.readouterr().out.splitlines()) == 38
+
+
+def decoded_words(session: Path) -> bytes:
+    """Decode `usart1.tx` of a sigrok session as 115200 8N1, by its samples alone."""
+    with zipfile.ZipFile(session) as archive:
+        metadata = archive.read("metadata").decode()
+        samples = archive.read("logic-1-1")
+    lines = dict(line.split("=") for line in metadata.splitlines() if "=" in line)
+    probe = next(int(key[5:]) - 1 for key, value in lines.items() if value == "usart1.tx")
+    unit, rate = int(lines["unitsize"]), {"20 MHz": 20_000_000, "1 MHz": 1_000_000}[lines["samplerate"]]
+    levels = bytes(samples[n + probe // 8] >> probe % 8 & 1 for n in range(0, len(samples), unit))
+    bit, at, found = rate / 115_200, 0, bytearray()
+    while (at := levels.find(0, at)) >= 0:
+        word = sum(levels[int(at + bit * (n + 1.5))] << n for n in range(8))
+        found.append(word)
+        at = int(at + bit * 9.5)
+    return bytes(found)
+
+
+def test_a_session_shows_the_bits_of_the_usart(tmp_path: Path) -> None:
+    session = tmp_path / "a.sr"
+    assert run(["mcu", "pins", SENSORS, "--for", "10ms", "--sr", str(session)]) == 0
+    assert decoded_words(session) == b"sensors: ready\n"
 
 
 def test_a_dump_holds_every_edge_and_every_word(tmp_path: Path) -> None:

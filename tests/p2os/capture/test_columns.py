@@ -2,6 +2,7 @@
 
 import dataclasses
 import json
+import sys
 from itertools import zip_longest
 from pathlib import Path
 
@@ -12,6 +13,7 @@ from hypothesis import strategies as st
 np = pytest.importorskip("numpy")
 
 from p2os.capture.columns import Columns, Damage, decode, find_frames  # noqa: E402
+from p2os.capture.columns.arrow import to_arrow  # noqa: E402
 from p2os.capture.columns.objects import rows_by_objects  # noqa: E402
 from p2os.capture.columns.tables import KINDS  # noqa: E402
 from p2os.protocol.frames import (  # noqa: E402
@@ -32,6 +34,7 @@ from p2os.protocol.packets import (  # noqa: E402
 from p2os.protocol.packets.registry import IDENTITY_KIND  # noqa: E402
 from p2os.protocol.profiles import Profile  # noqa: E402
 from p2os.protocol.sip import SIP_KINDS  # noqa: E402
+from simbase.errors import MissingDependencyError  # noqa: E402
 from simbase.timing import NS_PER_MS, Nanos  # noqa: E402
 from tests.p2os.protocol.packet_strategies import ANY, PACKETS  # noqa: E402
 
@@ -171,6 +174,23 @@ def test_numbers_come_as_arrays_and_texts_as_bytes() -> None:
     structured = sip.structured()
     assert structured["packet"].tolist() == [0, 2]
     assert structured["raw_heading"].tolist() == [0, -1]
+
+
+@given(streams)
+@settings(deadline=None)
+def test_arrow_tables_hold_the_same_rows(data: bytes) -> None:
+    pytest.importorskip("pyarrow")
+    for table in decode(data, Profile.P2OS).tables.values():
+        for packet, found in zip(table.packets.tolist(), to_arrow(table).to_pylist(), strict=True):
+            row = table.row(table.packets.tolist().index(packet))
+            listed = {name: list(value) if isinstance(value, tuple) else value for name, value in row.items()}
+            assert found == {"packet": packet, **listed}
+
+
+def test_arrow_tables_without_pyarrow_say_what_is_missing(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "pyarrow", None)
+    with pytest.raises(MissingDependencyError, match="pyarrow"):
+        to_arrow(decode(packet_frame(StandardSip(), Profile.P2OS).to_bytes(), Profile.P2OS).tables["sip"])
 
 
 @pytest.mark.parametrize("name", ["encoder", "sip"])

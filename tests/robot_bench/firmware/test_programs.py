@@ -32,7 +32,7 @@ def test_a_program_reaches_its_goals(program: str, mode: str, body: str, world: 
     outcome = run(program, tmp_path, mode=mode, body=body, world=world, duration_s=duration_s)
     assert outcome["collisions"] == 0
     names = {path.name for path in tmp_path.iterdir()}
-    assert names >= {"trace.jsonl", "summary.json", "pins.vcd", "wire.jsonl", "usart.txt", "report.html"}
+    assert names >= {"trace.jsonl", "summary.json", "pins.vcd", "pins.sr", "wire.jsonl", "usart.txt", "report.html"}
     assert json.loads((tmp_path / "summary.json").read_text()) == outcome
 
 
