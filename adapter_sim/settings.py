@@ -7,6 +7,7 @@ from dataclasses import dataclass, fields
 from enum import StrEnum
 
 from adapter_sim.codec import BitOrder
+from p2os.protocol.bauds import DEFAULT_BAUD
 from p2os.protocol.times import LIVENESS_NS, PULSE_NS
 from simbase.errors import UsageError
 from simbase.timing import NS_PER_MS, NS_PER_S, Nanos
@@ -30,12 +31,6 @@ class EncoderAtOpen(StrEnum):
     CONTINUE = "continue"
 
 
-#: Settings that were renamed: old name to present name, for those who read settings from a user's file.
-RENAMED_SETTINGS = {
-    "disbelief_ns": "plausibility_ns",
-    "disbelief_tolerance_mm_s": "plausibility_tolerance_mm_s",
-    "disbelief_progress_mm_s": "plausibility_progress_mm_s",
-}
 #: More line speeds than this are not searched.
 MAX_BAUDS = 8
 
@@ -104,7 +99,7 @@ class AdapterSettings:
     stop_repeat_ns: Nanos = 200 * NS_PER_MS
 
     #: Line speeds tried in turn while nobody answers, 1 to 8 of them.
-    bauds: tuple[int, ...] = (9_600,)
+    bauds: tuple[int, ...] = (DEFAULT_BAUD,)
 
     #: A game pad's full deflections (the thesis: 0.4 m/s and 1.7 rad/s; its later repository 0.5 m/s).
     pad_velocity_mm_s: int = 400
@@ -126,7 +121,7 @@ class AdapterSettings:
                 continue
             if not isinstance(value, int) or isinstance(value, bool):
                 raise UsageError(f"adapter setting {field.name} must be an integer, got {value!r}")
-            least = 0 if field.name in _MAY_BE_ZERO else 1
+            least = 0 if field.name in MAY_BE_ZERO else 1
             if value < least:
                 raise UsageError(f"adapter setting {field.name} must be {least} or more, got {value}")
         if not isinstance(self.stop_unknown_robot, bool):
@@ -169,7 +164,7 @@ class AdapterSettings:
 
 
 #: Settings for which 0 is a meaning: no debounce, no boot, no dwell, no repeats, no motion at all.
-_MAY_BE_ZERO = frozenset(
+MAY_BE_ZERO = frozenset(
     {
         "connect_after_ns", "disconnect_after_ns", "boot_ns", "encoder_dwell_ns", "stop_repeats",
         "max_velocity_mm_s", "max_rotation_deg_s", "step_um_per_s", "angular_step_urad_per_s",

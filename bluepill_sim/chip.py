@@ -227,13 +227,6 @@ class Chip:
         if level:
             self.processor.pending_changed()
 
-    def pulse_irq(self, irq: int) -> None:
-        """Make an interrupt pending once."""
-        for listener in self.irq_listeners:
-            listener(irq, True, self.now_ns)
-            listener(irq, False, self.now_ns)
-        self.processor.pend(16 + irq)
-
     def clock_changed(self) -> None:
         """Go on at the frequency and the wait states now in `clocks`."""
         clocks = self.clocks

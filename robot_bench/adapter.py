@@ -57,7 +57,6 @@ _FUNCTIONS = {
     "adapter_new": "ppppplp",
     "adapter_free": "vp",
     "adapter_setting_name": "si",
-    "adapter_setting_default": "li",
     "adapter_robot_name": "si",
     "adapter_wire_name": "si",
     "adapter_status_name": "si",
@@ -290,18 +289,10 @@ def make_adapter(scenario: Scenario, pins: PinBank, pinout: Pinout) -> AnyAdapte
     return kind(pins=pins, pinout=pinout, parameters=scenario.parameters, settings=scenario.adapter)
 
 
-def default_settings() -> dict[str, int]:
-    """Return the firmware's own defaults, by the names of its settings."""
-    library = _library()
-    return {
-        name: library.adapter_setting_default(place) for place, name in enumerate(_names(library.adapter_setting_name))
-    }
-
-
 def setting_numbers(settings: AdapterSettings, parameters: RobotParameters) -> dict[str, int]:
     """Return a model's settings as the firmware's numbers."""
     numbers = {}
-    for name in default_settings():
+    for name in _names(_library().adapter_setting_name):
         if name.startswith("baud"):
             place = int(name.removeprefix("baud"))
             numbers[name] = settings.bauds[place] if place < len(settings.bauds) else 0

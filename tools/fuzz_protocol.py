@@ -1,8 +1,7 @@
 """Fuzz targets for whatever reads bytes or files of others, and a plain mutator to run them with.
 
 A target takes any bytes and raises only when something is wrong: an exception
-that its reader does not promise, or a broken invariant. `tools/fuzz_atheris.py`
-runs the same targets guided by coverage.
+that its reader does not promise, or a broken invariant.
 
 Usage: python tools/fuzz_protocol.py TARGET COUNT [SEED]
 """

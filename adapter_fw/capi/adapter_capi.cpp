@@ -116,7 +116,6 @@ const char* adapter_setting_name(int32_t place) {
 }
 const char* adapter_robot_name(int32_t place) { return name_at(ROBOT, place); }
 const char* adapter_wire_name(int32_t place) { return name_at(WIRES, place); }
-int64_t adapter_setting_default(int32_t place) { return setting(place).get(Settings{}); }
 
 void adapter_receive(adapter_handle* handle, const uint8_t* data, size_t size, int64_t now) {
   handle->part.receive({data, size}, now);

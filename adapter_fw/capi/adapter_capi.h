@@ -41,8 +41,6 @@ void adapter_free(adapter_handle* handle);
 const char* adapter_setting_name(int32_t place);
 const char* adapter_robot_name(int32_t place);
 const char* adapter_wire_name(int32_t place);
-/* Their defaults. */
-int64_t adapter_setting_default(int32_t place);
 
 void adapter_receive(adapter_handle* handle, const uint8_t* data, size_t size, int64_t now);
 /* Buttons: bit 0 is Up, bit 1 is Down. */

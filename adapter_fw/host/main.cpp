@@ -130,7 +130,6 @@ int run(const Options& options, host::Line& line, host::Wires& wires, host::File
     err.write(fault);
     err.write("\n");
   }
-  app::report_renamed(store, err);
   app::EventLog log;
   app::EventPrinter printer(log, err);
   adapter::Adapter part(settings, *adapter::find_robot(options.robot.c_str()), numbers, clock.now());

@@ -12,11 +12,12 @@ from bluepill_sim.analysis.lcov import write_lcov
 from bluepill_sim.analysis.observation import Observation
 from bluepill_sim.board import BluePill
 from bluepill_sim.cli.driving import parse_changes, print_fault, print_status, run_driven, summary, warn_on_stderr
-from bluepill_sim.cli.quantities import percent_option, time_option
+from bluepill_sim.cli.quantities import option, time_option
 from bluepill_sim.errors import BluePillError
 from bluepill_sim.program.line_table import read_lines
 from bluepill_sim.program.static_code import StaticCode
 from simbase.timing import NS_PER_S, Nanos
+from simbase.units import PERCENT
 
 HELP = """Show which lines and branches of a firmware run.
 
@@ -51,7 +52,9 @@ def coverage(
     missed: Annotated[
         bool, typer.Option("--missed", help="Name lines that did not run, and branches that went one way.")
     ] = False,
-    fail_under: Annotated[float, percent_option("--fail-under", purpose="Least share of lines.", shown="0%")] = 0.0,
+    fail_under: Annotated[
+        float, option(PERCENT, "--fail-under", purpose="Least share of lines.", shown="0%", least="0%", most="100%")
+    ] = 0.0,
     json_output: Annotated[bool, typer.Option("--json", help="Print one JSON object.")] = False,
 ) -> None:
     """Measure coverage."""

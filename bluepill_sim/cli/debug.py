@@ -9,8 +9,9 @@ from bluepill_sim.board import BluePill
 from bluepill_sim.cli.console import connect, open_console
 from bluepill_sim.cli.driving import print_status, summary, warn_on_stderr
 from bluepill_sim.cli.gdb_server import GdbServer
-from bluepill_sim.cli.quantities import port_option
+from bluepill_sim.cli.quantities import option
 from bluepill_sim.debug.machine import LoneChip
+from simbase.units import PORT
 
 HELP = """Let GDB run, stop, look into and rewind a firmware.
 
@@ -37,7 +38,15 @@ def register(app: typer.Typer) -> None:
 def debug(
     firmware: Annotated[Path, typer.Argument(help="ELF, HEX or BIN.", metavar="FIRMWARE")],
     port: Annotated[
-        int, port_option("--port", purpose="TCP port on this machine; 0 takes a free one.", shown="3333")
+        int,
+        option(
+            PORT,
+            "--port",
+            purpose="TCP port on this machine; 0 takes a free one.",
+            shown="3333",
+            least="0",
+            most="65535",
+        ),
     ] = DEFAULT_PORT,
     uart: Annotated[str, typer.Option(help="Where USART1 goes: - (stdout), or a file.", metavar="WHERE")] = "-",
     fast: Annotated[bool, typer.Option("--fast", help="Do not hold virtual time back to the clock.")] = False,

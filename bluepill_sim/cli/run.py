@@ -19,9 +19,10 @@ from bluepill_sim.cli.driving import (
     summary,
     warn_on_stderr,
 )
-from bluepill_sim.cli.quantities import baud_option, time_option
+from bluepill_sim.cli.quantities import option, time_option
 from bluepill_sim.timing import ChipReached
 from simbase.timing import NS_PER_MS, NS_PER_S, Nanos, Reason
+from simbase.units import BAUD
 
 HELP = """Boot a firmware on an emulated BluePill.
 
@@ -71,7 +72,8 @@ def run(
         Nanos, time_option("--budget", purpose="Most time of the wall clock, unless --realtime.", shown="10min")
     ] = _BUDGET_NS,
     usart_baud: Annotated[
-        int | None, baud_option("--usart-baud", purpose="Speed of USART1's far end; unset follows the program.")
+        int | None,
+        option(BAUD, "--usart-baud", purpose="Speed of USART1's far end; unset follows the program.", above_zero=True),
     ] = None,
     strict: Annotated[bool, typer.Option("--strict", help="The first warning ends the run.")] = False,
 ) -> None:

@@ -38,10 +38,6 @@ class ChipPorts(Protocol):
         """Set the level of interrupt line `irq` (0 to 59; USART1 is 37)."""
         ...
 
-    def pulse_irq(self, irq: int) -> None:
-        """Make interrupt `irq` pending once, without a level that stays."""
-        ...
-
     def clock_changed(self) -> None:
         """Notify that `clocks` has new values: re-base cycles, and call each peripheral's `clock_changed`."""
         ...

@@ -75,11 +75,6 @@ class Register:
         if self.reset & ~self.readable:
             raise ValueError(f"{self.name}: the reset value holds bits that do not read")
 
-    @property
-    def is_plain_read(self) -> bool:
-        """Whether a read returns the stored word and causes nothing."""
-        return self.on_read is None
-
     def widen(self, previous: int, value: int, lanes: int) -> int:
         """Return the whole-word write that does what a write of some byte lanes does.
 

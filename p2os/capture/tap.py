@@ -10,11 +10,9 @@ one: closing frames that were not needed change nothing.
 
 from p2os.capture.chunks import Chunk, Direction
 from p2os.capture.listing import FrameCutter, RecordedSession, frame_of
+from p2os.protocol.bauds import BAUDS
 from p2os.protocol.commands import Command, CommandNumber, stop, vel
 from simbase.timing import Nanos
-
-#: Argument of HOSTBAUD → bit/s (Pioneer 3 manual, client commands).
-HOST_BAUDS = {0: 9600, 1: 19200, 2: 38400, 3: 57600, 4: 115200}
 
 
 class Tap:
@@ -39,7 +37,7 @@ class Tap:
             if direction is Direction.TO_ROBOT and frame.kind >= CommandNumber.CLOSE:
                 self._was_commanded = frame.kind > CommandNumber.CLOSE
             if direction is Direction.TO_ROBOT and frame.kind == CommandNumber.HOSTBAUD:
-                self.new_baud = HOST_BAUDS.get(Command.from_frame(frame).integer or 0)
+                self.new_baud = dict(enumerate(BAUDS)).get(Command.from_frame(frame).integer or 0)
         return chunk
 
     def closing_frames(self) -> bytes:

@@ -31,7 +31,7 @@ from p2os.client.line import Line, core_for, motion_result, no_answer, not_conne
 from p2os.client.notices import Notice
 from p2os.client.robot_state import Link, RobotState
 from p2os.client.robot_thread import CLOSING_S, MOST_NOTICES, TOUCH_S, Opener
-from p2os.client.settings import ClientSettings
+from p2os.client.settings import DEADMAN_S, ClientSettings
 from p2os.errors import TransportError
 from p2os.robots.parameters import RobotParameters
 from p2os.transport import open_url
@@ -54,7 +54,7 @@ class Robot(RobotCalls):
         model: str | RobotParameters | None = None,
         auto_enable: bool = True,
         reconnect: bool = True,
-        deadman_s: float | None = 2.0,
+        deadman_s: float | None = DEADMAN_S,
         settings: ClientSettings | None = None,
         opener: Opener = open_url,
         clock: Clock = wall_clock,

@@ -39,7 +39,8 @@ from p2os.client.notices import (
 )
 from p2os.client.outbox import Action, CloseLine, OpenLine, Outbox, Send, SetBaud
 from p2os.client.robot_state import Link
-from p2os.client.settings import BAUD_CODES, ClientSettings
+from p2os.client.settings import ClientSettings
+from p2os.protocol.bauds import BAUDS
 from p2os.protocol.commands import Command, CommandNumber, pulse
 from p2os.protocol.config_packet import ConfigPacket
 from p2os.protocol.connection import (
@@ -436,7 +437,7 @@ class LinkSupervisor:
         if (config.autobaud == WANTS_HIGHER_BAUD and wanted is not None and self.baud is not None
                 and wanted > self.baud and not self._raise_refused):  # fmt: skip
             self._raise = _Raise(old=self.baud, new=wanted)
-            self.send(Command(CommandNumber.HOSTBAUD, BAUD_CODES[wanted]), now)
+            self.send(Command(CommandNumber.HOSTBAUD, BAUDS.index(wanted)), now)
             self.outbox.put(SetBaud(wanted))
             self.send(pulse(), now)
 

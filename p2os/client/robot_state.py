@@ -40,11 +40,6 @@ class RobotPose:
     y_m: float = 0.0
     heading_rad: float = 0.0
 
-    def to_world(self, x_m: float, y_m: float) -> tuple[float, float]:
-        """Return where a point of the robot's frame lies in the pose's frame, metres."""
-        cos, sin = math.cos(self.heading_rad), math.sin(self.heading_rad)
-        return self.x_m + cos * x_m - sin * y_m, self.y_m + sin * x_m + cos * y_m
-
 
 @dataclass(frozen=True, slots=True)
 class SonarEcho:

@@ -2,15 +2,16 @@
 
 from dataclasses import dataclass
 
+from p2os.protocol.bauds import BAUDS, BAUDS_TEXT
 from p2os.protocol.profiles import Profile
 from p2os.protocol.times import WATCHDOG_NS
 from simbase.errors import UsageError
 from simbase.timing import NS_PER_MS, NS_PER_S, Nanos
 
-#: Baud rates of a Pioneer's HOST port, the likeliest first (Pioneer 3 manual, HOSTBAUD; 9600 is the default).
-BAUDS = (9600, 38400, 115200, 19200, 57600)
-#: HOSTBAUD's argument of each rate (Pioneer 3 manual, command 50).
-BAUD_CODES = {9600: 0, 19200: 1, 38400: 2, 57600: 3, 115200: 4}
+#: A program that holds a speed and makes no call for so long loses it; as long as the robot itself waits.
+DEADMAN_S = WATCHDOG_NS / NS_PER_S
+#: Where a robot is looked for, the likeliest first.
+SEARCHED_BAUDS = tuple(BAUDS[code] for code in (0, 2, 4, 1, 3))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -28,7 +29,7 @@ class ClientSettings:
     #: After a loss the robot is looked for again; nothing moves until asked.
     reconnect: bool = True
     #: A speed is taken back when the program has made no call for so long; None: never.
-    deadman_ns: Nanos | None = 2 * NS_PER_S
+    deadman_ns: Nanos | None = WATCHDOG_NS
     #: A session without a sound packet for so long is lost; half of the robot's own watchdog.
     liveness_ns: Nanos = WATCHDOG_NS // 2
     #: The present speed goes out again after so long, for P2OS acknowledges nothing: 200 ms less what frames queue for.
@@ -50,9 +51,9 @@ class ClientSettings:
     #: From the first OPEN to the first packet; OPEN is repeated meanwhile.
     first_packet_ns: Nanos = 1 * NS_PER_S
     #: Baud rates to look for the robot at, after the one that the line was opened with.
-    bauds: tuple[int, ...] = BAUDS
+    bauds: tuple[int, ...] = SEARCHED_BAUDS
     #: Rate to which a serial line is raised when the robot offers it (CONFIGpac autobaud 2); None: never.
-    raise_baud: int | None = 38400
+    raise_baud: int | None = BAUDS[2]
     #: From HOSTBAUD to the first packet at the new rate, before falling back.
     raise_window_ns: Nanos = 500 * NS_PER_MS
     #: First wait before looking for a lost robot again; doubled after each failure.
@@ -67,6 +68,5 @@ class ClientSettings:
                 raise UsageError(f"{name} = {getattr(self, name)} must be positive")
         if self.deadman_ns is not None and self.deadman_ns <= 0:
             raise UsageError(f"deadman_ns = {self.deadman_ns} must be positive, or None")
-        if self.raise_baud is not None and self.raise_baud not in BAUD_CODES:
-            rates = ", ".join(map(str, BAUD_CODES))
-            raise UsageError(f"raise_baud = {self.raise_baud} is no rate of HOSTBAUD", hint=f"one of {rates}")
+        if self.raise_baud is not None and self.raise_baud not in BAUDS:
+            raise UsageError(f"raise_baud = {self.raise_baud} is no rate of HOSTBAUD", hint=f"one of {BAUDS_TEXT}")

@@ -16,6 +16,7 @@ from difflib import get_close_matches
 from enum import Enum, IntEnum
 
 from p2os.errors import LocalProtocolError
+from p2os.protocol.bauds import BAUDS
 from p2os.protocol.profiles import Profile
 
 
@@ -379,7 +380,7 @@ ROWS = (
     _row(_N.SONARCYCLE, (_A.UNSIGNED,), "ms", (2, 120), "- 1.8 1.0", "Time of a ping, 40 ms by default."),
     _row(_N.MOVINGBLINK, (_A.INTEGER,), "", (0, 1), "- - ?", "PatrolBot: blink before moving."),
     _row(_N.HOSTBAUD, (_A.INTEGER,), "", (0, 4), "- 1.8 1.0",
-         "Baud of the host port: 0 9600, 1 19200, 2 38400, 3 57600, 4 115200."),
+         f"Baud of the host port: {', '.join(f'{code} {baud}' for code, baud in enumerate(BAUDS))}."),
     _row(_N.AUX1BAUD, (_A.INTEGER,), "", (0, 4), "- 1.8 1.0", "Baud of AUX1, as HOSTBAUD."),
     _row(_N.AUX2BAUD, (_A.INTEGER,), "", (0, 4), "- 1.8 1.0", "Baud of AUX2, as HOSTBAUD."),
     _row(_N.AUX3BAUD, (_A.INTEGER,), "", (0, 4), "- 1.8 1.0", "Baud of AUX3, as HOSTBAUD."),

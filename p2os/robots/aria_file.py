@@ -52,7 +52,6 @@ BUMPERS: Mapping[str, tuple[str, str]] = {
     "FrontBumpers": ("NumFrontBumpers", "front_bumpers"),
     "RearBumpers": ("NumRearBumpers", "rear_bumpers"),
 }
-DEFAULT_BAUD = 9600
 #: chosen: what a measure of a robot may be in ARIA's units; the smallest in use is an angle factor of 0.00153.
 SMALLEST, LARGEST = 1e-6, 1e6
 
@@ -123,8 +122,6 @@ def _equipment(source: str, values: Mapping[str, str]) -> Table:
         if key in values:
             is_there = values[key].lower() == "true"
             found[name] = round(_number(source, count, values.get(count, "5"))) if is_there else 0
-    if "SwitchToBaudRate" in values:
-        found["highest_baud"] = round(_number(source, "SwitchToBaudRate", values["SwitchToBaudRate"])) or DEFAULT_BAUD
     return found
 
 

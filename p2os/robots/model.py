@@ -64,8 +64,6 @@ class Equipment:
     has_move: bool = True
     #: Whether ARIA asks this model for IOpacs by itself: its bumpers and infra-red eyes are only there.
     sends_io_packets: bool = False
-    #: What HOSTBAUD may raise the line to; 9600 where it cannot.
-    highest_baud: int = 38400
     #: Driven wheels.
     wheels: int = 2
     #: Largest sideways speed, 0 where it cannot.

@@ -47,7 +47,7 @@ RANGES: Mapping[str, Mapping[str, tuple[float, float]]] = {
         "rear_mm": (1, 10_000),
     },
     "equipment": {
-        "front_bumpers": (0, 16), "rear_bumpers": (0, 16), "highest_baud": (300, 1_000_000), "wheels": (1, 64),
+        "front_bumpers": (0, 16), "rear_bumpers": (0, 16), "wheels": (1, 64),
         "max_lateral_mm_s": (0, 32_767), "gyro_scaler": (0.001, 1000),
     },
     "motion": {

@@ -4,7 +4,6 @@ One TOML file a model in `p2os/robots/`, each number with its source; a user's
 own file is TOML too, or one of ARIA's (`.p`).
 """
 
-from dataclasses import dataclass
 from difflib import get_close_matches
 from pathlib import Path
 
@@ -17,14 +16,12 @@ from simbase.errors import shown, shown_name
 __all__ = [
     "BodyParameters",
     "Equipment",
-    "MatchedParameters",
     "MotionDefaults",
     "ParametersError",
     "RobotParameters",
     "SonarPose",
     "known_robots",
     "load_parameters",
-    "parameters_for",
 ]
 
 #: What an unknown robot is taken for when its name has no known beginning.
@@ -35,15 +32,6 @@ FAMILIES = {
     "amigo": "amigo-sh", "power": "powerbot-sh", "patrol": "patrolbot-sh", "people": "peoplebot-sh", "perf": "perfpb",
     "mt400": "patrolbot-sh", "researchpb": "patrolbot-sh", "psos": "pion1m", "pion": "pion1m", "seekur": "seekur",
 }  # fmt: skip
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class MatchedParameters:
-    """The parameters taken for a robot, and the warning that a person should get."""
-
-    parameters: RobotParameters
-    #: None where the model is known or parameters were given.
-    warning: str | None = None
 
 
 def load_parameters(name_or_path: str | Path) -> RobotParameters:
@@ -65,32 +53,6 @@ def load_parameters(name_or_path: str | Path) -> RobotParameters:
     close = get_close_matches(name.lower(), known_robots(), n=1)
     hint = f"did you mean {close[0]}?" if close else f"known models: {', '.join(known_robots())}"
     raise ParametersError(f"no robot model {shown(name)}", hint=hint)
-
-
-def parameters_for(subclass: str, given: str | Path | RobotParameters | None = None) -> MatchedParameters:
-    """Return the parameters for a robot's identity; an unknown subclass falls back with a warning.
-
-    Args:
-        subclass: From the robot's identity, in any case.
-        given: Parameters, a model or a file that a person has named; they win over the robot's identity.
-
-    Raises:
-        ParametersError: What was given is unknown, missing or breaks the schema.
-    """
-    if isinstance(given, RobotParameters):
-        return MatchedParameters(parameters=given)
-    if given is not None:
-        return MatchedParameters(parameters=load_parameters(given))
-    if subclass.lower() in known_robots():
-        return MatchedParameters(parameters=load_parameters(subclass))
-    parameters = load_parameters(nearest_model(subclass))
-    return MatchedParameters(
-        parameters=parameters,
-        warning=(
-            f"no robot model {subclass!r}: taken for a {parameters.title} ({parameters.subclass}); distances, speeds"
-            " and sonar may be wrong. A file of its own (TOML, or ARIA's .p) sets them right"
-        ),
-    )
 
 
 def nearest_model(subclass: str) -> str:

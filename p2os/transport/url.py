@@ -9,10 +9,9 @@ import re
 from collections.abc import Callable
 from dataclasses import dataclass
 
+from p2os.protocol.bauds import DEFAULT_BAUD
 from simbase.errors import UsageError
 
-#: The rate at which a Pioneer 2 listens unless set otherwise (Pioneer 2 manual, HOST serial port).
-DEFAULT_BAUD = 9600
 #: The port on which simulated Pioneers have always listened; ARIA tries it first.
 DEFAULT_TCP_PORT = 8101
 LOOPBACK = "127.0.0.1"

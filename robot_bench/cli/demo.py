@@ -6,7 +6,7 @@ from typing import Annotated
 import typer
 
 from p2os.cli.help_pages import BENCH
-from p2os.cli.quantities import TIME
+from p2os.cli.quantities import option
 from p2os.pioneer.body.factory import BEST
 from robot_bench.cli.progress import RunDisplay
 from robot_bench.cli.run import end_with
@@ -14,6 +14,7 @@ from robot_bench.recording.run_folder import make_next_folder
 from robot_bench.run import run_scenario
 from robot_bench.scenario.scenario import load_scenario
 from simbase.timing import NS_PER_S, Nanos
+from simbase.units import TIME
 
 HELP = """Watch a BluePill program drive a Pioneer around obstacles.
 
@@ -31,7 +32,7 @@ def register(app: typer.Typer) -> None:
 def demo(
     out: Annotated[Path | None, typer.Option(help="Run folder; default runs/demo-NNN.", metavar="FOLDER")] = None,
     duration_ns: Annotated[
-        Nanos | None, TIME.option("--duration", purpose="How much virtual time.", above_zero=True)
+        Nanos | None, option(TIME, "--duration", purpose="How much virtual time.", above_zero=True)
     ] = None,
     force: Annotated[bool, typer.Option("--force", help="Overwrite the run that the --out folder holds.")] = False,
     json_output: Annotated[bool, typer.Option("--json", help="Print one JSON object.")] = False,

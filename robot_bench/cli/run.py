@@ -11,7 +11,7 @@ from p2os.cli.held_robot import hold_robot
 from p2os.cli.help_pages import BENCH, VerbPage
 from p2os.cli.main import EXIT_INTERRUPTED
 from p2os.cli.names import bodies, urls, worlds
-from p2os.cli.quantities import BAUD, FACTOR, PORT, SEED, SPEED, TIME
+from p2os.cli.quantities import option
 from p2os.errors import RunFailedError
 from p2os.transport import open_url
 from robot_bench.cli.gdb import debug_bench, debug_port
@@ -23,6 +23,7 @@ from robot_bench.run import RunResult, run_at_port, run_scenario
 from robot_bench.scenario.scenario import Scenario, known_scenarios, load_scenario
 from simbase.errors import UsageError
 from simbase.timing import NS_PER_S, Nanos
+from simbase.units import BAUD, FACTOR, PORT, SEED, SPEED, TIME
 
 HELP = """Run a scenario: a BluePill program drives a robot.
 
@@ -94,18 +95,22 @@ def run(
     world: Annotated[
         str | None, typer.Option(help="World, or a TOML file.", metavar="WORLD|FILE", autocompletion=worlds)
     ] = None,
-    seed: Annotated[int | None, SEED.option("--seed", purpose="Of everything random.", least="0")] = None,
+    seed: Annotated[int | None, option(SEED, "--seed", purpose="Of everything random.", least="0")] = None,
     duration_ns: Annotated[
-        Nanos | None, TIME.option("--duration", purpose="How much virtual time.", above_zero=True)
+        Nanos | None, option(TIME, "--duration", purpose="How much virtual time.", above_zero=True)
     ] = None,
     usart_baud: Annotated[
         int | None,
-        BAUD.option("--usart-baud", purpose="Speed of USART1's far end; unset follows the firmware.", above_zero=True),
+        option(BAUD, "--usart-baud", purpose="Speed of USART1's far end; unset follows the firmware.", above_zero=True),
     ] = None,
     realtime: Annotated[
         float | None,
-        FACTOR.option(
-            "--realtime", purpose="Keep pace with the clock, FACTOR times as fast.", above_zero=True, metavar="[FACTOR]"
+        option(
+            FACTOR,
+            "--realtime",
+            purpose="Keep pace with the clock, FACTOR times as fast.",
+            above_zero=True,
+            metavar="[FACTOR]",
         ),
     ] = None,
     out: Annotated[Path | None, typer.Option(help="Run folder; default runs/SCENARIO-NNN.", metavar="FOLDER")] = None,
@@ -115,11 +120,11 @@ def run(
     profile: Annotated[bool, typer.Option("--profile", help="Write where the cycles went.")] = False,
     gdb: Annotated[
         int | None,
-        PORT.option("--gdb", purpose="Wait for GDB on this TCP port; 0 takes a free one.", least="0", most="65535"),
+        option(PORT, "--gdb", purpose="Wait for GDB on this TCP port; 0 takes a free one.", least="0", most="65535"),
     ] = None,
     yes: Annotated[bool, typer.Option("--yes", help="With --port: do not ask before the first motion.")] = False,
     max_speed: Annotated[
-        float | None, SPEED.option("--max-speed", purpose="With --port: cap of the forward speed.", least="1mm/s")
+        float | None, option(SPEED, "--max-speed", purpose="With --port: cap of the forward speed.", least="1mm/s")
     ] = None,
 ) -> None:
     """Run a scenario."""

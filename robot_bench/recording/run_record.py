@@ -173,9 +173,7 @@ def _file(record: RunRecord, entry: Json) -> None:
     """Put one entry where it belongs; kinds that a later version adds are passed over."""
     kind = entry.get("k")
     if kind == "meta":
-        for item in cast("list[Json]", cast("Json", entry.get("world") or {}).get("obstacles") or []):
-            _ = str(item["name"]), *(float(cast("float", item[key])) for key in ("x", "y") if "mesh" not in item)
-        record.meta = entry
+        record.meta = _meta(entry)
         return
     if kind == "end":
         record.end = entry
@@ -198,6 +196,13 @@ def _file(record: RunRecord, entry: Json) -> None:
         record.events.append(Event(t=t, who=str(entry["who"]), what=str(entry["what"]), detail=detail))
     elif kind == "obstacle" and str(entry.get("op")) in _NUMBERS:
         record.obstacles.append(_obstacle(t, entry))
+
+
+def _meta(entry: Json) -> Json:
+    """Return the first line, whose world's things have names and places."""
+    things = cast("list[Json]", cast("Json", entry.get("world") or {}).get("obstacles") or [])
+    _ = [(str(item["name"]), float(cast("float", item["x"])), float(cast("float", item["y"]))) for item in things]
+    return entry
 
 
 #: What a change of the world has to say in numbers.

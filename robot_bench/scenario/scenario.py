@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import cast
 
 from adapter_sim.codec import BitOrder
-from adapter_sim.settings import RENAMED_SETTINGS, AdapterSettings
+from adapter_sim.settings import AdapterSettings
 from p2os.errors import ScenarioError
 from p2os.pioneer.body.factory import BEST, BODY_CHOICES
 from p2os.pioneer.controller import ControllerSettings, SonarPerSip
@@ -367,11 +367,6 @@ def _direct(part: Table, where: Where) -> DirectSettings:
 
 
 def _adapter(part: Table, threshold_um: int, where: Where) -> AdapterSettings:
-    for old, new in RENAMED_SETTINGS.items():
-        if old in part:
-            raise ScenarioError(
-                f"{within(where, 'adapter')}: {old} is called {new}", hint="only programs set it, as AdapterSettings"
-            )
     check_table(part, _ADAPTER, within(where, "adapter"))
     values = {name: value for name, value in part.items() if name not in {"step_mm_s", "core"}}
     if "step_mm_s" in part:

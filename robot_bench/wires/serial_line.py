@@ -16,11 +16,9 @@ from dataclasses import dataclass
 from typing import cast
 
 from p2os.errors import LocalProtocolError
+from p2os.protocol.bauds import DEFAULT_BAUD
 from p2os.protocol.line_time import LineTime
 from simbase.timing import Nanos, Reached
-
-#: What P2OS speaks at power-on, bit/s.
-P2OS_BAUD = 9600
 
 
 @dataclass(frozen=True, slots=True)
@@ -34,7 +32,7 @@ class Arrival:
 class SerialLine:
     """Carries messages one way at a fixed speed in bit/s."""
 
-    def __init__(self, baud: int = P2OS_BAUD) -> None:
+    def __init__(self, baud: int = DEFAULT_BAUD) -> None:
         if baud <= 0:
             raise LocalProtocolError(f"a serial line needs a positive speed, got {baud} bit/s")
         self.baud = baud

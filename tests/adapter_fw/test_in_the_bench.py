@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import pytest
 
-from robot_bench.adapter import FirmwareAdapter, default_settings, is_available, setting_numbers
+from robot_bench.adapter import FirmwareAdapter, is_available
 from robot_bench.bench import Bench
 from robot_bench.scenario.scenario import Scenario, load_scenario
 from simbase.errors import UsageError
@@ -44,14 +44,6 @@ def test_a_run_with_the_firmware_goes_on_from_half_way() -> None:
     second.restore(saved)
     finished(second)
     assert head + second.trace.text == first.trace.text
-
-
-def test_the_defaults_of_both_are_the_same() -> None:
-    model = setting_numbers(AdapterSettings(), PARAMETERS)
-    firmware = default_settings()
-    assert firmware.pop("threshold_um") == -1, "the firmware takes half of the robot's sonar range"
-    assert model.pop("threshold_um") == 2_500_000
-    assert firmware == model
 
 
 def test_numbers_that_the_firmware_cannot_hold_are_refused_in_one_line() -> None:

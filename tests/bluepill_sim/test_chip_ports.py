@@ -73,11 +73,6 @@ def test_a_level_makes_its_interrupt_pending(ports: Ports) -> None:
     assert not ports.is_pending(36)
 
 
-def test_a_pulse_makes_its_interrupt_pending(ports: Ports) -> None:
-    ports.chip.pulse_irq(6)
-    assert ports.is_pending(6)
-
-
 def test_a_deadline_that_moves_is_met_to_the_nanosecond(ports: Ports) -> None:
     chip = ports.chip
     csr = chip.parts.rcc

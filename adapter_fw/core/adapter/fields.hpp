@@ -22,17 +22,6 @@ const Field<Settings>& setting(std::int32_t place);
 // Returns the place of a setting by its name, -1 where there is none.
 std::int32_t find_setting(const char* name);
 
-//: A setting that an earlier firmware knew by another name.
-struct Renamed {
-  const char* old_name;
-  const char* name;
-};
-std::int32_t renamed_count();
-const Renamed& renamed(std::int32_t place);
-
-// Returns what a setting that was renamed is called now, nullptr for any other name.
-const char* present_name(const char* old_name);
-
 }  // namespace adapter
 
 #define ADAPTER_FIELD(Owner, member)                                                               \

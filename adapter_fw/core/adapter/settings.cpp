@@ -15,19 +15,7 @@ constexpr Nanos MAX_TIME_NS = 3'600 * NS_PER_S;
 //: chosen: what comes round more often than this would fill the line, or the loop, with itself.
 constexpr Nanos MIN_SAMPLE_NS = NS_PER_MS / 10, MIN_SPACING_NS = 1 * NS_PER_MS, MIN_ROUND_NS = 10 * NS_PER_MS;
 
-bool are_positive(const Settings& settings) {
-  return settings.sample_period_ns > 0 && settings.pair_spacing_ns > 0 && settings.refresh_ns > 0 &&
-         settings.pulse_ns > 0 && settings.liveness_ns > 0 && settings.first_sip_ns > 0 && settings.retry_ns > 0 &&
-         settings.plausibility_ns > 0 && settings.distance_stale_ns > 0 && settings.settle_ns > 0 &&
-         settings.stop_repeat_ns > 0 && settings.plausibility_progress_mm_s > 0 && settings.pad_loss_ns > 0;
-}
-
-bool are_not_negative(const Settings& settings) {
-  return settings.connect_after_ns >= 0 && settings.disconnect_after_ns >= 0 && settings.boot_ns >= 0 &&
-         settings.encoder_dwell_ns >= 0 && settings.stop_repeats >= 0 && settings.step_um_per_s >= 0 &&
-         settings.angular_step_urad_per_s >= 0 && settings.plausibility_tolerance_mm_s >= 0 &&
-         settings.pad_velocity_mm_s >= 0 && settings.pad_rotation_mrad_s >= 0;
-}
+bool is_below(std::int64_t value, std::int64_t least) { return value < least; }
 
 bool are_choices(const Settings& settings) {
   return settings.bit_order <= BitOrder::COMM1_MSB && settings.motor_meaning <= MotorMeaning::LINEAR_ANGULAR &&
@@ -56,12 +44,12 @@ bool are_bounded(const Settings& settings) {
 }  // namespace
 
 const char* fault_of(const Settings& settings, const WireNumbers& wires) {
-  if (!are_positive(settings)) {
-    return "a time or a step that must be positive is not";
+#define CHECK(type, name, standard, least)                           \
+  if (is_below(static_cast<std::int64_t>(settings.name), least)) { \
+    return #name " must be " #least " or more";                     \
   }
-  if (!are_not_negative(settings)) {
-    return "a time or a step is negative";
-  }
+  ADAPTER_SETTINGS(CHECK)
+#undef CHECK
   if (!are_choices(settings)) {
     return "a choice that does not exist";
   }

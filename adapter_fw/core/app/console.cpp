@@ -18,13 +18,6 @@ void write_bits(Writer& writer, const char* name, std::uint32_t levels, std::int
   }
 }
 
-void write_renamed(Writer& writer, const char* old_name, const char* name) {
-  writer.write(old_name);
-  writer.write(" is called ");
-  writer.write(name);
-  writer.write("\n");
-}
-
 }  // namespace
 
 adapter::Settings stored_settings(Store& store, const adapter::WireNumbers& wires, const char*& fault) {
@@ -37,17 +30,6 @@ adapter::Settings stored_settings(Store& store, const adapter::WireNumbers& wire
   }
   fault = adapter::fault_of(settings, wires);
   return fault == nullptr ? settings : adapter::Settings{};
-}
-
-void report_renamed(Store& store, Writer& writer) {
-  for (std::int32_t place = 0; place < adapter::renamed_count(); ++place) {
-    const adapter::Renamed& one = adapter::renamed(place);
-    std::int64_t value = 0;
-    if (store.load(one.old_name, value)) {
-      writer.write("a stored setting is left out: ");
-      write_renamed(writer, one.old_name, one.name);
-    }
-  }
 }
 
 void Console::take(char character, p2os::Nanos now) {
@@ -168,7 +150,7 @@ void Console::get(const char* name) {
   }
   const std::int32_t place = adapter::find_setting(name);
   if (place < 0) {
-    refuse_name(name);
+    parts_.writer.write("error: no such setting; get lists them\n");
   } else {
     show(place, settings);
   }
@@ -179,7 +161,7 @@ void Console::set(const char* name, const char* value) {
   const std::int32_t place = adapter::find_setting(name);
   std::int64_t wanted = 0;
   if (place < 0) {
-    refuse_name(name);
+    parts_.writer.write("error: no such setting; get lists them\n");
     return;
   }
   if (!read_number(value, wanted)) {
@@ -207,22 +189,10 @@ void Console::set(const char* name, const char* value) {
 void Console::reset(const char* name) {
   const std::int32_t place = adapter::find_setting(name);
   if (place < 0) {
-    if (adapter::present_name(name) != nullptr) {
-      parts_.store.forget(name);  // what an earlier firmware stored
-    }
-    refuse_name(name);
+    parts_.writer.write("error: no such setting; get lists them\n");
   } else {
     parts_.store.forget(adapter::setting(place).name);
     parts_.writer.write("ok, in force after restart\n");
-  }
-}
-
-void Console::refuse_name(const char* name) {
-  parts_.writer.write("error: ");
-  if (const char* present = adapter::present_name(name)) {
-    write_renamed(parts_.writer, name, present);
-  } else {
-    parts_.writer.write("no such setting; get lists them\n");
   }
 }
 

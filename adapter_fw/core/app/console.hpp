@@ -39,9 +39,6 @@ class Store {
 // Returns the defaults with what is stored in their place; if these have a fault, the defaults, and `fault` is why.
 adapter::Settings stored_settings(Store& store, const adapter::WireNumbers& wires, const char*& fault);
 
-// Writes a line for each value that is stored under the old name of a setting: it is left out.
-void report_renamed(Store& store, Writer& writer);
-
 class Console {
  public:
   struct Parts {
@@ -73,7 +70,6 @@ class Console {
   void get(const char* name);
   void set(const char* name, const char* value);
   void reset(const char* name);
-  void refuse_name(const char* name);
   void number(const char* name, std::int64_t value);
   void show(std::int32_t place, const adapter::Settings& settings);
 

@@ -33,7 +33,7 @@ namespace p2os {
 //: The client's times; those of the robot are in the manuals.
 struct ClientSettings {
   Nanos sync_timeout_ns = SYNC_TIMEOUT_NS;
-  std::int32_t sync_attempts = 6;
+  std::int32_t sync_attempts = SYNC_ATTEMPTS;
   Nanos close_wait_ns = CLOSE_WAIT_NS;
   Nanos open_delay_ns = OPEN_DELAY_NS;
   Nanos pulse_ns = PULSE_NS;

@@ -60,7 +60,6 @@ adapter::Master other(adapter::Master master) {
     terminal.write(fault);
     terminal.write("\n");
   }
-  app::report_renamed(store, terminal);
   line.start(settings.bauds[0]);
   static app::EventLog log;
   static app::EventPrinter printer(log, terminal);

@@ -42,10 +42,3 @@ SWD = frozenset({"PA13", "PA14"})
 
 #: Level that each strap needs at reset for a normal boot from flash (ESP32 data sheet, "Strapping Pins").
 STRAP_LEVEL = MappingProxyType({"IO0": True, "IO2": False, "IO5": True, "IO12": False, "IO15": True})
-#: Straps whose other level keeps the chip from booting; IO5 and IO15 only change timing and log output.
-STRAP_FATAL = frozenset({"IO0", "IO2", "IO12"})
-
-
-def pins_called(pins: tuple[str, ...], name: str) -> list[int]:
-    """Return the numbers (from 1) of the pins of that name; supplies have several."""
-    return [number for number, pin in enumerate(pins, start=1) if pin == name]

@@ -29,10 +29,6 @@ class Component:
     #: Words for silkscreen and drawings beside the reference.
     label: str = ""
 
-    def net_of(self, pin: str) -> str | None:
-        """Return the net at a pin; KeyError where the component has no such pin."""
-        return dict(self.pins)[pin]
-
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Design:

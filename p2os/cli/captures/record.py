@@ -15,7 +15,7 @@ from p2os.cli.held_robot import hold_robot
 from p2os.cli.help_pages import CAPTURES
 from p2os.cli.kept_files import FORCE_HELP, refuse_to_overwrite
 from p2os.cli.names import RobotUrl
-from p2os.cli.quantities import TIME
+from p2os.cli.quantities import option
 from p2os.cli.signals import postponed
 from p2os.errors import RemoteProtocolError, TransportError
 from p2os.protocol.connection import ConnectFailed, Connection, ConnectionLost, ConnectionRole, SipReceived
@@ -23,6 +23,7 @@ from p2os.transport import Transport, open_url
 from p2os.transport.waiting import wait_for_line
 from p2os.transport.wall_clock import Clock, wall_clock
 from simbase.timing import NS_PER_S, Nanos
+from simbase.units import TIME
 
 HELP = """Record all that a robot and this program send, motors off.
 
@@ -105,7 +106,7 @@ def record(
     out: Annotated[Path, typer.Option(help="Recording to write.", metavar="FILE")] = DEFAULT_OUT,
     pcap: Annotated[Path | None, typer.Option(help="Write this too, for Wireshark.", metavar="FILE")] = None,
     lasts_ns: Annotated[
-        Nanos | None, TIME.option("--for", purpose="How long; without, until Ctrl-C.", above_zero=True)
+        Nanos | None, option(TIME, "--for", purpose="How long; without, until Ctrl-C.", above_zero=True)
     ] = None,
     force: Annotated[bool, typer.Option("--force", help=FORCE_HELP)] = False,
 ) -> None:

@@ -15,7 +15,7 @@ from p2os.capture.tap import Tap
 from p2os.cli.held_robot import hold_robot
 from p2os.cli.help_pages import CAPTURES
 from p2os.cli.names import urls
-from p2os.cli.quantities import FACTOR
+from p2os.cli.quantities import option
 from p2os.cli.signals import postponed
 from p2os.client import ClientSettings
 from p2os.errors import RemoteProtocolError, RunFailedError, TransportError
@@ -26,6 +26,7 @@ from p2os.transport.waiting import LONGEST_WAIT_NS, wait_for_line, wait_readable
 from p2os.transport.wall_clock import Clock, GapWatch, wall_clock
 from simbase.errors import FileError, UsageError
 from simbase.timing import NS_PER_S, Nanos
+from simbase.units import FACTOR
 
 HELP = """Play a recorded conversation again.
 
@@ -132,7 +133,7 @@ def replay(
     side: Annotated[Side, typer.Option("--as", help="Whom to be.", metavar="robot|client")] = Side.ROBOT,
     speed: Annotated[
         float,
-        FACTOR.option("--speed", purpose="2: twice as fast.", least=f"{SLOWEST:g}", most=f"{FASTEST:g}", shown="1"),
+        option(FACTOR, "--speed", purpose="2: twice as fast.", least=f"{SLOWEST:g}", most=f"{FASTEST:g}", shown="1"),
     ] = 1.0,
     yes: Annotated[bool, typer.Option("--yes", help="Do not ask before moving a robot on a serial port.")] = False,
 ) -> None:

@@ -29,7 +29,7 @@ from p2os.cli.held_robot import hold_robot
 from p2os.cli.help_pages import CAPTURES
 from p2os.cli.kept_files import FORCE_HELP, refuse_to_overwrite
 from p2os.cli.names import robots, urls
-from p2os.cli.quantities import TIME
+from p2os.cli.quantities import option
 from p2os.cli.signals import postponed
 from p2os.errors import TransportError
 from p2os.protocol.profiles import Profile
@@ -39,6 +39,7 @@ from p2os.transport.ports import Listener, Transport
 from p2os.transport.waiting import BLIND_POLL_S, wait_readable
 from p2os.transport.wall_clock import Clock, GapWatch, wall_clock
 from simbase.timing import NS_PER_MS, NS_PER_S, Nanos
+from simbase.units import TIME
 
 DEFAULT_LISTEN = "tcp:127.0.0.1:8102"
 
@@ -81,7 +82,7 @@ def sniff(
     json_output: Annotated[bool, typer.Option("--json", help="Print one JSON object a packet.")] = False,
     quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Print no packets.")] = False,
     once: Annotated[bool, typer.Option("--once", help="End when the first client has gone.")] = False,
-    lasts_ns: Annotated[Nanos | None, TIME.option("--for", purpose="End after so long.", above_zero=True)] = None,
+    lasts_ns: Annotated[Nanos | None, option(TIME, "--for", purpose="End after so long.", above_zero=True)] = None,
     robot: Annotated[
         str, typer.Option(help="Robot model, or a TOML file, for units.", metavar="MODEL|FILE", autocompletion=robots)
     ] = DEFAULT_ROBOT,

@@ -12,7 +12,7 @@ from p2os.cli.held_robot import hold_robot
 from p2os.cli.help_pages import LINKS
 from p2os.cli.links.link_quality import LinkQuality, Spread, spread_of
 from p2os.cli.names import RobotUrl
-from p2os.cli.quantities import TIME
+from p2os.cli.quantities import option
 from p2os.cli.signals import postponed
 from p2os.errors import RemoteProtocolError, TransportError
 from p2os.protocol.commands import Command, CommandNumber
@@ -28,6 +28,7 @@ from p2os.transport import Transport, open_url
 from p2os.transport.waiting import wait_for_line
 from p2os.transport.wall_clock import Clock, wall_clock
 from simbase.timing import NS_PER_MS, NS_PER_S, Nanos
+from simbase.units import TIME
 
 HELP = """Measure a link to a robot, without moving it.
 
@@ -156,7 +157,8 @@ def register(app: typer.Typer) -> None:
 
 def bench(
     url: RobotUrl,
-    lasts_ns: Annotated[Nanos, TIME.option("--for", purpose="How long.", above_zero=True, shown="10s")] = 10 * NS_PER_S,
+    lasts_ns: Annotated[Nanos, option(TIME, "--for", purpose="How long.", above_zero=True, shown="10s")] = 10
+    * NS_PER_S,
     json_output: Annotated[bool, typer.Option("--json", help="Print a JSON object.")] = False,
 ) -> None:
     """Measure a link."""

@@ -10,14 +10,15 @@ import typer
 from p2os.cli.held_robot import held, hold_robot
 from p2os.cli.help_pages import LINKS
 from p2os.cli.names import urls
-from p2os.cli.quantities import BAUD
+from p2os.cli.quantities import option
 from p2os.client import ClientSettings, Connected, ConnectError, Robot
-from p2os.client.settings import BAUDS
+from p2os.client.settings import SEARCHED_BAUDS
 from p2os.errors import TransportError
 from p2os.robots.parameters import ParametersError, load_parameters
 from p2os.transport.serial_port import list_serial_ports
 from simbase.errors import P2osError, UsageError
 from simbase.timing import NS_PER_MS, NS_PER_S
+from simbase.units import BAUD
 
 #: Where simulated Pioneers listen.
 SIMULATOR = "tcp:127.0.0.1:8101"
@@ -25,7 +26,7 @@ SIMULATOR = "tcp:127.0.0.1:8101"
 HELP = f"""Look for robots, and identify them.
 
 Without a URL it tries every serial port of this machine and {SIMULATOR}.
-Each serial port is tried at its own speed and at {", ".join(map(str, BAUDS))} bit/s, which
+Each serial port is tried at its own speed and at {", ".join(map(str, SEARCHED_BAUDS))} bit/s, which
 takes up to ten seconds a port. A robot that is still streaming to an earlier
 program is stopped; motors stay off. Other devices on the ports get some bytes
 that they will not understand.
@@ -68,7 +69,7 @@ def scan(
     ] = None,
     baud: Annotated[
         list[int] | None,
-        BAUD.option("--baud", purpose="Try this speed only; may be repeated.", least="300", most="4000000"),
+        option(BAUD, "--baud", purpose="Try this speed only; may be repeated.", least="300", most="4000000"),
     ] = None,
     json_output: Annotated[bool, typer.Option("--json", help="Print a JSON list.")] = False,
 ) -> None:
@@ -79,7 +80,7 @@ def scan(
     for place in places:
         sys.stderr.write(f"{place}: ")
         try:
-            robot = identify(place, tuple(baud) if baud else BAUDS)
+            robot = identify(place, tuple(baud) if baud else SEARCHED_BAUDS)
         except (ConnectError, TransportError) as error:
             sys.stderr.write(f"no ({error})\n")
             continue
@@ -100,7 +101,7 @@ def scan(
         )
 
 
-def identify(url: str, bauds: tuple[int, ...] = BAUDS) -> Found:
+def identify(url: str, bauds: tuple[int, ...] = SEARCHED_BAUDS) -> Found:
     """Return the identity of the robot on a line.
 
     Args:

@@ -13,10 +13,11 @@ import typer
 from p2os.cli.held_robot import RobotWatch, held
 from p2os.cli.help_pages import ROBOTS
 from p2os.cli.names import ReportedModel, RobotUrl
-from p2os.cli.quantities import ANGLE, LENGTH, SPEED, TIME, TURN_RATE
+from p2os.cli.quantities import option
 from p2os.client import Limits, MotionResult, Robot, RobotState
 from simbase.errors import UsageError
 from simbase.timing import NS_PER_S, Nanos
+from simbase.units import ANGLE, LENGTH, SPEED, TIME, TURN_RATE
 
 HELP = """Move a robot, and leave it standing.
 
@@ -70,12 +71,12 @@ def register(app: typer.Typer) -> None:
 
 def drive(
     url: RobotUrl,
-    forward_m: Annotated[float | None, LENGTH.option("--forward", purpose="How far, negative backwards.")] = None,
-    turn_rad: Annotated[float | None, ANGLE.option("--turn", purpose="How far round, positive to the left.")] = None,
-    speed_mps: Annotated[float | None, SPEED.option("--vel", purpose="Speed: held with --for, else the most.")] = None,
-    rate_radps: Annotated[float | None, TURN_RATE.option("--turn-rate", purpose="Turning speed, likewise.")] = None,
+    forward_m: Annotated[float | None, option(LENGTH, "--forward", purpose="How far, negative backwards.")] = None,
+    turn_rad: Annotated[float | None, option(ANGLE, "--turn", purpose="How far round, positive to the left.")] = None,
+    speed_mps: Annotated[float | None, option(SPEED, "--vel", purpose="Speed: held with --for, else the most.")] = None,
+    rate_radps: Annotated[float | None, option(TURN_RATE, "--turn-rate", purpose="Turning speed, likewise.")] = None,
     lasts_ns: Annotated[
-        Nanos | None, TIME.option("--for", purpose="How long the speeds are held.", above_zero=True)
+        Nanos | None, option(TIME, "--for", purpose="How long the speeds are held.", above_zero=True)
     ] = None,
     robot: ReportedModel = "",
     json_output: Annotated[bool, typer.Option("--json", help="Print a JSON object.")] = False,

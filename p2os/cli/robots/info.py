@@ -27,6 +27,7 @@ from p2os.protocol.connection import (
 )
 from p2os.protocol.packets import Identity
 from p2os.protocol.sip import POSITION_MASK, StandardSip
+from p2os.protocol.times import WATCHDOG_NS
 from p2os.protocol.units import in_units
 from p2os.robots.parameters import ParametersError, RobotParameters, load_parameters
 from p2os.transport import Transport, open_url
@@ -85,7 +86,7 @@ def ask(transport: Transport, *, clock: Clock = wall_clock) -> RobotInfo:
         RemoteProtocolError: nobody answers, or not all of it.
         TransportError: the line was lost.
     """
-    connection = Connection(ConnectionRole.CLIENT, settings=ConnectionSettings(liveness_ns=2 * NS_PER_S))
+    connection = Connection(ConnectionRole.CLIENT, settings=ConnectionSettings(liveness_ns=WATCHDOG_NS))
     try:
         return _collect(connection, transport, clock)
     except HungUpError as error:

@@ -12,12 +12,13 @@ from p2os.cli.held_robot import held
 from p2os.cli.help_pages import ROBOTS
 from p2os.cli.links.link_quality import LinkQuality
 from p2os.cli.names import ReportedModel, RobotUrl
-from p2os.cli.quantities import TIME
+from p2os.cli.quantities import option
 from p2os.cli.robots.dashboard import Dashboard, draw, line_of
 from p2os.client import Notice, PacketArrived, Robot, RobotState
 from p2os.transport.wall_clock import wall_clock
 from simbase.errors import MissingDependencyError
 from simbase.timing import NS_PER_MS, NS_PER_S, Nanos
+from simbase.units import TIME
 
 HELP = """Show a robot's state as it comes, without moving it.
 
@@ -43,7 +44,7 @@ def register(app: typer.Typer) -> None:
 
 def monitor(
     url: RobotUrl,
-    lasts_ns: Annotated[Nanos | None, TIME.option("--for", purpose="End after so long.", above_zero=True)] = None,
+    lasts_ns: Annotated[Nanos | None, option(TIME, "--for", purpose="End after so long.", above_zero=True)] = None,
     robot: ReportedModel = "",
     json_output: Annotated[bool, typer.Option("--json", help="Print one JSON object a packet.")] = False,
 ) -> None:

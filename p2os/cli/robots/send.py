@@ -9,7 +9,7 @@ import typer
 from p2os.capture.describe import describe_packet
 from p2os.cli.held_robot import RobotWatch, held
 from p2os.cli.help_pages import ROBOTS
-from p2os.cli.quantities import TIME
+from p2os.cli.quantities import option
 from p2os.client import ConfigurationKnown, Notice, PacketArrived, Robot
 from p2os.errors import LocalProtocolError
 from p2os.protocol.command_table import ROWS, Argument, CommandRow, command_row
@@ -18,6 +18,7 @@ from p2os.protocol.packets import ServerPacket, packet_frame
 from p2os.protocol.profiles import Profile
 from simbase.errors import UsageError
 from simbase.timing import NS_PER_MS, Nanos
+from simbase.units import TIME
 
 HELP = """Send one command to a robot, and show what it answers.
 
@@ -51,7 +52,7 @@ def send(
     ] = None,
     list_all: Annotated[bool, typer.Option("--list", help="List the commands; a word chooses.")] = False,
     waits_ns: Annotated[
-        Nanos, TIME.option("--wait", purpose="How long to listen for answers.", above_zero=True, shown="0.5s")
+        Nanos, option(TIME, "--wait", purpose="How long to listen for answers.", above_zero=True, shown="0.5s")
     ] = DEFAULT_WAIT_NS,
     json_output: Annotated[bool, typer.Option("--json", help="Print JSON.")] = False,
 ) -> None:

@@ -28,7 +28,7 @@ import typer
 from p2os.cli.held_robot import held, hold_robot
 from p2os.cli.help_pages import ROBOTS
 from p2os.cli.names import ReportedModel, RobotUrl
-from p2os.cli.quantities import SPEED, TURN_RATE
+from p2os.cli.quantities import option
 from p2os.cli.robots.pad_source import SdlPad
 from p2os.client import Link, Robot
 from p2os.client.notices import DeadmanStopped, GapStopped, LinkLostError, Notice
@@ -37,6 +37,7 @@ from p2os.transport.waiting import wait_readable
 from p2os.transport.wall_clock import Clock, GapWatch, wall_clock
 from simbase.errors import MissingDependencyError, UsageError
 from simbase.timing import NS_PER_MS, NS_PER_S, Nanos
+from simbase.units import SPEED, TURN_RATE
 
 HELP = """Drive a robot with the keyboard, or with a game pad.
 
@@ -107,7 +108,8 @@ def teleop(
     url: RobotUrl,
     vel: Annotated[
         float | None,
-        SPEED.option(
+        option(
+            SPEED,
             "--vel",
             purpose="Speed of a held key or a full trigger.",
             above_zero=True,
@@ -116,7 +118,8 @@ def teleop(
     ] = None,
     turn_rate: Annotated[
         float | None,
-        TURN_RATE.option(
+        option(
+            TURN_RATE,
             "--turn-rate",
             purpose="Turning speed of a held key or a full stick.",
             above_zero=True,

@@ -25,7 +25,7 @@ from p2os.cli.help_pages import ROBOTS
 from p2os.cli.names import bodies, worlds
 from p2os.cli.names import robots as robot_names
 from p2os.cli.printing import queue_output
-from p2os.cli.quantities import ANGLE, BAUD, COUNT, FACTOR, LENGTH, SEED, TIME
+from p2os.cli.quantities import option
 from p2os.pioneer.body.factory import BEST
 from p2os.pioneer.controller import ControllerSettings, SonarPerSip
 from p2os.pioneer.controller.flash import load_flash
@@ -53,6 +53,7 @@ from p2os.transport import listen_url
 from p2os.transport.wall_clock import wall_clock
 from simbase.errors import UsageError
 from simbase.timing import NS_PER_S, Nanos
+from simbase.units import ANGLE, BAUD, COUNT, FACTOR, LENGTH, SEED, TIME
 
 #: chosen: several times what an eager client causes, and still readable.
 MOST_LINES = 50
@@ -113,7 +114,7 @@ def serve(
         ),
     ] = BEST,
     seed: Annotated[
-        int, SEED.option("--seed", purpose="Of a scattered world and of every sensor's error.", least="0", shown="0")
+        int, option(SEED, "--seed", purpose="Of a scattered world and of every sensor's error.", least="0", shown="0")
     ] = 0,
     firmware: Annotated[
         Profile,
@@ -136,12 +137,19 @@ def serve(
     ] = "ideal",
     baud: Annotated[
         int | None,
-        BAUD.option("--baud", purpose="Speed of the line: bytes take that time on pty: and tcp: too.", above_zero=True),
+        option(
+            BAUD, "--baud", purpose="Speed of the line: bytes take that time on pty: and tcp: too.", above_zero=True
+        ),
     ] = None,
     robots: Annotated[
         int,
-        COUNT.option(
-            "--robots", purpose="How many, on the ports that follow.", least="1", most=f"{MOST_ROBOTS}", shown="1"
+        option(
+            COUNT,
+            "--robots",
+            purpose="How many, on the ports that follow.",
+            least="1",
+            most=f"{MOST_ROBOTS}",
+            shown="1",
         ),
     ] = 1,
     at: Annotated[
@@ -156,8 +164,8 @@ def serve(
     ] = None,
     speed: Annotated[
         float,
-        FACTOR.option(
-            "--speed", purpose="Robot seconds a second.", least=f"{SLOWEST:g}", most=f"{FASTEST:g}", shown="1"
+        option(
+            FACTOR, "--speed", purpose="Robot seconds a second.", least=f"{SLOWEST:g}", most=f"{FASTEST:g}", shown="1"
         ),
     ] = 1.0,
     aux: Annotated[
@@ -168,13 +176,13 @@ def serve(
     ] = None,
     sync_limit_ns: Annotated[
         Nanos | None,
-        TIME.option("--sync-limit", purpose="Drop a client that has no open session for so long.", above_zero=True),
+        option(TIME, "--sync-limit", purpose="Drop a client that has no open session for so long.", above_zero=True),
     ] = None,
     control: Annotated[
         str | None, typer.Option(help="Where orders come from: a URL, or - for standard input.", metavar="URL")
     ] = None,
     status_ns: Annotated[
-        Nanos | None, TIME.option("--status", purpose="Print each robot's state so often.", least="100ms")
+        Nanos | None, option(TIME, "--status", purpose="Print each robot's state so often.", least="100ms")
     ] = None,
     json_output: Annotated[bool, typer.Option("--json", help="Print the start line as JSON.")] = False,
 ) -> None:
@@ -263,8 +271,8 @@ def _place(text: str) -> Pose:
         raise UsageError(f"--at {text!r} is no place", hint=hint)
     try:
         x_m, y_m, heading_rad = LENGTH.read(parts[0]), LENGTH.read(parts[1]), ANGLE.read((*parts, "0")[2])
-    except typer.BadParameter as error:
-        raise UsageError(f"--at {text!r} is no place: {error.message}", hint=hint) from error
+    except UsageError as error:
+        raise UsageError(f"--at {text!r} is no place: {error}", hint=hint) from error
     return Pose(x_m, y_m, heading_rad)
 
 

@@ -11,7 +11,7 @@ import typer
 from p2os.cli.help_pages import ROBOTS
 from p2os.cli.kept_files import FORCE_HELP, refuse_to_overwrite
 from p2os.cli.names import worlds
-from p2os.cli.quantities import SEED
+from p2os.cli.quantities import option
 from p2os.pioneer.world import known_worlds, load_world
 from p2os.pioneer.world.drawing import svg, text, text_key
 from p2os.pioneer.world.formats import Placing, read_placed
@@ -21,6 +21,7 @@ from p2os.pioneer.world.start_places import refuse_start
 from p2os.pioneer.world.writer import write_world
 from p2os.robots.parameters import load_parameters
 from simbase.errors import FileError, MissingDependencyError, UsageError
+from simbase.units import SEED
 
 HELP = """List, draw, check, make and convert worlds.
 
@@ -45,7 +46,7 @@ WORLD = Annotated[
     str, typer.Argument(help="A world that ships, or a file.", metavar="WORLD|FILE", autocompletion=worlds)
 ]
 FORCE = Annotated[bool, typer.Option("--force", help=FORCE_HELP)]
-WORLD_SEED = Annotated[int, SEED.option("--seed", purpose="Of a world that is made from one.", least="0", shown="0")]
+WORLD_SEED = Annotated[int, option(SEED, "--seed", purpose="Of a world that is made from one.", least="0", shown="0")]
 UP = Annotated[
     str,
     typer.Option(
@@ -125,7 +126,7 @@ def new(
     ] = None,
     kind: Annotated[str, typer.Option(help="What to make.", metavar="|".join(KINDS))] = "arena",
     seed: Annotated[
-        int, SEED.option("--seed", purpose="The same seed makes the same world.", least="0", shown="0")
+        int, option(SEED, "--seed", purpose="The same seed makes the same world.", least="0", shown="0")
     ] = 0,
     force: FORCE = False,
 ) -> None:

@@ -19,10 +19,10 @@ from collections.abc import Callable, Mapping
 from enum import Enum
 
 from p2os.pioneer.controller.context import Context
-from p2os.pioneer.controller.flash import BAUD_RATES
 from p2os.pioneer.controller.motion import NM_PER_MM, UDEG_PER_DEG, MotionLimits
 from p2os.pioneer.controller.packet_requests import Extra
 from p2os.pioneer.devices.heading_sensors import CompassMode
+from p2os.protocol.bauds import BAUDS
 from p2os.protocol.command_table import BY_NUMBER
 from p2os.protocol.commands import Command, CommandNumber
 from p2os.protocol.profiles import Profile
@@ -205,14 +205,14 @@ def _e_stall(context: Context, value: int) -> None:
 
 
 def _hostbaud(context: Context, value: int) -> None:
-    if 0 <= value < len(BAUD_RATES):
-        context.baud_wanted = BAUD_RATES[value]
+    if 0 <= value < len(BAUDS):
+        context.baud_wanted = BAUDS[value]
 
 
 def _aux_baud(port: int) -> Handler:
     def act(context: Context, value: int) -> None:
-        if 0 <= value < len(BAUD_RATES):
-            context.devices.aux[port - 1].baud = BAUD_RATES[value]
+        if 0 <= value < len(BAUDS):
+            context.devices.aux[port - 1].baud = BAUDS[value]
 
     return _number(act)
 

@@ -40,8 +40,6 @@ FAULTS: Mapping[str, tuple[tuple[str, ...], str]] = {
 SIDES = {"wheel-blocked": ("left", "right"), "bumper": ("front", "rear")}
 #: Happen once: there is nothing to clear.
 MOMENTARY = frozenset({"brown-out", "reboot"})
-#: First words of a line in earlier releases → today's.
-RENAMED_WORDS = {"mend": "clear"}
 #: Word of a fault → the most that it may be; none is below 0.
 MOST: Mapping[str, float] = {"METRES": 100.0, "RATE": 0.5, "VOLTS": 25.5}
 
@@ -60,16 +58,6 @@ class Fault:
         """The words that make it."""
         value = {"NUMBER": str(self.number), "SEGMENT": str(self.number), "SIDE": self.side}
         return " ".join([self.name, *(value.get(word, f"{self.value:g}") for word in FAULTS[self.name][0])])
-
-
-def refuse_renamed_word(word: str) -> None:
-    """Refuse a line that begins with a word of an earlier release, by naming today's.
-
-    Raises:
-        UsageError: It is such a word.
-    """
-    if word in RENAMED_WORDS:
-        raise UsageError(f"{word} is called {RENAMED_WORDS[word]}: {RENAMED_WORDS[word]} all")
 
 
 def read_fault(text: str, *, sonar: int, complete: bool = True) -> Fault:

@@ -18,6 +18,7 @@ from difflib import get_close_matches
 from pathlib import Path
 
 from p2os.errors import LocalProtocolError
+from p2os.protocol.bauds import BAUDS
 from p2os.protocol.config_packet import ARCOS_FIELDS, AROS_1_8_FIELDS, FIELDS, NUMBERS, P2OS_FIELDS, ConfigPacket
 from p2os.protocol.profiles import Profile
 from p2os.protocol.times import CYCLE_NS, WATCHDOG_NS
@@ -26,8 +27,6 @@ from p2os.toml_file import read_toml, read_user_text
 from simbase.errors import FileError, shown, shown_name
 from simbase.timing import NS_PER_MS
 
-#: HOSTBAUD and its like: code → bit/s.
-BAUD_RATES = (9600, 19200, 38400, 57600, 115200)
 #: What the robot file sets; a FLASH file cannot make another robot of it.
 FIXED = frozenset({"robot_class", "subclass", "four_motors", "frontsonar", "rearsonar"})
 FIELDS_OF_PROFILE = {Profile.P2OS: P2OS_FIELDS, Profile.AROS: AROS_1_8_FIELDS, Profile.ARCOS: ARCOS_FIELDS}
@@ -80,7 +79,7 @@ DEFAULTS: Mapping[str, int | str] = {
 
 #: What a field cannot be though it fits: a baud code, segments that the packet tells, what something is divided by.
 NARROWER: Mapping[str, tuple[int, int]] = {
-    **dict.fromkeys(("hostbaud", "auxbaud", "aux2baud", "aux3baud"), (0, len(BAUD_RATES) - 1)),
+    **dict.fromkeys(("hostbaud", "auxbaud", "aux2baud", "aux3baud"), (0, len(BAUDS) - 1)),
     **dict.fromkeys(("frontbumps", "rearbumps"), (0, MOST_SEGMENTS)),
     "sipcycle": (1, 255), "sonarcycle": (1, 255), "watchdog": (1, 65_535), "ticksmm": (1, 65_535),
 }  # fmt: skip
@@ -111,7 +110,7 @@ class Flash:
 
     def baud(self) -> int:
         """Return the rate at which the host's line starts, bit/s."""
-        return BAUD_RATES[self.number("hostbaud")]
+        return BAUDS[self.number("hostbaud")]
 
     def config(self, parameters: RobotParameters, profile: Profile) -> ConfigPacket:
         """Return the CONFIGpac of a robot with this FLASH."""

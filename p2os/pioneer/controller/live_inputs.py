@@ -12,7 +12,6 @@ Faults are injected and cleared by lines of their own (`faults`).
 from collections.abc import Callable, Mapping
 
 from p2os.pioneer.controller.context import Context
-from p2os.pioneer.controller.faults import refuse_renamed_word
 from simbase.errors import UsageError
 
 #: First word → (the others, what it means).
@@ -35,7 +34,6 @@ def apply_input(context: Context, text: str) -> None:
         UsageError: They are no input, or a word is missing or out of range.
     """
     name, *rest = text.split() or [""]
-    refuse_renamed_word(name)
     if name not in INPUTS:
         raise UsageError(f"no input {name!r}", hint=f"inputs: {', '.join(INPUTS)}")
     words = INPUTS[name][0]

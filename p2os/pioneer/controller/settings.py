@@ -3,8 +3,9 @@
 from dataclasses import dataclass, field, replace
 from enum import Enum
 
-from p2os.pioneer.controller.flash import BAUD_RATES, Flash
+from p2os.pioneer.controller.flash import Flash
 from p2os.pioneer.sensor_errors import IDEAL, SensorErrors
+from p2os.protocol.bauds import BAUDS, BAUDS_TEXT
 from p2os.protocol.profiles import Profile
 from p2os.protocol.times import CYCLE_NS, WATCHDOG_NS
 from simbase.errors import UsageError
@@ -60,9 +61,8 @@ class ControllerSettings:
             raise UsageError(f"a packet every {period_ms:g} ms is not between 1 and {LONGEST_SIP_PERIOD_MS} ms")
         if not 0 <= self.battery_decivolts <= 0xFF:
             raise UsageError(f"a battery of {self.battery_decivolts / 10:g} V does not fit the packet (0 to 25.5 V)")
-        if self.baud is not None and self.baud not in BAUD_RATES:
-            rates = ", ".join(str(rate) for rate in BAUD_RATES)
-            raise UsageError(f"a line of {self.baud} bit/s is none that HOSTBAUD names", hint=f"rates: {rates}")
+        if self.baud is not None and self.baud not in BAUDS:
+            raise UsageError(f"a line of {self.baud} bit/s is none that HOSTBAUD names", hint=f"rates: {BAUDS_TEXT}")
 
     def with_flash(self, flash: Flash) -> "ControllerSettings":
         """Return these settings with what a FLASH file sets."""

@@ -6,6 +6,7 @@ many bytes have come, and 0 flushes what waits.
 
 from dataclasses import dataclass
 
+from p2os.protocol.bauds import DEFAULT_BAUD
 from p2os.protocol.packets import SerauxPacket
 
 #: chosen: what a port keeps; older bytes are lost, as in the firmware's ring.
@@ -26,7 +27,7 @@ class AuxPort:
     outgoing: bytes = b""
     #: How many bytes GETAUX wants, 0 none.
     wanted: int = 0
-    baud: int = 9600
+    baud: int = DEFAULT_BAUD
     #: Bytes that found the buffer full.
     lost: int = 0
 

@@ -24,13 +24,14 @@ from typing import cast
 
 from p2os.pioneer.body.factory import BEST, BODY_CHOICES
 from p2os.pioneer.controller.faults import read_fault
-from p2os.pioneer.controller.flash import BAUD_RATES, load_flash
+from p2os.pioneer.controller.flash import load_flash
 from p2os.pioneer.controller.settings import ControllerSettings, SonarPerSip
 from p2os.pioneer.sensor_errors import load_sensor_errors
 from p2os.pioneer.serve.fleet_order import DEFAULT_PORT, MOST_ROBOTS, FleetOrder, RobotOrder, following_ports, read_aux
 from p2os.pioneer.world import known_worlds
 from p2os.pioneer.world.model import RANGES as WORLD_RANGES
 from p2os.pioneer.world.model import Pose
+from p2os.protocol.bauds import BAUDS, BAUDS_TEXT
 from p2os.protocol.profiles import Profile
 from p2os.robots.parameters import load_parameters
 from p2os.toml_file import TomlPlaces, is_file, read_toml, read_user_text
@@ -228,9 +229,8 @@ def _settings(section: _Section) -> ControllerSettings:
             "firmware", f"no firmware {shown(profile)}", f"one of {', '.join(p.value for p in Profile)}"
         )
     baud = section.get("baud", None)
-    if baud is not None and baud not in BAUD_RATES:
-        rates = ", ".join(str(rate) for rate in BAUD_RATES)
-        raise section.error("baud", f"a line of {baud} bit/s is none that HOSTBAUD names", f"rates: {rates}")
+    if baud is not None and baud not in BAUDS:
+        raise section.error("baud", f"a line of {baud} bit/s is none that HOSTBAUD names", f"rates: {BAUDS_TEXT}")
     try:
         settings = ControllerSettings(
             profile=Profile(profile), lenient=bool(section.get("lenient", False)),

@@ -9,12 +9,12 @@ from dataclasses import dataclass, field, replace
 from p2os.pioneer.body.contract import RobotBody
 from p2os.pioneer.body.factory import BEST, body_note, make_body, resolve_body
 from p2os.pioneer.controller import Pioneer
-from p2os.pioneer.controller.flash import BAUD_RATES
 from p2os.pioneer.controller.settings import ControllerSettings
 from p2os.pioneer.serve.multi_robot_world import MultiRobotWorld
 from p2os.pioneer.world import load_world
 from p2os.pioneer.world.model import Pose, World
 from p2os.pioneer.world.start_places import start_places
+from p2os.protocol.bauds import BAUDS
 from p2os.robots.parameters import RobotParameters, load_parameters
 from p2os.transport import PtyUrl, SerialUrl, TcpUrl, parse_url
 from simbase.errors import UsageError
@@ -161,7 +161,7 @@ def following_ports(given: Sequence[str], robots: int) -> list[str]:
 def serial_baud(url: str) -> int | None:
     """Return the speed of a real serial port, where the robot knows such a one."""
     parsed = parse_url(url)
-    return parsed.baud if isinstance(parsed, SerialUrl) and parsed.baud in BAUD_RATES else None
+    return parsed.baud if isinstance(parsed, SerialUrl) and parsed.baud in BAUDS else None
 
 
 def read_aux(text: str) -> tuple[int, str]:

@@ -16,7 +16,7 @@ from collections.abc import Sequence
 from difflib import get_close_matches
 
 from p2os.errors import WorldError
-from p2os.pioneer.controller.faults import FAULTS, refuse_renamed_word
+from p2os.pioneer.controller.faults import FAULTS
 from p2os.pioneer.controller.live_inputs import INPUTS
 from p2os.pioneer.serve.host import Host
 from p2os.pioneer.serve.multi_robot_world import MultiRobotWorld
@@ -90,7 +90,6 @@ def _speed(speed_mps: float) -> str:
 
 def _check_first_word(words: str) -> None:
     first = words.split(maxsplit=1)[0] if words else ""
-    refuse_renamed_word(first)
     if first not in FIRST_WORDS:
         close = get_close_matches(first, FIRST_WORDS, n=1)
         hint = f"did you mean {close[0]}?" if close else f"orders: {', '.join(FIRST_WORDS)}"

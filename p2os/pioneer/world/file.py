@@ -137,15 +137,6 @@ def parse_world(text: str, source: str, seed: int = 0, folder: Path | None = Non
     )
 
 
-def read_obstacle(source: str, section: str, row: Table, keys: Mapping[str, object] | None = None) -> Obstacle:
-    """Return the obstacle of one `[[box]]`, `[[cylinder]]`, `[[wall]]`, `[[floor]]` or `[[ramp]]`.
-
-    Raises:
-        WorldError: A key is unknown, missing or of the wrong type.
-    """
-    return _obstacle(Section(source, TomlPlaces(), section, 0, row), keys or SHAPES[section])
-
-
 def _sections(top: Section, name: str) -> list[Section]:
     rows = top.row.get(name, [])
     if not isinstance(rows, list) or not all(isinstance(row, dict) for row in rows):

@@ -120,8 +120,6 @@ def test_reads_of_any_width_are_slices_of_the_word(fake_chip: Any) -> None:
     assert [part.read(n, 1) for n in range(4)] == [0x78, 0x56, 0x34, 0x12]
     assert [part.read(n, 2) for n in (0, 2)] == [0x5678, 0x1234]
     assert part.read(0, 4) == 0x1234_5678
-    assert part.REGISTERS[0].is_plain_read
-    assert not part.REGISTERS[1].is_plain_read
 
 
 def test_a_narrow_write_is_duplicated_by_the_apb_bridge(fake_chip: Any) -> None:

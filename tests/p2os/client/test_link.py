@@ -13,7 +13,7 @@ from p2os.client.notices import (
     LinkLostError,
     ReconnectPlanned,
 )
-from p2os.client.settings import BAUDS, ClientSettings
+from p2os.client.settings import SEARCHED_BAUDS, ClientSettings
 from p2os.protocol.commands import Command, CommandNumber, enable, rvel, stop, vel
 from p2os.protocol.frames import Decoder, Frame
 from simbase.timing import NS_PER_S
@@ -179,7 +179,7 @@ def test_a_robot_that_streams_at_another_rate_is_stopped_closed_and_opened() -> 
 def test_a_known_rate_is_tried_between_all_others_and_the_plan_fits_its_limit() -> None:
     plan = search_plan(38400, (9600, 38400, 9600, 19200), ClientSettings(), is_known=True)
     assert [step.baud for step in plan] == [38400, 9600, 38400, 19200, 38400] * 2
-    longest = search_plan(9600, BAUDS, ClientSettings(), is_known=True)
+    longest = search_plan(9600, SEARCHED_BAUDS, ClientSettings(), is_known=True)
     assert sum(step.wait_ns * step.attempts for step in longest) < TRY_LIMIT_NS
 
 

@@ -55,7 +55,6 @@ def test_a_state_is_the_packet_in_si_units() -> None:
     assert near.y_m == pytest.approx(0.027 + 1.072 * math.sin(math.radians(10)))
     assert state.nearest() == near
     assert state.nearest(math.radians(90), math.radians(180)) is None
-    assert state.pose.to_world(1.0, 0.0) == (1.0, 0.0)
 
 
 def test_a_sonar_keeps_its_last_reading_until_the_next() -> None:

@@ -1,17 +1,12 @@
 """Mutated sessions and random bytes through everything that reads them: no exception, no hang, no growth.
 
-The targets are those of `tools/fuzz_protocol.py`; `tools/fuzz_atheris.py` runs them
-guided by coverage for as long as one likes.
+The targets are those of `tools/fuzz_protocol.py`.
 """
 
 import gc
-import importlib.util
 import json
-import os
 import random
 import runpy
-import subprocess
-import sys
 import tracemalloc
 from collections.abc import Iterator
 from pathlib import Path
@@ -54,19 +49,6 @@ def test_the_fuzzer_names_the_input_that_fails(monkeypatch: pytest.MonkeyPatch, 
     with pytest.raises(ZeroDivisionError):
         FUZZ["mutate"]("decoder", 1, 7)
     assert "decoder: input 0 of seed 7: " in capsys.readouterr().err
-
-
-@pytest.mark.slow
-@pytest.mark.skipif(importlib.util.find_spec("atheris") is None, reason="atheris is not installed")
-@pytest.mark.parametrize("target", ["decoder", "server"])
-def test_atheris_runs_a_target(target: str) -> None:
-    command = [sys.executable, str(ROOT / "tools" / "fuzz_atheris.py"), target, "-runs=2000", "-seed=1"]
-    environment = {**os.environ, "PYTHONPATH": str(ROOT)}
-    done = subprocess.run(
-        command, cwd=ROOT, env=environment, timeout=240, check=False, capture_output=True, text=True
-    )  # fmt: skip
-    assert done.returncode == 0, done.stderr[-2000:]
-    assert "Done 2000 runs" in done.stderr
 
 
 #: The captured sessions of both ways.

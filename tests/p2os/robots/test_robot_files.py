@@ -13,7 +13,6 @@ from p2os.robots.parameters import (
     known_robots,
     load_parameters,
     nearest_model,
-    parameters_for,
 )
 
 #: As a user of ARIA keeps it: sections, comments behind semicolons, more keys than anyone needs.
@@ -69,7 +68,6 @@ def test_a_file_of_arias_goes_over_the_shipped_model(tmp_path: Path) -> None:
     assert (robot.motion.max_velocity_mm_s, robot.motion.accel_mm_s2) == (900, shipped.motion.accel_mm_s2)
     assert (robot.equipment.front_bumpers, robot.equipment.rear_bumpers) == (7, 0)
     assert (robot.equipment.has_move, robot.equipment.sends_io_packets) == (False, True)
-    assert robot.equipment.highest_baud == 9600
     assert [(pose.x_mm, pose.heading_deg) for pose in robot.sonar] == [(69, 90), (114, 50)]
     assert robot.sonar_fitted == 2
     assert robot.body == shipped.body
@@ -121,22 +119,8 @@ def test_an_angle_factor_near_a_power_of_two_is_that_power() -> None:
         ("box", FALLBACK), ("", FALLBACK),
     ],
 )  # fmt: skip
-def test_an_unknown_robot_is_taken_for_the_nearest_with_a_warning(subclass: str, model: str) -> None:
-    found = parameters_for(subclass)
-    assert found.parameters == load_parameters(model)
-    assert found.warning is not None
-    assert repr(subclass) in found.warning
-    assert model in found.warning
-
-
-def test_what_is_known_or_given_has_no_warning(tmp_path: Path) -> None:
-    assert parameters_for("P3DX").warning is None
-    given = parameters_for("box", "p3at")
-    assert (given.parameters.subclass, given.warning) == ("p3at", None)
-    assert parameters_for("box", given.parameters).parameters is given.parameters
-    assert parameters_for("p2dx", written(tmp_path, MINE)).parameters.subclass == "p3dx-sh"
-    with pytest.raises(ParametersError):
-        parameters_for("p2dx", "nonsense")
+def test_an_unknown_robot_is_taken_for_the_nearest(subclass: str, model: str) -> None:
+    assert nearest_model(subclass) == model
 
 
 @given(st.text(max_size=12))

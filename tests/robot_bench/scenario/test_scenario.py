@@ -165,11 +165,6 @@ BOX = '[[obstacle]]\nat_s = 1\nname = "a"\nx_m = 0\ny_m = 0\nlength_m = 1\nwidth
         (LEAST.replace("dodge", "doge"), "firmware: there is no file 'doge'", "build it first"),
         (LEAST + "[direct]\nramp = 3\n", "[direct]: unknown key 'ramp'", "ramp_mm_s2"),
         (LEAST + "[start]\nx_m = 1\n", "[start]: key 'y_m' is missing", "metres"),
-        (
-            LEAST + "[adapter]\ndisbelief_ns = 1\n",
-            "[adapter]: disbelief_ns is called plausibility_ns",
-            "AdapterSettings",
-        ),
         (LEAST + "[in_world.ramp]\nbody = 1\n", "[in_world.ramp]: unknown key 'body'", "known are"),
         (LEAST + "[[goal]]\nleast = 1\n", "[[goal]] 1: key 'kind' is missing", "a text"),
         (LEAST + '[[goal]]\nkind = "no_colision"\n', "[[goal]] 1: there is no goal 'no_colision'", "no_collision"),

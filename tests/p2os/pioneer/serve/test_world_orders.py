@@ -9,7 +9,6 @@ from p2os.pioneer.serve.multi_robot_world import MultiRobotWorld
 from p2os.pioneer.serve.orders import execute
 from p2os.pioneer.serve.robot_time import RobotTime
 from p2os.transport import Loops
-from simbase.errors import UsageError
 
 ENGINES = ["kinematic", pytest.param("bullet", marks=pytest.mark.bullet)]
 
@@ -132,16 +131,6 @@ def test_words_that_mean_nothing_are_answered_with_what_would(words: str, answer
     hosts, _ = hosts_of("kinematic", robots=1)
     for line, expected in zip(execute(hosts, words), answer, strict=True):
         assert line.startswith(expected)
-
-
-@pytest.mark.parametrize("line", ["mend all", "mend sonar-stuck 3", "1: mend bumper front 1", "mend"])
-def test_the_word_of_earlier_releases_is_refused_with_the_word_of_today(line: str) -> None:
-    hosts, _ = hosts_of("kinematic", robots=1)
-    execute(hosts, "fault sonar-stuck 3 1.2")
-    assert execute(hosts, line) == ["error: mend is called clear: clear all"]
-    assert hosts[0].pioneer.state.injected == ("sonar-stuck 3 1.2",)
-    with pytest.raises(UsageError, match=r"^mend is called clear: clear all$"):
-        hosts[0].do("mend all")
 
 
 def test_help_lists_every_order() -> None:
