@@ -131,12 +131,14 @@ def test_a_snapshot_goes_through_a_pickle_into_a_part_built_alike() -> None:
 def test_whoever_refers_to_what_a_part_holds_sees_it_restored() -> None:
     part = Part()
     held = [part.wheel, part.wheel.marks, part.queue, part.table, part.child, part.children, part.children["left"],
-            part.levels, part.memory, part.source, part.raw, part.words, part.pairs, part.pairs[0], part.pairs[2]]  # fmt: skip
+            part.levels, part.memory, part.source, part.raw, part.words, part.pairs,
+            part.pairs[0], part.pairs[2]]  # fmt: skip
     before = part.snapshot()
     changed(part)
     part.restore(before)
     now = [part.wheel, part.wheel.marks, part.queue, part.table, part.child, part.children, part.children["left"],
-           part.levels, part.memory, part.source, part.raw, part.words, part.pairs, part.pairs[0], part.pairs[2]]  # fmt: skip
+           part.levels, part.memory, part.source, part.raw, part.words, part.pairs,
+            part.pairs[0], part.pairs[2]]  # fmt: skip
     assert all(one is other for one, other in zip(held, now, strict=True))
 
 
