@@ -20,8 +20,9 @@ leaves the board's watches and listeners as it found them.
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
+from typing import TypeAlias
 
 from bluepill_sim.chip import Chip
 from bluepill_sim.core import GENERAL, BlockRow, Register
@@ -37,6 +38,7 @@ from bluepill_sim.program.line_table import LineTable, read_lines
 from bluepill_sim.serial_port import Activity, SerialPort
 from bluepill_sim.stm32f103 import FLASH_BASE, SRAM_BASE
 from bluepill_sim.timing import ChipReached, Span, to_nanos
+from simbase.state import PartState, Stateful
 from simbase.timing import NS_PER_MS, NS_PER_S, Nanos, Reason
 
 #: Tells whether the board is where one wants it.
@@ -58,23 +60,11 @@ class WaitError(BluePillError):
     exit_code = 1
 
 
-@dataclass(frozen=True, slots=True)
-class BoardSnapshot:
-    """All that decides a board's future."""
-
-    chip: tuple[object, ...]
-    fault: FaultReport | None
-    activity: tuple[Nanos, Nanos, Nanos]
-    warned: tuple[tuple[str, str], ...]
-    #: What each USART has sent and nobody has taken.
-    unread: tuple[bytes, ...]
-    boot0: bool = False
-    resets: tuple[tuple[ResetCause, int], ...] = ()
-    #: Characters sent by each USART, by (PCLK, BRR).
-    sent_at: tuple[tuple[tuple[tuple[int, int], int], ...], ...] = ((), (), ())
+#: All that decides a board's future; it can be pickled.
+BoardSnapshot: TypeAlias = PartState
 
 
-class BluePill:
+class BluePill(Stateful):
     """An emulated BluePill.
 
     >>> board = BluePill("firmware.elf")                # doctest: +SKIP
@@ -86,6 +76,8 @@ class BluePill:
         ImageError: the firmware is missing, damaged, or not for this chip.
         MissingDependencyError: unicorn, pyelftools or intelhex is not installed.
     """
+
+    STATE = ("chip", "fault", "activity", "_warned", "_usarts", "boot0", "resets")
 
     def __init__(self, image: Image | str | Path, *, strict: bool = False) -> None:
         """Load a firmware and stand at its reset.
@@ -317,39 +309,6 @@ class BluePill:
     def read_memory(self, address: int, size: int) -> bytes | None:
         """Return bytes of flash or SRAM; None where there is no memory."""
         return self.chip.memory.read(address, size)
-
-    def snapshot(self) -> BoardSnapshot:
-        """Return all that decides the board's future; it can be pickled."""
-        activity = self.activity
-        return BoardSnapshot(
-            self.chip.snapshot(),
-            self.fault,
-            (activity.last_pin_ns, activity.last_usart_ns, activity.last_wfi_ns),
-            tuple(self._warned.items()),
-            tuple(bytes(port.unread) for port in self._usarts),
-            self.boot0,
-            tuple(self.resets.items()),
-            tuple(tuple(self.chip.parts.usart(n).sent_at.items()) for n in (1, 2, 3)),
-        )
-
-    def restore(self, snapshot: object) -> None:
-        """Put back what `snapshot` returned; no listener is called.
-
-        Raises:
-            TypeError: it is not a board's snapshot.
-        """
-        if not isinstance(snapshot, BoardSnapshot):
-            raise TypeError(f"not a BluePill's snapshot: {type(snapshot).__name__}")
-        self.chip.restore(snapshot.chip)
-        self.fault = snapshot.fault
-        self.boot0 = snapshot.boot0
-        self.resets = Counter(dict(snapshot.resets))
-        for number, sent_at in enumerate(snapshot.sent_at, start=1):
-            self.chip.parts.usart(number).sent_at = Counter(dict(sent_at))
-        self._activity.last_pin_ns, self._activity.last_usart_ns, self._activity.last_wfi_ns = snapshot.activity
-        self._warned = dict(snapshot.warned)
-        for port, unread in zip(self._usarts, snapshot.unread, strict=True):
-            port.unread[:] = unread
 
     # Callbacks of the chip.
 

@@ -16,7 +16,6 @@ time of the accessing instruction.
 
 import ctypes
 from collections.abc import Callable
-from typing import cast
 
 from bluepill_sim.core import GENERAL, BlockRecorder
 from bluepill_sim.core.block_cost import NO_BLOCK, Block, measure_block
@@ -42,6 +41,7 @@ from bluepill_sim.stm32f103 import (
     name_at,
 )
 from bluepill_sim.timing import ChipReached, CycleClock, HaltKind
+from simbase.state import Stateful
 from simbase.timing import Nanos, Reason
 
 #: What is mapped as peripherals: APB1, APB2 and AHB up to the end of CRC and reserved pages.
@@ -61,8 +61,23 @@ UNCLOCKED_NS: Nanos = 1_000_000
 WarningListener = Callable[[str, str, int], None]
 
 
-class Chip:
+class Chip(Stateful):
     """An STM32F103 with its flash filled by the caller; `ChipPorts` for its peripherals."""
+
+    STATE = (
+        "memory",
+        "processor",
+        "system",
+        "pins",
+        "parts",
+        "clocks",
+        "_clock",
+        "_bus",
+        "_stop_requested",
+        "_requested_reset",
+        "_flash_repairs",
+    )
+    DERIVED = ("_flash_access", "_next_due", "_deadlines_moved", "_event_ns", "_streams")
 
     def __init__(self, memory: Memory, vector_table: int, on_warning: WarningListener, on_fault: FaultListener) -> None:
         """Make the chip, in the state after power-on.
@@ -100,6 +115,7 @@ class Chip:
         self.pins = make_pins(self)
         self.parts = make_parts(self)
         self._is_complete = True
+        memory.on_reprogrammed = self._drop_flash
         self.parts.flash.memory = _FlashArray(memory, self._flash_repairs)
         self.system = SystemControl(self.processor, self)
         self._map()
@@ -127,7 +143,7 @@ class Chip:
     @property
     def time_base(self) -> tuple[int, Nanos, int]:
         """The present frequency in Hz, and the time in ns and the cycle from which it counts."""
-        return self._clock.snapshot()
+        return self._clock.base
 
     def ns_of(self, cycle: int) -> Nanos:
         """Return when a cycle of the present frequency began."""
@@ -275,43 +291,10 @@ class Chip:
         """Pass on a warning."""
         self._on_warning(message, once, self.engine.access_pc if pc is None else pc)
 
-    # Snapshots.
-
-    def snapshot(self) -> tuple[object, ...]:
-        """Return all that decides the chip's future, as plain values."""
-        return (
-            self.memory.snapshot(),
-            self.processor.snapshot(),
-            self.system.snapshot(),
-            self.parts.snapshot(),
-            self.pins.snapshot(),
-            self.clocks.snapshot(),
-            self._clock.snapshot(),
-            (
-                self._stop_requested,
-                self._requested_reset and self._requested_reset.name,
-                tuple(self._bus.read_unclocked_ns.items()),
-            ),
-        )
-
-    def restore(self, snapshot: tuple[object, ...]) -> None:
-        """Put back what `snapshot` returned."""
-        memory, processor, system, parts, pins, clocks, clock, requests = snapshot
-        if self.memory.restore(memory):  # type: ignore[arg-type]  # a snapshot is opaque to its keeper
-            self.engine.drop_code(FLASH_BASE, FLASH_BYTES_FITTED)
-            self.engine.drop_code(0, FLASH_BYTES_FITTED)
-        self.processor.restore(processor)  # type: ignore[arg-type]  # as above
-        self.system.restore(system)  # type: ignore[arg-type]  # as above
-        self.pins.restore(pins)  # type: ignore[arg-type]  # as above
-        self.parts.restore(parts)  # type: ignore[arg-type]  # as above
-        self.clocks.restore(clocks)  # type: ignore[arg-type]  # as above
-        self._clock.restore(clock)  # type: ignore[arg-type]  # as above
-        self._stop_requested, cause, unclocked = cast("tuple[bool, str | None, tuple[tuple[str, int], ...]]", requests)
-        self._bus.read_unclocked_ns = dict(unclocked)
-        self._requested_reset = None if cause is None else ResetCause[cause]
+    def _restored(self) -> None:
+        """Forget what was worked out before: due times, costs of blocks."""
         self._flash_access = self.clocks.flash_wait_states, self.clocks.flash_prefetch
         self.engine.forget_costs()
-        self._flash_repairs.clear()
         self._deadlines_moved = True
 
     # Internals.
@@ -410,6 +393,10 @@ class Chip:
         self._flash_repairs.append((offset, self.memory.read_flash(offset, size)))
         return True
 
+    def _drop_flash(self) -> None:
+        self.engine.drop_code(FLASH_BASE, FLASH_BYTES_FITTED)
+        self.engine.drop_code(0, FLASH_BYTES_FITTED)
+
     def _repair_flash(self) -> None:
         for offset, data in self._flash_repairs:
             self.memory.load_flash(offset, data)
@@ -418,12 +405,14 @@ class Chip:
         self._flash_repairs.clear()
 
 
-class PeripheralBus:
+class PeripheralBus(Stateful):
     """Reads and writes of the peripheral region; offsets count from PERIPHERAL_BASE.
 
     A peripheral sees an access only while its clock is on. Accesses without one are warned of where they matter: a
     write that sets what a reset would not leave, and reading on for a while; ST's de-initializations do neither.
     """
+
+    STATE = ("read_unclocked_ns",)
 
     def __init__(self, parts: dict[str, Peripheral], rcc: Rcc, chip: Chip) -> None:
         self._pages = {

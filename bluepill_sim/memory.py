@@ -8,6 +8,7 @@ Invariant: a buffer lives as long as this object and never moves.
 
 import ctypes
 import struct
+from collections.abc import Callable
 from dataclasses import dataclass
 
 from bluepill_sim.stm32f103 import (
@@ -20,6 +21,7 @@ from bluepill_sim.stm32f103 import (
     SYSTEM_MEMORY_BASE,
     UNIQUE_ID_REGISTER,
 )
+from simbase.state import Stateful
 
 #: What the flash shows where nothing is programmed.
 ERASED = 0xFF
@@ -27,9 +29,6 @@ ERASED = 0xFF
 _SYSTEM_BYTES = 0xC00
 #: Chosen: a unique id that says what it is.
 _UNIQUE_ID = b"P2OS-BLUEPIL"
-
-#: SRAM, and the flash if it differs from the program.
-MemorySnapshot = tuple[bytes, bytes | None]
 
 _CharBuffer = ctypes.Array[ctypes.c_char]
 
@@ -48,8 +47,12 @@ class Region:
         return self.base + len(self.buffer)
 
 
-class Memory:
+class Memory(Stateful):
     """All memories of one chip."""
+
+    STATE = ("sram", "reprogrammed")
+    #: What it was built with.
+    DERIVED = ("_program",)
 
     def __init__(self) -> None:
         self.flash = ctypes.create_string_buffer(bytes([ERASED]) * FLASH_BYTES_FITTED, FLASH_BYTES_FITTED)
@@ -59,6 +62,8 @@ class Memory:
         _place(system, UNIQUE_ID_REGISTER, _UNIQUE_ID)
         self.system = ctypes.create_string_buffer(bytes(system), _SYSTEM_BYTES)
         self._program = self.flash.raw
+        #: Called when `reprogrammed` has changed the flash.
+        self.on_reprogrammed: Callable[[], None] = lambda: None
         #: Where each memory appears; the flash twice.
         self.regions = (
             Region(SRAM_BASE, self.sram, is_writable=True),
@@ -104,20 +109,16 @@ class Memory:
         """Take the flash as it is now for the program that snapshots need not carry."""
         self._program = self.flash.raw
 
-    def snapshot(self) -> MemorySnapshot:
-        """Return SRAM, and the flash where it is no longer the program that was sealed."""
+    @property
+    def reprogrammed(self) -> bytes | None:
+        """The flash; None where it is the program that was sealed."""
         flash = self.flash.raw
-        return self.sram.raw, None if flash == self._program else flash
+        return None if flash == self._program else flash
 
-    def restore(self, snapshot: MemorySnapshot) -> bool:
-        """Put back what `snapshot` returned; return whether the flash has changed by that."""
-        sram, changed_flash = snapshot
-        flash = changed_flash or self._program
-        ctypes.memmove(self.sram, sram, len(sram))
-        if flash == self.flash.raw:
-            return False
-        ctypes.memmove(self.flash, flash, len(flash))
-        return True
+    @reprogrammed.setter
+    def reprogrammed(self, flash: bytes | None) -> None:
+        self.load_flash(0, self._program if flash is None else flash)
+        self.on_reprogrammed()
 
     def _region(self, address: int, size: int) -> Region | None:
         for region in self.regions:

@@ -11,6 +11,7 @@ from typing import Protocol
 from bluepill_sim.errors import BluePillError
 from bluepill_sim.peripherals.usart import CR1, PINS, RE, UE, Usart
 from bluepill_sim.timing import Span
+from simbase.state import Stateful
 from simbase.timing import Nanos
 
 #: chosen: six seconds of a line at 115200; older ones are forgotten.
@@ -54,8 +55,10 @@ class WaitForBytes(Protocol):
         ...
 
 
-class SerialPort:
+class SerialPort(Stateful):
     """A USART of the board, seen from outside."""
+
+    STATE = ("unread",)
 
     def __init__(self, usart: Usart, activity: Activity, wait: WaitForBytes) -> None:
         self._usart = usart

@@ -13,7 +13,7 @@ from typing import TypeAlias, cast
 
 from bluepill_sim.fabric.pins import PinBank, PinPorts
 from bluepill_sim.fabric.ports import ChipPorts
-from bluepill_sim.fabric.registers import ClockBit, Peripheral, PeripheralSnapshot, Place
+from bluepill_sim.fabric.registers import ClockBit, Peripheral, Place
 from bluepill_sim.peripherals.afio import Afio
 from bluepill_sim.peripherals.exti import Exti
 from bluepill_sim.peripherals.flash import Flash
@@ -22,6 +22,7 @@ from bluepill_sim.peripherals.iwdg import Iwdg
 from bluepill_sim.peripherals.rcc import Rcc, ResetCause
 from bluepill_sim.peripherals.usart import Usart
 from bluepill_sim.peripherals.wwdg import Wwdg
+from simbase.state import Stateful
 
 FLASH_BASE = 0x0800_0000
 #: The C8 is sold with 64 KiB and carries 128 KiB; programs that use the upper half run on most boards.
@@ -167,7 +168,7 @@ PERIPHERALS: tuple[tuple[_Maker, str, tuple[int, ...]], ...] = (
 
 
 @dataclass(frozen=True, slots=True)
-class ChipParts:
+class ChipParts(Stateful):
     """The peripherals of one chip."""
 
     #: All of them by name, in the order of `PERIPHERALS`.
@@ -233,15 +234,6 @@ class ChipParts:
                         f"{part.place.name} is still due at {part.due_ns} ns after acting at {due_ns} ns"
                     )
         return self.next_deadline()
-
-    def snapshot(self) -> dict[str, PeripheralSnapshot]:
-        """Return all that decides their future, as plain values."""
-        return {name: part.snapshot() for name, part in self.by_name.items()}
-
-    def restore(self, snapshot: dict[str, PeripheralSnapshot]) -> None:
-        """Put back what `snapshot` returned; no listener is called."""
-        for name, part in self.by_name.items():
-            part.restore(snapshot[name])
 
 
 def make_pins(chip: PinPorts) -> PinBank:

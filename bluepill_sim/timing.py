@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from enum import Enum
 
 from bluepill_sim.errors import BluePillError
+from simbase.state import Stateful
 from simbase.timing import NS_PER_S, Nanos, Reached
 from simbase.units import TIME
 
@@ -69,17 +70,24 @@ class ChipReached(Reached):
     halt: Halt | None = None
 
 
-class CycleClock:
+class CycleClock(Stateful):
     """Cycles of the core and nanoseconds of the world, one from the other.
 
     They are tied together at one point (base_ns, base_cycle), which moves only when
     the frequency changes; `cycle_at(ns)` is the first cycle whose `ns_of` is at or after `ns`.
     """
 
+    STATE = ("frequency_hz", "_base_ns", "_base_cycle")
+
     def __init__(self, frequency_hz: int) -> None:
         self.frequency_hz = frequency_hz
         self._base_ns = 0
         self._base_cycle = 0
+
+    @property
+    def base(self) -> tuple[int, Nanos, int]:
+        """The frequency in Hz, and the time in ns and the cycle from which it counts."""
+        return self.frequency_hz, self._base_ns, self._base_cycle
 
     def ns_of(self, cycle: int) -> Nanos:
         """Return when a cycle begins, rounded down."""
@@ -94,14 +102,6 @@ class CycleClock:
         self._base_ns = self.ns_of(cycle)
         self._base_cycle = cycle
         self.frequency_hz = frequency_hz
-
-    def snapshot(self) -> tuple[int, int, int]:
-        """Return the state as plain values."""
-        return self.frequency_hz, self._base_ns, self._base_cycle
-
-    def restore(self, snapshot: tuple[int, int, int]) -> None:
-        """Put back what `snapshot` returned."""
-        self.frequency_hz, self._base_ns, self._base_cycle = snapshot
 
 
 #: A span: nanoseconds, or a number with its unit.

@@ -11,8 +11,9 @@ What an attribute may hold:
 - numbers, texts, bytes, None, enums and frozen dataclasses, which are kept as they are;
 - lists, tuples, deques, dicts, sets and byte arrays of what may be held;
 - dataclasses, which are copied field by field;
-- other parts, alone or in a list, tuple or dict: they are restored in place, never replaced;
-- ctypes arrays and random generators, by their contents.
+- other parts, alone or in a list, tuple or dict: they are restored in place, never replaced. Whatever has
+  `snapshot` and `restore` is a part;
+- arrays of the module `array`, ctypes arrays and random generators, by their contents.
 
 Containers and dataclasses that a part holds are filled anew in place, so that whoever
 else refers to them sees what was restored.
@@ -24,14 +25,15 @@ import ctypes
 import dataclasses
 import operator
 import random
+from array import array
 from collections import deque
 from collections.abc import Callable, Iterable
 from enum import Enum
 from functools import cache
 from itertools import zip_longest
-from typing import Any, ClassVar, TypeAlias
+from typing import Any, ClassVar, Protocol, TypeAlias, runtime_checkable
 
-#: Kept as they are. A frozen set or dataclass is taken at its word.
+#: Kept as they are, as frozen dataclasses are. They and frozen sets are taken at their word.
 _LEAVES = (int, float, complex, str, bytes, type(None), Enum, frozenset, range)
 
 _Inner: TypeAlias = Callable[[Any, str], object]
@@ -57,7 +59,13 @@ class Stateful:
             TypeError: an attribute of `STATE` holds what is no state, such as a function.
         """
         kind: Any = type(self)
-        return PartState((name, _saved(getattr(self, name), name)) for name in state_names(kind))
+        names, values = _attributes(kind)
+        held = values(self)
+        state = PartState(zip(names, held))  # noqa: B905  # for each part of a board: strictness costs
+        for name, value in state.items():
+            if (rebuild := _REBUILDER[type(value)]) is not None:
+                state[name] = rebuild(value, name, _saved)
+        return state
 
     def restore(self, snapshot: object) -> None:
         """Put back what `snapshot` returned.
@@ -66,17 +74,47 @@ class Stateful:
             TypeError: it is no snapshot of a part built alike.
         """
         kind: Any = type(self)
-        names = state_names(kind)
-        if not isinstance(snapshot, PartState) or snapshot.keys() != set(names):
+        names, values = _attributes(kind)
+        if not isinstance(snapshot, PartState) or tuple(snapshot) != names:
             raise TypeError(f"not a snapshot of {kind.__name__}")
-        for name in names:
-            current = getattr(self, name)
-            if (value := _put_back(current, snapshot[name], name)) is not current:
-                setattr(self, name, value)
+        held = values(self)
+        if not all(map(operator.is_, held, snapshot.values())):
+            for (name, saved), current in zip(snapshot.items(), held, strict=True):
+                if saved is not current and (value := _put_back(current, saved, name)) is not current:
+                    setattr(self, name, value)
         self._restored()
 
     def _restored(self) -> None:
         """Work out again what follows from the state."""
+
+
+@runtime_checkable
+class Part(Protocol):
+    """Whatever saves and restores itself, such as a twin in another language that keeps its state itself."""
+
+    def snapshot(self) -> object:
+        """Return all that decides the future, as a value."""
+        ...
+
+    def restore(self, snapshot: Any) -> None:
+        """Put back what `snapshot` returned."""
+        ...
+
+
+class _Rebuilders(dict[type, Callable[[Any, str, _Inner], object] | None]):
+    """How values of a type are copied, None for those that are kept as they are; found out once a type."""
+
+    def __missing__(self, kind: type) -> Callable[[Any, str, _Inner], object] | None:
+        parameters = getattr(kind, "__dataclass_params__", None)
+        is_frozen = parameters is not None and parameters.frozen and not issubclass(kind, Part)
+        if issubclass(kind, _LEAVES) or is_frozen:
+            self[kind] = None
+        else:
+            self[kind] = next((rebuild for base, rebuild in _REBUILD if issubclass(kind, base)), _rebuild_fields)
+        return self[kind]
+
+
+_REBUILDER = _Rebuilders()
 
 
 @cache
@@ -93,7 +131,15 @@ def state_names(part: Any) -> tuple[str, ...]:
             names.update(dict.fromkeys(vars(base)["STATE"]))
     if names or not dataclasses.is_dataclass(part):
         return tuple(names)
-    return tuple(field.name for field in dataclasses.fields(part))
+    own: Any = part
+    return _fields(own)
+
+
+@cache
+def _attributes(part: Any) -> tuple[tuple[str, ...], Callable[[object], Iterable[object]]]:
+    """Return `state_names`, and a function of a part that returns the values of these attributes."""
+    names = state_names(part)
+    return names, operator.attrgetter(*names) if len(names) > 1 else lambda self: [getattr(self, n) for n in names]
 
 
 class PartState(dict[str, object]):
@@ -102,30 +148,22 @@ class PartState(dict[str, object]):
 
 def _saved(value: Any, path: str) -> object:
     """Return a value that shares nothing with `value`; a part gives its snapshot."""
-    if isinstance(value, Stateful):
-        return value.snapshot()
-    if isinstance(value, _LEAVES):
-        return value
-    return _rebuilt(value, path, _saved)
+    rebuild = _REBUILDER[type(value)]
+    return value if rebuild is None else rebuild(value, path, _saved)
 
 
 def _fresh(saved: Any, path: str) -> object:
     """Return a copy of a saved value, so that a snapshot can be restored again."""
     if isinstance(saved, PartState):
         raise TypeError(f"{path} has no part to restore this into")
-    return saved if isinstance(saved, _LEAVES) else _rebuilt(saved, path, _fresh)
+    rebuild = _REBUILDER[type(saved)]
+    return saved if rebuild is None else rebuild(saved, path, _fresh)
 
 
-def _rebuilt(value: Any, path: str, inner: _Inner) -> object:
-    """Return a container, dataclass, array or generator anew, with `inner` of all that it holds."""
-    for kind, rebuild in _REBUILD:
-        if isinstance(value, kind):
-            return rebuild(value, lambda item: inner(item, path))
-    if not dataclasses.is_dataclass(value) or isinstance(value, type):
-        raise TypeError(f"{path} holds {type(value).__name__}, which is no state")
+def _rebuild_fields(value: Any, path: str, inner: _Inner) -> object:
     own: Any = type(value)
-    if _is_frozen(own):
-        return value
+    if not hasattr(own, "__dataclass_fields__"):
+        raise TypeError(f"{path} holds {own.__name__}, which is no state")
     copy: Any = object.__new__(own)
     for name in _fields(own):
         setattr(copy, name, inner(getattr(value, name), f"{path}.{name}"))
@@ -134,24 +172,29 @@ def _rebuilt(value: Any, path: str, inner: _Inner) -> object:
 
 def _put_back(current: Any, saved: Any, path: str) -> object:
     """Return what stands here from now on: `current`, filled anew, wherever it can be."""
-    for kind, refill in _IN_PLACE:
-        if isinstance(current, kind):
-            refill(current, saved)
-            return current
-    if type(current) is not type(saved) or isinstance(current, _LEAVES):
-        return _fresh(saved, path)
-    for container, fill in _FILL:
-        if isinstance(current, container):
-            return fill(current, saved, path)
     own: Any = type(current)
-    if _is_frozen(own):
-        return saved
+    if _REBUILDER[own] is None:
+        return _fresh(saved, path)
+    refill = _in_place_of(own)
+    if refill is not None:
+        refill(current, saved)
+        return current
+    if type(current) is not type(saved):
+        return _fresh(saved, path)
+    fill = _fill_of(own)
+    if fill is not None:
+        return fill(current, saved, path)
     for name in _fields(own):
         setattr(current, name, _put_back(getattr(current, name), getattr(saved, name), f"{path}.{name}"))
     return current
 
 
 def _fill_dict(current: dict[Any, Any], saved: dict[Any, Any], path: str) -> object:
+    if list(current) == list(saved):
+        for key, item in saved.items():
+            if (here := current[key]) is not item:
+                current[key] = _put_back(here, item, path)
+        return current
     kept = {key: _put_back(current.pop(key, None), item, path) for key, item in saved.items()}
     _refuse_left_over(current.values(), path)
     current.clear()
@@ -160,6 +203,8 @@ def _fill_dict(current: dict[Any, Any], saved: dict[Any, Any], path: str) -> obj
 
 
 def _fill_sequence(current: Any, saved: Any, path: str) -> object:
+    if isinstance(current, tuple) and _saved(current, path) is current:  # nothing in it could be filled anew
+        return _fresh(saved, path)
     _refuse_left_over(list(current)[len(saved) :], path)
     items = [_put_back(here, item, path) for here, item in zip_longest(list(current)[: len(saved)], saved)]
     if isinstance(current, tuple):
@@ -170,19 +215,26 @@ def _fill_sequence(current: Any, saved: Any, path: str) -> object:
     return current
 
 
-def _fill_set(current: Any, saved: Any, path: str) -> object:  # noqa: ARG001  # one shape for all of the table
+def _fill_same(current: Any, saved: Any, path: str) -> object:  # noqa: ARG001  # one shape for all of the table
     current.clear()
     current.update(saved) if isinstance(current, set) else current.extend(saved)
     return current
 
 
+def _fill_array(current: Any, saved: Any, path: str) -> object:  # noqa: ARG001  # as above
+    current[:] = saved
+    return current
+
+
 def _refuse_left_over(items: Iterable[object], path: str) -> None:
-    if any(isinstance(item, Stateful) for item in items):
+    if any(isinstance(item, Part) for item in items):
         raise TypeError(f"{path} holds more parts than were saved")
 
 
 def _like_dict(value: dict[Any, Any], items: dict[Any, Any]) -> object:
     """Return a dict of the kind of `value`: a Counter stays one, a defaultdict keeps its factory."""
+    if type(value) is dict:
+        return items
     fresh = value.copy()
     fresh.clear()
     fresh.update(items)
@@ -193,6 +245,11 @@ def _like(value: Any, items: Iterable[object]) -> object:
     """Return a tuple of the kind of `value`, named or not."""
     kind = type(value)
     return kind(*items) if hasattr(kind, "_fields") else tuple(items)
+
+
+def _rebuild_tuple(value: Any, path: str, inner: _Inner) -> object:
+    items = [inner(item, path) for item in value]
+    return value if all(map(operator.is_, items, value)) else _like(value, items)
 
 
 class _Generator(tuple[object, ...]):
@@ -207,22 +264,24 @@ class _Generator(tuple[object, ...]):
 
 
 #: How a value is copied: of what kind, and how, with a function for what it holds.
-_REBUILD: tuple[tuple[type, Callable[[Any, Callable[[Any], object]], object]], ...] = (
-    (_Generator, lambda saved, _: saved.made()),
-    (tuple, lambda value, inner: _like(value, map(inner, value))),
-    (deque, lambda value, inner: deque(map(inner, value), value.maxlen)),
-    (list, lambda value, inner: [inner(item) for item in value]),
-    (dict, lambda value, inner: _like_dict(value, {key: inner(item) for key, item in value.items()})),
-    (set, lambda value, _: value.copy()),
-    (bytearray, lambda value, _: value.copy()),
-    (ctypes.Array, lambda value, _: bytes(value)),
-    (random.Random, lambda value, _: _Generator(value.getstate())),
+_REBUILD: tuple[tuple[type, Callable[[Any, str, _Inner], object]], ...] = (
+    (Part, lambda part, _path, _inner: part.snapshot()),
+    (_Generator, lambda saved, _path, _inner: saved.made()),
+    (tuple, _rebuild_tuple),
+    (deque, lambda value, path, inner: deque([inner(item, path) for item in value], value.maxlen)),
+    (list, lambda value, path, inner: [inner(item, path) for item in value]),
+    (dict, lambda value, path, inner: _like_dict(value, {key: inner(item, path) for key, item in value.items()})),
+    (set, lambda value, _path, _inner: value.copy()),
+    (bytearray, lambda value, _path, _inner: value.copy()),
+    (array, lambda value, _path, _inner: value[:]),
+    (ctypes.Array, lambda value, _path, _inner: bytes(value)),
+    (random.Random, lambda value, _path, _inner: _Generator(value.getstate())),
 )
 
 #: What is always restored in place, from a snapshot of another kind than itself.
 _IN_PLACE: tuple[tuple[type, Callable[[Any, Any], object]], ...] = (
-    (Stateful, lambda part, saved: part.restore(saved)),
-    (ctypes.Array, lambda array, saved: ctypes.memmove(array, saved, len(saved))),
+    (Part, lambda part, saved: part.restore(saved)),
+    (ctypes.Array, lambda words, saved: ctypes.memmove(words, saved, len(saved))),
     (random.Random, lambda source, saved: source.setstate(saved)),
 )
 
@@ -230,9 +289,14 @@ _IN_PLACE: tuple[tuple[type, Callable[[Any, Any], object]], ...] = (
 _FILL: tuple[tuple[type | tuple[type, ...], Callable[[Any, Any, str], object]], ...] = (
     (dict, _fill_dict),
     ((list, tuple, deque), _fill_sequence),
-    ((set, bytearray), _fill_set),
+    ((set, bytearray), _fill_same),
+    (array, _fill_array),
 )
 
 
-def _is_frozen(kind: Any) -> bool:
-    return bool(kind.__dataclass_params__.frozen)
+def _by_type(table: Iterable[tuple[Any, Any]]) -> Callable[[Any], Any]:
+    """Return a function of a type that finds its row in a table; None where it has none."""
+    return cache(lambda kind: next((way for base, way in table if issubclass(kind, base)), None))
+
+
+_in_place_of, _fill_of = _by_type(_IN_PLACE), _by_type(_FILL)

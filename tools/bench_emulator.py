@@ -147,7 +147,7 @@ def against_unicorn(folder: Path) -> None:
     twin = board(program, "python")
     for region in twin.chip.memory.regions:
         bare.map_memory(region.base, region.buffer, "rwx" if region.is_writable else "rx")
-    bare.load(twin.chip.snapshot()[1][0][0])
+    bare.context = twin.chip.engine._core.context  # noqa: SLF001
     bare_rounds = rounds_of(twin)
 
     def pair() -> float:

@@ -15,6 +15,8 @@ Invariant: a block's cost depends on its bytes, its address, the wait states
 and the prefetch setting, and on nothing else.
 """
 
+from dataclasses import dataclass, field
+
 from bluepill_sim.core.thumb import Instruction, Kind, decode_all
 
 #: TRM table 18-1: cycles without pipeline refill and per-register cycles.
@@ -65,59 +67,42 @@ REFILL = {
 LINE_BYTES = 8
 
 _SINGLE_LOADS = frozenset({Kind.LOAD, Kind.LOAD_LITERAL})
+_MULTIPLES = frozenset({Kind.LOAD_MULTIPLE, Kind.STORE_MULTIPLE, Kind.LOAD_DUAL, Kind.STORE_DUAL})
 _PIPELINED_AFTER_LOAD = frozenset({Kind.LOAD, Kind.LOAD_LITERAL, Kind.STORE_INDEXED})
 
 
+@dataclass(frozen=True, slots=True)
 class Block:
     """A basic block's costs and what in it needs attention."""
 
-    __slots__ = (
-        "aligned",
-        "changes_masks",
-        "divides",
-        "end",
-        "has_exclusive",
-        "has_it",
-        "is_self_loop",
-        "it_states",
-        "last",
-        "late_divides",
-        "offsets",
-        "sends_event",
-        "start",
-        "straight",
-        "taken",
-    )
-
-    def __init__(self, start: int, end: int, straight: int, taken: int, offsets: dict[int, int]) -> None:
-        self.start = start
-        #: Address after the block: where it goes on if no branch is taken.
-        self.end = end
-        #: Cycles when the block falls through to `end`.
-        self.straight = straight
-        #: Cycles when it goes anywhere else.
-        self.taken = taken
-        #: Cycles from the block's start to each instruction, by address.
-        self.offsets = offsets
-        #: Addresses and divisor registers of its divisions.
-        self.divides: tuple[tuple[int, int], ...] = ()
-        #: Those with a store before them in the block, which may be the one that switches the trap on.
-        self.late_divides: tuple[tuple[int, int], ...] = ()
-        #: Addresses and base registers of its accesses that must be aligned.
-        self.aligned: tuple[tuple[int, int], ...] = ()
-        #: Whether it may change what may interrupt (CPS, MSR).
-        self.changes_masks = False
-        self.sends_event = False
-        #: Whether it takes an exclusive reservation.
-        self.has_exclusive = False
-        #: Whether an IT instruction is in it.
-        self.has_it = False
-        #: ITSTATE of its instructions that stand under an IT of the same block, by address.
-        self.it_states: dict[int, int] = {}
-        #: Whether it is a single branch to itself.
-        self.is_self_loop = False
-        #: Kind of its last instruction.
-        self.last = Kind.PLAIN
+    start: int
+    #: Address after the block: where it goes on if no branch is taken.
+    end: int
+    #: Cycles when the block falls through to `end`.
+    straight: int
+    #: Cycles when it goes anywhere else.
+    taken: int
+    #: Cycles from the block's start to each instruction, by address.
+    offsets: dict[int, int]
+    #: Addresses and divisor registers of its divisions.
+    divides: tuple[tuple[int, int], ...] = ()
+    #: Those with a store before them in the block, which may be the one that switches the trap on.
+    late_divides: tuple[tuple[int, int], ...] = ()
+    #: Addresses and base registers of its accesses that must be aligned.
+    aligned: tuple[tuple[int, int], ...] = ()
+    #: Whether it may change what may interrupt (CPS, MSR).
+    changes_masks: bool = False
+    sends_event: bool = False
+    #: Whether it takes an exclusive reservation.
+    has_exclusive: bool = False
+    #: Whether an IT instruction is in it.
+    has_it: bool = False
+    #: ITSTATE of its instructions that stand under an IT of the same block, by address.
+    it_states: dict[int, int] = field(default_factory=dict)
+    #: Whether it is a single branch to itself.
+    is_self_loop: bool = False
+    #: Kind of its last instruction.
+    last: Kind = Kind.PLAIN
 
     def cycles_until(self, address: int) -> int:
         """Return the cycles from the block's start until the core stands at `address`, inside the block or after it."""
@@ -138,11 +123,11 @@ class Block:
         """Return what is left of it when the core stands before the instruction at `address`."""
         done = self.cycles_until(address)
         offsets = {at: cycles - done for at, cycles in self.offsets.items() if at >= address}
-        block = Block(address, self.end, self.straight - done, self.taken - done, offsets)
-        block.it_states = self.it_states
-        block.has_it = True  # at least it may begin inside an IT block
-        block.last = self.last
-        return block
+        # It has an IT instruction at least in so far as it may begin inside an IT block.
+        return Block(
+            address, self.end, self.straight - done, self.taken - done, offsets,
+            has_it=True, it_states=self.it_states, last=self.last,
+        )  # fmt: skip
 
     @property
     def needs_attention(self) -> bool:
@@ -175,10 +160,28 @@ def measure_block(code: bytes, start: int, wait_states: int, *, has_prefetch: bo
         if instruction.kind is Kind.LOAD_LITERAL:
             clock += wait_states
         previous = instruction
-    end = start + len(code)
-    block = Block(start, end, clock, clock + _refill(previous, wait_states), offsets)
-    _note(block, instructions)
-    return block
+    divides = tuple((i.address, i.base) for i in instructions if i.kind is Kind.DIVIDE and i.base is not None)
+    stores = [i.address for i in instructions if i.kind in {Kind.STORE, Kind.STORE_INDEXED}]
+    kinds = {i.kind for i in instructions}
+    return Block(
+        start,
+        start + len(code),
+        clock,
+        clock + _refill(previous, wait_states),
+        offsets,
+        divides=divides,
+        late_divides=tuple(row for row in divides if stores and row[0] > stores[0]),
+        aligned=tuple(
+            (i.address, i.base) for i in instructions if i.kind in _MULTIPLES and i.base is not None and i.base < 13
+        ),
+        changes_masks=Kind.MASK_CHANGE in kinds,
+        sends_event=Kind.SEND_EVENT in kinds,
+        has_exclusive=Kind.EXCLUSIVE in kinds,
+        has_it=Kind.IF_THEN in kinds,
+        it_states=_it_states(instructions),
+        is_self_loop=len(instructions) == 1 and instructions[0].destination == start,
+        last=instructions[-1].kind if instructions else Kind.PLAIN,
+    )
 
 
 def cycles_of(instruction: Instruction, previous: Instruction | None = None) -> int:
@@ -230,26 +233,6 @@ def _refill(last: Instruction | None, wait_states: int) -> int:
     if last.destination is not None and last.destination // LINE_BYTES == last.address // LINE_BYTES:
         return refill  # the line is still in the buffer
     return refill + wait_states
-
-
-def _note(block: Block, instructions: list[Instruction]) -> None:
-    """Write down what in the block needs the emulator's attention."""
-    multiples = (Kind.LOAD_MULTIPLE, Kind.STORE_MULTIPLE, Kind.LOAD_DUAL, Kind.STORE_DUAL)
-    block.divides = tuple((i.address, i.base) for i in instructions if i.kind is Kind.DIVIDE and i.base is not None)
-    stores = [i.address for i in instructions if i.kind in {Kind.STORE, Kind.STORE_INDEXED}]
-    block.late_divides = tuple(row for row in block.divides if stores and row[0] > stores[0])
-    block.aligned = tuple(
-        (i.address, i.base) for i in instructions if i.kind in multiples and i.base is not None and i.base < 13
-    )
-    kinds = {i.kind for i in instructions}
-    block.changes_masks = Kind.MASK_CHANGE in kinds
-    block.sends_event = Kind.SEND_EVENT in kinds
-    block.has_exclusive = Kind.EXCLUSIVE in kinds
-    block.has_it = Kind.IF_THEN in kinds
-    if block.has_it:
-        block.it_states = _it_states(instructions)
-    block.last = instructions[-1].kind if instructions else Kind.PLAIN
-    block.is_self_loop = len(instructions) == 1 and instructions[0].destination == block.start
 
 
 def _it_states(instructions: list[Instruction]) -> dict[int, int]:

@@ -22,9 +22,9 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from bluepill_sim.core.block_cost import NO_BLOCK, Block
-from bluepill_sim.core.thumb import Kind
-from bluepill_sim.core.unicorn_core import CoreSnapshot, Register, UnicornCore
+from bluepill_sim.core.unicorn_core import CoreContext, Register, UnicornCore
 from bluepill_sim.timing import Halt
+from simbase.state import Stateful
 
 #: ITSTATE in CPSR and xPSR: bits 1 to 0 at 26, bits 7 to 2 at 15.
 IT_BITS = 0x0600_FC00
@@ -35,12 +35,12 @@ WritableMemory = tuple[int, int, int]
 #: Returns the costs of the block of `size` bytes at `address`.
 Measure = Callable[[int, int], Block]
 
-#: Start, end, straight, taken, offsets, ITSTATEs, kind of the last instruction, when the run was to end.
-RestSnapshot = tuple[int, int, int, int, tuple[tuple[int, int], ...], tuple[tuple[int, int], ...], str, int]
 
-
-class BlockTable:
+class BlockTable(Stateful):
     """Measured blocks."""
+
+    STATE = ("uses_exclusive",)
+    DERIVED = ("plain", "_special", "_in_writable", "ran_writable")
 
     def __init__(self, measure: Measure) -> None:
         self._measure = measure
@@ -100,7 +100,7 @@ class Frozen:
     cycle: int
     stop_at: int
     it_state: int
-    registers: CoreSnapshot
+    registers: CoreContext
     #: What each writable memory held.
     memories: tuple[bytes, ...]
 
@@ -110,13 +110,16 @@ class Frozen:
             if ctypes.string_at(at, end - first) != data:
                 ctypes.memmove(at, data, len(data))
                 core.drop_code(first, end - first)
-        core.load(self.registers)
+        core.context = self.registers
         flags = core.registers[Register.CPSR] & ~IT_BITS
         core.registers[Register.CPSR] = flags | (self.it_state & 3) << 25 | (self.it_state >> 2) << 10
 
 
-class RestOfBlock:
+class RestOfBlock(Stateful):
     """What is left of a block that a debugger halted inside; empty most of the time."""
+
+    STATE = ("halted_in",)
+    DERIVED = ("block", "resumed", "_stop_at", "_displaced")
 
     def __init__(self) -> None:
         #: None where the core stands at a boundary.
@@ -126,6 +129,15 @@ class RestOfBlock:
         self._stop_at = 0
         #: The block of the table that usually stands in its place.
         self._displaced: Block | None = None
+
+    @property
+    def halted_in(self) -> tuple[Block, int] | None:
+        """What is left of the block, and when the run was to end; None at a boundary."""
+        return None if self.block is None else (self.block, self._stop_at)
+
+    @halted_in.setter
+    def halted_in(self, halted_in: tuple[Block, int] | None) -> None:
+        self.block, self._stop_at = halted_in or (None, 0)
 
     def is_at(self, pc: int) -> bool:
         """Tell whether the core, at `pc`, stands inside a block."""
@@ -151,23 +163,6 @@ class RestOfBlock:
             rest = None
         self.resumed = rest
         return rest, self._stop_at
-
-    def snapshot(self) -> RestSnapshot | None:
-        """Return the state as plain values."""
-        b = self.block
-        if b is None:
-            return None
-        offsets, it_states = tuple(b.offsets.items()), tuple(b.it_states.items())
-        return b.start, b.end, b.straight, b.taken, offsets, it_states, b.last.value, self._stop_at
-
-    def restore(self, snapshot: RestSnapshot | None) -> None:
-        """Put back what `snapshot` returned."""
-        self.block = None
-        if snapshot is None:
-            return
-        start, end, straight, taken, offsets, it_states, last, self._stop_at = snapshot
-        self.block = block = Block(start, end, straight, taken, dict(offsets))
-        block.it_states, block.has_it, block.last = dict(it_states), True, Kind(last)
 
 
 def copy_of(writable: list[WritableMemory]) -> tuple[bytes, ...]:

@@ -25,6 +25,7 @@ or of the instruction there where `is_inside_block`.
 import ctypes
 from collections.abc import Callable
 from dataclasses import replace
+from typing import ClassVar
 
 from bluepill_sim.core.block_cost import NO_BLOCK, Block
 from bluepill_sim.core.blocks import (
@@ -33,12 +34,11 @@ from bluepill_sim.core.blocks import (
     Frozen,
     Measure,
     RestOfBlock,
-    RestSnapshot,
     copy_of,
     it_state_of,
 )
 from bluepill_sim.core.debug_unit import DebugUnit, Watchpoint
-from bluepill_sim.core.recorder import BLOCK, BlockLog, BlockRecorder, BlockRow, KeptRows, LastRows
+from bluepill_sim.core.recorder import BLOCK, BlockLog, BlockRecorder, KeptRows, LastRows
 from bluepill_sim.core.thumb import Kind
 from bluepill_sim.core.unicorn_core import (
     FETCH_PROTECTED,
@@ -48,7 +48,6 @@ from bluepill_sim.core.unicorn_core import (
     SCRATCH_END,
     WRITE_PROTECTED,
     WRITE_UNMAPPED,
-    CoreSnapshot,
     ReadAccess,
     Register,
     UnicornCore,
@@ -57,11 +56,10 @@ from bluepill_sim.core.unicorn_core import (
     io_callbacks,
 )
 from bluepill_sim.timing import DEBUG_HALTS, Halt, HaltKind
+from simbase.state import Stateful
 
 #: Stops the engine before the instruction at an address: (kind, PC, address of the data).
 StopBefore = Callable[[HaltKind, int, int | None], None]
-#: Registers, cycle, PC, T bit, whether exclusive accesses are used, the rest of a block, the last rows.
-EngineSnapshot = tuple[CoreSnapshot, int, int, bool, bool, RestSnapshot | None, tuple[BlockRow, ...]]
 #: Flash and SRAM lie below; peripherals above have rules of their own.
 _LAST_NORMAL_ADDRESS = 0x21FF_FFFF
 
@@ -99,12 +97,21 @@ _BAD_ACCESSES = {
 }
 
 
-class Engine:
+class Engine(Stateful):
     """Runs instructions between block boundaries; see the theory of operation above.
 
     Raises:
         MissingDependencyError: Unicorn is not installed.
     """
+
+    STATE = ("_core", "cycle", "pc", "is_thumb", "has_branched_to_return", "_blocks", "_rest", "log")
+    DERIVED: ClassVar[tuple[str, ...]] = (
+        "it_state", "block", "stop_at", "_run_from", "_halt", "_failure", "_frozen", "_table",
+        # What a run or a block has for itself alone.
+        "_is_stepping", "_lets_writes_through", "raised_by_pc",
+        # Whom it calls, and what it is made of.
+        "_log_row", "_block_hook", "registers",
+    )  # fmt: skip
 
     def __init__(self, measure: Measure) -> None:
         self._core = UnicornCore(self._fail)
@@ -332,21 +339,10 @@ class Engine:
         self.cycle, self.stop_at, self._log_row = saved
         self.block = NO_BLOCK
 
-    # Snapshots.
-
-    def snapshot(self) -> EngineSnapshot:
-        """Return the core's state, memory left aside."""
-        rest, rows = self._rest.snapshot(), self.log.rows()
-        return self._core.save(), self.cycle, self.pc, self.is_thumb, self._blocks.uses_exclusive, rest, rows
-
-    def restore(self, snapshot: EngineSnapshot) -> None:
-        """Put back what `snapshot` returned; memory is the caller's business, before this call."""
-        registers, self.cycle, self.pc, self.is_thumb, self._blocks.uses_exclusive, rest, rows = snapshot
-        self.log.put_back(rows)
-        self._core.load(registers)
+    def _restored(self) -> None:
+        """Follow the registers; memory was restored before, so that code in it may be another."""
         self.it_state = it_state_of(self.registers[Register.CPSR])
         self.block = NO_BLOCK
-        self._rest.restore(rest)
         if self._blocks.ran_writable:
             self._core.drop_all_code()
             self._blocks.forget()
@@ -470,7 +466,7 @@ class Engine:
             self.cycle,
             self.stop_at,
             self.block.it_state_at(pc, begins_in_it),
-            self._core.save(),
+            self._core.context,
             copy_of(self._blocks.writable),
         )
         self._run_from = self.block.start  # so that accesses to peripherals look, and are not made

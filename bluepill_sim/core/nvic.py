@@ -9,7 +9,10 @@ Invariant: an exception is pending at most once; a line that stays high makes
 its interrupt pending again when its handler returns.
 """
 
+import ctypes
 from collections.abc import Iterator
+
+from simbase.state import Stateful
 
 NMI, HARD_FAULT, MEM_MANAGE, BUS_FAULT, USAGE_FAULT = 2, 3, 4, 5, 6
 SVCALL, DEBUG_MONITOR, PENDSV, SYSTICK = 11, 12, 14, 15
@@ -53,27 +56,32 @@ IRQ_LINES = 60
 _IRQ_MASK = (1 << IRQ_LINES) - 1
 SYSTEM_EXCEPTIONS = (1 << FIRST_IRQ) - 1
 
-NvicSnapshot = tuple[int, int, int, int, tuple[int, ...], int]
 
-
-class Nvic:
+class Nvic(Stateful):
     """State of all exceptions; numbers are those of the architecture (IRQ line n is 16 + n)."""
 
-    def __init__(self) -> None:
+    STATE = ("pending", "active", "enabled", "levels", "priorities", "priority_grouping")
+
+    def __init__(self, priorities: "ctypes.Array[ctypes.c_uint8] | None" = None) -> None:
+        """Make it in the state after a reset.
+
+        Args:
+            priorities: where the bytes of priority are kept, one an exception; None: anywhere.
+        """
         #: Bit masks over exception numbers.
         self.pending = 0
         self.active = 0
         #: Bit masks over interrupt lines.
         self.enabled = 0
         self.levels = 0
-        self.priorities = [0] * (FIRST_IRQ + IRQ_LINES)
+        self.priorities = priorities or (ctypes.c_uint8 * (FIRST_IRQ + IRQ_LINES))()
         #: AIRCR.PRIGROUP.
         self.priority_grouping = 0
 
     def reset(self) -> None:
         """Go back to the state after a reset; the levels of the lines belong to the peripherals."""
         self.pending = self.active = self.enabled = 0
-        self.priorities = [0] * (FIRST_IRQ + IRQ_LINES)
+        ctypes.memset(self.priorities, 0, len(self.priorities))
         self.priority_grouping = 0
 
     # Interrupt lines.
@@ -151,24 +159,6 @@ class Nvic:
     def set_priority(self, number: int, value: int) -> None:
         """Set a priority byte; only the upper four bits exist."""
         self.priorities[number] = value & PRIORITY_MASK
-
-    # Snapshots.
-
-    def snapshot(self) -> NvicSnapshot:
-        """Return the state as plain values."""
-        return (
-            self.pending,
-            self.active,
-            self.enabled,
-            self.levels,
-            tuple(self.priorities),
-            self.priority_grouping,
-        )
-
-    def restore(self, snapshot: NvicSnapshot) -> None:
-        """Put back what `snapshot` returned."""
-        self.pending, self.active, self.enabled, self.levels, priorities, self.priority_grouping = snapshot
-        self.priorities = list(priorities)
 
     def _active_irqs(self) -> int:
         return self.active >> FIRST_IRQ & _IRQ_MASK

@@ -29,6 +29,7 @@ from bluepill_sim.core.systick import SysTick
 from bluepill_sim.core.unicorn_core import Register
 from bluepill_sim.memory import Memory
 from bluepill_sim.timing import DEBUG_HALTS, Halt, HaltKind
+from simbase.state import Stateful
 
 #: TRM r1p1 5.7 and 5.9: cycles from the boundary to the first instruction of the handler, and back.
 ENTRY_CYCLES, EXIT_CYCLES, TAIL_CHAIN_CYCLES = 12, 12, 6
@@ -65,8 +66,29 @@ class Sleep(Enum):
 FaultListener = Callable[[FaultKind, int, int | None, bool], None]
 
 
-class Processor:
+class Processor(Stateful):
     """One core; `cycle` is its time."""
+
+    STATE = (
+        "engine",
+        "nvic",
+        "systick",
+        "exception_number",
+        "sleep",
+        "event_register",
+        "is_locked_up",
+        "last_sleep_cycle",
+        "vector_table",
+        "scr",
+        "ccr",
+        "shcsr",
+        "cfsr",
+        "hfsr",
+        "bfar",
+        "mmfar",
+    )
+    #: Taken by the chip at once.
+    DERIVED = ("halt",)
 
     #: Whether SysTick's wraps are acted on within `run`; else the caller stops at each.
     ticks_alone = False
@@ -445,32 +467,5 @@ class Processor:
         if self.on_fault is not None:
             self.on_fault(kind, pc, address, is_lockup)
 
-    # Snapshots.
-
-    def snapshot(self) -> tuple[object, ...]:
-        """Return all that decides the core's future, memory left aside."""
-        return (
-            self.engine.snapshot(),
-            self.nvic.snapshot(),
-            self.systick.snapshot(),
-            tuple(getattr(self, name) for name in _STATE),
-            self.sleep.value,
-        )
-
-    def restore(self, snapshot: tuple[object, ...]) -> None:
-        """Put back what `snapshot` returned."""
-        engine, nvic, systick, state, sleep = snapshot
-        self.engine.restore(engine)  # type: ignore[arg-type]  # a snapshot is opaque to its keeper
-        self.nvic.restore(nvic)  # type: ignore[arg-type]  # as above
-        self.systick.restore(systick)  # type: ignore[arg-type]  # as above
-        for name, value in zip(_STATE, state, strict=True):  # type: ignore[call-overload]  # as above
-            setattr(self, name, value)
-        self.sleep = Sleep(sleep)
+    def _restored(self) -> None:
         self.set_ccr(self.ccr)
-
-
-#: Plain attributes of a `Processor` that decide its future.
-_STATE = (
-    "exception_number", "event_register", "is_locked_up", "last_sleep_cycle",
-    "vector_table", "scr", "ccr", "shcsr", "cfsr", "hfsr", "bfar", "mmfar",
-)  # fmt: skip

@@ -17,15 +17,20 @@ Invariant: rows are in the order of time and independent of the caller's slices;
 the same run leaves the same rows, on both executors, recorded or not.
 """
 
+import struct
 from collections import deque
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from typing import Protocol
+
+from simbase.state import Stateful
 
 #: Kinds of rows that are not the number of an entered exception.
 BLOCK, EXCEPTION_RETURN = 0, -1
 
 #: Cycle, address, kind.
 BlockRow = tuple[int, int, int]
+#: A row as bytes (`struct record` of bluepill_sim/native/source/core.h).
+RECORD = struct.Struct("<QIi")
 
 #: How many rows every core keeps (`LAST_ROWS` of bluepill_sim/native/source/core.h).
 LAST_ROWS = 32
@@ -77,8 +82,11 @@ class BlockRecorder:
         return list(self._rows)[-count:] if count > 0 else []
 
 
-class BlockLog:
+class BlockLog(Stateful):
     """Takes the rows of one core."""
+
+    STATE = ("_last",)
+    DERIVED = ("_recorder", "add")
 
     def __init__(self, last: "KeptRows", fail: Callable[[BaseException], None]) -> None:
         """Keep rows.
@@ -123,11 +131,7 @@ class BlockLog:
 
     def rows(self) -> tuple[BlockRow, ...]:
         """Return what ran last, oldest first: at most `LAST_ROWS` rows."""
-        return self._last.rows()
-
-    def put_back(self, rows: Sequence[BlockRow]) -> None:
-        """Have run these last."""
-        self._last.put_back(rows)
+        return tuple(RECORD.iter_unpack(self._last.packed))
 
     def _keep_and_pass_on(self, row: BlockRow) -> None:
         self._last.append(row)
@@ -144,21 +148,19 @@ class KeptRows(Protocol):
         """Add a row; the oldest goes when there are more than `LAST_ROWS`."""
         ...
 
-    def rows(self) -> tuple[BlockRow, ...]:
-        """Return them, oldest first."""
-        ...
-
-    def put_back(self, rows: Sequence[BlockRow]) -> None:
-        """Hold these and no others."""
-        ...
+    #: They as bytes, `RECORD` by `RECORD`, oldest first.
+    packed: bytes
 
     def ends_with_block(self, address: int) -> bool:
         """Tell whether the last row is of the block at an address."""
         ...
 
 
-class LastRows:
+class LastRows(Stateful):
     """`KeptRows` in Python."""
+
+    STATE = ("packed",)
+    DERIVED = ("_rows",)
 
     def __init__(self) -> None:
         self._rows: deque[BlockRow] = deque(maxlen=LAST_ROWS)
@@ -169,14 +171,15 @@ class LastRows:
         """The list's own: it is called for each block."""
         return self._rows.append
 
-    def rows(self) -> tuple[BlockRow, ...]:
+    @property
+    def packed(self) -> bytes:
         """As of `KeptRows`."""
-        return tuple(self._rows)
+        return b"".join([RECORD.pack(*row) for row in self._rows])
 
-    def put_back(self, rows: Sequence[BlockRow]) -> None:
-        """As of `KeptRows`."""
+    @packed.setter
+    def packed(self, packed: bytes) -> None:
         self._rows.clear()
-        self._rows.extend(rows)
+        self._rows.extend(RECORD.iter_unpack(packed))
 
     def ends_with_block(self, address: int) -> bool:
         """As of `KeptRows`."""

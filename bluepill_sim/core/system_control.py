@@ -16,6 +16,7 @@ from bluepill_sim.core.nvic import FIRST_IRQ, MEM_MANAGE, NMI, PENDSV, SYSTICK
 from bluepill_sim.core.processor import Processor
 from bluepill_sim.core.systick import CALIBRATION
 from bluepill_sim.stm32f103 import IRQ_COUNT
+from simbase.state import Stateful
 
 #: The whole region, as the engine maps it.
 PPB_BASE, PPB_BYTES = 0xE000_0000, 0x10_0000
@@ -68,8 +69,12 @@ _Read = Callable[[], int]
 _Write = Callable[[int, int], None]
 
 
-class SystemControl:
+class SystemControl(Stateful):
     """Reads and writes of the private peripheral bus."""
+
+    STATE = ("_demcr", "_dbgmcu_cr", "_counts_cycles", "_cycle_base")
+    #: Tables that are filled in once.
+    DERIVED = ("_readers", "_writers")
 
     def __init__(self, processor: Processor, chip: SystemControlPorts) -> None:
         self._core = core = processor
@@ -165,14 +170,6 @@ class SystemControl:
     def is_open_to_all(self, offset: int) -> bool:
         """Tell whether a thread without privilege may write there: STIR, if CCR.USERSETMPEND is set (ARM B3.2.26)."""
         return PPB_BASE + (offset & ~3) == _STIR and bool(self._core.ccr & _USERSETMPEND)
-
-    def snapshot(self) -> tuple[int, int, bool, int]:
-        """Return the state that is not the processor's."""
-        return self._demcr, self._dbgmcu_cr, self._counts_cycles, self._cycle_base
-
-    def restore(self, snapshot: tuple[int, int, bool, int]) -> None:
-        """Put back what `snapshot` returned."""
-        self._demcr, self._dbgmcu_cr, self._counts_cycles, self._cycle_base = snapshot
 
     # NVIC.
 

@@ -10,6 +10,8 @@ Invariant: the value follows from the (value, cycle) pair of the last change alo
 
 from collections.abc import Callable
 
+from simbase.state import Stateful
+
 ENABLE, TICKINT, CLKSOURCE, COUNTFLAG = 1, 2, 4, 1 << 16
 #: STCALIB of an STM32F103: 9000 ticks of HCLK / 8 at 72 MHz are 1 ms (PM0056 4.5.4).
 CALIBRATION = 0x4000_0000 | 9000
@@ -20,8 +22,10 @@ _CONTROL_BITS = ENABLE | TICKINT | CLKSOURCE
 _REFERENCE_DIVIDER = 8
 
 
-class SysTick:
+class SysTick(Stateful):
     """The system timer; `now` is always a time in core cycles."""
+
+    STATE = ("_control", "_reload", "_count_flag", "_value", "_base", "next_cycle")
 
     def __init__(self, pend: Callable[[], None]) -> None:
         """Make the timer.
@@ -100,14 +104,6 @@ class SysTick:
         self._value, self._base = 0, now
         self._count_flag = False
         self._schedule()
-
-    def snapshot(self) -> tuple[int, int, bool, int, int, int | None]:
-        """Return the state as plain values."""
-        return self._control, self._reload, self._count_flag, self._value, self._base, self.next_cycle
-
-    def restore(self, snapshot: tuple[int, int, bool, int, int, int | None]) -> None:
-        """Put back what `snapshot` returned."""
-        self._control, self._reload, self._count_flag, self._value, self._base, self.next_cycle = snapshot
 
     def _divider(self) -> int:
         return 1 if self._control & CLKSOURCE else _REFERENCE_DIVIDER

@@ -20,14 +20,15 @@ Invariant: whatever the library keeps a pointer to lives as long as its
 """
 
 import ctypes
+import sys
 import weakref
-from array import array
 from collections.abc import Callable
 from dataclasses import dataclass
 from enum import Enum
 from typing import TypeVar, cast
 
 from simbase.errors import MissingDependencyError
+from simbase.state import Stateful
 
 
 class Register(Enum):
@@ -81,8 +82,8 @@ ReadAccess = Callable[[int, int], int]
 WriteAccess = Callable[[int, int, int], None]
 #: Takes (address, size, value) written to read-only memory; False refuses it.
 WriteToReadOnly = Callable[[int, int, int], bool]
-#: (index, word) of each word of the registers that differs from a new core's.
-CoreSnapshot = tuple[tuple[int, int], ...]
+#: All registers: the bits of their memory that differ from a new core's.
+CoreContext = bytes
 
 #: The scratch page. chosen: where an STM32F103C has nothing, outside the regions that never execute.
 SCRATCH_BASE, _SCRATCH_BYTES = 0x9FFF_FC00, 0x400
@@ -113,6 +114,7 @@ _NOWHERE = 0x9FFF_FFFF
 
 #: Size, mode, architecture, level, flag and two pointers come before the registers of a context (uc_priv.h).
 _CONTEXT_HEADER_BYTES = 24 + 2 * ctypes.sizeof(ctypes.c_void_p)
+_WORD = 0xFFFF_FFFF
 #: Registers of the other instruction set (X0 to X30, PC), which Unicorn leaves as it likes.
 _AARCH64_WORDS = range(16, 82)
 #: Syndrome, status, address and level of Unicorn's own last exception, which nothing reads again.
@@ -141,12 +143,16 @@ _Argument = ctypes.c_void_p | ctypes.c_int | ctypes.c_uint32 | ctypes.c_uint64 |
 _Result = TypeVar("_Result")
 
 
-class UnicornCore:
+class UnicornCore(Stateful):
     """A bare Cortex-M3: registers, memory maps, hooks and contexts.
 
     Raises:
         MissingDependencyError: Unicorn is not installed.
     """
+
+    STATE = ("context",)
+    #: What the library has pointers to.
+    DERIVED = ("_keep", "_buffers")
 
     def __init__(self, on_failure: Callable[[BaseException], None]) -> None:
         """Make a core without memory, but for the scratch page.
@@ -163,8 +169,12 @@ class UnicornCore:
         context = ctypes.c_void_p()
         self._check(library.context_alloc(self._handle, ctypes.addressof(context)), "allocate a context")
         self._context = context.value or 0
+        self._context_bytes = library.context_size(self._handle) - _CONTEXT_HEADER_BYTES
         #: The registers of a new core.
-        self._new = self._context_words()
+        self._new = self._read_context()
+        words = self._context_bytes // 4
+        #: The bits that `context` has.
+        self._saved_bits = sum(_WORD << 32 * n for n in range(words) if n not in _UNSAVED_WORDS)
         self._keep: list[object] = []
         #: Apart from the callbacks, which refer back to this object: these must outlive the library's handle.
         self._buffers: list[object] = []
@@ -279,32 +289,27 @@ class UnicornCore:
 
     # Contexts.
 
-    def save(self) -> CoreSnapshot:
-        """Return all registers, hidden ones included: what differs from a new core, as (index, word).
+    @property
+    def context(self) -> CoreContext:
+        """All registers, hidden ones included, for this process or another with the same library.
 
         What the library calls a context holds pointers too, which must not go to
         another machine: they never change, and so are never among the differences.
         """
-        words = self._context_words()
-        return tuple(
-            (n, word)
-            for n, (word, new) in enumerate(zip(words, self._new, strict=True))
-            if word != new and n not in _UNSAVED_WORDS
-        )
+        changed = (self._read_context() ^ self._new) & self._saved_bits
+        return changed.to_bytes(self._context_bytes, sys.byteorder)
 
-    def load(self, snapshot: CoreSnapshot) -> None:
-        """Put back what `save` returned, in this process or another with the same library."""
-        words = self._new[:]
-        for index, word in snapshot:
-            words[index] = word
-        data = words.tobytes()
+    @context.setter
+    def context(self, context: CoreContext) -> None:
+        words = int.from_bytes(context, sys.byteorder) ^ self._new
+        data = words.to_bytes(self._context_bytes, sys.byteorder)
         ctypes.memmove(self._context + _CONTEXT_HEADER_BYTES, data, len(data))
         self._check(self._library.context_restore(self._handle, self._context), "restore")
 
-    def _context_words(self) -> "array[int]":
+    def _read_context(self) -> int:
         self._check(self._library.context_save(self._handle, self._context), "save")
-        size = self._library.context_size(self._handle) - _CONTEXT_HEADER_BYTES
-        return array("I", ctypes.string_at(self._context + _CONTEXT_HEADER_BYTES, size))
+        at = self._context + _CONTEXT_HEADER_BYTES
+        return int.from_bytes(ctypes.string_at(at, self._context_bytes), sys.byteorder)
 
     # Internals.
 

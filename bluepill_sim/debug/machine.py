@@ -13,6 +13,7 @@ from typing import Protocol
 
 from bluepill_sim.board import BluePill
 from bluepill_sim.timing import ChipReached
+from simbase.state import Stateful
 from simbase.timing import Nanos
 
 
@@ -84,8 +85,10 @@ class Machine(Protocol):
         ...
 
 
-class LoneChip:
+class LoneChip(Stateful):
     """A board by itself."""
+
+    STATE = ("board",)
 
     end_ns: Nanos | None = None
     can_rewind = True
@@ -96,14 +99,6 @@ class LoneChip:
     def advance_to(self, limit_ns: Nanos, *, by_step: bool = False) -> ChipReached:
         """Bring the board to a time, or one instruction on."""
         return self.board.chip.step(limit_ns) if by_step else self.board.advance_to(limit_ns)
-
-    def snapshot(self) -> object:
-        """Return all that decides the board's future."""
-        return self.board.snapshot()
-
-    def restore(self, snapshot: object) -> None:
-        """Put back what `snapshot` returned."""
-        self.board.restore(snapshot)
 
     def halted(self) -> None:
         """Nothing else is connected."""

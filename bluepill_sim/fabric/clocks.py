@@ -8,6 +8,8 @@ Invariant: every frequency is a whole number of hertz, and `hclk_hz` > 0.
 
 from dataclasses import dataclass
 
+from simbase.state import Stateful
+
 #: Highest SYSCLK/HCLK/PCLK2, in Hz (DS5319 table 9).
 MAX_SYSCLK_HZ = 72_000_000
 #: Highest PCLK1, in Hz (DS5319 table 9).
@@ -19,7 +21,7 @@ MAX_SYSCLK_BY_WAIT_STATES = (24_000_000, 48_000_000, 72_000_000)
 
 
 @dataclass(slots=True)
-class Clocks:
+class Clocks(Stateful):
     """The clock tree's outputs, kept up to date by RCC and FLASH."""
 
     sysclk_hz: int = HSI_HZ
@@ -33,32 +35,6 @@ class Clocks:
     flash_wait_states: int = 0
     #: FLASH_ACR PRFTBE.
     flash_prefetch: bool = True
-
-    def snapshot(self) -> tuple[int, int, int, int, int, int, int, bool]:
-        """Return the values in the order of the fields."""
-        return (
-            self.sysclk_hz,
-            self.hclk_hz,
-            self.pclk1_hz,
-            self.pclk2_hz,
-            self.timer1_hz,
-            self.timer2_hz,
-            self.flash_wait_states,
-            self.flash_prefetch,
-        )
-
-    def restore(self, snapshot: tuple[int, int, int, int, int, int, int, bool]) -> None:
-        """Put back what `snapshot` returned."""
-        (
-            self.sysclk_hz,
-            self.hclk_hz,
-            self.pclk1_hz,
-            self.pclk2_hz,
-            self.timer1_hz,
-            self.timer2_hz,
-            self.flash_wait_states,
-            self.flash_prefetch,
-        ) = snapshot
 
 
 def illegal_settings(clocks: Clocks) -> list[tuple[str, str]]:

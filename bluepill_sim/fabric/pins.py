@@ -16,7 +16,10 @@ change of `output` is notified to `PinBank.on_output` once, with its exact time.
 
 from collections.abc import Callable, Iterator, Sequence
 from enum import Enum
-from typing import Protocol, Self, TypeAlias
+from typing import Protocol, Self
+
+from simbase.state import Stateful
+from simbase.wire import are_fighting, level_of
 
 
 class PinDrive(Enum):
@@ -72,18 +75,11 @@ class PinMode(Enum):
 
 ALTERNATE_MODES = (PinMode.ALTERNATE_PUSH_PULL, PinMode.ALTERNATE_OPEN_DRAIN)
 INPUT_MODES = (PinMode.FLOATING, PinMode.PULLED)
-DRIVES_BY_VALUE = {drive.value: drive for drive in PinDrive}
-MODES_BY_VALUE = {mode.value: mode for mode in PinMode}
 
 #: What a wire can be shorted to, and the level that it then has.
 RAILS = {"GND": False, "3V3": True}
 #: An input that is not 5 V-tolerant bears VDD + 0.3 V (DS5319 table 6); chosen: what counts as more than that.
 MAX_VOLTS = 3.65
-
-#: Level of the outside driver, mode, ODR bit, holder (owner, drive), connections, watched, output, level, rail.
-PinSnapshot: TypeAlias = tuple[
-    bool | None, str, bool, tuple[str, str] | None, tuple[tuple[str, bool], ...], bool, str, bool, str | None
-]
 
 
 class PinPorts(Protocol):
@@ -103,8 +99,11 @@ class PinPorts(Protocol):
         ...
 
 
-class Pin:
+class Pin(Stateful):
     """One pin of one port, seen from outside (`drive`, `level`, `output`, `watch`) and from inside."""
+
+    STATE = ("_outside", "_mode", "_output_bit", "_holder", "_sources", "is_watched", "output", "level", "_rail")
+    DERIVED = ("_drives", "_reads", "input")
 
     def __init__(
         self, bank: "PinBank", port: str, number: int, *, is_bonded: bool, is_five_volt_tolerant: bool = False
@@ -134,7 +133,8 @@ class Pin:
         self._mode = PinMode.FLOATING
         self._output_bit = False
         self._holder: tuple[str, PinDrive] | None = None
-        self._sources: dict[str, bool] = {}
+        #: The alternate functions that are offered, with their levels.
+        self._sources: frozenset[tuple[str, bool]] = frozenset()
         # What follows from the mode, the holder and the sources, kept at hand because pins change often:
         # the drive for an ODR bit of 0 and of 1, and whether the digital input reads the wire.
         self._drives = PinMode.FLOATING.drives
@@ -201,13 +201,13 @@ class Pin:
     def is_contended(self) -> bool:
         """Whether chip and outside world drive the wire to different levels."""
         outside = self._outside if self._rail is None else RAILS[self._rail]
-        return self.output.is_strong and outside is not None and self.output.level is not outside
+        return self.output.is_strong and outside is not None and are_fighting((outside, self.output.level))
 
     @property
     def function(self) -> str | None:
         """The alternate function that the wire shows, such as "USART1_TX"; None for none."""
-        source = min(self._sources, default=None)
-        return source if source is not None and self.carries(source) else None
+        source, _ = min(self._sources, default=("", False))
+        return source if self.carries(source) else None
 
     # From inside the chip.
 
@@ -244,13 +244,18 @@ class Pin:
 
     def connect(self, source: str, level: bool) -> None:
         """Offer `level` as the alternate function `source`; the latest call of each source counts."""
-        self._sources[source] = level
+        self._sources = frozenset({*self._others(source), (source, level)})
         self._update()
 
     def disconnect(self, source: str) -> None:
         """Take the alternate function `source` off the pin."""
-        if self._sources.pop(source, None) is not None:
+        others = self._others(source)
+        if others != self._sources:
+            self._sources = others
             self._update()
+
+    def _others(self, source: str) -> frozenset[tuple[str, bool]]:
+        return frozenset(pair for pair in self._sources if pair[0] != source)
 
     def carries(self, source: str) -> bool:
         """Whether the wire shows the alternate function `source`."""
@@ -258,7 +263,8 @@ class Pin:
             self._mode in ALTERNATE_MODES
             and self._holder is None
             and self.is_bonded
-            and min(self._sources, default=None) == source
+            and bool(self._sources)
+            and min(self._sources)[0] == source
         )
 
     def is_listening(self) -> bool:
@@ -278,29 +284,7 @@ class Pin:
             and not bank.edge_lines >> self.number & 1
         )
 
-    def snapshot(self) -> PinSnapshot:
-        """Return all that decides this pin's future, as plain values."""
-        holder = None if self._holder is None else (self._holder[0], self._holder[1].value)
-        return (
-            self._outside,
-            self._mode.value,
-            self._output_bit,
-            holder,
-            tuple(self._sources.items()),
-            self.is_watched,
-            self.output.value,
-            self.level,
-            self._rail,
-        )
-
-    def restore(self, snapshot: PinSnapshot) -> None:
-        """Put back what `snapshot` returned; no listener is called."""
-        self._outside, mode, self._output_bit, holder, sources, self.is_watched, output, self.level, rail = snapshot
-        self._rail = rail
-        self._mode = MODES_BY_VALUE[mode]
-        self._holder = None if holder is None else (holder[0], DRIVES_BY_VALUE[holder[1]])
-        self._sources = dict(sources)
-        self.output = DRIVES_BY_VALUE[output]
+    def _restored(self) -> None:
         self._derive()
         self.input = self.level and self._reads
 
@@ -316,7 +300,7 @@ class Pin:
             self._drives = mode.drives
         elif self._sources:
             # Two functions on one pin are unspecified; chosen: the first by name drives.
-            self._drives = (mode.drives[self._sources[min(self._sources)]],) * 2
+            self._drives = (mode.drives[min(self._sources)[1]],) * 2
         else:
             # "Not specified" (RM0008 9.1.9); chosen: nothing drives.
             self._drives = (PinDrive.NONE,) * 2
@@ -344,9 +328,9 @@ class Pin:
             # A weak pull of the chip is stronger than the board's (40 kΩ against an LED or 100 kΩ).
             level = bool(self.board_pull.level if output.level is None else output.level)
         elif output.is_strong:
-            # Chosen: of two strong drivers that differ the low one wins.
-            level = outside and bool(output.level)
-            if level is not outside or level is not output.level:
+            drivers = outside, bool(output.level)
+            level = bool(level_of(drivers))
+            if are_fighting(drivers):
                 self._bank.warn(contention(self), once=f"{self.name}:contention")
         else:
             level = outside
@@ -360,8 +344,11 @@ class Pin:
             self._bank.wire_changed(self)
 
 
-class PinBank:
+class PinBank(Stateful):
     """All pins of the chip, and the switches between them and its peripherals."""
+
+    STATE = ("_by_name", "remaps", "exti_ports", "edge_lines")
+    DERIVED = ("simple_is_known",)
 
     PORTS = "ABCDE"
 
@@ -448,18 +435,6 @@ class PinBank:
     def _make(self, port: str, number: int, bonded: frozenset[str], tolerant: frozenset[str]) -> Pin:
         name = f"P{port}{number}"
         return Pin(self, port, number, is_bonded=name in bonded, is_five_volt_tolerant=name in tolerant)
-
-    def snapshot(self) -> tuple[tuple[PinSnapshot, ...], tuple[tuple[str, int], ...], tuple[str, ...]]:
-        """Return all that decides the pins' future, as plain values."""
-        return tuple(p.snapshot() for p in self), tuple(self.remaps.items()), tuple(self.exti_ports)
-
-    def restore(self, snapshot: tuple[tuple[PinSnapshot, ...], tuple[tuple[str, int], ...], tuple[str, ...]]) -> None:
-        """Put back what `snapshot` returned; no listener is called."""
-        pins, remaps, exti_ports = snapshot
-        for pin, state in zip(self, pins, strict=True):
-            pin.restore(state)
-        self.remaps = dict(remaps)
-        self.exti_ports[:] = exti_ports
 
 
 def overvoltage(pin: "Pin", volts: float) -> str | None:

@@ -22,9 +22,10 @@ Invariant: a stored word never holds a bit outside `readable`, so that
 from array import array
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import ClassVar, TypeAlias, cast
+from typing import ClassVar, cast
 
 from bluepill_sim.fabric.ports import ChipPorts
+from simbase.state import Stateful
 
 #: Every bit of a 32-bit register.
 WORD = 0xFFFF_FFFF
@@ -128,16 +129,12 @@ class Place:
     size: int = 0x400
 
 
-#: A peripheral's registers and its `STATE` attributes, in declared order.
-PeripheralSnapshot: TypeAlias = tuple[tuple[int, ...], tuple[object, ...]]
-
-
-class Peripheral:
+class Peripheral(Stateful):
     """A block of registers at an address of the chip."""
 
+    STATE: ClassVar[tuple[str, ...]] = ("words", "due_ns")
+
     REGISTERS: ClassVar[tuple[Register, ...]] = ()
-    #: Names of the attributes beyond the registers that decide the future: plain, immutable values.
-    STATE: ClassVar[tuple[str, ...]] = ()
     #: Whether narrow writes touch only their bytes (AHB) or are duplicated over the word (APB).
     HAS_BYTE_LANES: ClassVar[bool] = False
 
@@ -245,18 +242,6 @@ class Peripheral:
 
     def clock_changed(self) -> None:
         """Act on a change of the frequencies in `chip.clocks`, which has just happened."""
-
-    def snapshot(self) -> PeripheralSnapshot:
-        """Return all that decides this peripheral's future, as plain values."""
-        return tuple(self.words), (self.due_ns, *(getattr(self, name) for name in self.STATE))
-
-    def restore(self, snapshot: PeripheralSnapshot) -> None:
-        """Put back what `snapshot` returned; no listener is called."""
-        words, (due_ns, *state) = snapshot
-        self.words[:] = array("I", words)
-        self.due_ns = cast("int | None", due_ns)
-        for name, value in zip(self.STATE, state, strict=True):
-            setattr(self, name, value)
 
     def _narrow(self, register: Register, offset: int, size: int, value: int) -> int:
         """Return the word that the peripheral sees when the CPU writes 1 or 2 bytes."""

@@ -19,8 +19,8 @@ from collections.abc import Callable
 
 from bluepill_sim.core.accesses import Access, accesses_of, is_ambiguous, only_reads
 from bluepill_sim.core.block_cost import NO_BLOCK, Block
-from bluepill_sim.core.engine import Engine, EngineSnapshot, StopBefore, Traps
-from bluepill_sim.core.recorder import BlockRecorder, KeptRows
+from bluepill_sim.core.engine import Engine, StopBefore, Traps
+from bluepill_sim.core.recorder import RECORD, BlockRecorder, KeptRows
 from bluepill_sim.core.thumb import Kind
 from bluepill_sim.core.unicorn_core import (
     GENERAL,
@@ -51,7 +51,6 @@ from bluepill_sim.native.state import (
     FROZEN,
     HALT_KINDS,
     HALT_NUMBERS,
-    RECORD,
     STALE,
     UNEXPLAINED,
     InstructionRow,
@@ -78,6 +77,13 @@ class NativeEngine(Engine):
     Raises:
         MissingDependencyError: Unicorn or the native core is not installed.
     """
+
+    DERIVED = (
+        # Shared with C, which has all of the state but what `Engine` declares.
+        "shared", "_state", "_calls", "_kept", "_regions", "_code", "before_run", "before_access",
+        # Hooks, and what is known of the program.
+        "_native_hooks", "_pc_hooks", "_known", "_noted", "_held",
+    )  # fmt: skip
 
     cycle = field("cycle", "As of `Engine`.")
     stop_at = field("stop_at", "As of `Engine`.")
@@ -293,9 +299,8 @@ class NativeEngine(Engine):
         if not library().core_start_recording(self._state, 0 if recorder is None else _RECORD_ROOM):
             raise MemoryError("no memory for a record of blocks")
 
-    def restore(self, snapshot: EngineSnapshot) -> None:
-        """As of `Engine`."""
-        super().restore(snapshot)
+    def _restored(self) -> None:
+        super()._restored()
         self.shared.uses_exclusive = self._blocks.uses_exclusive
 
     def stop_before(self, kind: HaltKind, pc: int, address: int | None = None) -> None:

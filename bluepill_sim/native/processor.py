@@ -6,7 +6,7 @@ whatever C leaves to Python is done by the methods inherited.
 Invariant: there is one copy of the state, in `shared`.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from typing import Any
 
 from bluepill_sim.core import Engine
@@ -64,7 +64,7 @@ class NativeNvic(Nvic):
 
     def __init__(self, shared: Shared) -> None:
         self.shared = shared
-        super().__init__()
+        super().__init__(shared.priorities)
 
     def set_level(self, irq: int, level: bool) -> None:
         """As of `Nvic`; called for each character of a USART, so it goes to the fields themselves."""
@@ -79,15 +79,6 @@ class NativeNvic(Nvic):
                 shared.pending_low |= 1 << number
             else:
                 shared.pending_high |= 1 << number - _HALF
-
-    @property  # type: ignore[override]  # the list is an array of bytes here
-    def priorities(self) -> Sequence[int]:
-        """As of `Nvic`."""
-        return self.shared.priorities  # type: ignore[no-any-return]  # an array of bytes
-
-    @priorities.setter
-    def priorities(self, values: Sequence[int]) -> None:
-        self.shared.priorities[:] = list(values)
 
 
 class NativeSysTick(SysTick):

@@ -5,12 +5,11 @@ field; `native/library.py` refuses a library that has another size of it.
 """
 
 import ctypes
-import struct
-from collections.abc import Sequence
 from typing import Any
 
-from bluepill_sim.core.recorder import BLOCK, LAST_ROWS, BlockRow
+from bluepill_sim.core.recorder import BLOCK, LAST_ROWS, RECORD, BlockRow
 from bluepill_sim.timing import HaltKind
+from simbase.state import Stateful
 
 #: What stands for "never" and for "none" among times.
 NO_TIME = (1 << 64) - 1
@@ -37,9 +36,6 @@ HALT_NUMBERS = {kind: number for number, kind in enumerate(HALT_KINDS)}
 #: The kinds that follow them, for Python alone.
 BOUNDARY = 0
 DELIVER, FAILED, STALE, FROZEN, UNEXPLAINED = range(len(HALT_KINDS), len(HALT_KINDS) + 5)
-
-#: `struct record`, for many at a time.
-RECORD = struct.Struct("<QIi")
 
 _U8, _U32, _U64 = ctypes.c_uint8, ctypes.c_uint32, ctypes.c_uint64
 
@@ -164,8 +160,10 @@ def time(name: str, doc: str) -> Any:
     return property(read, write, doc=doc)
 
 
-class NativeLastRows:
+class NativeLastRows(Stateful):
     """`KeptRows` in the shared struct."""
+
+    STATE = ("packed",)
 
     is_first = flag("is_first", "As of `KeptRows`.")
 
@@ -178,19 +176,17 @@ class NativeLastRows:
         shared.last[shared.logged % LAST_ROWS] = row
         shared.logged += 1
 
-    def rows(self) -> tuple[BlockRow, ...]:
+    @property
+    def packed(self) -> bytes:
         """As of `KeptRows`."""
-        shared = self.shared
-        count = min(shared.logged, LAST_ROWS)
-        rows = tuple(RECORD.iter_unpack(bytes(shared.last)))
-        first = shared.logged % LAST_ROWS
-        return (rows[first:] + rows[:first])[-count:] if count else ()
+        logged, rows = self.shared.logged, bytes(self.shared.last)
+        first = logged % LAST_ROWS * RECORD.size
+        return rows[:first] if logged < LAST_ROWS else rows[first:] + rows[:first]
 
-    def put_back(self, rows: Sequence[BlockRow]) -> None:
-        """As of `KeptRows`."""
-        self.shared.logged = 0
-        for row in rows:
-            self.append(row)
+    @packed.setter
+    def packed(self, packed: bytes) -> None:
+        ctypes.memmove(self.shared.last, packed, len(packed))
+        self.shared.logged = len(packed) // RECORD.size
 
     def ends_with_block(self, address: int) -> bool:
         """As of `KeptRows`."""

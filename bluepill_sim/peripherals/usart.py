@@ -26,6 +26,7 @@ from collections import Counter
 from collections.abc import Callable
 
 from bluepill_sim.fabric.line_speed import TOLERANCE_PERCENT, Heard, heard, is_usual, nearest_usual
+from bluepill_sim.fabric.pins import Pin
 from bluepill_sim.fabric.ports import ChipPorts
 from bluepill_sim.fabric.registers import Peripheral, Place, Register, bits
 
@@ -80,7 +81,9 @@ class Usart(Peripheral):
         "_clock_hz",
         "_is_enabled_before",
         "_rate_pc",
+        "sent_at",
     )
+    DERIVED = ("_tx_pin", "_rx_pin")
     REGISTERS = (
         Register(
             name="SR",
@@ -135,7 +138,7 @@ class Usart(Peripheral):
         self.sent_at: Counter[tuple[int, int]] = Counter()
         self._source = f"{place.name}_TX"
         self._pins = PINS[place.name]
-        self._tx_pin, self._rx_pin = (chip.pins[name] for name in self._pins[0])
+        self._tx_pin, self._rx_pin = self._routed_pins()
         self._clear()
         chip.pins.route_listeners.append(self._route_changed)
 
@@ -470,13 +473,19 @@ class Usart(Peripheral):
 
     def _route_changed(self) -> None:
         """Move to the pins that AFIO now gives."""
-        names = self._pins.get(self.chip.pins.remaps.get(self.name, 0), self._pins[0])
-        tx_pin, self._rx_pin = (self.chip.pins[name] for name in names)
+        tx_pin, self._rx_pin = self._routed_pins()
         if tx_pin is not self._tx_pin:
             self._tx_pin.disconnect(self._source)
             self._tx_pin = tx_pin
             if self._is_transmitting():
                 tx_pin.connect(self._source, level=True)
+
+    def _restored(self) -> None:
+        self._tx_pin, self._rx_pin = self._routed_pins()
+
+    def _routed_pins(self) -> tuple[Pin, Pin]:
+        tx, rx = self._pins.get(self.chip.pins.remaps.get(self.name, 0), self._pins[0])
+        return self.chip.pins[tx], self.chip.pins[rx]
 
     def _update_irq(self) -> None:
         status, control = self.words[SR], self.words[CR1]

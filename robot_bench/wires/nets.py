@@ -20,6 +20,7 @@ from typing import cast
 
 from p2os.errors import LocalProtocolError
 from simbase.timing import Nanos
+from simbase.wire import are_fighting, level_of
 
 
 class Strength(Enum):
@@ -192,7 +193,7 @@ class Net:
     def _fight(self, at: Nanos) -> tuple[str, ...]:
         """Return who drives hard against whom at the instant `at`; empty in peace."""
         hard = {name: _at(history, at) for name, history in self._drives.items() if _is_hard(_at(history, at))}
-        return tuple(sorted(hard)) if len({drive.level for drive in hard.values()}) > 1 else ()
+        return tuple(sorted(hard)) if are_fighting([drive.level for drive in hard.values()]) else ()
 
 
 class Harness:
@@ -252,13 +253,8 @@ def _is_hard(drive: Drive) -> bool:
 
 
 def _resolved(drives: list[Drive]) -> bool | None:
-    """Return the level that drives make together; None where nobody holds the wire.
-
-    Hard low wins over hard high, and a pull down over a pull up: a wire that is
-    fought over is read as low, repeatably. The real one is anything between.
-    """
-    hard = [drive.level for drive in drives if _is_hard(drive)]
-    if hard:
-        return all(hard)
-    pulls = [drive.level for drive in drives if drive.strength is Strength.PULL]
-    return all(pulls) if pulls else None
+    """Return the level that drives make together; None where nobody holds the wire."""
+    return level_of(
+        [drive.level for drive in drives if _is_hard(drive)],
+        [drive.level for drive in drives if drive.strength is Strength.PULL],
+    )

@@ -8,6 +8,7 @@ import pickle
 import pkgutil
 import random
 import textwrap
+from array import array
 from collections import Counter, deque
 from collections.abc import Iterator
 from dataclasses import dataclass, field
@@ -60,7 +61,7 @@ class Child(Stateful):
 
 class Part(Stateful):
     STATE = ("number", "wheel", "limits", "queue", "table", "child", "children", "colour", "named", "levels", "memory",
-             "source", "counts", "raw", "pairs")  # fmt: skip
+             "source", "counts", "raw", "pairs", "words", "rows")  # fmt: skip
     DERIVED = ("twice",)
 
     def __init__(self) -> None:
@@ -77,6 +78,8 @@ class Part(Stateful):
         self.counts: Counter[str] = Counter(a=0, b=2)
         self.raw = bytearray(b"abc")
         self.pairs = (Child(5), None, Wheel(6))
+        self.words = array("I", [1, 2])
+        self.rows: tuple[tuple[int, ...], ...] = ((1, 2),)
         self.twice = 0
         self.settings = print
 
@@ -98,6 +101,8 @@ def changed(part: Part) -> None:
     part.source.random()
     part.counts["c"] += 1
     part.raw += b"d"
+    part.words[1] = 7
+    part.rows = ((3,), ())
     part.pairs[0].count, part.pairs[2].speed = 8, 9  # type: ignore[union-attr]
 
 
@@ -111,6 +116,7 @@ def test_what_was_changed_is_put_back_and_gives_the_same_snapshot() -> None:
     assert part.snapshot() == before
     assert (part.number, part.wheel, list(part.queue), part.queue.maxlen) == (None, Wheel(), [1], 4)
     assert (part.counts, type(part.counts), bytes(part.memory)) == (Counter(a=0, b=2), Counter, b"\x01\x02\x03\x04")
+    assert (part.words, part.rows) == (array("I", [1, 2]), ((1, 2),))
     assert part.source.random() == drawn
 
 
@@ -125,12 +131,14 @@ def test_a_snapshot_goes_through_a_pickle_into_a_part_built_alike() -> None:
 def test_whoever_refers_to_what_a_part_holds_sees_it_restored() -> None:
     part = Part()
     held = [part.wheel, part.wheel.marks, part.queue, part.table, part.child, part.children, part.children["left"],
-            part.levels, part.memory, part.source, part.raw, part.pairs, part.pairs[0], part.pairs[2]]  # fmt: skip
+            part.levels, part.memory, part.source, part.raw, part.words, part.pairs,
+            part.pairs[0], part.pairs[2]]  # fmt: skip
     before = part.snapshot()
     changed(part)
     part.restore(before)
     now = [part.wheel, part.wheel.marks, part.queue, part.table, part.child, part.children, part.children["left"],
-           part.levels, part.memory, part.source, part.raw, part.pairs, part.pairs[0], part.pairs[2]]  # fmt: skip
+           part.levels, part.memory, part.source, part.raw, part.words, part.pairs,
+            part.pairs[0], part.pairs[2]]  # fmt: skip
     assert all(one is other for one, other in zip(held, now, strict=True))
 
 

@@ -121,7 +121,7 @@ def test_a_snapshot_keeps_an_exclusive_reservation(boot) -> None:
 
 
 def test_something_else_is_no_snapshot(boot) -> None:
-    with pytest.raises(TypeError, match="not a BluePill's snapshot: int"):
+    with pytest.raises(TypeError, match="not a snapshot of BluePill"):
         boot("nop").board.restore(5)
 
 

@@ -125,6 +125,6 @@ def test_random_programs_are_the_same_on_both_cores(seed: int, monkeypatch: pyte
         drain(recorder)
         assert board.chip.engine.log.rows() == tuple(rows[-LAST_ROWS:])
         assert sum(row[2] == 15 for row in rows) > 20
-        return rows, board.cycle, board.pc, board.fault, board.snapshot().chip
+        return rows, board.cycle, board.pc, board.fault, board.snapshot()["chip"]
 
     assert story("native") == story("python")

@@ -210,3 +210,10 @@ def test_memory_reads_what_was_written_and_nothing_beyond() -> None:
     assert memory.read(0x2000_4FFC, 5) is None
     assert memory.read_word(0x0801_FFFC) == 0xFFFF_FFFF
     assert memory.read_word(0x0802_0000) is None
+
+
+def test_a_fork_of_a_run_that_failed_in_an_exception_return_makes_that_return(boot) -> None:
+    one, other = boot("nop").board.chip.engine, boot("nop").board.chip.engine
+    one.has_branched_to_return = True
+    other.restore(one.snapshot())
+    assert other.has_branched_to_return

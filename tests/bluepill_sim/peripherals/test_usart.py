@@ -196,6 +196,23 @@ def test_remapped_usart1_uses_pb6_and_pb7(fake_chip: Any) -> None:
     assert [word for word, _ in sent] == [9]
 
 
+def test_a_restored_usart_sends_on_the_pins_that_it_was_remapped_to(
+    fake_chip: Any, make_fake_chip: Callable[[], Any]
+) -> None:
+    set_up(fake_chip)
+    fake_chip.write("AFIO.MAPR", 1 << 2)
+    fake_chip.write("GPIOB.CRL", 0x4B44_4444)
+    other = make_fake_chip()
+    other.clocks.restore(fake_chip.clocks.snapshot())
+    other.pins.restore(fake_chip.pins.snapshot())
+    other.parts.restore(fake_chip.parts.snapshot())
+    sent: list[int] = []
+    other.parts.usart(1).on_transmit = lambda word, _at_ns: sent.append(word)
+    other.write("USART1.DR", 9)
+    other.advance(10**6)
+    assert sent == [9]
+
+
 def test_a_remap_before_the_start_connects_later(fake_chip: Any) -> None:
     fake_chip.write("AFIO.MAPR", 1 << 2)
     fake_chip.write("GPIOB.CRL", 0x4B44_4444)
