@@ -11,7 +11,8 @@ What an attribute may hold:
 - numbers, texts, bytes, None, enums and frozen dataclasses, which are kept as they are;
 - lists, tuples, deques, dicts, sets and byte arrays of what may be held;
 - dataclasses, which are copied field by field;
-- other parts, alone or in a list, tuple or dict: they are restored in place, never replaced;
+- other parts, alone or in a list, tuple or dict: they are restored in place, never replaced. Whatever has
+  `snapshot` and `restore` is a part, such as a twin in another language that keeps its state itself;
 - ctypes arrays and random generators, by their contents.
 
 Containers and dataclasses that a part holds are filled anew in place, so that whoever
@@ -79,6 +80,11 @@ class Stateful:
         """Work out again what follows from the state."""
 
 
+def _is_part(value: object) -> bool:
+    """Tell whether an object saves and restores itself."""
+    return hasattr(type(value), "snapshot") and hasattr(type(value), "restore")
+
+
 @cache
 def _fields(part: Any) -> tuple[str, ...]:
     return tuple(field.name for field in dataclasses.fields(part))
@@ -102,10 +108,10 @@ class PartState(dict[str, object]):
 
 def _saved(value: Any, path: str) -> object:
     """Return a value that shares nothing with `value`; a part gives its snapshot."""
-    if isinstance(value, Stateful):
-        return value.snapshot()
     if isinstance(value, _LEAVES):
         return value
+    if _is_part(value):
+        return value.snapshot()
     return _rebuilt(value, path, _saved)
 
 
@@ -134,6 +140,9 @@ def _rebuilt(value: Any, path: str, inner: _Inner) -> object:
 
 def _put_back(current: Any, saved: Any, path: str) -> object:
     """Return what stands here from now on: `current`, filled anew, wherever it can be."""
+    if _is_part(current):
+        current.restore(saved)
+        return current
     for kind, refill in _IN_PLACE:
         if isinstance(current, kind):
             refill(current, saved)
@@ -177,7 +186,7 @@ def _fill_set(current: Any, saved: Any, path: str) -> object:  # noqa: ARG001  #
 
 
 def _refuse_left_over(items: Iterable[object], path: str) -> None:
-    if any(isinstance(item, Stateful) for item in items):
+    if any(map(_is_part, items)):
         raise TypeError(f"{path} holds more parts than were saved")
 
 
@@ -209,7 +218,6 @@ _REBUILD: tuple[tuple[type, Callable[[Any, Callable[[Any], object]], object]], .
 
 #: What is always restored in place, from a snapshot of another kind than itself.
 _IN_PLACE: tuple[tuple[type, Callable[[Any, Any], object]], ...] = (
-    (Stateful, lambda part, saved: part.restore(saved)),
     (ctypes.Array, lambda array, saved: ctypes.memmove(array, saved, len(saved))),
     (random.Random, lambda source, saved: source.setstate(saved)),
 )
