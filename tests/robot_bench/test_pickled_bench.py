@@ -20,8 +20,8 @@ from simbase.errors import FileError, UsageError
 from tests.robot_bench.wires.fake_chip import FakeChip
 
 S = 10**9
-#: Half a character of USART1, which sends at 115200 bit/s.
-HALF_A_CHARACTER_NS = 43_000
+#: So long before a line of the trace its bytes are under way: half a character of 115200 bit/s, one of 9600 bit/s.
+UNDER_WAY_NS = {"usart": 43_000, "wire": 1_000_000}
 WAYS = [("direct", "model"), ("adapter", "model"), *([("adapter", "firmware")] if is_available() else [])]
 BODIES = ["kinematic", pytest.param("bullet", marks=pytest.mark.bullet)]
 
@@ -60,11 +60,12 @@ def in_another_process(data: bytes, folder: Path) -> Any:
 
 
 def cut_runs(of: Scenario, *cuts_ns: int) -> list[tuple[Bench, tuple[str, str]]]:
-    """Return what stands at each cut, and in the middle of the first line's last character, with the unbroken run."""
+    """Return what stands at each cut, and with bytes under way on each line, beside what the unbroken run gave."""
     whole = finished(Bench(of))
-    printed_ns = next(row["t"] for row in map(json.loads, whole[0].splitlines()) if row["k"] == "usart")
+    last = {row["k"]: row["t"] for row in map(json.loads, whole[0].splitlines())}
+    under_way = {last[kind] - before_ns for kind, before_ns in UNDER_WAY_NS.items() if kind in last}
     bench, cut = Bench(of), []
-    for cut_ns in sorted({printed_ns - HALF_A_CHARACTER_NS, *cuts_ns}):
+    for cut_ns in sorted(under_way | set(cuts_ns)):
         bench.run_until(cut_ns)
         cut.append((loaded(pickle.dumps(bench)), whole))
     assert finished(bench) == whole, "pickling changes nothing"
@@ -113,6 +114,7 @@ def test_the_trace_file_goes_on_where_it_stood_wherever_the_process_is(
     bench.trace.meta({"scenario": "dodge"})
     bench.run_until(S)
     data = pickle.dumps([bench])
+    assert Path("trace.jsonl").stat().st_size == bench.trace.written, "all of it is in the file by then"
     text, digest = finished(bench)
     for _ in range(2):
         assert in_another_process(data, elsewhere) == [(text, digest)]
