@@ -10,9 +10,12 @@ they are.
 """
 
 import ctypes
+import hashlib
 from collections.abc import Callable
+from dataclasses import dataclass
 from functools import cache
 from importlib.util import find_spec
+from pathlib import Path
 from typing import Any, TypeAlias, cast
 
 from adapter_sim.adapter import Adapter, AdapterState, AdapterStatus
@@ -32,6 +35,8 @@ from simbase.timing import NS_PER_S, Nanos, Reached
 #: Of adapter_capi.h.
 VERSION = 1
 _MAX_FRAME_BYTES = 9
+#: What helps when a state cannot be taken up.
+RUN_ANEW = "run the scenario anew, and save it again"
 
 _Read = ctypes.CFUNCTYPE(ctypes.c_uint32, ctypes.c_void_p, ctypes.c_int64)
 _Drive = ctypes.CFUNCTYPE(None, ctypes.c_void_p, ctypes.c_uint32, ctypes.c_uint32, ctypes.c_int64)
@@ -84,6 +89,15 @@ _TYPES: dict[str, Any] = {
 def is_available() -> bool:
     """Tell whether the firmware's library was built with this package."""
     return find_spec("robot_bench._adapter_firmware") is not None
+
+
+@dataclass(frozen=True, slots=True)
+class FirmwareState:
+    """What a firmware adapter saves; only the same build can read it back."""
+
+    #: SHA-256 of the library.
+    build: str
+    data: bytes
 
 
 class FirmwareAdapter:
@@ -218,15 +232,24 @@ class FirmwareAdapter:
         self._raise_failure()
         return Reached(limit)
 
-    def snapshot(self) -> bytes:
-        """Return all that decides the future; only the same build of the firmware can read it back."""
+    def snapshot(self) -> FirmwareState:
+        """Return all that decides the future: one value, laid out by the firmware itself."""
         state = ctypes.create_string_buffer(self._library.adapter_state_size())
         self._library.adapter_save(self._handle, state)
-        return state.raw
+        return FirmwareState(_build(), state.raw)
 
     def restore(self, snapshot: object) -> None:
-        """Put back what `snapshot` returned."""
-        self._library.adapter_restore(self._handle, cast("bytes", snapshot))
+        """Put back what `snapshot` returned.
+
+        Raises:
+            TypeError: It is no snapshot of a firmware adapter.
+            UsageError: Another build of the firmware made it.
+        """
+        if not isinstance(snapshot, FirmwareState):
+            raise TypeError("not a snapshot of FirmwareAdapter")
+        if snapshot.build != _build():
+            raise UsageError("the state was saved by another build of the adapter's firmware", hint=RUN_ANEW)
+        self._library.adapter_restore(self._handle, snapshot.data)
 
     # What the firmware calls. An exception must not cross the C code: it is kept, and raised behind it.
 
@@ -357,6 +380,11 @@ def _library() -> Any:
             hint="install the package again",
         )
     return library
+
+
+@cache
+def _build() -> str:
+    return hashlib.sha256(Path(_library()._name).read_bytes()).hexdigest()  # noqa: SLF001 - where CDLL keeps its path
 
 
 def _names(function: Callable[[int], bytes | None]) -> list[str]:

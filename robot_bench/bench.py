@@ -7,26 +7,34 @@ Mode C (a real or remote robot) is built by `robot_bench.remote`, on the same
 parts. The order of the followers is fixed: who drives pins first, the script
 and its faults second, the recorder last.
 
+A bench is pickled as its scenario and its snapshot, and built anew where it is loaded,
+in another process too. What listens to it (`on_slice`, a debugger, a measurement) is set
+anew there. A trace in memory is in the pickle; a file goes on where it stood, and what was
+written to it since is taken back. So runs that go on from one pickle at the same time need
+a trace in memory.
+
 Invariant: a bench that was restored from a snapshot goes on as the one that the
 snapshot was taken of.
 """
 
-from collections.abc import Callable, Mapping, Sequence
+import hashlib
+import pickle
+from collections.abc import Callable
 from dataclasses import dataclass, replace
+from importlib.metadata import version
 from pathlib import Path
-from typing import Protocol, cast
 
 from adapter_sim import Adapter
 from adapter_sim.pinout import Pinout, Pull, WireRole, load_pinout
 from p2os.errors import ScenarioError
 from p2os.pioneer.body.contract import RobotBody
-from p2os.pioneer.body.factory import body_note, make_body
+from p2os.pioneer.body.factory import body_note, make_body, resolve_body
 from p2os.pioneer.controller import Pioneer
 from p2os.pioneer.world import load_world
 from p2os.pioneer.world.model import World
-from robot_bench.adapter import AnyAdapter, make_adapter
+from robot_bench.adapter import RUN_ANEW, AnyAdapter, make_adapter
 from robot_bench.direct import DirectRobot, DistanceSensors, JointMotor, WheelEncoder
-from robot_bench.loop import DEFAULT_SLICE_NS, Follower, LeaderReached, RunLoop
+from robot_bench.loop import DEFAULT_SLICE_NS, RunLoop
 from robot_bench.recording.client_view import SipRanges
 from robot_bench.recording.recorder import Recorder
 from robot_bench.recording.trace import TraceWriter
@@ -38,7 +46,9 @@ from robot_bench.wires.endpoints import Endpoint
 from robot_bench.wires.nets import Harness, Net, OwnedPins, Strength
 from robot_bench.wires.ports import Chip
 from robot_bench.wires.serial_line import SerialLine
-from simbase.timing import NS_PER_S, Nanos
+from simbase.errors import UsageError
+from simbase.state import PartState, Stateful
+from simbase.timing import NS_PER_S, Nanos, Reached
 
 #: chosen: so long a run goes on after a fault of the firmware, to show what the robot does then.
 AFTER_FAULT_NS: Nanos = 1 * NS_PER_S
@@ -46,20 +56,12 @@ AFTER_FAULT_NS: Nanos = 1 * NS_PER_S
 RESISTORS = "board"
 
 
-class Saved(Protocol):
-    """A part that can be saved."""
-
-    def snapshot(self) -> object:
-        """Return all that decides this part's future."""
-        ...
-
-    def restore(self, snapshot: object) -> None:
-        """Put back what `snapshot` returned."""
-        ...
-
-
-class RobotSide(Follower, Saved, Protocol):
-    """What stands at the far end of the wires and owns the body."""
+#: What decides a run besides its files; its end and its goals may be others after a restart.
+DECISIVE = (
+    "mode", "seed", "parameters", "threshold_um", "usart_baud", "start", "direct", "adapter", "adapter_core",
+    "controller", "changes", "faults",
+)  # fmt: skip
+_VERSION = "version of p2os"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -74,7 +76,7 @@ class BenchParts:
     pioneer: Pioneer | None = None
 
 
-class Bench:
+class Bench(Stateful):
     """A run in virtual time.
 
     Args:
@@ -84,6 +86,8 @@ class Bench:
         slice_ns: How often the loop gives control back; without effect on the result.
         on_slice: Called after each slice with the time reached; may raise to end the run.
     """
+
+    STATE = ("made_of", "chip", "_harness", "_robots", "_ranges", "script", "faults", "recorder", "loop")
 
     def __init__(
         self,
@@ -102,12 +106,22 @@ class Bench:
         refuse_what_its_world_refuses(scenario, world)
         body = make_body(scenario.body, world, scenario.parameters)
         body.reset(scenario.start or world.start, scenario.seed)
+        self._is_rebuildable = chip is None
         chip = chip or boot(scenario.firmware)
-        harness = make_harness(pinout)
+        self._harness = harness = make_harness(pinout)
         self.recorder = Recorder(self.trace, harness, body=body)
-        self._robots: list[RobotSide] = []
+        #: What stands at the far end of the wires and owns the body.
+        self._robots: list[DirectRobot | Endpoint] = []
         self._ranges: SipRanges | None = None
         self.parts = self._build(pinout, world, body, chip, harness)
+        #: What must be the same where a snapshot of this bench is restored.
+        self.made_of: dict[str, object] = {
+            _VERSION: version("p2os"),
+            "firmware": getattr(getattr(chip, "image", chip), "sha256", type(chip).__name__),
+            "world": hashlib.sha256(repr(world).encode()).hexdigest(),
+            "body": resolve_body(scenario.body),
+            **{name: getattr(scenario, name) for name in DECISIVE},
+        }
         self.script = WorldScript(
             scenario.changes, body, scenario.parameters,
             bring_to=self._bring_robot_to, on_change=self.recorder.obstacle,
@@ -158,7 +172,7 @@ class Bench:
         """Return the time that the chip has come to."""
         return self.parts.chip.now_ns
 
-    def run_until(self, end: Nanos, advance: Callable[[int], LeaderReached] | None = None) -> None:
+    def run_until(self, end: Nanos, advance: Callable[[int], Reached] | None = None) -> None:
         """Run to `end`, until shortly after a fault of the firmware, or to a debugger's halt.
 
         Args:
@@ -174,31 +188,27 @@ class Bench:
         self.recorder.finish(end)
         return end
 
-    def snapshot(self) -> dict[str, object]:
-        """Return all that decides the rest of the run, as a value that can be pickled."""
-        return {
-            "chip": self.parts.chip.snapshot(),
-            "harness": self.parts.harness.snapshot(),
-            "robots": [robot.snapshot() for robot in self._robots],
-            "ranges": None if self._ranges is None else self._ranges.snapshot(),
-            "script": self.script.snapshot(),
-            "faults": self.faults.snapshot(),
-            "recorder": self.recorder.snapshot(),
-            "loop": self.loop.snapshot(),
-        }
+    def restore(self, snapshot: object) -> None:
+        """Put back what `snapshot` returned, the trace too; the end of the run and its goals may be others.
 
-    def restore(self, snapshot: Mapping[str, object]) -> None:
-        """Put back what `snapshot` returned; the scenario must be the same."""
-        self.parts.chip.restore(snapshot["chip"])
-        self.parts.harness.restore(cast("Mapping[str, Mapping[str, object]]", snapshot["harness"]))
-        for robot, state in zip(self._robots, cast("Sequence[object]", snapshot["robots"]), strict=True):
-            robot.restore(state)
-        if self._ranges is not None:
-            self._ranges.restore(cast("Sequence[float]", snapshot["ranges"]))
-        self.script.restore(snapshot["script"])
-        self.faults.restore(snapshot["faults"])
-        self.recorder.restore(snapshot["recorder"])
-        self.loop.restore(cast("Mapping[str, object]", snapshot["loop"]))
+        Raises:
+            TypeError: It is no snapshot of a bench.
+            UsageError: It is of another version, firmware, world, seed or other setting that decides the run.
+            FileError: The trace's file is not the one that was begun.
+        """
+        made_of = snapshot.get("made_of") if isinstance(snapshot, PartState) else None
+        if isinstance(made_of, dict):
+            _refuse_others(made_of, self.made_of)
+        super().restore(snapshot)
+
+    def __reduce__(self) -> "tuple[Callable[[str, bytes], Bench], tuple[str, bytes]]":
+        if not self._is_rebuildable:
+            raise TypeError("a bench with a chip of the caller's cannot be pickled: pickle its snapshot()")
+        if not self.trace.has_end:
+            self.trace.flush()
+        path = None if self.trace.path is None else self.trace.path.absolute()
+        recipe = pickle.dumps((self.scenario, self.loop.slice_ns, path, self.snapshot()))
+        return _built_anew, (version("p2os"), recipe)
 
     def _after_slice(self, now: Nanos) -> None:
         if self.chip.fault is not None:
@@ -276,6 +286,30 @@ class Bench:
             )
         )
         return adapter, pioneer
+
+
+def _built_anew(saved_by: str, recipe: bytes) -> Bench:
+    """Return the bench of a pickle; the version is looked at before anything that another one may have changed.
+
+    Raises:
+        UsageError, FileError: As of `Bench.restore`.
+    """
+    _refuse_others({_VERSION: saved_by}, {_VERSION: version("p2os")})
+    try:
+        scenario, slice_ns, path, snapshot = pickle.loads(recipe)  # noqa: S301 - within a pickle already
+        bench = Bench(scenario, slice_ns=slice_ns, trace=TraceWriter(path, goes_on=path is not None))
+        bench.restore(snapshot)
+    except (TypeError, AttributeError, ImportError) as error:
+        raise UsageError(f"the bench was saved by another state of this version: {error}", hint=RUN_ANEW) from error
+    return bench
+
+
+def _refuse_others(saved: dict[str, object], here: dict[str, object]) -> None:
+    """Refuse what was saved where something that decides a run is different from here."""
+    for what, value in saved.items():
+        if here.get(what) != value:
+            values = f": {value} there, {here.get(what)} here" if isinstance(value, str | int) else ""
+            raise UsageError(f"the bench was saved with another {what}{values}", hint=RUN_ANEW)
 
 
 def boot(firmware: Path) -> Chip:

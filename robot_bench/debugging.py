@@ -9,17 +9,12 @@ Invariant: a run that a debugger has halted and let go on leaves the same trace
 as one that nobody debugged.
 """
 
-from typing import cast
-
 from bluepill_sim.board import BluePill
 from bluepill_sim.errors import BluePillError
 from bluepill_sim.timing import ChipReached
 from robot_bench.bench import Bench
-from robot_bench.recording.trace import TraceMark
 from robot_bench.remote import RemoteBench
 from simbase.timing import Nanos, Reason
-
-_Snapshot = tuple[dict[str, object], TraceMark]
 
 
 def board_of(bench: Bench | RemoteBench) -> BluePill:
@@ -68,13 +63,11 @@ class BenchMachine:
 
     def snapshot(self) -> object:
         """Return all that decides the bench's future, and where its trace stands."""
-        return self._bench.snapshot(), self._bench.trace.mark()
+        return self._bench.snapshot()
 
     def restore(self, snapshot: object) -> None:
         """Put back what `snapshot` returned."""
-        state, mark = cast("_Snapshot", snapshot)
-        self._bench.restore(state)
-        self._bench.trace.rewind(mark)
+        self._bench.restore(snapshot)
 
     def halted(self) -> None:
         """All parts stand still already."""

@@ -20,10 +20,11 @@ Invariant: when `run_until(end)` returns without a halt, every deadline before o
 reached has been acted on by all, in order of time.
 """
 
-from collections.abc import Callable, Mapping, Sequence
-from typing import Protocol, cast
+from collections.abc import Callable, Sequence
+from typing import Protocol
 
 from simbase.errors import P2osError
+from simbase.state import Stateful
 from simbase.timing import NS_PER_MS, Nanos, Reached
 
 #: chosen: the pacer's grain; small enough for a live view, large enough to cost nothing.
@@ -42,17 +43,8 @@ class Leader(Protocol):
         """The time reached."""
         ...
 
-    def advance_to(self, limit_ns: int) -> "LeaderReached":
+    def advance_to(self, limit_ns: int) -> Reached:
         """Run to `limit_ns`, at most a basic block beyond; less far where a watched net changes."""
-        ...
-
-
-class LeaderReached(Protocol):
-    """How far a leader came."""
-
-    @property
-    def now(self) -> int:
-        """The time reached."""
         ...
 
 
@@ -72,8 +64,12 @@ class StuckError(P2osError):
     """Parts kept making each other due without time passing; any such case is a bug here."""
 
 
-class RunLoop:
+class RunLoop(Stateful):
     """Brings a leader and its followers forward together."""
+
+    STATE = ("now", "_edges", "_is_inside_block", "_rounds")
+    #: Each `run_until` sets them anew.
+    DERIVED = ("_end", "_wanted_end", "_advance", "_deadlines", "_is_halted")
 
     def __init__(
         self,
@@ -94,7 +90,7 @@ class RunLoop:
         self._wanted_end: Nanos = 0
         self._edges: list[Nanos] = []
         self._rounds = 0
-        self._advance: Callable[[int], LeaderReached] = leader.advance_to
+        self._advance: Callable[[int], Reached] = leader.advance_to
         self._deadlines: list[Nanos] = []
         #: Whether the leader has halted in this run, and whether it stands inside a block.
         self._is_halted = False
@@ -113,7 +109,7 @@ class RunLoop:
         """End the present `run_until` earlier, or not earlier after all; what was brought beyond stays there."""
         self._end = min(self._wanted_end, end)
 
-    def run_until(self, end: Nanos, advance: Callable[[int], LeaderReached] | None = None) -> None:
+    def run_until(self, end: Nanos, advance: Callable[[int], Reached] | None = None) -> None:
         """Run to `end` in nanoseconds, to what `end_at` sets in the meantime, or to a halt.
 
         A leader that stands still for good lets time pass like any other.
@@ -145,17 +141,6 @@ class RunLoop:
         """Bring the followers to `end` itself, so that their state is that of the end of the run."""
         for follower in self.followers:
             follower.advance_to(min(end, max(self.leader.now_ns, self.now)))
-
-    def snapshot(self) -> dict[str, object]:
-        """Return the loop's own state; the parts are saved by whoever built them."""
-        return {"now": self.now, "edges": tuple(self._edges), "is_inside_block": self._is_inside_block}
-
-    def restore(self, snapshot: Mapping[str, object]) -> None:
-        """Put back what `snapshot` returned."""
-        self.now = cast("int", snapshot["now"])
-        self._edges = list(cast("tuple[int, ...]", snapshot["edges"]))
-        self._is_inside_block = bool(snapshot["is_inside_block"])
-        self._rounds = 0
 
     def _lead(self, now: Nanos, limit: Nanos) -> Nanos:
         """Let the leader run to `limit`, slice by slice; stop at an edge on a watched net. Return its time."""

@@ -9,6 +9,7 @@ from collections.abc import Callable, Sequence
 
 from adapter_sim.codec import is_near
 from robot_bench.wires.nets import Net, Strength
+from simbase.state import Stateful
 from simbase.timing import Nanos
 
 #: The name under which the plug-ins drive wires.
@@ -16,7 +17,7 @@ OWNER = "sensor"
 UM_PER_M = 1_000_000
 
 
-class DistanceSensors:
+class DistanceSensors(Stateful):
     """The ring of distance sensors.
 
     Args:
@@ -24,6 +25,8 @@ class DistanceSensors:
         threshold_um: Nearer than this is an obstacle.
         period_ns: Time between two samples.
     """
+
+    STATE = ("_next",)
 
     def __init__(self, nets: Sequence[Net], *, threshold_um: int, period_ns: Nanos) -> None:
         self._nets = tuple(nets)
@@ -45,11 +48,3 @@ class DistanceSensors:
             net.drive(OWNER, near, Strength.PUSH_PULL, now)
         if self.on_sample is not None:
             self.on_sample(now, measured_m)
-
-    def snapshot(self) -> dict[str, object]:
-        """Return when the next sample is due."""
-        return {"next": self._next}
-
-    def restore(self, snapshot: dict[str, object]) -> None:
-        """Put back what `snapshot` returned."""
-        self._next = int(str(snapshot["next"]))

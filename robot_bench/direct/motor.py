@@ -14,10 +14,11 @@ from collections.abc import Sequence
 from adapter_sim.codec import BitOrder, motor_value
 from p2os.errors import LocalProtocolError
 from robot_bench.wires.nets import Net
+from simbase.state import Stateful
 from simbase.timing import NS_PER_S, Nanos
 
 
-class JointMotor:
+class JointMotor(Stateful):
     """One wheel's motor.
 
     Args:
@@ -26,6 +27,8 @@ class JointMotor:
         ramp_um_per_s2: Most change of speed a second; None jumps.
         dt_ns: Length of a step of the body; the ramp must come to whole µm/s a step.
     """
+
+    STATE = ("speed_um_per_s", "asked")
 
     def __init__(
         self,

@@ -10,9 +10,8 @@ at with the encoders); the body itself tells of collisions.
 Invariant: at time t the body has made every step that ended at or before t.
 """
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import cast
 
 from adapter_sim.codec import BitOrder
 from p2os.pioneer.body.contract import BodyState, RobotBody
@@ -20,6 +19,7 @@ from robot_bench.direct.distance import DistanceSensors
 from robot_bench.direct.encoder import WheelEncoder
 from robot_bench.direct.motor import JointMotor
 from simbase.errors import UsageError
+from simbase.state import Stateful
 from simbase.timing import NS_PER_MS, Nanos, Reached
 
 UM_PER_M = 1_000_000
@@ -51,8 +51,10 @@ class DirectSettings:
                 raise UsageError(f"direct setting {name} must be above 0, got {getattr(self, name)}")
 
 
-class DirectRobot:
+class DirectRobot(Stateful):
     """A body whose motors and sensors hang on wires."""
+
+    STATE = ("body", "sensors", "_left", "_right", "_next_encoder", "_steps", "_asked", "_stalled")
 
     def __init__(
         self,
@@ -95,27 +97,6 @@ class DirectRobot:
                 self.sensors.sample(self.body.ranges(self._sonar_numbers), due)
         self._step_to(limit)
         return Reached(limit)
-
-    def snapshot(self) -> dict[str, object]:
-        """Return all that decides the future, body included."""
-        return {
-            "body": self.body.snapshot(),
-            "steps": self._steps,
-            "told": (self._asked, self._stalled),
-            "speeds": (self._left.speed_um_per_s, self._right.speed_um_per_s),
-            "next_encoder": self._next_encoder,
-            "sensors": self.sensors.snapshot(),
-        }
-
-    def restore(self, snapshot: object) -> None:
-        """Put back what `snapshot` returned."""
-        state = cast("Mapping[str, object]", snapshot)
-        self.body.restore(state["body"])
-        self._steps = cast("int", state["steps"])
-        self._asked, self._stalled = cast("tuple[tuple[int, int], tuple[bool, bool]]", state["told"])
-        self._left.speed_um_per_s, self._right.speed_um_per_s = cast("tuple[int, int]", state["speeds"])
-        self._next_encoder = cast("int", state["next_encoder"])
-        self.sensors.restore(cast("dict[str, object]", state["sensors"]))
 
     def _step_to(self, limit: Nanos) -> None:
         body, dt_ns = self.body, self.body.dt_ns

@@ -17,14 +17,17 @@ from p2os.protocol.odometry import Unwrapper
 from p2os.protocol.profiles import Profile
 from p2os.protocol.sip import POSITION_MASK, SIP_KINDS, StandardSip
 from p2os.robots.parameters import RobotParameters
+from simbase.state import Stateful
 from simbase.timing import Nanos
 
 UM_PER_M = 1_000_000
 NM_PER_UM = 1_000
 
 
-class SipRanges:
+class SipRanges(Stateful):
     """Ranges of all fitted sonar; `on_ranges` is called after each packet that brings a reading."""
+
+    STATE = ("_ranges_m",)
 
     def __init__(
         self, parameters: RobotParameters, profile: Profile, *, on_ranges: Callable[[Nanos, Sequence[float]], None]
@@ -53,14 +56,6 @@ class SipRanges:
                 self._ranges_m[reading.number] = min(metres, self._parameters.sonar_range_m)
         if sip.sonar:
             self._on_ranges(now, self._ranges_m)
-
-    def snapshot(self) -> tuple[float, ...]:
-        """Return the ranges."""
-        return tuple(self._ranges_m)
-
-    def restore(self, snapshot: Sequence[float]) -> None:
-        """Put back what `snapshot` returned."""
-        self._ranges_m = list(snapshot)
 
 
 class OdometryPose:

@@ -12,13 +12,14 @@ Invariant: it changes nothing that it watches.
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from typing import Protocol, cast
+from typing import Protocol
 
 from p2os.pioneer.body.contract import BodyState, Hit
 from p2os.pioneer.world.model import Obstacle
 from robot_bench.recording.run_record import COLLISION
 from robot_bench.recording.trace import TraceWriter
 from robot_bench.wires.nets import Harness, Net
+from simbase.state import Stateful
 from simbase.timing import NS_PER_MS, Nanos, Reached
 
 SAMPLE_NS: Nanos = 50 * NS_PER_MS
@@ -48,7 +49,7 @@ class Observed(Protocol):
         ...
 
 
-class Recorder:
+class Recorder(Stateful):
     """Watches the parts and fills the trace.
 
     Args:
@@ -57,6 +58,11 @@ class Recorder:
         body: What moves; None where it is unknown.
         sample_ns: Time between two poses.
     """
+
+    STATE = (
+        "trace", "min_clearance_m", "distance_m", "last_state", "last_line", "_next_sample", "_changed", "_has_levels",
+        "_text", "_sonar_mm",
+    )  # fmt: skip
 
     def __init__(
         self,
@@ -141,34 +147,6 @@ class Recorder:
         if self._next_sample - self._sample_ns < end:
             self._sample(end)
         self._pass(end)
-
-    def snapshot(self) -> dict[str, object]:
-        """Return what decides the rest of the recording."""
-        return {
-            "trace": self.trace.snapshot(),
-            "min_clearance_m": self.min_clearance_m,
-            "distance_m": self.distance_m,
-            "last_state": self.last_state,
-            "next_sample": self._next_sample,
-            "changed": tuple(self._changed),
-            "has_levels": self._has_levels,
-            "text": self._text,
-            "sonar_mm": None if self._sonar_mm is None else tuple(self._sonar_mm),
-        }
-
-    def restore(self, snapshot: object) -> None:
-        """Put back what `snapshot` returned."""
-        state = cast("Mapping[str, object]", snapshot)
-        self.trace.restore(state["trace"])
-        self.min_clearance_m = cast("float | None", state["min_clearance_m"])
-        self.distance_m = cast("float", state["distance_m"])
-        self.last_state = cast("BodyState | None", state["last_state"])
-        self._next_sample = cast("int", state["next_sample"])
-        self._changed = dict.fromkeys(cast("tuple[str, ...]", state["changed"]))
-        self._has_levels = bool(state["has_levels"])
-        self._text = cast("bytes", state["text"])
-        sonar = cast("tuple[int, ...] | None", state["sonar_mm"])
-        self._sonar_mm = None if sonar is None else list(sonar)
 
     def _note_change(self, net: Net, _owner: str, _at: Nanos) -> None:
         self._changed[net.name] = None

@@ -12,6 +12,9 @@ only: no path, version, host or wall time. `t` is nanoseconds.
     {"k":"sonar","mm":[…]}               ranges, all sonar, when new
     {"k":"pose","x","y","z","h","p","l","r","la","ra","c"}   µm, µrad, µm/s, collisions; each 50 ms
 
+The hash is a chain: 32 zero bytes, then for each line SHA-256 of the hash so far and the
+line with its line end. So it is a value that can be saved, and a run goes on from any line.
+
 Parts report in any order; the writer sorts by time, then by kind, then
 by the order of telling. It writes only what nobody can precede any more.
 
@@ -23,13 +26,15 @@ import contextlib
 import hashlib
 import io
 import json
-from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+import operator
+from bisect import bisect_right
+from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
-from typing import IO, cast
+from typing import IO
 
 from p2os.errors import LocalProtocolError, RunFailedError
 from simbase.errors import FileError
+from simbase.state import Stateful
 from simbase.timing import NS_PER_S, Nanos
 
 TRACE_NAME = "trace.jsonl"
@@ -41,13 +46,8 @@ RANKS = {"pin": 0, "usart": 1, "obstacle": 2, "wire": 3, "event": 4, "sonar": 5,
 Entry = Mapping[str, object]
 
 
-@dataclass(frozen=True, slots=True)
-class TraceMark:
-    """A place in a trace that is being written."""
-
-    position: int
-    digest: "hashlib._Hash"
-    flushed_second: int
+#: The hash of no line at all.
+EMPTY_HASH = bytes(32)
 
 
 def canonical(entry: Entry) -> str:
@@ -55,22 +55,41 @@ def canonical(entry: Entry) -> str:
     return json.dumps(entry, sort_keys=True, separators=(",", ":"), ensure_ascii=True)
 
 
-class TraceWriter:
+def chained(digest: bytes, lines: Iterable[str]) -> bytes:
+    """Return the hash after more lines, each with its line end."""
+    for line in lines:
+        digest = hashlib.sha256(digest + line.encode("latin-1")).digest()
+    return digest
+
+
+class TraceWriter(Stateful):
     """Sorts, writes and hashes the entries of a run.
+
+    A snapshot says where the trace stands: of one in memory it has the text, of a file the length. Restoring takes
+    back what was written since; the file must still begin with what was in it then.
 
     Args:
         path: The file; None keeps no file, for tests and searches that want the hash only.
+        goes_on: Whether the file is one that an earlier writer has begun; `restore` says how far it counts.
+
+    Raises:
+        FileError: The file cannot be written.
     """
 
-    def __init__(self, path: Path | None = None) -> None:
+    STATE = ("_pending", "_sequence", "_written_until", "_flushed_second", "_hash", "has_meta", "has_end", "written")
+    #: The disk's trouble is this process's own.
+    DERIVED = ("_failure", "_length")
+
+    def __init__(self, path: Path | None = None, *, goes_on: bool = False) -> None:
         self.path = path
         self._file: IO[str] = io.StringIO()
+        self._length = 0
         if path is not None:
             try:
-                self._file = path.open("w", encoding="utf-8", newline="\n")
+                self._file = path.open("r+" if goes_on else "w", encoding="ascii", newline="\n")
             except OSError as error:
                 raise FileError(f"cannot write {path}: {error.strerror}") from error
-        self._hash = hashlib.sha256()
+        self._hash = EMPTY_HASH
         self._pending: list[tuple[Nanos, int, int, str]] = []
         self._sequence = 0
         self._written_until: Nanos = -1
@@ -82,7 +101,7 @@ class TraceWriter:
     @property
     def sha256(self) -> str:
         """Return the hash of all hashed lines written so far."""
-        return self._hash.hexdigest()
+        return self._hash.hex()
 
     @property
     def text(self) -> str:
@@ -96,7 +115,7 @@ class TraceWriter:
             RunFailedError: The disk is full or gone.
         """
         with self._writing() as file:
-            file.write(json.dumps({"k": "meta", **entry}) + "\n")
+            self._write(json.dumps({"k": "meta", **entry}) + "\n")
             file.flush()
         self.has_meta = True
 
@@ -120,14 +139,10 @@ class TraceWriter:
         with self._writing() as file:
             if self._pending:
                 self._pending.sort()
-                count = 0
-                for at, _rank, _order, line in self._pending:
-                    if at > limit:
-                        break
-                    data = line + "\n"
-                    file.write(data)
-                    self._hash.update(data.encode("ascii"))
-                    count += 1
+                count = bisect_right(self._pending, limit, key=operator.itemgetter(0))
+                lines = [line + "\n" for *_, line in self._pending[:count]]
+                self._write("".join(lines))
+                self._hash = chained(self._hash, lines)
                 del self._pending[:count]
             self._written_until = max(self._written_until, limit)
             second = limit // NS_PER_S
@@ -151,7 +166,7 @@ class TraceWriter:
             RunFailedError: The disk is full or gone.
         """
         with self._writing() as file:
-            file.write(json.dumps({"k": "end", **entry}) + "\n")
+            self._write(json.dumps({"k": "end", **entry}) + "\n")
             file.flush()
         self.has_end = True
         self.close()
@@ -179,23 +194,39 @@ class TraceWriter:
             )
             raise self._failure from error
 
-    def mark(self) -> TraceMark:
-        """Return where the trace stands, for `rewind`."""
-        return TraceMark(self._file.tell(), self._hash.copy(), self._flushed_second)
+    def _write(self, text: str) -> None:
+        self._file.write(text)
+        self._length += len(text)
 
-    def rewind(self, mark: TraceMark) -> None:
-        """Take back everything that was written after `mark`; what was reported is `restore`'s business."""
-        self._file.seek(mark.position)
+    @property
+    def written(self) -> str | int:
+        """What was written: the text where it is in memory, its length in bytes where it is in a file."""
+        return self._length if self.path is not None else self.text
+
+    @written.setter
+    def written(self, written: str | int) -> None:
+        """Take back what was written since.
+
+        Raises:
+            FileError: The file does not begin with what the hash is of.
+        """
+        length = written if isinstance(written, int) else 0
+        if length:
+            self._refuse_another_file(length)
+        self._file.seek(length)
         self._file.truncate()
-        self._hash, self._flushed_second = mark.digest.copy(), mark.flushed_second
+        self._length = length
+        if isinstance(written, str):
+            self._write(written)
 
-    def snapshot(self) -> dict[str, object]:
-        """Return what is reported and not yet written."""
-        return {"pending": tuple(self._pending), "sequence": self._sequence, "written_until": self._written_until}
-
-    def restore(self, snapshot: object) -> None:
-        """Put back what `snapshot` returned; the file and the hash go on from where this writer stands."""
-        state = cast("Mapping[str, object]", snapshot)
-        self._pending = list(cast("tuple[tuple[int, int, int, str], ...]", state["pending"]))
-        self._sequence = cast("int", state["sequence"])
-        self._written_until = cast("int", state["written_until"])
+    def _refuse_another_file(self, length: int) -> None:
+        if self.path is None:
+            raise FileError("the trace that this run has begun is in a file, and this writer has none")
+        self.flush()
+        text = self.path.read_bytes()[:length].decode("latin-1")
+        lines = text.splitlines(keepends=True)[self.has_meta :]
+        if len(text) < length or chained(EMPTY_HASH, lines[: len(lines) - self.has_end]) != self._hash:
+            raise FileError(
+                f"{self.path} is not the trace that this run has begun",
+                hint="put the file back as it was, or run the scenario anew",
+            )

@@ -3,9 +3,10 @@
 Invariant: each change is applied once, in order of time, and saving and restoring keeps the place.
 """
 
-from collections.abc import Callable, Mapping, Sequence
-from typing import Generic, Protocol, TypeVar, cast
+from collections.abc import Callable, Sequence
+from typing import Generic, Protocol, TypeVar
 
+from simbase.state import Stateful
 from simbase.timing import Nanos, Reached
 
 
@@ -21,13 +22,15 @@ class Timed(Protocol):
 T = TypeVar("T", bound=Timed)
 
 
-class Timeline(Generic[T]):
+class Timeline(Stateful, Generic[T]):
     """Applies changes when they are due.
 
     Args:
         changes: In any order; those of one time keep theirs.
         apply: Makes one change.
     """
+
+    STATE = ("_done",)
 
     def __init__(self, changes: Sequence[T], apply: Callable[[T], None]) -> None:
         self._changes = tuple(sorted(changes, key=lambda change: change.at))
@@ -44,11 +47,3 @@ class Timeline(Generic[T]):
             self._apply_change(self._changes[self._done])
             self._done += 1
         return Reached(limit)
-
-    def snapshot(self) -> dict[str, object]:
-        """Return how many changes were made."""
-        return {"done": self._done}
-
-    def restore(self, snapshot: object) -> None:
-        """Put back what `snapshot` returned; what was changed is restored by whoever owns it."""
-        self._done = cast("int", cast("Mapping[str, object]", snapshot)["done"])

@@ -132,6 +132,9 @@ class WorldScript(Timeline[Change]):
         on_change: Called with each change.
     """
 
+    #: The body is saved by the robot that owns it.
+    DERIVED = ("_body",)
+
     def __init__(
         self,
         changes: Sequence[Change],

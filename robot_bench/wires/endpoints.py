@@ -7,14 +7,15 @@ Invariant: bytes enter a part at the time at which their last character arrived,
 and leave it at the time at which the part acted.
 """
 
-from collections.abc import Callable, Mapping
-from typing import Protocol, cast
+from collections.abc import Callable
+from typing import Protocol
 
 from robot_bench.wires.serial_line import SerialLine
-from simbase.timing import Nanos, Reached
+from simbase.state import Stateful
+from simbase.timing import Nanos, Reached, Timed
 
 
-class EndpointPart(Protocol):
+class EndpointPart(Timed, Protocol):
     """A part that exchanges bytes: the adapter, the robot's controller."""
 
     def receive(self, data: bytes, now: Nanos) -> None:
@@ -25,24 +26,8 @@ class EndpointPart(Protocol):
         """Return the frames to send, one item each, oldest first, and forget them."""
         ...
 
-    def next_deadline(self) -> Nanos | None:
-        """Return when this part next wants to act."""
-        ...
 
-    def advance_to(self, limit: Nanos) -> Reached:
-        """Act on everything due up to and including `limit`."""
-        ...
-
-    def snapshot(self) -> object:
-        """Return all that decides this part's future."""
-        ...
-
-    def restore(self, snapshot: object) -> None:
-        """Put back what `snapshot` returned."""
-        ...
-
-
-class Endpoint:
+class Endpoint(Stateful):
     """A part between an incoming and an outgoing line.
 
     Args:
@@ -51,6 +36,9 @@ class Endpoint:
         outgoing: The line that it writes to.
         on_arrival: Called with each delivery, before the part takes it: (bytes, ns).
     """
+
+    STATE = ("part", "_incoming")
+    DERIVED = ("_own_deadline",)
 
     def __init__(
         self,
@@ -90,13 +78,5 @@ class Endpoint:
         self._own_deadline = part.next_deadline()
         return Reached(limit)
 
-    def snapshot(self) -> dict[str, object]:
-        """Return the part and the line that it reads."""
-        return {"part": self.part.snapshot(), "incoming": self._incoming.snapshot()}
-
-    def restore(self, snapshot: object) -> None:
-        """Put back what `snapshot` returned."""
-        state = cast("Mapping[str, object]", snapshot)
-        self.part.restore(state["part"])
-        self._incoming.restore(state["incoming"])
+    def _restored(self) -> None:
         self._own_deadline = self.part.next_deadline()

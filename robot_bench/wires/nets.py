@@ -13,12 +13,12 @@ on the order in which different owners reported them.
 """
 
 from bisect import bisect_right
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from enum import Enum
-from typing import cast
 
 from p2os.errors import LocalProtocolError
+from simbase.state import Stateful
 from simbase.timing import Nanos
 from simbase.wire import are_fighting, level_of
 
@@ -59,13 +59,20 @@ class Contention:
     owners: tuple[str, ...]
 
 
-class Net:
+class Net(Stateful):
     """One wire.
 
     Args:
         name: As in pinout.toml.
         idle: The level that is read while nobody holds the wire.
     """
+
+    STATE = (
+        "_drives", "_last_level", "last_edge", "_notified_until", "_notified_level", "_notified_contention",
+        "_contentions",
+    )  # fmt: skip
+    #: Who listens is settled when a bench is built.
+    DERIVED = ("_watchers",)
 
     def __init__(self, name: str, *, idle: bool = False) -> None:
         self.name = name
@@ -160,32 +167,6 @@ class Net:
             later = later or history[-1][0] > limit
         return later
 
-    def snapshot(self) -> dict[str, object]:
-        """Return the drives still remembered, as plain values."""
-        return {
-            "drives": tuple(
-                (owner, tuple((at, drive.level, drive.strength.value) for at, drive in history))
-                for owner, history in self._drives.items()
-            ),
-            "notified": (self._notified_until, self._notified_level, self._notified_contention),
-            "contentions": tuple((item.at, item.owners) for item in self._contentions),
-        }
-
-    def restore(self, snapshot: Mapping[str, object]) -> None:
-        """Put back what `snapshot` returned; watchers stay and are not called."""
-        drives = cast("tuple[tuple[str, tuple[tuple[int, bool, str], ...]], ...]", snapshot["drives"])
-        contentions = cast("tuple[tuple[int, tuple[str, ...]], ...]", snapshot["contentions"])
-        self._drives = {
-            owner: [(at, Drive(level, Strength(strength))) for at, level, strength in history]
-            for owner, history in drives
-        }
-        self._notified_until, self._notified_level, self._notified_contention = cast(
-            "tuple[int, bool, tuple[str, ...]]", snapshot["notified"]
-        )
-        self._contentions = [Contention(at, self.name, owners) for at, owners in contentions]
-        self.last_edge = max((history[-1][0] for history in self._drives.values() if history), default=0)
-        self._last_level = self._resolve(self.last_edge)
-
     def _resolve(self, at: Nanos) -> bool:
         level = _resolved([_at(history, at) for history in self._drives.values()])
         return self.idle if level is None else level
@@ -196,8 +177,10 @@ class Net:
         return tuple(sorted(hard)) if are_fighting([drive.level for drive in hard.values()]) else ()
 
 
-class Harness:
+class Harness(Stateful):
     """All the wires between the parts, by name."""
+
+    STATE = ("nets",)
 
     def __init__(self, nets: Iterable[Net]) -> None:
         self.nets: dict[str, Net] = {net.name: net for net in nets}
@@ -207,15 +190,6 @@ class Harness:
 
     def __iter__(self) -> Iterator[Net]:
         return iter(self.nets.values())
-
-    def snapshot(self) -> dict[str, dict[str, object]]:
-        """Return every net's snapshot."""
-        return {name: net.snapshot() for name, net in self.nets.items()}
-
-    def restore(self, snapshot: Mapping[str, Mapping[str, object]]) -> None:
-        """Put back what `snapshot` returned."""
-        for name, net in self.nets.items():
-            net.restore(snapshot[name])
 
 
 class OwnedPins:

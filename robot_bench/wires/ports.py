@@ -7,8 +7,8 @@ from collections.abc import Callable, Sequence
 from typing import Protocol
 
 from bluepill_sim.fabric.pins import PinDrive
-from robot_bench.loop import LeaderReached
 from robot_bench.wires.chip_pins import ChipPin
+from simbase.timing import Reached
 
 
 class Usart(Protocol):
@@ -93,7 +93,7 @@ class Chip(Protocol):
         """Return a pin by its name, such as "PA4"."""
         ...
 
-    def advance_to(self, limit_ns: int) -> LeaderReached:
+    def advance_to(self, limit_ns: int) -> Reached:
         """Run to `limit_ns`, at most a basic block beyond; less far where a watched pin changes."""
         ...
 

@@ -11,13 +11,12 @@ Invariant: arrivals are those of `LineTime`, in the order of sending.
 """
 
 from collections import deque
-from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import cast
 
 from p2os.errors import LocalProtocolError
 from p2os.protocol.bauds import DEFAULT_BAUD
 from p2os.protocol.line_time import LineTime
+from simbase.state import Stateful
 from simbase.timing import Nanos, Reached
 
 
@@ -29,8 +28,10 @@ class Arrival:
     data: bytes
 
 
-class SerialLine:
+class SerialLine(Stateful):
     """Carries messages one way at a fixed speed in bit/s."""
+
+    STATE = ("_time", "_under_way", "_arrived")
 
     def __init__(self, baud: int = DEFAULT_BAUD) -> None:
         if baud <= 0:
@@ -66,20 +67,3 @@ class SerialLine:
         while self._under_way and self._under_way[0].at <= limit:
             self._arrived.append(self._under_way.popleft())
         return Reached(limit)
-
-    def snapshot(self) -> dict[str, object]:
-        """Return the bytes in flight and when they arrive."""
-        return {
-            "time": self._time,
-            "under_way": tuple((item.at, item.data) for item in self._under_way),
-            "arrived": tuple((item.at, item.data) for item in self._arrived),
-        }
-
-    def restore(self, snapshot: object) -> None:
-        """Put back what `snapshot` returned."""
-        state = cast("Mapping[str, object]", snapshot)
-        self._time = cast("LineTime", state["time"])
-        self._under_way = deque(
-            Arrival(at, data) for at, data in cast("tuple[tuple[int, bytes], ...]", state["under_way"])
-        )
-        self._arrived = [Arrival(at, data) for at, data in cast("tuple[tuple[int, bytes], ...]", state["arrived"])]

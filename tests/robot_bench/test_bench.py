@@ -74,7 +74,7 @@ def test_a_bench_restored_half_way_goes_on_alike(mode: str, body: str, cut_ns: i
     first.run_until(cut_ns)
     second = bench(scenario(mode, body))
     second.restore(pickle.loads(pickle.dumps(first.snapshot())))  # noqa: S301 - our own bytes
-    assert first.trace.text + finished(second).trace.text == whole
+    assert finished(second).trace.text == whole
 
 
 @pytest.mark.parametrize("mode", MODES)

@@ -59,10 +59,10 @@ def test_a_run_restored_half_way_has_the_same_rest(mode: str, body: str, cut_ns:
     of = scenario(mode, body, 7.0)
     first = Bench(of)
     first.run_until(cut_ns)
-    snapshot, head = pickle.dumps(first.snapshot()), first.trace.text
+    snapshot = pickle.dumps(first.snapshot())
     first.run_until(of.duration_ns)
     first.finish()
-    assert head + rest_of(of, snapshot, MS) == first.trace.text
+    assert rest_of(of, snapshot, MS) == first.trace.text
 
 
 @pytest.mark.slow

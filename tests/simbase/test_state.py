@@ -206,6 +206,30 @@ def test_what_is_no_state_is_refused_by_the_name_of_its_attribute(held: object) 
         Holder(held).snapshot()
 
 
+class Twin:
+    """A part whose state another language holds."""
+
+    def __init__(self, data: bytes) -> None:
+        self.data = data
+
+    def snapshot(self) -> bytes:
+        return self.data
+
+    def restore(self, snapshot: bytes) -> None:
+        self.data = snapshot
+
+
+def test_whatever_saves_and_restores_itself_is_a_part() -> None:
+    holder = Holder([Twin(b"a"), {"twin": Twin(b"b")}])
+    saved, twins = holder.snapshot(), (holder.held[0], holder.held[1]["twin"])
+    twins[0].data = twins[1].data = b"c"
+    holder.restore(saved)
+    assert (holder.held[0], holder.held[1]["twin"]) == twins
+    assert [twin.data for twin in twins] == [b"a", b"b"]
+    with pytest.raises(TypeError, match="more parts"):
+        Holder([Twin(b""), Twin(b"")]).restore(Holder([Twin(b"")]).snapshot())
+
+
 def test_a_dataclass_declares_its_fields_and_a_subclass_adds_to_its_base() -> None:
     @dataclass
     class Fields(Stateful):

@@ -6,6 +6,7 @@ import os
 import signal
 import subprocess
 import sys
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -18,6 +19,14 @@ from robot_bench.recording.trace import RANKS, TraceWriter, canonical
 from simbase.errors import FileError
 
 S = 10**9
+
+
+def chain(text: str) -> str:
+    """Return the hash of a trace, by its definition."""
+    digest = bytes(32)
+    for line in text.splitlines(keepends=True):
+        digest = hashlib.sha256(digest + line.encode()).digest()
+    return digest.hex()
 
 
 def test_a_line_has_one_spelling() -> None:
@@ -38,7 +47,7 @@ def test_when_it_is_written_changes_nothing(entries: list[tuple[int, str, int]],
     for trace in (at_once, in_pieces):
         trace.write_until(50)
     assert in_pieces.text == at_once.text
-    assert in_pieces.sha256 == at_once.sha256 == hashlib.sha256(at_once.text.encode()).hexdigest()
+    assert in_pieces.sha256 == at_once.sha256 == chain(at_once.text)
     times = [json.loads(line)["t"] for line in at_once.text.splitlines()]
     assert times == sorted(times)
 
@@ -68,7 +77,7 @@ def test_first_and_last_line_are_not_hashed(tmp_path: Path) -> None:
     trace.end({"passed": True})
     lines = path.read_text().splitlines(keepends=True)
     assert [json.loads(line)["k"] for line in lines] == ["meta", "pin", "end"]
-    assert digest == hashlib.sha256(lines[1].encode()).hexdigest()
+    assert digest == chain(lines[1])
     trace.close()
 
 
@@ -91,11 +100,65 @@ def test_a_restored_writer_goes_on_alike() -> None:
     first.add("pin", 9, {"v": 2})
     first.write_until(5)
     second.restore(first.snapshot())
-    first_text = first.text
     for trace in (first, second):
         trace.add("pin", 7, {"v": 3})
         trace.write_until(10)
-    assert first.text == first_text + second.text
+    assert (second.text, second.sha256) == (first.text, first.sha256)
+
+
+def begun(path: Path | None) -> TraceWriter:
+    trace = TraceWriter(path)
+    trace.meta({"version": "1"})
+    trace.add("pin", 3, {"v": 1})
+    trace.add("pin", 9, {"v": 2})
+    trace.write_until(5)
+    return trace
+
+
+def ended(trace: TraceWriter) -> str:
+    trace.add("pin", 7, {"v": 3})
+    trace.write_until(10)
+    trace.end({"passed": True})
+    return trace.sha256
+
+
+def test_a_file_goes_on_where_it_stood_and_what_came_after_is_taken_back(tmp_path: Path) -> None:
+    first = begun(tmp_path / "trace")
+    saved = first.snapshot()
+    digest = ended(first)
+    whole = (tmp_path / "trace").read_bytes()
+    for _ in range(2):
+        again = TraceWriter(tmp_path / "trace", goes_on=True)
+        again.restore(saved)
+        assert ended(again) == digest
+        assert (tmp_path / "trace").read_bytes() == whole
+
+
+def test_a_trace_in_memory_goes_on_in_a_file(tmp_path: Path) -> None:
+    first = begun(None)
+    again = TraceWriter(tmp_path / "trace")
+    again.restore(first.snapshot())
+    assert ended(again) == ended(first)
+    assert (tmp_path / "trace").read_text() == first.text
+
+
+@pytest.mark.parametrize(
+    "change", [lambda data: data[:-3], lambda data: data.replace(b'"v":1', b'"v":2'), lambda _: b""]
+)
+def test_a_file_that_is_not_the_one_that_was_begun_is_left_alone(
+    tmp_path: Path, change: Callable[[bytes], bytes]
+) -> None:
+    path = tmp_path / "trace"
+    first = begun(path)
+    saved = first.snapshot()
+    first.flush()
+    path.write_bytes(change(path.read_bytes()))
+    kept = path.read_bytes()
+    with pytest.raises(FileError, match="is not the trace that this run has begun"):
+        TraceWriter(path, goes_on=True).restore(saved)
+    with pytest.raises(FileError, match="this writer has none"):
+        TraceWriter().restore(saved)
+    assert path.read_bytes() == kept
 
 
 KILLED = """

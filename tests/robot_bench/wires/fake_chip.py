@@ -2,24 +2,10 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from enum import Enum
 from types import SimpleNamespace
 
 from bluepill_sim.fabric.pins import PinDrive
-
-
-class Reason(Enum):
-    """As the real chip's."""
-
-    DEADLINE = "deadline"
-    EDGE = "edge"
-    HALT = "halt"
-
-
-@dataclass(frozen=True)
-class Reached:
-    now: int
-    reason: Reason
+from simbase.timing import Reached, Reason
 
 
 @dataclass(frozen=True)

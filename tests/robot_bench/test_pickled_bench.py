@@ -1,0 +1,203 @@
+"""A whole bench is pickled, and goes on in another process as if nothing had been."""
+
+import json
+import os
+import pickle
+import subprocess
+import sys
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from robot_bench.adapter import FirmwareAdapter, FirmwareState, is_available
+from robot_bench.bench import Bench
+from robot_bench.recording.trace import TraceWriter
+from robot_bench.scenario.fault_script import FaultChange
+from robot_bench.scenario.scenario import Scenario, load_scenario
+from simbase.errors import FileError, UsageError
+from tests.robot_bench.wires.fake_chip import FakeChip
+
+S = 10**9
+#: So long before a line of the trace its bytes are under way: half a character of 115200 bit/s, one of 9600 bit/s.
+UNDER_WAY_NS = {"usart": 43_000, "wire": 1_000_000}
+WAYS = [("direct", "model"), ("adapter", "model"), *([("adapter", "firmware")] if is_available() else [])]
+BODIES = ["kinematic", pytest.param("bullet", marks=pytest.mark.bullet)]
+
+
+def scenario(way: tuple[str, str] = ("adapter", "model"), body: str = "kinematic", duration_s: float = 1.8) -> Scenario:
+    mode, core = way
+    return load_scenario("dodge").with_options(mode=mode, adapter_core=core, body=body, duration_s=duration_s)
+
+
+def finished(bench: Bench) -> tuple[str, str]:
+    bench.run_until(bench.end)
+    bench.finish()
+    bench.trace.flush()
+    return bench.trace.text if bench.trace.path is None else bench.trace.path.read_text(), bench.trace.sha256
+
+
+def loaded(data: bytes) -> Any:
+    return pickle.loads(data)  # noqa: S301 - our own bytes
+
+
+GOES_ON = """
+import pickle, sys
+from tests.robot_bench.test_pickled_bench import finished
+benches = pickle.load(sys.stdin.buffer)
+sys.stdout.buffer.write(pickle.dumps([finished(bench) for bench in benches]))
+"""
+
+
+def in_another_process(data: bytes, folder: Path) -> Any:
+    done = subprocess.run(
+        [sys.executable, "-c", GOES_ON], input=data, capture_output=True, cwd=folder, timeout=200, check=False,
+        env={**os.environ, "PYTHONHASHSEED": "7", "PYTHONPATH": os.pathsep.join(path for path in sys.path if path)},
+    )  # fmt: skip
+    assert done.returncode == 0, done.stderr.decode()
+    return loaded(done.stdout)
+
+
+def cut_runs(of: Scenario, *cuts_ns: int) -> list[tuple[Bench, tuple[str, str]]]:
+    """Return what stands at each cut, and with bytes under way on each line, beside what the unbroken run gave."""
+    whole = finished(Bench(of))
+    last = {row["k"]: row["t"] for row in map(json.loads, whole[0].splitlines())}
+    under_way = {last[kind] - before_ns for kind, before_ns in UNDER_WAY_NS.items() if kind in last}
+    bench, cut = Bench(of), []
+    for cut_ns in sorted(under_way | set(cuts_ns)):
+        bench.run_until(cut_ns)
+        cut.append((loaded(pickle.dumps(bench)), whole))
+    assert finished(bench) == whole, "pickling changes nothing"
+    return cut
+
+
+def test_a_bench_goes_on_in_another_process(tmp_path: Path) -> None:
+    cut = [item for way in WAYS for item in cut_runs(scenario(way), 0, 1_300_000_007)]
+    assert in_another_process(pickle.dumps([bench for bench, _ in cut]), tmp_path) == [whole for _, whole in cut]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("body", BODIES)
+def test_a_bench_that_drives_goes_on_in_another_process(body: str, tmp_path: Path) -> None:
+    cuts_ns = 3_217_654_321, 5_000_000_001, 6_543_210_987
+    cut = [item for way in WAYS for item in cut_runs(scenario(way, body, 9.0), *cuts_ns)]
+    assert in_another_process(pickle.dumps([bench for bench, _ in cut]), tmp_path) == [whole for _, whole in cut]
+
+
+def test_a_bench_is_pickled_from_within_a_slice() -> None:
+    taken: list[bytes] = []
+    bench = Bench(scenario(), slice_ns=70_000)
+    bench.on_slice = lambda now: taken.append(pickle.dumps(bench)) if now // S > len(taken) - 1 else None
+    whole = finished(bench)
+    assert len(taken) == 2
+    assert [finished(loaded(data)) for data in taken] == [whole] * 2
+
+
+def test_two_that_go_on_from_one_pickle_are_equal_and_share_nothing() -> None:
+    bench = Bench(scenario())
+    bench.run_until(S)
+    data = pickle.dumps(bench)
+    one, other = loaded(data), loaded(data)
+    one.run_until(S + S // 2)
+    assert other.now == bench.now < one.now
+    assert finished(other) == finished(one) == finished(bench)
+
+
+def test_the_trace_file_goes_on_where_it_stood_wherever_the_process_is(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    elsewhere = tmp_path / "elsewhere"
+    elsewhere.mkdir()
+    bench = Bench(scenario(), trace=TraceWriter(Path("trace.jsonl")))
+    bench.trace.meta({"scenario": "dodge"})
+    bench.run_until(S)
+    data = pickle.dumps([bench])
+    assert Path("trace.jsonl").stat().st_size == bench.trace.written, "all of it is in the file by then"
+    text, digest = finished(bench)
+    for _ in range(2):
+        assert in_another_process(data, elsewhere) == [(text, digest)]
+    Path("trace.jsonl").write_text("another run's\n")
+    with pytest.raises(FileError, match="is not the trace that this run has begun"):
+        loaded(data)
+    assert Path("trace.jsonl").read_text() == "another run's\n"
+
+
+def test_a_bench_at_its_end_can_be_pickled_too(tmp_path: Path) -> None:
+    bench = Bench(scenario(duration_s=0.1), trace=TraceWriter(tmp_path / "trace"))
+    finished(bench)
+    bench.trace.end({"passed": True})
+    again = loaded(pickle.dumps(bench))
+    assert again.trace.sha256 == bench.trace.sha256
+    assert again.recorder.last_line == bench.recorder.last_line
+
+
+def test_what_was_printed_last_is_known_after_a_restart() -> None:
+    bench = Bench(scenario(("direct", "model"), duration_s=0.6))
+    bench.run_until(S // 2)
+    assert bench.recorder.last_line
+    assert loaded(pickle.dumps(bench)).recorder.last_line == bench.recorder.last_line
+
+
+def test_a_run_can_be_made_longer_where_it_goes_on() -> None:
+    bench, longer = Bench(scenario(duration_s=0.5)), Bench(scenario(duration_s=0.7))
+    bench.run_until(S // 4)
+    longer.restore(bench.snapshot())
+    assert finished(longer) == finished(Bench(scenario(duration_s=0.7)))
+
+
+@pytest.mark.parametrize(
+    ("changes", "says"),
+    [
+        ({"seed": 1}, "another seed: 0 there, 1 here"),
+        ({"world": "arena"}, "another world"),
+        ({"body": "bullet"}, "another body: kinematic there, bullet here"),
+        ({"mode": "direct"}, "another mode: adapter there, direct here"),
+        ({"threshold_um": 1}, "another threshold_um"),
+        ({"faults": (FaultChange(S, "fault reboot"),)}, "another faults$"),
+    ],
+)
+def test_a_snapshot_of_another_run_is_refused(changes: dict[str, Any], says: str) -> None:
+    if changes.get("body") == "bullet":
+        pytest.importorskip("pybullet")
+    bench = Bench(scenario(duration_s=0.1))
+    other = Bench(replace(scenario(duration_s=0.1), **changes))
+    before = other.snapshot()
+    with pytest.raises(UsageError, match=says):
+        other.restore(bench.snapshot())
+    assert other.snapshot() == before
+
+
+def test_another_firmware_is_refused(tmp_path: Path) -> None:
+    elf, other = tmp_path / "firmware.elf", load_scenario("motors").firmware
+    elf.write_bytes(scenario().firmware.read_bytes())
+    data = pickle.dumps(Bench(replace(scenario(), firmware=elf)))
+    elf.write_bytes(other.read_bytes())
+    with pytest.raises(UsageError, match="saved with another firmware"):
+        loaded(data)
+
+
+def test_another_version_is_refused_before_anything_else_is_read() -> None:
+    make, (version, recipe) = Bench(scenario()).__reduce__()
+    with pytest.raises(UsageError, match=r"another version of p2os: 0\.0\.1 there, .* here"):
+        make("0.0.1", b"of another shape")
+    *recipe_of, snapshot = loaded(recipe)
+    del snapshot["script"]
+    with pytest.raises(UsageError, match="another state of this version: not a snapshot of Bench"):
+        make(version, pickle.dumps((*recipe_of, snapshot)))
+
+
+@pytest.mark.skipif(not is_available(), reason="no C++17 compiler")
+def test_the_state_of_another_build_of_the_adapter_is_refused() -> None:
+    adapter = Bench(scenario(("adapter", "firmware"))).parts.adapter
+    assert isinstance(adapter, FirmwareAdapter)
+    with pytest.raises(UsageError, match="another build of the adapter's firmware"):
+        adapter.restore(FirmwareState("0" * 64, adapter.snapshot().data))
+    with pytest.raises(TypeError, match="not a snapshot"):
+        adapter.restore(b"")
+
+
+def test_a_bench_with_a_chip_of_the_callers_says_what_to_pickle_in_its_place() -> None:
+    with pytest.raises(TypeError, match=r"pickle its snapshot\(\)"):
+        pickle.dumps(Bench(scenario(), chip=FakeChip()))
