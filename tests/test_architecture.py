@@ -63,7 +63,7 @@ IO_LAYER = (
 
 #: The map of ARCHITECTURE.md, lowest first: a package imports none of its own row and none above it.
 LAYERS = {
-    "simbase": (("timing", "state", "installation"), ("errors",)),
+    "simbase": (("timing", "state", "installation", "lazy"), ("errors",)),
     "p2os": (
         ("errors",), ("toml_file",), ("robots", "gamepad"), ("protocol",), ("transport",),
         ("capture", "client", "pioneer"), ("cli",), ("__main__",),
