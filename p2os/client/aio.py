@@ -311,12 +311,12 @@ class RobotLoop:
         try:
             self._line.finish()
         finally:
-            if not self._is_finished:
-                self._line.log_end()
-            self._is_finished = True
+            was_finished, self._is_finished = self._is_finished, True
             if self._loop is not None and not self._loop.is_closed():
                 self._let_go_of_loop()
             self._changed.set()
+            if not was_finished:
+                self._line.log_end()
 
     def check(self) -> None:
         """Raise what the client failed with.
