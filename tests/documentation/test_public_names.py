@@ -75,7 +75,7 @@ def test_the_pages_of_the_api_are_made_without_a_warning_and_every_public_name_i
     assert set(PACKAGES) <= {path.stem for path in tmp_path.glob("*.html")}
 
 
-def test_a_public_name_without_a_docstring_and_one_that_is_not_there_are_told(
+def test_public_names_without_a_docstring_are_told(
     api_pages: dict[str, Any], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     source = '"""A module."""\nclass Told:\n    """It is."""\n    def bare(self): ...\ndef told(): ...\n'
