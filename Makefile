@@ -12,7 +12,7 @@ JOBS   ?= 2
 # What is built with the package: set up again when it has changed.
 COMPILED := $(wildcard bluepill_sim/native/source/*) $(shell find adapter_fw/core adapter_fw/capi -type f)
 
-.PHONY: setup demo test lint type unit bench soak clean firmware board board-check board-tools pictures
+.PHONY: setup demo test lint type unit bench soak clean firmware board board-check board-tools pictures docs
 
 setup: $(STAMP)
 
@@ -79,6 +79,10 @@ board-tools: setup
 # Every picture of docs/ whose inputs have changed, made anew; `make test` names those that are out of date.
 pictures: board-tools
 	$(BIN)/python tools/make_pictures.py
+
+# The pages of the API, from the docstrings, in build/api.
+docs: setup
+	$(BIN)/python tools/make_api_pages.py
 
 clean:
 	rm -rf $(VENV) build dist *.egg-info .pytest_cache .mypy_cache .ruff_cache .hypothesis .coverage .coverage.* runs

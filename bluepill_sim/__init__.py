@@ -1,34 +1,53 @@
-"""An emulated STM32F103 on its BluePill board; knows nothing of robots or P2OS."""
+"""An emulated STM32F103 on its BluePill board; knows nothing of robots or P2OS.
 
-from bluepill_sim.board import BluePill, BoardSnapshot, WaitError
-from bluepill_sim.core.faults import FaultKind, FaultReport
-from bluepill_sim.errors import BluePillError, ImageError, UnmodelledError
-from bluepill_sim.fabric.pins import Pin, PinDrive
-from bluepill_sim.program.image import Image, Symbol, SymbolTable, load_image
-from bluepill_sim.serial_port import Activity, SerialPort
-from bluepill_sim.timing import ChipReached
-from simbase.errors import MissingDependencyError
-from simbase.timing import Nanos, Reason
+    from bluepill_sim import BluePill
+
+    board = BluePill("firmware.elf")
+    board.usart1.expect(b"ready", within="5 s")
+
+Names are fetched on first use: importing the package loads no emulator.
+"""
+
+from typing import TYPE_CHECKING
+
+from simbase.lazy import lazily
+
+if TYPE_CHECKING:
+    from bluepill_sim.board import BluePill, BoardSnapshot, WaitError
+    from bluepill_sim.core.faults import FaultKind, FaultReport
+    from bluepill_sim.errors import BluePillError, ImageError, UnmodelledError
+    from bluepill_sim.fabric.pins import Pin, PinDrive
+    from bluepill_sim.program.image import Image, load_image
+    from bluepill_sim.serial_port import SerialPort
+    from simbase.errors import MissingDependencyError
 
 __all__ = [
-    "Activity",
     "BluePill",
     "BluePillError",
     "BoardSnapshot",
-    "ChipReached",
     "FaultKind",
     "FaultReport",
     "Image",
     "ImageError",
     "MissingDependencyError",
-    "Nanos",
     "Pin",
     "PinDrive",
-    "Reason",
     "SerialPort",
-    "Symbol",
-    "SymbolTable",
     "UnmodelledError",
     "WaitError",
     "load_image",
 ]
+
+if not TYPE_CHECKING:
+    __getattr__, __dir__ = lazily(
+        __name__,
+        {
+            "bluepill_sim.board": ("BluePill", "BoardSnapshot", "WaitError"),
+            "bluepill_sim.core.faults": ("FaultKind", "FaultReport"),
+            "bluepill_sim.errors": ("BluePillError", "ImageError", "UnmodelledError"),
+            "bluepill_sim.fabric.pins": ("Pin", "PinDrive"),
+            "bluepill_sim.program.image": ("Image", "load_image"),
+            "bluepill_sim.serial_port": ("SerialPort",),
+            "simbase.errors": ("MissingDependencyError",),
+        },
+    )

@@ -1,20 +1,72 @@
 """The P2OS protocol: wire, commands, packets, connection, client and virtual robot.
 
-`from p2os import Robot` is the blocking client. It is fetched on first use, so
-that the protocol alone loads no port.
+    from p2os import Robot, served_pioneer
+
+    with served_pioneer(world="room") as url, Robot(url) as robot:
+        robot.drive(0.2)
+
+`Robot` is the blocking client (`p2os.client.aio` has the one for asyncio), `served_pioneer` a
+virtual robot in the background. Names are fetched on first use: importing the package loads no port.
 """
 
 from typing import TYPE_CHECKING
 
+from simbase.lazy import lazily
+
 if TYPE_CHECKING:
-    from p2os.client.robot import Robot
+    from p2os.client import (
+        ClientSettings,
+        ConnectError,
+        Limits,
+        LinkLostError,
+        MotionError,
+        MotionResult,
+        MotorsDisabledError,
+        NoAnswerError,
+        Robot,
+        RobotPose,
+        RobotState,
+    )
+    from p2os.pioneer.serve import served_pioneer
+    from p2os.robots.parameters import load_parameters
+    from simbase.errors import P2osError
 
-__all__ = ["Robot"]
+__all__ = [
+    "ClientSettings",
+    "ConnectError",
+    "Limits",
+    "LinkLostError",
+    "MotionError",
+    "MotionResult",
+    "MotorsDisabledError",
+    "NoAnswerError",
+    "P2osError",
+    "Robot",
+    "RobotPose",
+    "RobotState",
+    "load_parameters",
+    "served_pioneer",
+]
 
-
-def __getattr__(name: str) -> object:
-    if name == "Robot":
-        from p2os.client.robot import Robot
-
-        return Robot
-    raise AttributeError(f"module 'p2os' has no attribute {name!r}")
+if not TYPE_CHECKING:
+    __getattr__, __dir__ = lazily(
+        __name__,
+        {
+            "p2os.client": (
+                "ClientSettings",
+                "ConnectError",
+                "Limits",
+                "LinkLostError",
+                "MotionError",
+                "MotionResult",
+                "MotorsDisabledError",
+                "NoAnswerError",
+                "Robot",
+                "RobotPose",
+                "RobotState",
+            ),
+            "p2os.pioneer.serve": ("served_pioneer",),
+            "p2os.robots.parameters": ("load_parameters",),
+            "simbase.errors": ("P2osError",),
+        },
+    )

@@ -23,30 +23,41 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from importlib.metadata import version
 from pathlib import Path
+from typing import Self, Unpack
 
 from adapter_sim import Adapter
 from adapter_sim.pinout import Pinout, Pull, WireRole, load_pinout
+from bluepill_sim.timing import Span, to_nanos
 from p2os.errors import ScenarioError
+from p2os.event_log import log_event, logger
 from p2os.pioneer.body.contract import RobotBody
 from p2os.pioneer.body.factory import body_note, make_body, resolve_body
 from p2os.pioneer.controller import Pioneer
 from p2os.pioneer.world import load_world
-from p2os.pioneer.world.model import World
+from p2os.pioneer.world.model import Pose, World
 from robot_bench.adapter import RUN_ANEW, AnyAdapter, make_adapter
 from robot_bench.direct import DirectRobot, DistanceSensors, JointMotor, WheelEncoder
 from robot_bench.loop import DEFAULT_SLICE_NS, RunLoop
 from robot_bench.recording.client_view import SipRanges
 from robot_bench.recording.recorder import Recorder
+from robot_bench.recording.run_record import RunRecord, record_of
 from robot_bench.recording.trace import TraceWriter
 from robot_bench.scenario.fault_script import FaultScript
-from robot_bench.scenario.scenario import Scenario, refuse_what_its_world_refuses
+from robot_bench.scenario.goals import Judgement, judge
+from robot_bench.scenario.scenario import (
+    Scenario,
+    ScenarioOptions,
+    load_scenario,
+    refuse_what_its_world_refuses,
+)
+from robot_bench.scenario.schema import nearest
 from robot_bench.scenario.world_script import WorldScript
 from robot_bench.wires.chip_pins import ChipPins
 from robot_bench.wires.endpoints import Endpoint
 from robot_bench.wires.nets import Harness, Net, OwnedPins, Strength
 from robot_bench.wires.ports import Chip
 from robot_bench.wires.serial_line import SerialLine
-from simbase.errors import UsageError
+from simbase.errors import UsageError, shown
 from simbase.state import PartState, Stateful
 from simbase.timing import NS_PER_S, Nanos, Reached
 
@@ -54,6 +65,7 @@ from simbase.timing import NS_PER_S, Nanos, Reached
 AFTER_FAULT_NS: Nanos = 1 * NS_PER_S
 #: Owner of the resistors on the wires.
 RESISTORS = "board"
+_LOG = logger("bench")
 
 
 #: What decides a run besides its files; its end and its goals may be others after a restart.
@@ -77,7 +89,12 @@ class BenchParts:
 
 
 class Bench(Stateful):
-    """A run in virtual time.
+    """A firmware, its robot and its world, run in virtual time; `from_scenario` makes one.
+
+    >>> bench = Bench.from_scenario("motors", body="kinematic")  # doctest: +SKIP
+    >>> bench.run_until("2 s")                                   # doctest: +SKIP
+    >>> bench.pose, bench.level("PB12"), bench.text              # doctest: +SKIP
+    >>> bench.judge().missed                                     # doctest: +SKIP
 
     Args:
         scenario: What to run.
@@ -85,6 +102,11 @@ class Bench(Stateful):
         chip: Runs the firmware; None boots the scenario's on an emulated BluePill.
         slice_ns: How often the loop gives control back; without effect on the result.
         on_slice: Called after each slice with the time reached; may raise to end the run.
+
+    Raises:
+        ScenarioError: The scenario's world refuses it, or its mode has not what it asks for.
+        ImageError: The firmware is missing, damaged, or not for this chip.
+        MissingDependencyError: The emulator or the body is not installed.
     """
 
     STATE = ("made_of", "chip", "_harness", "_robots", "_ranges", "script", "faults", "recorder", "loop")
@@ -110,6 +132,7 @@ class Bench(Stateful):
         chip = chip or boot(scenario.firmware)
         self._harness = harness = make_harness(pinout)
         self.recorder = Recorder(self.trace, harness, body=body)
+        self.recorder.on_event = log_bench_event
         #: What stands at the far end of the wires and owns the body.
         self._robots: list[DirectRobot | Endpoint] = []
         self._ranges: SipRanges | None = None
@@ -131,6 +154,8 @@ class Bench(Stateful):
         followers = (*self._robots, self.script, self.faults, self.recorder)
         self.loop = RunLoop(chip, followers, slice_ns=slice_ns, on_slice=self._after_slice)
         pin_of = {wire.name: wire.bluepill for wire in pinout.wires}
+        #: Name of a wire, or of its pin → name of the wire.
+        self._wires = {pin: name for name, pin in pin_of.items()} | {name: name for name in pin_of}
         pins = ChipPins(chip, harness, pin_of, on_watched=self.loop.note_edge)
         for wire in pinout.with_role(WireRole.RESET):
             pins.watch(wire.name)
@@ -139,6 +164,23 @@ class Bench(Stateful):
         chip.usart1.on_transmit = lambda byte, at: self.recorder.usart(bytes([byte]), at)
         chip.on_warning = lambda text: self.recorder.event("chip", chip.now_ns, "warning", text)
         self.recorder.start()
+
+    @classmethod
+    def from_scenario(cls, scenario: Scenario | str | Path, **options: Unpack[ScenarioOptions]) -> Self:
+        """Return a bench at its beginning.
+
+        Args:
+            scenario: A shipped scenario's name, a TOML file, or a `Scenario`.
+            options: What is to be otherwise than it says: see `ScenarioOptions`.
+
+        Raises:
+            ScenarioError: There is no such scenario, or it breaks the schema.
+            UsageError: An option cannot be.
+            ImageError: The firmware is missing, damaged, or not for this chip.
+            MissingDependencyError: The emulator or the body is not installed.
+        """
+        found = scenario if isinstance(scenario, Scenario) else load_scenario(str(scenario))
+        return cls(found.with_options(**options))
 
     def _bring_adapter_to_edges(self, pins: ChipPins, harness: Harness) -> None:
         """Let a model of the adapter that looks at settled pins wait for their edges instead of sampling on."""
@@ -172,18 +214,65 @@ class Bench(Stateful):
         """Return the time that the chip has come to."""
         return self.parts.chip.now_ns
 
-    def run_until(self, end: Nanos, advance: Callable[[int], Reached] | None = None) -> None:
+    @property
+    def pose(self) -> Pose:
+        """Where the robot is now: metres and radians of the world's plan."""
+        self._bring_robot_to(self.now)
+        state = self.parts.body.state
+        return Pose(state.x_m, state.y_m, state.heading_rad, state.z_m)
+
+    @property
+    def text(self) -> str:
+        """All that the firmware has printed on USART1 so far, undecodable bytes replaced."""
+        printed = record_of(line for line in self.trace.lines() if '"k":"usart"' in line)
+        pieces = [*(data for _, data in printed.usart), self.recorder.unfinished_text]
+        return b"".join(pieces).decode("utf-8", "replace")
+
+    def level(self, wire: str) -> bool:
+        """Return the level on a wire now.
+
+        Args:
+            wire: Its name in the pin-out (`motor1_comm1`), or the BluePill's pin (`PB7`).
+
+        Raises:
+            UsageError: There is no such wire.
+        """
+        if wire not in self._wires:
+            raise UsageError(f"there is no wire {shown(wire)}", hint=nearest(wire, self._wires))
+        return self.parts.harness[self._wires[wire]].level(self.now)
+
+    def record(self) -> RunRecord:
+        """Return what was recorded so far: poses, edges, texts, packets and the state log, each with its time."""
+        return record_of(self.trace.lines())
+
+    def judge(self) -> Judgement:
+        """End the run here and judge the scenario's goals; what an unfinished run could still meet is left open."""
+        return judged(self.trace, self.scenario, self.finish())
+
+    def run_until(self, end: Span, advance: Callable[[int], Reached] | None = None) -> None:
         """Run to `end`, until shortly after a fault of the firmware, or to a debugger's halt.
 
         Args:
-            end: When to come back.
+            end: When to come back, counted from the beginning: nanoseconds, or a text such as "2.5 s".
             advance: As of `RunLoop.run_until`.
+
+        Raises:
+            UsageError: The run has been judged, or finished.
+            BluePillError: `end` is no time.
         """
-        self.loop.run_until(min(end, self.end), advance)
+        end_ns = min(to_nanos(end), self.end)
+        if end_ns > self.now and self.trace.written_until >= self.now:
+            raise UsageError(f"the run was ended at {self.now / NS_PER_S:g} s", hint="make another Bench")
+        had_died = self.chip.has_died
+        self.loop.run_until(end_ns, advance)
+        if self.chip.has_died and not had_died:
+            _LOG.error("chip: %s", self.chip.verdict)
 
     def finish(self) -> Nanos:
         """Bring everything to the end of the run and write the rest of the trace; return the end's time."""
         end = min(self.now, self.end)
+        if self.trace.written_until >= end:
+            return end
         self.loop.finish(end)
         self.recorder.finish(end)
         return end
@@ -310,6 +399,16 @@ def _refuse_others(saved: dict[str, object], here: dict[str, object]) -> None:
         if here.get(what) != value:
             values = f": {value} there, {here.get(what)} here" if isinstance(value, str | int) else ""
             raise UsageError(f"the bench was saved with another {what}{values}", hint=RUN_ANEW)
+
+
+def judged(trace: TraceWriter, scenario: Scenario, end: Nanos) -> Judgement:
+    """Judge a scenario's goals by what a run has recorded until its `end`."""
+    return judge(record_of(trace.lines()), scenario.goals, end_ns=end, planned_ns=scenario.planned_ns)
+
+
+def log_bench_event(who: str, at: Nanos, what: str, detail: str) -> None:
+    """Log a line of a bench's state log."""
+    log_event(_LOG, who, at, what, detail)
 
 
 def boot(firmware: Path) -> Chip:

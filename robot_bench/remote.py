@@ -20,7 +20,7 @@ from p2os.protocol.frames import Decoder, Frame
 from p2os.protocol.sip import SIP_KINDS, StandardSip
 from p2os.transport import Transport
 from robot_bench.adapter import make_adapter
-from robot_bench.bench import boot, make_harness
+from robot_bench.bench import boot, log_bench_event, make_harness
 from robot_bench.loop import RunLoop
 from robot_bench.pacer import PACED_SLICE_NS, RealTimePacer
 from robot_bench.recording.client_view import OdometryPose, SipRanges
@@ -75,6 +75,7 @@ class RemoteBench:
         pinout = load_pinout()
         harness = make_harness(pinout)
         self.recorder = recorder = Recorder(self.trace, harness, body=None)
+        recorder.on_event = log_bench_event
         self.adapter = make_adapter(scenario, OwnedPins(harness, "adapter"), pinout)
         self.adapter.on_event = recorder.listener("adapter")
         self._listener = _Listener(scenario, recorder)

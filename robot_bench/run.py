@@ -21,11 +21,12 @@ from pathlib import Path
 from typing import TYPE_CHECKING, TypeVar
 
 from bluepill_sim.serial_port import QUIET_NS
+from p2os.event_log import logger
 from p2os.pioneer.body.factory import resolve_body
 from p2os.pioneer.world.model import Pose, World
 from p2os.transport import Transport
 from p2os.transport.wall_clock import Clock, wall_clock
-from robot_bench.bench import Bench
+from robot_bench.bench import Bench, judged
 from robot_bench.pacer import PACED_SLICE_NS, RealTimePacer
 from robot_bench.recording.run_folder import reserved
 from robot_bench.recording.run_record import Json, read_run
@@ -33,7 +34,6 @@ from robot_bench.recording.summary import end_of_a_broken_run
 from robot_bench.recording.trace import TRACE_NAME, TraceWriter
 from robot_bench.remote import RemoteBench
 from robot_bench.report.make import make_artefacts
-from robot_bench.scenario.goals import judge
 from robot_bench.scenario.scenario import Scenario
 from robot_bench.wires.ports import Chip
 from simbase.errors import P2osError
@@ -48,7 +48,7 @@ UNPACED_SLICE_NS: Nanos = 10 * NS_PER_MS
 UNKNOWN_PLACE: Json = {"extent": [-4.0, -4.0, 4.0, 4.0], "obstacles": []}
 #: Exit code of errors that whoever types the command can mend.
 WRONG_USAGE = 2
-#: What the packages under the bench raise on purpose; neither knows the other.
+_LOG = logger("bench")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -291,20 +291,20 @@ def _record(
         raise
     end = bench.finish()
     wall_s = (clock() - began) / NS_PER_S
+    for failure in failures:
+        _LOG.error("%s: %s", bench.scenario.name, failure)
     if bench.chip.has_died:
         failures.append(bench.chip.verdict)
-    trace.flush()
-    record = read_run(folder)
-    judged = judge(record, bench.scenario.goals, end_ns=end, planned_ns=bench.scenario.planned_ns)
-    passed = not failures and not judged.missed
+    goals = judged(trace, bench.scenario, end)
+    passed = not failures and not goals.missed
     trace.end(
         _figures(bench, end, wall_s)
         | {
             "trace_sha256": trace.sha256,
             "passed": passed,
-            "failures": failures + judged.missed,
-            "goals_met": judged.met,
-            "goals_not_judged": judged.not_judged,
+            "failures": failures + goals.missed,
+            "goals_met": goals.met,
+            "goals_not_judged": goals.not_judged,
             "notes": notes(bench, end, pacer),
             "last_blocks": last_blocks(bench, end, passed=passed),
             "worst_lag_ms": None if pacer is None else round(pacer.worst_lag_ns / NS_PER_MS, 1),
@@ -312,6 +312,7 @@ def _record(
         | ({} if measurement is None else measurement.write(folder, bench.scenario.firmware.parent))
     )
     made = make_artefacts(folder)
+    _LOG.info("%s %s: %s", bench.scenario.name, "passed" if passed else "failed", made.report)
     return RunResult(folder=folder, outcome=made.outcome, report=made.report, was_interrupted=was_interrupted)
 
 

@@ -49,6 +49,7 @@ class MissingDependencyError(P2osError):
     exit_code = 2
 
     def __init__(self, message: str, *, extra: str | None = None, hint: str | None = None) -> None:
+
         ways = [] if extra is None else [install_command(extra)]
         super().__init__(message, hint=", or ".join([*ways, *([hint] if hint else [])]) or None)
 

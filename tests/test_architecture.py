@@ -61,11 +61,16 @@ IO_LAYER = (
     "robot_bench.cli", "robot_bench.pacer", "robot_bench.live", "robot_bench.report", "robot_bench.firmware.build",
 )  # fmt: skip
 
+#: What may log beside the I/O layer: what joins models to lines, and the bench. A model tells its owner by a callback.
+LOGGING = (
+    "p2os.event_log", "p2os.client.line", "robot_bench.bench", "robot_bench.remote", "robot_bench.run",
+)  # fmt: skip
+
 #: The map of ARCHITECTURE.md, lowest first: a package imports none of its own row and none above it.
 LAYERS = {
-    "simbase": (("timing", "state", "installation", "wire"), ("errors",), ("units",)),
+    "simbase": (("timing", "state", "installation", "wire", "lazy"), ("errors",), ("units",)),
     "p2os": (
-        ("errors",), ("toml_file",), ("robots", "gamepad"), ("protocol",), ("transport",),
+        ("errors", "event_log"), ("toml_file",), ("robots", "gamepad"), ("protocol",), ("transport",),
         ("capture", "client", "pioneer"), ("cli",), ("__main__",),
     ),
     "bluepill_sim": (
@@ -156,6 +161,8 @@ def faults(name: str, targets: set[str]) -> list[str]:
         top = target.split(".")[0]
         if top in FORBIDDEN_IN_CORE and not is_in_io_layer(name):
             result.append(f"{name} imports {target}: only the I/O layer may")
+        elif target in {"logging", "p2os.event_log"} and not is_in_io_layer(name) and name not in LOGGING:
+            result.append(f"{name} imports {target}: models do not log")
         elif top not in sys.stdlib_module_names and top not in {package, BASE} and top not in allowed_for(name):
             result.append(f"{name} imports {target}: its row in ALLOWED does not have it")
         if top == package and is_upwards(name, target):
@@ -207,6 +214,8 @@ def test_one_peripheral_never_imports_another() -> None:
         ("bluepill_sim.core.nvic", "from bluepill_sim.chip import Chip"),
         ("robot_bench.wires.nets", "from robot_bench.run import run_scenario"),
         ("p2os.pioneer.body.kinematic", "import numpy"),
+        ("adapter_sim.adapter", "import logging"),
+        ("p2os.pioneer.controller.controller", "from p2os.event_log import logger"),
         ("bluepill_sim.peripherals.gpio", "from p2os.robots.parameters import load_parameters"),
         ("bluepill_sim.core.nvic", "import unicorn"),
         ("adapter_sim.adapter", "import robot_bench.wires.nets"),

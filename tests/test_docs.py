@@ -6,8 +6,6 @@ that cannot run here says so.
 
 import re
 import runpy
-import subprocess
-import sys
 import tomllib
 from functools import cache
 
@@ -17,7 +15,6 @@ from tests.documentation import command_lines
 from tests.documentation.page import ROOT, Page, pages
 from tests.documentation.session import RUN, run_blocks
 
-LIMIT_S = 240
 KEPT = {"", "text"}  # drawings, and what is no program
 PAGES = pages()
 #: What a fresh machine has not, so that a block may stand unexecuted.
@@ -139,14 +136,6 @@ def test_the_table_of_verbs_has_every_verb() -> None:
     table = (ROOT / "docs" / "cli.md").read_text(encoding="utf-8").partition("\n## ")[0]
     rows = " ".join(line.split("|")[1] for line in table.splitlines() if line.startswith("| "))
     assert set(re.findall(r"`([a-z]+)`", rows)) == set(command_lines.command_line().commands)
-
-
-def test_the_api_reference_is_up_to_date() -> None:
-    done = subprocess.run(
-        [sys.executable, str(ROOT / "tools" / "generate_api.py"), "--check"],
-        capture_output=True, text=True, timeout=LIMIT_S, check=False,
-    )  # fmt: skip
-    assert done.returncode == 0, done.stdout + done.stderr
 
 
 def test_the_ranges_in_the_pages_are_those_that_the_readers_check_by() -> None:

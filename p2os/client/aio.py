@@ -311,10 +311,12 @@ class RobotLoop:
         try:
             self._line.finish()
         finally:
-            self._is_finished = True
+            was_finished, self._is_finished = self._is_finished, True
             if self._loop is not None and not self._loop.is_closed():
                 self._let_go_of_loop()
             self._changed.set()
+            if not was_finished:
+                self._line.log_end()
 
     def check(self) -> None:
         """Raise what the client failed with.
@@ -380,8 +382,8 @@ class RobotLoop:
             self._timer = loop.call_later(wait_s, self._turn)
 
     def _notify(self) -> None:
-        news = list(self.core.news)
-        self.core.news.clear()
+        news = self._line.take_news()
+        self._line.log(news)
         for item in news:
             if isinstance(item, RobotState):
                 for on_state in tuple(self.state_callbacks):

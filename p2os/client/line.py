@@ -13,15 +13,35 @@ Invariant: `finish` returns, or is left by an exception, only after STOP has bee
 """
 
 import contextlib
+import logging
+from collections.abc import Sequence
 
 from p2os.client.core import RobotCore
 from p2os.client.goals import Goal, MotionResult
 from p2os.client.interrupts import held_back
-from p2os.client.notices import ConnectError, GaveUp, LinkLostError, MotionError, NoAnswerError
+from p2os.client.notices import (
+    BaudKept,
+    ConnectError,
+    DeadmanStopped,
+    Disobeyed,
+    GapStopped,
+    GaveUp,
+    LinkLost,
+    LinkLostError,
+    MotionError,
+    MotorsDisabled,
+    NoAnswerError,
+    Notice,
+    OdometryDoubtful,
+    PacketArrived,
+    RobotUnknown,
+    words_of,
+)
 from p2os.client.outbox import CloseLine, OpenLine, Send, SetBaud
-from p2os.client.robot_state import Link
+from p2os.client.robot_state import Link, RobotState
 from p2os.client.settings import ClientSettings
 from p2os.errors import TransportError
+from p2os.event_log import logger
 from p2os.protocol.commands import Command, CommandNumber, enable, stop, vel
 from p2os.robots.parameters import RobotParameters, load_parameters
 from p2os.transport.ports import Transport
@@ -34,6 +54,20 @@ from simbase.timing import NS_PER_S, Nanos
 MOST_READS = 16
 #: chosen: the longest wait of a line that has nothing to do.
 LONGEST_WAIT_NS: Nanos = NS_PER_S // 2
+
+#: chosen: how often a noisy line is told of at most.
+DROPS_LOG_NS: Nanos = NS_PER_S
+
+_LOG = logger("client")
+#: Notices that are no plain news (INFO).
+_LEVELS = {
+    PacketArrived: logging.DEBUG,
+    GaveUp: logging.ERROR,
+    **dict.fromkeys(
+        (LinkLost, BaudKept, DeadmanStopped, Disobeyed, GapStopped, MotorsDisabled, OdometryDoubtful, RobotUnknown),
+        logging.WARNING,
+    ),
+}
 
 #: What is written where the core cannot be asked any more: it was interrupted, or has failed. Some of it may have been
 #: sent already; a repetition changes nothing.
@@ -62,6 +96,9 @@ class Line:
         self._watch = GapWatch(self._looked_at)
         #: The core's time of the last turn.
         self._turned_at: Nanos = 0
+        #: Packets that were dropped on this connection, so far as the log knows, and when it was told.
+        self._logged_drops = 0
+        self._logged_drops_at: Nanos = -DROPS_LOG_NS
         #: The owner is to open the line and to call `opened` or `failed`.
         self.is_wanted = False
 
@@ -124,6 +161,29 @@ class Line:
                         self._lose(error, now)
                 case _:
                     pass  # the line has gone meanwhile
+
+    def take_news(self) -> list[RobotState | Notice]:
+        """Return what the program has to be told, oldest first, and forget it."""
+        news = list(self.core.news)
+        self.core.news.clear()
+        return news
+
+    def log(self, news: Sequence[RobotState | Notice]) -> None:
+        """Log what was taken, and packets that were dropped meanwhile; a program's handlers run here: hold no lock."""
+        for item in news:
+            if not isinstance(item, RobotState):
+                _LOG.log(_LEVELS.get(type(item), logging.INFO), "%s", words_of(item))
+        stats = self.core.stats
+        drops = stats.wire.bad_checksums + stats.wire.bad_counts + stats.wire.stalled + stats.malformed
+        if drops < self._logged_drops:  # another connection
+            self._logged_drops = 0
+        if drops > self._logged_drops and self._looked_at - self._logged_drops_at >= DROPS_LOG_NS:
+            _LOG.warning("packets dropped: %d, not sound", drops - self._logged_drops)
+            self._logged_drops, self._logged_drops_at = drops, self._looked_at
+
+    def log_end(self) -> None:
+        """Log that the client is closed."""
+        _LOG.info("closed")
 
     def wait_s(self) -> float:
         """Return for how many seconds nothing is due without bytes; whoever comes back later has had a gap."""

@@ -4,12 +4,14 @@ Errors are one class for each thing that a program may want to catch; all are
 `P2osError`: one line for a person, and a hint. Notices are past-tense facts, in order.
 """
 
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from typing import Any
 
 from p2os.errors import LocalProtocolError, TransportError
 from p2os.protocol.config_packet import ConfigPacket
 from p2os.protocol.packets import Identity, ServerPacket
-from simbase.timing import Nanos
+from simbase.timing import NS_PER_S, Nanos
 
 
 class ConnectError(TransportError):
@@ -175,3 +177,30 @@ Notice = (
     | OdometryDoubtful
     | PacketArrived
 )
+
+#: What there is to say of a notice beside its name.
+_DETAILS: Mapping[type, Callable[[Any], str]] = {
+    Connected: lambda it: (
+        f"{it.identity.name or 'a robot'} ({it.identity.subclass}){'' if it.baud is None else f' at {it.baud} bit/s'}, "
+        f"after {it.took_ns / NS_PER_S:.1f} s"
+    ),
+    LinkLost: lambda it: it.reason,
+    ReconnectPlanned: lambda it: f"try {it.attempt} in {it.wait_ns / NS_PER_S:.1f} s",
+    GaveUp: lambda it: it.reason,
+    Disobeyed: lambda it: it.text,
+    MotorsDisabled: lambda it: it.reason,
+    DeadmanStopped: lambda it: f"the program made no call for {it.silent_ns / NS_PER_S:.1f} s",
+    GapStopped: lambda it: f"the program paused for {it.gap_ns / NS_PER_S:.1f} s",
+    MotionEnded: lambda it: f"{it.what}{f': {it.problem}' if it.problem else ''}",
+    BaudRaised: lambda it: f"{it.baud} bit/s",
+    BaudKept: lambda it: f"{it.baud} bit/s; no packet came at {it.tried}",
+    RobotUnknown: lambda it: f"{it.subclass!r}, taken for a {it.used}",
+    OdometryDoubtful: lambda it: f"no packet for {it.gap_ns / NS_PER_S:.1f} s",
+}
+
+
+def words_of(notice: Notice) -> str:
+    """Return a notice in words, for a person."""
+    name = "".join(f" {letter.lower()}" if letter.isupper() else letter for letter in type(notice).__name__).strip()
+    detail = _DETAILS.get(type(notice), lambda _: "")(notice)
+    return f"{name}: {detail}" if detail else name

@@ -213,6 +213,7 @@ class RobotThread:
                 self._has_ended = True
                 with contextlib.suppress(RuntimeError):  # without the lock nobody can be notified; their waits time out
                     self.changed.notify_all()
+            self._line.log_end()
 
     def _turn(self) -> bool:
         """Do what is due; return whether all is over."""
@@ -240,8 +241,7 @@ class RobotThread:
         self._wake_thread()
 
     def _take_news(self) -> list[RobotState | Notice]:
-        news = list(self.core.news)
-        self.core.news.clear()
+        news = self._line.take_news()
         for item in news:
             if not isinstance(item, RobotState):
                 for queue in self._queues:
@@ -251,7 +251,8 @@ class RobotThread:
         return news
 
     def _notify(self, news: list[RobotState | Notice]) -> None:
-        """Call the callbacks, without the lock."""
+        """Log, and call the callbacks, without the lock."""
+        self._line.log(news)
         for item in news:
             if isinstance(item, RobotState):
                 for on_state in tuple(self._state_callbacks):

@@ -73,6 +73,8 @@ class Recorder(Stateful):
         sample_ns: Nanos = SAMPLE_NS,
     ) -> None:
         self.trace = trace
+        #: Called with (who, ns, what, detail) of each line of a part's state log.
+        self.on_event: Callable[[str, Nanos, str, str], None] | None = None
         #: Brings the body to an instant before it is looked at; whoever owns the body sets it.
         self.bring_to: Callable[[Nanos], None] = lambda _at: None
         self.min_clearance_m: float | None = None
@@ -97,6 +99,11 @@ class Recorder(Stateful):
         """Have every wire's level at time 0 written once nobody can drive at that instant any more."""
         self._changed = dict.fromkeys(net.name for net in self._harness)
 
+    @property
+    def unfinished_text(self) -> bytes:
+        """What the firmware has printed of a line whose end has not come."""
+        return self._text
+
     def usart(self, data: bytes, at: Nanos) -> None:
         """Take characters that the chip has sent, their last one complete at `at`."""
         for byte in data:
@@ -111,6 +118,8 @@ class Recorder(Stateful):
     def event(self, who: str, at: Nanos, what: str, detail: str) -> None:
         """Take a line of a part's state log."""
         self.trace.add("event", at, {"who": who, "what": what, "detail": detail})
+        if self.on_event is not None:
+            self.on_event(who, at, what, detail)
 
     def listener(self, who: str) -> Callable[[Nanos, str, str], None]:
         """Return a callback for a part's state log."""

@@ -10,7 +10,7 @@ Invariant: reading never fails on a trace that ends early; it fails with
 
 import json
 import re
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import cast
@@ -137,16 +137,27 @@ def read_run(folder: Path) -> RunRecord:
     path = folder / TRACE_NAME
     if not path.is_file():
         raise TraceError(f"{folder} holds no {TRACE_NAME}", hint="give the folder that `p2os run --out DIR` wrote")
+    with path.open(encoding="utf-8", errors="replace") as lines:
+        record = record_of(lines, str(path))
+    if not record.meta:
+        raise TraceError(f"{path} does not start with a trace's meta line", hint="was it made by `p2os run`?")
+    return record
+
+
+def record_of(lines: Iterable[str], where: str = "the trace") -> RunRecord:
+    """Return what the lines of a trace hold.
+
+    Raises:
+        TraceError: A line is damaged.
+    """
     record = RunRecord()
-    for number, entry in enumerate(_entries(path), start=1):
+    for number, entry in enumerate(_entries(lines), start=1):
         try:
             _file(record, entry)
         except (KeyError, TypeError, ValueError, OverflowError) as error:
             raise TraceError(
-                f"{path}:{number}: a damaged line", hint="cut the file before it: what stands above it is reported"
+                f"{where}:{number}: a damaged line", hint="cut the file before it: what stands above it is reported"
             ) from error
-    if not record.meta:
-        raise TraceError(f"{path} does not start with a trace's meta line", hint="was it made by `p2os run`?")
     return record
 
 
@@ -154,19 +165,18 @@ def read_run(folder: Path) -> RunRecord:
 _MOST = 2**63 - 1
 
 
-def _entries(path: Path) -> Iterator[Json]:
+def _entries(lines: Iterable[str]) -> Iterator[Json]:
     """Yield each complete line; stop quietly at the first that is cut or no object."""
-    with path.open(encoding="utf-8", errors="replace") as lines:
-        for line in lines:
-            if not line.endswith("\n"):
-                return
-            try:
-                entry = json.loads(line)
-            except (ValueError, RecursionError):
-                return
-            if not isinstance(entry, dict):
-                return
-            yield entry
+    for line in lines:
+        if not line.endswith("\n"):
+            return
+        try:
+            entry = json.loads(line)
+        except (ValueError, RecursionError):
+            return
+        if not isinstance(entry, dict):
+            return
+        yield entry
 
 
 def _file(record: RunRecord, entry: Json) -> None:

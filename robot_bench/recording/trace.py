@@ -150,6 +150,30 @@ class TraceWriter(Stateful):
                 self._flushed_second = second
                 file.flush()
 
+    @property
+    def written_until(self) -> Nanos:
+        """Return up to when everything is written; -1 before the first."""
+        return self._written_until
+
+    def lines(self) -> Iterator[str]:
+        """Yield every line that was reported so far, with its end, in order; also those not yet written.
+
+        Raises:
+            RunFailedError: The disk is full or gone.
+            FileError: The file cannot be read.
+        """
+        self.flush()
+        if self.path is None:
+            yield from io.StringIO(self.text)
+        else:
+            try:
+                with self.path.open(encoding="utf-8", errors="replace") as lines:
+                    yield from lines
+            except OSError as error:
+                raise FileError(f"cannot read {self.path}: {error.strerror}") from error
+        for _at, _rank, _order, line in sorted(self._pending):
+            yield f"{line}\n"
+
     def flush(self) -> None:
         """Have all that was written so far in the file, for whoever reads it now.
 

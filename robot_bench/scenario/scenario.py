@@ -13,7 +13,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from importlib.resources import as_file, files
 from pathlib import Path
-from typing import cast
+from typing import TypedDict, Unpack, cast
 
 from adapter_sim.codec import BitOrder
 from adapter_sim.settings import AdapterSettings
@@ -107,6 +107,27 @@ TABLES: Mapping[str, tuple[Key, ...]] = {
 }
 
 
+class ScenarioOptions(TypedDict, total=False):
+    """What a command line or a program may set otherwise than a scenario; None keeps it as it is."""
+
+    #: An ELF, HEX or BIN file.
+    firmware: str | Path | None
+    #: `adapter` or `direct`.
+    mode: str | None
+    #: `model` or `firmware`.
+    adapter_core: str | None
+    #: `kinematic`, `bullet`, `mujoco` or `best`.
+    body: str | None
+    #: A shipped world's name or a file.
+    world: str | None
+    #: Of everything random.
+    seed: int | None
+    #: Virtual time of the run, seconds.
+    duration_s: float | None
+    #: Speed of USART1's far end, bit/s.
+    usart_baud: int | None
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Scenario:
     """Everything that a run needs to know."""
@@ -150,37 +171,29 @@ class Scenario:
         """The distance below which something counts as an obstacle, metres."""
         return self.threshold_um / 1e6
 
-    def with_options(
-        self,
-        *,
-        firmware: Path | None = None,
-        mode: str | None = None,
-        adapter_core: str | None = None,
-        body: str | None = None,
-        world: str | None = None,
-        seed: int | None = None,
-        duration_s: float | None = None,
-        usart_baud: int | None = None,
-    ) -> "Scenario":
-        """Return the scenario with what a command line sets otherwise; None keeps it as it is.
+    def with_options(self, **options: Unpack[ScenarioOptions]) -> "Scenario":
+        """Return the scenario with what a command line or a program sets otherwise.
 
         Raises:
             UsageError: A value cannot be.
         """
-        _refuse_unknown("mode", mode, MODES)
-        _refuse_unknown("adapter", adapter_core, ADAPTER_CORES)
-        _refuse_unknown("body", body, BODY_CHOICES)
+        _refuse_unknown("mode", options.get("mode"), MODES)
+        _refuse_unknown("adapter", options.get("adapter_core"), ADAPTER_CORES)
+        _refuse_unknown("body", options.get("body"), BODY_CHOICES)
+        duration_s, world = options.get("duration_s"), options.get("world")
+        seed, usart_baud = options.get("seed"), options.get("usart_baud")
         if duration_s is not None and not 0 < duration_s < math.inf:
             raise UsageError(f"a run of {duration_s:g} s cannot be", hint="--duration takes more than 0, such as 10s")
-        if firmware is not None and not firmware.is_file():
+        firmware = Path(options.get("firmware") or self.firmware)
+        if options.get("firmware") and not firmware.is_file():
             raise UsageError(f"there is no firmware file {firmware}", hint="give an ELF, HEX or BIN file")
         moved = self if world is None else self._moved_to(world)
         return replace(
             moved,
-            firmware=firmware or moved.firmware,
-            mode=mode or moved.mode,
-            adapter_core=adapter_core or moved.adapter_core,
-            body=body or moved.body,
+            firmware=firmware,
+            mode=options.get("mode") or moved.mode,
+            adapter_core=options.get("adapter_core") or moved.adapter_core,
+            body=options.get("body") or moved.body,
             usart_baud=moved.usart_baud if usart_baud is None else usart_baud,
             seed=moved.seed if seed is None else seed,
             duration_ns=moved.duration_ns if duration_s is None else round(duration_s * NS_PER_S),

@@ -6,7 +6,8 @@ from pathlib import Path
 
 import pytest
 
-from adapter_sim import Adapter, AdapterSettings, Pinout, load_pinout, motor_code
+from adapter_sim import Adapter, AdapterSettings, Pinout, load_pinout
+from adapter_sim.codec import motor_code
 from p2os.protocol.commands import Command
 from p2os.protocol.connection import CommandReceived, Connection, ConnectionRole, Opened
 from p2os.protocol.frames import Frame

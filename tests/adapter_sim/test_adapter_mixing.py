@@ -6,7 +6,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from adapter_sim import AdapterSettings, Mixer, MotorMeaning, Speeds, threshold_um
+from adapter_sim import AdapterSettings, MotorMeaning
+from adapter_sim.distances import threshold_um
+from adapter_sim.mixing import Mixer, Speeds
 from p2os.robots.parameters import load_parameters
 from simbase.errors import UsageError
 

@@ -1,13 +1,18 @@
 """A bench with a scripted chip: both modes, any slice, cut in two, the same trace."""
 
 import json
+import logging
 import pickle
+from collections.abc import Callable
 from dataclasses import replace
+from pathlib import Path
 
 import pytest
 
+from bluepill_sim.errors import BluePillError
 from robot_bench.bench import Bench
 from robot_bench.scenario.scenario import Scenario, load_scenario
+from simbase.errors import UsageError
 from tests.p2os.pioneer.body.bodies import each_body
 from tests.robot_bench.wires.fake_chip import FakeChip, PinDrive
 
@@ -159,3 +164,61 @@ def test_a_run_goes_on_when_the_firmware_comes_back_from_a_fault(slice_ns: int) 
     made = finished(Bench(scenario("direct", duration_s=2), chip=chip, slice_ns=slice_ns))
     assert chip.fault is not None
     assert made.finish() == 2 * S
+
+
+@pytest.mark.parametrize("mode", MODES)
+def test_a_program_looks_at_levels_pose_and_text_of_a_run_and_changes_nothing_by_it(mode: str) -> None:
+    looked, unseen = bench(scenario(mode)), finished(bench(scenario(mode)))
+    looked.run_until("1.5 s")
+    assert [looked.level(wire) for wire in (*LEFT, "motor1_comm1", "motor2_comm3")] == [True, True, False, True, False]
+    assert looked.text == "hello\nworld"
+    assert (looked.now, looked.record().last_ns) >= (1_500_000_000, 1_400_000_000)
+    assert looked.pose.x_m == pytest.approx(looked.parts.body.state.x_m)
+    looked.run_until("3 s")
+    looked.finish()
+    assert looked.trace.sha256 == unseen.trace.sha256
+
+
+def test_judging_ends_a_run_once_and_leaves_open_what_a_longer_one_could_meet() -> None:
+    made = bench(scenario("adapter"))
+    made.run_until("1.5 s")
+    judgement = made.judge()
+    assert (judgement.met, judgement.missed, len(judgement.not_judged)) == (["touches nothing"], [], 3)
+    digest = made.trace.sha256
+    assert made.judge() == judgement
+    assert made.finish() == made.now
+    with pytest.raises(UsageError, match=r"the run was ended at 1\.5 s"):
+        made.run_until("2 s")
+    assert made.trace.sha256 == digest
+
+
+def test_a_bench_is_made_of_a_scenario_by_name_by_file_or_as_it_is(tmp_path: Path) -> None:
+    file = tmp_path / "mine.toml"
+    file.write_text(load_scenario("motors").text, encoding="utf-8")
+    for one in ("motors", file, str(file), load_scenario("motors")):
+        made = Bench.from_scenario(one, body="kinematic", mode="direct", seed=7, duration_s=2)
+        found = made.scenario
+        assert (found.body, found.mode, found.seed, made.end) == ("kinematic", "direct", 7, 2 * S)
+
+
+@pytest.mark.parametrize(
+    ("do", "message"),
+    [
+        (lambda made: made.level("PB99"), "there is no wire 'PB99'"),
+        (lambda made: made.run_until("2"), "'2' is no span of time"),
+        (lambda made: made.from_scenario("motors", firmware="none.elf"), "there is no firmware file none.elf"),
+    ],
+)
+def test_a_wrong_word_to_a_bench_is_refused_with_a_hint(do: Callable[[Bench], object], message: str) -> None:
+    with pytest.raises((UsageError, BluePillError), match=message) as refused:
+        do(bench(scenario("direct")))
+    assert refused.value.hint
+
+
+def test_a_bench_logs_what_its_parts_note_with_their_time(caplog: pytest.LogCaptureFixture) -> None:
+    caplog.set_level(logging.INFO, "p2os")
+    finished(bench(scenario("adapter")))
+    lines = [record.getMessage() for record in caplog.records if record.name == "p2os.bench"]
+    assert lines[0].startswith("adapter at 0.")
+    assert any(line.startswith("pioneer at ") and line.endswith(": opened") for line in lines)
+    assert not any(": command" in line for line in lines)

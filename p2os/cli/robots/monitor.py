@@ -14,7 +14,8 @@ from p2os.cli.links.link_quality import LinkQuality
 from p2os.cli.names import ReportedModel, RobotUrl
 from p2os.cli.quantities import option
 from p2os.cli.robots.dashboard import Dashboard, draw, line_of
-from p2os.client import Notice, PacketArrived, Robot, RobotState
+from p2os.client import PacketArrived, Robot, RobotState
+from p2os.client.notices import words_of
 from p2os.transport.wall_clock import wall_clock
 from simbase.errors import MissingDependencyError
 from simbase.timing import NS_PER_MS, NS_PER_S, Nanos
@@ -70,13 +71,6 @@ def state_as_plain(state: RobotState, start_ns: Nanos = 0) -> dict[str, object]:
         "sonar_m": sonar,
     }
     return {name: plain(value) for name, value in fields.items()}
-
-
-def words_of(notice: Notice) -> str:
-    """Return a notice in words, for a person."""
-    name = "".join(f" {letter.lower()}" if letter.isupper() else letter for letter in type(notice).__name__).strip()
-    detail = getattr(notice, "reason", None) or getattr(notice, "text", None) or getattr(notice, "what", None)
-    return f"{name}: {detail}" if detail else name
 
 
 def _print_states(client: Robot, lasts_ns: Nanos | None, *, as_json: bool) -> None:

@@ -21,6 +21,7 @@ from functools import partial
 from typing import cast
 
 from p2os.errors import TransportError
+from p2os.event_log import EventCallback, logged, logger
 from p2os.pioneer.body.contract import RobotBody
 from p2os.pioneer.controller import Pioneer
 from p2os.pioneer.serve.aux_endpoint import AuxEndpoint
@@ -33,8 +34,7 @@ from p2os.transport.waiting import BLIND_POLL_S, ClosingLines, has_hung_up, wait
 from p2os.transport.wall_clock import wall_clock
 from simbase.timing import NS_PER_S, Nanos
 
-#: (robot's time in ns, what happened in a word or two, detail).
-HostEvent = Callable[[Nanos, str, str], None]
+_LOG = logger("serve")
 
 #: chosen: well below the pause, and often enough for a robot that is connected but not open.
 ACTIVE_WAIT_S = 0.1
@@ -70,7 +70,7 @@ class Host:
         pioneer: Pioneer,
         listener: Listener,
         *,
-        on_event: HostEvent | None = None,
+        on_event: EventCallback | None = None,
         clock: Callable[[], Nanos] = wall_clock,
         speed: float = 1.0,
         shared: tuple[RobotTime, MultiRobotWorld, int] | None = None,
@@ -79,9 +79,10 @@ class Host:
         sync_limit_ns: Nanos | None = None,
     ) -> None:
         self.pioneer = pioneer
+        pioneer.on_event = logged(_LOG, listener.description, pioneer.on_event)
         self.listener = listener
         self.aux = tuple(aux)
-        self._on_event = on_event
+        self._notified = logged(_LOG, listener.description, on_event)
         self._time = RobotTime(clock, speed) if shared is None else shared[0]
         self._bring: Callable[[Nanos], object] = self._advance_to
         #: Of the robots that share the world, if others do.
@@ -401,5 +402,4 @@ class Host:
             self.pioneer.count_silence(silence, self.now)
 
     def _notify(self, what: str, detail: str) -> None:
-        if self._on_event is not None:
-            self._on_event(self.now, what, detail)
+        self._notified(self.now, what, detail)

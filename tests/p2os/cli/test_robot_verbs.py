@@ -20,7 +20,6 @@ sys.path.insert(0, str(Path(__file__).parent))
 from p2os.cli.held_robot import RobotWatch, problem_of
 from p2os.cli.links.bench import Bench, lines_of, measure
 from p2os.cli.links.ports import guess
-from p2os.cli.robots.monitor import words_of
 from p2os.cli.robots.send import make_command
 from p2os.client import (
     DeadmanStopped,
@@ -32,6 +31,7 @@ from p2os.client import (
     ReconnectPlanned,
     Robot,
 )
+from p2os.client.notices import words_of
 from p2os.errors import RemoteProtocolError, TransportError
 from p2os.protocol.commands import CommandNumber
 from p2os.transport import waiting
@@ -197,7 +197,7 @@ def test_states_are_printed_where_there_is_no_terminal(served: object, run: Run,
 
 def test_what_happened_is_told_in_words() -> None:
     assert words_of(LinkLost("no packet")) == "link lost: no packet"
-    assert words_of(ReconnectPlanned(1, 5)) == "reconnect planned"
+    assert words_of(ReconnectPlanned(1, 500_000_000)) == "reconnect planned: try 1 in 0.5 s"
     assert words_of(MotorsDisabled("button")) == "motors disabled: button"
 
 
