@@ -11,6 +11,7 @@ Allowed are success and the project's own errors; anything else, a second line o
 """
 
 import argparse
+import base64
 import json
 import random
 import re
@@ -588,6 +589,47 @@ def _stl() -> Seed:
     return Seed("seed.stl", bytes(80) + struct.pack("<I", len(rows)) + b"".join(rows))
 
 
+def _gltf() -> dict[str, object]:
+    """Return a tent, shown twice, and a strip within a node; its bytes are `_gltf_bytes`."""
+    view = {"buffer": 0, "byteOffset": 0, "byteLength": 48, "byteStride": 12}
+    return {
+        "asset": {"version": "2.0", "generator": "by hand"}, "scene": 0, "scenes": [{"nodes": [0, 3]}],
+        "nodes": [
+            {"name": "base", "translation": [2, 0, -2], "rotation": [0, 0.7071068, 0, 0.7071068], "children": [1, 2]},
+            {"mesh": 0, "scale": [2, 1, 1]}, {"mesh": 1, "camera": 0},
+            {"mesh": 0, "matrix": [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, -2, 0, 2, 1]},
+        ],
+        "meshes": [
+            {"name": "tent", "primitives": [{"attributes": {"POSITION": 0}, "indices": 1, "material": 0}]},
+            {"primitives": [{"mode": 5, "attributes": {"POSITION": 0}}, {"mode": 1, "attributes": {"POSITION": 0}}]},
+        ],
+        "materials": [{}], "cameras": [{"type": "orthographic"}],
+        "accessors": [
+            {"bufferView": 0, "componentType": 5126, "count": 4, "type": "VEC3", "min": [0, 0, 0], "max": [1, 1, 1]},
+            {"bufferView": 1, "componentType": 5123, "count": 12, "type": "SCALAR"},
+        ],
+        "bufferViews": [view, {"buffer": 0, "byteOffset": 48, "byteLength": 24}],
+        "buffers": [{"byteLength": 72}],
+    }  # fmt: skip
+
+
+def _gltf_bytes() -> bytes:
+    return struct.pack("<12f12H", *(0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 1, 0), *(0, 2, 1, 0, 1, 3, 0, 3, 2, 1, 2, 3))
+
+
+def _gltf_text() -> list[Seed]:
+    uris = ("part.bin", "data:application/octet-stream;base64," + base64.b64encode(_gltf_bytes()).decode())
+    documents = [_gltf() | {"buffers": [{"byteLength": 72, "uri": uri}]} for uri in uris]
+    return [Seed("seed.gltf", json.dumps(one, indent=1).encode(), {"part.bin": _gltf_bytes()}) for one in documents]
+
+
+def _glb() -> Seed:
+    text = json.dumps(_gltf()).encode()
+    chunks = [(b"JSON", text + b" " * (-len(text) % 4)), (b"BIN\0", _gltf_bytes())]
+    body = b"".join(struct.pack("<I", len(data)) + kind + data for kind, data in chunks)
+    return Seed("seed.glb", struct.pack("<4sII", b"glTF", 2, 12 + len(body)) + body)
+
+
 def _sessions() -> list[Seed]:
     found = []
     for path in sorted((GOLDEN / "captures").glob("*.jsonl")):
@@ -687,6 +729,8 @@ FORMATS: Mapping[str, FileFormat] = {
     "stl": FileFormat(_own(_text("seed.stl", STL_TEXT)), "words", use_world),
     "stl-binary": FileFormat(_own(_stl()), "bytes", use_world),
     "collada": FileFormat(_own(_text("seed.dae", DAE)), "words", use_world),
+    "gltf": FileFormat(_gltf_text, "json", use_world),
+    "glb": FileFormat(_own(_glb()), "bytes", use_world),
     "fleet": FileFormat(_own(Seed("seed.toml", FLEET.encode(), _CONTROLLER_BESIDE)), "toml", use_fleet),
     "flash": FileFormat(_own(_text("seed.toml", FLASH)), "toml", use_flash),
     "sensor-errors": FileFormat(_own(_text("seed.toml", SENSOR_ERRORS)), "toml", use_sensor_errors),

@@ -26,7 +26,8 @@ from simbase.units import SEED
 HELP = """List, draw, check, make and convert worlds.
 
 A world is one that ships, a TOML file, or a file of another program: an ARIA
-map, an occupancy image with its YAML, SDF, URDF, OBJ, STL or COLLADA.
+map, an occupancy image with its YAML, SDF, URDF, OBJ, STL,
+COLLADA or glTF.
 
 \b
 Examples:
@@ -40,7 +41,7 @@ Examples:
 #: Widest drawing in a terminal, in characters.
 WIDEST_COLUMNS = 100
 #: Files whose up axis may be named.
-MESH_SUFFIXES = (".obj", ".stl", ".dae")
+MESH_SUFFIXES = (".obj", ".stl", ".dae", ".gltf", ".glb")
 
 WORLD = Annotated[
     str, typer.Argument(help="A world that ships, or a file.", metavar="WORLD|FILE", autocompletion=worlds)

@@ -8,6 +8,7 @@ Invariant: no name is given twice, and no world is larger than a body can take.
 """
 
 import math
+from bisect import bisect_left, bisect_right
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 
@@ -36,6 +37,8 @@ LOW_M, HIGH_M = 0.05, 0.5
 #: The plan is searched on a grid of so many places along its longer side.
 PLACES = 24
 MOST_TRIANGLES = 200_000
+#: In a mesh file, before it is known which of them triangles use.
+MOST_VERTICES = 1_000_000
 MOST_THINGS = 20_000
 #: The floor reaches so far beyond what stands on it, m.
 MARGIN_M = 0.5
@@ -239,19 +242,6 @@ def _free_start(
     obstacles: Iterable[Obstacle], meshes: Iterable[Mesh], extent: tuple[float, float, float, float]
 ) -> Pose:
     """Return the origin where it is free, else the free place nearest to the middle, else the middle."""
-    footprints = [Footprint(item) for item in obstacles if item.stands_in(LOW_M, HIGH_M)]
-    segments = [
-        (a, b)
-        for mesh in meshes
-        for polygon in shadow(mesh, LOW_M, HIGH_M)
-        for a, b in zip(polygon, (*polygon[1:], polygon[0]), strict=True)
-    ]
-
-    def is_free(x: float, y: float) -> bool:
-        return all(thing.distance_to_point(x, y) > FREE_M for thing in footprints) and all(
-            _distance_to_segment(x, y, a, b) > FREE_M for a, b in segments
-        )
-
     x0, y0, x1, y1 = extent
     middle_x, middle_y = (x0 + x1) / 2, (y0 + y1) / 2
     step = max(x1 - x0, y1 - y0) / PLACES
@@ -262,10 +252,28 @@ def _free_start(
     ]
     grid.sort(key=lambda place: math.dist(place, (middle_x, middle_y)))
     origin = [(0.0, 0.0)] if x0 < 0 < x1 and y0 < 0 < y1 else []
-    for x, y in (*origin, (middle_x, middle_y), *grid):
-        if is_free(x, y):
-            return Pose(round(x, 3), round(y, 3), 0.0)
-    return Pose(middle_x, middle_y, 0.0)
+    footprints = [Footprint(item) for item in obstacles if item.stands_in(LOW_M, HIGH_M)]
+    tried = (*origin, (middle_x, middle_y), *grid)
+    left = sorted(place for place in {*tried} if all(thing.distance_to_point(*place) > FREE_M for thing in footprints))
+    for mesh in meshes:
+        for polygon in shadow(mesh, LOW_M, HIGH_M):
+            for a, b in zip(polygon, (*polygon[1:], polygon[0]), strict=True):
+                _drop_near(left, a, b)
+            if not left:
+                return Pose(middle_x, middle_y, 0.0)
+    x, y = next((place for place in tried if place in left), (middle_x, middle_y))
+    return Pose(round(x, 3), round(y, 3), 0.0) if left else Pose(x, y, 0.0)
+
+
+def _drop_near(places: list[tuple[float, float]], a: tuple[float, float], b: tuple[float, float]) -> None:
+    """Take out of sorted places those near a segment; only those about its own x are looked at."""
+    low, high = min(a[1], b[1]) - FREE_M, max(a[1], b[1]) + FREE_M
+    first = bisect_left(places, (min(a[0], b[0]) - FREE_M, -math.inf))
+    last = bisect_right(places, (max(a[0], b[0]) + FREE_M, math.inf))
+    for number in range(last - 1, first - 1, -1):
+        x, y = places[number]
+        if low <= y <= high and _distance_to_segment(x, y, a, b) <= FREE_M:
+            del places[number]
 
 
 def _distance_to_segment(x: float, y: float, a: tuple[float, float], b: tuple[float, float]) -> float:

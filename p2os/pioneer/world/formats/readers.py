@@ -25,6 +25,8 @@ FORMATS: Mapping[str, str] = {
     ".obj": "mesh_file",
     ".stl": "mesh_file",
     ".dae": "mesh_file",
+    ".gltf": "mesh_file",
+    ".glb": "mesh_file",
 }
 
 

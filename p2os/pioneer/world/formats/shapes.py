@@ -9,6 +9,9 @@ from p2os.pioneer.world.formats.mesh_file import read_triangles
 from p2os.pioneer.world.formats.transform import Transform, after, apply, scaled
 from p2os.pioneer.world.formats.xml_tree import Element, numbers
 
+#: Mesh formats that say which axis is up.
+STATES_ITS_AXIS = (".dae", ".gltf", ".glb")
+
 
 def take_geometry(
     name: str, geometry: Element, place: Transform, collection: Collection, path: Path, *, in_attributes: bool
@@ -55,8 +58,8 @@ def _take_mesh(
     if not file_name.strip():
         raise WorldError(f"{path}:{shape.line}: <mesh> names no file")
     mesh_path = find_local(file_name, path)
-    # These formats take a mesh's axes as they are, but for what COLLADA states of its own.
-    found = read_triangles(mesh_path, "auto" if mesh_path.suffix.lower() == ".dae" else "z")
+    # These formats take a mesh's axes as they are, but for what the mesh's own states.
+    found = read_triangles(mesh_path, "auto" if mesh_path.suffix.lower() in STATES_ITS_AXIS else "z")
     for what in found.skipped:
         collection.skip(what)
     collection.add_mesh(name, apply(after(place, scaled(x, y, z)), found.vertices), found.triangles)

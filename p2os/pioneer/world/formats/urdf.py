@@ -5,6 +5,9 @@ box, cylinder, sphere, mesh; joints of every kind at their zero.
 
 Left out, and reported: movement, masses, transmissions, sensors. Xacro files must
 be expanded first.
+
+Ours and not yourdfpy's: yourdfpy 0.0.60 brings 300 MB of packages (scipy, embree, ...) for these 80 lines, fails with
+a TypeError on `package://file`, takes one in five damaged files that are refused here, and names no line.
 """
 
 from pathlib import Path

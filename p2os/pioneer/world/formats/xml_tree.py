@@ -2,6 +2,9 @@
 
 A document type declaration is refused, so there are no entities to expand and
 nothing is fetched; the number of elements and their depth are bounded.
+
+Over expat of the standard library, and not lxml or defusedxml: lxml (12 MB) builds its tree before the
+elements can be counted and drops entities without a word; defusedxml knows no line to name.
 """
 
 from dataclasses import dataclass, field

@@ -1,6 +1,7 @@
 """Files that are odd but right, and small files that ask for much: read as they are meant, or refused in one line."""
 
 import os
+import time
 from pathlib import Path
 
 import pytest
@@ -250,3 +251,16 @@ def test_the_command_says_it_in_one_line_and_ends_with_2(tmp_path: Path, capsys:
     captured = capsys.readouterr()
     assert captured.err.splitlines()[0] == f"p2os: {tmp_path / 'a.obj'}:2: 'f 1 2' cannot be read"
     assert captured.out == ""
+
+
+def test_the_start_in_a_large_uneven_field_is_found_at_once(tmp_path: Path) -> None:
+    side = 100  # 19 602 triangles, each through the height of the hull, over 10 x 10 m
+    points = "".join(f"v {x / 10} {(x + y) % 2} {y / 10}\n" for y in range(side) for x in range(side))
+    faces = "".join(
+        f"f {i} {i + 1} {i + side}\nf {i + 1} {i + side + 1} {i + side}\n"
+        for i in (1 + y * side + x for y in range(side - 1) for x in range(side - 1))
+    )
+    begun = time.perf_counter()
+    world = read(tmp_path / "a.obj", points + faces)
+    assert time.perf_counter() - begun < 5  # 30 s where each place is compared with each triangle
+    assert (world.start.x_m, world.start.y_m) == pytest.approx((4.95, -4.95))  # no place is free: the middle
