@@ -49,7 +49,7 @@ def test_both_cores_measure_the_same(tmp_path: Path, monkeypatch: pytest.MonkeyP
 
 
 def test_files_summary_and_page_tell_of_one_measurement(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    words = ["run", "sensors", "--mode", "direct", "--body", "kinematic", "--duration", "1"]
+    words = ["run", "sensors", "--mode", "direct", "--body", "kinematic", "--duration", "1s"]
     assert p2os([*words, "--out", str(tmp_path / "run"), "--coverage", "--profile", "--json"]) in {0, 1}
     outcome = json.loads(capsys.readouterr().out)
     folder, facts = tmp_path / "run", outcome["coverage"]
