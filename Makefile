@@ -31,7 +31,9 @@ demo: setup
 	    echo; echo "type next:  . $(BIN)/activate    (p2os is then on your PATH in this terminal)"; \
 	    echo "then:       p2os doctor"; exit $$status
 
-test: lint type unit
+# The type check fills the time in which tests wait.
+test: lint
+	$(MAKE) --no-print-directory -j2 type unit
 
 lint: setup
 	$(BIN)/ruff check .
@@ -40,11 +42,10 @@ lint: setup
 type: setup
 	$(BIN)/mypy
 
-# Coverage is counted where a test is quick; the long runs of the whole chain go without it.
+# One run for all; whose lines are counted says tests/conftest.py.
 unit: setup
-	$(BIN)/pytest -n $(JOBS) -m 'not slow and not soak and not hardware' --cov --cov-report=json:.coverage.json
+	$(BIN)/pytest -n $(JOBS) --dist worksteal -m 'not soak and not hardware' --cov --cov-report=json:.coverage.json
 	$(BIN)/python tools/check_coverage.py .coverage.json
-	$(BIN)/pytest -n $(JOBS) -m 'slow and not soak and not hardware'
 
 bench: setup
 	$(BIN)/python tools/bench_emulator.py
