@@ -6,6 +6,7 @@ from typing import Annotated
 
 import typer
 
+from p2os.cli.help_pages import BENCH
 from p2os.pioneer.body.factory import BEST, resolve_body
 from robot_bench.firmware.build import COMPILER
 from robot_bench.project.files import project_files, write_project
@@ -24,7 +25,7 @@ Examples:
 
 def register(app: typer.Typer) -> None:
     """Add the verb."""
-    app.command("new", help=HELP)(new)
+    app.command("new", help=HELP, rich_help_panel=BENCH)(new)
 
 
 def new(folder: Annotated[Path, typer.Argument(help="A folder that is new or empty.", metavar="FOLDER")]) -> None:
