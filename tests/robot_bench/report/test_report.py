@@ -10,8 +10,8 @@ from robot_bench.recording.run_record import TraceError, WireChunk, read_run
 from robot_bench.recording.signals import grouped, motor_steps
 from robot_bench.recording.summary import cells_entered, distance_m, figures, verdict
 from robot_bench.report import make_report
-from robot_bench.report.page import page_data
 from robot_bench.report.packets import describe
+from robot_bench.report.page import page_data
 
 SIP = "fafb1b33a604000000049600fa007d00000004030000000000000000"
 
@@ -91,7 +91,7 @@ def test_the_page_says_of_a_run_what_the_screen_says(end: dict[str, object], sai
     record = read_run(run)
     assert verdict(record) == said
     page = make_report(run).page.read_text(encoding="utf-8")
-    assert f'<span class="verdict {said.split()[0].strip(",")}">{said}</span>' in page
+    assert f'<span class="verdict {said.split(maxsplit=1)[0].strip(",")}">{said}</span>' in page
     assert page_data(record)["title"].endswith(f": {said}")
 
 
