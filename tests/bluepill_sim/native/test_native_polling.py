@@ -60,7 +60,9 @@ WAITS = {
     "the cycle counter": "mov32 r4, #0xE0001004\nb w@\nw@: ldr r3, [r4, #0]\n.half 0x051B\nbpl w@",
     "a bit of the time": "mov32 r4, #0xE000E018\nb w@\nw@: ldr r3, [r4, #0]\n.half 0x0A5B\nbne w@",
     "a count": "movs r3, #200\nb w@\nw@: ldr r4, [r6, #0]\nsubs r3, #1\nbne w@",
-    "room for a character": "mov32 r4, #0x40013800\nstr r4, [r4, #4]\nb w@\nw@: nop\nnop\nldr r3, [r4, #0]\n.half 0x061B\nbpl w@",
+    "room for a character": (
+        "mov32 r4, #0x40013800\nstr r4, [r4, #4]\nb w@\nw@: nop\nnop\nldr r3, [r4, #0]\n.half 0x061B\nbpl w@"
+    ),
     "two things": "ldr r4, [r6, #0]\nb w@\nw@: ldr r3, [r6, #0]\n.half 0x42A3\nbne x@\nb w@\nx@: nop",
     "with a store": "ldr r4, [r6, #0]\nb w@\nw@: str r3, [r6, #4]\nldr r3, [r6, #0]\n.half 0x42A3\nbeq w@",
 }
