@@ -30,7 +30,7 @@ from robot_bench.bench import Bench, judged
 from robot_bench.pacer import PACED_SLICE_NS, RealTimePacer
 from robot_bench.recording.run_folder import reserved
 from robot_bench.recording.run_record import Json, read_run
-from robot_bench.recording.summary import end_of_a_broken_run
+from robot_bench.recording.summary import INTERRUPTED, end_of_a_broken_run
 from robot_bench.recording.trace import TRACE_NAME, TraceWriter
 from robot_bench.remote import RemoteBench
 from robot_bench.report.make import make_artefacts
@@ -245,7 +245,7 @@ def _trace_of(scenario: Scenario, folder: Path, *, is_at_port: bool) -> Iterator
 def _reason(error: BaseException) -> str:
     """Return why a run ended, in one line."""
     if isinstance(error, KeyboardInterrupt):
-        return f"interrupted ({error})" if error.args else "interrupted"
+        return f"{INTERRUPTED} ({error})" if error.args else INTERRUPTED
     if isinstance(error, (P2osError, ModuleNotFoundError)):
         return str(error)
     return f"this is a bug: {type(error).__name__}: {error}"

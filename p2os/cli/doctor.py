@@ -72,9 +72,12 @@ NEEDS = (
     Need(name="numpy", kind="package", feature="--body bullet, --body mujoco", extra="columns"),
     Need(name="pyarrow", kind="package", feature="export to Parquet and Arrow", extra="export"),
     Need(name="mcap", kind="package", feature="export to MCAP", extra="export"),
+    Need(name="pillow", kind="package", feature="worlds from ROS maps: pictures", extra="worlds"),
+    Need(name="pyyaml", kind="package", feature="worlds from ROS maps", extra="worlds"),
+    Need(name="pygame-ce", kind="package", feature="teleop --pad", extra="pad"),
     Need(name="tshark", kind="program", feature="captures on the command line", get="sudo apt-get install tshark"),
     Need(
-        name="bluepill_sim._native", kind="built", feature="the emulated BluePill at full speed",
+        name="bluepill_sim._native", kind="built", feature="the BluePill at full speed",
     ),
     Need(
         name="robot_bench._adapter_firmware", kind="built", feature="--adapter firmware",
@@ -178,5 +181,6 @@ def doctor(json_output: Annotated[bool, typer.Option("--json", help="Print a JSO
 def line_of(finding: Finding) -> str:
     """Return a line of the table, and of what is missing a second one with the way to get it."""
     state = "ok     " if finding.found is not None else "missing"
-    line = f"{state}  {finding.name:<18}  {finding.feature:<31}  {finding.found or ''}".rstrip()
+    name = finding.name.rpartition(".")[2] if finding.kind == "built" else finding.name
+    line = f"{state}  {name:<18}  {finding.feature:<31}  {finding.found or ''}".rstrip()
     return line if finding.found is not None else f"{line}\n         get it: {finding.get}"

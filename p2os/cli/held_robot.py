@@ -61,7 +61,7 @@ def held(robot: AbstractContextManager[Held], *, moves: bool = False) -> Iterato
         with postponed():
             if not robot.__exit__(*sys.exc_info()):
                 if moves and isinstance(error, KeyboardInterrupt):
-                    sys.stderr.write("\ninterrupted: the robot was stopped and let go\n")
+                    sys.stderr.write("\nthe robot was stopped and let go\n")
                 raise
     else:
         with postponed():

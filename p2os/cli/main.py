@@ -48,8 +48,8 @@ EPILOG = """Examples:
   p2os scan                         find a robot, and identify it
   p2os monitor tcp:127.0.0.1:8101   watch it
   p2os drive URL --forward 0.5m     move it
-  p2os decode --explain fafb03000000what bytes mean, one by one
-  p2os doctor                       show what is installed and what is missing
+  p2os decode fafb03000000          what bytes mean
+  p2os doctor                       what is installed, what is missing
 
 With --trace anywhere, an error shows where in the program it arose.
 """

@@ -141,11 +141,16 @@ class Robot(RobotCalls):
         if self._core.link is not Link.OPEN:
             raise not_connected(self._core)
 
-    async def states(self) -> AsyncIterator[RobotState]:
-        """Yield each new state as it comes, the newest where the program is slow; ends when the client does."""
+    async def states(self, lasts_s: float | None = None) -> AsyncIterator[RobotState]:
+        """Yield each new state as it comes, the newest where the program is slow.
+
+        Ends when the client does, and after `lasts_s` seconds, also while the robot is lost; None: never.
+        """
         last: RobotState | None = None
-        while True:
-            await self._wait_for(lambda core, seen=last: core.state is not seen or _is_over(core), None)  # type: ignore[misc]  # bound now
+        ends = None if lasts_s is None else wall_clock() + round(lasts_s * NS_PER_S)
+        while ends is None or wall_clock() < ends:
+            left_s = None if ends is None else (ends - wall_clock()) / NS_PER_S
+            await self._wait_for(lambda core, seen=last: core.state is not seen or _is_over(core), left_s)  # type: ignore[misc]  # bound now
             state = self._core.state
             if state is None or state is last:
                 return

@@ -162,12 +162,17 @@ class Robot(RobotCalls):
             if thread.core.link is not Link.OPEN:
                 raise not_connected(thread.core)
 
-    def states(self) -> Iterator[RobotState]:
-        """Yield each new state as it comes, the newest where the program is slow; ends when the client does."""
+    def states(self, lasts_s: float | None = None) -> Iterator[RobotState]:
+        """Yield each new state as it comes, the newest where the program is slow.
+
+        Ends when the client does, and after `lasts_s` seconds, also while the robot is lost; None: never.
+        """
         thread, last = self._thread, None
-        while True:
+        ends = None if lasts_s is None else wall_clock() + round(lasts_s * NS_PER_S)
+        while ends is None or wall_clock() < ends:
+            left_s = None if ends is None else (ends - wall_clock()) / NS_PER_S
             with thread.changed:
-                thread.wait_for(lambda core, seen=last: core.state is not seen or _is_over(core), None)  # type: ignore[misc]  # bound now
+                thread.wait_for(lambda core, seen=last: core.state is not seen or _is_over(core), left_s)  # type: ignore[misc]  # bound now
                 state = thread.core.state
                 if state is None or state is last:
                     return

@@ -128,7 +128,7 @@ def run(
     ] = None,
 ) -> None:
     """Run a scenario."""
-    wanted = load_scenario(scenario)
+    wanted = load_scenario(scenario, firmware=firmware)
     if coverage or profile:
         refuse_to_measure(port=port, gdb=gdb)
     if port is not None:

@@ -10,7 +10,7 @@ from rich.console import Console
 from rich.table import Table
 
 from bluepill_sim.program.last_blocks import TITLE
-from robot_bench.recording.summary import LISTED_HITS
+from robot_bench.recording.summary import LISTED_HITS, verdict_of
 from robot_bench.run import RunResult
 from simbase.errors import shown
 
@@ -36,17 +36,27 @@ def print_result(result: RunResult, console: Console | None = None) -> None:
         console.print(line, markup=False, soft_wrap=True)
     for note in cast("Sequence[str]", outcome["notes"]):
         console.print(f"note    {note}", markup=False, soft_wrap=True)
-    hits = cast("Sequence[Mapping[str, object]]", outcome["hits"])
-    for hit in hits[:LISTED_HITS]:
-        text = f"hit     {hit['what']} at {hit['t_s']:.3f} s, x {hit['x_m']:.2f} m, y {hit['y_m']:.2f} m"
-        console.print(text, markup=False, soft_wrap=True)
-    if len(hits) > LISTED_HITS:
-        console.print(f"hit     {len(hits) - LISTED_HITS} more, in the state log")
+    for line in _hits(outcome):
+        console.print(f"hit     {line}", markup=False, soft_wrap=True)
     for label, key in LABELS:
-        for goal in cast("Sequence[str]", outcome[key] or ()):
+        # What interrupted a run is no goal, and stands in the last line.
+        for goal in cast("Sequence[str]", outcome[key] or ())[key == "failures" and result.was_interrupted :]:
             console.print(label, end="")
             console.print(goal, markup=False, soft_wrap=True)
-    console.print(f"{_verdict(result)}; report: {result.report}", markup=False, soft_wrap=True)
+    verdict = verdict_of(outcome)
+    console.print(
+        f"{verdict if result.passed else verdict.upper()}; report: {result.report}", markup=False, soft_wrap=True
+    )
+
+
+def _hits(outcome: Mapping[str, object]) -> list[str]:
+    """Return what was hit, the first few; nothing where a failed goal names it."""
+    hits = cast("Sequence[Mapping[str, object]]", outcome["hits"])
+    lines = [f"{hit['what']} at {hit['t_s']:.3f} s, x {hit['x_m']:.2f} m, y {hit['y_m']:.2f} m" for hit in hits]
+    if any(lines[0] in failure for failure in cast("Sequence[str]", outcome["failures"]) if lines):
+        return []
+    left = len(lines) - LISTED_HITS
+    return lines[:LISTED_HITS] + ([f"{left} more, in the state log"] if left > 0 else [])
 
 
 def rows(outcome: Mapping[str, object]) -> list[tuple[str, str]]:
@@ -65,15 +75,6 @@ def rows(outcome: Mapping[str, object]) -> list[tuple[str, str]]:
         ("trace", str(outcome["trace_sha256"] or "")[:16]),
     ]  # fmt: skip
     return [(name, value) for name, value in found if value]
-
-
-def _verdict(result: RunResult) -> str:
-    left = len(cast("Sequence[str]", result.outcome["goals_not_judged"] or ()))
-    if not result.passed:
-        return "INTERRUPTED" if result.was_interrupted else "FAILED"
-    if left:
-        return f"passed, {left} goal{'s' if left > 1 else ''} not judged"
-    return "passed" if result.outcome["goals_met"] else "ended well, no goals were set"
 
 
 def _printed(outcome: Mapping[str, object]) -> str:

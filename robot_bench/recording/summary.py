@@ -6,9 +6,10 @@ from the samples where the run was cut.
 
 import json
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from itertools import pairwise
 from pathlib import Path
+from typing import cast
 
 from robot_bench.recording.run_record import Json, RunRecord
 from simbase.timing import NS_PER_S
@@ -18,6 +19,8 @@ CELL_M = 0.5
 #: chosen: so many collisions are listed in the table; all stand in the state log.
 LISTED_HITS = 5
 SUMMARY_NAME = "summary.json"
+#: How the first failure of a run begins that a signal ended.
+INTERRUPTED = "interrupted"
 
 _FROM_META = ("firmware_sha256", "scenario", "mode", "body", "world", "seed")
 _FROM_END = (
@@ -30,10 +33,20 @@ MEASURED = ("coverage", "profile")
 
 
 def verdict(record: RunRecord) -> str:
-    """Return `passed`, `failed`, or `cut at … s` for a run without an end."""
-    if record.is_cut:
-        return f"cut at {record.last_ns / NS_PER_S:.1f} s"
-    return "passed" if record.end.get("passed") else "failed"
+    """Return what `verdict_of` says, or `cut at … s` for a run without an end."""
+    return f"cut at {record.last_ns / NS_PER_S:.1f} s" if record.is_cut else verdict_of(record.end)
+
+
+def verdict_of(end: Mapping[str, object]) -> str:
+    """Return what a run came to, in the words of screen, page and plot; `end` is its last line or its outcome."""
+    met, left, failures = (
+        cast("Sequence[str]", end.get(key) or ()) for key in ("goals_met", "goals_not_judged", "failures")
+    )
+    if not end.get("passed"):
+        return failures[0] if failures and failures[0].startswith(INTERRUPTED) else "failed"
+    if left:
+        return f"passed, {len(left)} goal{'s' if len(left) > 1 else ''} not judged"
+    return "passed" if met else "ended well, no goals were set"
 
 
 def distance_m(record: RunRecord) -> float:

@@ -39,7 +39,7 @@ def render_page(record: RunRecord, drawn: Json) -> str:
         title=html.escape(f"{record.meta.get('scenario', 'run')} · {result}"),
         heading=html.escape(str(record.meta.get("scenario", "run"))),
         verdict=html.escape(result),
-        verdict_class=html.escape(result.split()[0]),
+        verdict_class=html.escape(result.split()[0].strip(",")),
         lead=html.escape(_lead(record.meta)),
         figures="".join(f"<tr><td>{html.escape(k)}</td><td>{html.escape(v)}</td></tr>" for k, v in figures(record)),
         goals=_goals(record.end),

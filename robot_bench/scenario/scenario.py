@@ -205,15 +205,15 @@ class Scenario:
         return _apply_in_world(moved, self.in_world.get(world, {}))
 
 
-def load_scenario(name_or_path: str) -> Scenario:
-    """Return a shipped scenario by its name, or one from a file.
+def load_scenario(name_or_path: str, *, firmware: Path | None = None) -> Scenario:
+    """Return a shipped scenario by its name, or one from a file; `firmware` takes the place of its own program.
 
     Raises:
         ScenarioError: There is no such scenario, or it breaks the schema.
     """
     if name_or_path in known_scenarios():
         with as_file(files("robot_bench.scenarios").joinpath(f"{name_or_path}.toml")) as path:
-            return read_scenario(path)
+            return read_scenario(path, firmware=firmware)
     path = Path(name_or_path)
     if not path.is_file():
         if path.suffix == ".toml" or len(path.parts) > 1:
@@ -221,7 +221,7 @@ def load_scenario(name_or_path: str) -> Scenario:
         beside = Path(f"{name_or_path}.toml")
         hint = f"the file here is {beside}" if beside.is_file() else nearest(name_or_path, known_scenarios())
         raise ScenarioError(f"there is no scenario {name_or_path!r}", hint=hint)
-    return read_scenario(path)
+    return read_scenario(path, firmware=firmware)
 
 
 def known_scenarios() -> tuple[str, ...]:
@@ -230,15 +230,15 @@ def known_scenarios() -> tuple[str, ...]:
     return tuple(sorted(item.name.removesuffix(".toml") for item in folder.iterdir() if item.name.endswith(".toml")))
 
 
-def read_scenario(path: Path) -> Scenario:
-    """Read and check a scenario file.
+def read_scenario(path: Path, *, firmware: Path | None = None) -> Scenario:
+    """Read and check a scenario file; its own program need not be there where `firmware` takes its place.
 
     Raises:
         ScenarioError: The file cannot be read or breaks the schema.
     """
     text = read_user_text(path, "a scenario", ScenarioError)
     table, places = read_toml(text, shown_name(path.name), "a scenario", ScenarioError)
-    scenario = _build(table, text, path, Place(TomlSource(shown_name(path.name), places)))
+    scenario = _build(table, text, path, Place(TomlSource(shown_name(path.name), places)), firmware)
     refuse_what_its_world_refuses(scenario, load_world(scenario.world, seed=scenario.seed))
     return scenario
 
@@ -275,7 +275,7 @@ def refuse_what_its_world_refuses(scenario: Scenario, world: World) -> None:
     refuse_names(scenario.changes, world)
 
 
-def _build(table: Table, text: str, path: Path, where: Place) -> Scenario:
+def _build(table: Table, text: str, path: Path, where: Place, firmware: Path | None) -> Scenario:
     check_table(table, _TOP, where)
     robot = str(table.get("robot", "p2dx"))
     try:
@@ -297,7 +297,7 @@ def _build(table: Table, text: str, path: Path, where: Place) -> Scenario:
         name=path.stem,
         description=str(table.get("description", "")),
         text=text,
-        firmware=_firmware(str(table["firmware"]), path, where),
+        firmware=firmware or _firmware(str(table["firmware"]), path, where),
         world=resolve_world(str(table["world"]), path.parent, f"{where.at('world')}: world"),
         parameters=parameters,
         robot=robot,
@@ -349,7 +349,7 @@ def _firmware(name: str, path: Path, where: Place) -> Path:
     raise ScenarioError(
         f"{where.at('firmware')}: firmware: there is no file {shown(name)} beside it, nor a program of that name that"
         " ships",
-        hint="build it first, or name it as seen from the scenario file",
+        hint="build it first, name it as seen from the scenario file, or give another by --firmware",
     )
 
 

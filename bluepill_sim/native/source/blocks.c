@@ -175,7 +175,6 @@ void core_on_block(void *unicorn, uint64_t at, uint32_t size, void *user)
         log_row(core, cycle, address, 0);
         if (UNLIKELY(row == before) && row->flags & ROW_READS && polls_unchanged(core, row)) {
             wait_on(core, row);
-            stop_at_boundary(core, address);
         }
     }
 }

@@ -50,12 +50,14 @@ bool polls_unchanged(struct core *core, const struct row *row)
     return is_same;
 }
 
-/* Lets the time pass until the run has to end, at the start of a round; the rows of the last rounds are kept. */
+/* Lets the time pass up to the round within which the run has to end, and which is to be run: what is due by then
+ * may be seen by that round's own read. The rows of the last rounds are kept.
+ */
 void wait_on(struct core *core, const struct row *row)
 {
     struct shared *s = &core->shared;
-    const uint64_t rounds = (s->stop_at - s->cycle + row->taken - 1) / row->taken;
-    for (uint64_t n = rounds > LAST_ROWS ? rounds - LAST_ROWS : 1; n < rounds; ++n) {
+    const uint64_t rounds = (s->stop_at - s->cycle - 1) / row->taken;
+    for (uint64_t n = rounds > LAST_ROWS ? rounds - LAST_ROWS : 1; n <= rounds; ++n) {
         record_at(core, s->cycle + n * row->taken, row->start, 0);
     }
     s->cycle += rounds * row->taken;

@@ -14,7 +14,7 @@ from p2os.cli.links.link_quality import LinkQuality
 from p2os.cli.names import ReportedModel, RobotUrl
 from p2os.cli.quantities import option
 from p2os.cli.robots.dashboard import Dashboard, draw, line_of
-from p2os.client import PacketArrived, Robot, RobotState
+from p2os.client import Connected, GaveUp, LinkLost, Notice, PacketArrived, Robot, RobotState
 from p2os.client.notices import words_of
 from p2os.transport.wall_clock import wall_clock
 from simbase.errors import MissingDependencyError
@@ -36,6 +36,8 @@ Examples:
 #: How often the picture is renewed; packets come ten times a second.
 PICTURES_PER_S = 10
 NEWS_LINES = 4
+#: What is told on stderr where no dashboard shows it: what explains a gap in the lines.
+LINK_NOTICES = (LinkLost, Connected, GaveUp)
 
 
 def register(app: typer.Typer) -> None:
@@ -74,16 +76,19 @@ def state_as_plain(state: RobotState, start_ns: Nanos = 0) -> dict[str, object]:
 
 
 def _print_states(client: Robot, lasts_ns: Nanos | None, *, as_json: bool) -> None:
-    ends = None if lasts_ns is None else wall_clock() + lasts_ns
     count, start_ns = 0, None
-    for state in client.states():
+    client.on_event(lambda notice: _tell(notice) if isinstance(notice, LINK_NOTICES) else None)
+    for state in client.states(None if lasts_ns is None else lasts_ns / NS_PER_S):
         start_ns = state.at_ns if start_ns is None else start_ns
         typer.echo(json.dumps(state_as_plain(state, start_ns)) if as_json else line_of(state))
         count += 1
-        if ends is not None and wall_clock() >= ends:
-            break
     if not as_json:
         sys.stderr.write(f"{count} packets\n")
+    client.wait_open(0.0)  # whoever asked for so long a time is told when the robot is gone at its end
+
+
+def _tell(notice: Notice) -> None:
+    sys.stderr.write(f"{words_of(notice)}\n")
 
 
 def _show(client: Robot, url: str, lasts_ns: Nanos | None) -> None:

@@ -16,11 +16,17 @@ from tests.bluepill_sim.native.test_native_core import state
 pytestmark = pytest.mark.skipif(library_path() is None, reason="the native core is not built: no C compiler")
 
 SYSTICK = 15
-#: SysTick each 1000 cycles counts a word of SRAM up; port A has its clock; the cycle counter runs.
+#: SysTick each 1000 cycles counts a word of SRAM up; port A has its clock, USART1 sends at 8 MHz / 69; the cycle
+#: counter runs.
 SET_UP = """
 mov32 r0, #0x40021018
-movs r1, #4
+mov32 r1, #0x4004
 str r1, [r0, #0]
+mov32 r0, #0x40013800
+movs r1, #69
+str r1, [r0, #8]
+mov32 r1, #0x2008
+str r1, [r0, #12]
 mov32 r0, #0xE000EDFC
 mov32 r1, #0x01000000
 str r1, [r0, #0]
@@ -46,7 +52,7 @@ bx lr
 main: nop
 """
 #: Loops that wait for something; `@` is the number of the loop. The halfwords compare r3 with r4 and shift r3
-#: (lsls #31, lsls #20, lsrs #9).
+#: (lsls #31, lsls #24, lsls #20, lsrs #9).
 WAITS = {
     "a tick": "ldr r4, [r6, #0]\nb w@\nw@: ldr r3, [r6, #0]\n.half 0x42A3\nbeq w@",
     "some ticks": "ldr r4, [r6, #0]\nadds r4, #3\nb w@\nw@: ldr r3, [r6, #0]\n.half 0x42A3\nbne w@",
@@ -54,6 +60,9 @@ WAITS = {
     "the cycle counter": "mov32 r4, #0xE0001004\nb w@\nw@: ldr r3, [r4, #0]\n.half 0x051B\nbpl w@",
     "a bit of the time": "mov32 r4, #0xE000E018\nb w@\nw@: ldr r3, [r4, #0]\n.half 0x0A5B\nbne w@",
     "a count": "movs r3, #200\nb w@\nw@: ldr r4, [r6, #0]\nsubs r3, #1\nbne w@",
+    "room for a character": (
+        "mov32 r4, #0x40013800\nstr r4, [r4, #4]\nb w@\nw@: nop\nnop\nldr r3, [r4, #0]\n.half 0x061B\nbpl w@"
+    ),
     "two things": "ldr r4, [r6, #0]\nb w@\nw@: ldr r3, [r6, #0]\n.half 0x42A3\nbne x@\nb w@\nx@: nop",
     "with a store": "ldr r4, [r6, #0]\nb w@\nw@: str r3, [r6, #4]\nldr r3, [r6, #0]\n.half 0x42A3\nbeq w@",
 }
@@ -91,6 +100,11 @@ def test_every_slice_ends_alike(waits: list[str], seed: int) -> None:
     for number, (one, other) in enumerate(zip(native, python, strict=True)):
         for name in one:
             assert one[name] == other[name], (number, name)
+
+
+def test_a_flag_that_rises_within_a_round_is_seen_by_that_round() -> None:
+    native, python = (live(make(program(["room for a character"]), core), 0, 14) for core in ("native", "python"))
+    assert native == python
 
 
 @pytest.mark.parametrize("wait", sorted(WAITS))

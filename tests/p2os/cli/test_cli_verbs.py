@@ -3,11 +3,13 @@
 import json
 import os
 import sys
+import tomllib
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
 import pytest
+from packaging.requirements import Requirement
 
 from p2os.cli import doctor
 from p2os.cli.links import ports
@@ -84,6 +86,27 @@ def test_doctor_tells_how_to_get_what_is_missing() -> None:
     assert compiler.found is None
     assert "missing  arm-none-eabi-gcc" in doctor.line_of(compiler)
     assert "get it: sudo apt-get install gcc-arm-none-eabi" in doctor.line_of(compiler)
+
+
+def test_doctor_lists_the_packages_of_every_extra() -> None:
+    project = tomllib.loads((Path(__file__).parents[3] / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+    extras = project["optional-dependencies"]
+    users = Requirement(*extras["all"]).extras
+    wanted = {(Requirement(line).name, extra) for extra in users for line in extras[extra]} | {
+        (Requirement(line).name, "") for line in project["dependencies"]
+    }
+    listed = {need.name for need in doctor.NEEDS if need.kind == "package"}
+    assert listed == {name for name, _ in wanted}
+    assert {(need.name, need.extra) for need in doctor.NEEDS if need.kind == "package"} <= wanted
+
+
+def test_the_columns_of_doctor_hold_every_row(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(doctor, "find_spec", lambda _name: object())
+    rows = [doctor.line_of(finding) for finding in doctor.examine(find_program=lambda name: f"/usr/bin/{name}")]
+    found = [row.splitlines()[0] for row in rows if row.startswith("ok")]
+    assert {row[27:29] for row in found} == {"  "}, rows
+    assert {row[60:62] for row in found} == {"  "}
+    assert not {row[29] for row in found} & {" "}
 
 
 def test_doctor_tells_what_was_compiled(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -1,6 +1,7 @@
 """The command line as such: verbs found, errors told in one line and a hint, exit codes."""
 
 import os
+import re
 import runpy
 import subprocess
 import sys
@@ -179,6 +180,18 @@ def test_a_verb_that_cannot_be_imported_says_what_it_lacks_and_others_work(
     assert cli.run(["run", "dodge", "--world", "arena"]) == 2
     assert capsys.readouterr().err == f"p2os: `p2os run` needs {lacking}\nhint: {hint}\n"
     assert cli.run(["ports", "--json"]) == 0
+
+
+def test_help_shows_each_example_beside_what_it_does_and_each_verb_in_a_group(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setenv("COLUMNS", "80")
+    assert cli.run(["--help"]) == 0
+    out = capsys.readouterr().out
+    examples = [line for line in cli.EPILOG.splitlines() if line.startswith("  p2os ")]
+    assert len(examples) > 5
+    assert [line for line in examples if not re.search(r"\S {2,}\S", line) or line not in out] == []
+    assert "Others:" not in out
 
 
 def test_main_ends_the_process_and_understands_trace_anywhere(

@@ -33,6 +33,7 @@ from p2os.client import (
 )
 from p2os.client.notices import words_of
 from p2os.errors import RemoteProtocolError, TransportError
+from p2os.pioneer.serve import served_pioneer
 from p2os.protocol.commands import CommandNumber
 from p2os.transport import waiting
 from simbase.errors import UsageError
@@ -193,6 +194,23 @@ def test_states_are_printed_where_there_is_no_terminal(served: object, run: Run,
     captured = capsys.readouterr()
     assert captured.out.startswith("x 0.000 m, y 0.000 m, heading 0.0 deg, 0.000 m/s, 0.0 deg/s, 12.6 V, nearest ")
     assert captured.err.endswith(" packets\n")
+
+
+def test_a_robot_that_goes_away_is_told_and_does_not_hold_the_monitor_beyond_its_time(
+    run: Run, capsys: Capture
+) -> None:
+    with contextlib.ExitStack() as stack:
+        url = stack.enter_context(served_pioneer(body="kinematic"))
+        leaving = threading.Timer(0.6, stack.close)
+        leaving.start()
+        began = time.monotonic()
+        assert run("monitor", url, "--for", "2s", "--json") == 1
+        assert time.monotonic() - began < TIMEOUT_S / 2
+        leaving.join()
+    captured = capsys.readouterr()
+    assert json.loads(captured.out.splitlines()[0])["x_m"] == 0
+    assert captured.err.startswith("link lost: ")
+    assert captured.err.splitlines()[-1].startswith(("p2os: ", "hint: "))
 
 
 def test_what_happened_is_told_in_words() -> None:
@@ -356,7 +374,8 @@ def test_a_robot_on_its_way_shows_where_it_is_and_an_interruption_says_that_it_s
         assert driver.end()[0] == 130
         assert STOP in robot.numbers
     assert "driving 3.000 m: 0." in shown
-    assert "interrupted: the robot was stopped and let go" in shown
+    assert "\nthe robot was stopped and let go" in shown.replace("\r", "")
+    assert "interrupted" not in shown.partition("let go")[0], "the last line says it"
 
 
 def seen_until(driver: Driver, words: str) -> str:

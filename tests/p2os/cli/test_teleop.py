@@ -15,6 +15,7 @@ import pytest
 from p2os.cli.robots.teleop import FIRST_HOLD_NS, KEYS, NEXT_HOLD_NS, QUIT_KEYS, STOP_KEYS, KeyLoop, Teleop, split_keys
 from p2os.client import DeadmanStopped, GapStopped, Link, LinkLost, Notice
 from simbase.timing import NS_PER_MS
+from tests.p2os.cli.driven import until
 
 TIMEOUT_S = 60.0
 
@@ -193,7 +194,8 @@ def test_ctrl_c_stops_the_robot_first(served: object) -> None:
     terminal = Terminal(served.url)
     terminal.wait_for("stand")
     terminal.press("w")
-    terminal.wait_for("x 0.02 m")
+    terminal.wait_for("DRIVE +0.20 m/s")
+    until(lambda: "motors: on" in served.text)  # a packet may step over any one place
     terminal.process.send_signal(signal.SIGINT)
     assert terminal.end() == 130
     assert "motors: off" in served.text

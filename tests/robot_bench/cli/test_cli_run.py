@@ -241,6 +241,15 @@ def test_a_signal_leaves_a_complete_folder_and_130(number: signal.Signals) -> No
     assert record.last_ns / 1e9 == pytest.approx(outcome["virtual_s"])
 
 
+def test_an_interrupted_run_says_so_once_in_its_result_and_once_beside_it() -> None:
+    process = started(10_000)
+    process.send_signal(signal.SIGINT)
+    out, err = process.communicate(timeout=60)
+    assert out.splitlines()[-1] == "INTERRUPTED (SIGINT); report: there/report.html"
+    assert out.lower().count("interrupted") == 1
+    assert err.endswith("p2os: interrupted\n")
+
+
 def test_kill_9_leaves_a_trace_that_makes_a_report(capsys: pytest.CaptureFixture[str]) -> None:
     process = started(10_000)
     os.kill(process.pid, signal.SIGKILL)

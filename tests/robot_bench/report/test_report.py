@@ -11,6 +11,7 @@ from robot_bench.recording.signals import grouped, motor_steps
 from robot_bench.recording.summary import cells_entered, distance_m, figures, verdict
 from robot_bench.report import make_report
 from robot_bench.report.packets import describe
+from robot_bench.report.page import page_data
 
 SIP = "fafb1b33a604000000049600fa007d00000004030000000000000000"
 
@@ -72,6 +73,26 @@ def test_a_whole_run_is_read_back(run: Path) -> None:
     assert cells_entered(record) == 2
     assert record.usart_lines() == [(50, "hello </script> world"), (50, "rest")]
     assert ("collisions", "1") in figures(record)
+
+
+@pytest.mark.parametrize(
+    ("end", "said"),
+    [
+        ({"passed": True, "goals_met": ["1 m"]}, "passed"),
+        ({"passed": True, "goals_met": ["1 m"], "goals_not_judged": ["2 m"]}, "passed, 1 goal not judged"),
+        ({"passed": True, "goals_met": []}, "ended well, no goals were set"),
+        ({"passed": False}, "failed"),
+        ({"passed": False, "failures": ["interrupted (SIGINT)"]}, "interrupted (SIGINT)"),
+    ],
+)
+def test_the_page_says_of_a_run_what_the_screen_says(end: dict[str, object], said: str, run: Path) -> None:
+    lines = (run / "trace.jsonl").read_text(encoding="utf-8").splitlines()
+    (run / "trace.jsonl").write_text("\n".join([*lines[:-1], json.dumps({"k": "end", **end}), ""]), encoding="utf-8")
+    record = read_run(run)
+    assert verdict(record) == said
+    page = make_report(run).page.read_text(encoding="utf-8")
+    assert f'<span class="verdict {said.split(maxsplit=1)[0].strip(",")}">{said}</span>' in page
+    assert page_data(record)["title"].endswith(f": {said}")
 
 
 def test_the_motor_pins_read_as_twos_complement(run: Path) -> None:

@@ -310,3 +310,13 @@ def test_a_scenario_with_a_byte_order_mark_is_read(tmp_path: Path) -> None:
     path = tmp_path / "mine.toml"
     path.write_text(LEAST, encoding="utf-8-sig")
     assert read_scenario(path).world == "room"
+
+
+def test_a_scenario_whose_own_program_is_not_built_runs_another(tmp_path: Path) -> None:
+    other = tmp_path / "other.elf"
+    other.write_bytes(b"")
+    path = write(tmp_path, LEAST.replace("dodge", "build/none.elf"))
+    with pytest.raises(ScenarioError, match=r"there is no file 'build/none\.elf'") as refused:
+        load_scenario(str(path))
+    assert "--firmware" in str(refused.value.hint)
+    assert load_scenario(str(path), firmware=other).firmware == other
