@@ -68,7 +68,7 @@ board: board-tools
 	$(BIN)/python -m hardware.pcb build
 	$(BIN)/python -m hardware.pcb simulate
 	$(BIN)/python -m hardware.pcb check
-	$(BIN)/python tools/make_pictures.py
+	$(BIN)/python -m tools.make_pictures
 
 board-check: board-tools
 	$(BIN)/python -m hardware.pcb check $(BOARD_CHECK)
@@ -79,7 +79,7 @@ board-tools: setup
 
 # Every picture of docs/ whose inputs have changed, made anew; `make test` names those that are out of date.
 pictures: board-tools
-	$(BIN)/python tools/make_pictures.py
+	$(BIN)/python -m tools.make_pictures
 
 # The pages of the API, from the docstrings, in build/api.
 docs: setup

@@ -1,6 +1,6 @@
 """Makes the pictures of docs/pictures, and tells which are older than what they show.
 
-Usage: python tools/make_pictures.py [--check] [--all] [--folder DIR]
+Usage: python -m tools.make_pictures [--check] [--all] [--folder DIR]
 
 Each picture carries a hash of its inputs (world, scenario and firmware, the board's files,
 and the code that draws) as a PNG text chunk. Without options the pictures whose inputs have
