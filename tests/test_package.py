@@ -23,7 +23,7 @@ from packaging.requirements import Requirement
 
 ROOT = Path(__file__).resolve().parent.parent
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
-PACKAGES = ("p2os", "bluepill_sim", "adapter_sim", "robot_bench")
+PACKAGES = ("simbase", "p2os", "bluepill_sim", "adapter_sim", "robot_bench")
 PARTS = ("bluepill_sim._native", "robot_bench._adapter_firmware")
 LIMIT_S = 300
 

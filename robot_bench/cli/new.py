@@ -11,7 +11,7 @@ from p2os.pioneer.body.factory import BEST, resolve_body
 from robot_bench.firmware.build import COMPILER
 from robot_bench.project.files import project_files, write_project
 
-HELP = """Write a small project of your own: a program for the BluePill that drives at once.
+HELP = """Write a project of your own: a BluePill program that drives.
 
 FOLDER is new or empty. It gets one C file to change, start-up code, linker
 script, register names, a Makefile, a scenario without goals, and a README.

@@ -117,10 +117,13 @@ class Page:
 
 
 def pages() -> list[Page]:
-    """Every Markdown file of the repository, whether committed already or new."""
+    """Every Markdown file of the repository, whether committed already or new.
+
+    The pages of the project that `p2os new` writes are for its folder: test_cli_new.py does what they say there.
+    """
     listed = subprocess.run(
         ["git", "ls-files", "--cached", "--others", "--exclude-standard", "*.md"],
         cwd=ROOT, capture_output=True, text=True, check=False, timeout=60,
     )  # fmt: skip
     names = listed.stdout.split() or [str(path.relative_to(ROOT)) for path in ROOT.glob("docs/*.md")]
-    return [Page(ROOT / name) for name in sorted(names) if (ROOT / name).exists()]
+    return [Page(ROOT / name) for name in sorted(names) if (ROOT / name).exists() and "/template/" not in name]

@@ -60,9 +60,8 @@ def test_a_lost_line_and_the_way_back_are_logged(caplog: pytest.LogCaptureFixtur
     finally:
         served.close()
     kinds = [line.partition(":")[0] for line in lines(caplog, "client")]
-    assert kinds == [
-        "INFO connected", "INFO configuration known", "WARNING link lost", "INFO reconnect planned",
-        "INFO connected", "INFO configuration known", "INFO closed",
+    assert [kind for kind in kinds if kind != "INFO configuration known"] == [
+        "INFO connected", "WARNING link lost", "INFO reconnect planned", "INFO connected", "INFO closed",
     ]  # fmt: skip
 
 

@@ -235,12 +235,8 @@ def test_the_emulated_bluepill_drives_a_served_robot(
     else:
         pytest.skip("this machine is too busy for real time now")
     record = read_run(tmp_path / "run")
-    assert code == 1, "8 s are too short for the whole sequence of motors"
-    assert [failure.split(":")[0] for failure in outcome["failures"]] == [
-        "motor_sequence",
-        "usart_in_order",
-        "min_distance",
-    ]
+    assert code == 0, outcome["failures"]
+    assert len(outcome["goals_not_judged"]) == 3, "8 s are too short for the whole sequence of motors"
     assert (outcome["mode"], outcome["body"], outcome["seed"]) == ("port", "remote", None)
     assert outcome["min_clearance_m"] is None
     assert outcome["collisions"] is None

@@ -114,7 +114,10 @@ def show(
 
 
 def check(world: WORLD, seed: WORLD_SEED = 0, up: UP = "auto") -> None:
-    """Read a world and print what is in it; an error names its line, a start where no p2dx can stand too."""
+    """Read a world and print what is in it; errors name their line.
+
+    A start where no p2dx can stand is an error too.
+    """
     place = _load(world, seed, up)
     _print_skipped(place)
     refuse_start(place, load_parameters("p2dx"), place.start, place.start_at)

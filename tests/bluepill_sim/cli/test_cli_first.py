@@ -36,7 +36,7 @@ def test_run_in_real_time_serves_a_pseudo_terminal(capfd: pytest.CaptureFixture[
     ("words", "message"),
     [
         (["run", "nothing.elf"], "no such file"),
-        (["run", SENSORS, "--for", "10"], "is no span of time"),
+        (["run", SENSORS, "--for", "10"], "'10' has no unit"),
         (["run", SENSORS, "--drive", "PA6"], "is not understood"),
         (["run", SENSORS, "--drive", "PE6=1"], "no leg PE6"),
         (["run", SENSORS, "--drive", "XY=1"], "no leg XY"),

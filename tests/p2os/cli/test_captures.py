@@ -327,6 +327,7 @@ def test_a_disk_that_is_full_from_the_start_is_one_line(
 LIMITED = """
 import resource, sys
 from p2os.cli.main import main
+sys.dont_write_bytecode = True  # Python would leave cut files in the cache
 resource.setrlimit(resource.RLIMIT_FSIZE, (1_500, 1_500))
 main(sys.argv[1:])
 """

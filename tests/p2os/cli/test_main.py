@@ -133,7 +133,7 @@ def test_a_verb_can_choose_its_exit_code(offer: Callable[[object], None]) -> Non
             "p2os: No such option: --forwrd. Did you mean --forward?",
             "hint: p2os drive --help",
         ),
-        (["mcu", "run", "x.elf", "--for", "5"], "p2os: --for '5' is no span of time", "hint: p2os mcu run --help"),
+        (["mcu", "run", "x.elf", "--for", "5"], "p2os: --for '5' has no unit", "hint: p2os mcu run --help"),
         (["--frob"], "p2os: No such option: --frob", "hint: p2os --help"),
         (["ports", "--frob"], "p2os: No such option: --frob", "hint: p2os ports --help"),
         (["info"], "p2os: Missing argument 'URL'", "hint: p2os info --help"),

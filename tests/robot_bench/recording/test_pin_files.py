@@ -11,7 +11,7 @@ import pytest
 from bluepill_sim.analysis.vcd import identifier
 from robot_bench.recording.run_record import RunRecord
 from robot_bench.recording.waveforms import edges_in_order, nets_in_order, write_sigrok, write_vcd
-from tests.robot_bench.records import motor_pins, record
+from tests.robot_bench.recording.records import motor_pins, record
 
 MS = 1_000_000
 

@@ -9,7 +9,7 @@ from p2os.protocol.packets import EncoderPacket
 from robot_bench.recording.run_record import Event, RunRecord, WireChunk
 from robot_bench.report.page import page_data, render_page
 from robot_bench.report.thinning import ends, extremes, pulses
-from tests.robot_bench.records import S, pose
+from tests.robot_bench.recording.records import S, pose
 
 MS = 10**6
 PACKET = EncoderPacket(left_counts=5, right_counts=-7).to_frame().to_bytes()

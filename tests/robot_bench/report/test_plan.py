@@ -10,7 +10,7 @@ from robot_bench.recording.run_record import Event, Json, RunRecord, WireChunk
 from robot_bench.recording.signals import pin_labels
 from robot_bench.report.page import page_data, render_page
 from robot_bench.report.plan import LETTER_PX, LINE_PX, NARROW_PX, WIDE_PX, plan
-from tests.robot_bench.records import S, pose
+from tests.robot_bench.recording.records import S, pose
 
 EXTENT = (-3.0, -3.0, 3.0, 3.0)
 CRATE: Json = {"name": "crate", "shape": "box", "x": 1.0, "y": 1.0, "length": 0.8, "width": 0.4, "heading": 0.0}

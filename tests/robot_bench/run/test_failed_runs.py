@@ -36,7 +36,7 @@ def raising(error: BaseException) -> Callable[..., object]:
 def told(folder: Path) -> list[object]:
     """Return the failures that a folder tells of, the same from trace, summary and a report made anew."""
     record = read_run(folder)
-    assert verdict(record) == "failed"
+    assert verdict(record) in {"failed", "interrupted"}
     assert (folder / "report.html").is_file()
     summary = json.loads((folder / "summary.json").read_text(encoding="utf-8"))
     assert summary == outcome_of(record) == make_artefacts(folder).outcome
@@ -107,6 +107,7 @@ def test_ctrl_c_in_the_midst_of_the_chips_work_is_an_end_in_good_order(tmp_path:
 
 LIMITED = """
 import resource, sys
+sys.dont_write_bytecode = True  # Python would leave cut files in the cache
 resource.setrlimit(resource.RLIMIT_FSIZE, (30_000, 30_000))
 from p2os.cli.main import main
 main(["run", "dodge", "--mode", "adapter", "--body", "kinematic", "--duration", "20s", "--out", sys.argv[1]])
@@ -144,6 +145,6 @@ def test_goals_are_judged_from_all_of_the_trace(tmp_path: Path, monkeypatch: pyt
         seen.append(record.poses[-1].t)
         return Judgement([], [], [])
 
-    monkeypatch.setattr(run, "judge", judge)
+    monkeypatch.setattr(bench, "judge", judge)
     run.run_scenario(wanted(1.95), tmp_path / "run")
     assert seen == [1_950_000_000]

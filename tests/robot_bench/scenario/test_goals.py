@@ -6,7 +6,7 @@ import pytest
 
 from robot_bench.recording.run_record import RunRecord
 from robot_bench.scenario.goals import KINDS, Goal, judge, load_goal
-from tests.robot_bench.records import S, motor_pins, pose, record, text
+from tests.robot_bench.recording.records import S, motor_pins, pose, record, text
 
 EIGHTH = math.pi / 4 * 1e6
 
