@@ -321,6 +321,12 @@ def test_a_run_in_which_too_few_lines_ran_has_failed(capsys: pytest.CaptureFixtu
     assert p2os(["run", "motors", *QUICK, "--coverage", "--fail-under", "1%", "--json"]) == 0
 
 
+def test_a_working_folder_in_which_nothing_can_be_made_has_a_way_out(capsys: pytest.CaptureFixture[str]) -> None:
+    Path("runs").write_text("a file where the run folders would be")
+    assert p2os(["run", "motors", *QUICK]) == 2
+    assert capsys.readouterr().err.splitlines()[1] == "hint: --out FOLDER makes it elsewhere"
+
+
 def test_a_program_without_lines_has_no_share_of_them(capsys: pytest.CaptureFixture[str]) -> None:
     assert p2os(["run", make(thumb.SLEEP), "--coverage", "--fail-under", "80"]) == 2
     assert "no debug information in it" in capsys.readouterr().err
