@@ -96,6 +96,7 @@ def run_scenario(
     force: bool = False,
     coverage: bool = False,
     profile: bool = False,
+    fail_under: float = 0.0,
 ) -> RunResult:
     """Run a scenario in virtual time and make its run folder.
 
@@ -110,6 +111,7 @@ def run_scenario(
         force: Overwrite the run that the folder holds.
         coverage: Write which lines and branches of the firmware ran; not with a `drive` that goes back.
         profile: Write where its cycles went; likewise.
+        fail_under: With `coverage`, the run fails where fewer percent of the lines ran; 0 asks for nothing.
 
     Raises:
         P2osError: The folder is not free, a file cannot be read or written, or a part is not installed.
@@ -127,7 +129,7 @@ def run_scenario(
 
         bench.on_slice = after_slice
         trace.meta(meta_of(scenario, bench.parts.world, bench.note, is_at_port=False))
-        with _measured(bench.chip, coverage=coverage, profile=profile) as measurement:
+        with _measured(bench.chip, coverage=coverage, profile=profile, fail_under=fail_under) as measurement:
             return _record(bench, trace, folder, pacer, clock, drive, measurement)
 
 
@@ -206,7 +208,9 @@ def meta_of(scenario: Scenario, world: World | None, note: str | None, *, is_at_
     }
 
 
-def _measured(chip: Chip, *, coverage: bool, profile: bool) -> "contextlib.AbstractContextManager[Measurement | None]":
+def _measured(
+    chip: Chip, *, coverage: bool, profile: bool, fail_under: float
+) -> "contextlib.AbstractContextManager[Measurement | None]":
     """Return a block in which coverage and profile of a chip are measured; nothing is where neither is wanted."""
     if not coverage and not profile:
         return contextlib.nullcontext()
@@ -215,7 +219,7 @@ def _measured(chip: Chip, *, coverage: bool, profile: bool) -> "contextlib.Abstr
 
     if not isinstance(chip, BluePill):
         raise TypeError(f"a {type(chip).__name__} cannot be measured: an emulated BluePill can")
-    return measuring(chip, coverage=coverage, profile=profile)
+    return measuring(chip, coverage=coverage, profile=profile, fail_under=fail_under)
 
 
 def _sha256_of(firmware: Path) -> str | None:
@@ -295,6 +299,10 @@ def _record(
         _LOG.error("%s: %s", bench.scenario.name, failure)
     if bench.chip.has_died:
         failures.append(bench.chip.verdict)
+    measured: Json = {}
+    if measurement is not None:
+        measured = measurement.write(folder, bench.scenario.firmware.parent)
+        failures += measurement.failures
     goals = judged(trace, bench.scenario, end)
     passed = not failures and not goals.missed
     trace.end(
@@ -309,7 +317,7 @@ def _record(
             "last_blocks": last_blocks(bench, end, passed=passed),
             "worst_lag_ms": None if pacer is None else round(pacer.worst_lag_ns / NS_PER_MS, 1),
         }
-        | ({} if measurement is None else measurement.write(folder, bench.scenario.firmware.parent))
+        | measured
     )
     made = make_artefacts(folder)
     _LOG.info("%s %s: %s", bench.scenario.name, "passed" if passed else "failed", made.report)

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 
 from bluepill_sim.analysis.columns import in_columns
 from bluepill_sim.analysis.coverage import Coverage, FileCoverage, FunctionCoverage
+from bluepill_sim.errors import BluePillError
 
 #: chosen: so many stretches of a program without symbols are listed.
 _SHOWN_PIECES = 40
@@ -26,6 +27,30 @@ def coverage_lines(coverage: Coverage, *, missed: bool = True) -> list[str]:
         found = ["no debug information and no symbols: by address (give the ELF, compiled with -Og -g)", ""]
         found += _by_address(coverage.pieces())
     return [*found, *one_way_lines(coverage)] if missed else found
+
+
+def refuse_without_lines(coverage: Coverage, firmware: object) -> None:
+    """Refuse a program without debug information where its lines are to be counted.
+
+    Raises:
+        BluePillError: It has none.
+    """
+    if not coverage.has_lines:
+        raise BluePillError(f"{firmware}: no debug information in it", hint="build with -g, and give the ELF itself")
+
+
+def shortfall(coverage: Coverage, least_percent: float) -> str | None:
+    """Return by how much too few lines ran, or None where they suffice.
+
+    Args:
+        coverage: Of the whole run.
+        least_percent: Least share of the lines, 0 to 100; 0 asks for nothing.
+    """
+    files = coverage.files()
+    share = 100 * sum(file.lines_hit for file in files) / max(1, sum(len(file.lines) for file in files))
+    if share >= least_percent:
+        return None
+    return f"coverage: {share:.1f} % of the lines are less than {least_percent:g} %"
 
 
 def one_way_lines(coverage: Coverage) -> list[str]:

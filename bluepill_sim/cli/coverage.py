@@ -7,13 +7,12 @@ from typing import Annotated
 import typer
 
 from bluepill_sim.analysis.coverage import Coverage, FileCoverage
-from bluepill_sim.analysis.coverage_text import coverage_lines
+from bluepill_sim.analysis.coverage_text import coverage_lines, refuse_without_lines, shortfall
 from bluepill_sim.analysis.lcov import write_lcov
 from bluepill_sim.analysis.observation import Observation
 from bluepill_sim.board import BluePill
 from bluepill_sim.cli.driving import parse_changes, print_fault, print_status, run_driven, summary, warn_on_stderr
 from bluepill_sim.cli.quantities import option, time_option
-from bluepill_sim.errors import BluePillError
 from bluepill_sim.program.line_table import read_lines
 from bluepill_sim.program.static_code import StaticCode
 from simbase.timing import NS_PER_S, Nanos
@@ -59,12 +58,11 @@ def coverage(
 ) -> None:
     """Measure coverage."""
     board = BluePill(firmware)
-    table = read_lines(board.image)
-    if not table.rows and (lcov is not None or fail_under or json_output):
-        raise BluePillError(f"{firmware}: no debug information in it", hint="build with -g, and give the ELF itself")
+    listener = Coverage(board.image, read_lines(board.image), StaticCode(board.chip.memory))
+    if lcov is not None or fail_under or json_output:
+        refuse_without_lines(listener, firmware)
     changes = parse_changes(drive or [], board)
     warn_on_stderr(board)
-    listener = Coverage(board.image, table, StaticCode(board.chip.memory))
     with Observation(board, [listener]):
         run_driven(board, span_ns, changes)
     files = listener.files()
@@ -76,10 +74,9 @@ def coverage(
         typer.echo("\n".join(coverage_lines(listener, missed=missed)))
     print_status(summary(board))
     has_died = print_fault(board)
-    share = 100 * sum(f.lines_hit for f in files) / max(1, sum(len(f.lines) for f in files))
-    if share < fail_under:
-        print_status(f"coverage: {share:.1f} % of the lines are less than {fail_under:g} %")
-    if has_died or share < fail_under:
+    if (too_few := shortfall(listener, fail_under)) is not None:
+        print_status(too_few)
+    if has_died or too_few is not None:
         raise typer.Exit(1)
 
 

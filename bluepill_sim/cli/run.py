@@ -28,7 +28,8 @@ HELP = """Boot a firmware on an emulated BluePill.
 
 What it sends on USART1 goes to stdout. Time is virtual: a program that sleeps runs much faster than real time. Exit
 code 1: the firmware died of a fault, or the wall clock's budget was used up;
-then the last blocks that it ran are shown.
+then the last blocks that it ran are shown. Resets are no failure (a watchdog may be
+what is tried): the last line counts them, by cause.
 
 \b
 Examples:

@@ -8,6 +8,7 @@ that it prints makes it wait, and no signal cuts the release of a robot short.
 """
 
 import contextlib
+import math
 import sys
 from collections import deque
 from collections.abc import Iterator
@@ -20,6 +21,7 @@ from p2os.client import (
     DeadmanStopped,
     Disobeyed,
     GapStopped,
+    Limits,
     Link,
     LinkLost,
     LinkLostError,
@@ -66,6 +68,18 @@ def held(robot: AbstractContextManager[Held], *, moves: bool = False) -> Iterato
     else:
         with postponed():
             robot.__exit__(None, None, None)
+
+
+def say_what_is_beyond(limits: Limits, *, speed_mps: float | None, rate_radps: float | None) -> None:
+    """Say on stderr which of `--vel` and `--turn-rate` are above the robot's limits, to which the client cuts them."""
+    notes = []
+    if speed_mps is not None and abs(speed_mps) > limits.forward_mps:
+        notes.append(f"--vel {abs(speed_mps):.2f} m/s is above this robot's limit, {limits.forward_mps:.2f} m/s")
+    if rate_radps is not None and abs(rate_radps) > limits.turn_radps:
+        asked, most = math.degrees(abs(rate_radps)), math.degrees(limits.turn_radps)
+        notes.append(f"--turn-rate {asked:.0f} deg/s is above this robot's limit, {most:.0f} deg/s")
+    for note in notes:
+        sys.stderr.write(f"note: {note}: it takes that\n")
 
 
 class RobotWatch:

@@ -1,7 +1,7 @@
 """What is there already is not overwritten without a word where it could not be had again.
 
-For recordings of a robot and for world files that people go on writing by hand. What
-is made of another file (exports, pictures, reports) is made anew.
+For recordings of a robot, for world files that people go on writing by hand, and for exports: their target
+stands without an option's name, where the shell puts whatever `*.csv` finds. Pictures and reports are made anew.
 """
 
 from pathlib import Path

@@ -317,5 +317,5 @@ def motion_result(goal: Goal, core: RobotCore) -> MotionResult:
         return MotionResult(ended.asked, ended.reached, ended.took_ns)
     text = f"{ended.what}: {ended.problem}; reached {ended.reached:.3f}"
     if core.link is not Link.OPEN:
-        raise LinkLostError(text, hint="the robot was told to stop")
+        raise LinkLostError(text, hint="its watchdog stops the robot; is it on, and the cable in?")
     raise MotionError(text)

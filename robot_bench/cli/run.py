@@ -23,7 +23,7 @@ from robot_bench.run import RunResult, run_at_port, run_scenario
 from robot_bench.scenario.scenario import Scenario, known_scenarios, load_scenario
 from simbase.errors import UsageError
 from simbase.timing import NS_PER_S, Nanos
-from simbase.units import BAUD, FACTOR, PORT, SEED, SPEED, TIME
+from simbase.units import BAUD, FACTOR, PERCENT, PORT, SEED, SPEED, TIME
 
 HELP = """Run a scenario: a BluePill program drives a robot.
 
@@ -45,6 +45,7 @@ Examples:
   p2os run dodge --world arena --seed 7 --json      one JSON object for a script
   p2os run dodge --realtime                         at the speed of the clock
   p2os run dodge --coverage --profile               lines, branches, cycles of the whole run
+  p2os run dodge --coverage --fail-under 80         exit code 1 below 80 % of the lines
   p2os run dodge --gdb 3333                         under GDB; the robot stands still at a halt
   p2os run dodge --port serial:/dev/ttyUSB0         drive a real Pioneer; asks first
 """
@@ -117,6 +118,17 @@ def run(
     force: Annotated[bool, typer.Option("--force", help="Overwrite the run that the --out folder holds.")] = False,
     json_output: Annotated[bool, typer.Option("--json", help="Print one JSON object.")] = False,
     coverage: Annotated[bool, typer.Option("--coverage", help="Write which lines and branches ran.")] = False,
+    fail_under: Annotated[
+        float,
+        option(
+            PERCENT,
+            "--fail-under",
+            purpose="With --coverage: least share of lines.",
+            shown="0%",
+            least="0%",
+            most="100%",
+        ),
+    ] = 0.0,
     profile: Annotated[bool, typer.Option("--profile", help="Write where the cycles went.")] = False,
     gdb: Annotated[
         int | None,
@@ -131,6 +143,8 @@ def run(
     wanted = load_scenario(scenario, firmware=firmware)
     if coverage or profile:
         refuse_to_measure(port=port, gdb=gdb)
+    if fail_under and not coverage:
+        raise UsageError("--fail-under goes with --coverage only", hint="add --coverage")
     if port is not None:
         refuse_beside_port(mode=mode, body=body, world=world, seed=seed, realtime=realtime)
     elif yes or max_speed is not None:
@@ -154,7 +168,7 @@ def run(
         if gdb is None:
             result = run_scenario(
                 wanted, folder, speed=realtime, on_progress=display.update, force=force,
-                coverage=coverage, profile=profile,
+                coverage=coverage, profile=profile, fail_under=fail_under,
             )  # fmt: skip
         else:
             driver = debug_bench(gdb, is_paced=realtime is not None, on_wait=display.raise_if_interrupted)

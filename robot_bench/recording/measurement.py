@@ -14,7 +14,7 @@ from pathlib import Path
 
 from bluepill_sim.analysis.coverage import Coverage
 from bluepill_sim.analysis.coverage_page import coverage_page
-from bluepill_sim.analysis.coverage_text import coverage_lines
+from bluepill_sim.analysis.coverage_text import coverage_lines, refuse_without_lines, shortfall
 from bluepill_sim.analysis.cycle_profile import ASLEEP, CycleProfile
 from bluepill_sim.analysis.flame_graph import flame_svg
 from bluepill_sim.analysis.latency import Latency
@@ -42,6 +42,13 @@ class Measurement:
     profile: CycleProfile | None
     latency: Latency | None
     observation: Observation
+    fail_under: float = 0.0
+
+    @property
+    def failures(self) -> list[str]:
+        """What was asked for and did not come: `fail_under` percent of the lines."""
+        too_few = None if self.coverage is None else shortfall(self.coverage, self.fail_under)
+        return [] if too_few is None else [too_few]
 
     def write(self, folder: Path, sources: Path) -> Json:
         """End the measurement, write the files into a run folder, and return the figures that its trace keeps.
@@ -86,16 +93,22 @@ class Measurement:
 
 
 @contextmanager
-def measuring(board: BluePill, *, coverage: bool, profile: bool) -> Iterator[Measurement]:
-    """Listen to a board for a block, or until the figures are written."""
+def measuring(board: BluePill, *, coverage: bool, profile: bool, fail_under: float = 0.0) -> Iterator[Measurement]:
+    """Listen to a board for a block, or until the figures are written.
+
+    Raises:
+        BluePillError: `fail_under` percent of the lines are asked for, and the program has no debug information.
+    """
     code = StaticCode(board.chip.memory)
     lines = Coverage(board.image, read_lines(board.image), code) if coverage else None
+    if lines is not None and fail_under:
+        refuse_without_lines(lines, board.image.name)
     cycles = CycleProfile(FunctionTable(board.image), code) if profile else None
     latency = Latency(board) if profile else None
     listeners = [listener for listener in (lines, cycles, latency) if listener is not None]
     try:
         with Observation(board, listeners) as observation:
-            yield Measurement(board, lines, cycles, latency, observation)
+            yield Measurement(board, lines, cycles, latency, observation, fail_under)
     finally:
         if latency is not None:
             latency.detach()

@@ -71,7 +71,10 @@ def make_next_folder(name: str, parent: Path = RUNS) -> Path:
                 folder.mkdir()
                 return folder
     except OSError as error:
-        raise UsageError(f"cannot make a run folder in {parent}: {error.strerror}") from error
+        raise UsageError(
+            f"cannot make a run folder in {parent}: {(error.strerror or str(error)).lower()}",
+            hint="--out FOLDER makes it elsewhere",
+        ) from error
 
 
 def _lock(handle: int, folder: Path) -> None:

@@ -13,6 +13,7 @@ from p2os.capture.formats.mcap_files import write_mcap
 from p2os.capture.table import Table, from_robot, table_of, write_csv
 from p2os.cli.captures.reading import ProfileForLayouts, RobotForUnits, reading_of
 from p2os.cli.help_pages import CAPTURES
+from p2os.cli.kept_files import FORCE_HELP, refuse_to_overwrite
 from simbase.errors import FileError, UsageError
 
 HELP = """Write a capture as CSV, Parquet, Arrow or MCAP.
@@ -47,12 +48,14 @@ def export(
     ] = "",
     robot: RobotForUnits = "",
     profile: ProfileForLayouts = None,
+    force: Annotated[bool, typer.Option("--force", help=FORCE_HELP)] = False,
 ) -> None:
     """Write a capture in another format."""
     ending = ".csv" if str(target) == "-" else target.suffix.lower()
     if ending not in {*_TABLES, ".mcap"}:
         known = ", ".join(sorted({*_TABLES, ".mcap"}))
         raise UsageError(f"{target}: cannot tell the format from {ending or 'no ending'!r}", hint=f"use {known}")
+    refuse_to_overwrite(target, force=force)
     capture = read_file(source)
     reading = reading_of(capture, robot=robot, profile=profile)
     rows = rows_of(capture, reading)

@@ -10,11 +10,11 @@ from typing import Annotated
 
 import typer
 
-from p2os.cli.held_robot import RobotWatch, held
+from p2os.cli.held_robot import RobotWatch, held, say_what_is_beyond
 from p2os.cli.help_pages import ROBOTS
 from p2os.cli.names import ReportedModel, RobotUrl
 from p2os.cli.quantities import option
-from p2os.client import Limits, MotionResult, Robot, RobotState
+from p2os.client import MotionResult, Robot, RobotState
 from simbase.errors import UsageError
 from simbase.timing import NS_PER_S, Nanos
 from simbase.units import ANGLE, LENGTH, SPEED, TIME, TURN_RATE
@@ -86,8 +86,7 @@ def drive(
         forward_m=forward_m, turn_rad=turn_rad, speed_mps=speed_mps, rate_radps=rate_radps, lasts_ns=lasts_ns,
     )  # fmt: skip
     with held(Robot(url, model=robot or None, reconnect=False), moves=True) as client:
-        for note in beyond(plan, client.limits):
-            sys.stderr.write(f"note: {note}\n")
+        say_what_is_beyond(client.limits, speed_mps=plan.speed_mps, rate_radps=plan.rate_radps)
         steps = carry_out(plan, client)
         pose = client.pose
     if json_output:
@@ -129,17 +128,6 @@ def carry_out(plan: Plan, robot: Robot) -> list[dict[str, object]]:
             f"in {result.took_ns / NS_PER_S:.1f} s\n"
         )
     return steps
-
-
-def beyond(plan: Plan, limits: Limits) -> list[str]:
-    """Return which speeds of a plan are above the robot's own, which they are cut to."""
-    notes = []
-    if plan.speed_mps is not None and abs(plan.speed_mps) > limits.forward_mps:
-        notes.append(f"--vel {abs(plan.speed_mps):.2f} m/s is above this robot's limit, {limits.forward_mps:.2f} m/s")
-    if plan.rate_radps is not None and abs(plan.rate_radps) > limits.turn_radps:
-        asked, most = math.degrees(abs(plan.rate_radps)), math.degrees(limits.turn_radps)
-        notes.append(f"--turn-rate {asked:.0f} deg/s is above this robot's limit, {most:.0f} deg/s")
-    return [f"{note}: it takes that" for note in notes]
 
 
 @contextlib.contextmanager

@@ -25,7 +25,7 @@ from typing import Annotated, Protocol
 
 import typer
 
-from p2os.cli.held_robot import held, hold_robot
+from p2os.cli.held_robot import held, hold_robot, say_what_is_beyond
 from p2os.cli.help_pages import ROBOTS
 from p2os.cli.names import ReportedModel, RobotUrl
 from p2os.cli.quantities import option
@@ -130,16 +130,23 @@ def teleop(
     robot: ReportedModel = "",
 ) -> None:
     """Drive by keyboard or pad."""
-    forward_mps = vel or (PAD_MPS if pad else KEY_MPS)
-    turn_radps = turn_rate or (PAD_RADPS if pad else KEY_RADPS)
+
+    @contextlib.contextmanager
+    def connected() -> Iterator[Robot]:
+        with held(Robot(url, model=robot or None), moves=True) as client:
+            say_what_is_beyond(client.limits, speed_mps=vel, rate_radps=turn_rate)
+            yield client
+
     if pad:
-        drive_by_pad(url, robot or None, (forward_mps, turn_radps))
+        drive_by_pad(connected, (vel or PAD_MPS, turn_rate or PAD_RADPS))
         return
     if not sys.stdin.isatty():
         raise UsageError("there is no keyboard: stdin is not a terminal", hint="p2os drive URL --vel 0.2m/s --for 2s")
-    with held(Robot(url, model=robot or None), moves=True) as client, raw_keyboard():
+    with connected() as client, raw_keyboard():
         sys.stderr.write("hold arrows or w a s d to drive, space stops, + - change the speed, q ends\r\n")
-        loop = KeyLoop(Teleop(forward_mps, turn_radps), client)
+        most = client.limits
+        keys = Teleop(min(vel or KEY_MPS, most.forward_mps), min(turn_rate or KEY_RADPS, most.turn_radps))
+        loop = KeyLoop(keys, client)
         try:
             while not loop.keys.is_over:
                 loop.turn()
@@ -147,14 +154,14 @@ def teleop(
             sys.stderr.write("\r\n")
 
 
-def drive_by_pad(url: str, model: str | None, fastest: tuple[float, float]) -> None:
+def drive_by_pad(connect: Callable[[], AbstractContextManager[Robot]], fastest: tuple[float, float]) -> None:
     """Drive by the first game pad of this machine."""
     hold_robot()
     with SdlPad() as pad:
         sys.stderr.write(f"game pad: {pad.name}\n")
         PadDriver(
             pad.report,
-            lambda: held(Robot(url, model=model), moves=True),
+            connect,
             fastest,
             clock=wall_clock,
             wait=lambda span_ns: time.sleep(span_ns / NS_PER_S),

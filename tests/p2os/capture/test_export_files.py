@@ -67,6 +67,20 @@ def test_parquet_arrow_and_csv_hold_the_same(tmp_path: Path, capsys: Capture) ->
     assert (tmp_path / "talk.feather").read_bytes() == (tmp_path / "talk.arrow").read_bytes()
 
 
+@pytest.mark.parametrize("ending", ["csv", "mcap"])
+def test_an_export_is_overwritten_by_force_alone(
+    tmp_path: Path, ending: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    target = tmp_path / f"notes.{ending}"
+    target.write_text("what a person wrote\n")
+    assert run(["export", str(GOLDEN), str(target)]) == 2
+    assert capsys.readouterr().err.startswith(f"p2os: {target} is there already\nhint: another name, or --force")
+    assert target.read_text() == "what a person wrote\n"
+    pytest.importorskip("mcap")
+    assert run(["export", str(GOLDEN), str(target), "--force"]) == 0
+    assert target.stat().st_size > 100
+
+
 def test_mcap_has_a_channel_for_each_name(tmp_path: Path) -> None:
     reader = pytest.importorskip("mcap.reader")
     target = tmp_path / "talk.mcap"

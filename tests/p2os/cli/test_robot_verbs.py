@@ -96,6 +96,23 @@ def test_a_robot_that_vanishes_ends_a_held_speed_and_a_wait_at_once(run: Run, ca
         assert "the link was lost" in capsys.readouterr().err
 
 
+def test_a_way_that_ends_with_the_link_does_not_claim_that_the_robot_was_told(run: Run, capsys: Capture) -> None:
+    robot = RecordingRobot()
+
+    def vanish() -> None:
+        until(lambda: CommandNumber.MOVE in robot.numbers, "MOVE")
+        robot.close()
+
+    thread = threading.Thread(target=vanish)
+    thread.start()
+    assert run("drive", robot.url, "--forward", "1m") == 1
+    thread.join(TIMEOUT_S)
+    error = capsys.readouterr().err
+    assert "the link was lost" in error
+    assert "told" not in error
+    assert "hint: its watchdog stops the robot" in error
+
+
 def test_motors_that_go_off_end_a_held_speed(run: Run, capsys: Capture) -> None:
     robot = RecordingRobot()
 

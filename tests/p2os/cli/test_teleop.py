@@ -2,6 +2,7 @@
 
 import os
 import pty
+import re
 import select
 import signal
 import subprocess
@@ -150,19 +151,20 @@ def test_a_robot_that_its_client_has_stopped_waits_for_the_next_press(
 class Terminal:
     """`p2os teleop` on a terminal of its own."""
 
-    def __init__(self, url: str) -> None:
+    def __init__(self, url: str, vel: str = "200mm/s") -> None:
         self.keyboard, inside = pty.openpty()
-        command = [str(Path(sys.executable).parent / "p2os"), "teleop", url, "--vel", "200mm/s"]
+        command = [str(Path(sys.executable).parent / "p2os"), "teleop", url, "--vel", vel]
         self.process = subprocess.Popen(command, stdin=inside, stdout=inside, stderr=inside, start_new_session=True)
         os.close(inside)
-        self.seen = ""
+        self.seen = self.drawn = ""
 
     def wait_for(self, words: str) -> None:
         ends = time.monotonic() + TIMEOUT_S
         while words not in self.seen and time.monotonic() < ends:
             if select.select([self.keyboard], [], [], 1.0)[0]:
                 try:
-                    self.seen += os.read(self.keyboard, 4096).decode("utf-8", "replace")
+                    text = os.read(self.keyboard, 4096).decode("utf-8", "replace")
+                    self.seen, self.drawn = self.seen + text, self.drawn + text
                 except OSError:  # the program has closed its terminal
                     break
         assert words in self.seen, self.seen[-500:]
@@ -199,3 +201,15 @@ def test_ctrl_c_stops_the_robot_first(served: object) -> None:
     terminal.process.send_signal(signal.SIGINT)
     assert terminal.end() == 130
     assert "motors: off" in served.text
+
+
+def test_a_speed_above_the_robots_own_is_said_and_the_one_it_takes_is_shown(served: object) -> None:
+    terminal = Terminal(served.url, vel="9m/s")
+    terminal.wait_for("stand")
+    said = re.search(r"note: --vel 9\.00 m/s is above this robot's limit, ([0-9.]+) m/s: it takes that", terminal.seen)
+    terminal.press("w")
+    terminal.wait_for("DRIVE +")
+    terminal.press("q")
+    assert terminal.end() == 0
+    assert said, terminal.seen
+    assert f"DRIVE +{said[1]} m/s" in terminal.drawn

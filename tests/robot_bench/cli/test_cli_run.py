@@ -2,6 +2,7 @@
 
 import json
 import os
+import re
 import signal
 import subprocess
 import sys
@@ -161,6 +162,7 @@ def test_a_firmware_that_is_none_is_one_line_and_2(
         (["run", "dodge", "--port", "tcp:127.0.0.1:1", "--world", "room"], "--world cannot stand beside --port"),
         (["run", "dodge", "--port", "tcp:127.0.0.1:1", "--seed", "1"], "--seed cannot stand beside --port"),
         (["run", "dodge", "--out", "."], "holds something that is no run"),
+        (["run", "dodge", "--fail-under", "80"], "--fail-under goes with --coverage only"),
         (["report", "nowhere"], "holds no trace.jsonl"),
     ],
 )
@@ -309,3 +311,22 @@ def test_an_untried_program_is_capped_unless_told() -> None:
     assert capped(scenario, None).adapter.max_velocity_mm_s == 200
     assert capped(scenario, None).adapter.max_rotation_deg_s == 45
     assert capped(scenario, 0.35).adapter.max_velocity_mm_s == 350
+
+
+def test_a_run_in_which_too_few_lines_ran_has_failed(capsys: pytest.CaptureFixture[str]) -> None:
+    assert p2os(["run", "motors", *QUICK, "--coverage", "--fail-under", "100%"]) == 1
+    lines = capsys.readouterr().out.splitlines()
+    assert re.fullmatch(r"failed  coverage: [0-9.]+ % of the lines are less than 100 %", lines[-2])
+    assert lines[-1].startswith("FAILED; ")
+    assert p2os(["run", "motors", *QUICK, "--coverage", "--fail-under", "1%", "--json"]) == 0
+
+
+def test_a_working_folder_in_which_nothing_can_be_made_has_a_way_out(capsys: pytest.CaptureFixture[str]) -> None:
+    Path("runs").write_text("a file where the run folders would be")
+    assert p2os(["run", "motors", *QUICK]) == 2
+    assert capsys.readouterr().err.splitlines()[1] == "hint: --out FOLDER makes it elsewhere"
+
+
+def test_a_program_without_lines_has_no_share_of_them(capsys: pytest.CaptureFixture[str]) -> None:
+    assert p2os(["run", make(thumb.SLEEP), "--coverage", "--fail-under", "80"]) == 2
+    assert "no debug information in it" in capsys.readouterr().err
