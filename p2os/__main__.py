@@ -1,6 +1,24 @@
-"""`python -m p2os`: the command line, for a Python whose scripts are not on the path."""
+"""The command line's first step: Ctrl-C during the imports, too, ends with a word and 130; also `python -m p2os`."""
 
-from p2os.cli.main import main
+import os
+import signal
+import sys
+
+
+def main() -> None:
+    """Run the command line and end the process with its exit code."""
+    if signal.getsignal(signal.SIGINT) is signal.default_int_handler:
+        signal.signal(signal.SIGINT, _end)
+    from p2os.cli.main import main as run
+
+    run()
+
+
+def _end(_number: int, _frame: object) -> None:
+    """End before there is anything to put in order."""
+    sys.stderr.write("p2os: interrupted\n")
+    os._exit(130)
+
 
 if __name__ == "__main__":
     main()

@@ -145,6 +145,18 @@ def only_reads(code: bytes) -> bool:
     return True
 
 
+def may_end_in_it(code: bytes) -> bool:
+    """Tell whether what follows some code may be inside an IT block that begins there: in doubt, yes."""
+    for at in range(0, len(code) - 1, 2):
+        if code[at + 1] == 0xBF and code[at] & 15:
+            end = at + 2
+            for _ in range(4 - (code[at] & -code[at] & 15).bit_length() + 1):
+                if end >= len(code):
+                    return True
+                end += 4 if code[end + 1] >> 3 >= _FIRST_WIDE >> 11 else 2
+    return False
+
+
 def is_ambiguous(code: bytes, start: int) -> bool:
     """Tell whether two accesses look alike although the first one's base may change in between.
 

@@ -113,6 +113,8 @@ class Frozen:
         core.context = self.registers
         flags = core.registers[Register.CPSR] & ~IT_BITS
         core.registers[Register.CPSR] = flags | (self.it_state & 3) << 25 | (self.it_state >> 2) << 10
+        # Not every hook finds it up to date; nothing but a comparison of states looks at it.
+        core.registers[Register.PC] = self.halt.pc | flags >> 5 & 1
 
 
 class RestOfBlock(Stateful):

@@ -17,7 +17,7 @@ import ctypes
 import weakref
 from collections.abc import Callable
 
-from bluepill_sim.core.accesses import Access, accesses_of, is_ambiguous, only_reads
+from bluepill_sim.core.accesses import Access, accesses_of, is_ambiguous, may_end_in_it, only_reads
 from bluepill_sim.core.block_cost import NO_BLOCK, Block
 from bluepill_sim.core.engine import Engine, StopBefore, Traps
 from bluepill_sim.core.recorder import RECORD, BlockRecorder, KeptRows
@@ -62,9 +62,13 @@ from bluepill_sim.native.state import (
 from bluepill_sim.timing import Halt, HaltKind
 
 #: Flags of a row (`enum row_flag`).
-_CHANGES_MASKS, _SENDS_EVENT, _SELF_LOOP, _WRITABLE, _NOTED, _READS = 1, 2, 4, 8, 128, 256
+_CHANGES_MASKS, _SENDS_EVENT, _SELF_LOOP, _WRITABLE, _NOTED, _READS, _AMBIGUOUS = 1, 2, 4, 8, 128, 256, 512
 _ENDS = {Kind.WAIT_INTERRUPT: 16, Kind.WAIT_EVENT: 32, Kind.YIELD: 64}
 _NO_BLOCK_START = 0xFFFF_FFFF
+#: IT and the four instructions that may follow in its block.
+_IT_BLOCK_BYTES = 2 + 4 * 4
+#: Chosen: a block up to this size is never cut by Unicorn's buffer, so that its rest ends where it does.
+_WHOLE_BYTES = 256
 #: Chosen: at least so often Python handles signals, such as Ctrl-C.
 _SLICE_CYCLES = 20_000_000
 #: Chosen: rows that C keeps before Python takes them.
@@ -344,7 +348,9 @@ class NativeEngine(Engine):
         self._known[start] = block
         memory = self._blocks.writable_at(start)
         host = None if memory is None else memory[2] + start - memory[0]
-        code = next(ctypes.string_at(at + start - first, size) for first, end, at in self._code if first <= start < end)
+        first, _, at = next(memory for memory in self._code if memory[0] <= start < memory[1])
+        code = ctypes.string_at(at + start - first, size)
+        before = min(_IT_BLOCK_BYTES, start - first)
         accesses = {access.address: access for access in accesses_of(code, start)}
         flags = _ENDS.get(block.last, 0)
         flags |= (
@@ -352,7 +358,15 @@ class NativeEngine(Engine):
         )
         flags |= _WRITABLE * (host is not None)
         flags |= _READS * (only_reads(code) and not block.has_exclusive)
-        if is_ambiguous(code, start):
+        if not is_ambiguous(code, start):
+            pass
+        elif (
+            size <= _WHOLE_BYTES
+            and not may_end_in_it(ctypes.string_at(at + start - first - before, before))
+            and not _has_like_access_under_it(block, accesses)
+        ):
+            flags |= _AMBIGUOUS
+        else:
             flags |= _NOTED
             if not accesses.keys() <= self._noted:
                 self._note(accesses)
@@ -432,6 +446,12 @@ class NativeTraps(Traps):
         self._trapped.add((address, number, kind))
         user = library().core_trap(self._state, address, GENERAL[number].value, HALT_NUMBERS[kind])
         self._core.hook_native("instruction", address_of("core_on_trap"), user, address, address)
+
+
+def _has_like_access_under_it(block: Block, accesses: dict[int, Access]) -> bool:
+    """Tell whether an access under IT has the kind and the width of another one of its block."""
+    kinds = [(access.is_load, access.bytes) for access in accesses.values()]
+    return any(kinds.count(kind) > 1 for at, kind in zip(accesses, kinds, strict=True) if block.it_state_at(at, 0))
 
 
 def _fill(row: InstructionRow, access: Access | None) -> None:

@@ -101,6 +101,7 @@ class Shared(ctypes.Structure):
         ("flash_bytes", _U32),
         ("scratch", _U32),
         ("has_irq_listeners", _U32),
+        ("exact_stops", _U64),
         ("logged", _U64),
         ("last", Record * LAST_ROWS),
     )

@@ -63,8 +63,10 @@ def compiler_version() -> str | None:
     return done.stdout.splitlines()[0]
 
 
-def build_elf(sources: tuple[str, ...], *, folder: Path, linker_script: str, output: Path) -> None:
-    """Compile and link `sources` of `folder` into the ELF `output`.
+def build_elf(
+    sources: tuple[str, ...], *, folder: Path, linker_script: str, output: Path, more_flags: tuple[str, ...] = ()
+) -> None:
+    """Compile and link `sources` of `folder` into the ELF `output`; `more_flags` come after those of all programs.
 
     Raises:
         subprocess.CalledProcessError: The compiler refused; its words are on stderr.
@@ -75,7 +77,7 @@ def build_elf(sources: tuple[str, ...], *, folder: Path, linker_script: str, out
         objects = []
         for source in sources:
             target = str(Path(scratch) / source.replace("/", "_").replace(".c", ".o"))
-            _run([COMPILER, *COMPILE_FLAGS, *prefix_maps, "-c", source, "-o", target], folder)
+            _run([COMPILER, *COMPILE_FLAGS, *more_flags, *prefix_maps, "-c", source, "-o", target], folder)
             objects.append(target)
         _run([COMPILER, *LINK_FLAGS, "-T", linker_script, *objects, "-lgcc", "-o", str(output)], folder)
     output.chmod(0o644)

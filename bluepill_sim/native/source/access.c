@@ -3,9 +3,13 @@
  * Unicorn does not bring the PC up to date for an access to I/O, but all other
  * registers are. So the accessing instruction is found by working out which of
  * the block's loads or stores, from the last one found on, reaches the address
- * with the registers as they are. Blocks in which that could be mistaken (one
- * base register, the same offset, and the base changed in between) get hooks
- * that note the PC instead: see `native/engine.py`.
+ * with the registers as they are. In some blocks that could be mistaken (one
+ * base register, the same offset, and the base changed in between): where two of
+ * their instructions reach the address, the access is not made, and the run is
+ * stopped there. Unicorn then leaves the PC at the accessing instruction, with
+ * nothing of it done, and the run goes on from it inside the block. Within an IT
+ * block Unicorn does not stop: such blocks have hooks that note the PC instead,
+ * see `native/engine.py`.
  */
 #include "core.h"
 
@@ -14,6 +18,9 @@ struct region_user {
     uint32_t number;
     uint32_t base;
 };
+
+/* An unaligned access is made in at most so many. */
+enum { PARTS = 16 };
 
 #define IN_PAGE ((1u << PAGE_SHIFT) - 1)
 
@@ -82,6 +89,9 @@ static void pass(struct core *core, uint32_t n)
 /* Notes an access whose instruction is not looked for now, so that the next one of the block is not taken for it. */
 void skip(struct core *core, uint32_t address, bool is_write, uint32_t bytes)
 {
+    if (UNLIKELY(core->block->flags & ROW_AMBIGUOUS)) {
+        return; /* later, with other registers, it could not be told: the next one has to be looked for from the start */
+    }
     if (UNLIKELY(core->skipped_count == SKIPPED)) {
         resolve(core, address, is_write, bytes);
     } else {
@@ -89,8 +99,74 @@ void skip(struct core *core, uint32_t address, bool is_write, uint32_t bytes)
     }
 }
 
-/* Works out which instruction of the block makes an access, and with it when. */
-void resolve(struct core *core, uint32_t address, bool is_write, uint32_t bytes)
+static void set_access(struct core *core, uint32_t n)
+{
+    const struct instruction *one = &core->block->instructions[n];
+    core->shared.access_cycle = core->shared.cycle + one->cycle;
+    core->shared.access_pc = one->address;
+    pass(core, n);
+}
+
+/* The first instruction from `n` on that may make the access; `count` of the row for none. */
+static uint32_t reaching(struct core *core, uint32_t n, uint32_t address, bool is_write, uint32_t bytes)
+{
+    const struct row *row = core->block;
+    do {
+        n = fitting(row, n, is_write, bytes);
+    } while (n < row->count && !reaches(core, &row->instructions[n], address) && ++n);
+    return n;
+}
+
+/* `resolve` where accesses may be mistaken: false where the run is to be stopped to learn it. */
+static bool resolve_ambiguous(struct core *core, uint32_t address, bool is_write, uint32_t bytes)
+{
+    struct located *located = &core->located;
+    const struct row *row = core->block;
+    if (located->cycle != core->shared.cycle || !located->words ||
+        (address != located->address && !located->is_anywhere)) {
+        const uint32_t n = reaching(core, core->io_next, address, is_write, bytes);
+        if (n == row->count) { /* half of an unaligned access */
+            return true;
+        }
+        if (reaching(core, n + 1, address, is_write, bytes) < row->count) {
+            core->is_stopping = 1;
+            core->api.stop(core->unicorn);
+            return false;
+        }
+        *located = (struct located){.cycle = core->shared.cycle, .n = n, .words = row->instructions[n].count};
+    }
+    --located->words;
+    located->address = address + 4;
+    located->is_anywhere &= located->words >= PARTS;
+    set_access(core, located->n);
+    return true;
+}
+
+/* Prepares the run that goes on at the access that it was stopped at. */
+void go_on_at_access(struct core *core, uint32_t pc)
+{
+    struct shared *s = &core->shared;
+    struct row *row = core->block;
+    uint32_t n = 0;
+    while (n + 1 < row->count && row->instructions[n].address != pc) {
+        ++n;
+    }
+    /* A second time at one instruction: the parts of an unaligned access, the first of which were made already. */
+    const bool is_again = core->located.cycle == s->cycle && core->located.n == n;
+    core->is_stopping = 0;
+    core->located = (struct located){
+        .cycle = s->cycle, .n = n, .words = is_again ? 2 * PARTS : row->instructions[n].count, .is_anywhere = 1};
+    core->resumed = row;
+    core->resumed_stop_at = s->stop_at;
+    core->block = &core->none;
+    s->stop_at = 0; /* so that the start of this run, which is no boundary, is looked at */
+    ++s->exact_stops;
+}
+
+/* Works out which instruction of the block makes an access, and with it when.
+ * Returns false where the access is not to be made, because it comes again.
+ */
+bool resolve(struct core *core, uint32_t address, bool is_write, uint32_t bytes)
 {
     struct shared *s = &core->shared;
     const struct row *row = core->block;
@@ -98,7 +174,10 @@ void resolve(struct core *core, uint32_t address, bool is_write, uint32_t bytes)
     s->access_pc = row->start;
     if (row == &core->none) {
         s->access_pc = s->pc;
-        return;
+        return true;
+    }
+    if (row->flags & ROW_AMBIGUOUS) {
+        return resolve_ambiguous(core, address, is_write, bytes);
     }
     if (row->flags & ROW_NOTED) {
         const struct instruction *noted = instruction_at(row, core->noted);
@@ -106,7 +185,7 @@ void resolve(struct core *core, uint32_t address, bool is_write, uint32_t bytes)
             s->access_cycle = s->cycle + noted->cycle;
             s->access_pc = noted->address;
         }
-        return;
+        return true;
     }
     for (uint32_t k = 0; k < core->skipped_count; ++k) {
         const struct skipped *one = &core->skipped[k];
@@ -121,10 +200,9 @@ void resolve(struct core *core, uint32_t address, bool is_write, uint32_t bytes)
         found = fitting(row, core->io_next, is_write, bytes);
     }
     if (found < row->count) {
-        s->access_cycle = s->cycle + row->instructions[found].cycle;
-        s->access_pc = row->instructions[found].address;
-        pass(core, found);
+        set_access(core, found);
     }
+    return true;
 }
 
 static bool is_over(const struct core *core)
@@ -132,20 +210,25 @@ static bool is_over(const struct core *core)
     return core->shared.cycle + core->block->straight >= core->shared.stop_at;
 }
 
-/* Finds the accessing instruction for Python, unless Python itself runs the blocks and knows it. */
-static void begin_access(struct core *core, uint32_t address, bool is_write, uint32_t size)
+/* Finds the accessing instruction for Python, unless Python itself runs the blocks and knows it; false: not now. */
+static bool begin_access(struct core *core, uint32_t address, bool is_write, uint32_t size)
 {
     if (!core->shared.is_python) {
-        resolve(core, address, is_write, size);
+        if (!resolve(core, address, is_write, size)) {
+            return false;
+        }
         core->shared.in_access = 1;
     }
+    return true;
 }
 
 static RARELY uint32_t ask_read(const struct region_user *region, uint32_t offset, uint32_t size)
 {
     struct core *core = region->core;
     core->polling.asked = 1;
-    begin_access(core, region->base + offset, false, size);
+    if (!begin_access(core, region->base + offset, false, size)) {
+        return 0;
+    }
     const uint32_t word = core->calls.read(region->number, offset, size);
     core->shared.in_access = 0;
     return word;
@@ -154,7 +237,9 @@ static RARELY uint32_t ask_read(const struct region_user *region, uint32_t offse
 static RARELY void ask_write(const struct region_user *region, uint32_t offset, uint32_t size, uint32_t value)
 {
     struct core *core = region->core;
-    begin_access(core, region->base + offset, true, size);
+    if (!begin_access(core, region->base + offset, true, size)) {
+        return;
+    }
     core->calls.write(region->number, offset, size, value);
     core->shared.in_access = 0;
 }
@@ -179,6 +264,9 @@ uint64_t core_read_io(void *unicorn, uint64_t at, unsigned size, void *user)
     const uint32_t offset = (uint32_t)at, index = (offset & IN_PAGE) >> 2;
     const struct page *page = open_page(region, offset);
     uint32_t word;
+    if (UNLIKELY(region->core->is_stopping)) { /* the other half of an unaligned access */
+        return 0;
+    }
     if (page != NULL && page->behaviour[index] & READS_PLAIN) {
         const uint32_t latch = page->behaviour[index] >> LATCH_SHIFT;
         word = page->words[index];
@@ -199,6 +287,9 @@ void core_write_io(void *unicorn, uint64_t at, unsigned size, uint64_t value, vo
     const struct region_user *region = user;
     struct page *page = open_page(region, offset);
     bool is_done = false;
+    if (UNLIKELY(region->core->is_stopping)) {
+        return;
+    }
     if (page != NULL && size == 4) {
         if (page->behaviour[index] & WRITES_PLAIN) {
             const uint32_t *mask = page->masks[index], before = page->words[index];

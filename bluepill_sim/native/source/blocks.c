@@ -164,7 +164,13 @@ void core_on_block(void *unicorn, uint64_t at, uint32_t size, void *user)
         trim_registers(core);
     }
     if (UNLIKELY(cycle >= core->shared.stop_at)) {
-        stop_at_boundary(core, address);
+        if (core->resumed != NULL) { /* no boundary: it goes on inside its block */
+            core->block = core->resumed;
+            core->shared.stop_at = core->resumed_stop_at;
+            core->resumed = NULL;
+        } else {
+            stop_at_boundary(core, address);
+        }
         return;
     }
     struct row *row = find(core, address);

@@ -60,7 +60,9 @@ enum row_flag {
     /* Hooks note the PC of each access. */
     ROW_NOTED = 128,
     /* It stores nothing: the same registers before it twice running are the same for ever. */
-    ROW_READS = 256
+    ROW_READS = 256,
+    /* Two of its accesses may be mistaken for each other. */
+    ROW_AMBIGUOUS = 512
 };
 
 /* An instruction of a block: where it starts in time, and which memory it reaches for. */
@@ -117,6 +119,7 @@ struct shared {
     uint32_t sram_base, sram_bytes, flash_base, flash_bytes;
     uint32_t scratch;
     uint32_t has_irq_listeners; /* the interrupt lines have listeners */
+    uint64_t exact_stops; /* how often a run was stopped to learn which instruction makes an access */
     uint64_t logged; /* rows so far: the next one goes to `last` at this, modulo its size */
     struct record last[LAST_ROWS];
 };
@@ -182,6 +185,15 @@ struct skipped {
 };
 #define SKIPPED 8
 
+/* What is known for sure of the block that began at `cycle`: its instruction `n` makes the next accesses, at most
+ * `words` of them, from `address` on (or wherever the first one is).
+ */
+struct located {
+    uint64_t cycle;
+    uint32_t n, words, address;
+    uint32_t is_anywhere;
+};
+
 /* A character that has gone out, at the end of its stop bit. */
 struct sent {
     uint64_t ns;
@@ -231,6 +243,10 @@ struct core {
     uint32_t io_next;       /* the first instruction of the block that may make the next access */
     uint32_t skipped_count; /* accesses since that are not yet counted in it */
     struct skipped skipped[SKIPPED];
+    struct located located;
+    uint32_t is_stopping; /* at an access that is not made: the run goes on from its instruction */
+    struct row *resumed;  /* the block within which it goes on */
+    uint64_t resumed_stop_at;
     struct row none;
     struct row *flash_rows[FLASH_SLOTS];
     struct row *sram_rows[SRAM_SLOTS];
@@ -278,7 +294,8 @@ bool read_usart_data(struct core *core, const struct page *page, uint32_t *word)
 /* streams.c */
 void end_characters(struct core *core);
 /* access.c */
-void resolve(struct core *core, uint32_t address, bool is_write, uint32_t bytes);
+void go_on_at_access(struct core *core, uint32_t pc);
+bool resolve(struct core *core, uint32_t address, bool is_write, uint32_t bytes);
 void skip(struct core *core, uint32_t address, bool is_write, uint32_t bytes);
 /* run.c */
 void *allocate(struct core *core, size_t bytes);

@@ -10,10 +10,9 @@
 
 enum { IDR = 2, ODR = 3, BSRR = 4, BRR = 5 };
 
-static void record_pins(struct core *core, const struct page *page, uint32_t changed, uint32_t address)
+static void record_pins(struct core *core, const struct page *page, uint32_t changed)
 {
     struct shared *s = &core->shared;
-    resolve(core, address, true, 4);
     core->pin_rows[core->pin_count++] = (struct pin_row){
         s->access_cycle, (uint16_t)(page->port - core->ports), (uint16_t)changed, (uint16_t)page->words[ODR], 0};
     if (core->pin_count > PIN_ROWS - PIN_SLACK) {
@@ -41,13 +40,16 @@ bool write_port(struct core *core, struct page *page, uint32_t index, uint32_t v
         return false;
     }
     if (changed) {
+        if (core->pin_rows != NULL && !resolve(core, address, true, 4)) {
+            return true;
+        }
         core->shared.last_pin_cycle = core->shared.cycle;
         page->words[ODR] = after;
         page->words[IDR] = (page->words[IDR] & ~changed) | (after & changed);
         page->port->changed |= changed;
         core->shared.dirty |= changed;
         if (core->pin_rows != NULL) {
-            record_pins(core, page, changed, address);
+            record_pins(core, page, changed);
             return true;
         }
     }

@@ -196,7 +196,13 @@ static uint32_t run_slice(struct core *core)
         return s->halt_kind = HALT_EXECUTE_NEVER;
     }
     core->io_next = core->skipped_count = 0;
-    const int error = core->api.start(core->unicorn, s->pc | s->is_thumb, NOWHERE, 0, 0);
+    core->located.cycle = NO_TIME;
+    int error = core->api.start(core->unicorn, s->pc | s->is_thumb, NOWHERE, 0, 0);
+    while (core->is_stopping) {
+        const uint32_t pc = read_register(core, REG_PC);
+        go_on_at_access(core, pc);
+        error = core->api.start(core->unicorn, pc | 1, NOWHERE, 0, 0);
+    }
     if (s->halt_kind == HALT_NONE) {
         const uint32_t pc = read_register(core, REG_PC);
         s->halt_pc = pc;

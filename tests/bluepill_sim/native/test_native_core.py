@@ -19,6 +19,7 @@ pytestmark = pytest.mark.skipif(library_path() is None, reason="the native core 
 FIRMWARE = files("robot_bench.firmware")
 PROGRAMS = {name: Path(str(FIRMWARE / f"{name}.elf")) for name in ("motors", "sensors", "encoders", "dodge")}
 PROGRAMS["foreign"] = Path(__file__).parents[2] / "firmware_foreign" / "foreign.elf"
+PROGRAMS["unoptimised"] = Path(__file__).parents[1] / "firmware" / "unoptimised.elf"
 #: Pins that the examples read.
 INPUTS = ("PA0", "PA1", "PA4", "PA5", "PB0", "PB5", "PB10", "PB11", "PB12", "PC13")
 
@@ -91,7 +92,7 @@ def test_every_block_exception_and_edge_is_the_same(make: MakeBoard, program: st
         take(recorder)
     assert rows["native"] == rows["python"]
     assert edges["native"] == edges["python"]
-    assert len(rows["native"]) > 1000
+    assert len(rows["native"]) > 500
 
 
 def test_a_snapshot_of_one_goes_on_in_the_other(make: MakeBoard) -> None:

@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 
 SOURCES = sorted((Path(__file__).parents[3] / "bluepill_sim" / "native" / "source").glob("*.c"))
+UNOPTIMISED = Path(__file__).parents[1] / "firmware" / "unoptimised.elf"
 COMPILER = shutil.which("gcc")
 PROGRAM = """
 import sys
@@ -19,8 +20,9 @@ from pathlib import Path
 from bluepill_sim import BluePill
 from bluepill_sim.analysis.probe import Probe
 from bluepill_sim.analysis.vcd import write_vcd
-for name in ("dodge", "motors", "encoders"):
-    board = BluePill(str(files("robot_bench.firmware") / f"{name}.elf"))
+programs = [str(files("robot_bench.firmware") / f"{name}.elf") for name in ("dodge", "motors", "encoders")]
+for program in (*programs, *sys.argv[3:]):
+    board = BluePill(program)
     board.chip.record_blocks(100)
     for step in range(40):
         board.pin("PA4").drive(step % 3 == 0)
@@ -63,6 +65,7 @@ def test_no_warning_and_no_finding(tmp_path: Path) -> None:
         PROGRAM,
         str(library),
         str(tmp_path / "pins.vcd"),
+        str(UNOPTIMISED),
         LD_PRELOAD=preload,
         ASAN_OPTIONS="detect_leaks=0",
         P2OS_CORE="native",

@@ -13,15 +13,17 @@ from adapter_sim.pinout import load_pinout
 from robot_bench.firmware import build
 
 FOREIGN = Path(__file__).parents[2] / "firmware_foreign"
-ELFS = [*(build.HERE / f"{name}.elf" for name in build.PROGRAMS), FOREIGN / "foreign.elf"]
+UNOPTIMISED = Path(__file__).parents[2] / "bluepill_sim" / "firmware"
+OTHERS = [FOREIGN / "foreign.elf", UNOPTIMISED / "unoptimised.elf"]
+ELFS = [*(build.HERE / f"{name}.elf" for name in build.PROGRAMS), *OTHERS]
 FLASH_START, FLASH_END = 0x0800_0000, 0x0801_0000
 SRAM_START, SRAM_END = 0x2000_0000, 0x2000_5000
 #: 16 of the core and 60 of an STM32F103.
 VECTORS = 76
 
 
-def builder_of_the_foreign_program() -> ModuleType:
-    spec = importlib.util.spec_from_file_location("foreign_build", FOREIGN / "build.py")
+def builder_in(folder: Path) -> ModuleType:
+    spec = importlib.util.spec_from_file_location("other_build", folder / "build.py")
     assert spec is not None
     assert spec.loader is not None
     module = importlib.util.module_from_spec(spec)
@@ -33,14 +35,18 @@ def test_the_same_compiler_builds_the_same_bytes(tmp_path: Path) -> None:
     version = build.compiler_version()
     if version != build.COMPILER_VERSION:
         pytest.skip(f"the committed ELFs are of {build.COMPILER_VERSION}; here is {version or 'no cross compiler'}")
-    built = [*build.build_programs(tmp_path), builder_of_the_foreign_program().build_foreign(tmp_path)]
+    built = [
+        *build.build_programs(tmp_path),
+        builder_in(FOREIGN).build_foreign(tmp_path),
+        builder_in(UNOPTIMISED).build_program(tmp_path / "unoptimised.elf"),
+    ]
     assert [path.name for path in built] == [path.name for path in ELFS]
     stale = [
         committed.name
         for committed, fresh in zip(ELFS, built, strict=True)
         if committed.read_bytes() != fresh.read_bytes()
     ]
-    assert stale == [], "rebuild them: make firmware, python tests/firmware_foreign/build.py"
+    assert stale == [], "rebuild them: make firmware, and the build.py beside each of the others"
 
 
 def test_a_missing_compiler_is_one_line_and_a_hint(
