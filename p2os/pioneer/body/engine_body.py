@@ -12,7 +12,14 @@ from typing import ClassVar
 from p2os.pioneer.body.contacts import ContactCounter
 from p2os.pioneer.body.contract import BodyState
 from p2os.pioneer.body.in_world import BodyInWorld
-from p2os.pioneer.body.physical import PUSHED_M, STALL_RIM_MPS, STALL_STEPS, STALL_TORQUE_SHARE
+from p2os.pioneer.body.physical import (
+    BACK_DRIVE,
+    PUSHED_BACK_MPS,
+    PUSHED_M,
+    STALL_RIM_MPS,
+    STALL_STEPS,
+    STALL_TORQUE_SHARE,
+)
 from p2os.pioneer.world.model import World
 from p2os.robots.parameters import RobotParameters
 
@@ -20,7 +27,7 @@ from p2os.robots.parameters import RobotParameters
 class EngineBody(BodyInWorld):
     """A differential drive with mass, torque limits and friction."""
 
-    STATE: ClassVar[tuple[str, ...]] = ("_zero", "_stalling")
+    STATE: ClassVar[tuple[str, ...]] = ("_zero", "_stalling", "_is_held")
     DERIVED: ClassVar[tuple[str, ...]] = ("_state",)
 
     #: Angles of the wheels when it was reset.
@@ -32,7 +39,10 @@ class EngineBody(BodyInWorld):
         self._straining_nm = STALL_TORQUE_SHARE * parameters.body.motor_torque_nm
         self._slow_radps = STALL_RIM_MPS / self._radius_m
         self._state: BodyState | None = None
+        self._torque_nm = parameters.body.motor_torque_nm
         self._stalling = [0, 0]
+        #: Wheels that something would turn back against their motor, and that the gear's friction holds.
+        self._is_held = [False, False]
 
     def _restored(self) -> None:
         super()._restored()
@@ -55,12 +65,36 @@ class EngineBody(BodyInWorld):
         """Begin to count contacts and stalls."""
         self._contacts = ContactCounter()
         self._stalling = [0, 0]
+        self._is_held = [False, False]
         self._state = None
 
-    def _watch_motor(self, wheel: int, effort_nm: float, rate_radps: float) -> None:
-        """Count for how many steps a wheel's motor has been stalled."""
-        is_stalled = abs(effort_nm) > self._straining_nm and abs(rate_radps) < self._slow_radps
+    def _watch_motor(self, wheel: int, asked_mps: float, effort_nm: float, rate_radps: float) -> None:
+        """Count for how many steps a wheel's motor has been stalled; see whether the gear holds the wheel from now on.
+
+        Args:
+            wheel: 0 left, 1 right.
+            asked_mps: Its set-point.
+            effort_nm: What its motor and gear gave in the last step, positive forward.
+            rate_radps: Its rate since.
+        """
+        forward = math.copysign(1.0, asked_mps)
+        if self._is_held[wheel]:
+            self._is_held[wheel] = asked_mps != 0.0 and effort_nm * forward > self._torque_nm
+        else:
+            is_pushed_back = asked_mps != 0.0 and rate_radps * forward * self._radius_m < -PUSHED_BACK_MPS
+            self._is_held[wheel] = is_pushed_back and effort_nm * forward > self._straining_nm
+        is_straining = self._is_held[wheel] or abs(effort_nm) > self._straining_nm
+        is_stalled = is_straining and abs(rate_radps) < self._slow_radps
         self._stalling[wheel] = min(STALL_STEPS, self._stalling[wheel] + 1) if is_stalled else 0
+
+    def _motor(self, wheel: int, asked_mps: float) -> tuple[float, float]:
+        """Return the rate that a wheel is driven to, rad/s, and the greatest torque for it, Nm.
+
+        A wheel that is held stands, until what pushes it back has become less than what its motor gives.
+        """
+        if self._is_held[wheel] and asked_mps != 0.0:
+            return 0.0, self._torque_nm * BACK_DRIVE
+        return asked_mps / self._radius_m, self._torque_nm
 
     def _walk(self) -> None:
         """Put everything that walks where it is by now; the plan learns of it when it is asked."""

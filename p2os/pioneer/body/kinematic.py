@@ -3,7 +3,8 @@
 Within a step both rims keep their set-points and the path is the exact arc.
 Slopes are flat to it; walls and echoes are those at the height of the hull and
 of the sonar ring; what is lower than the hull stops the wheels, unless it is a
-sill. A step that would bring the hull into a thing does not happen: the wheels
+sill. A step that would bring the hull into a thing does not happen: the robot slides
+along the thing where one slower wheel leads past it, without friction, else the wheels
 stall until the set-points lead away. A thing that can be pushed slides out of
 the way, without turning, where it has room and its friction is less than what
 the motors can push. What walks by itself goes on through the robot. Another
@@ -29,6 +30,8 @@ from p2os.robots.parameters import RobotParameters
 STRAIGHT_RAD = 1e-9
 #: Farther than this nothing is measured exactly, m: it only bounds how soon the next look is due.
 LOOK_AHEAD_M = 2.0
+#: Where the set-points lead into a thing, one wheel is tried at these shares of its own (chosen).
+SLIDING_SHARES = (0.75, 0.5, 0.25, 0.0)
 #: What walks is moved each 10 ms (chosen: 8 mm at a walker's pace).
 WALK_STEPS = 10
 GRAVITY_MPS2 = 9.81
@@ -137,6 +140,26 @@ class KinematicBody(BodyInWorld):
         self._asked = asked = (left_mps, right_mps)
         if left_mps == 0.0 and right_mps == 0.0:
             return self._stand()
+        arc = self._arc(left_mps, right_mps)
+        robots_near = self._other_robots is not None and bool(self._other_robots.near)
+        # What was blocked stays so: neither the pose nor the plan has changed since; other robots may have.
+        is_known = asked == self._blocked_at and not robots_near
+        rims = asked if not is_known and self._take(arc) else None
+        is_touching = rims is None or self._is_bumped or self._free_m == 0.0
+        if rims is None and not is_known:
+            rims = self._slide(left_mps, right_mps)
+            self._blocked_at = asked if rims is None and not robots_near else None
+        self._stalled = rims is None
+        if self._contacts.update(touching=is_touching):
+            self._note_contact(*arc[:3])
+        self._is_bumped = False
+        self._left, self._right = rims or (0.0, 0.0)
+        self._left_angle += self._left * DT_S / self._radius_m
+        self._right_angle += self._right * DT_S / self._radius_m
+        return Turned(self._left_angle, self._right_angle)
+
+    def _arc(self, left_mps: float, right_mps: float) -> tuple[float, float, float, float, float, float]:
+        """Return where one step leads: x, y, heading, its cosine and sine, and the farthest way of a point, metres."""
         forward, turn = (left_mps + right_mps) / 2 * DT_S, (right_mps - left_mps) / self._track_m * DT_S
         c, s = self._cos, self._sin
         heading = self._heading + turn
@@ -148,33 +171,30 @@ class KinematicBody(BodyInWorld):
             radius, c, s = forward / turn, math.cos(heading), math.sin(heading)
             x = self._x + radius * (s - self._sin)
             y = self._y - radius * (c - self._cos)
-        travel = abs(forward) + abs(turn) * self._hull_reach
-        blocked = (
-            self._other_robots is not None
-            and bool(self._other_robots.near)
-            and self._meets(self._other_robots, x, y, heading)
-        )
-        if not blocked:
-            # What was blocked stays so: neither the pose nor the plan has changed since.
-            blocked = asked == self._blocked_at
-            if not blocked:
-                if self._free_m > travel:
-                    self._free_m -= travel
-                else:
-                    blocked = self._is_blocked(x, y, heading)
-            self._blocked_at = asked if blocked else None
-        self._stalled = blocked
-        if self._contacts.update(touching=blocked or self._is_bumped or self._free_m == 0.0):
-            self._note_contact(x, y, heading)
-        self._is_bumped = False
-        if blocked:
-            self._left = self._right = 0.0
-            return Turned(self._left_angle, self._right_angle)
+        return x, y, heading, c, s, abs(forward) + abs(turn) * self._hull_reach
+
+    def _take(self, arc: tuple[float, float, float, float, float, float]) -> bool:
+        """Go where a step leads; tell whether nothing is in the way."""
+        x, y, heading, c, s, travel = arc
+        others = self._other_robots
+        if others is not None and others.near and self._meets(others, x, y, heading):
+            return False
+        if self._free_m > travel:
+            self._free_m -= travel
+        elif self._is_blocked(x, y, heading):
+            return False
         self._x, self._y, self._heading, self._cos, self._sin = x, y, heading, c, s
-        self._left, self._right = left_mps, right_mps
-        self._left_angle += left_mps * DT_S / self._radius_m
-        self._right_angle += right_mps * DT_S / self._radius_m
-        return Turned(self._left_angle, self._right_angle)
+        return True
+
+    def _slide(self, left_mps: float, right_mps: float) -> tuple[float, float] | None:
+        """Go on with one wheel slower, where that leads along what is in the way; return the rims' speeds."""
+        if left_mps == 0.0 or right_mps == 0.0:
+            return None
+        for share in SLIDING_SHARES:
+            for rims in ((left_mps, right_mps * share), (left_mps * share, right_mps)):
+                if self._take(self._arc(*rims)):
+                    return rims
+        return None
 
     def _stand(self) -> Turned:
         """Stand for one step, and feel what has come to touch the hull."""

@@ -37,6 +37,13 @@ SETTLE_STEPS = 300
 STALL_TORQUE_SHARE = 0.95
 STALL_RIM_MPS = 0.05
 STALL_STEPS = 200
+#: The share of its torque that a motor's gear passes on (chosen: two stages of spur gears); the rest is friction.
+GEAR_EFFICIENCY = 0.73
+#: So much more than what a motor gives at the wheel must turn the wheel back against it: the friction of the gear then
+#: helps the motor. Without it a robot that leans on a thing swings about it for half a minute, as on two springs.
+BACK_DRIVE = GEAR_EFFICIENCY**-2
+#: chosen: a rim that is slower is not pushed back, it trembles.
+PUSHED_BACK_MPS = 2e-3
 #: A thing that was displaced by less stands where it stood, m.
 PUSHED_M = 1e-4
 

@@ -70,8 +70,6 @@ class BulletBody(EngineBody):
         super().__init__(world, parameters)
         self._sonar_rays = SonarRays(cones(parameters), parameters.sonar_height_m, parameters.sonar_range_m)
         self._bands = Bands(parameters)
-        torque = parameters.body.motor_torque_nm
-        self._forces = [torque, torque]
         #: The engine takes its client as a keyword of every call.
         self._client = pybullet.connect(pybullet.DIRECT)
         #: Steps for which nothing can touch the robot, and steps until that is looked at again.
@@ -162,8 +160,11 @@ class BulletBody(EngineBody):
             if self._contacts.update(touching=self._is_touching()):
                 self._note_contact()
             self._look_around()
-        self._watch_motor(LEFT, left[3], left[1])
-        self._watch_motor(RIGHT, right[3], right[1])
+        held = self._is_held[:]
+        self._watch_motor(LEFT, left_mps, left[3], left[1])
+        self._watch_motor(RIGHT, right_mps, right[3], right[1])
+        if held != self._is_held:
+            self._command()
         zero = self._zero
         return Turned(left[0] - zero[0], right[0] - zero[1])
 
@@ -181,11 +182,10 @@ class BulletBody(EngineBody):
 
     def _command(self) -> None:
         """Give the motors their targets; the engine does not save them with its state."""
-        radius = self._radius_m
-        left, right = self._targets
+        left, right = (self._motor(wheel, asked) for wheel, asked in zip(WHEELS, self._targets, strict=True))
         pybullet.setJointMotorControlArray(
             self._robot, WHEELS, pybullet.VELOCITY_CONTROL,
-            targetVelocities=[left / radius, right / radius], forces=self._forces,
+            targetVelocities=[left[0], right[0]], forces=[left[1], right[1]],
             physicsClientId=self._client,
         )  # fmt: skip
 

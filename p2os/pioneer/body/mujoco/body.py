@@ -123,14 +123,15 @@ class MujocoBody(EngineBody):
         self._steps += 1
         if self._walking:
             self._walk()
-        left, right = self._rotors
-        qvel[left], qvel[right] = left_mps / self._radius_m, right_mps / self._radius_m
+        asked = left_mps, right_mps
+        for wheel, rotor in enumerate(self._rotors):
+            qvel[rotor], model.tendon_frictionloss[wheel] = self._motor(wheel, asked[wheel])
         mujoco.mj_step(model, data)
         if self._contacts.update(touching=self._is_touching()):
             self._note_contact()
         # The motors are the only frictions of joints, and the engine lists those first.
         for wheel, effort in enumerate(data.efc_force[:2].tolist()):
-            self._watch_motor(wheel, effort, qvel[self._wheel_speeds[wheel]])
+            self._watch_motor(wheel, asked[wheel], effort, float(qvel[self._wheel_speeds[wheel]]))
         left, right = self._wheel_places
         return Turned(float(self._qpos[left]) - self._zero[0], float(self._qpos[right]) - self._zero[1])
 

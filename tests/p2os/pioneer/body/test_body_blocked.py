@@ -1,0 +1,89 @@
+"""One contract for a robot that drives against a thing, held by every body: it slides, or it stalls and rests."""
+
+import math
+
+import pytest
+
+from p2os.pioneer.body.factory import make_body
+from p2os.pioneer.world import load_world, parse_world
+from p2os.pioneer.world.model import Pose
+from p2os.robots.parameters import load_parameters
+from tests.p2os.pioneer.body.bodies import drive, each_body
+from tools.contact_survey import MODELS, Contact, measure, survey
+
+ARENA = load_world("arena", 1)
+WALL = parse_world(
+    """
+    name = "wall"
+    extent_m = [-9, -9, 9, 9]
+    [[box]]
+    name = "wall"
+    x_m = 0.0
+    y_m = 1.05
+    length_m = 16.0
+    width_m = 0.1
+    height_m = 0.5
+    """,
+    "wall",
+)
+#: At these a corner of the hull meets a thing beside the robot's middle, and it may turn about it.
+OFF_CENTRE_DEG = (72, 120, 312)
+
+
+def told(contact: Contact) -> str:
+    return f"{contact.model} on {contact.body}, heading {contact.heading_deg:g}: {'; '.join(contact.faults())}"
+
+
+@pytest.mark.parametrize("heading_deg", OFF_CENTRE_DEG)
+@pytest.mark.parametrize("name", each_body())
+def test_a_robot_that_meets_a_thing_beside_its_middle_slides_or_stalls_and_rests(name: str, heading_deg: int) -> None:
+    model = load_parameters("p2dx")
+    contact = measure(make_body(name, ARENA, model), model, heading_deg, 4.0)
+    assert contact is not None
+    assert not contact.faults(), told(contact)
+
+
+@pytest.mark.soak
+@pytest.mark.parametrize("model", MODELS)
+@pytest.mark.parametrize("name", each_body())
+def test_every_contact_of_thirty_headings_is_within_the_contract(name: str, model: str) -> None:
+    contacts = list(survey([name], [model], 30, ARENA))
+    assert len(contacts) == 30
+    assert not [told(contact) for contact in contacts if contact.faults()]
+
+
+@pytest.mark.parametrize("model", ["p2dx", "powerbot"])
+@pytest.mark.parametrize("name", each_body())
+def test_a_robot_that_meets_a_wall_at_a_small_angle_goes_along_it(name: str, model: str) -> None:
+    body = make_body(name, WALL, load_parameters(model))
+    body.reset(Pose(-4.0, 0.4, math.radians(20)), 0)
+    met = drive(body, 0.3, 0.3, 4.0)
+    assert met.collisions
+    along = drive(body, 0.3, 0.3, 3.0)
+    assert along.x_m - met.x_m > 0.5 * 0.3 * 3
+    assert abs(along.heading_rad) < math.radians(3)
+    assert not along.stalled_left
+    assert not along.stalled_right
+
+
+@pytest.mark.parametrize("name", each_body())
+def test_a_robot_that_meets_a_wall_at_a_large_angle_stalls(name: str) -> None:
+    body = make_body(name, WALL, load_parameters("p2dx"))
+    body.reset(Pose(-4.0, 0.6, math.radians(75)), 0)
+    stuck = drive(body, 0.3, 0.3, 3.0)
+    assert stuck.stalled_left
+    assert stuck.stalled_right
+    assert drive(body, 0.0, 0.0, 0.05).left_speed_mps == pytest.approx(0.0, abs=0.005)
+    assert drive(body, -0.3, -0.3, 1.0).y_m < stuck.y_m - 0.2
+
+
+@pytest.mark.parametrize("name", each_body("kinematic"))
+def test_a_gear_holds_a_wheel_that_is_pushed_back_and_lets_it_go_again(name: str) -> None:
+    body = make_body(name, ARENA, load_parameters("p2dx"))
+    body.reset(Pose(0.0, 0.0, math.radians(72)), 0)
+    stuck = drive(body, 0.4, 0.4, 8.0)
+    assert stuck.stalled_left or stuck.stalled_right
+    free = drive(body, -0.4, -0.4, 1.0)
+    assert (free.left_speed_mps, free.right_speed_mps) == pytest.approx((-0.4, -0.4), abs=0.01)
+    assert not free.stalled_left
+    assert not free.stalled_right

@@ -1,0 +1,255 @@
+"""Drive each body against the things of an arena and measure each contact.
+
+    python tools/contact_survey.py                             # thirty headings, three bodies, three models
+    python tools/contact_survey.py --body bullet --headings 6 --csv contacts.csv
+    python tools/contact_survey.py --picture contacts.png      # time to stall and to rest
+
+A robot drives from the middle of the arena with both rims at 0.4 m/s, ramped as the firmware
+ramps, until it meets a thing; the same command goes on for some seconds, then both set-points
+are zero. `Contact.faults` says what of a contact breaks the contract of `body`'s data sheet.
+
+Needs the engines of the bodies, and Matplotlib for the picture. Ends with 1 where a contact
+breaks the contract.
+"""
+
+import argparse
+import csv
+import itertools
+import math
+import sys
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import asdict, dataclass, fields
+from pathlib import Path
+
+from p2os.pioneer.body.contract import BodyState, RobotBody
+from p2os.pioneer.body.factory import BODY_NAMES, make_body
+from p2os.pioneer.world import load_world
+from p2os.pioneer.world.model import Pose, World
+from p2os.robots.parameters import RobotParameters, load_parameters
+
+MODELS = ("p2dx", "p3dx-sh", "powerbot")
+COMMAND_MPS, RAMP_MPS2 = 0.4, 0.3
+#: The states are looked at so often, steps of 1 ms.
+LOOK_STEPS = 10
+LOOK_S = LOOK_STEPS / 1000
+#: A robot that has met nothing by then has no contact, s; and how long one is watched.
+LONGEST_WAY_S, WATCHED_S = 30.0, 8.0
+#: Speeds of the centre are means over so many looks.
+MEAN_LOOKS = 10
+
+# The contract.
+#: Of the command: a centre that is faster slides, rims that are slower are blocked.
+SLIDE_SHARE, BLOCKED_SHARE = 0.2, 0.1
+DECIDED_S, STALL_S, REST_S, STOP_S = 1.5, 0.6, 2.0, 0.05
+MOST_SIGN_CHANGES = 2
+#: Slower is no turn, rad/s, and no motion, m/s.
+TURNING_RADPS, RESTING_MPS = 0.05, 0.005
+#: Above the kinetic energy of the robot at its command, per kg; a share.
+ENERGY_MARGIN = 1.05
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Contact:
+    """What was measured of one contact; times in seconds from the first touch, None where it did not happen."""
+
+    body: str
+    model: str
+    heading_deg: float
+    #: First stall bit.
+    stall_s: float | None
+    #: From both rims blocked to the first stall bit, the longest.
+    blocked_to_stall_s: float
+    #: When all came to rest for good.
+    rest_s: float | None
+    #: From the first time with both stall bits to rest, or for as long as it was watched; None where it never stood.
+    stand_to_rest_s: float | None
+    #: Share of the looks at which its centre slid.
+    slide_share: float
+    #: The longest time, from `DECIDED_S` on, in which it touched and neither slid nor had a stall bit.
+    undecided_s: float
+    sign_changes: int
+    #: The greatest kinetic energy in that of the command.
+    energy: float
+    #: From the set-points at zero until the rims stood, None where they did not within a second.
+    stop_s: float | None
+
+    def faults(self) -> list[str]:
+        """Return what of this breaks the contract."""
+        found = []
+        # What slid until then may come to be blocked.
+        if self.undecided_s > STALL_S:
+            found.append(f"neither slides nor stalls for {self.undecided_s:.2f} s")
+        if self.blocked_to_stall_s > STALL_S:
+            found.append(f"blocked for {self.blocked_to_stall_s:.2f} s without a stall bit")
+        if self.sign_changes > MOST_SIGN_CHANGES:
+            found.append(f"its turn changes sign {self.sign_changes} times")
+        if self.stand_to_rest_s is not None and self.stand_to_rest_s > REST_S:
+            found.append(f"moves for {self.stand_to_rest_s:.2f} s after both wheels stalled")
+        if self.energy > ENERGY_MARGIN:
+            found.append(f"{self.energy:.2f} times the energy of the command")
+        if self.stop_s is None or self.stop_s > STOP_S:
+            found.append("a stop is not effective at once")
+        return found
+
+
+def measure(
+    body: RobotBody, model: RobotParameters, heading_deg: float, watched_s: float = WATCHED_S
+) -> Contact | None:
+    """Drive against whatever is there; return what was measured, None where nothing is met."""
+    body.reset(Pose(0.0, 0.0, math.radians(heading_deg)), 0)
+    for step in range(round(LONGEST_WAY_S * 1000)):
+        speed = min(COMMAND_MPS, step * RAMP_MPS2 / 1000)
+        body.step(speed, speed)
+        if step % LOOK_STEPS == 0 and body.state.collisions:
+            break
+    else:
+        return None
+    states = list(_watch(body, COMMAND_MPS, watched_s))
+    stopping = list(_watch(body, 0.0, 1.0))
+    return _judge(body.name, model, heading_deg, states, stopping)
+
+
+def _watch(body: RobotBody, speed_mps: float, seconds: float) -> Iterator[BodyState]:
+    for _ in range(round(seconds * 1000 / LOOK_STEPS)):
+        for _ in range(LOOK_STEPS):
+            body.step(speed_mps, speed_mps)
+        yield body.state
+
+
+def _judge(
+    name: str, model: RobotParameters, heading_deg: float, states: Sequence[BodyState], stopping: Sequence[BodyState]
+) -> Contact:
+    """Return what the states after a first touch, and those after the command to stop, amount to."""
+    speeds = [_speed(states, look) for look in range(len(states))]
+    slides = [speed >= SLIDE_SHARE * COMMAND_MPS for speed in speeds]
+    stalls = [state.stalled_left or state.stalled_right for state in states]
+    stands = [state.stalled_left and state.stalled_right for state in states]
+    blocked = [_rim(state) < BLOCKED_SHARE * COMMAND_MPS for state in states]
+    rests = [max(_rim(state), speed) <= RESTING_MPS for state, speed in zip(states, speeds, strict=True)]
+    late = range(round(DECIDED_S / LOOK_S), len(states))
+    turns = [state.turn_radps for state in states if abs(state.turn_radps) > TURNING_RADPS]
+    rest = next((look for look in reversed(range(len(states))) if not rests[look]), -1) + 1
+    stand_s = _first(stands)
+    rest_s = rest * LOOK_S
+    own = model.body
+    gyration_m2 = ((own.hull_front_m + own.hull_rear_m) ** 2 + own.hull_width_m**2) / 12
+    energies = [
+        speed**2 + gyration_m2 * state.turn_radps**2
+        for speed, state in list(zip(speeds, states, strict=True))[MEAN_LOOKS:]
+    ]
+    return Contact(
+        body=name,
+        model=model.subclass,
+        heading_deg=heading_deg,
+        stall_s=_first(stalls),
+        blocked_to_stall_s=_longest(
+            is_blocked and not stall for is_blocked, stall in zip(blocked, stalls, strict=True)
+        ),
+        rest_s=rest_s if rest < len(states) else None,
+        stand_to_rest_s=None if stand_s is None else max(0.0, rest_s - stand_s),
+        slide_share=sum(slides) / len(slides),
+        undecided_s=_longest(states[n].in_contact and not slides[n] and not stalls[n] for n in late),
+        sign_changes=sum(one * other < 0 for one, other in itertools.pairwise(turns)),
+        energy=max(energies) / COMMAND_MPS**2,
+        stop_s=_first(_rim(state) < RESTING_MPS for state in stopping),
+    )
+
+
+def _speed(states: Sequence[BodyState], look: int) -> float:
+    """Return the mean speed of the robot's centre over `MEAN_LOOKS`, m/s."""
+    since = max(0, look - MEAN_LOOKS)
+    now, then = states[look], states[since]
+    return math.dist((now.x_m, now.y_m), (then.x_m, then.y_m)) / (max(1, look - since) * LOOK_S)
+
+
+def _rim(state: BodyState) -> float:
+    """Return the speed of the faster rim, m/s."""
+    return max(abs(state.left_speed_mps), abs(state.right_speed_mps))
+
+
+def _first(claims: Iterable[bool]) -> float | None:
+    """Return after how many seconds a claim is true for the first time."""
+    return next((look * LOOK_S for look, claim in enumerate(claims) if claim), None)
+
+
+def _longest(claims: Iterable[bool]) -> float:
+    """Return for how many seconds a claim is true without a break, at the most."""
+    return max((sum(1 for _ in run) * LOOK_S for claim, run in itertools.groupby(claims) if claim), default=0.0)
+
+
+def survey(bodies: Sequence[str], models: Sequence[str], headings: int, world: World) -> Iterator[Contact]:
+    """Measure a contact for each model, body and heading that meets a thing."""
+    for model in models:
+        parameters = load_parameters(model)
+        for name in bodies:
+            body = make_body(name, world, parameters)
+            for number in range(headings):
+                found = measure(body, parameters, number * 360.0 / headings)
+                if found is not None:
+                    yield found
+
+
+def main() -> int:
+    """Print what each contact was, and what of it breaks the contract."""
+    parser = argparse.ArgumentParser(description=(__doc__ or "").partition("\n")[0])
+    parser.add_argument("--body", action="append", choices=BODY_NAMES, help="may be given more than once; default: all")
+    parser.add_argument("--model", action="append", help=f"may be given more than once; default: {', '.join(MODELS)}")
+    parser.add_argument("--headings", type=int, default=30, help="default: 30")
+    parser.add_argument("--seed", type=int, default=1, help="of the arena; default: 1")
+    parser.add_argument("--csv", type=Path, help="write every figure here")
+    parser.add_argument("--picture", type=Path, help="draw the times to stall and to rest here")
+    options = parser.parse_args()
+    world = load_world("arena", options.seed)
+    found = []
+    print("model      body       heading   stall    rest  slides  signs  energy")
+    for one in survey(options.body or BODY_NAMES, options.model or MODELS, options.headings, world):
+        found.append(one)
+        stall, rest = (f"{'never':>7}" if s is None else f"{s:5.2f} s" for s in (one.stall_s, one.rest_s))
+        print(f"{one.model:<10} {one.body:<10} {one.heading_deg:5.0f} \N{DEGREE SIGN} {stall} {rest}"
+              f" {one.slide_share:6.0%} {one.sign_changes:6} {one.energy:7.2f}", *one.faults(), sep="  ")  # fmt: skip
+    if options.csv:
+        with options.csv.open("w", newline="") as file:
+            writer = csv.DictWriter(file, [field.name for field in fields(Contact)])
+            writer.writeheader()
+            writer.writerows(asdict(one) for one in found)
+    if options.picture:
+        draw(found, options.picture)
+    broken = sum(bool(one.faults()) for one in found)
+    print(f"{len(found)} contacts, {broken} break the contract")
+    return int(broken > 0)
+
+
+def draw(found: Sequence[Contact], path: Path) -> None:
+    """Draw the times to stall and to rest over the heading: a panel for each model and body."""
+    import matplotlib as mpl
+
+    mpl.use("Agg")
+    from matplotlib import pyplot as plt
+
+    models, bodies = (list(dict.fromkeys(getattr(one, key) for one in found)) for key in ("model", "body"))
+    figure, axes = plt.subplots(
+        len(models), len(bodies), sharex=True, sharey=True, squeeze=False, layout="constrained",
+        figsize=(3.2 * len(bodies) + 0.8, 2.2 * len(models) + 0.8),
+    )  # fmt: skip
+    for (row, model), (column, body) in itertools.product(enumerate(models), enumerate(bodies)):
+        panel = axes[row][column]
+        own = [one for one in found if (one.model, one.body) == (model, body)]
+        for times, mark, label in (
+            ([one.stall_s for one in own], "o", "first stall bit"),
+            ([one.rest_s for one in own], "x", "at rest for good"),
+        ):
+            # What never came is drawn at the upper edge.
+            panel.plot([one.heading_deg for one in own], [WATCHED_S if s is None else s for s in times], mark,
+                       markersize=4, fillstyle="none", label=label)  # fmt: skip
+        panel.set_title(f"{model}, {body}", fontsize=9)
+        panel.set_ylim(-0.3, WATCHED_S + 0.3)
+        panel.axhline(DECIDED_S, linewidth=0.6, color="gray")
+        panel.grid(alpha=0.3)
+    axes[0][0].legend(fontsize=7)
+    figure.supxlabel("heading, degrees", fontsize=9)
+    figure.supylabel(f"seconds from the first touch ({WATCHED_S:g}: not within {WATCHED_S:g} s)", fontsize=9)
+    figure.savefig(path, dpi=110)
+
+
+if __name__ == "__main__":
+    sys.exit(main())
