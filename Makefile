@@ -48,11 +48,11 @@ unit: setup
 	$(BIN)/python tools/check_coverage.py .coverage.json
 
 bench: setup
-	$(BIN)/python tools/bench_emulator.py
-	$(BIN)/python tools/bench_columns.py
-	$(BIN)/python tools/bench_bodies.py
-	$(BIN)/python tools/bench_pioneer.py
-	$(BIN)/python tools/bench_speed.py
+	$(BIN)/python tools/bench/emulator.py
+	$(BIN)/python tools/bench/columns.py
+	$(BIN)/python tools/bench/bodies.py
+	$(BIN)/python tools/bench/pioneer.py
+	$(BIN)/python tools/bench/speed.py
 
 soak: setup
 	$(BIN)/pytest -n $(JOBS) -m 'soak' --no-cov

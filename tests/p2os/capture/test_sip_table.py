@@ -118,7 +118,7 @@ def test_export_of_a_large_capture_works_without_numpy(tmp_path: Path, monkeypat
 
 @pytest.mark.slow
 def test_the_benchmark_compares_what_it_times() -> None:
-    tool = GOLDEN.parent.parent / "tools" / "bench_columns.py"
+    tool = GOLDEN.parent.parent / "tools" / "bench" / "columns.py"
     done = subprocess.run([sys.executable, str(tool), "--quick", "--json"], capture_output=True, text=True, check=False,
                           timeout=300, env={**os.environ, "PYTHONPATH": str(tool.parent.parent)})  # fmt: skip
     assert done.returncode == 0, done.stderr

@@ -1,6 +1,6 @@
 """Print what virtual Pioneers cost: many in virtual time, and one served in real time.
 
-Run it on an idle machine. Usage: python tools/bench_pioneer.py [ROBOTS]
+Run it on an idle machine. Usage: python tools/bench/pioneer.py [ROBOTS]
 """
 
 import math

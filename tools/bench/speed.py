@@ -1,7 +1,7 @@
-"""Print the speed of the wire's decoder and of the whole chain, as ratios to real time; `bench_bodies` has the bodies.
+"""Print the speed of the wire's decoder and of the whole chain, as ratios to real time; `bodies.py` has the bodies.
 
 Each figure is the median of several runs in this process; run it on an idle
-machine. Usage: python tools/bench_speed.py [--quick]
+machine. Usage: python tools/bench/speed.py [--quick]
 """
 
 import statistics

@@ -4,7 +4,7 @@ The first stream is one of mixed packet types and lengths; two more hold the SIP
 of 57 and 81 bytes that ARIA's receiver was measured with (1.6 million a second,
 framed and checked only). 1 % of all frames are damaged. A part of each is decoded
 both ways and compared row by row, and the C++ framer's count of frames with ours:
-what differs ends the program. Times are those of one core. Usage: python tools/bench_columns.py [--quick] [--json]
+what differs ends the program. Times are those of one core. Usage: python tools/bench/columns.py [--quick] [--json]
 """
 
 import json

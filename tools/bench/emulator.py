@@ -1,8 +1,8 @@
 """Print how fast the emulated BluePill is, next to Unicorn without hooks and to QEMU, on this machine.
 
-Each row runs one program of tools/bench_firmware, built here by
+Each row runs one program of tools/bench/firmware, built here by
 arm-none-eabi-gcc, several times in turn with what it is compared to, and prints
-the median. Run it on an idle machine. Usage: python tools/bench_emulator.py [--quick]
+the median. Run it on an idle machine. Usage: python tools/bench/emulator.py [--quick]
 """
 
 import os
@@ -23,7 +23,7 @@ from bluepill_sim.core.unicorn_core import Register, UnicornCore
 from bluepill_sim.native.library import CORE_VARIABLE, library_path
 
 HERE = Path(__file__).parent
-RUNTIME = HERE.parent / "robot_bench" / "firmware"
+RUNTIME = HERE.parent.parent / "robot_bench" / "firmware"
 RUNS = 1 if "--quick" in sys.argv else 5
 #: Program, virtual seconds a run in C and in Python, goal of the native core in times real time.
 ROWS = (
@@ -41,9 +41,9 @@ QEMU += ("-serial", "none")
 
 
 def build(name: str, folder: Path, *options: str) -> Path:
-    """Return a program of tools/bench_firmware, built."""
+    """Return a program of tools/bench/firmware, built."""
     out = folder / f"{name}{len(options)}.elf"
-    sources = [HERE / "bench_firmware" / f"{name}.c", RUNTIME / "startup.c", RUNTIME / "memory.c"]
+    sources = [HERE / "firmware" / f"{name}.c", RUNTIME / "startup.c", RUNTIME / "memory.c"]
     subprocess.run(
         ["arm-none-eabi-gcc", "-mcpu=cortex-m3", "-mthumb", "-O2", "-ffreestanding", "-nostdlib", f"-I{RUNTIME}",
          *options, f"-T{RUNTIME / 'f103c8.ld'}", *map(str, sources), "-lgcc", "-o", str(out)],

@@ -1,7 +1,7 @@
 """Print how far each body ends from ideal paths, and how fast one robot lives on it, controller and sonar included.
 
 Goals stand beside the figures. Run it on an idle machine; a body whose engine is
-not installed is left out aloud. Usage: python tools/bench_bodies.py [--quick]
+not installed is left out aloud. Usage: python tools/bench/bodies.py [--quick]
 """
 
 import math
