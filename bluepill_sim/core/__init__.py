@@ -10,7 +10,7 @@ underscore, which is all that `processor.py`, `chip.py` and `board.py` use.
     block, access_cycle, access_pc   inside an access: the block that runs, the accessing instruction and its time
     registers             `RegisterFile`
     map_memory, map_io, drop_code, forget_costs, on_read_only_write, on_read_only_written
-    set_traps, stops_after_mask_change, on_event, clear_exclusive
+    set_traps, stops_after_mask_change, on_event, note_raised, clear_exclusive
     breakpoints, watchpoints, is_inside_block, recorder   for debuggers and tools
     snapshot, restore
 

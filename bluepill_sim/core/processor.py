@@ -228,7 +228,7 @@ class Processor(Stateful):
         if self.scr & SEVONPEND and self.nvic.pending:
             self.event_register = True
         if self.nvic.deliverable():
-            self.engine.raised_by_pc = self.engine.access_pc
+            self.engine.note_raised()
             self.stop_at_boundary()
 
     def is_interrupted(self) -> bool:
