@@ -22,8 +22,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from bluepill_sim.core.block_cost import NO_BLOCK, Block
+from bluepill_sim.core.halts import Halt
 from bluepill_sim.core.unicorn_core import CoreContext, Register, UnicornCore
-from bluepill_sim.timing import Halt
 from simbase.state import Stateful
 
 #: ITSTATE in CPSR and xPSR: bits 1 to 0 at 26, bits 7 to 2 at 15.

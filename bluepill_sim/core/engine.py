@@ -38,6 +38,7 @@ from bluepill_sim.core.blocks import (
     it_state_of,
 )
 from bluepill_sim.core.debug_unit import DebugUnit, Watchpoint
+from bluepill_sim.core.halts import DEBUG_HALTS, Halt, HaltKind
 from bluepill_sim.core.recorder import BLOCK, BlockLog, BlockRecorder, KeptRows, LastRows
 from bluepill_sim.core.thumb import Kind
 from bluepill_sim.core.unicorn_core import (
@@ -55,7 +56,6 @@ from bluepill_sim.core.unicorn_core import (
     WriteToReadOnly,
     io_callbacks,
 )
-from bluepill_sim.timing import DEBUG_HALTS, Halt, HaltKind
 from simbase.state import Stateful
 
 #: Stops the engine before the instruction at an address: (kind, PC, address of the data).
