@@ -27,6 +27,7 @@ from typing import TypeAlias
 from bluepill_sim.chip import Chip
 from bluepill_sim.core import GENERAL, BlockRow, Register
 from bluepill_sim.core.faults import FAULT_ROWS, FaultKind, FaultReport
+from bluepill_sim.core.halts import ChipReached
 from bluepill_sim.core.nvic import HARD_FAULT, exception_name
 from bluepill_sim.errors import BluePillError, ImageError, UnmodelledError
 from bluepill_sim.fabric.pins import Pin, PinDrive
@@ -36,8 +37,8 @@ from bluepill_sim.program.image import Image, load_image
 from bluepill_sim.program.last_blocks import TITLE, shortened
 from bluepill_sim.program.line_table import LineTable, read_lines
 from bluepill_sim.serial_port import Activity, SerialPort
+from bluepill_sim.spans import Span, to_nanos
 from bluepill_sim.stm32f103 import FLASH_BASE, SRAM_BASE
-from bluepill_sim.timing import ChipReached, Span, to_nanos
 from simbase.state import PartState, Stateful
 from simbase.timing import NS_PER_MS, NS_PER_S, Nanos, Reason
 

@@ -20,9 +20,11 @@ from collections.abc import Callable
 from bluepill_sim.core import GENERAL, BlockRecorder
 from bluepill_sim.core.block_cost import NO_BLOCK, Block, measure_block
 from bluepill_sim.core.forced_bits import forced_bits
+from bluepill_sim.core.halts import ChipReached, HaltKind
 from bluepill_sim.core.processor import FaultListener
 from bluepill_sim.core.system_control import PPB_BASE, PPB_BYTES, SystemControl
 from bluepill_sim.fabric.clocks import Clocks
+from bluepill_sim.fabric.cycle_clock import CycleClock
 from bluepill_sim.fabric.registers import Peripheral
 from bluepill_sim.memory import Memory
 from bluepill_sim.native.processor import make_core
@@ -40,7 +42,6 @@ from bluepill_sim.stm32f103 import (
     make_pins,
     name_at,
 )
-from bluepill_sim.timing import ChipReached, CycleClock, HaltKind
 from simbase.state import Stateful
 from simbase.timing import Nanos, Reason
 

@@ -10,7 +10,7 @@ from typing import Protocol
 
 from bluepill_sim.errors import BluePillError
 from bluepill_sim.peripherals.usart import CR1, PINS, RE, UE, Usart
-from bluepill_sim.timing import Span
+from bluepill_sim.spans import Span
 from simbase.state import Stateful
 from simbase.timing import Nanos
 

@@ -27,7 +27,7 @@ from typing import Self, Unpack
 
 from adapter_sim import Adapter
 from adapter_sim.pinout import Pinout, Pull, WireRole, load_pinout
-from bluepill_sim.timing import Span, to_nanos
+from bluepill_sim.spans import Span, to_nanos
 from p2os.errors import ScenarioError
 from p2os.event_log import log_event, logger
 from p2os.pioneer.body.contract import RobotBody

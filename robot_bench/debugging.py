@@ -10,8 +10,8 @@ as one that nobody debugged.
 """
 
 from bluepill_sim.board import BluePill
+from bluepill_sim.core.halts import ChipReached
 from bluepill_sim.errors import BluePillError
-from bluepill_sim.timing import ChipReached
 from robot_bench.bench import Bench
 from robot_bench.remote import RemoteBench
 from simbase.timing import Nanos, Reason

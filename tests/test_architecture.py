@@ -74,7 +74,7 @@ LAYERS = {
         ("capture", "client", "pioneer"), ("cli",), ("__main__",),
     ),
     "bluepill_sim": (
-        ("errors",), ("timing",), ("fabric",), ("peripherals",), ("stm32f103",), ("memory", "serial_port"), ("core",),
+        ("errors",), ("spans",), ("fabric",), ("peripherals",), ("stm32f103",), ("memory", "serial_port"), ("core",),
         ("program", "native"), ("chip",), ("board",), ("analysis", "debug"), ("cli",),
     ),
     "adapter_sim": (

@@ -9,10 +9,11 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 
 from bluepill_sim.board import BluePill, WaitError
+from bluepill_sim.core.halts import ChipReached
 from bluepill_sim.errors import BluePillError
 from bluepill_sim.fabric.pins import Pin
 from bluepill_sim.program.last_blocks import TITLE
-from bluepill_sim.timing import ChipReached, to_nanos
+from bluepill_sim.spans import to_nanos
 from simbase.timing import NS_PER_S, Nanos, Reason
 
 #: What a level's word does to a pin; "gnd" and "3v3" are solder bridges.

@@ -4,7 +4,7 @@ from typing import Any
 
 import typer
 
-from bluepill_sim.timing import LONGEST
+from bluepill_sim.spans import LONGEST
 from simbase.units import TIME, Quantity
 
 

@@ -20,7 +20,7 @@ from bluepill_sim.cli.driving import (
     warn_on_stderr,
 )
 from bluepill_sim.cli.quantities import option, time_option
-from bluepill_sim.timing import ChipReached
+from bluepill_sim.core.halts import ChipReached
 from simbase.timing import NS_PER_MS, NS_PER_S, Nanos, Reason
 from simbase.units import BAUD
 

@@ -10,7 +10,7 @@ underscore, which is all that `processor.py`, `chip.py` and `board.py` use.
     block, access_cycle, access_pc   inside an access: the block that runs, the accessing instruction and its time
     registers             `RegisterFile`
     map_memory, map_io, drop_code, forget_costs, on_read_only_write, on_read_only_written
-    set_traps, stops_after_mask_change, on_event, clear_exclusive
+    set_traps, stops_after_mask_change, on_event, note_raised, clear_exclusive
     breakpoints, watchpoints, is_inside_block, recorder   for debuggers and tools
     snapshot, restore
 
@@ -22,9 +22,9 @@ that a run with halts is the same as one without.
 from bluepill_sim.core.blocks import it_state_of
 from bluepill_sim.core.debug_unit import WatchKind, Watchpoint
 from bluepill_sim.core.engine import Engine
+from bluepill_sim.core.halts import DEBUG_HALTS, Halt, HaltKind
 from bluepill_sim.core.recorder import BLOCK, EXCEPTION_RETURN, BlockRecorder, BlockRow
 from bluepill_sim.core.unicorn_core import GENERAL, Register, RegisterFile
-from bluepill_sim.timing import DEBUG_HALTS, Halt, HaltKind
 
 __all__ = [
     "BLOCK",

@@ -22,8 +22,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from bluepill_sim.core.block_cost import NO_BLOCK, Block
+from bluepill_sim.core.halts import Halt
 from bluepill_sim.core.unicorn_core import CoreContext, Register, UnicornCore
-from bluepill_sim.timing import Halt
 from simbase.state import Stateful
 
 #: ITSTATE in CPSR and xPSR: bits 1 to 0 at 26, bits 7 to 2 at 15.
@@ -121,7 +121,7 @@ class RestOfBlock(Stateful):
     """What is left of a block that a debugger halted inside; empty most of the time."""
 
     STATE = ("halted_in",)
-    DERIVED = ("block", "resumed", "_stop_at", "_displaced")
+    DERIVED = ("block", "resumed", "has_raised", "_stop_at", "_displaced")
 
     def __init__(self) -> None:
         #: None where the core stands at a boundary.
@@ -129,26 +129,28 @@ class RestOfBlock(Stateful):
         #: The one that the present run began with.
         self.resumed: Block | None = None
         self._stop_at = 0
+        #: Whether an access before the halt raised an exception: it interrupts before the next one.
+        self.has_raised = False
         #: The block of the table that usually stands in its place.
         self._displaced: Block | None = None
 
     @property
-    def halted_in(self) -> tuple[Block, int] | None:
-        """What is left of the block, and when the run was to end; None at a boundary."""
-        return None if self.block is None else (self.block, self._stop_at)
+    def halted_in(self) -> tuple[Block, int, bool] | None:
+        """What is left of the block, when the run was to end, and `has_raised`; None at a boundary."""
+        return None if self.block is None else (self.block, self._stop_at, self.has_raised)
 
     @halted_in.setter
-    def halted_in(self, halted_in: tuple[Block, int] | None) -> None:
-        self.block, self._stop_at = halted_in or (None, 0)
+    def halted_in(self, halted_in: tuple[Block, int, bool] | None) -> None:
+        self.block, self._stop_at, self.has_raised = halted_in or (None, 0, False)
 
     def is_at(self, pc: int) -> bool:
         """Tell whether the core, at `pc`, stands inside a block."""
         return self.block is not None and self.block.start == pc
 
-    def keep(self, block: Block, pc: int, stop_at: int) -> None:
+    def keep(self, block: Block, pc: int, stop_at: int, *, has_raised: bool) -> None:
         """Halt inside `block`, before the instruction at `pc`, in a run that was to end at `stop_at`."""
         if block is not NO_BLOCK:
-            self.block, self._stop_at = block.rest(pc), stop_at
+            self.block, self._stop_at, self.has_raised = block.rest(pc), stop_at, has_raised
 
     def resume(self, table: dict[int, Block], stop_at: int) -> None:
         """Prepare a run that begins inside the block."""

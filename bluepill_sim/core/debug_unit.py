@@ -20,8 +20,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from enum import Enum
 
+from bluepill_sim.core.halts import HaltKind
 from bluepill_sim.core.unicorn_core import READ_ACCESS, Register, UnicornCore
-from bluepill_sim.timing import HaltKind
 
 
 class WatchKind(Enum):

@@ -38,6 +38,7 @@ from bluepill_sim.core.blocks import (
     it_state_of,
 )
 from bluepill_sim.core.debug_unit import DebugUnit, Watchpoint
+from bluepill_sim.core.halts import DEBUG_HALTS, Halt, HaltKind
 from bluepill_sim.core.recorder import BLOCK, BlockLog, BlockRecorder, KeptRows, LastRows
 from bluepill_sim.core.thumb import Kind
 from bluepill_sim.core.unicorn_core import (
@@ -55,7 +56,6 @@ from bluepill_sim.core.unicorn_core import (
     WriteToReadOnly,
     io_callbacks,
 )
-from bluepill_sim.timing import DEBUG_HALTS, Halt, HaltKind
 from simbase.state import Stateful
 
 #: Stops the engine before the instruction at an address: (kind, PC, address of the data).
@@ -73,6 +73,8 @@ _SCRATCH_BLOCK = Block(SCRATCH_BASE, SCRATCH_END, 0, 0, {})
 
 #: Later than any run.
 _NEVER = 1 << 62
+#: Of an access in a part of the block that ran before a halt: no instruction of the rest has it.
+_AN_EARLIER_PC = 0
 
 _T_BIT = 1 << 24
 
@@ -108,7 +110,7 @@ class Engine(Stateful):
     DERIVED: ClassVar[tuple[str, ...]] = (
         "it_state", "block", "stop_at", "_run_from", "_halt", "_failure", "_frozen", "_table",
         # What a run or a block has for itself alone.
-        "_is_stepping", "_lets_writes_through", "raised_by_pc",
+        "_is_stepping", "_lets_writes_through", "_raised_by",
         # Whom it calls, and what it is made of.
         "_log_row", "_block_hook", "registers",
     )  # fmt: skip
@@ -128,9 +130,10 @@ class Engine(Stateful):
         self.block = NO_BLOCK
         #: Whether a block that may unmask an interrupt ends the run at its boundary.
         self.stops_after_mask_change = False
-        #: Tells whether an exception may interrupt now, and the access that raised the last one.
+        #: Tells whether an exception may interrupt now.
         self.is_interrupted: Callable[[], bool] = lambda: False
-        self.raised_by_pc = 0
+        # The access that raised the last one: the cycle at which its block began, and its instruction.
+        self._raised_by: tuple[int, int] | None = None
         #: Called when the firmware executes SEV.
         self.on_event: Callable[[], None] | None = None
         #: Called with writes to read-only memory, and after the instruction that made them.
@@ -328,6 +331,14 @@ class Engine(Stateful):
         """The instruction that is accessing a peripheral; the next one between runs."""
         return self.pc if self.block is NO_BLOCK else self.registers[Register.PC]
 
+    def note_raised(self) -> None:
+        """Note that the instruction that is accessing a peripheral has raised an exception."""
+        self._raised_by = self.cycle, self.access_pc
+
+    def _has_raised(self, cycle: int) -> bool:
+        """Whether an access of the block that began at `cycle` has raised an exception."""
+        return self._raised_by is not None and self._raised_by[0] == cycle
+
     def clear_exclusive(self) -> None:
         """Break the exclusive reservation, as an exception does; leaves `pc` alone."""
         if not self._blocks.uses_exclusive:
@@ -410,6 +421,7 @@ class Engine(Stateful):
             self._rest.block = None
             return
         self._debug.passes = self.pc
+        self._raised_by = (self.cycle, _AN_EARLIER_PC) if self._rest.has_raised else None
         self._rest.resume(self._table, stop_at)
         self.stop_at = _NEVER  # this is no boundary
 
@@ -481,7 +493,7 @@ class Engine(Stateful):
         self.stop_at, self.it_state = frozen.stop_at, frozen.it_state
         halt = frozen.halt
         if halt.kind in DEBUG_HALTS or halt.kind is HaltKind.TAKEN_WRITE:
-            self._rest.keep(frozen.block, halt.pc, frozen.stop_at)
+            self._rest.keep(frozen.block, halt.pc, frozen.stop_at, has_raised=self._has_raised(frozen.cycle))
         self._settle(halt.pc)
         return halt
 
@@ -499,8 +511,10 @@ class Engine(Stateful):
         if self.block is NO_BLOCK or self._frozen is not None or not self.is_interrupted():
             return False
         pc = self.access_pc
-        is_at_boundary = pc == self.block.start and self.block is not self._rest.resumed
-        if pc == self.raised_by_pc or is_at_boundary:
+        # What came at a halt waits for the boundary, as it would without the halt.
+        is_rest = self.block is self._rest.resumed
+        must_wait = not self._has_raised(self.cycle) if is_rest else pc == self.block.start
+        if (self.cycle, pc) == self._raised_by or must_wait:
             return False
         self.stop_before(HaltKind.BOUNDARY, pc)
         return True

@@ -7,9 +7,9 @@ Invariant: every kind has one row in `FAULT_ROWS`.
 from dataclasses import dataclass
 from enum import Enum
 
+from bluepill_sim.core.halts import HaltKind
 from bluepill_sim.core.nvic import BUS_FAULT, HARD_FAULT, MEM_MANAGE, USAGE_FAULT
 from bluepill_sim.core.recorder import BlockRow
-from bluepill_sim.timing import HaltKind
 from simbase.timing import Nanos
 
 #: HFSR bits.

@@ -23,12 +23,12 @@ from enum import Enum
 from bluepill_sim.core.blocks import it_state_of
 from bluepill_sim.core.engine import FIRST_EXCEPTION_RETURN, Engine
 from bluepill_sim.core.faults import FAULT_OF_HALT, FAULT_ROWS, HFSR_FORCED, FaultKind
+from bluepill_sim.core.halts import DEBUG_HALTS, Halt, HaltKind
 from bluepill_sim.core.nvic import BUS_FAULT, HARD_FAULT, NMI, SVCALL, SYSTICK, Nvic
 from bluepill_sim.core.recorder import EXCEPTION_RETURN
 from bluepill_sim.core.systick import SysTick
 from bluepill_sim.core.unicorn_core import Register
 from bluepill_sim.memory import Memory
-from bluepill_sim.timing import DEBUG_HALTS, Halt, HaltKind
 from simbase.state import Stateful
 
 #: TRM r1p1 5.7 and 5.9: cycles from the boundary to the first instruction of the handler, and back.
@@ -228,7 +228,7 @@ class Processor(Stateful):
         if self.scr & SEVONPEND and self.nvic.pending:
             self.event_register = True
         if self.nvic.deliverable():
-            self.engine.raised_by_pc = self.engine.access_pc
+            self.engine.note_raised()
             self.stop_at_boundary()
 
     def is_interrupted(self) -> bool:

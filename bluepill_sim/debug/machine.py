@@ -12,7 +12,7 @@ from enum import Enum
 from typing import Protocol
 
 from bluepill_sim.board import BluePill
-from bluepill_sim.timing import ChipReached
+from bluepill_sim.core.halts import ChipReached
 from simbase.state import Stateful
 from simbase.timing import Nanos
 

@@ -15,10 +15,11 @@ change of `output` is notified to `PinBank.on_output` once, with its exact time.
 """
 
 from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
 from enum import Enum
 from typing import Protocol, Self
 
-from simbase.state import Stateful
+from simbase.state import Rows, Stateful
 from simbase.wire import are_fighting, level_of
 
 
@@ -99,6 +100,15 @@ class PinPorts(Protocol):
         ...
 
 
+@dataclass(frozen=True, slots=True)
+class Holder:
+    """What keeps GPIO off a pin."""
+
+    #: Such as "JTDO".
+    name: str
+    drive: PinDrive
+
+
 class Pin(Stateful):
     """One pin of one port, seen from outside (`drive`, `level`, `output`, `watch`) and from inside."""
 
@@ -132,7 +142,7 @@ class Pin(Stateful):
         self._rail: str | None = None
         self._mode = PinMode.FLOATING
         self._output_bit = False
-        self._holder: tuple[str, PinDrive] | None = None
+        self._holder: Holder | None = None
         #: The alternate functions that are offered, with their levels.
         self._sources: frozenset[tuple[str, bool]] = frozenset()
         # What follows from the mode, the holder and the sources, kept at hand because pins change often:
@@ -219,7 +229,7 @@ class Pin(Stateful):
     @property
     def holder(self) -> str | None:
         """What keeps GPIO off the pin, such as "JTDO"; None for nothing."""
-        return None if self._holder is None else self._holder[0]
+        return None if self._holder is None else self._holder.name
 
     def configure(self, mode: PinMode, output_bit: bool) -> None:
         """Set mode and ODR bit (called by GPIO)."""
@@ -234,7 +244,7 @@ class Pin(Stateful):
 
     def hold(self, owner: str, drive: PinDrive = PinDrive.NONE) -> None:
         """Take the pin from GPIO for a fixed function, such as the debug port."""
-        self._holder = (owner, drive)
+        self._holder = Holder(owner, drive)
         self._update()
 
     def release(self) -> None:
@@ -294,8 +304,8 @@ class Pin(Stateful):
         self._reads = mode is not PinMode.ANALOG and self._holder is None
         if self._holder is not None:
             # The debug port's inputs have their pulls, and GPIO's input reads what stands there.
-            self._reads = self._holder[1] in {PinDrive.PULL_UP, PinDrive.PULL_DOWN}
-            self._drives = (self._holder[1],) * 2
+            self._reads = self._holder.drive in {PinDrive.PULL_UP, PinDrive.PULL_DOWN}
+            self._drives = (self._holder.drive,) * 2
         elif mode not in ALTERNATE_MODES:
             self._drives = mode.drives
         elif self._sources:
@@ -347,7 +357,7 @@ class Pin(Stateful):
 class PinBank(Stateful):
     """All pins of the chip, and the switches between them and its peripherals."""
 
-    STATE = ("_by_name", "remaps", "exti_ports", "edge_lines")
+    STATE = ("_rows", "remaps", "exti_ports", "edge_lines")
     DERIVED = ("simple_is_known",)
 
     PORTS = "ABCDE"
@@ -375,6 +385,7 @@ class PinBank(Stateful):
             port: tuple(self._make(port, n, bonded, five_volt_tolerant) for n in range(16)) for port in self.PORTS
         }
         self._by_name = {pin.name: pin for pins in self._pins.values() for pin in pins}
+        self._rows = Rows(self._by_name.values())
         #: Called with (pin name, drive, time in ns) at every change of the chip's own drive.
         self.on_output: Callable[[str, PinDrive, int], None] | None = None
         #: Whether anything beyond `on_silent_output` subscribes to each output.
@@ -409,6 +420,9 @@ class PinBank(Stateful):
     def port(self, letter: str) -> tuple[Pin, ...]:
         """Return the 16 pins of a port, bonded or not."""
         return self._pins[letter]
+
+    def _restored(self) -> None:
+        self.simple_is_known = False
 
     def route_changed(self) -> None:
         """Notify the listeners that AFIO has changed `remaps` or `exti_ports`."""

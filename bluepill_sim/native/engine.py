@@ -20,6 +20,7 @@ from collections.abc import Callable
 from bluepill_sim.core.accesses import Access, accesses_of, is_ambiguous, may_end_in_it, only_reads
 from bluepill_sim.core.block_cost import NO_BLOCK, Block
 from bluepill_sim.core.engine import Engine, StopBefore, Traps
+from bluepill_sim.core.halts import Halt, HaltKind
 from bluepill_sim.core.recorder import RECORD, BlockRecorder, KeptRows
 from bluepill_sim.core.thumb import Kind
 from bluepill_sim.core.unicorn_core import (
@@ -59,7 +60,6 @@ from bluepill_sim.native.state import (
     field,
     flag,
 )
-from bluepill_sim.timing import Halt, HaltKind
 
 #: Flags of a row (`enum row_flag`).
 _CHANGES_MASKS, _SENDS_EVENT, _SELF_LOOP, _WRITABLE, _NOTED, _READS, _AMBIGUOUS = 1, 2, 4, 8, 128, 256, 512

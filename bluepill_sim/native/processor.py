@@ -158,5 +158,5 @@ class NativeProcessor(Processor):
             shared.event_register = 1
         enabled = shared.enabled << FIRST_IRQ
         if shared.pending_low & (enabled | SYSTEM_EXCEPTIONS) or shared.pending_high & enabled >> _HALF:
-            self._native.raised_by_pc = self._native.access_pc
+            self._native.note_raised()
             shared.stop_at = 0

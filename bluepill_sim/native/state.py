@@ -7,8 +7,8 @@ field; `native/library.py` refuses a library that has another size of it.
 import ctypes
 from typing import Any
 
+from bluepill_sim.core.halts import HaltKind
 from bluepill_sim.core.recorder import BLOCK, LAST_ROWS, RECORD, BlockRow
-from bluepill_sim.timing import HaltKind
 from simbase.state import Stateful
 
 #: What stands for "never" and for "none" among times.

@@ -54,8 +54,9 @@ def table_of(rows: Iterable[ListingRow], parameters: RobotParameters) -> Table:
         who = None if row.direction is None else row.direction.value
         leading = (row.at_ns / NS_PER_S, who, row.kind, row.name, row.valid)
         for name, cell in {**dict(zip(LEADING, leading, strict=True)), **cells}.items():
-            column = columns.setdefault(name, [None] * count)
-            column.append(cell)
+            if name not in columns:
+                columns[name] = [None] * count
+            columns[name].append(cell)
         for column in columns.values():
             if len(column) == count:
                 column.append(None)

@@ -23,7 +23,7 @@ import adapter_sim
 import bluepill_sim
 import p2os
 import robot_bench
-from simbase.state import PartState, Stateful, state_names
+from simbase.state import PartState, Rows, Stateful, state_names
 
 
 def reloaded(data: bytes) -> Any:
@@ -228,6 +228,51 @@ def test_whatever_saves_and_restores_itself_is_a_part() -> None:
     assert [twin.data for twin in twins] == [b"a", b"b"]
     with pytest.raises(TypeError, match="more parts"):
         Holder([Twin(b""), Twin(b"")]).restore(Holder([Twin(b"")]).snapshot())
+
+
+class Bulb(Stateful):
+    STATE = ("colour", "limits", "is_on")
+    DERIVED = ("shows",)
+
+    def __init__(self) -> None:
+        self.colour: object = Colour.RED
+        self.limits: Limits | None = None
+        self.is_on = False
+        self.worked_out = 0
+        self._restored()
+
+    def _restored(self) -> None:
+        self.shows = self.colour if self.is_on else None
+        self.worked_out += 1
+
+
+class Chain(Stateful):
+    STATE = ("rows",)
+
+    def __init__(self, bulbs: int) -> None:
+        self.bulbs = [Bulb() for _ in range(bulbs)]
+        self.rows = Rows(self.bulbs)
+
+
+def test_rows_are_put_back_where_they_have_changed_and_that_is_worked_out_again() -> None:
+    chain, twin = Chain(3), Chain(3)
+    chain.bulbs[1].is_on, chain.bulbs[1].colour, chain.bulbs[2].limits = True, Colour.BLUE, Limits(4)
+    bulbs, saved = list(twin.bulbs), reloaded(pickle.dumps(chain.snapshot()))
+    twin.restore(saved)
+    assert twin.snapshot() == saved == chain.snapshot()
+    assert twin.bulbs == bulbs
+    assert [bulb.shows for bulb in bulbs] == [None, Colour.BLUE, None]
+    assert [bulb.worked_out for bulb in bulbs] == [1, 2, 2]
+
+
+def test_rows_refuse_what_is_not_kept_as_it_is_and_the_rows_of_others() -> None:
+    chain = Chain(2)
+    for wrong in (Chain(3).snapshot(), PartState(rows=(("red",), ("red",))), PartState(rows=None)):
+        with pytest.raises(TypeError, match="not a snapshot of these rows"):
+            chain.restore(wrong)
+    chain.bulbs[1].colour = [1]
+    with pytest.raises(TypeError, match="a row holds list, which is not kept as it is"):
+        chain.snapshot()
 
 
 def test_a_dataclass_declares_its_fields_and_a_subclass_adds_to_its_base() -> None:

@@ -10,6 +10,7 @@ from bluepill_sim.core import BlockRow
 
 RCC_APB2ENR, GPIOA_CRL, GPIOA_CRH = 0x40021018, 0x40010800, 0x40010804
 USART1_BRR, USART1_CR1 = 0x40013808, 0x4001380C
+EXTI_IMR, EXTI_RTSR = 0x40010400, 0x40010408
 END_NS = 5_500_000
 
 
@@ -129,3 +130,55 @@ def test_taking_snapshots_changes_nothing(boot) -> None:
         watched.board.advance_to(min(3_000_000, watched.board.now_ns + 50_000))
         watched.board.snapshot()
     assert future(watched, END_NS) == future(plain, END_NS)
+
+
+#: EXTI0 by a rising PA0; its handler logs what the program has put out by then.
+THREE_STORES = (
+    store(RCC_APB2ENR, 0x4) + store(EXTI_IMR, 1) + store(EXTI_RTSR, 1) + store(0xE000E100, 1 << 6)
+    + """
+        mov32 r4, #0x4001080C
+loop:   adds r2, #1
+        str r2, [r4, #0]
+        adds r2, #1
+second: str r2, [r4, #0]
+        adds r2, #1
+        str r2, [r4, #0]
+        b loop
+pin:    mov32 r0, #0x40010414
+        movs r1, #1
+        str r1, [r0, #0]
+        ldr r0, [r4, #0]
+        log r0
+        bx lr"""
+)  # fmt: skip
+
+
+@pytest.mark.parametrize("core", ["python", "native"])
+def test_a_fork_inside_a_block_with_an_interrupt_just_raised_has_the_same_future(boot, core, monkeypatch) -> None:
+    """The pin rises at a breakpoint: the interrupt waits for the boundary, as it would without the breakpoint."""
+    monkeypatch.setenv("P2OS_CORE", core)
+    machine, other = (boot(THREE_STORES, {16 + 6: "pin"}) for _ in range(2))
+    machine.board.chip.engine.breakpoints.add(machine.label("second"))
+    machine.board.advance_to(100_000)
+    machine.board.chip.engine.breakpoints.clear()
+    machine.board.pin("PA0").drive(True)
+    other.board.restore(machine.board.snapshot())
+    logs = [each.run(10).log for each in (machine, other)]
+    put_out = (1 << 6) + 3  # r2 held the bit of EXTI0
+    assert logs == [[put_out], [put_out]]
+    assert machine.board.snapshot() == other.board.snapshot()
+
+
+@pytest.mark.parametrize("core", ["python", "native"])
+def test_an_interrupt_raised_before_a_halt_inside_a_block_comes_before_the_next_access(boot, core, monkeypatch) -> None:
+    monkeypatch.setenv("P2OS_CORE", core)
+    source = THREE_STORES.replace("loop: ", "mov32 r5, #0xE000E200\nloop: str r2, [r5, #0]\n")
+    plain, machine, other = (boot(source, {16 + 6: "pin"}) for _ in range(3))
+    machine.board.chip.engine.breakpoints.add(machine.label("loop") + 2)
+    machine.board.advance_to(100_000)
+    machine.board.chip.engine.breakpoints.clear()
+    other.board.restore(machine.board.snapshot())
+    plain.run(110)
+    logs = [each.run(10).log[:2] for each in (machine, other)]
+    assert logs == [plain.log[:2]] * 2
+    assert logs[0] == [0, (1 << 6) + 3]  # nothing was put out when it first came

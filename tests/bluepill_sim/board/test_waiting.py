@@ -5,7 +5,7 @@ from importlib.resources import files
 import pytest
 
 from bluepill_sim import BluePill, BluePillError, WaitError
-from bluepill_sim.timing import to_nanos
+from bluepill_sim.spans import to_nanos
 
 SENSORS = str(files("robot_bench.firmware") / "sensors.elf")
 

@@ -7,8 +7,8 @@ from hypothesis.stateful import RuleBasedStateMachine, initialize, invariant, ru
 
 from bluepill_sim.core.nvic import FIRST_IRQ, HARD_FAULT, NMI, THREAD_PRIORITY, Nvic
 from bluepill_sim.core.systick import CLKSOURCE, COUNTFLAG, ENABLE, TICKINT, SysTick
+from bluepill_sim.fabric.cycle_clock import CycleClock
 from bluepill_sim.memory import Memory
-from bluepill_sim.timing import CycleClock
 
 FREQUENCIES = st.sampled_from([8_000_000, 72_000_000, 1_000_000, 56_000_000, 15_625, 36_000_001])
 

@@ -4,6 +4,7 @@ import json
 import os
 import subprocess
 import sys
+import time
 from pathlib import Path
 
 import pytest
@@ -95,6 +96,18 @@ def test_a_capture_without_sips_is_an_empty_table() -> None:
 def test_a_capture_with_two_kinds_of_origin_is_left_to_the_rows() -> None:
     assert sip_table(capture_of([(0, ROBOT, sip_bytes()), (0, None, sip_bytes())]), P2DX) is None
     assert sip_table(capture_of([(0, CLIENT, b"\0")]), P2DX) is None
+
+
+@pytest.mark.no_cover  # it takes times
+def test_a_row_takes_as_long_in_a_large_table_as_in_a_small_one() -> None:
+    (row,) = from_robot(rows_of(capture_of([(0, ROBOT, sip_bytes())]), P2DX))
+
+    def seconds_a_row(rows: int) -> float:
+        began = time.process_time()
+        assert table_of([row] * rows, P2DX.parameters).rows == rows
+        return (time.process_time() - began) / rows
+
+    assert min(seconds_a_row(8000) for _ in range(2)) < 3 * min(seconds_a_row(500) for _ in range(5))
 
 
 def exported(target: Path) -> str:
