@@ -68,6 +68,9 @@ class Equipment:
     wheels: int = 2
     #: Largest sideways speed, 0 where it cannot.
     max_lateral_mm_s: int = 0
+    #: Where a simulated laser stands, if there is one.
+    laser_x_mm: int = 0
+    laser_y_mm: int = 0
     #: GyroScaler of ARIA's parameter file.
     gyro_scaler: float = 1.626
 

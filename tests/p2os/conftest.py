@@ -9,6 +9,7 @@ from typing import Any
 import pytest
 
 from p2os.pioneer.controller import ControllerSettings, Pioneer
+from p2os.pioneer.sonar.ring import Cone
 from p2os.protocol.commands import Command, CommandNumber
 from p2os.protocol.frames import Decoder, Frame
 from p2os.protocol.profiles import Profile
@@ -30,6 +31,9 @@ class WheelAngles:
     pitch_rad: float = 0.0
     turn_radps: float = 0.0
     in_contact: bool = False
+    x_m: float = 0.0
+    y_m: float = 0.0
+    z_m: float = 0.0
 
 
 @dataclass
@@ -47,6 +51,12 @@ class PerfectBody(Stateful):
 
     def put_back(self) -> None:
         self.state = WheelAngles()
+
+    def stand_at(self, x_m: float, y_m: float, heading_rad: float) -> None:
+        self.state = replace(self.state, x_m=x_m, y_m=y_m, heading_rad=heading_rad)
+
+    def scan(self, fan: Cone, longest_m: float) -> list[float]:
+        return [min(1.0 + ray / 1000, longest_m) for ray in range(len(fan.headings_rad))]
 
     def step(self, left_mps: float, right_mps: float) -> WheelAngles:
         self.steps += 1
