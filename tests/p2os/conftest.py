@@ -40,13 +40,15 @@ class WheelAngles:
 class PerfectBody(Stateful):
     """Wheels that do what they are told, and sonar that read what the test says."""
 
-    STATE = ("state", "range_m", "steps")
+    STATE = ("state", "range_m", "steps", "blocked")
 
     dt_ns: int = NS_PER_MS
     radius_m: float = 0.0825
     state: WheelAngles = field(default_factory=WheelAngles)
     range_m: dict[int, float] = field(default_factory=dict)
     steps: int = 0
+    #: Something holds both wheels.
+    blocked: bool = False
     asked: list[tuple[int, ...]] = field(default_factory=list)
 
     def put_back(self) -> None:
@@ -60,6 +62,8 @@ class PerfectBody(Stateful):
 
     def step(self, left_mps: float, right_mps: float) -> WheelAngles:
         self.steps += 1
+        if self.blocked:
+            left_mps = right_mps = 0.0
         turn = self.dt_ns / 1e9 / self.radius_m
         self.state = replace(
             self.state, left_angle_rad=self.state.left_angle_rad + left_mps * turn,

@@ -248,7 +248,7 @@ def _standard_packet(
     left, right = (_raw_velocity(speed, parameters) for speed in (wheels.left_speed_mps, wheels.right_speed_mps))
     devices, profile = context.devices, context.profile
     return StandardSip(
-        kind=MOVING if left or right or any(context.motion.wheels_mps) else STANDING,
+        kind=MOVING if left or right else STANDING,
         raw_x=raw_x,
         raw_y=raw_y,
         raw_heading=raw_angle(context.reckoning.heading_rad),
