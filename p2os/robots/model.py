@@ -5,7 +5,7 @@ number; `p2os.robots.parameters` loads them.
 """
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from simbase.errors import FileError
 
@@ -108,6 +108,10 @@ class RobotParameters:
     sonar_height_m: float
     sonar: tuple[SonarPose, ...]
     body: BodyParameters
+
+    def with_every_sonar(self) -> "RobotParameters":
+        """Return the same robot with a sonar at each of its poses: with the rear ring that is an option of it."""
+        return replace(self, sonar_fitted=len(self.sonar))
 
     @property
     def distance_conv_mm(self) -> float:

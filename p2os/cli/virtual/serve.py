@@ -64,7 +64,7 @@ STANDARD_INPUT = "-"
 SLOWEST, FASTEST = 0.01, 100.0
 #: Options that a fleet's file takes the place of.
 IN_FLEET_FILE = (
-    "port", "robot", "world", "body", "seed", "for_client", "firmware", "lenient", "laser", "all_sonar",
+    "port", "robot", "world", "body", "seed", "for_client", "firmware", "lenient", "laser", "all_sonar", "rear_sonar",
     "flash", "errors", "baud", "robots",
     "at", "apart", "aux", "fault", "sync_limit_ns",
 )  # fmt: skip
@@ -144,6 +144,9 @@ def serve(
     all_sonar: Annotated[
         bool, typer.Option("--all-sonar", help="Send every sonar in every packet, not two as a Pioneer 2 does.")
     ] = False,
+    rear_sonar: Annotated[
+        bool, typer.Option("--rear-sonar", help="Fit the rear ring too, where it is an option of the model.")
+    ] = False,
     flash: Annotated[
         Path | None, typer.Option(help="TOML file with the robot's FLASH parameters.", metavar="FILE")
     ] = None,
@@ -211,7 +214,7 @@ def serve(
             settings, errors=load_sensor_errors(errors), baud=baud, lenient=lenient or settings.lenient,
             profile=settings.profile if firmware is None else firmware,
             sonar_per_sip=SonarPerSip.ALL if all_sonar else settings.sonar_per_sip,
-            laser=settings.laser if laser is None else read_laser(laser),
+            laser=settings.laser if laser is None else read_laser(laser), rear_sonar=rear_sonar or settings.rear_sonar,
         )  # fmt: skip
         if flash is not None:
             settings = settings.with_flash(load_flash(flash))

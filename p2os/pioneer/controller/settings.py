@@ -50,6 +50,8 @@ class ControllerSettings:
     sip_period_ns: Nanos = CYCLE_NS
     watchdog_ns: Nanos = WATCHDOG_NS
     sonar_per_sip: SonarPerSip = SonarPerSip.TWO
+    #: Also the sonar that are an option of the model, as ARIA's parameter file has them; the robot is made with them.
+    rear_sonar: bool = False
     #: The battery's resting voltage at the start; it drains from there.
     battery_decivolts: int = 126
     #: Speed of the host's line, bit/s; None: a line that takes no time.
@@ -97,6 +99,6 @@ class ControllerSettings:
 CLIENTS: Mapping[str, ControllerSettings] = {
     "aria": ControllerSettings(
         profile=Profile.ARCOS, lenient=True, sonar_per_sip=SonarPerSip.ALL, serial=SIMULATOR_SERIAL,
-        laser=LASERS["lms2xx"],
+        laser=LASERS["lms2xx"], rear_sonar=True,
     ),
 }  # fmt: skip

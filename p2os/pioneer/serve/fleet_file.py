@@ -61,6 +61,7 @@ KINDS: Mapping[str, tuple[tuple[type, ...], str]] = {
     "laser": ((str,), "a text"),
     "lenient": ((bool,), "true or false"),
     "all_sonar": ((bool,), "true or false"),
+    "rear_sonar": ((bool,), "true or false"),
     "flash": ((str,), "a text"),
     "errors": ((str,), "a text"),
     "baud": ((int,), "a whole number"),
@@ -247,6 +248,7 @@ def _settings(section: _Section) -> ControllerSettings:
     try:
         settings = replace(
             base, profile=Profile(profile), lenient=bool(section.get("lenient", base.lenient)), laser=laser,
+            rear_sonar=bool(section.get("rear_sonar", base.rear_sonar)),
             sonar_per_sip=SonarPerSip.ALL if section.get("all_sonar", False) else base.sonar_per_sip,
             errors=load_sensor_errors(str(section.get("errors", "ideal"))), baud=baud,
         )  # fmt: skip

@@ -121,7 +121,11 @@ def make_fleet(order: FleetOrder) -> MadeFleet:
     for robot in order.robots:
         if robot.model not in known:
             known[robot.model] = load_parameters(robot.model)
-    world, models = load_world(order.world, seed=order.seed), [known[robot.model] for robot in order.robots]
+    world = load_world(order.world, seed=order.seed)
+    models = [
+        known[robot.model].with_every_sonar() if robot.settings.rear_sonar else known[robot.model]
+        for robot in order.robots
+    ]
     starts = _starts(order, world, models)
     name = resolve_body(order.body)
     made: list[tuple[Pioneer, RobotBody]] = []
@@ -146,7 +150,8 @@ def _batteries_note(made: Sequence[tuple[Pioneer, RobotBody]]) -> str | None:
     ]  # fmt: skip
     if not needing:
         return None
-    return f"ARIA looks for the batteries of a {needing[0].parameters.subclass} on a serial port: --for aria spares it that"
+    model = needing[0].parameters.subclass
+    return f"ARIA looks for the batteries of a {model} on a serial port: --for aria spares it that"
 
 
 def following_ports(given: Sequence[str], robots: int) -> list[str]:

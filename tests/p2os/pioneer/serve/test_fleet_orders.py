@@ -189,3 +189,14 @@ def test_a_model_with_batteries_of_its_own_says_what_aria_needs() -> None:
 
     assert any("--for aria" in note for note in notes(ControllerSettings()))
     assert not any("--for aria" in note for note in notes(ControllerSettings.for_client("aria")))
+
+
+def test_the_rear_ring_is_fitted_on_demand_and_measures_behind() -> None:
+    fitted = {}
+    for chosen in (ControllerSettings(), ControllerSettings(rear_sonar=True), ControllerSettings.for_client("aria")):
+        (robot,) = make_fleet(
+            FleetOrder(robots=(RobotOrder(model="p3dx-sh", settings=chosen),), body="kinematic")
+        ).robots
+        fitted[chosen.rear_sonar] = robot.parameters.sonar_fitted
+        assert len(robot.body.ranges(range(robot.parameters.sonar_fitted))) == robot.parameters.sonar_fitted
+    assert fitted == {False: 8, True: 16}
