@@ -79,11 +79,13 @@ class CommandNumber(IntEnum):
     TTY4 = 60
     GETAUX3 = 61
     BATTERYINFO = 62
+    LOADWORLD = 63
     STEP = 64
     CALCOMP = 65
     TTY3 = 66
     GETAUX2 = 67
     CHARGE = 68
+    RESETSIMTOORIGIN = 69
     ARM_INFO = 70
     ARM_STATUS = 71
     ARM_INIT = 72
@@ -185,6 +187,8 @@ class TwoBytes:
         return (-128, 127) if self.is_signed else (0, 255)
 
 
+#: What only simulators before MobileSim had.
+OLD_SIMULATORS = frozenset({CommandNumber.LOADWORLD, CommandNumber.STEP, CommandNumber.RESETSIMTOORIGIN})
 #: What fits the wire, where a row names no range of its own: integers are read as 16 bits with a sign.
 WIRE_LIMITS: Mapping[Argument, tuple[int, int]] = {
     Argument.INTEGER: (-32767, 32767),
@@ -224,7 +228,7 @@ class CommandRow:
     @property
     def is_simulator_only(self) -> bool:
         """Whether no robot has it."""
-        return self.name.startswith("SIM_") or self.number is CommandNumber.STEP
+        return self.name.startswith("SIM_") or self.number in OLD_SIMULATORS
 
     def version(self, profile: Profile) -> str:
         """Return the first firmware of a family that has it, "-" for none, "?" for not established."""
@@ -360,7 +364,8 @@ ROWS = (
     _row(_N.GRIPPERVAL, (_A.INTEGER,), "", None, "yes yes 1.0", "Value for GRIPPER 16 and 17."),
     _row(_N.GRIPREQUEST, (_A.INTEGER,), "", (0, 2), "1.E yes 1.0", "GRIPPERpac: 0 none, 1 one, 2 continuous."),
     _row(_N.GYROCALCW, (_A.UNSIGNED,), "", None, "- - 2.0",
-         "Gyro calibration, clockwise. Simulators of old take 35 to 38 as a laser's setup."),
+         "Gyro calibration, clockwise. A simulator with a laser takes 35 to 38 for SIM_LRF_ENABLE and what follows it: "
+         "ARIA sends those."),
     _row(_N.GYROCALCCW, (_A.UNSIGNED,), "", None, "- - 2.0", "Gyro calibration, counter-clockwise."),
     _row(_N.IOREQUEST, (_A.INTEGER,), "", (0, 2), "1.E yes 1.0", "IOpac: 0 none, 1 one, 2 continuous."),
     _row(_N.PTUPOS, (_A.TWO_BYTES,), "", None, "1.2 yes ?", "Servo: port 1 to 4 and the width of its pulse in 10 us.",
@@ -395,11 +400,14 @@ ROWS = (
     _row(_N.GETAUX3, (_A.UNSIGNED,), "bytes", (0, 200), "- - 1.0", "As GETAUX, from AUX3."),
     _row(_N.BATTERYINFO, (_A.INTEGER,), "", (0, 2), "- - ?",
          "Battery packets: 0 none, 1 one, 2 continuous. An old simulator exits."),
+    _row(_N.LOADWORLD, (_A.STRING,), "", (0, 199), "- - -",
+         "Old simulators: load another world by its name; MobileSim has SIM_CTRL 1 for it."),
     _row(_N.STEP, (_A.NONE,), "", None, "1.0 - -", "One step of a simulator."),
     _row(_N.CALCOMP, (_A.INTEGER,), "", None, "- - ?", "Compass calibration."),
     _row(_N.TTY3, (_A.STRING,), "", (0, 199), "- 1.1 1.0", "Send bytes to AUX2."),
     _row(_N.GETAUX2, (_A.UNSIGNED,), "bytes", (0, 200), "- 1.1 1.0", "As GETAUX, from AUX2."),
     _row(_N.CHARGE, (_A.INTEGER,), "", (0, 1), "- 1.7 1.0", "1 deploys the charger, 0 retracts it."),
+    _row(_N.RESETSIMTOORIGIN, (_A.NONE,), "", None, "- - -", "Old simulators: as SIM_RESET."),
     _row(_N.ARM_INFO, (_A.NONE,), "", None, "1.H 1.3 1.1", "Ask for an ARMINFOpac."),
     _row(_N.ARM_STATUS, (_A.INTEGER,), "", (0, 2), "1.H 1.3 1.1", "ARMpac: 0 none, 1 one, 2 continuous."),
     _row(_N.ARM_INIT, (_A.NONE,), "", None, "1.H 1.3 1.1", "Initialise the arm."),
@@ -461,15 +469,18 @@ ROWS = (
     _row(_N.MARC_CONFIG_SET, (_A.STRING,), "", (0, 199), "- - -", "Pioneer LX: set the configuration."),
     _row(_N.MARC_CONFIG_GET, (_A.STRING,), "", (0, 199), "- - -", "Pioneer LX: ask for the configuration."),
     _row(_N.SIM_SET_POSE, (_A.DATA,), "", (12, 12), "- - -",
-         "Simulators: move the robot; x and y in mm and the heading in degrees as three integers of 32 bits."),
-    _row(_N.SIM_RESET, (_A.NONE,), "", None, "- - -", "Simulators: back to where the robot began."),
+         "Simulators: move the robot; x and y in mm and the heading in degrees as three integers of 32 bits. The "
+         "odometry stays."),
+    _row(_N.SIM_RESET, (_A.NONE,), "", None, "- - -",
+         "Simulators: back to where the robot began, odometry at 0; the session goes on."),
     _row(_N.SIM_MODEL_CONFIG, (_A.DATA,), "", (0, 200), "- - -", "Simulators: a robot sends its dimensions."),
     _row(_N.SIM_LRF_ENABLE, (_A.INTEGER,), "", (0, 2), "- - -", "Simulators: laser packets 0 off, 1 on, 2 extended."),
     _row(_N.SIM_LRF_SET_FOV_START, (_A.INTEGER,), "deg", None, "- - -", "Simulators: where the laser's field begins."),
     _row(_N.SIM_LRF_SET_FOV_END, (_A.INTEGER,), "deg", None, "- - -", "Simulators: where the laser's field ends."),
-    _row(_N.SIM_LRF_SET_RES, (_A.INTEGER,), "deg", None, "- - -", "Simulators: the angle between readings."),
+    _row(_N.SIM_LRF_SET_RES, (_A.INTEGER,), "0.01 deg", None, "- - -", "Simulators: the angle between readings."),
     _row(_N.SIM_CTRL, (_A.INTEGER, _A.DATA), "", None, "- - -",
-         "Simulators: an order to the simulator itself; some carry more bytes after the integer."),
+         "Simulators: an order to the simulator itself, as an integer of two bytes: 1 and 2 load the map whose name "
+         "follows, its length in two bytes before it; 6 asks for SIMINFO."),
     _row(_N.SIM_STAT, (_A.INTEGER, _A.NONE), "", (0, 2), "- - -", "Simulators: SIMSTAT 0 none, 1 one, 2 continuous."),
     _row(_N.SIM_MESSAGE, (_A.STRING,), "", (0, 199), "- - -", "Simulators: show a line of text."),
     _row(_N.SIM_EXIT, (_A.INTEGER,), "", None, "- - -", "Simulators: end the simulator with this exit code."),

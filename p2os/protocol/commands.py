@@ -45,7 +45,9 @@ POSITIVE, NEGATIVE, STRING = 0x3B, 0x1B, 0x2B
 #: The longest string that fits a frame: 202 bytes less number, type and length.
 MAX_STRING_BYTES = 199
 MAX_MAGNITUDE = 0xFFFF
-#: Commands whose bytes have no length before them (simulators only).
+#: A type byte and an integer, and the number of a laser after them.
+MOST_INTEGER_BYTES = 4
+#: Commands whose bytes have no length before them (simulators only); clients write any type byte there.
 UNCOUNTED = frozenset(int(row.number) for row in ROWS if Argument.DATA in row.kinds)
 
 
@@ -123,13 +125,13 @@ class Command:
         data = frame.data
         if not data:
             return cls(frame.kind)
+        if frame.kind in UNCOUNTED and (data[0] == STRING or len(data) > MOST_INTEGER_BYTES):
+            return cls(frame.kind, data[1 : 1 + MAX_STRING_BYTES])
         if data[0] in {POSITIVE, NEGATIVE}:
             if len(data) < 3:
                 return cls(frame.kind)
             magnitude = int.from_bytes(data[1:3], "little")
             return cls(frame.kind, -magnitude if data[0] == NEGATIVE else magnitude)
-        if data[0] == STRING and frame.kind in UNCOUNTED:
-            return cls(frame.kind, data[1 : 1 + MAX_STRING_BYTES])
         if data[0] == STRING and len(data) > 1:
             return cls(frame.kind, data[2 : 2 + data[1]])
         return cls(frame.kind, data[:MAX_STRING_BYTES])

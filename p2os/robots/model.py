@@ -5,7 +5,7 @@ number; `p2os.robots.parameters` loads them.
 """
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from simbase.errors import FileError
 
@@ -68,6 +68,9 @@ class Equipment:
     wheels: int = 2
     #: Largest sideways speed, 0 where it cannot.
     max_lateral_mm_s: int = 0
+    #: Where a simulated laser stands, if there is one.
+    laser_x_mm: int = 0
+    laser_y_mm: int = 0
     #: GyroScaler of ARIA's parameter file.
     gyro_scaler: float = 1.626
 
@@ -105,6 +108,10 @@ class RobotParameters:
     sonar_height_m: float
     sonar: tuple[SonarPose, ...]
     body: BodyParameters
+
+    def with_every_sonar(self) -> "RobotParameters":
+        """Return the same robot with a sonar at each of its poses: with the rear ring that is an option of it."""
+        return replace(self, sonar_fitted=len(self.sonar))
 
     @property
     def distance_conv_mm(self) -> float:

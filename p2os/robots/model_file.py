@@ -49,6 +49,7 @@ RANGES: Mapping[str, Mapping[str, tuple[float, float]]] = {
     "equipment": {
         "front_bumpers": (0, 16), "rear_bumpers": (0, 16), "wheels": (1, 64),
         "max_lateral_mm_s": (0, 32_767), "gyro_scaler": (0.001, 1000),
+        "laser_x_mm": (-10_000, 10_000), "laser_y_mm": (-10_000, 10_000),
     },
     "motion": {
         "max_velocity_mm_s": (1, 32_767), "max_rotation_deg_s": (1, 32_767), "accel_mm_s2": (1, 32_767),

@@ -9,6 +9,7 @@ from typing import Any
 import pytest
 
 from p2os.pioneer.controller import ControllerSettings, Pioneer
+from p2os.pioneer.sonar.ring import Cone
 from p2os.protocol.commands import Command, CommandNumber
 from p2os.protocol.frames import Decoder, Frame
 from p2os.protocol.profiles import Profile
@@ -30,26 +31,39 @@ class WheelAngles:
     pitch_rad: float = 0.0
     turn_radps: float = 0.0
     in_contact: bool = False
+    x_m: float = 0.0
+    y_m: float = 0.0
+    z_m: float = 0.0
 
 
 @dataclass
 class PerfectBody(Stateful):
     """Wheels that do what they are told, and sonar that read what the test says."""
 
-    STATE = ("state", "range_m", "steps")
+    STATE = ("state", "range_m", "steps", "blocked")
 
     dt_ns: int = NS_PER_MS
     radius_m: float = 0.0825
     state: WheelAngles = field(default_factory=WheelAngles)
     range_m: dict[int, float] = field(default_factory=dict)
     steps: int = 0
+    #: Something holds both wheels.
+    blocked: bool = False
     asked: list[tuple[int, ...]] = field(default_factory=list)
 
     def put_back(self) -> None:
         self.state = WheelAngles()
 
+    def stand_at(self, x_m: float, y_m: float, heading_rad: float) -> None:
+        self.state = replace(self.state, x_m=x_m, y_m=y_m, heading_rad=heading_rad)
+
+    def scan(self, fan: Cone, longest_m: float) -> list[float]:
+        return [min(1.0 + ray / 1000, longest_m) for ray in range(len(fan.headings_rad))]
+
     def step(self, left_mps: float, right_mps: float) -> WheelAngles:
         self.steps += 1
+        if self.blocked:
+            left_mps = right_mps = 0.0
         turn = self.dt_ns / 1e9 / self.radius_m
         self.state = replace(
             self.state, left_angle_rad=self.state.left_angle_rad + left_mps * turn,

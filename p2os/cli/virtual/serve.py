@@ -29,6 +29,7 @@ from p2os.cli.quantities import option
 from p2os.pioneer.body.factory import BEST
 from p2os.pioneer.controller import ControllerSettings, SonarPerSip
 from p2os.pioneer.controller.flash import load_flash
+from p2os.pioneer.devices.laser import read_laser
 from p2os.pioneer.sensor_errors import load_sensor_errors
 from p2os.pioneer.serve.aux_endpoint import AuxEndpoint
 from p2os.pioneer.serve.control_line import ControlLine, write_stderr
@@ -63,7 +64,8 @@ STANDARD_INPUT = "-"
 SLOWEST, FASTEST = 0.01, 100.0
 #: Options that a fleet's file takes the place of.
 IN_FLEET_FILE = (
-    "port", "robot", "world", "body", "seed", "firmware", "lenient", "all_sonar", "flash", "errors", "baud", "robots",
+    "port", "robot", "world", "body", "seed", "for_client", "firmware", "lenient", "laser", "all_sonar", "rear_sonar",
+    "flash", "errors", "baud", "robots",
     "at", "apart", "aux", "fault", "sync_limit_ns",
 )  # fmt: skip
 
@@ -83,6 +85,8 @@ Examples:
   p2os serve --world arena --seed 7   among obstacles scattered from a seed
   p2os serve --baud 9600              bytes take the time of a real line
   p2os serve --errors realistic       sonar, odometry and compass err as real ones
+  p2os serve --for aria --robot p3dx-sh   as MobileSim: laser, true pose, SIM_ commands
+  p2os serve --laser 180deg,1deg,8m   with a laser of its own
   p2os serve --robots 3               three of them in one room, on ports 8101 to 8103
   p2os serve --robots 2 --at 0,0 --at 1.5m,0,180deg   face to face
   p2os serve --fleet fleet.toml       robots of all kinds from a file
@@ -116,18 +120,32 @@ def serve(
     seed: Annotated[
         int, option(SEED, "--seed", purpose="Of a scattered world and of every sensor's error.", least="0", shown="0")
     ] = 0,
+    for_client: Annotated[
+        str | None,
+        typer.Option("--for", help="What a client library expects: ARCOS, a laser, a simulator.", metavar="aria"),
+    ] = None,
     firmware: Annotated[
-        Profile,
+        Profile | None,
         typer.Option(
-            help="Whose packets it sends; some clients of newer robots need ARCOS.",
+            help="Whose packets it sends, P2OS by default; some clients of newer robots need ARCOS.",
             metavar="|".join(profile.value for profile in Profile),
         ),
-    ] = Profile.P2OS,
+    ] = None,
     lenient: Annotated[
-        bool, typer.Option("--lenient", help="Answer syncs in any order and execute any family's commands, as AMRISim.")
+        bool,
+        typer.Option(
+            "--lenient", help="Answer syncs in any order; execute any family's and a simulator's commands, as AMRISim."
+        ),
     ] = False,
+    laser: Annotated[
+        str | None,
+        typer.Option(help="A simulated laser on ARIA's packets.", metavar="MODEL|FIELD,STEP,RANGE"),
+    ] = None,
     all_sonar: Annotated[
         bool, typer.Option("--all-sonar", help="Send every sonar in every packet, not two as a Pioneer 2 does.")
+    ] = False,
+    rear_sonar: Annotated[
+        bool, typer.Option("--rear-sonar", help="Fit the rear ring too, where it is an option of the model.")
     ] = False,
     flash: Annotated[
         Path | None, typer.Option(help="TOML file with the robot's FLASH parameters.", metavar="FILE")
@@ -191,9 +209,12 @@ def serve(
         _refuse_beside_fleet(context)
         order = load_fleet(fleet)
     else:
-        settings = ControllerSettings(
-            profile=firmware, lenient=lenient, sonar_per_sip=SonarPerSip.ALL if all_sonar else SonarPerSip.TWO,
-            errors=load_sensor_errors(errors), baud=baud,
+        settings = ControllerSettings() if for_client is None else ControllerSettings.for_client(for_client)
+        settings = replace(
+            settings, errors=load_sensor_errors(errors), baud=baud, lenient=lenient or settings.lenient,
+            profile=settings.profile if firmware is None else firmware,
+            sonar_per_sip=SonarPerSip.ALL if all_sonar else settings.sonar_per_sip,
+            laser=settings.laser if laser is None else read_laser(laser), rear_sonar=rear_sonar or settings.rear_sonar,
         )  # fmt: skip
         if flash is not None:
             settings = settings.with_flash(load_flash(flash))
@@ -229,7 +250,13 @@ def serve(
         for note in made.notes:
             _write(f"note: {note}\n")
         tick = None if status_ns is None else (status_ns / NS_PER_S, partial(_show_status, hosts))
-        Fleet(hosts, control=orders, on_tick=tick).run()
+        Fleet(hosts, control=orders, on_tick=tick).run(until=lambda: _exit_code(made) is not None)
+    raise typer.Exit(_exit_code(made) or 0)
+
+
+def _exit_code(made: MadeFleet) -> int | None:
+    """Return the code with which a client wants all of this to end, or None."""
+    return next((robot.exit_code for robot in made.robots if robot.exit_code is not None), None)
 
 
 def open_hosts(order: FleetOrder, made: MadeFleet, *, speed: float = 1.0) -> list[Host]:
@@ -281,7 +308,8 @@ def _refuse_beside_fleet(context: typer.Context) -> None:
         source = context.get_parameter_source(name)
         if source is not None and source.name == "COMMANDLINE":
             raise UsageError(
-                f"--{name.removesuffix('_ns').replace('_', '-')} beside --fleet", hint="the fleet's file sets that"
+                f"--{name.removesuffix('_ns').removesuffix('_client').replace('_', '-')} beside --fleet",
+                hint="the fleet's file sets that",
             )
 
 

@@ -13,6 +13,7 @@ from dataclasses import dataclass
 from typing import NamedTuple, Protocol
 
 from p2os.pioneer.body.ray_cast import Echo
+from p2os.pioneer.sonar.ring import Cone
 from p2os.pioneer.world.model import Obstacle, Pose
 from simbase.timing import NS_PER_MS, Nanos
 
@@ -121,6 +122,14 @@ class RobotBody(Protocol):
         """
         ...
 
+    def stand_at(self, x_m: float, y_m: float, heading_rad: float) -> None:
+        """Stand still elsewhere, as if carried there: wheel angles, collisions and the world go on.
+
+        Raises:
+            WorldError: A thing stands there, or there is no level floor; nothing has changed then.
+        """
+        ...
+
     def step(self, left_mps: float, right_mps: float) -> WheelAngles:
         """Move on by `dt_ns` with these rim-speed set-points; `state` has the rest."""
         ...
@@ -131,6 +140,13 @@ class RobotBody(Protocol):
 
     def echoes(self, numbers: Sequence[int]) -> list[list[Echo]]:
         """Return what each ray of some sonar meets, for a model of the sensor: range and angle, the rightmost first."""
+        ...
+
+    def scan(self, fan: Cone, longest_m: float) -> list[float]:
+        """Return how far each ray of a fan goes, metres from where it begins; `longest_m` where it meets nothing.
+
+        The rays run in the plane of the sonar ring, and meet what a sonar's rays meet.
+        """
         ...
 
     def take_moved(self) -> list[Obstacle]:

@@ -10,11 +10,14 @@ from collections.abc import Iterator
 from dataclasses import replace
 from typing import ClassVar
 
+from p2os.errors import WorldError
 from p2os.pioneer.body.contacts import ContactCounter
 from p2os.pioneer.body.contract import STEP_NS, Hit
 from p2os.pioneer.world.model import Obstacle, Walker, World
 from p2os.pioneer.world.plan import Plan, StaticPlan
+from p2os.pioneer.world.start_places import floor_height
 from p2os.robots.parameters import RobotParameters
+from simbase.errors import shown
 from simbase.state import Stateful
 from simbase.timing import NS_PER_S, Nanos
 
@@ -56,6 +59,24 @@ class BodyInWorld(Stateful):
         for item in self._plan.pushable(self._world):
             self.move(item.name, item.x_m, item.y_m, item.heading_rad)
             self._moved_things[item.name] = None
+
+    def _place_for(self, x_m: float, y_m: float, heading_rad: float) -> float:
+        """Return the height of the floor where the robot can stand.
+
+        Raises:
+            WorldError: A thing stands there, or there is no level floor.
+        """
+        self._tell_plan()
+        where, world = f"{x_m:g}, {y_m:g} m", shown(self._world.name)
+        if not self._world.contains(x_m, y_m):
+            raise WorldError(f"{where} is not in world {world}")
+        if self._plan.clearance(x_m, y_m, heading_rad, no_more_than=1.0) == 0.0:
+            names = self._plan.touched(x_m, y_m, heading_rad)
+            raise WorldError(f"{where} in world {world} is inside {shown(names[0]) if names else 'a low thing'}")
+        height_m = floor_height(self._world, x_m, y_m)
+        if height_m is None:
+            raise WorldError(f"{where} in world {world} is on a slope")
+        return height_m
 
     def place(self, obstacle: Obstacle) -> None:
         """Put an obstacle with a new name into the world; one that walks begins at its first point, now."""

@@ -20,8 +20,8 @@ from p2os.pioneer.body.contacts import ContactCounter
 from p2os.pioneer.body.contract import BodyState, Turned
 from p2os.pioneer.body.in_world import DT_S, BodyInWorld
 from p2os.pioneer.body.other_robots import OtherRobots, StandingPose
-from p2os.pioneer.body.ray_cast import Direction, Echo, cast, echoes
-from p2os.pioneer.sonar.ring import cones, reading
+from p2os.pioneer.body.ray_cast import Direction, Echo, cast, echoes, narrow_parts
+from p2os.pioneer.sonar.ring import Cone, cones, reading
 from p2os.pioneer.world.geometry import Footprint, hull_polygon, placed
 from p2os.pioneer.world.model import Pose, World
 from p2os.robots.parameters import RobotParameters
@@ -109,15 +109,23 @@ class KinematicBody(BodyInWorld):
         del seed
         self._begin()
         self._start = pose
-        self._stand_at(pose)
+        self._begin_at(pose)
         return self.state
 
     def put_back(self) -> None:
         """Stand still where the last `reset` put it, and what was pushed where the world has it."""
         super().put_back()
-        self._stand_at(self._start)
+        self._begin_at(self._start)
 
-    def _stand_at(self, pose: Pose) -> None:
+    def stand_at(self, x_m: float, y_m: float, heading_rad: float) -> None:
+        """Stand still elsewhere."""
+        self._place_for(x_m, y_m, heading_rad)
+        self._take_pose(x_m, y_m, heading_rad)
+        self._left = self._right = 0.0
+        self._stalled = False
+        self._changed()
+
+    def _begin_at(self, pose: Pose) -> None:
         """Stand still at a pose, wheels at angle 0, collisions at 0."""
         self._take_pose(pose.x_m, pose.y_m, pose.heading_rad)
         self._left_angle = self._right_angle = self._left = self._right = 0.0
@@ -283,25 +291,36 @@ class KinematicBody(BodyInWorld):
         return [self._range(number) for number in numbers]
 
     def _range(self, number: int) -> float:
-        x, y, rays = self._rays(number)
-        return reading(min(cast(self._echoing(x, y, rays), x, y, rays, self._longest_m)), self._parameters)
+        x, y, rays = self._rays(self._cones[number])
+        return reading(min(self._cast(x, y, rays, self._longest_m)), self._parameters)
+
+    def scan(self, fan: Cone, longest_m: float) -> list[float]:
+        """Return how far each ray of a fan goes, metres."""
+        x, y, rays = self._rays(fan)
+        found: list[float] = []
+        for first, last in narrow_parts(fan.headings_rad):
+            found += self._cast(x, y, rays[first:last], longest_m)
+        return found
+
+    def _cast(self, x: float, y: float, rays: Sequence[Direction], longest_m: float) -> list[float]:
+        return cast(self._echoing(x, y, rays, longest_m), x, y, rays, longest_m)
 
     def echoes(self, numbers: Sequence[int]) -> list[list[Echo]]:
         """Return what each ray of some sonar meets, with the angle at which it meets it."""
         found = []
         for number in numbers:
-            x, y, rays = self._rays(number)
-            found.append(echoes(self._echoing(x, y, rays), x, y, rays, self._longest_m))
+            x, y, rays = self._rays(self._cones[number])
+            found.append(echoes(self._echoing(x, y, rays, self._longest_m), x, y, rays, self._longest_m))
         return found
 
-    def _rays(self, number: int) -> tuple[float, float, list[Direction]]:
-        """Return where a sonar is and the directions of its rays, the rightmost first."""
-        cone, c, s = self._cones[number], self._cos, self._sin
+    def _rays(self, cone: Cone) -> tuple[float, float, list[Direction]]:
+        """Return where a sensor is and the directions of its rays, the rightmost first."""
+        c, s = self._cos, self._sin
         x, y = self._x + cone.x_m * c - cone.y_m * s, self._y + cone.x_m * s + cone.y_m * c
         return x, y, [(dx * c - dy * s, dx * s + dy * c) for dx, dy in cone.directions]
 
-    def _echoing(self, x: float, y: float, rays: Sequence[Direction]) -> Sequence[Footprint]:
-        xs, ys = [x, *(x + self._longest_m * dx for dx, _ in rays)], [y, *(y + self._longest_m * dy for _, dy in rays)]
+    def _echoing(self, x: float, y: float, rays: Sequence[Direction], longest_m: float) -> Sequence[Footprint]:
+        xs, ys = [x, *(x + longest_m * dx for dx, _ in rays)], [y, *(y + longest_m * dy for _, dy in rays)]
         box = (min(xs), min(ys), max(xs), max(ys))
         if self._other_robots is None:
             return self._plan.echoing_within(*box)

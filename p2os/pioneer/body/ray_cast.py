@@ -5,12 +5,14 @@ beside it, or seen from their back.
 """
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from typing import NamedTuple
 
 from p2os.pioneer.world.geometry import INFINITY, Footprint
 
 Direction = tuple[float, float]
+#: chosen: half the cone of a sonar; wider parts of a fan leave out fewer edges.
+NARROW_RAD = math.radians(15)
 
 
 class Echo(NamedTuple):
@@ -62,6 +64,17 @@ def cast(things: Iterable[Footprint], x: float, y: float, rays: Sequence[Directi
                     if 0.0 <= along < hits[ray] and 0.0 <= (qx * dy - qy * dx) / across <= 1.0:
                         hits[ray] = along
     return hits
+
+
+def narrow_parts(headings_rad: Sequence[float]) -> Iterator[tuple[int, int]]:
+    """Yield the first ray, and the one after the last, of each part of a fan that `cast` takes at one look."""
+    first = 0
+    for ray, heading in enumerate(headings_rad):
+        if heading - headings_rad[first] > NARROW_RAD:
+            yield first, ray
+            first = ray
+    if headings_rad:
+        yield first, len(headings_rad)
 
 
 def _circle(thing: Footprint, px: float, py: float, rays: Sequence[Direction], hits: list[float]) -> None:

@@ -55,9 +55,12 @@ def _middle(segments: int) -> int:
 
 
 def stalls(context: Context, body: SensedState, now: Nanos) -> tuple[bool, bool]:
-    """Return whether the left and right wheel are reported as stalled."""
+    """Return whether the left and right wheel are reported as stalled; without power by the stop button alone."""
     switches, faults = context.devices.switches, context.faults
-    both = now < context.bumper_watch.stalled_until or (switches.stop_button and switches.e_stall)
+    by_button = switches.stop_button and switches.e_stall
+    if not context.motors_enabled:
+        return by_button, by_button
+    both = by_button or now < context.bumper_watch.stalled_until
     left, right = context.motion.wheels_mps
     return (
         both or body.stalled_left or (faults.left_blocked and left != 0),

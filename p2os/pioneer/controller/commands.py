@@ -15,6 +15,7 @@ Invariant: a handler acts at once and within the context; none reads a clock or 
 """
 
 import math
+import struct
 from collections.abc import Callable, Mapping
 from enum import Enum
 
@@ -22,6 +23,7 @@ from p2os.pioneer.controller.context import Context
 from p2os.pioneer.controller.motion import NM_PER_MM, UDEG_PER_DEG, MotionLimits
 from p2os.pioneer.controller.packet_requests import Extra
 from p2os.pioneer.devices.heading_sensors import CompassMode
+from p2os.pioneer.devices.laser import EXTENDED
 from p2os.protocol.bauds import BAUDS
 from p2os.protocol.command_table import BY_NUMBER
 from p2os.protocol.commands import Command, CommandNumber
@@ -42,7 +44,7 @@ MOTION_COMMANDS = frozenset({_C.MOVE, _C.ROTATE, _C.VEL, _C.HEAD, _C.DHEAD, _C.R
 KEPT = {
     _C.ROTKP: "rotkp", _C.ROTKV: "rotkv", _C.ROTKI: "rotki", _C.TRANSKP: "transkp", _C.TRANSKV: "transkv",
     _C.TRANSKI: "transki", _C.REVCOUNT: "revcount", _C.DRIFTFACTOR: "driftfactor", _C.TICKSMM: "ticksmm",
-    _C.GYROCALCW: "gyrocw", _C.GYROCALCCW: "gyroccw",
+    _C.GYROCALCCW: "gyroccw",
 }  # fmt: skip
 #: Of things that this robot does not have; taken in silence, as the firmware does.
 NOT_FITTED = (
@@ -50,6 +52,15 @@ NOT_FITTED = (
     _C.POWER_5V, _C.POWER_12V, _C.POWER_AUX_PC, _C.POWER_TOUCHSCREEN, _C.POWER_PTZ, _C.POWER_AUDIO, _C.POWER_LRF2,
     _C.ARM_INIT, _C.ARM_CHECK, _C.ARM_HOME, _C.ARM_PARK, _C.ARM_POS, _C.ARM_SPEED, _C.ARM_STOP, _C.LCD,
 )  # fmt: skip
+#: What sets up a simulated laser: the simulators' own numbers, and the older ones that ARIA sends.
+LASER_COMMANDS = frozenset({
+    _C.SIM_LRF_ENABLE, _C.SIM_LRF_SET_FOV_START, _C.SIM_LRF_SET_FOV_END, _C.SIM_LRF_SET_RES,
+    _C.ADSEL, _C.GRIPPERVAL, _C.GRIPREQUEST, _C.GYROCALCW,
+})  # fmt: skip
+#: SIM_SET_POSE: x and y in mm, heading in degrees.
+POSE = struct.Struct("<iii")
+#: Orders of SIM_CTRL: ask for SIMINFO, and load a map by its name (AMRISim has two such).
+SIM_CTRL_INFO, SIM_CTRL_LOAD_MAP = 6, frozenset({1, 2})
 
 
 class Effect(Enum):
@@ -83,6 +94,8 @@ def apply(context: Context, command: Command, now: Nanos) -> Effect:
 def is_known(which: int, context: Context) -> bool:
     """Tell whether this firmware has a command; where no manual settles it, it has."""
     row = BY_NUMBER.get(which)
+    if which in LASER_COMMANDS and context.devices.laser.is_fitted:
+        return True
     return context.lenient or row is None or row.is_known_to(context.profile) is not False
 
 
@@ -250,6 +263,92 @@ def _charge(context: Context, value: int) -> None:
     context.notes.append(("charger", "deployed" if value else "retracted"))
 
 
+# Of simulators --------------------------------------------------------------------------
+
+
+def _sim_set_pose(context: Context, command: Command, _now: Nanos) -> bool:
+    """Move the robot in its world; the odometry goes on as if nothing had happened."""
+    if not isinstance(command.argument, bytes) or len(command.argument) < POSE.size:
+        return False
+    context.pose_wanted = POSE.unpack_from(command.argument)
+    return True
+
+
+def _sim_reset(context: Context) -> None:
+    context.sim_reset_wanted = True
+
+
+def _sim_stat(context: Context, command: Command, _now: Nanos) -> bool:
+    """Ask for SIMSTAT; without an argument for one."""
+    context.requests.set(Extra.SIMSTAT, command.argument if isinstance(command.argument, int) else 1)
+    return True
+
+
+def _sim_message(context: Context, data: bytes) -> None:
+    context.notes.append(("message", _shown_text(data)))
+
+
+def _sim_exit(context: Context, value: int) -> None:
+    context.exit_code = value & 0xFF
+    context.notes.append(("exit wanted", f"code {value}"))
+
+
+def _load_world(context: Context, data: bytes) -> None:
+    context.world_wanted = data.split(b"\0")[0].decode("latin-1")
+
+
+def _sim_ctrl(context: Context, command: Command, _now: Nanos) -> bool:
+    """Take an order to the simulator itself: a number of two bytes, then what belongs to it."""
+    argument = command.argument
+    if argument is None or (isinstance(argument, bytes) and len(argument) < 2):
+        return False
+    data = argument if isinstance(argument, bytes) else (argument & 0xFFFF).to_bytes(2, "little")
+    which = int.from_bytes(data[:2], "little")
+    if which == SIM_CTRL_INFO:
+        context.requests.set(Extra.SIMINFO, 1)
+    elif which in SIM_CTRL_LOAD_MAP:
+        _load_world(context, data[4 : 4 + int.from_bytes(data[2:4], "little")])
+    else:
+        context.notes.append(("SIM_CTRL ignored", f"order {which}"))
+    return True
+
+
+def _laser(act: Callable[[Context, int], None], otherwise: Handler | None = None) -> Handler:
+    """Return a handler of the laser's setup; without a laser the number has its other meaning, if it has one."""
+
+    def without(context: Context, _command: Command, _now: Nanos) -> bool:
+        context.notes.append(("no laser", "a robot has one with --laser"))
+        return True
+
+    with_laser, without_laser = _number(act), otherwise or without
+    return lambda context, command, now: (
+        with_laser(context, command, now) if context.devices.laser.is_fitted else without_laser(context, command, now)
+    )
+
+
+def _laser_enable(context: Context, value: int) -> None:
+    context.devices.laser.mode = min(max(value, 0), EXTENDED)
+    context.requests.set(Extra.LASER, 2 if value > 0 else 0)
+
+
+def _laser_start(context: Context, value: int) -> None:
+    context.devices.laser.set_start(value)
+
+
+def _laser_end(context: Context, value: int) -> None:
+    context.devices.laser.set_end(value)
+
+
+def _laser_step(context: Context, value: int) -> None:
+    context.devices.laser.set_step(value)
+
+
+def _shown_text(data: bytes) -> str:
+    """Return a client's text as one line that is safe to print."""
+    text = data.split(b"\0")[0].decode("latin-1")
+    return "".join(sign if sign.isprintable() else "?" for sign in text)
+
+
 # Handlers by what their command's argument is ------------------------------------------
 
 
@@ -358,9 +457,11 @@ HANDLERS: Mapping[int, Handler] = {
     _C.ENCODER: _request(Extra.ENCODER),
     _C.DIGOUT: _two_bytes(_digout),
     _C.GRIPPER: _timed(lambda context, value, now: context.devices.gripper.command(value, now)),
-    _C.ADSEL: _number(lambda context, value: context.devices.pins.select(value)),
-    _C.GRIPPERVAL: _number(lambda context, value: setattr(context.devices.gripper, "value", value)),
-    _C.GRIPREQUEST: _request(Extra.GRIPPER),
+    _C.ADSEL: _laser(_laser_enable, _number(lambda context, value: context.devices.pins.select(value))),
+    _C.GRIPPERVAL: _laser(
+        _laser_start, _number(lambda context, value: setattr(context.devices.gripper, "value", value))
+    ),
+    _C.GRIPREQUEST: _laser(_laser_end, _request(Extra.GRIPPER)),
     _C.IOREQUEST: _request(Extra.IO),
     _C.PTUPOS: _two_bytes(lambda context, width, port: context.devices.pins.set_servo(port, width)),
     _C.TTY2: _aux_send(1),
@@ -391,4 +492,18 @@ HANDLERS: Mapping[int, Handler] = {
     _C.MAINTENANCE: _plain(lambda context: _restart(context, "MAINTENANCE")),
     **{number: _kept(name) for number, name in KEPT.items()},
     **dict.fromkeys(NOT_FITTED, _plain(lambda _context: None)),
+    # of simulators
+    _C.GYROCALCW: _laser(_laser_step, _kept("gyrocw")),
+    _C.LOADWORLD: _text(_load_world),
+    _C.RESETSIMTOORIGIN: _plain(_sim_reset),
+    _C.SIM_SET_POSE: _sim_set_pose,
+    _C.SIM_RESET: _plain(_sim_reset),
+    _C.SIM_LRF_ENABLE: _laser(_laser_enable),
+    _C.SIM_LRF_SET_FOV_START: _laser(_laser_start),
+    _C.SIM_LRF_SET_FOV_END: _laser(_laser_end),
+    _C.SIM_LRF_SET_RES: _laser(_laser_step),
+    _C.SIM_CTRL: _sim_ctrl,
+    _C.SIM_STAT: _sim_stat,
+    _C.SIM_MESSAGE: _text(_sim_message),
+    _C.SIM_EXIT: _number(_sim_exit),
 }

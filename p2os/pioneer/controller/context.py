@@ -59,6 +59,14 @@ class Context(Stateful):
     baud_wanted: int | None = None
     #: RESET or MAINTENANCE.
     restart_wanted: str | None = None
+    #: SIM_SET_POSE: x and y in mm, heading in degrees.
+    pose_wanted: tuple[int, int, int] | None = None
+    #: SIM_RESET: back to where the robot began, the session goes on.
+    sim_reset_wanted: bool = False
+    #: LOADWORLD: the name of another world.
+    world_wanted: str | None = None
+    #: SIM_EXIT's code; stays, for whoever runs the robot.
+    exit_code: int | None = None
     #: Events to be notified: (what in a word or two, detail).
     notes: list[tuple[str, str]] = field(default_factory=list)
 

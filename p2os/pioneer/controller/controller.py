@@ -31,9 +31,11 @@ Invariant: at time t the body stands at its first step boundary at or after t, s
 the result does not depend on how often a caller calls `advance_to`.
 """
 
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
+from p2os.errors import WorldError
 from p2os.pioneer.controller.bumper_watch import check_bumpers, is_watching
 from p2os.pioneer.controller.commands import IGNORED, Effect, apply
 from p2os.pioneer.controller.context import BumperWatch, Context
@@ -50,6 +52,7 @@ from p2os.pioneer.controller.sender import Sender
 from p2os.pioneer.controller.settings import ControllerSettings
 from p2os.pioneer.devices.battery import Battery
 from p2os.pioneer.devices.fitted import Devices
+from p2os.pioneer.devices.laser import Laser
 from p2os.pioneer.random_source import RandomSource
 from p2os.pioneer.sonar.schedule import SonarSchedule
 from p2os.protocol.commands import Command
@@ -66,9 +69,10 @@ from p2os.protocol.connection import (
     WatchdogExpired,
     WatchdogRevived,
 )
-from p2os.protocol.packets import Identity, ResetNotice
+from p2os.protocol.packets import Identity, MapChangedPacket, ResetNotice
 from p2os.protocol.profiles import Profile
 from p2os.robots.parameters import RobotParameters
+from simbase.errors import shown
 from simbase.state import Stateful
 from simbase.timing import NS_PER_MS, NS_PER_S, Nanos, Reached
 
@@ -77,6 +81,8 @@ EventCallback = Callable[[Nanos, str, str], None]
 
 #: chosen: from a reset to the notice that the controller is there again.
 BOOT_NS: Nanos = 500 * NS_PER_MS
+#: AMRISim's status of a map that it could not load.
+MAP_NOT_LOADED = 2
 #: chosen: keeps a full battery above the half of a decivolt, so that it does not flicker.
 BATTERY_MARGIN_V = 0.04
 #: FLASH parameter → the limit that it sets.
@@ -214,6 +220,11 @@ class Pioneer(Stateful):
     def stats(self) -> ConnectionStats:
         """Return the counters of the line since its client came: frames, noise, bad checksums."""
         return self._connection.stats
+
+    @property
+    def exit_code(self) -> int | None:
+        """Return the code with which a client wants its simulator to end (SIM_EXIT); None until one does."""
+        return self._context.exit_code
 
     def receive(self, data: bytes, now: Nanos) -> None:
         """Take bytes that the line has delivered at `now`.
@@ -444,7 +455,7 @@ class Pioneer(Stateful):
         context.requests = Requests(dropped=context.requests.dropped)
         context.kept.clear()
         devices, defaults = context.devices, _new_devices(self.settings)
-        devices.gyro, devices.compass = defaults.gyro, defaults.compass
+        devices.gyro, devices.compass, devices.laser = defaults.gyro, defaults.compass, defaults.laser
         devices.joystick.may_drive = devices.joystick.drives = devices.switches.battery_reported = False
         devices.switches.bump_stall, devices.switches.e_stall = 0, defaults.switches.e_stall
         devices.battery.pretended_decivolts = None if devices.battery.is_test else devices.battery.pretended_decivolts
@@ -492,6 +503,8 @@ class Pioneer(Stateful):
             self._notify(now, "command ignored" if effect in IGNORED else "command waits", complaint)
         if context.motors_enabled is not had_power:
             self._notify(now, "motors", "on" if context.motors_enabled else "off")
+        self._move_in_world()
+        self._refuse_world(now)
         self._report_notes(now)
         self._reporter.check_aux_requests()
         if context.baud_wanted is not None:
@@ -505,6 +518,39 @@ class Pioneer(Stateful):
         if context.restart_wanted is not None:
             notice, context.restart_wanted = context.restart_wanted, None
             self._restart(now, notice, boot_ns=BOOT_NS if notice == "RESET" else None)
+
+    def _move_in_world(self) -> None:
+        """Do what a client wants of the simulator: carry the robot elsewhere, or back to its start."""
+        context, body = self._context, self.body
+        if context.pose_wanted is not None:
+            (x_mm, y_mm, heading_deg), context.pose_wanted = context.pose_wanted, None
+            where = f"{x_mm / 1000:g}, {y_mm / 1000:g} m, {heading_deg}°"
+            try:
+                body.stand_at(x_mm / 1000, y_mm / 1000, math.radians(heading_deg))
+            except WorldError as error:
+                context.notes.append(("not moved", str(error)))
+                return
+            context.motion.ramp_from_zero()
+            context.devices.laser.has_jumped = True
+            context.notes.append(("moved by its client", where))
+        if context.sim_reset_wanted:
+            context.sim_reset_wanted = False
+            body.put_back()
+            state = body.state
+            context.reckoning.begin(state.left_angle_rad, state.right_angle_rad)
+            context.reckoning.set_origin()
+            context.motion.ramp_from_zero()
+            context.devices.laser.has_jumped = True
+            context.notes.append(("back at its start", "its client wants it"))
+
+    def _refuse_world(self, now: Nanos) -> None:
+        """Answer that another world was not loaded: this robot stays in the one that it was made for."""
+        if (name := self._context.world_wanted) is None:
+            return
+        self._context.world_wanted = None
+        self._context.notes.append(("world stays", f"its client wants {shown(name)}; start again with --world"))
+        refusal = MapChangedPacket(status=MAP_NOT_LOADED, raw_name=name.encode("latin-1"))
+        self._sender.answer([refusal.to_frame().to_bytes()], now)
 
     def _report_notes(self, now: Nanos) -> None:
         notes, self._context.notes = self._context.notes, []
@@ -526,6 +572,7 @@ def _new_devices(settings: ControllerSettings) -> Devices:
     )
     devices.gripper.kind = flash.number("gripper")
     devices.gyro.is_fitted = flash.number("hasgyro") > 0 and settings.profile is not Profile.P2OS
+    devices.laser = Laser.of(settings.laser)
     devices.switches.e_stall = settings.profile is not Profile.P2OS
     return devices
 

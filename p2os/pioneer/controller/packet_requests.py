@@ -28,6 +28,9 @@ class Extra(Enum):
     ARM = "ARMpac"
     ARM_INFO = "ARMINFOpac"
     BATTERY = "BATTERYpac"
+    SIMSTAT = "SIMSTAT"
+    SIMINFO = "SIMINFO"
+    LASER = "SIMLASER"
 
 
 #: What ARCOS sends before the standard packet.

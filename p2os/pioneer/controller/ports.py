@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 from typing import Protocol
 
+from p2os.pioneer.sonar.ring import Cone
 from simbase.timing import Nanos
 
 
@@ -45,7 +46,22 @@ class WheelState(WheelAngles, Protocol):
 
 
 class SensedState(WheelState, Protocol):
-    """What compass, gyro and bumpers look at: how the body really stands and turns."""
+    """What compass, gyro and bumpers look at, how the body really stands and turns; a simulator tells its place too."""
+
+    @property
+    def x_m(self) -> float:
+        """Where it is in the world; told by SIMSTAT alone."""
+        ...
+
+    @property
+    def y_m(self) -> float:
+        """The same."""
+        ...
+
+    @property
+    def z_m(self) -> float:
+        """The same."""
+        ...
 
     @property
     def heading_rad(self) -> float:
@@ -83,6 +99,18 @@ class Body(Protocol):
 
     def put_back(self) -> None:
         """Stand still where it began, wheels at angle 0, and what was pushed where it was."""
+        ...
+
+    def stand_at(self, x_m: float, y_m: float, heading_rad: float) -> None:
+        """Stand still elsewhere, as if carried there.
+
+        Raises:
+            WorldError: It cannot stand there; nothing has changed then.
+        """
+        ...
+
+    def scan(self, fan: Cone, longest_m: float) -> Sequence[float]:
+        """Return how far each ray of a laser goes, metres; `longest_m` where it meets nothing."""
         ...
 
     def step(self, left_mps: float, right_mps: float) -> WheelAngles:

@@ -16,7 +16,7 @@ is in one packet only.
 """
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -29,6 +29,7 @@ from p2os.pioneer.controller.packet_requests import Extra
 from p2os.pioneer.controller.ports import Body, WheelState
 from p2os.pioneer.controller.sender import Sender
 from p2os.pioneer.controller.settings import ControllerSettings
+from p2os.pioneer.devices.laser import Laser
 from p2os.pioneer.sonar.errors import measure_ranges
 from p2os.pioneer.sonar.schedule import raw_range
 from p2os.protocol.config_packet import ConfigPacket
@@ -40,6 +41,10 @@ from p2os.protocol.packets import (
     EncoderPacket,
     PlaylistPacket,
     ServerPacket,
+    SimDevice,
+    SiminfoPacket,
+    SimLaserPacket,
+    SimstatPacket,
     packet_frame,
 )
 from p2os.protocol.profiles import Profile
@@ -182,14 +187,30 @@ class Reporter:
         if not line.fits(reserved + SMALLEST_FRAME, now, due) and not requests.must_go(extra):
             requests.no_room(extra)
             return
-        data = packet_frame(
-            MAKERS[extra](self.context, self.settings.flash, segments, now), self.settings.profile
-        ).to_bytes()
-        if not line.fits(reserved + len(data), now, due) and not requests.must_go(extra):
+        packets = self._packets_of(extra, segments, now)
+        frames = [packet_frame(packet, self.settings.profile).to_bytes() for packet in packets]
+        if not line.fits(reserved + sum(map(len, frames)), now, due) and not requests.must_go(extra):
             requests.no_room(extra)
             return
         requests.sent(extra)
-        self._sender.put(data, now)
+        for data in frames:
+            self._sender.put(data, now)
+
+    def _packets_of(self, extra: Extra, segments: tuple[int, int], now: Nanos) -> Sequence[ServerPacket]:
+        """Return the packets of one request: one, but for a laser's sweep."""
+        if extra is Extra.LASER:
+            return self._sweep()
+        if extra is Extra.SIMSTAT:
+            return (_simstat_packet(self.body),)
+        if extra is Extra.SIMINFO:
+            return (_siminfo_packet(self.parameters, self.context.devices.laser),)
+        return (MAKERS[extra](self.context, self.settings.flash, segments, now),)
+
+    def _sweep(self) -> list[SimLaserPacket]:
+        """Let the laser sweep once, all rays at the same moment."""
+        laser, reckoning, equipment = self.context.devices.laser, self.context.reckoning, self.parameters.equipment
+        ranges_m = self.body.scan(laser.fan(equipment.laser_x_mm, equipment.laser_y_mm), laser.range_m)
+        return laser.packets(ranges_m, (reckoning.x_mm, reckoning.y_mm, math.degrees(reckoning.heading_rad)))
 
     def _bumpers_reported(self, segments: tuple[int, int]) -> tuple[int, int]:
         """Return front and rear as the standard packet has them: without bumpers a P2OS robot reads ones."""
@@ -227,7 +248,7 @@ def _standard_packet(
     left, right = (_raw_velocity(speed, parameters) for speed in (wheels.left_speed_mps, wheels.right_speed_mps))
     devices, profile = context.devices, context.profile
     return StandardSip(
-        kind=MOVING if left or right or any(context.motion.wheels_mps) else STANDING,
+        kind=MOVING if left or right else STANDING,
         raw_x=raw_x,
         raw_y=raw_y,
         raw_heading=raw_angle(context.reckoning.heading_rad),
@@ -305,6 +326,26 @@ def _battery_packet(context: Context) -> BatteryPacket:
     """Return one battery's row: no flags, its charge twice."""
     charge = context.devices.battery.state_of_charge
     return BatteryPacket(batteries=((0, 0, 0, charge, charge),))
+
+
+def _simstat_packet(body: Body) -> SimstatPacket:
+    """Return where the robot really is; the simulator's name is left out, as AMRISim leaves it out."""
+    state, interval_ms = body.state, max(body.dt_ns // NS_PER_MS, 1)
+    return SimstatPacket(
+        wanted_interval_ms=interval_ms, real_interval_ms=interval_ms, last_interval_ms=interval_ms,
+        x_mm=round(state.x_m * 1000), y_mm=round(state.y_m * 1000), z_mm=round(state.z_m * 1000),
+        heading_deg=round(math.degrees(math.remainder(state.heading_rad, math.tau))),
+    )  # fmt: skip
+
+
+def _siminfo_packet(parameters: RobotParameters, laser: Laser) -> SiminfoPacket:
+    """Return which simulator this is, and what the robot has that measures distances."""
+    found = []
+    if parameters.sonar_fitted:
+        found.append(SimDevice(raw_name=b"sonar", raw_type=b"sonar", number=0, status=1))
+    if laser.is_fitted:
+        found.append(SimDevice(raw_name=b"laser", raw_type=b"laser", number=0, status=int(laser.mode > 0)))
+    return SiminfoPacket(raw_name=b"p2os", devices=tuple(found))
 
 
 def _signed32(value: int) -> int:

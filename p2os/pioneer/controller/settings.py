@@ -1,18 +1,22 @@
 """The settings of a virtual robot: its firmware, its FLASH, its line, its sensors' errors."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from enum import Enum
 
 from p2os.pioneer.controller.flash import Flash
+from p2os.pioneer.devices.laser import LASERS, LaserModel
 from p2os.pioneer.sensor_errors import IDEAL, SensorErrors
 from p2os.protocol.bauds import BAUDS, BAUDS_TEXT
 from p2os.protocol.profiles import Profile
 from p2os.protocol.times import CYCLE_NS, WATCHDOG_NS
-from simbase.errors import UsageError
+from simbase.errors import UsageError, shown
 from simbase.timing import NS_PER_MS, Nanos
 
 #: The CONFIGpac has one byte for the cycle.
 LONGEST_SIP_PERIOD_MS = 255
+#: A simulator's serial number: by it ARIA looks for no batteries, sonar boards or lasers on lines of their own.
+SIMULATOR_SERIAL = "SIM"
 
 
 class SonarPerSip(Enum):
@@ -41,17 +45,21 @@ class ControllerSettings:
     name: str = "Virtual"
     serial: str = "VIRTUAL"
     profile: Profile = Profile.P2OS
-    #: Answers syncs out of order and executes what any family knows, as AMRISim does.
+    #: Answers syncs out of order and executes what any family or simulator knows, as AMRISim does.
     lenient: bool = False
     sip_period_ns: Nanos = CYCLE_NS
     watchdog_ns: Nanos = WATCHDOG_NS
     sonar_per_sip: SonarPerSip = SonarPerSip.TWO
+    #: Also the sonar that are an option of the model, as ARIA's parameter file has them; the robot is made with them.
+    rear_sonar: bool = False
     #: The battery's resting voltage at the start; it drains from there.
     battery_decivolts: int = 126
     #: Speed of the host's line, bit/s; None: a line that takes no time.
     baud: int | None = None
     flash: Flash = field(default_factory=Flash)
     errors: SensorErrors = IDEAL
+    #: A simulated laser, as a simulator has it; then commands 35 to 38 are its setup, as ARIA sends it.
+    laser: LaserModel | None = None
     #: Decides every random error.
     seed: int = 0
 
@@ -64,6 +72,17 @@ class ControllerSettings:
         if self.baud is not None and self.baud not in BAUDS:
             raise UsageError(f"a line of {self.baud} bit/s is none that HOSTBAUD names", hint=f"rates: {BAUDS_TEXT}")
 
+    @classmethod
+    def for_client(cls, name: str) -> "ControllerSettings":
+        """Return what the programs of a client library expect of a simulated robot.
+
+        Raises:
+            UsageError: Nobody has written down what it expects.
+        """
+        if name not in CLIENTS:
+            raise UsageError(f"no settings for {shown(name)}", hint=f"there are some for: {', '.join(CLIENTS)}")
+        return CLIENTS[name]
+
     def with_flash(self, flash: Flash) -> "ControllerSettings":
         """Return these settings with what a FLASH file sets."""
         return replace(
@@ -74,3 +93,12 @@ class ControllerSettings:
             sip_period_ns=flash.number("sipcycle") * NS_PER_MS,
             watchdog_ns=flash.number("watchdog") * NS_PER_MS,
         )
+
+
+#: Client library → what its programs expect of a simulator, as they find it in MobileSim.
+CLIENTS: Mapping[str, ControllerSettings] = {
+    "aria": ControllerSettings(
+        profile=Profile.ARCOS, lenient=True, sonar_per_sip=SonarPerSip.ALL, serial=SIMULATOR_SERIAL,
+        laser=LASERS["lms2xx"], rear_sonar=True,
+    ),
+}  # fmt: skip

@@ -7,6 +7,7 @@ from p2os.pioneer.devices.battery import Battery
 from p2os.pioneer.devices.gripper import ON_USER_IO, SWITCHES, Gripper
 from p2os.pioneer.devices.heading_sensors import Compass, Gyro
 from p2os.pioneer.devices.joystick import Joystick
+from p2os.pioneer.devices.laser import Laser
 from p2os.pioneer.devices.pins import Pins
 from simbase.timing import Nanos
 
@@ -37,6 +38,7 @@ class Devices:
     compass: Compass = field(default_factory=Compass)
     gyro: Gyro = field(default_factory=Gyro)
     aux: tuple[AuxPort, ...] = field(default_factory=lambda: tuple(AuxPort(number) for number in PORTS))
+    laser: Laser = field(default_factory=Laser)
     switches: Switches = field(default_factory=Switches)
 
     def digital_in(self, now: Nanos) -> int:

@@ -26,6 +26,7 @@ from p2os.pioneer.body.factory import BEST, BODY_CHOICES
 from p2os.pioneer.controller.faults import read_fault
 from p2os.pioneer.controller.flash import load_flash
 from p2os.pioneer.controller.settings import ControllerSettings, SonarPerSip
+from p2os.pioneer.devices.laser import read_laser
 from p2os.pioneer.sensor_errors import load_sensor_errors
 from p2os.pioneer.serve.fleet_order import DEFAULT_PORT, MOST_ROBOTS, FleetOrder, RobotOrder, following_ports, read_aux
 from p2os.pioneer.world import known_worlds
@@ -55,9 +56,12 @@ KINDS: Mapping[str, tuple[tuple[type, ...], str]] = {
     "port": ((str,), "a text"),
     "at": ((list,), "[x, y] or [x, y, heading] in metres and degrees"),
     "model": ((str,), "a text"),
+    "for": ((str,), "a text"),
     "firmware": ((str,), "a text"),
+    "laser": ((str,), "a text"),
     "lenient": ((bool,), "true or false"),
     "all_sonar": ((bool,), "true or false"),
+    "rear_sonar": ((bool,), "true or false"),
     "flash": ((str,), "a text"),
     "errors": ((str,), "a text"),
     "baud": ((int,), "a whole number"),
@@ -223,7 +227,17 @@ def _place(section: _Section) -> Pose | None:
 
 
 def _settings(section: _Section) -> ControllerSettings:
-    profile, key = str(section.get("firmware", "P2OS")), "errors"
+    base, key = ControllerSettings(), "for"
+    try:
+        if "for" in section.row:
+            base = ControllerSettings.for_client(str(section.get("for", "")))
+        key = "laser"
+        laser = read_laser(str(section.get("laser", ""))) if "laser" in section.row else base.laser
+    except FleetError:
+        raise
+    except P2osError as error:
+        raise section.error(key, str(error), error.hint) from error
+    profile, key = str(section.get("firmware", base.profile.value)), "errors"
     if profile not in {member.value for member in Profile}:
         raise section.error(
             "firmware", f"no firmware {shown(profile)}", f"one of {', '.join(p.value for p in Profile)}"
@@ -232,9 +246,10 @@ def _settings(section: _Section) -> ControllerSettings:
     if baud is not None and baud not in BAUDS:
         raise section.error("baud", f"a line of {baud} bit/s is none that HOSTBAUD names", f"rates: {BAUDS_TEXT}")
     try:
-        settings = ControllerSettings(
-            profile=Profile(profile), lenient=bool(section.get("lenient", False)),
-            sonar_per_sip=SonarPerSip.ALL if section.get("all_sonar", False) else SonarPerSip.TWO,
+        settings = replace(
+            base, profile=Profile(profile), lenient=bool(section.get("lenient", base.lenient)), laser=laser,
+            rear_sonar=bool(section.get("rear_sonar", base.rear_sonar)),
+            sonar_per_sip=SonarPerSip.ALL if section.get("all_sonar", False) else base.sonar_per_sip,
             errors=load_sensor_errors(str(section.get("errors", "ideal"))), baud=baud,
         )  # fmt: skip
         key = "flash"

@@ -9,7 +9,7 @@ from dataclasses import dataclass, field, replace
 from p2os.pioneer.body.contract import RobotBody
 from p2os.pioneer.body.factory import BEST, body_note, make_body, resolve_body
 from p2os.pioneer.controller import Pioneer
-from p2os.pioneer.controller.settings import ControllerSettings
+from p2os.pioneer.controller.settings import SIMULATOR_SERIAL, ControllerSettings
 from p2os.pioneer.serve.multi_robot_world import MultiRobotWorld
 from p2os.pioneer.world import load_world
 from p2os.pioneer.world.model import Pose, World
@@ -24,6 +24,8 @@ from simbase.timing import Nanos
 DEFAULT_PORT = "tcp:127.0.0.1:8101"
 #: The AUX ports (H8 manual: AUX1 to AUX3).
 AUX_PORTS = (1, 2, 3)
+#: Robots of this class have batteries on a line of their own (ARIA's parameter file).
+MTX = "MTX"
 #: chosen: more than two cores carry; a larger number is a typing error.
 MOST_ROBOTS = 256
 
@@ -119,7 +121,11 @@ def make_fleet(order: FleetOrder) -> MadeFleet:
     for robot in order.robots:
         if robot.model not in known:
             known[robot.model] = load_parameters(robot.model)
-    world, models = load_world(order.world, seed=order.seed), [known[robot.model] for robot in order.robots]
+    world = load_world(order.world, seed=order.seed)
+    models = [
+        known[robot.model].with_every_sonar() if robot.settings.rear_sonar else known[robot.model]
+        for robot in order.robots
+    ]
     starts = _starts(order, world, models)
     name = resolve_body(order.body)
     made: list[tuple[Pioneer, RobotBody]] = []
@@ -132,8 +138,20 @@ def make_fleet(order: FleetOrder) -> MadeFleet:
         made.append((Pioneer(parameters=model, body=body, settings=settings, faults=robot.faults), body))
     multi_robot_world = MultiRobotWorld(made, world) if len(made) > 1 and not order.apart else None
     robots = tuple(pioneer for pioneer, _ in made)
-    notes = tuple(note for note in (body_note(order.body), made[0][1].note) if note)
+    notes = tuple(note for note in (body_note(order.body), made[0][1].note, _batteries_note(made)) if note)
     return MadeFleet(robots, starts, name, notes, multi_robot_world)
+
+
+def _batteries_note(made: Sequence[tuple[Pioneer, RobotBody]]) -> str | None:
+    """Return what ARIA needs for a model whose batteries it looks for on a serial port of its own."""
+    needing = [
+        pioneer for pioneer, _ in made
+        if pioneer.parameters.robot_class == MTX and pioneer.settings.serial != SIMULATOR_SERIAL
+    ]  # fmt: skip
+    if not needing:
+        return None
+    model = needing[0].parameters.subclass
+    return f"ARIA looks for the batteries of a {model} on a serial port: --for aria spares it that"
 
 
 def following_ports(given: Sequence[str], robots: int) -> list[str]:

@@ -380,6 +380,11 @@ class World:
     #: What a message calls the start: file, line and key.
     start_at: str = field(default="its start", compare=False)
 
+    def contains(self, x_m: float, y_m: float) -> bool:
+        """Tell whether a place is on the floor."""
+        x0, y0, x1, y1 = self.extent
+        return x0 <= x_m <= x1 and y0 <= y_m <= y1
+
     def __post_init__(self) -> None:
         _refuse_outside(f"world {shown(self.name)}", "extent_m", *self.extent)
         _refuse_outside(f"the start of world {shown(self.name)}", "x_m", self.start.x_m, self.start.y_m, self.start.z_m)

@@ -94,8 +94,7 @@ def thing_at(world: World, model: RobotParameters, pose: Pose) -> str | None:
 
 def _is_on_floor(world: World, pose: Pose) -> bool:
     """Tell whether a place is within a world's extent."""
-    x0, y0, x1, y1 = world.extent
-    return x0 <= pose.x_m <= x1 and y0 <= pose.y_m <= y1
+    return world.contains(pose.x_m, pose.y_m)
 
 
 def _extent_of(world: World) -> str:
@@ -119,7 +118,7 @@ def _checked(
         its_hull = placed(hull_polygon(its_model.body), there.x_m, there.y_m, there.heading_rad)
         if Footprint.of_polygon("", its_hull).overlaps(hull):
             raise UsageError(f"{where} would stand in robot {other + 1}", hint="its hull is 0.4 m wide")
-    height = _floor(world, pose.x_m, pose.y_m, 0.0)
+    height = floor_height(world, pose.x_m, pose.y_m)
     if height is None:
         raise UsageError(f"{where} would begin on a slope", hint="take a level place")
     return Pose(pose.x_m, pose.y_m, pose.heading_rad, height)
@@ -142,7 +141,7 @@ def _free_places(world: World, plan: Plan) -> Iterator[Pose]:
         free = plan.clearance(x, y, start.heading_rad, no_more_than=2 * FREE_M)
         if free < PASSED_M and (i, j) != (0, 0):
             continue
-        height = _floor(world, x, y, plan.hull_reach_m)
+        height = floor_height(world, x, y, plan.hull_reach_m)
         if free >= FREE_M and height is not None:
             yield Pose(x, y, start.heading_rad, height)
         for there in ((i + 1, j), (i - 1, j), (i, j + 1), (i, j - 1)):
@@ -164,8 +163,8 @@ def _reach(model: RobotParameters) -> float:
     return max(math.hypot(x, y) for x, y in hull_polygon(model.body))
 
 
-def _floor(world: World, x: float, y: float, reach: float) -> float | None:
-    """Return the height of the floor under a circle; None where it is not level.
+def floor_height(world: World, x: float, y: float, reach: float = 0.0) -> float | None:
+    """Return the height of the floor under a circle, metres; None where it is not level.
 
     Of a mesh's floors nothing is known: they count as the start's.
     """

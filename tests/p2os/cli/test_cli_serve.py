@@ -232,7 +232,7 @@ def test_a_served_robot_tells_its_host_in_the_same_process(monkeypatch: pytest.M
         def __init__(self, hosts: Any, **_: object) -> None:
             self.pioneer = hosts[0].pioneer
 
-        def run(self) -> None:
+        def run(self, **_: object) -> None:
             self.pioneer.on_event(1_500_000_000, "opened", "")
             self.pioneer.on_event(1_600_000_000, "motors", "on")
             signal.raise_signal(signal.SIGTERM)

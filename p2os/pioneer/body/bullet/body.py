@@ -13,6 +13,7 @@ gives way, and stall where the motors do.
 Not modelled: tyre scrub and wheel-size errors, battery sag.
 """
 
+import math
 import tempfile
 from collections.abc import Sequence
 from operator import itemgetter
@@ -43,7 +44,7 @@ from p2os.pioneer.body.physical import (
     group_of,
 )
 from p2os.pioneer.body.ray_cast import Echo
-from p2os.pioneer.sonar.ring import cones, reading
+from p2os.pioneer.sonar.ring import Cone, cones, reading
 from p2os.pioneer.world.model import Obstacle, Pose, World
 from p2os.pioneer.world.plan import Bands
 from p2os.robots.parameters import RobotParameters
@@ -61,7 +62,7 @@ class BulletBody(EngineBody):
     STATE = ("_made", "_targets", "_start", "engine_state")
     #: What `engine_state` makes anew, what is read from the engine, and what only spares a look for contacts.
     DERIVED = ("_floors", "_robot", "_centre", "_low", "_numbers", "_is_uneven", "_joints", "_matrix", "_origin",
-               "_alone", "_look_in", "_is_busy")  # fmt: skip
+               "_alone", "_look_in", "_is_busy", "_fan", "_fan_rays")  # fmt: skip
 
     name = "bullet"
     note: str | None = None
@@ -72,6 +73,8 @@ class BulletBody(EngineBody):
         self._bands = Bands(parameters)
         #: The engine takes its client as a keyword of every call.
         self._client = pybullet.connect(pybullet.DIRECT)
+        #: The fan of rays that was cast last, prepared.
+        self._fan: tuple[Cone, float] | None = None
         #: Steps for which nothing can touch the robot, and steps until that is looked at again.
         self._alone, self._look_in = 0, 0
         self.reset(world.start, 0)
@@ -108,6 +111,23 @@ class BulletBody(EngineBody):
         self._targets = (0.0, 0.0)
         self._command()
         self._count_anew()
+        self._changed()
+
+    def stand_at(self, x_m: float, y_m: float, heading_rad: float) -> None:
+        """Stand still elsewhere, a hair's breadth above the floor or on it."""
+        height_m, (cx, _, cz) = self._place_for(x_m, y_m, heading_rad), self._centre
+        place = x_m + cx * math.cos(heading_rad), y_m + cx * math.sin(heading_rad), height_m + cz
+        turn, still, client = pybullet.getQuaternionFromEuler((0.0, 0.0, heading_rad)), (0.0, 0.0, 0.0), self._client
+        pybullet.resetBasePositionAndOrientation(self._robot, place, turn, physicsClientId=client)
+        pybullet.resetBaseVelocity(self._robot, still, still, physicsClientId=client)
+        for wheel, joint in zip(
+            WHEELS, pybullet.getJointStates(self._robot, WHEELS, physicsClientId=client), strict=True
+        ):
+            pybullet.resetJointState(self._robot, wheel, joint[0], 0.0, physicsClientId=client)
+        self._command()
+        self._stalling = [0, 0]
+        self._joints = pybullet.getJointStates(self._robot, WHEELS, physicsClientId=client)
+        self._state = None
         self._changed()
 
     def _count_anew(self) -> None:
@@ -236,12 +256,19 @@ class BulletBody(EngineBody):
             for place, number in enumerate(numbers)
         ]
 
-    def _cast(self, numbers: Sequence[int]) -> list[tuple[Any, ...]]:
-        """Return what the engine returns for each ray of some sonar."""
+    def scan(self, fan: Cone, longest_m: float) -> list[float]:
+        """Return how far each ray of a fan goes, metres; the rays tilt with the body."""
+        if (fan, longest_m) != self._fan:
+            self._fan = (fan, longest_m)
+            self._fan_rays = SonarRays((fan,), self._parameters.sonar_height_m, longest_m)
+        return [longest_m * hit[2] for hit in self._cast((0,), self._fan_rays)]
+
+    def _cast(self, numbers: Sequence[int], rays: SonarRays | None = None) -> list[tuple[Any, ...]]:
+        """Return what the engine returns for each ray of some sonar, or of other rays by their numbers."""
         if not numbers:
             return []
         _ = self.state  # reads the robot's frame
-        starts, ends = self._sonar_rays.points(numbers, self._origin, self._matrix)
+        starts, ends = (rays or self._sonar_rays).points(numbers, self._origin, self._matrix)
         hits = pybullet.rayTestBatch(starts, ends, collisionFilterMask=ECHOING, physicsClientId=self._client)
         return cast("list[tuple[Any, ...]]", hits)
 

@@ -35,7 +35,7 @@ from p2os.pioneer.body.physical import (
     middle_and_slope,
 )
 from p2os.pioneer.body.ray_cast import Echo
-from p2os.pioneer.sonar.ring import cones, reading
+from p2os.pioneer.sonar.ring import Cone, cones, reading
 from p2os.pioneer.world.model import Obstacle, Pose, World
 from p2os.robots.parameters import RobotParameters
 
@@ -51,13 +51,15 @@ class MujocoBody(EngineBody):
     STATE = ("_start", "engine_state")
     #: The engine's own objects, and where in them things are: `engine_state` makes them anew.
     DERIVED = ("_model", "_data", "_qpos", "_qvel", "_efforts", "_wheel_places", "_wheel_speeds", "_rotors",
-               "_robot_place", "_robot_speed", "_hull", "_floors", "_low")  # fmt: skip
+               "_robot_place", "_robot_speed", "_hull", "_floors", "_low", "_fan", "_fan_rays")  # fmt: skip
 
     name = "mujoco"
 
     def __init__(self, world: World, parameters: RobotParameters) -> None:
         super().__init__(world, parameters)
         self._sonar_rays = SonarRays(cones(parameters), parameters.sonar_height_m, parameters.sonar_range_m)
+        #: The fan of rays that was cast last, prepared.
+        self._fan: tuple[Cone, float] | None = None
         self.reset(world.start, 0)
 
     @property
@@ -87,6 +89,15 @@ class MujocoBody(EngineBody):
         for name, place in self._start.items():
             self._data.joint(name).qpos, self._data.joint(name).qvel = place, 0.0
         self._count_anew()
+
+    def stand_at(self, x_m: float, y_m: float, heading_rad: float) -> None:
+        """Stand still elsewhere."""
+        height_m, data = self._place_for(x_m, y_m, heading_rad), self._data
+        data.joint(ROBOT).qpos = (x_m, y_m, height_m, *quaternion(heading_rad))
+        for name in ROBOT_JOINTS:
+            data.joint(name).qvel = 0.0
+        self._stalling = [0, 0]
+        self._state = None
 
     def _build(self) -> None:
         """Make the engine's model of what stands in the world now; all rests, the robot at the world's middle."""
@@ -197,6 +208,13 @@ class MujocoBody(EngineBody):
         """Return what each ray of some sonar meets, with the angle at which it meets it."""
         frame = self._look()
         return [self._sonar_rays.echoes(number, self._model, self._data, *frame) for number in numbers]
+
+    def scan(self, fan: Cone, longest_m: float) -> list[float]:
+        """Return how far each ray of a fan goes, metres; the rays tilt with the body."""
+        if (fan, longest_m) != self._fan:
+            self._fan = (fan, longest_m)
+            self._fan_rays = SonarRays((fan,), self._parameters.sonar_height_m, longest_m)
+        return self._fan_rays.ranges(0, self._model, self._data, *self._look())
 
     def _look(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Bring the engine's geometry to the end of the last step; return the robot's origin and turn."""

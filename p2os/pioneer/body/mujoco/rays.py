@@ -33,6 +33,15 @@ class SonarRays:
         met = self._ranges[self._ranges >= 0.0]
         return min(self._longest_m, float(met.min())) if met.size else self._longest_m
 
+    def ranges(
+        self, number: int, model: mujoco.MjModel, data: mujoco.MjData, origin: NDArray[np.float64],
+        turn: NDArray[np.float64],
+    ) -> list[float]:  # fmt: skip
+        """Return how far each ray of one sonar goes, metres; the longest range where it meets nothing."""
+        self._cast(number, model, data, origin, turn)
+        longest = self._longest_m
+        return [range_m if 0.0 <= range_m < longest else longest for range_m in self._ranges.tolist()]
+
     def echoes(
         self, number: int, model: mujoco.MjModel, data: mujoco.MjData, origin: NDArray[np.float64],
         turn: NDArray[np.float64],

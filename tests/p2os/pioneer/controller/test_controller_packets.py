@@ -119,3 +119,25 @@ def test_the_sonar_polling_order_can_be_set_from_one(robot: Any) -> None:
     assert [reading.number for reading in robot.sip().sonar] == [7, 0]
     robot.say(C.POLLING, b"")
     assert robot.sip().sonar == ()
+
+
+def test_the_packet_says_moving_only_while_a_wheel_turns(robot: Any) -> None:
+    robot.open()
+    assert robot.sip().kind == STANDING
+    robot.say(C.VEL, 200)
+    robot.run(1000)
+    assert robot.sip().kind == MOVING
+    robot.body.blocked = True
+    robot.run(100)
+    assert robot.sip().kind == STANDING, "the motors pull, and the wheels stand"
+
+
+def test_stall_bits_clear_when_the_motors_are_switched_off(make_robot: MakeRobot, profile: Profile) -> None:
+    robot = make_robot(profile=profile).open()
+    robot.say(C.VEL, 200)
+    robot.body.stall(left=True, right=True)
+    sip = robot.sip()
+    assert (sip.stall_left, sip.stall_right) == (True, True)
+    robot.say(C.ENABLE, 0)
+    sip = robot.sip()
+    assert (sip.stall_left, sip.stall_right) == (False, False), "a motor without power pulls at nothing"

@@ -8,6 +8,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from p2os.pioneer.controller import ControllerSettings
 from p2os.pioneer.serve.fleet_file import FleetError, load_fleet, parse_fleet
 from p2os.pioneer.serve.fleet_order import FleetOrder, RobotOrder, following_ports, make_fleet
 from p2os.pioneer.world import load_world
@@ -180,3 +181,22 @@ def test_a_fleet_stands_where_it_is_placed_in_one_world_or_apart() -> None:
     assert slow.robots[0].baud == 19200
     with pytest.raises(UsageError, match="0 robots"):
         FleetOrder(robots=())
+
+
+def test_a_model_with_batteries_of_its_own_says_what_aria_needs() -> None:
+    def notes(chosen: ControllerSettings) -> tuple[str, ...]:
+        return make_fleet(FleetOrder(robots=(RobotOrder(model="pioneer-lx", settings=chosen),), body="kinematic")).notes
+
+    assert any("--for aria" in note for note in notes(ControllerSettings()))
+    assert not any("--for aria" in note for note in notes(ControllerSettings.for_client("aria")))
+
+
+def test_the_rear_ring_is_fitted_on_demand_and_measures_behind() -> None:
+    fitted = {}
+    for chosen in (ControllerSettings(), ControllerSettings(rear_sonar=True), ControllerSettings.for_client("aria")):
+        (robot,) = make_fleet(
+            FleetOrder(robots=(RobotOrder(model="p3dx-sh", settings=chosen),), body="kinematic")
+        ).robots
+        fitted[chosen.rear_sonar] = robot.parameters.sonar_fitted
+        assert len(robot.body.ranges(range(robot.parameters.sonar_fitted))) == robot.parameters.sonar_fitted
+    assert fitted == {False: 8, True: 16}
