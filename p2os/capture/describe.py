@@ -6,9 +6,9 @@ of those. Names of fields end in their unit where they have one.
 
 import math
 from collections.abc import Callable
-from dataclasses import fields, is_dataclass, replace
+from dataclasses import fields, is_dataclass
 from enum import Enum
-from typing import TypeAlias, TypeVar, cast
+from typing import Any, TypeAlias, TypeVar, cast
 
 from p2os.protocol.commands import Command
 from p2os.protocol.config_packet import FIELDS, ConfigPacket
@@ -167,7 +167,12 @@ class SipFields:
     def memo(self, name: str) -> "Memo[Plain]":
         """Return what a field says of the raw value that alone decides it."""
         raw = RAW_OF[name]
-        return Memo(lambda value: self._described(replace(StandardSip(), **{raw: value}))[name])
+
+        def convert(value: int) -> Plain:
+            one: dict[str, Any] = {raw: value}
+            return self._described(StandardSip(**one))[name]
+
+        return Memo(convert)
 
     def of(self, payload: bytes) -> dict[str, Plain] | None:
         """Return a SIP's fields, or None where it is no sound SIP inside."""
