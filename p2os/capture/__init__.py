@@ -4,25 +4,36 @@ Nothing here reads a clock or opens a port; `p2os decode`, `sniff`, `record`,
 `replay` and `export` are layers over it.
 """
 
-from p2os.capture.chunks import Capture, CaptureBuilder, Chunk, Direction, capture_of
+from p2os.capture.chunks import Capture, Chunk, Direction, capture_of
 from p2os.capture.explain import Part, explain
 from p2os.capture.formats.pcap import read_pcap, write_pcap
 from p2os.capture.formats.recording import read_recording, write_recording
-from p2os.capture.formats.sources import read_argument, read_capture, read_file
+from p2os.capture.formats.sources import (
+    Source,
+    open_argument,
+    open_capture,
+    open_file,
+    read_argument,
+    read_capture,
+    read_file,
+)
 from p2os.capture.listing import Lister, ListingRow, Reading, frame_chunks, rows_of
 
 __all__ = [
     "Capture",
-    "CaptureBuilder",
     "Chunk",
     "Direction",
     "Lister",
     "ListingRow",
     "Part",
     "Reading",
+    "Source",
     "capture_of",
     "explain",
     "frame_chunks",
+    "open_argument",
+    "open_capture",
+    "open_file",
     "read_argument",
     "read_capture",
     "read_file",

@@ -7,9 +7,10 @@ frame's is guessed from its shape.
 Invariant: chunks are in the order in which they were read, and time never runs back.
 """
 
-from collections.abc import Iterable
-from dataclasses import dataclass, field
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
 from enum import Enum
+from typing import TypeAlias
 
 from p2os.errors import LocalProtocolError
 from simbase.timing import Nanos
@@ -70,6 +71,9 @@ class Capture:
     has_time: bool = True
     note: str = ""
 
+    def __iter__(self) -> Iterator[Chunk]:
+        return iter(self.chunks)
+
     @property
     def duration_ns(self) -> Nanos:
         """When the last chunk came, in nanoseconds."""
@@ -80,27 +84,19 @@ class Capture:
         return b"".join(chunk.data for chunk in self.chunks if chunk.direction is direction)
 
 
-@dataclass(slots=True)
-class CaptureBuilder:
-    """Collects chunks whose times may step back a little, as clocks of captures do."""
+#: What a source gives: nanoseconds, who sent it if that is known, bytes.
+Part: TypeAlias = tuple[Nanos, Direction | None, bytes]
 
-    chunks: list[Chunk] = field(default_factory=list)
-    _last_ns: Nanos = 0
 
-    def add(self, at_ns: Nanos, direction: Direction | None, data: bytes) -> None:
-        """Take bytes; a time before the last one is moved up to it."""
-        self._last_ns = max(self._last_ns, at_ns)
+def in_order(parts: Iterable[Part]) -> Iterator[Chunk]:
+    """Yield parts as chunks; a time that steps back a little, as clocks of captures do, is moved up to the last."""
+    last_ns = 0
+    for at_ns, direction, data in parts:
+        last_ns = max(last_ns, at_ns)
         if data:
-            self.chunks.append(Chunk(at_ns=self._last_ns, direction=direction, data=data))
-
-    def build(self, *, has_time: bool = True, note: str = "") -> Capture:
-        """Return the capture."""
-        return Capture(chunks=tuple(self.chunks), has_time=has_time, note=note)
+            yield Chunk(at_ns=last_ns, direction=direction, data=data)
 
 
-def capture_of(chunks: Iterable[tuple[Nanos, Direction | None, bytes]], *, has_time: bool = True) -> Capture:
+def capture_of(parts: Iterable[Part], *, has_time: bool = True, note: str = "") -> Capture:
     """Return a capture of (nanoseconds, direction, bytes)."""
-    builder = CaptureBuilder()
-    for at_ns, direction, data in chunks:
-        builder.add(at_ns, direction, data)
-    return builder.build(has_time=has_time)
+    return Capture(chunks=tuple(in_order(parts)), has_time=has_time, note=note)

@@ -5,33 +5,62 @@ of those. Names of fields end in their unit where they have one.
 """
 
 import math
+from collections.abc import Callable
 from dataclasses import fields, is_dataclass
 from enum import Enum
-from typing import TypeAlias
+from typing import Any, TypeAlias, TypeVar, cast
 
 from p2os.protocol.commands import Command
 from p2os.protocol.config_packet import FIELDS, ConfigPacket
-from p2os.protocol.frames import Frame
+from p2os.protocol.frames import CHECKSUM_BYTES, PREFIX_BYTES, Frame
 from p2os.protocol.packets import READERS, Identity, RawPacket, packet_name, read_packet
 from p2os.protocol.profiles import Profile
-from p2os.protocol.sip import POSITION_MASK, SIP_KINDS, TAIL, StandardSip
+from p2os.protocol.sip import (
+    HEAD_BYTES,
+    POSITION_MASK,
+    READING_BYTES,
+    SIP_KINDS,
+    TAIL,
+    SonarReading,
+    StandardSip,
+    unpack_head,
+    unpack_tail,
+)
 from p2os.protocol.units import in_units
 from p2os.robots.parameters import RobotParameters
 
 Plain: TypeAlias = "bool | int | float | str | list[Plain] | dict[str, Plain] | None"
 
+Value = TypeVar("Value")
+
+#: A field of a SIP in SI units → the raw field that alone decides it.
+RAW_OF = {
+    "moving": "kind", "x_m": "raw_x", "y_m": "raw_y",
+    "heading_rad": "raw_heading", "left_mps": "raw_left_velocity", "right_mps": "raw_right_velocity",
+    "battery_v": "raw_battery", "stall_left": "stall_left", "stall_right": "stall_right",
+    "front_bumpers": "front_bumpers", "rear_bumpers": "rear_bumpers", "control_rad": "raw_control",
+    "flags": "raw_flags", "servo_pulse": "raw_flags", "compass_deg": "raw_compass",
+    "gripper_state": "gripper_state", "analog_port": "analog_port", "analog": "raw_analog",
+    "digital_in": "digital_in", "digital_out": "digital_out",
+}  # fmt: skip
+
 #: A micrometre or a microradian: what is finer is an artefact of floating point.
 _DECIMALS = 6
 
 
-def describe_command(frame: Frame) -> tuple[str, dict[str, Plain]]:
-    """Return a command's name and argument."""
-    command = Command.from_frame(frame)
+def command_name(kind: int) -> str:
+    """Return a command's name in the manuals."""
+    return Command(kind).name
+
+
+def command_fields(data: bytes) -> dict[str, Plain]:
+    """Return a command's argument, out of its bytes on the wire."""
+    command = Command.from_frame(_frame(data))
     argument = command.argument
     if argument is None:
-        return command.name, {}
+        return {}
     if isinstance(argument, bytes):
-        return command.name, {"argument": argument.hex(" "), "text": printable(argument)}
+        return {"argument": argument.hex(" "), "text": printable(argument)}
     found: dict[str, Plain] = {"argument": argument}
     row = command.row
     if row is not None and row.unit:
@@ -39,28 +68,51 @@ def describe_command(frame: Frame) -> tuple[str, dict[str, Plain]]:
     if row is not None and row.two_bytes is not None:
         low, high = command.signed_bytes if row.two_bytes.is_signed else command.two_bytes
         found |= {row.two_bytes.low: low, row.two_bytes.high: high}
-    return command.name, found
+    return found
 
 
 def describe_packet(frame: Frame, profile: Profile, parameters: RobotParameters) -> tuple[str, dict[str, Plain]]:
     """Return a packet's name and fields; what cannot be read stands in `data` as hex."""
-    name = packet_name(frame.kind)
-    packet = read_packet(frame, profile)
-    if isinstance(packet, Identity):
-        return name, {"name": packet.name, "class": packet.robot_class, "subclass": packet.subclass}
-    if isinstance(packet, StandardSip):
-        return name, sip_fields(packet, profile, parameters)
-    if isinstance(packet, ConfigPacket):
-        return name, {field: plain(getattr(packet, field)) for field, _ in FIELDS[: packet.fields_sent]}
-    if isinstance(packet, RawPacket):
-        if frame.kind in SIP_KINDS or frame.kind in READERS:
-            return name, {"problem": "its inside does not follow its layout", "data": packet.data.hex(" ")}
-        return name, {"data": packet.data.hex(" ")} if packet.data else {}
-    return name, {
-        field.name: plain(getattr(packet, field.name))
-        for field in fields(packet)
-        if field.name not in {"kind", "rest"} or getattr(packet, field.name)
-    }
+    return packet_name(frame.kind), PacketFields(profile, parameters).fields_of(frame.to_bytes())
+
+
+class PacketFields:
+    """What stands in the packets of one robot.
+
+    Args:
+        profile: Its firmware family, for layouts.
+        parameters: Its units.
+    """
+
+    def __init__(self, profile: Profile, parameters: RobotParameters) -> None:
+        self._profile = profile
+        self._sips = SipFields(profile, parameters)
+
+    def fields_of(self, data: bytes) -> dict[str, Plain]:
+        """Return a packet's fields, out of its bytes on the wire; what cannot be read stands in `data` as hex."""
+        if data[PREFIX_BYTES] in SIP_KINDS:
+            found = self._sips.of(data[PREFIX_BYTES:-CHECKSUM_BYTES])
+            if found is not None:
+                return found
+        frame = _frame(data)
+        packet = read_packet(frame, self._profile)
+        if isinstance(packet, Identity):
+            return {"name": packet.name, "class": packet.robot_class, "subclass": packet.subclass}
+        if isinstance(packet, ConfigPacket):
+            return {field: plain(getattr(packet, field)) for field, _ in FIELDS[: packet.fields_sent]}
+        if isinstance(packet, RawPacket):
+            if frame.kind in SIP_KINDS or frame.kind in READERS:
+                return {"problem": "its inside does not follow its layout", "data": packet.data.hex(" ")}
+            return {"data": packet.data.hex(" ")} if packet.data else {}
+        return {
+            field.name: plain(getattr(packet, field.name))
+            for field in fields(packet)
+            if field.name not in {"kind", "rest"} or getattr(packet, field.name)
+        }
+
+
+def _frame(data: bytes) -> Frame:
+    return Frame(data[PREFIX_BYTES:-CHECKSUM_BYTES])
 
 
 def sip_fields(sip: StandardSip, profile: Profile, parameters: RobotParameters) -> dict[str, Plain]:
@@ -75,8 +127,8 @@ def sip_fields(sip: StandardSip, profile: Profile, parameters: RobotParameters) 
         "left_mps": _round(sensed.left_mps),
         "right_mps": _round(sensed.right_mps),
         "battery_v": sensed.battery_v,
-        "stall_left": sip.stall_left,
-        "stall_right": sip.stall_right,
+        "stall_left": bool(sip.stall_left),
+        "stall_right": bool(sip.stall_right),
         "front_bumpers": sip.front_bumpers,
         "rear_bumpers": sip.rear_bumpers,
         "control_rad": _round(sip.raw_control * parameters.angle_conv_rad),
@@ -94,6 +146,86 @@ def sip_fields(sip: StandardSip, profile: Profile, parameters: RobotParameters) 
     if sip.rest:
         found["rest"] = sip.rest.hex(" ")
     return found
+
+
+class SipFields:
+    """What `sip_fields` says, many times a second: each raw value that occurs is converted once.
+
+    Args:
+        profile: Layout of the last fields.
+        parameters: The robot's units.
+    """
+
+    def __init__(self, profile: Profile, parameters: RobotParameters) -> None:
+        self._profile, self._parameters = profile, parameters
+        #: Of each field, in their order; None stands for the sonar readings.
+        self.memos = {name: None if name == "sonar_m" else self.memo(name) for name in self._described(StandardSip())}
+        self.sonar: Memo[Plain] = Memo(self._range)
+        #: As a tail's fields are called here.
+        self.tail = tuple(name.removeprefix("raw_") for name, _, _ in TAIL)
+
+    def memo(self, name: str) -> "Memo[Plain]":
+        """Return what a field says of the raw value that alone decides it."""
+        raw = RAW_OF[name]
+
+        def convert(value: int) -> Plain:
+            one: dict[str, Any] = {raw: value}
+            return self._described(StandardSip(**one))[name]
+
+        return Memo(convert)
+
+    def of(self, payload: bytes) -> dict[str, Plain] | None:
+        """Return a SIP's fields, or None where it is no sound SIP inside."""
+        head = unpack_head(payload)
+        if head is None:
+            return None
+        x, y, heading, left_velocity, right_velocity, battery, left, right, control, flags, compass, count = head[:12]
+        behind = 12 + 2 * count
+        first, second, analog, digital_in, digital_out = head[behind:]
+        gripper, port = (first, second) if self._profile.has_gripper_first else (second, first)
+        numbers = map(str, head[12:behind:2])
+        ranges: Plain = dict(zip(numbers, map(self.sonar.__getitem__, head[13:behind:2]), strict=True))
+        raw = iter((
+            payload[0], x, y, heading, left_velocity, right_velocity, battery, left & 1, right & 1, right >> 1,
+            left >> 1, control, flags, compass, gripper, port, analog, digital_in, digital_out,
+        ))  # fmt: skip
+        found: dict[str, Plain] = {
+            name: ranges if memo is None else memo[next(raw)] for name, memo in self.memos.items()
+        }
+        size = HEAD_BYTES + READING_BYTES * count
+        if size < len(payload):
+            tail, place = unpack_tail(payload, size)
+            found.update(zip(self.tail, tail, strict=False))
+            if place < len(payload):
+                found["rest"] = payload[place:].hex(" ")
+        return found
+
+    def _described(self, sip: StandardSip) -> dict[str, Plain]:
+        return sip_fields(sip, self._profile, self._parameters)
+
+    def range_m(self, raw_range: int) -> float:
+        """Return a sonar reading in metres."""
+        return cast("float", self.sonar[raw_range])
+
+    def _range(self, raw_range: int) -> Plain:
+        sonar = self._described(StandardSip(sonar=(SonarReading(0, raw_range),)))["sonar_m"]
+        return cast("dict[str, Plain]", sonar)["0"]
+
+
+class Memo(dict[int, Value]):
+    """What a function says of each value that it was asked for.
+
+    Args:
+        convert: The function.
+    """
+
+    def __init__(self, convert: Callable[[int], Value]) -> None:
+        super().__init__()
+        self._convert = convert
+
+    def __missing__(self, key: int) -> Value:
+        value = self[key] = self._convert(key)
+        return value
 
 
 def plain(value: object) -> Plain:

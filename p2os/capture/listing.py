@@ -15,13 +15,13 @@ another frame.
 """
 
 import math
-from collections.abc import Iterable, Iterator
-from dataclasses import dataclass, field
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass
 from enum import Enum
 from typing import cast
 
-from p2os.capture.chunks import Capture, Chunk, Direction
-from p2os.capture.describe import Plain, describe_command, describe_packet
+from p2os.capture.chunks import Chunk, Direction
+from p2os.capture.describe import PacketFields, Plain, command_fields, command_name
 from p2os.protocol.commands import NEGATIVE, POSITIVE, STRING, CommandNumber
 from p2os.protocol.frames import (
     CHECKSUM_BYTES,
@@ -36,9 +36,9 @@ from p2os.protocol.frames import (
     Noise,
     Stalled,
 )
-from p2os.protocol.packets import IDENTITY_KIND, RESET_KINDS
+from p2os.protocol.packets import IDENTITY_KIND, RESET_KINDS, packet_name
 from p2os.protocol.profiles import Profile
-from p2os.protocol.sip import HEAD_BYTES, READING_BYTES, SIP_KINDS
+from p2os.protocol.sip import HEAD_BYTES, READING_BYTES, SIP_KINDS, unpack_head
 from p2os.robots.parameters import RobotParameters
 from simbase.timing import NS_PER_MS, NS_PER_S, Nanos
 
@@ -60,7 +60,6 @@ class Reading:
     parameters: RobotParameters
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
 class ListingRow:
     """One frame, or one run of bytes that is none.
 
@@ -70,22 +69,37 @@ class ListingRow:
         data: Its bytes on the wire.
         kind: Command number or packet type; None for what is no frame.
         name: Its name in the manuals, or what is wrong.
-        fields: What stands inside, SI units, in the order of the wire.
+        describe: What says what stands inside, when someone asks for `fields`.
         problem: One sentence about what is wrong; empty for a sound frame.
     """
 
-    at_ns: Nanos
-    direction: Direction | None
-    data: bytes
-    kind: int | None
-    name: str
-    fields: dict[str, Plain] = field(default_factory=dict)
-    problem: str = ""
+    __slots__ = ("_describe", "_fields", "at_ns", "data", "direction", "kind", "name", "problem")
+
+    def __init__(
+        self, *, at_ns: Nanos, direction: Direction | None, data: bytes, kind: int | None, name: str,
+        describe: Callable[[bytes], dict[str, Plain]], problem: str = "",
+    ) -> None:  # fmt: skip
+        self.at_ns, self.direction, self.data = at_ns, direction, data
+        self.kind, self.name, self.problem = kind, name, problem
+        self._describe = describe
+        self._fields: dict[str, Plain] | None = None
+
+    @property
+    def fields(self) -> dict[str, Plain]:
+        """What stands inside, SI units, in the order of the wire."""
+        if self._fields is None:
+            self._fields = self._describe(self.data)
+        return self._fields
 
     @property
     def valid(self) -> bool:
         """Whether this is a sound frame."""
         return not self.problem
+
+    @property
+    def is_sip(self) -> bool:
+        """Whether this is a standard SIP and sound inside, if the robot has sent it."""
+        return self.kind in SIP_KINDS and unpack_head(self.data[PREFIX_BYTES:-CHECKSUM_BYTES]) is not None
 
     def as_plain(self) -> dict[str, Plain]:
         """Return it as JSON wants it: `t` in seconds."""
@@ -107,7 +121,7 @@ class Lister:
     """
 
     def __init__(self, reading: Reading) -> None:
-        self._reading = reading
+        self._packets = PacketFields(reading.profile, reading.parameters)
         self._session = RecordedSession()
         self._streams: dict[Direction | None, _Stream] = {}
 
@@ -161,23 +175,26 @@ class Lister:
     def _frame_row(self, direction: Direction | None, frame: Frame, now: Nanos) -> ListingRow:
         if direction is None:
             direction = guess_direction(frame)
-        sync_name = self._session.name_of(frame, direction, now)
+        kind = frame.payload[0]
+        name = self._session.name_of(frame, direction, now)
         if direction is Direction.FROM_ROBOT:
-            name, fields = describe_packet(frame, self._reading.profile, self._reading.parameters)
-        else:
-            name, fields = describe_command(frame)
+            return ListingRow(
+                at_ns=now, direction=direction, data=frame.to_bytes(), kind=kind, name=name or packet_name(kind),
+                describe=self._packets.fields_of,
+            )  # fmt: skip
         return ListingRow(
-            at_ns=now, direction=direction, data=frame.to_bytes(), kind=frame.kind, name=sync_name or name,
-            fields=fields,
+            at_ns=now, direction=direction, data=frame.to_bytes(), kind=kind, name=name or command_name(kind),
+            describe=command_fields,
         )  # fmt: skip
 
 
-def rows_of(capture: Capture, reading: Reading) -> Iterator[ListingRow]:
-    """Yield every row of a capture."""
-    lister = Lister(reading)
-    for chunk in capture.chunks:
+def rows_of(chunks: Iterable[Chunk], reading: Reading) -> Iterator[ListingRow]:
+    """Yield every row of a capture, or of chunks while they are read."""
+    lister, last_ns = Lister(reading), 0
+    for chunk in chunks:
+        last_ns = chunk.at_ns
         yield from lister.take(chunk)
-    yield from lister.finish(capture.duration_ns)
+    yield from lister.finish(last_ns)
 
 
 def line_of(row: ListingRow, *, has_time: bool = True) -> str:
@@ -341,10 +358,12 @@ class _Stream:
 
 
 def _damage(stream: _Stream, now: Nanos, data: bytes, name: str, problem: str) -> ListingRow:
-    fields: dict[str, Plain] = {"bytes": data.hex(" "), "problem": problem}
+    def describe(data: bytes) -> dict[str, Plain]:
+        return {"bytes": data.hex(" "), "problem": problem}
+
     return ListingRow(
-        at_ns=now, direction=stream.direction, data=data, kind=None, name=name, fields=fields, problem=problem
-    )  # fmt: skip
+        at_ns=now, direction=stream.direction, data=data, kind=None, name=name, describe=describe, problem=problem
+    )
 
 
 def _cut_off(item: Stalled) -> str:

@@ -1,8 +1,9 @@
 -- P2OS for Wireshark and tshark: Pioneer robots and their clients.
 --
 -- Takes the captures of `p2os sniff --pcap` (link type USER0: one byte of
--- direction, then one frame) and TCP on port 8101, where simulated Pioneers
--- listen. Copy this file into Wireshark's folder of personal Lua plug-ins, or
+-- direction, then one frame) and TCP on any port: a conversation is taken for P2OS
+-- when a segment begins like a frame. Who speaks first is the client, unless
+-- it sends what only robots send. Copy this file into Wireshark's folder of personal Lua plug-ins, or
 -- let `p2os sniff --install-dissector` do it. MIT licence.
 
 local commands = {
@@ -67,8 +68,29 @@ local field = {
     battery = ProtoField.uint8("p2os.sip.battery", "Battery (0.1 V)"),
     stall_left = ProtoField.bool("p2os.sip.stall_left", "Left wheel stalled", 8, nil, 1),
     stall_right = ProtoField.bool("p2os.sip.stall_right", "Right wheel stalled", 8, nil, 1),
+    rear_bumpers = ProtoField.uint8("p2os.sip.rear_bumpers", "Rear bumpers", base.HEX, nil, 0xFE),
+    front_bumpers = ProtoField.uint8("p2os.sip.front_bumpers", "Front bumpers", base.HEX, nil, 0xFE),
+    control = ProtoField.int16("p2os.sip.control", "CONTROL (4096 a turn)"),
+    flags = ProtoField.uint16("p2os.sip.flags", "FLAGS, or servo 1 on P2OS", base.HEX),
+    compass = ProtoField.uint8("p2os.sip.compass", "Compass (2 deg)"),
+    analog_port = ProtoField.uint8("p2os.sip.analog_port", "Analog port (P2OS; gripper on AROS and ARCOS)"),
+    gripper = ProtoField.uint8("p2os.sip.gripper", "Gripper (P2OS; analog port on AROS and ARCOS)", base.HEX),
+    analog = ProtoField.uint8("p2os.sip.analog", "Analog input"),
+    digital_in = ProtoField.uint8("p2os.sip.digital_in", "Digital inputs", base.HEX),
+    digital_out = ProtoField.uint8("p2os.sip.digital_out", "Digital outputs", base.HEX),
     sonar = ProtoField.string("p2os.sip.sonar", "Sonar (number: counts)"),
 }
+-- The ARCOS tail, in the order of the wire: name, bytes, signed, what it is.
+local tail = {
+    { "battery_x10", 2, false, "Battery (0.1 V, 16 bits)" }, { "charge_state", 1, true, "Charge state" },
+    { "rotation_velocity", 2, true, "Rotation velocity (0.1 deg/s)" }, { "fault_flags", 2, false, "Fault flags" },
+    { "lateral_velocity", 2, true, "Lateral velocity (mm/s)" }, { "temperature", 1, true, "Temperature (deg C)" },
+    { "state_of_charge", 1, false, "State of charge (%)" }, { "controller_time_us", 4, false, "Controller time (us)" },
+    { "flags3", 4, false, "Flags 3" },
+}
+for _, row in ipairs(tail) do
+    field["tail_" .. row[1]] = ProtoField[(row[3] and "int" or "uint") .. 8 * row[2]]("p2os.sip." .. row[1], row[4])
+end
 p2os.fields = field
 local damaged = ProtoExpert.new("p2os.damaged", "Damaged frame", expert.group.CHECKSUM, expert.severity.ERROR)
 p2os.experts = { damaged }
@@ -97,6 +119,11 @@ local function add_sip(buffer, tree)
     tree:add(field.battery, buffer(11, 1))
     tree:add(field.stall_left, buffer(12, 1))
     tree:add(field.stall_right, buffer(13, 1))
+    tree:add(field.rear_bumpers, buffer(12, 1))
+    tree:add(field.front_bumpers, buffer(13, 1))
+    tree:add_le(field.control, buffer(14, 2))
+    tree:add_le(field.flags, buffer(16, 2))
+    tree:add(field.compass, buffer(18, 1))
     local readings = {}
     for number = 0, buffer(19, 1):uint() - 1 do
         local place = 20 + 3 * number
@@ -105,6 +132,18 @@ local function add_sip(buffer, tree)
     end
     if #readings > 0 then
         tree:add(field.sonar, buffer(20, 3 * #readings), table.concat(readings, ", "))
+    end
+    local place = 20 + 3 * buffer(19, 1):uint()
+    if place + 5 <= buffer:len() then
+        for number, name in ipairs({ "analog_port", "gripper", "analog", "digital_in", "digital_out" }) do
+            tree:add(field[name], buffer(place + number - 1, 1))
+        end
+        place = place + 5
+        for _, row in ipairs(tail) do
+            if place + row[2] > buffer:len() then break end
+            tree:add_le(field["tail_" .. row[1]], buffer(place, row[2]))
+            place = place + row[2]
+        end
     end
     return string.format(" x %d, y %d, heading %.1f deg, wheels %d %d mm/s", buffer(1, 2):le_uint() % 0x8000,
         buffer(3, 2):le_uint() % 0x8000, buffer(5, 2):le_int() * 360 / 4096, buffer(7, 2):le_int(), buffer(9, 2):le_int())
@@ -165,21 +204,39 @@ local function dissect_frame(buffer, tree, direction)
     return name .. detail
 end
 
-function p2os.dissector(buffer, pinfo, tree)
-    pinfo.cols.protocol = "P2OS"
-    local direction = buffer(0, 1):uint()
-    pinfo.cols.src = direction == 0 and "client" or "robot"
-    pinfo.cols.dst = direction == 0 and "robot" or "client"
-    pinfo.cols.info = dissect_frame(buffer(1):tvb(), tree, direction)
+-- Whether bytes begin like a frame; where all of it is there, with its checksum.
+local function is_frame(buffer)
+    local size = buffer:len()
+    if size < 6 or buffer(0, 2):uint() ~= 0xFAFB then return false end
+    local count = buffer(2, 1):uint()
+    if count < 3 or count > 204 then return false end
+    if count + 3 > size then return true end
+    return checksum(buffer, 3, count) == buffer(count + 1, 2):uint()
 end
 
--- Over TCP the frames are found again in the stream; a frame that is not whole yet waits for more.
-local stream = Proto("p2os_tcp", "Pioneer P2OS over TCP")
-local robot_port = 8101
+-- What only a robot sends: a SIP, or an identity with its name.
+local function is_robots(buffer)
+    local kind, size = buffer(3, 1):uint(), buffer(2, 1):uint() - 2
+    return (kind >= 0x30 and kind <= 0x34 and size >= 25)
+        or (kind == 2 and size > 3)
+end
 
-function stream.dissector(buffer, pinfo, tree)
+-- Number of a TCP conversation -> address and port of its client; the first frame decides.
+local clients = {}
+local stream_number = Field.new("tcp.stream")
+
+function p2os.init()
+    clients = {}
+end
+
+local function dissect_stream(buffer, pinfo, tree)
+    local number = stream_number().value
+    local source, target = pinfo.src_port .. tostring(pinfo.src), pinfo.dst_port .. tostring(pinfo.dst)
+    if clients[number] == nil and is_frame(buffer) then
+        clients[number] = is_robots(buffer) and target or source
+    end
     pinfo.cols.protocol = "P2OS"
-    local direction = pinfo.dst_port == robot_port and 0 or 1
+    local direction = (clients[number] or source) == source and 0 or 1
     local said, place, size = {}, 0, buffer:len()
     while place < size do
         local left = size - place
@@ -202,5 +259,23 @@ function stream.dissector(buffer, pinfo, tree)
     return size
 end
 
+function p2os.dissector(buffer, pinfo, tree)
+    if pinfo.src_port > 0 then return dissect_stream(buffer, pinfo, tree) end
+    pinfo.cols.protocol = "P2OS"
+    local direction = buffer(0, 1):uint()
+    pinfo.cols.src = direction == 0 and "client" or "robot"
+    pinfo.cols.dst = direction == 0 and "robot" or "client"
+    pinfo.cols.info = dissect_frame(buffer(1):tvb(), tree, direction)
+end
+
+-- Over TCP the frames are found again in the stream; a frame that is not whole yet waits for more.
 DissectorTable.get("wtap_encap"):add(wtap.USER0, p2os)
-DissectorTable.get("tcp.port"):add(robot_port, stream)
+-- The port of simulated Pioneers; on others Wireshark asks what registered the port first ("Decode As...", or
+-- the preference tcp.try_heuristic_first, where that takes the stream).
+DissectorTable.get("tcp.port"):add(8101, p2os)
+p2os:register_heuristic("tcp", function(buffer, pinfo, tree)
+    if not is_frame(buffer) then return false end
+    pinfo.conversation = p2os
+    dissect_stream(buffer, pinfo, tree)
+    return true
+end)

@@ -1,19 +1,25 @@
-"""A capture as columns of plain values, for CSV and Arrow.
+"""A capture as columns of plain values, for CSV and Arrow: a table after the other, so that any length is written.
 
 One row a packet. Nested fields become columns of their own (`sonar_m_3`), lists
 become JSON text. Positions are followed over the packets, so that they do not
 jump where the robot's 15-bit counters wrap.
+
+Which columns there are is known from the first `FIRST_ROWS` packets. A cell that comes later
+and has no column there, or is of another kind (a text among numbers), stands as JSON in one more, `more`.
+
+Invariant: all tables of a capture have the same columns in the same order, and no more than one is held.
 """
 
-import csv
 import json
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import IO, TypeAlias
+from itertools import chain, islice
+from typing import IO, Protocol, TypeAlias, cast, runtime_checkable
 
 from p2os.capture.chunks import Direction
 from p2os.capture.describe import Plain
-from p2os.capture.listing import ListingRow
+from p2os.capture.listing import ListingRow, Reading
+from p2os.capture.sip_columns import SipColumns
 from p2os.protocol.odometry import Unwrapper
 from p2os.protocol.sip import POSITION_MASK
 from p2os.robots.parameters import RobotParameters
@@ -22,15 +28,30 @@ from simbase.timing import NS_PER_S
 Cell: TypeAlias = "bool | int | float | str | None"
 #: Columns that every table begins with.
 LEADING = ("t_s", "dir", "type", "name", "valid")
+#: Cells whose column the beginning did not have.
+MORE = "more"
+#: chosen: seven minutes of SIPs; a table of them takes some MB.
+FIRST_ROWS = 4096
 #: Where XPOS and YPOS stand in a SIP's frame, header included.
 _X_AT, _Y_AT = 4, 6
+#: chosen: as many texts of one column are kept.
+_KEPT_TEXTS = 1 << 16
+
+
+@runtime_checkable
+class TextColumn(Protocol):
+    """A column that has its texts ready."""
+
+    def texts(self) -> Sequence[str]:
+        """Return each cell as it stands in CSV."""
+        ...
 
 
 @dataclass(frozen=True, slots=True)
 class Table:
     """Columns of equal length, by name; None where a packet has no such field."""
 
-    columns: Mapping[str, list[Cell]]
+    columns: Mapping[str, Sequence[Cell]]
 
     @property
     def rows(self) -> int:
@@ -38,46 +59,167 @@ class Table:
         return len(self.columns["t_s"])
 
 
-def table_of(rows: Iterable[ListingRow], parameters: RobotParameters) -> Table:
-    """Return rows as a table.
+def tables_of(rows: Iterable[ListingRow], reading: Reading, first_rows: int = FIRST_ROWS) -> Iterator[Table]:
+    """Yield rows as tables, each of `first_rows` rows, the last of fewer.
 
     Args:
-        rows: What is to stand in it, in order of time.
-        parameters: The robot's units, for positions over several packets.
+        rows: What is to stand in them, in order of time.
+        reading: How to read them, and the robot's units, for positions over several packets.
+        first_rows: How many rows decide which columns there are.
     """
-    places = (_Place(parameters, _X_AT), _Place(parameters, _Y_AT))
-    columns: dict[str, list[Cell]] = {name: [] for name in LEADING}
-    for count, row in enumerate(rows):
-        cells = dict(_flat(row.fields))
-        if "x_m" in cells:
-            cells["x_m"], cells["y_m"] = (place.follow(row) for place in places)
-        who = None if row.direction is None else row.direction.value
-        leading = (row.at_ns / NS_PER_S, who, row.kind, row.name, row.valid)
-        for name, cell in {**dict(zip(LEADING, leading, strict=True)), **cells}.items():
-            if name not in columns:
-                columns[name] = [None] * count
-            columns[name].append(cell)
-        for column in columns.values():
-            if len(column) == count:
-                column.append(None)
-    return Table(columns)
+    tables = _Tables(reading)
+    every = iter(rows)
+    yield from uniform(tables.table(block) for block in iter(lambda: list(islice(every, first_rows)), []))
 
 
-def write_csv(table: Table, file: IO[str]) -> None:
-    """Write a table as CSV with a line of names; empty cells are None."""
-    writer = csv.writer(file, lineterminator="\n")
-    writer.writerow(table.columns)
-    writer.writerows(zip(*table.columns.values(), strict=True))
+def table_of(rows: Iterable[ListingRow], reading: Reading) -> Table:
+    """Return rows as one table, as `tables_of` with room for all."""
+    return _Tables(reading).table(list(rows))
 
 
-def _flat(fields: Mapping[str, Plain], before: str = "") -> Iterator[tuple[str, Cell]]:
+def uniform(tables: Iterable[Table]) -> Iterator[Table]:
+    """Yield tables with the columns of the first; what other columns hold goes to `MORE` if a second one comes."""
+    every = iter(tables)
+    head = next(every, None)
+    if head is None:
+        return
+    second = next(every, None)
+    if second is None:
+        yield head
+        return
+    kinds = {name: _kinds(column) for name, column in head.columns.items()}
+    for table in chain((head, second), every):
+        columns: dict[str, Sequence[Cell]] = {}
+        more: dict[int, dict[str, Cell]] = {}
+        for name, column in table.columns.items():
+            known = kinds.get(name, set())
+            if known and (isinstance(column, TextColumn) or len(known) > 1 or _kinds(column) <= known):
+                columns[name] = column
+            else:
+                kept = list(column)
+                for row, cell in enumerate(kept):
+                    if cell is not None and type(cell) not in known:
+                        more.setdefault(row, {})[name] = cell
+                        kept[row] = None
+                columns[name] = kept
+        none: list[Cell] = [None] * table.rows
+        texts = none
+        if more:
+            texts = [json.dumps(more[row], sort_keys=True) if row in more else None for row in range(table.rows)]
+        yield Table({**{name: columns.get(name, none) for name in kinds}, MORE: texts})
+
+
+def write_csv(tables: Iterable[Table], file: IO[str]) -> int:
+    """Write tables as CSV with one line of names, each as it comes; empty cells are None.
+
+    Returns:
+        How many rows were written.
+    """
+    texts: dict[str, _Texts] = {}
+    count = 0
+    for table in tables:
+        if not texts:
+            texts = {name: _Texts() for name in table.columns}
+            file.write(",".join(map(_quoted, texts)) + "\n")
+        columns = [
+            column.texts() if isinstance(column, TextColumn) else texts[name].of(column)
+            for name, column in table.columns.items()
+        ]
+        file.write("\n".join(map(",".join, zip(*columns, strict=True))) + "\n")
+        file.flush()
+        count += table.rows
+    return count
+
+
+def from_robot(rows: Iterable[ListingRow]) -> Iterator[ListingRow]:
+    """Yield the rows of a robot's standard SIPs."""
+    for row in rows:
+        if row.direction is not Direction.TO_ROBOT and row.is_sip:
+            yield row
+
+
+class _Texts:
+    """The texts of one column's cells."""
+
+    def __init__(self) -> None:
+        self._known: dict[Cell, str] = {}
+        self._kind: type = type(None)
+
+    def of(self, column: Sequence[Cell]) -> Sequence[str]:
+        """Return each cell as it stands in CSV."""
+        kinds = _kinds(column)
+        if len(kinds) > 1:  # True and 1 are one key
+            return [cell_text(cell) for cell in column]
+        (kind,) = kinds or {type(None)}
+        if kind not in {self._kind, type(None)} or len(self._known) > _KEPT_TEXTS:
+            self._known.clear()
+            self._kind = kind
+        known = self._known
+        for cell in set(column) - known.keys():
+            known[cell] = cell_text(cell)
+        return list(map(known.__getitem__, column))
+
+
+def cell_text(cell: Cell) -> str:
+    """Return a cell as it stands in CSV."""
+    return "" if cell is None else _quoted(cell) if isinstance(cell, str) else str(cell)
+
+
+def _quoted(text: str) -> str:
+    if any(character in text for character in ',"\r\n'):
+        return '"' + text.replace('"', '""') + '"'
+    return text
+
+
+def _kinds(column: Sequence[Cell]) -> set[type]:
+    return set(map(type, column)) - {type(None)}
+
+
+class _Tables:
+    """Makes tables of rows, one behind the other."""
+
+    def __init__(self, reading: Reading) -> None:
+        self._sips = SipColumns(reading.profile, reading.parameters)
+        self._x, self._y = (_Place(reading.parameters, place) for place in (_X_AT, _Y_AT))
+
+    def table(self, rows: list[ListingRow]) -> Table:
+        """Return the next rows as a table."""
+        leading = (
+            [row.at_ns / NS_PER_S for row in rows],
+            [None if row.direction is None else row.direction.value for row in rows],
+            [row.kind for row in rows],
+            [row.name for row in rows],
+            [row.valid for row in rows],
+        )
+        columns: dict[str, Sequence[Cell]] = dict(zip(LEADING, leading, strict=True))
+        columns |= cast("dict[str, list[Cell]]", self._sips.of(rows)) or _described(rows)
+        if "x_m" in columns:
+            columns["x_m"], columns["y_m"] = (
+                [cell if cell is None else place.follow(row.data) for row, cell in zip(rows, column, strict=True)]
+                for place, column in ((self._x, columns["x_m"]), (self._y, columns["y_m"]))
+            )
+        return Table(columns)
+
+
+def _described(rows: list[ListingRow]) -> dict[str, list[Cell]]:
+    found: list[dict[str, Cell]] = []
+    names: dict[str, None] = {}
+    for row in rows:
+        cells: dict[str, Cell] = {}
+        _flatten(row.fields, cells)
+        names.update(dict.fromkeys(cells))
+        found.append(cells)
+    return {name: [cells.get(name) for cells in found] for name in names}
+
+
+def _flatten(fields: Mapping[str, Plain], cells: dict[str, Cell], before: str = "") -> None:
     for name, value in fields.items():
         if isinstance(value, dict):
-            yield from _flat(value, f"{before}{name}_")
+            _flatten(value, cells, f"{before}{name}_")
         elif isinstance(value, list):
-            yield f"{before}{name}", json.dumps(value)
+            cells[before + name] = json.dumps(value)
         else:
-            yield f"{before}{name}", value
+            cells[before + name] = value
 
 
 class _Place:
@@ -89,17 +231,10 @@ class _Place:
         self._counter = Unwrapper(POSITION_MASK + 1)
         self._first: int | None = None
 
-    def follow(self, row: ListingRow) -> float:
+    def follow(self, frame: bytes) -> float:
         """Return the coordinate in metres; the first one lies within half a span of 0."""
-        raw = int.from_bytes(row.data[self._offset : self._offset + 2], "little") & POSITION_MASK
+        raw = int.from_bytes(frame[self._offset : self._offset + 2], "little") & POSITION_MASK
         if self._first is None:
             self._first = raw if raw <= POSITION_MASK // 2 else raw - POSITION_MASK - 1
         self._counter.update(raw)
         return round((self._first + self._counter.total) * self._metres, 6)
-
-
-def from_robot(rows: Iterable[ListingRow]) -> Iterator[ListingRow]:
-    """Yield the rows of a robot's standard SIPs."""
-    for row in rows:
-        if row.direction is not Direction.TO_ROBOT and "x_m" in row.fields:
-            yield row

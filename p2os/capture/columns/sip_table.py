@@ -1,77 +1,173 @@
-"""A recorded conversation's SIPs as a table in SI units, by columns: the fast way of `p2os.capture.table.table_of`.
+"""A recorded conversation's SIPs as tables in SI units, by columns: the fast way of `p2os.capture.table.tables_of`.
 
-Invariant: cell by cell what `table_of(from_robot(rows_of(capture, reading)), reading.parameters)` returns. The
-conversions are those of `p2os.capture.describe`, asked once for each raw value that occurs.
+Theory of operation. A robot's bytes are decoded a block at a time. A block is cut where the decoder of
+`p2os.protocol.frames` holds nothing: at a place that no frame spans and that lies so far before the end of what has
+come that everything that begins before it is decided. What follows the cut is looked at again with the next block.
+
+Invariants: cell by cell what `tables_of(from_robot(rows_of(chunks, reading)), reading)` yields; the
+conversions are those of `p2os.capture.describe`, asked once for each raw value that occurs. No more than a block of
+bytes and its table is held.
 """
 
-from collections.abc import Callable, Sequence
-from typing import Any, cast
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from typing import Any, cast, overload
 
 import numpy as np
 import numpy.typing as npt
 
-from p2os.capture.chunks import Capture, Chunk, Direction
-from p2os.capture.columns.framing import Indexes, stalls_of
+from p2os.capture.chunks import Chunk, Direction
+from p2os.capture.columns.framing import LARGEST_FRAME, Indexes, stalls_of
 from p2os.capture.columns.table import Table as RawTable
 from p2os.capture.columns.tables import Columns, decode
-from p2os.capture.describe import Plain, sip_fields
+from p2os.capture.describe import RAW_OF, SipFields, sip_fields
 from p2os.capture.listing import Reading
-from p2os.capture.table import LEADING, Cell, Table
-from p2os.protocol.frames import GIVE_UP_NS
+from p2os.capture.table import FIRST_ROWS, LEADING, Cell, Table, cell_text, uniform
+from p2os.protocol.frames import CHECKSUM_BYTES, GIVE_UP_NS, PREFIX_BYTES
 from p2os.protocol.packets import packet_name
-from p2os.protocol.sip import MOVING, POSITION_MASK, TAIL, SonarReading, StandardSip
-from simbase.timing import NS_PER_S
+from p2os.protocol.sip import POSITION_MASK, TAIL, StandardSip
+from simbase.timing import NS_PER_S, Nanos
 
-#: A field in SI units → the raw field that alone decides it.
-RAW_OF = {
-    "heading_rad": "raw_heading", "left_mps": "raw_left_velocity", "right_mps": "raw_right_velocity",
-    "battery_v": "raw_battery", "stall_left": "stall_left", "stall_right": "stall_right",
-    "front_bumpers": "front_bumpers", "rear_bumpers": "rear_bumpers", "control_rad": "raw_control",
-    "flags": "raw_flags", "servo_pulse": "raw_flags", "compass_deg": "raw_compass",
-    "gripper_state": "gripper_state", "analog_port": "analog_port", "analog": "raw_analog",
-    "digital_in": "digital_in", "digital_out": "digital_out",
-}  # fmt: skip
+#: chosen: some twenty thousand SIPs; larger ones are no faster.
+BLOCK_BYTES = 1 << 20
 
 
-def sip_table(capture: Capture, reading: Reading) -> Table | None:
-    """Return a capture's SIPs as a table in SI units.
+def sip_tables(
+    chunks: Iterable[Chunk], reading: Reading, *, first_rows: int = FIRST_ROWS, block: int = BLOCK_BYTES
+) -> Iterator[Table]:
+    """Yield a robot's SIPs as tables in SI units.
 
-    Returns:
-        None where the robot's bytes are not one stream: some with a direction and some without.
+    Args:
+        chunks: In order of time; all of the robot's have the same direction, or none has one.
+        reading: How to read them.
+        first_rows: How many rows decide which columns there are, and are in the first table.
+        block: How many of the robot's bytes are decoded together; any number gives the same cells.
     """
-    streams = {chunk.direction for chunk in capture.chunks if chunk.direction is not Direction.TO_ROBOT}
-    if len(streams) != 1:
-        return None
-    (direction,) = streams
-    chunks = [chunk for chunk in capture.chunks if chunk.direction is direction and chunk.data]
-    data = np.frombuffer(b"".join(chunk.data for chunk in chunks), np.uint8)
-    columns = decode(data, reading.profile, pauses=_pauses(chunks))
-    raw = columns.tables.get("sip")
-    if raw is None:
-        return Table({name: [] for name in LEADING})
-    return _Builder(raw, _times(capture.chunks, chunks, columns)[raw.packets], reading).table()
+    builder = _Builder(reading)
+    return uniform(_first_alone((builder.table(*part) for part in _blocks(chunks, reading, block)), first_rows))
 
 
-def _pauses(chunks: Sequence[Chunk]) -> Indexes:
-    """Return the places before which the line was quiet for so long that the decoder gives up."""
-    times, places = _arrivals(chunks)
-    return places[1:-1][np.diff(times) >= GIVE_UP_NS]
+def _first_alone(tables: Iterator[Table], first_rows: int) -> Iterator[Table]:
+    """Yield the same rows with exactly so many in the first table, if there are."""
+    head: Table | None = None
+    for table in tables:
+        head = table if head is None else _joined(head, table)
+        if head.rows >= first_rows:
+            yield _cut(head, 0, first_rows)
+            if head.rows > first_rows:
+                yield _cut(head, first_rows, head.rows)
+            yield from tables
+            return
+    if head is not None:
+        yield head
 
 
-def _arrivals(chunks: Sequence[Chunk]) -> tuple[Indexes, Indexes]:
-    """Return when each chunk came and where it begins, and one past the last byte."""
-    times = np.array([chunk.at_ns for chunk in chunks], np.int64)
-    return times, np.concatenate(([0], np.cumsum([len(chunk.data) for chunk in chunks])))
+def _joined(first: Table, second: Table) -> Table:
+    none = [[None] * table.rows for table in (first, second)]
+    parts = {
+        name: (first.columns.get(name, none[0]), second.columns.get(name, none[1]))
+        for name in {**first.columns, **second.columns}
+    }
+    return Table({name: Column.joined(*pair) for name, pair in parts.items()})
 
 
-def _times(every: Sequence[Chunk], chunks: Sequence[Chunk], columns: Columns) -> Indexes:
+def _cut(table: Table, start: int, end: int) -> Table:
+    columns = {name: column[start:end] for name, column in table.columns.items()}
+    has = {
+        name: name in LEADING or not isinstance(column, Column) or column.has_any() for name, column in columns.items()
+    }
+    return Table({name: column for name, column in columns.items() if has[name]})
+
+
+class _Blocks:
+    """What has come of the robot's bytes and is not decoded yet."""
+
+    def __init__(self, reading: Reading) -> None:
+        self._reading = reading
+        self._chunks: list[Chunk] = []
+        #: When anything came, of either side: the decoder notices then that a frame is given up.
+        self._ticks: list[Nanos] = []
+        self.size = 0
+
+    def take(self, chunk: Chunk) -> None:
+        """Take a chunk of either side."""
+        if chunk.direction is not Direction.TO_ROBOT and chunk.data:
+            self._chunks.append(chunk)
+            self.size += len(chunk.data)
+        elif not self._chunks or self._ticks[-1] >= self._chunks[-1].at_ns + GIVE_UP_NS:
+            return  # nothing waits, or it was given up already
+        self._ticks.append(chunk.at_ns)
+
+    def decoded(self, *, is_last: bool) -> tuple[RawTable, int, Indexes] | None:
+        """Return the SIPs of what is decided, how many of them, and when each was known; None where there is none."""
+        if not self._chunks:
+            return None
+        data = np.frombuffer(b"".join(chunk.data for chunk in self._chunks), np.uint8)
+        times = np.array([chunk.at_ns for chunk in self._chunks], np.int64)
+        places = np.concatenate(([0], np.cumsum([len(chunk.data) for chunk in self._chunks])))
+        columns = decode(data, self._reading.profile, pauses=places[1:-1][np.diff(times) >= GIVE_UP_NS])
+        stalls = stalls_of(columns.data, columns.starts, columns.ends, columns.pauses)
+        known = _known(times, places, np.array(self._ticks, np.int64), columns, stalls)
+        cut = len(data) if is_last else _cut_place(columns, stalls)
+        self._drop(cut)
+        raw = columns.tables.get("sip")
+        if raw is None:
+            return None
+        count = int(np.searchsorted(columns.starts[raw.packets], cut))
+        return (raw, count, known[raw.packets]) if count else None
+
+    def _drop(self, place: int) -> None:
+        number = 0
+        while number < len(self._chunks) and place >= len(self._chunks[number].data):
+            place -= len(self._chunks[number].data)
+            number += 1
+        del self._chunks[:number]
+        if place:
+            first = self._chunks[0]
+            self._chunks[0] = Chunk(at_ns=first.at_ns, direction=first.direction, data=first.data[place:])
+        since = self._chunks[0].at_ns if self._chunks else self._ticks[-1] + 1
+        self._ticks = [tick for tick in self._ticks if tick >= since]
+        self.size = sum(len(chunk.data) for chunk in self._chunks)
+
+
+def _blocks(chunks: Iterable[Chunk], reading: Reading, block: int) -> Iterator[tuple[RawTable, int, Indexes]]:
+    blocks, least = _Blocks(reading), 0
+    for chunk in chunks:
+        blocks.take(chunk)
+        if blocks.size >= max(block, least):
+            found = blocks.decoded(is_last=False)
+            # What is not decided yet must not be looked at again with each chunk.
+            least = 2 * blocks.size
+            if found is not None:
+                yield found
+    found = blocks.decoded(is_last=True)
+    if found is not None:
+        yield found
+
+
+def _cut_place(columns: Columns, stalls: tuple[Indexes, Indexes]) -> int:
+    """Return a place where the decoder holds nothing, whatever comes."""
+    place = len(columns.data) - LARGEST_FRAME
+    if place <= 0:
+        return 0
+    before = int(np.searchsorted(columns.starts, place + PREFIX_BYTES)) - 1
+    if before >= 0:
+        place = max(place, int(columns.ends[before]) + CHECKSUM_BYTES)
+    # Frames behind a stall are known only when it is given up: they stay together.
+    starts, limits = stalls
+    hidden = (starts < place) & (place < limits)
+    if hidden.any():
+        place = int(starts[limits == limits[hidden][0]].min())
+    return place
+
+
+def _known(
+    times: Indexes, places: Indexes, ticks: Indexes, columns: Columns, found: tuple[Indexes, Indexes]
+) -> Indexes:
     """Return when each packet was known: at its last byte, or when what had hidden it was given up."""
-    times, places = _arrivals(chunks)
     # The checksum's second byte is the last.
     last = columns.ends + 1
-    known = times[np.searchsorted(places, last, side="right") - 1]
-    stalls, limits = stalls_of(columns.data, columns.starts, columns.ends, columns.pauses)
-    ticks = np.array([chunk.at_ns for chunk in every], np.int64)
+    known: Indexes = times[np.searchsorted(places, last, side="right") - 1]
+    stalls, limits = found
     # From a segment's first stall on, all that follows in it was known only when the decoder gave up.
     for limit in np.unique(limits).tolist():
         hidden = (last >= stalls[limits == limit].min()) & (last < limit)
@@ -81,94 +177,195 @@ def _times(every: Sequence[Chunk], chunks: Sequence[Chunk], columns: Columns) ->
     return known
 
 
+class _Conversion:
+    """What a field says of each raw value of 16 bits or fewer, as arrays that are indexed by its bits.
+
+    Args:
+        convert: The field.
+        kind: Of its cells.
+    """
+
+    def __init__(self, convert: Callable[[int], Cell], kind: type) -> None:
+        self._convert, self._kind = convert, kind
+        self._known = np.zeros(0, np.bool_)
+        self.values: npt.NDArray[Any] = np.zeros(0)
+        self.texts: npt.NDArray[Any] = np.zeros(0)
+
+    def codes(self, raw: npt.NDArray[Any]) -> npt.NDArray[np.uint16]:
+        """Return the places of raw values in `values` and `texts`."""
+        size = raw.dtype.itemsize
+        codes: npt.NDArray[np.uint16] = raw.astype(f"u{size}").astype(np.uint16)
+        if not len(self._known):
+            self._known = np.zeros(1 << 8 * size, np.bool_)
+            self.values = np.zeros(len(self._known), object if self._kind is str else self._kind)
+            self.texts = np.full(len(self._known), "", object)
+        seen = np.zeros(len(self._known), np.bool_)
+        seen[codes] = True
+        for code in np.flatnonzero(seen & ~self._known).tolist():
+            cell = self._convert(code - (raw.dtype.kind == "i" and code >> (8 * size - 1) and 1 << 8 * size))
+            self._known[code], self.values[code], self.texts[code] = True, cell, cell_text(cell)
+        return codes
+
+    def column(self, raw: npt.NDArray[Any], present: npt.NDArray[np.bool_] | None = None) -> "Column":
+        """Return a raw column converted."""
+        return Column(self.codes(raw), present, self)
+
+
+class Column(Sequence[Cell]):
+    """A column of one kind of cell, as an array; a cell that is absent is None.
+
+    Args:
+        codes: The cells themselves, or their places in what a conversion knows.
+        present: Which cells there are; None for all.
+        conversion: What the places are of.
+    """
+
+    def __init__(
+        self, codes: npt.NDArray[Any], present: npt.NDArray[np.bool_] | None = None,
+        conversion: _Conversion | None = None,
+    ) -> None:  # fmt: skip
+        self.codes, self.present, self.conversion = codes, present, conversion
+
+    @classmethod
+    def joined(cls, first: Sequence[Cell], second: Sequence[Cell]) -> "Column":
+        """Return two of one kind one behind the other; what is no `Column` has only None."""
+        one = next(column for column in (first, second) if isinstance(column, cls))
+        parts = [
+            column if isinstance(column, cls)
+            else cls(np.zeros(len(column), one.codes.dtype), np.zeros(len(column), np.bool_))
+            for column in (first, second)
+        ]  # fmt: skip
+        present = [np.ones(len(part), np.bool_) if part.present is None else part.present for part in parts]
+        return cls(np.concatenate([part.codes for part in parts]), np.concatenate(present), one.conversion)
+
+    @property
+    def values(self) -> npt.NDArray[Any]:
+        """The cells; anything where one is absent."""
+        return self.codes if self.conversion is None else self.conversion.values[self.codes]
+
+    def has_any(self) -> bool:
+        """Tell whether there is a cell."""
+        return self.present is None or bool(self.present.any())
+
+    def texts(self) -> Sequence[str]:
+        """Return each cell as it stands in CSV."""
+        if self.conversion is None:
+            return [cell_text(cell) for cell in self]
+        texts = self.conversion.texts[self.codes]
+        if self.present is not None:
+            texts[~self.present] = ""
+        return cast("list[str]", texts.tolist())
+
+    def tolist(self) -> list[Cell]:
+        """Return the cells."""
+        cells: list[Cell] = self.values.tolist()
+        if self.present is not None:
+            cells = [cell if there else None for cell, there in zip(cells, self.present.tolist(), strict=True)]
+        return cells
+
+    def __len__(self) -> int:
+        return len(self.codes)
+
+    def __iter__(self) -> Iterator[Cell]:
+        return iter(self.tolist())
+
+    @overload
+    def __getitem__(self, place: int) -> Cell: ...
+    @overload
+    def __getitem__(self, place: slice) -> "Column": ...
+    def __getitem__(self, place: int | slice) -> "Cell | Column":
+        if isinstance(place, slice):
+            return Column(self.codes[place], None if self.present is None else self.present[place], self.conversion)
+        return self.tolist()[place]
+
+
 class _Builder:
-    """Turns one table of raw SIPs into columns of plain values."""
+    """Turns raw SIPs into columns, block by block."""
 
-    def __init__(self, raw: RawTable, times: Indexes, reading: Reading) -> None:
-        self._raw, self._times, self._reading = raw, times, reading
-        #: (first row that has it, place in that row) → name and cells.
-        self._found: dict[tuple[float, float], tuple[str, list[Cell]]] = {}
+    def __init__(self, reading: Reading) -> None:
+        self._metres = reading.parameters.distance_conv_mm / 1000
+        fields = SipFields(reading.profile, reading.parameters)
+        one = sip_fields(StandardSip(), reading.profile, reading.parameters)
+        self._names = list(one)
+        self._fields = {
+            name: _Conversion(cast("Callable[[int], Cell]", fields.memo(name).__getitem__), type(one[name]))
+            for name in one if name not in {"sonar_m", "x_m", "y_m"}
+        }  # fmt: skip
+        self._names_of = {name: _Conversion(convert, kind) for name, convert, kind in (
+            ("dir", lambda _: Direction.FROM_ROBOT.value, str), ("type", int, int), ("name", packet_name, str),
+            ("valid", lambda _: True, bool),
+        )}  # fmt: skip
+        self._range = _Conversion(fields.range_m, float)
+        self._tail = {name: _Conversion(int, int) for name, _, _ in TAIL}
+        #: Counts and raw value of the last SIP, by coordinate.
+        self._last: dict[str, tuple[int, int]] = {}
 
-    def table(self) -> Table:
-        """Return the table, its columns in the order in which the rows first have them."""
-        kinds, rows = self._raw["kind"], len(self._raw)
-        leading: tuple[list[Cell], ...] = (
-            [at_ns / NS_PER_S for at_ns in self._times.tolist()],
-            [Direction.FROM_ROBOT.value] * rows,
-            kinds.tolist(),
-            [packet_name(kind) for kind in kinds.tolist()],
-            [True] * rows,
-        )
-        fields = self._fields(StandardSip())
-        for place, name in enumerate(fields):
+    def table(self, raw: RawTable, rows: int, times: Indexes) -> Table:
+        """Return the first rows of a block, columns in the order in which the rows first have them."""
+        kinds = raw["kind"][:rows]
+        leading = [conversion.column(kinds) for conversion in self._names_of.values()]
+        found: dict[tuple[float, float], tuple[str, Column]] = {}
+        for place, name in enumerate(self._names):
             if name == "sonar_m":
-                self._sonar(place)
+                found |= self._sonar(raw, rows, place)
             elif name in {"x_m", "y_m"}:
-                self._add(place, name, self._followed(f"raw_{name[0]}"))
-            elif name == "moving":
-                self._add(place, name, (kinds == MOVING).tolist())
+                found[0, place] = name, self._followed(f"raw_{name[0]}", raw, rows)
             else:
-                self._add(place, name, self._converted(self._raw[RAW_OF[name]], self._by_field(name)))
-        for number, (name, _, _) in enumerate(TAIL):
-            has = np.flatnonzero(self._raw["tail_count"] > number)
-            self._add_some(len(fields) + number, name.removeprefix("raw_"), has, self._raw[name][has].tolist())
-        rests = self._raw.bytes_of("rest")
-        has = np.flatnonzero([bool(rest) for rest in rests])
-        self._add_some(len(fields) + len(TAIL), "rest", has, [rests[row].hex(" ") for row in has.tolist()])
-        columns = dict(zip(LEADING, leading, strict=True))
-        return Table({**columns, **dict(self._found[order] for order in sorted(self._found))})
+                found[0, place] = name, self._fields[name].column(raw[RAW_OF[name]][:rows])
+        counts = raw["tail_count"][:rows]
+        for number, (name, width, _) in enumerate(TAIL[: int(counts.max(initial=0))]):
+            has = counts > number
+            column, present = raw[name][:rows], None if has.all() else has
+            cells = self._tail[name].column(column, present) if width < 4 else Column(column.astype(np.int64), present)
+            found[float(np.argmax(has)), len(self._names) + number] = name.removeprefix("raw_"), cells
+        rest = raw.texts["rest"]
+        has = (rest.ends > rest.starts)[:rows]
+        if has.any():
+            texts = np.array([data.hex(" ") for data in raw.bytes_of("rest")[:rows]], object)
+            found[float(np.argmax(has)), len(self._names) + len(TAIL)] = "rest", Column(texts, has)
+        columns: dict[str, Sequence[Cell]] = dict(
+            zip(LEADING, (Column(times[:rows] / NS_PER_S), *leading), strict=True)
+        )
+        return Table({**columns, **dict(found[order] for order in sorted(found))})
 
-    def _fields(self, sip: StandardSip) -> dict[str, Plain]:
-        return sip_fields(sip, self._reading.profile, self._reading.parameters)
+    def _followed(self, name: str, raw: RawTable, rows: int) -> Column:
+        """Return a coordinate followed over the wraps of its counter, metres; the first within half a span of 0."""
+        values = raw[name][:rows].astype(np.int64) & POSITION_MASK
+        half, modulus = (POSITION_MASK + 1) // 2, POSITION_MASK + 1
+        first = int(values[0])
+        count, before = self._last.get(name, (first if first <= POSITION_MASK // 2 else first - modulus, first))
+        totals = count + np.cumsum((np.diff(values, prepend=before) + half) % modulus - half)
+        self._last[name] = int(totals[-1]), int(values[-1])
+        return Column(_rounded(totals * self._metres))
 
-    def _by_field(self, name: str) -> Callable[[Any], Cell]:
-        raw = RAW_OF[name]
-
-        def convert(value: Any) -> Cell:
-            return cast("Cell", self._fields(StandardSip(**{raw: value}))[name])
-
-        return convert
-
-    def _converted(self, raw: npt.NDArray[Any], convert: Callable[[Any], Cell]) -> list[Cell]:
-        """Return a raw column in units: each value that occurs is converted once."""
-        values, places = np.unique(raw, return_inverse=True)
-        cells = np.array([convert(value) for value in values.tolist()], object)
-        found: list[Cell] = cells[places].tolist()
+    def _sonar(self, raw: RawTable, rows: int, place: int) -> dict[tuple[float, float], tuple[str, Column]]:
+        ragged = raw.ragged["sonar"]
+        items = int(ragged.offsets[rows])
+        if not items:
+            return {}
+        numbers, row_of = ragged.columns["number"][:items], ragged.rows[:items]
+        codes = self._range.codes(ragged.columns["raw_range"][:items])
+        order, found, end = np.argsort(numbers, kind="stable"), {}, 0
+        for number, count in enumerate(np.bincount(numbers).tolist()):
+            if count:
+                those = order[end : end + count]
+                end += count
+                mine = row_of[those]
+                present, cells = np.zeros(rows, np.bool_), np.zeros(rows, np.uint16)
+                # Of two readings of one row the later counts.
+                present[mine], cells[mine] = True, codes[those]
+                behind = int(those[0] - ragged.offsets[mine[0]])
+                column = Column(cells, present, self._range)
+                found[float(mine[0]), place + behind / 256] = f"sonar_m_{number}", column
         return found
 
-    def _followed(self, name: str) -> list[Cell]:
-        """Return a coordinate followed over the wraps of its counter, metres; the first within half a span of 0."""
-        raw = self._raw[name].astype(np.int64) & POSITION_MASK
-        half, modulus = (POSITION_MASK + 1) // 2, POSITION_MASK + 1
-        first = raw[0] if raw[0] <= POSITION_MASK // 2 else raw[0] - modulus
-        totals = np.concatenate(([first], first + np.cumsum((np.diff(raw) + half) % modulus - half)))
-        metres = self._reading.parameters.distance_conv_mm / 1000
-        counts: list[int] = totals.tolist()
-        return [round(count * metres, 6) for count in counts]
 
-    def _sonar(self, place: int) -> None:
-        ragged = self._raw.ragged["sonar"]
-        numbers, rows = ragged.columns["number"], ragged.rows
-
-        def convert(value: Any) -> Cell:
-            found = cast("dict[str, Cell]", self._fields(StandardSip(sonar=(SonarReading(0, value),)))["sonar_m"])
-            return found["0"]
-
-        cells = np.array(self._converted(ragged.columns["raw_range"], convert), object)
-        for number in np.unique(numbers).tolist():
-            items = np.flatnonzero(numbers == number)
-            behind = items[0] - ragged.offsets[rows[items[0]]]
-            self._add_some(
-                place + float(behind) / 256, f"sonar_m_{number}", rows[items], cells[items].tolist()
-            )  # fmt: skip
-
-    def _add(self, place: float, name: str, cells: list[Cell]) -> None:
-        self._found[0, place] = name, cells
-
-    def _add_some(self, place: float, name: str, rows: Indexes, cells: Sequence[Cell]) -> None:
-        """Add a column that only some rows have; of two cells of one row the later counts."""
-        if len(rows):
-            column: list[Cell] = [None] * len(self._raw)
-            for row, cell in zip(rows.tolist(), cells, strict=True):
-                column[row] = cell
-            self._found[float(rows[0]), place] = name, column
+def _rounded(values: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
+    """Return values rounded to six decimals as `round` does it."""
+    millionths = values * 1e6
+    whole = np.rint(millionths)
+    rounded: npt.NDArray[np.float64] = whole / 1e6
+    # The product is inexact: what lies near the middle between two is left to `round`.
+    for place in np.flatnonzero(np.abs(np.abs(millionths - whole) - 0.5) < 1e-3).tolist():
+        rounded[place] = round(float(values[place]), 6)
+    return rounded + 0.0

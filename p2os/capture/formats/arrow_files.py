@@ -1,45 +1,89 @@
-"""Tables as Apache Parquet and Arrow (Feather) files; needs the extra `export`."""
+"""Tables as Apache Parquet and Arrow (Feather) files, written one table at a time; needs the extra `export`."""
 
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Any
 
-from p2os.capture.table import Table
+from p2os.capture.table import Cell, Table
 from simbase.errors import MissingDependencyError
 
 
-def write_parquet(table: Table, path: Path) -> None:
-    """Write a table as a Parquet file.
+def write_parquet(tables: Iterable[Table], path: Path) -> int:
+    """Write tables as a Parquet file; return how many rows.
 
     Raises:
         MissingDependencyError: pyarrow is not installed.
         OSError: The file cannot be written.
     """
-    columns = _columns(table, path)
+    _pyarrow(path)
     from pyarrow import parquet
 
-    parquet.write_table(columns, path)
+    return _write(tables, path, parquet.ParquetWriter)
 
 
-def write_arrow(table: Table, path: Path) -> None:
-    """Write a table as an Arrow IPC file (also known as Feather 2).
+def write_arrow(tables: Iterable[Table], path: Path) -> int:
+    """Write tables as an Arrow IPC file (also known as Feather 2); return how many rows.
 
     Raises:
         MissingDependencyError: pyarrow is not installed.
         OSError: The file cannot be written.
     """
-    columns = _columns(table, path)
+    _pyarrow(path)
     from pyarrow import ipc
 
-    with path.open("wb") as file, ipc.new_file(file, columns.schema) as writer:
-        writer.write_table(columns)
+    return _write(tables, path, ipc.new_file)
 
 
-def _columns(table: Table, path: Path) -> Any:
-    """Return a table as pyarrow's."""
+def _pyarrow(path: Path) -> Any:
     try:
         import pyarrow as pa
     except ImportError as error:
         raise MissingDependencyError(
             f"{path.suffix} files need pyarrow", extra="export", hint="export to .csv"
         ) from error
-    return pa.table(dict(table.columns))
+    return pa
+
+
+def _write(tables: Iterable[Table], path: Path, writer_of: Any) -> int:
+    """Write tables; without any there is no file."""
+    pa = _pyarrow(path)
+    count, schema = 0, None
+    every = iter(tables)
+    first = next(every, None)
+    if first is None:
+        return 0
+    schema = pa.schema([(name, _type(pa, column)) for name, column in first.columns.items()])
+    with path.open("wb") as file, writer_of(file, schema) as writer:
+        table: Table | None = first
+        while table is not None:
+            arrays = [
+                _array(pa, column, field.type) for column, field in zip(table.columns.values(), schema, strict=True)
+            ]
+            writer.write_table(pa.Table.from_arrays(arrays, schema=schema))
+            count += table.rows
+            table = next(every, None)
+    return count
+
+
+def _type(pa: Any, column: Sequence[Cell]) -> Any:
+    """Return the type that holds every cell of a column: text where they are of several kinds."""
+    if (kind := _array_kind(column)) is not None:
+        return {"b": pa.bool_(), "i": pa.int64(), "f": pa.float64()}.get(kind, pa.string())
+    kinds = frozenset(map(type, column)) - {type(None)}
+    known = {bool: pa.bool_(), int: pa.int64(), float: pa.float64()}
+    only = next(iter(kinds)) if len(kinds) == 1 else float if kinds == {int, float} else str
+    return known.get(only, pa.string())
+
+
+def _array_kind(column: Sequence[Cell]) -> str | None:
+    values = getattr(column, "values", None)
+    return None if values is None else str(values.dtype.kind)
+
+
+def _array(pa: Any, column: Sequence[Cell], kind: Any) -> Any:
+    if _array_kind(column) is not None:
+        values, present = column.values, column.present  # type: ignore[attr-defined]  # a column of NumPy's
+        return pa.array(values, kind, mask=None if present is None else ~present)
+    if kind == pa.string():
+        return pa.array([cell if cell is None or isinstance(cell, str) else str(cell) for cell in column], kind)
+    return pa.array(column, kind)

@@ -5,8 +5,9 @@ Lines without either belong to one stream whose direction is not given.
 """
 
 import re
+from collections.abc import Iterable, Iterator
 
-from p2os.capture.chunks import Capture, CaptureBuilder, Direction
+from p2os.capture.chunks import Capture, Direction, Part, capture_of
 from simbase.errors import FileError
 
 #: `00000010: fafb 0300 0000 …  text` (xxd) and `00000010  fa fb 03 |text|` (hexdump -C).
@@ -30,17 +31,28 @@ def read_hex(text: str) -> Capture:
     Raises:
         FileError: A line holds something else, or half a byte.
     """
-    builder = CaptureBuilder()
-    is_dump = any(_HEXDUMP.match(line) for line in text.splitlines())
-    for number, raw_line in enumerate(text.splitlines(), 1):
+    return capture_of(hex_parts(text.splitlines(), is_dump=is_hexdump(text)), has_time=False)
+
+
+def is_hexdump(text: str) -> bool:
+    """Tell whether a line is one of hexdump -C, so that a last line is a length and no bytes."""
+    return any(_HEXDUMP.match(line) for line in text.splitlines())
+
+
+def hex_parts(lines: Iterable[str], *, is_dump: bool) -> Iterator[Part]:
+    """Yield the bytes of each line, one line read at a time.
+
+    Raises:
+        FileError: A line holds something else, or half a byte.
+    """
+    for number, raw_line in enumerate(lines, 1):
         line = raw_line.split("#", maxsplit=1)[0].strip()
         direction = _ARROWS.get(line[:1])
         line = line.lstrip("<> ")
         if is_dump and _LENGTH.match(line):
             continue
         found = _XXD.match(line) or _HEXDUMP.match(line)
-        builder.add(0, direction, _bytes(found["bytes"] if found else line, number))
-    return builder.build(has_time=False)
+        yield 0, direction, _bytes(found["bytes"] if found else line, number)
 
 
 def write_hex(capture: Capture) -> str:

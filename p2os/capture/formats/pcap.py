@@ -14,11 +14,13 @@ of tcpdump.org.
 Invariant: `read_pcap(write_pcap(chunks))` has the same bytes in each direction.
 """
 
+import io
 import struct
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
+from typing import BinaryIO
 
-from p2os.capture.chunks import Capture, CaptureBuilder, Chunk, Direction
+from p2os.capture.chunks import Capture, Chunk, Direction, Part, capture_of
 from simbase.errors import FileError
 from simbase.timing import NS_PER_S, NS_PER_US, Nanos
 
@@ -52,6 +54,8 @@ _LINKS: dict[int, tuple[int, int | None]] = {
 LONGEST_NS: Nanos = 366 * 86_400 * NS_PER_S
 #: chosen: more segments than this out of order, and the missing one was never captured.
 MOST_WAITING = 64
+#: chosen: far more than any capture program's snap length; a longer record is a damaged one.
+LARGEST_RECORD = 16 << 20
 
 _End = tuple[bytes, int]
 
@@ -97,8 +101,18 @@ def read_pcap(data: bytes) -> Capture:
     Raises:
         FileError: The file is cut or of a kind that is not read here.
     """
-    records = _pcapng_records(data) if data[:4] == PCAPNG_MAGIC.to_bytes(4, "big") else _pcap_records(data)
-    builder, streams, start = CaptureBuilder(), TcpStreams(), None
+    return capture_of(pcap_parts(io.BytesIO(data)))
+
+
+def pcap_parts(file: BinaryIO) -> Iterator[Part]:
+    """Yield what a pcap or pcapng file holds, one record read at a time; times count from its first.
+
+    Raises:
+        FileError: The file is cut or of a kind that is not read here.
+    """
+    magic = file.read(4)
+    records = _pcapng_records(file, magic) if magic == PCAPNG_MAGIC.to_bytes(4, "big") else _pcap_records(file, magic)
+    streams, start, is_empty = TcpStreams(), None, True
     try:
         for item in records:
             start = item.at_ns if start is None else start
@@ -108,48 +122,60 @@ def read_pcap(data: bytes) -> Capture:
             if item.link == LINKTYPE_USER0:
                 if item.data[:1] not in (b"\0", b"\1"):
                     raise FileError("a record of link type USER0 that is not ours: its first byte gives no direction")
-                builder.add(at_ns, _IN_DIRECTION[item.data[0]], item.data[1:])
+                is_empty = False
+                yield at_ns, _IN_DIRECTION[item.data[0]], item.data[1:]
             else:
                 for direction, sent in streams.take(item.link, item.data):
-                    builder.add(at_ns, direction, sent)
+                    is_empty = False
+                    yield at_ns, direction, sent
     except struct.error as error:
         raise FileError("the capture file is cut off in the middle of a record") from error
-    if not builder.chunks and streams.unread_links:
+    if is_empty and streams.unread_links:
         kinds = ", ".join(str(link) for link in sorted(streams.unread_links))
         raise FileError(
             f"no P2OS in the capture file: link type {kinds} is not read here",
             hint="capture TCP on Ethernet or loopback, or use p2os sniff --pcap",
         )
-    return builder.build()
 
 
-def _pcap_records(data: bytes) -> Iterator[_Record]:
-    order = "<" if int.from_bytes(data[:4], "little") in {MAGIC_US, MAGIC_NS} else ">"
+def _pcap_records(file: BinaryIO, first: bytes) -> Iterator[_Record]:
+    order = "<" if int.from_bytes(first, "little") in {MAGIC_US, MAGIC_NS} else ">"
     try:
-        magic, _, _, _, _, _, link = struct.unpack_from(order + _FILE_HEADER, data)
+        magic, _, _, _, _, _, link = struct.unpack(order + _FILE_HEADER, first + file.read(20))
     except struct.error as error:
         raise FileError("the capture file ends in its header") from error
-    unit_ns, place = (1 if magic == MAGIC_NS else NS_PER_US), 24
-    while place < len(data):
-        seconds, fraction, size, _ = struct.unpack_from(order + _RECORD_HEADER, data, place)
+    unit_ns, place, link = (1 if magic == MAGIC_NS else NS_PER_US), 24, link & 0xFFFF
+    header = struct.Struct(order + _RECORD_HEADER)
+    while head := file.read(16):
+        seconds, fraction, size, _ = header.unpack(head)
         place += 16
-        if place + size > len(data):
-            raise FileError(f"the capture file is cut off at byte {place}")
-        yield _Record(seconds * NS_PER_S + fraction * unit_ns, link & 0xFFFF, data[place : place + size])
+        yield _Record(seconds * NS_PER_S + fraction * unit_ns, link, _taken(file, size, place))
         place += size
 
 
-def _pcapng_records(data: bytes) -> Iterator[_Record]:
+def _taken(file: BinaryIO, size: int, place: int) -> bytes:
+    """Return the next bytes of a file, all of them."""
+    data = file.read(size) if size <= LARGEST_RECORD else b""
+    if len(data) < size:
+        raise FileError(f"the capture file is cut off at byte {place}")
+    return data
+
+
+def _pcapng_records(file: BinaryIO, first: bytes) -> Iterator[_Record]:
     order, place = "<", 0
     interfaces: list[tuple[int, int]] = []
-    while place < len(data):
-        if data[place : place + 4] == PCAPNG_MAGIC.to_bytes(4, "big"):
-            order = "<" if data[place + 8 : place + 12] == _BYTE_ORDER_MAGIC.to_bytes(4, "little") else ">"
+    while head := first + file.read(8 - len(first)):
+        first = b""
+        if head[:4] == PCAPNG_MAGIC.to_bytes(4, "big"):
+            mark = file.read(4)
+            order = "<" if mark == _BYTE_ORDER_MAGIC.to_bytes(4, "little") else ">"
             interfaces.clear()
-        kind, size = struct.unpack_from(order + "II", data, place)
-        if size < 12 or place + size > len(data):
+        else:
+            mark = b""
+        kind, size = struct.unpack(order + "II", head)
+        if size < 12:
             raise FileError(f"the capture file is cut off at byte {place}")
-        body = data[place + 8 : place + size - 4]
+        body = (mark + _taken(file, size - 8 - len(mark), place))[:-4]
         if kind == _INTERFACE:
             interfaces.append((struct.unpack_from(order + "H", body)[0], _ticks_per_s(body, order)))
         elif kind == _ENHANCED:

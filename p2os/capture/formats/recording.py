@@ -8,9 +8,9 @@ Others: `t` seconds, `dir` `c2s`, `s2c` or `event`; events are left out.
 """
 
 import json
-from collections.abc import Mapping
+from collections.abc import Iterable, Iterator, Mapping
 
-from p2os.capture.chunks import Capture, CaptureBuilder, Chunk, Direction
+from p2os.capture.chunks import Capture, Chunk, Direction, Part, capture_of
 from simbase.errors import FileError
 from simbase.timing import NS_PER_S, Nanos
 
@@ -34,13 +34,31 @@ def read_recording(text: str) -> Capture:
     Raises:
         FileError: A line is no chunk; the message names it.
     """
-    builder, note = CaptureBuilder(), ""
-    for number, line in enumerate(text.splitlines(), 1):
+    lines = text.splitlines()
+    return capture_of(recorded_parts(lines), note=note_of(lines[0] if lines else ""))
+
+
+def note_of(line: str) -> str:
+    """Return the note in the first line of a recording of ours; empty where the line is none."""
+    try:
+        entry = json.loads(line)
+    except (ValueError, RecursionError):
+        return ""
+    return str(entry.get("note", "")) if isinstance(entry, dict) and "format" in entry else ""
+
+
+def recorded_parts(lines: Iterable[str]) -> Iterator[Part]:
+    """Yield what each line holds, one line read at a time.
+
+    Raises:
+        FileError: A line is no chunk; the message names it.
+    """
+    for number, line in enumerate(lines, 1):
         if not line.strip():
             continue
         entry = _object(line, number)
         if "format" in entry:
-            note = _header(entry, number)
+            _check_header(entry, number)
             continue
         spelling = entry.get("dir")
         if not isinstance(spelling, str) or spelling not in _DIRECTIONS:
@@ -49,8 +67,7 @@ def read_recording(text: str) -> Capture:
         data = _hex(entry.get("hex", ""), number)
         at_ns = _time(entry.get("t"), unit_ns, number)
         if direction is not None:
-            builder.add(at_ns, direction, data)
-    return builder.build(note=note)
+            yield at_ns, direction, data
 
 
 def header_line(note: str = "") -> str:
@@ -81,11 +98,10 @@ def _object(line: str, number: int) -> Mapping[str, object]:
     return entry
 
 
-def _header(entry: Mapping[str, object], number: int) -> str:
+def _check_header(entry: Mapping[str, object], number: int) -> None:
     if entry["format"] != FORMAT or entry.get("version") != VERSION:
         said = f"{entry['format']!r} version {entry.get('version')!r}"
         raise FileError(f"line {number}: {said} is not {FORMAT} version {VERSION}", hint="renew p2os")
-    return str(entry.get("note", ""))
 
 
 def _hex(value: object, number: int) -> bytes:

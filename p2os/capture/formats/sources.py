@@ -1,46 +1,120 @@
-"""Any file, folder or text that holds P2OS bytes, read as a capture."""
+"""Any file, folder or text that holds P2OS bytes, read as a capture: whole, or chunk by chunk as it is read.
 
+Invariant: what is opened holds no more of its file than a block or a line.
+"""
+
+import codecs
+import io
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import BinaryIO, cast
 
-from p2os.capture.chunks import Capture, Direction, capture_of
-from p2os.capture.formats.hex_text import looks_like_hex, read_hex
-from p2os.capture.formats.pcap import is_pcap, read_pcap
-from p2os.capture.formats.recording import read_recording
+from p2os.capture.chunks import Capture, Chunk, Direction, Part, in_order
+from p2os.capture.formats.hex_text import hex_parts, is_hexdump, looks_like_hex
+from p2os.capture.formats.pcap import is_pcap, pcap_parts
+from p2os.capture.formats.recording import note_of, recorded_parts
 from simbase.errors import FileError
 
 #: The P2OS bytes in the folder that `p2os run` makes.
 RUN_WIRE = "wire.jsonl"
-#: chosen: a day of a fully used 115200-baud line is less.
+#: chosen: what is held whole in memory, by `read_file`; `open_file` takes any length.
 LARGEST_BYTES = 2_000_000_000
+#: chosen: what is read at a time; the kind of a file is told by its first block.
+BLOCK_BYTES = 1 << 16
+#: chosen: a line of a recording is one chunk; a longer one is no text.
+LONGEST_LINE = 16 << 20
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Source:
+    """A capture that is read while its chunks are taken.
+
+    Args:
+        chunks: In the order of time, once.
+        has_time: Whether the source gives times; without, all are 0.
+        note: Free text, such as which robot and program were recorded.
+        has_one_origin: Whether all of the robot's chunks have a direction, or none has.
+    """
+
+    chunks: Iterator[Chunk]
+    has_time: bool = True
+    note: str = ""
+    has_one_origin: bool = True
+
+    def whole(self) -> Capture:
+        """Read all of it.
+
+        Raises:
+            FileError: It is broken.
+        """
+        return Capture(chunks=tuple(self.chunks), has_time=self.has_time, note=self.note)
+
+
+def open_capture(file: BinaryIO, direction: Direction | None = None) -> Source:
+    """Begin to read a capture of whatever kind its bytes are: pcap, pcapng, JSON lines, hex text, else raw bytes.
+
+    Args:
+        file: Its content; taking chunks reads it, and raises `FileError` where it is broken.
+        direction: Who sent raw or hex bytes whose source does not give it.
+    """
+    buffered = cast(
+        "io.BufferedReader",
+        file if isinstance(file, io.BufferedReader) else io.BufferedReader(cast("io.RawIOBase", file), BLOCK_BYTES),
+    )
+    head = buffered.peek(BLOCK_BYTES)
+    if is_pcap(head):
+        return Source(chunks=in_order(pcap_parts(cast("BinaryIO", buffered))))
+    text = _text(head)
+    if text is not None and text.lstrip().startswith("{"):
+        return Source(chunks=in_order(recorded_parts(_lines(buffered))), note=note_of(text.lstrip().split("\n")[0]))
+    is_hex = bool(text and text.strip())
+    parts = hex_parts(_lines(buffered), is_dump=is_hexdump(text or "")) if is_hex else _raw(buffered)
+    directed = ((at_ns, sent_by or direction, data) for at_ns, sent_by, data in parts)
+    return Source(chunks=in_order(directed), has_time=False, has_one_origin=not is_hex)
+
+
+def open_file(path: Path, direction: Direction | None = None) -> Source:
+    """Begin to read a capture from a file, or from the folder of a run.
+
+    Raises:
+        FileError: The file cannot be read; taking chunks raises it where the file is broken.
+    """
+    place = path / RUN_WIRE if path.is_dir() else path
+    try:
+        file = place.open("rb", buffering=BLOCK_BYTES)
+        source = open_capture(file, direction)
+    except OSError as error:
+        raise _unreadable(place, error) from error
+    return replace(source, chunks=_named(source.chunks, file, place))
+
+
+def open_argument(words: list[str], direction: Direction | None = None) -> Source:
+    """Begin to read what a person named: one file or folder, or hex text in one or more words.
+
+    Raises:
+        FileError: It is neither.
+    """
+    if len(words) == 1 and Path(words[0]).exists():
+        return open_file(Path(words[0]), direction)
+    text = " ".join(words)
+    if looks_like_hex(text):
+        return open_capture(io.BytesIO(text.encode("ascii")), direction)
+    what = words[0] if len(words) == 1 else text
+    raise FileError(f"{what!r} is no file and no hex text", hint="p2os decode 'fa fb 03 00 00 00'")
 
 
 def read_capture(data: bytes, direction: Direction | None = None) -> Capture:
-    """Read a capture of whatever kind its bytes are: pcap, pcapng, JSON lines, hex text, else raw bytes.
-
-    Args:
-        data: The content of a file.
-        direction: Who sent raw or hex bytes whose source does not give it.
+    """Read a whole capture, as `open_capture` does.
 
     Raises:
-        FileError: The content is of one of these kinds, and broken.
+        FileError: The content is of one of the kinds, and broken.
     """
-    if is_pcap(data):
-        return read_pcap(data)
-    text = _text(data)
-    if text is not None and text.lstrip().startswith("{"):
-        return read_recording(text)
-    if text is not None and text.strip():
-        capture = read_hex(text)
-    else:
-        capture = capture_of([(0, direction, data)], has_time=False)
-    if direction is None:
-        return capture
-    directed = [(chunk.at_ns, chunk.direction or direction, chunk.data) for chunk in capture.chunks]
-    return capture_of(directed, has_time=False)
+    return open_capture(io.BytesIO(data), direction).whole()
 
 
 def read_file(path: Path, direction: Direction | None = None) -> Capture:
-    """Read a capture from a file, or from the folder of a run.
+    """Read a whole capture from a file, or from the folder of a run.
 
     Raises:
         FileError: The file cannot be read, or holds no capture.
@@ -49,34 +123,60 @@ def read_file(path: Path, direction: Direction | None = None) -> Capture:
     try:
         if place.stat().st_size > LARGEST_BYTES:
             raise FileError(f"{place} is larger than {LARGEST_BYTES // 1_000_000_000} GB")
-        data = place.read_bytes()
     except OSError as error:
-        raise FileError(f"cannot read {place}: {(error.strerror or str(error)).lower()}") from error
-    try:
-        return read_capture(data, direction)
-    except FileError as error:
-        raise FileError(f"{place}: {error}", hint=error.hint) from error
+        raise _unreadable(place, error) from error
+    return open_file(path, direction).whole()
 
 
 def read_argument(words: list[str], direction: Direction | None = None) -> Capture:
-    """Read what a person named: one file or folder, or hex text in one or more words.
+    """Read what a person named, whole, as `open_argument` does.
 
     Raises:
-        FileError: It is neither.
+        FileError: It is neither a file nor hex text, or broken.
     """
-    if len(words) == 1 and Path(words[0]).exists():
-        return read_file(Path(words[0]), direction)
-    text = " ".join(words)
-    if looks_like_hex(text):
-        return read_capture(text.encode("ascii"), direction)
-    what = words[0] if len(words) == 1 else text
-    raise FileError(f"{what!r} is no file and no hex text", hint="p2os decode 'fa fb 03 00 00 00'")
+    return open_argument(words, direction).whole()
+
+
+def _named(chunks: Iterator[Chunk], file: BinaryIO, place: Path) -> Iterator[Chunk]:
+    """Yield chunks; what is wrong names the file, which is closed at the end."""
+    with file:
+        try:
+            yield from chunks
+        except FileError as error:
+            raise FileError(f"{place}: {error}", hint=error.hint) from error
+        except OSError as error:
+            raise _unreadable(place, error) from error
+
+
+def _unreadable(place: Path, error: OSError) -> FileError:
+    return FileError(f"cannot read {place}: {(error.strerror or str(error)).lower()}")
+
+
+def _raw(file: io.BufferedReader) -> Iterator[Part]:
+    while data := file.read1(BLOCK_BYTES):
+        yield 0, None, data
+
+
+def _lines(file: io.BufferedReader) -> Iterator[str]:
+    """Yield each line, however lines end."""
+    number = 0
+    while line := file.readline(LONGEST_LINE):
+        if len(line) == LONGEST_LINE:
+            raise FileError(f"line {number + 1} is longer than {LONGEST_LINE >> 20} MB")
+        try:
+            text = line.decode("utf-8")
+        except UnicodeDecodeError as error:
+            raise FileError(f"line {number + 1} is no text: byte 0x{line[error.start]:02X}") from error
+        for part in text.splitlines():
+            number += 1
+            yield part
 
 
 def _text(data: bytes) -> str | None:
-    """Return the content as text, or None where it is not meant as such."""
+    """Return what a file begins with as text, or None where it is not meant as such."""
     try:
-        text = data.decode("ascii" if data[:1] != b"{" else "utf-8")
+        # The block may end inside a character.
+        text = codecs.getincrementaldecoder("ascii" if data[:1] != b"{" else "utf-8")().decode(data)
     except UnicodeDecodeError:
         return None
     return text if all(character.isprintable() or character in "\t\n\r\f" for character in text) else None

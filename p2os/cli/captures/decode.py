@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from p2os.capture import Capture, ListingRow, Reading, explain, read_argument, read_capture, rows_of
+from p2os.capture import Chunk, ListingRow, Reading, explain, open_argument, open_capture, rows_of
 from p2os.capture.explain import lines_of
 from p2os.capture.listing import line_of, summary_of
 from p2os.cli.captures.reading import (
@@ -18,7 +18,7 @@ from p2os.cli.captures.reading import (
 )
 from p2os.cli.help_pages import CAPTURES
 from simbase.errors import UsageError
-from simbase.timing import NS_PER_S
+from simbase.timing import NS_PER_S, Nanos
 
 HELP = """Show what stands in P2OS bytes.
 
@@ -62,17 +62,35 @@ def decode(
     if json_output and explained:
         raise UsageError("--json and --explain exclude each other", hint="--json already holds every field")
     sent_by = direction_of(direction)
-    capture = read_capture(sys.stdin.buffer.read(), sent_by) if source == ["-"] else read_argument(source, sent_by)
-    reading = reading_of(capture, robot=robot, profile=profile)
+    is_live = source == ["-"]
+    capture = open_capture(sys.stdin.buffer, sent_by) if is_live else open_argument(source, sent_by)
+    reading, chunks = reading_of(capture.chunks, robot=robot, profile=profile)
     wanted = {name.strip().lower() for name in only.split(",") if name.strip()}
     shown = damaged = 0
-    for row in _chosen(rows_of(capture, reading), wanted):
+    end = _End()
+    for row in _chosen(rows_of(end.watched(chunks), reading), wanted):
+        for line in _lines(row, reading, has_time=capture.has_time, as_json=json_output, explained=explained):
+            sys.stdout.write(f"{line}\n")
+        if is_live or not shown:
+            sys.stdout.flush()
         shown += 1
         damaged += not row.valid
-        _show(row, capture, reading, as_json=json_output, explained=explained)
     if not json_output:
         sys.stdout.flush()
-        sys.stderr.write(f"{summary_of(shown, damaged, capture.duration_ns / NS_PER_S)}\n")
+        sys.stderr.write(f"{summary_of(shown, damaged, end.at_ns / NS_PER_S)}\n")
+
+
+class _End:
+    """When the last chunk came that was read."""
+
+    def __init__(self) -> None:
+        self.at_ns: Nanos = 0
+
+    def watched(self, chunks: Iterator[Chunk]) -> Iterator[Chunk]:
+        """Yield the same chunks."""
+        for chunk in chunks:
+            self.at_ns = chunk.at_ns
+            yield chunk
 
 
 def _chosen(rows: Iterator[ListingRow], wanted: set[str]) -> Iterator[ListingRow]:
@@ -81,11 +99,10 @@ def _chosen(rows: Iterator[ListingRow], wanted: set[str]) -> Iterator[ListingRow
             yield row
 
 
-def _show(row: ListingRow, capture: Capture, reading: Reading, *, as_json: bool, explained: bool) -> None:
+def _lines(row: ListingRow, reading: Reading, *, has_time: bool, as_json: bool, explained: bool) -> Iterator[str]:
     if as_json:
-        typer.echo(json.dumps(row.as_plain()))
+        yield json.dumps(row.as_plain())
         return
-    typer.echo(line_of(row, has_time=capture.has_time))
+    yield line_of(row, has_time=has_time)
     if explained:
-        for line in lines_of(explain(row, reading)):
-            typer.echo(line)
+        yield from lines_of(explain(row, reading))

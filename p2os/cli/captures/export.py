@@ -1,16 +1,17 @@
 """`p2os export`: a capture as a table or a log that other programs read."""
 
 import sys
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator
+from itertools import chain
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
-from p2os.capture import Capture, ListingRow, Reading, read_file, rows_of
+from p2os.capture import Chunk, ListingRow, Reading, Source, open_file, rows_of
 from p2os.capture.formats.arrow_files import write_arrow, write_parquet
 from p2os.capture.formats.mcap_files import write_mcap
-from p2os.capture.table import Table, from_robot, table_of, write_csv
+from p2os.capture.table import Table, from_robot, tables_of, write_csv
 from p2os.cli.captures.reading import ProfileForLayouts, RobotForUnits, reading_of
 from p2os.cli.help_pages import CAPTURES
 from p2os.cli.kept_files import FORCE_HELP, refuse_to_overwrite
@@ -56,19 +57,13 @@ def export(
         known = ", ".join(sorted({*_TABLES, ".mcap"}))
         raise UsageError(f"{target}: cannot tell the format from {ending or 'no ending'!r}", hint=f"use {known}")
     refuse_to_overwrite(target, force=force)
-    capture = read_file(source)
-    reading = reading_of(capture, robot=robot, profile=profile)
-    rows = rows_of(capture, reading)
+    capture = open_file(source)
+    reading, chunks = reading_of(capture.chunks, robot=robot, profile=profile)
     try:
         if ending == ".mcap":
-            count = write_mcap(_chosen(rows, only or "all"), target)
+            count = write_mcap(_chosen(rows_of(chunks, reading), only or "all"), target)
         else:
-            table = None if only else _by_columns(capture, reading)
-            if table is None:
-                table = table_of(_chosen(rows, only), reading.parameters)
-            count = table.rows
-            if count:
-                _TABLES[ending](table, target)
+            count = _TABLES[ending](_tables(capture, chunks, reading, only), target)
     except OSError as error:
         raise FileError(f"cannot write {target}: {(error.strerror or str(error)).lower()}") from error
     if not count:
@@ -77,15 +72,25 @@ def export(
     sys.stderr.write(f"{count} packets\n")
 
 
-def _by_columns(capture: Capture, reading: Reading) -> Table | None:
-    """Return a large capture's SIPs the fast way; the same cells, where NumPy is installed."""
-    if sum(len(chunk.data) for chunk in capture.chunks) < LARGE_BYTES:
-        return None
-    try:
-        from p2os.capture.columns.sip_table import sip_table
-    except ImportError:
-        return None
-    return sip_table(capture, reading)
+def _tables(capture: Source, chunks: Iterator[Chunk], reading: Reading, only: str) -> Iterator[Table]:
+    """Return what was chosen as tables; a large capture's SIPs the fast way, where NumPy is installed."""
+    seen: list[Chunk] = []
+    if not only and capture.has_one_origin:
+        size = 0
+        for chunk in chunks:
+            seen.append(chunk)
+            size += len(chunk.data)
+            if size >= LARGE_BYTES:
+                break
+        chunks = chain(seen, chunks)
+        if size >= LARGE_BYTES:
+            try:
+                from p2os.capture.columns.sip_table import sip_tables
+            except ImportError:
+                pass
+            else:
+                return sip_tables(chunks, reading)
+    return tables_of(_chosen(rows_of(chunks, reading), only), reading)
 
 
 def _chosen(rows: Iterable[ListingRow], only: str) -> Iterable[ListingRow]:
@@ -95,15 +100,17 @@ def _chosen(rows: Iterable[ListingRow], only: str) -> Iterable[ListingRow]:
     return (row for row in rows if "all" in wanted or row.name.lower() in wanted)
 
 
-def _write_csv(table: Table, target: Path) -> None:
+def _write_csv(tables: Iterator[Table], target: Path) -> int:
     if str(target) == "-":
-        write_csv(table, sys.stdout)
-        return
+        return write_csv(tables, sys.stdout)
+    first = next(tables, None)
+    if first is None:
+        return 0
     with target.open("w", encoding="utf-8", newline="") as file:
-        write_csv(table, file)
+        return write_csv(chain([first], tables), file)
 
 
-_TABLES: dict[str, Callable[[Table, Path], None]] = {
+_TABLES: dict[str, Callable[[Iterator[Table], Path], int]] = {
     ".csv": _write_csv,
     ".parquet": write_parquet,
     ".arrow": write_arrow,

@@ -4,11 +4,14 @@ Left open, both are found in the capture itself: the robot gives its model in
 answer to SYNC2, and the model implies which firmware family it runs.
 """
 
+from collections.abc import Iterable, Iterator
+from itertools import chain
 from typing import Annotated
 
 import typer
 
-from p2os.capture import Capture, Direction, Reading, frame_chunks
+from p2os.capture import Chunk, Direction, Reading
+from p2os.capture.listing import FrameCutter
 from p2os.cli.names import robots
 from p2os.protocol.frames import Frame
 from p2os.protocol.packets import IDENTITY_KIND, Identity
@@ -30,6 +33,8 @@ ProfileForLayouts = Annotated[
     typer.Option("--profile", help="Firmware family, for layouts; default: as the packets look.", metavar=FAMILIES),
 ]
 DEFAULT_ROBOT = "p2dx"
+#: chosen: some two minutes of SIPs; a robot says who it is before the first.
+LOOKED_AT_BYTES = 1 << 16
 
 
 def direction_of(text: str) -> Direction | None:
@@ -46,20 +51,23 @@ def direction_of(text: str) -> Direction | None:
         raise UsageError(f"--dir {text!r} is none of auto, c2r, r2c", hint="c2r: sent by the client") from error
 
 
-def reading_of(capture: Capture, *, robot: str = "", profile: Profile | None = None) -> Reading:
-    """Return how to read a capture.
+def reading_of(
+    source: Iterable[Chunk], *, robot: str = "", profile: Profile | None = None
+) -> tuple[Reading, Iterator[Chunk]]:
+    """Return how to read a capture, and its chunks, of which no more than the beginning was read.
 
     Args:
-        capture: What is to be read.
+        source: What is to be read.
         robot: Model or file; empty to look into the capture.
         profile: Firmware family; None to look into the capture.
 
     Raises:
         ParametersError: There is no such model or file.
     """
-    subclass, guessed = _look(capture) if not robot or profile is None else ("", Profile.P2OS)
+    chunks, seen = iter(source), list[Chunk]()
+    subclass, guessed = _look(chunks, seen) if not robot or profile is None else ("", Profile.P2OS)
     parameters = load_parameters(robot) if robot else _parameters(subclass)
-    return Reading(profile=profile or guessed, parameters=parameters)
+    return Reading(profile=profile or guessed, parameters=parameters), chain(seen, chunks)
 
 
 def _parameters(subclass: str) -> RobotParameters:
@@ -69,22 +77,28 @@ def _parameters(subclass: str) -> RobotParameters:
         return load_parameters(DEFAULT_ROBOT)
 
 
-def _look(capture: Capture) -> tuple[str, Profile]:
-    """Return the model and the firmware family that a capture shows.
+def _look(chunks: Iterator[Chunk], seen: list[Chunk]) -> tuple[str, Profile]:
+    """Return the model and the firmware family that a capture's beginning shows, and put what was read into `seen`.
 
     A SIP longer than its sonar readings need has the tail that only ARCOS sends;
     AROS and P2OS have the same shape.
     """
-    subclass, profile = "", Profile.P2OS
-    for chunk in frame_chunks(capture.chunks):
-        if chunk.direction is Direction.TO_ROBOT or len(chunk.data) < 6 or chunk.data[:2] != b"\xfa\xfb":
-            continue
-        kind, data = chunk.data[3], chunk.data[4:-2]
-        if kind == IDENTITY_KIND and data:
-            subclass = Identity.from_frame(Frame(chunk.data[3:-2])).subclass.lower()
-        elif kind in SIP_KINDS and len(data) >= HEAD_BYTES - 1:
-            if len(data) > HEAD_BYTES - 1 + READING_BYTES * data[18]:
-                profile = Profile.ARCOS
-            if subclass:
-                break
+    subclass, profile, size = "", Profile.P2OS, 0
+    cutter = FrameCutter()
+    for chunk in chunks:
+        seen.append(chunk)
+        size += len(chunk.data)
+        for piece in cutter.take(chunk):
+            if piece.direction is Direction.TO_ROBOT or len(piece.data) < 6 or piece.data[:2] != b"\xfa\xfb":
+                continue
+            kind, data = piece.data[3], piece.data[4:-2]
+            if kind == IDENTITY_KIND and data:
+                subclass = Identity.from_frame(Frame(piece.data[3:-2])).subclass.lower()
+            elif kind in SIP_KINDS and len(data) >= HEAD_BYTES - 1:
+                if len(data) > HEAD_BYTES - 1 + READING_BYTES * data[18]:
+                    profile = Profile.ARCOS
+                if subclass:
+                    return subclass, profile
+        if size > LOOKED_AT_BYTES:
+            break
     return subclass, profile

@@ -13,7 +13,8 @@ from p2os.capture import Direction, capture_of, frame_chunks, read_file, write_p
 from p2os.capture.dissector import install
 from p2os.cli.main import run
 from p2os.protocol.commands import CommandNumber
-from p2os.protocol.packets import PACKET_NAMES
+from p2os.protocol.packets import PACKET_NAMES, SonarReading, StandardSip, packet_frame
+from p2os.protocol.profiles import Profile
 from simbase.errors import FileError
 
 GOLDEN = Path(__file__).resolve().parents[2] / "golden" / "captures" / "aria_p2de.jsonl"
@@ -69,23 +70,49 @@ def test_tshark_shows_a_capture_of_ours(tmp_path: Path) -> None:
     assert [row[3] for row in rows if row[1] == "5"] == ["300", "-300"]
 
 
-@needs_tshark
-def test_tshark_finds_frames_that_tcp_has_cut(tmp_path: Path) -> None:
-    frames = [chunk.data for chunk in read_file(GOLDEN).chunks if chunk.direction is Direction.FROM_ROBOT][:6]
-    stream, packets, sequence = b"".join(frames), [], 1
-    for start in range(0, len(stream), 50):
-        data = stream[start : start + 50]
-        tcp = struct.pack(">HHIIBBHHH", 8101, 40000, sequence, 0, 5 << 4, 0x18, 1000, 0, 0) + data
-        packets.append(struct.pack(">BBHHHBBH", 0x45, 0, 20 + len(tcp), 0, 0, 64, 6, 0) + b"\x7f\0\0\1" * 2 + tcp)
-        sequence += len(data)
+def network_file(path: Path, sent: list[tuple[int, int, bytes]]) -> Path:
+    """Write TCP segments of (source port, target port, bytes), cut at 50 bytes; return the path."""
+    packets, sequences = [], {source: 1 for source, _, _ in sent}
+    for source, target, stream in sent:
+        for start in range(0, len(stream), 50):
+            data = stream[start : start + 50]
+            tcp = struct.pack(">HHIIBBHHH", source, target, sequences[source], 0, 5 << 4, 0x18, 1000, 0, 0) + data
+            packets.append(struct.pack(">BBHHHBBH", 0x45, 0, 20 + len(tcp), 0, 0, 64, 6, 0) + b"\x7f\0\0\1" * 2 + tcp)
+            sequences[source] += len(data)
     records = b"".join(
         struct.pack("<IIII", 1, place, len(data), len(data)) + data for place, data in enumerate(packets)
     )
-    path = tmp_path / "tcp.pcap"
     path.write_bytes(struct.pack("<IHHiIII", 0xA1B2C3D4, 2, 4, 0, 0, 65535, 101) + records)
-    kinds = [kind for (row,) in shown(path, "p2os.packet") for kind in row.split(",") if kind]
-    assert kinds == [f"0x{frame[3]:02x}" for frame in frames]
-    assert read_file(path).bytes_of(Direction.FROM_ROBOT) == stream
+    return path
+
+
+@needs_tshark
+@pytest.mark.parametrize(("robot", "client"), [(8101, 40000), (40000, 8101), (45555, 45001)])
+def test_tshark_finds_frames_on_any_port_and_the_robot_is_who_answers(robot: int, client: int, tmp_path: Path) -> None:
+    pieces = frame_chunks(read_file(GOLDEN).chunks)
+    chunks = [(chunk.direction, chunk.data) for chunk in pieces][:12]
+    ends = {Direction.TO_ROBOT: (client, robot), Direction.FROM_ROBOT: (robot, client)}
+    path = network_file(tmp_path / "tcp.pcap", [(*ends[direction], data) for direction, data in chunks if direction])
+    rows = shown(path, "p2os.packet", "p2os.command", "_ws.col.Protocol")
+    kinds = [kind for row in rows for kind in row[0].split(",") if kind]
+    assert kinds == [f"0x{data[3]:02x}" for direction, data in chunks if direction is Direction.FROM_ROBOT]
+    commands = [kind for row in rows for kind in row[1].split(",") if kind]
+    assert commands == [str(data[3]) for direction, data in chunks if direction is Direction.TO_ROBOT]
+    assert {row[2] for row in rows} <= {"P2OS", "TCP"}
+
+
+@needs_tshark
+def test_tshark_shows_every_field_of_a_sip_and_its_tail(tmp_path: Path) -> None:
+    sip = StandardSip(
+        stall_left=True, rear_bumpers=5, front_bumpers=9, raw_control=-7, raw_flags=513, raw_compass=90,
+        sonar=(SonarReading(3, 700),), analog_port=4, gripper_state=6, raw_analog=77, digital_in=12, digital_out=13,
+        tail=(126, -1, -300, 2, 0, -128, 80, 123456, 9),
+    )  # fmt: skip
+    path = network_file(tmp_path / "sip.pcap", [(45555, 45001, packet_frame(sip, Profile.P2OS).to_bytes())])
+    names = ("rear_bumpers", "front_bumpers", "control", "compass", "analog_port", "analog", "battery_x10",
+             "charge_state", "rotation_velocity", "temperature", "state_of_charge", "controller_time_us")  # fmt: skip
+    row = shown(path, *(f"p2os.sip.{name}" for name in names))[-1]
+    assert [int(cell, 0) for cell in row] == [5, 9, -7, 90, 4, 77, 126, -1, -300, -128, 80, 123456]
 
 
 def test_the_dissector_is_put_where_wireshark_looks(

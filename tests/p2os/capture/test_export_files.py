@@ -32,7 +32,7 @@ def drive(*raw_x: int) -> list[tuple[int, Direction, bytes]]:
 
 def test_positions_go_on_where_the_counters_wrap() -> None:
     rows = rows_of(capture_of(drive(32000, 100, 16000, 31000, 14000)), P2OS)
-    table = table_of(rows, P2OS.parameters)
+    table = table_of(rows, P2OS)
     counts = [-768, 100, 16000, 31000, 46768]
     assert table.columns["x_m"] == [round(count * 0.00084, 6) for count in counts]
     assert table.columns["y_m"] == [round(-8 * 0.00084, 6)] * 5
@@ -42,7 +42,7 @@ def test_positions_go_on_where_the_counters_wrap() -> None:
 
 def test_csv_has_a_line_of_names_and_empty_cells() -> None:
     file = io.StringIO()
-    write_csv(table_of(rows_of(capture_of(drive(0)), P2OS), P2OS.parameters), file)
+    write_csv([table_of(rows_of(capture_of(drive(0)), P2OS), P2OS)], file)
     names, cells = (line.split(",") for line in file.getvalue().splitlines())
     assert names[:7] == ["t_s", "dir", "type", "name", "valid", "moving", "x_m"]
     assert cells[:7] == ["0.0", "r2c", "50", "SIP", "True", "False", "0.0"]
