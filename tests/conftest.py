@@ -19,13 +19,16 @@ def pytest_configure(config: pytest.Config) -> None:
         del os.environ["PYTHONDONTWRITEBYTECODE"]
 
 
+@pytest.hookimpl(trylast=True)  # hypothesis has marked its own by then
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Count no lines in long tests, and begin with the long ones.
+    """Count no lines in long and repeating tests, and begin with the long ones.
 
-    Tracing makes a simulation three times slower.
+    Tracing makes a simulation three times slower, and the hundredth example runs the lines of the first ten.
     """
     for item in items:
-        if any(item.get_closest_marker(name) for name in ("slow", "soak")):
+        is_core = "protocol" in item.path.parts  # counted whole (tools/check_coverage.py), with all examples
+        names = ("slow", "soak") if is_core else ("slow", "soak", "hypothesis")
+        if any(item.get_closest_marker(name) for name in names):
             item.add_marker("no_cover")
     items.sort(key=lambda item: item.get_closest_marker("slow") is None)
 

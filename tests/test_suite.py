@@ -8,9 +8,14 @@ ROOT = Path(__file__).parents[1]
 SUITE = """
 import sys
 import pytest
+from hypothesis import given, strategies as st
 
 def test_quick(request):
     assert not request.node.get_closest_marker("no_cover")
+
+@given(st.booleans())
+def test_repeating(value):
+    assert sys.gettrace() is None
 
 @pytest.mark.slow
 def test_long(request):
@@ -42,6 +47,7 @@ def test_quick_tests_alone_are_traced_and_none_may_end_it(tmp_path: Path) -> Non
     assert verdicts == [
         ["test_long", "PASSED"],
         ["test_quick", "PASSED"],
+        ["test_repeating", "PASSED"],
         ["test_that_ends_the_tracing", "FAILED"],
         ["test_that_ends_its_own_tracing", "PASSED"],
         ["test_after_it_is_traced", "PASSED"],
