@@ -8,7 +8,8 @@ endif
 VENV   := .venv
 BIN    := $(VENV)/bin
 STAMP  := $(VENV)/.set-up
-JOBS   ?= 2
+# One more than two cores: many tests wait for a real clock.
+JOBS   ?= 3
 # What is built with the package: set up again when it has changed.
 COMPILED := $(wildcard bluepill_sim/native/source/*) $(shell find adapter_fw/core adapter_fw/capi -type f)
 
