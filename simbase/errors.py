@@ -5,8 +5,6 @@ Whatever is raised here reaches a person as one line and one hint.
 
 import re
 
-from simbase.installation import install_command
-
 
 class P2osError(Exception):
     """The root: whatever p2os and the packages that come with it raise for a person.
@@ -49,6 +47,7 @@ class MissingDependencyError(P2osError):
     exit_code = 2
 
     def __init__(self, message: str, *, extra: str | None = None, hint: str | None = None) -> None:
+        from simbase.installation import install_command  # reads the installed metadata, which takes time
 
         ways = [] if extra is None else [install_command(extra)]
         super().__init__(message, hint=", or ".join([*ways, *([hint] if hint else [])]) or None)
