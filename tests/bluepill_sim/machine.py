@@ -18,6 +18,16 @@ STACK = 0x2000_5000
 LOG = 0x2000_0100
 VECTORS = 16 + 43
 
+#: Lets the cycle counter (DWT_CYCCNT, 0xE0001004) run: TRCENA, then CYCCNTENA. Uses r0 and r1.
+COUNTER_ON = """
+mov32 r0, #0xE000EDFC
+mov32 r1, #0x01000000
+str r1, [r0, #0]
+mov32 r0, #0xE0001000
+movs r1, #1
+str r1, [r0, #0]
+"""
+
 _CONDITIONS = {"eq": 0, "ne": 1, "cs": 2, "cc": 3, "mi": 4, "pl": 5, "ge": 10, "lt": 11, "al": 14}
 _SPECIAL = {"apsr": 0, "ipsr": 5, "msp": 8, "psp": 9, "primask": 16, "basepri": 17, "faultmask": 19, "control": 20}
 _PLAIN = {

@@ -7,20 +7,13 @@ import pytest
 from bluepill_sim import BluePill
 from bluepill_sim.core.accesses import may_end_in_it
 from bluepill_sim.native.library import library_path
-from tests.bluepill_sim.machine import Machine
+from tests.bluepill_sim.machine import COUNTER_ON, Machine
 
 PROGRAM = Path(__file__).parents[1] / "firmware" / "unoptimised.elf"
 pytestmark = pytest.mark.skipif(library_path() is None, reason="the native core is not built")
 
 #: r3 is the base of each access. The cycle counter counts, r1 is its address, [r2] holds it and [r2, #4] holds r2.
-COUNTING = """
-mov32 r0, #0xE000EDFC
-mov32 r1, #0x01000000
-str r1, [r0, #0]
-mov32 r0, #0xE0001000
-movs r1, #1
-str r1, [r0, #0]
-mov32 r2, #0x20000800
+COUNTING = f"""{COUNTER_ON}mov32 r2, #0x20000800
 mov32 r1, #0xE0001004
 str r1, [r2, #0]
 str r2, [r2, #4]

@@ -12,7 +12,7 @@ from bluepill_sim import BluePill
 from bluepill_sim.core import BlockRecorder
 from bluepill_sim.errors import BluePillError
 from bluepill_sim.native.library import library_path
-from tests.bluepill_sim.machine import Machine
+from tests.bluepill_sim.machine import COUNTER_ON, Machine
 
 pytestmark = pytest.mark.skipif(library_path() is None, reason="the native core is not built: no C compiler")
 
@@ -104,14 +104,7 @@ def test_a_snapshot_of_one_goes_on_in_the_other(make: MakeBoard) -> None:
 
 
 #: Cycle counter on; r1 is its address, and [r2] holds it.
-COUNTING = """
-mov32 r0, #0xE000EDFC
-mov32 r1, #0x01000000
-str r1, [r0, #0]
-mov32 r0, #0xE0001000
-movs r1, #1
-str r1, [r0, #0]
-mov32 r2, #0x20000800
+COUNTING = f"""{COUNTER_ON}mov32 r2, #0x20000800
 mov32 r1, #0xE0001004
 str r1, [r2, #0]
 b next

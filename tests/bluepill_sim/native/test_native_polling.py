@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from bluepill_sim import BluePill
 from bluepill_sim.core.accesses import only_reads
 from bluepill_sim.native.library import library_path
-from tests.bluepill_sim.machine import Machine
+from tests.bluepill_sim.machine import COUNTER_ON, Machine
 from tests.bluepill_sim.native.test_native_core import state
 
 pytestmark = pytest.mark.skipif(library_path() is None, reason="the native core is not built: no C compiler")
@@ -18,7 +18,7 @@ pytestmark = pytest.mark.skipif(library_path() is None, reason="the native core 
 SYSTICK = 15
 #: SysTick each 1000 cycles counts a word of SRAM up; port A has its clock, USART1 sends at 8 MHz / 69; the cycle
 #: counter runs.
-SET_UP = """
+SET_UP = f"""
 mov32 r0, #0x40021018
 mov32 r1, #0x4004
 str r1, [r0, #0]
@@ -27,13 +27,7 @@ movs r1, #69
 str r1, [r0, #8]
 mov32 r1, #0x2008
 str r1, [r0, #12]
-mov32 r0, #0xE000EDFC
-mov32 r1, #0x01000000
-str r1, [r0, #0]
-mov32 r0, #0xE0001000
-movs r1, #1
-str r1, [r0, #0]
-mov32 r0, #0xE000E014
+{COUNTER_ON}mov32 r0, #0xE000E014
 mov32 r1, #999
 str r1, [r0, #0]
 movs r1, #0
