@@ -18,7 +18,7 @@ leaves the board's watches and listeners as it found them.
 """
 
 from collections import Counter
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
@@ -31,6 +31,7 @@ from bluepill_sim.core.halts import ChipReached
 from bluepill_sim.core.nvic import HARD_FAULT, exception_name
 from bluepill_sim.errors import BluePillError, ImageError, UnmodelledError
 from bluepill_sim.fabric.pins import Pin, PinDrive
+from bluepill_sim.fabric.subscriptions import EdgeSink, Of, PinSubscription
 from bluepill_sim.memory import Memory
 from bluepill_sim.peripherals.rcc import ResetCause
 from bluepill_sim.program.image import Image, load_image
@@ -108,7 +109,9 @@ class BluePill(Stateful):
         self._activity = Activity()
         #: More of the same, for tools.
         self.pin_listeners: list[Callable[[str, PinDrive, Nanos], None]] = []
-        self._usarts = tuple(SerialPort(chip.parts.usart(n), self._activity, self._wait_for_bytes) for n in (1, 2, 3))
+        self._usarts = tuple(
+            SerialPort(chip.parts.usart(n), self._activity, self._wait_for_bytes, chip.deliveries) for n in (1, 2, 3)
+        )
         #: How often it was reset since power came up, by cause.
         self.resets: Counter[ResetCause] = Counter()
         chip.on_reset = self._reset_begins
@@ -196,6 +199,22 @@ class BluePill(Stateful):
             KeyError: the chip has no such pin.
         """
         return self.chip.pins[name]
+
+    def subscribe_pins(
+        self, pins: Iterable[str], sink: EdgeSink, *, of: Of = Of.DRIVE, ends_slice: Iterable[str] = ()
+    ) -> PinSubscription:
+        """Have `sink` called with each change of these pins from now on, in bulk: rows of `EDGE`, oldest first.
+
+        Args:
+            pins: names, such as "PA4".
+            sink: called before `advance_to` returns.
+            of: which changes make a row.
+            ends_slice: pins whose change ends the chip's slice.
+
+        Raises:
+            KeyError: the chip has no such pin.
+        """
+        return self.chip.pins.subscribe_pins(pins, sink, of=of, ends_slice=ends_slice)
 
     @property
     def pins(self) -> tuple[Pin, ...]:

@@ -99,6 +99,8 @@ class Chip(Stateful):
         self._clock = CycleClock(self.clocks.hclk_hz)
         #: Called with (line, level, ns) at every change of an interrupt line, for tools.
         self.irq_listeners: list[Callable[[int, bool, Nanos], None]] = []
+        #: Called when the chip has run: sinks get what waits for them.
+        self.deliveries: list[Callable[[], None]] = []
         #: Called before each reset, for tools.
         self.reset_listeners: list[Callable[[], None]] = []
         #: Time of the event that a peripheral is acting on, while it does.
@@ -165,14 +167,26 @@ class Chip(Stateful):
 
     def advance_to(self, limit_ns: Nanos) -> ChipReached:
         """Run to the first block boundary at or after a time, or to what stops the chip before."""
-        return self._advance(limit_ns, self.processor.run, self._streams)
+        try:
+            return self._advance(limit_ns, self.processor.run, self._streams)
+        finally:
+            self._deliver()
 
     def step(self, limit_ns: Nanos) -> ChipReached:
         """Run one instruction, or the entry of the exception that comes before it: HALT with a STEP.
 
         A core that sleeps first goes on to what wakes it; DEADLINE where that comes after `limit_ns`.
         """
-        return self._advance(limit_ns, self.processor.step, None)
+        try:
+            return self._advance(limit_ns, self.processor.step, None)
+        finally:
+            self._deliver()
+
+    def _deliver(self) -> None:
+        """Hand the subscribers what has happened."""
+        self.pins.deliver()
+        for deliver in self.deliveries:
+            deliver()
 
     def record_blocks(self, capacity: int, on_full: Callable[[BlockRecorder], None] | None = None) -> BlockRecorder:
         """Record each block, exception entry and exception return from now on; `stop_recording` ends it.

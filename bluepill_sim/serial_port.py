@@ -4,7 +4,7 @@ Not the line itself: characters go at the speed that the USART is set to.
 Invariant: `unread` holds what was sent and no `expect` or `read` has taken yet, at most twice `KEPT_BYTES`.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -43,6 +43,10 @@ class Activity:
         return now_ns - max(self.last_pin_ns, self.last_usart_ns, self.last_wfi_ns) >= QUIET_NS
 
 
+#: Takes rows (word, ns at the end of its stop bit), oldest first.
+WordSink = Callable[[Sequence[tuple[int, Nanos]]], None]
+
+
 class WaitForBytes(Protocol):
     """Runs the chip until a port has sent something."""
 
@@ -60,7 +64,10 @@ class SerialPort(Stateful):
 
     STATE = ("unread",)
 
-    def __init__(self, usart: Usart, activity: Activity, wait: WaitForBytes) -> None:
+    def __init__(
+        self, usart: Usart, activity: Activity, wait: WaitForBytes, deliveries: list[Callable[[], None]]
+    ) -> None:
+        self._deliveries = deliveries
         self._usart = usart
         self._activity = activity
         self._wait = wait
@@ -79,6 +86,32 @@ class SerialPort(Stateful):
     def receive(self, data: bytes) -> None:
         """Send characters to the RX pin, at the speed of the line."""
         self._usart.receive(data)
+
+    def subscribe(self, sink: WordSink) -> Callable[[], None]:
+        """Have `sink` called with the characters that go out from now on, in bulk, before `advance_to` returns.
+
+        Returns:
+            A function that ends the subscription.
+        """
+        rows: list[tuple[int, Nanos]] = []
+
+        def deliver() -> None:
+            if rows:
+                taken = rows.copy()
+                rows.clear()
+                sink(taken)
+
+        def take(word: int, at_ns: Nanos) -> None:
+            rows.append((word, at_ns))
+
+        def close() -> None:
+            deliver()
+            self.listeners.remove(take)
+            self._deliveries.remove(deliver)
+
+        self.listeners.append(take)
+        self._deliveries.append(deliver)
+        return close
 
     def receives_at(self, pin: str) -> bool:
         """Tell whether the receiver is on and takes its characters from a pin: those of `receive`, or its level."""

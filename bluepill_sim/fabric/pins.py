@@ -14,11 +14,12 @@ Invariant: `output` and `level` follow from the other attributes alone; every
 change of `output` is notified to `PinBank.on_output` once, with its exact time.
 """
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from enum import Enum
 from typing import Protocol, Self
 
+from bluepill_sim.fabric.subscriptions import EDGE, FLOATING, EdgeSink, Of
 from simbase.state import Rows, Stateful
 from simbase.wire import are_fighting, level_of
 
@@ -112,7 +113,18 @@ class Holder:
 class Pin(Stateful):
     """One pin of one port, seen from outside (`drive`, `level`, `output`, `watch`) and from inside."""
 
-    STATE = ("_outside", "_mode", "_output_bit", "_holder", "_sources", "is_watched", "output", "level", "_rail")
+    STATE = (
+        "_outside",
+        "_is_weak",
+        "_mode",
+        "_output_bit",
+        "_holder",
+        "_sources",
+        "is_watched",
+        "output",
+        "level",
+        "_rail",
+    )
     DERIVED = ("_drives", "_reads", "input")
 
     def __init__(
@@ -139,6 +151,8 @@ class Pin(Stateful):
         #: Called at every change of `input`, in the order of subscription (GPIO's IDR, EXTI).
         self.listeners: list[Callable[[Pin], None]] = []
         self._outside: bool | None = None
+        #: Whether a resistor drives it, which yields to the chip.
+        self._is_weak = False
         self._rail: str | None = None
         self._mode = PinMode.FLOATING
         self._output_bit = False
@@ -152,12 +166,13 @@ class Pin(Stateful):
 
     # From outside the chip.
 
-    def drive(self, level: bool | int | None, *, volts: float | None = None) -> None:
-        """Put a level (False, True, or 0, 1) on the wire from outside; None lets go.
+    def drive(self, level: bool | int | None, *, volts: float | None = None, is_weak: bool = False) -> None:
+        """Put a level on the wire from outside; None lets go.
 
         Args:
-            level: What the other end drives.
-            volts: How high a 1 is; None is 3.3 V. More than the pin bears is warned of.
+            level: 0, 1 or None.
+            volts: how high a 1 is, where that is known; more than the pin bears is warned of.
+            is_weak: whether a resistor does it: stronger than the chip's own pulls of 40 kΩ, weaker than its outputs.
 
         Raises:
             ValueError: The package has no leg for this pin.
@@ -168,8 +183,8 @@ class Pin(Stateful):
         if complaint is not None:
             self._bank.warn(complaint, once=f"{self.name}:volts")
         outside = None if level is None else bool(level)
-        if outside is not self._outside:
-            self._outside = outside
+        if (outside, is_weak) != (self._outside, self._is_weak):
+            self._outside, self._is_weak = outside, is_weak
             self._bank.simple_is_known = False
             self._resolve()
             if outside is None:
@@ -210,7 +225,7 @@ class Pin(Stateful):
     @property
     def is_contended(self) -> bool:
         """Whether chip and outside world drive the wire to different levels."""
-        outside = self._outside if self._rail is None else RAILS[self._rail]
+        outside = (None if self._is_weak else self._outside) if self._rail is None else RAILS[self._rail]
         return self.output.is_strong and outside is not None and are_fighting((outside, self.output.level))
 
     @property
@@ -337,6 +352,8 @@ class Pin(Stateful):
         elif outside is None:
             # A weak pull of the chip is stronger than the board's (40 kΩ against an LED or 100 kΩ).
             level = bool(self.board_pull.level if output.level is None else output.level)
+        elif output.is_strong and self._is_weak:
+            level = bool(output.level)
         elif output.is_strong:
             drivers = outside, bool(output.level)
             level = bool(level_of(drivers))
@@ -350,7 +367,7 @@ class Pin(Stateful):
             self.input = seen
             for listener in self.listeners:
                 listener(self)
-        if self._bank.wire_listeners:
+        if self._bank.wire_listeners or self._bank.subscriptions:
             self._bank.wire_changed(self)
 
 
@@ -386,6 +403,8 @@ class PinBank(Stateful):
         }
         self._by_name = {pin.name: pin for pins in self._pins.values() for pin in pins}
         self._rows = Rows(self._by_name.values())
+        #: Who wants edges in bulk.
+        self.subscriptions: list[Subscription] = []
         #: Called with (pin name, drive, time in ns) at every change of the chip's own drive.
         self.on_output: Callable[[str, PinDrive, int], None] | None = None
         #: Whether anything beyond `on_silent_output` subscribes to each output.
@@ -435,12 +454,35 @@ class PinBank(Stateful):
             self.on_output(pin.name, pin.output, self._ports.now_ns)
         if pin.is_watched:
             self._ports.request_stop()
+        for subscription in self.subscriptions:
+            if subscription.of is Of.DRIVE:
+                subscription.put(pin, self._ports)
 
     def wire_changed(self, pin: Pin) -> None:
         """Notify the tools that a pin's wire may have changed (called by the pin)."""
         now_ns = self._ports.now_ns
         for listener in self.wire_listeners:
             listener(pin, now_ns)
+        for subscription in self.subscriptions:
+            if subscription.of is Of.WIRE:
+                subscription.put(pin, self._ports)
+
+    def subscribe_pins(
+        self, pins: Iterable[str], sink: EdgeSink, *, of: Of = Of.DRIVE, ends_slice: Iterable[str] = ()
+    ) -> "Subscription":
+        """Have `sink` called with each change of these pins from now on.
+
+        Raises:
+            KeyError: The chip has no such pin.
+        """
+        subscription = Subscription(self, [self._by_name[name] for name in pins], sink, of, frozenset(ends_slice))
+        self.subscriptions.append(subscription)
+        return subscription
+
+    def deliver(self) -> None:
+        """Hand every sink what waits for it."""
+        for subscription in self.subscriptions:
+            subscription.deliver()
 
     def warn(self, message: str, *, once: str) -> None:
         """Warn of something electrical."""
@@ -449,6 +491,50 @@ class PinBank(Stateful):
     def _make(self, port: str, number: int, bonded: frozenset[str], tolerant: frozenset[str]) -> Pin:
         name = f"P{port}{number}"
         return Pin(self, port, number, is_bonded=name in bonded, is_five_volt_tolerant=name in tolerant)
+
+
+class Subscription:
+    """One subscriber's pins; see `fabric/subscriptions.py`."""
+
+    def __init__(self, bank: PinBank, pins: Iterable[Pin], sink: EdgeSink, of: Of, ends_slice: frozenset[str]) -> None:
+        self._bank = bank
+        self._sink = sink
+        self._rows = bytearray()
+        self.of = of
+        self.ends_slice = ends_slice
+        self._values = {pin.name: self._value(pin) for pin in pins}
+
+    def put(self, pin: Pin, ports: PinPorts) -> None:
+        """Note what a pin is now, where that is another than before."""
+        before, now = self._values.get(pin.name), self._value(pin)
+        if before is None or before == now:
+            return
+        self._values[pin.name] = now
+        drive, wire = _DRIVES.index(pin.output), FLOATING if pin.is_floating else int(pin.level)
+        number = 16 * self._bank.PORTS.index(pin.port) + pin.number
+        self._rows += EDGE.pack(ports.now_ns, number, drive, wire, 0, 0)
+        if pin.name in self.ends_slice:
+            ports.request_stop()
+
+    def deliver(self) -> None:
+        """Hand the sink what waits for it."""
+        if self._rows:
+            rows = bytes(self._rows)
+            self._rows.clear()
+            self._sink(rows)
+
+    def close(self) -> None:
+        """Deliver what waits, and get nothing more."""
+        self.deliver()
+        self._bank.subscriptions.remove(self)
+
+    def _value(self, pin: Pin) -> int:
+        if self.of is Of.DRIVE:
+            return _DRIVES.index(pin.output)
+        return FLOATING if pin.is_floating else int(pin.level)
+
+
+_DRIVES = tuple(PinDrive)
 
 
 def overvoltage(pin: "Pin", volts: float) -> str | None:

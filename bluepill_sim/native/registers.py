@@ -99,7 +99,9 @@ class SharedPorts:
             self._is_recording = is_recording
             if not library().core_record_pins(self._engine.state, is_recording):
                 raise MemoryError("no memory for a record of pins")
-        is_subscribed = bank.is_subscribed() or len(bank.wire_listeners) > len(bank.bulk_listeners)
+        is_subscribed = (
+            bank.is_subscribed() or bool(bank.subscriptions) or len(bank.wire_listeners) > len(bank.bulk_listeners)
+        )
         if bank.simple_is_known and is_subscribed is self._was_subscribed:
             return
         bank.simple_is_known, self._was_subscribed = True, is_subscribed
