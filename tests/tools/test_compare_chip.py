@@ -7,6 +7,7 @@ import pytest
 
 from tools.compare_chip.comparison import LEVELS, Comparison
 from tools.compare_chip.differences import compare, difference_of_states
+from tools.compare_chip.generator import generate, labels_at, name_of
 from tools.compare_chip.programs import script_of
 from tools.compare_chip.worker import Worker, WorkerError
 
@@ -87,3 +88,27 @@ def test_a_program_that_is_none_is_told_and_the_next_job_runs(tmp_path: Path, wo
     with pytest.raises(WorkerError, match="bad"):
         worker.ask("symbols", image=str(tmp_path / "bad.elf"), addresses=[])
     assert "USART1.SR" in worker.ask("registers", folder=str(tmp_path))["addresses"]
+
+
+def test_generated_programs_follow_from_seed_and_number_and_use_what_they_should(tmp_path: Path) -> None:
+    sources = []
+    for number in range(20):
+        image = generate(7, number, tmp_path)
+        kept = image.read_bytes(), image.with_suffix(".s").read_text()
+        assert generate(7, number, tmp_path).read_bytes() == kept[0]
+        sources.append(kept[1])
+    used = ("wfi", "wfe", "svc", "udf", "cpsid i", "basepri", "stop: b stop", "psp", "blx")
+    assert [word for word in used if not any(word in source for source in sources)] == []
+
+
+def test_addresses_in_a_generated_program_have_its_labels(tmp_path: Path) -> None:
+    image = generate(0, 0, tmp_path)
+    assert labels_at(image, ["0x08000132"]) == {"0x08000132": "start+0x2 (0x08000132)"}
+
+
+def test_generated_programs_run_on_both_cores_alike(tmp_path: Path, worker: Worker) -> None:
+    said: list[str] = []
+    comparison = Comparison(worker, worker, tmp_path, said.append, slices=("random",), is_quick=True)
+    for number in range(2):
+        assert comparison.compare(name_of(0, number), generate(0, number, tmp_path)), said
+    assert comparison.runs == 2 * len(LEVELS)

@@ -17,7 +17,7 @@ import time
 from pathlib import Path
 
 from tools.compare_chip.comparison import LEVELS, SLICES, Comparison
-from tools.compare_chip.programs import chosen, programs_of
+from tools.compare_chip.programs import chosen, generated, programs_of
 from tools.compare_chip.worker import PACKAGE, Worker
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -38,15 +38,17 @@ def main() -> int:
         levels = [level for level in LEVELS if not options.level or level.name in options.level]
         same = count = 0
         try:
-            for program in chosen(programs_of(old.checkout), options.program):
+            programs = [*programs_of(old.checkout), *generated(options.seed, options.generated)]
+            for program in chosen(programs, options.program):
                 is_same = comparison.compare(program.name, program.image(folder), levels)
                 same, count = same + is_same, count + 1
                 print(f"{program.name:<24} {'the same' if is_same else 'DIFFERS'}", flush=True)
         finally:
             old.close()
             new.close()
+    alike = f", {comparison.alike} differ on both chips alike" if comparison.alike else ""
     print(
-        f"{same} of {count} programs the same, {comparison.runs - comparison.differing} of {comparison.runs} runs; "
+        f"{same} of {count} programs the same; {comparison.differing} of {comparison.runs} runs differ{alike}; "
         f"{time.monotonic() - began:.0f} s"
     )
     return 0 if same == count else 1

@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from tools.compare_chip.differences import STATE, Difference, compare
+from tools.compare_chip.generator import labels_at
 from tools.compare_chip.programs import MS, script_of
 from tools.compare_chip.worker import Worker, WorkerError
 
@@ -96,9 +97,10 @@ class Comparison:
     seed: int = 0
     slices: tuple[int | str, ...] = SLICES
     is_quick: bool = False
-    #: Runs that were compared, and those that differ.
+    #: Runs that were compared, those that differ, and those that differ on both chips alike: no difference of the two.
     runs: int = 0
     differing: int = 0
+    alike: int = 0
     _addresses: dict[str, int] = field(default_factory=dict)
 
     def compare(self, program: str, image: Path, levels: Iterable[Level] = LEVELS) -> bool:
@@ -106,6 +108,7 @@ class Comparison:
         references: dict[int, Reference] = {}
         #: Runs by how they differ.
         found: dict[str, list[Run]] = {}
+        before = self.differing
         for level in levels:
             end_ns = (level.quick_ms if self.is_quick else level.ms) * MS
             run = Run(program=program, image=image, level=level, end_ns=end_ns, seed=self.seed)
@@ -113,6 +116,7 @@ class Comparison:
                 made = self._run(self.old, replace(run, level=replace(level, core="native")))
                 if isinstance(made, str):
                     found.setdefault(f"the old chip {made}", []).append(run)
+                    self.differing += 1
                     continue
                 references[end_ns] = made
             for slices in self.slices:
@@ -123,7 +127,7 @@ class Comparison:
         for folder, _ in references.values():
             shutil.rmtree(folder)
         self._tell(found)
-        return not found
+        return self.differing == before
 
     def _compare_run(self, run: Run, reference: "Reference") -> str:
         """Return how a run on the new chip differs from that of the old one; empty where it does not."""
@@ -132,10 +136,15 @@ class Comparison:
         if not new:
             return ""
         old = self._differences(self.old, run, reference)
-        notes = [] if not old else ["(the old chip's own results depend on this: it differs from itself alike)"]
-        if old and old != new:
-            notes = ["(the old chip's own results depend on this: it differs from itself, in another way)"]
-        return "\n".join([*notes, *(new if isinstance(new[0], str) else self._texts(run, new))])
+        note = []
+        if old == new:
+            self.alike += 1
+            note = ["the old chip differs alike from its own first run"]
+        else:
+            self.differing += 1
+            if old:
+                note = ["the old chip differs too from its own first run, in another way"]
+        return "\n".join([*note, *(new if isinstance(new[0], str) else self._texts(run, new))])
 
     def _differences(self, worker: Worker, run: Run, reference: "Reference") -> list[Any]:
         """Run a program and return its differences; a text where it did not run."""
@@ -161,15 +170,16 @@ class Comparison:
     def _texts(self, run: Run, found: list[Difference]) -> list[str]:
         """Return differences for a person, with the symbols of the program where it has any."""
         addresses = sorted(set().union(*(difference.addresses() for difference in found)))
-        try:
-            answer = self.old.ask("symbols", image=str(run.image), addresses=[int(at, 0) for at in addresses])
-        except WorkerError:
-            answer = {"where": {}}
-        names = dict(zip(addresses, answer["where"], strict=False))
+        names = labels_at(run.image, addresses)
+        if not names:
+            try:
+                answer = self.old.ask("symbols", image=str(run.image), addresses=[int(at, 0) for at in addresses])
+                names = dict(zip(addresses, answer["where"], strict=True))
+            except WorkerError:
+                names = {}
         return [one.text(lambda address: names.get(address, address)) for one in found]
 
     def _tell(self, found: dict[str, list[Run]]) -> None:
-        self.differing += sum(map(len, found.values()))
         for text, runs in list(found.items())[:MOST_TOLD]:
             self.say("\n".join([f"  {runs[0]}", *(f"    {line}" for line in text.splitlines())]))
             if len(runs) > 1:

@@ -13,7 +13,8 @@ from pathlib import Path
 STATE = "state"
 #: chosen: items before the first difference, and differing names of a state, that are shown.
 BEFORE, MOST_NAMES = 2, 8
-_ADDRESS = re.compile(r"0x0[08][0-9a-f]{6}\b")
+#: An address in the flash that stands without its symbol.
+_ADDRESS = re.compile(r"(?<!\()0x080[0-9a-f]{5}\b")
 
 
 @dataclass(frozen=True, slots=True)

@@ -19,6 +19,7 @@ import sys
 import time
 import zlib
 from collections.abc import Callable, Iterator
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any, TextIO
 
@@ -36,6 +37,9 @@ FLASH_BASE, SRAM_BASE, SRAM_BYTES, PERIPHERAL_BASE, PPB_BASE = (
 ROWS = 1 << 15
 #: chosen: a chip that stops so often without getting anywhere stands at a halt for good.
 MOST_STOPS = 1000
+
+#: chosen: bytes of SRAM, and characters, that a line shows.
+ROW_BYTES = 16
 
 #: What checkouts spell differently: by what it does, the ways to do it, of which the first that exists is taken.
 WAYS: dict[str, tuple[Callable[..., Any], ...]] = {
@@ -142,26 +146,12 @@ class Seen:
 
 def state_of(board: Any, addresses: dict[str, int]) -> Iterator[tuple[str, object]]:
     """Yield everything that can be seen of a board that stands, by name."""
-    yield "time in ns", board.now_ns
-    yield "cycle", board.cycle
-    yield "HCLK in Hz", board.hclk_hz
-    yield "PC", f"{board.pc:#010x}"
-    yield "asleep", board.is_asleep
-    yield "fault", str(board.fault)
-    yield "verdict", board.verdict
-    for number, text in enumerate(board.warnings):
-        yield f"warning {number + 1}", text
-    yield "last pin, character, sleep in ns", str(board.activity)
+    yield from outside_of(board)
     for name in CPU_REGISTERS:
         yield name, f"{board.register(name):#010x}"
-    for name, port in board.serial_ports.items():
-        yield f"{name} unread", bytes(port.unread).hex()
-        yield f"{name} speeds", port.speeds
-    for pin in board.pins:
-        yield f"pin {pin.name}", f"{pin.output.value}, {int(pin.level)}, {pin.mode.value}, {pin.function}"
     sram = board.read_memory(SRAM_BASE, SRAM_BYTES)
-    for at in range(0, SRAM_BYTES, 16):
-        yield f"SRAM {SRAM_BASE + at:#010x}", sram[at : at + 16].hex(" ", 4)
+    for at in range(0, SRAM_BYTES, ROW_BYTES):
+        yield f"SRAM {SRAM_BASE + at:#010x}", sram[at : at + ROW_BYTES].hex(" ", 4)
     yield "flash (CRC)", zlib.crc32(board.read_memory(FLASH_BASE, 0x1_0000))
     for name, address in CORE_REGISTERS.items():
         yield name, f"{way('read', board, address):#010x}"
@@ -172,16 +162,36 @@ def state_of(board: Any, addresses: dict[str, int]) -> Iterator[tuple[str, objec
         yield name, f"{way('read', board, address):#010x}"
 
 
-def limits(start_ns: int, end_ns: int, slices: int | str) -> Iterator[Callable[[int], int]]:
-    """Yield for ever what gives, at a time, the limit of the next slice: fixed, none, or "random SEED"."""
-    if isinstance(slices, int):
-        while True:
-            yield lambda now_ns: now_ns + slices
-    kind, _, seed = slices.partition(" ")
+def outside_of(board: Any) -> Iterator[tuple[str, object]]:
+    """Yield what is seen of a board from outside, by name."""
+    yield "time in ns", board.now_ns
+    yield "cycle", board.cycle
+    yield "HCLK in Hz", board.hclk_hz
+    yield "PC", f"{board.pc:#010x}"
+    yield "asleep", board.is_asleep
+    yield "fault", str(board.fault)
+    yield "verdict", board.verdict
+    for number, text in enumerate(board.warnings):
+        yield f"warning {number + 1}", text
+    for name, value in asdict(board.activity).items():
+        yield name, value
+    for name, port in board.serial_ports.items():
+        for at in range(0, len(port.unread), ROW_BYTES):
+            yield f"{name} sent {at}", bytes(port.unread[at : at + ROW_BYTES]).hex(" ", 4)
+        yield f"{name} speeds", port.speeds
+    for pin in board.pins:
+        yield f"pin {pin.name}", f"{pin.output.value}, {int(pin.level)}, {pin.mode.value}, {pin.function}"
+
+
+def spans(slices: int | str, end_ns: int) -> Iterator[int]:
+    """Yield for ever how long the next slice is, in ns: fixed, up to the next input ("whole") or "random SEED"."""
+    kind, _, seed = str(slices).partition(" ")
     dice = random.Random(seed)
     while True:
-        span = end_ns - start_ns if kind == "whole" else dice.choice((1, 17, 777, 31_337, 250_001, 3_000_017))
-        yield lambda now_ns, span=span: now_ns + span
+        if kind == "random":
+            yield dice.choice((1, 17, 777, 31_337, 250_001, 3_000_017))
+        else:
+            yield end_ns if kind == "whole" else int(slices)
 
 
 def run(job: dict[str, Any]) -> dict[str, Any]:
@@ -194,13 +204,16 @@ def run(job: dict[str, Any]) -> dict[str, Any]:
     began = time.process_time()
     inputs = [*job["script"], [end_ns, "end"]]
     middle = inputs[len(inputs) // 2] if level == "restored" else None
-    slices = limits(0, end_ns, job["slices"])
+    slices = spans(job["slices"], end_ns)
     for what in inputs:
         advance(board, min(what[0], end_ns), slices)
         if what is middle:
             snapshot = pickle.dumps(board.snapshot())
+            far_bauds = {name: port.far_baud for name, port in board.serial_ports.items()}
             board = BluePill(job["image"])
             board.restore(pickle.loads(snapshot))  # noqa: S301 - made a line above
+            for name, baud in far_bauds.items():  # the line's other end is no part of the board
+                board.serial_ports[name].far_baud = baud
             seen.subscribe(board, is_watched=False)
         if what[0] >= end_ns:
             break
@@ -210,12 +223,12 @@ def run(job: dict[str, Any]) -> dict[str, Any]:
     return {"used_s": used_s}
 
 
-def advance(board: Any, until_ns: int, slices: Iterator[Callable[[int], int]]) -> None:
+def advance(board: Any, until_ns: int, slices: Iterator[int]) -> None:
     """Bring a board to a time in slices."""
     stops = 0
     while board.now_ns < until_ns:
         before = board.now_ns
-        board.advance_to(min(until_ns, next(slices)(before)))
+        board.advance_to(min(until_ns, before + next(slices)))
         stops = stops + 1 if board.now_ns == before else 0
         if stops > MOST_STOPS:
             return

@@ -1,6 +1,6 @@
-"""The programs that are compared: what a checkout has committed or can build, and generated ones.
+"""The programs that are compared: what a checkout has committed or can build, and generated ones; and their inputs.
 
-All are taken from the old checkout, so that both run the same bytes; the script of what is put in from outside is
+Files are taken from the old checkout, so that both run the same bytes; the script of what is put in from outside is
 made of a seed and the program's name.
 """
 
@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from tools.bench.firmware.build import COMPILER, build
+from tools.compare_chip.generator import generate, name_of
 
 MS = 1_000_000
 #: Where ELF files are committed.
@@ -76,6 +77,14 @@ def programs_of(checkout: Path) -> list[Program]:
     for pattern, options in BUILT.items():
         found += [built(source, option) for source in sorted(checkout.glob(pattern)) for option in options]
     return [*found, Program("exercise", lambda folder: _exercise(checkout, folder / "exercise.elf"))]
+
+
+def generated(seed: int, count: int) -> list[Program]:
+    """Return generated programs."""
+    return [
+        Program(name_of(seed, number), lambda folder, number=number: generate(seed, number, folder))
+        for number in range(count)
+    ]
 
 
 def chosen(programs: list[Program], names: list[str] | None) -> list[Program]:
