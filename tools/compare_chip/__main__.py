@@ -1,7 +1,7 @@
 """Compares the chips of two checkouts: edges, characters, blocks and final states of many programs.
 
     python -m tools.compare_chip ../old                      this checkout with another
-    python -m tools.compare_chip ../old ../new --quick       few slices, short
+    python -m tools.compare_chip ../old ../new --quick       shorter runs
     python -m tools.compare_chip ../old --program dodge --generated 0
 
 Each program runs on the old chip once a level, in one call; then on the new one in slices of several lengths, each
@@ -28,6 +28,12 @@ BUDGET_S = 120.0
 def main() -> int:
     """Compare, and print one line a program and every difference."""
     options = _options()
+    programs = [*programs_of(options.old), *generated(options.seed, options.generated)]
+    try:
+        programs = chosen(programs, options.program)
+    except LookupError as error:
+        print(f"compare_chip: {error}", file=sys.stderr)
+        return 2
     began = time.monotonic()
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
@@ -38,9 +44,8 @@ def main() -> int:
         levels = [level for level in LEVELS if not options.level or level.name in options.level]
         same = count = 0
         try:
-            programs = [*programs_of(old.checkout), *generated(options.seed, options.generated)]
-            for program in chosen(programs, options.program):
-                is_same = comparison.compare(program.name, program.image(folder), levels)
+            for program in programs:
+                is_same = comparison.compare(program.name, program.image(options.keep or folder), levels)
                 same, count = same + is_same, count + 1
                 print(f"{program.name:<24} {'the same' if is_same else 'DIFFERS'}", flush=True)
         finally:
@@ -79,6 +84,7 @@ def _options() -> argparse.Namespace:
     parser.add_argument("--quick", action="store_true", help="shorter runs")
     parser.add_argument("--generated", type=int, default=20, metavar="N", help="how many generated programs (20)")
     parser.add_argument("--seed", type=int, default=0, help="of inputs, random slices and generated programs (0)")
+    parser.add_argument("--keep", type=_folder, metavar="DIR", help="leave the programs here")
     return parser.parse_args()
 
 
@@ -86,7 +92,13 @@ def _checkout(text: str) -> Path:
     path = Path(text)
     if not (path / PACKAGE / "__init__.py").is_file():
         raise argparse.ArgumentTypeError(f"{text} is no checkout: it has no {PACKAGE} (hint: git worktree add)")
-    return path
+    return path.resolve()
+
+
+def _folder(text: str) -> Path:
+    path = Path(text)
+    path.mkdir(parents=True, exist_ok=True)
+    return path.resolve()
 
 
 def _slices(text: str) -> int | str:
@@ -98,4 +110,7 @@ def _slices(text: str) -> int | str:
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    try:
+        sys.exit(main())
+    except KeyboardInterrupt:
+        sys.exit(130)

@@ -81,7 +81,9 @@ class Generator:
     def source(self) -> str:
         """Return the program."""
         dice = self.dice
-        steps = [(f"step{number}", dice.choice(self.steps)()) for number in range(dice.randrange(14, 34))]
+        # Each program computes, with IT blocks and all; the rest is left to chance.
+        kinds = [self.compute, self.compute, self.compute, *dice.choices(self.steps, k=dice.randrange(12, 30))]
+        steps = [(f"step{number}", kind()) for number, kind in enumerate(dice.sample(kinds, len(kinds)))]
         # Each round takes some of them, by bits of the round's number: no two rounds are alike.
         calls = "\n".join(f"bl {name}" if dice.random() < 0.7 else self.sometimes(name) for name, _ in steps)
         functions = "\n".join(f"{name}: push {{lr}}\n{text}\npop {{pc}}" for name, text in steps)
