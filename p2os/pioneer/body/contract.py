@@ -149,7 +149,7 @@ class RobotBody(Protocol):
         ...
 
     def sees(self, number: int, other: Self, its_number: int) -> float | None:
-        """Return how far one of its sonar is from one of another robot's, metres; None where not each sees the other."""
+        """Return how far one of its sonar is from another's, metres; None where not each sees the other."""
         ...
 
     def step(self, left_mps: float, right_mps: float) -> WheelAngles:

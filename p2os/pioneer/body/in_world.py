@@ -322,20 +322,27 @@ class BodyInWorld(Stateful):
         return found
 
     def sees(self, number: int, other: "BodyInWorld", its_number: int) -> float | None:
-        """Return how far one of its sonar is from one of another robot's, metres, where each stands in the other's beam.
+        """Return how far one of its sonar is from one of another's, metres, where each stands in the other's beam.
 
         None where they do not face each other, are out of range, or something stands between them.
         """
-        (x, y, rays), (ox, oy, its) = self._rays(self._cones[number]), other._rays(other._cones[its_number])  # noqa: SLF001  # one of its own kind
-        far = math.hypot(ox - x, oy - y)
-        if not 0.0 < far <= self._parameters.sonar_range_m:
+        own, its = self.standing_pose, other.standing_pose
+        longest = self._parameters.sonar_range_m
+        if math.hypot(its.x_m - own.x_m, its.y_m - own.y_m) > longest + self.reach_m + other.reach_m:
+            return None
+        x, y = _point(own, self._cones[number])
+        ox, oy = _point(its, other._cones[its_number])  # noqa: SLF001  # one of its own kind
+        far, bearing = math.hypot(ox - x, oy - y), math.atan2(oy - y, ox - x)
+        if (
+            not 0.0 < far <= longest
+            or not _is_in_beam(self._cones[number], bearing - own.heading_rad)
+            or not _is_in_beam(other._cones[its_number], bearing + math.pi - its.heading_rad)  # noqa: SLF001  # as above
+        ):
             return None
         way = ((ox - x) / far, (oy - y) / far)
-        if not _is_between(way, rays) or not _is_between((-way[0], -way[1]), its):
-            return None
         self._tell_plan()
         box = (min(x, ox), min(y, oy), max(x, ox), max(y, oy))
-        between = [shape for shape in self._plan.echoing_within(*box)]
+        between = list(self._plan.echoing_within(*box))
         between += [robot.footprint for robot in self.others if robot is not other]
         is_free = cast(between, x, y, [way], far)[0] >= far
         return far if is_free else None
@@ -420,8 +427,13 @@ def free_name(number: int, world: World) -> str:
     return name
 
 
-def _is_between(way: Direction, rays: Sequence[Direction]) -> bool:
-    """Tell whether a direction lies between the rightmost and the leftmost of some rays."""
-    (rx, ry), (lx, ly) = rays[0], rays[-1]
-    is_ahead = rx * way[0] + ry * way[1] > 0.0
-    return is_ahead and rx * way[1] - ry * way[0] >= 0.0 >= lx * way[1] - ly * way[0]
+def _point(pose: StandingPose, cone: Cone) -> tuple[float, float]:
+    """Return where a sensor of a robot is in the plan."""
+    c, s = math.cos(pose.heading_rad), math.sin(pose.heading_rad)
+    return pose.x_m + cone.x_m * c - cone.y_m * s, pose.y_m + cone.x_m * s + cone.y_m * c
+
+
+def _is_in_beam(cone: Cone, bearing_rad: float) -> bool:
+    """Tell whether a bearing in the robot's frame lies in a cone."""
+    right, left = cone.headings_rad[0], cone.headings_rad[-1]
+    return abs(math.remainder(bearing_rad - (right + left) / 2, math.tau)) <= (left - right) / 2

@@ -118,6 +118,7 @@ class KinematicBody(BodyInWorld):
 
     name = "kinematic"
     scene: KinematicScene
+    others: "tuple[KinematicBody, ...]"
 
     def __init__(self, scene: KinematicScene, parameters: RobotParameters, number: int) -> None:
         super().__init__(scene, parameters, number)
@@ -325,7 +326,7 @@ class KinematicBody(BodyInWorld):
         reach, found = self.reach_m, []
         hull = None
         for other in self.near:
-            if math.hypot(other._x - x, other._y - y) <= reach + other.reach_m:
+            if math.hypot(other.standing_pose.x_m - x, other.standing_pose.y_m - y) <= reach + other.reach_m:
                 hull = hull or placed(self._hull, x, y, heading)
                 if other.footprint.overlaps(hull):
                     found.append(other)
@@ -353,14 +354,14 @@ class KinematicBody(BodyInWorld):
                 continue
             share = 1 + APART_M / length
             dx, dy = dx * share, dy * share
-            further = other._behind(dx, dy, (*pushing, other))
+            further = other.what_it_pushes(dx, dy, (*pushing, other))
             if further is None:
                 return None
-            moves += [*further, (other, dx, dy, other._hold_n(dx / length, dy / length))]
+            moves += [*further, (other, dx, dy, other.hold_n(dx / length, dy / length))]
         robots = [robot for robot, _, _, _ in moves]
         return moves if len(set(robots)) == len(robots) else None
 
-    def _behind(
+    def what_it_pushes(
         self, dx: float, dy: float, pushing: "tuple[KinematicBody, ...]"
     ) -> "list[tuple[KinematicBody, float, float, float]] | None":
         """Return what is pushed when this robot gives way by (dx, dy), metres; None where a thing stands there."""
@@ -369,7 +370,7 @@ class KinematicBody(BodyInWorld):
             return None
         return self._pushed_robots(x, y, self._heading, pushing)
 
-    def _hold_n(self, dx: float, dy: float) -> float:
+    def hold_n(self, dx: float, dy: float) -> float:
         """Return the force that it takes to push this robot along a unit direction, N."""
         along, across = dx * self._cos + dy * self._sin, dy * self._cos - dx * self._sin
         drives = self._asked[0] + self._asked[1]

@@ -20,15 +20,15 @@ from simbase.timing import NS_PER_S, Nanos
 
 #: At 20 °C.
 SOUND_MPS = 343.0
-#: chosen: as long as sound takes for 17 m; no sonar of a shipped model looks farther than 5 m.
-KEPT_NS: Nanos = 50_000_000
+#: chosen: as long as sound takes for 6.9 m; no sonar of a shipped model looks farther than 5 m.
+KEPT_NS: Nanos = 20_000_000
 
 
 class Seeing(Protocol):
     """A body whose sonar may face another's."""
 
     def sees(self, number: int, other: Any, its_number: int) -> float | None:
-        """Return how far one of its sonar is from one of another robot's, metres; None where not each sees the other."""
+        """Return how far one of its sonar is from another's, metres; None where not each sees the other."""
         ...
 
 

@@ -193,7 +193,7 @@ class BulletBody(EngineBody):
     """A differential drive with mass, torque limits and friction."""
 
     STATE = ("_targets", "_start")
-    #: What the scene's `engine_state` makes anew, what is read from the engine, and what only spares a look for contacts.
+    #: What the scene's `engine_state` makes anew, what is read from the engine, and what spares a look for contacts.
     DERIVED = ("robot", "_centre", "_joints", "_matrix", "_origin", "_alone", "_look_in", "_is_busy", "_fan",
                "_fan_rays", "_motors")  # fmt: skip
 

@@ -147,8 +147,8 @@ class MujocoBody(EngineBody):
 
     STATE = ("_start",)
     #: Where in the engine's objects things are.
-    DERIVED = ("_qpos", "_qvel", "_wheel_places", "_wheel_speeds", "_rotors", "_robot_place", "_robot_speed", "_hull_number",
-               "_wheel_numbers", "_asked", "_fan", "_fan_rays")  # fmt: skip
+    DERIVED = ("_qpos", "_qvel", "_wheel_places", "_wheel_speeds", "_rotors", "_robot_place", "_robot_speed",
+               "_hull_number", "_wheel_numbers", "_asked", "_fan", "_fan_rays")  # fmt: skip
 
     name = "mujoco"
     scene: MujocoScene

@@ -187,8 +187,8 @@ def _add_robot(spec: mujoco.MjSpec, parameters: RobotParameters, names: RobotNam
     above = (0.0, 0.0, chassis.middle_m - chassis.centre[2])
     solid.add_geom(name=names.hull, type=_BOX, size=(length / 2, width / 2, height / 2), pos=above, mass=0.0, **hull)
     robot.add_geom(
-        name=names.caster, type=_SPHERE, size=(own.caster_radius_m, 0.0, 0.0), pos=(own.caster_x_m, 0.0, own.caster_radius_m),
-        mass=CASTER_MASS_KG, **caster,
+        name=names.caster, type=_SPHERE, size=(own.caster_radius_m, 0.0, 0.0),
+        pos=(own.caster_x_m, 0.0, own.caster_radius_m), mass=CASTER_MASS_KG, **caster,
     )  # fmt: skip
     for name, rotor_name, side in zip(names.wheels, names.rotors, (1, -1), strict=True):
         body = robot.add_body(name=name, pos=(0.0, side * parameters.track_mm / 2000, radius))
