@@ -93,11 +93,12 @@ def start_arrow(world: World, length_m: float) -> tuple[Point, ...]:
 def _thing(item: Obstacle) -> Shape:
     at = (item.x_m, item.y_m) if item.walk is None else item.walk.points_m[0]
     if item.is_cylinder:
-        return Shape(_look(item), item.name, (at,), item.radius_m)
-    return Shape(_look(item), item.name, Footprint(item).polygon)
+        return Shape(look_of(item), item.name, (at,), item.radius_m)
+    return Shape(look_of(item), item.name, Footprint(item).polygon)
 
 
-def _look(item: Obstacle) -> Look:
+def look_of(item: Obstacle) -> Look:
+    """Return how a thing is drawn."""
     if item.kind.is_driven_on:
         return Look.RAMP if item.kind is Kind.RAMP else Look.FLOOR
     if item.walk is not None:
