@@ -3,6 +3,7 @@
 import json
 import shutil
 import sys
+from collections import Counter
 from pathlib import Path
 from typing import Annotated
 
@@ -246,7 +247,9 @@ def _summary(place: World) -> str:
         (pushed, "that can be pushed"),
     ]  # fmt: skip
     counted = ", ".join(_count(number, what) for number, what in counts if number or what == "obstacle")
-    return f"{place.name}, {_size(place)}: {counted}"
+    kinds = Counter(mark.kind for mark in place.marks)
+    marks = f"; marks: {', '.join(f'{number} {kind}' for kind, number in kinds.items())}" if kinds else ""
+    return f"{place.name}, {_size(place)}: {counted}{marks}"
 
 
 def _count(number: int, what: str) -> str:
