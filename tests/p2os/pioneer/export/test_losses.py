@@ -9,8 +9,10 @@ from p2os.errors import WorldError
 from p2os.pioneer.export import FORMATS, export, scene_of
 from p2os.pioneer.export.scene import Property
 from p2os.pioneer.world import load_world, parse_world
+from p2os.pioneer.world.model import Kind
 from p2os.robots.parameters import load_parameters
 from simbase.errors import UsageError
+from tests.p2os.pioneer.export.exported import written
 
 P2DX = load_parameters("p2dx")
 #: All that a world can have.
@@ -118,3 +120,20 @@ def test_what_cannot_be_exported_is_one_line_and_a_hint(
     assert said in err
     assert err.count("\n") <= 2
     assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize("ending", [".sdf", ".urdf", ".gltf", ".glb"])
+def test_what_the_table_says_is_held_comes_back(ending: str, tmp_path: Path) -> None:
+    world = parse_world(EVERYTHING, "all.toml")
+    again = load_world(written(tmp_path, f"all{ending}", world))
+    came_back = {
+        Property.KIND: any(item.kind is Kind.RAMP for item in again.obstacles),
+        Property.WALK: any(item.walk is not None for item in again.obstacles),
+        Property.PUSHED: any(item.mass_kg > 0 for item in again.obstacles),
+        Property.ROUND: any(item.is_cylinder for item in again.obstacles),
+        Property.START: again.extent == world.extent,
+        Property.MARK: again.marks != (),
+        Property.NAME: any("::" in item.name for item in again.obstacles),
+    }
+    made = FORMATS[ending]
+    assert [prop for prop, is_back in came_back.items() if made.cell(prop).held and not is_back] == []
