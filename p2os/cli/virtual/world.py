@@ -1,8 +1,9 @@
-"""`p2os world`: list, draw, check, make and convert the places a robot can be in."""
+"""`p2os world`: list, draw, check, make, convert and export the places a robot can be in, and robots."""
 
 import json
 import shutil
 import sys
+from collections import Counter
 from pathlib import Path
 from typing import Annotated
 
@@ -10,8 +11,9 @@ import typer
 
 from p2os.cli.help_pages import ROBOTS
 from p2os.cli.kept_files import FORCE_HELP, refuse_to_overwrite
-from p2os.cli.names import worlds
+from p2os.cli.names import robots, worlds
 from p2os.cli.quantities import option
+from p2os.pioneer.export import FORMATS, Export, export
 from p2os.pioneer.world import known_worlds, load_world
 from p2os.pioneer.world.drawing import svg, text, text_key
 from p2os.pioneer.world.formats import Placing, read_placed
@@ -37,14 +39,23 @@ Examples:
   p2os world check my.toml                        find what is wrong, with its line
   p2os world new --kind maze --seed 7 --out my.toml
   p2os world convert floor.yaml --out floor.toml
+  p2os world convert room --out room.sdf          for another program: .sdf, .urdf,
+                                                  .xml (MuJoCo), .gltf, .glb
+  p2os world convert room --robot p2dx --out room.sdf
+  p2os world convert --robot p2dx --out p2dx.urdf
 """
 #: Widest drawing in a terminal, in characters.
 WIDEST_COLUMNS = 100
+TOML = ".toml"
 #: Files whose up axis may be named.
 MESH_SUFFIXES = (".obj", ".stl", ".dae", ".gltf", ".glb")
 
 WORLD = Annotated[
     str, typer.Argument(help="A world that ships, or a file.", metavar="WORLD|FILE", autocompletion=worlds)
+]
+CONVERTED = Annotated[
+    str | None,
+    typer.Argument(help="A world that ships, or a file.", metavar="[WORLD|FILE]", autocompletion=worlds),
 ]
 FORCE = Annotated[bool, typer.Option("--force", help=FORCE_HELP)]
 WORLD_SEED = Annotated[int, option(SEED, "--seed", purpose="Of a world that is made from one.", least="0", shown="0")]
@@ -139,18 +150,47 @@ def new(
 
 
 def convert(
-    world: WORLD,
+    world: CONVERTED = None,
     out: Annotated[
-        Path | None, typer.Option(help="The file to write; without it the text is printed.", metavar="FILE")
+        Path | None,
+        typer.Option(help="The file to write; without it the text of a TOML file is printed.", metavar="FILE"),
+    ] = None,
+    robot: Annotated[
+        str | None,
+        typer.Option(
+            help="Put this robot at the start; without a WORLD, the robot alone.",
+            metavar="MODEL|FILE",
+            autocompletion=robots,
+        ),
     ] = None,
     seed: WORLD_SEED = 0,
     up: UP = "auto",
     force: FORCE = False,
 ) -> None:
-    """Write any readable world as a TOML file, to be changed by hand."""
-    place = _load(world, seed, up)
-    _print_skipped(place)
-    _write(place, out, force=force)
+    """Write a world as TOML, to be changed by hand; or a world, a robot or both for another program.
+
+    The ending names the format: .toml, .sdf, .urdf, .xml (MuJoCo's MJCF), .gltf
+    or .glb. What the format does not hold is said, a line each.
+    """  # fmt: skip
+    place = None if world is None else _load(world, seed, up)
+    if place is not None:
+        _print_skipped(place)
+    if place is not None and robot is None and (out is None or out.suffix.lower() == ".toml"):
+        _write(place, out, force=force)
+        return
+    if place is None and robot is None:
+        raise UsageError("neither a world nor a robot is named", hint="p2os world convert room --out room.sdf")
+    if out is None or out.suffix.lower() not in FORMATS:
+        raise UsageError(
+            f"a {'world' if robot is None else 'robot'} cannot be written to {out or 'a terminal'}",
+            hint=f"--out FILE with {', '.join((*[TOML] * (robot is None), *FORMATS))}",
+        )
+    parameters = None if robot is None else load_parameters(robot)
+    if place is not None and parameters is not None:
+        refuse_start(place, parameters, place.start, place.start_at)
+    _write_files(export(out, place, parameters), out.parent, force=force)
+    what = [] if place is None else [_summary(place)]
+    typer.echo(f"{out}: {', with '.join([*what, *([] if parameters is None else [parameters.title])])}")
 
 
 def _load(world: str, seed: int, up: str) -> World:
@@ -164,17 +204,27 @@ def _load(world: str, seed: int, up: str) -> World:
 
 
 def _write(place: World, out: Path | None, *, force: bool) -> None:
+    """Write a world as TOML."""
     if out is None:
         sys.stdout.write(write_world(place))
         return
-    if out.suffix.lower() != ".toml":
+    if out.suffix.lower() != TOML:
         raise UsageError(f"a world cannot be written to {out}", hint="--out FILE.toml")
-    refuse_to_overwrite(out, force=force)
-    try:
-        out.write_text(write_world(place), encoding="utf-8")
-    except OSError as error:
-        raise FileError(f"{out}: {error.strerror}") from error
+    _write_files(Export(files={out.name: write_world(place).encode()}, losses=()), out.parent, force=force)
     typer.echo(f"{out}: {_summary(place)}")
+
+
+def _write_files(made: Export, folder: Path, *, force: bool) -> None:
+    """Write files into a folder, all or none where one is there already; say what they do not hold."""
+    for name in made.files:
+        refuse_to_overwrite(folder / name, force=force)
+    for name, data in made.files.items():
+        try:
+            (folder / name).write_bytes(data)
+        except OSError as error:
+            raise FileError(f"{folder / name}: {error.strerror}") from error
+    for line in made.losses:
+        sys.stderr.write(f"note: {line}\n")
 
 
 def _write_png(place: World, out: Path) -> None:
@@ -197,7 +247,9 @@ def _summary(place: World) -> str:
         (pushed, "that can be pushed"),
     ]  # fmt: skip
     counted = ", ".join(_count(number, what) for number, what in counts if number or what == "obstacle")
-    return f"{place.name}, {_size(place)}: {counted}"
+    kinds = Counter(mark.kind for mark in place.marks)
+    marks = f"; marks: {', '.join(f'{number} {kind}' for kind, number in kinds.items())}" if kinds else ""
+    return f"{place.name}, {_size(place)}: {counted}{marks}"
 
 
 def _count(number: int, what: str) -> str:
