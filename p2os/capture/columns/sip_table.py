@@ -15,13 +15,14 @@ from typing import Any, cast, overload
 import numpy as np
 import numpy.typing as npt
 
+from p2os.capture.cells import Cell, cell_text
 from p2os.capture.chunks import Chunk, Direction
 from p2os.capture.columns.framing import LARGEST_FRAME, Indexes, stalls_of
 from p2os.capture.columns.table import Table as RawTable
 from p2os.capture.columns.tables import Columns, decode
 from p2os.capture.describe import RAW_OF, SipFields, sip_fields
 from p2os.capture.listing import Reading
-from p2os.capture.table import FIRST_ROWS, LEADING, Cell, Table, cell_text, uniform
+from p2os.capture.table import FIRST_ROWS, LEADING, Table, uniform
 from p2os.protocol.frames import CHECKSUM_BYTES, GIVE_UP_NS, PREFIX_BYTES
 from p2os.protocol.packets import packet_name
 from p2os.protocol.sip import POSITION_MASK, TAIL, StandardSip

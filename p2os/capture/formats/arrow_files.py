@@ -5,7 +5,8 @@ from itertools import chain
 from pathlib import Path
 from typing import Any
 
-from p2os.capture.table import Cell, Table
+from p2os.capture.cells import Cell
+from p2os.capture.table import Table
 from simbase.errors import MissingDependencyError
 
 #: chosen: larger groups of rows are little faster and smaller in the file, and take more memory.
