@@ -18,7 +18,7 @@ import math
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from enum import Enum
-from typing import cast
+from typing import Protocol, cast
 
 from p2os.capture.chunks import Chunk, Direction
 from p2os.capture.describe import PacketFields, Plain, command_fields, command_name
@@ -114,14 +114,24 @@ class ListingRow:
         }
 
 
+class Passing(Protocol):
+    """What finds the sound frames that bytes begin with, and says which of them need no row."""
+
+    def frames(self, data: bytes, direction: Direction | None) -> tuple[list[tuple[int, int, bool]], int]:
+        """Return where each payload begins and ends and whether it is passed over, and where the frames end."""
+        ...
+
+
 class Lister:
     """Turns chunks into rows as they come.
 
     Args:
         reading: How to read what stands in the frames.
+        passing: Which packets are passed over; None for none.
     """
 
-    def __init__(self, reading: Reading) -> None:
+    def __init__(self, reading: Reading, passing: Passing | None = None) -> None:
+        self._passing = passing
         self._packets = PacketFields(reading.profile, reading.parameters)
         self._session = RecordedSession()
         self._streams: dict[Direction | None, _Stream] = {}
@@ -136,10 +146,19 @@ class Lister:
         if rest and (waiting := stream.decoder.take_back()) is not None:
             # Most bytes are sound frames, one behind the other: these need no second look.
             data, place = waiting + rest, 0
-            for payload in sound_frames(data):
-                end = place + len(payload) + PREFIX_BYTES + CHECKSUM_BYTES
-                yield self._frame_row(stream.direction, payload, data[place:end], now)
-                place = end
+            if self._passing is not None:
+                frames, place = self._passing.frames(data, stream.direction)
+                for start, end, is_passed in frames:
+                    if is_passed:
+                        self._session.name_of(data[start:end], Direction.FROM_ROBOT, now)
+                    else:
+                        whole = data[start - PREFIX_BYTES : end + CHECKSUM_BYTES]
+                        yield self._frame_row(stream.direction, data[start:end], whole, now)
+            else:
+                for payload in sound_frames(data):
+                    end = place + len(payload) + PREFIX_BYTES + CHECKSUM_BYTES
+                    yield self._frame_row(stream.direction, payload, data[place:end], now)
+                    place = end
             stream.consume(place)
             rest = data[place:]
         stream.decoder.receive(rest, now)
@@ -196,9 +215,9 @@ class Lister:
         return ListingRow(at_ns=now, direction=direction, data=whole, kind=kind, name=name, describe=describe)
 
 
-def rows_of(chunks: Iterable[Chunk], reading: Reading) -> Iterator[ListingRow]:
-    """Yield every row of a capture, or of chunks while they are read."""
-    lister, last_ns = Lister(reading), 0
+def rows_of(chunks: Iterable[Chunk], reading: Reading, passing: Passing | None = None) -> Iterator[ListingRow]:
+    """Yield every row of a capture, or of chunks while they are read; none of what is passed over."""
+    lister, last_ns = Lister(reading, passing), 0
     for chunk in chunks:
         last_ns = chunk.at_ns
         yield from lister.take(chunk)

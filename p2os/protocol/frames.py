@@ -100,7 +100,7 @@ def checksum(data: bytes) -> int:
     A 16-bit sum of big-endian pairs; an odd last byte is XORed into the low byte.
     Source: Pioneer manuals, "Packet checksum".
     """
-    total = sum(_pairs(len(data) >> 1).unpack_from(data)) & 0xFFFF
+    total: int = sum(_pairs(len(data) >> 1).unpack_from(data)) & 0xFFFF
     return total ^ data[-1] if len(data) & 1 else total
 
 

@@ -2,15 +2,17 @@
 
 import io
 import itertools
+from collections.abc import Iterable
 from pathlib import Path
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from p2os.capture import Reading, open_capture, open_file, rows_of
+from p2os.capture import ListingRow, Reading, open_capture, open_file, rows_of
 from p2os.capture.chunks import Chunk, Direction, Part, capture_of
 from p2os.capture.formats.recording import plain_parts, recorded_parts, write_recording
+from p2os.cli.captures.reading import chosen_rows, wanted_names
 from p2os.protocol.commands import rvel, vel
 from p2os.protocol.frames import Decoder, checksum, sound_frames
 from p2os.protocol.packets import EncoderPacket, SonarReading, StandardSip, packet_frame
@@ -27,7 +29,11 @@ STREAM = b"".join(FRAMES)
 
 
 def shown(chunks: list[Chunk]) -> list[tuple[object, ...]]:
-    return [(row.at_ns, row.direction, row.data, row.kind, row.name, row.problem) for row in rows_of(chunks, P2DX)]
+    return shown_of(rows_of(chunks, P2DX))
+
+
+def shown_of(rows: Iterable[ListingRow]) -> list[tuple[object, ...]]:
+    return [(row.at_ns, row.direction, row.data, row.kind, row.name, row.problem) for row in rows]
 
 
 def both_ways(chunks: list[Chunk]) -> None:
@@ -35,11 +41,17 @@ def both_ways(chunks: list[Chunk]) -> None:
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(Decoder, "take_back", lambda _: None)
         assert fast == shown(chunks)
+        patch.undo()
+        for least, wanted in itertools.product((0, 1 << 11), ("vel", "sip", "encoder,sync0,pulse", "damaged")):
+            patch.setattr("p2os.capture.columns.passing.LEAST_BYTES", least)
+            names = wanted_names(wanted)
+            passed = shown_of(chosen_rows(chunks, P2DX, names))
+            assert passed == [row for row in fast if str(row[4]).lower() in names or ("damaged" in names and row[5])]
 
 
-def chunks_of(stream: bytes, cuts: tuple[int, ...], wait_ns: int) -> list[Chunk]:
+def chunks_of(stream: bytes, cuts: tuple[int, ...], wait_ns: int, direction: Direction | None = None) -> list[Chunk]:
     places = sorted({0, *cuts, len(stream)})
-    return [Chunk(at_ns=number * wait_ns, direction=None, data=stream[start:end])
+    return [Chunk(at_ns=number * wait_ns, direction=direction, data=stream[start:end])
             for number, (start, end) in enumerate(itertools.pairwise(places))]  # fmt: skip
 
 
@@ -54,10 +66,13 @@ def test_rows_are_the_same_however_a_stream_is_cut_and_corrupted(wait_ns: int) -
 
 @given(st.lists(st.one_of(st.sampled_from(FRAMES), st.binary(max_size=4), st.just(b"\xfa\xfb\xc0"), st.just(b"\xfa")),
                 max_size=8),
-       st.lists(st.integers(0, 300), max_size=4), st.sampled_from((0, 100 * NS_PER_MS, 250 * NS_PER_MS)))  # fmt: skip
-def test_rows_of_any_stream_are_the_decoders(parts: list[bytes], cuts: list[int], wait_ns: int) -> None:
+       st.lists(st.integers(0, 300), max_size=4), st.sampled_from((0, 100 * NS_PER_MS, 250 * NS_PER_MS)),
+       st.sampled_from((None, *Direction)))  # fmt: skip
+def test_rows_of_any_stream_are_the_decoders(
+    parts: list[bytes], cuts: list[int], wait_ns: int, direction: Direction | None
+) -> None:
     stream = b"".join(parts)
-    both_ways(chunks_of(stream, tuple(min(cut, len(stream)) for cut in cuts), wait_ns))
+    both_ways(chunks_of(stream, tuple(min(cut, len(stream)) for cut in cuts), wait_ns, direction))
 
 
 def test_sound_frames_end_at_the_first_byte_that_is_none() -> None:
