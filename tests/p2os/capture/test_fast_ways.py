@@ -126,3 +126,11 @@ def test_a_source_says_whether_its_chunks_have_one_origin(content: bytes, has_on
     assert source.has_one_origin is has_one_origin
     origins = {chunk.direction is None for chunk in source.chunks}
     assert len(origins) == 1 or not has_one_origin
+
+
+@pytest.mark.parametrize("least", [0, 1 << 11])
+def test_a_packet_that_is_passed_over_still_opens_the_session(least: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("p2os.capture.columns.passing.LEAST_BYTES", least)
+    pulse = b"\xfa\xfb\x03\x00\x00\x00"
+    chunks = chunks_of(SIP + SIP + pulse + SIP, (), 0)
+    assert [row.name for row in chosen_rows(chunks, P2DX, {"pulse", "sync0"})] == ["PULSE"]
