@@ -79,7 +79,7 @@ LAYERS = {
     ),
     "adapter_sim": (
         ("codec",), ("settings", "pinout"), ("pins", "mixing", "encoders", "distances", "session"),
-        ("masters", "driver", "waveforms"), ("adapter",), ("faults",),
+        ("masters", "driver"), ("adapter",),
     ),
     "robot_bench": (
         ("loop", "pacer", "firmware", "scenarios"), ("wires",), ("direct",), ("recording",), ("scenario", "report"),
