@@ -39,7 +39,6 @@ ALLOWED = {
     "p2os.pioneer.body.bullet": {"pybullet", "numpy"},
     "p2os.pioneer.world.formats": {"yaml", "PIL"},
     "p2os.pioneer.body.mujoco": {"mujoco", "numpy"},
-    "p2os.cli.virtual.world_picture": {"matplotlib"},
     "p2os.cli.robots.pad_source": {"pygame"},
     "bluepill_sim": set(),
     "bluepill_sim.core.unicorn_core": {"unicorn"},
@@ -79,7 +78,7 @@ LAYERS = {
     ),
     "adapter_sim": (
         ("codec",), ("settings", "pinout"), ("pins", "mixing", "encoders", "distances", "session"),
-        ("masters", "driver", "waveforms"), ("adapter",), ("faults",),
+        ("masters", "driver"), ("adapter",),
     ),
     "robot_bench": (
         ("loop", "pacer", "firmware", "scenarios"), ("wires",), ("direct",), ("recording",), ("scenario", "report"),

@@ -22,7 +22,7 @@ from p2os.pioneer.world.model import World
 from p2os.pioneer.world.start_places import refuse_start
 from p2os.pioneer.world.writer import write_world
 from p2os.robots.parameters import load_parameters
-from simbase.errors import FileError, MissingDependencyError, UsageError
+from simbase.errors import FileError, UsageError
 from simbase.units import SEED
 
 HELP = """List, draw, check, make and convert worlds.
@@ -35,7 +35,7 @@ COLLADA or glTF.
 Examples:
   p2os world list                                 those that ship
   p2os world show maze                            draw one in the terminal
-  p2os world show room.dae --out room.png         as a picture (.png or .svg)
+  p2os world show room.dae --out room.svg         as a picture
   p2os world check my.toml                        find what is wrong, with its line
   p2os world new --kind maze --seed 7 --out my.toml
   p2os world convert floor.yaml --out floor.toml
@@ -99,7 +99,7 @@ def list_worlds(
 
 def show(
     world: WORLD,
-    out: Annotated[Path | None, typer.Option(help="Write a picture: .png or .svg.", metavar="FILE")] = None,
+    out: Annotated[Path | None, typer.Option(help="Write a picture, an .svg.", metavar="FILE")] = None,
     seed: WORLD_SEED = 0,
     up: UP = "auto",
 ) -> None:
@@ -111,14 +111,10 @@ def show(
         typer.echo("\n".join([*text(place, columns), text_key(place, columns)]))
         typer.echo(_summary(place))
         return
-    suffix = out.suffix.lower()
-    if suffix not in {".png", ".svg"}:
-        raise UsageError(f"no picture can be written to {out}", hint="--out FILE.png or FILE.svg")
+    if out.suffix.lower() != ".svg":
+        raise UsageError(f"no picture can be written to {out}", hint="--out FILE.svg")
     try:
-        if suffix == ".svg":
-            out.write_text(svg(place), encoding="utf-8")
-        else:
-            _write_png(place, out)
+        out.write_text(svg(place), encoding="utf-8")
     except OSError as error:
         raise FileError(f"{out}: {error.strerror}") from error
     typer.echo(f"{out}: {_summary(place)}")
@@ -225,17 +221,6 @@ def _write_files(made: Export, folder: Path, *, force: bool) -> None:
             raise FileError(f"{folder / name}: {error.strerror}") from error
     for line in made.losses:
         sys.stderr.write(f"note: {line}\n")
-
-
-def _write_png(place: World, out: Path) -> None:
-    from p2os.cli.virtual.world_picture import write_png
-
-    try:
-        write_png(place, out)
-    except ModuleNotFoundError as error:
-        raise MissingDependencyError(
-            f"a PNG needs {error.name}", extra="sim", hint=f"--out {out.with_suffix('.svg')}"
-        ) from error
 
 
 def _summary(place: World) -> str:

@@ -1,8 +1,7 @@
 """A world as a drawing: the shapes that all pictures share, an SVG picture, and characters for a terminal.
 
-`shapes` is the one list; `svg` and `text` draw it without any dependency, and
-`p2os.cli.virtual.world_picture` draws it as a PNG. A character of `text` is two square
-points, one above the other.
+`shapes` is the one list; `svg` and `text` draw it without any dependency. A character
+of `text` is two square points, one above the other.
 
 Invariant: what is drawn depends on the world alone, so that pictures can be compared.
 """
