@@ -19,6 +19,17 @@ def pytest_configure(config: pytest.Config) -> None:
         del os.environ["PYTHONDONTWRITEBYTECODE"]
 
 
+@pytest.hookimpl(tryfirst=True)
+def pytest_sessionstart(session: pytest.Session) -> None:
+    """Stop the first of the two measurements that pytest-cov starts in a worker of xdist; it keeps only the second.
+
+    Where a test of `no_cover` pauses the second, the first would go on: all would be traced.
+    """
+    measuring = getattr(session.config.pluginmanager.getplugin("_cov"), "cov_controller", None)
+    if measuring is not None and hasattr(session.config, "workerinput"):
+        measuring.pause()
+
+
 @pytest.hookimpl(trylast=True)  # hypothesis has marked its own by then
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     """Count no lines in long and repeating tests, and begin with the long ones.
