@@ -16,21 +16,17 @@ from types import FrameType
 from typing import Any, Self
 
 import pytest
+from p2os.client.interrupts import held_back
 
 import p2os
 from p2os import Robot
 from p2os.client import ConnectError, LinkLostError
 from p2os.client.aio import Robot as AsyncRobot
-from p2os.client.interrupts import held_back
 from p2os.protocol.commands import vel
 from p2os.transport import open_url
 from p2os.transport.ports import Transport
-from tests.p2os.client.served_robot import CLOSING_COMMANDS, QUICK, Recorder, ServedRobot, until
-from p2os.protocol.commands import Command, CommandNumber, enable, stop, vel
-from p2os.transport import open_url
-from p2os.transport.ports import Transport
 from simbase.interrupts import held_back
-from tests.p2os.client.served_robot import QUICK, Recorder, ServedRobot, until
+from tests.p2os.client.served_robot import CLOSING_COMMANDS, QUICK, Recorder, ServedRobot, until
 
 OURS = str(Path(p2os.__file__).parent)
 
