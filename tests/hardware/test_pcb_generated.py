@@ -121,7 +121,7 @@ def test_gerbers_of_another_size_or_with_other_holes_are_found() -> None:
                               unplated=4, smallest_drill_mm=0.3)  # fmt: skip
     found = gerbers.faults(design_of(), generated_files.copper_of(design_of())[1], reading)
     assert found[:3] == ["width is 99, the design has 100", "copper layers is 1, the design has 2",
-                         "plated holes is 3, the design has 324"]  # fmt: skip
+                         "plated holes is 3, the design has 333"]  # fmt: skip
     assert "layer bottom mask is missing" in found
 
 

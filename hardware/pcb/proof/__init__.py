@@ -1,1 +1,1 @@
-"""Proof that the circuit is the one that is meant: an expected table of its own, and wrong circuits that must be noticed."""
+"""Proof that the circuit is the one that is meant: expected connections, and wrong circuits to be noticed."""

@@ -70,7 +70,7 @@ def apply(design: Design, mutant: Mutant) -> Design:
 
 def draw(design: Design, seed: int = SEED) -> tuple[Mutant, ...]:
     """Return a mutant for each net, polarised part, value and connector, and more of the resistor network and chips."""
-    chance = random.Random(seed)  # noqa: S311  -- a draw that can be repeated, no secret
+    chance = random.Random(seed)
     found: list[Mutant] = []
     for rule in (_named, _nets, _polarised, _values, _connectors, _chips, _network, _left_out):
         found += [mutant for mutant in rule(design, chance) if mutant.edits not in {one.edits for one in found}]
@@ -140,8 +140,7 @@ def _connectors(design: Design, chance: random.Random) -> list[Mutant]:
     found = []
     for part in design.components:
         if part.part.symbol in {"CONN2", "CONN3", "CONN24", "DE9"}:
-            for _ in range(3 if len(part.pins) > 3 else 1):
-                found.append(_crossed("connector", part, chance))
+            found += [_crossed("connector", part, chance) for _ in range(3 if len(part.pins) > 3 else 1)]
     return found
 
 
@@ -211,7 +210,7 @@ def _with_nets(design: Design, nets: Mapping[str, str | None]) -> Design:
     """Return the design with other nets at some pins, which are named REF.PIN."""
     known = {f"{part.ref}.{pin}" for part in design.components for pin, _ in part.pins}
     if not set(nets) <= known:
-        raise DesignError(f"no pin {sorted(set(nets) - known)[0]}")
+        raise DesignError(f"no pin {min(set(nets) - known)}")
     return _changed(design, (
         dataclasses.replace(part, pins=tuple((pin, nets.get(f"{part.ref}.{pin}", net)) for pin, net in part.pins))
         for part in design.components
