@@ -68,8 +68,8 @@ def test_every_deck_says_what_it_cannot_say_and_limits_what_it_measures() -> Non
 def test_a_deck_is_written_with_its_measures_and_traces(tmp_path) -> None:
     text = run.deck_text(DECKS["reset"], tmp_path / "traces.txt")
     assert text.startswith("* Reset: level at the ESP32's EN\n")
-    assert "meas tran en_low find v(en) at=39m\n" in text
-    assert f"wrdata {tmp_path}/traces.txt v(pin) v(en) v(en2)\nquit\n.endc\n.end\n" in text
+    assert "meas tran en_low find v(n_esp_en) at=39m\n" in text
+    assert f"wrdata {tmp_path}/traces.txt v(pin) v(n_esp_en) v(en2)\nquit\n.endc\n.end\n" in text
 
 
 DECK = Deck(name="d", title="t", circuit="R1 a 0 1", measures=("dc top max v(a)",), x_label="x", y_label="y",
@@ -170,8 +170,8 @@ def wrong(edit: str) -> Design:
 #: Edits of the circuit, the deck that must notice it, and one figure that leaves its limits.
 FELT = (
     ("swap J3.2 J3.3", "rs232", "space"), ("swap U5.11 U5.12", "rs232", "space"),
-    ("swap D1.K D1.A", "reverse", "right"), ("swap D2.K D2.A", "reverse", "right"), ("swap D5.K D5.A", "startup-buck", "esp"),
-    ("net J3.4 -", "rs232", "dtr_low"),
+    ("swap D1.K D1.A", "reverse", "right"), ("swap D2.K D2.A", "reverse", "right"),
+    ("swap D5.K D5.A", "startup-buck", "esp"), ("net J3.4 -", "rs232", "dtr_low"),
     ("swap R1.2 R2.2", "wires", "dd1"), ("net Q1.2 +3V3", "reset", "en_low"), ("drop R73", "boot", "din_down"),
     ("value R60 4k7", "boot", "mode_low"), ("drop R33", "boot", "dd3_low"), ("swap D3.K D3.A", "bank", "good"),
 )  # fmt: skip

@@ -72,7 +72,7 @@ def _signal_places() -> dict[str, tuple[int, int]]:
         column, row = divmod(index, 11)
         x, y = 50 + 107 * column, 22 + 9 * row
         places[f"R{index + 1}"] = (x, y)
-        places[f"R{index + 1 + PULL_OFFSET}"] = (x + 32, y + 4)
+        places[f"R{index + 1 + PULL_OFFSET}"] = (x + 44, y + 4)
     return places
 
 
@@ -347,7 +347,7 @@ def _rows(page: Page, pins: list[PlacedPin]) -> set[tuple[str, str]]:
             page.nodes.append(node("junction", node("at", *_mm(fork, far.y)), node("diameter", 0),
                                    node("color", 0, 0, 0, 0), page.ident("junction")))  # fmt: skip
             joined.add((pull.component.ref, "1"))
-        for net, x in ((near.net, near.x - 34), (far.net, label + 18)):
+        for net, x in ((near.net, near.x - 34), (far.net, label + 15)):
             words = [
                 f"{part.ref}.{pin} {SYMBOLS[part.part.symbol].pin_name(pin)}".removesuffix(f" {pin}")
                 for part in page.design.components
@@ -355,7 +355,7 @@ def _rows(page: Page, pins: list[PlacedPin]) -> set[tuple[str, str]]:
                 if part.ref in _PADS and name == net
             ]
             _, y = _mm(0, near.y)
-            page.nodes.append(_text("\n".join(words), (*_mm(x), y - 1.2 * len(words)), 1.27, page.ident("pads")))
+            page.nodes.append(_text("  ".join(words), (*_mm(x), y - 1.2), 1.27, page.ident("pads")))
     return joined
 
 
