@@ -354,8 +354,8 @@ def _rows(page: Page, pins: list[PlacedPin]) -> set[tuple[str, str]]:
                 for pin, name in part.pins
                 if part.ref in _PADS and name == net
             ]
-            _, y = _mm(0, near.y)
-            page.nodes.append(_text("  ".join(words), (*_mm(x), y - 1.2), 1.27, page.ident("pads")))
+            left, y = _mm(x, near.y)
+            page.nodes.append(_text("  ".join(words), (left, y - 1.2), 1.27, page.ident("pads")))
     return joined
 
 

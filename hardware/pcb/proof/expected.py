@@ -181,7 +181,7 @@ def _by_place(part: Component, rows: list[list[str]]) -> dict[str, str]:
     """Name a module's pads by where they stand: rows from left to right, each from the top."""
     pads = FOOTPRINTS[part.part.footprint].pads
     columns = sorted({pad.at_mm[0] for pad in pads})
-    names = {}
+    names: dict[str, str] = {}
     for x, row in zip(columns, rows, strict=True):
         column = sorted((pad for pad in pads if pad.at_mm[0] == x), key=lambda pad: pad.at_mm[1])
         names |= {pad.number: name for pad, name in zip(column, row, strict=True)}
