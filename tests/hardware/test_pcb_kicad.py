@@ -208,6 +208,12 @@ def test_schematic_pages_are_drawn_by_number(tmp_path, monkeypatch) -> None:
     assert pictures.schematic_pictures("rev-b") == []
 
 
+def test_a_step_file_has_no_date(fake_kicad, tmp_path) -> None:
+    fake_kicad("FILE_NAME('b.step','2026-01-02T03:04:05',('Pcbnew'));")
+    kicad_cli.step(tmp_path / "b.kicad_pcb", tmp_path / "b.step")
+    assert (tmp_path / "b.step").read_text(encoding="utf-8") == "FILE_NAME('b.step','',('Pcbnew'));"
+
+
 #: KiCad's own footprint for each of ours that has one, and what differs on purpose.
 TWINS = {
     "SOIC16": "Package_SO/SOIC-16_3.9x9.9mm_P1.27mm", "SOT23": "Package_TO_SOT_SMD/SOT-23",
