@@ -54,6 +54,9 @@ class PerfectBody(Stateful):
     def put_back(self) -> None:
         self.state = WheelAngles()
 
+    def who_stands_at_start(self) -> str | None:
+        return None
+
     def stand_at(self, x_m: float, y_m: float, heading_rad: float) -> None:
         self.state = replace(self.state, x_m=x_m, y_m=y_m, heading_rad=heading_rad)
 

@@ -8,7 +8,7 @@ the middle of the axle, on the floor.
 Invariant: the same calls after the same `reset` give the same states, bit for bit.
 """
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple, Protocol, Self
 
@@ -123,6 +123,14 @@ class RobotBody(Protocol):
         """Stand still where the last `reset` put it, wheels at angle 0, collisions at 0; the world goes on.
 
         What can be pushed goes back to where the world has it; `take_moved` then tells of it.
+        """
+        ...
+
+    def who_stands_at_start(self, leaving: Collection[Self] = ()) -> str | None:
+        """Return the name of another robot that stands where `put_back` would put this one, or None.
+
+        Args:
+            leaving: Robots that go away at the same moment.
         """
         ...
 

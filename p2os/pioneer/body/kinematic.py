@@ -112,7 +112,7 @@ class KinematicScene(Scene):
 class KinematicBody(BodyInWorld):
     """A differential drive on a plan."""
 
-    STATE = ("_start", "_x", "_y", "_heading", "_left_angle", "_right_angle", "_left", "_right", "_asked", "_stalled",
+    STATE = ("_x", "_y", "_heading", "_left_angle", "_right_angle", "_left", "_right", "_asked", "_stalled",
              "_is_bumped", "_blocked_at", "_free_m", "_carried_m")  # fmt: skip
     DERIVED = ("_cos", "_sin", "near")
 
@@ -167,14 +167,13 @@ class KinematicBody(BodyInWorld):
 
     def begin_at_start(self, pose: Pose) -> None:
         """Stand still at a pose in the world as it was made."""
-        self.begin()
-        self._start = pose
+        self.begin(pose)
         self._begin_at(pose)
 
     def put_back(self) -> None:
         """Stand still where the last `reset` put it, and what was pushed where the world has it."""
         super().put_back()
-        self._begin_at(self._start)
+        self._begin_at(self.start)
         self.scene.changed()
 
     def stand_at(self, x_m: float, y_m: float, heading_rad: float) -> None:

@@ -294,7 +294,7 @@ def _sim_exit(context: Context, value: int) -> None:
 
 
 def _load_world(context: Context, data: bytes) -> None:
-    context.world_wanted = data.split(b"\0")[0].decode("latin-1")
+    context.world_wanted = data.split(b"\0")[0]
 
 
 def _sim_ctrl(context: Context, command: Command, _now: Nanos) -> bool:

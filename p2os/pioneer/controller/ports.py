@@ -104,6 +104,10 @@ class Body(Protocol):
         """Stand still where it began, wheels at angle 0, and what was pushed where it was."""
         ...
 
+    def who_stands_at_start(self) -> str | None:
+        """Return the name of another robot that stands where `put_back` would put this one, or None."""
+        ...
+
     def stand_at(self, x_m: float, y_m: float, heading_rad: float) -> None:
         """Stand still elsewhere, as if carried there.
 
