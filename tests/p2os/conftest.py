@@ -31,6 +31,7 @@ class WheelAngles:
     pitch_rad: float = 0.0
     turn_radps: float = 0.0
     in_contact: bool = False
+    contact_rad: float | None = None
     x_m: float = 0.0
     y_m: float = 0.0
     z_m: float = 0.0

@@ -311,8 +311,9 @@ def _refuse_beside_fleet(context: typer.Context) -> None:
     for name in IN_FLEET_FILE:
         source = context.get_parameter_source(name)
         if source is not None and source.name == "COMMANDLINE":
+            option_name = name.removesuffix("_ns").removesuffix("_client").removesuffix("_folder").replace("_", "-")
             raise UsageError(
-                f"--{name.removesuffix('_ns').removesuffix('_client').removesuffix('_folder').replace('_', '-')} beside --fleet",
+                f"--{option_name} beside --fleet",
                 hint="the fleet's file sets that",
             )
 

@@ -49,6 +49,8 @@ class BodyState:
     stalled_right: bool = False
     collisions: int = 0
     in_contact: bool = False
+    #: Where the hull is touched, counter-clockwise from ahead, rad: where the last collision was; None without contact.
+    contact_rad: float | None = None
 
 
 #: chosen: so many hits are remembered until somebody takes them; collisions are 0.2 s apart at the least.

@@ -158,6 +158,7 @@ class KinematicBody(BodyInWorld):
             stalled_right=self._stalled and self._asked[1] != 0.0,
             collisions=self._contacts.collisions,
             in_contact=self._contacts.touching,
+            contact_rad=self._contacts.bearing_rad(self._x, self._y, self._heading),
         )
 
     @property

@@ -155,6 +155,7 @@ class Pioneer(Stateful):
     ) -> None:
         self.parameters, self.body = parameters, body
         self.settings = settings or ControllerSettings()
+        self.settings = replace(self.settings, flash=self.settings.flash.for_model(parameters))
         self.on_event = on_event
         #: What its sonar hear of other robots; none by itself.
         self.hears: Ears | None = None

@@ -83,6 +83,11 @@ class SensedState(WheelState, Protocol):
         """Whether the hull touches anything but the floor."""
         ...
 
+    @property
+    def contact_rad(self) -> float | None:
+        """Where it does, counter-clockwise from ahead; None where that is not known."""
+        ...
+
 
 class Body(Protocol):
     """A body that is stepped; for a snapshot of the robot its state is declared (`simbase.state`)."""
