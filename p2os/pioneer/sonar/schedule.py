@@ -106,7 +106,7 @@ class SonarSchedule(Stateful):
     @property
     def fitted_arrays(self) -> frozenset[int]:
         """Return the arrays in which there are sonar."""
-        return frozenset(number // ARRAY_SONAR + 1 for number in range(min(self._fitted, ARRAYS * ARRAY_SONAR)))
+        return frozenset(map(_array_of, range(self._fitted)))
 
     @property
     def is_on(self) -> bool:
@@ -138,7 +138,7 @@ class SonarSchedule(Stateful):
         self._firing = tuple(number for number in self.order if self._is_of_array_on(number))
 
     def _is_of_array_on(self, number: int) -> bool:
-        return number // ARRAY_SONAR + 1 in self.arrays
+        return _array_of(number) in self.arrays
 
     @property
     def _per_cycle(self) -> int:
@@ -154,6 +154,11 @@ class SonarSchedule(Stateful):
     def _skip_passed(self, now: Nanos) -> None:
         while self._pings_done < self._per_cycle and self._ping_time(self._pings_done) <= now:
             self._pings_done += 1
+
+
+def _array_of(number: int) -> int:
+    """Return the array of a sonar, from 1; what a robot has beyond the last goes with that."""
+    return min(number // ARRAY_SONAR + 1, ARRAYS)
 
 
 def raw_range(range_m: float, parameters: RobotParameters, profile: Profile) -> int:

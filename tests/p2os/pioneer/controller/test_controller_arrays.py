@@ -8,6 +8,7 @@ import pytest
 from p2os.pioneer.body.factory import make_body
 from p2os.pioneer.controller import ControllerSettings, Pioneer, SonarPerSip
 from p2os.pioneer.controller.flash import Flash
+from p2os.pioneer.sonar.schedule import SonarSchedule
 from p2os.pioneer.world import parse_world
 from p2os.pioneer.world.model import Pose
 from p2os.protocol.commands import Command
@@ -65,6 +66,15 @@ def test_a_p2os_robot_knows_no_arrays(make_robot: Any) -> None:
     robot.say(C.SONAR, 0)
     robot.say(C.SONAR, 4)
     assert fired(robot) == set(range(32))
+
+
+def test_sonar_beyond_the_fourth_array_go_with_it() -> None:
+    bank = SonarSchedule(40, pings_per_cycle=None, cycle_ns=100 * NS_PER_MS)
+    assert bank.fitted_arrays == {1, 2, 3, 4}
+    bank.switch(on=False, now=0, array=4)
+    ping = bank.next_ping()
+    assert ping is not None
+    assert ping.numbers == tuple(range(24))
 
 
 def test_polling_and_arrays_go_together(make_robot: Any) -> None:
