@@ -70,11 +70,11 @@ def test_a_p2os_robot_knows_no_arrays(make_robot: Any) -> None:
 
 def test_sonar_beyond_the_fourth_array_go_with_it() -> None:
     bank = SonarSchedule(40, pings_per_cycle=None, cycle_ns=100 * NS_PER_MS)
-    assert bank.fitted_arrays == {1, 2, 3, 4}
-    bank.switch(on=False, now=0, array=4)
-    ping = bank.next_ping()
-    assert ping is not None
-    assert ping.numbers == tuple(range(24))
+    for is_on, fired in ((False, 24), (True, 40)):
+        bank.switch(on=is_on, now=0, array=4)
+        ping = bank.next_ping()
+        assert ping is not None
+        assert ping.numbers == tuple(range(fired))
 
 
 def test_polling_and_arrays_go_together(make_robot: Any) -> None:
