@@ -13,7 +13,7 @@ JOBS   ?= 3
 # What is built with the package: set up again when it has changed.
 COMPILED := $(wildcard bluepill_sim/native/source/*) $(shell find adapter_fw/core adapter_fw/capi -type f)
 
-.PHONY: setup demo test lint type unit bench soak clean firmware board board-check board-tools pictures docs
+.PHONY: setup demo test lint type unit bench soak peers clean firmware board board-check board-tools pictures docs
 
 setup: $(STAMP)
 
@@ -57,6 +57,10 @@ bench: setup
 
 soak: setup
 	$(BIN)/pytest -n $(JOBS) -m 'soak' --no-cov
+
+# The programs of others that are on PATH, or PEERS='--peer "p2os-arduino=/home/me/drive {line}"', against p2os serve.
+peers: setup
+	@$(BIN)/python -m tools.peers $(PEERS)
 
 # Rebuilds the example firmware (needs gcc-arm-none-eabi); `make test` compares.
 firmware: setup
