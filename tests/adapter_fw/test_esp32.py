@@ -52,13 +52,13 @@ def test_every_environment_of_the_project_names_a_board_and_a_pad_that_exist() -
             r"-DADAPTER_BOARD=(\w+) -DADAPTER_PAD=(\w+)", parser[name]["board_build.cmake_extra_args"]
         ).groups()
         assert (FIRMWARE / "generated" / board / "pins.hpp").exists()
-        assert (FIRMWARE / "esp32" / "src" / f"pad_{pad}.cpp").exists()
+        assert (FIRMWARE / "esp32" / "main" / f"pad_{pad}.cpp").exists()
     assert parser["platformio"]["default_envs"] == "rev-b"
     assert "env:thesis-table3" in environments
 
 
 def test_the_project_compiles_every_source_of_the_esp32() -> None:
-    listed = (FIRMWARE / "esp32" / "src" / "CMakeLists.txt").read_text(encoding="utf-8")
+    listed = (FIRMWARE / "esp32" / "main" / "CMakeLists.txt").read_text(encoding="utf-8")
     for path in CHECK.sources("none"):
         assert path.name in listed or path.name.startswith("pad_")
 
