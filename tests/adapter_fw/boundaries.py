@@ -188,6 +188,13 @@ class Life:
         self.twins.pass_time(self.rng.choice([1 * MS, 100 * MS, 249 * MS, 250 * MS, 251 * MS]))
         self.twins.receive(data[cut:])
 
+    def _nested(self) -> None:
+        """A damaged frame that holds another one, and behind that a sound one."""
+        damaged = bytearray(self._sip_bytes())
+        damaged[-1] ^= 1
+        body = self.rng.choice([bytes(damaged), b""]) + self._sip_bytes() + self.rng.choice([b"", self._sip_bytes()])
+        self.twins.receive(HEADER + bytes([len(body) + 2]) + body + b"\x00\x01")
+
     def _sip_bytes(self) -> bytes:
         return self.twins.sip.to_frame(Profile.P2OS).to_bytes()
 
@@ -254,8 +261,16 @@ class Life:
 
     def _no_answer(self) -> None:
         """A robot that does not answer, with all that the adapter tries."""
-        if self.twins.model.state is AdapterState.CONNECTING and self.rng.random() < 0.2:
-            self.twins.pass_time(7 * NS_PER_S)
+        self.sequence.step("pin", "p2dx_con", False)
+        self.twins.pass_time(300 * MS)
+        self.sequence.step("pin", "p2dx_con", True)
+        self.twins.pass_time(self.rng.choice([6_200, 7_500]) * MS)
+
+    def _late(self) -> None:
+        """Something comes, and what was due before it has not been asked for yet."""
+        self.twins.now += self.rng.choice([1, 3 * MS, 30 * MS, 400 * MS])
+        getattr(self, self.rng.choice(["_come_sip", "_come_byte", "_come_pad", "_come_rare", "_come_answer"]))()
+        self.twins.pass_time(0)
 
     def _stream_on(self) -> None:
         """A robot that still streams, or has just stopped to, when the stop sequence is due again."""
@@ -306,14 +321,15 @@ class Life:
 
     def _drive_by_pad(self) -> None:
         self.twins.master(Master.PAD)
-        for number in range(14):
-            if number == 1 or self.twins.model.state not in OPEN_STATES:
+        for number in range(32):
+            if number < 2 or self.twins.model.state not in OPEN_STATES:
                 self.twins.pad(PadReport(up=number == 1))
             else:
-                self._pad()
+                self.twins.pad(PadReport(forward=self.rng.randrange(1_024), turn=self.rng.randrange(-512, 512)))
+            if self.twins.model.state in OPEN_STATES and number % 3 == 0:
+                self.twins.send_sip(raw_x=0, raw_y=0, raw_heading=0)
             self.twins.answer()
-            self.twins.pass_time(40 * MS)
-        self._obey()
+            self.twins.pass_time(30 * MS)
 
     def _connect(self) -> None:
         self.sequence.step("connect", self.rng.random() < 0.5)
@@ -325,6 +341,6 @@ class Life:
 #: Kinds of steps, and how often each comes.
 LIFE_STEPS = {
     "threshold": 3, "heading jump": 5, "longest step": 4, "small steps": 3, "tolerance": 4, "short sip": 2,
-    "count": 2, "at deadline": 12, "silence": 2, "no answer": 1, "stream on": 2, "glitch": 3, "motors": 3, "obey": 4,
-    "pad": 2, "drive by pad": 1, "connect": 1, "rare": 1,
+    "count": 2, "nested": 1, "at deadline": 12, "late": 3, "silence": 2, "no answer": 1, "stream on": 2, "glitch": 3,
+    "motors": 3, "obey": 4, "pad": 2, "drive by pad": 2, "connect": 1, "rare": 1,
 }  # fmt: skip
