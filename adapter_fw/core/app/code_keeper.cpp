@@ -1,5 +1,7 @@
 #include "code_keeper.hpp"
 
+#include <initializer_list>
+
 namespace app {
 
 namespace {
