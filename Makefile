@@ -13,11 +13,7 @@ JOBS   ?= 3
 # What is built with the package: set up again when it has changed.
 COMPILED := $(wildcard bluepill_sim/native/source/*) $(shell find adapter_fw/core adapter_fw/capi -type f)
 
-<<<<<<< HEAD
-.PHONY: setup demo test lint type unit bench soak peers clean firmware board board-check board-tools pictures docs
-=======
-.PHONY: setup demo test lint type unit bench soak clean firmware mutation-tools board board-check board-tools pictures docs
->>>>>>> h23fw
+.PHONY: setup demo test lint type unit bench soak peers clean firmware mutation-tools board board-check board-tools pictures docs
 
 setup: $(STAMP)
 
@@ -62,17 +58,15 @@ bench: setup
 soak: setup mutation-tools
 	$(BIN)/pytest -n $(JOBS) -m 'soak' --no-cov
 
-<<<<<<< HEAD
 # The programs of others that are on PATH, or PEERS='--peer "p2os-arduino=/home/me/drive {line}"', against p2os serve.
 peers: setup
 	@$(BIN)/python -m tools.peers $(PEERS)
-=======
+
 # What changes the adapter's two sides in `make soak`. Without universalmutator's own wishes: one of them is a copy of
 # `typing` that shadows Python's.
 mutation-tools: setup
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check 'cosmic-ray==8.7.0'
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --no-deps 'universalmutator==1.14.1'
->>>>>>> h23fw
 
 # Rebuilds the example firmware (needs gcc-arm-none-eabi); `make test` compares.
 firmware: setup
