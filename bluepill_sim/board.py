@@ -18,7 +18,7 @@ leaves the board's watches and listeners as it found them.
 """
 
 from collections import Counter
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
@@ -96,8 +96,6 @@ class BluePill(Stateful):
         self.boot0 = False
         #: Called with each new warning.
         self.on_warning: Callable[[str], None] | None = None
-        #: Called with (pin, drive, ns) at every change of what the chip itself puts on a pin.
-        self.on_pin: Callable[[str, PinDrive, Nanos], None] | None = None
         #: The first HardFault or lockup; a later one, where the firmware came back from those before. None: none yet.
         self.fault: FaultReport | None = None
         memory = Memory()
@@ -107,19 +105,12 @@ class BluePill(Stateful):
         self._chip: Chip | None = None
         self._chip = chip = Chip(memory, self.image.vector_table, self._warn, self._fault)
         self._activity = Activity()
-        #: More of the same, for tools.
-        self.pin_listeners: list[Callable[[str, PinDrive, Nanos], None]] = []
-        self._usarts = tuple(
-            SerialPort(chip.parts.usart(n), self._activity, self._wait_for_bytes, chip.deliveries) for n in (1, 2, 3)
-        )
+        self._usarts = tuple(SerialPort(chip.parts.usart(n), self._activity, self._wait_for_bytes) for n in (1, 2, 3))
         #: How often it was reset since power came up, by cause.
         self.resets: Counter[ResetCause] = Counter()
         chip.on_reset = self._reset_begins
         chip.boot_address = self._boot_address
-        chip.pins.on_output = self._pin_changed
-        chip.pins.is_subscribed = lambda: self.on_pin is not None or bool(self.pin_listeners)
         chip.pins.is_serial_input = lambda pin: any(port.receives_at(pin.name) for port in self._usarts)
-        chip.pins.on_silent_output = self._pins_changed_silently
         chip.pins["PC13"].board_pull = PinDrive.PULL_UP
         chip.pins["PB2"].board_pull = PinDrive.PULL_DOWN
 
@@ -263,6 +254,7 @@ class BluePill(Stateful):
     @property
     def activity(self) -> Activity:
         """When the firmware last did something that shows outside."""
+        self._activity.last_pin_ns = max(self._activity.last_pin_ns, self.chip.fabric.last_output_ns)
         slept = self.chip.processor.last_sleep_cycle
         if slept is not None:
             self._activity.last_wfi_ns = self.chip.ns_of(slept)
@@ -348,22 +340,12 @@ class BluePill(Stateful):
             hint="clear boot0 for the flash, or drive PB2 high for the SRAM",
         )
 
-    def _pin_changed(self, name: str, drive: PinDrive, at_ns: Nanos) -> None:
-        self._activity.last_pin_ns = at_ns
-        if self.on_pin is not None:
-            self.on_pin(name, drive, at_ns)
-        for listener in self.pin_listeners:
-            listener(name, drive, at_ns)
-
-    def _pins_changed_silently(self, at_ns: Nanos) -> None:
-        self._activity.last_pin_ns = at_ns
-
     def _wait_for_bytes(self, port: SerialPort, pattern: bytes, within: Span) -> None:
         """Run until `pattern` is in what `port` has sent and nobody has taken (`SerialPort.expect`)."""
         if not pattern:
             raise BluePillError("an empty pattern is always there", hint="expect at least one byte")
         end_ns = self.now_ns + to_nanos(within)
-        with _stop_at_characters(self, port):
+        with _stop_at_characters(port):
             while pattern not in port.unread:
                 reached = self.advance_to(end_ns)
                 if reached.reason is Reason.HALT or (self.now_ns >= end_ns and pattern not in port.unread):
@@ -468,7 +450,7 @@ def _watch(board: BluePill, condition: Condition) -> Iterator[tuple[Callable[[],
                 yield holds, None
         case [port, "sends"] if len(words) == 3 and port in board.serial_ports:
             sent, text = bytearray(), words[2].encode()
-            with _stop_at_characters(board, board.serial_ports[port], sent):
+            with _stop_at_characters(board.serial_ports[port], sent):
                 yield (lambda: text in sent), None
         case [state] if state in _STATES:
             yield (lambda: _STATES[state](board)), STEP_NS
@@ -497,28 +479,26 @@ def _stop_at_pin(board: BluePill, name: str, what: str) -> Iterator[Callable[[],
     }
     if what not in tests:
         raise BluePillError(f"a pin is high, low, or changes; it cannot be {what!r}", hint=_HINT)
-    was_watched = pin.is_watched
-    pin.watch(True)
+    subscription = board.subscribe_pins([name], lambda _rows: None, of=Of.WIRE, ends_slice=[name])
     try:
         yield tests[what]
     finally:
-        pin.watch(was_watched)
+        subscription.close()
 
 
 @contextmanager
-def _stop_at_characters(board: BluePill, port: SerialPort, sent: bytearray | None = None) -> Iterator[None]:
+def _stop_at_characters(port: SerialPort, sent: bytearray | None = None) -> Iterator[None]:
     """End the board's slice after each character that a port sends; collect them in `sent`."""
 
-    def stop(word: int, _at_ns: Nanos) -> None:
+    def take(rows: Sequence[tuple[int, Nanos]]) -> None:
         if sent is not None:
-            sent.append(word & 0xFF)
-        board.request_stop()
+            sent.extend(word & 0xFF for word, _ in rows)
 
-    port.listeners.append(stop)
+    close = port.subscribe(take, ends_slice=True)
     try:
         yield
     finally:
-        port.listeners.remove(stop)
+        close()
 
 
 def _words_of(condition: Condition) -> str:

@@ -28,7 +28,6 @@ class FakeChip:
         self.resets: list[str] = []
         self.expired: list[tuple[str, int]] = []
         self.stops = 0
-        self.deadline_changes = 0
         self.clock_changes = 0
         self._parts: ChipParts | None = None
         self._parts = make_parts(self)
@@ -52,8 +51,15 @@ class FakeChip:
     def request_stop(self) -> None:
         self.stops += 1
 
-    def deadline_changed(self) -> None:
-        self.deadline_changes += 1
+    def irq_changed(self, irq: int, level: bool) -> bool:
+        self.irqs[irq] = level
+        return True
+
+    def end_slice(self) -> None:
+        self.stops += 1
+
+    def event_due(self, at_ns: int) -> None:
+        pass
 
     def reset_peripheral(self, name: str) -> None:
         self.resets.append(name)
@@ -80,8 +86,14 @@ class FakeChip:
                 break
             assert due_ns >= self.now_ns
             self.now_ns = due_ns
-            self.parts.act_at(due_ns)
+            self.pins.fabric.run_events(due_ns)
         self.now_ns = to_ns
+        self.deliver()
+
+    def deliver(self) -> None:
+        self.pins.deliver()
+        for part in self.parts.by_name.values():
+            part.deliver()
 
     def write(self, register: str, value: int, size: int = 4, byte: int = 0) -> None:
         """Write "GPIOA.ODR" or, with `byte`, a part of it."""

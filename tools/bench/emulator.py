@@ -16,11 +16,12 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
+from bluepill_sim.native.library import CORE_VARIABLE, library_path
+
 from bluepill_sim import BluePill
 from bluepill_sim.analysis.probe import Probe
 from bluepill_sim.analysis.vcd import write_vcd
 from bluepill_sim.core.unicorn_core import Register, UnicornCore
-from bluepill_sim.native.library import CORE_VARIABLE, library_path
 
 HERE = Path(__file__).parent
 RUNTIME = HERE.parent.parent / "robot_bench" / "firmware"

@@ -15,7 +15,7 @@ import pytest
 from bluepill_sim.board import BluePill
 from bluepill_sim.core import BLOCK, BlockRecorder
 from bluepill_sim.core.recorder import LAST_ROWS
-from bluepill_sim.native.library import library_path
+from bluepill_sim.extension.library import library_path
 from bluepill_sim.program.image import Image, SymbolTable
 from tests.bluepill_sim.core.thumb_streams import SRAM, SRAM_BYTES, Program, program
 

@@ -6,7 +6,7 @@ import pytest
 
 from bluepill_sim import BluePill
 from bluepill_sim.core.accesses import may_end_in_it
-from bluepill_sim.native.library import library_path
+from bluepill_sim.extension.library import library_path
 from tests.bluepill_sim.machine import COUNTER_ON, Machine
 
 PROGRAM = Path(__file__).parents[1] / "firmware" / "unoptimised.elf"

@@ -11,7 +11,7 @@ from bluepill_sim.analysis.edge_log import NativeEdgeLog, PythonEdgeLog
 from bluepill_sim.analysis.probe import Probe
 from bluepill_sim.analysis.vcd import write_vcd
 from bluepill_sim.errors import BluePillError
-from bluepill_sim.native.library import library_path
+from bluepill_sim.extension.library import library_path
 from tests.bluepill_sim.machine import Machine
 
 pytestmark = pytest.mark.skipif(library_path() is None, reason="the native core is not built: no C compiler")

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from bluepill_sim import BluePill
 from bluepill_sim.core.accesses import only_reads
-from bluepill_sim.native.library import library_path
+from bluepill_sim.extension.library import library_path
 from tests.bluepill_sim.machine import COUNTER_ON, Machine
 from tests.bluepill_sim.native.test_native_core import state
 

@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from bluepill_sim import BluePill
-from bluepill_sim.native.library import library_path
+from bluepill_sim.extension.library import library_path
 from tests.bluepill_sim.machine import Machine
 from tests.bluepill_sim.native.test_native_core import state
 

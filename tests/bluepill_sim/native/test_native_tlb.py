@@ -4,7 +4,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from bluepill_sim.native.library import library_path
+from bluepill_sim.extension.library import library_path
 from tests.bluepill_sim.machine import Machine
 
 pytestmark = pytest.mark.skipif(library_path() is None, reason="the native core is not built: no C compiler")

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from bluepill_sim.board import BluePill
 from bluepill_sim.errors import BluePillError
 from bluepill_sim.fabric.line_speed import USUAL_BAUDS, Heard, heard, is_usual
-from bluepill_sim.native.library import library_path
+from bluepill_sim.extension.library import library_path
 from tests.bluepill_sim.machine import Machine
 from tests.bluepill_sim.peripherals.usart_line import CHARACTER_NS, IRQ, ORE, PCE, RXNE, set_up, status
 
