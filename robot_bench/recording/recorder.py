@@ -26,6 +26,7 @@ SAMPLE_NS: Nanos = 50 * NS_PER_MS
 #: A line of text longer than this is written in pieces.
 LONGEST_TEXT = 64
 MICRO = 1_000_000
+_LINE_END = ord("\n")
 
 
 class Observed(Protocol):
@@ -90,7 +91,7 @@ class Recorder(Stateful):
         self._changed: dict[str, None] = {}
         #: Whether the levels at time 0 are written: not before everything of that instant was driven.
         self._has_levels = False
-        self._text = b""
+        self._text = bytearray()
         self._sonar_mm: list[int] | None = None
         for net in harness:
             net.watch(self._note_change)
@@ -102,13 +103,13 @@ class Recorder(Stateful):
     @property
     def unfinished_text(self) -> bytes:
         """What the firmware has printed of a line whose end has not come."""
-        return self._text
+        return bytes(self._text)
 
-    def usart(self, data: bytes, at: Nanos) -> None:
-        """Take characters that the chip has sent, their last one complete at `at`."""
-        for byte in data:
-            self._text += bytes([byte])
-            if byte == ord("\n") or len(self._text) >= LONGEST_TEXT:
+    def usart(self, sent: Sequence[tuple[int, Nanos]]) -> None:
+        """Take what the chip has sent: (word, ns at the end of its stop bit), oldest first."""
+        for word, at in sent:
+            self._text.append(word & 0xFF)
+            if word == _LINE_END or len(self._text) >= LONGEST_TEXT:
                 self._write_text(at)
 
     def wire(self, direction: str, data: bytes, at: Nanos) -> None:
@@ -163,7 +164,7 @@ class Recorder(Stateful):
     def _write_text(self, at: Nanos) -> None:
         self.trace.add("usart", at, {"hex": self._text.hex()})
         self.last_line = self._text.decode("utf-8", "replace").strip()
-        self._text = b""
+        self._text.clear()
 
     def _sample(self, at: Nanos) -> None:
         if self._body is None:

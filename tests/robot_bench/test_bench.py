@@ -60,6 +60,19 @@ def test_the_slice_limit_changes_nothing(mode: str, body: str) -> None:
     assert len(hashes) == 1
 
 
+# The adapter samples each 2 ms, and stops for the first time after that at 302 ms.
+@pytest.mark.parametrize("edge_ns", [302 * MS - 1, 302 * MS, 302 * MS + 1, 305 * MS])
+def test_an_edge_that_the_chip_has_made_before_the_adapter_stopped_sampling_is_not_missed(edge_ns: int) -> None:
+    # A chip of long blocks runs far ahead of a sample; an edge in between comes before the adapter waits for edges.
+    def wire_of(block_ns: int) -> str:
+        script = [(0, "PB13", PinDrive.LOW), (10, "PB12", PinDrive.LOW), (edge_ns, "PB12", PinDrive.HIGH)]
+        made = finished(Bench(scenario("adapter", duration_s=1.0), chip=FakeChip(script, block_ns=block_ns)))
+        return "".join(line for line in made.trace.text.splitlines(keepends=True) if '"k":"wire"' in line)
+
+    assert wire_of(700)
+    assert wire_of(700) == wire_of(37 * MS) == wire_of(400 * MS)
+
+
 @pytest.mark.parametrize("mode", MODES)
 def test_the_first_level_of_every_wire_is_what_it_is_when_all_of_time_0_was_driven(mode: str) -> None:
     made = bench(scenario(mode, duration_s=0.0001))

@@ -3,6 +3,8 @@
 import pytest
 
 from robot_bench.loop import RunLoop, StuckError
+from robot_bench.wires.chip_pins import ChipPins
+from robot_bench.wires.nets import Harness, Net
 from simbase.timing import Reached
 from tests.robot_bench.wires.fake_chip import FakeChip, PinDrive
 
@@ -36,8 +38,8 @@ def test_an_edge_on_a_watched_net_brings_all_to_its_own_time() -> None:
     log: list[tuple[str, int]] = []
     chip = FakeChip([(1_234, "PB13", PinDrive.HIGH)], block_ns=100)
     loop = RunLoop(chip, [Ticker("a", 5_000, log)], slice_ns=10_000)
-    chip.pin("PB13").watch()
-    chip.on_pin = lambda _pin, _drive, at: loop.note_edge(at)
+    pins = ChipPins(chip, Harness([Net("rst")]), {"rst": "PB13"}, on_watched=loop.note_edge)
+    pins.watch(frozenset({"rst"}), 0)
     loop.run_until(6_000)
     assert log == [("a", 1_234), ("a", 5_000)]
 
