@@ -11,13 +11,15 @@ Invariant: it changes nothing that it watches.
 """
 
 import math
+from binascii import b2a_base64
 from collections.abc import Callable, Mapping, Sequence
 from typing import Protocol
 
 from p2os.pioneer.body.contract import BodyState, Hit
 from p2os.pioneer.world.model import Obstacle
-from robot_bench.recording.run_record import COLLISION
-from robot_bench.recording.trace import TraceWriter
+from robot_bench.recording.run_record import BLOCKS_VERSION, COLLISION
+from robot_bench.recording.trace import MOST_EDGES, TraceWriter
+from robot_bench.wires.edges import Edges, pack
 from robot_bench.wires.nets import Harness, Net
 from simbase.state import Stateful
 from simbase.timing import NS_PER_MS, Nanos, Reached
@@ -26,6 +28,8 @@ SAMPLE_NS: Nanos = 50 * NS_PER_MS
 #: A line of text longer than this is written in pieces.
 LONGEST_TEXT = 64
 MICRO = 1_000_000
+#: Of a wire that has not changed.
+_NONE = Edges()
 _LINE_END = ord("\n")
 
 
@@ -193,23 +197,29 @@ class Recorder(Stateful):
         self.trace.write_until(limit)
 
     def _write_levels(self) -> None:
+        levels = ""
         for net in self._harness:
             net.edges_until(0)
-            self.trace.add("pin", 0, {"net": net.name, "v": int(net.level(0))})
+            levels += str(int(net.level(0)))
+        names = [net.name for net in self._harness]
+        self.trace.add("pins", 0, {"v": BLOCKS_VERSION, "nets": names, "levels": levels})
 
     def _write_edges(self, limit: Nanos) -> None:
         changed, self._changed = self._changed, {}
+        tracks = []
         for net in self._harness:
             if net.name not in changed:
+                tracks.append(_NONE)
                 continue
-            for at, level in net.edges_until(limit):
-                self.trace.add("pin", at, {"net": net.name, "v": int(level)})
+            tracks.append(net.edges_until(limit))
             for fight in net.take_contentions():
                 self.event(
                     "bench", fight.at, "contention", f"{net.name} is driven hard by {' and '.join(fight.owners)}"
                 )
             if net.forget_before(limit):
                 self._changed[net.name] = None
+        for first, count, block in pack(tracks, MOST_EDGES):
+            self.trace.add("pins", first, {"n": count, "d": b2a_base64(block, newline=False).decode("ascii")})
 
 
 def hit_detail(hit: Hit) -> str:

@@ -79,8 +79,7 @@ def test_the_first_level_of_every_wire_is_what_it_is_when_all_of_time_0_was_driv
     made.run_until(made.scenario.duration_ns)
     levels = {net.name: int(net.level(0)) for net in made.parts.harness}
     made.finish()
-    assert {entry["net"]: entry["v"] for entry in entries(made, "pin") if entry["t"] == 0} == levels
-    assert sum(entry["t"] == 0 for entry in entries(made, "pin")) == len(levels)
+    assert {net: edges[0] for net, edges in made.record().pins.items()} == {net: (0, v) for net, v in levels.items()}
 
 
 @pytest.mark.parametrize("body", BODIES)
@@ -108,8 +107,7 @@ def test_the_robot_drives_as_its_pins_say(mode: str) -> None:
 
 def test_the_trace_begins_with_every_wire_and_ends_with_a_pose() -> None:
     made = finished(bench(scenario("direct", duration_s=1.02)))
-    pins = entries(made, "pin")
-    assert len({entry["net"] for entry in pins if entry["t"] == 0}) == 22
+    assert len([edges for edges in made.record().pins.values() if edges[0][0] == 0]) == 22
     assert [entry["t"] for entry in entries(made, "pose")][-2:] == [S, S + 20 * MS]
 
 
@@ -147,7 +145,7 @@ def test_changes_of_the_world_happen_at_their_time() -> None:
     changes = [(entry["t"], entry["op"], entry.get("sonar")) for entry in entries(made, "obstacle")]
     assert changes[0] == (S, "place", 1)
     assert changes[-1] == (S + 950 * MS, "move", None)
-    near = [entry["t"] for entry in entries(made, "pin") if entry["net"] == "DD1" and entry["v"]]
+    near = [at for at, level in made.record().pins["DD1"] if level]
     assert near == [S + 50 * MS], "sampled at S before the post stood there, and 50 ms later"
 
 
