@@ -153,11 +153,11 @@ class Bench(Stateful):
         )  # fmt: skip
         self.recorder.bring_to = self._bring_robot_to
         self.faults = FaultScript(scenario.faults, bring_to=self._bring_robot_to, do=self._inject)
-        followers = (*self._robots, self.script, self.faults, self.recorder)
+        followers = (*self._robots, self.script, self.faults)
         self._slices = SliceLength() if slice_ns is None else None
         self.loop = RunLoop(
-            chip, followers, slice_ns=slice_ns or FIRST_SLICE_NS, on_slice=self._after_slice,
-            choose_watched=self._watch_wires,
+            chip, followers, observers=(self.recorder,), slice_ns=slice_ns or FIRST_SLICE_NS,
+            on_slice=self._after_slice, choose_watched=self._watch_wires,
         )  # fmt: skip
         pin_of = {wire.name: wire.bluepill for wire in pinout.wires}
         #: Name of a wire, or of its pin → name of the wire.

@@ -1,7 +1,7 @@
 """The one run loop: the chip leads, everything else follows to each deadline.
 
 Theory of operation. The leader (the emulated BluePill) runs to the earliest
-deadline of the others. It may stop short at an edge on a watched net, and late
+deadline of the others, but for those who only observe. It may stop short at an edge on a watched net, and late
 by one basic block. Then every deadline that the leader has passed is acted on,
 in order of time: those who are due are brought there, in their fixed order. At
 the moment of an edge on a watched net all are. Nets keep their history, so that
@@ -69,6 +69,8 @@ class RunLoop(Stateful):
     Args:
         leader: Leads.
         followers: Follow, in this order where several are due.
+        observers: Follow after them, and change nothing: the leader does not stop for their deadlines, they are
+            brought there when it has stopped for another reason.
         slice_ns: As of the attribute.
         on_slice: As of the attribute.
         choose_watched: Called with `now` whenever followers have acted: chooses which nets are watched, and notes
@@ -84,12 +86,14 @@ class RunLoop(Stateful):
         leader: Leader,
         followers: Sequence[Follower],
         *,
+        observers: Sequence[Follower] = (),
         slice_ns: Nanos = NEVER,
         on_slice: Callable[[Nanos], None] | None = None,
         choose_watched: Callable[[Nanos], None] | None = None,
     ) -> None:
         self.leader = leader
-        self.followers = tuple(followers)
+        self.followers = (*followers, *observers)
+        self._count = len(followers)
         #: The longest that the leader runs without giving control back; whoever wants it may set it at any time.
         self.slice_ns = slice_ns
         self._choose_watched = choose_watched or (lambda _now: None)
@@ -149,7 +153,7 @@ class RunLoop(Stateful):
             elif led >= self._end:
                 return
             else:
-                led = self._lead(led, min(due, self._end))
+                led = self._lead(led, min((self._end, *self._deadlines[: self._count])))
                 if self._edges:
                     due = min(due, self._edges[0])
 
@@ -173,7 +177,7 @@ class RunLoop(Stateful):
         noted = self._deadlines = [
             NEVER if at is None else at for at in [part.next_deadline() for part in self.followers]
         ]
-        return min(due, *noted) if noted else due
+        return min((due, *noted))
 
     def _follow(self, due: Nanos) -> None:
         """Bring those who are due to `due`, as noted; at a watched edge all."""

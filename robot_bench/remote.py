@@ -83,7 +83,9 @@ class RemoteBench:
             self.adapter, transport,
             on_sent=lambda data, at: recorder.wire("c2r", data, at), on_received=self._listener.receive,
         )  # fmt: skip
-        self.loop = RunLoop(chip, (endpoint, recorder), slice_ns=PACED_SLICE_NS, on_slice=self._after_slice)
+        self.loop = RunLoop(
+            chip, (endpoint,), observers=(recorder,), slice_ns=PACED_SLICE_NS, on_slice=self._after_slice
+        )
         pin_of = {wire.name: wire.bluepill for wire in pinout.wires}
         ChipPins(chip, harness, pin_of, on_watched=self.loop.note_edge).watch(self.adapter.wakes_on, 0)
         chip.usart1.far_baud = scenario.usart_baud

@@ -41,8 +41,8 @@ class Observed(Protocol):
         """Where it is and how it moves."""
         ...
 
-    def clearance(self) -> float:
-        """Return metres between the hull and the nearest thing in the plan view."""
+    def clearance(self, *, no_more_than: float = math.inf) -> float:
+        """Return metres between the hull and the nearest thing in the plan view, or `no_more_than`."""
         ...
 
     def take_moved(self) -> Sequence[Obstacle]:
@@ -177,9 +177,8 @@ class Recorder(Stateful):
         if self.last_state is not None:
             self.distance_m += math.hypot(state.x_m - self.last_state.x_m, state.y_m - self.last_state.y_m)
         self.last_state = state
-        clearance = self._body.clearance()
-        if self.min_clearance_m is None or clearance < self.min_clearance_m:
-            self.min_clearance_m = clearance
+        least = self.min_clearance_m
+        self.min_clearance_m = self._body.clearance(no_more_than=math.inf if least is None else least)
         self.trace.add("pose", at, pose_entry(state))
         for item in self._body.take_moved():
             self.obstacle("move", item.name, at, moved_entry(item))

@@ -48,6 +48,8 @@ MOST_EDGES = 4096
 #: Order of kinds within one instant.
 RANKS = {"pins": 0, "usart": 1, "obstacle": 2, "wire": 3, "event": 4, "sonar": 5, "pose": 6}
 
+_encode = json.JSONEncoder(sort_keys=True, separators=(",", ":"), ensure_ascii=True).encode
+
 #: A line's content.
 Entry = Mapping[str, object]
 
@@ -58,7 +60,7 @@ EMPTY_HASH = bytes(32)
 
 def canonical(entry: Entry) -> str:
     """Return the one spelling of an entry, without its line end."""
-    return json.dumps(entry, sort_keys=True, separators=(",", ":"), ensure_ascii=True)
+    return _encode(entry)
 
 
 def chained(digest: bytes, lines: Iterable[str]) -> bytes:

@@ -85,7 +85,7 @@ class ChipPins:
 
     def watch(self, nets: frozenset[str], now: Nanos) -> None:
         """Have each edge after `now` that the chip makes on these nets, and no other, end its slice and reported."""
-        if nets == self._watched:
+        if nets is self._watched:  # called often; whoever watches has one set for each state
             return
         added, self._watched = nets - self._watched, nets
         self._subscription.ends_slice = frozenset(self._pin_of[net] for net in nets)

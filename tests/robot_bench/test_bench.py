@@ -60,6 +60,23 @@ def test_the_slice_limit_changes_nothing(mode: str, body: str) -> None:
     assert len(hashes) == 1
 
 
+def test_encoders_that_cannot_have_changed_are_not_waited_for_and_change_nothing(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    def run() -> tuple[str, int]:
+        made, stops = bench(scenario("direct")), []
+        made.loop.on_slice = stops.append
+        made.loop.slice_ns = S
+        return finished(made).trace.sha256, len(stops)
+
+    ahead = run()
+    monkeypatch.setattr(type(bench(scenario("direct")).parts.body), "most_radps", lambda _body, _rim: None)
+    each = run()
+    assert ahead[0] == each[0]
+    assert each[1] == 3 * 200
+    assert ahead[1] < each[1] * 0.6, "a second of standing at a boundary included"
+
+
 # The adapter samples each 2 ms, and stops for the first time after that at 302 ms.
 @pytest.mark.parametrize("edge_ns", [302 * MS - 1, 302 * MS, 302 * MS + 1, 305 * MS])
 def test_an_edge_that_the_chip_has_made_before_the_adapter_stopped_sampling_is_not_missed(edge_ns: int) -> None:

@@ -97,3 +97,13 @@ def test_a_restored_loop_goes_on_alike() -> None:
     second = RunLoop(FakeChip(block_ns=10), [])
     second.restore(first.snapshot())
     assert second.snapshot() == first.snapshot()
+
+
+def test_the_leader_does_not_stop_for_those_who_only_observe_and_they_come_to_each_deadline() -> None:
+    log: list[tuple[str, int]] = []
+    slices: list[int] = []
+    loop = RunLoop(FakeChip(block_ns=1), [Ticker("a", 50, log)], observers=[Ticker("o", 20, log)])
+    loop.on_slice = slices.append
+    loop.run_until(110)
+    assert slices == [50, 100, 110]
+    assert log == [("o", 20), ("o", 40), ("a", 50), ("o", 60), ("o", 80), ("a", 100), ("o", 100)]

@@ -326,9 +326,13 @@ class KinematicBody(BodyInWorld):
             return self._plan.echoing_within(*box)
         return [*self._plan.echoing_within(*box), *self._other_robots.echoing_within(*box)]
 
-    def clearance(self) -> float:
-        """Return the distance from the hull to the nearest thing that it could touch, metres."""
-        free = self._plan.clearance(self._x, self._y, self._heading)
+    def most_radps(self, rim_mps: float) -> float | None:
+        """Return how fast a wheel turns at most while it is told no more than `rim_mps`."""
+        return rim_mps / self._radius_m
+
+    def clearance(self, *, no_more_than: float = math.inf) -> float:
+        """Return the distance from the hull to the nearest thing that it could touch, metres, or `no_more_than`."""
+        free = self._plan.clearance(self._x, self._y, self._heading, no_more_than=no_more_than)
         if self._other_robots is None:
             return free
         hull = placed(self._hull, self._x, self._y, self._heading)
