@@ -54,6 +54,7 @@ bench: setup
 	$(BIN)/python tools/bench/bodies.py
 	$(BIN)/python tools/bench/pioneer.py
 	$(BIN)/python tools/bench/speed.py
+	$(BIN)/python tools/bench/shares.py
 
 soak: setup
 	$(BIN)/pytest -n $(JOBS) -m 'soak' --no-cov

@@ -24,14 +24,14 @@ from packaging.requirements import Requirement
 ROOT = Path(__file__).resolve().parent.parent
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
 PACKAGES = ("simbase", "p2os", "bluepill_sim", "adapter_sim", "robot_bench")
-PARTS = ("bluepill_sim._native", "robot_bench._adapter_firmware")
+PARTS = ("bluepill_sim._native", "robot_bench._edges", "robot_bench._adapter_firmware")
 LIMIT_S = 300
 
 #: What of the checkout only the checkout needs.
 OF_THE_CHECKOUT = (".ci/", ".gitignore")
 
 #: What of the packages is compiled into the wheel and need not lie in it.
-COMPILED = "bluepill_sim/native/source/"
+COMPILED = ("bluepill_sim/native/source/", "robot_bench/wires/edges.c")
 
 CONSTRAINTS = ROOT / "constraints.txt"
 

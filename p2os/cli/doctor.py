@@ -80,6 +80,9 @@ NEEDS = (
         name="bluepill_sim._native", kind="built", feature="the BluePill at full speed",
     ),
     Need(
+        name="robot_bench._edges", kind="built", feature="many edges at full speed",
+    ),
+    Need(
         name="robot_bench._adapter_firmware", kind="built", feature="--adapter firmware",
     ),
     Need(
