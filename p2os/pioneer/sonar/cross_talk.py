@@ -54,6 +54,11 @@ class PingTable(Stateful):
         self._bodies = tuple(bodies)
         self._sent: deque[SentPing] = deque()
 
+    def enter_world(self, bodies: Sequence[Seeing]) -> None:
+        """Go on with other bodies of the same robots; what was under way is gone."""
+        self._bodies = tuple(bodies)
+        self._sent.clear()
+
     def ears_of(self, robot: int) -> Ears:
         """Return what one robot, counted from 0, hears."""
         return lambda numbers, now: self._fire(robot, numbers, now)
