@@ -80,6 +80,8 @@ class BluePill(Stateful):
     """
 
     STATE = ("chip", "fault", "activity", "_warned", "_usarts", "boot0", "resets")
+    #: Who listens.
+    DERIVED = ("_warning_sinks",)
 
     def __init__(self, image: Image | str | Path, *, strict: bool = False) -> None:
         """Load a firmware and stand at its reset.

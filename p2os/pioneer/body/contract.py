@@ -9,7 +9,6 @@ Invariant: the same calls after the same `reset` give the same states, bit for b
 """
 
 import math
-from collections.abc import Sequence
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple, Protocol, Self
