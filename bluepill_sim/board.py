@@ -18,7 +18,7 @@ leaves the board's watches and listeners as it found them.
 """
 
 from collections import Counter
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
@@ -80,6 +80,8 @@ class BluePill(Stateful):
     """
 
     STATE = ("chip", "fault", "activity", "_warned", "_usarts", "boot0", "resets")
+    #: Who listens.
+    DERIVED = ("_warning_sinks",)
 
     def __init__(self, image: Image | str | Path, *, strict: bool = False) -> None:
         """Load a firmware and stand at its reset.
@@ -94,10 +96,7 @@ class BluePill(Stateful):
         self._vector_offset = self.image.vector_table - FLASH_BASE
         #: The BOOT0 jumper; looked at, with BOOT1 (PB2), at each reset: 0x flash, 11 SRAM, 10 ST's boot loader.
         self.boot0 = False
-        #: Called with each new warning.
-        self.on_warning: Callable[[str], None] | None = None
-        #: Called with (pin, drive, ns) at every change of what the chip itself puts on a pin.
-        self.on_pin: Callable[[str, PinDrive, Nanos], None] | None = None
+        self._warning_sinks: list[Callable[[str], None]] = []
         #: The first HardFault or lockup; a later one, where the firmware came back from those before. None: none yet.
         self.fault: FaultReport | None = None
         memory = Memory()
@@ -107,19 +106,12 @@ class BluePill(Stateful):
         self._chip: Chip | None = None
         self._chip = chip = Chip(memory, self.image.vector_table, self._warn, self._fault)
         self._activity = Activity()
-        #: More of the same, for tools.
-        self.pin_listeners: list[Callable[[str, PinDrive, Nanos], None]] = []
-        self._usarts = tuple(
-            SerialPort(chip.parts.usart(n), self._activity, self._wait_for_bytes, chip.deliveries) for n in (1, 2, 3)
-        )
+        self._usarts = tuple(SerialPort(chip.parts.usart(n), self._activity, self._wait_for_bytes) for n in (1, 2, 3))
         #: How often it was reset since power came up, by cause.
         self.resets: Counter[ResetCause] = Counter()
         chip.on_reset = self._reset_begins
         chip.boot_address = self._boot_address
-        chip.pins.on_output = self._pin_changed
-        chip.pins.is_subscribed = lambda: self.on_pin is not None or bool(self.pin_listeners)
         chip.pins.is_serial_input = lambda pin: any(port.receives_at(pin.name) for port in self._usarts)
-        chip.pins.on_silent_output = self._pins_changed_silently
         chip.pins["PC13"].board_pull = PinDrive.PULL_UP
         chip.pins["PB2"].board_pull = PinDrive.PULL_DOWN
 
@@ -216,6 +208,20 @@ class BluePill(Stateful):
         """
         return self.chip.pins.subscribe_pins(pins, sink, of=of, ends_slice=ends_slice)
 
+    def subscribe_warnings(self, sink: Callable[[str], None]) -> Callable[[], None]:
+        """Have `sink` called with each new warning, at its time; return a function that ends it."""
+        self._warning_sinks.append(sink)
+        return lambda: self._warning_sinks.remove(sink)
+
+    @contextmanager
+    def without_warnings(self) -> Iterator[None]:
+        """Tell nobody of warnings while a debugger looks at what the program would be warned of; they are noted."""
+        sinks, self._warning_sinks = self._warning_sinks, []
+        try:
+            yield
+        finally:
+            self._warning_sinks = sinks
+
     @property
     def pins(self) -> tuple[Pin, ...]:
         """Every pin that has a leg, in the order of the ports."""
@@ -263,6 +269,7 @@ class BluePill(Stateful):
     @property
     def activity(self) -> Activity:
         """When the firmware last did something that shows outside."""
+        self._activity.last_pin_ns = max(self._activity.last_pin_ns, self.chip.fabric.last_output_ns)
         slept = self.chip.processor.last_sleep_cycle
         if slept is not None:
             self._activity.last_wfi_ns = self.chip.ns_of(slept)
@@ -348,22 +355,12 @@ class BluePill(Stateful):
             hint="clear boot0 for the flash, or drive PB2 high for the SRAM",
         )
 
-    def _pin_changed(self, name: str, drive: PinDrive, at_ns: Nanos) -> None:
-        self._activity.last_pin_ns = at_ns
-        if self.on_pin is not None:
-            self.on_pin(name, drive, at_ns)
-        for listener in self.pin_listeners:
-            listener(name, drive, at_ns)
-
-    def _pins_changed_silently(self, at_ns: Nanos) -> None:
-        self._activity.last_pin_ns = at_ns
-
     def _wait_for_bytes(self, port: SerialPort, pattern: bytes, within: Span) -> None:
         """Run until `pattern` is in what `port` has sent and nobody has taken (`SerialPort.expect`)."""
         if not pattern:
             raise BluePillError("an empty pattern is always there", hint="expect at least one byte")
         end_ns = self.now_ns + to_nanos(within)
-        with _stop_at_characters(self, port):
+        with _stop_at_characters(port):
             while pattern not in port.unread:
                 reached = self.advance_to(end_ns)
                 if reached.reason is Reason.HALT or (self.now_ns >= end_ns and pattern not in port.unread):
@@ -381,8 +378,8 @@ class BluePill(Stateful):
         self._warned[once] = text
         if self._strict:
             raise UnmodelledError(text, hint="run without --strict to go on after warnings")
-        if self.on_warning is not None:
-            self.on_warning(text)
+        for sink in self._warning_sinks:
+            sink(text)
 
     def _fault(self, kind: FaultKind, pc: int, address: int | None, is_lockup: bool) -> None:
         if kind is FaultKind.MASKED_SVC and not is_lockup:
@@ -468,7 +465,7 @@ def _watch(board: BluePill, condition: Condition) -> Iterator[tuple[Callable[[],
                 yield holds, None
         case [port, "sends"] if len(words) == 3 and port in board.serial_ports:
             sent, text = bytearray(), words[2].encode()
-            with _stop_at_characters(board, board.serial_ports[port], sent):
+            with _stop_at_characters(board.serial_ports[port], sent):
                 yield (lambda: text in sent), None
         case [state] if state in _STATES:
             yield (lambda: _STATES[state](board)), STEP_NS
@@ -497,28 +494,26 @@ def _stop_at_pin(board: BluePill, name: str, what: str) -> Iterator[Callable[[],
     }
     if what not in tests:
         raise BluePillError(f"a pin is high, low, or changes; it cannot be {what!r}", hint=_HINT)
-    was_watched = pin.is_watched
-    pin.watch(True)
+    subscription = board.subscribe_pins([name], lambda _rows: None, of=Of.WIRE, ends_slice=[name])
     try:
         yield tests[what]
     finally:
-        pin.watch(was_watched)
+        subscription.close()
 
 
 @contextmanager
-def _stop_at_characters(board: BluePill, port: SerialPort, sent: bytearray | None = None) -> Iterator[None]:
+def _stop_at_characters(port: SerialPort, sent: bytearray | None = None) -> Iterator[None]:
     """End the board's slice after each character that a port sends; collect them in `sent`."""
 
-    def stop(word: int, _at_ns: Nanos) -> None:
+    def take(rows: Sequence[tuple[int, Nanos]]) -> None:
         if sent is not None:
-            sent.append(word & 0xFF)
-        board.request_stop()
+            sent.extend(word & 0xFF for word, _ in rows)
 
-    port.listeners.append(stop)
+    close = port.subscribe(take, ends_slice=True)
     try:
         yield
     finally:
-        port.listeners.remove(stop)
+        close()
 
 
 def _words_of(condition: Condition) -> str:

@@ -3,11 +3,12 @@
 This is not the board: pins are handed out and images are loaded by `board.py`;
 the tables of the chip are `stm32f103.py`.
 
-Theory of operation. At each block boundary: peripherals and SysTick act on what
-is due, a requested reset is done, then the core goes on to the earliest of the
-limit and the next deadline. A peripheral that moves a deadline or an interrupt
-line inside an access ends the core's slice at the boundary of the running block,
-so that what happens never depends on where the caller's slices end.
+Theory of operation. At each block boundary: SysTick and the fabric's queue act on
+what is due, a requested reset is done, then the core goes on to the earliest of the
+limit and the next deadline (the native core does all that by itself). A peripheral
+that moves a deadline or an interrupt line inside an access brings the end of the
+core's slice forward, so that what happens never depends on where the caller's slices
+end. Subscribers get what has happened when the chip has run.
 
 Source: RM0008 sections 3.1, 3.3.2 (bit-band) and 7.3 (clock gates).
 Invariant: time never goes back; `now_ns` inside a peripheral's access is the
@@ -28,8 +29,7 @@ from bluepill_sim.fabric.cycle_clock import CycleClock
 from bluepill_sim.fabric.registers import Peripheral
 from bluepill_sim.memory import Memory
 from bluepill_sim.native.processor import make_core
-from bluepill_sim.native.registers import share_registers
-from bluepill_sim.native.streams import SharedStreams
+from bluepill_sim.native.registers import join_fabric, share_registers
 from bluepill_sim.peripherals.rcc import Rcc, ResetCause
 from bluepill_sim.stm32f103 import (
     CLOCK_GATES,
@@ -78,7 +78,7 @@ class Chip(Stateful):
         "_requested_reset",
         "_flash_repairs",
     )
-    DERIVED = ("_flash_access", "_next_due", "_deadlines_moved", "_event_ns", "_streams")
+    DERIVED = ("_flash_access",)
 
     def __init__(self, memory: Memory, vector_table: int, on_warning: WarningListener, on_fault: FaultListener) -> None:
         """Make the chip, in the state after power-on.
@@ -97,25 +97,21 @@ class Chip(Stateful):
         self._on_warning = on_warning
         self.clocks = Clocks()
         self._clock = CycleClock(self.clocks.hclk_hz)
-        #: Called with (line, level, ns) at every change of an interrupt line, for tools.
-        self.irq_listeners: list[Callable[[int, bool, Nanos], None]] = []
-        #: Called when the chip has run: sinks get what waits for them.
-        self.deliveries: list[Callable[[], None]] = []
         #: Called before each reset, for tools.
         self.reset_listeners: list[Callable[[], None]] = []
-        #: Time of the event that a peripheral is acting on, while it does.
-        self._event_ns: Nanos | None = None
         self._stop_requested = False
         self._requested_reset: ResetCause | None = None
-        self._next_due: Nanos | None = None
-        self._deadlines_moved = True
         self._flash_access = self.clocks.flash_wait_states, self.clocks.flash_prefetch
         self._flash_repairs: list[tuple[int, bytes]] = []
-        #: Whether the peripherals exist: making them already calls back.
-        self._is_complete = False
+        #: Whether the pins, and whether the peripherals exist: making them already calls back.
+        self._is_made = self._is_complete = False
         self.engine, self.processor = make_core(self._measure, memory)
         self.processor.on_fault = on_fault
         self.pins = make_pins(self)
+        self.fabric = self.pins.fabric
+        self.uses_native_core = join_fabric(self.engine, self.fabric)
+        self._is_made = True
+        self._time_changed()
         self.parts = make_parts(self)
         self._is_complete = True
         memory.on_reprogrammed = self._drop_flash
@@ -129,8 +125,9 @@ class Chip(Stateful):
     @property
     def now_ns(self) -> Nanos:
         """The exact time of the accessing instruction or event inside a peripheral, else the time reached."""
-        if self._event_ns is not None:
-            return self._event_ns
+        event_ns = self.fabric.event_ns if self._is_made else None
+        if event_ns is not None:
+            return event_ns
         return self._clock.ns_of(self.engine.access_cycle)
 
     @property
@@ -158,7 +155,7 @@ class Chip(Stateful):
 
     def next_deadline(self) -> Nanos | None:
         """Return when a peripheral or SysTick next acts by itself; the core itself may act at any time."""
-        due = self._next_peripheral_due()
+        due = self.fabric.next_ns
         tick = self.processor.systick.next_cycle
         if tick is None:
             return due
@@ -168,9 +165,9 @@ class Chip(Stateful):
     def advance_to(self, limit_ns: Nanos) -> ChipReached:
         """Run to the first block boundary at or after a time, or to what stops the chip before."""
         try:
-            return self._advance(limit_ns, self.processor.run, self._streams)
+            return self._advance(limit_ns, self.processor.run)
         finally:
-            self._deliver()
+            self.deliver()
 
     def step(self, limit_ns: Nanos) -> ChipReached:
         """Run one instruction, or the entry of the exception that comes before it: HALT with a STEP.
@@ -178,15 +175,16 @@ class Chip(Stateful):
         A core that sleeps first goes on to what wakes it; DEADLINE where that comes after `limit_ns`.
         """
         try:
-            return self._advance(limit_ns, self.processor.step, None)
+            return self._advance(limit_ns, self.processor.step)
         finally:
-            self._deliver()
+            self.deliver()
 
-    def _deliver(self) -> None:
+    def deliver(self) -> None:
         """Hand the subscribers what has happened."""
-        self.pins.deliver()
-        for deliver in self.deliveries:
-            deliver()
+        if self.fabric.has_news:
+            self.pins.deliver()
+            for part in self.parts.by_name.values():
+                part.deliver()
 
     def record_blocks(self, capacity: int, on_full: Callable[[BlockRecorder], None] | None = None) -> BlockRecorder:
         """Record each block, exception entry and exception return from now on; `stop_recording` ends it.
@@ -205,8 +203,8 @@ class Chip(Stateful):
         """Record no more."""
         self.engine.recorder = None
 
-    def _advance(self, limit_ns: Nanos, go_on: Callable[[int], None], streams: SharedStreams | None) -> ChipReached:
-        processor, engine, clock = self.processor, self.engine, self._clock
+    def _advance(self, limit_ns: Nanos, go_on: Callable[[int], None]) -> ChipReached:
+        processor, engine, clock, fabric = self.processor, self.engine, self._clock, self.fabric
         while True:
             if not engine.is_inside_block:
                 self._act()
@@ -222,9 +220,12 @@ class Chip(Stateful):
             if processor.is_locked_up:
                 engine.cycle = self._stop_cycle(limit_ns)
                 continue
-            if streams is not None and streams.give():
-                self._deadlines_moved = True
             go_on(self._stop_cycle(limit_ns))
+            fabric.check()
+            if fabric.take_stop():
+                self._stop_requested = True
+            elif fabric.has_news:
+                self.deliver()
             if processor.halt is not None:
                 halt, processor.halt = processor.halt, None
                 return ChipReached(clock.ns_of(engine.cycle), Reason.HALT, halt)
@@ -244,40 +245,44 @@ class Chip(Stateful):
         self.system.reset()
         # A program at the start of the flash is found through its alias at 0, where VTOR points after a reset.
         self.processor.reset(0 if vectors == FLASH_BASE else vectors)
-        self._deadlines_moved = True
 
     # What the peripherals ask for.
 
     def set_irq(self, irq: int, level: bool) -> None:
         """Set the level of an interrupt line."""
-        if self.processor.nvic.levels >> irq & 1 == level:
-            return
-        for listener in self.irq_listeners:
-            listener(irq, level, self.now_ns)
+        self.fabric.set_line(irq, level)
+
+    def irq_changed(self, irq: int, level: bool) -> bool:
+        """Take a new level of an interrupt line to the NVIC; return whether it is enabled (called by the fabric)."""
         self.processor.nvic.set_level(irq, level)
         if level:
             self.processor.pending_changed()
+        return bool(self.processor.nvic.enabled >> irq & 1)
+
+    def end_slice(self) -> None:
+        """End the slice at the boundary of the running block (called by the fabric)."""
+        self.processor.stop_at_boundary()
+
+    def event_due(self, at_ns: Nanos) -> None:
+        """End the slice at a time at the latest (called by the fabric)."""
+        self.engine.stop_at = min(self.engine.stop_at, self._clock.cycle_at(at_ns))
 
     def clock_changed(self) -> None:
         """Go on at the frequency and the wait states now in `clocks`."""
         clocks = self.clocks
         self._clock.set_frequency(clocks.hclk_hz, self.engine.access_cycle)
+        self._time_changed()
         access = clocks.flash_wait_states, clocks.flash_prefetch
         if access != self._flash_access:
             self._flash_access = access
             self.engine.forget_costs()
         if self._is_complete:
             self.parts.clock_changed()
-        self.deadline_changed()
+        self.processor.stop_at_boundary()
 
     def request_stop(self) -> None:
         """End the slice at the boundary of the running block."""
         self._stop_requested = True
-        self.processor.stop_at_boundary()
-
-    def deadline_changed(self) -> None:
-        """Look at the deadlines again at the boundary of the running block."""
-        self._deadlines_moved = True
         self.processor.stop_at_boundary()
 
     def reset_peripheral(self, name: str) -> None:
@@ -285,7 +290,7 @@ class Chip(Stateful):
         part = self.parts.by_name.get(name)
         if part is not None:
             part.reset()
-            self.deadline_changed()
+            self.processor.stop_at_boundary()
 
     def request_reset(self) -> None:
         """Reset the chip at the boundary of the running block (SYSRESETREQ)."""
@@ -310,9 +315,15 @@ class Chip(Stateful):
         """Forget what was worked out before: due times, costs of blocks."""
         self._flash_access = self.clocks.flash_wait_states, self.clocks.flash_prefetch
         self.engine.forget_costs()
-        self._deadlines_moved = True
+        self._time_changed()
 
     # Internals.
+
+    def _time_changed(self) -> None:
+        """Tell the fabric where cycles and nanoseconds are tied together; to Python's core a cycle is a nanosecond."""
+        if self.uses_native_core:
+            frequency_hz, base_ns, base_cycle = self._clock.base
+            self.fabric.set_time(base_ns, base_cycle, frequency_hz)
 
     def _act(self) -> None:
         """At a boundary: do what was left for it, and what is due."""
@@ -324,29 +335,17 @@ class Chip(Stateful):
         systick = self.processor.systick
         if systick.next_cycle is not None and cycle >= systick.next_cycle:
             systick.advance_to(cycle)
-        now = self._clock.ns_of(cycle)
-        while (due := self._next_peripheral_due()) is not None and due <= now:
-            self._event_ns = due
-            self._deadlines_moved = True
-            try:
-                self._next_due = self.parts.act_at(due)
-                self._deadlines_moved = False
-            finally:
-                self._event_ns = None
+        self.fabric.run_events(self._clock.ns_of(cycle))
         if self._requested_reset is not None:
             self.reset(self._requested_reset)
 
-    def _next_peripheral_due(self) -> Nanos | None:
-        if self._deadlines_moved:
-            self._deadlines_moved = False
-            self._next_due = self.parts.next_deadline()
-        return self._next_due
-
     def _stop_cycle(self, limit_ns: Nanos) -> int:
         """Return the cycle of the earliest of the limit and the deadlines."""
-        due = self._next_peripheral_due()
+        if self.uses_native_core and not self.processor.is_locked_up:
+            return self._clock.cycle_at(limit_ns)
+        due = self.fabric.next_ns
         stop = self._clock.cycle_at(limit_ns if due is None else min(due, limit_ns))
-        tick = None if self.processor.ticks_alone else self.processor.systick.next_cycle
+        tick = self.processor.systick.next_cycle
         return stop if tick is None else min(stop, tick)
 
     def _measure(self, address: int, size: int) -> Block:
@@ -367,7 +366,7 @@ class Chip(Stateful):
         bits = SramBitBand(self.memory.sram)
         engine.map_io(SRAM_ALIAS, SRAM_BYTES * _ALIAS_BYTES, bits.read_bit, bits.write_bit)
         engine.map_io(PPB_BASE, PPB_BYTES, self._read_system, self._write_system)
-        self._streams = share_registers(self, self.parts.by_name.values(), self.parts.rcc)
+        share_registers(engine, self.parts.by_name.values(), self.parts.rcc)
         self.pins.written_by = self._written_by
         engine.on_read_only_write = self._write_flash
         engine.on_read_only_written = self._repair_flash

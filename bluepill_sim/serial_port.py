@@ -23,9 +23,6 @@ QUIET_NS: Nanos = 1_000_000_000
 #: RM0008 27.3.4: PCLK2 / 16.
 HIGHEST_BAUD = 4_500_000
 
-#: Takes (word, ns at the end of its stop bit).
-WordListener = Callable[[int, Nanos], None]
-
 
 @dataclass(slots=True)
 class Activity:
@@ -63,54 +60,46 @@ class SerialPort(Stateful):
     """A USART of the board, seen from outside."""
 
     STATE = ("unread",)
+    #: Who listens.
+    DERIVED = ("_sinks", "_waiting")
 
-    def __init__(
-        self, usart: Usart, activity: Activity, wait: WaitForBytes, deliveries: list[Callable[[], None]]
-    ) -> None:
-        self._deliveries = deliveries
+    def __init__(self, usart: Usart, activity: Activity, wait: WaitForBytes) -> None:
         self._usart = usart
         self._activity = activity
         self._wait = wait
         self.name = usart.name
-        #: Called with (word, ns) at the end of each stop bit that goes out.
-        self.on_transmit: WordListener | None = None
-        #: Whether `on_transmit` may be called later than that, for several characters together: cheaper.
-        self.is_notified_late = False
-        #: More of the same, for tools.
-        self.listeners: list[WordListener] = []
+        self._sinks: list[WordSink] = []
+        self._waiting = 0
         #: What was sent and not yet taken.
         self.unread = bytearray()
-        usart.on_transmit = self._transmitted
-        usart.is_subscribed = self._is_subscribed
+        usart.sinks.append(self._take)
 
     def receive(self, data: bytes) -> None:
         """Send characters to the RX pin, at the speed of the line."""
         self._usart.receive(data)
 
-    def subscribe(self, sink: WordSink) -> Callable[[], None]:
+    def subscribe(self, sink: WordSink, *, ends_slice: bool = False) -> Callable[[], None]:
         """Have `sink` called with the characters that go out from now on, in bulk, before `advance_to` returns.
+
+        Args:
+            sink: called with rows (word, ns at the end of its stop bit), oldest first.
+            ends_slice: whether each character ends the chip's slice.
 
         Returns:
             A function that ends the subscription.
         """
-        rows: list[tuple[int, Nanos]] = []
-
-        def deliver() -> None:
-            if rows:
-                taken = rows.copy()
-                rows.clear()
-                sink(taken)
-
-        def take(word: int, at_ns: Nanos) -> None:
-            rows.append((word, at_ns))
+        usart = self._usart
+        usart.deliver()
+        self._sinks.append(sink)
+        self._waiting += ends_slice
+        usart.fabric.stop_at_words(usart.slot, self._waiting > 0)
 
         def close() -> None:
-            deliver()
-            self.listeners.remove(take)
-            self._deliveries.remove(deliver)
+            usart.deliver()
+            self._sinks.remove(sink)
+            self._waiting -= ends_slice
+            usart.fabric.stop_at_words(usart.slot, self._waiting > 0)
 
-        self.listeners.append(take)
-        self._deliveries.append(deliver)
         return close
 
     def receives_at(self, pin: str) -> bool:
@@ -171,16 +160,12 @@ class SerialPort(Stateful):
         del self.unread[:end]
         return taken
 
-    def _is_subscribed(self) -> bool:
-        return bool(self.listeners) or (self.on_transmit is not None and not self.is_notified_late)
-
-    def _transmitted(self, word: int, at_ns: Nanos) -> None:
-        self._activity.last_usart_ns = at_ns
+    def _take(self, sent: Sequence[tuple[int, Nanos, int]]) -> None:
+        rows = [(word, at_ns) for word, at_ns, _ in sent]
+        self._activity.last_usart_ns = rows[-1][1] if rows else self._activity.last_usart_ns
         unread = self.unread
-        unread.append(word & 0xFF)
+        unread += bytes(word & 0xFF for word, _ in rows)
         if len(unread) > 2 * KEPT_BYTES:
             del unread[:-KEPT_BYTES]
-        if self.on_transmit is not None:
-            self.on_transmit(word, at_ns)
-        for listener in self.listeners:
-            listener(word, at_ns)
+        for sink in self._sinks:
+            sink(rows)

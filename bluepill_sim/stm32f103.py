@@ -148,7 +148,7 @@ def _make_rcc(chip: ChipPorts, place: Place) -> Rcc:
     return Rcc(chip, place, gates=CLOCK_GATES)
 
 
-#: The modelled peripherals, in the order in which they are made, reset and advanced: class, name, IRQs.
+#: The modelled peripherals, in the order in which they are made, reset and act: class, name, IRQs.
 PERIPHERALS: tuple[tuple[_Maker, str, tuple[int, ...]], ...] = (
     (_make_rcc, "RCC", (5,)),
     (Flash, "FLASH", (4,)),
@@ -165,6 +165,12 @@ PERIPHERALS: tuple[tuple[_Maker, str, tuple[int, ...]], ...] = (
     (Iwdg, "IWDG", ()),
     (Wwdg, "WWDG", (0,)),
 )
+
+
+#: Lines inside the chip; those before them are the interrupts, by their numbers.
+PVD_LINE, RTC_ALARM_LINE, USB_WAKEUP_LINE = range(64, 67)
+#: What hangs on them: device, and number of its input (RM0008 10.2.5 for EXTI 16 to 18).
+WIRING = {PVD_LINE: ("EXTI", 0), RTC_ALARM_LINE: ("EXTI", 1), USB_WAKEUP_LINE: ("EXTI", 2)}
 
 
 @dataclass(frozen=True, slots=True)
@@ -213,27 +219,7 @@ class ChipParts(Stateful):
 
     def next_deadline(self) -> int | None:
         """Return when the first of them next acts by itself, in ns, or None for never."""
-        first = None
-        for part in self.by_name.values():
-            due_ns = part.due_ns
-            if due_ns is not None and (first is None or due_ns < first):
-                first = due_ns
-        return first
-
-    def act_at(self, due_ns: int) -> int | None:
-        """Act on what is due at the first deadline, in the order of `PERIPHERALS`; return the next deadline.
-
-        Raises:
-            RuntimeError: a peripheral has not done what was due, and would be asked for ever; a bug of its model.
-        """
-        for part in self.by_name.values():
-            if part.due_ns == due_ns:
-                part.advance_to(due_ns)
-                if part.due_ns is not None and part.due_ns <= due_ns:
-                    raise RuntimeError(
-                        f"{part.place.name} is still due at {part.due_ns} ns after acting at {due_ns} ns"
-                    )
-        return self.next_deadline()
+        return self.rcc.fabric.next_ns
 
 
 def make_pins(chip: PinPorts) -> PinBank:
@@ -246,6 +232,8 @@ def make_parts(chip: ChipPorts) -> ChipParts:
     by_name: dict[str, Peripheral] = {}
     for make, name, irqs in PERIPHERALS:
         by_name[name] = make(chip, Place(name=name, base=BASES[name], clock=CLOCK_GATES.get(name), irqs=irqs))
+    for line, (name, number) in WIRING.items():
+        chip.pins.fabric.wire(line, by_name[name].slot, number)
     return ChipParts(by_name)
 
 

@@ -13,8 +13,9 @@ Invariant: of one exception, entries = waits known + waits not known.
 from dataclasses import dataclass, field
 
 from bluepill_sim.board import BluePill
-from bluepill_sim.core.nvic import FIRST_IRQ, SYSTICK
-from simbase.timing import Nanos
+from bluepill_sim.core.nvic import FIRST_IRQ, IRQ_NAMES, SYSTICK
+from bluepill_sim.fabric.fabric import FIRST_LINE_ROW
+from bluepill_sim.fabric.subscriptions import EDGE
 
 
 @dataclass(slots=True)
@@ -65,12 +66,12 @@ class Latency:
         self._running: list[tuple[int, int]] = []
         #: An entry whose handler has not begun: (number, when it was due).
         self._entered: tuple[int, int | None] | None = None
-        board.chip.irq_listeners.append(self._irq_changed)
+        self._lines = board.chip.pins.subscribe_pins((), self._irqs_changed, lines=range(len(IRQ_NAMES)))
         board.chip.processor.systick.schedule_listeners.append(self._tick_set)
 
     def detach(self) -> None:
         """Stop listening."""
-        self._board.chip.irq_listeners.remove(self._irq_changed)
+        self._lines.close()
         self._board.chip.processor.systick.schedule_listeners.remove(self._tick_set)
 
     @property
@@ -90,6 +91,7 @@ class Latency:
 
     def enter(self, number: int, cycle: int) -> None:
         """Take an entry."""
+        self._lines.deliver()  # what was raised before this
         cost = self.costs.setdefault(number, ExceptionCost(number))
         cost.entries += 1
         # What fell due more than once before the entry is served once, and waits since the first time.
@@ -118,10 +120,10 @@ class Latency:
 
     # What makes exceptions pending.
 
-    def _irq_changed(self, irq: int, level: bool, at_ns: Nanos) -> None:
-        nvic = self._board.chip.processor.nvic
-        if level and nvic.enabled >> irq & 1:
-            self._due.setdefault(FIRST_IRQ + irq, []).append(self._board.chip.cycle_at(at_ns))
+    def _irqs_changed(self, rows: bytes) -> None:
+        for at_ns, row, is_enabled, level, _, _ in EDGE.iter_unpack(rows):
+            if level and is_enabled:
+                self._due.setdefault(FIRST_IRQ + row - FIRST_LINE_ROW, []).append(self._board.chip.cycle_at(at_ns))
 
     def _tick_set(self, cycle: int, following: int | None, period: int) -> None:
         self._ticks.append((cycle, following, period))

@@ -13,22 +13,18 @@ Invariant: probing changes nothing; edges of one signal are in order of time
 and differ from one to the next.
 """
 
-import ctypes
-from collections.abc import Callable, MutableSequence
-from typing import TypeVar
+from collections.abc import Callable, Sequence
 
-from bluepill_sim.analysis.edge_log import EdgeLog, NativeEdgeLog, PythonEdgeLog
+from bluepill_sim.analysis.edge_log import EdgeLog
 from bluepill_sim.board import BluePill
 from bluepill_sim.core.nvic import IRQ_NAMES
-from bluepill_sim.fabric.pins import Pin, PinBank
-from bluepill_sim.native.engine import NativeEngine
+from bluepill_sim.fabric.pins import Pin
+from bluepill_sim.fabric.subscriptions import FLOATING, Of
+from bluepill_sim.peripherals.usart import Usart
 from simbase.timing import Nanos
 
-#: The value of a wire that is not driven.
-FLOATING = 2
 #: (ns, 0 or 1, or FLOATING).
 Edge = tuple[Nanos, int]
-_Listener = TypeVar("_Listener")
 
 
 class Probe:
@@ -42,37 +38,36 @@ class Probe:
     def __init__(self, board: BluePill, *, with_signals: bool = True) -> None:
         self._board = board
         self.start_ns = self.end_ns = board.now_ns
-        ports = [board.chip.pins.port(letter) for letter in PinBank.PORTS]
-        inside = [f"irq.{name}" for name in IRQ_NAMES] + [f"{name}.tx" for name in board.serial_ports]
+        pins = list(board.chip.pins)
+        inside = sorted([f"irq.{name}" for name in IRQ_NAMES] + [f"{name}.tx" for name in board.serial_ports])
         #: Every signal in the order in which a person reads them, the words of the USARTs behind.
-        self.names = [pin.name for port in ports for pin in port] + sorted(inside)
+        self.names = [pin.name for pin in pins] + inside
         self.first_word = len(self.names)
         self.names += [f"{name}.word" for name in sorted(board.serial_ports)]
         self._numbers = {name: number for number, name in enumerate(self.names)}
         #: Values at the start, by signal: of all pins, and of what has changed inside.
         self.initial = {pin.name: _value(pin) for pin in board.pins}
-        self._undo: list[Callable[[], None]] = []
-        levels = [_value(pin) for port in ports for pin in port]
-        bonded = [sum(1 << pin.number for pin in port if pin.is_bonded) for port in ports]
-        engine = board.chip.engine
+        self.initial |= {name: 0 for name in inside if name.startswith("irq.")} if with_signals else {}
         self._last: dict[int, int] = {}
-        if isinstance(engine, NativeEngine):
-            log = NativeEdgeLog(bonded, levels)
-            self._levels: MutableSequence[int] | ctypes.Array[ctypes.c_uint8] = log.last
-            self.log: EdgeLog = log
-            self._listen(board.chip.pins.bulk_listeners, lambda: log.take(engine.state, board.chip.time_base))
-        else:
-            self._levels = levels
-            self.log = PythonEdgeLog()
-        self._listen(board.chip.pins.wire_listeners, self._wire_changed)
+        lines = range(len(IRQ_NAMES)) if with_signals else range(0)
+        signals = [*range(len(pins)), *(self._numbers[f"irq.{name}"] for name in IRQ_NAMES)]
+        values = [_value(pin) for pin in pins] + [0] * len(inside)
+        for line in lines:
+            values[signals[len(pins) + line]] = board.chip.processor.nvic.levels >> line & 1
+        self.initial |= {self.names[signals[len(pins) + line]]: values[signals[len(pins) + line]] for line in lines}
+        #: What happened.
+        self.log = EdgeLog(signals, values)
+        bonded = [pin.name for pin in board.pins]
+        subscription = board.chip.pins.subscribe_pins(bonded, self.log.take, of=Of.WIRE, lines=lines)
+        self._undo: list[Callable[[], None]] = [subscription.close]
         if with_signals:
-            self._listen(board.chip.irq_listeners, self._irq_changed)
             for name, port in board.serial_ports.items():
-                self._listen(port.listeners, self._word_listener(name, port.name))
+                self._listen(board.chip.parts.usart(int(port.name[-1])), name)
 
     def finish(self) -> None:
         """End the recording here."""
         self.end_ns = self._board.now_ns
+        self._board.chip.deliver()
         while self._undo:
             self._undo.pop()()
 
@@ -93,45 +88,28 @@ class Probe:
                 rows.setdefault(self.names[number], []).append((at_ns, value))
         return rows
 
-    def _listen(self, listeners: list[_Listener], listener: _Listener) -> None:
-        listeners.append(listener)
-        self._undo.append(lambda: listeners.remove(listener))
-
-    def _put(self, name: str, value: int, at_ns: Nanos) -> None:
-        number = self._numbers[name]
-        last = self._last.get(number)
-        if last is None:
-            self.initial[name] = last = 0
-        if value != last:
-            self._last[number] = value
-            self.log.put(at_ns, number, value)
-
-    def _wire_changed(self, pin: Pin, at_ns: Nanos) -> None:
-        if pin.is_bonded:
-            number = self._numbers[pin.name]
-            value = _value(pin)
-            if value != self._levels[number]:
-                self._levels[number] = value
-                self.log.put(at_ns, number, value)
-
-    def _irq_changed(self, irq: int, level: bool, at_ns: Nanos) -> None:
-        self._put(f"irq.{IRQ_NAMES[irq]}", int(level), at_ns)
-
-    def _word_listener(self, name: str, peripheral: str) -> Callable[[int, Nanos], None]:
-        usart = self._board.chip.parts.usart(int(peripheral[-1]))
+    def _listen(self, usart: Usart, name: str) -> None:
+        """Record what a USART sends."""
         line = f"{name}.tx"
         line_number, word_number = self._numbers[line], self._numbers[f"{name}.word"]
 
-        def sent(word: int, at_ns: Nanos) -> None:
-            self.log.put(at_ns, word_number, word)
-            bit_ns = usart.bit_ns
-            if line_number not in self._last:
-                self.initial[line] = self._last[line_number] = 1
-            begin = at_ns - 10 * bit_ns
-            for number, level in enumerate([0, *(word >> n & 1 for n in range(8)), 1]):
-                self._put(line, level, begin + number * bit_ns)
+        def take(sent: Sequence[tuple[int, Nanos, int]]) -> None:
+            for word, at_ns, bit_ns in sent:
+                self.log.put(at_ns, word_number, word)
+                if line_number not in self._last:
+                    self.initial[line] = self._last[line_number] = 1
+                begin = at_ns - 10 * bit_ns
+                for number, level in enumerate([0, *(word >> n & 1 for n in range(8)), 1]):
+                    self._put(line_number, level, begin + number * bit_ns)
 
-        return sent
+        usart.deliver()
+        usart.sinks.append(take)
+        self._undo.append(lambda: usart.sinks.remove(take))
+
+    def _put(self, number: int, value: int, at_ns: Nanos) -> None:
+        if value != self._last[number]:
+            self._last[number] = value
+            self.log.put(at_ns, number, value)
 
 
 def _value(pin: Pin) -> int:

@@ -8,7 +8,6 @@ import os
 from collections.abc import Iterator
 from pathlib import Path
 
-from bluepill_sim.analysis.edge_log import NativeEdgeLog
 from bluepill_sim.analysis.probe import Probe, signals_in_order, words_in_order
 from bluepill_sim.errors import BluePillError
 
@@ -25,15 +24,11 @@ def write_vcd(probe: Probe, path: Path) -> None:
     """
     signals, words = signals_in_order(probe), words_in_order(probe)
     codes = {name: identifier(index) for index, name in enumerate([*signals, *words])}
-    log = probe.log
     try:
         with path.open("w", encoding="ascii", newline="\n") as file:
             file.writelines(f"{line}\n" for line in _head(probe, codes, words))
-            if not isinstance(log, NativeEdgeLog):
-                file.writelines(f"{line}\n" for line in _changes(probe, codes))
-        if isinstance(log, NativeEdgeLog):
-            texts = [codes.get(name, "") for name in probe.names]
-            log.write(os.fsencode(path), texts, probe.first_word, (probe.start_ns, probe.end_ns))
+        texts = [codes.get(name, "") for name in probe.names]
+        probe.log.write(os.fsencode(path), texts, probe.first_word, (probe.start_ns, probe.end_ns))
     except OSError as error:
         raise BluePillError(f"cannot write {path}: {error.strerror}", hint="give a file in a folder") from error
 
@@ -58,15 +53,3 @@ def _head(probe: Probe, codes: dict[str, str], words: list[str]) -> Iterator[str
     for name, code in codes.items():
         yield f"bx {code}" if name in words else f"{_LETTERS[probe.initial[name]]}{code}"
     yield "$end"
-
-
-def _changes(probe: Probe, codes: dict[str, str]) -> Iterator[str]:
-    now = probe.start_ns
-    for at_ns, number, value in probe.log.rows():
-        if at_ns > now:
-            now = at_ns
-            yield f"#{at_ns}"
-        code = codes[probe.names[number]]
-        yield f"b{value:b} {code}" if number >= probe.first_word else f"{_LETTERS[value]}{code}"
-    if probe.end_ns > now:
-        yield f"#{probe.end_ns}"

@@ -10,7 +10,7 @@ once to a pseudo-terminal that is not read is dropped and counted.
 
 import os
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import BinaryIO, Protocol
 
@@ -23,8 +23,9 @@ _READ_BYTES = 4096
 class SerialPort(Protocol):
     """What a console needs of a USART."""
 
-    on_transmit: Callable[[int, int], None] | None
-    is_notified_late: bool
+    def subscribe(self, sink: Callable[[Sequence[tuple[int, int]]], None]) -> Callable[[], None]:
+        """Have `sink` called with rows (word, ns) that go out from now on."""
+        ...
 
     def receive(self, data: bytes) -> None:
         """Take characters from outside."""
@@ -39,8 +40,8 @@ class Console(Protocol):
         """Where it goes, for people."""
         ...
 
-    def write(self, word: int, at_ns: int) -> None:
-        """Take one character that the chip has sent; fits `on_transmit`."""
+    def write(self, data: bytes) -> None:
+        """Take characters that the chip has sent."""
         ...
 
     def poll(self) -> bytes:
@@ -67,10 +68,10 @@ class StreamConsole:
         self._stream = stream
         self._is_owner = is_owner
 
-    def write(self, word: int, at_ns: int) -> None:  # noqa: ARG002 - the signature of `on_transmit`
-        """Write one character."""
-        self._stream.write(bytes([word & 0xFF]))
-        if word == ord("\n"):
+    def write(self, data: bytes) -> None:
+        """Write characters."""
+        self._stream.write(data)
+        if b"\n" in data:
             self._stream.flush()
 
     def poll(self) -> bytes:
@@ -107,12 +108,13 @@ class PtyConsole:
         #: Characters that were not read in time.
         self.dropped = 0
 
-    def write(self, word: int, at_ns: int) -> None:  # noqa: ARG002 - the signature of `on_transmit`
-        """Write one character, or drop it when the far end does not read."""
+    def write(self, data: bytes) -> None:
+        """Write characters, or drop what the far end does not read."""
         try:
-            os.write(self._master, bytes([word & 0xFF]))
+            written = os.write(self._master, data)
         except BlockingIOError:
-            self.dropped += 1
+            written = 0
+        self.dropped += len(data) - written
 
     def poll(self) -> bytes:
         """Return what has been typed."""
@@ -150,7 +152,7 @@ def open_console(where: str) -> Console:
 
 def connect(console: Console, port: SerialPort) -> Callable[[], None]:
     """Connect a console to a USART, and return the function that carries what was typed to the chip."""
-    port.on_transmit, port.is_notified_late = console.write, True
+    port.subscribe(lambda rows: console.write(bytes(word & 0xFF for word, _ in rows)))
 
     def carry() -> None:
         data = console.poll()

@@ -22,6 +22,7 @@ from collections import deque
 from collections.abc import Callable
 from typing import Protocol
 
+from bluepill_sim.extension.layout import LAST_ROWS
 from simbase.state import Stateful
 
 #: Kinds of rows that are not the number of an entered exception.
@@ -31,9 +32,6 @@ BLOCK, EXCEPTION_RETURN = 0, -1
 BlockRow = tuple[int, int, int]
 #: A row as bytes (`struct record` of bluepill_sim/native/source/core.h).
 RECORD = struct.Struct("<QIi")
-
-#: How many rows every core keeps (`LAST_ROWS` of bluepill_sim/native/source/core.h).
-LAST_ROWS = 32
 
 
 class BlockRecorder:

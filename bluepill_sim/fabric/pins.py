@@ -10,18 +10,17 @@ supply pins, slew rates, and the two clocks of the input synchroniser.
 
 Source: RM0008 sections 9.1 (table 20) and 9.3.5; data sheet DS5319 tables 5 and
 6 (pin definitions, absolute maximum ratings).
-Invariant: `output` and `level` follow from the other attributes alone; every
-change of `output` is notified to `PinBank.on_output` once, with its exact time.
+The levels themselves are worked out in C, a port at a time (`extension/source/pins.c`).
+Invariant: `output` and `level` follow from the other attributes alone.
 """
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from dataclasses import dataclass
 from enum import Enum
-from typing import Protocol, Self
+from typing import Any, Protocol, Self, cast
 
-from bluepill_sim.fabric.subscriptions import EDGE, FLOATING, EdgeSink, Of
-from simbase.state import Rows, Stateful
-from simbase.wire import are_fighting, level_of
+from bluepill_sim.fabric.fabric import NO_LEVEL, Fabric, FabricPorts
+from bluepill_sim.fabric.subscriptions import EdgeSink, Of
+from simbase.state import Stateful
 
 
 class PinDrive(Enum):
@@ -84,6 +83,18 @@ RAILS = {"GND": False, "3V3": True}
 MAX_VOLTS = 3.65
 
 
+#: Alternate functions that drive pins; where two offer a level on one pin, which is unspecified, the first drives.
+ALTERNATE_FUNCTIONS = tuple(
+    sorted(
+        ["CAN_TX", "MCO", "EVENTOUT", "I2C1_SCL", "I2C1_SDA", "I2C2_SCL", "I2C2_SDA", "I2C1_SMBA", "I2C2_SMBA"]
+        + [f"SPI{n}_{signal}" for n in (1, 2) for signal in ("MISO", "MOSI", "NSS", "SCK")]
+        + [f"TIM{n}_CH{channel}" for n in (1, 2, 3, 4) for channel in (1, 2, 3, 4)]
+        + [f"TIM1_CH{channel}N" for channel in (1, 2, 3)]
+        + [f"USART{n}_{signal}" for n in (1, 2, 3) for signal in ("TX", "RX", "CK", "RTS")]
+    )
+)
+
+
 class PinPorts(Protocol):
     """What the pins need of the chip."""
 
@@ -101,78 +112,37 @@ class PinPorts(Protocol):
         ...
 
 
-@dataclass(frozen=True, slots=True)
-class Holder:
-    """What keeps GPIO off a pin."""
-
-    #: Such as "JTDO".
-    name: str
-    drive: PinDrive
-
-
-class Pin(Stateful):
-    """One pin of one port, seen from outside (`drive`, `level`, `output`, `watch`) and from inside."""
-
-    STATE = (
-        "_outside",
-        "_is_weak",
-        "_mode",
-        "_output_bit",
-        "_holder",
-        "_sources",
-        "is_watched",
-        "output",
-        "level",
-        "_rail",
-    )
-    DERIVED = ("_drives", "_reads", "input")
+class Pin:
+    """One pin of one port, seen from outside (`drive`, `level`, `output`) and from inside."""
 
     def __init__(
         self, bank: "PinBank", port: str, number: int, *, is_bonded: bool, is_five_volt_tolerant: bool = False
     ) -> None:
         self._bank = bank
+        self._port_index = bank.PORTS.index(port)
+        self._struct: Any = bank.fabric.port_structs[self._port_index]
+        self._bit = 1 << number
         self.port = port
         self.number = number
+        #: Its number among all pins, as rows of subscriptions have it.
+        self.index = 16 * self._port_index + number
         self.name = f"P{port}{number}"
         #: Whether the package has a leg for it.
         self.is_bonded = is_bonded
         #: Whether it bears 5 V as an input without a pull (DS5319 table 5, "FT").
         self.is_five_volt_tolerant = is_five_volt_tolerant
-        #: What the board hangs on the pin: PULL_UP, PULL_DOWN or NONE.
-        self.board_pull = PinDrive.NONE
-        #: What the chip itself puts on the wire.
-        self.output = PinDrive.NONE
-        #: The logic level on the wire; a floating wire is taken as low.
-        self.level = False
-        #: What the digital input sees: `level`, or False while the Schmitt trigger is off or the pin is held.
-        self.input = False
-        #: Whether a change of `output` ends the CPU's slice.
-        self.is_watched = False
-        #: Called at every change of `input`, in the order of subscription (GPIO's IDR, EXTI).
-        self.listeners: list[Callable[[Pin], None]] = []
-        self._outside: bool | None = None
-        #: Whether a resistor drives it, which yields to the chip.
-        self._is_weak = False
-        self._rail: str | None = None
-        self._mode = PinMode.FLOATING
-        self._output_bit = False
-        self._holder: Holder | None = None
-        #: The alternate functions that are offered, with their levels.
-        self._sources: frozenset[tuple[str, bool]] = frozenset()
-        # What follows from the mode, the holder and the sources, kept at hand because pins change often:
-        # the drive for an ODR bit of 0 and of 1, and whether the digital input reads the wire.
-        self._drives = PinMode.FLOATING.drives
-        self._reads = True
+        self._struct.modes[number] = _MODES.index(PinMode.FLOATING)
+        self._set(bonded=is_bonded)
 
     # From outside the chip.
 
     def drive(self, level: bool | int | None, *, volts: float | None = None, is_weak: bool = False) -> None:
-        """Put a level on the wire from outside; None lets go.
+        """Put a level (False, True, or 0, 1) on the wire from outside; None lets go.
 
         Args:
-            level: 0, 1 or None.
-            volts: how high a 1 is, where that is known; more than the pin bears is warned of.
-            is_weak: whether a resistor does it: stronger than the chip's own pulls of 40 kΩ, weaker than its outputs.
+            level: What the other end drives.
+            volts: How high a 1 is; None is 3.3 V. More than the pin bears is warned of.
+            is_weak: Whether a resistor does it: stronger than the chip's own pulls of 40 kΩ, weaker than its outputs.
 
         Raises:
             ValueError: The package has no leg for this pin.
@@ -182,14 +152,12 @@ class Pin(Stateful):
         complaint = overvoltage(self, volts) if volts is not None and level else None
         if complaint is not None:
             self._bank.warn(complaint, once=f"{self.name}:volts")
-        outside = None if level is None else bool(level)
-        if (outside, is_weak) != (self._outside, self._is_weak):
-            self._outside, self._is_weak = outside, is_weak
-            self._bank.simple_is_known = False
-            self._resolve()
-            if outside is None:
-                for listener in self._bank.release_listeners:
-                    listener(self)
+        before = self.driven
+        is_driven = level is not None
+        self._change(outside=is_driven, outside_high=bool(level), outside_weak=is_driven and is_weak)
+        if before is not None and not is_driven:
+            for listener in self._bank.release_listeners:
+                listener(self)
 
     def short(self, rail: str | None) -> None:
         """Tie the wire to a supply rail, as a solder bridge does; None cuts it again.
@@ -202,36 +170,61 @@ class Pin(Stateful):
         """
         if rail is not None and rail not in RAILS:
             raise ValueError(f"no such rail: {rail!r}; a wire can be shorted to {' or '.join(RAILS)}")
-        self._rail = rail
-        self._bank.simple_is_known = False
-        self._resolve()
+        self._change(rail=rail is not None, rail_high=rail is not None and RAILS[rail])
 
-    def watch(self, on: bool = True) -> None:
-        """Choose whether a change of the chip's own drive ends the CPU's slice."""
-        self.is_watched = on
-        self._bank.simple_is_known = False
+    @property
+    def board_pull(self) -> PinDrive:
+        """What the board hangs on the pin: PULL_UP, PULL_DOWN or NONE."""
+        return _first(self._has("board_up"), PinDrive.PULL_UP, self._has("board_down"), PinDrive.PULL_DOWN)
+
+    @board_pull.setter
+    def board_pull(self, pull: PinDrive) -> None:
+        self._change(board_up=pull is PinDrive.PULL_UP, board_down=pull is PinDrive.PULL_DOWN)
 
     @property
     def driven(self) -> bool | None:
         """What the outside world puts on the wire; None is nothing."""
-        return self._outside
+        return self._has("outside_high") if self._has("outside") else None
+
+    @property
+    def output(self) -> PinDrive:
+        """What the chip itself puts on the wire."""
+        return next((drive for name, drive in _DRIVEN.items() if self._has(name)), PinDrive.NONE)
+
+    @property
+    def level(self) -> bool:
+        """The logic level on the wire; a floating wire is taken as low."""
+        return self._has("level")
+
+    @property
+    def input(self) -> bool:
+        """What the digital input sees: `level`, or False while the Schmitt trigger is off or the pin is held."""
+        return self._has("input")
 
     @property
     def is_floating(self) -> bool:
         """Whether nobody drives or pulls the wire."""
-        is_driven = self._outside is not None or self._rail is not None
-        return self.output is PinDrive.NONE and not is_driven and self.board_pull is PinDrive.NONE
+        return self._has("floating")
 
     @property
     def is_contended(self) -> bool:
         """Whether chip and outside world drive the wire to different levels."""
-        outside = (None if self._is_weak else self._outside) if self._rail is None else RAILS[self._rail]
-        return self.output.is_strong and outside is not None and are_fighting((outside, self.output.level))
+        return self._has("fighting") or self._has("shorted")
+
+    @property
+    def rail(self) -> str | None:
+        """The supply rail that the wire is shorted to."""
+        return (
+            next(name for name, level in RAILS.items() if level is self._has("rail_high"))
+            if self._has("rail")
+            else None
+        )
 
     @property
     def function(self) -> str | None:
         """The alternate function that the wire shows, such as "USART1_TX"; None for none."""
-        source, _ = min(self._sources, default=("", False))
+        sources = self._struct.sources[self.number]
+        source = ALTERNATE_FUNCTIONS[(sources & -sources).bit_length() - 1] if sources else ""
         return source if self.carries(source) else None
 
     # From inside the chip.
@@ -239,143 +232,72 @@ class Pin(Stateful):
     @property
     def mode(self) -> PinMode:
         """What GPIO has configured, whether or not GPIO has the pin now."""
-        return self._mode
+        mode: int = self._struct.modes[self.number]
+        return _MODES[mode]
 
     @property
     def holder(self) -> str | None:
         """What keeps GPIO off the pin, such as "JTDO"; None for nothing."""
-        return None if self._holder is None else self._holder.name
+        return self._bank.holders.get(self.name)
 
     def configure(self, mode: PinMode, output_bit: bool) -> None:
         """Set mode and ODR bit (called by GPIO)."""
-        self._mode = mode
-        self._output_bit = output_bit
-        self._update()
-
-    def set_output_bit(self, output_bit: bool) -> None:
-        """Set the ODR bit (called by GPIO)."""
-        self._output_bit = output_bit
-        self._put(self._drives[output_bit])
+        self._struct.modes[self.number] = _MODES.index(mode)
+        self._change(odr=output_bit, **_BITS_OF_MODE[mode])
 
     def hold(self, owner: str, drive: PinDrive = PinDrive.NONE) -> None:
         """Take the pin from GPIO for a fixed function, such as the debug port."""
-        self._holder = Holder(owner, drive)
-        self._update()
+        self._bank.holders[self.name] = owner
+        self._change(held=True, **{f"hold_{name}": drive is of for name, of in _DRIVEN.items()})
 
     def release(self) -> None:
         """Give the pin back to GPIO."""
-        self._holder = None
-        self._update()
+        self._bank.holders.pop(self.name, None)
+        self._change(held=False, **{f"hold_{name}": False for name in _DRIVEN})
 
     def connect(self, source: str, level: bool) -> None:
         """Offer `level` as the alternate function `source`; the latest call of each source counts."""
-        self._sources = frozenset({*self._others(source), (source, level)})
-        self._update()
+        self._bank.fabric.offer(self.index, ALTERNATE_FUNCTIONS.index(source), int(level))
 
     def disconnect(self, source: str) -> None:
         """Take the alternate function `source` off the pin."""
-        others = self._others(source)
-        if others != self._sources:
-            self._sources = others
-            self._update()
-
-    def _others(self, source: str) -> frozenset[tuple[str, bool]]:
-        return frozenset(pair for pair in self._sources if pair[0] != source)
+        self._bank.fabric.offer(self.index, ALTERNATE_FUNCTIONS.index(source), NO_LEVEL)
 
     def carries(self, source: str) -> bool:
         """Whether the wire shows the alternate function `source`."""
-        return (
-            self._mode in ALTERNATE_MODES
-            and self._holder is None
-            and self.is_bonded
-            and bool(self._sources)
-            and min(self._sources)[0] == source
-        )
+        sources = self._struct.sources[self.number]
+        is_first = bool(sources) and ALTERNATE_FUNCTIONS[(sources & -sources).bit_length() - 1] == source
+        return is_first and self._has("alternate") and not self._has("held") and self.is_bonded
 
     def is_listening(self) -> bool:
         """Whether an alternate function can receive from this pin: an input that nobody holds."""
-        is_input = self._mode in INPUT_MODES or self._mode in ALTERNATE_MODES
-        return is_input and self._holder is None and self.is_bonded
+        mode = self.mode
+        return (mode in INPUT_MODES or mode in ALTERNATE_MODES) and not self._has("held") and self.is_bonded
 
-    def is_simple(self) -> bool:
-        """Whether a change of the ODR bit changes nothing but the level on the wire, and has no listener."""
-        bank = self._bank
-        return (
-            self._drives == PinMode.PUSH_PULL.drives
-            and self._mode is PinMode.PUSH_PULL
-            and self._outside is None
-            and self._rail is None
-            and not self.is_watched
-            and not bank.edge_lines >> self.number & 1
-        )
+    def _has(self, name: str) -> bool:
+        return bool(getattr(self._struct, name) & self._bit)
 
-    def _restored(self) -> None:
-        self._derive()
-        self.input = self.level and self._reads
+    def _set(self, **flags: bool) -> bool:
+        """Set the pin's bits in masks of its port; return whether one has changed."""
+        struct, bit, has_changed = self._struct, self._bit, False
+        for name, wanted in flags.items():
+            mask = getattr(struct, name)
+            if bool(mask & bit) is not wanted:
+                setattr(struct, name, mask ^ bit)
+                has_changed = True
+        return has_changed
 
-    def _derive(self) -> None:
-        """Work out `_drives` and `_reads`, by RM0008 table 20."""
-        self._bank.simple_is_known, mode = False, self._mode
-        self._reads = mode is not PinMode.ANALOG and self._holder is None
-        if self._holder is not None:
-            # The debug port's inputs have their pulls, and GPIO's input reads what stands there.
-            self._reads = self._holder.drive in {PinDrive.PULL_UP, PinDrive.PULL_DOWN}
-            self._drives = (self._holder.drive,) * 2
-        elif mode not in ALTERNATE_MODES:
-            self._drives = mode.drives
-        elif self._sources:
-            # Two functions on one pin are unspecified; chosen: the first by name drives.
-            self._drives = (mode.drives[min(self._sources)[1]],) * 2
-        else:
-            # "Not specified" (RM0008 9.1.9); chosen: nothing drives.
-            self._drives = (PinDrive.NONE,) * 2
-
-    def _update(self) -> None:
-        self._derive()
-        self._put(self._drives[self._output_bit])
-
-    def _put(self, output: PinDrive) -> None:
-        """Put a drive on the wire."""
-        if output is not self.output:
-            self.output = output
-            self._bank.output_changed(self)
-        self._resolve()
-
-    def _resolve(self) -> None:
-        """Bring `level` and `input` up to date; notify the listeners of a change of the input."""
-        output, outside = self.output, self._outside
-        level: bool
-        if self._rail is not None:
-            level = RAILS[self._rail]
-            if output.is_strong and output.level is not level:
-                self._bank.warn(short_circuit(self, self._rail), once=f"{self.name}:short")
-        elif outside is None:
-            # A weak pull of the chip is stronger than the board's (40 kΩ against an LED or 100 kΩ).
-            level = bool(self.board_pull.level if output.level is None else output.level)
-        elif output.is_strong and self._is_weak:
-            level = bool(output.level)
-        elif output.is_strong:
-            drivers = outside, bool(output.level)
-            level = bool(level_of(drivers))
-            if are_fighting(drivers):
-                self._bank.warn(contention(self), once=f"{self.name}:contention")
-        else:
-            level = outside
-        self.level = level
-        seen = level and self._reads
-        if seen is not self.input:
-            self.input = seen
-            for listener in self.listeners:
-                listener(self)
-        if self._bank.wire_listeners or self._bank.subscriptions:
-            self._bank.wire_changed(self)
+    def _change(self, **flags: bool) -> None:
+        if self._set(**flags):
+            self._bank.fabric.pins_changed(self._port_index)
 
 
 class PinBank(Stateful):
     """All pins of the chip, and the switches between them and its peripherals."""
 
-    STATE = ("_rows", "remaps", "exti_ports", "edge_lines")
-    DERIVED = ("simple_is_known",)
+    STATE = ("fabric", "holders", "remaps", "exti_ports")
+    #: Who listens.
+    DERIVED = ("_subscriptions",)
 
     PORTS = "ABCDE"
 
@@ -390,27 +312,18 @@ class PinBank(Stateful):
             five_volt_tolerant: Names of those that bear 5 V.
         """
         self._ports = ports
-        #: EXTI lines on which an edge makes a request, as a mask.
-        self.edge_lines = 0
-        #: Whether no pin has changed in what `Pin.is_simple` looks at, since it was set.
-        self.simple_is_known = False
-        #: Called with (pin, time in ns) whenever something on a wire may have changed, for tools.
-        self.wire_listeners: list[Callable[[Pin, int], None]] = []
-        #: Tools that take changes of simple pins in bulk, where the native core keeps them: called to do so.
-        self.bulk_listeners: list[Callable[[], None]] = []
+        #: Queue, lines and devices, which stand at the pins.
+        self.fabric = Fabric(cast("FabricPorts", ports))
+        self.fabric.electrical = self._warn_of
+        #: What keeps GPIO off a pin, by the pin's name.
+        self.holders: dict[str, str] = {}
         self._pins = {
             port: tuple(self._make(port, n, bonded, five_volt_tolerant) for n in range(16)) for port in self.PORTS
         }
         self._by_name = {pin.name: pin for pins in self._pins.values() for pin in pins}
-        self._rows = Rows(self._by_name.values())
-        #: Who wants edges in bulk.
-        self.subscriptions: list[Subscription] = []
-        #: Called with (pin name, drive, time in ns) at every change of the chip's own drive.
-        self.on_output: Callable[[str, PinDrive, int], None] | None = None
-        #: Whether anything beyond `on_silent_output` subscribes to each output.
-        self.is_subscribed: Callable[[], bool] = lambda: self.on_output is not None
-        #: Called with the time in ns of the last output of those that were not notified one by one.
-        self.on_silent_output: Callable[[int], None] | None = None
+        for port in range(len(self.PORTS)):
+            self.fabric.pins_changed(port)
+        self._subscriptions: list[Subscription] = []
         #: Called when AFIO has changed `remaps` or `exti_ports`.
         self.route_listeners: list[Callable[[], None]] = []
         #: AFIO_MAPR by function, such as {"USART1": 1}; a function that is missing is not remapped.
@@ -440,53 +353,53 @@ class PinBank(Stateful):
         """Return the 16 pins of a port, bonded or not."""
         return self._pins[letter]
 
-    def _restored(self) -> None:
-        self.simple_is_known = False
-
     def route_changed(self) -> None:
         """Notify the listeners that AFIO has changed `remaps` or `exti_ports`."""
         for listener in self.route_listeners:
             listener()
 
-    def output_changed(self, pin: Pin) -> None:
-        """Pass on a change of a pin's own drive (called by the pin)."""
-        if self.on_output is not None:
-            self.on_output(pin.name, pin.output, self._ports.now_ns)
-        if pin.is_watched:
-            self._ports.request_stop()
-        for subscription in self.subscriptions:
-            if subscription.of is Of.DRIVE:
-                subscription.put(pin, self._ports)
-
-    def wire_changed(self, pin: Pin) -> None:
-        """Notify the tools that a pin's wire may have changed (called by the pin)."""
-        now_ns = self._ports.now_ns
-        for listener in self.wire_listeners:
-            listener(pin, now_ns)
-        for subscription in self.subscriptions:
-            if subscription.of is Of.WIRE:
-                subscription.put(pin, self._ports)
-
     def subscribe_pins(
-        self, pins: Iterable[str], sink: EdgeSink, *, of: Of = Of.DRIVE, ends_slice: Iterable[str] = ()
-    ) -> "Subscription":
-        """Have `sink` called with each change of these pins from now on.
+        self, pins: Iterable[str], sink: EdgeSink, *, of: Of = Of.DRIVE, ends_slice: Iterable[str] = (),
+        lines: Iterable[int] = (),
+    ) -> "Subscription":  # fmt: skip
+        """Have `sink` called with each change of these pins, and of lines by their numbers, from now on.
 
         Raises:
             KeyError: The chip has no such pin.
         """
-        subscription = Subscription(self, [self._by_name[name] for name in pins], sink, of, frozenset(ends_slice))
-        self.subscriptions.append(subscription)
+        subscription = Subscription(self, tuple(pins), sink, of, frozenset(ends_slice), lines)
+        self._subscriptions.append(subscription)
         return subscription
 
     def deliver(self) -> None:
         """Hand every sink what waits for it."""
-        for subscription in self.subscriptions:
+        for subscription in self._subscriptions:
             subscription.deliver()
+
+    def masks(self, names: Iterable[str]) -> list[int]:
+        """Return pins as masks, one a port.
+
+        Raises:
+            KeyError: The chip has no such pin.
+        """
+        masks = [0] * len(self.PORTS)
+        for name in names:
+            masks[self.PORTS.index(self[name].port)] |= 1 << self[name].number
+        return masks
 
     def warn(self, message: str, *, once: str) -> None:
         """Warn of something electrical."""
         self._ports.warn(message, once=once)
+
+    def _end(self, subscription: "Subscription") -> None:
+        self._subscriptions.remove(subscription)
+
+    def _warn_of(self, index: int, what: int) -> None:
+        pin = self._pins[self.PORTS[index // 16]][index % 16]
+        if what:
+            self.warn(short_circuit(pin), once=f"{pin.name}:short")
+        else:
+            self.warn(contention(pin), once=f"{pin.name}:contention")
 
     def _make(self, port: str, number: int, bonded: frozenset[str], tolerant: frozenset[str]) -> Pin:
         name = f"P{port}{number}"
@@ -496,45 +409,59 @@ class PinBank(Stateful):
 class Subscription:
     """One subscriber's pins; see `fabric/subscriptions.py`."""
 
-    def __init__(self, bank: PinBank, pins: Iterable[Pin], sink: EdgeSink, of: Of, ends_slice: frozenset[str]) -> None:
-        self._bank = bank
-        self._sink = sink
-        self._rows = bytearray()
-        self.of = of
-        self.ends_slice = ends_slice
-        self._values = {pin.name: self._value(pin) for pin in pins}
+    def __init__(
+        self, bank: PinBank, pins: tuple[str, ...], sink: EdgeSink, of: Of, ends_slice: frozenset[str],
+        lines: Iterable[int],
+    ) -> None:  # fmt: skip
+        self._bank, self._sink = bank, sink
+        masks, none = bank.masks(pins), bank.masks(())
+        self._ends_slice = ends_slice
+        drive, wire = (masks, none) if of is Of.DRIVE else (none, masks)
+        self._number = bank.fabric.subscribe(drive, wire, bank.masks(ends_slice), lines)
 
-    def put(self, pin: Pin, ports: PinPorts) -> None:
-        """Note what a pin is now, where that is another than before."""
-        before, now = self._values.get(pin.name), self._value(pin)
-        if before is None or before == now:
-            return
-        self._values[pin.name] = now
-        drive, wire = _DRIVES.index(pin.output), FLOATING if pin.is_floating else int(pin.level)
-        number = 16 * self._bank.PORTS.index(pin.port) + pin.number
-        self._rows += EDGE.pack(ports.now_ns, number, drive, wire, 0, 0)
-        if pin.name in self.ends_slice:
-            ports.request_stop()
+    @property
+    def ends_slice(self) -> frozenset[str]:
+        """Names of the pins whose edges end the chip's slice; set it whenever the chip does not run."""
+        return self._ends_slice
+
+    @ends_slice.setter
+    def ends_slice(self, names: frozenset[str]) -> None:
+        if names != self._ends_slice:
+            self._ends_slice = names
+            self._bank.fabric.stop_at(self._number, self._bank.masks(names))
 
     def deliver(self) -> None:
         """Hand the sink what waits for it."""
-        if self._rows:
-            rows = bytes(self._rows)
-            self._rows.clear()
+        rows = self._bank.fabric.take_rows(self._number)
+        if rows:
             self._sink(rows)
 
     def close(self) -> None:
         """Deliver what waits, and get nothing more."""
         self.deliver()
-        self._bank.subscriptions.remove(self)
-
-    def _value(self, pin: Pin) -> int:
-        if self.of is Of.DRIVE:
-            return _DRIVES.index(pin.output)
-        return FLOATING if pin.is_floating else int(pin.level)
+        self._bank._end(self)  # noqa: SLF001 - its own bank
+        self._bank.fabric.unsubscribe(self._number)
 
 
-_DRIVES = tuple(PinDrive)
+#: The masks of a port that say what the chip drives.
+_DRIVEN = {"low": PinDrive.LOW, "high": PinDrive.HIGH, "up": PinDrive.PULL_UP, "down": PinDrive.PULL_DOWN}
+_MODES = tuple(PinMode)
+_OUTPUTS = {PinMode.PUSH_PULL, PinMode.OPEN_DRAIN}
+#: The bits of a port's masks by mode.
+_BITS_OF_MODE = {
+    mode: {
+        "output": mode in _OUTPUTS,
+        "alternate": mode in ALTERNATE_MODES,
+        "open_drain": mode in {PinMode.OPEN_DRAIN, PinMode.ALTERNATE_OPEN_DRAIN},
+        "pulled": mode is PinMode.PULLED,
+        "analog": mode is PinMode.ANALOG,
+    }
+    for mode in PinMode
+}
+
+
+def _first(one: bool, then: PinDrive, other: bool, otherwise: PinDrive) -> PinDrive:
+    return then if one else otherwise if other else PinDrive.NONE
 
 
 def overvoltage(pin: "Pin", volts: float) -> str | None:
@@ -565,6 +492,6 @@ def floating_inputs(names: Sequence[str]) -> str:
     return f"{', '.join(names)}: {what} that nobody drives: {they} 0 here and anything on a board; configured"
 
 
-def short_circuit(pin: "Pin", rail: str) -> str:
+def short_circuit(pin: "Pin") -> str:
     """Return the warning of an output that drives against a supply rail."""
-    return f"{pin.name}: output {pin.output.value} is shorted to {rail}"
+    return f"{pin.name}: output {pin.output.value} is shorted to {pin.rail}"

@@ -46,10 +46,6 @@ class ChipPorts(Protocol):
         """End the CPU's slice at the boundary of the running block."""
         ...
 
-    def deadline_changed(self) -> None:
-        """Notify that this peripheral's `next_deadline` may be earlier than before."""
-        ...
-
     def reset_peripheral(self, name: str) -> None:
         """Call `reset` of the peripheral `name`, if it is modelled (RCC's APBxRSTR)."""
         ...

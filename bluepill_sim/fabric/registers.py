@@ -6,9 +6,11 @@ outside the peripherals are the business of `chip.py`.
 Theory of operation. A `Register` says which bits store, which clear, and which
 method a read or write calls. A `Peripheral` declares `REGISTERS`, names in
 `STATE` its plain attributes beyond the registers, and writes methods for what a
-read or write *causes*. The table may be executed by any other executor: nothing
-in it is Python-specific (`native/registers.py` hands it to C). A peripheral
-that acts by itself keeps the time of its next action in `due_ns`; accesses catch
+read or write *causes*. A hot one is a kind of device in C (`KIND`): what a register
+that says `NATIVE` causes is written there, once, and what it holds beside the
+registers is the struct `HOLDS`. The table itself is executed by the native core
+too (`native/registers.py` hands it over). A peripheral that acts by itself keeps
+the time of its next action in `due_ns`, a slot of the chip's queue; accesses catch
 up to that time first, so that a register never reads older than the instruction
 that asks.
 
@@ -19,14 +21,19 @@ Invariant: a stored word never holds a bit outside `readable`, so that
 `words[offset // 4]` of a register without `on_read` is what a read returns.
 """
 
+import ctypes
 from array import array
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import ClassVar, cast
+from typing import Any, ClassVar, cast
 
+from bluepill_sim.extension.layout import Struct, structure
+from bluepill_sim.fabric.fabric import CLOCK, RESET
 from bluepill_sim.fabric.ports import ChipPorts
 from simbase.state import Stateful
 
+#: In place of a method's name: the device's file in C does it.
+NATIVE = "native"
 #: Every bit of a 32-bit register.
 WORD = 0xFFFF_FFFF
 
@@ -49,11 +56,11 @@ class Register:
     write_one_to_clear: int = 0
     #: Bits cleared by writing 0 and left alone by 1 (rc_w0).
     write_zero_to_clear: int = 0
-    #: Name of the peripheral's method `() -> int` that answers a read in place of the stored word.
+    #: Name of the peripheral's method `() -> int` that answers a read in place of the stored word; or `NATIVE`.
     on_read: str | None = None
     #: Offset of a hidden word, after the registers, in which each read leaves what it returned; None for none.
     latched_in: int | None = None
-    #: Name of the peripheral's method `(written: int, previous: int) -> None`, called after the store.
+    #: Name of the peripheral's method `(written: int, previous: int) -> None`, called after the store; or `NATIVE`.
     on_write: str | None = None
     #: One line for people.
     doc: str = ""
@@ -132,19 +139,22 @@ class Place:
 class Peripheral(Stateful):
     """A block of registers at an address of the chip."""
 
-    STATE: ClassVar[tuple[str, ...]] = ("words", "due_ns")
+    STATE: ClassVar[tuple[str, ...]] = ("words", "held", "due_ns")
+    DERIVED: ClassVar[tuple[str, ...]] = ("_due_ns",)
 
     REGISTERS: ClassVar[tuple[Register, ...]] = ()
     #: Whether narrow writes touch only their bytes (AHB) or are duplicated over the word (APB).
     HAS_BYTE_LANES: ClassVar[bool] = False
+    #: Its kind of device in C, and the struct that this holds beside the words; None: it is written in Python.
+    KIND: ClassVar[str | None] = None
+    HOLDS: ClassVar[Struct | None] = None
 
     def __init__(self, chip: ChipPorts, place: Place) -> None:
         self.chip = chip
         self.place = place
         self.name = place.name
         self.base = place.base
-        #: When this peripheral next acts by itself, in ns; None for never.
-        self.due_ns: int | None = None
+        self.fabric = chip.pins.fabric
         #: The stored words of the whole block, indexed by offset // 4; the object stays the same for ever.
         self.words = array("I", bytes(place.size))
         count = place.size // 4
@@ -167,10 +177,46 @@ class Peripheral(Stateful):
             if register.latched_in is not None:
                 self._latches[index] = register.latched_in // 4
             if register.on_read is not None:
-                self._read_hooks[index] = cast("Callable[[], int]", getattr(self, register.on_read))
+                self._read_hooks[index] = self._reader(register.on_read, index)
             if register.on_write is not None:
-                self._write_hooks[index] = cast("Callable[[int, int], None]", getattr(self, register.on_write))
+                self._write_hooks[index] = self._writer(register.on_write, index)
             self.words[index] = register.reset
+        self._due_ns: int | None = None
+        #: What a device in C holds beside the words: the struct `HOLDS`.
+        self.native: Any = structure(self.HOLDS)() if self.HOLDS is not None else None
+        #: Its place in the queue of events.
+        self.slot = self._take_slot()
+
+    @property
+    def due_ns(self) -> int | None:
+        """When this peripheral next acts by itself, in ns; None for never."""
+        return self._due_ns if self.KIND is None else self.fabric.due(self.slot)
+
+    @due_ns.setter
+    def due_ns(self, at_ns: int | None) -> None:
+        self._due_ns = at_ns
+        self.fabric.schedule(self.slot, at_ns)
+
+    @property
+    def held(self) -> bytes:
+        """What a device in C holds, as bytes; none of one in Python."""
+        return b"" if self.native is None else bytes(self.native)
+
+    @held.setter
+    def held(self, held: bytes) -> None:
+        if self.native is not None:
+            ctypes.memmove(ctypes.addressof(self.native), held, len(held))
+
+    def command(self, what: int, one: int = 0, other: int = 0) -> int:
+        """Have the device in C do something; return its answer."""
+        return self.fabric.command(self.slot, what, one, other)
+
+    def answer(self, what: int, value: int) -> int:
+        """Answer what the device in C asks."""
+        raise NotImplementedError(f"{self.name} was asked {what}, {value}")
+
+    def deliver(self) -> None:
+        """Take over the words that the device in C has sent."""
 
     def changes_reset_value(self, offset: int, value: int) -> bool:
         """Tell whether a write would set a bit that is 0 after a reset: more than a de-initialization does."""
@@ -184,8 +230,7 @@ class Peripheral(Stateful):
             offset: Byte offset from the base, aligned to `size`.
             size: 1, 2 or 4 bytes.
         """
-        if self.due_ns is not None and self.chip.now_ns >= self.due_ns:
-            self.advance_to(self.chip.now_ns)
+        self._catch_up()
         index = offset >> 2
         hook = self._read_hooks[index]
         if hook is None:
@@ -204,8 +249,7 @@ class Peripheral(Stateful):
 
     def write(self, offset: int, size: int, value: int) -> None:
         """Take what the bus writes; arguments as of `read`."""
-        if self.due_ns is not None and self.chip.now_ns >= self.due_ns:
-            self.advance_to(self.chip.now_ns)
+        self._catch_up()
         index = offset >> 2
         register = self._registers[index]
         if register is None:
@@ -228,20 +272,52 @@ class Peripheral(Stateful):
         self.due_ns = None
         for register in self.REGISTERS:
             self.words[register.offset // 4] = register.reset
+        if self.KIND is not None:
+            self.command(RESET)
         self.on_reset()
 
     def on_reset(self) -> None:
         """Put back what is not a register; called by `reset` after the registers."""
 
-    def next_deadline(self) -> int | None:
-        """Return when this peripheral next acts by itself, in ns, or None for never."""
-        return self.due_ns
-
     def advance_to(self, now_ns: int) -> None:
         """Act on everything due up to and including `now_ns`, in order of its time."""
 
+    def clock_hz(self) -> int:
+        """Return the frequency of the peripheral's own clock, for a device in C that counts it; 0: it does not."""
+        return 0
+
     def clock_changed(self) -> None:
         """Act on a change of the frequencies in `chip.clocks`, which has just happened."""
+        if self.KIND is not None and self.clock_hz():
+            self.command(CLOCK, self.clock_hz())
+
+    def _take_slot(self) -> int:
+        if self.KIND is None:
+            return self.fabric.add_slot(self.name, self.advance_to)
+        words, _ = self.words.buffer_info()
+        state = 0 if self.native is None else ctypes.addressof(self.native)
+        slot = self.fabric.add_device(
+            self.name, self.KIND, words, state, act=self.advance_to, answer=self.answer, deliver=self.deliver
+        )
+        for output, irq in enumerate(self.place.irqs):
+            self.fabric.put_output(slot, output, irq)
+        return slot
+
+    def _reader(self, name: str, index: int) -> Callable[[], int]:
+        if name == NATIVE:
+            return lambda: self.fabric.read(self.slot, index)
+        return cast("Callable[[], int]", getattr(self, name))
+
+    def _writer(self, name: str, index: int) -> Callable[[int, int], None]:
+        if name == NATIVE:
+            return lambda written, previous: self.fabric.write(self.slot, index, written, previous)
+        return cast("Callable[[int, int], None]", getattr(self, name))
+
+    def _catch_up(self) -> None:
+        if self.KIND is not None:
+            self.fabric.catch_up(self.slot, self.chip.now_ns)
+        elif self._due_ns is not None and self.chip.now_ns >= self._due_ns:
+            self.advance_to(self.chip.now_ns)
 
     def _narrow(self, register: Register, offset: int, size: int, value: int) -> int:
         """Return the word that the peripheral sees when the CPU writes 1 or 2 bytes."""

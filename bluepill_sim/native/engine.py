@@ -16,6 +16,7 @@ state is in `shared`, whichever of them ran last.
 import ctypes
 import weakref
 from collections.abc import Callable
+from typing import Any
 
 from bluepill_sim.core.accesses import Access, accesses_of, is_ambiguous, may_end_in_it, only_reads
 from bluepill_sim.core.block_cost import NO_BLOCK, Block
@@ -33,7 +34,9 @@ from bluepill_sim.core.unicorn_core import (
     WriteAccess,
     io_callbacks,
 )
-from bluepill_sim.native.library import (
+from bluepill_sim.extension.library import (
+    ACCESS_CYCLE,
+    ACCESS_PC,
     READ,
     RECORDED,
     TRAPPED,
@@ -52,6 +55,7 @@ from bluepill_sim.native.state import (
     FROZEN,
     HALT_KINDS,
     HALT_NUMBERS,
+    NO_TIME,
     STALE,
     UNEXPLAINED,
     InstructionRow,
@@ -84,7 +88,7 @@ class NativeEngine(Engine):
 
     DERIVED = (
         # Shared with C, which has all of the state but what `Engine` declares.
-        "shared", "_state", "_calls", "_kept", "_regions", "_code", "before_run", "before_access",
+        "shared", "_state", "_calls", "_kept", "_regions", "_code",
         # Hooks, and what is known of the program.
         "_native_hooks", "_pc_hooks", "_known", "_noted", "_held",
     )  # fmt: skip
@@ -106,17 +110,13 @@ class NativeEngine(Engine):
         self._held: Block | None = NO_BLOCK
         self._native_hooks: tuple[int, ...] = ()
         self._pc_hooks: tuple[int, ...] = ()
-        #: Called before Python looks at what C may have changed (levels of pins).
-        self.before_access: Callable[[], None] | None = None
-        #: Called before each run in C.
-        self.before_run: Callable[[], None] | None = None
         self._kept: list[object] = []
         unicorn = self._core.library
         api = UnicornApi(*(ctypes.cast(getattr(unicorn, name), ctypes.c_void_p) for name in UNICORN_FUNCTIONS))
         #: Keeps the callbacks alive.
         self._calls = Callbacks(
             UNKNOWN_BLOCK(self._measure_block), READ(self._read_io), WRITE(self._write_io), TRAPPED(self._trapped),
-            RECORDED(self._take_records),
+            RECORDED(self._take_records), ACCESS_CYCLE(lambda: self.access_cycle), ACCESS_PC(lambda: self.access_pc),
         )  # fmt: skip
         self._state = state = ctypes.c_void_p(
             library().core_new(self._core.handle, ctypes.addressof(api), ctypes.addressof(self._calls))
@@ -214,11 +214,7 @@ class NativeEngine(Engine):
         if traps.have_changed:
             traps.apply()
             self.forget_costs()
-        if self.before_run is not None:
-            self.before_run()
         kind = library().core_run(self._state, min(limit, shared.cycle + _SLICE_CYCLES))
-        if shared.dirty and self.before_access is not None:
-            self.before_access()
         if self._failure is not None:
             failure, self._failure = self._failure, None
             self._frozen = None
@@ -302,6 +298,25 @@ class NativeEngine(Engine):
         super()._set_recorder(recorder)
         if not library().core_start_recording(self._state, 0 if recorder is None else _RECORD_ROOM):
             raise MemoryError("no memory for a record of blocks")
+
+    @property
+    def next_event(self) -> int:
+        """The cycle at which SysTick or the fabric's queue next acts."""
+        cycle: int = library().core_next_event(self._state)
+        return cycle
+
+    @property
+    def _raised_by(self) -> tuple[int, int] | None:
+        shared = self.shared
+        return None if shared.raised_cycle == NO_TIME else (shared.raised_cycle, shared.raised_pc)
+
+    @_raised_by.setter
+    def _raised_by(self, raised: tuple[int, int] | None) -> None:
+        self.shared.raised_cycle, self.shared.raised_pc = raised or (NO_TIME, 0)
+
+    def _fail(self, error: BaseException) -> None:
+        super()._fail(error)
+        self.shared.attention = 1
 
     def _restored(self) -> None:
         super()._restored()
@@ -398,8 +413,6 @@ class NativeEngine(Engine):
     def _is_denied(self) -> bool:
         """Prepare an access; return whether the run has ended before it."""
         shared = self.shared
-        if shared.dirty and self.before_access is not None:
-            self.before_access()
         if shared.is_python:
             return super()._is_denied()
         return self._frozen is not None or (not shared.stop_at and self._is_interrupted_here())
@@ -454,7 +467,7 @@ def _has_like_access_under_it(block: Block, accesses: dict[int, Access]) -> bool
     return any(kinds.count(kind) > 1 for at, kind in zip(accesses, kinds, strict=True) if block.it_state_at(at, 0))
 
 
-def _fill(row: InstructionRow, access: Access | None) -> None:
+def _fill(row: Any, access: Access | None) -> None:
     """Fill in which memory an instruction accesses."""
     if access is None:
         return

@@ -14,9 +14,9 @@ from bluepill_sim.core.blocks import Measure
 from bluepill_sim.core.nvic import FIRST_IRQ, SYSTEM_EXCEPTIONS, Nvic
 from bluepill_sim.core.processor import SEVONPEND, Processor, Sleep
 from bluepill_sim.core.systick import SysTick
+from bluepill_sim.extension.library import is_native_wanted
 from bluepill_sim.memory import Memory
-from bluepill_sim.native.library import is_native_wanted
-from bluepill_sim.native.state import Shared, field, flag, time
+from bluepill_sim.native.state import field, flag, time
 
 _HALF = 64
 _LOW = (1 << _HALF) - 1
@@ -41,14 +41,14 @@ def make_core(measure: Measure, memory: Memory) -> tuple[Engine, Processor]:
 
 def _wide(name: str, doc: str) -> Any:
     """Return a property over two 64-bit fields: a mask over exception numbers."""
-    low, high = f"{name}_low", f"{name}_high"
 
     def read(self: Any) -> int:
-        return getattr(self.shared, low) | getattr(self.shared, high) << 64  # type: ignore[no-any-return]  # ctypes
+        low, high = getattr(self.shared, name)
+        return low | high << 64  # type: ignore[no-any-return]  # ctypes
 
     def write(self: Any, value: int) -> None:
-        setattr(self.shared, low, value & _LOW)
-        setattr(self.shared, high, value >> 64 & _LOW)
+        words = getattr(self.shared, name)
+        words[0], words[1] = value & _LOW, value >> 64 & _LOW
 
     return property(read, write, doc=doc)
 
@@ -62,7 +62,7 @@ class NativeNvic(Nvic):
     levels = field("levels", "As of `Nvic`.")
     priority_grouping = field("grouping", "As of `Nvic`.")
 
-    def __init__(self, shared: Shared) -> None:
+    def __init__(self, shared: Any) -> None:
         self.shared = shared
         super().__init__(shared.priorities)
 
@@ -75,10 +75,7 @@ class NativeNvic(Nvic):
         elif not levels & bit:
             shared.levels = levels | bit
             number = FIRST_IRQ + irq
-            if number < _HALF:
-                shared.pending_low |= 1 << number
-            else:
-                shared.pending_high |= 1 << number - _HALF
+            shared.pending[number // _HALF] |= 1 << number % _HALF
 
 
 class NativeSysTick(SysTick):
@@ -91,7 +88,7 @@ class NativeSysTick(SysTick):
     _count_flag = flag("tick_count_flag", "As of `SysTick`.")
     next_cycle = time("tick_next", "As of `SysTick`.")
 
-    def __init__(self, pend: Callable[[], None], shared: Shared) -> None:
+    def __init__(self, pend: Callable[[], None], shared: Any) -> None:
         self.shared = shared
         super().__init__(pend)
 
@@ -109,7 +106,7 @@ class NativeProcessor(Processor):
     last_sleep_cycle = time("last_sleep_cycle", "As of `Processor`.")
 
     def __init__(self, engine: Any, memory: Memory) -> None:
-        self.shared: Shared = engine.shared
+        self.shared: Any = engine.shared
         self._native = engine
         super().__init__(engine, memory)
 
@@ -131,7 +128,7 @@ class NativeProcessor(Processor):
     def run(self, stop_at: int) -> None:
         """As of `Processor`; the ticks of SysTick on the way are no reason to come back."""
         if self._native.needs_python:
-            super().run(self._before_tick(stop_at))
+            super().run(self._before_event(stop_at))
             return
         must_deliver, halt = self._native.go_on(stop_at)
         if must_deliver:
@@ -141,11 +138,11 @@ class NativeProcessor(Processor):
 
     def step(self, stop_at: int) -> None:
         """As of `Processor`."""
-        super().step(self._before_tick(stop_at))
+        super().step(self._before_event(stop_at))
 
-    def _before_tick(self, stop_at: int) -> int:
-        tick = self.systick.next_cycle
-        return stop_at if tick is None else min(stop_at, tick)
+    def _before_event(self, stop_at: int) -> int:
+        next_event: int = self._native.next_event
+        return min(stop_at, next_event)
 
     def stop_at_boundary(self) -> None:
         """As of `Processor`."""
@@ -157,6 +154,7 @@ class NativeProcessor(Processor):
         if shared.scr & SEVONPEND and self.nvic.pending:
             shared.event_register = 1
         enabled = shared.enabled << FIRST_IRQ
-        if shared.pending_low & (enabled | SYSTEM_EXCEPTIONS) or shared.pending_high & enabled >> _HALF:
+        low, high = shared.pending
+        if low & (enabled | SYSTEM_EXCEPTIONS) or high & enabled >> _HALF:
             self._native.note_raised()
             shared.stop_at = 0

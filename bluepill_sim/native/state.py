@@ -1,14 +1,11 @@
-"""What the native core and Python both see: one struct in the C core's memory.
-
-Invariant: `Shared` is `struct shared` of bluepill_sim/native/source/core.h, field by
-field; `native/library.py` refuses a library that has another size of it.
-"""
+"""What the native core and Python both see: one struct in the C core's memory, declared in `extension/layout.py`."""
 
 import ctypes
 from typing import Any
 
 from bluepill_sim.core.halts import HaltKind
-from bluepill_sim.core.recorder import BLOCK, LAST_ROWS, RECORD, BlockRow
+from bluepill_sim.core.recorder import BLOCK, RECORD, BlockRow
+from bluepill_sim.extension.layout import INSTRUCTION, LAST_ROWS, SHARED, structure
 from simbase.state import Stateful
 
 #: What stands for "never" and for "none" among times.
@@ -37,91 +34,7 @@ HALT_NUMBERS = {kind: number for number, kind in enumerate(HALT_KINDS)}
 BOUNDARY = 0
 DELIVER, FAILED, STALE, FROZEN, UNEXPLAINED = range(len(HALT_KINDS), len(HALT_KINDS) + 5)
 
-_U8, _U32, _U64 = ctypes.c_uint8, ctypes.c_uint32, ctypes.c_uint64
-
-
-class Record(ctypes.Structure):
-    """`struct record`."""
-
-    _fields_ = (("cycle", _U64), ("address", _U32), ("kind", ctypes.c_int32))
-
-
-class Shared(ctypes.Structure):
-    """`struct shared`."""
-
-    _fields_ = (
-        ("cycle", _U64),
-        ("stop_at", _U64),
-        ("access_cycle", _U64),
-        ("last_sleep_cycle", _U64),
-        ("tick_base", _U64),
-        ("tick_next", _U64),
-        ("pending_low", _U64),
-        ("pending_high", _U64),
-        ("active_low", _U64),
-        ("active_high", _U64),
-        ("enabled", _U64),
-        ("levels", _U64),
-        ("access_pc", _U32),
-        ("in_access", _U32),
-        ("pc", _U32),
-        ("is_thumb", _U32),
-        ("mask_stop", _U32),
-        ("attention", _U32),
-        ("halt_kind", _U32),
-        ("halt_pc", _U32),
-        ("halt_address", _U32),
-        ("halt_has_address", _U32),
-        ("run_from", _U32),
-        ("uses_exclusive", _U32),
-        ("exception_number", _U32),
-        ("sleep", _U32),
-        ("event_register", _U32),
-        ("vector_table", _U32),
-        ("scr", _U32),
-        ("ccr", _U32),
-        ("tick_control", _U32),
-        ("tick_reload", _U32),
-        ("tick_value", _U32),
-        ("tick_count_flag", _U32),
-        ("traps_division", _U32),
-        ("grouping", _U32),
-        ("it_state", _U32),
-        ("is_python", _U32),
-        ("dirty", _U32),
-        ("is_first", _U32),
-        ("last_pin_cycle", _U64),
-        ("priorities", _U8 * 76),
-        ("_priorities_end", _U8 * 4),
-        ("sram", _U64),
-        ("flash", _U64),
-        ("sram_base", _U32),
-        ("sram_bytes", _U32),
-        ("flash_base", _U32),
-        ("flash_bytes", _U32),
-        ("scratch", _U32),
-        ("has_irq_listeners", _U32),
-        ("exact_stops", _U64),
-        ("logged", _U64),
-        ("last", Record * LAST_ROWS),
-    )
-
-
-class InstructionRow(ctypes.Structure):
-    """`struct instruction`."""
-
-    _fields_ = (
-        ("address", _U32),
-        ("cycle", _U32),
-        ("offset", ctypes.c_int32),
-        ("kind", _U8),
-        ("bytes", _U8),
-        ("base", _U8),
-        ("index", _U8),
-        ("shift", _U8),
-        ("count", _U8),
-        ("_padding", _U8 * 2),
-    )
+Shared, InstructionRow = structure(SHARED), structure(INSTRUCTION)
 
 
 def field(name: str, doc: str) -> Any:
@@ -168,7 +81,7 @@ class NativeLastRows(Stateful):
 
     is_first = flag("is_first", "As of `KeptRows`.")
 
-    def __init__(self, shared: Shared) -> None:
+    def __init__(self, shared: Any) -> None:
         self.shared = shared
 
     def append(self, row: BlockRow) -> None:

@@ -214,7 +214,6 @@ class Flash(Peripheral):
     def _begin(self, duration_ns: int) -> None:
         self.words[SR] |= BSY
         self.due_ns = self.chip.now_ns + duration_ns
-        self.chip.deadline_changed()
 
     def _finish(self, flag: int) -> None:
         self.words[SR] |= flag

@@ -3,6 +3,7 @@
 Modelled: all modes of CRL/CRH, pulls by ODR, open drain, atomic set/reset,
 the key sequence of LCKR. Not modelled: output speed, the two APB2 clocks of
 the input synchroniser. IDR is kept up to date by the pins, so that reading it is plain.
+What a write of ODR, BSRR or BRR does is `extension/source/gpio.c`.
 
 A pin that the program configures as a floating input is checked a little
 later: it should be driven by then. What a program never configures floats
@@ -13,9 +14,11 @@ Source: RM0008 sections 9.1 and 9.2.
 Invariant: bit n of the stored IDR is `pins[n].input`.
 """
 
+from bluepill_sim.extension.layout import GPIO
+from bluepill_sim.fabric.fabric import RESET
 from bluepill_sim.fabric.pins import Pin, PinMode, floating_inputs
 from bluepill_sim.fabric.ports import ChipPorts
-from bluepill_sim.fabric.registers import Peripheral, Place, Register, bits
+from bluepill_sim.fabric.registers import NATIVE, Peripheral, Place, Register, bits
 
 CRL, CRH, IDR, ODR, BSRR, BRR, LCKR = range(7)
 
@@ -38,14 +41,15 @@ PIN_MODES = tuple((_OUTPUT_MODES if nibble & 3 else _INPUT_MODES)[nibble >> 2] f
 class Gpio(Peripheral):
     """One general-purpose I/O port; the last letter of its name is the port's."""
 
+    KIND, HOLDS = "gpio", GPIO
     STATE = ("_lock_writes", "_locked", "_intended", "_warned")
     REGISTERS = (
         Register(name="CRL", offset=0x00, reset=_CR_RESET, on_write="_write_crl"),
         Register(name="CRH", offset=0x04, reset=_CR_RESET, on_write="_write_crh"),
         Register(name="IDR", offset=0x08, readable=_PORT, writable=0),
-        Register(name="ODR", offset=0x0C, readable=_PORT, writable=_PORT, on_write="_write_odr"),
-        Register(name="BSRR", offset=0x10, readable=0, on_write="_write_bsrr"),
-        Register(name="BRR", offset=0x14, readable=0, writable=_PORT, on_write="_write_brr"),
+        Register(name="ODR", offset=0x0C, readable=_PORT, writable=_PORT, on_write=NATIVE),
+        Register(name="BSRR", offset=0x10, readable=0, on_write=NATIVE),
+        Register(name="BRR", offset=0x14, readable=0, writable=_PORT, on_write=NATIVE),
         Register(
             name="LCKR", offset=0x18, readable=_LCKK | _PORT, writable=0, on_read="_read_lckr", on_write="_write_lckr"
         ),
@@ -63,9 +67,9 @@ class Gpio(Peripheral):
         #: Pins that were warned of as floating.
         self._warned = 0
         chip.pins.release_listeners.append(self._released)
-        for pin in self._pins:
-            pin.listeners.append(self._input_changed)
-            self._input_changed(pin)
+        self.native.port = chip.pins.PORTS.index(place.name[-1])
+        self.fabric.show_input(self.native.port, self.words.buffer_info()[0] + IDR * self.words.itemsize)
+        self.command(RESET)
 
     def on_reset(self) -> None:
         """Make every pin a floating input and undo the lock."""
@@ -74,14 +78,7 @@ class Gpio(Peripheral):
         self._intended = ()
         for pin in self._pins:
             pin.configure(PinMode.FLOATING, output_bit=False)
-            self._input_changed(pin)
-
-    def _input_changed(self, pin: Pin) -> None:
-        bit = 1 << pin.number
-        if pin.input:
-            self.words[IDR] |= bit
-        else:
-            self.words[IDR] &= ~bit
+        self.command(RESET)
 
     def _write_crl(self, _written: int, previous: int) -> None:
         self._configure(CRL, 0, previous)
@@ -129,7 +126,6 @@ class Gpio(Peripheral):
 
     def _check_later(self) -> None:
         self.due_ns = self.chip.now_ns + SETTLING_NS
-        self.chip.deadline_changed()
 
     def advance_to(self, now_ns: int) -> None:
         """Warn of the intended inputs that float."""
@@ -142,36 +138,6 @@ class Gpio(Peripheral):
             self._warned |= sum(1 << pin.number for pin, _ in floating)
             names = [pin.name for pin, _ in floating]
             self.chip.warn(floating_inputs(names), once=f"floating:{' '.join(names)}", pc=floating[0][1])
-
-    def _write_odr(self, _written: int, previous: int) -> None:
-        self._output(self.words[ODR], previous)
-
-    def _write_bsrr(self, written: int, _previous: int) -> None:
-        previous = self.words[ODR]
-        # A set wins over a reset of the same bit (RM0008 9.2.5).
-        self._output(previous & ~(written >> 16) | written & _PORT, previous)
-
-    def _write_brr(self, written: int, _previous: int) -> None:
-        previous = self.words[ODR]
-        self._output(previous & ~(written & _PORT), previous)
-
-    def _output(self, bits_now: int, previous: int) -> None:
-        self.words[ODR] = bits_now
-        changed = bits_now ^ previous
-        while changed:
-            lowest = changed & -changed
-            changed ^= lowest
-            self._pins[lowest.bit_length() - 1].set_output_bit(bool(bits_now & lowest))
-
-    def simple_outputs(self) -> int:
-        """Return the pins of which a change of the ODR bit changes nothing but what IDR reads, as a mask."""
-        return sum(1 << pin.number for pin in self._pins if pin.is_simple())
-
-    def repeat_outputs(self, pins: int) -> None:
-        """Bring pins in line with their ODR bits, which were written without them."""
-        for pin in self._pins:
-            if pins >> pin.number & 1:
-                pin.set_output_bit(bool(self.words[ODR] >> pin.number & 1))
 
     def _write_lckr(self, written: int, _previous: int) -> None:
         if not self.words[LCKR] & _LCKK:

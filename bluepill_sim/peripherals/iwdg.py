@@ -104,4 +104,3 @@ class Iwdg(Peripheral):
     def _count_from(self, count: int) -> None:
         self._base_ns, self._base_count = self.chip.now_ns, count
         self.due_ns = self._base_ns + (count + 1) * DIVIDERS[self.words[PR]] * LSI_NS
-        self.chip.deadline_changed()

@@ -312,7 +312,6 @@ class Rcc(Peripheral):
         due_ns = min((at for at in times if at is not None), default=None)
         if due_ns != self.due_ns:
             self.due_ns = due_ns
-            self.chip.deadline_changed()
 
     def _hold_crystal_pins(self) -> None:
         """Give PC14 and PC15 to the 32 kHz crystal while LSE is on (RM0008 9.3.1)."""

@@ -113,4 +113,3 @@ class Wwdg(Peripheral):
         self._base_ns, self._base_count = self.chip.now_ns, count
         self._pclk1_hz = self.chip.clocks.pclk1_hz
         self.due_ns = self._time_of(T6 if count > T6 else T6 - 1) if count & T6 else None
-        self.chip.deadline_changed()

@@ -1,6 +1,7 @@
 """A chip without a CPU, with the ports that peripherals need; boards that run assembled programs."""
 
 import signal
+from collections import defaultdict
 from collections.abc import Callable, Iterator
 
 import pytest
@@ -21,14 +22,13 @@ class FakeChip:
         self.access_pc = 0
         self.clocks = Clocks()
         self.pins = make_pins(self)
-        self.irqs: dict[int, bool] = {}
+        self.irqs: dict[int, bool] = defaultdict(bool)
         self.pulses: list[int] = []
         self.signals: list[str] = []
         self.warnings: dict[str, str] = {}
         self.resets: list[str] = []
         self.expired: list[tuple[str, int]] = []
         self.stops = 0
-        self.deadline_changes = 0
         self.clock_changes = 0
         self._parts: ChipParts | None = None
         self._parts = make_parts(self)
@@ -52,8 +52,15 @@ class FakeChip:
     def request_stop(self) -> None:
         self.stops += 1
 
-    def deadline_changed(self) -> None:
-        self.deadline_changes += 1
+    def irq_changed(self, irq: int, level: bool) -> bool:
+        self.irqs[irq] = level
+        return True
+
+    def end_slice(self) -> None:
+        self.stops += 1
+
+    def event_due(self, at_ns: int) -> None:
+        pass
 
     def reset_peripheral(self, name: str) -> None:
         self.resets.append(name)
@@ -80,8 +87,14 @@ class FakeChip:
                 break
             assert due_ns >= self.now_ns
             self.now_ns = due_ns
-            self.parts.act_at(due_ns)
+            self.pins.fabric.run_events(due_ns)
         self.now_ns = to_ns
+        self.deliver()
+
+    def deliver(self) -> None:
+        self.pins.deliver()
+        for part in self.parts.by_name.values():
+            part.deliver()
 
     def write(self, register: str, value: int, size: int = 4, byte: int = 0) -> None:
         """Write "GPIOA.ODR" or, with `byte`, a part of it."""

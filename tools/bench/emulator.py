@@ -23,7 +23,7 @@ from bluepill_sim import BluePill
 from bluepill_sim.analysis.probe import Probe
 from bluepill_sim.analysis.vcd import write_vcd
 from bluepill_sim.core.unicorn_core import Register, UnicornCore
-from bluepill_sim.native.library import CORE_VARIABLE, library_path
+from bluepill_sim.extension.library import CORE_VARIABLE, library_path
 
 HERE = Path(__file__).parent
 RUNS = 1 if "--quick" in sys.argv else 5

@@ -48,6 +48,8 @@ class Scene(Stateful):
     """
 
     STATE: ClassVar[tuple[str, ...]] = ("_owns",)
+    #: They are taken once, when the scene is made.
+    DERIVED: ClassVar[tuple[str, ...]] = ("bodies",)
 
     dt_ns: Nanos = STEP_NS
     #: The first robot first.
@@ -116,7 +118,7 @@ class BodyInWorld(Stateful):
 
     STATE: ClassVar[tuple[str, ...]] = ("is_powered", "start", "_steps", "_plan", "_walking", "_moved_things",
                                     "_contacts")  # fmt: skip
-    DERIVED: ClassVar[tuple[str, ...]] = ("_walkers", "_footprint")
+    DERIVED: ClassVar[tuple[str, ...]] = ("scene", "_walkers", "_footprint")
 
     dt_ns: Nanos = STEP_NS
 

@@ -49,6 +49,8 @@ class PingTable(Stateful):
     """The pings of all robots of a world."""
 
     STATE = ("_sent",)
+    #: Who they are is settled when a scene is made.
+    DERIVED = ("_bodies",)
 
     def __init__(self, bodies: Sequence[Seeing]) -> None:
         self._bodies = tuple(bodies)

@@ -7,7 +7,7 @@ import pytest
 from bluepill_sim.board import BluePill, WaitError
 from bluepill_sim.core import BLOCK, EXCEPTION_RETURN, BlockRecorder, BlockRow
 from bluepill_sim.core.recorder import LAST_ROWS
-from bluepill_sim.native.library import library_path
+from bluepill_sim.extension.library import library_path
 from bluepill_sim.program.image import Image, SymbolTable
 from bluepill_sim.program.last_blocks import TITLE
 from tests.bluepill_sim.core.thumb_streams import Program, program

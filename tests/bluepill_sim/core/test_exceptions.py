@@ -2,7 +2,7 @@
 
 import pytest
 
-from bluepill_sim.native.library import library_path
+from bluepill_sim.extension.library import library_path
 
 ICSR, AIRCR, SHPR3, ISER0, ISPR0, IPR0, STIR = (
     0xE000ED04,

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from bluepill_sim import BluePill
-from bluepill_sim.native.library import library_path
+from bluepill_sim.extension.library import library_path
 from p2os.cli.main import run
 from tests.bluepill_sim.machine import Machine
 

@@ -1,8 +1,8 @@
-"""The native core's shared library: found next to the package, loaded by ctypes.
+"""The emulator's library in C: found next to the package, loaded by ctypes.
 
-It is built with the package where there is a C compiler (`p2os doctor` says why it
-is not there). `P2OS_CORE=python` in the environment chooses the Python
-executor, `P2OS_CORE=native` insists on this one.
+It is built with the package where there is a C compiler (`p2os doctor` says why it is
+not there), and the emulator needs it: the devices are in it. `P2OS_CORE=python` in the
+environment chooses the Python executor for the core, `native`, the default, the one in C.
 """
 
 import ctypes
@@ -12,7 +12,7 @@ from importlib.util import find_spec
 from typing import Any
 
 from bluepill_sim.errors import BluePillError
-from bluepill_sim.native.state import Shared
+from bluepill_sim.extension.layout import SHARED, structure
 from simbase.errors import MissingDependencyError
 
 #: The name of the environment variable, and what it may hold.
@@ -23,6 +23,8 @@ READ = ctypes.CFUNCTYPE(ctypes.c_uint32, ctypes.c_uint32, ctypes.c_uint32, ctype
 WRITE = ctypes.CFUNCTYPE(None, ctypes.c_uint32, ctypes.c_uint32, ctypes.c_uint32, ctypes.c_uint32)
 TRAPPED = ctypes.CFUNCTYPE(None, ctypes.c_uint32, ctypes.c_uint32, ctypes.c_uint32)
 RECORDED = ctypes.CFUNCTYPE(None, ctypes.c_void_p, ctypes.c_uint32)
+ACCESS_CYCLE = ctypes.CFUNCTYPE(ctypes.c_uint64)
+ACCESS_PC = ctypes.CFUNCTYPE(ctypes.c_uint32)
 
 
 #: The functions of Unicorn that C calls, by their names in `core.unicorn_core.UnicornLibrary`.
@@ -44,10 +46,12 @@ class Callbacks(ctypes.Structure):
         ("write", WRITE),
         ("trapped", TRAPPED),
         ("recorded", RECORDED),
+        ("access_cycle", ACCESS_CYCLE),
+        ("access_pc", ACCESS_PC),
     )
 
 
-#: Result and arguments: v nothing, b flag, i signed, u 32 bits, l 64 bits, z size, p pointer.
+#: Result and arguments: v nothing, b flag, i signed, u 32 bits, l 64 bits, z size, p pointer, s text.
 _FUNCTIONS = {
     "core_shared_bytes": "z",
     "core_new": "pppp",
@@ -56,23 +60,55 @@ _FUNCTIONS = {
     "core_add_row": "bpuuuuupup",
     "core_forget_rows": "vp",
     "core_block_start": "up",
-    "core_set_page": "vpupupuppiu",
+    "core_set_page": "vpupupuppi",
     "core_set_paged_region": "vpu",
-    "core_port": "ppu",
+    "core_join": "vpp",
+    "core_next_event": "lp",
     "core_clear_exclusive": "vp",
     "core_leave_block": "vp",
     "core_region": "ppuu",
     "core_trap": "ppuuu",
     "core_start_recording": "bpu",
-    "core_record_pins": "bpb",
-    "core_drop_pins": "vp",
-    "core_stream": "ppu",
-    "core_start_streams": "vpull",
-    "core_stop_streams": "vp",
+    "fabric_new": "ppp",
+    "fabric_free": "vp",
+    "fabric_set_host": "vpp",
+    "fabric_set_time": "vpllu",
+    "fabric_event_ns": "lp",
+    "fabric_next_ns": "lp",
+    "fabric_run_events": "vpl",
+    "fabric_catch_up": "vpul",
+    "fabric_schedule": "vpul",
+    "fabric_due": "lpu",
+    "fabric_add_slot": "ip",
+    "fabric_add_device": "bpuspp",
+    "fabric_put_output": "vpuuu",
+    "fabric_show_input": "vpup",
+    "fabric_read": "upuu",
+    "fabric_write": "vpuuuu",
+    "fabric_command": "upuuuu",
+    "fabric_word_count": "upu",
+    "fabric_take_words": "ppu",
+    "fabric_stop_at_words": "vpub",
+    "fabric_set_line": "vpub",
+    "fabric_line": "bpu",
+    "fabric_restore_line": "vpub",
+    "fabric_wire": "bpuuu",
+    "fabric_pins_changed": "vpu",
+    "fabric_offer": "vpuuu",
+    "fabric_last_output": "lp",
+    "fabric_forget_output": "vp",
+    "fabric_subscribe": "ippppp",
+    "fabric_stop_at": "vpup",
+    "fabric_unsubscribe": "vpu",
+    "fabric_row_count": "zpu",
+    "fabric_take_rows": "ppu",
+    "fabric_take_stop": "bp",
+    "fabric_end_slice": "vp",
+    "fabric_has_news": "bp",
     "edge_log_new": "p",
     "edge_log_free": "vp",
     "edge_log_put": "bpluu",
-    "edge_log_take": "bppllupp",
+    "edge_log_take": "bppzpp",
     "edge_log_write": "ipppull",
     "edge_log_rows": "pp",
     "edge_log_count": "zp",
@@ -80,7 +116,7 @@ _FUNCTIONS = {
 }
 _TYPES: dict[str, Any] = {
     "v": None, "b": ctypes.c_bool, "i": ctypes.c_int32, "u": ctypes.c_uint32, "l": ctypes.c_uint64,
-    "z": ctypes.c_size_t, "p": ctypes.c_void_p,
+    "z": ctypes.c_size_t, "p": ctypes.c_void_p, "s": ctypes.c_char_p,
 }  # fmt: skip
 
 
@@ -89,7 +125,6 @@ def is_native_wanted() -> bool:
 
     Raises:
         BluePillError: `P2OS_CORE` holds neither "native" nor "python".
-        MissingDependencyError: it insists on a native core that is not built.
     """
     choice = os.environ.get(CORE_VARIABLE, "")
     if choice and choice not in CORE_CHOICES:
@@ -97,9 +132,7 @@ def is_native_wanted() -> bool:
             f"{CORE_VARIABLE}={choice}: no such core",
             hint=f"{CORE_VARIABLE} is {' or '.join(CORE_CHOICES)}, or not set",
         )
-    if choice == "native" and library_path() is None:
-        raise MissingDependencyError("the native core is not built", hint="p2os doctor says why")
-    return choice != "python" and library_path() is not None
+    return choice != "python"
 
 
 @cache
@@ -118,14 +151,14 @@ def library() -> ctypes.PyDLL:
     """
     where = library_path()
     if where is None:
-        raise MissingDependencyError("the native core is not built", hint="p2os doctor says why")
+        raise MissingDependencyError("the emulator's library is not built", hint="p2os doctor says why")
     loaded = ctypes.PyDLL(where)  # keeps the interpreter's lock: callbacks come often
     for name, signature in _FUNCTIONS.items():
         function = getattr(loaded, name)
         function.restype = _TYPES[signature[0]]
         function.argtypes = [_TYPES[letter] for letter in signature[1:]]
-    if loaded.core_shared_bytes() != ctypes.sizeof(Shared):
-        raise MissingDependencyError("the native core is of another version", hint="install the package again")
+    if loaded.core_shared_bytes() != ctypes.sizeof(structure(SHARED)):
+        raise MissingDependencyError("the emulator's library is of another version", hint="install the package again")
     return loaded
 
 

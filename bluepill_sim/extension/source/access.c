@@ -257,13 +257,54 @@ static struct page *open_page(const struct region_user *region, uint32_t offset)
     return is_there && (page->gate == NULL || *page->gate & page->gate_mask) ? page : NULL;
 }
 
+/* Reads a register of a device in C; false: not now, the access comes again. */
+static bool read_device(struct core *core, struct device *device, uint32_t index, uint32_t address, uint32_t size,
+                        uint32_t *word)
+{
+    const struct device_kind *kind = device->kind;
+    const bool needs_time = kind->needs_time == NULL || kind->needs_time(device, index, false) ||
+                            device->fabric->watches_lines;
+    if (!needs_time) {
+        *word = kind->read(device, index);
+        skip(core, address, false, size);
+        return true;
+    }
+    core->polling.asked = 1;
+    if (!begin_access(core, address, false, size)) {
+        return false;
+    }
+    *word = kind->read(device, index);
+    core->shared.in_access = 0;
+    return true;
+}
+
+static void write_device(struct core *core, struct page *page, uint32_t index, uint32_t address, uint32_t size,
+                         uint32_t written)
+{
+    struct device *device = page->device;
+    const struct device_kind *kind = device->kind;
+    const bool needs_time = kind->needs_time == NULL || kind->needs_time(device, index, true) ||
+                            device->fabric->watches_lines;
+    if (needs_time && !begin_access(core, address, true, size)) {
+        return;
+    }
+    const uint32_t before = page->words[index], *mask = page->masks[index];
+    page->words[index] = (before & mask[0] & ~(written & mask[2]) & (written | ~mask[3])) | (written & mask[1]);
+    kind->write(device, index, written, before);
+    if (needs_time) {
+        core->shared.in_access = 0;
+    } else {
+        skip(core, address, true, size);
+    }
+}
+
 uint64_t core_read_io(void *unicorn, uint64_t at, unsigned size, void *user)
 {
     (void)unicorn;
     const struct region_user *region = user;
     const uint32_t offset = (uint32_t)at, index = (offset & IN_PAGE) >> 2;
     const struct page *page = open_page(region, offset);
-    uint32_t word;
+    uint32_t word = 0;
     if (UNLIKELY(region->core->is_stopping)) { /* the other half of an unaligned access */
         return 0;
     }
@@ -273,40 +314,42 @@ uint64_t core_read_io(void *unicorn, uint64_t at, unsigned size, void *user)
         if (latch) {
             page->words[latch] = word;
         }
-    } else if (page == NULL || !(page->behaviour[index] & USART_DATA) || !read_usart_data(region->core, page, &word)) {
+        skip(region->core, region->base + offset, false, size);
+    } else if (page != NULL && page->behaviour[index] & READS_NATIVE) {
+        if (!read_device(region->core, page->device, index, region->base + offset, size, &word)) {
+            return 0;
+        }
+    } else {
         return ask_read(region, offset, size);
     }
-    skip(region->core, region->base + offset, false, size);
     return size == 4 ? word : (word >> (offset & 3) * 8) & ((1u << size * 8) - 1);
 }
 
 void core_write_io(void *unicorn, uint64_t at, unsigned size, uint64_t value, void *user)
 {
     (void)unicorn;
-    const uint32_t offset = (uint32_t)at, index = (offset & IN_PAGE) >> 2, written = (uint32_t)value;
+    const uint32_t offset = (uint32_t)at, index = (offset & IN_PAGE) >> 2;
+    uint32_t written = (uint32_t)value;
     const struct region_user *region = user;
     struct page *page = open_page(region, offset);
-    bool is_done = false;
     if (UNLIKELY(region->core->is_stopping)) {
         return;
     }
-    if (page != NULL && size == 4) {
-        if (page->behaviour[index] & WRITES_PLAIN) {
-            const uint32_t *mask = page->masks[index], before = page->words[index];
-            page->words[index] = (before & mask[0] & ~(written & mask[2]) & (written | ~mask[3])) | (written & mask[1]);
-            is_done = true;
-        } else if (page->port != NULL) {
-            if (write_port(region->core, page, index, written, region->base + offset)) {
-                return;
-            }
-        }
-    }
-    if (!is_done && page != NULL && size >= 2 && page->behaviour[index] & USART_DATA) {
-        is_done = write_usart_data(region->core, page, written);
-    }
-    if (is_done) {
-        skip(region->core, region->base + offset, true, size);
-    } else {
+    const bool is_half = size == 2 && !(offset & 3) && page != NULL && page->behaviour[index] & HALFWORDS;
+    if (page == NULL || (size != 4 && !is_half)) {
         ask_write(region, offset, size, written);
+        return;
+    }
+    if (is_half) { /* the APB bridge puts it on both halves of the bus */
+        written = (written & 0xFFFF) * 0x10001u;
+    }
+    if (page->behaviour[index] & WRITES_PLAIN) {
+        const uint32_t *mask = page->masks[index], before = page->words[index];
+        page->words[index] = (before & mask[0] & ~(written & mask[2]) & (written | ~mask[3])) | (written & mask[1]);
+        skip(region->core, region->base + offset, true, size);
+    } else if (page->behaviour[index] & WRITES_NATIVE) {
+        write_device(region->core, page, index, region->base + offset, size, written);
+    } else {
+        ask_write(region, offset, size, (uint32_t)value);
     }
 }

@@ -9,20 +9,18 @@
 #include <stdio.h>
 #include <stdlib.h>
 
-#include "core.h"
+#include "fabric.h"
 
-#define PINS_OF_A_PORT 16
 #define SIGNALS 256
-enum { LOW = 0, HIGH = 1, FLOATING = 2 };
 
-struct edge {
+struct logged {
     uint64_t ns;
     uint32_t signal;
     uint32_t value;
 };
 
 struct edge_log {
-    struct edge *rows;
+    struct logged *rows;
     size_t count, room;
 };
 
@@ -36,7 +34,7 @@ void edge_log_free(struct edge_log *log)
 
 size_t edge_log_count(const struct edge_log *log) { return log->count; }
 
-const struct edge *edge_log_rows(const struct edge_log *log) { return log->rows; }
+const struct logged *edge_log_rows(const struct edge_log *log) { return log->rows; }
 
 /* Sets the flag of each signal that has a row. */
 void edge_log_used(const struct edge_log *log, uint8_t *flags)
@@ -46,7 +44,7 @@ void edge_log_used(const struct edge_log *log, uint8_t *flags)
     }
 }
 
-static bool comes_after(const struct edge *one, const struct edge *other)
+static bool comes_after(const struct logged *one, const struct logged *other)
 {
     return one->ns > other->ns || (one->ns == other->ns && one->signal > other->signal);
 }
@@ -56,14 +54,14 @@ bool edge_log_put(struct edge_log *log, uint64_t ns, uint32_t signal, uint32_t v
 {
     if (log->count == log->room) {
         const size_t room = log->room ? 2 * log->room : 4096;
-        struct edge *rows = realloc(log->rows, room * sizeof *rows);
+        struct logged *rows = realloc(log->rows, room * sizeof *rows);
         if (rows == NULL) {
             return false;
         }
         log->rows = rows;
         log->room = room;
     }
-    const struct edge edge = {ns, signal, value};
+    const struct logged edge = {ns, signal, value};
     size_t at = log->count++;
     while (at > 0 && comes_after(&log->rows[at - 1], &edge)) {
         log->rows[at] = log->rows[at - 1];
@@ -73,22 +71,16 @@ bool edge_log_put(struct edge_log *log, uint64_t ns, uint32_t signal, uint32_t v
     return true;
 }
 
-/* Takes a core's pins over, whose times count from `base_cycle` at `base_ns`; `bonded` has a mask for each port.
- * `last` keeps each pin's value. Returns false without memory for it. */
-bool edge_log_take(struct edge_log *log, const struct core *core, uint64_t base_ns, uint64_t base_cycle,
-                   uint32_t frequency_hz, const uint32_t *bonded, uint8_t *last)
+/* Takes rows of a subscription over; `signals` has the number of each pin's and line's signal, `last` its value.
+ * Returns false without memory for it. */
+bool edge_log_take(struct edge_log *log, const struct edge *rows, size_t count, const uint8_t *signals, uint8_t *last)
 {
-    for (uint32_t n = 0; n < core->pin_count; ++n) {
-        const struct pin_row *row = &core->pin_rows[n];
-        const uint64_t ns = base_ns + (uint64_t)((__uint128_t)(row->cycle - base_cycle) * NS_PER_S / frequency_hz);
-        for (uint32_t left = row->changed & bonded[row->port]; left; left &= left - 1) {
-            const uint32_t pin = (uint32_t)__builtin_ctz(left), signal = row->port * PINS_OF_A_PORT + pin;
-            const uint8_t level = row->levels >> pin & 1;
-            if (level != last[signal]) {
-                last[signal] = level;
-                if (!edge_log_put(log, ns, signal, level)) {
-                    return false;
-                }
+    for (size_t n = 0; n < count; ++n) {
+        const uint32_t signal = signals[rows[n].pin];
+        if (rows[n].wire != last[signal]) {
+            last[signal] = rows[n].wire;
+            if (!edge_log_put(log, rows[n].ns, signal, rows[n].wire)) {
+                return false;
             }
         }
     }
@@ -141,7 +133,7 @@ int edge_log_write(const struct edge_log *log, const char *path, const char *con
     uint64_t now = start_ns;
     char line[80];
     for (size_t n = 0; n < log->count; ++n) {
-        const struct edge *edge = &log->rows[n];
+        const struct logged *edge = &log->rows[n];
         char *to = line;
         if (edge->ns > now) {
             now = edge->ns;

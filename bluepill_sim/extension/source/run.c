@@ -41,10 +41,7 @@ struct core *core_new(void *unicorn, const struct unicorn_api *api, const struct
         core->none.start = core->none.end = UINT32_MAX;
         core->block = &core->none;
         core->paged_region = UINT32_MAX;
-        core->shared.last_sleep_cycle = core->shared.tick_next = core->stream_next = NO_TIME;
-        for (uint32_t n = 0; n < STREAMS; ++n) {
-            core->streams[n].due_cycle = NO_TIME;
-        }
+        core->shared.last_sleep_cycle = core->shared.tick_next = core->shared.raised_cycle = NO_TIME;
     }
     return core;
 }
@@ -56,7 +53,6 @@ void core_free(struct core *core)
     core_forget_rows(core);
     free_dropped(core);
     free(core->records);
-    free(core->pin_rows);
     while (core->allocations != NULL) {
         struct allocation *one = core->allocations;
         core->allocations = one->next;
@@ -65,16 +61,14 @@ void core_free(struct core *core)
     free(core);
 }
 
+/* `slot` is that of a device in C, -1 for one in Python. */
 void core_set_page(struct core *core, uint32_t number, uint32_t *words, uint32_t count, const uint32_t *gate,
-                   uint32_t gate_mask, const uint8_t *behaviour, const uint32_t (*masks)[4], int port,
-                   uint32_t irq)
+                   uint32_t gate_mask, const uint16_t *behaviour, const uint32_t (*masks)[4], int slot)
 {
     core->pages[number] = (struct page){.words = words, .gate = gate, .gate_mask = gate_mask, .count = count,
                                         .behaviour = behaviour, .masks = masks,
-                                        .port = port < 0 ? NULL : &core->ports[port], .irq = irq};
+                                        .device = slot < 0 ? NULL : &core->fabric->devices[slot]};
 }
-
-struct port *core_port(struct core *core, uint32_t number) { return &core->ports[number]; }
 
 static uint32_t kind_of_denied_fetch(uint32_t pc)
 {
@@ -230,6 +224,13 @@ static void fall_asleep(struct core *core, uint32_t what)
     s->sleep = what;
 }
 
+/* The cycle at which SysTick or the fabric's queue next acts. */
+uint64_t core_next_event(const struct core *core)
+{
+    const uint64_t tick = core->shared.tick_next, other = core->fabric->next_cycle;
+    return tick < other ? tick : other;
+}
+
 static uint32_t run(struct core *core, uint64_t limit)
 {
     struct shared *s = &core->shared;
@@ -239,13 +240,13 @@ static uint32_t run(struct core *core, uint64_t limit)
         if (s->cycle >= s->tick_next) {
             tick(core);
         }
-        if (s->cycle >= core->stream_next) {
-            end_characters(core);
+        if (s->cycle >= core->fabric->next_cycle) {
+            run_events(core->fabric, ns_of(core->fabric, s->cycle));
         }
         if (s->attention || s->cycle >= limit) {
             return HALT_BOUNDARY;
         }
-        const uint64_t event = s->tick_next < core->stream_next ? s->tick_next : core->stream_next;
+        const uint64_t event = core_next_event(core);
         const uint64_t stop = event < limit ? event : limit;
         if (s->sleep && !wakes(core)) {
             if (s->cycle < stop) {

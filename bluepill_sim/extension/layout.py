@@ -1,0 +1,196 @@
+"""The structs that C and Python share, declared once.
+
+`tools/generate_layout.py` writes them as `source/layout.h`; `structure` makes the ctypes class of the same fields. Both
+sides keep the natural alignment of the machine, and `library.py` refuses a library whose sizes are others.
+
+Invariant: a struct holds numbers and arrays of them, no pointers: what it holds can be saved as bytes.
+"""
+
+import ctypes
+from dataclasses import dataclass
+from functools import cache
+from typing import Any
+
+#: How many ports the chip has, and pins each port.
+PORTS, PINS = 5, 16
+#: How many of the last rows are kept with or without a recorder; a power of 2.
+LAST_ROWS = 32
+#: Exceptions of the architecture that a chip of the family can have.
+EXCEPTIONS = 76
+#: Characters that wait in C to arrive at a USART; the others wait in Python.
+RECEIVED = 256
+
+
+@dataclass(frozen=True, slots=True)
+class Field:
+    """One member of a struct."""
+
+    name: str
+    #: "u8", "u16", "u32", "u64", "i32", or the name of a struct above.
+    kind: str
+    #: None: no array.
+    count: int | None = None
+    doc: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class Struct:
+    """One struct, with what C says of it."""
+
+    name: str
+    doc: str
+    fields: tuple[Field, ...]
+
+
+def _fields(kind: str, *names: str) -> tuple[Field, ...]:
+    return tuple(Field(name, kind) for name in names)
+
+
+RECORD = Struct(
+    "record",
+    "A block that began, an exception that was entered (its number) or left (-1).",
+    (Field("cycle", "u64"), Field("address", "u32"), Field("kind", "i32")),
+)
+INSTRUCTION = Struct(
+    "instruction",
+    "An instruction of a block: where it starts in time, and which memory it reaches for.",
+    (
+        Field("address", "u32"),
+        Field("cycle", "u32"),
+        Field("offset", "i32"),
+        Field("kind", "u8", doc="0: no access of interest, 1: load, 2: store"),
+        *_fields("u8", "bytes", "base"),
+        Field("index", "u8", doc="255: none"),
+        Field("shift", "u8"),
+        Field("count", "u8", doc="words of a multiple transfer, else 1"),
+        Field("padding", "u8", 2),
+    ),
+)
+SHARED = Struct(
+    "shared",
+    "The state of one core.",
+    (
+        *_fields("u64", "cycle", "stop_at", "access_cycle", "last_sleep_cycle", "tick_base", "tick_next"),
+        *(Field(name, "u64", 2, "a bit an exception") for name in ("pending", "active")),
+        *_fields("u64", "enabled", "levels"),
+        *_fields("u32", "access_pc", "in_access", "pc", "is_thumb", "mask_stop", "attention"),
+        *_fields("u32", "halt_kind", "halt_pc", "halt_address", "halt_has_address", "run_from", "uses_exclusive"),
+        *_fields("u32", "exception_number", "sleep", "event_register", "vector_table", "scr", "ccr"),
+        *_fields("u32", "tick_control", "tick_reload", "tick_value", "tick_count_flag"),
+        *_fields("u32", "traps_division", "grouping", "it_state", "is_python"),
+        Field("is_first", "u32", doc="the recorder has not had a row yet"),
+        Field("raised_pc", "u32", doc="the access that raised the last exception: its instruction,"),
+        Field("raised_cycle", "u64", doc="and when its block began"),
+        Field("priorities", "u8", EXCEPTIONS, "one an exception"),
+        Field("priorities_end", "u8", 4),
+        *(Field(name, "u64", doc="set by Python before the first run") for name in ("sram", "flash")),
+        *_fields("u32", "sram_base", "sram_bytes", "flash_base", "flash_bytes", "scratch", "padding"),
+        Field("exact_stops", "u64", doc="how often a run was stopped to learn which instruction makes an access"),
+        Field("logged", "u64", doc="rows so far: the next one goes to `last` at this, modulo its size"),
+        Field("last", "record", LAST_ROWS),
+    ),
+)
+PORT = Struct(
+    "port",
+    "The pins of one port, a bit each. RM0008 9.1, table 20.",
+    (
+        *_fields("u32", "bonded", "board_up", "board_down"),
+        Field("outside", "u32", doc="driven from outside,"),
+        Field("outside_high", "u32", doc="to 1,"),
+        Field("outside_weak", "u32", doc="by a resistor"),
+        *_fields("u32", "rail", "rail_high"),
+        Field("odr", "u32", doc="what GPIO has configured: the data bits,"),
+        Field("output", "u32", doc="general-purpose outputs,"),
+        Field("alternate", "u32", doc="outputs of an alternate function,"),
+        Field("open_drain", "u32", doc="those of both that cannot drive high,"),
+        *_fields("u32", "pulled", "analog"),
+        Field("offered", "u32", doc="some alternate function offers a level,"),
+        Field("offered_high", "u32", doc="which is 1"),
+        Field("held", "u32", doc="kept off GPIO, and what drives then"),
+        *_fields("u32", "hold_low", "hold_high", "hold_up", "hold_down"),
+        Field("low", "u32", doc="what the chip itself drives"),
+        *_fields("u32", "high", "up", "down"),
+        Field("level", "u32", doc="on the wire; a floating wire is low"),
+        Field("input", "u32", doc="what the digital input reads"),
+        *_fields("u32", "floating", "fighting", "shorted"),
+        Field("modes", "u8", PINS, "index in `PinMode`"),
+        Field("sources", "u64", PINS, "the alternate functions that offer a level, a bit each; the lowest drives"),
+        Field("source_levels", "u64", PINS),
+    ),
+)
+USART = Struct(
+    "usart",
+    "What a USART holds beyond its registers. RM0008 27.3.",
+    (
+        Field("tx_base_ns", "u64", doc="start of the run of characters,"),
+        Field("tx_half_bits", "u64", doc="and half-bits from there to the end of the present one"),
+        *_fields("u64", "tx_due_ns", "rx_base_ns", "rx_half_bits", "rx_due_ns", "idle_due_ns"),
+        Field("clock_hz", "u32", doc="the PCLK that the deadlines were worked out with"),
+        Field("was_enabled", "u32", doc="whether transmission was on at the last write of a control register"),
+        Field("rate_pc", "u32", doc="the instruction that has set the speed"),
+        Field("judged_hz", "u32", doc="the speed that was judged last"),
+        *_fields("u32", "judged_brr", "source"),
+        Field("tx_pin", "u32", doc="16 times the port, and the pin"),
+        *_fields("u32", "rx_pin", "rx_first", "rx_count"),
+        Field("rx_more", "u32", doc="Python has more characters to come"),
+        Field("rx", "u32", RECEIVED, "what DR will read, and above it the flags of SR"),
+    ),
+)
+EXTI = Struct("exti", "What EXTI holds beyond its registers.", (Field("levels", "u32"), Field("routes", "u8", PINS)))
+GPIO = Struct("gpio", "Which port a GPIO is.", (Field("port", "u32"),))
+EDGE = Struct(
+    "edge",
+    "A change of a pin, for who has subscribed: `bluepill_sim/fabric/subscriptions.py`.",
+    (Field("ns", "u64"), *_fields("u8", "pin", "drive", "wire", "padding"), Field("zero", "u32")),
+)
+SENT = Struct(
+    "sent",
+    "A word that has gone out, when, and how: clock and divider, and what else its device says of its format.",
+    (Field("ns", "u64"), *_fields("u32", "word", "clock_hz", "brr", "format")),
+)
+
+#: All of them; one that holds another comes behind it.
+STRUCTS = (RECORD, INSTRUCTION, SHARED, PORT, USART, EXTI, GPIO, EDGE, SENT)
+
+_KINDS: dict[str, Any] = {
+    "u8": ctypes.c_uint8, "u16": ctypes.c_uint16, "u32": ctypes.c_uint32, "u64": ctypes.c_uint64, "i32": ctypes.c_int32,
+}  # fmt: skip
+
+
+@cache
+def structure(struct: Struct) -> type[ctypes.Structure]:
+    """Return the ctypes class of a struct."""
+    rows = []
+    for field in struct.fields:
+        inner = _KINDS.get(field.kind) or structure(next(one for one in STRUCTS if one.name == field.kind))
+        rows.append((field.name, inner if field.count is None else inner * field.count))
+    return type(struct.name, (ctypes.Structure,), {"_fields_": rows, "__doc__": struct.doc})
+
+
+def header() -> str:
+    """Return the structs as a C header."""
+    lines = [
+        "/* The structs that C and Python share: made by tools/generate_layout.py from extension/layout.py. */",
+        "#ifndef BLUEPILL_LAYOUT_H",
+        "#define BLUEPILL_LAYOUT_H",
+        "",
+        "#include <stdint.h>",
+        "",
+        *(f"#define {name} {value}" for name, value in _CONSTANTS.items()),
+    ]
+    for struct in STRUCTS:
+        lines += ["", f"/* {struct.doc} */", f"struct {struct.name} {{"]
+        for field in struct.fields:
+            count = "" if field.count is None else f"[{field.count}]"
+            comment = f" /* {field.doc} */" if field.doc else ""
+            lines.append(f"    {_C_KINDS.get(field.kind, f'struct {field.kind}')} {field.name}{count};{comment}")
+        lines += ["};", f'_Static_assert(sizeof(struct {struct.name}) == {_size(struct)}, "{struct.name}");']
+    return "\n".join([*lines, "", "#endif", ""])
+
+
+def _size(struct: Struct) -> int:
+    return ctypes.sizeof(structure(struct))
+
+
+_CONSTANTS = {"PORTS": PORTS, "PINS": PINS, "LAST_ROWS": LAST_ROWS, "RECEIVED": RECEIVED}
+_C_KINDS = {"u8": "uint8_t", "u16": "uint16_t", "u32": "uint32_t", "u64": "uint64_t", "i32": "int32_t"}

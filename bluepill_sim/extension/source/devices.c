@@ -1,0 +1,150 @@
+/* The kinds of devices that are written in C, and how Python reaches them. */
+#include <stdlib.h>
+#include <string.h>
+
+#include "fabric.h"
+
+extern const struct device_kind exti_kind, gpio_kind, usart_kind;
+
+static const struct device_kind *const kinds[] = {&exti_kind, &gpio_kind, &usart_kind};
+
+struct fabric *fabric_new(const struct fabric_calls *calls, struct port *ports)
+{
+    struct fabric *fabric = calloc(1, sizeof *fabric);
+    if (fabric != NULL) {
+        fabric->calls = *calls;
+        fabric->ports = ports;
+        fabric->event_ns = fabric->next_cycle = fabric->last_output = NO_TIME;
+        fabric->time.hz = NS_PER_S;
+        for (uint32_t n = 0; n < SLOTS; ++n) {
+            fabric->slots[n].ns = fabric->slots[n].cycle = NO_TIME;
+            memset(fabric->devices[n].outputs, NO_LINE, sizeof fabric->devices[n].outputs);
+        }
+    }
+    return fabric;
+}
+
+void fabric_free(struct fabric *fabric)
+{
+    for (uint32_t n = 0; n < SUBSCRIBERS; ++n) {
+        free(fabric->subscribers[n].rows);
+    }
+    for (uint32_t n = 0; n < SLOTS; ++n) {
+        free(fabric->devices[n].words_out);
+    }
+    free(fabric);
+}
+
+void fabric_set_host(struct fabric *fabric, const struct host *host) { fabric->host = *host; }
+
+/* Takes a slot of the queue; -1 where there is none left. */
+int32_t fabric_add_slot(struct fabric *fabric)
+{
+    return fabric->slot_count < SLOTS ? (int32_t)fabric->slot_count++ : -1;
+}
+
+/* Puts a device of a kind into a slot; false: there is no such kind. */
+bool fabric_add_device(struct fabric *fabric, uint32_t slot, const char *name, uint32_t *words, void *state)
+{
+    for (size_t n = 0; n < sizeof kinds / sizeof *kinds; ++n) {
+        if (strcmp(kinds[n]->name, name) == 0) {
+            struct device *device = &fabric->devices[slot];
+            device->kind = kinds[n];
+            device->fabric = fabric;
+            device->words = words;
+            device->state = state;
+            device->slot = slot;
+            fabric->slots[slot].device = device;
+            return true;
+        }
+    }
+    return false;
+}
+
+/* Puts an output of a device on a line. */
+void fabric_put_output(struct fabric *fabric, uint32_t slot, uint32_t output, uint32_t line)
+{
+    fabric->devices[slot].outputs[output] = (uint8_t)line;
+}
+
+/* Where a port's input is to be written as well. */
+void fabric_show_input(struct fabric *fabric, uint32_t port, uint32_t *word) { fabric->inputs[port] = word; }
+
+uint32_t fabric_read(struct fabric *fabric, uint32_t slot, uint32_t index)
+{
+    struct device *device = &fabric->devices[slot];
+    return device->kind->read(device, index);
+}
+
+void fabric_write(struct fabric *fabric, uint32_t slot, uint32_t index, uint32_t written, uint32_t previous)
+{
+    struct device *device = &fabric->devices[slot];
+    device->kind->write(device, index, written, previous);
+}
+
+uint32_t fabric_command(struct fabric *fabric, uint32_t slot, uint32_t what, uint32_t one, uint32_t other)
+{
+    struct device *device = &fabric->devices[slot];
+    return device->kind->command == NULL ? 0 : device->kind->command(device, what, one, other);
+}
+
+/* The time of the event that is acted on; NO_TIME for none. */
+uint64_t fabric_event_ns(const struct fabric *fabric) { return fabric->event_ns; }
+
+/* Whether a subscriber wants the slice to end; it is forgotten. */
+bool fabric_take_stop(struct fabric *fabric)
+{
+    const bool wants_stop = fabric->wants_stop;
+    fabric->wants_stop = 0;
+    return wants_stop;
+}
+
+void fabric_end_slice(struct fabric *fabric) { fabric->host.end_slice(fabric->host.user); }
+
+/* Whether anything waits for Python. */
+bool fabric_has_news(const struct fabric *fabric)
+{
+    size_t count = 0;
+    for (uint32_t n = 0; n < SUBSCRIBERS; ++n) {
+        count += fabric->subscribers[n].count;
+    }
+    for (uint32_t n = 0; n < fabric->slot_count; ++n) {
+        count += fabric->devices[n].word_count;
+    }
+    return count != 0;
+}
+
+/* Words that a device has sent. */
+
+/* Whether each word ends the slice. */
+void fabric_stop_at_words(struct fabric *fabric, uint32_t slot, bool wanted) { fabric->devices[slot].ends_slice = wanted; }
+
+void send_word(struct device *device, const struct sent *row)
+{
+    struct fabric *fabric = device->fabric;
+    if (device->words_out == NULL) {
+        device->words_out = malloc(WORDS * sizeof *device->words_out);
+        if (device->words_out == NULL) {
+            abort();
+        }
+    }
+    if (device->word_count == WORDS) {
+        fabric->calls.deliver(device->slot);
+    }
+    device->words_out[device->word_count++] = *row;
+    if (device->ends_slice) {
+        fabric->wants_stop = 1;
+    }
+    if (device->ends_slice || device->word_count >= WORDS / 2) {
+        fabric->host.end_slice(fabric->host.user);
+    }
+}
+
+uint32_t fabric_word_count(const struct fabric *fabric, uint32_t slot) { return fabric->devices[slot].word_count; }
+
+/* The words of a device, which the caller has then: they stand until the chip goes on. */
+const struct sent *fabric_take_words(struct fabric *fabric, uint32_t slot)
+{
+    fabric->devices[slot].word_count = 0;
+    return fabric->devices[slot].words_out;
+}

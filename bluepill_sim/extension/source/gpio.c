@@ -1,0 +1,51 @@
+/* GPIO: the data registers of a port. How its pins are configured is Python's business (peripherals/gpio.py).
+ *
+ * Source: RM0008 9.2.
+ */
+#include "fabric.h"
+
+enum { IDR = 2, ODR = 3, BSRR = 4, BRR = 5, ALL = 0xFFFF };
+
+static uint32_t number_of(const struct device *device) { return ((const struct gpio *)device->state)->port; }
+
+static bool needs_time(const struct device *device, uint32_t index, bool is_write)
+{
+    (void)index;
+    return is_write && !is_unwatched(device->fabric, number_of(device));
+}
+
+static void put(struct device *device, uint32_t bits)
+{
+    struct port *port = &device->fabric->ports[number_of(device)];
+    device->words[ODR] = bits;
+    if (port->odr != bits) {
+        port->odr = bits;
+        pins_changed(device->fabric, number_of(device));
+    }
+}
+
+static void write(struct device *device, uint32_t index, uint32_t written, uint32_t previous)
+{
+    const uint32_t before = device->words[ODR];
+    (void)previous;
+    if (index == BSRR) {
+        /* A set wins over a reset of the same bit (RM0008 9.2.5). */
+        put(device, (before & ~(written >> 16)) | (written & ALL));
+    } else if (index == BRR) {
+        put(device, before & ~(written & ALL));
+    } else if (index == ODR) {
+        put(device, written & ALL);
+    }
+}
+
+static uint32_t command(struct device *device, uint32_t what, uint32_t one, uint32_t other)
+{
+    (void)one;
+    (void)other;
+    if (what == RESET) {
+        device->words[IDR] = device->fabric->ports[number_of(device)].input;
+    }
+    return 0;
+}
+
+const struct device_kind gpio_kind = {.name = "gpio", .needs_time = needs_time, .write = write, .command = command};

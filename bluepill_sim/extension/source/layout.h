@@ -1,0 +1,188 @@
+/* The structs that C and Python share: made by tools/generate_layout.py from extension/layout.py. */
+#ifndef BLUEPILL_LAYOUT_H
+#define BLUEPILL_LAYOUT_H
+
+#include <stdint.h>
+
+#define PORTS 5
+#define PINS 16
+#define LAST_ROWS 32
+#define RECEIVED 256
+
+/* A block that began, an exception that was entered (its number) or left (-1). */
+struct record {
+    uint64_t cycle;
+    uint32_t address;
+    int32_t kind;
+};
+_Static_assert(sizeof(struct record) == 16, "record");
+
+/* An instruction of a block: where it starts in time, and which memory it reaches for. */
+struct instruction {
+    uint32_t address;
+    uint32_t cycle;
+    int32_t offset;
+    uint8_t kind; /* 0: no access of interest, 1: load, 2: store */
+    uint8_t bytes;
+    uint8_t base;
+    uint8_t index; /* 255: none */
+    uint8_t shift;
+    uint8_t count; /* words of a multiple transfer, else 1 */
+    uint8_t padding[2];
+};
+_Static_assert(sizeof(struct instruction) == 20, "instruction");
+
+/* The state of one core. */
+struct shared {
+    uint64_t cycle;
+    uint64_t stop_at;
+    uint64_t access_cycle;
+    uint64_t last_sleep_cycle;
+    uint64_t tick_base;
+    uint64_t tick_next;
+    uint64_t pending[2]; /* a bit an exception */
+    uint64_t active[2]; /* a bit an exception */
+    uint64_t enabled;
+    uint64_t levels;
+    uint32_t access_pc;
+    uint32_t in_access;
+    uint32_t pc;
+    uint32_t is_thumb;
+    uint32_t mask_stop;
+    uint32_t attention;
+    uint32_t halt_kind;
+    uint32_t halt_pc;
+    uint32_t halt_address;
+    uint32_t halt_has_address;
+    uint32_t run_from;
+    uint32_t uses_exclusive;
+    uint32_t exception_number;
+    uint32_t sleep;
+    uint32_t event_register;
+    uint32_t vector_table;
+    uint32_t scr;
+    uint32_t ccr;
+    uint32_t tick_control;
+    uint32_t tick_reload;
+    uint32_t tick_value;
+    uint32_t tick_count_flag;
+    uint32_t traps_division;
+    uint32_t grouping;
+    uint32_t it_state;
+    uint32_t is_python;
+    uint32_t is_first; /* the recorder has not had a row yet */
+    uint32_t raised_pc; /* the access that raised the last exception: its instruction, */
+    uint64_t raised_cycle; /* and when its block began */
+    uint8_t priorities[76]; /* one an exception */
+    uint8_t priorities_end[4];
+    uint64_t sram; /* set by Python before the first run */
+    uint64_t flash; /* set by Python before the first run */
+    uint32_t sram_base;
+    uint32_t sram_bytes;
+    uint32_t flash_base;
+    uint32_t flash_bytes;
+    uint32_t scratch;
+    uint32_t padding;
+    uint64_t exact_stops; /* how often a run was stopped to learn which instruction makes an access */
+    uint64_t logged; /* rows so far: the next one goes to `last` at this, modulo its size */
+    struct record last[32];
+};
+_Static_assert(sizeof(struct shared) == 864, "shared");
+
+/* The pins of one port, a bit each. RM0008 9.1, table 20. */
+struct port {
+    uint32_t bonded;
+    uint32_t board_up;
+    uint32_t board_down;
+    uint32_t outside; /* driven from outside, */
+    uint32_t outside_high; /* to 1, */
+    uint32_t outside_weak; /* by a resistor */
+    uint32_t rail;
+    uint32_t rail_high;
+    uint32_t odr; /* what GPIO has configured: the data bits, */
+    uint32_t output; /* general-purpose outputs, */
+    uint32_t alternate; /* outputs of an alternate function, */
+    uint32_t open_drain; /* those of both that cannot drive high, */
+    uint32_t pulled;
+    uint32_t analog;
+    uint32_t offered; /* some alternate function offers a level, */
+    uint32_t offered_high; /* which is 1 */
+    uint32_t held; /* kept off GPIO, and what drives then */
+    uint32_t hold_low;
+    uint32_t hold_high;
+    uint32_t hold_up;
+    uint32_t hold_down;
+    uint32_t low; /* what the chip itself drives */
+    uint32_t high;
+    uint32_t up;
+    uint32_t down;
+    uint32_t level; /* on the wire; a floating wire is low */
+    uint32_t input; /* what the digital input reads */
+    uint32_t floating;
+    uint32_t fighting;
+    uint32_t shorted;
+    uint8_t modes[16]; /* index in `PinMode` */
+    uint64_t sources[16]; /* the alternate functions that offer a level, a bit each; the lowest drives */
+    uint64_t source_levels[16];
+};
+_Static_assert(sizeof(struct port) == 392, "port");
+
+/* What a USART holds beyond its registers. RM0008 27.3. */
+struct usart {
+    uint64_t tx_base_ns; /* start of the run of characters, */
+    uint64_t tx_half_bits; /* and half-bits from there to the end of the present one */
+    uint64_t tx_due_ns;
+    uint64_t rx_base_ns;
+    uint64_t rx_half_bits;
+    uint64_t rx_due_ns;
+    uint64_t idle_due_ns;
+    uint32_t clock_hz; /* the PCLK that the deadlines were worked out with */
+    uint32_t was_enabled; /* whether transmission was on at the last write of a control register */
+    uint32_t rate_pc; /* the instruction that has set the speed */
+    uint32_t judged_hz; /* the speed that was judged last */
+    uint32_t judged_brr;
+    uint32_t source;
+    uint32_t tx_pin; /* 16 times the port, and the pin */
+    uint32_t rx_pin;
+    uint32_t rx_first;
+    uint32_t rx_count;
+    uint32_t rx_more; /* Python has more characters to come */
+    uint32_t rx[256]; /* what DR will read, and above it the flags of SR */
+};
+_Static_assert(sizeof(struct usart) == 1128, "usart");
+
+/* What EXTI holds beyond its registers. */
+struct exti {
+    uint32_t levels;
+    uint8_t routes[16];
+};
+_Static_assert(sizeof(struct exti) == 20, "exti");
+
+/* Which port a GPIO is. */
+struct gpio {
+    uint32_t port;
+};
+_Static_assert(sizeof(struct gpio) == 4, "gpio");
+
+/* A change of a pin, for who has subscribed: `bluepill_sim/fabric/subscriptions.py`. */
+struct edge {
+    uint64_t ns;
+    uint8_t pin;
+    uint8_t drive;
+    uint8_t wire;
+    uint8_t padding;
+    uint32_t zero;
+};
+_Static_assert(sizeof(struct edge) == 16, "edge");
+
+/* A word that has gone out, when, and how: clock and divider, and what else its device says of its format. */
+struct sent {
+    uint64_t ns;
+    uint32_t word;
+    uint32_t clock_hz;
+    uint32_t brr;
+    uint32_t format;
+};
+_Static_assert(sizeof(struct sent) == 24, "sent");
+
+#endif

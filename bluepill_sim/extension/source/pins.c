@@ -1,0 +1,233 @@
+/* Pins: what the chip drives, what is on the wire, what its inputs read; a port at a time, a bit a pin.
+ *
+ * A pin has one driver inside (GPIO, an alternate function, or a fixed function that holds it) and one outside, hard
+ * or through a resistor. A wire that is fought over is low, as in simbase/wire.py.
+ * Source: RM0008 9.1, table 20.
+ * Invariant: everything from `low` on in `struct port` follows from what stands before it.
+ */
+#include <stdlib.h>
+#include <string.h>
+
+#include "fabric.h"
+
+enum { IS_FIGHTING, IS_SHORTED };
+/* Indices of `PinDrive`. */
+enum { DRIVES_NOTHING, DRIVES_LOW, DRIVES_HIGH, PULLS_UP, PULLS_DOWN };
+/* Rows that wait before the slice ends for them to be taken over. */
+enum { FIRST_ROOM = 256, MOST_ROWS = 32768 };
+
+static uint32_t drive_of(const struct port *port, uint32_t bit)
+{
+    return port->low & bit    ? DRIVES_LOW
+           : port->high & bit ? DRIVES_HIGH
+           : port->up & bit   ? PULLS_UP
+           : port->down & bit ? PULLS_DOWN
+                              : DRIVES_NOTHING;
+}
+
+void put_row(struct fabric *fabric, struct subscriber *subscriber, const struct edge *row)
+{
+    if (subscriber->count == subscriber->room) {
+        const size_t room = subscriber->room ? 2 * subscriber->room : FIRST_ROOM;
+        struct edge *rows = realloc(subscriber->rows, room * sizeof *rows);
+        if (rows == NULL) {
+            abort(); /* a few megabytes: nothing that could be done about it would work either */
+        }
+        subscriber->rows = rows;
+        subscriber->room = room;
+    }
+    subscriber->rows[subscriber->count++] = *row;
+    if (subscriber->count >= MOST_ROWS) {
+        fabric->host.end_slice(fabric->host.user);
+    }
+}
+
+static RARELY void tell_subscribers(struct fabric *fabric, uint32_t number, uint32_t drives, uint32_t wires)
+{
+    const struct port *port = &fabric->ports[number];
+    const uint64_t ns = now_ns(fabric);
+    bool ends_slice = false;
+    for (uint32_t n = 0; n < SUBSCRIBERS; ++n) {
+        struct subscriber *one = &fabric->subscribers[n];
+        const uint32_t wanted = (drives & one->drive[number]) | (wires & one->wire[number]);
+        for (uint32_t left = wanted; left; left &= left - 1) {
+            const uint32_t bit = left & -left;
+            const uint8_t wire = port->floating & bit ? FLOATING : port->level & bit ? HIGH : LOW;
+            const struct edge row = {.ns = ns, .pin = (uint8_t)(PINS * number + (uint32_t)__builtin_ctz(left)),
+                                     .drive = (uint8_t)drive_of(port, bit), .wire = wire};
+            put_row(fabric, one, &row);
+        }
+        ends_slice |= (wanted & one->stop[number]) != 0;
+    }
+    if (ends_slice) {
+        fabric->wants_stop = 1;
+        fabric->host.end_slice(fabric->host.user);
+    }
+}
+
+static RARELY void tell_trouble(struct fabric *fabric, uint32_t number, uint32_t pins, uint32_t what)
+{
+    for (uint32_t left = pins; left; left &= left - 1) {
+        fabric->calls.electrical(PINS * number + (uint32_t)__builtin_ctz(left), what);
+    }
+}
+
+static void tell_listeners(struct fabric *fabric, uint32_t number, uint32_t changed)
+{
+    for (uint32_t n = 0; n < fabric->listener_count; ++n) {
+        struct pin_listener *one = &fabric->listeners[n];
+        if (changed & one->pins[number]) {
+            one->device->kind->pins(one->device, number, changed & one->pins[number]);
+        }
+    }
+}
+
+/* Works out what the pins of a port are, and tells whoever has to know. */
+void pins_changed(struct fabric *fabric, uint32_t number)
+{
+    struct port *port = &fabric->ports[number];
+    const struct port before = *port;
+    const uint32_t free = ~port->held;
+    const uint32_t offered = port->alternate & port->offered;
+    port->high = ((((port->output & port->odr) | (offered & port->offered_high)) & ~port->open_drain & free) | port->hold_high);
+    port->low = ((((port->output & ~port->odr) | (offered & ~port->offered_high)) & free) | port->hold_low);
+    port->up = (port->pulled & port->odr & free) | port->hold_up;
+    port->down = (port->pulled & ~port->odr & free) | port->hold_down;
+    const uint32_t strong = port->low | port->high;
+    const uint32_t hard = port->outside & ~port->outside_weak;
+    const uint32_t driven = port->high & (~hard | port->outside_high);
+    const uint32_t undriven = (port->outside & port->outside_high) |
+                              (~port->outside & (port->up | (~port->down & port->board_up)));
+    port->level = (port->rail & port->rail_high) | (~port->rail & ((strong & driven) | (~strong & undriven)));
+    port->floating = 0xFFFF & ~(strong | port->up | port->down | port->outside | port->rail | port->board_up | port->board_down);
+    port->input = port->level & ((~port->analog & free) | port->hold_up | port->hold_down);
+    port->fighting = ~port->rail & strong & hard & (port->high ^ port->outside_high);
+    port->shorted = port->rail & strong & (port->high ^ port->rail_high);
+
+    const uint32_t inputs = before.input ^ port->input;
+    const uint32_t drives = (before.low ^ port->low) | (before.high ^ port->high) | (before.up ^ port->up) |
+                            (before.down ^ port->down);
+    const uint32_t wires = (before.level ^ port->level) | (before.floating ^ port->floating);
+    if (drives) {
+        fabric->last_output = fabric->host.boundary != NULL ? *fabric->host.boundary : fabric->host.cycle(fabric->host.user);
+        if (UNLIKELY(fabric->event_ns != NO_TIME)) {
+            fabric->last_output = NO_TIME;
+            fabric->last_output_ns = fabric->event_ns;
+        }
+    }
+    if (inputs && fabric->inputs[number] != NULL) {
+        *fabric->inputs[number] = port->input;
+    }
+    if (UNLIKELY((drives | wires) & fabric->subscribed[number])) {
+        tell_subscribers(fabric, number, drives, wires);
+    }
+    if (UNLIKELY(inputs & fabric->listened[number])) {
+        tell_listeners(fabric, number, inputs);
+    }
+    if (UNLIKELY(port->fighting & ~before.fighting)) {
+        tell_trouble(fabric, number, port->fighting & ~before.fighting, IS_FIGHTING);
+    }
+    if (UNLIKELY(port->shorted & ~before.shorted)) {
+        tell_trouble(fabric, number, port->shorted & ~before.shorted, IS_SHORTED);
+    }
+}
+
+void fabric_pins_changed(struct fabric *fabric, uint32_t number) { pins_changed(fabric, number); }
+
+/* The level that an alternate function offers on a pin: 0, 1, or 2 for none any more. */
+void offer(struct fabric *fabric, uint32_t pin, uint32_t source, uint32_t level)
+{
+    struct port *port = &fabric->ports[pin / PINS];
+    const uint32_t at = pin % PINS, bit = 1u << at;
+    const uint64_t mask = UINT64_C(1) << source;
+    port->sources[at] = level == FLOATING ? port->sources[at] & ~mask : port->sources[at] | mask;
+    port->source_levels[at] = level == HIGH ? port->source_levels[at] | mask : port->source_levels[at] & ~mask;
+    const uint64_t first = port->sources[at] & -port->sources[at];
+    port->offered = first ? port->offered | bit : port->offered & ~bit;
+    port->offered_high = port->source_levels[at] & first ? port->offered_high | bit : port->offered_high & ~bit;
+    pins_changed(fabric, pin / PINS);
+}
+
+void fabric_offer(struct fabric *fabric, uint32_t pin, uint32_t source, uint32_t level)
+{
+    offer(fabric, pin, source, level);
+}
+
+/* Has a device notified of changes of these pins' inputs, in place of those before. */
+void listen_to_pins(struct device *device, uint32_t port, uint32_t pins)
+{
+    struct fabric *fabric = device->fabric;
+    uint32_t n = 0;
+    while (n < fabric->listener_count && fabric->listeners[n].device != device) {
+        ++n;
+    }
+    if (n == fabric->listener_count && n < LISTENERS) {
+        fabric->listeners[fabric->listener_count++].device = device;
+    }
+    fabric->listeners[n].pins[port] = pins;
+    fabric->listened[port] = 0;
+    for (n = 0; n < fabric->listener_count; ++n) {
+        fabric->listened[port] |= fabric->listeners[n].pins[port];
+    }
+}
+
+/* Subscriptions. */
+
+static void sum_up(struct fabric *fabric)
+{
+    for (uint32_t port = 0; port < PORTS; ++port) {
+        fabric->subscribed[port] = 0;
+        for (uint32_t n = 0; n < SUBSCRIBERS; ++n) {
+            fabric->subscribed[port] |= fabric->subscribers[n].drive[port] | fabric->subscribers[n].wire[port];
+        }
+    }
+    fabric->watches_lines = 0;
+    for (uint32_t word = 0; word < LINE_WORDS; ++word) {
+        fabric->subscribed_lines[word] = 0;
+        for (uint32_t n = 0; n < SUBSCRIBERS; ++n) {
+            fabric->subscribed_lines[word] |= fabric->subscribers[n].lines[word];
+        }
+        fabric->watches_lines |= fabric->subscribed_lines[word] != 0;
+    }
+}
+
+/* Subscribes to pins and lines, by masks; returns the subscriber's number, -1 where there is no room. */
+int32_t fabric_subscribe(struct fabric *fabric, const uint32_t *drive, const uint32_t *wire, const uint32_t *stop,
+                         const uint64_t *lines)
+{
+    for (int32_t n = 0; n < SUBSCRIBERS; ++n) {
+        struct subscriber *one = &fabric->subscribers[n];
+        if (!one->is_used) {
+            one->is_used = 1;
+            memcpy(one->drive, drive, sizeof one->drive);
+            memcpy(one->wire, wire, sizeof one->wire);
+            memcpy(one->stop, stop, sizeof one->stop);
+            memcpy(one->lines, lines, sizeof one->lines);
+            sum_up(fabric);
+            return n;
+        }
+    }
+    return -1;
+}
+
+void fabric_stop_at(struct fabric *fabric, uint32_t number, const uint32_t *stop)
+{
+    memcpy(fabric->subscribers[number].stop, stop, sizeof fabric->subscribers[number].stop);
+}
+
+void fabric_unsubscribe(struct fabric *fabric, uint32_t number)
+{
+    struct subscriber *one = &fabric->subscribers[number];
+    free(one->rows);
+    *one = (struct subscriber){0};
+    sum_up(fabric);
+}
+
+size_t fabric_row_count(const struct fabric *fabric, uint32_t number) { return fabric->subscribers[number].count; }
+
+/* The rows of a subscriber, which has them then: they stand until the chip goes on. */
+const struct edge *fabric_take_rows(struct fabric *fabric, uint32_t number)
+{
+    fabric->subscribers[number].count = 0;
+    return fabric->subscribers[number].rows;
+}

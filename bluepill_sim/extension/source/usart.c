@@ -1,0 +1,352 @@
+/* A USART, asynchronous: characters at the speed of the line. What is warned of, and lines whose far end has another
+ * speed, are Python's business (peripherals/usart.py, which has the theory of operation).
+ *
+ * Source: RM0008 27.
+ * Invariant: a character ends floor(frame half-bits * BRR * 10**9 / (2 * PCLK)) ns after the point from which its run
+ * of characters is counted.
+ */
+#include "fabric.h"
+
+/* Registers by offset / 4, and the hidden words behind them: SR at its last read (half of the sequence that clears a
+ * flag), what stands behind the shift register, what is in it (0: nothing), and what DR reads. */
+enum { SR, DR, BRR, CR1, CR2, CR3, SEEN = 7, TDR, SHIFT, RDR };
+/* Of SR, and of what it enables in CR1 at the same places. */
+enum { PE = 1 << 0, ORE = 1 << 3, IDLE = 1 << 4, RXNE = 1 << 5, TC = 1 << 6, TXE = 1 << 7 };
+enum { ASKING = TXE | TC | RXNE | IDLE, READ_SEQUENCE = 0x1F };
+/* Of CR1. */
+enum { SBK = 1 << 0, RE = 1 << 2, TE = 1 << 3, RXNEIE = 1 << 5, PEIE = 1 << 8, M = 1 << 12, UE = 1 << 13 };
+/* A data word, what marks one in TDR and SHIFT, and what SHIFT holds besides. */
+enum { WORD = 0x1FF, HELD = 1 << 16, PREAMBLE = 1 << 17, BREAK = 1 << 18, FLAGS_AT = 16 };
+/* What Python is asked, as `Question` of usart.py: all but the last two are warnings. */
+enum { TX_PIN, TX_OFF, NO_RATE, CHARACTER_LOST, RX_OFF, CUT_OFF, CHECK_MODES, JUDGE_SPEED, GIVE_MORE };
+/* Commands of its own: move to the pins (TX, RX); hear a word, or learn that no more can be held. */
+enum { MOVE = OWN_COMMANDS, HEAR, CAN_HEAR };
+/* Its outputs. */
+enum { IRQ };
+
+static bool is_transmitting(const struct device *device) { return (device->words[CR1] & (UE | TE)) == (UE | TE); }
+
+static bool carries(const struct device *device)
+{
+    const struct usart *usart = device->state;
+    const struct port *port = &device->fabric->ports[usart->tx_pin / PINS];
+    const uint32_t at = usart->tx_pin % PINS;
+    const uint64_t sources = port->sources[at];
+    return port->alternate & port->bonded & ~port->held & 1u << at && (sources & -sources) >> usart->source & 1;
+}
+
+static bool can_receive(const struct device *device)
+{
+    const struct usart *usart = device->state;
+    const struct port *port = &device->fabric->ports[usart->rx_pin / PINS];
+    const uint32_t listening = port->bonded & ~port->held & (port->alternate | ~(port->output | port->analog));
+    return (device->words[CR1] & (UE | RE)) == (UE | RE) && device->words[BRR] && listening >> usart->rx_pin % PINS & 1;
+}
+
+static uint64_t frame_half_bits(const struct device *device)
+{
+    static const uint8_t stop_half_bits[4] = {2, 1, 4, 3};
+    const uint32_t data_bits = device->words[CR1] & M ? 9 : 8;
+    return 2 * (1 + data_bits) + stop_half_bits[device->words[CR2] >> 12 & 3];
+}
+
+static uint64_t span_ns(const struct device *device, uint64_t half_bits)
+{
+    const struct usart *usart = device->state;
+    return (uint64_t)((__uint128_t)half_bits * device->words[BRR] * NS_PER_S / (2 * (uint64_t)usart->clock_hz));
+}
+
+static void update_irq(struct device *device)
+{
+    const uint32_t status = device->words[SR], control = device->words[CR1];
+    /* TXEIE, TCIE and IDLEIE sit at the places of their flags; ORE shares RXNEIE. */
+    output_set(device, IRQ,
+               (status & control & ASKING) || (status & ORE && control & RXNEIE) || (status & PE && control & PEIE));
+}
+
+/* Works out all deadlines from what is on the line. */
+static void find_deadlines(struct device *device)
+{
+    struct usart *usart = device->state;
+    usart->tx_due_ns = device->words[SHIFT] ? usart->tx_base_ns + span_ns(device, usart->tx_half_bits) : NO_TIME;
+    usart->rx_due_ns = usart->rx_count ? usart->rx_base_ns + span_ns(device, usart->rx_half_bits) : NO_TIME;
+    uint64_t due = usart->tx_due_ns;
+    due = usart->rx_due_ns < due ? usart->rx_due_ns : due;
+    due = usart->idle_due_ns < due ? usart->idle_due_ns : due;
+    schedule(device, due);
+}
+
+/* Puts an item into the shift register, `before` half-bits after `base_ns`. */
+static void load(struct device *device, uint32_t item, uint64_t base_ns, uint64_t before)
+{
+    struct usart *usart = device->state;
+    device->words[SHIFT] = item;
+    usart->tx_base_ns = base_ns;
+    usart->tx_half_bits = before + frame_half_bits(device);
+}
+
+static void connect(struct device *device, bool is_on)
+{
+    const struct usart *usart = device->state;
+    offer(device->fabric, usart->tx_pin, usart->source, is_on ? HIGH : FLOATING);
+}
+
+static void emit(struct device *device, uint32_t word, uint64_t ns)
+{
+    struct usart *usart = device->state;
+    if (!carries(device)) {
+        ask(device, TX_PIN, 0);
+        return;
+    }
+    if (usart->judged_hz != usart->clock_hz || usart->judged_brr != device->words[BRR]) {
+        usart->judged_hz = usart->clock_hz;
+        usart->judged_brr = device->words[BRR];
+        ask(device, JUDGE_SPEED, 0);
+    }
+    const uint32_t format = device->words[CR1] | (device->words[CR2] >> 12 & 3) << 16;
+    const struct sent row = {ns, word, usart->clock_hz, device->words[BRR], format};
+    send_word(device, &row);
+}
+
+static void end_transmission(struct device *device, uint64_t ns)
+{
+    struct usart *usart = device->state;
+    uint32_t *words = device->words;
+    const uint32_t ended = words[SHIFT];
+    words[SHIFT] = 0;
+    if (ended & HELD) {
+        emit(device, ended & WORD, ns);
+    }
+    if (ended == BREAK) {
+        words[CR1] &= ~(uint32_t)SBK;
+    }
+    if (!is_transmitting(device)) {
+        connect(device, false);
+        words[SR] |= TC;
+    } else if (words[CR1] & SBK) {
+        load(device, BREAK, usart->tx_base_ns, usart->tx_half_bits);
+    } else if (words[TDR]) {
+        const uint32_t item = words[TDR];
+        words[TDR] = 0;
+        words[SR] |= TXE;
+        load(device, item, usart->tx_base_ns, usart->tx_half_bits);
+    } else {
+        words[SR] |= TC;
+    }
+}
+
+static void end_reception(struct device *device, uint64_t ns)
+{
+    struct usart *usart = device->state;
+    uint32_t *words = device->words;
+    const uint32_t arrived = usart->rx[usart->rx_first];
+    usart->rx_first = (usart->rx_first + 1) % RECEIVED;
+    if (!--usart->rx_count && usart->rx_more) {
+        ask(device, GIVE_MORE, 0);
+    }
+    usart->rx_half_bits += frame_half_bits(device);
+    if (!can_receive(device)) {
+        ask(device, RX_OFF, 0);
+        return;
+    }
+    if (words[SR] & RXNE) {
+        words[SR] |= ORE;
+    } else {
+        words[RDR] = arrived & WORD;
+        words[SR] |= RXNE | arrived >> FLAGS_AT;
+    }
+    if (!usart->rx_count) {
+        usart->idle_due_ns = ns + span_ns(device, frame_half_bits(device));
+    }
+}
+
+static void event(struct device *device, uint64_t until)
+{
+    struct usart *usart = device->state;
+    uint64_t ns;
+    while ((ns = device->fabric->slots[device->slot].ns) <= until) {
+        if (usart->tx_due_ns == ns) {
+            end_transmission(device, ns);
+        } else if (usart->rx_due_ns == ns) {
+            end_reception(device, ns);
+        } else {
+            usart->idle_due_ns = NO_TIME;
+            device->words[SR] |= IDLE;
+        }
+        find_deadlines(device);
+        update_irq(device);
+    }
+}
+
+static void write_data(struct device *device, uint32_t word)
+{
+    uint32_t *words = device->words;
+    if (words[SEEN] & TC) {
+        words[SEEN] &= ~(uint32_t)TC;
+        words[SR] &= ~(uint32_t)TC;
+    }
+    if (!is_transmitting(device)) {
+        ask(device, TX_OFF, 0);
+    } else if (!words[BRR]) {
+        ask(device, NO_RATE, 0);
+    } else if (!words[SHIFT]) {
+        load(device, HELD | word, now_ns(device->fabric), 0);
+        find_deadlines(device);
+    } else {
+        if (words[TDR]) {
+            ask(device, CHARACTER_LOST, 0);
+        }
+        words[TDR] = HELD | word;
+        words[SR] &= ~(uint32_t)TXE;
+    }
+    update_irq(device);
+}
+
+/* Uses the new rate from the next character on. */
+static void write_rate(struct device *device, uint64_t tx_end_ns, uint64_t rx_end_ns)
+{
+    struct usart *usart = device->state;
+    if (usart->tx_due_ns != NO_TIME) {
+        usart->tx_base_ns = tx_end_ns;
+        usart->tx_half_bits = 0;
+    }
+    if (usart->rx_due_ns != NO_TIME) {
+        usart->rx_base_ns = rx_end_ns;
+        usart->rx_half_bits = 0;
+    }
+    find_deadlines(device);
+}
+
+/* Follows UE, TE and SBK. */
+static void write_control(struct device *device)
+{
+    struct usart *usart = device->state;
+    uint32_t *words = device->words;
+    const bool is_on = is_transmitting(device), has_rate = words[BRR] > 0;
+    ask(device, CHECK_MODES, 0);
+    if (is_on && !usart->was_enabled) {
+        connect(device, true);
+        if (!words[SHIFT] && has_rate) {
+            load(device, PREAMBLE, now_ns(device->fabric), 0);
+        }
+    } else if (!(words[CR1] & TE) && words[SHIFT]) {
+        /* UE lets the present character end; TE cuts it off (RM0008 27.3.2). */
+        ask(device, CUT_OFF, 0);
+        words[SHIFT] = words[TDR] = 0;
+        words[SR] |= TXE | TC;
+    }
+    if (!is_on && !words[SHIFT]) {
+        connect(device, false);
+    }
+    usart->was_enabled = is_on;
+    if (is_on && words[CR1] & SBK && !words[SHIFT] && has_rate) {
+        load(device, BREAK, now_ns(device->fabric), 0);
+    }
+    find_deadlines(device);
+    update_irq(device);
+}
+
+static uint32_t read(struct device *device, uint32_t index)
+{
+    uint32_t *words = device->words;
+    (void)index; /* DR */
+    words[SR] &= ~(RXNE | (words[SEEN] & READ_SEQUENCE));
+    words[SEEN] &= ~(uint32_t)READ_SEQUENCE;
+    update_irq(device);
+    return words[RDR];
+}
+
+static void write(struct device *device, uint32_t index, uint32_t written, uint32_t previous)
+{
+    struct usart *usart = device->state;
+    (void)previous;
+    if (index == DR) {
+        write_data(device, written & WORD);
+    } else if (index == BRR) {
+        usart->rate_pc = device->fabric->host.pc(device->fabric->host.user);
+        write_rate(device, usart->tx_due_ns, usart->rx_due_ns);
+    } else if (index == SR) {
+        update_irq(device);
+    } else {
+        write_control(device);
+    }
+}
+
+/* Flags only fall and TDR is filled behind a character that is going out: neither needs time. */
+static bool needs_time(const struct device *device, uint32_t index, bool is_write)
+{
+    const uint32_t *words = device->words;
+    const bool is_behind = is_transmitting(device) && words[BRR] && words[SHIFT] && !words[TDR];
+    return !(index == SR || (index == DR && (!is_write || is_behind)));
+}
+
+static uint64_t rescaled(uint64_t due, uint64_t now, uint32_t from_hz, uint32_t to_hz)
+{
+    return due == NO_TIME ? NO_TIME : now + (uint64_t)((__uint128_t)(due - now) * from_hz / to_hz);
+}
+
+static void clear(struct device *device)
+{
+    struct usart *usart = device->state;
+    const struct usart fresh = {.tx_due_ns = NO_TIME, .rx_due_ns = NO_TIME, .idle_due_ns = NO_TIME,
+                                .clock_hz = usart->clock_hz, .source = usart->source, .tx_pin = usart->tx_pin,
+                                .rx_pin = usart->rx_pin, .judged_hz = usart->judged_hz,
+                                .judged_brr = usart->judged_brr};
+    connect(device, false);
+    *usart = fresh;
+    for (uint32_t n = SEEN; n <= RDR; ++n) {
+        device->words[n] = 0;
+    }
+    schedule(device, NO_TIME);
+    output_set(device, IRQ, false);
+}
+
+static bool hear(struct device *device, uint32_t word)
+{
+    struct usart *usart = device->state;
+    if (usart->rx_count == RECEIVED) {
+        return false;
+    }
+    if (!usart->rx_count && usart->rx_due_ns == NO_TIME) {
+        usart->rx_base_ns = now_ns(device->fabric);
+        usart->rx_half_bits = frame_half_bits(device);
+    }
+    usart->rx[(usart->rx_first + usart->rx_count++) % RECEIVED] = word;
+    usart->idle_due_ns = NO_TIME;
+    find_deadlines(device);
+    return true;
+}
+
+static uint32_t command(struct device *device, uint32_t what, uint32_t one, uint32_t other)
+{
+    struct usart *usart = device->state;
+    const uint64_t now = now_ns(device->fabric);
+    switch (what) {
+    case RESET: clear(device); break;
+    case CLOCK:
+        event(device, now);
+        if (one != usart->clock_hz) {
+            const uint32_t before = usart->clock_hz;
+            usart->clock_hz = one;
+            write_rate(device, rescaled(usart->tx_due_ns, now, before, one), rescaled(usart->rx_due_ns, now, before, one));
+        }
+        break;
+    case MOVE:
+        if (one != usart->tx_pin) {
+            connect(device, false);
+            usart->tx_pin = one;
+            if (is_transmitting(device)) {
+                connect(device, true);
+            }
+        }
+        usart->rx_pin = other;
+        break;
+    case HEAR: return hear(device, one);
+    case CAN_HEAR: return can_receive(device);
+    default: break;
+    }
+    return 0;
+}
+
+const struct device_kind usart_kind = {
+    .name = "usart", .needs_time = needs_time, .read = read, .write = write, .event = event, .command = command};

@@ -1,0 +1,414 @@
+"""The chip around its core, as Python reaches it: the queue of events, lines, and devices that are written in C.
+
+A device takes a slot of the queue. One in C is a row of `source/devices.c` and keeps its state in words of
+Python's; one in Python is called when its slot is due. Lines are numbered, those of interrupts first.
+
+Python stands on both sides of C here: what a callback raises is kept, and raised by `check` once C has come back.
+
+Invariant: all state is in Python's memory (`port_structs`, the words and structs of devices, `lines`, the slots'
+times), so that a snapshot is made of bytes and numbers.
+"""
+
+import ctypes
+import struct
+import weakref
+from collections.abc import Callable, Iterable
+from typing import Any, Protocol, TypeVar
+
+from bluepill_sim.extension.layout import PORT, PORTS, structure
+from bluepill_sim.extension.library import library
+from bluepill_sim.fabric.subscriptions import EDGE
+from simbase.state import Stateful
+from simbase.timing import Nanos
+
+#: What stands for "never" among times.
+NO_TIME = (1 << 64) - 1
+#: Lines, and how many words of 64 of them there are (`LINES` of fabric.h); rows show a line as a pin behind the last.
+LINES, LINE_WORDS, FIRST_LINE_ROW = 192, 3, 16 * PORTS
+#: Commands of every device (`enum command`), and the first of its own.
+RESET, CLOCK, ROUTE, OWN_COMMANDS = 0, 1, 2, 16
+#: An alternate function that offers nothing.
+NO_LEVEL = 2
+
+#: A word that has gone out (`struct sent`): ns, the word, clock in Hz, divider, format.
+WORD = struct.Struct("<QIIII")
+PortStruct = structure(PORT)
+_U32, _U64, _USER = ctypes.c_uint32, ctypes.c_uint64, ctypes.c_void_p
+_CYCLE = ctypes.CFUNCTYPE(_U64, _USER)
+_SET_IRQ = ctypes.CFUNCTYPE(_U32, _USER, _U32, _U32)
+_PLAIN = ctypes.CFUNCTYPE(None, _USER)
+_DUE = ctypes.CFUNCTYPE(None, _USER, _U64)
+_PC = ctypes.CFUNCTYPE(_U32, _USER)
+_EVENT = ctypes.CFUNCTYPE(None, _U32, _U64)
+_ASK = ctypes.CFUNCTYPE(_U32, _U32, _U32, _U32)
+_PAIR = ctypes.CFUNCTYPE(None, _U32, _U32)
+_ONE = ctypes.CFUNCTYPE(None, _U32)
+_Result = TypeVar("_Result")
+
+
+class Host(ctypes.Structure):
+    """`struct host`: what the fabric needs of the core."""
+
+    _fields_ = (
+        ("user", _USER),
+        ("cycle", ctypes.c_void_p),
+        ("boundary", ctypes.c_void_p),
+        ("set_irq", ctypes.c_void_p),
+        ("end_slice", ctypes.c_void_p),
+        ("due", ctypes.c_void_p),
+        ("pc", ctypes.c_void_p),
+        ("signal", ctypes.c_void_p),
+    )
+
+
+class _Calls(ctypes.Structure):
+    """`struct fabric_calls`."""
+
+    _fields_ = (("event", _EVENT), ("ask", _ASK), ("electrical", _PAIR), ("deliver", _ONE))
+
+
+class FabricPorts(Protocol):
+    """What the fabric needs of the chip, where no native core stands under it."""
+
+    @property
+    def now_ns(self) -> int:
+        """The exact time of what is happening now."""
+        ...
+
+    @property
+    def access_pc(self) -> int:
+        """The accessing instruction."""
+        ...
+
+    def irq_changed(self, irq: int, level: bool) -> bool:
+        """Take a new level of an interrupt line; return whether the interrupt is enabled."""
+        ...
+
+    def end_slice(self) -> None:
+        """End the slice at the boundary of the running block."""
+        ...
+
+    def event_due(self, at_ns: Nanos) -> None:
+        """End the slice at this time at the latest."""
+        ...
+
+    def signal(self, name: str) -> None:
+        """Signal an event to the core by name."""
+        ...
+
+
+class Fabric(Stateful):
+    """Queue, lines and devices of one chip."""
+
+    STATE = ("ports", "lines")
+    #: What one of the callbacks has raised; and what is filled once, when a chip is made.
+    DERIVED = ("_failure", "electrical", "_kept", "_names", "_acts", "_answers", "_deliveries")
+
+    def __init__(self, chip: FabricPorts) -> None:
+        self._chip = chip
+        self._calls_of_c = calls = library()
+        self._failure: BaseException | None = None
+        self._names: dict[int, str] = {}
+        self._acts: dict[int, Callable[[Nanos], None]] = {}
+        self._answers: dict[int, Callable[[int, int], int]] = {}
+        self._deliveries: dict[int, Callable[[], None]] = {}
+        self._kept: list[object] = []
+        #: Called with (number of the pin, 0 for a fight with the outside and 1 for a short).
+        self.electrical: Callable[[int, int], None] = lambda _pin, _what: None
+        self.port_structs: Any = (PortStruct * PORTS)()
+        self._callbacks = _Calls(
+            _EVENT(self._guarded(self._event, None)),
+            _ASK(self._guarded(self._ask, 0)),
+            _PAIR(self._guarded(self._electrical, None)),
+            _ONE(self._guarded(lambda slot: self._deliveries[slot](), None)),
+        )
+        #: `struct fabric`, for the native core.
+        self.handle = ctypes.c_void_p(
+            calls.fabric_new(ctypes.addressof(self._callbacks), ctypes.addressof(self.port_structs))
+        )
+        if not self.handle.value:
+            raise MemoryError("no memory for the fabric")
+        weakref.finalize(self, calls.fabric_free, self.handle)
+        self._use_python_host()
+        self._schedule = calls.fabric_schedule
+        self._due = calls.fabric_due
+
+    # The core.
+
+    def use_host(self, host: Host, *kept: object) -> None:
+        """Take another core than Python's."""
+        self._kept[:] = [host, *kept]
+        self._calls_of_c.fabric_set_host(self.handle, ctypes.addressof(host))
+
+    def set_time(self, base_ns: Nanos, base_cycle: int, frequency_hz: int) -> None:
+        """Tie nanoseconds and the host's cycles together; before that a cycle is a nanosecond."""
+        self._calls_of_c.fabric_set_time(self.handle, base_ns, base_cycle, frequency_hz)
+
+    # Events.
+
+    @property
+    def event_ns(self) -> Nanos | None:
+        """The time of the event that is acted on, while one is."""
+        at = self._calls_of_c.fabric_event_ns(self.handle)
+        return None if at == NO_TIME else at
+
+    @property
+    def next_ns(self) -> Nanos | None:
+        """When the first event is due; None for never."""
+        at = self._calls_of_c.fabric_next_ns(self.handle)
+        return None if at == NO_TIME else at
+
+    def run_events(self, until_ns: Nanos) -> None:
+        """Act on all that is due up to a time, in order of time, then of slots."""
+        self._calls_of_c.fabric_run_events(self.handle, until_ns)
+        self.check()
+
+    def catch_up(self, slot: int, until_ns: Nanos) -> None:
+        """Act on what one device has due up to a time."""
+        self._calls_of_c.fabric_catch_up(self.handle, slot, until_ns)
+        self.check()
+
+    def schedule(self, slot: int, at_ns: Nanos | None) -> None:
+        """Have a slot's event come at a time; None takes it back."""
+        self._schedule(self.handle, slot, NO_TIME if at_ns is None else at_ns)
+
+    def due(self, slot: int) -> Nanos | None:
+        """Return when a slot's event comes."""
+        at = self._due(self.handle, slot)
+        return None if at == NO_TIME else at
+
+    def check(self) -> None:
+        """Raise what a callback has raised since.
+
+        Raises:
+            Exception: Whatever it was.
+        """
+        if self._failure is not None:
+            failure, self._failure = self._failure, None
+            raise failure
+
+    # Devices.
+
+    def add_slot(self, name: str, act: Callable[[Nanos], None]) -> int:
+        """Take a slot for a device in Python, called with the time that was due; return its number."""
+        slot = self._new_slot(name)
+        self._acts[slot] = act
+        return slot
+
+    def add_device(
+        self,
+        name: str,
+        kind: str,
+        words: int,
+        state: int,
+        *,
+        act: Callable[[Nanos], None],
+        answer: Callable[[int, int], int],
+        deliver: Callable[[], None],
+    ) -> int:
+        """Take a slot for a device in C; return its number.
+
+        Args:
+            name: its own, for messages.
+            kind: that of its kind in `source/devices.c`.
+            words: where its registers are in the host's memory.
+            state: and what it holds beside them.
+            act: called when it is due, where its kind leaves that to Python.
+            answer: called with what it asks.
+            deliver: called when the words that it has sent must be taken over.
+        """
+        slot = self._new_slot(name)
+        if not self._calls_of_c.fabric_add_device(self.handle, slot, kind.encode(), words, state):
+            raise ValueError(f"no kind of device is called {kind!r}")
+        self._acts[slot], self._answers[slot], self._deliveries[slot] = act, answer, deliver
+        return slot
+
+    def read(self, slot: int, index: int) -> int:
+        """Return what a device in C answers to the read of a register."""
+        word: int = self._calls_of_c.fabric_read(self.handle, slot, index)
+        self.check()
+        return word
+
+    def write(self, slot: int, index: int, written: int, previous: int) -> None:
+        """Have a device in C do what follows a store."""
+        self._calls_of_c.fabric_write(self.handle, slot, index, written, previous)
+        self.check()
+
+    def command(self, slot: int, what: int, one: int = 0, other: int = 0) -> int:
+        """Have a device in C do something; return its answer."""
+        answer: int = self._calls_of_c.fabric_command(self.handle, slot, what, one, other)
+        self.check()
+        return answer
+
+    def take_words(self, slot: int) -> bytes:
+        """Take the words that a device has sent: rows of `WORD`."""
+        count = self._calls_of_c.fabric_word_count(self.handle, slot)
+        if not count:
+            return b""
+        return ctypes.string_at(self._calls_of_c.fabric_take_words(self.handle, slot), count * WORD.size)
+
+    def stop_at_words(self, slot: int, wanted: bool) -> None:
+        """Choose whether each word that a device sends ends the slice."""
+        self._calls_of_c.fabric_stop_at_words(self.handle, slot, wanted)
+
+    # Lines.
+
+    def set_line(self, line: int, level: bool) -> None:
+        """Set a line from Python."""
+        self._calls_of_c.fabric_set_line(self.handle, line, level)
+        self.check()
+
+    def put_output(self, slot: int, output: int, line: int) -> None:
+        """Put an output of a device on a line."""
+        self._calls_of_c.fabric_put_output(self.handle, slot, output, line)
+
+    def wire(self, line: int, slot: int, input_number: int) -> None:
+        """Hang an input of a device in C on a line.
+
+        Raises:
+            ValueError: There is no room, or no such device.
+        """
+        if not self._calls_of_c.fabric_wire(self.handle, line, slot, input_number):
+            raise ValueError(f"line {line} cannot take another input")
+
+    @property
+    def lines(self) -> bytes:
+        """The levels of all lines, a byte each."""
+        level = self._calls_of_c.fabric_line
+        return bytes(level(self.handle, line) for line in range(LINES))
+
+    @lines.setter
+    def lines(self, levels: bytes) -> None:
+        for line, level in enumerate(levels):
+            self._calls_of_c.fabric_restore_line(self.handle, line, bool(level))
+
+    @property
+    def ports(self) -> bytes:
+        """The pins, as bytes."""
+        return bytes(self.port_structs)
+
+    @ports.setter
+    def ports(self, ports: bytes) -> None:
+        ctypes.memmove(self.port_structs, ports, len(ports))
+        self._calls_of_c.fabric_forget_output(self.handle)
+
+    # Pins, for `PinBank`.
+
+    def pins_changed(self, port: int) -> None:
+        """Work out a port anew: something of it was written from Python."""
+        self._calls_of_c.fabric_pins_changed(self.handle, port)
+        self.check()
+
+    def offer(self, pin: int, source: int, level: int) -> None:
+        """Have an alternate function offer a level on a pin: 0, 1, or `NO_LEVEL`."""
+        self._calls_of_c.fabric_offer(self.handle, pin, source, level)
+        self.check()
+
+    def show_input(self, port: int, word: int) -> None:
+        """Have a port's input kept in a word of the host's memory too."""
+        self._calls_of_c.fabric_show_input(self.handle, port, word)
+
+    @property
+    def last_output_ns(self) -> Nanos:
+        """When the chip last changed what it drives; 0 for never."""
+        at: int = self._calls_of_c.fabric_last_output(self.handle)
+        return at
+
+    def subscribe(self, drive: Iterable[int], wire: Iterable[int], stop: Iterable[int], lines: Iterable[int]) -> int:
+        """Subscribe to pins by masks, one a port, and to lines by their numbers; return the subscription's number.
+
+        Raises:
+            ValueError: There are too many subscriptions.
+        """
+        words = [0] * LINE_WORDS
+        for line in lines:
+            words[line // 64] |= 1 << line % 64
+        number: int = self._calls_of_c.fabric_subscribe(
+            self.handle, _masks(drive), _masks(wire), _masks(stop), (_U64 * LINE_WORDS)(*words)
+        )
+        if number < 0:
+            raise ValueError("too many subscriptions to pins")
+        return number
+
+    def stop_at(self, subscription: int, stop: Iterable[int]) -> None:
+        """Choose which pins of a subscription end the slice."""
+        self._calls_of_c.fabric_stop_at(self.handle, subscription, _masks(stop))
+
+    def unsubscribe(self, subscription: int) -> None:
+        """End a subscription."""
+        self._calls_of_c.fabric_unsubscribe(self.handle, subscription)
+
+    def take_rows(self, subscription: int) -> bytes:
+        """Take the rows of a subscription."""
+        count = self._calls_of_c.fabric_row_count(self.handle, subscription)
+        if not count:
+            return b""
+        at = self._calls_of_c.fabric_take_rows(self.handle, subscription)
+        return ctypes.string_at(at, count * EDGE.size)
+
+    def take_stop(self) -> bool:
+        """Return whether a subscriber wants the slice to end, and forget it."""
+        wanted: bool = self._calls_of_c.fabric_take_stop(self.handle)
+        return wanted
+
+    @property
+    def has_news(self) -> bool:
+        """Whether rows or words wait for Python."""
+        has: bool = self._calls_of_c.fabric_has_news(self.handle)
+        return has
+
+    # Callbacks.
+
+    def _new_slot(self, name: str) -> int:
+        slot: int = self._calls_of_c.fabric_add_slot(self.handle)
+        if slot < 0:
+            raise ValueError("the queue of events has no slot left")
+        self._names[slot] = name
+        return slot
+
+    def _event(self, slot: int, at_ns: Nanos) -> None:
+        self._acts[slot](at_ns)
+        if self._due(self.handle, slot) <= at_ns:
+            raise RuntimeError(f"{self._names[slot]} is still due at {at_ns} ns after acting then")
+
+    def _electrical(self, pin: int, what: int) -> None:
+        self.electrical(pin, what)
+
+    def _ask(self, slot: int, what: int, value: int) -> int:
+        return self._answers[slot](what, value)
+
+    def _guarded(self, call: Callable[..., _Result], default: _Result) -> Callable[..., _Result]:
+        """Return a callback for C: what it raises is kept, and the slice ends."""
+        reference = weakref.ref(self)
+
+        def callback(*arguments: int) -> _Result:
+            try:
+                return call(*arguments)
+            except BaseException as error:  # noqa: BLE001 - C stands between here and the caller
+                fabric = reference()
+                if fabric is not None:
+                    fabric._fail(error)  # noqa: SLF001 - its own
+                return default
+
+        return callback
+
+    def _fail(self, error: BaseException) -> None:
+        self._failure = error
+        self._calls_of_c.fabric_end_slice(self.handle)
+
+    def _use_python_host(self) -> None:
+        chip = self._chip
+        calls = (
+            _CYCLE(self._guarded(lambda _user: chip.now_ns, 0)),
+            _SET_IRQ(self._guarded(lambda _user, irq, level: chip.irq_changed(irq, bool(level)), 0)),
+            _PLAIN(self._guarded(lambda _user: chip.end_slice(), None)),
+            _DUE(self._guarded(lambda _user, at_ns: chip.event_due(at_ns), None)),
+            _PC(self._guarded(lambda _user: chip.access_pc, 0)),
+            _PLAIN(self._guarded(lambda _user: chip.signal("event"), None)),
+        )
+        at = [ctypes.cast(call, ctypes.c_void_p) for call in calls]
+        self.use_host(Host(None, at[0], None, *at[1:]), *calls)
+
+
+def _masks(values: Iterable[int]) -> "ctypes.Array[ctypes.c_uint32]":
+    return (_U32 * PORTS)(*values)
