@@ -40,19 +40,19 @@ def write_sigrok(probe: Probe, path: Path) -> None:
     edges = sorted((at - start_ns, n, value) for n, name in enumerate(names) for at, value in by_name.get(name, ()))
     bits = sum((probe.initial[name] & 1) << n for n, name in enumerate(names))
     try:
-        write_session(path, names, rate_hz, runs(edges, bits, span_ns, rate_hz))
+        write_session(path, names, rate_hz, _samples(runs(edges, bits, span_ns, rate_hz), len(names)))
     except OSError as error:
         raise BluePillError(f"cannot write {path}: {error.strerror}", hint="give a file in a folder") from error
 
 
-def write_session(path: Path, names: Sequence[str], rate_hz: int, stretches: Iterable[tuple[int, int]]) -> None:
+def write_session(path: Path, names: Sequence[str], rate_hz: int, samples: Iterable[bytes]) -> None:
     """Write a session.
 
     Args:
         path: the file.
         names: of the probes.
         rate_hz: one of `RATE_NAMES`.
-        stretches: (levels as bits, number of samples), one after the other.
+        samples: one after the other, each of as many whole bytes as the probes need, the first probe as bit 0.
 
     Raises:
         OSError: the file cannot be written.
@@ -61,11 +61,17 @@ def write_session(path: Path, names: Sequence[str], rate_hz: int, stretches: Ite
     with zipfile.ZipFile(path, "w") as archive:
         archive.writestr(_entry("version"), "2")
         archive.writestr(_entry("metadata"), _metadata(names, RATE_NAMES[rate_hz], unit))
-        with archive.open(_entry("logic-1-1"), "w") as samples:
-            for bits, count in stretches:
-                sample = bits.to_bytes(unit, "little")
-                for start in range(0, count, _CHUNK):
-                    samples.write(sample * min(_CHUNK, count - start))
+        with archive.open(_entry("logic-1-1"), "w") as file:
+            for part in samples:
+                file.write(part)
+
+
+def _samples(stretches: Iterable[tuple[int, int]], probes: int) -> Iterator[bytes]:
+    """Yield the samples of stretches: (levels as bits, number of samples)."""
+    for bits, count in stretches:
+        sample = bits.to_bytes(max(1, (probes + 7) // 8), "little")
+        for start in range(0, count, _CHUNK):
+            yield sample * min(_CHUNK, count - start)
 
 
 def sample_at(ns: Nanos, rate_hz: int) -> int:

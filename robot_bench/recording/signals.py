@@ -4,10 +4,12 @@ Names are those of the pin-out (`adapter_sim/pinout.toml`); a recording with
 other nets shows them last, in their own group.
 """
 
-from collections.abc import Mapping, Sequence
+from array import array
+from collections.abc import Iterator, Mapping, Sequence
+from typing import overload
 
 from adapter_sim.pinout import load_pinout
-from robot_bench.wires.edges import Edges
+from robot_bench.wires.edges import Edges, codes
 
 #: Group title → nets, least significant bit first.
 GROUPS: Mapping[str, tuple[str, ...]] = {
@@ -35,23 +37,40 @@ def pin_labels() -> dict[str, str]:
     return {wire.name: f"{wire.bluepill} {signals[wire.name]}" for wire in wires}
 
 
-def motor_steps(pins: Mapping[str, Edges], motor: int) -> list[tuple[int, int]]:
+class Steps(Sequence[tuple[int, int]]):
+    """Signed values over time, as (ns, steps), oldest first."""
+
+    def __init__(self, times: "array[int]", values: "array[int]") -> None:
+        self.times, self.values = times, values
+
+    def __len__(self) -> int:
+        return len(self.times)
+
+    @overload
+    def __getitem__(self, place: int) -> tuple[int, int]: ...
+    @overload
+    def __getitem__(self, place: slice) -> "Steps": ...
+    def __getitem__(self, place: int | slice) -> "tuple[int, int] | Steps":
+        if isinstance(place, int):
+            return self.times[place], self.values[place]
+        return Steps(self.times[place], self.values[place])
+
+    def __iter__(self) -> Iterator[tuple[int, int]]:
+        return zip(self.times, self.values, strict=True)
+
+    def __eq__(self, other: object) -> bool:
+        return list(self) == list(other) if isinstance(other, Sequence) else NotImplemented
+
+    __hash__ = None  # type: ignore[assignment]  # it holds arrays
+
+
+def motor_steps(pins: Mapping[str, Edges], motor: int) -> Steps:
     """Return the value of a motor's pins over time, as (ns, steps).
 
     Two's complement with comm1 as the least significant bit. Edges at one
     instant are one change.
     """
     nets = [net for net in GROUPS[f"motor {motor} ({'left' if motor == 1 else 'right'})"] if net in pins]
-    if not nets:
-        return []
-    changes = sorted((t, bit, level) for bit, net in enumerate(nets) for t, level in pins[net])
-    width, code = len(nets), 0
-    result: list[tuple[int, int]] = []
-    for t, bit, level in changes:
-        code = code | 1 << bit if level else code & ~(1 << bit)
-        value = code - (1 << width) if code >> (width - 1) else code
-        if result and result[-1][0] == t:
-            result.pop()
-        if not result or result[-1][1] != value:
-            result.append((t, value))
-    return result
+    found, sign = codes([pins[net] for net in nets]), 1 << max(0, len(nets) - 1)
+    signed = bytes((code ^ sign) - sign & 0xFF for code in range(256))
+    return Steps(found.times, array("b", bytes(found.levels).translate(signed)))

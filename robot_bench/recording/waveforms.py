@@ -11,10 +11,11 @@ Invariant: the same run gives the same bytes.
 from collections.abc import Iterator
 from pathlib import Path
 
-from bluepill_sim.analysis.sigrok import MAX_SAMPLES, runs, sample_at, write_session
+from bluepill_sim.analysis.sigrok import MAX_SAMPLES, sample_at, write_session
 from bluepill_sim.analysis.vcd import identifier
 from robot_bench.recording.run_record import RunRecord
 from robot_bench.recording.signals import grouped
+from robot_bench.wires.edges import dumped, sampled
 
 #: Sample rates to choose from, Hz, the finest first: each divides 10**9.
 RATES_HZ = (1_000_000, 100_000, 10_000)
@@ -22,14 +23,22 @@ RATES_HZ = (1_000_000, 100_000, 10_000)
 
 def write_vcd(record: RunRecord, path: Path) -> None:
     """Write every net's edges, in nanoseconds; the same run gives the same bytes."""
-    path.write_text("\n".join(_lines(record)) + "\n", encoding="ascii")
+    names = nets_in_order(record)
+    codes = [identifier(index) for index in range(len(names))]
+    tracks = [record.pins[name] for name in names]
+    with path.open("w", encoding="ascii", newline="\n") as file:
+        file.writelines(f"{line}\n" for line in _head(names, codes))
+        file.writelines(dumped(tracks, codes))
+        if record.last_ns > max((track.times[-1] for track in tracks if track), default=-1):
+            file.write(f"#{record.last_ns}\n")
 
 
 def write_sigrok(record: RunRecord, path: Path) -> None:
     """Write every net's levels, sampled evenly over the run."""
-    end_ns = record.last_ns
+    end_ns, names = record.last_ns, nets_in_order(record)
     rate_hz = next((rate for rate in RATES_HZ if sample_at(end_ns, rate) + 1 <= MAX_SAMPLES), RATES_HZ[-1])
-    write_session(path, nets_in_order(record), rate_hz, runs(edges_in_order(record), 0, end_ns, rate_hz))
+    tracks = [record.pins[name] for name in names]
+    write_session(path, names, rate_hz, sampled(tracks, rate_hz, sample_at(end_ns, rate_hz) + 1))
 
 
 def nets_in_order(record: RunRecord) -> list[str]:
@@ -37,15 +46,7 @@ def nets_in_order(record: RunRecord) -> list[str]:
     return [name for _, names in grouped(sorted(record.pins)) for name in names]
 
 
-def edges_in_order(record: RunRecord) -> Iterator[tuple[int, int, int]]:
-    """Return (ns, index of the net in `nets_in_order`, level) of every edge, by time."""
-    names = nets_in_order(record)
-    yield from sorted((at, index, level) for index, name in enumerate(names) for at, level in record.pins[name])
-
-
-def _lines(record: RunRecord) -> Iterator[str]:
-    names = nets_in_order(record)
-    codes = [identifier(index) for index in range(len(names))]
+def _head(names: list[str], codes: list[str]) -> Iterator[str]:
     yield "$version p2os test bench $end"
     yield "$timescale 1 ns $end"
     yield "$scope module bench $end"
@@ -53,11 +54,3 @@ def _lines(record: RunRecord) -> Iterator[str]:
         yield f"$var wire 1 {code} {name} $end"
     yield "$upscope $end"
     yield "$enddefinitions $end"
-    now = -1
-    for at, index, level in edges_in_order(record):
-        if at != now:
-            now = at
-            yield f"#{at}"
-        yield f"{level}{codes[index]}"
-    if record.last_ns > now:
-        yield f"#{record.last_ns}"

@@ -114,7 +114,7 @@ def _sonar(record: RunRecord, left_out: list[str]) -> list[list[float]]:
 
 def _motor(record: RunRecord, motor: int, step: float) -> list[list[float]]:
     steps = motor_steps(record.pins, motor)
-    kept = [steps[n] for n in extremes([t for t, _ in steps], [[value for _, value in steps]])]
+    kept = [steps[n] for n in extremes(steps.times, [steps.values])]
     return [[_seconds(t), value * step] for t, value in kept] or [[0, 0]]
 
 

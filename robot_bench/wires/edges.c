@@ -59,6 +59,16 @@ size_t edges_changes(int64_t *times, uint8_t *levels, size_t count, uint8_t leve
     return kept;
 }
 
+/* The wire whose next edge comes first, the first of those of one instant; `wires` for none. */
+static size_t earliest(size_t wires, const int64_t *const *times, const size_t *counts, const size_t *at)
+{
+    size_t next = wires;
+    for (size_t wire = 0; wire < wires; ++wire)
+        if (at[wire] < counts[wire] && (next == wires || times[wire][at[wire]] < times[next][at[next]]))
+            next = wire;
+    return next;
+}
+
 /* Merge tracks into at most `most` edges as variable-length integers of (ns since the edge before) * wires + wire. */
 size_t edges_pack(size_t wires, const int64_t *const *times, const size_t *counts, size_t *at, size_t most,
                   uint8_t *out, size_t *edges, int64_t *first)
@@ -67,10 +77,7 @@ size_t edges_pack(size_t wires, const int64_t *const *times, const size_t *count
     size_t done = 0;
     int64_t last = 0;
     while (done < most) {
-        size_t next = wires;
-        for (size_t wire = 0; wire < wires; ++wire)
-            if (at[wire] < counts[wire] && (next == wires || times[wire][at[wire]] < times[next][at[next]]))
-                next = wire;
+        size_t next = earliest(wires, times, counts, at);
         if (next == wires)
             break;
         int64_t now = times[next][at[next]++];
@@ -123,4 +130,79 @@ int edges_unpack(const uint8_t *data, size_t bytes, size_t wires, int64_t first,
     memmove(starts + 1, starts, wires * sizeof *starts);
     starts[0] = 0;
     return 1;
+}
+
+/* Take wires as the bits of a code, the first as bit 0; return how many changes of the code there are. */
+size_t edges_codes(size_t wires, const int64_t *const *times, const uint8_t *const *levels, const size_t *counts,
+                   size_t *at, int64_t *out_times, uint8_t *out_codes)
+{
+    size_t found = 0, next;
+    uint8_t code = 0;
+    while ((next = earliest(wires, times, counts, at)) < wires) {
+        int64_t now = times[next][at[next]];
+        uint8_t bit = (uint8_t)(1u << next);
+        code = levels[next][at[next]++] ? code | bit : code & (uint8_t)~bit;
+        if (found && out_times[found - 1] == now)
+            --found;
+        if (!found || out_codes[found - 1] != code) {
+            out_times[found] = now;
+            out_codes[found++] = code;
+        }
+    }
+    return found;
+}
+
+static uint8_t *put_number(uint8_t *to, uint64_t value)
+{
+    uint8_t digits[20];
+    size_t count = 0;
+    do {
+        digits[count++] = (uint8_t)('0' + value % 10);
+        value /= 10;
+    } while (value);
+    while (count)
+        *to++ = digits[--count];
+    return to;
+}
+
+enum { LONGEST_CHANGE = 40 };
+
+/* Write changes as a value change dump has them, as many as there is room for; return the bytes. `now` goes on. */
+size_t edges_vcd(size_t wires, const int64_t *const *times, const uint8_t *const *levels, const size_t *counts,
+                 size_t *at, const char *const *codes, int64_t *now, uint8_t *out, size_t room)
+{
+    uint8_t *to = out;
+    size_t next;
+    while ((size_t)(to - out) + LONGEST_CHANGE <= room && (next = earliest(wires, times, counts, at)) < wires) {
+        int64_t when = times[next][at[next]];
+        if (when != *now) {
+            *now = when;
+            *to++ = '#';
+            to = put_number(to, (uint64_t)when);
+            *to++ = '\n';
+        }
+        *to++ = (uint8_t)('0' + levels[next][at[next]++]);
+        for (const char *code = codes[next]; *code; ++code)
+            *to++ = (uint8_t)*code;
+        *to++ = '\n';
+    }
+    return (size_t)(to - out);
+}
+
+/* Write `count` samples of all wires from sample `first` on, `unit` bytes each, the first wire as bit 0; `bits` goes on.
+   A sample at k * 10^9 / rate_hz ns sees the edges up to and at it. */
+void edges_samples(size_t wires, const int64_t *const *times, const uint8_t *const *levels, const size_t *counts,
+                   size_t *at, uint64_t *bits, int64_t first, size_t count, int64_t rate_hz, size_t unit, uint8_t *out)
+{
+    const int64_t period_ns = 1000000000 / rate_hz;
+    for (size_t k = 0; k < count; ++k) {
+        int64_t now = (first + (int64_t)k) * period_ns;
+        for (size_t wire = 0; wire < wires; ++wire)
+            while (at[wire] < counts[wire] && times[wire][at[wire]] <= now) {
+                uint64_t bit = (uint64_t)1 << wire;
+                *bits = levels[wire][at[wire]++] ? *bits | bit : *bits & ~bit;
+            }
+        for (size_t byte = 0; byte < unit; ++byte)
+            *out++ = (uint8_t)(*bits >> 8 * byte);
+    }
 }

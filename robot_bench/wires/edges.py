@@ -1,6 +1,6 @@
 """Edges of wires in bulk: as arrays, in the trace's blocks, and as the chip gives them.
 
-What is long goes through five functions that are there twice: in C (edges.c), and in Python for
+What is long goes through functions that are there twice: in C (edges.c), and in Python for
 where no compiler was. `p2os doctor` says which are used.
 
 A block holds the edges of several wires in order of time, those of one instant in the order of the
@@ -20,10 +20,12 @@ from itertools import pairwise
 from typing import Any, overload
 
 from bluepill_sim.fabric.subscriptions import EDGE
-from simbase.timing import Nanos
+from simbase.timing import NS_PER_S, Nanos
 
 #: Of a row of the chip: a pin that is on no wire.
 NO_WIRE = 255
+#: Bytes of a piece of what is written to a file.
+_PIECE = 1 << 20
 #: More bytes than a number of a block has.
 _LONGEST = 9
 _LAST_NS = 2**63 - 1
@@ -33,6 +35,9 @@ _FUNCTIONS = {
     "edges_changes": "zppzc",
     "edges_pack": "zzpppzppp",
     "edges_unpack": "ipzzlpp",
+    "edges_codes": "zzpppppp",
+    "edges_vcd": "zzpppppppz",
+    "edges_samples": "vzppppplzlzp",
 }
 _TYPES: dict[str, Any] = {
     "v": None, "i": ctypes.c_int, "l": ctypes.c_int64, "z": ctypes.c_size_t, "p": ctypes.c_void_p, "c": ctypes.c_uint8,
@@ -235,6 +240,108 @@ def unpack_in_python(block: bytes, wires: int, first: Nanos) -> "list[tuple[int,
     if length or first > _LAST_NS:
         raise ValueError("a damaged block of edges")
     return sorted(found.items())
+
+
+def codes(tracks: Sequence[Edges]) -> Edges:
+    """Take wires as the bits of a code, the first as bit 0; edges at one instant are one change.
+
+    Args:
+        tracks: At most eight wires.
+    """
+    native = _library()
+    if native is None:
+        return codes_in_python(tracks)
+    merged, count = _Merged(tracks), sum(map(len, tracks))
+    found = Edges()
+    found.extend(array("q", bytes(8 * count)), bytes(count))
+    kept = native.edges_codes(*merged.arguments, _at(found.times), _in(found.levels))
+    del found.times[kept:], found.levels[kept:]
+    return found
+
+
+def codes_in_python(tracks: Sequence[Edges]) -> Edges:
+    """Do as `codes`."""
+    found, code = Edges(), 0
+    for at, bit, level in sorted((at, bit, level) for bit, track in enumerate(tracks) for at, level in track):
+        code = code | 1 << bit if level else code & ~(1 << bit)
+        if found.times and found.times[-1] == at:
+            found.times.pop()
+            found.levels.pop()
+        if not found.times or found.levels[-1] != code:
+            found.append(at, code)
+    return found
+
+
+def dumped(tracks: Sequence[Edges], identifiers: Sequence[str]) -> Iterator[str]:
+    """Yield the changes as a value change dump has them, in pieces of whole lines, from before time 0 on."""
+    native = _library()
+    if native is None:
+        yield from dumped_in_python(tracks, identifiers)
+        return
+    merged, now = _Merged(tracks), ctypes.c_int64(-1)
+    names = (ctypes.c_char_p * len(tracks))(*(name.encode() for name in identifiers))
+    room = ctypes.create_string_buffer(_PIECE)
+    while size := native.edges_vcd(*merged.arguments, names, ctypes.byref(now), room, _PIECE):
+        yield ctypes.string_at(room, size).decode("ascii")
+
+
+def dumped_in_python(tracks: Sequence[Edges], identifiers: Sequence[str]) -> Iterator[str]:
+    """Do as `dumped`."""
+    now = -1
+    for at, wire, level in sorted((at, wire, level) for wire, track in enumerate(tracks) for at, level in track):
+        if at != now:
+            now = at
+            yield f"#{at}\n"
+        yield f"{level}{identifiers[wire]}\n"
+
+
+def sampled(tracks: Sequence[Edges], rate_hz: int, count: int) -> Iterator[bytes]:
+    """Yield so many samples of all wires from time 0 on, the first wire as bit 0 of whole bytes, in pieces.
+
+    Args:
+        tracks: At most 64 wires.
+        rate_hz: Samples a second, a divisor of 10**9.
+        count: How many samples there are.
+    """
+    unit = max(1, (len(tracks) + 7) // 8)
+    native = _library()
+    if native is None:
+        yield from sampled_in_python(tracks, rate_hz, count)
+        return
+    merged, bits = _Merged(tracks), ctypes.c_uint64()
+    for first in range(0, count, _PIECE // unit):
+        part = min(_PIECE // unit, count - first)
+        room = ctypes.create_string_buffer(part * unit)
+        native.edges_samples(*merged.arguments, ctypes.byref(bits), first, part, rate_hz, unit, room)
+        yield room.raw
+
+
+def sampled_in_python(tracks: Sequence[Edges], rate_hz: int, count: int) -> Iterator[bytes]:
+    """Do as `sampled`."""
+    unit, bits, begin = max(1, (len(tracks) + 7) // 8), 0, 0
+    for at, wire, level in sorted((at, wire, level) for wire, track in enumerate(tracks) for at, level in track):
+        sample = min(count, -(-at * rate_hz // NS_PER_S))
+        if sample > begin:
+            yield bits.to_bytes(unit, "little") * (sample - begin)
+            begin = sample
+        bits = bits | 1 << wire if level else bits & ~(1 << wire)
+    yield bits.to_bytes(unit, "little") * (count - begin)
+
+
+class _Merged:
+    """Several wires' edges as C takes them, with the place of the next one of each."""
+
+    def __init__(self, tracks: Sequence[Edges]) -> None:
+        wires = len(tracks)
+        self._kept = [_in(track.levels) for track in tracks]
+        levels = [ctypes.addressof(kept) for kept in self._kept]
+        self.arguments = (
+            wires,
+            (ctypes.c_void_p * wires)(*(_at(track.times) for track in tracks)),
+            (ctypes.c_void_p * wires)(*levels),
+            (ctypes.c_size_t * wires)(*map(len, tracks)),
+            (ctypes.c_size_t * wires)(),
+        )
 
 
 @cache

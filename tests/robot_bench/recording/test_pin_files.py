@@ -10,14 +10,18 @@ import pytest
 
 from bluepill_sim.analysis.vcd import identifier
 from robot_bench.recording.run_record import RunRecord
-from robot_bench.recording.waveforms import edges_in_order, nets_in_order, write_sigrok, write_vcd
+from robot_bench.recording.waveforms import nets_in_order, write_sigrok, write_vcd
+from robot_bench.wires.edges import Edges
 from tests.robot_bench.recording.records import motor_pins, record
 
 MS = 1_000_000
 
 
 def a_run() -> RunRecord:
-    pins = motor_pins((0, 0, 0), (0.003, 3, 1), (0.004, -4, 0)) | {"DD1": [(0, 0), (1_500_001, 1)], "rst": [(0, 0)]}
+    pins = motor_pins((0, 0, 0), (0.003, 3, 1), (0.004, -4, 0)) | {
+        "DD1": Edges([(0, 0), (1_500_001, 1)]),
+        "rst": Edges([(0, 0)]),
+    }
     return record(pins=pins, last_ns=5 * MS)
 
 
@@ -36,7 +40,8 @@ def test_a_vcd_holds_every_edge_to_the_nanosecond(tmp_path: Path) -> None:
         elif token.kind is TokenKind.CHANGE_SCALAR:
             edges.append((now, names[token.scalar_change.id_code], int(token.scalar_change.value)))
     order = nets_in_order(run)
-    assert edges == [(at, order[index], level) for at, index, level in edges_in_order(run)]
+    wanted = sorted((at, index, level) for index, name in enumerate(order) for at, level in run.pins[name])
+    assert edges == [(at, order[index], level) for at, index, level in wanted]
     assert now == 5 * MS
 
 

@@ -9,6 +9,7 @@ from p2os.protocol.packets import EncoderPacket
 from robot_bench.recording.run_record import Event, RunRecord, WireChunk
 from robot_bench.report.page import page_data, render_page
 from robot_bench.report.thinning import ends, extremes, pulses
+from robot_bench.wires.edges import Edges
 from tests.robot_bench.recording.records import S, pose
 
 MS = 10**6
@@ -25,7 +26,7 @@ def long_run(seconds: int) -> RunRecord:
     sonar = [(n * 100 * MS, [1500 + n % 700] * 16) for n in range(seconds * 10)]
     sonar[len(sonar) // 3] = (sonar[len(sonar) // 3][0], [1500] * 15 + [123])
     nets = [f"DD{n}" for n in range(1, 9)] + [f"motor{m}_comm{n}" for m in (1, 2) for n in (1, 2, 3)]
-    pins = {net: [(n * 20 * MS, n & 1) for n in range(seconds * 50)] for net in nets}
+    pins = {net: Edges((n * 20 * MS, n & 1) for n in range(seconds * 50)) for net in nets}
     return RunRecord(
         meta={"scenario": "long", "threshold_m": 0.6},
         poses=poses,

@@ -10,6 +10,7 @@ from robot_bench.recording.run_record import Event, Json, RunRecord, WireChunk
 from robot_bench.recording.signals import pin_labels
 from robot_bench.report.page import page_data, render_page
 from robot_bench.report.plan import LETTER_PX, LINE_PX, NARROW_PX, WIDE_PX, plan
+from robot_bench.wires.edges import Edges
 from tests.robot_bench.recording.records import S, pose
 
 EXTENT = (-3.0, -3.0, 3.0, 3.0)
@@ -76,7 +77,7 @@ def hits(seconds: int) -> RunRecord:
     detail = "'crate' at x 1.000 m, y 0.000 m"
     return RunRecord(
         meta={"scenario": "hit"}, poses=[pose(t=n * S) for n in range(seconds)], is_cut=False, last_ns=seconds * S,
-        pins={"motor1_comm1": [(0, 1)]}, events=[Event(t=S, who="body", what="collision", detail=detail)],
+        pins={"motor1_comm1": Edges([(0, 1)])}, events=[Event(t=S, who="body", what="collision", detail=detail)],
         wire=[WireChunk(t=n * S, direction="c2r", data=bytes.fromhex("fafb03000000")) for n in range(seconds)],
     )  # fmt: skip
 

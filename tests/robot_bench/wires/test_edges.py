@@ -14,8 +14,14 @@ from robot_bench.wires.edges import (
     Edges,
     changes,
     changes_in_python,
+    codes,
+    codes_in_python,
+    dumped,
+    dumped_in_python,
     pack,
     pack_in_python,
+    sampled,
+    sampled_in_python,
     split,
     split_in_python,
     unpack,
@@ -119,3 +125,45 @@ def test_edges_are_a_sequence_of_times_and_levels() -> None:
     assert list(some) == [(1, 1), (5, 0), (9, 1)]
     some.extend(array("q", [10]), b"\0")
     assert some[3] == (10, 0)
+
+
+one_level_an_instant = st.dictionaries(st.integers(0, 40), st.integers(0, 1), max_size=15)
+levels = st.lists(one_level_an_instant.map(lambda levels: dense(list(levels.items()))), min_size=1, max_size=8)
+
+
+@native
+@given(levels)
+def test_codes_are_the_same_in_both_languages(tracks: list[Edges]) -> None:
+    assert codes(tracks) == codes_in_python(tracks)
+
+
+@given(levels)
+def test_a_code_is_what_its_wires_are_after_each_instant(tracks: list[Edges]) -> None:
+    found, now = dict(codes(tracks)), 0
+    for at in range(41):
+        now = found.get(at, now)
+        if any(track and track.times[0] <= at for track in tracks):
+            held = [[level for t, level in track if t <= at] for track in tracks]
+            assert now == sum((level[-1] if level else 0) << bit for bit, level in enumerate(held))
+
+
+@native
+@given(tracks=levels, piece=st.integers(40, 200))
+def test_a_dump_is_the_same_in_both_languages(tracks: list[Edges], piece: int) -> None:
+    identifiers = ["!", "a", "zz", "b", "c", "d", "e", "f"][: len(tracks)]
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(module, "_PIECE", piece)
+        assert "".join(dumped(tracks, identifiers)) == "".join(dumped_in_python(tracks, identifiers))
+
+
+@native
+@given(tracks=levels, rate_hz=st.sampled_from([10**9, 10**8]), count=st.integers(1, 60), piece=st.integers(1, 9))
+def test_samples_are_the_same_in_both_languages(tracks: list[Edges], rate_hz: int, count: int, piece: int) -> None:
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(module, "_PIECE", piece)
+        found = b"".join(sampled(tracks, rate_hz, count))
+    assert found == b"".join(sampled_in_python(tracks, rate_hz, count))
+    assert len(found) == count
+    for number in range(count):
+        held = [[level for t, level in track if t * rate_hz <= number * 10**9] for track in tracks]
+        assert found[number] == sum((level[-1] if level else 0) << bit for bit, level in enumerate(held))
