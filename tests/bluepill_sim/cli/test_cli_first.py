@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pytest
 
+from bluepill_sim.extension import library
 from p2os.cli.main import run
 
 SENSORS = str(files("robot_bench.firmware") / "sensors.elf")
@@ -131,3 +132,15 @@ def test_a_dump_holds_every_edge_and_every_word(tmp_path: Path) -> None:
     assert bytes(words) == b"sensors: ready\n"
     assert {"PB12", "irq.USART1", "usart1.tx"} <= set(names.values())
     assert 10_000_000 <= highest < 10_100_000
+
+
+def test_without_its_library_the_emulator_says_so_in_a_line(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    library.library.cache_clear()
+    monkeypatch.setattr(library, "library_path", lambda: None)
+    try:
+        assert run(["mcu", "run", str(files("robot_bench.firmware") / "motors.elf"), "--for", "1ms"]) == 2
+    finally:
+        library.library.cache_clear()
+    assert capsys.readouterr().err == "p2os: the emulator's library is not built\nhint: p2os doctor says why\n"
