@@ -203,6 +203,10 @@ bool core_add_row(struct core *core, uint32_t start, uint32_t end, uint32_t stra
     memcpy(row->instructions, instructions, list);
     if (host != NULL) {
         memcpy(code, host, end - start);
+        const uint32_t first = (start - core->shared.sram_base) / CODE_BYTES, last = (end - 1 - core->shared.sram_base) / CODE_BYTES;
+        for (uint32_t n = first; n <= last && n < CODE_PLACES; ++n) {
+            core->code_places[n / 8] |= (uint8_t)(1 << n % 8);
+        }
     }
     core->all = row;
     *at = row;

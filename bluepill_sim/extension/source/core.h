@@ -137,6 +137,9 @@ struct polling {
     uint32_t registers[16];
 };
 
+/* Where in SRAM code was translated from, in places of some bytes; never fewer than there are. */
+enum { CODE_BYTES = 32, CODE_PLACES = 2 * SRAM_SLOTS / CODE_BYTES };
+
 struct core {
     struct shared shared;
     void *unicorn;
@@ -164,6 +167,7 @@ struct core {
     struct record *records;
     uint32_t record_count, record_room;
     struct polling polling;
+    uint8_t code_places[CODE_PLACES / 8];
 };
 
 static inline void begin_block(struct core *core, struct row *row)

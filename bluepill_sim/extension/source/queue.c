@@ -68,11 +68,13 @@ uint64_t fabric_next_ns(const struct fabric *fabric)
 static void act(struct fabric *fabric, struct slot *slot)
 {
     struct device *device = slot->device;
+    slot->is_acting = 1;
     if (device == NULL || device->kind->event == NULL) {
         fabric->calls.event((uint32_t)(slot - fabric->slots), slot->ns);
     } else {
         device->kind->event(device, slot->ns);
     }
+    slot->is_acting = 0;
 }
 
 void run_events(struct fabric *fabric, uint64_t until_ns)
@@ -82,7 +84,7 @@ void run_events(struct fabric *fabric, uint64_t until_ns)
     while ((due = fabric_next_ns(fabric)) <= until_ns) {
         fabric->event_ns = due;
         for (uint32_t n = 0; n < fabric->slot_count; ++n) {
-            if (fabric->slots[n].ns == due) {
+            if (fabric->slots[n].ns == due && !fabric->slots[n].is_acting) {
                 act(fabric, &fabric->slots[n]);
                 if (fabric->slots[n].ns <= due) { /* what has acted is done; Python checks its own */
                     fabric_schedule(fabric, n, NO_TIME);
@@ -100,7 +102,7 @@ void fabric_run_events(struct fabric *fabric, uint64_t until_ns) { run_events(fa
 void fabric_catch_up(struct fabric *fabric, uint32_t number, uint64_t until_ns)
 {
     struct slot *slot = &fabric->slots[number];
-    while (slot->ns <= until_ns) {
+    while (slot->ns <= until_ns && !slot->is_acting) { /* its own event may reach its own registers by the bus */
         const uint64_t before = fabric->event_ns, due = slot->ns;
         fabric->event_ns = due;
         act(fabric, slot);

@@ -348,5 +348,5 @@ static uint32_t command(struct device *device, uint32_t what, uint32_t one, uint
     return 0;
 }
 
-const struct device_kind usart_kind = {
+DEVICE_KIND(usart_kind) = {
     .name = "usart", .needs_time = needs_time, .read = read, .write = write, .event = event, .command = command};
