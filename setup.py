@@ -7,6 +7,7 @@ and a file beside it holds the reason, which `p2os doctor` tells (pip shows noth
 import os
 import re
 import shutil
+from glob import glob
 from pathlib import Path
 
 from setuptools import Extension, setup
@@ -18,6 +19,13 @@ README_LINK = re.compile(r"(!?)\[([^]]*)\]\((?!https?:)([^)#]*)[^)]*\)")
 
 class BuildParts(build_ext):
     """Builds the parts that a compiler is there for."""
+
+    def finalize_options(self) -> None:
+        """Expand the patterns among the files of each part."""
+        super().finalize_options()
+        for part in self.extensions:
+            part.sources = [file for pattern in part.sources for file in sorted(glob(pattern))]
+            part.depends = [file for pattern in part.depends for file in sorted(glob(pattern))]
 
     def run(self) -> None:
         """Build, and write down what was left out and why."""

@@ -169,8 +169,8 @@ PERIPHERALS: tuple[tuple[_Maker, str], ...] = (
 )
 
 
-#: Where each output leads: interrupts by their numbers (RM0008 10.1.2), inputs of devices by their names. Outputs that lead
-#: to the same are one line, which is their OR; a device that is not modelled may be the source of a line.
+#: Where each output leads: interrupts by their numbers (RM0008 10.1.2), inputs of devices by their names. Outputs
+#: that lead to the same are one line, which is their OR; the source may be a device that is not modelled.
 WIRING: dict[str, tuple[int | str, ...]] = {
     "WWDG.irq": (0,),
     "EXTI.pvd_irq": (1,),

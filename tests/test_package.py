@@ -31,7 +31,7 @@ LIMIT_S = 300
 OF_THE_CHECKOUT = (".ci/", ".gitignore")
 
 #: What of the packages is compiled into the wheel and need not lie in it.
-COMPILED = ("bluepill_sim/native/source/", "robot_bench/wires/edges.c")
+COMPILED = ("bluepill_sim/extension/source/", "robot_bench/wires/edges.c")
 
 CONSTRAINTS = ROOT / "constraints.txt"
 

@@ -139,7 +139,7 @@ class Fabric(Stateful):
             _PAIR(self._guarded(self._electrical, None)),
             _ONE(self._guarded(lambda slot: self._deliveries[slot](), None)),
             _BUS(self._guarded(self._reach_registers, NO_TIME)),
-            _PAIR(self._guarded(lambda address, size: self._chip.code_written(address, size), None)),
+            _PAIR(self._guarded(self._code_written, None)),
         )
         #: `struct fabric`, for the native core.
         self.handle = ctypes.c_void_p(
@@ -351,6 +351,9 @@ class Fabric(Stateful):
         answer: int = self._calls_of_c.fabric_bus(self.handle, slot, is_write, address, size, word)
         self.check()
         return None if answer == NO_TIME else answer
+
+    def _code_written(self, address: int, size: int) -> None:
+        self._chip.code_written(address, size)
 
     def _reach_registers(self, is_write: int, address: int, size: int, word: int) -> int:
         answer = self._chip.reach_registers(address, size, word if is_write else None)

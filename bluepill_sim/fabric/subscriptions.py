@@ -4,9 +4,9 @@ A subscription names pins and a sink. The sink is called with whole rows of `EDG
 `advance_to` returns; never in the middle of an instruction. An edge of a pin of `ends_slice` ends the chip's slice at
 the boundary of the running block.
 
-A pin may show a wave (PWM). A subscription gets its edges like any others, made in bulk; one that asks for `waves` gets
-one row where a wave begins, changes or ends instead, and reads the stream with `read_rows`. A wave's time is in ticks of
-the clock that makes it, not in ns: 20 kHz of 72 MHz are 3600 ticks, and 3601 are no whole number of ns.
+A pin may show a wave (PWM). A subscription gets its edges like any others, made in bulk; one that asks for `waves`
+gets one row where a wave begins, changes or ends instead, and reads the stream with `read_rows`. A wave's time is in
+ticks of the clock that makes it, not in ns: 20 kHz of 72 MHz are 3600 ticks, and 3601 are no whole number of ns.
 
 Invariant: every edge of a subscribed pin reaches each sink once, in order of time, and the run is the same with and
 without subscribers, but for the slices that they end.
@@ -21,8 +21,8 @@ from typing import Protocol
 from simbase.timing import NS_PER_S, Nanos
 
 #: A row: ns, number of the pin (16 times the port, A = 0, and the pin's number in it), what the chip itself puts on the
-#: wire (index in `PinDrive`), what the wire is then (`LOW`, `HIGH`, `FLOATING`), 0 for an edge and `WAVE_ROW` for a wave
-#: (drive and wire are then those of its low phase, and above them by 4 bits those of its high one), and 0.
+#: wire (index in `PinDrive`), what the wire is then (`LOW`, `HIGH`, `FLOATING`), 0 for an edge or `WAVE_ROW`
+#: (drive and wire are then those of the low phase, and above them by 4 bits those of the high one), and 0.
 EDGE = struct.Struct("<QBBBBI")
 #: The third of them.
 LOW, HIGH, FLOATING = range(3)

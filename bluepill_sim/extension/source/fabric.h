@@ -211,6 +211,7 @@ static inline uint64_t now_ns(struct fabric *fabric)
 
 /* Has the device's event come at a time; NO_TIME takes it back. */
 void schedule(struct device *device, uint64_t ns);
+static inline uint64_t due_ns(const struct device *device) { return device->fabric->slots[device->slot].ns; }
 /* Acts on all that is due at or before a time, in order of time, then of slots. */
 void run_events(struct fabric *fabric, uint64_t until_ns);
 

@@ -164,7 +164,7 @@ static void event(struct device *device, uint64_t until)
 {
     struct usart *usart = device->state;
     uint64_t ns;
-    while ((ns = device->fabric->slots[device->slot].ns) <= until) {
+    while ((ns = due_ns(device)) <= until) {
         if (usart->tx_due_ns == ns) {
             end_transmission(device, ns);
         } else if (usart->rx_due_ns == ns) {

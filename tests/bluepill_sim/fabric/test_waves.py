@@ -1,4 +1,4 @@
-"""Waves on pins: a level at a time is arithmetic; edges are made for who wants them, and are the same however they are."""
+"""Waves on pins: a level at a time is arithmetic; edges are made for who wants them, and are the same either way."""
 
 from typing import Any
 
