@@ -8,8 +8,6 @@
 
 #include "fabric.h"
 
-enum { PERIPHERALS = 0x40000000, PERIPHERALS_END = 0x40024000 };
-
 /* Makes a memory known; `bytes` is Python's and stays where it is. */
 bool fabric_add_memory(struct fabric *fabric, uint8_t *bytes, uint32_t base, uint32_t size, bool is_writable)
 {

@@ -22,6 +22,8 @@ enum { SLOTS = 128, LINES = 192, SUBSCRIBERS = 16, LISTENERS = 16, OUTPUTS = 24,
 /* The first lines are those of interrupts, by their numbers. */
 enum { IRQ_LINES_END = 64, NO_LINE = 255 };
 enum { LOW, HIGH, FLOATING };
+/* What is reached as registers. */
+enum { PERIPHERALS = 0x40000000, PERIPHERALS_END = 0x40024000 };
 
 struct fabric;
 struct device;

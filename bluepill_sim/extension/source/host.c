@@ -56,7 +56,7 @@ static uint32_t set_irq(void *user, uint32_t irq, uint32_t level)
 static bool registers(void *user, struct bus_access *access)
 {
     struct core *core = user;
-    const uint32_t offset = access->address & ((PAGES << PAGE_SHIFT) - 1), index = (offset & ((1u << PAGE_SHIFT) - 1)) >> 2;
+    const uint32_t offset = access->address - PERIPHERALS, index = (offset & ((1u << PAGE_SHIFT) - 1)) >> 2;
     struct page *page = &core->pages[offset >> PAGE_SHIFT];
     if (page->device == NULL || index >= page->count) {
         return false;
