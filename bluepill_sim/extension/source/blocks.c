@@ -168,10 +168,12 @@ void core_on_block(void *unicorn, uint64_t at, uint32_t size, void *user)
             core->block = core->resumed;
             core->shared.stop_at = core->resumed_stop_at;
             core->resumed = NULL;
-        } else {
-            stop_at_boundary(core, address);
+            return;
         }
-        return;
+        if (!goes_on(core, address)) {
+            stop_at_boundary(core, address);
+            return;
+        }
     }
     struct row *row = find(core, address);
     if (UNLIKELY(row == NULL || row->flags & ROW_ATTENTION)) {

@@ -167,6 +167,7 @@ struct core {
     struct record *records;
     uint32_t record_count, record_room;
     struct polling polling;
+    uint64_t limit; /* of the run */
     uint8_t code_places[CODE_PLACES / 8];
 };
 
@@ -193,6 +194,7 @@ void go_on_at_access(struct core *core, uint32_t pc);
 bool resolve(struct core *core, uint32_t address, bool is_write, uint32_t bytes);
 void skip(struct core *core, uint32_t address, bool is_write, uint32_t bytes);
 /* run.c */
+bool goes_on(struct core *core, uint32_t address);
 void *allocate(struct core *core, size_t bytes);
 uint32_t read_register(struct core *core, int number);
 /* exceptions.c */

@@ -203,7 +203,8 @@ struct fabric {
 static inline uint64_t ns_of(const struct fabric *fabric, uint64_t cycle)
 {
     const struct time_base *time = &fabric->time;
-    return time->ns + (uint64_t)((__uint128_t)(cycle - time->cycle) * NS_PER_S / time->hz);
+    const uint64_t cycles = cycle - time->cycle; /* by whole seconds, so that 64 bits are enough */
+    return time->ns + cycles / time->hz * NS_PER_S + cycles % time->hz * NS_PER_S / time->hz;
 }
 
 static inline uint64_t now_ns(struct fabric *fabric)
