@@ -55,6 +55,7 @@ bench: setup
 	$(BIN)/python tools/bench/pioneer.py
 	$(BIN)/python tools/bench/speed.py
 	$(BIN)/python tools/bench/shares.py
+	$(BIN)/python tools/bench/devices.py
 
 soak: setup
 	$(BIN)/pytest -n $(JOBS) -m 'soak' --no-cov

@@ -7,7 +7,6 @@ and a file beside it holds the reason, which `p2os doctor` tells (pip shows noth
 import os
 import re
 import shutil
-from glob import glob
 from pathlib import Path
 
 from setuptools import Extension, setup
@@ -24,8 +23,8 @@ class BuildParts(build_ext):
         """Expand the patterns among the files of each part."""
         super().finalize_options()
         for part in self.extensions:
-            part.sources = [file for pattern in part.sources for file in sorted(glob(pattern))]
-            part.depends = [file for pattern in part.depends for file in sorted(glob(pattern))]
+            part.sources = expanded(part.sources)
+            part.depends = expanded(part.depends)
 
     def run(self) -> None:
         """Build, and write down what was left out and why."""
@@ -88,6 +87,11 @@ class BuildParts(build_ext):
 
     def _note(self, name: str) -> Path:
         return Path(self.get_ext_fullpath(name)).with_name(f"{name.rpartition('.')[2]}.left_out")
+
+
+def expanded(patterns: list[str]) -> list[str]:
+    """Return the files that patterns stand for."""
+    return [file.as_posix() for pattern in patterns for file in sorted(Path().glob(pattern))]
 
 
 def page() -> str:

@@ -4,8 +4,8 @@ from typing import Any
 
 import pytest
 
-from bluepill_sim.peripherals.rcc import ResetCause
 from bluepill_sim import stm32f103
+from bluepill_sim.peripherals.rcc import ResetCause
 from bluepill_sim.stm32f103 import (
     BASES,
     BONDED_PINS,

@@ -127,3 +127,36 @@ def test_code_that_a_device_in_c_writes_over_is_run_as_written(built: None) -> N
         words.append((seen, state(machine)))
     assert words[0] == words[1]
     assert words[0][0][0] != words[0][0][2]
+
+
+def run_at_72_mhz(machine: Machine) -> None:
+    """Set the clock from outside, while the program waits."""
+    rcc, flash = machine.board.chip.parts.rcc, machine.board.chip.parts.flash
+    flash.write(0, 4, 0x12)
+    rcc.write(0, 4, rcc.read(0, 4) | 1 << 16)
+    machine.board.run_for("3 ms")
+    rcc.write(4, 4, 1 << 16 | 7 << 18 | 4 << 8)
+    rcc.write(0, 4, rcc.read(0, 4) | 1 << 24)
+    machine.board.run_for("1 ms")
+    rcc.write(4, 4, rcc.read(4, 4) | 2)
+
+
+def test_a_loop_that_waits_for_a_word_ends_at_the_right_round_whichever_it_is(built: None) -> None:
+    # Ten rounds or so go between two words, and every 64th round or so is compared with the one before.
+    machines = []
+    for core in ("python", "native"):
+        machine, _ = moving(LOOPS["waits for a word"], core, BUFFER, 1)
+        machine.board.pin("PA0").drive(True)
+        run_at_72_mhz(machine)
+        machines.append((machine, machine.board.snapshot(), machine.board.now_ns))
+    for rise in range(1_000, 30_000, 250):
+        ends = []
+        for machine, saved, start_ns in machines:
+            machine.board.restore(saved)
+            machine.board.advance_to(start_ns + rise)
+            machine.board.pin("PA3").drive(True)
+            machine.board.advance_to(start_ns + 32_000)
+            assert machine.board.hclk_hz == 72_000_000
+            ends.append(next(row[0] for row in machine.board.last_rows if row[1] == machine.label("stop")))
+            machine.board.pin("PA3").drive(None)
+        assert ends[0] == ends[1], rise
