@@ -11,9 +11,10 @@ STAMP  := $(VENV)/.set-up
 # One more than two cores: many tests wait for a real clock.
 JOBS   ?= 3
 # What is built with the package: set up again when it has changed.
-COMPILED := $(wildcard bluepill_sim/native/source/*) $(shell find adapter_fw/core adapter_fw/capi -type f)
+COMPILED := $(wildcard bluepill_sim/extension/source/*) robot_bench/wires/edges.c \
+    $(shell find adapter_fw/core adapter_fw/capi -type f)
 
-.PHONY: setup demo test lint type unit bench soak clean firmware board board-check board-tools pictures docs
+.PHONY: setup demo test lint type unit bench soak peers clean firmware mutation-tools board board-check board-tools pictures docs
 
 setup: $(STAMP)
 
@@ -22,6 +23,8 @@ setup: $(STAMP)
 $(STAMP): pyproject.toml setup.py constraints.txt $(COMPILED)
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || \
 	    { echo "make: Python 3.11 or newer is needed (hint: make PYTHON=/path/to/python3.11)"; exit 2; }
+	@command -v $${CC:-cc} gcc >/dev/null || \
+	    { echo "make: the emulator needs a C compiler (hint: apt-get install g++ libc6-dev)"; exit 2; }
 	@test -x $(BIN)/python || $(PYTHON) -m venv $(VENV) || \
 	    { rm -rf $(VENV); echo "make: cannot create a virtual environment (hint: apt-get install python3-venv)"; exit 2; }
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt -e '.[all,dev]'
@@ -57,8 +60,18 @@ bench: setup
 	$(BIN)/python tools/bench/shares.py
 	$(BIN)/python tools/bench/devices.py
 
-soak: setup
+soak: setup mutation-tools
 	$(BIN)/pytest -n $(JOBS) -m 'soak' --no-cov
+
+# The programs of others that are on PATH, or PEERS='--peer "p2os-arduino=/home/me/drive {line}"', against p2os serve.
+peers: setup
+	@$(BIN)/python -m tools.peers $(PEERS)
+
+# What changes the adapter's two sides in `make soak`. Without universalmutator's own wishes: one of them is a copy of
+# `typing` that shadows Python's.
+mutation-tools: setup
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check 'cosmic-ray==8.7.0'
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --no-deps 'universalmutator==1.14.1'
 
 # Rebuilds the example firmware (needs gcc-arm-none-eabi); `make test` compares.
 firmware: setup
