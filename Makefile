@@ -58,6 +58,7 @@ bench: setup
 	$(BIN)/python tools/bench/pioneer.py
 	$(BIN)/python tools/bench/speed.py
 	$(BIN)/python tools/bench/shares.py
+	$(BIN)/python tools/bench/devices.py
 
 soak: setup mutation-tools
 	$(BIN)/pytest -n $(JOBS) -m 'soak' --no-cov

@@ -19,6 +19,13 @@ README_LINK = re.compile(r"(!?)\[([^]]*)\]\((?!https?:)([^)#]*)[^)]*\)")
 class BuildParts(build_ext):
     """Builds the parts that a compiler is there for."""
 
+    def finalize_options(self) -> None:
+        """Expand the patterns among the files of each part."""
+        super().finalize_options()
+        for part in self.extensions:
+            part.sources = expanded(part.sources)
+            part.depends = expanded(part.depends)
+
     def run(self) -> None:
         """Build, and write down what was left out and why."""
         self.left_out: dict[str, str] = {}
@@ -80,6 +87,11 @@ class BuildParts(build_ext):
 
     def _note(self, name: str) -> Path:
         return Path(self.get_ext_fullpath(name)).with_name(f"{name.rpartition('.')[2]}.left_out")
+
+
+def expanded(patterns: list[str]) -> list[str]:
+    """Return the files that patterns stand for."""
+    return [file.as_posix() for pattern in patterns for file in sorted(Path().glob(pattern))]
 
 
 def page() -> str:

@@ -78,7 +78,7 @@ class Chip(Stateful):
         "_requested_reset",
         "_flash_repairs",
     )
-    DERIVED = ("_flash_access",)
+    DERIVED = ("_flash_access", "_written_code")
 
     def __init__(self, memory: Memory, vector_table: int, on_warning: WarningListener, on_fault: FaultListener) -> None:
         """Make the chip, in the state after power-on.
@@ -103,6 +103,8 @@ class Chip(Stateful):
         self._requested_reset: ResetCause | None = None
         self._flash_access = self.clocks.flash_wait_states, self.clocks.flash_prefetch
         self._flash_repairs: list[tuple[int, bytes]] = []
+        #: What a bus master has written over code in SRAM since the last boundary: addresses and sizes.
+        self._written_code: list[tuple[int, int]] = []
         #: Whether the pins, and whether the peripherals exist: making them already calls back.
         self._is_made = self._is_complete = False
         self.engine, self.processor = make_core(self._measure, memory)
@@ -248,10 +250,6 @@ class Chip(Stateful):
 
     # What the peripherals ask for.
 
-    def set_irq(self, irq: int, level: bool) -> None:
-        """Set the level of an interrupt line."""
-        self.fabric.set_line(irq, level)
-
     def irq_changed(self, irq: int, level: bool) -> bool:
         """Take a new level of an interrupt line to the NVIC; return whether it is enabled (called by the fabric)."""
         self.processor.nvic.set_level(irq, level)
@@ -263,9 +261,18 @@ class Chip(Stateful):
         """End the slice at the boundary of the running block (called by the fabric)."""
         self.processor.stop_at_boundary()
 
-    def event_due(self, at_ns: Nanos) -> None:
-        """End the slice at a time at the latest (called by the fabric)."""
-        self.engine.stop_at = min(self.engine.stop_at, self._clock.cycle_at(at_ns))
+    def event_due(self, cycle: int) -> None:
+        """End the slice at a cycle at the latest (called by the fabric)."""
+        self.engine.stop_at = min(self.engine.stop_at, cycle)
+
+    def reach_registers(self, address: int, size: int, written: int | None) -> int | None:
+        """Make an access of a bus master to the peripherals (called by the fabric)."""
+        return self._bus.reach(address - PERIPHERAL_BASE, size, written)
+
+    def code_written(self, address: int, size: int) -> None:
+        """Forget, before the next block, what was translated from these bytes (called by the fabric)."""
+        self._written_code.append((address, size))
+        self.processor.stop_at_boundary()
 
     def clock_changed(self) -> None:
         """Go on at the frequency and the wait states now in `clocks`."""
@@ -309,6 +316,9 @@ class Chip(Stateful):
 
     def warn(self, message: str, *, once: str, pc: int | None = None) -> None:
         """Pass on a warning."""
+        master = self.fabric.master if self._is_made else None
+        if master is not None:
+            message = f"{message} by {master}"
         self._on_warning(message, once, self.engine.access_pc if pc is None else pc)
 
     def _restored(self) -> None:
@@ -316,19 +326,20 @@ class Chip(Stateful):
         self._flash_access = self.clocks.flash_wait_states, self.clocks.flash_prefetch
         self.engine.forget_costs()
         self._time_changed()
+        self.fabric.resume()
 
     # Internals.
 
     def _time_changed(self) -> None:
-        """Tell the fabric where cycles and nanoseconds are tied together; to Python's core a cycle is a nanosecond."""
-        if self.uses_native_core:
-            frequency_hz, base_ns, base_cycle = self._clock.base
-            self.fabric.set_time(base_ns, base_cycle, frequency_hz)
+        """Tell the fabric where cycles and nanoseconds are tied together."""
+        frequency_hz, base_ns, base_cycle = self._clock.base
+        self.fabric.set_time(base_ns, base_cycle, frequency_hz)
 
     def _act(self) -> None:
         """At a boundary: do what was left for it, and what is due."""
         if self._flash_repairs:
             self._repair_flash()
+        self._drop_written_code()
         if self._requested_reset is not None:
             self.reset(self._requested_reset)
         cycle = self.engine.cycle
@@ -336,8 +347,14 @@ class Chip(Stateful):
         if systick.next_cycle is not None and cycle >= systick.next_cycle:
             systick.advance_to(cycle)
         self.fabric.run_events(self._clock.ns_of(cycle))
+        self._drop_written_code()
         if self._requested_reset is not None:
             self.reset(self._requested_reset)
+
+    def _drop_written_code(self) -> None:
+        for address, size in self._written_code:
+            self.engine.drop_code(address, size)
+        self._written_code.clear()
 
     def _stop_cycle(self, limit_ns: Nanos) -> int:
         """Return the cycle of the earliest of the limit and the deadlines."""
@@ -360,6 +377,8 @@ class Chip(Stateful):
         engine = self.engine
         for region in self.memory.regions:
             engine.map_memory(region.base, region.buffer, is_writable=region.is_writable)
+            if region.base:  # the alias at 0 is the core's
+                self.fabric.add_memory(region.base, region.buffer, is_writable=region.is_writable)
         self._bus = bus = PeripheralBus(self.parts.by_name, self.parts.rcc, self)
         engine.map_io(PERIPHERAL_BASE, PERIPHERAL_BYTES, bus.read, bus.write)
         engine.map_io(PERIPHERAL_ALIAS, PERIPHERAL_BYTES * _ALIAS_BYTES, bus.read_bit, bus.write_bit)
@@ -463,6 +482,16 @@ class PeripheralBus(Stateful):
                 self._refuse(part, offset, f"write of {value:#x} to")
             return
         part.write(PERIPHERAL_BASE + offset - part.base, size, value)
+
+    def reach(self, offset: int, size: int, written: int | None) -> int | None:
+        """Make an access of a bus master: the word that is read, 0 after a write, None where nothing answers."""
+        part = self._pages.get(offset >> _PAGE_SHIFT)
+        if part is None or not self._rcc.is_clocked(part.name):
+            return None
+        if written is None:
+            return part.read(PERIPHERAL_BASE + offset - part.base, size)
+        part.write(PERIPHERAL_BASE + offset - part.base, size, written)
+        return 0
 
     def read_bit(self, offset: int, size: int) -> int:
         """Return a bit through its alias; `offset` counts from the alias region."""

@@ -9,8 +9,10 @@ named stands in `BASES`, so that a warning can name what was touched.
 from bisect import bisect_right
 from collections.abc import Callable
 from dataclasses import dataclass
+from itertools import count
 from typing import TypeAlias, cast
 
+from bluepill_sim.fabric.fabric import Fabric
 from bluepill_sim.fabric.pins import PinBank, PinPorts
 from bluepill_sim.fabric.ports import ChipPorts
 from bluepill_sim.fabric.registers import ClockBit, Peripheral, Place
@@ -148,29 +150,51 @@ def _make_rcc(chip: ChipPorts, place: Place) -> Rcc:
     return Rcc(chip, place, gates=CLOCK_GATES)
 
 
-#: The modelled peripherals, in the order in which they are made, reset and act: class, name, IRQs.
-PERIPHERALS: tuple[tuple[_Maker, str, tuple[int, ...]], ...] = (
-    (_make_rcc, "RCC", (5,)),
-    (Flash, "FLASH", (4,)),
-    (Afio, "AFIO", ()),
-    (Gpio, "GPIOA", ()),
-    (Gpio, "GPIOB", ()),
-    (Gpio, "GPIOC", ()),
-    (Gpio, "GPIOD", ()),
-    (Gpio, "GPIOE", ()),
-    (Exti, "EXTI", (6, 7, 8, 9, 10, 23, 40, 1, 41, 42)),
-    (Usart, "USART1", (37,)),
-    (Usart, "USART2", (38,)),
-    (Usart, "USART3", (39,)),
-    (Iwdg, "IWDG", ()),
-    (Wwdg, "WWDG", (0,)),
+#: The modelled peripherals, in the order in which they are made, reset and act.
+PERIPHERALS: tuple[tuple[_Maker, str], ...] = (
+    (_make_rcc, "RCC"),
+    (Flash, "FLASH"),
+    (Afio, "AFIO"),
+    (Gpio, "GPIOA"),
+    (Gpio, "GPIOB"),
+    (Gpio, "GPIOC"),
+    (Gpio, "GPIOD"),
+    (Gpio, "GPIOE"),
+    (Exti, "EXTI"),
+    (Usart, "USART1"),
+    (Usart, "USART2"),
+    (Usart, "USART3"),
+    (Iwdg, "IWDG"),
+    (Wwdg, "WWDG"),
 )
 
 
-#: Lines inside the chip; those before them are the interrupts, by their numbers.
-PVD_LINE, RTC_ALARM_LINE, USB_WAKEUP_LINE = range(64, 67)
-#: What hangs on them: device, and number of its input (RM0008 10.2.5 for EXTI 16 to 18).
-WIRING = {PVD_LINE: ("EXTI", 0), RTC_ALARM_LINE: ("EXTI", 1), USB_WAKEUP_LINE: ("EXTI", 2)}
+#: Where each output leads: interrupts by their numbers (RM0008 10.1.2), inputs of devices by their names. Outputs
+#: that lead to the same are one line, which is their OR; the source may be a device that is not modelled.
+WIRING: dict[str, tuple[int | str, ...]] = {
+    "WWDG.irq": (0,),
+    "EXTI.pvd_irq": (1,),
+    "FLASH.irq": (4,),
+    "RCC.irq": (5,),
+    "EXTI.0": (6,),
+    "EXTI.1": (7,),
+    "EXTI.2": (8,),
+    "EXTI.3": (9,),
+    "EXTI.4": (10,),
+    "EXTI.9_5": (23,),
+    "USART1.irq": (37,),
+    "USART2.irq": (38,),
+    "USART3.irq": (39,),
+    "EXTI.15_10": (40,),
+    "EXTI.rtc_alarm_irq": (41,),
+    "EXTI.usb_wakeup_irq": (42,),
+    # EXTI 16 to 18 (RM0008 10.2.5).
+    "PWR.pvd": ("EXTI.pvd",),
+    "RTC.alarm": ("EXTI.rtc_alarm",),
+    "USB.wakeup": ("EXTI.usb_wakeup",),
+}
+#: The first line that is no interrupt.
+_FIRST_INNER_LINE = 64
 
 
 @dataclass(frozen=True, slots=True)
@@ -230,11 +254,68 @@ def make_pins(chip: PinPorts) -> PinBank:
 def make_parts(chip: ChipPorts) -> ChipParts:
     """Return the peripherals of one chip, in their state after power-on; `chip.pins` and `chip.clocks` come first."""
     by_name: dict[str, Peripheral] = {}
-    for make, name, irqs in PERIPHERALS:
-        by_name[name] = make(chip, Place(name=name, base=BASES[name], clock=CLOCK_GATES.get(name), irqs=irqs))
-    for line, (name, number) in WIRING.items():
-        chip.pins.fabric.wire(line, by_name[name].slot, number)
+    for make, name in PERIPHERALS:
+        by_name[name] = make(chip, Place(name=name, base=BASES[name], clock=CLOCK_GATES.get(name)))
+    _wire(by_name, chip.pins.fabric)
     return ChipParts(by_name)
+
+
+def line_of(output: str) -> int:
+    """Return the number of the line that an output is on, such as "RTC.alarm".
+
+    Raises:
+        KeyError: The table does not have it.
+    """
+    return _lines()[WIRING[output]]
+
+
+def _lines() -> dict[tuple[int | str, ...], int]:
+    """Return the number of each line by where it leads: that of its interrupt, or the next one inside the chip."""
+    numbers: dict[tuple[int | str, ...], int] = {}
+    inner = count(_FIRST_INNER_LINE)
+    for ends in WIRING.values():
+        if ends not in numbers:
+            irqs = [end for end in ends if isinstance(end, int)]
+            numbers[ends] = irqs[0] if irqs else next(inner)
+    return numbers
+
+
+def _wire(parts: dict[str, Peripheral], fabric: Fabric) -> None:
+    """Wire the devices as the table says.
+
+    Raises:
+        ValueError: The table has a name that there is not, or two lines that lead to one end.
+    """
+    for output, ends in WIRING.items():
+        found = _find(output, parts, "output", lambda part: part.OUTPUTS)
+        if found is not None:
+            fabric.put_output(*found, _lines()[ends])
+    led: set[int | str] = set()
+    for ends, line in _lines().items():
+        for end in ends:
+            if end in led:
+                raise ValueError(f"WIRING: two lines lead to {end}")
+            led.add(end)
+            if isinstance(end, int):
+                if end != line or end >= IRQ_COUNT:
+                    raise ValueError(f"WIRING: {end} is no interrupt that can be on line {line}")
+            elif (found := _find(end, parts, "input", lambda part: part.INPUTS)) is not None:
+                fabric.wire(line, *found)
+
+
+def _find(
+    name: str, parts: dict[str, Peripheral], what: str, names_of: Callable[[Peripheral], tuple[str, ...]]
+) -> tuple[int, int] | None:
+    """Return slot and number of an output or input; None of a device that is not modelled."""
+    device, _, end = name.partition(".")
+    if device not in BASES:
+        raise ValueError(f"WIRING: {name}: the chip has no {device}")
+    if device not in parts:
+        return None
+    names = names_of(parts[device])
+    if end not in names:
+        raise ValueError(f"WIRING: {name}: {device} has no {what} {end!r}; it has {', '.join(names) or 'none'}")
+    return parts[device].slot, names.index(end)
 
 
 def name_at(address: int) -> str | None:

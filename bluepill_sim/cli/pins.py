@@ -17,7 +17,7 @@ from simbase.timing import NS_PER_S, Nanos
 
 HELP = """Run a firmware for a while, then show what each pin is and did.
 
-Mode, level, who drives it, edges.
+Mode, level (of PWM frequency and share of the time at 1), who drives it, edges.
 
 With --vcd or --sr the pins are also written as waveforms, with the interrupt
 lines and what the USARTs send beside them.
@@ -81,9 +81,11 @@ def pin_rows(board: BluePill, probe: Probe) -> list[dict[str, object]]:
                 "mode": pin.mode.value,
                 "function": pin.holder or pin.function or "",
                 "level": "floating" if pin.is_floating else "high" if pin.level else "low",
-                "chip": pin.output.value,
+                "chip": pin.output.value if pin.wave is None else "wave",
                 "outside": {None: "", True: "high", False: "low"}[pin.driven],
                 "edges": len(edges),
+                "frequency_hz": None if pin.wave is None else pin.wave.frequency_hz,
+                "duty": None if pin.wave is None else pin.wave.duty,
                 "last_edge_s": edges[-1][0] / NS_PER_S if edges else None,
                 "five_volt": pin.is_five_volt_tolerant,
                 "used": not is_untouched or pin.holder is not None,
@@ -97,13 +99,22 @@ def _print(rows: list[dict[str, object]]) -> None:
     table = []
     for row in rows:
         last = row["last_edge_s"]
-        names = ("pin", "mode", "function", "level", "chip", "outside")
         table.append(
             (
-                *(str(row[name]) for name in names),
+                *(str(row[name]) for name in ("pin", "mode", "function")),
+                _wave(row) or str(row["level"]),
+                *(str(row[name]) for name in ("chip", "outside")),
                 str(row["edges"]) if row["edges"] else "",
                 f"{last:.6f} s" if isinstance(last, float) else "",
                 "yes" if row["five_volt"] else "no",
             )
         )
     typer.echo("\n".join(in_columns(headers, table, right=(6, 7))))
+
+
+def _wave(row: dict[str, object]) -> str:
+    """Return frequency and duty of a pin's wave; empty for none."""
+    frequency_hz, duty = row["frequency_hz"], row["duty"]
+    if not isinstance(frequency_hz, float) or not isinstance(duty, float):
+        return ""
+    return f"{frequency_hz:g} Hz, {100 * duty:.1f} %"

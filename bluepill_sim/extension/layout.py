@@ -13,6 +13,8 @@ from typing import Any
 
 #: How many ports the chip has, and pins each port.
 PORTS, PINS = 5, 16
+#: Alternate functions that may drive a pin, at most.
+SOURCES = 64
 #: How many of the last rows are kept with or without a recorder; a power of 2.
 LAST_ROWS = 32
 #: Exceptions of the architecture that a chip of the family can have.
@@ -106,6 +108,7 @@ PORT = Struct(
         *_fields("u32", "pulled", "analog"),
         Field("offered", "u32", doc="some alternate function offers a level,"),
         Field("offered_high", "u32", doc="which is 1"),
+        Field("waving", "u32", doc="or a wave"),
         Field("held", "u32", doc="kept off GPIO, and what drives then"),
         *_fields("u32", "hold_low", "hold_high", "hold_up", "hold_down"),
         Field("low", "u32", doc="what the chip itself drives"),
@@ -113,6 +116,7 @@ PORT = Struct(
         Field("level", "u32", doc="on the wire; a floating wire is low"),
         Field("input", "u32", doc="what the digital input reads"),
         *_fields("u32", "floating", "fighting", "shorted"),
+        Field("shown", "u32", doc="pins that show a wave: what stands above of them is as of their last edge made"),
         Field("modes", "u8", PINS, "index in `PinMode`"),
         Field("sources", "u64", PINS, "the alternate functions that offer a level, a bit each; the lowest drives"),
         Field("source_levels", "u64", PINS),
@@ -138,10 +142,23 @@ USART = Struct(
 )
 EXTI = Struct("exti", "What EXTI holds beyond its registers.", (Field("levels", "u32"), Field("routes", "u8", PINS)))
 GPIO = Struct("gpio", "Which port a GPIO is.", (Field("port", "u32"),))
+WAVE = Struct(
+    "wave",
+    "A level that goes up every `period` ticks, and down `high` ticks later.",
+    (
+        Field("ns", "u64", doc="when tick 0 begins; tick n begins floor(n * 10**9 / hz) ns later"),
+        Field("at", "u64", doc="ticks from a rising edge to tick 0, less than the period"),
+        Field("period", "u64", doc="in ticks; 0: there is no wave"),
+        Field("high", "u64", doc="of them at level 1, more than 0 and less than the period"),
+        Field("hz", "u32", doc="ticks a second: the clock of who makes it"),
+        Field("pin", "u32", doc="on which it is offered"),
+        Field("padding", "u64"),
+    ),
+)
 EDGE = Struct(
     "edge",
     "A change of a pin, for who has subscribed: `bluepill_sim/fabric/subscriptions.py`.",
-    (Field("ns", "u64"), *_fields("u8", "pin", "drive", "wire", "padding"), Field("zero", "u32")),
+    (Field("ns", "u64"), *_fields("u8", "pin", "drive", "wire", "kind"), Field("zero", "u32")),
 )
 SENT = Struct(
     "sent",
@@ -150,7 +167,7 @@ SENT = Struct(
 )
 
 #: All of them; one that holds another comes behind it.
-STRUCTS = (RECORD, INSTRUCTION, SHARED, PORT, USART, EXTI, GPIO, EDGE, SENT)
+STRUCTS = (RECORD, INSTRUCTION, SHARED, PORT, USART, EXTI, GPIO, WAVE, EDGE, SENT)
 
 _KINDS: dict[str, Any] = {
     "u8": ctypes.c_uint8, "u16": ctypes.c_uint16, "u32": ctypes.c_uint32, "u64": ctypes.c_uint64, "i32": ctypes.c_int32,
@@ -192,5 +209,5 @@ def _size(struct: Struct) -> int:
     return ctypes.sizeof(structure(struct))
 
 
-_CONSTANTS = {"PORTS": PORTS, "PINS": PINS, "LAST_ROWS": LAST_ROWS, "RECEIVED": RECEIVED}
+_CONSTANTS = {"PORTS": PORTS, "PINS": PINS, "SOURCES": SOURCES, "LAST_ROWS": LAST_ROWS, "RECEIVED": RECEIVED}
 _C_KINDS = {"u8": "uint8_t", "u16": "uint16_t", "u32": "uint32_t", "u64": "uint64_t", "i32": "int32_t"}

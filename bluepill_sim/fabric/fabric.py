@@ -15,7 +15,7 @@ import weakref
 from collections.abc import Callable, Iterable
 from typing import Any, Protocol, TypeVar
 
-from bluepill_sim.extension.layout import PORT, PORTS, structure
+from bluepill_sim.extension.layout import PORT, PORTS, SOURCES, WAVE, structure
 from bluepill_sim.extension.library import library
 from bluepill_sim.fabric.subscriptions import EDGE
 from simbase.state import Stateful
@@ -32,7 +32,7 @@ NO_LEVEL = 2
 
 #: A word that has gone out (`struct sent`): ns, the word, clock in Hz, divider, format.
 WORD = struct.Struct("<QIIII")
-PortStruct = structure(PORT)
+PortStruct, WaveStruct = structure(PORT), structure(WAVE)
 _U32, _U64, _USER = ctypes.c_uint32, ctypes.c_uint64, ctypes.c_void_p
 _CYCLE = ctypes.CFUNCTYPE(_U64, _USER)
 _SET_IRQ = ctypes.CFUNCTYPE(_U32, _USER, _U32, _U32)
@@ -43,6 +43,7 @@ _EVENT = ctypes.CFUNCTYPE(None, _U32, _U64)
 _ASK = ctypes.CFUNCTYPE(_U32, _U32, _U32, _U32)
 _PAIR = ctypes.CFUNCTYPE(None, _U32, _U32)
 _ONE = ctypes.CFUNCTYPE(None, _U32)
+_BUS = ctypes.CFUNCTYPE(_U64, _U32, _U32, _U32, _U32)
 _Result = TypeVar("_Result")
 
 
@@ -58,21 +59,30 @@ class Host(ctypes.Structure):
         ("due", ctypes.c_void_p),
         ("pc", ctypes.c_void_p),
         ("signal", ctypes.c_void_p),
+        ("registers", ctypes.c_void_p),
+        ("holds_code", ctypes.c_void_p),
     )
 
 
 class _Calls(ctypes.Structure):
     """`struct fabric_calls`."""
 
-    _fields_ = (("event", _EVENT), ("ask", _ASK), ("electrical", _PAIR), ("deliver", _ONE))
+    _fields_ = (
+        ("event", _EVENT),
+        ("ask", _ASK),
+        ("electrical", _PAIR),
+        ("deliver", _ONE),
+        ("bus", _BUS),
+        ("code_written", _PAIR),
+    )
 
 
 class FabricPorts(Protocol):
     """What the fabric needs of the chip, where no native core stands under it."""
 
     @property
-    def now_ns(self) -> int:
-        """The exact time of what is happening now."""
+    def access_cycle(self) -> int:
+        """The cycle of the accessing instruction, else the one reached."""
         ...
 
     @property
@@ -88,8 +98,16 @@ class FabricPorts(Protocol):
         """End the slice at the boundary of the running block."""
         ...
 
-    def event_due(self, at_ns: Nanos) -> None:
-        """End the slice at this time at the latest."""
+    def event_due(self, cycle: int) -> None:
+        """End the slice at this cycle at the latest."""
+        ...
+
+    def reach_registers(self, address: int, size: int, written: int | None) -> int | None:
+        """Make an access of a bus master: the word that is read, 0 after a write, None for an error of the bus."""
+        ...
+
+    def code_written(self, address: int, size: int) -> None:
+        """Forget, before the next block, what was translated from bytes that a bus master has written."""
         ...
 
     def signal(self, name: str) -> None:
@@ -100,7 +118,7 @@ class FabricPorts(Protocol):
 class Fabric(Stateful):
     """Queue, lines and devices of one chip."""
 
-    STATE = ("ports", "lines")
+    STATE = ("ports", "waves", "lines")
     #: What one of the callbacks has raised; and what is filled once, when a chip is made.
     DERIVED = ("_failure", "electrical", "_kept", "_names", "_acts", "_answers", "_deliveries")
 
@@ -116,15 +134,20 @@ class Fabric(Stateful):
         #: Called with (number of the pin, 0 for a fight with the outside and 1 for a short).
         self.electrical: Callable[[int, int], None] = lambda _pin, _what: None
         self.port_structs: Any = (PortStruct * PORTS)()
+        self._waves: Any = (WaveStruct * SOURCES)()
         self._callbacks = _Calls(
             _EVENT(self._guarded(self._event, None)),
             _ASK(self._guarded(self._ask, 0)),
             _PAIR(self._guarded(self._electrical, None)),
             _ONE(self._guarded(lambda slot: self._deliveries[slot](), None)),
+            _BUS(self._guarded(self._reach_registers, NO_TIME)),
+            _PAIR(self._guarded(self._code_written, None)),
         )
         #: `struct fabric`, for the native core.
         self.handle = ctypes.c_void_p(
-            calls.fabric_new(ctypes.addressof(self._callbacks), ctypes.addressof(self.port_structs))
+            calls.fabric_new(
+                ctypes.addressof(self._callbacks), ctypes.addressof(self.port_structs), ctypes.addressof(self._waves)
+            )
         )
         if not self.handle.value:
             raise MemoryError("no memory for the fabric")
@@ -254,13 +277,23 @@ class Fabric(Stateful):
     # Lines.
 
     def set_line(self, line: int, level: bool) -> None:
-        """Set a line from Python."""
+        """Set a line as the first output on it does."""
         self._calls_of_c.fabric_set_line(self.handle, line, level)
         self.check()
 
+    def set_output(self, slot: int, output: int, level: bool) -> None:
+        """Set an output of a device in Python; nothing happens where it is on no line."""
+        self._calls_of_c.fabric_set_output(self.handle, slot, output, level)
+        self.check()
+
     def put_output(self, slot: int, output: int, line: int) -> None:
-        """Put an output of a device on a line."""
-        self._calls_of_c.fabric_put_output(self.handle, slot, output, line)
+        """Put an output of a device on a line.
+
+        Raises:
+            ValueError: There is no room.
+        """
+        if not self._calls_of_c.fabric_put_output(self.handle, slot, output, line):
+            raise ValueError(f"line {line} cannot take another output")
 
     def wire(self, line: int, slot: int, input_number: int) -> None:
         """Hang an input of a device in C on a line.
@@ -273,14 +306,59 @@ class Fabric(Stateful):
 
     @property
     def lines(self) -> bytes:
-        """The levels of all lines, a byte each."""
+        """The outputs that are 1 on each line, a bit each."""
         level = self._calls_of_c.fabric_line
         return bytes(level(self.handle, line) for line in range(LINES))
 
     @lines.setter
     def lines(self, levels: bytes) -> None:
         for line, level in enumerate(levels):
-            self._calls_of_c.fabric_restore_line(self.handle, line, bool(level))
+            self._calls_of_c.fabric_restore_line(self.handle, line, level)
+
+    @property
+    def waves(self) -> bytes:
+        """What the alternate functions offer as waves, as bytes."""
+        return bytes(self._waves)
+
+    @waves.setter
+    def waves(self, waves: bytes) -> None:
+        ctypes.memmove(self._waves, waves, len(waves))
+
+    def resume(self) -> None:
+        """Go on with a state that was put back, once core and clock have theirs."""
+        self._calls_of_c.fabric_resume(self.handle)
+        self.check()
+
+    # The bus, for masters that are not the core.
+
+    def add_memory(self, address: int, buffer: "ctypes.Array[ctypes.c_char]", *, is_writable: bool) -> None:
+        """Make a memory known to bus masters."""
+        self._calls_of_c.fabric_add_memory(self.handle, ctypes.addressof(buffer), address, len(buffer), is_writable)
+
+    def bus_read(self, slot: int, address: int, size: int) -> int | None:
+        """Read 1, 2 or 4 bytes for a device in Python; None for an error of the bus."""
+        return self._bus(slot, 0, address, size, 0)
+
+    def bus_write(self, slot: int, address: int, size: int, word: int) -> bool:
+        """Write 1, 2 or 4 bytes for a device in Python; False for an error of the bus."""
+        return self._bus(slot, 1, address, size, word) is not None
+
+    @property
+    def master(self) -> str | None:
+        """The device whose access is under way; None for the core."""
+        return self._names.get(self._calls_of_c.fabric_master(self.handle))
+
+    def _bus(self, slot: int, is_write: int, address: int, size: int, word: int) -> int | None:
+        answer: int = self._calls_of_c.fabric_bus(self.handle, slot, is_write, address, size, word)
+        self.check()
+        return None if answer == NO_TIME else answer
+
+    def _code_written(self, address: int, size: int) -> None:
+        self._chip.code_written(address, size)
+
+    def _reach_registers(self, is_write: int, address: int, size: int, word: int) -> int:
+        answer = self._chip.reach_registers(address, size, word if is_write else None)
+        return NO_TIME if answer is None else answer
 
     @property
     def ports(self) -> bytes:
@@ -304,9 +382,20 @@ class Fabric(Stateful):
         self._calls_of_c.fabric_offer(self.handle, pin, source, level)
         self.check()
 
-    def show_input(self, port: int, word: int) -> None:
-        """Have a port's input kept in a word of the host's memory too."""
-        self._calls_of_c.fabric_show_input(self.handle, port, word)
+    def look(self, port: int) -> Any:
+        """Return a port as it is now, where pins of it show waves."""
+        now = PortStruct()
+        self._calls_of_c.fabric_look(self.handle, port, ctypes.addressof(now))
+        return now
+
+    def wave_of(self, source: int) -> Any:
+        """Return the wave (`WaveStruct`) that an alternate function offers; its period is 0 where it offers none."""
+        return self._waves[source]
+
+    def set_wave(self, pin: int, source: int, frequency_hz: int, period: int, high: int, position: int) -> None:
+        """Have an alternate function offer a wave on a pin: `wave_set` of `source/fabric.h`."""
+        self._calls_of_c.fabric_set_wave(self.handle, pin, source, frequency_hz, period, high, position)
+        self.check()
 
     @property
     def last_output_ns(self) -> Nanos:
@@ -314,8 +403,12 @@ class Fabric(Stateful):
         at: int = self._calls_of_c.fabric_last_output(self.handle)
         return at
 
-    def subscribe(self, drive: Iterable[int], wire: Iterable[int], stop: Iterable[int], lines: Iterable[int]) -> int:
+    def subscribe(
+        self, drive: Iterable[int], wire: Iterable[int], stop: Iterable[int], lines: Iterable[int], *, waves: bool
+    ) -> int:
         """Subscribe to pins by masks, one a port, and to lines by their numbers; return the subscription's number.
+
+        With `waves` it gets waves as they are, else their edges.
 
         Raises:
             ValueError: There are too many subscriptions.
@@ -324,7 +417,7 @@ class Fabric(Stateful):
         for line in lines:
             words[line // 64] |= 1 << line % 64
         number: int = self._calls_of_c.fabric_subscribe(
-            self.handle, _masks(drive), _masks(wire), _masks(stop), (_U64 * LINE_WORDS)(*words)
+            self.handle, _masks(drive), _masks(wire), _masks(stop), (_U64 * LINE_WORDS)(*words), waves
         )
         if number < 0:
             raise ValueError("too many subscriptions to pins")
@@ -399,15 +492,15 @@ class Fabric(Stateful):
     def _use_python_host(self) -> None:
         chip = self._chip
         calls = (
-            _CYCLE(self._guarded(lambda _user: chip.now_ns, 0)),
+            _CYCLE(self._guarded(lambda _user: chip.access_cycle, 0)),
             _SET_IRQ(self._guarded(lambda _user, irq, level: chip.irq_changed(irq, bool(level)), 0)),
             _PLAIN(self._guarded(lambda _user: chip.end_slice(), None)),
-            _DUE(self._guarded(lambda _user, at_ns: chip.event_due(at_ns), None)),
+            _DUE(self._guarded(lambda _user, cycle: chip.event_due(cycle), None)),
             _PC(self._guarded(lambda _user: chip.access_pc, 0)),
             _PLAIN(self._guarded(lambda _user: chip.signal("event"), None)),
         )
         at = [ctypes.cast(call, ctypes.c_void_p) for call in calls]
-        self.use_host(Host(None, at[0], None, *at[1:]), *calls)
+        self.use_host(Host(None, at[0], None, *at[1:], None, None), *calls)
 
 
 def _masks(values: Iterable[int]) -> "ctypes.Array[ctypes.c_uint32]":

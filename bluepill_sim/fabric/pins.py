@@ -19,7 +19,7 @@ from enum import Enum
 from typing import Any, Protocol, Self, cast
 
 from bluepill_sim.fabric.fabric import NO_LEVEL, Fabric, FabricPorts
-from bluepill_sim.fabric.subscriptions import EdgeSink, Of
+from bluepill_sim.fabric.subscriptions import EdgeSink, Of, Wave
 from simbase.state import Stateful
 
 
@@ -259,8 +259,30 @@ class Pin:
         """Offer `level` as the alternate function `source`; the latest call of each source counts."""
         self._bank.fabric.offer(self.index, ALTERNATE_FUNCTIONS.index(source), int(level))
 
+    def offer_wave(self, source: str, frequency_hz: int, period: int, high: int, position: int = 0) -> None:
+        """Offer a wave as the alternate function `source`, in place of what it offered before.
+
+        Args:
+            source: its name.
+            frequency_hz: ticks a second: the clock of who makes it.
+            period: ticks from one rising edge to the next; it is a constant level unless 0 < `high` < `period`.
+            high: ticks at level 1.
+            position: ticks since the last rising edge, now.
+        """
+        number = ALTERNATE_FUNCTIONS.index(source)
+        self._bank.fabric.set_wave(self.index, number, frequency_hz, period, high, position)
+
+    @property
+    def wave(self) -> Wave | None:
+        """The wave that the chip puts on the wire now; None for none."""
+        if not self._struct.shown & self._bit:
+            return None
+        sources = self._struct.sources[self.number]
+        wave = self._bank.fabric.wave_of((sources & -sources).bit_length() - 1)
+        return Wave(wave.ns, wave.at, wave.period, wave.high, wave.hz)
+
     def disconnect(self, source: str) -> None:
-        """Take the alternate function `source` off the pin."""
+        """Take the alternate function `source` off the pin, level or wave."""
         self._bank.fabric.offer(self.index, ALTERNATE_FUNCTIONS.index(source), NO_LEVEL)
 
     def carries(self, source: str) -> bool:
@@ -275,7 +297,8 @@ class Pin:
         return (mode in INPUT_MODES or mode in ALTERNATE_MODES) and not self._has("held") and self.is_bonded
 
     def _has(self, name: str) -> bool:
-        return bool(getattr(self._struct, name) & self._bit)
+        struct = self._struct if not self._struct.shown & self._bit else self._bank.fabric.look(self._port_index)
+        return bool(getattr(struct, name) & self._bit)
 
     def _set(self, **flags: bool) -> bool:
         """Set the pin's bits in masks of its port; return whether one has changed."""
@@ -360,14 +383,16 @@ class PinBank(Stateful):
 
     def subscribe_pins(
         self, pins: Iterable[str], sink: EdgeSink, *, of: Of = Of.DRIVE, ends_slice: Iterable[str] = (),
-        lines: Iterable[int] = (),
+        lines: Iterable[int] = (), waves: bool = False,
     ) -> "Subscription":  # fmt: skip
         """Have `sink` called with each change of these pins, and of lines by their numbers, from now on.
+
+        With `waves` it gets waves as they are (`read_rows`), else their edges.
 
         Raises:
             KeyError: The chip has no such pin.
         """
-        subscription = Subscription(self, tuple(pins), sink, of, frozenset(ends_slice), lines)
+        subscription = Subscription(self, tuple(pins), sink, of, frozenset(ends_slice), lines, waves=waves)
         self._subscriptions.append(subscription)
         return subscription
 
@@ -411,13 +436,13 @@ class Subscription:
 
     def __init__(
         self, bank: PinBank, pins: tuple[str, ...], sink: EdgeSink, of: Of, ends_slice: frozenset[str],
-        lines: Iterable[int],
+        lines: Iterable[int], *, waves: bool,
     ) -> None:  # fmt: skip
         self._bank, self._sink = bank, sink
         masks, none = bank.masks(pins), bank.masks(())
         self._ends_slice = ends_slice
         drive, wire = (masks, none) if of is Of.DRIVE else (none, masks)
-        self._number = bank.fabric.subscribe(drive, wire, bank.masks(ends_slice), lines)
+        self._number = bank.fabric.subscribe(drive, wire, bank.masks(ends_slice), lines, waves=waves)
 
     @property
     def ends_slice(self) -> frozenset[str]:

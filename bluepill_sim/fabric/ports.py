@@ -34,10 +34,6 @@ class ChipPorts(Protocol):
         """The one shared bank of pins; GPIO, AFIO and the alternate functions write it."""
         ...
 
-    def set_irq(self, irq: int, level: bool) -> None:
-        """Set the level of interrupt line `irq` (0 to 59; USART1 is 37)."""
-        ...
-
     def clock_changed(self) -> None:
         """Notify that `clocks` has new values: re-base cycles, and call each peripheral's `clock_changed`."""
         ...

@@ -131,8 +131,6 @@ class Place:
     base: int
     #: None: always clocked.
     clock: ClockBit | None = None
-    #: Interrupt lines, in the order that the peripheral's class says.
-    irqs: tuple[int, ...] = ()
     size: int = 0x400
 
 
@@ -148,6 +146,9 @@ class Peripheral(Stateful):
     #: Its kind of device in C, and the struct that this holds beside the words; None: it is written in Python.
     KIND: ClassVar[str | None] = None
     HOLDS: ClassVar[Struct | None] = None
+    #: Its outputs to lines, and of a device in C its inputs, in the order of their numbers: the chip's page wires them.
+    OUTPUTS: ClassVar[tuple[str, ...]] = ()
+    INPUTS: ClassVar[tuple[str, ...]] = ()
 
     def __init__(self, chip: ChipPorts, place: Place) -> None:
         self.chip = chip
@@ -206,6 +207,10 @@ class Peripheral(Stateful):
     def held(self, held: bytes) -> None:
         if self.native is not None:
             ctypes.memmove(ctypes.addressof(self.native), held, len(held))
+
+    def set_output(self, name: str, level: bool) -> None:
+        """Set one of `OUTPUTS`; nothing happens where the chip's page wires it to nothing."""
+        self.fabric.set_output(self.slot, self.OUTPUTS.index(name), level)
 
     def command(self, what: int, one: int = 0, other: int = 0) -> int:
         """Have the device in C do something; return its answer."""
@@ -296,12 +301,9 @@ class Peripheral(Stateful):
             return self.fabric.add_slot(self.name, self.advance_to)
         words, _ = self.words.buffer_info()
         state = 0 if self.native is None else ctypes.addressof(self.native)
-        slot = self.fabric.add_device(
+        return self.fabric.add_device(
             self.name, self.KIND, words, state, act=self.advance_to, answer=self.answer, deliver=self.deliver
         )
-        for output, irq in enumerate(self.place.irqs):
-            self.fabric.put_output(slot, output, irq)
-        return slot
 
     def _reader(self, name: str, index: int) -> Callable[[], int]:
         if name == NATIVE:

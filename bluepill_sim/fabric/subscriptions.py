@@ -4,20 +4,31 @@ A subscription names pins and a sink. The sink is called with whole rows of `EDG
 `advance_to` returns; never in the middle of an instruction. An edge of a pin of `ends_slice` ends the chip's slice at
 the boundary of the running block.
 
+A pin may show a wave (PWM). A subscription gets its edges like any others, made in bulk; one that asks for `waves`
+gets one row where a wave begins, changes or ends instead, and reads the stream with `read_rows`. A wave's time is in
+ticks of the clock that makes it, not in ns: 20 kHz of 72 MHz are 3600 ticks, and 3601 are no whole number of ns.
+
 Invariant: every edge of a subscribed pin reaches each sink once, in order of time, and the run is the same with and
 without subscribers, but for the slices that they end.
 """
 
 import struct
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass
 from enum import Enum
 from typing import Protocol
 
+from simbase.timing import NS_PER_S, Nanos
+
 #: A row: ns, number of the pin (16 times the port, A = 0, and the pin's number in it), what the chip itself puts on the
-#: wire (index in `PinDrive`), what the wire is then (`LOW`, `HIGH`, `FLOATING`), two bytes to fill up, and 0.
+#: wire (index in `PinDrive`), what the wire is then (`LOW`, `HIGH`, `FLOATING`), 0 for an edge or `WAVE_ROW`
+#: (drive and wire are then those of the low phase, and above them by 4 bits those of the high one), and 0.
 EDGE = struct.Struct("<QBBBBI")
 #: The third of them.
 LOW, HIGH, FLOATING = range(3)
+WAVE_ROW = 1
+#: What follows a row of a wave: ns, ticks from a rising edge to there, period and high time in ticks, ticks a second.
+_WAVE = struct.Struct("<QQQQI12x")
 
 #: Takes whole rows of `EDGE`.
 EdgeSink = Callable[[bytes], None]
@@ -30,6 +41,51 @@ class Of(Enum):
     DRIVE = "drive"
     #: The level on the wire, whoever makes it, and whether it floats.
     WIRE = "wire"
+
+
+@dataclass(frozen=True, slots=True)
+class Wave:
+    """A level that goes up every `period` ticks, and down `high` ticks later."""
+
+    #: When tick 0 begins; tick n begins floor(n * 10**9 / ticks_hz) ns later.
+    ns: Nanos
+    #: Ticks from a rising edge to tick 0.
+    at: int
+    period: int
+    high: int
+    ticks_hz: int
+
+    @property
+    def frequency_hz(self) -> float:
+        """Rising edges a second."""
+        return self.ticks_hz / self.period
+
+    @property
+    def duty(self) -> float:
+        """The share of the time at level 1, between 0 and 1."""
+        return self.high / self.period
+
+    def level(self, at_ns: Nanos) -> bool:
+        """Return the level at a time, which is at or after `ns`."""
+        ticks = ((at_ns - self.ns + 1) * self.ticks_hz - 1) // NS_PER_S
+        return (self.at + ticks) % self.period < self.high
+
+
+#: ns, number of the pin, what the chip puts on the wire and what the wire is (of a wave: in its low phase), the wave.
+Row = tuple[Nanos, int, int, int, Wave | None]
+
+
+def read_rows(rows: bytes) -> Iterator[Row]:
+    """Iterate over the rows of a subscription that takes waves."""
+    at = 0
+    while at < len(rows):
+        ns, pin, drive, wire, kind, _ = EDGE.unpack_from(rows, at)
+        at += EDGE.size
+        if kind == WAVE_ROW:
+            yield ns, pin, drive & 15, wire & 15, Wave(*_WAVE.unpack_from(rows, at))
+            at += _WAVE.size
+        else:
+            yield ns, pin, drive, wire, None
 
 
 class PinSubscription(Protocol):

@@ -17,14 +17,15 @@ from bluepill_sim.fabric.registers import NATIVE, Peripheral, Place, Register, b
 IMR, EMR, RTSR, FTSR, SWIER, PR = range(6)
 
 _LINES = bits((18, 0))
-#: Lines that share one interrupt, in the order of the place's `irqs`: 6 to 10, 23, 40, 1, 41, 42.
-LINES_BY_IRQ = (bits(0), bits(1), bits(2), bits(3), bits(4), bits((9, 5)), bits((15, 10)), bits(16), bits(17), bits(18))
 
 
 class Exti(Peripheral):
     """External interrupt/event controller."""
 
     KIND, HOLDS = "exti", EXTI
+    #: Lines that share an interrupt: `lines_by_irq` of exti.c.
+    OUTPUTS = ("0", "1", "2", "3", "4", "9_5", "15_10", "pvd_irq", "rtc_alarm_irq", "usb_wakeup_irq")
+    INPUTS = ("pvd", "rtc_alarm", "usb_wakeup")
     REGISTERS = (
         Register(name="IMR", offset=0x00, readable=_LINES, writable=_LINES, on_write=NATIVE),
         Register(name="EMR", offset=0x04, readable=_LINES, writable=_LINES),

@@ -53,6 +53,7 @@ class Flash(Peripheral):
 
     HAS_BYTE_LANES = True
     STATE = ("_key_step", "_address")
+    OUTPUTS = ("irq",)
     REGISTERS = (
         Register(
             name="ACR",
@@ -135,7 +136,7 @@ class Flash(Peripheral):
         self._key_step = 0
         self._address = 0
         self._set_access(0, has_prefetch=True)
-        self.chip.set_irq(self.place.irqs[0], False)
+        self.set_output("irq", False)
 
     def _write_acr(self, written: int, _previous: int) -> None:
         latency = written & 7
@@ -223,4 +224,4 @@ class Flash(Peripheral):
         status, control = self.words[SR], self.words[CR]
         done = status & EOP and control & EOPIE
         failed = status & (PGERR | WRPRTERR) and control & ERRIE
-        self.chip.set_irq(self.place.irqs[0], bool(done or failed))
+        self.set_output("irq", bool(done or failed))

@@ -2,8 +2,7 @@
 
 Modelled: all modes of CRL/CRH, pulls by ODR, open drain, atomic set/reset,
 the key sequence of LCKR. Not modelled: output speed, the two APB2 clocks of
-the input synchroniser. IDR is kept up to date by the pins, so that reading it is plain.
-What a write of ODR, BSRR or BRR does is `extension/source/gpio.c`.
+the input synchroniser. What reading IDR and writing ODR, BSRR or BRR does is `extension/source/gpio.c`.
 
 A pin that the program configures as a floating input is checked a little
 later: it should be driven by then. What a program never configures floats
@@ -11,11 +10,10 @@ unnoticed, as does what it configures by writing the reset value over a whole
 register: nothing shows whether that pin was intended.
 
 Source: RM0008 sections 9.1 and 9.2.
-Invariant: bit n of the stored IDR is `pins[n].input`.
+Invariant: bit n of IDR reads as `pins[n].input`.
 """
 
 from bluepill_sim.extension.layout import GPIO
-from bluepill_sim.fabric.fabric import RESET
 from bluepill_sim.fabric.pins import Pin, PinMode, floating_inputs
 from bluepill_sim.fabric.ports import ChipPorts
 from bluepill_sim.fabric.registers import NATIVE, Peripheral, Place, Register, bits
@@ -46,7 +44,7 @@ class Gpio(Peripheral):
     REGISTERS = (
         Register(name="CRL", offset=0x00, reset=_CR_RESET, on_write="_write_crl"),
         Register(name="CRH", offset=0x04, reset=_CR_RESET, on_write="_write_crh"),
-        Register(name="IDR", offset=0x08, readable=_PORT, writable=0),
+        Register(name="IDR", offset=0x08, readable=_PORT, writable=0, on_read=NATIVE),
         Register(name="ODR", offset=0x0C, readable=_PORT, writable=_PORT, on_write=NATIVE),
         Register(name="BSRR", offset=0x10, readable=0, on_write=NATIVE),
         Register(name="BRR", offset=0x14, readable=0, writable=_PORT, on_write=NATIVE),
@@ -68,8 +66,6 @@ class Gpio(Peripheral):
         self._warned = 0
         chip.pins.release_listeners.append(self._released)
         self.native.port = chip.pins.PORTS.index(place.name[-1])
-        self.fabric.show_input(self.native.port, self.words.buffer_info()[0] + IDR * self.words.itemsize)
-        self.command(RESET)
 
     def on_reset(self) -> None:
         """Make every pin a floating input and undo the lock."""
@@ -78,7 +74,6 @@ class Gpio(Peripheral):
         self._intended = ()
         for pin in self._pins:
             pin.configure(PinMode.FLOATING, output_bit=False)
-        self.command(RESET)
 
     def _write_crl(self, _written: int, previous: int) -> None:
         self._configure(CRL, 0, previous)

@@ -93,6 +93,7 @@ class Rcc(Peripheral):
 
     HAS_BYTE_LANES = True
     STATE = ("_ready_at", "_illegal")
+    OUTPUTS = ("irq",)
     REGISTERS = (
         Register(
             name="CR",
@@ -182,7 +183,7 @@ class Rcc(Peripheral):
         """Stop every oscillator but HSI."""
         self._ready_at = (None,) * len(OSCILLATORS)
         self._illegal = ()
-        self.chip.set_irq(self.place.irqs[0], False)
+        self.set_output("irq", False)
 
     def advance_to(self, now_ns: int) -> None:
         """Raise the ready flags that are due."""
@@ -249,7 +250,7 @@ class Rcc(Peripheral):
 
     def _update_irq(self) -> None:
         flags = self.words[CIR]
-        self.chip.set_irq(self.place.irqs[0], bool(flags & (flags >> 8) & bits((4, 0))))
+        self.set_output("irq", bool(flags & (flags >> 8) & bits((4, 0))))
 
     def _oscillators_in_use(self) -> int:
         """Return the on bits of CR that SYSCLK hangs on."""

@@ -97,6 +97,7 @@ class Usart(Peripheral):
     """Universal asynchronous receiver transmitter."""
 
     KIND, HOLDS = "usart", USART
+    OUTPUTS = ("irq",)
     STATE = ("_coming", "sent_at")
     DERIVED = ("_tx_pin", "_rx_pin")
     REGISTERS = (

@@ -26,6 +26,7 @@ class Wwdg(Peripheral):
     """The window watchdog."""
 
     STATE = ("_base_ns", "_base_count", "_pclk1_hz")
+    OUTPUTS = ("irq",)
     REGISTERS = (
         Register(
             name="CR", offset=0x00, reset=_T, readable=bits((7, 0)), writable=bits((7, 0)), on_read="_read_cr",
@@ -66,7 +67,7 @@ class Wwdg(Peripheral):
     def on_reset(self) -> None:
         """Stop."""
         self._base_ns, self._base_count, self._pclk1_hz = 0, _T, 0
-        self.chip.set_irq(self.place.irqs[0], False)
+        self.set_output("irq", False)
 
     def _read_cr(self) -> int:
         return WDGA | self._count_at(self.chip.now_ns) if self.is_running else self.words[CR]
@@ -94,7 +95,7 @@ class Wwdg(Peripheral):
         self._update_irq()
 
     def _update_irq(self) -> None:
-        self.chip.set_irq(self.place.irqs[0], bool(self.words[SR] & EWIF and self.words[CFR] & EWI))
+        self.set_output("irq", bool(self.words[SR] & EWIF and self.words[CFR] & EWI))
 
     def _divider(self, configuration: int) -> int:
         return _DIVIDER << (configuration >> 7 & 3)

@@ -23,7 +23,6 @@ class FakeChip:
         self.clocks = Clocks()
         self.pins = make_pins(self)
         self.irqs: dict[int, bool] = defaultdict(bool)
-        self.pulses: list[int] = []
         self.signals: list[str] = []
         self.warnings: dict[str, str] = {}
         self.resets: list[str] = []
@@ -38,11 +37,9 @@ class FakeChip:
         assert self._parts is not None
         return self._parts
 
-    def set_irq(self, irq: int, level: bool) -> None:
-        self.irqs[irq] = level
-
-    def pulse_irq(self, irq: int) -> None:
-        self.pulses.append(irq)
+    @property
+    def access_cycle(self) -> int:
+        return self.now_ns
 
     def clock_changed(self) -> None:
         self.clock_changes += 1
@@ -59,7 +56,19 @@ class FakeChip:
     def end_slice(self) -> None:
         self.stops += 1
 
-    def event_due(self, at_ns: int) -> None:
+    def event_due(self, cycle: int) -> None:
+        pass
+
+    def reach_registers(self, address: int, size: int, written: int | None) -> int | None:
+        part = next((p for p in self.parts.by_name.values() if 0 <= address - p.base < p.place.size), None)
+        if part is None:
+            return None
+        if written is None:
+            return part.read(address - part.base, size)
+        part.write(address - part.base, size, written)
+        return 0
+
+    def code_written(self, address: int, size: int) -> None:
         pass
 
     def reset_peripheral(self, name: str) -> None:

@@ -4,12 +4,12 @@ from typing import Any
 
 import pytest
 
+from bluepill_sim import stm32f103
 from bluepill_sim.peripherals.rcc import ResetCause
 from bluepill_sim.stm32f103 import (
     BASES,
     BONDED_PINS,
     CLOCK_GATES,
-    IRQ_COUNT,
     PERIPHERAL_BASE,
     PERIPHERAL_END,
     PERIPHERALS,
@@ -24,14 +24,42 @@ def test_blocks_do_not_overlap_and_lie_on_kilobytes() -> None:
 
 
 def test_modelled_peripherals_lie_in_the_peripheral_region() -> None:
-    for _, name, irqs in PERIPHERALS:
+    for _, name in PERIPHERALS:
         assert PERIPHERAL_BASE <= BASES[name] < PERIPHERAL_END, name
-        assert all(irq < IRQ_COUNT for irq in irqs), name
 
 
-def test_no_two_peripherals_share_an_interrupt() -> None:
-    irqs = [irq for _, _, numbers in PERIPHERALS for irq in numbers]
-    assert len(set(irqs)) == len(irqs)
+def test_outputs_that_lead_to_one_end_are_one_line_which_is_their_or(
+    make_fake_chip: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(stm32f103, "WIRING", {"USART1.irq": (37,), "USART2.irq": (37,)})
+    chip = make_fake_chip()
+    one, other = (chip.parts.usart(number) for number in (1, 2))
+    one.set_output("irq", True)
+    other.set_output("irq", True)
+    one.set_output("irq", False)
+    assert chip.irqs[37]
+    other.set_output("irq", False)
+    assert not chip.irqs[37]
+
+
+@pytest.mark.parametrize(
+    ("wiring", "message"),
+    [
+        ({"USART1.irqq": (37,)}, "USART1.irqq: USART1 has no output 'irqq'; it has irq"),
+        ({"USART9.irq": (37,)}, "USART9.irq: the chip has no USART9"),
+        ({"PWR.pvd": ("EXTI.pwd",)}, "EXTI.pwd: EXTI has no input 'pwd'; it has pvd, rtc_alarm, usb_wakeup"),
+        ({"PWR.pvd": ("IWDG.pvd",)}, "IWDG has no input 'pvd'; it has none"),
+        ({"USART1.irq": (60,)}, "60 is no interrupt"),
+        ({"USART1.irq": (37, 38)}, "38 is no interrupt that can be on line 37"),
+        ({"PWR.pvd": ("EXTI.pvd",), "RTC.alarm": ("EXTI.pvd", 41)}, "two lines lead to EXTI.pvd"),
+    ],
+)
+def test_a_table_of_wires_with_a_mistake_is_refused_at_the_start(
+    wiring: dict[str, Any], message: str, make_fake_chip: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(stm32f103, "WIRING", wiring)
+    with pytest.raises(ValueError, match=message):
+        make_fake_chip()
 
 
 def test_every_gate_has_its_own_bit() -> None:
@@ -62,7 +90,7 @@ def test_the_package_has_37_io_pins() -> None:
 
 def test_parts_stand_at_their_places(fake_chip: Any) -> None:
     parts = fake_chip.parts
-    assert list(parts.by_name) == [name for _, name, _ in PERIPHERALS]
+    assert list(parts.by_name) == [name for _, name in PERIPHERALS]
     assert parts.by_name["GPIOC"].base == 0x4001_1000
     assert parts.by_name["USART1"].place.clock == CLOCK_GATES["USART1"]
     assert (parts.rcc.name, parts.flash.name, parts.exti.name) == ("RCC", "FLASH", "EXTI")

@@ -229,12 +229,15 @@ class Session:
     def _take_c(self, block: Block) -> None:
         file = self._keep(block) or self._folder / "tmp" / "block.c"
         file.write_text(block.text, encoding="utf-8")
-        compiler = shutil.which("arm-none-eabi-gcc")
+        is_firmware = '#include "fabric.h"' not in block.text  # else a device of the emulator
+        compiler = shutil.which("arm-none-eabi-gcc" if is_firmware else "gcc")
         if compiler is None:
             self.missing.append(f"the C block of line {block.line}")
             return
-        flags = ["-mcpu=cortex-m3", "-mthumb", "-Wall", "-Wextra", "-Werror", "-fsyntax-only"]
-        self._finish([compiler, *flags, f"-I{ROOT / 'robot_bench/firmware'}", str(file)], f"line {block.line}", [])
+        headers = ROOT / ("robot_bench/firmware" if is_firmware else "bluepill_sim/extension/source")
+        flags = ["-mcpu=cortex-m3", "-mthumb"] if is_firmware else []
+        flags += ["-Wall", "-Wextra", "-Werror", "-fsyntax-only", f"-I{headers}"]
+        self._finish([compiler, *flags, str(file)], f"line {block.line}", [])
 
     def _keep(self, block: Block) -> Path | None:
         named = NAMED_FILE.match(block.text)

@@ -168,10 +168,12 @@ void core_on_block(void *unicorn, uint64_t at, uint32_t size, void *user)
             core->block = core->resumed;
             core->shared.stop_at = core->resumed_stop_at;
             core->resumed = NULL;
-        } else {
-            stop_at_boundary(core, address);
+            return;
         }
-        return;
+        if (!goes_on(core, address)) {
+            stop_at_boundary(core, address);
+            return;
+        }
     }
     struct row *row = find(core, address);
     if (UNLIKELY(row == NULL || row->flags & ROW_ATTENTION)) {
@@ -203,6 +205,10 @@ bool core_add_row(struct core *core, uint32_t start, uint32_t end, uint32_t stra
     memcpy(row->instructions, instructions, list);
     if (host != NULL) {
         memcpy(code, host, end - start);
+        const uint32_t first = (start - core->shared.sram_base) / CODE_BYTES, last = (end - 1 - core->shared.sram_base) / CODE_BYTES;
+        for (uint32_t n = first; n <= last && n < CODE_PLACES; ++n) {
+            core->code_places[n / 8] |= (uint8_t)(1 << n % 8);
+        }
     }
     core->all = row;
     *at = row;

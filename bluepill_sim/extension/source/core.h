@@ -137,6 +137,9 @@ struct polling {
     uint32_t registers[16];
 };
 
+/* Where in SRAM code was translated from, in places of some bytes; never fewer than there are. */
+enum { CODE_BYTES = 32, CODE_PLACES = 2 * SRAM_SLOTS / CODE_BYTES };
+
 struct core {
     struct shared shared;
     void *unicorn;
@@ -164,6 +167,8 @@ struct core {
     struct record *records;
     uint32_t record_count, record_room;
     struct polling polling;
+    uint64_t limit; /* of the run */
+    uint8_t code_places[CODE_PLACES / 8];
 };
 
 static inline void begin_block(struct core *core, struct row *row)
@@ -189,6 +194,7 @@ void go_on_at_access(struct core *core, uint32_t pc);
 bool resolve(struct core *core, uint32_t address, bool is_write, uint32_t bytes);
 void skip(struct core *core, uint32_t address, bool is_write, uint32_t bytes);
 /* run.c */
+bool goes_on(struct core *core, uint32_t address);
 void *allocate(struct core *core, size_t bytes);
 uint32_t read_register(struct core *core, int number);
 /* exceptions.c */

@@ -4,22 +4,33 @@
 
 #include "fabric.h"
 
-extern const struct device_kind exti_kind, gpio_kind, usart_kind;
+static const struct device_kind *kinds;
 
-static const struct device_kind *const kinds[] = {&exti_kind, &gpio_kind, &usart_kind};
+void add_kind(struct device_kind *kind)
+{
+    kind->next = kinds;
+    kinds = kind;
+}
 
-struct fabric *fabric_new(const struct fabric_calls *calls, struct port *ports)
+struct fabric *fabric_new(const struct fabric_calls *calls, struct port *ports, struct wave *waves)
 {
     struct fabric *fabric = calloc(1, sizeof *fabric);
     if (fabric != NULL) {
         fabric->calls = *calls;
         fabric->ports = ports;
+        fabric->waves = waves;
+        fabric->master = SLOTS;
         fabric->event_ns = fabric->next_cycle = fabric->last_output = NO_TIME;
         fabric->time.hz = NS_PER_S;
         for (uint32_t n = 0; n < SLOTS; ++n) {
             fabric->slots[n].ns = fabric->slots[n].cycle = NO_TIME;
             memset(fabric->devices[n].outputs, NO_LINE, sizeof fabric->devices[n].outputs);
+            fabric->devices[n].fabric = fabric;
+            fabric->devices[n].slot = n;
         }
+        fabric->devices[0].kind = &waves_kind; /* the first slot is that of the pins */
+        fabric->slots[0].device = &fabric->devices[0];
+        fabric->slot_count = 1;
     }
     return fabric;
 }
@@ -46,29 +57,18 @@ int32_t fabric_add_slot(struct fabric *fabric)
 /* Puts a device of a kind into a slot; false: there is no such kind. */
 bool fabric_add_device(struct fabric *fabric, uint32_t slot, const char *name, uint32_t *words, void *state)
 {
-    for (size_t n = 0; n < sizeof kinds / sizeof *kinds; ++n) {
-        if (strcmp(kinds[n]->name, name) == 0) {
+    for (const struct device_kind *kind = kinds; kind != NULL; kind = kind->next) {
+        if (strcmp(kind->name, name) == 0) {
             struct device *device = &fabric->devices[slot];
-            device->kind = kinds[n];
-            device->fabric = fabric;
+            device->kind = kind;
             device->words = words;
             device->state = state;
-            device->slot = slot;
             fabric->slots[slot].device = device;
             return true;
         }
     }
     return false;
 }
-
-/* Puts an output of a device on a line. */
-void fabric_put_output(struct fabric *fabric, uint32_t slot, uint32_t output, uint32_t line)
-{
-    fabric->devices[slot].outputs[output] = (uint8_t)line;
-}
-
-/* Where a port's input is to be written as well. */
-void fabric_show_input(struct fabric *fabric, uint32_t port, uint32_t *word) { fabric->inputs[port] = word; }
 
 uint32_t fabric_read(struct fabric *fabric, uint32_t slot, uint32_t index)
 {
@@ -102,10 +102,11 @@ bool fabric_take_stop(struct fabric *fabric)
 void fabric_end_slice(struct fabric *fabric) { fabric->host.end_slice(fabric->host.user); }
 
 /* Whether anything waits for Python. */
-bool fabric_has_news(const struct fabric *fabric)
+bool fabric_has_news(struct fabric *fabric)
 {
     size_t count = 0;
     for (uint32_t n = 0; n < SUBSCRIBERS; ++n) {
+        expand_waves(fabric, &fabric->subscribers[n], settled_ns(fabric));
         count += fabric->subscribers[n].count;
     }
     for (uint32_t n = 0; n < fabric->slot_count; ++n) {

@@ -47,7 +47,9 @@ static uint32_t present_levels(const struct device *device)
     const uint32_t wanted = device->words[RTSR] | device->words[FTSR];
     uint32_t levels = exti->levels & ~(uint32_t)PIN_LINES;
     for (uint32_t n = 0; n < PINS; ++n) {
-        levels |= device->fabric->ports[exti->routes[n]].input & wanted & 1u << n;
+        if (wanted >> n & 1) {
+            levels |= port_input(device->fabric, exti->routes[n]) & 1u << n;
+        }
     }
     return levels;
 }
@@ -118,4 +120,4 @@ static uint32_t command(struct device *device, uint32_t what, uint32_t one, uint
     return 0;
 }
 
-const struct device_kind exti_kind = {.name = "exti", .write = write, .line = take_line, .pins = take_pins, .command = command};
+DEVICE_KIND(exti_kind) = {.name = "exti", .write = write, .line = take_line, .pins = take_pins, .command = command};

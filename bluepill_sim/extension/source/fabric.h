@@ -1,7 +1,7 @@
 /* The chip around its core: devices, the queue of their events, lines, pins, and who has subscribed to them.
  *
  * It knows nothing of the core but what `struct host` says, and no device by name: a device is a file with a
- * `struct device_kind`, and a row in `kinds` of devices.c.
+ * `DEVICE_KIND`.
  */
 #ifndef BLUEPILL_FABRIC_H
 #define BLUEPILL_FABRIC_H
@@ -18,13 +18,21 @@
 /* Kept out of its callers, which stay short enough to need no stack. */
 #define RARELY __attribute__((noinline, cold))
 
-enum { SLOTS = 128, LINES = 192, SUBSCRIBERS = 16, LISTENERS = 16, DEVICE_LINES = 8, SINKS = 4, WORDS = 1024, LINE_WORDS = LINES / 64 };
+enum { SLOTS = 128, LINES = 192, SUBSCRIBERS = 16, LISTENERS = 16, OUTPUTS = 24, SINKS = 8, WORDS = 1024, MEMORIES = 4, MOST_ROWS = 32768, LINE_WORDS = LINES / 64 };
 /* The first lines are those of interrupts, by their numbers. */
 enum { IRQ_LINES_END = 64, NO_LINE = 255 };
 enum { LOW, HIGH, FLOATING };
+/* What is reached as registers. */
+enum { PERIPHERALS = 0x40000000, PERIPHERALS_END = 0x40024000 };
 
 struct fabric;
 struct device;
+
+/* An access of a bus master that is not the core. */
+struct bus_access {
+    uint32_t address, bytes, is_write, word;
+    bool is_error;
+};
 
 /* What the fabric needs of the core around it. */
 struct host {
@@ -43,6 +51,10 @@ struct host {
     uint32_t (*pc)(void *user);
     /* Sets the event register of the core. */
     void (*signal)(void *user);
+    /* Makes an access to a register for the bus; false: Python has to. Null: it always has. */
+    bool (*registers)(void *user, struct bus_access *access);
+    /* Whether anything was translated from these bytes of SRAM; null: it may have been. */
+    bool (*holds_code)(void *user, uint32_t address, uint32_t bytes);
 };
 
 /* What Python is asked: each keeps an exception for later. */
@@ -55,11 +67,16 @@ struct fabric_calls {
     void (*electrical)(uint32_t pin, uint32_t what);
     /* A device's words must be taken over now: there is no room for another. */
     void (*deliver)(uint32_t slot);
+    /* An access of a bus master to registers: the word; NO_TIME for an error of the bus. */
+    uint64_t (*bus)(uint32_t is_write, uint32_t address, uint32_t bytes, uint32_t word);
+    /* A bus master has written where code may have been translated from. */
+    void (*code_written)(uint32_t address, uint32_t bytes);
 };
 
 /* A kind of device: what it does. A null is nothing. */
 struct device_kind {
     const char *name;
+    const struct device_kind *next;
     /* Whether an access needs to know its time, or may do what needs to; null: it always does. */
     bool (*needs_time)(const struct device *device, uint32_t index, bool is_write);
     /* A register that is declared as native: what is read; what follows a store of `written` over `previous`. */
@@ -88,7 +105,8 @@ struct device {
     uint32_t *words; /* Python's: its registers */
     void *state;     /* Python's: what it holds beside them */
     uint32_t slot;
-    uint8_t outputs[DEVICE_LINES + 2];
+    uint8_t outputs[OUTPUTS]; /* their lines, */
+    uint8_t drivers[OUTPUTS]; /* and which of the outputs on the line each is */
     uint32_t ends_slice; /* somebody waits for each word */
     uint32_t word_count;
     struct sent *words_out; /* room for WORDS of them; null: it sends none */
@@ -96,6 +114,7 @@ struct device {
 
 struct slot {
     uint64_t ns, cycle;
+    uint32_t is_acting;
     struct device *device; /* null: Python's */
 };
 
@@ -105,7 +124,8 @@ struct sink {
 };
 
 struct line {
-    uint8_t level, sink_count;
+    uint8_t high; /* the outputs on it that are 1, a bit each: their OR is its level */
+    uint8_t driver_count, sink_count;
     struct sink sinks[SINKS];
 };
 
@@ -113,9 +133,23 @@ struct line {
 struct subscriber {
     uint32_t drive[PORTS], wire[PORTS], stop[PORTS];
     uint64_t lines[LINE_WORDS];
-    uint32_t is_used;
+    uint32_t is_used, takes_waves;
     struct edge *rows;
     size_t count, room;
+    /* Waves of which it gets the edges, in bulk. */
+    uint32_t expanded_count;
+    uint64_t expanded_ns; /* up to when they are made */
+    struct expanded {
+        uint64_t tick, next_ns; /* the next edge */
+        uint8_t pin, level;     /* before it */
+    } expanded[PORTS * PINS];
+};
+
+/* What a pin shows: a level (that of index 0), or a wave. */
+struct shown {
+    struct wave wave;
+    uint8_t drive[2], wire[2], is_wave, is_made;
+    uint64_t next_ns; /* the next edge, where each is made at its time */
 };
 
 /* A device that listens to inputs of pins. */
@@ -128,6 +162,12 @@ struct pin_listener {
 struct time_base {
     uint64_t ns, cycle;
     uint32_t hz;
+};
+
+/* A memory, as a bus master sees it. */
+struct memory {
+    uint8_t *bytes;
+    uint32_t base, size, is_writable;
 };
 
 struct fabric {
@@ -146,7 +186,11 @@ struct fabric {
     struct slot slots[SLOTS];
     struct line lines[LINES];
     struct port *ports; /* Python's: PORTS of them */
-    uint32_t *inputs[PORTS]; /* the word that reads as a port's input, if any */
+    struct wave *waves; /* Python's: one a source */
+    struct shown shown[PORTS * PINS];
+    struct memory memories[MEMORIES];
+    uint32_t memory_count;
+    uint32_t master; /* the slot of the device that makes an access; SLOTS for none */
     struct subscriber subscribers[SUBSCRIBERS];
     struct pin_listener listeners[LISTENERS];
     struct device devices[SLOTS];
@@ -159,7 +203,8 @@ struct fabric {
 static inline uint64_t ns_of(const struct fabric *fabric, uint64_t cycle)
 {
     const struct time_base *time = &fabric->time;
-    return time->ns + (uint64_t)((__uint128_t)(cycle - time->cycle) * NS_PER_S / time->hz);
+    const uint64_t cycles = cycle - time->cycle; /* by whole seconds, so that 64 bits are enough */
+    return time->ns + cycles / time->hz * NS_PER_S + cycles % time->hz * NS_PER_S / time->hz;
 }
 
 static inline uint64_t now_ns(struct fabric *fabric)
@@ -169,16 +214,12 @@ static inline uint64_t now_ns(struct fabric *fabric)
 
 /* Has the device's event come at a time; NO_TIME takes it back. */
 void schedule(struct device *device, uint64_t ns);
+static inline uint64_t due_ns(const struct device *device) { return device->fabric->slots[device->slot].ns; }
 /* Acts on all that is due at or before a time, in order of time, then of slots. */
 void run_events(struct fabric *fabric, uint64_t until_ns);
 
 /* lines.c */
-void line_set(struct fabric *fabric, uint32_t number, bool level);
-
-static inline void output_set(struct device *device, uint32_t output, bool level)
-{
-    line_set(device->fabric, device->outputs[output], level);
-}
+void output_set(struct device *device, uint32_t output, bool level);
 
 static inline uint32_t ask(struct device *device, uint32_t what, uint32_t value)
 {
@@ -186,6 +227,7 @@ static inline uint32_t ask(struct device *device, uint32_t what, uint32_t value)
 }
 
 /* devices.c */
+void add_kind(struct device_kind *kind);
 void send_word(struct device *device, const struct sent *row);
 
 /* pins.c */
@@ -193,8 +235,49 @@ void offer(struct fabric *fabric, uint32_t pin, uint32_t source, uint32_t level)
 void put_row(struct fabric *fabric, struct subscriber *subscriber, const struct edge *row);
 void pins_changed(struct fabric *fabric, uint32_t port);
 void listen_to_pins(struct device *device, uint32_t port, uint32_t pins);
+/* What a port's inputs are now, those that show waves too. */
+uint32_t port_input(struct fabric *fabric, uint32_t number);
+uint8_t wire_of(const struct port *port, uint32_t bit);
+uint8_t drive_of(const struct port *port, uint32_t bit);
+void work_out(struct port *port);
+void take_offer(struct fabric *fabric, uint32_t pin, uint32_t source, uint32_t level);
+void tell_listeners(struct fabric *fabric, uint32_t number, uint32_t changed);
+
+/* waves.c */
+/* Has an alternate function offer a wave on a pin, in place of what it offered before: it is `position` of `period`
+ * ticks after a rising edge now, and `high` ticks long at 1. A tick is one of `hz`, which are counted from where the
+ * core's clock was last changed: so an edge comes exactly where a count of this clock puts it. */
+void wave_set(struct fabric *fabric, uint32_t pin, uint32_t source, uint32_t hz, uint64_t period, uint64_t high,
+              uint64_t position);
+/* Puts pins that show a wave at its level at a time; `work_out` follows. */
+void sample_waves(const struct fabric *fabric, struct port *port, uint32_t pins, uint64_t ns);
+/* Follows the waves of a port that may have changed; returns the pins whose wave has. */
+uint32_t show_waves(struct fabric *fabric, uint32_t number, const struct port *before);
+/* Makes the edges that a subscriber has waiting. */
+void expand_waves(struct fabric *fabric, struct subscriber *subscriber, uint64_t until_ns);
+/* Who wants edges at their time has changed. */
+void make_edges_where_wanted(struct fabric *fabric);
+/* Begins a subscription with the waves that are there. */
+void show_to(struct fabric *fabric, struct subscriber *subscriber);
+/* Up to when nothing changes any more. */
+uint64_t settled_ns(struct fabric *fabric);
+extern struct device_kind waves_kind;
+
+/* bus.c */
+/* Reads or writes 1, 2 or 4 bytes for a device, at the time of its event; false: an error of the bus. */
+bool bus_read(struct device *master, uint32_t address, uint32_t bytes, uint32_t *word);
+bool bus_write(struct device *master, uint32_t address, uint32_t bytes, uint32_t word);
 
 #pragma GCC visibility pop
+
+uint64_t fabric_next_ns(const struct fabric *fabric);
+void fabric_catch_up(struct fabric *fabric, uint32_t number, uint64_t until_ns);
+
+/* A kind of device, which the library knows from when it is loaded on. */
+#define DEVICE_KIND(kind)                                                                                              \
+    static struct device_kind kind;                                                                                    \
+    __attribute__((constructor)) static void add_##kind(void) { add_kind(&kind); }                                     \
+    static struct device_kind kind
 
 /* Whether a port's outputs may change without their time: nobody looks at them, and none has to be warned of. */
 static inline bool is_unwatched(const struct fabric *fabric, uint32_t number)

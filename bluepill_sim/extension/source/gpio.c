@@ -4,14 +4,14 @@
  */
 #include "fabric.h"
 
-enum { IDR = 2, ODR = 3, BSRR = 4, BRR = 5, ALL = 0xFFFF };
+enum { ODR = 3, BSRR = 4, BRR = 5, ALL = 0xFFFF };
 
 static uint32_t number_of(const struct device *device) { return ((const struct gpio *)device->state)->port; }
 
 static bool needs_time(const struct device *device, uint32_t index, bool is_write)
 {
     (void)index;
-    return is_write && !is_unwatched(device->fabric, number_of(device));
+    return is_write ? !is_unwatched(device->fabric, number_of(device)) : device->fabric->ports[number_of(device)].shown != 0;
 }
 
 static void put(struct device *device, uint32_t bits)
@@ -38,14 +38,10 @@ static void write(struct device *device, uint32_t index, uint32_t written, uint3
     }
 }
 
-static uint32_t command(struct device *device, uint32_t what, uint32_t one, uint32_t other)
+static uint32_t read(struct device *device, uint32_t index)
 {
-    (void)one;
-    (void)other;
-    if (what == RESET) {
-        device->words[IDR] = device->fabric->ports[number_of(device)].input;
-    }
-    return 0;
+    (void)index; /* IDR */
+    return port_input(device->fabric, number_of(device));
 }
 
-const struct device_kind gpio_kind = {.name = "gpio", .needs_time = needs_time, .write = write, .command = command};
+DEVICE_KIND(gpio_kind) = {.name = "gpio", .needs_time = needs_time, .read = read, .write = write};

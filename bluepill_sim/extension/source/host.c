@@ -52,10 +52,58 @@ static uint32_t set_irq(void *user, uint32_t irq, uint32_t level)
     return s->enabled >> irq & 1;
 }
 
+/* A register of a device in C, for a bus master; false where Python has to answer, as `open_page` of access.c. */
+static bool registers(void *user, struct bus_access *access)
+{
+    struct core *core = user;
+    const uint32_t offset = access->address - PERIPHERALS, index = (offset & ((1u << PAGE_SHIFT) - 1)) >> 2;
+    struct page *page = &core->pages[offset >> PAGE_SHIFT];
+    if (page->device == NULL || index >= page->count) {
+        return false;
+    }
+    if (page->gate != NULL && !(*page->gate & page->gate_mask)) {
+        access->is_error = true;
+        return true;
+    }
+    const struct device_kind *kind = page->device->kind;
+    const uint32_t behaviour = page->behaviour[index];
+    fabric_catch_up(core->fabric, page->device->slot, now_ns(core->fabric));
+    if (access->is_write) {
+        const uint32_t previous = page->words[index], *mask = page->masks[index];
+        if (access->bytes != 4 || !(behaviour & (WRITES_PLAIN | WRITES_NATIVE))) {
+            return false;
+        }
+        page->words[index] = (previous & mask[0] & ~(access->word & mask[2]) & (access->word | ~mask[3])) |
+                             (access->word & mask[1]);
+        if (behaviour & WRITES_NATIVE) {
+            kind->write(page->device, index, access->word, previous);
+        }
+        return true;
+    }
+    if (!(behaviour & (READS_PLAIN | READS_NATIVE))) {
+        return false;
+    }
+    const uint32_t word = behaviour & READS_NATIVE ? kind->read(page->device, index) : page->words[index];
+    if (behaviour >> LATCH_SHIFT) {
+        page->words[behaviour >> LATCH_SHIFT] = word;
+    }
+    access->word = access->bytes == 4 ? word : word >> (offset & 3) * 8 & ((1u << access->bytes * 8) - 1);
+    return true;
+}
+
+static bool holds_code(void *user, uint32_t address, uint32_t bytes)
+{
+    const struct core *core = user;
+    const uint32_t at = (address - core->shared.sram_base) / CODE_BYTES;
+    (void)bytes; /* aligned: within one place */
+    return core->code_places[at / 8] >> at % 8 & 1;
+}
+
 /* Puts the core under a fabric. */
 void core_join(struct core *core, struct fabric *fabric)
 {
     core->fabric = fabric;
     fabric->host = (struct host){.user = core, .cycle = cycle, .boundary = &core->shared.cycle, .set_irq = set_irq,
-                                 .end_slice = end_slice, .due = due, .pc = pc, .signal = signal};
+                                 .end_slice = end_slice, .due = due, .pc = pc, .signal = signal,
+                                 .registers = registers, .holds_code = holds_code};
 }

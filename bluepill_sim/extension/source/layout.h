@@ -6,6 +6,7 @@
 
 #define PORTS 5
 #define PINS 16
+#define SOURCES 64
 #define LAST_ROWS 32
 #define RECEIVED 256
 
@@ -107,6 +108,7 @@ struct port {
     uint32_t analog;
     uint32_t offered; /* some alternate function offers a level, */
     uint32_t offered_high; /* which is 1 */
+    uint32_t waving; /* or a wave */
     uint32_t held; /* kept off GPIO, and what drives then */
     uint32_t hold_low;
     uint32_t hold_high;
@@ -121,11 +123,12 @@ struct port {
     uint32_t floating;
     uint32_t fighting;
     uint32_t shorted;
+    uint32_t shown; /* pins that show a wave: what stands above of them is as of their last edge made */
     uint8_t modes[16]; /* index in `PinMode` */
     uint64_t sources[16]; /* the alternate functions that offer a level, a bit each; the lowest drives */
     uint64_t source_levels[16];
 };
-_Static_assert(sizeof(struct port) == 392, "port");
+_Static_assert(sizeof(struct port) == 400, "port");
 
 /* What a USART holds beyond its registers. RM0008 27.3. */
 struct usart {
@@ -164,13 +167,25 @@ struct gpio {
 };
 _Static_assert(sizeof(struct gpio) == 4, "gpio");
 
+/* A level that goes up every `period` ticks, and down `high` ticks later. */
+struct wave {
+    uint64_t ns; /* when tick 0 begins; tick n begins floor(n * 10**9 / hz) ns later */
+    uint64_t at; /* ticks from a rising edge to tick 0, less than the period */
+    uint64_t period; /* in ticks; 0: there is no wave */
+    uint64_t high; /* of them at level 1, more than 0 and less than the period */
+    uint32_t hz; /* ticks a second: the clock of who makes it */
+    uint32_t pin; /* on which it is offered */
+    uint64_t padding;
+};
+_Static_assert(sizeof(struct wave) == 48, "wave");
+
 /* A change of a pin, for who has subscribed: `bluepill_sim/fabric/subscriptions.py`. */
 struct edge {
     uint64_t ns;
     uint8_t pin;
     uint8_t drive;
     uint8_t wire;
-    uint8_t padding;
+    uint8_t kind;
     uint32_t zero;
 };
 _Static_assert(sizeof(struct edge) == 16, "edge");

@@ -1,6 +1,7 @@
-/* Lines: one bit each from an output of a device to inputs of others; the first ones are interrupts.
+/* Lines: one bit each from outputs of devices to inputs of others; the first ones are interrupts.
  *
- * Which output is on which line, and which inputs hang on it, is a table on the chip's page (`stm32f103.py`).
+ * Which outputs are on which line, and which inputs hang on it, is a table on the chip's page (`stm32f103.py`).
+ * Invariant: a line is 1 exactly while one of its outputs is.
  */
 #include "fabric.h"
 
@@ -15,13 +16,17 @@ static RARELY void tell_subscribers(struct fabric *fabric, uint32_t number, bool
     }
 }
 
-void line_set(struct fabric *fabric, uint32_t number, bool level)
+static void drive(struct fabric *fabric, uint32_t number, uint32_t driver, bool level)
 {
-    if (number >= LINES || fabric->lines[number].level == level) {
+    if (number >= LINES) {
         return;
     }
     struct line *line = &fabric->lines[number];
-    line->level = level;
+    const uint8_t before = line->high, bit = (uint8_t)(1 << driver);
+    line->high = level ? before | bit : before & ~bit;
+    if (!before == !line->high) {
+        return;
+    }
     uint32_t is_enabled = 0;
     if (number < IRQ_LINES_END) {
         is_enabled = fabric->host.set_irq(fabric->host.user, number, level);
@@ -35,12 +40,36 @@ void line_set(struct fabric *fabric, uint32_t number, bool level)
     }
 }
 
-void fabric_set_line(struct fabric *fabric, uint32_t number, bool level) { line_set(fabric, number, level); }
+void output_set(struct device *device, uint32_t output, bool level)
+{
+    drive(device->fabric, device->outputs[output], device->drivers[output], level);
+}
 
-bool fabric_line(const struct fabric *fabric, uint32_t number) { return fabric->lines[number].level; }
+void fabric_set_output(struct fabric *fabric, uint32_t slot, uint32_t output, bool level)
+{
+    output_set(&fabric->devices[slot], output, level);
+}
 
-/* Takes a level without a word to anyone: a state is put back. */
-void fabric_restore_line(struct fabric *fabric, uint32_t number, bool level) { fabric->lines[number].level = level; }
+/* As the first output on the line. */
+void fabric_set_line(struct fabric *fabric, uint32_t number, bool level) { drive(fabric, number, 0, level); }
+
+/* The outputs on a line that are 1, a bit each. */
+uint32_t fabric_line(const struct fabric *fabric, uint32_t number) { return fabric->lines[number].high; }
+
+/* Takes them without a word to anyone: a state is put back. */
+void fabric_restore_line(struct fabric *fabric, uint32_t number, uint32_t high) { fabric->lines[number].high = (uint8_t)high; }
+
+/* Puts an output of a device on a line; false: there is no room. */
+bool fabric_put_output(struct fabric *fabric, uint32_t slot, uint32_t output, uint32_t number)
+{
+    struct line *line = &fabric->lines[number];
+    if (number >= LINES || output >= OUTPUTS || line->driver_count == 8 * sizeof line->high) {
+        return false;
+    }
+    fabric->devices[slot].outputs[output] = (uint8_t)number;
+    fabric->devices[slot].drivers[output] = line->driver_count++;
+    return true;
+}
 
 /* Hangs an input of a device on a line; false: there is no room. */
 bool fabric_wire(struct fabric *fabric, uint32_t number, uint32_t slot, uint32_t input)

@@ -13,16 +13,21 @@
 enum { IS_FIGHTING, IS_SHORTED };
 /* Indices of `PinDrive`. */
 enum { DRIVES_NOTHING, DRIVES_LOW, DRIVES_HIGH, PULLS_UP, PULLS_DOWN };
-/* Rows that wait before the slice ends for them to be taken over. */
-enum { FIRST_ROOM = 256, MOST_ROWS = 32768 };
+/* Room for rows at first. */
+enum { FIRST_ROOM = 256 };
 
-static uint32_t drive_of(const struct port *port, uint32_t bit)
+uint8_t drive_of(const struct port *port, uint32_t bit)
 {
     return port->low & bit    ? DRIVES_LOW
            : port->high & bit ? DRIVES_HIGH
            : port->up & bit   ? PULLS_UP
            : port->down & bit ? PULLS_DOWN
                               : DRIVES_NOTHING;
+}
+
+uint8_t wire_of(const struct port *port, uint32_t bit)
+{
+    return port->floating & bit ? FLOATING : port->level & bit ? HIGH : LOW;
 }
 
 void put_row(struct fabric *fabric, struct subscriber *subscriber, const struct edge *row)
@@ -52,9 +57,9 @@ static RARELY void tell_subscribers(struct fabric *fabric, uint32_t number, uint
         const uint32_t wanted = (drives & one->drive[number]) | (wires & one->wire[number]);
         for (uint32_t left = wanted; left; left &= left - 1) {
             const uint32_t bit = left & -left;
-            const uint8_t wire = port->floating & bit ? FLOATING : port->level & bit ? HIGH : LOW;
             const struct edge row = {.ns = ns, .pin = (uint8_t)(PINS * number + (uint32_t)__builtin_ctz(left)),
-                                     .drive = (uint8_t)drive_of(port, bit), .wire = wire};
+                                     .drive = drive_of(port, bit), .wire = wire_of(port, bit)};
+            expand_waves(fabric, one, ns);
             put_row(fabric, one, &row);
         }
         ends_slice |= (wanted & one->stop[number]) != 0;
@@ -72,7 +77,7 @@ static RARELY void tell_trouble(struct fabric *fabric, uint32_t number, uint32_t
     }
 }
 
-static void tell_listeners(struct fabric *fabric, uint32_t number, uint32_t changed)
+void tell_listeners(struct fabric *fabric, uint32_t number, uint32_t changed)
 {
     for (uint32_t n = 0; n < fabric->listener_count; ++n) {
         struct pin_listener *one = &fabric->listeners[n];
@@ -82,11 +87,9 @@ static void tell_listeners(struct fabric *fabric, uint32_t number, uint32_t chan
     }
 }
 
-/* Works out what the pins of a port are, and tells whoever has to know. */
-void pins_changed(struct fabric *fabric, uint32_t number)
+/* Works out what the pins of a port are. */
+void work_out(struct port *port)
 {
-    struct port *port = &fabric->ports[number];
-    const struct port before = *port;
     const uint32_t free = ~port->held;
     const uint32_t offered = port->alternate & port->offered;
     port->high = ((((port->output & port->odr) | (offered & port->offered_high)) & ~port->open_drain & free) | port->hold_high);
@@ -103,23 +106,33 @@ void pins_changed(struct fabric *fabric, uint32_t number)
     port->input = port->level & ((~port->analog & free) | port->hold_up | port->hold_down);
     port->fighting = ~port->rail & strong & hard & (port->high ^ port->outside_high);
     port->shorted = port->rail & strong & (port->high ^ port->rail_high);
+}
 
+/* Works out what the pins of a port are, and tells whoever has to know. */
+void pins_changed(struct fabric *fabric, uint32_t number)
+{
+    struct port *port = &fabric->ports[number];
+    const struct port before = *port;
+    port->shown = port->waving & port->alternate & ~port->held;
+    const uint32_t waves = port->shown | before.shown;
+    if (UNLIKELY(port->shown & ~before.shown)) {
+        sample_waves(fabric, port, port->shown & ~before.shown, now_ns(fabric));
+    }
+    work_out(port);
+    const uint32_t changed_waves = UNLIKELY(waves) ? show_waves(fabric, number, &before) : 0;
     const uint32_t inputs = before.input ^ port->input;
     const uint32_t drives = (before.low ^ port->low) | (before.high ^ port->high) | (before.up ^ port->up) |
                             (before.down ^ port->down);
     const uint32_t wires = (before.level ^ port->level) | (before.floating ^ port->floating);
-    if (drives) {
+    if ((drives & ~waves) | changed_waves) {
         fabric->last_output = fabric->host.boundary != NULL ? *fabric->host.boundary : fabric->host.cycle(fabric->host.user);
         if (UNLIKELY(fabric->event_ns != NO_TIME)) {
             fabric->last_output = NO_TIME;
             fabric->last_output_ns = fabric->event_ns;
         }
     }
-    if (inputs && fabric->inputs[number] != NULL) {
-        *fabric->inputs[number] = port->input;
-    }
-    if (UNLIKELY((drives | wires) & fabric->subscribed[number])) {
-        tell_subscribers(fabric, number, drives, wires);
+    if (UNLIKELY((drives | wires) & ~waves & fabric->subscribed[number])) {
+        tell_subscribers(fabric, number, drives & ~waves, wires & ~waves);
     }
     if (UNLIKELY(inputs & fabric->listened[number])) {
         tell_listeners(fabric, number, inputs);
@@ -134,8 +147,7 @@ void pins_changed(struct fabric *fabric, uint32_t number)
 
 void fabric_pins_changed(struct fabric *fabric, uint32_t number) { pins_changed(fabric, number); }
 
-/* The level that an alternate function offers on a pin: 0, 1, or 2 for none any more. */
-void offer(struct fabric *fabric, uint32_t pin, uint32_t source, uint32_t level)
+void take_offer(struct fabric *fabric, uint32_t pin, uint32_t source, uint32_t level)
 {
     struct port *port = &fabric->ports[pin / PINS];
     const uint32_t at = pin % PINS, bit = 1u << at;
@@ -145,7 +157,19 @@ void offer(struct fabric *fabric, uint32_t pin, uint32_t source, uint32_t level)
     const uint64_t first = port->sources[at] & -port->sources[at];
     port->offered = first ? port->offered | bit : port->offered & ~bit;
     port->offered_high = port->source_levels[at] & first ? port->offered_high | bit : port->offered_high & ~bit;
+    const struct wave *wave = first ? &fabric->waves[__builtin_ctzll(first)] : NULL;
+    port->waving = wave != NULL && wave->period && wave->pin == pin ? port->waving | bit : port->waving & ~bit;
+    sample_waves(fabric, port, port->waving & bit, now_ns(fabric));
     pins_changed(fabric, pin / PINS);
+}
+
+/* The level that an alternate function offers on a pin: 0, 1, or 2 for none any more. */
+void offer(struct fabric *fabric, uint32_t pin, uint32_t source, uint32_t level)
+{
+    if (fabric->waves[source].pin == pin) {
+        fabric->waves[source].period = 0;
+    }
+    take_offer(fabric, pin, source, level);
 }
 
 void fabric_offer(struct fabric *fabric, uint32_t pin, uint32_t source, uint32_t level)
@@ -169,6 +193,7 @@ void listen_to_pins(struct device *device, uint32_t port, uint32_t pins)
     for (n = 0; n < fabric->listener_count; ++n) {
         fabric->listened[port] |= fabric->listeners[n].pins[port];
     }
+    make_edges_where_wanted(fabric);
 }
 
 /* Subscriptions. */
@@ -193,7 +218,7 @@ static void sum_up(struct fabric *fabric)
 
 /* Subscribes to pins and lines, by masks; returns the subscriber's number, -1 where there is no room. */
 int32_t fabric_subscribe(struct fabric *fabric, const uint32_t *drive, const uint32_t *wire, const uint32_t *stop,
-                         const uint64_t *lines)
+                         const uint64_t *lines, bool takes_waves)
 {
     for (int32_t n = 0; n < SUBSCRIBERS; ++n) {
         struct subscriber *one = &fabric->subscribers[n];
@@ -203,7 +228,9 @@ int32_t fabric_subscribe(struct fabric *fabric, const uint32_t *drive, const uin
             memcpy(one->wire, wire, sizeof one->wire);
             memcpy(one->stop, stop, sizeof one->stop);
             memcpy(one->lines, lines, sizeof one->lines);
+            one->takes_waves = takes_waves;
             sum_up(fabric);
+            show_to(fabric, one);
             return n;
         }
     }
@@ -213,6 +240,7 @@ int32_t fabric_subscribe(struct fabric *fabric, const uint32_t *drive, const uin
 void fabric_stop_at(struct fabric *fabric, uint32_t number, const uint32_t *stop)
 {
     memcpy(fabric->subscribers[number].stop, stop, sizeof fabric->subscribers[number].stop);
+    make_edges_where_wanted(fabric);
 }
 
 void fabric_unsubscribe(struct fabric *fabric, uint32_t number)
@@ -221,9 +249,14 @@ void fabric_unsubscribe(struct fabric *fabric, uint32_t number)
     free(one->rows);
     *one = (struct subscriber){0};
     sum_up(fabric);
+    make_edges_where_wanted(fabric);
 }
 
-size_t fabric_row_count(const struct fabric *fabric, uint32_t number) { return fabric->subscribers[number].count; }
+size_t fabric_row_count(struct fabric *fabric, uint32_t number)
+{
+    expand_waves(fabric, &fabric->subscribers[number], settled_ns(fabric));
+    return fabric->subscribers[number].count;
+}
 
 /* The rows of a subscriber, which has them then: they stand until the chip goes on. */
 const struct edge *fabric_take_rows(struct fabric *fabric, uint32_t number)

@@ -15,8 +15,11 @@ static uint64_t cycle_at(const struct fabric *fabric, uint64_t ns)
         const __uint128_t back = (__uint128_t)(time->ns - ns) * time->hz / NS_PER_S;
         return back > time->cycle ? 0 : time->cycle - (uint64_t)back;
     }
-    const __uint128_t cycles = ((__uint128_t)(ns - time->ns) * time->hz + NS_PER_S - 1) / NS_PER_S;
-    return cycles > NO_TIME / 4 ? NO_TIME / 4 : time->cycle + (uint64_t)cycles;
+    const uint64_t span = ns - time->ns, seconds = span / NS_PER_S;
+    if (seconds > NO_TIME / 8 / time->hz) {
+        return NO_TIME / 4;
+    }
+    return time->cycle + seconds * time->hz + (span % NS_PER_S * time->hz + NS_PER_S - 1) / NS_PER_S;
 }
 
 static void find_first(struct fabric *fabric)
@@ -41,7 +44,7 @@ void fabric_schedule(struct fabric *fabric, uint32_t number, uint64_t ns)
     slot->cycle = cycle_at(fabric, ns);
     if (slot->cycle <= fabric->next_cycle) {
         fabric->next_cycle = slot->cycle;
-    } else if (before == fabric->next_cycle) {
+    } else if (before == fabric->next_cycle && fabric->event_ns == NO_TIME) { /* else once, behind the events */
         find_first(fabric);
     }
     if (fabric->event_ns == NO_TIME && slot->cycle != NO_TIME) {
@@ -68,11 +71,13 @@ uint64_t fabric_next_ns(const struct fabric *fabric)
 static void act(struct fabric *fabric, struct slot *slot)
 {
     struct device *device = slot->device;
+    slot->is_acting = 1;
     if (device == NULL || device->kind->event == NULL) {
         fabric->calls.event((uint32_t)(slot - fabric->slots), slot->ns);
     } else {
         device->kind->event(device, slot->ns);
     }
+    slot->is_acting = 0;
 }
 
 void run_events(struct fabric *fabric, uint64_t until_ns)
@@ -82,7 +87,7 @@ void run_events(struct fabric *fabric, uint64_t until_ns)
     while ((due = fabric_next_ns(fabric)) <= until_ns) {
         fabric->event_ns = due;
         for (uint32_t n = 0; n < fabric->slot_count; ++n) {
-            if (fabric->slots[n].ns == due) {
+            if (fabric->slots[n].ns == due && !fabric->slots[n].is_acting) {
                 act(fabric, &fabric->slots[n]);
                 if (fabric->slots[n].ns <= due) { /* what has acted is done; Python checks its own */
                     fabric_schedule(fabric, n, NO_TIME);
@@ -100,7 +105,7 @@ void fabric_run_events(struct fabric *fabric, uint64_t until_ns) { run_events(fa
 void fabric_catch_up(struct fabric *fabric, uint32_t number, uint64_t until_ns)
 {
     struct slot *slot = &fabric->slots[number];
-    while (slot->ns <= until_ns) {
+    while (slot->ns <= until_ns && !slot->is_acting) { /* its own event may reach its own registers by the bus */
         const uint64_t before = fabric->event_ns, due = slot->ns;
         fabric->event_ns = due;
         act(fabric, slot);
@@ -108,6 +113,7 @@ void fabric_catch_up(struct fabric *fabric, uint32_t number, uint64_t until_ns)
             fabric_schedule(fabric, number, NO_TIME);
         }
         fabric->event_ns = before;
+        find_first(fabric);
     }
 }
 

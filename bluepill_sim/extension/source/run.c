@@ -231,11 +231,40 @@ uint64_t core_next_event(const struct core *core)
     return tick < other ? tick : other;
 }
 
+/* At a boundary within a run: acts on what is due in the fabric, and tells whether the run goes on: nothing is for
+ * Python, no interrupt can be taken, and the time is not up. */
+bool goes_on(struct core *core, uint32_t address)
+{
+    struct shared *s = &core->shared;
+    const struct fabric *fabric = core->fabric;
+    if (!s->stop_at || s->attention || s->cycle >= core->limit || s->cycle >= s->tick_next ||
+        s->cycle < fabric->next_cycle || core->is_scratch) {
+        return false;
+    }
+    for (uint32_t n = 0; n < fabric->slot_count; ++n) {
+        const struct slot *slot = &fabric->slots[n];
+        if (slot->cycle <= s->cycle && (slot->device == NULL || slot->device->kind->event == NULL)) {
+            return false;
+        }
+    }
+    core->block = &core->none;
+    s->pc = address;
+    run_events(core->fabric, ns_of(core->fabric, s->cycle));
+    const uint64_t event = core_next_event(core), stop = event < core->limit ? event : core->limit;
+    if (!s->stop_at || s->attention || s->halt_kind != HALT_NONE || s->cycle >= stop) {
+        return false;
+    }
+    s->stop_at = stop;
+    core->polling.cycle = NO_TIME; /* what a loop waits for may be there now */
+    return true;
+}
+
 static uint32_t run(struct core *core, uint64_t limit)
 {
     struct shared *s = &core->shared;
     free_dropped(core);
     s->attention = 0;
+    core->limit = limit;
     for (;;) {
         if (s->cycle >= s->tick_next) {
             tick(core);

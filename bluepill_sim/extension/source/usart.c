@@ -164,7 +164,7 @@ static void event(struct device *device, uint64_t until)
 {
     struct usart *usart = device->state;
     uint64_t ns;
-    while ((ns = device->fabric->slots[device->slot].ns) <= until) {
+    while ((ns = due_ns(device)) <= until) {
         if (usart->tx_due_ns == ns) {
             end_transmission(device, ns);
         } else if (usart->rx_due_ns == ns) {
@@ -348,5 +348,5 @@ static uint32_t command(struct device *device, uint32_t what, uint32_t one, uint
     return 0;
 }
 
-const struct device_kind usart_kind = {
+DEVICE_KIND(usart_kind) = {
     .name = "usart", .needs_time = needs_time, .read = read, .write = write, .event = event, .command = command};

@@ -276,10 +276,10 @@ def test_an_interrupt_line_that_stays_high_interrupts_again(boot) -> None:
     machine = boot(store(ISER0, 1 << 6) + "loop: b loop\nirq: log #1\nbx lr", {16 + 6: "irq"})
     chip = machine.board.chip
     machine.run(10)
-    chip.set_irq(6, True)
+    chip.fabric.set_line(6, True)
     machine.run(30)
     assert len(machine.log) > 2
-    chip.set_irq(6, False)
+    chip.fabric.set_line(6, False)
     machine.run(10)
     settled = len(machine.log)
     machine.run(10)

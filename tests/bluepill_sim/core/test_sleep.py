@@ -56,7 +56,7 @@ def test_basepri_holds_back_the_wakening_by_wfi(boot) -> None:
 
 def test_a_disabled_interrupt_does_not_wake_wfi(boot) -> None:
     machine = boot("wfi\nlog #1\nb stop").run(50)
-    machine.board.chip.set_irq(6, True)
+    machine.board.chip.fabric.set_line(6, True)
     assert machine.run(50).log == []
 
 

@@ -21,6 +21,10 @@ class Ports:
     def request_stop(self) -> None:
         pass
 
+    @property
+    def access_cycle(self) -> int:
+        return self.now_ns
+
     def warn(self, message: str, *, once: str) -> None:
         self.warnings.setdefault(once, message)
 

@@ -1,6 +1,5 @@
 """Pins: who drives the wire, what it reads, and who is told when."""
 
-import ctypes
 import itertools
 from collections.abc import Callable
 from typing import Any
@@ -28,6 +27,10 @@ class Ports:
 
     def end_slice(self) -> None:
         self.stops += 1
+
+    @property
+    def access_cycle(self) -> int:
+        return self.now_ns
 
     def warn(self, message: str, *, once: str) -> None:
         self.warnings.setdefault(once, message)
@@ -195,19 +198,6 @@ def test_an_edge_that_ends_slices_asks_for_a_stop(bank: PinBank, ports: Ports) -
     subscription.ends_slice = frozenset({"PA1"})
     pin.configure(PinMode.PUSH_PULL, output_bit=True)
     assert ports.stops == 2
-
-
-def test_the_input_is_shown_in_a_word_too(bank: PinBank) -> None:
-    word = ctypes.c_uint32()
-    bank.fabric.show_input(0, ctypes.addressof(word))
-    pin = bank["PA0"]
-    pin.drive(True)
-    assert word.value == 1
-    pin.hold("JTDI", PinDrive.PULL_UP)
-    pin.drive(None)
-    assert word.value == 1
-    pin.hold("JTDO")
-    assert word.value == 0
 
 
 def test_a_pin_without_a_leg_cannot_be_driven(bank: PinBank) -> None:

@@ -14,7 +14,7 @@ from bluepill_sim.stm32f103 import PERIPHERALS
 QUICK = settings(max_examples=40, deadline=None)
 
 WORDS = st.integers(0, WORD)
-NAMES = [name for _, name, _ in PERIPHERALS]
+NAMES = [name for _, name in PERIPHERALS]
 
 
 @st.composite

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from bluepill_sim.stm32f103 import PVD_LINE, RTC_ALARM_LINE, USB_WAKEUP_LINE
+from bluepill_sim.stm32f103 import line_of
 
 QUICK = settings(max_examples=40, deadline=None)
 
@@ -111,7 +111,7 @@ def test_inner_lines_have_their_own_interrupts(fake_chip: Any, line: int, irq: i
     enable(fake_chip, 0)
     fake_chip.write("EXTI.IMR", 1 << line)
     fake_chip.write("EXTI.RTSR", 1 << line)
-    inner = {16: PVD_LINE, 17: RTC_ALARM_LINE, 18: USB_WAKEUP_LINE}[line]
+    inner = line_of({16: "PWR.pvd", 17: "RTC.alarm", 18: "USB.wakeup"}[line])
     fake_chip.pins.fabric.set_line(inner, True)
     fake_chip.pins.fabric.set_line(inner, True)
     assert fake_chip.irqs[irq]

@@ -1,0 +1,146 @@
+"""Print what test devices cost: four channels of PWM at 20 kHz, and a DMA of a million words a second.
+
+Each figure is the median of paired runs by CPU time in this process; the library is built here, with `mover.c` in it.
+Usage: python tools/bench/devices.py [--quick]
+"""
+
+import shutil
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+
+from emulator import build
+from shares import RUNS, bench, cpu_s, row, run
+
+from bluepill_sim import BluePill, stm32f103
+from bluepill_sim.analysis.probe import Probe
+from bluepill_sim.analysis.vcd import write_vcd
+from bluepill_sim.extension import library
+from bluepill_sim.fabric.registers import NATIVE, Peripheral, Register
+from simbase.timing import NS_PER_S
+
+HERE = Path(__file__).parent
+SOURCES = sorted((HERE.parents[1] / "bluepill_sim" / "extension" / "source").glob("*.c"))
+#: Where TIM6 would stand on a larger chip.
+PLACE = "TIM6"
+PWM_S, DMA_S = (1.0, 0.2) if "--quick" in sys.argv else (20.0, 2.0)
+#: Pins without a wire on the board, and their timer's clock, period and high time in cycles.
+PWM = {"PA8": "TIM1_CH1", "PA9": "TIM1_CH2", "PA10": "TIM1_CH3", "PA11": "TIM1_CH4"}
+TIMER_HZ, PERIOD, HIGH = 72_000_000, 3600, 900
+#: After the program's start, with its clock at 72 MHz.
+STARTED_NS = 10_000_000
+RCC_APB2ENR, GPIOA_ENABLE = 0x18, 1 << 2
+GPIOA_IDR, BUFFER, BUFFER_WORDS = 0x4001_0808, 0x2000_3000, 256
+
+
+class Mover(Peripheral):
+    """`mover.c`."""
+
+    KIND = "mover"
+    REGISTERS = (
+        Register(name="FROM", offset=0x0),
+        Register(name="TO", offset=0x4),
+        Register(name="COUNT", offset=0x8, on_write=NATIVE),
+        Register(name="ERRORS", offset=0xC, writable=0),
+    )
+
+
+def start_pwm(board: BluePill) -> None:
+    """Have four pins carry waves."""
+    board.chip.parts.by_name["GPIOA"].write(4, 4, 0x8884_BBBB)  # PA8 to PA11 alternate functions
+    for pin, source in PWM.items():
+        board.pin(pin).offer_wave(source, TIMER_HZ, PERIOD, HIGH)
+
+
+def start_mover(board: BluePill) -> None:
+    """Have words of a port moved into SRAM."""
+    rcc, mover = board.chip.parts.rcc, board.chip.parts.by_name[PLACE]
+    rcc.write(RCC_APB2ENR, 4, rcc.read(RCC_APB2ENR, 4) | GPIOA_ENABLE)
+    for offset, word in ((0, GPIOA_IDR), (4, BUFFER), (8, BUFFER_WORDS)):
+        mover.write(offset, 4, word)
+
+
+def waves(folder: Path) -> None:
+    """Four channels of PWM in the bench, the CPU asleep between interrupts."""
+    program = build("systick", folder)
+    unseen, recorded = [], []
+    for _ in range(RUNS):
+        took = {}
+        for name in ("without", "unseen", "recorded"):
+            made = bench(folder, program, PWM_S, "adapter")
+            made.run_until(STARTED_NS)
+            if name != "without":
+                start_pwm(made.chip)
+            probe = Probe(made.chip) if name == "recorded" else None
+
+            def whole() -> None:
+                run(made)  # noqa: B023 - called at once
+                if probe is not None:  # noqa: B023
+                    probe.finish()  # noqa: B023
+                    write_vcd(probe, folder / "pins.vcd")  # noqa: B023
+
+            took[name] = cpu_s(whole)
+            if probe is not None and len(probe.edges["PA11"]) < 2 * TIMER_HZ // PERIOD * (PWM_S - 0.1):
+                sys.exit("bench: edges of PWM are missing")
+        unseen.append(took["without"] / took["unseen"])
+        recorded.append(PWM_S / took["recorded"])
+    row("4 channels of PWM at 20 kHz: bench without / with", unseen, "0.9")
+    row("the same, recorded as VCD: times real", recorded, "2")
+
+
+def moved(folder: Path, name: str) -> tuple[list[float], list[float]]:
+    """Return ratios to the same program without the device, and times real, of a program."""
+    program = build(name, folder)
+    ratios, factors = [], []
+    for _ in range(RUNS):
+        took = []
+        for is_on in (False, True):
+            board = BluePill(program)
+            board.advance_to(STARTED_NS)
+            if is_on:
+                start_mover(board)
+            took.append(cpu_s(lambda: board.advance_to(STARTED_NS + round(DMA_S * NS_PER_S))))  # noqa: B023
+        errors = board.chip.parts.by_name[PLACE].words[3]
+        if errors:
+            sys.exit(f"bench: {errors} accesses of the bus failed")
+        ratios.append(took[0] / took[1])
+        factors.append(DMA_S / took[1])
+    return ratios, factors
+
+
+def movers(folder: Path) -> None:
+    """A million words a second by the bus."""
+    ratios, factors = moved(folder, "compute")
+    row("a million words a second, computing: without / with", ratios, "0.6")
+    row("the same: times real", factors, "-")
+    _, asleep = moved(folder, "systick")
+    row("the same, asleep: times real", asleep, "2")
+
+
+def build_library(folder: Path) -> Path:
+    """Return the emulator's library with the device of this bench in it."""
+    out = folder / "native.so"
+    flags = ["-shared", "-fPIC", "-std=c11", "-O2", f"-I{SOURCES[0].parent}"]
+    subprocess.run(["gcc", *flags, *map(str, SOURCES), str(HERE / "mover.c"), "-o", str(out)], check=True)
+    return out
+
+
+def main() -> int:
+    """Print the table; 1 without the compilers for it."""
+    for compiler in ("arm-none-eabi-gcc", "gcc"):
+        if shutil.which(compiler) is None:
+            print(f"bench: no {compiler} (hint: sudo apt-get install gcc gcc-arm-none-eabi)")
+            return 1
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        built = str(build_library(folder))
+        library.library_path = lambda: built  # type: ignore[assignment]  # a cached function, for this process
+        stm32f103.PERIPHERALS = (*stm32f103.PERIPHERALS, (Mover, PLACE))
+        waves(folder)
+        movers(folder)
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
