@@ -22,7 +22,7 @@ from enum import Enum
 
 from bluepill_sim.core.blocks import it_state_of
 from bluepill_sim.core.engine import FIRST_EXCEPTION_RETURN, Engine
-from bluepill_sim.core.faults import FAULT_OF_HALT, FAULT_ROWS, HFSR_FORCED, FaultKind
+from bluepill_sim.core.faults import FAULT_OF_HALT, FAULT_ROWS, HFSR_FORCED, FaultKind, SeenFault
 from bluepill_sim.core.halts import DEBUG_HALTS, Halt, HaltKind
 from bluepill_sim.core.nvic import BUS_FAULT, HARD_FAULT, NMI, SVCALL, SYSTICK, Nvic
 from bluepill_sim.core.recorder import EXCEPTION_RETURN
@@ -62,8 +62,9 @@ class Sleep(Enum):
     EVENT = "event"
 
 
-#: Called with each HardFault taken and each lockup: (kind, PC, address, whether it is a lockup).
-FaultListener = Callable[[FaultKind, int, int | None, bool], None]
+#: Called with each HardFault taken and each lockup: (kind, PC, address, whether it is a lockup, what was seen then or
+#: None for the core as it is).
+FaultListener = Callable[[FaultKind, int, int | None, bool, SeenFault | None], None]
 
 
 class Processor(Stateful):
@@ -463,9 +464,11 @@ class Processor(Stateful):
         self.is_locked_up = True
         self._report(kind, pc, address, is_lockup=True)
 
-    def _report(self, kind: FaultKind, pc: int, address: int | None, *, is_lockup: bool) -> None:
+    def _report(
+        self, kind: FaultKind, pc: int, address: int | None, *, is_lockup: bool, seen: SeenFault | None = None
+    ) -> None:
         if self.on_fault is not None:
-            self.on_fault(kind, pc, address, is_lockup)
+            self.on_fault(kind, pc, address, is_lockup, seen)
 
     def _restored(self) -> None:
         self.set_ccr(self.ccr)

@@ -66,6 +66,18 @@ INSTRUCTION = Struct(
         Field("padding", "u8", 2),
     ),
 )
+FAULT = Struct(
+    "fault",
+    "A HardFault that was entered here, for Python to report: the core as it was before.",
+    (
+        *_fields("u64", "ns", "logged"),
+        Field("kind", "u32", doc="number of its halt"),
+        *_fields("u32", "pc", "address", "has_address", "exception_number"),
+        Field("vector", "u32", doc="of the handler that ran"),
+        Field("registers", "u32", 16, "R0 to R12, SP, LR, xPSR"),
+        Field("last", "record", LAST_ROWS),
+    ),
+)
 SHARED = Struct(
     "shared",
     "The state of one core.",
@@ -86,6 +98,11 @@ SHARED = Struct(
         *_fields("u32", "sram_base", "sram_bytes", "flash_base", "flash_bytes", "scratch", "padding"),
         Field("exact_stops", "u64", doc="how often a run was stopped to learn which instruction makes an access"),
         Field("logged", "u64", doc="rows so far: the next one goes to `last` at this, modulo its size"),
+        *_fields("u32", "shcsr", "cfsr", "hfsr", "mmfar", "bfar"),
+        Field("has_debugger", "u32", doc="Python sees to BKPT and HardFaults"),
+        Field("knows_masked_svc", "u32", doc="Python was told of an SVC that its priority does not allow"),
+        Field("has_fault", "u32", doc="`fault` waits for Python"),
+        Field("fault", "fault"),
         Field("last", "record", LAST_ROWS),
     ),
 )
@@ -149,7 +166,7 @@ SENT = Struct(
 )
 
 #: All of them; one that holds another comes behind it.
-STRUCTS = (RECORD, INSTRUCTION, SHARED, PORT, USART, EXTI, GPIO, EDGE, SENT)
+STRUCTS = (RECORD, INSTRUCTION, FAULT, SHARED, PORT, USART, EXTI, GPIO, EDGE, SENT)
 
 _KINDS: dict[str, Any] = {
     "u8": ctypes.c_uint8, "u16": ctypes.c_uint16, "u32": ctypes.c_uint32, "u64": ctypes.c_uint64, "i32": ctypes.c_int32,

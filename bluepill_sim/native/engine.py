@@ -37,6 +37,7 @@ from bluepill_sim.core.unicorn_core import (
 from bluepill_sim.extension.library import (
     ACCESS_CYCLE,
     ACCESS_PC,
+    BAD_ACCESS,
     READ,
     RECORDED,
     TRAPPED,
@@ -116,7 +117,7 @@ class NativeEngine(Engine):
         #: Keeps the callbacks alive.
         self._calls = Callbacks(
             UNKNOWN_BLOCK(self._measure_block), READ(self._read_io), WRITE(self._write_io), TRAPPED(self._trapped),
-            RECORDED(self._take_records), ACCESS_CYCLE(lambda: self.access_cycle), ACCESS_PC(lambda: self.access_pc),
+            RECORDED(self._take_records), ACCESS_CYCLE(lambda: self.access_cycle), ACCESS_PC(lambda: self.access_pc), BAD_ACCESS(self._guarded_bad_access),
         )  # fmt: skip
         self._state = state = ctypes.c_void_p(
             library().core_new(self._core.handle, ctypes.addressof(api), ctypes.addressof(self._calls))
@@ -160,7 +161,7 @@ class NativeEngine(Engine):
         core.allow_execution(address, size)
         core.remove_hook(self._bad_access_hook)
         for first, last in ((0, address - 1), (address + size, 0xFFFF_FFFF)):
-            core.on_bad_access(self._bad_access, first, last)
+            core.hook_native("bad access", address_of("core_on_bad_access"), self._state.value or 0, first, last)
         core.fill_tlb_native(address_of("core_on_tlb_fill"), self._state.value or 0)
 
     def map_io(self, address: int, size: int, read: ReadAccess, write: WriteAccess) -> None:
@@ -432,6 +433,13 @@ class NativeEngine(Engine):
                     put(cycle, address, kind)
         except BaseException as error:  # noqa: BLE001 - C stands between here and the caller
             self._fail(error)
+
+    def _guarded_bad_access(self, access: int, address: int, size: int, value: int) -> bool:
+        try:
+            return self._bad_access(access, address, size, value)
+        except BaseException as error:  # noqa: BLE001 - C stands between here and the caller
+            self._fail(error)
+            return True
 
     def _bad_access(self, access: int, address: int, size: int, value: int) -> bool:
         self._halt = None

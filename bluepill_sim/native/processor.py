@@ -11,12 +11,15 @@ from typing import Any
 
 from bluepill_sim.core import Engine
 from bluepill_sim.core.blocks import Measure
+from bluepill_sim.core.faults import FAULT_OF_HALT, FAULT_ROWS, FaultKind, SeenFault
+from bluepill_sim.core.halts import HaltKind
 from bluepill_sim.core.nvic import FIRST_IRQ, SYSTEM_EXCEPTIONS, Nvic
 from bluepill_sim.core.processor import SEVONPEND, Processor, Sleep
+from bluepill_sim.core.recorder import RECORD
 from bluepill_sim.core.systick import SysTick
-from bluepill_sim.extension.library import is_native_wanted
+from bluepill_sim.extension.library import is_native_wanted, library
 from bluepill_sim.memory import Memory
-from bluepill_sim.native.state import field, flag, time
+from bluepill_sim.native.state import HALT_KINDS, HALT_NUMBERS, field, flag, ordered_rows, time
 
 _HALF = 64
 _LOW = (1 << _HALF) - 1
@@ -104,11 +107,21 @@ class NativeProcessor(Processor):
     scr = field("scr", "As of `Processor`.")
     ccr = field("ccr", "As of `Processor`.")
     last_sleep_cycle = time("last_sleep_cycle", "As of `Processor`.")
+    shcsr = field("shcsr", "As of `Processor`.")
+    cfsr = field("cfsr", "As of `Processor`.")
+    hfsr = field("hfsr", "As of `Processor`.")
+    mmfar = field("mmfar", "As of `Processor`.")
+    bfar = field("bfar", "As of `Processor`.")
+    halts_on_bkpt = flag("has_debugger", "As of `Processor`.")
 
     def __init__(self, engine: Any, memory: Memory) -> None:
         self.shared: Any = engine.shared
         self._native = engine
         super().__init__(engine, memory)
+        rows = {HALT_NUMBERS[halt]: FAULT_ROWS[kind] for halt, kind in FAULT_OF_HALT.items()}
+        rows[HALT_NUMBERS[HaltKind.SUPERVISOR_CALL]] = FAULT_ROWS[FaultKind.MASKED_SVC]
+        for number, row in rows.items():
+            library().core_set_fault(engine.state, number, row.exception, row.cfsr, row.hfsr)
 
     def _make_nvic(self) -> Nvic:
         return NativeNvic(self.shared)
@@ -131,10 +144,36 @@ class NativeProcessor(Processor):
             super().run(self._before_event(stop_at))
             return
         must_deliver, halt = self._native.go_on(stop_at)
+        if self.shared.has_fault:
+            self._report_fault()
         if must_deliver:
             self._deliver()
         elif halt is not None:
             self._act_on(halt)
+
+    def _report_fault(self) -> None:
+        """Report the last HardFault that C has entered."""
+        self.shared.has_fault, fault = 0, self.shared.fault
+        seen = SeenFault(
+            at_ns=fault.ns,
+            registers=tuple(fault.registers),
+            exception_number=fault.exception_number,
+            vector=fault.vector,
+            last_rows=tuple(RECORD.iter_unpack(ordered_rows(fault))),
+        )
+        address = fault.address if fault.has_address else None
+        self._report(FAULT_OF_HALT[HALT_KINDS[fault.kind]], fault.pc, address, is_lockup=False, seen=seen)
+
+    def _report(
+        self, kind: FaultKind, pc: int, address: int | None, *, is_lockup: bool, seen: SeenFault | None = None
+    ) -> None:
+        if kind is FaultKind.MASKED_SVC:
+            self.shared.knows_masked_svc = True
+        super()._report(kind, pc, address, is_lockup=is_lockup, seen=seen)
+
+    def _restored(self) -> None:
+        super()._restored()
+        self.shared.knows_masked_svc = self.shared.has_fault = False
 
     def step(self, stop_at: int) -> None:
         """As of `Processor`."""

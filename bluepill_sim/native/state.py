@@ -74,6 +74,13 @@ def time(name: str, doc: str) -> Any:
     return property(read, write, doc=doc)
 
 
+def ordered_rows(holder: Any) -> bytes:
+    """Return the rows of a struct with the fields `logged` and `last`, oldest first."""
+    logged, rows = holder.logged, bytes(holder.last)
+    first = logged % LAST_ROWS * RECORD.size
+    return rows[:first] if logged < LAST_ROWS else rows[first:] + rows[:first]
+
+
 class NativeLastRows(Stateful):
     """`KeptRows` in the shared struct."""
 
@@ -93,9 +100,7 @@ class NativeLastRows(Stateful):
     @property
     def packed(self) -> bytes:
         """As of `KeptRows`."""
-        logged, rows = self.shared.logged, bytes(self.shared.last)
-        first = logged % LAST_ROWS * RECORD.size
-        return rows[:first] if logged < LAST_ROWS else rows[first:] + rows[:first]
+        return ordered_rows(self.shared)
 
     @packed.setter
     def packed(self, packed: bytes) -> None:

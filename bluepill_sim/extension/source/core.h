@@ -85,6 +85,8 @@ struct callbacks {
     /* Of the access that is made while Python enters the blocks. */
     uint64_t (*access_cycle)(void);
     uint32_t (*access_pc)(void);
+    /* An access that the memory's protection forbids: whether it may pass. */
+    bool (*bad_access)(uint32_t kind, uint32_t address, uint32_t size, uint64_t value);
 };
 
 #define FLASH_SLOTS 65536
@@ -137,6 +139,11 @@ struct polling {
     uint32_t registers[16];
 };
 
+/* What ends a run for a fault raises, and which status bits it sets; 0: it is none. */
+struct fault_row {
+    uint32_t exception, cfsr, hfsr;
+};
+
 struct core {
     struct shared shared;
     void *unicorn;
@@ -164,6 +171,7 @@ struct core {
     struct record *records;
     uint32_t record_count, record_room;
     struct polling polling;
+    struct fault_row faults[HALT_NONE]; /* by kind of halt */
 };
 
 static inline void begin_block(struct core *core, struct row *row)
@@ -199,6 +207,11 @@ bool leave(struct core *core, uint32_t exc_return);
 bool supervisor_call(struct core *core, uint32_t pc);
 void pend(struct core *core, unsigned number);
 void tick(struct core *core);
+bool can_preempt(struct core *core, unsigned number, bool ignores_primask);
+bool enter(struct core *core, unsigned number, uint32_t return_address);
+uint32_t vector(const struct core *core, unsigned number);
+/* faults.c */
+bool take_fault(struct core *core, uint32_t kind);
 #pragma GCC visibility pop
 /* run.c, for Python as well. */
 uint64_t core_next_event(const struct core *core);

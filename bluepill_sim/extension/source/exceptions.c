@@ -1,8 +1,8 @@
 /* Exceptions of the ordinary kind: entry, return, tail-chaining, SysTick, sleep.
  *
  * What is out of the ordinary (a frame outside SRAM, a vector outside the
- * flash, an escalation, a lockup) is left to bluepill_sim/core/processor.py, before
- * anything has changed. Source: ARMv7-M Architecture Reference Manual B1.5.
+ * flash, a lockup) is left to bluepill_sim/core/processor.py, before
+ * anything has changed. Faults are faults.c. Source: ARMv7-M Architecture Reference Manual B1.5.
  */
 #include <string.h>
 
@@ -92,7 +92,7 @@ static int execution_priority(struct core *core, bool ignores_primask)
     return priority;
 }
 
-static bool can_preempt(struct core *core, unsigned number, bool ignores_primask)
+bool can_preempt(struct core *core, unsigned number, bool ignores_primask)
 {
     return group(&core->shared, priority_of(&core->shared, number)) < execution_priority(core, ignores_primask);
 }
@@ -107,7 +107,7 @@ static uint32_t *sram_at(const struct core *core, uint32_t address, uint32_t byt
 }
 
 /* The handler of an exception; 0 where Python has to look. */
-static uint32_t vector(const struct core *core, unsigned number)
+uint32_t vector(const struct core *core, unsigned number)
 {
     const struct shared *s = &core->shared;
     const uint32_t address = s->vector_table + 4 * number;
@@ -158,7 +158,7 @@ static void start_handler(struct core *core, unsigned number, uint32_t handler, 
     s->it_state = 0;
 }
 
-static bool enter(struct core *core, unsigned number, uint32_t return_address)
+bool enter(struct core *core, unsigned number, uint32_t return_address)
 {
     struct shared *s = &core->shared;
     const uint32_t handler = vector(core, number);

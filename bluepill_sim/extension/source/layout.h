@@ -32,6 +32,21 @@ struct instruction {
 };
 _Static_assert(sizeof(struct instruction) == 20, "instruction");
 
+/* A HardFault that was entered here, for Python to report: the core as it was before. */
+struct fault {
+    uint64_t ns;
+    uint64_t logged;
+    uint32_t kind; /* number of its halt */
+    uint32_t pc;
+    uint32_t address;
+    uint32_t has_address;
+    uint32_t exception_number;
+    uint32_t vector; /* of the handler that ran */
+    uint32_t registers[16]; /* R0 to R12, SP, LR, xPSR */
+    struct record last[32];
+};
+_Static_assert(sizeof(struct fault) == 616, "fault");
+
 /* The state of one core. */
 struct shared {
     uint64_t cycle;
@@ -84,9 +99,18 @@ struct shared {
     uint32_t padding;
     uint64_t exact_stops; /* how often a run was stopped to learn which instruction makes an access */
     uint64_t logged; /* rows so far: the next one goes to `last` at this, modulo its size */
+    uint32_t shcsr;
+    uint32_t cfsr;
+    uint32_t hfsr;
+    uint32_t mmfar;
+    uint32_t bfar;
+    uint32_t has_debugger; /* Python sees to BKPT and HardFaults */
+    uint32_t knows_masked_svc; /* Python was told of an SVC that its priority does not allow */
+    uint32_t has_fault; /* `fault` waits for Python */
+    struct fault fault;
     struct record last[32];
 };
-_Static_assert(sizeof(struct shared) == 864, "shared");
+_Static_assert(sizeof(struct shared) == 1512, "shared");
 
 /* The pins of one port, a bit each. RM0008 9.1, table 20. */
 struct port {

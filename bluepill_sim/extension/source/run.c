@@ -279,11 +279,14 @@ static uint32_t run(struct core *core, uint64_t limit)
             }
             break;
         case HALT_SUPERVISOR_CALL:
-            if (!supervisor_call(core, s->halt_pc)) {
+            if (!supervisor_call(core, s->halt_pc) && !take_fault(core, kind)) {
                 return kind;
             }
             break;
-        default: return kind;
+        default:
+            if (!take_fault(core, kind)) {
+                return kind;
+            }
         }
     }
 }
