@@ -11,11 +11,9 @@ from simbase.lazy import lazily
 if TYPE_CHECKING:
     from adapter_sim.adapter import Adapter, AdapterState, AdapterStatus
     from adapter_sim.codec import BitOrder
-    from adapter_sim.faults import BrownOut, FaultyPins, Glitch, SlowLoop, StuckPin
     from adapter_sim.pinout import Pinout, PinoutError, load_pinout, parse_pinout
     from adapter_sim.pins import PinBank
     from adapter_sim.settings import AdapterSettings, EncoderAtOpen, MotorMeaning
-    from adapter_sim.waveforms import Waveforms
 
 __all__ = [
     "Adapter",
@@ -23,17 +21,11 @@ __all__ = [
     "AdapterState",
     "AdapterStatus",
     "BitOrder",
-    "BrownOut",
     "EncoderAtOpen",
-    "FaultyPins",
-    "Glitch",
     "MotorMeaning",
     "PinBank",
     "Pinout",
     "PinoutError",
-    "SlowLoop",
-    "StuckPin",
-    "Waveforms",
     "load_pinout",
     "parse_pinout",
 ]
@@ -44,10 +36,8 @@ if not TYPE_CHECKING:
         {
             "adapter_sim.adapter": ("Adapter", "AdapterState", "AdapterStatus"),
             "adapter_sim.codec": ("BitOrder",),
-            "adapter_sim.faults": ("BrownOut", "FaultyPins", "Glitch", "SlowLoop", "StuckPin"),
             "adapter_sim.pinout": ("Pinout", "PinoutError", "load_pinout", "parse_pinout"),
             "adapter_sim.pins": ("PinBank",),
             "adapter_sim.settings": ("AdapterSettings", "EncoderAtOpen", "MotorMeaning"),
-            "adapter_sim.waveforms": ("Waveforms",),
         },
     )

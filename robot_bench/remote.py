@@ -14,7 +14,6 @@ from collections.abc import Callable
 
 from adapter_sim.adapter import AdapterState
 from adapter_sim.pinout import WireRole, load_pinout
-from p2os.client.interrupts import held_back
 from p2os.errors import RemoteProtocolError, RunFailedError, TransportError
 from p2os.protocol.frames import Decoder, Frame
 from p2os.protocol.sip import SIP_KINDS, StandardSip
@@ -31,6 +30,7 @@ from robot_bench.wires.chip_pins import ChipPins
 from robot_bench.wires.nets import OwnedPins
 from robot_bench.wires.port_endpoint import PortEndpoint, stop_robot
 from robot_bench.wires.ports import Chip
+from simbase.interrupts import held_back
 from simbase.timing import NS_PER_MS, NS_PER_S, Nanos
 
 #: More than this behind the wall clock, and the robot is stopped.

@@ -29,8 +29,6 @@ class Reason(Enum):
     EDGE = "edge"
     #: A debugger or a fault stands the part still.
     HALT = "halt"
-    #: The part has decided the outcome of the run.
-    VERDICT = "verdict"
 
 
 @dataclass(frozen=True, slots=True)

@@ -3,6 +3,7 @@
 import os
 import sys
 from collections.abc import Iterator
+from pathlib import Path
 
 import pytest
 
@@ -19,10 +20,22 @@ def pytest_configure(config: pytest.Config) -> None:
         del os.environ["PYTHONDONTWRITEBYTECODE"]
 
 
+@pytest.hookimpl(tryfirst=True)
+def pytest_sessionstart(session: pytest.Session) -> None:
+    """Stop the first of the two measurements that pytest-cov starts in a worker of xdist; it keeps only the second.
+
+    Where a test of `no_cover` pauses the second, the first would go on: all would be traced.
+    """
+    measuring = getattr(session.config.pluginmanager.getplugin("_cov"), "cov_controller", None)
+    if measuring is not None and hasattr(session.config, "workerinput"):
+        measuring.pause()
+
+
 @pytest.hookimpl(trylast=True)  # hypothesis has marked its own by then
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Count no lines in long and repeating tests, and begin with the long ones.
+    """Count no lines in long and repeating tests, and begin with the long ones, then those of the project as a whole.
 
+    The latter wait for processes, some for half a minute: at the end one worker alone would.
     Tracing makes a simulation three times slower, and the hundredth example runs the lines of the first ten.
     """
     for item in items:
@@ -30,7 +43,7 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
         names = ("slow", "soak") if is_core else ("slow", "soak", "hypothesis")
         if any(item.get_closest_marker(name) for name in names):
             item.add_marker("no_cover")
-    items.sort(key=lambda item: item.get_closest_marker("slow") is None)
+    items.sort(key=lambda item: (item.get_closest_marker("slow") is None, item.path.parent != Path(__file__).parent))
 
 
 @pytest.hookimpl(wrapper=True, tryfirst=True)

@@ -39,7 +39,6 @@ ALLOWED = {
     "p2os.pioneer.body.bullet": {"pybullet", "numpy"},
     "p2os.pioneer.world.formats": {"yaml", "PIL"},
     "p2os.pioneer.body.mujoco": {"mujoco", "numpy"},
-    "p2os.cli.virtual.world_picture": {"matplotlib"},
     "p2os.cli.robots.pad_source": {"pygame"},
     "bluepill_sim": set(),
     "bluepill_sim.core.unicorn_core": {"unicorn"},
@@ -56,7 +55,7 @@ ALLOWED = {
 IO_LAYER = (
     "p2os.__main__", "p2os.transport", "p2os.cli", "p2os.pioneer.serve.host", "p2os.pioneer.serve.background_host",
     "p2os.pioneer.serve.fleet",
-    "p2os.pioneer.serve.control_line", "p2os.client.robot_thread", "p2os.client.aio", "p2os.client.interrupts",
+    "p2os.pioneer.serve.control_line", "p2os.client.robot_thread", "p2os.client.aio", "simbase.interrupts",
     "bluepill_sim.cli", "bluepill_sim.cli.console",
     "robot_bench.cli", "robot_bench.pacer", "robot_bench.live", "robot_bench.report", "robot_bench.firmware.build",
 )  # fmt: skip
@@ -68,7 +67,7 @@ LOGGING = (
 
 #: The map of ARCHITECTURE.md, lowest first: a package imports none of its own row and none above it.
 LAYERS = {
-    "simbase": (("timing", "state", "installation", "wire", "lazy"), ("errors",), ("units",)),
+    "simbase": (("timing", "state", "installation", "wire", "lazy", "interrupts"), ("errors",), ("units",)),
     "p2os": (
         ("errors", "event_log"), ("toml_file",), ("robots", "gamepad"), ("protocol",), ("transport",),
         ("capture", "client", "pioneer"), ("cli",), ("__main__",),
@@ -79,7 +78,7 @@ LAYERS = {
     ),
     "adapter_sim": (
         ("codec",), ("settings", "pinout"), ("pins", "mixing", "encoders", "distances", "session"),
-        ("masters", "driver", "waveforms"), ("adapter",), ("faults",),
+        ("masters", "driver"), ("adapter",),
     ),
     "robot_bench": (
         ("loop", "pacer", "firmware", "scenarios"), ("wires",), ("direct",), ("recording",), ("scenario", "report"),

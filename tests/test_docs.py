@@ -19,6 +19,8 @@ KEPT = {"", "text"}  # drawings, and what is no program
 PAGES = pages()
 #: What a fresh machine has not, so that a block may stand unexecuted.
 REASONS = re.compile(r"needs (hardware|the network|an ESP32|an FTDI adapter|a game pad)\b")
+#: The test that runs all blocks of a page, where some are slow.
+LONG = "test_the_long_examples_of_a_page_run_among_the_others"
 CHECKOUT = re.compile(r"(?:p2os|robot_bench|bluepill_sim|adapter_sim|adapter_fw|hardware|tests|tools|docs)/[\w./-]+")
 
 
@@ -45,7 +47,9 @@ def runnable(*, slow: bool) -> list[Page]:
 
 
 @pytest.mark.parametrize("page", runnable(slow=False), ids=str)
-def test_the_examples_of_a_page_run(page: Page) -> None:
+def test_the_examples_of_a_page_run(page: Page, request: pytest.FixtureRequest) -> None:
+    if any(f"{LONG}[{page}]" == item.name for item in request.session.items):
+        pytest.skip("they run among the long ones")
     run(page, slow=False)
 
 
@@ -141,5 +145,5 @@ def test_the_table_of_verbs_has_every_verb() -> None:
 def test_the_ranges_in_the_pages_are_those_that_the_readers_check_by() -> None:
     generator = runpy.run_path(str(ROOT / "tools" / "generate_ranges.py"))
     texts = [path.read_text(encoding="utf-8") for path in generator["PAGES"]]
-    assert sorted(re.findall(r"<!-- ranges: ([a-z ]+) -->", "".join(texts))) == sorted(generator["tables"]())
+    assert sorted(re.findall(r"<!-- (?:ranges|table): ([a-z ]+) -->", "".join(texts))) == sorted(generator["tables"]())
     assert [generator["page"](text) for text in texts] == texts, "run tools/generate_ranges.py"

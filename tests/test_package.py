@@ -49,10 +49,12 @@ def tracked() -> list[str]:
 
 def python_of(folder: Path, *requirements: str) -> Path:
     """Return the Python of a new environment that holds nothing but what is named."""
-    venv.create(folder, with_pip=True)
-    command = [folder / "bin" / "python", "-m", "pip", "install", "--quiet", "--disable-pip-version-check"]
+    venv.create(folder)
+    command = [sys.executable, "-m", "pip", "--python", folder / "bin" / "python", "install"]
+    # Compiled is what a test imports, and no more: half of the time otherwise.
+    options = ["--quiet", "--disable-pip-version-check", "--no-compile"]
     done = subprocess.run(
-        [*command, "-c", CONSTRAINTS, *requirements],
+        [*command, *options, "-c", CONSTRAINTS, *requirements],
         cwd=folder, capture_output=True, text=True, timeout=LIMIT_S, check=False,
     )  # fmt: skip
     if "No matching distribution found" in done.stderr or "connection" in done.stderr.lower():

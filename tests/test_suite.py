@@ -1,8 +1,11 @@
 """The tests as a whole: what tests/conftest.py promises of each."""
 
+import re
 import subprocess
 import sys
 from pathlib import Path
+
+import pytest
 
 ROOT = Path(__file__).parents[1]
 SUITE = """
@@ -34,23 +37,24 @@ def test_after_it_is_traced():
 """
 
 
-def test_quick_tests_alone_are_traced_and_none_may_end_it(tmp_path: Path) -> None:
+@pytest.mark.parametrize("workers", [[], ["-n", "1"]], ids=["one process", "a worker"])
+def test_quick_tests_alone_are_traced_and_none_may_end_it(tmp_path: Path, workers: list[str]) -> None:
     for name in ("tests/conftest.py", "pyproject.toml"):
         (tmp_path / Path(name).name).write_bytes((ROOT / name).read_bytes())
     (tmp_path / "test_all.py").write_text(SUITE)
+    options = ["-p", "no:cacheprovider", "-vv", "--cov", "--cov-report=", *workers]
     done = subprocess.run(
-        [sys.executable, "-m", "pytest", "-p", "no:cacheprovider", "-vv", "--cov", "--cov-report=", "test_all.py"],
+        [sys.executable, "-m", "pytest", *options, "test_all.py"],
         cwd=tmp_path, capture_output=True, text=True, check=False, timeout=60,
     )  # fmt: skip
-    told = [line for line in done.stdout.splitlines() if line.startswith("test_all.py::")]
-    verdicts = [line.split("::")[1].split()[:2] for line in told]
-    assert verdicts == [
-        ["test_long", "PASSED"],
-        ["test_quick", "PASSED"],
-        ["test_repeating", "PASSED"],
-        ["test_that_ends_the_tracing", "FAILED"],
-        ["test_that_ends_its_own_tracing", "PASSED"],
-        ["test_after_it_is_traced", "PASSED"],
+    told = re.findall(r"(?m)^(?:\[gw0\].*(PASSED|FAILED) )?test_all.py::(\w+)(?: (PASSED|FAILED))?", done.stdout)
+    assert [(name, before or after) for before, name, after in told if before or after] == [
+        ("test_long", "PASSED"),
+        ("test_quick", "PASSED"),
+        ("test_repeating", "PASSED"),
+        ("test_that_ends_the_tracing", "FAILED"),
+        ("test_that_ends_its_own_tracing", "PASSED"),
+        ("test_after_it_is_traced", "PASSED"),
     ], done.stdout
 
 

@@ -1,25 +1,22 @@
 """Drive each body against the things of an arena and measure each contact.
 
     python tools/contact_survey.py                             # thirty headings, three bodies, three models
-    python tools/contact_survey.py --body bullet --headings 6 --csv contacts.csv
-    python tools/contact_survey.py --picture contacts.png      # time to stall and to rest
+    python tools/contact_survey.py --body bullet --headings 6
 
 A robot drives from the middle of the arena with both rims at 0.4 m/s, ramped as the firmware
 ramps, until it meets a thing; the same command goes on for some seconds, then both set-points
 are zero. `Contact.faults` says what of a contact breaks the contract of `body`'s data sheet.
 
-Needs the engines of the bodies, and Matplotlib for the picture. Ends with 1 where a contact
+Needs the engines of the bodies. Ends with 1 where a contact
 breaks the contract.
 """
 
 import argparse
-import csv
 import itertools
 import math
 import sys
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import asdict, dataclass, fields
-from pathlib import Path
+from dataclasses import dataclass
 
 from p2os.pioneer.body.contract import BodyState, RobotBody
 from p2os.pioneer.body.factory import BODY_NAMES, make_body
@@ -196,8 +193,6 @@ def main() -> int:
     parser.add_argument("--model", action="append", help=f"may be given more than once; default: {', '.join(MODELS)}")
     parser.add_argument("--headings", type=int, default=30, help="default: 30")
     parser.add_argument("--seed", type=int, default=1, help="of the arena; default: 1")
-    parser.add_argument("--csv", type=Path, help="write every figure here")
-    parser.add_argument("--picture", type=Path, help="draw the times to stall and to rest here")
     options = parser.parse_args()
     world = load_world("arena", options.seed)
     found = []
@@ -207,48 +202,9 @@ def main() -> int:
         stall, rest = (f"{'never':>7}" if s is None else f"{s:5.2f} s" for s in (one.stall_s, one.rest_s))
         print(f"{one.model:<10} {one.body:<10} {one.heading_deg:5.0f} \N{DEGREE SIGN} {stall} {rest}"
               f" {one.slide_share:6.0%} {one.sign_changes:6} {one.energy:7.2f}", *one.faults(), sep="  ")  # fmt: skip
-    if options.csv:
-        with options.csv.open("w", newline="") as file:
-            writer = csv.DictWriter(file, [field.name for field in fields(Contact)])
-            writer.writeheader()
-            writer.writerows(asdict(one) for one in found)
-    if options.picture:
-        draw(found, options.picture)
     broken = sum(bool(one.faults()) for one in found)
     print(f"{len(found)} contacts, {broken} break the contract")
     return int(broken > 0)
-
-
-def draw(found: Sequence[Contact], path: Path) -> None:
-    """Draw the times to stall and to rest over the heading: a panel for each model and body."""
-    import matplotlib as mpl
-
-    mpl.use("Agg")
-    from matplotlib import pyplot as plt
-
-    models, bodies = (list(dict.fromkeys(getattr(one, key) for one in found)) for key in ("model", "body"))
-    figure, axes = plt.subplots(
-        len(models), len(bodies), sharex=True, sharey=True, squeeze=False, layout="constrained",
-        figsize=(3.2 * len(bodies) + 0.8, 2.2 * len(models) + 0.8),
-    )  # fmt: skip
-    for (row, model), (column, body) in itertools.product(enumerate(models), enumerate(bodies)):
-        panel = axes[row][column]
-        own = [one for one in found if (one.model, one.body) == (model, body)]
-        for times, mark, label in (
-            ([one.stall_s for one in own], "o", "first stall bit"),
-            ([one.rest_s for one in own], "x", "at rest for good"),
-        ):
-            # What never came is drawn at the upper edge.
-            panel.plot([one.heading_deg for one in own], [WATCHED_S if s is None else s for s in times], mark,
-                       markersize=4, fillstyle="none", label=label)  # fmt: skip
-        panel.set_title(f"{model}, {body}", fontsize=9)
-        panel.set_ylim(-0.3, WATCHED_S + 0.3)
-        panel.axhline(DECIDED_S, linewidth=0.6, color="gray")
-        panel.grid(alpha=0.3)
-    axes[0][0].legend(fontsize=7)
-    figure.supxlabel("heading, degrees", fontsize=9)
-    figure.supylabel(f"seconds from the first touch ({WATCHED_S:g}: not within {WATCHED_S:g} s)", fontsize=9)
-    figure.savefig(path, dpi=110)
 
 
 if __name__ == "__main__":

@@ -1,4 +1,4 @@
-"""Fuzz targets for whatever reads bytes or files of others, and a plain mutator to run them with.
+"""Fuzz targets for whatever reads bytes of others, and a plain mutator to run them with; files: `fuzz_files.py`.
 
 A target takes any bytes and raises only when something is wrong: an exception
 that its reader does not promise, or a broken invariant.
@@ -11,10 +11,9 @@ import json
 import random
 import sys
 from collections.abc import Callable, Iterable, Iterator, Mapping
-from importlib.resources import files
 from pathlib import Path
 
-from p2os.capture import Direction, Reading, capture_of, read_capture, rows_of
+from p2os.capture import Direction, Reading, capture_of, rows_of
 from p2os.capture.explain import explain
 from p2os.pioneer.body.factory import make_body
 from p2os.pioneer.controller import Pioneer
@@ -24,10 +23,7 @@ from p2os.protocol.connection import Connection, ConnectionRole, ConnectionState
 from p2os.protocol.frames import GIVE_UP_NS, KEPT_BYTES, MAX_COUNT, PREFIX_BYTES, Decoder, Frame
 from p2os.protocol.packets import packet_frame, read_packet
 from p2os.protocol.profiles import Profile
-from p2os.robots.aria_file import aria_table
-from p2os.robots.model_file import build_parameters, table_of
-from p2os.robots.parameters import known_robots, load_parameters, nearest_model
-from simbase.errors import FileError, P2osError
+from p2os.robots.parameters import load_parameters
 from simbase.timing import NS_PER_MS, Nanos
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -145,48 +141,14 @@ def fuzz_columns(data: bytes) -> None:
             assert ours == theirs, (ours, theirs)
 
 
-def fuzz_captures(data: bytes) -> None:
-    """A file of any content is a capture, or is refused in one line."""
-    try:
-        capture = read_capture(data)
-    except FileError as error:
-        told = str(error)
-    else:
-        told = "".join(row.name for row in rows_of(capture, Reading(profile=Profile.P2OS, parameters=P2DX)))
-    assert "\n" not in told
-
-
-def fuzz_robot_files(data: bytes) -> None:
-    """A parameter file of any content, ARIA's or TOML, is a robot, or is refused in one line."""
-    text = data.decode("utf-8", "replace")
-    is_aria = "Subclass" in text
-    try:
-        table = aria_table("x.p", text, nearest_model) if is_aria else table_of("x.toml", text)
-        parameters = build_parameters("x", table)
-    except P2osError as error:
-        told = str(error)
-    else:
-        told = parameters.subclass
-        assert parameters.distance_nm_per_count > 0
-    assert "\n" not in told
-
-
 TARGETS: Mapping[str, Callable[[bytes], None]] = {
     "decoder": fuzz_decoder, "packets": fuzz_packets, "rows": fuzz_rows, "server": fuzz_server,
-    "client": fuzz_client, "robot": fuzz_robot, "columns": fuzz_columns, "captures": fuzz_captures,
-    "robot-files": fuzz_robot_files,
+    "client": fuzz_client, "robot": fuzz_robot, "columns": fuzz_columns,
 }  # fmt: skip
-
-#: Targets that take bytes as they are; the others take chunks with their times.
-STREAMS = {"columns", "captures"}
 
 
 def seeds(target: str) -> list[bytes]:
     """Return what a target's inputs are mutated from."""
-    if target == "robot-files":
-        shipped = files("p2os.robots")
-        own = [f'based_on = "{name}"\nsubclass = "mine"\n[sonar]\nfitted = 2\n'.encode() for name in known_robots()]
-        return [ARIA_FILE.encode(), shipped.joinpath("p2dx.toml").read_bytes(), *own]
     vectors = json.loads((GOLDEN / "p2os_vectors.json").read_text(encoding="utf-8"))
     frames = [bytes.fromhex(vector["hex"]) for vector in vectors]
     if target == "packets":
@@ -194,35 +156,13 @@ def seeds(target: str) -> list[bytes]:
     found = []
     for path in sorted((GOLDEN / "captures").glob("*.jsonl")):
         lines = path.read_text(encoding="utf-8").splitlines()
-        if target == "captures":
-            found.append("\n".join(lines[:40]).encode())
         for way in ("c2s", "s2c"):
             parts = [bytes.fromhex(entry["hex"]) for entry in map(json.loads, lines) if entry["dir"] == way]
-            if target in STREAMS:
+            if target == "columns":
                 found.append(b"".join(parts)[:4000])
             else:
                 found.append(packed(part[at : at + 255] for part in parts[:60] for at in range(0, len(part), 255)))
-    return found + [frame if target in STREAMS else packed((frame,)) for frame in frames]
-
-
-ARIA_FILE = """;SECTION GENERAL
-Section General settings
-Class Pioneer
-Subclass p2dx
-RobotRadius 250
-DiffConvFactor 0.0056
-DistConvFactor 0.84
-AngleConvFactor 0.00153
-VelConvFactor 1
-RangeConvFactor 0.268
-Vel2Divisor 20
-HasMoveCommand true
-SonarNum 2
-SonarUnit 0 69 136 90
-SonarUnit 1 114 119 50
-FrontBumpers true
-NumFrontBumpers 5
-"""
+    return found + [frame if target == "columns" else packed((frame,)) for frame in frames]
 
 
 def mutated(data: bytes, rng: random.Random) -> bytes:

@@ -1,7 +1,7 @@
-"""Write the ranges of every number of every file format into its page, from the tables that the readers check by.
+"""Write into their pages what the files' readers and writers check by: ranges of numbers, and what a format holds.
 
-What stands between `<!-- ranges: NAME -->` and `<!-- end -->` is generated; a test holds the committed pages to what
-comes out here.
+What stands between `<!-- ranges: NAME -->`, or `table: NAME`, and `<!-- end -->` is generated; a test holds the
+committed pages to what comes out here.
 Usage: python tools/generate_ranges.py [--check]
 """
 
@@ -13,6 +13,8 @@ from pathlib import Path
 from adapter_sim import pinout
 from p2os.pioneer import sensor_errors
 from p2os.pioneer.controller import faults, flash
+from p2os.pioneer.export.formats import FORMATS
+from p2os.pioneer.export.scene import Property
 from p2os.pioneer.serve import fleet_file
 from p2os.pioneer.world import model as world
 from p2os.robots import model_file
@@ -21,7 +23,7 @@ from robot_bench.scenario.schema import Key
 
 ROOT = Path(__file__).resolve().parents[1]
 PAGES = tuple(ROOT / "docs" / name for name in ("worlds.md", "scenarios.md", "pioneer.md", "adapter.md"))
-BLOCK = re.compile(r"(<!-- ranges: (?P<name>[a-z ]+) -->\n)(?P<body>.*?)(<!-- end -->)", re.DOTALL)
+BLOCK = re.compile(r"(<!-- (?:ranges|table): (?P<name>[a-z ]+) -->\n)(?P<body>.*?)(<!-- end -->)", re.DOTALL)
 #: Table → key → its range in words.
 Ranges = Mapping[str, Mapping[str, str]]
 
@@ -66,6 +68,17 @@ def _poses(names: Sequence[str], ranges: Sequence[tuple[float, float]]) -> dict[
     return dict(zip(names, ranges, strict=True))
 
 
+def exports() -> str:
+    """Return what the formats hold of a world and a robot: a row a property, a column a format."""
+    made = {one.title: one for one in FORMATS.values()}
+    rows = [f"| | {' | '.join(made)} |", f"|---|{'---|' * len(made)}"]
+    for prop in Property:
+        cells = (one.cell(prop) for one in made.values())
+        words = (("yes" if cell.held else "**no**") + (f": {cell.how}" if cell.how else "") for cell in cells)
+        rows.append(f"| {prop.value} | {' | '.join(words)} |")
+    return "\n".join(rows)
+
+
 def tables() -> dict[str, str]:
     """Return every generated table by its name."""
     robots = {f"`[{name}]`": plain(keys) for name, keys in model_file.RANGES.items()}
@@ -82,6 +95,7 @@ def tables() -> dict[str, str]:
         "faults": _one({word: (0.0, most) for word, most in faults.MOST.items()}),
         "flash": _one(flash.RANGES),
         "pinout": _one(pinout.RANGES),
+        "exports": exports(),
     }
 
 

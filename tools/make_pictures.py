@@ -2,7 +2,7 @@
 
 Usage: python -m tools.make_pictures [--check] [--all] [--folder DIR]
 
-Each picture carries a hash of its inputs (world, scenario and firmware, the board's files,
+Each picture carries a hash of its inputs (scenario and firmware, the board's files,
 and the code that draws) as a PNG text chunk. Without options the pictures whose inputs have
 changed are made anew. `--check` makes none, names them, and ends with 1 where there are any.
 
@@ -25,7 +25,6 @@ from pathlib import Path
 from hardware.pcb.circuit.design import BOARD_VARIANTS, VARIANTS
 from hardware.pcb.outputs import generated_files, pictures
 from hardware.pcb.spice.decks import decks
-from p2os.pioneer.world import known_worlds, load_world
 
 ROOT = Path(__file__).resolve().parent.parent
 PICTURES = ROOT / "docs" / "pictures"
@@ -33,7 +32,6 @@ PICTURES = ROOT / "docs" / "pictures"
 KEYWORD = b"inputs"
 SIGNATURE = b"\x89PNG\r\n\x1a\n"
 WORLDS = "p2os/pioneer/world/worlds"
-DRAWING = ("p2os/pioneer/world/drawing.py", "p2os/cli/virtual/world_picture.py")
 REPORT = tuple(f"robot_bench/report/{name}.py" for name in ("page", "plan", "plots", "thinning"))
 BOARD = "hardware/pcb/outputs/pictures.py"
 
@@ -64,9 +62,6 @@ class Group:
 
 def groups() -> Iterator[Group]:
     """Yield all that docs/pictures holds."""
-    for world in known_worlds():
-        yield Group(names=(f"world-{world}.png",), files=(f"{WORLDS}/{world}.toml", *DRAWING),
-                    make=lambda world=world: make_world(world))  # fmt: skip
     files = ("robot_bench/scenarios/dodge.toml", f"{WORLDS}/room.toml", "robot_bench/firmware/dodge.elf", *REPORT)
     yield Group(names=("demo.png",), files=files, make=make_demo)
     for variant in BOARD_VARIANTS:
@@ -82,13 +77,6 @@ def groups() -> Iterator[Group]:
     for deck in decks():
         yield Group(names=(f"board/sim-{deck.name}.png",), files=(BOARD,), text=repr(deck),
                     make=lambda deck=deck: make_plot(deck))  # fmt: skip
-
-
-def make_world(name: str) -> None:
-    """Draw a world that ships."""
-    from p2os.cli.virtual.world_picture import write_png
-
-    write_png(load_world(name), PICTURES / f"world-{name}.png")
 
 
 def make_demo() -> None:

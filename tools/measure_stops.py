@@ -221,7 +221,6 @@ class Driver:
 
     process: subprocess.Popen[bytes]
     slept: mmap.mmap
-    feeder: Callable[[], None] | None = None
     is_held: threading.Event = field(default_factory=threading.Event)
     ends: list[int] = field(default_factory=list)
     #: Processes beside it that belong to it.

@@ -15,8 +15,8 @@ from typing import Any
 PORTS, PINS = 5, 16
 #: How many of the last rows are kept with or without a recorder; a power of 2.
 LAST_ROWS = 32
-#: Bytes of a priority, one an exception, and those to fill up.
-EXCEPTIONS, PRIORITY_BYTES = 76, 80
+#: Exceptions of the architecture that a chip of the family can have.
+EXCEPTIONS = 76
 #: Characters that wait in C to arrive at a USART; the others wait in Python.
 RECEIVED = 256
 
@@ -93,7 +93,8 @@ SHARED = Struct(
         Field("is_first", "u32", doc="the recorder has not had a row yet"),
         Field("raised_pc", "u32", doc="the access that raised the last exception: its instruction,"),
         Field("raised_cycle", "u64", doc="and when its block began"),
-        Field("priorities", "u8", PRIORITY_BYTES),
+        Field("priorities", "u8", EXCEPTIONS, "one an exception"),
+        Field("priorities_end", "u8", 4),
         *(Field(name, "u64", doc="set by Python before the first run") for name in ("sram", "flash")),
         *_fields("u32", "sram_base", "sram_bytes", "flash_base", "flash_bytes", "scratch", "padding"),
         Field("exact_stops", "u64", doc="how often a run was stopped to learn which instruction makes an access"),

@@ -99,6 +99,7 @@ _FUNCTIONS = {
     "fabric_pins_changed": "vpu",
     "fabric_offer": "vpuuu",
     "fabric_last_output": "lp",
+    "fabric_forget_output": "vp",
     "fabric_subscribe": "ippppp",
     "fabric_stop_at": "vpup",
     "fabric_unsubscribe": "vpu",

@@ -104,6 +104,7 @@ class Fabric(Stateful):
         self._chip = chip
         self._calls_of_c = calls = library()
         self._failure: BaseException | None = None
+        self._names: dict[int, str] = {}
         self._acts: dict[int, Callable[[Nanos], None]] = {}
         self._answers: dict[int, Callable[[int, int], int]] = {}
         self._deliveries: dict[int, Callable[[], None]] = {}
@@ -184,14 +185,15 @@ class Fabric(Stateful):
 
     # Devices.
 
-    def add_slot(self, act: Callable[[Nanos], None]) -> int:
+    def add_slot(self, name: str, act: Callable[[Nanos], None]) -> int:
         """Take a slot for a device in Python, called with the time that was due; return its number."""
-        slot = self._new_slot()
+        slot = self._new_slot(name)
         self._acts[slot] = act
         return slot
 
     def add_device(
         self,
+        name: str,
         kind: str,
         words: int,
         state: int,
@@ -203,14 +205,15 @@ class Fabric(Stateful):
         """Take a slot for a device in C; return its number.
 
         Args:
-            kind: its name in `source/devices.c`.
+            name: its own, for messages.
+            kind: that of its kind in `source/devices.c`.
             words: where its registers are in the host's memory.
             state: and what it holds beside them.
             act: called when it is due, where its kind leaves that to Python.
             answer: called with what it asks.
             deliver: called when the words that it has sent must be taken over.
         """
-        slot = self._new_slot()
+        slot = self._new_slot(name)
         if not self._calls_of_c.fabric_add_device(self.handle, slot, kind.encode(), words, state):
             raise ValueError(f"no kind of device is called {kind!r}")
         self._acts[slot], self._answers[slot], self._deliveries[slot] = act, answer, deliver
@@ -284,6 +287,7 @@ class Fabric(Stateful):
     @ports.setter
     def ports(self, ports: bytes) -> None:
         ctypes.memmove(self.port_structs, ports, len(ports))
+        self._calls_of_c.fabric_forget_output(self.handle)
 
     # Pins, for `PinBank`.
 
@@ -352,16 +356,17 @@ class Fabric(Stateful):
 
     # Callbacks.
 
-    def _new_slot(self) -> int:
+    def _new_slot(self, name: str) -> int:
         slot: int = self._calls_of_c.fabric_add_slot(self.handle)
         if slot < 0:
             raise ValueError("the queue of events has no slot left")
+        self._names[slot] = name
         return slot
 
     def _event(self, slot: int, at_ns: Nanos) -> None:
         self._acts[slot](at_ns)
         if self._due(self.handle, slot) <= at_ns:
-            raise RuntimeError(f"slot {slot} is still due at {at_ns} ns after acting then")
+            raise RuntimeError(f"{self._names[slot]} is still due at {at_ns} ns after acting then")
 
     def _electrical(self, pin: int, what: int) -> None:
         self.electrical(pin, what)

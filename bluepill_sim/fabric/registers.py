@@ -293,11 +293,11 @@ class Peripheral(Stateful):
 
     def _take_slot(self) -> int:
         if self.KIND is None:
-            return self.fabric.add_slot(self.advance_to)
+            return self.fabric.add_slot(self.name, self.advance_to)
         words, _ = self.words.buffer_info()
         state = 0 if self.native is None else ctypes.addressof(self.native)
         slot = self.fabric.add_device(
-            self.KIND, words, state, act=self.advance_to, answer=self.answer, deliver=self.deliver
+            self.name, self.KIND, words, state, act=self.advance_to, answer=self.answer, deliver=self.deliver
         )
         for output, irq in enumerate(self.place.irqs):
             self.fabric.put_output(slot, output, irq)

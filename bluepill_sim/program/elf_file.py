@@ -13,7 +13,7 @@ from bluepill_sim.errors import ImageError
 from bluepill_sim.program.image import Image
 from bluepill_sim.stm32f103 import FLASH_BASE, FLASH_BYTES, FLASH_BYTES_FITTED, SRAM_BASE, SRAM_BYTES
 
-_SHF_ALLOC, _SHF_EXECINSTR = 2, 4
+_SHF_ALLOC = 2
 
 
 @dataclass(frozen=True, slots=True)
@@ -26,7 +26,6 @@ class Section:
     #: Whether its bytes stand in the flash, and whether it stands in SRAM while the program runs.
     in_flash: bool
     in_sram: bool
-    is_code: bool
 
 
 @dataclass(frozen=True, slots=True)
@@ -92,7 +91,7 @@ def _sections(data: bytes) -> "list[Section]":
             continue
         in_sram = SRAM_BASE <= address < SRAM_BASE + SRAM_BYTES
         has_bytes = section["sh_type"] != "SHT_NOBITS"
-        found.append(Section(section.name, address, size, has_bytes, in_sram, bool(flags & _SHF_EXECINSTR)))
+        found.append(Section(section.name, address, size, has_bytes, in_sram))
     return found
 
 

@@ -18,7 +18,7 @@ import math
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from enum import Enum
-from typing import cast
+from typing import Protocol, cast
 
 from p2os.capture.chunks import Chunk, Direction
 from p2os.capture.describe import PacketFields, Plain, command_fields, command_name
@@ -35,10 +35,11 @@ from p2os.protocol.frames import (
     Item,
     Noise,
     Stalled,
+    sound_frames,
 )
 from p2os.protocol.packets import IDENTITY_KIND, RESET_KINDS, packet_name
 from p2os.protocol.profiles import Profile
-from p2os.protocol.sip import HEAD_BYTES, READING_BYTES, SIP_KINDS, unpack_head
+from p2os.protocol.sip import SIP_KINDS, is_sip
 from p2os.robots.parameters import RobotParameters
 from simbase.timing import NS_PER_MS, NS_PER_S, Nanos
 
@@ -99,7 +100,7 @@ class ListingRow:
     @property
     def is_sip(self) -> bool:
         """Whether this is a standard SIP and sound inside, if the robot has sent it."""
-        return self.kind in SIP_KINDS and unpack_head(self.data[PREFIX_BYTES:-CHECKSUM_BYTES]) is not None
+        return self.kind in SIP_KINDS and is_sip(self.data[PREFIX_BYTES:-CHECKSUM_BYTES])
 
     def as_plain(self) -> dict[str, Plain]:
         """Return it as JSON wants it: `t` in seconds."""
@@ -113,14 +114,24 @@ class ListingRow:
         }
 
 
+class Passing(Protocol):
+    """What finds the sound frames that bytes begin with, and says which of them need no row."""
+
+    def frames(self, data: bytes, direction: Direction | None) -> tuple[list[tuple[int, int, bool]], int]:
+        """Return where each payload begins and ends and whether it is passed over, and where the frames end."""
+        ...
+
+
 class Lister:
     """Turns chunks into rows as they come.
 
     Args:
         reading: How to read what stands in the frames.
+        passing: Which packets are passed over; None for none.
     """
 
-    def __init__(self, reading: Reading) -> None:
+    def __init__(self, reading: Reading, passing: Passing | None = None) -> None:
+        self._passing = passing
         self._packets = PacketFields(reading.profile, reading.parameters)
         self._session = RecordedSession()
         self._streams: dict[Direction | None, _Stream] = {}
@@ -130,9 +141,28 @@ class Lister:
         if chunk.direction not in self._streams:
             self._streams[chunk.direction] = _Stream(chunk.direction)
         yield from self.advance_to(chunk.at_ns)
-        stream = self._streams[chunk.direction]
-        stream.decoder.receive(chunk.data, chunk.at_ns)
-        yield from self._drain(stream, chunk.at_ns)
+        stream, now = self._streams[chunk.direction], chunk.at_ns
+        rest = chunk.data
+        if rest and (waiting := stream.decoder.take_back()) is not None:
+            # Most bytes are sound frames, one behind the other: these need no second look.
+            data, place = waiting + rest, 0
+            if self._passing is not None:
+                frames, place = self._passing.frames(data, stream.direction)
+                for start, end, is_passed in frames:
+                    if is_passed:
+                        self._session.name_of(data[start:end], Direction.FROM_ROBOT, now)
+                    else:
+                        whole = data[start - PREFIX_BYTES : end + CHECKSUM_BYTES]
+                        yield self._frame_row(stream.direction, data[start:end], whole, now)
+            else:
+                for payload in sound_frames(data):
+                    end = place + len(payload) + PREFIX_BYTES + CHECKSUM_BYTES
+                    yield self._frame_row(stream.direction, payload, data[place:end], now)
+                    place = end
+            stream.consume(place)
+            rest = data[place:]
+        stream.decoder.receive(rest, now)
+        yield from self._drain(stream, now)
 
     def advance_to(self, now: Nanos) -> Iterator[ListingRow]:
         """Yield what has been given up by `now` nanoseconds: frames whose rest never came."""
@@ -154,8 +184,9 @@ class Lister:
 
     def _row(self, stream: "_Stream", item: Item, now: Nanos) -> ListingRow | None:
         if isinstance(item, Frame):
-            stream.consume(len(item.to_bytes()))
-            return self._frame_row(stream.direction, item, now)
+            whole = item.to_bytes()
+            stream.consume(len(whole))
+            return self._frame_row(stream.direction, item.payload, whole, now)
         if isinstance(item, Noise):
             shown = stream.consume_noise(item.data)
             if not shown:
@@ -172,25 +203,21 @@ class Lister:
         stream.reject(len(item.data))
         return _damage(stream, now, item.data, "cut off", _cut_off(item))
 
-    def _frame_row(self, direction: Direction | None, frame: Frame, now: Nanos) -> ListingRow:
+    def _frame_row(self, direction: Direction | None, payload: bytes, whole: bytes, now: Nanos) -> ListingRow:
         if direction is None:
-            direction = guess_direction(frame)
-        kind = frame.payload[0]
-        name = self._session.name_of(frame, direction, now)
+            direction = guess_direction(payload)
+        kind = payload[0]
+        name = self._session.name_of(payload, direction, now)
         if direction is Direction.FROM_ROBOT:
-            return ListingRow(
-                at_ns=now, direction=direction, data=frame.to_bytes(), kind=kind, name=name or packet_name(kind),
-                describe=self._packets.fields_of,
-            )  # fmt: skip
-        return ListingRow(
-            at_ns=now, direction=direction, data=frame.to_bytes(), kind=kind, name=name or command_name(kind),
-            describe=command_fields,
-        )  # fmt: skip
+            name, describe = name or packet_name(kind), self._packets.fields_of
+        else:
+            name, describe = name or command_name(kind), command_fields
+        return ListingRow(at_ns=now, direction=direction, data=whole, kind=kind, name=name, describe=describe)
 
 
-def rows_of(chunks: Iterable[Chunk], reading: Reading) -> Iterator[ListingRow]:
-    """Yield every row of a capture, or of chunks while they are read."""
-    lister, last_ns = Lister(reading), 0
+def rows_of(chunks: Iterable[Chunk], reading: Reading, passing: Passing | None = None) -> Iterator[ListingRow]:
+    """Yield every row of a capture, or of chunks while they are read; none of what is passed over."""
+    lister, last_ns = Lister(reading, passing), 0
     for chunk in chunks:
         last_ns = chunk.at_ns
         yield from lister.take(chunk)
@@ -281,45 +308,46 @@ class RecordedSession:
         """Whether a session is open, as far as was captured."""
         return self._state is _State.OPEN
 
-    def name_of(self, frame: Frame, direction: Direction | None, now: Nanos) -> str:
-        """Take a frame; return its name if it is one of the six, else an empty string."""
+    def name_of(self, payload: bytes, direction: Direction | None, now: Nanos) -> str:
+        """Take a frame's payload; return its name if it is one of the six, else an empty string."""
+        kind, has_data = payload[0], len(payload) > 1
         if direction is Direction.FROM_ROBOT:
-            return self._take_packet(frame, now)
-        if frame.kind > CommandNumber.CLOSE:
+            return self._take_packet(kind, now, has_data=has_data)
+        if kind > CommandNumber.CLOSE:
             return ""
-        if self._state is _State.SYNCED and frame.kind == CommandNumber.OPEN:
+        if self._state is _State.SYNCED and kind == CommandNumber.OPEN:
             self._state = _State.OPEN
-        is_command = self._state is _State.OPEN or (bool(frame.data) and frame.kind != CommandNumber.PULSE)
+        is_command = self._state is _State.OPEN or (has_data and kind != CommandNumber.PULSE)
         if not is_command:
-            return SYNC_NAMES[frame.kind]
-        if frame.kind == CommandNumber.CLOSE:
+            return SYNC_NAMES[kind]
+        if kind == CommandNumber.CLOSE:
             self._state, self._closed_at = _State.CLOSED, now
-        return COMMAND_NAMES[frame.kind]
+        return COMMAND_NAMES[kind]
 
-    def _take_packet(self, frame: Frame, now: Nanos) -> str:
-        if frame.kind == IDENTITY_KIND and frame.data:
+    def _take_packet(self, kind: int, now: Nanos, *, has_data: bool) -> str:
+        if kind > IDENTITY_KIND and kind not in RESET_KINDS:
+            if self._closed_at is None or now > self._closed_at + IN_FLIGHT_NS:
+                self._state, self._closed_at = _State.OPEN, None
+        elif kind == IDENTITY_KIND and has_data:
             self._state = _State.SYNCED
-        elif frame.kind in RESET_KINDS:
+        elif kind in RESET_KINDS:
             self._state = _State.CLOSED
-        elif frame.kind > IDENTITY_KIND and (self._closed_at is None or now > self._closed_at + IN_FLIGHT_NS):
-            self._state, self._closed_at = _State.OPEN, None
-        elif frame.kind <= IDENTITY_KIND and not frame.data:
+        elif not has_data:
             self._state = _State.CLOSED
-            return SYNC_NAMES[frame.kind]
+            return SYNC_NAMES[kind]
         return ""
 
 
-def guess_direction(frame: Frame) -> Direction | None:
+def guess_direction(payload: bytes) -> Direction | None:
     """Return who is likely to have sent a frame, by its shape; None where both would send the same bytes."""
-    data = frame.data
-    if frame.kind <= IDENTITY_KIND and not data:
-        return None
-    if frame.kind == IDENTITY_KIND and data.count(b"\0") >= 3 and data[-1:] == b"\0":
+    kind = payload[0]
+    if kind in SIP_KINDS and is_sip(payload):
         return Direction.FROM_ROBOT
-    if frame.kind in SIP_KINDS and len(frame.payload) >= HEAD_BYTES:
-        readings = frame.payload[19]
-        if len(frame.payload) >= HEAD_BYTES + READING_BYTES * readings:
-            return Direction.FROM_ROBOT
+    data = payload[1:]
+    if kind <= IDENTITY_KIND and not data:
+        return None
+    if kind == IDENTITY_KIND and data.count(b"\0") >= 3 and data[-1:] == b"\0":
+        return Direction.FROM_ROBOT
     if _is_argument(data):
         return Direction.TO_ROBOT
     return Direction.FROM_ROBOT

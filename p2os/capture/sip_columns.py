@@ -3,9 +3,11 @@
 Invariant: cell by cell what `ListingRow.fields` says, positions left out: those are followed by who makes a table.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Iterator, Sequence
+from typing import cast, overload
 
-from p2os.capture.describe import RAW_OF, Plain, SipFields
+from p2os.capture.cells import Cell, cell_text
+from p2os.capture.describe import RAW_OF, Memo, Plain, SipFields
 from p2os.capture.listing import ListingRow
 from p2os.protocol.frames import CHECKSUM_BYTES, PREFIX_BYTES
 from p2os.protocol.profiles import Profile
@@ -24,6 +26,53 @@ from p2os.robots.parameters import RobotParameters
 _Place = tuple[int, float]
 
 
+#: Raw value of a cell that is not there.
+_ABSENT = -1
+
+
+class Conversion:
+    """What a field says of each raw value that occurs, and how that stands in CSV.
+
+    Args:
+        cells: The field.
+    """
+
+    def __init__(self, cells: Memo[Plain]) -> None:
+        self.cell_of = cast("Callable[[int], Cell]", cells.__getitem__)
+        self.text_of: Callable[[int], str] = Memo(lambda raw: cell_text(self.cell_of(raw))).__getitem__
+
+
+class RawColumn(Sequence[Cell]):
+    """A column whose cells are converted when they are asked for.
+
+    Args:
+        raw: The raw values.
+        conversion: What they say.
+    """
+
+    def __init__(self, raw: Sequence[int], conversion: Conversion) -> None:
+        self._raw, self._conversion = raw, conversion
+
+    def texts(self) -> Sequence[str]:
+        """Return each cell as it stands in CSV."""
+        return list(map(self._conversion.text_of, self._raw))
+
+    def __len__(self) -> int:
+        return len(self._raw)
+
+    def __iter__(self) -> Iterator[Cell]:
+        return map(self._conversion.cell_of, self._raw)
+
+    @overload
+    def __getitem__(self, place: int) -> Cell: ...
+    @overload
+    def __getitem__(self, place: slice) -> "RawColumn": ...
+    def __getitem__(self, place: int | slice) -> "Cell | RawColumn":
+        if isinstance(place, slice):
+            return RawColumn(self._raw[place], self._conversion)
+        return self._conversion.cell_of(self._raw[place])
+
+
 class SipColumns:
     """Makes columns of SIPs.
 
@@ -36,8 +85,12 @@ class SipColumns:
         self._fields = SipFields(profile, parameters)
         port, gripper = ("second", "first") if profile.has_gripper_first else ("first", "second")
         self._renamed = {"analog_port": port, "gripper_state": gripper}
+        self._conversions = {name: Conversion(memo) for name, memo in self._fields.memos.items() if memo is not None}
+        ranges = self._fields.sonar
+        ranges[_ABSENT] = None
+        self._range = Conversion(ranges)
 
-    def of(self, rows: Sequence[ListingRow]) -> dict[str, list[Plain]] | None:
+    def of(self, rows: Sequence[ListingRow]) -> dict[str, Sequence[Cell]] | None:
         """Return the columns in the order in which the rows first have them; None if not all are sound SIPs."""
         payloads = [row.data[PREFIX_BYTES:-CHECKSUM_BYTES] for row in rows if row.kind in SIP_KINDS]
         heads = [head for head in map(unpack_head, payloads) if head is not None]
@@ -50,42 +103,42 @@ class SipColumns:
         for side, bumpers in (("left", "rear_bumpers"), ("right", "front_bumpers")):
             raw[f"stall_{side}"] = tuple([value & 1 for value in raw[side]])
             raw[bumpers] = tuple([value >> 1 for value in raw[side]])
-        found: dict[_Place, tuple[str, list[Plain]]] = {}
-        for place, (name, memo) in enumerate(self._fields.memos.items()):
-            if memo is None:
+        found: dict[_Place, tuple[str, Sequence[Cell]]] = {}
+        for place, name in enumerate(self._fields.memos):
+            if name == "sonar_m":
                 found |= self._sonar(heads, place)
             else:
                 raw_name = RAW_OF[name]
                 column = raw[self._renamed.get(raw_name, raw_name)]
-                found[0, place] = name, list(map(memo.__getitem__, column))
+                found[0, place] = name, RawColumn(column, self._conversions[name])
         found |= self._tail(payloads, raw["count"], len(self._fields.memos))
         return dict(found[order] for order in sorted(found))
 
-    def _sonar(self, heads: list[tuple[int, ...]], place: int) -> dict[_Place, tuple[str, list[Plain]]]:
+    def _sonar(self, heads: list[tuple[int, ...]], place: int) -> dict[_Place, tuple[str, Sequence[Cell]]]:
         begin, end = len(BEFORE_SONAR), -len(BEHIND_SONAR)
-        columns: dict[int, list[Plain]] = {}
-        found, none = {}, [None] * len(heads)
-        memo = self._fields.sonar
+        columns: dict[int, list[int]] = {}
+        found: dict[_Place, tuple[str, Sequence[Cell]]] = {}
         for row, head in enumerate(heads):
-            for at in range(begin, len(head) + end, 2):
-                number = head[at]
+            numbers = head[begin:end:2]
+            for number, raw_range in zip(numbers, head[begin + 1 : end : 2], strict=True):
                 if number not in columns:
-                    columns[number] = list[Plain](none)
-                    found[row, place + (at - begin) / 512] = f"sonar_m_{number}", columns[number]
-                columns[number][row] = memo[head[at + 1]]
+                    columns[number] = [_ABSENT] * len(heads)
+                    column = RawColumn(columns[number], self._range)
+                    found[row, place + numbers.index(number) / 256] = f"sonar_m_{number}", column
+                columns[number][row] = raw_range
         return found
 
     def _tail(
         self, payloads: list[bytes], counts: tuple[int, ...], place: int
-    ) -> dict[_Place, tuple[str, list[Plain]]]:
-        columns: dict[str, list[Plain]] = {}
-        found = {}
+    ) -> dict[_Place, tuple[str, Sequence[Cell]]]:
+        columns: dict[str, list[Cell]] = {}
+        found: dict[_Place, tuple[str, Sequence[Cell]]] = {}
         for row, (payload, count) in enumerate(zip(payloads, counts, strict=True)):
             size = HEAD_BYTES + READING_BYTES * count
             if size == len(payload):
                 continue
             values, end = unpack_tail(payload, size)
-            cells: list[Plain] = list(values)
+            cells: list[Cell] = list(values)
             names = self._fields.tail[: len(cells)]
             if end < len(payload):
                 names, cells = (*names, "rest"), [*cells, payload[end:].hex(" ")]

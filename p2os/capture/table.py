@@ -14,18 +14,17 @@ import json
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import chain, islice
-from typing import IO, Protocol, TypeAlias, cast, runtime_checkable
+from typing import IO, Protocol, runtime_checkable
 
+from p2os.capture.cells import Cell, cell_text, quoted
 from p2os.capture.chunks import Direction
 from p2os.capture.describe import Plain
 from p2os.capture.listing import ListingRow, Reading
 from p2os.capture.sip_columns import SipColumns
-from p2os.protocol.odometry import Unwrapper
 from p2os.protocol.sip import POSITION_MASK
 from p2os.robots.parameters import RobotParameters
 from simbase.timing import NS_PER_S
 
-Cell: TypeAlias = "bool | int | float | str | None"
 #: Columns that every table begins with.
 LEADING = ("t_s", "dir", "type", "name", "valid")
 #: Cells whose column the beginning did not have.
@@ -120,7 +119,7 @@ def write_csv(tables: Iterable[Table], file: IO[str]) -> int:
     for table in tables:
         if not texts:
             texts = {name: _Texts() for name in table.columns}
-            file.write(",".join(map(_quoted, texts)) + "\n")
+            file.write(",".join(map(quoted, texts)) + "\n")
         columns = [
             column.texts() if isinstance(column, TextColumn) else texts[name].of(column)
             for name, column in table.columns.items()
@@ -160,17 +159,6 @@ class _Texts:
         return list(map(known.__getitem__, column))
 
 
-def cell_text(cell: Cell) -> str:
-    """Return a cell as it stands in CSV."""
-    return "" if cell is None else _quoted(cell) if isinstance(cell, str) else str(cell)
-
-
-def _quoted(text: str) -> str:
-    if any(character in text for character in ',"\r\n'):
-        return '"' + text.replace('"', '""') + '"'
-    return text
-
-
 def _kinds(column: Sequence[Cell]) -> set[type]:
     return set(map(type, column)) - {type(None)}
 
@@ -192,16 +180,14 @@ class _Tables:
             [row.valid for row in rows],
         )
         columns: dict[str, Sequence[Cell]] = dict(zip(LEADING, leading, strict=True))
-        columns |= cast("dict[str, list[Cell]]", self._sips.of(rows)) or _described(rows)
+        columns |= self._sips.of(rows) or _described(rows)
         if "x_m" in columns:
-            columns["x_m"], columns["y_m"] = (
-                [cell if cell is None else place.follow(row.data) for row, cell in zip(rows, column, strict=True)]
-                for place, column in ((self._x, columns["x_m"]), (self._y, columns["y_m"]))
-            )
+            has = [cell is not None for cell in columns["x_m"]]
+            columns["x_m"], columns["y_m"] = self._x.follow(rows, has), self._y.follow(rows, has)
         return Table(columns)
 
 
-def _described(rows: list[ListingRow]) -> dict[str, list[Cell]]:
+def _described(rows: list[ListingRow]) -> dict[str, Sequence[Cell]]:
     found: list[dict[str, Cell]] = []
     names: dict[str, None] = {}
     for row in rows:
@@ -228,13 +214,21 @@ class _Place:
     def __init__(self, parameters: RobotParameters, offset: int) -> None:
         self._metres = parameters.distance_conv_mm / 1000
         self._offset = offset
-        self._counter = Unwrapper(POSITION_MASK + 1)
-        self._first: int | None = None
+        self._counts = 0
+        self._last = 0
 
-    def follow(self, frame: bytes) -> float:
-        """Return the coordinate in metres; the first one lies within half a span of 0."""
-        raw = int.from_bytes(frame[self._offset : self._offset + 2], "little") & POSITION_MASK
-        if self._first is None:
-            self._first = raw if raw <= POSITION_MASK // 2 else raw - POSITION_MASK - 1
-        self._counter.update(raw)
-        return round((self._first + self._counter.total) * self._metres, 6)
+    def follow(self, rows: Sequence[ListingRow], has: Sequence[bool]) -> list[Cell]:
+        """Return the coordinate in metres where rows have one; the first one lies within half a span of 0."""
+        metres, first, second = self._metres, self._offset, self._offset + 1
+        counts, last, half, found = self._counts, self._last, (POSITION_MASK + 1) // 2, list[Cell]()
+        for row, there in zip(rows, has, strict=True):
+            if not there:
+                found.append(None)
+                continue
+            raw = (row.data[first] | row.data[second] << 8) & POSITION_MASK
+            # The nearer way round; also from 0 to the first.
+            counts += (raw - last + half & POSITION_MASK) - half
+            last = raw
+            found.append(round(counts * metres, 6))
+        self._counts, self._last = counts, last
+        return found

@@ -33,7 +33,7 @@ class Tap:
             frame = frame_of(piece)
             if frame is None:
                 continue
-            self._session.name_of(frame, direction, now)
+            self._session.name_of(frame.payload, direction, now)
             if direction is Direction.TO_ROBOT and frame.kind >= CommandNumber.CLOSE:
                 self._was_commanded = frame.kind > CommandNumber.CLOSE
             if direction is Direction.TO_ROBOT and frame.kind == CommandNumber.HOSTBAUD:

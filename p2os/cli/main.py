@@ -134,6 +134,8 @@ def make_app(words: Sequence[str] = ()) -> typer.Typer:
     completed = completed_words(os.environ)
     first = next((word for word in (words if completed is None else completed) if not word.startswith("-")), None)
     wanted = [entry for entry in found if entry.name == first]
+    if first is None and "--version" in words:
+        return app  # no verb is wanted
     if completed is not None and not wanted:
         for entry in found:  # only their names are wanted: a TAB is to be quick
             app.command(entry.name)(lambda: None)

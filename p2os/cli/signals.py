@@ -23,8 +23,8 @@ from collections.abc import Iterator
 from types import FrameType, TracebackType
 from typing import Self
 
-from p2os.client.interrupts import FATAL, signal_numbers
 from p2os.transport.wall_clock import wall_clock
+from simbase.interrupts import FATAL, signal_numbers
 from simbase.timing import NS_PER_S, Nanos
 
 #: Caught even where they are ignored: shells start background programs with the keyboard's two ignored.

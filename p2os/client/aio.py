@@ -26,7 +26,6 @@ from p2os.client.aux_ports import AsyncAux
 from p2os.client.calls import Result, RobotCalls
 from p2os.client.core import PacketType, RobotCore, request_for
 from p2os.client.goals import Axis, DriveAxis, MotionResult, TurnAxis, as_number
-from p2os.client.interrupts import exit_on_signals
 from p2os.client.line import Line, core_for, motion_result, no_answer, not_connected, not_found
 from p2os.client.notices import Notice
 from p2os.client.robot_state import Link, RobotState
@@ -39,6 +38,7 @@ from p2os.transport.ports import Transport
 from p2os.transport.waiting import BLIND_POLL_S
 from p2os.transport.wall_clock import Clock, wall_clock
 from simbase.errors import P2osError
+from simbase.interrupts import exit_on_signals
 from simbase.timing import NS_PER_S, Nanos
 
 __all__ = ["Robot"]

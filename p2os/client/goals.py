@@ -3,7 +3,8 @@
 MOVE and HEAD have no answer and can be lost like any frame, so each packet's
 odometry is held against what was asked: a robot that stands short of its goal
 is sent on, one that stalls, does not start, or takes too long ends the goal
-with its reason. HEAD names an absolute heading and is repeated; MOVE is
+with its reason. A robot that still comes nearer does not take too long, however
+slowly it goes, unless the program gave a limit of its own. HEAD names an absolute heading and is repeated; MOVE is
 relative and never is: what is left is asked for when the robot stands.
 
 Long ways go in legs: MOVE carries at most `LEG_M`, and HEAD turns the shorter
@@ -41,8 +42,11 @@ SEND_ON_LIMIT = 3
 STALL_LIMIT_NS: Nanos = 1 * NS_PER_S
 #: HEAD is repeated so often, like any speed.
 REPEAT_NS: Nanos = 200 * NS_PER_MS
-#: chosen: beyond twice the time that the limits allow: AMRISim creeps for 7 s up to its goal.
+#: chosen: beyond twice the time that the limits allow, and again whenever a robot has come nearer by its share.
 GRACE_NS: Nanos = 10 * NS_PER_S
+#: chosen: a controller that goes the more slowly the nearer it is, as AMRISim's, does a tenth of what is left in a
+#: second or two; and at a tenth each time the end of a goal cannot be put off for ever.
+NEARER_SHARE = 0.9
 
 
 @dataclass(frozen=True, slots=True)
@@ -214,7 +218,8 @@ class Goal:
 
     Args:
         axis: What is to be done.
-        limit_ns: When it is given up, counted from `begin`; None: twice what the limits allow, and some seconds.
+        limit_ns: When it is given up, counted from `begin`; None: twice what the limits allow, and some seconds;
+            later while the robot comes nearer.
     """
 
     def __init__(self, axis: Axis, limit_ns: Nanos | None) -> None:
@@ -229,6 +234,8 @@ class Goal:
         self._standing_packets = 0
         self._sent_on = 0
         self._least_left = math.inf
+        #: What was left when the end was last put off.
+        self._left_then = abs(axis.asked)
         self.reached = 0.0
         #: How it ended, once it has.
         self.ended: MotionEnded | None = None
@@ -260,6 +267,9 @@ class Goal:
         axis = self.axis
         self.reached = axis.reached(state)
         remaining = axis.asked - self.reached
+        if self._limit_ns is None and abs(remaining) <= NEARER_SHARE * self._left_then:
+            self._left_then = abs(remaining)
+            self._ends_at = max(self._ends_at, now + GRACE_NS)
         if (stalled := self._stalled(state, now)) is not None:
             return None, False, stalled
         if not axis.is_standing(state):

@@ -18,7 +18,6 @@ from collections.abc import Sequence
 
 from p2os.client.core import RobotCore
 from p2os.client.goals import Goal, MotionResult
-from p2os.client.interrupts import held_back
 from p2os.client.notices import (
     BaudKept,
     ConnectError,
@@ -48,6 +47,7 @@ from p2os.transport.ports import Transport
 from p2os.transport.url import SerialUrl, parse_url
 from p2os.transport.wall_clock import GAP_NS, Clock, GapWatch, wall_clock
 from simbase.errors import P2osError
+from simbase.interrupts import held_back
 from simbase.timing import NS_PER_S, Nanos
 
 #: chosen: more reads a turn than any line fills between two wakes; a flood must not starve the clock.

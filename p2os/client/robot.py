@@ -19,7 +19,6 @@ from p2os.client.aux_ports import AuxStream
 from p2os.client.calls import Result, RobotCalls
 from p2os.client.core import PacketType, RobotCore, request_for
 from p2os.client.goals import Axis, DriveAxis, MotionResult, TurnAxis, as_number
-from p2os.client.interrupts import exit_on_signals
 from p2os.client.line import core_for, motion_result, no_answer, not_connected, not_found
 from p2os.client.notices import Notice
 from p2os.client.robot_state import Link, RobotState
@@ -28,6 +27,7 @@ from p2os.client.settings import DEADMAN_S, ClientSettings
 from p2os.robots.parameters import RobotParameters
 from p2os.transport import open_url
 from p2os.transport.wall_clock import Clock, wall_clock
+from simbase.interrupts import exit_on_signals
 from simbase.timing import NS_PER_S, Nanos
 
 

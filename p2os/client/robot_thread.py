@@ -23,7 +23,6 @@ from typing import Any
 
 from p2os.client.calls import Result
 from p2os.client.core import RobotCore
-from p2os.client.interrupts import held_back
 from p2os.client.line import Line
 from p2os.client.notices import Notice
 from p2os.client.robot_state import RobotState
@@ -32,6 +31,7 @@ from p2os.transport.ports import Transport
 from p2os.transport.waiting import BLIND_POLL_S, wait_readable
 from p2os.transport.wall_clock import Clock, wall_clock
 from simbase.errors import P2osError
+from simbase.interrupts import held_back
 from simbase.timing import NS_PER_S, Nanos
 
 #: Opens the line that a URL names.

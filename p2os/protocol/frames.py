@@ -19,8 +19,11 @@ are inverses. The decoder's buffer never holds more than one frame (207 bytes)
 between calls.
 """
 
+import struct
 from collections import deque
+from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import cache
 
 from p2os.errors import LocalProtocolError
 from simbase.state import Stateful
@@ -97,11 +100,28 @@ def checksum(data: bytes) -> int:
     A 16-bit sum of big-endian pairs; an odd last byte is XORed into the low byte.
     Source: Pioneer manuals, "Packet checksum".
     """
-    even = len(data) & ~1
-    total = 256 * sum(data[0:even:2]) + sum(data[1:even:2])
-    if len(data) != even:
-        return (total & 0xFFFF) ^ data[-1]
-    return total & 0xFFFF
+    total: int = sum(_pairs(len(data) >> 1).unpack_from(data)) & 0xFFFF
+    return total ^ data[-1] if len(data) & 1 else total
+
+
+@cache
+def _pairs(count: int) -> struct.Struct:
+    return struct.Struct(f">{count}H")
+
+
+def sound_frames(data: bytes) -> Iterator[bytes]:
+    """Yield the payload of each sound frame that bytes begin with; end where something else stands."""
+    place = 0
+    while data[place : place + 2] == HEADER and place + PREFIX_BYTES < len(data):
+        count = data[place + 2]
+        end = place + PREFIX_BYTES + count
+        if not MIN_COUNT <= count <= MAX_COUNT or end > len(data):
+            return
+        payload = data[place + PREFIX_BYTES : end - CHECKSUM_BYTES]
+        if data[end - 2] << 8 | data[end - 1] != checksum(payload):
+            return
+        yield payload
+        place = end
 
 
 @dataclass(frozen=True, slots=True)
@@ -178,6 +198,17 @@ class Decoder(Stateful):
             self._last_byte_ns = now
             self._buffer += data
             self._scan()
+
+    def take_back(self) -> bytes | None:
+        """Return the beginning of a frame that waits for its rest, and hold it no longer.
+
+        None where something else waits: items, or bytes of a rejected frame that are scanned again.
+        """
+        if self._items or self._rescanned:
+            return None
+        waiting = bytes(self._buffer)
+        self._buffer.clear()
+        return waiting
 
     def next_item(self) -> Item | None:
         """Return what was found next, in the order of the stream, or None."""

@@ -216,10 +216,12 @@ def unpack_head(payload: bytes) -> tuple[int, ...] | None:
     """Return the numbers of a SIP's head in the order of the wire: those before the sonar, number and range of each
     reading, those behind it; None where the packet is shorter than its own sonar count says.
     """  # noqa: D205  # one sentence of two lines
-    count = payload[19] if len(payload) > 19 else 0
-    if len(payload) < HEAD_BYTES + READING_BYTES * count:
-        return None
-    return _head_of(count).unpack_from(payload)
+    return _head_of(payload[19]).unpack_from(payload) if is_sip(payload) else None
+
+
+def is_sip(payload: bytes) -> bool:
+    """Tell whether a packet of one of the types is a SIP inside: as long as its own sonar count says, or longer."""
+    return len(payload) >= HEAD_BYTES and len(payload) >= HEAD_BYTES + READING_BYTES * payload[19]
 
 
 def unpack_tail(payload: bytes, place: int) -> tuple[tuple[int, ...], int]:

@@ -1,6 +1,7 @@
 """A chip without a CPU, with the ports that peripherals need; boards that run assembled programs."""
 
 import signal
+from collections import defaultdict
 from collections.abc import Callable, Iterator
 
 import pytest
@@ -21,7 +22,7 @@ class FakeChip:
         self.access_pc = 0
         self.clocks = Clocks()
         self.pins = make_pins(self)
-        self.irqs: dict[int, bool] = {}
+        self.irqs: dict[int, bool] = defaultdict(bool)
         self.pulses: list[int] = []
         self.signals: list[str] = []
         self.warnings: dict[str, str] = {}

@@ -8,8 +8,11 @@ not stacked by exceptions, so that handlers and the main program write one log.
 
 import re
 import struct
+from typing import Any
 
 from bluepill_sim.board import BluePill
+from bluepill_sim.fabric.pins import PinDrive
+from bluepill_sim.fabric.subscriptions import EDGE, PinSubscription
 from bluepill_sim.program.image import Image, Symbol, SymbolTable
 
 FLASH = 0x0800_0000
@@ -199,6 +202,17 @@ def move(base: int, rd: int, value: int) -> list[int]:
     return [base | value >> 12 & 15 | (value >> 11 & 1) << 10, (value >> 8 & 7) << 12 | rd << 8 | value & 0xFF]
 
 
+def listen(board: BluePill, edges: list[Any], **options: Any) -> PinSubscription:
+    """Subscribe to what a board's pins drive: (name, drive, ns) come into `edges` when the board has run."""
+    names = {pin.index: pin.name for pin in board.chip.pins}
+    drives = [drive.value for drive in PinDrive]
+
+    def take(rows: bytes) -> None:
+        edges.extend((names[row[1]], drives[row[2]], row[0]) for row in EDGE.iter_unpack(rows))
+
+    return board.subscribe_pins([pin.name for pin in board.pins], take, **options)
+
+
 class Machine:
     """A board with an assembled program."""
 
@@ -214,8 +228,14 @@ class Machine:
         self.board = BluePill(self.image)
         self.edges: list[tuple[str, str, int]] = []
         self.sent = bytearray()
-        self.board.on_pin = lambda name, drive, at: self.edges.append((name, drive.value, at))
-        self.board.usart1.on_transmit = lambda word, _at: self.sent.append(word)
+        self._pins = listen(self.board, self.edges)
+        self._words = self.board.usart1.subscribe(lambda rows: self.sent.extend(word & 0xFF for word, _ in rows))
+
+    def deafen(self) -> "Machine":
+        """Listen no more."""
+        self._pins.close()
+        self._words()
+        return self
 
     def label(self, name: str) -> int:
         return self.assembled.labels[name]

@@ -85,7 +85,7 @@ def test_a_deadline_that_moves_is_met_to_the_nanosecond(ports: Ports) -> None:
         seen.append(chip.now_ns)
         at(now_ns)
 
-    csr.advance_to = advance_to
+    chip.pins.fabric._acts[csr.slot] = advance_to
     ports.advance(start_ns + 200_000)
     assert csr.read(0x24, 4) & 2
     assert seen[0] == start_ns + 85_000
@@ -119,7 +119,7 @@ def test_a_warning_is_kept_under_its_key(ports: Ports) -> None:
 
 def test_stops_and_signals_are_accepted_at_any_time(ports: Ports) -> None:
     ports.chip.request_stop()
-    ports.chip.deadline_changed()
+    ports.chip.end_slice()
     ports.chip.signal("event")
     ports.chip.signal("unknown")
     start_ns = ports.chip.now_ns

@@ -10,11 +10,13 @@ import pytest
 
 pytest.importorskip("unicorn")
 
+from collections.abc import Sequence
+
 from bluepill_sim.analysis.coverage import Coverage
 from bluepill_sim.board import BluePill, BoardSnapshot
-from bluepill_sim.fabric.pins import PinDrive
 from bluepill_sim.program.line_table import read_lines
 from bluepill_sim.program.static_code import StaticCode
+from tests.bluepill_sim.machine import listen
 
 HERE = Path(__file__).resolve().parent / "firmware"
 COMPILER = "arm-none-eabi-gcc"
@@ -87,13 +89,13 @@ class Session:
         self.board.pin("PB4").drive(True)
         self.text = ""
         self.times: list[int] = []
-        self.edges: list[tuple[str, PinDrive, int]] = []
-        self.board.usart1.on_transmit = self._transmit
-        self.board.on_pin = lambda name, drive, at_ns: self.edges.append((name, drive, at_ns))
+        self.edges: list[tuple[str, str, int]] = []
+        self.board.usart1.subscribe(self._take)
+        listen(self.board, self.edges)
 
-    def _transmit(self, word: int, at_ns: int) -> None:
-        self.text += chr(word)
-        self.times.append(at_ns)
+    def _take(self, rows: Sequence[tuple[int, int]]) -> None:
+        self.text += "".join(chr(word) for word, _ in rows)
+        self.times += [at_ns for _, at_ns in rows]
 
     def run(self, span_ns: int, slice_ns: int = MS) -> str:
         """Run for a while, and return what came out."""
@@ -151,7 +153,7 @@ def test_an_edge_wakes_the_program_within_a_microsecond(session: Session, pin: s
     session.board.pin(pin).drive(level)
     assert session.run(2 * MS) == text
     (_, high, at_ns), (_, low, later_ns) = session.edges
-    assert (high, low) == (PinDrive.HIGH, PinDrive.LOW)
+    assert (high, low) == ("high", "low")
     # 12 cycles of entry and a dozen instructions at 72 MHz.
     assert start_ns < at_ns < later_ns < start_ns + 1000
 
@@ -165,8 +167,7 @@ def test_slices_do_not_show(elf: Path, slice_ns: int) -> None:
 
 
 def test_a_watched_pin_ends_the_slice_at_its_edge(session: Session) -> None:
-    pin = session.board.pin("PB7")
-    pin.watch()
+    session.board.subscribe_pins(["PB7"], lambda _rows: None, ends_slice=["PB7"])
     session.edges.clear()
     session.board.pin("PA0").drive(True)
     reached = session.board.advance_to(session.board.now_ns + MS)

@@ -48,7 +48,7 @@ def test_an_access_to_a_peripheral_happens_once_even_when_it_ends_the_slice(boot
     """Unicorn runs an access twice if it is stopped inside: reading COUNTFLAG twice would lose it."""
     machine = boot(PORT_A + "movs r4, #5\nloop: " + store(GPIOA_BSRR, 1) + store(GPIOA_BSRR, 1 << 16)
                    + "subs r4, #1\nbne loop\nlog #1")  # fmt: skip
-    machine.board.pin("PA0").watch()
+    machine.board.subscribe_pins(["PA0"], lambda _rows: None, ends_slice=["PA0"])
     for _ in range(200):
         machine.board.advance_to(machine.board.now_ns + 5_000)
     assert machine.log == [1]

@@ -16,15 +16,17 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-from bluepill_sim.native.library import CORE_VARIABLE, library_path
+from firmware.build import COMPILER
+from firmware.build import build as build_program
+
 
 from bluepill_sim import BluePill
 from bluepill_sim.analysis.probe import Probe
 from bluepill_sim.analysis.vcd import write_vcd
 from bluepill_sim.core.unicorn_core import Register, UnicornCore
+from bluepill_sim.extension.library import CORE_VARIABLE, library_path
 
 HERE = Path(__file__).parent
-RUNTIME = HERE.parent.parent / "robot_bench" / "firmware"
 RUNS = 1 if "--quick" in sys.argv else 5
 #: Program, virtual seconds a run in C and in Python, goal of the native core in times real time.
 ROWS = (
@@ -43,14 +45,7 @@ QEMU += ("-serial", "none")
 
 def build(name: str, folder: Path, *options: str) -> Path:
     """Return a program of tools/bench/firmware, built."""
-    out = folder / f"{name}{len(options)}.elf"
-    sources = [HERE / "firmware" / f"{name}.c", RUNTIME / "startup.c", RUNTIME / "memory.c"]
-    subprocess.run(
-        ["arm-none-eabi-gcc", "-mcpu=cortex-m3", "-mthumb", "-O2", "-ffreestanding", "-nostdlib", f"-I{RUNTIME}",
-         *options, f"-T{RUNTIME / 'f103c8.ld'}", *map(str, sources), "-lgcc", "-o", str(out)],
-        check=True,
-    )  # fmt: skip
-    return out
+    return build_program(HERE / "firmware" / f"{name}.c", folder / f"{name}{len(options)}.elf", *options)
 
 
 @contextmanager
@@ -189,7 +184,7 @@ def against_qemu(folder: Path) -> None:
 
 def main() -> int:
     """Print the table; 1 without a compiler for it."""
-    if shutil.which("arm-none-eabi-gcc") is None:
+    if shutil.which(COMPILER) is None:
         print("bench: no arm-none-eabi-gcc (hint: sudo apt-get install gcc-arm-none-eabi)")
         return 1
     with tempfile.TemporaryDirectory() as folder:

@@ -1,6 +1,6 @@
 """Print what virtual Pioneers cost: many in virtual time, and one served in real time.
 
-Run it on an idle machine. Usage: python tools/bench/pioneer.py [ROBOTS]
+Run it on an idle machine. Usage: python tools/bench/pioneer.py [ROBOTS [BODY]]
 """
 
 import math
@@ -9,7 +9,7 @@ import sys
 import time
 from itertools import pairwise
 
-from p2os.pioneer.body.factory import make_body
+from p2os.pioneer.body.factory import make_scene
 from p2os.pioneer.controller import Pioneer
 from p2os.pioneer.serve import served_pioneer
 from p2os.pioneer.serve.multi_robot_world import MultiRobotWorld
@@ -22,6 +22,7 @@ from p2os.transport import open_url
 from simbase.timing import NS_PER_MS, NS_PER_S
 
 ROBOTS = int(sys.argv[1]) if len(sys.argv) > 1 else 64
+ENGINE = sys.argv[2] if len(sys.argv) > 2 else "kinematic"
 #: Robot seconds of the first figure, seconds of the others.
 LIVED_S, WATCHED_S = 10, 5
 #: How they stand: so many in a row, so far from each other.
@@ -44,30 +45,31 @@ def hall() -> World:
     return parse_world(f'name = "hall"\nextent_m = [-{half}, -{half}, {half}, {half}]\n{walls}', "hall")
 
 
-def many_robots() -> None:
+def many_robots(engine: str) -> None:
     """Print how much of one core many turning robots take in real time, in one world and each in its own."""
     parameters, world = load_parameters("p2dx"), hall()
     for is_shared in (False, True):
-        made = []
-        for number in range(ROBOTS):
-            body = make_body("kinematic", world, parameters)
-            x, y = (PITCH_M * (place - (ROW - 1) / 2) for place in divmod(number, ROW))
-            body.reset(Pose(x, y, 0.0), 0)
-            made.append((Pioneer(parameters=parameters, body=body), body))
-        multi_robot_world = MultiRobotWorld(made, world) if is_shared else None
-        for robot, _ in made:
+        places = [divmod(number, ROW) for number in range(ROBOTS)]
+        poses = [Pose(*(PITCH_M * (place - (ROW - 1) / 2) for place in row), 0.0) for row in places]
+        groups = [poses] if is_shared else [[pose] for pose in poses]
+        scenes = [make_scene(engine, world, [parameters] * len(group)) for group in groups]
+        for scene, group in zip(scenes, groups, strict=True):
+            scene.reset(group, 0)
+        made = [Pioneer(parameters=parameters, body=body) for scene in scenes for body in scene.bodies]
+        multi_robot_world = MultiRobotWorld(made, scenes[0]) if is_shared else None
+        for robot in made:
             for data in (*map(command, (0, 1, 2, 1)), command(C.ENABLE, 1), command(C.RVEL, 20)):
                 robot.receive(data, 0)
         begin = time.process_time()
         for at in range(100 * NS_PER_MS, LIVED_S * NS_PER_S + 1, 100 * NS_PER_MS):
-            for number, (robot, _) in enumerate(made):
+            for number, robot in enumerate(made):
                 if multi_robot_world is not None:
                     multi_robot_world.bring(number, at)
                 robot.receive(command(C.PULSE), at)
                 robot.take_output()
         used = 100 * (time.process_time() - begin) / LIVED_S
         where = "in one world" if is_shared else "each in its own world"
-        print(f"{ROBOTS} robots turning, kinematic, {where}: {used:.0f} % of one core in real time (goal: < 100)")
+        print(f"{ROBOTS} robots turning, {engine}, {where}: {used:.0f} % of one core in real time (goal: < 100)")
 
 
 def one_served() -> None:
@@ -95,5 +97,5 @@ def one_served() -> None:
     print(f"{100 * used / WATCHED_S:.1f} % of one core, this client's polling included")
 
 
-many_robots()
+many_robots(ENGINE)
 one_served()

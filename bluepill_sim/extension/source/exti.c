@@ -40,12 +40,14 @@ static void take_levels(struct device *device, uint32_t levels)
     }
 }
 
-static uint32_t pin_levels(const struct device *device)
+/* The levels of all lines; of those on pins only where an edge counts: nobody listens to the others. */
+static uint32_t present_levels(const struct device *device)
 {
     const struct exti *exti = device->state;
+    const uint32_t wanted = device->words[RTSR] | device->words[FTSR];
     uint32_t levels = exti->levels & ~(uint32_t)PIN_LINES;
     for (uint32_t n = 0; n < PINS; ++n) {
-        levels |= device->fabric->ports[exti->routes[n]].input & 1u << n;
+        levels |= device->fabric->ports[exti->routes[n]].input & wanted & 1u << n;
     }
     return levels;
 }
@@ -81,7 +83,7 @@ static void write(struct device *device, uint32_t index, uint32_t written, uint3
 {
     if (index == RTSR || index == FTSR) {
         struct exti *exti = device->state;
-        exti->levels = pin_levels(device); /* those of lines that nobody has listened to so far */
+        exti->levels = present_levels(device);
         listen(device);
         return;
     }
@@ -107,9 +109,9 @@ static uint32_t command(struct device *device, uint32_t what, uint32_t one, uint
     (void)other;
     if (what == ROUTE) {
         listen(device);
-        take_levels(device, pin_levels(device));
+        take_levels(device, present_levels(device));
     } else if (what == RESET) {
-        exti->levels = pin_levels(device);
+        exti->levels = present_levels(device);
         listen(device);
         update_irqs(device);
     }

@@ -88,7 +88,8 @@ struct shared {
     uint32_t is_first; /* the recorder has not had a row yet */
     uint32_t raised_pc; /* the access that raised the last exception: its instruction, */
     uint64_t raised_cycle; /* and when its block began */
-    uint8_t priorities[80];
+    uint8_t priorities[76]; /* one an exception */
+    uint8_t priorities_end[4];
     uint64_t sram; /* set by Python before the first run */
     uint64_t flash; /* set by Python before the first run */
     uint32_t sram_base;

@@ -117,6 +117,12 @@ uint64_t fabric_last_output(const struct fabric *fabric)
     return fabric->last_output == NO_TIME ? fabric->last_output_ns : ns_of(fabric, fabric->last_output);
 }
 
+void fabric_forget_output(struct fabric *fabric)
+{
+    fabric->last_output = NO_TIME;
+    fabric->last_output_ns = 0;
+}
+
 void fabric_set_time(struct fabric *fabric, uint64_t ns, uint64_t cycle, uint32_t hz)
 {
     fabric->last_output_ns = fabric_last_output(fabric);

@@ -195,7 +195,7 @@ class _Rejected:
 
 def _rejected(data: Bytes, first: Indexes, last: Indexes, pauses: Indexes | None) -> _Rejected:
     quiet = np.array([*([] if pauses is None else pauses), len(data)], np.int64)
-    places = _outside(_headers(data, quiet), first, last)
+    places = _headers_between(data, np.concatenate(([0], last)), np.concatenate((first, [len(data)])), quiet)
     limits = quiet[np.searchsorted(quiet, places, side="right")]
     counted = places + 2 < limits
     counts = np.zeros(len(places), np.int64)
@@ -205,15 +205,13 @@ def _rejected(data: Bytes, first: Indexes, last: Indexes, pauses: Indexes | None
     return _Rejected(places, limits, sizes, illegal, ~counted | (~illegal & (places + sizes > limits)))
 
 
-def _headers(data: Bytes, quiet: Indexes) -> Indexes:
-    """Return the places of headers that no pause cuts, and of a lone first byte before a pause."""
-    whole = headers(data)
-    whole = whole[~crosses(quiet, whole, whole + 2)]
-    final = np.unique(quiet[quiet > 0]) - 1
-    return np.union1d(whole, final[data[final] == HEADER[0]])
-
-
-def _outside(places: Indexes, first: Indexes, last: Indexes) -> Indexes:
-    """Return the places that no sound frame covers."""
-    frame = np.searchsorted(first, places, side="right") - 1
-    return places[np.concatenate((last, [0]))[frame] <= places]
+def _headers_between(data: Bytes, starts: Indexes, ends: Indexes, quiet: Indexes) -> Indexes:
+    """Return the places of headers that no pause cuts, and of a lone first byte before a pause, in some gaps."""
+    gaps = starts < ends
+    starts, sizes = starts[gaps], (ends - starts)[gaps]
+    places = np.repeat(starts - (np.cumsum(sizes) - sizes), sizes) + np.arange(sizes.sum())
+    places = places[data[places] == HEADER[0]]
+    behind = places + 1
+    is_whole = data[np.minimum(behind, len(data) - 1)] == HEADER[1]
+    found: Indexes = places[is_whole | np.isin(behind, quiet)]
+    return found

@@ -15,13 +15,14 @@ from typing import Any, cast, overload
 import numpy as np
 import numpy.typing as npt
 
+from p2os.capture.cells import Cell, cell_text
 from p2os.capture.chunks import Chunk, Direction
 from p2os.capture.columns.framing import LARGEST_FRAME, Indexes, stalls_of
 from p2os.capture.columns.table import Table as RawTable
 from p2os.capture.columns.tables import Columns, decode
 from p2os.capture.describe import RAW_OF, SipFields, sip_fields
 from p2os.capture.listing import Reading
-from p2os.capture.table import FIRST_ROWS, LEADING, Cell, Table, cell_text, uniform
+from p2os.capture.table import FIRST_ROWS, LEADING, Table, uniform
 from p2os.protocol.frames import CHECKSUM_BYTES, GIVE_UP_NS, PREFIX_BYTES
 from p2os.protocol.packets import packet_name
 from p2os.protocol.sip import POSITION_MASK, TAIL, StandardSip
@@ -197,11 +198,11 @@ class _Conversion:
         codes: npt.NDArray[np.uint16] = raw.astype(f"u{size}").astype(np.uint16)
         if not len(self._known):
             self._known = np.zeros(1 << 8 * size, np.bool_)
-            self.values = np.zeros(len(self._known), object if self._kind is str else self._kind)
+            self.values = np.full(len(self._known), self._kind(), object if self._kind is str else self._kind)
             self.texts = np.full(len(self._known), "", object)
-        seen = np.zeros(len(self._known), np.bool_)
-        seen[codes] = True
-        for code in np.flatnonzero(seen & ~self._known).tolist():
+        # Nearly always everything is known: asking costs less than listing what occurs.
+        unknown = codes[~np.take(self._known, codes)]
+        for code in np.unique(unknown).tolist():
             cell = self._convert(code - (raw.dtype.kind == "i" and code >> (8 * size - 1) and 1 << 8 * size))
             self._known[code], self.values[code], self.texts[code] = True, cell, cell_text(cell)
         return codes
@@ -242,6 +243,11 @@ class Column(Sequence[Cell]):
     def values(self) -> npt.NDArray[Any]:
         """The cells; anything where one is absent."""
         return self.codes if self.conversion is None else self.conversion.values[self.codes]
+
+    @property
+    def kind(self) -> str:
+        """NumPy's letter for the kind of the cells."""
+        return str((self.codes if self.conversion is None else self.conversion.values).dtype.kind)
 
     def has_any(self) -> bool:
         """Tell whether there is a cell."""

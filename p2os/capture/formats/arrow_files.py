@@ -1,11 +1,16 @@
 """Tables as Apache Parquet and Arrow (Feather) files, written one table at a time; needs the extra `export`."""
 
 from collections.abc import Iterable, Sequence
+from itertools import chain
 from pathlib import Path
 from typing import Any
 
-from p2os.capture.table import Cell, Table
+from p2os.capture.cells import Cell
+from p2os.capture.table import Table
 from simbase.errors import MissingDependencyError
+
+#: chosen: larger groups of rows are little faster and smaller in the file, and take more memory.
+GROUP_ROWS = 1 << 15
 
 
 def write_parquet(tables: Iterable[Table], path: Path) -> int:
@@ -54,14 +59,18 @@ def _write(tables: Iterable[Table], path: Path, writer_of: Any) -> int:
         return 0
     schema = pa.schema([(name, _type(pa, column)) for name, column in first.columns.items()])
     with path.open("wb") as file, writer_of(file, schema) as writer:
-        table: Table | None = first
-        while table is not None:
+        group: list[Any] = []
+        for table in chain([first], every):
             arrays = [
                 _array(pa, column, field.type) for column, field in zip(table.columns.values(), schema, strict=True)
             ]
-            writer.write_table(pa.Table.from_arrays(arrays, schema=schema))
+            group.append(pa.Table.from_arrays(arrays, schema=schema))
             count += table.rows
-            table = next(every, None)
+            if sum(part.num_rows for part in group) >= GROUP_ROWS:
+                writer.write_table(pa.concat_tables(group))
+                group.clear()
+        if group:
+            writer.write_table(pa.concat_tables(group))
     return count
 
 
@@ -76,14 +85,15 @@ def _type(pa: Any, column: Sequence[Cell]) -> Any:
 
 
 def _array_kind(column: Sequence[Cell]) -> str | None:
-    values = getattr(column, "values", None)
-    return None if values is None else str(values.dtype.kind)
+    kind: str | None = getattr(column, "kind", None)
+    return kind
 
 
 def _array(pa: Any, column: Sequence[Cell], kind: Any) -> Any:
     if _array_kind(column) is not None:
-        values, present = column.values, column.present  # type: ignore[attr-defined]  # a column of NumPy's
-        return pa.array(values, kind, mask=None if present is None else ~present)
+        codes, present, conversion = column.codes, column.present, column.conversion  # type: ignore[attr-defined]  # a column of NumPy's
+        cells = pa.array(codes, None if conversion else kind, mask=None if present is None else ~present)
+        return pa.array(conversion.values, kind).take(cells) if conversion else cells
     if kind == pa.string():
         return pa.array([cell if cell is None or isinstance(cell, str) else str(cell) for cell in column], kind)
     return pa.array(column, kind)

@@ -8,6 +8,8 @@ Others: `t` seconds, `dir` `c2s`, `s2c` or `event`; events are left out.
 """
 
 import json
+import re
+from binascii import unhexlify
 from collections.abc import Iterable, Iterator, Mapping
 
 from p2os.capture.chunks import Capture, Chunk, Direction, Part, capture_of
@@ -26,6 +28,9 @@ _DIRECTIONS: Mapping[str, tuple[Direction | None, int]] = {
 }
 #: chosen: eleven days; a larger number of seconds is a mistake of the unit.
 LONGEST_NS: Nanos = 1_000_000 * NS_PER_S
+#: A line as `chunk_line` writes it, its time below `LONGEST_NS`.
+_PLAIN_LINE = re.compile(rb'^\{"t": (\d{1,15}), "dir": "(c2r|r2c)", "hex": "([0-9a-f]*)"\}\r?$', re.MULTILINE)
+_PLAIN_DIRECTIONS = {direction.value.encode("ascii"): direction for direction in Direction}
 
 
 def read_recording(text: str) -> Capture:
@@ -47,13 +52,28 @@ def note_of(line: str) -> str:
     return str(entry.get("note", "")) if isinstance(entry, dict) and "format" in entry else ""
 
 
-def recorded_parts(lines: Iterable[str]) -> Iterator[Part]:
+def plain_parts(block: bytes) -> list[Part] | None:
+    """Return what whole lines hold if `chunk_line` wrote each of them, many times faster than `recorded_parts`."""
+    found = _PLAIN_LINE.findall(block)
+    if len(found) != block.count(b"\n") or not block.endswith(b"\n"):
+        return None
+    try:
+        return [(int(t), _PLAIN_DIRECTIONS[sent], unhexlify(data)) for t, sent, data in found]
+    except ValueError:  # an odd number of digits
+        return None
+
+
+def recorded_parts(lines: Iterable[str], first: int = 1) -> Iterator[Part]:
     """Yield what each line holds, one line read at a time.
+
+    Args:
+        lines: Of a recording.
+        first: The number of the first of them.
 
     Raises:
         FileError: A line is no chunk; the message names it.
     """
-    for number, line in enumerate(lines, 1):
+    for number, line in enumerate(lines, first):
         if not line.strip():
             continue
         entry = _object(line, number)

@@ -5,7 +5,7 @@ Invariant: what is opened holds no more of its file than a block or a line.
 
 import codecs
 import io
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import BinaryIO, cast
@@ -13,7 +13,7 @@ from typing import BinaryIO, cast
 from p2os.capture.chunks import Capture, Chunk, Direction, Part, in_order
 from p2os.capture.formats.hex_text import hex_parts, is_hexdump, looks_like_hex
 from p2os.capture.formats.pcap import is_pcap, pcap_parts
-from p2os.capture.formats.recording import note_of, recorded_parts
+from p2os.capture.formats.recording import note_of, plain_parts, recorded_parts
 from simbase.errors import FileError
 
 #: The P2OS bytes in the folder that `p2os run` makes.
@@ -67,9 +67,9 @@ def open_capture(file: BinaryIO, direction: Direction | None = None) -> Source:
         return Source(chunks=in_order(pcap_parts(cast("BinaryIO", buffered))))
     text = _text(head)
     if text is not None and text.lstrip().startswith("{"):
-        return Source(chunks=in_order(recorded_parts(_lines(buffered))), note=note_of(text.lstrip().split("\n")[0]))
+        return Source(chunks=in_order(_recorded(buffered)), note=note_of(text.lstrip().split("\n")[0]))
     is_hex = bool(text and text.strip())
-    parts = hex_parts(_lines(buffered), is_dump=is_hexdump(text or "")) if is_hex else _raw(buffered)
+    parts = hex_parts(_lines(_blocks_of_lines(buffered)), is_dump=is_hexdump(text or "")) if is_hex else _raw(buffered)
     directed = ((at_ns, sent_by or direction, data) for at_ns, sent_by, data in parts)
     return Source(chunks=in_order(directed), has_time=False, has_one_origin=not is_hex)
 
@@ -157,19 +157,58 @@ def _raw(file: io.BufferedReader) -> Iterator[Part]:
         yield 0, None, data
 
 
-def _lines(file: io.BufferedReader) -> Iterator[str]:
+def _recorded(file: io.BufferedReader) -> Iterator[Part]:
+    before = 0
+    for block in _blocks_of_lines(file):
+        parts = plain_parts(block)
+        if parts is None:
+            lines = _Numbered(before)
+            yield from recorded_parts(_lines((block,), lines), before + 1)
+            before = lines.count
+        else:
+            yield from parts
+            before += len(parts)
+
+
+@dataclass(slots=True)
+class _Numbered:
+    """How many lines there were."""
+
+    count: int = 0
+
+
+def _lines(blocks: Iterable[bytes], lines: _Numbered | None = None) -> Iterator[str]:
     """Yield each line, however lines end."""
-    number = 0
-    while line := file.readline(LONGEST_LINE):
-        if len(line) == LONGEST_LINE:
-            raise FileError(f"line {number + 1} is longer than {LONGEST_LINE >> 20} MB")
-        try:
-            text = line.decode("utf-8")
-        except UnicodeDecodeError as error:
-            raise FileError(f"line {number + 1} is no text: byte 0x{line[error.start]:02X}") from error
-        for part in text.splitlines():
-            number += 1
-            yield part
+    lines = lines or _Numbered()
+    for block in blocks:
+        for line in block.split(b"\n") if len(block) < LONGEST_LINE else [block]:
+            if len(line) >= LONGEST_LINE:
+                raise FileError(f"line {lines.count + 1} is longer than {LONGEST_LINE >> 20} MB")
+            try:
+                text = line.decode("utf-8")
+            except UnicodeDecodeError as error:
+                raise FileError(f"line {lines.count + 1} is no text: byte 0x{line[error.start]:02X}") from error
+            for part in text.splitlines():
+                lines.count += 1
+                yield part
+
+
+def _blocks_of_lines(file: io.BufferedReader) -> Iterator[bytes]:
+    """Yield whole lines, as many as were read together; what is longer than any line may be is cut."""
+    rest: list[bytes] = []
+    size = 0
+    while data := file.read1(BLOCK_BYTES):
+        whole, newline, tail = data.rpartition(b"\n")
+        if newline:
+            yield b"".join((*rest, whole, newline))
+            rest, size = [], 0
+        rest.append(tail)
+        size += len(tail)
+        if size >= LONGEST_LINE:
+            yield b"".join(rest)
+            rest, size = [], 0
+    if size:
+        yield b"".join(rest)
 
 
 def _text(data: bytes) -> str | None:

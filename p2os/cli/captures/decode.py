@@ -13,8 +13,10 @@ from p2os.capture.listing import line_of, summary_of
 from p2os.cli.captures.reading import (
     ProfileForLayouts,
     RobotForUnits,
+    chosen_rows,
     direction_of,
     reading_of,
+    wanted_names,
 )
 from p2os.cli.help_pages import CAPTURES
 from simbase.errors import UsageError
@@ -65,10 +67,11 @@ def decode(
     is_live = source == ["-"]
     capture = open_capture(sys.stdin.buffer, sent_by) if is_live else open_argument(source, sent_by)
     reading, chunks = reading_of(capture.chunks, robot=robot, profile=profile)
-    wanted = {name.strip().lower() for name in only.split(",") if name.strip()}
+    wanted = wanted_names(only)
     shown = damaged = 0
     end = _End()
-    for row in _chosen(rows_of(end.watched(chunks), reading), wanted):
+    watched = end.watched(chunks)
+    for row in chosen_rows(watched, reading, wanted) if wanted else rows_of(watched, reading):
         for line in _lines(row, reading, has_time=capture.has_time, as_json=json_output, explained=explained):
             sys.stdout.write(f"{line}\n")
         if is_live or not shown:
@@ -91,12 +94,6 @@ class _End:
         for chunk in chunks:
             self.at_ns = chunk.at_ns
             yield chunk
-
-
-def _chosen(rows: Iterator[ListingRow], wanted: set[str]) -> Iterator[ListingRow]:
-    for row in rows:
-        if not wanted or row.name.lower() in wanted or ("damaged" in wanted and not row.valid):
-            yield row
 
 
 def _lines(row: ListingRow, reading: Reading, *, has_time: bool, as_json: bool, explained: bool) -> Iterator[str]:

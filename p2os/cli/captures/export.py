@@ -12,7 +12,7 @@ from p2os.capture import Chunk, ListingRow, Reading, Source, open_file, rows_of
 from p2os.capture.formats.arrow_files import write_arrow, write_parquet
 from p2os.capture.formats.mcap_files import write_mcap
 from p2os.capture.table import Table, from_robot, tables_of, write_csv
-from p2os.cli.captures.reading import ProfileForLayouts, RobotForUnits, reading_of
+from p2os.cli.captures.reading import ProfileForLayouts, RobotForUnits, chosen_rows, reading_of, wanted_names
 from p2os.cli.help_pages import CAPTURES
 from p2os.cli.kept_files import FORCE_HELP, refuse_to_overwrite
 from simbase.errors import FileError, UsageError
@@ -61,7 +61,7 @@ def export(
     reading, chunks = reading_of(capture.chunks, robot=robot, profile=profile)
     try:
         if ending == ".mcap":
-            count = write_mcap(_chosen(rows_of(chunks, reading), only or "all"), target)
+            count = write_mcap(_chosen(chunks, reading, only or "all"), target)
         else:
             count = _TABLES[ending](_tables(capture, chunks, reading, only), target)
     except OSError as error:
@@ -90,14 +90,14 @@ def _tables(capture: Source, chunks: Iterator[Chunk], reading: Reading, only: st
                 pass
             else:
                 return sip_tables(chunks, reading)
-    return tables_of(_chosen(rows_of(chunks, reading), only), reading)
+    return tables_of(_chosen(chunks, reading, only), reading)
 
 
-def _chosen(rows: Iterable[ListingRow], only: str) -> Iterable[ListingRow]:
-    wanted = {name.strip().lower() for name in only.split(",") if name.strip()}
+def _chosen(chunks: Iterable[Chunk], reading: Reading, only: str) -> Iterable[ListingRow]:
+    wanted = wanted_names(only)
     if not wanted:
-        return from_robot(rows)
-    return (row for row in rows if "all" in wanted or row.name.lower() in wanted)
+        return from_robot(rows_of(chunks, reading))
+    return rows_of(chunks, reading) if "all" in wanted else chosen_rows(chunks, reading, wanted - {"damaged"})
 
 
 def _write_csv(tables: Iterator[Table], target: Path) -> int:

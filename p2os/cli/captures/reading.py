@@ -4,13 +4,14 @@ Left open, both are found in the capture itself: the robot gives its model in
 answer to SYNC2, and the model implies which firmware family it runs.
 """
 
+import contextlib
 from collections.abc import Iterable, Iterator
 from itertools import chain
 from typing import Annotated
 
 import typer
 
-from p2os.capture import Chunk, Direction, Reading
+from p2os.capture import Chunk, Direction, ListingRow, Reading, rows_of
 from p2os.capture.listing import FrameCutter
 from p2os.cli.names import robots
 from p2os.protocol.frames import Frame
@@ -68,6 +69,24 @@ def reading_of(
     subclass, guessed = _look(chunks, seen) if not robot or profile is None else ("", Profile.P2OS)
     parameters = load_parameters(robot) if robot else _parameters(subclass)
     return Reading(profile=profile or guessed, parameters=parameters), chain(seen, chunks)
+
+
+def wanted_names(only: str) -> set[str]:
+    """Return the names that `--only` lists, in lower case; none stands for the verb's own choice."""
+    return {name.strip().lower() for name in only.split(",") if name.strip()}
+
+
+def chosen_rows(chunks: Iterable[Chunk], reading: Reading, wanted: set[str]) -> Iterator[ListingRow]:
+    """Yield the rows of these names (`damaged`: of what is no sound frame); the rest costs little with NumPy."""
+    passing = None
+    if wanted:
+        with contextlib.suppress(ImportError):
+            from p2os.capture.columns.passing import Passing
+
+            passing = Passing(wanted)
+    for row in rows_of(chunks, reading, passing):
+        if row.name.lower() in wanted or ("damaged" in wanted and not row.valid):
+            yield row
 
 
 def _parameters(subclass: str) -> RobotParameters:

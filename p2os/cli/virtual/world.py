@@ -1,8 +1,9 @@
-"""`p2os world`: list, draw, check, make and convert the places a robot can be in."""
+"""`p2os world`: list, draw, check, make, convert and export the places a robot can be in, and robots."""
 
 import json
 import shutil
 import sys
+from collections import Counter
 from pathlib import Path
 from typing import Annotated
 
@@ -10,8 +11,9 @@ import typer
 
 from p2os.cli.help_pages import ROBOTS
 from p2os.cli.kept_files import FORCE_HELP, refuse_to_overwrite
-from p2os.cli.names import worlds
+from p2os.cli.names import robots, worlds
 from p2os.cli.quantities import option
+from p2os.pioneer.export import FORMATS, Export, export
 from p2os.pioneer.world import known_worlds, load_world
 from p2os.pioneer.world.drawing import svg, text, text_key
 from p2os.pioneer.world.formats import Placing, read_placed
@@ -20,7 +22,7 @@ from p2os.pioneer.world.model import World
 from p2os.pioneer.world.start_places import refuse_start
 from p2os.pioneer.world.writer import write_world
 from p2os.robots.parameters import load_parameters
-from simbase.errors import FileError, MissingDependencyError, UsageError
+from simbase.errors import FileError, UsageError
 from simbase.units import SEED
 
 HELP = """List, draw, check, make and convert worlds.
@@ -33,18 +35,27 @@ COLLADA or glTF.
 Examples:
   p2os world list                                 those that ship
   p2os world show maze                            draw one in the terminal
-  p2os world show room.dae --out room.png         as a picture (.png or .svg)
+  p2os world show room.dae --out room.svg         as a picture
   p2os world check my.toml                        find what is wrong, with its line
   p2os world new --kind maze --seed 7 --out my.toml
   p2os world convert floor.yaml --out floor.toml
+  p2os world convert room --out room.sdf          for another program: .sdf, .urdf,
+                                                  .xml (MuJoCo), .gltf, .glb
+  p2os world convert room --robot p2dx --out room.sdf
+  p2os world convert --robot p2dx --out p2dx.urdf
 """
 #: Widest drawing in a terminal, in characters.
 WIDEST_COLUMNS = 100
+TOML = ".toml"
 #: Files whose up axis may be named.
 MESH_SUFFIXES = (".obj", ".stl", ".dae", ".gltf", ".glb")
 
 WORLD = Annotated[
     str, typer.Argument(help="A world that ships, or a file.", metavar="WORLD|FILE", autocompletion=worlds)
+]
+CONVERTED = Annotated[
+    str | None,
+    typer.Argument(help="A world that ships, or a file.", metavar="[WORLD|FILE]", autocompletion=worlds),
 ]
 FORCE = Annotated[bool, typer.Option("--force", help=FORCE_HELP)]
 WORLD_SEED = Annotated[int, option(SEED, "--seed", purpose="Of a world that is made from one.", least="0", shown="0")]
@@ -88,7 +99,7 @@ def list_worlds(
 
 def show(
     world: WORLD,
-    out: Annotated[Path | None, typer.Option(help="Write a picture: .png or .svg.", metavar="FILE")] = None,
+    out: Annotated[Path | None, typer.Option(help="Write a picture, an .svg.", metavar="FILE")] = None,
     seed: WORLD_SEED = 0,
     up: UP = "auto",
 ) -> None:
@@ -100,14 +111,10 @@ def show(
         typer.echo("\n".join([*text(place, columns), text_key(place, columns)]))
         typer.echo(_summary(place))
         return
-    suffix = out.suffix.lower()
-    if suffix not in {".png", ".svg"}:
-        raise UsageError(f"no picture can be written to {out}", hint="--out FILE.png or FILE.svg")
+    if out.suffix.lower() != ".svg":
+        raise UsageError(f"no picture can be written to {out}", hint="--out FILE.svg")
     try:
-        if suffix == ".svg":
-            out.write_text(svg(place), encoding="utf-8")
-        else:
-            _write_png(place, out)
+        out.write_text(svg(place), encoding="utf-8")
     except OSError as error:
         raise FileError(f"{out}: {error.strerror}") from error
     typer.echo(f"{out}: {_summary(place)}")
@@ -139,18 +146,47 @@ def new(
 
 
 def convert(
-    world: WORLD,
+    world: CONVERTED = None,
     out: Annotated[
-        Path | None, typer.Option(help="The file to write; without it the text is printed.", metavar="FILE")
+        Path | None,
+        typer.Option(help="The file to write; without it the text of a TOML file is printed.", metavar="FILE"),
+    ] = None,
+    robot: Annotated[
+        str | None,
+        typer.Option(
+            help="Put this robot at the start; without a WORLD, the robot alone.",
+            metavar="MODEL|FILE",
+            autocompletion=robots,
+        ),
     ] = None,
     seed: WORLD_SEED = 0,
     up: UP = "auto",
     force: FORCE = False,
 ) -> None:
-    """Write any readable world as a TOML file, to be changed by hand."""
-    place = _load(world, seed, up)
-    _print_skipped(place)
-    _write(place, out, force=force)
+    """Write a world as TOML, to be changed by hand; or a world, a robot or both for another program.
+
+    The ending names the format: .toml, .sdf, .urdf, .xml (MuJoCo's MJCF), .gltf
+    or .glb. What the format does not hold is said, a line each.
+    """  # fmt: skip
+    place = None if world is None else _load(world, seed, up)
+    if place is not None:
+        _print_skipped(place)
+    if place is not None and robot is None and (out is None or out.suffix.lower() == ".toml"):
+        _write(place, out, force=force)
+        return
+    if place is None and robot is None:
+        raise UsageError("neither a world nor a robot is named", hint="p2os world convert room --out room.sdf")
+    if out is None or out.suffix.lower() not in FORMATS:
+        raise UsageError(
+            f"a {'world' if robot is None else 'robot'} cannot be written to {out or 'a terminal'}",
+            hint=f"--out FILE with {', '.join((*[TOML] * (robot is None), *FORMATS))}",
+        )
+    parameters = None if robot is None else load_parameters(robot)
+    if place is not None and parameters is not None:
+        refuse_start(place, parameters, place.start, place.start_at)
+    _write_files(export(out, place, parameters), out.parent, force=force)
+    what = [] if place is None else [_summary(place)]
+    typer.echo(f"{out}: {', with '.join([*what, *([] if parameters is None else [parameters.title])])}")
 
 
 def _load(world: str, seed: int, up: str) -> World:
@@ -164,28 +200,27 @@ def _load(world: str, seed: int, up: str) -> World:
 
 
 def _write(place: World, out: Path | None, *, force: bool) -> None:
+    """Write a world as TOML."""
     if out is None:
         sys.stdout.write(write_world(place))
         return
-    if out.suffix.lower() != ".toml":
+    if out.suffix.lower() != TOML:
         raise UsageError(f"a world cannot be written to {out}", hint="--out FILE.toml")
-    refuse_to_overwrite(out, force=force)
-    try:
-        out.write_text(write_world(place), encoding="utf-8")
-    except OSError as error:
-        raise FileError(f"{out}: {error.strerror}") from error
+    _write_files(Export(files={out.name: write_world(place).encode()}, losses=()), out.parent, force=force)
     typer.echo(f"{out}: {_summary(place)}")
 
 
-def _write_png(place: World, out: Path) -> None:
-    from p2os.cli.virtual.world_picture import write_png
-
-    try:
-        write_png(place, out)
-    except ModuleNotFoundError as error:
-        raise MissingDependencyError(
-            f"a PNG needs {error.name}", extra="sim", hint=f"--out {out.with_suffix('.svg')}"
-        ) from error
+def _write_files(made: Export, folder: Path, *, force: bool) -> None:
+    """Write files into a folder, all or none where one is there already; say what they do not hold."""
+    for name in made.files:
+        refuse_to_overwrite(folder / name, force=force)
+    for name, data in made.files.items():
+        try:
+            (folder / name).write_bytes(data)
+        except OSError as error:
+            raise FileError(f"{folder / name}: {error.strerror}") from error
+    for line in made.losses:
+        sys.stderr.write(f"note: {line}\n")
 
 
 def _summary(place: World) -> str:
@@ -197,7 +232,9 @@ def _summary(place: World) -> str:
         (pushed, "that can be pushed"),
     ]  # fmt: skip
     counted = ", ".join(_count(number, what) for number, what in counts if number or what == "obstacle")
-    return f"{place.name}, {_size(place)}: {counted}"
+    kinds = Counter(mark.kind for mark in place.marks)
+    marks = f"; marks: {', '.join(f'{number} {kind}' for kind, number in kinds.items())}" if kinds else ""
+    return f"{place.name}, {_size(place)}: {counted}{marks}"
 
 
 def _count(number: int, what: str) -> str:

@@ -10,10 +10,11 @@ Invariant: the same calls after the same `reset` give the same states, bit for b
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import NamedTuple, Protocol
+from typing import NamedTuple, Protocol, Self
 
 from p2os.pioneer.body.ray_cast import Echo
 from p2os.pioneer.sonar.ring import Cone
+from p2os.pioneer.world.geometry import Footprint
 from p2os.pioneer.world.model import Obstacle, Pose
 from simbase.timing import NS_PER_MS, Nanos
 
@@ -91,6 +92,9 @@ class Turned(NamedTuple):
 class RobotBody(Protocol):
     """A robot as a physical thing in a world."""
 
+    #: Whether its motors have power; without it a wheel that has come to rest is held by its gear alone.
+    is_powered: bool
+
     @property
     def name(self) -> str:
         """Which engine this is."""
@@ -130,8 +134,30 @@ class RobotBody(Protocol):
         """
         ...
 
+    @property
+    def robot_name(self) -> str:
+        """What it is called among the things of the world."""
+        ...
+
+    @property
+    def footprint(self) -> Footprint:
+        """The outline of its hull where it stands."""
+        ...
+
+    def footprint_at(self, x_m: float, y_m: float, heading_rad: float) -> Footprint:
+        """Return the outline of its hull at a pose."""
+        ...
+
+    def sees(self, number: int, other: Self, its_number: int) -> float | None:
+        """Return how far one of its sonar is from another's, metres; None where not each sees the other."""
+        ...
+
     def step(self, left_mps: float, right_mps: float) -> WheelAngles:
-        """Move on by `dt_ns` with these rim-speed set-points; `state` has the rest."""
+        """Move on by `dt_ns` with these rim-speed set-points; `state` has the rest.
+
+        Raises:
+            UsageError: There are other robots in its scene, which steps all of them together.
+        """
         ...
 
     def ranges(self, numbers: Sequence[int]) -> list[float]:
@@ -175,6 +201,51 @@ class RobotBody(Protocol):
 
     def snapshot(self) -> object:
         """Return all that decides the future."""
+        ...
+
+    def restore(self, snapshot: object) -> None:
+        """Put back what `snapshot` returned."""
+        ...
+
+
+class RobotScene(Protocol):
+    """Robots in one world, stepped together: they meet, push and sense each other where they are at that step.
+
+    The order of the robots is fixed and decides, with the set-points, everything.
+    """
+
+    @property
+    def bodies(self) -> Sequence[RobotBody]:
+        """The robots, the first first; none of them is stepped or reset by itself where there are several."""
+        ...
+
+    @property
+    def dt_ns(self) -> Nanos:
+        """The length of a step."""
+        ...
+
+    def reset(self, poses: Sequence[Pose], seed: int) -> None:
+        """Let every robot stand still at its pose, in the world as it was made."""
+        ...
+
+    def step(self, setpoints: Sequence[tuple[float, float]]) -> Sequence[WheelAngles]:
+        """Move all on by `dt_ns` with these rim-speed set-points, left and right, m/s; return their wheels' angles."""
+        ...
+
+    def place(self, obstacle: Obstacle) -> None:
+        """Put an obstacle with a new name into the world."""
+        ...
+
+    def move(self, name: str, x_m: float, y_m: float, heading_rad: float) -> None:
+        """Put an obstacle somewhere else."""
+        ...
+
+    def remove(self, name: str) -> None:
+        """Take an obstacle out of the world."""
+        ...
+
+    def snapshot(self) -> object:
+        """Return all that decides the future of every robot in it."""
         ...
 
     def restore(self, snapshot: object) -> None:

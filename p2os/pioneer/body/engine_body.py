@@ -11,7 +11,7 @@ from typing import ClassVar
 
 from p2os.pioneer.body.contacts import ContactCounter
 from p2os.pioneer.body.contract import BodyState
-from p2os.pioneer.body.in_world import BodyInWorld
+from p2os.pioneer.body.in_world import BodyInWorld, Scene
 from p2os.pioneer.body.physical import (
     BACK_DRIVE,
     PUSHED_BACK_MPS,
@@ -19,22 +19,23 @@ from p2os.pioneer.body.physical import (
     STALL_RIM_MPS,
     STALL_STEPS,
     STALL_TORQUE_SHARE,
+    UNPOWERED_SHARE,
 )
-from p2os.pioneer.world.model import World
+from p2os.pioneer.world.model import Obstacle
 from p2os.robots.parameters import RobotParameters
 
 
 class EngineBody(BodyInWorld):
     """A differential drive with mass, torque limits and friction."""
 
-    STATE: ClassVar[tuple[str, ...]] = ("_zero", "_stalling", "_is_held")
+    STATE: ClassVar[tuple[str, ...]] = ("_zero", "_stalling", "_is_held", "_is_at_rest")
     DERIVED: ClassVar[tuple[str, ...]] = ("_state",)
 
     #: Angles of the wheels when it was reset.
     _zero: tuple[float, ...]
 
-    def __init__(self, world: World, parameters: RobotParameters) -> None:
-        super().__init__(world, parameters)
+    def __init__(self, scene: Scene, parameters: RobotParameters, number: int) -> None:
+        super().__init__(scene, parameters, number)
         self._radius_m = parameters.body.wheel_diameter_m / 2
         self._straining_nm = STALL_TORQUE_SHARE * parameters.body.motor_torque_nm
         self._slow_radps = STALL_RIM_MPS / self._radius_m
@@ -43,6 +44,8 @@ class EngineBody(BodyInWorld):
         self._stalling = [0, 0]
         #: Wheels that something would turn back against their motor, and that the gear's friction holds.
         self._is_held = [False, False]
+        #: Wheels that have come to rest since their set-point is 0: they are held, as hard as the gear allows.
+        self._is_at_rest = [False, False]
 
     def _restored(self) -> None:
         super()._restored()
@@ -59,13 +62,13 @@ class EngineBody(BodyInWorld):
         """Return the plan-view distance from the hull to the nearest thing that it could touch, metres."""
         state = self.state
         self._tell_plan()
-        return self._plan.clearance(state.x_m, state.y_m, state.heading_rad)
+        return self._nearest_robot(self._plan.clearance(state.x_m, state.y_m, state.heading_rad))
 
     def _count_anew(self) -> None:
         """Begin to count contacts and stalls."""
         self._contacts = ContactCounter()
         self._stalling = [0, 0]
-        self._is_held = [False, False]
+        self._is_held, self._is_at_rest = [False, False], [False, False]
         self._state = None
 
     def _watch_motor(self, wheel: int, asked_mps: float, effort_nm: float, rate_radps: float) -> None:
@@ -83,6 +86,8 @@ class EngineBody(BodyInWorld):
         else:
             is_pushed_back = asked_mps != 0.0 and rate_radps * forward * self._radius_m < -PUSHED_BACK_MPS
             self._is_held[wheel] = is_pushed_back and effort_nm * forward > self._straining_nm
+        is_slow = abs(rate_radps) * self._radius_m < PUSHED_BACK_MPS
+        self._is_at_rest[wheel] = asked_mps == 0.0 and (is_slow or self._is_at_rest[wheel])
         is_straining = self._is_held[wheel] or abs(effort_nm) > self._straining_nm
         is_stalled = is_straining and abs(rate_radps) < self._slow_radps
         self._stalling[wheel] = min(STALL_STEPS, self._stalling[wheel] + 1) if is_stalled else 0
@@ -90,17 +95,26 @@ class EngineBody(BodyInWorld):
     def _motor(self, wheel: int, asked_mps: float) -> tuple[float, float]:
         """Return the rate that a wheel is driven to, rad/s, and the greatest torque for it, Nm.
 
-        A wheel that is held stands, until what pushes it back has become less than what its motor gives.
+        A wheel that is held stands, until what pushes it back has become less than what its motor gives. One that
+        rests at a set-point of 0 is held so too; without power, by the friction of motor and gear.
         """
+        if self._is_at_rest[wheel] and asked_mps == 0.0:
+            return 0.0, self._torque_nm * (BACK_DRIVE if self.is_powered else UNPOWERED_SHARE)
         if self._is_held[wheel] and asked_mps != 0.0:
             return 0.0, self._torque_nm * BACK_DRIVE
         return asked_mps / self._radius_m, self._torque_nm
 
-    def _walk(self) -> None:
-        """Put everything that walks where it is by now; the plan learns of it when it is asked."""
+    def read_anew(self) -> None:
+        """Forget the state that was read while robots of the scene took their step one after the other."""
+        self._state = None
+
+    def walk(self) -> list[Obstacle]:
+        """Return everything that walks where it is by now; the plan learns of it when it is asked."""
+        found = []
         for name, (x, y, heading) in self._walked():
-            self._put(replace(self._plan.find(name), x_m=x, y_m=y, heading_rad=heading))
-            self._moved_things[name] = None
+            found.append(replace(self._plan.find(name), x_m=x, y_m=y, heading_rad=heading))
+            self.note_moved(name)
+        return found
 
     def _tell_plan(self) -> None:
         for name, pose in self._walked():
@@ -110,7 +124,7 @@ class EngineBody(BodyInWorld):
                 x, y, m = self._where_is(item.name)
                 if math.dist((x, y), (item.x_m, item.y_m)) > PUSHED_M:
                     self._plan.move(item.name, x, y, math.atan2(m[3], m[0]))
-                    self._moved_things[item.name] = None
+                    self.note_moved(item.name)
 
     def _note_touched(self, name: str | None, x_m: float, y_m: float) -> None:
         """Remember a collision; what the engine has no name for is found by its place."""

@@ -3,10 +3,10 @@
 Invariant: an engine is imported only when it is asked for; whether one is installed is looked up, not tried.
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from importlib.util import find_spec
 
-from p2os.pioneer.body.contract import RobotBody
+from p2os.pioneer.body.contract import RobotBody, RobotScene
 from p2os.pioneer.world.model import World
 from p2os.robots.parameters import RobotParameters
 from simbase.errors import MissingDependencyError, UsageError
@@ -22,7 +22,7 @@ NEEDS: Mapping[str, tuple[str, ...]] = {
 
 
 def make_body(name: str, world: World, parameters: RobotParameters) -> RobotBody:
-    """Return a body that stands at the world's start.
+    """Return a body that stands at the world's start, alone in a scene of its own.
 
     Args:
         name: `kinematic` (exact, no dependency), `bullet` (PyBullet), `mujoco` (MuJoCo), or `best`.
@@ -34,19 +34,35 @@ def make_body(name: str, world: World, parameters: RobotParameters) -> RobotBody
         MissingDependencyError: The engine or NumPy is not installed.
         WorldError: The world has something that this body cannot take.
     """
+    return make_scene(name, world, [parameters]).bodies[0]
+
+
+def make_scene(name: str, world: World, models: Sequence[RobotParameters]) -> RobotScene:
+    """Return a scene with a robot of each of these models; `reset` puts them where they begin.
+
+    Args:
+        name: As for `make_body`.
+        world: Where they are.
+        models: One a robot, the first first.
+
+    Raises:
+        UsageError: There is no body of that name.
+        MissingDependencyError: The engine or NumPy is not installed.
+        WorldError: The world has something that this body cannot take.
+    """
     name = resolve_body(name)
     if name == "kinematic":
-        from p2os.pioneer.body.kinematic import KinematicBody
+        from p2os.pioneer.body.kinematic import KinematicScene
 
-        return KinematicBody(world, parameters)
+        return KinematicScene(world, models)
     try:
         if name == "bullet":
-            from p2os.pioneer.body.bullet import BulletBody
+            from p2os.pioneer.body.bullet import BulletScene
 
-            return BulletBody(world, parameters)
-        from p2os.pioneer.body.mujoco import MujocoBody
+            return BulletScene(world, models)
+        from p2os.pioneer.body.mujoco import MujocoScene
 
-        return MujocoBody(world, parameters)
+        return MujocoScene(world, models)
     except ModuleNotFoundError as error:
         raise MissingDependencyError(f"the {name} body needs {error.name}", extra=name, hint="--body best") from error
 

@@ -8,7 +8,11 @@ along the thing where one slower wheel leads past it, without friction, else the
 stall until the set-points lead away. A thing that can be pushed slides out of
 the way, without turning, where it has room and its friction is less than what
 the motors can push. What walks by itself goes on through the robot. Another
-robot of the same world stops it as a wall does.
+robot gives way as such a thing does, along the shortest way out of the hull that
+pushes it and without turning, where there is room and where its own hold is less
+than what the motors behind it can push (`physical` has the shares). Its wheels turn
+by the part of the way that lies along its heading, and count. Robots move one after
+the other within a step, the first first, and hulls never overlap.
 
 It serves as the oracle for the other bodies, and where PyBullet is not to be had.
 """
@@ -18,12 +22,13 @@ from collections.abc import Sequence
 
 from p2os.pioneer.body.contacts import ContactCounter
 from p2os.pioneer.body.contract import BodyState, Turned
-from p2os.pioneer.body.in_world import DT_S, BodyInWorld
-from p2os.pioneer.body.other_robots import OtherRobots, StandingPose
+from p2os.pioneer.body.in_world import DT_S, BodyInWorld, Scene, StandingPose
+from p2os.pioneer.body.physical import BACK_DRIVE, GRAVITY_MPS2, UNPOWERED_SHARE, WHEEL_FRICTION
 from p2os.pioneer.body.ray_cast import Direction, Echo, cast, echoes, narrow_parts
-from p2os.pioneer.sonar.ring import Cone, cones, reading
-from p2os.pioneer.world.geometry import Footprint, hull_polygon, placed
-from p2os.pioneer.world.model import Pose, World
+from p2os.pioneer.sonar.ring import Cone, reading
+from p2os.pioneer.world.geometry import Footprint, placed
+from p2os.pioneer.world.model import Obstacle, Pose, World
+from p2os.pioneer.world.plan import APART_M
 from p2os.robots.parameters import RobotParameters
 
 #: Below this turn in one step the arc is a straight line to double precision, rad.
@@ -34,34 +39,98 @@ LOOK_AHEAD_M = 2.0
 SLIDING_SHARES = (0.75, 0.5, 0.25, 0.0)
 #: What walks is moved each 10 ms (chosen: 8 mm at a walker's pace).
 WALK_STEPS = 10
-GRAVITY_MPS2 = 9.81
+#: chosen: robots whose circles are farther apart are not looked at until they have moved by as much, m.
+SPARE_M = 0.4
+
+
+class KinematicScene(Scene):
+    """Robots on one plan, one after the other in each step."""
+
+    DERIVED = ("_spare_m",)
+
+    name = "kinematic"
+    bodies: "tuple[KinematicBody, ...]"
+
+    def __init__(self, world: World, models: Sequence[RobotParameters]) -> None:
+        super().__init__(world, len(models))
+        #: By so much two robots that are not near to each other can still close in.
+        self._spare_m = 0.0
+        self._take(KinematicBody(self, model, number) for number, model in enumerate(models))
+        self.reset([world.start] * len(models), 0)
+
+    def _restored(self) -> None:
+        self._spare_m = 0.0
+
+    def reset(self, poses: Sequence[Pose], seed: int) -> None:
+        """Let every robot stand still at its pose in the world as it was made; nothing here is random."""
+        del seed
+        for body, pose in zip(self.bodies, poses, strict=True):
+            body.begin_at_start(pose)
+        self.changed()
+
+    def step(self, setpoints: Sequence[tuple[float, float]]) -> Sequence[Turned]:
+        """Move all on by one step, the first robot first."""
+        if len(self.bodies) == 1:
+            ((left_mps, right_mps),) = setpoints
+            return (self.bodies[0].go(left_mps, right_mps),)
+        fastest = max(max(abs(left), abs(right)) for left, right in setpoints)
+        # An axle moves no faster than its faster rim; one that is pushed, than a corner of what pushes it.
+        self._spare_m -= 4 * fastest * DT_S
+        if self._spare_m <= 0.0:
+            self._find_near()
+        return [body.go(*asked) for body, asked in zip(self.bodies, setpoints, strict=True)]
+
+    def changed(self) -> None:
+        """Prepare for another world."""
+        self._spare_m = 0.0
+        super().changed()
+
+    def thing_moved(self, by: "KinematicBody", name: str) -> None:
+        """Tell the others that one robot has pushed a thing."""
+        for other in by.others:
+            other.follow_thing(by.thing(name))
+
+    def _find_near(self) -> None:
+        """Find which robots could meet before they have moved by `SPARE_M`: a sweep along x."""
+        self._spare_m = SPARE_M
+        near: dict[KinematicBody, list[KinematicBody]] = {body: [] for body in self.bodies}
+        row = sorted((body.standing_pose[:2], number) for number, body in enumerate(self.bodies))
+        widest = max(body.reach_m for body in self.bodies)
+        for place, ((x, y), number) in enumerate(row):
+            body = self.bodies[number]
+            for (other_x, other_y), other_number in row[place + 1 :]:
+                if other_x - x > body.reach_m + widest + SPARE_M:
+                    break
+                other = self.bodies[other_number]
+                if math.hypot(other_x - x, other_y - y) <= body.reach_m + other.reach_m + SPARE_M:
+                    near[body].append(other)
+                    near[other].append(body)
+        for body, found in near.items():
+            body.near = tuple(other for other in body.others if other in found)
 
 
 class KinematicBody(BodyInWorld):
     """A differential drive on a plan."""
 
     STATE = ("_start", "_x", "_y", "_heading", "_left_angle", "_right_angle", "_left", "_right", "_asked", "_stalled",
-             "_is_bumped", "_blocked_at", "_free_m")  # fmt: skip
-    #: The other robots of a world are made known by `join`.
-    DERIVED = ("_cos", "_sin", "_other_robots")
+             "_is_bumped", "_blocked_at", "_free_m", "_carried_m")  # fmt: skip
+    DERIVED = ("_cos", "_sin", "near")
 
     name = "kinematic"
+    scene: KinematicScene
+    others: "tuple[KinematicBody, ...]"
 
-    def __init__(self, world: World, parameters: RobotParameters) -> None:
-        super().__init__(world, parameters)
-        self._cones = cones(parameters)
+    def __init__(self, scene: KinematicScene, parameters: RobotParameters, number: int) -> None:
+        super().__init__(scene, parameters, number)
         self._track_m = parameters.track_mm / 1000
         self._radius_m = parameters.body.wheel_diameter_m / 2
-        body = parameters.body
-        self._hull = hull_polygon(body)
-        self._other_robots: OtherRobots | None = None
-        #: The greatest force of both motors together, N.
-        self._push_n = 2 * body.motor_torque_nm / self._radius_m
+        #: The greatest force of both motors together, and of tyres that scrape sideways, N.
+        self._push_n = 2 * parameters.body.motor_torque_nm / self._radius_m
+        self._scrape_n = WHEEL_FRICTION * parameters.body.mass_kg * GRAVITY_MPS2
         self._longest_m = parameters.sonar_range_m
-        #: How far any point of the hull moves when the robot turns by 1 rad.
-        self._hull_reach = math.hypot(max(body.hull_front_m, body.hull_rear_m), body.hull_width_m / 2)
+        #: The robots that it could meet soon.
+        self.near: tuple[KinematicBody, ...] = ()
         self._x, self._y, self._heading, self._cos, self._sin = 0.0, 0.0, 0.0, 1.0, 0.0
-        self.reset(world.start, 0)
 
     def _restored(self) -> None:
         super()._restored()
@@ -93,29 +162,20 @@ class KinematicBody(BodyInWorld):
 
     @property
     def standing_pose(self) -> StandingPose:
-        """Where it stands, without the rest of its state."""
+        """Where it stands."""
         return StandingPose(self._x, self._y, self._heading)
 
-    def join(self, other_robots: OtherRobots | None) -> None:
-        """Meet others from now on, also after a reset."""
-        self._other_robots = other_robots
-
-    def bump(self) -> None:
-        """Feel that another robot has driven against the hull."""
-        self._is_bumped = True
-
-    def reset(self, pose: Pose, seed: int) -> BodyState:
-        """Stand still at a pose in the world as it was made; nothing here is random."""
-        del seed
-        self._begin()
+    def begin_at_start(self, pose: Pose) -> None:
+        """Stand still at a pose in the world as it was made."""
+        self.begin()
         self._start = pose
         self._begin_at(pose)
-        return self.state
 
     def put_back(self) -> None:
         """Stand still where the last `reset` put it, and what was pushed where the world has it."""
         super().put_back()
         self._begin_at(self._start)
+        self.scene.changed()
 
     def stand_at(self, x_m: float, y_m: float, heading_rad: float) -> None:
         """Stand still elsewhere."""
@@ -123,7 +183,7 @@ class KinematicBody(BodyInWorld):
         self._take_pose(x_m, y_m, heading_rad)
         self._left = self._right = 0.0
         self._stalled = False
-        self._changed()
+        self.scene.changed()
 
     def _begin_at(self, pose: Pose) -> None:
         """Stand still at a pose, wheels at angle 0, collisions at 0."""
@@ -131,16 +191,15 @@ class KinematicBody(BodyInWorld):
         self._left_angle = self._right_angle = self._left = self._right = 0.0
         self._asked = (0.0, 0.0)
         self._stalled = False
-        #: Another robot has driven against this one since the last step.
-        self._is_bumped = False
+        #: Another robot has driven against this one since the last step, and has pushed it along its heading so far.
+        self._is_bumped, self._carried_m = False, 0.0
         #: The last set-points, where they would have brought the hull into a thing.
         self._blocked_at: tuple[float, float] | None = None
         self._contacts = ContactCounter()
         #: No thing is nearer to the hull than this; 0 only where the hull is inside one.
         self._free_m = 0.0
-        self._changed()
 
-    def step(self, left_mps: float, right_mps: float) -> Turned:
+    def go(self, left_mps: float, right_mps: float) -> Turned:
         """Move on by one step along the exact arc, or stall."""
         self._steps += 1
         if self._walking and self._steps % WALK_STEPS == 0:
@@ -149,19 +208,25 @@ class KinematicBody(BodyInWorld):
         if left_mps == 0.0 and right_mps == 0.0:
             return self._stand()
         arc = self._arc(left_mps, right_mps)
-        robots_near = self._other_robots is not None and bool(self._other_robots.near)
         # What was blocked stays so: neither the pose nor the plan has changed since; other robots may have.
-        is_known = asked == self._blocked_at and not robots_near
+        is_known = asked == self._blocked_at and not self.near
         rims = asked if not is_known and self._take(arc) else None
         is_touching = rims is None or self._is_bumped or self._free_m == 0.0
         if rims is None and not is_known:
             rims = self._slide(left_mps, right_mps)
-            self._blocked_at = asked if rims is None and not robots_near else None
+            self._blocked_at = asked if rims is None and not self.near else None
         self._stalled = rims is None
         if self._contacts.update(touching=is_touching):
             self._note_contact(*arc[:3])
-        self._is_bumped = False
         self._left, self._right = rims or (0.0, 0.0)
+        return self._turn_wheels()
+
+    def _turn_wheels(self) -> Turned:
+        """Turn the wheels by this step, and by how far another robot has pushed them since the last."""
+        if self._is_bumped:
+            pushed_mps = self._carried_m / DT_S
+            self._left, self._right = self._left + pushed_mps, self._right + pushed_mps
+            self._is_bumped, self._carried_m = False, 0.0
         self._left_angle += self._left * DT_S / self._radius_m
         self._right_angle += self._right * DT_S / self._radius_m
         return Turned(self._left_angle, self._right_angle)
@@ -179,13 +244,12 @@ class KinematicBody(BodyInWorld):
             radius, c, s = forward / turn, math.cos(heading), math.sin(heading)
             x = self._x + radius * (s - self._sin)
             y = self._y - radius * (c - self._cos)
-        return x, y, heading, c, s, abs(forward) + abs(turn) * self._hull_reach
+        return x, y, heading, c, s, abs(forward) + abs(turn) * self.reach_m
 
     def _take(self, arc: tuple[float, float, float, float, float, float]) -> bool:
         """Go where a step leads; tell whether nothing is in the way."""
         x, y, heading, c, s, travel = arc
-        others = self._other_robots
-        if others is not None and others.near and self._meets(others, x, y, heading):
+        if self.near and self._meets_robots(x, y, heading):
             return False
         if self._free_m > travel:
             self._free_m -= travel
@@ -210,8 +274,7 @@ class KinematicBody(BodyInWorld):
         self._stalled = False
         if self._contacts.update(touching=self._is_bumped or self._free_m == 0.0):
             self._note_contact(self._x, self._y, self._heading)
-        self._is_bumped = False
-        return Turned(self._left_angle, self._right_angle)
+        return self._turn_wheels() if self._is_bumped else Turned(self._left_angle, self._right_angle)
 
     def _take_pose(self, x_m: float, y_m: float, heading_rad: float) -> None:
         """Take a pose, and what is often asked of its heading."""
@@ -235,29 +298,101 @@ class KinematicBody(BodyInWorld):
 
     def _note_contact(self, x: float, y: float, heading: float) -> None:
         """Remember a collision at a pose, whether or not the robot may take it."""
-        robots = () if self._other_robots is None else self._other_robots.touchable()
-        self._note_hit(*self._plan.contact(x, y, heading, robots))
+        self._note_hit(*self._plan.contact(x, y, heading, [other.footprint for other in self.others]))
 
-    def _meets(self, other_robots: OtherRobots, x: float, y: float, heading: float) -> bool:
-        """Tell whether another robot is in the way, and let it feel so; one that was put into another may move."""
-        reach = self._hull_reach
-        close = [
-            other for other in other_robots.near
-            if math.hypot(other.current[0] - x, other.current[1] - y) <= reach + other.reach_m
-        ]  # fmt: skip
-        if not close:
-            return False
-        hull = placed(self._hull, x, y, heading)
-        shapes = [(other, other.footprint(other.current)) for other in close]
-        found = [(other, shape) for other, shape in shapes if shape.overlaps(hull)]
+    # Robots and things in the way -----------------------------------------------------------
+
+    def _meets_robots(self, x: float, y: float, heading: float) -> bool:
+        """Tell whether another robot is in the way and does not give way; one that was put into another may move."""
+        found = self._overlapped(x, y, heading)
         if not found:
             return False
-        here = placed(self._hull, self._x, self._y, self._heading)
-        if any(shape.overlaps(here) for _, shape in found):
+        here = self.footprint.polygon
+        if any(other.footprint.overlaps(here) for other in found):
             return False
-        for other, _ in found:
-            other.bump()
-        return True
+        for other in found:
+            other.feel_push()
+        moves = self._pushed_robots(x, y, heading, (self,))
+        if moves is None or sum(hold_n for _, _, _, hold_n in moves) >= self._push_n:
+            return True
+        for other, dx, dy, _ in moves:
+            other.give_way(dx, dy)
+        if self._contacts.update(touching=True, steps=0):
+            self._note_contact(x, y, heading)
+        return False
+
+    def _overlapped(self, x: float, y: float, heading: float) -> "list[KinematicBody]":
+        """Return the robots that the hull would overlap at a pose."""
+        reach, found = self.reach_m, []
+        hull = None
+        for other in self.near:
+            if math.hypot(other.standing_pose.x_m - x, other.standing_pose.y_m - y) <= reach + other.reach_m:
+                hull = hull or placed(self._hull, x, y, heading)
+                if other.footprint.overlaps(hull):
+                    found.append(other)
+        return found
+
+    def _pushed_robots(
+        self, x: float, y: float, heading: float, pushing: "tuple[KinematicBody, ...]"
+    ) -> "list[tuple[KinematicBody, float, float, float]] | None":
+        """Return how far each robot must be pushed out of the hull at a pose, and what holds it, N; None: no room.
+
+        Args:
+            x: Where the hull is to be.
+            y: The same.
+            heading: The same.
+            pushing: This robot and those behind it, which cannot be pushed themselves.
+        """
+        moves: list[tuple[KinematicBody, float, float, float]] = []
+        hull = placed(self._hull, x, y, heading)
+        for other in self._overlapped(x, y, heading):
+            if other in pushing:
+                return None
+            dx, dy = other.footprint.way_out(hull)
+            length = math.hypot(dx, dy)
+            if length == 0.0:
+                continue
+            share = 1 + APART_M / length
+            dx, dy = dx * share, dy * share
+            further = other.what_it_pushes(dx, dy, (*pushing, other))
+            if further is None:
+                return None
+            moves += [*further, (other, dx, dy, other.hold_n(dx / length, dy / length))]
+        robots = [robot for robot, _, _, _ in moves]
+        return moves if len(set(robots)) == len(robots) else None
+
+    def what_it_pushes(
+        self, dx: float, dy: float, pushing: "tuple[KinematicBody, ...]"
+    ) -> "list[tuple[KinematicBody, float, float, float]] | None":
+        """Return what is pushed when this robot gives way by (dx, dy), metres; None where a thing stands there."""
+        x, y, way = self._x + dx, self._y + dy, math.hypot(dx, dy)
+        if self._free_m <= way and self._plan.clearance(x, y, self._heading, no_more_than=LOOK_AHEAD_M) == 0.0:
+            return None
+        return self._pushed_robots(x, y, self._heading, pushing)
+
+    def hold_n(self, dx: float, dy: float) -> float:
+        """Return the force that it takes to push this robot along a unit direction, N."""
+        along, across = dx * self._cos + dy * self._sin, dy * self._cos - dx * self._sin
+        drives = self._asked[0] + self._asked[1]
+        if not self.is_powered:
+            share = UNPOWERED_SHARE
+        elif drives == 0.0 or drives * along < 0.0:
+            share = BACK_DRIVE
+        else:
+            share = 1.0  # it drives the same way, slower: its motors brake
+        return abs(along) * share * self._push_n + abs(across) * self._scrape_n
+
+    def feel_push(self) -> None:
+        """Feel that another robot has driven against the hull."""
+        self._is_bumped = True
+
+    def give_way(self, dx_m: float, dy_m: float) -> None:
+        """Be pushed by another robot; the wheels roll along the heading and scrape across."""
+        self._is_bumped = True
+        self._carried_m += dx_m * self._cos + dy_m * self._sin
+        self._x, self._y = self._x + dx_m, self._y + dy_m
+        self._free_m = self._plan.clearance(self._x, self._y, self._heading, no_more_than=LOOK_AHEAD_M)
+        self._blocked_at = None
 
     def _push(self, x: float, y: float, heading: float) -> bool:
         """Push what is in the way; tell whether all of it went."""
@@ -266,25 +401,37 @@ class KinematicBody(BodyInWorld):
         resistance_n = sum(item.mass_kg * item.friction * GRAVITY_MPS2 for item in things)
         if len(things) < len(names) or resistance_n > self._push_n:
             return False
-        robots = (
-            () if self._other_robots is None else [other.footprint(other.current) for other in self._other_robots.near]
-        )
+        robots = [other.footprint for other in self.others]
         if not all(self._plan.push(item.name, x, y, heading, robots) for item in things):
             return False
-        self._moved_things |= dict.fromkeys(item.name for item in things)
+        for item in things:
+            self.note_moved(item.name)
+            self.scene.thing_moved(self, item.name)
         return True
+
+    def thing(self, name: str) -> Obstacle:
+        """Return a thing where it stands now."""
+        return self._plan.find(name)
+
+    def follow_thing(self, item: Obstacle) -> None:
+        """Take over where another robot has pushed a thing."""
+        self._plan.move(item.name, item.x_m, item.y_m, item.heading_rad)
+        self.note_moved(item.name)
+        self.look_anew()
 
     def _walk(self) -> None:
         """Put everything that walks where it is by now."""
         for name, pose in self._walked():
             self._plan.move(name, *pose)
-            self._moved_things[name] = None
-        self._changed()
+            self.note_moved(name)
+        self.look_anew()
 
-    def _changed(self) -> None:
+    def look_anew(self) -> None:
         """Prepare for a plan that is another one now."""
         self._blocked_at = None
         self._free_m = self._plan.clearance(self._x, self._y, self._heading, no_more_than=LOOK_AHEAD_M)
+
+    # Sensors ---------------------------------------------------------------------------------
 
     def ranges(self, numbers: Sequence[int]) -> list[float]:
         """Return the nearest echo of each cone, metres."""
@@ -313,23 +460,11 @@ class KinematicBody(BodyInWorld):
             found.append(echoes(self._echoing(x, y, rays, self._longest_m), x, y, rays, self._longest_m))
         return found
 
-    def _rays(self, cone: Cone) -> tuple[float, float, list[Direction]]:
-        """Return where a sensor is and the directions of its rays, the rightmost first."""
-        c, s = self._cos, self._sin
-        x, y = self._x + cone.x_m * c - cone.y_m * s, self._y + cone.x_m * s + cone.y_m * c
-        return x, y, [(dx * c - dy * s, dx * s + dy * c) for dx, dy in cone.directions]
-
     def _echoing(self, x: float, y: float, rays: Sequence[Direction], longest_m: float) -> Sequence[Footprint]:
         xs, ys = [x, *(x + longest_m * dx for dx, _ in rays)], [y, *(y + longest_m * dy for _, dy in rays)]
-        box = (min(xs), min(ys), max(xs), max(ys))
-        if self._other_robots is None:
-            return self._plan.echoing_within(*box)
-        return [*self._plan.echoing_within(*box), *self._other_robots.echoing_within(*box)]
+        things = self._plan.echoing_within(min(xs), min(ys), max(xs), max(ys))
+        return [*things, *self._echoing_robots(x, y, rays, longest_m)] if self.others else things
 
     def clearance(self) -> float:
         """Return the distance from the hull to the nearest thing that it could touch, metres."""
-        free = self._plan.clearance(self._x, self._y, self._heading)
-        if self._other_robots is None:
-            return free
-        hull = placed(self._hull, self._x, self._y, self._heading)
-        return min([free, *(shape.distance(hull) for shape in self._other_robots.touchable())])
+        return self._nearest_robot(self._plan.clearance(self._x, self._y, self._heading))

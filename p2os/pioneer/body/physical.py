@@ -5,6 +5,7 @@ caster meet floors and what is lower than the hull, the hull meets all else.
 """
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 from p2os.pioneer.world.model import Kind, Obstacle, World
@@ -15,7 +16,7 @@ OBSTACLE_GROUP, FLOOR_GROUP, WHEEL_GROUP, HULL_GROUP = 16, 2, 4, 8
 #: Things that can be pushed, and things that pass under the hull and stop wheels.
 PUSHED_GROUP, LOW_GROUP = 32, 64
 #: What the hull meets, what wheels and caster meet, and what a pushed thing meets.
-HULL_MEETS = OBSTACLE_GROUP | FLOOR_GROUP | PUSHED_GROUP
+HULL_MEETS = OBSTACLE_GROUP | FLOOR_GROUP | PUSHED_GROUP | HULL_GROUP
 WHEEL_MEETS = FLOOR_GROUP | LOW_GROUP
 PUSHED_MEETS = HULL_GROUP | OBSTACLE_GROUP | FLOOR_GROUP | PUSHED_GROUP
 
@@ -42,12 +43,23 @@ GEAR_EFFICIENCY = 0.73
 #: So much more than what a motor gives at the wheel must turn the wheel back against it: the friction of the gear then
 #: helps the motor. Without it a robot that leans on a thing swings about it for half a minute, as on two springs.
 BACK_DRIVE = GEAR_EFFICIENCY**-2
+#: The share of a motor's torque with which motor and gear hold a wheel without power that has come to rest (chosen: a
+#: robot that is switched off can be pushed by hand, and stays on a slope of 6 degrees).
+UNPOWERED_SHARE = 0.4
 #: chosen: a rim that is slower is not pushed back, it trembles.
 PUSHED_BACK_MPS = 2e-3
 #: A thing that was displaced by less stands where it stood, m.
 PUSHED_M = 1e-4
 
 Vector = tuple[float, float, float]
+
+
+def group_for(item: Obstacle, models: Sequence[Bands]) -> int:
+    """Return what an obstacle meets where several models are: what it meets of each."""
+    group = 0
+    for bands in models:
+        group |= group_of(item, bands)
+    return group
 
 
 def group_of(item: Obstacle, bands: Bands) -> int:

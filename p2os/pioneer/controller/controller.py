@@ -54,6 +54,7 @@ from p2os.pioneer.devices.battery import Battery
 from p2os.pioneer.devices.fitted import Devices
 from p2os.pioneer.devices.laser import Laser
 from p2os.pioneer.random_source import RandomSource
+from p2os.pioneer.sonar.cross_talk import Ears
 from p2os.pioneer.sonar.schedule import SonarSchedule
 from p2os.protocol.commands import Command
 from p2os.protocol.connection import (
@@ -152,6 +153,8 @@ class Pioneer(Stateful):
         self.parameters, self.body = parameters, body
         self.settings = settings or ControllerSettings()
         self.on_event = on_event
+        #: What its sonar hear of other robots; none by itself.
+        self.hears: Ears | None = None
         self._faults = tuple(faults)
         self._body_now: Nanos = 0
         self._switch_on(0)
@@ -318,7 +321,7 @@ class Pioneer(Stateful):
 
     def advance_to(self, limit: Nanos) -> Reached:
         """Act on everything due up to and including `limit`, and bring the body there."""
-        while (due := self._next_due()) is not None and due <= limit:
+        while (due := self.next_due()) is not None and due <= limit:
             self._step_body_to(due)
             self._act(due)
         self._step_body_to(limit)
@@ -326,7 +329,7 @@ class Pioneer(Stateful):
 
     # Time ----------------------------------------------------------------------------
 
-    def _next_due(self) -> Nanos | None:
+    def next_due(self) -> Nanos | None:
         """Return when anything happens next, also what shows only in the next packet."""
         due = self.next_deadline()
         if self._sip_due is None or due is None:
@@ -358,7 +361,7 @@ class Pioneer(Stateful):
             self._notify(now, "bumper stall", "the robot drove against a pressed bumper")
         ping = context.sonar.next_ping()
         if ping is not None and ping.at <= now:
-            self._reporter.fire(ping.numbers)
+            self._reporter.fire(ping.numbers, None if self.hears is None else self.hears(ping.numbers, ping.at))
         if self._sip_due is not None and self._sip_due <= now and self._sender.is_turn_of_packet(now):
             self._sip_due = self._reporter.send_standard_packet(self._connection, now)
         self._sender.flush(now)
@@ -368,6 +371,7 @@ class Pioneer(Stateful):
         if self._body_now >= limit:
             return
         context, body = self._context, self.body
+        body.is_powered = context.motion.is_powered
         motion, step, advance = context.motion, body.step, context.reckoning.advance
         if context.faults.left_blocked or context.faults.right_blocked:
             step = self._step_blocked
@@ -382,6 +386,24 @@ class Pioneer(Stateful):
         for _ in range(steps):
             wheels = step(left, right)
             advance(wheels.left_angle_rad, wheels.right_angle_rad)
+
+    def next_setpoints(self) -> tuple[float, float]:
+        """Return the rim-speed set-points of the body's next step, m/s, for who steps it together with others."""
+        context, motion = self._context, self._context.motion
+        self.body.is_powered = motion.is_powered
+        if motion.is_steady:
+            left, right = motion.wheels_mps
+        elif motion.has_goal:
+            left, right = motion.step(context.travel_nm, context.heading_udeg)
+        else:
+            left, right = motion.step(0, 0)
+        faults = context.faults
+        return 0.0 if faults.left_blocked else left, 0.0 if faults.right_blocked else right
+
+    def take_step(self, wheels: WheelAngles) -> None:
+        """Take the wheels' angles after a step that was made with `next_setpoints`."""
+        self._body_now += self.body.dt_ns
+        self._context.reckoning.advance(wheels.left_angle_rad, wheels.right_angle_rad)
 
     def _step_blocked(self, left_mps: float, right_mps: float) -> WheelAngles:
         """Step the body with wheels that do not turn."""

@@ -92,6 +92,9 @@ class Body(Protocol):
         """Length of a step; a whole number of microseconds."""
         ...
 
+    #: Whether the motors have power; the controller says so before a step.
+    is_powered: bool
+
     @property
     def state(self) -> SensedState:
         """What the sensors know now."""

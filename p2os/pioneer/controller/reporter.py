@@ -94,11 +94,22 @@ class Reporter:
             **working,
         )  # fmt: skip
 
-    def fire(self, numbers: tuple[int, ...]) -> None:
-        """Let sonar ping, and keep what they measure for the next packet."""
+    def fire(self, numbers: tuple[int, ...], heard: Sequence[float | None] | None = None) -> None:
+        """Let sonar ping, and keep what they measure for the next packet.
+
+        Args:
+            numbers: Which.
+            heard: What each takes another robot's ping for, metres, or None; None: it hears none.
+        """
         parameters, settings = self.parameters, self.settings
         ranges = measure_ranges(
-            self.body, numbers, parameters, settings.errors.sonar, self.context.faults.sonar, self.context.random_source
+            self.body,
+            numbers,
+            parameters,
+            settings.errors.sonar,
+            self.context.faults.sonar,
+            self.context.random_source,
+            heard,
         )
         self.context.sonar.take_ping(
             [

@@ -51,6 +51,7 @@ KINDS: Mapping[str, tuple[tuple[type, ...], str]] = {
     "body": ((str,), "a text"),
     "seed": ((int,), "a whole number"),
     "apart": ((bool,), "true or false"),
+    "cross_talk": ((bool,), "true or false"),
     "robot": ((list,), "written as [[robot]]"),
     "count": ((int,), "a whole number"),
     "port": ((str,), "a text"),
@@ -75,7 +76,7 @@ RANGES: Mapping[str, tuple[float, float]] = {
 }  # fmt: skip
 #: A place: metres, metres, degrees.
 PLACE_RANGES = (WORLD_RANGES["x_m"], WORLD_RANGES["y_m"], WORLD_RANGES["heading_deg"])
-TOP_KEYS = ("world", "body", "seed", "apart", "robot")
+TOP_KEYS = ("world", "body", "seed", "apart", "cross_talk", "robot")
 ROBOT_KEYS = tuple(key for key in KINDS if key not in TOP_KEYS)
 #: Keys whose value may be a file.
 FILES = frozenset({"world", "model", "flash", "errors"})
@@ -165,8 +166,9 @@ def parse_fleet(text: str, source: str, folder: Path) -> FleetOrder:
     if body not in BODY_CHOICES:
         raise top.error("body", f"no body {shown(body)}", f"bodies: {', '.join(BODY_CHOICES)}")
     seed, apart = cast("int", top.get("seed", 0)), bool(top.get("apart", False))
+    cross_talk = bool(top.get("cross_talk", True))
     try:
-        return FleetOrder(robots=tuple(robots), world=world, body=body, seed=seed, apart=apart)
+        return FleetOrder(robots=tuple(robots), world=world, body=body, seed=seed, apart=apart, cross_talk=cross_talk)
     except P2osError as error:
         raise top.error("robot", str(error), error.hint) from error
 

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
 from p2os.pioneer.body.contract import RobotBody
-from p2os.pioneer.body.factory import BEST, body_note, make_body, resolve_body
+from p2os.pioneer.body.factory import BEST, body_note, make_scene, resolve_body
 from p2os.pioneer.controller import Pioneer
 from p2os.pioneer.controller.settings import SIMULATOR_SERIAL, ControllerSettings
 from p2os.pioneer.serve.multi_robot_world import MultiRobotWorld
@@ -73,6 +73,7 @@ class FleetOrder:
         body: `kinematic`, `bullet`, `mujoco`, or `best`: the best that is installed.
         seed: Of a scattered world; robot N errs by this and N - 1 more.
         apart: Each has a copy of the world, without the others.
+        cross_talk: Whether sonar hear the pings of the other robots of the world.
 
     Raises:
         UsageError: There is no robot, or there are too many; two share a port, or a port is no URL.
@@ -83,6 +84,7 @@ class FleetOrder:
     body: str = BEST
     seed: int = 0
     apart: bool = False
+    cross_talk: bool = True
 
     def __post_init__(self) -> None:
         if not 1 <= len(self.robots) <= MOST_ROBOTS:
@@ -128,16 +130,23 @@ def make_fleet(order: FleetOrder) -> MadeFleet:
     ]
     starts = _starts(order, world, models)
     name = resolve_body(order.body)
+    if order.apart:
+        scenes = [make_scene(name, world, [model]) for model in models]
+        for scene, start in zip(scenes, starts, strict=True):
+            scene.reset([start], order.seed)
+    else:
+        scenes = [make_scene(name, world, models)]
+        scenes[0].reset(starts, order.seed)
+    bodies = [body for scene in scenes for body in scene.bodies]
     made: list[tuple[Pioneer, RobotBody]] = []
-    for number, (robot, model, start) in enumerate(zip(order.robots, models, starts, strict=True)):
-        body = make_body(name, world, model)
-        body.reset(start, order.seed)
+    for number, (robot, model, body) in enumerate(zip(order.robots, models, bodies, strict=True)):
         settings = replace(robot.settings, seed=order.seed + number)
         if settings.baud is None:
             settings = replace(settings, baud=serial_baud(robot.port))
         made.append((Pioneer(parameters=model, body=body, settings=settings, faults=robot.faults), body))
-    multi_robot_world = MultiRobotWorld(made, world) if len(made) > 1 and not order.apart else None
     robots = tuple(pioneer for pioneer, _ in made)
+    is_shared = len(made) > 1 and not order.apart
+    multi_robot_world = MultiRobotWorld(robots, scenes[0], cross_talk=order.cross_talk) if is_shared else None
     notes = tuple(note for note in (body_note(order.body), made[0][1].note, _batteries_note(made)) if note)
     return MadeFleet(robots, starts, name, notes, multi_robot_world)
 

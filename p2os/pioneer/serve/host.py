@@ -93,7 +93,8 @@ class Host:
             _, multi_robot_world, number = shared
             self.number = number
             self.multi_robot_world = multi_robot_world
-            multi_robot_world.members[number].advance_to = self._advance_to
+            member = multi_robot_world.members[number]
+            member.advance_to, member.next_due, member.due = self._advance_to, self._next_due, None
             self._bring = partial(multi_robot_world.bring, number)
         self._client: Transport | None = None
         self._closing_lines = ClosingLines(self._time.clock)
@@ -232,10 +233,9 @@ class Host:
             WorldError: There is no such thing, or it is part of the building.
         """
         if self.multi_robot_world is not None:
-            robots = [member.as_other.name for member in self.multi_robot_world.members]
-            return change_world(self.multi_robot_world.bodies_at(self.now), words, robots)
+            return change_world(self.multi_robot_world.scene_at(self.now), words, self.multi_robot_world.names)
         self._bring(self.now)
-        return change_world([cast("RobotBody", self.pioneer.body)], words)
+        return change_world(cast("RobotBody", self.pioneer.body), words)
 
     def _advance_to(self, limit: Nanos) -> None:
         """Run the robot until `limit`, with what arrives by then on a line that takes its time."""
@@ -243,6 +243,11 @@ class Host:
             for at, data in self._lines[0].take(limit):
                 self._receive(data, at)
         self.pioneer.advance_to(limit)
+
+    def _next_due(self) -> Nanos | None:
+        """Return when anything is due with the robot or arrives there."""
+        due = [self.pioneer.next_due(), self._lines[0].next_deadline() if self._lines is not None else None]
+        return min((at for at in due if at is not None), default=None)
 
     def _deadlines(self) -> list[Nanos]:
         due = [self.pioneer.next_deadline()]

@@ -11,11 +11,11 @@ Metres and degrees. A thing that an order places is called by its shape and a nu
 import contextlib
 import math
 import shlex
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Mapping
 from dataclasses import replace
+from typing import Protocol
 
 from p2os.errors import WorldError
-from p2os.pioneer.body.contract import RobotBody
 from p2os.pioneer.world.model import Obstacle
 from simbase.errors import UsageError
 
@@ -35,16 +35,32 @@ MOST_THINGS = 100
 SIZES = frozenset({"LENGTH", "WIDTH", "RADIUS"})
 
 
+class Changeable(Protocol):
+    """A world in which things can be placed, moved and removed."""
+
+    def place(self, obstacle: Obstacle) -> None:
+        """Put an obstacle with a new name into the world."""
+        ...
+
+    def move(self, name: str, x_m: float, y_m: float, heading_rad: float) -> None:
+        """Put an obstacle somewhere else."""
+        ...
+
+    def remove(self, name: str) -> None:
+        """Take an obstacle out of the world."""
+        ...
+
+
 def is_world_order(text: str) -> bool:
     """Tell whether a line is one of these orders, or begins as one."""
     return text.split(maxsplit=1)[:1] in (["place"], ["move"], ["remove"])
 
 
-def change_world(bodies: Sequence[RobotBody], text: str, robots: Collection[str] = ()) -> str:
-    """Execute an order in every body's copy of the world; return what was done.
+def change_world(world: Changeable, text: str, robots: Collection[str] = ()) -> str:
+    """Execute an order in a world; return what was done.
 
     Args:
-        bodies: All that share the world, brought to one time.
+        world: A scene, or a body that is alone in its own.
         text: The words.
         robots: What the robots are called among the things; an order cannot name them.
 
@@ -56,32 +72,28 @@ def change_world(bodies: Sequence[RobotBody], text: str, robots: Collection[str]
     if values.get("NAME") in robots:
         raise UsageError(f"{values['NAME']!r} is a robot", hint="robots move by themselves")
     if order == "remove":
-        for body in bodies:
-            body.remove(str(values["NAME"]))
+        world.remove(str(values["NAME"]))
         return f"{values['NAME']} is gone"
     x, y, heading = (float(values.get(word, 0.0)) for word in ("X", "Y", "HEADING"))
     where = f"at {x:g}, {y:g}"
     if order == "move":
-        for body in bodies:
-            body.move(str(values["NAME"]), x, y, math.radians(heading))
+        world.move(str(values["NAME"]), x, y, math.radians(heading))
         return f"{values['NAME']} {where}"
     length, width, radius = (float(values.get(word, 0.0)) for word in ("LENGTH", "WIDTH", "RADIUS"))
     thing = Obstacle(
         name="", x_m=x, y_m=y, heading_rad=math.radians(heading), length_m=length, width_m=width, radius_m=radius,
         height_m=HEIGHT_M,
     )  # fmt: skip
-    thing = _placed(bodies[0], thing, order.removeprefix("place "))
-    for body in bodies[1:]:
-        body.place(thing)
+    thing = _placed(world, thing, order.removeprefix("place "))
     return f"{thing.name} {where}"
 
 
-def _placed(body: RobotBody, thing: Obstacle, shape: str) -> Obstacle:
-    """Put a thing into a body's world under the first name that is free; return it."""
+def _placed(world: Changeable, thing: Obstacle, shape: str) -> Obstacle:
+    """Put a thing into a world under the first name that is free; return it."""
     for number in range(1, MOST_THINGS + 1):
         named = replace(thing, name=f"{shape}-{number}")
         with contextlib.suppress(WorldError):  # the name is taken
-            body.place(named)
+            world.place(named)
             return named
     raise UsageError(f"there are {MOST_THINGS} of that shape already", hint="remove some")
 

@@ -1,7 +1,8 @@
 """What a sonar makes of the echoes that the body gives: specular loss, crosstalk, noise, dropout, faults.
 
 A ping is nine rays. A ray that meets its surface too far from the square does not
-come back; the nearest of those that do come back is the range. Then, each
+come back; the nearest of those that do come back is the range, or another robot's ping
+where it arrives before (`cross_talk`). Then, each
 by its own random stream: crosstalk (another sonar's ping received: nearer), dropout
 (no echo), noise. A stuck or noisy sonar errs on top.
 
@@ -56,6 +57,7 @@ def measure_ranges(
     errors: SonarErrors,
     faults: Mapping[int, tuple[str, float]],
     random_source: RandomSource,
+    heard: Sequence[float | None] | None = None,
 ) -> list[float]:
     """Return the ranges that these sonar measure, metres; the robot file's longest range where no echo came.
 
@@ -66,6 +68,7 @@ def measure_ranges(
         errors: How much they err.
         faults: Sonar → ("stuck", metres), ("noisy", standard deviation in m) or ("dead", 0).
         random_source: The robot's randomness.
+        heard: What each takes the ping of another robot for, metres, or None; None: there are no other robots.
     """
     longest, least = parameters.sonar_range_m, parameters.sonar_min_range_m
     if errors.specular_deg < 90.0 and isinstance(body, Echoing):
@@ -76,6 +79,10 @@ def measure_ranges(
         ]
     else:
         found = list(body.ranges(numbers))
+    if heard is not None:
+        found = [
+            true_m if other_m is None else min(true_m, other_m) for true_m, other_m in zip(found, heard, strict=True)
+        ]
     measured = []
     for number, true_m in zip(numbers, found, strict=True):
         range_m = min(true_m, longest)

@@ -1,8 +1,7 @@
 """A world as a drawing: the shapes that all pictures share, an SVG picture, and characters for a terminal.
 
-`shapes` is the one list; `svg` and `text` draw it without any dependency, and
-`p2os.cli.virtual.world_picture` draws it as a PNG. A character of `text` is two square
-points, one above the other.
+`shapes` is the one list; `svg` and `text` draw it without any dependency. A character
+of `text` is two square points, one above the other.
 
 Invariant: what is drawn depends on the world alone, so that pictures can be compared.
 """
@@ -32,13 +31,18 @@ class Look(Enum):
     PATH = "#7fb2d6"
     #: A line or an area that programs keep out of.
     FORBIDDEN = "#d98c8c"
+    REFLECTOR = "#b04ab0"
     GOAL = "#5a9367"
 
 
+#: Kinds of marks that are not drawn as a goal is.
+MARKED = {"forbidden": Look.FORBIDDEN, "reflector": Look.REFLECTOR}
 #: What is drawn later covers what is drawn before.
 ORDER = tuple(Look)
 #: Of the dot that is drawn for a goal.
 MARK_RADIUS_M = 0.08
+#: What is thinner is drawn as a line, as that of a map is.
+THIN_M = 1e-3
 #: What begins higher is passed beneath by a Pioneer 2.
 OVERHEAD_M = 0.22
 
@@ -62,7 +66,7 @@ def shapes(world: World) -> list[Shape]:
             points = item.walk.points_m
             found.append(Shape(Look.PATH, f"{item.name}'s path", points, is_open=True))
     for mark in world.marks:
-        look = Look.FORBIDDEN if mark.kind == "forbidden" else Look.GOAL
+        look = MARKED.get(mark.kind, Look.GOAL)
         is_open, radius = len(mark.points_m) > 1, 0.0 if len(mark.points_m) > 1 else MARK_RADIUS_M
         points = (*mark.points_m, mark.points_m[0]) if len(mark.points_m) > 2 else mark.points_m
         found.append(Shape(look, mark.name or mark.kind, points, radius, is_open=is_open))
@@ -93,11 +97,15 @@ def start_arrow(world: World, length_m: float) -> tuple[Point, ...]:
 def _thing(item: Obstacle) -> Shape:
     at = (item.x_m, item.y_m) if item.walk is None else item.walk.points_m[0]
     if item.is_cylinder:
-        return Shape(_look(item), item.name, (at,), item.radius_m)
-    return Shape(_look(item), item.name, Footprint(item).polygon)
+        return Shape(look_of(item), item.name, (at,), item.radius_m)
+    if item.width_m < THIN_M:
+        c, s = item.length_m / 2 * math.cos(item.heading_rad), item.length_m / 2 * math.sin(item.heading_rad)
+        return Shape(look_of(item), item.name, ((at[0] - c, at[1] - s), (at[0] + c, at[1] + s)), is_open=True)
+    return Shape(look_of(item), item.name, Footprint(item).polygon)
 
 
-def _look(item: Obstacle) -> Look:
+def look_of(item: Obstacle) -> Look:
+    """Return how a thing is drawn."""
     if item.kind.is_driven_on:
         return Look.RAMP if item.kind is Kind.RAMP else Look.FLOOR
     if item.walk is not None:

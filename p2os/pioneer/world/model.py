@@ -55,7 +55,7 @@ RANGES: Mapping[str, tuple[float, float]] = {
 }  # fmt: skip
 #: Where a mesh is cut for a picture: at the height of the Pioneer's sonar ring; and how thick its walls are drawn, m.
 CUT_M, CUT_THICK_M = 0.2, 0.02
-MARK_KINDS = ("goal", "dock", "home", "forbidden")
+MARK_KINDS = ("goal", "dock", "home", "forbidden", "reflector")
 #: The tables of a world file, in the order in which a world keeps its obstacles.
 SECTIONS = ("box", "cylinder", "floor", "ramp")
 #: Pieces on lines that differ by less are one, m; and the grain to which lines are compared.
@@ -325,7 +325,8 @@ class Mark:
 
     Args:
         name: What is written beside it; need not be unique.
-        kind: `goal`, `dock`, `home`, or `forbidden` for a line or an area that programs keep out of.
+        kind: `goal`, `dock`, `home`, `forbidden` for a line or an area that programs keep out of, or `reflector` for a
+            line that shines (its wall is an obstacle of its own).
         points_m: One point, or the ends of a line, or the corners of an area.
     """
 

@@ -34,7 +34,7 @@ BLINK = (
 def test_the_example_programs_boot_and_idle_without_a_warning(name: str) -> None:
     board = BluePill(FOLDER / f"{name}.elf")
     text = bytearray()
-    board.usart1.on_transmit = lambda word, _at: text.append(word)
+    board.usart1.subscribe(lambda rows: text.extend(word for word, _ in rows))
     for signal in (
         "PA4",
         "PA5",
@@ -65,7 +65,7 @@ def test_the_example_programs_boot_and_idle_without_a_warning(name: str) -> None
 def test_a_watched_pin_ends_the_slice_and_an_unwatched_one_does_not(boot) -> None:
     machine = boot(BLINK, {15: "tick"})
     assert machine.board.advance_to(150_000).reason is Reason.DEADLINE
-    machine.board.pin("PC13").watch()
+    machine.board.subscribe_pins(["PC13"], lambda _rows: None, ends_slice=["PC13"])
     reached = machine.board.advance_to(1_000_000)
     assert reached.reason is Reason.EDGE
     assert reached.now < 250_000
@@ -176,13 +176,13 @@ def test_the_next_deadline_is_the_earliest_of_tick_and_peripherals(boot) -> None
 def test_an_exception_in_a_listener_comes_out_of_advance_to(boot) -> None:
     machine = boot(BLINK, {15: "tick"})
 
-    def fail(name: str, drive: PinDrive, at_ns: int) -> None:
+    def fail(rows: bytes) -> None:
         raise KeyboardInterrupt
 
-    machine.board.on_pin = fail
+    subscription = machine.board.subscribe_pins(["PC13"], fail)
     with pytest.raises(KeyboardInterrupt):
         machine.board.advance_to(1_000_000)
-    machine.board.on_pin = None
+    subscription.close()
     assert machine.board.advance_to(2_000_000).reason is Reason.DEADLINE
 
 

@@ -6,6 +6,8 @@ import pytest
 
 from bluepill_sim import BluePill, BluePillError, WaitError
 from bluepill_sim.spans import to_nanos
+from simbase.timing import Reason
+from tests.bluepill_sim.machine import listen
 
 SENSORS = str(files("robot_bench.firmware") / "sensors.elf")
 
@@ -31,19 +33,19 @@ def test_what_is_no_span_is_refused(text: object) -> None:
 
 
 def test_run_for_goes_past_the_edges_of_watched_pins(board: BluePill) -> None:
-    board.pin("PB12").watch()
+    board.subscribe_pins(["PB12"], lambda _rows: None, ends_slice=["PB12"])
     board.run_for("10ms")
     assert 10_000_000 <= board.now_ns < 10_100_000
     assert board.pin("PB12").level
 
 
 def test_until_a_pin_stops_at_the_block_that_drives_it(board: BluePill) -> None:
-    edges = []
-    board.pin_listeners.append(lambda pin, drive, at: edges.append((pin, drive.level, at)))
+    edges: list[tuple[str, str, int]] = []
+    listen(board, edges)
     at = board.until("pin PB12 high", timeout="10ms")
     assert at - edges[-1][2] < 1_000, "within one basic block"
-    assert edges[-1][:2] == ("PB12", True)
-    assert not board.pin("PB12").is_watched, "the watch is taken off again"
+    assert edges[-1][:2] == ("PB12", "high")
+    assert board.advance_to(board.now_ns + 5_000_000).reason is Reason.DEADLINE, "nothing ends slices any more"
 
 
 def test_expect_takes_what_was_sent_up_to_the_pattern(board: BluePill) -> None:
@@ -56,7 +58,7 @@ def test_expect_takes_what_was_sent_up_to_the_pattern(board: BluePill) -> None:
 
 def test_expect_ends_at_the_stop_bit_of_the_last_character(board: BluePill) -> None:
     sent = []
-    board.usart1.listeners.append(lambda word, at: sent.append((chr(word), at)))
+    board.usart1.subscribe(lambda rows: sent.extend((chr(word), at) for word, at in rows))
     board.usart1.expect(b"y", within="10ms")
     assert sent[-1][0] == "y"
     assert board.now_ns - sent[-1][1] < 10_000

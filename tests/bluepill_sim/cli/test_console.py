@@ -3,7 +3,7 @@
 import io
 import os
 import select
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import pytest
@@ -15,19 +15,21 @@ from bluepill_sim.errors import BluePillError
 class Port:
     """A USART for a console."""
 
-    on_transmit: Callable[[int, int], None] | None = None
-    is_notified_late: bool = False
-
     def __init__(self) -> None:
         self.received = b""
+        self.sinks: list[Callable[[Sequence[tuple[int, int]]], None]] = []
+
+    def subscribe(self, sink: Callable[[Sequence[tuple[int, int]]], None]) -> Callable[[], None]:
+        self.sinks.append(sink)
+        return lambda: self.sinks.remove(sink)
 
     def receive(self, data: bytes) -> None:
         self.received += data
 
     def send(self, data: bytes) -> None:
-        for word in data:
-            assert self.on_transmit is not None
-            self.on_transmit(word, 0)
+        assert self.sinks
+        for sink in self.sinks:
+            sink([(word, 0) for word in data])
 
 
 def test_a_file_gets_every_character(tmp_path: Path) -> None:
@@ -47,14 +49,14 @@ def test_a_file_gets_every_character(tmp_path: Path) -> None:
 def test_a_borrowed_stream_stays_open() -> None:
     stream = io.BytesIO()
     console = StreamConsole(stream, "memory", is_owner=False)
-    console.write(0x141, 0)
+    console.write(b"A")
     console.close()
     assert stream.getvalue() == b"A"
 
 
 def test_standard_output_is_a_dash(capfdbinary: pytest.CaptureFixture[bytes]) -> None:
     console = open_console("-")
-    console.write(ord("\n"), 0)
+    console.write(b"\n")
     console.close()
     assert capfdbinary.readouterr().out == b"\n"
 
@@ -87,7 +89,7 @@ def test_a_pseudo_terminal_that_nobody_reads_drops(monkeypatch: pytest.MonkeyPat
         raise BlockingIOError
 
     monkeypatch.setattr(os, "write", refuse)
-    console.write(1, 0)
+    console.write(b"\1")
     assert console.dropped == 1
     console.close()
 

@@ -214,7 +214,7 @@ def trace_of(boot, slice_us: float | None, watched: bool = False) -> tuple[str, 
     """Run the busy program for 5 ms with inputs at fixed times; return a hash of all that came out, and how much."""
     machine = boot(BUSY, {15: "tick", 16 + 10: "irq"})
     if watched:
-        machine.board.pin("PA1").watch()
+        machine.board.subscribe_pins(["PA1"], lambda _rows: None, ends_slice=["PA1"])
     end, inputs = 5_000_000, [2_600_123, 3_000_000, 3_141_592, 4_000_001]
     level = False
     while machine.board.now_ns < end:

@@ -35,7 +35,7 @@ def test_two_drivers_that_differ_are_reported(ports: Ports) -> None:
     pin.drive(0)
     pin.configure(PinMode.PUSH_PULL, output_bit=False)
     assert ports.warnings == {}, "both low: no harm"
-    pin.set_output_bit(True)
+    pin.configure(pin.mode, output_bit=True)
     assert list(ports.warnings.values()) == ["PB12: two drivers fight: the chip drives it high, the other end low"]
     assert pin.level is False
 
@@ -54,7 +54,7 @@ def test_a_shorted_output_is_reported(ports: Ports, rail: str, bit: bool, word: 
     pin.configure(PinMode.PUSH_PULL, output_bit=not bit)
     pin.short(rail)
     assert ports.warnings == {}
-    pin.set_output_bit(bit)
+    pin.configure(pin.mode, output_bit=bit)
     assert list(ports.warnings.values()) == [f"PA4: output {word} is shorted to {rail}"]
     assert pin.level is not bit
     assert pin.is_contended

@@ -1,5 +1,6 @@
 """Pins: who drives the wire, what it reads, and who is told when."""
 
+import ctypes
 import itertools
 from collections.abc import Callable
 from typing import Any
@@ -9,6 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from bluepill_sim.fabric.pins import Pin, PinBank, PinDrive, PinMode
+from bluepill_sim.fabric.subscriptions import EDGE, FLOATING, HIGH, LOW, Of
 
 QUICK = settings(max_examples=40, deadline=None)
 
@@ -24,7 +26,7 @@ class Ports:
     def __init__(self) -> None:
         self.warnings: dict[str, str] = {}
 
-    def request_stop(self) -> None:
+    def end_slice(self) -> None:
         self.stops += 1
 
     def warn(self, message: str, *, once: str) -> None:
@@ -120,67 +122,100 @@ def test_a_held_pin_ignores_its_configuration_until_released(bank: PinBank) -> N
 
 def test_an_alternate_function_drives_only_in_alternate_mode(bank: PinBank) -> None:
     pin = bank["PA0"]
-    pin.connect("TIM", level=True)
+    pin.connect("TIM2_CH1", level=True)
     assert pin.output is PinDrive.NONE
-    assert not pin.carries("TIM")
+    assert not pin.carries("TIM2_CH1")
     pin.configure(PinMode.ALTERNATE_PUSH_PULL, output_bit=False)
     assert pin.output is PinDrive.HIGH
-    assert pin.carries("TIM")
-    pin.connect("TIM", level=False)
+    assert pin.carries("TIM2_CH1")
+    pin.connect("TIM2_CH1", level=False)
     assert pin.output is PinDrive.LOW
     pin.configure(PinMode.ALTERNATE_OPEN_DRAIN, output_bit=False)
-    pin.connect("TIM", level=True)
+    pin.connect("TIM2_CH1", level=True)
     assert pin.output is PinDrive.NONE
-    pin.connect("ADC", level=False)
-    assert not pin.carries("TIM")
-    pin.disconnect("ADC")
-    pin.disconnect("ADC")
-    assert pin.carries("TIM")
+    pin.connect("I2C1_SCL", level=False)
+    assert not pin.carries("TIM2_CH1")
+    pin.disconnect("I2C1_SCL")
+    pin.disconnect("I2C1_SCL")
+    assert pin.carries("TIM2_CH1")
 
 
 def test_every_change_of_the_own_drive_is_notified_once_with_its_time(bank: PinBank, ports: Ports) -> None:
-    told: list[tuple[str, PinDrive, int]] = []
-    bank.on_output = lambda *change: told.append(change)
+    rows = bytearray()
+    bank.subscribe_pins(["PA1"], rows.extend)
     pin = bank["PA1"]
     pin.configure(PinMode.PUSH_PULL, output_bit=False)
     ports.now_ns = 17
-    pin.set_output_bit(True)
-    pin.set_output_bit(True)
-    pin.drive(True)
-    assert told == [("PA1", PinDrive.LOW, 0), ("PA1", PinDrive.HIGH, 17)]
-
-
-def test_a_change_of_a_watched_pin_asks_for_a_stop(bank: PinBank, ports: Ports) -> None:
-    pin = bank["PA1"]
-    pin.watch()
     pin.configure(PinMode.PUSH_PULL, output_bit=True)
-    assert ports.stops == 1
+    pin.configure(PinMode.PUSH_PULL, output_bit=True)
+    pin.drive(True)
+    bank.deliver()
+    told = [(at, index, list(PinDrive)[drive]) for at, index, drive, *_ in EDGE.iter_unpack(rows)]
+    assert told == [(0, 1, PinDrive.LOW), (17, 1, PinDrive.HIGH)]
+
+
+def test_a_subscriber_to_the_wire_sees_what_the_outside_does(bank: PinBank, ports: Ports) -> None:
+    rows = bytearray()
+    subscription = bank.subscribe_pins(["PA0", "PA1"], rows.extend, of=Of.WIRE)
+    bank["PA0"].drive(False)
+    ports.now_ns = 5
+    bank["PA0"].drive(True)
+    bank["PA1"].configure(PinMode.PULLED, output_bit=True)
+    bank["PA0"].drive(None)
+    subscription.close()
+    bank["PA0"].drive(True)
+    bank.deliver()
+    seen = [(at, index, wire) for at, index, _, wire, *_ in EDGE.iter_unpack(rows)]
+    assert seen == [(0, 0, LOW), (5, 0, HIGH), (5, 1, HIGH), (5, 0, FLOATING)]
+
+
+def test_a_resistor_yields_to_the_chips_output_and_wins_over_its_pull(bank: PinBank, ports: Ports) -> None:
+    pin = bank["PA0"]
+    pin.drive(True, is_weak=True)
+    assert pin.level
+    pin.configure(PinMode.PULLED, output_bit=False)
+    assert pin.level
+    pin.configure(PinMode.PUSH_PULL, output_bit=False)
+    assert not pin.level
+    assert not pin.is_contended
+    pin.drive(True)
+    assert pin.is_contended
+
+
+def test_an_edge_that_ends_slices_asks_for_a_stop(bank: PinBank, ports: Ports) -> None:
+    pin = bank["PA1"]
+    subscription = bank.subscribe_pins(["PA1"], lambda _rows: None, ends_slice=["PA1"])
+    pin.configure(PinMode.PUSH_PULL, output_bit=True)
+    assert (ports.stops, bank.fabric.take_stop(), bank.fabric.take_stop()) == (1, True, False)
     pin.drive(False)
     assert ports.stops == 1
-    pin.watch(False)
-    pin.set_output_bit(False)
+    subscription.ends_slice = frozenset()
+    pin.configure(PinMode.PUSH_PULL, output_bit=False)
     assert ports.stops == 1
+    subscription.ends_slice = frozenset({"PA1"})
+    pin.configure(PinMode.PUSH_PULL, output_bit=True)
+    assert ports.stops == 2
 
 
-def test_listeners_learn_of_changes_of_the_input_only(bank: PinBank) -> None:
-    seen: list[tuple[str, bool]] = []
+def test_the_input_is_shown_in_a_word_too(bank: PinBank) -> None:
+    word = ctypes.c_uint32()
+    bank.fabric.show_input(0, ctypes.addressof(word))
     pin = bank["PA0"]
-    pin.listeners.append(lambda changed: seen.append((changed.name, changed.input)))
     pin.drive(True)
-    pin.drive(True)
+    assert word.value == 1
     pin.hold("JTDI", PinDrive.PULL_UP)
     pin.drive(None)
-    assert seen == [("PA0", True)]
+    assert word.value == 1
     pin.hold("JTDO")
-    assert seen == [("PA0", True), ("PA0", False)]
+    assert word.value == 0
 
 
 def test_a_pin_without_a_leg_cannot_be_driven(bank: PinBank) -> None:
     with pytest.raises(ValueError, match="PA5 is not bonded out"):
         bank["PA5"].drive(True)
-    bank["PA5"].connect("X", level=True)
+    bank["PA5"].connect("MCO", level=True)
     bank["PA5"].configure(PinMode.ALTERNATE_PUSH_PULL, output_bit=True)
-    assert not bank["PA5"].carries("X")
+    assert not bank["PA5"].carries("MCO")
     assert not bank["PA5"].is_listening()
     with pytest.raises(KeyError):
         bank["PF0"]
@@ -210,11 +245,11 @@ def act(pin: Pin, what: str, value: Any) -> None:
     methods: dict[str, Callable[[], None]] = {
         "drive": lambda: pin.drive(value),
         "configure": lambda: pin.configure(value, output_bit=True),
-        "bit": lambda: pin.set_output_bit(value),
+        "bit": lambda: pin.configure(pin.mode, output_bit=value),
         "hold": lambda: pin.hold("X", value),
         "release": pin.release,
-        "connect": lambda: pin.connect("AF", level=value),
-        "disconnect": lambda: pin.disconnect("AF"),
+        "connect": lambda: pin.connect("MCO", level=value),
+        "disconnect": lambda: pin.disconnect("MCO"),
     }
     methods[what]()
 
@@ -223,8 +258,8 @@ def act(pin: Pin, what: str, value: Any) -> None:
 @given(actions=ACTIONS)
 def test_output_and_level_follow_from_the_state_alone(actions: Any) -> None:
     bank = PinBank(Ports(), frozenset({"PA0"}))
-    told: list[PinDrive] = []
-    bank.on_output = lambda _name, drive, _ns: told.append(drive)
+    rows = bytearray()
+    bank.subscribe_pins(["PA0"], rows.extend)
     pin = bank["PA0"]
     for what, value in actions:
         act(pin, what, value)
@@ -232,7 +267,9 @@ def test_output_and_level_follow_from_the_state_alone(actions: Any) -> None:
     other.restore(bank.snapshot())
     copy = other["PA0"]
     assert (copy.output, copy.level, copy.input) == (pin.output, pin.level, pin.input)
-    copy._update()
+    other.fabric.pins_changed(0)
     assert (copy.output, copy.level, copy.input) == (pin.output, pin.level, pin.input)
+    bank.deliver()
+    told = [list(PinDrive)[row[2]] for row in EDGE.iter_unpack(rows)]
     assert all(a is not b for a, b in itertools.pairwise(told))
     assert (told[-1] if told else PinDrive.NONE) is pin.output

@@ -162,7 +162,7 @@ def test_a_peripheral_without_deadlines_does_nothing_by_itself(fake_chip: Any) -
     before = part.snapshot()
     part.advance_to(10**12)
     part.clock_changed()
-    assert part.next_deadline() is None
+    assert part.due_ns is None
     assert part.snapshot() == before
 
 
@@ -224,7 +224,7 @@ def test_reset_brings_back_every_reset_value(make_fake_chip: Callable[[], Any], 
     access_at_random(chip, name, accesses)
     part = chip.parts.by_name[name]
     part.reset()
-    assert part.next_deadline() is None
+    assert part.due_ns is None
     for register in part.REGISTERS:
         if register.name != "IDR":
             assert part.words[register.offset // 4] == register.reset, register.name

@@ -7,7 +7,7 @@ import pytest
 from bluepill_sim import BluePill
 from bluepill_sim.core.accesses import may_end_in_it
 from bluepill_sim.extension.library import library_path
-from tests.bluepill_sim.machine import COUNTER_ON, Machine
+from tests.bluepill_sim.machine import COUNTER_ON, Machine, listen
 
 PROGRAM = Path(__file__).parents[1] / "firmware" / "unoptimised.elf"
 pytestmark = pytest.mark.skipif(library_path() is None, reason="the native core is not built")
@@ -76,13 +76,14 @@ def test_edges_characters_and_states_are_the_same_however_time_is_cut(monkeypatc
     for core, slice_ns in (("python", 6_000_000), ("native", 6_000_000), ("native", 77_777), ("native", 1_000_000)):
         monkeypatch.setenv("P2OS_CORE", core)
         board = BluePill(str(PROGRAM))
-        seen: list[tuple[object, ...]] = []
-        board.on_pin = lambda *edge, seen=seen: seen.append(edge)
-        board.usart1.on_transmit = lambda *character, seen=seen: seen.append(character)
+        edges: list[tuple[object, ...]] = []
+        words: list[tuple[int, int]] = []
+        listen(board, edges)
+        board.usart1.subscribe(words.extend)
         while board.now_ns < 6_000_000:
             board.advance_to(min(board.now_ns + slice_ns, 6_000_000))
-        lives.append((seen, board.chip.snapshot()))
-    assert len(lives[0][0]) > 40
+        lives.append((edges, words, board.chip.snapshot()))
+    assert len(lives[0][0]) + len(lives[0][1]) > 40
     assert all(one == lives[0] for one in lives)
 
 

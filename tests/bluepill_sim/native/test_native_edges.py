@@ -7,11 +7,12 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from bluepill_sim.analysis.edge_log import NativeEdgeLog, PythonEdgeLog
+from bluepill_sim.analysis.edge_log import EdgeLog
 from bluepill_sim.analysis.probe import Probe
 from bluepill_sim.analysis.vcd import write_vcd
 from bluepill_sim.errors import BluePillError
 from bluepill_sim.extension.library import library_path
+from bluepill_sim.fabric.subscriptions import EDGE, Of
 from tests.bluepill_sim.machine import Machine
 
 pytestmark = pytest.mark.skipif(library_path() is None, reason="the native core is not built: no C compiler")
@@ -61,14 +62,12 @@ def recording(text: str, core: str, limit_ms: int = 1) -> tuple[Probe, Machine]:
 def test_every_edge_has_the_time_of_its_store(accesses: list[tuple[int, int, str]]) -> None:
     text = program(accesses, 3)
     native, python = (recording(text, core)[0] for core in ("native", "python"))
-    assert isinstance(native.log, NativeEdgeLog)
-    assert isinstance(python.log, PythonEdgeLog)
     assert native.edges == python.edges
     assert native.initial == python.initial
     assert native.end_ns == python.end_ns
 
 
-def test_both_logs_write_the_same_file(tmp_path: Path) -> None:
+def test_both_cores_write_the_same_file(tmp_path: Path) -> None:
     text = program([(BSRR, 5, "r6"), (IDR, 0, "r5"), (ODR, 16, "r5"), (BRR, 31, "r6")], 200)
     written = []
     for core in ("native", "python"):
@@ -90,30 +89,28 @@ def test_a_full_buffer_loses_nothing() -> None:
     assert native["PB0"] == native["PB1"]
 
 
-def test_who_listens_one_by_one_hears_every_edge_beside_a_probe() -> None:
+def test_another_subscriber_gets_every_edge_beside_a_probe() -> None:
     text = program([(BSRR, 3, "r6"), (BRR, 1, "r6"), (BRR, 2, "r6")], 20)
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("P2OS_CORE", "native")
         machine = Machine(text, {})
-    heard: list[tuple[str, int]] = []
-    machine.board.chip.pins.wire_listeners.append(
-        lambda pin, at_ns: heard.append((pin.name, at_ns)) if pin.name == "PB0" else None
-    )
+    heard = bytearray()
+    machine.board.subscribe_pins(["PB0"], heard.extend, of=Of.WIRE)
     probe = Probe(machine.board)
     machine.run()
-    edges = {at_ns for at_ns, _ in probe.edges["PB0"]}
+    probe.finish()
+    edges = [at_ns for at_ns, _ in probe.edges["PB0"]]
     assert len(edges) == 1 + 2 * 20
-    assert edges <= {at_ns for _, at_ns in heard}
+    assert edges == [row[0] for row in EDGE.iter_unpack(heard)]
 
 
 @given(st.lists(st.tuples(st.integers(0, 30), st.integers(0, 100), st.integers(0, 2)), max_size=60))
 def test_late_rows_go_where_they_belong(rows: list[tuple[int, int, int]]) -> None:
-    native, python = NativeEdgeLog([0] * 5, [0] * 80), PythonEdgeLog()
+    log = EdgeLog([], [])
     for at_ns, signal, value in rows:
-        native.put(at_ns, signal, value)
-        python.put(at_ns, signal, value)
-    assert list(native.rows()) == list(python.rows()) == sorted(rows, key=lambda row: row[:2])
-    assert native.used() == python.used() == {signal for _, signal, _ in rows}
+        log.put(at_ns, signal, value)
+    assert list(log.rows()) == sorted(rows, key=lambda row: row[:2])
+    assert log.used() == {signal for _, signal, _ in rows}
 
 
 @pytest.mark.parametrize("core", ["native", "python"])

@@ -70,9 +70,7 @@ def program(waits: list[str]) -> str:
 def make(source: str, core: str) -> BluePill:
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("P2OS_CORE", core)
-        board = Machine(source, {SYSTICK: "tick"}).board
-    board.usart1.on_transmit = board.on_pin = None
-    return board
+        return Machine(source, {SYSTICK: "tick"}).deafen().board
 
 
 def live(board: BluePill, seed: int, slices: int) -> list[dict[str, Any]]:

@@ -8,13 +8,13 @@ from pathlib import Path
 
 import pytest
 
-SOURCES = sorted((Path(__file__).parents[3] / "bluepill_sim" / "native" / "source").glob("*.c"))
+SOURCES = sorted((Path(__file__).parents[3] / "bluepill_sim" / "extension" / "source").glob("*.c"))
 UNOPTIMISED = Path(__file__).parents[1] / "firmware" / "unoptimised.elf"
 COMPILER = shutil.which("gcc")
 PROGRAM = """
 import sys
 from importlib.resources import files
-from bluepill_sim.native import library
+from bluepill_sim.extension import library
 library.library_path = lambda: sys.argv[1]
 from pathlib import Path
 from bluepill_sim import BluePill

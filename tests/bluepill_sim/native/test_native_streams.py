@@ -76,9 +76,7 @@ PROGRAMS = st.fixed_dictionaries(
 def make(source: str, core: str) -> BluePill:
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("P2OS_CORE", core)
-        board = Machine(source, {EXCEPTION: "handler"}).board
-    board.usart1.on_transmit = board.on_pin = None
-    return board
+        return Machine(source, {EXCEPTION: "handler"}).deafen().board
 
 
 def live(board: BluePill, seed: int, slices: int) -> list[tuple[Any, ...]]:
@@ -115,14 +113,14 @@ def test_characters_come_out_while_nobody_listens_and_python_is_not_asked() -> N
     board = make(streaming(), "native")
     board.advance_to(1_000_000)
     calls = 0
-    real = board.chip.parts.usart(1).advance_to
+    engine = board.chip.engine
 
-    def counted(now_ns: int) -> None:
+    def counted(*_arguments: int) -> int:
         nonlocal calls
         calls += 1
-        real(now_ns)
+        return 0
 
-    board.chip.parts.usart(1).advance_to = counted  # type: ignore[method-assign]  # it only counts
+    engine._read_io = engine._write_io = counted
     board.advance_to(200_000_000)
     assert calls == 0
     character_ns = 10 * 69 * 125
@@ -130,26 +128,13 @@ def test_characters_come_out_while_nobody_listens_and_python_is_not_asked() -> N
     assert board.usart1.unread[:30] == bytes(range(65, 95))
 
 
-def test_who_listens_hears_each_character_at_its_time() -> None:
-    heard: dict[str, list[tuple[int, int]]] = {"native": [], "python": []}
-    for core, words in heard.items():
-        board = make(streaming(40), core)
-        board.advance_to(1_000_000)
-        board.usart1.listeners.append(
-            lambda word, at_ns, words=words, board=board: words.append((word, at_ns - board.chip.now_ns))
-        )
-        board.advance_to(6_000_000)
-    assert heard["native"] == heard["python"]
-    assert {late for _, late in heard["native"]} == {0}
-
-
-def test_who_may_hear_late_hears_the_same() -> None:
+@pytest.mark.parametrize("ends_slice", [False, True])
+def test_who_subscribes_hears_each_character_with_its_time(ends_slice: bool) -> None:
     heard: dict[str, list[tuple[int, int]]] = {"native": [], "python": []}
     for core, words in heard.items():
         board = make(streaming(200), core)
-        board.usart1.on_transmit = lambda word, at_ns, words=words: words.append((word, at_ns))
-        board.usart1.is_notified_late = True
-        board.advance_to(30_000_000)
+        board.usart1.subscribe(words.extend, ends_slice=ends_slice)
+        board.run_for(30_000_000)
     assert heard["native"] == heard["python"]
     assert len(heard["native"]) == 200
 
@@ -157,13 +142,13 @@ def test_who_may_hear_late_hears_the_same() -> None:
 def test_a_listener_that_fails_loses_no_time_of_the_line() -> None:
     board, twin = make(streaming(), "native"), make(streaming(), "native")
 
-    def fail(_word: int, _at_ns: int) -> None:
+    def fail(_rows: object) -> None:
         raise RuntimeError("the far end is gone")
 
-    board.usart1.on_transmit, board.usart1.is_notified_late = fail, True
+    close = board.usart1.subscribe(fail)
     with pytest.raises(RuntimeError, match="gone"):
         board.advance_to(3_000_000)
-    board.usart1.on_transmit = None
+    close()
     for one in (board, twin):
         one.advance_to(8_000_000)
     assert state(board) == state(twin)

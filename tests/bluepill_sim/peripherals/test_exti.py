@@ -7,6 +7,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from bluepill_sim.stm32f103 import PVD_LINE, RTC_ALARM_LINE, USB_WAKEUP_LINE
+
 QUICK = settings(max_examples=40, deadline=None)
 
 IRQ_OF_LINE = {0: 6, 1: 7, 2: 8, 3: 9, 4: 10, 5: 23, 9: 23, 10: 40, 12: 40, 15: 40}
@@ -109,8 +111,9 @@ def test_inner_lines_have_their_own_interrupts(fake_chip: Any, line: int, irq: i
     enable(fake_chip, 0)
     fake_chip.write("EXTI.IMR", 1 << line)
     fake_chip.write("EXTI.RTSR", 1 << line)
-    fake_chip.parts.exti.set_line(line, True)
-    fake_chip.parts.exti.set_line(line, True)
+    inner = {16: PVD_LINE, 17: RTC_ALARM_LINE, 18: USB_WAKEUP_LINE}[line]
+    fake_chip.pins.fabric.set_line(inner, True)
+    fake_chip.pins.fabric.set_line(inner, True)
     assert fake_chip.irqs[irq]
     fake_chip.parts.exti.reset()
     assert not fake_chip.irqs[irq]

@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, invariant, rule, run_state_machine_as_test
 
 from bluepill_sim.fabric.pins import PinDrive, PinMode
+from bluepill_sim.fabric.subscriptions import EDGE, HIGH, LOW
 from bluepill_sim.peripherals.gpio import PIN_MODES
 
 QUICK = settings(max_examples=40, deadline=None)
@@ -96,12 +97,14 @@ def test_odr_chooses_the_pull_of_an_input(fake_chip: Any) -> None:
 
 
 def test_an_edge_has_the_time_of_the_write(fake_chip: Any) -> None:
-    edges: list[tuple[str, PinDrive, int]] = []
-    fake_chip.pins.on_output = lambda *edge: edges.append(edge)
+    rows = bytearray()
+    fake_chip.pins.subscribe_pins(["PB6", "PB7"], rows.extend)
     fake_chip.write("GPIOB.CRL", 0x1444_4444)
     fake_chip.now_ns = 1_234_567
     fake_chip.write("GPIOB.BSRR", 0x00FF_0080)
-    assert edges == [("PB7", PinDrive.LOW, 0), ("PB7", PinDrive.HIGH, 1_234_567)]
+    fake_chip.deliver()
+    low, high, pb7 = 1, 2, 16 + 7
+    assert [row[:4] for row in EDGE.iter_unpack(rows)] == [(0, pb7, low, LOW), (1_234_567, pb7, high, HIGH)]
 
 
 def test_reset_lets_go_of_every_pin(fake_chip: Any) -> None:

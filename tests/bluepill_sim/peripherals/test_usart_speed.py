@@ -8,8 +8,8 @@ from hypothesis import strategies as st
 
 from bluepill_sim.board import BluePill
 from bluepill_sim.errors import BluePillError
-from bluepill_sim.fabric.line_speed import USUAL_BAUDS, Heard, heard, is_usual
 from bluepill_sim.extension.library import library_path
+from bluepill_sim.fabric.line_speed import USUAL_BAUDS, Heard, heard, is_usual
 from tests.bluepill_sim.machine import Machine
 from tests.bluepill_sim.peripherals.usart_line import CHARACTER_NS, IRQ, ORE, PCE, RXNE, set_up, status
 
@@ -36,7 +36,6 @@ def sender(brr: int, text: bytes = TEXT) -> str:
 def sent(core: str, monkeypatch: Any, brr: int, far_baud: int | None, ms: int = 20) -> tuple[bytes, BluePill]:
     monkeypatch.setenv("P2OS_CORE", core)
     board = Machine(sender(brr), {}).board
-    board.usart1.on_transmit = None
     board.usart1.far_baud = far_baud
     board.run_for(ms * 1_000_000)
     return board.usart1.read(), board

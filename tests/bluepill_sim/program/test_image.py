@@ -74,7 +74,7 @@ def test_the_same_program_runs_from_every_format(tmp_path: Path) -> None:
     sent = []
     for file in (FIRMWARE, tmp_path / "a.bin", tmp_path / "a.hex"):
         board, text = BluePill(file), bytearray()
-        board.usart1.on_transmit = lambda word, _at, text=text: text.append(word)
+        board.usart1.subscribe(lambda rows, text=text: text.extend(word for word, _ in rows))
         board.advance_to(10_000_000)
         sent.append(bytes(text))
     assert sent == [b"motors: ready\n"] * 3

@@ -110,7 +110,7 @@ def test_a_cell_whose_column_the_beginning_did_not_have_stands_in_one_more() -> 
 
 def test_a_column_of_the_beginning_stays_where_it_is() -> None:
     tables = late(LATE)
-    assert [table.columns["sonar_m_9"] for table in tables] == [[0.268, None], [0.268]]
+    assert [list(table.columns["sonar_m_9"]) for table in tables] == [[0.268, None], [0.268]]
     assert {tuple(table.columns) for table in tables} == {tuple(tables[0].columns)}
     assert tables[1].columns["more"] == [None]
 

@@ -36,7 +36,7 @@ def test_positions_go_on_where_the_counters_wrap() -> None:
     counts = [-768, 100, 16000, 31000, 46768]
     assert table.columns["x_m"] == [round(count * 0.00084, 6) for count in counts]
     assert table.columns["y_m"] == [round(-8 * 0.00084, 6)] * 5
-    assert table.columns["sonar_m_1"] == [None, 0.268, None, 0.268, None]
+    assert list(table.columns["sonar_m_1"]) == [None, 0.268, None, 0.268, None]
     assert table.rows == 5
 
 

@@ -136,7 +136,7 @@ def test_numbers_0_to_2_are_named_by_where_the_session_stands() -> None:
     ],
 )  # fmt: skip
 def test_who_spoke_is_guessed_by_the_frame_s_shape(frame: Frame, direction: Direction | None) -> None:
-    assert guess_direction(frame) is direction
+    assert guess_direction(frame.payload) is direction
 
 
 def test_lines_name_units_and_directions() -> None:

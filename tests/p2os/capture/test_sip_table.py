@@ -14,9 +14,10 @@ from hypothesis import strategies as st
 pytest.importorskip("numpy")
 
 from p2os.capture import Reading, read_file, rows_of
+from p2os.capture.cells import Cell
 from p2os.capture.chunks import Capture, Chunk, Direction, capture_of
 from p2os.capture.columns.sip_table import sip_tables
-from p2os.capture.table import Cell, Table, from_robot, tables_of
+from p2os.capture.table import Table, from_robot, tables_of
 from p2os.cli.main import run
 from p2os.protocol.packets import EncoderPacket, SonarReading, StandardSip, packet_frame
 from p2os.protocol.profiles import Profile

@@ -222,7 +222,7 @@ def test_serve_without_pybullet_says_how_to_get_it(monkeypatch: pytest.MonkeyPat
     def missing(*_: object) -> None:
         raise MissingDependencyError("the bullet body needs pybullet", hint="go and get it")
 
-    monkeypatch.setattr(fleet_order, "make_body", missing)
+    monkeypatch.setattr(fleet_order, "make_scene", missing)
     assert run(["serve"]) == 2
     assert capsys.readouterr().err == "p2os: the bullet body needs pybullet\nhint: go and get it\n"
 

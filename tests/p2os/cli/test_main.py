@@ -75,6 +75,11 @@ def test_the_version_is_printed(capsys: pytest.CaptureFixture[str]) -> None:
     assert capsys.readouterr().out.count(".") == 2
 
 
+def test_the_version_is_printed_without_loading_a_verb(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(cli, "add_verbs", lambda *_: pytest.fail("verbs are loaded"))
+    assert cli.run(["--version"]) == 0
+
+
 @pytest.mark.parametrize(
     ("error", "code", "lines"),
     [

@@ -7,7 +7,7 @@ from collections.abc import Callable
 from p2os.client.settings import ClientSettings
 from p2os.pioneer.controller import Pioneer
 from p2os.pioneer.serve.host import Host
-from p2os.protocol.commands import Command
+from p2os.protocol.commands import Command, CommandNumber, enable, stop, vel
 from p2os.protocol.frames import Decoder, Frame
 from p2os.transport import listen_url, open_url
 from p2os.transport.ports import HungUpError, Transport
@@ -18,6 +18,8 @@ from tests.p2os.client.client_rig import new_pioneer
 TIMEOUT_S = 30.0
 #: Robots of tests are never open already.
 QUICK = ClientSettings(listen_ns=NS_PER_MS)
+#: What a client says last.
+CLOSING_COMMANDS = [stop(), vel(0), enable(False), Command(CommandNumber.CLOSE)]
 
 
 def until(is_so: Callable[[], object], what: str = "it") -> None:

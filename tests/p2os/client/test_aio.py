@@ -2,27 +2,18 @@
 
 import asyncio
 import math
-from collections.abc import Coroutine, Iterator
+from collections.abc import Coroutine
 from typing import Any
 
 import pytest
 
 from p2os.client import ClientSettings, ConnectError, Link, LinkLostError, MotionEnded, MotionError, Notice, RobotState
 from p2os.client.aio import Robot
-from p2os.protocol.commands import Command, CommandNumber, enable, stop, vel
+from p2os.protocol.commands import Command, CommandNumber, stop, vel
 from p2os.protocol.packets import EncoderPacket, IoPacket, SerauxPacket
 from simbase.errors import P2osError
 from simbase.timing import NS_PER_MS
-from tests.p2os.client.served_robot import QUICK, TIMEOUT_S, Recorder, ServedRobot, until
-
-CLOSING_COMMANDS = [stop(), vel(0), enable(False), Command(CommandNumber.CLOSE)]
-
-
-@pytest.fixture
-def served() -> Iterator[ServedRobot]:
-    robot = ServedRobot()
-    yield robot
-    robot.close()
+from tests.p2os.client.served_robot import CLOSING_COMMANDS, QUICK, TIMEOUT_S, Recorder, ServedRobot, until
 
 
 def robot_on(served: ServedRobot, recorder: Recorder | None = None, settings: ClientSettings = QUICK) -> Robot:
@@ -149,7 +140,8 @@ def test_a_cancellation_that_comes_together_with_a_packet_is_not_lost(served: Se
     run(story())
 
 
-def test_a_program_that_is_cancelled_in_its_block_stops_the_robot(served: ServedRobot) -> None:
+@pytest.mark.parametrize("times", [1, 2], ids=["once", "again while it closes"])
+def test_a_program_that_is_cancelled_stops_the_robot_and_says_close(served: ServedRobot, times: int) -> None:
     recorder = Recorder()
 
     async def program() -> None:
@@ -160,29 +152,9 @@ def test_a_program_that_is_cancelled_in_its_block_stops_the_robot(served: Served
     async def story() -> None:
         task = asyncio.ensure_future(program())
         await moving(served)
-        task.cancel()
-        with pytest.raises(asyncio.CancelledError):
-            await task
-
-    run(story())
-    assert recorder.sent[-4:] == CLOSING_COMMANDS
-    until(lambda: not served.is_moving)
-
-
-def test_a_program_that_is_cancelled_again_while_it_closes_has_said_stop_and_close(served: ServedRobot) -> None:
-    recorder = Recorder()
-
-    async def program() -> None:
-        async with robot_on(served, recorder) as robot:
-            robot.set_velocity(0.3)
-            await robot.sleep(3600)
-
-    async def story() -> None:
-        task = asyncio.ensure_future(program())
-        await moving(served)
-        task.cancel()
-        await asyncio.sleep(0)
-        task.cancel()
+        for _ in range(times):
+            task.cancel()
+            await asyncio.sleep(0)
         with pytest.raises(asyncio.CancelledError):
             await task
 

@@ -16,26 +16,19 @@ from types import FrameType
 from typing import Any, Self
 
 import pytest
+from p2os.client.interrupts import held_back
 
 import p2os
 from p2os import Robot
 from p2os.client import ConnectError, LinkLostError
 from p2os.client.aio import Robot as AsyncRobot
-from p2os.client.interrupts import held_back
-from p2os.protocol.commands import Command, CommandNumber, enable, stop, vel
+from p2os.protocol.commands import vel
 from p2os.transport import open_url
 from p2os.transport.ports import Transport
-from tests.p2os.client.served_robot import QUICK, Recorder, ServedRobot, until
+from simbase.interrupts import held_back
+from tests.p2os.client.served_robot import CLOSING_COMMANDS, QUICK, Recorder, ServedRobot, until
 
-CLOSING_COMMANDS = [stop(), vel(0), enable(False), Command(CommandNumber.CLOSE)]
 OURS = str(Path(p2os.__file__).parent)
-
-
-@pytest.fixture
-def served() -> Iterator[ServedRobot]:
-    robot = ServedRobot()
-    yield robot
-    robot.close()
 
 
 def was_told(recorder: Recorder) -> bool:

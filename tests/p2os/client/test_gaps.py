@@ -3,7 +3,6 @@
 import asyncio
 import threading
 import time
-from collections.abc import Iterator
 
 import pytest
 
@@ -275,13 +274,6 @@ def test_a_gap_while_the_robot_is_looked_for_does_not_use_the_search_up() -> Non
 
 
 # On real lines, with the injected clock under every wait --------------------------------------
-
-
-@pytest.fixture
-def served() -> Iterator[ServedRobot]:
-    robot = ServedRobot()
-    yield robot
-    robot.close()
 
 
 def robot_with(clock: SuspendingClock, served: ServedRobot, recorder: Recorder) -> Robot:

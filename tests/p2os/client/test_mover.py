@@ -1,11 +1,12 @@
 """What moves the robot and what takes that away: speeds, goals, motors, deadman; in virtual time."""
 
 import math
+from dataclasses import replace
 from itertools import pairwise
 
 import pytest
 
-from p2os.client.goals import DriveAxis, TurnAxis
+from p2os.client.goals import GRACE_NS, DriveAxis, Goal, TurnAxis
 from p2os.client.mover import Speeds
 from p2os.client.notices import (
     DeadmanStopped,
@@ -16,7 +17,9 @@ from p2os.client.notices import (
     MotorsDisabled,
     MotorsDisabledError,
 )
+from p2os.client.robot_state import Limits, RobotPose, RobotState
 from p2os.client.settings import ClientSettings
+from p2os.pioneer.controller import motion
 from p2os.protocol.commands import Command, CommandNumber, enable, rvel, stop, vel
 from p2os.protocol.profiles import Profile
 from simbase.errors import UsageError
@@ -275,6 +278,57 @@ def test_a_goal_that_takes_too_long_is_given_up() -> None:
     assert goal.ended.problem == "not there after 2.0 s"
     rig.run(2)
     assert rig.wheels == (0.0, 0.0)
+
+
+def approach_slowly(patch: pytest.MonkeyPatch, seconds: int) -> None:
+    """Let MOVE go as slowly as what is left in so many seconds, as AMRISim does in some five."""
+    aim = motion._aim
+
+    def aim_slowly(axis: motion._Axis, left: int, *others: int, **limits: int) -> None:
+        aim(axis, left, *others, **limits)
+        most = abs(left) // seconds
+        axis.set_speed = max(-most, min(most, axis.set_speed))
+
+    patch.setattr(motion, "_aim", aim_slowly)
+
+
+@pytest.mark.parametrize("speed_mps", [0.05, 0.1, 0.2, 0.3, 0.75])
+@pytest.mark.parametrize("distance_m", [0.5, -1.0])
+def test_a_robot_that_approaches_ever_more_slowly_arrives_at_any_speed(
+    speed_mps: float, distance_m: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    approach_slowly(monkeypatch, 6)
+    rig = Rig().connect()
+    goal = rig.core.begin_goal(DriveAxis(distance_m), None, speed_mps, rig.now)
+    rig.until(lambda: goal.ended is not None, within_s=120)
+    assert goal.ended is not None
+    assert goal.ended.problem is None
+    assert rig.pioneer.state.x_mm / 1000 == pytest.approx(distance_m, abs=0.016)
+
+
+def test_a_limit_that_was_given_is_kept_also_while_the_robot_comes_nearer(monkeypatch: pytest.MonkeyPatch) -> None:
+    approach_slowly(monkeypatch, 6)
+    rig = Rig().connect()
+    goal = rig.core.begin_goal(DriveAxis(0.5), 5 * S, None, rig.now)
+    rig.until(lambda: goal.ended is not None)
+    assert goal.ended is not None
+    assert goal.ended.problem == "not there after 5.0 s"
+
+
+def at(x_m: float) -> RobotState:
+    return replace(Rig().connect().states[-1], odometry=RobotPose(x_m=x_m), left_mps=0.02, right_mps=0.02)
+
+
+@pytest.mark.parametrize(("left_m", "is_patient"), [(0.0899, True), (0.0901, False)])
+def test_patience_lasts_as_long_again_where_a_tenth_of_what_was_left_is_done(left_m: float, is_patient: bool) -> None:
+    goal = Goal(DriveAxis(1.0), None)
+    goal.begin(at(0.0), Limits(0.75, 1.7, 0.3, 0.3, 1.7, 1.7), 0)
+    goal.take(at(0.9), 1 * S)  # a tenth of a metre is left
+    ends = goal.next_deadline()
+    goal.take(at(1.0 - left_m), ends - 1)
+    assert goal.next_deadline() == (ends - 1 + GRACE_NS if is_patient else ends)
+    assert goal.time_is_up(ends - 1) is None
+    assert (goal.time_is_up(ends) is None) is is_patient
 
 
 def test_a_robot_whose_motors_do_not_come_on_ends_the_goal() -> None:

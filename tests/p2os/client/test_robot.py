@@ -3,7 +3,6 @@
 import _thread
 import math
 import threading
-from collections.abc import Iterator
 
 import pytest
 
@@ -20,22 +19,13 @@ from p2os.client import (
 )
 from p2os.client.robot_state import Link
 from p2os.client.settings import ClientSettings
-from p2os.protocol.commands import Command, CommandNumber, enable, stop, vel
+from p2os.protocol.commands import Command, CommandNumber, stop, vel
 from p2os.protocol.packets import EncoderPacket, IoPacket, RawPacket, SerauxPacket, StandardSip
 from p2os.protocol.profiles import Profile
 from p2os.robots.parameters import ParametersError
 from simbase.errors import P2osError, UsageError
 from simbase.timing import NS_PER_MS
-from tests.p2os.client.served_robot import QUICK, Recorder, ServedRobot, until
-
-CLOSING_COMMANDS = [stop(), vel(0), enable(False), Command(CommandNumber.CLOSE)]
-
-
-@pytest.fixture
-def served() -> Iterator[ServedRobot]:
-    robot = ServedRobot()
-    yield robot
-    robot.close()
+from tests.p2os.client.served_robot import CLOSING_COMMANDS, QUICK, Recorder, ServedRobot, until
 
 
 def robot_on(served: ServedRobot, recorder: Recorder | None = None, settings: ClientSettings = QUICK) -> Robot:

@@ -4,8 +4,8 @@ import json
 from pathlib import Path
 
 import pytest
-
 from bluepill_sim.native.library import library_path
+
 from bluepill_sim.program.image import load_image
 from p2os.cli.main import run as p2os
 from robot_bench.recording.run_folder import FILES

@@ -4,7 +4,8 @@ The drive wheels collide as spheres (they touch the floor in one point; cylinder
 scrub and turn 7 degrees short) and drive on a thick box, not on a plane. Wheels
 and caster touch floors and what is lower than the hull, the hull touches all
 else; so a wheel's sphere, wider than the real tyre, never brushes a wall (but it
-meets a low thing up to 6 cm beside the tyre). Every body has a client of its own.
+meets a low thing up to 6 cm beside the tyre). Every scene has a client of its own,
+in which all its robots stand; their hulls meet each other as they meet all else.
 
 What can be pushed is a rigid body; what walks is put along its path in each step.
 Whatever is fixed is merged into one body. Wheels slip where the floor's friction
@@ -36,15 +37,15 @@ from p2os.pioneer.body.bullet.model import (
 from p2os.pioneer.body.bullet.rays import SonarRays
 from p2os.pioneer.body.contract import FASTEST_MPS, BodyState, Turned
 from p2os.pioneer.body.engine_body import EngineBody
-from p2os.pioneer.body.in_world import DT_S
+from p2os.pioneer.body.in_world import DT_S, Scene
 from p2os.pioneer.body.physical import (
     FLOOR_GROUP,
     LOW_GROUP,
     SETTLE_STEPS,
-    group_of,
+    group_for,
 )
 from p2os.pioneer.body.ray_cast import Echo
-from p2os.pioneer.sonar.ring import Cone, cones, reading
+from p2os.pioneer.sonar.ring import Cone, reading
 from p2os.pioneer.world.model import Obstacle, Pose, World
 from p2os.pioneer.world.plan import Bands
 from p2os.robots.parameters import RobotParameters
@@ -56,123 +57,237 @@ FAR_M, LOOK_STEPS = 0.1, 50
 WHEELS = (LEFT, RIGHT)
 
 
-class BulletBody(EngineBody):
-    """A differential drive with mass, torque limits and friction."""
+class BulletScene(Scene):
+    """Robots and things in one client of the engine."""
 
-    STATE = ("_made", "_targets", "_start", "engine_state")
-    #: What `engine_state` makes anew, what is read from the engine, and what only spares a look for contacts.
-    DERIVED = ("_floors", "_robot", "_centre", "_low", "_numbers", "_is_uneven", "_joints", "_matrix", "_origin",
-               "_alone", "_look_in", "_is_busy", "_fan", "_fan_rays")  # fmt: skip
+    STATE = ("_made", "engine_state")
+    #: What `engine_state` makes anew.
+    DERIVED = ("floors", "low", "is_uneven", "_numbers")
 
     name = "bullet"
-    note: str | None = None
+    bodies: "tuple[BulletBody, ...]"
 
-    def __init__(self, world: World, parameters: RobotParameters) -> None:
-        super().__init__(world, parameters)
-        self._sonar_rays = SonarRays(cones(parameters), parameters.sonar_height_m, parameters.sonar_range_m)
-        self._bands = Bands(parameters)
+    def __init__(self, world: World, models: Sequence[RobotParameters]) -> None:
+        super().__init__(world, len(models))
+        self._bands = [Bands(model) for model in models]
         #: The engine takes its client as a keyword of every call.
-        self._client = pybullet.connect(pybullet.DIRECT)
-        #: The fan of rays that was cast last, prepared.
-        self._fan: tuple[Cone, float] | None = None
-        #: Steps for which nothing can touch the robot, and steps until that is looked at again.
-        self._alone, self._look_in = 0, 0
-        self.reset(world.start, 0)
+        self.client = pybullet.connect(pybullet.DIRECT)
+        self._take(BulletBody(self, model, number) for number, model in enumerate(models))
+        self.reset([world.start] * len(models), 0)
 
     def __del__(self) -> None:
-        client = getattr(self, "_client", -1)
+        client = getattr(self, "client", -1)
         if client >= 0 and pybullet.isConnected(client):
             pybullet.disconnect(client)
 
-    def reset(self, pose: Pose, seed: int) -> BodyState:
-        """Stand still at a pose in the world as it was made; nothing here is random."""
+    def reset(self, poses: Sequence[Pose], seed: int) -> None:
+        """Let every robot stand still at its pose in the world as it was made; nothing here is random."""
         del seed
-        self._begin()
-        self._build([(item, True) for item in self._plan.obstacles], pose)
-        self._targets = (0.0, 0.0)
-        self._command()
+        for body in self.bodies:
+            body.begin()
+        self._build([(item, True) for item in self.bodies[0].things], poses)
+        for body in self.bodies:
+            body.rest()
         for _ in range(SETTLE_STEPS):
-            pybullet.stepSimulation(physicsClientId=self._client)
-        joints = pybullet.getJointStates(self._robot, WHEELS, physicsClientId=self._client)
-        self._zero = (joints[0][0], joints[1][0])
-        #: Where the engine's base came to rest: place and turn.
-        self._start = pybullet.getBasePositionAndOrientation(self._robot, physicsClientId=self._client)
-        self._count_anew()
-        return self.state
+            pybullet.stepSimulation(physicsClientId=self.client)
+        for body in self.bodies:
+            body.begin_here()
 
-    def put_back(self) -> None:
-        """Stand still where the last `reset` put it, and what was pushed where the world has it."""
-        super().put_back()
-        client = self._client
-        pybullet.resetBasePositionAndOrientation(self._robot, *self._start, physicsClientId=client)
-        pybullet.resetBaseVelocity(self._robot, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0), physicsClientId=client)
-        for wheel, angle in zip(WHEELS, self._zero, strict=True):
-            pybullet.resetJointState(self._robot, wheel, angle, 0.0, physicsClientId=client)
-        self._targets = (0.0, 0.0)
-        self._command()
-        self._count_anew()
-        self._changed()
-
-    def stand_at(self, x_m: float, y_m: float, heading_rad: float) -> None:
-        """Stand still elsewhere, a hair's breadth above the floor or on it."""
-        height_m, (cx, _, cz) = self._place_for(x_m, y_m, heading_rad), self._centre
-        place = x_m + cx * math.cos(heading_rad), y_m + cx * math.sin(heading_rad), height_m + cz
-        turn, still, client = pybullet.getQuaternionFromEuler((0.0, 0.0, heading_rad)), (0.0, 0.0, 0.0), self._client
-        pybullet.resetBasePositionAndOrientation(self._robot, place, turn, physicsClientId=client)
-        pybullet.resetBaseVelocity(self._robot, still, still, physicsClientId=client)
-        for wheel, joint in zip(
-            WHEELS, pybullet.getJointStates(self._robot, WHEELS, physicsClientId=client), strict=True
-        ):
-            pybullet.resetJointState(self._robot, wheel, joint[0], 0.0, physicsClientId=client)
-        self._command()
-        self._stalling = [0, 0]
-        self._joints = pybullet.getJointStates(self._robot, WHEELS, physicsClientId=client)
-        self._state = None
-        self._changed()
-
-    def _count_anew(self) -> None:
-        super()._count_anew()
-        self._joints = pybullet.getJointStates(self._robot, WHEELS, physicsClientId=self._client)
-
-    def _build(self, made: Sequence[tuple[Obstacle, bool]], pose: Pose) -> None:
+    def _build(self, made: Sequence[tuple[Obstacle, bool]], poses: Sequence[Pose]) -> None:
         """Make the engine's world anew.
 
         The engine finds bodies again by their order, so each keeps its place from
         its making on: a thing that was taken out is parked, not removed.
         """
-        client = self._client
-        start_anew(client)
-        self._floors = {add_floor(self._world, client)}
-        self._robot, self._centre = add_robot(self._parameters, pose, client)
-        _, driven_on = add_building(self._world, client)
-        self._floors.update(driven_on)
-        in_building = {item.name for item in merged(self._world)}
-        self._low: set[int] = set()
-        for item in self._static.obstacles:
+        client, static = self.client, [item for item in self.world.obstacles if item.fixed]
+        start_anew(client, robots=len(self.bodies))
+        #: Floors, and what is lower than a hull and stops wheels, by the engine's numbers.
+        self.floors = {add_floor(self.world, client)}
+        self.low: set[int] = set()
+        for body, pose in zip(self.bodies, poses, strict=True):
+            body.make(pose)
+        _, driven_on = add_building(self.world, client)
+        self.floors.update(driven_on)
+        in_building = {item.name for item in merged(self.world)}
+        for item in static:
             if item.name not in in_building:
                 self._add(item)
         #: Every obstacle ever made, by the engine's number, and whether it stands in the world.
         self._made: dict[int, tuple[Obstacle, bool]] = {}
-        self._is_uneven = bool(driven_on) or any(item.kind.is_driven_on for item in self._static.obstacles)
+        #: Whether something is driven on beside the level floor.
+        self.is_uneven = bool(driven_on) or any(item.kind.is_driven_on for item in static)
         #: Those that stand in the world, by name.
         self._numbers: dict[str, int] = {}
         for item, stands in made:
             self._placed(item)
             if not stands:
                 self._removed(item.name)
-        self._changed()
+        self.changed()
 
-    def step(self, left_mps: float, right_mps: float) -> Turned:
-        """Move on by one step with these rim-speed set-points."""
-        client, self._state = self._client, None
-        if (left_mps, right_mps) != self._targets:
-            self._targets = (left_mps, right_mps)
+    def step(self, setpoints: Sequence[tuple[float, float]]) -> Sequence[Turned]:
+        """Move all on by one step with these rim-speed set-points."""
+        bodies = self.bodies
+        for body, (left_mps, right_mps) in zip(bodies, setpoints, strict=True):
+            for item in body.count_step(left_mps, right_mps):
+                if body is bodies[0]:
+                    self._put(item)
+        pybullet.stepSimulation(physicsClientId=self.client)
+        turned = [body.take_step() for body in bodies]
+        for body in bodies:
+            body.read_anew()
+        return turned
+
+    def name_of(self, number: int) -> str | None:
+        """Return what a thing or a robot is called by the engine's number; None for the building."""
+        if number in self._made:
+            return self._made[number][0].name
+        return next((body.robot_name for body in self.bodies if body.robot == number), None)
+
+    def where_is(self, name: str) -> tuple[float, float, Sequence[float]]:
+        """Return where a thing that can be pushed is: x, y, and its turn as nine numbers."""
+        place, turn = pybullet.getBasePositionAndOrientation(self._numbers[name], physicsClientId=self.client)
+        return place[0], place[1], pybullet.getMatrixFromQuaternion(turn)
+
+    def _placed(self, item: Obstacle) -> None:
+        number = self._numbers[item.name] = self._add(item)
+        self._made[number] = (item, True)
+
+    def _put(self, item: Obstacle) -> None:
+        move_obstacle(self._numbers[item.name], item, self.client)
+
+    def _removed(self, name: str) -> None:
+        number = self._numbers.pop(name)
+        self._made[number] = (self._made[number][0], False)
+        park_obstacle(number, self.client)
+
+    def _add(self, obstacle: Obstacle) -> int:
+        """Make an obstacle's body and note what touching it means."""
+        group = group_for(obstacle, self._bands)
+        number = add_obstacle(obstacle, group, self.client)
+        if group == FLOOR_GROUP:
+            self.floors.add(number)
+        elif group & LOW_GROUP:
+            self.low.add(number)
+        return number
+
+    @property
+    def engine_state(self) -> bytes:
+        """The engine's own file; it holds addresses too, so that one state can be written in two ways."""
+        with tempfile.TemporaryDirectory() as folder:
+            path = Path(folder) / "state.bullet"
+            pybullet.saveBullet(str(path), physicsClientId=self.client)
+            return path.read_bytes()
+
+    @engine_state.setter
+    def engine_state(self, saved: bytes) -> None:
+        self._build(list(self._made.values()), [self.world.start] * len(self.bodies))
+        with tempfile.TemporaryDirectory() as folder:
+            path = Path(folder) / "state.bullet"
+            path.write_bytes(saved)
+            pybullet.restoreState(fileName=str(path), physicsClientId=self.client)
+        for body in self.bodies:
+            body.go_on()
+
+
+class BulletBody(EngineBody):
+    """A differential drive with mass, torque limits and friction."""
+
+    STATE = ("_targets", "_start")
+    #: What the scene's `engine_state` makes anew, what is read from the engine, and what spares a look for contacts.
+    DERIVED = ("robot", "_centre", "_joints", "_matrix", "_origin", "_alone", "_look_in", "_is_busy", "_fan",
+               "_fan_rays", "_motors")  # fmt: skip
+
+    name = "bullet"
+    note: str | None = None
+    scene: BulletScene
+
+    def __init__(self, scene: BulletScene, parameters: RobotParameters, number: int) -> None:
+        super().__init__(scene, parameters, number)
+        self._sonar_rays = SonarRays(self._cones, parameters.sonar_height_m, parameters.sonar_range_m)
+        self._client = scene.client
+        #: The fan of rays that was cast last, prepared.
+        self._fan: tuple[Cone, float] | None = None
+        #: Steps for which nothing can touch the robot, and steps until that is looked at again.
+        self._alone, self._look_in = 0, 0
+        self._targets = (0.0, 0.0)
+        #: What the motors were told last: a rate and a torque each.
+        self._motors: list[tuple[float, float]] = []
+
+    @property
+    def things(self) -> tuple[Obstacle, ...]:
+        """All that is not part of the building."""
+        return self._plan.obstacles
+
+    def make(self, pose: Pose) -> None:
+        """Make the robot in the engine's empty world."""
+        #: The engine's number of it.
+        self.robot, self._centre = add_robot(self._parameters, pose, self._client)
+
+    def rest(self) -> None:
+        """Hold the wheels while the robot comes to rest on them."""
+        self._targets, self._is_at_rest = (0.0, 0.0), [False, False]
+        self._command()
+
+    def begin_here(self) -> None:
+        """Take the pose to which the robot has come as its start."""
+        joints = pybullet.getJointStates(self.robot, WHEELS, physicsClientId=self._client)
+        self._zero = (joints[0][0], joints[1][0])
+        #: Where the engine's base came to rest: place and turn.
+        self._start = pybullet.getBasePositionAndOrientation(self.robot, physicsClientId=self._client)
+        self._count_anew()
+
+    def go_on(self) -> None:
+        """Go on in an engine whose state was restored; it does not save the motors' targets."""
+        self._state = None
+        self._command()
+        self._joints = pybullet.getJointStates(self.robot, WHEELS, physicsClientId=self._client)
+
+    def put_back(self) -> None:
+        """Stand still where the last `reset` put it, and what was pushed where the world has it."""
+        super().put_back()
+        client = self._client
+        pybullet.resetBasePositionAndOrientation(self.robot, *self._start, physicsClientId=client)
+        pybullet.resetBaseVelocity(self.robot, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0), physicsClientId=client)
+        for wheel, angle in zip(WHEELS, self._zero, strict=True):
+            pybullet.resetJointState(self.robot, wheel, angle, 0.0, physicsClientId=client)
+        self._targets = (0.0, 0.0)
+        self._count_anew()
+        self._command()
+        self.scene.changed()
+
+    def stand_at(self, x_m: float, y_m: float, heading_rad: float) -> None:
+        """Stand still elsewhere, a hair's breadth above the floor or on it."""
+        height_m, (cx, _, cz) = self._place_for(x_m, y_m, heading_rad), self._centre
+        place = x_m + cx * math.cos(heading_rad), y_m + cx * math.sin(heading_rad), height_m + cz
+        turn, still, client = pybullet.getQuaternionFromEuler((0.0, 0.0, heading_rad)), (0.0, 0.0, 0.0), self._client
+        pybullet.resetBasePositionAndOrientation(self.robot, place, turn, physicsClientId=client)
+        pybullet.resetBaseVelocity(self.robot, still, still, physicsClientId=client)
+        for wheel, joint in zip(
+            WHEELS, pybullet.getJointStates(self.robot, WHEELS, physicsClientId=client), strict=True
+        ):
+            pybullet.resetJointState(self.robot, wheel, joint[0], 0.0, physicsClientId=client)
+        self._command()
+        self._stalling = [0, 0]
+        self._joints = pybullet.getJointStates(self.robot, WHEELS, physicsClientId=client)
+        self._state = None
+        self.scene.changed()
+
+    def _count_anew(self) -> None:
+        super()._count_anew()
+        self._joints = pybullet.getJointStates(self.robot, WHEELS, physicsClientId=self._client)
+
+    def count_step(self, left_mps: float, right_mps: float) -> Sequence[Obstacle]:
+        """Begin a step with these rim-speed set-points; return what walks, where it is by then."""
+        self._state = None
+        self._targets = (left_mps, right_mps)
+        if self._wanted_motors() != self._motors:
             self._command()
         self._steps += 1
-        if self._walking:
-            self._walk()
-        pybullet.stepSimulation(physicsClientId=client)
-        left, right = self._joints = pybullet.getJointStates(self._robot, WHEELS, physicsClientId=client)
+        return self.walk() if self._walking else ()
+
+    def take_step(self) -> Turned:
+        """Take what the engine's step has made of the robot."""
+        left, right = self._joints = pybullet.getJointStates(self.robot, WHEELS, physicsClientId=self._client)
         if self._alone:
             self._alone -= 1
             self._contacts.update(touching=False)
@@ -180,11 +295,8 @@ class BulletBody(EngineBody):
             if self._contacts.update(touching=self._is_touching()):
                 self._note_contact()
             self._look_around()
-        held = self._is_held[:]
-        self._watch_motor(LEFT, left_mps, left[3], left[1])
-        self._watch_motor(RIGHT, right_mps, right[3], right[1])
-        if held != self._is_held:
-            self._command()
+        self._watch_motor(LEFT, self._targets[LEFT], left[3], left[1])
+        self._watch_motor(RIGHT, self._targets[RIGHT], right[3], right[1])
         zero = self._zero
         return Turned(left[0] - zero[0], right[0] - zero[1])
 
@@ -195,16 +307,20 @@ class BulletBody(EngineBody):
             return
         self._look_in = LOOK_STEPS
         state = self.state
-        free = self._plan.clearance(state.x_m, state.y_m, state.heading_rad, no_more_than=2.0)
+        free = self._nearest_robot(self._plan.clearance(state.x_m, state.y_m, state.heading_rad, no_more_than=2.0))
         if free > FAR_M:
-            self._alone = int((free - FAR_M / 2) / (FASTEST_MPS * DT_S))
+            closing_mps = 2 * FASTEST_MPS if self.others else FASTEST_MPS
+            self._alone = int((free - FAR_M / 2) / (closing_mps * DT_S))
             self._look_in = 0
+
+    def _wanted_motors(self) -> list[tuple[float, float]]:
+        return [self._motor(wheel, asked) for wheel, asked in zip(WHEELS, self._targets, strict=True)]
 
     def _command(self) -> None:
         """Give the motors their targets; the engine does not save them with its state."""
-        left, right = (self._motor(wheel, asked) for wheel, asked in zip(WHEELS, self._targets, strict=True))
+        left, right = self._motors = self._wanted_motors()
         pybullet.setJointMotorControlArray(
-            self._robot, WHEELS, pybullet.VELOCITY_CONTROL,
+            self.robot, WHEELS, pybullet.VELOCITY_CONTROL,
             targetVelocities=[left[0], right[0]], forces=[left[1], right[1]],
             physicsClientId=self._client,
         )  # fmt: skip
@@ -214,24 +330,24 @@ class BulletBody(EngineBody):
 
     def _touching_points(self) -> list[tuple[Any, ...]]:
         """Return the engine's contacts of the hull with anything but a floor, else of the wheels with low things."""
-        points = pybullet.getContactPoints(bodyA=self._robot, linkIndexA=-1, physicsClientId=self._client)
-        found = [point for point in points if point[8] <= TOUCH_M and point[2] not in self._floors]
-        if found or not self._low:
+        points = pybullet.getContactPoints(bodyA=self.robot, linkIndexA=-1, physicsClientId=self._client)
+        found = [point for point in points if point[8] <= TOUCH_M and point[2] not in self.scene.floors]
+        if found or not self.scene.low:
             return found
-        points = pybullet.getContactPoints(bodyA=self._robot, physicsClientId=self._client)
-        return [point for point in points if point[8] <= TOUCH_M and point[2] in self._low]
+        points = pybullet.getContactPoints(bodyA=self.robot, physicsClientId=self._client)
+        return [point for point in points if point[8] <= TOUCH_M and point[2] in self.scene.low]
 
     def _note_contact(self) -> None:
         """Remember a collision, at the deepest of its points; what is merged into one body is found by its place."""
         point = min(self._touching_points(), key=itemgetter(8))
         number, (x, y, _) = point[2], point[6]
-        self._note_touched(self._made[number][0].name if number in self._made else None, x, y)
+        self._note_touched(self.scene.name_of(number), x, y)
 
     def _read(self) -> BodyState:
         """Return the engine's state as ours, and keep the robot's frame for the rays."""
         client = self._client
-        place, turn = pybullet.getBasePositionAndOrientation(self._robot, physicsClientId=client)
-        linear, angular = pybullet.getBaseVelocity(self._robot, physicsClientId=client)
+        place, turn = pybullet.getBasePositionAndOrientation(self.robot, physicsClientId=client)
+        linear, angular = pybullet.getBaseVelocity(self.robot, physicsClientId=client)
         self._matrix = pybullet.getMatrixFromQuaternion(turn)
         m, (cx, _, cz) = self._matrix, self._centre
         # The engine's point is the hull's centre of mass: take the axle's middle, on the floor.
@@ -243,25 +359,32 @@ class BulletBody(EngineBody):
         """Return the nearest echo of each cone, metres; the rays tilt with the body."""
         hits, rays = self._cast(numbers), self._sonar_rays.rays
         longest = self._sonar_rays.longest_m
-        return [
-            reading(longest * min(hit[2] for hit in hits[rays * place : rays * (place + 1)]), self._parameters)
-            for place in range(len(numbers))
+        found = [
+            longest * min(hit[2] for hit in hits[rays * place : rays * (place + 1)]) for place in range(len(numbers))
         ]
+        if self.others:
+            found = [
+                min(nearest, *self._robot_ranges(self._cones[number], longest))
+                for number, nearest in zip(numbers, found, strict=True)
+            ]
+        return [reading(nearest, self._parameters) for nearest in found]
 
     def echoes(self, numbers: Sequence[int]) -> list[list[Echo]]:
         """Return what each ray of some sonar meets, with the angle at which it meets it."""
         hits, rays = self._cast(numbers), self._sonar_rays.rays
-        return [
+        met = [
             self._sonar_rays.echoes(number, hits[rays * place : rays * (place + 1)], self._matrix)
             for place, number in enumerate(numbers)
         ]
+        return self._with_robots(numbers, met)
 
     def scan(self, fan: Cone, longest_m: float) -> list[float]:
         """Return how far each ray of a fan goes, metres; the rays tilt with the body."""
         if (fan, longest_m) != self._fan:
             self._fan = (fan, longest_m)
             self._fan_rays = SonarRays((fan,), self._parameters.sonar_height_m, longest_m)
-        return [longest_m * hit[2] for hit in self._cast((0,), self._fan_rays)]
+        met = [longest_m * hit[2] for hit in self._cast((0,), self._fan_rays)]
+        return list(map(min, met, self._robot_ranges(fan, longest_m))) if self.others else met
 
     def _cast(self, numbers: Sequence[int], rays: SonarRays | None = None) -> list[tuple[Any, ...]]:
         """Return what the engine returns for each ray of some sonar, or of other rays by their numbers."""
@@ -273,54 +396,13 @@ class BulletBody(EngineBody):
         return cast("list[tuple[Any, ...]]", hits)
 
     def _where_is(self, name: str) -> tuple[float, float, Sequence[float]]:
-        place, turn = pybullet.getBasePositionAndOrientation(self._numbers[name], physicsClientId=self._client)
-        return place[0], place[1], pybullet.getMatrixFromQuaternion(turn)
+        return self.scene.where_is(name)
 
-    def _placed(self, item: Obstacle) -> None:
-        number = self._numbers[item.name] = self._add(item)
-        self._made[number] = (item, True)
-
-    def _put(self, item: Obstacle) -> None:
-        move_obstacle(self._numbers[item.name], item, self._client)
-
-    def _removed(self, name: str) -> None:
-        number = self._numbers.pop(name)
-        self._made[number] = (self._made[number][0], False)
-        park_obstacle(number, self._client)
-
-    def _add(self, obstacle: Obstacle) -> int:
-        """Make an obstacle's body and note what touching it means."""
-        number = add_obstacle(obstacle, self._bands, self._client)
-        group = group_of(obstacle, self._bands)
-        if group == FLOOR_GROUP:
-            self._floors.add(number)
-        elif group == LOW_GROUP:
-            self._low.add(number)
-        return number
-
-    def _changed(self) -> None:
+    def look_anew(self) -> None:
         """Look for contacts anew: something else is around the robot now."""
         self._alone, self._look_in = 0, 0
         self._is_busy = (
-            self._is_uneven
+            self.scene.is_uneven
             or bool(self._walking)
             or any(item.mass_kg > 0 or item.kind.is_driven_on for item in self._plan.obstacles)
         )
-
-    @property
-    def engine_state(self) -> bytes:
-        """The engine's own file; it holds addresses too, so that one state can be written in two ways."""
-        with tempfile.TemporaryDirectory() as folder:
-            path = Path(folder) / "state.bullet"
-            pybullet.saveBullet(str(path), physicsClientId=self._client)
-            return path.read_bytes()
-
-    @engine_state.setter
-    def engine_state(self, saved: bytes) -> None:
-        self._build(list(self._made.values()), self._world.start)
-        with tempfile.TemporaryDirectory() as folder:
-            path = Path(folder) / "state.bullet"
-            path.write_bytes(saved)
-            pybullet.restoreState(fileName=str(path), physicsClientId=self._client)
-        self._command()
-        self._joints = pybullet.getJointStates(self._robot, WHEELS, physicsClientId=self._client)

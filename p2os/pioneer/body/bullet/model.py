@@ -32,14 +32,12 @@ from p2os.pioneer.body.physical import (
     Chassis,
     Vector,
     floor_box,
-    group_of,
     half_sizes,
     is_level,
     middle_and_slope,
 )
 from p2os.pioneer.world.geometry import Footprint
 from p2os.pioneer.world.model import Obstacle, Pose, Triangle, Vertex, World
-from p2os.pioneer.world.plan import Bands
 from p2os.robots.parameters import RobotParameters
 
 #: Links of the robot.
@@ -75,11 +73,10 @@ def add_floor(world: World, client: int) -> int:
     return _static_box(half, place, LEVEL, FLOOR_GROUP, client)
 
 
-def add_obstacle(item: Obstacle, bands: Bands, client: int) -> int:
-    """Make an obstacle, a raised floor or a ramp; return its number."""
-    group = group_of(item, bands)
+def add_obstacle(item: Obstacle, group: int, client: int) -> int:
+    """Make an obstacle, a raised floor or a ramp, of these groups; return its number."""
     place, turn = _pose(item)
-    if group == PUSHED_GROUP:
+    if group & PUSHED_GROUP:
         return _pushed(item, place, turn, client)
     if not item.is_cylinder:
         return _static_box(half_sizes(item), place, turn, group, client)

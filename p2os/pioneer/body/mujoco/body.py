@@ -6,7 +6,7 @@ engine: contacts are the solution of one convex problem in each step, not of an
 iteration that is cut short, so that hardly anything slips that need not.
 
 Not modelled: tyre scrub and wheel-size errors, battery sag; floors of meshes
-(refused, see `model`).
+(refused, see `model`). All robots of a scene are one model; their hulls meet each other.
 """
 
 from collections.abc import Sequence
@@ -17,12 +17,10 @@ from numpy.typing import NDArray
 
 from p2os.pioneer.body.contract import BodyState, Turned
 from p2os.pioneer.body.engine_body import EngineBody
+from p2os.pioneer.body.in_world import Scene
 from p2os.pioneer.body.mujoco.model import (
-    HULL,
-    ROBOT,
-    ROTORS,
     THING,
-    WHEELS,
+    RobotNames,
     floor_geometries,
     low_geometries,
     make_model,
@@ -35,32 +33,134 @@ from p2os.pioneer.body.physical import (
     middle_and_slope,
 )
 from p2os.pioneer.body.ray_cast import Echo
-from p2os.pioneer.sonar.ring import Cone, cones, reading
+from p2os.pioneer.sonar.ring import Cone, reading
 from p2os.pioneer.world.model import Obstacle, Pose, World
 from p2os.robots.parameters import RobotParameters
 
 #: All that MuJoCo needs to go on alike.
 _STATE = mujoco.mjtState.mjSTATE_INTEGRATION
-#: The joints of the robot: its place in the world, its wheels, and what drives them.
-ROBOT_JOINTS = (ROBOT, *WHEELS, *ROTORS)
+
+
+class MujocoScene(Scene):
+    """Robots and things in one model of the engine."""
+
+    STATE = ("engine_state",)
+    #: The engine's own objects: `engine_state` makes them anew.
+    DERIVED = ("model", "data", "floors", "low")
+
+    name = "mujoco"
+    bodies: "tuple[MujocoBody, ...]"
+
+    def __init__(self, world: World, models: Sequence[RobotParameters]) -> None:
+        super().__init__(world, len(models))
+        self._models = tuple(models)
+        self._take(MujocoBody(self, model, number) for number, model in enumerate(models))
+        self.reset([world.start] * len(models), 0)
+
+    def reset(self, poses: Sequence[Pose], seed: int) -> None:
+        """Let every robot stand still at its pose in the world as it was made; nothing here is random."""
+        del seed
+        for body in self.bodies:
+            body.begin()
+        self._build()
+        for body, pose in zip(self.bodies, poses, strict=True):
+            body.stand_down(pose)
+        for _ in range(SETTLE_STEPS):
+            mujoco.mj_step(self.model, self.data)
+        for body in self.bodies:
+            body.begin_here()
+
+    def _build(self) -> None:
+        """Make the engine's model of what stands in the world now; all rests, the robots at the world's middle."""
+        things = self.bodies[0].things
+        self.model = make_model(self.world, self._models, things)
+        self.data = mujoco.MjData(self.model)
+        self.floors, self.low = floor_geometries(self.model), low_geometries(self.model)
+        for body in self.bodies:
+            body.find_joints()
+        for item in things:
+            self._put(item)
+
+    def _rebuild(self) -> None:
+        """Make the model anew and go on where everything was."""
+        model, data = self.model, self.data
+        names = [model.joint(number).name for number in range(model.njnt)]
+        kept = {name: (data.joint(name).qpos.copy(), data.joint(name).qvel.copy()) for name in names}
+        self._build()
+        for name in (self.model.joint(number).name for number in range(self.model.njnt)):
+            if name in kept:
+                self.data.joint(name).qpos, self.data.joint(name).qvel = kept[name]
+        for body in self.bodies:
+            body.read_anew()
+
+    def step(self, setpoints: Sequence[tuple[float, float]]) -> Sequence[Turned]:
+        """Move all on by one step with these rim-speed set-points."""
+        bodies = self.bodies
+        for body, (left_mps, right_mps) in zip(bodies, setpoints, strict=True):
+            for item in body.count_step(left_mps, right_mps):
+                if body is bodies[0]:
+                    self._put(item)
+        mujoco.mj_step(self.model, self.data)
+        # The motors are the only frictions of joints, and the engine lists those first, in the robots' order.
+        efforts = self.data.efc_force[: 2 * len(bodies)].tolist()
+        turned = [body.take_step(efforts[2 * number : 2 * number + 2]) for number, body in enumerate(bodies)]
+        for body in bodies:
+            body.read_anew()
+        return turned
+
+    def _placed(self, item: Obstacle) -> None:
+        del item
+        self._rebuild()
+
+    def _removed(self, name: str) -> None:
+        del name
+        self._rebuild()
+
+    def _put(self, item: Obstacle) -> None:
+        """Put a thing of the model where it stands; one that can be pushed then rests."""
+        place, slope = middle_and_slope(item)
+        turn, name = quaternion(item.heading_rad, slope), THING + item.name
+        number = int(self.model.body(name).mocapid[0])
+        if number < 0:
+            joint = self.data.joint(name)
+            joint.qpos, joint.qvel = (*place, *turn), 0.0
+        else:
+            self.data.mocap_pos[number], self.data.mocap_quat[number] = place, turn
+
+    @property
+    def engine_state(self) -> bytes:
+        """All that MuJoCo needs to go on alike, for a model of what stands in the plan."""
+        numbers = np.empty(mujoco.mj_stateSize(self.model, _STATE))
+        mujoco.mj_getState(self.model, self.data, numbers, _STATE)
+        return numbers.tobytes()
+
+    @engine_state.setter
+    def engine_state(self, saved: bytes) -> None:
+        self._build()
+        mujoco.mj_setState(self.model, self.data, np.frombuffer(saved), _STATE)
+        for body in self.bodies:
+            body.read_anew()
 
 
 class MujocoBody(EngineBody):
     """A differential drive with mass, torque limits and friction."""
 
-    STATE = ("_start", "engine_state")
-    #: The engine's own objects, and where in them things are: `engine_state` makes them anew.
-    DERIVED = ("_model", "_data", "_qpos", "_qvel", "_efforts", "_wheel_places", "_wheel_speeds", "_rotors",
-               "_robot_place", "_robot_speed", "_hull", "_floors", "_low", "_fan", "_fan_rays")  # fmt: skip
+    STATE = ("_start",)
+    #: Where in the engine's objects things are.
+    DERIVED = ("_qpos", "_qvel", "_wheel_places", "_wheel_speeds", "_rotors", "_robot_place", "_robot_speed",
+               "_hull_number", "_wheel_numbers", "_asked", "_fan", "_fan_rays")  # fmt: skip
 
     name = "mujoco"
+    scene: MujocoScene
+    others: "tuple[MujocoBody, ...]"
 
-    def __init__(self, world: World, parameters: RobotParameters) -> None:
-        super().__init__(world, parameters)
-        self._sonar_rays = SonarRays(cones(parameters), parameters.sonar_height_m, parameters.sonar_range_m)
+    def __init__(self, scene: MujocoScene, parameters: RobotParameters, number: int) -> None:
+        super().__init__(scene, parameters, number)
+        self._names, self._number = RobotNames.of(number), number
+        self._sonar_rays = SonarRays(self._cones, parameters.sonar_height_m, parameters.sonar_range_m)
         #: The fan of rays that was cast last, prepared.
         self._fan: tuple[Cone, float] | None = None
-        self.reset(world.start, 0)
+        self._asked = (0.0, 0.0)
 
     @property
     def note(self) -> str | None:
@@ -69,93 +169,78 @@ class MujocoBody(EngineBody):
             return None
         return "the mujoco body touches a mesh as upright walls over its plan, at the height of the hull"
 
-    def reset(self, pose: Pose, seed: int) -> BodyState:
-        """Stand still at a pose in the world as it was made; nothing here is random."""
-        del seed
-        self._begin()
-        self._build()
-        self._data.joint(ROBOT).qpos = (pose.x_m, pose.y_m, pose.z_m, *quaternion(pose.heading_rad))
-        for _ in range(SETTLE_STEPS):
-            mujoco.mj_step(self._model, self._data)
+    @property
+    def things(self) -> tuple[Obstacle, ...]:
+        """All that is not part of the building."""
+        return self._plan.obstacles
+
+    def find_joints(self) -> None:
+        """Find the robot in a model that was made anew."""
+        model, data, names = self.scene.model, self.scene.data, self._names
+        self._qpos, self._qvel = data.qpos, data.qvel
+        joints = [model.joint(name) for name in names.wheels]
+        self._wheel_places = [int(joint.qposadr[0]) for joint in joints]
+        self._wheel_speeds = [int(joint.dofadr[0]) for joint in joints]
+        self._rotors = [int(model.joint(name).dofadr[0]) for name in names.rotors]
+        self._robot_place, self._robot_speed = (
+            int(model.joint(names.robot).qposadr[0]), int(model.joint(names.robot).dofadr[0]),
+        )  # fmt: skip
+        self._hull_number = int(model.geom(names.hull).id)
+        #: Its wheels and its caster.
+        self._wheel_numbers = frozenset(int(model.geom(name).id) for name in (*names.wheels, names.caster))
+
+    def stand_down(self, pose: Pose) -> None:
+        """Put the robot at a pose of a model that was made anew."""
+        place = (pose.x_m, pose.y_m, pose.z_m, *quaternion(pose.heading_rad))
+        self.scene.data.joint(self._names.robot).qpos = place
+
+    def begin_here(self) -> None:
+        """Take the pose to which the robot has come as its start."""
         self._zero = tuple(float(self._qpos[place]) for place in self._wheel_places)
         #: How the robot came to rest: each of its joints.
-        self._start = {name: tuple(self._data.joint(name).qpos.tolist()) for name in ROBOT_JOINTS}
+        self._start = {name: tuple(self.scene.data.joint(name).qpos.tolist()) for name in self._names.joints}
         self._count_anew()
-        return self.state
 
     def put_back(self) -> None:
         """Stand still where the last `reset` put it, and what was pushed where the world has it."""
         super().put_back()
         for name, place in self._start.items():
-            self._data.joint(name).qpos, self._data.joint(name).qvel = place, 0.0
+            self.scene.data.joint(name).qpos, self.scene.data.joint(name).qvel = place, 0.0
         self._count_anew()
+        self.scene.changed()
 
     def stand_at(self, x_m: float, y_m: float, heading_rad: float) -> None:
         """Stand still elsewhere."""
-        height_m, data = self._place_for(x_m, y_m, heading_rad), self._data
-        data.joint(ROBOT).qpos = (x_m, y_m, height_m, *quaternion(heading_rad))
-        for name in ROBOT_JOINTS:
+        height_m, data = self._place_for(x_m, y_m, heading_rad), self.scene.data
+        data.joint(self._names.robot).qpos = (x_m, y_m, height_m, *quaternion(heading_rad))
+        for name in self._names.joints:
             data.joint(name).qvel = 0.0
         self._stalling = [0, 0]
         self._state = None
+        self.scene.changed()
 
-    def _build(self) -> None:
-        """Make the engine's model of what stands in the world now; all rests, the robot at the world's middle."""
-        model = self._model = make_model(self._world, self._parameters, self._plan.obstacles)
-        data = self._data = mujoco.MjData(model)
-        self._qpos, self._qvel, self._efforts = data.qpos, data.qvel, data.efc_force
-        joints = [model.joint(name) for name in WHEELS]
-        self._wheel_places = [int(joint.qposadr[0]) for joint in joints]
-        self._wheel_speeds = [int(joint.dofadr[0]) for joint in joints]
-        self._rotors = [int(model.joint(name).dofadr[0]) for name in ROTORS]
-        self._robot_place, self._robot_speed = (
-            int(model.joint(ROBOT).qposadr[0]), int(model.joint(ROBOT).dofadr[0]),
-        )  # fmt: skip
-        self._hull = int(model.geom(HULL).id)
-        self._floors, self._low = floor_geometries(model), low_geometries(model)
-        for item in self._plan.obstacles:
-            self._put(item)
-
-    def _rebuild(self) -> None:
-        """Make the model anew and go on where everything was."""
-        model, data = self._model, self._data
-        names = [model.joint(number).name for number in range(model.njnt)]
-        kept = {name: (data.joint(name).qpos.copy(), data.joint(name).qvel.copy()) for name in names}
-        self._build()
-        for name in (self._model.joint(number).name for number in range(self._model.njnt)):
-            if name in kept:
-                self._data.joint(name).qpos, self._data.joint(name).qvel = kept[name]
-        self._state = None
-
-    def step(self, left_mps: float, right_mps: float) -> Turned:
-        """Move on by one step with these rim-speed set-points."""
-        model, data, qvel = self._model, self._data, self._qvel
+    def count_step(self, left_mps: float, right_mps: float) -> Sequence[Obstacle]:
+        """Begin a step with these rim-speed set-points; return what walks, where it is by then."""
         self._state = None
         self._steps += 1
-        if self._walking:
-            self._walk()
-        asked = left_mps, right_mps
+        self._asked = left_mps, right_mps
         for wheel, rotor in enumerate(self._rotors):
-            qvel[rotor], model.tendon_frictionloss[wheel] = self._motor(wheel, asked[wheel])
-        mujoco.mj_step(model, data)
+            self._qvel[rotor], torque_nm = self._motor(wheel, self._asked[wheel])
+            self.scene.model.tendon_frictionloss[2 * self._number + wheel] = torque_nm
+        return self.walk() if self._walking else ()
+
+    def take_step(self, efforts_nm: Sequence[float]) -> Turned:
+        """Take what the engine's step has made of the robot.
+
+        Args:
+            efforts_nm: What motor and gear of each wheel gave.
+        """
         if self._contacts.update(touching=self._is_touching()):
             self._note_contact()
-        # The motors are the only frictions of joints, and the engine lists those first.
-        for wheel, effort in enumerate(data.efc_force[:2].tolist()):
-            self._watch_motor(wheel, asked[wheel], effort, float(qvel[self._wheel_speeds[wheel]]))
+        for wheel, effort_nm in enumerate(efforts_nm):
+            self._watch_motor(wheel, self._asked[wheel], effort_nm, float(self._qvel[self._wheel_speeds[wheel]]))
         left, right = self._wheel_places
         return Turned(float(self._qpos[left]) - self._zero[0], float(self._qpos[right]) - self._zero[1])
-
-    def _put(self, item: Obstacle) -> None:
-        """Put a thing of the model where it stands; one that can be pushed then rests."""
-        place, slope = middle_and_slope(item)
-        turn, name = quaternion(item.heading_rad, slope), THING + item.name
-        number = int(self._model.body(name).mocapid[0])
-        if number < 0:
-            joint = self._data.joint(name)
-            joint.qpos, joint.qvel = (*place, *turn), 0.0
-        else:
-            self._data.mocap_pos[number], self._data.mocap_quat[number] = place, turn
 
     def _is_touching(self) -> bool:
         return self._touched() is not None
@@ -165,12 +250,13 @@ class MujocoBody(EngineBody):
 
         As its number and that of the geometry that is touched; None where there is none.
         """
-        for number, (one, other) in enumerate(self._data.contact.geom.tolist()):
-            if self._hull in {one, other}:
-                if one not in self._floors and other not in self._floors:
-                    return number, other if one == self._hull else one
-            elif one in self._low or other in self._low:
-                return number, one if one in self._low else other
+        floors, low, hull, wheels = self.scene.floors, self.scene.low, self._hull_number, self._wheel_numbers
+        for number, (one, other) in enumerate(self.scene.data.contact.geom.tolist()):
+            if hull in {one, other}:
+                if one not in floors and other not in floors:
+                    return number, other if one == hull else one
+            elif (one in low and other in wheels) or (other in low and one in wheels):
+                return number, one if one in low else other
         return None
 
     def _note_contact(self) -> None:
@@ -179,9 +265,15 @@ class MujocoBody(EngineBody):
         if touched is None:
             return
         number, geometry = touched
-        x, y, _ = self._data.contact.pos[number].tolist()
-        name = self._model.body(int(self._model.geom_bodyid[geometry])).name
-        self._note_touched(name.removeprefix(THING) if name.startswith(THING) else None, x, y)
+        model = self.scene.model
+        x, y, _ = self.scene.data.contact.pos[number].tolist()
+        name = model.body(int(model.geom_bodyid[geometry])).name
+        robots = (other.robot_name for other in self.others if other.is_hull(geometry))
+        self._note_touched(name.removeprefix(THING) if name.startswith(THING) else next(robots, None), x, y)
+
+    def is_hull(self, geometry: int) -> bool:
+        """Tell whether a piece of geometry is this robot's hull."""
+        return geometry == self._hull_number
 
     def _read(self) -> BodyState:
         qpos, qvel = self._qpos, self._qvel
@@ -198,51 +290,36 @@ class MujocoBody(EngineBody):
 
     def ranges(self, numbers: Sequence[int]) -> list[float]:
         """Return the nearest echo of each cone, metres; the rays tilt with the body."""
-        frame = self._look()
-        return [
-            reading(self._sonar_rays.nearest(number, self._model, self._data, *frame), self._parameters)
-            for number in numbers
-        ]
+        frame, longest = self._look(), self._parameters.sonar_range_m
+        found = [self._sonar_rays.nearest(number, *frame) for number in numbers]
+        if self.others:
+            found = [
+                min(nearest, *self._robot_ranges(self._cones[number], longest))
+                for number, nearest in zip(numbers, found, strict=True)
+            ]
+        return [reading(nearest, self._parameters) for nearest in found]
 
     def echoes(self, numbers: Sequence[int]) -> list[list[Echo]]:
         """Return what each ray of some sonar meets, with the angle at which it meets it."""
         frame = self._look()
-        return [self._sonar_rays.echoes(number, self._model, self._data, *frame) for number in numbers]
+        return self._with_robots(numbers, [self._sonar_rays.echoes(number, *frame) for number in numbers])
 
     def scan(self, fan: Cone, longest_m: float) -> list[float]:
         """Return how far each ray of a fan goes, metres; the rays tilt with the body."""
         if (fan, longest_m) != self._fan:
             self._fan = (fan, longest_m)
             self._fan_rays = SonarRays((fan,), self._parameters.sonar_height_m, longest_m)
-        return self._fan_rays.ranges(0, self._model, self._data, *self._look())
+        met = self._fan_rays.ranges(0, *self._look())
+        return list(map(min, met, self._robot_ranges(fan, longest_m))) if self.others else met
 
-    def _look(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Bring the engine's geometry to the end of the last step; return the robot's origin and turn."""
-        mujoco.mj_kinematics(self._model, self._data)
+    def _look(self) -> tuple[mujoco.MjModel, mujoco.MjData, NDArray[np.float64], NDArray[np.float64]]:
+        """Bring the engine's geometry to the end of the last step; return the engine, the robot's origin and turn."""
+        mujoco.mj_kinematics(self.scene.model, self.scene.data)
         place = self._robot_place
         turn = matrix(self._qpos[place + 3 : place + 7].tolist())
-        return np.array(self._qpos[place : place + 3]), np.array(turn).reshape(3, 3)
+        origin = np.array(self._qpos[place : place + 3])
+        return self.scene.model, self.scene.data, origin, np.array(turn).reshape(3, 3)
 
     def _where_is(self, name: str) -> tuple[float, float, Sequence[float]]:
-        x, y, _, *turn = self._data.joint(THING + name).qpos.tolist()
+        x, y, _, *turn = self.scene.data.joint(THING + name).qpos.tolist()
         return x, y, matrix(turn)
-
-    def _placed(self, item: Obstacle) -> None:
-        del item
-        self._rebuild()
-
-    def _removed(self, name: str) -> None:
-        del name
-        self._rebuild()
-
-    @property
-    def engine_state(self) -> bytes:
-        """All that MuJoCo needs to go on alike, for a model of what stands in the plan."""
-        numbers = np.empty(mujoco.mj_stateSize(self._model, _STATE))
-        mujoco.mj_getState(self._model, self._data, numbers, _STATE)
-        return numbers.tobytes()
-
-    @engine_state.setter
-    def engine_state(self, saved: bytes) -> None:
-        self._build()
-        mujoco.mj_setState(self._model, self._data, np.frombuffer(saved), _STATE)

@@ -15,6 +15,7 @@ ray meets. A mesh with faces that the wheels would climb is refused.
 
 import math
 from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
 
 import mujoco
 
@@ -35,7 +36,7 @@ from p2os.pioneer.body.physical import (
     WHEEL_MEETS,
     Chassis,
     floor_box,
-    group_of,
+    group_for,
     half_sizes,
     is_level,
     middle_and_slope,
@@ -48,9 +49,6 @@ from p2os.robots.parameters import RobotParameters
 Quaternion = tuple[float, float, float, float]
 #: Groups of geometry as MuJoCo's rays choose them: what they meet, and what they pass through.
 ECHOING, SILENT = 0, 1
-WHEELS = ("left wheel", "right wheel")
-ROTORS = ("left rotor", "right rotor")
-ROBOT, HULL = "robot", "hull"
 #: An obstacle's body and joint; with the prefix no name of a world file is one of the robot's.
 THING = "thing: "
 #: A rotor is not held back by what it pulls, kg m².
@@ -72,18 +70,43 @@ _SPHERE = mujoco.mjtGeom.mjGEOM_SPHERE
 _HINGE = mujoco.mjtJoint.mjJNT_HINGE
 
 
-def make_model(world: World, parameters: RobotParameters, things: Iterable[Obstacle]) -> mujoco.MjModel:
-    """Return a model of a world's building, a robot, and what stands around it.
+@dataclass(frozen=True, slots=True)
+class RobotNames:
+    """What the parts of one robot are called: bodies, joints and geometry."""
+
+    robot: str
+    hull: str
+    caster: str
+    wheels: tuple[str, str]
+    rotors: tuple[str, str]
+
+    @classmethod
+    def of(cls, number: int) -> "RobotNames":
+        """Return the names of a robot, counted from 0."""
+        own = f"robot {number}: "
+        return cls(
+            f"{own}base", f"{own}hull", f"{own}caster", (f"{own}left wheel", f"{own}right wheel"),
+            (f"{own}left rotor", f"{own}right rotor"),
+        )  # fmt: skip
+
+    @property
+    def joints(self) -> tuple[str, ...]:
+        """Its place in the world, its wheels, and what drives them."""
+        return (self.robot, *self.wheels, *self.rotors)
+
+
+def make_model(world: World, models: Sequence[RobotParameters], things: Iterable[Obstacle]) -> mujoco.MjModel:
+    """Return a model of a world's building, its robots, and what stands around them.
 
     Args:
         world: Its fixed obstacles and meshes are the building.
-        parameters: Of the robot.
+        models: Of the robots, the first first.
         things: All that is not fixed; their places go into the state (`body`).
 
     Raises:
         WorldError: A mesh cannot be met as this body meets meshes.
     """
-    spec, bands = new_spec(), Bands(parameters)
+    spec, every = new_spec(), [Bands(parameters) for parameters in models]
     root = spec.worldbody
     half, place = floor_box(world)
     root.add_geom(name="floor", type=_BOX, size=half, pos=place, **_collision(FLOOR_GROUP, 0, 0.0))
@@ -91,12 +114,13 @@ def make_model(world: World, parameters: RobotParameters, things: Iterable[Obsta
         if item.fixed:
             place, slope = middle_and_slope(item)
             turn = quaternion(item.heading_rad, slope)
-            root.add_geom(pos=place, quat=turn, **_shape(item), **_collision(group_of(item, bands), 0, 0.0))
+            root.add_geom(pos=place, quat=turn, **_shape(item), **_collision(group_for(item, every), 0, 0.0))
     for number, mesh in enumerate(world.meshes):
-        _add_mesh(spec, mesh, f"mesh {number}", bands, world.source)
-    _add_robot(spec, parameters)
+        _add_mesh(spec, mesh, f"mesh {number}", every, world.source)
+    for number, parameters in enumerate(models):
+        _add_robot(spec, parameters, RobotNames.of(number))
     for item in things:
-        _add_thing(root, item, group_of(item, bands))
+        _add_thing(root, item, group_for(item, every))
     try:
         return spec.compile()
     except ValueError as error:  # the engine's own checks
@@ -118,7 +142,11 @@ def low_geometries(model: mujoco.MjModel) -> frozenset[int]:
 
 
 def _of_group(model: mujoco.MjModel, group: int) -> frozenset[int]:
-    return frozenset(number for number, own in enumerate(model.geom_contype) if own == group)
+    return frozenset(
+        number
+        for number, own in enumerate(model.geom_contype)
+        if own & group and not own & (OBSTACLE_GROUP | PUSHED_GROUP)
+    )
 
 
 def _collision(group: int, meets: int, friction: float) -> dict[str, object]:
@@ -134,7 +162,7 @@ def _shape(item: Obstacle) -> dict[str, object]:
 
 def _add_thing(root: mujoco.MjsBody, item: Obstacle, group: int) -> None:
     """Add a thing at the world's middle; where it stands is a matter of the state."""
-    if group == PUSHED_GROUP:
+    if group & PUSHED_GROUP:
         body = root.add_body(name=THING + item.name)
         body.add_freejoint(name=THING + item.name)
         body.add_geom(mass=item.mass_kg, **_shape(item), **_collision(PUSHED_GROUP, PUSHED_MEETS, item.friction))
@@ -143,29 +171,29 @@ def _add_thing(root: mujoco.MjsBody, item: Obstacle, group: int) -> None:
         body.add_geom(**_shape(item), **_collision(group, 0, 0.0))
 
 
-def _add_robot(spec: mujoco.MjSpec, parameters: RobotParameters) -> None:
-    """Add the robot: its body's frame is the robot frame of `body`, the middle of the axle on the floor."""
+def _add_robot(spec: mujoco.MjSpec, parameters: RobotParameters, names: RobotNames) -> None:
+    """Add a robot: its body's frame is the robot frame of `body`, the middle of the axle on the floor."""
     own, chassis = parameters.body, Chassis.of(parameters)
     length, width, height, mass = chassis.length_m, chassis.width_m, chassis.height_m, chassis.mass_kg
     radius = own.wheel_diameter_m / 2
-    robot = spec.worldbody.add_body(name=ROBOT)
-    robot.add_freejoint(name=ROBOT)
+    robot = spec.worldbody.add_body(name=names.robot)
+    robot.add_freejoint(name=names.robot)
     hull = _collision(HULL_GROUP, HULL_MEETS, HULL_FRICTION) | {"group": SILENT, "priority": 1, "margin": KEPT_APART_M}
     wheel = _collision(0, WHEEL_MEETS, WHEEL_FRICTION) | {"group": SILENT}
     caster = _collision(0, WHEEL_MEETS, 0.0) | {"group": SILENT, "priority": 1, "condim": 1}
     # The hull's mass is a box about the chassis' own centre, lower than the geometry's middle on a tall robot.
     inertia = [mass / 12 * (a * a + b * b) for a, b in ((width, height), (length, height), (length, width))]
-    solid = robot.add_body(name=HULL, pos=chassis.centre, mass=mass, inertia=inertia, explicitinertial=True)
+    solid = robot.add_body(name=names.hull, pos=chassis.centre, mass=mass, inertia=inertia, explicitinertial=True)
     above = (0.0, 0.0, chassis.middle_m - chassis.centre[2])
-    solid.add_geom(name=HULL, type=_BOX, size=(length / 2, width / 2, height / 2), pos=above, mass=0.0, **hull)
+    solid.add_geom(name=names.hull, type=_BOX, size=(length / 2, width / 2, height / 2), pos=above, mass=0.0, **hull)
     robot.add_geom(
-        type=_SPHERE, size=(own.caster_radius_m, 0.0, 0.0), pos=(own.caster_x_m, 0.0, own.caster_radius_m),
-        mass=CASTER_MASS_KG, **caster,
+        name=names.caster, type=_SPHERE, size=(own.caster_radius_m, 0.0, 0.0),
+        pos=(own.caster_x_m, 0.0, own.caster_radius_m), mass=CASTER_MASS_KG, **caster,
     )  # fmt: skip
-    for name, rotor_name, side in zip(WHEELS, ROTORS, (1, -1), strict=True):
+    for name, rotor_name, side in zip(names.wheels, names.rotors, (1, -1), strict=True):
         body = robot.add_body(name=name, pos=(0.0, side * parameters.track_mm / 2000, radius))
         body.add_joint(name=name, type=_HINGE, axis=(0.0, 1.0, 0.0))
-        body.add_geom(type=_SPHERE, size=(radius, 0.0, 0.0), mass=own.wheel_mass_kg, **wheel)
+        body.add_geom(name=name, type=_SPHERE, size=(radius, 0.0, 0.0), mass=own.wheel_mass_kg, **wheel)
         rotor = spec.worldbody.add_body(name=rotor_name, pos=(0.0, 0.0, ROTORS_AT_M))
         rotor.add_joint(name=rotor_name, type=_HINGE, axis=(0.0, 1.0, 0.0), armature=ROTOR_INERTIA)
         rotor.add_geom(type=_SPHERE, size=(0.01, 0.0, 0.0), contype=0, conaffinity=0, group=SILENT)
@@ -180,14 +208,15 @@ def _add_robot(spec: mujoco.MjSpec, parameters: RobotParameters) -> None:
 # Meshes ---------------------------------------------------------------------------------
 
 
-def _add_mesh(spec: mujoco.MjSpec, mesh: Mesh, name: str, bands: Bands, source: str) -> None:
+def _add_mesh(spec: mujoco.MjSpec, mesh: Mesh, name: str, every: Sequence[Bands], source: str) -> None:
     """Add a mesh to a model under a name of its own.
 
     Raises:
         WorldError: It has faces that wheels would climb, or too many for this engine.
     """
-    _refuse_slopes(mesh, bands, source)
-    low, high = bands.touch
+    for bands in every:
+        _refuse_slopes(mesh, bands, source)
+    low, high = min(bands.touch[0] for bands in every), max(bands.touch[1] for bands in every)
     pieces = shadow(mesh, low, high)
     if len(pieces) > MOST_PIECES:
         raise WorldError(

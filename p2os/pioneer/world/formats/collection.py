@@ -11,12 +11,15 @@ import math
 from bisect import bisect_left, bisect_right
 from collections.abc import Iterable, Sequence
 from pathlib import Path
+from typing import TypedDict
 
 from p2os.errors import WorldError
+from p2os.pioneer.world.formats.annotation import Traits
 from p2os.pioneer.world.formats.transform import Transform, apply, upright_heading
 from p2os.pioneer.world.geometry import Footprint
 from p2os.pioneer.world.model import (
     FARTHEST_M,
+    LEAST_PUSHED_M,
     LONGEST_NAME,
     Kind,
     Mark,
@@ -42,6 +45,10 @@ MOST_VERTICES = 1_000_000
 MOST_THINGS = 20_000
 #: The floor reaches so far beyond what stands on it, m.
 MARGIN_M = 0.5
+#: What is noted of a thing that moves in its file and not in a world.
+STANDS_STILL = "that a model can move: it stands still"
+#: What a file says of nothing.
+PLAIN = Traits()
 #: A sphere is made of so many bands and sectors.
 BANDS, SECTORS = 8, 16
 
@@ -49,6 +56,14 @@ BOX_TRIANGLES: tuple[Triangle, ...] = (
     (0, 2, 1), (0, 3, 2), (4, 5, 6), (4, 6, 7), (0, 1, 5), (0, 5, 4),
     (1, 2, 6), (1, 6, 5), (2, 3, 7), (2, 7, 6), (3, 0, 4), (3, 4, 7),
 )  # fmt: skip
+
+
+class _TraitKeys(TypedDict):
+    kind: Kind
+    fixed: bool
+    floor_m: float
+    mass_kg: float
+    friction: float
 
 
 class Collection:
@@ -68,10 +83,13 @@ class Collection:
         """Note that something of the file is left out."""
         self._skipped[what] = self._skipped.get(what, 0) + 1
 
-    def add_box(self, name: str, size: Sequence[float], place: Transform) -> None:
-        """Take a box about its middle: its size along its own axes."""
+    def add_box(self, name: str, size: Sequence[float], place: Transform, traits: Traits = PLAIN) -> None:
+        """Take a box about its middle: its size along its own axes; a tilted one as a mesh, if it is no ramp."""
         if min(size) <= 0:
             raise WorldError(f"{self.path}: box {name!r}: its size must be above 0")
+        if traits.kind is Kind.RAMP:
+            self._add_ramp(name, size, place)
+            return
         heading = upright_heading(place)
         if heading is not None:
             self.add_thing(
@@ -84,17 +102,18 @@ class Collection:
                     width_m=size[1],
                     height_m=size[2],
                     base_m=place[2][3] - size[2] / 2,
-                    fixed=True,
+                    **self._traits(traits, size),
                 )
             )
             return
+        self._stands_still(traits)
         x, y, z = (value / 2 for value in size)
         corners = [
             (-x, -y, -z), (x, -y, -z), (x, y, -z), (-x, y, -z), (-x, -y, z), (x, -y, z), (x, y, z), (-x, y, z),
         ]  # fmt: skip
         self.add_mesh(name, apply(place, corners), BOX_TRIANGLES)
 
-    def add_cylinder(self, name: str, radius: float, length: float, place: Transform) -> None:
+    def add_cylinder(self, name: str, radius: float, length: float, place: Transform, traits: Traits = PLAIN) -> None:
         """Take a cylinder about its middle, along its own Z."""
         if min(radius, length) <= 0:
             raise WorldError(f"{self.path}: cylinder {name!r}: its size must be above 0")
@@ -107,10 +126,11 @@ class Collection:
                     radius_m=radius,
                     height_m=length,
                     base_m=place[2][3] - length / 2,
-                    fixed=True,
+                    **self._traits(traits, (radius, length)),
                 )
             )
             return
+        self._stands_still(traits)
         rings = [(radius, -length / 2), (radius, length / 2)]
         self._add_lathe(name, [(0.0, -length / 2), *rings, (0.0, length / 2)], place)
 
@@ -188,6 +208,41 @@ class Collection:
                 f"skipped: {what}" + (f" ({count} times)" if count > 1 else "") for what, count in self._skipped.items()
             ),
         )
+
+    def _add_ramp(self, name: str, size: Sequence[float], place: Transform) -> None:
+        """Take the upper face of a tilted box as an incline."""
+        (a, _, c, x), (d, _, f, y), (g, _, i, z) = place
+        rise, thick = size[0] * g, size[2] / 2
+        self.add_thing(
+            Obstacle(
+                name=self._name(name),
+                x_m=x + c * thick,
+                y_m=y + f * thick,
+                heading_rad=math.atan2(d, a),
+                length_m=size[0] * math.hypot(a, d),
+                width_m=size[1],
+                height_m=max(0.0, rise),
+                base_m=z + i * thick - rise / 2,
+                kind=Kind.RAMP,
+            )
+        )
+
+    def _traits(self, traits: Traits, size: Sequence[float]) -> "_TraitKeys":
+        """Return what an obstacle is beside its shape; what is too thin to be pushed stands fast."""
+        is_pushed = traits.mass_kg > 0 and min(size) >= LEAST_PUSHED_M
+        if not is_pushed:
+            self._stands_still(traits)
+        return {
+            "kind": traits.kind,
+            "fixed": traits.fixed or (traits.mass_kg > 0 and not is_pushed),
+            "floor_m": traits.floor_m,
+            "mass_kg": traits.mass_kg if is_pushed else 0.0,
+            "friction": traits.friction,
+        }
+
+    def _stands_still(self, traits: Traits) -> None:
+        if traits.mass_kg > 0:
+            self.skip(STANDS_STILL)
 
     def _add_lathe(self, name: str, profile: Sequence[tuple[float, float]], place: Transform) -> None:
         """Take a solid of revolution about Z: (radius, height) from the bottom up."""

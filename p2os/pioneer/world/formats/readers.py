@@ -22,11 +22,11 @@ FORMATS: Mapping[str, str] = {
     ".sdf": "sdf",
     ".world": "sdf",
     ".urdf": "urdf",
-    ".obj": "mesh_file",
-    ".stl": "mesh_file",
-    ".dae": "mesh_file",
-    ".gltf": "mesh_file",
-    ".glb": "mesh_file",
+    ".obj": "meshes.mesh_file",
+    ".stl": "meshes.mesh_file",
+    ".dae": "meshes.mesh_file",
+    ".gltf": "meshes.mesh_file",
+    ".glb": "meshes.mesh_file",
 }
 
 

@@ -2,7 +2,8 @@
 
 Taken: worlds, models within each other, links, collisions with box, cylinder,
 sphere, mesh; poses, nested, in radians or with degrees="true"; `include` of
-files that are here. A model that could move stands still.
+files that are here. A model of one upright box or cylinder with a mass can be pushed,
+with the friction that ODE is given; any other that could move stands still.
 
 Left out, and reported: poses relative to a named frame, other geometry, lights,
 plugins, sensors. Joints need nothing: each link has its place.
@@ -12,16 +13,21 @@ import math
 from pathlib import Path
 
 from p2os.errors import WorldError
-from p2os.pioneer.world.formats.collection import Collection
+from p2os.pioneer.world.formats.annotation import Traits, is_no_thing, noted_traits, noted_world, pushed
+from p2os.pioneer.world.formats.collection import PLAIN, STANDS_STILL, Collection
 from p2os.pioneer.world.formats.local_file import find_local
 from p2os.pioneer.world.formats.shapes import take_geometry
 from p2os.pioneer.world.formats.transform import IDENTITY, Transform, after, from_roll_pitch_yaw
 from p2os.pioneer.world.formats.xml_tree import Element, numbers, read_xml
-from p2os.pioneer.world.model import World
+from p2os.pioneer.world.model import Pose, World
 
 #: Files that include each other in a ring end here.
 DEEPEST_INCLUDE = 8
 MOST_INCLUDES = 1000
+#: SDF 1.7, <mu> of ODE: what holds where a file names none.
+FRICTION = 1.0
+#: As `model://sun`: it is in nearly every world.
+SUN = ("light", "sun")
 NOTED = ("light", "actor", "population", "road", "plugin")
 
 
@@ -34,19 +40,23 @@ def read(path: Path, up: str) -> World:
     if up not in {"auto", "z"}:
         raise WorldError(f"{path}: SDF is Z up; up = {up!r} makes no sense")
     collection = Collection(path)
-    _Reader(collection).file(path, IDENTITY, 0, "")
-    return collection.world()
+    reader = _Reader(collection)
+    reader.file(path, IDENTITY, 0, "")
+    return collection.world(*(reader.noted or ()))
 
 
 class _Reader:
     def __init__(self, collection: Collection) -> None:
         self._collection = collection
         self._includes = 0
+        #: The start and the extent that p2os wrote.
+        self.noted: tuple[Pose, tuple[float, float, float, float]] | None = None
 
     def file(self, path: Path, place: Transform, depth: int, name: str) -> None:
         root = read_xml(path, "sdf", "gazebo")
         for world in root.all("world"):
             self._holder(world, place, path, depth, name)
+            self.noted = self.noted or (noted_world(world, path) if depth == 0 else None)
         self._holder(root, place, path, depth, name)
 
     def _holder(self, holder: Element, place: Transform, path: Path, depth: int, prefix: str) -> None:
@@ -56,16 +66,17 @@ class _Reader:
                 self._model(child, place, path, depth, prefix)
             elif child.tag == "include":
                 self._include(child, place, path, depth, prefix)
-            elif child.tag in NOTED:
+            elif child.tag in NOTED and (child.tag, child.get("name")) != SUN:
                 self._collection.skip(f"SDF <{child.tag}>")
 
     def _model(self, model: Element, outer: Transform, path: Path, depth: int, prefix: str) -> None:
         if depth > DEEPEST_INCLUDE:
             raise WorldError(f"{path}:{model.line}: models within each other more than {DEEPEST_INCLUDE} deep")
+        if is_no_thing(model):
+            return
         name = f"{prefix}{model.get('name', 'model')}"
-        static = model.first("static")
-        if static is None or static.text.strip().lower() not in {"1", "true"}:
-            self._collection.skip("that a model can move: it stands still")
+        noted = noted_traits(model, path)
+        traits = self._traits(model, noted or PLAIN, path)
         place = after(outer, self._pose(model, path))
         for link in model.all("link"):
             at_link = after(place, self._pose(link, path))
@@ -73,11 +84,30 @@ class _Reader:
                 geometry = collision.first("geometry")
                 if geometry is not None:
                     at = after(at_link, self._pose(collision, path))
+                    shape = f"{name}/{link.get('name', 'link')}/{collision.get('name', 'collision')}"
                     take_geometry(
-                        f"{name}/{link.get('name', 'link')}/{collision.get('name', 'collision')}", geometry, at,
-                        self._collection, path, in_attributes=False,
+                        name if noted else shape, geometry, at, self._collection, path, in_attributes=False,
+                        traits=traits,
                     )  # fmt: skip
         self._holder(model, place, path, depth + 1, f"{name}/")
+
+    def _traits(self, model: Element, traits: Traits, path: Path) -> Traits:
+        """Return what a model's shapes are: one that moves can be pushed if it is one solid with a mass."""
+        static = model.first("static")
+        if static is not None and static.text.strip().lower() in {"1", "true"}:
+            return traits
+        links = model.all("link")
+        shapes = [shape for link in links for shape in link.all("collision")]
+        mass = links[0].first("inertial", "mass") if len(links) == len(shapes) == 1 else None
+        if mass is None or model.all("model") or model.all("include"):
+            self._collection.skip(STANDS_STILL)
+            return traits
+        mu = shapes[0].first("surface", "friction", "ode", "mu")
+        friction = numbers(mu, mu.text, path, 1)[0] if mu is not None else FRICTION
+        moving = pushed(traits, numbers(mass, mass.text, path, 1)[0], friction)
+        if moving is traits:
+            self._collection.skip(STANDS_STILL)
+        return moving
 
     def _include(self, include: Element, outer: Transform, path: Path, depth: int, prefix: str) -> None:
         self._includes += 1

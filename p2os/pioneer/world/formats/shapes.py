@@ -3,9 +3,10 @@
 from pathlib import Path
 
 from p2os.errors import WorldError
-from p2os.pioneer.world.formats.collection import Collection
+from p2os.pioneer.world.formats.annotation import Traits
+from p2os.pioneer.world.formats.collection import PLAIN, Collection
 from p2os.pioneer.world.formats.local_file import find_local
-from p2os.pioneer.world.formats.mesh_file import read_triangles
+from p2os.pioneer.world.formats.meshes.mesh_file import read_triangles
 from p2os.pioneer.world.formats.transform import Transform, after, apply, scaled
 from p2os.pioneer.world.formats.xml_tree import Element, numbers
 
@@ -14,7 +15,14 @@ STATES_ITS_AXIS = (".dae", ".gltf", ".glb")
 
 
 def take_geometry(
-    name: str, geometry: Element, place: Transform, collection: Collection, path: Path, *, in_attributes: bool
+    name: str,
+    geometry: Element,
+    place: Transform,
+    collection: Collection,
+    path: Path,
+    *,
+    in_attributes: bool,
+    traits: Traits = PLAIN,
 ) -> None:
     """Take a box, cylinder, sphere or mesh at its place; note whatever else it is.
 
@@ -25,6 +33,7 @@ def take_geometry(
         collection: Takes it.
         path: The file, for messages and for meshes beside it.
         in_attributes: URDF writes sizes as attributes, SDF as elements.
+        traits: What a box or a cylinder is beside its shape.
 
     Raises:
         WorldError: A size is no number, or a mesh cannot be read.
@@ -37,9 +46,10 @@ def take_geometry(
 
     for shape in geometry.children:
         if shape.tag == "box":
-            collection.add_box(name, sizes(shape, "size", 3), place)
+            collection.add_box(name, sizes(shape, "size", 3), place, traits)
         elif shape.tag == "cylinder":
-            collection.add_cylinder(name, sizes(shape, "radius", 1)[0], sizes(shape, "length", 1)[0], place)
+            radius, length = sizes(shape, "radius", 1)[0], sizes(shape, "length", 1)[0]
+            collection.add_cylinder(name, radius, length, place, traits)
         elif shape.tag == "sphere":
             collection.add_sphere(name, sizes(shape, "radius", 1)[0], place)
         elif shape.tag == "mesh":

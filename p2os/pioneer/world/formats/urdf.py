@@ -1,9 +1,11 @@
 """URDF as static geometry: a description of a robot or a scene, standing still.
 
 Taken: links with `collision` (with `visual` where a link has no collision) of
-box, cylinder, sphere, mesh; joints of every kind at their zero.
+box, cylinder, sphere, mesh; joints of every kind at their zero. A link of one upright
+box or cylinder that has a mass and hangs on a floating joint can be pushed, with the
+friction that PyBullet is given (`<contact>`).
 
-Left out, and reported: movement, masses, transmissions, sensors. Xacro files must
+Left out, and reported: any other movement, transmissions, sensors. Xacro files must
 be expanded first.
 
 Ours and not yourdfpy's: yourdfpy 0.0.60 brings 300 MB of packages (scipy, embree, ...) for these 80 lines, fails with
@@ -13,11 +15,15 @@ a TypeError on `package://file`, takes one in five damaged files that are refuse
 from pathlib import Path
 
 from p2os.errors import WorldError
-from p2os.pioneer.world.formats.collection import Collection
+from p2os.pioneer.world.formats.annotation import Traits, is_no_thing, noted_traits, noted_world, pushed
+from p2os.pioneer.world.formats.collection import PLAIN, STANDS_STILL, Collection
 from p2os.pioneer.world.formats.shapes import take_geometry
 from p2os.pioneer.world.formats.transform import IDENTITY, Transform, after, from_roll_pitch_yaw
 from p2os.pioneer.world.formats.xml_tree import Element, numbers, read_xml
 from p2os.pioneer.world.model import World
+
+#: PyBullet's, of a link that names none.
+FRICTION = 0.5
 
 
 def read(path: Path, up: str) -> World:
@@ -31,19 +37,39 @@ def read(path: Path, up: str) -> World:
     root, collection = read_xml(path, "robot"), Collection(path)
     joints = root.all("joint")
     parents = {_ends(joint, "child", path): joint for joint in joints}
-    if any(joint.get("type") not in {"fixed", ""} for joint in joints):
+    if any(joint.get("type") not in {"fixed", "floating", ""} for joint in joints):
         collection.skip("that joints move: each stands at its zero")
     places: dict[str, Transform] = {}
     for link in root.all("link"):
+        if is_no_thing(link):
+            continue
         place = _place(link.get("name"), parents, places, path)
+        joint = parents.get(link.get("name"))
+        traits = noted_traits(link, path) or PLAIN
+        if joint is not None and joint.get("type") == "floating":
+            traits = _traits(link, traits, collection, path)
         shown = link.all("collision") or link.all("visual")
         for number, shape in enumerate(shown):
             geometry = shape.first("geometry")
             if geometry is not None:
                 name = link.get("name") + (f" {number + 1}" if len(shown) > 1 else "")
                 at = after(place, _origin(shape, path))
-                take_geometry(name, geometry, at, collection, path, in_attributes=True)
-    return collection.world()
+                take_geometry(name, geometry, at, collection, path, in_attributes=True, traits=traits)
+    return collection.world(*(noted_world(root, path) or ()))
+
+
+def _traits(link: Element, traits: Traits, collection: Collection, path: Path) -> Traits:
+    """Return what a link that hangs on nothing is: one solid with a mass can be pushed."""
+    mass, friction = link.first("inertial", "mass"), link.first("contact", "lateral_friction")
+    if mass is None or len(link.all("collision")) != 1:
+        collection.skip(STANDS_STILL)
+        return traits
+    (mass_kg,) = numbers(mass, mass.get("value"), path, 1)
+    mu = numbers(friction, friction.get("value"), path, 1)[0] if friction is not None else FRICTION
+    moving = pushed(traits, mass_kg, mu)
+    if moving is traits:
+        collection.skip(STANDS_STILL)
+    return moving
 
 
 def _place(link: str, parents: dict[str, Element], places: dict[str, Transform], path: Path) -> Transform:

@@ -169,7 +169,6 @@ def test_one_robot_of_a_world_goes_back_the_others_go_on_and_see_it(fleet: Any) 
     hall.run(1500)
     hall.lines[1].write(Command(C.PULSE).to_frame().to_bytes())
     hall.run(1000)
-    bodies = [member.body for member in hall.made.multi_robot_world.members]
     assert hall.at(0)[0] > -0.4
     moving = hall.at(1)[0]
     assert execute(hall.hosts, "1: reset") == ["robot 1: at its start, as just switched on"]
@@ -182,8 +181,8 @@ def test_one_robot_of_a_world_goes_back_the_others_go_on_and_see_it(fleet: Any) 
     assert hall.hosts[0].client is not None
     assert hall.hosts[1].pioneer.state.open
     assert hall.at(1)[0] < moving - 0.03
-    for body in bodies:  # every robot's copy of the world
-        (carton,) = [item for item in body.snapshot()["_plan"]["_obstacles"].values() if item.name == "carton"]
+    for member in hall.made.multi_robot_world.members:  # each has its plan of the world
+        (carton,) = [item for item in member.body.take_moved() if item.name == "carton"]
         assert (carton.x_m, carton.y_m) == pytest.approx((0, 0), abs=1e-3)
 
 
@@ -205,7 +204,8 @@ def test_a_start_on_which_another_robot_stands_is_refused_and_nothing_changes(tm
     first, second = hall.made.multi_robot_world.members  # type: ignore[union-attr]  # they share the room
     for number in (0, 1):
         hall.drive(number, 0)
-    second.body.reset(Pose(-1.1, 0.1, 0.0), 0)
+    first.body.stand_at(2.0, 0.1, 0.0)
+    second.body.stand_at(-1.1, 0.1, 0.0)
     (error, hint) = execute(hall.hosts, "1: reset")
     assert error == "error: robot 2 stands where robot 1 starts"
     assert hint == "hint: drive it away, or put all back: reset"

@@ -9,11 +9,18 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from p2os.cli.main import run
 from p2os.errors import WorldError
+from p2os.pioneer.body.factory import make_body
 from p2os.pioneer.world import load_world, parse_world
+from p2os.pioneer.world.drawing import Look, shapes
 from p2os.pioneer.world.formats.rectangles import rectangles
 from p2os.pioneer.world.model import World
 from p2os.pioneer.world.writer import write_world
+from p2os.robots.parameters import load_parameters
+from tests.p2os.pioneer.body.bodies import drive, each_body
+
+P2DX = load_parameters("p2dx")
 
 ARIA = """2D-Map
 LineMinPos: -1000 -2000
@@ -27,6 +34,7 @@ Cairn: RobotHome -250 300 45.000000 "" ICON ""
 Cairn: DockLynx 0 0 0 "" ICON "dock"
 Cairn: ForbiddenLine 0 0 0.000000 "" ICON "a b" 0 1000 2000 1000
 Cairn: ForbiddenArea 0 0 90.000000 "" ICON "" 0 0 1000 500
+Cairn: Reflector 0 0 0.000000 "" ICON "bright" 3000 0 3000 500
 Cairn: MotionLimitsSector 0 0 0 "" ICON "x" 0 0 1 1
 LINES
 -1000 -2000 3000 -2000
@@ -49,8 +57,10 @@ def aria(tmp_path: Path, text: str) -> World:
 
 def test_an_aria_map_has_walls_points_and_marks(tmp_path: Path) -> None:
     world = aria(tmp_path, ARIA)
-    first, second, points = world.obstacles
-    assert (first.x_m, first.y_m, first.length_m, first.heading_rad) == (1.0, -2.0, 4.02, 0.0)
+    bright, first, second, points = world.obstacles
+    assert (first.x_m, first.y_m, first.heading_rad) == (1.0, -2.0, 0.0)
+    assert (first.length_m, first.width_m) == pytest.approx((4.0001, 0.0001))
+    assert (bright.name, bright.x_m, bright.y_m, bright.length_m) == ("bright", 3.0, 0.25, 0.5001)
     assert (second.x_m, second.y_m, second.heading_rad) == (-1.0, -0.5, math.pi / 2)
     # Beside lines, points are put on cells of 50 mm: these six on two of them.
     assert (points.x_m, points.y_m, points.length_m, points.width_m) == pytest.approx((2.025, 2.0, 0.1, 0.05))
@@ -58,11 +68,35 @@ def test_an_aria_map_has_walls_points_and_marks(tmp_path: Path) -> None:
     assert (world.start.x_m, world.start.y_m, world.start.heading_rad) == (-0.25, 0.3, math.radians(45))
     assert [(mark.kind, mark.name) for mark in world.marks] == [
         ("goal", "Goal 1"), ("goal", "Door"), ("home", ""), ("dock", "dock"), ("forbidden", "a b"), ("forbidden", ""),
+        ("reflector", "bright"),
     ]  # fmt: skip
     assert world.marks[4].points_m == ((0.0, 1.0), (2.0, 1.0))
     assert world.marks[5].points_m[2] == pytest.approx((-0.5, 1.0))
     assert world.skipped == ("skipped: Cairn MotionLimitsSector",)
     assert parse_world(write_world(world), "again.toml") == world
+
+
+@pytest.mark.parametrize("name", each_body())
+@pytest.mark.parametrize("far_mm", [0, 400_000])
+def test_a_line_stands_where_it_is_drawn_and_holds_a_robot(name: str, far_mm: int, tmp_path: Path) -> None:
+    home = f'Cairn: RobotHome {far_mm} 0 0 "" ICON ""'
+    world = aria(tmp_path, f"2D-Map\n{home}\nLINES\n{far_mm + 800} -1000 {far_mm + 800} 1100\n")
+    body = make_body(name, world, P2DX)
+    body.reset(world.start, 1)
+    # The two front sonars: 0.166 m ahead, 27 mm to the side, 10 degrees outwards; their cones reach straight ahead.
+    assert min(body.ranges([3, 4])) == pytest.approx(0.8 - 0.166, abs=0.002)
+    end = drive(body, 0.75, 0.75, 2.0)
+    assert end.x_m - far_mm / 1000 + P2DX.body.hull_front_m == pytest.approx(0.8, abs=0.012)
+
+
+def test_a_line_and_what_is_marked_are_drawn_and_counted(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    world = aria(tmp_path, ARIA)
+    assert [shape.is_open for shape in shapes(world) if shape.name == "line 1"] == [True]
+    assert {shape.look for shape in shapes(world) if shape.name == "bright"} == {Look.WALL, Look.REFLECTOR}
+    assert run(["world", "show", world.source]) == 0
+    out = capsys.readouterr().out.splitlines()
+    assert sum(character in "▀▄█" for line in out for character in line) > 60
+    assert out[-1].endswith(": 4 obstacles; marks: 2 goal, 1 home, 1 dock, 2 forbidden, 1 reflector")
 
 
 def test_points_alone_keep_the_resolution_and_points_on_a_line_are_the_line(tmp_path: Path) -> None:
@@ -86,9 +120,9 @@ def test_a_map_without_a_home_starts_at_a_goal_or_at_a_free_place(tmp_path: Path
         ("NumLines: 2", "NumLines: 5", "promises lines 5, and has 2"),
         ("NumPoints: 6", "NumPoints: 7", "promises points 7"),
         ("NumPoints: 6", "NumPoints: many", ":4: expected 1 numbers"),
-        ("-1000 -2000 3000 -2000", "-1000 -2000 3000", ":15: expected 4 numbers"),
-        ("-1000 -2000 3000 -2000", "-1000 -2000 nan 3", ":15: expected 4 numbers"),
-        ("2000 2000", "1e300 0", ":18: expected 2 numbers"),
+        ("-1000 -2000 3000 -2000", "-1000 -2000 3000", ":16: expected 4 numbers"),
+        ("-1000 -2000 3000 -2000", "-1000 -2000 nan 3", ":16: expected 4 numbers"),
+        ("2000 2000", "1e300 0", ":19: expected 2 numbers"),
         ("Cairn: Goal 1000 500 0.000000", "Cairn:", "without a type"),
         ("Cairn: Goal 1000 500 0.000000", "Cairn: Goal 1000", ":7: expected 3"),
         ("0 1000 2000 1000", "0 1000", ":11: expected 4"),

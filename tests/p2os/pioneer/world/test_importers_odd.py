@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from p2os.cli.main import run
 from p2os.errors import WorldError
 from p2os.pioneer.world import load_world
-from p2os.pioneer.world.formats.polygon import MOST_CORNERS, triangulated
+from p2os.pioneer.world.formats.meshes.polygon import MOST_CORNERS, triangulated
 from p2os.pioneer.world.model import World, cut
 
 #: A wall of 3 x 2 m in the plane y = 0 that goes around a doorway of 1 x 1.5 m, as one polygon: x, z.

@@ -16,7 +16,7 @@ from pathlib import Path
 
 from p2os.errors import WorldError
 from p2os.pioneer.world.formats.collection import MOST_TRIANGLES, MOST_VERTICES
-from p2os.pioneer.world.formats.polygon import triangulated
+from p2os.pioneer.world.formats.meshes.polygon import triangulated
 from p2os.pioneer.world.formats.transform import IDENTITY, Transform, about_axis, after, apply, moved, scaled
 from p2os.pioneer.world.formats.xml_tree import Element, numbers, read_xml
 from p2os.pioneer.world.model import Triangle, Vertex

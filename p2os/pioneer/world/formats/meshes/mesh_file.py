@@ -16,8 +16,8 @@ from pathlib import Path
 
 from p2os.errors import WorldError
 from p2os.pioneer.world.formats.collection import MOST_TRIANGLES, MOST_VERTICES, Collection
+from p2os.pioneer.world.formats.meshes.polygon import triangulated
 from p2os.pioneer.world.formats.placing import with_z_up
-from p2os.pioneer.world.formats.polygon import triangulated
 from p2os.pioneer.world.model import Triangle, Vertex, World
 from simbase.errors import shown
 
@@ -161,14 +161,14 @@ def _indexed(corners: list[Vertex]) -> Triangles:
 
 
 def _read_dae(path: Path) -> tuple[Triangles, str]:
-    from p2os.pioneer.world.formats.collada import read_collada
+    from p2os.pioneer.world.formats.meshes.collada import read_collada
 
     vertices, triangles, up, skipped = read_collada(path)
     return Triangles(vertices=vertices, triangles=triangles, skipped=skipped), up
 
 
 def _read_gltf(path: Path) -> tuple[Triangles, str]:
-    from p2os.pioneer.world.formats.gltf import read_gltf
+    from p2os.pioneer.world.formats.meshes.gltf import read_gltf
 
     vertices, triangles, skipped = read_gltf(path)
     return Triangles(vertices=vertices, triangles=triangles, skipped=skipped), "y"

@@ -1,0 +1,1 @@
+"""Readers of files that hold triangles: OBJ, STL, COLLADA, glTF."""
