@@ -368,9 +368,7 @@ class BluePill(Stateful):
         if self.on_warning is not None:
             self.on_warning(text)
 
-    def _fault(
-        self, kind: FaultKind, pc: int, address: int | None, is_lockup: bool, seen: SeenFault | None
-    ) -> None:
+    def _fault(self, kind: FaultKind, pc: int, address: int | None, is_lockup: bool, seen: SeenFault | None) -> None:
         if kind is FaultKind.MASKED_SVC and not is_lockup:
             # Some systems live on it (NuttX): its HardFault handler serves the call.
             self._warn("SVC while its priority is masked becomes a HardFault", "masked SVC", pc)

@@ -73,7 +73,7 @@ LAYERS = {
         ("capture", "client", "pioneer"), ("cli",), ("__main__",),
     ),
     "bluepill_sim": (
-        ("errors",), ("spans",), ("fabric",), ("peripherals",), ("stm32f103",), ("memory", "serial_port"), ("core",),
+        ("errors",), ("extension",), ("spans",), ("fabric",), ("peripherals",), ("stm32f103",), ("memory", "serial_port"), ("core",),
         ("program", "native"), ("chip",), ("board",), ("analysis", "debug"), ("cli",),
     ),
     "adapter_sim": (

@@ -159,9 +159,7 @@ class Execution:
     def _has_new_fault(self) -> bool:
         return self.machine.board.fault is not None and not self._reported_fault
 
-    def _faulted(
-        self, kind: FaultKind, pc: int, address: int | None, is_lockup: bool, seen: SeenFault | None
-    ) -> None:
+    def _faulted(self, kind: FaultKind, pc: int, address: int | None, is_lockup: bool, seen: SeenFault | None) -> None:
         if self._report is not None:
             self._report(kind, pc, address, is_lockup, seen)
         if self._has_new_fault():

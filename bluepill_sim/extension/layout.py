@@ -66,6 +66,18 @@ INSTRUCTION = Struct(
         Field("padding", "u8", 2),
     ),
 )
+RAMP = Struct(
+    "ramp",
+    "A counter that follows from the time: `source/ramp.c`.",
+    (
+        Field("base", "u64", doc="when it had `value`, in the units of its owner,"),
+        Field("value", "u32"),
+        Field("divider", "u32", doc="so many of which make it count once;"),
+        Field("top", "u32", doc="its limit: 0 and this are neighbours"),
+        *_fields("u8", "runs", "falls"),
+        Field("padding", "u16"),
+    ),
+)
 FAULT = Struct(
     "fault",
     "A HardFault that was entered here, for Python to report: the core as it was before.",
@@ -82,13 +94,13 @@ SHARED = Struct(
     "shared",
     "The state of one core.",
     (
-        *_fields("u64", "cycle", "stop_at", "access_cycle", "last_sleep_cycle", "tick_base", "tick_next"),
+        *_fields("u64", "cycle", "stop_at", "access_cycle", "last_sleep_cycle", "tick_next"),
         *(Field(name, "u64", 2, "a bit an exception") for name in ("pending", "active")),
         *_fields("u64", "enabled", "levels"),
         *_fields("u32", "access_pc", "in_access", "pc", "is_thumb", "mask_stop", "attention"),
         *_fields("u32", "halt_kind", "halt_pc", "halt_address", "halt_has_address", "run_from", "uses_exclusive"),
         *_fields("u32", "exception_number", "sleep", "event_register", "vector_table", "scr", "ccr"),
-        *_fields("u32", "tick_control", "tick_reload", "tick_value", "tick_count_flag"),
+        *_fields("u32", "tick_control", "tick_count_flag"),
         *_fields("u32", "traps_division", "grouping", "it_state", "is_python"),
         Field("is_first", "u32", doc="the recorder has not had a row yet"),
         Field("raised_pc", "u32", doc="the access that raised the last exception: its instruction,"),
@@ -99,7 +111,10 @@ SHARED = Struct(
         *_fields("u32", "sram_base", "sram_bytes", "flash_base", "flash_bytes", "scratch", "padding"),
         Field("exact_stops", "u64", doc="how often a run was stopped to learn which instruction makes an access"),
         Field("logged", "u64", doc="rows so far: the next one goes to `last` at this, modulo its size"),
-        *_fields("u32", "shcsr", "cfsr", "hfsr", "mmfar", "bfar"),
+        *_fields("u32", "shcsr", "cfsr", "hfsr", "mmfar", "bfar", "demcr", "dbgmcu_cr"),
+        Field("tick", "ramp", doc="SysTick's counter: its limit is the reload value"),
+        Field("cyccnt", "ramp"),
+        Field("hears_ticks", "u32", doc="Python wants to know when SysTick is set"),
         Field("has_debugger", "u32", doc="Python sees to BKPT and HardFaults"),
         Field("knows_masked_svc", "u32", doc="Python was told of an SVC that its priority does not allow"),
         Field("has_fault", "u32", doc="`fault` waits for Python"),
@@ -167,7 +182,7 @@ SENT = Struct(
 )
 
 #: All of them; one that holds another comes behind it.
-STRUCTS = (RECORD, INSTRUCTION, FAULT, SHARED, PORT, USART, EXTI, GPIO, EDGE, SENT)
+STRUCTS = (RECORD, INSTRUCTION, RAMP, FAULT, SHARED, PORT, USART, EXTI, GPIO, EDGE, SENT)
 
 _KINDS: dict[str, Any] = {
     "u8": ctypes.c_uint8, "u16": ctypes.c_uint16, "u32": ctypes.c_uint32, "u64": ctypes.c_uint64, "i32": ctypes.c_int32,

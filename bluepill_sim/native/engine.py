@@ -49,6 +49,7 @@ from bluepill_sim.extension.library import (
     address_of,
     library,
 )
+from bluepill_sim.extension.windows import NO_TIME, field, flag
 from bluepill_sim.native.state import (
     BOUNDARY,
     DELIVER,
@@ -56,14 +57,11 @@ from bluepill_sim.native.state import (
     FROZEN,
     HALT_KINDS,
     HALT_NUMBERS,
-    NO_TIME,
     STALE,
     UNEXPLAINED,
     InstructionRow,
     NativeLastRows,
     Shared,
-    field,
-    flag,
 )
 
 #: Flags of a row (`enum row_flag`).
@@ -117,7 +115,8 @@ class NativeEngine(Engine):
         #: Keeps the callbacks alive.
         self._calls = Callbacks(
             UNKNOWN_BLOCK(self._measure_block), READ(self._read_io), WRITE(self._write_io), TRAPPED(self._trapped),
-            RECORDED(self._take_records), ACCESS_CYCLE(lambda: self.access_cycle), ACCESS_PC(lambda: self.access_pc), BAD_ACCESS(self._guarded_bad_access),
+            RECORDED(self._take_records), ACCESS_CYCLE(lambda: self.access_cycle), ACCESS_PC(lambda: self.access_pc),
+            BAD_ACCESS(self._guarded_bad_access),
         )  # fmt: skip
         self._state = state = ctypes.c_void_p(
             library().core_new(self._core.handle, ctypes.addressof(api), ctypes.addressof(self._calls))
@@ -170,6 +169,10 @@ class NativeEngine(Engine):
         self._regions.append((address, size, *io_callbacks(read, write, self._is_denied, self._fail)))
         user = library().core_region(self._state, number, address)
         self._core.map_io_native(address, size, address_of("core_read_io"), address_of("core_write_io"), user)
+
+    def declare_zero(self, address: int) -> None:
+        """As of `Engine`; until a state is restored, whose warnings may be others."""
+        library().core_declare_zero(self._state, address)
 
     def forget_costs(self) -> None:
         """As of `Engine`."""
@@ -321,6 +324,7 @@ class NativeEngine(Engine):
 
     def _restored(self) -> None:
         super()._restored()
+        library().core_forget_zeros(self._state)
         self.shared.uses_exclusive = self._blocks.uses_exclusive
 
     def stop_before(self, kind: HaltKind, pc: int, address: int | None = None) -> None:

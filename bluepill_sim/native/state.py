@@ -6,10 +6,8 @@ from typing import Any
 from bluepill_sim.core.halts import HaltKind
 from bluepill_sim.core.recorder import BLOCK, RECORD, BlockRow
 from bluepill_sim.extension.layout import INSTRUCTION, LAST_ROWS, SHARED, structure
+from bluepill_sim.extension.windows import flag
 from simbase.state import Stateful
-
-#: What stands for "never" and for "none" among times.
-NO_TIME = (1 << 64) - 1
 
 #: Kinds of halts in the order of `enum halt`.
 HALT_KINDS = (
@@ -35,43 +33,6 @@ BOUNDARY = 0
 DELIVER, FAILED, STALE, FROZEN, UNEXPLAINED = range(len(HALT_KINDS), len(HALT_KINDS) + 5)
 
 Shared, InstructionRow = structure(SHARED), structure(INSTRUCTION)
-
-
-def field(name: str, doc: str) -> Any:
-    """Return a property that is a field of `self.shared`."""
-
-    def read(self: Any) -> int:
-        return getattr(self.shared, name)  # type: ignore[no-any-return]  # a field of a ctypes struct
-
-    def write(self: Any, value: int) -> None:
-        setattr(self.shared, name, value)
-
-    return property(read, write, doc=doc)
-
-
-def flag(name: str, doc: str) -> Any:
-    """Return a property that is a field of `self.shared`, as a bool."""
-
-    def read(self: Any) -> bool:
-        return getattr(self.shared, name) != 0  # type: ignore[no-any-return]  # as above
-
-    def write(self: Any, value: bool) -> None:
-        setattr(self.shared, name, value)
-
-    return property(read, write, doc=doc)
-
-
-def time(name: str, doc: str) -> Any:
-    """Return a property that is a time in `self.shared`, or None."""
-
-    def read(self: Any) -> int | None:
-        value: int = getattr(self.shared, name)
-        return None if value == NO_TIME else value
-
-    def write(self: Any, value: int | None) -> None:
-        setattr(self.shared, name, NO_TIME if value is None else value)
-
-    return property(read, write, doc=doc)
 
 
 def ordered_rows(holder: Any) -> bytes:

@@ -142,6 +142,7 @@ static RARELY void trim_registers(struct core *core)
 {
     static const int numbers[3] = {REG_BASEPRI, REG_MSP, REG_PSP};
     static const uint32_t kept[3] = {0xF0, ~3u, ~3u};
+    core->privilege = PRIVILEGE_UNKNOWN;
     for (int n = 0; n < 3; ++n) {
         uint32_t value = read_register(core, numbers[n]);
         if (value & ~kept[n]) {

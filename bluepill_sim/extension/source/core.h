@@ -7,6 +7,7 @@
 #include <stdint.h>
 
 #include "fabric.h"
+#include "system.h"
 
 #define NEVER (UINT64_C(1) << 62)
 /* ITSTATE in the CPSR, and the exception number of interrupt line 0. */
@@ -130,6 +131,13 @@ struct located {
     uint32_t is_anywhere;
 };
 
+/* Words that read a constant and ignore writes, as Python has said after its first warning; by a hash of the address. */
+#define CONSTANTS 1024
+struct constants {
+    uint32_t count;
+    uint32_t addresses[CONSTANTS]; /* 0: free */
+};
+
 /* A loop that waits for something: its state at its start, one round ago. */
 struct polling {
     const struct row *row;
@@ -166,7 +174,9 @@ struct core {
     struct fabric *fabric;
     uint32_t is_scratch;
     uint32_t noted;
-    uint32_t paged_region;
+    uint32_t paged_region, system_region;
+    struct constants constants;
+    enum { PRIVILEGE_UNKNOWN, PRIVILEGED, UNPRIVILEGED } privilege; /* of a thread, since the last MSR */
     struct allocation *allocations;
     struct record *records;
     uint32_t record_count, record_room;
@@ -200,13 +210,14 @@ void skip(struct core *core, uint32_t address, bool is_write, uint32_t bytes);
 void *allocate(struct core *core, size_t bytes);
 uint32_t read_register(struct core *core, int number);
 /* exceptions.c */
-uint64_t deliverable(const struct core *core, uint64_t *high);
+uint64_t deliverable(const struct shared *s, uint64_t *high);
 bool wakes(struct core *core);
 int deliver(struct core *core);
 bool leave(struct core *core, uint32_t exc_return);
 bool supervisor_call(struct core *core, uint32_t pc);
 void pend(struct core *core, unsigned number);
-void tick(struct core *core);
+void pending_changed(struct core *core, uint32_t pc);
+bool is_interrupted(struct core *core);
 bool can_preempt(struct core *core, unsigned number, bool ignores_primask);
 bool enter(struct core *core, unsigned number, uint32_t return_address);
 uint32_t vector(const struct core *core, unsigned number);

@@ -32,6 +32,18 @@ struct instruction {
 };
 _Static_assert(sizeof(struct instruction) == 20, "instruction");
 
+/* A counter that follows from the time: `source/ramp.c`. */
+struct ramp {
+    uint64_t base; /* when it had `value`, in the units of its owner, */
+    uint32_t value;
+    uint32_t divider; /* so many of which make it count once; */
+    uint32_t top; /* its limit: 0 and this are neighbours */
+    uint8_t runs;
+    uint8_t falls;
+    uint16_t padding;
+};
+_Static_assert(sizeof(struct ramp) == 24, "ramp");
+
 /* A HardFault that was entered here, for Python to report: the core as it was before. */
 struct fault {
     uint64_t ns;
@@ -53,7 +65,6 @@ struct shared {
     uint64_t stop_at;
     uint64_t access_cycle;
     uint64_t last_sleep_cycle;
-    uint64_t tick_base;
     uint64_t tick_next;
     uint64_t pending[2]; /* a bit an exception */
     uint64_t active[2]; /* a bit an exception */
@@ -78,8 +89,6 @@ struct shared {
     uint32_t scr;
     uint32_t ccr;
     uint32_t tick_control;
-    uint32_t tick_reload;
-    uint32_t tick_value;
     uint32_t tick_count_flag;
     uint32_t traps_division;
     uint32_t grouping;
@@ -105,13 +114,18 @@ struct shared {
     uint32_t hfsr;
     uint32_t mmfar;
     uint32_t bfar;
+    uint32_t demcr;
+    uint32_t dbgmcu_cr;
+    struct ramp tick; /* SysTick's counter: its limit is the reload value */
+    struct ramp cyccnt;
+    uint32_t hears_ticks; /* Python wants to know when SysTick is set */
     uint32_t has_debugger; /* Python sees to BKPT and HardFaults */
     uint32_t knows_masked_svc; /* Python was told of an SVC that its priority does not allow */
     uint32_t has_fault; /* `fault` waits for Python */
     struct fault fault;
     struct record last[32];
 };
-_Static_assert(sizeof(struct shared) == 1512, "shared");
+_Static_assert(sizeof(struct shared) == 1560, "shared");
 
 /* The pins of one port, a bit each. RM0008 9.1, table 20. */
 struct port {

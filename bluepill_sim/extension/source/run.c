@@ -4,7 +4,7 @@
 
 #include "core.h"
 
-enum { FOR_INTERRUPT = 1, FOR_EVENT = 2 };
+enum { FOR_INTERRUPT = 1, FOR_EVENT = 2, SYSTICK = 15 };
 #define FIRST_EXCEPTION_RETURN 0xFFFFFFE0u
 /* No instruction stands at an odd address, so a run never ends there; the page is that of `scratch`. */
 #define NOWHERE 0x9FFFFFFFu
@@ -40,8 +40,8 @@ struct core *core_new(void *unicorn, const struct unicorn_api *api, const struct
         core->calls = *calls;
         core->none.start = core->none.end = UINT32_MAX;
         core->block = &core->none;
-        core->paged_region = UINT32_MAX;
-        core->shared.last_sleep_cycle = core->shared.tick_next = core->shared.raised_cycle = NO_TIME;
+        core->paged_region = core->system_region = UINT32_MAX;
+        system_init(&core->shared);
     }
     return core;
 }
@@ -191,6 +191,7 @@ static uint32_t run_slice(struct core *core)
     }
     core->io_next = core->skipped_count = 0;
     core->located.cycle = NO_TIME;
+    core->privilege = PRIVILEGE_UNKNOWN;
     int error = core->api.start(core->unicorn, s->pc | s->is_thumb, NOWHERE, 0, 0);
     while (core->is_stopping) {
         const uint32_t pc = read_register(core, REG_PC);
@@ -237,8 +238,8 @@ static uint32_t run(struct core *core, uint64_t limit)
     free_dropped(core);
     s->attention = 0;
     for (;;) {
-        if (s->cycle >= s->tick_next) {
-            tick(core);
+        if (s->cycle >= s->tick_next && systick_advance(s, s->cycle)) {
+            pend(core, SYSTICK);
         }
         if (s->cycle >= core->fabric->next_cycle) {
             run_events(core->fabric, ns_of(core->fabric, s->cycle));
@@ -263,7 +264,7 @@ static uint32_t run(struct core *core, uint64_t limit)
                 continue;
             }
             uint64_t high;
-            s->mask_stop = deliverable(core, &high) || high;
+            s->mask_stop = deliverable(s, &high) || high;
         } else {
             s->mask_stop = 0;
         }
