@@ -11,7 +11,8 @@ STAMP  := $(VENV)/.set-up
 # One more than two cores: many tests wait for a real clock.
 JOBS   ?= 3
 # What is built with the package: set up again when it has changed.
-COMPILED := $(wildcard bluepill_sim/native/source/*) $(shell find adapter_fw/core adapter_fw/capi -type f)
+COMPILED := $(wildcard bluepill_sim/extension/source/*) robot_bench/wires/edges.c \
+    $(shell find adapter_fw/core adapter_fw/capi -type f)
 
 .PHONY: setup demo test lint type unit bench soak clean firmware board board-check board-tools pictures docs
 
@@ -22,6 +23,8 @@ setup: $(STAMP)
 $(STAMP): pyproject.toml setup.py constraints.txt $(COMPILED)
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || \
 	    { echo "make: Python 3.11 or newer is needed (hint: make PYTHON=/path/to/python3.11)"; exit 2; }
+	@command -v $${CC:-cc} gcc >/dev/null || \
+	    { echo "make: the emulator needs a C compiler (hint: apt-get install g++ libc6-dev)"; exit 2; }
 	@test -x $(BIN)/python || $(PYTHON) -m venv $(VENV) || \
 	    { rm -rf $(VENV); echo "make: cannot create a virtual environment (hint: apt-get install python3-venv)"; exit 2; }
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt -e '.[all,dev]'
@@ -54,6 +57,7 @@ bench: setup
 	$(BIN)/python tools/bench/bodies.py
 	$(BIN)/python tools/bench/pioneer.py
 	$(BIN)/python tools/bench/speed.py
+	$(BIN)/python tools/bench/shares.py
 
 soak: setup
 	$(BIN)/pytest -n $(JOBS) -m 'soak' --no-cov

@@ -1,4 +1,4 @@
-"""What pyproject.toml cannot say: how the two parts in C and C++ are built, and the page of the package.
+"""What pyproject.toml cannot say: how the parts in C and C++ are built, and the page of the package.
 
 A part that does not compile fails the build. Where there is no compiler, or `P2OS_NATIVE=0` says so, it is left out,
 and a file beside it holds the reason, which `p2os doctor` tells (pip shows nothing of a build that succeeds).

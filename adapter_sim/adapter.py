@@ -273,6 +273,11 @@ class Adapter(Stateful):
         """Return the frames to send, one item each, oldest first, and forget them."""
         return self.session.take_output()
 
+    @property
+    def wakes_on(self) -> frozenset[str]:
+        """Names of the wires whose edges it has to be brought to: rst, and all inputs while it does not sample them."""
+        return self.inputs.wires if self.samples.is_suspended else self.inputs.reset_wires
+
     def next_deadline(self) -> Nanos | None:
         """Return the next sample instant or deadline, in nanoseconds."""
         return self._deadline

@@ -69,6 +69,9 @@ class Inputs(Stateful):
         self._wires = tuple((name, 1 << bit) for bit, name in enumerate(names))
         self._connect_weight = 1 << (len(names) - 1)
         self._reset_wire = pinout.with_role(WireRole.RESET)[0].name
+        #: Names of rst, and of all wires that are looked at.
+        self.reset_wires = frozenset((self._reset_wire,))
+        self.wires = self.reset_wires.union(names)
         self._majority = Majority(settings.sample_count)
         self._connect = Debounce(settings.connect_after_ns, settings.disconnect_after_ns)
         self._word = 0
@@ -81,11 +84,6 @@ class Inputs(Stateful):
             values.append(motor_value(word & ((1 << value.width) - 1), value.width, self._bit_order))
             word >>= value.width
         return values[0], values[1]
-
-    @property
-    def wires(self) -> tuple[str, ...]:
-        """Return the names of all wires that are looked at."""
-        return (*(name for name, _ in self._wires), self._reset_wire)
 
     @property
     def wants_robot(self) -> bool:
@@ -180,8 +178,8 @@ class SampleClock(Stateful):
     def __init__(self, period_ns: Nanos) -> None:
         self._period_ns = period_ns
         self.next: Nanos = 0
-        #: Whether whoever runs the adapter brings it to every edge of its input wires: then settled pins
-        #: are not sampled again until one comes.
+        #: Whether whoever runs the adapter brings it to every edge of the wires in `Adapter.wakes_on`: then settled
+        #: pins are not sampled again until one comes.
         self.waits_for_edges = False
         self.is_suspended = False
 

@@ -135,6 +135,8 @@ class FirmwareAdapter:
         motors = [name for value in ("motor1", "motor2") for name in pinout.value(value).wires]
         ends = [pinout.with_role(role)[0].name for role in (WireRole.CONNECT, WireRole.RESET)]
         self._inputs = [(name, 1 << bit) for bit, name in enumerate([*motors, *ends])]
+        #: Names of the wires whose edges it has to be brought to; it samples the others.
+        self.wakes_on = frozenset(ends[1:])
         self._outputs = [wire.name for wire in pinout.with_role(WireRole.DISTANCE)]
         self._outputs += [name for value in ("encoder1", "encoder2") for name in pinout.value(value).wires]
         self._status_names = _names(library.adapter_status_name)

@@ -37,7 +37,8 @@ from p2os.pioneer.world import load_world
 from p2os.pioneer.world.model import Pose, World
 from robot_bench.adapter import RUN_ANEW, AnyAdapter, make_adapter
 from robot_bench.direct import DirectRobot, DistanceSensors, JointMotor, WheelEncoder
-from robot_bench.loop import DEFAULT_SLICE_NS, RunLoop
+from robot_bench.loop import RunLoop
+from robot_bench.pacer import FIRST_SLICE_NS, SliceLength
 from robot_bench.recording.client_view import SipRanges
 from robot_bench.recording.recorder import Recorder
 from robot_bench.recording.run_record import RunRecord, record_of
@@ -100,7 +101,8 @@ class Bench(Stateful):
         scenario: What to run.
         trace: Where the recording goes; None records in memory.
         chip: Runs the firmware; None boots the scenario's on an emulated BluePill.
-        slice_ns: How often the loop gives control back; without effect on the result.
+        slice_ns: How often the loop gives control back, in virtual time; without effect on the result. None: as often
+            as the wall clock wants it.
         on_slice: Called after each slice with the time reached; may raise to end the run.
 
     Raises:
@@ -117,7 +119,7 @@ class Bench(Stateful):
         *,
         trace: TraceWriter | None = None,
         chip: Chip | None = None,
-        slice_ns: Nanos = DEFAULT_SLICE_NS,
+        slice_ns: Nanos | None = None,
         on_slice: Callable[[Nanos], None] | None = None,
     ) -> None:
         self.scenario = scenario
@@ -151,17 +153,20 @@ class Bench(Stateful):
         )  # fmt: skip
         self.recorder.bring_to = self._bring_robot_to
         self.faults = FaultScript(scenario.faults, bring_to=self._bring_robot_to, do=self._inject)
-        followers = (*self._robots, self.script, self.faults, self.recorder)
-        self.loop = RunLoop(chip, followers, slice_ns=slice_ns, on_slice=self._after_slice)
+        followers = (*self._robots, self.script, self.faults)
+        self._slices = SliceLength() if slice_ns is None else None
+        self.loop = RunLoop(
+            chip, followers, observers=(self.recorder,), slice_ns=slice_ns or FIRST_SLICE_NS,
+            on_slice=self._after_slice, choose_watched=self._watch_wires,
+        )  # fmt: skip
         pin_of = {wire.name: wire.bluepill for wire in pinout.wires}
         #: Name of a wire, or of its pin → name of the wire.
         self._wires = {pin: name for name, pin in pin_of.items()} | {name: name for name in pin_of}
-        pins = ChipPins(chip, harness, pin_of, on_watched=self.loop.note_edge)
-        for wire in pinout.with_role(WireRole.RESET):
-            pins.watch(wire.name)
-        self._bring_adapter_to_edges(pins, harness)
+        self._pins = ChipPins(chip, harness, pin_of, on_watched=self.loop.note_edge)
+        if isinstance(self.parts.adapter, Adapter):
+            self.parts.adapter.samples.waits_for_edges = True
         chip.usart1.far_baud = scenario.usart_baud
-        chip.usart1.on_transmit = lambda byte, at: self.recorder.usart(bytes([byte]), at)
+        chip.usart1.subscribe(self.recorder.usart)
         chip.on_warning = lambda text: self.recorder.event("chip", chip.now_ns, "warning", text)
         self.recorder.start()
 
@@ -181,15 +186,6 @@ class Bench(Stateful):
         """
         found = scenario if isinstance(scenario, Scenario) else load_scenario(str(scenario))
         return cls(found.with_options(**options))
-
-    def _bring_adapter_to_edges(self, pins: ChipPins, harness: Harness) -> None:
-        """Let a model of the adapter that looks at settled pins wait for their edges instead of sampling on."""
-        adapter = self.parts.adapter
-        if isinstance(adapter, Adapter):
-            adapter.samples.waits_for_edges = True
-            for name in adapter.inputs.wires:
-                pins.watch(name)
-                harness[name].watch(lambda _net, _owner, at: self.loop.note_edge(at))
 
     @property
     def chip(self) -> Chip:
@@ -289,6 +285,7 @@ class Bench(Stateful):
         if isinstance(made_of, dict):
             _refuse_others(made_of, self.made_of)
         super().restore(snapshot)
+        self._pins.chip_restored()
 
     def __reduce__(self) -> "tuple[Callable[[str, bytes], Bench], tuple[str, bytes]]":
         if not self._is_rebuildable:
@@ -296,10 +293,18 @@ class Bench(Stateful):
         if not self.trace.has_end:
             self.trace.flush()
         path = None if self.trace.path is None else self.trace.path.absolute()
-        recipe = pickle.dumps((self.scenario, self.loop.slice_ns, path, self.snapshot()))
+        slice_ns = self.loop.slice_ns if self._slices is None else None
+        recipe = pickle.dumps((self.scenario, slice_ns, path, self.snapshot()))
         return _built_anew, (version("p2os"), recipe)
 
+    def _watch_wires(self, now: Nanos) -> None:
+        """Let an edge end the chip's slice where a part may change an input before its own next deadline."""
+        if self.parts.adapter is not None:
+            self._pins.watch(self.parts.adapter.wakes_on, now)
+
     def _after_slice(self, now: Nanos) -> None:
+        if self._slices is not None:
+            self.loop.slice_ns = self._slices.after_slice()
         if self.chip.fault is not None:
             self.loop.end_at(self.end)
         if self.on_slice is not None:

@@ -1,16 +1,16 @@
 """The one run loop: the chip leads, everything else follows to each deadline.
 
 Theory of operation. The leader (the emulated BluePill) runs to the earliest
-deadline of the others. It may stop short at an edge on a watched net, and late
+deadline of the others, but for those who only observe. It may stop short at an edge on a watched net, and late
 by one basic block. Then every deadline that the leader has passed is acted on,
 in order of time: those who are due are brought there, in their fixed order. At
 the moment of an edge on a watched net all are. Nets keep their history, so that
 a follower at time t reads the levels of t. A follower that needs another one
 brought up to date first (the recorder, the body) brings it there itself.
 
-Followers are never brought to the boundary of a slice: the slice limit only sets
-how often the leader gives control back (for pacing, progress and Ctrl-C). So
-the result does not depend on it.
+Where nobody wants control back earlier (for pacing, progress and Ctrl-C), the leader runs
+to the deadline in one go; else in slices. Followers are never brought to the boundary of a
+slice. So the result does not depend on it.
 
 A debugger may halt the leader, even inside a basic block. Then `run_until`
 comes back at once; nobody is brought anywhere before the leader stands at a
@@ -20,15 +20,14 @@ Invariant: when `run_until(end)` returns without a halt, every deadline before o
 reached has been acted on by all, in order of time.
 """
 
+from bisect import insort
 from collections.abc import Callable, Sequence
 from typing import Protocol
 
 from simbase.errors import P2osError
 from simbase.state import Stateful
-from simbase.timing import NS_PER_MS, Nanos, Reached
+from simbase.timing import Nanos, Reached
 
-#: chosen: the pacer's grain; small enough for a live view, large enough to cost nothing.
-DEFAULT_SLICE_NS: Nanos = 1 * NS_PER_MS
 #: How often followers may make each other due at one and the same instant before it is called a fault.
 MOST_ROUNDS = 16
 #: Later than any deadline.
@@ -65,7 +64,18 @@ class StuckError(P2osError):
 
 
 class RunLoop(Stateful):
-    """Brings a leader and its followers forward together."""
+    """Brings a leader and its followers forward together.
+
+    Args:
+        leader: Leads.
+        followers: Follow, in this order where several are due.
+        observers: Follow after them, and change nothing: the leader does not stop for their deadlines, they are
+            brought there when it has stopped for another reason.
+        slice_ns: As of the attribute.
+        on_slice: As of the attribute.
+        choose_watched: Called with `now` whenever followers have acted: chooses which nets are watched, and notes
+            their edges after that time that are known already.
+    """
 
     STATE = ("now", "_edges", "_is_inside_block", "_rounds")
     #: Each `run_until` sets them anew.
@@ -76,12 +86,17 @@ class RunLoop(Stateful):
         leader: Leader,
         followers: Sequence[Follower],
         *,
-        slice_ns: Nanos = DEFAULT_SLICE_NS,
+        observers: Sequence[Follower] = (),
+        slice_ns: Nanos = NEVER,
         on_slice: Callable[[Nanos], None] | None = None,
+        choose_watched: Callable[[Nanos], None] | None = None,
     ) -> None:
         self.leader = leader
-        self.followers = tuple(followers)
+        self.followers = (*followers, *observers)
+        self._count = len(followers)
+        #: The longest that the leader runs without giving control back; whoever wants it may set it at any time.
         self.slice_ns = slice_ns
+        self._choose_watched = choose_watched or (lambda _now: None)
         #: Called with the leader's time after each slice; may raise to end the run.
         self.on_slice = on_slice
         #: The last instant that all followers were brought to.
@@ -98,8 +113,8 @@ class RunLoop(Stateful):
 
     def note_edge(self, at: Nanos) -> None:
         """Have the followers brought to `at` as well: a watched net has changed there."""
-        if not self._edges or self._edges[-1] != at:
-            self._edges.append(at)
+        if at not in self._edges:
+            insort(self._edges, at)
 
     def note_halt(self, *, is_inside_block: bool) -> None:
         """Have `run_until` come back: the leader has halted for a debugger."""
@@ -128,14 +143,19 @@ class RunLoop(Stateful):
         if self._is_inside_block:
             self._is_inside_block = False
             led = self._advance(end).now
+        self._choose_watched(self.now)
+        due = self._next_due()
         while not self._is_halted:
-            due = self._next_due()
             if due <= led and due <= self._end:
                 self._follow(due)
+                self._choose_watched(self.now)
+                due = self._next_due()
             elif led >= self._end:
                 return
             else:
-                led = self._lead(led, min(due, self._end))
+                led = self._lead(led, min((self._end, *self._deadlines[: self._count])))
+                if self._edges:
+                    due = min(due, self._edges[0])
 
     def finish(self, end: Nanos) -> None:
         """Bring the followers to `end` itself, so that their state is that of the end of the run."""
@@ -144,9 +164,9 @@ class RunLoop(Stateful):
 
     def _lead(self, now: Nanos, limit: Nanos) -> Nanos:
         """Let the leader run to `limit`, slice by slice; stop at an edge on a watched net. Return its time."""
-        advance, slice_ns, on_slice = self._advance, self.slice_ns, self.on_slice
+        advance, on_slice = self._advance, self.on_slice
         while now < limit and not self._edges and not self._is_halted:
-            now = advance(min(limit, now + slice_ns)).now
+            now = advance(min(limit, now + self.slice_ns)).now
             if on_slice is not None:
                 on_slice(now)
         return now
@@ -157,7 +177,7 @@ class RunLoop(Stateful):
         noted = self._deadlines = [
             NEVER if at is None else at for at in [part.next_deadline() for part in self.followers]
         ]
-        return min(due, *noted) if noted else due
+        return min((due, *noted))
 
     def _follow(self, due: Nanos) -> None:
         """Bring those who are due to `due`, as noted; at a watched edge all."""

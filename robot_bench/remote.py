@@ -13,7 +13,7 @@ import contextlib
 from collections.abc import Callable
 
 from adapter_sim.adapter import AdapterState
-from adapter_sim.pinout import WireRole, load_pinout
+from adapter_sim.pinout import load_pinout
 from p2os.errors import RemoteProtocolError, RunFailedError, TransportError
 from p2os.protocol.frames import Decoder, Frame
 from p2os.protocol.sip import SIP_KINDS, StandardSip
@@ -83,14 +83,13 @@ class RemoteBench:
             self.adapter, transport,
             on_sent=lambda data, at: recorder.wire("c2r", data, at), on_received=self._listener.receive,
         )  # fmt: skip
-        self.loop = RunLoop(chip, (endpoint, recorder), slice_ns=PACED_SLICE_NS, on_slice=self._after_slice)
-        pins = ChipPins(
-            chip, harness, {wire.name: wire.bluepill for wire in pinout.wires}, on_watched=self.loop.note_edge
+        self.loop = RunLoop(
+            chip, (endpoint,), observers=(recorder,), slice_ns=PACED_SLICE_NS, on_slice=self._after_slice
         )
-        for wire in pinout.with_role(WireRole.RESET):
-            pins.watch(wire.name)
+        pin_of = {wire.name: wire.bluepill for wire in pinout.wires}
+        ChipPins(chip, harness, pin_of, on_watched=self.loop.note_edge).watch(self.adapter.wakes_on, 0)
         chip.usart1.far_baud = scenario.usart_baud
-        chip.usart1.on_transmit = lambda byte, at: recorder.usart(bytes([byte]), at)
+        chip.usart1.subscribe(recorder.usart)
         chip.on_warning = lambda text: recorder.event("chip", chip.now_ns, "warning", text)
         recorder.start()
 

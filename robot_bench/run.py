@@ -29,9 +29,9 @@ from p2os.transport.wall_clock import Clock, wall_clock
 from robot_bench.bench import Bench, judged
 from robot_bench.pacer import PACED_SLICE_NS, RealTimePacer
 from robot_bench.recording.run_folder import reserved
-from robot_bench.recording.run_record import Json, read_run
+from robot_bench.recording.run_record import TRACE_NAME, Json, read_run
 from robot_bench.recording.summary import INTERRUPTED, end_of_a_broken_run
-from robot_bench.recording.trace import TRACE_NAME, TraceWriter
+from robot_bench.recording.trace import TraceWriter
 from robot_bench.remote import RemoteBench
 from robot_bench.report.make import make_artefacts
 from robot_bench.scenario.scenario import Scenario

@@ -73,8 +73,8 @@ LAYERS = {
         ("capture", "client", "pioneer"), ("cli",), ("__main__",),
     ),
     "bluepill_sim": (
-        ("errors",), ("extension",), ("spans",), ("fabric",), ("peripherals",), ("stm32f103",),
-        ("memory", "serial_port"), ("core",), ("program", "native"), ("chip",), ("board",), ("analysis", "debug"), ("cli",),
+        ("errors",), ("spans", "extension"), ("fabric",), ("peripherals",), ("stm32f103",), ("memory", "serial_port"),
+        ("core",), ("program", "native"), ("chip",), ("board",), ("analysis", "debug"), ("cli",),
     ),
     "adapter_sim": (
         ("codec",), ("settings", "pinout"), ("pins", "mixing", "encoders", "distances", "session"),

@@ -24,14 +24,14 @@ from packaging.requirements import Requirement
 ROOT = Path(__file__).resolve().parent.parent
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
 PACKAGES = ("simbase", "p2os", "bluepill_sim", "adapter_sim", "robot_bench")
-PARTS = ("bluepill_sim._native", "robot_bench._adapter_firmware")
+PARTS = ("bluepill_sim._native", "robot_bench._edges", "robot_bench._adapter_firmware")
 LIMIT_S = 300
 
 #: What of the checkout only the checkout needs.
 OF_THE_CHECKOUT = (".ci/", ".gitignore")
 
 #: What of the packages is compiled into the wheel and need not lie in it.
-COMPILED = "bluepill_sim/native/source/"
+COMPILED = ("bluepill_sim/extension/source/", "robot_bench/wires/edges.c")
 
 CONSTRAINTS = ROOT / "constraints.txt"
 
@@ -218,7 +218,7 @@ def test_the_wheel_drives_the_demo_in_an_empty_environment(wheel: Path, tmp_path
 
 @pytest.mark.slow
 def test_a_part_that_does_not_compile_fails_the_build(builder: Path, unpacked: Path, tmp_path: Path) -> None:
-    (unpacked / "bluepill_sim/native/source/core.h").unlink()
+    (unpacked / "bluepill_sim/extension/source/core.h").unlink()
     done = build(builder, unpacked, "wheel", tmp_path / "out")
     assert done.returncode != 0
     assert "bluepill_sim._native does not compile" in done.stderr

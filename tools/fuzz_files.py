@@ -698,7 +698,12 @@ def _traces() -> list[Seed]:
          "min_clearance_m": 0.2, "trace_sha256": "00", "passed": False, "failures": ["no"], "goals_met": ["yes"],
          "notes": [], "last_blocks": ["0x08000000"]},
     ]  # fmt: skip
-    return [_text("trace.jsonl", "".join(json.dumps(line) + "\n" for line in lines))]
+    single = "".join(json.dumps(line) + "\n" for line in lines)
+    head = {"k": "pins", "t": 0, "v": 1, "nets": ["motor1_comm1", "encoder1_s1"], "levels": "01"}
+    block = {"k": "pins", "t": 4000, "n": 3, "d": "AAEG"}
+    lines[1:3], lines[10:11] = [head], [block]
+    blocks = "".join(json.dumps(line) + "\n" for line in lines if line["k"] != "pin")
+    return [_text("trace.jsonl", single), _text("trace.jsonl", blocks)]
 
 
 _OBJ_BESIDE = {"part.obj": OBJ.encode(), "other.sdf": OTHER_SDF.encode()}

@@ -1,8 +1,8 @@
-"""The native core's shared library: found next to the package, loaded by ctypes.
+"""The emulator's library in C: found next to the package, loaded by ctypes.
 
-It is built with the package where there is a C compiler (`p2os doctor` says why it
-is not there). `P2OS_CORE=python` in the environment chooses the Python
-executor, `P2OS_CORE=native` insists on this one.
+It is built with the package where there is a C compiler (`p2os doctor` says why it is
+not there), and the emulator needs it: the devices are in it. `P2OS_CORE=python` in the
+environment chooses the Python executor for the core, `native`, the default, the one in C.
 """
 
 import ctypes
@@ -139,7 +139,6 @@ def is_native_wanted() -> bool:
 
     Raises:
         BluePillError: `P2OS_CORE` holds neither "native" nor "python".
-        MissingDependencyError: it insists on a native core that is not built.
     """
     choice = os.environ.get(CORE_VARIABLE, "")
     if choice and choice not in CORE_CHOICES:
@@ -147,9 +146,7 @@ def is_native_wanted() -> bool:
             f"{CORE_VARIABLE}={choice}: no such core",
             hint=f"{CORE_VARIABLE} is {' or '.join(CORE_CHOICES)}, or not set",
         )
-    if choice == "native" and library_path() is None:
-        raise MissingDependencyError("the native core is not built", hint="p2os doctor says why")
-    return choice != "python" and library_path() is not None
+    return choice != "python"
 
 
 @cache
@@ -168,14 +165,14 @@ def library() -> ctypes.PyDLL:
     """
     where = library_path()
     if where is None:
-        raise MissingDependencyError("the native core is not built", hint="p2os doctor says why")
+        raise MissingDependencyError("the emulator's library is not built", hint="p2os doctor says why")
     loaded = ctypes.PyDLL(where)  # keeps the interpreter's lock: callbacks come often
     for name, signature in _FUNCTIONS.items():
         function = getattr(loaded, name)
         function.restype = _TYPES[signature[0]]
         function.argtypes = [_TYPES[letter] for letter in signature[1:]]
     if loaded.core_shared_bytes() != ctypes.sizeof(structure(SHARED)):
-        raise MissingDependencyError("the native core is of another version", hint="install the package again")
+        raise MissingDependencyError("the emulator's library is of another version", hint="install the package again")
     return loaded
 
 

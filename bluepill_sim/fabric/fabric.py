@@ -10,12 +10,14 @@ times), so that a snapshot is made of bytes and numbers.
 """
 
 import ctypes
+import struct
 import weakref
 from collections.abc import Callable, Iterable
 from typing import Any, Protocol, TypeVar
 
-from bluepill_sim.extension.layout import EDGE, PORT, PORTS, SENT, structure
+from bluepill_sim.extension.layout import PORT, PORTS, structure
 from bluepill_sim.extension.library import library
+from bluepill_sim.fabric.subscriptions import EDGE
 from simbase.state import Stateful
 from simbase.timing import Nanos
 
@@ -28,7 +30,9 @@ RESET, CLOCK, ROUTE, OWN_COMMANDS = 0, 1, 2, 16
 #: An alternate function that offers nothing.
 NO_LEVEL = 2
 
-PortStruct, EdgeStruct, SentStruct = structure(PORT), structure(EDGE), structure(SENT)
+#: A word that has gone out (`struct sent`): ns, the word, clock in Hz, divider, format.
+WORD = struct.Struct("<QIIII")
+PortStruct = structure(PORT)
 _U32, _U64, _USER = ctypes.c_uint32, ctypes.c_uint64, ctypes.c_void_p
 _CYCLE = ctypes.CFUNCTYPE(_U64, _USER)
 _SET_IRQ = ctypes.CFUNCTYPE(_U32, _USER, _U32, _U32)
@@ -236,13 +240,12 @@ class Fabric(Stateful):
         self.check()
         return answer
 
-    def take_words(self, slot: int) -> list[Any]:
-        """Take the words (`SentStruct`) that a device has sent."""
+    def take_words(self, slot: int) -> bytes:
+        """Take the words that a device has sent: rows of `WORD`."""
         count = self._calls_of_c.fabric_word_count(self.handle, slot)
         if not count:
-            return []
-        at = self._calls_of_c.fabric_take_words(self.handle, slot)
-        return list((SentStruct * count).from_address(at))
+            return b""
+        return ctypes.string_at(self._calls_of_c.fabric_take_words(self.handle, slot), count * WORD.size)
 
     def stop_at_words(self, slot: int, wanted: bool) -> None:
         """Choose whether each word that a device sends ends the slice."""
@@ -341,7 +344,7 @@ class Fabric(Stateful):
         if not count:
             return b""
         at = self._calls_of_c.fabric_take_rows(self.handle, subscription)
-        return ctypes.string_at(at, count * ctypes.sizeof(EdgeStruct))
+        return ctypes.string_at(at, count * EDGE.size)
 
     def take_stop(self) -> bool:
         """Return whether a subscriber wants the slice to end, and forget it."""

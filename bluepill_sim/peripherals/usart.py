@@ -27,10 +27,9 @@ after the point from which its run of characters is counted, never later than `d
 from collections import Counter
 from collections.abc import Callable, Sequence
 from enum import IntEnum
-from typing import Any
 
 from bluepill_sim.extension.layout import USART
-from bluepill_sim.fabric.fabric import OWN_COMMANDS
+from bluepill_sim.fabric.fabric import OWN_COMMANDS, WORD
 from bluepill_sim.fabric.line_speed import TOLERANCE_PERCENT, Heard, heard, is_usual, nearest_usual
 from bluepill_sim.fabric.pins import ALTERNATE_FUNCTIONS, Pin
 from bluepill_sim.fabric.ports import ChipPorts
@@ -178,11 +177,21 @@ class Usart(Peripheral):
         if not sent:
             return
         rows: list[tuple[int, int, int]] = []
-        for one in sent:
-            divider = one.clock_hz, one.brr
-            self.sent_at[divider] += 1
-            bit_ns = one.brr * 1_000_000_000 // one.clock_hz
-            rows += [(word, one.ns, bit_ns) for word in self._as_heard(one)]
+        made: tuple[int, int, int] | None = None
+        count = mask = bit_ns = 0
+        for at_ns, word, clock_hz, brr, how in WORD.iter_unpack(sent):
+            if (clock_hz, brr, how) != made:
+                if made is not None:
+                    self.sent_at[made[:2]] += count
+                made, count = (clock_hz, brr, how), 0
+                mask, bit_ns = _data_mask(how), brr * 1_000_000_000 // clock_hz
+            count += 1
+            if self.far_baud is None or not brr:
+                rows.append((word & mask, at_ns, bit_ns))
+            else:
+                rows += [(one & mask, at_ns, bit_ns) for one in self._as_heard(word, clock_hz, brr, how)]
+        if made is not None:
+            self.sent_at[made[:2]] += count
         for sink in self.sinks:
             sink(rows)
 
@@ -223,16 +232,12 @@ class Usart(Peripheral):
         self._coming = self._coming[given:]
         self.native.rx_more = bool(self._coming)
 
-    def _as_heard(self, sent: Any) -> list[int]:
-        """Return what the far end makes of a character that went out."""
-        control, stop_half_bits = sent.format & 0xFFFF, _STOP_HALF_BITS[sent.format >> 16]
-        bits = _data_bits(control)
-        mask = (1 << bits - bool(control & PCE)) - 1
-        if self.far_baud is None or not sent.brr:
-            return [sent.word & mask]
-        ratio = sent.clock_hz, self.far_baud * sent.brr
-        found = heard([_with_parity(sent.word, control)], bits, *ratio, stop_half_bits)
-        return [one.word & mask for one in found]
+    def _as_heard(self, word: int, clock_hz: int, brr: int, how: int) -> list[int]:
+        """Return what a far end of another speed makes of a character that went out."""
+        ratio = clock_hz, (self.far_baud or 0) * brr
+        control = how & 0xFFFF
+        found = heard([_with_parity(word, control)], _data_bits(control), *ratio, _STOP_HALF_BITS[how >> 16])
+        return [one.word for one in found]
 
     def _judge_speed(self) -> None:
         """Warn of a speed that the far end does not have, or, where none is set, that hardly any has."""
@@ -291,6 +296,11 @@ class Usart(Peripheral):
 def _data_bits(control: int) -> int:
     """Return how many bits stand between start and stop, a parity among them, by CR1."""
     return 9 if control & M else 8
+
+
+def _data_mask(control: int) -> int:
+    """Return which bits of a character are data, by CR1."""
+    return int((1 << _data_bits(control) - bool(control & PCE)) - 1)
 
 
 def _with_parity(word: int, control: int) -> int:

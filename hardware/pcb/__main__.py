@@ -65,6 +65,7 @@ def _build(_: argparse.Namespace) -> int:
             target = generated_files.GENERATED / variant / f"{variant}-gerbers.zip"
             target.write_bytes(generated_files.archive(files))
             print(f"{target.name}: {len(files)} files, {target.stat().st_size} bytes")
+            kicad_cli.step(board, target.with_name(f"{variant}.step"))
             _write_reports(variant, board)
     for variant in VARIANTS:
         if variant not in BOARD_VARIANTS:

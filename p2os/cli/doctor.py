@@ -4,7 +4,6 @@ It looks, but imports and starts nothing: a broken package shows when it is used
 """
 
 import json
-import os
 import platform
 import shutil
 import sys
@@ -77,7 +76,10 @@ NEEDS = (
     Need(name="pygame-ce", kind="package", feature="teleop --pad", extra="pad"),
     Need(name="tshark", kind="program", feature="captures on the command line", get="sudo apt-get install tshark"),
     Need(
-        name="bluepill_sim._native", kind="built", feature="the BluePill at full speed",
+        name="bluepill_sim._native", kind="built", feature="the emulated BluePill",
+    ),
+    Need(
+        name="robot_bench._edges", kind="built", feature="many edges at full speed",
     ),
     Need(
         name="robot_bench._adapter_firmware", kind="built", feature="--adapter firmware",
@@ -132,8 +134,7 @@ def built_part(name: str) -> str | None:
             return None
     except ImportError:
         return None
-    is_left_out = name.endswith("._native") and os.environ.get("P2OS_CORE") == "python"
-    return "built, not used: P2OS_CORE=python" if is_left_out else "built"
+    return "built"
 
 
 def way_to_build(name: str, find_program: Callable[[str], str | None] = shutil.which) -> str:

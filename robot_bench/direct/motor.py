@@ -29,6 +29,7 @@ class JointMotor(Stateful):
     """
 
     STATE = ("speed_um_per_s", "asked")
+    DERIVED = ("_is_known",)
 
     def __init__(
         self,
@@ -47,6 +48,10 @@ class JointMotor(Stateful):
             self._change, rest = divmod(ramp_um_per_s2 * dt_ns, NS_PER_S)
             if rest or self._change <= 0:
                 raise LocalProtocolError(f"a ramp of {ramp_um_per_s2} µm/s² is no whole number of µm/s in {dt_ns} ns")
+        #: Whether `asked` is the value of all drives that the wires have had.
+        self._is_known = False
+        for net in self._nets:
+            net.watch(self._note_drive)
         self.speed_um_per_s = 0
         #: The value that the wires had at the last step.
         self.asked = 0
@@ -59,9 +64,21 @@ class JointMotor(Stateful):
                 code |= 1 << bit
         return motor_value(code, len(self._nets), self._bit_order)
 
+    @property
+    def fastest_um_per_s(self) -> int:
+        """Return the rim speed that no step exceeds, whatever the wires come to say."""
+        return max(abs(self.speed_um_per_s), self._step_um_per_s << len(self._nets) - 1)
+
+    @property
+    def is_steady(self) -> bool:
+        """Tell whether all later steps have the speed of the last one, unless somebody drives the wires anew."""
+        return self._is_known and self.speed_um_per_s == self.asked * self._step_um_per_s
+
     def step(self, at: Nanos) -> int:
         """Return the rim speed in µm/s for the step of the body that starts at `at`."""
-        self.asked = self.value(at)
+        if not self._is_known:
+            self.asked = self.value(at)
+            self._is_known = all(net.last_edge <= at for net in self._nets)
         wanted = self.asked * self._step_um_per_s
         if self._change is None:
             self.speed_um_per_s = wanted
@@ -70,3 +87,9 @@ class JointMotor(Stateful):
         else:
             self.speed_um_per_s = max(wanted, self.speed_um_per_s - self._change)
         return self.speed_um_per_s
+
+    def _note_drive(self, _net: Net, _owner: str, _at: Nanos) -> None:
+        self._is_known = False
+
+    def _restored(self) -> None:
+        self._is_known = False

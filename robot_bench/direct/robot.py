@@ -7,6 +7,9 @@ start of each step, from the nets' history.
 Its state log has what the motors are told, and when a wheel stalls or is free again (looked
 at with the encoders); the body itself tells of collisions.
 
+Where a body's wheels turn no faster than they are told, the chip need not wait for instants of the
+encoders at which no wheel can have come to another sector.
+
 Invariant: at time t the body has made every step that ended at or before t.
 """
 
@@ -20,7 +23,7 @@ from robot_bench.direct.encoder import WheelEncoder
 from robot_bench.direct.motor import JointMotor
 from simbase.errors import UsageError
 from simbase.state import Stateful
-from simbase.timing import NS_PER_MS, Nanos, Reached
+from simbase.timing import NS_PER_MS, NS_PER_S, Nanos, Reached
 
 UM_PER_M = 1_000_000
 #: (left, right wheel stalled) → what the state log says.
@@ -55,6 +58,7 @@ class DirectRobot(Stateful):
     """A body whose motors and sensors hang on wires."""
 
     STATE = ("body", "sensors", "_left", "_right", "_next_encoder", "_steps", "_asked", "_stalled")
+    DERIVED = ("_next_change",)
 
     def __init__(
         self,
@@ -74,6 +78,8 @@ class DirectRobot(Stateful):
         self._sonar_numbers = tuple(sonar_numbers)
         self._encoder_period_ns = encoder_period_ns
         self._next_encoder: Nanos = 0
+        #: The first instant of the encoders at which they may show something else.
+        self._next_change: Nanos = 0
         self._steps = 0
         self._asked = (0, 0)
         self._stalled = (False, False)
@@ -82,12 +88,12 @@ class DirectRobot(Stateful):
 
     def next_deadline(self) -> Nanos:
         """Return when a wire may change next."""
-        return min(self._next_encoder, self.sensors.next_deadline())
+        return min(self._next_change, self.sensors.next_deadline())
 
     def advance_to(self, limit: Nanos) -> Reached:
         """Step the body and set the wires as they are due."""
         while True:
-            due = self.next_deadline()
+            due = min(self._next_encoder, self.sensors.next_deadline())
             if due > limit:
                 break
             self._step_to(due)
@@ -96,20 +102,37 @@ class DirectRobot(Stateful):
             if self.sensors.next_deadline() <= due:
                 self.sensors.sample(self.body.ranges(self._sonar_numbers), due)
         self._step_to(limit)
+        self._next_change = self._encoders_change_at()
         return Reached(limit)
+
+    def _encoders_change_at(self) -> Nanos:
+        """Return the first instant of the encoders that a wheel may have come to another sector by."""
+        fastest = max(self._left.fastest_um_per_s, self._right.fastest_um_per_s) / UM_PER_M
+        most_radps = self.body.most_radps(fastest)
+        if most_radps is None:
+            return self._next_encoder
+        state = self.body.state
+        turn_rad = min(
+            self._left_encoder.margin_rad(state.left_angle_rad), self._right_encoder.margin_rad(state.right_angle_rad)
+        )
+        safe_until = self._steps * self.body.dt_ns + int(turn_rad / most_radps * NS_PER_S)
+        missed = max(0, -((self._next_encoder - safe_until) // self._encoder_period_ns))
+        return self._next_encoder + missed * self._encoder_period_ns
 
     def _step_to(self, limit: Nanos) -> None:
         body, dt_ns = self.body, self.body.dt_ns
         left, right = self._left, self._right
-        steps = self._steps
-        while (steps + 1) * dt_ns <= limit:
-            start = steps * dt_ns
-            body.step(left.step(start) / UM_PER_M, right.step(start) / UM_PER_M)
+        wanted = limit // dt_ns
+        while self._steps < wanted:
+            start = self._steps * dt_ns
+            speeds = left.step(start) / UM_PER_M, right.step(start) / UM_PER_M
             if (left.asked, right.asked) != self._asked:
                 self._asked = (left.asked, right.asked)
                 self._tell(start, "command", f"motors {left.asked}, {right.asked}")
-            steps += 1
-        self._steps = steps
+            alike = wanted - self._steps if left.is_steady and right.is_steady else 1
+            for _ in range(alike):
+                body.step(*speeds)
+            self._steps += alike
 
     def _show_encoders(self, now: Nanos) -> None:
         state: BodyState = self.body.state
@@ -120,6 +143,11 @@ class DirectRobot(Stateful):
         if stalled != self._stalled:
             self._stalled = stalled
             self._tell(now, *STALLS[stalled])
+
+    def _restored(self) -> None:
+        self._left_encoder.forget()
+        self._right_encoder.forget()
+        self._next_change = self._next_encoder
 
     def _tell(self, at: Nanos, what: str, detail: str) -> None:
         if self.on_event is not None:

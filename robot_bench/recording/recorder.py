@@ -11,13 +11,15 @@ Invariant: it changes nothing that it watches.
 """
 
 import math
+from binascii import b2a_base64
 from collections.abc import Callable, Mapping, Sequence
 from typing import Protocol
 
 from p2os.pioneer.body.contract import BodyState, Hit
 from p2os.pioneer.world.model import Obstacle
-from robot_bench.recording.run_record import COLLISION
-from robot_bench.recording.trace import TraceWriter
+from robot_bench.recording.run_record import BLOCKS_VERSION, COLLISION
+from robot_bench.recording.trace import MOST_EDGES, TraceWriter
+from robot_bench.wires.edges import Edges, pack
 from robot_bench.wires.nets import Harness, Net
 from simbase.state import Stateful
 from simbase.timing import NS_PER_MS, Nanos, Reached
@@ -26,6 +28,9 @@ SAMPLE_NS: Nanos = 50 * NS_PER_MS
 #: A line of text longer than this is written in pieces.
 LONGEST_TEXT = 64
 MICRO = 1_000_000
+#: Of a wire that has not changed.
+_NONE = Edges()
+_LINE_END = ord("\n")
 
 
 class Observed(Protocol):
@@ -36,8 +41,8 @@ class Observed(Protocol):
         """Where it is and how it moves."""
         ...
 
-    def clearance(self) -> float:
-        """Return metres between the hull and the nearest thing in the plan view."""
+    def clearance(self, *, no_more_than: float = math.inf) -> float:
+        """Return metres between the hull and the nearest thing in the plan view, or `no_more_than`."""
         ...
 
     def take_moved(self) -> Sequence[Obstacle]:
@@ -90,7 +95,7 @@ class Recorder(Stateful):
         self._changed: dict[str, None] = {}
         #: Whether the levels at time 0 are written: not before everything of that instant was driven.
         self._has_levels = False
-        self._text = b""
+        self._text = bytearray()
         self._sonar_mm: list[int] | None = None
         for net in harness:
             net.watch(self._note_change)
@@ -102,13 +107,13 @@ class Recorder(Stateful):
     @property
     def unfinished_text(self) -> bytes:
         """What the firmware has printed of a line whose end has not come."""
-        return self._text
+        return bytes(self._text)
 
-    def usart(self, data: bytes, at: Nanos) -> None:
-        """Take characters that the chip has sent, their last one complete at `at`."""
-        for byte in data:
-            self._text += bytes([byte])
-            if byte == ord("\n") or len(self._text) >= LONGEST_TEXT:
+    def usart(self, sent: Sequence[tuple[int, Nanos]]) -> None:
+        """Take what the chip has sent: (word, ns at the end of its stop bit), oldest first."""
+        for word, at in sent:
+            self._text.append(word & 0xFF)
+            if word == _LINE_END or len(self._text) >= LONGEST_TEXT:
                 self._write_text(at)
 
     def wire(self, direction: str, data: bytes, at: Nanos) -> None:
@@ -163,7 +168,7 @@ class Recorder(Stateful):
     def _write_text(self, at: Nanos) -> None:
         self.trace.add("usart", at, {"hex": self._text.hex()})
         self.last_line = self._text.decode("utf-8", "replace").strip()
-        self._text = b""
+        self._text.clear()
 
     def _sample(self, at: Nanos) -> None:
         if self._body is None:
@@ -172,9 +177,8 @@ class Recorder(Stateful):
         if self.last_state is not None:
             self.distance_m += math.hypot(state.x_m - self.last_state.x_m, state.y_m - self.last_state.y_m)
         self.last_state = state
-        clearance = self._body.clearance()
-        if self.min_clearance_m is None or clearance < self.min_clearance_m:
-            self.min_clearance_m = clearance
+        least = self.min_clearance_m
+        self.min_clearance_m = self._body.clearance(no_more_than=math.inf if least is None else least)
         self.trace.add("pose", at, pose_entry(state))
         for item in self._body.take_moved():
             self.obstacle("move", item.name, at, moved_entry(item))
@@ -192,23 +196,29 @@ class Recorder(Stateful):
         self.trace.write_until(limit)
 
     def _write_levels(self) -> None:
+        levels = ""
         for net in self._harness:
             net.edges_until(0)
-            self.trace.add("pin", 0, {"net": net.name, "v": int(net.level(0))})
+            levels += str(int(net.level(0)))
+        names = [net.name for net in self._harness]
+        self.trace.add("pins", 0, {"v": BLOCKS_VERSION, "nets": names, "levels": levels})
 
     def _write_edges(self, limit: Nanos) -> None:
         changed, self._changed = self._changed, {}
+        tracks = []
         for net in self._harness:
             if net.name not in changed:
+                tracks.append(_NONE)
                 continue
-            for at, level in net.edges_until(limit):
-                self.trace.add("pin", at, {"net": net.name, "v": int(level)})
+            tracks.append(net.edges_until(limit))
             for fight in net.take_contentions():
                 self.event(
                     "bench", fight.at, "contention", f"{net.name} is driven hard by {' and '.join(fight.owners)}"
                 )
             if net.forget_before(limit):
                 self._changed[net.name] = None
+        for first, count, block in pack(tracks, MOST_EDGES):
+            self.trace.add("pins", first, {"n": count, "d": b2a_base64(block, newline=False).decode("ascii")})
 
 
 def hit_detail(hit: Hit) -> str:

@@ -10,11 +10,13 @@ Invariant: reading never fails on a trace that ends early; it fails with
 
 import json
 import re
-from collections.abc import Iterable, Iterator
+from binascii import a2b_base64
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import cast
 
+from robot_bench.wires.edges import Edges, unpack
 from simbase.errors import FileError
 from simbase.timing import NS_PER_S
 
@@ -22,6 +24,8 @@ from simbase.timing import NS_PER_S
 Json = dict[str, object]
 
 TRACE_NAME = "trace.jsonl"
+#: Of the blocks of edges.
+BLOCKS_VERSION = 1
 #: What the body notes when it comes to touch something.
 COLLISION = "collision"
 _PLACE = re.compile(r" at x (-?[\d.]+) m, y (-?[\d.]+) m$")
@@ -91,8 +95,10 @@ class RunRecord:
     meta: Json = field(default_factory=dict)
     end: Json = field(default_factory=dict)
     poses: list[PoseSample] = field(default_factory=list)
-    #: Net name → edges as (ns, level).
-    pins: dict[str, list[tuple[int, int]]] = field(default_factory=dict)
+    #: Net name → edges as (ns, level), the first of each at 0.
+    pins: dict[str, Edges] = field(default_factory=dict)
+    #: The nets in the order of the trace's blocks.
+    nets: tuple[str, ...] = ()
     sonar: list[tuple[int, list[int]]] = field(default_factory=list)
     usart: list[tuple[int, bytes]] = field(default_factory=list)
     wire: list[WireChunk] = field(default_factory=list)
@@ -148,12 +154,14 @@ def record_of(lines: Iterable[str], where: str = "the trace") -> RunRecord:
     """Return what the lines of a trace hold.
 
     Raises:
-        TraceError: A line is damaged.
+        TraceError: A line is damaged, or of a later version.
     """
     record = RunRecord()
     for number, entry in enumerate(_entries(lines), start=1):
         try:
             _file(record, entry)
+        except TraceError as error:
+            raise TraceError(f"{where}:{number}: {error}", hint=error.hint) from error
         except (KeyError, TypeError, ValueError, OverflowError) as error:
             raise TraceError(
                 f"{where}:{number}: a damaged line", hint="cut the file before it: what stands above it is reported"
@@ -191,21 +199,72 @@ def _file(record: RunRecord, entry: Json) -> None:
         return
     t = _integer(entry, "t")
     record.last_ns = max(record.last_ns, t)
-    if kind == "pose":
-        record.poses.append(_pose(t, entry))
-    elif kind == "pin":
-        record.pins.setdefault(str(entry["net"]), []).append((t, _integer(entry, "v")))
-    elif kind == "sonar":
-        record.sonar.append((t, [_whole(value) for value in cast("list[float]", entry["mm"])]))
-    elif kind == "usart":
-        record.usart.append((t, bytes.fromhex(str(entry["hex"]))))
-    elif kind == "wire":
-        record.wire.append(WireChunk(t=t, direction=str(entry["dir"]), data=bytes.fromhex(str(entry["hex"]))))
-    elif kind == "event":
-        detail = str(entry.get("detail", ""))
-        record.events.append(Event(t=t, who=str(entry["who"]), what=str(entry["what"]), detail=detail))
-    elif kind == "obstacle" and str(entry.get("op")) in _NUMBERS:
+    file = _KINDS.get(kind)
+    if file is not None:
+        file(record, t, entry)
+
+
+def _file_event(record: RunRecord, t: int, entry: Json) -> None:
+    detail = str(entry.get("detail", ""))
+    record.events.append(Event(t=t, who=str(entry["who"]), what=str(entry["what"]), detail=detail))
+
+
+def _file_wire(record: RunRecord, t: int, entry: Json) -> None:
+    record.wire.append(WireChunk(t=t, direction=str(entry["dir"]), data=bytes.fromhex(str(entry["hex"]))))
+
+
+def _file_sonar(record: RunRecord, t: int, entry: Json) -> None:
+    record.sonar.append((t, [_whole(value) for value in cast("list[float]", entry["mm"])]))
+
+
+def _file_obstacle(record: RunRecord, t: int, entry: Json) -> None:
+    if str(entry.get("op")) in _NUMBERS:
         record.obstacles.append(_obstacle(t, entry))
+
+
+def _file_pin(record: RunRecord, t: int, entry: Json) -> None:
+    record.pins.setdefault(str(entry["net"]), Edges()).append(t, _integer(entry, "v"))
+
+
+def _file_pins(record: RunRecord, t: int, entry: Json) -> None:
+    (_file_levels if "nets" in entry else _file_block)(record, t, entry)
+
+
+def _file_levels(record: RunRecord, t: int, entry: Json) -> None:
+    """Begin the blocks of edges."""
+    nets, levels = cast("list[object]", entry["nets"]), str(entry["levels"])
+    if _integer(entry, "v") != BLOCKS_VERSION:
+        raise TraceError("edges as a later version writes them", hint="install a newer p2os")
+    record.nets = tuple(str(net) for net in nets)
+    for net, level in zip(record.nets, levels, strict=True):
+        record.pins[net] = Edges([(t, int(level))])
+
+
+#: What follows a level of 0 and of 1.
+_TOGGLED = (b"\1\0", b"\0\1")
+
+
+def _file_block(record: RunRecord, t: int, entry: Json) -> None:
+    """Put a block of edges where they belong."""
+    found = unpack(a2b_base64(str(entry["d"])), len(record.nets), t)
+    if sum(len(times) for _, times in found) != _integer(entry, "n"):
+        raise ValueError("a block has not as many edges as it says")
+    for place, times in found:
+        edges, count = record.pins[record.nets[place]], len(times)
+        edges.extend(times, (_TOGGLED[bool(edges.levels[-1])] * (count // 2 + 1))[:count])
+        record.last_ns = max(record.last_ns, times[-1])
+
+
+_KINDS: dict[object, Callable[[RunRecord, int, Json], None]] = {
+    "pose": lambda record, t, entry: record.poses.append(_pose(t, entry)),
+    "pins": _file_pins,
+    "pin": _file_pin,
+    "sonar": _file_sonar,
+    "usart": lambda record, t, entry: record.usart.append((t, bytes.fromhex(str(entry["hex"])))),
+    "wire": _file_wire,
+    "event": _file_event,
+    "obstacle": _file_obstacle,
+}
 
 
 def _meta(entry: Json) -> Json:

@@ -7,6 +7,7 @@ other nets shows them last, in their own group.
 from collections.abc import Mapping, Sequence
 
 from adapter_sim.pinout import load_pinout
+from robot_bench.wires.edges import Edges
 
 #: Group title → nets, least significant bit first.
 GROUPS: Mapping[str, tuple[str, ...]] = {
@@ -17,9 +18,6 @@ GROUPS: Mapping[str, tuple[str, ...]] = {
     "encoder 2 (right)": tuple(f"encoder2_s{n}" for n in range(1, 5)),
     "link": ("p2dx_con", "rst"),
 }
-
-#: Edges of one net: (ns, level).
-Edges = Sequence[tuple[int, int]]
 
 
 def grouped(names: Sequence[str]) -> list[tuple[str, list[str]]]:

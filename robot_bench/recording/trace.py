@@ -4,13 +4,18 @@ Line 1 is `meta`, the last one `end`; neither is hashed. Between them stand
 canonical lines (sorted keys, no spaces) that hold integers, levels and bytes
 only: no path, version, host or wall time. `t` is nanoseconds.
 
-    {"k":"pin","net","v"}                a level, first at 0 for every net
+    {"k":"pins","v":1,"nets","levels"}   at 0: the wires in the order of the blocks, and the level of each, 0 or 1
+    {"k":"pins","n","d"}                 a block of n edges, the first at t: base64 of what wires/edges.py describes
     {"k":"usart","hex"}                  a line (or 64 bytes) that the chip has printed
     {"k":"wire","dir","hex"}             bytes that have arrived: c2r client to robot, r2c back
     {"k":"obstacle","op","name",…}       something placed, moved or removed; lengths in metres
     {"k":"event","who","what","detail"}  a state log: adapter, pioneer, direct, body, chip, bench
     {"k":"sonar","mm":[…]}               ranges, all sonar, when new
     {"k":"pose","x","y","z","h","p","l","r","la","ra","c"}   µm, µrad, µm/s, collisions; each 50 ms
+
+A block holds what has changed between two poses, or the first or next `MOST_EDGES` of it. It stands
+at the time of its first edge; so what came before its last one may follow it. A trace of before
+there were blocks has {"k":"pin","net","v"} for each level, first at 0 for every net; it is read too.
 
 The hash is a chain: 32 zero bytes, then for each line SHA-256 of the hash so far and the
 line with its line end. So it is a value that can be saved, and a run goes on from any line.
@@ -37,10 +42,13 @@ from simbase.errors import FileError
 from simbase.state import Stateful
 from simbase.timing import NS_PER_S, Nanos
 
-TRACE_NAME = "trace.jsonl"
+#: chosen: a line of some 10 kB, all that a cut can cost.
+MOST_EDGES = 4096
 
 #: Order of kinds within one instant.
-RANKS = {"pin": 0, "usart": 1, "obstacle": 2, "wire": 3, "event": 4, "sonar": 5, "pose": 6}
+RANKS = {"pins": 0, "usart": 1, "obstacle": 2, "wire": 3, "event": 4, "sonar": 5, "pose": 6}
+
+_encode = json.JSONEncoder(sort_keys=True, separators=(",", ":"), ensure_ascii=True).encode
 
 #: A line's content.
 Entry = Mapping[str, object]
@@ -52,7 +60,7 @@ EMPTY_HASH = bytes(32)
 
 def canonical(entry: Entry) -> str:
     """Return the one spelling of an entry, without its line end."""
-    return json.dumps(entry, sort_keys=True, separators=(",", ":"), ensure_ascii=True)
+    return _encode(entry)
 
 
 def chained(digest: bytes, lines: Iterable[str]) -> bytes:

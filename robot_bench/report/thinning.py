@@ -7,7 +7,10 @@ kept, so that the curve looks as that of all rows. Of lists the beginning and th
 Invariant: whatever is kept is a row of the recording, in its order; what fits is kept whole.
 """
 
+from bisect import bisect_right
 from collections.abc import Sequence
+
+from robot_bench.wires.edges import Edges
 
 #: chosen: one a pixel of the page's charts.
 BUCKETS = 1200
@@ -27,8 +30,8 @@ def extremes(times: Sequence[float], columns: Sequence[Sequence[float]], *, buck
     for first, last in _buckets(times, buckets):
         chosen = {first, last - 1}
         for column in columns:
-            chosen.add(min(range(first, last), key=column.__getitem__))
-            chosen.add(max(range(first, last), key=column.__getitem__))
+            part = column[first:last]
+            chosen |= {first + part.index(min(part)), first + part.index(max(part))}
         kept += sorted(chosen)
     return kept
 
@@ -41,7 +44,8 @@ def pulses(edges: Sequence[tuple[int, int]], *, buckets: int) -> list[tuple[int,
     if len(edges) <= 3 * buckets:
         return list(edges)
     kept = []
-    for first, last in _buckets([at for at, _ in edges], buckets):
+    times = edges.times if isinstance(edges, Edges) else [at for at, _ in edges]
+    for first, last in _buckets(times, buckets):
         kept += [edges[n] for n in sorted({first, min(first + 1, last - 1), last - 1})]
     return kept
 
@@ -63,12 +67,10 @@ def ends(sizes: Sequence[int], budget: int) -> tuple[int, int]:
 def _buckets(times: Sequence[float], buckets: int) -> list[tuple[int, int]]:
     """Return the first row and that after the last of each bucket of time that holds rows."""
     begin, width = times[0], (times[-1] - times[0]) / buckets or 1.0
-    found, first, current = [], 0, 0
-    for n, at in enumerate(times):
-        bucket = int((at - begin) / width)
-        if bucket != current and n > first:
-            found.append((first, n))
-            first = n
-        current = bucket
-    found.append((first, len(times)))
+    found, first = [], 0
+    while first < len(times):
+        bucket = int((times[first] - begin) / width)
+        last = bisect_right(times, bucket, lo=first, key=lambda at: int((at - begin) / width))
+        found.append((first, last))
+        first = last
     return found

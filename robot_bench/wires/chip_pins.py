@@ -1,50 +1,51 @@
 """Joins the chip's pins to the wires: drives both ways, each with its time stamp.
 
 The chip leads in time, so it is given a level when the part that drives it
-has come to that time; it acts from the first block boundary on.
+has come to that time; it acts from the first block boundary on. What the chip
+drives comes in bulk, when its slice is over.
 
-A resistor on the wire is passed to the chip as a level while the chip itself
-does not drive hard: the adapter's 20 kΩ win over the chip's own pulls of 40 kΩ.
+A resistor on the wire is passed to the chip as one, so that it yields to the chip's own
+outputs: the adapter's 20 kΩ win over the chip's own pulls of 40 kΩ.
 
-Invariant: the chip's input follows `level_without(OWNER)` of its net.
+Invariant: what is put on the chip's pin follows `level_without(OWNER)` of its net.
 """
 
+from array import array
 from collections.abc import Callable, Mapping
+from heapq import merge
 from typing import Protocol
 
 from bluepill_sim.fabric.pins import PinDrive
-from robot_bench.wires.nets import Harness, Net, Strength
+from bluepill_sim.fabric.subscriptions import PinSubscription, PinSubscriptions
+from robot_bench.wires.edges import NO_WIRE, split
+from robot_bench.wires.nets import RELEASED, Harness, Net, Strength
 from simbase.timing import Nanos
 
 #: The name under which the chip drives wires.
 OWNER = "bluepill"
 
-#: The chip's own drives: level and strength on the wire.
-DRIVES = {
-    PinDrive.NONE: (False, Strength.FLOATING),
-    PinDrive.LOW: (False, Strength.PUSH_PULL),
-    PinDrive.HIGH: (True, Strength.PUSH_PULL),
-    PinDrive.PULL_UP: (True, Strength.PULL),
-    PinDrive.PULL_DOWN: (False, Strength.PULL),
+#: The chip's own drives, as codes of a net.
+CODES = {
+    PinDrive.NONE: RELEASED,
+    PinDrive.LOW: Strength.PUSH_PULL.codes[0],
+    PinDrive.HIGH: Strength.PUSH_PULL.codes[1],
+    PinDrive.PULL_UP: Strength.PULL.codes[1],
+    PinDrive.PULL_DOWN: Strength.PULL.codes[0],
 }
+_CODE_OF_DRIVE = bytes(CODES[drive] for drive in PinDrive).ljust(256, b"\0")
+PINS_A_PORT = 16
 
 
 class ChipPin(Protocol):
     """One pin of the chip, from outside."""
 
-    def drive(self, level: bool | None) -> None:
-        """Put a level on the wire from outside; None lets go."""
-        ...
-
-    def watch(self, on: bool = True) -> None:
-        """Choose whether a change of the chip's own drive ends its slice."""
+    def drive(self, level: bool | None, *, is_weak: bool = False) -> None:
+        """Put a level on the wire from outside, by a resistor where `is_weak`; None lets go."""
         ...
 
 
-class ChipWithPins(Protocol):
+class ChipWithPins(PinSubscriptions, Protocol):
     """What the wires need of the chip."""
-
-    on_pin: Callable[[str, PinDrive, int], None] | None
 
     def pin(self, name: str) -> ChipPin:
         """Return a pin by its name, such as "PA4"."""
@@ -55,10 +56,10 @@ class ChipPins:
     """The chip's ends of the wires.
 
     Args:
-        chip: Gets its `on_pin` taken.
+        chip: Its pins on the wires are subscribed to.
         harness: The wires.
         pin_of: Net → pin of the chip.
-        on_watched: Called with the time of each edge that the chip makes on a watched net.
+        on_watched: Called with the time of each edge that the chip makes on a watched net, in order of time.
     """
 
     def __init__(
@@ -69,29 +70,52 @@ class ChipPins:
         *,
         on_watched: Callable[[Nanos], None] | None = None,
     ) -> None:
-        self._nets: dict[str, Net] = {pin: harness[net] for net, pin in pin_of.items()}
+        self._chip = chip
+        self._pin_of = dict(pin_of)
+        self._nets = tuple(harness[net] for net in pin_of)
+        places = {number_of(pin): place for place, pin in enumerate(pin_of.values())}
+        self._wire_of_pin = bytes(places.get(number, NO_WIRE) for number in range(256))
         self._pins: dict[str, ChipPin] = {net: chip.pin(pin) for net, pin in pin_of.items()}
-        self._watched: set[str] = set()
+        self._watched: frozenset[str] = frozenset()
         self._on_watched = on_watched
-        chip.on_pin = self._chip_drives
-        for net in self._nets.values():
+        self._subscription = self._subscribe()
+        for net in self._nets:
             net.watch(self._other_drives)
             self._pass_on(net, 0)
 
-    def watch(self, net: str) -> None:
-        """Have each edge that the chip makes on a net end its slice and be reported to `on_watched`."""
-        self._watched.add(net)
-        self._pins[net].watch(True)
-
-    def _chip_drives(self, pin: str, drive: PinDrive, at: Nanos) -> None:
-        net = self._nets.get(pin)
-        if net is None:
+    def watch(self, nets: frozenset[str], now: Nanos) -> None:
+        """Have each edge after `now` that the chip makes on these nets, and no other, end its slice and reported."""
+        if nets is self._watched:  # called often; whoever watches has one set for each state
             return
-        level, strength = DRIVES[drive]
-        net.drive(OWNER, level, strength, at)
-        self._pass_on(net, at)
-        if net.name in self._watched and self._on_watched is not None:
-            self._on_watched(at)
+        added, self._watched = nets - self._watched, nets
+        self._subscription.ends_slice = frozenset(self._pin_of[net] for net in nets)
+        # The chip stands up to a block ahead of those who have just begun to wait for edges.
+        self._report([net.times_after(OWNER, now) for net in self._nets if net.name in added])
+
+    def chip_restored(self) -> None:
+        """Go on from what the chip drives now: it has been put back to another state."""
+        self._subscription.close()
+        self._subscription = self._subscribe()
+
+    def _subscribe(self) -> PinSubscription:
+        pins = self._pin_of
+        return self._chip.subscribe_pins(
+            pins.values(), self._chip_drives, ends_slice=[pins[net] for net in self._watched]
+        )
+
+    def _chip_drives(self, rows: bytes) -> None:
+        watched = []
+        for place, times, codes in split(rows, self._wire_of_pin, _CODE_OF_DRIVE, len(self._nets)):
+            net = self._nets[place]
+            net.drive_in_turn(OWNER, times, codes)
+            if net.name in self._watched:
+                watched.append(times)
+        self._report(watched)
+
+    def _report(self, edges: "list[array[int]]") -> None:
+        if self._on_watched is not None:
+            for at in merge(*edges):
+                self._on_watched(at)
 
     def _other_drives(self, net: Net, owner: str, at: Nanos) -> None:
         if owner != OWNER:
@@ -99,6 +123,9 @@ class ChipPins:
 
     def _pass_on(self, net: Net, at: Nanos) -> None:
         level, is_hard = net.level_without(OWNER, at)
-        if not is_hard and net.drive_of(OWNER, max(at, net.last_edge)).strength is Strength.PUSH_PULL:
-            level = None
-        self._pins[net.name].drive(level)
+        self._pins[net.name].drive(level, is_weak=level is not None and not is_hard)
+
+
+def number_of(pin: str) -> int:
+    """Return a pin's number in the chip's rows: 16 times its port, and the number in it."""
+    return PINS_A_PORT * (ord(pin[1]) - ord("A")) + int(pin[2:])

@@ -1,9 +1,9 @@
 """Wires between parts: who drives them, how strongly, and which level results when.
 
 A net keeps, for each owner, the drives that are still of interest, each with
-its time stamp. So a part that stands behind the others in time still reads the
-level of its own instant. Edges are forgotten when `forget_before` states that
-every part has passed them.
+its time stamp, as arrays: a chip may change a wire millions of times a second. So
+a part that stands behind the others in time still reads the level of its own
+instant. Edges are forgotten when `forget_before` states that every part has passed them.
 
 Not modelled: voltages, capacitance and edge times. A drive is a level and a
 strength; a value in volts would be one more field of `Drive`.
@@ -12,12 +12,16 @@ Invariant: `level(at)` depends on the drives stamped at or before `at` only, not
 on the order in which different owners reported them.
 """
 
-from bisect import bisect_right
+from array import array
+from bisect import bisect_left, bisect_right
 from collections.abc import Callable, Iterable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from enum import Enum
+from functools import cache
+from typing import Self
 
 from p2os.errors import LocalProtocolError
+from robot_bench.wires.edges import Edges, changes
 from simbase.state import Stateful
 from simbase.timing import Nanos
 from simbase.wire import are_fighting, level_of
@@ -26,28 +30,50 @@ from simbase.wire import are_fighting, level_of
 class Strength(Enum):
     """How an owner holds a wire."""
 
+    #: The codes of a low and a high level so held.
+    codes: tuple[int, int]
+
+    def __new__(cls, label: str, *codes: int) -> Self:
+        """Make a member whose value is its label."""
+        member = object.__new__(cls)
+        member._value_ = label
+        member.codes = (codes[0], codes[1])
+        return member
+
     #: Both levels are driven hard.
-    PUSH_PULL = "push-pull"
+    PUSH_PULL = "push-pull", 1, 2
     #: Low is driven hard, high lets go.
-    OPEN_DRAIN = "open drain"
+    OPEN_DRAIN = "open drain", 3, 4
     #: A resistor; yields to anything driven hard.
-    PULL = "pull"
+    PULL = "pull", 5, 6
     #: Not at all.
-    FLOATING = "floating"
+    FLOATING = "floating", 0, 0
 
 
-@dataclass(frozen=True, slots=True)
-class Drive:
-    """What one owner does to a wire."""
+#: The code of letting go, and how many codes there are: what one owner does to a wire.
+RELEASED, CODES = 0, 7
+#: The levels of codes that drive hard, and of those that pull.
+HARD = {1: False, 2: True, 3: False}
+PULLS = {5: False, 6: True}
 
-    level: bool
-    strength: Strength
-
-
-RELEASED = Drive(level=False, strength=Strength.FLOATING)
-
-#: (net, owner of the new drive, ns from which it holds).
+#: (net, owner of the new drives, ns from which the first of them holds).
 Watcher = Callable[["Net", str, Nanos], None]
+
+
+@dataclass(slots=True)
+class History:
+    """What one owner has done to a wire: times in ns, and the code from each on."""
+
+    times: "array[int]" = field(default_factory=lambda: array("q"))
+    codes: bytearray = field(default_factory=bytearray)
+
+    def at(self, at: Nanos) -> int:
+        """Return the code at an instant."""
+        times = self.times
+        if not times or times[-1] <= at:
+            return self.codes[-1] if times else RELEASED
+        place = bisect_right(times, at)
+        return self.codes[place - 1] if place else RELEASED
 
 
 @dataclass(frozen=True, slots=True)
@@ -77,7 +103,7 @@ class Net(Stateful):
     def __init__(self, name: str, *, idle: bool = False) -> None:
         self.name = name
         self.idle = idle
-        self._drives: dict[str, list[tuple[Nanos, Drive]]] = {}
+        self._drives: dict[str, History] = {}
         self._watchers: list[Watcher] = []
         #: The time of the last drive known so far, and the level after it.
         self._last_level = idle
@@ -94,24 +120,32 @@ class Net(Stateful):
         Raises:
             LocalProtocolError: `owner` has already reported something later, or the edges of that instant were told.
         """
-        history = self._drives.setdefault(owner, [])
-        new = Drive(level, strength) if strength is not Strength.FLOATING else RELEASED
-        if history:
-            last_at, last = history[-1]
-            if now < last_at:
-                raise LocalProtocolError(
-                    f"{owner} drives {self.name} at {now} ns after having driven it at {last_at} ns"
-                )
-            if last == new:
-                return
+        code = strength.codes[level]
+        history = self._drives.get(owner)
+        if history is not None and history.codes[-1] == code and now >= history.times[-1]:
+            return
+        self.drive_in_turn(owner, array("q", (now,)), bytes((code,)))
+
+    def drive_in_turn(self, owner: str, times: "array[int]", codes: bytes) -> None:
+        """Take drives of one owner, oldest first: at each of these times one by its code (`Strength.codes`).
+
+        Raises:
+            LocalProtocolError: As of `drive`.
+        """
+        now, history = times[0], self._drives.get(owner)
+        if history is not None and now < history.times[-1]:
+            raise LocalProtocolError(
+                f"{owner} drives {self.name} at {now} ns after having driven it at {history.times[-1]} ns"
+            )
         if now <= self._notified_until:
             raise LocalProtocolError(
                 f"{owner} drives {self.name} at {now} ns after its edges up to {self._notified_until} ns were told"
             )
-        if history and history[-1][0] == now:
-            history.pop()
-        history.append((now, new))
-        self.last_edge = max(self.last_edge, now)
+        if history is None:
+            history = self._drives[owner] = History()
+        history.times += times
+        history.codes += codes
+        self.last_edge = max(self.last_edge, times[-1])
         self._last_level = self._resolve(self.last_edge)
         for watcher in self._watchers:
             watcher(self, owner, now)
@@ -126,32 +160,24 @@ class Net(Stateful):
 
     def level_without(self, owner: str, at: Nanos) -> tuple[bool | None, bool]:
         """Return what everybody but `owner` puts on the wire, None where nobody holds it, and whether it is hard."""
-        others = [_at(history, at) for name, history in self._drives.items() if name != owner]
-        return _resolved(others), any(map(_is_hard, others))
+        others = [history.at(at) for name, history in self._drives.items() if name != owner]
+        return _resolved(others), any(code in HARD for code in others)
 
-    def drive_of(self, owner: str, at: Nanos) -> Drive:
-        """Return what `owner` does to the wire at the instant `at`."""
-        return _at(self._drives.get(owner, []), at)
+    def times_after(self, owner: str, after: Nanos) -> "array[int]":
+        """Return when `owner` has driven the wire after `after`."""
+        history = self._drives.get(owner, History())
+        return history.times[bisect_right(history.times, after) :]
 
     def watch(self, watcher: Watcher) -> None:
-        """Call `watcher` at each new drive, whether or not it changes the level, in the order of telling."""
+        """Call `watcher` at new drives of an owner, whether or not they change the level, in the order of telling."""
         self._watchers.append(watcher)
 
-    def edges_until(self, limit: Nanos) -> list[tuple[Nanos, bool]]:
+    def edges_until(self, limit: Nanos) -> Edges:
         """Return the changes of level at or before `limit` that were not returned before, oldest first."""
-        times = {at for history in self._drives.values() for at, _ in history if self._notified_until < at <= limit}
-        self._notified_until = max(self._notified_until, limit)
-        found, level = [], self._notified_level
-        for at in sorted(times):
-            now = self._resolve(at)
-            if now != level:
-                found.append((at, now))
-                level = now
-            fight = self._fight(at)
-            if fight and fight != self._notified_contention:
-                self._contentions.append(Contention(at, self.name, fight))
-            self._notified_contention = fight
-        self._notified_level = level
+        before, self._notified_until = self._notified_until, max(self._notified_until, limit)
+        found = changes(self._levels(before, limit), self._notified_level)
+        if found:
+            self._notified_level = bool(found.levels[-1])
         return found
 
     def take_contentions(self) -> list[Contention]:
@@ -163,18 +189,50 @@ class Net(Stateful):
         """Drop what no reader at or after `limit` can see; return True where later drives are still remembered."""
         later = False
         for history in self._drives.values():
-            del history[: bisect_right(history, limit, lo=1, key=_time_of) - 1]
-            later = later or history[-1][0] > limit
+            passed = bisect_right(history.times, limit, lo=1) - 1
+            del history.times[:passed], history.codes[:passed]
+            later = later or history.times[-1] > limit
         return later
 
+    def _levels(self, after: Nanos, limit: Nanos) -> Edges:
+        """Return the level from each drive after `after` and up to `limit` on, and note who fights."""
+        # Those of the owner with the most drives in one go, between the drives of the others.
+        spans = {
+            owner: (bisect_right(history.times, after), bisect_right(history.times, limit))
+            for owner, history in self._drives.items()
+        }
+        found = Edges()
+        if not any(first < last for first, last in spans.values()):
+            return found
+        busiest = max(spans, key=lambda owner: spans[owner][1] - spans[owner][0])
+        own, others = self._drives[busiest], [item for owner, item in self._drives.items() if owner != busiest]
+        cuts = {at for owner, (first, last) in spans.items() if owner != busiest
+                for at in self._drives[owner].times[first:last]}  # fmt: skip
+        for cut in [*sorted(cuts), limit + 1]:
+            codes = tuple(history.at(after) for history in others)
+            first, last = bisect_right(own.times, after), bisect_left(own.times, cut)
+            times, mine = own.times[first:last], own.codes[first:last]
+            found.extend(times, mine.translate(_levels_with(codes, self.idle)))
+            if self._notified_contention or any(code in HARD for code in codes):
+                for at in times:
+                    self._note_fight(at)
+            if cut <= limit:
+                found.append(cut, self._resolve(cut))
+                self._note_fight(cut)
+            after = cut
+        return found
+
     def _resolve(self, at: Nanos) -> bool:
-        level = _resolved([_at(history, at) for history in self._drives.values()])
+        level = _resolved([history.at(at) for history in self._drives.values()])
         return self.idle if level is None else level
 
-    def _fight(self, at: Nanos) -> tuple[str, ...]:
-        """Return who drives hard against whom at the instant `at`; empty in peace."""
-        hard = {name: _at(history, at) for name, history in self._drives.items() if _is_hard(_at(history, at))}
-        return tuple(sorted(hard)) if are_fighting([drive.level for drive in hard.values()]) else ()
+    def _note_fight(self, at: Nanos) -> None:
+        """Note who drives hard against whom at the instant `at`, where that is new."""
+        hard = {owner: HARD[code] for owner, history in self._drives.items() if (code := history.at(at)) in HARD}
+        fight = tuple(sorted(hard)) if are_fighting(list(hard.values())) else ()
+        if fight and fight != self._notified_contention:
+            self._contentions.append(Contention(at, self.name, fight))
+        self._notified_contention = fight
 
 
 class Harness(Stateful):
@@ -211,24 +269,17 @@ class OwnedPins:
             self._nets[signal].drive(self._owner, high, Strength.PUSH_PULL, now)
 
 
-def _at(history: list[tuple[Nanos, Drive]], at: Nanos) -> Drive:
-    if not history or history[-1][0] <= at:
-        return history[-1][1] if history else RELEASED
-    place = bisect_right(history, at, key=_time_of)
-    return history[place - 1][1] if place else RELEASED
+@cache
+def _levels_with(others: tuple[int, ...], idle: bool) -> bytes:
+    """Return the level that each code of one owner makes, where the others do this; 256 bytes."""
+    levels = [_resolved([*others, code]) for code in range(CODES)]
+    return bytes([idle if level is None else level for level in levels]).ljust(256, b"\0")
 
 
-def _time_of(item: tuple[Nanos, Drive]) -> Nanos:
-    return item[0]
-
-
-def _is_hard(drive: Drive) -> bool:
-    return drive.strength is Strength.PUSH_PULL or (drive.strength is Strength.OPEN_DRAIN and not drive.level)
-
-
-def _resolved(drives: list[Drive]) -> bool | None:
+def _resolved(codes: Iterable[int]) -> bool | None:
     """Return the level that drives make together; None where nobody holds the wire."""
+    codes = tuple(codes)
     return level_of(
-        [drive.level for drive in drives if _is_hard(drive)],
-        [drive.level for drive in drives if drive.strength is Strength.PULL],
+        [HARD[code] for code in codes if code in HARD],
+        [PULLS[code] for code in codes if code in PULLS],
     )

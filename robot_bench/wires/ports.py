@@ -6,7 +6,7 @@
 from collections.abc import Callable, Sequence
 from typing import Protocol
 
-from bluepill_sim.fabric.pins import PinDrive
+from bluepill_sim.fabric.subscriptions import PinSubscriptions
 from robot_bench.wires.chip_pins import ChipPin
 from simbase.timing import Reached
 
@@ -14,10 +14,12 @@ from simbase.timing import Reached
 class Usart(Protocol):
     """A serial port of the chip, from outside."""
 
-    #: Called with each byte that the chip has sent, and when its stop bit ended, in ns.
-    on_transmit: Callable[[int, int], None] | None
     #: The far end's speed in bit/s; None follows the firmware.
     far_baud: int | None
+
+    def subscribe(self, sink: Callable[[Sequence[tuple[int, int]]], None]) -> Callable[[], None]:
+        """Have `sink` called with rows of what was sent, (word, ns when its stop bit ended); return what ends it."""
+        ...
 
     @property
     def measured_baud(self) -> int | None:
@@ -42,11 +44,9 @@ class ChipFault(Protocol):
         ...
 
 
-class Chip(Protocol):
+class Chip(PinSubscriptions, Protocol):
     """A chip that runs a firmware and leads the bench's time."""
 
-    #: Called with (pin, its own drive, ns) at each change of what the chip puts on a wire.
-    on_pin: Callable[[str, PinDrive, int], None] | None
     #: Called with each warning, once.
     on_warning: Callable[[str], None] | None
 
@@ -94,7 +94,7 @@ class Chip(Protocol):
         ...
 
     def advance_to(self, limit_ns: int) -> Reached:
-        """Run to `limit_ns`, at most a basic block beyond; less far where a watched pin changes."""
+        """Run to `limit_ns`, at most a basic block beyond; less far where a pin changes that ends its slice."""
         ...
 
     def where(self) -> str:

@@ -7,16 +7,18 @@ millisecond at most, sees the first one's pins as they stand at the begin of
 each step, and what it drives carries the time of the instruction that did it.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 from adapter_sim.adapter import AdapterState
 from adapter_sim.pinout import Pinout, WireRole
 from bluepill_sim import BluePill
 from bluepill_sim.fabric.pins import PinDrive
+from bluepill_sim.fabric.subscriptions import EDGE
 from p2os.pioneer.controller import Pioneer
 from robot_bench.bench import Bench
 from robot_bench.recording.client_view import SipRanges
+from robot_bench.wires.chip_pins import number_of
 from robot_bench.wires.nets import OwnedPins
 from simbase.timing import NS_PER_MS, Nanos, Reached
 
@@ -34,6 +36,8 @@ class SecondBluePill:
 
     def __init__(self, elf: Path, pins: OwnedPins, pinout: Pinout, pioneer: Pioneer) -> None:
         self.chip = BluePill(elf, strict=True)
+        #: It samples its inputs by itself.
+        self.wakes_on: frozenset[str] = frozenset()
         self.pioneer = pioneer
         #: Every byte that has left, with the end of its stop bit.
         self.sent: list[tuple[Nanos, int]] = []
@@ -46,9 +50,9 @@ class SecondBluePill:
         self._inputs = list(zip(names, map(self.chip.pin, INPUTS), strict=True))
         outputs = [wire.name for wire in pinout.with_role(WireRole.DISTANCE)]
         outputs += [name for value in ("encoder1", "encoder2") for name in pinout.value(value).wires]
-        self._outputs = dict(zip(OUTPUTS, outputs, strict=True))
-        self.chip.on_pin = self._drives
-        self.chip.usart1.on_transmit = self._sends
+        self._signals = dict(zip(map(number_of, OUTPUTS), outputs, strict=True))
+        self.chip.subscribe_pins(OUTPUTS, self._drives)
+        self.chip.usart1.subscribe(self._sends)
 
     @property
     def report(self) -> dict[str, int]:
@@ -84,13 +88,15 @@ class SecondBluePill:
         self._step_at = limit + STEP_NS
         return Reached(limit)
 
-    def _drives(self, pin: str, drive: PinDrive, at: Nanos) -> None:
-        if pin in self._outputs:
-            self._pins.write(self._outputs[pin], drive.level if drive.is_strong else None, at)
+    def _drives(self, rows: bytes) -> None:
+        for at, number, place, *_ in EDGE.iter_unpack(rows):
+            drive = list(PinDrive)[place]
+            self._pins.write(self._signals[number], drive.level if drive.is_strong else None, at)
 
-    def _sends(self, byte: int, at: Nanos) -> None:
-        self.sent.append((at, byte))
-        self._on_the_line.append((at, byte))
+    def _sends(self, rows: Sequence[tuple[int, Nanos]]) -> None:
+        sent = [(at, byte) for byte, at in rows]
+        self.sent += sent
+        self._on_the_line += sent
 
 
 class SecondBluePillBench(Bench):

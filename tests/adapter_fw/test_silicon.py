@@ -45,7 +45,7 @@ def test_ten_minutes_of_accidents_under_sanitizers_show_no_fault(host: Path, see
 def test_the_cortex_m3_of_our_emulator_gives_the_same_run(host: Path, tmp_path: Path) -> None:
     program, size = built("cortex-m", tmp_path)
     chip, text = BluePill(program), bytearray()
-    chip.usart1.on_transmit = lambda byte, _: text.append(byte)
+    chip.usart1.subscribe(lambda rows: text.extend(word for word, _ in rows))
     while b"ok\n" not in text and b"failed" not in text and chip.now_ns < 10 * 10**9:
         chip.advance_to(chip.now_ns + 10**8)
         assert chip.fault is None, chip.fault

@@ -56,7 +56,9 @@ def test_build_with_kicad_writes_the_archives(capsys, monkeypatch, tmp_path) -> 
     )
     monkeypatch.setattr(generated_files, "fabrication_files", lambda *_: {"a.gbr": "one"})
     monkeypatch.setattr(kicad_cli, "reports", lambda variant, *_: {f"{variant}-erc.rpt": "0"})
+    monkeypatch.setattr(kicad_cli, "step", lambda _, file: file.write_text("STEP", encoding="utf-8"))
     assert command.main(["build"]) == 0
+    assert (tmp_path / "rev-b" / "rev-b.step").exists()
     assert "rev-b-gerbers.zip: 1 files" in capsys.readouterr().out
     assert (tmp_path / "rev-c" / "rev-c-erc.rpt").read_text(encoding="utf-8") == "0"
     assert (tmp_path / "lm317" / "lm317-gerbers.zip").read_bytes() == generated_files.archive({"a.gbr": "one"})

@@ -7,11 +7,18 @@ import pytest
 
 from hardware.pcb.checks import suite
 from hardware.pcb.checks.results import Verdict
+from hardware.pcb.circuit.design import build
+from hardware.pcb.circuit.netlist import Design
 from hardware.pcb.outputs import generated_files
+from hardware.pcb.proof.mutants import Mutant, apply
 from hardware.pcb.spice import run
 from hardware.pcb.spice.deck import Deck, limits
 from hardware.pcb.spice.decks import decks
+from hardware.pcb.spice.netlist import circuit as elements
+from hardware.pcb.spice.netlist import node
 from hardware.pcb.spice.page import page_text, shown
+from hardware.pcb.spice.signal_decks import signal_decks
+from hardware.pcb.spice.supply_decks import supply_decks
 
 needs_ngspice = pytest.mark.skipif(
     not run.is_installed(), reason="ngspice is not installed: the circuits are not simulated (hint: make board)"
@@ -32,7 +39,7 @@ def test_every_figure_is_within_its_limits(name: str) -> None:
 def test_a_wrong_reset_transistor_would_be_noticed() -> None:
     # The thesis's resistor in the emitter: EN no longer gets below the threshold.
     deck = DECKS["reset"]
-    circuit = deck.circuit.replace("Q1 en b 0 BC817", "Q1 en b e1 BC817\nRe1 e1 0 2.2k")
+    circuit = deck.circuit.replace("n_rst_base 0 BC817", "n_rst_base e1 BC817\nRe1 e1 0 2.2k")
     assert circuit != deck.circuit
     weak = dataclasses.replace(deck, circuit=circuit, measures=deck.measures[:1], limits=deck.limits[:1])
     assert [good for *_, good in run.simulate(weak).verdicts()] == [False]
@@ -41,13 +48,15 @@ def test_a_wrong_reset_transistor_would_be_noticed() -> None:
 @needs_ngspice
 def test_a_reversed_input_without_its_diode_would_be_noticed() -> None:
     deck = DECKS["reverse"]
-    bridged = dataclasses.replace(deck, circuit=deck.circuit.replace("D1 a p12 B340A", "R9 a p12 0.01"))
+    bridged = dataclasses.replace(
+        deck, circuit=deck.circuit.replace("DD1 n_vin_fused n_p12v B340A", "R9 n_vin_fused n_p12v 0.01")
+    )
     failed = {limit.measure for limit, _, good in run.simulate(bridged).verdicts() if not good}
     assert {"wrong", "leak"} <= failed
 
 
 def test_every_deck_says_what_it_cannot_say_and_limits_what_it_measures() -> None:
-    assert len(DECKS) == len(decks()) == 14
+    assert len(DECKS) == len(decks()) == 17
     for deck in DECKS.values():
         assert deck.cannot_say.endswith("."), deck.name
         measured = {measure.split()[1] for measure in deck.measures}
@@ -59,8 +68,8 @@ def test_every_deck_says_what_it_cannot_say_and_limits_what_it_measures() -> Non
 def test_a_deck_is_written_with_its_measures_and_traces(tmp_path) -> None:
     text = run.deck_text(DECKS["reset"], tmp_path / "traces.txt")
     assert text.startswith("* Reset: level at the ESP32's EN\n")
-    assert "meas tran en_low find v(en) at=39m\n" in text
-    assert f"wrdata {tmp_path}/traces.txt v(pin) v(en) v(en2)\nquit\n.endc\n.end\n" in text
+    assert "meas tran en_low find v(n_esp_en) at=39m\n" in text
+    assert f"wrdata {tmp_path}/traces.txt v(pin) v(n_esp_en) v(en2)\nquit\n.endc\n.end\n" in text
 
 
 DECK = Deck(name="d", title="t", circuit="R1 a 0 1", measures=("dc top max v(a)",), x_label="x", y_label="y",
@@ -151,3 +160,44 @@ def test_the_page_shows_the_figures_of_today() -> None:
 @pytest.mark.parametrize(("value", "text"), [(0.0, "0"), (4.999, "5"), (119.44, "119"), (2.4e-05, "2.40e-05")])
 def test_figures_have_three_digits(value: float, text: str) -> None:
     assert shown(value) == text
+
+
+def wrong(edit: str) -> Design:
+    """Return rev-b with one edit of proof/mutants.py."""
+    return apply(build(), Mutant(rule="x", name="x", edits=(edit,)))
+
+
+#: Edits of the circuit, the deck that must notice it, and one figure that leaves its limits.
+FELT = (
+    ("swap J3.2 J3.3", "rs232", "space"), ("swap U5.11 U5.12", "rs232", "space"),
+    ("swap D1.K D1.A", "reverse", "right"), ("swap D2.K D2.A", "reverse", "right"),
+    ("swap D5.K D5.A", "startup-buck", "esp"), ("net J3.4 -", "rs232", "dtr_low"),
+    ("swap R1.2 R2.2", "wires", "dd1"), ("net Q1.2 +3V3", "reset", "en_low"), ("drop R73", "boot", "din_down"),
+    ("value R60 4k7", "boot", "mode_low"), ("drop R33", "boot", "dd3_low"), ("swap D3.K D3.A", "bank", "good"),
+)  # fmt: skip
+
+
+@needs_ngspice
+@pytest.mark.parametrize(("edit", "name", "measure"), FELT)
+def test_the_decks_are_built_from_the_netlist_and_feel_a_wrong_circuit(edit: str, name: str, measure: str) -> None:
+    design = wrong(edit)
+    deck = next(deck for deck in (*signal_decks(design), *supply_decks(design, build("lm317"))) if deck.name == name)
+    alone = dataclasses.replace(
+        deck,
+        measures=tuple(line for line in deck.measures if line.split()[1] == measure),
+        limits=tuple(limit for limit in deck.limits if limit.measure == measure),
+    )
+    assert [good for *_, good in run.simulate(alone).verdicts()] == [False]
+
+
+def test_every_part_of_the_board_is_an_element_with_its_own_nets_and_value() -> None:
+    lines = {line.split()[0]: line.split()[1:] for line in elements(build()).splitlines()}
+    assert lines["RR12"] == ["n_encoder2_s1_bp", "n_encoder2_s1", "680"]
+    assert lines["DD1"] == ["n_vin_fused", "n_p12v", "B340A"]
+    assert lines["QQ1"] == ["n_esp_en", "n_rst_base", "0", "BC817"]
+    silent = {"BLUEPILL", "ESP32_D1_MINI", "CONN2", "CONN3", "CONN24", "DE9", "TESTPOINT", "HOLE"}
+    for part in build().components:
+        assert (part.part.symbol in silent) != any(key[1:] == part.ref for key in lines), part.ref
+    assert node(build(), "U2.IO17") == "n_esp_tx"
+    assert node(build(), "J3.7") == "n_open_j3_7"
+    assert node(wrong("drop R62"), "R62.1") == "n_open_r62_1"

@@ -3,6 +3,8 @@
 import pytest
 
 from robot_bench.loop import RunLoop, StuckError
+from robot_bench.wires.chip_pins import ChipPins
+from robot_bench.wires.nets import Harness, Net
 from simbase.timing import Reached
 from tests.robot_bench.wires.fake_chip import FakeChip, PinDrive
 
@@ -36,8 +38,8 @@ def test_an_edge_on_a_watched_net_brings_all_to_its_own_time() -> None:
     log: list[tuple[str, int]] = []
     chip = FakeChip([(1_234, "PB13", PinDrive.HIGH)], block_ns=100)
     loop = RunLoop(chip, [Ticker("a", 5_000, log)], slice_ns=10_000)
-    chip.pin("PB13").watch()
-    chip.on_pin = lambda _pin, _drive, at: loop.note_edge(at)
+    pins = ChipPins(chip, Harness([Net("rst")]), {"rst": "PB13"}, on_watched=loop.note_edge)
+    pins.watch(frozenset({"rst"}), 0)
     loop.run_until(6_000)
     assert log == [("a", 1_234), ("a", 5_000)]
 
@@ -95,3 +97,13 @@ def test_a_restored_loop_goes_on_alike() -> None:
     second = RunLoop(FakeChip(block_ns=10), [])
     second.restore(first.snapshot())
     assert second.snapshot() == first.snapshot()
+
+
+def test_the_leader_does_not_stop_for_those_who_only_observe_and_they_come_to_each_deadline() -> None:
+    log: list[tuple[str, int]] = []
+    slices: list[int] = []
+    loop = RunLoop(FakeChip(block_ns=1), [Ticker("a", 50, log)], observers=[Ticker("o", 20, log)])
+    loop.on_slice = slices.append
+    loop.run_until(110)
+    assert slices == [50, 100, 110]
+    assert log == [("o", 20), ("o", 40), ("a", 50), ("o", 60), ("o", 80), ("a", 100), ("o", 100)]

@@ -3,7 +3,7 @@
 import pytest
 
 from p2os.errors import LocalProtocolError
-from robot_bench.pacer import RealTimePacer
+from robot_bench.pacer import GRAIN_NS, LONGEST_SLICE_NS, SHORTEST_SLICE_NS, RealTimePacer, SliceLength
 
 
 class Clock:
@@ -60,3 +60,25 @@ def test_a_sleep_that_lasts_longer_is_lag_at_once() -> None:
 def test_no_speed_is_no_pace() -> None:
     with pytest.raises(LocalProtocolError):
         RealTimePacer(speed=0.0)
+
+
+@pytest.mark.parametrize("speed", [0.001, 0.03, 1.0, 40.0])
+def test_control_comes_back_within_the_grain_however_fast_the_firmware_runs(speed: float) -> None:
+    clock = Clock()
+    slices = SliceLength(clock)
+    took = []
+    for _ in range(30):
+        took.append(round(slices.slice_ns / speed))
+        clock.now += took[-1]
+        slices.after_slice()
+    assert GRAIN_NS // 8 < max(took[15:]) <= GRAIN_NS
+
+
+def test_a_slice_is_neither_endless_nor_nothing() -> None:
+    clock = Clock()
+    slices = SliceLength(clock)
+    assert [slices.after_slice() for _ in range(20)][-1] == LONGEST_SLICE_NS
+    for _ in range(40):
+        clock.now += 10**9
+        slices.after_slice()
+    assert slices.slice_ns == SHORTEST_SLICE_NS

@@ -19,7 +19,6 @@ from pathlib import Path
 from firmware.build import COMPILER
 from firmware.build import build as build_program
 
-
 from bluepill_sim import BluePill
 from bluepill_sim.analysis.probe import Probe
 from bluepill_sim.analysis.vcd import write_vcd

@@ -41,6 +41,10 @@ MOST_STOPS = 1000
 #: chosen: bytes of SRAM, and characters, that a line shows.
 ROW_BYTES = 16
 
+#: Rows of edges: ns, number of the pin, of what it drives, of the wire's level.
+EDGE = struct.Struct("<QBBBBI")
+PIN_NAMES = [f"P{port}{number}" for port in "ABCDE" for number in range(16)]
+DRIVES = ("none", "low", "high", "pull-up", "pull-down")
 #: What checkouts spell differently: by what it does, the ways to do it, of which the first that exists is taken.
 WAYS: dict[str, tuple[Callable[..., Any], ...]] = {
     # (board) -> {"USART1.SR": address, …} of all modelled peripherals
@@ -62,11 +66,25 @@ WAYS: dict[str, tuple[Callable[..., Any], ...]] = {
     # (board, address, word): as a store of the program would
     "write": (lambda board, address, word: board.chip._bus.write(address - PERIPHERAL_BASE, 4, word),),  # noqa: SLF001
     # (board, take) where take(pin, drive, ns): what the chip puts on pins
-    "hear pins": (lambda board, take: setattr(board, "on_pin", lambda pin, drive, ns: take(pin, drive.value, ns)),),
+    "hear pins": (
+        lambda board, take: board.subscribe_pins(
+            [pin.name for pin in board.chip.pins],
+            lambda rows: [take(PIN_NAMES[row[1]], DRIVES[row[2]], row[0]) for row in EDGE.iter_unpack(rows)],
+        ),
+        lambda board, take: setattr(board, "on_pin", lambda pin, drive, ns: take(pin, drive.value, ns)),
+    ),
     # (port, take) where take(word, ns)
-    "hear characters": (lambda port, take: port.listeners.append(take),),
-    # (pin): its edges end slices
-    "watch": (lambda pin: pin.watch(),),
+    "hear characters": (
+        lambda port, take: port.subscribe(lambda rows: [take(word, ns) for word, ns in rows]),
+        lambda port, take: port.listeners.append(take),
+    ),
+    # (board): edges of its pins end slices
+    "watch": (
+        lambda board: board.subscribe_pins(
+            [pin.name for pin in board.pins], lambda _rows: None, ends_slice=[pin.name for pin in board.pins]
+        ),
+        lambda board: [pin.watch() for pin in board.pins],
+    ),
     # (board, take) where take(rows) and a row is (cycle, address, kind)
     "record": (lambda board, take: board.chip.record_blocks(ROWS, lambda recorder: take(recorder.drain())),),
     # (recorder) -> rows that wait
@@ -117,8 +135,7 @@ class Seen:
             for name, port in board.serial_ports.items():
                 way("hear characters", port, self._character_of(name))
         if is_watched:
-            for pin in board.pins:
-                way("watch", pin)
+            way("watch", board)
         self._recorder = None
         if "blocks" in self.files:
             self._recorder = way("record", board, self._rows)
@@ -200,6 +217,9 @@ def run(job: dict[str, Any]) -> dict[str, Any]:
     folder, level, end_ns = Path(job["folder"]), job["level"], job["end_ns"]
     seen = Seen(folder, [*job["kinds"], "state"])
     board: Any = BluePill(job["image"])
+    for pin in board.pins:  # older chips see what the board hangs on a pin from its first change on
+        pin.drive(True)
+        pin.drive(None)
     seen.subscribe(board, is_watched=level == "watched")
     began = time.process_time()
     inputs = [*job["script"], [end_ns, "end"]]

@@ -196,10 +196,12 @@ void listen_to_pins(struct device *device, uint32_t port, uint32_t pins);
 
 #pragma GCC visibility pop
 
-/* Works without time: nobody looks at the pins of a port. */
-static inline bool is_unwatched(const struct fabric *fabric, uint32_t port)
+/* Whether a port's outputs may change without their time: nobody looks at them, and none has to be warned of. */
+static inline bool is_unwatched(const struct fabric *fabric, uint32_t number)
 {
-    return !(fabric->subscribed[port] | fabric->listened[port]);
+    const struct port *port = &fabric->ports[number];
+    const uint32_t driven = (port->outside & ~port->outside_weak) | port->rail;
+    return !(fabric->subscribed[number] | fabric->listened[number] | (driven & (port->output | port->alternate)));
 }
 
 #endif

@@ -7,6 +7,7 @@ import importlib.util
 import tempfile
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 from hardware.pcb.circuit.netlist import Design
 from hardware.pcb.layout import rules
@@ -25,6 +26,8 @@ class Reading:
     plated: int
     unplated: int
     smallest_drill_mm: float
+    #: Every hole: x and y from the upper left corner, and its diameter, millimetres.
+    holes: frozenset[tuple[float, float, float]] = frozenset()
 
 
 def is_installed() -> bool:
@@ -47,13 +50,20 @@ def read(files: dict[str, str]) -> Reading:
         (left, bottom), (right, top) = outline.bounding_box(unit="mm")
         pen = 0.1
         plated, unplated = stack.drill_pth, stack.drill_npth
-        tools = [hole.aperture.diameter for layer in (plated, unplated) if layer for hole in layer.objects]
+        drilled = [hole for layer in (plated, unplated) if layer for hole in layer.objects]
+        holes = {_place(hole, left + pen / 2, top - pen / 2) for hole in drilled}
         return Reading(
             width_mm=round(right - left - pen, 3), height_mm=round(top - bottom - pen, 3),
             layers=tuple(sorted(" ".join(key) for key, layer in stack.graphic_layers.items() if layer is not None)),
             copper_layers=len(stack.copper_layers), plated=len(plated.objects) if plated else 0,
-            unplated=len(unplated.objects) if unplated else 0, smallest_drill_mm=min(tools, default=0.0),
+            unplated=len(unplated.objects) if unplated else 0,
+            smallest_drill_mm=min((size for *_, size in holes), default=0.0), holes=frozenset(holes),
         )  # fmt: skip
+
+
+def _place(hole: Any, left: float, top: float) -> tuple[float, float, float]:  # gerbonara has no types
+    x, y, size = (hole.unit.convert_to("mm", value) for value in (hole.x, hole.y, hole.aperture.diameter))
+    return round(x - left, 2), round(top - y, 2), round(size, 2)
 
 
 def faults(design: Design, vias: list[Via], reading: Reading) -> list[str]:
@@ -68,6 +78,12 @@ def faults(design: Design, vias: list[Via], reading: Reading) -> list[str]:
         ("smallest drill", round(reading.smallest_drill_mm, 3), min(via.drill_mm for via in vias)),
     ]  # fmt: skip
     found = [f"{name} is {value:g}, the design has {goal:g}" for name, value, goal in wanted if value != goal]
+    if reading.holes:
+        drilled = {(*via.at_mm, via.drill_mm) for via in vias}
+        drilled |= {(*pad.center_mm, pad.pad.drill_mm) for pad in pads if pad.pad.drill_mm}
+        goal_holes = {(round(x, 2), round(y, 2), round(size, 2)) for x, y, size in drilled}
+        found += [f"no hole of {size:g} mm at {x:g}, {y:g}" for x, y, size in sorted(goal_holes - reading.holes)]
+        found += [f"a hole of {size:g} mm at {x:g}, {y:g}" for x, y, size in sorted(reading.holes - goal_holes)]
     missing = _LAYERS - set(reading.layers)
     return [*found, *(f"layer {layer} is missing" for layer in sorted(missing))]
 

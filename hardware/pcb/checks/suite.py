@@ -14,6 +14,7 @@ from hardware.pcb.circuit.design import BOARD_VARIANTS, VARIANTS
 from hardware.pcb.circuit.design import build as design_of
 from hardware.pcb.circuit.electrical import all_checks, bom_faults, netlist_faults
 from hardware.pcb.outputs import generated_files
+from hardware.pcb.proof.expected import DESCRIBED, differences
 from hardware.pcb.spice import run
 from hardware.pcb.spice.decks import decks
 from hardware.pcb.spice.run import is_installed, simulate
@@ -38,6 +39,9 @@ def plain() -> list[Result]:
         results.append(listed("netlist complete", variant, netlist_faults(design), f"{len(design.nets())} nets"))
         words = f"{len(design.components)} components"
         results.append(listed("bill of materials", variant, bom_faults(design), words))
+        if variant in DESCRIBED:
+            words = f"{sum(len(part.pins) for part in design.components)} pins as the table of its own has them"
+            results.append(listed("expected connections", variant, differences(design), words))
         figures = all_checks(design)
         outside = [str(check) for check in figures if not check.is_good]
         results.append(listed("electrical", variant, outside, f"{len(figures)} figures within their limits"))

@@ -24,7 +24,7 @@ BOARD_VARIANTS = ("rev-b", "lm317")
 SERIES = "1k2"
 #: The BluePill's LED pulls PC13 up through its resistor; 680R still holds a low below VIL.
 SERIES_SPECIAL = {"encoder2_s1": "680R"}
-#: References: series resistors R1.., pull-downs R31.. with the same last number.
+#: References: series resistors R1.., pulls R31.. with the same last number.
 PULL_OFFSET = 30
 
 
@@ -87,8 +87,9 @@ def _signals(pinout: Pinout, variant: str) -> list[Component]:
     for index, wire in enumerate(series_wires(pinout), start=1):
         near, far = bluepill_net(wire), adapter_net(wire)
         parts.append(make(f"R{index}", SERIES_SPECIAL.get(wire.name, SERIES), [near, far], wire.name))
-        if wire.pull is Pull.DOWN:
-            parts.append(make(f"R{index + PULL_OFFSET}", "20k", [far, "GND"], wire.name))
+        if wire.pull is not Pull.NONE:
+            rail = "GND" if wire.pull is Pull.DOWN else "+3V3"
+            parts.append(make(f"R{index + PULL_OFFSET}", "20k", [far, rail], wire.name))
     return parts
 
 
@@ -113,7 +114,7 @@ def _supply(pinout: Pinout, variant: str) -> list[Component]:
         make("D2", "TVS12", {"K": "+12V", "A": "GND"}),
         make("C1", "C 100u", ["+12V", "GND"]),
         make("C2", "C 100n", ["+12V", "GND"]),
-        make("J2", "TERMINAL", ["5V_EXT", "GND"], "5V BANK"),
+        make("J2", "VH2", ["5V_EXT", "GND"], "5V BANK"),
         make("D3", "SCHOTTKY 5V", {"K": "5V_BANK", "A": "5V_EXT"}),
         make("JP1", "HEADER3", ["5V_REG", "+5V", "5V_BANK"], "12V|5V"),
         make("C4", "C 22u", ["+5V", "GND"]),
@@ -141,11 +142,14 @@ def _supply(pinout: Pinout, variant: str) -> list[Component]:
 
 
 def _serial(pinout: Pinout, variant: str) -> list[Component]:
-    """Build the RS-232 side; the spare driver asserts DTR, the spare receiver shows DSR on a test point."""
+    """Build the RS-232 side: JP2 connects the spare driver as DTR, the spare receiver shows DSR on a test point.
+
+    R73 holds the transmitter at mark while nothing drives IO17: during reset and boot.
+    """
     _, _ = pinout, variant
     return [
         make("U5", "MAX3232", [
-            "RS_C1P", "RS_VP", "RS_C1M", "RS_C2P", "RS_C2M", "RS_VM", "RS_DTR", "RS_DSR",
+            "RS_C1P", "RS_VP", "RS_C1M", "RS_C2P", "RS_C2M", "RS_VM", "DTR_ON", "RS_DSR",
             "DSR_N", "GND", "TXD", "RXD", "RS_RX", "RS_TX", "GND", "+3V3",
         ]),
         make("C5", "C 100n", ["RS_C1P", "RS_C1M"]),
@@ -154,7 +158,9 @@ def _serial(pinout: Pinout, variant: str) -> list[Component]:
         make("C8", "C 100n", ["RS_VM", "GND"]),
         make("C9", "C 100n", ["+3V3", "GND"]),
         make("J3", "DE9", _DE9_PINS, "HOST"),
+        make("JP2", "HEADER2", ["DTR_ON", "RS_DTR"], "DTR"),
         make("R62", "1k", ["ESP_TX", "TXD"]),
+        make("R73", "10k", ["+3V3", "ESP_TX"]),
         make("R63", "1k", ["RXD", "ESP_RX"]),
         make("R64", "2k2", ["+3V3", "LED_TX"]),
         make("D7", "LED yellow", {"K": "ESP_TX", "A": "LED_TX"}, "TX"),
@@ -170,7 +176,7 @@ def _reset_and_mode(pinout: Pinout, variant: str) -> list[Component]:
         make("R66", "4k7", ["RST_REQ", "RST_BASE"]),
         make("R67", "47k", ["RST_BASE", "GND"]),
         make("J5", "HEADER2", ["+3V3", "MODE_PULL"], "MODE"),
-        make("R60", "4k7", ["MODE_PULL", mode]),
+        make("R60", "2k2", ["MODE_PULL", mode]),
     ]
 
 

@@ -7,7 +7,7 @@ table of `make board-check` and the tests read the same values. No simulator her
 from dataclasses import dataclass
 
 from adapter_sim.pinout import Direction, load_pinout
-from hardware.pcb.circuit.design import adapter_net, bluepill_net, series_wires
+from hardware.pcb.circuit.design import PULL_OFFSET, adapter_net, bluepill_net, series_wires
 from hardware.pcb.circuit.modules import NOT_5V_TOLERANT
 from hardware.pcb.circuit.netlist import POWER_NETS, Design
 from hardware.pcb.circuit.parts import PARTS
@@ -50,12 +50,13 @@ def ohms(design: Design, ref: str) -> float:
 
 
 def mode_divider(design: Design) -> list[Check]:
-    """Judge the mode jumper: with it fitted the pin reads high against the wire's pull-down."""
+    """Judge the mode jumper: with it fitted the pin reads high against both pull-downs, the board's and the ESP32's."""
     if design.variant == "rev-c":
         return []
     esp = PARTS["ESP32"].facts
     index = [wire.name for wire in series_wires(load_pinout())].index("DD7") + 1
-    down = ohms(design, f"R{index + 30}")
+    board, own = ohms(design, f"R{index + PULL_OFFSET}"), esp["pull_ohm"]
+    down = board * own / (board + own)
     level = RAIL_V * down / (down + ohms(design, "R60"))
     return [Check(name="mode jumper fitted, level at IO26", value=level, low=esp["vih_v"], high=RAIL_V, unit="V")]
 
@@ -66,7 +67,8 @@ def logic_levels(design: Design) -> list[Check]:
     highs, lows = [], []
     for index, wire in enumerate(series_wires(load_pinout()), start=1):
         series = ohms(design, f"R{index}")
-        down = ohms(design, f"R{index + 30}") if f"R{index + 30}" in _refs(design) else float("inf")
+        pull = f"R{index + PULL_OFFSET}"
+        down = ohms(design, pull) if pull in _refs(design) else float("inf")
         divide = 1.0 if wire.direction is Direction.TO_BLUEPILL else 1 / (1 + series / down)
         highs.append(DRIVER_HIGH_V * divide)
         if wire.bluepill == "PC13":

@@ -34,7 +34,7 @@ EXPECTED: tuple[Expected, ...] = (
     Expected(net="ESP_EN", bare_v=(0.0, 0.3), full_v=(3.0, 3.4), note="below 0.3 V while PB13 is high: held in reset"),
     Expected(net="RS_VP", bare_v=(0.0, 0.5), full_v=(4.8, 5.8), note="U5's positive pump; low: C5, C7, +3V3"),
     Expected(net="RS_VM", bare_v=(-0.5, 0.0), full_v=(-5.8, -4.8), note="U5's negative pump; near 0: C6, C8"),
-    Expected(net="RS_DTR", bare_v=(0.0, 0.5), full_v=(4.8, 5.8), note="DTR asserted all the time"),
+    Expected(net="RS_DTR", bare_v=(0.0, 0.5), full_v=(4.8, 5.8), note="DTR asserted all the time; 0 V without JP2"),
     Expected(net="DSR_N", bare_v=(0.0, 0.5), full_v=(3.0, 3.4), note="falls below 0.4 V when the robot asserts DSR"),
 )
 

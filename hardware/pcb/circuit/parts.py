@@ -23,6 +23,8 @@ class Part:
     description: str
     manufacturer: str = ""
     mpn: str = ""
+    #: Distributor and its order number, where one is known: nothing here was looked up, so all are empty.
+    distributor: str = ""
     #: Where the facts come from.
     source: str = ""
     #: Data-sheet figures; the unit is in the name.
@@ -63,7 +65,7 @@ PARTS: Mapping[str, Part] = MappingProxyType({
             mpn="MH-ET LIVE MiniKit ESP32",
             source="Espressif ESP32 data sheet and the module's silkscreen, memory",
             facts={"supply_v": 5.0, "current_max_ma": 500.0, "rail_out_ma": 150.0, "vil_v": 0.825, "vih_v": 2.475,
-                   "en_low_v": 0.6, "en_pull_ohm": 10_000.0, "en_farad": 1e-6},
+                   "en_low_v": 0.6, "en_pull_ohm": 10_000.0, "en_farad": 1e-6, "pull_ohm": 45_000.0},
         ),
         # --- supply
         Part(
@@ -104,8 +106,9 @@ PARTS: Mapping[str, Part] = MappingProxyType({
             facts={"standoff_v": 15.0, "clamp_v": 24.4, "breakdown_min_v": 16.7},
         ),
         Part(
-            key="C 100u", value="100uF 35V", symbol="CP", footprint="CP_RADIAL_D8",
-            description="Electrolytic capacitor 100 uF 35 V, low impedance, 8 mm", manufacturer="Panasonic",
+            key="C 100u", value="100uF 35V", symbol="CP", footprint="CP_RADIAL_D6",
+            description="Electrolytic capacitor 100 uF 35 V, low impedance, 6.3 x 11.2 mm, pitch 2.5 mm",
+            manufacturer="Panasonic",
             mpn="EEU-FR1V101", source="Panasonic FR sheet, memory",
             facts={"farad": 100e-6, "voltage_v": 35.0, "esr_ohm": 0.15},
         ),
@@ -125,6 +128,7 @@ PARTS: Mapping[str, Part] = MappingProxyType({
         _resistor("680R", 680.0, "RC0805FR-07680RL"),
         _resistor("20k", 20e3, "RC0805FR-0720KL"),
         _resistor("4k7", 4.7e3, "RC0805FR-074K7L"),
+        _resistor("10k", 10e3, "RC0805FR-0710KL"),
         _resistor("47k", 47e3, "RC0805FR-0747KL"),
         _resistor("2k2", 2.2e3, "RC0805FR-072K2L"),
         _resistor("120R", 120.0, "RC0805FR-07120RL"),
@@ -158,9 +162,13 @@ PARTS: Mapping[str, Part] = MappingProxyType({
         Part(key="TERMINAL", value="2 x 5.08", symbol="CONN2", footprint="TERMINAL_5.08",
              description="Screw terminal 2 poles 5.08 mm", manufacturer="Phoenix Contact", mpn="1729128",
              source="Phoenix MKDS sheet, memory"),
+        Part(key="VH2", value="VH 2", symbol="CONN2", footprint="JST_VH_2",
+             description="Header JST VH, 2 poles, 3.96 mm, keyed", manufacturer="JST", mpn="B2P-VH",
+             source="JST VH sheet, memory; pads as KiCad's JST_VH_B2P-VH"),
         Part(key="DE9", value="DE-9 male", symbol="DE9", footprint="DE9_MALE",
              description="DE-9 plug, right angle, board locks, 2.77 x 2.84 mm", manufacturer="TE Connectivity",
-             mpn="5747840-3", source="memory: the pins' distance to the edge differs between makers"),
+             mpn="5747840-3",
+             source="memory: .318 inch (8.08 mm) from the second row of pins to the face of the flange"),
         Part(key="HEADER2", value="1x2", symbol="CONN2", footprint="HEADER_1X2",
              description="Pin header 1x2 2.54 mm", manufacturer="Wuerth", mpn="61300211121", source="memory"),
         Part(key="HEADER3", value="1x3", symbol="CONN3", footprint="HEADER_1X3",
@@ -187,5 +195,19 @@ def _accessory(value: str, mpn: str, description: str) -> Part:
 ACCESSORIES: tuple[tuple[int, str, Part], ...] = (
     (2, "U1", _accessory("socket 1x20", "61302011821", "Socket 1x20 2.54 mm, 8.5 mm high, for the BluePill")),
     (4, "U2", _accessory("socket 1x10", "61301011821", "Socket 1x10 2.54 mm, 8.5 mm high, for the ESP32 module")),
-    (2, "JP1 J5", _accessory("jumper", "60900213421", "Jumper 2.54 mm: one for the source, one for the mode")),
+    (3, "JP1 JP2 J5", _accessory("jumper", "60900213421", "Jumper 2.54 mm: source, DTR, mode")),
+    (
+        1,
+        "J2",
+        Part(
+            key="VH housing",
+            value="VH housing",
+            symbol="",
+            footprint="",
+            manufacturer="JST",
+            mpn="VHR-2N",
+            description="Housing for the power bank's lead, with two contacts BVH-21T-P1.1",
+            source="memory",
+        ),
+    ),
 )

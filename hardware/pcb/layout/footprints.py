@@ -269,15 +269,27 @@ def _buck() -> Footprint:
 
 
 def _radial() -> Footprint:
-    pads = (_hole("1", 0, 0, 1.6, 0.8, PadShape.RECT), _hole("2", 3.5, 0, 1.6, 0.8))
+    pads = (_hole("1", 0, 0, 1.6, 0.8, PadShape.RECT), _hole("2", 2.5, 0, 1.6, 0.8))
     return Footprint(
-        name="CP_RADIAL_D8", description="Electrolytic capacitor, 8 mm, pitch 3.5 mm", pads=pads,
-        drawings=(Circle(layer="F.SilkS", center_mm=(1.75, 0), radius_mm=4.12),
-                  Circle(layer="F.Fab", center_mm=(1.75, 0), radius_mm=4.0, width_mm=0.1),
-                  Label(layer="F.SilkS", text="+", at_mm=(-1.45, -1.3), size_mm=1.0),
-                  *courtyard(-2.55, -4.3, 6.05, 4.3)),
-        ref_at_mm=(1.75, 2.1),
-        boxes=(Box(center_mm=(1.75, 0), size_mm=(7.2, 7.2), z_mm=(0, 11.5), colour=BLUE),),
+        name="CP_RADIAL_D6", description="Electrolytic capacitor, 6.3 mm, pitch 2.5 mm", pads=pads,
+        drawings=(Circle(layer="F.SilkS", center_mm=(1.25, 0), radius_mm=3.3),
+                  Circle(layer="F.Fab", center_mm=(1.25, 0), radius_mm=3.15, width_mm=0.1),
+                  Label(layer="F.SilkS", text="+", at_mm=(-2.2, -2.0), size_mm=1.0),
+                  *courtyard(-2.3, -3.5, 4.8, 3.5)),
+        ref_at_mm=(1.25, 2.1),
+        boxes=(Box(center_mm=(1.25, 0), size_mm=(5.8, 5.8), z_mm=(0, 11.2), colour=BLUE),),
+    )  # fmt: skip
+
+
+def _jst_vh() -> Footprint:
+    pads = (_hole("1", 0, 0, 2.7, 1.7, PadShape.RECT), _hole("2", 3.96, 0, 2.7, 1.7))
+    return Footprint(
+        name="JST_VH_2", description="Header JST VH, 2 x 3.96 mm, upright, keyed by its wall", pads=pads,
+        drawings=(*rectangle("F.SilkS", -2.06, -2.11, 6.02, 4.91), *rectangle("F.SilkS", -0.86, -3.81, 4.82, -2.11),
+                  *rectangle("F.Fab", -1.95, -3.7, 5.91, 4.8, 0.1), *courtyard(-2.45, -4.2, 6.41, 5.3)),
+        ref_at_mm=(1.98, -4.9),
+        boxes=(Box(center_mm=(1.98, 1.4), size_mm=(7.86, 6.8), z_mm=(0, 3.8), colour=WHITE),
+               Box(center_mm=(1.98, -2.85), size_mm=(5.4, 1.7), z_mm=(0, 9.4), colour=WHITE)),
     )  # fmt: skip
 
 
@@ -287,7 +299,7 @@ def _de9() -> Footprint:
     pads += [_hole(str(n + 6), 1.385 + 2.77 * n, 2.84, 1.6, 1.0) for n in range(4)]
     names = [Label(layer="F.SilkS", text=str(n + 1), at_mm=(2.77 * n, -1.45), size_mm=0.8) for n in range(5)]
     return Footprint(
-        name="DE9_MALE", description="DE-9 plug, right angle, edge 10.54 mm below pin 1", pads=tuple(pads),
+        name="DE9_MALE", description="DE-9 plug, right angle, edge 10.54 mm below pin 1 at most", pads=tuple(pads),
         drawings=(*rectangle("F.Fab", -9.9, -1.8, 20.96, 10.54, 0.1), *names,
                   *(Line(layer="F.SilkS", start_mm=(x, -2.3), end_mm=(x, 9.9)) for x in (-10.0, 21.06)),
                   Line(layer="F.SilkS", start_mm=(-10.0, -2.3), end_mm=(21.06, -2.3)),
@@ -323,7 +335,8 @@ def _all() -> list[Footprint]:
         _chip("D_SMA", (2.0, 2.5, 1.8), (4.3, 2.6, 2.3), ("K", "A")),
         _chip("D_SMB", (2.15, 2.5, 2.3), (4.4, 3.6, 2.3), ("K", "A")),
         _chip("F_1812", (2.1375, 1.125, 3.4), (4.5, 3.2, 1.6), colour=GREEN),
-        _sot23(), _sot223(), _soic16(), _terminal(), _buck(), _radial(), _de9(), _test_point(), _mounting_hole(),
+        _sot23(), _sot223(), _soic16(), _terminal(), _jst_vh(), _buck(), _radial(), _de9(), _test_point(),
+        _mounting_hole(),
         _header("HEADER_1X2", 1, 2), _header("HEADER_1X3", 1, 3), _header("HEADER_2X12", 2, 12),
         bluepill(), esp32_d1_mini(),
     ]  # fmt: skip

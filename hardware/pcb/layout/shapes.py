@@ -6,6 +6,9 @@ Origin and axes are KiCad's: x to the right, y down, the part seen from above.
 from dataclasses import dataclass
 from enum import StrEnum
 
+#: Narrowest stroke that makers print.
+SILK_MM = 0.15
+
 
 class PadKind(StrEnum):
     """How a pad is made."""
@@ -44,7 +47,7 @@ class Line:
     layer: str
     start_mm: tuple[float, float]
     end_mm: tuple[float, float]
-    width_mm: float = 0.12
+    width_mm: float = SILK_MM
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -55,7 +58,7 @@ class Circle:
     center_mm: tuple[float, float]
     radius_mm: float
     is_filled: bool = False
-    width_mm: float = 0.12
+    width_mm: float = SILK_MM
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -100,7 +103,7 @@ class Footprint:
         return all(pad.kind is PadKind.SMD for pad in self.pads)
 
 
-def rectangle(layer: str, left: float, top: float, right: float, bottom: float, width: float = 0.12) -> list[Line]:
+def rectangle(layer: str, left: float, top: float, right: float, bottom: float, width: float = SILK_MM) -> list[Line]:
     """Return the four sides of a rectangle."""
     corners = [(left, top), (right, top), (right, bottom), (left, bottom)]
     return [

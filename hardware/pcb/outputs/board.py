@@ -13,7 +13,7 @@ from hardware.pcb.layout import rules
 from hardware.pcb.layout.footprints import FOOTPRINTS
 from hardware.pcb.layout.placement import Place, place, silk_labels, unturn
 from hardware.pcb.layout.routing import Track, Via, antenna_area
-from hardware.pcb.layout.shapes import Circle, Footprint, Label, Line, Pad, PadKind, PadShape
+from hardware.pcb.layout.shapes import SILK_MM, Circle, Footprint, Label, Line, Pad, PadKind, PadShape
 from hardware.pcb.outputs.schematic import page_of
 from hardware.pcb.outputs.sexp import Node, Text, node, render, sheet_path, uid, uuid_node
 from hardware.pcb.outputs.symbols import SYMBOLS
@@ -27,8 +27,9 @@ _CORNER_RATIO = 0.25
 
 
 def text_effects(size: float, justify: str = "center", *, is_hidden: bool = False, is_bold: bool = False) -> list[Node]:
-    """Return a text's font node (and what hides it); thickness is 15 % of the height."""
-    font = node("font", node("size", size, size), node("thickness", round(size * (0.2 if is_bold else 0.15), 3)))
+    """Return a text's font node (and what hides it); strokes are 15 % of the height, at least what makers print."""
+    thickness = max(SILK_MM, round(size * (0.2 if is_bold else 0.15), 3))
+    font = node("font", node("size", size, size), node("thickness", thickness))
     effects = node("effects", font)
     if justify != "center":
         effects.append(node("justify", justify))

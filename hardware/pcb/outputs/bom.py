@@ -53,11 +53,13 @@ def csv_text(design: Design) -> str:
     """Return the list as CSV."""
     out = io.StringIO()
     writer = csv.writer(out, lineterminator="\n")
-    writer.writerow(["Quantity", "References", "Value", "Footprint", "Manufacturer", "Part number", "Description"])
+    writer.writerow(
+        ["Quantity", "References", "Value", "Footprint", "Manufacturer", "Part number", "Distributor", "Description"]
+    )
     for row in rows(design):
         part = row.part
         writer.writerow([row.quantity, " ".join(row.refs), part.value, part.footprint, part.manufacturer, part.mpn,
-                         part.description])  # fmt: skip
+                         part.distributor, part.description])  # fmt: skip
     return out.getvalue()
 
 

@@ -131,6 +131,13 @@ def schematic_pdf(schematic: Path, file: Path) -> None:
     run("sch", "export", "pdf", "-o", file, schematic)
 
 
+def step(board: Path, file: Path) -> None:
+    """Write the bare board, its outline and holes, as STEP without its date: bodies of parts are pictures only."""
+    run("pcb", "export", "step", "--force", "--board-only", "-o", file, board)
+    text = re.sub(r"'\d{4}-\d\d-\d\dT[\d:]+[^']*'", "''", file.read_text(encoding="utf-8"))
+    file.write_text(text, encoding="utf-8", newline="\n")
+
+
 def picture(board: Path, file: Path, *arguments: str) -> None:
     """Render a picture of the board."""
     run("pcb", "render", *arguments, "-o", file, board)

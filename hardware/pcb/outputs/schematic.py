@@ -66,13 +66,13 @@ def frames(design: Design, page: str) -> list[Frame]:
 
 
 def _signal_places() -> dict[str, tuple[int, int]]:
-    """Return two columns of rows: series resistor, then the pull-down of the same wire."""
+    """Return two columns of rows, one a wire: series resistor, and its pull half a row lower."""
     places = {}
     for index in range(len(series_wires(load_pinout()))):
         column, row = divmod(index, 11)
-        x, y = 34 + 106 * column, 26 + 9 * row
+        x, y = 50 + 107 * column, 22 + 9 * row
         places[f"R{index + 1}"] = (x, y)
-        places[f"R{index + 1 + PULL_OFFSET}"] = (x + 50, y)
+        places[f"R{index + 1 + PULL_OFFSET}"] = (x + 44, y + 4)
     return places
 
 
@@ -90,7 +90,8 @@ _SUPPLY = {
     "U4": (38, 104), "R70": (56, 118), "R71": (74, 118), "C12": (80, 104), "C13": (96, 118),
 }  # fmt: skip
 _SERIAL = {
-    "U5": (64, 40), "C5": (18, 40), "C6": (30, 40), "C7": (96, 40), "C8": (110, 40), "C9": (124, 40), "J3": (156, 40),
+    "U5": (64, 40), "JP2": (112, 58), "R73": (78, 82),
+    "C5": (18, 40), "C6": (30, 40), "C7": (96, 40), "C8": (110, 40), "C9": (124, 40), "J3": (156, 40),
     "R62": (46, 82), "R63": (46, 90), "R64": (46, 100), "D7": (60, 100), "R65": (46, 110), "D8": (60, 110),
     "R66": (136, 92), "R67": (136, 104), "Q1": (152, 92), "J5": (30, 136), "R60": (48, 137),
     "U6": (198, 36), "C10": (208, 60), "R72": (194, 90), "D9": (208, 90),
@@ -134,9 +135,9 @@ _FRAMES = {
               note="GPIO6 to 11 carry the module's flash: never connected."),
     ],
     "signals": [
-        Frame(title="Series resistors and pull-downs", left=10, top=12, right=224, bottom=128,
+        Frame(title="One row a wire, from pad to pad", left=10, top=12, right=224, bottom=128,
               note="_BP: the BluePill's side. 1k2 limits what an unpowered module takes; "
-                   "680R at PC13 holds a low against the BluePill's LED. IO5 and IO15 are straps: no pull-down."),
+                   "680R at PC13 holds a low against the BluePill's LED. IO5 and IO15 boot high: pulled up."),
     ],
     "serial": [
         Frame(title="RS-232 at 3.3 V; DIN2 low asserts DTR", left=10, top=12, right=170, bottom=70,
@@ -163,6 +164,8 @@ _LIBRARY_VERSION = "20241209"
 _OUTWARD = {"left": (-1, 0), "right": (1, 0), "top": (0, -1), "bottom": (0, 1)}
 #: Nets whose current enters through passive parts only: ERC is told that they are supplied.
 _FLAGGED = ("GND", "+12V", "+5V", "BP_5V", "ESP_5V")
+#: Parts whose pads a wire joins.
+_PADS = frozenset({"U1", "U2", "J4", "U6"})
 #: Longest gap between two facing pins that gets a wire, steps.
 _WIRE_STEPS = 12
 
@@ -202,6 +205,8 @@ def page_text(design: Design, name: str) -> str:
     components = [component for component in design.components if page_of(component) == name]
     pins = [pin for component in components for pin in placed_pins(component)]
     joined = _wires(page, pins)
+    if name == "signals":
+        joined |= _rows(page, pins)
     for pin in pins:
         if (pin.component.ref, pin.pin.number) not in joined:
             _end(page, pin)
@@ -318,6 +323,39 @@ def _wires(page: Page, pins: list[PlacedPin]) -> set[tuple[str, str]]:
         _wire(page, (first.x, first.y), (second.x, second.y))
         _label(page, first.net, ((first.x + second.x) // 2, first.y), "top")
         joined |= {(end.component.ref, end.pin.number) for end in (first, second)}
+    return joined
+
+
+def _rows(page: Page, pins: list[PlacedPin]) -> set[tuple[str, str]]:
+    """Draw each wire's path: pads at both ends, series resistor, pull; return the pins that need no label of their own.
+
+    The modules are on a page of their own, so their pads stand as words: name, reference, number and name.
+    """
+    ends = {(placed.component.ref, placed.pin.number): placed for placed in pins}
+    joined: set[tuple[str, str]] = set()
+    for index in range(len(series_wires(load_pinout()))):
+        near, far = ends[f"R{index + 1}", "1"], ends[f"R{index + 1}", "2"]
+        pull = ends.get((f"R{index + 1 + PULL_OFFSET}", "1"))
+        fork, label = far.x + 4, far.x + 8
+        _wire(page, (far.x, far.y), (fork, far.y))
+        _wire(page, (fork, far.y), (label, far.y))
+        _label(page, far.net or "", (label, far.y), "right")
+        joined.add((far.component.ref, "2"))
+        if pull is not None and pull.net == far.net:
+            _wire(page, (fork, far.y), (fork, pull.y))
+            _wire(page, (fork, pull.y), (pull.x, pull.y))
+            page.nodes.append(node("junction", node("at", *_mm(fork, far.y)), node("diameter", 0),
+                                   node("color", 0, 0, 0, 0), page.ident("junction")))  # fmt: skip
+            joined.add((pull.component.ref, "1"))
+        for net, x in ((near.net, near.x - 34), (far.net, label + 15)):
+            words = [
+                f"{part.ref}.{pin} {SYMBOLS[part.part.symbol].pin_name(pin)}".removesuffix(f" {pin}")
+                for part in page.design.components
+                for pin, name in part.pins
+                if part.ref in _PADS and name == net
+            ]
+            left, y = _mm(x, near.y)
+            page.nodes.append(_text("  ".join(words), (left, y - 1.2), 1.27, page.ident("pads")))
     return joined
 
 

@@ -47,6 +47,10 @@ class Symbol:
     #: Where reference and value stand around their positions: "center", or "left" for texts beside the symbol.
     justify: str = "center"
 
+    def pin_name(self, number: str) -> str:
+        """Return the name of a pin; KeyError where there is none."""
+        return {pin.number: pin.name for pin in self.pins}[number]
+
     def rows(self) -> Iterator[tuple[str, str, str]]:
         """Yield number, name and electrical kind of each pin."""
         for pin in self.pins:

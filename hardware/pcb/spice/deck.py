@@ -99,26 +99,39 @@ Bbias in out I = 3.5m*min(1, max(0, (V(in)-V(out)-0.5)/1.5))
 .ends
 """
 
+#: MBRA210L: 0.28 V at 0.6 A, 10 V reverse (data sheet, memory).
+MBRA210L = ".model MBRA210L D(IS=40u N=1.05 RS=0.03 CJO=400p BV=12 IBV=1m)"
+
+#: A light: 1.8 V at 1 mA.
+LED = ".model LED D(IS=1e-19 N=1.9 RS=5)"
+
 #: MAX3232: averaged charge pump. Doubler and inverter each behind 1/(f C) + switches; regulated at 5.5 V. With
 #: f = 200 kHz (memory) and 100 nF: 50 ohm + 4 x 15 ohm of switches. Drivers: 300 ohm / 10 in series (sheet: swing
-#: 5.4 V typical into 3 kohm).
+#: 5.4 V typical into 3 kohm). Receivers: 5 kohm at the line, threshold 1.5 V, 50 ohm at the output. Pins 1 to 16.
 MAX3232 = """
-.subckt MAX3232 vcc vp vm din1 dout1 din2 dout2
+.subckt MAX3232 c1p vp c1m c2p c2m vm dout2 rin2 rout2 din2 din1 rout1 rin1 dout1 gnd vcc cpump=100n
 .param rp = {1/(200k*cpump) + 60}
 Bp 0 vp I = max(0, min((2*V(vcc)-V(vp))/{rp}, 5.5-V(vp)))
 Bm vm 0 I = max(0, min((2*V(vcc)+V(vm))/{2*rp}, 5.5+V(vm)))
 Bd1 d1 0 V = 0.5*(V(vp)+V(vm)) - 0.5*(V(vp)-V(vm))*tanh(4*(V(din1)-1.4))
 Bd2 d2 0 V = 0.5*(V(vp)+V(vm)) - 0.5*(V(vp)-V(vm))*tanh(4*(V(din2)-1.4))
+Br1 r1 0 V = 0.5*V(vcc)*(1 - tanh(4*(V(rin1)-1.5)))
+Br2 r2 0 V = 0.5*V(vcc)*(1 - tanh(4*(V(rin2)-1.5)))
+Rr1 r1 rout1 50
+Rr2 r2 rout2 50
+Ri1 rin1 0 5k
+Ri2 rin2 0 5k
 Fp vp 0 Vpos 1
 Fm 0 vm Vneg 1
 Rd1 d1 dout1 30
 Rd2 d2 dout2 30
 * what the drivers deliver is taken from the pump
-Bpos q1 0 V = 0
-Vpos q1 q1x 0
-Bq1 q1x 0 I = max(0, V(d1)-V(dout1))/30 + max(0, V(d2)-V(dout2))/30
-Bneg q2 0 V = 0
-Vneg q2 q2x 0
-Bq2 q2x 0 I = max(0, V(dout1)-V(d1))/30 + max(0, V(dout2)-V(d2))/30
+Vpos q1x 0 0
+Bq1 0 q1x I = max(0, V(d1)-V(dout1))/30 + max(0, V(d2)-V(dout2))/30
+Vneg q2x 0 0
+Bq2 0 q2x I = max(0, V(dout1)-V(d1))/30 + max(0, V(dout2)-V(d2))/30
 .ends
 """
+
+#: All of them: what `netlist.circuit` refers to.
+MODELS = f"{BC817}\n{B340A}\n{MBRA210L}\n{SMBJ15A}\n{LED}\n{BUCK}\n{LM317}\n{MAX3232}"

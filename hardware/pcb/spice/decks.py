@@ -1,6 +1,6 @@
 """Every question that the simulator is asked, in the order of docs/board-simulation.md.
 
-Values come from the design, so that a changed resistor changes the deck.
+Circuits are the netlist's own (netlist.py): values, topology and polarity come from the design.
 """
 
 from hardware.pcb.circuit.design import build
@@ -13,4 +13,4 @@ from hardware.pcb.spice.thermal_decks import thermal_decks
 def decks() -> tuple[Deck, ...]:
     """Return every simulation of the board."""
     buck, linear = build("rev-b"), build("lm317")
-    return (*signal_decks(buck), *supply_decks(linear), *thermal_decks(buck))
+    return (*signal_decks(buck), *supply_decks(buck, linear), *thermal_decks(buck))

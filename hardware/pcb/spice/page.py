@@ -14,7 +14,8 @@ with our own behavioural models: `hardware/pcb/spice/deck.py` says
 where each figure comes from. They show what the circuit's values make of the data sheets' figures. No board has been
 built: nothing here is a measurement. Each figure has limits,
 and `tests/hardware/test_pcb_spice.py` and `make board-check`
-fail when one leaves them. Values of parts come from the design, so a changed resistor changes the circuit.
+fail when one leaves them. Circuits are built from the netlist:
+parts, values, polarity and nets are the design's, and only what is outside the board is written by hand.
 
 `python -m hardware.pcb simulate` runs all of them, renews the plots and writes this page.
 """

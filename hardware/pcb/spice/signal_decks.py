@@ -1,49 +1,58 @@
-"""Signals: reset, RS-232 levels, and current that one module feeds into the other."""
+"""Signals: reset, boot, every wire, RS-232 levels, and current that one module feeds into the other."""
 
-from adapter_sim.pinout import Direction, load_pinout
+from adapter_sim.pinout import Direction, Wire, WireRole, load_pinout
 from hardware.pcb.circuit.design import series_wires
-from hardware.pcb.circuit.electrical import ohms
 from hardware.pcb.circuit.modules import NOT_5V_TOLERANT
 from hardware.pcb.circuit.netlist import Design
 from hardware.pcb.circuit.parts import PARTS
-from hardware.pcb.spice.deck import BC817, CLAMP, MAX3232, Deck, limits
+from hardware.pcb.spice.deck import CLAMP, MODELS, Deck, limits
+from hardware.pcb.spice.netlist import circuit, node
 
 
 def signal_decks(design: Design) -> tuple[Deck, ...]:
     """Return the decks of a variant's signals."""
-    return (_reset(design), _rs232(), _rs232_low(), _back_power(design), _back_power_esp(design))
+    return (_reset(design), _boot(design), _wires(design), _rs232(design), _rs232_low(design), _back_power(design),
+            _back_power_esp(design))  # fmt: skip
+
+
+def _board(design: Design, *without: str) -> str:
+    """Return models and board without its regulator, the DTR jumper fitted."""
+    return f"{MODELS}\n" + circuit(design, closed=[("JP2.1", "JP2.2")], without=("REGULATOR3", *without))
+
+
+def _rail(design: Design, volts: float = 3.3) -> str:
+    return f"Vrail33 {node(design, 'U2.3V3')} 0 {volts:g}"
 
 
 def _reset(design: Design) -> Deck:
-    circuit = f"""
-{BC817}
-V3 v3 0 3.3
+    esp, en, pin = PARTS["ESP32"].facts, node(design, "U2.EN"), node(design, "U1.PB13")
+    text = f"""
+{_board(design, "MAX3232")}
+{_rail(design)}
 Vpin pin 0 PULSE(0 2.9 10m 1u 1u 30m 200m)
-* rev B
-Rb pin b {ohms(design, "R66"):g}
-Rbe b 0 {ohms(design, "R67"):g}
-Rup v3 en 10k
-Cen en 0 1u
-Q1 en b 0 BC817
+Rpin pin {pin} 1
+* the ESP32 module's own pull-up and capacitor
+Rup {node(design, "U2.3V3")} {en} {esp["en_pull_ohm"]:g}
+Cen {en} 0 {esp["en_farad"]:g}
 * the thesis: 2k2 in the emitter and at the collector
-Rb2 pin b2 2.2k
-Rup2 v3 en2 10k
-Rc2 v3 en2 2.2k
-Cen2 en2 0 1u
-Re2 e2 0 2.2k
-Q2 en2 b2 e2 BC817
+Rthesis_b pin b2 2.2k
+Rthesis_up {node(design, "U2.3V3")} en2 10k
+Rthesis_c {node(design, "U2.3V3")} en2 2.2k
+Cthesis en2 0 1u
+Rthesis_e e2 0 2.2k
+Qthesis en2 b2 e2 BC817
 .tran 20u 100m
 """
     return Deck(
-        name="reset", title="Reset: level at the ESP32's EN", circuit=circuit,
-        measures=("tran en_low find v(en) at=39m", "tran en_thesis find v(en2) at=39m",
-                  "tran en_back find v(en) at=99m",
-                  "tran fall trig v(pin) val=1.5 rise=1 targ v(en) val=0.6 fall=1"),
+        name="reset", title="Reset: level at the ESP32's EN", circuit=text,
+        measures=(f"tran en_low find v({en}) at=39m", "tran en_thesis find v(en2) at=39m",
+                  f"tran en_back find v({en}) at=99m",
+                  f"tran fall trig v(pin) val=1.5 rise=1 targ v({en}) val=0.6 fall=1"),
         limits=limits(("en_low", -0.1, 0.3, "V", "EN while PB13 is high"),
                       ("en_thesis", 0.83, 3.3, "V", "the thesis's circuit never gets below the threshold"),
                       ("en_back", 2.9, 3.3, "V", "EN 59 ms after the release"),
                       ("fall", 0, 5e-3, "s", "time until EN is low")),
-        traces=(("v(pin)", "PB13"), ("v(en)", "EN, rev B"), ("v(en2)", "EN, thesis")),
+        traces=(("v(pin)", "PB13"), (f"v({en})", "EN, rev B"), ("v(en2)", "EN, thesis")),
         x_label="time, ms", y_label="V", x_scale=1e3,
         cannot_say=(
             "It takes the module's pull-up (10k) and capacitor (1 uF) as they are usually fitted; clones "
@@ -52,81 +61,139 @@ Q2 en2 b2 e2 BC817
     )  # fmt: skip
 
 
-def _serial(vcc: float) -> str:
+def _boot(design: Design) -> Deck:
+    """Sweep the ESP32's own pull-downs in while nothing drives its pins: 0 is high-impedance, 1 is 45k each."""
+    esp = PARTS["ESP32"].facts
+    pins = ("IO17", "IO5", "IO15", "IO26", "IO12", "IO2", "IO23")
+    own = "\n".join(
+        f"Bown_{pin} {node(design, f'U2.{pin}')} 0 I = V(own)*V({node(design, f'U2.{pin}')})/{esp['pull_ohm']:g}"
+        for pin in pins
+    )
+    jumper = [("JP2.1", "JP2.2"), ("J5.1", "J5.2")]
+    text = f"""
+{MODELS}
+{circuit(design, closed=jumper, without=("REGULATOR3",))}
+{_rail(design)}
+Vown own 0 0
+Rline {node(design, "J3.3")} 0 3k
+{own}
+.dc Vown 0 1 0.05
+"""
+    din, line = node(design, "U5.11"), node(design, "J3.3")
+    dd3, s3 = node(design, "U1.PA6"), node(design, "U1.PC15")
+    mode, flash, io2 = node(design, "U2.IO26"), node(design, "U2.IO12"), node(design, "U2.IO2")
+    vih = PARTS["BLUEPILL"].facts["vih_v"]
+    return Deck(
+        name="boot", title="Boot: nothing drives the ESP32's pins yet, mode jumper fitted", circuit=text,
+        measures=(f"dc din_free find v({din}) at=0", f"dc din_down find v({din}) at=1", f"dc mark max v({line})",
+                  f"dc dd3_low min v({dd3})", f"dc s3_low min v({s3})", f"dc mode_low min v({mode})",
+                  f"dc io12_high max v({flash})", f"dc io2_high max v({io2})"),
+        limits=limits(("din_free", 2.0, 3.4, "V", "driver's input, IO17 high-impedance: above VIH"),
+                      ("din_down", 2.0, 3.4, "V", "the same against the ESP32's pull-down"),
+                      ("mark", -15, -3.7, "V", "TX to the robot stays at mark"),
+                      ("dd3_low", vih, 3.4, "V", "DD3 at PA6: idle 1, as the pin-out says"),
+                      ("s3_low", vih, 3.4, "V", "encoder2_s3 at PC15: idle 1, as the pin-out says"),
+                      ("mode_low", esp["vih_v"], 3.4, "V", "mode jumper at IO26, against both pull-downs"),
+                      ("io12_high", -0.1, esp["vil_v"], "V", "IO12: a low selects 3.3 V flash"),
+                      ("io2_high", -0.1, esp["vil_v"], "V", "IO2: low, as the boot wants")),
+        traces=((f"v({din})", "driver's input"), (f"v({dd3})", "DD3 at PA6"), (f"v({s3})", "encoder2_s3 at PC15"),
+                (f"v({mode})", "IO26, jumper fitted")),
+        x_label="the ESP32's own pull-downs, 0: off, 1: 45 kohm", y_label="V",
+        cannot_say="The ESP32's pulls are its sheet's typical 45 kohm; a chip has 30 to 80 kohm.",
+    )  # fmt: skip
+
+
+#: One wire after the other is high for a slot.
+_SLOT_S = 1e-3
+
+
+def _ends(wire: Wire) -> tuple[str, str]:
+    """Return driver and receiver of a wire as pins."""
+    pads = f"U1.{wire.bluepill}", f"U2.{wire.esp32_pin('rev-b')}"
+    return pads if wire.direction is Direction.TO_ADAPTER else (pads[1], pads[0])
+
+
+def _wires(design: Design) -> Deck:
+    wires = series_wires(load_pinout())
+    drivers, receivers = [], []
+    for slot, wire in enumerate(wires):
+        near, far = (node(design, pin) for pin in _ends(wire))
+        drivers.append(
+            f"Vd{slot} d{slot} 0 PULSE(0 3.3 {slot * _SLOT_S:g} 1u 1u {0.9 * _SLOT_S:g} 1)\nRd{slot} d{slot} {near} 30"
+        )
+        receivers.append(far)
+    text = f"""
+{_board(design, "MAX3232")}
+{_rail(design)}
+{chr(10).join(drivers)}
+Ball all 0 V = {" + ".join(f"V({far})" for far in receivers)}
+.tran 20u {len(wires) * _SLOT_S:g}
+"""
+    low = {Direction.TO_ADAPTER: PARTS["ESP32"].facts["vih_v"], Direction.TO_BLUEPILL: PARTS["BLUEPILL"].facts["vih_v"]}
+    rows = [
+        (wire.name.lower(), low[wire.direction], 3.4, "V", f"{_ends(wire)[0]} high, at {_ends(wire)[1]}")
+        for wire in wires
+    ]
+    return Deck(
+        name="wires", title="Each wire in turn, from its driver's pad to its receiver's", circuit=text,
+        measures=(*(f"tran {wire.name.lower()} find v({far}) at={(slot + 0.5) * _SLOT_S:g}"
+                    for slot, (wire, far) in enumerate(zip(wires, receivers, strict=True))),
+                  "tran most max v(all)"),
+        limits=limits(*rows, ("most", 0, 3.4, "V", "all receivers together: never two high at once")),
+        traces=(("v(all)", "sum of all receivers"), (f"v({receivers[0]})", "DD1"),
+                (f"v({receivers[-1]})", "p2dx_con")),
+        x_label="time, ms", y_label="V", x_scale=1e3,
+        cannot_say="Pins are 30 ohm sources and open inputs; the LED at PC13 is in the arithmetic, not here.",
+    )  # fmt: skip
+
+
+def _serial(design: Design, vcc: float) -> str:
+    pump, minus = node(design, "U5.2"), node(design, "U5.6")
     return f"""
-.param cpump={PARTS["C 100n"].facts["farad"]:g}
-{MAX3232}
-Vcc vcc 0 {vcc:g}
-Vtx tx 0 PULSE(0 3.3 0.2m 1u 1u 104u 208u)
-Vdin2 din2 0 0
-X1 vcc vp vm tx dout din2 dtr MAX3232
-Cvp vp 0 100n
-Cvm vm 0 100n
-Rtx dout 0 3k
-Ctx dout 0 1n
-Rdtr dtr 0 3k
-.ic v(vp)=5.4 v(vm)=-5.4
+{_board(design)}
+{_rail(design, vcc)}
+Vtx tx 0 PULSE(0 {vcc:g} 0.2m 1u 1u 104u 208u)
+Rtxpin tx {node(design, "U2.IO17")} 30
+* the robot: 3 kohm at our drivers, its own driver at pin 2
+Rtx {node(design, "J3.3")} 0 3k
+Ctx {node(design, "J3.3")} 0 1n
+Rdtr {node(design, "J3.4")} 0 3k
+Vrobot robot 0 PULSE(-6 6 0.2m 1u 1u 104u 208u)
+Rrobot robot {node(design, "J3.2")} 300
+.ic v({pump})=5.4 v({minus})=-5.4
 .options method=gear
 .tran 0.2u 2m uic
 """
 
 
-def _rs232() -> Deck:
+_SERIAL_CANNOT = "The averaged pump is fitted to the sheet's typical 5.4 V (5.0 V guaranteed); no ripple, no spread."
+
+
+def _serial_deck(design: Design, name: str, title: str, vcc: float, swing: float) -> Deck:
+    tx, dtr, rx = node(design, "J3.3"), node(design, "J3.4"), node(design, "U2.IO16")
     return Deck(
-        name="rs232", title="RS-232 levels at 3.3 V, 3 kohm at TX and DTR, 9600 baud", circuit=_serial(3.3),
-        measures=("tran high max v(dout) from=0.5m to=2m", "tran low min v(dout) from=0.5m to=2m",
-                  "tran dtr_low min v(dtr) from=0.5m to=2m"),
-        limits=limits(("high", 5.0, 15, "V", "space on TX"),
-                      ("low", -15, -5.0, "V", "mark on TX"),
-                      ("dtr_low", 5.0, 15, "V", "DTR asserted, at its lowest")),
-        traces=(("v(dout)", "TX (DE-9 pin 3)"), ("v(dtr)", "DTR (DE-9 pin 4)"), ("v(tx)", "TXD, logic")),
-        x_label="time, ms", y_label="V", x_scale=1e3,
-        cannot_say=(
-            "An averaged pump has no ripple and no spread; the sheet guarantees 5.0 V, the model is fitted to "
-            "its typical 5.4 V."
-        ),
+        name=name, title=title, circuit=_serial(design, vcc),
+        # In the middle of bits: IO17 and the robot's pin 2 are high at 0.65 ms, low at 0.75 ms.
+        measures=(f"tran mark find v({tx}) at=0.67m", f"tran space find v({tx}) at=0.77m",
+                  f"tran dtr_low min v({dtr}) from=0.5m to=2m",
+                  f"tran rx_low find v({rx}) at=0.67m", f"tran rx_high find v({rx}) at=0.77m"),
+        limits=limits(("space", swing, 15, "V", "space at plug pin 3, IO17 low"),
+                      ("mark", -15, -swing, "V", "mark at plug pin 3, IO17 high"),
+                      ("dtr_low", swing, 15, "V", "DTR at plug pin 4, at its lowest"),
+                      ("rx_low", -0.1, PARTS["ESP32"].facts["vil_v"], "V", "IO16 while the robot sends a space"),
+                      ("rx_high", 0.75 * vcc, vcc + 0.1, "V", "IO16 while the robot sends a mark")),
+        traces=((f"v({tx})", "TX (DE-9 pin 3)"), (f"v({dtr})", "DTR (DE-9 pin 4)"), ("v(tx)", "IO17"),
+                (f"v({rx})", "IO16")),
+        x_label="time, ms", y_label="V", x_scale=1e3, cannot_say=_SERIAL_CANNOT,
     )  # fmt: skip
 
 
-def _rs232_low() -> Deck:
-    return Deck(
-        name="rs232-low", title="RS-232 levels at 3.0 V", circuit=_serial(3.0),
-        measures=("tran high max v(dout) from=0.5m to=2m", "tran low min v(dout) from=0.5m to=2m",
-                  "tran dtr_low min v(dtr) from=0.5m to=2m"),
-        limits=limits(("high", 3.7, 15, "V", "space on TX: a receiver needs 3 V"),
-                      ("low", -15, -3.7, "V", "mark on TX: a receiver needs -3 V"),
-                      ("dtr_low", 3.7, 15, "V", "DTR asserted")),
-        traces=(("v(dout)", "TX"), ("v(dtr)", "DTR")), x_label="time, ms", y_label="V", x_scale=1e3,
-        cannot_say=(
-            "Whether the ESP32 module's regulator really falls to 3.0 V: this is only the lower end of the "
-            "transceiver's range."
-        ),
-    )  # fmt: skip
+def _rs232(design: Design) -> Deck:
+    return _serial_deck(design, "rs232", "RS-232 both ways at 3.3 V, 3 kohm at TX and DTR, 9600 baud", 3.3, 5.0)
 
 
-def _back_power(design: Design) -> Deck:
-    lines = "\n".join(
-        f"Vd{n} d{n} 0 3.3\nRo{n} d{n} e{n} 30\nRs{n} e{n} p{n} {ohms(design, ref):g}\nDc{n} p{n} rail CLAMP"
-        for n, ref in enumerate(_clamped(design))
-    )
-    circuit = f"""
-{CLAMP}
-{lines}
-{_RAIL}
-"""
-    return Deck(
-        name="back-power", title="ESP32 on, BluePill off: current through the series resistors", circuit=circuit,
-        measures=("dc all_pins find v(total) at=0", "dc pin min i(vd0)", "dc rail100 find v(rail) when v(meet)=0"),
-        limits=limits(("all_pins", 0, 25, "mA", "into the BluePill in all, its rail held at 0 V"),
-                      ("pin", -5e-3, 0, "A", "into the pin with the smallest resistor"),
-                      ("rail100", 0, 2.0, "V", "rail with a load of 100 ohm: below where an STM32F103 runs")),
-        traces=(("v(total)", "into the BluePill, mA"), ("v(load)", "what 100 ohm would take, mA")),
-        x_label="rail of the unpowered BluePill, V", y_label="mA",
-        cannot_say=(
-            "What an unpowered chip does with it: its rail is a voltage here; 5 V tolerant pins are taken to "
-            "have no clamp."
-        ),
-    )  # fmt: skip
+def _rs232_low(design: Design) -> Deck:
+    return _serial_deck(design, "rs232-low", "RS-232 at 3.0 V: a receiver needs 3 V", 3.0, 3.7)
 
 
 #: The unpowered rail as a swept source: what enters it, and what a load of 100 ohm would take, both in mA.
@@ -139,26 +206,43 @@ Bmeet meet 0 V = V(total) - V(load)
 """
 
 
-def _clamped(design: Design) -> list[str]:
-    found = [
-        (ohms(design, f"R{number}"), f"R{number}")
-        for number, wire in enumerate(series_wires(load_pinout()), start=1)
-        if wire.direction is Direction.TO_BLUEPILL and wire.bluepill in NOT_5V_TOLERANT
-    ]
-    return [ref for _, ref in sorted(found)]
+def _fed(design: Design, direction: Direction) -> str:
+    """Drive the wires of a direction high at the module that is on; clamp them at the one that is off."""
+    lines = [CLAMP, _board(design, "MAX3232")]
+    for number, wire in enumerate(load_pinout().wires):
+        if wire.direction is not direction or wire.role is WireRole.RESET:
+            continue
+        near, far = (node(design, pin) for pin in _ends(wire))
+        lines.append(f"Vd{number} d{number} 0 3.3\nRo{number} d{number} {near} 30")
+        if direction is Direction.TO_ADAPTER or wire.bluepill in NOT_5V_TOLERANT:
+            lines.append(f"Vm{wire.bluepill} {far} c{number} 0\nDc{number} c{number} rail CLAMP")
+    if direction is Direction.TO_BLUEPILL:
+        lines.append(_rail(design))
+    return "\n".join([*lines, _RAIL])
+
+
+def _back_power(design: Design) -> Deck:
+    return Deck(
+        name="back-power", title="ESP32 on, BluePill off: current through the series resistors",
+        circuit=_fed(design, Direction.TO_BLUEPILL),
+        measures=("dc all_pins find v(total) at=0", "dc pin find i(vmpc13) at=0",
+                  "dc rail100 find v(rail) when v(meet)=0"),
+        limits=limits(("all_pins", 0, 25, "mA", "into the BluePill in all, its rail held at 0 V"),
+                      ("pin", 0, 5e-3, "A", "into PC13, the pin with the smallest resistor"),
+                      ("rail100", 0, 2.0, "V", "rail with a load of 100 ohm: below where an STM32F103 runs")),
+        traces=(("v(total)", "into the BluePill, mA"), ("v(load)", "what 100 ohm would take, mA")),
+        x_label="rail of the unpowered BluePill, V", y_label="mA",
+        cannot_say=(
+            "What an unpowered chip does with it: its rail is a voltage here; 5 V tolerant pins are taken to "
+            "have no clamp."
+        ),
+    )  # fmt: skip
 
 
 def _back_power_esp(design: Design) -> Deck:
-    lines = "\n".join(f"Rs{n} on p{n} {ohms(design, ref) + 30:g}\nDc{n} p{n} rail CLAMP"
-                      for n, ref in enumerate(_driven_by_bluepill()))  # fmt: skip
-    circuit = f"""
-{CLAMP}
-Von on 0 3.3
-{lines}
-{_RAIL}
-"""
     return Deck(
-        name="back-power-esp32", title="BluePill on, ESP32 off: current through the series resistors", circuit=circuit,
+        name="back-power-esp32", title="BluePill on, ESP32 off: current through the series resistors",
+        circuit=_fed(design, Direction.TO_ADAPTER),
         measures=("dc all_pins find v(total) at=0", "dc rail100 find v(rail) when v(meet)=0"),
         limits=limits(("all_pins", 0, 25, "mA", "into the ESP32 in all, its rail held at 0 V"),
                       ("rail100", 0, 2.3, "V", "rail with a load of 100 ohm: below the ESP32's brown-out level")),
@@ -166,8 +250,3 @@ Von on 0 3.3
         x_label="rail of the unpowered ESP32, V", y_label="mA",
         cannot_say="The ESP32's sheet gives no injection limit; the STM32's is borrowed.",
     )  # fmt: skip
-
-
-def _driven_by_bluepill() -> list[str]:
-    wires = enumerate(series_wires(load_pinout()), start=1)
-    return [f"R{number}" for number, wire in wires if wire.direction is Direction.TO_ADAPTER]

@@ -8,6 +8,7 @@ the middle of the axle, on the floor.
 Invariant: the same calls after the same `reset` give the same states, bit for bit.
 """
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import NamedTuple, Protocol, Self
@@ -183,8 +184,15 @@ class RobotBody(Protocol):
         """Return the collisions since this was asked last, the last 16 at the most."""
         ...
 
-    def clearance(self) -> float:
-        """Return the plan-view distance from the hull to the nearest thing it could touch, metres; 0 in contact."""
+    def most_radps(self, rim_mps: float) -> float | None:
+        """Return how fast a wheel turns at most while it is told no more than `rim_mps`; None: it may be pushed."""
+        ...
+
+    def clearance(self, *, no_more_than: float = math.inf) -> float:
+        """Return the plan-view distance from the hull to the nearest thing it could touch, metres; 0 in contact.
+
+        Things farther than `no_more_than` are not looked at; the answer is then that.
+        """
         ...
 
     def place(self, obstacle: Obstacle) -> None:

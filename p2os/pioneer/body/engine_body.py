@@ -58,11 +58,16 @@ class EngineBody(BodyInWorld):
             self._state = self._read()
         return self._state
 
-    def clearance(self) -> float:
-        """Return the plan-view distance from the hull to the nearest thing that it could touch, metres."""
+    def most_radps(self, rim_mps: float) -> float | None:  # noqa: ARG002  # the contract's
+        """Return None: what pushes the robot turns its wheels too."""
+        return None
+
+    def clearance(self, *, no_more_than: float = math.inf) -> float:
+        """Return the plan-view distance from the hull to the nearest thing that it could touch, metres, or that."""
         state = self.state
         self._tell_plan()
-        return self._nearest_robot(self._plan.clearance(state.x_m, state.y_m, state.heading_rad))
+        free = self._plan.clearance(state.x_m, state.y_m, state.heading_rad, no_more_than=no_more_than)
+        return self._nearest_robot(free)
 
     def _count_anew(self) -> None:
         """Begin to count contacts and stalls."""

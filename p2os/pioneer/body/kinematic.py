@@ -465,6 +465,11 @@ class KinematicBody(BodyInWorld):
         things = self._plan.echoing_within(min(xs), min(ys), max(xs), max(ys))
         return [*things, *self._echoing_robots(x, y, rays, longest_m)] if self.others else things
 
-    def clearance(self) -> float:
-        """Return the distance from the hull to the nearest thing that it could touch, metres."""
-        return self._nearest_robot(self._plan.clearance(self._x, self._y, self._heading))
+    def most_radps(self, rim_mps: float) -> float | None:
+        """Return how fast a wheel turns at most while it is told no more than `rim_mps`; None: a robot may push it."""
+        return None if self.others else rim_mps / self._radius_m
+
+    def clearance(self, *, no_more_than: float = math.inf) -> float:
+        """Return the distance from the hull to the nearest thing that it could touch, metres, or `no_more_than`."""
+        free = self._plan.clearance(self._x, self._y, self._heading, no_more_than=no_more_than)
+        return self._nearest_robot(free)

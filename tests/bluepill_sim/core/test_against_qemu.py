@@ -15,7 +15,6 @@ import pytest
 from bluepill_sim.board import BluePill
 from bluepill_sim.core import BLOCK, BlockRecorder
 from bluepill_sim.core.recorder import LAST_ROWS
-from bluepill_sim.extension.library import library_path
 from bluepill_sim.program.image import Image, SymbolTable
 from tests.bluepill_sim.core.thumb_streams import SRAM, SRAM_BYTES, Program, program
 
@@ -104,7 +103,6 @@ def test_random_programs_do_not_depend_on_breakpoints_and_steps() -> None:
     assert board.cycle == cycles
 
 
-@pytest.mark.skipif(library_path() is None, reason="the native core is not built: no C compiler")
 @pytest.mark.parametrize("seed", range(20, 24))
 def test_random_programs_are_the_same_on_both_cores(seed: int, monkeypatch: pytest.MonkeyPatch) -> None:
     """Interrupted by a tick at any block: every block and exception at its cycle, and all that decides the future."""

@@ -6,11 +6,9 @@ import pytest
 
 from bluepill_sim import BluePill
 from bluepill_sim.core.accesses import may_end_in_it
-from bluepill_sim.extension.library import library_path
 from tests.bluepill_sim.machine import COUNTER_ON, Machine, listen
 
 PROGRAM = Path(__file__).parents[1] / "firmware" / "unoptimised.elf"
-pytestmark = pytest.mark.skipif(library_path() is None, reason="the native core is not built")
 
 #: r3 is the base of each access. The cycle counter counts, r1 is its address, [r2] holds it and [r2, #4] holds r2.
 COUNTING = f"""{COUNTER_ON}mov32 r2, #0x20000800

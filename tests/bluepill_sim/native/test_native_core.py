@@ -11,10 +11,7 @@ import pytest
 from bluepill_sim import BluePill
 from bluepill_sim.core import BlockRecorder
 from bluepill_sim.errors import BluePillError
-from bluepill_sim.extension.library import library_path
 from tests.bluepill_sim.machine import COUNTER_ON, Machine, listen
-
-pytestmark = pytest.mark.skipif(library_path() is None, reason="the native core is not built: no C compiler")
 
 FIRMWARE = files("robot_bench.firmware")
 PROGRAMS = {name: Path(str(FIRMWARE / f"{name}.elf")) for name in ("motors", "sensors", "encoders", "dodge")}

@@ -11,11 +11,8 @@ from bluepill_sim.analysis.edge_log import EdgeLog
 from bluepill_sim.analysis.probe import Probe
 from bluepill_sim.analysis.vcd import write_vcd
 from bluepill_sim.errors import BluePillError
-from bluepill_sim.extension.library import library_path
 from bluepill_sim.fabric.subscriptions import EDGE, Of
 from tests.bluepill_sim.machine import Machine
-
-pytestmark = pytest.mark.skipif(library_path() is None, reason="the native core is not built: no C compiler")
 
 GPIOB = 0x4001_0C00
 #: Port B on, PB0 to PB3 push-pull outputs (PB3 is the debug port's), PB4 an input with a pull that ODR chooses.

@@ -9,11 +9,8 @@ from hypothesis import strategies as st
 
 from bluepill_sim import BluePill
 from bluepill_sim.core.accesses import only_reads
-from bluepill_sim.extension.library import library_path
 from tests.bluepill_sim.machine import COUNTER_ON, Machine
 from tests.bluepill_sim.native.test_native_core import state
-
-pytestmark = pytest.mark.skipif(library_path() is None, reason="the native core is not built: no C compiler")
 
 SYSTICK = 15
 #: SysTick each 1000 cycles counts a word of SRAM up; port A has its clock, USART1 sends at 8 MHz / 69; the cycle

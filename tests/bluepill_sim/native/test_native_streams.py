@@ -8,11 +8,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from bluepill_sim import BluePill
-from bluepill_sim.extension.library import library_path
 from tests.bluepill_sim.machine import Machine
 from tests.bluepill_sim.native.test_native_core import state
-
-pytestmark = pytest.mark.skipif(library_path() is None, reason="the native core is not built: no C compiler")
 
 USART1, EXCEPTION = 0x4001_3800, 16 + 37
 TXEIE, TCIE, RXNEIE = 1 << 7, 1 << 6, 1 << 5

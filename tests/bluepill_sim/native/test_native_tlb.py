@@ -4,10 +4,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from bluepill_sim.extension.library import library_path
 from tests.bluepill_sim.machine import Machine
-
-pytestmark = pytest.mark.skipif(library_path() is None, reason="the native core is not built: no C compiler")
 
 #: A page of SRAM that nothing has touched, and the vectors' neighbour where the function is put.
 FRESH, CODE = 0x2000_1800, 0x2000_1000

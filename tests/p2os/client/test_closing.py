@@ -16,7 +16,6 @@ from types import FrameType
 from typing import Any, Self
 
 import pytest
-from p2os.client.interrupts import held_back
 
 import p2os
 from p2os import Robot

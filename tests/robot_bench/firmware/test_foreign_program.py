@@ -5,6 +5,7 @@ from pathlib import Path
 import pytest
 
 from bluepill_sim.board import BluePill
+from bluepill_sim.fabric.subscriptions import EDGE
 from robot_bench.run import run_scenario
 from robot_bench.scenario.scenario import load_scenario
 
@@ -21,9 +22,10 @@ def test_it_drives_turns_and_stops(mode: str, tmp_path: Path) -> None:
 
 
 def test_its_clocks_and_delays_come_out_right() -> None:
-    changes: dict[str, list[int]] = {}
+    changes: dict[str, list[int]] = {"PB5": [], "PB6": []}
     chip = BluePill(FOREIGN / "foreign.elf")
-    chip.on_pin = lambda pin, _drive, at_ns: changes.setdefault(pin, []).append(at_ns)
+    for pin, edges in changes.items():
+        chip.subscribe_pins([pin], lambda rows, edges=edges: edges.extend(at for at, *_ in EDGE.iter_unpack(rows)))  # type: ignore[misc]  # bound at once
     chip.advance_to(30 * MS)
     assert chip.hclk_hz == 72_000_000
     while chip.now_ns < 7_000 * MS:

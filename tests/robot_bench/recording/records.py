@@ -1,6 +1,7 @@
 """Run records made by hand, for goals and exports."""
 
 from robot_bench.recording.run_record import PoseSample, RunRecord
+from robot_bench.wires.edges import Edges
 
 S = 10**9
 
@@ -15,16 +16,16 @@ def text(*lines: tuple[float, str]) -> list[tuple[int, bytes]]:
     return [(round(at * S), (line + "\n").encode()) for at, line in lines]
 
 
-def motor_pins(*steps: tuple[float, int, int], skew_ns: int = 0) -> dict[str, list[tuple[int, int]]]:
+def motor_pins(*steps: tuple[float, int, int], skew_ns: int = 0) -> dict[str, Edges]:
     """Edges of both motors' pins for (seconds, left value, right value); the right ones come later by the skew."""
-    pins: dict[str, list[tuple[int, int]]] = {}
+    pins: dict[str, Edges] = {}
     for motor in (1, 2):
         for bit in range(3):
-            edges: list[tuple[int, int]] = []
+            edges = Edges()
             for at, *values in steps:
                 level = values[motor - 1] >> bit & 1
                 if not edges or edges[-1][1] != level:
-                    edges.append((round(at * S) + (skew_ns if motor == 2 and at else 0), level))
+                    edges.append(round(at * S) + (skew_ns if motor == 2 and at else 0), level)
             pins[f"motor{motor}_comm{bit + 1}"] = edges
     return pins
 

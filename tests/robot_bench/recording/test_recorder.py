@@ -1,13 +1,12 @@
 """The recorder tells every wire's level at time 0 and each change of it once, whatever the order of telling."""
 
-import json
-
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 from p2os.errors import LocalProtocolError
 from robot_bench.recording.recorder import Recorder
+from robot_bench.recording.run_record import record_of
 from robot_bench.recording.trace import TraceWriter
 from robot_bench.wires.nets import Harness, Net, Strength
 
@@ -26,9 +25,9 @@ Told = list[tuple[str, int, int]]
 
 
 def told(trace: TraceWriter) -> Told:
-    """Return (net, ns, level) of each pin entry, sorted by net and time."""
-    lines = [json.loads(line) for line in trace.text.splitlines()]
-    return sorted((line["net"], line["t"], line["v"]) for line in lines if line["k"] == "pin")
+    """Return (net, ns, level) of each recorded level, sorted by net and time."""
+    pins = record_of(trace.text.splitlines(keepends=True)).pins
+    return sorted((net, at, level) for net, edges in pins.items() for at, level in edges)
 
 
 def settled(idle: bool, wanted: list[tuple[int, str, str, bool, Strength]]) -> Told:

@@ -14,7 +14,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from p2os.errors import LocalProtocolError, RunFailedError
-from robot_bench.recording.run_record import TraceError, read_run
+from robot_bench.recording.run_record import TraceError, read_run, record_of
 from robot_bench.recording.trace import RANKS, TraceWriter, canonical
 from simbase.errors import FileError
 
@@ -64,19 +64,19 @@ def test_what_comes_after_its_time_was_written_is_a_bug() -> None:
     trace = TraceWriter()
     trace.write_until(5)
     with pytest.raises(LocalProtocolError, match="at 5 ns comes after 5 ns"):
-        trace.add("pin", 5, {})
+        trace.add("pins", 5, {})
 
 
 def test_first_and_last_line_are_not_hashed(tmp_path: Path) -> None:
     path = tmp_path / "trace.jsonl"
     trace = TraceWriter(path)
     trace.meta({"version": "1"})
-    trace.add("pin", 0, {"net": "DD1", "v": 0})
+    trace.add("pins", 0, {"net": "DD1", "v": 0})
     trace.write_until(0)
     digest = trace.sha256
     trace.end({"passed": True})
     lines = path.read_text().splitlines(keepends=True)
-    assert [json.loads(line)["k"] for line in lines] == ["meta", "pin", "end"]
+    assert [json.loads(line)["k"] for line in lines] == ["meta", "pins", "end"]
     assert digest == chain(lines[1])
     trace.close()
 
@@ -96,12 +96,12 @@ def test_a_full_disk_is_one_line() -> None:
 
 def test_a_restored_writer_goes_on_alike() -> None:
     first, second = TraceWriter(), TraceWriter()
-    first.add("pin", 3, {"v": 1})
-    first.add("pin", 9, {"v": 2})
+    first.add("pins", 3, {"v": 1})
+    first.add("pins", 9, {"v": 2})
     first.write_until(5)
     second.restore(first.snapshot())
     for trace in (first, second):
-        trace.add("pin", 7, {"v": 3})
+        trace.add("pins", 7, {"v": 3})
         trace.write_until(10)
     assert (second.text, second.sha256) == (first.text, first.sha256)
 
@@ -109,14 +109,14 @@ def test_a_restored_writer_goes_on_alike() -> None:
 def begun(path: Path | None) -> TraceWriter:
     trace = TraceWriter(path)
     trace.meta({"version": "1"})
-    trace.add("pin", 3, {"v": 1})
-    trace.add("pin", 9, {"v": 2})
+    trace.add("pins", 3, {"v": 1})
+    trace.add("pins", 9, {"v": 2})
     trace.write_until(5)
     return trace
 
 
 def ended(trace: TraceWriter) -> str:
-    trace.add("pin", 7, {"v": 3})
+    trace.add("pins", 7, {"v": 3})
     trace.write_until(10)
     trace.end({"passed": True})
     return trace.sha256
@@ -202,9 +202,55 @@ def test_the_largest_time_that_64_bits_hold_is_read(tmp_path: Path) -> None:
         '{"k":"obstacle","t":1,"op":"place"}',
         f'{{"k":"pin","net":"a","t":{2**63},"v":1}}',
         f'{{"k":"sonar","t":1,"mm":[{10**400}]}}',
+        '{"k":"pin","net":"a","t":0,"v":300}',
+        '{"k":"pins","nets":["a","b"],"levels":"0","t":0,"v":1}',
+        '{"k":"pins","nets":["a"],"levels":"x","t":0,"v":1}',
+        '{"d":"AA==","k":"pins","n":1,"t":5}',
     ],
 )
 def test_a_damaged_line_is_named_by_its_number(tmp_path: Path, line: str) -> None:
     (tmp_path / "trace.jsonl").write_text('{"k":"meta","scenario":"s"}\n' + line + "\n", encoding="utf-8")
     with pytest.raises(TraceError, match=r"trace\.jsonl:2: a damaged line"):
         read_run(tmp_path)
+
+
+HEAD = '{"k":"pins","levels":"01","nets":["a","b"],"t":0,"v":1}\n'
+#: 100 ns: a; 100 ns: b; 103 ns: a. Two wires: 0 * 2 + 0, 0 * 2 + 1, 3 * 2 + 0.
+BLOCK = '{"d":"AAEG","k":"pins","n":3,"t":100}\n'
+
+
+def test_blocks_are_read_and_toggle_each_wire_from_its_level() -> None:
+    record = record_of([HEAD, BLOCK, BLOCK.replace("100", "500")])
+    assert record.pins == {"a": [(0, 0), (100, 1), (103, 0), (500, 1), (503, 0)], "b": [(0, 1), (100, 0), (500, 1)]}
+    assert record.last_ns == 503
+
+
+@pytest.mark.parametrize(
+    "block",
+    [
+        BLOCK.replace('"n":3', '"n":2'),
+        BLOCK.replace("AAEG", "AAGG"),  # cut within a number
+        BLOCK.replace("AAEG", "A"),  # no base64
+        BLOCK.replace('"t":100', '"t":-1'),
+        BLOCK.replace('"t":100', f'"t":{2**63 - 1}'),
+    ],
+)
+def test_a_damaged_block_is_named_by_its_number(block: str) -> None:
+    with pytest.raises(TraceError, match="the trace:2: a damaged line"):
+        record_of([HEAD, block])
+
+
+def test_blocks_of_a_later_version_are_refused_in_words() -> None:
+    with pytest.raises(TraceError, match="the trace:1: edges as a later version writes them"):
+        record_of([HEAD.replace('"v":1', '"v":2')])
+
+
+def test_a_trace_that_was_cut_anywhere_within_a_block_is_read_up_to_the_line_before() -> None:
+    whole = record_of([HEAD])
+    for end in range(len(BLOCK)):
+        assert record_of([HEAD, BLOCK[:end]]) == whole
+
+
+def test_a_trace_of_single_edges_is_read_too() -> None:
+    lines = [f'{{"k":"pin","net":"a","t":{t},"v":{v}}}\n' for t, v in ((0, 0), (7, 1), (9, 0))]
+    assert record_of(lines).pins == {"a": [(0, 0), (7, 1), (9, 0)]}

@@ -4,7 +4,6 @@ import json
 from pathlib import Path
 
 import pytest
-from bluepill_sim.native.library import library_path
 
 from bluepill_sim.program.image import load_image
 from p2os.cli.main import run as p2os
@@ -12,8 +11,7 @@ from robot_bench.recording.run_folder import FILES
 from robot_bench.run import Progress, RunResult, run_scenario
 from robot_bench.scenario.scenario import Scenario, load_scenario
 
-needs_native = pytest.mark.skipif(library_path() is None, reason="the native core is not built")
-CASES = [("python", "adapter"), *(pytest.param("native", mode, marks=needs_native) for mode in ("direct", "adapter"))]
+CASES = [("python", "adapter"), ("native", "direct"), ("native", "adapter")]
 COVERAGE = {"coverage.txt", "coverage.html", "coverage.info"}
 PROFILE = {"profile.txt", "profile.folded", "profile.svg"}
 
@@ -39,7 +37,6 @@ def test_a_measured_run_has_the_trace_of_one_that_is_not(
     assert "coverage" not in plain.outcome
 
 
-@needs_native
 def test_both_cores_measure_the_same(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     for core in ("native", "python"):
         monkeypatch.setenv("P2OS_CORE", core)

@@ -1,10 +1,11 @@
 """A chip without a processor: a script of pin changes and printed text, with times."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from types import SimpleNamespace
 
 from bluepill_sim.fabric.pins import PinDrive
+from bluepill_sim.fabric.subscriptions import EDGE, EdgeSink, Of
 from simbase.timing import Reached, Reason
 
 
@@ -21,15 +22,45 @@ class FakePin:
         self._chip = chip
         self.name = name
         self.outside: bool | None = None
-        self.is_watched = False
+        self.is_weak = False
 
-    def drive(self, level: bool | None) -> None:
-        if level is not self.outside:
-            self.outside = level
+    def drive(self, level: bool | None, *, is_weak: bool = False) -> None:
+        if (level, is_weak) != (self.outside, self.is_weak):
+            self.outside, self.is_weak = level, is_weak
             self._chip.inputs.append((self._chip.now_ns, self.name, level))
 
-    def watch(self, on: bool = True) -> None:
-        self.is_watched = on
+
+class FakeSubscription:
+    def __init__(self, pins: Iterable[str], sink: EdgeSink, ends_slice: Iterable[str]) -> None:
+        self.pins, self.sink, self.ends_slice = frozenset(pins), sink, frozenset(ends_slice)
+        self.rows = bytearray()
+
+    def deliver(self) -> None:
+        rows = bytes(self.rows)
+        self.rows.clear()
+        if rows:
+            self.sink(rows)
+
+    def close(self) -> None:
+        self.deliver()
+        self.pins = frozenset()
+
+
+class FakeUsart:
+    def __init__(self) -> None:
+        self.far_baud: int | None = None
+        self.measured_baud: int | None = None
+        self.sinks: list[Callable[[Sequence[tuple[int, int]]], None]] = []
+        self.sent: list[tuple[int, int]] = []
+
+    def subscribe(self, sink: Callable[[Sequence[tuple[int, int]]], None]) -> Callable[[], None]:
+        self.sinks.append(sink)
+        return lambda: self.sinks.remove(sink)
+
+    def deliver(self) -> None:
+        sent, self.sent = self.sent, []
+        for sink in self.sinks if sent else ():
+            sink(sent)
 
 
 class FakeChip:
@@ -45,9 +76,9 @@ class FakeChip:
     ) -> None:
         self.now_ns = 0
         self.inputs: list[tuple[int, str, bool | None]] = []
-        self.on_pin: Callable[[str, PinDrive, int], None] | None = None
         self.on_warning: Callable[[str], None] | None = None
-        self.usart1 = SimpleNamespace(on_transmit=None, far_baud=None, measured_baud=None)
+        self.usart1 = FakeUsart()
+        self.subscriptions: list[FakeSubscription] = []
         self.warnings: list[str] = []
         self.fault: FakeFault | None = None
         #: When the firmware comes back from its fault; None for never.
@@ -74,6 +105,13 @@ class FakeChip:
     def pin(self, name: str) -> FakePin:
         return self._pins.setdefault(name, FakePin(self, name))
 
+    def subscribe_pins(
+        self, pins: Iterable[str], sink: EdgeSink, *, of: Of = Of.DRIVE, ends_slice: Iterable[str] = ()
+    ) -> FakeSubscription:
+        assert of is Of.DRIVE
+        self.subscriptions.append(FakeSubscription(pins, sink, ends_slice))
+        return self.subscriptions[-1]
+
     def last_blocks(self) -> list[str]:
         return [] if self.fault is None else ["          12  main+0x4 (0x08000104)"]
 
@@ -81,6 +119,13 @@ class FakeChip:
         return "main+0x4 (0x08000104)"
 
     def advance_to(self, limit: int) -> Reached:
+        try:
+            return self._advance(limit)
+        finally:
+            for sender in (*self.subscriptions, self.usart1):
+                sender.deliver()
+
+    def _advance(self, limit: int) -> Reached:
         while self.now_ns < limit:
             boundary = (limit + self._block_ns - 1) // self._block_ns * self._block_ns
             if self._done < len(self._script) and self._script[self._done][0] <= boundary:
@@ -102,21 +147,23 @@ class FakeChip:
         return Reached(self.now_ns, Reason.DEADLINE)
 
     def _tell(self, at: int, name: str, what: object) -> bool:
-        if name:
-            self.activity.last_pin_ns = at
-            assert isinstance(what, PinDrive)
-            if self.on_pin is not None:
-                self.on_pin(name, what, at)
-            return self.pin(name).is_watched
-        self.activity.last_usart_ns = at
-        if self.usart1.on_transmit is not None:
-            self.usart1.on_transmit(what, at)
-        return False
+        if not name:
+            assert isinstance(what, int)
+            self.activity.last_usart_ns = at
+            self.usart1.sent.append((what, at))
+            return False
+        assert isinstance(what, PinDrive)
+        self.activity.last_pin_ns = at
+        number, drive = 16 * (ord(name[1]) - ord("A")) + int(name[2:]), list(PinDrive).index(what)
+        subscribed = [item for item in self.subscriptions if name in item.pins]
+        for item in subscribed:
+            item.rows += EDGE.pack(at, number, drive, int(bool(what.level)), 0, 0)
+        return any(name in item.ends_slice for item in subscribed)
 
     def snapshot(self) -> object:
-        return (self.now_ns, self._done, tuple((name, pin.outside) for name, pin in self._pins.items()))
+        return (self.now_ns, self._done, tuple((name, pin.outside, pin.is_weak) for name, pin in self._pins.items()))
 
     def restore(self, snapshot: object) -> None:
         self.now_ns, self._done, pins = snapshot  # type: ignore[misc]
-        for name, outside in pins:
-            self.pin(name).outside = outside
+        for name, outside, is_weak in pins:
+            self.pin(name).outside, self.pin(name).is_weak = outside, is_weak

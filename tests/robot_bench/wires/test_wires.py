@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from p2os.errors import LocalProtocolError
-from robot_bench.wires.nets import Contention, Drive, Harness, Net, OwnedPins, Strength
+from robot_bench.wires.nets import Contention, Harness, Net, OwnedPins, Strength
 
 PP, OD, PULL, FLOATING = Strength.PUSH_PULL, Strength.OPEN_DRAIN, Strength.PULL, Strength.FLOATING
 
@@ -127,9 +127,6 @@ def test_what_the_others_do_is_told_apart_from_ones_own() -> None:
     net.drive("chip", True, PP, 1)
     assert net.level_without("chip", 1) == (False, False)
     assert net.level_without("board", 1) == (True, True)
-    assert net.drive_of("chip", 0) == Drive(level=False, strength=FLOATING)
-    assert net.drive_of("chip", 1) == Drive(level=True, strength=PP)
-    assert net.drive_of("nobody", 1).strength is FLOATING
 
 
 def test_a_restored_harness_goes_on_alike() -> None:
