@@ -208,7 +208,7 @@ bool resolve(struct core *core, uint32_t address, bool is_write, uint32_t bytes)
 
 static bool is_over(const struct core *core)
 {
-    return core->shared.cycle + core->block->straight >= core->shared.stop_at;
+    return core->shared.cycle + core->block->costs[0] >= core->shared.stop_at;
 }
 
 /* Finds the accessing instruction for Python, unless Python itself runs the blocks and knows it; false: not now. */

@@ -60,7 +60,12 @@ enum row_flag {
 };
 
 struct row {
-    uint32_t start, end, straight, taken, flags, count;
+    uint32_t start, end;
+    uint32_t costs[2]; /* in cycles, where it goes on at its end, and elsewhere */
+    /* The block that came after it last time, likewise, where nothing but its start and the time need be looked at;
+     * else the core's `none`. */
+    struct row *after[2];
+    uint32_t flags, count;
     const uint8_t *host; /* of code in writable memory: where it stands now */
     uint8_t *code;       /* and what it was when it was measured */
     struct row *next;    /* in the list of all rows, or of dropped ones */

@@ -39,7 +39,7 @@ bool polls_unchanged(struct core *core, const struct row *row)
     uint32_t registers[16];
     look(core, registers);
     const bool is_same = polling->rounds > FIRST_LOOK && !polling->asked &&
-                         core->shared.cycle == polling->cycle + row->taken &&
+                         core->shared.cycle == polling->cycle + row->costs[1] &&
                          memcmp(registers, polling->registers, sizeof registers) == 0;
     if (polling->rounds > FIRST_LOOK) {
         polling->rounds = is_same ? 0 : -NEXT_LOOK;
@@ -56,9 +56,9 @@ bool polls_unchanged(struct core *core, const struct row *row)
 void wait_on(struct core *core, const struct row *row)
 {
     struct shared *s = &core->shared;
-    const uint64_t rounds = (s->stop_at - s->cycle - 1) / row->taken;
+    const uint64_t rounds = (s->stop_at - s->cycle - 1) / row->costs[1];
     for (uint64_t n = rounds > LAST_ROWS ? rounds - LAST_ROWS : 1; n <= rounds; ++n) {
-        record_at(core, s->cycle + n * row->taken, row->start, 0);
+        record_at(core, s->cycle + n * row->costs[1], row->start, 0);
     }
-    s->cycle += rounds * row->taken;
+    s->cycle += rounds * row->costs[1];
 }

@@ -39,6 +39,7 @@ struct core *core_new(void *unicorn, const struct unicorn_api *api, const struct
         core->api = *api;
         core->calls = *calls;
         core->none.start = core->none.end = UINT32_MAX;
+        core->none.after[0] = core->none.after[1] = &core->none;
         core->block = &core->none;
         core->paged_region = core->system_region = UINT32_MAX;
         system_init(&core->shared);
@@ -159,10 +160,10 @@ void core_clear_exclusive(struct core *core)
 static uint32_t cycles_until(const struct row *row, uint32_t address)
 {
     if (address == row->end) {
-        return row->straight;
+        return row->costs[0];
     }
     const struct instruction *one = instruction_at(row, address);
-    return one == NULL ? row->taken : one->cycle;
+    return one == NULL ? row->costs[1] : one->cycle;
 }
 
 /* Charges what of the running block has been run when the core stands at `pc`. */
@@ -172,7 +173,7 @@ static void settle(struct core *core, uint32_t pc)
     core->block = &core->none;
     if (row != &core->none) {
         /* The refill of an exception return is part of the exception's exit. */
-        core->shared.cycle += pc >= FIRST_EXCEPTION_RETURN ? row->straight : cycles_until(row, pc);
+        core->shared.cycle += pc >= FIRST_EXCEPTION_RETURN ? row->costs[0] : cycles_until(row, pc);
     }
     core->shared.pc = pc;
     core->shared.is_thumb = read_register(core, REG_XPSR) >> 24 & 1;
