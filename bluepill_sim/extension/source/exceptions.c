@@ -247,17 +247,25 @@ bool leave(struct core *core, uint32_t exc_return)
     const uint32_t select = exc_return == TO_THREAD_PSP ? SPSEL : 0;
     const uint32_t sp = (exc_return == TO_THREAD_PSP ? psp : msp) + FRAME_BYTES + (xpsr & ALIGN_BIT ? 4 : 0);
     const uint32_t kept = FLAG_BITS | IT_BITS;
-    /* CONTROL thrice: nPRIV would forbid the next writes, SPSEL is only taken in thread mode, nPRIV comes last. */
+    /* CONTROL thrice: nPRIV would forbid the next writes, SPSEL is only taken in thread mode, nPRIV comes last. Each
+     * costs as much as five others, and mostly it is what it was.
+     */
     static const int to[12] = {REG_CONTROL, REG_IPSR,   REG_CONTROL, REG_SP,  REG_R0, REG_R0 + 1,
                                REG_R0 + 2,  REG_R0 + 3, REG_R12,     REG_LR,  REG_CONTROL, REG_CPSR};
+    static const int to_same[9] = {REG_IPSR,   REG_SP,  REG_R0, REG_R0 + 1, REG_R0 + 2,
+                                   REG_R0 + 3, REG_R12, REG_LR, REG_CPSR};
     uint32_t values[12] = {0,        s->exception_number, select,   sp,       frame[0],
                            frame[1], frame[2],            frame[3], frame[4], frame[5],
                            (control & NPRIV) | select,    (cpsr & ~kept) | (xpsr & kept) | CPSR_T};
+    const bool is_same = control == select;
+    int count = 0;
     for (int n = 0; n < 12; ++n) {
-        at[n] = &values[n];
+        if (!is_same || to[n] != REG_CONTROL) {
+            at[count++] = &values[n];
+        }
     }
     const uint32_t pc = frame[6];
-    core->api.write_registers(core->unicorn, to, at, 12);
+    core->api.write_registers(core->unicorn, is_same ? to_same : to, at, count);
     s->pc = pc & ~1u;
     s->is_thumb = (xpsr & T_BIT) != 0;
     s->it_state = (xpsr >> 25 & 3) | (xpsr >> 10 & 0x3F) << 2;
