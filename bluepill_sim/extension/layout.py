@@ -78,6 +78,24 @@ RAMP = Struct(
         Field("padding", "u16"),
     ),
 )
+STEP = Struct(
+    "step",
+    "What one instruction of a polling loop makes of the value that it has read.",
+    (
+        *_fields("u8", "operation", "is_register", "is_flags_only", "padding"),
+        Field("operand", "u32", doc="or its register"),
+    ),
+)
+LOOP = Struct(
+    "loop",
+    "A block that reads one word, computes with it and what never changes, and goes round while a condition holds.",
+    (
+        Field("read_cycle", "u32", doc="from the start of the block"),
+        Field("offset", "u32"),
+        *_fields("u8", "base", "condition", "count", "padding"),
+        Field("steps", "step", 6),
+    ),
+)
 FAULT = Struct(
     "fault",
     "A HardFault that was entered here, for Python to report: the core as it was before.",
@@ -182,7 +200,7 @@ SENT = Struct(
 )
 
 #: All of them; one that holds another comes behind it.
-STRUCTS = (RECORD, INSTRUCTION, RAMP, FAULT, SHARED, PORT, USART, EXTI, GPIO, EDGE, SENT)
+STRUCTS = (RECORD, INSTRUCTION, RAMP, STEP, LOOP, FAULT, SHARED, PORT, USART, EXTI, GPIO, EDGE, SENT)
 
 _KINDS: dict[str, Any] = {
     "u8": ctypes.c_uint8, "u16": ctypes.c_uint16, "u32": ctypes.c_uint32, "u64": ctypes.c_uint64, "i32": ctypes.c_int32,

@@ -50,6 +50,7 @@ from bluepill_sim.extension.library import (
     library,
 )
 from bluepill_sim.extension.windows import NO_TIME, field, flag
+from bluepill_sim.native.polling import loop_of
 from bluepill_sim.native.state import (
     BOUNDARY,
     DELIVER,
@@ -402,6 +403,9 @@ class NativeEngine(Engine):
         )
         if not added:
             raise RuntimeError(f"no room for the block at {start:#010x}")
+        loop = loop_of(code, block.offsets, start) if flags & _READS else None
+        if loop is not None and not library().core_set_loop(self._state, start, ctypes.addressof(loop)):
+            raise MemoryError("no memory for a loop")
 
     def _note(self, accesses: dict[int, Access]) -> None:
         """Hook these instructions so that C notes their PC, in code that is translated from now on."""

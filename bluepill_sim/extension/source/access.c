@@ -322,7 +322,7 @@ static bool may_access(struct core *core)
 /* Which region is the system control space. */
 void core_set_system_region(struct core *core, uint32_t number) { core->system_region = number; }
 
-static bool is_privileged(struct core *core)
+bool is_privileged(struct core *core)
 {
     if (core->shared.exception_number) {
         return true;

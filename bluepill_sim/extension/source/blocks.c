@@ -188,8 +188,10 @@ static __attribute__((noinline)) void enter_block(struct core *core, uint32_t ad
     begin_block(core, row);
     log_row(core, cycle, address, 0);
     if (UNLIKELY(row == before) && row->flags & ROW_READS) {
-        if (polls_unchanged(core, row)) {
-            wait_on(core, row);
+        if (row->loop != NULL && core->records == NULL) {
+            wait_on(core, row, rounds_of_counter(core, row));
+        } else if (polls_unchanged(core, row)) {
+            wait_on(core, row, rounds_left(core, row));
         }
     } else if (!(before->flags & ROW_CHANGES_MASKS) && before != &core->none && core->records == NULL) {
         before->after[address != before->end] = row;
@@ -241,6 +243,17 @@ bool core_add_row(struct core *core, uint32_t start, uint32_t end, uint32_t stra
     return true;
 }
 
+/* Says of a known block that it is a loop that may poll a counter. Returns false without memory for it. */
+bool core_set_loop(struct core *core, uint32_t start, const struct loop *loop)
+{
+    struct row *row = find(core, start);
+    row->loop = malloc(sizeof *row->loop);
+    if (row->loop != NULL) {
+        *row->loop = *loop;
+    }
+    return row->loop != NULL;
+}
+
 /* Measure every block again when it is next entered; the one that runs keeps its costs. */
 void core_forget_rows(struct core *core)
 {
@@ -263,6 +276,7 @@ void free_dropped(struct core *core)
         struct row *row = core->dropped;
         core->dropped = row->next;
         free(row->code);
+        free(row->loop);
         free(row);
     }
 }

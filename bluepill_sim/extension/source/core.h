@@ -69,6 +69,7 @@ struct row {
     const uint8_t *host; /* of code in writable memory: where it stands now */
     uint8_t *code;       /* and what it was when it was measured */
     struct row *next;    /* in the list of all rows, or of dropped ones */
+    struct loop *loop;   /* where it is one that may poll a counter */
     struct instruction instructions[];
 };
 
@@ -206,9 +207,12 @@ void core_flush(struct core *core);
 void record_at(struct core *core, uint64_t cycle, uint32_t address, int32_t kind);
 /* polling.c */
 bool polls_unchanged(struct core *core, const struct row *row);
-void wait_on(struct core *core, const struct row *row);
+void wait_on(struct core *core, const struct row *row, uint64_t rounds);
+uint64_t rounds_left(const struct core *core, const struct row *row);
+uint64_t rounds_of_counter(struct core *core, const struct row *row);
 /* access.c */
 void go_on_at_access(struct core *core, uint32_t pc);
+bool is_privileged(struct core *core);
 bool resolve(struct core *core, uint32_t address, bool is_write, uint32_t bytes);
 void skip(struct core *core, uint32_t address, bool is_write, uint32_t bytes);
 /* run.c */

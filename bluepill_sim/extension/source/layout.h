@@ -44,6 +44,28 @@ struct ramp {
 };
 _Static_assert(sizeof(struct ramp) == 24, "ramp");
 
+/* What one instruction of a polling loop makes of the value that it has read. */
+struct step {
+    uint8_t operation;
+    uint8_t is_register;
+    uint8_t is_flags_only;
+    uint8_t padding;
+    uint32_t operand; /* or its register */
+};
+_Static_assert(sizeof(struct step) == 8, "step");
+
+/* A block that reads one word, computes with it and what never changes, and goes round while a condition holds. */
+struct loop {
+    uint32_t read_cycle; /* from the start of the block */
+    uint32_t offset;
+    uint8_t base;
+    uint8_t condition;
+    uint8_t count;
+    uint8_t padding;
+    struct step steps[6];
+};
+_Static_assert(sizeof(struct loop) == 60, "loop");
+
 /* A HardFault that was entered here, for Python to report: the core as it was before. */
 struct fault {
     uint64_t ns;

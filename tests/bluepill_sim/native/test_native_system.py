@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 
 from bluepill_sim import BluePill
 from bluepill_sim.extension.library import library_path
-from tests.bluepill_sim.machine import Machine
+from tests.bluepill_sim.machine import COUNTER_ON, Machine
 from tests.bluepill_sim.native.test_native_core import state
 
 pytestmark = pytest.mark.skipif(library_path() is None, reason="the native core is not built: no C compiler")
@@ -138,6 +138,82 @@ def test_a_loop_that_polls_is_left_at_the_same_cycle_on_both_cores(what: str, re
     for ours, reference in zip(ends[:4], ends[4:], strict=True):
         for name in reference[1]:
             assert ours[1][name] == reference[1][name], name
+
+
+#: Steps that compute with r3 (the counter) and r1, r2, r4, r6, some of which no such loop may have.
+COMPUTING = st.one_of(
+    st.builds(lambda base, bits: base | bits << 6 | 3 << 3 | 3, st.sampled_from([0, 0x800]), st.integers(0, 31)),
+    st.builds(
+        lambda base, m: base | m << 6 | 3 << 3 | 3, st.sampled_from([0x1800, 0x1A00]), st.sampled_from([1, 2, 4])
+    ),
+    st.builds(lambda n, d: 0x1A00 | 3 << 6 | n << 3 | d, st.sampled_from([1, 2, 4]), st.sampled_from([3, 3, 5, 1])),
+    st.builds(lambda base, k: base | 3 << 8 | k, st.sampled_from([0x2800, 0x3000, 0x3800]), st.integers(0, 255)),
+    st.builds(lambda base, m: base | m << 3 | 3, st.sampled_from([0x4280, 0x4000, 0x4200]), st.sampled_from([1, 2, 4])),
+    st.builds(lambda n: 0x4280 | 3 << 3 | n, st.sampled_from([1, 2, 4])),
+    st.just(0xBF00),
+    st.just(0x3601),  # adds r6, #1: not a value of the counter
+)
+CONSTANTS = st.one_of(st.integers(0, 3000), st.integers(0, 0xFFFF_FFFF), st.just(0xFFFF_FFFF))
+
+
+@settings(max_examples=40, deadline=None)
+@given(
+    register=st.sampled_from([0xE0001004, 0xE000E018, 0x20000000]), steps=st.lists(COMPUTING, min_size=1, max_size=4),
+    condition=st.integers(0, 13), constants=st.lists(CONSTANTS, min_size=3, max_size=3), reload=st.integers(0, 5000),
+    control=st.sampled_from([1, 5, 7]),
+)  # fmt: skip
+def test_a_loop_that_computes_with_a_counter_is_left_at_the_same_round_on_both_cores(
+    register: int, steps: list[int], condition: int, constants: list[int], reload: int, control: int
+) -> None:
+    sets = "\n".join(f"mov32 r{n}, #{value}" for n, value in zip((1, 2, 4), constants, strict=True))
+    source = f"""{COUNTER_ON}
+        mov32 r0, #0xE000E010
+        mov32 r1, #{reload}
+        str r1, [r0, #4]
+        str r1, [r0, #8]
+        movs r1, #{control}
+        str r1, [r0, #0]
+        mov32 r0, #{register}
+        {sets}
+        again: nop
+        b w
+        w: ldr r3, [r0, #0]
+        .half {", ".join(map(str, steps))}
+        .half {0xD000 | condition << 8 | 0x100 - len(steps) - 3}
+        adds r5, #1
+        b again"""
+    ends: list[dict[str, Any]] = []
+    for core, slices in (("native", (40_000, 333, 500_000)), ("python", (540_333,))):
+        board = make(source, core)
+        for slice_ns in slices:
+            board.advance_to(board.now_ns + slice_ns)
+        board.advance_to(700_000)
+        ends.append(state(board))
+    for name in ends[1]:
+        assert ends[0][name] == ends[1][name], name
+
+
+@pytest.mark.parametrize("limit", [20, 0x8000_0014, 0x7FFF_FFF0])
+@pytest.mark.parametrize("condition", range(14))
+def test_every_condition_leaves_a_loop_at_its_round(condition: int, limit: int) -> None:
+    """CYCCNT / 64 against a limit that it stays at for some rounds, or that is signed; the load is not at the start."""
+    source = f"""{COUNTER_ON}
+        mov32 r0, #0xE0001004
+        mov32 r4, #{limit}
+        b w
+        w: nop
+        nop
+        ldr r3, [r0, #0]
+        .half {0x0800 | 6 << 6 | 3 << 3 | 3}, {0x4280 | 4 << 3 | 3}
+        .half {0xD000 | condition << 8 | 0x100 - 7}
+        ldr r5, [r0, #0]
+        b stop"""
+    ends: list[dict[str, Any]] = []
+    for core in ("native", "python"):
+        board = make(source, core)
+        board.advance_to(400_000)
+        ends.append(state(board))
+    assert ends[0] == ends[1]
 
 
 def test_a_board_restored_from_before_a_warning_warns_again() -> None:
