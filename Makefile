@@ -14,7 +14,7 @@ JOBS   ?= 3
 COMPILED := $(wildcard bluepill_sim/extension/source/*) robot_bench/wires/edges.c \
     $(shell find adapter_fw/core adapter_fw/capi -type f)
 
-.PHONY: setup demo test lint type unit bench soak clean firmware board board-check board-tools pictures docs
+.PHONY: setup demo test lint type unit bench soak peers clean firmware mutation-tools board board-check board-tools pictures docs
 
 setup: $(STAMP)
 
@@ -59,8 +59,18 @@ bench: setup
 	$(BIN)/python tools/bench/speed.py
 	$(BIN)/python tools/bench/shares.py
 
-soak: setup
+soak: setup mutation-tools
 	$(BIN)/pytest -n $(JOBS) -m 'soak' --no-cov
+
+# The programs of others that are on PATH, or PEERS='--peer "p2os-arduino=/home/me/drive {line}"', against p2os serve.
+peers: setup
+	@$(BIN)/python -m tools.peers $(PEERS)
+
+# What changes the adapter's two sides in `make soak`. Without universalmutator's own wishes: one of them is a copy of
+# `typing` that shadows Python's.
+mutation-tools: setup
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check 'cosmic-ray==8.7.0'
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --no-deps 'universalmutator==1.14.1'
 
 # Rebuilds the example firmware (needs gcc-arm-none-eabi); `make test` compares.
 firmware: setup

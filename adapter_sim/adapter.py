@@ -108,7 +108,7 @@ class AdapterStatus:
     distances: tuple[bool, ...]
     #: Last range of each sonar in µm, None where unknown.
     ranges_um: tuple[int | None, ...]
-    #: Encoder steps since OPEN, (left, right), and those on the pins.
+    #: Encoder steps, (left, right), and those on the pins.
     counts: tuple[int, int]
     counts_shown: tuple[int, int]
     #: SIPs taken and odometry jumps since the boot.
@@ -410,7 +410,7 @@ class Adapter(Stateful):
         self._deadline = self.samples.due(self._other)
 
     def _clear(self) -> None:
-        """Forget everything, as a reset does."""
+        """Forget everything, as a reset does, but where the encoders stand."""
         self._agenda = Agenda()
         self._stop_repeater.reset()
         self.samples.next = self._now
@@ -435,7 +435,7 @@ class Adapter(Stateful):
 
     def _boot(self, now: Nanos) -> None:
         self.outputs.show_safe(now)
-        self.outputs.show_encoders((0, 0), now)
+        self.outputs.show_encoders(self._codes.shown, now)
         self.session.stop_unknown()
         self.samples.next = now
         self._enter(AdapterState.IDLE, now, "booted", "waits for its master's connect request")

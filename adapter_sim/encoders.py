@@ -24,7 +24,9 @@ travel: it becomes the new reference and is counted.
 
 Codes. They walk: at most one code each `encoder_dwell_ns`, so that a program that
 polls never sees a jump, not even when packets were lost and the wheels have
-turned meanwhile.
+turned meanwhile. They are absolute: neither a session's end nor a reset forgets where
+the wheels stand, and travel is kept whole, not only its code. What the wheels turn
+while no session is open is reported by nobody, and so not shown.
 
 Invariant: integers only; all shifts are floor shifts of signed integers of 64 bits
 or less, so the C++ twin computes the same.
@@ -63,7 +65,7 @@ _SINE = tuple(round(math.sin(math.pi * k / (2 * _QUARTER)) * (1 << ONE_BITS)) fo
 
 
 class WheelCodes(Stateful):
-    """What both wheels have turned since OPEN, and what of it stands on the pins.
+    """What both wheels have turned since power came, and what of it stands on the pins.
 
     Args:
         settings: Dwell, and where the codes stand when a session opens.
@@ -96,11 +98,11 @@ class WheelCodes(Stateful):
                 walk.rebase(1 << self.encoders.width)
             self.encoders.begin()
         else:
-            self.encoders.begin(self.shown)
+            self.encoders.begin(self.encoders.travel_nm)
 
     def reset(self) -> None:
-        """Forget everything."""
-        self.encoders.begin()
+        """Forget all but where the wheels and their codes stand."""
+        self.encoders.begin(self.encoders.travel_nm)
         self.encoders.jumps = 0
         for walk in self._walks:
             walk.reset()
@@ -166,7 +168,7 @@ class Encoders(Stateful):
         #: Turn and way since the reference, in heading counts and in counts × 2^30.
         self._heading = 0
         self._forward = 0
-        #: Travel at which the counts of this session began, (left, right) in nm.
+        #: Travel at which this session began, (left, right) in nm.
         self._offset_nm = (0, 0)
         #: Steps that no wheel can have made.
         self.jumps = 0
@@ -191,19 +193,14 @@ class Encoders(Stateful):
             encoder_count(right_nm, self._per_turn_nm, self.width),
         )
 
-    def begin(self, counts: tuple[int, int] = (0, 0)) -> None:
-        """Start anew at these counts; the next packet is the reference."""
+    def begin(self, travel_nm: tuple[int, int] = (0, 0)) -> None:
+        """Start anew at this travel; the next packet is the reference."""
         for counter in (self._x, self._y, self._turn):
             counter.forget()
         self._raw_heading = None
         self._heading = 0
         self._forward = 0
-        steps = 1 << self.width
-        # The lower boundary of a count, rounded up, so that floor gives the same count again.
-        self._offset_nm = (
-            -(-counts[0] * self._per_turn_nm // steps),
-            -(-counts[1] * self._per_turn_nm // steps),
-        )
+        self._offset_nm = travel_nm
 
     def take(self, raw_x: int, raw_y: int, raw_heading: int) -> bool:
         """Add the odometry of a packet; tell whether it is a plausible step."""
@@ -246,8 +243,7 @@ class CodeWalk(Stateful):
         self.shown = (self.shown + steps // 2) % steps - steps // 2
 
     def reset(self) -> None:
-        """Stand at 0."""
-        self.shown = 0
+        """Forget when the last step was; the code stays."""
         self._stepped_at = None
 
 

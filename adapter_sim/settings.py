@@ -27,7 +27,7 @@ class EncoderAtOpen(StrEnum):
 
     #: At phase 0, in every session; the pins walk there one code at a time.
     ZERO = "zero"
-    #: At the code that the last session left, so that a firmware's count goes on.
+    #: Where the wheels stood when the last session ended: absolute, whatever was reset or reconnected since.
     CONTINUE = "continue"
 
 
@@ -88,7 +88,7 @@ class AdapterSettings:
     distance_stale_ns: Nanos = 1 * NS_PER_S
     #: How long the odometry may take to read zero after SETO, before it is taken as it is.
     settle_ns: Nanos = 500 * NS_PER_MS
-    encoder_at_open: EncoderAtOpen = EncoderAtOpen.ZERO
+    encoder_at_open: EncoderAtOpen = EncoderAtOpen.CONTINUE
     #: A code stays on the pins this long at least. # chosen: two polls of a 100 Hz program; 50 codes/s are 3.2 m/s
     encoder_dwell_ns: Nanos = 20 * NS_PER_MS
     #: Whether a robot of unknown state is stopped too: at boot and before each SYNC0. Only for a peer that takes

@@ -82,6 +82,8 @@ class BluePill(Stateful):
     """
 
     STATE = ("chip", "fault", "activity", "_warned", "_usarts", "boot0", "resets")
+    #: Who listens.
+    DERIVED = ("_warning_sinks",)
 
     def __init__(self, image: Image | str | Path, *, strict: bool = False) -> None:
         """Load a firmware and stand at its reset.
@@ -96,8 +98,7 @@ class BluePill(Stateful):
         self._vector_offset = self.image.vector_table - FLASH_BASE
         #: The BOOT0 jumper; looked at, with BOOT1 (PB2), at each reset: 0x flash, 11 SRAM, 10 ST's boot loader.
         self.boot0 = False
-        #: Called with each new warning.
-        self.on_warning: Callable[[str], None] | None = None
+        self._warning_sinks: list[Callable[[str], None]] = []
         #: The first HardFault or lockup; a later one, where the firmware came back from those before. None: none yet.
         self.fault: FaultReport | None = None
         memory = Memory()
@@ -208,6 +209,20 @@ class BluePill(Stateful):
             KeyError: the chip has no such pin.
         """
         return self.chip.pins.subscribe_pins(pins, sink, of=of, ends_slice=ends_slice)
+
+    def subscribe_warnings(self, sink: Callable[[str], None]) -> Callable[[], None]:
+        """Have `sink` called with each new warning, at its time; return a function that ends it."""
+        self._warning_sinks.append(sink)
+        return lambda: self._warning_sinks.remove(sink)
+
+    @contextmanager
+    def without_warnings(self) -> Iterator[None]:
+        """Tell nobody of warnings while a debugger looks at what the program would be warned of; they are noted."""
+        sinks, self._warning_sinks = self._warning_sinks, []
+        try:
+            yield
+        finally:
+            self._warning_sinks = sinks
 
     @property
     def pins(self) -> tuple[Pin, ...]:
@@ -365,8 +380,8 @@ class BluePill(Stateful):
         self._warned[once] = text
         if self._strict:
             raise UnmodelledError(text, hint="run without --strict to go on after warnings")
-        if self.on_warning is not None:
-            self.on_warning(text)
+        for sink in self._warning_sinks:
+            sink(text)
 
     def _fault(self, kind: FaultKind, pc: int, address: int | None, is_lockup: bool, seen: SeenFault | None) -> None:
         if kind is FaultKind.MASKED_SVC and not is_lockup:

@@ -60,6 +60,8 @@ class SerialPort(Stateful):
     """A USART of the board, seen from outside."""
 
     STATE = ("unread",)
+    #: Who listens.
+    DERIVED = ("_sinks", "_waiting")
 
     def __init__(self, usart: Usart, activity: Activity, wait: WaitForBytes) -> None:
         self._usart = usart

@@ -73,6 +73,14 @@ def is_file(path: Path) -> bool:
         return False
 
 
+def is_folder(path: Path) -> bool:
+    """Tell whether a folder is there; a name that no folder can have is not."""
+    try:
+        return path.is_dir()
+    except (OSError, ValueError):  # as above
+        return False
+
+
 def find_places(text: str) -> TomlPlaces:
     """Return the places of a text that is valid TOML."""
     found = TomlPlaces()

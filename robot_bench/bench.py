@@ -167,7 +167,7 @@ class Bench(Stateful):
             self.parts.adapter.samples.waits_for_edges = True
         chip.usart1.far_baud = scenario.usart_baud
         chip.usart1.subscribe(self.recorder.usart)
-        chip.on_warning = lambda text: self.recorder.event("chip", chip.now_ns, "warning", text)
+        chip.subscribe_warnings(lambda text: self.recorder.event("chip", chip.now_ns, "warning", text))
         self.recorder.start()
 
     @classmethod

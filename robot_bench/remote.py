@@ -90,7 +90,7 @@ class RemoteBench:
         ChipPins(chip, harness, pin_of, on_watched=self.loop.note_edge).watch(self.adapter.wakes_on, 0)
         chip.usart1.far_baud = scenario.usart_baud
         chip.usart1.subscribe(recorder.usart)
-        chip.on_warning = lambda text: recorder.event("chip", chip.now_ns, "warning", text)
+        chip.subscribe_warnings(lambda text: recorder.event("chip", chip.now_ns, "warning", text))
         recorder.start()
 
     @property

@@ -17,6 +17,7 @@
 #include <ctime>
 #include <string>
 
+#include "../core/app/code_keeper.hpp"
 #include "../core/app/console.hpp"
 #include "../core/app/runner.hpp"
 #include "../core/app/event_printer.hpp"
@@ -121,7 +122,7 @@ void wait(const host::Line& line, const host::Wires& wires, int input, p2os::Nan
 
 //: Returns the exit code, or RESTART.
 int run(const Options& options, host::Line& line, host::Wires& wires, host::FileStore& store, host::Standard& out,
-        host::Standard& err, WallClock& clock) {
+        host::Standard& err, WallClock& clock, app::RetainedWheels& retained) {
   const adapter::WireNumbers numbers;
   const char* fault = nullptr;
   const adapter::Settings settings = app::stored_settings(store, numbers, fault);
@@ -134,6 +135,8 @@ int run(const Options& options, host::Line& line, host::Wires& wires, host::File
   app::EventPrinter printer(log, err);
   adapter::Adapter part(settings, *adapter::find_robot(options.robot.c_str()), numbers, clock.now());
   part.attach(&wires, &wires, &printer);
+  app::CodeKeeper keeper(retained, store);
+  keeper.restore(part);
   app::Console console({part, log, wires, store, out, numbers, "host"});
   app::Runner runner(part, clock, line, &wires);
   wires.release(clock.now());
@@ -142,6 +145,7 @@ int run(const Options& options, host::Line& line, host::Wires& wires, host::File
   while (true) {
     wires.serve();
     const p2os::Nanos due = runner.pass();
+    keeper.keep(part, clock.now());
     char character = 0;
     pollfd file{input, POLLIN, 0};
     for (int taken = 0; taken < TYPED_A_TURN && ::poll(&file, 1, 0) > 0; ++taken, file.fd = input) {
@@ -186,9 +190,10 @@ int main(int count, char** words) {
   }
   host::Standard out(STDOUT_FILENO), err(STDERR_FILENO);
   WallClock clock;
+  app::RetainedWheels retained{};
   int ended = RESTART;
   while (ended == RESTART) {
-    ended = run(options, line, wires, store, out, err, clock);
+    ended = run(options, line, wires, store, out, err, clock, retained);
   }
   if (line.is_gone()) {
     const std::string what = "p2os-adapter: the line " + options.line + " is gone\n";

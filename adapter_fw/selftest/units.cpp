@@ -1,4 +1,4 @@
-// Checks of what no run of the self-test exercises: the LED, the mode button, numbers as text, faults of settings, gaps.
+// Checks of what no run of the self-test exercises: the codes over a restart, the LED, the mode button, numbers as text, faults of settings, gaps.
 //
 // Prints each broken claim; ends with `ok` and exit code 0, or with 1.
 
@@ -6,6 +6,7 @@
 #include <cstring>
 
 #include "../core/adapter/fields.hpp"
+#include "../core/app/code_keeper.hpp"
 #include "../core/app/led.hpp"
 #include "../core/app/mode_button.hpp"
 #include "../core/app/runner.hpp"
@@ -219,9 +220,68 @@ void check_gaps() {
   claim(off.state() == State::BOOTING, "a gap in the boot is a longer boot");
 }
 
+//: Flash of one number that counts how often it was written.
+class OneNumber final : public app::Store {
+ public:
+  bool load(const char*, std::int64_t& value) override {
+    value = value_;
+    return is_there_;
+  }
+  bool save(const char*, std::int64_t value) override {
+    value_ = value;
+    is_there_ = true;
+    ++writes;
+    return true;
+  }
+  void forget(const char*) override { is_there_ = false; }
+
+  int writes = 0;
+
+ private:
+  std::int64_t value_ = 0;
+  bool is_there_ = false;
+};
+
+//: An adapter that has just started, as the keeper placed it.
+adapter::Wheels restored(app::RetainedWheels& memory, app::Store& store) {
+  adapter::Adapter part({}, {}, {}, 0);
+  app::CodeKeeper(memory, store).restore(part);
+  return part.wheel_phases_um();
+}
+
+void check_codes() {
+  using adapter::Wheels;
+  app::RetainedWheels memory{1, 2, 3};
+  OneNumber store;
+  claim(restored(memory, store) == Wheels{}, "what nobody has kept begins at 0");
+  adapter::Adapter part({}, {}, {}, 0);
+  app::CodeKeeper keeper(memory, store);
+  keeper.restore(part);
+  part.place_wheels({70'000, 518'000});
+  keeper.keep(part, 0);
+  claim(part.counts() == Wheels{1, 7} && part.counts_shown() == Wheels{1, 7}, "a code is the eighth of its turn");
+  claim(restored(memory, store) == Wheels{70'000, 518'000}, "a restart goes on where it was");
+  keeper.keep(part, app::CodeKeeper::STANDS_NS - 1);
+  claim(store.writes == 0, "wheels that have not stood for a second are not stored");
+  keeper.keep(part, app::CodeKeeper::STANDS_NS);
+  keeper.keep(part, 2 * app::CodeKeeper::STANDS_NS);
+  claim(store.writes == 1, "wheels that stand are stored once");
+  part.place_wheels({140'000, 0});
+  keeper.keep(part, 2 * app::CodeKeeper::STANDS_NS);
+  memory.left_um ^= 1;
+  claim(restored(memory, store) == Wheels{70'000, 518'000}, "after a power cut: where they last stood");
+  memory.check = 0;
+  store.save("", std::int64_t{1} << 62 | 5);
+  claim(restored(memory, store).right == 5, "any number of the store gives a place");
+  memory.check = 0;
+  store.save("", -1);
+  claim(restored(memory, store) == Wheels{}, "but a negative one");
+}
+
 }  // namespace
 
 int main() {
+  check_codes();
   check_led();
   check_button();
   check_numbers();

@@ -135,7 +135,7 @@ def print_status(line: str) -> None:
 
 def warn_on_stderr(board: BluePill) -> None:
     """Print each warning as it comes."""
-    board.on_warning = lambda text: print_status(f"warning: {text} (t = {board.now_ns / NS_PER_S:.6f} s)")
+    board.subscribe_warnings(lambda text: print_status(f"warning: {text} (t = {board.now_ns / NS_PER_S:.6f} s)"))
 
 
 def summary(board: BluePill) -> str:

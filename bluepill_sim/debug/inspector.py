@@ -7,7 +7,6 @@ Invariant: reading changes nothing, not even a status flag.
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from itertools import accumulate
 
 from bluepill_sim.board import BluePill
@@ -145,7 +144,7 @@ class Inspector:
         """Return a register of a peripheral or of the core without side effects; None where none is."""
         chip = self._board.chip
         if PPB_BASE <= address < PPB_BASE + PPB_BYTES:
-            with _silence(self._board):
+            with self._board.without_warnings():
                 saved = chip.system.snapshot(), chip.processor.systick.snapshot()
                 value = chip.system.read(address - PPB_BASE, 4)
                 chip.system.restore(saved[0])
@@ -169,16 +168,3 @@ class Inspector:
             return False
         part.write(address - BASES[name], len(data), int.from_bytes(data, "little"))
         return True
-
-
-@dataclass
-class _silence:  # noqa: N801 - a context manager
-    """Suppresses the warnings that a debugger's read would cause."""
-
-    board: BluePill
-
-    def __enter__(self) -> None:
-        self._listener, self.board.on_warning = self.board.on_warning, None
-
-    def __exit__(self, *_: object) -> None:
-        self.board.on_warning = self._listener

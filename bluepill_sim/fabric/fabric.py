@@ -101,8 +101,8 @@ class Fabric(Stateful):
     """Queue, lines and devices of one chip."""
 
     STATE = ("ports", "lines")
-    #: Callbacks that C has, and what one has raised.
-    DERIVED = ("_failure", "electrical")
+    #: What one of the callbacks has raised; and what is filled once, when a chip is made.
+    DERIVED = ("_failure", "electrical", "_kept", "_names", "_acts", "_answers", "_deliveries")
 
     def __init__(self, chip: FabricPorts) -> None:
         self._chip = chip

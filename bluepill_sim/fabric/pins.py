@@ -296,6 +296,8 @@ class PinBank(Stateful):
     """All pins of the chip, and the switches between them and its peripherals."""
 
     STATE = ("fabric", "holders", "remaps", "exti_ports")
+    #: Who listens.
+    DERIVED = ("_subscriptions",)
 
     PORTS = "ABCDE"
 

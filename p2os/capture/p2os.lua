@@ -9,10 +9,10 @@
 local commands = {
     [0] = "PULSE", [1] = "OPEN", [2] = "CLOSE", [3] = "POLLING", [4] = "ENABLE", [5] = "SETA", [6] = "SETV",
     [7] = "SETO", [8] = "MOVE", [9] = "ROTATE", [10] = "SETRV", [11] = "VEL", [12] = "HEAD", [13] = "DHEAD",
-    [15] = "SAY", [17] = "JOYREQUEST", [18] = "CONFIG", [19] = "ENCODER", [20] = "SETRVDIR", [21] = "RVEL",
+    [14] = "SETPBV", [15] = "SAY", [17] = "JOYREQUEST", [18] = "CONFIG", [19] = "ENCODER", [20] = "SETRVDIR", [21] = "RVEL",
     [22] = "DCHEAD", [23] = "SETRA", [26] = "IMUREQUEST", [28] = "SONAR", [29] = "STOP", [30] = "DIGOUT",
-    [31] = "TIMER", [32] = "VEL2", [33] = "GRIPPER", [35] = "ADSEL", [36] = "GRIPPERVAL", [37] = "GRIPREQUEST",
-    [38] = "GYROCALCW", [39] = "GYROCALCCW", [40] = "IOREQUEST", [41] = "PTUPOS", [42] = "TTY2", [43] = "GETAUX",
+    [31] = "TIMER", [32] = "VEL2", [33] = "GRIPPER", [34] = "KICK", [35] = "ADSEL", [36] = "GRIPPERVAL",
+    [37] = "GRIPREQUEST", [38] = "GYROCALCW", [39] = "GYROCALCCW", [40] = "IOREQUEST", [41] = "PTUPOS", [42] = "TTY2", [43] = "GETAUX",
     [44] = "BUMPSTALL", [45] = "TCM2", [46] = "DOCK", [47] = "JOYDRIVE", [48] = "SONARCYCLE", [49] = "MOVINGBLINK",
     [50] = "HOSTBAUD", [51] = "AUX1BAUD", [52] = "AUX2BAUD", [53] = "AUX3BAUD", [55] = "E_STOP", [56] = "E_STALL",
     [57] = "QSTOP", [58] = "GYRO", [59] = "LCD", [60] = "TTY4", [61] = "GETAUX3", [62] = "BATTERYINFO",

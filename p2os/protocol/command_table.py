@@ -37,6 +37,7 @@ class CommandNumber(IntEnum):
     VEL = 11
     HEAD = 12
     DHEAD = 13
+    SETPBV = 14
     SAY = 15
     JOYREQUEST = 17
     CONFIG = 18
@@ -52,6 +53,7 @@ class CommandNumber(IntEnum):
     TIMER = 31
     VEL2 = 32
     GRIPPER = 33
+    KICK = 34
     ADSEL = 35
     GRIPPERVAL = 36
     GRIPREQUEST = 37
@@ -333,6 +335,8 @@ ROWS = (
     _row(_N.HEAD, (_A.INTEGER,), "deg", None, "1.0 1.0 1.0", "Turn to an absolute heading, + counter-clockwise."),
     _row(_N.DHEAD, (_A.INTEGER,), "deg", None, "1.0 1.0 1.0",
          "Turn relative to the present heading, + counter-clockwise."),
+    _row(_N.SETPBV, (_A.INTEGER,), "", None, "? - -",
+         "No manual that could be found says what it does; ARIA calls number 14 one that does not really exist."),
     _row(_N.SAY, (_A.STRING,), "", (0, 40), "1.0 1.0 1.0",
          "Up to 20 pairs of duration (20 ms) and tone: 0 rest, 1 to 127 MIDI note, above (tone - 127) * 32 Hz."),
     _row(_N.JOYREQUEST, (_A.INTEGER,), "", (0, 2), "? yes 1.0", "JOYSTICKpac: 0 none, 1 one, 2 continuous."),
@@ -347,7 +351,9 @@ ROWS = (
     _row(_N.SETRA, (_A.INTEGER,), "deg/s2", None, "1.0 1.0 1.0",
          "Rotational acceleration, or deceleration where negative."),
     _row(_N.IMUREQUEST, (_A.INTEGER,), "", (0, 2), "- - -", "Seekur: IMU packets, 0 none, 1 one, 2 continuous."),
-    _row(_N.SONAR, (_A.INTEGER,), "", (0, 1), "1.0 1.0 1.0", "1 switches all sonar on, 0 off."),
+    _row(_N.SONAR, (_A.INTEGER,), "", (0, 9), "1.0 1.0 1.0",
+         "1 switches all sonar on, 0 off. AROS and ARCOS also one array of eight: its number, 1 to 4, in bits 1 to 3,"
+         " on or off in bit 0 (4: array 2 off, 5: on)."),
     _row(_N.STOP, (_A.NONE,), "", None, "1.0 1.0 1.0", "Stop; the motors stay enabled."),
     _row(_N.DIGOUT, (_A.TWO_BYTES,), "", None, "1.2 1.0 1.0",
          "Digital outputs: one byte is the mask, one the states; the manuals contradict each other on which "
@@ -360,6 +366,7 @@ ROWS = (
     _row(_N.GRIPPER, (_A.INTEGER,), "", (1, 17), "yes yes 1.0",
          "1 open, 2 close, 3 stop, 4 lift up, 5 lift down, 6 lift stop, 7 store, 8 deploy, 15 halt, 16 pressure, "
          "17 lift carry."),
+    _row(_N.KICK, (_A.INTEGER,), "ms", None, "? ? yes", "Hold the first digital output for so long, once."),
     _row(_N.ADSEL, (_A.INTEGER,), "", (0, 255), "? yes 1.0", "Select the analog port that the SIP shows."),
     _row(_N.GRIPPERVAL, (_A.INTEGER,), "", None, "yes yes 1.0", "Value for GRIPPER 16 and 17."),
     _row(_N.GRIPREQUEST, (_A.INTEGER,), "", (0, 2), "1.E yes 1.0", "GRIPPERpac: 0 none, 1 one, 2 continuous."),

@@ -74,7 +74,7 @@ def aria_table(source: str, text: str, base_of: Callable[[str], str]) -> Table:
     Raises:
         ParametersError: A value is no number, or there is no Subclass.
     """
-    values, sonar = _lines(source, text)
+    values, sonar, infrared = _lines(source, text)
     if "Subclass" not in values:
         raise ParametersError(f"{source}: no Subclass", hint="an ARIA parameter file names one in its first section")
     subclass = values["Subclass"].lower()
@@ -95,16 +95,29 @@ def aria_table(source: str, text: str, base_of: Callable[[str], str]) -> Table:
     if "SonarNum" in values:
         count = min(int(table["sonar"]["fitted"]), len(sonar))
         table["sonar"] |= {"fitted": count, "poses": [list(sonar[number]) for number in sorted(sonar)]}
+    if "IRNum" in values:
+        table["infrared"] = {"points": [list(infrared[number]) for number in sorted(infrared)]}
     return merged(base, table)
 
 
-def _lines(source: str, text: str) -> tuple[dict[str, str], dict[int, tuple[float, float, float]]]:
-    """Return the first value of each key, and the sonar by their numbers."""
+def _lines(
+    source: str, text: str
+) -> tuple[dict[str, str], dict[int, tuple[float, float, float]], dict[int, tuple[float, float]]]:
+    """Return the first value of each key, and the sonar and the infra-red eyes by their numbers."""
     values: dict[str, str] = {}
     sonar: dict[int, tuple[float, float, float]] = {}
+    infrared: dict[int, tuple[float, float]] = {}
     for line in text.splitlines():
         words = line.split(";")[0].split()
         if len(words) < 2 or words[0] == "Section":
+            continue
+        if words[0] == "IRUnit":
+            eye = [_number(source, "IRUnit", word) for word in words[1:6]]
+            if len(eye) < 5:
+                raise ParametersError(
+                    f"{source}: IRUnit needs a number, a type, cycles, x and y: {shown(line.strip())}"
+                )
+            infrared[int(eye[0])] = (eye[3], eye[4])
             continue
         if words[0] != "SonarUnit":
             values.setdefault(words[0], words[1])
@@ -113,7 +126,7 @@ def _lines(source: str, text: str) -> tuple[dict[str, str], dict[int, tuple[floa
         if len(numbers) < 4:
             raise ParametersError(f"{source}: SonarUnit needs a number, x, y and a heading: {shown(line.strip())}")
         sonar[int(numbers[0])] = (numbers[1], numbers[2], numbers[3])
-    return values, sonar
+    return values, sonar, infrared
 
 
 def _equipment(source: str, values: Mapping[str, str]) -> Table:

@@ -107,6 +107,8 @@ class RobotParameters:
     sonar_cone_deg: float
     sonar_height_m: float
     sonar: tuple[SonarPose, ...]
+    #: Where each infra-red eye sees a thing, mm: x forward, y left.
+    infrared: tuple[tuple[float, float], ...] = ()
     body: BodyParameters
 
     def with_every_sonar(self) -> "RobotParameters":

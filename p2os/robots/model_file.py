@@ -68,6 +68,8 @@ RANGES: Mapping[str, Mapping[str, tuple[float, float]]] = {
 }  # fmt: skip
 #: A sonar's place on its robot, mm and degrees.
 POSE_RANGES = ((-20_000, 20_000), (-20_000, 20_000), (-360, 360))
+#: Infra-red eyes that the IOpac has bits for.
+MOST_EYES = 8
 #: chosen: longer is no name; a title is shown on one line.
 LONGEST_TEXT = 100
 #: A caster of this mass rolls under every robot (`p2os.pioneer.body`).
@@ -152,7 +154,7 @@ def build_parameters(name: str, table: Table, places: TomlPlaces | None = None) 
         ParametersError: A key is missing, unknown, of another type, or out of range.
     """
     source = TomlSource(name, places)
-    sections = {*FLAT_SECTIONS, "equipment", "motion", "sonar", "body"}
+    sections = {*FLAT_SECTIONS, "equipment", "motion", "sonar", "infrared", "body"}
     _only(source, "", table, (*TOP_KEYS, *sections))
     values: Table = {key: _value(source, "", table, key, str) for key in TOP_KEYS[1:]}
     for section, keys in FLAT_SECTIONS.items():
@@ -180,6 +182,7 @@ def build_parameters(name: str, table: Table, places: TomlPlaces | None = None) 
         body=BodyParameters(**{key: _value(source, "body", body, key, float) for key in _keys(BodyParameters)}),
         sonar_fitted=fitted,
         sonar=poses,
+        infrared=_infrared(source, table.get("infrared", {"points": []})),
     )
 
 
@@ -267,6 +270,30 @@ def _poses(source: TomlSource, rows: object) -> tuple[SonarPose, ...]:
             hint="within 20 m of the robot's middle, and 360 degrees",
         )
     return tuple(SonarPose(x_mm=x, y_mm=y, heading_deg=h) for x, y, h in cast("list[list[float]]", rows))
+
+
+def _infrared(source: TomlSource, part: object) -> tuple[tuple[float, float], ...]:
+    """Return where the infra-red eyes see; the section may be left out."""
+    if not isinstance(part, dict):
+        raise ParametersError(f"{source.at('infrared')}: [infrared] is no section")
+    _only(source, "infrared.", part, ("points",))
+    rows = part.get("points")
+    good = (
+        isinstance(rows, list)
+        and len(rows) <= MOST_EYES
+        and all(
+            isinstance(row, list)
+            and len(row) == 2
+            and all(_is_within(item, *limits) for item, limits in zip(row, POSE_RANGES, strict=False))
+            for row in rows
+        )
+    )
+    if not good:
+        raise ParametersError(
+            f"{source.at('infrared', 'points')}: infrared.points must be up to {MOST_EYES} rows of [x mm, y mm]",
+            hint="within 20 m of the robot's middle",
+        )
+    return tuple((x, y) for x, y in cast("list[list[float]]", rows))
 
 
 def _is_within(item: object, least: float, most: float) -> bool:

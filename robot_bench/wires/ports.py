@@ -47,8 +47,9 @@ class ChipFault(Protocol):
 class Chip(PinSubscriptions, Protocol):
     """A chip that runs a firmware and leads the bench's time."""
 
-    #: Called with each warning, once.
-    on_warning: Callable[[str], None] | None
+    def subscribe_warnings(self, sink: Callable[[str], None]) -> Callable[[], None]:
+        """Have `sink` called with each new warning, at its time; return a function that ends it."""
+        ...
 
     @property
     def now_ns(self) -> int:

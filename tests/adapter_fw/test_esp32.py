@@ -1,7 +1,9 @@
 """The ESP32's program and the Arduino library, as far as a PC can tell: syntax, tables, projects, what runs here."""
 
+import argparse
 import configparser
 import json
+import os
 import re
 import shutil
 import subprocess
@@ -31,6 +33,35 @@ def test_the_esp32_program_fits_its_headers(board: str, pad: str) -> None:
     assert not CHECK.complaints(board, pad)
 
 
+def test_headers_that_are_not_there_are_skipped_aloud(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    words = argparse.Namespace(bluepad32=None, btstack=None)
+    assert CHECK.check_copy(words, CHECK.Source(f"{tmp_path}/idf"), tmp_path) == 0
+    assert "skipped" in capsys.readouterr().out
+
+
+@pytest.mark.soak
+@pytest.mark.skipif("P2OS_ESP_IDF" not in os.environ, reason="P2OS_ESP_IDF names no copy of ESP-IDF (DIR or DIR@REF)")
+def test_the_esp32_program_fits_the_headers_of_esp_idf(tmp_path: Path) -> None:
+    words = argparse.Namespace(bluepad32=os.environ.get("P2OS_BLUEPAD32"), btstack=os.environ.get("P2OS_BTSTACK"))
+    assert CHECK.check_copy(words, CHECK.Source(os.environ["P2OS_ESP_IDF"]), tmp_path) == 0
+
+
+def test_plain_esp_idf_finds_the_sources_and_the_drivers_of_its_version(tmp_path: Path) -> None:
+    if shutil.which("cmake") is None:
+        pytest.skip("cmake is not installed: apt-get install cmake")
+    assert (FIRMWARE / "esp32" / "main" / "CMakeLists.txt").exists()
+    assert CHECK.components(tmp_path, tmp_path)[0] == "driver"
+    (tmp_path / "components" / "esp_driver_uart").mkdir(parents=True)
+    assert CHECK.components(tmp_path, tmp_path)[:2] == ["esp_driver_gpio", "esp_driver_uart"]
+
+
+def test_the_library_names_only_boards_with_a_cpp_library() -> None:
+    text = (FIRMWARE / "library" / "library.properties").read_text(encoding="utf-8")
+    named = re.search(r"^architectures=(.*)$", text, re.MULTILINE)
+    assert named is not None
+    assert not {"*", "avr", "megaavr"} & set(named[1].split(","))
+
+
 @needs_compiler
 @pytest.mark.parametrize("revision", ["thesis-table3", "thesis-board"])
 def test_a_board_that_cannot_work_is_refused_with_every_reason(revision: str) -> None:
@@ -52,13 +83,13 @@ def test_every_environment_of_the_project_names_a_board_and_a_pad_that_exist() -
             r"-DADAPTER_BOARD=(\w+) -DADAPTER_PAD=(\w+)", parser[name]["board_build.cmake_extra_args"]
         ).groups()
         assert (FIRMWARE / "generated" / board / "pins.hpp").exists()
-        assert (FIRMWARE / "esp32" / "src" / f"pad_{pad}.cpp").exists()
+        assert (FIRMWARE / "esp32" / "main" / f"pad_{pad}.cpp").exists()
     assert parser["platformio"]["default_envs"] == "rev-b"
     assert "env:thesis-table3" in environments
 
 
 def test_the_project_compiles_every_source_of_the_esp32() -> None:
-    listed = (FIRMWARE / "esp32" / "src" / "CMakeLists.txt").read_text(encoding="utf-8")
+    listed = (FIRMWARE / "esp32" / "main" / "CMakeLists.txt").read_text(encoding="utf-8")
     for path in CHECK.sources("none"):
         assert path.name in listed or path.name.startswith("pad_")
 

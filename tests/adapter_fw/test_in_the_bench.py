@@ -4,14 +4,16 @@ from dataclasses import replace
 
 import pytest
 
+from p2os.robots.parameters import load_parameters
 from robot_bench.adapter import FirmwareAdapter, is_available
 from robot_bench.bench import Bench
 from robot_bench.scenario.scenario import Scenario, load_scenario
 from simbase.errors import UsageError
 from simbase.timing import NS_PER_S
 from tests.adapter_fw.builds import load_script
-from tests.adapter_fw.twins import PARAMETERS, PINOUT, AdapterSettings, FakePins
+from tests.adapter_fw.twins import PINOUT, AdapterSettings, FakePins
 
+PARAMETERS = load_parameters("p2dx")
 pytestmark = pytest.mark.skipif(not is_available(), reason="the firmware core is not built: no C++17 compiler")
 
 

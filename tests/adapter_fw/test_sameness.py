@@ -3,7 +3,11 @@
 Each example is a sequence of some fifty steps; a step changes pins, brings bytes
 (sound, damaged or noise), pad reports, a change of masters, a shutdown, a saved
 and restored state, and lets time pass. Both are asked for their deadlines, too.
+Lives stand on every boundary (boundaries.py); what they notice is measured (mutation.py).
 """
+
+import shutil
+from pathlib import Path
 
 import pytest
 from hypothesis import HealthCheck, given, settings
@@ -12,15 +16,12 @@ from hypothesis import strategies as st
 from adapter_sim import AdapterSettings
 from adapter_sim.codec import BitOrder
 from adapter_sim.masters import Master
-from adapter_sim.pinout import parse_pinout
 from adapter_sim.settings import EncoderAtOpen, MotorMeaning
-from p2os.gamepad import PadReport
-from p2os.protocol.frames import Frame
-from p2os.protocol.profiles import Profile
-from p2os.protocol.sip import SonarReading
 from robot_bench.adapter import is_available
-from tests.adapter_fw.twins import MS, Twins
-from tests.adapter_sim.conftest import four_bits
+from tests.adapter_fw import mutation
+from tests.adapter_fw.boundaries import Life
+from tests.adapter_fw.sequences import Sequence
+from tests.adapter_fw.twins import MS
 
 pytestmark = pytest.mark.skipif(not is_available(), reason="the firmware core is not built: no C++17 compiler")
 
@@ -69,121 +70,6 @@ SETTINGS = st.builds(
 )
 
 
-class Sequence:
-    """What a step does to both."""
-
-    def __init__(self, adapter_settings: AdapterSettings, *, has_four_bits: bool) -> None:
-        pinout = {"pinout": parse_pinout(four_bits())} if has_four_bits else {}
-        self.twins = Twins(adapter_settings, **pinout)
-        self.width = 4 if has_four_bits else 3
-        self.twins.pass_time(310 * MS)
-
-    def step(self, kind: str, *values: object) -> None:
-        getattr(self, "_" + kind.replace(" ", "_"))(*values)
-        self.twins.pass_time(1 * MS)
-
-    def _motors(self, left: int, right: int) -> None:
-        self.twins.motors(left, right, self.width)
-        self.twins.pass_time(12 * MS)
-
-    def _sips(self, count: int, dx: int, heading: int, left: int, right: int) -> None:
-        for number in range(count):
-            sip = self.twins.sip
-            self.twins.send_sip(
-                raw_x=(sip.raw_x + dx) % 0x8000,
-                raw_heading=heading // 16 + number * 3,
-                raw_left_velocity=left,
-                raw_right_velocity=right,
-            )
-            self.twins.pass_time(100 * MS)
-
-    def _sip(self, x: int, y: int, heading: int, speed: int, stall: bool, sonar: list[tuple[int, int]]) -> None:
-        self.twins.send_sip(
-            raw_x=x, raw_y=y, raw_heading=heading, raw_left_velocity=speed, stall_left=stall,
-            sonar=tuple(SonarReading(*reading) for reading in sonar),
-        )  # fmt: skip
-
-    def _obey(self, count: int) -> None:
-        """SIPs of a robot that does what it was told."""
-        for _ in range(count):
-            speeds = self.twins.model.status.speeds
-            self.twins.send_sip(raw_left_velocity=speeds.forward_mm_s, raw_right_velocity=speeds.forward_mm_s)
-            self.twins.pass_time(100 * MS)
-
-    def _noise(self, data: bytes) -> None:
-        self.twins.receive(data)
-
-    def _damaged(self, place: int, flip: int) -> None:
-        data = bytearray(self.twins.sip.to_frame(Profile.P2OS).to_bytes())
-        data[place % len(data)] ^= flip
-        self.twins.receive(bytes(data))
-
-    def _frame(self, kind: int, data: bytes) -> None:
-        self.twins.frame(bytes((kind,)) + data)
-
-    def _pin(self, name: str, high: bool) -> None:
-        self.twins.pin(name, high)
-
-    def _glitch(self, name: str, span_ms: int) -> None:
-        level = self.twins.sides[0].pins.read(name, self.twins.now)
-        self.twins.pin(name, not level)
-        self.twins.pin(name, level, span_ms * MS)
-        self.twins.pass_time(20 * MS)
-
-    def _time(self, span: int) -> None:
-        self.twins.pass_time(span)
-
-    def _connect(self, on_request: bool) -> None:
-        """All the way to driving, unless something is in the way."""
-        self.twins.pin("rst", False)
-        if on_request:
-            self.twins.pin("p2dx_con", False)
-            self.twins.pass_time(400 * MS)
-        self.twins.master(Master.BLUEPILL)
-        self.twins.pin("p2dx_con", True)
-        self.twins.pass_time(420 * MS)
-        self._handshake()
-
-    def _handshake(self) -> None:
-        for _ in range(3):
-            self.twins.answer()
-            self.twins.pass_time(40 * MS)
-        self.twins.pass_time(70 * MS)
-        self.twins.send_sip(raw_x=0, raw_y=0, raw_heading=0, raw_left_velocity=0, raw_right_velocity=0)
-        self.twins.pass_time(60 * MS)
-
-    def _pad(self, up: bool, down: bool, forward: int, backward: int, turn: int) -> None:
-        self.twins.pad(PadReport(up=up, down=down, forward=forward, backward=backward, turn=turn))
-
-    def _drive_by_pad(self, forward: int, turn: int) -> None:
-        self.twins.master(Master.PAD)
-        for up in (False, True, *(False,) * 12):
-            self.twins.pad(PadReport(up=up, forward=forward, turn=turn))
-            self.twins.answer()
-            self.twins.pass_time(40 * MS)
-        self._obey(1)
-
-    def _master(self, master: Master) -> None:
-        self.twins.master(master)
-
-    def _rare(self, what: str) -> None:
-        if what == "shutdown":
-            self.twins.shutdown()
-        elif what == "reset":
-            self._glitch("rst", 14)
-            self.twins.pass_time(310 * MS)
-        elif what == "restore":
-            saved = [side.adapter.snapshot() for side in self.twins.sides]
-            now, before = self.twins.now, self.twins.model.state
-            self.twins.pass_time(500 * MS)
-            self.twins.now = now
-            for side, state in zip(self.twins.sides, saved, strict=True):
-                side.adapter.restore(state)
-            assert self.twins.model.state == self.twins.firmware.state == before
-        else:
-            self.twins.receive(Frame(b"\x32" + bytes(40)).to_bytes()[:17])
-
-
 def run_both(steps: list[tuple[object, ...]], adapter_settings: AdapterSettings, *, has_four_bits: bool) -> int:
     sequence = Sequence(adapter_settings, has_four_bits=has_four_bits)
     for kind, *values in steps:
@@ -218,3 +104,80 @@ def test_firmware_and_model_agree_in_thousands_of_sequences(
     steps: list, adapter_settings: AdapterSettings, four: bool
 ) -> None:
     run_both(steps, adapter_settings, has_four_bits=four)
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_firmware_and_model_agree_at_every_boundary(seed: int) -> None:
+    Life(seed).live()
+
+
+@pytest.mark.soak
+@pytest.mark.parametrize("seeds", [range(first, first + 250) for first in range(0, 2_000, 250)], ids=str)
+def test_firmware_and_model_agree_at_every_boundary_in_thousands_of_lives(seeds: range) -> None:
+    for seed in seeds:
+        Life(seed).live()
+
+
+def test_the_lives_stand_on_the_boundaries_that_they_are_for() -> None:
+    """A threshold that a reading equals, a jump of exactly half a turn, the longest step, and one count more."""
+    seen = {"threshold": 0, "half a turn": 0, "longest step": 0, "tolerance": 0}
+    for seed in range(12):
+        life = Life(seed)
+        model = life.twins.model
+        longest, tolerance = model._codes.encoders._longest_counts, model.settings.plausibility_tolerance_mm_s
+        threshold, unit = model.distances.threshold_um, model.parameters.range_um_per_count
+        turn = model.parameters.angle_counts_per_turn
+        update, take = life.twins.send_sip, model._driver.plausibility.take
+
+        def send(**changes: object) -> None:
+            before, _ = life.twins.sip, update(**changes)  # noqa: B023 - called within the pass
+            after = life.twins.sip  # noqa: B023
+            seen["threshold"] += any(one.raw_range * unit == threshold for one in after.sonar)  # noqa: B023
+            seen["half a turn"] += (after.raw_heading - before.raw_heading) % turn == turn // 2  # noqa: B023
+            seen["longest step"] += (after.raw_x - before.raw_x) % 0x8000 in {longest, 0x8000 - longest}  # noqa: B023
+
+        def check(left: int, right: int, **rest: object) -> None:
+            take(left, right, **rest)  # noqa: B023
+            seen["tolerance"] += model._driver.plausibility._error() == tolerance > 0  # noqa: B023
+
+        life.twins.send_sip, model._driver.plausibility.take = send, check
+        life.live()
+    assert min(seen.values()) > 3, seen
+
+
+#: Changes of the kind that nothing noticed: one side's order, and where it is.
+OFF_BY_ONE = [
+    ("adapter_fw/core/adapter/distances.cpp", "reading.range_um < threshold_um_", "reading.range_um <= threshold_um_"),
+    ("adapter_fw/core/adapter/encoders.cpp", "(dx) > longest_counts_", "(dx) >= longest_counts_"),
+    ("adapter_fw/core/adapter/encoders.cpp", "size_of_number(turn) > MOST_TURN", "size_of_number(turn) >= MOST_TURN"),
+    ("adapter_fw/core/adapter/driver.cpp", "error_now <= tolerance_mm_s_ ||", "error_now < tolerance_mm_s_ ||"),
+    ("adapter_fw/core/adapter/driver.cpp", "error_now <= least_error_ -", "error_now < least_error_ -"),
+    ("adapter_fw/core/p2os/sip.cpp", "payload.size < READINGS", "payload.size <= READINGS"),
+    ("adapter_fw/core/p2os/decoder.cpp", "count > MAX_COUNT", "count >= MAX_COUNT"),
+    ("adapter_fw/core/adapter/adapter.cpp", "received_at < STREAMING_NS", "received_at <= STREAMING_NS"),
+    ("adapter_fw/core/adapter/inputs.cpp", "lasted <= high_after_ns_", "lasted < high_after_ns_"),
+    ("adapter_sim/codec.py", "return range_um < threshold_um", "return range_um <= threshold_um"),
+    ("adapter_sim/encoders.py", "if max(abs(dx), abs(dy)) > self", "if max(abs(dx), abs(dy)) >= self"),
+    ("adapter_sim/driver.py", "error <= self._tolerance_mm_s or stalled", "error < self._tolerance_mm_s or stalled"),
+]  # fmt: skip
+
+
+@pytest.mark.soak
+@pytest.mark.skipif(shutil.which("g++") is None, reason="g++ is not installed: apt-get install g++")
+def test_every_change_of_a_boundary_by_one_is_noticed(tmp_path: Path) -> None:
+    judge, unnoticed = mutation.Judge(tmp_path), []
+    for path, before, after in OFF_BY_ONE:
+        text = (mutation.ROOT / path).read_text(encoding="utf-8")
+        assert text.count(before) == 1, (path, before)
+        mutant = mutation.Mutant(path, 0, before, after, text.replace(before, after))
+        if not judge.is_other_program(mutant) or not judge.is_noticed(mutant):
+            unnoticed.append(mutant.name)
+    assert unnoticed == []
+
+
+@pytest.mark.soak
+@pytest.mark.parametrize("side", ["model", "firmware"])
+def test_ninety_five_of_a_hundred_changes_of_a_side_are_noticed(side: str) -> None:
+    pytest.importorskip("cosmic_ray" if side == "model" else "universalmutator", reason="make mutation-tools")
+    result = mutation.score(side, sample=100, seed=1)
+    assert result.share >= 0.95, "\n".join(mutant.name for mutant in result.unnoticed)

@@ -14,9 +14,10 @@ from robot_bench.adapter import FirmwareAdapter
 from simbase.timing import NS_PER_MS, Nanos
 from tests.adapter_sim.conftest import FakePins
 
-PARAMETERS = load_parameters("p2dx")
 PINOUT = load_pinout()
 MS = NS_PER_MS
+#: Events whose details are numbers; the words of the others are each side's own.
+EXACT = {"command", "stall", "connected"}
 #: Counters that both keep, by the firmware's name and the model's.
 WIRE_COUNTERS = ("frames", "noise_bytes", "bad_checksums", "bad_counts", "stalled", "rescued")
 
@@ -31,7 +32,9 @@ class Side:
     events: list[tuple[Nanos, str]] = field(default_factory=list)
 
     def listen(self) -> None:
-        self.adapter.on_event = lambda now, what, _: self.events.append((now, what))
+        self.adapter.on_event = lambda now, what, detail: self.events.append(
+            (now, f"{what}: {detail}" if what in EXACT else what)
+        )
 
     def collect(self) -> None:
         self.frames += self.adapter.take_output()
@@ -40,13 +43,21 @@ class Side:
 class Twins:
     """Both, fed alike; a robot that is only a source of SIPs answers the model's frames."""
 
-    def __init__(self, settings: AdapterSettings | None = None, pinout: Pinout = PINOUT) -> None:
-        self.now: Nanos = 0
+    def __init__(
+        self,
+        settings: AdapterSettings | None = None,
+        pinout: Pinout = PINOUT,
+        *,
+        robot: str = "p2dx",
+        start: Nanos = 0,
+    ) -> None:
+        self.now: Nanos = start
+        parameters = load_parameters(robot)
         self.steps = 0
         self.sides = []
         for kind in (Adapter, FirmwareAdapter):
             pins = FakePins()
-            adapter = kind(pins=pins, pinout=pinout, parameters=PARAMETERS, settings=settings)
+            adapter = kind(pins=pins, pinout=pinout, parameters=parameters, settings=settings, now=start)
             self.sides.append(Side(pins, adapter))
             self.sides[-1].listen()
         self.sip = StandardSip(sonar=(SonarReading(0, 5_000), SonarReading(3, 1_000)))
@@ -93,6 +104,11 @@ class Twins:
     def send_sip(self, **changes: object) -> None:
         self.sip = replace(self.sip, **changes)
         self.frame(self.sip.to_frame(Profile.P2OS).payload)
+
+    def go_before(self, at: Nanos) -> None:
+        """Pass the time up to the last nanosecond before an instant; what comes next comes at the instant itself."""
+        self.pass_time(at - 1 - self.now)
+        self.now = at
 
     def pass_time(self, span: Nanos) -> None:
         """Advance both, each at its own deadlines, and compare."""

@@ -240,7 +240,7 @@ def test_bit_zero_of_the_flags_is_not_a_motor_flag(driving: Rig) -> None:
     assert driving.adapter.state == "driving"
 
 
-def test_rst_wipes_everything_and_releases_the_outputs(driving: Rig) -> None:
+def test_rst_wipes_all_but_the_encoders_and_releases_the_outputs(driving: Rig) -> None:
     driving.robot.sip = replace(driving.robot.sip, raw_x=200)
     driving.ms(200)
     driving.pins.set("rst", True, driving.now)
@@ -255,7 +255,33 @@ def test_rst_wipes_everything_and_releases_the_outputs(driving: Rig) -> None:
     # p2dx_con is high still: the first frame of the new life is STOP.
     assert names(driving, since)[:7] == ["STOP", "VEL", "RVEL", "STOP", "VEL", "RVEL", "PULSE"]
     assert driving.adapter.state == "driving"
-    assert driving.pins.code("encoder1") == 0
+    assert driving.pins.code("encoder1") == 2
+
+
+def test_the_encoders_are_absolute_over_a_reset_of_the_adapter(driving: Rig) -> None:
+    driving.robot.sip = replace(driving.robot.sip, raw_x=200)  # 2.59 steps of 64.8 mm
+    driving.ms(400)
+    driving.pins.set("rst", True, driving.now)
+    driving.ms(20)
+    driving.pins.set("rst", False, driving.now)
+    driving.ms(310)
+    assert driving.pins.code("encoder1") == 2
+    driving.ms(1_600)
+    driving.robot.sip = replace(driving.robot.sip, raw_x=60)  # 0.78 steps more
+    driving.ms(400)
+    assert driving.pins.code("encoder1") == 3
+
+
+def test_the_encoders_are_absolute_while_the_bluepill_is_reset(driving: Rig) -> None:
+    driving.robot.sip = replace(driving.robot.sip, raw_x=200)
+    driving.ms(400)
+    for name in ("p2dx_con", "motor1_comm1", "motor2_comm1"):
+        driving.pins.set(name, False, driving.now)
+    driving.ms(2_000)
+    assert driving.pins.code("encoder1") == 2
+    driving.pins.set("p2dx_con", True, driving.now)
+    driving.ms(1_600)
+    assert (driving.adapter.state, driving.pins.code("encoder1")) == ("driving", 2)
 
 
 def test_rst_while_booting_begins_the_boot_anew(rig: Rig) -> None:

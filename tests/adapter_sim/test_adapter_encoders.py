@@ -146,11 +146,16 @@ def test_a_jump_of_the_odometry_is_counted_and_left_out() -> None:
     assert encoders.counts == (before[0] + 1, before[1] + 1)
 
 
-@given(st.integers(-100, 100), st.integers(-100, 100))
-def test_beginning_at_counts_shows_the_same_counts(left: int, right: int) -> None:
+@given(st.integers(-(10**9), 10**9), st.integers(-(10**9), 10**9))
+def test_travel_goes_on_whole_where_another_session_begins(left_nm: int, right_nm: int) -> None:
     encoders = Encoders(GEOMETRY, 3)
-    encoders.begin((left, right))
-    assert encoders.counts == (left, right)
+    encoders.begin((left_nm, right_nm))
+    encoders.take(0, 0, 0)
+    encoders.take(100, 0, 0)
+    before = encoders.travel_nm
+    assert before == (left_nm + 84_000_000, right_nm + 84_000_000)
+    encoders.begin(before)
+    assert encoders.travel_nm == before
 
 
 def test_a_snapshot_holds_all_of_it() -> None:

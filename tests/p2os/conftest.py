@@ -31,6 +31,7 @@ class WheelAngles:
     pitch_rad: float = 0.0
     turn_radps: float = 0.0
     in_contact: bool = False
+    contact_rad: float | None = None
     x_m: float = 0.0
     y_m: float = 0.0
     z_m: float = 0.0
@@ -53,6 +54,9 @@ class PerfectBody(Stateful):
 
     def put_back(self) -> None:
         self.state = WheelAngles()
+
+    def who_stands_at_start(self) -> str | None:
+        return None
 
     def stand_at(self, x_m: float, y_m: float, heading_rad: float) -> None:
         self.state = replace(self.state, x_m=x_m, y_m=y_m, heading_rad=heading_rad)

@@ -169,8 +169,8 @@ def test_changes_of_the_world_happen_at_their_time() -> None:
 def test_warnings_of_the_chip_stand_in_the_log() -> None:
     chip = FakeChip(drives((0, 0, 0)))
     made = Bench(scenario("direct", duration_s=1), chip=chip)
-    assert chip.on_warning is not None
-    chip.on_warning("TIM2 is not modelled")
+    for sink in chip.warning_sinks:
+        sink("TIM2 is not modelled")
     finished(made)
     assert entries(made, "event")[0] == {
         "k": "event", "t": 0, "who": "chip", "what": "warning", "detail": "TIM2 is not modelled",

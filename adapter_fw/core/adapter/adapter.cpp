@@ -126,6 +126,12 @@ void Adapter::skip_to(const char* reason, Nanos now) {
   replan();
 }
 
+void Adapter::place_wheels(Wheels phases_um) {
+  encoders_.begin({phases_um.left * 1'000, phases_um.right * 1'000});
+  left_walk_.stand_at(encoders_.counts().left);
+  right_walk_.stand_at(encoders_.counts().right);
+}
+
 void Adapter::advance_to(Nanos limit) {
   if (run(limit) == limit) {
     return;

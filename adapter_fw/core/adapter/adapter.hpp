@@ -102,6 +102,11 @@ class Adapter final : private p2os::ClientListener {
   // stopped as by `shutdown`, and STOP is the next frame out. `reason` is static.
   void skip_to(const char* reason, Nanos now);
 
+  // Says where the wheels stand within their turn, in um of the rim, as `wheel_phases_um` said before the power or
+  // the program went; before the first `advance_to`.
+  void place_wheels(Wheels phases_um);
+  Wheels wheel_phases_um() const { return encoders_.phases_um(); }
+
   // Acts on everything due up to and including `limit`, then looks at rst.
   void advance_to(Nanos limit);
   Nanos next_deadline() const { return deadline_; }

@@ -25,10 +25,6 @@ static_assert(sizeof(SINE_TABLE) / sizeof(SINE_TABLE[0]) == QUARTER + 1, "one en
 
 std::int64_t floor_shift(std::int64_t value, int bits) { return divide_floor(value, std::int64_t{1} << bits); }
 
-std::int64_t ceiling_divide(std::int64_t numerator, std::int64_t denominator) {
-  return -divide_floor(-numerator, denominator);
-}
-
 }  // namespace
 
 std::int32_t Unwrapper::update(std::int32_t raw) {
@@ -74,15 +70,13 @@ Encoders::Encoders(const RobotNumbers& robot, Nanos longest_gap_ns, std::int32_t
       y_(POSITION_MODULUS),
       turn_(HEADING_MODULUS) {}
 
-void Encoders::begin(Wheels counts) {
+void Encoders::begin(Wheels travel_nm) {
   x_.forget();
   y_.forget();
   turn_.forget();
   has_heading_ = false;
   heading_ = forward_ = 0;
-  // The lower boundary of a count, rounded up, so that floor gives the same count again.
-  const std::int64_t steps = std::int64_t{1} << width_;
-  offset_nm_ = {ceiling_divide(counts.left * per_turn_nm_, steps), ceiling_divide(counts.right * per_turn_nm_, steps)};
+  offset_nm_ = travel_nm;
 }
 
 bool Encoders::take(std::int32_t raw_x, std::int32_t raw_y, std::int32_t raw_heading) {
@@ -115,6 +109,11 @@ Wheels Encoders::travel_nm() const {
   const std::int64_t counts = remainder_floor(heading_, HEADING_MODULUS);
   const std::int64_t rim_nm = turns * rim_per_turn_nm_ + divide_half_away(counts * rim_per_turn_nm_, HEADING_MODULUS);
   return {offset_nm_.left + forward_nm - rim_nm, offset_nm_.right + forward_nm + rim_nm};
+}
+
+Wheels Encoders::phases_um() const {
+  const Wheels travel = travel_nm();
+  return {remainder_floor(travel.left, per_turn_nm_) / 1'000, remainder_floor(travel.right, per_turn_nm_) / 1'000};
 }
 
 Wheels Encoders::counts() const {

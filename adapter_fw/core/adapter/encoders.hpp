@@ -36,14 +36,17 @@ class Encoders {
  public:
   Encoders(const RobotNumbers& robot, Nanos longest_gap_ns, std::int32_t width);
 
-  // Starts anew at these counts; the next packet is the reference.
-  void begin(Wheels counts);
+  // Starts anew at this travel in nm; the next packet is the reference.
+  void begin(Wheels travel_nm);
 
   // Adds the odometry of a packet (heading in 4096ths of a turn); false where it is no step that a wheel can make.
   bool take(std::int32_t raw_x, std::int32_t raw_y, std::int32_t raw_heading);
 
   // Returns how far both rims have rolled, in nm, + forward.
   Wheels travel_nm() const;
+
+  // Returns where both wheels stand within their turn, in um of the rim.
+  Wheels phases_um() const;
 
   // Returns the encoder steps of both wheels, by floor, unwrapped.
   Wheels counts() const;

@@ -27,11 +27,6 @@ void CodeWalk::step(std::int64_t target, Nanos now) {
 
 void CodeWalk::rebase(std::int64_t steps) { shown_ = remainder_floor(shown_ + steps / 2, steps) - steps / 2; }
 
-void CodeWalk::reset() {
-  shown_ = 0;
-  has_stepped_ = false;
-}
-
 void Outputs::release(Nanos now) {
   if (driven_ != 0) {
     driven_ = levels_ = 0;

@@ -26,7 +26,10 @@ class CodeWalk {
 
   // Names the same code by its count nearest to 0.
   void rebase(std::int64_t steps);
-  void reset();
+  // Forgets when the last step was; the code stays.
+  void reset() { has_stepped_ = false; }
+  // Stands at a count, at once.
+  void stand_at(std::int64_t count) { shown_ = count; }
 
   std::int64_t shown() const { return shown_; }
 

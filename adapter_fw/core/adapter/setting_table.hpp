@@ -44,7 +44,7 @@ constexpr std::int32_t DEFAULT_BAUD = 9'600;
   SETTING(std::int64_t, plausibility_progress_mm_s, 5, 1) \
   SETTING(Nanos, distance_stale_ns, 1'000'000'000, 1) \
   SETTING(Nanos, settle_ns, 500'000'000, 1) \
-  SETTING(EncoderAtOpen, encoder_at_open, EncoderAtOpen::ZERO, 0) \
+  SETTING(EncoderAtOpen, encoder_at_open, EncoderAtOpen::CONTINUE, 0) \
   SETTING(Nanos, encoder_dwell_ns, 20'000'000, 0) \
   SETTING(bool, stop_unknown_robot, true, 0) \
   SETTING(std::int32_t, stop_repeats, 3, 0) \

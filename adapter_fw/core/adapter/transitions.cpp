@@ -24,7 +24,8 @@ void Adapter::clear() {
   plausibility_.begin(now_);
   pacer_.begin({});
   distances_.forget();
-  encoders_.begin({});
+  // Absolute: where the wheels stand outlives a reset.
+  encoders_.begin(encoders_.travel_nm());
   encoders_.forget_jumps();
   left_walk_.reset();
   right_walk_.reset();
@@ -48,7 +49,7 @@ void Adapter::follow_reset(Nanos now) {
 
 void Adapter::boot(Nanos now) {
   outputs_.show_safe(now);
-  outputs_.show_encoders({}, now);
+  outputs_.show_encoders(counts_shown(), now);
   client_.stop_unknown();
   next_sample_ = now;
   enter(State::IDLE, now, What::BOOTED, "waits for its master's connect request");
@@ -77,7 +78,7 @@ void Adapter::session_opened(const p2os::Identity& robot, Nanos now) {
     right_walk_.rebase(std::int64_t{1} << wires_.encoder_width);
     encoders_.begin({});
   } else {
-    encoders_.begin(counts_shown());
+    encoders_.begin(encoders_.travel_nm());
   }
   enter(State::SETTLING, now, What::CONNECTED, "waits for the odometry");
 }

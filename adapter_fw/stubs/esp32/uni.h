@@ -31,7 +31,7 @@ struct uni_platform {
   void (*on_oob_event)(uni_platform_oob_event_t event, void* data);
 };
 extern "C" {
-void uni_bt_enable_new_connections_unsafe(bool enabled);
+void uni_bt_start_scanning_and_autoconnect_unsafe(void);
 void uni_platform_set_custom(struct uni_platform* platform);
 int uni_init(int count, const char** words);
 }

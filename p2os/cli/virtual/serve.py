@@ -66,7 +66,7 @@ SLOWEST, FASTEST = 0.01, 100.0
 IN_FLEET_FILE = (
     "port", "robot", "world", "body", "seed", "for_client", "firmware", "lenient", "laser", "all_sonar", "rear_sonar",
     "flash", "errors", "baud", "robots",
-    "at", "apart", "aux", "fault", "sync_limit_ns",
+    "at", "apart", "worlds_folder", "aux", "fault", "sync_limit_ns",
 )  # fmt: skip
 
 HELP = f"""Be a Pioneer robot on a line, in real time, until Ctrl-C.
@@ -177,6 +177,10 @@ def serve(
     apart: Annotated[
         bool, typer.Option("--apart", help="A copy of the world for each robot, without the others.")
     ] = False,
+    worlds_folder: Annotated[
+        Path | None,
+        typer.Option("--worlds", help="Folder whose files clients may load as worlds (LOADWORLD).", metavar="DIR"),
+    ] = None,
     fleet: Annotated[
         Path | None, typer.Option(help="TOML file with the world and every robot.", metavar="FILE")
     ] = None,
@@ -233,7 +237,7 @@ def serve(
                 replace(first, port=url, at=places[number] if number < len(places) else None)
                 for number, url in enumerate(ports)
             ),
-            world=world, body=body, seed=seed, apart=apart,
+            world=world, body=body, seed=seed, apart=apart, worlds=worlds_folder,
         )  # fmt: skip
     made = make_fleet(order)
     queue_output()
@@ -307,8 +311,9 @@ def _refuse_beside_fleet(context: typer.Context) -> None:
     for name in IN_FLEET_FILE:
         source = context.get_parameter_source(name)
         if source is not None and source.name == "COMMANDLINE":
+            option_name = name.removesuffix("_ns").removesuffix("_client").removesuffix("_folder").replace("_", "-")
             raise UsageError(
-                f"--{name.removesuffix('_ns').removesuffix('_client').replace('_', '-')} beside --fleet",
+                f"--{option_name} beside --fleet",
                 hint="the fleet's file sets that",
             )
 

@@ -4,6 +4,7 @@ A collision is a new contact of the hull with anything but the floor; contacts
 that follow each other within 0.2 s are one.
 """
 
+import math
 from collections import deque
 
 from p2os.pioneer.body.contract import MOST_HITS, Hit
@@ -16,12 +17,14 @@ APART_STEPS = 200
 class ContactCounter(Stateful):
     """Turn a stream of touching/not touching into a count, and remember the collisions."""
 
-    __slots__ = ("_apart", "_hits", "collisions", "touching")
-    STATE = ("_apart", "_hits", "collisions", "touching")
+    __slots__ = ("_apart", "_hits", "collisions", "place", "touching")
+    STATE = ("_apart", "_hits", "collisions", "place", "touching")
 
     def __init__(self) -> None:
         self.collisions = 0
         self.touching = False
+        #: Where the last collision was, metres.
+        self.place: tuple[float, float] | None = None
         self._apart = APART_STEPS
         self._hits: deque[Hit] = deque(maxlen=MOST_HITS)
 
@@ -39,6 +42,14 @@ class ContactCounter(Stateful):
     def note(self, hit: Hit) -> None:
         """Remember what a new collision was."""
         self._hits.append(hit)
+        self.place = hit.x_m, hit.y_m
+
+    def bearing_rad(self, x_m: float, y_m: float, heading_rad: float) -> float | None:
+        """Return where a robot at a pose is touched, counter-clockwise from ahead; None where it is not."""
+        if not self.touching or self.place is None:
+            return None
+        x, y = self.place
+        return math.remainder(math.atan2(y - y_m, x - x_m) - heading_rad, math.tau)
 
     def take_hits(self) -> list[Hit]:
         """Return the collisions that were noted since this was asked last, the last 16 at the most."""

@@ -9,7 +9,7 @@ Invariant: the same calls after the same `reset` give the same states, bit for b
 """
 
 import math
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple, Protocol, Self
 
@@ -50,6 +50,8 @@ class BodyState:
     stalled_right: bool = False
     collisions: int = 0
     in_contact: bool = False
+    #: Where the hull is touched, counter-clockwise from ahead, rad: where the last collision was; None without contact.
+    contact_rad: float | None = None
 
 
 #: chosen: so many hits are remembered until somebody takes them; collisions are 0.2 s apart at the least.
@@ -124,6 +126,14 @@ class RobotBody(Protocol):
         """Stand still where the last `reset` put it, wheels at angle 0, collisions at 0; the world goes on.
 
         What can be pushed goes back to where the world has it; `take_moved` then tells of it.
+        """
+        ...
+
+    def who_stands_at_start(self, leaving: Collection[Self] = ()) -> str | None:
+        """Return the name of another robot that stands where `put_back` would put this one, or None.
+
+        Args:
+            leaving: Robots that go away at the same moment.
         """
         ...
 

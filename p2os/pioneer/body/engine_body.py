@@ -170,6 +170,7 @@ class EngineBody(BodyInWorld):
             stalled_right=self._stalling[1] >= STALL_STEPS,
             collisions=self._contacts.collisions,
             in_contact=self._contacts.touching,
+            contact_rad=self._contacts.bearing_rad(x, y, heading),
         )
 
     # What the engine tells -------------------------------------------------------------------

@@ -11,7 +11,7 @@ Invariant: a thing that walks is where its path leads at the step to which the s
 """
 
 import math
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Collection, Iterable, Iterator, Sequence
 from dataclasses import replace
 from typing import ClassVar, NamedTuple
 
@@ -48,6 +48,8 @@ class Scene(Stateful):
     """
 
     STATE: ClassVar[tuple[str, ...]] = ("_owns",)
+    #: They are taken once, when the scene is made.
+    DERIVED: ClassVar[tuple[str, ...]] = ("bodies",)
 
     dt_ns: Nanos = STEP_NS
     #: The first robot first.
@@ -114,8 +116,9 @@ class Scene(Stateful):
 class BodyInWorld(Stateful):
     """The part of a body that all of them share."""
 
-    STATE: ClassVar[tuple[str, ...]] = ("is_powered", "_steps", "_plan", "_walking", "_moved_things", "_contacts")
-    DERIVED: ClassVar[tuple[str, ...]] = ("_walkers", "_footprint")
+    STATE: ClassVar[tuple[str, ...]] = ("is_powered", "start", "_steps", "_plan", "_walking", "_moved_things",
+                                    "_contacts")  # fmt: skip
+    DERIVED: ClassVar[tuple[str, ...]] = ("scene", "_walkers", "_footprint")
 
     dt_ns: Nanos = STEP_NS
 
@@ -133,7 +136,7 @@ class BodyInWorld(Stateful):
         self._footprint: tuple[StandingPose, Footprint] | None = None
         #: Whether its motors have power; without it a wheel that has come to rest is held by its gear alone.
         self.is_powered = True
-        self.begin()
+        self.begin(scene.world.start)
 
     @property
     def state(self) -> BodyState:
@@ -158,8 +161,19 @@ class BodyInWorld(Stateful):
         """Return the outline of its hull at a pose."""
         return Footprint.of_polygon(self.robot_name, placed(self._hull, x_m, y_m, heading_rad))
 
-    def begin(self) -> None:
-        """Count from step 0, in the world as it was made."""
+    def who_stands_at_start(self, leaving: "Collection[BodyInWorld]" = ()) -> str | None:
+        """Return the name of another robot that stands where this one began, or None.
+
+        Args:
+            leaving: Robots that go away at the same moment.
+        """
+        hull = placed(self._hull, self.start.x_m, self.start.y_m, self.start.heading_rad)
+        there = (body for body in self.others if body not in leaving and body.footprint.overlaps(hull))
+        return next((body.robot_name for body in there), None)
+
+    def begin(self, start: Pose) -> None:
+        """Count from step 0, in the world as it was made; `start` is where it begins."""
+        self.start = start
         self._steps = 0
         self._plan = Plan((), self._parameters, self._static)
         #: What walks, and the step at which it began.

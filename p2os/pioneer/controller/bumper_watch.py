@@ -4,9 +4,13 @@ Source: Pioneer 2/3 H8 manual (BUMPSTALL, E_STALL), Pioneer 3 manual: a pressed
 bumper stalls the robot only when it drives that way. How often the firmware
 looks at the bumpers is chosen; the battery is looked at once a packet.
 
-Where a body touches something the segment is not known: the middle one of the
-ring on the side of the way is pressed.
+Of the ring the segment is pressed where the body is touched, as ARIA's ArBumpers places
+them: evenly over 135 degrees ahead and behind, the first one at the left end in front
+and at the right end behind. Beside these nothing is pressed. Where a body cannot tell
+its place, it is the middle segment on the side of the way.
 """
+
+import math
 
 from p2os.pioneer.controller.context import Context
 from p2os.pioneer.controller.flash import Flash
@@ -16,6 +20,8 @@ from simbase.timing import NS_PER_MS, Nanos
 #: chosen: the bumpers are looked at so often while BUMPSTALL is on.
 BUMPER_WATCH_NS: Nanos = 20 * NS_PER_MS
 FRONT, REAR = 1, 2
+#: Of each ring, half of it to each side (ARIA).
+RING_RAD = math.radians(135)
 
 
 def is_watching(context: Context) -> bool:
@@ -41,13 +47,24 @@ def pressed(context: Context, body: SensedState, flash: Flash) -> tuple[int, int
     """Return the pressed segments, front and rear, bit 0 is segment 1."""
     pins = context.devices.pins
     front, rear = pins.front_pressed, pins.rear_pressed
-    if body.in_contact:
+    segments = flash.number("frontbumps"), flash.number("rearbumps")
+    if body.in_contact and body.contact_rad is not None:
+        front |= _touched(segments[0], body.contact_rad)
+        rear |= _touched(segments[1], math.remainder(body.contact_rad - math.pi, math.tau))
+    elif body.in_contact:
         left, right = context.motion.wheels_mps
         if left + right >= 0:
-            front |= _middle(flash.number("frontbumps"))
+            front |= _middle(segments[0])
         if left + right <= 0:
-            rear |= _middle(flash.number("rearbumps"))
+            rear |= _middle(segments[1])
     return front, rear
+
+
+def _touched(segments: int, bearing_rad: float) -> int:
+    """Return the segment of a ring that is at a bearing from its middle, counter-clockwise; none beside the ring."""
+    if not segments or abs(bearing_rad) > RING_RAD / 2:
+        return 0
+    return 1 << min(int((RING_RAD / 2 - bearing_rad) / (RING_RAD / segments)), segments - 1)
 
 
 def _middle(segments: int) -> int:

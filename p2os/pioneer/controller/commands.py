@@ -50,7 +50,7 @@ KEPT = {
 NOT_FITTED = (
     _C.DOCK, _C.MOVINGBLINK, _C.CALCOMP, _C.ARM_POWER, _C.ARM_AUTOPARK, _C.ARM_GRIPPARK, _C.POWER_PC, _C.POWER_LRF,
     _C.POWER_5V, _C.POWER_12V, _C.POWER_AUX_PC, _C.POWER_TOUCHSCREEN, _C.POWER_PTZ, _C.POWER_AUDIO, _C.POWER_LRF2,
-    _C.ARM_INIT, _C.ARM_CHECK, _C.ARM_HOME, _C.ARM_PARK, _C.ARM_POS, _C.ARM_SPEED, _C.ARM_STOP, _C.LCD,
+    _C.SETPBV, _C.ARM_INIT, _C.ARM_CHECK, _C.ARM_HOME, _C.ARM_PARK, _C.ARM_POS, _C.ARM_SPEED, _C.ARM_STOP, _C.LCD,
 )  # fmt: skip
 #: What sets up a simulated laser: the simulators' own numbers, and the older ones that ARIA sends.
 LASER_COMMANDS = frozenset({
@@ -155,7 +155,18 @@ def _limit(change: Callable[[MotionLimits, int], MotionLimits]) -> Handler:
 
 
 def _sonar(context: Context, value: int, now: Nanos) -> None:
-    context.sonar.switch(on=value != 0, now=now)
+    """Switch all sonar, or one array.
+
+    AROS and ARCOS: "otherwise, use bits 1-3 to specify an individual array number 1-4", which leaves bit 0 for on and
+    off, as with 1 and 0 for all. ARIA sends no other value than these two. P2OS's manual knows no arrays.
+    """
+    array, is_on = (value & 0xFFFF) >> 1, value & 1
+    if array == 0 or context.profile is Profile.P2OS:
+        context.sonar.switch(on=value != 0, now=now)
+    elif array in context.sonar.fitted_arrays:
+        context.sonar.switch(on=is_on != 0, now=now, array=array)
+    else:
+        context.notes.append(("no such sonar", f"array {array}"))
 
 
 def _polling(context: Context, command: Command, now: Nanos) -> bool:
@@ -294,7 +305,7 @@ def _sim_exit(context: Context, value: int) -> None:
 
 
 def _load_world(context: Context, data: bytes) -> None:
-    context.world_wanted = data.split(b"\0")[0].decode("latin-1")
+    context.world_wanted = data.split(b"\0")[0]
 
 
 def _sim_ctrl(context: Context, command: Command, _now: Nanos) -> bool:
@@ -456,6 +467,7 @@ HANDLERS: Mapping[int, Handler] = {
     _C.JOYREQUEST: _request(Extra.JOYSTICK),
     _C.ENCODER: _request(Extra.ENCODER),
     _C.DIGOUT: _two_bytes(_digout),
+    _C.KICK: _timed(lambda context, value, now: context.devices.pins.kick(value, now)),
     _C.GRIPPER: _timed(lambda context, value, now: context.devices.gripper.command(value, now)),
     _C.ADSEL: _laser(_laser_enable, _number(lambda context, value: context.devices.pins.select(value))),
     _C.GRIPPERVAL: _laser(

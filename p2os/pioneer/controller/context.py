@@ -63,8 +63,8 @@ class Context(Stateful):
     pose_wanted: tuple[int, int, int] | None = None
     #: SIM_RESET: back to where the robot began, the session goes on.
     sim_reset_wanted: bool = False
-    #: LOADWORLD: the name of another world.
-    world_wanted: str | None = None
+    #: LOADWORLD: the name of another world, as it came.
+    world_wanted: bytes | None = None
     #: SIM_EXIT's code; stays, for whoever runs the robot.
     exit_code: int | None = None
     #: Events to be notified: (what in a word or two, detail).

@@ -73,17 +73,20 @@ from p2os.protocol.connection import (
 from p2os.protocol.packets import Identity, MapChangedPacket, ResetNotice
 from p2os.protocol.profiles import Profile
 from p2os.robots.parameters import RobotParameters
-from simbase.errors import shown
+from simbase.errors import P2osError, UsageError, shown, shown_name
 from simbase.state import Stateful
 from simbase.timing import NS_PER_MS, NS_PER_S, Nanos, Reached
 
 #: (now in ns, what happened in a word or two, detail).
 EventCallback = Callable[[Nanos, str, str], None]
+#: Takes a name of a world and the time; puts this robot, and all that share its world, into it (`enter_world`).
+#: Raises `P2osError` where it does not; nothing has changed then.
+WorldLoader = Callable[[str, Nanos], None]
 
 #: chosen: from a reset to the notice that the controller is there again.
 BOOT_NS: Nanos = 500 * NS_PER_MS
-#: AMRISim's status of a map that it could not load.
-MAP_NOT_LOADED = 2
+#: AMRISim's status of a map that it has loaded, and of one that it could not load.
+MAP_LOADED, MAP_NOT_LOADED = 1, 2
 #: chosen: keeps a full battery above the half of a decivolt, so that it does not flicker.
 BATTERY_MARGIN_V = 0.04
 #: FLASH parameter → the limit that it sets.
@@ -152,9 +155,12 @@ class Pioneer(Stateful):
     ) -> None:
         self.parameters, self.body = parameters, body
         self.settings = settings or ControllerSettings()
+        self.settings = replace(self.settings, flash=self.settings.flash.for_model(parameters))
         self.on_event = on_event
         #: What its sonar hear of other robots; none by itself.
         self.hears: Ears | None = None
+        #: Loads another world when a client wants it (LOADWORLD); none by itself.
+        self.loads_world: WorldLoader | None = None
         self._faults = tuple(faults)
         self._body_now: Nanos = 0
         self._switch_on(0)
@@ -526,7 +532,7 @@ class Pioneer(Stateful):
         if context.motors_enabled is not had_power:
             self._notify(now, "motors", "on" if context.motors_enabled else "off")
         self._move_in_world()
-        self._refuse_world(now)
+        self._change_world(now)
         self._report_notes(now)
         self._reporter.check_aux_requests()
         if context.baud_wanted is not None:
@@ -557,22 +563,55 @@ class Pioneer(Stateful):
             context.notes.append(("moved by its client", where))
         if context.sim_reset_wanted:
             context.sim_reset_wanted = False
+            if (other := body.who_stands_at_start()) is not None:
+                context.notes.append(("not reset", f"{other} stands where this robot starts"))
+                return
             body.put_back()
-            state = body.state
-            context.reckoning.begin(state.left_angle_rad, state.right_angle_rad)
+            self._feel_moved()
             context.reckoning.set_origin()
-            context.motion.ramp_from_zero()
-            context.devices.laser.has_jumped = True
             context.notes.append(("back at its start", "its client wants it"))
 
-    def _refuse_world(self, now: Nanos) -> None:
-        """Answer that another world was not loaded: this robot stays in the one that it was made for."""
-        if (name := self._context.world_wanted) is None:
+    def _feel_moved(self) -> None:
+        """Go on with wheels at other angles than the last."""
+        context, state = self._context, self.body.state
+        context.reckoning.begin(state.left_angle_rad, state.right_angle_rad)
+        context.motion.ramp_from_zero()
+        context.devices.laser.has_jumped = True
+
+    def _change_world(self, now: Nanos) -> None:
+        """Load the world that a client wants, where someone does that for this robot."""
+        if (raw_name := self._context.world_wanted) is None:
             return
         self._context.world_wanted = None
-        self._context.notes.append(("world stays", f"its client wants {shown(name)}; start again with --world"))
-        refusal = MapChangedPacket(status=MAP_NOT_LOADED, raw_name=name.encode("latin-1"))
-        self._sender.answer([refusal.to_frame().to_bytes()], now)
+        name = raw_name.decode("utf-8", "surrogateescape")
+        try:
+            if self.loads_world is None:
+                raise UsageError("this robot stays in the one that it was made for")
+            self.loads_world(name, now)
+        except P2osError as error:
+            self._context.notes.append(("world stays", f"its client wants {shown(name)}: {shown_name(error)}"))
+            self._tell_of_map(MAP_NOT_LOADED, raw_name, now)
+
+    def enter_world(self, body: Body, raw_name: bytes, now: Nanos) -> None:
+        """Go on in another world with the body that it has there; the session and the odometry go on.
+
+        A snapshot of before does not fit the robot after this.
+
+        Args:
+            body: Where the robot starts, at the step that the old one has reached.
+            raw_name: The world's, for the client.
+            now: The time, ns.
+        """
+        self.body = self._reporter.body = body
+        self._feel_moved()
+        self._notify(now, "another world", shown_name(raw_name.decode("utf-8", "replace")))
+        if self._sip_due is not None:
+            self._tell_of_map(MAP_LOADED, raw_name, now)
+
+    def _tell_of_map(self, status: int, raw_name: bytes, now: Nanos) -> None:
+        """Send what has become of a map that a client wanted."""
+        packet = MapChangedPacket(status=status, raw_name=raw_name)
+        self._sender.answer([packet.to_frame().to_bytes()], now)
 
     def _report_notes(self, now: Nanos) -> None:
         notes, self._context.notes = self._context.notes, []

@@ -112,6 +112,13 @@ class Flash:
         """Return the rate at which the host's line starts, bit/s."""
         return BAUDS[self.number("hostbaud")]
 
+    def for_model(self, parameters: RobotParameters) -> "Flash":
+        """Return this FLASH with the bumpers of a model, where nothing else sets them."""
+        equipment = parameters.equipment
+        segments = {"frontbumps": equipment.front_bumpers, "rearbumps": equipment.rear_bumpers}
+        fitting = {name: min(number, MOST_SEGMENTS) for name, number in segments.items()}
+        return replace(self, values={**fitting, **self.values})
+
     def config(self, parameters: RobotParameters, profile: Profile) -> ConfigPacket:
         """Return the CONFIGpac of a robot with this FLASH."""
         start = parameters.motion

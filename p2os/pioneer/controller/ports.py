@@ -83,6 +83,11 @@ class SensedState(WheelState, Protocol):
         """Whether the hull touches anything but the floor."""
         ...
 
+    @property
+    def contact_rad(self) -> float | None:
+        """Where it does, counter-clockwise from ahead; None where that is not known."""
+        ...
+
 
 class Body(Protocol):
     """A body that is stepped; for a snapshot of the robot its state is declared (`simbase.state`)."""
@@ -102,6 +107,10 @@ class Body(Protocol):
 
     def put_back(self) -> None:
         """Stand still where it began, wheels at angle 0, and what was pushed where it was."""
+        ...
+
+    def who_stands_at_start(self) -> str | None:
+        """Return the name of another robot that stands where `put_back` would put this one, or None."""
         ...
 
     def stand_at(self, x_m: float, y_m: float, heading_rad: float) -> None:

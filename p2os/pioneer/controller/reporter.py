@@ -31,14 +31,16 @@ from p2os.pioneer.controller.sender import Sender
 from p2os.pioneer.controller.settings import ControllerSettings
 from p2os.pioneer.devices.laser import Laser
 from p2os.pioneer.sonar.errors import measure_ranges
+from p2os.pioneer.sonar.ring import eyes
 from p2os.pioneer.sonar.schedule import raw_range
-from p2os.protocol.config_packet import ConfigPacket
+from p2os.protocol.config_packet import NUMBERS, ConfigPacket
 from p2os.protocol.connection import Connection
 from p2os.protocol.packets import (
     ArmInfoPacket,
     ArmPacket,
     BatteryPacket,
     EncoderPacket,
+    IoPacket,
     PlaylistPacket,
     ServerPacket,
     SimDevice,
@@ -56,8 +58,8 @@ RAD_PER_DEG = math.pi / 180
 
 #: Seven floating inputs read as ones (the captured P2-DX packet: stall bytes FE FE).
 BUMPERS_NOT_FITTED = 0x7F
-#: Bits of the AROS and ARCOS flags (H8 manual, SIP table).
-FLAG_MOTORS, FLAG_SONAR, FLAG_STOP_BUTTON, FLAG_E_STALL = 1 << 0, 1 << 1, 1 << 5, 1 << 6
+#: Bits of the AROS and ARCOS flags (H8 manual, SIP table); 1 to 4 are the sonar arrays that are on.
+FLAG_MOTORS, FLAG_STOP_BUTTON, FLAG_E_STALL = 1 << 0, 1 << 5, 1 << 6
 FLAG_JOYSTICK, FLAG_CHARGING = 1 << 9, 1 << 10
 #: The ARCOS tail where nothing is known: no fault, no sideways motion, no thermometer, no charge sensor.
 NO_TEMPERATURE, CHARGE_UNKNOWN, CHARGE_BULK = -127, -1, 1
@@ -80,11 +82,12 @@ class Reporter:
         self.parameters = parameters
         self.settings = settings
         self._notify = notify
+        self._eyes = eyes(parameters)
 
     def configuration(self) -> ConfigPacket:
         """Return the answer to CONFIG: the robot's own limits, and those in force."""
         settings, limits, kept = self.settings, self.context.motion.limits, self.context.kept
-        working: dict[str, Any] = {name: value & 0xFFFF for name, value in kept.items() if name != "driftfactor"}
+        working: dict[str, Any] = {name: _word(value, is_signed=NUMBERS[name][0] < 0) for name, value in kept.items()}
         config = settings.flash.config(self.parameters, settings.profile)
         return replace(
             config, name=settings.name, serial=settings.serial, sipcycle=settings.sip_period_ns // NS_PER_MS,
@@ -211,11 +214,24 @@ class Reporter:
         """Return the packets of one request: one, but for a laser's sweep."""
         if extra is Extra.LASER:
             return self._sweep()
+        if extra is Extra.IO:
+            return (self._io_packet(segments, now),)
         if extra is Extra.SIMSTAT:
             return (_simstat_packet(self.body),)
         if extra is Extra.SIMINFO:
             return (_siminfo_packet(self.parameters, self.context.devices.laser),)
-        return (MAKERS[extra](self.context, self.settings.flash, segments, now),)
+        return (MAKERS[extra](self.context, self.settings.flash, now),)
+
+    def _io_packet(self, segments: tuple[int, int], now: Nanos) -> IoPacket:
+        """Return the answer to IOREQUEST: pins, bumpers, and what the infra-red eyes see."""
+        devices, front, rear = self.context.devices, *segments
+        seen = sum(
+            (self.body.scan(eye, eye.length_m)[0] < eye.length_m) << number for number, eye in enumerate(self._eyes)
+        )
+        return devices.pins.packet(
+            digital_in=devices.digital_in(now), front=front, rear=rear, infrared=seen, now=now,
+            decivolts=devices.battery.decivolts,
+        )  # fmt: skip
 
     def _sweep(self) -> list[SimLaserPacket]:
         """Let the laser sweep once, all rays at the same moment."""
@@ -278,7 +294,7 @@ def _standard_packet(
         gripper_state=int(devices.gripper.state(now)),
         raw_analog=devices.pins.raw_analog,
         digital_in=devices.digital_in(now),
-        digital_out=devices.pins.digital_out,
+        digital_out=devices.pins.output(now),
         tail=_arcos_tail(context, wheels, parameters) if profile is Profile.ARCOS else (),
     )
 
@@ -288,7 +304,7 @@ def _flags(context: Context) -> int:
     pressed = devices.switches.stop_button
     return (
         context.motors_enabled * FLAG_MOTORS
-        | context.sonar.is_on * FLAG_SONAR
+        | sum(1 << array for array in context.sonar.arrays)
         | pressed * FLAG_STOP_BUTTON
         | (pressed and devices.switches.e_stall) * FLAG_E_STALL
         | bool(devices.joystick.button1) * FLAG_JOYSTICK
@@ -320,8 +336,8 @@ def _arcos_tail(context: Context, wheels: WheelState, parameters: RobotParameter
 
 # The extra packets --------------------------------------------------------------------
 
-#: What one packet is made from: the parts, the FLASH, pressed bumper segments (front, rear), the time.
-Maker = Callable[[Context, Flash, tuple[int, int], Nanos], ServerPacket]
+#: What one packet is made from: the parts, the FLASH, the time.
+Maker = Callable[[Context, Flash, Nanos], ServerPacket]
 
 
 def _encoder_packet(context: Context, flash: Flash) -> EncoderPacket:
@@ -359,27 +375,27 @@ def _siminfo_packet(parameters: RobotParameters, laser: Laser) -> SiminfoPacket:
     return SiminfoPacket(raw_name=b"p2os", devices=tuple(found))
 
 
+def _word(value: int, *, is_signed: bool) -> int:
+    """Return a number as a word of the FLASH holds it."""
+    word = value & 0xFFFF
+    return word - 0x10000 if is_signed and word >= 0x8000 else word
+
+
 def _signed32(value: int) -> int:
     return (value + (1 << 31)) % (1 << 32) - (1 << 31)
 
 
 MAKERS: Mapping[Extra, Maker] = {
-    Extra.GYRO: lambda context, _flash, _bumps, _now: context.devices.gyro.take_packet(),
-    Extra.JOYSTICK: lambda context, _flash, _bumps, _now: context.devices.joystick.packet(),
-    Extra.IO: lambda context, _flash, bumps, now: context.devices.pins.packet(
-        digital_in=context.devices.digital_in(now),
-        front=bumps[0],
-        rear=bumps[1],
-        decivolts=context.devices.battery.decivolts,
-    ),
-    Extra.ENCODER: lambda context, flash, _bumps, _now: _encoder_packet(context, flash),
-    Extra.GRIPPER: lambda context, _flash, _bumps, now: context.devices.gripper.packet(now),
-    Extra.COMPASS: lambda context, _flash, _bumps, _now: context.devices.compass.packet(),
-    Extra.AUX1: lambda context, _flash, _bumps, _now: context.devices.aux[0].take_answer(),
-    Extra.AUX2: lambda context, _flash, _bumps, _now: context.devices.aux[1].take_answer(),
-    Extra.AUX3: lambda context, _flash, _bumps, _now: context.devices.aux[2].take_answer(),
-    Extra.PLAYLIST: lambda _context, _flash, _bumps, _now: PlaylistPacket(),
-    Extra.ARM: lambda _context, _flash, _bumps, _now: ArmPacket(),
-    Extra.ARM_INFO: lambda _context, _flash, _bumps, _now: ArmInfoPacket(),
-    Extra.BATTERY: lambda context, _flash, _bumps, _now: _battery_packet(context),
+    Extra.GYRO: lambda context, _flash, _now: context.devices.gyro.take_packet(),
+    Extra.JOYSTICK: lambda context, _flash, _now: context.devices.joystick.packet(),
+    Extra.ENCODER: lambda context, flash, _now: _encoder_packet(context, flash),
+    Extra.GRIPPER: lambda context, _flash, now: context.devices.gripper.packet(now),
+    Extra.COMPASS: lambda context, _flash, _now: context.devices.compass.packet(),
+    Extra.AUX1: lambda context, _flash, _now: context.devices.aux[0].take_answer(),
+    Extra.AUX2: lambda context, _flash, _now: context.devices.aux[1].take_answer(),
+    Extra.AUX3: lambda context, _flash, _now: context.devices.aux[2].take_answer(),
+    Extra.PLAYLIST: lambda _context, _flash, _now: PlaylistPacket(),
+    Extra.ARM: lambda _context, _flash, _now: ArmPacket(),
+    Extra.ARM_INFO: lambda _context, _flash, _now: ArmInfoPacket(),
+    Extra.BATTERY: lambda context, _flash, _now: _battery_packet(context),
 }

@@ -7,6 +7,7 @@ PTUPOS). What nothing drives reads as in the one packet captured from a P2-DX.
 from dataclasses import dataclass
 
 from p2os.protocol.packets import IoPacket
+from simbase.timing import NS_PER_MS, Nanos
 
 #: Digital inputs and outputs of the captured P2-DX.
 CAPTURED_IN, CAPTURED_OUT = 0x30, 0xF0
@@ -35,6 +36,17 @@ class Pins:
     front_pressed: int = 0
     rear_pressed: int = 0
 
+    #: Until when KICK holds the first output.
+    kicked_until: Nanos = -1
+
+    def kick(self, milliseconds: int, now: Nanos) -> None:
+        """Hold the first output for so long, once (KICK)."""
+        self.kicked_until = now + max(milliseconds, 0) * NS_PER_MS
+
+    def output(self, now: Nanos) -> int:
+        """Return the outputs, bit 0 is the first."""
+        return self.digital_out | (now < self.kicked_until)
+
     def drive(self, mask: int, states: int) -> None:
         """Set the outputs that `mask` names (DIGOUT)."""
         self.digital_out = self.digital_out & ~mask & 0xFF | states & mask
@@ -60,18 +72,20 @@ class Pins:
         """The selected port as the packet carries it, 0 to 255."""
         return self.analog[self.selected - 1] >> 2
 
-    def packet(self, *, digital_in: int, front: int, rear: int, decivolts: int) -> IoPacket:
+    def packet(self, *, digital_in: int, front: int, rear: int, infrared: int, decivolts: int, now: Nanos) -> IoPacket:
         """Return the answer to IOREQUEST.
 
         Args:
             digital_in: The user's inputs, with what hangs at them.
             front: Pressed front segments; in this packet low is pressed.
             rear: Pressed rear segments.
+            infrared: Eyes that see something, bit 0 is eye 0; as the bumpers.
+            now: The time, ns.
             decivolts: The battery, which the last analog port shows.
         """
         battery = min(round(decivolts / 10 / BATTERY_DIVIDER / 5 * FULL_SCALE), FULL_SCALE)
         return IoPacket(
-            digital_in=(digital_in, ~front & 0xFF, ~rear & 0xFF, 0xFF),
-            digital_out=(self.digital_out,),
+            digital_in=(digital_in, ~front & 0xFF, ~rear & 0xFF, ~infrared & 0xFF),
+            digital_out=(self.output(now),),
             raw_analog=(*self.analog[:-1], battery),
         )

@@ -35,7 +35,7 @@ from p2os.pioneer.world.model import Pose
 from p2os.protocol.bauds import BAUDS, BAUDS_TEXT
 from p2os.protocol.profiles import Profile
 from p2os.robots.parameters import load_parameters
-from p2os.toml_file import TomlPlaces, is_file, read_toml, read_user_text
+from p2os.toml_file import TomlPlaces, is_file, is_folder, read_toml, read_user_text
 from simbase.errors import FileError, P2osError, shown, shown_name
 from simbase.timing import NS_PER_S, Nanos
 
@@ -52,6 +52,7 @@ KINDS: Mapping[str, tuple[tuple[type, ...], str]] = {
     "seed": ((int,), "a whole number"),
     "apart": ((bool,), "true or false"),
     "cross_talk": ((bool,), "true or false"),
+    "worlds": ((str,), "a text"),
     "robot": ((list,), "written as [[robot]]"),
     "count": ((int,), "a whole number"),
     "port": ((str,), "a text"),
@@ -76,7 +77,7 @@ RANGES: Mapping[str, tuple[float, float]] = {
 }  # fmt: skip
 #: A place: metres, metres, degrees.
 PLACE_RANGES = (WORLD_RANGES["x_m"], WORLD_RANGES["y_m"], WORLD_RANGES["heading_deg"])
-TOP_KEYS = ("world", "body", "seed", "apart", "cross_talk", "robot")
+TOP_KEYS = ("world", "body", "seed", "apart", "cross_talk", "worlds", "robot")
 ROBOT_KEYS = tuple(key for key in KINDS if key not in TOP_KEYS)
 #: Keys whose value may be a file.
 FILES = frozenset({"world", "model", "flash", "errors"})
@@ -167,8 +168,13 @@ def parse_fleet(text: str, source: str, folder: Path) -> FleetOrder:
         raise top.error("body", f"no body {shown(body)}", f"bodies: {', '.join(BODY_CHOICES)}")
     seed, apart = cast("int", top.get("seed", 0)), bool(top.get("apart", False))
     cross_talk = bool(top.get("cross_talk", True))
+    worlds = folder / str(top.get("worlds", "")) if "worlds" in table else None
+    if worlds is not None and not is_folder(worlds):
+        raise top.error("worlds", f"no folder {shown_name(worlds)}", "clients may load its files as worlds")
     try:
-        return FleetOrder(robots=tuple(robots), world=world, body=body, seed=seed, apart=apart, cross_talk=cross_talk)
+        return FleetOrder(
+            robots=tuple(robots), world=world, body=body, seed=seed, apart=apart, cross_talk=cross_talk, worlds=worlds
+        )
     except P2osError as error:
         raise top.error("robot", str(error), error.hint) from error
 

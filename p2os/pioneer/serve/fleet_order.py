@@ -5,19 +5,22 @@ An order comes from the options of `p2os serve`, from a file (`fleet_file`), or 
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
+from pathlib import Path
 
 from p2os.pioneer.body.contract import RobotBody
 from p2os.pioneer.body.factory import BEST, body_note, make_scene, resolve_body
 from p2os.pioneer.controller import Pioneer
 from p2os.pioneer.controller.settings import SIMULATOR_SERIAL, ControllerSettings
 from p2os.pioneer.serve.multi_robot_world import MultiRobotWorld
+from p2os.pioneer.serve.world_loader import WorldLoader
 from p2os.pioneer.world import load_world
 from p2os.pioneer.world.model import Pose, World
 from p2os.pioneer.world.start_places import start_places
 from p2os.protocol.bauds import BAUDS
 from p2os.robots.parameters import RobotParameters, load_parameters
+from p2os.toml_file import is_folder
 from p2os.transport import PtyUrl, SerialUrl, TcpUrl, parse_url
-from simbase.errors import UsageError
+from simbase.errors import UsageError, shown_name
 from simbase.timing import Nanos
 
 #: Where the first robot is found when nothing else is given.
@@ -74,9 +77,11 @@ class FleetOrder:
         seed: Of a scattered world; robot N errs by this and N - 1 more.
         apart: Each has a copy of the world, without the others.
         cross_talk: Whether sonar hear the pings of the other robots of the world.
+        worlds: Folder whose files clients may load as worlds (LOADWORLD); None: only what ships.
 
     Raises:
-        UsageError: There is no robot, or there are too many; two share a port, or a port is no URL.
+        UsageError: There is no robot, or there are too many; two share a port, or a port is no URL; `worlds` is no
+            folder.
     """
 
     robots: tuple[RobotOrder, ...]
@@ -85,8 +90,11 @@ class FleetOrder:
     seed: int = 0
     apart: bool = False
     cross_talk: bool = True
+    worlds: Path | None = None
 
     def __post_init__(self) -> None:
+        if self.worlds is not None and not is_folder(self.worlds):
+            raise UsageError(f"no folder {shown_name(self.worlds)}", hint="--worlds is for the folder with world files")
         if not 1 <= len(self.robots) <= MOST_ROBOTS:
             raise UsageError(f"{len(self.robots)} robots are not between 1 and {MOST_ROBOTS}")
         taken: set[str] = set()
@@ -147,6 +155,13 @@ def make_fleet(order: FleetOrder) -> MadeFleet:
     robots = tuple(pioneer for pioneer, _ in made)
     is_shared = len(made) > 1 and not order.apart
     multi_robot_world = MultiRobotWorld(robots, scenes[0], cross_talk=order.cross_talk) if is_shared else None
+    for together in (robots,) if is_shared else tuple((robot,) for robot in robots):
+        loader = WorldLoader(
+            robots=together, multi_robot_world=multi_robot_world, first=order.world, folder=order.worlds, body=name,
+            seed=order.seed,
+        )  # fmt: skip
+        for pioneer in together:
+            pioneer.loads_world = loader.load
     notes = tuple(note for note in (body_note(order.body), made[0][1].note, _batteries_note(made)) if note)
     return MadeFleet(robots, starts, name, notes, multi_robot_world)
 

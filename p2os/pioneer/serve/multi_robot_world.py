@@ -17,12 +17,10 @@ Not modelled: a ping that another robot sends while a sonar listens already.
 
 from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass
-from itertools import product
 
 from p2os.pioneer.body.contract import RobotBody, RobotScene
 from p2os.pioneer.controller import Pioneer
 from p2os.pioneer.sonar.cross_talk import PingTable
-from p2os.pioneer.world.geometry import Footprint
 from simbase.errors import UsageError
 from simbase.state import Stateful
 from simbase.timing import Nanos, Reached
@@ -41,8 +39,6 @@ class Member(Stateful):
     number: int
     pioneer: Pioneer
     body: RobotBody
-    #: Where it stood at first.
-    start: Footprint
     #: Brings the robot to a time: with what its line delivers until then, if it has one.
     advance_to: Callable[[Nanos], object]
     #: Returns when anything is due with it or its line; None when never.
@@ -73,7 +69,7 @@ class MultiRobotWorld(Stateful):
             raise UsageError("the robots of one world need the bodies of its scene, in its order")
         self.scene = scene
         self.members: tuple[Member, ...] = tuple(
-            Member(index, pioneer, body, body.footprint, pioneer.advance_to, pioneer.next_due)
+            Member(index, pioneer, body, pioneer.advance_to, pioneer.next_due)
             for index, (pioneer, body) in enumerate(zip(robots, scene.bodies, strict=True))
         )
         #: All bodies stand at this step.
@@ -110,14 +106,29 @@ class MultiRobotWorld(Stateful):
         """
         self.advance_to(now)
         chosen = [self.members[number] for number in sorted(set(numbers))]
-        for member, other in product(chosen, self.members):
-            if other not in chosen and member.start.overlaps(other.body.footprint.polygon):
+        leaving = [member.body for member in chosen]
+        for body in leaving:
+            if (other := body.who_stands_at_start(leaving)) is not None:
                 raise UsageError(
-                    f"{other.body.robot_name} stands where {member.body.robot_name} starts",
-                    hint="drive it away, or put all back: reset",
+                    f"{other} stands where {body.robot_name} starts", hint="drive it away, or put all back: reset"
                 )
         for member in chosen:
             member.pioneer.start_over(now)
+
+    def enter_world(self, scene: RobotScene, raw_name: bytes, now: Nanos) -> None:
+        """Go on in another world, where all robots stand at their places.
+
+        Args:
+            scene: Of the same robots in the same order.
+            raw_name: The world's, for the robots' clients.
+            now: The time to which the robots were brought, nanoseconds.
+        """
+        self.scene = scene
+        self._pings.enter_world(scene.bodies)
+        for member, body in zip(self.members, scene.bodies, strict=True):
+            member.body = body
+            member.pioneer.enter_world(body, raw_name, now)
+            self._look(member)
 
     def next_deadline(self) -> Nanos | None:
         """Return when bytes of any robot will come out; None when never."""
@@ -145,11 +156,11 @@ class MultiRobotWorld(Stateful):
         for member in self.members:
             if member.due is None:
                 self._look(member)
-        step_ns, scene = self.scene.dt_ns, self.scene
+        step_ns = self.scene.dt_ns
         robots = self.robots
         while self._at < limit:
             self._act(self._at)
-            wheels = scene.step([robot.next_setpoints() for robot in robots])
+            wheels = self.scene.step([robot.next_setpoints() for robot in robots])
             self._at += step_ns
             for robot, turned in zip(robots, wheels, strict=True):
                 robot.take_step(turned)

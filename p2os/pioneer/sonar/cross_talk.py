@@ -49,10 +49,17 @@ class PingTable(Stateful):
     """The pings of all robots of a world."""
 
     STATE = ("_sent",)
+    #: Who they are is settled when a scene is made.
+    DERIVED = ("_bodies",)
 
     def __init__(self, bodies: Sequence[Seeing]) -> None:
         self._bodies = tuple(bodies)
         self._sent: deque[SentPing] = deque()
+
+    def enter_world(self, bodies: Sequence[Seeing]) -> None:
+        """Go on with other bodies of the same robots; what was under way is gone."""
+        self._bodies = tuple(bodies)
+        self._sent.clear()
 
     def ears_of(self, robot: int) -> Ears:
         """Return what one robot, counted from 0, hears."""

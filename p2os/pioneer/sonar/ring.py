@@ -1,4 +1,4 @@
-"""The sonar ring as rays: one geometry for every body.
+"""The sonar ring as rays, and the infra-red eyes: one geometry for every body.
 
 Each sonar is rays spread over the opening angle of the robot file, in the
 plane of the ring; the nearest echo of them is the reading. Not modelled here:
@@ -24,6 +24,26 @@ class Cone:
     headings_rad: tuple[float, ...]
     #: The same as unit vectors.
     directions: tuple[tuple[float, float], ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Eye(Cone):
+    """An infra-red eye: one ray from the middle of the axle to where it sees."""
+
+    length_m: float
+
+
+def eyes(parameters: RobotParameters) -> tuple[Eye, ...]:
+    """Return each infra-red eye, number 0 first.
+
+    ARIA's parameter file has where a thing is that an eye sees, not where the eye is. Something on the way there from
+    the middle of the robot, beyond its hull, is seen; what stands within the hull's outline never is.
+    """
+    found = []
+    for x_mm, y_mm in parameters.infrared:
+        length, heading = math.hypot(x_mm, y_mm) / 1000, math.atan2(y_mm, x_mm)
+        found.append(Eye(0.0, 0.0, (heading,), ((math.cos(heading), math.sin(heading)),), length))
+    return tuple(found)
 
 
 def cones(parameters: RobotParameters) -> tuple[Cone, ...]:

@@ -12,7 +12,7 @@ from p2os.errors import WorldError
 from p2os.pioneer.world.file import parse_world
 from p2os.pioneer.world.model import World
 from p2os.pioneer.world.text_file import read_text
-from p2os.toml_file import is_file
+from p2os.toml_file import is_file, is_folder
 from simbase.errors import shown
 
 
@@ -48,7 +48,7 @@ def load_world(name_or_path: str | Path, seed: int = 0) -> World:
     if not is_file(path):
         if path.suffix.lower() in world_suffixes():
             raise WorldError(f"no world {shown(name)}: there is no such file", hint="p2os world list names what ships")
-        if _is_folder(path):
+        if is_folder(path):
             raise WorldError(f"no world {shown(name)}: that is a folder", hint="name a file in it")
         close = get_close_matches(name, known_worlds(), n=1)
         hint = f"did you mean {close[0]}?" if close else f"shipped worlds: {', '.join(known_worlds())}"
@@ -58,10 +58,3 @@ def load_world(name_or_path: str | Path, seed: int = 0) -> World:
 
         return read_world(path)
     return parse_world(read_text(path), name, seed, path.parent)
-
-
-def _is_folder(path: Path) -> bool:
-    try:
-        return path.is_dir()
-    except (OSError, ValueError):  # no name that a folder can have
-        return False

@@ -137,8 +137,9 @@ def test_strict_mode_raises_at_the_first_warning(boot, access: str) -> None:
 def test_warnings_are_reported_once_as_they_come(boot) -> None:
     machine = boot("movs r4, #3\nloop: " + store(0x40012C00, 1) + "subs r4, #1\nbne loop")
     told = []
-    machine.board.on_warning = told.append
+    end = machine.board.subscribe_warnings(told.append)
     machine.run(100)
+    end()
     assert told == machine.board.warnings
     assert len(told) == 1
 

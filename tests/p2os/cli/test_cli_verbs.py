@@ -250,7 +250,7 @@ def test_nobody_answering_is_an_error_with_a_hint(robot: Any) -> None:
 def test_a_robot_that_synchronises_but_sends_nothing_is_an_error(
     line: ToRobot, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(type(line.robot.pioneer), "_next_due", lambda _self: None)
+    monkeypatch.setattr(type(line.robot.pioneer), "next_due", lambda _self: None)
     with pytest.raises(RemoteProtocolError, match="no robot on loop:robot: no packet"):
         info.ask(line, clock=line.clock)  # type: ignore[arg-type]
 

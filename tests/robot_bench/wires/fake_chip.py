@@ -76,7 +76,7 @@ class FakeChip:
     ) -> None:
         self.now_ns = 0
         self.inputs: list[tuple[int, str, bool | None]] = []
-        self.on_warning: Callable[[str], None] | None = None
+        self.warning_sinks: list[Callable[[str], None]] = []
         self.usart1 = FakeUsart()
         self.subscriptions: list[FakeSubscription] = []
         self.warnings: list[str] = []
@@ -117,6 +117,10 @@ class FakeChip:
 
     def where(self) -> str:
         return "main+0x4 (0x08000104)"
+
+    def subscribe_warnings(self, sink: Callable[[str], None]) -> Callable[[], None]:
+        self.warning_sinks.append(sink)
+        return lambda: self.warning_sinks.remove(sink)
 
     def advance_to(self, limit: int) -> Reached:
         try:

@@ -83,8 +83,8 @@ class BulletScene(Scene):
     def reset(self, poses: Sequence[Pose], seed: int) -> None:
         """Let every robot stand still at its pose in the world as it was made; nothing here is random."""
         del seed
-        for body in self.bodies:
-            body.begin()
+        for body, pose in zip(self.bodies, poses, strict=True):
+            body.begin(pose)
         self._build([(item, True) for item in self.bodies[0].things], poses)
         for body in self.bodies:
             body.rest()

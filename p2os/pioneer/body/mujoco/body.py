@@ -60,8 +60,8 @@ class MujocoScene(Scene):
     def reset(self, poses: Sequence[Pose], seed: int) -> None:
         """Let every robot stand still at its pose in the world as it was made; nothing here is random."""
         del seed
-        for body in self.bodies:
-            body.begin()
+        for body, pose in zip(self.bodies, poses, strict=True):
+            body.begin(pose)
         self._build()
         for body, pose in zip(self.bodies, poses, strict=True):
             body.stand_down(pose)

@@ -44,7 +44,7 @@ uni_platform make_platform() {
   uni_platform platform = {};
   platform.name = name;
   platform.init = [](int, const char**) {};
-  platform.on_init_complete = [] { uni_bt_enable_new_connections_unsafe(true); };
+  platform.on_init_complete = [] { uni_bt_start_scanning_and_autoconnect_unsafe(); };
   platform.on_device_connected = [](uni_hid_device_t*) {};
   platform.on_device_disconnected = [](uni_hid_device_t*) {};
   platform.on_device_ready = [](uni_hid_device_t*) { return UNI_ERROR_SUCCESS; };

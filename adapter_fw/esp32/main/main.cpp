@@ -7,6 +7,7 @@
 // The task watchdog resets the chip if the adapter's task hangs for a second: the
 // outputs fall back to their pulls, and after the boot the first frame is STOP.
 
+#include <esp_attr.h>
 #include <esp_system.h>
 #include <esp_task_wdt.h>
 #include <freertos/FreeRTOS.h>
@@ -14,6 +15,7 @@
 
 #include <pins.hpp>
 
+#include "../../core/app/code_keeper.hpp"
 #include "../../core/app/console.hpp"
 #include "../../core/app/mode_button.hpp"
 #include "../../core/app/runner.hpp"
@@ -36,6 +38,9 @@ constexpr std::uint32_t STACK_BYTES = 12'288;
 //: Above Bluepad32 and everything else that is not the system's own.
 constexpr UBaseType_t PRIORITY = configMAX_PRIORITIES - 5;
 constexpr BaseType_t CORE = 1;
+
+//: Every restart but one by EN or power leaves it as it is.
+RTC_NOINIT_ATTR app::RetainedWheels retained;
 
 adapter::Master other(adapter::Master master) {
   return master == adapter::Master::PAD ? adapter::Master::BLUEPILL : adapter::Master::PAD;
@@ -65,6 +70,8 @@ adapter::Master other(adapter::Master master) {
   static app::EventPrinter printer(log, terminal);
   static adapter::Adapter part(settings, ROBOT, board::WIRES, clock.now());
   part.attach(&wires, &wires, &printer);
+  app::CodeKeeper keeper(retained, store);
+  keeper.restore(part);
   if (starts_with_pad) {
     part.set_master(adapter::Master::PAD, clock.now());
   }
@@ -77,6 +84,7 @@ adapter::Master other(adapter::Master master) {
   for (;;) {
     runner.pass();
     const p2os::Nanos now = clock.now();
+    keeper.keep(part, now);
     for (char character = 0; terminal.take(character);) {
       console.take(character, now);
     }

@@ -1,0 +1,50 @@
+"""The table of `tools/peers.py`: our own client's row, a peer that is not there, and one that fails."""
+
+import json
+import os
+import sys
+
+import pytest
+
+from tools.peers import PEERS, main
+
+pytestmark = pytest.mark.skipif(os.name != "posix", reason="signals and terminals are Unix's")
+
+
+@pytest.mark.slow
+def test_our_own_client_drives_is_killed_and_drives_again(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["--json", "--peer", "p2os drive"]) == 0
+    (row,) = [json.loads(line) for line in capsys.readouterr().out.splitlines()]
+    assert row["problem"] == ""
+    assert row["beside"] == "told busy"
+    assert 2.0 < float(row["stands"].split()[0]) < 5.0  # the watchdog, and 0.2 m/s at 0.3 m/s2
+    assert row["again"].endswith(" s")
+
+
+def test_a_peer_that_is_not_there_is_skipped_aloud(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["--peer", "mine=/no/such/program {host}"]) == 0
+    told = capsys.readouterr()
+    assert "mine: skipped: no /no/such/program" in told.err
+    assert told.out.splitlines()[-1].endswith("skipped: no /no/such/program")
+    assert [peer.name for peer in PEERS if not peer.commands] == []
+
+
+@pytest.mark.slow
+def test_a_peer_that_never_drives_fails(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["--peer", f"idle={sys.executable} -c pass"]) == 1
+    assert "never drove: it ended with code 0" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize("name", ["nobody", "empty="])
+def test_a_name_that_means_nothing_is_wrong_usage(name: str, capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit) as ended:
+        main(["--peer", name])
+    assert ended.value.code == 2
+    assert name.split("=", maxsplit=1)[0] in capsys.readouterr().err
+
+
+def test_every_row_talks_to_the_robot_over_one_line() -> None:
+    for peer in PEERS:
+        words = [word for command in peer.commands for word in command] + [text for _, text in peer.files]
+        assert any("{line}" in word or "{url}" in word or "{port}" in word for word in words), peer.name
+        assert 0 <= peer.killed < len(peer.commands)

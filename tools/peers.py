@@ -1,0 +1,371 @@
+"""Drive `p2os serve` with the programs of others, and treat them badly: `python -m tools.peers [--help]`.
+
+    for every peer that is on PATH, or that --peer names:
+      start it, let it drive the robot, bring a second client beside it, kill it by SIGKILL while the wheels turn;
+      the robot has to stand by its watchdog (the line hides who comes and goes, as a serial cable does),
+      the next client has to get in, and the peer itself, started again, has to drive again.
+
+A peer is a row of `PEERS`; what is not there is skipped aloud. Each has a robot of its own, on a free port of this
+machine. A row of --peer: NAME=COMMAND, in which {host}, {port}, {url}, {line} (a terminal) and {folder} stand for
+what they say; NAME alone is a name of the table or a new one.
+
+Exit codes: 0 every peer that is there passed, 1 one did not, 2 wrong usage.
+"""
+
+import argparse
+import contextlib
+import json
+import os
+import re
+import shlex
+import shutil
+import signal
+import socket
+import subprocess
+import sys
+import tempfile
+import threading
+import time
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import asdict, dataclass
+from pathlib import Path
+
+from p2os import Robot
+from p2os.errors import P2osError
+from p2os.transport import TcpUrl, parse_url
+from tools.measure_stops import Cable
+
+#: How long a peer may take to open a session and to set the wheels in motion (player needs 1.4 s, ROS a master).
+STARTING_S = 30.0
+#: The watchdog, the ramp, and what the status and a busy machine add.
+STANDING_S = 6.0
+#: Wheels slower than this stand, m/s.
+STANDING_MPS = 0.002
+#: `serve` says so often how fast the wheels turn.
+STATUS = "100ms"
+WHEELS = re.compile(r"wheels (-?[\d.]+) (-?[\d.]+) m/s")
+
+#: A brain of Soar that drives ahead.
+BRAIN = "def on_load():\n    pass\ndef on_step(step_duration):\n    robot.fv = 0.2\n"
+#: player's own configuration; without a pulse its driver is silent between two speeds.
+PLAYER = """driver (
+  name "p2os" provides ["odometry:::position2d:0"]
+  use_tcp 1 tcp_remote_host "{host}" tcp_remote_port {port} pulse 1.0
+)
+"""
+PLAYER_MOVER = """import playerc, time
+client = playerc.playerc_client(None, "127.0.0.1", 6665)
+client.connect()
+base = playerc.playerc_position2d(client, 0)
+base.subscribe(playerc.PLAYERC_OPEN_MODE)
+base.enable(1)
+while True:
+    base.set_cmd_vel(0.2, 0.0, 0.0, 1)
+    time.sleep(0.2)
+"""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Peer:
+    """A program that drives a robot.
+
+    Args:
+        name: As users call it.
+        needs: Programs that have to be on PATH; the first is the peer itself.
+        commands: What is started, one behind the other.
+        killed: Which of them talks to the robot.
+        serve: Options with which it expects the robot.
+        files: Written into its folder before: name and text.
+    """
+
+    name: str
+    needs: tuple[str, ...]
+    commands: tuple[tuple[str, ...], ...]
+    killed: int = 0
+    serve: tuple[str, ...] = ()
+    files: tuple[tuple[str, str], ...] = ()
+
+    @property
+    def has_terminal(self) -> bool:
+        """Tell whether it opens a terminal and no TCP port."""
+        return any("{line}" in word for words in self.commands for word in words)
+
+
+def _aria(program: str) -> Peer:
+    words = (program, "-rh", "{host}", "-rrtp", "{port}")
+    return Peer(name=f"ARIA {program}", needs=(program,), commands=(words,), serve=("--for", "aria"))
+
+
+PEERS = (
+    Peer(
+        name="p2os drive", needs=(sys.executable,),
+        commands=((sys.executable, "-m", "p2os", "drive", "{url}", "--vel", "0.2m/s", "--for", "60s"),),
+    ),
+    *map(_aria, ("simpleMotionCommands", "wander", "actionExample", "aria-demo")),
+    Peer(
+        name="ROS 1 p2os", needs=("rosrun", "roscore", "rostopic"), killed=1,
+        commands=(
+            ("roscore",),
+            ("rosrun", "p2os_driver", "p2os_driver", "_port:={line}", "_pulse:=1.0"),
+            ("rostopic", "pub", "-r", "5", "/cmd_motor_state", "p2os_msgs/MotorState", "{state: 1}"),
+            ("rostopic", "pub", "-r", "5", "/cmd_vel", "geometry_msgs/Twist", "{linear: {x: 0.2}}"),
+        ),
+    ),
+    Peer(
+        name="player", needs=("player",), files=(("player.cfg", PLAYER),),
+        commands=(("player", "{folder}/player.cfg"), (sys.executable, "-c", PLAYER_MOVER)),
+    ),
+    Peer(
+        name="Soar", needs=("soar",), serve=("--firmware", "ARCOS"), files=(("brain.py", BRAIN),),
+        commands=(
+            ("soar", "--headless", "-b", "{folder}/brain.py", "--options", '{"serial_ports": ["{line}"]}'),
+        ),
+    ),
+    Peer(name="p2os-arduino", needs=("p2os-arduino",), commands=(("p2os-arduino", "{line}"),)),
+)  # fmt: skip
+
+
+class Served:
+    """A robot of its own for one peer, its line, and what `serve` says of it."""
+
+    def __init__(self, peer: Peer, folder: Path) -> None:
+        port = f"pty:{folder / 'line'}" if peer.has_terminal else "tcp:127.0.0.1:0"
+        words = ("serve", "--port", port, "--body", "kinematic", "--json", "--status", STATUS, *peer.serve)
+        self.process = subprocess.Popen(
+            [sys.executable, "-m", "p2os", *words], stdin=subprocess.DEVNULL, stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE, text=True,
+        )  # fmt: skip
+        #: (seconds, line) of what it says; (seconds, m/s) of the faster wheel.
+        self.said: list[tuple[float, str]] = []
+        self.speeds: list[tuple[float, float]] = [(0.0, 0.0)]
+        streams = [stream for stream in (self.process.stdout, self.process.stderr) if stream is not None]
+        first = streams[0].readline()
+        if not first:
+            raise SystemExit(f"peers: p2os serve did not start: {self.process.communicate()[1].strip()}")
+        self.url = json.loads(first)["url"]
+        for stream in streams:
+            threading.Thread(target=self._hear, args=(stream,), daemon=True).start()
+        self._held = os.open(folder / "line", os.O_RDWR | os.O_NOCTTY) if peer.has_terminal else None
+        self.cable = None if peer.has_terminal else Cable(self.url)
+        self.line_url = self.url if self.cable is None else self.cable.url
+
+    def _hear(self, stream: Iterator[str]) -> None:
+        for line in stream:
+            now = time.monotonic()
+            if (found := WHEELS.search(line)) is not None:
+                self.speeds.append((now, max(abs(float(found[1])), abs(float(found[2])))))
+            else:
+                self.said.append((now, line.strip()))
+
+    def has_said(self, what: str, since: float) -> bool:
+        """Tell whether it has reported something."""
+        return any(what in line for at, line in self.said if at >= since)
+
+    def stood_at(self, since: float) -> float | None:
+        """Return when the wheels first stood after a time; None while they turn."""
+        return next((at for at, speed in self.speeds if at >= since and speed <= STANDING_MPS), None)
+
+    @property
+    def is_turning(self) -> bool:
+        """Tell whether a wheel turned when it was asked last."""
+        return self.speeds[-1][1] > 10 * STANDING_MPS
+
+    def close(self) -> None:
+        """End it."""
+        if self.cable is not None:
+            self.cable.close()
+        if self._held is not None:
+            os.close(self._held)
+        self.process.terminate()
+        try:
+            self.process.wait(10)
+        except subprocess.TimeoutExpired:
+            self.process.kill()
+
+
+@dataclass
+class Row:
+    """What a peer did, for the table; an empty word is not reached."""
+
+    peer: str
+    drives: str = ""
+    beside: str = ""
+    stands: str = ""
+    next_client: str = ""
+    again: str = ""
+    problem: str = ""
+
+    @property
+    def is_skipped(self) -> bool:
+        """Tell whether the peer is not there."""
+        return self.problem.startswith("skipped")
+
+
+class PeerError(Exception):
+    """A step did not come out; the message is the row's."""
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the peers and print the table; return the exit code."""
+    parser = argparse.ArgumentParser(prog="python -m tools.peers", description=(__doc__ or "").split("\n", 1)[0])
+    parser.add_argument(
+        "--peer", action="append", default=[], metavar="NAME[=COMMAND]",
+        help='only these: a name of the table, or "p2os-arduino=/home/me/drive {line}"; again for more',
+    )  # fmt: skip
+    parser.add_argument("--json", action="store_true", help="print a JSON object a peer")
+    chosen = parser.parse_args(arguments)
+    peers = [_named(text, parser.error) for text in chosen.peer] or list(PEERS)
+    rows = []
+    for peer in peers:
+        rows.append(row := measured(peer))
+        if chosen.json:
+            print(json.dumps(asdict(row)), flush=True)
+        else:
+            print(f"{row.peer}: {row.problem or 'passed'}", file=sys.stderr, flush=True)
+    if not chosen.json:
+        print(table(rows))
+    return int(any(row.problem and not row.is_skipped for row in rows))
+
+
+def _named(text: str, refuse: Callable[[str], object]) -> Peer:
+    """Return the peer that an option names."""
+    name, equals, command = text.partition("=")
+    known = next((peer for peer in PEERS if peer.name == name), None)
+    if equals:
+        words = tuple(shlex.split(command))
+        if not words:
+            refuse(f"--peer {text}: no command")
+        return Peer(name=name, needs=words[:1], commands=(words,), serve=known.serve if known else ())
+    if known is None:
+        refuse(f"no peer {name!r}; there are: {', '.join(peer.name for peer in PEERS)}; or NAME=COMMAND")
+        raise AssertionError
+    return known
+
+
+def table(rows: Sequence[Row]) -> str:
+    """Return the rows as a table of 80 columns."""
+    head = ("peer", "drives", "2nd client", "stands", "next", "again", "result")
+    lines = [head] + [
+        (row.peer, row.drives, row.beside, row.stands, row.next_client, row.again, row.problem or "passed")
+        for row in rows
+    ]
+    widths = [max(len(line[column]) for line in lines) for column in range(len(head) - 1)]
+    return "\n".join(
+        "  ".join([*(cell.ljust(width) for cell, width in zip(line, widths, strict=False)), line[-1]]) for line in lines
+    )
+
+
+def measured(peer: Peer) -> Row:
+    """Take one peer through everything; return its row."""
+    row = Row(peer.name)
+    missing = [program for program in peer.needs if shutil.which(program) is None]
+    if missing:
+        row.problem = f"skipped: no {', '.join(missing)}"
+        return row
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        served = Served(peer, folder)
+        try:
+            _through(peer, served, folder, row)
+        except PeerError as failure:
+            row.problem = str(failure)
+        finally:
+            served.close()
+    return row
+
+
+def _through(peer: Peer, served: Served, folder: Path, row: Row) -> None:
+    started = time.monotonic()
+    with _started(peer, served, folder) as processes:
+        _wait(lambda: served.is_turning, STARTING_S, "never drove", processes[peer.killed])
+        row.drives = f"{time.monotonic() - started:.1f} s"
+        row.beside = _second_client(served)
+        _wait(lambda: served.is_turning, STARTING_S, "stopped for a second client", processes[peer.killed])
+        at = time.monotonic()
+        processes[peer.killed].send_signal(signal.SIGKILL)
+        for other in processes:  # what feeds it must not start it again
+            other.kill()
+        _wait(lambda: served.stood_at(at + 0.2) is not None, STANDING_S, "did not stand after SIGKILL")
+        if not served.has_said("watchdog expired", at):
+            raise PeerError("stood, but not by its watchdog")
+        row.stands = f"{(served.stood_at(at + 0.2) or at) - at:.1f} s"
+    row.next_client = _next_client(served)
+    if served.is_turning:
+        raise PeerError("turned again when the next client came")
+    started = time.monotonic()
+    with _started(peer, served, folder) as processes:
+        _wait(lambda: served.is_turning, STARTING_S, "did not drive again", processes[peer.killed])
+        row.again = f"{time.monotonic() - started:.1f} s"
+
+
+@contextlib.contextmanager
+def _started(peer: Peer, served: Served, folder: Path) -> Iterator[list[subprocess.Popen[bytes]]]:
+    """Start a peer's programs, and kill what is left of them in the end."""
+    parsed = parse_url(served.line_url)
+    values = {"url": served.line_url, "folder": str(folder), "line": str(folder / "line")}
+    if isinstance(parsed, TcpUrl):
+        values |= {"host": parsed.host, "port": str(parsed.port)}
+
+    def filled(text: str) -> str:
+        return re.sub(r"\{(\w+)\}", lambda found: values.get(found[1], found[0]), text)
+
+    for name, text in peer.files:
+        (folder / name).write_text(filled(text))
+    processes: list[subprocess.Popen[bytes]] = []
+    try:
+        for words in peer.commands:
+            processes.append(
+                subprocess.Popen(
+                    [filled(word) for word in words], stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL,
+                    stderr=subprocess.DEVNULL, start_new_session=True,
+                )
+            )  # fmt: skip
+            if len(peer.commands) > 1:
+                time.sleep(2.0)  # a master has to be there before its nodes
+        yield processes
+    finally:
+        for process in processes:
+            with contextlib.suppress(ProcessLookupError, PermissionError):
+                os.killpg(process.pid, signal.SIGKILL)  # also what it has started; the session is its own
+            process.wait(10)
+
+
+def _second_client(served: Served) -> str:
+    """Come beside the peer; return what became of it: a TCP client is told that the robot is busy."""
+    parsed = parse_url(served.url)
+    if not isinstance(parsed, TcpUrl):
+        return "-"
+    with socket.create_connection((parsed.host, parsed.port), 5) as line:
+        line.settimeout(5)
+        told = line.recv(200)
+    if not told.startswith(b"busy"):
+        raise PeerError(f"a second client was told {told[:40]!r}")
+    return "told busy"
+
+
+def _next_client(served: Served) -> str:
+    """Come as the next client, drive nothing, leave; return how soon it was in."""
+    started = time.monotonic()
+    try:
+        with Robot(served.line_url) as robot:
+            if robot.state.is_moving:
+                raise PeerError("turned when the next client came")
+    except P2osError as error:
+        raise PeerError(f"the next client did not get in: {error}") from error
+    return f"{time.monotonic() - started:.1f} s"
+
+
+def _wait(
+    until: Callable[[], bool], longest_s: float, what: str, process: subprocess.Popen[bytes] | None = None
+) -> None:
+    end = time.monotonic() + longest_s
+    while not until():
+        if process is not None and process.poll() is not None:
+            raise PeerError(f"{what}: it ended with code {process.returncode}")
+        if time.monotonic() > end:
+            raise PeerError(f"{what} within {longest_s:g} s")
+        time.sleep(0.05)
+
+
+if __name__ == "__main__":
+    sys.exit(main())
