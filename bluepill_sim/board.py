@@ -26,7 +26,7 @@ from typing import TypeAlias
 
 from bluepill_sim.chip import Chip
 from bluepill_sim.core import GENERAL, BlockRow, Register
-from bluepill_sim.core.faults import FAULT_ROWS, FaultKind, FaultReport
+from bluepill_sim.core.faults import FAULT_ROWS, FaultKind, FaultReport, SeenFault
 from bluepill_sim.core.halts import ChipReached
 from bluepill_sim.core.nvic import HARD_FAULT, exception_name
 from bluepill_sim.errors import BluePillError, ImageError, UnmodelledError
@@ -53,6 +53,8 @@ STEP_NS: Nanos = 1 * NS_PER_MS
 _SHOWN_CHARACTERS = 60
 
 _ERASED_WORD = 0xFFFF_FFFF
+#: Those of `SeenFault`.
+_SEEN_REGISTERS = (*GENERAL[:15], Register.XPSR)
 _HINT = 'such as "pin PA4 high", "usart1 sends ready", "asleep", "fault", or a function of the board'
 
 
@@ -381,20 +383,19 @@ class BluePill(Stateful):
         for sink in self._warning_sinks:
             sink(text)
 
-    def _fault(self, kind: FaultKind, pc: int, address: int | None, is_lockup: bool) -> None:
+    def _fault(self, kind: FaultKind, pc: int, address: int | None, is_lockup: bool, seen: SeenFault | None) -> None:
         if kind is FaultKind.MASKED_SVC and not is_lockup:
             # Some systems live on it (NuttX): its HardFault handler serves the call.
             self._warn("SVC while its priority is masked becomes a HardFault", "masked SVC", pc)
             return
         # A lockup in the same moment is that of a HardFault that could not even be entered.
-        is_same = self.fault is not None and is_lockup and self.fault.at_ns == self.chip.now_ns
-        if self.fault is not None and (is_same or self.fault.ended_in_reset or self._handles_hard_fault()):
+        is_same = self.fault is not None and self.fault.at_ns == self.chip.now_ns
+        goes_on = is_lockup and (is_same or self._handles_hard_fault())
+        if self.fault is not None and (goes_on or self.fault.ended_in_reset):
             self.fault = replace(self.fault, is_lockup=self.fault.is_lockup or is_lockup)
             return
-        chip = self.chip
-        values = chip.engine.registers
-        names = [*GENERAL[:15], Register.XPSR]
-        registers = [(register.name, values[register]) for register in names]
+        seen = seen or self._seen()
+        registers = [(register.name, value) for register, value in zip(_SEEN_REGISTERS, seen.registers, strict=True)]
         registers.insert(15, ("PC", pc))
         self.fault = FaultReport(
             kind=kind,
@@ -403,19 +404,28 @@ class BluePill(Stateful):
             where=self.image.symbols.where(pc),
             address=address,
             registers=tuple(registers),
-            at_ns=chip.now_ns,
+            at_ns=seen.at_ns,
             is_lockup=is_lockup,
-            vector=self._vector_of(pc),
+            vector=self._vector_of(seen, pc),
+            last_rows=seen.last_rows,
+        )
+
+    def _seen(self) -> SeenFault:
+        """Return the core as it is."""
+        chip, processor = self.chip, self.chip.processor
+        number = processor.exception_number
+        return SeenFault(
+            at_ns=chip.now_ns,
+            registers=tuple(chip.engine.registers[register] for register in _SEEN_REGISTERS),
+            exception_number=number,
+            vector=chip.memory.read_word(processor.vector_table + 4 * number),
             last_rows=chip.engine.log.rows(),
         )
 
-    def _vector_of(self, pc: int) -> str:
+    def _vector_of(self, seen: SeenFault, pc: int) -> str:
         """Return what the vector of the running handler is, where it has just led to `pc`; empty where it has not."""
-        processor = self.chip.processor
-        number = processor.exception_number
-        rows = self.chip.engine.log.rows()
-        at = processor.vector_table + 4 * number
-        vector = self.chip.memory.read_word(at)
+        number, vector, rows = seen.exception_number, seen.vector, seen.last_rows
+        at = self.chip.processor.vector_table + 4 * number
         if not number or vector is None or vector & ~1 != pc or not rows or rows[-1][2] != number:
             return ""
         erased = ": erased flash" if vector == _ERASED_WORD else ""

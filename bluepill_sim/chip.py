@@ -395,7 +395,10 @@ class Chip(Stateful):
         if not self.processor.is_privileged:
             self.engine.stop_before(HaltKind.READ_ERROR, self.engine.access_pc, PPB_BASE + offset)
             return 0
-        return self.system.read(offset, size)
+        word = self.system.read(offset, size)
+        if not self.system.is_modelled(offset):
+            self.engine.declare_zero(PPB_BASE + offset)
+        return word
 
     def _write_system(self, offset: int, size: int, value: int) -> None:
         """Write to the private peripheral bus, as `_read_system`; STIR may be opened by CCR.USERSETMPEND."""
@@ -469,7 +472,11 @@ class PeripheralBus(Stateful):
             if now_ns - self.read_unclocked_ns.setdefault(part.name, now_ns) >= UNCLOCKED_NS:
                 self._refuse(part, offset, "read of")
             return 0
-        return part.read(PERIPHERAL_BASE + offset - part.base, size)
+        at = PERIPHERAL_BASE + offset - part.base
+        word = part.read(at, size)
+        if not part.has_register(at):
+            self._chip.engine.declare_zero(PERIPHERAL_BASE + offset)
+        return word
 
     def write(self, offset: int, size: int, value: int) -> None:
         """Take what the core writes."""
@@ -513,6 +520,7 @@ class PeripheralBus(Stateful):
             name = name_at(address)
             text = f"{name} is not modelled" if name else "no peripheral is here"
             self._chip.warn(f"{text} ({what} {address:#010x})", once=f"unmodelled:{name or address & ~0x3FF:}")
+            self._chip.engine.declare_zero(address)
             return
         gate = CLOCK_GATES[part.name]
         self._chip.warn(

@@ -67,12 +67,12 @@ class Latency:
         #: An entry whose handler has not begun: (number, when it was due).
         self._entered: tuple[int, int | None] | None = None
         self._lines = board.chip.pins.subscribe_pins((), self._irqs_changed, lines=range(len(IRQ_NAMES)))
-        board.chip.processor.systick.schedule_listeners.append(self._tick_set)
+        board.chip.processor.systick.listen(self._tick_set)
 
     def detach(self) -> None:
         """Stop listening."""
         self._lines.close()
-        self._board.chip.processor.systick.schedule_listeners.remove(self._tick_set)
+        self._board.chip.processor.systick.unlisten(self._tick_set)
 
     @property
     def by_name(self) -> list[ExceptionCost]:

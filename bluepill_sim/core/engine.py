@@ -56,6 +56,8 @@ from bluepill_sim.core.unicorn_core import (
     WriteToReadOnly,
     io_callbacks,
 )
+from bluepill_sim.extension.layout import SHARED, structure
+from bluepill_sim.extension.library import library
 from simbase.state import Stateful
 
 #: Stops the engine before the instruction at an address: (kind, PC, address of the data).
@@ -168,6 +170,9 @@ class Engine(Stateful):
 
     def _make_state(self) -> None:
         """Make what holds the state, for an engine that keeps it elsewhere."""
+        #: What C sees of the core's state: the system registers.
+        self.shared = structure(SHARED)()
+        library().system_init(ctypes.addressof(self.shared))
 
     def _make_last_rows(self) -> KeptRows:
         return LastRows()
@@ -191,6 +196,9 @@ class Engine(Stateful):
     def map_io(self, address: int, size: int, read: ReadAccess, write: WriteAccess) -> None:
         """Map a region whose accesses are calls; their offsets count from `address`."""
         self._core.map_io(address, size, *io_callbacks(read, write, self._is_denied, self._fail))
+
+    def declare_zero(self, address: int) -> None:
+        """Take note that a word of I/O reads 0 and ignores writes, and that whoever is to hear of it has."""
 
     def drop_code(self, address: int, size: int) -> None:
         """Forget what was translated and measured from bytes that have changed; not during a run."""

@@ -69,6 +69,19 @@ _EXCEPTION_NAMES = {HARD_FAULT: "HardFault", MEM_MANAGE: "MemManage", BUS_FAULT:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class SeenFault:
+    """The core as it was at a fault, before anything was stacked."""
+
+    at_ns: Nanos
+    #: R0 to R12, SP, LR and xPSR.
+    registers: tuple[int, ...]
+    #: The handler that ran, and its entry in the vector table.
+    exception_number: int
+    vector: int | None
+    last_rows: tuple[BlockRow, ...]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class FaultReport:
     """A fault that the firmware did not handle by itself: a HardFault taken, or a lockup."""
 

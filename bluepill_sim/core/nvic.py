@@ -11,7 +11,10 @@ its interrupt pending again when its handler returns.
 
 import ctypes
 from collections.abc import Iterator
+from typing import Any
 
+from bluepill_sim.extension.layout import SHARED, structure
+from bluepill_sim.extension.windows import field, wide
 from simbase.state import Stateful
 
 NMI, HARD_FAULT, MEM_MANAGE, BUS_FAULT, USAGE_FAULT = 2, 3, 4, 5, 6
@@ -62,21 +65,21 @@ class Nvic(Stateful):
 
     STATE = ("pending", "active", "enabled", "levels", "priorities", "priority_grouping")
 
-    def __init__(self, priorities: "ctypes.Array[ctypes.c_uint8] | None" = None) -> None:
+    pending: int = wide("pending", "A bit mask over exception numbers.")
+    active: int = wide("active", "A bit mask over exception numbers.")
+    enabled: int = field("enabled", "A bit mask over interrupt lines.")
+    levels: int = field("levels", "A bit mask over interrupt lines.")
+    priority_grouping: int = field("grouping", "AIRCR.PRIGROUP.")
+
+    def __init__(self, shared: Any = None) -> None:
         """Make it in the state after a reset.
 
         Args:
-            priorities: where the bytes of priority are kept, one an exception; None: anywhere.
+            shared: the struct that holds the state; None: one of its own.
         """
-        #: Bit masks over exception numbers.
-        self.pending = 0
-        self.active = 0
-        #: Bit masks over interrupt lines.
-        self.enabled = 0
-        self.levels = 0
-        self.priorities = priorities or (ctypes.c_uint8 * (FIRST_IRQ + IRQ_LINES))()
-        #: AIRCR.PRIGROUP.
-        self.priority_grouping = 0
+        self.shared = structure(SHARED)() if shared is None else shared
+        #: A byte an exception.
+        self.priorities = self.shared.priorities
 
     def reset(self) -> None:
         """Go back to the state after a reset; the levels of the lines belong to the peripherals."""

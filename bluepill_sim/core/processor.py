@@ -19,15 +19,17 @@ Invariant: `exception_number` is what IPSR holds in the engine.
 import struct
 from collections.abc import Callable
 from enum import Enum
+from typing import Any
 
 from bluepill_sim.core.blocks import it_state_of
 from bluepill_sim.core.engine import FIRST_EXCEPTION_RETURN, Engine
-from bluepill_sim.core.faults import FAULT_OF_HALT, FAULT_ROWS, HFSR_FORCED, FaultKind
+from bluepill_sim.core.faults import FAULT_OF_HALT, FAULT_ROWS, HFSR_FORCED, FaultKind, SeenFault
 from bluepill_sim.core.halts import DEBUG_HALTS, Halt, HaltKind
 from bluepill_sim.core.nvic import BUS_FAULT, HARD_FAULT, NMI, SVCALL, SYSTICK, Nvic
 from bluepill_sim.core.recorder import EXCEPTION_RETURN
 from bluepill_sim.core.systick import SysTick
 from bluepill_sim.core.unicorn_core import Register
+from bluepill_sim.extension.windows import field, flag, time
 from bluepill_sim.memory import Memory
 from simbase.state import Stateful
 
@@ -62,8 +64,9 @@ class Sleep(Enum):
     EVENT = "event"
 
 
-#: Called with each HardFault taken and each lockup: (kind, PC, address, whether it is a lockup).
-FaultListener = Callable[[FaultKind, int, int | None, bool], None]
+#: Called with each HardFault taken and each lockup: (kind, PC, address, whether it is a lockup, what was seen then or
+#: None for the core as it is).
+FaultListener = Callable[[FaultKind, int, int | None, bool, SeenFault | None], None]
 
 
 class Processor(Stateful):
@@ -90,33 +93,34 @@ class Processor(Stateful):
     #: Taken by the chip at once.
     DERIVED = ("halt",)
 
+    exception_number: int = field("exception_number", "IPSR.")
+    event_register: bool = flag("event_register", "What WFE waits for.")
+    last_sleep_cycle: int | None = time("last_sleep_cycle", "When the core last slept; None before the first time.")
+    vector_table: int = field("vector_table", "VTOR.")
+    scr: int = field("scr", "SCR.")
+    ccr: int = field("ccr", "CCR; `set_ccr` acts on it.")
+    shcsr: int = field("shcsr", "The enable bits of SHCSR.")
+    cfsr: int = field("cfsr", "CFSR.")
+    hfsr: int = field("hfsr", "HFSR.")
+    mmfar: int = field("mmfar", "MMFAR.")
+    bfar: int = field("bfar", "BFAR.")
+    halts_on_bkpt: bool = flag("has_debugger", "Whether BKPT halts for a debugger; without one it is a fault.")
+
     #: Whether SysTick's wraps are acted on within `run`; else the caller stops at each.
     ticks_alone = False
 
     def __init__(self, engine: Engine, memory: Memory) -> None:
         self.engine = engine
-        self.nvic = self._make_nvic()
-        self.systick = self._make_systick(lambda: self.pend(SYSTICK))
-        self.exception_number = 0
+        #: The state, shared with C.
+        self.shared: Any = engine.shared
+        self.nvic = Nvic(self.shared)
+        self.systick = SysTick(lambda: self.pend(SYSTICK), self.shared)
         self.sleep = Sleep.AWAKE
-        self.event_register = False
         self.is_locked_up = False
-        #: When the core last went to sleep, in cycles; None before the first time.
-        self.last_sleep_cycle: int | None = None
         self.on_fault: FaultListener | None = None
         #: Why a debugger's halt ended the last run; None where none did.
         self.halt: Halt | None = None
-        #: Whether BKPT halts for a debugger; without one it is a fault.
-        self.halts_on_bkpt = False
-        # Registers of the system control block, as plain words.
-        self.vector_table = 0
-        self.scr = 0
         self.ccr = STKALIGN
-        self.shcsr = 0
-        self.cfsr = 0
-        self.hfsr = 0
-        self.bfar = 0
-        self.mmfar = 0
         self._memory = memory
         engine.on_event = self.send_event
         engine.is_interrupted = self.is_interrupted
@@ -130,12 +134,6 @@ class Processor(Stateful):
         self._return_write = file.batch(
             r.CONTROL, r.IPSR, r.CONTROL, r.SP, r.R0, r.R1, r.R2, r.R3, r.R12, r.LR, r.CONTROL, r.CPSR
         )
-
-    def _make_nvic(self) -> Nvic:
-        return Nvic()
-
-    def _make_systick(self, pend: Callable[[], None]) -> SysTick:
-        return SysTick(pend)
 
     # Time.
 
@@ -152,7 +150,6 @@ class Processor(Stateful):
     def reset(self, vector_table: int) -> None:
         """Start at the vectors of `vector_table`."""
         self.nvic.reset()
-        self.systick.reset()
         self.exception_number = 0
         self.sleep = Sleep.AWAKE
         self.event_register = self.is_locked_up = False
@@ -180,12 +177,12 @@ class Processor(Stateful):
         if self.sleep is not Sleep.AWAKE and not self._wakes():
             self.engine.cycle = max(self.engine.cycle, stop_at)
             return
-        if self.nvic.pending and not self.engine.is_inside_block:
-            if self._deliver():
-                return
-            self.engine.stops_after_mask_change = self.nvic.deliverable() != 0
-        else:
-            self.engine.stops_after_mask_change = False
+        is_inside = self.engine.is_inside_block
+        if self.nvic.pending and not is_inside and self._deliver():
+            return
+        self.engine.stops_after_mask_change = self.nvic.deliverable() != 0
+        if is_inside and self.engine.stops_after_mask_change:
+            stop_at = 0  # what came at a halt waits for the boundary, and no longer
         if self._stands_at_return():
             return
         halt = self.engine.run(stop_at)
@@ -463,9 +460,11 @@ class Processor(Stateful):
         self.is_locked_up = True
         self._report(kind, pc, address, is_lockup=True)
 
-    def _report(self, kind: FaultKind, pc: int, address: int | None, *, is_lockup: bool) -> None:
+    def _report(
+        self, kind: FaultKind, pc: int, address: int | None, *, is_lockup: bool, seen: SeenFault | None = None
+    ) -> None:
         if self.on_fault is not None:
-            self.on_fault(kind, pc, address, is_lockup)
+            self.on_fault(kind, pc, address, is_lockup, seen)
 
     def _restored(self) -> None:
         self.set_ccr(self.ccr)

@@ -101,6 +101,7 @@ _NATIVE_HOOKS = {
     "instruction": _HOOK_CODE,
     "interrupt": _HOOK_INTERRUPT,
     "invalid": _HOOK_INVALID,
+    "bad access": _HOOK_BAD_ACCESS,
 }
 _PROTECTION_READ, _PROTECTION_WRITE, _PROTECTION_EXECUTE = 1, 2, 4
 #: uc_ctl numbers: item | argument count << 26 | direction (write = 1) << 30.
@@ -342,7 +343,10 @@ class UnicornCore(Stateful):
         return self._library
 
     def hook_native(self, kind: str, callback: ctypes.c_void_p, user: int, first: int = 1, last: int = 0) -> int:
-        """Call a C function with `user`: before a "block" or an "instruction", at an "interrupt", at "invalid" code."""
+        """Call a C function with `user`: before a "block" or an "instruction", at an "interrupt", at "invalid" code.
+
+        Or at a "bad access", as `on_bad_access`.
+        """
         return self._hook(_NATIVE_HOOKS[kind], callback, first, last, user)
 
     def fill_tlb_native(self, callback: ctypes.c_void_p, user: int) -> None:

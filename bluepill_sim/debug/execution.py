@@ -13,7 +13,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from bluepill_sim.core import HaltKind
-from bluepill_sim.core.faults import FaultKind
+from bluepill_sim.core.faults import FaultKind, SeenFault
 from bluepill_sim.debug.history import History, Point
 from bluepill_sim.debug.machine import Machine, Stop, StopKind
 from bluepill_sim.debug.semihosting import Semihosting
@@ -159,9 +159,9 @@ class Execution:
     def _has_new_fault(self) -> bool:
         return self.machine.board.fault is not None and not self._reported_fault
 
-    def _faulted(self, kind: FaultKind, pc: int, address: int | None, is_lockup: bool) -> None:
+    def _faulted(self, kind: FaultKind, pc: int, address: int | None, is_lockup: bool, seen: SeenFault | None) -> None:
         if self._report is not None:
-            self._report(kind, pc, address, is_lockup)
+            self._report(kind, pc, address, is_lockup, seen)
         if self._has_new_fault():
             self.machine.board.request_stop()
 

@@ -68,17 +68,59 @@ INSTRUCTION = Struct(
         Field("padding", "u8", 2),
     ),
 )
+RAMP = Struct(
+    "ramp",
+    "A counter that follows from the time: `source/ramp.c`.",
+    (
+        Field("base", "u64", doc="when it had `value`, in the units of its owner,"),
+        Field("value", "u32"),
+        Field("divider", "u32", doc="so many of which make it count once;"),
+        Field("top", "u32", doc="its limit: 0 and this are neighbours"),
+        *_fields("u8", "runs", "falls"),
+        Field("padding", "u16"),
+    ),
+)
+STEP = Struct(
+    "step",
+    "What one instruction of a polling loop makes of the value that it has read.",
+    (
+        *_fields("u8", "operation", "is_register", "is_flags_only", "padding"),
+        Field("operand", "u32", doc="or its register"),
+    ),
+)
+LOOP = Struct(
+    "loop",
+    "A block that reads one word, computes with it and what never changes, and goes round while a condition holds.",
+    (
+        Field("read_cycle", "u32", doc="from the start of the block"),
+        Field("offset", "u32"),
+        *_fields("u8", "base", "condition", "count", "padding"),
+        Field("steps", "step", 6),
+    ),
+)
+FAULT = Struct(
+    "fault",
+    "A HardFault that was entered here, for Python to report: the core as it was before.",
+    (
+        *_fields("u64", "ns", "logged"),
+        Field("kind", "u32", doc="number of its halt"),
+        *_fields("u32", "pc", "address", "has_address", "exception_number"),
+        Field("vector", "u32", doc="of the handler that ran"),
+        Field("registers", "u32", 16, "R0 to R12, SP, LR, xPSR"),
+        Field("last", "record", LAST_ROWS),
+    ),
+)
 SHARED = Struct(
     "shared",
     "The state of one core.",
     (
-        *_fields("u64", "cycle", "stop_at", "access_cycle", "last_sleep_cycle", "tick_base", "tick_next"),
+        *_fields("u64", "cycle", "stop_at", "access_cycle", "last_sleep_cycle", "tick_next"),
         *(Field(name, "u64", 2, "a bit an exception") for name in ("pending", "active")),
         *_fields("u64", "enabled", "levels"),
         *_fields("u32", "access_pc", "in_access", "pc", "is_thumb", "mask_stop", "attention"),
         *_fields("u32", "halt_kind", "halt_pc", "halt_address", "halt_has_address", "run_from", "uses_exclusive"),
         *_fields("u32", "exception_number", "sleep", "event_register", "vector_table", "scr", "ccr"),
-        *_fields("u32", "tick_control", "tick_reload", "tick_value", "tick_count_flag"),
+        *_fields("u32", "tick_control", "tick_count_flag"),
         *_fields("u32", "traps_division", "grouping", "it_state", "is_python"),
         Field("is_first", "u32", doc="the recorder has not had a row yet"),
         Field("raised_pc", "u32", doc="the access that raised the last exception: its instruction,"),
@@ -89,6 +131,14 @@ SHARED = Struct(
         *_fields("u32", "sram_base", "sram_bytes", "flash_base", "flash_bytes", "scratch", "padding"),
         Field("exact_stops", "u64", doc="how often a run was stopped to learn which instruction makes an access"),
         Field("logged", "u64", doc="rows so far: the next one goes to `last` at this, modulo its size"),
+        *_fields("u32", "shcsr", "cfsr", "hfsr", "mmfar", "bfar", "demcr", "dbgmcu_cr"),
+        Field("tick", "ramp", doc="SysTick's counter: its limit is the reload value"),
+        Field("cyccnt", "ramp"),
+        Field("hears_ticks", "u32", doc="Python wants to know when SysTick is set"),
+        Field("has_debugger", "u32", doc="Python sees to BKPT and HardFaults"),
+        Field("knows_masked_svc", "u32", doc="Python was told of an SVC that its priority does not allow"),
+        Field("has_fault", "u32", doc="`fault` waits for Python"),
+        Field("fault", "fault"),
         Field("last", "record", LAST_ROWS),
     ),
 )
@@ -167,7 +217,9 @@ SENT = Struct(
 )
 
 #: All of them; one that holds another comes behind it.
-STRUCTS = (RECORD, INSTRUCTION, SHARED, PORT, USART, EXTI, GPIO, WAVE, EDGE, SENT)
+STRUCTS = (
+    RECORD, INSTRUCTION, RAMP, STEP, LOOP, FAULT, SHARED, PORT, USART, EXTI, GPIO, WAVE, EDGE, SENT,
+)  # fmt: skip
 
 _KINDS: dict[str, Any] = {
     "u8": ctypes.c_uint8, "u16": ctypes.c_uint16, "u32": ctypes.c_uint32, "u64": ctypes.c_uint64, "i32": ctypes.c_int32,

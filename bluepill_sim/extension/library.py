@@ -23,6 +23,7 @@ READ = ctypes.CFUNCTYPE(ctypes.c_uint32, ctypes.c_uint32, ctypes.c_uint32, ctype
 WRITE = ctypes.CFUNCTYPE(None, ctypes.c_uint32, ctypes.c_uint32, ctypes.c_uint32, ctypes.c_uint32)
 TRAPPED = ctypes.CFUNCTYPE(None, ctypes.c_uint32, ctypes.c_uint32, ctypes.c_uint32)
 RECORDED = ctypes.CFUNCTYPE(None, ctypes.c_void_p, ctypes.c_uint32)
+BAD_ACCESS = ctypes.CFUNCTYPE(ctypes.c_bool, ctypes.c_uint32, ctypes.c_uint32, ctypes.c_uint32, ctypes.c_uint64)
 ACCESS_CYCLE = ctypes.CFUNCTYPE(ctypes.c_uint64)
 ACCESS_PC = ctypes.CFUNCTYPE(ctypes.c_uint32)
 
@@ -48,6 +49,7 @@ class Callbacks(ctypes.Structure):
         ("recorded", RECORDED),
         ("access_cycle", ACCESS_CYCLE),
         ("access_pc", ACCESS_PC),
+        ("bad_access", BAD_ACCESS),
     )
 
 
@@ -59,6 +61,19 @@ _FUNCTIONS = {
     "core_run": "upl",
     "core_add_row": "bpuuuuupup",
     "core_forget_rows": "vp",
+    "core_set_loop": "bpup",
+    "core_set_fault": "vpuuuu",
+    "core_set_system_region": "vpu",
+    "core_declare_zero": "vpu",
+    "core_forget_zeros": "vp",
+    "system_init": "vp",
+    "system_reset": "vp",
+    "system_has": "bu",
+    "system_read": "upulp",
+    "system_write": "upuuul",
+    "systick_advance": "bpl",
+    "systick_read": "upul",
+    "systick_write": "vpuul",
     "core_block_start": "up",
     "core_set_page": "vpupupuppi",
     "core_set_paged_region": "vpu",

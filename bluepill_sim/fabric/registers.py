@@ -223,6 +223,10 @@ class Peripheral(Stateful):
     def deliver(self) -> None:
         """Take over the words that the device in C has sent."""
 
+    def has_register(self, offset: int) -> bool:
+        """Tell whether there is a register; else the word reads 0, and is warned of once."""
+        return self._registers[offset >> 2] is not None
+
     def changes_reset_value(self, offset: int, value: int) -> bool:
         """Tell whether a write would set a bit that is 0 after a reset: more than a de-initialization does."""
         register = self._registers[offset >> 2]

@@ -37,6 +37,7 @@ from bluepill_sim.core.unicorn_core import (
 from bluepill_sim.extension.library import (
     ACCESS_CYCLE,
     ACCESS_PC,
+    BAD_ACCESS,
     READ,
     RECORDED,
     TRAPPED,
@@ -48,6 +49,8 @@ from bluepill_sim.extension.library import (
     address_of,
     library,
 )
+from bluepill_sim.extension.windows import NO_TIME, field, flag
+from bluepill_sim.native.polling import loop_of
 from bluepill_sim.native.state import (
     BOUNDARY,
     DELIVER,
@@ -55,14 +58,11 @@ from bluepill_sim.native.state import (
     FROZEN,
     HALT_KINDS,
     HALT_NUMBERS,
-    NO_TIME,
     STALE,
     UNEXPLAINED,
     InstructionRow,
     NativeLastRows,
     Shared,
-    field,
-    flag,
 )
 
 #: Flags of a row (`enum row_flag`).
@@ -117,6 +117,7 @@ class NativeEngine(Engine):
         self._calls = Callbacks(
             UNKNOWN_BLOCK(self._measure_block), READ(self._read_io), WRITE(self._write_io), TRAPPED(self._trapped),
             RECORDED(self._take_records), ACCESS_CYCLE(lambda: self.access_cycle), ACCESS_PC(lambda: self.access_pc),
+            BAD_ACCESS(self._guarded_bad_access),
         )  # fmt: skip
         self._state = state = ctypes.c_void_p(
             library().core_new(self._core.handle, ctypes.addressof(api), ctypes.addressof(self._calls))
@@ -160,7 +161,7 @@ class NativeEngine(Engine):
         core.allow_execution(address, size)
         core.remove_hook(self._bad_access_hook)
         for first, last in ((0, address - 1), (address + size, 0xFFFF_FFFF)):
-            core.on_bad_access(self._bad_access, first, last)
+            core.hook_native("bad access", address_of("core_on_bad_access"), self._state.value or 0, first, last)
         core.fill_tlb_native(address_of("core_on_tlb_fill"), self._state.value or 0)
 
     def map_io(self, address: int, size: int, read: ReadAccess, write: WriteAccess) -> None:
@@ -169,6 +170,10 @@ class NativeEngine(Engine):
         self._regions.append((address, size, *io_callbacks(read, write, self._is_denied, self._fail)))
         user = library().core_region(self._state, number, address)
         self._core.map_io_native(address, size, address_of("core_read_io"), address_of("core_write_io"), user)
+
+    def declare_zero(self, address: int) -> None:
+        """As of `Engine`; until a state is restored, whose warnings may be others."""
+        library().core_declare_zero(self._state, address)
 
     def forget_costs(self) -> None:
         """As of `Engine`."""
@@ -320,6 +325,7 @@ class NativeEngine(Engine):
 
     def _restored(self) -> None:
         super()._restored()
+        library().core_forget_zeros(self._state)
         self.shared.uses_exclusive = self._blocks.uses_exclusive
 
     def stop_before(self, kind: HaltKind, pc: int, address: int | None = None) -> None:
@@ -397,6 +403,9 @@ class NativeEngine(Engine):
         )
         if not added:
             raise RuntimeError(f"no room for the block at {start:#010x}")
+        loop = loop_of(code, block.offsets, start) if flags & _READS else None
+        if loop is not None and not library().core_set_loop(self._state, start, ctypes.addressof(loop)):
+            raise MemoryError("no memory for a loop")
 
     def _note(self, accesses: dict[int, Access]) -> None:
         """Hook these instructions so that C notes their PC, in code that is translated from now on."""
@@ -432,6 +441,13 @@ class NativeEngine(Engine):
                     put(cycle, address, kind)
         except BaseException as error:  # noqa: BLE001 - C stands between here and the caller
             self._fail(error)
+
+    def _guarded_bad_access(self, access: int, address: int, size: int, value: int) -> bool:
+        try:
+            return self._bad_access(access, address, size, value)
+        except BaseException as error:  # noqa: BLE001 - C stands between here and the caller
+            self._fail(error)
+            return True
 
     def _bad_access(self, access: int, address: int, size: int, value: int) -> bool:
         self._halt = None

@@ -1,25 +1,24 @@
-"""The processor of the native core: exceptions of the ordinary kind, NVIC and SysTick live in C.
+"""The processor of the native core: exceptions of the ordinary kind live in C.
 
-Each class is its Python namesake with its state in the struct that C shares;
-whatever C leaves to Python is done by the methods inherited.
+It is its Python namesake; whatever C leaves to Python is done by the methods inherited.
 
 Invariant: there is one copy of the state, in `shared`.
 """
 
-from collections.abc import Callable
 from typing import Any
 
 from bluepill_sim.core import Engine
 from bluepill_sim.core.blocks import Measure
-from bluepill_sim.core.nvic import FIRST_IRQ, SYSTEM_EXCEPTIONS, Nvic
+from bluepill_sim.core.faults import FAULT_OF_HALT, FAULT_ROWS, FaultKind, SeenFault
+from bluepill_sim.core.halts import HaltKind
+from bluepill_sim.core.nvic import FIRST_IRQ, SYSTEM_EXCEPTIONS
 from bluepill_sim.core.processor import SEVONPEND, Processor, Sleep
-from bluepill_sim.core.systick import SysTick
-from bluepill_sim.extension.library import is_native_wanted
+from bluepill_sim.core.recorder import RECORD
+from bluepill_sim.extension.library import is_native_wanted, library
 from bluepill_sim.memory import Memory
-from bluepill_sim.native.state import field, flag, time
+from bluepill_sim.native.state import HALT_KINDS, HALT_NUMBERS, ordered_rows
 
 _HALF = 64
-_LOW = (1 << _HALF) - 1
 _SLEEPS = (Sleep.AWAKE, Sleep.INTERRUPT, Sleep.EVENT)
 
 
@@ -39,82 +38,18 @@ def make_core(measure: Measure, memory: Memory) -> tuple[Engine, Processor]:
     return native, NativeProcessor(native, memory)
 
 
-def _wide(name: str, doc: str) -> Any:
-    """Return a property over two 64-bit fields: a mask over exception numbers."""
-
-    def read(self: Any) -> int:
-        low, high = getattr(self.shared, name)
-        return low | high << 64  # type: ignore[no-any-return]  # ctypes
-
-    def write(self: Any, value: int) -> None:
-        words = getattr(self.shared, name)
-        words[0], words[1] = value & _LOW, value >> 64 & _LOW
-
-    return property(read, write, doc=doc)
-
-
-class NativeNvic(Nvic):
-    """`Nvic` over the shared struct."""
-
-    pending = _wide("pending", "As of `Nvic`.")
-    active = _wide("active", "As of `Nvic`.")
-    enabled = field("enabled", "As of `Nvic`.")
-    levels = field("levels", "As of `Nvic`.")
-    priority_grouping = field("grouping", "As of `Nvic`.")
-
-    def __init__(self, shared: Any) -> None:
-        self.shared = shared
-        super().__init__(shared.priorities)
-
-    def set_level(self, irq: int, level: bool) -> None:
-        """As of `Nvic`; called for each character of a USART, so it goes to the fields themselves."""
-        shared, bit = self.shared, 1 << irq
-        levels = shared.levels
-        if not level:
-            shared.levels = levels & ~bit
-        elif not levels & bit:
-            shared.levels = levels | bit
-            number = FIRST_IRQ + irq
-            shared.pending[number // _HALF] |= 1 << number % _HALF
-
-
-class NativeSysTick(SysTick):
-    """`SysTick` over the shared struct."""
-
-    _control = field("tick_control", "As of `SysTick`.")
-    _reload = field("tick_reload", "As of `SysTick`.")
-    _value = field("tick_value", "As of `SysTick`.")
-    _base = field("tick_base", "As of `SysTick`.")
-    _count_flag = flag("tick_count_flag", "As of `SysTick`.")
-    next_cycle = time("tick_next", "As of `SysTick`.")
-
-    def __init__(self, pend: Callable[[], None], shared: Any) -> None:
-        self.shared = shared
-        super().__init__(pend)
-
-
 class NativeProcessor(Processor):
-    """`Processor` over the shared struct; C runs, Python does what is out of the ordinary."""
+    """`Processor`; C runs, Python does what is out of the ordinary."""
 
     ticks_alone = True
 
-    exception_number = field("exception_number", "As of `Processor`.")
-    event_register = flag("event_register", "As of `Processor`.")
-    vector_table = field("vector_table", "As of `Processor`.")
-    scr = field("scr", "As of `Processor`.")
-    ccr = field("ccr", "As of `Processor`.")
-    last_sleep_cycle = time("last_sleep_cycle", "As of `Processor`.")
-
     def __init__(self, engine: Any, memory: Memory) -> None:
-        self.shared: Any = engine.shared
         self._native = engine
         super().__init__(engine, memory)
-
-    def _make_nvic(self) -> Nvic:
-        return NativeNvic(self.shared)
-
-    def _make_systick(self, pend: Callable[[], None]) -> SysTick:
-        return NativeSysTick(pend, self.shared)
+        rows = {HALT_NUMBERS[halt]: FAULT_ROWS[kind] for halt, kind in FAULT_OF_HALT.items()}
+        rows[HALT_NUMBERS[HaltKind.SUPERVISOR_CALL]] = FAULT_ROWS[FaultKind.MASKED_SVC]
+        for number, row in rows.items():
+            library().core_set_fault(engine.state, number, row.exception, row.cfsr, row.hfsr)
 
     @property
     def sleep(self) -> Sleep:
@@ -131,10 +66,36 @@ class NativeProcessor(Processor):
             super().run(self._before_event(stop_at))
             return
         must_deliver, halt = self._native.go_on(stop_at)
+        if self.shared.has_fault:
+            self._report_fault()
         if must_deliver:
             self._deliver()
         elif halt is not None:
             self._act_on(halt)
+
+    def _report_fault(self) -> None:
+        """Report the last HardFault that C has entered."""
+        self.shared.has_fault, fault = 0, self.shared.fault
+        seen = SeenFault(
+            at_ns=fault.ns,
+            registers=tuple(fault.registers),
+            exception_number=fault.exception_number,
+            vector=fault.vector,
+            last_rows=tuple(RECORD.iter_unpack(ordered_rows(fault))),
+        )
+        address = fault.address if fault.has_address else None
+        self._report(FAULT_OF_HALT[HALT_KINDS[fault.kind]], fault.pc, address, is_lockup=False, seen=seen)
+
+    def _report(
+        self, kind: FaultKind, pc: int, address: int | None, *, is_lockup: bool, seen: SeenFault | None = None
+    ) -> None:
+        if kind is FaultKind.MASKED_SVC:
+            self.shared.knows_masked_svc = True
+        super()._report(kind, pc, address, is_lockup=is_lockup, seen=seen)
+
+    def _restored(self) -> None:
+        super()._restored()
+        self.shared.knows_masked_svc = self.shared.has_fault = False
 
     def step(self, stop_at: int) -> None:
         """As of `Processor`."""

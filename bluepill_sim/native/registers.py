@@ -12,6 +12,7 @@ import ctypes
 from collections.abc import Iterable
 
 from bluepill_sim.core import Engine
+from bluepill_sim.core.system_control import PPB_BASE
 from bluepill_sim.extension.library import library
 from bluepill_sim.fabric.fabric import Fabric
 from bluepill_sim.fabric.registers import NATIVE, Peripheral, Register
@@ -39,6 +40,7 @@ def share_registers(engine: Engine, parts: Iterable[Peripheral], rcc: Rcc) -> No
         return
     state, calls = engine.state, library()
     calls.core_set_paged_region(state, engine.region_at(PERIPHERAL_BASE))
+    calls.core_set_system_region(state, engine.region_at(PPB_BASE))
     for part in parts:
         count = len(part.REGISTERS) and max(register.offset for register in part.REGISTERS) // 4 + 1
         behaviour = (ctypes.c_uint16 * count)()

@@ -6,10 +6,8 @@ from typing import Any
 from bluepill_sim.core.halts import HaltKind
 from bluepill_sim.core.recorder import BLOCK, RECORD, BlockRow
 from bluepill_sim.extension.layout import INSTRUCTION, LAST_ROWS, SHARED, structure
+from bluepill_sim.extension.windows import flag
 from simbase.state import Stateful
-
-#: What stands for "never" and for "none" among times.
-NO_TIME = (1 << 64) - 1
 
 #: Kinds of halts in the order of `enum halt`.
 HALT_KINDS = (
@@ -37,41 +35,11 @@ DELIVER, FAILED, STALE, FROZEN, UNEXPLAINED = range(len(HALT_KINDS), len(HALT_KI
 Shared, InstructionRow = structure(SHARED), structure(INSTRUCTION)
 
 
-def field(name: str, doc: str) -> Any:
-    """Return a property that is a field of `self.shared`."""
-
-    def read(self: Any) -> int:
-        return getattr(self.shared, name)  # type: ignore[no-any-return]  # a field of a ctypes struct
-
-    def write(self: Any, value: int) -> None:
-        setattr(self.shared, name, value)
-
-    return property(read, write, doc=doc)
-
-
-def flag(name: str, doc: str) -> Any:
-    """Return a property that is a field of `self.shared`, as a bool."""
-
-    def read(self: Any) -> bool:
-        return getattr(self.shared, name) != 0  # type: ignore[no-any-return]  # as above
-
-    def write(self: Any, value: bool) -> None:
-        setattr(self.shared, name, value)
-
-    return property(read, write, doc=doc)
-
-
-def time(name: str, doc: str) -> Any:
-    """Return a property that is a time in `self.shared`, or None."""
-
-    def read(self: Any) -> int | None:
-        value: int = getattr(self.shared, name)
-        return None if value == NO_TIME else value
-
-    def write(self: Any, value: int | None) -> None:
-        setattr(self.shared, name, NO_TIME if value is None else value)
-
-    return property(read, write, doc=doc)
+def ordered_rows(holder: Any) -> bytes:
+    """Return the rows of a struct with the fields `logged` and `last`, oldest first."""
+    logged, rows = holder.logged, bytes(holder.last)
+    first = logged % LAST_ROWS * RECORD.size
+    return rows[:first] if logged < LAST_ROWS else rows[first:] + rows[:first]
 
 
 class NativeLastRows(Stateful):
@@ -93,9 +61,7 @@ class NativeLastRows(Stateful):
     @property
     def packed(self) -> bytes:
         """As of `KeptRows`."""
-        logged, rows = self.shared.logged, bytes(self.shared.last)
-        first = logged % LAST_ROWS * RECORD.size
-        return rows[:first] if logged < LAST_ROWS else rows[first:] + rows[:first]
+        return ordered_rows(self.shared)
 
     @packed.setter
     def packed(self, packed: bytes) -> None:

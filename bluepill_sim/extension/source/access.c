@@ -22,6 +22,7 @@ struct region_user {
 /* An unaligned access is made in at most so many. */
 enum { PARTS = 16 };
 
+enum { STK_CTRL = 0xE000E010, SCB_AIRCR = 0xE000ED0C, SCB_CCR = 0xE000ED14, STIR = 0xE000EF00, SYSTICK = 15 };
 #define IN_PAGE ((1u << PAGE_SHIFT) - 1)
 
 /* What Unicorn hands back at each access of a region; it is freed with the core. */
@@ -207,7 +208,7 @@ bool resolve(struct core *core, uint32_t address, bool is_write, uint32_t bytes)
 
 static bool is_over(const struct core *core)
 {
-    return core->shared.cycle + core->block->straight >= core->shared.stop_at;
+    return core->shared.cycle + core->block->costs[0] >= core->shared.stop_at;
 }
 
 /* Finds the accessing instruction for Python, unless Python itself runs the blocks and knows it; false: not now. */
@@ -257,6 +258,17 @@ static struct page *open_page(const struct region_user *region, uint32_t offset)
     return is_there && (page->gate == NULL || *page->gate & page->gate_mask) ? page : NULL;
 }
 
+/* Whether what is there has its clock, or needs none. */
+static bool has_clock(const struct region_user *region, uint32_t offset)
+{
+    const struct core *core = region->core;
+    if (region->number != core->paged_region || offset >> PAGE_SHIFT >= PAGES) {
+        return true;
+    }
+    const struct page *page = &core->pages[offset >> PAGE_SHIFT];
+    return page->gate == NULL || *page->gate & page->gate_mask;
+}
+
 /* Reads a register of a device in C; false: not now, the access comes again. */
 static bool read_device(struct core *core, struct device *device, uint32_t index, uint32_t address, uint32_t size,
                         uint32_t *word)
@@ -298,6 +310,115 @@ static void write_device(struct core *core, struct page *page, uint32_t index, u
     }
 }
 
+/* Whether an access is made here: where a hook has ended the run it is not made, and where a request that may interrupt
+ * came before, Python ends the block.
+ */
+static bool may_access(struct core *core)
+{
+    const struct shared *s = &core->shared;
+    return !s->is_python && s->halt_kind == HALT_NONE && (s->stop_at || !is_interrupted(core));
+}
+
+/* Which region is the system control space. */
+void core_set_system_region(struct core *core, uint32_t number) { core->system_region = number; }
+
+bool is_privileged(struct core *core)
+{
+    if (core->shared.exception_number) {
+        return true;
+    }
+    if (core->privilege == PRIVILEGE_UNKNOWN) {
+        core->privilege = read_register(core, REG_CONTROL) & 1 ? UNPRIVILEGED : PRIVILEGED;
+    }
+    return core->privilege == PRIVILEGED;
+}
+
+/* Acts on the wraps of SysTick up to an access. */
+static void bring_systick(struct core *core, uint64_t now)
+{
+    struct shared *s = &core->shared;
+    if (now >= s->tick_next && systick_advance(s, now)) {
+        pend(core, SYSTICK);
+        pending_changed(core, s->access_pc);
+    }
+}
+
+/* Reads the system control space; false: that is Python's. `word` is all ones more to the left if it comes again. */
+static bool read_system(struct core *core, uint32_t address, uint32_t size, uint32_t *word)
+{
+    struct shared *s = &core->shared;
+    const uint32_t at = address & ~3u;
+    if (!may_access(core) || !is_privileged(core) || !system_has(at)) {
+        return false;
+    }
+    if (!system_needs_time(at)) {
+        skip(core, address, false, size);
+        system_read(s, at, 0, word);
+        return true;
+    }
+    if (!begin_access(core, address, false, size)) {
+        return true;
+    }
+    bring_systick(core, s->access_cycle);
+    const uint32_t flag = s->tick_count_flag;
+    system_read(s, at, s->access_cycle, word);
+    core->shared.in_access = 0;
+    /* What moves with the time, or was changed by the read, is another value at the next one. */
+    core->polling.asked |= at != STK_CTRL || flag;
+    return true;
+}
+
+/* Stores to the system control space; false: that is Python's. */
+static bool write_system(struct core *core, uint32_t address, uint32_t size, uint32_t value)
+{
+    struct shared *s = &core->shared;
+    const uint32_t at = address & ~3u;
+    const uint32_t mask = (size == 4 ? UINT32_MAX : (1u << 8 * size) - 1) << 8 * (address & 3);
+    const bool is_systick = at - STK_CTRL <= 8;
+    if (!may_access(core) || !is_privileged(core) || at == SCB_AIRCR || at == SCB_CCR || !(system_has(at) || at == STIR) ||
+        (is_systick && s->hears_ticks)) {
+        return false;
+    }
+    if (!begin_access(core, address, true, size)) {
+        return true;
+    }
+    bring_systick(core, s->access_cycle);
+    if (system_write(s, at, value << 8 * (address & 3), mask, s->access_cycle) & SYSTEM_WRITTEN) {
+        pending_changed(core, s->access_pc);
+    }
+    core->shared.in_access = 0;
+    if (s->tick_next < s->stop_at) {
+        s->stop_at = s->tick_next;
+    }
+    return true;
+}
+
+static uint32_t *constant_slot(struct core *core, uint32_t address)
+{
+    uint32_t n = (address >> 2) * 2654435761u >> 22;
+    while (core->constants.addresses[n] && core->constants.addresses[n] != address) {
+        n = (n + 1) % CONSTANTS;
+    }
+    return &core->constants.addresses[n];
+}
+
+/* From now on a word of I/O reads 0, and ignores writes, without Python being asked. */
+void core_declare_zero(struct core *core, uint32_t address)
+{
+    uint32_t *slot = constant_slot(core, address & ~3u);
+    if (*slot == 0 && core->constants.count < CONSTANTS / 2) {
+        *slot = address & ~3u;
+        ++core->constants.count;
+    }
+}
+
+void core_forget_zeros(struct core *core) { core->constants = (struct constants){0}; }
+
+static bool is_zero(struct core *core, uint32_t address)
+{
+    return core->constants.count && *constant_slot(core, address & ~3u) && may_access(core);
+}
+
 uint64_t core_read_io(void *unicorn, uint64_t at, unsigned size, void *user)
 {
     (void)unicorn;
@@ -319,6 +440,10 @@ uint64_t core_read_io(void *unicorn, uint64_t at, unsigned size, void *user)
         if (!read_device(region->core, page->device, index, region->base + offset, size, &word)) {
             return 0;
         }
+    } else if (region->number == region->core->system_region &&
+               read_system(region->core, region->base + offset, size, &word)) {
+    } else if (has_clock(region, offset) && is_zero(region->core, region->base + offset)) {
+        skip(region->core, region->base + offset, false, size);
     } else {
         return ask_read(region, offset, size);
     }
@@ -333,6 +458,14 @@ void core_write_io(void *unicorn, uint64_t at, unsigned size, uint64_t value, vo
     const struct region_user *region = user;
     struct page *page = open_page(region, offset);
     if (UNLIKELY(region->core->is_stopping)) {
+        return;
+    }
+    if (region->number == region->core->system_region &&
+        write_system(region->core, region->base + offset, size, written)) {
+        return;
+    }
+    if (has_clock(region, offset) && is_zero(region->core, region->base + offset)) {
+        skip(region->core, region->base + offset, true, size);
         return;
     }
     const bool is_half = size == 2 && !(offset & 3) && page != NULL && page->behaviour[index] & HALFWORDS;

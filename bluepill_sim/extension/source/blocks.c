@@ -108,7 +108,7 @@ static void enter_special(struct core *core, uint32_t address, uint32_t size, st
     if (row->flags & ROW_SELF_LOOP && row == core->block) {
         /* It has gone round once: nothing but an interrupt ends it, so go round until the time is up. */
         uint64_t left = s->stop_at - s->cycle;
-        s->cycle += (left + row->taken - 1) / row->taken * row->taken;
+        s->cycle += (left + row->costs[1] - 1) / row->costs[1] * row->costs[1];
         stop_at_boundary(core, address);
         return;
     }
@@ -126,9 +126,18 @@ static void enter_special(struct core *core, uint32_t address, uint32_t size, st
     }
 }
 
+/* Lets nobody go on to a row without looking for it. */
+static void forget_order(struct core *core)
+{
+    for (struct row *row = core->all; row != NULL; row = row->next) {
+        row->after[0] = row->after[1] = &core->none;
+    }
+}
+
 /* Records from now on, `room` rows before Python is called; 0: no more. Returns false without memory for it. */
 bool core_start_recording(struct core *core, uint32_t room)
 {
+    forget_order(core);
     free(core->records);
     core->records = room ? malloc(room * sizeof *core->records) : NULL;
     core->record_room = room;
@@ -142,6 +151,7 @@ static RARELY void trim_registers(struct core *core)
 {
     static const int numbers[3] = {REG_BASEPRI, REG_MSP, REG_PSP};
     static const uint32_t kept[3] = {0xF0, ~3u, ~3u};
+    core->privilege = PRIVILEGE_UNKNOWN;
     for (int n = 0; n < 3; ++n) {
         uint32_t value = read_register(core, numbers[n]);
         if (value & ~kept[n]) {
@@ -152,14 +162,11 @@ static RARELY void trim_registers(struct core *core)
     }
 }
 
-void core_on_block(void *unicorn, uint64_t at, uint32_t size, void *user)
+/* Enters a block that may be the first, an unusual one, or too late. */
+static __attribute__((noinline)) void enter_block(struct core *core, uint32_t address, uint32_t size)
 {
-    (void)unicorn;
-    struct core *core = user;
-    const struct row *before = core->block;
-    const uint32_t address = (uint32_t)at;
-    const uint64_t cycle = core->shared.cycle + (address == before->end ? before->straight : before->taken);
-    core->shared.cycle = cycle;
+    struct row *before = core->block;
+    const uint64_t cycle = core->shared.cycle;
     if (UNLIKELY(before->flags & ROW_CHANGES_MASKS)) {
         trim_registers(core);
     }
@@ -178,13 +185,37 @@ void core_on_block(void *unicorn, uint64_t at, uint32_t size, void *user)
     struct row *row = find(core, address);
     if (UNLIKELY(row == NULL || row->flags & ROW_ATTENTION)) {
         enter_special(core, address, size, row);
-    } else {
-        begin_block(core, row);
-        log_row(core, cycle, address, 0);
-        if (UNLIKELY(row == before) && row->flags & ROW_READS && polls_unchanged(core, row)) {
-            wait_on(core, row);
-        }
+        return;
     }
+    begin_block(core, row);
+    log_row(core, cycle, address, 0);
+    if (UNLIKELY(row == before) && row->flags & ROW_READS) {
+        if (row->loop != NULL && core->records == NULL) {
+            wait_on(core, row, rounds_of_counter(core, row));
+        } else if (polls_unchanged(core, row)) {
+            wait_on(core, row, rounds_left(core, row));
+        }
+    } else if (!(before->flags & ROW_CHANGES_MASKS) && before != &core->none && core->records == NULL) {
+        before->after[address != before->end] = row;
+    }
+}
+
+void core_on_block(void *unicorn, uint64_t at, uint32_t size, void *user)
+{
+    (void)unicorn;
+    struct core *core = user;
+    const struct row *before = core->block;
+    const uint32_t address = (uint32_t)at;
+    const bool is_elsewhere = address != before->end;
+    struct row *row = before->after[is_elsewhere];
+    const uint64_t cycle = core->shared.cycle + before->costs[is_elsewhere];
+    core->shared.cycle = cycle;
+    if (UNLIKELY(row->start != address || cycle >= core->shared.stop_at)) {
+        enter_block(core, address, size);
+        return;
+    }
+    begin_block(core, row);
+    core->shared.last[core->shared.logged++ % LAST_ROWS] = (struct record){cycle, address, 0};
 }
 
 /* Returns false without memory for it. `instructions` has `count` rows, the costs are those of block_cost.py. */
@@ -200,8 +231,8 @@ bool core_add_row(struct core *core, uint32_t start, uint32_t end, uint32_t stra
         free(code);
         return false;
     }
-    *row = (struct row){.start = start, .end = end, .straight = straight, .taken = taken, .flags = flags,
-                        .count = count, .host = host, .code = code, .next = core->all};
+    *row = (struct row){.start = start, .end = end, .costs = {straight, taken}, .after = {&core->none, &core->none},
+                        .flags = flags, .count = count, .host = host, .code = code, .next = core->all};
     memcpy(row->instructions, instructions, list);
     if (host != NULL) {
         memcpy(code, host, end - start);
@@ -210,9 +241,23 @@ bool core_add_row(struct core *core, uint32_t start, uint32_t end, uint32_t stra
             core->code_places[n / 8] |= (uint8_t)(1 << n % 8);
         }
     }
+    if (*at != NULL) {
+        forget_order(core);
+    }
     core->all = row;
     *at = row;
     return true;
+}
+
+/* Says of a known block that it is a loop that may poll a counter. Returns false without memory for it. */
+bool core_set_loop(struct core *core, uint32_t start, const struct loop *loop)
+{
+    struct row *row = find(core, start);
+    row->loop = malloc(sizeof *row->loop);
+    if (row->loop != NULL) {
+        *row->loop = *loop;
+    }
+    return row->loop != NULL;
 }
 
 /* Measure every block again when it is next entered; the one that runs keeps its costs. */
@@ -221,6 +266,7 @@ void core_forget_rows(struct core *core)
     memset(core->flash_rows, 0, sizeof core->flash_rows);
     memset(core->sram_rows, 0, sizeof core->sram_rows);
     core->other_row = NULL;
+    forget_order(core);
     struct row **end = &core->all;
     while (*end != NULL) {
         end = &(*end)->next;
@@ -236,6 +282,7 @@ void free_dropped(struct core *core)
         struct row *row = core->dropped;
         core->dropped = row->next;
         free(row->code);
+        free(row->loop);
         free(row);
     }
 }

@@ -7,6 +7,7 @@
 #include <stdint.h>
 
 #include "fabric.h"
+#include "system.h"
 
 #define NEVER (UINT64_C(1) << 62)
 /* ITSTATE in the CPSR, and the exception number of interrupt line 0. */
@@ -59,10 +60,16 @@ enum row_flag {
 };
 
 struct row {
-    uint32_t start, end, straight, taken, flags, count;
+    uint32_t start, end;
+    uint32_t costs[2]; /* in cycles, where it goes on at its end, and elsewhere */
+    /* The block that came after it last time, likewise, where nothing but its start and the time need be looked at;
+     * else the core's `none`. */
+    struct row *after[2];
+    uint32_t flags, count;
     const uint8_t *host; /* of code in writable memory: where it stands now */
     uint8_t *code;       /* and what it was when it was measured */
     struct row *next;    /* in the list of all rows, or of dropped ones */
+    struct loop *loop;   /* where it is one that may poll a counter */
     struct instruction instructions[];
 };
 
@@ -85,6 +92,8 @@ struct callbacks {
     /* Of the access that is made while Python enters the blocks. */
     uint64_t (*access_cycle)(void);
     uint32_t (*access_pc)(void);
+    /* An access that the memory's protection forbids: whether it may pass. */
+    bool (*bad_access)(uint32_t kind, uint32_t address, uint32_t size, uint64_t value);
 };
 
 #define FLASH_SLOTS 65536
@@ -128,6 +137,13 @@ struct located {
     uint32_t is_anywhere;
 };
 
+/* Words that read a constant and ignore writes, as Python has said after its first warning; by a hash of the address. */
+#define CONSTANTS 1024
+struct constants {
+    uint32_t count;
+    uint32_t addresses[CONSTANTS]; /* 0: free */
+};
+
 /* A loop that waits for something: its state at its start, one round ago. */
 struct polling {
     const struct row *row;
@@ -139,6 +155,11 @@ struct polling {
 
 /* Where in SRAM code was translated from, in places of some bytes; never fewer than there are. */
 enum { CODE_BYTES = 32, CODE_PLACES = 2 * SRAM_SLOTS / CODE_BYTES };
+
+/* What ends a run for a fault raises, and which status bits it sets; 0: it is none. */
+struct fault_row {
+    uint32_t exception, cfsr, hfsr;
+};
 
 struct core {
     struct shared shared;
@@ -162,13 +183,16 @@ struct core {
     struct fabric *fabric;
     uint32_t is_scratch;
     uint32_t noted;
-    uint32_t paged_region;
+    uint32_t paged_region, system_region;
+    struct constants constants;
+    enum { PRIVILEGE_UNKNOWN, PRIVILEGED, UNPRIVILEGED } privilege; /* of a thread, since the last MSR */
     struct allocation *allocations;
     struct record *records;
     uint32_t record_count, record_room;
     struct polling polling;
     uint64_t limit; /* of the run */
     uint8_t code_places[CODE_PLACES / 8];
+    struct fault_row faults[HALT_NONE]; /* by kind of halt */
 };
 
 static inline void begin_block(struct core *core, struct row *row)
@@ -188,9 +212,12 @@ void core_flush(struct core *core);
 void record_at(struct core *core, uint64_t cycle, uint32_t address, int32_t kind);
 /* polling.c */
 bool polls_unchanged(struct core *core, const struct row *row);
-void wait_on(struct core *core, const struct row *row);
+void wait_on(struct core *core, const struct row *row, uint64_t rounds);
+uint64_t rounds_left(const struct core *core, const struct row *row);
+uint64_t rounds_of_counter(struct core *core, const struct row *row);
 /* access.c */
 void go_on_at_access(struct core *core, uint32_t pc);
+bool is_privileged(struct core *core);
 bool resolve(struct core *core, uint32_t address, bool is_write, uint32_t bytes);
 void skip(struct core *core, uint32_t address, bool is_write, uint32_t bytes);
 /* run.c */
@@ -198,13 +225,19 @@ bool goes_on(struct core *core, uint32_t address);
 void *allocate(struct core *core, size_t bytes);
 uint32_t read_register(struct core *core, int number);
 /* exceptions.c */
-uint64_t deliverable(const struct core *core, uint64_t *high);
+uint64_t deliverable(const struct shared *s, uint64_t *high);
 bool wakes(struct core *core);
 int deliver(struct core *core);
 bool leave(struct core *core, uint32_t exc_return);
 bool supervisor_call(struct core *core, uint32_t pc);
 void pend(struct core *core, unsigned number);
-void tick(struct core *core);
+void pending_changed(struct core *core, uint32_t pc);
+bool is_interrupted(struct core *core);
+bool can_preempt(struct core *core, unsigned number, bool ignores_primask);
+bool enter(struct core *core, unsigned number, uint32_t return_address);
+uint32_t vector(const struct core *core, unsigned number);
+/* faults.c */
+bool take_fault(struct core *core, uint32_t kind);
 #pragma GCC visibility pop
 /* run.c, for Python as well. */
 uint64_t core_next_event(const struct core *core);

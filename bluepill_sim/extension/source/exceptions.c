@@ -1,15 +1,15 @@
 /* Exceptions of the ordinary kind: entry, return, tail-chaining, SysTick, sleep.
  *
  * What is out of the ordinary (a frame outside SRAM, a vector outside the
- * flash, an escalation, a lockup) is left to bluepill_sim/core/processor.py, before
- * anything has changed. Source: ARMv7-M Architecture Reference Manual B1.5.
+ * flash, a lockup) is left to bluepill_sim/core/processor.py, before
+ * anything has changed. Faults are faults.c. Source: ARMv7-M Architecture Reference Manual B1.5.
  */
 #include <string.h>
 
 #include "core.h"
 
 enum { ENTRY_CYCLES = 12, EXIT_CYCLES = 12, TAIL_CHAIN_CYCLES = 6, FRAME_BYTES = 32 };
-enum { NMI = 2, HARD_FAULT = 3, SVCALL = 11, SYSTICK = 15, THREAD_PRIORITY = 256 };
+enum { NMI = 2, HARD_FAULT = 3, SVCALL = 11, THREAD_PRIORITY = 256 };
 enum { SLEEPONEXIT = 2, SEVONPEND = 16, STKALIGN = 1 << 9, SPSEL = 2, NPRIV = 1 };
 enum { AWAKE, FOR_INTERRUPT, FOR_EVENT };
 
@@ -21,9 +21,8 @@ enum { AWAKE, FOR_INTERRUPT, FOR_EVENT };
 #define TO_THREAD_MSP 0xFFFFFFF8u
 #define TO_THREAD_PSP 0xFFFFFFFCu
 
-uint64_t deliverable(const struct core *core, uint64_t *high)
+uint64_t deliverable(const struct shared *s, uint64_t *high)
 {
-    const struct shared *s = &core->shared;
     *high = s->pending[1] & (s->enabled >> (64 - FIRST_IRQ));
     return s->pending[0] & (s->enabled << FIRST_IRQ | ((1u << FIRST_IRQ) - 1));
 }
@@ -39,16 +38,16 @@ static int group(const struct shared *s, int priority)
 }
 
 /* The enabled pending exception of the highest priority, the lowest number among equals; 0: none. */
-static unsigned first_pending(const struct core *core)
+unsigned first_pending(const struct shared *s)
 {
     uint64_t words[2];
-    words[0] = deliverable(core, &words[1]);
+    words[0] = deliverable(s, &words[1]);
     unsigned best = 0;
     int best_priority = 1 << 10;
     for (unsigned word = 0; word < 2; ++word) {
         for (uint64_t left = words[word]; left; left &= left - 1) {
             const unsigned number = 64 * word + (unsigned)__builtin_ctzll(left);
-            const int priority = priority_of(&core->shared, number);
+            const int priority = priority_of(s, number);
             if (priority < best_priority) {
                 best = number;
                 best_priority = priority;
@@ -92,7 +91,7 @@ static int execution_priority(struct core *core, bool ignores_primask)
     return priority;
 }
 
-static bool can_preempt(struct core *core, unsigned number, bool ignores_primask)
+bool can_preempt(struct core *core, unsigned number, bool ignores_primask)
 {
     return group(&core->shared, priority_of(&core->shared, number)) < execution_priority(core, ignores_primask);
 }
@@ -107,7 +106,7 @@ static uint32_t *sram_at(const struct core *core, uint32_t address, uint32_t byt
 }
 
 /* The handler of an exception; 0 where Python has to look. */
-static uint32_t vector(const struct core *core, unsigned number)
+uint32_t vector(const struct core *core, unsigned number)
 {
     const struct shared *s = &core->shared;
     const uint32_t address = s->vector_table + 4 * number;
@@ -158,7 +157,7 @@ static void start_handler(struct core *core, unsigned number, uint32_t handler, 
     s->it_state = 0;
 }
 
-static bool enter(struct core *core, unsigned number, uint32_t return_address)
+bool enter(struct core *core, unsigned number, uint32_t return_address)
 {
     struct shared *s = &core->shared;
     const uint32_t handler = vector(core, number);
@@ -193,7 +192,7 @@ static bool enter(struct core *core, unsigned number, uint32_t return_address)
 /* 1: an exception was entered; 0: none may be; -1: Python has to. */
 int deliver(struct core *core)
 {
-    const unsigned number = first_pending(core);
+    const unsigned number = first_pending(&core->shared);
     if (!number || !can_preempt(core, number, false)) {
         return 0;
     }
@@ -236,7 +235,7 @@ bool leave(struct core *core, uint32_t exc_return)
     }
     s->event_register = 1;
     core_clear_exclusive(core);
-    const unsigned following = first_pending(core);
+    const unsigned following = first_pending(s);
     if (following && can_preempt(core, following, false)) {
         record(core, exc_return | 1, -1);
         record(core, exc_return | 1, (int32_t)following);
@@ -248,17 +247,25 @@ bool leave(struct core *core, uint32_t exc_return)
     const uint32_t select = exc_return == TO_THREAD_PSP ? SPSEL : 0;
     const uint32_t sp = (exc_return == TO_THREAD_PSP ? psp : msp) + FRAME_BYTES + (xpsr & ALIGN_BIT ? 4 : 0);
     const uint32_t kept = FLAG_BITS | IT_BITS;
-    /* CONTROL thrice: nPRIV would forbid the next writes, SPSEL is only taken in thread mode, nPRIV comes last. */
+    /* CONTROL thrice: nPRIV would forbid the next writes, SPSEL is only taken in thread mode, nPRIV comes last. Each
+     * costs as much as five others, and mostly it is what it was.
+     */
     static const int to[12] = {REG_CONTROL, REG_IPSR,   REG_CONTROL, REG_SP,  REG_R0, REG_R0 + 1,
                                REG_R0 + 2,  REG_R0 + 3, REG_R12,     REG_LR,  REG_CONTROL, REG_CPSR};
+    static const int to_same[9] = {REG_IPSR,   REG_SP,  REG_R0, REG_R0 + 1, REG_R0 + 2,
+                                   REG_R0 + 3, REG_R12, REG_LR, REG_CPSR};
     uint32_t values[12] = {0,        s->exception_number, select,   sp,       frame[0],
                            frame[1], frame[2],            frame[3], frame[4], frame[5],
                            (control & NPRIV) | select,    (cpsr & ~kept) | (xpsr & kept) | CPSR_T};
+    const bool is_same = control == select;
+    int count = 0;
     for (int n = 0; n < 12; ++n) {
-        at[n] = &values[n];
+        if (!is_same || to[n] != REG_CONTROL) {
+            at[count++] = &values[n];
+        }
     }
     const uint32_t pc = frame[6];
-    core->api.write_registers(core->unicorn, to, at, 12);
+    core->api.write_registers(core->unicorn, is_same ? to_same : to, at, count);
     s->pc = pc & ~1u;
     s->is_thumb = (xpsr & T_BIT) != 0;
     s->it_state = (xpsr >> 25 & 3) | (xpsr >> 10 & 0x3F) << 2;
@@ -275,7 +282,7 @@ bool leave(struct core *core, uint32_t exc_return)
 bool wakes(struct core *core)
 {
     struct shared *s = &core->shared;
-    const unsigned number = first_pending(core);
+    const unsigned number = first_pending(s);
     /* An exception that PRIMASK alone holds back wakes WFI, but not WFE. */
     if (number && can_preempt(core, number, s->sleep == FOR_INTERRUPT)) {
         s->sleep = AWAKE;
@@ -296,21 +303,24 @@ void pend(struct core *core, unsigned number)
     }
 }
 
-/* SysTick comes to 0 at or before the present cycle: as SysTick.advance_to. */
-void tick(struct core *core)
+/* An access has changed what is pending, enabled or its priority: as `Processor.pending_changed`. */
+void pending_changed(struct core *core, uint32_t pc)
 {
     struct shared *s = &core->shared;
-    s->tick_count_flag = 1;
-    if (s->tick_control & 2) {
-        pend(core, SYSTICK);
+    uint64_t high;
+    if (s->scr & SEVONPEND && (s->pending[0] | s->pending[1])) {
+        s->event_register = 1;
     }
-    s->tick_value = 0;
-    if (!s->tick_reload) {
-        s->tick_base = s->tick_next;
-        s->tick_next = NO_TIME;
-        return;
+    if (deliverable(s, &high) || high) {
+        s->raised_cycle = s->cycle;
+        s->raised_pc = pc;
+        s->stop_at = 0;
     }
-    const uint64_t period = (uint64_t)(s->tick_reload + 1) * (s->tick_control & 4 ? 1 : 8);
-    s->tick_base = s->tick_next + (s->cycle - s->tick_next) / period * period;
-    s->tick_next = s->tick_base + period;
+}
+
+/* Whether an exception is pending that may interrupt what runs. */
+bool is_interrupted(struct core *core)
+{
+    const unsigned number = first_pending(&core->shared);
+    return number && can_preempt(core, number, false);
 }

@@ -40,14 +40,9 @@ static uint32_t set_irq(void *user, uint32_t irq, uint32_t level)
     if (!level) {
         s->levels &= ~line;
     } else if (!(s->levels & line)) {
-        uint64_t high;
         s->levels |= line;
         pend(core, irq + FIRST_IRQ);
-        if (deliverable(core, &high) || high) {
-            s->raised_cycle = s->cycle;
-            s->raised_pc = pc(core);
-            s->stop_at = 0;
-        }
+        pending_changed(core, pc(core));
     }
     return s->enabled >> irq & 1;
 }

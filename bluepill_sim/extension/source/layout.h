@@ -33,13 +33,61 @@ struct instruction {
 };
 _Static_assert(sizeof(struct instruction) == 20, "instruction");
 
+/* A counter that follows from the time: `source/ramp.c`. */
+struct ramp {
+    uint64_t base; /* when it had `value`, in the units of its owner, */
+    uint32_t value;
+    uint32_t divider; /* so many of which make it count once; */
+    uint32_t top; /* its limit: 0 and this are neighbours */
+    uint8_t runs;
+    uint8_t falls;
+    uint16_t padding;
+};
+_Static_assert(sizeof(struct ramp) == 24, "ramp");
+
+/* What one instruction of a polling loop makes of the value that it has read. */
+struct step {
+    uint8_t operation;
+    uint8_t is_register;
+    uint8_t is_flags_only;
+    uint8_t padding;
+    uint32_t operand; /* or its register */
+};
+_Static_assert(sizeof(struct step) == 8, "step");
+
+/* A block that reads one word, computes with it and what never changes, and goes round while a condition holds. */
+struct loop {
+    uint32_t read_cycle; /* from the start of the block */
+    uint32_t offset;
+    uint8_t base;
+    uint8_t condition;
+    uint8_t count;
+    uint8_t padding;
+    struct step steps[6];
+};
+_Static_assert(sizeof(struct loop) == 60, "loop");
+
+/* A HardFault that was entered here, for Python to report: the core as it was before. */
+struct fault {
+    uint64_t ns;
+    uint64_t logged;
+    uint32_t kind; /* number of its halt */
+    uint32_t pc;
+    uint32_t address;
+    uint32_t has_address;
+    uint32_t exception_number;
+    uint32_t vector; /* of the handler that ran */
+    uint32_t registers[16]; /* R0 to R12, SP, LR, xPSR */
+    struct record last[32];
+};
+_Static_assert(sizeof(struct fault) == 616, "fault");
+
 /* The state of one core. */
 struct shared {
     uint64_t cycle;
     uint64_t stop_at;
     uint64_t access_cycle;
     uint64_t last_sleep_cycle;
-    uint64_t tick_base;
     uint64_t tick_next;
     uint64_t pending[2]; /* a bit an exception */
     uint64_t active[2]; /* a bit an exception */
@@ -64,8 +112,6 @@ struct shared {
     uint32_t scr;
     uint32_t ccr;
     uint32_t tick_control;
-    uint32_t tick_reload;
-    uint32_t tick_value;
     uint32_t tick_count_flag;
     uint32_t traps_division;
     uint32_t grouping;
@@ -86,9 +132,23 @@ struct shared {
     uint32_t padding;
     uint64_t exact_stops; /* how often a run was stopped to learn which instruction makes an access */
     uint64_t logged; /* rows so far: the next one goes to `last` at this, modulo its size */
+    uint32_t shcsr;
+    uint32_t cfsr;
+    uint32_t hfsr;
+    uint32_t mmfar;
+    uint32_t bfar;
+    uint32_t demcr;
+    uint32_t dbgmcu_cr;
+    struct ramp tick; /* SysTick's counter: its limit is the reload value */
+    struct ramp cyccnt;
+    uint32_t hears_ticks; /* Python wants to know when SysTick is set */
+    uint32_t has_debugger; /* Python sees to BKPT and HardFaults */
+    uint32_t knows_masked_svc; /* Python was told of an SVC that its priority does not allow */
+    uint32_t has_fault; /* `fault` waits for Python */
+    struct fault fault;
     struct record last[32];
 };
-_Static_assert(sizeof(struct shared) == 864, "shared");
+_Static_assert(sizeof(struct shared) == 1560, "shared");
 
 /* The pins of one port, a bit each. RM0008 9.1, table 20. */
 struct port {

@@ -4,7 +4,8 @@
  * round before does the same again, until an event that ends the run: what it
  * reads are memory and registers that only events change. If Python has
  * answered one of its reads, what was read may have been a clock, and it goes on
- * round by round.
+ * round by round. Where the word is a counter that is known to be a ramp of time,
+ * and the loop is as native/polling.py says, the round that leaves it is worked out.
  */
 #include <string.h>
 
@@ -39,7 +40,7 @@ bool polls_unchanged(struct core *core, const struct row *row)
     uint32_t registers[16];
     look(core, registers);
     const bool is_same = polling->rounds > FIRST_LOOK && !polling->asked &&
-                         core->shared.cycle == polling->cycle + row->taken &&
+                         core->shared.cycle == polling->cycle + row->costs[1] &&
                          memcmp(registers, polling->registers, sizeof registers) == 0;
     if (polling->rounds > FIRST_LOOK) {
         polling->rounds = is_same ? 0 : -NEXT_LOOK;
@@ -50,15 +51,86 @@ bool polls_unchanged(struct core *core, const struct row *row)
     return is_same;
 }
 
-/* Lets the time pass up to the round within which the run has to end, and which is to be run: what is due by then
- * may be seen by that round's own read. The rows of the last rounds are kept.
+/* How many rounds begin before the run has to end, without the last of them: what is due by then may be seen by that
+ * round's own read.
  */
-void wait_on(struct core *core, const struct row *row)
+uint64_t rounds_left(const struct core *core, const struct row *row)
+{
+    return (core->shared.stop_at - core->shared.cycle - 1) / row->costs[1];
+}
+
+/* Lets the time of some rounds pass. The rows of the last ones are kept. */
+void wait_on(struct core *core, const struct row *row, uint64_t rounds)
 {
     struct shared *s = &core->shared;
-    const uint64_t rounds = (s->stop_at - s->cycle - 1) / row->taken;
     for (uint64_t n = rounds > LAST_ROWS ? rounds - LAST_ROWS : 1; n <= rounds; ++n) {
-        record_at(core, s->cycle + n * row->taken, row->start, 0);
+        record_at(core, s->cycle + n * row->costs[1], row->start, 0);
     }
-    s->cycle += rounds * row->taken;
+    s->cycle += rounds * row->costs[1];
+}
+
+enum operation { ADD, SUBTRACT, SUBTRACT_FROM, SHIFT_LEFT, SHIFT_RIGHT, AND };
+enum { DWT_CYCCNT = 0xE0001004, STK_VAL = 0xE000E018 };
+
+/* N, Z, C and V of the last step; shifts and AND have no use of C and V here. */
+struct flags {
+    bool n, z, c, v;
+};
+
+static struct flags run_steps(const struct loop *loop, const uint32_t *operands, uint32_t x)
+{
+    struct flags flags = {0};
+    for (uint32_t k = 0; k < loop->count; ++k) {
+        const struct step *step = &loop->steps[k];
+        const uint32_t operation = step->operation, y = operands[k];
+        uint32_t result;
+        if (operation == ADD) {
+            result = x + y;
+            flags.c = result < x;
+            flags.v = (~(x ^ y) & (x ^ result)) >> 31;
+        } else if (operation == SUBTRACT || operation == SUBTRACT_FROM) {
+            const uint32_t from = operation == SUBTRACT ? x : y, what = operation == SUBTRACT ? y : x;
+            result = from - what;
+            flags.c = from >= what;
+            flags.v = ((from ^ what) & (from ^ result)) >> 31;
+        } else {
+            result = operation == SHIFT_LEFT ? x << y : operation == SHIFT_RIGHT ? x >> y : x & y;
+        }
+        flags.n = result >> 31;
+        flags.z = result == 0;
+        x = step->is_flags_only ? x : result;
+    }
+    return flags;
+}
+
+/* ARMv7-M A7.3, table A7-1. */
+static bool holds(uint32_t condition, struct flags f)
+{
+    const bool ways[7] = {f.z, f.c, f.n, f.v, f.c && !f.z, f.n == f.v, !f.z && f.n == f.v};
+    return ways[condition >> 1] != (condition & 1);
+}
+
+/* How many of the next rounds of such a loop go round again, of those that end before the run does: the value of a
+ * counter follows from the time, and each round but the last leaves nothing that the next one does not overwrite.
+ */
+uint64_t rounds_of_counter(struct core *core, const struct row *row)
+{
+    const struct loop *loop = row->loop;
+    const struct shared *s = &core->shared;
+    const uint32_t address = read_register(core, REG_R0 + loop->base) + loop->offset;
+    if ((address != DWT_CYCCNT && address != STK_VAL) || !s->stop_at || !is_privileged(core)) {
+        return polls_unchanged(core, row) ? rounds_left(core, row) : 0;
+    }
+    const struct ramp *ramp = address == DWT_CYCCNT ? &s->cyccnt : &s->tick;
+    uint32_t operands[sizeof loop->steps / sizeof *loop->steps];
+    for (uint32_t k = 0; k < loop->count; ++k) {
+        const struct step *step = &loop->steps[k];
+        operands[k] = step->is_register ? read_register(core, REG_R0 + (int)step->operand) : step->operand;
+    }
+    const uint64_t left = rounds_left(core, row);
+    uint64_t n = 0;
+    while (n < left && holds(loop->condition, run_steps(loop, operands, ramp_at(ramp, s->cycle + n * row->costs[1] + loop->read_cycle)))) {
+        ++n;
+    }
+    return n;
 }

@@ -4,7 +4,7 @@
 
 #include "core.h"
 
-enum { FOR_INTERRUPT = 1, FOR_EVENT = 2 };
+enum { FOR_INTERRUPT = 1, FOR_EVENT = 2, SYSTICK = 15 };
 #define FIRST_EXCEPTION_RETURN 0xFFFFFFE0u
 /* No instruction stands at an odd address, so a run never ends there; the page is that of `scratch`. */
 #define NOWHERE 0x9FFFFFFFu
@@ -39,9 +39,10 @@ struct core *core_new(void *unicorn, const struct unicorn_api *api, const struct
         core->api = *api;
         core->calls = *calls;
         core->none.start = core->none.end = UINT32_MAX;
+        core->none.after[0] = core->none.after[1] = &core->none;
         core->block = &core->none;
-        core->paged_region = UINT32_MAX;
-        core->shared.last_sleep_cycle = core->shared.tick_next = core->shared.raised_cycle = NO_TIME;
+        core->paged_region = core->system_region = UINT32_MAX;
+        system_init(&core->shared);
     }
     return core;
 }
@@ -159,10 +160,10 @@ void core_clear_exclusive(struct core *core)
 static uint32_t cycles_until(const struct row *row, uint32_t address)
 {
     if (address == row->end) {
-        return row->straight;
+        return row->costs[0];
     }
     const struct instruction *one = instruction_at(row, address);
-    return one == NULL ? row->taken : one->cycle;
+    return one == NULL ? row->costs[1] : one->cycle;
 }
 
 /* Charges what of the running block has been run when the core stands at `pc`. */
@@ -172,7 +173,7 @@ static void settle(struct core *core, uint32_t pc)
     core->block = &core->none;
     if (row != &core->none) {
         /* The refill of an exception return is part of the exception's exit. */
-        core->shared.cycle += pc >= FIRST_EXCEPTION_RETURN ? row->straight : cycles_until(row, pc);
+        core->shared.cycle += pc >= FIRST_EXCEPTION_RETURN ? row->costs[0] : cycles_until(row, pc);
     }
     core->shared.pc = pc;
     core->shared.is_thumb = read_register(core, REG_XPSR) >> 24 & 1;
@@ -191,6 +192,7 @@ static uint32_t run_slice(struct core *core)
     }
     core->io_next = core->skipped_count = 0;
     core->located.cycle = NO_TIME;
+    core->privilege = PRIVILEGE_UNKNOWN;
     int error = core->api.start(core->unicorn, s->pc | s->is_thumb, NOWHERE, 0, 0);
     while (core->is_stopping) {
         const uint32_t pc = read_register(core, REG_PC);
@@ -266,8 +268,8 @@ static uint32_t run(struct core *core, uint64_t limit)
     s->attention = 0;
     core->limit = limit;
     for (;;) {
-        if (s->cycle >= s->tick_next) {
-            tick(core);
+        if (s->cycle >= s->tick_next && systick_advance(s, s->cycle)) {
+            pend(core, SYSTICK);
         }
         if (s->cycle >= core->fabric->next_cycle) {
             run_events(core->fabric, ns_of(core->fabric, s->cycle));
@@ -292,7 +294,7 @@ static uint32_t run(struct core *core, uint64_t limit)
                 continue;
             }
             uint64_t high;
-            s->mask_stop = deliverable(core, &high) || high;
+            s->mask_stop = deliverable(s, &high) || high;
         } else {
             s->mask_stop = 0;
         }
@@ -308,11 +310,14 @@ static uint32_t run(struct core *core, uint64_t limit)
             }
             break;
         case HALT_SUPERVISOR_CALL:
-            if (!supervisor_call(core, s->halt_pc)) {
+            if (!supervisor_call(core, s->halt_pc) && !take_fault(core, kind)) {
                 return kind;
             }
             break;
-        default: return kind;
+        default:
+            if (!take_fault(core, kind)) {
+                return kind;
+            }
         }
     }
 }

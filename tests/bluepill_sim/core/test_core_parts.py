@@ -1,5 +1,7 @@
 """The parts of the core without the core: clock arithmetic, SysTick, NVIC, each against a naive twin."""
 
+import ctypes
+
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -7,6 +9,8 @@ from hypothesis.stateful import RuleBasedStateMachine, initialize, invariant, ru
 
 from bluepill_sim.core.nvic import FIRST_IRQ, HARD_FAULT, NMI, THREAD_PRIORITY, Nvic
 from bluepill_sim.core.systick import CLKSOURCE, COUNTFLAG, ENABLE, TICKINT, SysTick
+from bluepill_sim.extension.layout import SHARED, structure
+from bluepill_sim.extension.library import library
 from bluepill_sim.fabric.cycle_clock import CycleClock
 from bluepill_sim.memory import Memory
 
@@ -28,6 +32,41 @@ def test_the_cycle_at_a_time_is_the_first_not_before_it(frequency: int, at: int,
     twin = CycleClock(1)
     twin.restore(clock.snapshot())
     assert twin.cycle_at(at) == found
+
+
+class SysTickAlone(SysTick):
+    """SysTick without a core: its registers by C, as `SystemControl` and the native core have them."""
+
+    def __init__(self, pend) -> None:
+        shared = structure(SHARED)()
+        library().system_init(ctypes.addressof(shared))
+        super().__init__(pend, shared)
+
+    def _read(self, word: int, now: int) -> int:
+        self.advance_to(now)
+        return library().systick_read(self._at, word, now)
+
+    def _write(self, word: int, value: int, now: int) -> None:
+        self.advance_to(now)
+        library().systick_write(self._at, word, value, now)
+
+    def read_control(self, now: int) -> int:
+        return self._read(0, now)
+
+    def read_reload(self) -> int:
+        return library().systick_read(self._at, 1, 0)
+
+    def read_value(self, now: int) -> int:
+        return self._read(2, now)
+
+    def write_control(self, value: int, now: int) -> None:
+        self._write(0, value, now)
+
+    def write_reload(self, value: int, now: int) -> None:
+        self._write(1, value, now)
+
+    def write_value(self, now: int) -> None:
+        self._write(2, 0, now)
 
 
 class NaiveSysTick:
@@ -63,7 +102,7 @@ class SysTickTwins(RuleBasedStateMachine):
         self.now = 0
         self.pended = 0
         self.naive = NaiveSysTick()
-        self.lazy = SysTick(self._pend)
+        self.lazy = SysTickAlone(self._pend)
 
     def _pend(self) -> None:
         self.pended += 1
@@ -110,7 +149,7 @@ class SysTickTwins(RuleBasedStateMachine):
     @rule()
     def move_to_a_twin(self) -> None:
         snapshot = self.lazy.snapshot()
-        self.lazy = SysTick(self._pend)
+        self.lazy = SysTickAlone(self._pend)
         self.lazy.restore(snapshot)
 
     @invariant()
@@ -125,7 +164,7 @@ TestSysTickTwins = SysTickTwins.TestCase
 
 def test_systick_counts_from_reload_to_zero_in_reload_plus_one_ticks() -> None:
     pended = []
-    timer = SysTick(lambda: pended.append(1))
+    timer = SysTickAlone(lambda: pended.append(1))
     timer.write_reload(99, 0)
     timer.write_value(0)
     timer.write_control(7, 0)

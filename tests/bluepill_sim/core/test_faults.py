@@ -293,7 +293,7 @@ def test_a_thread_without_privilege_faults_in_the_system_control_space(boot, acc
     assert board.fault.kind.name == ("READ_ERROR" if access.startswith("ldr") else "WRITE_ERROR")
     assert board.register("R5") == 5
     assert board.register("R2") == 9
-    assert board.chip.processor.systick.read_reload() == 0x1234
+    assert board.chip.system.read(0xE014, 4) == 0x1234
     assert board.chip.processor.exception_number == 3
 
 

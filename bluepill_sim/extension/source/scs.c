@@ -1,0 +1,332 @@
+/* The private peripheral bus: SCB, NVIC, SysTick, DWT, DEMCR, DBGMCU: what is read there, and what a store does.
+ *
+ * Registers that store stand in one table; the others are below it. Whoever makes an access has brought SysTick to its
+ * time and acts on the answer: bluepill_sim/core/system_control.py, and access.c where the native core runs.
+ * Source: ARMv7-M Architecture Reference Manual B3.2 to B3.4 and C1; PM0056 chapter 4; RM0008 31.6 for DBGMCU.
+ */
+#include <stddef.h>
+#include <string.h>
+
+#include "fabric.h"
+#include "system.h"
+
+enum { NMI = 2, MEM_MANAGE = 4, PENDSV = 14, SYSTICK = 15, FIRST_IRQ = 16, IRQ_COUNT = 43 };
+/* The upper four bits of a priority exist (PM0056 2.3.5). */
+enum { PRIORITY_BITS = 0xF0 };
+#define IRQS ((UINT64_C(1) << IRQ_COUNT) - 1)
+
+enum {
+    DWT_CTRL = 0xE0001000, DWT_CYCCNT = 0xE0001004,
+    STK_CTRL = 0xE000E010, STK_CALIB = 0xE000E01C,
+    NVIC_ISER = 0xE000E100, NVIC_IPR = 0xE000E400, NVIC_IPR_END = 0xE000E4F0,
+    SCB_ICSR = 0xE000ED04, SCB_AIRCR = 0xE000ED0C, SCB_CCR = 0xE000ED14, SCB_SHPR1 = 0xE000ED18, SCB_SHPR3 = 0xE000ED20,
+    SCB_SHCSR = 0xE000ED24, SCB_CFSR = 0xE000ED28, SCB_HFSR = 0xE000ED2C, DEMCR = 0xE000EDFC, STIR = 0xE000EF00
+};
+/* The arrays of the NVIC's words of lines, 128 bytes each; each has 8 words, of which the chip has 2. */
+enum { ENABLE, DISABLE, PEND, UNPEND, ACTIVE, LINE_ARRAYS };
+
+#define VECTKEY 0x05FAu
+#define VECTKEY_READ (0xFA05u << 16)
+enum { SYSRESETREQ = 1 << 2, DEBUGGERS = 1 << 1 | 1 << 0 };
+#define NMIPENDSET (1u << 31)
+#define PENDSVSET (1u << 28)
+#define PENDSVCLR (1u << 27)
+#define PENDSTSET (1u << 26)
+#define PENDSTCLR (1u << 25)
+#define RETTOBASE (1u << 11)
+#define ISRPENDING (1u << 22)
+#define TRCENA (1u << 24)
+#define CYCCNTENA 1u
+/* Four comparators, cycle counter present. */
+#define DWT_CTRL_FIXED 0x40000000u
+
+/* A register that stores: what of a word written it takes, and what a 1 clears; without a field it reads `fixed`. */
+struct storing {
+    uint32_t address, fixed, takes, clears;
+    uint16_t field;
+    uint8_t is_read_only;
+};
+#define AT(name) offsetof(struct shared, name)
+#define WORD 0xFFFFFFFFu
+
+static const struct storing storing[] = {
+    {0xE000E004, 1, 0, 0, 0, 1},                         /* ICTR: 33 to 64 lines */
+    {0xE000E008, 0, 0, 0, 0, 0},                         /* ACTLR */
+    {0xE000ED00, 0x411FC231, 0, 0, 0, 1},                /* CPUID: Cortex-M3 r1p1 (PM0056 4.4.1) */
+    {0xE000ED08, 0, 0x3FFFFF80, 0, AT(vector_table), 0}, /* VTOR (PM0056 4.4.4) */
+    {0xE000ED10, 0, 0x16, 0, AT(scr), 0},
+    {SCB_CCR, 0, 0x31B, 0, AT(ccr), 0},
+    {SCB_CFSR, 0, 0, WORD, AT(cfsr), 0},
+    {SCB_HFSR, 0, 0, WORD, AT(hfsr), 0},
+    {0xE000ED30, 0, 0, 0, 0, 0}, /* DFSR */
+    {0xE000ED34, 0, WORD, 0, AT(mmfar), 0},
+    {0xE000ED38, 0, WORD, 0, AT(bfar), 0},
+    {0xE000ED90, 0, 0, 0, 0, 1}, /* MPU_TYPE: none */
+    {0xE000EDF0, 0, 0, 0, 0, 1}, /* DHCSR: no debugger */
+    {DEMCR, 0, WORD, 0, AT(demcr), 0},
+    {0xE0042000, 0x20036410, 0, 0, 0, 1}, /* DBGMCU_IDCODE: medium density, revision "X" (RM0008 31.6.1) */
+    {0xE0042004, 0, WORD, 0, AT(dbgmcu_cr), 0},
+};
+
+static const struct storing *storing_at(uint32_t address)
+{
+    for (size_t n = 0; n < sizeof storing / sizeof *storing; ++n) {
+        if (storing[n].address == address) {
+            return &storing[n];
+        }
+    }
+    return NULL;
+}
+
+static uint32_t *field_of(struct shared *s, const struct storing *row)
+{
+    return (uint32_t *)(void *)((char *)s + row->field);
+}
+
+/* SHCSR: the bit of each exception that is active, and pending. */
+struct state_bit {
+    uint8_t number, bit;
+};
+static const struct state_bit active_bits[] = {{4, 0}, {5, 1}, {6, 3}, {11, 7}, {12, 8}, {14, 10}, {15, 11}};
+static const struct state_bit pending_bits[] = {{6, 12}, {4, 13}, {5, 14}, {11, 15}};
+#define SHCSR_ENABLES (7u << 16)
+
+/* 32 lines of a mask over exceptions. */
+static uint32_t lines_of(const uint64_t *words, uint32_t word)
+{
+    return (uint32_t)(word ? words[0] >> (FIRST_IRQ + 32) | words[1] << (32 - FIRST_IRQ) : words[0] >> FIRST_IRQ);
+}
+
+static uint64_t *word_of(uint64_t *words, unsigned number) { return &words[number >> 6]; }
+static uint64_t bit_of(unsigned number) { return UINT64_C(1) << (number & 63); }
+
+static bool is_line_array(uint32_t address) { return address - NVIC_ISER < 0x80 * LINE_ARRAYS && (address & 0x7F) < 0x20; }
+
+static uint32_t read_lines(const struct shared *s, uint32_t address)
+{
+    const uint32_t array = (address - NVIC_ISER) >> 7, word = (address & 0x1F) >> 2;
+    if (word > 1) { /* for more lines than the chip has (ARM B3.4.3); ST's code writes it */
+        return 0;
+    }
+    if (array < PEND) {
+        return (uint32_t)(s->enabled >> 32 * word);
+    }
+    return lines_of(array == ACTIVE ? s->active : s->pending, word);
+}
+
+static void write_lines(struct shared *s, uint32_t address, uint32_t value)
+{
+    const uint32_t array = (address - NVIC_ISER) >> 7, word = (address & 0x1F) >> 2;
+    if (word > 1) {
+        return;
+    }
+    uint64_t lines = ((uint64_t)value << 32 * word) & IRQS;
+    if (array == ENABLE) {
+        s->enabled |= lines;
+    } else if (array == DISABLE) {
+        s->enabled &= ~lines;
+    } else if (array == PEND) {
+        s->pending[0] |= lines << FIRST_IRQ;
+        s->pending[1] |= lines >> (64 - FIRST_IRQ);
+    } else { /* a line that is still high keeps its own, unless it is served */
+        lines &= ~(s->levels & ~(s->active[0] >> FIRST_IRQ | s->active[1] << (64 - FIRST_IRQ)));
+        s->pending[0] &= ~(lines << FIRST_IRQ);
+        s->pending[1] &= ~(lines >> (64 - FIRST_IRQ));
+    }
+}
+
+/* The first of the four exceptions whose priorities stand in a word; 0 for none. */
+static unsigned priorities_at(uint32_t address)
+{
+    if (address - SCB_SHPR1 <= SCB_SHPR3 - SCB_SHPR1) {
+        return MEM_MANAGE + (address - SCB_SHPR1);
+    }
+    return address - NVIC_IPR < IRQ_COUNT ? FIRST_IRQ + (address - NVIC_IPR) : 0;
+}
+
+static bool is_beyond_priorities(uint32_t address)
+{
+    return address - NVIC_IPR < NVIC_IPR_END - NVIC_IPR && address - NVIC_IPR >= IRQ_COUNT;
+}
+
+static uint32_t read_icsr(const struct shared *s)
+{
+    uint32_t value = s->exception_number | first_pending(s) << 12;
+    if (__builtin_popcountll(s->active[0]) + __builtin_popcountll(s->active[1]) <= 1) {
+        value |= RETTOBASE;
+    }
+    if (s->pending[0] >> FIRST_IRQ || s->pending[1]) {
+        value |= ISRPENDING;
+    }
+    value |= s->pending[0] & bit_of(NMI) ? NMIPENDSET : 0;
+    value |= s->pending[0] & bit_of(PENDSV) ? PENDSVSET : 0;
+    return value | (s->pending[0] & bit_of(SYSTICK) ? PENDSTSET : 0);
+}
+
+static void write_icsr(struct shared *s, uint32_t value)
+{
+    s->pending[0] |= (value & NMIPENDSET ? bit_of(NMI) : 0) | (value & PENDSVSET ? bit_of(PENDSV) : 0) |
+                     (value & PENDSTSET ? bit_of(SYSTICK) : 0);
+    s->pending[0] &= ~((value & PENDSVCLR ? bit_of(PENDSV) : 0) | (value & PENDSTCLR ? bit_of(SYSTICK) : 0));
+}
+
+static uint32_t read_shcsr(const struct shared *s)
+{
+    uint32_t value = s->shcsr;
+    for (size_t n = 0; n < sizeof active_bits / sizeof *active_bits; ++n) {
+        value |= (uint32_t)(s->active[0] >> active_bits[n].number & 1) << active_bits[n].bit;
+    }
+    for (size_t n = 0; n < sizeof pending_bits / sizeof *pending_bits; ++n) {
+        value |= (uint32_t)(s->pending[0] >> pending_bits[n].number & 1) << pending_bits[n].bit;
+    }
+    return value;
+}
+
+static uint32_t write_aircr(struct shared *s, uint32_t value)
+{
+    if (value >> 16 != VECTKEY) {
+        return 0;
+    }
+    s->grouping = value >> 8 & 7;
+    return (value & SYSRESETREQ ? SYSTEM_RESET : 0) | (value & DEBUGGERS ? SYSTEM_DEBUGGER : 0);
+}
+
+/* Starts or stops CYCCNT at its present value. */
+static void set_counting(struct shared *s, bool on, uint64_t now)
+{
+    ramp_rebase(&s->cyccnt, now);
+    s->cyccnt.runs = on;
+}
+
+bool system_needs_time(uint32_t address)
+{
+    return address == STK_CTRL || address == STK_CTRL + 8 || address == DWT_CYCCNT;
+}
+
+bool system_has(uint32_t address)
+{
+    return storing_at(address) != NULL || address == DWT_CTRL || address == DWT_CYCCNT ||
+           address - STK_CTRL <= STK_CALIB - STK_CTRL || is_line_array(address) || priorities_at(address) ||
+           is_beyond_priorities(address) || address == SCB_ICSR || address == SCB_AIRCR || address == SCB_SHCSR;
+}
+
+/* Reads a word; `now` is the cycle of the reading instruction. */
+uint32_t system_read(struct shared *s, uint32_t address, uint64_t now, uint32_t *word)
+{
+    uint32_t answer = SYSTEM_KNOWN;
+    *word = 0;
+    if (address - STK_CTRL <= STK_CALIB - STK_CTRL) {
+        answer |= systick_advance(s, now) ? SYSTEM_TICKED : 0;
+        *word = systick_read(s, (address - STK_CTRL) >> 2, now);
+        return answer;
+    }
+    if (is_line_array(address)) {
+        *word = read_lines(s, address);
+        return answer;
+    }
+    const unsigned first = priorities_at(address);
+    if (first) {
+        memcpy(word, &s->priorities[first], sizeof *word);
+        return answer;
+    }
+    switch (address) {
+    case DWT_CTRL: *word = DWT_CTRL_FIXED | (s->cyccnt.runs ? CYCCNTENA : 0); return answer;
+    case DWT_CYCCNT: *word = ramp_at(&s->cyccnt, now); return answer;
+    case SCB_ICSR: *word = read_icsr(s); return answer;
+    case SCB_AIRCR: *word = VECTKEY_READ | s->grouping << 8; return answer;
+    case SCB_SHCSR: *word = read_shcsr(s); return answer;
+    default: break;
+    }
+    const struct storing *row = storing_at(address);
+    if (row == NULL) {
+        return is_beyond_priorities(address) ? answer : 0;
+    }
+    *word = row->field ? *field_of(s, row) : row->fixed;
+    return answer;
+}
+
+/* Whether a 0 written changes nothing, so that a narrow store needs no merging. */
+static bool takes_ones(uint32_t address)
+{
+    return (is_line_array(address) && (address & 0x1F) < 8) || address == SCB_ICSR || address == SCB_CFSR ||
+           address == SCB_HFSR;
+}
+
+/* Takes a store of the bytes in `mask`. */
+uint32_t system_write(struct shared *s, uint32_t address, uint32_t value, uint32_t mask, uint64_t now)
+{
+    uint32_t answer = SYSTEM_KNOWN | SYSTEM_WRITTEN;
+    value &= mask;
+    if (mask != WORD && !takes_ones(address)) {
+        uint32_t before;
+        answer |= system_read(s, address, now, &before) & SYSTEM_TICKED;
+        value |= before & ~mask;
+    }
+    if (address - STK_CTRL <= STK_CALIB - STK_CTRL) {
+        if (address == STK_CALIB) {
+            return SYSTEM_KNOWN;
+        }
+        answer |= systick_advance(s, now) ? SYSTEM_TICKED : 0;
+        systick_write(s, (address - STK_CTRL) >> 2, value, now);
+        return answer;
+    }
+    if (is_line_array(address)) {
+        if (address - NVIC_ISER >= 0x80 * ACTIVE && (address & 0x1F) < 8) {
+            return SYSTEM_KNOWN;
+        }
+        write_lines(s, address, value);
+        return answer;
+    }
+    const unsigned first = priorities_at(address);
+    if (first) {
+        value &= PRIORITY_BITS * 0x01010101u;
+        memcpy(&s->priorities[first], &value, sizeof value);
+        return answer;
+    }
+    switch (address) {
+    case DWT_CTRL: set_counting(s, value & CYCCNTENA && s->demcr & TRCENA, now); return answer;
+    case DWT_CYCCNT:
+        s->cyccnt.value = value;
+        s->cyccnt.base = now;
+        return answer;
+    case SCB_ICSR: write_icsr(s, value); return answer;
+    case SCB_AIRCR: return answer | write_aircr(s, value);
+    case SCB_SHCSR: s->shcsr = value & SHCSR_ENABLES; return answer;
+    case STIR: /* an interrupt by its number; one that the chip does not have is ignored */
+        if ((value & 0x1FF) < IRQ_COUNT) {
+            *word_of(s->pending, FIRST_IRQ + (value & 0x1FF)) |= bit_of(FIRST_IRQ + (value & 0x1FF));
+        }
+        return answer;
+    default: break;
+    }
+    const struct storing *row = storing_at(address);
+    if (row == NULL) {
+        return is_beyond_priorities(address) ? answer : 0;
+    }
+    if (row->is_read_only) {
+        return SYSTEM_KNOWN;
+    }
+    if (row->field) {
+        uint32_t *field = field_of(s, row);
+        *field = row->clears ? *field & ~(value & row->clears) : value & row->takes;
+    }
+    if (address == DEMCR && !(value & TRCENA)) {
+        set_counting(s, false, now);
+    }
+    return answer | (address == SCB_CCR ? SYSTEM_TRAPS : 0);
+}
+
+void system_init(struct shared *s)
+{
+    s->last_sleep_cycle = s->tick_next = s->raised_cycle = NO_TIME;
+    s->tick = (struct ramp){.divider = 1, .falls = 1};
+    s->cyccnt = (struct ramp){.divider = 1, .top = WORD};
+}
+
+void system_reset(struct shared *s)
+{
+    s->tick_control = s->tick_count_flag = 0;
+    s->tick_next = NO_TIME;
+    s->tick = (struct ramp){.divider = 1, .falls = 1};
+    s->cyccnt = (struct ramp){.divider = 1, .top = WORD};
+}
