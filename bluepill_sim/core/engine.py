@@ -110,6 +110,7 @@ class Engine(Stateful):
 
     STATE = ("_core", "cycle", "pc", "is_thumb", "has_branched_to_return", "_blocks", "_rest", "log")
     DERIVED: ClassVar[tuple[str, ...]] = (
+        "shared",  # its fields are the processor's
         "it_state", "block", "stop_at", "_run_from", "_halt", "_failure", "_frozen", "_table",
         # What a run or a block has for itself alone.
         "_is_stepping", "_lets_writes_through", "_raised_by",

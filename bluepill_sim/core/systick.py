@@ -22,6 +22,8 @@ class SysTick(Stateful):
     """The system timer; `now` is always a time in core cycles."""
 
     STATE = ("control", "_count_flag", "_counter", "next_cycle")
+    #: Who listens.
+    DERIVED = ("_listeners",)
 
     control: int = field("tick_control", "Bits 2 to 0 of STCSR.")
     _count_flag = flag("tick_count_flag", "COUNTFLAG.")
