@@ -11,7 +11,7 @@ STAMP  := $(VENV)/.set-up
 # One more than two cores: many tests wait for a real clock.
 JOBS   ?= 3
 # What is built with the package: set up again when it has changed.
-COMPILED := $(wildcard bluepill_sim/extension/source/*) robot_bench/wires/edges.c \
+COMPILED := $(wildcard bluepill_sim/extension/source/*/*) robot_bench/wires/edges.c \
     $(shell find adapter_fw/core adapter_fw/capi -type f)
 
 .PHONY: setup demo test lint type unit bench soak peers clean firmware mutation-tools board board-check board-tools pictures docs

@@ -218,7 +218,7 @@ def test_the_wheel_drives_the_demo_in_an_empty_environment(wheel: Path, tmp_path
 
 @pytest.mark.slow
 def test_a_part_that_does_not_compile_fails_the_build(builder: Path, unpacked: Path, tmp_path: Path) -> None:
-    (unpacked / "bluepill_sim/extension/source/core.h").unlink()
+    (unpacked / "bluepill_sim/extension/source/core/core.h").unlink()
     done = build(builder, unpacked, "wheel", tmp_path / "out")
     assert done.returncode != 0
     assert "bluepill_sim._native does not compile" in done.stderr

@@ -9,7 +9,7 @@ from pathlib import Path
 
 from bluepill_sim.extension.layout import header
 
-HEADER = Path(__file__).resolve().parents[1] / "bluepill_sim/extension/source/layout.h"
+HEADER = Path(__file__).resolve().parents[1] / "bluepill_sim/extension/source/fabric/layout.h"
 
 
 def main() -> int:

@@ -1,4 +1,4 @@
-"""A log of what signals did, in order of time; it is kept in C (`extension/source/edges.c`).
+"""A log of what signals did, in order of time; it is kept in C (`extension/source/fabric/edges.c`).
 
 Signals have numbers, in the order in which a person reads them. A row that
 comes late (the bits of a character, known at its end) goes where it belongs,

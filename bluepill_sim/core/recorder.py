@@ -30,7 +30,7 @@ BLOCK, EXCEPTION_RETURN = 0, -1
 
 #: Cycle, address, kind.
 BlockRow = tuple[int, int, int]
-#: A row as bytes (`struct record` of bluepill_sim/native/source/core.h).
+#: A row as bytes (`struct record` of extension/layout.py).
 RECORD = struct.Struct("<QIi")
 
 

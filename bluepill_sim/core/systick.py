@@ -1,4 +1,4 @@
-"""SysTick: the 24-bit down counter of the core, as `extension/source/systick.c` has it.
+"""SysTick: the 24-bit down counter of the core, as `extension/source/core/systick.c` has it.
 
 Source: ARMv7-M Architecture Reference Manual B3.3.
 Invariant: all state is in the struct that C shares.

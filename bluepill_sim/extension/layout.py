@@ -1,6 +1,6 @@
 """The structs that C and Python share, declared once.
 
-`tools/generate_layout.py` writes them as `source/layout.h`; `structure` makes the ctypes class of the same fields. Both
+`tools/generate_layout.py` writes them as `source/fabric/layout.h`; `structure` makes the ctypes class of the same fields. Both
 sides keep the natural alignment of the machine, and `library.py` refuses a library whose sizes are others.
 
 Invariant: a struct holds numbers and arrays of them, no pointers: what it holds can be saved as bytes.
@@ -70,7 +70,7 @@ INSTRUCTION = Struct(
 )
 RAMP = Struct(
     "ramp",
-    "A counter that follows from the time: `source/ramp.c`.",
+    "A counter that follows from the time: `source/core/ramp.c`.",
     (
         Field("base", "u64", doc="when it had `value`, in the units of its owner,"),
         Field("value", "u32"),

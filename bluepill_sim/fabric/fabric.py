@@ -1,6 +1,6 @@
 """The chip around its core, as Python reaches it: the queue of events, lines, and devices that are written in C.
 
-A device takes a slot of the queue. One in C is a row of `source/devices.c` and keeps its state in words of
+A device takes a slot of the queue. One in C is a row of `source/fabric/devices.c` and keeps its state in words of
 Python's; one in Python is called when its slot is due. Lines are numbered, those of interrupts first.
 
 Python stands on both sides of C here: what a callback raises is kept, and raised by `check` once C has come back.
@@ -233,7 +233,7 @@ class Fabric(Stateful):
 
         Args:
             name: its own, for messages.
-            kind: that of its kind in `source/devices.c`.
+            kind: that of its kind in `source/fabric/devices.c`.
             words: where its registers are in the host's memory.
             state: and what it holds beside them.
             act: called when it is due, where its kind leaves that to Python.
@@ -393,7 +393,7 @@ class Fabric(Stateful):
         return self._waves[source]
 
     def set_wave(self, pin: int, source: int, frequency_hz: int, period: int, high: int, position: int) -> None:
-        """Have an alternate function offer a wave on a pin: `wave_set` of `source/fabric.h`."""
+        """Have an alternate function offer a wave on a pin: `wave_set` of `source/fabric/fabric.h`."""
         self._calls_of_c.fabric_set_wave(self.handle, pin, source, frequency_hz, period, high, position)
         self.check()
 

@@ -10,7 +10,7 @@ supply pins, slew rates, and the two clocks of the input synchroniser.
 
 Source: RM0008 sections 9.1 (table 20) and 9.3.5; data sheet DS5319 tables 5 and
 6 (pin definitions, absolute maximum ratings).
-The levels themselves are worked out in C, a port at a time (`extension/source/pins.c`).
+The levels themselves are worked out in C, a port at a time (`extension/source/fabric/pins.c`).
 Invariant: `output` and `level` follow from the other attributes alone.
 """
 

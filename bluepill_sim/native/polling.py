@@ -1,4 +1,4 @@
-"""Which loops of one block may poll a counter: `source/polling.c` works out the round that leaves them.
+"""Which loops of one block may poll a counter: `source/core/polling.c` works out the round that leaves them.
 
 Such a block loads one word through a register that it does not write, computes with it and with what it does not
 write, and branches to its own start by the flags of the last step. So whether it goes round depends on the word alone,

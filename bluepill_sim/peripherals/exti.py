@@ -3,7 +3,7 @@
 Modelled: lines 0 to 18, both edges, software triggers, events (they set the
 event register that WFE waits for). An edge is seen without any clock, as on
 silicon. Lines 16 (PVD), 17 (RTC alarm) and 18 (USB wake-up) are inputs 0 to 2
-of the device, for the line of their source. What it does is `extension/source/exti.c`.
+of the device, for the line of their source. What it does is `extension/source/devices/exti.c`.
 
 Source: RM0008 section 10.
 Invariant: an IRQ is raised exactly while one of its lines is pending and unmasked.

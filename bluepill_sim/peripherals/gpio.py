@@ -2,7 +2,7 @@
 
 Modelled: all modes of CRL/CRH, pulls by ODR, open drain, atomic set/reset,
 the key sequence of LCKR. Not modelled: output speed, the two APB2 clocks of
-the input synchroniser. What reading IDR and writing ODR, BSRR or BRR does is `extension/source/gpio.c`.
+the input synchroniser. What reading IDR and writing ODR, BSRR or BRR does is `extension/source/devices/gpio.c`.
 
 A pin that the program configures as a floating input is checked a little
 later: it should be driven by then. What a program never configures floats

@@ -4,7 +4,7 @@ Theory of operation. DR hides two registers each way. A write fills TDR
 (TXE falls); as soon as the shift register is free it takes TDR over (TXE
 rises) and sends start, data, stop; at the end of the stop bit the character has
 gone out, and the next one follows without a gap, or TC rises. All of that is
-`extension/source/usart.c`; here is what is warned of, and what the far end makes of
+`extension/source/devices/usart.c`; here is what is warned of, and what the far end makes of
 a character. Those that have gone out are kept in C and handed to `sinks` in bulk.
 Switching TE on sends one idle character first. A received character is in DR
 when its stop bit has ended; one that finds RXNE still set is lost and raises

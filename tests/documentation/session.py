@@ -229,12 +229,12 @@ class Session:
     def _take_c(self, block: Block) -> None:
         file = self._keep(block) or self._folder / "tmp" / "block.c"
         file.write_text(block.text, encoding="utf-8")
-        is_firmware = '#include "fabric.h"' not in block.text  # else a device of the emulator
+        is_firmware = '#include "../fabric/fabric.h"' not in block.text  # else a device of the emulator
         compiler = shutil.which("arm-none-eabi-gcc" if is_firmware else "gcc")
         if compiler is None:
             self.missing.append(f"the C block of line {block.line}")
             return
-        headers = ROOT / ("robot_bench/firmware" if is_firmware else "bluepill_sim/extension/source")
+        headers = ROOT / ("robot_bench/firmware" if is_firmware else "bluepill_sim/extension/source/devices")
         flags = ["-mcpu=cortex-m3", "-mthumb"] if is_firmware else []
         flags += ["-Wall", "-Wextra", "-Werror", "-fsyntax-only", f"-I{headers}"]
         self._finish([compiler, *flags, str(file)], f"line {block.line}", [])

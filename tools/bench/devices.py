@@ -21,7 +21,7 @@ from bluepill_sim.fabric.registers import NATIVE, Peripheral, Register
 from simbase.timing import NS_PER_S
 
 HERE = Path(__file__).parent
-SOURCES = sorted((HERE.parents[1] / "bluepill_sim" / "extension" / "source").glob("*.c"))
+SOURCES = sorted((HERE.parents[1] / "bluepill_sim" / "extension" / "source").rglob("*.c"))
 #: Where TIM6 would stand on a larger chip.
 PLACE = "TIM6"
 PWM_S, DMA_S = (1.0, 0.2) if "--quick" in sys.argv else (20.0, 2.0)

@@ -16,7 +16,7 @@ from bluepill_sim.fabric.registers import NATIVE, Peripheral, Register
 from tests.bluepill_sim.machine import LOG, Machine
 
 ROOT = Path(__file__).resolve().parents[3]
-SOURCES = sorted((ROOT / "bluepill_sim" / "extension" / "source").glob("*.c"))
+SOURCES = sorted((ROOT / "bluepill_sim" / "extension" / "source").rglob("*.c"))
 GPIOA_IDR, BUFFER, WORDS = 0x4001_0808, 0x2000_3000, 16
 
 pytestmark = pytest.mark.skipif(shutil.which("gcc") is None, reason="no C compiler")

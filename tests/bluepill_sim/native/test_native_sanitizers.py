@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-SOURCES = sorted((Path(__file__).parents[3] / "bluepill_sim" / "extension" / "source").glob("*.c"))
+SOURCES = sorted((Path(__file__).parents[3] / "bluepill_sim" / "extension" / "source").rglob("*.c"))
 UNOPTIMISED = Path(__file__).parents[1] / "firmware" / "unoptimised.elf"
 COMPILER = shutil.which("gcc")
 PROGRAM = """

@@ -36,7 +36,7 @@ def scratch(tmp_path_factory: pytest.TempPathFactory) -> Path:
         name = block.text.split("\n")[0].strip("/*# ").split(":")[0]
         (folder / name).write_text(block.text, encoding="utf-8")
     put_rows(folder / "bluepill_sim" / "stm32f103.py", *rows.text.splitlines())
-    sources = sorted((folder / "bluepill_sim" / "extension" / "source").glob("*.c"))
+    sources = sorted((folder / "bluepill_sim" / "extension" / "source").rglob("*.c"))
     library = folder / "bluepill_sim" / "_native.so"
     command = ["gcc", "-shared", "-fPIC", "-std=c11", "-Wall", "-Wextra", "-Werror", *map(str, sources), "-o", library]
     subprocess.run(command, check=True, timeout=100)

@@ -7,7 +7,7 @@
 #include <stddef.h>
 #include <string.h>
 
-#include "fabric.h"
+#include "../fabric/fabric.h"
 #include "system.h"
 
 enum { NMI = 2, MEM_MANAGE = 4, PENDSV = 14, SYSTICK = 15, FIRST_IRQ = 16, IRQ_COUNT = 43 };

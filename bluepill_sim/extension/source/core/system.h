@@ -5,7 +5,7 @@
 #include <stdbool.h>
 #include <stdint.h>
 
-#include "layout.h"
+#include "../fabric/layout.h"
 
 /* What an access to it was, and what is left to whoever made it. */
 enum system_answer {

@@ -5,7 +5,7 @@
  * Invariant: a character ends floor(frame half-bits * BRR * 10**9 / (2 * PCLK)) ns after the point from which its run
  * of characters is counted.
  */
-#include "fabric.h"
+#include "../fabric/fabric.h"
 
 /* Registers by offset / 4, and the hidden words behind them: SR at its last read (half of the sequence that clears a
  * flag), what stands behind the shift register, what is in it (0: nothing), and what DR reads. */

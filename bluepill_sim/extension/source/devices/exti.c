@@ -4,7 +4,7 @@
  * Source: RM0008 10.
  * Invariant: an interrupt is raised exactly while one of its lines is pending and unmasked.
  */
-#include "fabric.h"
+#include "../fabric/fabric.h"
 
 enum { IMR, EMR, RTSR, FTSR, SWIER, PR, PIN_LINES = 0xFFFF, ALL = 0x7FFFF };
 

@@ -3,7 +3,7 @@
  * It costs nothing between two wraps. The reference clock is HCLK / 8, as an STM32F103 wires it (RM0008 7.2, clock
  * tree). Source: ARMv7-M Architecture Reference Manual B3.3.
  */
-#include "fabric.h"
+#include "../fabric/fabric.h"
 #include "system.h"
 
 enum { CTRL, LOAD, VAL, CALIB };

@@ -33,7 +33,7 @@ struct instruction {
 };
 _Static_assert(sizeof(struct instruction) == 20, "instruction");
 
-/* A counter that follows from the time: `source/ramp.c`. */
+/* A counter that follows from the time: `source/core/ramp.c`. */
 struct ramp {
     uint64_t base; /* when it had `value`, in the units of its owner, */
     uint32_t value;

@@ -2,7 +2,7 @@
  *
  * Source: RM0008 9.2.
  */
-#include "fabric.h"
+#include "../fabric/fabric.h"
 
 enum { ODR = 3, BSRR = 4, BRR = 5, ALL = 0xFFFF };
 

@@ -6,7 +6,7 @@
 #include <stddef.h>
 #include <stdint.h>
 
-#include "fabric.h"
+#include "../fabric/fabric.h"
 #include "system.h"
 
 #define NEVER (UINT64_C(1) << 62)
