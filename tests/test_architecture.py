@@ -233,7 +233,6 @@ LONG_FOLDERS = {
     "p2os/robots": "one TOML file a robot, beside the loader that finds them",
     "robot_bench/firmware": "the sources and programs of the examples, built by one command",
     "docs": "one page a subject",
-    "bluepill_sim/extension/source/devices": "one C file a device, found by pattern",
     "tests/adapter_fw": "one rig, many runs of the same firmware",
     "tests/bluepill_sim/core": "one assembled machine for all of them",
     "tests/golden": "recordings",

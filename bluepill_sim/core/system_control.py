@@ -1,4 +1,4 @@
-"""The private peripheral bus, as `extension/source/core/scs.c` has it: SCB, NVIC and SysTick registers, DWT, DEMCR, DBGMCU.
+"""The private peripheral bus (`extension/source/core/scs.c`): registers of SCB, NVIC, SysTick, DWT, DEMCR, DBGMCU.
 
 Here stands what C leaves to its caller: requests to the chip, warnings, what traps, and who is told of what.
 Not modelled: the MPU (MPU_TYPE reads 0), FPB, ITM, TPIU.

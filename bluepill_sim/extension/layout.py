@@ -1,7 +1,7 @@
 """The structs that C and Python share, declared once.
 
-`tools/generate_layout.py` writes them as `source/fabric/layout.h`; `structure` makes the ctypes class of the same fields. Both
-sides keep the natural alignment of the machine, and `library.py` refuses a library whose sizes are others.
+`tools/generate_layout.py` writes them as `source/fabric/layout.h`; `structure` makes the ctypes class of the same
+fields. Both sides keep the natural alignment of the machine, and `library.py` refuses a library whose sizes are others.
 
 Invariant: a struct holds numbers and arrays of them, no pointers: what it holds can be saved as bytes.
 """
