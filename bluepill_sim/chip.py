@@ -142,11 +142,6 @@ class Chip(Stateful):
         """The accessing instruction, else the next one."""
         return self.engine.access_pc
 
-    @property
-    def time_base(self) -> tuple[int, Nanos, int]:
-        """The present frequency in Hz, and the time in ns and the cycle from which it counts."""
-        return self._clock.base
-
     def ns_of(self, cycle: int) -> Nanos:
         """Return when a cycle of the present frequency began."""
         return self._clock.ns_of(cycle)

@@ -15,7 +15,7 @@ from simbase.timing import Nanos
 #: HFSR bits.
 HFSR_VECTTBL, HFSR_FORCED, HFSR_DEBUGEVT = 1 << 1, 1 << 30, 1 << 31
 #: CFSR bits that say that BFAR and MMFAR hold an address.
-CFSR_BFARVALID, CFSR_MMARVALID = 1 << 15, 1 << 7
+CFSR_BFARVALID = 1 << 15
 
 
 class FaultKind(Enum):

@@ -51,12 +51,9 @@ VECTOR_COUNT = FIRST_IRQ + len(IRQ_NAMES)
 THREAD_PRIORITY = 256
 #: Priorities that cannot be set.
 FIXED_PRIORITIES = {1: -3, NMI: -2, HARD_FAULT: -1}
-#: An STM32F103 implements the upper four bits of a priority (PM0056 2.3.5).
-PRIORITY_MASK = 0xF0
 #: Lines that an STM32F10x can have; a medium-density part uses 43.
 IRQ_LINES = 60
 
-_IRQ_MASK = (1 << IRQ_LINES) - 1
 SYSTEM_EXCEPTIONS = (1 << FIRST_IRQ) - 1
 
 
@@ -102,14 +99,6 @@ class Nvic(Stateful):
     def pend(self, number: int) -> None:
         """Make an exception pending."""
         self.pending |= 1 << number
-
-    def unpend(self, number: int) -> None:
-        """Take an exception off the pending ones."""
-        self.pending &= ~(1 << number)
-
-    def clear_pending_irqs(self, irqs: int) -> None:
-        """Clear pending bits of interrupt lines; a line that is still high keeps its own."""
-        self.pending &= ~((irqs & ~(self.levels & ~self._active_irqs())) << FIRST_IRQ)
 
     def activate(self, number: int) -> None:
         """Note that the handler of an exception starts."""
@@ -158,13 +147,6 @@ class Nvic(Stateful):
     def can_preempt(self, number: int, execution_priority: int) -> bool:
         """Tell whether an exception may interrupt what runs at `execution_priority`."""
         return self.group_priority(self.priority(number)) < execution_priority
-
-    def set_priority(self, number: int, value: int) -> None:
-        """Set a priority byte; only the upper four bits exist."""
-        self.priorities[number] = value & PRIORITY_MASK
-
-    def _active_irqs(self) -> int:
-        return self.active >> FIRST_IRQ & _IRQ_MASK
 
 
 def exception_name(number: int) -> str:

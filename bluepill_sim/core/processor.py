@@ -106,9 +106,6 @@ class Processor(Stateful):
     bfar: int = field("bfar", "BFAR.")
     halts_on_bkpt: bool = flag("has_debugger", "Whether BKPT halts for a debugger; without one it is a fault.")
 
-    #: Whether SysTick's wraps are acted on within `run`; else the caller stops at each.
-    ticks_alone = False
-
     def __init__(self, engine: Engine, memory: Memory) -> None:
         self.engine = engine
         #: The state, shared with C.

@@ -408,10 +408,6 @@ class RegisterFile:
         self._value.value = value
         self._write(self._handle, register.value, self._at)
 
-    def general(self, number: int) -> int:
-        """Return R0 to R15 by number."""
-        return self[GENERAL[number]]
-
     def batch(self, *registers: Register) -> "Batch":
         """Return a list of registers to be moved together."""
         return Batch(self._library, self._handle, registers)

@@ -75,7 +75,6 @@ class PinMode(Enum):
 
 
 ALTERNATE_MODES = (PinMode.ALTERNATE_PUSH_PULL, PinMode.ALTERNATE_OPEN_DRAIN)
-INPUT_MODES = (PinMode.FLOATING, PinMode.PULLED)
 
 #: What a wire can be shorted to, and the level that it then has.
 RAILS = {"GND": False, "3V3": True}
@@ -290,11 +289,6 @@ class Pin:
         sources = self._struct.sources[self.number]
         is_first = bool(sources) and ALTERNATE_FUNCTIONS[(sources & -sources).bit_length() - 1] == source
         return is_first and self._has("alternate") and not self._has("held") and self.is_bonded
-
-    def is_listening(self) -> bool:
-        """Whether an alternate function can receive from this pin: an input that nobody holds."""
-        mode = self.mode
-        return (mode in INPUT_MODES or mode in ALTERNATE_MODES) and not self._has("held") and self.is_bonded
 
     def _has(self, name: str) -> bool:
         struct = self._struct if not self._struct.shown & self._bit else self._bank.fabric.look(self._port_index)

@@ -41,8 +41,6 @@ def make_core(measure: Measure, memory: Memory) -> tuple[Engine, Processor]:
 class NativeProcessor(Processor):
     """`Processor`; C runs, Python does what is out of the ordinary."""
 
-    ticks_alone = True
-
     def __init__(self, engine: Any, memory: Memory) -> None:
         self._native = engine
         super().__init__(engine, memory)

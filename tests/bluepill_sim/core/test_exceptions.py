@@ -223,7 +223,7 @@ def test_each_request_of_one_block_is_served_before_the_next_is_raised(
         {number: "handler"},
     ).run(200)
     assert machine.log == [3]
-    assert machine.board.chip.engine.registers.general(5) == 3
+    assert machine.board.register(f"R{5}") == 3
 
 
 @pytest.mark.parametrize("core", CORES)
@@ -323,3 +323,27 @@ def test_what_aircr_keeps_for_debuggers_is_ignored_and_warned_of(run, bit: int) 
     machine = run(store(AIRCR, 0x05FA0000 | bit) + "log #1")
     assert machine.log == [1]
     assert len(machine.board.warnings) == 1
+
+
+@pytest.mark.parametrize("core", ["native", "python"])
+def test_a_line_that_is_high_keeps_its_interrupt_pending(core: str, boot, monkeypatch: pytest.MonkeyPatch) -> None:
+    """ICPR clears what no line holds; of an active interrupt the line comes again when its handler returns."""
+    monkeypatch.setenv("P2OS_CORE", core)
+    chip = boot("nop").board.chip
+    ispr1, icpr1, usart1 = 0xE204, 0xE284, 37
+
+    def pending() -> bool:
+        return bool(chip.system.read(ispr1, 4) >> usart1 - 32 & 1)
+
+    chip.fabric.set_line(usart1, True)
+    chip.system.write(icpr1, 4, 1 << usart1 - 32)
+    assert pending()
+    chip.processor.nvic.activate(16 + usart1)
+    chip.processor.nvic.pend(16 + usart1)
+    chip.system.write(icpr1, 4, 1 << usart1 - 32)
+    assert not pending(), "the handler runs"
+    chip.processor.nvic.deactivate(16 + usart1)
+    assert pending(), "and has returned"
+    chip.fabric.set_line(usart1, False)
+    chip.system.write(icpr1, 4, 1 << usart1 - 32)
+    assert not pending()
