@@ -2,6 +2,7 @@
 
 import pytest
 
+from bluepill_sim.core import Register
 from bluepill_sim.extension.library import library_path
 
 ICSR, AIRCR, SHPR3, ISER0, ISPR0, IPR0, STIR = (
@@ -223,7 +224,7 @@ def test_each_request_of_one_block_is_served_before_the_next_is_raised(
         {number: "handler"},
     ).run(200)
     assert machine.log == [3]
-    assert machine.board.register(f"R{5}") == 3
+    assert machine.board.register("R5") == 3
 
 
 @pytest.mark.parametrize("core", CORES)
@@ -248,8 +249,8 @@ def test_a_debugger_changes_nothing_where_a_request_ends_a_block(
             seen.append((chip.engine.pc, chip.engine.cycle))
             if chip.engine.pc == stop and not chip.processor.nvic.pending:
                 break
-        general = chip.engine.registers.general
-        ends.append((chip.engine.pc == stop, chip.engine.cycle, general(5), general(6)))
+        registers = chip.engine.registers
+        ends.append((chip.engine.pc == stop, chip.engine.cycle, registers[Register.R5], registers[Register.R6]))
         assert len(seen) == len(set(seen)), "each step gets somewhere"
     assert ends[0] == ends[1] == ends[2]
     assert ends[0][2:] == (3, 3)
