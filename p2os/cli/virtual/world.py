@@ -163,7 +163,7 @@ def convert(
     up: UP = "auto",
     force: FORCE = False,
 ) -> None:
-    """Write a world as TOML, to be changed by hand; or a world, a robot or both for another program.
+    """Write a world as TOML, or world and robot for another program.
 
     The ending names the format: .toml, .sdf, .urdf, .xml (MuJoCo's MJCF), .gltf
     or .glb. What the format does not hold is said, a line each.

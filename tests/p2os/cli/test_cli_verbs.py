@@ -110,14 +110,11 @@ def test_the_columns_of_doctor_hold_every_row(monkeypatch: pytest.MonkeyPatch) -
 
 
 def test_doctor_tells_what_was_compiled(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.delenv("P2OS_CORE", raising=False)
     assert doctor.built_part("p2os.transport") == "built"
     assert doctor.built_part("p2os.no_such_part") is None
     assert doctor.built_part("no_such_package.part") is None
     monkeypatch.setattr(doctor, "find_spec", lambda _name: object())
     assert doctor.built_part("bluepill_sim._native") == "built"
-    monkeypatch.setenv("P2OS_CORE", "python")
-    assert doctor.built_part("bluepill_sim._native") == "built, not used: P2OS_CORE=python"
 
 
 @pytest.mark.parametrize(
