@@ -114,8 +114,10 @@ def use_fleet(path: Path, _rng: random.Random) -> None:
     """Read a fleet, and make it where it is small."""
     order = load_fleet(path)
     if len(order.robots) <= 3:
-        for robot in make_fleet(order).robots:
-            robot.advance_to(300 * NS_PER_MS)
+        fleet = make_fleet(order)
+        together = fleet.multi_robot_world
+        for part in fleet.robots if together is None else [together]:
+            part.advance_to(300 * NS_PER_MS)
 
 
 def _room() -> World:

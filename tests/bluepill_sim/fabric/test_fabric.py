@@ -97,9 +97,10 @@ class Queue(RuleBasedStateMachine):
         if slot in self.due:
             at = self.due[slot]
             self.acted.clear()
-            self.fabric.catch_up(slot, at - early)
-            assert self.acted == ([] if early else [(at, slot)])
-            if not early:
+            self.fabric.catch_up(slot, max(0, at - early))
+            is_early = early and at > 0
+            assert self.acted == ([] if is_early else [(at, slot)])
+            if not is_early:
                 del self.due[slot]
 
     @invariant()

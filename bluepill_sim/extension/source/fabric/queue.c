@@ -84,7 +84,7 @@ void run_events(struct fabric *fabric, uint64_t until_ns)
 {
     const uint64_t before = fabric->event_ns;
     uint64_t due;
-    while ((due = fabric_next_ns(fabric)) <= until_ns) {
+    while ((due = fabric_next_ns(fabric)) != NO_TIME && due <= until_ns) {
         fabric->event_ns = due;
         for (uint32_t n = 0; n < fabric->slot_count; ++n) {
             if (fabric->slots[n].ns == due && !fabric->slots[n].is_acting) {
@@ -105,7 +105,7 @@ void fabric_run_events(struct fabric *fabric, uint64_t until_ns) { run_events(fa
 void fabric_catch_up(struct fabric *fabric, uint32_t number, uint64_t until_ns)
 {
     struct slot *slot = &fabric->slots[number];
-    while (slot->ns <= until_ns && !slot->is_acting) { /* its own event may reach its own registers by the bus */
+    while (slot->ns != NO_TIME && slot->ns <= until_ns && !slot->is_acting) { /* its own event may reach its own registers by the bus */
         const uint64_t before = fabric->event_ns, due = slot->ns;
         fabric->event_ns = due;
         act(fabric, slot);
