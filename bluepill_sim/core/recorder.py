@@ -17,12 +17,12 @@ Invariant: rows are in the order of time and independent of the caller's slices;
 the same run leaves the same rows, on both executors, recorded or not.
 """
 
-import struct
 from collections import deque
 from collections.abc import Callable
 from typing import Protocol
 
-from bluepill_sim.extension.layout import LAST_ROWS
+from bluepill_sim.extension import layout
+from bluepill_sim.extension.layout import LAST_ROWS, packing
 from simbase.state import Stateful
 
 #: Kinds of rows that are not the number of an entered exception.
@@ -31,7 +31,7 @@ BLOCK, EXCEPTION_RETURN = 0, -1
 #: Cycle, address, kind.
 BlockRow = tuple[int, int, int]
 #: A row as bytes (`struct record` of extension/layout.py).
-RECORD = struct.Struct("<QIi")
+RECORD = packing(layout.RECORD)
 
 
 class BlockRecorder:

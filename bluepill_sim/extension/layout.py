@@ -9,6 +9,7 @@ Invariant: a struct holds numbers and arrays of them, no pointers: what it holds
 import ctypes
 from dataclasses import dataclass
 from functools import cache
+from struct import Struct as Packing
 from typing import Any
 
 #: How many ports the chip has, and pins each port.
@@ -226,6 +227,10 @@ _KINDS: dict[str, Any] = {
 }  # fmt: skip
 
 
+#: The letters of the module `struct`.
+_LETTERS = {"u8": "B", "u16": "H", "u32": "I", "u64": "Q", "i32": "i"}
+
+
 @cache
 def structure(struct: Struct) -> type[ctypes.Structure]:
     """Return the ctypes class of a struct."""
@@ -234,6 +239,15 @@ def structure(struct: Struct) -> type[ctypes.Structure]:
         inner = _KINDS.get(field.kind) or structure(next(one for one in STRUCTS if one.name == field.kind))
         rows.append((field.name, inner if field.count is None else inner * field.count))
     return type(struct.name, (ctypes.Structure,), {"_fields_": rows, "__doc__": struct.doc})
+
+
+@cache
+def packing(struct: Struct) -> Packing:
+    """Return how rows of a struct without arrays lie in bytes, which `iter_unpack` reads faster than ctypes does."""
+    made = Packing("=" + "".join(_LETTERS[field.kind] for field in struct.fields))
+    if made.size != ctypes.sizeof(structure(struct)):
+        raise ValueError(f"{struct.name} has gaps: name them")
+    return made
 
 
 def header() -> str:

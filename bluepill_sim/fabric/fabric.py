@@ -10,19 +10,17 @@ times), so that a snapshot is made of bytes and numbers.
 """
 
 import ctypes
-import struct
 import weakref
 from collections.abc import Callable, Iterable
 from typing import Any, Protocol, TypeVar
 
-from bluepill_sim.extension.layout import PORT, PORTS, SOURCES, WAVE, structure
+from bluepill_sim.extension.layout import PORT, PORTS, SENT, SOURCES, WAVE, packing, structure
 from bluepill_sim.extension.library import library
+from bluepill_sim.extension.windows import NO_TIME
 from bluepill_sim.fabric.subscriptions import EDGE
 from simbase.state import Stateful
 from simbase.timing import Nanos
 
-#: What stands for "never" among times.
-NO_TIME = (1 << 64) - 1
 #: Lines, and how many words of 64 of them there are (`LINES` of fabric.h); rows show a line as a pin behind the last.
 LINES, LINE_WORDS, FIRST_LINE_ROW = 192, 3, 16 * PORTS
 #: Commands of every device (`enum command`), and the first of its own.
@@ -31,7 +29,7 @@ RESET, CLOCK, ROUTE, OWN_COMMANDS = 0, 1, 2, 16
 NO_LEVEL = 2
 
 #: A word that has gone out (`struct sent`): ns, the word, clock in Hz, divider, format.
-WORD = struct.Struct("<QIIII")
+WORD = packing(SENT)
 PortStruct, WaveStruct = structure(PORT), structure(WAVE)
 _U32, _U64, _USER = ctypes.c_uint32, ctypes.c_uint64, ctypes.c_void_p
 _CYCLE = ctypes.CFUNCTYPE(_U64, _USER)

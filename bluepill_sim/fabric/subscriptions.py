@@ -12,23 +12,24 @@ Invariant: every edge of a subscribed pin reaches each sink once, in order of ti
 without subscribers, but for the slices that they end.
 """
 
-import struct
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from enum import Enum
 from typing import Protocol
 
+from bluepill_sim.extension import layout
+from bluepill_sim.extension.layout import packing
 from simbase.timing import NS_PER_S, Nanos
 
 #: A row: ns, number of the pin (16 times the port, A = 0, and the pin's number in it), what the chip itself puts on the
 #: wire (index in `PinDrive`), what the wire is then (`LOW`, `HIGH`, `FLOATING`), 0 for an edge or `WAVE_ROW`
 #: (drive and wire are then those of the low phase, and above them by 4 bits those of the high one), and 0.
-EDGE = struct.Struct("<QBBBBI")
+EDGE = packing(layout.EDGE)
 #: The third of them.
 LOW, HIGH, FLOATING = range(3)
 WAVE_ROW = 1
-#: What follows a row of a wave: ns, ticks from a rising edge to there, period and high time in ticks, ticks a second.
-_WAVE = struct.Struct("<QQQQI12x")
+#: What follows a row of a wave: the first five fields are those of `Wave`.
+_WAVE = packing(layout.WAVE)
 
 #: Takes whole rows of `EDGE`.
 EdgeSink = Callable[[bytes], None]
@@ -82,7 +83,7 @@ def read_rows(rows: bytes) -> Iterator[Row]:
         ns, pin, drive, wire, kind, _ = EDGE.unpack_from(rows, at)
         at += EDGE.size
         if kind == WAVE_ROW:
-            yield ns, pin, drive & 15, wire & 15, Wave(*_WAVE.unpack_from(rows, at))
+            yield ns, pin, drive & 15, wire & 15, Wave(*_WAVE.unpack_from(rows, at)[:5])
             at += _WAVE.size
         else:
             yield ns, pin, drive, wire, None

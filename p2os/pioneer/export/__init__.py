@@ -1,7 +1,7 @@
 """Worlds and robots written for other programs: SDF, URDF, MJCF, glTF.
 
 One description (`scene`), made of a world and a robot (`scenes`), is what every writer walks; `formats` is the
-table of writers and of what each format holds. ARIA maps are plans, and have a writer of their own.
+table of writers and of what each format holds.
 """
 
 from p2os.pioneer.export.export import Export, export

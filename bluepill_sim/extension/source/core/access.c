@@ -300,9 +300,7 @@ static void write_device(struct core *core, struct page *page, uint32_t index, u
     if (needs_time && !begin_access(core, address, true, size)) {
         return;
     }
-    const uint32_t before = page->words[index], *mask = page->masks[index];
-    page->words[index] = (before & mask[0] & ~(written & mask[2]) & (written | ~mask[3])) | (written & mask[1]);
-    kind->write(device, index, written, before);
+    kind->write(device, index, written, store(page, index, written));
     if (needs_time) {
         core->shared.in_access = 0;
     } else {
@@ -477,8 +475,7 @@ void core_write_io(void *unicorn, uint64_t at, unsigned size, uint64_t value, vo
         written = (written & 0xFFFF) * 0x10001u;
     }
     if (page->behaviour[index] & WRITES_PLAIN) {
-        const uint32_t *mask = page->masks[index], before = page->words[index];
-        page->words[index] = (before & mask[0] & ~(written & mask[2]) & (written | ~mask[3])) | (written & mask[1]);
+        store(page, index, written);
         skip(region->core, region->base + offset, true, size);
     } else if (page->behaviour[index] & WRITES_NATIVE) {
         write_device(region->core, page, index, region->base + offset, size, written);

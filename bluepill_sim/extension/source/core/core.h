@@ -115,6 +115,14 @@ struct page {
 /* The word that latches what is read stands above the bits; 0 for none. */
 enum behaviour { READS_PLAIN = 1, WRITES_PLAIN = 2, READS_NATIVE = 4, WRITES_NATIVE = 8, HALFWORDS = 16, LATCH_SHIFT = 5 };
 
+/* Stores a word in a register as its masks say; returns what stood there. */
+static inline uint32_t store(struct page *page, uint32_t index, uint32_t written)
+{
+    const uint32_t previous = page->words[index], *mask = page->masks[index];
+    page->words[index] = (previous & mask[0] & ~(written & mask[2]) & (written | ~mask[3])) | (written & mask[1]);
+    return previous;
+}
+
 /* Memory that is freed with the core. */
 struct allocation {
     struct allocation *next;

@@ -64,12 +64,10 @@ static bool registers(void *user, struct bus_access *access)
     const uint32_t behaviour = page->behaviour[index];
     fabric_catch_up(core->fabric, page->device->slot, now_ns(core->fabric));
     if (access->is_write) {
-        const uint32_t previous = page->words[index], *mask = page->masks[index];
         if (access->bytes != 4 || !(behaviour & (WRITES_PLAIN | WRITES_NATIVE))) {
             return false;
         }
-        page->words[index] = (previous & mask[0] & ~(access->word & mask[2]) & (access->word | ~mask[3])) |
-                             (access->word & mask[1]);
+        const uint32_t previous = store(page, index, access->word);
         if (behaviour & WRITES_NATIVE) {
             kind->write(page->device, index, access->word, previous);
         }
