@@ -7,7 +7,6 @@ import os
 import pty
 import re
 import signal
-import socket
 import subprocess
 import sys
 import time
@@ -205,18 +204,13 @@ def test_odometry_wraps_without_a_jump() -> None:
 @pytest.fixture(params=["tcp"])
 def robot(request: pytest.FixtureRequest, tmp_path: Path) -> Iterator[tuple[str, subprocess.Popen[str]]]:
     """A virtual robot of its own process, on a free TCP port or a pseudo terminal."""
-    url = f"pty:{tmp_path}/robot"
-    if request.param == "tcp":
-        with socket.socket() as probe:
-            probe.bind(("127.0.0.1", 0))
-            url = f"tcp:127.0.0.1:{probe.getsockname()[1]}"
+    port = "tcp:127.0.0.1:0" if request.param == "tcp" else f"pty:{tmp_path}/robot"
     process = subprocess.Popen(
-        [*COMMAND, "serve", "--port", url, "--body", "kinematic", "--json"],
+        [*COMMAND, "serve", "--port", port, "--body", "kinematic", "--json"],
         stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
     )  # fmt: skip
     assert process.stdout is not None
-    assert json.loads(process.stdout.readline())
-    yield url, process
+    yield json.loads(process.stdout.readline())["url"], process
     process.send_signal(signal.SIGINT)
     process.communicate(timeout=20)
 
