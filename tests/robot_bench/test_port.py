@@ -215,6 +215,14 @@ def robot(request: pytest.FixtureRequest, tmp_path: Path) -> Iterator[tuple[str,
     process.communicate(timeout=20)
 
 
+def wait_until_recorded(run: Path) -> None:
+    """Wait until a run has recorded what came from the robot; a busy machine takes long to begin."""
+    ends = time.monotonic() + 60
+    while not any('"c2r"' in trace.read_text() for trace in run.glob("trace.jsonl")):
+        assert time.monotonic() < ends, "the run never began"
+        time.sleep(0.1)
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("robot", ["tcp", "pty"], indirect=True)
 def test_the_emulated_bluepill_drives_a_served_robot(
@@ -247,7 +255,7 @@ def test_a_robot_that_vanishes_ends_the_run_with_1(
     url, process = robot
     command = [*COMMAND, "run", "motors", "--port", url, "--yes", "--out", "run", "--json"]
     run = subprocess.Popen(command, cwd=tmp_path, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
-    time.sleep(4)
+    wait_until_recorded(tmp_path / "run")
     process.kill()
     out, err = run.communicate(timeout=60)
     assert run.returncode == 1, err
@@ -264,7 +272,7 @@ def test_a_signal_stops_a_served_robot_and_ends_with_130(
 ) -> None:
     command = [*COMMAND, "run", "motors", "--port", robot[0], "--yes", "--out", "run", "--json"]
     run = subprocess.Popen(command, cwd=tmp_path, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
-    time.sleep(5)
+    wait_until_recorded(tmp_path / "run")
     run.send_signal(number)
     out, err = run.communicate(timeout=60)
     assert run.returncode == 130, err
@@ -288,7 +296,7 @@ def test_a_terminal_that_is_held_holds_up_neither_the_run_nor_its_end(
     command = [*COMMAND, "run", "motors", "--port", robot[0], "--yes", "--out", "run", "--json"]
     run = subprocess.Popen(command, cwd=tmp_path, stdout=subprocess.PIPE, stderr=inside, text=True)
     os.close(inside)
-    time.sleep(4)
+    wait_until_recorded(tmp_path / "run")
     run.send_signal(signal.SIGTERM)
     out, _ = run.communicate(timeout=60)
     os.close(terminal)
