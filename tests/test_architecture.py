@@ -81,7 +81,7 @@ LAYERS = {
         ("masters", "driver"), ("adapter",),
     ),
     "robot_bench": (
-        ("loop", "pacer", "firmware", "scenarios"), ("wires",), ("direct", "board_test"), ("recording",),
+        ("loop", "pacer", "firmware", "scenarios"), ("wires",), ("direct",), ("recording",),
         ("scenario", "report"),
         ("adapter",), ("bench",), ("remote",), ("run", "debugging", "project"), ("cli",),
     ),

@@ -10,10 +10,10 @@ from adapter_sim.pinout import Pinout, load_pinout
 from p2os.cli.help_pages import BENCH
 from p2os.transport import Transport, open_url
 from p2os.transport.waiting import wait_for_bytes
-from robot_bench.board_test.circuit import EN, Fault, FaultKind, Side
-from robot_bench.board_test.ends import AdapterEnd, BluePillEnd
-from robot_bench.board_test.verdicts import Finding, Verdict, judge
-from robot_bench.board_test.walk import Walk
+from robot_bench.wires.board_test.circuit import EN, Fault, FaultKind, Side
+from robot_bench.wires.board_test.ends import AdapterEnd, BluePillEnd
+from robot_bench.wires.board_test.verdicts import Finding, Verdict, judge
+from robot_bench.wires.board_test.walk import Walk
 from simbase.errors import UsageError
 
 BLUEPILL_BAUD, ADAPTER_BAUD = 57_600, 115_200
@@ -101,7 +101,7 @@ def fault_of(text: str, pinout: Pinout) -> Fault:
 
 def _emulated(pinout: Pinout, faults: list[str]) -> list[Finding]:
     planted = tuple(fault_of(text, pinout) for text in faults)
-    from robot_bench.board_test.emulated import REVISION, EmulatedBoard
+    from robot_bench.wires.board_test.emulated import REVISION, EmulatedBoard
 
     board = EmulatedBoard(planted)
     return judge(Walk(board.bluepill_end, board.adapter_end, pinout).measure(), pinout, REVISION)

@@ -5,7 +5,7 @@ from pathlib import Path
 from adapter_sim.pinout import Direction, Pinout, WireRole, load_pinout
 from p2os.protocol.commands import Command
 from p2os.protocol.frames import Frame
-from robot_bench.board_test.esp32 import CONSOLE, ROBOT, Esp32
+from robot_bench.wires.board_test.esp32 import CONSOLE, ROBOT, Esp32
 from tests.adapter_sim.conftest import FakeRobot
 
 PINOUT = load_pinout()

@@ -6,7 +6,7 @@ import pytest
 
 from tests.adapter_fw.builds import load_script
 
-SIZES = load_script("adapter_fw/function_sizes.py")
+SIZES = load_script("adapter_fw/selftest/function_sizes.py")
 Size = SIZES.Size
 LIMITS = {"core/a f()": Size(48, 32)}
 

@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from adapter_sim.pinout import Direction, WireRole
-from robot_bench.board_test.esp32 import CONSOLE, NvsFault, ResetReason
+from robot_bench.wires.board_test.esp32 import CONSOLE, NvsFault, ResetReason
 from tests.adapter_fw.builds import built
 from tests.adapter_fw.shell import PINOUT, Shell, pad_of
 from tests.adapter_sim.conftest import FakeRobot

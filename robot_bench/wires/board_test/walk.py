@@ -13,13 +13,13 @@ Invariant: what is measured does not depend on the wires measured before it.
 from dataclasses import dataclass, field
 
 from adapter_sim.pinout import Direction, Pinout, WireRole
-from robot_bench.board_test.ends import AdapterEnd, BluePillEnd, BoardTestError
+from robot_bench.wires.board_test.ends import AdapterEnd, BluePillEnd, BoardTestError
 
 GREETINGS = 3
 #: Tries of `test on` after a reset. chosen: with a console that waits 0.2 s, more than any ESP32 needs to boot.
 BOOT_TRIES = 15
-#: chosen: each takes 2 ms at the least, and the pattern 9 ms at 9600 baud.
-LINK_TRIES = 10
+#: chosen: each takes a millisecond at the least, and the pattern 9 ms at 9600 baud.
+LINK_TRIES = 40
 #: Sent on the robot's line, which returns it where its pins 2 and 3 are joined. No header of a P2OS frame is in it.
 PATTERN = bytes.fromhex("55aa00ff0f5a33cc")
 
@@ -177,6 +177,8 @@ class Walk:
         result.link = b""
         for _ in range(LINK_TRIES):
             result.link += self._adapter.received()
+            if len(result.link) >= len(PATTERN):
+                break
         pad = self._adapter.pad()
         if pad is not None and pad.reports is not None:
             result.has_pad, result.pad_reports = True, pad.reports

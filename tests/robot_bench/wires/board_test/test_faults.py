@@ -6,9 +6,9 @@ import pytest
 
 from adapter_sim.pinout import Direction, load_pinout
 from hardware.pcb.circuit.modules import BLUEPILL_PINS, ESP32_PINS
-from robot_bench.board_test.circuit import Fault, FaultKind, Side
-from robot_bench.board_test.verdicts import Finding, Verdict
-from tests.robot_bench.board_test.conftest import Tested
+from robot_bench.wires.board_test.circuit import Fault, FaultKind, Side
+from robot_bench.wires.board_test.verdicts import Finding, Verdict
+from tests.robot_bench.wires.board_test.conftest import Tested
 
 PINOUT = load_pinout()
 WIRES = [wire.name for wire in PINOUT.wires]

@@ -1,4 +1,4 @@
-"""Flash and stack of each function of the core against committed limits: `python adapter_fw/function_sizes.py`.
+"""Flash and stack of each function of the core against limits: `python adapter_fw/selftest/function_sizes.py`.
 
 The core is compiled as for the Xtensa self-test (build.py): `nm` says what a function takes of flash, the compiler what
 it takes of the stack (-fstack-usage); constants and variables stand in the table too. A limit is what was measured when
@@ -54,8 +54,8 @@ class Size:
 def builder() -> ModuleType:
     """Return build.py, which knows the compiler and its flags."""
     if "adapter_fw_build" not in sys.modules:
-        spec = importlib.util.spec_from_file_location("adapter_fw_build", HERE / "build.py")
-        assert spec is not None and spec.loader is not None  # noqa: PT018, S101 - it stands beside this file
+        spec = importlib.util.spec_from_file_location("adapter_fw_build", HERE.parent / "build.py")
+        assert spec is not None and spec.loader is not None  # noqa: PT018, S101 - it stands above this folder
         sys.modules["adapter_fw_build"] = module = importlib.util.module_from_spec(spec)
         spec.loader.exec_module(module)
     return sys.modules["adapter_fw_build"]

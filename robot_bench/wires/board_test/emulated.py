@@ -14,7 +14,7 @@ from bluepill_sim import BluePill
 from bluepill_sim.fabric.pins import PinDrive
 from bluepill_sim.fabric.subscriptions import EDGE
 from robot_bench import firmware
-from robot_bench.board_test.circuit import (
+from robot_bench.wires.board_test.circuit import (
     BLUEPILL_INPUT,
     BLUEPILL_PULL_OHM,
     EN,
@@ -29,8 +29,8 @@ from robot_bench.board_test.circuit import (
     Side,
     Source,
 )
-from robot_bench.board_test.ends import AdapterEnd, BluePillEnd, Line
-from robot_bench.board_test.esp32 import CONSOLE, NS_PER_US, ROBOT, Esp32
+from robot_bench.wires.board_test.ends import AdapterEnd, BluePillEnd, Line
+from robot_bench.wires.board_test.esp32 import CONSOLE, NS_PER_US, ROBOT, Esp32
 from robot_bench.wires.chip_pins import number_of
 from simbase.timing import Reason
 

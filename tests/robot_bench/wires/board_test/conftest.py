@@ -5,10 +5,10 @@ from pathlib import Path
 
 import pytest
 
-from robot_bench.board_test.circuit import Fault
-from robot_bench.board_test.emulated import REVISION, EmulatedBoard
-from robot_bench.board_test.verdicts import Finding, judge
-from robot_bench.board_test.walk import Walk
+from robot_bench.wires.board_test.circuit import Fault
+from robot_bench.wires.board_test.emulated import REVISION, EmulatedBoard
+from robot_bench.wires.board_test.verdicts import Finding, judge
+from robot_bench.wires.board_test.walk import Walk
 from tests.adapter_fw.builds import built
 
 Tested = Callable[..., list[Finding]]

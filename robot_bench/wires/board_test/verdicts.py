@@ -15,7 +15,7 @@ from dataclasses import dataclass
 from enum import Enum
 
 from adapter_sim.pinout import Direction, Pinout, Pull, Wire, WireRole
-from robot_bench.board_test.walk import PATTERN, Measurement, Response
+from robot_bench.wires.board_test.walk import PATTERN, Measurement, Response
 
 
 class Verdict(Enum):

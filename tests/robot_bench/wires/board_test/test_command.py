@@ -11,11 +11,11 @@ import pytest
 import typer
 from typer.testing import CliRunner
 
-from robot_bench.board_test import esp32
-from robot_bench.board_test.circuit import Fault, FaultKind, Side
-from robot_bench.board_test.emulated import PROGRAM, EmulatedBoard
-from robot_bench.board_test.esp32 import CONSOLE
 from robot_bench.cli import board as verb
+from robot_bench.wires.board_test import esp32
+from robot_bench.wires.board_test.circuit import Fault, FaultKind, Side
+from robot_bench.wires.board_test.emulated import PROGRAM, EmulatedBoard
+from robot_bench.wires.board_test.esp32 import CONSOLE
 from simbase.errors import UsageError
 
 Run = Callable[..., tuple[int, str]]

@@ -4,8 +4,8 @@ import pytest
 
 from adapter_sim.pinout import load_pinout
 from hardware.pcb.circuit.design import SERIES, SERIES_SPECIAL, build
-from robot_bench.board_test import circuit
-from robot_bench.board_test.circuit import EN, Circuit, Fault, FaultKind, Node, Side, Source
+from robot_bench.wires.board_test import circuit
+from robot_bench.wires.board_test.circuit import EN, Circuit, Fault, FaultKind, Node, Side, Source
 
 PINOUT = load_pinout()
 OHMS = {"1k2": 1200, "680R": 680, "20k": 20_000, "4k7": 4700, "47k": 47_000}
