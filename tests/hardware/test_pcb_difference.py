@@ -1,12 +1,13 @@
 """`python -m hardware.pcb diff`: what two boards do not share is said and drawn, and nothing else."""
 
 import xml.etree.ElementTree as ET
+from functools import cache
 from pathlib import Path
 
 import pytest
 
 from hardware.pcb.__main__ import main
-from hardware.pcb.outputs.difference import NEW, OLD, picture, read_source, words
+from hardware.pcb.outputs.difference import NEW, OLD, Board, picture, read_source, words
 from hardware.pcb.outputs.generated_files import GENERATED
 
 BOARD = GENERATED / "rev-b" / "rev-b.kicad_pcb"
@@ -24,13 +25,18 @@ def changed(tmp_path: Path):
     return change
 
 
+@cache
+def committed() -> Board:
+    return read_source("rev-b")
+
+
 def colours(svg: str) -> dict[str, int]:
     ET.fromstring(svg)  # noqa: S314 - made here
     return {colour: svg.count(f'"{colour}"') - 1 for colour in (OLD, NEW)}
 
 
 def test_a_board_has_no_difference_from_itself() -> None:
-    board = read_source("rev-b")
+    board = committed()
     assert len(board.parts) == 97
     assert words(board, board) == []
     assert colours(picture(board, board, ("a", "b"))) == {OLD: 0, NEW: 0}
@@ -48,7 +54,7 @@ def test_a_board_has_no_difference_from_itself() -> None:
     ],
 )
 def test_one_change_is_one_line_and_red_and_green(changed, before: str, after: str, said: str) -> None:
-    old, new = read_source("rev-b"), read_source(str(changed(before, after)))
+    old, new = committed(), read_source(str(changed(before, after)))
     assert any(line.startswith(said) for line in words(old, new)), words(old, new)
     drawn = colours(picture(old, new, ("a", "b")))
     assert drawn[OLD] == drawn[NEW]
@@ -57,7 +63,7 @@ def test_one_change_is_one_line_and_red_and_green(changed, before: str, after: s
 
 def test_turned_pads_stand_where_their_part_puts_them() -> None:
     """R1 is turned by 180 degrees or not: its pads must meet its tracks, whatever the angle."""
-    board = read_source("rev-b")
+    board = committed()
     ends = {(point, one.text) for one in board.strokes if one.layer == "F.Cu" for point in (one.start, one.end)}
     pads = [land for land in board.lands if len(land.layers) == 1 and land.net not in {"", "GND"}]
     assert len(pads) > 80

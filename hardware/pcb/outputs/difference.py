@@ -1,7 +1,8 @@
 """Two boards laid over each other: what only the first has in red, what only the second has in green, the rest in grey.
 
 Read from .kicad_pcb files, of this working tree, of another revision in git, or any others: parts with value and
-place, pads with their net, tracks, vias, silkscreen, outline. Left out: pours, which follow from the rest, and the arcs of the outline's corners.
+place, pads with their net, tracks, vias, silkscreen, outline. Left out: pours, which follow from the rest, and the arcs
+of the outline's corners.
 
 Invariant: a board laid over itself has no difference; the same two boards give the same bytes.
 """
