@@ -409,19 +409,28 @@ static void reset(struct device *device)
     refresh(device);
 }
 
+/* Goes on with the same count at another speed, from where the core does. */
+static void set_clock(struct device *device, uint32_t hz)
+{
+    struct tim *tim = tim_of(device);
+    const struct fabric *fabric = device->fabric;
+    const uint64_t now = now_ns(device->fabric), ns = now > fabric->time.ns ? now : fabric->time.ns;
+    if (tim->ticks.hz) {
+        synchronize(device, tick_at(&tim->ticks, ns));
+    } else {
+        tim->at = FIRST_TICK;
+    }
+    tim->ticks = (struct ticks){.ns = ns, .hz = hz, .tick = tim->at};
+    forget_outputs(device);
+}
+
 static uint32_t command(struct device *device, uint32_t what, uint32_t one, uint32_t other)
 {
     struct tim *tim = tim_of(device);
     switch (what) {
     case SETTLE: return settled(device, one);
     case RESET: reset(device); return 0;
-    case CLOCK: /* what was counted stays */
-        if (tim->ticks.hz) {
-            synchronize(device, tick_now(device));
-        }
-        tim->ticks = (struct ticks){.ns = device->fabric->time.ns, .hz = one, .tick = tim->ticks.hz ? tim->at : FIRST_TICK};
-        forget_outputs(device);
-        break;
+    case CLOCK: set_clock(device, one); break;
     case MOVE:
         if (tim->pins[one] != other && one < PIN_ETR) {
             offer(device->fabric, tim->pins[one], tim->sources[one], FLOATING);
