@@ -390,8 +390,8 @@ static void reset(struct device *device)
     struct tim *tim = tim_of(device);
     const struct tim was = *tim;
     memset(tim, 0, sizeof *tim);
-    tim->ticks = was.ticks;
-    tim->at = tick_now(device);
+    tim->ticks = (struct ticks){.ns = device->fabric->time.ns, .tick = FIRST_TICK, .hz = was.ticks.hz};
+    tim->at = FIRST_TICK;
     tim->base = was.base;
     tim->is_advanced = was.is_advanced;
     tim->trgo = was.trgo;
