@@ -159,7 +159,7 @@ static void tick(void)
     while (updates < 3) {
         __asm__ volatile("wfi");
     }
-    report("three-updates-us", ((TIM2->CNT - start) & 0xFFFF) / 100 * 100);
+    report("three-updates-us", (((TIM2->CNT - start) & 0xFFFF) + 50) / 100 * 100);
     TIM3->CR1 = TIM3->DIER = 0;
 }
 
@@ -174,7 +174,7 @@ static void poll_updates(void)
         }
         TIM3->SR = 0;
     }
-    report("two-polled-us", ((TIM2->CNT - start) & 0xFFFF) / 10 * 10);
+    report("two-polled-us", (((TIM2->CNT - start) & 0xFFFF) + 5) / 10 * 10);
     TIM3->CR1 = 0;
 }
 
@@ -213,7 +213,7 @@ int main(void)
     pulse_once();
     const uint32_t start = TIM2->CNT;
     wait_us(2000);
-    report("waited-us", ((TIM2->CNT - start) & 0xFFFF) / 10 * 10);
+    report("waited-us", (((TIM2->CNT - start) & 0xFFFF) + 5) / 10 * 10);
     for (const char *text = "ready\n"; *text; ++text) {
         put(*text);
     }
