@@ -31,6 +31,7 @@ from bluepill_sim.core.halts import ChipReached
 from bluepill_sim.core.nvic import HARD_FAULT, exception_name
 from bluepill_sim.errors import BluePillError, ImageError, UnmodelledError
 from bluepill_sim.fabric.pins import Pin, PinDrive
+from bluepill_sim.fabric.registers import RegisterView
 from bluepill_sim.fabric.subscriptions import EdgeSink, Of, PinSubscription
 from bluepill_sim.memory import Memory
 from bluepill_sim.peripherals.rcc import ResetCause
@@ -334,6 +335,19 @@ class BluePill(Stateful):
     def register(self, name: str) -> int:
         """Return a register by its name, such as "R0", "SP" or "XPSR"."""
         return self.chip.engine.registers[Register[name.upper()]]
+
+    def registers(self, peripheral: str) -> dict[str, RegisterView]:
+        """Return the registers of a peripheral by name, with their fields, as a read would find them; nothing changes.
+
+        `board.registers("TIM3")["CR1"]["CEN"]` is a field, `print(board.registers("TIM3")["CR1"])` shows them all.
+
+        Raises:
+            BluePillError: The emulated chip has no such peripheral.
+        """
+        parts = self.chip.parts.by_name
+        if peripheral not in parts:
+            raise BluePillError(f"no peripheral {peripheral!r}", hint=f"there are {', '.join(parts)}")
+        return parts[peripheral].view()
 
     def read_memory(self, address: int, size: int) -> bytes | None:
         """Return bytes of flash or SRAM; None where there is no memory."""

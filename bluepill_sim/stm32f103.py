@@ -22,6 +22,7 @@ from bluepill_sim.peripherals.flash import Flash
 from bluepill_sim.peripherals.gpio import Gpio
 from bluepill_sim.peripherals.iwdg import Iwdg
 from bluepill_sim.peripherals.rcc import Rcc, ResetCause
+from bluepill_sim.peripherals.tim import AdvancedTimer, GeneralTimer
 from bluepill_sim.peripherals.usart import Usart
 from bluepill_sim.peripherals.wwdg import Wwdg
 from simbase.state import Stateful
@@ -166,6 +167,10 @@ PERIPHERALS: tuple[tuple[_Maker, str], ...] = (
     (Usart, "USART3"),
     (Iwdg, "IWDG"),
     (Wwdg, "WWDG"),
+    (AdvancedTimer, "TIM1"),
+    (GeneralTimer, "TIM2"),
+    (GeneralTimer, "TIM3"),
+    (GeneralTimer, "TIM4"),
 )
 
 
@@ -182,6 +187,13 @@ WIRING: dict[str, tuple[int | str, ...]] = {
     "EXTI.3": (9,),
     "EXTI.4": (10,),
     "EXTI.9_5": (23,),
+    "TIM1.brk_irq": (24,),
+    "TIM1.up_irq": (25,),
+    "TIM1.trg_com_irq": (26,),
+    "TIM1.cc_irq": (27,),
+    "TIM2.irq": (28,),
+    "TIM3.irq": (29,),
+    "TIM4.irq": (30,),
     "USART1.irq": (37,),
     "USART2.irq": (38,),
     "USART3.irq": (39,),
@@ -192,6 +204,11 @@ WIRING: dict[str, tuple[int | str, ...]] = {
     "PWR.pvd": ("EXTI.pvd",),
     "RTC.alarm": ("EXTI.rtc_alarm",),
     "USB.wakeup": ("EXTI.usb_wakeup",),
+    # Internal triggers (RM0008 tables 82 and 86).
+    "TIM1.trgo": ("TIM2.itr0", "TIM3.itr0", "TIM4.itr0"),
+    "TIM2.trgo": ("TIM1.itr1", "TIM3.itr1", "TIM4.itr1"),
+    "TIM3.trgo": ("TIM1.itr2", "TIM2.itr2", "TIM4.itr2"),
+    "TIM4.trgo": ("TIM1.itr3", "TIM2.itr3", "TIM3.itr3"),
 }
 #: The first line that is no interrupt.
 _FIRST_INNER_LINE = 64

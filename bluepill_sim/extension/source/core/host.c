@@ -92,6 +92,8 @@ static bool holds_code(void *user, uint32_t address, uint32_t bytes)
     return core->code_places[at / 8] >> at % 8 & 1;
 }
 
+enum { DWT_CYCCNT = 0xE0001004, STK_VAL = 0xE000E018 };
+
 /* Puts the core under a fabric. */
 void core_join(struct core *core, struct fabric *fabric)
 {
@@ -99,4 +101,6 @@ void core_join(struct core *core, struct fabric *fabric)
     fabric->host = (struct host){.user = core, .cycle = cycle, .boundary = &core->shared.cycle, .set_irq = set_irq,
                                  .end_slice = end_slice, .due = due, .pc = pc, .signal = signal,
                                  .registers = registers, .holds_code = holds_code};
+    add_counter(fabric, DWT_CYCCNT, &core->shared.cyccnt, NULL);
+    add_counter(fabric, STK_VAL, &core->shared.tick, NULL);
 }

@@ -342,6 +342,7 @@ static uint32_t command(struct device *device, uint32_t what, uint32_t one, uint
         usart->rx_pin = other;
         break;
     case HEAR: return hear(device, one);
+    case SETTLE: return device->words[RDR] & WORD; /* DR */
     case CAN_HEAR: return can_receive(device);
     default: break;
     }
