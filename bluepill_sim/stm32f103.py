@@ -17,6 +17,7 @@ from bluepill_sim.fabric.pins import PinBank, PinPorts
 from bluepill_sim.fabric.ports import ChipPorts
 from bluepill_sim.fabric.registers import ClockBit, Peripheral, Place
 from bluepill_sim.peripherals.afio import Afio
+from bluepill_sim.peripherals.dma import Dma
 from bluepill_sim.peripherals.exti import Exti
 from bluepill_sim.peripherals.flash import Flash
 from bluepill_sim.peripherals.gpio import Gpio
@@ -161,6 +162,7 @@ PERIPHERALS: tuple[tuple[_Maker, str], ...] = (
     (Gpio, "GPIOD"),
     (Gpio, "GPIOE"),
     (Exti, "EXTI"),
+    (Dma, "DMA1"),
     (Usart, "USART1"),
     (Usart, "USART2"),
     (Usart, "USART3"),
@@ -168,6 +170,21 @@ PERIPHERALS: tuple[tuple[_Maker, str], ...] = (
     (Wwdg, "WWDG"),
 )
 
+
+#: The requests of each channel of DMA1 (RM0008 table 78).
+_REQUESTS = {
+    1: ("ADC1.dma", "TIM2.cc3_dma", "TIM4.cc1_dma"),
+    2: ("SPI1.rx_dma", "USART3.tx_dma", "TIM1.cc1_dma", "TIM2.up_dma", "TIM3.cc3_dma"),
+    3: ("SPI1.tx_dma", "USART3.rx_dma", "TIM1.cc2_dma", "TIM3.cc4_dma", "TIM3.up_dma"),
+    4: (
+        "SPI2.rx_dma", "USART1.tx_dma", "I2C2.tx_dma",
+        "TIM1.cc4_dma", "TIM1.trig_dma", "TIM1.com_dma", "TIM4.cc2_dma",
+    ),
+    5: ("SPI2.tx_dma", "USART1.rx_dma", "I2C2.rx_dma", "TIM1.up_dma", "TIM2.cc1_dma", "TIM4.cc3_dma"),
+    6: ("USART2.rx_dma", "I2C1.tx_dma", "TIM1.cc3_dma", "TIM3.cc1_dma", "TIM3.trig_dma"),
+    7: ("USART2.tx_dma", "I2C1.rx_dma", "TIM2.cc2_dma", "TIM2.cc4_dma", "TIM4.up_dma"),
+}  # fmt: skip
+_DMA1_REQUESTS = {output: (f"DMA1.ch{n}",) for n, outputs in _REQUESTS.items() for output in outputs}
 
 #: Where each output leads: interrupts by their numbers (RM0008 10.1.2), inputs of devices by their names. Outputs
 #: that lead to the same are one line, which is their OR; the source may be a device that is not modelled.
@@ -181,6 +198,7 @@ WIRING: dict[str, tuple[int | str, ...]] = {
     "EXTI.2": (8,),
     "EXTI.3": (9,),
     "EXTI.4": (10,),
+    **{f"DMA1.ch{n}_irq": (10 + n,) for n in range(1, 8)},
     "EXTI.9_5": (23,),
     "USART1.irq": (37,),
     "USART2.irq": (38,),
@@ -192,6 +210,7 @@ WIRING: dict[str, tuple[int | str, ...]] = {
     "PWR.pvd": ("EXTI.pvd",),
     "RTC.alarm": ("EXTI.rtc_alarm",),
     "USB.wakeup": ("EXTI.usb_wakeup",),
+    **_DMA1_REQUESTS,
 }
 #: The first line that is no interrupt.
 _FIRST_INNER_LINE = 64

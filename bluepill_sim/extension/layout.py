@@ -192,6 +192,22 @@ USART = Struct(
     ),
 )
 EXTI = Struct("exti", "What EXTI holds beyond its registers.", (Field("levels", "u32"), Field("routes", "u8", PINS)))
+DMA = Struct(
+    "dma",
+    "What a DMA controller holds beyond its registers. RM0008 13.3.",
+    (
+        Field("base_ns", "u64", doc="start of the transfers that follow each other without a gap,"),
+        Field("cycles", "u64", doc="and cycles of HCLK from there to the end of the one under way"),
+        *_fields("u32", "hz", "apb1_cycles", "apb2_cycles"),
+        Field("current", "u32", doc="1 + the channel whose transfer is under way; 0: none"),
+        Field("ready", "u32", doc="channels that are enabled and have something left,"),
+        Field("unasked", "u32", doc="those that need no request,"),
+        Field("lines", "u32", doc="those whose request is high,"),
+        Field("latched", "u32", doc="and those of which a request has come"),
+        *(Field(name, "u32", 7) for name in ("peripheral", "memory", "reload")),
+        Field("padding", "u32"),
+    ),
+)
 GPIO = Struct("gpio", "Which port a GPIO is.", (Field("port", "u32"),))
 WAVE = Struct(
     "wave",
@@ -219,7 +235,7 @@ SENT = Struct(
 
 #: All of them; one that holds another comes behind it.
 STRUCTS = (
-    RECORD, INSTRUCTION, RAMP, STEP, LOOP, FAULT, SHARED, PORT, USART, EXTI, GPIO, WAVE, EDGE, SENT,
+    RECORD, INSTRUCTION, RAMP, STEP, LOOP, FAULT, SHARED, PORT, USART, EXTI, DMA, GPIO, WAVE, EDGE, SENT,
 )  # fmt: skip
 
 _KINDS: dict[str, Any] = {

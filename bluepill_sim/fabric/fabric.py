@@ -59,6 +59,7 @@ class Host(ctypes.Structure):
         ("signal", ctypes.c_void_p),
         ("registers", ctypes.c_void_p),
         ("holds_code", ctypes.c_void_p),
+        ("asleep_until", ctypes.c_void_p),
     )
 
 
@@ -498,7 +499,7 @@ class Fabric(Stateful):
             _PLAIN(self._guarded(lambda _user: chip.signal("event"), None)),
         )
         at = [ctypes.cast(call, ctypes.c_void_p) for call in calls]
-        self.use_host(Host(None, at[0], None, *at[1:], None, None), *calls)
+        self.use_host(Host(None, at[0], None, *at[1:], None, None, None), *calls)
 
 
 def _masks(values: Iterable[int]) -> "ctypes.Array[ctypes.c_uint32]":

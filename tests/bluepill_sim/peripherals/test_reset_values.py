@@ -22,6 +22,7 @@ PERIPHERALS = {
     "GPIOA": {"CRL": 0x4444_4444, "CRH": 0x4444_4444, "IDR": 0xA000},
     "GPIOB": {"CRL": 0x4444_4444, "CRH": 0x4444_4444, "IDR": 0x0010},
     "EXTI": {},
+    "DMA1": {},
     **{f"USART{number}": {"SR": 0xC0} for number in (1, 2, 3)},
     "IWDG": {"RLR": 0xFFF},
     "WWDG": {"CR": 0x7F, "CFR": 0x7F},

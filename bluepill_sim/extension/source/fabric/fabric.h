@@ -55,6 +55,8 @@ struct host {
     bool (*registers)(void *user, struct bus_access *access);
     /* Whether anything was translated from these bytes of SRAM; null: it may have been. */
     bool (*holds_code)(void *user, uint32_t address, uint32_t bytes);
+    /* Up to which cycle the core looks at nothing, unless an event wakes it; null or 0: it is awake. */
+    uint64_t (*asleep_until)(void *user);
 };
 
 /* What Python is asked: each keeps an exception for later. */
@@ -215,6 +217,8 @@ static inline uint64_t now_ns(struct fabric *fabric)
 /* Has the device's event come at a time; NO_TIME takes it back. */
 void schedule(struct device *device, uint64_t ns);
 static inline uint64_t due_ns(const struct device *device) { return device->fabric->slots[device->slot].ns; }
+/* Up to when, but not at which, nothing but this device acts, or looks at memory. */
+uint64_t quiet_ns(const struct device *device);
 /* Acts on all that is due at or before a time, in order of time, then of slots. */
 void run_events(struct fabric *fabric, uint64_t until_ns);
 
@@ -267,6 +271,8 @@ extern struct device_kind waves_kind;
 /* Reads or writes 1, 2 or 4 bytes for a device, at the time of its event; false: an error of the bus. */
 bool bus_read(struct device *master, uint32_t address, uint32_t bytes, uint32_t *word);
 bool bus_write(struct device *master, uint32_t address, uint32_t bytes, uint32_t word);
+/* Whether an access there reaches memory. */
+bool is_memory(const struct fabric *fabric, uint32_t address, bool is_write);
 
 #pragma GCC visibility pop
 

@@ -221,6 +221,25 @@ struct exti {
 };
 _Static_assert(sizeof(struct exti) == 20, "exti");
 
+/* What a DMA controller holds beyond its registers. RM0008 13.3. */
+struct dma {
+    uint64_t base_ns; /* start of the transfers that follow each other without a gap, */
+    uint64_t cycles; /* and cycles of HCLK from there to the end of the one under way */
+    uint32_t hz;
+    uint32_t apb1_cycles;
+    uint32_t apb2_cycles;
+    uint32_t current; /* 1 + the channel whose transfer is under way; 0: none */
+    uint32_t ready; /* channels that are enabled and have something left, */
+    uint32_t unasked; /* those that need no request, */
+    uint32_t lines; /* those whose request is high, */
+    uint32_t latched; /* and those of which a request has come */
+    uint32_t peripheral[7];
+    uint32_t memory[7];
+    uint32_t reload[7];
+    uint32_t padding;
+};
+_Static_assert(sizeof(struct dma) == 136, "dma");
+
 /* Which port a GPIO is. */
 struct gpio {
     uint32_t port;
