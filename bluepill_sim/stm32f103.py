@@ -16,6 +16,7 @@ from bluepill_sim.fabric.fabric import Fabric
 from bluepill_sim.fabric.pins import PinBank, PinPorts
 from bluepill_sim.fabric.ports import ChipPorts
 from bluepill_sim.fabric.registers import ClockBit, Peripheral, Place
+from bluepill_sim.peripherals.adc import Adc, Adc2
 from bluepill_sim.peripherals.afio import Afio
 from bluepill_sim.peripherals.dma import Dma
 from bluepill_sim.peripherals.exti import Exti
@@ -163,6 +164,8 @@ PERIPHERALS: tuple[tuple[_Maker, str], ...] = (
     (Gpio, "GPIOE"),
     (Exti, "EXTI"),
     (Dma, "DMA1"),
+    (Adc, "ADC1"),
+    (Adc2, "ADC2"),
     (Usart, "USART1"),
     (Usart, "USART2"),
     (Usart, "USART3"),
@@ -199,6 +202,8 @@ WIRING: dict[str, tuple[int | str, ...]] = {
     "EXTI.3": (9,),
     "EXTI.4": (10,),
     **{f"DMA1.ch{n}_irq": (10 + n,) for n in range(1, 8)},
+    "ADC1.irq": (18,),
+    "ADC2.irq": (18,),
     "EXTI.9_5": (23,),
     "USART1.irq": (37,),
     "USART2.irq": (38,),
@@ -211,6 +216,21 @@ WIRING: dict[str, tuple[int | str, ...]] = {
     "RTC.alarm": ("EXTI.rtc_alarm",),
     "USB.wakeup": ("EXTI.usb_wakeup",),
     **_DMA1_REQUESTS,
+    # Triggers of both ADCs: regular and injected groups (RM0008 tables 67 and 68).
+    "TIM1.cc1": ("ADC1.tim1_cc1", "ADC2.tim1_cc1"),
+    "TIM1.cc2": ("ADC1.tim1_cc2", "ADC2.tim1_cc2"),
+    "TIM1.cc3": ("ADC1.tim1_cc3", "ADC2.tim1_cc3"),
+    "TIM2.cc2": ("ADC1.tim2_cc2", "ADC2.tim2_cc2"),
+    "TIM3.trgo": ("ADC1.tim3_trgo", "ADC2.tim3_trgo"),
+    "TIM4.cc4": ("ADC1.tim4_cc4", "ADC2.tim4_cc4"),
+    "EXTI.line11": ("ADC1.exti_line11", "ADC2.exti_line11"),
+    "TIM1.trgo": ("ADC1.tim1_trgo", "ADC2.tim1_trgo"),
+    "TIM1.cc4": ("ADC1.tim1_cc4", "ADC2.tim1_cc4"),
+    "TIM2.trgo": ("ADC1.tim2_trgo", "ADC2.tim2_trgo"),
+    "TIM2.cc1": ("ADC1.tim2_cc1", "ADC2.tim2_cc1"),
+    "TIM3.cc4": ("ADC1.tim3_cc4", "ADC2.tim3_cc4"),
+    "TIM4.trgo": ("ADC1.tim4_trgo", "ADC2.tim4_trgo"),
+    "EXTI.line15": ("ADC1.exti_line15", "ADC2.exti_line15"),
 }
 #: The first line that is no interrupt.
 _FIRST_INNER_LINE = 64

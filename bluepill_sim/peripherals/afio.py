@@ -48,6 +48,10 @@ REMAP_FIELDS = {
     "TIM3": (10, 3),
     "TIM4": (12, 1),
     "CAN": (13, 3),
+    "ADC1_ETRGINJ": (17, 1),
+    "ADC1_ETRGREG": (18, 1),
+    "ADC2_ETRGINJ": (19, 1),
+    "ADC2_ETRGREG": (20, 1),
 }
 _PD01_REMAP = 1 << 15
 _SWJ_SHIFT, _SWJ_MASK = 24, bits((26, 24))

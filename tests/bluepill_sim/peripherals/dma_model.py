@@ -7,8 +7,8 @@ EN, TCIE, HTIE, TEIE, DIR, CIRC, PINC, MINC = (1 << n for n in range(8))
 MEM2MEM = 1 << 14
 TCIF, HTIF, TEIF = 2, 4, 8
 SRAM, SRAM_BYTES, FLASH, FLASH_BYTES = 0x2000_0000, 0x800, 0x0800_0000, 0x100
-#: A register of GPIO that reads what was written, and keeps 16 bits.
-ODR = 0x4001_080C
+#: AFIO_EXTICR4: reads what was written, keeps 16 bits, and nothing but zeros stands behind it.
+EXTICR4, AFIO_END = 0x4001_0014, 0x4001_0400
 
 
 @dataclass
@@ -35,7 +35,7 @@ class DmaModel:
     apb2_cycles: int
     now_ns: int = 0
     flags: int = 0
-    odr: int = 0
+    exticr4: int = 0
     sram: bytearray = field(default_factory=lambda: bytearray(SRAM_BYTES))
     flash: bytes = bytes(range(FLASH_BYTES))
     channels: list[Channel] = field(default_factory=lambda: [Channel() for _ in range(7)])
@@ -143,15 +143,16 @@ class DmaModel:
         for base, data in ((SRAM, self.sram), (FLASH, self.flash)):
             if base <= address < base + len(data):
                 return int.from_bytes(data[address - base : address - base + width], "little")
-        if ODR <= address < ODR + 4:
-            return self.odr >> 8 * (address - ODR) & (1 << 8 * width) - 1
+        if EXTICR4 <= address < AFIO_END:
+            return (self.exticr4 if address < EXTICR4 + 4 else 0) >> 8 * (address & 3) & (1 << 8 * width) - 1
         return None
 
     def _write(self, address: int, width: int, word: int) -> bool:
         if SRAM <= address < SRAM + SRAM_BYTES:
             self.sram[address - SRAM : address - SRAM + width] = word.to_bytes(width, "little")
             return True
-        if ODR <= address < ODR + 4:  # the APB bridge duplicates what is narrower
-            self.odr = word * {1: 0x0101_0101, 2: 0x0001_0001, 4: 1}[width] & 0xFFFF
+        if EXTICR4 <= address < AFIO_END:
+            if address < EXTICR4 + 4:  # the APB bridge duplicates what is narrower
+                self.exticr4 = word * {1: 0x0101_0101, 2: 0x0001_0001, 4: 1}[width] & 0xFFFF
             return True
         return False

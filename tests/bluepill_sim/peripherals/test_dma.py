@@ -13,12 +13,12 @@ from tests.bluepill_sim.peripherals.dma_model import (
     CIRC,
     DIR,
     EN,
+    EXTICR4,
     FLASH,
     HTIE,
     HTIF,
     MEM2MEM,
     MINC,
-    ODR,
     PINC,
     SRAM,
     SRAM_BYTES,
@@ -48,7 +48,7 @@ LINES = [
 BYTE, HALF, WORD = 0, 1, 2
 ADDRESSES = st.one_of(
     st.integers(SRAM, SRAM + 64), st.integers(SRAM, SRAM + 64),
-    st.sampled_from([ODR, FLASH + 4, SRAM + SRAM_BYTES - 4, 0, 0xE000_E010, 0x4000_7C00, FLASH + 0xFD]),
+    st.sampled_from([EXTICR4, FLASH + 4, SRAM + SRAM_BYTES - 4, 0, 0xE000_E010, 0x4000_7C00, FLASH + 0xFD]),
 )  # fmt: skip
 #: Some more often than others, so that much happens to one.
 CHANNELS = st.sampled_from([0, 0, 0, 0, 1, 1, 1, 2, 3, 4, 5, 6])
@@ -70,7 +70,7 @@ STEPS = st.one_of(
 
 
 def connected(chip: Any) -> Any:
-    """Give the chip its memories, and GPIOA and DMA1 no gate to forget; return the SRAM."""
+    """Give the chip its memories; return the SRAM."""
     sram, flash = (ctypes.c_char * SRAM_BYTES)(), (ctypes.c_char * 0x100)(*bytes(range(0x100)))
     chip.memories = sram, flash
     chip.pins.fabric.add_memory(SRAM, sram, is_writable=True)
@@ -103,7 +103,7 @@ def same(chip: Any, model: DmaModel) -> None:
         assert chip.irqs[10 + n] == model.irqs()[n - 1]
     assert chip.parts.by_name["DMA1"].due_ns == model.due_ns
     assert bytes(chip.memories[0]) == bytes(model.sram)
-    assert chip.read("GPIOA.ODR") == model.odr
+    assert chip.read("AFIO.EXTICR4") == model.exticr4
 
 
 def apply(chip: Any, model: DmaModel, name: str, *values: Any) -> None:
@@ -179,7 +179,7 @@ def test_widths_pack_and_truncate_as_the_manual_tabulates(
 
 
 @pytest.mark.parametrize(
-    ("peripheral", "cycles"), [(SRAM, 1 + 2 + 2), (ODR, 1 + 2 + 3), (0x4001_8000, 1 + 2 + 2), (0x4000_FFFC, 6)]
+    ("peripheral", "cycles"), [(SRAM, 1 + 2 + 2), (EXTICR4, 1 + 2 + 3), (0x4001_8000, 1 + 2 + 2), (0x4000_FFFC, 6)]
 )
 def test_a_transfer_ends_in_its_cycle_and_not_before(fake_chip: Any, peripheral: int, cycles: int) -> None:
     connected(fake_chip)

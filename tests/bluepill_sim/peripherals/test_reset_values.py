@@ -23,6 +23,8 @@ PERIPHERALS = {
     "GPIOB": {"CRL": 0x4444_4444, "CRH": 0x4444_4444, "IDR": 0x0010},
     "EXTI": {},
     "DMA1": {},
+    "ADC1": {"HTR": 0xFFF},
+    "ADC2": {"HTR": 0xFFF},
     **{f"USART{number}": {"SR": 0xC0} for number in (1, 2, 3)},
     "IWDG": {"RLR": 0xFFF},
     "WWDG": {"CR": 0x7F, "CFR": 0x7F},

@@ -190,6 +190,8 @@ struct fabric {
     struct port *ports; /* Python's: PORTS of them */
     struct wave *waves; /* Python's: one a source */
     struct shown shown[PORTS * PINS];
+    const struct analog *analog;         /* Python's, */
+    const int32_t *samples[ANALOG_PINS]; /* and these */
     struct memory memories[MEMORIES];
     uint32_t memory_count;
     uint32_t master; /* the slot of the device that makes an access; SLOTS for none */
@@ -266,6 +268,10 @@ void show_to(struct fabric *fabric, struct subscriber *subscriber);
 /* Up to when nothing changes any more. */
 uint64_t settled_ns(struct fabric *fabric);
 extern struct device_kind waves_kind;
+
+/* analog.c */
+/* Microvolts on the pin of an ADC channel, which may be an earlier time's. */
+int64_t channel_uv(const struct fabric *fabric, uint32_t channel, uint64_t ns);
 
 /* bus.c */
 /* Reads or writes 1, 2 or 4 bytes for a device, at the time of its event; false: an error of the bus. */
