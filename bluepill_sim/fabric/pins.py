@@ -184,6 +184,12 @@ class Pin:
             put_signal(fabric, channel, volts if isinstance(volts, Signal) else constant, self._bank.now_ns)
 
     @property
+    def has_volts(self) -> bool:
+        """Whether `set_volts` has put something on the wire."""
+        channel = _channel_of(self)
+        return channel is not None and self._bank.fabric.analog_struct.signals[channel].shape != 0
+
+    @property
     def volts(self) -> float | None:
         """The volts on the wire now; None of a pin that leads to no ADC. What floats has 0 V."""
         channel = _channel_of(self)

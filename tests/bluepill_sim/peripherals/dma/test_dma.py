@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from bluepill_sim.stm32f103 import WIRING, line_of
-from tests.bluepill_sim.peripherals.dma_model import (
+from tests.bluepill_sim.peripherals.dma.model import (
     CIRC,
     DIR,
     EN,

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from bluepill_sim.fabric.signals import Oscillation, Samples, Shape
 from bluepill_sim.peripherals.adc import INJECTED_TRIGGERS, REGULAR_TRIGGERS
 from bluepill_sim.stm32f103 import line_of
-from tests.bluepill_sim.peripherals.adc_model import (
+from tests.bluepill_sim.peripherals.adc.model import (
     ADON,
     ALIGN,
     AWD,
