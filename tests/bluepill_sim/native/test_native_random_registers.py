@@ -79,8 +79,9 @@ CONVERSION = st.tuples(st.sampled_from([ADC1, ADC1, ADC2]), st.integers(0, 1 << 
 )  # fmt: skip
 IRQS = st.integers(0, 0xFF).map(lambda bits: [(0xE000_E100, bits << 11)])
 STEPS = st.lists(
-    st.one_of(st.tuples(REGISTERS, WORDS).map(lambda pair: [pair]), CHANNEL, CONVERSION, IRQS), max_size=14
-)
+    st.one_of(CHANNEL, CHANNEL, CONVERSION, st.tuples(REGISTERS, WORDS).map(lambda pair: [pair]), IRQS),
+    min_size=3, max_size=16,
+)  # fmt: skip
 WAITS = st.lists(st.sampled_from([1, 1, 1, 3, 20, 300]), min_size=4, max_size=4)
 
 

@@ -291,13 +291,13 @@ static uint64_t round_cycles(const struct device *device)
     return halves * adc->divider / 2;
 }
 
-/* Passes over the rounds of which nothing is left to see; the last two are made. */
+/* Passes over the rounds of which nothing is left to see; the last one is made. */
 static void skip_rounds(struct device *device, uint64_t until)
 {
     struct adc *adc = device->state;
     const uint64_t round = round_cycles(device), behind = (uint64_t)((__uint128_t)(until - adc->end_ns) * adc->hz / NS_PER_S);
-    if (behind > 3 * round) {
-        adc->cycles += (behind / round - 2) * round;
+    if (behind > 2 * round) {
+        adc->cycles += (behind / round - 1) * round;
         adc->has_sample = 0;
         const uint64_t end = adc->cycles;
         adc->end_ns = run_ns(adc);

@@ -368,6 +368,24 @@ def test_parts_of_a_sequence_follow_their_triggers_without_rollover(fake_chip: A
     assert dones == [3, 3, 2, 3]
 
 
+def test_in_parts_each_trigger_converts_one_injected_channel(fake_chip: Any) -> None:
+    # RM0008 11.3.10: the third trigger ends the group of three, the fourth converts the first channel.
+    switch_on(fake_chip, cr2=JSOFTWARE, cr1=SCAN | JDISCEN)
+    fake_chip.write("ADC1.JSQR", 2 << 20 | 1 << 5 | 2 << 10 | 3 << 15)
+    for n in (1, 2, 3):
+        fake_chip.pins[f"PA{n}"].set_volts(n / 2)
+    seen = []
+    for turn in range(4):
+        fake_chip.pins["PA1"].set_volts(0.5 if turn < 3 else 3.0)
+        fake_chip.write("ADC1.CR2", ADON | JSOFTWARE | JSWSTART)
+        fake_chip.advance(fake_chip.now_ns + 100 * CYCLE_NS)
+        seen.append([fake_chip.read(f"ADC1.JDR{n}") for n in (1, 2, 3)])
+        assert bool(fake_chip.read("ADC1.SR") & JEOC) is (turn == 2)
+        fake_chip.write("ADC1.SR", 0)
+    first, second, third = (code(n / 2) for n in (1, 2, 3))
+    assert seen == [[first, 0, 0], [first, second, 0], [first, second, third], [code(3.0), second, third]]
+
+
 def test_injected_data_lose_their_offset_and_keep_their_sign(fake_chip: Any) -> None:
     switch_on(fake_chip, cr2=JSOFTWARE, cr1=SCAN)
     fake_chip.pins["PA2"].set_volts(1.65)
@@ -421,7 +439,8 @@ def test_the_watchdog_looks_below_and_above_its_thresholds(
 ) -> None:
     for guard, watched in (
         (AWDEN, not is_injected), (JAWDEN, is_injected), (AWDEN | JAWDEN, True),
-        (AWDEN | JAWDEN | AWDSGL | 1, True), (AWDEN | JAWDEN | AWDSGL | 2, False), (0, False),
+        (AWDEN | JAWDEN | AWDSGL | 1, True), (AWDEN | JAWDEN | AWDSGL | 2, False),
+        (AWDEN | JAWDEN | AWDSGL | 17, False), (0, False),
     ):  # fmt: skip
         switch_on(fake_chip, cr2=JSOFTWARE, cr1=guard | AWDIE)
         fake_chip.pins["PA1"].set_volts(1.65)
@@ -490,6 +509,29 @@ def test_continuous_conversions_that_nobody_sees_have_no_events(fake_chip: Any) 
         assert adc.due_ns == last_ns + 3_125 + 14 * CYCLE_NS  # EOC is to be seen again
         fake_chip.advance(adc.due_ns)
         assert adc.due_ns is None
+
+
+@settings(max_examples=40, deadline=None)
+@given(waits=st.lists(st.tuples(st.integers(1, 3_000), st.booleans()), min_size=1, max_size=5), watches=st.booleans())
+def test_what_nobody_saw_is_as_if_each_conversion_had_been_made(
+    make_fake_chip: Callable[[], Any], waits: list[tuple[int, bool]], watches: bool
+) -> None:
+    pair = Pair(make_fake_chip(), 4)
+    for register, word in (
+        ("CR1", SCAN | JAUTO | (AWDEN if watches else 0)), ("HTR", 2000), ("SQR1", 2 << 20), ("SQR3", 3 << 5),
+        ("JSQR", 1 << 20 | 3 << 10), ("CR2", ADON | CONT), ("CR2", ADON | CONT),
+    ):  # fmt: skip
+        pair.do("write", 0, (register, word))
+    pair.do("wait", 14 * 60, 0)
+    adc = pair.chip.parts.by_name["ADC1"]
+    for wait, is_read in waits:
+        assert watches or adc.due_ns is None
+        pair.do("wait", wait, 0)
+        pair.do("volts", 1, wait % 4)  # of no channel that is converted
+        pair.compare()
+        if is_read:
+            pair.do("read", 0)
+            pair.do("wait", 14 * 6, 0)
 
 
 # Dual modes: which ADC converts when, by the ends of conversions in cycles of ADCCLK.
