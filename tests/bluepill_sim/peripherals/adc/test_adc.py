@@ -124,6 +124,8 @@ REGISTERS = st.one_of(
 STEPS = st.one_of(
     st.tuples(st.just("write"), st.integers(0, 1), REGISTERS),
     st.tuples(st.just("write"), st.just(0), REGISTERS),
+    st.tuples(st.just("start"), st.integers(0, 1), st.booleans()),
+    st.tuples(st.just("start"), st.just(0), st.booleans()),
     st.tuples(st.just("trigger"), st.booleans(), st.sampled_from([0, 4, 6])),
     st.tuples(st.just("volts"), st.sampled_from([0, 1, 2]), st.sampled_from([0, 0.8, 1.65, 3.3, 3.4, -0.1])),
     st.tuples(st.just("wait"), st.sampled_from([1, 3, 13, 14, 27, 28, 100, 700, 5000]), st.integers(-1, 1)),
@@ -153,6 +155,10 @@ class Pair:
             n, (register, value) = values
             chip.write(f"ADC{n + 1}.{register}", value)
             model.write(n, register, value)
+        elif name == "start":
+            n, is_injected = values
+            bits = JSOFTWARE | JSWSTART if is_injected else SOFTWARE | SWSTART
+            self.do("write", n, ("CR2", model.units[n]["CR2"] | ADON | bits))
         elif name == "trigger":
             is_injected, source = values
             model.trigger(source, is_injected=is_injected)
