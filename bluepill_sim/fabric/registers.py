@@ -143,15 +143,15 @@ class RegisterView:
         ).rstrip()
 
 
-def numbered(pattern: str, numbers: Iterable[int], width: int = 1) -> str:
-    """Return fields that differ by their numbers and stand one behind the other: `n` is the number.
+def numbered(pattern: str, numbers: Iterable[int], width: int = 1, first: int = 0) -> str:
+    """Return fields that differ by their numbers, `n`, and stand one behind the other, that of `first` at bit 0.
 
     >>> numbered("MRn", (1, 0))
     'MR1 1, MR0 0'
     """
     found = []
     for n in numbers:
-        high, low = width * n + width - 1, width * n
+        high, low = width * (n - first) + width - 1, width * (n - first)
         found.append(f"{pattern.replace('n', str(n))} {high if width == 1 else f'{high}:{low}'}")
     return ", ".join(found)
 

@@ -25,8 +25,10 @@ class Exti(Peripheral):
     """External interrupt/event controller."""
 
     KIND, HOLDS = "exti", EXTI
-    #: Lines that share an interrupt: `lines_by_irq` of exti.c.
-    OUTPUTS = ("0", "1", "2", "3", "4", "9_5", "15_10", "pvd_irq", "rtc_alarm_irq", "usb_wakeup_irq")
+    #: Lines that share an interrupt, `lines_by_irq` of exti.c; and events that trigger ADCs, `trigger_lines`.
+    OUTPUTS = (
+        "0", "1", "2", "3", "4", "9_5", "15_10", "pvd_irq", "rtc_alarm_irq", "usb_wakeup_irq", "line11", "line15",
+    )  # fmt: skip
     INPUTS = ("pvd", "rtc_alarm", "usb_wakeup")
     REGISTERS = (
         Register(

@@ -41,6 +41,7 @@ _CSR_FLAGS = bits((31, 26))
 #: AHB divider by CFGR HPRE; APB divider by PPRE1/PPRE2.
 _AHB_DIVIDERS = (1,) * 8 + (2, 4, 8, 16, 64, 128, 256, 512)
 _APB_DIVIDERS = (1,) * 4 + (2, 4, 8, 16)
+_ADC_DIVIDERS = (2, 4, 6, 8)
 #: PLL factor by CFGR PLLMUL.
 _PLL_FACTORS = (2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15, 16, 16)
 
@@ -378,6 +379,7 @@ class Rcc(Peripheral):
         before = clocks.snapshot()
         clocks.sysclk_hz, clocks.hclk_hz = sysclk_hz, hclk_hz
         clocks.pclk1_hz, clocks.pclk2_hz = hclk_hz // divider1, hclk_hz // divider2
+        clocks.adc_divider = _ADC_DIVIDERS[(cfgr >> 14) & 3]
         clocks.timer1_hz = clocks.pclk1_hz * (1 if divider1 == 1 else 2)
         clocks.timer2_hz = clocks.pclk2_hz * (1 if divider2 == 1 else 2)
         if clocks.snapshot() != before:
