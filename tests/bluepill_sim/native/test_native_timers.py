@@ -1,4 +1,4 @@
-"""Loops that poll a timer: their time passes at once in the native core, which leaves them where the Python one does."""
+"""Loops that poll a timer: their time passes at once on the native core, and they end where they do on Python's."""
 
 from typing import Any
 
