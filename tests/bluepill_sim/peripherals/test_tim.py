@@ -768,10 +768,10 @@ def test_timers_that_trigger_each_other_come_to_an_end(fake_chip: Any) -> None:
 
 @pytest.fixture
 def requests(monkeypatch: pytest.MonkeyPatch, make_fake_chip: Callable[[], Any]) -> Callable[..., Any]:
-    """A chip on which some outputs of TIM3 lead to a line each, and the ticks of their pulses."""
+    """A chip on which some outputs of TIM3 lead to a line each, at the end of which nothing is, and the ticks of their pulses."""
 
     def make(*outputs: str) -> tuple[Timer, dict[str, list[int]]]:
-        wiring = {output: (f"DMA1.test{n}",) for n, output in enumerate(outputs)}
+        wiring = {output: (f"BKP.test{n}",) for n, output in enumerate(outputs)}
         kept = {row: ends for row, ends in stm32f103.WIRING.items() if row not in wiring}
         monkeypatch.setattr(stm32f103, "WIRING", kept | wiring)
         chip = make_fake_chip()
