@@ -93,6 +93,8 @@ class Monitor:
         if not every and pin.mode.value == "floating input" and pin.driven is None and pin.holder is None:
             return ""
         level = "floating" if pin.is_floating else "high" if pin.level else "low"
+        if pin.wave is not None:
+            level = f"{pin.wave.frequency_hz:g} Hz, {100 * pin.wave.duty:.1f} %"
         outside = {None: "", True: ", high from outside", False: ", low from outside"}[pin.driven]
         use = pin.holder or pin.function or ""
         return f"{name:<5} {level:<9} {pin.mode.value}{f' ({use})' if use else ''}{outside}"

@@ -10,6 +10,9 @@ import pytest
 pytest.importorskip("unicorn")
 
 from bluepill_sim.board import BluePill
+from bluepill_sim.debug.execution import Execution
+from bluepill_sim.debug.machine import LoneChip
+from bluepill_sim.debug.monitor import Monitor
 
 HERE = Path(__file__).resolve().parent / "firmware"
 COMPILER = "arm-none-eabi-gcc"
@@ -85,6 +88,35 @@ def test_both_cores_and_other_slices_end_in_the_same_state(elf: Path, monkeypatc
     for core, slice_ns in (("native", END_NS), ("native", 77_777), ("python", END_NS), ("python", 1_234_567)):
         monkeypatch.setenv("P2OS_CORE", core)
         text, board = run(elf, slice_ns)
-        timers = [board.chip.parts.by_name[f"TIM{n}"] for n in (1, 2, 3, 4)]
-        ends.append((text, board.cycle, [(bytes(timer.words), timer.held, timer.due_ns) for timer in timers]))
+        ends.append((text, state(board)))
     assert all(end == ends[0] for end in ends)
+
+
+def state(board: BluePill) -> tuple[object, ...]:
+    timers = [board.chip.parts.by_name[f"TIM{n}"] for n in (1, 2, 3, 4)]
+    return board.cycle, [(bytes(timer.words), timer.held, timer.due_ns) for timer in timers]
+
+
+@pytest.mark.parametrize("at_ns", [2_500_000, 4_100_000, 9_000_000, 15_000_001])
+def test_a_snapshot_goes_on_on_another_board(elf: Path, at_ns: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("P2OS_CORE", "native")
+    board, other = BluePill(elf), BluePill(elf)
+    board.advance_to(at_ns)
+    other.restore(board.snapshot())
+    rows: list[bytes] = []
+    for one in (board, other):
+        found = bytearray()
+        one.subscribe_pins(["PA8", "PB1", "PB6"], found.extend)
+        one.advance_to(END_NS)
+        rows.append(bytes(found))
+    assert rows[0] == rows[1]
+    assert rows[0]
+    assert state(board) == state(other)
+
+
+def test_gdb_sees_a_wave_at_its_pin(elf: Path) -> None:
+    board = BluePill(elf)
+    board.advance_to(5_000_000)
+    monitor = Monitor(Execution(LoneChip(board), lambda _text: None))
+    assert monitor.run("pin PA8").split()[1:5] == ["20000", "Hz,", "25.0", "%"]
+    assert "CEN=0x1" in monitor.run("registers TIM1")

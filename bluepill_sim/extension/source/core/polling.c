@@ -193,18 +193,30 @@ static const struct counter *counter_at(struct core *core, uint32_t address)
     return NULL;
 }
 
-/* What a counter reads at a cycle. A clock of the chip is the core's, divided by a power of 2. */
-static uint32_t count_at(const struct core *core, const struct counter *counter, uint64_t cycle)
+/* Cycles of the core a tick: a clock of the chip is the core's, divided by a power of 2. 0: it is tied to another time. */
+static uint64_t cycles_a_tick(const struct fabric *fabric, const struct ticks *ticks)
 {
-    const struct fabric *fabric = core->fabric;
+    return ticks == NULL ? 1 : ticks->ns == fabric->time.ns && fabric->time.hz % ticks->hz == 0 ? fabric->time.hz / ticks->hz : 0;
+}
+
+/* What a counter reads at a cycle, and the first cycle after it at which it may read another word. */
+static uint32_t count_at(const struct fabric *fabric, const struct counter *counter, uint64_t cycle, uint64_t *changes)
+{
+    const struct ramp *ramp = counter->ramp;
     const struct ticks *ticks = counter->ticks;
-    if (ticks == NULL) {
-        return ramp_at(counter->ramp, cycle);
+    const uint64_t unit = cycles_a_tick(fabric, ticks);
+    const uint64_t start = ticks == NULL ? 0 : fabric->time.cycle, first = ticks == NULL ? 0 : ticks->tick;
+    *changes = cycle + 1;
+    if (!unit) {
+        return ramp_at(ramp, tick_at(ticks, ns_of(fabric, cycle)));
     }
-    if (ticks->ns == fabric->time.ns && fabric->time.hz % ticks->hz == 0) {
-        return ramp_at(counter->ramp, ticks->tick + (cycle - fabric->time.cycle) / (fabric->time.hz / ticks->hz));
+    const uint64_t tick = first + (cycle - start) / unit;
+    if (!ramp->runs) {
+        *changes = NO_TIME;
+    } else if (tick >= ramp->base) {
+        *changes = start + unit * (ramp->base + ((tick - ramp->base) / ramp->divider + 1) * ramp->divider - first);
     }
-    return ramp_at(counter->ramp, tick_at(ticks, ns_of(fabric, cycle)));
+    return ramp_at(ramp, tick);
 }
 
 /* How many of the next rounds of such a loop go round again, of those that end before the run does: the value of a
@@ -224,10 +236,13 @@ uint64_t rounds_of_counter(struct core *core, const struct row *row)
         const struct step *step = &loop->steps[k];
         operands[k] = step->is_register ? read_register(core, REG_R0 + (int)step->operand) : step->operand;
     }
-    const uint64_t left = rounds_left(core, row), first = s->cycle + loop->read_cycle;
-    uint64_t n = 0;
-    while (n < left && holds(loop->condition, run_steps(loop, operands, count_at(core, counter, first + n * row->costs[1])))) {
-        ++n;
+    const uint64_t left = rounds_left(core, row), first = s->cycle + loop->read_cycle, cost = row->costs[1];
+    uint64_t n = 0, changes;
+    while (n < left && holds(loop->condition, run_steps(loop, operands, count_at(core->fabric, counter, first + n * cost, &changes)))) {
+        if (changes == NO_TIME) {
+            return left;
+        }
+        n = (changes - first + cost - 1) / cost;
     }
-    return n;
+    return n < left ? n : left;
 }

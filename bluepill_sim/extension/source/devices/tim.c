@@ -45,7 +45,9 @@ void request(struct device *device, uint32_t output)
 
 static uint64_t next_stop(const struct device *device)
 {
-    return earlier(earlier(next_count_stop(device), next_filter_stop(device)), next_output_stop(device));
+    const uint64_t late_at = tim_of(device)->late_at;
+    const uint64_t first = earlier(earlier(next_count_stop(device), next_filter_stop(device)), next_output_stop(device));
+    return late_at ? earlier(first, late_at) : first;
 }
 
 static void leap(struct device *device, uint64_t tick)
@@ -68,6 +70,7 @@ void synchronize(struct device *device, uint64_t tick)
     while ((stop = next_stop(device)) <= tick) {
         leap(device, stop);
         flip_filters(device);
+        take_late_levels(device);
         refresh(device);
     }
     if (tick > tim_of(device)->at) {
@@ -102,7 +105,6 @@ static void give_pulses(struct device *device)
 {
     struct tim *tim = tim_of(device);
     const bool trgo = trgo_level(device);
-    tim->is_busy = 1;
     if (trgo != tim->trgo) {
         tim->trgo = trgo;
         output_set(device, TRGO, trgo);
@@ -115,18 +117,20 @@ static void give_pulses(struct device *device)
             output_set(device, output, false);
         }
     }
-    tim->is_busy = 0;
 }
 
 void refresh(struct device *device)
 {
     struct tim *tim = tim_of(device);
-    if (tim->is_busy) { /* within its own pulses: whoever gives them goes on */
+    if (tim->is_busy) { /* what it puts out has come back, by a bus master say: the rest follows a tick later */
+        tim->late_at = tim->at + 1;
         return;
     }
+    tim->is_busy = 1;
     show_outputs(device);
     update_irqs(device);
     give_pulses(device);
+    tim->is_busy = 0;
     const uint64_t stop = next_stop(device);
     schedule(device, stop == NO_TIME ? NO_TIME : ns_of_tick(&tim->ticks, stop));
 }
@@ -177,7 +181,7 @@ static uint32_t burst(struct device *device, bool is_write, uint32_t word)
         --tim->burst_left;
         pulse(device, tim->burst_output);
     }
-    give_pulses(device);
+    refresh(device);
     return answer;
 }
 
@@ -208,6 +212,7 @@ static uint32_t read(struct device *device, uint32_t index)
         return device->words[SR];
     }
     if (index == DMAR) {
+        synchronize(device, tick_now(device));
         return burst(device, false, 0);
     }
     const uint32_t word = device->words[index]; /* CCRx */
@@ -439,6 +444,7 @@ static uint32_t command(struct device *device, uint32_t what, uint32_t one, uint
         tim->pins[one] = (uint8_t)other;
         return 0;
     case ROUTE: /* the levels of the other pins are taken as they are */
+        synchronize(device, tick_now(device));
         tim->listening = 0;
         listen(device, false);
         check_break(device);

@@ -124,6 +124,8 @@ void take_levels(struct device *device);
 /* Listens to the pins that matter now; `is_restored`: their levels are known. */
 void listen(struct device *device, bool is_restored);
 uint64_t next_filter_stop(const struct device *device);
+/* Takes levels that its own outputs have changed, a tick later. */
+void take_late_levels(struct device *device);
 /* Lets through what filters have seen for long enough. */
 void flip_filters(struct device *device);
 void set_filters(struct device *device);

@@ -389,18 +389,37 @@ void take_levels(struct device *device)
     }
 }
 
+static void take_all_levels(struct device *device)
+{
+    const struct tim *tim = tim_of(device);
+    if (tim->listening >> PIN_BKIN & 1 && is_break_active(device) != tim->in_break) {
+        check_break(device);
+    }
+    take_levels(device);
+}
+
 void take_pins(struct device *device, uint32_t port, uint32_t changed)
 {
     struct tim *tim = tim_of(device);
     (void)port;
     (void)changed;
+    if (tim->is_busy) { /* an output of its own leads here: else the two could chase each other within a tick */
+        tim->late_at = tim->at + 1;
+        return;
+    }
     fabric_catch_up(device->fabric, device->slot, now_ns(device->fabric));
     synchronize(device, tick_now(device));
-    if (tim->listening >> PIN_BKIN & 1 && is_break_active(device) != tim->in_break) {
-        check_break(device);
-    }
-    take_levels(device);
+    take_all_levels(device);
     refresh(device);
+}
+
+void take_late_levels(struct device *device)
+{
+    struct tim *tim = tim_of(device);
+    if (tim->late_at && tim->at >= tim->late_at) {
+        tim->late_at = 0;
+        take_all_levels(device);
+    }
 }
 
 /* The inputs from which something follows, as bits of `pins`. */

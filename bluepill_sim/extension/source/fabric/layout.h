@@ -359,7 +359,8 @@ struct tim {
     uint8_t trgi;
     uint8_t trgo;
     uint8_t in_break;
-    uint8_t is_busy; /* triggers that come back from its own pulses are not taken */
+    uint8_t is_busy; /* what it puts out may come back to it: pulses are not taken, */
+    uint64_t late_at; /* and levels at this tick, the next one; 0: none has come back */
     uint32_t pulses; /* outputs that give a pulse at the end of what happens now */
     uint32_t listening; /* bits of `pins` that are listened to, */
     uint32_t hears; /* and of the internal triggers */
@@ -373,7 +374,7 @@ struct tim {
     uint8_t pins[9]; /* CH1 to CH4, CH1N to CH3N, ETR, BKIN */
     uint8_t sources[7]; /* the alternate functions of the first seven */
 };
-_Static_assert(sizeof(struct tim) == 704, "tim");
+_Static_assert(sizeof(struct tim) == 712, "tim");
 
 /* A level that goes up every `period` ticks, and down `high` ticks later. */
 struct wave {

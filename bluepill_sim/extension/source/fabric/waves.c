@@ -145,7 +145,7 @@ void make_edges_where_wanted(struct fabric *fabric)
             const uint32_t at = (uint32_t)__builtin_ctz(left);
             struct shown *one = &fabric->shown[PINS * number + at];
             const bool was_made = one->is_made;
-            one->is_made = wanted >> at & 1;
+            one->is_made = one->is_wave && wanted >> at & 1; /* a state that is being put back is not shown yet */
             if (one->is_made && !was_made) {
                 struct port low, high;
                 const uint64_t ns = now_ns(fabric);

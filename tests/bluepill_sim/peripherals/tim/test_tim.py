@@ -259,11 +259,20 @@ def test_dir_shows_which_way_a_centred_counter_goes(tim2: Timer) -> None:
 
 
 def test_the_repetition_counter_divides_updates(tim1: Timer) -> None:
-    tim1.set(ARR=9, RCR=2, EGR=1, SR=0, DIER=1, CR1=CEN)
-    tim1.at(30)
-    assert not tim1.chip.irqs[25]
-    tim1.at(31)
-    assert tim1.chip.irqs[25]
+    tim1.set(ARR=9, RCR=2, EGR=1, SR=0, CR1=CEN)
+    for tick, is_up in ((11, False), (21, False), (30, False), (31, True)):
+        assert bool(tim1.at(tick).flags & UIF) is is_up, tick
+    tim1.set(SR=0, DIER=1)
+    for tick, is_up in ((51, False), (60, False), (61, True)):
+        assert tim1.at(tick).chip.irqs[25] is is_up, tick
+
+
+def test_many_repetitions_at_once_leave_the_counter_where_it_belongs(tim1: Timer) -> None:
+    """A thousand overflows that nobody sees are 333 updates and one overflow of the next three."""
+    tim1.set(ARR=9, RCR=2, EGR=1, SR=0, CR1=CEN)
+    tim1.at(10_001)["SR"] = 0
+    for tick, is_up in ((10_011, False), (10_020, False), (10_021, True)):
+        assert bool(tim1.at(tick).flags & UIF) is is_up, tick
 
 
 def test_udis_and_urs_hold_updates_back(tim3: Timer) -> None:
@@ -768,7 +777,7 @@ def test_timers_that_trigger_each_other_come_to_an_end(fake_chip: Any) -> None:
 
 @pytest.fixture
 def requests(monkeypatch: pytest.MonkeyPatch, make_fake_chip: Callable[[], Any]) -> Callable[..., Any]:
-    """A chip on which some outputs of TIM3 lead to a line each, and the ticks of their pulses."""
+    """A chip on which some outputs of TIM3 lead to a line each, which leads nowhere, and the ticks of their pulses."""
 
     def make(*outputs: str) -> tuple[Timer, dict[str, list[int]]]:
         wiring = {output: (f"DAC.test{n}",) for n, output in enumerate(outputs)}
