@@ -5,26 +5,24 @@ import os
 import sys
 from pathlib import Path
 
-import hypothesis
 import pytest
-
-# How long an example takes depends on what else the machine does.
-hypothesis.settings.register_profile(
-    "tests", deadline=None, suppress_health_check=[hypothesis.HealthCheck.too_slow]
-)  # fmt: skip
-hypothesis.settings.load_profile("tests")
 
 
 def pytest_configure(config: pytest.Config) -> None:
-    """Keep compiled modules where PYTHONDONTWRITEBYTECODE forbids it beside the sources.
+    """Keep compiled modules where PYTHONDONTWRITEBYTECODE forbids it beside the sources, and bound no example's time.
 
     A child that compiles 200 modules of ours takes 1.0 s of processor time to start, and 0.25 s else.
+    How long an example takes depends on what else the machine does.
     """
     if sys.dont_write_bytecode:
         sys.dont_write_bytecode = False
         sys.pycache_prefix = str(config.rootpath / ".pytest_cache" / "bytecode")
         os.environ["PYTHONPYCACHEPREFIX"] = sys.pycache_prefix
         del os.environ["PYTHONDONTWRITEBYTECODE"]
+    from hypothesis import HealthCheck, settings  # whose modules pytest rewrites: after it is known where they are kept
+
+    settings.register_profile("tests", deadline=None, suppress_health_check=[HealthCheck.too_slow])
+    settings.load_profile("tests")
 
 
 def pytest_collection_finish() -> None:
