@@ -8,6 +8,11 @@ from pathlib import Path
 import pytest
 
 
+def pytest_addoption(parser: pytest.Parser) -> None:
+    """Add the option of tests/counted_lines.py."""
+    parser.addoption("--count-lines", metavar="FOLDER", help="where to write which lines of the packages ran")
+
+
 def pytest_configure(config: pytest.Config) -> None:
     """Keep compiled modules where PYTHONDONTWRITEBYTECODE forbids it beside the sources, and bound no example's time.
 
@@ -19,6 +24,11 @@ def pytest_configure(config: pytest.Config) -> None:
         sys.pycache_prefix = str(config.rootpath / ".pytest_cache" / "bytecode")
         os.environ["PYTHONPYCACHEPREFIX"] = sys.pycache_prefix
         del os.environ["PYTHONDONTWRITEBYTECODE"]
+    folder = config.getoption("--count-lines")
+    if folder is not None:
+        from tests.counted_lines import LineCounter
+
+        config.pluginmanager.register(LineCounter(config.rootpath / folder))
     from hypothesis import HealthCheck, settings  # whose modules pytest rewrites: after it is known where they are kept
 
     settings.register_profile("tests", deadline=None, suppress_health_check=[HealthCheck.too_slow])

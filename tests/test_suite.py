@@ -1,13 +1,14 @@
 """The tests as a whole: what tests/conftest.py promises of each."""
 
-import json
 import os
 import subprocess
 import sys
-import tomllib
 from pathlib import Path
 
 import pytest
+
+from tests.counted_lines import LineCounter
+from tools.check_coverage import merged
 
 ROOT = Path(__file__).parents[1]
 PART = """
@@ -29,24 +30,34 @@ def test_way(first):
 @pytest.mark.parametrize("workers", [[], ["-n", "2"]], ids=["one process", "two workers"])
 @pytest.mark.parametrize(("ways", "missed"), [("[0, 1]", ([], [])), ("[0, 0]", ([4], [[3, 4]]))], ids=["both", "one"])
 def test_lines_and_branches_that_no_test_of_any_worker_reaches_are_counted(
-    tmp_path: Path, workers: list[str], ways: str, missed: tuple[list[int], list[list[int]]]
-) -> None:
-    for name in ("tests/conftest.py", "pyproject.toml"):
-        (tmp_path / Path(name).name).write_bytes((ROOT / name).read_bytes())
-    for package in tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["tool"]["slipcover"]["source"]:
-        (tmp_path / package).mkdir()
-        (tmp_path / package / "__init__.py").touch()
-    (tmp_path / "simbase" / "part.py").write_text(PART)
-    (tmp_path / "test_all.py").write_text(SUITE.format(ways=ways))
-    environment = {name: value for name, value in os.environ.items() if not name.startswith(("SLIPCOVER", "PYTEST"))}
-    options = ["--json", "--out", "lines.json", "-m", "pytest", "-p", "no:cacheprovider", *workers, "test_all.py"]
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, workers: list[str], ways: str,
+    missed: tuple[list[int], list[list[int]]],
+) -> None:  # fmt: skip
+    for name in ("tests/conftest.py", "tests/counted_lines.py", "pyproject.toml"):
+        (tmp_path / name).parent.mkdir(exist_ok=True)
+        (tmp_path / name).write_bytes((ROOT / name).read_bytes())
+    (tmp_path / "simbase").mkdir()
+    for name, text in (("__init__", ""), ("part", PART), ("unseen", PART)):
+        (tmp_path / "simbase" / f"{name}.py").write_text(text)
+    (tmp_path / "tests" / "test_all.py").write_text(SUITE.format(ways=ways))
+    environment = {name: value for name, value in os.environ.items() if not name.startswith("PYTEST")}
+    options = ["-p", "no:cacheprovider", "--count-lines", "lines", *workers]
     done = subprocess.run(
-        [sys.executable, "-m", "slipcover", *options],
+        [sys.executable, "-m", "pytest", *options],
         cwd=tmp_path, env=environment, capture_output=True, text=True, check=False, timeout=120,
     )  # fmt: skip
     assert done.returncode == 0, done.stdout + done.stderr
-    found = json.loads((tmp_path / "lines.json").read_text())["files"]["simbase/part.py"]
+    monkeypatch.chdir(tmp_path)
+    files = merged(Path("lines"))
+    found = files["simbase/part.py"]
     assert (found["missing_lines"], found["missing_branches"]) == missed
+    assert files["simbase/unseen.py"]["missing_lines"] == [2, 3, 4, 5]
+
+
+def test_lines_are_not_counted_once_a_package_is_imported(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "simbase", sys)
+    with pytest.raises(pytest.UsageError, match="simbase is imported before its lines can be counted"):
+        LineCounter(Path("never"))
 
 
 def test_children_keep_the_modules_that_they_compile(tmp_path: Path) -> None:
