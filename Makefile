@@ -46,7 +46,7 @@ lint: setup
 type: setup
 	$(BIN)/mypy
 
-# One run for all; how lines are counted says tests/counted_lines.py.
+# One run for all; how lines are counted says tests/tools/counted_lines.py.
 unit: setup
 	rm -rf .coverage
 	$(BIN)/pytest -n $(JOBS) --dist worksteal -m 'not soak and not hardware' --count-lines .coverage

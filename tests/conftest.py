@@ -9,7 +9,7 @@ import pytest
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
-    """Add the option of tests/counted_lines.py."""
+    """Add the option of tests/tools/counted_lines.py."""
     parser.addoption("--count-lines", metavar="FOLDER", help="where to write which lines of the packages ran")
 
 
@@ -26,7 +26,7 @@ def pytest_configure(config: pytest.Config) -> None:
         del os.environ["PYTHONDONTWRITEBYTECODE"]
     folder = config.getoption("--count-lines")
     if folder is not None:
-        from tests.counted_lines import LineCounter
+        from tests.tools.counted_lines import LineCounter
 
         config.pluginmanager.register(LineCounter(config.rootpath / folder))
     from hypothesis import HealthCheck, settings  # whose modules pytest rewrites: after it is known where they are kept

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.counted_lines import LineCounter
+from tests.tools.counted_lines import LineCounter
 from tools.check_coverage import merged
 
 ROOT = Path(__file__).parents[1]
@@ -33,8 +33,8 @@ def test_lines_and_branches_that_no_test_of_any_worker_reaches_are_counted(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, workers: list[str], ways: str,
     missed: tuple[list[int], list[list[int]]],
 ) -> None:  # fmt: skip
-    for name in ("tests/conftest.py", "tests/counted_lines.py", "pyproject.toml"):
-        (tmp_path / name).parent.mkdir(exist_ok=True)
+    for name in ("tests/conftest.py", "tests/tools/counted_lines.py", "pyproject.toml"):
+        (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
         (tmp_path / name).write_bytes((ROOT / name).read_bytes())
     (tmp_path / "simbase").mkdir()
     for name, text in (("__init__", ""), ("part", PART), ("unseen", PART)):

@@ -10,7 +10,7 @@ from pathlib import Path
 
 from slipcover import Slipcover, branch, merge_coverage
 
-from tests.counted_lines import PACKAGES, UNCOUNTED
+from tests.tools.counted_lines import PACKAGES, UNCOUNTED
 
 #: Modules whose every branch is tested: a fault in them reaches every user.
 CORE = (

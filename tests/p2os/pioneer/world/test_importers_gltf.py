@@ -12,7 +12,7 @@ import pytest
 from p2os.errors import WorldError
 from p2os.pioneer.world import load_world
 from p2os.pioneer.world.formats.meshes.gltf import read_gltf
-from tests.counted_calls import calls_of
+from tests.p2os.pioneer.world.counted_calls import calls_of
 
 #: A wedge that no mirror image and no wrong turn leaves as it is, Z up: (x, z, -y) is how a file writes it.
 WEDGE = [(0, 0, 0), (2, 0, 0), (0, 1, 0), (0, 0, 3)]
