@@ -37,7 +37,7 @@ from tests.documentation.page import ROOT, Block, Page
 
 LIMIT_S = 240.0
 READY_S = 60.0
-ENDING_S = 15.0
+ENDING_S = 60.0
 PORTS = 24
 RUN = {"python", "console", "sh", "c", "toml"}  # languages of blocks that are run
 FAILURES = ("p2os: ", "fault: ")
