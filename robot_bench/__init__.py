@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from robot_bench.recording.run_record import RunRecord, read_run
     from robot_bench.remote import RemoteBench
     from robot_bench.run import RunResult, run_at_port, run_scenario
-    from robot_bench.scenario.goals import Goal, Judgement
+    from robot_bench.scenario.goals.judging import Goal, Judgement
     from robot_bench.scenario.scenario import Scenario, known_scenarios, load_scenario
 
 __all__ = [
@@ -46,7 +46,7 @@ if not TYPE_CHECKING:
             "robot_bench.recording.run_record": ("RunRecord", "read_run"),
             "robot_bench.remote": ("RemoteBench",),
             "robot_bench.run": ("RunResult", "run_at_port", "run_scenario"),
-            "robot_bench.scenario.goals": ("Goal", "Judgement"),
+            "robot_bench.scenario.goals.judging": ("Goal", "Judgement"),
             "robot_bench.scenario.scenario": ("Scenario", "known_scenarios", "load_scenario"),
         },
     )

@@ -37,6 +37,9 @@ from p2os.pioneer.world import load_world
 from p2os.pioneer.world.model import Pose, World
 from robot_bench.adapter import RUN_ANEW, AnyAdapter, make_adapter
 from robot_bench.direct import DirectRobot, DistanceSensors, JointMotor, WheelEncoder
+from robot_bench.events.codec import events_of
+from robot_bench.events.selection import wire_named
+from robot_bench.events.stream import EventStream
 from robot_bench.loop import RunLoop
 from robot_bench.pacer import FIRST_SLICE_NS, SliceLength
 from robot_bench.recording.client_view import SipRanges
@@ -44,21 +47,20 @@ from robot_bench.recording.recorder import Recorder
 from robot_bench.recording.run_record import RunRecord, record_of
 from robot_bench.recording.trace import TraceWriter
 from robot_bench.scenario.fault_script import FaultScript
-from robot_bench.scenario.goals import Judgement, judge
+from robot_bench.scenario.goals.judging import GoalJudge, Judgement
 from robot_bench.scenario.scenario import (
     Scenario,
     ScenarioOptions,
     load_scenario,
     refuse_what_its_world_refuses,
 )
-from robot_bench.scenario.schema import nearest
 from robot_bench.scenario.world_script import WorldScript
 from robot_bench.wires.chip_pins import ChipPins
 from robot_bench.wires.endpoints import Endpoint
 from robot_bench.wires.nets import Harness, Net, OwnedPins, Strength
 from robot_bench.wires.ports import Chip
 from robot_bench.wires.serial_line import SerialLine
-from simbase.errors import UsageError, shown
+from simbase.errors import UsageError
 from simbase.state import PartState, Stateful
 from simbase.timing import NS_PER_S, Nanos, Reached
 
@@ -111,7 +113,10 @@ class Bench(Stateful):
         MissingDependencyError: The emulator or the body is not installed.
     """
 
-    STATE = ("made_of", "chip", "_harness", "_robots", "_ranges", "script", "faults", "recorder", "loop")
+    STATE = (
+        "made_of", "chip", "_harness", "_robots", "_ranges", "script", "faults", "recorder", "goals", "loop",
+        "_ends_at", "_has_told_death",
+    )  # fmt: skip
 
     def __init__(
         self,
@@ -159,14 +164,18 @@ class Bench(Stateful):
             chip, followers, observers=(self.recorder,), slice_ns=slice_ns or FIRST_SLICE_NS,
             on_slice=self._after_slice, choose_watched=self._watch_wires,
         )  # fmt: skip
+        #: When a goal's verdict ended the run; None while none has.
+        self._ends_at: Nanos | None = None
+        self._has_told_death = False
+        self.goals = GoalJudge(scenario.goals)
+        self.goals.on_end = self._end_now
+        self.goals.subscribe(self.events)
         pin_of = {wire.name: wire.bluepill for wire in pinout.wires}
-        #: Name of a wire, or of its pin → name of the wire.
-        self._wires = {pin: name for name, pin in pin_of.items()} | {name: name for name in pin_of}
         self._pins = ChipPins(chip, harness, pin_of, on_watched=self.loop.note_edge)
         if isinstance(self.parts.adapter, Adapter):
             self.parts.adapter.samples.waits_for_edges = True
         chip.usart1.far_baud = scenario.usart_baud
-        chip.usart1.subscribe(self.recorder.usart)
+        hear_usarts(chip, self.recorder)
         chip.subscribe_warnings(lambda text: self.recorder.event("chip", chip.now_ns, "warning", text))
         self.recorder.start()
 
@@ -188,6 +197,11 @@ class Bench(Stateful):
         return cls(found.with_options(**options))
 
     @property
+    def events(self) -> EventStream:
+        """What happens, for whoever subscribes; it lags up to 50 ms behind `now`."""
+        return self.recorder.events
+
+    @property
     def chip(self) -> Chip:
         """Return the chip."""
         return self.parts.chip
@@ -200,10 +214,10 @@ class Bench(Stateful):
     @property
     def end(self) -> Nanos:
         """Return when the run ends, as far as is known now."""
-        fault, duration_ns = self.chip.fault, self.scenario.duration_ns
-        return (
-            duration_ns if fault is None or not self.chip.has_died else min(duration_ns, fault.at_ns + AFTER_FAULT_NS)
-        )
+        fault, ends = self.chip.fault, [self.scenario.duration_ns]
+        if fault is not None and self.chip.has_died:
+            ends.append(fault.at_ns + AFTER_FAULT_NS)
+        return min(ends if self._ends_at is None else [*ends, self._ends_at])
 
     @property
     def now(self) -> Nanos:
@@ -220,7 +234,7 @@ class Bench(Stateful):
     @property
     def text(self) -> str:
         """All that the firmware has printed on USART1 so far, undecodable bytes replaced."""
-        printed = record_of(line for line in self.trace.lines() if '"k":"usart"' in line)
+        printed = record_of(line for line in self.recorder.lines() if '"k":"usart"' in line)
         pieces = [*(data for _, data in printed.usart), self.recorder.unfinished_text]
         return b"".join(pieces).decode("utf-8", "replace")
 
@@ -233,17 +247,15 @@ class Bench(Stateful):
         Raises:
             UsageError: There is no such wire.
         """
-        if wire not in self._wires:
-            raise UsageError(f"there is no wire {shown(wire)}", hint=nearest(wire, self._wires))
-        return self.parts.harness[self._wires[wire]].level(self.now)
+        return self.parts.harness[wire_named(wire)].level(self.now)
 
     def record(self) -> RunRecord:
         """Return what was recorded so far: poses, edges, texts, packets and the state log, each with its time."""
-        return record_of(self.trace.lines())
+        return record_of(self.recorder.lines())
 
     def judge(self) -> Judgement:
         """End the run here and judge the scenario's goals; what an unfinished run could still meet is left open."""
-        return judged(self.trace, self.scenario, self.finish())
+        return self.goals.finish(self.finish(), planned_ns=self.scenario.planned_ns)
 
     def run_until(self, end: Span, advance: Callable[[int], Reached] | None = None) -> None:
         """Run to `end`, until shortly after a fault of the firmware, or to a debugger's halt.
@@ -257,7 +269,7 @@ class Bench(Stateful):
             BluePillError: `end` is no time.
         """
         end_ns = min(to_nanos(end), self.end)
-        if end_ns > self.now and self.trace.written_until >= self.now:
+        if end_ns > self.now and self.events.released_until >= self.now:
             raise UsageError(f"the run was ended at {self.now / NS_PER_S:g} s", hint="make another Bench")
         had_died = self.chip.has_died
         self.loop.run_until(end_ns, advance)
@@ -267,9 +279,10 @@ class Bench(Stateful):
     def finish(self) -> Nanos:
         """Bring everything to the end of the run and write the rest of the trace; return the end's time."""
         end = min(self.now, self.end)
-        if self.trace.written_until >= end:
+        if self.events.released_until >= end:
             return end
         self.loop.finish(end)
+        self.goals.end_at(end, self.scenario.planned_ns)
         self.recorder.finish(end)
         return end
 
@@ -286,6 +299,8 @@ class Bench(Stateful):
             _refuse_others(made_of, self.made_of)
         super().restore(snapshot)
         self._pins.chip_restored()
+        if self.goals.is_behind:
+            self.goals.catch_up(events_of(self.trace.lines()), self.events.released_until)
 
     def __reduce__(self) -> "tuple[Callable[[str, bytes], Bench], tuple[str, bytes]]":
         if not self._is_rebuildable:
@@ -307,6 +322,9 @@ class Bench(Stateful):
             self.loop.slice_ns = self._slices.after_slice()
         if self.chip.fault is not None:
             self.loop.end_at(self.end)
+            if self.chip.has_died and not self._has_told_death:
+                self._has_told_death = True
+                self.recorder.fault("died", self.chip.verdict, self.chip.fault.at_ns)
         if self.on_slice is not None:
             self.on_slice(now)
 
@@ -314,7 +332,15 @@ class Bench(Stateful):
         for robot in self._robots:
             robot.advance_to(at)
 
+    def _end_now(self) -> None:
+        """End the run where the loop stands: a goal is decided."""
+        if self._ends_at is None:
+            self._ends_at = self.loop.now
+            self.loop.end_at(self.end)
+
     def _inject(self, words: str, at: Nanos) -> None:
+        op, _, fault = words.partition(" ")
+        self.recorder.fault("inject" if op == "fault" else op, fault, at)
         if self.parts.pioneer is not None:
             self.parts.pioneer.do(words, at)
 
@@ -406,9 +432,12 @@ def _refuse_others(saved: dict[str, object], here: dict[str, object]) -> None:
             raise UsageError(f"the bench was saved with another {what}{values}", hint=RUN_ANEW)
 
 
-def judged(trace: TraceWriter, scenario: Scenario, end: Nanos) -> Judgement:
-    """Judge a scenario's goals by what a run has recorded until its `end`."""
-    return judge(record_of(trace.lines()), scenario.goals, end_ns=end, planned_ns=scenario.planned_ns)
+def hear_usarts(chip: Chip, recorder: Recorder) -> None:
+    """Have all that a chip sends on any of its ports recorded."""
+    chip.usart1.subscribe(recorder.usart)
+    for port in ("usart2", "usart3"):
+        if (other := getattr(chip, port, None)) is not None:
+            other.subscribe(lambda sent, port=port: recorder.usart(sent, port))
 
 
 def log_bench_event(who: str, at: Nanos, what: str, detail: str) -> None:

@@ -26,10 +26,11 @@ from p2os.pioneer.body.factory import resolve_body
 from p2os.pioneer.world.model import Pose, World
 from p2os.transport import Transport
 from p2os.transport.wall_clock import Clock, wall_clock
-from robot_bench.bench import Bench, judged
+from robot_bench.bench import Bench
+from robot_bench.events.codec import Json
 from robot_bench.pacer import PACED_SLICE_NS, RealTimePacer
 from robot_bench.recording.run_folder import reserved
-from robot_bench.recording.run_record import TRACE_NAME, Json, read_run
+from robot_bench.recording.run_record import TRACE_NAME, read_run
 from robot_bench.recording.summary import INTERRUPTED, end_of_a_broken_run
 from robot_bench.recording.trace import TraceWriter
 from robot_bench.remote import RemoteBench
@@ -303,7 +304,7 @@ def _record(
     if measurement is not None:
         measured = measurement.write(folder, bench.scenario.firmware.parent)
         failures += measurement.failures
-    goals = judged(trace, bench.scenario, end)
+    goals = bench.goals.finish(end, planned_ns=bench.scenario.planned_ns)
     passed = not failures and not goals.missed
     trace.end(
         _figures(bench, end, wall_s)

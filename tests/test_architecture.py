@@ -81,7 +81,8 @@ LAYERS = {
         ("masters", "driver"), ("adapter",),
     ),
     "robot_bench": (
-        ("loop", "pacer", "firmware", "scenarios"), ("wires",), ("direct",), ("recording",), ("scenario", "report"),
+        ("loop", "pacer", "firmware", "scenarios"), ("wires",), ("events",), ("direct",), ("recording",),
+        ("scenario", "report"),
         ("adapter",), ("bench",), ("remote",), ("run", "debugging", "project"), ("cli",),
     ),
 }  # fmt: skip

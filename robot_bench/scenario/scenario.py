@@ -30,7 +30,8 @@ from p2os.toml_file import TomlSource, is_file, read_toml, read_user_text
 from robot_bench.direct.robot import DirectSettings
 from robot_bench.scenario import fault_script, world_script
 from robot_bench.scenario.fault_script import FaultChange, load_faults
-from robot_bench.scenario.goals import KINDS, Goal, load_goal
+from robot_bench.scenario.goals.judging import Goal, load_goal
+from robot_bench.scenario.goals.kinds import KINDS
 from robot_bench.scenario.schema import LONGEST_S, Key, Place, Table, Where, check_table, in_range, nearest, within
 from robot_bench.scenario.world_script import Change, load_changes, refuse_names
 from simbase.errors import FileError, UsageError, shown, shown_name
@@ -103,7 +104,7 @@ TABLES: Mapping[str, tuple[Key, ...]] = {
     "[in_world.NAME]": _IN_WORLD,
     "[[obstacle]]": world_script.KEYS,
     "[[fault]]": fault_script.KEYS,
-    "[[goal]]": tuple(key for kind in KINDS.values() for key in kind.keys),
+    **{f"[[goal]] {name}": kind.keys for name, kind in KINDS.items()},
 }
 
 
