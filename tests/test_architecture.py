@@ -81,7 +81,7 @@ LAYERS = {
         ("masters", "driver"), ("adapter",),
     ),
     "robot_bench": (
-        ("loop", "pacer", "firmware", "scenarios"), ("wires",), ("events",), ("direct",), ("recording",),
+        ("loop", "pacer", "firmware", "scenarios", "expectation"), ("wires",), ("events",), ("direct",), ("recording",),
         ("scenario", "report"),
         ("adapter",), ("bench",), ("remote",), ("run", "debugging", "project"), ("cli",),
     ),
