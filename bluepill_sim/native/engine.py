@@ -18,7 +18,7 @@ import weakref
 from collections.abc import Callable
 from typing import Any
 
-from bluepill_sim.core.accesses import Access, accesses_of, is_ambiguous, may_end_in_it, only_reads
+from bluepill_sim.core.accesses import Access, accesses_of, is_ambiguous, may_end_in_it, may_wait
 from bluepill_sim.core.block_cost import NO_BLOCK, Block
 from bluepill_sim.core.engine import Engine, StopBefore, Traps
 from bluepill_sim.core.halts import Halt, HaltKind
@@ -378,7 +378,7 @@ class NativeEngine(Engine):
             _CHANGES_MASKS * block.changes_masks | _SENDS_EVENT * block.sends_event | _SELF_LOOP * block.is_self_loop
         )
         flags |= _WRITABLE * (host is not None)
-        flags |= _READS * (only_reads(code) and not block.has_exclusive)
+        flags |= _READS * (may_wait(code) and not block.has_exclusive)
         if not is_ambiguous(code, start):
             pass
         elif (

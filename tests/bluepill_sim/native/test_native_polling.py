@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from bluepill_sim import BluePill
-from bluepill_sim.core.accesses import only_reads
+from bluepill_sim.core.accesses import may_wait, only_reads
 from tests.bluepill_sim.machine import COUNTER_ON, Machine
 from tests.bluepill_sim.native.test_native_core import state
 
@@ -141,3 +141,21 @@ CODES = [
 def test_a_store_is_seen(words: str, is_reading: bool) -> None:
     code = b"".join(int(word, 16).to_bytes(2, "little") for word in words.split())
     assert only_reads(code) is is_reading
+
+
+#: (halfwords, whether such a block may find its registers as they were one round before).
+ROUNDS = [
+    ("680B 079B D5FC", True),  # ldr, lsls, bpl
+    ("BF00 E7FD", True), ("BF00 D1FD", False),  # nop, b and bne: flags that nothing changes
+    ("680B 3A01 D1FC", False), ("680B 3201 D1FC", False), ("680B 3A00 D1FC", True),  # counts in r2, by 1 and by 0
+    ("680B 3A01 2200 D1FB", True),  # counts, and sets anew
+    ("3A01 E7FD", False), ("9A01 4293 D1FC", True), ("600B E7FD", False),
+    ("F8D1 0004 D1FB", True), ("F8DD 0004 D1FB", True), ("EA80 0001 D1FC", False),
+    ("EA80 0001 F47F AFFC", False), ("680B F47F AFFC", True),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("words", "is_waiting"), ROUNDS)
+def test_a_block_that_cannot_wait_is_not_looked_at(words: str, is_waiting: bool) -> None:
+    code = b"".join(int(word, 16).to_bytes(2, "little") for word in words.split())
+    assert may_wait(code) is is_waiting
