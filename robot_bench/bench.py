@@ -153,6 +153,8 @@ class Bench(Stateful):
         self._lines: tuple[SerialLine, ...] = ()
         #: States that `rewind` may go back to, oldest first: times and snapshots.
         self._checkpoints: list[tuple[Nanos, object]] = []
+        #: What was waited for last, and when the bench stood still after it.
+        self._expected: tuple[Nanos, Event | None] = (-1, None)
         #: What stands at the far end of the wires and owns the body.
         self._robots: list[DirectRobot | Endpoint] = []
         self._ranges: SipRanges | None = None
@@ -191,6 +193,7 @@ class Bench(Stateful):
         hear_usarts(chip, self.recorder)
         chip.subscribe_warnings(lambda text: self.recorder.event("chip", chip.now_ns, "warning", text))
         self.recorder.start()
+        self._listeners = self.events.listeners()
 
     @classmethod
     def from_scenario(cls, scenario: Scenario | str | Path, **options: Unpack[ScenarioOptions]) -> Self:
@@ -208,6 +211,10 @@ class Bench(Stateful):
         """
         found = scenario if isinstance(scenario, Scenario) else load_scenario(str(scenario))
         return cls(found.with_options(**options))
+
+    def __repr__(self) -> str:
+        what = self.scenario
+        return f"<Bench {what.name} in {what.world}, {what.mode}, at {self.now / NS_PER_S:.3f} s>"
 
     @property
     def events(self) -> EventStream:
@@ -295,10 +302,10 @@ class Bench(Stateful):
         """
         if callable(end):
             asked = end
-            self._step_until(lambda: asked(self), self._limit(within))
+            self._step_until(lambda: asked(self), self._limit(within, self.now))
             return None
         if isinstance(end, str) and (end.split() or [""])[0] in SELECTORS:
-            return self._wait_for(end, self._limit(within))
+            return self._wait_for(end, within)
         self._run_to(to_nanos(end), advance)
         return None
 
@@ -311,8 +318,8 @@ class Bench(Stateful):
         if self.chip.has_died and not had_died:
             _LOG.error("chip: %s", self.chip.verdict)
 
-    def _limit(self, within: Span | None) -> Nanos:
-        return self.end if within is None else self.now + to_nanos(within)
+    def _limit(self, within: Span | None, since: Nanos) -> Nanos:
+        return self.end if within is None else since + to_nanos(within)
 
     def _step_until(self, is_done: Callable[[], bool], limit: Nanos) -> bool:
         """Run in steps of 50 ms until something is so, or to a time; tell whether it is so."""
@@ -320,18 +327,32 @@ class Bench(Stateful):
             self._run_to(min(limit, (self.now // SAMPLE_NS + 1) * SAMPLE_NS))
         return so
 
-    def _wait_for(self, words: str, limit: Nanos) -> Event | None:
-        selector, since, found = select(words), self.now, list[Event]()
+    @property
+    def _since(self) -> Nanos:
+        """From when on the next event is waited for: from the last one, where nothing was done since."""
+        at, event = self._expected
+        return event.t if event is not None and at == self.now else self.now
+
+    def _wait_for(self, words: str, within: Span | None) -> Event | None:
+        """Run until an event happens, counted from the last one that was waited for where nothing was done since."""
+        selector, since, last = select(words), self._since, self._expected[1]
+        limit, found = self._limit(within, since), list[Event]()
 
         def take(event: Event) -> None:
-            if selector.takes(event) and event.t >= since:
+            if selector.takes(event) and since <= event.t <= limit and (event.t > since or event != last):
                 found.append(event)
 
+        if since < self.now:
+            for event in events_of(self.trace.lines()):
+                if type(event) in selector.kinds:
+                    take(event)
         end = self.events.subscribe(take, *selector.kinds, wires=selector.wires)
         try:
-            self._step_until(lambda: bool(found), limit)
+            # What happened until the limit is told at the pose after it.
+            self._step_until(lambda: bool(found), -(-limit // SAMPLE_NS) * SAMPLE_NS)
         finally:
             end()
+        self._expected = (self.now, found[0]) if found else (-1, None)
         return found[0] if found else None
 
     def expect(self, words: str, within: Span | None = None) -> Event:
@@ -339,16 +360,18 @@ class Bench(Stateful):
 
         Args:
             words: As of `robot_bench.events.selection`: "contact", "pin PB12 high", "robot stops".
-            within: How long to wait from now on; None waits to the end of the run.
+            within: How long to wait: from the event on that was expected last, where nothing was done since, else from
+                now on. So a second `expect` is an exact bound of a latency. None waits to the end of the run.
 
         Raises:
             ExpectationError: It did not happen; the message has the last events.
             UsageError: The words mean no events.
         """
-        since = self.now
-        found = self._wait_for(words, self._limit(within))
+        since = self._since
+        found = self._wait_for(words, within)
         if found is None:
-            raise self._unmet(f"{words!r} did not happen", since)
+            __tracebackhide__ = True
+            raise self._unmet(f"{words!r} did not happen", since, self._limit(within, since))
         return found
 
     def expect_no(self, words: str, during: Span) -> None:
@@ -358,9 +381,10 @@ class Bench(Stateful):
             ExpectationError: It happened.
             UsageError: The words mean no events.
         """
-        since = self.now
-        found = self._wait_for(words, self._limit(during))
+        since = self._since
+        found = self._wait_for(words, during)
         if found is not None:
+            __tracebackhide__ = True
             raise self._unmet(f"{words!r} happened at {found.t / NS_PER_S:.3f} s", since)
 
     def expect_text(self, text: str | re.Pattern[str], within: Span | None = None) -> Event:
@@ -369,6 +393,7 @@ class Bench(Stateful):
         Raises:
             ExpectationError: It did not.
         """
+        __tracebackhide__ = True
         words = f"sends {text}" if isinstance(text, str) else f"matches {text.pattern}"
         return self.expect(f"usart1 {words}", within)
 
@@ -379,6 +404,7 @@ class Bench(Stateful):
             ExpectationError: It had not.
             UsageError: There is no such wire or level.
         """
+        __tracebackhide__ = True
         select(f"pin {pin} {level}")
         if self.level(pin) is not (level == "high"):
             self.expect(f"pin {pin} {level}", within)
@@ -406,7 +432,8 @@ class Bench(Stateful):
             turn = 0.0 if heading_deg is None else pose.heading_rad - math.radians(heading_deg)
             return off_m <= tolerance_m and abs(math.remainder(turn, math.tau)) <= math.radians(tolerance_deg)
 
-        if not self._step_until(is_there, self._limit(within)):
+        if not self._step_until(is_there, self._limit(within, since)):
+            __tracebackhide__ = True
             rows = (("x", x_m, " m"), ("y", y_m, " m"), ("heading", heading_deg, "°"))
             wanted = ", ".join(f"{name} {value:g}{unit}" for name, value, unit in rows if value is not None)
             pose = self.pose
@@ -414,9 +441,10 @@ class Bench(Stateful):
             raise self._unmet(f"the robot was not at {wanted}; it is at {here}", since)
         return self.pose
 
-    def _unmet(self, what: str, since: Nanos) -> ExpectationError:
+    def _unmet(self, what: str, since: Nanos, limit: Nanos | None = None) -> ExpectationError:
+        until = self.now if limit is None else min(limit, self.now)
         return ExpectationError(
-            f"{what}, from {since / NS_PER_S:.3f} s to {self.now / NS_PER_S:.3f} s", self.last_events()
+            f"{what}, from {since / NS_PER_S:.3f} s to {until / NS_PER_S:.3f} s", self.last_events()
         )
 
     def last_events(self, count: int = 8) -> list[str]:
@@ -500,6 +528,7 @@ class Bench(Stateful):
     def _intervene(self, script: Timeline[T], changes: Sequence[T]) -> None:
         """Add changes to what a scenario has; `rewind` will not go on through them, but begin after them."""
         self._refuse_the_ended()
+        self._expected = -1, None
         script.add(*changes, now=self.now)
         self.checkpoint()
 
@@ -532,6 +561,17 @@ class Bench(Stateful):
         self._checkpoints = [(t, snapshot) for t, snapshot in self._checkpoints if t <= at]
         self.restore(self._checkpoints[-1][1] if self._checkpoints else self._at_beginning())
         self._run_to(at)
+
+    def restart(self, snapshot: object) -> None:
+        """Go back to a state as if it had just been built: who listens to events or slices since then does no more.
+
+        Raises:
+            TypeError, UsageError, FileError: As of `restore`.
+        """
+        self.events.drop_later(self._listeners)
+        self.on_slice = None
+        self._checkpoints.clear()
+        self.restore(snapshot)
 
     def fork(self) -> "Bench":
         """Return a bench that goes on from here by itself, with its trace in memory; this one goes on too.
@@ -586,6 +626,7 @@ class Bench(Stateful):
             _refuse_others(made_of, self.made_of)
         super().restore(snapshot)
         self._pins.chip_restored()
+        self._expected = -1, None
         if self.goals.is_behind:
             self.goals.catch_up(events_of(self.trace.lines()), self.events.released_until)
 

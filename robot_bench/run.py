@@ -171,6 +171,29 @@ def run_at_port(
         return _record(bench, trace, folder, pacer, clock, drive)
 
 
+def write_run(bench: Bench, folder: Path, failure: str = "") -> Path:
+    """Write what a bench with its trace in memory has recorded so far as a run folder; return its report's path.
+
+    Args:
+        bench: Stays as it is.
+        folder: Made where it is missing; a run that is there is overwritten.
+        failure: Why it failed; empty where it did not.
+
+    Raises:
+        UsageError: The folder holds something that is no run, or is written by another run.
+        FileError: It cannot be written.
+    """
+    end = end_of_a_broken_run(bench.record(), failure) | {"trace_sha256": bench.trace.sha256}
+    if not failure:
+        end |= {"passed": True, "failures": []}
+    meta = meta_of(bench.scenario, bench.parts.world, bench.note, is_at_port=False)
+    with reserved(folder, force=True), contextlib.closing(TraceWriter(folder / TRACE_NAME)) as trace:
+        trace.meta(meta)
+        trace.copy(bench.recorder.lines())
+        trace.end(end)
+        return make_artefacts(folder).report
+
+
 def meta_of(scenario: Scenario, world: World | None, note: str | None, *, is_at_port: bool) -> Json:
     """Return the trace's first line: what was run, where, with what robot; no world is one that is not known."""
     parameters = scenario.parameters

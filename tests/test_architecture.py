@@ -49,6 +49,7 @@ ALLOWED = {
     "adapter_sim": {"p2os"},
     "robot_bench": {"p2os", "bluepill_sim", "adapter_sim", "typer", "rich", "click"},
     "robot_bench.report": {"p2os", "matplotlib"},
+    "robot_bench.pytest_plugin": {"p2os", "bluepill_sim", "pytest"},
 }
 
 #: The I/O layer: what may read a clock, open a port or start a thread.
@@ -83,7 +84,7 @@ LAYERS = {
     "robot_bench": (
         ("loop", "pacer", "firmware", "scenarios", "expectation"), ("wires",), ("events",), ("direct",), ("recording",),
         ("scenario", "report"),
-        ("adapter",), ("bench",), ("remote",), ("run", "debugging", "project"), ("cli",),
+        ("adapter",), ("bench",), ("remote",), ("run", "debugging", "project"), ("cli", "pytest_plugin"),
     ),
 }  # fmt: skip
 

@@ -71,6 +71,18 @@ class EventStream(Stateful):
         """Have `recorder` called after each release with all of it, edges in blocks, and its limit."""
         self._recorders.append(recorder)
 
+    def listeners(self) -> object:
+        """Return who listens now, for `drop_later`."""
+        copies = [{key: [*sinks] for key, sinks in table.items()} for table in (self._sinks, self._wires)]
+        return copies, [*self._at_limit], [*self._recorders]
+
+    def drop_later(self, listeners: Any) -> None:
+        """Have nobody listen but those who did when `listeners` was asked."""
+        (sinks, wires), at_limit, recorders = listeners
+        self._sinks = {key: [*kept] for key, kept in sinks.items()}
+        self._wires = {key: [*kept] for key, kept in wires.items()}
+        self._at_limit, self._recorders = [*at_limit], [*recorders]
+
     def at_limit(self, listener: Callable[[Nanos], None]) -> Callable[[], None]:
         """Have `listener` called when all events up to a time were handed on; return a function that ends it."""
         self._at_limit.append(listener)

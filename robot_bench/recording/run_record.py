@@ -39,11 +39,12 @@ from robot_bench.events.kinds import (
     WorldChange,
 )
 from robot_bench.wires.edges import Edges
+from simbase.timing import NS_PER_S
 
 TRACE_NAME = "trace.jsonl"
 
 
-@dataclass(slots=True, kw_only=True)
+@dataclass(slots=True, kw_only=True, repr=False)
 class RunRecord:
     """All that a trace holds, sorted by kind, each list in order of time."""
 
@@ -68,6 +69,12 @@ class RunRecord:
     last_ns: int = 0
     #: True where the trace has no end line, or its last line was cut.
     is_cut: bool = True
+
+    def __repr__(self) -> str:
+        name = self.meta.get("scenario", "a run")
+        return (
+            f"<RunRecord of {name}, {self.last_ns / NS_PER_S:g} s, {len(self.poses)} poses, {len(self.events)} notes>"
+        )
 
     @property
     def usart_text(self) -> str:

@@ -16,6 +16,7 @@ from robot_bench.recording.trace import TraceWriter
 from robot_bench.scenario.scenario import load_scenario
 from simbase.errors import UsageError
 from tests.robot_bench.test_bench import S, bench, scenario
+from tests.robot_bench.wires.fake_chip import FakeChip, PinDrive
 
 MS = 10**6
 
@@ -38,9 +39,33 @@ def test_a_bench_runs_until_an_event_and_stands_soon_after_it() -> None:
     edge = one.run_until("pin PB7 high", within="1 s")
     assert edge == PinEdge(t=S, wire="motor1_comm1", level=True)
     assert one.run_until("pin PB12 low", within="200 ms") is None
-    assert one.now == pytest.approx(1250 * MS, abs=MS)
+    assert one.now == pytest.approx(1200 * MS, abs=MS), "counted from the edge"
     one.run_until(lambda now: now.pose.x_m > -1.0 or now.now > 2 * S)
     assert one.now <= 2 * S + MS
+
+
+@pytest.mark.parametrize(("within", "comes"), [("299 ns", False), ("300 ns", True), ("301 ns", True)])
+def test_an_expectation_after_another_is_a_bound_of_the_time_between(within: str, comes: bool) -> None:
+    one = made()
+    first = one.expect("pin PB7 high")
+    assert first.t < one.now - MS
+    if comes:
+        assert one.expect("pin PB6 high", within=within).t == first.t + 300
+    else:
+        with pytest.raises(ExpectationError, match=r"'pin PB6 high' did not happen, from 1\.000 s"):
+            one.expect("pin PB6 high", within=within)
+    one.run_until("2.6 s")
+    with pytest.raises(ExpectationError, match=r"from 2\.600 s"):
+        one.expect("pin PB7 changes", within="100 ms")
+
+
+def test_what_happened_at_the_very_instant_is_not_missed_and_not_taken_twice() -> None:
+    chip = FakeChip([(0, "PB13", PinDrive.LOW), (0, "PB7", PinDrive.LOW), (0, "PB6", PinDrive.LOW),
+                     (S, "PB7", PinDrive.HIGH), (S, "PB6", PinDrive.HIGH)])  # fmt: skip
+    one = Bench(scenario("direct"), chip=chip)
+    assert one.expect("pin PB7 high").t == one.expect("pin PB6 high", within="1 ns").t == S
+    with pytest.raises(ExpectationError):
+        one.expect("pin PB6 high", within="200 ms")
 
 
 def test_waiting_changes_nothing() -> None:
