@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from robot_bench.bench import Bench, BenchParts
     from robot_bench.events.codec import events_of
     from robot_bench.events.kinds import Event
-    from robot_bench.expectation import ExpectationError
+    from robot_bench.events.expectation import ExpectationError
     from robot_bench.recording.run_record import RunRecord, read_run
     from robot_bench.remote import RemoteBench
     from robot_bench.run import RunResult, run_at_port, run_scenario
@@ -55,7 +55,7 @@ if not TYPE_CHECKING:
             "robot_bench.bench": ("Bench", "BenchParts"),
             "robot_bench.events.codec": ("events_of",),
             "robot_bench.events.kinds": ("Event",),
-            "robot_bench.expectation": ("ExpectationError",),
+            "robot_bench.events.expectation": ("ExpectationError",),
             "robot_bench.recording.run_record": ("RunRecord", "read_run"),
             "robot_bench.remote": ("RemoteBench",),
             "robot_bench.run": ("RunResult", "run_at_port", "run_scenario"),

@@ -44,7 +44,7 @@ from robot_bench.events.kinds import Event
 from robot_bench.events.selection import SELECTORS, select, wire_named
 from robot_bench.events.stream import EventStream
 from robot_bench.events.words import last_words
-from robot_bench.expectation import ExpectationError
+from robot_bench.events.expectation import ExpectationError
 from robot_bench.loop import RunLoop
 from robot_bench.pacer import FIRST_SLICE_NS, SliceLength
 from robot_bench.recording.client_view import SipRanges

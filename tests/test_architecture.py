@@ -49,7 +49,7 @@ ALLOWED = {
     "adapter_sim": {"p2os"},
     "robot_bench": {"p2os", "bluepill_sim", "adapter_sim", "typer", "rich", "click"},
     "robot_bench.report": {"p2os", "matplotlib"},
-    "robot_bench.pytest_plugin": {"p2os", "bluepill_sim", "pytest"},
+    "robot_bench.cli.pytest_plugin": {"p2os", "bluepill_sim", "pytest"},
 }
 
 #: The I/O layer: what may read a clock, open a port or start a thread.
@@ -82,9 +82,9 @@ LAYERS = {
         ("masters", "driver"), ("adapter",),
     ),
     "robot_bench": (
-        ("loop", "pacer", "firmware", "scenarios", "expectation"), ("wires",), ("events",), ("direct",), ("recording",),
+        ("loop", "pacer", "firmware", "scenarios"), ("wires",), ("events",), ("direct",), ("recording",),
         ("scenario", "report"),
-        ("adapter",), ("bench",), ("remote",), ("run", "debugging", "project"), ("cli", "pytest_plugin"),
+        ("adapter",), ("bench",), ("remote",), ("run", "project"), ("cli",),
     ),
 }  # fmt: skip
 

@@ -8,7 +8,7 @@ import pytest
 
 pytest_plugins = ("pytester",)
 
-PLUGIN = ("-p", "robot_bench.pytest_plugin", "-p", "no:cacheprovider", "-p", "no:xdist")
+PLUGIN = ("-p", "robot_bench.cli.pytest_plugin", "-p", "no:cacheprovider", "-p", "no:xdist")
 SETTINGS = "[pytest]\nbench_scenario = motors\n"
 
 
