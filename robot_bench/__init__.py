@@ -17,8 +17,8 @@ from simbase.lazy import lazily
 if TYPE_CHECKING:
     from robot_bench.bench import Bench, BenchParts
     from robot_bench.events.codec import events_of
-    from robot_bench.events.kinds import Event
     from robot_bench.events.expectation import ExpectationError
+    from robot_bench.events.kinds import Event
     from robot_bench.recording.run_record import RunRecord, read_run
     from robot_bench.remote import RemoteBench
     from robot_bench.run import RunResult, run_at_port, run_scenario

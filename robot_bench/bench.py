@@ -40,11 +40,11 @@ from p2os.pioneer.world.model import Pose, World
 from robot_bench.adapter import RUN_ANEW, AnyAdapter, make_adapter
 from robot_bench.direct import DirectRobot, DistanceSensors, JointMotor, WheelEncoder
 from robot_bench.events.codec import events_of
+from robot_bench.events.expectation import ExpectationError
 from robot_bench.events.kinds import Event
 from robot_bench.events.selection import SELECTORS, select, wire_named
 from robot_bench.events.stream import EventStream
 from robot_bench.events.words import last_words
-from robot_bench.events.expectation import ExpectationError
 from robot_bench.loop import RunLoop
 from robot_bench.pacer import FIRST_SLICE_NS, SliceLength
 from robot_bench.recording.client_view import SipRanges

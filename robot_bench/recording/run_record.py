@@ -8,7 +8,7 @@ Invariant: reading never fails on a trace that ends early; it fails with
 `TraceError` on a folder that holds no trace at all.
 """
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, cast
@@ -23,10 +23,12 @@ from robot_bench.events.codec import (
     damaged,
     entries_of,
     event_of,
+    events_of,
 )
 from robot_bench.events.kinds import (
     Clearance,
     Contact,
+    Event,
     Fault,
     Note,
     Packet,
@@ -99,14 +101,30 @@ def read_run(folder: Path) -> RunRecord:
     Raises:
         TraceError: The folder or its trace is missing, or its first line is no trace.
     """
-    path = folder / TRACE_NAME
-    if not path.is_file():
-        raise TraceError(f"{folder} holds no {TRACE_NAME}", hint="give the folder that `p2os run --out DIR` wrote")
+    path = _trace_in(folder)
     with path.open(encoding="utf-8", errors="replace") as lines:
         record = record_of(lines, str(path))
     if not record.meta:
         raise TraceError(f"{path} does not start with a trace's meta line", hint="was it made by `p2os run`?")
     return record
+
+
+def read_events(folder: Path) -> Iterator[Event]:
+    """Play back a run folder's trace.
+
+    Raises:
+        TraceError: The folder or its trace is missing, or a line is damaged.
+    """
+    path = _trace_in(folder)
+    with path.open(encoding="utf-8", errors="replace") as lines:
+        yield from events_of(lines, str(path))
+
+
+def _trace_in(folder: Path) -> Path:
+    path = folder / TRACE_NAME
+    if not path.is_file():
+        raise TraceError(f"{folder} holds no {TRACE_NAME}", hint="give the folder that `p2os run --out DIR` wrote")
+    return path
 
 
 def record_of(lines: Iterable[str], where: str = "the trace") -> RunRecord:

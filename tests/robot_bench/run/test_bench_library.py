@@ -10,8 +10,8 @@ import pytest
 from p2os.errors import ScenarioError, WorldError
 from robot_bench.bench import Bench
 from robot_bench.events.codec import events_of
-from robot_bench.events.kinds import Fault, PinEdge, Pose, WorldChange
 from robot_bench.events.expectation import ExpectationError
+from robot_bench.events.kinds import Fault, PinEdge, Pose, WorldChange
 from robot_bench.recording.trace import TraceWriter
 from robot_bench.scenario.scenario import load_scenario
 from simbase.errors import UsageError
