@@ -60,6 +60,7 @@ from robot_bench.scenario.scenario import (
     refuse_what_its_world_refuses,
 )
 from robot_bench.scenario.timeline import Timed, Timeline
+from robot_bench.scenario.when_script import WhenScript
 from robot_bench.scenario.world_script import WorldScript, load_changes
 from robot_bench.wires.chip_pins import ChipPins
 from robot_bench.wires.endpoints import Endpoint
@@ -83,7 +84,7 @@ Condition: TypeAlias = "str | Callable[[Bench], bool]"
 #: What decides a run besides its files; its end and its goals may be others after a restart.
 DECISIVE = (
     "mode", "seed", "parameters", "threshold_um", "usart_baud", "start", "direct", "adapter", "adapter_core",
-    "controller", "changes", "faults",
+    "controller", "changes", "faults", "whens",
 )  # fmt: skip
 _VERSION = "version of p2os"
 
@@ -123,7 +124,7 @@ class Bench(Stateful):
     """
 
     STATE = (
-        "made_of", "chip", "_harness", "_robots", "_ranges", "script", "faults", "recorder", "goals", "loop",
+        "made_of", "chip", "_harness", "_robots", "_ranges", "script", "faults", "whens", "recorder", "goals", "loop",
         "_ends_at", "_has_told_death",
     )  # fmt: skip
 
@@ -182,6 +183,11 @@ class Bench(Stateful):
         #: When a goal's verdict ended the run; None while none has.
         self._ends_at: Nanos | None = None
         self._has_told_death = False
+        self.whens = WhenScript(
+            scenario.whens, on_end=self._end_now,
+            on_change=lambda changes: self.script.add(*changes), on_fault=lambda faults: self.faults.add(*faults),
+        )  # fmt: skip
+        self.whens.subscribe(self.events)
         self.goals = GoalJudge(scenario.goals)
         self.goals.on_end = self._end_now
         self.goals.subscribe(self.events)
@@ -677,7 +683,7 @@ class Bench(Stateful):
 
     def _build(self, pinout: Pinout, world: World, body: RobotBody, chip: Chip, harness: Harness) -> BenchParts:
         if self.scenario.mode == "direct":
-            if self.scenario.faults:
+            if self.scenario.faults or any(when.faults for when in self.scenario.whens):
                 raise ScenarioError(
                     f"{self.scenario.name}: [[fault]] acts on the robot's controller, and mode direct has none",
                     hint="--mode adapter",

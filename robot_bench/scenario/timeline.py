@@ -37,7 +37,7 @@ class Timeline(Stateful, Generic[T]):
         self._apply_change = apply
         self._done = 0
 
-    def add(self, *changes: T, now: Nanos) -> None:
+    def add(self, *changes: T, now: Nanos = -1) -> None:
         """Take more changes, and make those that are due by `now`.
 
         Raises:
