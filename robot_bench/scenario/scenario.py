@@ -42,7 +42,10 @@ MODES = ("direct", "adapter")
 #: What runs in the adapter's place: the Python model, or the firmware's C++ core.
 ADAPTER_CORES = ("model", "firmware")
 
+#: Of the schema of scenario files.
+SCHEMA_VERSION = 1
 _TOP = (
+    Key(name="version", kind="whole", least=1, most=SCHEMA_VERSION),
     Key(name="description", kind="text"),
     Key(name="firmware", kind="text", required=True),
     Key(name="world", kind="text", required=True),

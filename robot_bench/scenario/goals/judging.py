@@ -21,9 +21,10 @@ from simbase.errors import UsageError, shown
 from simbase.state import PartState, Stateful
 from simbase.timing import NS_PER_S, Nanos
 
-#: What every goal may say: when its verdict ends the run.
+#: When a verdict ends the run.
 _ENDS_RUN = Key(name="ends_run", kind="text", choices=("met", "missed", "decided"))
-_COMMON = (Key(name="kind", kind="text", required=True), _ENDS_RUN)
+#: What every goal may say.
+COMMON = (Key(name="kind", kind="text", required=True), _ENDS_RUN)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -73,7 +74,7 @@ def load_goal(table: Table, where: Where) -> Goal:
     Raises:
         ScenarioError: The kind or a key is unknown, or a value is wrong.
     """
-    check_table({name: table[name] for name in ("kind", "ends_run") if name in table}, _COMMON, where)
+    check_table({name: table[name] for name in ("kind", "ends_run") if name in table}, COMMON, where)
     name = str(table["kind"])
     kind = kind_named(name)
     if kind is None:
