@@ -44,10 +44,11 @@ from p2os.pioneer.world import load_world
 from p2os.pioneer.world.model import World
 from p2os.protocol.profiles import Profile
 from p2os.robots.parameters import RobotParameters, load_parameters
+from robot_bench.events.codec import events_of
 from robot_bench.recording.run_record import read_run
 from robot_bench.recording.summary import outcome_of
 from robot_bench.report.page import page_data, render_page
-from robot_bench.scenario.goals import judge
+from robot_bench.scenario.goals.judging import judge
 from robot_bench.scenario.scenario import Scenario, known_scenarios, read_scenario
 from robot_bench.scenario.world_script import WorldScript
 from simbase.errors import P2osError
@@ -189,7 +190,8 @@ def use_trace(path: Path, _rng: random.Random) -> None:
     record = read_run(path.parent)
     json.dumps(outcome_of(record))
     render_page(record, page_data(record))
-    judge(record, read_scenario(_shipped_scenario("dodge")).goals, end_ns=record.last_ns)
+    with path.open(encoding="utf-8", errors="replace") as lines:
+        judge(events_of(lines), read_scenario(_shipped_scenario("dodge")).goals, end_ns=record.last_ns)
 
 
 # What is right ------------------------------------------------------------------------------

@@ -6,7 +6,8 @@ from dataclasses import replace
 import pytest
 
 from p2os.protocol.packets import EncoderPacket
-from robot_bench.recording.run_record import Event, RunRecord, WireChunk
+from robot_bench.events.kinds import Contact, Note, Packet, WorldChange
+from robot_bench.recording.run_record import RunRecord
 from robot_bench.report.page import page_data, render_page
 from robot_bench.report.thinning import ends, extremes, pulses
 from robot_bench.wires.edges import Edges
@@ -33,14 +34,14 @@ def long_run(seconds: int) -> RunRecord:
         sonar=sonar,
         pins=pins,
         usart=[(n * 100 * MS, f"line {n}\n".encode()) for n in range(seconds * 10)],
-        wire=[WireChunk(t=n * 50 * MS, direction="r2c", data=PACKET) for n in range(seconds * 20)],
+        wire=[Packet(t=n * 50 * MS, direction="r2c", data=PACKET) for n in range(seconds * 20)],
         events=[
-            Event(t=n * 500 * MS, who="adapter", what="command", detail="VEL 188, RVEL 0 (motors 3, 3)")
+            Note(t=n * 500 * MS, who="adapter", what="command", detail="VEL 188, RVEL 0 (motors 3, 3)")
             for n in range(seconds * 2)
-        ]
-        + [Event(t=seconds // 2 * S, who="body", what="collision", detail="'crate' at x 1.000 m, y 0.000 m")],
-        obstacles=[{"k": "obstacle", "op": "move", "name": "dog", "t": n * 50 * MS, "x": 1.0, "y": n * 1e-3,
-                    "heading": 0.0} for n in range(seconds * 20)],
+        ],
+        contacts=[Contact(t=seconds // 2 * S, what="'crate'", x_m=1.0, y_m=0.0)],
+        changes=[WorldChange(t=n * 50 * MS, op="move", name="dog", fields={"x": 1.0, "y": n * 1e-3, "heading": 0.0})
+                 for n in range(seconds * 20)],
         last_ns=seconds * S,
         is_cut=False,
     )  # fmt: skip
