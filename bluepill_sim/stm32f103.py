@@ -17,6 +17,7 @@ from bluepill_sim.fabric.pins import PinBank, PinPorts
 from bluepill_sim.fabric.ports import ChipPorts
 from bluepill_sim.fabric.registers import ClockBit, Peripheral, Place
 from bluepill_sim.peripherals.afio import Afio
+from bluepill_sim.peripherals.crc import Crc
 from bluepill_sim.peripherals.exti import Exti
 from bluepill_sim.peripherals.flash import Flash
 from bluepill_sim.peripherals.gpio import Gpio
@@ -166,6 +167,7 @@ PERIPHERALS: tuple[tuple[_Maker, str], ...] = (
     (Usart, "USART3"),
     (Iwdg, "IWDG"),
     (Wwdg, "WWDG"),
+    (Crc, "CRC"),
 )
 
 

@@ -25,6 +25,7 @@ PERIPHERALS = {
     **{f"USART{number}": {"SR": 0xC0} for number in (1, 2, 3)},
     "IWDG": {"RLR": 0xFFF},
     "WWDG": {"CR": 0x7F, "CFR": 0x7F},
+    "CRC": {"DR": 0xFFFF_FFFF},
 }
 #: Reset values of the core's registers; GPIOA's IDR apart, nothing here depends on the outside.
 CORE = {
