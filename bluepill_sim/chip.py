@@ -26,6 +26,7 @@ from bluepill_sim.core.processor import FaultListener
 from bluepill_sim.core.system_control import PPB_BASE, PPB_BYTES, SystemControl
 from bluepill_sim.fabric.clocks import Clocks
 from bluepill_sim.fabric.cycle_clock import CycleClock
+from bluepill_sim.fabric.power import Power
 from bluepill_sim.fabric.registers import Peripheral
 from bluepill_sim.memory import Memory
 from bluepill_sim.native.processor import make_core
@@ -72,6 +73,7 @@ class Chip(Stateful):
         "pins",
         "parts",
         "clocks",
+        "power",
         "_clock",
         "_bus",
         "_stop_requested",
@@ -96,6 +98,7 @@ class Chip(Stateful):
         self.on_reset: Callable[[ResetCause], None] | None = None
         self._on_warning = on_warning
         self.clocks = Clocks()
+        self.power = Power()
         self._clock = CycleClock(self.clocks.hclk_hz)
         #: Called before each reset, for tools.
         self.reset_listeners: list[Callable[[], None]] = []
@@ -293,6 +296,11 @@ class Chip(Stateful):
         if part is not None:
             part.reset()
             self.processor.stop_at_boundary()
+
+    def reset_backup_domain(self) -> None:
+        """Reset what the backup domain holds."""
+        self.parts.reset_backup_domain()
+        self.processor.stop_at_boundary()
 
     def request_reset(self) -> None:
         """Reset the chip at the boundary of the running block (SYSRESETREQ)."""

@@ -17,12 +17,15 @@ from bluepill_sim.fabric.pins import PinBank, PinPorts
 from bluepill_sim.fabric.ports import ChipPorts
 from bluepill_sim.fabric.registers import ClockBit, Peripheral, Place
 from bluepill_sim.peripherals.afio import Afio
+from bluepill_sim.peripherals.bkp import Bkp
 from bluepill_sim.peripherals.crc import Crc
 from bluepill_sim.peripherals.exti import Exti
 from bluepill_sim.peripherals.flash import Flash
 from bluepill_sim.peripherals.gpio import Gpio
 from bluepill_sim.peripherals.iwdg import Iwdg
+from bluepill_sim.peripherals.pwr import Pwr
 from bluepill_sim.peripherals.rcc import Rcc, ResetCause
+from bluepill_sim.peripherals.rtc import Rtc
 from bluepill_sim.peripherals.usart import Usart
 from bluepill_sim.peripherals.wwdg import Wwdg
 from simbase.state import Stateful
@@ -168,6 +171,9 @@ PERIPHERALS: tuple[tuple[_Maker, str], ...] = (
     (Iwdg, "IWDG"),
     (Wwdg, "WWDG"),
     (Crc, "CRC"),
+    (Bkp, "BKP"),
+    (Rtc, "RTC"),
+    (Pwr, "PWR"),
 )
 
 
@@ -176,6 +182,8 @@ PERIPHERALS: tuple[tuple[_Maker, str], ...] = (
 WIRING: dict[str, tuple[int | str, ...]] = {
     "WWDG.irq": (0,),
     "EXTI.pvd_irq": (1,),
+    "BKP.irq": (2,),
+    "RTC.irq": (3,),
     "FLASH.irq": (4,),
     "RCC.irq": (5,),
     "EXTI.0": (6,),
@@ -192,7 +200,8 @@ WIRING: dict[str, tuple[int | str, ...]] = {
     "EXTI.usb_wakeup_irq": (42,),
     # EXTI 16 to 18 (RM0008 10.2.5).
     "PWR.pvd": ("EXTI.pvd",),
-    "RTC.alarm": ("EXTI.rtc_alarm",),
+    "RTC.alarm": ("EXTI.rtc_alarm", "BKP.alarm", "PWR.alarm"),
+    "RTC.second": ("BKP.second",),
     "USB.wakeup": ("EXTI.usb_wakeup",),
 }
 #: The first line that is no interrupt.
@@ -222,6 +231,11 @@ class ChipParts(Stateful):
         return cast("Exti", self.by_name["EXTI"])
 
     @property
+    def pwr(self) -> Pwr:
+        """Power control."""
+        return cast("Pwr", self.by_name["PWR"])
+
+    @property
     def has_running_watchdog(self) -> bool:
         """Whether a watchdog will reset the chip unless it is fed."""
         iwdg, wwdg = cast("Iwdg", self.by_name["IWDG"]), cast("Wwdg", self.by_name["WWDG"])
@@ -234,9 +248,17 @@ class ChipParts(Stateful):
     def reset(self, cause: ResetCause) -> None:
         """Reset every peripheral; the clocks first, so that the old ones are not taken for too fast."""
         self.rcc.reset(cause)
+        if cause is ResetCause.POWER:
+            self.reset_backup_domain()
+            self.pwr.forget_flags()
         for part in self.by_name.values():
             if part is not self.rcc:
                 part.reset()
+
+    def reset_backup_domain(self) -> None:
+        """Reset what VBAT keeps."""
+        for part in self.by_name.values():
+            part.backup_reset()
 
     def clock_changed(self) -> None:
         """Notify every peripheral that the frequencies have changed."""

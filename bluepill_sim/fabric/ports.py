@@ -1,7 +1,7 @@
 """What a peripheral needs of the chip around it.
 
-Peripherals never import each other: they meet at pins, at IRQ lines, at the
-clocks, and at nothing else. The chip (`chip.py`) implements this protocol;
+Peripherals never import each other: they meet at pins, at lines, at the
+clocks, at the supply, and at nothing else. The chip (`chip.py`) implements this protocol;
 the tests have a fake that passes the same contract test.
 """
 
@@ -9,6 +9,7 @@ from typing import Protocol
 
 from bluepill_sim.fabric.clocks import Clocks
 from bluepill_sim.fabric.pins import PinBank
+from bluepill_sim.fabric.power import Power
 
 
 class ChipPorts(Protocol):
@@ -30,6 +31,11 @@ class ChipPorts(Protocol):
         ...
 
     @property
+    def power(self) -> Power:
+        """The one shared object of the supply; PWR writes it."""
+        ...
+
+    @property
     def pins(self) -> PinBank:
         """The one shared bank of pins; GPIO, AFIO and the alternate functions write it."""
         ...
@@ -44,6 +50,10 @@ class ChipPorts(Protocol):
 
     def reset_peripheral(self, name: str) -> None:
         """Call `reset` of the peripheral `name`, if it is modelled (RCC's APBxRSTR)."""
+        ...
+
+    def reset_backup_domain(self) -> None:
+        """Call `backup_reset` of every peripheral (BDRST of RCC_BDCR)."""
         ...
 
     def watchdog_expired(self, name: str) -> None:

@@ -14,7 +14,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from enum import Enum
 
-from bluepill_sim.fabric.clocks import HSI_HZ, illegal_settings
+from bluepill_sim.fabric.clocks import HSI_HZ, LSE_HZ, illegal_settings
 from bluepill_sim.fabric.ports import ChipPorts
 from bluepill_sim.fabric.registers import ClockBit, Peripheral, Place, Register, bits
 
@@ -35,6 +35,10 @@ _SW = bits((1, 0))
 #: MCO: 0xx is no clock.
 _MCO_ON = 1 << 26
 _BDRST = 1 << 16
+#: BDCR: RTCSEL's place, which keeps its first choice; RTCEN.
+_RTCSEL_AT, _RTCSEL, _RTCEN = 8, bits((9, 8)), 1 << 15
+#: HSE is divided by this for the RTC.
+_RTC_HSE_DIVIDER = 128
 _RMVF = 1 << 24
 _CSR_FLAGS = bits((31, 26))
 
@@ -83,7 +87,7 @@ OSCILLATORS = (
     Oscillator("LSE", BDCR, 1, 2, 1, 1_500_000_000),  # DS5319 table 23: 1.5 s typical
     Oscillator("LSI", CSR, 1, 2, 0, 85_000),  # DS5319 table 25: at most 85 µs
 )
-_HSE, _PLL = 1, 2
+_HSE, _PLL, _LSE, _LSI = 1, 2, 3, 4
 #: CR's ready bit by SW.
 _SOURCE_READY = (HSIRDY, HSERDY, PLLRDY)
 
@@ -232,9 +236,19 @@ class Rcc(Peripheral):
     def _write_apb1rstr(self, _written: int, previous: int) -> None:
         self._reset_peripherals(APB1ENR, self.words[APB1RSTR] & ~previous)
 
-    def _write_bdcr(self, written: int, _previous: int) -> None:
+    def _write_bdcr(self, written: int, previous: int) -> None:
+        if not self.chip.power.is_backup_open:
+            self.words[BDCR] = previous
+            self.chip.warn("RCC_BDCR: written while PWR_CR DBP is 0: ignored", once="RCC:dbp")
+            return
+        if (chosen := previous & _RTCSEL) and (written & _RTCSEL) != chosen and not written & _BDRST:
+            self.words[BDCR] = self.words[BDCR] & ~_RTCSEL | chosen
+            self.chip.warn("RCC_BDCR: RTCSEL changes only by a reset with BDRST: ignored", once="RCC:rtcsel")
         if written & _BDRST:
             self.words[BDCR] = _BDRST
+            self._settle()
+            self.chip.reset_backup_domain()
+            return
         self._settle()
 
     def _write_csr(self, written: int, _previous: int) -> None:
@@ -331,6 +345,18 @@ class Rcc(Peripheral):
             return HSI_HZ // 2 * factor
         return (self.hse_hz or 0) // (2 if cfgr & PLLXTPRE else 1) * factor
 
+    def _rtcclk_hz(self) -> int:
+        """Return the frequency of the source that RTCSEL chooses; 0 while it does not run, or without RTCEN."""
+        backup = self.words[BDCR]
+        source = (backup & _RTCSEL) >> _RTCSEL_AT if backup & _RTCEN else 0
+        hse_hz = (self.hse_hz or 0) // _RTC_HSE_DIVIDER
+        rows = ((_LSE, LSE_HZ), (_LSI, self.chip.clocks.lsi_hz), (_HSE, hse_hz))
+        if not source:
+            return 0
+        index, frequency_hz = rows[source - 1]
+        oscillator = OSCILLATORS[index]
+        return frequency_hz if self.words[oscillator.register] & oscillator.ready else 0
+
     def _update_frequencies(self) -> None:
         cfgr = self.words[CFGR]
         source = (cfgr >> 2) & 3
@@ -343,5 +369,6 @@ class Rcc(Peripheral):
         clocks.pclk1_hz, clocks.pclk2_hz = hclk_hz // divider1, hclk_hz // divider2
         clocks.timer1_hz = clocks.pclk1_hz * (1 if divider1 == 1 else 2)
         clocks.timer2_hz = clocks.pclk2_hz * (1 if divider2 == 1 else 2)
+        clocks.rtcclk_hz = self._rtcclk_hz()
         if clocks.snapshot() != before:
             self.chip.clock_changed()

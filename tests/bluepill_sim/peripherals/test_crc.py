@@ -60,7 +60,8 @@ def test_a_program_checks_the_words_of_its_flash(
     machine = boot(
         f"mov32 r1, #{AHBENR}\nmov32 r2, #{CRCEN | 0x14}\nstr r2, [r1, #0]\n"
         f"mov32 r1, #{CRC}\nmov32 r3, #0x08000000\nmov32 r4, #0x08000100\n"
-        "next: ldr r2, [r3, #0]\nstr r2, [r1, #0]\nadds r3, #4\nsubs r5, r4, r3\nbne next\nldr r0, [r1, #0]\nlog r0\nb stop"
+        "next: ldr r2, [r3, #0]\nstr r2, [r1, #0]\nadds r3, #4\nsubs r5, r4, r3\nbne next\n"
+        "ldr r0, [r1, #0]\nlog r0\nb stop"
     ).run(500)
     flash = machine.board.read_memory(0x0800_0000, 0x100)
     assert machine.log == [crc_of([int.from_bytes(flash[at : at + 4], "little") for at in range(0, 0x100, 4)])]

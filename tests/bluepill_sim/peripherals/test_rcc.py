@@ -37,6 +37,7 @@ def clear_bits(chip: Any, register: str, mask: int) -> None:
 def test_an_oscillator_is_ready_after_its_start_up_time(
     fake_chip: Any, register: str, on: int, ready: int, start_ns: int
 ) -> None:
+    fake_chip.power.is_backup_open = True
     fake_chip.advance(1000)
     set_bits(fake_chip, register, on)
     fake_chip.advance(1000 + start_ns - 1)
@@ -264,12 +265,16 @@ def test_a_reset_goes_back_to_hsi(fake_chip: Any) -> None:
 
 
 def test_the_backup_domain_outlives_all_but_a_power_cut(fake_chip: Any) -> None:
+    fake_chip.power.is_backup_open = True
     fake_chip.write("RCC.BDCR", 1 << 8 | 1)
     fake_chip.advance(1_000_000_000)
     fake_chip.parts.reset(ResetCause.PIN)
     assert fake_chip.parts.next_deadline() == OSCILLATORS[3].start_ns
     fake_chip.advance(OSCILLATORS[3].start_ns)
     assert fake_chip.read("RCC.BDCR") == 1 << 8 | 3
+    fake_chip.write("RCC.BDCR", 1 << 16)
+    assert fake_chip.read("RCC.BDCR") == 1 << 8 | 3  # the reset has locked it
+    fake_chip.power.is_backup_open = True
     fake_chip.write("RCC.BDCR", 1 << 16)
     assert fake_chip.read("RCC.BDCR") == 1 << 16
     fake_chip.write("RCC.BDCR", 1)
@@ -278,6 +283,7 @@ def test_the_backup_domain_outlives_all_but_a_power_cut(fake_chip: Any) -> None:
 
 
 def test_the_slow_crystal_takes_its_pins(fake_chip: Any) -> None:
+    fake_chip.power.is_backup_open = True
     fake_chip.write("RCC.BDCR", 1)
     assert [fake_chip.pins[name].holder for name in ("PC13", "PC14", "PC15")] == [None, "OSC32_IN", "OSC32_OUT"]
     fake_chip.write("RCC.BDCR", 0)

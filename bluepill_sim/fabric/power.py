@@ -1,0 +1,24 @@
+"""The supply of the chip as every part sees it: its voltage, and whether the backup domain may be written.
+
+This holds it only. The bench sets the voltage, PWR the rest; RCC, RTC and BKP read it.
+
+Source: RM0008 section 5; data sheet DS5319 section 5.3.1.
+Invariant: the voltage is one that the chip works at.
+"""
+
+from dataclasses import dataclass
+
+from simbase.state import Stateful
+
+#: The supply on a BluePill, and the range that the chip works in, in mV (DS5319 table 9).
+SUPPLY_MV, LEAST_SUPPLY_MV, MOST_SUPPLY_MV = 3_300, 2_000, 3_600
+
+
+@dataclass(slots=True)
+class Power(Stateful):
+    """The supply."""
+
+    #: VDD in mV.
+    supply_mv: int = SUPPLY_MV
+    #: PWR_CR DBP: RTC, BKP and RCC_BDCR take writes.
+    is_backup_open: bool = False
