@@ -172,6 +172,19 @@ class BluePill(Stateful):
         """
         return run_until(self, condition, timeout)
 
+    @property
+    def supply_v(self) -> float:
+        """The supply in volts, which the PVD sees; 2.0 to 3.6.
+
+        Raises:
+            ValueError: set to what the chip does not work at.
+        """
+        return self.chip.power.supply_mv / 1000
+
+    @supply_v.setter
+    def supply_v(self, volts: float) -> None:
+        self.chip.set_supply(round(1000 * volts))
+
     def request_stop(self) -> None:
         """End the running `advance_to` at the boundary of the running block."""
         self.chip.request_stop()

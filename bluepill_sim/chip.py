@@ -26,7 +26,8 @@ from bluepill_sim.core.processor import FaultListener
 from bluepill_sim.core.system_control import PPB_BASE, PPB_BYTES, SystemControl
 from bluepill_sim.fabric.clocks import Clocks
 from bluepill_sim.fabric.cycle_clock import CycleClock
-from bluepill_sim.fabric.power import Power
+from bluepill_sim.fabric.low_power import STOP_WAKE_NS, LowPower, Mode
+from bluepill_sim.fabric.power import LEAST_SUPPLY_MV, MOST_SUPPLY_MV, Power
 from bluepill_sim.fabric.registers import Peripheral
 from bluepill_sim.memory import Memory
 from bluepill_sim.native.processor import make_core
@@ -39,6 +40,7 @@ from bluepill_sim.stm32f103 import (
     PERIPHERAL_BASE,
     SRAM_BASE,
     SRAM_BYTES,
+    WAKING_IRQS,
     make_parts,
     make_pins,
     name_at,
@@ -74,11 +76,14 @@ class Chip(Stateful):
         "parts",
         "clocks",
         "power",
+        "low_power",
         "_clock",
         "_bus",
         "_stop_requested",
         "_requested_reset",
         "_flash_repairs",
+        "_stopped_tick",
+        "_stopped_cycle",
     )
     DERIVED = ("_flash_access", "_written_code")
 
@@ -99,6 +104,10 @@ class Chip(Stateful):
         self._on_warning = on_warning
         self.clocks = Clocks()
         self.power = Power()
+        self.low_power = LowPower(self)
+        #: When Stop began, and when SysTick would have acted next, in cycles.
+        self._stopped_cycle = 0
+        self._stopped_tick: int | None = None
         self._clock = CycleClock(self.clocks.hclk_hz)
         #: Called before each reset, for tools.
         self.reset_listeners: list[Callable[[], None]] = []
@@ -112,6 +121,7 @@ class Chip(Stateful):
         self._is_made = self._is_complete = False
         self.engine, self.processor = make_core(self._measure, memory)
         self.processor.on_fault = on_fault
+        self.processor.on_deep_sleep = self._begin_low_power
         self.pins = make_pins(self)
         self.fabric = self.pins.fabric
         self.uses_native_core = join_fabric(self.engine, self.fabric)
@@ -155,12 +165,11 @@ class Chip(Stateful):
 
     def next_deadline(self) -> Nanos | None:
         """Return when a peripheral or SysTick next acts by itself; the core itself may act at any time."""
-        due = self.fabric.next_ns
         tick = self.processor.systick.next_cycle
-        if tick is None:
-            return due
-        tick_ns = self._clock.ns_of(tick)
-        return tick_ns if due is None else min(due, tick_ns)
+        tick_ns = None if tick is None else self._clock.ns_of(tick)
+        return min(
+            (at for at in (self.fabric.next_ns, tick_ns, self.low_power.wake_ns) if at is not None), default=None
+        )
 
     def advance_to(self, limit_ns: Nanos) -> ChipReached:
         """Run to the first block boundary at or after a time, or to what stops the chip before."""
@@ -217,8 +226,8 @@ class Chip(Stateful):
                 return ChipReached(clock.ns_of(engine.cycle), Reason.HALT)
             if now >= limit_ns and not engine.is_inside_block:
                 return ChipReached(now, Reason.DEADLINE)
-            if processor.is_locked_up:
-                engine.cycle = self._stop_cycle(limit_ns)
+            if processor.is_locked_up or self._core_stands_still():
+                engine.cycle = max(engine.cycle, self._next_cycle(limit_ns))
                 continue
             go_on(self._stop_cycle(limit_ns))
             fabric.check()
@@ -237,10 +246,11 @@ class Chip(Stateful):
             self.on_reset(cause)
         for listener in self.reset_listeners:
             listener()
+        self.low_power.end()
+        self.power.is_stopped = False
         vectors = self.boot_address()
         if cause is ResetCause.POWER:
-            self.memory.lose_power()
-            self.engine.drop_code(SRAM_BASE, SRAM_BYTES)
+            self._lose_sram()
         self.parts.reset(cause)
         self.system.reset()
         # A program at the start of the flash is found through its alias at 0, where VTOR points after a reset.
@@ -285,6 +295,18 @@ class Chip(Stateful):
             self.parts.clock_changed()
         self.processor.stop_at_boundary()
 
+    def set_supply(self, supply_mv: int) -> None:
+        """Change the supply, in mV.
+
+        Raises:
+            ValueError: The chip does not work at it.
+        """
+        if not LEAST_SUPPLY_MV <= supply_mv <= MOST_SUPPLY_MV:
+            limits = f"{LEAST_SUPPLY_MV / 1000:g} to {MOST_SUPPLY_MV / 1000:g} V"
+            raise ValueError(f"the chip works at {limits}, not at {supply_mv / 1000:g} V")
+        self.power.supply_mv = supply_mv
+        self.parts.pwr.supply_changed()
+
     def request_stop(self) -> None:
         """End the slice at the boundary of the running block."""
         self._stop_requested = True
@@ -313,9 +335,12 @@ class Chip(Stateful):
         self.processor.stop_at_boundary()
 
     def signal(self, name: str) -> None:
-        """Set the event register."""
+        """Set the event register, or take a wake-up event of PWR."""
         if name == "event":
             self.processor.send_event()
+        elif name == "wake":
+            self.low_power.wake()
+            self.processor.stop_at_boundary()
 
     def warn(self, message: str, *, once: str, pc: int | None = None) -> None:
         """Pass on a warning."""
@@ -360,13 +385,85 @@ class Chip(Stateful):
         self._written_code.clear()
 
     def _stop_cycle(self, limit_ns: Nanos) -> int:
+        """Return the cycle up to which the core may run: C stops at deadlines by itself."""
+        return self._clock.cycle_at(limit_ns) if self.uses_native_core else self._next_cycle(limit_ns)
+
+    def _next_cycle(self, limit_ns: Nanos) -> int:
         """Return the cycle of the earliest of the limit and the deadlines."""
-        if self.uses_native_core and not self.processor.is_locked_up:
-            return self._clock.cycle_at(limit_ns)
-        due = self.fabric.next_ns
-        stop = self._clock.cycle_at(limit_ns if due is None else min(due, limit_ns))
-        tick = self.processor.systick.next_cycle
-        return stop if tick is None else min(stop, tick)
+        due = self.next_deadline()
+        return self._clock.cycle_at(limit_ns if due is None else min(due, limit_ns))
+
+    # Where the core stands still (`LowPowerPorts`).
+
+    def _core_stands_still(self) -> bool:
+        """Tell whether time passes without the core, at a boundary: in a low-power mode."""
+        return self.low_power.mode is not Mode.RUN and self.low_power.holds()
+
+    def _begin_low_power(self) -> None:
+        self.low_power.begin()
+        self.processor.stop_at_boundary()
+
+    @property
+    def flash_is_busy(self) -> bool:
+        """Whether the flash is programmed or erased."""
+        return self.parts.flash.is_busy
+
+    @property
+    def wants_standby(self) -> bool:
+        """Whether SLEEPDEEP means Standby."""
+        return self.parts.pwr.stands_by
+
+    @property
+    def stop_wake_ns(self) -> Nanos:
+        """How long the end of Stop takes."""
+        return STOP_WAKE_NS[self.parts.pwr.regulator_is_slow]
+
+    def refusal(self) -> str | None:
+        """Return what forbids the mode that SLEEPDEEP means (RM0008 tables 14 and 15)."""
+        if self.wants_standby:
+            return "PWR_CSR WUF is set" if self.parts.pwr.is_woken else None
+        lines = self.parts.exti.pending
+        if lines:
+            return f"EXTI_PR is {lines:#x}"
+        return "RTC_CRL ALRF is set" if self.parts.rtc.has_alarm else None
+
+    def pass_over(self, why: str) -> None:
+        """Go on behind the instruction."""
+        mode = "Standby" if self.wants_standby else "Stop"
+        self.warn(f"{mode} does not begin: {why}", once=f"PWR:{mode}")
+        self.processor.wake()
+
+    def is_woken_from_stop(self) -> bool:
+        """Whether an interrupt of EXTI, or the event of a WFE, is there."""
+        return self.processor.is_woken_by(WAKING_IRQS)
+
+    def enter_stop(self) -> None:
+        """Have the clocks of the core stand still."""
+        self.power.is_stopped = True
+        self.parts.stop()
+        systick = self.processor.systick
+        self._stopped_cycle, self._stopped_tick, systick.next_cycle = self.engine.cycle, systick.next_cycle, None
+
+    def leave_stop(self, stopped_ns: Nanos) -> None:
+        """Have them go on."""
+        self.power.is_stopped = False
+        self.processor.skip_cycles(self.engine.cycle - self._stopped_cycle, self._stopped_tick)
+        self.parts.resume(stopped_ns)
+
+    def enter_standby(self) -> None:
+        """Forget SRAM and registers."""
+        self.power.is_stopped = True
+        self._lose_sram()
+        self.parts.stand_by()
+        self.system.reset()
+
+    def leave_standby(self) -> None:
+        """Start anew."""
+        self.reset(ResetCause.STANDBY)
+
+    def _lose_sram(self) -> None:
+        self.memory.lose_power()
+        self.engine.drop_code(SRAM_BASE, SRAM_BYTES)
 
     def _measure(self, address: int, size: int) -> Block:
         """Return the costs of a block at the present flash settings."""

@@ -204,6 +204,10 @@ WIRING: dict[str, tuple[int | str, ...]] = {
     "RTC.second": ("BKP.second",),
     "USB.wakeup": ("EXTI.usb_wakeup",),
 }
+#: The interrupts that end Stop, as a mask: those of EXTI.
+WAKING_IRQS = sum(
+    1 << end for output, ends in WIRING.items() for end in ends if output.startswith("EXTI.") and isinstance(end, int)
+)
 #: The first line that is no interrupt.
 _FIRST_INNER_LINE = 64
 
@@ -236,6 +240,11 @@ class ChipParts(Stateful):
         return cast("Pwr", self.by_name["PWR"])
 
     @property
+    def rtc(self) -> Rtc:
+        """The real-time clock."""
+        return cast("Rtc", self.by_name["RTC"])
+
+    @property
     def has_running_watchdog(self) -> bool:
         """Whether a watchdog will reset the chip unless it is fed."""
         iwdg, wwdg = cast("Iwdg", self.by_name["IWDG"]), cast("Wwdg", self.by_name["WWDG"])
@@ -254,6 +263,25 @@ class ChipParts(Stateful):
         for part in self.by_name.values():
             if part is not self.rcc:
                 part.reset()
+
+    def stop(self) -> None:
+        """Have what the core's clocks drive stand still."""
+        self.rcc.stop()
+        for part in self.by_name.values():
+            part.clock_stopped()
+
+    def resume(self, stopped_ns: int) -> None:
+        """Have it go on, after so long."""
+        for part in self.by_name.values():
+            part.clock_resumed(stopped_ns)
+
+    def stand_by(self) -> None:
+        """Forget what Standby forgets: all but the backup domain, IWDG, the flags and the pin of PWR."""
+        self.rcc.stand_by()
+        for name, part in self.by_name.items():
+            if name not in {"RCC", "PWR", "IWDG"}:
+                part.reset()
+        self.pwr.note_standby()
 
     def reset_backup_domain(self) -> None:
         """Reset what VBAT keeps."""

@@ -22,3 +22,5 @@ class Power(Stateful):
     supply_mv: int = SUPPLY_MV
     #: PWR_CR DBP: RTC, BKP and RCC_BDCR take writes.
     is_backup_open: bool = False
+    #: Whether the clocks of the core stand still: Stop or Standby.
+    is_stopped: bool = False

@@ -28,7 +28,7 @@ from dataclasses import dataclass
 from typing import Any, ClassVar, cast
 
 from bluepill_sim.extension.layout import Struct, structure
-from bluepill_sim.fabric.fabric import CLOCK, OWN_COMMANDS, RESET
+from bluepill_sim.fabric.fabric import CLOCK, OWN_COMMANDS, RESET, RESUMED, STOPPED
 from bluepill_sim.fabric.ports import ChipPorts
 from simbase.state import Stateful
 
@@ -322,6 +322,16 @@ class Peripheral(Stateful):
         """Act on a change of the frequencies in `chip.clocks`, which has just happened."""
         if self.KIND is not None and self.clock_hz():
             self.command(CLOCK, self.clock_hz())
+
+    def clock_stopped(self) -> None:
+        """Stand still, where the clock is one of the core's: Stop mode begins."""
+        if self.KIND is not None:
+            self.command(STOPPED)
+
+    def clock_resumed(self, stopped_ns: int) -> None:
+        """Go on after `stopped_ns`, from where `clock_stopped` was called."""
+        if self.KIND is not None:
+            self.command(RESUMED, stopped_ns & WORD, stopped_ns >> 32)
 
     def _take_slot(self) -> int:
         if self.KIND is None:

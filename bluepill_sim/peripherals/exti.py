@@ -35,6 +35,11 @@ class Exti(Peripheral):
         Register(name="PR", offset=0x14, readable=_LINES, writable=0, write_one_to_clear=_LINES, on_write=NATIVE),
     )
 
+    @property
+    def pending(self) -> int:
+        """The lines that are pending, and would make an interrupt or an event, as a mask."""
+        return self.words[PR] & (self.words[IMR] | self.words[EMR])
+
     def __init__(self, chip: ChipPorts, place: Place) -> None:
         super().__init__(chip, place)
         chip.pins.route_listeners.append(self._route_changed)

@@ -94,6 +94,11 @@ class Flash(Peripheral):
         self._key_step = 0
         self._address = 0
 
+    @property
+    def is_busy(self) -> bool:
+        """Whether it is being programmed or erased."""
+        return bool(self.words[SR] & BSY)
+
     def program(self, offset: int, size: int, value: int) -> bool:
         """Take a write by the CPU to the flash array itself; False: the bus answers with an error.
 
@@ -111,7 +116,7 @@ class Flash(Peripheral):
         if not self.words[CR] & PG or self.words[CR] & LOCK:
             self.chip.warn("write to flash without FLASH_CR PG: ignored", once="FLASH:write")
             return
-        if self._is_busy():
+        if self.is_busy:
             self._finish(PGERR)
             return
         memory = self._array()
@@ -172,7 +177,7 @@ class Flash(Peripheral):
         self._update_irq()
 
     def _write_cr(self, written: int, previous: int) -> None:
-        if previous & LOCK or self._is_busy():
+        if previous & LOCK or self.is_busy:
             self.words[CR] = previous
             if previous & LOCK and written & ~LOCK:
                 self.chip.warn("FLASH_CR: written while locked: ignored", once="FLASH:locked")
@@ -208,9 +213,6 @@ class Flash(Peripheral):
         if self.memory is None:
             self.chip.warn("FLASH: programming and erasing are not modelled on this board", once="FLASH:memory")
         return self.memory
-
-    def _is_busy(self) -> bool:
-        return bool(self.words[SR] & BSY)
 
     def _begin(self, duration_ns: int) -> None:
         self.words[SR] |= BSY

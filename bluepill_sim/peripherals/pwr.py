@@ -50,7 +50,7 @@ class Pwr(Peripheral):
         return bool(self.words[CSR] & WUF)
 
     @property
-    def stop_regulator_is_slow(self) -> bool:
+    def regulator_is_slow(self) -> bool:
         """Whether the regulator is in low-power mode in Stop (LPDS)."""
         return bool(self.words[CR] & LPDS)
 

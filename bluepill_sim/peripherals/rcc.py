@@ -62,6 +62,8 @@ class ResetCause(Enum):
     IWDG = bits(26, 29)
     #: The window watchdog.
     WWDG = bits(26, 30)
+    #: The end of Standby, which leaves the flags alone.
+    STANDBY = 0
     #: Entry of a low-power mode that the option bytes forbid.
     LOW_POWER = bits(26, 31)
 
@@ -204,6 +206,21 @@ class Rcc(Peripheral):
             self._set_ready_at(index, None)
             self._settle(at_ns)
             self._update_irq()
+
+    def stop(self) -> None:
+        """Stop HSE and PLL, and take HSI: Stop mode begins, and it is what runs when that ends (RM0008 7.3.1, 7.3.2)."""
+        self.words[CR] = self.words[CR] & ~(HSEON | HSERDY | PLLON | PLLRDY) | HSION | HSIRDY
+        self.words[CFGR] &= ~(_SW | _SW << 2)
+        self._set_ready_at(0, None)
+        self._settle()
+
+    def stand_by(self) -> None:
+        """Go to the reset state, but for the oscillators that Standby leaves running."""
+        lsi, lsi_ready = self.words[CSR] & bits(1, 0), self._ready_at[_LSI]
+        self.reset(ResetCause.STANDBY)
+        self.words[CSR] |= lsi
+        self._set_ready_at(_LSI, lsi_ready)
+        self._settle()
 
     def _write_cr(self, written: int, previous: int) -> None:
         in_use = self._oscillators_in_use() & previous & ~written

@@ -85,6 +85,11 @@ class Rtc(Peripheral):
         #: When the outputs of alarm and second fall.
         self._pulse_end_ns: Nanos | None = None
 
+    @property
+    def has_alarm(self) -> bool:
+        """Whether ALRF is set."""
+        return bool(self.words[CRL] & ALRF)
+
     def write(self, offset: int, size: int, value: int) -> None:
         """Take what the bus writes, where PWR_CR DBP allows it."""
         if self.chip.power.is_backup_open:

@@ -64,6 +64,17 @@ class Wwdg(Peripheral):
         if self.is_running and self.chip.clocks.pclk1_hz != self._pclk1_hz:
             self._count_from(self._count_at(self.chip.now_ns))
 
+    def clock_stopped(self) -> None:
+        """Stand still."""
+        self.due_ns = None
+
+    def clock_resumed(self, stopped_ns: Nanos) -> None:
+        """Go on."""
+        self._base_ns += stopped_ns
+        if self.is_running:
+            count = self._count_at(self.chip.now_ns)
+            self.due_ns = self._time_of(T6 if count > T6 else T6 - 1)
+
     def on_reset(self) -> None:
         """Stop."""
         self._base_ns, self._base_count, self._pclk1_hz = 0, _T, 0

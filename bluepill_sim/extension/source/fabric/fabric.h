@@ -96,6 +96,8 @@ enum command {
     RESET, /* the registers have their reset values */
     CLOCK, /* its clock has another frequency: `one`, in Hz */
     ROUTE, /* AFIO has changed what concerns it */
+    STOPPED = 8, /* its clock stands still from now on: the chip is in Stop mode */
+    RESUMED, /* it goes on, `one` + 2^32 * `other` ns later */
     OWN_COMMANDS = 16
 };
 
