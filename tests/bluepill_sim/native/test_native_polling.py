@@ -150,7 +150,8 @@ ROUNDS = [
     ("680B 3A01 D1FC", False), ("680B 3201 D1FC", False), ("680B 3A00 D1FC", True),  # counts in r2, by 1 and by 0
     ("680B 3A01 2200 D1FB", True),  # counts, and sets anew
     ("3A01 E7FD", False), ("9A01 4293 D1FC", True), ("600B E7FD", False),
-    ("F8D1 0004 D1FB", True), ("F8DD 0004 D1FB", True), ("EA80 0001 D1FC", False), ("EA80 0001 F47F AFFC", False), ("680B F47F AFFC", True),
+    ("F8D1 0004 D1FB", True), ("F8DD 0004 D1FB", True), ("EA80 0001 D1FC", False),
+    ("EA80 0001 F47F AFFC", False), ("680B F47F AFFC", True),
 ]  # fmt: skip
 
 
