@@ -10,7 +10,8 @@ lost; WKUP and the RTC's alarm end it with a reset, as others do.
 
 Time passes by itself from deadline to deadline: a long mode costs nothing.
 
-Chosen: a mode that may not begin (WUF for Standby, a pending line of EXTI or ALRF for Stop) is passed over and warned of.
+Chosen: a mode that may not begin (WUF for Standby, a pending line of EXTI or ALRF for Stop) is passed over and warned
+of.
 Not modelled: DBG_SLEEP, DBG_STOP and DBG_STANDBY of DBGMCU_CR.
 
 Source: RM0008 section 5.3; wake-up times from the data sheet DS5319 table 20.

@@ -208,7 +208,7 @@ class Rcc(Peripheral):
             self._update_irq()
 
     def stop(self) -> None:
-        """Stop HSE and PLL, and take HSI: Stop mode begins, and it is what runs when that ends (RM0008 7.3.1, 7.3.2)."""
+        """Stop HSE and PLL, and take HSI: Stop mode begins, and HSI runs when that ends (RM0008 7.3.1, 7.3.2)."""
         self.words[CR] = self.words[CR] & ~(HSEON | HSERDY | PLLON | PLLRDY) | HSION | HSIRDY
         self.words[CFGR] &= ~(_SW | _SW << 2)
         self._set_ready_at(0, None)

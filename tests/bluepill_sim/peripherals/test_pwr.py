@@ -116,7 +116,7 @@ def test_the_bench_sets_the_supply_within_what_the_chip_works_at(boot: Callable[
     board.supply_v = 2.0
     board.supply_v = 3.6
     for volts in (1.999, 3.601):
-        with pytest.raises(ValueError, match="works at 2 to 3.6 V"):
+        with pytest.raises(ValueError, match=r"works at 2 to 3\.6 V"):
             board.supply_v = volts
     assert board.supply_v == 3.6
     board.restore(saved)
