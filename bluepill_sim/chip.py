@@ -22,6 +22,7 @@ from bluepill_sim.core import GENERAL, BlockRecorder
 from bluepill_sim.core.block_cost import NO_BLOCK, Block, measure_block
 from bluepill_sim.core.forced_bits import forced_bits
 from bluepill_sim.core.halts import ChipReached, HaltKind
+from bluepill_sim.core.nvic import NMI
 from bluepill_sim.core.processor import FaultListener
 from bluepill_sim.core.system_control import PPB_BASE, PPB_BYTES, SystemControl
 from bluepill_sim.fabric.clocks import Clocks
@@ -32,14 +33,17 @@ from bluepill_sim.fabric.registers import Peripheral
 from bluepill_sim.memory import Memory
 from bluepill_sim.native.processor import make_core
 from bluepill_sim.native.registers import join_fabric, share_registers
+from bluepill_sim.peripherals.flash import OPTION_BYTES
 from bluepill_sim.peripherals.rcc import Rcc, ResetCause
 from bluepill_sim.stm32f103 import (
     CLOCK_GATES,
     FLASH_BASE,
     FLASH_BYTES_FITTED,
+    OPTION_BYTES_BASE,
     PERIPHERAL_BASE,
     SRAM_BASE,
     SRAM_BYTES,
+    SYSTEM_MEMORY_BASE,
     WAKING_IRQS,
     make_parts,
     make_pins,
@@ -226,8 +230,8 @@ class Chip(Stateful):
                 return ChipReached(clock.ns_of(engine.cycle), Reason.HALT)
             if now >= limit_ns and not engine.is_inside_block:
                 return ChipReached(now, Reason.DEADLINE)
-            if processor.is_locked_up or self._core_stands_still():
-                engine.cycle = max(engine.cycle, self._next_cycle(limit_ns))
+            if self._core_stands_still():
+                self._pass_time(limit_ns)
                 continue
             go_on(self._stop_cycle(limit_ns))
             fabric.check()
@@ -307,6 +311,11 @@ class Chip(Stateful):
         self.power.supply_mv = supply_mv
         self.parts.pwr.supply_changed()
 
+    def flash_began(self) -> None:
+        """Have the core wait where it needs the flash: before the next access of the block, or at its end."""
+        self.engine.shared.waits = self.engine.access_pc < SYSTEM_MEMORY_BASE
+        self.processor.stop_at_boundary()
+
     def request_stop(self) -> None:
         """End the slice at the boundary of the running block."""
         self._stop_requested = True
@@ -335,9 +344,14 @@ class Chip(Stateful):
         self.processor.stop_at_boundary()
 
     def signal(self, name: str) -> None:
-        """Set the event register, or take a wake-up event of PWR."""
+        """Do what an event means to the core: WFE's, NMI, PWR's wake-up, the loss of its clock."""
         if name == "event":
             self.processor.send_event()
+        elif name == "nmi" and not self.processor.nvic.active >> NMI & 1:
+            self.processor.pend(NMI)
+        elif name == "no clock":
+            self.low_power.lose_clock()
+            self.processor.stop_at_boundary()
         elif name == "wake":
             self.low_power.wake()
             self.processor.stop_at_boundary()
@@ -385,7 +399,14 @@ class Chip(Stateful):
         self._written_code.clear()
 
     def _stop_cycle(self, limit_ns: Nanos) -> int:
-        """Return the cycle up to which the core may run: C stops at deadlines by itself."""
+        """Return the cycle up to which the core may run: C stops at deadlines by itself.
+
+        Code in SRAM goes on while the flash is busy, up to where it, or the handler of an interrupt, needs flash: each
+        boundary has to be looked at.
+        """
+        if self.parts.flash.is_busy:
+            next_cycle = self._next_cycle(limit_ns)
+            return next_cycle if self.processor.is_asleep else min(next_cycle, self.engine.cycle + 1)
         return self._clock.cycle_at(limit_ns) if self.uses_native_core else self._next_cycle(limit_ns)
 
     def _next_cycle(self, limit_ns: Nanos) -> int:
@@ -396,8 +417,17 @@ class Chip(Stateful):
     # Where the core stands still (`LowPowerPorts`).
 
     def _core_stands_still(self) -> bool:
-        """Tell whether time passes without the core, at a boundary: in a low-power mode."""
-        return self.low_power.mode is not Mode.RUN and self.low_power.holds()
+        """Tell whether time passes without the core: locked up, in a low-power mode, or while it waits for flash."""
+        if self.processor.is_locked_up or (self.low_power.mode is not Mode.RUN and self.low_power.holds()):
+            return True
+        self.engine.shared.waits = is_waiting = self.parts.flash.is_busy and self.engine.pc < SYSTEM_MEMORY_BASE
+        return is_waiting
+
+    def _pass_time(self, limit_ns: Nanos) -> None:
+        engine = self.engine
+        engine.cycle = max(engine.cycle, self._next_cycle(limit_ns))
+        if engine.is_inside_block:  # what ends the wait is no boundary of the program
+            self.fabric.run_events(self._clock.ns_of(engine.cycle))
 
     def _begin_low_power(self) -> None:
         self.low_power.begin()
@@ -407,6 +437,15 @@ class Chip(Stateful):
     def flash_is_busy(self) -> bool:
         """Whether the flash is programmed or erased."""
         return self.parts.flash.is_busy
+
+    @property
+    def resets_instead(self) -> bool:
+        """Whether the option bytes make a reset of the mode that SLEEPDEEP means."""
+        return self.power.resets_at_standby if self.wants_standby else self.power.resets_at_stop
+
+    def reset_instead(self) -> None:
+        """Reset the chip because of the option bytes."""
+        self.reset(ResetCause.LOW_POWER)
 
     @property
     def wants_standby(self) -> bool:
@@ -519,14 +558,20 @@ class Chip(Stateful):
         return forced_bits(code, registers, address, memory.read), pc
 
     def _write_flash(self, address: int, size: int, value: int) -> bool:
-        """Take a write of the core to the flash array: its controller decides; False: a bus error."""
+        """Take a write of the core to flash or option bytes: their controller decides; False: a bus error."""
+        option = address - OPTION_BYTES_BASE
+        if 0 <= option <= OPTION_BYTES - size:
+            if not self.parts.flash.program_option(option, size, value):
+                return False
+            self._flash_repairs.append((OPTION_BYTES_BASE, self.memory.options))
+            return True
         offset = address - FLASH_BASE if address >= FLASH_BASE else address
         if not 0 <= offset <= FLASH_BYTES_FITTED - size:
             return False
         if not self.parts.flash.program(offset, size, value):
             return False
         # The engine stores the value whatever the controller says: put back what should be there.
-        self._flash_repairs.append((offset, self.memory.read_flash(offset, size)))
+        self._flash_repairs.append((FLASH_BASE + offset, self.memory.read_flash(offset, size)))
         return True
 
     def _drop_flash(self) -> None:
@@ -534,7 +579,11 @@ class Chip(Stateful):
         self.engine.drop_code(0, FLASH_BYTES_FITTED)
 
     def _repair_flash(self) -> None:
-        for offset, data in self._flash_repairs:
+        for address, data in self._flash_repairs:
+            if address == OPTION_BYTES_BASE:
+                self.memory.options = data
+                continue
+            offset = address - FLASH_BASE
             self.memory.load_flash(offset, data)
             self.engine.drop_code(FLASH_BASE + offset, len(data))
             self.engine.drop_code(offset, len(data))
@@ -664,4 +713,11 @@ class _FlashArray:
 
     def write(self, offset: int, data: bytes) -> None:
         self._memory.load_flash(offset, data)
-        self._repairs.append((offset, data))
+        self._repairs.append((FLASH_BASE + offset, data))
+
+    @property
+    def options(self) -> bytes:
+        return self._memory.options
+
+    def write_options(self, options: bytes) -> None:
+        self._memory.options = options

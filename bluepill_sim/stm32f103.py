@@ -36,10 +36,11 @@ FLASH_BYTES = 64 * 1024
 FLASH_BYTES_FITTED = 128 * 1024
 SRAM_BASE = 0x2000_0000
 SRAM_BYTES = 20 * 1024
-#: Boot loader ROM; the option bytes follow it at 0x1FFFF800.
+#: Boot loader ROM; the option bytes follow it.
 SYSTEM_MEMORY_BASE = 0x1FFF_F000
 #: Unique id (12 bytes) and flash size in KiB (2 bytes): in system memory, after the boot loader.
 FLASH_SIZE_REGISTER, UNIQUE_ID_REGISTER = 0x1FFF_F7E0, 0x1FFF_F7E8
+OPTION_BYTES_BASE = 0x1FFF_F800
 PERIPHERAL_BASE, PERIPHERAL_END = 0x4000_0000, 0x4002_3400
 #: Interrupt lines of a medium-density part: 0 to 42.
 IRQ_COUNT = 43
@@ -202,6 +203,7 @@ WIRING: dict[str, tuple[int | str, ...]] = {
     "PWR.pvd": ("EXTI.pvd",),
     "RTC.alarm": ("EXTI.rtc_alarm", "BKP.alarm", "PWR.alarm"),
     "RTC.second": ("BKP.second",),
+    "IWDG.lsi": ("RCC.lsi",),
     "USB.wakeup": ("EXTI.usb_wakeup",),
 }
 #: The interrupts that end Stop, as a mask: those of EXTI.

@@ -122,7 +122,7 @@ class Processor(Stateful):
         self.ccr = STKALIGN
         self._memory = memory
         engine.on_event = self.send_event
-        engine.is_interrupted = self.is_interrupted
+        engine.is_interrupted = lambda: bool(self.shared.waits) or self.is_interrupted()
         r = Register
         file = engine.registers
         self._masks = file.batch(r.PRIMASK, r.BASEPRI, r.FAULTMASK)

@@ -18,8 +18,8 @@ MAX_PCLK1_HZ = 36_000_000
 HSI_HZ = 8_000_000
 #: The crystal on PC14 and PC15.
 LSE_HZ = 32_768
-#: LSI, typical, in Hz (DS5319 table 25: 30 to 60 kHz).
-LSI_HZ = 40_000
+#: LSI, typical, and its range, in Hz (DS5319 table 25).
+LSI_HZ, LEAST_LSI_HZ, MOST_LSI_HZ = 40_000, 30_000, 60_000
 #: Highest SYSCLK for 0, 1, 2 wait states, in Hz (RM0008 3.3.3, FLASH_ACR).
 MAX_SYSCLK_BY_WAIT_STATES = (24_000_000, 48_000_000, 72_000_000)
 

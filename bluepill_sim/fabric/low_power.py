@@ -1,4 +1,4 @@
-"""Stop and Standby: what stands still, what ends it, and how long that takes.
+"""Stop and Standby, and the loss of the clock: what stands still, what ends it, and how long that takes.
 
 Theory of operation. WFI, WFE or a return from a handler with SLEEPDEEP begins a mode, once the flash is done. In Stop
 the core runs no more, HSI is what clocks are derived from afterwards, and devices that have a clock of the core's
@@ -37,6 +37,8 @@ class Mode(Enum):
     ENTERING = "entering"
     STOP = "stop"
     STANDBY = "standby"
+    #: Without a clock, until a reset.
+    UNCLOCKED = "unclocked"
     #: Back to where the program runs.
     WAKING = "waking"
 
@@ -64,6 +66,11 @@ class LowPowerPorts(Protocol):
         """How long the end of Stop takes."""
         ...
 
+    @property
+    def resets_instead(self) -> bool:
+        """Whether the option bytes make a reset of the mode that SLEEPDEEP means."""
+        ...
+
     def refusal(self) -> str | None:
         """Return what forbids the mode that SLEEPDEEP means, in words; None for nothing."""
         ...
@@ -78,6 +85,10 @@ class LowPowerPorts(Protocol):
 
     def leave_stop(self, stopped_ns: Nanos) -> None:
         """Have it go on, after so long."""
+        ...
+
+    def reset_instead(self) -> None:
+        """Reset the chip because of the option bytes."""
         ...
 
     def enter_standby(self) -> None:
@@ -105,6 +116,12 @@ class LowPower(Stateful):
         #: While WAKING: when the program goes on.
         self.wake_ns: Nanos | None = None
         self._is_standby = False
+
+    def lose_clock(self) -> None:
+        """Stop until a reset: what SYSCLK came from has failed."""
+        self._is_standby = False
+        self.mode = Mode.UNCLOCKED
+        self._chip.enter_stop()
 
     def begin(self) -> None:
         """Take up a sleep with SLEEPDEEP."""
@@ -140,6 +157,9 @@ class LowPower(Stateful):
         if refusal is not None:
             self.end()
             chip.pass_over(refusal)
+        elif chip.resets_instead:
+            self.end()
+            chip.reset_instead()
         elif self._is_standby:
             self.mode = Mode.STANDBY
             chip.enter_standby()

@@ -44,6 +44,10 @@ class ChipPorts(Protocol):
         """Notify that `clocks` has new values: re-base cycles, and call each peripheral's `clock_changed`."""
         ...
 
+    def flash_began(self) -> None:
+        """Have the core wait where it needs the flash, which is programmed or erased from now on."""
+        ...
+
     def request_stop(self) -> None:
         """End the CPU's slice at the boundary of the running block."""
         ...
@@ -61,7 +65,11 @@ class ChipPorts(Protocol):
         ...
 
     def signal(self, name: str) -> None:
-        """Signal an event to the core by name: "event" sets the event register that WFE waits for."""
+        """Signal an event to the core by name.
+
+        "event" sets the event register that WFE waits for, "nmi" is a request, "wake" ends Standby, and after
+        "no clock" only a reset helps.
+        """
         ...
 
     def warn(self, message: str, *, once: str, pc: int | None = None) -> None:

@@ -1,8 +1,8 @@
-"""The supply of the chip as every part sees it: its voltage, and whether the backup domain may be written.
+"""The supply of the chip as every part sees it, and what the option bytes make of its low-power modes and watchdog.
 
-This holds it only. The bench sets the voltage, PWR the rest; RCC, RTC and BKP read it.
+This holds it only. The bench sets the voltage, PWR the lock of the backup domain, FLASH what its option byte USER says.
 
-Source: RM0008 section 5; data sheet DS5319 section 5.3.1.
+Source: RM0008 section 5; PM0075 section 2.2; data sheet DS5319 section 5.3.1.
 Invariant: the voltage is one that the chip works at.
 """
 
@@ -24,3 +24,8 @@ class Power(Stateful):
     is_backup_open: bool = False
     #: Whether the clocks of the core stand still: Stop or Standby.
     is_stopped: bool = False
+    #: Whether IWDG starts with the chip.
+    starts_watchdog: bool = False
+    #: Whether the entry of a low-power mode resets the chip.
+    resets_at_stop: bool = False
+    resets_at_standby: bool = False

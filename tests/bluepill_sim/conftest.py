@@ -55,6 +55,9 @@ class FakeChip:
         self.irqs[irq] = level
         return True
 
+    def flash_began(self) -> None:
+        pass
+
     def end_slice(self) -> None:
         self.stops += 1
 
