@@ -16,7 +16,8 @@ time of the accessing instruction.
 """
 
 import ctypes
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 
 from bluepill_sim.core import GENERAL, BlockRecorder
 from bluepill_sim.core.block_cost import NO_BLOCK, Block, measure_block
@@ -29,7 +30,7 @@ from bluepill_sim.fabric.clocks import Clocks
 from bluepill_sim.fabric.cycle_clock import CycleClock
 from bluepill_sim.fabric.low_power import STOP_WAKE_NS, LowPower, Mode
 from bluepill_sim.fabric.power import LEAST_SUPPLY_MV, MOST_SUPPLY_MV, Power
-from bluepill_sim.fabric.registers import Peripheral
+from bluepill_sim.fabric.registers import WORD, Peripheral
 from bluepill_sim.memory import Memory
 from bluepill_sim.native.processor import make_core
 from bluepill_sim.native.registers import join_fabric, share_registers
@@ -39,6 +40,7 @@ from bluepill_sim.stm32f103 import (
     CLOCK_GATES,
     FLASH_BASE,
     FLASH_BYTES_FITTED,
+    FREEZE_BITS,
     OPTION_BYTES_BASE,
     PERIPHERAL_BASE,
     SRAM_BASE,
@@ -89,7 +91,7 @@ class Chip(Stateful):
         "_stopped_tick",
         "_stopped_cycle",
     )
-    DERIVED = ("_flash_access", "_written_code")
+    DERIVED = ("_flash_access", "_written_code", "_frozen_since", "resets")
 
     def __init__(self, memory: Memory, vector_table: int, on_warning: WarningListener, on_fault: FaultListener) -> None:
         """Make the chip, in the state after power-on.
@@ -112,6 +114,9 @@ class Chip(Stateful):
         #: When Stop began, and when SysTick would have acted next, in cycles.
         self._stopped_cycle = 0
         self._stopped_tick: int | None = None
+        #: Since when time passes with the core halted by a debugger; None: it does not. And the resets so far.
+        self._frozen_since: Nanos | None = None
+        self.resets = 0
         self._clock = CycleClock(self.clocks.hclk_hz)
         #: Called before each reset, for tools.
         self.reset_listeners: list[Callable[[], None]] = []
@@ -250,6 +255,7 @@ class Chip(Stateful):
             self.on_reset(cause)
         for listener in self.reset_listeners:
             listener()
+        self.resets += 1
         self.low_power.end()
         self.power.is_stopped = False
         vectors = self.boot_address()
@@ -259,6 +265,8 @@ class Chip(Stateful):
         self.system.reset()
         # A program at the start of the flash is found through its alias at 0, where VTOR points after a reset.
         self.processor.reset(0 if vectors == FLASH_BASE else vectors)
+        if self._frozen_since is not None:
+            self._freeze()
 
     # What the peripherals ask for.
 
@@ -315,6 +323,32 @@ class Chip(Stateful):
         """Have the core wait where it needs the flash: before the next access of the block, or at its end."""
         self.engine.shared.waits = self.engine.access_pc < SYSTEM_MEMORY_BASE
         self.processor.stop_at_boundary()
+
+    @contextmanager
+    def halted_core(self) -> Iterator[None]:
+        """Have time pass without the core, as while a debugger halts it; what DBGMCU_CR freezes stands still too."""
+        systick = self.processor.systick
+        cycle, tick, systick.next_cycle = self.engine.cycle, systick.next_cycle, None
+        count = self.resets
+        self._freeze()
+        try:
+            yield
+        finally:
+            self._frozen_since, since_ns = None, self._frozen_since or 0
+            for part in self._frozen_parts():
+                part.thaw(self.now_ns - since_ns)
+            if self.resets == count:
+                self.processor.skip_cycles(self.engine.cycle - cycle, tick)
+
+    def _freeze(self) -> None:
+        self._frozen_since = self.now_ns
+        for part in self._frozen_parts():
+            part.freeze()
+
+    def _frozen_parts(self) -> list[Peripheral]:
+        """Return what DBGMCU_CR freezes; in Stop all of it but IWDG stands still already."""
+        bits = self.system.dbgmcu_cr & (1 << FREEZE_BITS["IWDG"] if self.power.is_stopped else WORD)
+        return [part for name, part in self.parts.by_name.items() if bits >> FREEZE_BITS.get(name, 32) & 1]
 
     def request_stop(self) -> None:
         """End the slice at the boundary of the running block."""
@@ -418,7 +452,9 @@ class Chip(Stateful):
 
     def _core_stands_still(self) -> bool:
         """Tell whether time passes without the core: locked up, in a low-power mode, or while it waits for flash."""
-        if self.processor.is_locked_up or (self.low_power.mode is not Mode.RUN and self.low_power.holds()):
+        if self._frozen_since is not None or self.processor.is_locked_up:
+            return True
+        if self.low_power.mode is not Mode.RUN and self.low_power.holds():
             return True
         self.engine.shared.waits = is_waiting = self.parts.flash.is_busy and self.engine.pc < SYSTEM_MEMORY_BASE
         return is_waiting
@@ -428,6 +464,8 @@ class Chip(Stateful):
         engine.cycle = max(engine.cycle, self._next_cycle(limit_ns))
         if engine.is_inside_block:  # what ends the wait is no boundary of the program
             self.fabric.run_events(self._clock.ns_of(engine.cycle))
+            if self._requested_reset is not None:
+                self.reset(self._requested_reset)
 
     def _begin_low_power(self) -> None:
         self.low_power.begin()

@@ -210,6 +210,10 @@ WIRING: dict[str, tuple[int | str, ...]] = {
 WAKING_IRQS = sum(
     1 << end for output, ends in WIRING.items() for end in ends if output.startswith("EXTI.") and isinstance(end, int)
 )
+#: The bits of DBGMCU_CR that freeze a peripheral while a debugger halts the core (RM0008 31.16.3).
+FREEZE_BITS = {
+    "IWDG": 8, "WWDG": 9, "TIM1": 10, "TIM2": 11, "TIM3": 12, "TIM4": 13, "CAN": 14, "I2C1": 15, "I2C2": 16,
+}  # fmt: skip
 #: The first line that is no interrupt.
 _FIRST_INNER_LINE = 64
 

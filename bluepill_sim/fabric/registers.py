@@ -333,6 +333,14 @@ class Peripheral(Stateful):
         if self.KIND is not None:
             self.command(RESUMED, stopped_ns & WORD, stopped_ns >> 32)
 
+    def freeze(self) -> None:
+        """Stand still while a debugger halts the core (DBGMCU_CR)."""
+        self.clock_stopped()
+
+    def thaw(self, frozen_ns: int) -> None:
+        """Go on after `frozen_ns`, from where `freeze` was called."""
+        self.clock_resumed(frozen_ns)
+
     def _take_slot(self) -> int:
         if self.KIND is None:
             return self.fabric.add_slot(self.name, self.advance_to)

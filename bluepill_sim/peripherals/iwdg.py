@@ -62,6 +62,16 @@ class Iwdg(Peripheral):
         if self._is_running and self.chip.clocks.lsi_hz != self._lsi_hz:
             self._count_from(self._count(DIVIDERS[self.words[PR]]))
 
+    def freeze(self) -> None:
+        """Stand still."""
+        self.due_ns = None
+
+    def thaw(self, frozen_ns: Nanos) -> None:
+        """Go on."""
+        if self._is_running:
+            self._base_ns += frozen_ns
+            self.due_ns = self._expiry_ns()
+
     def on_reset(self) -> None:
         """Stop, or start where the option bytes say so."""
         self._is_running = self._is_unlocked = False
@@ -116,4 +126,7 @@ class Iwdg(Peripheral):
 
     def _count_from(self, count: int) -> None:
         self._base_ns, self._base_count, self._lsi_hz = self.chip.now_ns, count, self.chip.clocks.lsi_hz
-        self.due_ns = self._base_ns - (-(count + 1) * DIVIDERS[self.words[PR]] * NS_PER_S // self._lsi_hz)
+        self.due_ns = self._expiry_ns()
+
+    def _expiry_ns(self) -> Nanos:
+        return self._base_ns - (-(self._base_count + 1) * DIVIDERS[self.words[PR]] * NS_PER_S // self._lsi_hz)

@@ -4,7 +4,7 @@ Modelled: the counter from PCLK1 / 4096 with its four prescalers, the window,
 the reset as T6 falls, the early wake-up interrupt (IRQ 0). Not modelled: the
 phase of the divider (a count begins anew with each write of CR or CFR and with
 each change of PCLK1), counting before it is activated, a clock gate that stops
-it, the freeze by DBGMCU.
+it.
 
 Source: RM0008 section 20.
 Invariant: while it is active, `due_ns` is the earlier of the early wake-up and the reset.
