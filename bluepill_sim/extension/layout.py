@@ -152,6 +152,8 @@ SHARED = Struct(
         Field("has_debugger", "u32", doc="Python sees to BKPT and HardFaults"),
         Field("knows_masked_svc", "u32", doc="Python was told of an SVC that its priority does not allow"),
         Field("has_fault", "u32", doc="`fault` waits for Python"),
+        Field("waits", "u32", doc="the block ends before its next access: the flash cannot give more code now"),
+        Field("waits_end", "u32"),
         Field("fault", "fault"),
         Field("last", "record", LAST_ROWS),
     ),

@@ -156,10 +156,12 @@ struct shared {
     uint32_t has_debugger; /* Python sees to BKPT and HardFaults */
     uint32_t knows_masked_svc; /* Python was told of an SVC that its priority does not allow */
     uint32_t has_fault; /* `fault` waits for Python */
+    uint32_t waits; /* the block ends before its next access: the flash cannot give more code now */
+    uint32_t waits_end;
     struct fault fault;
     struct record last[32];
 };
-_Static_assert(sizeof(struct shared) == 1560, "shared");
+_Static_assert(sizeof(struct shared) == 1568, "shared");
 
 /* The pins of one port, a bit each. RM0008 9.1, table 20. */
 struct port {
