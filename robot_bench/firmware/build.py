@@ -22,6 +22,7 @@ PROGRAMS = {
     "motors": (*BOARD_SOURCES, "motors.c"),
     "sensors": (*BOARD_SOURCES, "sensors.c"),
     "encoders": (*BOARD_SOURCES, "encoders.c", "odometer.c"),
+    "analog": (*BOARD_SOURCES, "analog.c"),
     "dodge": (*BOARD_SOURCES, "dodge.c", "dodge_fsm.c", "odometer.c"),
     # Brings pins, clock and line of its own.
     "board_test": ("startup.c", "memory.c", "board_test.c"),

@@ -239,7 +239,7 @@ def live(module: str | None, file: str | None, library: str | None) -> int:
         boundaries.Life(seed).live()
     signal.alarm(0)
     own = OWN_TESTS.get(module or "")
-    return 0 if own is None else pytest.main(["-q", "-x", "--no-cov", "-p", "no:cacheprovider", own])
+    return 0 if own is None else pytest.main(["-q", "-x", "-p", "no:cacheprovider", own])
 
 
 def _replace_module(name: str, file: str) -> None:
