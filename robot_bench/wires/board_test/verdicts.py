@@ -167,7 +167,8 @@ def _link(measured: Measurement) -> Finding:
     path = "IO17 - J3 - IO16"
     if not measured.link:
         return Finding("link", path, Verdict.UNKNOWN, "join pins 2 and 3 of J3 to test it")
-    if measured.link == PATTERN:
+    # The adapter's own STOP may come back beside it.
+    if PATTERN in measured.link:
         return Finding("link", path, Verdict.SOUND, f"{len(PATTERN)} bytes came back")
     return Finding("link", path, Verdict.WRONG, f"sent {PATTERN.hex()}, {measured.link.hex()} came back")
 

@@ -100,7 +100,6 @@ class Walk:
                 self._adapter.hold(0, 0)
                 result.idle_adapter = self._adapter.read()
                 self._measure_wires(result)
-                self._measure_line(result)
         finally:
             self._bluepill.hold()
             self._adapter.end()
@@ -114,6 +113,8 @@ class Walk:
                 if not follows or response.silent_at:
                     self._ask_again(place, wire.direction, response)
                 result.wires[wire.name] = response
+        # Before the reset, for after it the adapter has its own STOP to say on the line.
+        self._measure_line(result)
         # Last, for it takes the adapter with it.
         for place, wire in enumerate(self._wires):
             if wire.role is WireRole.RESET:
@@ -177,7 +178,7 @@ class Walk:
         result.link = b""
         for _ in range(LINK_TRIES):
             result.link += self._adapter.received()
-            if len(result.link) >= len(PATTERN):
+            if PATTERN in result.link:
                 break
         pad = self._adapter.pad()
         if pad is not None and pad.reports is not None:
