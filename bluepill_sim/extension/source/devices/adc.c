@@ -243,7 +243,7 @@ static void end_injected(struct device *device, uint32_t code)
     adc->is_automatic = 0;
     if (adc->regular_waits) {
         adc->regular_waits = 0;
-        begin(device, REGULAR, 0);
+        begin(device, REGULAR, was_automatic ? switching_cycles(adc) : 0);
     } else if (was_automatic && device->words[CR2] & CONT && !(device->words[CR1] & DISCEN)) {
         adc->regular_left = regular_length(device);
         begin(device, REGULAR, switching_cycles(adc));
@@ -349,7 +349,7 @@ static void start_regular(struct device *device, uint64_t ns, uint32_t delay)
         return;
     }
     settle(device, ns);
-    if (adc->state == REGULAR || adc->regular_waits || adc->is_automatic) {
+    if (adc->state == REGULAR || adc->regular_waits) {
         return; /* chosen: a trigger while the group is converted is ignored */
     }
     const uint32_t length = regular_length(device), at_once = (device->words[CR1] >> 13 & 7) + 1;

@@ -436,6 +436,19 @@ def test_an_automatic_group_follows_behind_the_delay_of_the_prescaler(fake_chip:
     assert fake_chip.read("ADC1.SR") & JEOC
 
 
+def test_a_regular_trigger_during_the_automatic_group_starts_behind_it(fake_chip: Any) -> None:
+    switch_on(fake_chip, cr1=JAUTO)
+    begin_ns = start(fake_chip)
+    fake_chip.advance(begin_ns + 20 * CYCLE_NS)
+    start(fake_chip)
+    fake_chip.advance(begin_ns + 30 * CYCLE_NS)
+    fake_chip.write("ADC1.SR", 0)
+    fake_chip.advance(begin_ns + (30 + 2 + 14) * CYCLE_NS - 1)
+    assert not fake_chip.read("ADC1.SR") & EOC
+    fake_chip.advance(begin_ns + (30 + 2 + 14) * CYCLE_NS)
+    assert fake_chip.read("ADC1.SR") & (EOC | JEOC) == EOC
+
+
 @pytest.mark.parametrize("is_injected", [False, True])
 @pytest.mark.parametrize(
     ("low", "high", "expected"), [(2048, 2048, False), (2049, 4095, True), (0, 2047, True), (2047, 2049, False)]
