@@ -62,6 +62,11 @@ class Oscillation:
         to_uv(self.low_v)
         to_uv(self.high_v)
 
+    @property
+    def most_v(self) -> float:
+        """The highest volts."""
+        return max(self.low_v, self.high_v)
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Samples:
@@ -86,6 +91,11 @@ class Samples:
             raise ValueError(f"{len(self.volts)} samples every {self.interval_ns} ns are no signal")
         for one in self.volts:
             to_uv(one)
+
+    @property
+    def most_v(self) -> float:
+        """The highest volts."""
+        return max(self.volts)
 
 
 Signal: TypeAlias = Oscillation | Samples

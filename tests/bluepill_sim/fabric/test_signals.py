@@ -76,8 +76,19 @@ def test_every_pin_has_its_channel_and_a_constant_has_a_level(fake_chip: Any) ->
     fake_chip.pins["PA0"].set_volts(None)
     assert (fake_chip.pins["PA0"].is_floating, fake_chip.pins["PA0"].volts) == (True, 0.0)
     assert fake_chip.warnings == {}
-    fake_chip.pins["PA0"].set_volts(5.0)
-    assert "PA0:volts" in fake_chip.warnings
+
+
+@pytest.mark.parametrize(
+    "volts",
+    [
+        5.0,
+        Oscillation(shape=Shape.SINE, low_v=3.7, high_v=-1, period_ns=9),
+        Samples(volts=(0.0, 3.7, 1.0), interval_ns=1),
+    ],
+)
+def test_more_volts_than_the_pin_bears_are_warned_of(fake_chip: Any, volts: Any) -> None:
+    fake_chip.pins["PA0"].set_volts(volts)
+    assert list(fake_chip.warnings) == ["PA0:volts"]
 
 
 SINE = Oscillation(shape=Shape.SINE, low_v=0, high_v=1, period_ns=10)
