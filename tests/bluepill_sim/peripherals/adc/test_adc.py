@@ -530,6 +530,30 @@ def test_continuous_conversions_that_nobody_sees_have_no_events(fake_chip: Any) 
         assert adc.due_ns is None
 
 
+@pytest.mark.parametrize(
+    ("register", "word", "flags", "expected"),
+    [
+        ("SR", 0, 0, 1.0),
+        ("SQR3", 1, STRT | EOC, 1.0),
+        ("CR2", ADON | CONT | ALIGN, STRT | EOC, 1.0),
+        ("SMPR2", 7, 18, 1.0),
+    ],
+)
+def test_what_is_written_changes_nothing_that_was_converted_unseen(
+    fake_chip: Any, register: str, word: int, flags: int, expected: float
+) -> None:
+    switch_on(fake_chip, cr2=CONT)
+    fake_chip.pins["PA0"].set_volts(2.0)
+    fake_chip.pins["PA1"].set_volts(3.0)
+    begin_ns = start(fake_chip)
+    fake_chip.advance(begin_ns + 14 * CYCLE_NS)
+    fake_chip.pins["PA0"].set_volts(1.0)
+    fake_chip.advance(begin_ns + 100 * 14 * CYCLE_NS + 1)
+    fake_chip.write(f"ADC1.{register}", word)
+    assert fake_chip.read("ADC1.SR") == flags
+    assert fake_chip.read("ADC1.DR") == code(expected)
+
+
 @settings(max_examples=40, deadline=None)
 @given(waits=st.lists(st.tuples(st.integers(1, 3_000), st.booleans()), min_size=1, max_size=5), watches=st.booleans())
 def test_what_nobody_saw_is_as_if_each_conversion_had_been_made(
