@@ -166,7 +166,7 @@ class Pin:
         half of VDDA on, and nothing of a signal.
 
         Args:
-            volts: A constant in volts, above -2000 and below 2000, or a `Signal` from now on; on a pin that leads
+            volts: A constant in volts, above -1000 and below 1000, or a `Signal` from now on; on a pin that leads
                 to no ADC a constant alone.
 
         Raises:
