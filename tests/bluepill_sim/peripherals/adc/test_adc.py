@@ -1,5 +1,7 @@
 """ADC1 and ADC2: against a model in plain Python, and what a program sees of them."""
 
+import ctypes
+import struct
 from collections.abc import Callable
 from typing import Any
 
@@ -9,7 +11,7 @@ from hypothesis import strategies as st
 
 from bluepill_sim.fabric.signals import Oscillation, Samples, Shape
 from bluepill_sim.peripherals.adc import INJECTED_TRIGGERS, REGULAR_TRIGGERS
-from bluepill_sim.stm32f103 import line_of
+from bluepill_sim.stm32f103 import BASES, line_of
 from tests.bluepill_sim.peripherals.adc.model import (
     ADON,
     ALIGN,
@@ -648,3 +650,59 @@ def test_in_a_dual_mode_dr_holds_both_and_the_slave_follows_no_trigger(fake_chip
     pulse(fake_chip, TRIGGERS[False][4])
     fake_chip.advance(fake_chip.now_ns + 14 * CYCLE_NS)
     assert not fake_chip.read("ADC2.SR") & EOC
+
+
+# With DMA.
+
+SRAM = 0x2000_0000
+
+
+def receive(chip: Any, count: int, width: int) -> Any:
+    """Have channel 1 take what ADC1 converts into words of 1 << `width` bytes, round and round; return the memory."""
+    sram = (ctypes.c_char * 0x400)()
+    chip.pins.fabric.add_memory(SRAM, sram, is_writable=True)
+    words = (
+        ("CNDTR1", count),
+        ("CPAR1", BASES["ADC1"] + 0x4C),
+        ("CMAR1", SRAM),
+        ("CCR1", 0xA1 | width << 8 | width << 10),
+    )
+    for register, word in words:
+        chip.write(f"DMA1.{register}", word)
+    return sram
+
+
+@pytest.mark.parametrize("cr2", [CONT, CONT | ALIGN])
+def test_circular_dma_takes_every_conversion_at_the_limit(fake_chip: Any, cr2: int) -> None:
+    fake_chip.run_at_72_mhz()
+    fake_chip.write("RCC.CFGR", fake_chip.read("RCC.CFGR") | 2 << 14)
+    switch_on(fake_chip, cr2=cr2 | DMA)
+    fake_chip.pins["PA0"].set_volts(Oscillation(shape=Shape.SAWTOOTH, low_v=0, high_v=3.3, period_ns=100_000))
+    sram = receive(fake_chip, 32, 1)
+    begin_ns = start(fake_chip)
+    fake_chip.advance(begin_ns + 40 * 14 * 1_000_000_000 // 12_000_000 + 100)
+    taken = struct.unpack("<32H", bytes(sram)[:64])
+    for n in range(8, 40):
+        sample_ns = begin_ns + (14 * n * 6 + 9) * 1_000_000_000 // 72_000_000
+        expected = code(fake_chip.pins.fabric.channel_uv(0, sample_ns) / 1e6)
+        assert taken[n % 32] == (expected << 4 if cr2 & ALIGN else expected)
+    assert fake_chip.read("DMA1.CNDTR1") == 24
+    assert fake_chip.warnings == {}
+
+
+@pytest.mark.parametrize(("mode", "delay"), [(6, 0), (7, 7)])
+def test_in_dual_modes_dma_takes_words_of_both(fake_chip: Any, mode: int, delay: int) -> None:
+    for number in (2, 1):
+        switch_on(fake_chip, number, CONT | (DMA if number == 1 else 0))
+        fake_chip.write(f"ADC{number}.SQR3", number)
+    fake_chip.write("ADC1.CR1", mode << 16)
+    fake_chip.pins["PA1"].set_volts(1.0)
+    fake_chip.pins["PA2"].set_volts(Oscillation(shape=Shape.SAWTOOTH, low_v=0, high_v=3.3, period_ns=100_000))
+    sram = receive(fake_chip, 16, 2)
+    begin_ns = start(fake_chip)
+    fake_chip.advance(begin_ns + (delay + 10 * 14) * CYCLE_NS + 1_000)
+    for n, word in enumerate(struct.unpack("<10I", bytes(sram)[:40])):
+        assert word & 0xFFFF == code(1.0)
+        sample_ns = begin_ns + 14 * n * CYCLE_NS + 375
+        assert word >> 16 == code(fake_chip.pins.fabric.channel_uv(2, sample_ns) / 1e6)
+    assert fake_chip.read("DMA1.CNDTR1") == 6
