@@ -438,6 +438,23 @@ def test_an_automatic_group_follows_behind_the_delay_of_the_prescaler(fake_chip:
     assert fake_chip.read("ADC1.SR") & JEOC
 
 
+def test_a_second_regular_trigger_leaves_an_interrupted_sequence_where_it_was(fake_chip: Any) -> None:
+    switch_on(fake_chip, cr2=JSOFTWARE | SOFTWARE, cr1=SCAN)
+    fake_chip.write("ADC1.SQR1", 2 << 20)
+    begin_ns = start(fake_chip)
+    fake_chip.advance(begin_ns + 20 * CYCLE_NS)  # in the second conversion
+    fake_chip.write("ADC1.CR2", ADON | SOFTWARE | JSOFTWARE | JSWSTART)
+    fake_chip.advance(begin_ns + 30 * CYCLE_NS)
+    start(fake_chip)
+    fake_chip.advance(begin_ns + 34 * CYCLE_NS)
+    assert fake_chip.read("ADC1.SR") & JEOC
+    fake_chip.write("ADC1.SR", 0)
+    fake_chip.advance(begin_ns + 62 * CYCLE_NS - 1)
+    assert not fake_chip.read("ADC1.SR") & EOC
+    fake_chip.advance(begin_ns + 62 * CYCLE_NS)
+    assert fake_chip.read("ADC1.SR") & EOC
+
+
 def test_a_regular_trigger_during_the_automatic_group_starts_behind_it(fake_chip: Any) -> None:
     switch_on(fake_chip, cr1=JAUTO)
     begin_ns = start(fake_chip)
