@@ -648,8 +648,11 @@ def test_injected_groups_of_dual_modes_begin_in_their_cycles(
         fake_chip.write("ADC1.CR2", ADON | JSOFTWARE | JSWSTART)
 
     assert ends(fake_chip, mode << 16, inject, 40, JEOC) == expected
-    if mode == 9:  # and the next trigger is ADC2's
+    if mode == 9:  # and the next trigger is ADC2's; a mode that is written anew begins with ADC1
         assert ends(fake_chip, mode << 16, inject, 40, JEOC) == {1: [], 2: [14]}
+        assert ends(fake_chip, mode << 16, inject, 40, JEOC) == {1: [14], 2: []}
+        fake_chip.write("ADC1.CR1", 0)
+        assert ends(fake_chip, mode << 16, inject, 40, JEOC) == {1: [14], 2: []}
 
 
 def test_in_a_dual_mode_dr_holds_both_and_the_slave_follows_no_trigger(fake_chip: Any) -> None:
