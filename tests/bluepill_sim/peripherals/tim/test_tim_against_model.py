@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from bluepill_sim.fabric.subscriptions import EDGE, Of
 from bluepill_sim.stm32f103 import line_of
-from tests.bluepill_sim.peripherals.timers.tim_model import FLOATING, Model
+from tests.bluepill_sim.peripherals.tim.tim_model import FLOATING, Model
 
 TICK_NS = 125  # 8 MHz, after a reset
 #: CH1 to CH4, CH1N to CH3N, ETR, BKIN without remap.
