@@ -18,6 +18,8 @@ PORTS, PINS = 5, 16
 SOURCES = 64
 #: How many of the last rows are kept with or without a recorder; a power of 2.
 LAST_ROWS = 32
+#: Channels of an ADC that lead to pins: PA0 to PA7, PB0, PB1.
+ANALOG_PINS = 10
 #: Exceptions of the architecture that a chip of the family can have.
 EXCEPTIONS = 76
 #: Characters that wait in C to arrive at a USART; the others wait in Python.
@@ -150,6 +152,8 @@ SHARED = Struct(
         Field("has_debugger", "u32", doc="Python sees to BKPT and HardFaults"),
         Field("knows_masked_svc", "u32", doc="Python was told of an SVC that its priority does not allow"),
         Field("has_fault", "u32", doc="`fault` waits for Python"),
+        Field("waits", "u32", doc="the block ends before its next access: the flash cannot give more code now"),
+        Field("waits_end", "u32"),
         Field("fault", "fault"),
         Field("last", "record", LAST_ROWS),
     ),
@@ -203,6 +207,71 @@ USART = Struct(
     ),
 )
 EXTI = Struct("exti", "What EXTI holds beyond its registers.", (Field("levels", "u32"), Field("routes", "u8", PINS)))
+DMA = Struct(
+    "dma",
+    "What a DMA controller holds beyond its registers. RM0008 13.3.",
+    (
+        Field("base_ns", "u64", doc="start of the transfers that follow each other without a gap,"),
+        Field("cycles", "u64", doc="and cycles of HCLK from there to the end of the one under way"),
+        *_fields("u32", "hz", "apb1_cycles", "apb2_cycles"),
+        Field("current", "u32", doc="1 + the channel whose transfer is under way; 0: none"),
+        Field("ready", "u32", doc="channels that are enabled and have something left,"),
+        Field("unasked", "u32", doc="those that need no request,"),
+        Field("lines", "u32", doc="those whose request is high,"),
+        Field("latched", "u32", doc="and those of which a request has come"),
+        *(Field(name, "u32", 7) for name in ("peripheral", "memory", "reload")),
+        Field("padding", "u32"),
+    ),
+)
+SIGNAL = Struct(
+    "signal",
+    "Volts on a pin, from outside: `bluepill_sim/fabric/signals.py`.",
+    (
+        Field("start_ns", "u64", doc="when it began,"),
+        Field("phase_ns", "u64", doc="at this place of its period"),
+        Field("period_ns", "u64"),
+        Field("interval_ns", "u64", doc="between two samples; of a square wave, how long it is high"),
+        *_fields("i32", "low_uv", "high_uv"),
+        Field("shape", "u32", doc="0: none, the pin has its logic level"),
+        Field("is_repeated", "u32"),
+        Field("count", "u32", doc="samples, which stand elsewhere"),
+        Field("padding", "u32"),
+    ),
+)
+ANALOG = Struct(
+    "analog",
+    "The analog side of a chip.",
+    (
+        Field("vdda_uv", "u32"),
+        Field("temperature_mc", "i32", doc="of the chip, in thousandths of a degree Celsius"),
+        Field("signals", "signal", ANALOG_PINS),
+    ),
+)
+ADC = Struct(
+    "adc",
+    "What an ADC holds beyond its registers. RM0008 11.3.",
+    (
+        Field("base_ns", "u64", doc="start of the run of conversions,"),
+        Field("cycles", "u64", doc="and cycles of PCLK2 from there to the end of the present one"),
+        *_fields("u64", "sample_ns", "end_ns"),
+        Field("ready_ns", "u64", doc="no conversion begins earlier"),
+        Field("calibrated_ns", "u64", doc="when CAL and RSTCAL fall"),
+        Field("hz", "u32", doc="PCLK2,"),
+        Field("divider", "u32", doc="and what ADCCLK is divided by"),
+        Field("number", "u32", doc="1 or 2"),
+        Field("remapped", "u32", doc="bit 0: the regular group's EXTI trigger is TIM8's, bit 1: the injected one's"),
+        Field("state", "u32", doc="which group is being converted"),
+        *_fields("u32", "channel", "has_sample", "sample"),
+        Field("regular_at", "u32", doc="rank in the sequence,"),
+        Field("regular_left", "u32", doc="and conversions that are left of this trigger"),
+        Field("regular_waits", "u32", doc="for the end of the injected group"),
+        *_fields("u32", "injected_at", "injected_left"),
+        Field("is_automatic", "u32", doc="the injected group follows the regular one"),
+        Field("turns", "u32", doc="triggers that alternate, modulo 2"),
+        Field("padding", "u32"),
+        Field("warned", "u32", 6, "by question: channels that were warned of"),
+    ),
+)
 GPIO = Struct("gpio", "Which port a GPIO is.", (Field("port", "u32"),))
 FILTER = Struct(
     "filter",
@@ -300,8 +369,8 @@ SENT = Struct(
 
 #: All of them; one that holds another comes behind it.
 STRUCTS = (
-    RECORD, INSTRUCTION, RAMP, TICKS, STEP, LOOP, FAULT, SHARED, PORT, USART, EXTI, GPIO, FILTER, SHAPE, TIM, WAVE,
-    EDGE, SENT,
+    RECORD, INSTRUCTION, RAMP, TICKS, STEP, LOOP, FAULT, SHARED, PORT, USART, EXTI, DMA, SIGNAL, ANALOG, ADC, GPIO,
+    FILTER, SHAPE, TIM, WAVE, EDGE, SENT,
 )  # fmt: skip
 
 _KINDS: dict[str, Any] = {
@@ -357,5 +426,7 @@ def _size(struct: Struct) -> int:
     return ctypes.sizeof(structure(struct))
 
 
-_CONSTANTS = {"PORTS": PORTS, "PINS": PINS, "SOURCES": SOURCES, "LAST_ROWS": LAST_ROWS, "RECEIVED": RECEIVED}
+_CONSTANTS = {"PORTS": PORTS, "PINS": PINS, "SOURCES": SOURCES, "LAST_ROWS": LAST_ROWS, "RECEIVED": RECEIVED,
+    "ANALOG_PINS": ANALOG_PINS,
+}  # fmt: skip
 _C_KINDS = {"u8": "uint8_t", "u16": "uint16_t", "u32": "uint32_t", "u64": "uint64_t", "i32": "int32_t"}

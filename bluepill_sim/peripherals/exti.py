@@ -25,8 +25,10 @@ class Exti(Peripheral):
     """External interrupt/event controller."""
 
     KIND, HOLDS = "exti", EXTI
-    #: Lines that share an interrupt: `lines_by_irq` of exti.c.
-    OUTPUTS = ("0", "1", "2", "3", "4", "9_5", "15_10", "pvd_irq", "rtc_alarm_irq", "usb_wakeup_irq")
+    #: Lines that share an interrupt, `lines_by_irq` of exti.c; and events that trigger ADCs, `trigger_lines`.
+    OUTPUTS = (
+        "0", "1", "2", "3", "4", "9_5", "15_10", "pvd_irq", "rtc_alarm_irq", "usb_wakeup_irq", "line11", "line15",
+    )  # fmt: skip
     INPUTS = ("pvd", "rtc_alarm", "usb_wakeup")
     REGISTERS = (
         Register(
@@ -52,6 +54,11 @@ class Exti(Peripheral):
             fields=numbered("PRn", _DOWN),
         ),
     )
+
+    @property
+    def pending(self) -> int:
+        """The lines that are pending, and would make an interrupt or an event, as a mask."""
+        return self.words[PR] & (self.words[IMR] | self.words[EMR])
 
     def __init__(self, chip: ChipPorts, place: Place) -> None:
         super().__init__(chip, place)

@@ -11,13 +11,13 @@ when its stop bit has ended; one that finds RXNE still set is lost and raises
 ORE; a line that then stays idle for one character raises IDLE.
 
 Modelled: 8 and 9 bits, parity, 0.5 to 2 stop bits, breaks (sent as silence),
-all of these flags and their interrupts. The far end sends and listens at our
+all of these flags, their interrupts and DMA requests. The far end sends and listens at our
 own baud rate, without errors, unless it has one of its own (`far_baud`): then
 characters too far off arrive damaged, both ways, and what comes in raises the
 FE, NE and PE that the samples of the line give (`fabric/line_speed.py`), at the
 times of our own frames. Not modelled, and warned of: synchronous, LIN, IrDA,
-smartcard and half-duplex modes, hardware flow control, mute mode, DMA
-requests. The levels of single bits do not show on the TX pin: it stays high.
+smartcard and half-duplex modes, hardware flow control and mute mode. The levels
+of single bits do not show on the TX pin: it stays high.
 
 Source: RM0008 section 27.
 Invariant: a character ends floor(frame half-bits * BRR * 10**9 / (2 * PCLK)) ns
@@ -51,8 +51,6 @@ _UNMODELLED = (
     (CR3, 1 << 1, "IrDA mode"),
     (CR3, 1 << 3, "half-duplex mode"),
     (CR3, 1 << 5, "smartcard mode"),
-    (CR3, 1 << 6, "DMA reception"),
-    (CR3, 1 << 7, "DMA transmission"),
     (CR3, bits(8, 9), "hardware flow control"),
 )
 #: Stop bits in halves, by CR2 STOP.
@@ -97,7 +95,7 @@ class Usart(Peripheral):
     """Universal asynchronous receiver transmitter."""
 
     KIND, HOLDS = "usart", USART
-    OUTPUTS = ("irq",)
+    OUTPUTS = ("irq", "tx_dma", "rx_dma")
     STATE = ("_coming", "sent_at")
     DERIVED = ("_tx_pin", "_rx_pin")
     REGISTERS = (
@@ -179,7 +177,7 @@ class Usart(Peripheral):
 
     def receive(self, data: bytes) -> None:
         """Send characters to the RX pin, at the speed of the line, behind those still on their way."""
-        if not self.command(_CAN_HEAR):
+        if self.chip.power.is_stopped or not self.command(_CAN_HEAR):
             self._warn(Question.RX_OFF)
             return
         control = self.words[CR1]

@@ -1,4 +1,4 @@
-"""Print what test devices cost: four channels of PWM at 20 kHz, and a DMA of a million words a second.
+"""Print what devices cost: four channels of PWM at 20 kHz, a test device that moves a million words a second, the ADC.
 
 Each figure is the median of paired runs by CPU time in this process; the library is built here, with `mover.c` in it.
 Usage: python tools/bench/devices.py [--quick]
@@ -18,13 +18,20 @@ from bluepill_sim.analysis.probe import Probe
 from bluepill_sim.analysis.vcd import write_vcd
 from bluepill_sim.extension import library
 from bluepill_sim.fabric.registers import NATIVE, Peripheral, Register
+from bluepill_sim.fabric.signals import Oscillation, Shape
 from simbase.timing import NS_PER_S
 
 HERE = Path(__file__).parent
 SOURCES = sorted((HERE.parents[1] / "bluepill_sim" / "extension" / "source").rglob("*.c"))
 #: Where TIM6 would stand on a larger chip.
 PLACE = "TIM6"
-PWM_S, DMA_S = (1.0, 0.2) if "--quick" in sys.argv else (20.0, 2.0)
+PWM_S, DMA_S, ADC_S = (1.0, 0.2, 0.2) if "--quick" in sys.argv else (20.0, 2.0, 5.0)
+#: What the ADC converts by circular DMA, and with which options tools/bench/firmware/adc.c is built.
+CONVERSIONS = {
+    "8 channels at 10 kHz": (80_000, "5", ("-DBENCH_EIGHT",)),
+    "1 channel at 857 kS/s": (857_142, "2", ()),
+    "1 channel at 1 MS/s": (1_000_000, "2", ("-DBENCH_56_MHZ",)),
+}
 #: TIM1's clock, period and high time in cycles; it drives PA8 to PA11, which have no wire on the board.
 TIMER_HZ, PERIOD, HIGH = 72_000_000, 3600, 900
 #: Registers of TIM1, by offset: ARR, CCMR1, CCMR2, CCR1 to CCR4, CCER, EGR, BDTR, CR1.
@@ -124,6 +131,22 @@ def movers(folder: Path) -> None:
     row("the same, asleep: times real", asleep, "2")
 
 
+def conversions(folder: Path) -> None:
+    """Conversions by circular DMA, in the bench with the kinematic body, the CPU asleep between interrupts."""
+    for name, (rate, goal, options) in CONVERSIONS.items():
+        program = build("adc", folder, *options)
+        factors = []
+        for _ in range(RUNS):
+            made = bench(folder, program, ADC_S, "adapter")
+            made.run_until(STARTED_NS)
+            made.chip.pin("PA0").set_volts(Oscillation(shape=Shape.SINE, low_v=0, high_v=3.3, period_ns=1_000_000))
+            samples = made.chip.image.symbols.address_of("bench_samples") or 0
+            factors.append(ADC_S / cpu_s(lambda: run(made)))  # noqa: B023 - called at once
+            if made.chip.warnings or not any(made.chip.read_memory(samples, 128) or b"") or not made.chip.is_asleep:
+                sys.exit(f"bench: {name} does not run: {made.chip.warnings}")
+        row(f"ADC, {name} ({rate} conversions a second): times real", factors, goal)
+
+
 def build_library(folder: Path) -> Path:
     """Return the emulator's library with the device of this bench in it."""
     out = folder / "native.so"
@@ -145,6 +168,7 @@ def main() -> int:
         stm32f103.PERIPHERALS = (*stm32f103.PERIPHERALS, (Mover, PLACE))
         waves(folder)
         movers(folder)
+        conversions(folder)
     return 0
 
 

@@ -55,6 +55,8 @@ struct host {
     bool (*registers)(void *user, struct bus_access *access);
     /* Whether anything was translated from these bytes of SRAM; null: it may have been. */
     bool (*holds_code)(void *user, uint32_t address, uint32_t bytes);
+    /* Up to which cycle the core looks at nothing, unless an event wakes it; null or 0: it is awake. */
+    uint64_t (*asleep_until)(void *user);
 };
 
 /* What Python is asked: each keeps an exception for later. */
@@ -100,6 +102,8 @@ enum command {
     ROUTE, /* AFIO has changed what concerns it */
     HEARD, /* somebody hears its outputs, or no longer does */
     SETTLE, /* returns the word of the register with the index `one` as a read would find it now, and changes nothing */
+    STOPPED = 8, /* its clock stands still from now on: the chip is in Stop mode */
+    RESUMED, /* it goes on, `one` + 2^32 * `other` ns later */
     OWN_COMMANDS = 16
 };
 
@@ -201,6 +205,8 @@ struct fabric {
     struct shown shown[PORTS * PINS];
     struct counter counters[COUNTERS];
     uint32_t counter_count;
+    const struct analog *analog;         /* Python's, */
+    const int32_t *samples[ANALOG_PINS]; /* and these */
     struct memory memories[MEMORIES];
     uint32_t memory_count;
     uint32_t master; /* the slot of the device that makes an access; SLOTS for none */
@@ -251,6 +257,8 @@ static inline uint64_t ns_of_tick(const struct ticks *ticks, uint64_t tick)
 /* Has the device's event come at a time; NO_TIME takes it back. */
 void schedule(struct device *device, uint64_t ns);
 static inline uint64_t due_ns(const struct device *device) { return device->fabric->slots[device->slot].ns; }
+/* Up to when, but not at which, nothing but this device acts, or looks at memory. */
+uint64_t quiet_ns(const struct device *device);
 /* Acts on all that is due at or before a time, in order of time, then of slots. */
 void run_events(struct fabric *fabric, uint64_t until_ns);
 
@@ -305,10 +313,16 @@ void show_to(struct fabric *fabric, struct subscriber *subscriber);
 uint64_t settled_ns(struct fabric *fabric);
 extern struct device_kind waves_kind;
 
+/* analog.c */
+/* Microvolts on the pin of an ADC channel, which may be an earlier time's. */
+int64_t channel_uv(const struct fabric *fabric, uint32_t channel, uint64_t ns);
+
 /* bus.c */
 /* Reads or writes 1, 2 or 4 bytes for a device, at the time of its event; false: an error of the bus. */
 bool bus_read(struct device *master, uint32_t address, uint32_t bytes, uint32_t *word);
 bool bus_write(struct device *master, uint32_t address, uint32_t bytes, uint32_t word);
+/* Whether an access there reaches memory. */
+bool is_memory(const struct fabric *fabric, uint32_t address, bool is_write);
 
 #pragma GCC visibility pop
 

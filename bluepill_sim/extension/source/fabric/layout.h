@@ -9,6 +9,7 @@
 #define SOURCES 64
 #define LAST_ROWS 32
 #define RECEIVED 256
+#define ANALOG_PINS 10
 
 /* A block that began, an exception that was entered (its number) or left (-1). */
 struct record {
@@ -155,10 +156,12 @@ struct shared {
     uint32_t has_debugger; /* Python sees to BKPT and HardFaults */
     uint32_t knows_masked_svc; /* Python was told of an SVC that its priority does not allow */
     uint32_t has_fault; /* `fault` waits for Python */
+    uint32_t waits; /* the block ends before its next access: the flash cannot give more code now */
+    uint32_t waits_end;
     struct fault fault;
     struct record last[32];
 };
-_Static_assert(sizeof(struct shared) == 1560, "shared");
+_Static_assert(sizeof(struct shared) == 1568, "shared");
 
 /* The pins of one port, a bit each. RM0008 9.1, table 20. */
 struct port {
@@ -230,6 +233,76 @@ struct exti {
     uint8_t routes[16];
 };
 _Static_assert(sizeof(struct exti) == 20, "exti");
+
+/* What a DMA controller holds beyond its registers. RM0008 13.3. */
+struct dma {
+    uint64_t base_ns; /* start of the transfers that follow each other without a gap, */
+    uint64_t cycles; /* and cycles of HCLK from there to the end of the one under way */
+    uint32_t hz;
+    uint32_t apb1_cycles;
+    uint32_t apb2_cycles;
+    uint32_t current; /* 1 + the channel whose transfer is under way; 0: none */
+    uint32_t ready; /* channels that are enabled and have something left, */
+    uint32_t unasked; /* those that need no request, */
+    uint32_t lines; /* those whose request is high, */
+    uint32_t latched; /* and those of which a request has come */
+    uint32_t peripheral[7];
+    uint32_t memory[7];
+    uint32_t reload[7];
+    uint32_t padding;
+};
+_Static_assert(sizeof(struct dma) == 136, "dma");
+
+/* Volts on a pin, from outside: `bluepill_sim/fabric/signals.py`. */
+struct signal {
+    uint64_t start_ns; /* when it began, */
+    uint64_t phase_ns; /* at this place of its period */
+    uint64_t period_ns;
+    uint64_t interval_ns; /* between two samples; of a square wave, how long it is high */
+    int32_t low_uv;
+    int32_t high_uv;
+    uint32_t shape; /* 0: none, the pin has its logic level */
+    uint32_t is_repeated;
+    uint32_t count; /* samples, which stand elsewhere */
+    uint32_t padding;
+};
+_Static_assert(sizeof(struct signal) == 56, "signal");
+
+/* The analog side of a chip. */
+struct analog {
+    uint32_t vdda_uv;
+    int32_t temperature_mc; /* of the chip, in thousandths of a degree Celsius */
+    struct signal signals[10];
+};
+_Static_assert(sizeof(struct analog) == 568, "analog");
+
+/* What an ADC holds beyond its registers. RM0008 11.3. */
+struct adc {
+    uint64_t base_ns; /* start of the run of conversions, */
+    uint64_t cycles; /* and cycles of PCLK2 from there to the end of the present one */
+    uint64_t sample_ns;
+    uint64_t end_ns;
+    uint64_t ready_ns; /* no conversion begins earlier */
+    uint64_t calibrated_ns; /* when CAL and RSTCAL fall */
+    uint32_t hz; /* PCLK2, */
+    uint32_t divider; /* and what ADCCLK is divided by */
+    uint32_t number; /* 1 or 2 */
+    uint32_t remapped; /* bit 0: the regular group's EXTI trigger is TIM8's, bit 1: the injected one's */
+    uint32_t state; /* which group is being converted */
+    uint32_t channel;
+    uint32_t has_sample;
+    uint32_t sample;
+    uint32_t regular_at; /* rank in the sequence, */
+    uint32_t regular_left; /* and conversions that are left of this trigger */
+    uint32_t regular_waits; /* for the end of the injected group */
+    uint32_t injected_at;
+    uint32_t injected_left;
+    uint32_t is_automatic; /* the injected group follows the regular one */
+    uint32_t turns; /* triggers that alternate, modulo 2 */
+    uint32_t padding;
+    uint32_t warned[6]; /* by question: channels that were warned of */
+};
+_Static_assert(sizeof(struct adc) == 136, "adc");
 
 /* Which port a GPIO is. */
 struct gpio {
