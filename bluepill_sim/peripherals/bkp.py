@@ -39,16 +39,40 @@ class Bkp(Peripheral):
     REGISTERS = (
         *(
             Register(
-                name=f"DR{n}", offset=4 * n, readable=_HALFWORD, writable=_HALFWORD, on_write="_write_data"
+                name=f"DR{n}",
+                offset=4 * n,
+                readable=_HALFWORD,
+                writable=_HALFWORD,
+                on_write="_write_data",
+                fields="D 15:0",
             )
             for n in DATA_REGISTERS
         ),
         Register(
-            name="RTCCR", offset=4 * RTCCR, readable=bits((9, 0)), writable=bits((9, 0)), on_write="_write_rtccr"
+            name="RTCCR",
+            offset=4 * RTCCR,
+            readable=bits((9, 0)),
+            writable=bits((9, 0)),
+            on_write="_write_rtccr",
+            fields="ASOS 9, ASOE 8, CCO 7, CAL 6:0",
         ),
-        Register(name="CR", offset=4 * CR, readable=TPE | TPAL, writable=TPE | TPAL, on_write="_write_cr"),
-        Register(name="CSR", offset=4 * CSR, readable=TPIE | TEF | TIF, writable=TPIE, on_write="_write_csr"),
-    )  # fmt: skip
+        Register(
+            name="CR",
+            offset=4 * CR,
+            readable=TPE | TPAL,
+            writable=TPE | TPAL,
+            on_write="_write_cr",
+            fields="TPAL 1, TPE 0",
+        ),
+        Register(
+            name="CSR",
+            offset=4 * CSR,
+            readable=TPIE | TEF | TIF,
+            writable=TPIE,
+            on_write="_write_csr",
+            fields="TIF 9, TEF 8, TPIE 2, CTI 1, CTE 0",
+        ),
+    )
     #: Whether TPE was set and the pin at the level of TPAL.
     _was_active = False
     #: CCO: when the first of its edges came, how many there were since, and at which RTCCLK.

@@ -32,8 +32,10 @@ class Pwr(Peripheral):
         Register(
             name="CR", offset=0x00, readable=LPDS | PDDS | PVDE | _PLS | DBP,
             writable=LPDS | PDDS | CWUF | CSBF | PVDE | _PLS | DBP, on_write="_write_cr",
+            fields="DBP 8, PLS 7:5, PVDE 4, CSBF 3, CWUF 2, PDDS 1, LPDS 0",
         ),
-        Register(name="CSR", offset=0x04, readable=WUF | SBF | PVDO | EWUP, writable=EWUP, on_write="_write_csr"),
+        Register(name="CSR", offset=0x04, readable=WUF | SBF | PVDO | EWUP, writable=EWUP, on_write="_write_csr",
+            fields="EWUP 8, PVDO 2, SBF 1, WUF 0"),
     )  # fmt: skip
 
     @property

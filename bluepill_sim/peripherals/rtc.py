@@ -51,20 +51,61 @@ class Rtc(Peripheral):
     )  # fmt: skip
     OUTPUTS = ("irq", "alarm", "second")
     REGISTERS = (
-        Register(name="CRH", offset=0x00, readable=_INTERRUPTS, writable=_INTERRUPTS, on_write="_write_crh"),
         Register(
-            name="CRL", offset=0x04, reset=RTOFF, readable=bits((5, 0)), writable=CNF,
-            write_zero_to_clear=_INTERRUPTS | RSF, on_write="_write_crl",
+            name="CRH",
+            offset=0x00,
+            readable=_INTERRUPTS,
+            writable=_INTERRUPTS,
+            on_write="_write_crh",
+            fields="OWIE 2, ALRIE 1, SECIE 0",
         ),
-        Register(name="PRLH", offset=0x08, readable=0, writable=_PRLH_BITS, on_write="_write_prlh"),
-        Register(name="PRLL", offset=0x0C, readable=0, writable=_HALFWORD, on_write="_write_prll"),
-        Register(name="DIVH", offset=0x10, readable=_PRLH_BITS, writable=0, on_read="_read_divh"),
-        Register(name="DIVL", offset=0x14, readable=_HALFWORD, writable=0, on_read="_read_divl"),
-        Register(name="CNTH", offset=0x18, readable=_HALFWORD, on_read="_read_cnth", on_write="_write_cnth"),
-        Register(name="CNTL", offset=0x1C, readable=_HALFWORD, on_read="_read_cntl", on_write="_write_cntl"),
-        Register(name="ALRH", offset=0x20, readable=_HALFWORD, on_read="_read_alrh", on_write="_write_alrh"),
-        Register(name="ALRL", offset=0x24, readable=_HALFWORD, on_read="_read_alrl", on_write="_write_alrl"),
-    )  # fmt: skip
+        Register(
+            name="CRL",
+            offset=0x04,
+            reset=RTOFF,
+            readable=bits((5, 0)),
+            writable=CNF,
+            write_zero_to_clear=_INTERRUPTS | RSF,
+            on_write="_write_crl",
+            fields="RTOFF 5, CNF 4, RSF 3, OWF 2, ALRF 1, SECF 0",
+        ),
+        Register(name="PRLH", offset=0x08, readable=0, writable=_PRLH_BITS, on_write="_write_prlh", fields="PRL 3:0"),
+        Register(name="PRLL", offset=0x0C, readable=0, writable=_HALFWORD, on_write="_write_prll", fields="PRL 15:0"),
+        Register(name="DIVH", offset=0x10, readable=_PRLH_BITS, writable=0, on_read="_read_divh", fields="RTC_DIV 3:0"),
+        Register(name="DIVL", offset=0x14, readable=_HALFWORD, writable=0, on_read="_read_divl", fields="RTC_DIV 15:0"),
+        Register(
+            name="CNTH",
+            offset=0x18,
+            readable=_HALFWORD,
+            on_read="_read_cnth",
+            on_write="_write_cnth",
+            fields="RTC_CNT 15:0",
+        ),
+        Register(
+            name="CNTL",
+            offset=0x1C,
+            readable=_HALFWORD,
+            on_read="_read_cntl",
+            on_write="_write_cntl",
+            fields="RTC_CNT 15:0",
+        ),
+        Register(
+            name="ALRH",
+            offset=0x20,
+            readable=_HALFWORD,
+            on_read="_read_alrh",
+            on_write="_write_alrh",
+            fields="RTC_ALR 15:0",
+        ),
+        Register(
+            name="ALRL",
+            offset=0x24,
+            readable=_HALFWORD,
+            on_read="_read_alrl",
+            on_write="_write_alrl",
+            fields="RTC_ALR 15:0",
+        ),
+    )
 
     def __init__(self, chip: ChipPorts, place: Place) -> None:
         super().__init__(chip, place)

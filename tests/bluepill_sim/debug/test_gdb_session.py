@@ -291,6 +291,16 @@ def test_monitor_tells_what_gdb_has_no_word_for(debug) -> None:
     assert gdb.monitor("warnings") == "no warnings\n"
 
 
+def test_monitor_shows_registers_by_name_with_their_fields(debug) -> None:
+    gdb = debug(LOOP)
+    assert "TIM4" in gdb.monitor("registers")
+    assert gdb.monitor("registers tim3").splitlines()[11] == "ARR      0x0000ffff  ARR=0xffff"
+    assert gdb.monitor("registers RCC cr").splitlines()[0] == "RCC_CR at 0x40021000: 0x00000083"
+    assert "HSION        0x1" in gdb.monitor("registers RCC CR")
+    assert "TIM3 has no RCR; it has CR1" in gdb.monitor("registers TIM3 RCR")
+    assert "not understood" in gdb.monitor("registers TIM9")
+
+
 def test_documents_are_read_in_parts(debug) -> None:
     gdb = debug(LOOP)
     whole, at = "", 0
