@@ -31,6 +31,7 @@ from bluepill_sim.core.halts import ChipReached
 from bluepill_sim.core.nvic import HARD_FAULT, exception_name
 from bluepill_sim.errors import BluePillError, ImageError, UnmodelledError
 from bluepill_sim.fabric.pins import Pin, PinDrive
+from bluepill_sim.fabric.registers import RegisterView
 from bluepill_sim.fabric.signals import UV_PER_V, to_uv
 from bluepill_sim.fabric.subscriptions import EdgeSink, Of, PinSubscription
 from bluepill_sim.memory import Memory
@@ -174,6 +175,43 @@ class BluePill(Stateful):
             BluePillError: the words are not understood.
         """
         return run_until(self, condition, timeout)
+
+    @property
+    def supply_v(self) -> float:
+        """The supply in volts, which the PVD sees; 2.0 to 3.6.
+
+        Raises:
+            ValueError: set to what the chip does not work at.
+        """
+        return self.chip.power.supply_mv / 1000
+
+    @supply_v.setter
+    def supply_v(self, volts: float) -> None:
+        self.chip.set_supply(round(1000 * volts))
+
+    @property
+    def crystal_works(self) -> bool:
+        """Whether the crystal of HSE oscillates; set it to False to have it fail."""
+        return self.chip.parts.rcc.crystal_works
+
+    @crystal_works.setter
+    def crystal_works(self, works: bool) -> None:
+        rcc = self.chip.parts.rcc
+        if works is not rcc.crystal_works:
+            rcc.repair_crystal() if works else rcc.fail_crystal()
+
+    @property
+    def lsi_hz(self) -> int:
+        """The frequency of LSI, which differs from part to part: 30 to 60 kHz.
+
+        Raises:
+            ValueError: set to one that it does not have.
+        """
+        return self.chip.clocks.lsi_hz
+
+    @lsi_hz.setter
+    def lsi_hz(self, frequency_hz: int) -> None:
+        self.chip.parts.rcc.set_lsi(frequency_hz)
 
     def request_stop(self) -> None:
         """End the running `advance_to` at the boundary of the running block."""
@@ -361,6 +399,19 @@ class BluePill(Stateful):
     def register(self, name: str) -> int:
         """Return a register by its name, such as "R0", "SP" or "XPSR"."""
         return self.chip.engine.registers[Register[name.upper()]]
+
+    def registers(self, peripheral: str) -> dict[str, RegisterView]:
+        """Return the registers of a peripheral by name, with their fields, as a read would find them; nothing changes.
+
+        `board.registers("TIM3")["CR1"]["CEN"]` is a field, `print(board.registers("TIM3")["CR1"])` shows them all.
+
+        Raises:
+            BluePillError: The emulated chip has no such peripheral.
+        """
+        parts = self.chip.parts.by_name
+        if peripheral not in parts:
+            raise BluePillError(f"no peripheral {peripheral!r}", hint=f"there are {', '.join(parts)}")
+        return parts[peripheral].view()
 
     def read_memory(self, address: int, size: int) -> bytes | None:
         """Return bytes of flash or SRAM; None where there is no memory."""

@@ -73,14 +73,25 @@ INSTRUCTION = Struct(
 )
 RAMP = Struct(
     "ramp",
-    "A counter that follows from the time: `source/core/ramp.c`.",
+    "A counter that follows from the time: `source/fabric/ramp.c`.",
     (
         Field("base", "u64", doc="when it had `value`, in the units of its owner,"),
         Field("value", "u32"),
         Field("divider", "u32", doc="so many of which make it count once;"),
         Field("top", "u32", doc="its limit: 0 and this are neighbours"),
         *_fields("u8", "runs", "falls"),
-        Field("padding", "u16"),
+        Field("mirrors", "u8", doc="it turns round at both"),
+        Field("padding", "u8"),
+    ),
+)
+TICKS = Struct(
+    "ticks",
+    "A clock that is counted from where the core's was last changed.",
+    (
+        Field("ns", "u64", doc="when"),
+        Field("tick", "u64", doc="begins; each one after it at floor(n * 10**9 / hz) ns"),
+        Field("hz", "u32"),
+        Field("padding", "u32"),
     ),
 )
 STEP = Struct(
@@ -141,6 +152,8 @@ SHARED = Struct(
         Field("has_debugger", "u32", doc="Python sees to BKPT and HardFaults"),
         Field("knows_masked_svc", "u32", doc="Python was told of an SVC that its priority does not allow"),
         Field("has_fault", "u32", doc="`fault` waits for Python"),
+        Field("waits", "u32", doc="the block ends before its next access: the flash cannot give more code now"),
+        Field("waits_end", "u32"),
         Field("fault", "fault"),
         Field("last", "record", LAST_ROWS),
     ),
@@ -260,6 +273,75 @@ ADC = Struct(
     ),
 )
 GPIO = Struct("gpio", "Which port a GPIO is.", (Field("port", "u32"),))
+FILTER = Struct(
+    "filter",
+    "A digital filter of an input. RM0008 14.4.7, IC1F.",
+    (
+        Field("sampled", "u64", doc="the tick up to which samples were taken"),
+        Field("raw", "u8", doc="the level in front of it,"),
+        Field("out", "u8", doc="and behind"),
+        Field("count", "u8", doc="samples so far that differ from `out`"),
+        Field("padding", "u8"),
+        Field("period", "u32", doc="ticks from sample to sample,"),
+        Field("length", "u32", doc="so many of which change `out`; 0: it passes everything"),
+        Field("end", "u32"),
+    ),
+)
+SHAPE = Struct(
+    "shape",
+    "What an output of a timer shows: a level, a wave, or nothing.",
+    (
+        Field("period", "u64", doc="in ticks,"),
+        Field("high", "u64", doc="of which it is so many at 1"),
+        Field("edge", "u64", doc="a tick of a rising edge, modulo the period"),
+        Field("kind", "u32", doc="nothing, low, high, a wave (`tim.h`)"),
+        Field("padding", "u32"),
+    ),
+)
+TIM = Struct(
+    "tim",
+    "What a timer holds beyond its registers. RM0008 14, 15.",
+    (
+        Field("ramp", "ramp", doc="CNT, in ticks"),
+        Field("ticks", "ticks", doc="of CK_INT"),
+        Field("at", "u64", doc="the tick up to which all is worked out"),
+        Field("idle_at", "u64", doc="the tick at which outputs go to OISx; all ones: none is to come"),
+        Field(
+            "edge_at", "u64", 3, "the tick at which OC1REF to OC3REF last changed before they were what they are now,"
+        ),
+        Field("shaped_at", "u64", 3, "since when they are that,"),
+        Field("born", "u64", 3, "and of a wave the tick of its last edge before, which there was not"),
+        Field("filters", "filter", 5, "TI1 to TI4, ETR"),
+        Field("outputs", "shape", 7, "CH1 to CH4, CH1N to CH3N"),
+        Field("references", "shape", 3, "OC1REF to OC3REF, for the dead time"),
+        Field("base", "u32", doc="the address of its registers"),
+        *_fields("u32", "psc", "arr"),
+        Field("ccr", "u32", 4, "active registers, behind the preload registers"),
+        Field("ccer", "u32", doc="the same of CCPC"),
+        Field("ccmr", "u32", 2),
+        Field("repetitions", "u32", doc="overflows before the next update event"),
+        Field("psc_count", "u32", doc="of the prescaler while no clock of its own drives it"),
+        Field("captures", "u8", 4, "events in the prescaler of an input"),
+        Field("latched", "u32", doc="OCxREF where it does not follow from CNT, a bit each"),
+        Field("cleared", "u32", doc="OCxREF that ETRF has cleared"),
+        Field("armed", "u32", doc="flags of SR whose rising is an event, because the program looks for them"),
+        Field("itr", "u32", doc="levels of the internal triggers"),
+        *_fields("u8", "trgi", "trgo", "in_break"),
+        Field("is_busy", "u8", doc="what it puts out may come back to it: pulses are not taken,"),
+        Field("late_at", "u64", doc="and levels at this tick, the next one; 0: none has come back"),
+        Field("pulses", "u32", doc="outputs that give a pulse at the end of what happens now"),
+        Field("listening", "u32", doc="bits of `pins` that are listened to,"),
+        Field("hears", "u32", doc="and of the internal triggers"),
+        *_fields("u32", "etr_was", "etr_edges"),
+        Field("burst_index", "u32", doc="the next register of a burst,"),
+        Field("burst_left", "u32", doc="transfers that are still to be asked for,"),
+        Field("burst_output", "u32", doc="by this output"),
+        Field("lock", "u32", doc="LOCK, once it was written"),
+        Field("is_advanced", "u32", doc="it is TIM1"),
+        Field("pins", "u8", 9, "CH1 to CH4, CH1N to CH3N, ETR, BKIN"),
+        Field("sources", "u8", 7, "the alternate functions of the first seven"),
+    ),
+)
 WAVE = Struct(
     "wave",
     "A level that goes up every `period` ticks, and down `high` ticks later.",
@@ -286,8 +368,8 @@ SENT = Struct(
 
 #: All of them; one that holds another comes behind it.
 STRUCTS = (
-    RECORD, INSTRUCTION, RAMP, STEP, LOOP, FAULT, SHARED, PORT, USART, EXTI, DMA,
-    SIGNAL, ANALOG, ADC, GPIO, WAVE, EDGE, SENT,
+    RECORD, INSTRUCTION, RAMP, TICKS, STEP, LOOP, FAULT, SHARED, PORT, USART, EXTI, DMA, SIGNAL, ANALOG, ADC, GPIO,
+    FILTER, SHAPE, TIM, WAVE, EDGE, SENT,
 )  # fmt: skip
 
 _KINDS: dict[str, Any] = {

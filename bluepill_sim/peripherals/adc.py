@@ -12,7 +12,7 @@ from typing import ClassVar
 from bluepill_sim.extension.layout import ADC
 from bluepill_sim.fabric.fabric import CLOCK, OWN_COMMANDS, RESET
 from bluepill_sim.fabric.ports import ChipPorts
-from bluepill_sim.fabric.registers import NATIVE, Peripheral, Place, Register, bits
+from bluepill_sim.fabric.registers import NATIVE, Peripheral, Place, Register, bits, numbered
 
 #: A command of its own (adc.c): what is on the pins is about to change.
 _INPUTS_CHANGE = OWN_COMMANDS
@@ -45,32 +45,59 @@ _MASTER_CR1, _MASTER_CR2 = bits((19, 16)), bits(8, 23)
 _STARTS = bits(22, 21)
 
 
-def _stored(name: str, offset: int, mask: int, reset: int = 0) -> Register:
-    return Register(name=name, offset=offset, reset=reset, readable=mask, writable=mask, on_write=NATIVE)
+def _stored(name: str, offset: int, mask: int, fields: str, reset: int = 0) -> Register:
+    return Register(name=name, offset=offset, reset=reset, readable=mask, writable=mask, on_write=NATIVE, fields=fields)
 
 
 def _registers(cr1: int, cr2: int) -> tuple[Register, ...]:
     """Return the registers, with the bits that CR1 and CR2 store."""
     return (
         Register(
-            name="SR", offset=0x00, readable=bits((4, 0)), writable=0, write_zero_to_clear=bits((4, 0)), on_write=NATIVE
+            name="SR",
+            offset=0x00,
+            readable=bits((4, 0)),
+            writable=0,
+            write_zero_to_clear=bits((4, 0)),
+            on_write=NATIVE,
+            fields="STRT 4, JSTRT 3, JEOC 2, EOC 1, AWD 0",
         ),
-        _stored("CR1", 0x04, cr1),
-        Register(name="CR2", offset=0x08, readable=cr2, writable=cr2 | _STARTS, on_write=NATIVE),
-        _stored("SMPR1", 0x0C, bits((23, 0))),
-        _stored("SMPR2", 0x10, bits((29, 0))),
-        *(_stored(f"JOFR{n}", 0x10 + 4 * n, bits((11, 0))) for n in (1, 2, 3, 4)),
-        _stored("HTR", 0x24, bits((11, 0)), 0xFFF),
-        _stored("LTR", 0x28, bits((11, 0))),
-        _stored("SQR1", 0x2C, bits((23, 0))),
-        _stored("SQR2", 0x30, bits((29, 0))),
-        _stored("SQR3", 0x34, bits((29, 0))),
-        _stored("JSQR", 0x38, bits((21, 0))),
+        _stored(
+            "CR1",
+            0x04,
+            cr1,
+            "AWDEN 23, JAWDEN 22, DUALMOD 19:16, DISCNUM 15:13, JDISCEN 12, DISCEN 11, JAUTO 10, AWDSGL 9, SCAN 8, "
+            "JEOCIE 7, AWDIE 6, EOCIE 5, AWDCH 4:0",
+        ),
+        Register(
+            name="CR2",
+            offset=0x08,
+            readable=cr2,
+            writable=cr2 | _STARTS,
+            on_write=NATIVE,
+            fields="TSVREFE 23, SWSTART 22, JSWSTART 21, EXTTRIG 20, EXTSEL 19:17, JEXTTRIG 15, JEXTSEL 14:12, "
+            "ALIGN 11, DMA 8, RSTCAL 3, CAL 2, CONT 1, ADON 0",
+        ),
+        _stored("SMPR1", 0x0C, bits((23, 0)), numbered("SMPn", range(17, 9, -1), 3, 10)),
+        _stored("SMPR2", 0x10, bits((29, 0)), numbered("SMPn", range(9, -1, -1), 3, 0)),
+        *(_stored(f"JOFR{n}", 0x10 + 4 * n, bits((11, 0)), f"JOFFSET{n} 11:0") for n in (1, 2, 3, 4)),
+        _stored("HTR", 0x24, bits((11, 0)), "HT 11:0", 0xFFF),
+        _stored("LTR", 0x28, bits((11, 0)), "LT 11:0"),
+        _stored("SQR1", 0x2C, bits((23, 0)), "L 23:20, " + numbered("SQn", range(16, 12, -1), 5, 13)),
+        _stored("SQR2", 0x30, bits((29, 0)), numbered("SQn", range(12, 6, -1), 5, 7)),
+        _stored("SQR3", 0x34, bits((29, 0)), numbered("SQn", range(6, 0, -1), 5, 1)),
+        _stored("JSQR", 0x38, bits((21, 0)), "JL 21:20, " + numbered("JSQn", range(4, 0, -1), 5, 1)),
         *(
-            Register(name=f"JDR{n}", offset=0x38 + 4 * n, readable=bits((15, 0)), writable=0, on_read=NATIVE)
+            Register(
+                name=f"JDR{n}",
+                offset=0x38 + 4 * n,
+                readable=bits((15, 0)),
+                writable=0,
+                on_read=NATIVE,
+                fields="JDATA 15:0",
+            )
             for n in (1, 2, 3, 4)
         ),
-        Register(name="DR", offset=0x4C, writable=0, on_read=NATIVE),
+        Register(name="DR", offset=0x4C, writable=0, on_read=NATIVE, fields="ADC2DATA 31:16, DATA 15:0"),
     )
 
 

@@ -15,6 +15,8 @@ from bluepill_sim.fabric.ports import ChipPorts
 from bluepill_sim.fabric.registers import NATIVE, Peripheral, Place, Register, bits
 
 CHANNELS = range(1, 8)
+#: Of CCRx, RM0008 13.4.3.
+_CONTROL = "MEM2MEM 14, PL 13:12, MSIZE 11:10, PSIZE 9:8, MINC 7, PINC 6, CIRC 5, DIR 4, TEIE 3, HTIE 2, TCIE 1, EN 0"
 #: chosen: an access on an APB takes one cycle of HCLK, and two of its own clock.
 _BRIDGE_CYCLES, _APB_CYCLES = 1, 2
 
@@ -34,6 +36,13 @@ _WARNINGS = {
 }
 
 
+def _flags(names: str) -> str:
+    """Return the fields of ISR or IFCR: four a channel, the last channel's first."""
+    return ", ".join(
+        f"{name}{n} {4 * (n - 1) + 3 - place}" for n in reversed(CHANNELS) for place, name in enumerate(names.split())
+    )
+
+
 class Dma(Peripheral):
     """Direct memory access controller."""
 
@@ -42,16 +51,25 @@ class Dma(Peripheral):
     OUTPUTS = tuple(f"ch{n}_irq" for n in CHANNELS)
     INPUTS = tuple(f"ch{n}" for n in CHANNELS)
     REGISTERS = (
-        Register(name="ISR", offset=0x00, readable=bits((27, 0)), writable=0),
-        Register(name="IFCR", offset=0x04, readable=0, writable=bits((27, 0)), on_write=NATIVE),
+        Register(name="ISR", offset=0x00, readable=bits((27, 0)), writable=0, fields=_flags("TEIF HTIF TCIF GIF")),
+        Register(
+            name="IFCR",
+            offset=0x04,
+            readable=0,
+            writable=bits((27, 0)),
+            on_write=NATIVE,
+            fields=_flags("CTEIF CHTIF CTCIF CGIF"),
+        ),
         *(
-            Register(name=f"{name}{n}", offset=offset + 20 * n, readable=mask, writable=mask, on_write=NATIVE)
+            Register(
+                name=f"{name}{n}", offset=offset + 20 * n, readable=mask, writable=mask, on_write=NATIVE, fields=fields
+            )
             for n in CHANNELS
-            for name, offset, mask in (
-                ("CCR", -0x0C, bits((14, 0))),
-                ("CNDTR", -0x08, bits((15, 0))),
-                ("CPAR", -0x04, bits((31, 0))),
-                ("CMAR", 0x00, bits((31, 0))),
+            for name, offset, mask, fields in (
+                ("CCR", -0x0C, bits((14, 0)), _CONTROL),
+                ("CNDTR", -0x08, bits((15, 0)), "NDT 15:0"),
+                ("CPAR", -0x04, bits((31, 0)), "PA 31:0"),
+                ("CMAR", 0x00, bits((31, 0)), "MA 31:0"),
             )
         ),
     )

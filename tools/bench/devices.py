@@ -32,12 +32,16 @@ CONVERSIONS = {
     "1 channel at 857 kS/s": (857_142, "2", ()),
     "1 channel at 1 MS/s": (1_000_000, "2", ("-DBENCH_56_MHZ",)),
 }
-#: Pins without a wire on the board, and their timer's clock, period and high time in cycles.
-PWM = {"PA8": "TIM1_CH1", "PA9": "TIM1_CH2", "PA10": "TIM1_CH3", "PA11": "TIM1_CH4"}
+#: TIM1's clock, period and high time in cycles; it drives PA8 to PA11, which have no wire on the board.
 TIMER_HZ, PERIOD, HIGH = 72_000_000, 3600, 900
+#: Registers of TIM1, by offset: ARR, CCMR1, CCMR2, CCR1 to CCR4, CCER, EGR, BDTR, CR1.
+PWM = (
+    (0x2C, PERIOD - 1), (0x18, 0x6868), (0x1C, 0x6868), (0x34, HIGH), (0x38, HIGH), (0x3C, HIGH), (0x40, HIGH),
+    (0x20, 0x1111), (0x14, 1), (0x44, 0x8000), (0x00, 0x81),
+)  # fmt: skip
 #: After the program's start, with its clock at 72 MHz.
 STARTED_NS = 10_000_000
-RCC_APB2ENR, GPIOA_ENABLE = 0x18, 1 << 2
+RCC_APB2ENR, GPIOA_ENABLE, TIM1_ENABLE = 0x18, 1 << 2, 1 << 11
 GPIOA_IDR, BUFFER, BUFFER_WORDS = 0x4001_0808, 0x2000_3000, 256
 
 
@@ -54,10 +58,12 @@ class Mover(Peripheral):
 
 
 def start_pwm(board: BluePill) -> None:
-    """Have four pins carry waves."""
-    board.chip.parts.by_name["GPIOA"].write(4, 4, 0x8884_BBBB)  # PA8 to PA11 alternate functions
-    for pin, source in PWM.items():
-        board.pin(pin).offer_wave(source, TIMER_HZ, PERIOD, HIGH)
+    """Have TIM1 make four of them."""
+    rcc, parts = board.chip.parts.rcc, board.chip.parts.by_name
+    rcc.write(RCC_APB2ENR, 4, rcc.read(RCC_APB2ENR, 4) | GPIOA_ENABLE | TIM1_ENABLE)
+    parts["GPIOA"].write(4, 4, 0x8884_BBBB)  # PA8 to PA11 alternate functions
+    for offset, word in PWM:
+        parts["TIM1"].write(offset, 4, word)
 
 
 def start_mover(board: BluePill) -> None:

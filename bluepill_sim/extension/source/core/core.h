@@ -229,6 +229,8 @@ uint64_t rounds_of_counter(struct core *core, const struct row *row);
 /* access.c */
 void go_on_at_access(struct core *core, uint32_t pc);
 bool is_privileged(struct core *core);
+/* Whether a register of a peripheral has its clock. */
+bool is_clocked(const struct core *core, uint32_t address);
 bool resolve(struct core *core, uint32_t address, bool is_write, uint32_t bytes);
 void skip(struct core *core, uint32_t address, bool is_write, uint32_t bytes);
 /* run.c */

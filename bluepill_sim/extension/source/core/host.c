@@ -98,6 +98,8 @@ static bool holds_code(void *user, uint32_t address, uint32_t bytes)
     return core->code_places[at / 8] >> at % 8 & 1;
 }
 
+enum { DWT_CYCCNT = 0xE0001004, STK_VAL = 0xE000E018 };
+
 static uint64_t asleep_until(void *user)
 {
     struct core *core = user;
@@ -116,4 +118,6 @@ void core_join(struct core *core, struct fabric *fabric)
                                  .end_slice = end_slice, .due = due, .pc = pc, .signal = signal,
                                  .registers = registers, .holds_code = holds_code,
                                  .asleep_until = asleep_until};
+    add_counter(fabric, DWT_CYCCNT, &core->shared.cyccnt, NULL);
+    add_counter(fabric, STK_VAL, &core->shared.tick, NULL);
 }

@@ -437,15 +437,21 @@ static bool is_led(const struct device *device, bool is_injected)
     return mode & (is_injected ? WITH_INJECTED | ALTERNATE : WITH_REGULAR | FAST | SLOW);
 }
 
-static void line(struct device *device, uint32_t input, bool level)
+/* Whether the trigger of an input is chosen and enabled. */
+static bool hears(const struct device *device, uint32_t input)
 {
     const struct adc *adc = device->state;
     const bool is_injected = input >= TRIGGERS;
     const uint32_t which = input % TRIGGERS, control = device->words[CR2];
     const uint32_t selected = control >> (is_injected ? JEXTSEL_AT : EXTSEL_AT) & 7;
-    const bool is_enabled = control & (is_injected ? JEXTTRIG : EXTTRIG);
-    if (!level || !is_enabled || selected != which || is_led(device, is_injected) ||
-        (which == BY_EXTI && adc->remapped >> is_injected & 1)) { /* TIM8's, which is not there */
+    const bool is_other = which == BY_EXTI && adc->remapped >> is_injected & 1; /* TIM8's, which is not there */
+    return control & (is_injected ? JEXTTRIG : EXTTRIG) && selected == which && !is_other;
+}
+
+static void line(struct device *device, uint32_t input, bool level)
+{
+    const bool is_injected = input >= TRIGGERS;
+    if (!level || !hears(device, input) || is_led(device, is_injected)) {
         return;
     }
     if (is_injected) {
@@ -548,15 +554,28 @@ static void write(struct device *device, uint32_t index, uint32_t written, uint3
     }
     update_irq(device);
     reschedule(device);
+    if (index == CR2 && stored != previous) {
+        hearing_changed(device);
+    }
 }
 
-static uint32_t read(struct device *device, uint32_t index)
+/* What a read finds, without what it causes. */
+static uint32_t look(struct device *device, uint32_t index)
 {
     if (is_unseen(device)) {
         settle(device, now_ns(device->fabric));
     }
+    const struct device *other = index == DR && is_master(device) && dual_mode(device) ? other_of(device) : NULL;
+    return device->words[index] | (other == NULL ? 0 : other->words[DR] << 16);
+}
+
+static uint32_t read(struct device *device, uint32_t index)
+{
     if (index != DR) {
-        return device->words[index];
+        return look(device, index);
+    }
+    if (is_unseen(device)) {
+        settle(device, now_ns(device->fabric));
     }
     struct device *other = is_master(device) && dual_mode(device) ? other_of(device) : NULL;
     if (other != NULL) { /* whose conversion may have ended in this very nanosecond */
@@ -567,7 +586,7 @@ static uint32_t read(struct device *device, uint32_t index)
     update_irq(device);
     output_set(device, DMA_REQUEST, false);
     reschedule(device);
-    return device->words[DR] | (other == NULL ? 0 : other->words[DR] << 16);
+    return look(device, DR);
 }
 
 static bool needs_time(const struct device *device, uint32_t index, bool is_write)
@@ -592,6 +611,8 @@ static uint32_t command(struct device *device, uint32_t what, uint32_t one, uint
         }
         adc->hz = one;
         adc->divider = other;
+    } else if (what == SETTLE) {
+        return look(device, one);
     } else if (what == INPUTS_CHANGE) {
         settle(device, now);
         if (adc->state != IDLE && !adc->has_sample && adc->sample_ns <= now) {
@@ -604,4 +625,4 @@ static uint32_t command(struct device *device, uint32_t what, uint32_t one, uint
 }
 
 DEVICE_KIND(adc_kind) = {.name = "adc", .needs_time = needs_time, .read = read, .write = write,
-                         .event = event, .line = line, .command = command};
+                         .event = event, .hears = hears, .line = line, .command = command};

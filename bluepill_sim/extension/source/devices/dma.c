@@ -209,6 +209,9 @@ static void write_control(struct device *device, uint32_t n, uint32_t previous)
     }
     start(device);
     update_irq(device, n);
+    if ((control ^ previous) & EN) {
+        hearing_changed(device);
+    }
 }
 
 static void write(struct device *device, uint32_t index, uint32_t written, uint32_t previous)
@@ -233,6 +236,11 @@ static void write(struct device *device, uint32_t index, uint32_t written, uint3
     } else if (which == CNDTR) {
         dma->reload[n] = device->words[index];
     }
+}
+
+static bool hears(const struct device *device, uint32_t input)
+{
+    return device->words[FIRST + WORDS_EACH * input + CCR] & EN;
 }
 
 static bool needs_time(const struct device *device, uint32_t index, bool is_write)
@@ -261,5 +269,5 @@ static uint32_t command(struct device *device, uint32_t what, uint32_t one, uint
     return 0;
 }
 
-DEVICE_KIND(dma_kind) = {
-    .name = "dma", .needs_time = needs_time, .write = write, .event = event, .line = line, .command = command};
+DEVICE_KIND(dma_kind) = {.name = "dma", .needs_time = needs_time, .write = write, .event = event,
+                         .hears = hears, .line = line, .command = command};

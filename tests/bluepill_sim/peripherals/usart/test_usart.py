@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from tests.bluepill_sim.peripherals.usart_line import (
+from tests.bluepill_sim.peripherals.usart.usart_line import (
     BRR,
     CHARACTER_NS,
     IRQ,
