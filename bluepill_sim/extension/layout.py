@@ -268,7 +268,7 @@ ADC = Struct(
         *_fields("u32", "injected_at", "injected_left"),
         Field("is_automatic", "u32", doc="the injected group follows the regular one"),
         Field("turns", "u32", doc="triggers that alternate, modulo 2"),
-        Field("padding", "u32"),
+        Field("is_stopped", "u32", doc="its clock stands still: Stop mode"),
         Field("warned", "u32", 6, "by question: channels that were warned of"),
     ),
 )

@@ -333,6 +333,9 @@ static void skip_rounds(struct device *device, uint64_t until)
 static void settle(struct device *device, uint64_t until)
 {
     struct adc *adc = device->state;
+    if (adc->is_stopped) {
+        return;
+    }
     if (adc->calibrated_ns <= until) {
         adc->calibrated_ns = NO_TIME;
         device->words[CR2] &= ~(uint32_t)(CAL | RSTCAL);
@@ -353,7 +356,7 @@ static void reschedule(struct device *device)
 {
     const struct adc *adc = device->state;
     const uint64_t end = is_unseen(device) ? NO_TIME : adc->end_ns;
-    schedule(device, end < adc->calibrated_ns ? end : adc->calibrated_ns);
+    schedule(device, adc->is_stopped ? NO_TIME : end < adc->calibrated_ns ? end : adc->calibrated_ns);
 }
 
 static void event(struct device *device, uint64_t ns)
@@ -594,6 +597,28 @@ static bool needs_time(const struct device *device, uint32_t index, bool is_writ
     return is_write || is_unseen(device) || (index == DR && dual_mode(device));
 }
 
+/* Samples what is due, with the volts of before. */
+static void take_sample(struct device *device, uint64_t now)
+{
+    struct adc *adc = device->state;
+    settle(device, now);
+    if (adc->state != IDLE && !adc->is_stopped && !adc->has_sample && adc->sample_ns <= now) {
+        adc->sample = convert(device, adc->channel, adc->sample_ns);
+        adc->has_sample = 1;
+    }
+}
+
+/* Goes on from where the clock stood still. */
+static void resume(struct adc *adc, uint64_t span)
+{
+    adc->is_stopped = 0;
+    adc->base_ns += span;
+    adc->ready_ns += span;
+    adc->sample_ns += span;
+    adc->end_ns += adc->end_ns == NO_TIME ? 0 : span;
+    adc->calibrated_ns += adc->calibrated_ns == NO_TIME ? 0 : span;
+}
+
 static uint32_t command(struct device *device, uint32_t what, uint32_t one, uint32_t other)
 {
     struct adc *adc = device->state;
@@ -614,11 +639,12 @@ static uint32_t command(struct device *device, uint32_t what, uint32_t one, uint
     } else if (what == SETTLE) {
         return look(device, one);
     } else if (what == INPUTS_CHANGE) {
-        settle(device, now);
-        if (adc->state != IDLE && !adc->has_sample && adc->sample_ns <= now) {
-            adc->sample = convert(device, adc->channel, adc->sample_ns);
-            adc->has_sample = 1;
-        }
+        take_sample(device, now);
+    } else if (what == STOPPED) {
+        take_sample(device, now);
+        adc->is_stopped = 1;
+    } else if (what == RESUMED) {
+        resume(adc, (uint64_t)other << 32 | one);
     }
     reschedule(device);
     return 0;

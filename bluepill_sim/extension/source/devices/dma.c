@@ -50,6 +50,11 @@ static uint64_t cycles_to(const struct dma *dma, uint32_t address)
                                          : AHB_ACCESS;
 }
 
+static uint64_t end_ns(const struct dma *dma)
+{
+    return dma->base_ns + dma->cycles / dma->hz * NS_PER_S + dma->cycles % dma->hz * NS_PER_S / dma->hz;
+}
+
 /* Chooses the channel of the next transfer, and returns when this ends; NO_TIME: none asks. */
 static uint64_t choose(struct device *device)
 {
@@ -69,7 +74,7 @@ static uint64_t choose(struct device *device)
     dma->current = best + 1;
     dma->latched &= ~(1u << best);
     dma->cycles += ARBITRATION + cycles_to(dma, dma->peripheral[best]) + cycles_to(dma, dma->memory[best]);
-    return dma->base_ns + dma->cycles / dma->hz * NS_PER_S + dma->cycles % dma->hz * NS_PER_S / dma->hz;
+    return end_ns(dma);
 }
 
 /* The bus has become free, or a request has come: goes on, from now where nothing was under way. */
@@ -261,10 +266,14 @@ static uint32_t command(struct device *device, uint32_t what, uint32_t one, uint
             update_irq(device, n);
         }
     } else if (what == CLOCK && one != dma->hz) { /* what is under way ends when it would have */
-        const uint64_t due = due_ns(device);
-        dma->base_ns = due == NO_TIME ? dma->base_ns : due;
+        dma->base_ns = dma->current == NONE ? dma->base_ns : end_ns(dma);
         dma->cycles = 0;
         dma->hz = one;
+    } else if (what == STOPPED) {
+        schedule(device, NO_TIME);
+    } else if (what == RESUMED && dma->current != NONE) {
+        dma->base_ns += (uint64_t)other << 32 | one;
+        schedule(device, end_ns(dma));
     }
     return 0;
 }

@@ -299,7 +299,7 @@ struct adc {
     uint32_t injected_left;
     uint32_t is_automatic; /* the injected group follows the regular one */
     uint32_t turns; /* triggers that alternate, modulo 2 */
-    uint32_t padding;
+    uint32_t is_stopped; /* its clock stands still: Stop mode */
     uint32_t warned[6]; /* by question: channels that were warned of */
 };
 _Static_assert(sizeof(struct adc) == 136, "adc");

@@ -596,6 +596,23 @@ def test_what_nobody_saw_is_as_if_each_conversion_had_been_made(
             pair.do("wait", 14 * 6, 0)
 
 
+def test_in_stop_mode_a_conversion_stands_still_and_keeps_what_it_sampled(fake_chip: Any) -> None:
+    switch_on(fake_chip)
+    fake_chip.pins["PA0"].set_volts(1.0)
+    adc, begin_ns = fake_chip.parts.by_name["ADC1"], start(fake_chip)
+    fake_chip.advance(begin_ns + 2 * CYCLE_NS)  # behind the sample, at 1.5
+    adc.clock_stopped()
+    fake_chip.pins["PA0"].set_volts(3.0)
+    fake_chip.advance(begin_ns + 5_000_000_002 * CYCLE_NS)
+    adc.clock_resumed(5_000_000_000 * CYCLE_NS)
+    end_ns = begin_ns + 5_000_000_014 * CYCLE_NS
+    fake_chip.advance(end_ns - 1)
+    assert fake_chip.read("ADC1.SR") == STRT
+    fake_chip.advance(end_ns)
+    assert fake_chip.read("ADC1.SR") == STRT | EOC
+    assert fake_chip.read("ADC1.DR") == code(1.0)
+
+
 # Dual modes: which ADC converts when, by the ends of conversions in cycles of ADCCLK.
 
 
