@@ -98,6 +98,7 @@ def test_the_data_is_held_until_the_event_is_cleared_and_each_event_is_an_edge(c
     chip.write("BKP.CSR", CTE)
     assert chip.read("BKP.CSR") == 0
     values = fill(chip)
+    chip.write("BKP.CR", TPE)
     assert data(chip) == values  # the pin is still high, which is no edge
     pin.drive(False)
     assert data(chip) == values
