@@ -7,7 +7,7 @@ Each case takes a file that is right and damages it: a value becomes one of anot
 extreme number, a key is dropped, doubled or misspelt, a line is cut, bytes are turned. What is
 accepted is then used: a world gets a robot, a scenario's script is played, a trace is reported on.
 Allowed are success and the project's own errors; anything else, a second line or more than
-`LIMIT_S` of time is a failure, and the file is kept for a look.
+`LIMIT_S` of processor time is a failure, and the file is kept for a look.
 """
 
 import argparse
@@ -56,7 +56,7 @@ from simbase.timing import NS_PER_MS
 
 ROOT = Path(__file__).resolve().parents[1]
 GOLDEN = ROOT / "tests" / "golden"
-#: chosen: the slowest right file of those below takes a tenth of it on a busy machine.
+#: chosen: the slowest right file of those below takes a tenth of it.
 LIMIT_S = 2.0
 #: chosen: a refusal is read on one line of a terminal, or on two.
 LONGEST_MESSAGE = 600
@@ -862,18 +862,18 @@ def _hit_bytes(data: bytes, rng: random.Random) -> bytes:
 
 @contextmanager
 def limited(seconds: float) -> Iterator[None]:
-    """Interrupt what takes longer; Python code alone, an engine in C ends its call first."""
+    """Interrupt what takes more processor time; Python code alone, an engine in C ends its call first."""
 
     def ring(_number: int, _frame: FrameType | None) -> None:
         raise CaseTimeoutError
 
-    before = signal.signal(signal.SIGALRM, ring)
-    signal.setitimer(signal.ITIMER_REAL, seconds)
+    before = signal.signal(signal.SIGPROF, ring)
+    signal.setitimer(signal.ITIMER_PROF, seconds)
     try:
         yield
     finally:
-        signal.setitimer(signal.ITIMER_REAL, 0)
-        signal.signal(signal.SIGALRM, before)
+        signal.setitimer(signal.ITIMER_PROF, 0)
+        signal.signal(signal.SIGPROF, before)
 
 
 def run_case(name: str, seed: Seed, data: bytes, folder: Path, rng: random.Random) -> bool:
@@ -895,7 +895,7 @@ def run_case(name: str, seed: Seed, data: bytes, folder: Path, rng: random.Rando
             raise CaseFailedError(f"a refusal that names no file: {told!r}") from error
         return False
     except CaseTimeoutError as error:
-        raise CaseFailedError(f"not done within {LIMIT_S:g} s") from error
+        raise CaseFailedError(f"not done within {LIMIT_S:g} s of processor time") from error
     except Exception as error:
         raise CaseFailedError(f"{type(error).__name__}: {error}") from error
     return True

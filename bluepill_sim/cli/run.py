@@ -37,6 +37,7 @@ Examples:
   p2os mcu run mine.elf --for 2s --uart log.txt  what it prints goes to a file
   p2os mcu run mine.elf --realtime --uart pty:   talk to it with any terminal program, until Ctrl-C
   p2os mcu run mine.elf --drive PA6=1@500ms      something comes before a sensor
+  p2os mcu run mine.elf --drive PA0=1.65V        what the ADC sees on a pin
   p2os mcu run mine.elf --until "pin PC13 low"   up to an event
 """
 
@@ -64,7 +65,8 @@ def run(
     uart: Annotated[str, typer.Option(help="Where USART1 goes: - (stdout), pty:, or a file.", metavar="WHERE")] = "-",
     realtime: Annotated[bool, typer.Option("--realtime", help="At the speed of the clock, until Ctrl-C.")] = False,
     drive: Annotated[
-        list[str] | None, typer.Option(help="Put a level on a pin at a time; repeatable.", metavar="PIN=LEVEL@TIME")
+        list[str] | None,
+        typer.Option(help="Put a level or volts on a pin at a time; repeatable.", metavar="PIN=LEVEL@TIME"),
     ] = None,
     until: Annotated[
         str | None, typer.Option(help='End earlier: "pin PA4 high", "usart1 sends ready", "fault".', metavar="EVENT")

@@ -7,6 +7,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from bluepill_sim.debug.execution import Execution
+from bluepill_sim.errors import BluePillError
+from bluepill_sim.spans import to_nanos
 from simbase.timing import NS_PER_S
 
 _LEVELS = {"0": False, "1": True, "low": False, "high": True, "z": None}
@@ -25,8 +27,10 @@ COMMANDS = {
     "help": Command("help", "this list"),
     "reset": Command("reset", "press the reset button (halt and init are taken as well); time goes on"),
     "time": Command("time", "virtual time, cycles, clock"),
+    "wait": Command("wait 10ms", "let time pass with the core halted; DBGMCU_CR says which watchdogs stand still"),
     "pins": Command("pins [all]", "pins in use: mode, level, who drives"),
     "pin": Command("pin PA4 [1|0|z]", "one pin; with a level: drive it from outside, z lets go"),
+    "registers": Command("registers TIM3 [CR1]", "registers of a peripheral with their fields"),
     "snapshot": Command("snapshot [NAME]", "keep the whole machine's state"),
     "restore": Command("restore [NAME]", "go back to it"),
     "fault": Command("fault", "the fault, if there was one, with what ran before it"),
@@ -55,8 +59,10 @@ class Monitor:
             "help": self._help,
             "reset": self._reset,
             "time": self._time,
+            "wait": self._wait,
             "pins": self._pins,
             "pin": self._pin,
+            "registers": self._registers,
             "snapshot": self._snapshot,
             "restore": self._restore,
             "fault": self._fault,
@@ -67,7 +73,7 @@ class Monitor:
         return (f"{line}: {_UNKNOWN}" if act is None else act(words[1:])) + "\n"
 
     def _help(self, _words: list[str]) -> str:
-        return "\n".join(f"{command.usage:<18} {command.help}" for command in COMMANDS.values())
+        return "\n".join(f"{command.usage:<22} {command.help}" for command in COMMANDS.values())
 
     def _reset(self, _words: list[str]) -> str:
         board = self._execution.machine.board
@@ -81,6 +87,24 @@ class Monitor:
         parts += [f"{board.hclk_hz / 1e6:g} MHz", *(["asleep"] if board.is_asleep else [])]
         return ", ".join(parts)
 
+    def _wait(self, words: list[str]) -> str:
+        machine = self._execution.machine
+        board = machine.board
+        try:
+            [span_ns] = map(to_nanos, words)
+        except (BluePillError, ValueError):
+            return f"wait {' '.join(words)}: {_UNKNOWN}"
+        end_ns = board.now_ns + span_ns
+        if machine.end_ns is not None:
+            end_ns = min(end_ns, machine.end_ns)
+        before = board.resets.copy()
+        with board.chip.halted_core():
+            while board.now_ns < end_ns:
+                machine.advance_to(end_ns)
+        self._execution.changed()
+        causes = ", ".join(cause.name for cause in board.resets - before)
+        return f"{self._time([])}{f'; reset by {causes}: at {board.where()}' if causes else ''}"
+
     def _pins(self, words: list[str]) -> str:
         names = [pin.name for pin in self._execution.machine.board.pins]
         lines = [self._line(name, every=bool(words)) for name in names]
@@ -91,6 +115,8 @@ class Monitor:
         if not every and pin.mode.value == "floating input" and pin.driven is None and pin.holder is None:
             return ""
         level = "floating" if pin.is_floating else "high" if pin.level else "low"
+        if pin.wave is not None:
+            level = f"{pin.wave.frequency_hz:g} Hz, {100 * pin.wave.duty:.1f} %"
         outside = {None: "", True: ", high from outside", False: ", low from outside"}[pin.driven]
         use = pin.holder or pin.function or ""
         return f"{name:<5} {level:<9} {pin.mode.value}{f' ({use})' if use else ''}{outside}"
@@ -105,6 +131,27 @@ class Monitor:
             board.pin(name).drive(_LEVELS[words[1].lower()])
             self._execution.changed()
         return self._line(name, every=True)
+
+    def _registers(self, words: list[str]) -> str:
+        board = self._execution.machine.board
+        parts = board.chip.parts.by_name
+        if not words:
+            return ", ".join(parts)
+        name, *wanted = (word.upper() for word in words)
+        if name not in parts or len(wanted) > 1:
+            return f"registers {' '.join(words)}: {_UNKNOWN}"
+        views = board.registers(name)
+        if not wanted:
+            return "\n".join(f"{view.name:<8} {view}" for view in views.values())
+        if wanted[0] not in views:
+            return f"{name} has no {wanted[0]}; it has {', '.join(views)}"
+        view = views[wanted[0]]
+        return "\n".join(
+            [
+                f"{name}_{view.name} at {view.address:#010x}: {view.word:#010x}",
+                *(f"{field:<12} {value:#x}" for field, value in view.fields),
+            ]
+        )
 
     def _snapshot(self, words: list[str]) -> str:
         if not self._execution.machine.can_rewind:

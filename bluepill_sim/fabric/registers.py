@@ -23,17 +23,22 @@ Invariant: a stored word never holds a bit outside `readable`, so that
 
 import ctypes
 from array import array
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
+from functools import cache
 from typing import Any, ClassVar, cast
 
 from bluepill_sim.extension.layout import Struct, structure
-from bluepill_sim.fabric.fabric import CLOCK, RESET
+from bluepill_sim.fabric.fabric import CLOCK, OWN_COMMANDS, RESET, RESUMED, SETTLE, STOPPED
 from bluepill_sim.fabric.ports import ChipPorts
 from simbase.state import Stateful
 
 #: In place of a method's name: the device's file in C does it.
 NATIVE = "native"
+#: The kind of a device in Python that has `INPUTS`, or listens to pins: `source/devices/listener.c`.
+LISTENER = "listener"
+#: What it is told first (the other is pins), and its command.
+_HEARS_LINE, _LISTEN = 0, OWN_COMMANDS
 #: Every bit of a 32-bit register.
 WORD = 0xFFFF_FFFF
 
@@ -62,6 +67,8 @@ class Register:
     latched_in: int | None = None
     #: Name of the peripheral's method `(written: int, previous: int) -> None`, called after the store; or `NATIVE`.
     on_write: str | None = None
+    #: Its fields as the manual names them, from the left: "CKD 9:8, ARPE 7".
+    fields: str = ""
     #: One line for people.
     doc: str = ""
 
@@ -99,6 +106,73 @@ class Register:
         kept = previous & ~self.writable & ~(written & self.write_one_to_clear)
         kept &= written | ~self.write_zero_to_clear
         return (kept | (written & self.writable)) & self.readable
+
+
+@dataclass(frozen=True, slots=True)
+class BitField:
+    """A named part of a register."""
+
+    name: str
+    high: int
+    low: int
+
+    def of(self, word: int) -> int:
+        """Return its value in a register's word."""
+        return word >> self.low & (1 << self.high - self.low + 1) - 1
+
+
+@dataclass(frozen=True, slots=True)
+class RegisterView:
+    """A register of a peripheral as a person wants to see it."""
+
+    name: str
+    address: int
+    #: What a read finds.
+    word: int
+    #: Name and value of each field, from the left.
+    fields: tuple[tuple[str, int], ...]
+
+    def __getitem__(self, field: str) -> int:
+        """Return the value of a field.
+
+        Raises:
+            KeyError: The register has no such field.
+        """
+        return dict(self.fields)[field]
+
+    def __str__(self) -> str:
+        """Return the word and the fields that are not 0, on one line."""
+        return " ".join(
+            [f"{self.word:#010x} ", *(f"{name}={value:#x}" for name, value in self.fields if value)]
+        ).rstrip()
+
+
+def numbered(pattern: str, numbers: Iterable[int], width: int = 1, first: int = 0) -> str:
+    """Return fields that differ by their numbers, `n`, and stand one behind the other, that of `first` at bit 0.
+
+    >>> numbered("MRn", (1, 0))
+    'MR1 1, MR0 0'
+    """
+    found = []
+    for n in numbers:
+        high, low = width * (n - first) + width - 1, width * (n - first)
+        found.append(f"{pattern.replace('n', str(n))} {high if width == 1 else f'{high}:{low}'}")
+    return ", ".join(found)
+
+
+@cache
+def fields_of(text: str) -> tuple[BitField, ...]:
+    """Return the fields that `Register.fields` names.
+
+    >>> fields_of("CKD 9:8, ARPE 7")[0].of(0x200)
+    2
+    """
+    found = []
+    for entry in filter(None, text.split(", ")):
+        name, place = entry.split()
+        high, _, low = place.partition(":")
+        found.append(BitField(name, int(high), int(low or high)))
+    return tuple(found)
 
 
 def bits(*positions: int | tuple[int, int]) -> int:
@@ -218,7 +292,23 @@ class Peripheral(Stateful):
 
     def answer(self, what: int, value: int) -> int:
         """Answer what the device in C asks."""
-        raise NotImplementedError(f"{self.name} was asked {what}, {value}")
+        if self.KIND != LISTENER:
+            raise NotImplementedError(f"{self.name} was asked {what}, {value}")
+        if what == _HEARS_LINE:
+            self.line_changed(self.INPUTS[value >> 1], bool(value & 1))
+        else:
+            self.pins_changed()
+        return 0
+
+    def listen_to_pins(self, port: str, pins: int) -> None:
+        """Have a LISTENER's `pins_changed` called for inputs of these pins of a port, a bit each, from now on."""
+        self.command(_LISTEN, self.chip.pins.PORTS.index(port), pins)
+
+    def line_changed(self, name: str, level: bool) -> None:
+        """Act on a new level of one of a LISTENER's `INPUTS`."""
+
+    def pins_changed(self) -> None:
+        """Act on new levels of the pins that a LISTENER listens to."""
 
     def deliver(self) -> None:
         """Take over the words that the device in C has sent."""
@@ -272,6 +362,34 @@ class Peripheral(Stateful):
         if hook is not None:
             hook(written, previous)
 
+    def look(self, offset: int) -> int:
+        """Return what a read would find at an offset now, with nothing of what a read causes; 0 without a register."""
+        index = offset >> 2
+        register = self._registers[index]
+        hook = self._read_hooks[index]
+        if register is None or hook is None:
+            return self.words[index]
+        if register.on_read == NATIVE:
+            return self.fabric.command(self.slot, SETTLE, index)
+        state = self.snapshot()
+        try:
+            return hook()
+        finally:
+            self.restore(state)
+
+    def view(self) -> dict[str, RegisterView]:
+        """Return its registers as a read would find them now, by name, in the order of their addresses."""
+        found = {}
+        for register in sorted(self.REGISTERS, key=lambda one: one.offset):
+            word = self.look(register.offset)
+            fields = tuple((field.name, field.of(word)) for field in fields_of(self.fields_now(register, word)))
+            found[register.name] = RegisterView(register.name, self.base + register.offset, word, fields)
+        return found
+
+    def fields_now(self, register: Register, _word: int) -> str:
+        """Return the fields of a register whose word is that, where they depend on it."""
+        return register.fields
+
     def masks_of(self, index: int) -> tuple[int, int, int, int]:
         """Return what the stored word `index` keeps, takes, and clears by 1 and by 0, as masks."""
         return self._masks[index]
@@ -288,6 +406,9 @@ class Peripheral(Stateful):
     def on_reset(self) -> None:
         """Put back what is not a register; called by `reset` after the registers."""
 
+    def backup_reset(self) -> None:
+        """Go back to the state of a backup domain that had no power, or after BDRST of RCC_BDCR."""
+
     def advance_to(self, now_ns: int) -> None:
         """Act on everything due up to and including `now_ns`, in order of its time."""
 
@@ -299,6 +420,24 @@ class Peripheral(Stateful):
         """Act on a change of the frequencies in `chip.clocks`, which has just happened."""
         if self.KIND is not None and self.clock_hz():
             self.command(CLOCK, self.clock_hz())
+
+    def clock_stopped(self) -> None:
+        """Stand still, where the clock is one of the core's: Stop mode begins."""
+        if self.KIND is not None:
+            self.command(STOPPED)
+
+    def clock_resumed(self, stopped_ns: int) -> None:
+        """Go on after `stopped_ns`, from where `clock_stopped` was called."""
+        if self.KIND is not None:
+            self.command(RESUMED, stopped_ns & WORD, stopped_ns >> 32)
+
+    def freeze(self) -> None:
+        """Stand still while a debugger halts the core (DBGMCU_CR)."""
+        self.clock_stopped()
+
+    def thaw(self, frozen_ns: int) -> None:
+        """Go on after `frozen_ns`, from where `freeze` was called."""
+        self.clock_resumed(frozen_ns)
 
     def _take_slot(self) -> int:
         if self.KIND is None:

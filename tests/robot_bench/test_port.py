@@ -124,7 +124,6 @@ def test_a_machine_that_slept_in_the_pacers_wait_stops_the_robot_first() -> None
     assert line.sent[sent_before[0] :] == STOP_SEQUENCE
 
 
-@pytest.mark.no_cover  # it traces the lines itself
 @pytest.mark.parametrize("place", range(1, 12))
 def test_a_second_ctrl_c_in_closing_leaves_the_robot_told(place: int) -> None:
     line, lines = FakeLine(), [0]

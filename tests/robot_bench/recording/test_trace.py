@@ -141,7 +141,7 @@ def test_a_killed_process_leaves_everything_up_to_its_last_whole_second(tmp_path
     assert process.stdout is not None
     assert process.stdout.readline() == "ready\n"
     os.kill(process.pid, signal.SIGKILL)
-    process.communicate(timeout=10)
+    process.communicate(timeout=60)
     times = [json.loads(line).get("t", -1) for line in path.read_text().splitlines()]
     assert max(times) >= 2 * S
 

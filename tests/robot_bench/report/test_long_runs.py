@@ -52,7 +52,6 @@ def hour() -> RunRecord:
     return long_run(3600)
 
 
-@pytest.mark.no_cover  # an hour of events
 def test_the_page_of_an_hour_is_bounded_and_says_what_it_leaves_out(hour: RunRecord) -> None:
     page = render_page(hour, page_data(hour))
     assert len(page) < MOST_BYTES
@@ -61,7 +60,6 @@ def test_the_page_of_an_hour_is_bounded_and_says_what_it_leaves_out(hour: RunRec
     assert "trace.jsonl holds all" in page
 
 
-@pytest.mark.no_cover  # an hour of events
 def test_what_stands_out_is_kept(hour: RunRecord) -> None:
     data = json.loads(json.dumps(page_data(hour)))
     assert max(row[4] for row in data["poses"]) == 0.999
