@@ -17,8 +17,8 @@ from robot_bench.wires.board_test.walk import Walk
 from simbase.errors import UsageError
 
 BLUEPILL_BAUD, ADAPTER_BAUD = 57_600, 115_200
-#: chosen: many times what an answer takes, and short beside a boot.
-ANSWER_S = 0.2
+#: chosen: many times what an answer takes, on a busy machine too; a module in reset costs it.
+ANSWER_S = 1.0
 
 HELP = """Test an adapter board: every wire, from end to end.
 

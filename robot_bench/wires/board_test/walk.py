@@ -16,7 +16,7 @@ from adapter_sim.pinout import Direction, Pinout, WireRole
 from robot_bench.wires.board_test.ends import AdapterEnd, BluePillEnd, BoardTestError
 
 GREETINGS = 3
-#: Tries of `test on` after a reset. chosen: with a console that waits 0.2 s, more than any ESP32 needs to boot.
+#: Tries of `test on` after a reset. chosen: with a console that waits 0.2 s or more, longer than an ESP32 boots.
 BOOT_TRIES = 15
 #: chosen: each takes a millisecond at the least, and the pattern 9 ms at 9600 baud.
 LINK_TRIES = 40

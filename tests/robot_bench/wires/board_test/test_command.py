@@ -138,7 +138,8 @@ def test_the_same_walk_at_two_ports_names_the_same_fault(run: Run, ports: Ports)
     )
 
 
-def test_a_bluepill_that_does_not_answer_is_one_line_and_a_hint() -> None:
+def test_a_bluepill_that_does_not_answer_is_one_line_and_a_hint(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(verb, "ANSWER_S", 0.05)
     ends = [os.openpty() for _ in range(2)]
     urls = [f"pty:{os.ttyname(slave)}" for _, slave in ends]
     try:
