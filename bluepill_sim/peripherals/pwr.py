@@ -26,7 +26,6 @@ class Pwr(Peripheral):
     """Power control."""
 
     KIND = LISTENER
-    STATE = ("_was_high",)
     OUTPUTS = ("pvd",)
     INPUTS = ("alarm",)
     REGISTERS = (
@@ -38,8 +37,6 @@ class Pwr(Peripheral):
         Register(name="CSR", offset=0x04, readable=WUF | SBF | PVDO | EWUP, writable=EWUP, on_write="_write_csr",
             fields="EWUP 8, PVDO 2, SBF 1, WUF 0"),
     )  # fmt: skip
-    #: The level of WKUP, while EWUP is set.
-    _was_high = False
 
     @property
     def stands_by(self) -> bool:
@@ -92,9 +89,7 @@ class Pwr(Peripheral):
 
     def pins_changed(self) -> None:
         """Take a rising edge of WKUP for a wake-up event."""
-        is_high = bool(self.words[CSR] & EWUP) and self.chip.pins[f"P{_PORT}{_PIN}"].input
-        was_high, self._was_high = self._was_high, is_high
-        if is_high and not was_high:
+        if self.words[CSR] & EWUP and self.chip.pins[f"P{_PORT}{_PIN}"].input:
             self._wake()
 
     def _restored(self) -> None:

@@ -14,8 +14,9 @@ from simbase.timing import NS_PER_S
 
 HELP = """Check scenario files without running them.
 
-Keys, ranges, names, events in words, firmware and world are looked at, as by
-p2os run. Exit code: 0 all can be run, 1 one cannot.
+Keys, ranges, names, events in words, firmware and world are looked at.
+
+Exit code: 0 all can be run, 1 one cannot.
 
 \b
 Examples:

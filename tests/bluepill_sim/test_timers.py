@@ -120,3 +120,30 @@ def test_gdb_sees_a_wave_at_its_pin(elf: Path) -> None:
     monitor = Monitor(Execution(LoneChip(board), lambda _text: None))
     assert monitor.run("pin PA8").split()[1:5] == ["20000", "Hz,", "25.0", "%"]
     assert "CEN=0x1" in monitor.run("registers TIM1")
+
+
+def test_a_burst_of_dma_renews_three_compare_registers_with_each_update(tmp_path: Path) -> None:
+    """TIM3_UP is channel 3 (RM0008 table 78); DCR makes three words by DMAR CCR1 to CCR3."""
+    (tmp_path / "idle.bin").write_bytes(bytes.fromhex("00500020 09000008 fee7fee7"))
+    board = BluePill(tmp_path / "idle.bin")
+    parts = board.chip.parts.by_name
+    parts["RCC"].write(0x14, 4, 0x15)
+    parts["RCC"].write(0x1C, 4, 2)
+    words = [100, 200, 300, 110, 210, 310]
+    assert board.chip.memory.write(0x2000_1000, b"".join(word.to_bytes(2, "little") for word in words))
+    for offset, word in (
+        (0x38, 0x4000_044C),
+        (0x3C, 0x2000_1000),
+        (0x34, 6),
+        (0x30, 1 << 10 | 1 << 8 | 1 << 7 | 1 << 4 | 1),
+    ):
+        parts["DMA1"].write(offset, 4, word)
+    for offset, word in ((0x2C, 799), (0x48, 2 << 8 | 13), (0x0C, 0x100), (0x00, 1)):
+        parts["TIM3"].write(offset, 4, word)
+    seen = []
+    for at_ns in (100_000, 105_000, 200_000, 205_000, 305_000):
+        board.advance_to(at_ns)
+        seen.append([board.registers("TIM3")[f"CCR{n}"].word for n in (1, 2, 3, 4)])
+    first, second = [*words[:3], 0], [*words[3:], 0]
+    assert seen == [[0, 0, 0, 0], first, first, second, second]
+    assert board.registers("DMA1")["CNDTR3"].word == 0

@@ -4,7 +4,7 @@ from collections.abc import Callable
 from typing import Any
 
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 POLYNOMIAL, WORD = 0x04C1_1DB7, 0xFFFF_FFFF
@@ -21,6 +21,7 @@ def crc_of(words: list[int]) -> int:
     return remainder
 
 
+@settings(max_examples=25)
 @given(words=st.lists(st.integers(0, WORD), max_size=8), idr=st.integers(0, WORD))
 def test_any_words_give_the_remainder_of_the_polynomial(
     make_fake_chip: Callable[[], Any], words: list[int], idr: int

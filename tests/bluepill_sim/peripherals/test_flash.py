@@ -4,7 +4,7 @@ from collections.abc import Callable
 from typing import Any
 
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from bluepill_sim.peripherals.flash import DELIVERED
@@ -247,6 +247,7 @@ def test_option_bytes_take_halfwords_only(open_options: Any, size: int) -> None:
     assert not open_options.parts.flash.program_option(4, size, 0)
 
 
+@settings(max_examples=25)
 @given(pairs=st.lists(st.tuples(st.integers(0, 255), st.integers(0, 255), st.booleans()), min_size=8, max_size=8))
 def test_a_reset_loads_what_fits_its_complement(
     make_fake_chip: Callable[[], Any], pairs: list[tuple[int, int, bool]]

@@ -335,6 +335,21 @@ def test_a_change_of_the_clock_counts_from_the_next_transfer_on(fake_chip: Any) 
     assert dma.due_ns == 5 * CYCLE_NS + 5 * 2 * CYCLE_NS
 
 
+def test_in_stop_mode_a_transfer_stands_still(fake_chip: Any) -> None:
+    connected(fake_chip)
+    dma = fake_chip.parts.by_name["DMA1"]
+    set_up(fake_chip, 1, EN | MEM2MEM, 2, SRAM, SRAM + 0x40)
+    fake_chip.advance(2 * CYCLE_NS)
+    dma.clock_stopped()
+    fake_chip.advance(5_000_000_002 * CYCLE_NS)
+    assert fake_chip.read("DMA1.CNDTR1") == 2
+    dma.clock_resumed(5_000_000_000 * CYCLE_NS)
+    fake_chip.advance(5_000_000_005 * CYCLE_NS - 1)
+    assert fake_chip.read("DMA1.CNDTR1") == 2
+    fake_chip.advance(5_000_000_005 * CYCLE_NS)
+    assert fake_chip.read("DMA1.CNDTR1") == 1
+
+
 # With USARTs.
 
 UE, TE, RE, DMAR, DMAT, EIE = 1 << 13, 8, 4, 1 << 6, 1 << 7, 1

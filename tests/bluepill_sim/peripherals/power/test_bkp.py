@@ -4,7 +4,7 @@ from collections.abc import Callable
 from typing import Any
 
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from bluepill_sim.fabric.pins import PinDrive
@@ -32,6 +32,7 @@ def fill(chip: Any) -> list[int]:
     return values
 
 
+@settings(max_examples=25)
 @given(values=st.lists(st.integers(0, 0xFFFF_FFFF), min_size=10, max_size=10), is_open=st.booleans())
 def test_the_ten_data_registers_keep_halfwords_where_they_may_be_written(
     make_fake_chip: Callable[[], Any], values: list[int], is_open: bool
@@ -98,6 +99,7 @@ def test_the_data_is_held_until_the_event_is_cleared_and_each_event_is_an_edge(c
     chip.write("BKP.CSR", CTE)
     assert chip.read("BKP.CSR") == 0
     values = fill(chip)
+    chip.write("BKP.CR", TPE)
     assert data(chip) == values  # the pin is still high, which is no edge
     pin.drive(False)
     assert data(chip) == values

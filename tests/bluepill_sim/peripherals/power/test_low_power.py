@@ -5,9 +5,11 @@ from typing import Any
 
 import pytest
 
-from bluepill_sim.fabric.low_power import STANDBY_WAKE_NS, Mode
+from bluepill_sim import BluePill
+from bluepill_sim.fabric.low_power import Mode
 from bluepill_sim.fabric.pins import PinDrive
 from bluepill_sim.peripherals.rcc import ResetCause
+from tests.bluepill_sim.machine import Machine
 
 S, US = 1_000_000_000, 1000
 #: HSI: one cycle in ns, and the entry of a handler.
@@ -242,13 +244,26 @@ def test_the_wake_up_pin_ends_standby_with_a_reset_after_its_time(make: Any) -> 
     assert board.pin("PA0").output is PinDrive.PULL_DOWN
     at = board.now_ns
     board.pin("PA0").drive(True)
-    board.advance_to(at + STANDBY_WAKE_NS - 1)
+    board.advance_to(at + 50_000 - 1)  # DS5319 table 20
     assert mode(machine) is Mode.WAKING
+    board.advance_to(at + 50_000 + 1)
+    assert mode(machine) is Mode.RUN
     machine.run(100)
     assert machine.is_done
     flags, sram, csr = logged(machine)
     assert (flags, sram, csr & ALL_FLAGS) == (WUF | SBF, 0, 0x0C00_0000)
     assert dict(board.resets) == {ResetCause.STANDBY: 1}
+
+
+def test_another_board_that_takes_over_standby_hears_the_pin(make: Any) -> None:
+    machine = standing_by(make, store(PWR + 4, EWUP))
+    saved = machine.board.snapshot()
+    other = Machine.__new__(Machine)
+    other.board = BluePill(machine.image)
+    other.board.restore(saved)
+    other.board.pin("PA0").drive(True)
+    other.board.run_for("1 us")
+    assert mode(other) is Mode.WAKING
 
 
 def test_without_ewup_the_pin_does_nothing(make: Any) -> None:

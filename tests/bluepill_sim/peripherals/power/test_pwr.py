@@ -4,7 +4,7 @@ from collections.abc import Callable
 from typing import Any
 
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from bluepill_sim.fabric.pins import PinDrive
@@ -84,6 +84,7 @@ def test_a_pin_that_is_high_before_ewup_is_an_event_of_its_own(fake_chip: Any) -
     assert fake_chip.signals == ["wake"]
 
 
+@settings(max_examples=25)
 @given(control=st.integers(0, 0xFFFF_FFFF), status=st.integers(0, 0xFFFF_FFFF))
 def test_the_flags_fall_by_their_bits_alone_and_those_read_0(
     make_fake_chip: Callable[[], Any], control: int, status: int

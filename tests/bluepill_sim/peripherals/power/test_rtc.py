@@ -217,6 +217,29 @@ def test_it_runs_through_resets_and_the_bus_sees_it_with_the_next_cycle(fake_chi
     assert clock.flags() & RSF
 
 
+def test_the_last_cycle_of_a_second_is_that_of_divider_0(fake_chip: Any) -> None:
+    """RSF rises in the cycle before it, and SECF does not."""
+    clock = Clock(fake_chip)
+    clock.go_to(0x7FFE)
+    clock.clear(RSF)
+    clock.go_to(0x7FFF)
+    assert (clock.word("DIV"), clock.flags() & (RSF | SECF)) == (1, RSF)
+
+
+def test_a_reset_drops_what_is_being_configured_and_lets_a_write_come_to_its_end(fake_chip: Any) -> None:
+    clock = Clock(fake_chip)
+    fake_chip.write("RTC.CRL", CNF)
+    fake_chip.write("RTC.CNTH", 7)
+    fake_chip.parts.reset(ResetCause.PIN)
+    fake_chip.power.is_backup_open = True
+    clock.configure(ALR=5)
+    fake_chip.parts.reset(ResetCause.PIN)
+    fake_chip.power.is_backup_open = True
+    assert not clock.flags() & RTOFF
+    clock.go_to(3)
+    assert (clock.flags() & RTOFF, clock.word("CNT"), clock.word("ALR")) == (RTOFF, 0, 5)
+
+
 @pytest.mark.parametrize("how", ["power", "BDRST"])
 def test_a_power_cut_and_bdrst_take_the_time(fake_chip: Any, how: str) -> None:
     clock = Clock(fake_chip)
@@ -250,9 +273,12 @@ def test_the_source_is_chosen_once(fake_chip: Any) -> None:
     clock = Clock(fake_chip)
     fake_chip.write("RCC.BDCR", 1 << 15 | LSI << 8 | 1)
     assert fake_chip.read("RCC.BDCR") >> 8 & 3 == LSE
-    assert "RCC:rtcsel" in fake_chip.warnings
-    clock.go_to(0x8001)
-    assert clock.word("CNT") == 1
+    assert fake_chip.warnings.pop("RCC:rtcsel")
+    fake_chip.write("RCC.BDCR", 1 << 16)
+    assert fake_chip.warnings == {}
+    fake_chip.write("RCC.BDCR", 1 << 15 | LSE << 8 | 1)
+    assert fake_chip.read("RCC.BDCR") >> 8 & 3 == LSE
+    clock.go_to(1)
 
 
 @pytest.mark.parametrize("calibration", [1, 127])
