@@ -271,7 +271,7 @@ def test_ctrl_c_stops_a_program_that_spins_or_sleeps(debug) -> None:
 
 def test_monitor_tells_what_gdb_has_no_word_for(debug) -> None:
     gdb = debug(LOOP)
-    assert gdb.monitor("help").count("\n") == 11
+    assert gdb.monitor("help").count("\n") == 12
     assert gdb.monitor("") == gdb.monitor("help")
     assert gdb.monitor("time") == "0.000000000 s of virtual time, 0 cycles, 8 MHz\n"
     assert "PA13" in gdb.monitor("pins")
