@@ -175,7 +175,7 @@ def write_run(bench: Bench, folder: Path, failure: str = "") -> Path:
     """Write what a bench with its trace in memory has recorded so far as a run folder; return its report's path.
 
     Args:
-        bench: Stays as it is.
+        bench: It has run as far as it will.
         folder: Made where it is missing; a run that is there is overwritten.
         failure: Why it failed; empty where it did not.
 
@@ -184,6 +184,8 @@ def write_run(bench: Bench, folder: Path, failure: str = "") -> Path:
         FileError: It cannot be written.
     """
     end = end_of_a_broken_run(bench.record(), failure) | {"trace_sha256": bench.trace.sha256}
+    goals = bench.goals.finish(bench.now, planned_ns=bench.scenario.planned_ns)
+    end |= {"goals_met": goals.met, "goals_not_judged": goals.not_judged}
     if not failure:
         end |= {"passed": True, "failures": []}
     meta = meta_of(bench.scenario, bench.parts.world, bench.note, is_at_port=False)

@@ -310,7 +310,8 @@ TIM = Struct(
             "edge_at", "u64", 3, "the tick at which OC1REF to OC3REF last changed before they were what they are now,"
         ),
         Field("shaped_at", "u64", 3, "since when they are that,"),
-        Field("born", "u64", 3, "and of a wave the tick of its last edge before, which there was not"),
+        Field("born", "u64", 3, "of a wave the tick of its last edge before, which there was not,"),
+        Field("turns_at", "u64", 3, "and of the first that there is"),
         Field("filters", "filter", 5, "TI1 to TI4, ETR"),
         Field("outputs", "shape", 7, "CH1 to CH4, CH1N to CH3N"),
         Field("references", "shape", 3, "OC1REF to OC3REF, for the dead time"),

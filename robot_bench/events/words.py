@@ -40,7 +40,12 @@ _FREQUENT = (PinEdge, Packet, Pose, Clearance, Ranges)
 
 def words_of(event: Event) -> str:
     """Return an event with its time in one line."""
-    return f"{event.t / NS_PER_S:10.6f} s  {_WORDS[type(event)](event)}"
+    return f"{event.t / NS_PER_S:10.6f} s  {what_of(event)}"
+
+
+def what_of(event: Event) -> str:
+    """Return an event in words, without its time."""
+    return _WORDS[type(event)](event)
 
 
 def last_words(events: Iterable[Event], count: int = 8) -> list[str]:

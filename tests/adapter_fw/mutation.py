@@ -41,8 +41,12 @@ FIRMWARE = tuple(
 SIDES = {"model": MODEL, "firmware": FIRMWARE}
 #: Lives until a change counts as unnoticed, and how long one may take: an endless loop is noticed by this.
 LIVES, LIFE_LIMIT_S = 120, 20
+_BEHAVIOUR = "tests/adapter_sim/test_adapter_behaviour.py"
 #: Modules of which others than the adapter use a part: their own tests are asked too.
-OWN_TESTS = {"adapter_sim.codec": "tests/adapter_sim/test_adapter_codec.py"}
+OWN_TESTS = {
+    "adapter_sim.codec": "tests/adapter_sim/test_adapter_codec.py",
+    "adapter_sim.distances": f"{_BEHAVIOUR}::test_a_default_adapter_takes_half_the_sonar_range",
+}
 #: The same on the firmware's side: what no life exercises.
 UNITS = "adapter_fw/selftest/units.cpp"
 #: Operators of cosmic-ray that change no arithmetic or order: what they break is found by the type check.

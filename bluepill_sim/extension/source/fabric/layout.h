@@ -341,7 +341,8 @@ struct tim {
     uint64_t idle_at; /* the tick at which outputs go to OISx; all ones: none is to come */
     uint64_t edge_at[3]; /* the tick at which OC1REF to OC3REF last changed before they were what they are now, */
     uint64_t shaped_at[3]; /* since when they are that, */
-    uint64_t born[3]; /* and of a wave the tick of its last edge before, which there was not */
+    uint64_t born[3]; /* of a wave the tick of its last edge before, which there was not, */
+    uint64_t turns_at[3]; /* and of the first that there is */
     struct filter filters[5]; /* TI1 to TI4, ETR */
     struct shape outputs[7]; /* CH1 to CH4, CH1N to CH3N */
     struct shape references[3]; /* OC1REF to OC3REF, for the dead time */
@@ -376,7 +377,7 @@ struct tim {
     uint8_t pins[9]; /* CH1 to CH4, CH1N to CH3N, ETR, BKIN */
     uint8_t sources[7]; /* the alternate functions of the first seven */
 };
-_Static_assert(sizeof(struct tim) == 712, "tim");
+_Static_assert(sizeof(struct tim) == 736, "tim");
 
 /* A level that goes up every `period` ticks, and down `high` ticks later. */
 struct wave {
