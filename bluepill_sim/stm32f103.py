@@ -20,8 +20,10 @@ from bluepill_sim.peripherals.afio import Afio
 from bluepill_sim.peripherals.exti import Exti
 from bluepill_sim.peripherals.flash import Flash
 from bluepill_sim.peripherals.gpio import Gpio
+from bluepill_sim.peripherals.i2c import I2c
 from bluepill_sim.peripherals.iwdg import Iwdg
 from bluepill_sim.peripherals.rcc import Rcc, ResetCause
+from bluepill_sim.peripherals.spi import Spi
 from bluepill_sim.peripherals.usart import Usart
 from bluepill_sim.peripherals.wwdg import Wwdg
 from simbase.state import Stateful
@@ -164,6 +166,10 @@ PERIPHERALS: tuple[tuple[_Maker, str], ...] = (
     (Usart, "USART1"),
     (Usart, "USART2"),
     (Usart, "USART3"),
+    (Spi, "SPI1"),
+    (Spi, "SPI2"),
+    (I2c, "I2C1"),
+    (I2c, "I2C2"),
     (Iwdg, "IWDG"),
     (Wwdg, "WWDG"),
 )
@@ -182,6 +188,12 @@ WIRING: dict[str, tuple[int | str, ...]] = {
     "EXTI.3": (9,),
     "EXTI.4": (10,),
     "EXTI.9_5": (23,),
+    "I2C1.event_irq": (31,),
+    "I2C1.error_irq": (32,),
+    "I2C2.event_irq": (33,),
+    "I2C2.error_irq": (34,),
+    "SPI1.irq": (35,),
+    "SPI2.irq": (36,),
     "USART1.irq": (37,),
     "USART2.irq": (38,),
     "USART3.irq": (39,),

@@ -23,6 +23,8 @@ PERIPHERALS = {
     "GPIOB": {"CRL": 0x4444_4444, "CRH": 0x4444_4444, "IDR": 0x0010},
     "EXTI": {},
     **{f"USART{number}": {"SR": 0xC0} for number in (1, 2, 3)},
+    **{f"SPI{number}": {"SR": 0x02, "CRCPR": 7} for number in (1, 2)},
+    **{f"I2C{number}": {"TRISE": 2} for number in (1, 2)},
     "IWDG": {"RLR": 0xFFF},
     "WWDG": {"CR": 0x7F, "CFR": 0x7F},
 }
