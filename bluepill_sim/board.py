@@ -31,16 +31,18 @@ from bluepill_sim.core.halts import ChipReached
 from bluepill_sim.core.nvic import HARD_FAULT, exception_name
 from bluepill_sim.errors import BluePillError, ImageError, UnmodelledError
 from bluepill_sim.fabric.bus_parts import I2cDevice, SpiDevice
+from bluepill_sim.fabric.can_network import CanNetwork
 from bluepill_sim.fabric.pins import Pin, PinDrive
 from bluepill_sim.fabric.subscriptions import EdgeSink, Of, PinSubscription
 from bluepill_sim.memory import Memory
+from bluepill_sim.parts.serial_port import Activity, SerialPort
+from bluepill_sim.peripherals.can import Can
 from bluepill_sim.peripherals.i2c import I2c
 from bluepill_sim.peripherals.rcc import ResetCause
 from bluepill_sim.peripherals.spi import Spi
 from bluepill_sim.program.image import Image, load_image
 from bluepill_sim.program.last_blocks import TITLE, shortened
 from bluepill_sim.program.line_table import LineTable, read_lines
-from bluepill_sim.serial_port import Activity, SerialPort
 from bluepill_sim.spans import Span, to_nanos
 from bluepill_sim.stm32f103 import FLASH_BASE, SRAM_BASE
 from simbase.state import PartState, Stateful
@@ -378,11 +380,20 @@ class BluePill(Stateful):
             part.attach(device)
         return part
 
+    def can(self, network: CanNetwork | None = None) -> Can:
+        """Return the CAN; with a network, join it first."""
+        part = self.chip.parts.by_name["CAN"]
+        if not isinstance(part, Can):
+            raise TypeError("CAN is made by another class")
+        if network is not None:
+            part.attach(network)
+        return part
+
     # Callbacks of the chip.
 
     def _is_driven_in_words(self, pin: Pin) -> bool:
         """Whether something outside sends on a pin, though not as levels."""
-        buses = (part for part in self.chip.parts.by_name.values() if isinstance(part, Spi))
+        buses = [part for part in self.chip.parts.by_name.values() if isinstance(part, Spi | Can)]
         return any(port.receives_at(pin.name) for port in self._usarts) or any(bus.sends_at(pin.name) for bus in buses)
 
     def _reset_begins(self, cause: ResetCause) -> None:

@@ -17,6 +17,7 @@ from bluepill_sim.fabric.pins import PinBank, PinPorts
 from bluepill_sim.fabric.ports import ChipPorts
 from bluepill_sim.fabric.registers import ClockBit, Peripheral, Place
 from bluepill_sim.peripherals.afio import Afio
+from bluepill_sim.peripherals.can import Can
 from bluepill_sim.peripherals.exti import Exti
 from bluepill_sim.peripherals.flash import Flash
 from bluepill_sim.peripherals.gpio import Gpio
@@ -170,6 +171,7 @@ PERIPHERALS: tuple[tuple[_Maker, str], ...] = (
     (Spi, "SPI2"),
     (I2c, "I2C1"),
     (I2c, "I2C2"),
+    (Can, "CAN"),
     (Iwdg, "IWDG"),
     (Wwdg, "WWDG"),
 )
@@ -187,6 +189,10 @@ WIRING: dict[str, tuple[int | str, ...]] = {
     "EXTI.2": (8,),
     "EXTI.3": (9,),
     "EXTI.4": (10,),
+    "CAN.tx_irq": (19,),
+    "CAN.rx0_irq": (20,),
+    "CAN.rx1_irq": (21,),
+    "CAN.sce_irq": (22,),
     "EXTI.9_5": (23,),
     "I2C1.event_irq": (31,),
     "I2C1.error_irq": (32,),

@@ -73,8 +73,8 @@ LAYERS = {
         ("capture", "client", "pioneer"), ("cli",), ("__main__",),
     ),
     "bluepill_sim": (
-        ("errors",), ("spans", "extension"), ("fabric",), ("peripherals", "parts"), ("stm32f103",),
-        ("memory", "serial_port"), ("core",), ("program", "native"), ("chip",), ("board",),
+        ("errors",), ("spans", "extension"), ("fabric",), ("peripherals",), ("parts",), ("stm32f103",),
+        ("memory",), ("core",), ("program", "native"), ("chip",), ("board",),
         ("analysis", "debug"), ("cli",),
     ),
     "adapter_sim": (

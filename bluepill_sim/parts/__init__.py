@@ -4,7 +4,9 @@ Not the chip and not the board: a part knows the interface of its bus (`fabric/b
 Invariant: a part is told the time; it has no clock.
 """
 
+from bluepill_sim.fabric.bus_parts import CanFrame
+from bluepill_sim.fabric.can_network import CanNetwork, CanNode
 from bluepill_sim.parts.eeprom_24c02 import Eeprom24C02
 from bluepill_sim.parts.spi_flash import SpiFlash
 
-__all__ = ["Eeprom24C02", "SpiFlash"]
+__all__ = ["CanFrame", "CanNetwork", "CanNode", "Eeprom24C02", "SpiFlash"]
