@@ -128,59 +128,6 @@ def may_write(code: bytes, at: int) -> int:
     return 1 << (second >> 12) | 1 << (second >> 8 & 15) | 1 << (first & 15)
 
 
-def only_reads(code: bytes) -> bool:
-    """Tell whether a straight run of code stores nothing and uses no coprocessor: in doubt, no."""
-    at = 0
-    while at + 2 <= len(code):
-        first = code[at] | code[at + 1] << 8
-        if first >= _FIRST_WIDE:
-            if first & 0xFE10 in (0xE800, 0xF800) or first & 0xEC00 == 0xEC00:
-                return False
-            at += 4
-            continue
-        is_store = first & 0xF000 in (0x6000, 0x7000, 0x8000, 0x9000) and not first & 0x0800
-        if is_store or 0x5000 <= first < 0x5600 or first & 0xFE00 == 0xB400 or first & 0xF800 == 0xC000:
-            return False
-        at += 2
-    return True
-
-
-def may_wait(code: bytes) -> bool:
-    """Tell whether a block that goes round may find its registers as they were one round before: in doubt, yes.
-
-    It cannot where it stores, where it counts in a register, or where it loads nothing and branches by its own flags.
-    """
-    if not only_reads(code):
-        return False
-    starts = _starts(code)
-    words = [code[at] | code[at + 1] << 8 for at in starts]
-    writes = [may_write(code, at) for at in starts]
-    for number, word in enumerate(words):
-        register = word >> 8 & 7
-        counts = word & 0xF000 == 0x3000 and word & 0xFF  # ADDS or SUBS with 8 bits
-        if counts and not any(write >> register & 1 for n, write in enumerate(writes) if n != number):
-            return False
-    is_conditional = words[-1] & 0xF000 == 0xD000 or _is_wide_conditional(code, starts[-1])
-    loads_of_sp = any(word & 0xF800 == 0x9800 or word & 0xFE1F in (0xE81D, 0xF81D) for word in words)
-    return not is_conditional or loads_of_sp or any(access.is_load for access in accesses_of(code, 0))
-
-
-def _is_wide_conditional(code: bytes, at: int) -> bool:
-    """Tell whether the instruction at offset `at` is the wide form of a conditional branch (A7.7.12, T3)."""
-    first, second = (int.from_bytes(code[at + n : at + n + 2], "little") for n in (0, 2))
-    return first & 0xF800 == 0xF000 and second & 0xD000 == 0x8000
-
-
-def _starts(code: bytes) -> list[int]:
-    """Return the offsets of the instructions of a straight run of code."""
-    starts = []
-    at = 0
-    while at + 2 <= len(code):
-        starts.append(at)
-        at += 4 if (code[at] | code[at + 1] << 8) >= _FIRST_WIDE else 2
-    return starts
-
-
 def may_end_in_it(code: bytes) -> bool:
     """Tell whether what follows some code may be inside an IT block that begins there: in doubt, yes."""
     for at in range(0, len(code) - 1, 2):
