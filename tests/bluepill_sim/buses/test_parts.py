@@ -10,6 +10,7 @@ from bluepill_sim import BluePill, BluePillError
 from bluepill_sim.parts import Eeprom24C02, SpiFlash
 from bluepill_sim.parts.eeprom_24c02 import WRITE_NS
 from bluepill_sim.parts.spi_flash import BUSY, ERASES, PROGRAM_NS, SIZE_BYTES, WEL
+from bluepill_sim.peripherals.spi import Loopback
 
 Boards = Callable[[str], BluePill]
 QUICK = settings(max_examples=40, deadline=None)
@@ -40,6 +41,17 @@ def test_a_program_scans_writes_and_reads_the_eeprom(board_of: Boards) -> None:
     said = said_by(board)
     assert said == ["scan 50", "write at once waited", "read a", "read ab", "read abc", "read abcdefgh45678923", "end"]
     assert memory.memory[0x28:0x30] == b"45678923"
+    assert board.warnings == []
+
+
+def test_dma_serves_both_buses_and_ends_a_reception_at_its_last_byte(board_of: Boards) -> None:
+    board, memory = board_of("dma_buses"), Eeprom24C02(contents=bytes(range(48, 112)))
+    if "DMA1" not in board.chip.parts.by_name:
+        pytest.skip("the chip has no DMA1 yet")
+    board.spi("SPI1", Loopback())
+    board.i2c("I2C1", memory)
+    said = said_by(board)
+    assert said == ["spi 000", f"i2c {bytes(range(48, 112)).decode()}", "end"]
     assert board.warnings == []
 
 
