@@ -13,7 +13,7 @@ from bluepill_sim.parts import Eeprom24C02
 from bluepill_sim.peripherals.spi import Loopback
 from robot_bench.firmware import build
 
-PROGRAM = Path(__file__).resolve().parents[2] / "tests" / "bluepill_sim" / "buses" / "firmware"
+PROGRAM = Path(__file__).resolve().parents[2] / "tests" / "bluepill_sim" / "peripherals" / "buses" / "firmware"
 #: Of virtual time.
 SPAN_NS = 200_000_000
 

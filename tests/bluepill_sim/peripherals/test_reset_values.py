@@ -22,12 +22,16 @@ PERIPHERALS = {
     "GPIOA": {"CRL": 0x4444_4444, "CRH": 0x4444_4444, "IDR": 0xA000},
     "GPIOB": {"CRL": 0x4444_4444, "CRH": 0x4444_4444, "IDR": 0x0010},
     "EXTI": {},
+    "DMA1": {},
+    "ADC1": {"HTR": 0xFFF},
+    "ADC2": {"HTR": 0xFFF},
     **{f"USART{number}": {"SR": 0xC0} for number in (1, 2, 3)},
     **{f"SPI{number}": {"SR": 0x02, "CRCPR": 7} for number in (1, 2)},
     **{f"I2C{number}": {"TRISE": 2} for number in (1, 2)},
     "CAN": {"MCR": 0x1_0002, "MSR": 0xC02, "TSR": 0x1C00_0000, "BTR": 0x0123_0000, "FMR": 0x2A1C_0E01},
     "IWDG": {"RLR": 0xFFF},
     "WWDG": {"CR": 0x7F, "CFR": 0x7F},
+    **{f"TIM{number}": {"ARR": 0xFFFF} for number in (1, 2, 3, 4)},
 }
 #: Reset values of the core's registers; GPIOA's IDR apart, nothing here depends on the outside.
 CORE = {
