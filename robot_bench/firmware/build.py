@@ -1,6 +1,6 @@
 """Build the example programs for the BluePill: `python robot_bench/firmware/build.py [--out DIR]`.
 
-Each program is one C file with `main` beside the shared board files; the ELF
+Each program is one C file with `main`, most beside the shared board files; the ELF
 keeps its debug information with paths relative to this folder, so that the
 same compiler gives the same bytes wherever the folder lies.
 Source: gcc-arm-none-eabi of Debian 12 (12.2.rel1) built the committed files.
@@ -17,13 +17,15 @@ COMPILER = "arm-none-eabi-gcc"
 #: First line of `arm-none-eabi-gcc --version` for the compiler of the committed ELFs.
 COMPILER_VERSION = "arm-none-eabi-gcc (15:12.2.rel1-1) 12.2.1 20221205"
 BOARD_SOURCES = ("startup.c", "memory.c", "board.c", "pins.c", "tick.c", "uart.c")
-#: Program name to its own sources.
+#: Program name to its sources.
 PROGRAMS = {
-    "motors": ("motors.c",),
-    "sensors": ("sensors.c",),
-    "encoders": ("encoders.c", "odometer.c"),
-    "analog": ("analog.c",),
-    "dodge": ("dodge.c", "dodge_fsm.c", "odometer.c"),
+    "motors": (*BOARD_SOURCES, "motors.c"),
+    "sensors": (*BOARD_SOURCES, "sensors.c"),
+    "encoders": (*BOARD_SOURCES, "encoders.c", "odometer.c"),
+    "analog": (*BOARD_SOURCES, "analog.c"),
+    "dodge": (*BOARD_SOURCES, "dodge.c", "dodge_fsm.c", "odometer.c"),
+    # Brings pins, clock and line of its own.
+    "board_test": ("startup.c", "memory.c", "board_test.c"),
 }
 MACHINE_FLAGS = ("-mcpu=cortex-m3", "-mthumb")
 COMPILE_FLAGS = (
@@ -87,9 +89,9 @@ def build_elf(
 def build_programs(output_folder: Path) -> list[Path]:
     """Build every example program into `output_folder` and return the ELFs."""
     built = []
-    for name, own in PROGRAMS.items():
+    for name, sources in PROGRAMS.items():
         output = output_folder.resolve() / f"{name}.elf"
-        build_elf((*BOARD_SOURCES, *own), folder=HERE, linker_script="f103c8.ld", output=output)
+        build_elf(sources, folder=HERE, linker_script="f103c8.ld", output=output)
         built.append(output)
     return built
 
