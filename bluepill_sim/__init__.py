@@ -17,8 +17,8 @@ if TYPE_CHECKING:
     from bluepill_sim.core.faults import FaultKind, FaultReport
     from bluepill_sim.errors import BluePillError, ImageError, UnmodelledError
     from bluepill_sim.fabric.pins import Pin, PinDrive
+    from bluepill_sim.parts.serial_port import SerialPort
     from bluepill_sim.program.image import Image, load_image
-    from bluepill_sim.serial_port import SerialPort
     from simbase.errors import MissingDependencyError
 
 __all__ = [
@@ -47,7 +47,7 @@ if not TYPE_CHECKING:
             "bluepill_sim.errors": ("BluePillError", "ImageError", "UnmodelledError"),
             "bluepill_sim.fabric.pins": ("Pin", "PinDrive"),
             "bluepill_sim.program.image": ("Image", "load_image"),
-            "bluepill_sim.serial_port": ("SerialPort",),
+            "bluepill_sim.parts.serial_port": ("SerialPort",),
             "simbase.errors": ("MissingDependencyError",),
         },
     )

@@ -30,16 +30,21 @@ from bluepill_sim.core.faults import FAULT_ROWS, FaultKind, FaultReport, SeenFau
 from bluepill_sim.core.halts import ChipReached
 from bluepill_sim.core.nvic import HARD_FAULT, exception_name
 from bluepill_sim.errors import BluePillError, ImageError, UnmodelledError
+from bluepill_sim.fabric.bus_parts import I2cDevice, SpiDevice
+from bluepill_sim.fabric.can_network import CanNetwork
 from bluepill_sim.fabric.pins import Pin, PinDrive
 from bluepill_sim.fabric.registers import RegisterView
 from bluepill_sim.fabric.signals import UV_PER_V, to_uv
 from bluepill_sim.fabric.subscriptions import EdgeSink, Of, PinSubscription
 from bluepill_sim.memory import Memory
+from bluepill_sim.parts.serial_port import Activity, SerialPort
+from bluepill_sim.peripherals.can import Can
+from bluepill_sim.peripherals.i2c import I2c
 from bluepill_sim.peripherals.rcc import ResetCause
+from bluepill_sim.peripherals.spi import Spi
 from bluepill_sim.program.image import Image, load_image
 from bluepill_sim.program.last_blocks import TITLE, shortened
 from bluepill_sim.program.line_table import LineTable, read_lines
-from bluepill_sim.serial_port import Activity, SerialPort
 from bluepill_sim.spans import Span, to_nanos
 from bluepill_sim.stm32f103 import FLASH_BASE, SRAM_BASE
 from simbase.state import PartState, Stateful
@@ -117,7 +122,7 @@ class BluePill(Stateful):
         self.resets: Counter[ResetCause] = Counter()
         chip.on_reset = self._reset_begins
         chip.boot_address = self._boot_address
-        chip.pins.is_serial_input = lambda pin: any(port.receives_at(pin.name) for port in self._usarts)
+        chip.pins.is_serial_input = self._is_driven_in_words
         chip.pins["PC13"].board_pull = PinDrive.PULL_UP
         chip.pins["PB2"].board_pull = PinDrive.PULL_DOWN
 
@@ -417,7 +422,57 @@ class BluePill(Stateful):
         """Return bytes of flash or SRAM; None where there is no memory."""
         return self.chip.memory.read(address, size)
 
+    # What hangs on its buses.
+
+    def spi(self, name: str, device: SpiDevice | None = None, *, select: str | None = None) -> Spi:
+        """Return an SPI, "SPI1" or "SPI2"; with a device, hang it on the bus first.
+
+        Args:
+            name: which.
+            device: a part, or `Loopback()` for a wire from MOSI to MISO.
+            select: the pin that selects the part while it is low, such as "PA4", with a pull-up; None: it always is.
+
+        Raises:
+            BluePillError: the chip has no such SPI or pin.
+        """
+        part = self.chip.parts.by_name.get(name.upper())
+        if not isinstance(part, Spi):
+            raise BluePillError(f"no such SPI: {name}", hint="SPI1 or SPI2")
+        if device is not None:
+            try:
+                part.attach(device, select and select.upper())
+            except KeyError:
+                raise BluePillError(f"no such pin: {select}", hint="PA0 to PA15, PB0 to PB15, PC13 to PC15") from None
+        return part
+
+    def i2c(self, name: str, device: I2cDevice | None = None) -> I2c:
+        """Return an I2C, "I2C1" or "I2C2"; with a device, hang it on the bus first, which then has pull-ups.
+
+        Raises:
+            BluePillError: the chip has no such I2C.
+        """
+        part = self.chip.parts.by_name.get(name.upper())
+        if not isinstance(part, I2c):
+            raise BluePillError(f"no such I2C: {name}", hint="I2C1 or I2C2")
+        if device is not None:
+            part.attach(device)
+        return part
+
+    def can(self, network: CanNetwork | None = None) -> Can:
+        """Return the CAN; with a network, join it first."""
+        part = self.chip.parts.by_name["CAN"]
+        if not isinstance(part, Can):
+            raise TypeError("CAN is made by another class")
+        if network is not None:
+            part.attach(network)
+        return part
+
     # Callbacks of the chip.
+
+    def _is_driven_in_words(self, pin: Pin) -> bool:
+        """Whether something outside sends on a pin, though not as levels."""
+        buses = [part for part in self.chip.parts.by_name.values() if isinstance(part, Spi | Can)]
+        return any(port.receives_at(pin.name) for port in self._usarts) or any(bus.sends_at(pin.name) for bus in buses)
 
     def _reset_begins(self, cause: ResetCause) -> None:
         if self.fault is not None and self._is_in_fault():

@@ -19,15 +19,18 @@ from bluepill_sim.fabric.registers import ClockBit, Peripheral, Place
 from bluepill_sim.peripherals.adc import Adc, Adc2
 from bluepill_sim.peripherals.afio import Afio
 from bluepill_sim.peripherals.bkp import Bkp
+from bluepill_sim.peripherals.can import Can
 from bluepill_sim.peripherals.crc import Crc
 from bluepill_sim.peripherals.dma import Dma
 from bluepill_sim.peripherals.exti import Exti
 from bluepill_sim.peripherals.flash import Flash
 from bluepill_sim.peripherals.gpio import Gpio
+from bluepill_sim.peripherals.i2c import I2c
 from bluepill_sim.peripherals.iwdg import Iwdg
 from bluepill_sim.peripherals.pwr import Pwr
 from bluepill_sim.peripherals.rcc import Rcc, ResetCause
 from bluepill_sim.peripherals.rtc import Rtc
+from bluepill_sim.peripherals.spi import Spi
 from bluepill_sim.peripherals.tim import AdvancedTimer, GeneralTimer
 from bluepill_sim.peripherals.usart import Usart
 from bluepill_sim.peripherals.wwdg import Wwdg
@@ -175,6 +178,11 @@ PERIPHERALS: tuple[tuple[_Maker, str], ...] = (
     (Usart, "USART1"),
     (Usart, "USART2"),
     (Usart, "USART3"),
+    (Spi, "SPI1"),
+    (Spi, "SPI2"),
+    (I2c, "I2C1"),
+    (I2c, "I2C2"),
+    (Can, "CAN"),
     (Iwdg, "IWDG"),
     (Wwdg, "WWDG"),
     (AdvancedTimer, "TIM1"),
@@ -220,6 +228,10 @@ WIRING: dict[str, tuple[int | str, ...]] = {
     **{f"DMA1.ch{n}_irq": (10 + n,) for n in range(1, 8)},
     "ADC1.irq": (18,),
     "ADC2.irq": (18,),
+    "CAN.tx_irq": (19,),
+    "CAN.rx0_irq": (20,),
+    "CAN.rx1_irq": (21,),
+    "CAN.sce_irq": (22,),
     "EXTI.9_5": (23,),
     "TIM1.brk_irq": (24,),
     "TIM1.up_irq": (25,),
@@ -228,6 +240,12 @@ WIRING: dict[str, tuple[int | str, ...]] = {
     "TIM2.irq": (28,),
     "TIM3.irq": (29,),
     "TIM4.irq": (30,),
+    "I2C1.event_irq": (31,),
+    "I2C1.error_irq": (32,),
+    "I2C2.event_irq": (33,),
+    "I2C2.error_irq": (34,),
+    "SPI1.irq": (35,),
+    "SPI2.irq": (36,),
     "USART1.irq": (37,),
     "USART2.irq": (38,),
     "USART3.irq": (39,),

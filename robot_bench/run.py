@@ -20,7 +20,7 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import TYPE_CHECKING, TypeVar
 
-from bluepill_sim.serial_port import QUIET_NS
+from bluepill_sim.parts.serial_port import QUIET_NS
 from p2os.event_log import logger
 from p2os.pioneer.body.factory import resolve_body
 from p2os.pioneer.world.model import Pose, World

@@ -75,8 +75,9 @@ LAYERS = {
         ("capture", "client", "pioneer"), ("cli",), ("__main__",),
     ),
     "bluepill_sim": (
-        ("errors",), ("spans", "extension"), ("fabric",), ("peripherals",), ("stm32f103",), ("memory", "serial_port"),
-        ("core",), ("program", "native"), ("chip",), ("board",), ("analysis", "debug"), ("cli",),
+        ("errors",), ("spans", "extension"), ("fabric",), ("peripherals",), ("parts",), ("stm32f103",),
+        ("memory",), ("core",), ("program", "native"), ("chip",), ("board",),
+        ("analysis", "debug"), ("cli",),
     ),
     "adapter_sim": (
         ("codec",), ("settings", "pinout"), ("pins", "mixing", "encoders", "distances", "session"),

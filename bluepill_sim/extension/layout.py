@@ -206,6 +206,54 @@ USART = Struct(
         Field("rx", "u32", RECEIVED, "what DR will read, and above it the flags of SR"),
     ),
 )
+SPI = Struct(
+    "spi",
+    "What an SPI holds beyond its registers. RM0008 25.3.",
+    (
+        Field("base_ns", "u64", doc="start of the run of words,"),
+        Field("ticks", "u64", doc="and ticks of `rate_hz` from there to the end of the present one"),
+        Field("word_ns", "u64", doc="when the present word began"),
+        Field("clock_hz", "u32", doc="PCLK"),
+        Field("rate_hz", "u32", doc="PCLK, or the clock of a master outside"),
+        Field("shift", "u32", doc="what is in the shift register; 0: nothing"),
+        *_fields("u32", "tdr", "rdr"),
+        Field("seen", "u32", doc="flags of which half of the clearing sequence was seen"),
+        Field("source", "u32", doc="its first alternate function; MISO, MOSI, NSS and SCK follow each other,"),
+        Field("pins", "u32", 4, "and so do these: 16 times the port, and the pin"),
+        Field("offered", "u32", 4, "the levels that they were last given"),
+        Field("selects", "u32", PORTS, "pins that select parts"),
+        Field("is_looped", "u32", doc="MISO is tied to MOSI"),
+        Field("selected", "u32", doc="parts that are selected"),
+        Field("far", "u32", doc="the word that a master outside sends; 0: none"),
+        Field("wants_words", "u32", doc="somebody has subscribed to words"),
+    ),
+)
+I2C = Struct(
+    "i2c",
+    "What an I2C holds beyond its registers. RM0008 26.3.",
+    (
+        Field("base_ns", "u64", doc="start of the run of bits,"),
+        Field("ticks", "u64", doc="and ticks of `rate_hz` from there to the end of what is under way"),
+        Field("due_ns", "u64", doc="which is this; all ones: nothing is"),
+        Field("timeout_ns", "u64", doc="when SCL will have been low for too long"),
+        Field("clock_hz", "u32", doc="PCLK1"),
+        Field("rate_hz", "u32", doc="PCLK1, or the bits a second of a master outside"),
+        *_fields("u32", "phase", "shift", "tdr", "rdr"),
+        Field("received", "u32", doc="a byte behind the one in DR; 0: none"),
+        Field("next_ack", "u32", doc="ACK as it was when the byte before ended, for POS"),
+        *_fields("u32", "was_refused", "has_sent", "is_second", "is_pec", "is_lost", "is_late", "is_own"),
+        Field("far", "u32", doc="what a master outside does next; 0: nothing"),
+        Field("far_waits", "u32", doc="it will, once the bus is free"),
+        Field("header", "u32", doc="the 10-bit header that it has sent matched"),
+        Field("lines", "u32", doc="lines that are low: SCL, SDA, SMBA"),
+        Field("source", "u32", doc="its first alternate function; SCL and SDA follow each other, then SMBA"),
+        *_fields("u32", "smba_source", "has_parts"),
+        Field("pins", "u32", 3, "SCL, SDA, SMBA: 16 times the port, and the pin"),
+        Field("offered", "u32", 3, "the levels that they were last given"),
+        Field("counter", "u32", doc="address of CNDTR of the DMA channel that it receives by"),
+        Field("far_hz", "u32", doc="bits a second of a master outside"),
+    ),
+)
 EXTI = Struct("exti", "What EXTI holds beyond its registers.", (Field("levels", "u32"), Field("routes", "u8", PINS)))
 DMA = Struct(
     "dma",
@@ -370,7 +418,7 @@ SENT = Struct(
 #: All of them; one that holds another comes behind it.
 STRUCTS = (
     RECORD, INSTRUCTION, RAMP, TICKS, STEP, LOOP, FAULT, SHARED, PORT, USART, EXTI, DMA, SIGNAL, ANALOG, ADC, GPIO,
-    FILTER, SHAPE, TIM, WAVE, EDGE, SENT,
+    FILTER, SHAPE, TIM, SPI, I2C, WAVE, EDGE, SENT,
 )  # fmt: skip
 
 _KINDS: dict[str, Any] = {

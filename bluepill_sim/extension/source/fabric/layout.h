@@ -379,6 +379,63 @@ struct tim {
 };
 _Static_assert(sizeof(struct tim) == 736, "tim");
 
+/* What an SPI holds beyond its registers. RM0008 25.3. */
+struct spi {
+    uint64_t base_ns; /* start of the run of words, */
+    uint64_t ticks; /* and ticks of `rate_hz` from there to the end of the present one */
+    uint64_t word_ns; /* when the present word began */
+    uint32_t clock_hz; /* PCLK */
+    uint32_t rate_hz; /* PCLK, or the clock of a master outside */
+    uint32_t shift; /* what is in the shift register; 0: nothing */
+    uint32_t tdr;
+    uint32_t rdr;
+    uint32_t seen; /* flags of which half of the clearing sequence was seen */
+    uint32_t source; /* its first alternate function; MISO, MOSI, NSS and SCK follow each other, */
+    uint32_t pins[4]; /* and so do these: 16 times the port, and the pin */
+    uint32_t offered[4]; /* the levels that they were last given */
+    uint32_t selects[5]; /* pins that select parts */
+    uint32_t is_looped; /* MISO is tied to MOSI */
+    uint32_t selected; /* parts that are selected */
+    uint32_t far; /* the word that a master outside sends; 0: none */
+    uint32_t wants_words; /* somebody has subscribed to words */
+};
+_Static_assert(sizeof(struct spi) == 120, "spi");
+
+/* What an I2C holds beyond its registers. RM0008 26.3. */
+struct i2c {
+    uint64_t base_ns; /* start of the run of bits, */
+    uint64_t ticks; /* and ticks of `rate_hz` from there to the end of what is under way */
+    uint64_t due_ns; /* which is this; all ones: nothing is */
+    uint64_t timeout_ns; /* when SCL will have been low for too long */
+    uint32_t clock_hz; /* PCLK1 */
+    uint32_t rate_hz; /* PCLK1, or the bits a second of a master outside */
+    uint32_t phase;
+    uint32_t shift;
+    uint32_t tdr;
+    uint32_t rdr;
+    uint32_t received; /* a byte behind the one in DR; 0: none */
+    uint32_t next_ack; /* ACK as it was when the byte before ended, for POS */
+    uint32_t was_refused;
+    uint32_t has_sent;
+    uint32_t is_second;
+    uint32_t is_pec;
+    uint32_t is_lost;
+    uint32_t is_late;
+    uint32_t is_own;
+    uint32_t far; /* what a master outside does next; 0: nothing */
+    uint32_t far_waits; /* it will, once the bus is free */
+    uint32_t header; /* the 10-bit header that it has sent matched */
+    uint32_t lines; /* lines that are low: SCL, SDA, SMBA */
+    uint32_t source; /* its first alternate function; SCL and SDA follow each other, then SMBA */
+    uint32_t smba_source;
+    uint32_t has_parts;
+    uint32_t pins[3]; /* SCL, SDA, SMBA: 16 times the port, and the pin */
+    uint32_t offered[3]; /* the levels that they were last given */
+    uint32_t counter; /* address of CNDTR of the DMA channel that it receives by */
+    uint32_t far_hz; /* bits a second of a master outside */
+};
+_Static_assert(sizeof(struct i2c) == 152, "i2c");
+
 /* A level that goes up every `period` ticks, and down `high` ticks later. */
 struct wave {
     uint64_t ns; /* when tick 0 begins; tick n begins floor(n * 10**9 / hz) ns later */

@@ -185,6 +185,9 @@ void listen_to_pins(struct device *device, uint32_t port, uint32_t pins)
     while (n < fabric->listener_count && fabric->listeners[n].device != device) {
         ++n;
     }
+    if (n == fabric->listener_count && !pins) {
+        return;
+    }
     if (n == fabric->listener_count && n < LISTENERS) {
         fabric->listeners[fabric->listener_count++].device = device;
     }

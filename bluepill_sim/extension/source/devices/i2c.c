@@ -1,0 +1,755 @@
+/* An I2C, master or slave: conditions and bytes at the speed of SCL, each acted on when its last bit has ended.
+ *
+ * Theory of operation. `phase` is what is on the bus. A condition lasts one bit, a byte nine. Behind each of them the next
+ * follows at once where the software has left nothing to wait for, else SCL is held low (HOLD) until it has: SB wants the
+ * address, ADDR a read of both status registers, BTF a byte or room for one. `go_on` is the one place that decides.
+ * Parts, and a master outside (FAR phases), are Python's (peripherals/i2c.py), asked once a byte; what happens between is
+ * here since drivers poll these flags millions of times a second, and DMA serves them.
+ * Source: RM0008 26.3, 26.6.
+ * Invariant: what is under way ends floor(ticks * 10**9 / rate) ns after the last time that SCL was let go.
+ */
+#include "../fabric/fabric.h"
+
+/* Registers by offset / 4, and the hidden word behind them: SR1 at its last read, half of the clearing sequences. */
+enum { CR1, CR2, OAR1, OAR2, DR, SR1, SR2, CCR, TRISE, SEEN };
+/* Of CR1. */
+enum { PE = 1 << 0, SMBUS = 1 << 1, SMBTYPE = 1 << 3, ENPEC = 1 << 5, ENGC = 1 << 6, NOSTRETCH = 1 << 7, START = 1 << 8, STOP = 1 << 9 };
+enum { ACK = 1 << 10, POS = 1 << 11, PEC = 1 << 12, ALERT = 1 << 13, SWRST = 1 << 15 };
+/* Of CR2. */
+enum { ITERREN = 1 << 8, ITEVTEN = 1 << 9, ITBUFEN = 1 << 10, DMAEN = 1 << 11, LAST = 1 << 12 };
+/* Of SR1. */
+enum { SB = 1 << 0, ADDR = 1 << 1, BTF = 1 << 2, ADD10 = 1 << 3, STOPF = 1 << 4, RXNE = 1 << 6, TXE = 1 << 7, BERR = 1 << 8 };
+enum { ARLO = 1 << 9, AF = 1 << 10, OVR = 1 << 11, PECERR = 1 << 12, TIMEOUT = 1 << 14, SMBALERT = 1 << 15 };
+enum { EVENTS = SB | ADDR | BTF | ADD10 | STOPF, ERRORS = BERR | ARLO | AF | OVR | PECERR | TIMEOUT | SMBALERT };
+/* Of SR2. */
+enum { MSL = 1 << 0, BUSY = 1 << 1, TRA = 1 << 2, GENCALL = 1 << 4, DUALF = 1 << 7, PEC_AT = 8 };
+/* Of CCR. */
+enum { DUTY = 1 << 14, FS = 1 << 15, CCR_BITS = 0xFFF };
+/* Bits of a condition and of a byte; that a byte is held; SCL low for so long is a timeout (RM0008 26.3.8). */
+enum { CONDITION = 1, BYTE = 9, HELD = 1 << 8, TIMEOUT_NS = 25000000 };
+enum phase { FREE, STARTING, ADDRESSING, SENDING, RECEIVING, STOPPING, HOLD, OTHERS, FAR, FAR_HOLD };
+/* Its pins. */
+enum { SCL, SDA, SMBA, I2C_PINS };
+/* What Python is asked, as `Question` of i2c.py; from NO_PINS on they are warnings. An answer has HELD for an acknowledge. */
+enum { ADDRESS, WRITE, READ, END, NEXT_STEP, NO_PINS, SEQUENCE };
+/* What a master outside does: `far` holds one of these times 2 * HELD, above a byte or, for FAR_READ, its acknowledge. */
+enum { FAR_NOTHING, FAR_START, FAR_WRITE, FAR_READ, FAR_STOP, FAR_AT = 9 };
+/* Commands of its own: move to pins; a master outside has something to do; arbitration is lost or the bus disturbed. */
+enum { MOVE = OWN_COMMANDS, CALL, DISTURB, LISTEN };
+/* Its outputs. */
+enum { EVENT_IRQ, ERROR_IRQ, RX_DMA, TX_DMA };
+
+static void go_on(struct device *device, uint64_t ns);
+static void go_on_far(struct device *device, uint64_t ns);
+
+static void update_outputs(struct device *device)
+{
+    const uint32_t status = device->words[SR1], control = device->words[CR2];
+    output_set(device, RX_DMA, status & RXNE && control & DMAEN);
+    output_set(device, TX_DMA, status & TXE && !(status & ADDR) && control & DMAEN);
+    const uint32_t now = device->words[SR1];
+    output_set(device, EVENT_IRQ, control & ITEVTEN && (now & EVENTS || (now & (TXE | RXNE) && control & ITBUFEN)));
+    output_set(device, ERROR_IRQ, control & ITERREN && now & ERRORS);
+}
+
+/* Pins. */
+
+static bool is_low(const struct device *device, uint32_t which)
+{
+    const struct i2c *i2c = device->state;
+    const struct port *port = &device->fabric->ports[i2c->pins[which] / PINS];
+    return ~(port->level | port->floating) >> i2c->pins[which] % PINS & 1; /* chosen: a line without a pull is high */
+}
+
+static bool carries(const struct device *device, uint32_t which)
+{
+    const struct i2c *i2c = device->state;
+    const struct port *port = &device->fabric->ports[i2c->pins[which] / PINS];
+    const uint32_t at = i2c->pins[which] % PINS;
+    const uint64_t sources = port->sources[at];
+    return port->alternate & port->bonded & ~port->held & 1u << at && (sources & -sources) >> (i2c->source + which) & 1;
+}
+
+static void put(struct device *device, uint32_t which, uint32_t level)
+{
+    struct i2c *i2c = device->state;
+    if (i2c->offered[which] != level) {
+        i2c->offered[which] = level;
+        offer(device->fabric, i2c->pins[which], which == SMBA ? i2c->smba_source : i2c->source + which, level);
+    }
+}
+
+static void connect(struct device *device)
+{
+    const uint32_t control = device->words[CR1];
+    put(device, SCL, control & PE ? HIGH : FLOATING);
+    put(device, SDA, control & PE ? HIGH : FLOATING);
+    put(device, SMBA, (control & (PE | SMBUS)) != (PE | SMBUS) ? FLOATING : control & ALERT ? LOW : HIGH);
+}
+
+static void listen(struct device *device)
+{
+    const struct i2c *i2c = device->state;
+    for (uint32_t port = 0; port < PORTS; ++port) {
+        uint32_t mask = 0;
+        for (uint32_t n = 0; n < I2C_PINS; ++n) {
+            const bool is_wanted = n != SMBA || device->words[CR1] & SMBUS;
+            mask |= is_wanted && i2c->pins[n] / PINS == port ? 1u << i2c->pins[n] % PINS : 0;
+        }
+        listen_to_pins(device, port, device->words[CR1] & PE ? mask : 0);
+    }
+}
+
+/* Time. */
+
+static void wait_for_events(struct device *device)
+{
+    const struct i2c *i2c = device->state;
+    schedule(device, i2c->due_ns < i2c->timeout_ns ? i2c->due_ns : i2c->timeout_ns);
+}
+
+/* RM0008 26.6.8: SCL high and low take CCR each, or in fast mode one and two, or nine and sixteen of them. */
+static uint64_t bit_ticks(const struct device *device)
+{
+    const struct i2c *i2c = device->state;
+    const uint32_t control = device->words[CCR], count = control & CCR_BITS ? control & CCR_BITS : 1;
+    return i2c->phase >= FAR ? 1 : (uint64_t)count * (!(control & FS) ? 2 : control & DUTY ? 25 : 3);
+}
+
+static uint64_t end_ns(const struct i2c *i2c)
+{
+    return i2c->base_ns + (uint64_t)((__uint128_t)i2c->ticks * NS_PER_S / i2c->rate_hz);
+}
+
+static void begin(struct device *device, enum phase phase, uint32_t bits)
+{
+    struct i2c *i2c = device->state;
+    i2c->phase = phase;
+    i2c->ticks += bits * bit_ticks(device);
+    i2c->due_ns = end_ns(i2c);
+}
+
+static void rest(struct device *device, enum phase phase)
+{
+    struct i2c *i2c = device->state;
+    i2c->phase = phase;
+    i2c->due_ns = NO_TIME;
+    i2c->is_late = 0;
+}
+
+static void run_from(struct device *device, uint64_t ns)
+{
+    struct i2c *i2c = device->state;
+    i2c->base_ns = ns;
+    i2c->ticks = 0;
+    i2c->rate_hz = i2c->phase == FAR || i2c->phase == FAR_HOLD ? i2c->rate_hz : i2c->clock_hz;
+}
+
+/* PEC (RM0008 26.3.6): x^8 + x^2 + x + 1 over all bytes, addresses too. */
+static uint32_t pec_of(const struct device *device) { return device->words[SR2] >> PEC_AT & 0xFF; }
+
+static void set_pec(struct device *device, uint32_t pec) { device->words[SR2] = (device->words[SR2] & 0xFF) | pec << PEC_AT; }
+
+static void add_to_pec(struct device *device, uint32_t byte)
+{
+    uint32_t crc = pec_of(device) ^ byte;
+    for (int n = 0; n < 8; ++n) {
+        crc = crc & 0x80 ? (crc << 1 ^ 0x07) & 0xFF : crc << 1;
+    }
+    if (device->words[CR1] & ENPEC) {
+        set_pec(device, crc);
+    }
+}
+
+/* Bytes. */
+
+/* A byte has come: into DR, or behind it, where it holds SCL. */
+static void take(struct device *device, uint32_t byte)
+{
+    struct i2c *i2c = device->state;
+    if (!(device->words[SR1] & RXNE)) {
+        i2c->rdr = byte;
+        device->words[SR1] |= RXNE;
+    } else if (device->words[CR1] & NOSTRETCH && !(device->words[SR2] & MSL)) {
+        device->words[SR1] |= OVR;
+    } else {
+        i2c->received = HELD | byte;
+        device->words[SR1] |= BTF;
+    }
+}
+
+/* Puts what is to be sent into the shift register; false: there is nothing. */
+static bool load(struct device *device)
+{
+    struct i2c *i2c = device->state;
+    const bool is_pec = (device->words[CR1] & (PEC | ENPEC)) == (PEC | ENPEC);
+    i2c->is_pec = !i2c->tdr && is_pec;
+    if (!i2c->tdr && !is_pec) {
+        return false;
+    }
+    i2c->shift = i2c->tdr ? i2c->tdr : HELD | pec_of(device);
+    i2c->tdr = 0;
+    device->words[CR1] &= i2c->is_pec ? ~(uint32_t)PEC : ~0u;
+    device->words[SR1] = (device->words[SR1] & ~(uint32_t)BTF) | (i2c->is_pec ? 0 : TXE);
+    return true;
+}
+
+/* Whether the byte that has just come is the last that DMA takes (RM0008 26.3.7): its channel has so many to go. */
+static bool is_last_of_dma(struct device *device)
+{
+    const struct i2c *i2c = device->state;
+    uint32_t left = 0;
+    if ((device->words[CR2] & (DMAEN | LAST)) != (DMAEN | LAST) || !bus_read(device, i2c->counter, 4, &left)) {
+        return false;
+    }
+    return left == (device->words[SR1] & RXNE ? 2 : 1);
+}
+
+/* Takes a received byte with its PEC; returns whether it is acknowledged. */
+static bool receive(struct device *device, uint32_t byte)
+{
+    struct i2c *i2c = device->state;
+    uint32_t *words = device->words;
+    bool is_ack = (words[CR1] & POS ? i2c->next_ack : words[CR1] & ACK) && !is_last_of_dma(device);
+    const bool is_pec = (words[CR1] & (PEC | ENPEC)) == (PEC | ENPEC);
+    if (is_pec) {
+        const bool is_wrong = byte != pec_of(device);
+        words[SR1] |= is_wrong ? PECERR : 0;
+        words[CR1] &= ~(uint32_t)PEC;
+        is_ack = words[SR2] & MSL ? false : !is_wrong;
+    }
+    add_to_pec(device, byte);
+    take(device, byte);
+    i2c->next_ack = words[CR1] & ACK;
+    return is_ack;
+}
+
+/* The master. */
+
+static void begin_start(struct device *device, uint64_t ns)
+{
+    struct i2c *i2c = device->state;
+    if (i2c->phase == FREE && (device->words[CR1] & (PE | START)) == (PE | START) && !(device->words[SR2] & BUSY)) {
+        if (!carries(device, SCL) || !carries(device, SDA)) {
+            ask(device, NO_PINS, 0);
+        }
+        run_from(device, ns);
+        begin(device, STARTING, CONDITION);
+    }
+}
+
+/* What the master does next, where the software lets it; else it holds SCL. */
+static void go_on(struct device *device, uint64_t ns)
+{
+    struct i2c *i2c = device->state;
+    uint32_t *words = device->words;
+    if (i2c->phase == HOLD) {
+        run_from(device, ns);
+    }
+    const bool waits_for_address = words[SR1] & (SB | ADD10);
+    if (words[SR1] & ADDR) {
+        rest(device, HOLD);
+    } else if (words[CR1] & STOP) {
+        begin(device, STOPPING, CONDITION);
+    } else if (words[CR1] & START && !(words[SR1] & SB)) {
+        begin(device, STARTING, CONDITION);
+    } else if (waits_for_address || i2c->was_refused) {
+        rest(device, HOLD);
+    } else if (words[SR2] & TRA) {
+        if (load(device)) {
+            begin(device, SENDING, BYTE);
+        } else {
+            words[SR1] |= i2c->has_sent ? BTF | TXE : TXE;
+            rest(device, HOLD);
+        }
+    } else if (i2c->received) {
+        rest(device, HOLD);
+    } else {
+        begin(device, RECEIVING, BYTE);
+    }
+}
+
+static void end_start(struct device *device)
+{
+    struct i2c *i2c = device->state;
+    uint32_t *words = device->words;
+    if (!(words[SR2] & MSL)) {
+        set_pec(device, 0);
+    }
+    words[CR1] &= ~(uint32_t)START;
+    words[SR1] = (words[SR1] & ~(uint32_t)(TXE | BTF)) | SB;
+    words[SR2] = (words[SR2] & ~(uint32_t)TRA) | MSL | BUSY;
+    i2c->was_refused = i2c->is_second = i2c->has_sent = i2c->tdr = 0;
+}
+
+static void lose_arbitration(struct device *device)
+{
+    struct i2c *i2c = device->state;
+    device->words[SR1] = (device->words[SR1] & ~(uint32_t)(TXE | BTF)) | ARLO;
+    device->words[SR2] &= ~(uint32_t)(MSL | TRA);
+    i2c->tdr = 0;
+    if (i2c->is_lost) { /* chosen: who has won sends one byte more */
+        begin(device, OTHERS, BYTE);
+    } else {
+        rest(device, FREE);
+    }
+    i2c->is_lost = 0;
+}
+
+/* An address or a byte has gone out. */
+static void end_sent(struct device *device, uint64_t ns)
+{
+    struct i2c *i2c = device->state;
+    uint32_t *words = device->words;
+    const uint32_t byte = i2c->shift & 0xFF;
+    const bool is_address = i2c->phase == ADDRESSING;
+    if (i2c->is_lost || (is_low(device, SDA) && byte != 0)) {
+        lose_arbitration(device);
+        return;
+    }
+    const bool can_be_heard = i2c->has_parts && carries(device, SCL) && carries(device, SDA);
+    const bool is_ack = can_be_heard && ask(device, is_address ? ADDRESS : WRITE, byte) & HELD;
+    add_to_pec(device, byte);
+    i2c->was_refused = !is_ack;
+    if (!is_ack) {
+        words[SR1] = (words[SR1] & ~(uint32_t)TXE) | AF;
+    } else if (is_address && (byte & 0xF9) == 0xF0 && !i2c->is_second) {
+        words[SR1] |= ADD10;
+    } else if (is_address) {
+        words[SR1] |= ADDR;
+        words[SR2] = byte & 1 && !i2c->is_second ? words[SR2] & ~(uint32_t)TRA : words[SR2] | TRA;
+        i2c->next_ack = words[CR1] & ACK;
+    }
+    i2c->has_sent = !is_address;
+    go_on(device, ns);
+}
+
+static void end_stop(struct device *device, uint64_t ns)
+{
+    struct i2c *i2c = device->state;
+    uint32_t *words = device->words;
+    if (i2c->has_parts) {
+        ask(device, END, 0);
+    }
+    words[CR1] &= ~(uint32_t)(STOP | PEC);
+    words[SR1] &= ~(uint32_t)(SB | ADD10 | TXE | (words[SR2] & TRA ? BTF : 0));
+    words[SR2] &= ~(uint32_t)(MSL | BUSY | TRA);
+    i2c->tdr = 0;
+    rest(device, FREE);
+    begin_start(device, ns);
+    if (i2c->phase == FREE && i2c->far_waits) {
+        i2c->far_waits = 0;
+        device->kind->command(device, CALL, 0, 0);
+    }
+}
+
+/* A master outside. */
+
+static bool is_my_address(struct device *device, uint32_t byte)
+{
+    const struct i2c *i2c = device->state;
+    uint32_t *words = device->words;
+    const uint32_t own = words[OAR1], dual = words[OAR2];
+    if (byte == 0 && words[CR1] & ENGC) {
+        words[SR2] |= GENCALL;
+        return true;
+    }
+    if (own >> 15 & 1) { /* ten bits: the header, to read the second time */
+        return byte == (0xF1 | (own >> 7 & 6)) && i2c->header;
+    }
+    if (byte >> 1 == (own >> 1 & 0x7F)) {
+        return true;
+    }
+    if (dual & 1 && byte >> 1 == (dual >> 1 & 0x7F)) {
+        words[SR2] |= DUALF;
+        return true;
+    }
+    return false;
+}
+
+static uint32_t called(struct device *device, bool is_read)
+{
+    struct i2c *i2c = device->state;
+    device->words[SR1] |= ADDR;
+    device->words[SR2] |= is_read ? TRA : 0;
+    i2c->is_own = 1;
+    i2c->next_ack = device->words[CR1] & ACK;
+    return HELD;
+}
+
+static uint32_t end_far_start(struct device *device, uint32_t byte)
+{
+    struct i2c *i2c = device->state;
+    uint32_t *words = device->words;
+    const bool answers = (words[CR1] & (PE | ACK)) == (PE | ACK);
+    words[SR1] &= ~(uint32_t)(BTF | TXE);
+    words[SR2] = (words[SR2] & ~(uint32_t)(TRA | GENCALL | DUALF)) | BUSY;
+    if (!(i2c->is_own || i2c->header)) {
+        set_pec(device, 0);
+    }
+    i2c->is_own = i2c->tdr = i2c->was_refused = 0;
+    add_to_pec(device, byte);
+    if (answers && is_my_address(device, byte)) {
+        return called(device, byte & 1);
+    }
+    const bool is_header = answers && words[OAR1] >> 15 && byte == (0xF0 | (words[OAR1] >> 7 & 6));
+    i2c->header = is_header;
+    i2c->is_second = is_header;
+    return is_header ? HELD : 0;
+}
+
+static uint32_t end_far_write(struct device *device, uint32_t byte)
+{
+    struct i2c *i2c = device->state;
+    if (i2c->is_second) { /* of a 10-bit address */
+        i2c->is_second = 0;
+        add_to_pec(device, byte);
+        i2c->header = byte == (device->words[OAR1] & 0xFF);
+        return i2c->header ? called(device, false) : 0;
+    }
+    return i2c->is_own && device->words[CR1] & PE && receive(device, byte) ? HELD : 0;
+}
+
+static uint32_t end_far_read(struct device *device, uint32_t acknowledges)
+{
+    struct i2c *i2c = device->state;
+    const uint32_t byte = i2c->shift & 0xFF;
+    add_to_pec(device, byte);
+    if (!acknowledges && i2c->is_own) {
+        device->words[SR1] = (device->words[SR1] & ~(uint32_t)TXE) | AF;
+        i2c->was_refused = 1;
+    }
+    return byte;
+}
+
+static uint32_t end_far_stop(struct device *device)
+{
+    struct i2c *i2c = device->state;
+    uint32_t *words = device->words;
+    words[SR1] = (words[SR1] & ~(uint32_t)(TXE | (words[SR2] & TRA ? BTF : 0))) | (i2c->is_own && !(words[SR2] & TRA) ? STOPF : 0);
+    words[SR2] &= ~(uint32_t)(BUSY | TRA | GENCALL | DUALF);
+    words[CR1] &= ~(uint32_t)PEC;
+    i2c->is_own = i2c->is_second = i2c->header = 0;
+    return 0;
+}
+
+/* The next step of a master outside, which waits where the software has to read or write first. */
+static void go_on_far(struct device *device, uint64_t ns)
+{
+    struct i2c *i2c = device->state;
+    uint32_t *words = device->words;
+    const uint32_t step = i2c->far >> FAR_AT;
+    const bool sends = step == FAR_READ && i2c->is_own && words[SR2] & TRA;
+    const bool waits = words[SR1] & ADDR || i2c->received || (sends && !i2c->tdr && !(words[CR1] & PEC));
+    if (i2c->phase == FAR_HOLD) {
+        run_from(device, ns);
+    }
+    if (step == FAR_NOTHING) {
+        rest(device, FREE);
+        begin_start(device, ns);
+        return;
+    }
+    if (i2c->is_own && waits && !(words[CR1] & NOSTRETCH)) {
+        words[SR1] |= sends && i2c->has_sent && !(words[SR1] & ADDR) ? BTF : 0;
+        rest(device, FAR_HOLD);
+        return;
+    }
+    if (sends) {
+        words[SR1] |= load(device) ? 0 : OVR;
+        i2c->has_sent = 1;
+    } else if (step == FAR_READ) {
+        i2c->shift = 0xFF;
+    }
+    i2c->has_sent = step == FAR_READ && i2c->has_sent;
+    begin(device, FAR, step == FAR_STOP ? CONDITION : step == FAR_START ? BYTE + CONDITION : BYTE);
+}
+
+static void end_far(struct device *device, uint64_t ns)
+{
+    struct i2c *i2c = device->state;
+    const uint32_t byte = i2c->far & 0xFF, step = i2c->far >> FAR_AT;
+    const uint32_t answer = step == FAR_START   ? end_far_start(device, byte)
+                            : step == FAR_WRITE ? end_far_write(device, byte)
+                            : step == FAR_READ  ? end_far_read(device, byte)
+                                                : end_far_stop(device);
+    i2c->far = ask(device, NEXT_STEP, answer);
+    go_on_far(device, ns);
+}
+
+/* Events. */
+
+static void end_phase(struct device *device, uint64_t ns)
+{
+    struct i2c *i2c = device->state;
+    switch (i2c->phase) {
+    case STARTING:
+        end_start(device);
+        rest(device, HOLD);
+        break;
+    case ADDRESSING:
+    case SENDING: end_sent(device, ns); break;
+    case RECEIVING:
+        i2c->was_refused = !receive(device, i2c->has_parts && carries(device, SDA) ? ask(device, READ, 0) & 0xFF : 0xFF);
+        go_on(device, ns);
+        break;
+    case STOPPING: end_stop(device, ns); break;
+    case OTHERS:
+        device->words[SR2] &= ~(uint32_t)BUSY;
+        rest(device, FREE);
+        begin_start(device, ns);
+        break;
+    default: end_far(device, ns); break;
+    }
+}
+
+/* SCL has been low for too long: nothing is under way any more. */
+static void time_out(struct device *device)
+{
+    struct i2c *i2c = device->state;
+    i2c->timeout_ns = NO_TIME;
+    device->words[SR1] |= TIMEOUT;
+    device->words[CR1] &= ~(uint32_t)(START | STOP);
+    device->words[SR2] &= ~(uint32_t)(MSL | TRA);
+    i2c->tdr = i2c->far = 0;
+    if (i2c->phase != FREE && i2c->has_parts) {
+        ask(device, END, 0);
+    }
+    rest(device, FREE);
+}
+
+static void event(struct device *device, uint64_t until)
+{
+    struct i2c *i2c = device->state;
+    while (i2c->due_ns <= until || i2c->timeout_ns <= until) {
+        if (i2c->timeout_ns <= i2c->due_ns) {
+            time_out(device);
+        } else if (i2c->lines & 1 << SCL) { /* somebody holds the clock: it ends when that lets go */
+            i2c->is_late = 1;
+            i2c->due_ns = NO_TIME;
+        } else {
+            end_phase(device, i2c->due_ns);
+        }
+    }
+    wait_for_events(device);
+    update_outputs(device);
+}
+
+static void pins(struct device *device, uint32_t port, uint32_t changed)
+{
+    struct i2c *i2c = device->state;
+    uint32_t *words = device->words;
+    const uint64_t ns = now_ns(device->fabric);
+    const uint32_t before = i2c->lines, low = (uint32_t)is_low(device, SCL) | (uint32_t)is_low(device, SDA) << SDA | (uint32_t)is_low(device, SMBA) << SMBA;
+    (void)port, (void)changed;
+    i2c->lines = low;
+    if (low & ~before & 1 << SMBA && (words[CR1] & (PE | SMBUS | SMBTYPE)) == (PE | SMBUS | SMBTYPE)) {
+        words[SR1] |= SMBALERT;
+    }
+    if (i2c->phase == FREE) {
+        if (low & (1 << SCL | 1 << SDA)) {
+            words[SR2] |= BUSY;
+        } else if (before & 1 << SDA && !(before & 1 << SCL)) { /* SDA rises while SCL is high: a STOP */
+            words[SR2] &= ~(uint32_t)BUSY;
+            begin_start(device, ns);
+        }
+    } else if (i2c->is_late && !(low & 1 << SCL)) {
+        i2c->is_late = 0;
+        i2c->due_ns = ns;
+        i2c->base_ns = ns;
+        i2c->ticks = 0;
+    }
+    i2c->timeout_ns = !(low & 1 << SCL) || !(words[CR1] & SMBUS) ? NO_TIME : before & 1 << SCL ? i2c->timeout_ns : ns + TIMEOUT_NS;
+    if (i2c->due_ns <= ns && device->fabric->event_ns == NO_TIME) {
+        event(device, ns);
+    }
+    wait_for_events(device);
+    update_outputs(device);
+}
+
+/* Registers. */
+
+static void release(struct device *device)
+{
+    const struct i2c *i2c = device->state;
+    const uint64_t ns = now_ns(device->fabric);
+    if (i2c->phase == HOLD) {
+        go_on(device, ns);
+    } else if (i2c->phase == FAR_HOLD) {
+        go_on_far(device, ns);
+    } else if (i2c->phase == FREE) {
+        begin_start(device, ns);
+    }
+    wait_for_events(device);
+}
+
+static uint32_t read(struct device *device, uint32_t index)
+{
+    struct i2c *i2c = device->state;
+    uint32_t *words = device->words;
+    if (index == SR2) {
+        const uint32_t status = words[SR2];
+        if (words[SR1] & words[SEEN] & ADDR) {
+            words[SR1] &= ~(uint32_t)ADDR;
+            words[SR1] |= status & TRA ? TXE : 0;
+            release(device);
+            update_outputs(device);
+        }
+        return status;
+    }
+    const uint32_t byte = i2c->rdr;
+    words[SR1] &= ~(uint32_t)(RXNE | BTF);
+    if (i2c->received) {
+        i2c->rdr = i2c->received & 0xFF;
+        i2c->received = 0;
+        words[SR1] |= RXNE;
+        release(device);
+    }
+    update_outputs(device);
+    return byte;
+}
+
+static void write_data(struct device *device, uint32_t byte)
+{
+    struct i2c *i2c = device->state;
+    uint32_t *words = device->words;
+    if (words[SR1] & (SB | ADD10)) {
+        if (!(words[SEEN] & words[SR1] & (SB | ADD10))) {
+            ask(device, SEQUENCE, 0);
+            return;
+        }
+        i2c->is_second = words[SR1] & ADD10;
+        words[SR1] &= ~(uint32_t)(SB | ADD10);
+        i2c->shift = HELD | byte;
+        run_from(device, now_ns(device->fabric));
+        begin(device, ADDRESSING, BYTE);
+        wait_for_events(device);
+        return;
+    }
+    if (words[SR2] & TRA) {
+        i2c->tdr = HELD | byte;
+        words[SR1] &= ~(uint32_t)(TXE | BTF);
+        release(device);
+    }
+}
+
+static void clear(struct device *device, bool keeps_busy)
+{
+    struct i2c *i2c = device->state;
+    device->words[CR1] &= ~(uint32_t)(START | STOP | ACK | PEC | ALERT);
+    device->words[SR1] = 0;
+    device->words[SR2] = keeps_busy && i2c->phase == FREE ? device->words[SR2] & BUSY : 0;
+    device->words[SEEN] = 0;
+    if (i2c->phase != FREE && i2c->has_parts) {
+        ask(device, END, 0);
+    }
+    i2c->shift = i2c->tdr = i2c->rdr = i2c->received = i2c->far = i2c->is_own = i2c->header = i2c->is_lost = 0;
+    i2c->next_ack = i2c->was_refused = i2c->has_sent = i2c->is_second = i2c->is_pec = i2c->lines = 0;
+    i2c->timeout_ns = NO_TIME;
+    rest(device, FREE);
+    schedule(device, NO_TIME);
+}
+
+static void write_control(struct device *device, uint32_t previous)
+{
+    struct i2c *i2c = device->state;
+    uint32_t *words = device->words;
+    if (words[CR1] & SWRST) { /* RM0008 26.6.1: everything else is in its reset state while it is set */
+        for (uint32_t n = CR1; n <= TRISE; ++n) {
+            words[n] = n == CR1 ? SWRST : n == TRISE ? 2 : 0;
+        }
+        clear(device, false);
+    } else if (!(words[CR1] & PE)) {
+        clear(device, true);
+    } else {
+        words[SR1] &= ~(words[SEEN] & STOPF); /* a read of SR1, then a write of CR1 */
+        words[SEEN] &= ~(uint32_t)STOPF;
+    }
+    connect(device);
+    listen(device);
+    if (words[CR1] & ~previous & PE) {
+        i2c->lines = (uint32_t)is_low(device, SCL) | (uint32_t)is_low(device, SDA) << SDA;
+        words[SR2] |= i2c->lines ? BUSY : 0;
+    }
+    if (!(words[SR2] & MSL) && !(previous & STOP)) {
+        words[CR1] &= i2c->phase == STARTING || words[CR1] & START ? ~0u : ~(uint32_t)STOP;
+    }
+    release(device);
+}
+
+static void write(struct device *device, uint32_t index, uint32_t written, uint32_t previous)
+{
+    if (index == CR1) {
+        write_control(device, previous);
+    } else if (index == DR) {
+        write_data(device, written & 0xFF);
+    }
+    update_outputs(device);
+}
+
+/* What only fills a buffer or lowers a flag needs none. */
+static bool needs_time(const struct device *device, uint32_t index, bool is_write)
+{
+    const struct i2c *i2c = device->state;
+    const uint32_t *words = device->words;
+    if (is_write) {
+        return index == CR1 || index == CR2 || (index == DR && i2c->phase != SENDING && i2c->phase != FAR);
+    }
+    return index == SR2 ? (words[SR1] & words[SEEN] & ADDR) != 0 : i2c->received != 0;
+}
+
+static uint32_t command(struct device *device, uint32_t what, uint32_t one, uint32_t other)
+{
+    struct i2c *i2c = device->state;
+    const uint64_t now = now_ns(device->fabric);
+    switch (what) {
+    case RESET:
+        clear(device, false);
+        connect(device);
+        listen(device);
+        break;
+    case CLOCK:
+        event(device, now);
+        if (i2c->due_ns != NO_TIME && i2c->phase < FAR && one != i2c->clock_hz) {
+            i2c->base_ns = now + (uint64_t)((__uint128_t)(i2c->due_ns - now) * i2c->clock_hz / one);
+            i2c->ticks = 0;
+            i2c->rate_hz = one;
+            i2c->due_ns = i2c->base_ns;
+            wait_for_events(device);
+        }
+        i2c->clock_hz = one;
+        break;
+    case MOVE:
+        for (uint32_t n = 0; n < I2C_PINS; ++n) {
+            const uint32_t pin = one >> 8 * n & 0xFF;
+            if (pin != i2c->pins[n]) {
+                put(device, n, FLOATING);
+                i2c->pins[n] = pin;
+            }
+        }
+        connect(device);
+        listen(device);
+        break;
+    case CALL:
+        if (i2c->phase != FREE || device->words[SR2] & BUSY) {
+            i2c->far_waits = 1;
+            break;
+        }
+        i2c->far = ask(device, NEXT_STEP, 0);
+        i2c->phase = FAR_HOLD;
+        i2c->rate_hz = i2c->far_hz;
+        go_on_far(device, now);
+        wait_for_events(device);
+        break;
+    case DISTURB:
+        i2c->is_lost = one == ARLO;
+        device->words[SR1] |= one & BERR;
+        break;
+    case LISTEN: listen(device); return 0;
+    default: break;
+    }
+    update_outputs(device);
+    (void)other;
+    return 0;
+}
+
+DEVICE_KIND(i2c_kind) = {.name = "i2c", .needs_time = needs_time, .read = read, .write = write, .event = event, .pins = pins, .command = command};

@@ -1,0 +1,619 @@
+"""bxCAN: three mailboxes that send, two FIFOs of three that receive, fourteen filters.
+
+In Python, since a frame takes at least 44 us of bus and what drivers poll are plain words. Who sends when is the
+network's business (`fabric/can_network.py`); until a chip joins one it is alone, where nobody acknowledges, and in
+loop-back mode too.
+
+Theory of operation. A mailbox is latched when TXRQ is set. The network asks for the best one (`offer`) when a frame
+begins, and tells its end in advance (`end`); what follows from it happens at that time.
+Source: RM0008 24.
+Invariant: FMP of each FIFO is the number of messages in `_fifos`, and its first stands in the registers.
+"""
+
+from collections import deque
+from dataclasses import dataclass
+from fractions import Fraction
+from functools import partialmethod
+
+from bluepill_sim.fabric.bus_parts import CanFrame
+from bluepill_sim.fabric.can_network import CanEnd, CanError, CanNetwork
+from bluepill_sim.fabric.ports import ChipPorts
+from bluepill_sim.fabric.registers import Peripheral, Place, Register, bits
+from simbase.timing import NS_PER_S, Nanos
+
+MCR, MSR, TSR, RF0R, RF1R, IER, ESR, BTR = range(8)
+TI0R, RI0R, FMR, FM1R, FS1R, FFA1R, FA1R, F0R1 = (
+    at // 4 for at in (0x180, 0x1B0, 0x200, 0x204, 0x20C, 0x214, 0x21C, 0x240)
+)
+INRQ, SLEEP, TXFP, RFLM, NART, AWUM, ABOM, TTCM, RESET = (1 << n for n in (0, 1, 2, 3, 4, 5, 6, 7, 15))
+INAK, SLAK, ERRI, WKUI, SLAKI = (1 << n for n in range(5))
+RQCP, TXOK, ALST, TERR, ABRQ = (1 << n for n in (0, 1, 2, 3, 7))
+FULL, FOVR, RFOM = (1 << n for n in (3, 4, 5))
+TMEIE, EWGIE, EPVIE, BOFIE, LECIE, ERRIE, WKUIE, SLKIE = (1 << n for n in (0, 8, 9, 10, 11, 15, 16, 17))
+EWGF, EPVF, BOFF = 1, 2, 4
+LBKM, SILM = 1 << 30, 1 << 31
+TXRQ, RTR, IDE = 1, 2, 4
+_TME_AT, _LOW_AT, _CODE_AT = 26, 29, 24
+_MAILBOXES, _FIFO_DEPTH, _BANKS = 3, 3, 14
+_LEC = bits((6, 4))
+#: RM0008 24.7.6; ISO 11898-1: warning, passive, off; bits at 1 that end an initialisation, and a bus-off.
+_WARNING, _PASSIVE, _OFF = 96, 128, 256
+_SYNC_BITS, _RECOVERY_BITS = 11, 128 * 11
+#: LEC of a receiver of a damaged frame.
+_CRC_ERROR = 6
+#: Pins (RX, TX) by the remap field (RM0008 table 42).
+PINS = {0: ("PA11", "PA12"), 2: ("PB8", "PB9"), 3: ("PD0", "PD1")}
+_FILTER_MODES = bits((13, 0))
+
+
+@dataclass(frozen=True, slots=True)
+class _Mailbox:
+    """What is to be sent, and since when."""
+
+    frame: CanFrame
+    asked_ns: Nanos
+    order: int
+
+
+@dataclass(frozen=True, slots=True)
+class _Message:
+    """What was received: the four words of a FIFO."""
+
+    words: tuple[int, int, int, int]
+
+
+def _mailbox_registers() -> tuple[Register, ...]:
+    rows: list[Register] = []
+    for n in range(_MAILBOXES):
+        at = 0x180 + 0x10 * n
+        rows += (
+            Register(name=f"TI{n}R", offset=at, on_write=f"_write_ti{n}r"),
+            Register(name=f"TDT{n}R", offset=at + 4, readable=bits((31, 16), 8, (3, 0)), writable=bits(8, (3, 0))),
+            Register(name=f"TDL{n}R", offset=at + 8),
+            Register(name=f"TDH{n}R", offset=at + 12),
+        )
+    for n in range(2):
+        at = 0x1B0 + 0x10 * n
+        rows += (
+            Register(name=f"{what}{n}R", offset=at + 4 * k, writable=0)
+            for k, what in enumerate(("RI", "RDT", "RDL", "RDH"))
+        )
+    return tuple(rows)
+
+
+class Can(Peripheral):
+    """Basic extended CAN."""
+
+    OUTPUTS = ("tx_irq", "rx0_irq", "rx1_irq", "sce_irq")
+    STATE = (
+        "_alone", "_joined", "_mailboxes", "_order", "_fifos", "_ends", "_sync_ns", "_recover_ns", "_tec", "_rec",
+        "_timer_ns", "_lost",
+    )  # fmt: skip
+    DERIVED = ("_pin_names",)
+    REGISTERS = (
+        Register(
+            name="MCR",
+            offset=0x00,
+            reset=0x1_0002,
+            readable=bits(16, (7, 0)),
+            writable=bits((16, 15), (7, 0)),
+            on_write="_write_mcr",
+        ),
+        Register(
+            name="MSR",
+            offset=0x04,
+            reset=0xC02,
+            readable=bits((11, 8), (4, 0)),
+            writable=0,
+            write_one_to_clear=bits((4, 2)),
+            on_write="_write_flags",
+        ),
+        Register(name="TSR", offset=0x08, reset=0x1C00_0000, writable=0, on_write="_write_tsr"),
+        Register(
+            name="RF0R",
+            offset=0x0C,
+            readable=bits((4, 3), (1, 0)),
+            writable=0,
+            write_one_to_clear=bits((4, 3)),
+            on_write="_write_rf0r",
+        ),
+        Register(
+            name="RF1R",
+            offset=0x10,
+            readable=bits((4, 3), (1, 0)),
+            writable=0,
+            write_one_to_clear=bits((4, 3)),
+            on_write="_write_rf1r",
+        ),
+        Register(
+            name="IER",
+            offset=0x14,
+            readable=bits((17, 15), (11, 8), (6, 0)),
+            writable=bits((17, 15), (11, 8), (6, 0)),
+            on_write="_write_flags",
+        ),
+        Register(
+            name="ESR", offset=0x18, readable=bits((31, 16), (6, 4), (2, 0)), writable=_LEC, on_write="_write_flags"
+        ),
+        Register(
+            name="BTR",
+            offset=0x1C,
+            reset=0x0123_0000,
+            readable=bits((31, 30), (25, 24), (22, 16), (9, 0)),
+            writable=bits((31, 30), (25, 24), (22, 16), (9, 0)),
+            on_write="_write_btr",
+        ),
+        *_mailbox_registers(),
+        Register(name="FMR", offset=0x200, reset=0x2A1C_0E01, writable=1),
+        *(
+            Register(
+                name=name,
+                offset=offset,
+                readable=_FILTER_MODES,
+                writable=_FILTER_MODES,
+                on_write=f"_write_{name.lower()}",
+            )
+            for name, offset in (("FM1R", 0x204), ("FS1R", 0x20C), ("FFA1R", 0x214))
+        ),
+        Register(name="FA1R", offset=0x21C, readable=_FILTER_MODES, writable=_FILTER_MODES),
+        *(Register(name=f"F{n // 2}R{n % 2 + 1}", offset=0x240 + 4 * n) for n in range(2 * _BANKS)),
+    )
+
+    def __init__(self, chip: ChipPorts, place: Place) -> None:
+        super().__init__(chip, place)
+        self._alone = CanNetwork()
+        self._alone.join(self)
+        self._joined: CanNetwork | None = None
+        self._clear()
+        self._pin_names = PINS[0]
+        self.on_reset()
+        chip.pins.route_listeners.append(self._route_changed)
+
+    def _clear(self) -> None:
+        self._mailboxes: dict[int, _Mailbox] = {}
+        self._order = 0
+        self._fifos: tuple[deque[_Message], deque[_Message]] = (deque(), deque())
+        #: Ends of frames that are to come.
+        self._ends: deque[CanEnd] = deque()
+        self._sync_ns: Nanos | None = None
+        self._recover_ns: Nanos | None = None
+        self._tec = self._rec = 0
+        self._timer_ns: Nanos = 0
+        #: Mailboxes that have lost an arbitration and do not try again.
+        self._lost: tuple[int, ...] = ()
+
+    # From outside the chip.
+
+    def attach(self, network: CanNetwork) -> None:
+        """Join a network."""
+        self._joined = network
+        network.join(self)
+
+    def sends_at(self, pin: str) -> bool:
+        """Whether something outside sends on a pin: a network does so on RX."""
+        return self._joined is not None and pin == self._pin_names[0]
+
+    # For the network.
+
+    @property
+    def network(self) -> CanNetwork:
+        """The one that it is on now."""
+        return self._alone if self._joined is None or self.words[BTR] & LBKM else self._joined
+
+    @property
+    def now_ns(self) -> Nanos | None:
+        """The time reached."""
+        return self.chip.now_ns
+
+    @property
+    def bit_rate(self) -> Fraction | None:
+        """Bits a second."""
+        timing = self.words[BTR]
+        quanta = 1 + (timing >> 16 & 15) + 1 + (timing >> 20 & 7) + 1
+        return Fraction(self.chip.clocks.pclk1_hz, quanta * ((timing & 0x3FF) + 1))
+
+    @property
+    def is_on(self) -> bool:
+        """Whether it takes part in the traffic."""
+        is_there = self.hears_itself or self._is_wired()
+        return is_there and not self.words[MSR] & (INAK | SLAK) and not self.words[ESR] & BOFF
+
+    @property
+    def hears_itself(self) -> bool:
+        """Whether it is in loop-back mode."""
+        return bool(self.words[BTR] & LBKM)
+
+    @property
+    def acknowledges(self) -> bool:
+        """Whether it drives the bus where it hears a frame."""
+        return self.is_on and not self.words[BTR] & (SILM | LBKM)
+
+    @property
+    def is_passive(self) -> bool:
+        """Whether it is error passive."""
+        return bool(self.words[ESR] & EPVF)
+
+    def offer(self, at_ns: Nanos) -> CanFrame | None:
+        """Return the frame of the best mailbox, if there is one."""
+        best = self._best(at_ns)
+        is_mute = self.words[BTR] & SILM and not self.words[BTR] & LBKM
+        return None if best is None or is_mute or not self.is_on else self._mailboxes[best].frame
+
+    def lose(self, at_ns: Nanos) -> bool:
+        """Try again, but for NART."""
+        if not self.words[MCR] & NART:
+            return True
+        best = self._best(at_ns)
+        self._lost += () if best is None else (best,)
+        self.plan()
+        return False
+
+    def end(self, end: CanEnd) -> None:
+        """Take the end of a frame, to act on it at its time."""
+        self._ends.append(end)
+        self.plan()
+
+    def plan(self) -> None:
+        """Work out when it acts next."""
+        times = [self._sync_ns, self._recover_ns, self.network.next_ns if self._mailboxes or self._joined else None]
+        if self._ends:
+            times.append(self._ends[0].end_ns)
+        if self._lost:
+            times.append(self.chip.now_ns)
+        known = [time for time in times if time is not None]
+        self.due_ns = max(min(known), self.chip.now_ns) if known else None
+
+    # For the chip.
+
+    def advance_to(self, now_ns: Nanos) -> None:
+        """Act on what is due: ends of frames, changes of mode, what the network has to decide."""
+        self.due_ns = None
+        self._take_ends(now_ns)
+        if self._sync_ns is not None and self._sync_ns <= now_ns:
+            self._sync_ns = None
+            self._synchronise(now_ns)
+        if self._recover_ns is not None and self._recover_ns <= now_ns:
+            self._recover_ns = None
+            self._tec = self._rec = 0
+            self._count_errors(0)
+            self._want()
+        self.network.advance_to(now_ns)
+        for mailbox in self._lost:
+            self._complete(mailbox, ALST)
+        self._lost = ()
+        self._take_ends(now_ns)  # a chip that others have left behind is told of what is over
+        self._update()
+        self.plan()
+
+    def on_reset(self) -> None:
+        """Drop everything; it stays on its network."""
+        self._clear()
+        self._route_changed()
+        self._update()
+
+    def _restored(self) -> None:
+        self._find_pins()
+
+    # Registers.
+
+    def _write_mcr(self, written: int, previous: int) -> None:
+        now_ns = self.chip.now_ns
+        if written & RESET:
+            self.reset()
+            return
+        status = self.words[MSR]
+        if written & INRQ and not written & SLEEP:
+            status = status & ~SLAK | INAK
+            self._sync_ns = None
+        elif written & SLEEP:
+            if not status & SLAK and not previous & SLEEP:
+                status |= SLAK | (SLAKI if self.words[IER] & SLKIE else 0)
+            status &= ~INAK
+            self._sync_ns = None
+        elif status & (INAK | SLAK) and (self._sync_ns is None):
+            rate = self.bit_rate or Fraction(1)
+            self._sync_ns = now_ns + int(_SYNC_BITS * NS_PER_S / rate)
+        self.words[MSR] = status
+        self._update()
+        self.plan()
+
+    def _synchronise(self, now_ns: Nanos) -> None:
+        """Leave initialisation or sleep after eleven bits at 1."""
+        rx = self.chip.pins[self._pin_names[0]]
+        if not self.words[BTR] & LBKM and not rx.level and not rx.is_floating:
+            self._sync_ns = now_ns + int(_SYNC_BITS * NS_PER_S / (self.bit_rate or Fraction(1)))
+            return
+        if self.words[MSR] & INAK:
+            self._timer_ns = now_ns
+            if self.words[ESR] & BOFF:
+                self._recover(now_ns)
+        self.words[MSR] &= ~(INAK | SLAK)
+        if not self._is_wired() and not self.words[BTR] & LBKM:
+            self.chip.warn(
+                f"CAN: it is on no bus: {self._pin_names[1]} is no alternate-function output", once="CAN:pins"
+            )
+        self._want()
+
+    def _recover(self, now_ns: Nanos) -> None:
+        self._recover_ns = now_ns + int(_RECOVERY_BITS * NS_PER_S / (self.bit_rate or Fraction(1)))
+
+    def _write_btr(self, _written: int, previous: int) -> None:
+        if not self.words[MSR] & INAK:
+            self.words[BTR] = previous
+            self.chip.warn("CAN_BTR: written outside initialisation: ignored", once="CAN:btr")
+
+    def _write_flags(self, _written: int, _previous: int) -> None:
+        self._update()
+
+    def _write_tsr(self, written: int, _previous: int) -> None:
+        for n in range(_MAILBOXES):
+            field = written >> 8 * n
+            if field & RQCP:
+                self.words[TSR] &= ~((RQCP | TXOK | ALST | TERR) << 8 * n)
+            if field & ABRQ and n in self._mailboxes:
+                start_ns = self.network.start_ns
+                is_sending = start_ns is not None and start_ns <= self.chip.now_ns and n == self._best(start_ns)
+                if is_sending or any(end.is_own for end in self._ends):
+                    self.words[TSR] |= ABRQ << 8 * n  # it goes out, unless that fails
+                else:
+                    self._complete(n, 0)
+        self._update()
+        self.plan()
+
+    def _write_ti(self, n: int, written: int, previous: int) -> None:
+        at = TI0R + 4 * n
+        if n in self._mailboxes:  # it is locked
+            self.words[at] = previous
+        elif written & TXRQ:
+            self._mailboxes[n] = _Mailbox(self._frame_at(at), self.chip.now_ns, self._order)
+            self._order += 1
+            self.words[TSR] &= ~((RQCP | TXOK | ALST | TERR | ABRQ) << 8 * n)
+            self._want()
+            self._update()
+            self.plan()
+
+    _write_ti0r = partialmethod(_write_ti, 0)
+    _write_ti1r = partialmethod(_write_ti, 1)
+    _write_ti2r = partialmethod(_write_ti, 2)
+
+    def _write_rf(self, n: int, written: int, _previous: int) -> None:
+        if written & RFOM and self._fifos[n]:
+            self._fifos[n].popleft()
+        self._update()
+
+    _write_rf0r = partialmethod(_write_rf, 0)
+    _write_rf1r = partialmethod(_write_rf, 1)
+
+    def _write_filter_mode(self, index: int, _written: int, previous: int) -> None:
+        if not self.words[FMR] & 1:
+            self.words[index] = previous
+            self.chip.warn("CAN: modes of filters written while FINIT is 0: ignored", once="CAN:finit")
+
+    _write_fm1r = partialmethod(_write_filter_mode, FM1R)
+    _write_fs1r = partialmethod(_write_filter_mode, FS1R)
+    _write_ffa1r = partialmethod(_write_filter_mode, FFA1R)
+
+    # Sending.
+
+    def _frame_at(self, at: int) -> CanFrame:
+        identifier, control, low, high = self.words[at : at + 4]
+        length = min(control & 15, 8)
+        is_remote, is_extended = bool(identifier & RTR), bool(identifier & IDE)
+        data = (low | high << 32).to_bytes(8, "little")[:length]
+        if self.words[MCR] & TTCM and control >> 8 & 1 and length == 8:
+            data = data[:6] + self._time(self.chip.now_ns).to_bytes(2, "little")
+        return CanFrame(
+            identifier=identifier >> 3 if is_extended else identifier >> 21,
+            data=b"" if is_remote else data,
+            is_extended=is_extended,
+            is_remote=is_remote,
+            remote_bytes=length if is_remote else 0,
+        )
+
+    def _best(self, at_ns: Nanos) -> int | None:
+        """Return the mailbox that goes next: the lowest identifier, or with TXFP the first that was asked for."""
+        ready = [n for n, box in self._mailboxes.items() if box.asked_ns <= at_ns]
+        if not ready:
+            return None
+        if self.words[MCR] & TXFP:
+            return min(ready, key=lambda n: self._mailboxes[n].order)
+        return min(ready, key=lambda n: (_rank(self._mailboxes[n].frame), n))
+
+    def _want(self) -> None:
+        if self._mailboxes and self.is_on:
+            self.network.want(self, self.chip.now_ns)
+
+    def _complete(self, n: int, flags: int) -> None:
+        """End a mailbox's request."""
+        if self._mailboxes.pop(n, None) is None:
+            return
+        self.words[TI0R + 4 * n] &= ~TXRQ
+        self.words[TSR] = self.words[TSR] & ~(ABRQ << 8 * n) | (RQCP | flags) << 8 * n
+
+    def _take_ends(self, now_ns: Nanos) -> None:
+        while self._ends and self._ends[0].end_ns <= now_ns:
+            self._take_end(self._ends.popleft())
+
+    def _take_end(self, end: CanEnd) -> None:
+        if end.is_own:
+            self._take_own_end(end)
+        elif self.is_on and end.error is CanError.NONE:
+            self._rec = min(self._rec - 1, _PASSIVE - 8) if self._rec else 0
+            self._count_errors(0)
+            self._receive(end)
+        elif self.is_on and end.error is CanError.BIT_DOMINANT:
+            self._rec = min(self._rec + 1, 255)
+            self._count_errors(_CRC_ERROR)
+        elif self.words[MSR] & SLAK and self.words[MCR] & SLEEP:
+            self._wake()
+
+    def _take_own_end(self, end: CanEnd) -> None:
+        n = next(
+            (n for n, box in self._mailboxes.items() if box.frame == end.frame and n == self._best(end.start_ns)), None
+        )
+        if n is None:
+            return
+        if end.error is CanError.NONE:
+            self.words[TI0R + 4 * n + 1] = self.words[TI0R + 4 * n + 1] & 0xFFFF | self._time(end.start_ns) << 16
+            self._complete(n, TXOK)
+            self._tec = max(self._tec - 1, 0)
+            self._count_errors(0)
+            if self.words[BTR] & LBKM:
+                self._receive(end)
+        else:
+            if not (end.error is CanError.ACKNOWLEDGE and self._tec >= _PASSIVE):
+                self._tec += 8
+            self._count_errors(end.error)
+            if self.words[MCR] & NART or self.words[TSR] >> 8 * n & ABRQ:
+                self._complete(n, TERR)
+        self._want()
+
+    # Receiving.
+
+    def _receive(self, end: CanEnd) -> None:
+        found = self._filtered(end.frame)
+        if found is None:
+            return
+        n, number = found
+        fifo, frame = self._fifos[n], end.frame
+        identifier = frame.identifier << 3 | IDE if frame.is_extended else frame.identifier << 21
+        data = frame.data.ljust(8, b"\0")
+        message = _Message((
+            identifier | (RTR if frame.is_remote else 0),
+            frame.dlc | number << 8 | self._time(end.start_ns) << 16,
+            int.from_bytes(data[:4], "little"),
+            int.from_bytes(data[4:], "little"),
+        ))  # fmt: skip
+        if len(fifo) == _FIFO_DEPTH:
+            self.words[RF0R + n] |= FOVR
+            if self.words[MCR] & RFLM:
+                return
+            fifo.pop()
+        fifo.append(message)
+        self.words[RF0R + n] |= FULL if len(fifo) == _FIFO_DEPTH else 0
+
+    def _filtered(self, frame: CanFrame) -> tuple[int, int] | None:
+        """Return the FIFO of a frame and the number of the filter that lets it in: RM0008 24.7.4."""
+        best: tuple[int, int, int, int] | None = None
+        numbers = [0, 0]
+        if self.words[FMR] & 1:
+            return None
+        for bank in range(_BANKS):
+            fifo, is_active, is_wide, is_list = (self.words[index] >> bank & 1 for index in (FFA1R, FA1R, FS1R, FM1R))
+            one, two = self.words[F0R1 + 2 * bank], self.words[F0R1 + 2 * bank + 1]
+            tests = _tests(one, two, is_wide=bool(is_wide), is_list=bool(is_list))
+            wanted = _wide_word(frame) if is_wide else _narrow_word(frame)
+            for value, mask in tests:
+                if is_active and not (wanted ^ value) & mask:
+                    rank = (1 - is_wide, 1 - is_list, numbers[fifo], fifo)
+                    best = rank if best is None else min(best, rank)
+                numbers[fifo] += 1
+        return None if best is None else (best[3], best[2])
+
+    def _time(self, at_ns: Nanos) -> int:
+        """Return the 16-bit time of TTCM: bits since it left initialisation."""
+        if not self.words[MCR] & TTCM:
+            return 0
+        return int(max(at_ns - self._timer_ns, 0) * (self.bit_rate or 0) / NS_PER_S) & 0xFFFF
+
+    def _wake(self) -> None:
+        """A frame has passed while it slept: with AWUM it leaves sleep."""
+        self.words[MSR] |= WKUI
+        if self.words[MCR] & AWUM:
+            self.words[MCR] &= ~SLEEP
+            self._sync_ns = self.chip.now_ns + int(_SYNC_BITS * NS_PER_S / (self.bit_rate or Fraction(1)))
+
+    # Errors and what is shown of it all.
+
+    def _count_errors(self, code: int) -> None:
+        before = self.words[ESR]
+        is_off = self._tec >= _OFF
+        highest = max(self._tec, self._rec)
+        flags = (EWGF if highest >= _WARNING else 0) | (EPVF if highest >= _PASSIVE else 0) | (BOFF if is_off else 0)
+        self.words[ESR] = min(self._tec, 255) << 16 | self._rec << 24 | code << 4 | flags
+        if is_off and not before & BOFF and self.words[MCR] & ABOM:
+            self._recover(self.chip.now_ns)
+        enabled = self.words[IER]
+        new = flags & ~before
+        causes = (EWGIE if new & EWGF else 0) | (EPVIE if new & EPVF else 0) | (BOFIE if new & BOFF else 0)
+        if enabled & (causes | (LECIE if code else 0)):
+            self.words[MSR] |= ERRI
+
+    def _update(self) -> None:
+        words = self.words
+        for n, fifo in enumerate(self._fifos):
+            words[RF0R + n] = words[RF0R + n] & (FULL | FOVR) | len(fifo)
+            if fifo:
+                at = RI0R + 4 * n
+                for k, word in enumerate(fifo[0].words):
+                    words[at + k] = word
+        free = [n for n in range(_MAILBOXES) if n not in self._mailboxes]
+        flags = words[TSR] & 0xFF_FFFF | sum(1 << _TME_AT + n for n in free)
+        last = self._last()
+        flags |= 0 if last is None or len(self._mailboxes) < 2 else 1 << _LOW_AT + last
+        words[TSR] = flags | (free[0] if free else last or 0) << _CODE_AT
+        enabled = words[IER]
+        self.set_output("tx_irq", bool(enabled & TMEIE and words[TSR] & 0x01_0101))
+        for n in range(2):
+            shift, status = 3 * n + 1, words[RF0R + n]
+            causes = (1 if status & 3 else 0) | (2 if status & FULL else 0) | (4 if status & FOVR else 0)
+            self.set_output(f"rx{n}_irq", bool(enabled >> shift & causes))
+        status = words[MSR]
+        self.set_output(
+            "sce_irq",
+            bool(
+                (status & ERRI and enabled & ERRIE)
+                or (status & WKUI and enabled & WKUIE)
+                or (status & SLAKI and enabled & SLKIE)
+            ),
+        )
+
+    def _last(self) -> int | None:
+        """Return the mailbox that goes last."""
+        if not self._mailboxes:
+            return None
+        if self.words[MCR] & TXFP:
+            return max(self._mailboxes, key=lambda n: self._mailboxes[n].order)
+        return max(self._mailboxes, key=lambda n: (_rank(self._mailboxes[n].frame), n))
+
+    # Pins.
+
+    def _is_wired(self) -> bool:
+        return self.chip.pins[self._pin_names[1]].carries("CAN_TX")
+
+    def _route_changed(self) -> None:
+        self.chip.pins[self._pin_names[1]].disconnect("CAN_TX")
+        self._find_pins()
+        self.chip.pins[self._pin_names[1]].connect("CAN_TX", level=True)
+
+    def _find_pins(self) -> None:
+        self._pin_names = PINS.get(self.chip.pins.remaps.get("CAN", 0), PINS[0])
+
+
+def _rank(frame: CanFrame) -> tuple[int, int, int, int]:
+    """Return what decides between two frames: the base identifier, then standard before extended."""
+    base = frame.identifier >> 18 if frame.is_extended else frame.identifier
+    return base, int(frame.is_extended), frame.identifier, int(frame.is_remote)
+
+
+def _wide_word(frame: CanFrame) -> int:
+    """Return a frame as a filter of 32 bits sees it."""
+    flags = (IDE if frame.is_extended else 0) | (RTR if frame.is_remote else 0)
+    return (frame.identifier << 3 if frame.is_extended else frame.identifier << 21) | flags
+
+
+def _narrow_word(frame: CanFrame) -> int:
+    """Return a frame as a filter of 16 bits sees it: STID, RTR, IDE, EXID 17 to 15."""
+    base = frame.identifier >> 18 if frame.is_extended else frame.identifier
+    high = frame.identifier >> 15 & 7 if frame.is_extended else 0
+    return base << 5 | int(frame.is_remote) << 4 | int(frame.is_extended) << 3 | high
+
+
+def _tests(one: int, two: int, *, is_wide: bool, is_list: bool) -> tuple[tuple[int, int], ...]:
+    """Return the filters of a bank as (value, mask), in the order of their numbers: RM0008 figure 230."""
+    if is_wide:
+        return ((one, 0xFFFF_FFFE), (two, 0xFFFF_FFFE)) if is_list else ((one, two & 0xFFFF_FFFE),)
+    halves = (one & 0xFFFF, one >> 16, two & 0xFFFF, two >> 16)
+    if is_list:
+        return tuple((half, 0xFFFF) for half in halves)
+    return (halves[0], halves[1]), (halves[2], halves[3])

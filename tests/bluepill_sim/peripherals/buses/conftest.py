@@ -1,0 +1,41 @@
+"""Programs of this folder, built once."""
+
+import shutil
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import pytest
+
+from bluepill_sim import BluePill
+from robot_bench.firmware import build
+
+HERE = Path(__file__).resolve().parent
+BORROWED = ("startup.c", "memory.c", "f103.h", "f103c8.ld")
+
+
+@pytest.fixture(scope="session")
+def program(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str], Path]:
+    """Build a program of `firmware` and return its ELF."""
+    if shutil.which(build.COMPILER) is None:
+        pytest.skip(f"{build.COMPILER} is not installed")
+    folder = tmp_path_factory.mktemp("buses")
+    for source in (*(HERE / "firmware").iterdir(), *(build.HERE / name for name in BORROWED)):
+        shutil.copy(source, folder)
+
+    def built(name: str) -> Path:
+        elf = folder / f"{name}.elf"
+        if not elf.exists():
+            sources = ("startup.c", "memory.c", f"{name}.c")
+            build.build_elf(sources, folder=folder, linker_script="f103c8.ld", output=elf)
+        return elf
+
+    return built
+
+
+@pytest.fixture(params=["native", "python"])
+def board_of(
+    request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch, program: Callable[[str], Path], watchdog: None
+) -> Iterator[Callable[[str], BluePill]]:
+    """Make a board with a program, on each of the cores."""
+    monkeypatch.setenv("P2OS_CORE", request.param)
+    return lambda name: BluePill(program(name))
