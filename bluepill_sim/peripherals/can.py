@@ -18,7 +18,7 @@ from functools import partialmethod
 from bluepill_sim.fabric.bus_parts import CanFrame
 from bluepill_sim.fabric.can_network import CanEnd, CanError, CanNetwork
 from bluepill_sim.fabric.ports import ChipPorts
-from bluepill_sim.fabric.registers import Peripheral, Place, Register, bits
+from bluepill_sim.fabric.registers import Peripheral, Place, Register, bits, numbered
 from simbase.timing import NS_PER_S, Nanos
 
 MCR, MSR, TSR, RF0R, RF1R, IER, ESR, BTR = range(8)
@@ -62,21 +62,40 @@ class _Message:
     words: tuple[int, int, int, int]
 
 
+#: Fields, RM0008 24.9.
+_IDENTIFIER = "STID 31:21, EXID 20:3, IDE 2, RTR 1"
+_RECEIVED = "TIME 31:16, FMI 15:8, RESERVED 7:4, DLC 3:0"
+_LOW, _HIGH = ("DATA{3} 31:24, DATA{2} 23:16, DATA{1} 15:8, DATA{0} 7:0".format(*names) for names in ("0123", "4567"))
+_TRANSMISSION = (
+    "LOW2 31, LOW1 30, LOW0 29, TME2 28, TME1 27, TME0 26, CODE 25:24, ABRQ2 23, RESERVED2 22:20, TERR2 19, ALST2 18, "
+    "TXOK2 17, RQCP2 16, ABRQ1 15, RESERVED1 14:12, TERR1 11, ALST1 10, TXOK1 9, RQCP1 8, ABRQ0 7, RESERVED0 6:4, "
+    "TERR0 3, ALST0 2, TXOK0 1, RQCP0 0"
+)
+
+
 def _mailbox_registers() -> tuple[Register, ...]:
     rows: list[Register] = []
     for n in range(_MAILBOXES):
         at = 0x180 + 0x10 * n
         rows += (
-            Register(name=f"TI{n}R", offset=at, on_write=f"_write_ti{n}r"),
-            Register(name=f"TDT{n}R", offset=at + 4, readable=bits((31, 16), 8, (3, 0)), writable=bits(8, (3, 0))),
-            Register(name=f"TDL{n}R", offset=at + 8),
-            Register(name=f"TDH{n}R", offset=at + 12),
+            Register(name=f"TI{n}R", offset=at, on_write=f"_write_ti{n}r", fields=_IDENTIFIER + ", TXRQ 0"),
+            Register(
+                name=f"TDT{n}R",
+                offset=at + 4,
+                readable=bits((31, 16), 8, (3, 0)),
+                writable=bits(8, (3, 0)),
+                fields="TIME 31:16, TGT 8, DLC 3:0",
+            ),
+            Register(name=f"TDL{n}R", offset=at + 8, fields=_LOW),
+            Register(name=f"TDH{n}R", offset=at + 12, fields=_HIGH),
         )
     for n in range(2):
         at = 0x1B0 + 0x10 * n
         rows += (
-            Register(name=f"{what}{n}R", offset=at + 4 * k, writable=0)
-            for k, what in enumerate(("RI", "RDT", "RDL", "RDH"))
+            Register(name=f"{what}{n}R", offset=at + 4 * k, writable=0, fields=fields)
+            for k, (what, fields) in enumerate(
+                (("RI", _IDENTIFIER + ", RESERVED 0"), ("RDT", _RECEIVED), ("RDL", _LOW), ("RDH", _HIGH))
+            )
         )
     return tuple(rows)
 
@@ -93,6 +112,7 @@ class Can(Peripheral):
     REGISTERS = (
         Register(
             name="MCR",
+            fields="DBF 16, RESET 15, TTCM 7, ABOM 6, AWUM 5, NART 4, RFLM 3, TXFP 2, SLEEP 1, INRQ 0",
             offset=0x00,
             reset=0x1_0002,
             readable=bits(16, (7, 0)),
@@ -101,6 +121,7 @@ class Can(Peripheral):
         ),
         Register(
             name="MSR",
+            fields="RX 11, SAMP 10, RXM 9, TXM 8, SLAKI 4, WKUI 3, ERRI 2, SLAK 1, INAK 0",
             offset=0x04,
             reset=0xC02,
             readable=bits((11, 8), (4, 0)),
@@ -108,9 +129,10 @@ class Can(Peripheral):
             write_one_to_clear=bits((4, 2)),
             on_write="_write_flags",
         ),
-        Register(name="TSR", offset=0x08, reset=0x1C00_0000, writable=0, on_write="_write_tsr"),
+        Register(name="TSR", offset=0x08, reset=0x1C00_0000, writable=0, on_write="_write_tsr", fields=_TRANSMISSION),
         Register(
             name="RF0R",
+            fields="RFOM0 5, FOVR0 4, FULL0 3, FMP0 1:0",
             offset=0x0C,
             readable=bits((4, 3), (1, 0)),
             writable=0,
@@ -119,6 +141,7 @@ class Can(Peripheral):
         ),
         Register(
             name="RF1R",
+            fields="RFOM1 5, FOVR1 4, FULL1 3, FMP1 1:0",
             offset=0x10,
             readable=bits((4, 3), (1, 0)),
             writable=0,
@@ -127,16 +150,24 @@ class Can(Peripheral):
         ),
         Register(
             name="IER",
+            fields="SLKIE 17, WKUIE 16, ERRIE 15, LECIE 11, BOFIE 10, EPVIE 9, EWGIE 8, "
+            "FOVIE1 6, FFIE1 5, FMPIE1 4, FOVIE0 3, FFIE0 2, FMPIE0 1, TMEIE 0",
             offset=0x14,
             readable=bits((17, 15), (11, 8), (6, 0)),
             writable=bits((17, 15), (11, 8), (6, 0)),
             on_write="_write_flags",
         ),
         Register(
-            name="ESR", offset=0x18, readable=bits((31, 16), (6, 4), (2, 0)), writable=_LEC, on_write="_write_flags"
+            name="ESR",
+            offset=0x18,
+            readable=bits((31, 16), (6, 4), (2, 0)),
+            writable=_LEC,
+            on_write="_write_flags",
+            fields="REC 31:24, TEC 23:16, LEC 6:4, BOFF 2, EPVF 1, EWGF 0",
         ),
         Register(
             name="BTR",
+            fields="SILM 31, LBKM 30, SJW 25:24, TS2 22:20, TS1 19:16, BRP 9:0",
             offset=0x1C,
             reset=0x0123_0000,
             readable=bits((31, 30), (25, 24), (22, 16), (9, 0)),
@@ -144,7 +175,7 @@ class Can(Peripheral):
             on_write="_write_btr",
         ),
         *_mailbox_registers(),
-        Register(name="FMR", offset=0x200, reset=0x2A1C_0E01, writable=1),
+        Register(name="FMR", offset=0x200, reset=0x2A1C_0E01, writable=1, fields="RESERVED 31:1, FINIT 0"),
         *(
             Register(
                 name=name,
@@ -152,11 +183,18 @@ class Can(Peripheral):
                 readable=_FILTER_MODES,
                 writable=_FILTER_MODES,
                 on_write=f"_write_{name.lower()}",
+                fields=numbered(f"{bit}n", range(_BANKS - 1, -1, -1)),
             )
-            for name, offset in (("FM1R", 0x204), ("FS1R", 0x20C), ("FFA1R", 0x214))
+            for name, offset, bit in (("FM1R", 0x204, "FBM"), ("FS1R", 0x20C, "FSC"), ("FFA1R", 0x214, "FFA"))
         ),
-        Register(name="FA1R", offset=0x21C, readable=_FILTER_MODES, writable=_FILTER_MODES),
-        *(Register(name=f"F{n // 2}R{n % 2 + 1}", offset=0x240 + 4 * n) for n in range(2 * _BANKS)),
+        Register(
+            name="FA1R",
+            offset=0x21C,
+            readable=_FILTER_MODES,
+            writable=_FILTER_MODES,
+            fields=numbered("FACTn", range(_BANKS - 1, -1, -1)),
+        ),
+        *(Register(name=f"F{n // 2}R{n % 2 + 1}", offset=0x240 + 4 * n, fields="FB 31:0") for n in range(2 * _BANKS)),
     )
 
     def __init__(self, chip: ChipPorts, place: Place) -> None:

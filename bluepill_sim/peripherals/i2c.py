@@ -85,18 +85,39 @@ class I2c(Peripheral):
     STATE = ("_hung", "_addressed", "_high_bits", "_ten_bit", "_calls", "_step", "_is_stopping", "answered")
     DERIVED = ("_pin_names",)
     REGISTERS = (
-        Register(name="CR1", offset=0x00, readable=_CR1, writable=_CR1, on_write=NATIVE),
-        Register(name="CR2", offset=0x04, readable=_CR2, writable=_CR2, on_write=NATIVE),
-        Register(name="OAR1", offset=0x08, readable=bits(15, 14, (9, 0)), writable=bits(15, 14, (9, 0))),
-        Register(name="OAR2", offset=0x0C, readable=bits((7, 0)), writable=bits((7, 0))),
-        Register(name="DR", offset=0x10, readable=0, writable=bits((7, 0)), on_read=NATIVE, on_write=NATIVE),
+        Register(
+            name="CR1", offset=0x00, readable=_CR1, writable=_CR1, on_write=NATIVE,
+            fields="SWRST 15, ALERT 13, PEC 12, POS 11, ACK 10, STOP 9, "
+            "START 8, NOSTRETCH 7, ENGC 6, ENPEC 5, ENARP 4, "
+            "SMBTYPE 3, SMBUS 1, PE 0",
+        ),
+        Register(
+            name="CR2", offset=0x04, readable=_CR2, writable=_CR2, on_write=NATIVE,
+            fields="LAST 12, DMAEN 11, ITBUFEN 10, ITEVTEN 9, ITERREN 8, FREQ 5:0",
+        ),
+        Register(
+            name="OAR1", offset=0x08, readable=bits(15, 14, (9, 0)), writable=bits(15, 14, (9, 0)),
+            fields="ADDMODE 15, one 14, ADD 9:0",
+        ),
+        Register(
+            name="OAR2", offset=0x0C, readable=bits((7, 0)), writable=bits((7, 0)), fields="ADD2 7:1, ENDUAL 0"
+        ),
+        Register(
+            name="DR", offset=0x10, readable=0, writable=bits((7, 0)), on_read=NATIVE, on_write=NATIVE, fields="DR 7:0"
+        ),
         Register(
             name="SR1", offset=0x14, readable=bits(15, 14, (12, 6), (4, 0)), writable=0,
             write_zero_to_clear=bits(15, 14, (12, 8)), latched_in=_SEEN, on_write=NATIVE,
+            fields="SMBALERT 15, TIMEOUT 14, PECERR 12, OVR 11, AF 10, ARLO 9, "
+            "BERR 8, TxE 7, RxNE 6, STOPF 4, ADD10 3, BTF 2, "
+            "ADDR 1, SB 0",
         ),
-        Register(name="SR2", offset=0x18, readable=bits((15, 4), (2, 0)), writable=0, on_read=NATIVE),
-        Register(name="CCR", offset=0x1C, readable=_CCR, writable=_CCR, on_write="_write_ccr"),
-        Register(name="TRISE", offset=0x20, reset=2, readable=bits((5, 0)), writable=bits((5, 0))),
+        Register(
+            name="SR2", offset=0x18, readable=bits((15, 4), (2, 0)), writable=0, on_read=NATIVE,
+            fields="PEC 15:8, DUALF 7, SMBHOST 6, SMBDEFAULT 5, GENCALL 4, TRA 2, BUSY 1, MSL 0",
+        ),
+        Register(name="CCR", offset=0x1C, readable=_CCR, writable=_CCR, on_write="_write_ccr", fields="FS 15, DUTY 14, CCR 11:0"),
+        Register(name="TRISE", offset=0x20, reset=2, readable=bits((5, 0)), writable=bits((5, 0)), fields="TRISE 5:0"),
     )  # fmt: skip
 
     def __init__(self, chip: ChipPorts, place: Place) -> None:

@@ -702,6 +702,7 @@ static uint32_t command(struct device *device, uint32_t what, uint32_t one, uint
     struct i2c *i2c = device->state;
     const uint64_t now = now_ns(device->fabric);
     switch (what) {
+    case SETTLE: return one == SR2 ? device->words[SR2] : i2c->rdr;
     case RESET:
         clear(device, false);
         connect(device);

@@ -405,6 +405,7 @@ static uint32_t command(struct device *device, uint32_t what, uint32_t one, uint
     struct spi *spi = device->state;
     const uint64_t now = now_ns(device->fabric);
     switch (what) {
+    case SETTLE: return one == SR ? device->words[SR] : spi->rdr;
     case RESET: clear(device); break;
     case CLOCK:
         event(device, now);

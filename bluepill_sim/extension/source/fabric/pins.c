@@ -188,7 +188,10 @@ void listen_to_pins(struct device *device, uint32_t port, uint32_t pins)
     if (n == fabric->listener_count && !pins) {
         return;
     }
-    if (n == fabric->listener_count && n < LISTENERS) {
+    if (n == LISTENERS) {
+        return; /* the chip has fewer devices */
+    }
+    if (n == fabric->listener_count) {
         fabric->listeners[fabric->listener_count++].device = device;
     }
     fabric->listeners[n].pins[port] = pins;
