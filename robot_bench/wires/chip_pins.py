@@ -4,6 +4,9 @@ The chip leads in time, so it is given a level when the part that drives it
 has come to that time; it acts from the first block boundary on. What the chip
 drives comes in bulk, when its slice is over.
 
+A wave (PWM) of the chip is one drive of the net, where nobody waits for edges (`takes_waves`). Levels that a part puts
+on a wire ahead of the chip's time are handed to the chip with their times, so that it need not stop for each.
+
 A resistor on the wire is passed to the chip as one, so that it yields to the chip's own
 outputs: the adapter's 20 kΩ win over the chip's own pulls of 40 kΩ.
 
@@ -11,14 +14,15 @@ Invariant: what is put on the chip's pin follows `level_without(OWNER)` of its n
 """
 
 from array import array
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from heapq import merge
 from typing import Protocol
 
 from bluepill_sim.fabric.pins import PinDrive
-from bluepill_sim.fabric.subscriptions import PinSubscription, PinSubscriptions
+from bluepill_sim.fabric.subscriptions import EDGE, PinSubscription, PinSubscriptions, read_wave
+from p2os.errors import LocalProtocolError
 from robot_bench.wires.edges import NO_WIRE, split
-from robot_bench.wires.nets import RELEASED, Harness, Net, Strength
+from robot_bench.wires.nets import RELEASED, Harness, Net, Strength, WaveDrive
 from simbase.timing import Nanos
 
 #: The name under which the chip drives wires.
@@ -34,6 +38,8 @@ CODES = {
 }
 _CODE_OF_DRIVE = bytes(CODES[drive] for drive in PinDrive).ljust(256, b"\0")
 PINS_A_PORT = 16
+#: Where a row of `EDGE` says whether it is one of a wave.
+_KIND = 11
 
 
 class ChipPin(Protocol):
@@ -43,9 +49,18 @@ class ChipPin(Protocol):
         """Put a level on the wire from outside, by a resistor where `is_weak`; None lets go."""
         ...
 
+    def drive_later(self, levels: Iterable[tuple[Nanos, bool]], *, is_weak: bool = False) -> None:
+        """Put levels on the wire from outside at times to come."""
+        ...
+
 
 class ChipWithPins(PinSubscriptions, Protocol):
     """What the wires need of the chip."""
+
+    @property
+    def now_ns(self) -> int:
+        """The time reached."""
+        ...
 
     def pin(self, name: str) -> ChipPin:
         """Return a pin by its name, such as "PA4"."""
@@ -60,6 +75,7 @@ class ChipPins:
         harness: The wires.
         pin_of: Net → pin of the chip.
         on_watched: Called with the time of each edge that the chip makes on a watched net, in order of time.
+        takes_waves: Whether a wave of the chip is a wave on its net, and not its edges; nothing is watched then.
     """
 
     def __init__(
@@ -69,8 +85,10 @@ class ChipPins:
         pin_of: Mapping[str, str],
         *,
         on_watched: Callable[[Nanos], None] | None = None,
+        takes_waves: bool = False,
     ) -> None:
         self._chip = chip
+        self._takes_waves = takes_waves
         self._pin_of = dict(pin_of)
         self._nets = tuple(harness[net] for net in pin_of)
         places = {number_of(pin): place for place, pin in enumerate(pin_of.values())}
@@ -100,10 +118,22 @@ class ChipPins:
     def _subscribe(self) -> PinSubscription:
         pins = self._pin_of
         return self._chip.subscribe_pins(
-            pins.values(), self._chip_drives, ends_slice=[pins[net] for net in self._watched]
+            pins.values(), self._chip_drives, ends_slice=[pins[net] for net in self._watched], waves=self._takes_waves
         )
 
     def _chip_drives(self, rows: bytes) -> None:
+        # Up to the first row of a wave all rows are edges, and so on behind what follows it.
+        while self._takes_waves and (kinds := rows[_KIND :: EDGE.size].lstrip(b"\0")):
+            first = len(rows) - len(kinds) * EDGE.size
+            self._edges(rows[:first])
+            at, pin, drives, *_ = EDGE.unpack_from(rows, first)
+            wave, behind = read_wave(rows, first + EDGE.size)
+            codes = (_CODE_OF_DRIVE[drives & 15], _CODE_OF_DRIVE[drives >> 4])
+            self._nets[self._wire_of_pin[pin]].wave_from(OWNER, WaveDrive(wave, codes), at)
+            rows = rows[behind:]
+        self._edges(rows)
+
+    def _edges(self, rows: bytes) -> None:
         watched = []
         for place, times, codes in split(rows, self._wire_of_pin, _CODE_OF_DRIVE, len(self._nets)):
             net = self._nets[place]
@@ -118,8 +148,17 @@ class ChipPins:
                 self._on_watched(at)
 
     def _other_drives(self, net: Net, owner: str, at: Nanos) -> None:
-        if owner != OWNER:
+        if owner == OWNER:
+            return
+        to_come = net.drives_without(OWNER, at)
+        if len(to_come) == 1 and at <= self._chip.now_ns:
             self._pass_on(net, at)
+            return
+        if any(level is None for _, level, _ in to_come):
+            raise LocalProtocolError(f"{owner} lets {net.name} go ahead of the chip")
+        for is_hard in {is_hard for _, _, is_hard in to_come}:
+            levels = [(when, bool(level)) for when, level, hard in to_come if hard is is_hard]
+            self._pins[net.name].drive_later(levels, is_weak=not is_hard)
 
     def _pass_on(self, net: Net, at: Nanos) -> None:
         level, is_hard = net.level_without(OWNER, at)

@@ -5,6 +5,10 @@ its time stamp, as arrays: a chip may change a wire millions of times a second. 
 a part that stands behind the others in time still reads the level of its own
 instant. Edges are forgotten when `forget_before` states that every part has passed them.
 
+A drive may be a wave (PWM): one row from when on the wire goes up and down by itself. Who asks gets the level at a
+time, the wave at a time, or what the wire did in a span (`course`); edges are not made. In what `edges_until`
+returns a wave is a low level; `take_waves` has the rows.
+
 Not modelled: voltages, capacitance and edge times. A drive is a level and a
 strength; a value in volts would be one more field of `Drive`.
 
@@ -20,6 +24,7 @@ from enum import Enum
 from functools import cache
 from typing import Self
 
+from bluepill_sim.fabric.subscriptions import Wave
 from p2os.errors import LocalProtocolError
 from robot_bench.wires.edges import Edges, changes
 from simbase.state import Stateful
@@ -52,6 +57,8 @@ class Strength(Enum):
 
 #: The code of letting go, and how many codes there are: what one owner does to a wire.
 RELEASED, CODES = 0, 7
+#: The code of a wave: what its owner does follows from the time.
+WAVING = 7
 #: The levels of codes that drive hard, and of those that pull.
 HARD = {1: False, 2: True, 3: False}
 PULLS = {5: False, 6: True}
@@ -60,20 +67,47 @@ PULLS = {5: False, 6: True}
 Watcher = Callable[["Net", str, Nanos], None]
 
 
+@dataclass(frozen=True, slots=True)
+class WaveDrive:
+    """A wave, and the codes of its low and its high phase."""
+
+    wave: Wave
+    codes: tuple[int, int]
+
+
 @dataclass(slots=True)
 class History:
     """What one owner has done to a wire: times in ns, and the code from each on."""
 
     times: "array[int]" = field(default_factory=lambda: array("q"))
     codes: bytearray = field(default_factory=bytearray)
+    #: The waves of the times with the code `WAVING`.
+    waves: dict[Nanos, WaveDrive] = field(default_factory=dict)
 
     def at(self, at: Nanos) -> int:
-        """Return the code at an instant."""
-        times = self.times
-        if not times or times[-1] <= at:
-            return self.codes[-1] if times else RELEASED
-        place = bisect_right(times, at)
-        return self.codes[place - 1] if place else RELEASED
+        """Return the code at an instant; of a wave that of its phase."""
+        place = bisect_right(self.times, at) - 1
+        if place < 0:
+            return RELEASED
+        code = self.codes[place]
+        if code == WAVING:
+            drive = self.waves[self.times[place]]
+            return drive.codes[drive.wave.level(at)]
+        return code
+
+    def codes_at(self, at: Nanos) -> tuple[int, ...]:
+        """Return the code at an instant; of a wave those of both phases."""
+        drive = self.wave_at(at)
+        return (self.at(at),) if drive is None else drive.codes
+
+    def between(self, after: Nanos, before: Nanos) -> "array[int]":
+        """Return the times later than `after` and earlier than `before`."""
+        return self.times[bisect_right(self.times, after) : bisect_left(self.times, before)]
+
+    def wave_at(self, at: Nanos) -> WaveDrive | None:
+        """Return the wave at an instant; None for none."""
+        place = bisect_right(self.times, at) - 1
+        return self.waves[self.times[place]] if place >= 0 and self.codes[place] == WAVING else None
 
 
 @dataclass(frozen=True, slots=True)
@@ -95,7 +129,7 @@ class Net(Stateful):
 
     STATE = (
         "_drives", "_last_level", "last_edge", "_notified_until", "_notified_level", "_notified_contention",
-        "_contentions",
+        "_contentions", "_notified_wave", "_waves", "_may_wave",
     )  # fmt: skip
     #: Who listens is settled when a bench is built.
     DERIVED = ("_watchers",)
@@ -113,6 +147,11 @@ class Net(Stateful):
         self._notified_level = idle
         self._notified_contention: tuple[str, ...] = ()
         self._contentions: list[Contention] = []
+        #: The wave at the end of what `edges_until` has returned, the changes that it came across, and whether an
+        #: owner has a wave that is still of interest.
+        self._notified_wave: Wave | None = None
+        self._waves: list[tuple[Nanos, Wave | None]] = []
+        self._may_wave = False
 
     def drive(self, owner: str, level: bool, strength: Strength, now: Nanos) -> None:
         """Hold the wire from `now` on; it replaces what the same owner did before.
@@ -132,23 +171,26 @@ class Net(Stateful):
         Raises:
             LocalProtocolError: As of `drive`.
         """
-        now, history = times[0], self._drives.get(owner)
-        if history is not None and now < history.times[-1]:
-            raise LocalProtocolError(
-                f"{owner} drives {self.name} at {now} ns after having driven it at {history.times[-1]} ns"
-            )
-        if now <= self._notified_until:
-            raise LocalProtocolError(
-                f"{owner} drives {self.name} at {now} ns after its edges up to {self._notified_until} ns were told"
-            )
-        if history is None:
-            history = self._drives[owner] = History()
+        history = self._history(owner, times[0])
         history.times += times
         history.codes += codes
-        self.last_edge = max(self.last_edge, times[-1])
-        self._last_level = self._resolve(self.last_edge)
-        for watcher in self._watchers:
-            watcher(self, owner, now)
+        self._driven(owner, times[0], times[-1])
+
+    def wave_from(self, owner: str, drive: WaveDrive, now: Nanos) -> None:
+        """Take a wave of one owner; it holds from `now` on, in place of what the same owner did before.
+
+        Raises:
+            LocalProtocolError: As of `drive`.
+        """
+        history = self._drives.get(owner)
+        if history is not None and now >= history.times[-1] and history.wave_at(now) == drive:
+            return
+        history = self._history(owner, now)
+        history.times.append(now)
+        history.codes.append(WAVING)
+        history.waves[now] = drive
+        self._may_wave = True
+        self._driven(owner, now, now)
 
     def release(self, owner: str, now: Nanos) -> None:
         """Let the wire go from `now` on."""
@@ -156,12 +198,41 @@ class Net(Stateful):
 
     def level(self, at: Nanos) -> bool:
         """Return the level at the instant `at`, an edge at `at` included."""
-        return self._last_level if at >= self.last_edge else self._resolve(at)
+        return self._last_level if at >= self.last_edge and not self._may_wave else self._resolve(at)
+
+    def wave(self, at: Nanos) -> Wave | None:
+        """Return the wave that is on the wire at the instant `at`; None where it has a level."""
+        for owner, history in self._drives.items():
+            drive = history.wave_at(at)
+            if drive is not None:
+                others = [other.at(at) for name, other in self._drives.items() if name != owner]
+                low, high = (_resolved([*others, code]) for code in drive.codes)
+                if (self.idle if low is None else low) != (self.idle if high is None else high):
+                    return drive.wave
+        return None
+
+    def course(self, begin: Nanos, end: Nanos) -> list[tuple[Nanos, bool | Wave]]:
+        """Return what the wire does from `begin` on until before `end`: when, and the level or wave."""
+        if self.last_edge <= begin and not self._may_wave:
+            return [(begin, self._last_level)]
+        cuts = {at for history in self._drives.values() for at in history.between(begin, end)}
+        return [(at, self.wave(at) or self._resolve(at)) for at in (begin, *sorted(cuts))]
 
     def level_without(self, owner: str, at: Nanos) -> tuple[bool | None, bool]:
         """Return what everybody but `owner` puts on the wire, None where nobody holds it, and whether it is hard."""
         others = [history.at(at) for name, history in self._drives.items() if name != owner]
         return _resolved(others), any(code in HARD for code in others)
+
+    def drives_without(self, owner: str, begin: Nanos) -> list[tuple[Nanos, bool | None, bool]]:
+        """Return what everybody but `owner` does from `begin` on: when, and what `level_without` has then."""
+        others = [history for name, history in self._drives.items() if name != owner]
+        if len(others) == 1:
+            (only,) = others
+            first = bisect_left(only.times, begin)
+            drives = zip(only.times[first:], only.codes[first:], strict=True)
+            return [(at, _resolved((code,)), code in HARD) for at, code in drives]
+        times = sorted({at for history in others for at in history.times[bisect_left(history.times, begin) :]})
+        return [(at, *self.level_without(owner, at)) for at in times]
 
     def times_after(self, owner: str, after: Nanos) -> "array[int]":
         """Return when `owner` has driven the wire after `after`."""
@@ -175,7 +246,8 @@ class Net(Stateful):
     def edges_until(self, limit: Nanos) -> Edges:
         """Return the changes of level at or before `limit` that were not returned before, oldest first."""
         before, self._notified_until = self._notified_until, max(self._notified_until, limit)
-        found = changes(self._levels(before, limit), self._notified_level)
+        levels = self._levels_and_waves(before, limit) if self._may_wave else self._levels(before, limit)
+        found = changes(levels, self._notified_level)
         if found:
             self._notified_level = bool(found.levels[-1])
         return found
@@ -185,13 +257,21 @@ class Net(Stateful):
         found, self._contentions = self._contentions, []
         return found
 
+    def take_waves(self) -> list[tuple[Nanos, Wave | None]]:
+        """Return the changes of waves that `edges_until` has come across, None for the end of one, and forget them."""
+        found, self._waves = self._waves, []
+        return found
+
     def forget_before(self, limit: Nanos) -> bool:
         """Drop what no reader at or after `limit` can see; return True where later drives are still remembered."""
         later = False
         for history in self._drives.values():
             passed = bisect_right(history.times, limit, lo=1) - 1
             del history.times[:passed], history.codes[:passed]
+            for at in history.waves.keys() - set(history.times):
+                del history.waves[at]
             later = later or history.times[-1] > limit
+        self._may_wave = any(history.waves for history in self._drives.values())
         return later
 
     def _levels(self, after: Nanos, limit: Nanos) -> Edges:
@@ -222,14 +302,50 @@ class Net(Stateful):
             after = cut
         return found
 
+    def _levels_and_waves(self, after: Nanos, limit: Nanos) -> Edges:
+        """Do as `_levels` where owners have waves, which are low levels here, and note how the wave changes."""
+        found = Edges()
+        for at in sorted({at for history in self._drives.values() for at in history.between(after, limit + 1)}):
+            wave = self.wave(at)
+            found.append(at, wave is None and self._resolve(at))
+            if wave != self._notified_wave:
+                self._notified_wave = wave
+                self._waves.append((at, wave))
+            self._note_fight(at)
+        return found
+
+    def _history(self, owner: str, now: Nanos) -> History:
+        """Return an owner's history, which goes on at `now`."""
+        history = self._drives.get(owner)
+        if history is not None and now < history.times[-1]:
+            raise LocalProtocolError(
+                f"{owner} drives {self.name} at {now} ns after having driven it at {history.times[-1]} ns"
+            )
+        if now <= self._notified_until:
+            raise LocalProtocolError(
+                f"{owner} drives {self.name} at {now} ns after its edges up to {self._notified_until} ns were told"
+            )
+        if history is None:
+            history = self._drives[owner] = History()
+        return history
+
+    def _driven(self, owner: str, first: Nanos, last: Nanos) -> None:
+        """Work out what follows from new drives, and tell whoever watches."""
+        self.last_edge = max(self.last_edge, last)
+        self._last_level = self._resolve(self.last_edge)
+        for watcher in self._watchers:
+            watcher(self, owner, first)
+
     def _resolve(self, at: Nanos) -> bool:
         level = _resolved([history.at(at) for history in self._drives.values()])
         return self.idle if level is None else level
 
     def _note_fight(self, at: Nanos) -> None:
-        """Note who drives hard against whom at the instant `at`, where that is new."""
-        hard = {owner: HARD[code] for owner, history in self._drives.items() if (code := history.at(at)) in HARD}
-        fight = tuple(sorted(hard)) if are_fighting(list(hard.values())) else ()
+        """Note who drives hard against whom at the instant `at`, where that is new; a wave fights by either phase."""
+        hard = [(owner, HARD[code]) for owner, history in self._drives.items() for code in history.codes_at(at)
+                if code in HARD]  # fmt: skip
+        owners = tuple(sorted({owner for owner, _ in hard}))
+        fight = owners if len(owners) > 1 and are_fighting([level for _, level in hard]) else ()
         if fight and fight != self._notified_contention:
             self._contentions.append(Contention(at, self.name, fight))
         self._notified_contention = fight
@@ -279,6 +395,8 @@ def _levels_with(others: tuple[int, ...], idle: bool) -> bytes:
 def _resolved(codes: Iterable[int]) -> bool | None:
     """Return the level that drives make together; None where nobody holds the wire."""
     codes = tuple(codes)
+    if len(codes) == 1:
+        return HARD.get(codes[0], PULLS.get(codes[0]))
     return level_of(
         [HARD[code] for code in codes if code in HARD],
         [PULLS[code] for code in codes if code in PULLS],
