@@ -12,9 +12,11 @@ Invariant: it changes nothing that it watches.
 
 import math
 from binascii import b2a_base64
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from itertools import groupby
 from typing import Protocol
 
+from bluepill_sim.fabric.subscriptions import Wave
 from p2os.pioneer.body.contract import BodyState, Hit
 from p2os.pioneer.world.model import Obstacle
 from robot_bench.recording.run_record import BLOCKS_VERSION, COLLISION
@@ -211,6 +213,8 @@ class Recorder(Stateful):
                 tracks.append(_NONE)
                 continue
             tracks.append(net.edges_until(limit))
+            for at, entry in wave_entries(net.name, net.take_waves()):
+                self.trace.add("waves", at, entry)
             for fight in net.take_contentions():
                 self.event(
                     "bench", fight.at, "contention", f"{net.name} is driven hard by {' and '.join(fight.owners)}"
@@ -219,6 +223,14 @@ class Recorder(Stateful):
                 self._changed[net.name] = None
         for first, count, block in pack(tracks, MOST_EDGES):
             self.trace.add("pins", first, {"n": count, "d": b2a_base64(block, newline=False).decode("ascii")})
+
+
+def wave_entries(net: str, rows: Sequence[tuple[Nanos, Wave | None]]) -> Iterator[tuple[Nanos, dict[str, object]]]:
+    """Yield the lines of a net's waves and when each begins: the rows that share a clock are one."""
+    for (hz, ns), part in groupby(rows, lambda row: (0, 0) if row[1] is None else (row[1].ticks_hz, row[1].ns)):
+        some = list(part)
+        changes = [[at, *((wave.at, wave.period, wave.high) if wave else ())] for at, wave in some]
+        yield some[0][0], {"net": net, "hz": hz, "ns": ns, "rows": changes}
 
 
 def hit_detail(hit: Hit) -> str:

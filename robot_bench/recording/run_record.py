@@ -16,6 +16,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import cast
 
+from bluepill_sim.fabric.subscriptions import Wave
 from robot_bench.wires.edges import Edges, unpack
 from simbase.errors import FileError
 from simbase.timing import NS_PER_S
@@ -97,6 +98,8 @@ class RunRecord:
     poses: list[PoseSample] = field(default_factory=list)
     #: Net name → edges as (ns, level), the first of each at 0.
     pins: dict[str, Edges] = field(default_factory=dict)
+    #: Net name → waves as (ns, wave from then on, None for a level again); the level in `pins` is 0 during a wave.
+    waves: dict[str, list[tuple[int, Wave | None]]] = field(default_factory=dict)
     #: The nets in the order of the trace's blocks.
     nets: tuple[str, ...] = ()
     sonar: list[tuple[int, list[int]]] = field(default_factory=list)
@@ -255,10 +258,22 @@ def _file_block(record: RunRecord, t: int, entry: Json) -> None:
         record.last_ns = max(record.last_ns, times[-1])
 
 
+def _file_waves(record: RunRecord, _t: int, entry: Json) -> None:
+    """Put a net's changes of waves where they belong."""
+    hz, ns, found = _integer(entry, "hz"), _integer(entry, "ns"), record.waves.setdefault(str(entry["net"]), [])
+    for row in cast("list[list[float]]", entry["rows"]):
+        at, *shape = map(_whole, row)
+        if shape and (len(shape) != 3 or hz <= 0 or not 0 < shape[2] < shape[1] or at < ns):
+            raise ValueError("no such wave")
+        found.append((at, Wave(ns, *shape, hz) if shape else None))
+        record.last_ns = max(record.last_ns, at)
+
+
 _KINDS: dict[object, Callable[[RunRecord, int, Json], None]] = {
     "pose": lambda record, t, entry: record.poses.append(_pose(t, entry)),
     "pins": _file_pins,
     "pin": _file_pin,
+    "waves": _file_waves,
     "sonar": _file_sonar,
     "usart": lambda record, t, entry: record.usart.append((t, bytes.fromhex(str(entry["hex"])))),
     "wire": _file_wire,

@@ -9,6 +9,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from typing import overload
 
 from adapter_sim.pinout import load_pinout
+from robot_bench.recording.run_record import RunRecord
 from robot_bench.wires.edges import Edges, codes
 
 #: Group title → nets, least significant bit first.
@@ -35,6 +36,13 @@ def pin_labels() -> dict[str, str]:
     wires = load_pinout().wires
     signals = {wire.name: wire.name.rpartition("_")[2] if wire.value else wire.name for wire in wires}
     return {wire.name: f"{wire.bluepill} {signals[wire.name]}" for wire in wires}
+
+
+def levels_and_duties(record: RunRecord, net: str) -> list[tuple[int, float]]:
+    """Return what a net was from when on: 0 or 1, or the duty of the wave that it shows."""
+    edges = record.pins[net]
+    duties = {at: wave.duty for at, wave in record.waves.get(net, []) if wave is not None}
+    return sorted((dict(edges) | duties).items())
 
 
 class Steps(Sequence[tuple[int, int]]):

@@ -6,6 +6,8 @@ only: no path, version, host or wall time. `t` is nanoseconds.
 
     {"k":"pins","v":1,"nets","levels"}   at 0: the wires in the order of the blocks, and the level of each, 0 or 1
     {"k":"pins","n","d"}                 a block of n edges, the first at t: base64 of what wires/edges.py describes
+    {"k":"waves","net","hz","ns","rows"} changes of a net's wave, a row each: [t, at, period, high] (`Wave`), or [t] where
+                                         it ends; in the blocks the level is 0 during a wave
     {"k":"usart","hex"}                  a line (or 64 bytes) that the chip has printed
     {"k":"wire","dir","hex"}             bytes that have arrived: c2r client to robot, r2c back
     {"k":"obstacle","op","name",…}       something placed, moved or removed; lengths in metres
@@ -46,7 +48,7 @@ from simbase.timing import NS_PER_S, Nanos
 MOST_EDGES = 4096
 
 #: Order of kinds within one instant.
-RANKS = {"pins": 0, "usart": 1, "obstacle": 2, "wire": 3, "event": 4, "sonar": 5, "pose": 6}
+RANKS = {"pins": 0, "waves": 1, "usart": 2, "obstacle": 3, "wire": 4, "event": 5, "sonar": 6, "pose": 7}
 
 _encode = json.JSONEncoder(sort_keys=True, separators=(",", ":"), ensure_ascii=True).encode
 
