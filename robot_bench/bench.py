@@ -1,6 +1,6 @@
 """The composition root: builds the chip, the wires, the robot and the loop for a scenario.
 
-    mode A, direct     chip ─ nets ─ motors, encoders, sensors ─ body
+    mode A, direct     chip ─ nets ─ motors, encoders, sensors ─ body      (of a Pioneer, or a robot on own pins)
     mode B, adapter    chip ─ nets ─ adapter ─ lines at 9600 8N1 ─ controller ─ body
 
 Mode C (a real or remote robot) is built by `robot_bench.remote`, on the same
@@ -19,11 +19,11 @@ snapshot was taken of.
 
 import hashlib
 import pickle
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from importlib.metadata import version
 from pathlib import Path
-from typing import Self, Unpack
+from typing import Self, Unpack, cast
 
 from adapter_sim import Adapter
 from adapter_sim.pinout import Pinout, Pull, WireRole, load_pinout
@@ -37,6 +37,7 @@ from p2os.pioneer.world import load_world
 from p2os.pioneer.world.model import Pose, World
 from robot_bench.adapter import RUN_ANEW, AnyAdapter, make_adapter
 from robot_bench.direct import DirectRobot, DistanceSensors, JointMotor, WheelEncoder
+from robot_bench.direct.wired import AnalogPin, RobotWire
 from robot_bench.loop import RunLoop
 from robot_bench.pacer import FIRST_SLICE_NS, SliceLength
 from robot_bench.recording.client_view import SipRanges
@@ -52,6 +53,7 @@ from robot_bench.scenario.scenario import (
     refuse_what_its_world_refuses,
 )
 from robot_bench.scenario.schema import nearest
+from robot_bench.scenario.wired_robots import WiredPart
 from robot_bench.scenario.world_script import WorldScript
 from robot_bench.wires.chip_pins import ChipPins
 from robot_bench.wires.endpoints import Endpoint
@@ -72,7 +74,7 @@ _LOG = logger("bench")
 #: What decides a run besides its files; its end and its goals may be others after a restart.
 DECISIVE = (
     "mode", "seed", "parameters", "threshold_um", "usart_baud", "start", "direct", "adapter", "adapter_core",
-    "controller", "changes", "faults",
+    "controller", "changes", "faults", "own_robot",
 )  # fmt: skip
 _VERSION = "version of p2os"
 
@@ -132,11 +134,12 @@ class Bench(Stateful):
         body.reset(scenario.start or world.start, scenario.seed)
         self._is_rebuildable = chip is None
         chip = chip or boot(scenario.firmware)
-        self._harness = harness = make_harness(pinout)
+        own = scenario.own_robot
+        self._harness = harness = make_harness(pinout) if own is None else make_own_harness(own.robot.signals)
         self.recorder = Recorder(self.trace, harness, body=body)
         self.recorder.on_event = log_bench_event
         #: What stands at the far end of the wires and owns the body.
-        self._robots: list[DirectRobot | Endpoint] = []
+        self._robots: list[DirectRobot | Endpoint | WiredPart] = []
         self._ranges: SipRanges | None = None
         self.parts = self._build(pinout, world, body, chip, harness)
         #: What must be the same where a snapshot of this bench is restored.
@@ -159,10 +162,13 @@ class Bench(Stateful):
             chip, followers, observers=(self.recorder,), slice_ns=slice_ns or FIRST_SLICE_NS,
             on_slice=self._after_slice, choose_watched=self._watch_wires,
         )  # fmt: skip
-        pin_of = {wire.name: wire.bluepill for wire in pinout.wires}
+        pin_of = pins_of(scenario)
         #: Name of a wire, or of its pin → name of the wire.
         self._wires = {pin: name for name, pin in pin_of.items()} | {name: name for name in pin_of}
-        self._pins = ChipPins(chip, harness, pin_of, on_watched=self.loop.note_edge)
+        # The adapter waits for edges at times; a part of mode direct never does.
+        self._pins = ChipPins(
+            chip, harness, pin_of, on_watched=self.loop.note_edge, takes_waves=scenario.mode == "direct"
+        )
         if isinstance(self.parts.adapter, Adapter):
             self.parts.adapter.samples.waits_for_edges = True
         chip.usart1.far_baud = scenario.usart_baud
@@ -319,6 +325,14 @@ class Bench(Stateful):
             self.parts.pioneer.do(words, at)
 
     def _build(self, pinout: Pinout, world: World, body: RobotBody, chip: Chip, harness: Harness) -> BenchParts:
+        if self.scenario.own_robot is not None:
+            pins = {wire.name: wire.pin for wire in self.scenario.own_robot.robot.signals}
+            robot = self.scenario.own_robot.build(
+                body, harness, lambda signal: cast("AnalogPin", chip.pin(pins[signal]))
+            )
+            robot.on_event, robot.on_ranges = self.recorder.listener("robot"), self.recorder.sonar
+            self._robots.append(robot)
+            return BenchParts(chip=chip, harness=harness, body=body, world=world)
         if self.scenario.mode == "direct":
             if self.scenario.faults:
                 raise ScenarioError(
@@ -425,6 +439,22 @@ def boot(firmware: Path) -> Chip:
     from bluepill_sim.board import BluePill
 
     return BluePill(firmware)
+
+
+def pins_of(scenario: Scenario) -> dict[str, str]:
+    """Return the chip's pin of each wire of a scenario."""
+    if scenario.own_robot is None:
+        return {wire.name: wire.bluepill for wire in load_pinout().wires}
+    return {wire.name: wire.pin for wire in scenario.own_robot.robot.signals if not wire.is_analog}
+
+
+def make_own_harness(signals: Sequence[RobotWire]) -> Harness:
+    """Return the wires of a robot on own pins, with the resistors that hang on them."""
+    harness = Harness(Net(wire.name) for wire in signals if not wire.is_analog)
+    for wire in signals:
+        if wire.pull is not None:
+            harness[wire.name].drive(RESISTORS, wire.pull, Strength.PULL, 0)
+    return harness
 
 
 def make_harness(pinout: Pinout) -> Harness:

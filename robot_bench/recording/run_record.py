@@ -263,9 +263,13 @@ def _file_waves(record: RunRecord, _t: int, entry: Json) -> None:
     hz, ns, found = _integer(entry, "hz"), _integer(entry, "ns"), record.waves.setdefault(str(entry["net"]), [])
     for row in cast("list[list[float]]", entry["rows"]):
         at, *shape = map(_whole, row)
-        if shape and (len(shape) != 3 or hz <= 0 or not 0 < shape[2] < shape[1] or at < ns):
-            raise ValueError("no such wave")
-        found.append((at, Wave(ns, *shape, hz) if shape else None))
+        wave = None
+        if shape:
+            position, period, high = shape
+            wave = Wave(ns, position, period, high, hz)
+            if hz <= 0 or not 0 < high < period or at < ns:
+                raise ValueError("no such wave")
+        found.append((at, wave))
         record.last_ns = max(record.last_ns, at)
 
 

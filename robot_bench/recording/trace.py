@@ -6,8 +6,8 @@ only: no path, version, host or wall time. `t` is nanoseconds.
 
     {"k":"pins","v":1,"nets","levels"}   at 0: the wires in the order of the blocks, and the level of each, 0 or 1
     {"k":"pins","n","d"}                 a block of n edges, the first at t: base64 of what wires/edges.py describes
-    {"k":"waves","net","hz","ns","rows"} changes of a net's wave, a row each: [t, at, period, high] (`Wave`), or [t] where
-                                         it ends; in the blocks the level is 0 during a wave
+    {"k":"waves","net","hz","ns","rows"} changes of a net's wave, a row each: [t, at, period, high] (`Wave`), or [t]
+                                         where it ends; in the blocks the level is 0 during a wave
     {"k":"usart","hex"}                  a line (or 64 bytes) that the chip has printed
     {"k":"wire","dir","hex"}             bytes that have arrived: c2r client to robot, r2c back
     {"k":"obstacle","op","name",…}       something placed, moved or removed; lengths in metres
