@@ -202,25 +202,19 @@ class Net(Stateful):
 
     def wave(self, at: Nanos) -> Wave | None:
         """Return the wave that is on the wire at the instant `at`; None where it has a level."""
-        for owner, history in self._drives.items():
-            drive = history.wave_at(at)
-            if drive is not None:
-                others = [other.at(at) for name, other in self._drives.items() if name != owner]
-                low, high = (_resolved([*others, code]) for code in drive.codes)
-                if (self.idle if low is None else low) != (self.idle if high is None else high):
-                    return drive.wave
-        return None
+        found = self._shown(at)
+        return None if isinstance(found, bool) else found
 
     def course(self, begin: Nanos, end: Nanos) -> list[tuple[Nanos, bool | Wave]]:
         """Return what the wire does from `begin` on until before `end`: when, and the level or wave."""
         if self.last_edge <= begin and not self._may_wave:
             return [(begin, self._last_level)]
         cuts = {at for history in self._drives.values() for at in history.between(begin, end)}
-        return [(at, self.wave(at) or self._resolve(at)) for at in (begin, *sorted(cuts))]
+        return [(at, self._shown(at)) for at in (begin, *sorted(cuts))]
 
     def level_without(self, owner: str, at: Nanos) -> tuple[bool | None, bool]:
         """Return what everybody but `owner` puts on the wire, None where nobody holds it, and whether it is hard."""
-        others = [history.at(at) for name, history in self._drives.items() if name != owner]
+        others = tuple([history.at(at) for name, history in self._drives.items() if name != owner])
         return _resolved(others), any(code in HARD for code in others)
 
     def drives_without(self, owner: str, begin: Nanos) -> list[tuple[Nanos, bool | None, bool]]:
@@ -271,7 +265,8 @@ class Net(Stateful):
             for at in history.waves.keys() - set(history.times):
                 del history.waves[at]
             later = later or history.times[-1] > limit
-        self._may_wave = any(history.waves for history in self._drives.values())
+        if self._may_wave and not any(history.waves for history in self._drives.values()):
+            self._may_wave, self._last_level = False, self._resolve(self.last_edge)
         return later
 
     def _levels(self, after: Nanos, limit: Nanos) -> Edges:
@@ -305,14 +300,34 @@ class Net(Stateful):
     def _levels_and_waves(self, after: Nanos, limit: Nanos) -> Edges:
         """Do as `_levels` where owners have waves, which are low levels here, and note how the wave changes."""
         found = Edges()
+        may_fight = sum(any(code in HARD or code == WAVING for code in one.codes) for one in self._drives.values()) > 1
         for at in sorted({at for history in self._drives.values() for at in history.between(after, limit + 1)}):
-            wave = self.wave(at)
-            found.append(at, wave is None and self._resolve(at))
+            shown = self._shown(at)
+            wave = None if isinstance(shown, bool) else shown
+            found.append(at, shown is True)
             if wave != self._notified_wave:
                 self._notified_wave = wave
                 self._waves.append((at, wave))
-            self._note_fight(at)
+            if may_fight or self._notified_contention:
+                self._note_fight(at)
         return found
+
+    def _shown(self, at: Nanos) -> bool | Wave:
+        """Return the level at an instant, or the wave."""
+        drive, codes = None, []
+        for history in self._drives.values():
+            place = bisect_right(history.times, at) - 1
+            code = history.codes[place] if place >= 0 else RELEASED
+            if code == WAVING:
+                drive = history.waves[history.times[place]]
+            else:
+                codes.append(code)
+        if drive is None:
+            level = _resolved(tuple(codes))
+            return self.idle if level is None else level
+        low, high = (_resolved((*codes, code)) for code in drive.codes)
+        low, high = self.idle if low is None else low, self.idle if high is None else high
+        return low if low == high else drive.wave
 
     def _history(self, owner: str, now: Nanos) -> History:
         """Return an owner's history, which goes on at `now`."""
@@ -332,12 +347,13 @@ class Net(Stateful):
     def _driven(self, owner: str, first: Nanos, last: Nanos) -> None:
         """Work out what follows from new drives, and tell whoever watches."""
         self.last_edge = max(self.last_edge, last)
-        self._last_level = self._resolve(self.last_edge)
+        if not self._may_wave:
+            self._last_level = self._resolve(self.last_edge)
         for watcher in self._watchers:
             watcher(self, owner, first)
 
     def _resolve(self, at: Nanos) -> bool:
-        level = _resolved([history.at(at) for history in self._drives.values()])
+        level = _resolved(tuple([history.at(at) for history in self._drives.values()]))
         return self.idle if level is None else level
 
     def _note_fight(self, at: Nanos) -> None:
@@ -388,15 +404,13 @@ class OwnedPins:
 @cache
 def _levels_with(others: tuple[int, ...], idle: bool) -> bytes:
     """Return the level that each code of one owner makes, where the others do this; 256 bytes."""
-    levels = [_resolved([*others, code]) for code in range(CODES)]
+    levels = [_resolved((*others, code)) for code in range(CODES)]
     return bytes([idle if level is None else level for level in levels]).ljust(256, b"\0")
 
 
-def _resolved(codes: Iterable[int]) -> bool | None:
+@cache
+def _resolved(codes: tuple[int, ...]) -> bool | None:
     """Return the level that drives make together; None where nobody holds the wire."""
-    codes = tuple(codes)
-    if len(codes) == 1:
-        return HARD.get(codes[0], PULLS.get(codes[0]))
     return level_of(
         [HARD[code] for code in codes if code in HARD],
         [PULLS[code] for code in codes if code in PULLS],

@@ -12,7 +12,8 @@ Invariant: the parts are at least 0 and add up to 1.
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from itertools import pairwise
-from typing import NamedTuple
+from operator import itemgetter
+from typing import NamedTuple, cast
 
 from bluepill_sim.fabric.subscriptions import Wave
 from robot_bench.direct.differential.description import Bridge, BridgeKind, Off
@@ -49,7 +50,7 @@ class HBridge(Stateful):
     """One motor's bridge; `nets` are its pins, in the order of `BridgeKind.pins`."""
 
     #: What is known follows from the nets.
-    DERIVED = ("_known", "_is_steady")
+    DERIVED = ("_known", "_is_steady", "_now", "_changed")
 
     def __init__(self, nets: Sequence[Net], settings: Bridge) -> None:
         self._nets = tuple(nets)
@@ -60,45 +61,76 @@ class HBridge(Stateful):
         self._off = off
         self._known = Shares(0.0, 0.0, 0.0)
         self._is_steady = False
-        for net in self._nets:
-            net.watch(self._note_drive)
+        #: What each pin does at the end of the last span, and the places of those that may do something else since.
+        self._now: list[bool | Wave] = [False] * len(self._nets)
+        self._changed: set[int] = set()
+        self._restored()
+        for place, net in enumerate(self._nets):
+            net.watch(lambda _net, _owner, _at, place=place: self._note_drive(place))
 
     def shares(self, begin: Nanos, end: Nanos) -> Shares:
-        """Return what it does from `begin` until before `end`; the nets must know all of that time."""
+        """Return what it does from `begin` until before `end`, where the last span ended; the nets know all of it."""
         if self._is_steady:
             return self._known
-        courses = [_delayed(net.course(begin - self._dead_ns, end), self._dead_ns, begin) for net in self._nets]
-        times = [0.0, 0.0, 0.0, 0.0]
-        cuts = sorted({at for course in courses for at, _ in course} | {end})
-        for first, last in pairwise(cuts):
-            now = [next(what for at, what in reversed(course) if at <= first) for course in courses]
-            for levels, ns in _times(now, first, last, self._dead_ns).items():
-                times[self._truth.get(levels, self._off)] += ns
+        now, changes = self._now, []
+        for place in self._changed:
+            first, *others = self._course(place, begin, end)
+            now[place] = first[1]
+            changes += [(at, place, what) for at, what in others]
+        times, last = [0.0, 0.0, 0.0, 0.0], begin
+        for at, place, what in sorted(changes, key=itemgetter(0, 1)):
+            self._add(times, last, at)
+            now[place], last = what, at
+        self._add(times, last, end)
         span = end - begin
-        self._known = Shares(*(ns / span for ns in times[:3]))
+        self._known = Shares(times[0] / span, times[1] / span, times[2] / span)
+        # What is known already of the time after the end was not looked at, nor how a dead time goes on.
+        self._changed = {place for place, net in enumerate(self._nets) if net.last_edge >= end - self._dead_ns}
         # So it goes on, where nobody drives a pin anew and whole periods fit.
-        self._is_steady = len(cuts) == 2 and all(net.last_edge <= begin - self._dead_ns for net in self._nets)
-        self._is_steady = self._is_steady and all(
-            not isinstance(course[0][1], Wave) or span * course[0][1].ticks_hz % (course[0][1].period * NS_PER_S) == 0
-            for course in courses
-        )
+        self._is_steady = not changes and not self._changed and all(
+            what is True or what is False or span * what.ticks_hz % (what.period * NS_PER_S) == 0 for what in now
+        )  # fmt: skip
         return self._known
 
-    def _note_drive(self, _net: Net, _owner: str, _at: Nanos) -> None:
+    def _course(self, place: int, begin: Nanos, end: Nanos) -> list[_Piece]:
+        course = self._nets[place].course(begin - self._dead_ns, end)
+        return _delayed(course, self._dead_ns, begin, end) if self._dead_ns else course
+
+    def _add(self, times: list[float], begin: Nanos, end: Nanos) -> None:
+        """Add a span in which no pin changes what it does."""
+        if begin == end:
+            return
+        now, truth = self._now, self._truth
+        waves = [place for place, what in enumerate(now) if what is not True and what is not False]
+        if not waves:
+            times[truth.get(tuple(now), self._off)] += end - begin  # type: ignore[arg-type]  # levels all
+        elif len(waves) == 1:
+            wave = cast("Wave", now[waves[0]])
+            high_ns = high_time_ns(wave, begin, end, self._dead_ns)
+            low, high = ((*now[: waves[0]], level, *now[waves[0] + 1 :]) for level in (False, True))
+            times[truth.get(high, self._off)] += high_ns  # type: ignore[arg-type]  # as above
+            times[truth.get(low, self._off)] += (end - begin) - high_ns  # type: ignore[arg-type]  # as above
+        else:
+            for levels, ns in _walked(now, begin, end, self._dead_ns).items():
+                times[truth.get(levels, self._off)] += ns
+
+    def _note_drive(self, place: int) -> None:
         self._is_steady = False
+        self._changed.add(place)
 
     def _restored(self) -> None:
         self._is_steady = False
+        self._changed = set(range(len(self._nets)))
 
 
-def _delayed(course: Sequence[_Piece], dead_ns: int, begin: Nanos) -> list[_Piece]:
-    """Return what acts from `begin` on, where each rising edge comes later."""
+def _delayed(course: Sequence[_Piece], dead_ns: int, begin: Nanos, end: Nanos) -> list[_Piece]:
+    """Return what acts from `begin` until before `end`, where each rising edge comes later."""
     ends = [at for at, _ in course[1:]]
     found: list[_Piece] = []
     for place, (at, what) in enumerate(course):
         is_late = what is True and place > 0 and course[place - 1][1] is False
         from_ns = at + dead_ns if is_late else at
-        if place < len(ends) and from_ns >= ends[place]:
+        if from_ns >= (ends[place] if place < len(ends) else end):
             continue
         if from_ns > begin and not found:
             found.append((begin, False))
@@ -109,24 +141,13 @@ def _delayed(course: Sequence[_Piece], dead_ns: int, begin: Nanos) -> list[_Piec
     return found
 
 
-def _times(now: Sequence[bool | Wave], begin: Nanos, end: Nanos, dead_ns: int) -> dict[tuple[bool, ...], float]:
-    """Return for how long, in ns, each combination of the pins' levels is there."""
-    places = [place for place, what in enumerate(now) if isinstance(what, Wave)]
-    if not places:
-        return {tuple(bool(what) for what in now): float(end - begin)}
-    if len(places) == 1:
-        wave = now[places[0]]
-        high_ns = high_time_ns(wave, begin, end, dead_ns) if isinstance(wave, Wave) else 0.0
-        low, high = (
-            tuple(level if place == places[0] else bool(what) for place, what in enumerate(now))
-            for level in (False, True)
-        )
-        return {high: high_ns, low: (end - begin) - high_ns}
+def _walked(now: Sequence[bool | Wave], begin: Nanos, end: Nanos, dead_ns: int) -> Counter[tuple[bool, ...]]:
+    """Return for how long, in ns, each combination of the pins' levels is there, from edge to edge."""
     found: Counter[tuple[bool, ...]] = Counter()
     edges = {at for what in now if isinstance(what, Wave) for at in edge_times(what, begin, end, dead_ns)}
     for first, last in pairwise([begin, *sorted(edges - {begin}), end]):
         found[tuple(_level(what, first, dead_ns) if isinstance(what, Wave) else what for what in now)] += last - first
-    return {levels: float(ns) for levels, ns in found.items()}
+    return found
 
 
 def high_time_ns(wave: Wave, begin: Nanos, end: Nanos, dead_ns: int = 0) -> float:
@@ -134,14 +155,12 @@ def high_time_ns(wave: Wave, begin: Nanos, end: Nanos, dead_ns: int = 0) -> floa
 
     By fractions of a tick of 10**-9, in integers; one division at the end.
     """
-    period, dead = wave.period * NS_PER_S, min(dead_ns * wave.ticks_hz, wave.high * NS_PER_S)
-    high = wave.high * NS_PER_S - dead
-
-    def until(ns: Nanos) -> int:
-        whole, part = divmod(wave.at * NS_PER_S + (ns - wave.ns) * wave.ticks_hz - dead, period)
-        return whole * high + min(part, high)
-
-    return (until(end) - until(begin)) / wave.ticks_hz
+    hz = wave.ticks_hz
+    period, dead = wave.period * NS_PER_S, min(dead_ns * hz, wave.high * NS_PER_S)
+    high, base = wave.high * NS_PER_S - dead, wave.at * NS_PER_S - wave.ns * hz - dead
+    first, first_part = divmod(base + begin * hz, period)
+    last, last_part = divmod(base + end * hz, period)
+    return ((last - first) * high + min(last_part, high) - min(first_part, high)) / hz
 
 
 def edge_times(wave: Wave, begin: Nanos, end: Nanos, dead_ns: int = 0) -> Iterator[Nanos]:

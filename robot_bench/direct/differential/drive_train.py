@@ -81,12 +81,11 @@ class DriveTrain(Stateful):
         """Take a step."""
         volts, k, resistance, dt = max(0.0, supply_v - self._drop_v), self._k, self._resistance, self._dt_s
         pull = k / resistance
-        torque_l, torque_r = (
-            pull * volts * (left.forward - left.reverse),
-            pull * volts * (right.forward - right.reverse),
-        )
-        brake_l = pull * k * (left.forward + left.reverse + left.brake) + self._damping
-        brake_r = pull * k * (right.forward + right.reverse + right.brake) + self._damping
+        along_l, along_r = left.forward - left.reverse, right.forward - right.reverse
+        driven_l, driven_r = left.forward + left.reverse, right.forward + right.reverse
+        torque_l, torque_r = pull * volts * along_l, pull * volts * along_r
+        brake_l = pull * k * (driven_l + left.brake) + self._damping
+        brake_r = pull * k * (driven_r + right.brake) + self._damping
         # (M + B dt/2) (after − before) = dt (torque − B before + friction)
         own_l, own_r, other = self.own + brake_l * dt / 2, self.own + brake_r * dt / 2, self.other
         scale = dt / (own_l * own_r - other * other)
@@ -97,12 +96,9 @@ class DriveTrain(Stateful):
         after_l, after_r = self._rubbed(free_l, free_r, scale * own_r, scale * own_l, -scale * other)
         mean_l, mean_r = (self.left_radps + after_l) / 2, (self.right_radps + after_r) / 2
         self.left_radps, self.right_radps = after_l, after_r
-        left_a = ((left.forward - left.reverse) * volts - sum(left) * k * mean_l) / resistance
-        right_a = ((right.forward - right.reverse) * volts - sum(right) * k * mean_r) / resistance
-        supply_a = sum(
-            ((side.forward + side.reverse) * volts - (side.forward - side.reverse) * k * mean) / resistance
-            for side, mean in ((left, mean_l), (right, mean_r))
-        )
+        left_a = (along_l * volts - (driven_l + left.brake) * k * mean_l) / resistance
+        right_a = (along_r * volts - (driven_r + right.brake) * k * mean_r) / resistance
+        supply_a = ((driven_l + driven_r) * volts - k * (along_l * mean_l + along_r * mean_r)) / resistance
         return Step(mean_l, mean_r, left_a, right_a, supply_a)
 
     def _rubbed(self, left: float, right: float, own_l: float, own_r: float, other: float) -> tuple[float, float]:
