@@ -165,10 +165,7 @@ class Bench(Stateful):
         pin_of = pins_of(scenario)
         #: Name of a wire, or of its pin → name of the wire.
         self._wires = {pin: name for name, pin in pin_of.items()} | {name: name for name in pin_of}
-        # The adapter waits for edges at times; a part of mode direct never does.
-        self._pins = ChipPins(
-            chip, harness, pin_of, on_watched=self.loop.note_edge, takes_waves=scenario.mode == "direct"
-        )
+        self._pins = ChipPins(chip, harness, pin_of, on_watched=self.loop.note_edge)
         if isinstance(self.parts.adapter, Adapter):
             self.parts.adapter.samples.waits_for_edges = True
         chip.usart1.far_baud = scenario.usart_baud

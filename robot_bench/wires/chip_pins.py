@@ -4,7 +4,7 @@ The chip leads in time, so it is given a level when the part that drives it
 has come to that time; it acts from the first block boundary on. What the chip
 drives comes in bulk, when its slice is over.
 
-A wave (PWM) of the chip is one drive of the net, where nobody waits for edges (`takes_waves`). Levels that a part puts
+A wave (PWM) of the chip is one drive of its net, but where somebody waits for the net's edges. Levels that a part puts
 on a wire ahead of the chip's time are handed to the chip with their times, so that it need not stop for each.
 
 A resistor on the wire is passed to the chip as one, so that it yields to the chip's own
@@ -23,6 +23,7 @@ from bluepill_sim.fabric.subscriptions import EDGE, PinSubscription, PinSubscrip
 from p2os.errors import LocalProtocolError
 from robot_bench.wires.edges import NO_WIRE, split
 from robot_bench.wires.nets import RELEASED, Harness, Net, Strength, WaveDrive
+from robot_bench.wires.waves import edge_times
 from simbase.timing import Nanos
 
 #: The name under which the chip drives wires.
@@ -75,7 +76,6 @@ class ChipPins:
         harness: The wires.
         pin_of: Net → pin of the chip.
         on_watched: Called with the time of each edge that the chip makes on a watched net, in order of time.
-        takes_waves: Whether a wave of the chip is a wave on its net, and not its edges; nothing is watched then.
     """
 
     def __init__(
@@ -85,10 +85,8 @@ class ChipPins:
         pin_of: Mapping[str, str],
         *,
         on_watched: Callable[[Nanos], None] | None = None,
-        takes_waves: bool = False,
     ) -> None:
         self._chip = chip
-        self._takes_waves = takes_waves
         self._pin_of = dict(pin_of)
         self._nets = tuple(harness[net] for net in pin_of)
         places = {number_of(pin): place for place, pin in enumerate(pin_of.values())}
@@ -96,7 +94,8 @@ class ChipPins:
         self._pins: dict[str, ChipPin] = {net: chip.pin(pin) for net, pin in pin_of.items()}
         self._watched: frozenset[str] = frozenset()
         self._on_watched = on_watched
-        self._subscription = self._subscribe()
+        self._subscriptions: tuple[PinSubscription, ...] = ()
+        self._subscribe()
         for net in self._nets:
             net.watch(self._other_drives)
             self._pass_on(net, 0)
@@ -105,25 +104,39 @@ class ChipPins:
         """Have each edge after `now` that the chip makes on these nets, and no other, end its slice and reported."""
         if nets is self._watched:  # called often; whoever watches has one set for each state
             return
-        added, self._watched = nets - self._watched, nets
-        self._subscription.ends_slice = frozenset(self._pin_of[net] for net in nets)
+        added, self._watched = [net for net in self._nets if net.name in nets - self._watched], nets
+        self._subscribe()
         # The chip stands up to a block ahead of those who have just begun to wait for edges.
-        self._report([net.times_after(OWNER, now) for net in self._nets if net.name in added])
+        self._report([self._unfolded(net, now) for net in added])
 
     def chip_restored(self) -> None:
         """Go on from what the chip drives now: it has been put back to another state."""
-        self._subscription.close()
-        self._subscription = self._subscribe()
+        self._subscribe()
 
-    def _subscribe(self) -> PinSubscription:
-        pins = self._pin_of
-        return self._chip.subscribe_pins(
-            pins.values(), self._chip_drives, ends_slice=[pins[net] for net in self._watched], waves=self._takes_waves
+    def _subscribe(self) -> None:
+        """Subscribe to the edges of the watched wires, and to the waves of the others."""
+        for one in self._subscriptions:
+            one.close()
+        watched = [pin for net, pin in self._pin_of.items() if net in self._watched]
+        others = [pin for net, pin in self._pin_of.items() if net not in self._watched]
+        self._subscriptions = (
+            self._chip.subscribe_pins(others, self._chip_drives, waves=True),
+            self._chip.subscribe_pins(watched, self._edges, ends_slice=watched),
         )
+
+    def _unfolded(self, net: Net, after: Nanos) -> "array[int]":
+        """Return when the chip has driven a net after a time; of a wave its edges, of which it goes on from now."""
+        times, now = net.times_after(OWNER, after), self._chip.now_ns
+        drive = net.drive_at(OWNER, now)
+        if drive is not None:
+            begin = max(after, times[-1]) if times else after
+            times += array("q", edge_times(drive.wave, begin + 1, now + 1))
+            net.drive_in_turn(OWNER, array("q", (now,)), bytes((drive.codes[drive.wave.level(now)],)))
+        return times
 
     def _chip_drives(self, rows: bytes) -> None:
         # Up to the first row of a wave all rows are edges, and so on behind what follows it.
-        while self._takes_waves and (kinds := rows[_KIND :: EDGE.size].lstrip(b"\0")):
+        while kinds := rows[_KIND :: EDGE.size].lstrip(b"\0"):
             first = len(rows) - len(kinds) * EDGE.size
             self._edges(rows[:first])
             at, pin, drives, *_ = EDGE.unpack_from(rows, first)

@@ -228,6 +228,10 @@ class Net(Stateful):
         times = sorted({at for history in others for at in history.times[bisect_left(history.times, begin) :]})
         return [(at, *self.level_without(owner, at)) for at in times]
 
+    def drive_at(self, owner: str, at: Nanos) -> WaveDrive | None:
+        """Return the wave that `owner` puts on the wire at the instant `at`; None for none."""
+        return self._drives.get(owner, History()).wave_at(at)
+
     def times_after(self, owner: str, after: Nanos) -> "array[int]":
         """Return when `owner` has driven the wire after `after`."""
         history = self._drives.get(owner, History())

@@ -10,7 +10,8 @@ Invariant: the parts are at least 0 and add up to 1.
 """
 
 from collections import Counter
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
+from functools import partial
 from itertools import pairwise
 from operator import itemgetter
 from typing import NamedTuple, cast
@@ -18,6 +19,7 @@ from typing import NamedTuple, cast
 from bluepill_sim.fabric.subscriptions import Wave
 from robot_bench.direct.differential.description import Bridge, BridgeKind, Off
 from robot_bench.wires.nets import Net
+from robot_bench.wires.waves import edge_times, high_time_ns
 from simbase.state import Stateful
 from simbase.timing import NS_PER_S, Nanos
 
@@ -66,7 +68,7 @@ class HBridge(Stateful):
         self._changed: set[int] = set()
         self._restored()
         for place, net in enumerate(self._nets):
-            net.watch(lambda _net, _owner, _at, place=place: self._note_drive(place))
+            net.watch(partial(self._note_drive, place))
 
     def shares(self, begin: Nanos, end: Nanos) -> Shares:
         """Return what it does from `begin` until before `end`, where the last span ended; the nets know all of it."""
@@ -114,7 +116,7 @@ class HBridge(Stateful):
             for levels, ns in _walked(now, begin, end, self._dead_ns).items():
                 times[truth.get(levels, self._off)] += ns
 
-    def _note_drive(self, place: int) -> None:
+    def _note_drive(self, place: int, _net: Net, _owner: str, _at: Nanos) -> None:
         self._is_steady = False
         self._changed.add(place)
 
@@ -148,29 +150,6 @@ def _walked(now: Sequence[bool | Wave], begin: Nanos, end: Nanos, dead_ns: int) 
     for first, last in pairwise([begin, *sorted(edges - {begin}), end]):
         found[tuple(_level(what, first, dead_ns) if isinstance(what, Wave) else what for what in now)] += last - first
     return found
-
-
-def high_time_ns(wave: Wave, begin: Nanos, end: Nanos, dead_ns: int = 0) -> float:
-    """Return for how long a wave is high between two times, its rising edges so much later.
-
-    By fractions of a tick of 10**-9, in integers; one division at the end.
-    """
-    hz = wave.ticks_hz
-    period, dead = wave.period * NS_PER_S, min(dead_ns * hz, wave.high * NS_PER_S)
-    high, base = wave.high * NS_PER_S - dead, wave.at * NS_PER_S - wave.ns * hz - dead
-    first, first_part = divmod(base + begin * hz, period)
-    last, last_part = divmod(base + end * hz, period)
-    return ((last - first) * high + min(last_part, high) - min(first_part, high)) / hz
-
-
-def edge_times(wave: Wave, begin: Nanos, end: Nanos, dead_ns: int = 0) -> Iterator[Nanos]:
-    """Yield the times from `begin` until before `end` at which a wave changes, its rising edges so much later."""
-    first = wave.at + (begin - dead_ns - wave.ns) * wave.ticks_hz // NS_PER_S
-    for turn in range(first // wave.period, (wave.at + (end - wave.ns) * wave.ticks_hz // NS_PER_S) // wave.period + 1):
-        for ticks, later in ((turn * wave.period, dead_ns), (turn * wave.period + wave.high, 0)):
-            at = wave.ns + (ticks - wave.at) * NS_PER_S // wave.ticks_hz + later
-            if begin <= at < end:
-                yield at
 
 
 def _level(wave: Wave, at: Nanos, dead_ns: int) -> bool:

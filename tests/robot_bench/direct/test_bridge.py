@@ -7,9 +7,10 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from bluepill_sim.fabric.subscriptions import Wave
-from robot_bench.direct.differential.bridge import TRUTH, HBridge, edge_times, high_time_ns
+from robot_bench.direct.differential.bridge import TRUTH, HBridge
 from robot_bench.direct.differential.description import Bridge, BridgeKind, Off
 from robot_bench.wires.nets import Net, Strength, WaveDrive
+from robot_bench.wires.waves import edge_times, high_time_ns
 from simbase.timing import NS_PER_S
 
 QUICK = settings(max_examples=80, deadline=None)

@@ -42,7 +42,7 @@ class Chip(Ports):
 
 def joined() -> tuple[Chip, Net, ChipPins]:
     chip, harness = Chip(), Harness([Net("pwm"), Net("in")])
-    return chip, harness["pwm"], ChipPins(chip, harness, {"pwm": "PA0", "in": "PA1"}, takes_waves=True)  # type: ignore[arg-type]
+    return chip, harness["pwm"], ChipPins(chip, harness, {"pwm": "PA0", "in": "PA1"})  # type: ignore[arg-type]
 
 
 def test_a_wave_is_one_drive_and_its_level_is_that_of_the_time() -> None:
@@ -178,3 +178,33 @@ def test_levels_ahead_of_the_chip_reach_it_at_their_times() -> None:
     assert levels == [True, True, False, False, True]
     with pytest.raises(LocalProtocolError, match="lets in go ahead of the chip"):
         net.drive_in_turn("robot", array("q", (250, 300)), bytes([0, 1]))
+
+
+def test_who_begins_to_wait_for_edges_gets_those_of_a_wave_from_then_on_and_no_others() -> None:
+    chip, net, _ = joined()
+    seen: list[int] = []
+    pins = ChipPins(chip, Harness([net]), {"pwm": "PA0"}, on_watched=seen.append)  # type: ignore[arg-type]  # a part
+    # Up each 100 ns, down 40 ns later.
+    chip.pin("PA0").offer_wave("TIM2_CH1", NS_PER_S, 100, 40)
+    chip.run(250)
+    assert net.wave(250) is not None
+    pins.watch(frozenset({"pwm"}), 130)
+    assert seen == [140, 200, 240], "the chip stands at 250 already"
+    chip.run(420)
+    assert seen == [140, 200, 240, 300, 340, 400]
+    assert [net.level(at) for at in (199, 200, 240, 299, 300, 399, 400)] == [
+        False,
+        True,
+        False,
+        False,
+        True,
+        False,
+        True,
+    ]
+    assert net.wave(420) is None
+    assert chip.stops > 0
+    pins.watch(frozenset(), 420)
+    chip.run(1000)
+    assert net.wave(1000) == chip.pin("PA0").wave
+    assert seen[-1] == 400
+    assert net.level(440) is False
