@@ -23,7 +23,7 @@ EXCEPTIONS = 76
 #: Characters that wait in C to arrive at a USART; the others wait in Python.
 RECEIVED = 256
 #: Levels that the outside puts on pins later: more than a step of a robot brings.
-INPUTS = 1024
+LATER_INPUTS = 1024
 
 
 @dataclass(frozen=True, slots=True)
@@ -216,7 +216,7 @@ EDGE = Struct(
 INPUT_ROWS = Struct(
     "inputs",
     "Levels that the outside puts on pins later: a ring, oldest first.",
-    (*_fields("u32", "first", "count"), Field("padding", "u64"), Field("rows", "edge", INPUTS)),
+    (*_fields("u32", "first", "count"), Field("padding", "u64"), Field("rows", "edge", LATER_INPUTS)),
 )
 SENT = Struct(
     "sent",
@@ -288,6 +288,6 @@ _CONSTANTS = {
     "SOURCES": SOURCES,
     "LAST_ROWS": LAST_ROWS,
     "RECEIVED": RECEIVED,
-    "INPUTS": INPUTS,
+    "LATER_INPUTS": LATER_INPUTS,
 }
 _C_KINDS = {"u8": "uint8_t", "u16": "uint16_t", "u32": "uint32_t", "u64": "uint64_t", "i32": "int32_t"}

@@ -340,7 +340,7 @@ class Fabric(Stateful):
         """Have the outside put levels on pins later: rows of `EDGE`, of which time, pin and drive count.
 
         Raises:
-            ValueError: More than `INPUTS` would be to come.
+            ValueError: More than `LATER_INPUTS` would be to come.
         """
         if not self._calls_of_c.fabric_put_inputs(self.handle, self._input_slot, rows, len(rows) // EDGE.size):
             raise ValueError("too many levels of pins to come")

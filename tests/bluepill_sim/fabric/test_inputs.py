@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from bluepill_sim.board import BluePill
-from bluepill_sim.extension.layout import INPUTS
+from bluepill_sim.extension.layout import LATER_INPUTS
 from bluepill_sim.fabric.pins import PinDrive
 from bluepill_sim.fabric.subscriptions import EDGE, Of
 from tests.bluepill_sim.fabric.test_waves import Bank
@@ -61,14 +61,14 @@ def test_a_resistor_later_is_a_resistor(is_weak: bool) -> None:
 def test_no_more_are_taken_than_there_is_room_for_and_then_none() -> None:
     bank = Bank()
     pin = bank.pins["PA0"]
-    pin.drive_later([(10, True)] * (INPUTS - 1))
+    pin.drive_later([(10, True)] * (LATER_INPUTS - 1))
     with pytest.raises(ValueError, match="too many"):
         pin.drive_later([(5, False), (6, False)])
     bank.run(9)
     assert pin.driven is None, "none of the two was taken"
     pin.drive_later([(9, True)])
     bank.run(10)
-    pin.drive_later([(20, True)] * INPUTS)
+    pin.drive_later([(20, True)] * LATER_INPUTS)
 
 
 def test_a_pin_without_a_leg_is_refused() -> None:

@@ -8,7 +8,7 @@
 /* Indices of `PinDrive`. */
 enum { OUTSIDE_HIGH = 2, OUTSIDE_PULLS_UP, OUTSIDE_PULLS_DOWN };
 
-static struct edge *row_at(struct inputs *inputs, uint32_t n) { return &inputs->rows[(inputs->first + n) % INPUTS]; }
+static struct edge *row_at(struct inputs *inputs, uint32_t n) { return &inputs->rows[(inputs->first + n) % LATER_INPUTS]; }
 
 static void schedule_first(struct device *device)
 {
@@ -25,7 +25,7 @@ static void event(struct device *device, uint64_t ns)
         const uint32_t bit = 1u << row.pin % PINS;
         const bool is_high = row.drive == OUTSIDE_HIGH || row.drive == OUTSIDE_PULLS_UP;
         const bool is_weak = row.drive == OUTSIDE_PULLS_UP || row.drive == OUTSIDE_PULLS_DOWN;
-        inputs->first = (inputs->first + 1) % INPUTS;
+        inputs->first = (inputs->first + 1) % LATER_INPUTS;
         --inputs->count;
         port->outside |= bit;
         port->outside_high = is_high ? port->outside_high | bit : port->outside_high & ~bit;
@@ -41,7 +41,7 @@ bool fabric_put_inputs(struct fabric *fabric, uint32_t slot, const struct edge *
     struct device *device = &fabric->devices[slot];
     struct inputs *inputs = device->state;
     const uint64_t now = now_ns(fabric);
-    if (count > INPUTS - inputs->count) {
+    if (count > LATER_INPUTS - inputs->count) {
         return false;
     }
     for (uint32_t n = 0; n < count; ++n) {

@@ -9,7 +9,7 @@
 #define SOURCES 64
 #define LAST_ROWS 32
 #define RECEIVED 256
-#define INPUTS 1024
+#define LATER_INPUTS 1024
 
 /* A block that began, an exception that was entered (its number) or left (-1). */
 struct record {
