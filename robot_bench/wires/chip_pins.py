@@ -147,6 +147,8 @@ class ChipPins:
         self._edges(rows)
 
     def _edges(self, rows: bytes) -> None:
+        if not rows:
+            return
         watched = []
         for place, times, codes in split(rows, self._wire_of_pin, _CODE_OF_DRIVE, len(self._nets)):
             net = self._nets[place]
@@ -163,15 +165,19 @@ class ChipPins:
     def _other_drives(self, net: Net, owner: str, at: Nanos) -> None:
         if owner == OWNER:
             return
-        to_come = net.drives_without(OWNER, at)
-        if len(to_come) == 1 and at <= self._chip.now_ns:
+        times = net.times_after(owner, at - 1)
+        if len(times) == 1 and at <= self._chip.now_ns:
             self._pass_on(net, at)
             return
-        if any(level is None for _, level, _ in to_come):
-            raise LocalProtocolError(f"{owner} lets {net.name} go ahead of the chip")
-        for is_hard in {is_hard for _, _, is_hard in to_come}:
-            levels = [(when, bool(level)) for when, level, hard in to_come if hard is is_hard]
-            self._pins[net.name].drive_later(levels, is_weak=not is_hard)
+        hard, weak = [], []
+        for when in times:
+            level, is_hard = net.level_without(OWNER, when)
+            if level is None:
+                raise LocalProtocolError(f"{owner} lets {net.name} go ahead of the chip")
+            (hard if is_hard else weak).append((when, level))
+        for levels in (hard, weak):
+            if levels:
+                self._pins[net.name].drive_later(levels, is_weak=levels is weak)
 
     def _pass_on(self, net: Net, at: Nanos) -> None:
         level, is_hard = net.level_without(OWNER, at)

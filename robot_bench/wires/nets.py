@@ -214,19 +214,7 @@ class Net(Stateful):
 
     def level_without(self, owner: str, at: Nanos) -> tuple[bool | None, bool]:
         """Return what everybody but `owner` puts on the wire, None where nobody holds it, and whether it is hard."""
-        others = tuple([history.at(at) for name, history in self._drives.items() if name != owner])
-        return _resolved(others), any(code in HARD for code in others)
-
-    def drives_without(self, owner: str, begin: Nanos) -> list[tuple[Nanos, bool | None, bool]]:
-        """Return what everybody but `owner` does from `begin` on: when, and what `level_without` has then."""
-        others = [history for name, history in self._drives.items() if name != owner]
-        if len(others) == 1:
-            (only,) = others
-            first = bisect_left(only.times, begin)
-            drives = zip(only.times[first:], only.codes[first:], strict=True)
-            return [(at, _resolved((code,)), code in HARD) for at, code in drives]
-        times = sorted({at for history in others for at in history.times[bisect_left(history.times, begin) :]})
-        return [(at, *self.level_without(owner, at)) for at in times]
+        return _held(tuple([history.at(at) for name, history in self._drives.items() if name != owner]))
 
     def drive_at(self, owner: str, at: Nanos) -> WaveDrive | None:
         """Return the wave that `owner` puts on the wire at the instant `at`; None for none."""
@@ -410,6 +398,12 @@ def _levels_with(others: tuple[int, ...], idle: bool) -> bytes:
     """Return the level that each code of one owner makes, where the others do this; 256 bytes."""
     levels = [_resolved((*others, code)) for code in range(CODES)]
     return bytes([idle if level is None else level for level in levels]).ljust(256, b"\0")
+
+
+@cache
+def _held(codes: tuple[int, ...]) -> tuple[bool | None, bool]:
+    """Return the level that drives make together, and whether one of them is hard."""
+    return _resolved(codes), any(code in HARD for code in codes)
 
 
 @cache

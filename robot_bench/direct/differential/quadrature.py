@@ -50,14 +50,18 @@ class Quadrature(Stateful):
         if first == last:
             return
         times, codes = (array("q"), array("q")), (bytearray(), bytearray())
-        step = 1 if last > first else -1
-        for count in range(first + step, last + step, step):
-            # An edge lies where the angle is a whole number: forward the one reached, in reverse the one left.
-            edge = count if step > 0 else count + 1
-            channel = 1 - edge % 2
-            share = min(max((edge - before) / (after - before), 0.0), 1.0)
-            times[channel].append(begin + max(1, round(share * span_ns)))
-            codes[channel].append(_CODES[QUARTERS[count % 4][channel]])
+        way = after - before
+        # An edge lies where the angle is a whole number: forward the one that is reached, in reverse the one left.
+        table, edges = (_FORWARD, range(first + 1, last + 1)) if last > first else (_REVERSE, range(first, last, -1))
+        for edge in edges:
+            channel, code = table[edge & 3]
+            times[channel].append(begin + min(max(round((edge - before) / way * span_ns), 1), span_ns))
+            codes[channel].append(code)
         for net, when, what in zip(self._nets, times, codes, strict=True):
             if when:
                 net.drive_in_turn(OWNER, when, bytes(what))
+
+
+#: What the edge at a number of edges does, modulo four: the channel, and the code of its level behind the edge.
+_FORWARD = tuple((1 - edge % 2, _CODES[QUARTERS[edge][1 - edge % 2]]) for edge in range(4))
+_REVERSE = tuple((1 - edge % 2, _CODES[QUARTERS[edge - 1][1 - edge % 2]]) for edge in range(4))

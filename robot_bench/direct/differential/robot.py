@@ -29,6 +29,8 @@ from simbase.timing import NS_PER_S, Nanos, Reached
 
 #: chosen: a wheel's own speed counts from this difference to its motor on, as a part and as a speed of the rim.
 HELD_SHARE, HELD_MPS = 0.1, 0.001
+#: chosen: volts on a pin change by an eighth of what the ADC tells apart, 3.3 V by 4096.
+VOLTS_STEP = 1e-4
 #: chosen: bumpers and stalls are looked at each 10 ms, as programs do.
 LOOK_STEPS = 10
 
@@ -45,7 +47,7 @@ class DifferentialRobot(Stateful):
 
     STATE = (
         "body", "train", "cell", "_encoders", "_bridges", "_steps", "_angles", "_next_distance", "_stalled",
-        "_microvolts",
+        "_steps_of_volts",
     )  # fmt: skip
 
     def __init__(
@@ -64,8 +66,8 @@ class DifferentialRobot(Stateful):
         self._encoders = tuple(Quadrature(harness[f"{side}_a"], harness[f"{side}_b"], per_turn) for side in SIDES)
         self._bumpers = [(harness[f"bumper_{one.name}"], one) for one in robot.bumpers]
         self._analog = {wire.name: analog_pin(wire.name) for wire in robot.signals if wire.is_analog}
-        #: What is on the analog pins.
-        self._microvolts: dict[str, int] = {}
+        #: What is on the analog pins, in steps.
+        self._steps_of_volts: dict[str, int] = {}
         self._steps = 0
         self._angles = (0.0, 0.0)
         self._next_distance: Nanos = 0
@@ -124,12 +126,12 @@ class DifferentialRobot(Stateful):
             self._look(now)
 
     def _put(self, signal: str, volts: float) -> None:
-        microvolts = round(volts * 1e6)
-        if self._microvolts.get(signal) != microvolts:
-            self._microvolts[signal] = microvolts
+        steps = round(volts / VOLTS_STEP)
+        if self._steps_of_volts.get(signal) != steps:
+            self._steps_of_volts[signal] = steps
             set_volts = getattr(self._analog[signal], "set_volts", None)
             if set_volts is not None:
-                set_volts(microvolts / 1e6)
+                set_volts(steps * VOLTS_STEP)
 
     def _look(self, now: Nanos) -> None:
         state = self.body.state
