@@ -169,7 +169,8 @@ class ChipPins:
         if len(times) == 1 and at <= self._chip.now_ns:
             self._pass_on(net, at)
             return
-        hard, weak = [], []
+        hard: list[tuple[Nanos, bool]] = []
+        weak: list[tuple[Nanos, bool]] = []
         for when in times:
             level, is_hard = net.level_without(OWNER, when)
             if level is None:
