@@ -22,12 +22,20 @@ GROUPS: Mapping[str, tuple[str, ...]] = {
     "link": ("p2dx_con", "rst"),
 }
 
+#: Beginnings of the nets of a robot on own pins.
+SIDES = ("left", "right")
+
 
 def grouped(names: Sequence[str]) -> list[tuple[str, list[str]]]:
-    """Return the groups that have a net among `names`, with those nets."""
+    """Return the groups that have a net among `names`, with those nets.
+
+    Of the nets of a robot on own pins, those of a side are one.
+    """
     known = {net for nets in GROUPS.values() for net in nets}
     groups = [(title, [net for net in nets if net in names]) for title, nets in GROUPS.items()]
-    groups.append(("other", [net for net in names if net not in known]))
+    others = [net for net in names if net not in known]
+    groups += [(side, [net for net in others if net.startswith(f"{side}_")]) for side in SIDES]
+    groups.append(("other", [net for net in others if not net.startswith(tuple(f"{side}_" for side in SIDES))]))
     return [(title, nets) for title, nets in groups if nets]
 
 

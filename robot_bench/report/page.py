@@ -115,7 +115,7 @@ def _sonar(record: RunRecord, left_out: list[str]) -> list[list[float]]:
 def _motor(record: RunRecord, motor: int, step: float) -> list[list[float]]:
     steps = motor_steps(record.pins, motor)
     kept = [steps[n] for n in extremes(steps.times, [steps.values])]
-    return [[_seconds(t), value * step] for t, value in kept] or [[0, 0]]
+    return [[_seconds(t), value * step] for t, value in kept]
 
 
 def _pins(record: RunRecord, left_out: list[str]) -> list[Json | list[object]]:
