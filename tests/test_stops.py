@@ -25,7 +25,8 @@ def test_a_robot_stands_whatever_happens_to_its_driver() -> None:
     )  # fmt: skip
     rows = [json.loads(line) for line in done.stdout.splitlines()]
     assert len(rows) == len(ways) * len(EVENTS), done.stderr
-    assert [row for row in rows if row["problem"] or row["moves_again"]] == []
+    wrong = [row for row in rows if row["problem"] or row["moves_again"]]
+    assert not wrong, "\n".join(json.dumps(row) for row in wrong)
     told = [row["stop_ms"] for row in rows if row["event"] in {"SIGTERM", "suspend 1 s", "output blocked, SIGINT"}]
     assert max(told) < 500
     assert done.returncode == 0

@@ -128,23 +128,6 @@ def may_write(code: bytes, at: int) -> int:
     return 1 << (second >> 12) | 1 << (second >> 8 & 15) | 1 << (first & 15)
 
 
-def only_reads(code: bytes) -> bool:
-    """Tell whether a straight run of code stores nothing and uses no coprocessor: in doubt, no."""
-    at = 0
-    while at + 2 <= len(code):
-        first = code[at] | code[at + 1] << 8
-        if first >= _FIRST_WIDE:
-            if first & 0xFE10 in (0xE800, 0xF800) or first & 0xEC00 == 0xEC00:
-                return False
-            at += 4
-            continue
-        is_store = first & 0xF000 in (0x6000, 0x7000, 0x8000, 0x9000) and not first & 0x0800
-        if is_store or 0x5000 <= first < 0x5600 or first & 0xFE00 == 0xB400 or first & 0xF800 == 0xC000:
-            return False
-        at += 2
-    return True
-
-
 def may_end_in_it(code: bytes) -> bool:
     """Tell whether what follows some code may be inside an IT block that begins there: in doubt, yes."""
     for at in range(0, len(code) - 1, 2):

@@ -154,9 +154,11 @@ class Processor(Stateful):
         self.scr = self.shcsr = self.cfsr = self.hfsr = self.bfar = self.mmfar = 0
         self.set_ccr(STKALIGN)
         registers = self.engine.registers
-        # A faulting handler may have left any of these; leave handler mode last.
+        # A faulting handler may have left any of these; nPRIV goes in handler mode, SPSEL only in thread mode.
         registers[Register.IPSR] = 3
-        for register in (Register.CONTROL, Register.PRIMASK, Register.BASEPRI, Register.FAULTMASK, Register.IPSR):
+        for register in (
+            Register.CONTROL, Register.PRIMASK, Register.BASEPRI, Register.FAULTMASK, Register.IPSR, Register.CONTROL
+        ):  # fmt: skip
             registers[register] = 0
         registers[Register.CPSR] = registers[Register.CPSR] & ~(_IT_BITS | _FLAG_BITS) | _CPSR_T
         registers[Register.LR] = 0xFFFF_FFFF

@@ -105,6 +105,7 @@ _NATIVE_HOOKS = {
 }
 _PROTECTION_READ, _PROTECTION_WRITE, _PROTECTION_EXECUTE = 1, 2, 4
 #: uc_ctl numbers: item | argument count << 26 | direction (write = 1) << 30.
+_CONTROL_EXITS = 4 | 1 << 26 | 1 << 30
 _CONTROL_MODEL = 7 | 1 << 26 | 1 << 30
 _CONTROL_DROP_CODE = 9 | 2 << 26 | 1 << 30
 _CONTROL_DROP_ALL_CODE = 10 | 1 << 30
@@ -167,6 +168,9 @@ class UnicornCore(Stateful):
         self._check(library.open(_ARCHITECTURE_ARM, _MODE_THUMB, ctypes.addressof(handle)), "open")
         self._handle = handle.value or 0
         self._control(_CONTROL_MODEL, ctypes.c_int(_MODEL_CORTEX_M3))
+        # A list of addresses that end a run, which stays empty: with a single one, what was translated there is looked
+        # for after each run, which takes longer than a short run.
+        self._control(_CONTROL_EXITS, ctypes.c_int(1))
         context = ctypes.c_void_p()
         self._check(library.context_alloc(self._handle, ctypes.addressof(context)), "allocate a context")
         self._context = context.value or 0

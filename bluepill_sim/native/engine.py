@@ -18,7 +18,7 @@ import weakref
 from collections.abc import Callable
 from typing import Any
 
-from bluepill_sim.core.accesses import Access, accesses_of, is_ambiguous, may_end_in_it, only_reads
+from bluepill_sim.core.accesses import Access, accesses_of, is_ambiguous, may_end_in_it
 from bluepill_sim.core.block_cost import NO_BLOCK, Block
 from bluepill_sim.core.engine import Engine, StopBefore, Traps
 from bluepill_sim.core.halts import Halt, HaltKind
@@ -66,7 +66,7 @@ from bluepill_sim.native.state import (
 )
 
 #: Flags of a row (`enum row_flag`).
-_CHANGES_MASKS, _SENDS_EVENT, _SELF_LOOP, _WRITABLE, _NOTED, _READS, _AMBIGUOUS = 1, 2, 4, 8, 128, 256, 512
+_CHANGES_MASKS, _SENDS_EVENT, _SELF_LOOP, _WRITABLE, _NOTED, _AMBIGUOUS = 1, 2, 4, 8, 128, 256
 _ENDS = {Kind.WAIT_INTERRUPT: 16, Kind.WAIT_EVENT: 32, Kind.YIELD: 64}
 _NO_BLOCK_START = 0xFFFF_FFFF
 #: IT and the four instructions that may follow in its block.
@@ -378,7 +378,6 @@ class NativeEngine(Engine):
             _CHANGES_MASKS * block.changes_masks | _SENDS_EVENT * block.sends_event | _SELF_LOOP * block.is_self_loop
         )
         flags |= _WRITABLE * (host is not None)
-        flags |= _READS * (only_reads(code) and not block.has_exclusive)
         if not is_ambiguous(code, start):
             pass
         elif (
@@ -403,7 +402,7 @@ class NativeEngine(Engine):
         )
         if not added:
             raise RuntimeError(f"no room for the block at {start:#010x}")
-        loop = loop_of(code, block.offsets, start) if flags & _READS else None
+        loop = loop_of(code, block.offsets, start)
         if loop is not None and not library().core_set_loop(self._state, start, ctypes.addressof(loop)):
             raise MemoryError("no memory for a loop")
 

@@ -7,7 +7,6 @@ import os
 import pty
 import re
 import signal
-import socket
 import subprocess
 import sys
 import time
@@ -205,20 +204,23 @@ def test_odometry_wraps_without_a_jump() -> None:
 @pytest.fixture(params=["tcp"])
 def robot(request: pytest.FixtureRequest, tmp_path: Path) -> Iterator[tuple[str, subprocess.Popen[str]]]:
     """A virtual robot of its own process, on a free TCP port or a pseudo terminal."""
-    url = f"pty:{tmp_path}/robot"
-    if request.param == "tcp":
-        with socket.socket() as probe:
-            probe.bind(("127.0.0.1", 0))
-            url = f"tcp:127.0.0.1:{probe.getsockname()[1]}"
+    port = "tcp:127.0.0.1:0" if request.param == "tcp" else f"pty:{tmp_path}/robot"
     process = subprocess.Popen(
-        [*COMMAND, "serve", "--port", url, "--body", "kinematic", "--json"],
+        [*COMMAND, "serve", "--port", port, "--body", "kinematic", "--json"],
         stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
     )  # fmt: skip
     assert process.stdout is not None
-    assert json.loads(process.stdout.readline())
-    yield url, process
+    yield json.loads(process.stdout.readline())["url"], process
     process.send_signal(signal.SIGINT)
     process.communicate(timeout=20)
+
+
+def wait_until_recorded(run: Path) -> None:
+    """Wait until a run has recorded what came from the robot; a busy machine takes long to begin."""
+    ends = time.monotonic() + 60
+    while not any('"c2r"' in trace.read_text() for trace in run.glob("trace.jsonl")):
+        assert time.monotonic() < ends, "the run never began"
+        time.sleep(0.1)
 
 
 @pytest.mark.slow
@@ -253,7 +255,7 @@ def test_a_robot_that_vanishes_ends_the_run_with_1(
     url, process = robot
     command = [*COMMAND, "run", "motors", "--port", url, "--yes", "--out", "run", "--json"]
     run = subprocess.Popen(command, cwd=tmp_path, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
-    time.sleep(4)
+    wait_until_recorded(tmp_path / "run")
     process.kill()
     out, err = run.communicate(timeout=60)
     assert run.returncode == 1, err
@@ -270,7 +272,7 @@ def test_a_signal_stops_a_served_robot_and_ends_with_130(
 ) -> None:
     command = [*COMMAND, "run", "motors", "--port", robot[0], "--yes", "--out", "run", "--json"]
     run = subprocess.Popen(command, cwd=tmp_path, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
-    time.sleep(5)
+    wait_until_recorded(tmp_path / "run")
     run.send_signal(number)
     out, err = run.communicate(timeout=60)
     assert run.returncode == 130, err
@@ -294,7 +296,7 @@ def test_a_terminal_that_is_held_holds_up_neither_the_run_nor_its_end(
     command = [*COMMAND, "run", "motors", "--port", robot[0], "--yes", "--out", "run", "--json"]
     run = subprocess.Popen(command, cwd=tmp_path, stdout=subprocess.PIPE, stderr=inside, text=True)
     os.close(inside)
-    time.sleep(4)
+    wait_until_recorded(tmp_path / "run")
     run.send_signal(signal.SIGTERM)
     out, _ = run.communicate(timeout=60)
     os.close(terminal)

@@ -4,6 +4,7 @@ import pytest
 
 from bluepill_sim.core import Register
 from bluepill_sim.extension.library import library_path
+from tests.bluepill_sim.machine import STACK
 
 ICSR, AIRCR, SHPR3, ISER0, ISPR0, IPR0, STIR = (
     0xE000ED04,
@@ -317,6 +318,17 @@ def test_a_software_request_for_an_interrupt_that_does_not_exist_is_ignored(run,
 def test_a_software_request_pends_the_interrupt_of_its_number(run) -> None:
     machine = run(store(STIR, 42) + f"isb\nmov32 r1, #{ISPR0}\nldr r0, [r1, #4]\nlog r0")
     assert machine.log == [1 << 10]
+
+
+@pytest.mark.parametrize("control", [0, 1, 2, 3])
+@pytest.mark.parametrize("core", ["native", "python"])
+def test_a_reset_begins_privileged_on_the_main_stack(
+    control: int, core: str, boot, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("P2OS_CORE", core)
+    machine = boot(f"mov32 r0, #0x20001000\nmsr psp, r0\nmovs r0, #{control}\nmsr control, r0\nisb\nb stop").run(100)
+    machine.board.reset()
+    assert [machine.board.register(name) for name in ("CONTROL", "MSP", "SP")] == [0, STACK, STACK]
 
 
 @pytest.mark.parametrize("bit", [1 << 0, 1 << 1])

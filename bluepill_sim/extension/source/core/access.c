@@ -208,7 +208,7 @@ bool resolve(struct core *core, uint32_t address, bool is_write, uint32_t bytes)
 
 static bool is_over(const struct core *core)
 {
-    return core->shared.cycle + core->block->costs[0] >= core->shared.stop_at;
+    return core->shared.cycle + core->block->costs[0] >= next_stop(core);
 }
 
 /* Finds the accessing instruction for Python, unless Python itself runs the blocks and knows it; false: not now. */
@@ -226,7 +226,7 @@ static bool begin_access(struct core *core, uint32_t address, bool is_write, uin
 static RARELY uint32_t ask_read(const struct region_user *region, uint32_t offset, uint32_t size)
 {
     struct core *core = region->core;
-    core->polling.asked = 1;
+    core->waiting.has_acted = 1;
     if (!begin_access(core, region->base + offset, false, size)) {
         return 0;
     }
@@ -281,7 +281,7 @@ static bool read_device(struct core *core, struct device *device, uint32_t index
         skip(core, address, false, size);
         return true;
     }
-    core->polling.asked = 1;
+    core->waiting.has_acted = 1;
     if (!begin_access(core, address, false, size)) {
         return false;
     }
@@ -362,7 +362,7 @@ static bool read_system(struct core *core, uint32_t address, uint32_t size, uint
     system_read(s, at, s->access_cycle, word);
     core->shared.in_access = 0;
     /* What moves with the time, or was changed by the read, is another value at the next one. */
-    core->polling.asked |= at != STK_CTRL || flag;
+    core->waiting.has_acted |= at != STK_CTRL || flag;
     return true;
 }
 
@@ -458,6 +458,7 @@ void core_write_io(void *unicorn, uint64_t at, unsigned size, uint64_t value, vo
     if (UNLIKELY(region->core->is_stopping)) {
         return;
     }
+    region->core->waiting.has_acted = 1;
     if (region->number == region->core->system_region &&
         write_system(region->core, region->base + offset, size, written)) {
         return;

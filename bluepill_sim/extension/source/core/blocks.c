@@ -93,6 +93,7 @@ static void enter_special(struct core *core, uint32_t address, uint32_t size, st
     if (row != NULL && row->flags & ROW_WRITABLE && memcmp(row->host, row->code, row->end - row->start) != 0) {
         row = NULL;
     }
+    core->waiting.has_acted |= row == NULL || row->flags & (ROW_CHANGES_MASKS | ROW_SENDS_EVENT);
     if (row == NULL) {
         core->calls.unknown_block(address, size);
         row = find(core, address);
@@ -107,7 +108,7 @@ static void enter_special(struct core *core, uint32_t address, uint32_t size, st
     }
     if (row->flags & ROW_SELF_LOOP && row == core->block) {
         /* It has gone round once: nothing but an interrupt ends it, so go round until the time is up. */
-        uint64_t left = s->stop_at - s->cycle;
+        const uint64_t left = next_stop(core) - s->cycle;
         s->cycle += (left + row->costs[1] - 1) / row->costs[1] * row->costs[1];
         stop_at_boundary(core, address);
         return;
@@ -166,18 +167,17 @@ static RARELY void trim_registers(struct core *core)
 static __attribute__((noinline)) void enter_block(struct core *core, uint32_t address, uint32_t size)
 {
     struct row *before = core->block;
-    const uint64_t cycle = core->shared.cycle;
     if (UNLIKELY(before->flags & ROW_CHANGES_MASKS)) {
         trim_registers(core);
     }
-    if (UNLIKELY(cycle >= core->shared.stop_at)) {
+    if (UNLIKELY(core->shared.cycle >= core->shared.stop_at)) {
         if (core->resumed != NULL) { /* no boundary: it goes on inside its block */
             core->block = core->resumed;
             core->shared.stop_at = core->resumed_stop_at;
             core->resumed = NULL;
             return;
         }
-        if (!goes_on(core, address)) {
+        if (!looks_for_waiting(core, address) && !goes_on(core, address)) {
             stop_at_boundary(core, address);
             return;
         }
@@ -188,13 +188,9 @@ static __attribute__((noinline)) void enter_block(struct core *core, uint32_t ad
         return;
     }
     begin_block(core, row);
-    log_row(core, cycle, address, 0);
-    if (UNLIKELY(row == before) && row->flags & ROW_READS) {
-        if (row->loop != NULL && core->records == NULL) {
-            wait_on(core, row, rounds_of_counter(core, row));
-        } else if (polls_unchanged(core, row)) {
-            wait_on(core, row, rounds_left(core, row));
-        }
+    record(core, address, 0);
+    if (UNLIKELY(row == before) && row->loop != NULL && core->records == NULL) {
+        wait_on(core, row, rounds_of_counter(core, row));
     } else if (!(before->flags & ROW_CHANGES_MASKS) && before != &core->none && core->records == NULL) {
         before->after[address != before->end] = row;
     }

@@ -53,10 +53,8 @@ enum row_flag {
     ROW_ENDS_IN_YIELD = 64,
     /* Hooks note the PC of each access. */
     ROW_NOTED = 128,
-    /* It stores nothing: the same registers before it twice running are the same for ever. */
-    ROW_READS = 256,
     /* Two of its accesses may be mistaken for each other. */
-    ROW_AMBIGUOUS = 512
+    ROW_AMBIGUOUS = 256
 };
 
 struct row {
@@ -152,13 +150,18 @@ struct constants {
     uint32_t addresses[CONSTANTS]; /* 0: free */
 };
 
-/* A loop that waits for something: its state at its start, one round ago. */
-struct polling {
-    const struct row *row;
-    uint64_t cycle;
-    int32_t rounds;
-    uint32_t asked; /* Python has answered since */
+/* Cycles between two looks for a loop that waits. Chosen: looking costs less than 1 % of the longest interval. */
+enum { LEAST_INTERVAL = 64, MOST_INTERVAL = 1 << 16 };
+
+/* What is looked for: a round of blocks that leaves everything as it was (polling.c). */
+struct waiting {
+    enum { NOT_LOOKING, FIRST_ROUND, SECOND_ROUND } phase;
+    uint32_t address, blocks; /* where the round began, and blocks since, that one among them */
+    uint32_t has_acted;       /* an access since may have changed something, or depends on the time */
+    uint64_t cycle;           /* at which the round began */
+    uint64_t next, interval;  /* when to look next, and how long after that if it is in vain */
     uint32_t registers[16];
+    uint8_t *memory; /* the SRAM as it was; null: it was not needed yet */
 };
 
 /* Where in SRAM code was translated from, in places of some bytes; never fewer than there are. */
@@ -197,7 +200,7 @@ struct core {
     struct allocation *allocations;
     struct record *records;
     uint32_t record_count, record_room;
-    struct polling polling;
+    struct waiting waiting;
     uint64_t limit; /* of the run */
     uint8_t code_places[CODE_PLACES / 8];
     struct fault_row faults[HALT_NONE]; /* by kind of halt */
@@ -219,9 +222,9 @@ void record(struct core *core, uint32_t address, int32_t kind);
 void core_flush(struct core *core);
 void record_at(struct core *core, uint64_t cycle, uint32_t address, int32_t kind);
 /* polling.c */
-bool polls_unchanged(struct core *core, const struct row *row);
+void look_later(struct core *core);
+bool looks_for_waiting(struct core *core, uint32_t address);
 void wait_on(struct core *core, const struct row *row, uint64_t rounds);
-uint64_t rounds_left(const struct core *core, const struct row *row);
 uint64_t rounds_of_counter(struct core *core, const struct row *row);
 /* access.c */
 void go_on_at_access(struct core *core, uint32_t pc);
@@ -249,6 +252,12 @@ bool take_fault(struct core *core, uint32_t kind);
 #pragma GCC visibility pop
 /* run.c, for Python as well. */
 uint64_t core_next_event(const struct core *core);
+/* When the run has to end or an event is due: `stop_at` may be earlier, to look for a loop that waits. */
+static inline uint64_t next_stop(const struct core *core)
+{
+    const uint64_t event = core_next_event(core);
+    return !core->shared.stop_at ? 0 : event < core->limit ? event : core->limit;
+}
 void core_clear_exclusive(struct core *core);
 
 /* Register numbers of Unicorn 2 (arm.h). */

@@ -1,20 +1,22 @@
-/* Loops of one block that wait: for a flag of a peripheral, a pin, a word that an interrupt sets.
+/* Loops that wait: for a flag of a peripheral, a pin, a word that an interrupt sets, the end of a delay.
  *
- * A block that stores nothing and finds the same registers at its start as one
- * round before does the same again, until an event that ends the run: what it
- * reads are memory and registers that only events change. If Python has
- * answered one of its reads, what was read may have been a clock, and it goes on
- * round by round. Where the word is a counter that is known to be a ramp of time,
- * and the loop is as native/polling.py says, the round that leaves it is worked out.
+ * A round of blocks that finds registers and SRAM as they were one round before does the same again, until an event:
+ * what it reads are memory, and registers that only events change. So its time can pass at once. From time to time,
+ * the more rarely the longer it was in vain, a block's start is taken for that of such a round: twice it has to come
+ * with the same registers, and the second time with the same SRAM. A round does not count where something was written
+ * to a peripheral, where a value was read that may be a clock, or that Python has answered, and where priorities or
+ * masks may have changed. Where a loop of one block reads a counter that is known to be a ramp of time, as
+ * native/polling.py says, the round that leaves it is worked out.
  */
+#include <stdlib.h>
 #include <string.h>
 
 #include "core.h"
 
-/* Chosen: rounds before the registers are looked at, which costs as much as some rounds do. */
-enum { FIRST_LOOK = 6, NEXT_LOOK = 64 };
+/* A round has no more blocks than rows are kept of. */
+enum { MOST_BLOCKS = LAST_ROWS };
 
-static void look(struct core *core, uint32_t registers[16])
+static void read_all(struct core *core, uint32_t registers[16])
 {
     static const int numbers[16] = {REG_R0,     REG_R0 + 1, REG_R0 + 2, REG_R0 + 3, REG_R0 + 4,  REG_R0 + 5,
                                     REG_R0 + 6, REG_R0 + 7, REG_R0 + 8, REG_R0 + 9, REG_R0 + 10, REG_R0 + 11,
@@ -26,43 +28,112 @@ static void look(struct core *core, uint32_t registers[16])
     core->api.read_registers(core->unicorn, numbers, at, 16);
 }
 
-/* Called when a block is entered right after itself. */
-bool polls_unchanged(struct core *core, const struct row *row)
+/* Has the run that begins look for a loop that waits, when it is time to. */
+void look_later(struct core *core)
 {
-    struct polling *polling = &core->polling;
-    if (polling->row != row) {
-        polling->row = row;
-        polling->rounds = 0;
+    struct waiting *waiting = &core->waiting;
+    struct shared *s = &core->shared;
+    waiting->phase = NOT_LOOKING;
+    if (waiting->next < s->cycle + LEAST_INTERVAL) {
+        waiting->next = s->cycle + LEAST_INTERVAL;
     }
-    if (++polling->rounds < FIRST_LOOK || core->records != NULL) {
+    if (core->records == NULL && waiting->next < s->stop_at) {
+        s->stop_at = waiting->next;
+    }
+}
+
+/* Lets the time of rounds pass that are as the last one was. The rows of the last ones are kept. */
+static void repeat(struct core *core, uint64_t stop)
+{
+    struct shared *s = &core->shared;
+    const uint64_t length = s->cycle - core->waiting.cycle, rounds = (stop - s->cycle - 1) / length;
+    struct record round[MOST_BLOCKS];
+    const uint32_t blocks = core->waiting.blocks;
+    for (uint32_t n = 0; n < blocks; ++n) {
+        round[n] = s->last[(s->logged - blocks + n) % LAST_ROWS];
+    }
+    const uint64_t kept = (LAST_ROWS + blocks - 1) / blocks;
+    for (uint64_t k = rounds > kept ? rounds - kept + 1 : 1; k <= rounds; ++k) {
+        for (uint32_t n = 0; n < blocks; ++n) {
+            record_at(core, round[n].cycle + k * length, round[n].address, 0);
+        }
+    }
+    s->cycle += rounds * length;
+}
+
+/* The start of a block where another round begins: whether it is a waiting one. */
+static bool is_same_round(struct core *core)
+{
+    struct waiting *waiting = &core->waiting;
+    const struct shared *s = &core->shared;
+    const uint8_t *memory = (const uint8_t *)(uintptr_t)s->sram;
+    uint32_t registers[16];
+    read_all(core, registers);
+    if (memcmp(registers, waiting->registers, sizeof registers) != 0) {
         return false;
     }
-    uint32_t registers[16];
-    look(core, registers);
-    const bool is_same = polling->rounds > FIRST_LOOK && !polling->asked &&
-                         core->shared.cycle == polling->cycle + row->costs[1] &&
-                         memcmp(registers, polling->registers, sizeof registers) == 0;
-    if (polling->rounds > FIRST_LOOK) {
-        polling->rounds = is_same ? 0 : -NEXT_LOOK;
+    if (waiting->phase == SECOND_ROUND) {
+        return memcmp(memory, waiting->memory, s->sram_bytes) == 0;
     }
-    memcpy(polling->registers, registers, sizeof registers);
-    polling->cycle = core->shared.cycle;
-    polling->asked = 0;
-    return is_same;
+    if (waiting->memory == NULL && (waiting->memory = malloc(s->sram_bytes)) == NULL) {
+        return false;
+    }
+    memcpy(waiting->memory, memory, s->sram_bytes);
+    return true;
+}
+
+/* At a boundary at or after `stop_at`: looks for a loop that waits, and lets its time pass; false: it is not for that
+ * that the boundary is looked at.
+ */
+bool looks_for_waiting(struct core *core, uint32_t address)
+{
+    struct waiting *waiting = &core->waiting;
+    struct shared *s = &core->shared;
+    const uint64_t stop = next_stop(core);
+    if (s->attention || s->halt_kind != HALT_NONE || s->cycle >= stop || core->is_scratch || core->records != NULL) {
+        return false;
+    }
+    const bool is_begin = waiting->phase == NOT_LOOKING, is_round = waiting->address == address;
+    s->stop_at = 1; /* each block is looked at */
+    if (is_begin) {
+        waiting->address = address;
+        read_all(core, waiting->registers);
+    } else if (waiting->has_acted || waiting->blocks == MOST_BLOCKS || (is_round && !is_same_round(core))) {
+        waiting->phase = NOT_LOOKING;
+        waiting->interval = waiting->interval < MOST_INTERVAL ? 2 * waiting->interval : MOST_INTERVAL;
+        waiting->next = s->cycle + waiting->interval;
+        s->stop_at = waiting->next < stop ? waiting->next : stop;
+        return true;
+    } else if (!is_round) {
+        ++waiting->blocks;
+        return true;
+    } else if (waiting->phase == SECOND_ROUND) {
+        repeat(core, stop);
+        waiting->phase = NOT_LOOKING;
+        waiting->interval = LEAST_INTERVAL;
+        s->stop_at = stop;
+        return true;
+    }
+    ++waiting->phase;
+    waiting->blocks = 1;
+    waiting->has_acted = 0;
+    waiting->cycle = s->cycle;
+    return true;
 }
 
 /* How many rounds begin before the run has to end, without the last of them: what is due by then may be seen by that
  * round's own read.
  */
-uint64_t rounds_left(const struct core *core, const struct row *row)
+static uint64_t rounds_left(const struct core *core, const struct row *row)
 {
-    return (core->shared.stop_at - core->shared.cycle - 1) / row->costs[1];
+    return (next_stop(core) - core->shared.cycle - 1) / row->costs[1];
 }
 
-/* Lets the time of some rounds pass. The rows of the last ones are kept. */
+/* Lets the time of some rounds of a block pass. The rows of the last ones are kept. */
 void wait_on(struct core *core, const struct row *row, uint64_t rounds)
 {
     struct shared *s = &core->shared;
+    core->waiting.has_acted |= rounds != 0;
     for (uint64_t n = rounds > LAST_ROWS ? rounds - LAST_ROWS : 1; n <= rounds; ++n) {
         record_at(core, s->cycle + n * row->costs[1], row->start, 0);
     }
@@ -119,7 +190,7 @@ uint64_t rounds_of_counter(struct core *core, const struct row *row)
     const struct shared *s = &core->shared;
     const uint32_t address = read_register(core, REG_R0 + loop->base) + loop->offset;
     if ((address != DWT_CYCCNT && address != STK_VAL) || !s->stop_at || !is_privileged(core)) {
-        return polls_unchanged(core, row) ? rounds_left(core, row) : 0;
+        return 0;
     }
     const struct ramp *ramp = address == DWT_CYCCNT ? &s->cyccnt : &s->tick;
     uint32_t operands[sizeof loop->steps / sizeof *loop->steps];

@@ -42,6 +42,7 @@ struct core *core_new(void *unicorn, const struct unicorn_api *api, const struct
         core->none.after[0] = core->none.after[1] = &core->none;
         core->block = &core->none;
         core->paged_region = core->system_region = UINT32_MAX;
+        core->waiting.interval = LEAST_INTERVAL;
         system_init(&core->shared);
     }
     return core;
@@ -54,6 +55,7 @@ void core_free(struct core *core)
     core_forget_rows(core);
     free_dropped(core);
     free(core->records);
+    free(core->waiting.memory);
     while (core->allocations != NULL) {
         struct allocation *one = core->allocations;
         core->allocations = one->next;
@@ -257,7 +259,7 @@ bool goes_on(struct core *core, uint32_t address)
         return false;
     }
     s->stop_at = stop;
-    core->polling.cycle = NO_TIME; /* what a loop waits for may be there now */
+    look_later(core);
     return true;
 }
 
@@ -299,6 +301,7 @@ static uint32_t run(struct core *core, uint64_t limit)
             s->mask_stop = 0;
         }
         s->stop_at = stop;
+        look_later(core);
         const uint32_t kind = run_slice(core);
         switch (kind) {
         case HALT_BOUNDARY: break;
