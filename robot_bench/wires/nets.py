@@ -128,19 +128,19 @@ class Net(Stateful):
     """
 
     STATE = (
-        "_drives", "_last_level", "last_edge", "_notified_until", "_notified_level", "_notified_contention",
+        "_drives", "last_edge", "_notified_until", "_notified_level", "_notified_contention",
         "_contentions", "_notified_wave", "_waves", "_may_wave",
     )  # fmt: skip
     #: Who listens is settled when a bench is built.
-    DERIVED = ("_watchers",)
+    DERIVED = ("_watchers", "_last_level")
 
     def __init__(self, name: str, *, idle: bool = False) -> None:
         self.name = name
         self.idle = idle
         self._drives: dict[str, History] = {}
         self._watchers: list[Watcher] = []
-        #: The time of the last drive known so far, and the level after it.
-        self._last_level = idle
+        #: The time of the last drive known so far, and the level after it; None: not worked out.
+        self._last_level: bool | None = idle
         self.last_edge: Nanos = 0
         #: Level and fighting owners at the end of what `edges_until` has returned.
         self._notified_until: Nanos = -1
@@ -198,7 +198,7 @@ class Net(Stateful):
 
     def level(self, at: Nanos) -> bool:
         """Return the level at the instant `at`, an edge at `at` included."""
-        return self._last_level if at >= self.last_edge and not self._may_wave else self._resolve(at)
+        return self._resolve(at) if at < self.last_edge or self._may_wave else self._level_at_last()
 
     def wave(self, at: Nanos) -> Wave | None:
         """Return the wave that is on the wire at the instant `at`; None where it has a level."""
@@ -208,7 +208,7 @@ class Net(Stateful):
     def course(self, begin: Nanos, end: Nanos) -> list[tuple[Nanos, bool | Wave]]:
         """Return what the wire does from `begin` on until before `end`: when, and the level or wave."""
         if self.last_edge <= begin and not self._may_wave:
-            return [(begin, self._last_level)]
+            return [(begin, self._level_at_last())]
         cuts = {at for history in self._drives.values() for at in history.between(begin, end)}
         return [(at, self._shown(at)) for at in (begin, *sorted(cuts))]
 
@@ -257,8 +257,7 @@ class Net(Stateful):
             for at in history.waves.keys() - set(history.times):
                 del history.waves[at]
             later = later or history.times[-1] > limit
-        if self._may_wave and not any(history.waves for history in self._drives.values()):
-            self._may_wave, self._last_level = False, self._resolve(self.last_edge)
+        self._may_wave = self._may_wave and any(history.waves for history in self._drives.values())
         return later
 
     def _levels(self, after: Nanos, limit: Nanos) -> Edges:
@@ -339,10 +338,18 @@ class Net(Stateful):
     def _driven(self, owner: str, first: Nanos, last: Nanos) -> None:
         """Work out what follows from new drives, and tell whoever watches."""
         self.last_edge = max(self.last_edge, last)
-        if not self._may_wave:
-            self._last_level = self._resolve(self.last_edge)
+        self._last_level = None
         for watcher in self._watchers:
             watcher(self, owner, first)
+
+    def _level_at_last(self) -> bool:
+        """Return the level after the last drive, where no wave is there."""
+        if self._last_level is None:
+            self._last_level = self._resolve(self.last_edge)
+        return self._last_level
+
+    def _restored(self) -> None:
+        self._last_level = None
 
     def _resolve(self, at: Nanos) -> bool:
         level = _resolved(tuple([history.at(at) for history in self._drives.values()]))

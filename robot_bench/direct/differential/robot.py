@@ -29,8 +29,8 @@ from simbase.timing import NS_PER_S, Nanos, Reached
 
 #: chosen: a wheel's own speed counts from this difference to its motor on, as a part and as a speed of the rim.
 HELD_SHARE, HELD_MPS = 0.1, 0.001
-#: chosen: volts on a pin change by an eighth of what the ADC tells apart, 3.3 V by 4096.
-VOLTS_STEP = 1e-4
+#: chosen: volts on a pin change by half of what the ADC tells apart, 3.3 V by 4096.
+VOLTS_STEP = 4e-4
 #: chosen: bumpers and stalls are looked at each 10 ms, as programs do.
 LOOK_STEPS = 10
 
