@@ -173,8 +173,8 @@ class Pin:
         if not self.is_bonded:
             raise ValueError(f"{self.name} is not bonded out on this package")
         index, drives = self.index, _LATER[is_weak]
-        rows = sorted(levels, key=itemgetter(0))
-        self._bank.fabric.put_inputs(b"".join(EDGE.pack(at, index, drives[level], 0, 0, 0) for at, level in rows))
+        rows = [EDGE.pack(at, index, drives[level], 0, 0, 0) for at, level in sorted(levels, key=itemgetter(0))]
+        self._bank.fabric.put_inputs(b"".join(rows))
 
     def short(self, rail: str | None) -> None:
         """Tie the wire to a supply rail, as a solder bridge does; None cuts it again.

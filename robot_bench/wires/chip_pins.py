@@ -16,7 +16,7 @@ Invariant: what is put on the chip's pin follows `level_without(OWNER)` of its n
 from array import array
 from collections.abc import Callable, Iterable, Mapping
 from heapq import merge
-from typing import Protocol
+from typing import Protocol, cast
 
 from bluepill_sim.fabric.pins import PinDrive
 from bluepill_sim.fabric.subscriptions import EDGE, PinSubscription, PinSubscriptions, read_wave
@@ -169,16 +169,13 @@ class ChipPins:
         if len(times) == 1 and at <= self._chip.now_ns:
             self._pass_on(net, at)
             return
-        hard: list[tuple[Nanos, bool]] = []
-        weak: list[tuple[Nanos, bool]] = []
-        for when in times:
-            level, is_hard = net.level_without(OWNER, when)
-            if level is None:
-                raise LocalProtocolError(f"{owner} lets {net.name} go ahead of the chip")
-            (hard if is_hard else weak).append((when, level))
-        for levels in (hard, weak):
-            if levels:
-                self._pins[net.name].drive_later(levels, is_weak=levels is weak)
+        levels = net.levels_without(OWNER, times)
+        if any(level is None for level, _ in levels):
+            raise LocalProtocolError(f"{owner} lets {net.name} go ahead of the chip")
+        pin = self._pins[net.name]
+        for strength in {is_hard for _, is_hard in levels}:
+            rows = [(when, level) for when, (level, is_hard) in zip(times, levels, strict=True) if is_hard is strength]
+            pin.drive_later(cast("list[tuple[Nanos, bool]]", rows), is_weak=not strength)
 
     def _pass_on(self, net: Net, at: Nanos) -> None:
         level, is_hard = net.level_without(OWNER, at)

@@ -18,7 +18,7 @@ on the order in which different owners reported them.
 
 from array import array
 from bisect import bisect_left, bisect_right
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 from enum import Enum
 from functools import cache
@@ -215,6 +215,14 @@ class Net(Stateful):
     def level_without(self, owner: str, at: Nanos) -> tuple[bool | None, bool]:
         """Return what everybody but `owner` puts on the wire, None where nobody holds it, and whether it is hard."""
         return _held(tuple([history.at(at) for name, history in self._drives.items() if name != owner]))
+
+    def levels_without(self, owner: str, times: Sequence[Nanos]) -> list[tuple[bool | None, bool]]:
+        """Return what `level_without` has at some instants."""
+        others = [history for name, history in self._drives.items() if name != owner]
+        if len(others) == 1:
+            at = others[0].at
+            return [_held((at(when),)) for when in times]
+        return [_held(tuple([history.at(when) for history in others])) for when in times]
 
     def drive_at(self, owner: str, at: Nanos) -> WaveDrive | None:
         """Return the wave that `owner` puts on the wire at the instant `at`; None for none."""

@@ -93,18 +93,18 @@ class DifferentialRobot(Stateful):
     def _step(self) -> None:
         body, train, cell, battery = self.body, self.train, self.cell, self._robot.battery
         begin, end = self._steps * body.dt_ns, (self._steps + 1) * body.dt_ns
-        left, right = (bridge.shares(begin, end) for bridge in self._bridges)
+        left, right = self._bridges[0].shares(begin, end), self._bridges[1].shares(begin, end)
         cell.volts = train.supply_v(left, right, cell.source_v, battery.resistance_ohm, battery.idle_current_a)
         made = train.step(left, right, cell.volts)
         cell.give(made.supply_a + battery.idle_current_a, self._dt_s)
         turned = body.step(made.left_radps * self._radius_m, made.right_radps * self._radius_m)
-        before, self._angles = self._angles, (turned.left_angle_rad, turned.right_angle_rad)
-        real_l, real_r = ((after - angle) / self._dt_s for angle, after in zip(before, self._angles, strict=True))
-        train.left_radps = self._held(made.left_radps, real_l, train.left_radps)
-        train.right_radps = self._held(made.right_radps, real_r, train.right_radps)
+        angle_l, angle_r = self._angles
+        self._angles = turned_l, turned_r = turned.left_angle_rad, turned.right_angle_rad
+        train.left_radps = self._held(made.left_radps, (turned_l - angle_l) / self._dt_s, train.left_radps)
+        train.right_radps = self._held(made.right_radps, (turned_r - angle_r) / self._dt_s, train.right_radps)
         self._steps += 1
-        for encoder, angle in zip(self._encoders, self._angles, strict=True):
-            encoder.turn_to(angle, end, body.dt_ns)
+        self._encoders[0].turn_to(turned_l, end, body.dt_ns)
+        self._encoders[1].turn_to(turned_r, end, body.dt_ns)
         self._show(end)
 
     def _held(self, asked: float, real: float, now: float) -> float:
