@@ -160,7 +160,7 @@ class Pin:
             for listener in self._bank.release_listeners:
                 listener(self)
 
-    def drive_later(self, levels: Iterable[tuple[Nanos, bool]], *, is_weak: bool = False) -> None:
+    def drive_later(self, levels: Iterable[tuple[Nanos, int]], *, is_weak: bool = False) -> None:
         """Put levels on the wire from outside at times to come, without anybody stopping the chip there.
 
         Args:

@@ -22,7 +22,7 @@ from bluepill_sim.fabric.pins import PinDrive
 from bluepill_sim.fabric.subscriptions import EDGE, PinSubscription, PinSubscriptions, read_wave
 from p2os.errors import LocalProtocolError
 from robot_bench.wires.edges import NO_WIRE, split
-from robot_bench.wires.nets import RELEASED, Harness, Net, Strength, WaveDrive
+from robot_bench.wires.nets import HARD, RELEASED, Harness, Net, Strength, WaveDrive
 from robot_bench.wires.waves import edge_times
 from simbase.timing import Nanos
 
@@ -38,6 +38,9 @@ CODES = {
     PinDrive.PULL_DOWN: Strength.PULL.codes[0],
 }
 _CODE_OF_DRIVE = bytes(CODES[drive] for drive in PinDrive).ljust(256, b"\0")
+#: The codes that drive hard, and the level of each code of these; 256 bytes.
+_HARD = bytes(HARD)
+_LEVEL_OF_HARD = bytes(HARD.get(code, False) for code in range(256))
 PINS_A_PORT = 16
 #: Where a row of `EDGE` says whether it is one of a wave.
 _KIND = 11
@@ -50,7 +53,7 @@ class ChipPin(Protocol):
         """Put a level on the wire from outside, by a resistor where `is_weak`; None lets go."""
         ...
 
-    def drive_later(self, levels: Iterable[tuple[Nanos, bool]], *, is_weak: bool = False) -> None:
+    def drive_later(self, levels: Iterable[tuple[Nanos, int]], *, is_weak: bool = False) -> None:
         """Put levels on the wire from outside at times to come."""
         ...
 
@@ -165,9 +168,12 @@ class ChipPins:
     def _other_drives(self, net: Net, owner: str, at: Nanos) -> None:
         if owner == OWNER:
             return
-        times = net.times_after(owner, at - 1)
+        times, codes = net.drives_from(owner, at)
         if len(times) == 1 and at <= self._chip.now_ns:
             self._pass_on(net, at)
+            return
+        if net.is_alone(owner, OWNER) and not codes.strip(_HARD):
+            self._pins[net.name].drive_later(zip(times, codes.translate(_LEVEL_OF_HARD), strict=True))
             return
         levels = net.levels_without(OWNER, times)
         if any(level is None for level, _ in levels):
@@ -175,7 +181,7 @@ class ChipPins:
         pin = self._pins[net.name]
         for strength in {is_hard for _, is_hard in levels}:
             rows = [(when, level) for when, (level, is_hard) in zip(times, levels, strict=True) if is_hard is strength]
-            pin.drive_later(cast("list[tuple[Nanos, bool]]", rows), is_weak=not strength)
+            pin.drive_later(cast("list[tuple[Nanos, int]]", rows), is_weak=not strength)
 
     def _pass_on(self, net: Net, at: Nanos) -> None:
         level, is_hard = net.level_without(OWNER, at)

@@ -216,6 +216,16 @@ class Net(Stateful):
         """Return what everybody but `owner` puts on the wire, None where nobody holds it, and whether it is hard."""
         return _held(tuple([history.at(at) for name, history in self._drives.items() if name != owner]))
 
+    def drives_from(self, owner: str, begin: Nanos) -> "tuple[array[int], bytearray]":
+        """Return the drives of `owner` from `begin` on: when, and their codes."""
+        history = self._drives[owner]
+        place = bisect_left(history.times, begin)
+        return history.times[place:], history.codes[place:]
+
+    def is_alone(self, owner: str, other: str) -> bool:
+        """Tell whether nobody but these two has driven the wire."""
+        return len(self._drives) <= 1 + (other in self._drives) and owner in self._drives
+
     def levels_without(self, owner: str, times: Sequence[Nanos]) -> list[tuple[bool | None, bool]]:
         """Return what `level_without` has at some instants."""
         others = [history for name, history in self._drives.items() if name != owner]

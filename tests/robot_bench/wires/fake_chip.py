@@ -31,7 +31,7 @@ class FakePin:
 
     def drive_later(self, levels: Iterable[tuple[int, bool]], *, is_weak: bool = False) -> None:
         for _, level in levels:  # its blocks are long
-            self.drive(level, is_weak=is_weak)
+            self.drive(bool(level), is_weak=is_weak)
 
 
 class FakeSubscription:
