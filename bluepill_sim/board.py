@@ -31,6 +31,8 @@ from bluepill_sim.core.halts import ChipReached
 from bluepill_sim.core.nvic import HARD_FAULT, exception_name
 from bluepill_sim.errors import BluePillError, ImageError, UnmodelledError
 from bluepill_sim.fabric.pins import Pin, PinDrive
+from bluepill_sim.fabric.registers import RegisterView
+from bluepill_sim.fabric.signals import UV_PER_V, to_uv
 from bluepill_sim.fabric.subscriptions import EdgeSink, Of, PinSubscription
 from bluepill_sim.memory import Memory
 from bluepill_sim.peripherals.rcc import ResetCause
@@ -52,6 +54,8 @@ STEP_NS: Nanos = 1 * NS_PER_MS
 #: How many of the last characters of a port a message shows.
 _SHOWN_CHARACTERS = 60
 
+#: DS5319 table 6, VDDA above VSS; and more than any chip bears.
+_MOST_VDDA_V, _MOST_DEGREES = 4.0, 200
 _ERASED_WORD = 0xFFFF_FFFF
 #: Those of `SeenFault`.
 _SEEN_REGISTERS = (*GENERAL[:15], Register.XPSR)
@@ -193,6 +197,30 @@ class BluePill(Stateful):
             KeyError: the chip has no such pin.
         """
         return self.chip.pins[name]
+
+    @property
+    def vdda_v(self) -> float:
+        """The supply of the ADCs, and their reference, in volts: 3.3, or what was set, above 0 and at most 4."""
+        return float(self.chip.fabric.analog_struct.vdda_uv / UV_PER_V)
+
+    @vdda_v.setter
+    def vdda_v(self, volts: float) -> None:
+        if not 0 < volts <= _MOST_VDDA_V:
+            raise ValueError(f"VDDA of {volts} V")
+        self.chip.fabric.inputs_change()
+        self.chip.fabric.analog_struct.vdda_uv = to_uv(volts)
+
+    @property
+    def temperature_c(self) -> float:
+        """The temperature of the chip in degrees Celsius: 25, or what was set, from -200 to 200."""
+        return float(self.chip.fabric.analog_struct.temperature_mc / 1000)
+
+    @temperature_c.setter
+    def temperature_c(self, degrees: float) -> None:
+        if not abs(degrees) <= _MOST_DEGREES:
+            raise ValueError(f"a chip at {degrees} degrees")
+        self.chip.fabric.inputs_change()
+        self.chip.fabric.analog_struct.temperature_mc = round(1000 * degrees)
 
     def subscribe_pins(
         self, pins: Iterable[str], sink: EdgeSink, *, of: Of = Of.DRIVE, ends_slice: Iterable[str] = (),
@@ -336,6 +364,19 @@ class BluePill(Stateful):
     def register(self, name: str) -> int:
         """Return a register by its name, such as "R0", "SP" or "XPSR"."""
         return self.chip.engine.registers[Register[name.upper()]]
+
+    def registers(self, peripheral: str) -> dict[str, RegisterView]:
+        """Return the registers of a peripheral by name, with their fields, as a read would find them; nothing changes.
+
+        `board.registers("TIM3")["CR1"]["CEN"]` is a field, `print(board.registers("TIM3")["CR1"])` shows them all.
+
+        Raises:
+            BluePillError: The emulated chip has no such peripheral.
+        """
+        parts = self.chip.parts.by_name
+        if peripheral not in parts:
+            raise BluePillError(f"no peripheral {peripheral!r}", hint=f"there are {', '.join(parts)}")
+        return parts[peripheral].view()
 
     def read_memory(self, address: int, size: int) -> bytes | None:
         """Return bytes of flash or SRAM; None where there is no memory."""

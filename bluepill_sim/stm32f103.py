@@ -16,12 +16,15 @@ from bluepill_sim.fabric.fabric import Fabric
 from bluepill_sim.fabric.pins import PinBank, PinPorts
 from bluepill_sim.fabric.ports import ChipPorts
 from bluepill_sim.fabric.registers import ClockBit, Peripheral, Place
+from bluepill_sim.peripherals.adc import Adc, Adc2
 from bluepill_sim.peripherals.afio import Afio
+from bluepill_sim.peripherals.dma import Dma
 from bluepill_sim.peripherals.exti import Exti
 from bluepill_sim.peripherals.flash import Flash
 from bluepill_sim.peripherals.gpio import Gpio
 from bluepill_sim.peripherals.iwdg import Iwdg
 from bluepill_sim.peripherals.rcc import Rcc, ResetCause
+from bluepill_sim.peripherals.tim import AdvancedTimer, GeneralTimer
 from bluepill_sim.peripherals.usart import Usart
 from bluepill_sim.peripherals.wwdg import Wwdg
 from simbase.state import Stateful
@@ -161,13 +164,35 @@ PERIPHERALS: tuple[tuple[_Maker, str], ...] = (
     (Gpio, "GPIOD"),
     (Gpio, "GPIOE"),
     (Exti, "EXTI"),
+    (Dma, "DMA1"),
+    (Adc, "ADC1"),
+    (Adc2, "ADC2"),
     (Usart, "USART1"),
     (Usart, "USART2"),
     (Usart, "USART3"),
     (Iwdg, "IWDG"),
     (Wwdg, "WWDG"),
+    (AdvancedTimer, "TIM1"),
+    (GeneralTimer, "TIM2"),
+    (GeneralTimer, "TIM3"),
+    (GeneralTimer, "TIM4"),
 )
 
+
+#: The requests of each channel of DMA1 (RM0008 table 78).
+_REQUESTS = {
+    1: ("ADC1.dma", "TIM2.cc3_dma", "TIM4.cc1_dma"),
+    2: ("SPI1.rx_dma", "USART3.tx_dma", "TIM1.cc1_dma", "TIM2.up_dma", "TIM3.cc3_dma"),
+    3: ("SPI1.tx_dma", "USART3.rx_dma", "TIM1.cc2_dma", "TIM3.cc4_dma", "TIM3.up_dma"),
+    4: (
+        "SPI2.rx_dma", "USART1.tx_dma", "I2C2.tx_dma",
+        "TIM1.cc4_dma", "TIM1.trig_dma", "TIM1.com_dma", "TIM4.cc2_dma",
+    ),
+    5: ("SPI2.tx_dma", "USART1.rx_dma", "I2C2.rx_dma", "TIM1.up_dma", "TIM2.cc1_dma", "TIM4.cc3_dma"),
+    6: ("USART2.rx_dma", "I2C1.tx_dma", "TIM1.cc3_dma", "TIM3.cc1_dma", "TIM3.trig_dma"),
+    7: ("USART2.tx_dma", "I2C1.rx_dma", "TIM2.cc2_dma", "TIM2.cc4_dma", "TIM4.up_dma"),
+}  # fmt: skip
+_DMA1_REQUESTS = {output: (f"DMA1.ch{n}",) for n, outputs in _REQUESTS.items() for output in outputs}
 
 #: Where each output leads: interrupts by their numbers (RM0008 10.1.2), inputs of devices by their names. Outputs
 #: that lead to the same are one line, which is their OR; the source may be a device that is not modelled.
@@ -181,7 +206,17 @@ WIRING: dict[str, tuple[int | str, ...]] = {
     "EXTI.2": (8,),
     "EXTI.3": (9,),
     "EXTI.4": (10,),
+    **{f"DMA1.ch{n}_irq": (10 + n,) for n in range(1, 8)},
+    "ADC1.irq": (18,),
+    "ADC2.irq": (18,),
     "EXTI.9_5": (23,),
+    "TIM1.brk_irq": (24,),
+    "TIM1.up_irq": (25,),
+    "TIM1.trg_com_irq": (26,),
+    "TIM1.cc_irq": (27,),
+    "TIM2.irq": (28,),
+    "TIM3.irq": (29,),
+    "TIM4.irq": (30,),
     "USART1.irq": (37,),
     "USART2.irq": (38,),
     "USART3.irq": (39,),
@@ -192,6 +227,22 @@ WIRING: dict[str, tuple[int | str, ...]] = {
     "PWR.pvd": ("EXTI.pvd",),
     "RTC.alarm": ("EXTI.rtc_alarm",),
     "USB.wakeup": ("EXTI.usb_wakeup",),
+    **_DMA1_REQUESTS,
+    # Triggers: of other timers (RM0008 tables 82 and 86), of both ADCs' regular and injected groups (67 and 68).
+    "TIM1.trgo": ("TIM2.itr0", "TIM3.itr0", "TIM4.itr0", "ADC1.tim1_trgo", "ADC2.tim1_trgo"),
+    "TIM2.trgo": ("TIM1.itr1", "TIM3.itr1", "TIM4.itr1", "ADC1.tim2_trgo", "ADC2.tim2_trgo"),
+    "TIM3.trgo": ("TIM1.itr2", "TIM2.itr2", "TIM4.itr2", "ADC1.tim3_trgo", "ADC2.tim3_trgo"),
+    "TIM4.trgo": ("TIM1.itr3", "TIM2.itr3", "TIM3.itr3", "ADC1.tim4_trgo", "ADC2.tim4_trgo"),
+    "TIM1.cc1": ("ADC1.tim1_cc1", "ADC2.tim1_cc1"),
+    "TIM1.cc2": ("ADC1.tim1_cc2", "ADC2.tim1_cc2"),
+    "TIM1.cc3": ("ADC1.tim1_cc3", "ADC2.tim1_cc3"),
+    "TIM2.cc2": ("ADC1.tim2_cc2", "ADC2.tim2_cc2"),
+    "TIM4.cc4": ("ADC1.tim4_cc4", "ADC2.tim4_cc4"),
+    "EXTI.line11": ("ADC1.exti_line11", "ADC2.exti_line11"),
+    "TIM1.cc4": ("ADC1.tim1_cc4", "ADC2.tim1_cc4"),
+    "TIM2.cc1": ("ADC1.tim2_cc1", "ADC2.tim2_cc1"),
+    "TIM3.cc4": ("ADC1.tim3_cc4", "ADC2.tim3_cc4"),
+    "EXTI.line15": ("ADC1.exti_line15", "ADC2.exti_line15"),
 }
 #: The first line that is no interrupt.
 _FIRST_INNER_LINE = 64

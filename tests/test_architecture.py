@@ -232,6 +232,7 @@ LONG_FOLDERS = {
     ".": "the top folder",
     "p2os/robots": "one TOML file a robot, beside the loader that finds them",
     "robot_bench/firmware": "the sources and programs of the examples, built by one command",
+    "bluepill_sim/peripherals": "one peripheral a file",
     "docs": "one page a subject",
     "tests/adapter_fw": "one rig, many runs of the same firmware",
     "tests/bluepill_sim/core": "one assembled machine for all of them",

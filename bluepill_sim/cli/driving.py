@@ -3,6 +3,7 @@
 Invariant: the same list gives the same run, whatever the slices.
 """
 
+import re
 import sys
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
@@ -12,6 +13,7 @@ from bluepill_sim.board import BluePill, WaitError
 from bluepill_sim.core.halts import ChipReached
 from bluepill_sim.errors import BluePillError
 from bluepill_sim.fabric.pins import Pin
+from bluepill_sim.fabric.signals import to_uv
 from bluepill_sim.program.last_blocks import TITLE
 from bluepill_sim.spans import to_nanos
 from simbase.timing import NS_PER_S, Nanos, Reason
@@ -22,12 +24,13 @@ _LEVELS: dict[str, Callable[[Pin], None]] = {
     "1": lambda pin: pin.drive(1),
     "low": lambda pin: pin.drive(0),
     "high": lambda pin: pin.drive(1),
-    "5v": lambda pin: pin.drive(1, volts=5.0),
     "z": lambda pin: pin.drive(None),
     "gnd": lambda pin: pin.short("GND"),
     "3v3": lambda pin: pin.short("3V3"),
 }
-_HINT = "PIN=LEVEL@TIME with a level of 0, 1, z, 5V, GND or 3V3, such as PA6=1@3.5s"
+_HINT = "PIN=LEVEL@TIME with a level of 0, 1, z, GND, 3V3 or volts, such as PA6=1@3.5s or PA0=1.65V"
+#: Volts as they are typed, in lower case.
+_VOLTS = re.compile(r"(-?\d+(?:\.\d+)?)v")
 
 
 class OverBudgetError(BluePillError):
@@ -42,7 +45,7 @@ class Change:
 
     at_ns: Nanos
     pin: str
-    #: One of the words that `--drive` knows.
+    #: One of the words that `--drive` knows, or volts such as "1.65v".
     level: str
 
 
@@ -56,7 +59,7 @@ def parse_changes(texts: Sequence[str], board: BluePill) -> list[Change]:
     for text in texts:
         name, _, rest = text.partition("=")
         level, _, at = rest.partition("@")
-        if level.lower() not in _LEVELS:
+        if level.lower() not in _LEVELS and not _is_volts(level.lower()):
             raise BluePillError(f"--drive {text!r} is not understood", hint=_HINT)
         try:
             is_bonded = board.pin(name.upper()).is_bonded
@@ -105,7 +108,26 @@ class Schedule:
     def _act(self, now_ns: Nanos) -> None:
         while self._left and self._left[-1].at_ns <= now_ns:
             change = self._left.pop()
-            _LEVELS[change.level](self._board.pin(change.pin))
+            _put(self._board.pin(change.pin), change.level)
+
+
+def _is_volts(level: str) -> bool:
+    """Tell whether a level is volts that a pin may have."""
+    found = _VOLTS.fullmatch(level)
+    try:
+        return found is not None and to_uv(float(found[1])) is not None
+    except ValueError:
+        return False
+
+
+def _put(pin: Pin, level: str) -> None:
+    """Put a level on a pin, in place of volts before it."""
+    if level in _LEVELS:
+        if pin.has_volts:
+            pin.set_volts(None)
+        _LEVELS[level](pin)
+    else:
+        pin.set_volts(float(level[:-1]))
 
 
 def run_driven(board: BluePill, end_ns: Nanos, changes: Sequence[Change]) -> ChipReached:

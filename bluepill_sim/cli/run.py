@@ -37,6 +37,7 @@ Examples:
   p2os mcu run mine.elf --for 2s --uart log.txt  what it prints goes to a file
   p2os mcu run mine.elf --realtime --uart pty:   talk to it with any terminal program, until Ctrl-C
   p2os mcu run mine.elf --drive PA6=1@500ms      something comes before a sensor
+  p2os mcu run mine.elf --drive PA0=1.65V        what the ADC sees on a pin
   p2os mcu run mine.elf --until "pin PC13 low"   up to an event
 """
 

@@ -154,8 +154,7 @@ class Inspector:
         part = None if name is None else chip.parts.by_name.get(name)
         if part is None or name is None:
             return None
-        index = (address - BASES[name]) // 4
-        return part.words[index] if index < len(part.words) else 0
+        return part.look(address - BASES[name]) if address - BASES[name] < part.place.size else 0
 
     def _write_peripheral(self, address: int, data: bytes) -> bool:
         chip = self._board.chip

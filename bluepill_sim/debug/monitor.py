@@ -27,6 +27,7 @@ COMMANDS = {
     "time": Command("time", "virtual time, cycles, clock"),
     "pins": Command("pins [all]", "pins in use: mode, level, who drives"),
     "pin": Command("pin PA4 [1|0|z]", "one pin; with a level: drive it from outside, z lets go"),
+    "registers": Command("registers TIM3 [CR1]", "registers of a peripheral with their fields"),
     "snapshot": Command("snapshot [NAME]", "keep the whole machine's state"),
     "restore": Command("restore [NAME]", "go back to it"),
     "fault": Command("fault", "the fault, if there was one, with what ran before it"),
@@ -57,6 +58,7 @@ class Monitor:
             "time": self._time,
             "pins": self._pins,
             "pin": self._pin,
+            "registers": self._registers,
             "snapshot": self._snapshot,
             "restore": self._restore,
             "fault": self._fault,
@@ -67,7 +69,7 @@ class Monitor:
         return (f"{line}: {_UNKNOWN}" if act is None else act(words[1:])) + "\n"
 
     def _help(self, _words: list[str]) -> str:
-        return "\n".join(f"{command.usage:<18} {command.help}" for command in COMMANDS.values())
+        return "\n".join(f"{command.usage:<22} {command.help}" for command in COMMANDS.values())
 
     def _reset(self, _words: list[str]) -> str:
         board = self._execution.machine.board
@@ -91,6 +93,8 @@ class Monitor:
         if not every and pin.mode.value == "floating input" and pin.driven is None and pin.holder is None:
             return ""
         level = "floating" if pin.is_floating else "high" if pin.level else "low"
+        if pin.wave is not None:
+            level = f"{pin.wave.frequency_hz:g} Hz, {100 * pin.wave.duty:.1f} %"
         outside = {None: "", True: ", high from outside", False: ", low from outside"}[pin.driven]
         use = pin.holder or pin.function or ""
         return f"{name:<5} {level:<9} {pin.mode.value}{f' ({use})' if use else ''}{outside}"
@@ -105,6 +109,27 @@ class Monitor:
             board.pin(name).drive(_LEVELS[words[1].lower()])
             self._execution.changed()
         return self._line(name, every=True)
+
+    def _registers(self, words: list[str]) -> str:
+        board = self._execution.machine.board
+        parts = board.chip.parts.by_name
+        if not words:
+            return ", ".join(parts)
+        name, *wanted = (word.upper() for word in words)
+        if name not in parts or len(wanted) > 1:
+            return f"registers {' '.join(words)}: {_UNKNOWN}"
+        views = board.registers(name)
+        if not wanted:
+            return "\n".join(f"{view.name:<8} {view}" for view in views.values())
+        if wanted[0] not in views:
+            return f"{name} has no {wanted[0]}; it has {', '.join(views)}"
+        view = views[wanted[0]]
+        return "\n".join(
+            [
+                f"{name}_{view.name} at {view.address:#010x}: {view.word:#010x}",
+                *(f"{field:<12} {value:#x}" for field, value in view.fields),
+            ]
+        )
 
     def _snapshot(self, words: list[str]) -> str:
         if not self._execution.machine.can_rewind:

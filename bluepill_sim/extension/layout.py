@@ -18,6 +18,8 @@ PORTS, PINS = 5, 16
 SOURCES = 64
 #: How many of the last rows are kept with or without a recorder; a power of 2.
 LAST_ROWS = 32
+#: Channels of an ADC that lead to pins: PA0 to PA7, PB0, PB1.
+ANALOG_PINS = 10
 #: Exceptions of the architecture that a chip of the family can have.
 EXCEPTIONS = 76
 #: Characters that wait in C to arrive at a USART; the others wait in Python.
@@ -73,14 +75,25 @@ INSTRUCTION = Struct(
 )
 RAMP = Struct(
     "ramp",
-    "A counter that follows from the time: `source/core/ramp.c`.",
+    "A counter that follows from the time: `source/fabric/ramp.c`.",
     (
         Field("base", "u64", doc="when it had `value`, in the units of its owner,"),
         Field("value", "u32"),
         Field("divider", "u32", doc="so many of which make it count once;"),
         Field("top", "u32", doc="its limit: 0 and this are neighbours"),
         *_fields("u8", "runs", "falls"),
-        Field("padding", "u16"),
+        Field("mirrors", "u8", doc="it turns round at both"),
+        Field("padding", "u8"),
+    ),
+)
+TICKS = Struct(
+    "ticks",
+    "A clock that is counted from where the core's was last changed.",
+    (
+        Field("ns", "u64", doc="when"),
+        Field("tick", "u64", doc="begins; each one after it at floor(n * 10**9 / hz) ns"),
+        Field("hz", "u32"),
+        Field("padding", "u32"),
     ),
 )
 STEP = Struct(
@@ -194,7 +207,141 @@ USART = Struct(
     ),
 )
 EXTI = Struct("exti", "What EXTI holds beyond its registers.", (Field("levels", "u32"), Field("routes", "u8", PINS)))
+DMA = Struct(
+    "dma",
+    "What a DMA controller holds beyond its registers. RM0008 13.3.",
+    (
+        Field("base_ns", "u64", doc="start of the transfers that follow each other without a gap,"),
+        Field("cycles", "u64", doc="and cycles of HCLK from there to the end of the one under way"),
+        *_fields("u32", "hz", "apb1_cycles", "apb2_cycles"),
+        Field("current", "u32", doc="1 + the channel whose transfer is under way; 0: none"),
+        Field("ready", "u32", doc="channels that are enabled and have something left,"),
+        Field("unasked", "u32", doc="those that need no request,"),
+        Field("lines", "u32", doc="those whose request is high,"),
+        Field("latched", "u32", doc="and those of which a request has come"),
+        *(Field(name, "u32", 7) for name in ("peripheral", "memory", "reload")),
+        Field("padding", "u32"),
+    ),
+)
+SIGNAL = Struct(
+    "signal",
+    "Volts on a pin, from outside: `bluepill_sim/fabric/signals.py`.",
+    (
+        Field("start_ns", "u64", doc="when it began,"),
+        Field("phase_ns", "u64", doc="at this place of its period"),
+        Field("period_ns", "u64"),
+        Field("interval_ns", "u64", doc="between two samples; of a square wave, how long it is high"),
+        *_fields("i32", "low_uv", "high_uv"),
+        Field("shape", "u32", doc="0: none, the pin has its logic level"),
+        Field("is_repeated", "u32"),
+        Field("count", "u32", doc="samples, which stand elsewhere"),
+        Field("padding", "u32"),
+    ),
+)
+ANALOG = Struct(
+    "analog",
+    "The analog side of a chip.",
+    (
+        Field("vdda_uv", "u32"),
+        Field("temperature_mc", "i32", doc="of the chip, in thousandths of a degree Celsius"),
+        Field("signals", "signal", ANALOG_PINS),
+    ),
+)
+ADC = Struct(
+    "adc",
+    "What an ADC holds beyond its registers. RM0008 11.3.",
+    (
+        Field("base_ns", "u64", doc="start of the run of conversions,"),
+        Field("cycles", "u64", doc="and cycles of PCLK2 from there to the end of the present one"),
+        *_fields("u64", "sample_ns", "end_ns"),
+        Field("ready_ns", "u64", doc="no conversion begins earlier"),
+        Field("calibrated_ns", "u64", doc="when CAL and RSTCAL fall"),
+        Field("hz", "u32", doc="PCLK2,"),
+        Field("divider", "u32", doc="and what ADCCLK is divided by"),
+        Field("number", "u32", doc="1 or 2"),
+        Field("remapped", "u32", doc="bit 0: the regular group's EXTI trigger is TIM8's, bit 1: the injected one's"),
+        Field("state", "u32", doc="which group is being converted"),
+        *_fields("u32", "channel", "has_sample", "sample"),
+        Field("regular_at", "u32", doc="rank in the sequence,"),
+        Field("regular_left", "u32", doc="and conversions that are left of this trigger"),
+        Field("regular_waits", "u32", doc="for the end of the injected group"),
+        *_fields("u32", "injected_at", "injected_left"),
+        Field("is_automatic", "u32", doc="the injected group follows the regular one"),
+        Field("turns", "u32", doc="triggers that alternate, modulo 2"),
+        Field("padding", "u32"),
+        Field("warned", "u32", 6, "by question: channels that were warned of"),
+    ),
+)
 GPIO = Struct("gpio", "Which port a GPIO is.", (Field("port", "u32"),))
+FILTER = Struct(
+    "filter",
+    "A digital filter of an input. RM0008 14.4.7, IC1F.",
+    (
+        Field("sampled", "u64", doc="the tick up to which samples were taken"),
+        Field("raw", "u8", doc="the level in front of it,"),
+        Field("out", "u8", doc="and behind"),
+        Field("count", "u8", doc="samples so far that differ from `out`"),
+        Field("padding", "u8"),
+        Field("period", "u32", doc="ticks from sample to sample,"),
+        Field("length", "u32", doc="so many of which change `out`; 0: it passes everything"),
+        Field("end", "u32"),
+    ),
+)
+SHAPE = Struct(
+    "shape",
+    "What an output of a timer shows: a level, a wave, or nothing.",
+    (
+        Field("period", "u64", doc="in ticks,"),
+        Field("high", "u64", doc="of which it is so many at 1"),
+        Field("edge", "u64", doc="a tick of a rising edge, modulo the period"),
+        Field("kind", "u32", doc="nothing, low, high, a wave (`tim.h`)"),
+        Field("padding", "u32"),
+    ),
+)
+TIM = Struct(
+    "tim",
+    "What a timer holds beyond its registers. RM0008 14, 15.",
+    (
+        Field("ramp", "ramp", doc="CNT, in ticks"),
+        Field("ticks", "ticks", doc="of CK_INT"),
+        Field("at", "u64", doc="the tick up to which all is worked out"),
+        Field("idle_at", "u64", doc="the tick at which outputs go to OISx; all ones: none is to come"),
+        Field(
+            "edge_at", "u64", 3, "the tick at which OC1REF to OC3REF last changed before they were what they are now,"
+        ),
+        Field("shaped_at", "u64", 3, "since when they are that,"),
+        Field("born", "u64", 3, "and of a wave the tick of its last edge before, which there was not"),
+        Field("filters", "filter", 5, "TI1 to TI4, ETR"),
+        Field("outputs", "shape", 7, "CH1 to CH4, CH1N to CH3N"),
+        Field("references", "shape", 3, "OC1REF to OC3REF, for the dead time"),
+        Field("base", "u32", doc="the address of its registers"),
+        *_fields("u32", "psc", "arr"),
+        Field("ccr", "u32", 4, "active registers, behind the preload registers"),
+        Field("ccer", "u32", doc="the same of CCPC"),
+        Field("ccmr", "u32", 2),
+        Field("repetitions", "u32", doc="overflows before the next update event"),
+        Field("psc_count", "u32", doc="of the prescaler while no clock of its own drives it"),
+        Field("captures", "u8", 4, "events in the prescaler of an input"),
+        Field("latched", "u32", doc="OCxREF where it does not follow from CNT, a bit each"),
+        Field("cleared", "u32", doc="OCxREF that ETRF has cleared"),
+        Field("armed", "u32", doc="flags of SR whose rising is an event, because the program looks for them"),
+        Field("itr", "u32", doc="levels of the internal triggers"),
+        *_fields("u8", "trgi", "trgo", "in_break"),
+        Field("is_busy", "u8", doc="what it puts out may come back to it: pulses are not taken,"),
+        Field("late_at", "u64", doc="and levels at this tick, the next one; 0: none has come back"),
+        Field("pulses", "u32", doc="outputs that give a pulse at the end of what happens now"),
+        Field("listening", "u32", doc="bits of `pins` that are listened to,"),
+        Field("hears", "u32", doc="and of the internal triggers"),
+        *_fields("u32", "etr_was", "etr_edges"),
+        Field("burst_index", "u32", doc="the next register of a burst,"),
+        Field("burst_left", "u32", doc="transfers that are still to be asked for,"),
+        Field("burst_output", "u32", doc="by this output"),
+        Field("lock", "u32", doc="LOCK, once it was written"),
+        Field("is_advanced", "u32", doc="it is TIM1"),
+        Field("pins", "u8", 9, "CH1 to CH4, CH1N to CH3N, ETR, BKIN"),
+        Field("sources", "u8", 7, "the alternate functions of the first seven"),
+    ),
+)
 WAVE = Struct(
     "wave",
     "A level that goes up every `period` ticks, and down `high` ticks later.",
@@ -226,7 +373,8 @@ SENT = Struct(
 
 #: All of them; one that holds another comes behind it.
 STRUCTS = (
-    RECORD, INSTRUCTION, RAMP, STEP, LOOP, FAULT, SHARED, PORT, USART, EXTI, GPIO, WAVE, EDGE, INPUT_ROWS, SENT,
+    RECORD, INSTRUCTION, RAMP, TICKS, STEP, LOOP, FAULT, SHARED, PORT, USART, EXTI, DMA, SIGNAL, ANALOG, ADC, GPIO,
+    FILTER, SHAPE, TIM, WAVE, EDGE, INPUT_ROWS, SENT,
 )  # fmt: skip
 
 _KINDS: dict[str, Any] = {
@@ -282,12 +430,7 @@ def _size(struct: Struct) -> int:
     return ctypes.sizeof(structure(struct))
 
 
-_CONSTANTS = {
-    "PORTS": PORTS,
-    "PINS": PINS,
-    "SOURCES": SOURCES,
-    "LAST_ROWS": LAST_ROWS,
-    "RECEIVED": RECEIVED,
-    "LATER_INPUTS": LATER_INPUTS,
-}
+_CONSTANTS = {"PORTS": PORTS, "PINS": PINS, "SOURCES": SOURCES, "LAST_ROWS": LAST_ROWS, "RECEIVED": RECEIVED,
+    "ANALOG_PINS": ANALOG_PINS, "LATER_INPUTS": LATER_INPUTS,
+}  # fmt: skip
 _C_KINDS = {"u8": "uint8_t", "u16": "uint16_t", "u32": "uint32_t", "u64": "uint64_t", "i32": "int32_t"}

@@ -31,6 +31,8 @@ class Clocks(Stateful):
     #: Clock of TIM2-7 and TIM1/8: PCLKx, doubled when its prescaler is not 1.
     timer1_hz: int = HSI_HZ
     timer2_hz: int = HSI_HZ
+    #: What PCLK2 is divided by for the ADCs.
+    adc_divider: int = 2
     #: FLASH_ACR LATENCY, 0 to 2 wait states.
     flash_wait_states: int = 0
     #: FLASH_ACR PRFTBE.

@@ -14,7 +14,18 @@ import weakref
 from collections.abc import Callable, Iterable
 from typing import Any, Protocol, TypeVar
 
-from bluepill_sim.extension.layout import INPUT_ROWS, PORT, PORTS, SENT, SOURCES, WAVE, packing, structure
+from bluepill_sim.extension.layout import (
+    ANALOG,
+    ANALOG_PINS,
+    INPUT_ROWS,
+    PORT,
+    PORTS,
+    SENT,
+    SOURCES,
+    WAVE,
+    packing,
+    structure,
+)
 from bluepill_sim.extension.library import library
 from bluepill_sim.extension.windows import NO_TIME
 from bluepill_sim.fabric.subscriptions import EDGE
@@ -24,13 +35,15 @@ from simbase.timing import Nanos
 #: Lines, and how many words of 64 of them there are (`LINES` of fabric.h); rows show a line as a pin behind the last.
 LINES, LINE_WORDS, FIRST_LINE_ROW = 192, 3, 16 * PORTS
 #: Commands of every device (`enum command`), and the first of its own.
-RESET, CLOCK, ROUTE, OWN_COMMANDS = 0, 1, 2, 16
+RESET, CLOCK, ROUTE, SETTLE, OWN_COMMANDS = 0, 1, 2, 4, 16
 #: An alternate function that offers nothing.
 NO_LEVEL = 2
 
 #: A word that has gone out (`struct sent`): ns, the word, clock in Hz, divider, format.
 WORD = packing(SENT)
-PortStruct, WaveStruct = structure(PORT), structure(WAVE)
+PortStruct, WaveStruct, AnalogStruct = structure(PORT), structure(WAVE), structure(ANALOG)
+#: VDDA of a board as it is delivered, in microvolts, and the temperature of the chip, in thousandths of a degree.
+VDDA_UV, TEMPERATURE_MC = 3_300_000, 25_000
 _U32, _U64, _USER = ctypes.c_uint32, ctypes.c_uint64, ctypes.c_void_p
 _CYCLE = ctypes.CFUNCTYPE(_U64, _USER)
 _SET_IRQ = ctypes.CFUNCTYPE(_U32, _USER, _U32, _U32)
@@ -59,6 +72,7 @@ class Host(ctypes.Structure):
         ("signal", ctypes.c_void_p),
         ("registers", ctypes.c_void_p),
         ("holds_code", ctypes.c_void_p),
+        ("asleep_until", ctypes.c_void_p),
     )
 
 
@@ -116,9 +130,9 @@ class FabricPorts(Protocol):
 class Fabric(Stateful):
     """Queue, lines and devices of one chip."""
 
-    STATE = ("ports", "waves", "lines", "inputs")
+    STATE = ("ports", "waves", "lines", "inputs", "analog", "samples")
     #: What one of the callbacks has raised; and what is filled once, when a chip is made.
-    DERIVED = ("_failure", "electrical", "_kept", "_names", "_acts", "_answers", "_deliveries")
+    DERIVED = ("_failure", "electrical", "_kept", "_names", "_acts", "_answers", "_deliveries", "_samples")
 
     def __init__(self, chip: FabricPorts) -> None:
         self._chip = chip
@@ -150,6 +164,12 @@ class Fabric(Stateful):
         if not self.handle.value:
             raise MemoryError("no memory for the fabric")
         weakref.finalize(self, calls.fabric_free, self.handle)
+        #: `struct analog`: write it between two runs, behind a call of `inputs_change`.
+        self.analog_struct: Any = AnalogStruct(vdda_uv=VDDA_UV, temperature_mc=TEMPERATURE_MC)
+        self._samples: list[Any] = [None] * ANALOG_PINS
+        #: Called before volts on pins change: what was sampled by now, was sampled with those before.
+        self.input_listeners: list[Callable[[], object]] = []
+        calls.fabric_set_analog(self.handle, ctypes.addressof(self.analog_struct))
         self._use_python_host()
         self._schedule = calls.fabric_schedule
         self._due = calls.fabric_due
@@ -345,6 +365,43 @@ class Fabric(Stateful):
         if not self._calls_of_c.fabric_put_inputs(self.handle, self._input_slot, rows, len(rows) // EDGE.size):
             raise ValueError("too many levels of pins to come")
 
+    # Volts.
+
+    def inputs_change(self) -> None:
+        """Notify that volts on pins are about to change."""
+        for listener in self.input_listeners:
+            listener()
+
+    def channel_uv(self, channel: int, at_ns: Nanos) -> int:
+        """Return the microvolts on the pin of an ADC channel, 0 to 9, at a time."""
+        return ctypes.c_int64(self._calls_of_c.fabric_channel_uv(self.handle, channel, at_ns)).value
+
+    def set_samples(self, channel: int, samples: bytes) -> None:
+        """Give the samples of a pin's signal: 32-bit integers of microvolts."""
+        kept = (ctypes.c_int32 * (len(samples) // 4)).from_buffer_copy(samples) if samples else None
+        self._samples[channel] = kept
+        at = None if kept is None else ctypes.addressof(kept)
+        self._calls_of_c.fabric_set_samples(self.handle, channel, at)
+
+    @property
+    def analog(self) -> bytes:
+        """The analog side, as bytes."""
+        return bytes(self.analog_struct)
+
+    @analog.setter
+    def analog(self, analog: bytes) -> None:
+        ctypes.memmove(ctypes.addressof(self.analog_struct), analog, len(analog))
+
+    @property
+    def samples(self) -> tuple[bytes, ...]:
+        """The samples of each signal."""
+        return tuple(b"" if kept is None else bytes(kept) for kept in self._samples)
+
+    @samples.setter
+    def samples(self, samples: tuple[bytes, ...]) -> None:
+        for channel, data in enumerate(samples):
+            self.set_samples(channel, data)
+
     def resume(self) -> None:
         """Go on with a state that was put back, once core and clock have theirs."""
         self._calls_of_c.fabric_resume(self.handle)
@@ -522,7 +579,7 @@ class Fabric(Stateful):
             _PLAIN(self._guarded(lambda _user: chip.signal("event"), None)),
         )
         at = [ctypes.cast(call, ctypes.c_void_p) for call in calls]
-        self.use_host(Host(None, at[0], None, *at[1:], None, None), *calls)
+        self.use_host(Host(None, at[0], None, *at[1:], None, None, None), *calls)
 
 
 def _masks(values: Iterable[int]) -> "ctypes.Array[ctypes.c_uint32]":

@@ -20,6 +20,7 @@ from operator import itemgetter
 from typing import Any, Protocol, Self, cast
 
 from bluepill_sim.fabric.fabric import NO_LEVEL, Fabric, FabricPorts
+from bluepill_sim.fabric.signals import UV_PER_V, Signal, put_signal, to_uv
 from bluepill_sim.fabric.subscriptions import EDGE, EdgeSink, Of, Wave
 from simbase.state import Stateful
 from simbase.timing import Nanos
@@ -176,6 +177,42 @@ class Pin:
         rows = [EDGE.pack(at, index, drives[level], 0, 0, 0) for at, level in sorted(levels, key=itemgetter(0))]
         self._bank.fabric.put_inputs(b"".join(rows))
 
+    def set_volts(self, volts: "float | Signal | None") -> None:
+        """Put volts on the wire from outside, for an ADC to sample; None takes them off.
+
+        They stand until they are set again, whatever `drive` does. A digital input reads a constant, as high from
+        half of VDDA on, and nothing of a signal.
+
+        Args:
+            volts: A constant in volts, above -2000 and below 2000, or a `Signal` from now on; on a pin that leads
+                to no ADC a constant alone.
+
+        Raises:
+            ValueError: The package has no leg for this pin, or it is nothing that a pin can have.
+        """
+        constant = None if volts is None or isinstance(volts, Signal) else to_uv(volts)
+        channel = _channel_of(self)
+        if isinstance(volts, Signal) and (channel is None or not self.is_bonded):
+            raise ValueError(f"{self.name} leads to no ADC")
+        fabric = self._bank.fabric
+        level = None if constant is None else 2 * constant >= fabric.analog_struct.vdda_uv
+        self.drive(level, volts=None if constant is None else constant / UV_PER_V)
+        if channel is not None:
+            fabric.inputs_change()
+            put_signal(fabric, channel, volts if isinstance(volts, Signal) else constant, self._bank.now_ns)
+
+    @property
+    def has_volts(self) -> bool:
+        """Whether `set_volts` has put something on the wire."""
+        channel = _channel_of(self)
+        return channel is not None and self._bank.fabric.analog_struct.signals[channel].shape != 0
+
+    @property
+    def volts(self) -> float | None:
+        """The volts on the wire now; None of a pin that leads to no ADC. What floats has 0 V."""
+        channel = _channel_of(self)
+        return None if channel is None else self._bank.fabric.channel_uv(channel, self._bank.now_ns) / UV_PER_V
+
     def short(self, rail: str | None) -> None:
         """Tie the wire to a supply rail, as a solder bridge does; None cuts it again.
 
@@ -323,6 +360,8 @@ class Pin:
         return has_changed
 
     def _change(self, **flags: bool) -> None:
+        if self._struct.analog & self._bit:
+            self._bank.fabric.inputs_change()
         if self._set(**flags):
             self._bank.fabric.pins_changed(self._port_index)
 
@@ -424,6 +463,11 @@ class PinBank(Stateful):
             masks[self.PORTS.index(self[name].port)] |= 1 << self[name].number
         return masks
 
+    @property
+    def now_ns(self) -> int:
+        """The time of what is happening now."""
+        return self._ports.now_ns
+
     def warn(self, message: str, *, once: str) -> None:
         """Warn of something electrical."""
         self._ports.warn(message, once=once)
@@ -478,6 +522,12 @@ class Subscription:
         self.deliver()
         self._bank._end(self)  # noqa: SLF001 - its own bank
         self._bank.fabric.unsubscribe(self._number)
+
+
+def _channel_of(pin: Pin) -> int | None:
+    """Return the ADC channel that a pin leads to: PA0 to PA7, PB0 and PB1 are 0 to 9 (DS5319 table 5)."""
+    first, count = {"A": (0, 8), "B": (8, 2)}.get(pin.port, (0, 0))
+    return first + pin.number if pin.number < count else None
 
 
 #: The masks of a port that say what the chip drives.

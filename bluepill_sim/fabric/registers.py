@@ -23,12 +23,13 @@ Invariant: a stored word never holds a bit outside `readable`, so that
 
 import ctypes
 from array import array
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
+from functools import cache
 from typing import Any, ClassVar, cast
 
 from bluepill_sim.extension.layout import Struct, structure
-from bluepill_sim.fabric.fabric import CLOCK, RESET
+from bluepill_sim.fabric.fabric import CLOCK, RESET, SETTLE
 from bluepill_sim.fabric.ports import ChipPorts
 from simbase.state import Stateful
 
@@ -62,6 +63,8 @@ class Register:
     latched_in: int | None = None
     #: Name of the peripheral's method `(written: int, previous: int) -> None`, called after the store; or `NATIVE`.
     on_write: str | None = None
+    #: Its fields as the manual names them, from the left: "CKD 9:8, ARPE 7".
+    fields: str = ""
     #: One line for people.
     doc: str = ""
 
@@ -99,6 +102,73 @@ class Register:
         kept = previous & ~self.writable & ~(written & self.write_one_to_clear)
         kept &= written | ~self.write_zero_to_clear
         return (kept | (written & self.writable)) & self.readable
+
+
+@dataclass(frozen=True, slots=True)
+class BitField:
+    """A named part of a register."""
+
+    name: str
+    high: int
+    low: int
+
+    def of(self, word: int) -> int:
+        """Return its value in a register's word."""
+        return word >> self.low & (1 << self.high - self.low + 1) - 1
+
+
+@dataclass(frozen=True, slots=True)
+class RegisterView:
+    """A register of a peripheral as a person wants to see it."""
+
+    name: str
+    address: int
+    #: What a read finds.
+    word: int
+    #: Name and value of each field, from the left.
+    fields: tuple[tuple[str, int], ...]
+
+    def __getitem__(self, field: str) -> int:
+        """Return the value of a field.
+
+        Raises:
+            KeyError: The register has no such field.
+        """
+        return dict(self.fields)[field]
+
+    def __str__(self) -> str:
+        """Return the word and the fields that are not 0, on one line."""
+        return " ".join(
+            [f"{self.word:#010x} ", *(f"{name}={value:#x}" for name, value in self.fields if value)]
+        ).rstrip()
+
+
+def numbered(pattern: str, numbers: Iterable[int], width: int = 1, first: int = 0) -> str:
+    """Return fields that differ by their numbers, `n`, and stand one behind the other, that of `first` at bit 0.
+
+    >>> numbered("MRn", (1, 0))
+    'MR1 1, MR0 0'
+    """
+    found = []
+    for n in numbers:
+        high, low = width * (n - first) + width - 1, width * (n - first)
+        found.append(f"{pattern.replace('n', str(n))} {high if width == 1 else f'{high}:{low}'}")
+    return ", ".join(found)
+
+
+@cache
+def fields_of(text: str) -> tuple[BitField, ...]:
+    """Return the fields that `Register.fields` names.
+
+    >>> fields_of("CKD 9:8, ARPE 7")[0].of(0x200)
+    2
+    """
+    found = []
+    for entry in filter(None, text.split(", ")):
+        name, place = entry.split()
+        high, _, low = place.partition(":")
+        found.append(BitField(name, int(high), int(low or high)))
+    return tuple(found)
 
 
 def bits(*positions: int | tuple[int, int]) -> int:
@@ -271,6 +341,34 @@ class Peripheral(Stateful):
         hook = self._write_hooks[index]
         if hook is not None:
             hook(written, previous)
+
+    def look(self, offset: int) -> int:
+        """Return what a read would find at an offset now, with nothing of what a read causes; 0 without a register."""
+        index = offset >> 2
+        register = self._registers[index]
+        hook = self._read_hooks[index]
+        if register is None or hook is None:
+            return self.words[index]
+        if register.on_read == NATIVE:
+            return self.fabric.command(self.slot, SETTLE, index)
+        state = self.snapshot()
+        try:
+            return hook()
+        finally:
+            self.restore(state)
+
+    def view(self) -> dict[str, RegisterView]:
+        """Return its registers as a read would find them now, by name, in the order of their addresses."""
+        found = {}
+        for register in sorted(self.REGISTERS, key=lambda one: one.offset):
+            word = self.look(register.offset)
+            fields = tuple((field.name, field.of(word)) for field in fields_of(self.fields_now(register, word)))
+            found[register.name] = RegisterView(register.name, self.base + register.offset, word, fields)
+        return found
+
+    def fields_now(self, register: Register, _word: int) -> str:
+        """Return the fields of a register whose word is that, where they depend on it."""
+        return register.fields
 
     def masks_of(self, index: int) -> tuple[int, int, int, int]:
         """Return what the stored word `index` keeps, takes, and clears by 1 and by 0, as masks."""

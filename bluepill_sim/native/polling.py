@@ -16,7 +16,9 @@ from bluepill_sim.extension.layout import LOOP, structure
 #: Operations of a step (`enum operation`).
 _ADD, _SUBTRACT, _SUBTRACT_FROM, _SHIFT_LEFT, _SHIFT_RIGHT, _AND = range(6)
 _STEPS = 6
-_NOP = 0xBF00
+_NOP, _UXTH, _LDRH, _HALFWORD = 0xBF00, 0xB280, 0x8800, 0xFFFF
+#: LDR and LDRH with an immediate.
+_LOADS = frozenset({0x6800, _LDRH})
 #: Conditions that look at N and Z alone: eq, ne, mi, pl.
 _OF_RESULT = frozenset({0, 1, 4, 5})
 _ALWAYS = 14
@@ -36,15 +38,20 @@ def loop_of(code: bytes, offsets: dict[int, int], start: int) -> "ctypes.Structu
     branch, condition = words[-1], words[-1] >> 8 & 15
     body = [(start + 2 * n, word) for n, word in enumerate(words[:-1]) if word != _NOP]
     goes_back = branch & 0xF000 == 0xD000 and condition < _ALWAYS and (branch & 0xFF) + len(words) + 1 == 0x100
-    if not goes_back or not body or body[0][1] & 0xF800 != 0x6800:
+    if not goes_back or not body or body[0][1] & 0xF800 not in _LOADS:
         return None
     at, load = body[0]
-    base, held = load >> 3 & 7, load & 7
+    base, held, is_half = load >> 3 & 7, load & 7, load & 0xF800 == _LDRH
+    offset = (load >> 6 & 31) * (2 if is_half else 4)
     steps = _steps([word for _, word in body[1:]], base, held)
-    if not steps or (steps[-1][0] > _SUBTRACT_FROM and condition not in _OF_RESULT):
+    if is_half:
+        steps = [(_AND, _HALFWORD, False, held), *steps]
+    if offset % 4 or not 0 < len(steps) - is_half <= _STEPS - is_half:
+        return None
+    if body[-1][1] & 0xFFC0 == _UXTH or (steps[-1][0] > _SUBTRACT_FROM and condition not in _OF_RESULT):
         return None
     loop: Any = structure(LOOP)()
-    loop.read_cycle, loop.offset, loop.base = offsets[at], (load >> 6 & 31) * 4, base
+    loop.read_cycle, loop.offset, loop.base = offsets[at], offset, base
     loop.condition, loop.count = condition, len(steps)
     for row, (operation, operand, is_register, result) in zip(loop.steps, steps, strict=False):
         row.operation, row.operand, row.is_register, row.is_flags_only = operation, operand, is_register, result is None
@@ -81,6 +88,8 @@ def _step(word: int, held: int) -> _Step | None:  # noqa: PLR0911 - one return a
     if word & 0xF800 in (0x2800, 0x3000, 0x3800) and wide == held:  # CMP, ADDS, SUBS with 8 bits
         is_sum, is_kept = word & 0xF800 == 0x3000, word & 0x1000
         return _ADD if is_sum else _SUBTRACT, word & 0xFF, False, wide if is_kept else None
+    if word & 0xFFC0 == _UXTH and middle == held:  # the only step that leaves the flags alone
+        return _AND, _HALFWORD, False, low
     if word & 0xFFC0 == 0x4280:  # CMP
         return _of_two(_SUBTRACT, low, middle, held, None)
     if word & 0xFFC0 in (0x4000, 0x4200):  # ANDS, TST

@@ -3,6 +3,8 @@
     reads plain, writes plain    the register has no `on_read`, or no `on_write`; what is read may be latched
     reads, writes native         the device's file in C does it
     halfwords                    all that it takes are the lower 16 bits: the APB bridge's copy above them is lost
+    duplicates                   it stores nothing that is read back: what a bus master's narrow write is duplicated to
+                                 changes nothing that would be warned of
 
 An access goes to Python when its page has no clock, when an event is due
 before the block ends, and for everything else.
@@ -21,7 +23,8 @@ from bluepill_sim.peripherals.rcc import Rcc
 from bluepill_sim.stm32f103 import CLOCK_GATES, PERIPHERAL_BASE
 
 #: Bits of a register's behaviour (`enum behaviour`); the word that latches stands above them, 0 for none.
-_READS_PLAIN, _WRITES_PLAIN, _READS_NATIVE, _WRITES_NATIVE, _HALFWORDS, _LATCH_SHIFT = 1, 2, 4, 8, 16, 5
+_READS_PLAIN, _WRITES_PLAIN, _READS_NATIVE, _WRITES_NATIVE, _HALFWORDS, _DUPLICATES = 1, 2, 4, 8, 16, 32
+_LATCH_SHIFT = 6
 _PAGE_SHIFT = 10
 _HALFWORD = 0xFFFF
 
@@ -47,7 +50,7 @@ def share_registers(engine: Engine, parts: Iterable[Peripheral], rcc: Rcc) -> No
         masks = (ctypes.c_uint32 * (4 * count))()
         for register in part.REGISTERS:
             index = register.offset // 4
-            behaviour[index] = _behaviour(register)
+            behaviour[index] = _behaviour(register, has_byte_lanes=part.HAS_BYTE_LANES)
             masks[4 * index : 4 * index + 4] = list(part.masks_of(index))
         gate = CLOCK_GATES.get(part.name)
         at, mask = rcc.gate_address(part.name) if gate is not None else (None, 0)
@@ -58,7 +61,7 @@ def share_registers(engine: Engine, parts: Iterable[Peripheral], rcc: Rcc) -> No
         calls.core_set_page(state, page, words, count, at, mask, behaviour, masks, slot)
 
 
-def _behaviour(register: Register) -> int:
+def _behaviour(register: Register, *, has_byte_lanes: bool) -> int:
     takes = register.writable | register.write_one_to_clear | register.write_zero_to_clear
     latch = 0 if register.latched_in is None else register.latched_in // 4
     return (
@@ -67,5 +70,6 @@ def _behaviour(register: Register) -> int:
         | _READS_NATIVE * (register.on_read == NATIVE)
         | _WRITES_NATIVE * (register.on_write == NATIVE)
         | _HALFWORDS * (takes <= _HALFWORD)
+        | _DUPLICATES * (not has_byte_lanes and not takes & register.readable)
         | latch << _LATCH_SHIFT
     )

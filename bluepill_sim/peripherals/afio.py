@@ -48,7 +48,15 @@ REMAP_FIELDS = {
     "TIM3": (10, 3),
     "TIM4": (12, 1),
     "CAN": (13, 3),
+    "ADC1_ETRGINJ": (17, 1),
+    "ADC1_ETRGREG": (18, 1),
+    "ADC2_ETRGINJ": (19, 1),
+    "ADC2_ETRGREG": (20, 1),
 }
+_MAPR = (
+    "ADC2_ETRGREG 20, ADC2_ETRGINJ 19, ADC1_ETRGREG 18, ADC1_ETRGINJ 17, TIM5CH4_IREMAP 16, PD01_REMAP 15, CAN 14:13, "
+    "TIM4 12, TIM3 11:10, TIM2 9:8, TIM1 7:6, USART3 5:4, USART2 3, USART1 2, I2C1 1, SPI1 0"
+)
 _PD01_REMAP = 1 << 15
 _SWJ_SHIFT, _SWJ_MASK = 24, bits((26, 24))
 #: What ST's own code writes to leave the debug port as it is (RM0008 9.4.2: other combinations have no effect).
@@ -61,8 +69,22 @@ class Afio(Peripheral):
 
     STATE = ("_swj_cfg",)
     REGISTERS = (
-        Register(name="EVCR", offset=0x00, readable=bits((7, 0)), writable=bits((7, 0)), on_write="_write_evcr"),
-        Register(name="MAPR", offset=0x04, readable=bits((20, 0)), writable=bits((26, 24), (20, 0)), on_write="_route"),
+        Register(
+            name="EVCR",
+            offset=0x00,
+            readable=bits((7, 0)),
+            writable=bits((7, 0)),
+            on_write="_write_evcr",
+            fields="EVOE 7, PORT 6:4, PIN 3:0",
+        ),
+        Register(
+            name="MAPR",
+            offset=0x04,
+            readable=bits((20, 0)),
+            writable=bits((26, 24), (20, 0)),
+            on_write="_route",
+            fields=_MAPR,
+        ),
         *(
             Register(
                 name=f"EXTICR{n + 1}",
@@ -70,6 +92,7 @@ class Afio(Peripheral):
                 readable=bits((15, 0)),
                 writable=bits((15, 0)),
                 on_write="_write_exticr",
+                fields=", ".join(f"EXTI{4 * n + k} {4 * k + 3}:{4 * k}" for k in range(3, -1, -1)),
             )
             for n in range(4)
         ),

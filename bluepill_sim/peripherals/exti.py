@@ -12,27 +12,47 @@ Invariant: an IRQ is raised exactly while one of its lines is pending and unmask
 from bluepill_sim.extension.layout import EXTI
 from bluepill_sim.fabric.fabric import ROUTE
 from bluepill_sim.fabric.ports import ChipPorts
-from bluepill_sim.fabric.registers import NATIVE, Peripheral, Place, Register, bits
+from bluepill_sim.fabric.registers import NATIVE, Peripheral, Place, Register, bits, numbered
 
 IMR, EMR, RTSR, FTSR, SWIER, PR = range(6)
 
 _LINES = bits((18, 0))
+#: From the left.
+_DOWN = range(18, -1, -1)
 
 
 class Exti(Peripheral):
     """External interrupt/event controller."""
 
     KIND, HOLDS = "exti", EXTI
-    #: Lines that share an interrupt: `lines_by_irq` of exti.c.
-    OUTPUTS = ("0", "1", "2", "3", "4", "9_5", "15_10", "pvd_irq", "rtc_alarm_irq", "usb_wakeup_irq")
+    #: Lines that share an interrupt, `lines_by_irq` of exti.c; and events that trigger ADCs, `trigger_lines`.
+    OUTPUTS = (
+        "0", "1", "2", "3", "4", "9_5", "15_10", "pvd_irq", "rtc_alarm_irq", "usb_wakeup_irq", "line11", "line15",
+    )  # fmt: skip
     INPUTS = ("pvd", "rtc_alarm", "usb_wakeup")
     REGISTERS = (
-        Register(name="IMR", offset=0x00, readable=_LINES, writable=_LINES, on_write=NATIVE),
-        Register(name="EMR", offset=0x04, readable=_LINES, writable=_LINES),
-        Register(name="RTSR", offset=0x08, readable=_LINES, writable=_LINES, on_write=NATIVE),
-        Register(name="FTSR", offset=0x0C, readable=_LINES, writable=_LINES, on_write=NATIVE),
-        Register(name="SWIER", offset=0x10, readable=_LINES, writable=0, on_write=NATIVE),
-        Register(name="PR", offset=0x14, readable=_LINES, writable=0, write_one_to_clear=_LINES, on_write=NATIVE),
+        Register(
+            name="IMR", offset=0x00, readable=_LINES, writable=_LINES, on_write=NATIVE, fields=numbered("MRn", _DOWN)
+        ),
+        Register(name="EMR", offset=0x04, readable=_LINES, writable=_LINES, fields=numbered("MRn", _DOWN)),
+        Register(
+            name="RTSR", offset=0x08, readable=_LINES, writable=_LINES, on_write=NATIVE, fields=numbered("TRn", _DOWN)
+        ),
+        Register(
+            name="FTSR", offset=0x0C, readable=_LINES, writable=_LINES, on_write=NATIVE, fields=numbered("TRn", _DOWN)
+        ),
+        Register(
+            name="SWIER", offset=0x10, readable=_LINES, writable=0, on_write=NATIVE, fields=numbered("SWIERn", _DOWN)
+        ),
+        Register(
+            name="PR",
+            offset=0x14,
+            readable=_LINES,
+            writable=0,
+            write_one_to_clear=_LINES,
+            on_write=NATIVE,
+            fields=numbered("PRn", _DOWN),
+        ),
     )
 
     def __init__(self, chip: ChipPorts, place: Place) -> None:

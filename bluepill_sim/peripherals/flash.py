@@ -62,6 +62,7 @@ class Flash(Peripheral):
             readable=bits((5, 0)),
             writable=bits(4, 3, (2, 0)),
             on_write="_write_acr",
+            fields="PRFTBS 5, PRFTBE 4, HLFCYA 3, LATENCY 2:0",
         ),
         Register(name="KEYR", offset=0x04, readable=0, on_write="_write_keyr"),
         Register(name="OPTKEYR", offset=0x08, readable=0, on_write="_write_optkeyr"),
@@ -72,6 +73,7 @@ class Flash(Peripheral):
             writable=0,
             write_one_to_clear=PGERR | WRPRTERR | EOP,
             on_write="_write_sr",
+            fields="EOP 5, WRPRTERR 4, PGERR 2, BSY 0",
         ),
         Register(
             name="CR",
@@ -80,10 +82,21 @@ class Flash(Peripheral):
             readable=PG | PER | MER | OPTPG | OPTER | STRT | LOCK | OPTWRE | ERRIE | EOPIE,
             writable=PG | PER | MER | OPTPG | OPTER | STRT | LOCK | ERRIE | EOPIE,
             on_write="_write_cr",
+            fields="EOPIE 12, ERRIE 10, OPTWRE 9, LOCK 7, STRT 6, OPTER 5, OPTPG 4, MER 2, PER 1, PG 0",
         ),
         Register(name="AR", offset=0x14, readable=0, on_write="_write_ar"),
-        Register(name="OBR", offset=0x1C, reset=0x03FF_FFFC, writable=0, doc="option bytes as delivered"),
-        Register(name="WRPR", offset=0x20, reset=0xFFFF_FFFF, writable=0, doc="no page is write-protected"),
+        Register(
+            name="OBR",
+            offset=0x1C,
+            reset=0x03FF_FFFC,
+            readable=bits((25, 0)),
+            writable=0,
+            doc="option bytes as delivered",
+            fields="Data1 25:18, Data0 17:10, UNUSED 9:5, nRST_STDBY 4, nRST_STOP 3, WDG_SW 2, RDPRT 1, OPTERR 0",
+        ),
+        Register(
+            name="WRPR", offset=0x20, reset=0xFFFF_FFFF, writable=0, doc="no page is write-protected", fields="WRP 31:0"
+        ),
     )
 
     def __init__(self, chip: ChipPorts, place: Place) -> None:

@@ -13,10 +13,12 @@ Source: RM0008 sections 9.1 and 9.2.
 Invariant: bit n of IDR reads as `pins[n].input`.
 """
 
+from collections.abc import Iterable
+
 from bluepill_sim.extension.layout import GPIO
 from bluepill_sim.fabric.pins import Pin, PinMode, floating_inputs
 from bluepill_sim.fabric.ports import ChipPorts
-from bluepill_sim.fabric.registers import NATIVE, Peripheral, Place, Register, bits
+from bluepill_sim.fabric.registers import NATIVE, Peripheral, Place, Register, bits, numbered
 
 CRL, CRH, IDR, ODR, BSRR, BRR, LCKR = range(7)
 
@@ -36,20 +38,39 @@ _OUTPUT_MODES = (PinMode.PUSH_PULL, PinMode.OPEN_DRAIN, PinMode.ALTERNATE_PUSH_P
 PIN_MODES = tuple((_OUTPUT_MODES if nibble & 3 else _INPUT_MODES)[nibble >> 2] for nibble in range(16))
 
 
+#: From the left.
+_DOWN = range(15, -1, -1)
+
+
+def _modes(numbers: Iterable[int]) -> str:
+    """Return the fields of CRL or CRH."""
+    return ", ".join(
+        f"CNF{n} {4 * (n % 8) + 3}:{4 * (n % 8) + 2}, MODE{n} {4 * (n % 8) + 1}:{4 * (n % 8)}" for n in numbers
+    )
+
+
 class Gpio(Peripheral):
     """One general-purpose I/O port; the last letter of its name is the port's."""
 
     KIND, HOLDS = "gpio", GPIO
     STATE = ("_lock_writes", "_locked", "_intended", "_warned")
     REGISTERS = (
-        Register(name="CRL", offset=0x00, reset=_CR_RESET, on_write="_write_crl"),
-        Register(name="CRH", offset=0x04, reset=_CR_RESET, on_write="_write_crh"),
-        Register(name="IDR", offset=0x08, readable=_PORT, writable=0, on_read=NATIVE),
-        Register(name="ODR", offset=0x0C, readable=_PORT, writable=_PORT, on_write=NATIVE),
+        Register(name="CRL", offset=0x00, reset=_CR_RESET, on_write="_write_crl", fields=_modes(range(7, -1, -1))),
+        Register(name="CRH", offset=0x04, reset=_CR_RESET, on_write="_write_crh", fields=_modes(range(15, 7, -1))),
+        Register(name="IDR", offset=0x08, readable=_PORT, writable=0, on_read=NATIVE, fields=numbered("IDRn", _DOWN)),
+        Register(
+            name="ODR", offset=0x0C, readable=_PORT, writable=_PORT, on_write=NATIVE, fields=numbered("ODRn", _DOWN)
+        ),
         Register(name="BSRR", offset=0x10, readable=0, on_write=NATIVE),
         Register(name="BRR", offset=0x14, readable=0, writable=_PORT, on_write=NATIVE),
         Register(
-            name="LCKR", offset=0x18, readable=_LCKK | _PORT, writable=0, on_read="_read_lckr", on_write="_write_lckr"
+            name="LCKR",
+            offset=0x18,
+            readable=_LCKK | _PORT,
+            writable=0,
+            on_read="_read_lckr",
+            on_write="_write_lckr",
+            fields="LCKK 16, " + numbered("LCKn", _DOWN),
         ),
     )
 

@@ -41,6 +41,7 @@ _CSR_FLAGS = bits((31, 26))
 #: AHB divider by CFGR HPRE; APB divider by PPRE1/PPRE2.
 _AHB_DIVIDERS = (1,) * 8 + (2, 4, 8, 16, 64, 128, 256, 512)
 _APB_DIVIDERS = (1,) * 4 + (2, 4, 8, 16)
+_ADC_DIVIDERS = (2, 4, 6, 8)
 #: PLL factor by CFGR PLLMUL.
 _PLL_FACTORS = (2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15, 16, 16)
 
@@ -88,6 +89,24 @@ _HSE, _PLL = 1, 2
 _SOURCE_READY = (HSIRDY, HSERDY, PLLRDY)
 
 
+#: Fields of the registers, from the left.
+_CR = "PLLRDY 25, PLLON 24, CSSON 19, HSEBYP 18, HSERDY 17, HSEON 16, HSICAL 15:8, HSITRIM 7:3, HSIRDY 1, HSION 0"
+_CFGR = (
+    "MCO 26:24, USBPRE 22, PLLMUL 21:18, PLLXTPRE 17, PLLSRC 16, ADCPRE 15:14, PPRE2 13:11, PPRE1 10:8, HPRE 7:4, "
+    "SWS 3:2, SW 1:0"
+)
+_CIR = (
+    "PLLRDYIE 12, HSERDYIE 11, HSIRDYIE 10, LSERDYIE 9, LSIRDYIE 8, CSSF 7, "
+    "PLLRDYF 4, HSERDYF 3, HSIRDYF 2, LSERDYF 1, LSIRDYF 0"
+)
+_APB2 = "USART1 14, SPI1 12, TIM1 11, ADC2 10, ADC1 9, IOPE 6, IOPD 5, IOPC 4, IOPB 3, IOPA 2, AFIO 0"
+_APB1 = (
+    "PWR 28, BKP 27, CAN 25, USB 23, I2C2 22, I2C1 21, USART3 18, USART2 17, SPI2 14, WWDG 11, TIM4 2, TIM3 1, TIM2 0"
+)
+_AHB = "CRC 6, FLITF 4, SRAM 2, DMA1 0"
+_CSR = "LPWRRSTF 31, WWDGRSTF 30, IWDGRSTF 29, SFTRSTF 28, PORRSTF 27, PINRSTF 26, LSIRDY 1, LSION 0"
+
+
 class Rcc(Peripheral):
     """Reset and clock control."""
 
@@ -102,6 +121,7 @@ class Rcc(Peripheral):
             readable=bits((19, 16), 24, 25, (15, 0)) & ~bits(2),
             writable=HSION | HSEON | HSEBYP | bits(19) | PLLON | bits((7, 3)),
             on_write="_write_cr",
+            fields=_CR,
         ),
         Register(
             name="CFGR",
@@ -109,6 +129,7 @@ class Rcc(Peripheral):
             readable=bits((26, 24), (22, 0)),
             writable=bits((26, 24), (22, 4), (1, 0)),
             on_write="_write_cfgr",
+            fields=_CFGR,
         ),
         Register(
             name="CIR",
@@ -116,18 +137,34 @@ class Rcc(Peripheral):
             readable=bits((12, 8), 7, (4, 0)),
             writable=bits((12, 8)),
             on_write="_write_cir",
+            fields=_CIR,
         ),
-        Register(name="APB2RSTR", offset=0x0C, readable=_APB2_GATES, writable=_APB2_GATES, on_write="_write_apb2rstr"),
-        Register(name="APB1RSTR", offset=0x10, readable=_APB1_GATES, writable=_APB1_GATES, on_write="_write_apb1rstr"),
-        Register(name="AHBENR", offset=0x14, reset=0x14, readable=_AHB_GATES, writable=_AHB_GATES),
-        Register(name="APB2ENR", offset=0x18, readable=_APB2_GATES, writable=_APB2_GATES),
-        Register(name="APB1ENR", offset=0x1C, readable=_APB1_GATES, writable=_APB1_GATES),
+        Register(
+            name="APB2RSTR",
+            offset=0x0C,
+            readable=_APB2_GATES,
+            writable=_APB2_GATES,
+            on_write="_write_apb2rstr",
+            fields=_APB2,
+        ),
+        Register(
+            name="APB1RSTR",
+            offset=0x10,
+            readable=_APB1_GATES,
+            writable=_APB1_GATES,
+            on_write="_write_apb1rstr",
+            fields=_APB1,
+        ),
+        Register(name="AHBENR", offset=0x14, reset=0x14, readable=_AHB_GATES, writable=_AHB_GATES, fields=_AHB),
+        Register(name="APB2ENR", offset=0x18, readable=_APB2_GATES, writable=_APB2_GATES, fields=_APB2),
+        Register(name="APB1ENR", offset=0x1C, readable=_APB1_GATES, writable=_APB1_GATES, fields=_APB1),
         Register(
             name="BDCR",
             offset=0x20,
             readable=bits(16, 15, 9, 8, 2, 1, 0),
             writable=bits(16, 15, 9, 8, 2, 0),
             on_write="_write_bdcr",
+            fields="BDRST 16, RTCEN 15, RTCSEL 9:8, LSEBYP 2, LSERDY 1, LSEON 0",
         ),
         Register(
             name="CSR",
@@ -136,6 +173,7 @@ class Rcc(Peripheral):
             readable=_CSR_FLAGS | bits(1, 0),
             writable=bits(0),
             on_write="_write_csr",
+            fields=_CSR,
         ),
     )
 
@@ -341,6 +379,7 @@ class Rcc(Peripheral):
         before = clocks.snapshot()
         clocks.sysclk_hz, clocks.hclk_hz = sysclk_hz, hclk_hz
         clocks.pclk1_hz, clocks.pclk2_hz = hclk_hz // divider1, hclk_hz // divider2
+        clocks.adc_divider = _ADC_DIVIDERS[(cfgr >> 14) & 3]
         clocks.timer1_hz = clocks.pclk1_hz * (1 if divider1 == 1 else 2)
         clocks.timer2_hz = clocks.pclk2_hz * (1 if divider2 == 1 else 2)
         if clocks.snapshot() != before:

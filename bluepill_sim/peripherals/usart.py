@@ -11,13 +11,13 @@ when its stop bit has ended; one that finds RXNE still set is lost and raises
 ORE; a line that then stays idle for one character raises IDLE.
 
 Modelled: 8 and 9 bits, parity, 0.5 to 2 stop bits, breaks (sent as silence),
-all of these flags and their interrupts. The far end sends and listens at our
+all of these flags, their interrupts and DMA requests. The far end sends and listens at our
 own baud rate, without errors, unless it has one of its own (`far_baud`): then
 characters too far off arrive damaged, both ways, and what comes in raises the
 FE, NE and PE that the samples of the line give (`fabric/line_speed.py`), at the
 times of our own frames. Not modelled, and warned of: synchronous, LIN, IrDA,
-smartcard and half-duplex modes, hardware flow control, mute mode, DMA
-requests. The levels of single bits do not show on the TX pin: it stays high.
+smartcard and half-duplex modes, hardware flow control and mute mode. The levels
+of single bits do not show on the TX pin: it stays high.
 
 Source: RM0008 section 27.
 Invariant: a character ends floor(frame half-bits * BRR * 10**9 / (2 * PCLK)) ns
@@ -51,8 +51,6 @@ _UNMODELLED = (
     (CR3, 1 << 1, "IrDA mode"),
     (CR3, 1 << 3, "half-duplex mode"),
     (CR3, 1 << 5, "smartcard mode"),
-    (CR3, 1 << 6, "DMA reception"),
-    (CR3, 1 << 7, "DMA transmission"),
     (CR3, bits(8, 9), "hardware flow control"),
 )
 #: Stop bits in halves, by CR2 STOP.
@@ -97,7 +95,7 @@ class Usart(Peripheral):
     """Universal asynchronous receiver transmitter."""
 
     KIND, HOLDS = "usart", USART
-    OUTPUTS = ("irq",)
+    OUTPUTS = ("irq", "tx_dma", "rx_dma")
     STATE = ("_coming", "sent_at")
     DERIVED = ("_tx_pin", "_rx_pin")
     REGISTERS = (
@@ -110,19 +108,45 @@ class Usart(Peripheral):
             write_zero_to_clear=_CTS_LBD | TC | RXNE,
             latched_in=0x1C,
             on_write=NATIVE,
+            fields="CTS 9, LBD 8, TXE 7, TC 6, RXNE 5, IDLE 4, ORE 3, NE 2, FE 1, PE 0",
         ),
-        Register(name="DR", offset=0x04, readable=0, writable=bits((8, 0)), on_read=NATIVE, on_write=NATIVE),
-        Register(name="BRR", offset=0x08, readable=bits((15, 0)), writable=bits((15, 0)), on_write=NATIVE),
-        Register(name="CR1", offset=0x0C, readable=bits((13, 0)), writable=bits((13, 0)), on_write=NATIVE),
+        Register(
+            name="DR", offset=0x04, readable=0, writable=bits((8, 0)), on_read=NATIVE, on_write=NATIVE, fields="DR 8:0"
+        ),
+        Register(
+            name="BRR",
+            offset=0x08,
+            readable=bits((15, 0)),
+            writable=bits((15, 0)),
+            on_write=NATIVE,
+            fields="DIV_Mantissa 15:4, DIV_Fraction 3:0",
+        ),
+        Register(
+            name="CR1",
+            offset=0x0C,
+            readable=bits((13, 0)),
+            writable=bits((13, 0)),
+            on_write=NATIVE,
+            fields="UE 13, M 12, WAKE 11, PCE 10, PS 9, PEIE 8, TXEIE 7, TCIE 6, RXNEIE 5, IDLEIE 4, TE 3, RE 2, "
+            "RWU 1, SBK 0",
+        ),
         Register(
             name="CR2",
             offset=0x10,
             readable=bits((14, 8), (6, 5), (3, 0)),
             writable=bits((14, 8), (6, 5), (3, 0)),
             on_write=NATIVE,
+            fields="LINEN 14, STOP 13:12, CLKEN 11, CPOL 10, CPHA 9, LBCL 8, LBDIE 6, LBDL 5, ADD 3:0",
         ),
-        Register(name="CR3", offset=0x14, readable=bits((10, 0)), writable=bits((10, 0)), on_write=NATIVE),
-        Register(name="GTPR", offset=0x18, readable=bits((15, 0)), writable=bits((15, 0))),
+        Register(
+            name="CR3",
+            offset=0x14,
+            readable=bits((10, 0)),
+            writable=bits((10, 0)),
+            on_write=NATIVE,
+            fields="CTSIE 10, CTSE 9, RTSE 8, DMAT 7, DMAR 6, SCEN 5, NACK 4, HDSEL 3, IRLP 2, IREN 1, EIE 0",
+        ),
+        Register(name="GTPR", offset=0x18, readable=bits((15, 0)), writable=bits((15, 0)), fields="GT 15:8, PSC 7:0"),
     )
 
     def __init__(self, chip: ChipPorts, place: Place) -> None:

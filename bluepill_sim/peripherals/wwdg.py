@@ -30,12 +30,16 @@ class Wwdg(Peripheral):
     REGISTERS = (
         Register(
             name="CR", offset=0x00, reset=_T, readable=bits((7, 0)), writable=bits((7, 0)), on_read="_read_cr",
-            on_write="_write_cr",
+            on_write="_write_cr", fields="WDGA 7, T 6:0",
         ),
         Register(
-            name="CFR", offset=0x04, reset=_T, readable=bits((9, 0)), writable=bits((9, 0)), on_write="_write_cfr"
+            name="CFR", offset=0x04, reset=_T, readable=bits((9, 0)), writable=bits((9, 0)), on_write="_write_cfr",
+            fields="EWI 9, WDGTB 8:7, W 6:0",
         ),
-        Register(name="SR", offset=0x08, readable=EWIF, writable=0, write_zero_to_clear=EWIF, on_write="_write_sr"),
+        Register(
+            name="SR", offset=0x08, readable=EWIF, writable=0, write_zero_to_clear=EWIF, on_write="_write_sr",
+            fields="EWIF 0",
+        ),
     )  # fmt: skip
     #: The counter held `_base_count` from `_base_ns` on, and counts at this PCLK1.
     _base_ns: Nanos = 0

@@ -22,6 +22,7 @@ PROGRAMS = {
     "motors": ("motors.c",),
     "sensors": ("sensors.c",),
     "encoders": ("encoders.c", "odometer.c"),
+    "analog": ("analog.c",),
     "dodge": ("dodge.c", "dodge_fsm.c", "odometer.c"),
 }
 MACHINE_FLAGS = ("-mcpu=cortex-m3", "-mthumb")

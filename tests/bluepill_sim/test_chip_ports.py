@@ -103,7 +103,7 @@ def test_a_peripheral_is_reset_by_name_and_strangers_are_ignored(ports: Ports) -
     port = ports.chip.parts.by_name["GPIOA"]
     port.write(0x0C, 4, 5)
     ports.chip.reset_peripheral("GPIOB")
-    ports.chip.reset_peripheral("TIM1")
+    ports.chip.reset_peripheral("TIM8")
     assert port.read(0x0C, 4) == 5
     ports.chip.reset_peripheral("GPIOA")
     assert port.read(0x0C, 4) == 0

@@ -125,7 +125,7 @@ def session(elf: Path, ready: tuple[BoardSnapshot, list[str]]) -> Session:
 def test_warnings_name_what_the_program_did_wrong(session: Session) -> None:
     beginnings = (
         "GPIOC has no clock: RCC_APB2ENR bit 4 is 0 (write of 0x44344444 to 0x40011000) at meet_gpio+0x",
-        "TIM2 is not modelled (read of 0x40000000) at meet_gpio+0x",
+        "TIM5 is not modelled (read of 0x40000c00) at meet_gpio+0x",
         "PC13: configured while locked: ignored at meet_gpio+0x",
         "write to flash without FLASH_CR PG: ignored at program_flash+0x",
     )

@@ -1,4 +1,4 @@
-"""Print what test devices cost: four channels of PWM at 20 kHz, and a DMA of a million words a second.
+"""Print what devices cost: four channels of PWM at 20 kHz, a test device that moves a million words a second, the ADC.
 
 Each figure is the median of paired runs by CPU time in this process; the library is built here, with `mover.c` in it.
 Usage: python tools/bench/devices.py [--quick]
@@ -18,19 +18,30 @@ from bluepill_sim.analysis.probe import Probe
 from bluepill_sim.analysis.vcd import write_vcd
 from bluepill_sim.extension import library
 from bluepill_sim.fabric.registers import NATIVE, Peripheral, Register
+from bluepill_sim.fabric.signals import Oscillation, Shape
 from simbase.timing import NS_PER_S
 
 HERE = Path(__file__).parent
 SOURCES = sorted((HERE.parents[1] / "bluepill_sim" / "extension" / "source").rglob("*.c"))
 #: Where TIM6 would stand on a larger chip.
 PLACE = "TIM6"
-PWM_S, DMA_S = (1.0, 0.2) if "--quick" in sys.argv else (20.0, 2.0)
-#: Pins without a wire on the board, and their timer's clock, period and high time in cycles.
-PWM = {"PA8": "TIM1_CH1", "PA9": "TIM1_CH2", "PA10": "TIM1_CH3", "PA11": "TIM1_CH4"}
+PWM_S, DMA_S, ADC_S = (1.0, 0.2, 0.2) if "--quick" in sys.argv else (20.0, 2.0, 5.0)
+#: What the ADC converts by circular DMA, and with which options tools/bench/firmware/adc.c is built.
+CONVERSIONS = {
+    "8 channels at 10 kHz": (80_000, "5", ("-DBENCH_EIGHT",)),
+    "1 channel at 857 kS/s": (857_142, "2", ()),
+    "1 channel at 1 MS/s": (1_000_000, "2", ("-DBENCH_56_MHZ",)),
+}
+#: TIM1's clock, period and high time in cycles; it drives PA8 to PA11, which have no wire on the board.
 TIMER_HZ, PERIOD, HIGH = 72_000_000, 3600, 900
+#: Registers of TIM1, by offset: ARR, CCMR1, CCMR2, CCR1 to CCR4, CCER, EGR, BDTR, CR1.
+PWM = (
+    (0x2C, PERIOD - 1), (0x18, 0x6868), (0x1C, 0x6868), (0x34, HIGH), (0x38, HIGH), (0x3C, HIGH), (0x40, HIGH),
+    (0x20, 0x1111), (0x14, 1), (0x44, 0x8000), (0x00, 0x81),
+)  # fmt: skip
 #: After the program's start, with its clock at 72 MHz.
 STARTED_NS = 10_000_000
-RCC_APB2ENR, GPIOA_ENABLE = 0x18, 1 << 2
+RCC_APB2ENR, GPIOA_ENABLE, TIM1_ENABLE = 0x18, 1 << 2, 1 << 11
 GPIOA_IDR, BUFFER, BUFFER_WORDS = 0x4001_0808, 0x2000_3000, 256
 
 
@@ -47,10 +58,12 @@ class Mover(Peripheral):
 
 
 def start_pwm(board: BluePill) -> None:
-    """Have four pins carry waves."""
-    board.chip.parts.by_name["GPIOA"].write(4, 4, 0x8884_BBBB)  # PA8 to PA11 alternate functions
-    for pin, source in PWM.items():
-        board.pin(pin).offer_wave(source, TIMER_HZ, PERIOD, HIGH)
+    """Have TIM1 make four of them."""
+    rcc, parts = board.chip.parts.rcc, board.chip.parts.by_name
+    rcc.write(RCC_APB2ENR, 4, rcc.read(RCC_APB2ENR, 4) | GPIOA_ENABLE | TIM1_ENABLE)
+    parts["GPIOA"].write(4, 4, 0x8884_BBBB)  # PA8 to PA11 alternate functions
+    for offset, word in PWM:
+        parts["TIM1"].write(offset, 4, word)
 
 
 def start_mover(board: BluePill) -> None:
@@ -118,6 +131,22 @@ def movers(folder: Path) -> None:
     row("the same, asleep: times real", asleep, "2")
 
 
+def conversions(folder: Path) -> None:
+    """Conversions by circular DMA, in the bench with the kinematic body, the CPU asleep between interrupts."""
+    for name, (rate, goal, options) in CONVERSIONS.items():
+        program = build("adc", folder, *options)
+        factors = []
+        for _ in range(RUNS):
+            made = bench(folder, program, ADC_S, "adapter")
+            made.run_until(STARTED_NS)
+            made.chip.pin("PA0").set_volts(Oscillation(shape=Shape.SINE, low_v=0, high_v=3.3, period_ns=1_000_000))
+            samples = made.chip.image.symbols.address_of("bench_samples") or 0
+            factors.append(ADC_S / cpu_s(lambda: run(made)))  # noqa: B023 - called at once
+            if made.chip.warnings or not any(made.chip.read_memory(samples, 128) or b"") or not made.chip.is_asleep:
+                sys.exit(f"bench: {name} does not run: {made.chip.warnings}")
+        row(f"ADC, {name} ({rate} conversions a second): times real", factors, goal)
+
+
 def build_library(folder: Path) -> Path:
     """Return the emulator's library with the device of this bench in it."""
     out = folder / "native.so"
@@ -139,6 +168,7 @@ def main() -> int:
         stm32f103.PERIPHERALS = (*stm32f103.PERIPHERALS, (Mover, PLACE))
         waves(folder)
         movers(folder)
+        conversions(folder)
     return 0
 
 

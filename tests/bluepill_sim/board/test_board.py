@@ -127,15 +127,15 @@ def test_something_else_is_no_snapshot(boot) -> None:
 
 @pytest.mark.parametrize("access", ["str", "ldr"])
 def test_strict_mode_raises_at_the_first_warning(boot, access: str) -> None:
-    image = boot(f"mov32 r1, #0x40012C00\n{access} r2, [r1, #0]").image
+    image = boot(f"mov32 r1, #0x40013400\n{access} r2, [r1, #0]").image
     board = BluePill(image, strict=True)
-    with pytest.raises(UnmodelledError, match="TIM1 is not modelled") as error:
+    with pytest.raises(UnmodelledError, match="TIM8 is not modelled") as error:
         board.advance_to(1_000_000)
     assert error.value.exit_code == 1
 
 
 def test_warnings_are_reported_once_as_they_come(boot) -> None:
-    machine = boot("movs r4, #3\nloop: " + store(0x40012C00, 1) + "subs r4, #1\nbne loop")
+    machine = boot("movs r4, #3\nloop: " + store(0x40013400, 1) + "subs r4, #1\nbne loop")
     told = []
     end = machine.board.subscribe_warnings(told.append)
     machine.run(100)

@@ -271,7 +271,7 @@ def test_ctrl_c_stops_a_program_that_spins_or_sleeps(debug) -> None:
 
 def test_monitor_tells_what_gdb_has_no_word_for(debug) -> None:
     gdb = debug(LOOP)
-    assert gdb.monitor("help").count("\n") == 10
+    assert gdb.monitor("help").count("\n") == 11
     assert gdb.monitor("") == gdb.monitor("help")
     assert gdb.monitor("time") == "0.000000000 s of virtual time, 0 cycles, 8 MHz\n"
     assert "PA13" in gdb.monitor("pins")
@@ -289,6 +289,16 @@ def test_monitor_tells_what_gdb_has_no_word_for(debug) -> None:
     assert gdb.place == before
     assert "no snapshot x; there are: 1" in gdb.monitor("restore x")
     assert gdb.monitor("warnings") == "no warnings\n"
+
+
+def test_monitor_shows_registers_by_name_with_their_fields(debug) -> None:
+    gdb = debug(LOOP)
+    assert "TIM4" in gdb.monitor("registers")
+    assert gdb.monitor("registers tim3").splitlines()[11] == "ARR      0x0000ffff  ARR=0xffff"
+    assert gdb.monitor("registers RCC cr").splitlines()[0] == "RCC_CR at 0x40021000: 0x00000083"
+    assert "HSION        0x1" in gdb.monitor("registers RCC CR")
+    assert "TIM3 has no RCR; it has CR1" in gdb.monitor("registers TIM3 RCR")
+    assert "not understood" in gdb.monitor("registers TIM9")
 
 
 def test_documents_are_read_in_parts(debug) -> None:

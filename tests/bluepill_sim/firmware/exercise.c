@@ -18,7 +18,7 @@
 #define GPIOB 0x40010C00u
 #define GPIOC 0x40011000u
 #define USART1 0x40013800u
-#define TIM2 0x40000000u
+#define TIM5 0x40000C00u
 #define ISER0 WORD(0xE000E100u)
 #define ISER1 WORD(0xE000E104u)
 #define PAGE 0x0800F000u
@@ -93,7 +93,7 @@ static void meet_gpio(void)
 {
     report("unclocked", WORD(GPIOC));
     WORD(GPIOC) = 0x44344444u;
-    report("unmodelled", WORD(TIM2));
+    report("unmodelled", WORD(TIM5));
     WORD(RCC + 0x18) |= 1u << 4;
     report("clocked", WORD(GPIOC));
     report("pb4-jtag", WORD(GPIOB + 8) & 0x10u);

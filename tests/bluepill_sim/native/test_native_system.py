@@ -108,7 +108,7 @@ def test_random_accesses_and_faults_end_alike_on_both_cores(steps: list[str], sl
 POLLED = {
     "COUNTFLAG": (f"{0xE000E010}", "ldr r3, [r0, #0]\n.half 0x03DB\nbpl w", 0),
     "VAL": (f"{0xE000E010}", "ldr r3, [r0, #8]\n.half 0x055B\nbne w", 0),
-    "an unmodelled register": (f"{0x40000000}", "ldr r3, [r0, #16]\n.half 0x07DB\nbpl w", 1),
+    "an unmodelled register": (f"{0x40000C00}", "ldr r3, [r0, #16]\n.half 0x07DB\nbpl w", 1),
     "an unmodelled word of the core": (f"{0xE000EFF0}", "ldr r3, [r0, #0]\n.half 0x07DB\nbpl w", 1),
 }
 
@@ -217,7 +217,7 @@ def test_every_condition_leaves_a_loop_at_its_round(condition: int, limit: int) 
 
 
 def test_a_board_restored_from_before_a_warning_warns_again() -> None:
-    board = make("mov32 r0, #0x40000000\nw: ldr r3, [r0, #16]\n.half 0x07DB\nbpl w", "native")
+    board = make("mov32 r0, #0x40000C00\nw: ldr r3, [r0, #16]\n.half 0x07DB\nbpl w", "native")
     early = board.snapshot()
     board.run_for("1 ms")
     assert len(board.warnings) == 1

@@ -22,9 +22,13 @@ PERIPHERALS = {
     "GPIOA": {"CRL": 0x4444_4444, "CRH": 0x4444_4444, "IDR": 0xA000},
     "GPIOB": {"CRL": 0x4444_4444, "CRH": 0x4444_4444, "IDR": 0x0010},
     "EXTI": {},
+    "DMA1": {},
+    "ADC1": {"HTR": 0xFFF},
+    "ADC2": {"HTR": 0xFFF},
     **{f"USART{number}": {"SR": 0xC0} for number in (1, 2, 3)},
     "IWDG": {"RLR": 0xFFF},
     "WWDG": {"CR": 0x7F, "CFR": 0x7F},
+    **{f"TIM{number}": {"ARR": 0xFFFF} for number in (1, 2, 3, 4)},
 }
 #: Reset values of the core's registers; GPIOA's IDR apart, nothing here depends on the outside.
 CORE = {

@@ -269,6 +269,12 @@ static bool has_clock(const struct region_user *region, uint32_t offset)
     return page->gate == NULL || *page->gate & page->gate_mask;
 }
 
+bool is_clocked(const struct core *core, uint32_t address)
+{
+    const struct page *page = &core->pages[(address - PERIPHERALS) >> PAGE_SHIFT];
+    return page->gate == NULL || *page->gate & page->gate_mask;
+}
+
 /* Reads a register of a device in C; false: not now, the access comes again. */
 static bool read_device(struct core *core, struct device *device, uint32_t index, uint32_t address, uint32_t size,
                         uint32_t *word)

@@ -111,7 +111,7 @@ struct page {
 };
 
 /* The word that latches what is read stands above the bits; 0 for none. */
-enum behaviour { READS_PLAIN = 1, WRITES_PLAIN = 2, READS_NATIVE = 4, WRITES_NATIVE = 8, HALFWORDS = 16, LATCH_SHIFT = 5 };
+enum behaviour { READS_PLAIN = 1, WRITES_PLAIN = 2, READS_NATIVE = 4, WRITES_NATIVE = 8, HALFWORDS = 16, DUPLICATES = 32, LATCH_SHIFT = 6 };
 
 /* Stores a word in a register as its masks say; returns what stood there. */
 static inline uint32_t store(struct page *page, uint32_t index, uint32_t written)
@@ -229,6 +229,8 @@ uint64_t rounds_of_counter(struct core *core, const struct row *row);
 /* access.c */
 void go_on_at_access(struct core *core, uint32_t pc);
 bool is_privileged(struct core *core);
+/* Whether a register of a peripheral has its clock. */
+bool is_clocked(const struct core *core, uint32_t address);
 bool resolve(struct core *core, uint32_t address, bool is_write, uint32_t bytes);
 void skip(struct core *core, uint32_t address, bool is_write, uint32_t bytes);
 /* run.c */

@@ -64,8 +64,14 @@ static bool registers(void *user, struct bus_access *access)
     const uint32_t behaviour = page->behaviour[index];
     fabric_catch_up(core->fabric, page->device->slot, now_ns(core->fabric));
     if (access->is_write) {
-        if (access->bytes != 4 || !(behaviour & (WRITES_PLAIN | WRITES_NATIVE))) {
+        if (!(behaviour & (WRITES_PLAIN | WRITES_NATIVE))) {
             return false;
+        }
+        if (access->bytes != 4) { /* the APB bridge duplicates what is narrower: RM0008 13.3.4 */
+            if (!(behaviour & DUPLICATES)) {
+                return false;
+            }
+            access->word = (access->word & (access->bytes == 1 ? 0xFF : 0xFFFF)) * (access->bytes == 1 ? 0x01010101u : 0x10001u);
         }
         const uint32_t previous = store(page, index, access->word);
         if (behaviour & WRITES_NATIVE) {
@@ -92,11 +98,26 @@ static bool holds_code(void *user, uint32_t address, uint32_t bytes)
     return core->code_places[at / 8] >> at % 8 & 1;
 }
 
+enum { DWT_CYCCNT = 0xE0001004, STK_VAL = 0xE000E018 };
+
+static uint64_t asleep_until(void *user)
+{
+    struct core *core = user;
+    const struct shared *s = &core->shared;
+    if (s->is_python || !s->sleep || wakes(core)) {
+        return 0;
+    }
+    return s->tick_next < core->limit ? s->tick_next : core->limit;
+}
+
 /* Puts the core under a fabric. */
 void core_join(struct core *core, struct fabric *fabric)
 {
     core->fabric = fabric;
     fabric->host = (struct host){.user = core, .cycle = cycle, .boundary = &core->shared.cycle, .set_irq = set_irq,
                                  .end_slice = end_slice, .due = due, .pc = pc, .signal = signal,
-                                 .registers = registers, .holds_code = holds_code};
+                                 .registers = registers, .holds_code = holds_code,
+                                 .asleep_until = asleep_until};
+    add_counter(fabric, DWT_CYCCNT, &core->shared.cyccnt, NULL);
+    add_counter(fabric, STK_VAL, &core->shared.tick, NULL);
 }

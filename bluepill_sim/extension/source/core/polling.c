@@ -141,7 +141,6 @@ void wait_on(struct core *core, const struct row *row, uint64_t rounds)
 }
 
 enum operation { ADD, SUBTRACT, SUBTRACT_FROM, SHIFT_LEFT, SHIFT_RIGHT, AND };
-enum { DWT_CYCCNT = 0xE0001004, STK_VAL = 0xE000E018 };
 
 /* N, Z, C and V of the last step; shifts and AND have no use of C and V here. */
 struct flags {
@@ -181,6 +180,45 @@ static bool holds(uint32_t condition, struct flags f)
     return ways[condition >> 1] != (condition & 1);
 }
 
+/* The ramp that a register reads; null: it reads none, or not now. */
+static const struct counter *counter_at(struct core *core, uint32_t address)
+{
+    const struct fabric *fabric = core->fabric;
+    for (uint32_t n = 0; n < fabric->counter_count; ++n) {
+        const struct counter *one = &fabric->counters[n];
+        if (one->address == address) {
+            return one->ticks == NULL ? is_privileged(core) ? one : NULL : is_clocked(core, address) ? one : NULL;
+        }
+    }
+    return NULL;
+}
+
+/* Cycles of the core a tick: a clock of the chip is the core's, divided by a power of 2. 0: it is tied to another time. */
+static uint64_t cycles_a_tick(const struct fabric *fabric, const struct ticks *ticks)
+{
+    return ticks == NULL ? 1 : ticks->ns == fabric->time.ns && fabric->time.hz % ticks->hz == 0 ? fabric->time.hz / ticks->hz : 0;
+}
+
+/* What a counter reads at a cycle, and the first cycle after it at which it may read another word. */
+static uint32_t count_at(const struct fabric *fabric, const struct counter *counter, uint64_t cycle, uint64_t *changes)
+{
+    const struct ramp *ramp = counter->ramp;
+    const struct ticks *ticks = counter->ticks;
+    const uint64_t unit = cycles_a_tick(fabric, ticks);
+    const uint64_t start = ticks == NULL ? 0 : fabric->time.cycle, first = ticks == NULL ? 0 : ticks->tick;
+    *changes = cycle + 1;
+    if (!unit) {
+        return ramp_at(ramp, tick_at(ticks, ns_of(fabric, cycle)));
+    }
+    const uint64_t tick = first + (cycle - start) / unit;
+    if (!ramp->runs) {
+        *changes = NO_TIME;
+    } else if (tick >= ramp->base) {
+        *changes = start + unit * (ramp->base + ((tick - ramp->base) / ramp->divider + 1) * ramp->divider - first);
+    }
+    return ramp_at(ramp, tick);
+}
+
 /* How many of the next rounds of such a loop go round again, of those that end before the run does: the value of a
  * counter follows from the time, and each round but the last leaves nothing that the next one does not overwrite.
  */
@@ -189,19 +227,22 @@ uint64_t rounds_of_counter(struct core *core, const struct row *row)
     const struct loop *loop = row->loop;
     const struct shared *s = &core->shared;
     const uint32_t address = read_register(core, REG_R0 + loop->base) + loop->offset;
-    if ((address != DWT_CYCCNT && address != STK_VAL) || !s->stop_at || !is_privileged(core)) {
+    const struct counter *counter = s->stop_at ? counter_at(core, address) : NULL;
+    if (counter == NULL) {
         return 0;
     }
-    const struct ramp *ramp = address == DWT_CYCCNT ? &s->cyccnt : &s->tick;
     uint32_t operands[sizeof loop->steps / sizeof *loop->steps];
     for (uint32_t k = 0; k < loop->count; ++k) {
         const struct step *step = &loop->steps[k];
         operands[k] = step->is_register ? read_register(core, REG_R0 + (int)step->operand) : step->operand;
     }
-    const uint64_t left = rounds_left(core, row);
-    uint64_t n = 0;
-    while (n < left && holds(loop->condition, run_steps(loop, operands, ramp_at(ramp, s->cycle + n * row->costs[1] + loop->read_cycle)))) {
-        ++n;
+    const uint64_t left = rounds_left(core, row), first = s->cycle + loop->read_cycle, cost = row->costs[1];
+    uint64_t n = 0, changes;
+    while (n < left && holds(loop->condition, run_steps(loop, operands, count_at(core->fabric, counter, first + n * cost, &changes)))) {
+        if (changes == NO_TIME) {
+            return left;
+        }
+        n = (changes - first + cost - 1) / cost;
     }
-    return n;
+    return n < left ? n : left;
 }

@@ -18,13 +18,6 @@ enum system_answer {
 };
 
 #pragma GCC visibility push(hidden)
-/* Counters that follow from the time: ramp.c */
-uint32_t ramp_at(const struct ramp *ramp, uint64_t now);
-/* Makes `now` the time that it counts from; the phase of its divider is kept. */
-void ramp_rebase(struct ramp *ramp, uint64_t now);
-/* When a ramp that falls next comes to 0. */
-uint64_t ramp_zero(const struct ramp *ramp);
-
 /* Registers whose value moves, or whose read does something: an access needs its exact time. */
 bool system_needs_time(uint32_t address);
 /* exceptions.c */

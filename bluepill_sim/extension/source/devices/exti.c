@@ -19,10 +19,22 @@ static void update_irqs(struct device *device)
     }
 }
 
+/* Lines whose events trigger ADCs too: their outputs come behind those of interrupts. */
+static const uint32_t trigger_lines[] = {11, 15};
+
 static void signal_events(struct device *device, uint32_t lines)
 {
-    if (lines & device->words[EMR]) {
-        device->fabric->host.signal(device->fabric->host.user);
+    const uint32_t events = lines & device->words[EMR];
+    if (!events) {
+        return;
+    }
+    device->fabric->host.signal(device->fabric->host.user);
+    for (uint32_t n = 0; n < sizeof trigger_lines / sizeof *trigger_lines; ++n) {
+        if (events >> trigger_lines[n] & 1) {
+            const uint32_t output = sizeof lines_by_irq / sizeof *lines_by_irq + n;
+            output_set(device, output, true);
+            output_set(device, output, false);
+        }
     }
 }
 

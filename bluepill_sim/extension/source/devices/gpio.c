@@ -44,4 +44,10 @@ static uint32_t read(struct device *device, uint32_t index)
     return port_input(device->fabric, number_of(device));
 }
 
-DEVICE_KIND(gpio_kind) = {.name = "gpio", .needs_time = needs_time, .read = read, .write = write};
+static uint32_t command(struct device *device, uint32_t what, uint32_t one, uint32_t other)
+{
+    (void)other;
+    return what == SETTLE ? read(device, one) : 0;
+}
+
+DEVICE_KIND(gpio_kind) = {.name = "gpio", .needs_time = needs_time, .read = read, .write = write, .command = command};

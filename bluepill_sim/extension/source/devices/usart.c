@@ -11,10 +11,12 @@
  * flag), what stands behind the shift register, what is in it (0: nothing), and what DR reads. */
 enum { SR, DR, BRR, CR1, CR2, CR3, SEEN = 7, TDR, SHIFT, RDR };
 /* Of SR, and of what it enables in CR1 at the same places. */
-enum { PE = 1 << 0, ORE = 1 << 3, IDLE = 1 << 4, RXNE = 1 << 5, TC = 1 << 6, TXE = 1 << 7 };
+enum { PE = 1 << 0, FE = 1 << 1, NE = 1 << 2, ORE = 1 << 3, IDLE = 1 << 4, RXNE = 1 << 5, TC = 1 << 6, TXE = 1 << 7 };
 enum { ASKING = TXE | TC | RXNE | IDLE, READ_SEQUENCE = 0x1F };
 /* Of CR1. */
 enum { SBK = 1 << 0, RE = 1 << 2, TE = 1 << 3, RXNEIE = 1 << 5, PEIE = 1 << 8, M = 1 << 12, UE = 1 << 13 };
+/* Of CR3. */
+enum { EIE = 1 << 0, DMAR = 1 << 6, DMAT = 1 << 7 };
 /* A data word, what marks one in TDR and SHIFT, and what SHIFT holds besides. */
 enum { WORD = 0x1FF, HELD = 1 << 16, PREAMBLE = 1 << 17, BREAK = 1 << 18, FLAGS_AT = 16 };
 /* What Python is asked, as `Question` of usart.py: all but the last two are warnings. */
@@ -22,7 +24,7 @@ enum { TX_PIN, TX_OFF, NO_RATE, CHARACTER_LOST, RX_OFF, CUT_OFF, CHECK_MODES, JU
 /* Commands of its own: move to the pins (TX, RX); hear a word, or learn that no more can be held. */
 enum { MOVE = OWN_COMMANDS, HEAR, CAN_HEAR };
 /* Its outputs. */
-enum { IRQ };
+enum { IRQ, TX_DMA, RX_DMA };
 
 static bool is_transmitting(const struct device *device) { return (device->words[CR1] & (UE | TE)) == (UE | TE); }
 
@@ -56,12 +58,16 @@ static uint64_t span_ns(const struct device *device, uint64_t half_bits)
     return (uint64_t)((__uint128_t)half_bits * device->words[BRR] * NS_PER_S / (2 * (uint64_t)usart->clock_hz));
 }
 
-static void update_irq(struct device *device)
+/* Interrupt and DMA requests. */
+static void update_outputs(struct device *device)
 {
-    const uint32_t status = device->words[SR], control = device->words[CR1];
+    const uint32_t status = device->words[SR], control = device->words[CR1], dma = device->words[CR3];
     /* TXEIE, TCIE and IDLEIE sit at the places of their flags; ORE shares RXNEIE. */
     output_set(device, IRQ,
-               (status & control & ASKING) || (status & ORE && control & RXNEIE) || (status & PE && control & PEIE));
+               (status & control & ASKING) || (status & ORE && control & RXNEIE) || (status & PE && control & PEIE) ||
+                   (status & (FE | NE | ORE) && (dma & (EIE | DMAR)) == (EIE | DMAR)));
+    output_set(device, TX_DMA, dma & DMAT && status & TXE && is_transmitting(device));
+    output_set(device, RX_DMA, dma & DMAR && status & RXNE);
 }
 
 /* Works out all deadlines from what is on the line. */
@@ -174,7 +180,7 @@ static void event(struct device *device, uint64_t until)
             device->words[SR] |= IDLE;
         }
         find_deadlines(device);
-        update_irq(device);
+        update_outputs(device);
     }
 }
 
@@ -199,7 +205,7 @@ static void write_data(struct device *device, uint32_t word)
         words[TDR] = HELD | word;
         words[SR] &= ~(uint32_t)TXE;
     }
-    update_irq(device);
+    update_outputs(device);
 }
 
 /* Uses the new rate from the next character on. */
@@ -243,7 +249,7 @@ static void write_control(struct device *device)
         load(device, BREAK, now_ns(device->fabric), 0);
     }
     find_deadlines(device);
-    update_irq(device);
+    update_outputs(device);
 }
 
 static uint32_t read(struct device *device, uint32_t index)
@@ -252,7 +258,7 @@ static uint32_t read(struct device *device, uint32_t index)
     (void)index; /* DR */
     words[SR] &= ~(RXNE | (words[SEEN] & READ_SEQUENCE));
     words[SEEN] &= ~(uint32_t)READ_SEQUENCE;
-    update_irq(device);
+    update_outputs(device);
     return words[RDR];
 }
 
@@ -266,7 +272,7 @@ static void write(struct device *device, uint32_t index, uint32_t written, uint3
         usart->rate_pc = device->fabric->host.pc(device->fabric->host.user);
         write_rate(device, usart->tx_due_ns, usart->rx_due_ns);
     } else if (index == SR) {
-        update_irq(device);
+        update_outputs(device);
     } else {
         write_control(device);
     }
@@ -298,7 +304,7 @@ static void clear(struct device *device)
         device->words[n] = 0;
     }
     schedule(device, NO_TIME);
-    output_set(device, IRQ, false);
+    update_outputs(device);
 }
 
 static bool hear(struct device *device, uint32_t word)
@@ -342,6 +348,7 @@ static uint32_t command(struct device *device, uint32_t what, uint32_t one, uint
         usart->rx_pin = other;
         break;
     case HEAR: return hear(device, one);
+    case SETTLE: return device->words[RDR] & WORD; /* DR */
     case CAN_HEAR: return can_receive(device);
     default: break;
     }

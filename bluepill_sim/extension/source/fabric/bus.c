@@ -18,6 +18,17 @@ bool fabric_add_memory(struct fabric *fabric, uint8_t *bytes, uint32_t base, uin
     return true;
 }
 
+bool is_memory(const struct fabric *fabric, uint32_t address, bool is_write)
+{
+    for (uint32_t n = 0; n < fabric->memory_count; ++n) {
+        const struct memory *memory = &fabric->memories[n];
+        if (address - memory->base < memory->size && (!is_write || memory->is_writable)) {
+            return true;
+        }
+    }
+    return false;
+}
+
 static bool reach_memory(struct fabric *fabric, struct bus_access *access)
 {
     for (uint32_t n = 0; n < fabric->memory_count; ++n) {

@@ -85,7 +85,14 @@ void fabric_write(struct fabric *fabric, uint32_t slot, uint32_t index, uint32_t
 uint32_t fabric_command(struct fabric *fabric, uint32_t slot, uint32_t what, uint32_t one, uint32_t other)
 {
     struct device *device = &fabric->devices[slot];
-    return device->kind->command == NULL ? 0 : device->kind->command(device, what, one, other);
+    return device->kind == NULL || device->kind->command == NULL ? 0 : device->kind->command(device, what, one, other);
+}
+
+void add_counter(struct fabric *fabric, uint32_t address, const struct ramp *ramp, const struct ticks *ticks)
+{
+    if (fabric->counter_count < COUNTERS) { /* without room, such loops run round by round */
+        fabric->counters[fabric->counter_count++] = (struct counter){address, ramp, ticks};
+    }
 }
 
 /* The time of the event that is acted on; NO_TIME for none. */

@@ -18,7 +18,7 @@
 /* Kept out of its callers, which stay short enough to need no stack. */
 #define RARELY __attribute__((noinline, cold))
 
-enum { SLOTS = 128, LINES = 192, SUBSCRIBERS = 16, LISTENERS = 16, OUTPUTS = 24, SINKS = 8, WORDS = 1024, MEMORIES = 4, MOST_ROWS = 32768, LINE_WORDS = LINES / 64 };
+enum { SLOTS = 128, LINES = 192, SUBSCRIBERS = 16, LISTENERS = 16, OUTPUTS = 24, SINKS = 8, WORDS = 1024, MEMORIES = 4, MOST_ROWS = 32768, COUNTERS = 8, LINE_WORDS = LINES / 64 };
 /* The first lines are those of interrupts, by their numbers. */
 enum { IRQ_LINES_END = 64, NO_LINE = 255 };
 enum { LOW, HIGH, FLOATING };
@@ -55,6 +55,8 @@ struct host {
     bool (*registers)(void *user, struct bus_access *access);
     /* Whether anything was translated from these bytes of SRAM; null: it may have been. */
     bool (*holds_code)(void *user, uint32_t address, uint32_t bytes);
+    /* Up to which cycle the core looks at nothing, unless an event wakes it; null or 0: it is awake. */
+    uint64_t (*asleep_until)(void *user);
 };
 
 /* What Python is asked: each keeps an exception for later. */
@@ -84,6 +86,8 @@ struct device_kind {
     void (*write)(struct device *device, uint32_t index, uint32_t written, uint32_t previous);
     /* Its slot is due at a time; null: that is Python's business. */
     void (*event)(struct device *device, uint64_t ns);
+    /* Whether it would do anything about an input now; null: always. It tells of changes with `hearing_changed`. */
+    bool (*hears)(const struct device *device, uint32_t input);
     /* One of its inputs has changed. */
     void (*line)(struct device *device, uint32_t input, bool level);
     /* Pins of a port that it listens to have changed their input. */
@@ -96,6 +100,8 @@ enum command {
     RESET, /* the registers have their reset values */
     CLOCK, /* its clock has another frequency: `one`, in Hz */
     ROUTE, /* AFIO has changed what concerns it */
+    HEARD, /* somebody hears its outputs, or no longer does */
+    SETTLE, /* returns the word of the register with the index `one` as a read would find it now, and changes nothing */
     OWN_COMMANDS = 16
 };
 
@@ -164,6 +170,13 @@ struct time_base {
     uint32_t hz;
 };
 
+/* A register that reads what a ramp of time is: a loop that polls it is worked out (`core/polling.c`). */
+struct counter {
+    uint32_t address;
+    const struct ramp *ramp;
+    const struct ticks *ticks; /* null: it counts cycles of the core */
+};
+
 /* A memory, as a bus master sees it. */
 struct memory {
     uint8_t *bytes;
@@ -188,6 +201,10 @@ struct fabric {
     struct port *ports; /* Python's: PORTS of them */
     struct wave *waves; /* Python's: one a source */
     struct shown shown[PORTS * PINS];
+    struct counter counters[COUNTERS];
+    uint32_t counter_count;
+    const struct analog *analog;         /* Python's, */
+    const int32_t *samples[ANALOG_PINS]; /* and these */
     struct memory memories[MEMORIES];
     uint32_t memory_count;
     uint32_t master; /* the slot of the device that makes an access; SLOTS for none */
@@ -198,6 +215,14 @@ struct fabric {
 
 /* Services. */
 #pragma GCC visibility push(hidden)
+
+/* ramp.c */
+/* What a counter reads at a time. */
+uint32_t ramp_at(const struct ramp *ramp, uint64_t now);
+/* Makes `now` the time that it counts from; the phase of its divider is kept. */
+void ramp_rebase(struct ramp *ramp, uint64_t now);
+/* When a ramp that falls next comes to 0. */
+uint64_t ramp_zero(const struct ramp *ramp);
 
 /* queue.c */
 static inline uint64_t ns_of(const struct fabric *fabric, uint64_t cycle)
@@ -212,13 +237,34 @@ static inline uint64_t now_ns(struct fabric *fabric)
     return fabric->event_ns != NO_TIME ? fabric->event_ns : ns_of(fabric, fabric->host.cycle(fabric->host.user));
 }
 
+/* The last tick of a clock that begins at or before a time. */
+static inline uint64_t tick_at(const struct ticks *ticks, uint64_t ns)
+{
+    if (ns < ticks->ns) {
+        return ticks->tick;
+    }
+    return ticks->tick + (uint64_t)(((__uint128_t)(ns - ticks->ns + 1) * ticks->hz + NS_PER_S - 1) / NS_PER_S - 1);
+}
+
+/* When a tick begins. */
+static inline uint64_t ns_of_tick(const struct ticks *ticks, uint64_t tick)
+{
+    return ticks->ns + (uint64_t)((__uint128_t)(tick - ticks->tick) * NS_PER_S / ticks->hz);
+}
+
 /* Has the device's event come at a time; NO_TIME takes it back. */
 void schedule(struct device *device, uint64_t ns);
 static inline uint64_t due_ns(const struct device *device) { return device->fabric->slots[device->slot].ns; }
+/* Up to when, but not at which, nothing but this device acts, or looks at memory. */
+uint64_t quiet_ns(const struct device *device);
 /* Acts on all that is due at or before a time, in order of time, then of slots. */
 void run_events(struct fabric *fabric, uint64_t until_ns);
 
 /* lines.c */
+/* Whether a change of an output would be seen by anyone. */
+bool is_heard(const struct device *device, uint32_t output);
+/* Tells the devices whose outputs lead to inputs of this one that what it `hears` has changed. */
+void hearing_changed(struct device *device);
 void output_set(struct device *device, uint32_t output, bool level);
 
 static inline uint32_t ask(struct device *device, uint32_t what, uint32_t value)
@@ -227,6 +273,8 @@ static inline uint32_t ask(struct device *device, uint32_t what, uint32_t value)
 }
 
 /* devices.c */
+/* Makes the register of a counter known; `ramp` and `ticks` stay where they are, and are right up to the next event. */
+void add_counter(struct fabric *fabric, uint32_t address, const struct ramp *ramp, const struct ticks *ticks);
 void add_kind(struct device_kind *kind);
 void send_word(struct device *device, const struct sent *row);
 
@@ -263,15 +311,22 @@ void show_to(struct fabric *fabric, struct subscriber *subscriber);
 uint64_t settled_ns(struct fabric *fabric);
 extern struct device_kind waves_kind;
 
+/* analog.c */
+/* Microvolts on the pin of an ADC channel, which may be an earlier time's. */
+int64_t channel_uv(const struct fabric *fabric, uint32_t channel, uint64_t ns);
+
 /* bus.c */
 /* Reads or writes 1, 2 or 4 bytes for a device, at the time of its event; false: an error of the bus. */
 bool bus_read(struct device *master, uint32_t address, uint32_t bytes, uint32_t *word);
 bool bus_write(struct device *master, uint32_t address, uint32_t bytes, uint32_t word);
+/* Whether an access there reaches memory. */
+bool is_memory(const struct fabric *fabric, uint32_t address, bool is_write);
 
 #pragma GCC visibility pop
 
 uint64_t fabric_next_ns(const struct fabric *fabric);
 void fabric_catch_up(struct fabric *fabric, uint32_t number, uint64_t until_ns);
+uint32_t fabric_command(struct fabric *fabric, uint32_t slot, uint32_t what, uint32_t one, uint32_t other);
 
 /* A kind of device, which the library knows from when it is loaded on. */
 #define DEVICE_KIND(kind)                                                                                              \

@@ -9,6 +9,7 @@
 #define SOURCES 64
 #define LAST_ROWS 32
 #define RECEIVED 256
+#define ANALOG_PINS 10
 #define LATER_INPUTS 1024
 
 /* A block that began, an exception that was entered (its number) or left (-1). */
@@ -34,7 +35,7 @@ struct instruction {
 };
 _Static_assert(sizeof(struct instruction) == 20, "instruction");
 
-/* A counter that follows from the time: `source/core/ramp.c`. */
+/* A counter that follows from the time: `source/fabric/ramp.c`. */
 struct ramp {
     uint64_t base; /* when it had `value`, in the units of its owner, */
     uint32_t value;
@@ -42,9 +43,19 @@ struct ramp {
     uint32_t top; /* its limit: 0 and this are neighbours */
     uint8_t runs;
     uint8_t falls;
-    uint16_t padding;
+    uint8_t mirrors; /* it turns round at both */
+    uint8_t padding;
 };
 _Static_assert(sizeof(struct ramp) == 24, "ramp");
+
+/* A clock that is counted from where the core's was last changed. */
+struct ticks {
+    uint64_t ns; /* when */
+    uint64_t tick; /* begins; each one after it at floor(n * 10**9 / hz) ns */
+    uint32_t hz;
+    uint32_t padding;
+};
+_Static_assert(sizeof(struct ticks) == 24, "ticks");
 
 /* What one instruction of a polling loop makes of the value that it has read. */
 struct step {
@@ -222,11 +233,149 @@ struct exti {
 };
 _Static_assert(sizeof(struct exti) == 20, "exti");
 
+/* What a DMA controller holds beyond its registers. RM0008 13.3. */
+struct dma {
+    uint64_t base_ns; /* start of the transfers that follow each other without a gap, */
+    uint64_t cycles; /* and cycles of HCLK from there to the end of the one under way */
+    uint32_t hz;
+    uint32_t apb1_cycles;
+    uint32_t apb2_cycles;
+    uint32_t current; /* 1 + the channel whose transfer is under way; 0: none */
+    uint32_t ready; /* channels that are enabled and have something left, */
+    uint32_t unasked; /* those that need no request, */
+    uint32_t lines; /* those whose request is high, */
+    uint32_t latched; /* and those of which a request has come */
+    uint32_t peripheral[7];
+    uint32_t memory[7];
+    uint32_t reload[7];
+    uint32_t padding;
+};
+_Static_assert(sizeof(struct dma) == 136, "dma");
+
+/* Volts on a pin, from outside: `bluepill_sim/fabric/signals.py`. */
+struct signal {
+    uint64_t start_ns; /* when it began, */
+    uint64_t phase_ns; /* at this place of its period */
+    uint64_t period_ns;
+    uint64_t interval_ns; /* between two samples; of a square wave, how long it is high */
+    int32_t low_uv;
+    int32_t high_uv;
+    uint32_t shape; /* 0: none, the pin has its logic level */
+    uint32_t is_repeated;
+    uint32_t count; /* samples, which stand elsewhere */
+    uint32_t padding;
+};
+_Static_assert(sizeof(struct signal) == 56, "signal");
+
+/* The analog side of a chip. */
+struct analog {
+    uint32_t vdda_uv;
+    int32_t temperature_mc; /* of the chip, in thousandths of a degree Celsius */
+    struct signal signals[10];
+};
+_Static_assert(sizeof(struct analog) == 568, "analog");
+
+/* What an ADC holds beyond its registers. RM0008 11.3. */
+struct adc {
+    uint64_t base_ns; /* start of the run of conversions, */
+    uint64_t cycles; /* and cycles of PCLK2 from there to the end of the present one */
+    uint64_t sample_ns;
+    uint64_t end_ns;
+    uint64_t ready_ns; /* no conversion begins earlier */
+    uint64_t calibrated_ns; /* when CAL and RSTCAL fall */
+    uint32_t hz; /* PCLK2, */
+    uint32_t divider; /* and what ADCCLK is divided by */
+    uint32_t number; /* 1 or 2 */
+    uint32_t remapped; /* bit 0: the regular group's EXTI trigger is TIM8's, bit 1: the injected one's */
+    uint32_t state; /* which group is being converted */
+    uint32_t channel;
+    uint32_t has_sample;
+    uint32_t sample;
+    uint32_t regular_at; /* rank in the sequence, */
+    uint32_t regular_left; /* and conversions that are left of this trigger */
+    uint32_t regular_waits; /* for the end of the injected group */
+    uint32_t injected_at;
+    uint32_t injected_left;
+    uint32_t is_automatic; /* the injected group follows the regular one */
+    uint32_t turns; /* triggers that alternate, modulo 2 */
+    uint32_t padding;
+    uint32_t warned[6]; /* by question: channels that were warned of */
+};
+_Static_assert(sizeof(struct adc) == 136, "adc");
+
 /* Which port a GPIO is. */
 struct gpio {
     uint32_t port;
 };
 _Static_assert(sizeof(struct gpio) == 4, "gpio");
+
+/* A digital filter of an input. RM0008 14.4.7, IC1F. */
+struct filter {
+    uint64_t sampled; /* the tick up to which samples were taken */
+    uint8_t raw; /* the level in front of it, */
+    uint8_t out; /* and behind */
+    uint8_t count; /* samples so far that differ from `out` */
+    uint8_t padding;
+    uint32_t period; /* ticks from sample to sample, */
+    uint32_t length; /* so many of which change `out`; 0: it passes everything */
+    uint32_t end;
+};
+_Static_assert(sizeof(struct filter) == 24, "filter");
+
+/* What an output of a timer shows: a level, a wave, or nothing. */
+struct shape {
+    uint64_t period; /* in ticks, */
+    uint64_t high; /* of which it is so many at 1 */
+    uint64_t edge; /* a tick of a rising edge, modulo the period */
+    uint32_t kind; /* nothing, low, high, a wave (`tim.h`) */
+    uint32_t padding;
+};
+_Static_assert(sizeof(struct shape) == 32, "shape");
+
+/* What a timer holds beyond its registers. RM0008 14, 15. */
+struct tim {
+    struct ramp ramp; /* CNT, in ticks */
+    struct ticks ticks; /* of CK_INT */
+    uint64_t at; /* the tick up to which all is worked out */
+    uint64_t idle_at; /* the tick at which outputs go to OISx; all ones: none is to come */
+    uint64_t edge_at[3]; /* the tick at which OC1REF to OC3REF last changed before they were what they are now, */
+    uint64_t shaped_at[3]; /* since when they are that, */
+    uint64_t born[3]; /* and of a wave the tick of its last edge before, which there was not */
+    struct filter filters[5]; /* TI1 to TI4, ETR */
+    struct shape outputs[7]; /* CH1 to CH4, CH1N to CH3N */
+    struct shape references[3]; /* OC1REF to OC3REF, for the dead time */
+    uint32_t base; /* the address of its registers */
+    uint32_t psc;
+    uint32_t arr;
+    uint32_t ccr[4]; /* active registers, behind the preload registers */
+    uint32_t ccer; /* the same of CCPC */
+    uint32_t ccmr[2];
+    uint32_t repetitions; /* overflows before the next update event */
+    uint32_t psc_count; /* of the prescaler while no clock of its own drives it */
+    uint8_t captures[4]; /* events in the prescaler of an input */
+    uint32_t latched; /* OCxREF where it does not follow from CNT, a bit each */
+    uint32_t cleared; /* OCxREF that ETRF has cleared */
+    uint32_t armed; /* flags of SR whose rising is an event, because the program looks for them */
+    uint32_t itr; /* levels of the internal triggers */
+    uint8_t trgi;
+    uint8_t trgo;
+    uint8_t in_break;
+    uint8_t is_busy; /* what it puts out may come back to it: pulses are not taken, */
+    uint64_t late_at; /* and levels at this tick, the next one; 0: none has come back */
+    uint32_t pulses; /* outputs that give a pulse at the end of what happens now */
+    uint32_t listening; /* bits of `pins` that are listened to, */
+    uint32_t hears; /* and of the internal triggers */
+    uint32_t etr_was;
+    uint32_t etr_edges;
+    uint32_t burst_index; /* the next register of a burst, */
+    uint32_t burst_left; /* transfers that are still to be asked for, */
+    uint32_t burst_output; /* by this output */
+    uint32_t lock; /* LOCK, once it was written */
+    uint32_t is_advanced; /* it is TIM1 */
+    uint8_t pins[9]; /* CH1 to CH4, CH1N to CH3N, ETR, BKIN */
+    uint8_t sources[7]; /* the alternate functions of the first seven */
+};
+_Static_assert(sizeof(struct tim) == 712, "tim");
 
 /* A level that goes up every `period` ticks, and down `high` ticks later. */
 struct wave {

@@ -45,6 +45,47 @@ void output_set(struct device *device, uint32_t output, bool level)
     drive(device->fabric, device->outputs[output], device->drivers[output], level);
 }
 
+bool is_heard(const struct device *device, uint32_t output)
+{
+    const struct fabric *fabric = device->fabric;
+    const uint32_t number = device->outputs[output];
+    if (number >= LINES) {
+        return false;
+    }
+    const struct line *line = &fabric->lines[number];
+    bool is_heard = number < IRQ_LINES_END || fabric->subscribed_lines[number / 64] >> number % 64 & 1;
+    for (uint32_t n = 0; n < line->sink_count; ++n) {
+        const struct sink *sink = &line->sinks[n];
+        is_heard |= sink->device->kind->hears == NULL || sink->device->kind->hears(sink->device, sink->input);
+    }
+    return is_heard;
+}
+
+static bool leads_to(const struct line *line, const struct device *device)
+{
+    for (uint32_t n = 0; n < line->sink_count; ++n) {
+        if (line->sinks[n].device == device) {
+            return true;
+        }
+    }
+    return false;
+}
+
+void hearing_changed(struct device *device)
+{
+    struct fabric *fabric = device->fabric;
+    for (uint32_t slot = 0; slot < fabric->slot_count; ++slot) {
+        struct device *source = &fabric->devices[slot];
+        for (uint32_t output = 0; output < OUTPUTS; ++output) {
+            const uint32_t number = source->outputs[output];
+            if (number < LINES && leads_to(&fabric->lines[number], device)) {
+                fabric_command(fabric, slot, HEARD, 0, 0);
+                break;
+            }
+        }
+    }
+}
+
 void fabric_set_output(struct fabric *fabric, uint32_t slot, uint32_t output, bool level)
 {
     output_set(&fabric->devices[slot], output, level);

@@ -68,6 +68,19 @@ uint64_t fabric_next_ns(const struct fabric *fabric)
     return first;
 }
 
+uint64_t quiet_ns(const struct device *device)
+{
+    const struct fabric *fabric = device->fabric;
+    const uint64_t cycle = fabric->host.asleep_until == NULL ? 0 : fabric->host.asleep_until(fabric->host.user);
+    uint64_t first = cycle > fabric->time.cycle ? ns_of(fabric, cycle) : 0;
+    for (uint32_t n = 0; n < fabric->slot_count; ++n) {
+        if (n != device->slot && fabric->slots[n].ns < first) {
+            first = fabric->slots[n].ns;
+        }
+    }
+    return first;
+}
+
 static void act(struct fabric *fabric, struct slot *slot)
 {
     struct device *device = slot->device;

@@ -18,23 +18,23 @@
 
 enum { EDGE_ROW, WAVE_ROW };
 
-/* The last tick that begins at or before a time. */
-static uint64_t tick_at(const struct wave *wave, uint64_t ns)
+static struct ticks ticks_of(const struct wave *wave) { return (struct ticks){.ns = wave->ns, .hz = wave->hz}; }
+
+static uint64_t wave_tick(const struct wave *wave, uint64_t ns)
 {
-    if (ns < wave->ns) {
-        return 0;
-    }
-    return (uint64_t)(((__uint128_t)(ns - wave->ns + 1) * wave->hz + NS_PER_S - 1) / NS_PER_S - 1);
+    const struct ticks ticks = ticks_of(wave);
+    return tick_at(&ticks, ns);
 }
 
-static uint64_t ns_of_tick(const struct wave *wave, uint64_t tick)
+static uint64_t wave_ns(const struct wave *wave, uint64_t tick)
 {
-    return wave->ns + (uint64_t)((__uint128_t)tick * NS_PER_S / wave->hz);
+    const struct ticks ticks = ticks_of(wave);
+    return ns_of_tick(&ticks, tick);
 }
 
 static uint64_t position(const struct wave *wave, uint64_t tick) { return (wave->at + tick) % wave->period; }
 
-static bool wave_level(const struct wave *wave, uint64_t ns) { return position(wave, tick_at(wave, ns)) < wave->high; }
+static bool wave_level(const struct wave *wave, uint64_t ns) { return position(wave, wave_tick(wave, ns)) < wave->high; }
 
 /* The tick of the first edge after a tick. */
 static uint64_t next_edge(const struct wave *wave, uint64_t tick)
@@ -45,7 +45,7 @@ static uint64_t next_edge(const struct wave *wave, uint64_t tick)
 
 static uint64_t next_edge_ns(const struct wave *wave, uint64_t ns)
 {
-    return ns_of_tick(wave, next_edge(wave, tick_at(wave, ns)));
+    return wave_ns(wave, next_edge(wave, wave_tick(wave, ns)));
 }
 
 /* The wave that drives a pin which shows one. */
@@ -145,7 +145,7 @@ void make_edges_where_wanted(struct fabric *fabric)
             const uint32_t at = (uint32_t)__builtin_ctz(left);
             struct shown *one = &fabric->shown[PINS * number + at];
             const bool was_made = one->is_made;
-            one->is_made = wanted >> at & 1;
+            one->is_made = one->is_wave && wanted >> at & 1; /* a state that is being put back is not shown yet */
             if (one->is_made && !was_made) {
                 struct port low, high;
                 const uint64_t ns = now_ns(fabric);
@@ -166,11 +166,11 @@ static void expand(struct fabric *fabric, struct subscriber *subscriber, uint32_
         subscriber->expanded_ns = ns;
     }
     struct expanded *one = &subscriber->expanded[subscriber->expanded_count++];
-    const uint64_t tick = tick_at(&shown->wave, ns);
+    const uint64_t tick = wave_tick(&shown->wave, ns);
     one->pin = (uint8_t)pin;
     one->level = position(&shown->wave, tick) < shown->wave.high;
     one->tick = next_edge(&shown->wave, tick);
-    one->next_ns = ns_of_tick(&shown->wave, one->tick);
+    one->next_ns = wave_ns(&shown->wave, one->tick);
 }
 
 static RARELY void make_rows(struct fabric *fabric, struct subscriber *subscriber, uint64_t until_ns)
@@ -192,7 +192,7 @@ static RARELY void make_rows(struct fabric *fabric, struct subscriber *subscribe
         const struct edge row = {.ns = first->next_ns, .pin = first->pin, .drive = shown->drive[first->level],
                                  .wire = shown->wire[first->level]};
         first->tick += first->level ? wave->high : wave->period - wave->high;
-        first->next_ns = ns_of_tick(wave, first->tick);
+        first->next_ns = wave_ns(wave, first->tick);
         put_row(fabric, subscriber, &row);
     }
     if (subscriber->expanded_ns < until_ns) {
@@ -408,7 +408,7 @@ void wave_set(struct fabric *fabric, uint32_t pin, uint32_t source, uint32_t hz,
     }
     const uint64_t now = now_ns(fabric), ns = now < fabric->time.ns ? now : fabric->time.ns;
     *wave = (struct wave){.ns = ns, .period = period, .high = high, .hz = hz, .pin = pin};
-    wave->at = (at % period + period - tick_at(wave, now) % period) % period;
+    wave->at = (at % period + period - wave_tick(wave, now) % period) % period;
     take_offer(fabric, pin, source, wave_level(wave, now));
 }
 

@@ -11,7 +11,7 @@ from bluepill_sim.errors import BluePillError
 from bluepill_sim.extension.library import library_path
 from bluepill_sim.fabric.line_speed import USUAL_BAUDS, Heard, heard, is_usual
 from tests.bluepill_sim.machine import Machine
-from tests.bluepill_sim.peripherals.usart_line import CHARACTER_NS, IRQ, ORE, PCE, RXNE, set_up, status
+from tests.bluepill_sim.peripherals.usart.usart_line import CHARACTER_NS, IRQ, ORE, PCE, RXNE, set_up, status
 
 PE, FE, NE, PEIE = 1, 2, 4, 1 << 8
 TEXT = b"ready 1\nready 2\n"

@@ -15,7 +15,7 @@ from hypothesis.stateful import (
     run_state_machine_as_test,
 )
 
-from tests.bluepill_sim.peripherals.usart_line import CHARACTER_NS, ORE, RXNE, TXE, set_up, status
+from tests.bluepill_sim.peripherals.usart.usart_line import CHARACTER_NS, ORE, RXNE, TXE, set_up, status
 
 QUICK = settings(max_examples=40, deadline=None)
 

@@ -5,7 +5,7 @@ from typing import Any
 
 import pytest
 
-from tests.bluepill_sim.peripherals.usart_line import (
+from tests.bluepill_sim.peripherals.usart.usart_line import (
     CHARACTER_NS,
     IDLE,
     IDLEIE,

@@ -1,0 +1,96 @@
+"""DMA1: seven channels that move data between peripherals and memory without the core.
+
+What it does is `extension/source/devices/dma.c`; here are its registers, and what it warns of. Which request
+leads to which channel is a table on the chip's page (RM0008 table 78).
+
+Source: RM0008 section 13.
+Invariant: CNDTR of a channel counts the transfers that are left, at any time.
+"""
+
+from enum import IntEnum
+
+from bluepill_sim.extension.layout import DMA
+from bluepill_sim.fabric.fabric import CLOCK
+from bluepill_sim.fabric.ports import ChipPorts
+from bluepill_sim.fabric.registers import NATIVE, Peripheral, Place, Register, bits
+
+CHANNELS = range(1, 8)
+#: Of CCRx, RM0008 13.4.3.
+_CONTROL = "MEM2MEM 14, PL 13:12, MSIZE 11:10, PSIZE 9:8, MINC 7, PINC 6, CIRC 5, DIR 4, TEIE 3, HTIE 2, TCIE 1, EN 0"
+#: chosen: an access on an APB takes one cycle of HCLK, and two of its own clock.
+_BRIDGE_CYCLES, _APB_CYCLES = 1, 2
+
+
+class Question(IntEnum):
+    """What the device in C warns of (dma.c), with the number of the channel from 0 on."""
+
+    LOCKED = 0
+    FAILED = 1
+    CIRCLES = 2
+
+
+_WARNINGS = {
+    Question.LOCKED: "CNDTR, CPAR or CMAR written while the channel is enabled: ignored",
+    Question.FAILED: "an access to nothing, or to what has no clock: the channel is disabled, TEIF set",
+    Question.CIRCLES: "MEM2MEM and CIRC exclude each other: it ends at 0",
+}
+
+
+def _flags(names: str) -> str:
+    """Return the fields of ISR or IFCR: four a channel, the last channel's first."""
+    return ", ".join(
+        f"{name}{n} {4 * (n - 1) + 3 - place}" for n in reversed(CHANNELS) for place, name in enumerate(names.split())
+    )
+
+
+class Dma(Peripheral):
+    """Direct memory access controller."""
+
+    KIND, HOLDS = "dma", DMA
+    HAS_BYTE_LANES = True
+    OUTPUTS = tuple(f"ch{n}_irq" for n in CHANNELS)
+    INPUTS = tuple(f"ch{n}" for n in CHANNELS)
+    REGISTERS = (
+        Register(name="ISR", offset=0x00, readable=bits((27, 0)), writable=0, fields=_flags("TEIF HTIF TCIF GIF")),
+        Register(
+            name="IFCR",
+            offset=0x04,
+            readable=0,
+            writable=bits((27, 0)),
+            on_write=NATIVE,
+            fields=_flags("CTEIF CHTIF CTCIF CGIF"),
+        ),
+        *(
+            Register(
+                name=f"{name}{n}", offset=offset + 20 * n, readable=mask, writable=mask, on_write=NATIVE, fields=fields
+            )
+            for n in CHANNELS
+            for name, offset, mask, fields in (
+                ("CCR", -0x0C, bits((14, 0)), _CONTROL),
+                ("CNDTR", -0x08, bits((15, 0)), "NDT 15:0"),
+                ("CPAR", -0x04, bits((31, 0)), "PA 31:0"),
+                ("CMAR", 0x00, bits((31, 0)), "MA 31:0"),
+            )
+        ),
+    )
+
+    def __init__(self, chip: ChipPorts, place: Place) -> None:
+        super().__init__(chip, place)
+        self.clock_changed()
+
+    def clock_hz(self) -> int:
+        """Return HCLK."""
+        return self.chip.clocks.hclk_hz
+
+    def clock_changed(self) -> None:
+        """Take what an access of each bus costs."""
+        clocks = self.chip.clocks
+        self.native.apb1_cycles = _BRIDGE_CYCLES + _APB_CYCLES * clocks.hclk_hz // clocks.pclk1_hz
+        self.native.apb2_cycles = _BRIDGE_CYCLES + _APB_CYCLES * clocks.hclk_hz // clocks.pclk2_hz
+        self.command(CLOCK, self.clock_hz())
+
+    def answer(self, what: int, value: int) -> int:
+        """Warn."""
+        question = Question(what)
+        self.chip.warn(f"{self.name} channel {value + 1}: {_WARNINGS[question]}", once=f"{self.name}:{value}:{what}")
+        return 0
