@@ -17,13 +17,15 @@ COMPILER = "arm-none-eabi-gcc"
 #: First line of `arm-none-eabi-gcc --version` for the compiler of the committed ELFs.
 COMPILER_VERSION = "arm-none-eabi-gcc (15:12.2.rel1-1) 12.2.1 20221205"
 BOARD_SOURCES = ("startup.c", "memory.c", "board.c", "pins.c", "tick.c", "uart.c")
-#: Program name to its own sources.
+#: Program name to its sources.
 PROGRAMS = {
-    "motors": ("motors.c",),
-    "sensors": ("sensors.c",),
-    "encoders": ("encoders.c", "odometer.c"),
-    "analog": ("analog.c",),
-    "dodge": ("dodge.c", "dodge_fsm.c", "odometer.c"),
+    "motors": (*BOARD_SOURCES, "motors.c"),
+    "sensors": (*BOARD_SOURCES, "sensors.c"),
+    "encoders": (*BOARD_SOURCES, "encoders.c", "odometer.c"),
+    "analog": (*BOARD_SOURCES, "analog.c"),
+    "dodge": (*BOARD_SOURCES, "dodge.c", "dodge_fsm.c", "odometer.c"),
+    # Its pins are its own: of board.c only the clock is kept.
+    "rover": ("startup.c", "memory.c", "board.c", "uart.c", "rover_board.c", "rover.c"),
 }
 MACHINE_FLAGS = ("-mcpu=cortex-m3", "-mthumb")
 COMPILE_FLAGS = (
@@ -87,9 +89,9 @@ def build_elf(
 def build_programs(output_folder: Path) -> list[Path]:
     """Build every example program into `output_folder` and return the ELFs."""
     built = []
-    for name, own in PROGRAMS.items():
+    for name, sources in PROGRAMS.items():
         output = output_folder.resolve() / f"{name}.elf"
-        build_elf((*BOARD_SOURCES, *own), folder=HERE, linker_script="f103c8.ld", output=output)
+        build_elf(sources, folder=HERE, linker_script="f103c8.ld", output=output)
         built.append(output)
     return built
 

@@ -129,9 +129,7 @@ class DifferentialRobot(Stateful):
         steps = round(volts / VOLTS_STEP)
         if self._steps_of_volts.get(signal) != steps:
             self._steps_of_volts[signal] = steps
-            set_volts = getattr(self._analog[signal], "set_volts", None)
-            if set_volts is not None:
-                set_volts(steps * VOLTS_STEP)
+            self._analog[signal].set_volts(steps * VOLTS_STEP)
 
     def _look(self, now: Nanos) -> None:
         state = self.body.state
