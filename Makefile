@@ -46,10 +46,11 @@ lint: setup
 type: setup
 	$(BIN)/mypy
 
-# One run for all; whose lines are counted says tests/conftest.py.
+# One run for all; how lines are counted says tests/tools/counted_lines.py.
 unit: setup
-	$(BIN)/pytest -n $(JOBS) --dist worksteal -m 'not soak and not hardware' --cov --cov-report=json:.coverage.json
-	$(BIN)/python tools/check_coverage.py .coverage.json
+	rm -rf .coverage
+	$(BIN)/pytest -n $(JOBS) --dist worksteal -m 'not soak and not hardware' --count-lines .coverage
+	$(BIN)/python -m tools.check_coverage .coverage
 
 bench: setup
 	$(BIN)/python tools/bench/emulator.py
@@ -61,7 +62,7 @@ bench: setup
 	$(BIN)/python tools/bench/devices.py
 
 soak: setup mutation-tools
-	$(BIN)/pytest -n $(JOBS) -m 'soak' --no-cov
+	$(BIN)/pytest -n $(JOBS) -m 'soak'
 
 # The programs of others that are on PATH, or PEERS='--peer "p2os-arduino=/home/me/drive {line}"', against p2os serve.
 peers: setup

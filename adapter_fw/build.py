@@ -3,6 +3,8 @@
     host       the self-test, with sanitizers
     program    p2os-adapter: the adapter as a PC program on any line (host/)
     units      checks of the core's single parts, with sanitizers
+    esp32-…    the ESP32's whole program with simulated hardware under it, as a shared library (esp32_sim/):
+               boards rev_b and rev_c, rev_b with a game pad
     library    the Arduino library against a robot of a few lines, with sanitizers (library/)
     replay     the fuzzing target with its corpus' reader, with sanitizers (fuzz/)
     cortex-m   the self-test on an STM32F103
@@ -66,6 +68,27 @@ def _on_host(output: str, *sources: Path, include: tuple[Path, ...] = ()) -> Tar
     )  # fmt: skip
 
 
+def _on_simulated_esp32(board: str, pad: str) -> Target:
+    """Return the program of esp32/ for this machine: no sanitizer, for another program loads it."""
+    flags = ("-O1", "-g", "-fPIC")
+    headers = (
+        "-I",
+        str(HERE / "esp32_sim"),
+        "-isystem",
+        str(HERE / "stubs" / "esp32"),
+        "-I",
+        str(HERE / "generated" / board),
+    )
+    program = (path for path in sorted((HERE / "esp32" / "main").glob("*.cpp")) if not path.stem.startswith("pad_"))
+    return Target(
+        output=f"esp32-{board}-{pad}.so", compiler="g++", package="g++", flags=flags,
+        # The ESP32's size_t has the 32 bits that its drivers take.
+        own_flags=(*headers, "-Wno-conversion", '-DADAPTER_ROBOT="p2dx"'),
+        sources=(*program, HERE / "esp32" / "main" / f"pad_{pad}.cpp", *sorted((HERE / "esp32_sim").glob("*.cpp"))),
+        link=("-shared", "-Wl,-z,relro,-z,now"),
+    )  # fmt: skip
+
+
 def _on_cortex_m(output: str, *sources: Path) -> Target:
     return Target(
         output=output,
@@ -82,6 +105,9 @@ def _on_cortex_m(output: str, *sources: Path) -> Target:
 TARGETS = {
     "host": _on_host("selftest-host", *TRIAL, SELFTEST / "host.cpp"),
     "program": _on_host("p2os-adapter", *sorted((HERE / "host").glob("*.cpp"))),
+    "esp32-rev_b": _on_simulated_esp32("rev_b", "none"),
+    "esp32-rev_b-pad": _on_simulated_esp32("rev_b", "bluepad32"),
+    "esp32-rev_c": _on_simulated_esp32("rev_c", "none"),
     "units": _on_host("units", SELFTEST / "units.cpp"),
     "library": _on_host(
         "library", SELFTEST / "library.cpp", SELFTEST / "robot.cpp", HERE / "library" / "src" / "P2OSClient.cpp",
@@ -185,8 +211,10 @@ def main() -> int:
         except subprocess.CalledProcessError:
             print(f"build: {name}: the compiler's words stand above", file=sys.stderr)
             return 1
-        words_of_size = f"core {size['flash']} bytes of flash, {size['ram']} bytes of RAM beside the adapter itself"
-        print(f"{name}: {words.out / target.output}, {words_of_size if target.is_small else 'with sanitizers'}")
+        said = f", core {size['flash']} bytes of flash, {size['ram']} bytes of RAM beside the adapter itself"
+        if not target.is_small:
+            said = ", with sanitizers" if "-fsanitize=address,undefined" in target.flags else ""
+        print(f"{name}: {words.out / target.output}{said}")
     return 0
 
 

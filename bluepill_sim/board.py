@@ -176,6 +176,43 @@ class BluePill(Stateful):
         """
         return run_until(self, condition, timeout)
 
+    @property
+    def supply_v(self) -> float:
+        """The supply in volts, which the PVD sees; 2.0 to 3.6.
+
+        Raises:
+            ValueError: set to what the chip does not work at.
+        """
+        return self.chip.power.supply_mv / 1000
+
+    @supply_v.setter
+    def supply_v(self, volts: float) -> None:
+        self.chip.set_supply(round(1000 * volts))
+
+    @property
+    def crystal_works(self) -> bool:
+        """Whether the crystal of HSE oscillates; set it to False to have it fail."""
+        return self.chip.parts.rcc.crystal_works
+
+    @crystal_works.setter
+    def crystal_works(self, works: bool) -> None:
+        rcc = self.chip.parts.rcc
+        if works is not rcc.crystal_works:
+            rcc.repair_crystal() if works else rcc.fail_crystal()
+
+    @property
+    def lsi_hz(self) -> int:
+        """The frequency of LSI, which differs from part to part: 30 to 60 kHz.
+
+        Raises:
+            ValueError: set to one that it does not have.
+        """
+        return self.chip.clocks.lsi_hz
+
+    @lsi_hz.setter
+    def lsi_hz(self, frequency_hz: int) -> None:
+        self.chip.parts.rcc.set_lsi(frequency_hz)
+
     def request_stop(self) -> None:
         """End the running `advance_to` at the boundary of the running block."""
         self.chip.request_stop()

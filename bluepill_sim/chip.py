@@ -16,28 +16,37 @@ time of the accessing instruction.
 """
 
 import ctypes
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 
 from bluepill_sim.core import GENERAL, BlockRecorder
 from bluepill_sim.core.block_cost import NO_BLOCK, Block, measure_block
 from bluepill_sim.core.forced_bits import forced_bits
 from bluepill_sim.core.halts import ChipReached, HaltKind
+from bluepill_sim.core.nvic import NMI
 from bluepill_sim.core.processor import FaultListener
 from bluepill_sim.core.system_control import PPB_BASE, PPB_BYTES, SystemControl
 from bluepill_sim.fabric.clocks import Clocks
 from bluepill_sim.fabric.cycle_clock import CycleClock
-from bluepill_sim.fabric.registers import Peripheral
+from bluepill_sim.fabric.low_power import STOP_WAKE_NS, LowPower, Mode
+from bluepill_sim.fabric.power import LEAST_SUPPLY_MV, MOST_SUPPLY_MV, Power
+from bluepill_sim.fabric.registers import WORD, Peripheral
 from bluepill_sim.memory import Memory
 from bluepill_sim.native.processor import make_core
 from bluepill_sim.native.registers import join_fabric, share_registers
+from bluepill_sim.peripherals.flash import OPTION_BYTES
 from bluepill_sim.peripherals.rcc import Rcc, ResetCause
 from bluepill_sim.stm32f103 import (
     CLOCK_GATES,
     FLASH_BASE,
     FLASH_BYTES_FITTED,
+    FREEZE_BITS,
+    OPTION_BYTES_BASE,
     PERIPHERAL_BASE,
     SRAM_BASE,
     SRAM_BYTES,
+    SYSTEM_MEMORY_BASE,
+    WAKING_IRQS,
     make_parts,
     make_pins,
     name_at,
@@ -72,13 +81,17 @@ class Chip(Stateful):
         "pins",
         "parts",
         "clocks",
+        "power",
+        "low_power",
         "_clock",
         "_bus",
         "_stop_requested",
         "_requested_reset",
         "_flash_repairs",
+        "_stopped_tick",
+        "_stopped_cycle",
     )
-    DERIVED = ("_flash_access", "_written_code")
+    DERIVED = ("_flash_access", "_written_code", "_frozen_since", "resets")
 
     def __init__(self, memory: Memory, vector_table: int, on_warning: WarningListener, on_fault: FaultListener) -> None:
         """Make the chip, in the state after power-on.
@@ -96,6 +109,14 @@ class Chip(Stateful):
         self.on_reset: Callable[[ResetCause], None] | None = None
         self._on_warning = on_warning
         self.clocks = Clocks()
+        self.power = Power()
+        self.low_power = LowPower(self)
+        #: When Stop began, and when SysTick would have acted next, in cycles.
+        self._stopped_cycle = 0
+        self._stopped_tick: int | None = None
+        #: Since when time passes with the core halted by a debugger; None: it does not. And the resets so far.
+        self._frozen_since: Nanos | None = None
+        self.resets = 0
         self._clock = CycleClock(self.clocks.hclk_hz)
         #: Called before each reset, for tools.
         self.reset_listeners: list[Callable[[], None]] = []
@@ -109,6 +130,7 @@ class Chip(Stateful):
         self._is_made = self._is_complete = False
         self.engine, self.processor = make_core(self._measure, memory)
         self.processor.on_fault = on_fault
+        self.processor.on_deep_sleep = self._begin_low_power
         self.pins = make_pins(self)
         self.fabric = self.pins.fabric
         self.uses_native_core = join_fabric(self.engine, self.fabric)
@@ -152,12 +174,11 @@ class Chip(Stateful):
 
     def next_deadline(self) -> Nanos | None:
         """Return when a peripheral or SysTick next acts by itself; the core itself may act at any time."""
-        due = self.fabric.next_ns
         tick = self.processor.systick.next_cycle
-        if tick is None:
-            return due
-        tick_ns = self._clock.ns_of(tick)
-        return tick_ns if due is None else min(due, tick_ns)
+        tick_ns = None if tick is None else self._clock.ns_of(tick)
+        return min(
+            (at for at in (self.fabric.next_ns, tick_ns, self.low_power.wake_ns) if at is not None), default=None
+        )
 
     def advance_to(self, limit_ns: Nanos) -> ChipReached:
         """Run to the first block boundary at or after a time, or to what stops the chip before."""
@@ -214,8 +235,8 @@ class Chip(Stateful):
                 return ChipReached(clock.ns_of(engine.cycle), Reason.HALT)
             if now >= limit_ns and not engine.is_inside_block:
                 return ChipReached(now, Reason.DEADLINE)
-            if processor.is_locked_up:
-                engine.cycle = self._stop_cycle(limit_ns)
+            if self._core_stands_still():
+                self._pass_time(limit_ns)
                 continue
             go_on(self._stop_cycle(limit_ns))
             fabric.check()
@@ -234,14 +255,18 @@ class Chip(Stateful):
             self.on_reset(cause)
         for listener in self.reset_listeners:
             listener()
+        self.resets += 1
+        self.low_power.end()
+        self.power.is_stopped = False
         vectors = self.boot_address()
         if cause is ResetCause.POWER:
-            self.memory.lose_power()
-            self.engine.drop_code(SRAM_BASE, SRAM_BYTES)
+            self._lose_sram()
         self.parts.reset(cause)
         self.system.reset()
         # A program at the start of the flash is found through its alias at 0, where VTOR points after a reset.
         self.processor.reset(0 if vectors == FLASH_BASE else vectors)
+        if self._frozen_since is not None:
+            self._freeze()
 
     # What the peripherals ask for.
 
@@ -282,6 +307,49 @@ class Chip(Stateful):
             self.parts.clock_changed()
         self.processor.stop_at_boundary()
 
+    def set_supply(self, supply_mv: int) -> None:
+        """Change the supply, in mV.
+
+        Raises:
+            ValueError: The chip does not work at it.
+        """
+        if not LEAST_SUPPLY_MV <= supply_mv <= MOST_SUPPLY_MV:
+            limits = f"{LEAST_SUPPLY_MV / 1000:g} to {MOST_SUPPLY_MV / 1000:g} V"
+            raise ValueError(f"the chip works at {limits}, not at {supply_mv / 1000:g} V")
+        self.power.supply_mv = supply_mv
+        self.parts.pwr.supply_changed()
+
+    def flash_began(self) -> None:
+        """Have the core wait where it needs the flash: before the next access of the block, or at its end."""
+        self.engine.shared.waits = self.engine.access_pc < SYSTEM_MEMORY_BASE
+        self.processor.stop_at_boundary()
+
+    @contextmanager
+    def halted_core(self) -> Iterator[None]:
+        """Have time pass without the core, as while a debugger halts it; what DBGMCU_CR freezes stands still too."""
+        systick = self.processor.systick
+        cycle, tick, systick.next_cycle = self.engine.cycle, systick.next_cycle, None
+        count = self.resets
+        self._freeze()
+        try:
+            yield
+        finally:
+            self._frozen_since, since_ns = None, self._frozen_since or 0
+            for part in self._frozen_parts():
+                part.thaw(self.now_ns - since_ns)
+            if self.resets == count:
+                self.processor.skip_cycles(self.engine.cycle - cycle, tick)
+
+    def _freeze(self) -> None:
+        self._frozen_since = self.now_ns
+        for part in self._frozen_parts():
+            part.freeze()
+
+    def _frozen_parts(self) -> list[Peripheral]:
+        """Return what DBGMCU_CR freezes; in Stop all of it but IWDG stands still already."""
+        bits = self.system.dbgmcu_cr & (1 << FREEZE_BITS["IWDG"] if self.power.is_stopped else WORD)
+        return [part for name, part in self.parts.by_name.items() if bits >> FREEZE_BITS.get(name, 32) & 1]
+
     def request_stop(self) -> None:
         """End the slice at the boundary of the running block."""
         self._stop_requested = True
@@ -294,6 +362,11 @@ class Chip(Stateful):
             part.reset()
             self.processor.stop_at_boundary()
 
+    def reset_backup_domain(self) -> None:
+        """Reset what the backup domain holds."""
+        self.parts.reset_backup_domain()
+        self.processor.stop_at_boundary()
+
     def request_reset(self) -> None:
         """Reset the chip at the boundary of the running block (SYSRESETREQ)."""
         self._requested_reset = ResetCause.SOFTWARE
@@ -305,9 +378,17 @@ class Chip(Stateful):
         self.processor.stop_at_boundary()
 
     def signal(self, name: str) -> None:
-        """Set the event register."""
+        """Do what an event means to the core: WFE's, NMI, PWR's wake-up, the loss of its clock."""
         if name == "event":
             self.processor.send_event()
+        elif name == "nmi" and not self.processor.nvic.active >> NMI & 1:
+            self.processor.pend(NMI)
+        elif name == "no clock":
+            self.low_power.lose_clock()
+            self.processor.stop_at_boundary()
+        elif name == "wake":
+            self.low_power.wake()
+            self.processor.stop_at_boundary()
 
     def warn(self, message: str, *, once: str, pc: int | None = None) -> None:
         """Pass on a warning."""
@@ -352,13 +433,114 @@ class Chip(Stateful):
         self._written_code.clear()
 
     def _stop_cycle(self, limit_ns: Nanos) -> int:
+        """Return the cycle up to which the core may run: C stops at deadlines by itself.
+
+        Code in SRAM goes on while the flash is busy, up to where it, or the handler of an interrupt, needs flash: each
+        boundary has to be looked at.
+        """
+        if self.parts.flash.is_busy:
+            next_cycle = self._next_cycle(limit_ns)
+            return next_cycle if self.processor.is_asleep else min(next_cycle, self.engine.cycle + 1)
+        return self._clock.cycle_at(limit_ns) if self.uses_native_core else self._next_cycle(limit_ns)
+
+    def _next_cycle(self, limit_ns: Nanos) -> int:
         """Return the cycle of the earliest of the limit and the deadlines."""
-        if self.uses_native_core and not self.processor.is_locked_up:
-            return self._clock.cycle_at(limit_ns)
-        due = self.fabric.next_ns
-        stop = self._clock.cycle_at(limit_ns if due is None else min(due, limit_ns))
-        tick = self.processor.systick.next_cycle
-        return stop if tick is None else min(stop, tick)
+        due = self.next_deadline()
+        return self._clock.cycle_at(limit_ns if due is None else min(due, limit_ns))
+
+    # Where the core stands still (`LowPowerPorts`).
+
+    def _core_stands_still(self) -> bool:
+        """Tell whether time passes without the core: locked up, in a low-power mode, or while it waits for flash."""
+        if self._frozen_since is not None or self.processor.is_locked_up:
+            return True
+        if self.low_power.mode is not Mode.RUN and self.low_power.holds():
+            return True
+        self.engine.shared.waits = is_waiting = self.parts.flash.is_busy and self.engine.pc < SYSTEM_MEMORY_BASE
+        return is_waiting
+
+    def _pass_time(self, limit_ns: Nanos) -> None:
+        engine = self.engine
+        engine.cycle = max(engine.cycle, self._next_cycle(limit_ns))
+        if engine.is_inside_block:  # what ends the wait is no boundary of the program
+            self.fabric.run_events(self._clock.ns_of(engine.cycle))
+            if self._requested_reset is not None:
+                self.reset(self._requested_reset)
+
+    def _begin_low_power(self) -> None:
+        self.low_power.begin()
+        self.processor.stop_at_boundary()
+
+    @property
+    def flash_is_busy(self) -> bool:
+        """Whether the flash is programmed or erased."""
+        return self.parts.flash.is_busy
+
+    @property
+    def resets_instead(self) -> bool:
+        """Whether the option bytes make a reset of the mode that SLEEPDEEP means."""
+        return self.power.resets_at_standby if self.wants_standby else self.power.resets_at_stop
+
+    def reset_instead(self) -> None:
+        """Reset the chip because of the option bytes."""
+        self.reset(ResetCause.LOW_POWER)
+
+    @property
+    def wants_standby(self) -> bool:
+        """Whether SLEEPDEEP means Standby."""
+        return self.parts.pwr.stands_by
+
+    @property
+    def stop_wake_ns(self) -> Nanos:
+        """How long the end of Stop takes."""
+        return STOP_WAKE_NS[self.parts.pwr.regulator_is_slow]
+
+    def refusal(self) -> str | None:
+        """Return what forbids the mode that SLEEPDEEP means (RM0008 tables 14 and 15)."""
+        if self.wants_standby:
+            return "PWR_CSR WUF is set" if self.parts.pwr.is_woken else None
+        lines = self.parts.exti.pending
+        if lines:
+            return f"EXTI_PR is {lines:#x}"
+        return "RTC_CRL ALRF is set" if self.parts.rtc.has_alarm else None
+
+    def pass_over(self, why: str) -> None:
+        """Go on behind the instruction."""
+        mode = "Standby" if self.wants_standby else "Stop"
+        self.warn(f"{mode} does not begin: {why}", once=f"PWR:{mode}")
+        self.processor.wake()
+
+    def is_woken_from_stop(self) -> bool:
+        """Whether an interrupt of EXTI, or the event of a WFE, is there."""
+        return self.processor.is_woken_by(WAKING_IRQS)
+
+    def enter_stop(self) -> None:
+        """Have the clocks of the core stand still."""
+        self.power.is_stopped = True
+        self.parts.stop()
+        systick = self.processor.systick
+        self._stopped_cycle, self._stopped_tick, systick.next_cycle = self.engine.cycle, systick.next_cycle, None
+
+    def leave_stop(self, stopped_ns: Nanos) -> None:
+        """Have them go on."""
+        self.power.is_stopped = False
+        self.processor.skip_cycles(self.engine.cycle - self._stopped_cycle, self._stopped_tick)
+        self.parts.resume(stopped_ns)
+
+    def enter_standby(self) -> None:
+        """Forget SRAM and registers."""
+        self.power.is_stopped = True
+        self._lose_sram()
+        self.parts.stand_by()
+        self.system.reset()
+
+    def leave_standby(self) -> None:
+        """Start anew."""
+        self.reset(ResetCause.STANDBY)
+
+    def _lose_sram(self) -> None:
+        self.memory.lose_power()
+        self.engine.drop_code(SRAM_BASE, SRAM_BYTES)
 
     def _measure(self, address: int, size: int) -> Block:
         """Return the costs of a block at the present flash settings."""
@@ -414,14 +596,20 @@ class Chip(Stateful):
         return forced_bits(code, registers, address, memory.read), pc
 
     def _write_flash(self, address: int, size: int, value: int) -> bool:
-        """Take a write of the core to the flash array: its controller decides; False: a bus error."""
+        """Take a write of the core to flash or option bytes: their controller decides; False: a bus error."""
+        option = address - OPTION_BYTES_BASE
+        if 0 <= option <= OPTION_BYTES - size:
+            if not self.parts.flash.program_option(option, size, value):
+                return False
+            self._flash_repairs.append((OPTION_BYTES_BASE, self.memory.options))
+            return True
         offset = address - FLASH_BASE if address >= FLASH_BASE else address
         if not 0 <= offset <= FLASH_BYTES_FITTED - size:
             return False
         if not self.parts.flash.program(offset, size, value):
             return False
         # The engine stores the value whatever the controller says: put back what should be there.
-        self._flash_repairs.append((offset, self.memory.read_flash(offset, size)))
+        self._flash_repairs.append((FLASH_BASE + offset, self.memory.read_flash(offset, size)))
         return True
 
     def _drop_flash(self) -> None:
@@ -429,7 +617,11 @@ class Chip(Stateful):
         self.engine.drop_code(0, FLASH_BYTES_FITTED)
 
     def _repair_flash(self) -> None:
-        for offset, data in self._flash_repairs:
+        for address, data in self._flash_repairs:
+            if address == OPTION_BYTES_BASE:
+                self.memory.options = data
+                continue
+            offset = address - FLASH_BASE
             self.memory.load_flash(offset, data)
             self.engine.drop_code(FLASH_BASE + offset, len(data))
             self.engine.drop_code(offset, len(data))
@@ -559,4 +751,11 @@ class _FlashArray:
 
     def write(self, offset: int, data: bytes) -> None:
         self._memory.load_flash(offset, data)
-        self._repairs.append((offset, data))
+        self._repairs.append((FLASH_BASE + offset, data))
+
+    @property
+    def options(self) -> bytes:
+        return self._memory.options
+
+    def write_options(self, options: bytes) -> None:
+        self._memory.options = options

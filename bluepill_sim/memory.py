@@ -11,11 +11,13 @@ import struct
 from collections.abc import Callable
 from dataclasses import dataclass
 
+from bluepill_sim.peripherals.flash import DELIVERED, OPTION_BYTES
 from bluepill_sim.stm32f103 import (
     FLASH_BASE,
     FLASH_BYTES,
     FLASH_BYTES_FITTED,
     FLASH_SIZE_REGISTER,
+    OPTION_BYTES_BASE,
     SRAM_BASE,
     SRAM_BYTES,
     SYSTEM_MEMORY_BASE,
@@ -50,7 +52,7 @@ class Region:
 class Memory(Stateful):
     """All memories of one chip."""
 
-    STATE = ("sram", "reprogrammed")
+    STATE = ("sram", "reprogrammed", "options")
     #: What it was built with.
     DERIVED = ("_program",)
 
@@ -60,6 +62,7 @@ class Memory(Stateful):
         system = bytearray([ERASED]) * _SYSTEM_BYTES
         _place(system, FLASH_SIZE_REGISTER, struct.pack("<H", FLASH_BYTES // 1024))
         _place(system, UNIQUE_ID_REGISTER, _UNIQUE_ID)
+        _place(system, OPTION_BYTES_BASE, DELIVERED)
         self.system = ctypes.create_string_buffer(bytes(system), _SYSTEM_BYTES)
         self._program = self.flash.raw
         #: Called when `reprogrammed` has changed the flash.
@@ -100,6 +103,19 @@ class Memory(Stateful):
     def read_flash(self, offset: int, size: int) -> bytes:
         """Return bytes of the flash array."""
         return ctypes.string_at(ctypes.addressof(self.flash) + offset, size)
+
+    @property
+    def options(self) -> bytes:
+        """The option bytes, with their complements."""
+        return ctypes.string_at(self._options_at, OPTION_BYTES)
+
+    @options.setter
+    def options(self, options: bytes) -> None:
+        ctypes.memmove(self._options_at, options, OPTION_BYTES)
+
+    @property
+    def _options_at(self) -> int:
+        return ctypes.addressof(self.system) + OPTION_BYTES_BASE - SYSTEM_MEMORY_BASE
 
     def lose_power(self) -> None:
         """Forget what the SRAM holds."""

@@ -18,12 +18,16 @@ from bluepill_sim.fabric.ports import ChipPorts
 from bluepill_sim.fabric.registers import ClockBit, Peripheral, Place
 from bluepill_sim.peripherals.adc import Adc, Adc2
 from bluepill_sim.peripherals.afio import Afio
+from bluepill_sim.peripherals.bkp import Bkp
+from bluepill_sim.peripherals.crc import Crc
 from bluepill_sim.peripherals.dma import Dma
 from bluepill_sim.peripherals.exti import Exti
 from bluepill_sim.peripherals.flash import Flash
 from bluepill_sim.peripherals.gpio import Gpio
 from bluepill_sim.peripherals.iwdg import Iwdg
+from bluepill_sim.peripherals.pwr import Pwr
 from bluepill_sim.peripherals.rcc import Rcc, ResetCause
+from bluepill_sim.peripherals.rtc import Rtc
 from bluepill_sim.peripherals.tim import AdvancedTimer, GeneralTimer
 from bluepill_sim.peripherals.usart import Usart
 from bluepill_sim.peripherals.wwdg import Wwdg
@@ -35,10 +39,11 @@ FLASH_BYTES = 64 * 1024
 FLASH_BYTES_FITTED = 128 * 1024
 SRAM_BASE = 0x2000_0000
 SRAM_BYTES = 20 * 1024
-#: Boot loader ROM; the option bytes follow it at 0x1FFFF800.
+#: Boot loader ROM; the option bytes follow it.
 SYSTEM_MEMORY_BASE = 0x1FFF_F000
 #: Unique id (12 bytes) and flash size in KiB (2 bytes): in system memory, after the boot loader.
 FLASH_SIZE_REGISTER, UNIQUE_ID_REGISTER = 0x1FFF_F7E0, 0x1FFF_F7E8
+OPTION_BYTES_BASE = 0x1FFF_F800
 PERIPHERAL_BASE, PERIPHERAL_END = 0x4000_0000, 0x4002_3400
 #: Interrupt lines of a medium-density part: 0 to 42.
 IRQ_COUNT = 43
@@ -176,6 +181,10 @@ PERIPHERALS: tuple[tuple[_Maker, str], ...] = (
     (GeneralTimer, "TIM2"),
     (GeneralTimer, "TIM3"),
     (GeneralTimer, "TIM4"),
+    (Crc, "CRC"),
+    (Bkp, "BKP"),
+    (Rtc, "RTC"),
+    (Pwr, "PWR"),
 )
 
 
@@ -199,6 +208,8 @@ _DMA1_REQUESTS = {output: (f"DMA1.ch{n}",) for n, outputs in _REQUESTS.items() f
 WIRING: dict[str, tuple[int | str, ...]] = {
     "WWDG.irq": (0,),
     "EXTI.pvd_irq": (1,),
+    "BKP.irq": (2,),
+    "RTC.irq": (3,),
     "FLASH.irq": (4,),
     "RCC.irq": (5,),
     "EXTI.0": (6,),
@@ -225,7 +236,9 @@ WIRING: dict[str, tuple[int | str, ...]] = {
     "EXTI.usb_wakeup_irq": (42,),
     # EXTI 16 to 18 (RM0008 10.2.5).
     "PWR.pvd": ("EXTI.pvd",),
-    "RTC.alarm": ("EXTI.rtc_alarm",),
+    "RTC.alarm": ("EXTI.rtc_alarm", "BKP.alarm", "PWR.alarm"),
+    "RTC.second": ("BKP.second",),
+    "IWDG.lsi": ("RCC.lsi",),
     "USB.wakeup": ("EXTI.usb_wakeup",),
     **_DMA1_REQUESTS,
     # Triggers: of other timers (RM0008 tables 82 and 86), of both ADCs' regular and injected groups (67 and 68).
@@ -244,6 +257,14 @@ WIRING: dict[str, tuple[int | str, ...]] = {
     "TIM3.cc4": ("ADC1.tim3_cc4", "ADC2.tim3_cc4"),
     "EXTI.line15": ("ADC1.exti_line15", "ADC2.exti_line15"),
 }
+#: The interrupts that end Stop, as a mask: those of EXTI.
+WAKING_IRQS = sum(
+    1 << end for output, ends in WIRING.items() for end in ends if output.startswith("EXTI.") and isinstance(end, int)
+)
+#: The bits of DBGMCU_CR that freeze a peripheral while a debugger halts the core (RM0008 31.16.3).
+FREEZE_BITS = {
+    "IWDG": 8, "WWDG": 9, "TIM1": 10, "TIM2": 11, "TIM3": 12, "TIM4": 13, "CAN": 14, "I2C1": 15, "I2C2": 16,
+}  # fmt: skip
 #: The first line that is no interrupt.
 _FIRST_INNER_LINE = 64
 
@@ -271,6 +292,16 @@ class ChipParts(Stateful):
         return cast("Exti", self.by_name["EXTI"])
 
     @property
+    def pwr(self) -> Pwr:
+        """Power control."""
+        return cast("Pwr", self.by_name["PWR"])
+
+    @property
+    def rtc(self) -> Rtc:
+        """The real-time clock."""
+        return cast("Rtc", self.by_name["RTC"])
+
+    @property
     def has_running_watchdog(self) -> bool:
         """Whether a watchdog will reset the chip unless it is fed."""
         iwdg, wwdg = cast("Iwdg", self.by_name["IWDG"]), cast("Wwdg", self.by_name["WWDG"])
@@ -283,9 +314,36 @@ class ChipParts(Stateful):
     def reset(self, cause: ResetCause) -> None:
         """Reset every peripheral; the clocks first, so that the old ones are not taken for too fast."""
         self.rcc.reset(cause)
+        if cause is ResetCause.POWER:
+            self.reset_backup_domain()
+            self.pwr.forget_flags()
         for part in self.by_name.values():
             if part is not self.rcc:
                 part.reset()
+
+    def stop(self) -> None:
+        """Have what the core's clocks drive stand still."""
+        self.rcc.stop()
+        for part in self.by_name.values():
+            part.clock_stopped()
+
+    def resume(self, stopped_ns: int) -> None:
+        """Have it go on, after so long."""
+        for part in self.by_name.values():
+            part.clock_resumed(stopped_ns)
+
+    def stand_by(self) -> None:
+        """Forget what Standby forgets: all but the backup domain, IWDG, the flags and the pin of PWR."""
+        self.rcc.stand_by()
+        for name, part in self.by_name.items():
+            if name not in {"RCC", "PWR", "IWDG"}:
+                part.reset()
+        self.pwr.note_standby()
+
+    def reset_backup_domain(self) -> None:
+        """Reset what VBAT keeps."""
+        for part in self.by_name.values():
+            part.backup_reset()
 
     def clock_changed(self) -> None:
         """Notify every peripheral that the frequencies have changed."""

@@ -16,21 +16,31 @@ from simbase.lazy import lazily
 
 if TYPE_CHECKING:
     from robot_bench.bench import Bench, BenchParts
+    from robot_bench.events.codec import events_of
+    from robot_bench.events.expectation import ExpectationError
+    from robot_bench.events.kinds import Event
     from robot_bench.recording.run_record import RunRecord, read_run
     from robot_bench.remote import RemoteBench
     from robot_bench.run import RunResult, run_at_port, run_scenario
-    from robot_bench.scenario.goals import Goal, Judgement
+    from robot_bench.scenario.goals.judging import Goal, Judgement
+    from robot_bench.scenario.goals.watch import GoalKind, Outcome, Watch
     from robot_bench.scenario.scenario import Scenario, known_scenarios, load_scenario
 
 __all__ = [
     "Bench",
     "BenchParts",
+    "Event",
+    "ExpectationError",
     "Goal",
+    "GoalKind",
     "Judgement",
+    "Outcome",
     "RemoteBench",
     "RunRecord",
     "RunResult",
     "Scenario",
+    "Watch",
+    "events_of",
     "known_scenarios",
     "load_scenario",
     "read_run",
@@ -43,10 +53,14 @@ if not TYPE_CHECKING:
         __name__,
         {
             "robot_bench.bench": ("Bench", "BenchParts"),
+            "robot_bench.events.codec": ("events_of",),
+            "robot_bench.events.kinds": ("Event",),
+            "robot_bench.events.expectation": ("ExpectationError",),
             "robot_bench.recording.run_record": ("RunRecord", "read_run"),
             "robot_bench.remote": ("RemoteBench",),
             "robot_bench.run": ("RunResult", "run_at_port", "run_scenario"),
-            "robot_bench.scenario.goals": ("Goal", "Judgement"),
+            "robot_bench.scenario.goals.judging": ("Goal", "Judgement"),
+            "robot_bench.scenario.goals.watch": ("GoalKind", "Outcome", "Watch"),
             "robot_bench.scenario.scenario": ("Scenario", "known_scenarios", "load_scenario"),
         },
     )

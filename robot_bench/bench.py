@@ -18,12 +18,14 @@ snapshot was taken of.
 """
 
 import hashlib
+import math
 import pickle
+import re
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from importlib.metadata import version
 from pathlib import Path
-from typing import Self, Unpack, cast
+from typing import Self, TypeAlias, TypeVar, Unpack, cast
 
 from adapter_sim import Adapter
 from adapter_sim.pinout import Pinout, Pull, WireRole, load_pinout
@@ -38,23 +40,30 @@ from p2os.pioneer.world.model import Pose, World
 from robot_bench.adapter import RUN_ANEW, AnyAdapter, make_adapter
 from robot_bench.direct import DirectRobot, DistanceSensors, JointMotor, WheelEncoder
 from robot_bench.direct.wired import AnalogPin, RobotWire
+from robot_bench.events.codec import events_of
+from robot_bench.events.expectation import ExpectationError
+from robot_bench.events.kinds import Event
+from robot_bench.events.selection import SELECTORS, select, wire_named
+from robot_bench.events.stream import EventStream
+from robot_bench.events.words import last_words
 from robot_bench.loop import RunLoop
 from robot_bench.pacer import FIRST_SLICE_NS, SliceLength
 from robot_bench.recording.client_view import SipRanges
-from robot_bench.recording.recorder import Recorder
+from robot_bench.recording.recorder import SAMPLE_NS, Recorder
 from robot_bench.recording.run_record import RunRecord, record_of
 from robot_bench.recording.trace import TraceWriter
-from robot_bench.scenario.fault_script import FaultScript
-from robot_bench.scenario.goals import Judgement, judge
+from robot_bench.scenario.fault_script import LINK_DOWN, FaultChange, FaultScript, load_faults
+from robot_bench.scenario.goals.judging import GoalJudge, Judgement
 from robot_bench.scenario.scenario import (
     Scenario,
     ScenarioOptions,
     load_scenario,
     refuse_what_its_world_refuses,
 )
-from robot_bench.scenario.schema import nearest
+from robot_bench.scenario.timeline import Timed, Timeline
+from robot_bench.scenario.when_script import WhenScript
 from robot_bench.scenario.wired_robots import WiredPart
-from robot_bench.scenario.world_script import WorldScript
+from robot_bench.scenario.world_script import WorldScript, load_changes
 from robot_bench.wires.chip_pins import ChipPins
 from robot_bench.wires.endpoints import Endpoint
 from robot_bench.wires.nets import Harness, Net, OwnedPins, Strength
@@ -69,12 +78,15 @@ AFTER_FAULT_NS: Nanos = 1 * NS_PER_S
 #: Owner of the resistors on the wires.
 RESISTORS = "board"
 _LOG = logger("bench")
+T = TypeVar("T", bound=Timed)
+#: What `run_until` waits for beside a time: an event in words, or a function of the bench.
+Condition: TypeAlias = "str | Callable[[Bench], bool]"
 
 
 #: What decides a run besides its files; its end and its goals may be others after a restart.
 DECISIVE = (
     "mode", "seed", "parameters", "threshold_um", "usart_baud", "start", "direct", "adapter", "adapter_core",
-    "controller", "changes", "faults", "own_robot",
+    "controller", "changes", "faults", "whens", "own_robot",
 )  # fmt: skip
 _VERSION = "version of p2os"
 
@@ -113,7 +125,10 @@ class Bench(Stateful):
         MissingDependencyError: The emulator or the body is not installed.
     """
 
-    STATE = ("made_of", "chip", "_harness", "_robots", "_ranges", "script", "faults", "recorder", "loop")
+    STATE = (
+        "made_of", "chip", "_harness", "_robots", "_ranges", "script", "faults", "whens", "recorder", "goals", "loop",
+        "_ends_at", "_has_told_death",
+    )  # fmt: skip
 
     def __init__(
         self,
@@ -138,6 +153,12 @@ class Bench(Stateful):
         self._harness = harness = make_harness(pinout) if own is None else make_own_harness(own.robot.signals)
         self.recorder = Recorder(self.trace, harness, body=body)
         self.recorder.on_event = log_bench_event
+        #: Both directions of the P2OS line; none in mode A.
+        self._lines: tuple[SerialLine, ...] = ()
+        #: States that `rewind` may go back to, oldest first: times and snapshots.
+        self._checkpoints: list[tuple[Nanos, object]] = []
+        #: What was waited for last, and when the bench stood still after it.
+        self._expected: tuple[Nanos, Event | None] = (-1, None)
         #: What stands at the far end of the wires and owns the body.
         self._robots: list[DirectRobot | Endpoint | WiredPart] = []
         self._ranges: SipRanges | None = None
@@ -162,16 +183,26 @@ class Bench(Stateful):
             chip, followers, observers=(self.recorder,), slice_ns=slice_ns or FIRST_SLICE_NS,
             on_slice=self._after_slice, choose_watched=self._watch_wires,
         )  # fmt: skip
+        #: When a goal's verdict ended the run; None while none has.
+        self._ends_at: Nanos | None = None
+        self._has_told_death = False
+        self.whens = WhenScript(
+            scenario.whens, on_end=self._end_now,
+            on_change=lambda changes: self.script.add(*changes), on_fault=lambda faults: self.faults.add(*faults),
+        )  # fmt: skip
+        self.whens.subscribe(self.events)
+        self.goals = GoalJudge(scenario.goals)
+        self.goals.on_end = self._end_now
+        self.goals.subscribe(self.events)
         pin_of = pins_of(scenario)
-        #: Name of a wire, or of its pin → name of the wire.
-        self._wires = {pin: name for name, pin in pin_of.items()} | {name: name for name in pin_of}
         self._pins = ChipPins(chip, harness, pin_of, on_watched=self.loop.note_edge)
         if isinstance(self.parts.adapter, Adapter):
             self.parts.adapter.samples.waits_for_edges = True
         chip.usart1.far_baud = scenario.usart_baud
-        chip.usart1.subscribe(self.recorder.usart)
+        hear_usarts(chip, self.recorder)
         chip.subscribe_warnings(lambda text: self.recorder.event("chip", chip.now_ns, "warning", text))
         self.recorder.start()
+        self._listeners = self.events.listeners()
 
     @classmethod
     def from_scenario(cls, scenario: Scenario | str | Path, **options: Unpack[ScenarioOptions]) -> Self:
@@ -190,6 +221,15 @@ class Bench(Stateful):
         found = scenario if isinstance(scenario, Scenario) else load_scenario(str(scenario))
         return cls(found.with_options(**options))
 
+    def __repr__(self) -> str:
+        what = self.scenario
+        return f"<Bench {what.name} in {what.world}, {what.mode}, at {self.now / NS_PER_S:.3f} s>"
+
+    @property
+    def events(self) -> EventStream:
+        """What happens, for whoever subscribes; it lags up to 50 ms behind `now`."""
+        return self.recorder.events
+
     @property
     def chip(self) -> Chip:
         """Return the chip."""
@@ -203,10 +243,10 @@ class Bench(Stateful):
     @property
     def end(self) -> Nanos:
         """Return when the run ends, as far as is known now."""
-        fault, duration_ns = self.chip.fault, self.scenario.duration_ns
-        return (
-            duration_ns if fault is None or not self.chip.has_died else min(duration_ns, fault.at_ns + AFTER_FAULT_NS)
-        )
+        fault, ends = self.chip.fault, [self.scenario.duration_ns]
+        if fault is not None and self.chip.has_died:
+            ends.append(fault.at_ns + AFTER_FAULT_NS)
+        return min(ends if self._ends_at is None else [*ends, self._ends_at])
 
     @property
     def now(self) -> Nanos:
@@ -223,7 +263,7 @@ class Bench(Stateful):
     @property
     def text(self) -> str:
         """All that the firmware has printed on USART1 so far, undecodable bytes replaced."""
-        printed = record_of(line for line in self.trace.lines() if '"k":"usart"' in line)
+        printed = record_of(line for line in self.recorder.lines() if '"k":"usart"' in line)
         pieces = [*(data for _, data in printed.usart), self.recorder.unfinished_text]
         return b"".join(pieces).decode("utf-8", "replace")
 
@@ -236,43 +276,350 @@ class Bench(Stateful):
         Raises:
             UsageError: There is no such wire.
         """
-        if wire not in self._wires:
-            raise UsageError(f"there is no wire {shown(wire)}", hint=nearest(wire, self._wires))
-        return self.parts.harness[self._wires[wire]].level(self.now)
+        own = self.scenario.own_robot
+        return self.parts.harness[wire_named(wire) if own is None else own.wire_named(wire)].level(self.now)
 
     def record(self) -> RunRecord:
         """Return what was recorded so far: poses, edges, texts, packets and the state log, each with its time."""
-        return record_of(self.trace.lines())
+        return record_of(self.recorder.lines())
 
     def judge(self) -> Judgement:
         """End the run here and judge the scenario's goals; what an unfinished run could still meet is left open."""
-        return judged(self.trace, self.scenario, self.finish())
+        return self.goals.finish(self.finish(), planned_ns=self.scenario.planned_ns)
 
-    def run_until(self, end: Span, advance: Callable[[int], Reached] | None = None) -> None:
-        """Run to `end`, until shortly after a fault of the firmware, or to a debugger's halt.
+    def run_until(
+        self,
+        end: "Span | Condition",
+        advance: Callable[[int], Reached] | None = None,
+        *,
+        within: Span | None = None,
+    ) -> Event | None:
+        """Run to a time or until something happens; no further than the run lasts, nor beyond a debugger's halt.
 
         Args:
-            end: When to come back, counted from the beginning: nanoseconds, or a text such as "2.5 s".
-            advance: As of `RunLoop.run_until`.
+            end: A time counted from the beginning: nanoseconds, or a text such as "2.5 s". Or an event in words, as
+                of `robot_bench.events.selection` ("pin PB12 high"). Or a function of the bench, asked each 50 ms.
+            advance: As of `RunLoop.run_until`; with a time only.
+            within: With a condition: how long to wait for it from now on; None waits to the end of the run.
+
+        Returns:
+            The event that was waited for; None where it did not come, and with a time or a function. The bench stands
+            up to 50 ms after it.
 
         Raises:
-            UsageError: The run has been judged, or finished.
+            UsageError: The run has been judged, or finished; the words mean no events.
             BluePillError: `end` is no time.
         """
-        end_ns = min(to_nanos(end), self.end)
-        if end_ns > self.now and self.trace.written_until >= self.now:
+        if callable(end):
+            asked = end
+            self._step_until(lambda: asked(self), self._limit(within, self.now))
+            return None
+        if isinstance(end, str) and (end.split() or [""])[0] in SELECTORS:
+            return self._wait_for(end, within)
+        self._run_to(to_nanos(end), advance)
+        return None
+
+    def _run_to(self, wanted: Nanos, advance: Callable[[int], Reached] | None = None) -> None:
+        end_ns = min(wanted, self.end)
+        if end_ns > self.now and self.events.released_until >= self.now:
             raise UsageError(f"the run was ended at {self.now / NS_PER_S:g} s", hint="make another Bench")
         had_died = self.chip.has_died
         self.loop.run_until(end_ns, advance)
         if self.chip.has_died and not had_died:
             _LOG.error("chip: %s", self.chip.verdict)
 
+    def _limit(self, within: Span | None, since: Nanos) -> Nanos:
+        return self.end if within is None else since + to_nanos(within)
+
+    def _step_until(self, is_done: Callable[[], bool], limit: Nanos) -> bool:
+        """Run in steps of 50 ms until something is so, or to a time; tell whether it is so."""
+        while not (so := is_done()) and self.now < min(limit, self.end):
+            self._run_to(min(limit, (self.now // SAMPLE_NS + 1) * SAMPLE_NS))
+        return so
+
+    @property
+    def _since(self) -> Nanos:
+        """From when on the next event is waited for: from the last one, where nothing was done since."""
+        at, event = self._expected
+        return event.t if event is not None and at == self.now else self.now
+
+    def _wait_for(self, words: str, within: Span | None) -> Event | None:
+        """Run until an event happens, counted from the last one that was waited for where nothing was done since."""
+        selector, since, last = select(words), self._since, self._expected[1]
+        limit, found = self._limit(within, since), list[Event]()
+
+        def take(event: Event) -> None:
+            if selector.takes(event) and since <= event.t <= limit and (event.t > since or event != last):
+                found.append(event)
+
+        if since < self.now:
+            for event in events_of(self.trace.lines()):
+                if type(event) in selector.kinds:
+                    take(event)
+        end = self.events.subscribe(take, *selector.kinds, wires=selector.wires)
+        try:
+            # What happened until the limit is told at the pose after it.
+            self._step_until(lambda: bool(found), -(-limit // SAMPLE_NS) * SAMPLE_NS)
+        finally:
+            end()
+        self._expected = (self.now, found[0]) if found else (-1, None)
+        return found[0] if found else None
+
+    def expect(self, words: str, within: Span | None = None) -> Event:
+        """Run until an event happens and return it.
+
+        Args:
+            words: As of `robot_bench.events.selection`: "contact", "pin PB12 high", "robot stops".
+            within: How long to wait: from the event on that was expected last, where nothing was done since, else from
+                now on. So a second `expect` is an exact bound of a latency. None waits to the end of the run.
+
+        Raises:
+            ExpectationError: It did not happen; the message has the last events.
+            UsageError: The words mean no events.
+        """
+        since = self._since
+        found = self._wait_for(words, within)
+        if found is None:
+            __tracebackhide__ = True
+            raise self._unmet(f"{words!r} did not happen", since, self._limit(within, since))
+        return found
+
+    def expect_no(self, words: str, during: Span) -> None:
+        """Run for a time in which an event must not happen.
+
+        Raises:
+            ExpectationError: It happened.
+            UsageError: The words mean no events.
+        """
+        since = self._since
+        found = self._wait_for(words, during)
+        if found is not None:
+            __tracebackhide__ = True
+            raise self._unmet(f"{words!r} happened at {found.t / NS_PER_S:.3f} s", since)
+
+    def expect_text(self, text: str | re.Pattern[str], within: Span | None = None) -> Event:
+        """Run until the firmware prints a line that holds a text, or matches a pattern; return it.
+
+        Raises:
+            ExpectationError: It did not.
+        """
+        __tracebackhide__ = True
+        words = f"sends {text}" if isinstance(text, str) else f"matches {text.pattern}"
+        return self.expect(f"usart1 {words}", within)
+
+    def expect_pin(self, pin: str, level: str, within: Span | None = None) -> None:
+        """Run until a wire has a level, `high` or `low`; at once where it has it.
+
+        Raises:
+            ExpectationError: It had not.
+            UsageError: There is no such wire or level.
+        """
+        __tracebackhide__ = True
+        select(f"pin {pin} {level}")
+        if self.level(pin) is not (level == "high"):
+            self.expect(f"pin {pin} {level}", within)
+
+    def expect_pose(
+        self,
+        *,
+        x_m: float | None = None,
+        y_m: float | None = None,
+        heading_deg: float | None = None,
+        tolerance_m: float = 0.05,
+        tolerance_deg: float = 5.0,
+        within: Span | None = None,
+    ) -> Pose:
+        """Run until the robot is at a place, or has a heading; what is None is not looked at.
+
+        Raises:
+            ExpectationError: It was not; the message says where it is.
+        """
+        since = self.now
+
+        def is_there() -> bool:
+            pose = self.pose
+            off_m = math.hypot(0 if x_m is None else pose.x_m - x_m, 0 if y_m is None else pose.y_m - y_m)
+            turn = 0.0 if heading_deg is None else pose.heading_rad - math.radians(heading_deg)
+            return off_m <= tolerance_m and abs(math.remainder(turn, math.tau)) <= math.radians(tolerance_deg)
+
+        if not self._step_until(is_there, self._limit(within, since)):
+            __tracebackhide__ = True
+            rows = (("x", x_m, " m"), ("y", y_m, " m"), ("heading", heading_deg, "°"))
+            wanted = ", ".join(f"{name} {value:g}{unit}" for name, value, unit in rows if value is not None)
+            pose = self.pose
+            here = f"x {pose.x_m:.3f} m, y {pose.y_m:.3f} m, heading {math.degrees(pose.heading_rad):.1f}°"
+            raise self._unmet(f"the robot was not at {wanted}; it is at {here}", since)
+        return self.pose
+
+    def _unmet(self, what: str, since: Nanos, limit: Nanos | None = None) -> ExpectationError:
+        until = self.now if limit is None else min(limit, self.now)
+        return ExpectationError(
+            f"{what}, from {since / NS_PER_S:.3f} s to {until / NS_PER_S:.3f} s", self.last_events()
+        )
+
+    def last_events(self, count: int = 8) -> list[str]:
+        """Return what happened last, a line each with its time; poses, edges, packets and ranges aside."""
+        return last_words(events_of(self.recorder.lines()), count)
+
+    def place(self, name: str, **keys: object) -> None:
+        """Place a thing now, as `[[obstacle]]` of a scenario does: `shape`, `x_m`, `before_sonar`, `hold_s`, ….
+
+        Raises:
+            ScenarioError: A key is unknown or missing, or a value is wrong.
+            WorldError: There is one of that name.
+        """
+        self._change_world({"name": name, **keys})
+
+    def move(self, name: str, **keys: object) -> None:
+        """Put a thing elsewhere now: `x_m`, `y_m`, `heading_deg`.
+
+        Raises:
+            ScenarioError: As of `place`.
+            WorldError: There is none of that name, or it cannot be moved.
+        """
+        self._change_world({"name": name, "op": "move", **keys})
+
+    def remove(self, name: str) -> None:
+        """Take a thing away now.
+
+        Raises:
+            WorldError: There is none of that name, or it cannot be taken away.
+        """
+        self._change_world({"name": name, "op": "remove"})
+
+    def inject(self, words: str, during: Span | None = None) -> None:
+        """Make something go wrong now: the words of a scenario's `[[fault]]`, such as "sonar-stuck 3 1.2".
+
+        Args:
+            words: The fault.
+            during: It is cleared after so long; None leaves it.
+
+        Raises:
+            ScenarioError: There is no such fault, or the bench is in mode direct.
+        """
+        self._refuse_faults_in_mode_a()
+        table: dict[str, object] = {"at_s": 0, "fault": words}
+        if during is not None:
+            table["for_s"] = to_nanos(during) / NS_PER_S
+        changes = load_faults([table], self.scenario.parameters, "inject")
+        self._intervene(self.faults, [replace(change, at=self.now + change.at) for change in changes])
+
+    def clear(self, words: str) -> None:
+        """Set right again what `inject` did.
+
+        Raises:
+            ScenarioError: The bench is in mode direct.
+        """
+        self._refuse_faults_in_mode_a()
+        self._intervene(self.faults, [FaultChange(self.now, f"clear {words}")])
+
+    def press(self, button: str, during: Span | None = None) -> None:
+        """Press a button of the robot now: "stop-button", or a bumper such as "bumper front 1".
+
+        Raises:
+            ScenarioError: There is no such button, or the bench is in mode direct.
+        """
+        if button.split()[:1] not in (["stop-button"], ["bumper"]):
+            raise ScenarioError(f"there is no button {shown(button)}", hint='"stop-button", or "bumper front 1"')
+        self.inject(button, during)
+
+    def drop_link(self, during: Span | None = None) -> None:
+        """Break the P2OS line now, both ways; it is joined again after so long, or by `clear("link-down")`.
+
+        Raises:
+            ScenarioError: The bench is in mode direct, which has no such line.
+        """
+        self.inject(LINK_DOWN, during)
+
+    def _change_world(self, table: dict[str, object]) -> None:
+        changes = load_changes([{"at_s": 0, **table}], self.scenario.parameters, str(table["name"]), are_later=True)
+        self._intervene(self.script, [replace(change, at=self.now + change.at) for change in changes])
+
+    def _intervene(self, script: Timeline[T], changes: Sequence[T]) -> None:
+        """Add changes to what a scenario has; `rewind` will not go on through them, but begin after them."""
+        self._refuse_the_ended()
+        self._expected = -1, None
+        script.add(*changes, now=self.now)
+        self.checkpoint()
+
+    def _refuse_the_ended(self) -> None:
+        if self.events.released_until >= self.now:
+            raise UsageError(f"the run was ended at {self.now / NS_PER_S:g} s", hint="make another Bench")
+
+    def _refuse_faults_in_mode_a(self) -> None:
+        if self.scenario.mode == "direct":
+            raise ScenarioError(
+                "a fault acts on the robot's controller, and mode direct has none", hint='mode="adapter"'
+            )
+
+    def checkpoint(self) -> None:
+        """Keep the present state, so that `rewind` to a later time is quick; some 100 kB."""
+        self._checkpoints.append((self.now, self.snapshot()))
+
+    def rewind(self, to: Span) -> None:
+        """Go back to a time: to the newest checkpoint before it, and on from there; the trace forgets what came after.
+
+        Raises:
+            UsageError: The time is not yet reached, or the bench has a chip of the caller's and no checkpoint.
+            BluePillError: `to` is no time.
+        """
+        at = to_nanos(to)
+        if at > self.now:
+            raise UsageError(
+                f"{at / NS_PER_S:g} s is not reached yet: it is {self.now / NS_PER_S:g} s", hint="run_until"
+            )
+        self._checkpoints = [(t, snapshot) for t, snapshot in self._checkpoints if t <= at]
+        self.restore(self._checkpoints[-1][1] if self._checkpoints else self._at_beginning())
+        self._run_to(at)
+
+    def restart(self, snapshot: object) -> None:
+        """Go back to a state as if it had just been built: who listens to events or slices since then does no more.
+
+        Raises:
+            TypeError, UsageError, FileError: As of `restore`.
+        """
+        self.events.drop_later(self._listeners)
+        self.on_slice = None
+        self._checkpoints.clear()
+        self.restore(snapshot)
+
+    def fork(self) -> "Bench":
+        """Return a bench that goes on from here by itself, with its trace in memory; this one goes on too.
+
+        Raises:
+            TypeError: The bench has a chip of the caller's.
+        """
+        self._refuse_a_chip_of_others()
+        slice_ns = self.loop.slice_ns if self._slices is None else None
+        other = Bench(self.scenario, slice_ns=slice_ns)
+        other.restore(self._with_trace(self.snapshot(), "".join(self.trace.lines())))
+        return other
+
+    def _at_beginning(self) -> object:
+        """Return the snapshot of this bench at time 0, whose trace has no more than its first line."""
+        self._refuse_a_chip_of_others()
+        head = next((line for line in self.trace.lines() if self.trace.has_meta), "")
+        of_file = self.trace.path is not None
+        snapshot = self._with_trace(Bench(self.scenario).snapshot(), len(head.encode()) if of_file else head)
+        _recorder(snapshot)["has_meta"] = self.trace.has_meta
+        return snapshot
+
+    @staticmethod
+    def _with_trace(snapshot: object, written: str | int) -> object:
+        _recorder(snapshot)["written"] = written
+        return snapshot
+
+    def _refuse_a_chip_of_others(self) -> None:
+        if not self._is_rebuildable:
+            raise TypeError("a bench with a chip of the caller's cannot be built anew: restore its snapshot()")
+
     def finish(self) -> Nanos:
         """Bring everything to the end of the run and write the rest of the trace; return the end's time."""
         end = min(self.now, self.end)
-        if self.trace.written_until >= end:
+        if self.events.released_until >= end:
             return end
         self.loop.finish(end)
+        self.goals.end_at(end, self.scenario.planned_ns)
         self.recorder.finish(end)
         return end
 
@@ -289,6 +636,9 @@ class Bench(Stateful):
             _refuse_others(made_of, self.made_of)
         super().restore(snapshot)
         self._pins.chip_restored()
+        self._expected = -1, None
+        if self.goals.is_behind:
+            self.goals.catch_up(events_of(self.trace.lines()), self.events.released_until)
 
     def __reduce__(self) -> "tuple[Callable[[str, bytes], Bench], tuple[str, bytes]]":
         if not self._is_rebuildable:
@@ -310,6 +660,9 @@ class Bench(Stateful):
             self.loop.slice_ns = self._slices.after_slice()
         if self.chip.fault is not None:
             self.loop.end_at(self.end)
+            if self.chip.has_died and not self._has_told_death:
+                self._has_told_death = True
+                self.recorder.fault("died", self.chip.verdict, self.chip.fault.at_ns)
         if self.on_slice is not None:
             self.on_slice(now)
 
@@ -317,8 +670,19 @@ class Bench(Stateful):
         for robot in self._robots:
             robot.advance_to(at)
 
+    def _end_now(self) -> None:
+        """End the run where the loop stands: a goal is decided."""
+        if self._ends_at is None:
+            self._ends_at = self.loop.now
+            self.loop.end_at(self.end)
+
     def _inject(self, words: str, at: Nanos) -> None:
-        if self.parts.pioneer is not None:
+        op, _, fault = words.partition(" ")
+        self.recorder.fault("inject" if op == "fault" else op, fault, at)
+        if fault == LINK_DOWN:
+            for line in self._lines:
+                line.is_cut = op == "fault"
+        elif self.parts.pioneer is not None:
             self.parts.pioneer.do(words, at)
 
     def _build(self, pinout: Pinout, world: World, body: RobotBody, chip: Chip, harness: Harness) -> BenchParts:
@@ -331,7 +695,7 @@ class Bench(Stateful):
             self._robots.append(robot)
             return BenchParts(chip=chip, harness=harness, body=body, world=world)
         if self.scenario.mode == "direct":
-            if self.scenario.faults:
+            if self.scenario.faults or any(when.faults for when in self.scenario.whens):
                 raise ScenarioError(
                     f"{self.scenario.name}: [[fault]] acts on the robot's controller, and mode direct has none",
                     hint="--mode adapter",
@@ -369,7 +733,7 @@ class Bench(Stateful):
 
     def _adapter_and_pioneer(self, pinout: Pinout, body: RobotBody, harness: Harness) -> tuple[AnyAdapter, Pioneer]:
         recorder, parameters = self.recorder, self.scenario.parameters
-        to_robot, to_client = SerialLine(), SerialLine()
+        to_robot, to_client = self._lines = SerialLine(), SerialLine()
         adapter = make_adapter(self.scenario, OwnedPins(harness, "adapter"), pinout)
         adapter.on_event = recorder.listener("adapter")
         settings = replace(self.scenario.controller, baud=to_client.baud, seed=self.scenario.seed)
@@ -409,6 +773,12 @@ def _built_anew(saved_by: str, recipe: bytes) -> Bench:
     return bench
 
 
+def _recorder(snapshot: object) -> dict[str, object]:
+    """Return the part of a bench's snapshot that says where its trace stands."""
+    bench = cast("dict[str, dict[str, dict[str, object]]]", snapshot)
+    return bench["recorder"]["trace"]
+
+
 def _refuse_others(saved: dict[str, object], here: dict[str, object]) -> None:
     """Refuse what was saved where something that decides a run is different from here."""
     for what, value in saved.items():
@@ -417,9 +787,12 @@ def _refuse_others(saved: dict[str, object], here: dict[str, object]) -> None:
             raise UsageError(f"the bench was saved with another {what}{values}", hint=RUN_ANEW)
 
 
-def judged(trace: TraceWriter, scenario: Scenario, end: Nanos) -> Judgement:
-    """Judge a scenario's goals by what a run has recorded until its `end`."""
-    return judge(record_of(trace.lines()), scenario.goals, end_ns=end, planned_ns=scenario.planned_ns)
+def hear_usarts(chip: Chip, recorder: Recorder) -> None:
+    """Have all that a chip sends on any of its ports recorded."""
+    chip.usart1.subscribe(recorder.usart)
+    for port in ("usart2", "usart3"):
+        if (other := getattr(chip, port, None)) is not None:
+            other.subscribe(lambda sent, port=port: recorder.usart(sent, port))
 
 
 def log_bench_event(who: str, at: Nanos, what: str, detail: str) -> None:

@@ -19,12 +19,13 @@ from p2os.protocol.frames import Decoder, Frame
 from p2os.protocol.sip import SIP_KINDS, StandardSip
 from p2os.transport import Transport
 from robot_bench.adapter import make_adapter
-from robot_bench.bench import boot, log_bench_event, make_harness
+from robot_bench.bench import boot, hear_usarts, log_bench_event, make_harness
 from robot_bench.loop import RunLoop
 from robot_bench.pacer import PACED_SLICE_NS, RealTimePacer
 from robot_bench.recording.client_view import OdometryPose, SipRanges
 from robot_bench.recording.recorder import Recorder
 from robot_bench.recording.trace import TraceWriter
+from robot_bench.scenario.goals.judging import GoalJudge
 from robot_bench.scenario.scenario import Scenario
 from robot_bench.wires.chip_pins import ChipPins
 from robot_bench.wires.nets import OwnedPins
@@ -86,10 +87,13 @@ class RemoteBench:
         self.loop = RunLoop(
             chip, (endpoint,), observers=(recorder,), slice_ns=PACED_SLICE_NS, on_slice=self._after_slice
         )
+        self.goals = GoalJudge(scenario.goals, can_tell_world=False)
+        self.goals.on_end = lambda: self.loop.end_at(self.loop.now)
+        self.goals.subscribe(recorder.events)
         pin_of = {wire.name: wire.bluepill for wire in pinout.wires}
         ChipPins(chip, harness, pin_of, on_watched=self.loop.note_edge).watch(self.adapter.wakes_on, 0)
         chip.usart1.far_baud = scenario.usart_baud
-        chip.usart1.subscribe(recorder.usart)
+        hear_usarts(chip, recorder)
         chip.subscribe_warnings(lambda text: recorder.event("chip", chip.now_ns, "warning", text))
         recorder.start()
 
@@ -135,6 +139,7 @@ class RemoteBench:
         """Write the rest of the trace; return the end's time."""
         end = min(self.chip.now_ns, self.scenario.duration_ns)
         self.recorder.distance_m = self._listener.pose.distance_m
+        self.goals.end_at(end, self.scenario.planned_ns)
         self.recorder.finish(end)
         return end
 
@@ -176,5 +181,5 @@ class _Listener:
             if item.kind in SIP_KINDS:
                 with contextlib.suppress(RemoteProtocolError):
                     sip = StandardSip.from_frame(item, self._profile)
-                    self._recorder.trace.add("pose", now, self.pose.take(sip))
+                    self._recorder.events.publish(self.pose.take(sip, now))
                     self._ranges.take_sip(sip, now)

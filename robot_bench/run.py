@@ -26,10 +26,11 @@ from p2os.pioneer.body.factory import resolve_body
 from p2os.pioneer.world.model import Pose, World
 from p2os.transport import Transport
 from p2os.transport.wall_clock import Clock, wall_clock
-from robot_bench.bench import Bench, judged, pins_of
+from robot_bench.bench import Bench, pins_of
+from robot_bench.events.codec import Json
 from robot_bench.pacer import PACED_SLICE_NS, RealTimePacer
 from robot_bench.recording.run_folder import reserved
-from robot_bench.recording.run_record import TRACE_NAME, Json, read_run
+from robot_bench.recording.run_record import TRACE_NAME, read_run
 from robot_bench.recording.summary import INTERRUPTED, end_of_a_broken_run
 from robot_bench.recording.trace import TraceWriter
 from robot_bench.remote import RemoteBench
@@ -170,6 +171,31 @@ def run_at_port(
         return _record(bench, trace, folder, pacer, clock, drive)
 
 
+def write_run(bench: Bench, folder: Path, failure: str = "") -> Path:
+    """Write what a bench with its trace in memory has recorded so far as a run folder; return its report's path.
+
+    Args:
+        bench: It has run as far as it will.
+        folder: Made where it is missing; a run that is there is overwritten.
+        failure: Why it failed; empty where it did not.
+
+    Raises:
+        UsageError: The folder holds something that is no run, or is written by another run.
+        FileError: It cannot be written.
+    """
+    end = end_of_a_broken_run(bench.record(), failure) | {"trace_sha256": bench.trace.sha256}
+    goals = bench.goals.finish(bench.now, planned_ns=bench.scenario.planned_ns)
+    end |= {"goals_met": goals.met, "goals_not_judged": goals.not_judged}
+    if not failure:
+        end |= {"passed": True, "failures": []}
+    meta = meta_of(bench.scenario, bench.parts.world, bench.note, is_at_port=False)
+    with reserved(folder, force=True), contextlib.closing(TraceWriter(folder / TRACE_NAME)) as trace:
+        trace.meta(meta)
+        trace.copy(bench.recorder.lines())
+        trace.end(end)
+        return make_artefacts(folder).report
+
+
 def meta_of(scenario: Scenario, world: World | None, note: str | None, *, is_at_port: bool) -> Json:
     """Return the trace's first line: what was run, where, with what robot; no world is one that is not known."""
     parameters = scenario.parameters
@@ -304,7 +330,7 @@ def _record(
     if measurement is not None:
         measured = measurement.write(folder, bench.scenario.firmware.parent)
         failures += measurement.failures
-    goals = judged(trace, bench.scenario, end)
+    goals = bench.goals.finish(end, planned_ns=bench.scenario.planned_ns)
     passed = not failures and not goals.missed
     trace.end(
         _figures(bench, end, wall_s)

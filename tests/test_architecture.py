@@ -49,6 +49,8 @@ ALLOWED = {
     "adapter_sim": {"p2os"},
     "robot_bench": {"p2os", "bluepill_sim", "adapter_sim", "typer", "rich", "click"},
     "robot_bench.report": {"p2os", "matplotlib"},
+    "robot_bench.recording.event_files": {"pyarrow"},
+    "robot_bench.cli.pytest_plugin": {"p2os", "bluepill_sim", "pytest"},
 }
 
 #: The I/O layer: what may read a clock, open a port or start a thread.
@@ -81,8 +83,9 @@ LAYERS = {
         ("masters", "driver"), ("adapter",),
     ),
     "robot_bench": (
-        ("loop", "pacer", "firmware", "scenarios"), ("wires",), ("direct",), ("recording",), ("scenario", "report"),
-        ("adapter",), ("bench",), ("remote",), ("run", "debugging", "project"), ("cli",),
+        ("loop", "pacer", "firmware", "scenarios"), ("wires",), ("events",), ("direct",), ("recording",),
+        ("scenario", "report"),
+        ("adapter",), ("bench",), ("remote",), ("run", "project"), ("cli",),
     ),
 }  # fmt: skip
 

@@ -24,7 +24,7 @@ from packaging.requirements import Requirement
 ROOT = Path(__file__).resolve().parent.parent
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
 PACKAGES = ("simbase", "p2os", "bluepill_sim", "adapter_sim", "robot_bench")
-PARTS = ("bluepill_sim._native", "robot_bench._edges", "robot_bench._adapter_firmware")
+PARTS = ("bluepill_sim._native", "robot_bench._edges", "robot_bench._adapter_firmware", "robot_bench._esp32")
 LIMIT_S = 300
 
 #: What of the checkout only the checkout needs.

@@ -1,61 +1,63 @@
 """The tests as a whole: what tests/conftest.py promises of each."""
 
-import re
+import os
 import subprocess
 import sys
 from pathlib import Path
 
 import pytest
 
+from tests.tools.counted_lines import LineCounter
+from tools.check_coverage import merged
+
 ROOT = Path(__file__).parents[1]
+PART = """
+def which(first):
+    if first:
+        return 1
+    return 2
+"""
 SUITE = """
-import sys
 import pytest
-from hypothesis import given, strategies as st
+from simbase.part import which
 
-def test_quick(request):
-    assert not request.node.get_closest_marker("no_cover")
-
-@given(st.booleans())
-def test_repeating(value):
-    assert sys.gettrace() is None
-
-@pytest.mark.slow
-def test_long(request):
-    assert request.node.get_closest_marker("no_cover")
-    assert sys.gettrace() is None
-
-def test_that_ends_the_tracing():
-    sys.settrace(None)
-
-@pytest.mark.no_cover
-def test_that_ends_its_own_tracing():
-    sys.settrace(None)
-
-def test_after_it_is_traced():
-    assert sys.gettrace() is not None
+@pytest.mark.parametrize("first", {ways})
+def test_way(first):
+    assert which(first) == 2 - first
 """
 
 
-@pytest.mark.parametrize("workers", [[], ["-n", "1"]], ids=["one process", "a worker"])
-def test_quick_tests_alone_are_traced_and_none_may_end_it(tmp_path: Path, workers: list[str]) -> None:
-    for name in ("tests/conftest.py", "pyproject.toml"):
-        (tmp_path / Path(name).name).write_bytes((ROOT / name).read_bytes())
-    (tmp_path / "test_all.py").write_text(SUITE)
-    options = ["-p", "no:cacheprovider", "-vv", "--cov", "--cov-report=", *workers]
+@pytest.mark.parametrize("workers", [[], ["-n", "2"]], ids=["one process", "two workers"])
+@pytest.mark.parametrize(("ways", "missed"), [("[0, 1]", ([], [])), ("[0, 0]", ([4], [[3, 4]]))], ids=["both", "one"])
+def test_lines_and_branches_that_no_test_of_any_worker_reaches_are_counted(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, workers: list[str], ways: str,
+    missed: tuple[list[int], list[list[int]]],
+) -> None:  # fmt: skip
+    for name in ("tests/conftest.py", "tests/tools/counted_lines.py", "pyproject.toml"):
+        (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
+        (tmp_path / name).write_bytes((ROOT / name).read_bytes())
+    (tmp_path / "simbase").mkdir()
+    for name, text in (("__init__", ""), ("part", PART), ("unseen", PART)):
+        (tmp_path / "simbase" / f"{name}.py").write_text(text)
+    (tmp_path / "tests" / "test_all.py").write_text(SUITE.format(ways=ways))
+    environment = {name: value for name, value in os.environ.items() if not name.startswith("PYTEST")}
+    options = ["-p", "no:cacheprovider", "--count-lines", "lines", *workers]
     done = subprocess.run(
-        [sys.executable, "-m", "pytest", *options, "test_all.py"],
-        cwd=tmp_path, capture_output=True, text=True, check=False, timeout=60,
+        [sys.executable, "-m", "pytest", *options],
+        cwd=tmp_path, env=environment, capture_output=True, text=True, check=False, timeout=120,
     )  # fmt: skip
-    told = re.findall(r"(?m)^(?:\[gw0\].*(PASSED|FAILED) )?test_all.py::(\w+)(?: (PASSED|FAILED))?", done.stdout)
-    assert [(name, before or after) for before, name, after in told if before or after] == [
-        ("test_long", "PASSED"),
-        ("test_quick", "PASSED"),
-        ("test_repeating", "PASSED"),
-        ("test_that_ends_the_tracing", "FAILED"),
-        ("test_that_ends_its_own_tracing", "PASSED"),
-        ("test_after_it_is_traced", "PASSED"),
-    ], done.stdout
+    assert done.returncode == 0, done.stdout + done.stderr
+    monkeypatch.chdir(tmp_path)
+    files = merged(Path("lines"))
+    found = files["simbase/part.py"]
+    assert (found["missing_lines"], found["missing_branches"]) == missed
+    assert files["simbase/unseen.py"]["missing_lines"] == [2, 3, 4, 5]
+
+
+def test_lines_are_not_counted_once_a_package_is_imported(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "simbase", sys)
+    with pytest.raises(pytest.UsageError, match="simbase is imported before its lines can be counted"):
+        LineCounter(Path("never"))
 
 
 def test_children_keep_the_modules_that_they_compile(tmp_path: Path) -> None:

@@ -7,7 +7,7 @@ Each case takes a file that is right and damages it: a value becomes one of anot
 extreme number, a key is dropped, doubled or misspelt, a line is cut, bytes are turned. What is
 accepted is then used: a world gets a robot, a scenario's script is played, a trace is reported on.
 Allowed are success and the project's own errors; anything else, a second line or more than
-`LIMIT_S` of time is a failure, and the file is kept for a look.
+`LIMIT_S` of processor time is a failure, and the file is kept for a look.
 """
 
 import argparse
@@ -44,10 +44,11 @@ from p2os.pioneer.world import load_world
 from p2os.pioneer.world.model import World
 from p2os.protocol.profiles import Profile
 from p2os.robots.parameters import RobotParameters, load_parameters
+from robot_bench.events.codec import events_of
 from robot_bench.recording.run_record import read_run
 from robot_bench.recording.summary import outcome_of
 from robot_bench.report.page import page_data, render_page
-from robot_bench.scenario.goals import judge
+from robot_bench.scenario.goals.judging import judge
 from robot_bench.scenario.scenario import Scenario, known_scenarios, read_scenario
 from robot_bench.scenario.world_script import WorldScript
 from simbase.errors import P2osError
@@ -55,7 +56,7 @@ from simbase.timing import NS_PER_MS
 
 ROOT = Path(__file__).resolve().parents[1]
 GOLDEN = ROOT / "tests" / "golden"
-#: chosen: the slowest right file of those below takes a tenth of it on a busy machine.
+#: chosen: the slowest right file of those below takes a tenth of it.
 LIMIT_S = 2.0
 #: chosen: a refusal is read on one line of a terminal, or on two.
 LONGEST_MESSAGE = 600
@@ -189,7 +190,8 @@ def use_trace(path: Path, _rng: random.Random) -> None:
     record = read_run(path.parent)
     json.dumps(outcome_of(record))
     render_page(record, page_data(record))
-    judge(record, read_scenario(_shipped_scenario("dodge")).goals, end_ns=record.last_ns)
+    with path.open(encoding="utf-8", errors="replace") as lines:
+        judge(events_of(lines), read_scenario(_shipped_scenario("dodge")).goals, end_ns=record.last_ns)
 
 
 # What is right ------------------------------------------------------------------------------
@@ -860,18 +862,18 @@ def _hit_bytes(data: bytes, rng: random.Random) -> bytes:
 
 @contextmanager
 def limited(seconds: float) -> Iterator[None]:
-    """Interrupt what takes longer; Python code alone, an engine in C ends its call first."""
+    """Interrupt what takes more processor time; Python code alone, an engine in C ends its call first."""
 
     def ring(_number: int, _frame: FrameType | None) -> None:
         raise CaseTimeoutError
 
-    before = signal.signal(signal.SIGALRM, ring)
-    signal.setitimer(signal.ITIMER_REAL, seconds)
+    before = signal.signal(signal.SIGPROF, ring)
+    signal.setitimer(signal.ITIMER_PROF, seconds)
     try:
         yield
     finally:
-        signal.setitimer(signal.ITIMER_REAL, 0)
-        signal.signal(signal.SIGALRM, before)
+        signal.setitimer(signal.ITIMER_PROF, 0)
+        signal.signal(signal.SIGPROF, before)
 
 
 def run_case(name: str, seed: Seed, data: bytes, folder: Path, rng: random.Random) -> bool:
@@ -893,7 +895,7 @@ def run_case(name: str, seed: Seed, data: bytes, folder: Path, rng: random.Rando
             raise CaseFailedError(f"a refusal that names no file: {told!r}") from error
         return False
     except CaseTimeoutError as error:
-        raise CaseFailedError(f"not done within {LIMIT_S:g} s") from error
+        raise CaseFailedError(f"not done within {LIMIT_S:g} s of processor time") from error
     except Exception as error:
         raise CaseFailedError(f"{type(error).__name__}: {error}") from error
     return True

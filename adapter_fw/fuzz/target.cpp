@@ -67,14 +67,20 @@ adapter::Settings settings_of(Source& source, const adapter::WireNumbers& wires)
   return adapter::fault_of(settings, wires) == nullptr ? settings : adapter::Settings{};
 }
 
-class World final : private hal::PinsIn, private hal::PinsOut, private app::Writer, private app::Store {
+class World final : private hal::PinsIn,
+                    private hal::PinsOut,
+                    private hal::OutputPads,
+                    private hal::Uart,
+                    private app::Writer,
+                    private app::Store {
  public:
   explicit World(Source& source)
       : source_(source),
         settings_(settings_of(source, wires_)),
         part_(settings_, {}, wires_, 0),
-        console_({part_, log_, *this, *this, *this, wires_, "fuzz"}) {
-    part_.attach(this, this, &log_);
+        test_({*this, *this, *this, *this, nullptr}),
+        console_({part_, log_, test_, *this, *this, wires_, "fuzz", "power"}) {
+    part_.attach(&test_, &test_, &log_);
   }
 
   void run() {
@@ -201,6 +207,9 @@ class World final : private hal::PinsIn, private hal::PinsOut, private app::Writ
   void check() {
     send();
     const bool is_driving = part_.state() == adapter::State::DRIVING;
+    if (is_driving && test_.is_on()) {
+      broken("drives while the board is tested");
+    }
     if (is_driving && now_ - sip_at_ > settings_.liveness_ns) {
       broken("drives without a SIP");
     }
@@ -218,6 +227,10 @@ class World final : private hal::PinsIn, private hal::PinsOut, private app::Writ
   std::uint32_t read(Nanos) override { return pins_; }
   void drive(std::uint32_t, std::uint32_t, Nanos) override {}
   void release(Nanos) override {}
+  std::uint32_t sense(Nanos) override { return pins_; }
+  std::size_t read(std::uint8_t*, std::size_t) override { return 0; }
+  void write(p2os::Bytes) override {}
+  void set_baud(std::int32_t) override {}
   void write(const char* text) override { said_ += text[0] != '\0' ? 1U : 0U; }
   bool load(const char*, std::int64_t&) override { return false; }
   bool save(const char*, std::int64_t) override { return true; }
@@ -228,6 +241,7 @@ class World final : private hal::PinsIn, private hal::PinsOut, private app::Writ
   adapter::Settings settings_;
   adapter::Adapter part_;
   app::EventLog log_;
+  app::BoardTest test_;
   app::Console console_;
   selftest::Robot robot_;
   Nanos now_ = 0;

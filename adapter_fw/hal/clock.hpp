@@ -1,4 +1,4 @@
-// The time; one of five small interfaces of the hardware.
+// The time; one of six small interfaces of the hardware.
 #pragma once
 
 #include "../core/p2os/time.hpp"

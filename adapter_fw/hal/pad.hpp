@@ -1,4 +1,4 @@
-// A game pad; one of five small interfaces of the hardware.
+// A game pad; one of six small interfaces of the hardware.
 #pragma once
 
 #include "../core/adapter/gamepad.hpp"

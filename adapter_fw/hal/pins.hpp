@@ -1,4 +1,4 @@
-// The adapter's ends of the wires, as the core needs them; one of five small interfaces of the hardware.
+// The adapter's ends of the wires, as the core needs them; one of six small interfaces of the hardware.
 #pragma once
 
 #include <cstdint>
@@ -28,6 +28,16 @@ class PinsOut {
 
  protected:
   ~PinsOut() = default;
+};
+
+//: The output wires' own pads.
+class OutputPads {
+ public:
+  //: Returns the levels that stand on them, whoever makes them; a word as of PinsOut.
+  virtual std::uint32_t sense(p2os::Nanos now) = 0;
+
+ protected:
+  ~OutputPads() = default;
 };
 
 }  // namespace hal

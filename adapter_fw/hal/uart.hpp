@@ -1,4 +1,4 @@
-// The line to the robot; one of five small interfaces of the hardware.
+// The line to the robot; one of six small interfaces of the hardware.
 #pragma once
 
 #include <cstddef>

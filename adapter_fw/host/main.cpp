@@ -134,11 +134,12 @@ int run(const Options& options, host::Line& line, host::Wires& wires, host::File
   app::EventLog log;
   app::EventPrinter printer(log, err);
   adapter::Adapter part(settings, *adapter::find_robot(options.robot.c_str()), numbers, clock.now());
-  part.attach(&wires, &wires, &printer);
+  app::BoardTest test({wires, wires, wires, line, &wires});
+  part.attach(&test, &test, &printer);
   app::CodeKeeper keeper(retained, store);
   keeper.restore(part);
-  app::Console console({part, log, wires, store, out, numbers, "host"});
-  app::Runner runner(part, clock, line, &wires);
+  app::Console console({part, log, test, store, out, numbers, "host", "the program's start"});
+  app::Runner runner(part, clock, test, test.pad());
   wires.release(clock.now());
   console.banner();
   int input = STDIN_FILENO;

@@ -20,7 +20,7 @@
 
 namespace host {
 
-class Wires final : public hal::PinsIn, public hal::PinsOut, public hal::Pad {
+class Wires final : public hal::PinsIn, public hal::PinsOut, public hal::OutputPads, public hal::Pad {
  public:
   explicit Wires(const adapter::WireNumbers& wires)
       : connect_bit_(1U << (wires.motor1_width + wires.motor2_width)) {}
@@ -37,6 +37,8 @@ class Wires final : public hal::PinsIn, public hal::PinsOut, public hal::Pad {
   std::uint32_t read(p2os::Nanos) override { return word_; }
   void drive(std::uint32_t mask, std::uint32_t levels, p2os::Nanos now) override;
   void release(p2os::Nanos now) override { drive(0, 0, now); }
+  // Nothing but what is driven is known of the far side's wires.
+  std::uint32_t sense(p2os::Nanos) override { return levels_; }
   bool take(adapter::PadReport& report) override;
 
   int listening() const { return listener_; }

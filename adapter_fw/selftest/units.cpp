@@ -278,9 +278,27 @@ void check_codes() {
   claim(restored(memory, store) == Wheels{}, "but a negative one");
 }
 
+//: Of an Arduino sketch, not of the adapter: whoever asks again while a session is being opened begins nothing anew.
+void check_client() {
+  p2os::Client client({});
+  p2os::CommandFrame frame;
+  const auto taken = [&client, &frame] {
+    int count = 0;
+    while (client.take_output(frame)) {
+      ++count;
+    }
+    return count;
+  };
+  client.connect(0);
+  claim(client.state() == p2os::ClientState::SYNC0 && taken() > 0, "connect sends SYNC0");
+  client.connect(1);
+  claim(taken() == 0, "a second connect sends nothing");
+}
+
 }  // namespace
 
 int main() {
+  check_client();
   check_codes();
   check_led();
   check_button();

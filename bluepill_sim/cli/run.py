@@ -65,7 +65,8 @@ def run(
     uart: Annotated[str, typer.Option(help="Where USART1 goes: - (stdout), pty:, or a file.", metavar="WHERE")] = "-",
     realtime: Annotated[bool, typer.Option("--realtime", help="At the speed of the clock, until Ctrl-C.")] = False,
     drive: Annotated[
-        list[str] | None, typer.Option(help="Put a level on a pin at a time; repeatable.", metavar="PIN=LEVEL@TIME")
+        list[str] | None,
+        typer.Option(help="Put a level or volts on a pin at a time; repeatable.", metavar="PIN=LEVEL@TIME"),
     ] = None,
     until: Annotated[
         str | None, typer.Option(help='End earlier: "pin PA4 high", "usart1 sends ready", "fault".', metavar="EVENT")

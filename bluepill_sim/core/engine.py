@@ -227,7 +227,7 @@ class Engine(Stateful):
         while halt.kind is HaltKind.TAKEN_WRITE:
             halt = self._step_over_write(stop_at)
             if halt.kind is HaltKind.STEP:
-                halt = self._run(stop_at)
+                halt = Halt(HaltKind.BOUNDARY, halt.pc) if self.shared.waits else self._run(stop_at)
         return halt if halt.kind is not HaltKind.WATCHPOINT else self._step_over_access(halt, stop_at)
 
     def step(self, stop_at: int) -> Halt:

@@ -125,7 +125,7 @@ class Nvic(Stateful):
             return None
         if not candidates & candidates - 1:
             return candidates.bit_length() - 1
-        return min(_numbers(candidates), key=lambda number: (self.priority(number), number))
+        return min(numbers_of(candidates), key=lambda number: (self.priority(number), number))
 
     def priority(self, number: int) -> int:
         """Return the priority of an exception; lower comes first."""
@@ -142,7 +142,7 @@ class Nvic(Stateful):
         """Return the group priority of the handlers that are active, masks left aside."""
         if not self.active:
             return THREAD_PRIORITY
-        return min(self.group_priority(self.priority(number)) for number in _numbers(self.active))
+        return min(self.group_priority(self.priority(number)) for number in numbers_of(self.active))
 
     def can_preempt(self, number: int, execution_priority: int) -> bool:
         """Tell whether an exception may interrupt what runs at `execution_priority`."""
@@ -158,7 +158,7 @@ def exception_name(number: int) -> str:
     return _SYSTEM_NAMES.get(number, f"exception {number}")
 
 
-def _numbers(mask: int) -> Iterator[int]:
+def numbers_of(mask: int) -> Iterator[int]:
     """Iterate over the positions of the bits of a mask, lowest first."""
     while mask:
         lowest = mask & -mask

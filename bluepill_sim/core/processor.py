@@ -25,7 +25,7 @@ from bluepill_sim.core.blocks import it_state_of
 from bluepill_sim.core.engine import FIRST_EXCEPTION_RETURN, Engine
 from bluepill_sim.core.faults import FAULT_OF_HALT, FAULT_ROWS, HFSR_FORCED, FaultKind, SeenFault
 from bluepill_sim.core.halts import DEBUG_HALTS, Halt, HaltKind
-from bluepill_sim.core.nvic import BUS_FAULT, HARD_FAULT, NMI, SVCALL, SYSTICK, Nvic
+from bluepill_sim.core.nvic import BUS_FAULT, FIRST_IRQ, HARD_FAULT, NMI, SVCALL, SYSTICK, Nvic, numbers_of
 from bluepill_sim.core.recorder import EXCEPTION_RETURN
 from bluepill_sim.core.systick import SysTick
 from bluepill_sim.core.unicorn_core import Register
@@ -39,7 +39,7 @@ ENTRY_CYCLES, EXIT_CYCLES, TAIL_CHAIN_CYCLES = 12, 12, 6
 #: SHCSR enable bits.
 MEMFAULTENA = 1 << 16
 #: SCR bits.
-SLEEPONEXIT, SEVONPEND = 1 << 1, 1 << 4
+SLEEPONEXIT, SLEEPDEEP, SEVONPEND = 1 << 1, 1 << 2, 1 << 4
 #: CCR bits; reset value of an STM32F10x (PM0056 4.4.6).
 UNALIGN_TRP, DIV_0_TRP, STKALIGN = 1 << 3, 1 << 4, 1 << 9
 
@@ -115,12 +115,14 @@ class Processor(Stateful):
         self.sleep = Sleep.AWAKE
         self.is_locked_up = False
         self.on_fault: FaultListener | None = None
+        #: Called when the core falls asleep with SLEEPDEEP.
+        self.on_deep_sleep: Callable[[], None] = lambda: None
         #: Why a debugger's halt ended the last run; None where none did.
         self.halt: Halt | None = None
         self.ccr = STKALIGN
         self._memory = memory
         engine.on_event = self.send_event
-        engine.is_interrupted = self.is_interrupted
+        engine.is_interrupted = lambda: bool(self.shared.waits) or self.is_interrupted()
         r = Register
         file = engine.registers
         self._masks = file.batch(r.PRIMASK, r.BASEPRI, r.FAULTMASK)
@@ -280,6 +282,26 @@ class Processor(Stateful):
             self.event_register = False
             return
         self.sleep = sleep
+        if self.scr & SLEEPDEEP and not self._wakes():
+            self.on_deep_sleep()
+
+    def is_woken_by(self, lines: int) -> bool:
+        """Tell whether one of these interrupt lines (a mask), or the event of a WFE, would wake it."""
+        if self.sleep is Sleep.EVENT and self.event_register:
+            return True
+        priority = self.execution_priority(ignores_primask=self.sleep is Sleep.INTERRUPT)
+        wanted = self.nvic.deliverable() & lines << FIRST_IRQ
+        return any(self.nvic.can_preempt(number, priority) for number in numbers_of(wanted))
+
+    def wake(self) -> None:
+        """End the sleep."""
+        self.sleep = Sleep.AWAKE
+
+    def skip_cycles(self, cycles: int, next_tick: int | None) -> None:
+        """Have SysTick and CYCCNT leave out cycles that have passed; with the cycle of the next tick before that."""
+        self.shared.tick.base += cycles
+        self.shared.cyccnt.base += cycles
+        self.systick.next_cycle = None if next_tick is None else next_tick + cycles
 
     # Exceptions.
 

@@ -49,7 +49,7 @@ class SystemControl(Stateful):
     STATE = ("_demcr", "_dbgmcu_cr", "_cyccnt")
 
     _demcr = field("demcr", "DEMCR.")
-    _dbgmcu_cr = field("dbgmcu_cr", "DBGMCU_CR.")
+    _dbgmcu_cr: int = field("dbgmcu_cr", "DBGMCU_CR.")
     _cyccnt = packed("cyccnt", "CYCCNT.")
 
     def __init__(self, processor: Processor, chip: SystemControlPorts) -> None:
@@ -58,6 +58,11 @@ class SystemControl(Stateful):
         self.shared = processor.shared
         self._at = ctypes.addressof(self.shared)
         self._word = ctypes.c_uint32()
+
+    @property
+    def dbgmcu_cr(self) -> int:
+        """DBGMCU_CR."""
+        return self._dbgmcu_cr
 
     def reset(self) -> None:
         """Go back to the state after a reset; DBGMCU and DEMCR belong to the debugger and stay."""

@@ -7,6 +7,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from bluepill_sim.debug.execution import Execution
+from bluepill_sim.errors import BluePillError
+from bluepill_sim.spans import to_nanos
 from simbase.timing import NS_PER_S
 
 _LEVELS = {"0": False, "1": True, "low": False, "high": True, "z": None}
@@ -25,6 +27,7 @@ COMMANDS = {
     "help": Command("help", "this list"),
     "reset": Command("reset", "press the reset button (halt and init are taken as well); time goes on"),
     "time": Command("time", "virtual time, cycles, clock"),
+    "wait": Command("wait 10ms", "let time pass with the core halted; DBGMCU_CR says which watchdogs stand still"),
     "pins": Command("pins [all]", "pins in use: mode, level, who drives"),
     "pin": Command("pin PA4 [1|0|z]", "one pin; with a level: drive it from outside, z lets go"),
     "registers": Command("registers TIM3 [CR1]", "registers of a peripheral with their fields"),
@@ -56,6 +59,7 @@ class Monitor:
             "help": self._help,
             "reset": self._reset,
             "time": self._time,
+            "wait": self._wait,
             "pins": self._pins,
             "pin": self._pin,
             "registers": self._registers,
@@ -82,6 +86,24 @@ class Monitor:
         parts = [f"{board.now_ns / NS_PER_S:.9f} s of virtual time", f"{board.cycle} cycles"]
         parts += [f"{board.hclk_hz / 1e6:g} MHz", *(["asleep"] if board.is_asleep else [])]
         return ", ".join(parts)
+
+    def _wait(self, words: list[str]) -> str:
+        machine = self._execution.machine
+        board = machine.board
+        try:
+            [span_ns] = map(to_nanos, words)
+        except (BluePillError, ValueError):
+            return f"wait {' '.join(words)}: {_UNKNOWN}"
+        end_ns = board.now_ns + span_ns
+        if machine.end_ns is not None:
+            end_ns = min(end_ns, machine.end_ns)
+        before = board.resets.copy()
+        with board.chip.halted_core():
+            while board.now_ns < end_ns:
+                machine.advance_to(end_ns)
+        self._execution.changed()
+        causes = ", ".join(cause.name for cause in board.resets - before)
+        return f"{self._time([])}{f'; reset by {causes}: at {board.where()}' if causes else ''}"
 
     def _pins(self, words: list[str]) -> str:
         names = [pin.name for pin in self._execution.machine.board.pins]

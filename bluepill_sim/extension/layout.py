@@ -154,6 +154,8 @@ SHARED = Struct(
         Field("has_debugger", "u32", doc="Python sees to BKPT and HardFaults"),
         Field("knows_masked_svc", "u32", doc="Python was told of an SVC that its priority does not allow"),
         Field("has_fault", "u32", doc="`fault` waits for Python"),
+        Field("waits", "u32", doc="the block ends before its next access: the flash cannot give more code now"),
+        Field("waits_end", "u32"),
         Field("fault", "fault"),
         Field("last", "record", LAST_ROWS),
     ),
@@ -310,7 +312,8 @@ TIM = Struct(
             "edge_at", "u64", 3, "the tick at which OC1REF to OC3REF last changed before they were what they are now,"
         ),
         Field("shaped_at", "u64", 3, "since when they are that,"),
-        Field("born", "u64", 3, "and of a wave the tick of its last edge before, which there was not"),
+        Field("born", "u64", 3, "of a wave the tick of its last edge before, which there was not,"),
+        Field("turns_at", "u64", 3, "and of the first that there is"),
         Field("filters", "filter", 5, "TI1 to TI4, ETR"),
         Field("outputs", "shape", 7, "CH1 to CH4, CH1N to CH3N"),
         Field("references", "shape", 3, "OC1REF to OC3REF, for the dead time"),

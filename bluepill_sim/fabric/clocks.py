@@ -16,6 +16,10 @@ MAX_SYSCLK_HZ = 72_000_000
 MAX_PCLK1_HZ = 36_000_000
 #: HSI after reset, in Hz (RM0008 7.2.2).
 HSI_HZ = 8_000_000
+#: The crystal on PC14 and PC15.
+LSE_HZ = 32_768
+#: LSI, typical, and its range, in Hz (DS5319 table 25).
+LSI_HZ, LEAST_LSI_HZ, MOST_LSI_HZ = 40_000, 30_000, 60_000
 #: Highest SYSCLK for 0, 1, 2 wait states, in Hz (RM0008 3.3.3, FLASH_ACR).
 MAX_SYSCLK_BY_WAIT_STATES = (24_000_000, 48_000_000, 72_000_000)
 
@@ -33,6 +37,14 @@ class Clocks(Stateful):
     timer2_hz: int = HSI_HZ
     #: What PCLK2 is divided by for the ADCs.
     adc_divider: int = 2
+    #: The independent watchdog's clock: LSI, whether or not it runs for others.
+    lsi_hz: int = LSI_HZ
+    #: RTCCLK; 0: it stands still.
+    rtcclk_hz: int = 0
+    #: BKP_RTCCR CAL: so many of 2**20 cycles of RTCCLK do not count.
+    rtc_calibration: int = 0
+    #: Whether BKP puts the pulse of each second on PC13, so that RTC has to make it.
+    rtc_seconds_shown: bool = False
     #: FLASH_ACR LATENCY, 0 to 2 wait states.
     flash_wait_states: int = 0
     #: FLASH_ACR PRFTBE.

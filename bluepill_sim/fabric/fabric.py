@@ -35,7 +35,7 @@ from simbase.timing import Nanos
 #: Lines, and how many words of 64 of them there are (`LINES` of fabric.h); rows show a line as a pin behind the last.
 LINES, LINE_WORDS, FIRST_LINE_ROW = 192, 3, 16 * PORTS
 #: Commands of every device (`enum command`), and the first of its own.
-RESET, CLOCK, ROUTE, SETTLE, OWN_COMMANDS = 0, 1, 2, 4, 16
+RESET, CLOCK, ROUTE, SETTLE, STOPPED, RESUMED, OWN_COMMANDS = 0, 1, 2, 4, 8, 9, 16
 #: An alternate function that offers nothing.
 NO_LEVEL = 2
 

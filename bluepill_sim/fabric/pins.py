@@ -184,7 +184,7 @@ class Pin:
         half of VDDA on, and nothing of a signal.
 
         Args:
-            volts: A constant in volts, above -2000 and below 2000, or a `Signal` from now on; on a pin that leads
+            volts: A constant in volts, above -1000 and below 1000, or a `Signal` from now on; on a pin that leads
                 to no ADC a constant alone.
 
         Raises:
@@ -196,7 +196,10 @@ class Pin:
             raise ValueError(f"{self.name} leads to no ADC")
         fabric = self._bank.fabric
         level = None if constant is None else 2 * constant >= fabric.analog_struct.vdda_uv
-        self.drive(level, volts=None if constant is None else constant / UV_PER_V)
+        most = volts.most_v if isinstance(volts, Signal) else volts
+        if most is not None and (complaint := overvoltage(self, most)) is not None:
+            self._bank.warn(complaint, once=f"{self.name}:volts")
+        self.drive(level)
         if channel is not None:
             fabric.inputs_change()
             put_signal(fabric, channel, volts if isinstance(volts, Signal) else constant, self._bank.now_ns)

@@ -29,12 +29,16 @@ from functools import cache
 from typing import Any, ClassVar, cast
 
 from bluepill_sim.extension.layout import Struct, structure
-from bluepill_sim.fabric.fabric import CLOCK, RESET, SETTLE
+from bluepill_sim.fabric.fabric import CLOCK, OWN_COMMANDS, RESET, RESUMED, SETTLE, STOPPED
 from bluepill_sim.fabric.ports import ChipPorts
 from simbase.state import Stateful
 
 #: In place of a method's name: the device's file in C does it.
 NATIVE = "native"
+#: The kind of a device in Python that has `INPUTS`, or listens to pins: `source/devices/listener.c`.
+LISTENER = "listener"
+#: What it is told first (the other is pins), and its command.
+_HEARS_LINE, _LISTEN = 0, OWN_COMMANDS
 #: Every bit of a 32-bit register.
 WORD = 0xFFFF_FFFF
 
@@ -288,7 +292,23 @@ class Peripheral(Stateful):
 
     def answer(self, what: int, value: int) -> int:
         """Answer what the device in C asks."""
-        raise NotImplementedError(f"{self.name} was asked {what}, {value}")
+        if self.KIND != LISTENER:
+            raise NotImplementedError(f"{self.name} was asked {what}, {value}")
+        if what == _HEARS_LINE:
+            self.line_changed(self.INPUTS[value >> 1], bool(value & 1))
+        else:
+            self.pins_changed()
+        return 0
+
+    def listen_to_pins(self, port: str, pins: int) -> None:
+        """Have a LISTENER's `pins_changed` called for inputs of these pins of a port, a bit each, from now on."""
+        self.command(_LISTEN, self.chip.pins.PORTS.index(port), pins)
+
+    def line_changed(self, name: str, level: bool) -> None:
+        """Act on a new level of one of a LISTENER's `INPUTS`."""
+
+    def pins_changed(self) -> None:
+        """Act on new levels of the pins that a LISTENER listens to."""
 
     def deliver(self) -> None:
         """Take over the words that the device in C has sent."""
@@ -386,6 +406,9 @@ class Peripheral(Stateful):
     def on_reset(self) -> None:
         """Put back what is not a register; called by `reset` after the registers."""
 
+    def backup_reset(self) -> None:
+        """Go back to the state of a backup domain that had no power, or after BDRST of RCC_BDCR."""
+
     def advance_to(self, now_ns: int) -> None:
         """Act on everything due up to and including `now_ns`, in order of its time."""
 
@@ -397,6 +420,24 @@ class Peripheral(Stateful):
         """Act on a change of the frequencies in `chip.clocks`, which has just happened."""
         if self.KIND is not None and self.clock_hz():
             self.command(CLOCK, self.clock_hz())
+
+    def clock_stopped(self) -> None:
+        """Stand still, where the clock is one of the core's: Stop mode begins."""
+        if self.KIND is not None:
+            self.command(STOPPED)
+
+    def clock_resumed(self, stopped_ns: int) -> None:
+        """Go on after `stopped_ns`, from where `clock_stopped` was called."""
+        if self.KIND is not None:
+            self.command(RESUMED, stopped_ns & WORD, stopped_ns >> 32)
+
+    def freeze(self) -> None:
+        """Stand still while a debugger halts the core (DBGMCU_CR)."""
+        self.clock_stopped()
+
+    def thaw(self, frozen_ns: int) -> None:
+        """Go on after `frozen_ns`, from where `freeze` was called."""
+        self.clock_resumed(frozen_ns)
 
     def _take_slot(self) -> int:
         if self.KIND is None:

@@ -17,8 +17,8 @@ if TYPE_CHECKING:
     from bluepill_sim.fabric.fabric import Fabric
 
 UV_PER_V = 1_000_000
-#: What 32 bits of microvolts hold.
-_MOST_V = 2000
+#: What 31 bits of microvolts hold, so that a span of them has 32.
+_MOST_V = 1000
 #: Numbers of shapes in analog.c that are no `Shape`.
 _CONSTANT, _SAMPLES, _HELD = 1, 6, 7
 
@@ -62,6 +62,11 @@ class Oscillation:
         to_uv(self.low_v)
         to_uv(self.high_v)
 
+    @property
+    def most_v(self) -> float:
+        """The highest volts."""
+        return max(self.low_v, self.high_v)
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Samples:
@@ -87,6 +92,11 @@ class Samples:
         for one in self.volts:
             to_uv(one)
 
+    @property
+    def most_v(self) -> float:
+        """The highest volts."""
+        return max(self.volts)
+
 
 Signal: TypeAlias = Oscillation | Samples
 
@@ -95,7 +105,7 @@ def to_uv(volts: float) -> int:
     """Return volts as a whole number of microvolts.
 
     Raises:
-        ValueError: They are no number, or 2000 V or more either way.
+        ValueError: They are no number, or 1000 V or more either way.
     """
     if not math.isfinite(volts) or abs(volts) >= _MOST_V:
         raise ValueError(f"{volts} V on a pin")

@@ -55,6 +55,11 @@ class Exti(Peripheral):
         ),
     )
 
+    @property
+    def pending(self) -> int:
+        """The lines that are pending, and would make an interrupt or an event, as a mask."""
+        return self.words[PR] & (self.words[IMR] | self.words[EMR])
+
     def __init__(self, chip: ChipPorts, place: Place) -> None:
         super().__init__(chip, place)
         chip.pins.route_listeners.append(self._route_changed)

@@ -2,9 +2,12 @@
 
 Modelled: wait states and prefetch (the CPU's block costs read them from
 `chip.clocks`), the two keys, halfword programming, page and mass erase with
-typical times, the error flags. Not modelled: option bytes (declared, warned),
-write protection, the half-cycle access, and the stall of a CPU that fetches
-from flash while it is being programmed.
+typical times, the error flags; option bytes: their keys, erasing, programming
+(the controller makes the complement), what a reset loads of them; protection of
+groups of four pages (WRP), of the first four by RDP, and the mass erase that
+takes RDP away. That the core waits meanwhile is `chip.py`'s. Chosen: erasing
+the option bytes takes as long as a page. Not modelled: the half-cycle access,
+and that RDP keeps a debugger and code in SRAM from reading the flash.
 
 Source: RM0008 section 3.3.3, PM0075 sections 2 and 3; times from DS5319 table 28.
 Invariant: the memory changes only while CR is unlocked and PG, PER or MER says so.
@@ -15,7 +18,7 @@ from typing import Protocol
 from bluepill_sim.fabric.ports import ChipPorts
 from bluepill_sim.fabric.registers import Peripheral, Place, Register, bits
 
-ACR, KEYR, OPTKEYR, SR, CR, AR = range(6)
+ACR, KEYR, OPTKEYR, SR, CR, AR, _RESERVED, OBR, WRPR = range(9)
 
 KEY1, KEY2 = 0x4567_0123, 0xCDEF_89AB
 PG, PER, MER, OPTPG, OPTER, STRT, LOCK, OPTWRE, ERRIE, EOPIE = (1 << n for n in (0, 1, 2, 4, 5, 6, 7, 9, 10, 12))
@@ -28,7 +31,20 @@ PROGRAM_NS, PAGE_ERASE_NS, MASS_ERASE_NS = 52_500, 20_000_000, 20_000_000
 #: Where the flash appears besides its alias at 0.
 FLASH_BASE = 0x0800_0000
 
-_OPTION_BITS = OPTPG | OPTER
+#: Option bytes: each a halfword, the complement above the byte (PM0075 2.2).
+RDP, USER, DATA0, DATA1, WRP0 = range(5)
+OPTION_BYTES = 16
+#: As delivered: readable, nothing chosen, no page protected.
+DELIVERED = b"\xa5\x5a" + b"\xff\x00" * 7
+UNPROTECTED = 0xA5
+#: USER: 0 starts IWDG with the chip, resets where Stop or Standby begins.
+WDG_SW, N_RST_STOP, N_RST_STDBY = 1, 2, 4
+#: OBR.
+OPTERR, RDPRT = 1, 2
+_USER_AT, _DATA0_AT, _DATA1_AT = 2, 10, 18
+#: One bit of WRPR protects so much; RDP protects the first one.
+GROUP_BYTES = 4 * PAGE_BYTES
+_ERASED = 0xFF
 
 
 class FlashMemory(Protocol):
@@ -47,12 +63,21 @@ class FlashMemory(Protocol):
         """Replace bytes, and drop whatever was translated from them."""
         ...
 
+    @property
+    def options(self) -> bytes:
+        """The option bytes, with their complements."""
+        ...
+
+    def write_options(self, options: bytes) -> None:
+        """Replace the option bytes."""
+        ...
+
 
 class Flash(Peripheral):
     """Flash memory interface."""
 
     HAS_BYTE_LANES = True
-    STATE = ("_key_step", "_address")
+    STATE = ("_key_step", "_option_key_step", "_address")
     OUTPUTS = ("irq",)
     REGISTERS = (
         Register(
@@ -80,7 +105,7 @@ class Flash(Peripheral):
             offset=0x10,
             reset=LOCK,
             readable=PG | PER | MER | OPTPG | OPTER | STRT | LOCK | OPTWRE | ERRIE | EOPIE,
-            writable=PG | PER | MER | OPTPG | OPTER | STRT | LOCK | ERRIE | EOPIE,
+            writable=PG | PER | MER | OPTPG | OPTER | STRT | LOCK | OPTWRE | ERRIE | EOPIE,
             on_write="_write_cr",
             fields="EOPIE 12, ERRIE 10, OPTWRE 9, LOCK 7, STRT 6, OPTER 5, OPTPG 4, MER 2, PER 1, PG 0",
         ),
@@ -91,11 +116,16 @@ class Flash(Peripheral):
             reset=0x03FF_FFFC,
             readable=bits((25, 0)),
             writable=0,
-            doc="option bytes as delivered",
+            doc="option bytes as the last reset found them",
             fields="Data1 25:18, Data0 17:10, UNUSED 9:5, nRST_STDBY 4, nRST_STOP 3, WDG_SW 2, RDPRT 1, OPTERR 0",
         ),
         Register(
-            name="WRPR", offset=0x20, reset=0xFFFF_FFFF, writable=0, doc="no page is write-protected", fields="WRP 31:0"
+            name="WRPR",
+            offset=0x20,
+            reset=0xFFFF_FFFF,
+            writable=0,
+            doc="likewise: 0 protects four pages",
+            fields="WRP 31:0",
         ),
     )
 
@@ -104,8 +134,13 @@ class Flash(Peripheral):
         #: The array; the board sets it. None: programming is warned of and does nothing.
         self.memory: FlashMemory | None = None
         #: Keys of the unlock sequence seen; -1: a wrong one, locked until reset.
-        self._key_step = 0
+        self._key_step = self._option_key_step = 0
         self._address = 0
+
+    @property
+    def is_busy(self) -> bool:
+        """Whether it is being programmed or erased."""
+        return bool(self.words[SR] & BSY)
 
     def program(self, offset: int, size: int, value: int) -> bool:
         """Take a write by the CPU to the flash array itself; False: the bus answers with an error.
@@ -124,17 +159,49 @@ class Flash(Peripheral):
         if not self.words[CR] & PG or self.words[CR] & LOCK:
             self.chip.warn("write to flash without FLASH_CR PG: ignored", once="FLASH:write")
             return
-        if self._is_busy():
+        if self.is_busy:
             self._finish(PGERR)
             return
         memory = self._array()
         if memory is None:
+            return
+        if self._is_protected(offset):
+            self._finish(WRPRTERR)
             return
         if memory.read(offset, 2) != b"\xff\xff" and value:
             self._finish(PGERR)
             return
         memory.write(offset, value.to_bytes(2, "little"))
         self._begin(PROGRAM_NS)
+
+    def program_option(self, offset: int, size: int, value: int) -> bool:
+        """Take a write by the CPU to the option bytes; False: the bus answers with an error.
+
+        Args:
+            offset: Byte offset from the first of them.
+            size: 1, 2 or 4 bytes; only halfwords can be programmed.
+            value: The data; the controller makes the complement of its lower byte.
+        """
+        control = self.words[CR]
+        if not control & OPTPG or not control & OPTWRE or control & LOCK:
+            self.chip.warn("write to the option bytes without FLASH_CR OPTPG and OPTWRE: ignored", once="FLASH:options")
+            return True
+        if size != 2:
+            return False
+        memory = self._array()
+        if memory is None:
+            return True
+        options, byte = memory.options, value & 0xFF
+        if self.is_busy or options[offset : offset + 2] != b"\xff\xff":
+            self._finish(PGERR)
+            return True
+        took_ns = PROGRAM_NS
+        if offset == 2 * RDP and byte == UNPROTECTED and self.words[OBR] & RDPRT:
+            memory.write(0, b"\xff" * memory.size)
+            took_ns += MASS_ERASE_NS
+        memory.write_options(options[:offset] + bytes((byte, byte ^ 0xFF)) + options[offset + 2 :])
+        self._begin(took_ns)
+        return True
 
     def advance_to(self, now_ns: int) -> None:
         """End the operation that is due."""
@@ -145,9 +212,10 @@ class Flash(Peripheral):
             self._finish(EOP)
 
     def on_reset(self) -> None:
-        """Lock the controller; no wait state."""
-        self._key_step = 0
+        """Lock the controller; no wait state; load the option bytes."""
+        self._key_step = self._option_key_step = 0
         self._address = 0
+        self._load_options()
         self._set_access(0, has_prefetch=True)
         self.set_output("irq", False)
 
@@ -178,21 +246,29 @@ class Flash(Peripheral):
         else:
             self._key_step = 1
 
-    def _write_optkeyr(self, _written: int, _previous: int) -> None:
-        self.chip.warn("FLASH_OPTKEYR: option bytes are not modelled", once="FLASH:options")
+    def _write_optkeyr(self, written: int, _previous: int) -> None:
+        if self.words[CR] & (LOCK | OPTWRE):
+            return
+        if written != (KEY1, KEY2)[self._option_key_step]:
+            self._option_key_step = 0
+            self.chip.warn("FLASH_OPTKEYR: wrong key", once="FLASH:option-key")
+        elif self._option_key_step:
+            self._option_key_step = 0
+            self.words[CR] |= OPTWRE
+        else:
+            self._option_key_step = 1
 
     def _write_sr(self, _written: int, _previous: int) -> None:
         self._update_irq()
 
     def _write_cr(self, written: int, previous: int) -> None:
-        if previous & LOCK or self._is_busy():
+        if previous & LOCK or self.is_busy:
             self.words[CR] = previous
             if previous & LOCK and written & ~LOCK:
                 self.chip.warn("FLASH_CR: written while locked: ignored", once="FLASH:locked")
             return
-        # LOCK can be set by software, not cleared: `previous` was unlocked, so a 1 is new.
-        if written & _OPTION_BITS:
-            self.chip.warn("FLASH_CR: option bytes are not modelled", once="FLASH:options")
+        # LOCK can be set by software, not cleared: `previous` was unlocked, so a 1 is new. OPTWRE is the opposite.
+        self.words[CR] &= ~OPTWRE | previous
         if written & STRT:
             self._erase(written)
         self._update_irq()
@@ -202,32 +278,62 @@ class Flash(Peripheral):
 
     def _erase(self, control: int) -> None:
         memory = self._array()
-        if memory is None or not control & (MER | PER):
+        erases_options = control & OPTER and self.words[CR] & OPTWRE
+        if memory is None or not (control & (MER | PER) or erases_options):
             self.words[CR] &= ~STRT
             return
+        if erases_options:
+            memory.write_options(bytes((_ERASED,)) * OPTION_BYTES)
+            self._begin(PAGE_ERASE_NS)
+            return
         if control & MER:
+            if any(self._is_protected(at) for at in range(0, memory.size, GROUP_BYTES)):
+                self.words[CR] &= ~STRT
+                self._finish(WRPRTERR)
+                return
             memory.write(0, b"\xff" * memory.size)
             self._begin(MASS_ERASE_NS)
             return
         page = (self._address - FLASH_BASE) // PAGE_BYTES * PAGE_BYTES
-        if not 0 <= page < memory.size:
+        if not 0 <= page < memory.size or self._is_protected(page):
             self.words[CR] &= ~STRT
             self._finish(WRPRTERR)
             return
         memory.write(page, b"\xff" * PAGE_BYTES)
         self._begin(PAGE_ERASE_NS)
 
+    def _is_protected(self, offset: int) -> bool:
+        """Tell whether the page at an offset must not be changed."""
+        group = offset // GROUP_BYTES
+        return not self.words[WRPR] >> group & 1 or bool(self.words[OBR] & RDPRT and not group)
+
+    def _load_options(self) -> None:
+        """Take over the option bytes; one that does not fit its complement counts as 0xFF (PM0075 2.2)."""
+        options = DELIVERED if self.memory is None else self.memory.options
+        values, obr = [], 0
+        for at in range(0, OPTION_BYTES, 2):
+            byte, complement = options[at], options[at + 1]
+            if byte ^ complement != 0xFF:
+                obr |= OPTERR if (byte, complement) != (_ERASED, _ERASED) else 0
+                byte = _ERASED
+            values.append(byte)
+        obr |= RDPRT if values[RDP] != UNPROTECTED else 0
+        obr |= values[USER] << _USER_AT | values[DATA0] << _DATA0_AT | values[DATA1] << _DATA1_AT
+        self.words[OBR] = obr
+        self.words[WRPR] = int.from_bytes(bytes(values[WRP0:]), "little")
+        power = self.chip.power
+        power.starts_watchdog = not values[USER] & WDG_SW
+        power.resets_at_stop, power.resets_at_standby = not values[USER] & N_RST_STOP, not values[USER] & N_RST_STDBY
+
     def _array(self) -> FlashMemory | None:
         if self.memory is None:
             self.chip.warn("FLASH: programming and erasing are not modelled on this board", once="FLASH:memory")
         return self.memory
 
-    def _is_busy(self) -> bool:
-        return bool(self.words[SR] & BSY)
-
     def _begin(self, duration_ns: int) -> None:
         self.words[SR] |= BSY
         self.due_ns = self.chip.now_ns + duration_ns
+        self.chip.flash_began()
 
     def _finish(self, flag: int) -> None:
         self.words[SR] |= flag

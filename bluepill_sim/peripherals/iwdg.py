@@ -2,23 +2,22 @@
 
 Modelled: the three keys, every prescaler and reload value, the flags of an
 update that is under way, a counter that only a reset stops. It counts in sleep
-too, and whatever the core does, a lockup included. Not modelled: the start by
-option byte, the freeze by DBGMCU, and that RCC_CSR shows LSI forced on.
+too, and whatever the core does, a lockup included; it may start with the chip
+(option byte), and keeps LSI on, which RCC_CSR shows.
 
 Source: RM0008 section 19; LSI from the data sheet DS5319 table 25 (40 kHz typical, 30 to 60).
 Invariant: while it runs, `due_ns` is when the chip is reset.
 """
 
+from bluepill_sim.fabric.clocks import LSI_HZ
 from bluepill_sim.fabric.registers import Peripheral, Register, bits
-from simbase.timing import Nanos
+from simbase.timing import NS_PER_S, Nanos
 
 KR, PR, RLR, SR = range(4)
 
 START, FEED, UNLOCK = 0xCCCC, 0xAAAA, 0x5555
-#: One cycle of LSI at its typical frequency.
-LSI_NS: Nanos = 25_000
 #: RM0008 19.4.2: an update takes up to five cycles of LSI.
-UPDATE_NS: Nanos = 5 * LSI_NS
+UPDATE_CYCLES = 5
 _PVU, _RVU = 1, 2
 #: Divider of LSI by PR.
 DIVIDERS = (4, 8, 16, 32, 64, 128, 256, 256)
@@ -28,7 +27,8 @@ _COUNTS = 0xFFF
 class Iwdg(Peripheral):
     """The independent watchdog."""
 
-    STATE = ("_is_running", "_is_unlocked", "_base_ns", "_base_count", "_updated_ns")
+    STATE = ("_is_running", "_is_unlocked", "_base_ns", "_base_count", "_lsi_hz", "_updated_ns")
+    OUTPUTS = ("lsi",)
     REGISTERS = (
         Register(name="KR", offset=0x00, readable=0, on_write="_write_kr"),
         Register(
@@ -45,6 +45,7 @@ class Iwdg(Peripheral):
     #: The counter held `_base_count` from `_base_ns` on.
     _base_ns: Nanos = 0
     _base_count = _COUNTS
+    _lsi_hz = LSI_HZ
     #: When the last writes of PR and of RLR are done.
     _updated_ns: tuple[Nanos, Nanos] = (0, 0)
 
@@ -59,22 +60,44 @@ class Iwdg(Peripheral):
             self.due_ns = None
             self.chip.watchdog_expired(self.name)
 
+    def clock_changed(self) -> None:
+        """Go on at the LSI that is now."""
+        if self._is_running and self.chip.clocks.lsi_hz != self._lsi_hz:
+            self._count_from(self._count(DIVIDERS[self.words[PR]]))
+
+    def freeze(self) -> None:
+        """Stand still."""
+        self.due_ns = None
+
+    def thaw(self, frozen_ns: Nanos) -> None:
+        """Go on."""
+        if self._is_running:
+            self._base_ns += frozen_ns
+            self.due_ns = self._expiry_ns()
+
     def on_reset(self) -> None:
-        """Stop."""
+        """Stop, or start where the option bytes say so."""
         self._is_running = self._is_unlocked = False
         self._base_count = _COUNTS
         self._updated_ns = (0, 0)
+        self.set_output("lsi", False)
+        if self.chip.power.starts_watchdog:
+            self._start()
 
     def _write_kr(self, written: int, _previous: int) -> None:
         key = written & 0xFFFF
         self._is_unlocked = key == UNLOCK
         if key == START and not self._is_running:
-            self._is_running = True
-            self._count_from(_COUNTS)
+            self._start()
         elif key == FEED and self._is_running:
             self._count_from(self.words[RLR])
         elif key not in {START, FEED, UNLOCK}:
             self.chip.warn(f"IWDG_KR: {key:#06x} is no key", once="IWDG:key")
+
+    def _start(self) -> None:
+        self._is_running = True
+        self._count_from(_COUNTS)
+        self.set_output("lsi", True)
 
     def _write_pr(self, _written: int, previous: int) -> None:
         count = self._count(DIVIDERS[previous])
@@ -97,13 +120,16 @@ class Iwdg(Peripheral):
             why = "locked" if not self._is_unlocked else "written while the last update is under way"
             self.chip.warn(f"IWDG_{self.REGISTERS[register].name}: {why}: ignored", once=f"IWDG:{register}:{why}")
             return False
-        done = self.chip.now_ns + UPDATE_NS
+        done = self.chip.now_ns - (-UPDATE_CYCLES * NS_PER_S // self.chip.clocks.lsi_hz)
         self._updated_ns = (done, self._updated_ns[1]) if register == PR else (self._updated_ns[0], done)
         return True
 
     def _count(self, divider: int) -> int:
-        return max(0, self._base_count - (self.chip.now_ns - self._base_ns) // (divider * LSI_NS))
+        return max(0, self._base_count - (self.chip.now_ns - self._base_ns) * self._lsi_hz // (divider * NS_PER_S))
 
     def _count_from(self, count: int) -> None:
-        self._base_ns, self._base_count = self.chip.now_ns, count
-        self.due_ns = self._base_ns + (count + 1) * DIVIDERS[self.words[PR]] * LSI_NS
+        self._base_ns, self._base_count, self._lsi_hz = self.chip.now_ns, count, self.chip.clocks.lsi_hz
+        self.due_ns = self._expiry_ns()
+
+    def _expiry_ns(self) -> Nanos:
+        return self._base_ns - (-(self._base_count + 1) * DIVIDERS[self.words[PR]] * NS_PER_S // self._lsi_hz)

@@ -3,8 +3,12 @@
 Modelled: every multiplier and divider, ready flags after typical start-up
 times, the RM's rules of what may not be changed while in use, a switch of
 SYSCLK that waits until its source is ready, ready interrupts, peripheral
-reset, reset causes. Not modelled: the clock security system (no crystal ever
-fails), HSI trimming, MCO, and the write protection of BDCR by PWR_CR DBP.
+reset, reset causes; HSI trimming (40 kHz a step), MCO on PA8, LSI that IWDG
+keeps on, BDCR that PWR_CR DBP protects; a crystal that fails, and the clock
+security system, which then takes HSI and raises NMI until CSSC. Chosen: NMI
+comes again a microsecond after its handler has returned with CSSF set; LSION
+reads 1 while IWDG keeps LSI on; without CSS a crystal that fails under SYSCLK
+stops the core until a reset.
 
 Source: RM0008 section 7; start-up times from the data sheet DS5319 section 5.3.6 to 5.3.8.
 Invariant: `chip.clocks` is what SWS and the dividers say.
@@ -14,9 +18,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from enum import Enum
 
-from bluepill_sim.fabric.clocks import HSI_HZ, illegal_settings
+from bluepill_sim.fabric.clocks import HSI_HZ, LEAST_LSI_HZ, LSE_HZ, MOST_LSI_HZ, illegal_settings
 from bluepill_sim.fabric.ports import ChipPorts
-from bluepill_sim.fabric.registers import ClockBit, Peripheral, Place, Register, bits
+from bluepill_sim.fabric.registers import LISTENER, ClockBit, Peripheral, Place, Register, bits
 
 CR, CFGR, CIR, APB2RSTR, APB1RSTR, AHBENR, APB2ENR, APB1ENR, BDCR, CSR = range(10)
 
@@ -32,9 +36,19 @@ ILLEGAL_NS = 1_000_000
 PLLSRC, PLLXTPRE = 1 << 16, 1 << 17
 _PLL_SETTINGS = bits((21, 16))
 _SW = bits((1, 0))
-#: MCO: 0xx is no clock.
-_MCO_ON = 1 << 26
+#: MCO: 0xx is no clock, then SYSCLK, HSI, HSE, PLL / 2.
+_MCO_AT, _MCO_SYSCLK = 24, 4
+_MCO_PIN, _MCO = "PA8", "MCO"
+CSSON, CSSF, CSSC = 1 << 19, 1 << 7, 1 << 23
+#: chosen: so long after its handler NMI comes again while CSSF is set.
+NMI_AGAIN_NS = 1_000
+#: CR HSITRIM: the middle, and what a step does to HSI (DS5319 5.3.7).
+_TRIM_AT, _TRIM_MIDDLE, TRIM_STEP_HZ = 3, 16, 40_000
 _BDRST = 1 << 16
+#: BDCR: RTCSEL's place, which keeps its first choice; RTCEN.
+_RTCSEL_AT, _RTCSEL, _RTCEN = 8, bits((9, 8)), 1 << 15
+#: HSE is divided by this for the RTC.
+_RTC_HSE_DIVIDER = 128
 _RMVF = 1 << 24
 _CSR_FLAGS = bits((31, 26))
 
@@ -59,6 +73,8 @@ class ResetCause(Enum):
     IWDG = bits(26, 29)
     #: The window watchdog.
     WWDG = bits(26, 30)
+    #: The end of Standby, which leaves the flags alone.
+    STANDBY = 0
     #: Entry of a low-power mode that the option bytes forbid.
     LOW_POWER = bits(26, 31)
 
@@ -84,7 +100,7 @@ OSCILLATORS = (
     Oscillator("LSE", BDCR, 1, 2, 1, 1_500_000_000),  # DS5319 table 23: 1.5 s typical
     Oscillator("LSI", CSR, 1, 2, 0, 85_000),  # DS5319 table 25: at most 85 µs
 )
-_HSE, _PLL = 1, 2
+_HSE, _PLL, _LSE, _LSI = 1, 2, 3, 4
 #: CR's ready bit by SW.
 _SOURCE_READY = (HSIRDY, HSERDY, PLLRDY)
 
@@ -110,9 +126,11 @@ _CSR = "LPWRRSTF 31, WWDGRSTF 30, IWDGRSTF 29, SFTRSTF 28, PORRSTF 27, PINRSTF 2
 class Rcc(Peripheral):
     """Reset and clock control."""
 
+    KIND = LISTENER
     HAS_BYTE_LANES = True
-    STATE = ("_ready_at", "_illegal")
+    STATE = ("_ready_at", "_illegal", "_nmi_ns", "_keeps_lsi", "crystal_works", "_shown")
     OUTPUTS = ("irq",)
+    INPUTS = ("lsi",)
     REGISTERS = (
         Register(
             name="CR",
@@ -194,6 +212,14 @@ class Rcc(Peripheral):
         self._gates = {name: (register_index[gate.register], 1 << gate.bit) for name, gate in gates.items()}
         #: When each oscillator that is starting gets ready, in the order of `OSCILLATORS`.
         self._ready_at: tuple[int | None, ...] = (None,) * len(OSCILLATORS)
+        #: Whether the crystal oscillates; `fail_crystal` breaks it.
+        self.crystal_works = True
+        #: When NMI is next raised, while CSSF is set.
+        self._nmi_ns: int | None = None
+        #: Whether IWDG keeps LSI on.
+        self._keeps_lsi = False
+        #: What MCO puts out: its source and frequency.
+        self._shown = (0, 0)
         #: What the data sheet forbids and the clocks now are: key, when it is warned of (None: it was), and by whom.
         self._illegal: tuple[tuple[str, int | None, int], ...] = ()
 
@@ -221,12 +247,18 @@ class Rcc(Peripheral):
         """Stop every oscillator but HSI."""
         self._ready_at = (None,) * len(OSCILLATORS)
         self._illegal = ()
+        self._nmi_ns = None
         self.set_output("irq", False)
 
     def advance_to(self, now_ns: int) -> None:
         """Raise the ready flags that are due."""
         while self.due_ns is not None and self.due_ns <= now_ns:
             at_ns = self.due_ns
+            if at_ns == self._nmi_ns:
+                self._nmi_ns = at_ns + NMI_AGAIN_NS
+                self.chip.signal("nmi")
+                self._schedule()
+                continue
             if at_ns not in self._ready_at:
                 self._warn_of_settings(at_ns)
                 self._schedule()
@@ -239,6 +271,73 @@ class Rcc(Peripheral):
             self._settle(at_ns)
             self._update_irq()
 
+    def line_changed(self, name: str, level: bool) -> None:
+        """Keep LSI on for IWDG."""
+        if name == "lsi":
+            self._keeps_lsi = level
+            self.words[CSR] &= ~1  # it ends with a reset, as what a program has set does
+            self._settle()
+
+    def fail_crystal(self) -> None:
+        """Break the crystal of HSE; `repair_crystal` mends it."""
+        self.crystal_works = False
+        was_ready, in_use = self.words[CR] & HSERDY, self._oscillators_in_use() & HSEON
+        if was_ready and self.words[CR] & CSSON:
+            self.words[CR] &= ~HSEON
+            if in_use:
+                self.words[CFGR] &= ~(_SW | _SW << 2)
+                self.words[CR] |= HSION | HSIRDY
+            if self.words[CFGR] & PLLSRC:
+                self.words[CR] &= ~(PLLON | PLLRDY)
+            self.words[CIR] |= CSSF
+            self._nmi_ns = self.chip.now_ns + NMI_AGAIN_NS
+            self.chip.signal("nmi")
+        elif was_ready and in_use:
+            self.chip.warn("HSE has failed under SYSCLK, and RCC_CR CSSON is 0: the core stops", once="RCC:hse")
+            self.chip.signal("no clock")
+        self._settle()
+
+    def repair_crystal(self) -> None:
+        """Mend the crystal; it starts anew where it is on."""
+        self.crystal_works = True
+        self._settle()
+
+    def set_lsi(self, frequency_hz: int) -> None:
+        """Give LSI another frequency.
+
+        Raises:
+            ValueError: It is not one that LSI can have (DS5319 table 25).
+        """
+        if not LEAST_LSI_HZ <= frequency_hz <= MOST_LSI_HZ:
+            raise ValueError(f"LSI has {LEAST_LSI_HZ} to {MOST_LSI_HZ} Hz, not {frequency_hz}")
+        self.chip.clocks.lsi_hz = frequency_hz
+        self.chip.clocks.rtcclk_hz = self._rtcclk_hz()
+        self.chip.clock_changed()
+
+    def clock_stopped(self) -> None:
+        """Put nothing out in Stop."""
+        self._show_clock(is_stopped=True)
+
+    def clock_resumed(self, stopped_ns: int) -> None:
+        """Put the clock out again."""
+        del stopped_ns
+        self._show_clock()
+
+    def stop(self) -> None:
+        """Stop HSE and PLL, and take HSI: Stop mode begins, and HSI runs when that ends (RM0008 7.3.1, 7.3.2)."""
+        self.words[CR] = self.words[CR] & ~(HSEON | HSERDY | PLLON | PLLRDY) | HSION | HSIRDY
+        self.words[CFGR] &= ~(_SW | _SW << 2)
+        self._set_ready_at(0, None)
+        self._settle()
+
+    def stand_by(self) -> None:
+        """Go to the reset state, but for the oscillators that Standby leaves running."""
+        lsi, lsi_ready = self.words[CSR] & bits(1, 0), self._ready_at[_LSI]
+        self.reset(ResetCause.STANDBY)
+        self.words[CSR] |= lsi
+        self._set_ready_at(_LSI, lsi_ready)
+        self._settle()
+
     def _write_cr(self, written: int, previous: int) -> None:
         in_use = self._oscillators_in_use() & previous & ~written
         if in_use:
@@ -249,8 +348,6 @@ class Rcc(Peripheral):
         self._settle()
 
     def _write_cfgr(self, written: int, previous: int) -> None:
-        if written & _MCO_ON:
-            self.chip.warn("RCC_CFGR: MCO, the clock on PA8, is not modelled", once="RCC:mco")
         changed = (written ^ previous) & _PLL_SETTINGS
         if changed and self.words[CR] & PLLON:
             self.words[CFGR] ^= changed
@@ -262,6 +359,9 @@ class Rcc(Peripheral):
 
     def _write_cir(self, written: int, _previous: int) -> None:
         self.words[CIR] &= ~((written >> 16) & bits(7, (4, 0)))
+        if written & CSSC:
+            self._nmi_ns = None
+            self._schedule()
         self._update_irq()
 
     def _write_apb2rstr(self, _written: int, previous: int) -> None:
@@ -270,9 +370,19 @@ class Rcc(Peripheral):
     def _write_apb1rstr(self, _written: int, previous: int) -> None:
         self._reset_peripherals(APB1ENR, self.words[APB1RSTR] & ~previous)
 
-    def _write_bdcr(self, written: int, _previous: int) -> None:
+    def _write_bdcr(self, written: int, previous: int) -> None:
+        if not self.chip.power.is_backup_open:
+            self.words[BDCR] = previous
+            self.chip.warn("RCC_BDCR: written while PWR_CR DBP is 0: ignored", once="RCC:dbp")
+            return
+        if (chosen := previous & _RTCSEL) and (written & _RTCSEL) != chosen and not written & _BDRST:
+            self.words[BDCR] = self.words[BDCR] & ~_RTCSEL | chosen
+            self.chip.warn("RCC_BDCR: RTCSEL changes only by a reset with BDRST: ignored", once="RCC:rtcsel")
         if written & _BDRST:
             self.words[BDCR] = _BDRST
+            self._settle()
+            self.chip.reset_backup_domain()
+            return
         self._settle()
 
     def _write_csr(self, written: int, _previous: int) -> None:
@@ -301,7 +411,7 @@ class Rcc(Peripheral):
     def _can_start(self, index: int) -> bool:
         """Return whether an oscillator that is on has what it needs to get ready."""
         if index == _HSE:
-            return self.hse_hz is not None
+            return self.hse_hz is not None and self.crystal_works
         if index == _PLL:
             return bool(self.words[CR] & (HSERDY if self.words[CFGR] & PLLSRC else HSIRDY))
         return True
@@ -314,6 +424,8 @@ class Rcc(Peripheral):
     def _settle(self, now_ns: int | None = None) -> None:
         """Start and stop oscillators, switch SYSCLK, and bring the clocks up to date."""
         now_ns = self.chip.now_ns if now_ns is None else now_ns
+        if self._keeps_lsi:
+            self.words[CSR] |= 1
         for index, oscillator in enumerate(OSCILLATORS):
             word = self.words[oscillator.register]
             starts = bool(word & oscillator.on) and self._can_start(index)
@@ -347,7 +459,7 @@ class Rcc(Peripheral):
 
     def _schedule(self) -> None:
         """Work out when something is next due."""
-        times = (*self._ready_at, *(due_ns for _, due_ns, _ in self._illegal))
+        times = (self._nmi_ns, *self._ready_at, *(due_ns for _, due_ns, _ in self._illegal))
         due_ns = min((at for at in times if at is not None), default=None)
         if due_ns != self.due_ns:
             self.due_ns = due_ns
@@ -362,17 +474,56 @@ class Rcc(Peripheral):
             elif not is_on and pin.holder == owner:
                 pin.release()
 
+    def _hsi_hz(self) -> int:
+        """Return what HSITRIM makes of HSI."""
+        trim = self.words[CR] >> _TRIM_AT & 0x1F
+        return HSI_HZ + (trim - _TRIM_MIDDLE) * TRIM_STEP_HZ
+
+    def _show_clock(self, *, is_stopped: bool = False) -> None:
+        """Put the clock that MCO chooses on PA8; one that does not run is low."""
+        chosen, ready = self.words[CFGR] >> _MCO_AT & 7, self.words[CR]
+        frequencies = (
+            self.chip.clocks.sysclk_hz,
+            self._hsi_hz() if ready & HSIRDY else 0,
+            self.hse_hz or 0 if ready & HSERDY else 0,
+            self._pll_hz() // 2 if ready & PLLRDY else 0,
+        )
+        frequency_hz = 0 if is_stopped or chosen < _MCO_SYSCLK else frequencies[chosen - _MCO_SYSCLK]
+        shown = chosen, frequency_hz
+        if shown == self._shown:
+            return
+        self._shown = shown
+        pin = self.chip.pins[_MCO_PIN]
+        if chosen < _MCO_SYSCLK:
+            pin.disconnect(_MCO)
+        elif frequency_hz:
+            pin.offer_wave(_MCO, 2 * frequency_hz, 2, 1)
+        else:
+            pin.connect(_MCO, level=False)
+
     def _pll_hz(self) -> int:
         cfgr = self.words[CFGR]
         factor = _PLL_FACTORS[(cfgr >> 18) & 0xF]
         if not cfgr & PLLSRC:
-            return HSI_HZ // 2 * factor
+            return self._hsi_hz() // 2 * factor
         return (self.hse_hz or 0) // (2 if cfgr & PLLXTPRE else 1) * factor
+
+    def _rtcclk_hz(self) -> int:
+        """Return the frequency of the source that RTCSEL chooses; 0 while it does not run, or without RTCEN."""
+        backup = self.words[BDCR]
+        source = (backup & _RTCSEL) >> _RTCSEL_AT if backup & _RTCEN else 0
+        hse_hz = (self.hse_hz or 0) // _RTC_HSE_DIVIDER
+        rows = ((_LSE, LSE_HZ), (_LSI, self.chip.clocks.lsi_hz), (_HSE, hse_hz))
+        if not source:
+            return 0
+        index, frequency_hz = rows[source - 1]
+        oscillator = OSCILLATORS[index]
+        return frequency_hz if self.words[oscillator.register] & oscillator.ready else 0
 
     def _update_frequencies(self) -> None:
         cfgr = self.words[CFGR]
         source = (cfgr >> 2) & 3
-        sysclk_hz = (HSI_HZ, self.hse_hz or HSI_HZ, self._pll_hz())[source]
+        sysclk_hz = (self._hsi_hz(), self.hse_hz or HSI_HZ, self._pll_hz())[source]
         hclk_hz = sysclk_hz // _AHB_DIVIDERS[(cfgr >> 4) & 0xF]
         divider1, divider2 = _APB_DIVIDERS[(cfgr >> 8) & 7], _APB_DIVIDERS[(cfgr >> 11) & 7]
         clocks = self.chip.clocks
@@ -382,5 +533,7 @@ class Rcc(Peripheral):
         clocks.adc_divider = _ADC_DIVIDERS[(cfgr >> 14) & 3]
         clocks.timer1_hz = clocks.pclk1_hz * (1 if divider1 == 1 else 2)
         clocks.timer2_hz = clocks.pclk2_hz * (1 if divider2 == 1 else 2)
+        clocks.rtcclk_hz = self._rtcclk_hz()
         if clocks.snapshot() != before:
             self.chip.clock_changed()
+        self._show_clock()

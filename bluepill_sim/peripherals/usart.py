@@ -177,7 +177,7 @@ class Usart(Peripheral):
 
     def receive(self, data: bytes) -> None:
         """Send characters to the RX pin, at the speed of the line, behind those still on their way."""
-        if not self.command(_CAN_HEAR):
+        if self.chip.power.is_stopped or not self.command(_CAN_HEAR):
             self._warn(Question.RX_OFF)
             return
         control = self.words[CR1]

@@ -4,7 +4,7 @@ Modelled: the counter from PCLK1 / 4096 with its four prescalers, the window,
 the reset as T6 falls, the early wake-up interrupt (IRQ 0). Not modelled: the
 phase of the divider (a count begins anew with each write of CR or CFR and with
 each change of PCLK1), counting before it is activated, a clock gate that stops
-it, the freeze by DBGMCU.
+it.
 
 Source: RM0008 section 20.
 Invariant: while it is active, `due_ns` is the earlier of the early wake-up and the reset.
@@ -67,6 +67,17 @@ class Wwdg(Peripheral):
         """Go on at the new PCLK1."""
         if self.is_running and self.chip.clocks.pclk1_hz != self._pclk1_hz:
             self._count_from(self._count_at(self.chip.now_ns))
+
+    def clock_stopped(self) -> None:
+        """Stand still."""
+        self.due_ns = None
+
+    def clock_resumed(self, stopped_ns: Nanos) -> None:
+        """Go on."""
+        self._base_ns += stopped_ns
+        if self.is_running:
+            count = self._count_at(self.chip.now_ns)
+            self.due_ns = self._time_of(T6 if count > T6 else T6 - 1)
 
     def on_reset(self) -> None:
         """Stop."""

@@ -1,4 +1,4 @@
-"""`python -m hardware.pcb VERB`: builds, checks, routes, fills and simulates the board.
+"""`python -m hardware.pcb VERB`: builds, checks, routes, fills, simulates and compares the board.
 
 Its pictures are made by tools/make_pictures.py.
 Exit codes: 0 done, 1 something failed, 2 wrong usage.
@@ -16,7 +16,7 @@ from hardware.pcb.circuit.design import BOARD_VARIANTS, VARIANTS
 from hardware.pcb.circuit.design import build as design_of
 from hardware.pcb.circuit.netlist import DesignError
 from hardware.pcb.layout.routing import HERE, RoutingError, run_router
-from hardware.pcb.outputs import generated_files, kicad_cli
+from hardware.pcb.outputs import difference, generated_files, kicad_cli
 from hardware.pcb.outputs.pours import KicadMissingError
 from hardware.pcb.spice.decks import decks
 from hardware.pcb.spice.page import page_text
@@ -37,6 +37,12 @@ def main(arguments: list[str] | None = None) -> int:
         one = verbs.add_parser(name, help=words)
         one.add_argument("variant", nargs="*", help=f"one of {', '.join(BOARD_VARIANTS)}; none for all")
     verbs.add_parser("simulate", help="run every circuit simulation and renew the page of their figures")
+    comparing = verbs.add_parser("diff", help="lay two boards over each other: old in red, new in green")
+    for name in ("old", "new"):
+        comparing.add_argument(name, help="a variant, a .kicad_pcb file, or REVISION:VARIANT of git")
+    comparing.add_argument(
+        "--out", type=Path, default=Path("board-diff.svg"), help="the picture (default: %(default)s)"
+    )
     given = parser.parse_args(arguments)
     try:
         return _VERBS[given.verb](given)
@@ -115,6 +121,14 @@ def _simulate(_: argparse.Namespace) -> int:
     return 1 if any(result.verdict is Verdict.BAD for result in results) else 0
 
 
+def _diff(given: argparse.Namespace) -> int:
+    old, new = difference.read_source(given.old), difference.read_source(given.new)
+    said = difference.words(old, new)
+    given.out.write_text(difference.picture(old, new, (given.old, given.new)), encoding="utf-8", newline="\n")
+    print("\n".join([*said, f"{given.out}: {'no difference' if not said else 'red is gone, green is new'}"]))
+    return 0
+
+
 def _variants(names: list[str]) -> list[str]:
     unknown = [name for name in names if name not in BOARD_VARIANTS]
     if unknown:
@@ -122,7 +136,7 @@ def _variants(names: list[str]) -> list[str]:
     return names or list(BOARD_VARIANTS)
 
 
-_VERBS = {"build": _build, "check": _check, "route": _route, "stitch": _stitch, "simulate": _simulate}
+_VERBS = {"build": _build, "check": _check, "route": _route, "stitch": _stitch, "simulate": _simulate, "diff": _diff}
 
 if __name__ == "__main__":
     sys.exit(main())

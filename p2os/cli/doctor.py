@@ -82,6 +82,9 @@ NEEDS = (
         name="robot_bench._edges", kind="built", feature="many edges at full speed",
     ),
     Need(
+        name="robot_bench._esp32", kind="built", feature="board test --emulated",
+    ),
+    Need(
         name="robot_bench._adapter_firmware", kind="built", feature="--adapter firmware",
     ),
     Need(

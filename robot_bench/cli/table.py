@@ -52,7 +52,11 @@ def print_result(result: RunResult, console: Console | None = None) -> None:
 def _hits(outcome: Mapping[str, object]) -> list[str]:
     """Return what was hit, the first few; nothing where a failed goal names it."""
     hits = cast("Sequence[Mapping[str, object]]", outcome["hits"])
-    lines = [f"{hit['what']} at {hit['t_s']:.3f} s, x {hit['x_m']:.2f} m, y {hit['y_m']:.2f} m" for hit in hits]
+    lines = [
+        f"{hit['what']} at {hit['t_s']:.3f} s, x {hit['x_m']:.2f} m, y {hit['y_m']:.2f} m"
+        + (f", by the robot's {hit['part']}" if hit["part"] else "")
+        for hit in hits
+    ]
     if any(lines[0] in failure for failure in cast("Sequence[str]", outcome["failures"]) if lines):
         return []
     left = len(lines) - LISTED_HITS

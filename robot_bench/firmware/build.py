@@ -1,6 +1,6 @@
 """Build the example programs for the BluePill: `python robot_bench/firmware/build.py [--out DIR]`.
 
-Each program is one C file with `main` beside the shared board files; the ELF
+Each program is one C file with `main`, most beside the shared board files; the ELF
 keeps its debug information with paths relative to this folder, so that the
 same compiler gives the same bytes wherever the folder lies.
 Source: gcc-arm-none-eabi of Debian 12 (12.2.rel1) built the committed files.
@@ -26,6 +26,8 @@ PROGRAMS = {
     "dodge": (*BOARD_SOURCES, "dodge.c", "dodge_fsm.c", "odometer.c"),
     # Its pins are its own: of board.c only the clock is kept.
     "rover": ("startup.c", "memory.c", "board.c", "uart.c", "rover_board.c", "rover.c"),
+    # Brings pins, clock and line of its own.
+    "board_test": ("startup.c", "memory.c", "board_test.c"),
 }
 MACHINE_FLAGS = ("-mcpu=cortex-m3", "-mthumb")
 COMPILE_FLAGS = (

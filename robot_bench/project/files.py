@@ -24,7 +24,10 @@ IGNORED = frozenset({".git"})
 #: Names that neither make nor a shell needs quotes for.
 _NAME = re.compile(r"[A-Za-z0-9_][A-Za-z0-9._-]*")
 #: File of the project → file of `template/`.
-_TEMPLATES = {"main.c": "main.c", "Makefile": "Makefile", "README.md": "README.md", ".gitignore": "gitignore"}
+_TEMPLATES = {
+    "main.c": "main.c", "Makefile": "Makefile", "README.md": "README.md", ".gitignore": "gitignore",
+    "tests/test_robot.py": "test_robot", "pytest.ini": "pytest.ini",
+}  # fmt: skip
 #: Files of the example programs, for `board/`.
 _SHIPPED = ("startup.c", "memory.c", "f103.h", "f103c8.ld")
 _HEADER = """\

@@ -17,6 +17,7 @@ from p2os.protocol.odometry import Unwrapper
 from p2os.protocol.profiles import Profile
 from p2os.protocol.sip import POSITION_MASK, SIP_KINDS, StandardSip
 from p2os.robots.parameters import RobotParameters
+from robot_bench.events.kinds import Pose
 from simbase.state import Stateful
 from simbase.timing import Nanos
 
@@ -67,22 +68,23 @@ class OdometryPose:
         #: Path over ground, metres.
         self.distance_m = 0.0
 
-    def take(self, sip: StandardSip) -> dict[str, int]:
-        """Return the pose entry of a packet."""
+    def take(self, sip: StandardSip, now: Nanos) -> Pose:
+        """Return the pose that a packet tells."""
         per_count_um = self._parameters.distance_nm_per_count / NM_PER_UM
         step = math.hypot(self._x.update(sip.raw_x), self._y.update(sip.raw_y))
         self.distance_m += step * per_count_um / 1e6
         turn = sip.raw_heading / self._parameters.angle_counts_per_turn * 2 * math.pi
         speed_um = self._parameters.velocity_um_s_per_count
-        return {
-            "x": round(self._x.total * per_count_um),
-            "y": round(self._y.total * per_count_um),
-            "z": 0,
-            "h": round(turn * 1e6),
-            "p": 0,
-            "l": sip.raw_left_velocity * speed_um,
-            "r": sip.raw_right_velocity * speed_um,
-            "la": 0,
-            "ra": 0,
-            "c": 0,
-        }
+        return Pose(
+            t=now,
+            x=round(self._x.total * per_count_um),
+            y=round(self._y.total * per_count_um),
+            z=0,
+            heading=round(turn * 1e6),
+            pitch=0,
+            left=sip.raw_left_velocity * speed_um,
+            right=sip.raw_right_velocity * speed_um,
+            left_angle=0,
+            right_angle=0,
+            collisions=0,
+        )

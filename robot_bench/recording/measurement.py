@@ -25,7 +25,7 @@ from bluepill_sim.board import BluePill
 from bluepill_sim.program.functions import FunctionTable
 from bluepill_sim.program.line_table import read_lines
 from bluepill_sim.program.static_code import StaticCode
-from robot_bench.recording.run_record import Json
+from robot_bench.events.codec import Json
 from simbase.errors import FileError
 from simbase.timing import NS_PER_S
 

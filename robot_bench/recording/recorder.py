@@ -1,10 +1,10 @@
-"""What a run writes down: pins, text, wire bytes, state logs, ranges and poses.
+"""What a bench tells of its parts: pins, text, wire bytes, state logs, ranges and poses become events.
 
-The recorder is the last follower of the loop. It samples the pose each 50 ms,
-hands the trace what has passed, and keeps the few figures that a summary needs
-and no trace holds (the clearance).
+The recorder is the last follower of the loop. It samples the pose each 50 ms, publishes what has
+happened (`robot_bench.events`), and releases it to whoever has subscribed: the trace, goals, a program.
+It keeps the few figures that a summary needs and no trace holds.
 
-Edges are written up to the instant before the one reached: at that one itself someone may
+Edges are released up to the instant before the one reached: at that one itself someone may
 still drive. So a wire's first level, too, is what it is when all of time 0 was driven.
 
 Invariant: it changes nothing that it watches.
@@ -13,23 +13,39 @@ Invariant: it changes nothing that it watches.
 import math
 from binascii import b2a_base64
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from itertools import groupby
 from typing import Protocol
 
-from bluepill_sim.fabric.subscriptions import Wave
 from p2os.pioneer.body.contract import BodyState, Hit
 from p2os.pioneer.world.model import Obstacle
-from robot_bench.recording.run_record import BLOCKS_VERSION, COLLISION
-from robot_bench.recording.trace import MOST_EDGES, TraceWriter
+from robot_bench.events.codec import EdgeBlock, Levels, line_of
+from robot_bench.events.kinds import (
+    MICRO,
+    Clearance,
+    Contact,
+    Fault,
+    Note,
+    Packet,
+    Pose,
+    Ranges,
+    Text,
+    Wave,
+    WorldChange,
+    hull_part,
+)
+from robot_bench.events.stream import EventStream
+from robot_bench.recording.trace import TraceWriter
 from robot_bench.wires.edges import Edges, pack
 from robot_bench.wires.nets import Harness, Net
 from simbase.state import Stateful
-from simbase.timing import NS_PER_MS, Nanos, Reached
+from simbase.timing import NS_PER_MS, NS_PER_S, Nanos, Reached
 
 SAMPLE_NS: Nanos = 50 * NS_PER_MS
-#: A line of text longer than this is written in pieces.
+#: chosen: a line of some 10 kB, all that a cut can cost.
+MOST_EDGES = 4096
+#: A line of text longer than this is told in pieces.
 LONGEST_TEXT = 64
-MICRO = 1_000_000
+#: The port that firmware prints on.
+CONSOLE = "usart1"
 #: Of a wire that has not changed.
 _NONE = Edges()
 _LINE_END = ord("\n")
@@ -57,18 +73,18 @@ class Observed(Protocol):
 
 
 class Recorder(Stateful):
-    """Watches the parts and fills the trace.
+    """Watches the parts and publishes what they do.
 
     Args:
-        trace: Where entries go.
+        trace: Where all of it is written.
         harness: The wires; every one is recorded.
         body: What moves; None where it is unknown.
         sample_ns: Time between two poses.
     """
 
     STATE = (
-        "trace", "min_clearance_m", "distance_m", "last_state", "last_line", "_next_sample", "_changed", "_has_levels",
-        "_text", "_sonar_mm",
+        "trace", "events", "min_clearance_m", "distance_m", "last_state", "last_line", "_next_sample", "_changed",
+        "_has_levels", "_text", "_sonar_mm", "_clearance_um",
     )  # fmt: skip
 
     def __init__(
@@ -80,6 +96,9 @@ class Recorder(Stateful):
         sample_ns: Nanos = SAMPLE_NS,
     ) -> None:
         self.trace = trace
+        #: What happens, for whoever subscribes.
+        self.events = EventStream()
+        self.events.record(trace.take)
         #: Called with (who, ns, what, detail) of each line of a part's state log.
         self.on_event: Callable[[str, Nanos, str, str], None] | None = None
         #: Brings the body to an instant before it is looked at; whoever owns the body sets it.
@@ -95,38 +114,46 @@ class Recorder(Stateful):
         self._sample_ns = sample_ns
         self._next_sample: Nanos = 0
         self._changed: dict[str, None] = {}
-        #: Whether the levels at time 0 are written: not before everything of that instant was driven.
+        #: Whether the levels at time 0 are told: not before everything of that instant was driven.
         self._has_levels = False
-        self._text = bytearray()
-        self._sonar_mm: list[int] | None = None
+        #: Port → what was sent of a line whose end has not come.
+        self._text: dict[str, bytearray] = {}
+        self._sonar_mm: tuple[int, ...] | None = None
+        self._clearance_um: int | None = None
         for net in harness:
             net.watch(self._note_change)
 
     def start(self) -> None:
-        """Have every wire's level at time 0 written once nobody can drive at that instant any more."""
+        """Have every wire's level at time 0 told once nobody can drive at that instant any more."""
         self._changed = dict.fromkeys(net.name for net in self._harness)
 
     @property
     def unfinished_text(self) -> bytes:
         """What the firmware has printed of a line whose end has not come."""
-        return bytes(self._text)
+        return bytes(self._text.get(CONSOLE, b""))
 
-    def usart(self, sent: Sequence[tuple[int, Nanos]]) -> None:
-        """Take what the chip has sent: (word, ns at the end of its stop bit), oldest first."""
+    def lines(self) -> Iterator[str]:
+        """Yield every line of the trace so far, with its end, in order; also those not yet written."""
+        yield from self.trace.lines()
+        for event in self.events.pending():
+            yield f"{line_of(event)}\n"
+
+    def usart(self, sent: Sequence[tuple[int, Nanos]], port: str = CONSOLE) -> None:
+        """Take what a port of the chip has sent: (word, ns at the end of its stop bit), oldest first."""
+        text = self._text.setdefault(port, bytearray())
         for word, at in sent:
-            self._text.append(word & 0xFF)
-            if word == _LINE_END or len(self._text) >= LONGEST_TEXT:
-                self._write_text(at)
+            text.append(word & 0xFF)
+            if word == _LINE_END or len(text) >= LONGEST_TEXT:
+                self._tell_text(port, at)
 
     def wire(self, direction: str, data: bytes, at: Nanos) -> None:
         """Take bytes that have arrived: `c2r` client to robot, `r2c` back."""
-        self.trace.add("wire", at, {"dir": direction, "hex": data.hex()})
+        self.events.publish(Packet(t=at, direction=direction, data=data))
 
     def event(self, who: str, at: Nanos, what: str, detail: str) -> None:
         """Take a line of a part's state log."""
-        self.trace.add("event", at, {"who": who, "what": what, "detail": detail})
-        if self.on_event is not None:
-            self.on_event(who, at, what, detail)
+        self.events.publish(Note(t=at, who=who, what=what, detail=detail))
+        self._log(who, at, what, detail)
 
     def listener(self, who: str) -> Callable[[Nanos, str, str], None]:
         """Return a callback for a part's state log."""
@@ -134,21 +161,25 @@ class Recorder(Stateful):
 
     def obstacle(self, op: str, name: str, at: Nanos, fields: Mapping[str, object]) -> None:
         """Take a change of the world."""
-        self.trace.add("obstacle", at, {"op": op, "name": name, **fields})
+        self.events.publish(WorldChange(t=at, op=op, name=name, fields=fields))
+
+    def fault(self, op: str, words: str, at: Nanos) -> None:
+        """Take what was made to go wrong (`inject`), what was set right (`clear`), and a firmware that `died`."""
+        self.events.publish(Fault(t=at, op=op, words=words))
 
     def sonar(self, at: Nanos, metres: Sequence[float]) -> None:
-        """Take ranges in metres, all sonar in order; written when they differ from the last."""
-        mm = [round(value * 1000) for value in metres]
+        """Take ranges in metres, all sonar in order; told when they differ from the last."""
+        mm = tuple(round(value * 1000) for value in metres)
         if mm != self._sonar_mm:
             self._sonar_mm = mm
-            self.trace.add("sonar", at, {"mm": mm})
+            self.events.publish(Ranges(t=at, mm=mm))
 
     def next_deadline(self) -> Nanos:
         """Return when the next pose is due."""
         return self._next_sample
 
     def advance_to(self, limit: Nanos) -> Reached:
-        """Sample the pose where due, and write what nobody can precede any more."""
+        """Sample the pose where due, and release what nobody can precede any more."""
         if self._next_sample <= limit:
             self.bring_to(limit)
             self._sample(limit)
@@ -157,20 +188,27 @@ class Recorder(Stateful):
         return Reached(limit)
 
     def finish(self, end: Nanos) -> None:
-        """Write everything up to `end`, a last pose and an unfinished line of text."""
-        if self._text:
-            self._write_text(end)
+        """Release everything up to `end`, a last pose and unfinished lines of text."""
+        for port, text in self._text.items():
+            if text:
+                self._tell_text(port, end)
         if self._next_sample - self._sample_ns < end:
             self._sample(end)
         self._pass(end)
 
+    def _log(self, who: str, at: Nanos, what: str, detail: str) -> None:
+        if self.on_event is not None:
+            self.on_event(who, at, what, detail)
+
     def _note_change(self, net: Net, _owner: str, _at: Nanos) -> None:
         self._changed[net.name] = None
 
-    def _write_text(self, at: Nanos) -> None:
-        self.trace.add("usart", at, {"hex": self._text.hex()})
-        self.last_line = self._text.decode("utf-8", "replace").strip()
-        self._text.clear()
+    def _tell_text(self, port: str, at: Nanos) -> None:
+        text = self._text[port]
+        self.events.publish(Text(t=at, data=bytes(text), port=port))
+        if port == CONSOLE:
+            self.last_line = text.decode("utf-8", "replace").strip()
+        text.clear()
 
     def _sample(self, at: Nanos) -> None:
         if self._body is None:
@@ -179,42 +217,65 @@ class Recorder(Stateful):
         if self.last_state is not None:
             self.distance_m += math.hypot(state.x_m - self.last_state.x_m, state.y_m - self.last_state.y_m)
         self.last_state = state
-        least = self.min_clearance_m
-        self.min_clearance_m = self._body.clearance(no_more_than=math.inf if least is None else least)
-        self.trace.add("pose", at, pose_entry(state))
+        self.events.publish(pose_of(state, at))
+        self._measure_clearance(self._body, at)
         for item in self._body.take_moved():
             self.obstacle("move", item.name, at, moved_entry(item))
         for hit in self._body.take_hits():
             # The body may have made the step that ends just after `at` already.
-            self.event("body", min(hit.at_ns, at), COLLISION, hit_detail(hit))
+            contact = contact_of(hit, state, min(hit.at_ns, at))
+            self.events.publish(contact)
+            self._log("body", contact.t, "collision", f"{contact.what} at x {hit.x_m:.3f} m, y {hit.y_m:.3f} m")
+
+    def _measure_clearance(self, body: Observed, at: Nanos) -> None:
+        """Tell the clearance where it is less than ever."""
+        least = self.min_clearance_m
+        self.min_clearance_m = found = body.clearance(no_more_than=math.inf if least is None else least)
+        if math.isfinite(found) and (um := round(found * MICRO)) != self._clearance_um:
+            self._clearance_um = um
+            self.events.publish(Clearance(t=at, um=um))
 
     def _pass(self, limit: Nanos) -> None:
-        """Write what is stamped at or before `limit`, and let the wires forget it."""
+        """Release what is stamped at or before `limit`, and let the wires forget it."""
         if not self._has_levels and limit >= 0:
             self._has_levels = True
-            self._write_levels()
-        if self._changed:
-            self._write_edges(limit)
-        self.trace.write_until(limit)
+            self._tell_levels()
+        self.events.release(limit, self._tell_edges(limit) if self._changed else None)
 
-    def _write_levels(self) -> None:
+    def _tell_levels(self) -> None:
         levels = ""
         for net in self._harness:
             net.edges_until(0)
             levels += str(int(net.level(0)))
-        names = [net.name for net in self._harness]
-        self.trace.add("pins", 0, {"v": BLOCKS_VERSION, "nets": names, "levels": levels})
+        self.events.publish(Levels(t=0, nets=tuple(net.name for net in self._harness), levels=levels))
 
-    def _write_edges(self, limit: Nanos) -> None:
+    def _tell_waves(self, net: Net) -> None:
+        """Publish how a wire's wave has changed; where it ends, one of no period."""
+        for at, wave in net.take_waves():
+            if wave is None:
+                self.events.publish(Wave(t=at, wire=net.name, at=0, period=0, high=0, ticks_hz=0))
+            else:
+                ticks = wave.at + ((at - wave.ns + 1) * wave.ticks_hz - 1) // NS_PER_S
+                self.events.publish(
+                    Wave(
+                        t=at, wire=net.name, at=ticks % wave.period, period=wave.period, high=wave.high,
+                        ticks_hz=wave.ticks_hz,
+                    )
+                )  # fmt: skip
+
+    def _tell_edges(self, limit: Nanos) -> dict[str, tuple[int, Edges]]:
+        """Publish the edges of all wires in blocks; return those that somebody wants one by one."""
         changed, self._changed = self._changed, {}
-        tracks = []
-        for net in self._harness:
+        tracks, wanted = [], {}
+        for place, net in enumerate(self._harness):
             if net.name not in changed:
                 tracks.append(_NONE)
                 continue
-            tracks.append(net.edges_until(limit))
-            for at, entry in wave_entries(net.name, net.take_waves()):
-                self.trace.add("waves", at, entry)
+            edges = net.edges_until(limit)
+            tracks.append(edges)
+            if edges and self.events.wants_edges(net.name):
+                wanted[net.name] = place, edges
+            self._tell_waves(net)
             for fight in net.take_contentions():
                 self.event(
                     "bench", fight.at, "contention", f"{net.name} is driven hard by {' and '.join(fight.owners)}"
@@ -222,21 +283,18 @@ class Recorder(Stateful):
             if net.forget_before(limit):
                 self._changed[net.name] = None
         for first, count, block in pack(tracks, MOST_EDGES):
-            self.trace.add("pins", first, {"n": count, "d": b2a_base64(block, newline=False).decode("ascii")})
+            data = b2a_base64(block, newline=False).decode("ascii")
+            self.events.publish(EdgeBlock(t=first, count=count, data=data))
+        return wanted
 
 
-def wave_entries(net: str, rows: Sequence[tuple[Nanos, Wave | None]]) -> Iterator[tuple[Nanos, dict[str, object]]]:
-    """Yield the lines of a net's waves and when each begins: the rows that share a clock are one."""
-    for (hz, ns), part in groupby(rows, lambda row: (0, 0) if row[1] is None else (row[1].ticks_hz, row[1].ns)):
-        some = list(part)
-        changes = [[at, *((wave.at, wave.period, wave.high) if wave else ())] for at, wave in some]
-        yield some[0][0], {"net": net, "hz": hz, "ns": ns, "rows": changes}
-
-
-def hit_detail(hit: Hit) -> str:
-    """Return what was hit, and where, in one line."""
-    what = repr(hit.name) if hit.name else "something"
-    return f"{what} at x {hit.x_m:.3f} m, y {hit.y_m:.3f} m"
+def contact_of(hit: Hit, state: BodyState, at: Nanos) -> Contact:
+    """Return a collision as an event: to a micrometre, and with the part of the hull by where the robot is now."""
+    bearing = math.atan2(hit.y_m - state.y_m, hit.x_m - state.x_m) - state.heading_rad
+    return Contact(
+        t=at, what=repr(hit.name) if hit.name else "something", part=hull_part(bearing),
+        x_m=round(hit.x_m * MICRO) / MICRO, y_m=round(hit.y_m * MICRO) / MICRO,
+    )  # fmt: skip
 
 
 def moved_entry(item: Obstacle) -> dict[str, object]:
@@ -244,17 +302,18 @@ def moved_entry(item: Obstacle) -> dict[str, object]:
     return {"x": round(item.x_m, 6), "y": round(item.y_m, 6), "heading": round(item.heading_rad, 6)}
 
 
-def pose_entry(state: BodyState) -> dict[str, int]:
+def pose_of(state: BodyState, at: Nanos) -> Pose:
     """Return a body's state in the integers of the trace."""
-    return {
-        "x": round(state.x_m * MICRO),
-        "y": round(state.y_m * MICRO),
-        "z": round(state.z_m * MICRO),
-        "h": round(state.heading_rad * MICRO),
-        "p": round(state.pitch_rad * MICRO),
-        "l": round(state.left_speed_mps * MICRO),
-        "r": round(state.right_speed_mps * MICRO),
-        "la": round(state.left_angle_rad * MICRO),
-        "ra": round(state.right_angle_rad * MICRO),
-        "c": state.collisions,
-    }
+    return Pose(
+        t=at,
+        x=round(state.x_m * MICRO),
+        y=round(state.y_m * MICRO),
+        z=round(state.z_m * MICRO),
+        heading=round(state.heading_rad * MICRO),
+        pitch=round(state.pitch_rad * MICRO),
+        left=round(state.left_speed_mps * MICRO),
+        right=round(state.right_speed_mps * MICRO),
+        left_angle=round(state.left_angle_rad * MICRO),
+        right_angle=round(state.right_angle_rad * MICRO),
+        collisions=state.collisions,
+    )

@@ -11,8 +11,9 @@ from itertools import pairwise
 from pathlib import Path
 from typing import cast
 
-from bluepill_sim.fabric.subscriptions import Wave
-from robot_bench.recording.run_record import Json, RunRecord
+from robot_bench.events.codec import Json
+from robot_bench.events.kinds import Wave
+from robot_bench.recording.run_record import RunRecord
 from simbase.timing import NS_PER_S
 
 #: Side of the cells that a run's coverage is counted in, metres.
@@ -68,7 +69,7 @@ def figures(record: RunRecord) -> list[tuple[str, str]]:
         ("distance", f"{distance_m(record):.2f} m"),
         ("cells of 0.5 m entered", f"{cells_entered(record)}"),
         ("collisions", f"{record.poses[-1].collisions if record.poses else 0}"),
-        *((f"collision {number}", str(hit)) for number, hit in enumerate(record.collisions()[:LISTED_HITS], 1)),
+        *((f"collision {number}", str(hit)) for number, hit in enumerate(record.contacts[:LISTED_HITS], 1)),
     ]
     clearance = record.end.get("min_clearance_m")
     if isinstance(clearance, (int, float)):
@@ -99,7 +100,8 @@ def outcome_of(record: RunRecord) -> Json:
     result.update((key, end.get(key)) for key in _FROM_END)
     result.update((key, end[key]) for key in MEASURED if key in end)
     result["hits"] = [
-        {"t_s": hit.t / NS_PER_S, "what": hit.what, "x_m": hit.x, "y_m": hit.y} for hit in record.collisions()
+        {"t_s": hit.t / NS_PER_S, "what": hit.what, "x_m": hit.x_m, "y_m": hit.y_m, "part": hit.part}
+        for hit in record.contacts
     ]
     lines = [line for _, line in record.usart_lines()]
     result["usart_lines"], result["usart_last"] = len(lines), lines[-1] if lines else None

@@ -1,79 +1,52 @@
 """The trace of a run: one JSON object a line, in order of time, with a hash.
 
-Line 1 is `meta`, the last one `end`; neither is hashed. Between them stand
-canonical lines (sorted keys, no spaces) that hold integers, levels and bytes
-only: no path, version, host or wall time. `t` is nanoseconds.
-
-    {"k":"pins","v":1,"nets","levels"}   at 0: the wires in the order of the blocks, and the level of each, 0 or 1
-    {"k":"pins","n","d"}                 a block of n edges, the first at t: base64 of what wires/edges.py describes
-    {"k":"waves","net","hz","ns","rows"} changes of a net's wave, a row each: [t, at, period, high] (`Wave`), or [t]
-                                         where it ends; in the blocks the level is 0 during a wave
-    {"k":"usart","hex"}                  a line (or 64 bytes) that the chip has printed
-    {"k":"wire","dir","hex"}             bytes that have arrived: c2r client to robot, r2c back
-    {"k":"obstacle","op","name",…}       something placed, moved or removed; lengths in metres
-    {"k":"event","who","what","detail"}  a state log: adapter, pioneer, direct, body, chip, bench
-    {"k":"sonar","mm":[…]}               ranges, all sonar, when new
-    {"k":"pose","x","y","z","h","p","l","r","la","ra","c"}   µm, µrad, µm/s, collisions; each 50 ms
-
-A block holds what has changed between two poses, or the first or next `MOST_EDGES` of it. It stands
-at the time of its first edge; so what came before its last one may follow it. A trace of before
-there were blocks has {"k":"pin","net","v"} for each level, first at 0 for every net; it is read too.
+Line 1 is `meta`, the last one `end`. Between them stand the run's events, as `robot_bench.events.codec`
+spells them: integers, levels and bytes, no path, version, host or wall time.
 
 The hash is a chain: 32 zero bytes, then for each line SHA-256 of the hash so far and the
-line with its line end. So it is a value that can be saved, and a run goes on from any line.
+line with its line end. So it is a value that can be saved, and a run goes on from any line. Of the first and
+the last line and of verdicts it knows nothing: they tell what was made of a run, not what happened.
 
-Parts report in any order; the writer sorts by time, then by kind, then
-by the order of telling. It writes only what nobody can precede any more.
+A line is the frame: it was written whole where its line end is there. What was flushed is the operating
+system's, and is readable after this process was killed; what was being written ends within a line.
 
-Invariant: the same run gives the same bytes, whatever the slices of the loop;
-what was flushed is readable after the process was killed.
+Invariant: the same run gives the same bytes, whatever the slices of the loop.
 """
 
 import contextlib
 import hashlib
 import io
 import json
-import operator
-from bisect import bisect_right
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import IO
 
-from p2os.errors import LocalProtocolError, RunFailedError
+from p2os.errors import RunFailedError
+from robot_bench.events.codec import TRACE_VERSION, Recorded, line_of
+from robot_bench.events.kinds import Verdict
 from simbase.errors import FileError
 from simbase.state import Stateful
 from simbase.timing import NS_PER_S, Nanos
 
-#: chosen: a line of some 10 kB, all that a cut can cost.
-MOST_EDGES = 4096
-
-#: Order of kinds within one instant.
-RANKS = {"pins": 0, "waves": 1, "usart": 2, "obstacle": 3, "wire": 4, "event": 5, "sonar": 6, "pose": 7}
-
-_encode = json.JSONEncoder(sort_keys=True, separators=(",", ":"), ensure_ascii=True).encode
-
 #: A line's content.
 Entry = Mapping[str, object]
-
-
 #: The hash of no line at all.
 EMPTY_HASH = bytes(32)
-
-
-def canonical(entry: Entry) -> str:
-    """Return the one spelling of an entry, without its line end."""
-    return _encode(entry)
+#: How a line begins that is not hashed; no other begins with its kind.
+_UNHASHED = '{"k": "'
 
 
 def chained(digest: bytes, lines: Iterable[str]) -> bytes:
-    """Return the hash after more lines, each with its line end."""
+    """Return the hash after more lines, each with its line end; verdicts, first and last line are passed over."""
     for line in lines:
+        if line.startswith(_UNHASHED):
+            continue
         digest = hashlib.sha256(digest + line.encode("latin-1")).digest()
     return digest
 
 
 class TraceWriter(Stateful):
-    """Sorts, writes and hashes the entries of a run.
+    """Writes and hashes the events of a run.
 
     A snapshot says where the trace stands: of one in memory it has the text, of a file the length. Restoring takes
     back what was written since; the file must still begin with what was in it then.
@@ -86,7 +59,7 @@ class TraceWriter(Stateful):
         FileError: The file cannot be written.
     """
 
-    STATE = ("_pending", "_sequence", "_written_until", "_flushed_second", "_hash", "has_meta", "has_end", "written")
+    STATE = ("_flushed_second", "_hash", "has_meta", "has_end", "written")
     #: The disk's trouble is this process's own.
     DERIVED = ("_failure", "_length")
 
@@ -100,9 +73,6 @@ class TraceWriter(Stateful):
             except OSError as error:
                 raise FileError(f"cannot write {path}: {error.strerror}") from error
         self._hash = EMPTY_HASH
-        self._pending: list[tuple[Nanos, int, int, str]] = []
-        self._sequence = 0
-        self._written_until: Nanos = -1
         self._flushed_second = -1
         #: Why nothing can be written any more.
         self._failure: RunFailedError | None = None
@@ -125,48 +95,39 @@ class TraceWriter(Stateful):
             RunFailedError: The disk is full or gone.
         """
         with self._writing() as file:
-            self._write(json.dumps({"k": "meta", **entry}) + "\n")
+            self._write(json.dumps({"k": "meta", "trace": TRACE_VERSION, **entry}) + "\n")
             file.flush()
         self.has_meta = True
 
-    def add(self, kind: str, at: Nanos, entry: Entry) -> None:
-        """Take an entry of `kind` stamped `at`.
-
-        Raises:
-            LocalProtocolError: Entries of that time were already written.
-        """
-        if at <= self._written_until:
-            raise LocalProtocolError(f"a {kind} entry at {at} ns comes after {self._written_until} ns was written")
-        self._sequence += 1
-        self._pending.append((at, RANKS[kind], self._sequence, canonical({"k": kind, "t": at, **entry})))
-
-    def write_until(self, limit: Nanos) -> None:
-        """Write everything stamped at or before `limit`; flush at each virtual second.
+    def take(self, events: Sequence[Recorded], limit: Nanos) -> None:
+        """Write the events up to and including `limit`; flush at each virtual second.
 
         Raises:
             RunFailedError: The disk is full or gone; so it is from then on.
         """
         with self._writing() as file:
-            if self._pending:
-                self._pending.sort()
-                count = bisect_right(self._pending, limit, key=operator.itemgetter(0))
-                lines = [line + "\n" for *_, line in self._pending[:count]]
+            if events:
+                lines = [_spelled(event) for event in events]
                 self._write("".join(lines))
                 self._hash = chained(self._hash, lines)
-                del self._pending[:count]
-            self._written_until = max(self._written_until, limit)
             second = limit // NS_PER_S
             if second != self._flushed_second:
                 self._flushed_second = second
                 file.flush()
 
-    @property
-    def written_until(self) -> Nanos:
-        """Return up to when everything is written; -1 before the first."""
-        return self._written_until
+    def copy(self, lines: Iterable[str]) -> None:
+        """Write the lines of another trace, its first and last one left out.
+
+        Raises:
+            RunFailedError: The disk is full or gone.
+        """
+        kept = [line for line in lines if not line.startswith((_UNHASHED + "meta", _UNHASHED + "end"))]
+        with self._writing():
+            self._write("".join(kept))
+            self._hash = chained(self._hash, kept)
 
     def lines(self) -> Iterator[str]:
-        """Yield every line that was reported so far, with its end, in order; also those not yet written.
+        """Yield every line that was written so far, with its end.
 
         Raises:
             RunFailedError: The disk is full or gone.
@@ -175,14 +136,12 @@ class TraceWriter(Stateful):
         self.flush()
         if self.path is None:
             yield from io.StringIO(self.text)
-        else:
-            try:
-                with self.path.open(encoding="utf-8", errors="replace") as lines:
-                    yield from lines
-            except OSError as error:
-                raise FileError(f"cannot read {self.path}: {error.strerror}") from error
-        for _at, _rank, _order, line in sorted(self._pending):
-            yield f"{line}\n"
+            return
+        try:
+            with self.path.open(encoding="utf-8", errors="replace") as lines:
+                yield from lines
+        except OSError as error:
+            raise FileError(f"cannot read {self.path}: {error.strerror}") from error
 
     def flush(self) -> None:
         """Have all that was written so far in the file, for whoever reads it now.
@@ -194,7 +153,7 @@ class TraceWriter(Stateful):
             file.flush()
 
     def end(self, entry: Entry) -> None:
-        """Write the last line and close the file; entries later than what was written are dropped.
+        """Write the last line and close the file.
 
         Raises:
             RunFailedError: The disk is full or gone.
@@ -258,9 +217,14 @@ class TraceWriter(Stateful):
             raise FileError("the trace that this run has begun is in a file, and this writer has none")
         self.flush()
         text = self.path.read_bytes()[:length].decode("latin-1")
-        lines = text.splitlines(keepends=True)[self.has_meta :]
-        if len(text) < length or chained(EMPTY_HASH, lines[: len(lines) - self.has_end]) != self._hash:
+        if len(text) < length or chained(EMPTY_HASH, text.splitlines(keepends=True)) != self._hash:
             raise FileError(
                 f"{self.path} is not the trace that this run has begun",
                 hint="put the file back as it was, or run the scenario anew",
             )
+
+
+def _spelled(event: Recorded) -> str:
+    """Return the line of an event, with its end; an unhashed one begins with its kind."""
+    line = line_of(event)
+    return json.dumps({"k": "verdict", **json.loads(line)}) + "\n" if isinstance(event, Verdict) else line + "\n"

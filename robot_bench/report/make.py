@@ -18,7 +18,8 @@ import json
 from dataclasses import dataclass
 from pathlib import Path
 
-from robot_bench.recording.run_record import Json, RunRecord, read_run
+from robot_bench.events.codec import Json
+from robot_bench.recording.run_record import RunRecord, read_run
 from robot_bench.recording.summary import write_outcome
 from robot_bench.recording.waveforms import write_sigrok, write_vcd
 from robot_bench.report.page import page_data, render_page

@@ -8,13 +8,13 @@ from p2os.protocol.frames import Decoder, Frame
 from p2os.protocol.packets import Identity, RawPacket, read_packet
 from p2os.protocol.profiles import Profile
 from p2os.protocol.sip import StandardSip
-from robot_bench.recording.run_record import WireChunk
+from robot_bench.events.kinds import Packet
 
 #: The numbers that mean something else until the session is open.
 SYNCS = {0: "SYNC0 / PULSE", 1: "SYNC1 / OPEN", 2: "SYNC2 / CLOSE"}
 
 
-def describe(chunk: WireChunk) -> list[tuple[str, str]]:
+def describe(chunk: Packet) -> list[tuple[str, str]]:
     """Return (name, meaning) of each frame in a chunk, and of what is no frame.
 
     A recording holds whole frames a chunk; what a fault has cut is shown as noise.

@@ -11,7 +11,9 @@ from importlib.resources import files
 from string import Template
 from typing import cast
 
-from robot_bench.recording.run_record import COLLISION, Json, RunRecord
+from robot_bench.events.codec import Json
+from robot_bench.events.kinds import WorldChange
+from robot_bench.recording.run_record import RunRecord
 from robot_bench.recording.signals import grouped, levels_and_duties, motor_steps, pin_labels
 from robot_bench.recording.summary import MEASURED, figures, verdict
 from robot_bench.report.packets import describe
@@ -28,6 +30,8 @@ ROW_BYTES, PACKET_BYTES = 24, 130
 PIN_BUCKETS = 500
 MOST_MOVES = 2000
 MOST_HITS = 500
+#: What the state log calls a contact.
+_COLLISION = "collision"
 
 
 def render_page(record: RunRecord, drawn: Json) -> str:
@@ -59,7 +63,7 @@ def page_data(record: RunRecord) -> Json:
     step = float(cast("float", record.meta.get("step_mps") or DEFAULT_STEP_MPS))
     obstacles = [_obstacle(item) for item in cast("list[Json]", world.get("obstacles") or [])]
     changes, poses = _changes(record, left_out), _poses(record, left_out)
-    hits = [(_seconds(hit.t), hit.x, hit.y, hit.what) for hit in record.collisions()[:MOST_HITS]]
+    hits = [(_seconds(hit.t), hit.x_m, hit.y_m, hit.what) for hit in record.contacts[:MOST_HITS]]
     extent = cast("list[float]", world.get("extent") or [-3, -3, 3, 3])
     duration = max(_seconds(record.last_ns), 1e-6)
     return {
@@ -84,16 +88,15 @@ def page_data(record: RunRecord) -> Json:
 
 def _changes(record: RunRecord, left_out: list[str]) -> list[Json]:
     """Return the changes of the world; of what walks or is pushed on and on, the last place in each bucket of time."""
-    moves = sum(item.get("op") == "move" for item in record.obstacles)
-    width = 0 if moves <= MOST_MOVES else record.last_ns * len({item["name"] for item in record.obstacles}) / MOST_MOVES
-    kept: dict[object, Json] = {}
-    for number, item in enumerate(record.obstacles):
-        at = cast("int", item["t"])
-        is_thinned = width and item.get("op") == "move"
-        kept[(item["name"], int(at / width)) if is_thinned else number] = item
-    _note(left_out, "moves of things", len(kept), len(record.obstacles), "in each")
-    ordered = sorted(kept.values(), key=lambda item: cast("int", item["t"]))
-    return [_obstacle({**item, "t": _seconds(cast("int", item["t"]))}) for item in ordered]
+    moves = [change.name for change in record.changes if change.op == "move"]
+    names = {change.name for change in record.changes}
+    width = 0 if len(moves) <= MOST_MOVES else record.last_ns * len(names) / MOST_MOVES
+    kept: dict[object, WorldChange] = {}
+    for number, change in enumerate(record.changes):
+        kept[(change.name, int(change.t / width)) if width and change.op == "move" else number] = change
+    _note(left_out, "moves of things", len(kept), len(record.changes), "in each")
+    ordered = sorted(kept.values(), key=lambda change: change.t)
+    return [_obstacle({"op": item.op, "name": item.name, **item.fields, "t": _seconds(item.t)}) for item in ordered]
 
 
 def _poses(record: RunRecord, left_out: list[str]) -> list[list[float]]:
@@ -140,12 +143,15 @@ def _drawn(record: RunRecord, net: str) -> Sequence[tuple[int, float]]:
 
 def _events(record: RunRecord, left_out: list[str]) -> list[list[object]]:
     """Return the state log: its beginning, its end, and every collision of those shown on the map."""
-    events = record.events
-    head, tail = ends([len(e.who) + len(e.what) + len(e.detail) + ROW_BYTES for e in events], LIST_BYTES)
+    events = [(e.t, e.who, e.what, e.detail) for e in record.events]
+    events += [(fault.t, "fault", fault.op, fault.words) for fault in record.faults]
+    events += [(hit.t, "body", _COLLISION, hit.place) for hit in record.contacts]
+    events.sort(key=lambda event: event[0])
+    head, tail = ends([len(who) + len(what) + len(detail) + ROW_BYTES for _, who, what, detail in events], LIST_BYTES)
     shown = {*range(head), *range(len(events) - tail, len(events))}
-    shown |= set([n for n, e in enumerate(events) if e.what == COLLISION][:MOST_HITS])
+    shown |= set([n for n, event in enumerate(events) if event[2] == _COLLISION][:MOST_HITS])
     _note(left_out, "state log", len(shown), len(events), "lines, from the beginning and the end")
-    return [[_seconds(e.t), e.who, e.what, e.detail] for n, e in enumerate(events) if n in shown]
+    return [[_seconds(t), *words] for n, (t, *words) in enumerate(events) if n in shown]
 
 
 def _usart(record: RunRecord, left_out: list[str]) -> list[list[object]]:

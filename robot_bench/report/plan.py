@@ -14,7 +14,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 
 from p2os.pioneer.world.drawing import grid_step
-from robot_bench.recording.run_record import Json
+from robot_bench.events.codec import Json
 
 #: Width of the drawn world that the two label lists are made for: page or PNG, and telephone; pixels.
 WIDE_PX, NARROW_PX = 690, 320

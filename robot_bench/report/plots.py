@@ -15,7 +15,7 @@ from matplotlib.patheffects import withStroke
 from matplotlib.ticker import MultipleLocator
 from matplotlib.transforms import Affine2D
 
-from robot_bench.recording.run_record import Json
+from robot_bench.events.codec import Json
 from robot_bench.report.plan import things_at_the_end
 
 LEFT, RIGHT, WALL, BOX, FLOOR, HIT = "#1b6ca8", "#c8553d", "#4a5560", "#b9a66b", "#dfe3d8", "#b00020"

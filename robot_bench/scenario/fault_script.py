@@ -5,8 +5,9 @@
     fault = "sonar-stuck 3 1.2"
     for_s = 2.0                  # then it is cleared; without it stays
 
-The words are those of `p2os.pioneer.controller.faults`. They act on the robot's controller,
-so they need mode B; which bits a noisy line turns is decided by the scenario's seed.
+The words are those of `p2os.pioneer.controller.faults`, and `link-down`: both directions of the P2OS line are
+broken. They act on the robot's controller and its line, so they need mode B; which bits a noisy line turns is decided
+by the scenario's seed.
 
 Invariant: a fault at t affects everything that happens after t, and
 nothing that happened up to t.
@@ -24,6 +25,8 @@ from robot_bench.scenario.timeline import Timeline
 from simbase.errors import UsageError
 from simbase.timing import NS_PER_S, Nanos
 
+#: The fault of the line itself.
+LINK_DOWN = "link-down"
 KEYS = (
     Key(name="at_s", kind="number", required=True, least=0, most=LONGEST_S),
     Key(name="fault", kind="text", required=True),
@@ -50,15 +53,17 @@ def load_faults(tables: Sequence[Table], parameters: RobotParameters, where: Whe
         place = within(where, "fault", number)
         check_table(table, KEYS, place)
         words = str(table["fault"])
-        try:
-            fault = read_fault(words, sonar=parameters.sonar_fitted)
-        except UsageError as error:
-            raise ScenarioError(f"{place}: {error}", hint=error.hint) from error
+        name = words
+        if words != LINK_DOWN:
+            try:
+                name = read_fault(words, sonar=parameters.sonar_fitted).name
+            except UsageError as error:
+                raise ScenarioError(f"{place}: {error}", hint=error.hint) from error
         at = _nanos(table, "at_s")
         found.append(FaultChange(at, f"fault {words}"))
         if "for_s" in table:
-            if fault.name in MOMENTARY:
-                raise ScenarioError(f"{place}: for_s, but {fault.name} happens once", hint="leave for_s out")
+            if name in MOMENTARY:
+                raise ScenarioError(f"{place}: for_s, but {name} happens once", hint="leave for_s out")
             found.append(FaultChange(at + _nanos(table, "for_s"), f"clear {words}"))
     return tuple(sorted(found, key=lambda change: change.at))
 

@@ -28,10 +28,12 @@ from p2os.pioneer.world.start_places import refuse_start
 from p2os.robots.parameters import RobotParameters, load_parameters
 from p2os.toml_file import TomlSource, is_file, read_toml, read_user_text
 from robot_bench.direct.robot import DirectSettings
-from robot_bench.scenario import fault_script, world_script
+from robot_bench.scenario import fault_script, when_script, world_script
 from robot_bench.scenario.fault_script import FaultChange, load_faults
-from robot_bench.scenario.goals import KINDS, Goal, load_goal
+from robot_bench.scenario.goals.judging import Goal, load_goal
+from robot_bench.scenario.goals.kinds import KINDS
 from robot_bench.scenario.schema import LONGEST_S, Key, Place, Table, Where, check_table, in_range, nearest, within
+from robot_bench.scenario.when_script import When, load_whens
 from robot_bench.scenario.wired_robots import OwnRobot, find_own_robot, known_own_robots, load_own_robot
 from robot_bench.scenario.world_script import Change, load_changes, refuse_names
 from simbase.errors import FileError, UsageError, shown, shown_name
@@ -41,7 +43,10 @@ MODES = ("direct", "adapter")
 #: What runs in the adapter's place: the Python model, or the firmware's C++ core.
 ADAPTER_CORES = ("model", "firmware")
 
+#: Of the schema of scenario files.
+SCHEMA_VERSION = 1
 _TOP = (
+    Key(name="version", kind="whole", least=1, most=SCHEMA_VERSION),
     Key(name="description", kind="text"),
     Key(name="firmware", kind="text", required=True),
     Key(name="world", kind="text", required=True),
@@ -60,6 +65,7 @@ _TOP = (
     Key(name="in_world", kind="table"),
     Key(name="obstacle", kind="tables"),
     Key(name="fault", kind="tables"),
+    Key(name="when", kind="tables"),
     Key(name="goal", kind="tables"),
 )
 _START = (
@@ -105,7 +111,8 @@ TABLES: Mapping[str, tuple[Key, ...]] = {
     "[in_world.NAME]": _IN_WORLD,
     "[[obstacle]]": world_script.KEYS,
     "[[fault]]": fault_script.KEYS,
-    "[[goal]]": tuple(key for kind in KINDS.values() for key in kind.keys),
+    "[[when]]": tuple(key for key in when_script.KEYS if key not in world_script.KEYS),
+    **{f"[[goal]] {name}": kind.keys for name, kind in KINDS.items()},
 }
 
 
@@ -164,6 +171,7 @@ class Scenario:
     controller: ControllerSettings = field(default_factory=ControllerSettings)
     changes: tuple[Change, ...] = ()
     faults: tuple[FaultChange, ...] = ()
+    whens: tuple[When, ...] = ()
     goals: tuple[Goal, ...] = ()
     #: World → what is otherwise there.
     in_world: Mapping[str, Table] = field(default_factory=dict)
@@ -321,6 +329,7 @@ def _build(table: Table, text: str, path: Path, where: Place, firmware: Path | N
         controller=_controller(cast("Table", table.get("controller", {})), path, where),
         changes=changes,
         faults=load_faults(cast("list[Table]", table.get("fault", [])), parameters, where),
+        whens=load_whens(cast("list[Table]", table.get("when", [])), parameters, where),
         goals=tuple(goals),
         in_world=in_world,
         where=where,

@@ -30,12 +30,27 @@ class Timeline(Stateful, Generic[T]):
         apply: Makes one change.
     """
 
-    STATE = ("_done",)
+    STATE = ("_changes", "_done")
 
     def __init__(self, changes: Sequence[T], apply: Callable[[T], None]) -> None:
         self._changes = tuple(sorted(changes, key=lambda change: change.at))
         self._apply_change = apply
         self._done = 0
+
+    def add(self, *changes: T, now: Nanos = -1) -> None:
+        """Take more changes, and make those that are due by `now`.
+
+        Raises:
+            P2osError: One that is due cannot be made; none of them will be.
+        """
+        kept = self._changes
+        done, left = kept[: self._done], kept[self._done :]
+        self._changes = (*done, *sorted((*left, *changes), key=lambda change: change.at))
+        try:
+            self.advance_to(now)
+        except BaseException:
+            self._changes = kept
+            raise
 
     def next_deadline(self) -> Nanos | None:
         """Return when the next change is due."""

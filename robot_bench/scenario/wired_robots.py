@@ -22,7 +22,7 @@ from robot_bench.direct.wired import AnalogPin, RobotWire
 from robot_bench.scenario.differential_file import load_differential
 from robot_bench.scenario.schema import Place, Table, Where, nearest, within
 from robot_bench.wires.nets import Harness
-from simbase.errors import shown, shown_name
+from simbase.errors import UsageError, shown, shown_name
 from simbase.timing import Nanos, Reached
 
 #: Pins that the ADC can measure on this package.
@@ -86,6 +86,18 @@ class OwnRobot:
 
     kind: str
     robot: WiredRobot
+
+    def wire_named(self, name: str) -> str:
+        """Return the name of a wire that has a level, by itself or by the BluePill's pin.
+
+        Raises:
+            UsageError: There is no such wire.
+        """
+        wires = {wire.pin: wire.name for wire in self.robot.signals if not wire.is_analog}
+        wires |= {wire: wire for wire in wires.values()}
+        if name not in wires:
+            raise UsageError(f"there is no wire {shown(name)}", hint=nearest(name, wires))
+        return wires[name]
 
     def build(self, body: RobotBody, harness: Harness, analog_pin: Callable[[str], AnalogPin]) -> WiredPart:
         """Return the part of the bench."""

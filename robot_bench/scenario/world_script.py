@@ -105,8 +105,12 @@ DEFAULT_FRICTION, DEFAULT_SPEED_MPS = 0.5, 0.5
 _SIZES = {"box": ("length_m", "width_m", "height_m"), "cylinder": ("radius_m", "height_m")}
 
 
-def load_changes(tables: list[Table], parameters: RobotParameters, where: Where) -> tuple[Change, ...]:
+def load_changes(
+    tables: list[Table], parameters: RobotParameters, where: Where, *, are_later: bool = False
+) -> tuple[Change, ...]:
     """Return the changes that a scenario's `[[obstacle]]` tables ask for, in order of time.
+
+    With `are_later` the tables are not all: things may have been placed before.
 
     Raises:
         ScenarioError: A table breaks the schema, or asks for what cannot be.
@@ -117,7 +121,8 @@ def load_changes(tables: list[Table], parameters: RobotParameters, where: Where)
         check_table(table, KEYS, place)
         changes += _changes(table, parameters, str(place))
     changes.sort(key=lambda change: change.at)
-    _check_names(changes)
+    if not are_later:
+        _check_names(changes)
     return tuple(changes)
 
 

@@ -31,12 +31,14 @@ class Arrival:
 class SerialLine(Stateful):
     """Carries messages one way at a fixed speed in bit/s."""
 
-    STATE = ("_time", "_under_way", "_arrived")
+    STATE = ("is_cut", "_time", "_under_way", "_arrived")
 
     def __init__(self, baud: int = DEFAULT_BAUD) -> None:
         if baud <= 0:
             raise LocalProtocolError(f"a serial line needs a positive speed, got {baud} bit/s")
         self.baud = baud
+        #: Whether it is broken: what is sent and what would arrive meanwhile is lost.
+        self.is_cut = False
         self._time = LineTime(baud)
         self._under_way: deque[Arrival] = deque()
         self._arrived: list[Arrival] = []
@@ -51,7 +53,8 @@ class SerialLine(Stateful):
         if not data:
             return
         self._time = self._time.sent(len(data), now)
-        self._under_way.append(Arrival(self.free_at, bytes(data)))
+        if not self.is_cut:
+            self._under_way.append(Arrival(self.free_at, bytes(data)))
 
     def take_arrived(self) -> list[Arrival]:
         """Return the messages that have arrived, oldest first, and forget them."""
@@ -65,5 +68,7 @@ class SerialLine(Stateful):
     def advance_to(self, limit: Nanos) -> Reached:
         """Deliver what has arrived by `limit`."""
         while self._under_way and self._under_way[0].at <= limit:
-            self._arrived.append(self._under_way.popleft())
+            arrival = self._under_way.popleft()
+            if not self.is_cut:
+                self._arrived.append(arrival)
         return Reached(limit)

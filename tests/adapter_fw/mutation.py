@@ -43,6 +43,8 @@ SIDES = {"model": MODEL, "firmware": FIRMWARE}
 LIVES, LIFE_LIMIT_S = 120, 20
 #: Modules of which others than the adapter use a part: their own tests are asked too.
 OWN_TESTS = {"adapter_sim.codec": "tests/adapter_sim/test_adapter_codec.py"}
+#: The same on the firmware's side: what no life exercises.
+UNITS = "adapter_fw/selftest/units.cpp"
 #: Operators of cosmic-ray that change no arithmetic or order: what they break is found by the type check.
 LEFT_OUT = ("RemoveDecorator", "ExceptionReplacer", "VariableReplacer", "VariableInserter", "KeywordReplacer")
 COMPILE = ("g++", "-std=c++17", "-O1", "-fPIC", "-w", "-fno-exceptions", "-fno-rtti")
@@ -154,7 +156,21 @@ class Judge:
             words = ["--library", str(self._library(mutant))]
         command = [sys.executable, "-m", "tests.adapter_fw.mutation", "live", *words]
         done = subprocess.run(command, cwd=ROOT, capture_output=True, check=False)
+        if done.returncode == 0 and not mutant.path.endswith(".py"):
+            return self._units_notice(mutant)
         return {0: False, IMPORT_FAILED: None}.get(done.returncode, True)
+
+    def _units_notice(self, mutant: Mutant) -> bool:
+        """Tell whether the checks of single parts notice it: codes over a restart, gaps, a client without adapter."""
+        program = self.folder / "units"
+        sources = [str(path.relative_to(ROOT)) for path in (ROOT / "adapter_fw" / "core").rglob("*.cpp")]
+        others = [self._object(path) for path in (*sources, UNITS) if path != mutant.path]
+        subprocess.run(["g++", str(self.folder / "mutant.s"), *map(str, others), "-o", str(program)], check=True)
+        try:
+            done = subprocess.run([program], capture_output=True, check=False, timeout=LIFE_LIMIT_S)
+        except subprocess.TimeoutExpired:
+            return True
+        return done.returncode != 0
 
     def _assembled(self, path: str, text: str) -> str | None:
         done = subprocess.run(
@@ -219,7 +235,7 @@ def live(module: str | None, file: str | None, library: str | None) -> int:
         boundaries.Life(seed).live()
     signal.alarm(0)
     own = OWN_TESTS.get(module or "")
-    return 0 if own is None else pytest.main(["-q", "-x", "--no-cov", "-p", "no:cacheprovider", own])
+    return 0 if own is None else pytest.main(["-q", "-x", "-p", "no:cacheprovider", own])
 
 
 def _replace_module(name: str, file: str) -> None:

@@ -282,7 +282,6 @@ def busy(seed_ms: int) -> Rig:
     return rig
 
 
-@pytest.mark.no_cover  # hundreds of connections: the other tests have run their lines
 def test_stop_is_out_375_ms_after_the_last_sip_and_35_ms_after_p2dx_con_fell_however_full_the_line() -> None:
     silences, releases = [], []
     for phase_ms in range(0, 100, 3):

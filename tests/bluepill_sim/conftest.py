@@ -7,6 +7,7 @@ from collections.abc import Callable, Iterator
 import pytest
 
 from bluepill_sim.fabric.clocks import Clocks
+from bluepill_sim.fabric.power import Power
 from bluepill_sim.stm32f103 import ChipParts, make_parts, make_pins
 from tests.bluepill_sim.machine import Assembler, Machine
 
@@ -21,6 +22,7 @@ class FakeChip:
         self.now_ns = 0
         self.access_pc = 0
         self.clocks = Clocks()
+        self.power = Power()
         self.pins = make_pins(self)
         self.irqs: dict[int, bool] = defaultdict(bool)
         self.signals: list[str] = []
@@ -53,6 +55,9 @@ class FakeChip:
         self.irqs[irq] = level
         return True
 
+    def flash_began(self) -> None:
+        pass
+
     def end_slice(self) -> None:
         self.stops += 1
 
@@ -76,6 +81,9 @@ class FakeChip:
         part = self.parts.by_name.get(name)
         if part is not None:
             part.reset()
+
+    def reset_backup_domain(self) -> None:
+        self.parts.reset_backup_domain()
 
     def watchdog_expired(self, name: str) -> None:
         self.expired.append((name, self.now_ns))

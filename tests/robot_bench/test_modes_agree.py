@@ -25,8 +25,9 @@ from adapter_sim.pinout import Direction, load_pinout
 from p2os.robots.parameters import RobotParameters
 from robot_bench.bench import Bench
 from robot_bench.recording.run_record import RunRecord, read_run
+from robot_bench.recording.signals import motor_steps
 from robot_bench.recording.trace import TraceWriter
-from robot_bench.scenario.goals import motor_pairs
+from robot_bench.scenario.goals.signals import SKEW_NS
 from robot_bench.scenario.scenario import Scenario, load_scenario
 from tests.robot_bench.wires.fake_chip import FakeChip, PinDrive
 
@@ -52,6 +53,19 @@ def recorded(scenario: Scenario, folder: Path, chip: FakeChip | None = None) -> 
 
 def chip_edges(record: RunRecord) -> dict[str, list[tuple[int, int]]]:
     return {wire.name: record.pins[wire.name] for wire in load_pinout().wires if wire.direction is Direction.TO_ADAPTER}
+
+
+def motor_pairs(record: RunRecord) -> list[tuple[int, tuple[int, int]]]:
+    """Return the values of both motors' pins over time; changes within a millisecond are one."""
+    steps = [(at, side, value) for side in (0, 1) for at, value in motor_steps(record.pins, side + 1)]
+    result: list[tuple[int, tuple[int, int]]] = []
+    values = [0, 0]
+    for at, side, value in sorted(steps):
+        values[side] = value
+        begin = result.pop()[0] if result and at - result[-1][0] < SKEW_NS else at
+        if not result or result[-1][1] != (values[0], values[1]):
+            result.append((begin, (values[0], values[1])))
+    return result
 
 
 @dataclass

@@ -124,7 +124,6 @@ def test_a_machine_that_slept_in_the_pacers_wait_stops_the_robot_first() -> None
     assert line.sent[sent_before[0] :] == STOP_SEQUENCE
 
 
-@pytest.mark.no_cover  # it traces the lines itself
 @pytest.mark.parametrize("place", range(1, 12))
 def test_a_second_ctrl_c_in_closing_leaves_the_robot_told(place: int) -> None:
     line, lines = FakeLine(), [0]
@@ -195,9 +194,10 @@ def test_a_firmware_that_dies_stops_the_robot() -> None:
 def test_odometry_wraps_without_a_jump() -> None:
     pose = OdometryPose(load_parameters("p2dx"))
     for raw_x in (32_760, 32_767, 3):
-        entry = pose.take(StandardSip(raw_x=raw_x, raw_heading=-1024, raw_left_velocity=100, raw_right_velocity=-5))
-    assert entry["x"] == 11 * 840
-    assert (entry["h"], entry["l"], entry["r"]) == (-1_570_796, 100_000, -5_000)
+        sip = StandardSip(raw_x=raw_x, raw_heading=-1024, raw_left_velocity=100, raw_right_velocity=-5)
+        told = pose.take(sip, 7)
+    assert (told.t, told.x) == (7, 11 * 840)
+    assert (told.heading, told.left, told.right) == (-1_570_796, 100_000, -5_000)
     assert pose.distance_m == pytest.approx(0.00924)
 
 

@@ -123,7 +123,6 @@ class Adapter final : private p2os::ClientListener {
   Wheels counts_shown() const { return {left_walk_.shown(), right_walk_.shown()}; }
   std::uint32_t sips() const { return agenda_.sips; }
   std::uint32_t jumps() const { return encoders_.jumps(); }
-  std::int64_t range_um(std::int32_t number) const { return distances_.range_um(number); }
   const Outputs& outputs() const { return outputs_; }
   const p2os::Client& client() const { return client_; }
   const p2os::Identity& robot() const { return identity_; }

@@ -39,12 +39,4 @@ std::uint32_t Distances::levels() const {
   return levels;
 }
 
-std::int64_t Distances::range_um(std::int32_t number) const {
-  if (number < 0 || number >= count_) {
-    return -1;
-  }
-  const Reading& reading = readings_[static_cast<std::size_t>(number)];
-  return reading.is_known ? reading.range_um : -1;
-}
-
 }  // namespace adapter

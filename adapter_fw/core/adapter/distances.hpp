@@ -29,9 +29,6 @@ class Distances {
   // Returns the level of each distance wire, DD1 in bit 0.
   std::uint32_t levels() const;
 
-  // Returns the range of a sonar in um, -1 where it is not known.
-  std::int64_t range_um(std::int32_t number) const;
-
  private:
   struct Reading {
     std::int64_t range_um = 0;

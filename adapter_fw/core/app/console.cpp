@@ -9,7 +9,8 @@ namespace {
 
 constexpr char HELP[] =
     "version | status | pins | log | get [NAME] | set NAME VALUE | reset NAME\n"
-    "master bluepill|pad | stop | restart\n";
+    "master bluepill|pad | stop | restart\n"
+    "test on|off | wires [MASK LEVELS] | link [HEX] | pad\n";
 
 void write_bits(Writer& writer, const char* name, std::uint32_t levels, std::int32_t from, std::int32_t count) {
   writer.write(name);
@@ -90,6 +91,14 @@ void Console::run(char* line, p2os::Nanos now) {
     parts_.adapter.shutdown("restarted on the console", now);
     wants_restart_ = true;
     writer.write("ok\n");
+  } else if (is("test", 2) && (is_same(given.words[1], "on") || is_same(given.words[1], "off"))) {
+    test(is_same(given.words[1], "on"), now);
+  } else if (is("wires", 1) || is("wires", 3)) {
+    wires(given.words[1], given.words[2], now);
+  } else if (is("link", 1) || is("link", 2)) {
+    link(given.words[1]);
+  } else if (is("pad", 1)) {
+    pad();
   } else {
     writer.write("error: no such command; type help\n");
   }
@@ -126,7 +135,7 @@ void Console::status() {
 
 void Console::pins(p2os::Nanos now) {
   const adapter::WireNumbers& wires = parts_.wires;
-  const std::uint32_t in = parts_.pins.read(now);
+  const std::uint32_t in = parts_.test.inputs(now);
   const std::uint32_t out = parts_.adapter.outputs().levels();
   Writer& writer = parts_.writer;
   write_bits(writer, "in:  motor1_comm1.. ", in, 0, wires.motor1_width);
@@ -137,6 +146,90 @@ void Console::pins(p2os::Nanos now) {
   write_bits(writer, "  encoder1_s1.. ", out, wires.distances, wires.encoder_width);
   write_bits(writer, "  encoder2_s1.. ", out, wires.distances + wires.encoder_width, wires.encoder_width);
   writer.write("\n");
+}
+
+void Console::test(bool is_on, p2os::Nanos now) {
+  BoardTest& test = parts_.test;
+  if (is_on && !test.is_on()) {
+    parts_.adapter.shutdown("the board is tested", now);
+    test.begin(now);
+  } else if (!is_on && test.is_on()) {
+    test.end(now);
+  }
+  parts_.writer.write(is_on ? "test on, started by " : "test off, started by ");
+  parts_.writer.write(parts_.started_by);
+  parts_.writer.write("\n");
+}
+
+void Console::wires(const char* mask, const char* levels, p2os::Nanos now) {
+  std::uint32_t driven = 0, wanted = 0;
+  if (mask != nullptr) {
+    if (!is_in_test()) {
+      return;
+    }
+    if (!read_hex(mask, driven) || !read_hex(levels, wanted)) {
+      parts_.writer.write("error: that is no hexadecimal number\n");
+      return;
+    }
+    parts_.test.hold(driven, wanted, now);
+  }
+  parts_.writer.write("wires in ");
+  write_hex(parts_.writer, parts_.test.inputs(now), 8);
+  parts_.writer.write(" out ");
+  write_hex(parts_.writer, parts_.test.outputs(now), 8);
+  parts_.writer.write("\n");
+}
+
+void Console::link(const char* hex) {
+  if (!is_in_test()) {
+    return;
+  }
+  if (hex != nullptr) {
+    std::array<std::uint8_t, BoardTest::KEPT_BYTES / 2> bytes{};
+    std::size_t size = 0;
+    for (; hex[0] != '\0' && hex[1] != '\0' && size < bytes.size(); hex += 2, ++size) {
+      const char pair[] = {hex[0], hex[1], '\0'};
+      std::uint32_t value = 0;
+      if (!read_hex(pair, value)) {
+        break;
+      }
+      bytes[size] = static_cast<std::uint8_t>(value);
+    }
+    if (*hex != '\0' || size == 0) {
+      parts_.writer.write("error: that is not one to 16 bytes in hexadecimal\n");
+      return;
+    }
+    parts_.test.send({bytes.data(), size});
+  }
+  std::array<std::uint8_t, BoardTest::KEPT_BYTES> back{};
+  const std::size_t size = parts_.test.take_back(back);
+  parts_.writer.write("link ");
+  for (std::size_t place = 0; place < size; ++place) {
+    write_hex(parts_.writer, back[place], 2);
+  }
+  parts_.writer.write("\n");
+}
+
+void Console::pad() {
+  if (!parts_.test.has_pad()) {
+    parts_.writer.write("pad none\n");
+    return;
+  }
+  const adapter::PadReport& report = parts_.test.last_report();
+  number("pad", parts_.test.pad_reports());
+  number("up", report.up);
+  number("down", report.down);
+  number("forward", report.forward);
+  number("backward", report.backward);
+  number("turn", report.turn);
+  parts_.writer.write("\n");
+}
+
+bool Console::is_in_test() {
+  if (!parts_.test.is_on()) {
+    parts_.writer.write("error: only in a test; type test on\n");
+  }
+  return parts_.test.is_on();
 }
 
 void Console::get(const char* name) {

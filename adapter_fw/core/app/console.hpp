@@ -11,6 +11,10 @@
 //   master bluepill|pad  gives the robot to the other one
 //   stop                 stops the robot until its master asks anew
 //   restart              stops the robot, then begins anew with the stored settings
+//   test on|off          stops the robot and takes the hardware from the adapter; gives it back
+//   wires [MASK LEVELS]  every pad in hexadecimal, after these outputs alone were driven (in a test)
+//   link [HEX]           what came on the line; or sends up to 16 bytes (in a test)
+//   pad                  the last report of the game pad, and how many came
 #pragma once
 
 #include <array>
@@ -18,6 +22,7 @@
 #include <cstdint>
 
 #include "../adapter/adapter.hpp"
+#include "board_test.hpp"
 #include "event_log.hpp"
 #include "text.hpp"
 
@@ -44,12 +49,14 @@ class Console {
   struct Parts {
     adapter::Adapter& adapter;
     const EventLog& log;
-    hal::PinsIn& pins;
+    BoardTest& test;
     Store& store;
     Writer& writer;
     const adapter::WireNumbers& wires;
     //: Such as "rev-b" or "host".
     const char* board;
+    //: Why the program runs, such as "power" or "watchdog".
+    const char* started_by;
   };
 
   explicit Console(const Parts& parts) : parts_(parts) {}
@@ -67,6 +74,11 @@ class Console {
   void run(char* line, p2os::Nanos now);
   void status();
   void pins(p2os::Nanos now);
+  void test(bool is_on, p2os::Nanos now);
+  void wires(const char* mask, const char* levels, p2os::Nanos now);
+  void link(const char* hex);
+  void pad();
+  bool is_in_test();
   void get(const char* name);
   void set(const char* name, const char* value);
   void reset(const char* name);

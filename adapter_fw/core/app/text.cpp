@@ -34,6 +34,27 @@ bool read_number(const char* text, std::int64_t& value) {
   return true;
 }
 
+void write_hex(Writer& writer, std::uint32_t value, std::size_t digits) {
+  char text[9] = {};
+  for (std::size_t place = digits < 8 ? digits : 8; place-- > 0; value >>= 4) {
+    text[place] = "0123456789abcdef"[value & 0xF];
+  }
+  writer.write(text);
+}
+
+bool read_hex(const char* text, std::uint32_t& value) {
+  value = 0;
+  std::size_t digits = 0;
+  for (; *text != '\0' && digits < 8; ++text, ++digits) {
+    const bool is_letter = *text >= 'a' && *text <= 'f';
+    if (!is_letter && (*text < '0' || *text > '9')) {
+      return false;
+    }
+    value = value << 4 | static_cast<std::uint32_t>(is_letter ? *text - 'a' + 10 : *text - '0');
+  }
+  return digits != 0 && *text == '\0';
+}
+
 bool is_same(const char* one, const char* other) {
   while (*one != '\0' && *one == *other) {
     ++one;

@@ -20,6 +20,12 @@ void write_number(Writer& writer, std::int64_t value);
 // Reads a whole decimal number; false where the text is none, or does not fit.
 [[nodiscard]] bool read_number(const char* text, std::int64_t& value);
 
+// Writes the lowest `digits` hexadecimal digits.
+void write_hex(Writer& writer, std::uint32_t value, std::size_t digits);
+
+// Reads one to eight hexadecimal digits, lower case; false where the text is none.
+[[nodiscard]] bool read_hex(const char* text, std::uint32_t& value);
+
 bool is_same(const char* one, const char* other);
 
 //: A line cut into its words, in place.

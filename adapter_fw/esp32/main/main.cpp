@@ -42,6 +42,26 @@ constexpr BaseType_t CORE = 1;
 //: Every restart but one by EN or power leaves it as it is.
 RTC_NOINIT_ATTR app::RetainedWheels retained;
 
+//: Why the chip began to run the program, as far as a person can do something about it.
+const char* started_by() {
+  switch (esp_reset_reason()) {
+    case ESP_RST_POWERON:
+      return "power or EN";
+    case ESP_RST_SW:
+      return "restart";
+    case ESP_RST_PANIC:
+      return "panic";
+    case ESP_RST_TASK_WDT:
+    case ESP_RST_INT_WDT:
+    case ESP_RST_WDT:
+      return "watchdog";
+    case ESP_RST_BROWNOUT:
+      return "brown-out";
+    default:
+      return "something else";
+  }
+}
+
 adapter::Master other(adapter::Master master) {
   return master == adapter::Master::PAD ? adapter::Master::BLUEPILL : adapter::Master::PAD;
 }
@@ -69,14 +89,15 @@ adapter::Master other(adapter::Master master) {
   static app::EventLog log;
   static app::EventPrinter printer(log, terminal);
   static adapter::Adapter part(settings, ROBOT, board::WIRES, clock.now());
-  part.attach(&wires, &wires, &printer);
+  static app::BoardTest test({wires, wires, wires, line, esp32::pad()});
+  part.attach(&test, &test, &printer);
   app::CodeKeeper keeper(retained, store);
   keeper.restore(part);
   if (starts_with_pad) {
     part.set_master(adapter::Master::PAD, clock.now());
   }
-  app::Runner runner(part, clock, line, esp32::pad());
-  app::Console console({part, log, wires, store, terminal, board::WIRES, board::REVISION});
+  app::Runner runner(part, clock, test, test.pad());
+  app::Console console({part, log, test, store, terminal, board::WIRES, board::REVISION, started_by()});
   app::ModeButton button;
   console.banner();
   ESP_ERROR_CHECK(esp_task_wdt_add(nullptr));

@@ -98,6 +98,17 @@ void Wires::release(p2os::Nanos) {
   }
 }
 
+std::uint32_t Wires::sense(p2os::Nanos) {
+  const std::uint64_t levels = GPIO.in;
+  std::uint32_t word = 0;
+  for (std::size_t place = 0; place < OUTPUTS; ++place) {
+    const bool is_shifted = board::OUTPUT_PLACES[place] >= 0;
+    const bool level = is_shifted ? (shown_ >> place & 1U) != 0 : (levels & bit_of(board::OUTPUT_PINS[place])) != 0;
+    word |= level ? 1U << place : 0;
+  }
+  return word;
+}
+
 // The last bit in is QA's.
 void Wires::shift(std::uint32_t levels) {
   shown_ = levels;

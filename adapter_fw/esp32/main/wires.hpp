@@ -10,7 +10,7 @@
 
 namespace esp32 {
 
-class Wires final : public hal::PinsIn, public hal::PinsOut {
+class Wires final : public hal::PinsIn, public hal::PinsOut, public hal::OutputPads {
  public:
   // Makes every wire an input that follows its pull.
   void start();
@@ -19,6 +19,8 @@ class Wires final : public hal::PinsIn, public hal::PinsOut {
   void drive(std::uint32_t mask, std::uint32_t levels, p2os::Nanos) override;
   // A shift register cannot let go: its outputs show the safe levels.
   void release(p2os::Nanos) override;
+  // A shift register's outputs cannot be read back: they are taken to be what was shifted in.
+  std::uint32_t sense(p2os::Nanos) override;
 
  private:
   void shift(std::uint32_t levels);

@@ -1,3 +1,3 @@
 #pragma once
-#include "esp_err.h"
+#include <esp_err.h>
 extern "C" std::int64_t esp_timer_get_time(void);

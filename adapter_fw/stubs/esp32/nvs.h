@@ -1,5 +1,5 @@
 #pragma once
-#include "esp_err.h"
+#include <esp_err.h>
 typedef std::uint32_t nvs_handle_t;
 typedef enum { NVS_READONLY, NVS_READWRITE } nvs_open_mode_t;
 extern "C" {

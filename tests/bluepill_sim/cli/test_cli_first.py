@@ -11,6 +11,7 @@ from bluepill_sim.extension import library
 from p2os.cli.main import run
 
 SENSORS = str(files("robot_bench.firmware") / "sensors.elf")
+ANALOG = str(files("robot_bench.firmware") / "analog.elf")
 DODGE = str(files("robot_bench.firmware") / "dodge.elf")
 
 
@@ -19,6 +20,15 @@ def test_run_prints_what_the_firmware_sends(capfdbinary: pytest.CaptureFixture[b
     captured = capfdbinary.readouterr()
     assert captured.out == b"sensors: ready\nsensor 3 on\n"
     assert b"3.700000 s of virtual time" in captured.err
+
+
+def test_run_puts_volts_on_pins_and_takes_them_off(capfdbinary: pytest.CaptureFixture[bytes]) -> None:
+    volts = ["PA0=1.65V", "PA4=2V", "PA4=z@120ms", "PA5=1.5v", "PA5=1@120ms", "PA6=-0.2V"]
+    options = [word for one in volts for word in ("--drive", one)]
+    assert run(["mcu", "run", ANALOG, "--for", "230ms", *options]) == 0
+    first, second = capfdbinary.readouterr().out.decode().splitlines()
+    assert "PA0 1651 mV, PA4 2000 mV, PA5 1501 mV, PA6 0 mV" in first
+    assert "PA0 1651 mV, PA4 0 mV, PA5 3300 mV, PA6 0 mV" in second
 
 
 def test_run_writes_to_a_file_and_ends_at_an_event(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
@@ -39,6 +49,9 @@ def test_run_in_real_time_serves_a_pseudo_terminal(capfd: pytest.CaptureFixture[
         (["run", "nothing.elf"], "no such file"),
         (["run", SENSORS, "--for", "10"], "'10' has no unit"),
         (["run", SENSORS, "--drive", "PA6"], "is not understood"),
+        (["run", SENSORS, "--drive", "PA6=V"], "is not understood"),
+        (["run", SENSORS, "--drive", "PA6=1000V"], "is not understood"),
+        (["run", SENSORS, "--drive", "PE6=1V"], "no leg PE6"),
         (["run", SENSORS, "--drive", "PE6=1"], "no leg PE6"),
         (["run", SENSORS, "--drive", "XY=1"], "no leg XY"),
         (["run", SENSORS, "--until", "tea"], "is not understood"),

@@ -3,7 +3,6 @@
 A table in SRAM says what is stored where, and how long to wait; DMA may write over it, and over what it likes.
 """
 
-import os
 import struct
 from typing import Any
 
@@ -130,7 +129,7 @@ def test_whatever_a_program_writes_both_cores_do_the_same(
 
 
 @pytest.mark.soak
-@settings(max_examples=int(os.environ.get("P2OS_SOAK_EXAMPLES", "4000")), deadline=None)
+@settings(max_examples=10_000, deadline=None)
 @FUZZED
 def test_whatever_many_programs_write_both_cores_do_the_same(
     steps: list[list[tuple[int, int]]], waits: list[int], slices: list[int]

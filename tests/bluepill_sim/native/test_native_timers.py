@@ -48,7 +48,7 @@ def ends(source: str, slices: tuple[int, ...]) -> list[dict[str, Any]]:
     return found
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=40, deadline=None)
 @given(
     load=st.sampled_from([LOAD_CNT, LOAD_HALF_CNT]), control=st.sampled_from([0x00, 0x01, 0x11, 0x21, 0x61, 0x09]),
     psc=st.sampled_from([0, 1, 6, 71]), arr=st.one_of(st.integers(0, 9), st.integers(10, 3000), st.just(0xFFFF)),

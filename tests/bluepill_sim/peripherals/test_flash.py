@@ -1,28 +1,38 @@
 """FLASH: wait states, keys, programming and erasing."""
 
+from collections.abc import Callable
 from typing import Any
 
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from bluepill_sim.peripherals.flash import DELIVERED
 
 KEYS = (0x4567_0123, 0xCDEF_89AB)
 PG, PER, MER, STRT, LOCK, ERRIE, EOPIE = 1, 2, 4, 1 << 6, 1 << 7, 1 << 10, 1 << 12
+OPTPG, OPTER, OPTWRE = 1 << 4, 1 << 5, 1 << 9
 BSY, PGERR, WRPRTERR, EOP = 1, 1 << 2, 1 << 4, 1 << 5
 PROGRAM_NS, ERASE_NS = 52_500, 20_000_000
 
 
 class Array:
-    """Four pages of flash."""
+    """Eight pages of flash."""
 
-    size = 4096
+    size = 8192
 
     def __init__(self) -> None:
         self.data = bytearray(b"\xff" * self.size)
+        self.options = DELIVERED
 
     def read(self, offset: int, size: int) -> bytes:
         return bytes(self.data[offset : offset + size])
 
     def write(self, offset: int, data: bytes) -> None:
         self.data[offset : offset + len(data)] = data
+
+    def write_options(self, options: bytes) -> None:
+        self.options = options
 
 
 @pytest.fixture
@@ -140,7 +150,7 @@ def test_a_page_is_erased(unlocked: Any, array: Array) -> None:
     assert unlocked.read("FLASH.SR") == BSY
     unlocked.advance(ERASE_NS)
     assert (unlocked.read("FLASH.SR"), unlocked.read("FLASH.CR")) == (EOP, PER)
-    assert bytes(array.data) == bytes(1024) + b"\xff" * 1024 + bytes(2048)
+    assert bytes(array.data) == bytes(1024) + b"\xff" * 1024 + bytes(array.size - 2048)
 
 
 def test_everything_is_erased(unlocked: Any, array: Array) -> None:
@@ -165,7 +175,143 @@ def test_a_board_that_does_not_offer_its_array_warns(unlocked: Any) -> None:
     assert list(unlocked.warnings) == ["FLASH:memory"]
 
 
-def test_option_bytes_are_warned_of(unlocked: Any) -> None:
-    unlocked.write("FLASH.OPTKEYR", KEYS[0])
-    unlocked.write("FLASH.CR", 1 << 4)
-    assert list(unlocked.warnings) == ["FLASH:options"]
+def unlock_options(chip: Any) -> None:
+    for key in KEYS:
+        chip.write("FLASH.OPTKEYR", key)
+
+
+def options_of(array: Array) -> list[int]:
+    """The bytes, where each has its complement."""
+    pairs = zip(array.options[::2], array.options[1::2], strict=True)
+    return [byte if byte ^ complement == 0xFF else -1 for byte, complement in pairs]
+
+
+@pytest.fixture
+def open_options(unlocked: Any, array: Array) -> Any:
+    unlock_options(unlocked)
+    return unlocked
+
+
+def test_option_bytes_have_keys_of_their_own_behind_those_of_the_flash(fake_chip: Any, array: Array) -> None:
+    unlock_options(fake_chip)
+    assert fake_chip.read("FLASH.CR") == LOCK
+    for key in KEYS:
+        fake_chip.write("FLASH.KEYR", key)
+    fake_chip.write("FLASH.OPTKEYR", KEYS[0])
+    fake_chip.write("FLASH.OPTKEYR", KEYS[0])
+    assert "FLASH:option-key" in fake_chip.warnings
+    fake_chip.write("FLASH.CR", OPTWRE)
+    assert fake_chip.read("FLASH.CR") == 0  # it cannot be set
+    unlock_options(fake_chip)
+    assert fake_chip.read("FLASH.CR") == OPTWRE
+    fake_chip.write("FLASH.CR", 0)
+    assert fake_chip.read("FLASH.CR") == 0
+    assert array.options == DELIVERED
+
+
+def test_erased_options_are_read_after_a_reset_and_protect_the_flash(open_options: Any, array: Array) -> None:
+    chip = open_options
+    chip.write("FLASH.CR", OPTER | OPTWRE)
+    chip.write("FLASH.CR", OPTER | OPTWRE | STRT)
+    assert array.options == b"\xff" * 16
+    chip.advance(ERASE_NS - 1)
+    assert chip.read("FLASH.SR") == BSY
+    chip.advance(ERASE_NS)
+    assert chip.read("FLASH.SR") == EOP
+    assert (chip.read("FLASH.OBR"), chip.read("FLASH.WRPR")) == (0x03FF_FFFC, 0xFFFF_FFFF)
+    chip.parts.flash.reset()
+    assert (chip.read("FLASH.OBR"), chip.read("FLASH.WRPR")) == (0x03FF_FFFE, 0xFFFF_FFFF)
+
+
+def test_an_option_byte_gets_its_complement_and_must_be_erased_before(open_options: Any, array: Array) -> None:
+    chip = open_options
+    chip.write("FLASH.CR", OPTPG | OPTWRE)
+    assert chip.parts.flash.program_option(4, 2, 0x1234)
+    assert chip.read("FLASH.SR") == PGERR
+    array.options = array.options[:4] + b"\xff\xff" + array.options[6:]
+    chip.write("FLASH.SR", PGERR)
+    assert chip.parts.flash.program_option(4, 2, 0x1234)
+    assert (chip.read("FLASH.SR"), options_of(array)[2]) == (BSY, 0x34)
+    chip.advance(chip.now_ns + PROGRAM_NS)
+    assert chip.read("FLASH.SR") == EOP
+    chip.parts.flash.reset()
+    assert chip.read("FLASH.OBR") >> 10 & 0xFF == 0x34
+    assert chip.parts.flash.program_option(6, 2, 0)
+    assert "FLASH:options" in chip.warnings  # the reset has locked them
+    assert not open_options.parts.flash.is_busy
+
+
+@pytest.mark.parametrize("size", [1, 4])
+def test_option_bytes_take_halfwords_only(open_options: Any, size: int) -> None:
+    open_options.write("FLASH.CR", OPTPG | OPTWRE)
+    assert not open_options.parts.flash.program_option(4, size, 0)
+
+
+@given(pairs=st.lists(st.tuples(st.integers(0, 255), st.integers(0, 255), st.booleans()), min_size=8, max_size=8))
+def test_a_reset_loads_what_fits_its_complement(
+    make_fake_chip: Callable[[], Any], pairs: list[tuple[int, int, bool]]
+) -> None:
+    """PM0075 2.2: one that does not fit counts as 0xFF, and is an error unless both halves are erased."""
+    chip, array = make_fake_chip(), Array()
+    chip.parts.flash.memory = array
+    rows = [(byte, byte ^ 0xFF if is_good else other) for byte, other, is_good in pairs]
+    array.options = bytes(half for row in rows for half in row)
+    chip.parts.flash.reset()
+    values = [byte if byte ^ complement == 0xFF else 0xFF for byte, complement in rows]
+    error = any(byte ^ other != 0xFF and (byte, other) != (0xFF, 0xFF) for byte, other in rows)
+    obr = chip.read("FLASH.OBR")
+    assert obr & 3 == error | (values[0] != 0xA5) << 1
+    assert [obr >> 2 & 0xFF, obr >> 10 & 0xFF, obr >> 18 & 0xFF] == values[1:4]
+    assert chip.read("FLASH.WRPR").to_bytes(4, "little") == bytes(values[4:])
+    assert (chip.power.starts_watchdog, chip.power.resets_at_stop, chip.power.resets_at_standby) == tuple(
+        not values[1] >> bit & 1 for bit in range(3)
+    )
+
+
+@pytest.mark.parametrize("offset", [0, 4095, 4096, 8191])
+def test_a_protected_page_is_neither_programmed_nor_erased(unlocked: Any, array: Array, offset: int) -> None:
+    """Bit 1 of WRP0 is 0: pages 4 to 7."""
+    array.options = array.options[:8] + b"\xfd\x02" + array.options[10:]
+    unlocked.parts.flash._load_options()
+    is_protected = offset >= 4096
+    unlocked.write("FLASH.CR", PG)
+    unlocked.parts.flash.program(offset & ~1, 2, 5)
+    assert unlocked.read("FLASH.SR") == (WRPRTERR if is_protected else BSY)
+    unlocked.advance(unlocked.now_ns + PROGRAM_NS)
+    unlocked.write("FLASH.SR", WRPRTERR | EOP)
+    array.data[offset] = 7
+    unlocked.write("FLASH.CR", PER)
+    unlocked.write("FLASH.AR", 0x0800_0000 + offset)
+    unlocked.write("FLASH.CR", PER | STRT)
+    assert unlocked.read("FLASH.SR") == (WRPRTERR if is_protected else BSY)
+    assert array.data[offset] == (7 if is_protected else 0xFF)
+
+
+def test_one_protected_page_keeps_the_mass_erase_away(unlocked: Any, array: Array) -> None:
+    array.data[0] = 7
+    array.options = array.options[:8] + b"\xfd\x02" + array.options[10:]
+    unlocked.parts.flash._load_options()
+    unlocked.write("FLASH.CR", MER)
+    unlocked.write("FLASH.CR", MER | STRT)
+    assert (unlocked.read("FLASH.SR"), array.data[0], unlocked.read("FLASH.CR")) == (WRPRTERR, 7, MER)
+
+
+def test_read_protection_guards_the_first_pages_and_goes_with_the_whole_flash(open_options: Any, array: Array) -> None:
+    chip = open_options
+    array.options = b"\xff" * 16
+    chip.parts.flash._load_options()
+    array.data[0] = array.data[5000] = 7
+    chip.write("FLASH.CR", PER | OPTWRE)
+    chip.write("FLASH.AR", 0x0800_0000)
+    chip.write("FLASH.CR", PER | STRT | OPTWRE)
+    assert chip.read("FLASH.SR") == WRPRTERR
+    chip.write("FLASH.SR", WRPRTERR)
+    chip.write("FLASH.CR", OPTPG | OPTWRE)
+    chip.parts.flash.program_option(0, 2, 0xA5)
+    assert (array.data[0], array.data[5000], options_of(array)[0]) == (0xFF, 0xFF, 0xA5)
+    chip.advance(PROGRAM_NS + ERASE_NS - 1)
+    assert chip.read("FLASH.SR") == BSY
+    chip.advance(PROGRAM_NS + ERASE_NS)
+    assert chip.read("FLASH.SR") == EOP
+    chip.parts.flash.reset()
+    assert not chip.read("FLASH.OBR") & 2

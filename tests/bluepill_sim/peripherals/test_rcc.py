@@ -37,6 +37,7 @@ def clear_bits(chip: Any, register: str, mask: int) -> None:
 def test_an_oscillator_is_ready_after_its_start_up_time(
     fake_chip: Any, register: str, on: int, ready: int, start_ns: int
 ) -> None:
+    fake_chip.power.is_backup_open = True
     fake_chip.advance(1000)
     set_bits(fake_chip, register, on)
     fake_chip.advance(1000 + start_ns - 1)
@@ -169,11 +170,102 @@ def test_too_few_wait_states_are_warned_of(fake_chip: Any) -> None:
     }
 
 
-def test_a_clock_on_pa8_is_warned_of(fake_chip: Any) -> None:
-    fake_chip.write("RCC.CFGR", 3 << 24)
-    assert fake_chip.warnings == {}
+PA8_ALTERNATE = 0x4444_444B
+
+
+def wave_hz(chip: Any) -> float | None:
+    """What PA8 shows: a frequency, or None for a constant level."""
+    wave = chip.pins["PA8"].wave
+    return None if wave is None else float(wave.frequency_hz)
+
+
+@pytest.mark.parametrize(("mco", "hz"), [(3, None), (4, 72_000_000), (5, 8_000_000), (6, 8_000_000), (7, 36_000_000)])
+def test_mco_puts_a_clock_on_pa8_where_it_is_an_alternate_function(fake_chip: Any, mco: int, hz: int | None) -> None:
+    fake_chip.run_at_72_mhz()
+    fake_chip.write("RCC.CFGR", fake_chip.read("RCC.CFGR") & 0xFF_FFFF | mco << 24)
+    assert wave_hz(fake_chip) is None
+    fake_chip.write("GPIOA.CRH", PA8_ALTERNATE)
+    assert wave_hz(fake_chip) == hz
+    assert fake_chip.pins["PA8"].function == ("MCO" if hz else None)
+    fake_chip.parts.reset(ResetCause.PIN)
+    fake_chip.write("GPIOA.CRH", PA8_ALTERNATE)
+    assert fake_chip.pins["PA8"].function is None
+
+
+def test_mco_follows_its_clock_and_is_low_without_it(fake_chip: Any) -> None:
+    fake_chip.write("GPIOA.CRH", PA8_ALTERNATE)
+    fake_chip.write("RCC.CFGR", 6 << 24)
+    assert (fake_chip.pins["PA8"].function, wave_hz(fake_chip)) == ("MCO", None)
+    set_bits(fake_chip, "RCC.CR", HSEON)
+    fake_chip.advance(2_000_000)
+    assert wave_hz(fake_chip) == 8_000_000
     fake_chip.write("RCC.CFGR", 4 << 24)
-    assert list(fake_chip.warnings) == ["RCC:mco"]
+    fake_chip.write("RCC.CR", 0x81 & ~0xF8 | 15 << 3)
+    assert wave_hz(fake_chip) == 7_960_000
+
+
+@pytest.mark.parametrize("trim", [0, 15, 16, 17, 31])
+def test_trimming_moves_hsi_and_all_that_comes_from_it(fake_chip: Any, trim: int) -> None:
+    """DS5319: 40 kHz a step, 8 MHz in the middle."""
+    hsi_hz = 8_000_000 + (trim - 16) * 40_000
+    fake_chip.write("RCC.CR", 1 | trim << 3)
+    assert fake_chip.clocks.hclk_hz == hsi_hz
+    fake_chip.write("RCC.CR", 1 | trim << 3 | PLLON)
+    fake_chip.advance(200_000)
+    fake_chip.write("RCC.CFGR", 2)
+    assert fake_chip.clocks.hclk_hz == hsi_hz // 2 * 2
+
+
+CSSON, CSSF, CSSC = 1 << 19, 1 << 7, 1 << 23
+
+
+@pytest.mark.parametrize("source", ["HSI", "HSE", "PLL"])
+def test_the_clock_security_system_takes_hsi_and_raises_nmi_until_it_is_cleared(fake_chip: Any, source: str) -> None:
+    if source == "PLL":
+        fake_chip.run_at_72_mhz()
+        set_bits(fake_chip, "RCC.CR", CSSON)
+    else:
+        set_bits(fake_chip, "RCC.CR", HSEON | CSSON)
+        fake_chip.advance(2_000_000)
+        fake_chip.write("RCC.CFGR", 1 if source == "HSE" else 0)
+    now_ns = fake_chip.now_ns
+    fake_chip.parts.rcc.fail_crystal()
+    assert fake_chip.signals == ["nmi"]
+    assert fake_chip.clocks.sysclk_hz == 8_000_000
+    assert fake_chip.read("RCC.CR") & (HSEON | HSERDY | PLLON | PLLRDY | 3) == 3
+    assert fake_chip.read("RCC.CFGR") & 0xF == 0
+    assert fake_chip.read("RCC.CIR") & CSSF
+    fake_chip.advance(now_ns + 999)
+    assert fake_chip.signals == ["nmi"]
+    fake_chip.advance(now_ns + 2000)
+    assert fake_chip.signals == ["nmi"] * 3
+    fake_chip.write("RCC.CIR", CSSC)
+    assert not fake_chip.read("RCC.CIR") & CSSF
+    fake_chip.advance(now_ns + 10**9)
+    assert fake_chip.signals == ["nmi"] * 3
+
+
+def test_without_css_a_crystal_in_use_takes_the_core_with_it(fake_chip: Any) -> None:
+    set_bits(fake_chip, "RCC.CR", HSEON)
+    fake_chip.advance(2_000_000)
+    fake_chip.parts.rcc.fail_crystal()
+    assert fake_chip.signals == []  # nobody used it
+    fake_chip.parts.rcc.repair_crystal()
+    fake_chip.advance(3_999_999)
+    assert not fake_chip.read("RCC.CR") & HSERDY
+    fake_chip.advance(4_000_000)
+    fake_chip.write("RCC.CFGR", 1)
+    fake_chip.parts.rcc.fail_crystal()
+    assert fake_chip.signals == ["no clock"]
+    assert "RCC:hse" in fake_chip.warnings
+
+
+def test_a_crystal_that_does_not_work_never_gets_ready(fake_chip: Any) -> None:
+    fake_chip.parts.rcc.fail_crystal()
+    set_bits(fake_chip, "RCC.CR", HSEON | CSSON)
+    fake_chip.advance(10**9)
+    assert not fake_chip.read("RCC.CR") & HSERDY
+    assert fake_chip.signals == []
 
 
 def test_a_forbidden_setting_that_passes_at_once_is_none(fake_chip: Any) -> None:
@@ -264,12 +356,16 @@ def test_a_reset_goes_back_to_hsi(fake_chip: Any) -> None:
 
 
 def test_the_backup_domain_outlives_all_but_a_power_cut(fake_chip: Any) -> None:
+    fake_chip.power.is_backup_open = True
     fake_chip.write("RCC.BDCR", 1 << 8 | 1)
     fake_chip.advance(1_000_000_000)
     fake_chip.parts.reset(ResetCause.PIN)
     assert fake_chip.parts.next_deadline() == OSCILLATORS[3].start_ns
     fake_chip.advance(OSCILLATORS[3].start_ns)
     assert fake_chip.read("RCC.BDCR") == 1 << 8 | 3
+    fake_chip.write("RCC.BDCR", 1 << 16)
+    assert fake_chip.read("RCC.BDCR") == 1 << 8 | 3  # the reset has locked it
+    fake_chip.power.is_backup_open = True
     fake_chip.write("RCC.BDCR", 1 << 16)
     assert fake_chip.read("RCC.BDCR") == 1 << 16
     fake_chip.write("RCC.BDCR", 1)
@@ -278,6 +374,7 @@ def test_the_backup_domain_outlives_all_but_a_power_cut(fake_chip: Any) -> None:
 
 
 def test_the_slow_crystal_takes_its_pins(fake_chip: Any) -> None:
+    fake_chip.power.is_backup_open = True
     fake_chip.write("RCC.BDCR", 1)
     assert [fake_chip.pins[name].holder for name in ("PC13", "PC14", "PC15")] == [None, "OSC32_IN", "OSC32_OUT"]
     fake_chip.write("RCC.BDCR", 0)

@@ -29,6 +29,10 @@ PERIPHERALS = {
     "IWDG": {"RLR": 0xFFF},
     "WWDG": {"CR": 0x7F, "CFR": 0x7F},
     **{f"TIM{number}": {"ARR": 0xFFFF} for number in (1, 2, 3, 4)},
+    "CRC": {"DR": 0xFFFF_FFFF},
+    "BKP": {},
+    "RTC": {"CRL": 0x20, "DIVL": 0x8000, "ALRH": 0xFFFF, "ALRL": 0xFFFF},
+    "PWR": {},
 }
 #: Reset values of the core's registers; GPIOA's IDR apart, nothing here depends on the outside.
 CORE = {

@@ -4,9 +4,12 @@ from typing import Any
 
 import pytest
 
-from bluepill_sim.peripherals.iwdg import DIVIDERS, FEED, LSI_NS, START, UNLOCK, UPDATE_NS
+from bluepill_sim.peripherals.iwdg import DIVIDERS, FEED, START, UNLOCK, UPDATE_CYCLES
+from bluepill_sim.peripherals.rcc import ResetCause
 
 MS = 1_000_000
+LSI_NS = 25_000
+UPDATE_NS = UPDATE_CYCLES * LSI_NS
 
 
 def start_iwdg(chip: Any, pr: int, rlr: int) -> None:
@@ -48,7 +51,7 @@ def test_before_its_start_nothing_counts(fake_chip: Any) -> None:
     assert not fake_chip.parts.has_running_watchdog
     fake_chip.write("IWDG.KR", START)
     assert fake_chip.parts.has_running_watchdog
-    assert fake_chip.parts.next_deadline() == 0x1000 * 4 * LSI_NS
+    assert fake_chip.parts.by_name["IWDG"].due_ns == 0x1000 * 4 * LSI_NS
 
 
 def test_settings_are_locked_without_their_key(fake_chip: Any) -> None:
@@ -143,3 +146,51 @@ def test_the_window_watchdog_follows_pclk1(fake_chip: Any) -> None:
     assert fake_chip.expired == []
     fake_chip.advance(due)
     assert fake_chip.expired == [("WWDG", due)]
+
+
+@pytest.mark.parametrize("lsi_hz", [30_000, 47_001, 60_000])
+def test_the_time_out_follows_lsi(fake_chip: Any, lsi_hz: int) -> None:
+    fake_chip.parts.rcc.set_lsi(lsi_hz)
+    fake_chip.write("IWDG.KR", START)
+    due = -(-0x1000 * 4 * 10**9 // lsi_hz)
+    fake_chip.advance(due - 1)
+    assert fake_chip.expired == []
+    fake_chip.advance(due)
+    assert fake_chip.expired == [("IWDG", due)]
+
+
+def test_a_count_under_way_goes_on_at_the_new_lsi(fake_chip: Any) -> None:
+    fake_chip.write("IWDG.KR", START)
+    fake_chip.advance(0x800 * 4 * LSI_NS)
+    fake_chip.parts.rcc.set_lsi(60_000)
+    due = 0x800 * 4 * LSI_NS - (-0x800 * 4 * 10**9 // 60_000)
+    fake_chip.advance(due - 1)
+    assert fake_chip.expired == []
+    fake_chip.advance(due)
+    assert len(fake_chip.expired) == 1
+
+
+@pytest.mark.parametrize("lsi_hz", [29_999, 60_001])
+def test_lsi_has_a_range(fake_chip: Any, lsi_hz: int) -> None:
+    with pytest.raises(ValueError, match="30000 to 60000"):
+        fake_chip.parts.rcc.set_lsi(lsi_hz)
+
+
+def test_the_watchdog_keeps_lsi_on_until_a_reset(fake_chip: Any) -> None:
+    fake_chip.write("IWDG.KR", START)
+    assert fake_chip.read("RCC.CSR") & 3 == 1
+    fake_chip.advance(85_000)
+    assert fake_chip.read("RCC.CSR") & 3 == 3
+    fake_chip.write("RCC.CSR", 0)
+    assert fake_chip.read("RCC.CSR") & 3 == 3
+    fake_chip.parts.reset(ResetCause.PIN)
+    assert fake_chip.read("RCC.CSR") & 3 == 0
+
+
+def test_the_option_byte_starts_it_with_the_chip(fake_chip: Any) -> None:
+    fake_chip.power.starts_watchdog = True
+    fake_chip.parts.by_name["IWDG"].reset()
+    assert fake_chip.parts.has_running_watchdog
+    assert fake_chip.read("RCC.CSR") & 1
+    fake_chip.advance(0x1000 * 4 * LSI_NS)
+    assert len(fake_chip.expired) == 1

@@ -105,7 +105,6 @@ def test_a_capture_without_sips_has_no_table() -> None:
     assert same(capture_of([(0, ROBOT, packet)])) == {}
 
 
-@pytest.mark.no_cover  # it takes times
 def exported(target: Path) -> str:
     source = GOLDEN / "captures" / "player_p2de.jsonl"
     assert run(["export", str(source), str(target)]) == 0

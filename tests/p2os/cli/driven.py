@@ -2,6 +2,7 @@
 
 import os
 import pty
+import re
 import subprocess
 import sys
 import time
@@ -15,6 +16,8 @@ from tests.p2os.client.served_robot import TIMEOUT_S, ServedRobot, until
 
 COMMAND = (sys.executable, "-m", "p2os")
 CLOSE, STOP, VEL = CommandNumber.CLOSE, CommandNumber.STOP, CommandNumber.VEL
+#: A bound on what is done at once: ten times what it takes, for a machine that does other things too.
+AT_ONCE_S = 5.0
 
 
 class RecordingRobot(ServedRobot):
@@ -55,7 +58,10 @@ class RecordingRobot(ServedRobot):
 class Driver:
     """A verb in a process of its own, on a terminal of its own."""
 
-    def __init__(self, words: Sequence[str], *, on_terminal: bool = False, cwd: Path | None = None) -> None:
+    def __init__(
+        self, words: Sequence[str], *, on_terminal: bool = False, cwd: Path | None = None,
+        stdout: int = subprocess.PIPE,
+    ) -> None:  # fmt: skip
         self.keyboard = -1
         if on_terminal:
             self.keyboard, inside = pty.openpty()
@@ -63,8 +69,16 @@ class Driver:
             os.close(inside)
         else:
             self.process = subprocess.Popen(
-                words, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.PIPE, cwd=cwd
+                words, stdin=subprocess.DEVNULL, stdout=stdout, stderr=subprocess.PIPE, cwd=cwd
             )
+
+    def listens_at(self) -> str:
+        """Return the URL that `p2os sniff` says it listens at, of a port that the system chose."""
+        assert self.process.stderr is not None
+        said = self.process.stderr.readline().decode()
+        found = re.match(r"listening on (\S+) ", said)
+        assert found, said
+        return found[1]
 
     def press(self, keys: str) -> None:
         os.write(self.keyboard, keys.encode())
@@ -74,7 +88,7 @@ class Driver:
         try:
             if self.keyboard < 0:
                 out, err = self.process.communicate(timeout=TIMEOUT_S)
-                return self.process.returncode, (out + err).decode()
+                return self.process.returncode, ((out or b"") + err).decode()
             return self.process.wait(TIMEOUT_S), ""
         finally:
             self.close()
@@ -88,4 +102,4 @@ class Driver:
             self.keyboard = -1
 
 
-__all__ = ["CLOSE", "COMMAND", "STOP", "TIMEOUT_S", "VEL", "Driver", "RecordingRobot", "until"]
+__all__ = ["AT_ONCE_S", "CLOSE", "COMMAND", "STOP", "TIMEOUT_S", "VEL", "Driver", "RecordingRobot", "until"]

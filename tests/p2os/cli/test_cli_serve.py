@@ -192,7 +192,7 @@ def test_nobody_who_reads_its_lines_keeps_no_client_from_the_robot(serving: Call
     assert served.process.stderr is not None
     fcntl.fcntl(served.process.stderr, fcntl.F_SETPIPE_SZ, 4096)
     address = "127.0.0.1", int(served.start["url"].rpartition(":")[2])
-    with socket.create_connection(address, timeout=5.0) as client:
+    with socket.create_connection(address, timeout=TIMEOUT_S) as client:
         end = time.monotonic() + 1.0
         while time.monotonic() < end:  # each round tells "synchronised": at 20 times 50 lines a second some 25 KB
             for number in (0, 1, 2):

@@ -56,7 +56,7 @@ class Interrupter:
     def _trace(self, frame: FrameType, event: str, _: object) -> Any:
         if not frame.f_code.co_filename.startswith(self.files):
             return None
-        if event == "line":
+        if event == "line" and frame.f_lineno:  # 0: a probe that counts branches
             self.lines += 1
             if self.lines == self.place:
                 self.at = f"{frame.f_code.co_filename}:{frame.f_lineno}"

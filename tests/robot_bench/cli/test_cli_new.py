@@ -19,7 +19,7 @@ from robot_bench.project import files as project
 from robot_bench.scenario.scenario import read_scenario
 
 NAMES = {
-    "main.c", "Makefile", "README.md", ".gitignore", "just-drive.toml",
+    "main.c", "Makefile", "README.md", ".gitignore", "just-drive.toml", "tests/test_robot.py", "pytest.ini",
     "board/startup.c", "board/memory.c", "board/f103.h", "board/f103c8.ld", "board/wires.h",
 }  # fmt: skip
 PATROL = re.compile(r"```toml\n(# patrol\.toml\n.*?)```", re.DOTALL)
@@ -49,7 +49,7 @@ def test_a_project_is_written_and_the_next_command_is_named(capsys: pytest.Captu
     assert p2os(["new", "mine"]) == 0
     assert held(Path("mine")) == NAMES
     said = capsys.readouterr().out.splitlines()
-    assert said[0].startswith("mine: 10 files")
+    assert said[0].startswith("mine: 12 files")
     assert said[-1] == "next: cd mine && make run"
     assert max(map(len, said)) <= 80
 
@@ -112,7 +112,7 @@ def test_what_cannot_be_is_one_line_and_a_hint_and_leaves_all_as_it_was(
     assert Path("full/theirs.c").read_text(encoding="utf-8") == "mine"
 
 
-@pytest.mark.parametrize("written", range(12))
+@pytest.mark.parametrize("written", range(14))
 def test_a_disk_that_fills_up_leaves_nothing_behind(written: int, monkeypatch: pytest.MonkeyPatch) -> None:
     contents = project.project_files("kinematic")
     left = [written]
@@ -149,7 +149,7 @@ def test_make_without_the_compiler_is_one_line_with_its_package() -> None:
     done = make("CC=no-such-compiler")
     assert done.returncode == 2
     assert done.stderr == (
-        "Makefile:20: *** no-such-compiler is not installed (hint: sudo apt-get install gcc-arm-none-eabi).  Stop.\n"
+        "Makefile:22: *** no-such-compiler is not installed (hint: sudo apt-get install gcc-arm-none-eabi).  Stop.\n"
     )
 
 
@@ -190,6 +190,34 @@ def test_a_student_gets_from_nothing_to_a_robot_that_drives() -> None:
     assert outcome["usart_lines"] == len(printed)
     assert outcome["usart_last"] == printed[-1]
     assert set(printed) == {"waiting for the robot", "forward", "turning left", "turning right"}
+
+
+PYTEST = f"PYTEST={sys.executable} -m pytest -p robot_bench.cli.pytest_plugin -p no:cacheprovider -q"
+
+
+@needs_compiler
+@pytest.mark.slow
+def test_the_tests_of_a_new_project_pass_and_notice_what_was_broken() -> None:
+    project.write_project(Path("mine"), project.project_files("kinematic"))
+    done = make("test", PYTEST)
+    assert "12 passed" in done.stdout, done.stdout
+    main = Path("mine/main.c")
+    text = main.read_text(encoding="utf-8")
+    for right, wrong, noticed in (
+        ("sleep_ticks(3u *", "sleep_ticks(2u *", "test_it_stands_until_three_seconds"),
+        (
+            "seen & LEFT_AHEAD ? &turn_right",
+            "seen & LEFT_AHEAD ? &turn_left",
+            "test_it_turns_away_from_what_a_sonar_sees",
+        ),
+        ("(1u << 2 | 1u << 3)", "(1u << 1 | 1u << 2)", "test_it_turns_away_from_what_a_sonar_sees[4-right]"),
+        ("sleep_ticks(1))", "sleep_ticks(7))", "test_the_motors_answer_a_sensor_within_20_ms"),
+    ):
+        assert right in text
+        main.write_text(text.replace(right, wrong), encoding="utf-8")
+        failed = make("test", f"{PYTEST} --bench-record none -k {noticed.partition('[')[0]}", "-s")
+        assert failed.returncode != 0
+        assert f"FAILED tests/test_robot.py::{noticed}" in failed.stdout, failed.stdout
 
 
 @needs_compiler

@@ -114,7 +114,7 @@ at_s = 2.0
     stopped = next(pose for pose in record.poses if pose.t >= 1_990_000_000)
     assert stopped.left == 0
     assert record.poses[-1].left > 100 * MM, "and on it goes"
-    assert record.collisions() == []
+    assert record.contacts == []
 
 
 def test_it_is_the_same_in_any_slices_and_from_a_pickle() -> None:

@@ -1,13 +1,16 @@
 """Run records made by hand, for goals and exports."""
 
-from robot_bench.recording.run_record import PoseSample, RunRecord
+from collections.abc import Iterator
+
+from robot_bench.events.kinds import Event, PinEdge, Pose, Text
+from robot_bench.recording.run_record import RunRecord
 from robot_bench.wires.edges import Edges
 
 S = 10**9
 
 
-def pose(t: int = 0, x: int = 0, y: int = 0, *, la: int = 0, ra: int = 0, collisions: int = 0) -> PoseSample:
-    return PoseSample(
+def pose(t: int = 0, x: int = 0, y: int = 0, *, la: int = 0, ra: int = 0, collisions: int = 0) -> Pose:
+    return Pose(
         t=t, x=x, y=y, z=0, heading=0, pitch=0, left=0, right=0, left_angle=la, right_angle=ra, collisions=collisions
     )
 
@@ -32,3 +35,11 @@ def motor_pins(*steps: tuple[float, int, int], skew_ns: int = 0) -> dict[str, Ed
 
 def record(**fields: object) -> RunRecord:
     return RunRecord(meta={"scenario": "mine"}, is_cut=False, **fields)  # type: ignore[arg-type]
+
+
+def events_in(run: RunRecord) -> Iterator[Event]:
+    """Yield what a record holds as its subscribers would have got it."""
+    edges = [PinEdge(t=t, wire=net, level=bool(v)) for net, track in run.pins.items() for t, v in track]
+    texts = [Text(t=t, data=data) for t, data in run.usart]
+    ranked = (edges, texts, run.changes, run.contacts, run.poses)
+    yield from sorted((event for kind in ranked for event in kind), key=lambda event: event.t)

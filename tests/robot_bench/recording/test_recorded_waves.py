@@ -42,7 +42,13 @@ def recorded() -> RunRecord:
 
 def test_a_wave_is_a_row_a_change_and_the_edges_have_it_as_low() -> None:
     record = recorded()
-    assert record.waves == {"pwm": [(10 * MS, SLOW), (30 * MS, FAST), (60 * MS, OTHER), (120 * MS, None)]}
+    found = [(at // MS, wave and (wave.period, wave.high, wave.ticks_hz)) for at, wave in record.waves["pwm"]]
+    shapes = [(wave.period, wave.high, wave.ticks_hz) for wave in (SLOW, FAST, OTHER)]
+    assert found == [(10, shapes[0]), (30, shapes[1]), (60, shapes[2]), (120, None)]
+    for at, wave in record.waves["pwm"][:3]:
+        there = next(one for one in (SLOW, FAST, OTHER) if one.high == wave.high)
+        # So many ticks ago it rose: high since then, if that is less than it stays high.
+        assert (wave.at < wave.high) is there.level(at)
     assert record.pins["pwm"] == [(0, 1), (10 * MS, 0), (120 * MS, 1)]
     assert record.pins["plain"] == [(0, 0), (20 * MS, 1)]
 
@@ -77,8 +83,9 @@ def test_the_vcd_has_x_during_a_wave_and_duty_and_frequency_as_numbers(tmp_path:
     assert [(at, value) for at, name, value in rows if name == "plain"] == [(0, "0"), (20, "1")]
 
 
-@pytest.mark.parametrize("row", [[5, 0, 10, 10], [5, 0, 10, 0], [5, 0, 0, 0], [5, 0, 10], [1 << 70], ["x"], 7])
-def test_a_row_that_is_no_wave_is_a_damaged_line(row: object) -> None:
-    line = json.dumps({"k": "waves", "t": 5, "net": "pwm", "hz": 1000, "ns": 0, "rows": [row]}) + "\n"
+@pytest.mark.parametrize("row", [(0, 10, 10), (0, 10, 0), (10, 10, 5), (-1, 10, 5), (0, -10, 5), (1 << 70, 10, 5)])
+def test_a_row_that_is_no_wave_is_a_damaged_line(row: tuple[int, int, int]) -> None:
+    shape = dict(zip(("at", "period", "high"), row, strict=True))
+    line = json.dumps({"k": "wave", "t": 5, "net": "pwm", "hz": 1000, **shape}) + "\n"
     with pytest.raises(TraceError, match="the trace:2: a damaged line"):
         record_of(StringIO('{"k":"meta"}\n' + line))

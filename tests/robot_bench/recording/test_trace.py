@@ -10,12 +10,12 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 
-from p2os.errors import LocalProtocolError, RunFailedError
-from robot_bench.recording.run_record import TraceError, read_run, record_of
-from robot_bench.recording.trace import RANKS, TraceWriter, canonical
+from p2os.errors import RunFailedError
+from robot_bench.events.codec import TraceError, events_of
+from robot_bench.events.kinds import Contact, Note, Verdict
+from robot_bench.recording.run_record import read_run, record_of
+from robot_bench.recording.trace import TraceWriter
 from simbase.errors import FileError
 
 S = 10**9
@@ -29,55 +29,21 @@ def chain(text: str) -> str:
     return digest.hex()
 
 
-def test_a_line_has_one_spelling() -> None:
-    assert canonical({"t": 1, "k": "pin", "net": "µ"}) == '{"k":"pin","net":"\\u00b5","t":1}'
+def note(t: int, what: str = "x") -> Note:
+    return Note(t=t, who="adapter", what=what)
 
 
-@given(
-    st.lists(st.tuples(st.integers(0, 40), st.sampled_from(sorted(RANKS)), st.integers(0, 3)), max_size=20), st.data()
-)
-def test_when_it_is_written_changes_nothing(entries: list[tuple[int, str, int]], data: st.DataObject) -> None:
-    entries = sorted(entries, key=lambda entry: entry[0])
-    at_once, in_pieces = TraceWriter(), TraceWriter()
-    for at, kind, value in entries:
-        at_once.add(kind, at, {"v": value})
-        in_pieces.add(kind, at, {"v": value})
-        if data.draw(st.booleans()):
-            in_pieces.write_until(at - 1)
-    for trace in (at_once, in_pieces):
-        trace.write_until(50)
-    assert in_pieces.text == at_once.text
-    assert in_pieces.sha256 == at_once.sha256 == chain(at_once.text)
-    times = [json.loads(line)["t"] for line in at_once.text.splitlines()]
-    assert times == sorted(times)
-
-
-def test_kinds_of_one_instant_have_a_fixed_order() -> None:
-    trace = TraceWriter()
-    for kind in sorted(RANKS, reverse=True):
-        trace.add(kind, 5, {})
-    trace.write_until(5)
-    assert [json.loads(line)["k"] for line in trace.text.splitlines()] == sorted(RANKS, key=RANKS.__getitem__)
-
-
-def test_what_comes_after_its_time_was_written_is_a_bug() -> None:
-    trace = TraceWriter()
-    trace.write_until(5)
-    with pytest.raises(LocalProtocolError, match="at 5 ns comes after 5 ns"):
-        trace.add("pins", 5, {})
-
-
-def test_first_and_last_line_are_not_hashed(tmp_path: Path) -> None:
+def test_first_and_last_line_and_verdicts_are_not_hashed(tmp_path: Path) -> None:
     path = tmp_path / "trace.jsonl"
     trace = TraceWriter(path)
     trace.meta({"version": "1"})
-    trace.add("pins", 0, {"net": "DD1", "v": 0})
-    trace.write_until(0)
+    trace.take([note(0), Verdict(t=0, goal="touches nothing", met=False, says="a wall"), note(0, "y")], 0)
     digest = trace.sha256
     trace.end({"passed": True})
     lines = path.read_text().splitlines(keepends=True)
-    assert [json.loads(line)["k"] for line in lines] == ["meta", "pins", "end"]
-    assert digest == chain(lines[1])
+    assert [json.loads(line)["k"] for line in lines] == ["meta", "event", "verdict", "event", "end"]
+    assert digest == chain(lines[1] + lines[3])
+    assert [type(event) for event in events_of(lines)] == [Note, Verdict, Note]
     trace.close()
 
 
@@ -96,28 +62,22 @@ def test_a_full_disk_is_one_line() -> None:
 
 def test_a_restored_writer_goes_on_alike() -> None:
     first, second = TraceWriter(), TraceWriter()
-    first.add("pins", 3, {"v": 1})
-    first.add("pins", 9, {"v": 2})
-    first.write_until(5)
+    first.take([note(3)], 5)
     second.restore(first.snapshot())
     for trace in (first, second):
-        trace.add("pins", 7, {"v": 3})
-        trace.write_until(10)
+        trace.take([note(7), note(9)], 10)
     assert (second.text, second.sha256) == (first.text, first.sha256)
 
 
 def begun(path: Path | None) -> TraceWriter:
     trace = TraceWriter(path)
     trace.meta({"version": "1"})
-    trace.add("pins", 3, {"v": 1})
-    trace.add("pins", 9, {"v": 2})
-    trace.write_until(5)
+    trace.take([note(3, "one"), Verdict(t=4, goal="x", met=True, says="")], 5)
     return trace
 
 
 def ended(trace: TraceWriter) -> str:
-    trace.add("pins", 7, {"v": 3})
-    trace.write_until(10)
+    trace.take([note(7), note(9)], 10)
     trace.end({"passed": True})
     return trace.sha256
 
@@ -142,9 +102,7 @@ def test_a_trace_in_memory_goes_on_in_a_file(tmp_path: Path) -> None:
     assert (tmp_path / "trace").read_text() == first.text
 
 
-@pytest.mark.parametrize(
-    "change", [lambda data: data[:-3], lambda data: data.replace(b'"v":1', b'"v":2'), lambda _: b""]
-)
+@pytest.mark.parametrize("change", [lambda data: data[:-3], lambda data: data.replace(b"one", b"two"), lambda _: b""])
 def test_a_file_that_is_not_the_one_that_was_begun_is_left_alone(
     tmp_path: Path, change: Callable[[bytes], bytes]
 ) -> None:
@@ -164,12 +122,12 @@ def test_a_file_that_is_not_the_one_that_was_begun_is_left_alone(
 KILLED = """
 import os, sys
 from pathlib import Path
+from robot_bench.events.kinds import Note
 from robot_bench.recording.trace import TraceWriter
 trace = TraceWriter(Path(sys.argv[1]))
 trace.meta({})
 for ms in range(0, 2600, 100):
-    trace.add("pose", ms * 10**6, {"x": ms})
-    trace.write_until(ms * 10**6)
+    trace.take([Note(t=ms * 10**6, who="test", what="x")], ms * 10**6)
 print("ready", flush=True)
 sys.stdin.read()
 """
@@ -183,7 +141,7 @@ def test_a_killed_process_leaves_everything_up_to_its_last_whole_second(tmp_path
     assert process.stdout is not None
     assert process.stdout.readline() == "ready\n"
     os.kill(process.pid, signal.SIGKILL)
-    process.communicate(timeout=10)
+    process.communicate(timeout=60)
     times = [json.loads(line).get("t", -1) for line in path.read_text().splitlines()]
     assert max(times) >= 2 * S
 
@@ -249,6 +207,18 @@ def test_a_trace_that_was_cut_anywhere_within_a_block_is_read_up_to_the_line_bef
     whole = record_of([HEAD])
     for end in range(len(BLOCK)):
         assert record_of([HEAD, BLOCK[:end]]) == whole
+
+
+def test_a_trace_of_a_later_version_is_refused_in_words(tmp_path: Path) -> None:
+    (tmp_path / "trace.jsonl").write_text('{"k":"meta","trace":3}\n', encoding="utf-8")
+    with pytest.raises(TraceError, match=r"trace\.jsonl:1: a trace of version 3, and this p2os reads 2"):
+        read_run(tmp_path)
+
+
+def test_a_collision_of_an_old_trace_is_a_contact() -> None:
+    old = '{"k":"event","t":5,"who":"body","what":"collision","detail":"\'red box\' at x 1.250 m, y -0.500 m"}\n'
+    assert list(events_of([old])) == [Contact(t=5, what="'red box'", x_m=1.25, y_m=-0.5)]
+    assert record_of([old]).contacts[0].part == ""
 
 
 def test_a_trace_of_single_edges_is_read_too() -> None:

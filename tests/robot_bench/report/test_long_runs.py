@@ -6,7 +6,8 @@ from dataclasses import replace
 import pytest
 
 from p2os.protocol.packets import EncoderPacket
-from robot_bench.recording.run_record import Event, RunRecord, WireChunk
+from robot_bench.events.kinds import Contact, Note, Packet, WorldChange
+from robot_bench.recording.run_record import RunRecord
 from robot_bench.report.page import page_data, render_page
 from robot_bench.report.thinning import ends, extremes, pulses
 from robot_bench.wires.edges import Edges
@@ -33,14 +34,14 @@ def long_run(seconds: int) -> RunRecord:
         sonar=sonar,
         pins=pins,
         usart=[(n * 100 * MS, f"line {n}\n".encode()) for n in range(seconds * 10)],
-        wire=[WireChunk(t=n * 50 * MS, direction="r2c", data=PACKET) for n in range(seconds * 20)],
+        wire=[Packet(t=n * 50 * MS, direction="r2c", data=PACKET) for n in range(seconds * 20)],
         events=[
-            Event(t=n * 500 * MS, who="adapter", what="command", detail="VEL 188, RVEL 0 (motors 3, 3)")
+            Note(t=n * 500 * MS, who="adapter", what="command", detail="VEL 188, RVEL 0 (motors 3, 3)")
             for n in range(seconds * 2)
-        ]
-        + [Event(t=seconds // 2 * S, who="body", what="collision", detail="'crate' at x 1.000 m, y 0.000 m")],
-        obstacles=[{"k": "obstacle", "op": "move", "name": "dog", "t": n * 50 * MS, "x": 1.0, "y": n * 1e-3,
-                    "heading": 0.0} for n in range(seconds * 20)],
+        ],
+        contacts=[Contact(t=seconds // 2 * S, what="'crate'", x_m=1.0, y_m=0.0)],
+        changes=[WorldChange(t=n * 50 * MS, op="move", name="dog", fields={"x": 1.0, "y": n * 1e-3, "heading": 0.0})
+                 for n in range(seconds * 20)],
         last_ns=seconds * S,
         is_cut=False,
     )  # fmt: skip
@@ -51,7 +52,6 @@ def hour() -> RunRecord:
     return long_run(3600)
 
 
-@pytest.mark.no_cover  # an hour of events
 def test_the_page_of_an_hour_is_bounded_and_says_what_it_leaves_out(hour: RunRecord) -> None:
     page = render_page(hour, page_data(hour))
     assert len(page) < MOST_BYTES
@@ -60,7 +60,6 @@ def test_the_page_of_an_hour_is_bounded_and_says_what_it_leaves_out(hour: RunRec
     assert "trace.jsonl holds all" in page
 
 
-@pytest.mark.no_cover  # an hour of events
 def test_what_stands_out_is_kept(hour: RunRecord) -> None:
     data = json.loads(json.dumps(page_data(hour)))
     assert max(row[4] for row in data["poses"]) == 0.999

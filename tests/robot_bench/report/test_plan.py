@@ -6,7 +6,9 @@ import re
 import pytest
 
 from adapter_sim.pinout import load_pinout
-from robot_bench.recording.run_record import Event, Json, RunRecord, WireChunk
+from robot_bench.events.codec import Json
+from robot_bench.events.kinds import Contact, Packet
+from robot_bench.recording.run_record import RunRecord
 from robot_bench.recording.signals import pin_labels
 from robot_bench.report.page import page_data, render_page
 from robot_bench.report.plan import LETTER_PX, LINE_PX, NARROW_PX, WIDE_PX, plan
@@ -74,11 +76,10 @@ def test_each_wire_is_labelled_with_its_pin_and_its_signal() -> None:
 
 
 def hits(seconds: int) -> RunRecord:
-    detail = "'crate' at x 1.000 m, y 0.000 m"
     return RunRecord(
         meta={"scenario": "hit"}, poses=[pose(t=n * S) for n in range(seconds)], is_cut=False, last_ns=seconds * S,
-        pins={"motor1_comm1": Edges([(0, 1)])}, events=[Event(t=S, who="body", what="collision", detail=detail)],
-        wire=[WireChunk(t=n * S, direction="c2r", data=bytes.fromhex("fafb03000000")) for n in range(seconds)],
+        pins={"motor1_comm1": Edges([(0, 1)])}, contacts=[Contact(t=S, what="'crate'", x_m=1.0, y_m=0.0)],
+        wire=[Packet(t=n * S, direction="c2r", data=bytes.fromhex("fafb03000000")) for n in range(seconds)],
     )  # fmt: skip
 
 

@@ -6,7 +6,9 @@ from pathlib import Path
 import pytest
 
 from p2os.protocol.packets import EncoderPacket
-from robot_bench.recording.run_record import TraceError, WireChunk, read_run
+from robot_bench.events.codec import TraceError
+from robot_bench.events.kinds import Packet
+from robot_bench.recording.run_record import read_run
 from robot_bench.recording.signals import grouped, motor_steps
 from robot_bench.recording.summary import cells_entered, distance_m, figures, verdict
 from robot_bench.report import make_report
@@ -144,6 +146,6 @@ def test_a_folder_without_a_trace_is_refused_with_a_hint(tmp_path: Path) -> None
 
 def test_a_packet_beyond_the_standard_one_is_named_with_its_fields() -> None:
     frame = EncoderPacket(left_counts=5, right_counts=-7).to_frame()
-    assert describe(WireChunk(t=0, direction="r2c", data=frame.to_bytes())) == [
+    assert describe(Packet(t=0, direction="r2c", data=frame.to_bytes())) == [
         ("EncoderPacket", "left_counts 5, right_counts -7")
     ]

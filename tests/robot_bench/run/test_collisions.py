@@ -43,18 +43,21 @@ def test_what_was_hit_is_named_everywhere(body: str, mode: str, capsys: pytest.C
     assert p2os(["run", "crash.toml", "--body", body, "--mode", mode, "--out", "crash"]) == 1
     out = capsys.readouterr().out
     record = read_run(Path("crash"))
-    (hit, *_) = record.collisions()
+    (hit, *_) = record.contacts
     assert hit.what == "'red box'"
-    assert hit.x == pytest.approx(-1.0, abs=0.02)
+    assert hit.x_m == pytest.approx(-1.0, abs=0.02)
     first = next(pose.t for pose in record.poses if pose.collisions)
     assert first - 50_000_000 <= hit.t <= first
     assert out.count(str(hit)) == 1, "the goal that it fails names it"
-    assert f"failed  no_collision: {len(record.collisions())} collision(s): {hit}" in out
+    assert f"failed  no_collision: {len(record.contacts)} collision(s): {hit}" in out
     summary = json.loads(Path("crash/summary.json").read_text(encoding="utf-8"))
-    assert summary["hits"][0] == {"t_s": hit.t / 1e9, "what": "'red box'", "x_m": hit.x, "y_m": hit.y}
+    assert summary["hits"][0] == {
+        "t_s": hit.t / 1e9, "what": "'red box'", "x_m": hit.x_m, "y_m": hit.y_m, "part": hit.part,
+    }  # fmt: skip
     data = page_data(record)
-    assert (hit.t / 1e9, hit.x, hit.y, "'red box'") in data["hits"]  # type: ignore[operator] # a list
-    log = [(event.who, event.what) for event in record.events]
+    assert (hit.t / 1e9, hit.x_m, hit.y_m, "'red box'") in data["hits"]  # type: ignore[operator] # a list
+    assert hit.part.startswith("front")
+    log = [(who, what) for _, who, what, _ in data["events"]]  # type: ignore[misc, attr-defined] # rows of a list
     assert ("body", "collision") in log
     assert ("direct" if mode == "direct" else "adapter", "command") in log
     capsys.readouterr()
@@ -66,7 +69,7 @@ def test_what_no_goal_forbids_is_named_all_the_same(capsys: pytest.CaptureFixtur
     without_goal = SCENARIO.format(duration_s=8.9).partition("[[goal]]")[0]
     Path("crash.toml").write_text(without_goal, encoding="utf-8")
     assert p2os(["run", "crash.toml", "--body", "kinematic", "--mode", "direct", "--out", "crash"]) == 0
-    (hit, *_) = read_run(Path("crash")).collisions()
+    (hit, *_) = read_run(Path("crash")).contacts
     assert capsys.readouterr().out.count(f"hit     {hit}\n") == 1
 
 

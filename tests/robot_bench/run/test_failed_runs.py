@@ -12,10 +12,10 @@ import pytest
 from bluepill_sim.errors import UnmodelledError
 from p2os.cli.main import run as p2os
 from robot_bench import bench, run
-from robot_bench.recording.run_record import RunRecord, read_run
+from robot_bench.events.kinds import Pose
+from robot_bench.recording.run_record import read_run
 from robot_bench.recording.summary import outcome_of, verdict
 from robot_bench.report.make import make_artefacts
-from robot_bench.scenario.goals import Judgement
 from robot_bench.scenario.scenario import Scenario, load_scenario
 from simbase.errors import MissingDependencyError, P2osError
 
@@ -138,13 +138,12 @@ def test_a_report_that_cannot_be_written_is_one_line(
     assert capsys.readouterr().err == f"p2os: cannot write into {tmp_path}: No space left on device\n"
 
 
-def test_goals_are_judged_from_all_of_the_trace(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_goals_are_judged_from_all_of_the_run(tmp_path: Path) -> None:
     seen: list[int] = []
 
-    def judge(record: RunRecord, _goals: object, **_times: int) -> Judgement:
-        seen.append(record.poses[-1].t)
-        return Judgement([], [], [])
+    def drive(made: bench.Bench) -> None:
+        made.events.subscribe(lambda pose: seen.append(pose.t), Pose)
+        made.run_until(made.end)
 
-    monkeypatch.setattr(bench, "judge", judge)
-    run.run_scenario(wanted(1.95), tmp_path / "run")
-    assert seen == [1_950_000_000]
+    run.run_scenario(wanted(1.95), tmp_path / "run", drive=drive)
+    assert seen[-1] == 1_950_000_000

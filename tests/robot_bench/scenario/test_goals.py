@@ -4,9 +4,10 @@ import math
 
 import pytest
 
+from robot_bench.events.kinds import WorldChange
 from robot_bench.recording.run_record import RunRecord
-from robot_bench.scenario.goals import KINDS, Goal, judge, load_goal
-from tests.robot_bench.recording.records import S, motor_pins, pose, record, text
+from robot_bench.scenario.goals.judging import Goal, Judgement, judge, load_goal
+from tests.robot_bench.recording.records import S, events_in, motor_pins, pose, record, text
 
 EIGHTH = math.pi / 4 * 1e6
 
@@ -14,12 +15,12 @@ EIGHTH = math.pi / 4 * 1e6
 def failure(kind: str, run: RunRecord, **arguments: object) -> str | None:
     goal = load_goal({"kind": kind, **arguments}, "mine.toml: [[goal]] 1")
     assert goal.wanted
-    return goal.failure(run)
+    (said,) = [*(found := judged(run, goal, end_ns=run.last_ns)).missed, *([None] if found.met else [])]
+    return said if said is None else said.removeprefix(f"{kind}: ")
 
 
-def test_every_kind_of_goal_is_tried_here() -> None:
-    names = " ".join(name for name in globals() if name.startswith("test_goal_"))
-    assert [kind for kind in KINDS if kind not in names] == []
+def judged(run: RunRecord, *goals: Goal, end_ns: int, planned_ns: int = 0, can_tell_world: bool = True) -> Judgement:
+    return judge(events_in(run), goals, end_ns=end_ns, planned_ns=planned_ns, can_tell_world=can_tell_world)
 
 
 def test_goal_no_collision() -> None:
@@ -88,21 +89,21 @@ def test_goal_encoder_counts_match(left: int, right: int, lacks: str | None) -> 
     assert failure("encoder_counts_match", record()) == "no counts were printed; nothing was printed"
 
 
-def placed(*numbers: int) -> list[dict[str, object]]:
-    return [{"t": 10 * n * S, "op": "place", "name": "post", "sonar": n} for n in numbers]
+def placed(*numbers: int) -> list[WorldChange]:
+    return [WorldChange(t=10 * n * S, op="place", name="post", fields={"sonar": n}) for n in numbers]
 
 
 def test_goal_sensor_named() -> None:
     said = [(10.2, "sensor 1 on"), (11.2, "sensor 1 off"), (20.2, "sensor 2 on"), (21.2, "sensor 2 off")]
-    run = record(obstacles=placed(1, 2), usart=text(*said), last_ns=30 * S)
+    run = record(changes=placed(1, 2), usart=text(*said), last_ns=30 * S)
     assert failure("sensor_named", run) is None
-    missed = record(obstacles=placed(1, 2), usart=text(*said[:3]), last_ns=30 * S)
+    missed = record(changes=placed(1, 2), usart=text(*said[:3]), last_ns=30 * S)
     assert (
         failure("sensor_named", missed) == "with something before sonar 2 from 20.000 s on it printed ['sensor 2 on']"
     )
-    other = record(obstacles=placed(1), usart=text(*said, (11.5, "sensor 7 on")), last_ns=30 * S)
+    other = record(changes=placed(1), usart=text(*said, (11.5, "sensor 7 on")), last_ns=30 * S)
     assert failure("sensor_named", other) is not None
-    early = record(obstacles=placed(1), usart=text((5, "sensor 4 on"), *said[:2]), last_ns=30 * S)
+    early = record(changes=placed(1), usart=text((5, "sensor 4 on"), *said[:2]), last_ns=30 * S)
     assert failure("sensor_named", early) == "'sensor 4 on' was printed before anything was placed"
     assert failure("sensor_named", record()) == "nothing was placed before a sonar"
 
@@ -110,30 +111,44 @@ def test_goal_sensor_named() -> None:
 def test_a_real_robot_is_not_asked_what_it_cannot_tell() -> None:
     run = record(poses=[pose(collisions=1)])
     goals = (Goal(kind="no_collision", arguments={}), Goal(kind="min_distance", arguments={"distance_m": 1}))
-    assert [line.split(":")[0] for line in judge(run, goals, end_ns=S).missed] == ["no_collision", "min_distance"]
-    run.meta["mode"] = "port"
-    assert [line.split(":")[0] for line in judge(run, goals, end_ns=S).missed] == ["min_distance"]
+    assert [line.split(":")[0] for line in judged(run, *goals, end_ns=S).missed] == ["no_collision", "min_distance"]
+    told = judged(run, *goals, end_ns=S, can_tell_world=False)
+    assert [line.split(":")[0] for line in told.missed] == ["min_distance"]
 
 
 def test_what_is_met_is_told_as_it_was_wanted() -> None:
     run = record(poses=[pose()], usart=text((1, "x")))
     goals = (Goal(kind="no_collision", arguments={}), Goal(kind="usart_lacks", arguments={"text": "x"}))
-    judged = judge(run, goals, end_ns=S, planned_ns=9 * S)
-    assert judged.met == ["touches nothing"]
-    assert judged.missed == ["usart_lacks: 'x' was printed at 1.000 s"], "what forbids is judged from the start"
+    found = judged(run, *goals, end_ns=S, planned_ns=9 * S)
+    assert found.met == ["touches nothing"]
+    assert found.missed == ["usart_lacks: 'x' was printed at 1.000 s"], "what forbids is judged from the start"
 
 
-@pytest.mark.parametrize("kind", sorted(KINDS))
-def test_a_goal_is_missed_from_the_planned_end_on_and_not_before_unless_it_forbids(kind: str) -> None:
-    arguments = {
-        "min_distance": {"distance_m": 1}, "cells": {"least": 2}, "motor_sequence": {"values": [[1, 1]]},
-        "usart_contains": {"text": "ready"}, "usart_lacks": {"text": "panic"}, "usart_in_order": {"texts": ["ready"]},
-    }  # fmt: skip
-    run = record(poses=[pose(collisions=1)], usart=text((1, "panic")))
-    goal = Goal(kind=kind, arguments=arguments.get(kind, {}))
-    early, late = (judge(run, (goal,), end_ns=end_ns, planned_ns=9 * S) for end_ns in (9 * S - 1, 9 * S))
+@pytest.mark.parametrize(
+    ("kind", "arguments"),
+    [
+        ("min_distance", {"distance_m": 1}), ("cells", {"least": 2}), ("motor_sequence", {"values": [[1, 1]]}),
+        ("usart_contains", {"text": "ready"}), ("usart_in_order", {"texts": ["ready"]}), ("encoder_counts_match", {}),
+        ("sensor_named", {}), ("reach", {"x_m": 5, "y_m": 0, "radius_m": 1}),
+        ("eventually", {"signal": "x_m", "least": 1}), ("happens", {"event": "contact"}),
+        ("in_order", {"events": ["contact"]}), ("wave", {"pin": "PB7"}),
+        ("latency", {"from": "contact", "to": "contact", "most_s": 1}),
+    ],
+)  # fmt: skip
+def test_what_is_to_be_reached_is_missed_from_the_planned_end_on_and_not_before(
+    kind: str, arguments: dict[str, object]
+) -> None:
+    run, goal = record(poses=[pose()], usart=text((1, "panic"))), Goal(kind=kind, arguments=arguments)
+    early, late = (judged(run, goal, end_ns=end_ns, planned_ns=9 * S) for end_ns in (9 * S - 1, 9 * S))
     assert (len(late.missed), late.not_judged) == (1, [])
-    if kind in {"no_collision", "usart_lacks"}:
-        assert early == late
-    else:
-        assert (early.missed, early.not_judged) == ([], [f"{goal.wanted}: not judged before 9 s"])
+    assert (early.missed, early.not_judged) == ([], [f"{goal.wanted}: not judged before 9 s"])
+
+
+@pytest.mark.parametrize(("kind", "arguments"), [("no_collision", {}), ("usart_lacks", {"text": "panic"})])
+def test_what_is_forbidden_is_missed_at_any_time(kind: str, arguments: dict[str, object]) -> None:
+    run = record(poses=[pose(collisions=1)], usart=text((1, "panic")))
+    early, late = (
+        judged(run, Goal(kind=kind, arguments=arguments), end_ns=t, planned_ns=9 * S) for t in (2 * S, 9 * S)
+    )
+    assert early == late
+    assert len(early.missed) == 1

@@ -10,7 +10,7 @@ from p2os.errors import ScenarioError
 from p2os.pioneer.controller.settings import SonarPerSip
 from p2os.pioneer.world import load_world
 from robot_bench.bench import Bench
-from robot_bench.scenario.goals import KINDS
+from robot_bench.scenario.goals.kinds import KINDS
 from robot_bench.scenario.scenario import known_scenarios, load_scenario, read_scenario
 from robot_bench.scenario.schema import Key
 from robot_bench.scenario.world_script import Op

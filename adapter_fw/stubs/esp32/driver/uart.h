@@ -1,6 +1,6 @@
 #pragma once
-#include "../esp_err.h"
-#include "../freertos/FreeRTOS.h"
+#include <esp_err.h>
+#include <freertos/FreeRTOS.h>
 typedef enum { UART_NUM_0, UART_NUM_1, UART_NUM_2 } uart_port_t;
 typedef enum { UART_DATA_8_BITS = 3 } uart_word_length_t;
 typedef enum { UART_PARITY_DISABLE = 0 } uart_parity_t;

@@ -315,12 +315,12 @@ static void write_device(struct core *core, struct page *page, uint32_t index, u
 }
 
 /* Whether an access is made here: where a hook has ended the run it is not made, and where a request that may interrupt
- * came before, Python ends the block.
+ * came before, or the core has to wait, Python ends the block.
  */
 static bool may_access(struct core *core)
 {
     const struct shared *s = &core->shared;
-    return !s->is_python && s->halt_kind == HALT_NONE && (s->stop_at || !is_interrupted(core));
+    return !s->is_python && s->halt_kind == HALT_NONE && (s->stop_at || !(s->waits || is_interrupted(core)));
 }
 
 /* Which region is the system control space. */

@@ -10,7 +10,7 @@
 
 enum { ENTRY_CYCLES = 12, EXIT_CYCLES = 12, TAIL_CHAIN_CYCLES = 6, FRAME_BYTES = 32 };
 enum { NMI = 2, HARD_FAULT = 3, SVCALL = 11, THREAD_PRIORITY = 256 };
-enum { SLEEPONEXIT = 2, SEVONPEND = 16, STKALIGN = 1 << 9, SPSEL = 2, NPRIV = 1 };
+enum { SLEEPONEXIT = 2, SLEEPDEEP = 4, SEVONPEND = 16, STKALIGN = 1 << 9, SPSEL = 2, NPRIV = 1 };
 enum { AWAKE, FOR_INTERRUPT, FOR_EVENT };
 
 #define T_BIT (1u << 24)
@@ -222,7 +222,8 @@ bool leave(struct core *core, uint32_t exc_return)
     core->api.read_registers(core->unicorn, numbers, at, 5);
     const uint32_t control = value[0], cpsr = value[1], psp = value[2], msp = value[3];
     uint32_t *frame = sram_at(core, exc_return == TO_THREAD_PSP ? psp : msp, FRAME_BYTES);
-    if (frame == NULL || value[4] || !has_vectors(core)) {
+    const bool may_stop = to_thread && s->scr & SLEEPONEXIT && s->scr & SLEEPDEEP;
+    if (frame == NULL || value[4] || may_stop || !has_vectors(core)) {
         return false;
     }
     const uint32_t xpsr = frame[7];

@@ -4,7 +4,7 @@
 
 #include "core.h"
 
-enum { FOR_INTERRUPT = 1, FOR_EVENT = 2, SYSTICK = 15 };
+enum { FOR_INTERRUPT = 1, FOR_EVENT = 2, SLEEPDEEP = 4, SYSTICK = 15 };
 #define FIRST_EXCEPTION_RETURN 0xFFFFFFE0u
 /* No instruction stands at an odd address, so a run never ends there; the page is that of `scratch`. */
 #define NOWHERE 0x9FFFFFFFu
@@ -303,6 +303,9 @@ static uint32_t run(struct core *core, uint64_t limit)
         s->stop_at = stop;
         look_later(core);
         const uint32_t kind = run_slice(core);
+        if ((kind == HALT_WAIT_INTERRUPT || kind == HALT_WAIT_EVENT) && s->scr & SLEEPDEEP) {
+            return kind; /* the clocks may stop */
+        }
         switch (kind) {
         case HALT_BOUNDARY: break;
         case HALT_WAIT_INTERRUPT: fall_asleep(core, FOR_INTERRUPT); break;

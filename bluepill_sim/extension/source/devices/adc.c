@@ -14,15 +14,19 @@
 enum { SR, CR1, CR2, SMPR1, SMPR2, JOFR1, HTR = 9, LTR, SQR1, SQR2, SQR3, JSQR, JDR1, DR = 19 };
 enum { AWD = 1 << 0, EOC = 1 << 1, JEOC = 1 << 2, JSTRT = 1 << 3, STRT = 1 << 4 };
 /* Of CR1. */
-enum { EOCIE = 1 << 5, AWDIE = 1 << 6, JEOCIE = 1 << 7, SCAN = 1 << 8, AWDSGL = 1 << 9, JAUTO = 1 << 10, DISCEN = 1 << 11, JDISCEN = 1 << 12, JAWDEN = 1 << 22, AWDEN = 1 << 23 };
+enum { EOCIE = 1 << 5, AWDIE = 1 << 6, JEOCIE = 1 << 7, SCAN = 1 << 8, AWDSGL = 1 << 9, JAUTO = 1 << 10 };
+enum { DISCEN = 1 << 11, JDISCEN = 1 << 12, JAWDEN = 1 << 22, AWDEN = 1 << 23, AWDCH = 31, DISCNUM_AT = 13, DUALMOD_AT = 16 };
 /* Of CR2. */
-enum { ADON = 1 << 0, CONT = 1 << 1, CAL = 1 << 2, RSTCAL = 1 << 3, DMA = 1 << 8, ALIGN = 1 << 11, JEXTTRIG = 1 << 15, EXTTRIG = 1 << 20, JSWSTART = 1 << 21, SWSTART = 1 << 22, TSVREFE = 1 << 23 };
+enum { ADON = 1 << 0, CONT = 1 << 1, CAL = 1 << 2, RSTCAL = 1 << 3, DMA = 1 << 8, ALIGN = 1 << 11, JEXTTRIG = 1 << 15 };
+enum { EXTTRIG = 1 << 20, JSWSTART = 1 << 21, SWSTART = 1 << 22, TSVREFE = 1 << 23 };
 enum { EXTSEL_AT = 17, JEXTSEL_AT = 12, BY_SOFTWARE = 7, BY_EXTI = 6, TRIGGERS = 7 };
 enum { IDLE, REGULAR, INJECTED };
 enum { IRQ, DMA_REQUEST };
 /* Of the dual modes: what ADC2 does with ADC1. */
 enum { WITH_REGULAR = 1, WITH_INJECTED = 2, FAST = 4, SLOW = 8, ALTERNATE = 16 };
-static const uint8_t dual_modes[16] = {0, WITH_REGULAR | WITH_INJECTED, WITH_REGULAR | ALTERNATE, WITH_INJECTED | FAST, WITH_INJECTED | SLOW, WITH_INJECTED, WITH_REGULAR, FAST, SLOW, ALTERNATE};
+static const uint8_t dual_modes[16] = {
+    0, WITH_REGULAR | WITH_INJECTED, WITH_REGULAR | ALTERNATE, WITH_INJECTED | FAST, WITH_INJECTED | SLOW,
+    WITH_INJECTED, WITH_REGULAR, FAST, SLOW, ALTERNATE};
 /* Sampling times by SMP, and what follows them, in halves of a cycle of ADCCLK. */
 static const uint16_t sampling_halves[8] = {3, 15, 27, 57, 83, 111, 143, 479};
 enum { CONVERTING_HALVES = 25 };
@@ -31,7 +35,9 @@ enum { FAST_DELAY = 7, SLOW_DELAY = 14, CALIBRATION = 83, RESET_CALIBRATION = 4 
 /* tSTAB, DS5319 table 46. */
 enum { STABILIZATION_NS = 1000, MOST_HZ = 14000000, RESOLUTION = 4096 };
 /* Channels without a pin, and their volts: DS5319 tables 46 and 50. */
-enum { TEMPERATURE = 16, REFERENCE = 17, PIN_CHANNELS = 10, REFERENCE_UV = 1200000, V25_UV = 1430000, UV_PER_MC = 43, MC_PER_PART = 10, V25_MC = 25000 };
+enum { PIN_CHANNELS = 10, TEMPERATURE = 16, REFERENCE = 17, REFERENCE_UV = 1200000, V25_UV = 1430000, V25_MC = 25000 };
+/* Microvolts by so many thousandths of a degree. */
+enum { SLOPE_UV = 43, SLOPE_MC = 10 };
 /* What Python is asked: warnings, as `Question` of adc.py. */
 enum { NOT_ANALOG, NO_PIN, NOT_ENABLED, TOO_FAST, CAL_OFF };
 /* A command of its own: what is on the pins is about to change. */
@@ -56,22 +62,32 @@ static bool is_master(const struct device *device) { return ((const struct adc *
 static uint32_t dual_mode(const struct device *device)
 {
     const struct device *master = is_master(device) ? device : other_of(device);
-    return master == NULL ? 0 : dual_modes[master->words[CR1] >> 16 & 15];
+    return master == NULL ? 0 : dual_modes[master->words[CR1] >> DUALMOD_AT & 15];
 }
 
 static void update_irq(struct device *device)
 {
     const uint32_t flags = device->words[SR], control = device->words[CR1];
-    output_set(device, IRQ, (flags & EOC && control & EOCIE) || (flags & JEOC && control & JEOCIE) || (flags & AWD && control & AWDIE));
+    output_set(device, IRQ,
+               (flags & EOC && control & EOCIE) || (flags & JEOC && control & JEOCIE) || (flags & AWD && control & AWDIE));
 }
 
 /* The groups. */
 
-static uint32_t regular_length(const struct device *device) { return device->words[CR1] & SCAN ? (device->words[SQR1] >> 20 & 15) + 1 : 1; }
+static uint32_t regular_length(const struct device *device)
+{
+    return device->words[CR1] & SCAN ? (device->words[SQR1] >> 20 & 15) + 1 : 1;
+}
 
-static uint32_t injected_length(const struct device *device) { return device->words[CR1] & SCAN ? (device->words[JSQR] >> 20 & 3) + 1 : 1; }
+static uint32_t injected_length(const struct device *device)
+{
+    return device->words[CR1] & SCAN ? (device->words[JSQR] >> 20 & 3) + 1 : 1;
+}
 
-static uint32_t regular_channel(const struct device *device, uint32_t rank) { return device->words[SQR3 - rank / 6] >> 5 * (rank % 6) & 31; }
+static uint32_t regular_channel(const struct device *device, uint32_t rank)
+{
+    return device->words[SQR3 - rank / 6] >> 5 * (rank % 6) & 31;
+}
 
 /* The sequence ends with JSQ4, however short it is. */
 static uint32_t injected_channel(const struct device *device, uint32_t rank)
@@ -88,7 +104,10 @@ static uint32_t halves_of(const struct device *device, uint32_t channel)
 
 /* Time. */
 
-static uint64_t run_ns(const struct adc *adc) { return adc->base_ns + adc->cycles / adc->hz * NS_PER_S + adc->cycles % adc->hz * NS_PER_S / adc->hz; }
+static uint64_t run_ns(const struct adc *adc)
+{
+    return adc->base_ns + adc->cycles / adc->hz * NS_PER_S + adc->cycles % adc->hz * NS_PER_S / adc->hz;
+}
 
 static uint32_t switching_cycles(const struct adc *adc) { return adc->divider == 2 ? 2 : 1; } /* RM0008 11.3.9 */
 
@@ -104,7 +123,7 @@ static int64_t input_uv(const struct device *device, uint32_t channel, uint64_t 
         return 0;
     }
     const int64_t over_mc = fabric->analog->temperature_mc - V25_MC;
-    return channel == TEMPERATURE ? V25_UV - over_mc * UV_PER_MC / MC_PER_PART : channel == REFERENCE ? REFERENCE_UV : 0;
+    return channel == TEMPERATURE ? V25_UV - over_mc * SLOPE_UV / SLOPE_MC : channel == REFERENCE ? REFERENCE_UV : 0;
 }
 
 static uint32_t convert(const struct device *device, uint32_t channel, uint64_t ns)
@@ -147,9 +166,11 @@ static void begin(struct device *device, uint32_t state, uint32_t delay)
 {
     struct adc *adc = device->state;
     adc->state = state;
-    adc->channel = state == REGULAR ? regular_channel(device, adc->regular_at) : injected_channel(device, adc->injected_at);
+    adc->channel =
+        state == REGULAR ? regular_channel(device, adc->regular_at) : injected_channel(device, adc->injected_at);
     adc->has_sample = 0;
-    adc->cycles += (uint64_t)delay * adc->divider + (halves_of(device, adc->channel) - CONVERTING_HALVES) * (uint64_t)adc->divider / 2;
+    const uint64_t sampling = halves_of(device, adc->channel) - CONVERTING_HALVES;
+    adc->cycles += (uint64_t)delay * adc->divider + sampling * adc->divider / 2;
     adc->sample_ns = run_ns(adc);
     adc->cycles += CONVERTING_HALVES * (uint64_t)adc->divider / 2;
     adc->end_ns = run_ns(adc);
@@ -174,7 +195,7 @@ static void stop(struct adc *adc)
 static void watch(struct device *device, uint32_t enable, uint32_t channel, uint32_t code)
 {
     const uint32_t control = device->words[CR1];
-    const bool is_watched = control & enable && (!(control & AWDSGL) || (control & 31) == channel);
+    const bool is_watched = control & enable && (!(control & AWDSGL) || (control & AWDCH) == channel);
     if (is_watched && (code > device->words[HTR] || code < device->words[LTR])) {
         device->words[SR] |= AWD;
     }
@@ -243,7 +264,7 @@ static void end_injected(struct device *device, uint32_t code)
     adc->is_automatic = 0;
     if (adc->regular_waits) {
         adc->regular_waits = 0;
-        begin(device, REGULAR, 0);
+        begin(device, REGULAR, was_automatic ? switching_cycles(adc) : 0);
     } else if (was_automatic && device->words[CR2] & CONT && !(device->words[CR1] & DISCEN)) {
         adc->regular_left = regular_length(device);
         begin(device, REGULAR, switching_cycles(adc));
@@ -295,7 +316,8 @@ static uint64_t round_cycles(const struct device *device)
 static void skip_rounds(struct device *device, uint64_t until)
 {
     struct adc *adc = device->state;
-    const uint64_t round = round_cycles(device), behind = (uint64_t)((__uint128_t)(until - adc->end_ns) * adc->hz / NS_PER_S);
+    const uint64_t round = round_cycles(device);
+    const uint64_t behind = (uint64_t)((__uint128_t)(until - adc->end_ns) * adc->hz / NS_PER_S);
     if (behind > 2 * round) {
         adc->cycles += (behind / round - 1) * round;
         adc->has_sample = 0;
@@ -349,10 +371,10 @@ static void start_regular(struct device *device, uint64_t ns, uint32_t delay)
         return;
     }
     settle(device, ns);
-    if (adc->state == REGULAR || adc->regular_waits || adc->is_automatic) {
+    if (adc->state == REGULAR || adc->regular_waits) {
         return; /* chosen: a trigger while the group is converted is ignored */
     }
-    const uint32_t length = regular_length(device), at_once = (device->words[CR1] >> 13 & 7) + 1;
+    const uint32_t length = regular_length(device), at_once = (device->words[CR1] >> DISCNUM_AT & 7) + 1;
     const bool is_in_parts = device->words[CR1] & DISCEN;
     adc->regular_at = is_in_parts && adc->regular_at < length ? adc->regular_at : 0;
     adc->regular_left = is_in_parts && at_once < length - adc->regular_at ? at_once : length - adc->regular_at;
@@ -486,7 +508,8 @@ static void write_control(struct device *device, uint32_t written, uint32_t prev
     if (is_started && !is_led(device, false)) {
         trigger_regular(device, now);
     }
-    if (written & JSWSTART && control & JEXTTRIG && (control >> JEXTSEL_AT & 7) == BY_SOFTWARE && !is_led(device, true)) {
+    if (written & JSWSTART && control & JEXTTRIG && (control >> JEXTSEL_AT & 7) == BY_SOFTWARE &&
+        !is_led(device, true)) {
         trigger_injected(device, now);
     }
 }
@@ -500,7 +523,7 @@ static void restart(struct device *device, uint32_t index, uint64_t now)
         adc->injected_left = device->words[CR1] & JDISCEN ? 1 : injected_length(device);
         begin_at(device, INJECTED, now, 0);
     } else if (index != JSQR && (adc->state == REGULAR || adc->regular_waits)) {
-        const uint32_t length = regular_length(device), at_once = (device->words[CR1] >> 13 & 7) + 1;
+        const uint32_t length = regular_length(device), at_once = (device->words[CR1] >> DISCNUM_AT & 7) + 1;
         adc->regular_at = 0;
         adc->regular_left = device->words[CR1] & DISCEN && at_once < length ? at_once : length;
         if (adc->state == REGULAR) {
@@ -524,7 +547,7 @@ static void write(struct device *device, uint32_t index, uint32_t written, uint3
     if (index == CR2) {
         write_control(device, written, previous, now);
     } else if (other != NULL) {
-        adc->turns = dual_modes[stored >> 16 & 15] == dual_modes[previous >> 16 & 15] ? adc->turns : 0;
+        adc->turns = dual_modes[stored >> DUALMOD_AT & 15] == dual_modes[previous >> DUALMOD_AT & 15] ? adc->turns : 0;
         reschedule(other);
     } else if (index >= SQR1 && index <= JSQR && stored != previous) {
         restart(device, index, now);
@@ -576,7 +599,8 @@ static uint32_t command(struct device *device, uint32_t what, uint32_t one, uint
     struct adc *adc = device->state;
     const uint64_t now = now_ns(device->fabric);
     if (what == RESET) {
-        *adc = (struct adc){.number = adc->number, .hz = adc->hz, .divider = adc->divider, .remapped = adc->remapped, .end_ns = NO_TIME, .calibrated_ns = NO_TIME};
+        *adc = (struct adc){.number = adc->number, .hz = adc->hz, .divider = adc->divider, .remapped = adc->remapped,
+                            .end_ns = NO_TIME, .calibrated_ns = NO_TIME};
         output_set(device, DMA_REQUEST, false);
         update_irq(device);
     } else if (what == CLOCK) { /* what is under way ends when it would have */

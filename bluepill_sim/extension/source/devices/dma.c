@@ -12,8 +12,8 @@
 enum { ISR, IFCR, FIRST, WORDS_EACH = 5, CHANNELS = 7 };
 enum { CCR, CNDTR, CPAR, CMAR };
 /* Of CCR; the flags in ISR stand at the places of their enable bits. */
-enum { EN = 1 << 0, TCIE = 1 << 1, HTIE = 1 << 2, TEIE = 1 << 3, DIR = 1 << 4, CIRC = 1 << 5, PINC = 1 << 6, MINC = 1 << 7, MEM2MEM = 1 << 14 };
-enum { PSIZE_AT = 8, MSIZE_AT = 10, PL_AT = 12 };
+enum { EN = 1 << 0, TCIE = 1 << 1, HTIE = 1 << 2, TEIE = 1 << 3, DIR = 1 << 4, CIRC = 1 << 5, PINC = 1 << 6 };
+enum { MINC = 1 << 7, MEM2MEM = 1 << 14, PSIZE_AT = 8, MSIZE_AT = 10, PL_AT = 12 };
 enum { GIF = 1 << 0, TCIF = 1 << 1, HTIF = 1 << 2, TEIF = 1 << 3, FLAGS = 0xF };
 /* `current` besides 1 + the channel's number. */
 enum { NONE, ACTING = CHANNELS + 1 };
@@ -21,6 +21,8 @@ enum { NONE, ACTING = CHANNELS + 1 };
 enum { LOCKED, FAILED, CIRCLES };
 /* chosen: cycles of HCLK for the arbitration, and for an access on the AHB; those of the APBs are Python's. */
 enum { ARBITRATION = 1, AHB_ACCESS = 2 };
+/* RM0008 3.3, table 3. */
+enum { APB1 = 0x40000000, APB1_BYTES = 0x10000, APB2 = 0x40010000, APB2_BYTES = 0x8000 };
 
 static uint32_t *words_of(const struct device *device, uint32_t n) { return &device->words[FIRST + WORDS_EACH * n]; }
 
@@ -43,7 +45,9 @@ static void raise(struct device *device, uint32_t n, uint32_t flags)
 
 static uint64_t cycles_to(const struct dma *dma, uint32_t address)
 {
-    return address - 0x40000000 < 0x10000 ? dma->apb1_cycles : address - 0x40010000 < 0x8000 ? dma->apb2_cycles : AHB_ACCESS;
+    return address - APB1 < APB1_BYTES   ? dma->apb1_cycles
+           : address - APB2 < APB2_BYTES ? dma->apb2_cycles
+                                         : AHB_ACCESS;
 }
 
 /* Chooses the channel of the next transfer, and returns when this ends; NO_TIME: none asks. */
@@ -250,7 +254,8 @@ static uint32_t command(struct device *device, uint32_t what, uint32_t one, uint
     struct dma *dma = device->state;
     (void)other;
     if (what == RESET) {
-        *dma = (struct dma){.hz = dma->hz, .apb1_cycles = dma->apb1_cycles, .apb2_cycles = dma->apb2_cycles, .lines = dma->lines};
+        *dma = (struct dma){
+            .hz = dma->hz, .apb1_cycles = dma->apb1_cycles, .apb2_cycles = dma->apb2_cycles, .lines = dma->lines};
         schedule(device, NO_TIME);
         for (uint32_t n = 0; n < CHANNELS; ++n) {
             update_irq(device, n);

@@ -41,13 +41,10 @@ static uint64_t last_edge(const struct shape *shape, uint64_t tick)
     return tick - (since < shape->high ? since : since - shape->high);
 }
 
-/* Rising edges come `ticks` later; of a level that has been there since `edge_at`. */
-static struct shape delayed(struct shape shape, uint64_t ticks, uint64_t edge_at, uint64_t now)
+static uint64_t next_edge(const struct shape *shape, uint64_t tick)
 {
-    if (shape.kind == SHOWS_WAVE) {
-        return shape.high > ticks ? wave(shape.period, shape.high - ticks, shape.edge + ticks) : low;
-    }
-    return shape.kind == SHOWS_HIGH && now < edge_at + ticks ? low : shape;
+    const uint64_t since = (tick % shape->period + shape->period - shape->edge) % shape->period;
+    return tick + (since < shape->high ? shape->high : shape->period) - since;
 }
 
 /* DTG in ticks (RM0008 14.4.18). */
@@ -56,6 +53,23 @@ static uint64_t dead_time(const struct device *device)
     const uint32_t dtg = device->words[BDTR] & DTG, steps = dtg & 31, divider = 1u << (device->words[CR1] >> CKD_AT & 3);
     const uint32_t time = dtg < 128 ? dtg : dtg < 192 ? 2 * (64 + (dtg & 63)) : (dtg < 224 ? 8 : 16) * (32 + steps);
     return (uint64_t)time * (divider > 4 ? 4 : divider);
+}
+
+/* Until when the dead time of a new wave may count from another edge than the wave has: it was not there before. */
+static uint64_t young_until(const struct device *device, uint32_t channel)
+{
+    const struct tim *tim = tim_of(device);
+    const uint64_t last = tim->born[channel] > tim->edge_at[channel] ? tim->born[channel] : tim->edge_at[channel];
+    return earlier(last + dead_time(device), tim->turns_at[channel]);
+}
+
+/* Rising edges come `ticks` later; of a level that has been there since `edge_at`. */
+static struct shape delayed(struct shape shape, uint64_t ticks, uint64_t edge_at, uint64_t now)
+{
+    if (shape.kind == SHOWS_WAVE) {
+        return shape.high > ticks ? wave(shape.period, shape.high - ticks, shape.edge + ticks) : low;
+    }
+    return shape.kind == SHOWS_HIGH && now < edge_at + ticks ? low : shape;
 }
 
 bool reference(const struct device *device, uint32_t channel)
@@ -152,7 +166,7 @@ static struct shape output_shape(const struct device *device, uint32_t channel, 
     }
     struct shape shape = reference_shape(device, channel);
     if (is_partner_on) {
-        if (tim->at < tim->born[channel] + dead_time(device)) {
+        if (tim->at < young_until(device, channel)) {
             shape = level(reference(device, channel));
         }
         shape = delayed(inverted(shape, is_complement), dead_time(device), tim->edge_at[channel], tim->at);
@@ -199,6 +213,7 @@ static void note_edge(struct device *device, uint32_t channel)
         tim->edge_at[channel] = last_edge(&was, before);
     }
     tim->born[channel] = shape.kind == SHOWS_WAVE ? last_edge(&shape, tim->at) : 0;
+    tim->turns_at[channel] = shape.kind == SHOWS_WAVE ? next_edge(&shape, tim->at) : 0;
     tim->shaped_at[channel] = tim->at;
     tim->references[channel] = shape;
 }
@@ -231,7 +246,7 @@ uint64_t next_output_stop(const struct device *device)
         return NO_TIME;
     }
     for (uint32_t n = 0; n < PAIRS; ++n) {
-        const uint64_t ends = tim->edge_at[n] + dead_time(device), matures = tim->born[n] + dead_time(device);
+        const uint64_t ends = tim->edge_at[n] + dead_time(device), matures = young_until(device, n);
         if ((tim->ccer >> 4 * n & 5) == 5) {
             first = ends > tim->at ? earlier(first, ends) : first;
             first = matures > tim->at ? earlier(first, matures) : first;

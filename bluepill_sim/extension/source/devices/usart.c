@@ -337,6 +337,15 @@ static uint32_t command(struct device *device, uint32_t what, uint32_t one, uint
             write_rate(device, rescaled(usart->tx_due_ns, now, before, one), rescaled(usart->rx_due_ns, now, before, one));
         }
         break;
+    case STOPPED: schedule(device, NO_TIME); break;
+    case RESUMED: {
+        const uint64_t span = (uint64_t)other << 32 | one;
+        usart->tx_base_ns += span;
+        usart->rx_base_ns += span;
+        usart->idle_due_ns += usart->idle_due_ns == NO_TIME ? 0 : span;
+        find_deadlines(device);
+        break;
+    }
     case MOVE:
         if (one != usart->tx_pin) {
             connect(device, false);

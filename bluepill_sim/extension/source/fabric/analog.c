@@ -14,7 +14,10 @@ enum { ONE_AT = 30 };
 void fabric_set_analog(struct fabric *fabric, const struct analog *analog) { fabric->analog = analog; }
 
 /* Gives the samples of a signal, in microvolts; they stay where they are as long as the signal uses them. */
-void fabric_set_samples(struct fabric *fabric, uint32_t number, const int32_t *samples) { fabric->samples[number] = samples; }
+void fabric_set_samples(struct fabric *fabric, uint32_t number, const int32_t *samples)
+{
+    fabric->samples[number] = samples;
+}
 
 /* The sine of a part of a turn (2^32 is a whole one), in units of 2^-30: Taylor's series, in integers so that it is the
  * same on every machine; off by less than 2e-9. */
@@ -55,7 +58,8 @@ static int64_t signal_uv(const struct signal *signal, const int32_t *samples, ui
     const int64_t span = (int64_t)signal->high_uv - signal->low_uv;
     switch (signal->shape) {
     case SINE: return signal->low_uv + (span * ((INT64_C(1) << ONE_AT) + sine_of((uint32_t)turn)) >> (ONE_AT + 1));
-    case TRIANGLE: return signal->low_uv + (span * (int64_t)(turn < 1u << 31 ? 2 * turn : 2 * ((UINT64_C(1) << 32) - turn)) >> 32);
+    case TRIANGLE:
+        return signal->low_uv + (span * (int64_t)(2 * (turn < 1u << 31 ? turn : (UINT64_C(1) << 32) - turn)) >> 32);
     case SAWTOOTH: return signal->low_uv + (span * (int64_t)turn >> 32);
     default: return at < signal->interval_ns ? signal->high_uv : signal->low_uv;
     }
@@ -82,4 +86,7 @@ int64_t channel_uv(const struct fabric *fabric, uint32_t number, uint64_t ns)
 }
 
 /* For Python. */
-int64_t fabric_channel_uv(const struct fabric *fabric, uint32_t number, uint64_t ns) { return channel_uv(fabric, number, ns); }
+int64_t fabric_channel_uv(const struct fabric *fabric, uint32_t number, uint64_t ns)
+{
+    return channel_uv(fabric, number, ns);
+}

@@ -102,6 +102,8 @@ enum command {
     ROUTE, /* AFIO has changed what concerns it */
     HEARD, /* somebody hears its outputs, or no longer does */
     SETTLE, /* returns the word of the register with the index `one` as a read would find it now, and changes nothing */
+    STOPPED = 8, /* its clock stands still from now on: the chip is in Stop mode */
+    RESUMED, /* it goes on, `one` + 2^32 * `other` ns later */
     OWN_COMMANDS = 16
 };
 

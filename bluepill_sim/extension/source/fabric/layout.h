@@ -157,10 +157,12 @@ struct shared {
     uint32_t has_debugger; /* Python sees to BKPT and HardFaults */
     uint32_t knows_masked_svc; /* Python was told of an SVC that its priority does not allow */
     uint32_t has_fault; /* `fault` waits for Python */
+    uint32_t waits; /* the block ends before its next access: the flash cannot give more code now */
+    uint32_t waits_end;
     struct fault fault;
     struct record last[32];
 };
-_Static_assert(sizeof(struct shared) == 1560, "shared");
+_Static_assert(sizeof(struct shared) == 1568, "shared");
 
 /* The pins of one port, a bit each. RM0008 9.1, table 20. */
 struct port {
@@ -340,7 +342,8 @@ struct tim {
     uint64_t idle_at; /* the tick at which outputs go to OISx; all ones: none is to come */
     uint64_t edge_at[3]; /* the tick at which OC1REF to OC3REF last changed before they were what they are now, */
     uint64_t shaped_at[3]; /* since when they are that, */
-    uint64_t born[3]; /* and of a wave the tick of its last edge before, which there was not */
+    uint64_t born[3]; /* of a wave the tick of its last edge before, which there was not, */
+    uint64_t turns_at[3]; /* and of the first that there is */
     struct filter filters[5]; /* TI1 to TI4, ETR */
     struct shape outputs[7]; /* CH1 to CH4, CH1N to CH3N */
     struct shape references[3]; /* OC1REF to OC3REF, for the dead time */
@@ -375,7 +378,7 @@ struct tim {
     uint8_t pins[9]; /* CH1 to CH4, CH1N to CH3N, ETR, BKIN */
     uint8_t sources[7]; /* the alternate functions of the first seven */
 };
-_Static_assert(sizeof(struct tim) == 712, "tim");
+_Static_assert(sizeof(struct tim) == 736, "tim");
 
 /* A level that goes up every `period` ticks, and down `high` ticks later. */
 struct wave {

@@ -196,7 +196,7 @@ class AdcModel:
             unit.injected_left = 1 if in_parts else len(unit.injected)
             self._begin_run(unit, "J")
             return
-        if unit.group == "R" or unit.is_interrupted or unit.is_automatic:
+        if unit.group == "R" or unit.is_interrupted:
             return
         if not unit.has("CR1", DISCEN) or unit.rank >= len(unit.regular):
             unit.rank = 0
@@ -289,7 +289,7 @@ class AdcModel:
         unit.is_automatic = False
         if unit.is_interrupted:
             unit.is_interrupted = False
-            self._begin(unit, "R")
+            self._begin(unit, "R", (2 if self.divider == 2 else 1) if was_automatic else 0)
         elif was_automatic and unit.has("CR2", CONT) and not unit.has("CR1", DISCEN):
             unit.left = len(unit.regular)
             self._begin(unit, "R", 2 if self.divider == 2 else 1)

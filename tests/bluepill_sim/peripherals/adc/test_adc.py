@@ -1,5 +1,7 @@
 """ADC1 and ADC2: against a model in plain Python, and what a program sees of them."""
 
+import ctypes
+import struct
 from collections.abc import Callable
 from typing import Any
 
@@ -9,7 +11,7 @@ from hypothesis import strategies as st
 
 from bluepill_sim.fabric.signals import Oscillation, Samples, Shape
 from bluepill_sim.peripherals.adc import INJECTED_TRIGGERS, REGULAR_TRIGGERS
-from bluepill_sim.stm32f103 import line_of
+from bluepill_sim.stm32f103 import BASES, line_of
 from tests.bluepill_sim.peripherals.adc.model import (
     ADON,
     ALIGN,
@@ -436,6 +438,36 @@ def test_an_automatic_group_follows_behind_the_delay_of_the_prescaler(fake_chip:
     assert fake_chip.read("ADC1.SR") & JEOC
 
 
+def test_a_second_regular_trigger_leaves_an_interrupted_sequence_where_it_was(fake_chip: Any) -> None:
+    switch_on(fake_chip, cr2=JSOFTWARE | SOFTWARE, cr1=SCAN)
+    fake_chip.write("ADC1.SQR1", 2 << 20)
+    begin_ns = start(fake_chip)
+    fake_chip.advance(begin_ns + 20 * CYCLE_NS)  # in the second conversion
+    fake_chip.write("ADC1.CR2", ADON | SOFTWARE | JSOFTWARE | JSWSTART)
+    fake_chip.advance(begin_ns + 30 * CYCLE_NS)
+    start(fake_chip)
+    fake_chip.advance(begin_ns + 34 * CYCLE_NS)
+    assert fake_chip.read("ADC1.SR") & JEOC
+    fake_chip.write("ADC1.SR", 0)
+    fake_chip.advance(begin_ns + 62 * CYCLE_NS - 1)
+    assert not fake_chip.read("ADC1.SR") & EOC
+    fake_chip.advance(begin_ns + 62 * CYCLE_NS)
+    assert fake_chip.read("ADC1.SR") & EOC
+
+
+def test_a_regular_trigger_during_the_automatic_group_starts_behind_it(fake_chip: Any) -> None:
+    switch_on(fake_chip, cr1=JAUTO)
+    begin_ns = start(fake_chip)
+    fake_chip.advance(begin_ns + 20 * CYCLE_NS)
+    start(fake_chip)
+    fake_chip.advance(begin_ns + 30 * CYCLE_NS)
+    fake_chip.write("ADC1.SR", 0)
+    fake_chip.advance(begin_ns + (30 + 2 + 14) * CYCLE_NS - 1)
+    assert not fake_chip.read("ADC1.SR") & EOC
+    fake_chip.advance(begin_ns + (30 + 2 + 14) * CYCLE_NS)
+    assert fake_chip.read("ADC1.SR") & (EOC | JEOC) == EOC
+
+
 @pytest.mark.parametrize("is_injected", [False, True])
 @pytest.mark.parametrize(
     ("low", "high", "expected"), [(2048, 2048, False), (2049, 4095, True), (0, 2047, True), (2047, 2049, False)]
@@ -517,6 +549,30 @@ def test_continuous_conversions_that_nobody_sees_have_no_events(fake_chip: Any) 
         assert adc.due_ns is None
 
 
+@pytest.mark.parametrize(
+    ("register", "word", "flags", "expected"),
+    [
+        ("SR", 0, 0, 1.0),
+        ("SQR3", 1, STRT | EOC, 1.0),
+        ("CR2", ADON | CONT | ALIGN, STRT | EOC, 1.0),
+        ("SMPR2", 7, 18, 1.0),
+    ],
+)
+def test_what_is_written_changes_nothing_that_was_converted_unseen(
+    fake_chip: Any, register: str, word: int, flags: int, expected: float
+) -> None:
+    switch_on(fake_chip, cr2=CONT)
+    fake_chip.pins["PA0"].set_volts(2.0)
+    fake_chip.pins["PA1"].set_volts(3.0)
+    begin_ns = start(fake_chip)
+    fake_chip.advance(begin_ns + 14 * CYCLE_NS)
+    fake_chip.pins["PA0"].set_volts(1.0)
+    fake_chip.advance(begin_ns + 100 * 14 * CYCLE_NS + 1)
+    fake_chip.write(f"ADC1.{register}", word)
+    assert fake_chip.read("ADC1.SR") == flags
+    assert fake_chip.read("ADC1.DR") == code(expected)
+
+
 @settings(max_examples=40, deadline=None)
 @given(waits=st.lists(st.tuples(st.integers(1, 3_000), st.booleans()), min_size=1, max_size=5), watches=st.booleans())
 def test_what_nobody_saw_is_as_if_each_conversion_had_been_made(
@@ -592,8 +648,11 @@ def test_injected_groups_of_dual_modes_begin_in_their_cycles(
         fake_chip.write("ADC1.CR2", ADON | JSOFTWARE | JSWSTART)
 
     assert ends(fake_chip, mode << 16, inject, 40, JEOC) == expected
-    if mode == 9:  # and the next trigger is ADC2's
+    if mode == 9:  # and the next trigger is ADC2's; a mode that is written anew begins with ADC1
         assert ends(fake_chip, mode << 16, inject, 40, JEOC) == {1: [], 2: [14]}
+        assert ends(fake_chip, mode << 16, inject, 40, JEOC) == {1: [14], 2: []}
+        fake_chip.write("ADC1.CR1", 0)
+        assert ends(fake_chip, mode << 16, inject, 40, JEOC) == {1: [14], 2: []}
 
 
 def test_in_a_dual_mode_dr_holds_both_and_the_slave_follows_no_trigger(fake_chip: Any) -> None:
@@ -611,3 +670,59 @@ def test_in_a_dual_mode_dr_holds_both_and_the_slave_follows_no_trigger(fake_chip
     pulse(fake_chip, TRIGGERS[False][4])
     fake_chip.advance(fake_chip.now_ns + 14 * CYCLE_NS)
     assert not fake_chip.read("ADC2.SR") & EOC
+
+
+# With DMA.
+
+SRAM = 0x2000_0000
+
+
+def receive(chip: Any, count: int, width: int) -> Any:
+    """Have channel 1 take what ADC1 converts into words of 1 << `width` bytes, round and round; return the memory."""
+    sram = (ctypes.c_char * 0x400)()
+    chip.pins.fabric.add_memory(SRAM, sram, is_writable=True)
+    words = (
+        ("CNDTR1", count),
+        ("CPAR1", BASES["ADC1"] + 0x4C),
+        ("CMAR1", SRAM),
+        ("CCR1", 0xA1 | width << 8 | width << 10),
+    )
+    for register, word in words:
+        chip.write(f"DMA1.{register}", word)
+    return sram
+
+
+@pytest.mark.parametrize("cr2", [CONT, CONT | ALIGN])
+def test_circular_dma_takes_every_conversion_at_the_limit(fake_chip: Any, cr2: int) -> None:
+    fake_chip.run_at_72_mhz()
+    fake_chip.write("RCC.CFGR", fake_chip.read("RCC.CFGR") | 2 << 14)
+    switch_on(fake_chip, cr2=cr2 | DMA)
+    fake_chip.pins["PA0"].set_volts(Oscillation(shape=Shape.SAWTOOTH, low_v=0, high_v=3.3, period_ns=100_000))
+    sram = receive(fake_chip, 32, 1)
+    begin_ns = start(fake_chip)
+    fake_chip.advance(begin_ns + 40 * 14 * 1_000_000_000 // 12_000_000 + 100)
+    taken = struct.unpack("<32H", bytes(sram)[:64])
+    for n in range(8, 40):
+        sample_ns = begin_ns + (14 * n * 6 + 9) * 1_000_000_000 // 72_000_000
+        expected = code(fake_chip.pins.fabric.channel_uv(0, sample_ns) / 1e6)
+        assert taken[n % 32] == (expected << 4 if cr2 & ALIGN else expected)
+    assert fake_chip.read("DMA1.CNDTR1") == 24
+    assert fake_chip.warnings == {}
+
+
+@pytest.mark.parametrize(("mode", "delay"), [(6, 0), (7, 7)])
+def test_in_dual_modes_dma_takes_words_of_both(fake_chip: Any, mode: int, delay: int) -> None:
+    for number in (2, 1):
+        switch_on(fake_chip, number, CONT | (DMA if number == 1 else 0))
+        fake_chip.write(f"ADC{number}.SQR3", number)
+    fake_chip.write("ADC1.CR1", mode << 16)
+    fake_chip.pins["PA1"].set_volts(1.0)
+    fake_chip.pins["PA2"].set_volts(Oscillation(shape=Shape.SAWTOOTH, low_v=0, high_v=3.3, period_ns=100_000))
+    sram = receive(fake_chip, 16, 2)
+    begin_ns = start(fake_chip)
+    fake_chip.advance(begin_ns + (delay + 10 * 14) * CYCLE_NS + 1_000)
+    for n, word in enumerate(struct.unpack("<10I", bytes(sram)[:40])):
+        assert word & 0xFFFF == code(1.0)
+        sample_ns = begin_ns + 14 * n * CYCLE_NS + 375
+        assert word >> 16 == code(fake_chip.pins.fabric.channel_uv(2, sample_ns) / 1e6)
+    assert fake_chip.read("DMA1.CNDTR1") == 6

@@ -3,7 +3,6 @@
 import base64
 import json
 import struct
-import time
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -12,6 +11,8 @@ import pytest
 
 from p2os.errors import WorldError
 from p2os.pioneer.world import load_world
+from p2os.pioneer.world.formats.meshes.gltf import read_gltf
+from tests.p2os.pioneer.world.counted_calls import calls_of
 
 #: A wedge that no mirror image and no wrong turn leaves as it is, Z up: (x, z, -y) is how a file writes it.
 WEDGE = [(0, 0, 0), (2, 0, 0), (0, 1, 0), (0, 0, 3)]
@@ -198,9 +199,14 @@ def test_a_strip_and_a_fan_cover_the_same_square(mode: int, count: int, tmp_path
     assert total == pytest.approx(1.0)  # both the right way round
 
 
-def test_thousands_of_nodes_in_chains_are_read_at_once(tmp_path: Path) -> None:
-    nodes = [{"mesh": 0} | ({"children": [n + 1]} if n % 60 != 59 else {}) for n in range(3000)]
-    content = document(nodes=nodes, scenes=[{"nodes": list(range(0, 3000, 60))}])
-    begun = time.perf_counter()
-    assert len(load_world(written(tmp_path, content)).meshes[0].triangles) == 12_000
-    assert time.perf_counter() - begun < 10  # 300 of them took trimesh seconds
+def test_twice_as_many_nodes_in_chains_are_twice_the_work(tmp_path: Path) -> None:
+    def read(count: int, deep: int) -> int:
+        nodes = [{"mesh": 0} | ({"children": [n + 1]} if (n + 1) % deep else {}) for n in range(count)]
+        path = written(tmp_path, document(nodes=nodes, scenes=[{"nodes": list(range(0, count, deep))}]))
+        work = calls_of(lambda: read_gltf(path))
+        assert len(load_world(path).meshes[0].triangles) == 4 * count
+        return work
+
+    once = read(1500, 60)
+    assert read(3000, 60) < 2.1 * once
+    assert read(1500, 6) > 0.9 * once, "a node costs the same at every depth"

@@ -14,7 +14,7 @@ from bluepill_sim.debug.execution import Execution
 from bluepill_sim.debug.machine import LoneChip
 from bluepill_sim.debug.monitor import Monitor
 
-HERE = Path(__file__).resolve().parent / "firmware"
+HERE = Path(__file__).resolve().parents[2] / "firmware"
 COMPILER = "arm-none-eabi-gcc"
 pytestmark = [
     pytest.mark.skipif(shutil.which(COMPILER) is None, reason=f"{COMPILER} is not installed"),

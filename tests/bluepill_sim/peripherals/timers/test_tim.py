@@ -275,6 +275,37 @@ def test_many_repetitions_at_once_leave_the_counter_where_it_belongs(tim1: Timer
         assert bool(tim1.at(tick).flags & UIF) is is_up, tick
 
 
+def test_centred_repetitions_count_both_ends(tim1: Timer) -> None:
+    """Overflows and underflows come every ARR counts: the third is an update."""
+    tim1.set(ARR=4, RCR=2, EGR=1, SR=0, DIER=1, CR1=0x60 | CEN)
+    for tick, is_up in ((12, False), (13, True)):
+        assert tim1.at(tick).chip.irqs[25] is is_up, tick
+    tim1["SR"] = 0
+    for tick, is_up in ((24, False), (25, True)):
+        assert tim1.at(tick).chip.irqs[25] is is_up, tick
+
+
+@pytest.mark.parametrize(("control", "at"), [(0x00, 10), (DIR, 2), (0x60, 10)])
+def test_a_match_at_the_limit_comes_as_the_counter_does(tim3: Timer, control: int, at: int) -> None:
+    """CCR = ARR = 9: up, down (from 0 to 9 at the first count) and centre-aligned."""
+    tim3.set(ARR=9, CCR1=9, DIER=2, CR1=control | CEN)
+    assert not tim3.at(at - 1).chip.irqs[29]
+    assert tim3.at(at).chip.irqs[29]
+
+
+def test_a_centred_counter_comes_down_from_beyond_its_limit(tim3: Timer) -> None:
+    """From 4, with ARR = 1: 3, 2, 1, and an underflow at 0."""
+    tim3.set(ARR=9, CNT=4, CR1=DIR)
+    tim3.set(CR1=0x60 | DIR)
+    tim3.set(ARR=1, EGR=0, DIER=1)
+    tim3["CR1"] = 0x60 | DIR | CEN
+    found = []
+    for tick in range(2, 8):
+        found.append((tim3.at(tick)["CNT"], tim3.chip.irqs[29]))
+        tim3["SR"] = 0
+    assert found == [(3, False), (2, False), (1, False), (0, True), (1, True), (0, True)]
+
+
 def test_udis_and_urs_hold_updates_back(tim3: Timer) -> None:
     tim3.set(ARR=9, CR1=URS | CEN, EGR=1)
     assert tim3.flags == 0

@@ -1,0 +1,18 @@
+// What the simulated parts share: the state, and the program's way to wait.
+#pragma once
+
+#include "machine.h"
+
+namespace simulated {
+
+extern machine_state state;
+
+// Gives way until the clock stands at `until_us`; on the program's own stack.
+void wait_until(std::int64_t until_us);
+
+// Called as time passes, up to `now_us`.
+void move_uarts(std::int64_t now_us);
+// When a byte next leaves; far away where none waits.
+std::int64_t next_byte_us();
+
+}  // namespace simulated

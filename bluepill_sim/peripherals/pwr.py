@@ -1,0 +1,127 @@
+"""PWR: which low-power mode SLEEPDEEP means, the wake-up pin, the supply's detector, the lock of the backup domain.
+
+Modelled: CR and CSR, DBP, the PVD with its eight thresholds and their hysteresis (typical values), WKUP on PA0. What a
+mode stops and what ends it is `chip.py`'s; LPDS makes the end of Stop slower. Chosen: CWUF and CSBF act at once (two
+cycles on silicon); the flags outlive every reset but that of the supply.
+
+Source: RM0008 section 5; thresholds from the data sheet DS5319 table 12.
+Invariant: PVDO is 1 exactly while PVDE is set and the supply was last seen below the threshold.
+"""
+
+from bluepill_sim.fabric.pins import PinDrive
+from bluepill_sim.fabric.registers import LISTENER, Peripheral, Register, bits
+
+CR, CSR = range(2)
+
+LPDS, PDDS, CWUF, CSBF, PVDE, DBP = (1 << n for n in (0, 1, 2, 3, 4, 8))
+_PLS_AT, _PLS = 5, bits((7, 5))
+WUF, SBF, PVDO, EWUP = (1 << n for n in (0, 1, 2, 8))
+#: The lowest threshold for a supply that falls, how far each PLS is above the one before, and how much higher the one
+#: for a supply that rises is, in mV.
+FALLING_MV, STEP_MV, HYSTERESIS_MV = 2_080, 100, 100
+_PORT, _PIN, _OWNER = "A", 0, "WKUP"
+
+
+class Pwr(Peripheral):
+    """Power control."""
+
+    KIND = LISTENER
+    STATE = ("_was_high",)
+    OUTPUTS = ("pvd",)
+    INPUTS = ("alarm",)
+    REGISTERS = (
+        Register(
+            name="CR", offset=0x00, readable=LPDS | PDDS | PVDE | _PLS | DBP,
+            writable=LPDS | PDDS | CWUF | CSBF | PVDE | _PLS | DBP, on_write="_write_cr",
+            fields="DBP 8, PLS 7:5, PVDE 4, CSBF 3, CWUF 2, PDDS 1, LPDS 0",
+        ),
+        Register(name="CSR", offset=0x04, readable=WUF | SBF | PVDO | EWUP, writable=EWUP, on_write="_write_csr",
+            fields="EWUP 8, PVDO 2, SBF 1, WUF 0"),
+    )  # fmt: skip
+    #: The level of WKUP, while EWUP is set.
+    _was_high = False
+
+    @property
+    def stands_by(self) -> bool:
+        """Whether SLEEPDEEP means Standby (PDDS)."""
+        return bool(self.words[CR] & PDDS)
+
+    @property
+    def is_woken(self) -> bool:
+        """Whether WUF is set."""
+        return bool(self.words[CSR] & WUF)
+
+    @property
+    def regulator_is_slow(self) -> bool:
+        """Whether the regulator is in low-power mode in Stop (LPDS)."""
+        return bool(self.words[CR] & LPDS)
+
+    def note_standby(self) -> None:
+        """Set SBF: Standby begins."""
+        self.words[CSR] |= SBF
+
+    def forget_flags(self) -> None:
+        """Clear WUF and SBF: the supply came up."""
+        self.words[CSR] &= ~(WUF | SBF)
+
+    def reset(self) -> None:
+        """Go back to the state after a system reset; SBF and WUF stay."""
+        flags = self.words[CSR] & (WUF | SBF)
+        super().reset()
+        self.words[CSR] = flags
+
+    def on_reset(self) -> None:
+        """Lock the backup domain, and give up the pin."""
+        self.chip.power.is_backup_open = False
+        self._place_pin()
+        self.supply_changed()
+
+    def supply_changed(self) -> None:
+        """Look at the supply."""
+        threshold_mv = FALLING_MV + STEP_MV * ((self.words[CR] & _PLS) >> _PLS_AT)
+        if self.words[CSR] & PVDO:
+            threshold_mv += HYSTERESIS_MV
+        is_low = bool(self.words[CR] & PVDE) and self.chip.power.supply_mv < threshold_mv
+        self.words[CSR] = self.words[CSR] & ~PVDO | (PVDO if is_low else 0)
+        self.set_output("pvd", is_low)
+
+    def line_changed(self, name: str, level: bool) -> None:
+        """Take the RTC's alarm for a wake-up event."""
+        if name == "alarm" and level:
+            self._wake()
+
+    def pins_changed(self) -> None:
+        """Take a rising edge of WKUP for a wake-up event."""
+        is_high = bool(self.words[CSR] & EWUP) and self.chip.pins[f"P{_PORT}{_PIN}"].input
+        was_high, self._was_high = self._was_high, is_high
+        if is_high and not was_high:
+            self._wake()
+
+    def _restored(self) -> None:
+        self._listen()
+
+    def _write_cr(self, written: int, _previous: int) -> None:
+        self.words[CSR] &= ~((WUF if written & CWUF else 0) | (SBF if written & CSBF else 0))
+        self.chip.power.is_backup_open = bool(self.words[CR] & DBP)
+        self.supply_changed()
+
+    def _write_csr(self, written: int, previous: int) -> None:
+        if (written ^ previous) & EWUP:
+            self._place_pin()
+
+    def _place_pin(self) -> None:
+        """Give PA0 to WKUP, with its pull-down, while EWUP is set (RM0008 5.4.2)."""
+        pin = self.chip.pins[f"P{_PORT}{_PIN}"]
+        if self.words[CSR] & EWUP:
+            pin.hold(_OWNER, PinDrive.PULL_DOWN)
+        elif pin.holder == _OWNER:
+            pin.release()
+        self._listen()
+        self.pins_changed()
+
+    def _listen(self) -> None:
+        self.listen_to_pins(_PORT, 1 << _PIN if self.words[CSR] & EWUP else 0)
+
+    def _wake(self) -> None:
+        self.words[CSR] |= WUF
+        self.chip.signal("wake")

@@ -1,0 +1,59 @@
+"""`p2os check`: says whether scenario files can be run, without running them."""
+
+import json
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from p2os.cli.help_pages import BENCH
+from robot_bench.scenario.json_schema import scenario_schema
+from robot_bench.scenario.scenario import load_scenario
+from simbase.errors import P2osError, UsageError
+from simbase.timing import NS_PER_S
+
+HELP = """Check scenario files without running them.
+
+Keys, ranges, names, events in words, firmware and world are looked at, as by
+p2os run. Exit code: 0 all can be run, 1 one cannot.
+
+\b
+Examples:
+  p2os check patrol.toml                    what it is, or what is wrong, with its line
+  p2os check tests/*.toml
+  p2os check --schema > scenario.schema.json   for editors that check TOML
+"""
+
+
+def register(app: typer.Typer) -> None:
+    """Add the verb."""
+    app.command("check", help=HELP, rich_help_panel=BENCH)(check)
+
+
+def check(
+    files: Annotated[list[str] | None, typer.Argument(help="Scenario files, or names.", metavar="[FILE]...")] = None,
+    firmware: Annotated[
+        Path | None, typer.Option(help="ELF, HEX or BIN in place of the scenarios'.", metavar="FILE")
+    ] = None,
+    schema: Annotated[bool, typer.Option("--schema", help="Print the JSON schema of scenarios.")] = False,
+) -> None:
+    """Check scenarios."""
+    if schema:
+        typer.echo(json.dumps(scenario_schema(), indent=2))
+        return
+    if not files:
+        raise UsageError("which scenario?", hint="p2os check FILE, or --schema")
+    wrong = 0
+    for name in files:
+        try:
+            found = load_scenario(name, firmware=firmware)
+        except P2osError as error:
+            wrong += 1
+            typer.echo(f"wrong  {error}" + (f" (hint: {error.hint})" if error.hint else ""))
+            continue
+        typer.echo(
+            f"ok     {name}: {found.duration_ns / NS_PER_S:g} s of {found.firmware.name} in {found.world}, "
+            f"{len(found.goals)} goals"
+        )
+    if wrong:
+        raise typer.Exit(1)

@@ -1,0 +1,56 @@
+"""`p2os diff`: where two runs of one scenario part, by signal."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from p2os.cli.help_pages import BENCH
+from robot_bench.events.kinds import Event
+from robot_bench.events.words import last_words, what_of
+from robot_bench.recording.divergence import differences
+from robot_bench.recording.run_record import read_events
+from simbase.timing import NS_PER_S
+
+#: chosen: so many signals are listed, the first that part.
+MOST_SIGNALS = 8
+HELP = """Tell where two runs part: the first difference of each signal.
+
+Exit code: 0 they are alike, 1 they differ.
+
+\b
+Examples:
+  p2os diff runs/dodge-001 runs/dodge-002     what differs first, when, and what came before
+"""
+
+
+def register(app: typer.Typer) -> None:
+    """Add the verb."""
+    app.command("diff", help=HELP, rich_help_panel=BENCH)(diff)
+
+
+def diff(
+    one: Annotated[Path, typer.Argument(help="A run folder.", metavar="RUN")],
+    other: Annotated[Path, typer.Argument(help="Another one.", metavar="RUN")],
+) -> None:
+    """Compare two runs."""
+    ours, theirs = list(read_events(one)), list(read_events(other))
+    found = differences(ours, theirs)
+    if not found:
+        typer.echo(f"alike: {len(ours)} events")
+        return
+    first = found[0]
+    typer.echo(f"alike until {first.at / NS_PER_S:.6f} s; {first.signal} differs first")
+    for line in last_words((event for event in ours if event.t < first.at), 4):
+        typer.echo(f"   {line}")
+    for difference in found[:MOST_SIGNALS]:
+        typer.echo(f"{difference.signal}:")
+        for folder, event in ((one, difference.one), (other, difference.other)):
+            typer.echo(f"   {_told(event)}   {folder.name}")
+    if len(found) > MOST_SIGNALS:
+        typer.echo(f"and {len(found) - MOST_SIGNALS} more signals, later")
+    raise typer.Exit(1)
+
+
+def _told(event: Event | None) -> str:
+    return "nothing more" if event is None else f"{event.t} ns  {what_of(event)}"

@@ -1,0 +1,226 @@
+"""The pytest plugin: tests of a firmware that drive a bench. Inert until a test asks for the fixture `bench`.
+
+    def test_it_turns_before_a_wall(bench):
+        bench.expect("robot moves", within="5 s")
+        bench.place("post", shape="cylinder", radius_m=0.1, height_m=0.5, before_sonar=4, distance_m=0.3)
+        bench.expect_text("turning", within="1 s")
+
+Markers say what a test runs in (`scenario`, `worlds`, `modes`, `bodies`, `seeds`, `faults`), and `booted` from where
+on: what was booted once is kept, and each test that wants the same begins there. Nothing of a test is seen by another.
+
+Invariant: a test's run depends on its markers, the options and what it does itself; not on the tests before it, nor
+on the worker that it runs in.
+"""
+
+import itertools
+import re
+from collections.abc import Generator, Iterator
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import pytest
+
+if TYPE_CHECKING:
+    from robot_bench.bench import Bench
+    from robot_bench.scenario.scenario import Scenario
+
+#: Marker → the option of a scenario that its words are values of.
+_AXES = {"worlds": "world", "modes": "mode", "bodies": "body", "seeds": "seed", "faults": "fault"}
+_MARKERS = (
+    "scenario(name_or_file, **options): what the fixture bench runs; options as of Bench.from_scenario",
+    "worlds(*names): run the test in each of these worlds",
+    "modes(*modes): run it in each mode, direct or adapter",
+    "bodies(*bodies): run it with each body",
+    "seeds(*seeds): run it with each seed; a text such as '0-9' is a range",
+    "faults(*words, at='0 s'): run it with each of these faults, injected at a time",
+    "booted(event='note adapter driving'): begin where this event has happened; it is waited for once for all tests",
+)
+#: What a test waits for first that is marked `booted`, in mode adapter.
+_BOOTED = "note adapter driving"
+#: chosen: so long that is waited for.
+_BOOT_WITHIN = "20 s"
+_BENCH = pytest.StashKey["Bench"]()
+
+
+def pytest_addoption(parser: pytest.Parser) -> None:
+    """Add the options and the setting `bench_scenario`."""
+    group = parser.getgroup("bench", "tests of a firmware on the bench (p2os)")
+    group.addoption("--firmware", metavar="FILE", help="ELF, HEX or BIN in place of the scenarios'")
+    group.addoption("--bench-mode", choices=("adapter", "direct"), help="of tests that do not name modes")
+    group.addoption("--bench-body", metavar="BODY", help="of tests that do not name bodies")
+    group.addoption(
+        "--bench-record", choices=("failures", "all", "none"), default="failures",
+        help="of which tests a run folder with its report is written (default: failures)",
+    )  # fmt: skip
+    group.addoption("--bench-out", metavar="FOLDER", default="bench-runs", help="where to (default: bench-runs)")
+    parser.addini("bench_scenario", "scenario of tests that name none: a name, or a file", default="free-drive")
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    """Tell the markers."""
+    for line in _MARKERS:
+        config.addinivalue_line("markers", line)
+
+
+def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
+    """Run a test once for each combination of what its markers name."""
+    if "bench" not in metafunc.fixturenames:
+        return
+    axes: list[list[tuple[str, object]]] = []
+    for marker, option in _AXES.items():
+        mark = metafunc.definition.get_closest_marker(marker)
+        if mark is not None:
+            values = [value for given in mark.args for value in (_seeds(given) if marker == "seeds" else [given])]
+            axes.append([(option, value) for value in values])
+    if axes:
+        rows = [dict(row) for row in itertools.product(*axes)]
+        ids = ["-".join(_identifier(value) for value in row.values()) for row in rows]
+        metafunc.parametrize("bench", rows, indirect=True, ids=ids)
+
+
+def _seeds(given: object) -> list[int]:
+    """Return the seeds of a number or of a range in words."""
+    if isinstance(given, str):
+        first, _, last = given.partition("-")
+        return list(range(int(first), int(last or first) + 1))
+    return [int(str(given))]
+
+
+def _identifier(value: object) -> str:
+    return Path(str(value)).name.replace(" ", "_")
+
+
+class _Pool:
+    """Benches that were built and booted once in this process, each with the state that tests begin with."""
+
+    def __init__(self) -> None:
+        #: Benches that no test has now, by what they are of.
+        self._kept: dict[str, tuple[Bench, object]] = {}
+        #: Benches that a test has, with what they are of and where they began.
+        self._lent: dict[int, tuple[str, object]] = {}
+        #: How many were built, and how many tests were given one that was there.
+        self.built = self.reused = 0
+
+    def take(self, scenario: "Scenario", booted: str | None) -> "Bench":
+        """Return a bench at its beginning, or where it is booted; nobody but the caller has it.
+
+        Raises:
+            ExpectationError: It does not boot.
+        """
+        from robot_bench.bench import Bench
+
+        stat = scenario.firmware.stat()
+        key = repr((scenario, booted, stat.st_mtime_ns, stat.st_size))
+        kept = self._kept.pop(key, None)
+        if kept is not None:
+            self.reused += 1
+            bench, begin = kept
+            bench.restart(begin)
+            self._lent[id(bench)] = key, begin
+            return bench
+        self.built += 1
+        bench = Bench(scenario)
+        if booted is not None:
+            bench.expect(booted, within=_BOOT_WITHIN)
+        self._lent[id(bench)] = key, bench.snapshot()
+        return bench
+
+    def give_back(self, bench: "Bench") -> None:
+        """Keep a bench for the next test that wants the same."""
+        key, begin = self._lent.pop(id(bench))
+        self._kept[key] = bench, begin
+
+
+_POOL = pytest.StashKey[_Pool]()
+
+
+@pytest.fixture
+def bench(request: pytest.FixtureRequest) -> "Iterator[Bench]":
+    """A firmware on an emulated BluePill, its robot and its world, in virtual time: a `robot_bench.Bench`."""
+    from bluepill_sim.errors import BluePillError
+    from simbase.errors import P2osError
+
+    item: pytest.Item = request.node
+    mark = item.get_closest_marker("booted")
+    booted = None if mark is None else str((*mark.args, *mark.kwargs.values(), _BOOTED)[0])
+    pool = item.config.stash.setdefault(_POOL, _Pool())
+    try:
+        made = pool.take(_scenario_of(item, getattr(request, "param", {})), booted)
+    except (P2osError, BluePillError) as error:
+        hint = getattr(error, "hint", None)
+        pytest.fail(f"{error}{f' (hint: {hint})' if hint else ''}", pytrace=False)
+    item.stash[_BENCH] = made
+    yield made
+    pool.give_back(made)
+
+
+def _scenario_of(item: pytest.Item, chosen: dict[str, Any]) -> "Scenario":
+    from bluepill_sim.spans import to_nanos
+    from robot_bench.scenario.fault_script import load_faults
+    from robot_bench.scenario.scenario import load_scenario
+    from simbase.timing import NS_PER_S
+
+    config, mark = item.config, item.get_closest_marker("scenario")
+    named = str(mark.args[0]) if mark is not None else str(config.getini("bench_scenario"))
+    options: dict[str, Any] = {"mode": config.getoption("--bench-mode"), "body": config.getoption("--bench-body")}
+    options |= {"firmware": config.getoption("--firmware")} | (dict(mark.kwargs) if mark is not None else {}) | chosen
+    fault = options.pop("fault", None)
+    beside = [folder / named for folder in (item.path.parent, config.rootpath) if (folder / named).is_file()]
+    firmware = options["firmware"]
+    found = load_scenario(
+        str(beside[0]) if beside else named, firmware=None if firmware is None else Path(firmware)
+    ).with_options(**options)
+    if fault is None:
+        return found
+    faults = item.get_closest_marker("faults")
+    at = to_nanos(faults.kwargs.get("at", "0 s") if faults is not None else 0)
+    table = {"at_s": at / NS_PER_S, "fault": fault}
+    return replace(found, faults=(*found.faults, *load_faults([table], found.parameters, "faults")))
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_runtest_makereport(item: pytest.Item, call: pytest.CallInfo[None]) -> Generator[None, Any, Any]:
+    """Tell of a test's run what a person needs who looks into it: last events, report, picture, how to replay it."""
+    report: Any = yield
+    used = item.stash.get(_BENCH, None)
+    wanted = item.config.getoption("--bench-record")
+    if call.when == "call" and used is not None:
+        item.user_properties.append(("bench_seed", used.scenario.seed))
+        said = call.excinfo is not None and hasattr(call.excinfo.value, "last_events")
+        if report.failed and not said:
+            lines = [f"at {used.now / 1e9:.3f} s of {used.scenario.name}; the last events:", *used.last_events(12)]
+            report.sections.append(("bench", "\n".join(lines)))
+        if wanted == "all" or (wanted == "failures" and report.failed):
+            _record(item, used, report, str(call.excinfo.value) if call.excinfo is not None and report.failed else "")
+    return report
+
+
+def _record(item: pytest.Item, used: "Bench", report: Any, failure: str) -> None:
+    """Write the run folder of a test, and tell where it is."""
+    from robot_bench.run import write_run
+    from simbase.errors import P2osError
+
+    name = re.sub(r"[^\w.-]+", "_", item.nodeid.replace("::", "-")).strip("_")
+    folder = item.config.rootpath / str(item.config.getoption("--bench-out")) / name
+    try:
+        page = write_run(used, folder, failure.partition("\n")[0])
+    except (P2osError, OSError) as error:  # a test's own outcome counts
+        report.sections.append(("bench: no report", str(error)))
+        return
+    item.user_properties.append(("bench_report", str(page)))
+    item.user_properties.append(("trace_sha256", used.trace.sha256))
+    firmware = item.config.getoption("--firmware")
+    options = f" --firmware {firmware}" if firmware else ""
+    picture = folder / "path.png"
+    lines = [f"report:   {page}", *([f"picture:  {picture}"] if picture.is_file() else [])]
+    report.sections.append(
+        ("bench: look, and replay", "\n".join([*lines, f"replay:   pytest '{item.nodeid}'{options}"]))
+    )
+
+
+def pytest_terminal_summary(terminalreporter: Any, config: pytest.Config) -> None:
+    """Say with -v how many benches were built, and how many tests began with one that was there."""
+    pool = config.stash.get(_POOL, None)
+    if pool is not None and config.getoption("verbose") > 0:
+        terminalreporter.write_line(f"bench: {pool.built} built and booted, {pool.reused} tests began where one stood")

@@ -1,0 +1,355 @@
+"""Events as lines of a trace, and lines as events: one row of `ROWS` a kind.
+
+A line is one JSON object with its kind `k` and its time `t`; docs/bench.md lists the kinds. Edges are
+written in blocks, whose numbers `robot_bench.wires.edges` describes. Kinds that a later version adds
+are passed over.
+
+Invariant: `event_of` gives back the event that `line_of` has written.
+"""
+
+import json
+import re
+from binascii import a2b_base64
+from collections import deque
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from dataclasses import dataclass, field
+from typing import Any, TypeAlias, cast
+
+from robot_bench.events.kinds import (
+    Clearance,
+    Contact,
+    Event,
+    Fault,
+    Note,
+    Packet,
+    PinEdge,
+    Pose,
+    Ranges,
+    Text,
+    Verdict,
+    Wave,
+    WorldChange,
+)
+from robot_bench.wires.edges import Edges, unpack
+from simbase.errors import FileError
+from simbase.timing import Nanos
+
+#: A parsed JSON object.
+Json: TypeAlias = dict[str, object]
+
+#: Of the whole file, in its first line; without one it is of before events had kinds of their own.
+TRACE_VERSION = 2
+#: Of the blocks of edges.
+BLOCKS_VERSION = 1
+#: What any number of a trace stays within: 64 bits, as the parts that write it count.
+_MOST = 2**63 - 1
+#: What a body noted of a collision before contacts were events: what, and where.
+_OLD_CONTACT = re.compile(r"(.*) at x (-?[\d.]+) m, y (-?[\d.]+) m$")
+
+_encode = json.JSONEncoder(sort_keys=True, separators=(",", ":"), ensure_ascii=True).encode
+
+
+class TraceError(FileError):
+    """There is no readable trace, or a line of it is damaged."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Levels:
+    """At 0: the wires in the order of the blocks, and the level of each."""
+
+    t: Nanos
+    nets: tuple[str, ...]
+    levels: str
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class EdgeBlock:
+    """So many edges, the first at `t`: base64 of what `robot_bench.wires.edges` packs."""
+
+    t: Nanos
+    count: int
+    data: str
+
+
+#: What a trace is written of: events, their edges in bulk.
+Recorded: TypeAlias = Event | Levels | EdgeBlock
+
+
+def _um(metres: float) -> int:
+    return round(metres * 1e6)
+
+
+@dataclass(frozen=True, slots=True)
+class _Row:
+    kind: str
+    to_entry: Callable[[Any], Mapping[str, object]]
+    from_entry: Callable[[Nanos, Json], Recorded | None]
+
+
+def _integer(entry: Json, key: str) -> int:
+    value = entry.get(key, 0)
+    return _whole(value) if isinstance(value, (int, float)) else 0
+
+
+def _whole(value: float) -> int:
+    if abs(value) > _MOST:
+        raise ValueError("a number beyond 64 bits")
+    return int(value)
+
+
+def _pins_entry(pins: Levels | EdgeBlock) -> Mapping[str, object]:
+    if isinstance(pins, Levels):
+        return {"v": BLOCKS_VERSION, "nets": pins.nets, "levels": pins.levels}
+    return {"n": pins.count, "d": pins.data}
+
+
+def _pins(t: Nanos, entry: Json) -> Recorded:
+    if "nets" not in entry:
+        return EdgeBlock(t=t, count=_integer(entry, "n"), data=str(entry["d"]))
+    if _integer(entry, "v") != BLOCKS_VERSION:
+        raise TraceError("edges as a later version writes them", hint="install a newer p2os")
+    nets, levels = tuple(map(str, cast("list[object]", entry["nets"]))), str(entry["levels"])
+    if len(nets) != len(levels) or set(levels) - {"0", "1"}:
+        raise ValueError("not a level for each wire")
+    return Levels(t=t, nets=nets, levels=levels)
+
+
+def _text_entry(text: Text) -> Mapping[str, object]:
+    return {"hex": text.data.hex()} | ({} if text.port == "usart1" else {"port": text.port})
+
+
+def _note(t: Nanos, entry: Json) -> Recorded:
+    who, what, detail = str(entry["who"]), str(entry["what"]), str(entry.get("detail", ""))
+    if who == "body" and what == "collision" and (old := _OLD_CONTACT.match(detail)):
+        return Contact(t=t, what=old[1], x_m=float(old[2]), y_m=float(old[3]))
+    return Note(t=t, who=who, what=what, detail=detail)
+
+
+#: What a change of the world has to say in numbers.
+_NUMBERS: Mapping[object, tuple[str, ...]] = {"place": ("x", "y"), "move": ("x", "y"), "remove": ()}
+
+
+def _world_change(t: Nanos, entry: Json) -> Recorded | None:
+    """Return a change of the world whose numbers are numbers; None for what a later version does to it."""
+    op = str(entry.get("op"))
+    if op not in _NUMBERS:
+        return None
+    sizes = ("length", "width") if entry.get("shape", "box") == "box" else ("radius",)
+    needed = (*_NUMBERS[op], *(sizes if op == "place" else ()), *(["heading"] if "heading" in entry else []))
+    numbers = {key: float(cast("float", entry[key])) for key in needed}
+    rest = {key: value for key, value in entry.items() if key not in {"k", "t", "op", "name"}}
+    return WorldChange(t=t, op=op, name=str(entry["name"]), fields=rest | numbers)
+
+
+_POSE = {
+    "x": "x", "y": "y", "z": "z", "h": "heading", "p": "pitch", "l": "left", "r": "right", "la": "left_angle",
+    "ra": "right_angle", "c": "collisions",
+}  # fmt: skip
+
+
+def _verdict(t: Nanos, entry: Json) -> Recorded:
+    by = entry.get("robustness")
+    return Verdict(
+        t=t, goal=str(entry["goal"]), met=bool(entry["met"]), says=str(entry["says"]),
+        robustness=float(by) if isinstance(by, (int, float)) else None, unit=str(entry.get("unit", "")),
+    )  # fmt: skip
+
+
+def _wave(t: Nanos, entry: Json) -> Recorded:
+    at, period, high, hz = (_integer(entry, key) for key in ("at", "period", "high", "hz"))
+    if period and not (hz > 0 and 0 < high < period and 0 <= at < period):
+        raise ValueError("no such wave")
+    return Wave(t=t, wire=str(entry["net"]), at=at, period=period, high=high, ticks_hz=hz)
+
+
+#: In the order of one instant.
+ROWS: Mapping[type, _Row] = {
+    Levels: _Row("pins", _pins_entry, _pins),
+    EdgeBlock: _Row("pins", _pins_entry, _pins),
+    PinEdge: _Row(
+        "pin",
+        lambda edge: {"net": edge.wire, "v": int(edge.level)},
+        lambda t, entry: PinEdge(t=t, wire=str(entry["net"]), level=_level(_integer(entry, "v"))),
+    ),
+    Wave: _Row(
+        "wave",
+        lambda wave: {
+            "net": wave.wire,
+            "at": wave.at,
+            "period": wave.period,
+            "high": wave.high,
+            "hz": wave.ticks_hz,
+        },
+        _wave,
+    ),
+    Text: _Row(
+        "usart",
+        _text_entry,
+        lambda t, entry: Text(t=t, data=bytes.fromhex(str(entry["hex"])), port=str(entry.get("port", "usart1"))),
+    ),
+    WorldChange: _Row("obstacle", lambda item: {"op": item.op, "name": item.name, **item.fields}, _world_change),
+    Fault: _Row(
+        "fault",
+        lambda fault: {"op": fault.op, "words": fault.words},
+        lambda t, entry: Fault(t=t, op=str(entry["op"]), words=str(entry["words"])),
+    ),
+    Packet: _Row(
+        "wire",
+        lambda packet: {"dir": packet.direction, "hex": packet.data.hex()},
+        lambda t, entry: Packet(t=t, direction=str(entry["dir"]), data=bytes.fromhex(str(entry["hex"]))),
+    ),
+    Note: _Row("event", lambda note: {"who": note.who, "what": note.what, "detail": note.detail}, _note),
+    Ranges: _Row(
+        "sonar",
+        lambda ranges: {"mm": ranges.mm},
+        lambda t, entry: Ranges(t=t, mm=tuple(_whole(value) for value in cast("list[float]", entry["mm"]))),
+    ),
+    Pose: _Row(
+        "pose",
+        lambda pose: {key: getattr(pose, name) for key, name in _POSE.items()},
+        lambda t, entry: Pose(t=t, **{name: _integer(entry, key) for key, name in _POSE.items()}),
+    ),
+    Clearance: _Row(
+        "clearance",
+        lambda clearance: {"um": clearance.um},
+        lambda t, entry: Clearance(t=t, um=_integer(entry, "um")),
+    ),
+    Contact: _Row(
+        "contact",
+        lambda hit: {"what": hit.what, "x": _um(hit.x_m), "y": _um(hit.y_m), "part": hit.part},
+        lambda t, entry: Contact(
+            t=t,
+            what=str(entry["what"]),
+            x_m=_integer(entry, "x") / 1e6,
+            y_m=_integer(entry, "y") / 1e6,
+            part=str(entry.get("part", "")),
+        ),
+    ),
+    Verdict: _Row(
+        "verdict",
+        lambda verdict: {
+            "goal": verdict.goal,
+            "met": verdict.met,
+            "says": verdict.says,
+            "robustness": verdict.robustness,
+            "unit": verdict.unit,
+        },
+        _verdict,
+    ),
+}
+#: Order of kinds within one instant.
+RANKS: Mapping[type, int] = {kind: rank for rank, kind in enumerate(ROWS)} | {EdgeBlock: 0}
+_BY_KIND: Mapping[object, Callable[[Nanos, Json], Recorded | None]] = {
+    row.kind: row.from_entry for row in ROWS.values()
+}
+
+
+def _level(value: int) -> bool:
+    if value not in {0, 1}:
+        raise ValueError("no level")
+    return bool(value)
+
+
+def line_of(event: Recorded) -> str:
+    """Return the one spelling of an event, without its line end: sorted keys, no spaces."""
+    row = ROWS[type(event)]
+    return _encode({"k": row.kind, "t": event.t, **row.to_entry(event)})
+
+
+def event_of(entry: Json) -> Recorded | None:
+    """Return what a line tells; None for the first and the last one, and for kinds of a later version.
+
+    Raises:
+        TraceError: It is written as a later version does.
+        KeyError, TypeError, ValueError: It is damaged.
+    """
+    from_entry = _BY_KIND.get(entry.get("k"))
+    return None if from_entry is None else from_entry(_integer(entry, "t"), entry)
+
+
+def entries_of(lines: Iterable[str]) -> Iterator[Json]:
+    """Yield each complete line; stop quietly at the first that is cut or no object."""
+    for line in lines:
+        if not line.endswith("\n"):
+            return
+        try:
+            entry = json.loads(line)
+        except (ValueError, RecursionError):
+            return
+        if not isinstance(entry, dict):
+            return
+        yield entry
+
+
+@dataclass(slots=True)
+class Blocks:
+    """Reads blocks of edges one after the other."""
+
+    nets: tuple[str, ...] = ()
+    levels: bytearray = field(default_factory=bytearray)
+
+    def begin(self, head: Levels) -> None:
+        """Take what the wires begin with."""
+        self.nets, self.levels = head.nets, bytearray(map(int, head.levels))
+
+    def take(self, block: EdgeBlock) -> Iterator[tuple[str, Edges]]:
+        """Yield each wire's edges of the next block.
+
+        Raises:
+            ValueError: The block is damaged.
+        """
+        found = unpack(a2b_base64(block.data), len(self.nets), block.t)
+        if sum(len(times) for _, times in found) != block.count:
+            raise ValueError("a block has not as many edges as it says")
+        for place, times in found:
+            edges, count, level = Edges(), len(times), self.levels[place]
+            edges.extend(times, (_TOGGLED[level] * (count // 2 + 1))[:count])
+            self.levels[place] = level ^ count & 1
+            yield self.nets[place], edges
+
+
+#: What follows a level of 0 and of 1.
+_TOGGLED = (b"\1\0", b"\0\1")
+
+
+def events_of(lines: Iterable[str], where: str = "the trace") -> Iterator[Event]:
+    """Play back a trace: yield the events of a run in the order in which its subscribers got them.
+
+    It ends with the last whole line, whether the run came to its end or was killed.
+
+    Raises:
+        TraceError: A line is damaged, or of a later version.
+    """
+    blocks, edges, places = Blocks(), deque[PinEdge](), dict[str, int]()
+    for number, entry in enumerate(entries_of(lines), start=1):
+        try:
+            event = event_of(entry)
+            if isinstance(event, Levels):
+                blocks.begin(event)
+                places = {net: place for place, net in enumerate(event.nets)}
+                edges.extend(
+                    PinEdge(t=event.t, wire=net, level=level == "1")
+                    for net, level in zip(event.nets, event.levels, strict=True)
+                )
+                continue
+            if isinstance(event, EdgeBlock):
+                rows = [(t, places[net], net, level) for net, track in blocks.take(event) for t, level in track]
+                edges.extend(PinEdge(t=t, wire=net, level=bool(level)) for t, _, net, level in sorted(rows))
+                continue
+        except (KeyError, TypeError, ValueError, OverflowError) as error:
+            raise damaged(where, number) from error
+        except TraceError as error:
+            raise TraceError(f"{where}:{number}: {error}", hint=error.hint) from error
+        if event is None:
+            continue
+        while edges and edges[0].t <= event.t:
+            yield edges.popleft()
+        yield event
+    yield from edges
+
+
+def damaged(where: str, number: int) -> TraceError:
+    """Return the refusal of a line."""
+    return TraceError(
+        f"{where}:{number}: a damaged line", hint="cut the file before it: what stands above it is reported"
+    )

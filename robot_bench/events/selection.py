@@ -1,0 +1,267 @@
+r"""Which events are meant: one line of words, the same in goals, scenario files and `Bench.run_until`.
+
+    pin PB12 high                 a wire comes to a level (high, low, changes); a pin or a name of the pin-out
+    usart1 sends dodge: CRUISE    a line that the firmware prints holds these words
+    usart1 matches ^left=\d+      a line that it prints matches a regular expression
+    contact [NAME]                the hull comes to touch something, or this thing
+    robot near X Y RADIUS         it comes within so many metres of a place
+    robot moves | robot stops     it is faster, or no faster, than 5 mm/s
+    sonar 3 below 0.4             a range comes below so many metres
+    note adapter driving          a line of a part's state log begins so
+    fault [WORDS]                 something is made to go wrong, or the firmware dies
+    thing NAME                    a thing is placed, moved or removed
+
+Invariant: what a selector says of an event depends on the events before it alone; it is saved with the bench.
+"""
+
+import difflib
+import math
+import re
+from collections.abc import Callable, Mapping
+from functools import cache
+
+from adapter_sim.pinout import load_pinout
+from robot_bench.events.kinds import Contact, Event, Fault, Note, PinEdge, Pose, Ranges, Text, WorldChange
+from simbase.errors import UsageError, shown
+from simbase.state import Stateful
+
+#: chosen: a robot that is no faster stands still; half of the slowest motor step would be 31 mm/s.
+STILL_MPS = 0.005
+
+
+class Selector(Stateful):
+    """Picks events; `takes` is fed all those of its `kinds`, in order of time."""
+
+    #: What it wants to be fed, and of which wires the edges are wanted.
+    kinds: tuple[type, ...] = ()
+    wires: tuple[str, ...] | None = None
+
+    def __init__(self, words: str) -> None:
+        self.words = words
+
+    def takes(self, event: Event) -> bool:
+        """Tell whether this event is meant."""
+        raise NotImplementedError
+
+
+def select(words: str) -> Selector:
+    """Return what picks the events that a line of words means.
+
+    Raises:
+        UsageError: There are no such events; the hint says what is nearest, or how it is written.
+    """
+    name, *rest = words.split(maxsplit=1) or [""]
+    row = SELECTORS.get(name)
+    if row is None:
+        near = difflib.get_close_matches(name, SELECTORS, n=1)
+        hint = (
+            f"did you mean {near[0]!r}?" if near else f"events: {'; '.join(usage for usage, _ in SELECTORS.values())}"
+        )
+        raise UsageError(f"no events {shown(words)}", hint=hint)
+    usage, make = row
+    try:
+        return make(words, rest[0] if rest else "")
+    except (ValueError, re.error) as error:
+        raise UsageError(f"events {shown(words)} are not understood: {error}", hint=f"such as {usage}") from error
+
+
+@cache
+def _wires() -> Mapping[str, str]:
+    wires = load_pinout().wires
+    return {wire.bluepill: wire.name for wire in wires} | {wire.name: wire.name for wire in wires}
+
+
+def wire_named(name: str) -> str:
+    """Return the name of a wire, by itself or by the BluePill's pin.
+
+    Raises:
+        UsageError: There is no such wire.
+    """
+    wires = _wires()
+    if name not in wires:
+        near = difflib.get_close_matches(name, wires, n=1, cutoff=0.5)
+        hint = f"did you mean {near[0]!r}?" if near else f"known are {', '.join(sorted(wires))}"
+        raise UsageError(f"there is no wire {shown(name)}", hint=hint)
+    return wires[name]
+
+
+class _Pin(Selector):
+    STATE = ("_begun",)
+    kinds = (PinEdge,)
+
+    def __init__(self, words: str, rest: str) -> None:
+        super().__init__(words)
+        name, level = rest.split() if len(rest.split()) == 2 else ("", "")
+        if level not in {"high", "low", "changes"}:
+            raise ValueError("a pin, and high, low or changes")
+        self._wire = wire_named(name)
+        self.wires = (self._wire,)
+        self._wanted = {"high": True, "low": False}.get(level)
+        self._begun = False
+
+    def takes(self, event: Event) -> bool:
+        if not isinstance(event, PinEdge) or event.wire != self._wire:
+            return False
+        begun, self._begun = self._begun, True
+        if not begun and self._wanted is None:
+            return False  # the level that a wire begins with is no change
+        return self._wanted is None or event.level is self._wanted
+
+
+class Lines(Stateful):
+    """Joins the pieces of one port's text to lines."""
+
+    STATE = ("_line",)
+
+    def __init__(self, port: str = "usart1") -> None:
+        self._port = port
+        self._line = b""
+
+    def take(self, text: Text) -> str | None:
+        """Return the line so far, without its end; None for another port's."""
+        if text.port != self._port:
+            return None
+        whole = self._line + text.data
+        self._line = b"" if whole.endswith(b"\n") else whole
+        return whole.decode("utf-8", "replace").rstrip("\r\n")
+
+
+class _Usart(Selector):
+    STATE = ("_lines", "_was_taken")
+    kinds = (Text,)
+
+    def __init__(self, words: str, rest: str) -> None:
+        super().__init__(words)
+        verb, _, wanted = rest.partition(" ")
+        if verb not in {"sends", "matches"} or not wanted:
+            raise ValueError("sends TEXT, or matches REGEX")
+        self._found: Callable[[str], object] = (
+            re.compile(wanted).search if verb == "matches" else lambda line: wanted in line
+        )
+        self._lines = Lines(words.split(maxsplit=1)[0])
+        self._was_taken = False
+
+    def takes(self, event: Event) -> bool:
+        line = self._lines.take(event) if isinstance(event, Text) else None
+        if line is None or not isinstance(event, Text):
+            return False
+        was_taken = self._was_taken
+        found = bool(self._found(line))
+        # A long line comes in pieces, and is meant once.
+        self._was_taken = (was_taken or found) and not event.data.endswith(b"\n")
+        return found and not was_taken
+
+
+class _Contact(Selector):
+    kinds = (Contact,)
+
+    def __init__(self, words: str, rest: str) -> None:
+        super().__init__(words)
+        self._name = rest
+
+    def takes(self, event: Event) -> bool:
+        return isinstance(event, Contact) and (not self._name or event.what.strip("'") == self._name)
+
+
+class _Robot(Selector):
+    STATE = ("_was",)
+    kinds = (Pose,)
+
+    def __init__(self, words: str, rest: str) -> None:
+        super().__init__(words)
+        verb, *numbers = rest.split() or [""]
+        self._is: Callable[[Pose], bool]
+        if verb == "near" and len(numbers) == 3:
+            x_m, y_m, radius_m = map(float, numbers)
+            self._is = lambda pose: math.hypot(pose.x_m - x_m, pose.y_m - y_m) <= radius_m
+        elif verb in {"moves", "stops"} and not numbers:
+            self._is = lambda pose: moves(pose) is (verb == "moves")
+        else:
+            raise ValueError("near X Y RADIUS, moves, or stops")
+        # Standing still at the beginning is no stop.
+        self._was = verb == "stops"
+
+    def takes(self, event: Event) -> bool:
+        if not isinstance(event, Pose):
+            return False
+        was, self._was = self._was, self._is(event)
+        return self._was and not was
+
+
+def moves(pose: Pose) -> bool:
+    """Tell whether a wheel is faster than a robot at rest."""
+    return max(abs(pose.left), abs(pose.right)) > STILL_MPS * 1e6
+
+
+class _Sonar(Selector):
+    STATE = ("_was",)
+    kinds = (Ranges,)
+
+    def __init__(self, words: str, rest: str) -> None:
+        super().__init__(words)
+        number, verb, metres = rest.split() if len(rest.split()) == 3 else ("", "", "")
+        if verb != "below" or not number.isdecimal() or int(number) == 0:
+            raise ValueError("a sonar from 1 on, below, and metres")
+        self._number, self._mm = int(number) - 1, float(metres) * 1000
+        self._was = False
+
+    def takes(self, event: Event) -> bool:
+        if not isinstance(event, Ranges) or self._number >= len(event.mm):
+            return False
+        was, self._was = self._was, event.mm[self._number] < self._mm
+        return self._was and not was
+
+
+class _Note(Selector):
+    kinds = (Note,)
+
+    def __init__(self, words: str, rest: str) -> None:
+        super().__init__(words)
+        self._who, _, self._what = rest.partition(" ")
+        if not self._who:
+            raise ValueError("who notes it, and what")
+
+    def takes(self, event: Event) -> bool:
+        return (
+            isinstance(event, Note) and event.who == self._who and f"{event.what} {event.detail}".startswith(self._what)
+        )
+
+
+class _Fault(Selector):
+    kinds = (Fault,)
+
+    def __init__(self, words: str, rest: str) -> None:
+        super().__init__(words)
+        self._begin = rest
+
+    def takes(self, event: Event) -> bool:
+        return isinstance(event, Fault) and event.op != "clear" and event.words.startswith(self._begin)
+
+
+class _Thing(Selector):
+    kinds = (WorldChange,)
+
+    def __init__(self, words: str, rest: str) -> None:
+        super().__init__(words)
+        if not rest:
+            raise ValueError("the name of a thing")
+        self._name = rest
+
+    def takes(self, event: Event) -> bool:
+        return isinstance(event, WorldChange) and event.name == self._name
+
+
+_USART = ("usart1 sends TEXT", _Usart)
+#: First word → how it is written, and what picks the events.
+SELECTORS: Mapping[str, tuple[str, Callable[[str, str], Selector]]] = {
+    "pin": ("pin PB12 high", _Pin),
+    "usart1": _USART,
+    "usart2": _USART,
+    "usart3": _USART,
+    "contact": ("contact [NAME]", _Contact),
+    "robot": ("robot near X Y RADIUS", _Robot),
+    "sonar": ("sonar 3 below 0.4", _Sonar),
+    "note": ("note adapter driving", _Note),
+    "fault": ("fault [WORDS]", _Fault),
+    "thing": ("thing NAME", _Thing),
+}

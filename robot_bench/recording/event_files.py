@@ -1,0 +1,93 @@
+"""The events of a run as files for other programs: JSON lines, or a Parquet table (extra `export`).
+
+A line of JSON is an object with `kind` and the fields of its event; bytes are hex. The table has a row an event, and
+a column for each field of any kind, null where a kind has it not.
+
+Invariant: the events are those of `robot_bench.events.codec.events_of`, in their order.
+"""
+
+import dataclasses
+import json
+from collections.abc import Callable, Iterable, Mapping
+from itertools import islice
+from pathlib import Path
+from typing import Any
+
+from robot_bench.events.kinds import KINDS, Event
+from simbase.errors import FileError, MissingDependencyError, UsageError
+
+#: chosen: rows of a group of a Parquet file.
+GROUP = 65_536
+
+
+def write_events(events: Iterable[Event], path: Path) -> int:
+    """Write events to a file whose suffix says how, `.jsonl` or `.parquet`; return how many.
+
+    Raises:
+        UsageError: It has another suffix.
+        MissingDependencyError: pyarrow is not installed.
+        FileError: It cannot be written.
+    """
+    write = WRITERS.get(path.suffix)
+    if write is None:
+        raise UsageError(f"cannot write events as {path.suffix or path.name}", hint=" or ".join(WRITERS))
+    try:
+        return write(events, path)
+    except OSError as error:
+        raise FileError(f"cannot write {path}: {error.strerror or error}") from error
+
+
+def _plain(event: Event) -> dict[str, object]:
+    values: dict[str, object] = {"kind": type(event).__name__}
+    for field in dataclasses.fields(event):
+        value = getattr(event, field.name)
+        values[field.name] = value.hex() if isinstance(value, bytes) else value
+    return values
+
+
+def _write_json(events: Iterable[Event], path: Path) -> int:
+    count = 0
+    with path.open("w", encoding="utf-8", newline="\n") as file:
+        for event in events:
+            file.write(json.dumps(_plain(event), separators=(",", ":")) + "\n")
+            count += 1
+    return count
+
+
+def _write_parquet(events: Iterable[Event], path: Path) -> int:
+    try:
+        import pyarrow as pa
+        from pyarrow import parquet
+    except ImportError as error:
+        raise MissingDependencyError(".parquet files need pyarrow", extra="export", hint="write .jsonl") from error
+    types = {
+        "int": pa.int64(), "bool": pa.bool_(), "float": pa.float64(), "str": pa.string(), "bytes": pa.binary(),
+        "Nanos": pa.int64(), "tuple": pa.list_(pa.int64()), "Mapping": pa.string(),
+    }  # fmt: skip
+    named = {field.name: field.type for kind in KINDS for field in dataclasses.fields(kind)}
+    columns = {"kind": pa.string()} | {name: _type(types, hint) for name, hint in named.items()}
+    schema, count = pa.schema(list(columns.items())), 0
+    with path.open("wb") as file, parquet.ParquetWriter(file, schema) as writer:
+        every = iter(events)
+        while group := list(islice(every, GROUP)):
+            rows = [_row(event) for event in group]
+            writer.write_table(pa.Table.from_pylist(rows, schema=schema))
+            count += len(rows)
+    return count
+
+
+def _type(types: Mapping[str, Any], hint: Any) -> Any:
+    name = getattr(hint, "__name__", str(hint))
+    return types[name.partition("[")[0].partition(" |")[0]]
+
+
+def _row(event: Event) -> dict[str, object]:
+    row: dict[str, object] = {"kind": type(event).__name__}
+    for field in dataclasses.fields(event):
+        value = getattr(event, field.name)
+        row[field.name] = json.dumps(value, sort_keys=True) if isinstance(value, Mapping) else value
+    return row
+
+
+#: Suffix → what writes it.
+WRITERS: Mapping[str, Callable[[Iterable[Event], Path], int]] = {".jsonl": _write_json, ".parquet": _write_parquet}

@@ -1,0 +1,287 @@
+"""Judges the goals of a run while it runs: feeds their watches, publishes verdicts, and may end the run early.
+
+What wants something to be reached is missed only by a run that was as long as the scenario plans: a shorter one
+meets it or leaves it open. What was decided before is decided. What is unknown of a real robot (a collision) is
+not judged there.
+
+Invariant: a verdict depends on the events of the run alone; played back from its trace they give the same.
+"""
+
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
+from typing import cast
+
+from p2os.errors import ScenarioError
+from robot_bench.events.kinds import Event, PinEdge, Verdict
+from robot_bench.events.stream import EventStream
+from robot_bench.scenario.goals.kinds import kind_named, known_kinds
+from robot_bench.scenario.goals.watch import GoalKind, Outcome, Watch
+from robot_bench.scenario.schema import Key, Table, Where, check_table, nearest
+from simbase.errors import UsageError, shown
+from simbase.state import PartState, Stateful
+from simbase.timing import NS_PER_S, Nanos
+
+#: When a verdict ends the run.
+_ENDS_RUN = Key(name="ends_run", kind="text", choices=("met", "missed", "decided"))
+#: What every goal may say.
+COMMON = (Key(name="kind", kind="text", required=True), _ENDS_RUN)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Goal:
+    """One thing that a run must show."""
+
+    kind: str
+    arguments: Table
+    #: Which verdict ends the run: `met`, `missed`, `decided` (either), or none.
+    ends_run: str = ""
+
+    @property
+    def definition(self) -> GoalKind:
+        """The row of its kind.
+
+        Raises:
+            ScenarioError: There is no such kind here.
+        """
+        found = kind_named(self.kind)
+        if found is None:
+            raise ScenarioError(f"there is no goal {shown(self.kind)}", hint=nearest(self.kind, known_kinds()))
+        return found
+
+    @property
+    def wanted(self) -> str:
+        """Return the goal as a sentence."""
+        return self.definition.wanted(self.arguments)
+
+    def watch(self) -> Watch:
+        """Return what watches one run for it."""
+        return self.definition.watch(self.arguments)
+
+
+@dataclass(frozen=True, slots=True)
+class Judgement:
+    """What became of a run's goals, each as a sentence."""
+
+    met: list[str]
+    missed: list[str]
+    #: The run was too short to miss them, and has not met them.
+    not_judged: list[str]
+
+
+def load_goal(table: Table, where: Where) -> Goal:
+    """Return the goal that a TOML table asks for.
+
+    Raises:
+        ScenarioError: The kind or a key is unknown, or a value is wrong.
+    """
+    check_table({name: table[name] for name in ("kind", "ends_run") if name in table}, COMMON, where)
+    name = str(table["kind"])
+    kind = kind_named(name)
+    if kind is None:
+        raise ScenarioError(f"{where}: there is no goal {shown(name)}", hint=nearest(name, known_kinds()))
+    arguments = {key: value for key, value in table.items() if key not in {"kind", "ends_run"}}
+    check_table(arguments, kind.keys, f"{where} ({name})" if isinstance(where, str) else where)
+    _check(arguments, where)
+    try:
+        kind.watch(arguments)
+    except UsageError as error:
+        raise ScenarioError(f"{where}: {error}", hint=error.hint) from error
+    return Goal(kind=name, arguments=arguments, ends_run=str(table.get("ends_run", "")))
+
+
+def _check(arguments: Table, where: Where) -> None:
+    """Check what is in the lists of a goal, and that a region is one."""
+    pairs = cast("list[object]", arguments.get("values", []))
+    if not all(_is_pair(pair) for pair in pairs):
+        raise ScenarioError(
+            f"{where}: values must be pairs of motor values, [[left, right], ...]", hint="of -128 to 127"
+        )
+    for key in ("texts", "events"):
+        items = cast("list[object]", arguments.get(key, []))
+        if not all(isinstance(item, str) for item in items) or (key in arguments and not items):
+            raise ScenarioError(f"{where}: {key} must be a list of texts in quotes")
+    area = arguments.get("area_m")
+    circle = [key for key in ("x_m", "y_m", "radius_m") if key in arguments]
+    if area is not None and (circle or not _is_area(area)):
+        raise ScenarioError(f"{where}: area_m must be [least x, least y, most x, most y], and stand alone")
+    if circle and len(circle) < 3:
+        raise ScenarioError(f"{where}: a circle needs x_m, y_m and radius_m")
+
+
+def _is_area(area: object) -> bool:
+    return (
+        isinstance(area, list)
+        and len(area) == 4
+        and all(isinstance(value, (int, float)) and not isinstance(value, bool) for value in area)
+        and area[0] < area[2]
+        and area[1] < area[3]
+    )
+
+
+def _is_pair(pair: object) -> bool:
+    return (
+        isinstance(pair, list)
+        and len(pair) == 2
+        and all(isinstance(value, int) and not isinstance(value, bool) and -128 <= value <= 127 for value in pair)
+    )
+
+
+class GoalJudge(Stateful):
+    """Feeds the goals of a run; subscribes to its events.
+
+    Args:
+        goals: What the run has to show.
+        can_tell_world: Whether collisions and the like are known; not of a real robot.
+    """
+
+    STATE = ("_watches", "_decided")
+    DERIVED = ("_last", "_publish", "is_behind")
+
+    def __init__(self, goals: Sequence[Goal], *, can_tell_world: bool = True) -> None:
+        self.goals = tuple(goal for goal in goals if can_tell_world or not goal.definition.needs_world)
+        self._watches = [goal.watch() for goal in self.goals]
+        #: What is decided, in the order of the goals; None where nothing is.
+        self._decided: list[Outcome | None] = [None] * len(self.goals)
+        self._begun = super().snapshot()
+        self._publish: Callable[[Verdict], object] = _nowhere
+        #: The run's end and how long it was to be, once they are known.
+        self._last: tuple[Nanos, Nanos] | None = None
+        #: Whether it was restored from a run with other goals, and waits for `catch_up`.
+        self.is_behind = False
+        #: Called when a verdict ends the run.
+        self.on_end: Callable[[], None] = _nothing
+
+    def snapshot(self) -> PartState:
+        """Return the goals and what is known of them."""
+        return PartState(goals=self.goals, judged=super().snapshot())
+
+    def restore(self, snapshot: object) -> None:
+        """Put back what `snapshot` returned; of a run with other goals nothing, and `catch_up` has to follow.
+
+        Raises:
+            TypeError: It is no snapshot of goals.
+        """
+        if not isinstance(snapshot, PartState) or set(snapshot) != {"goals", "judged"}:
+            raise TypeError("not a snapshot of goals")
+        self.is_behind = snapshot["goals"] != self.goals
+        super().restore(self._begun if self.is_behind else snapshot["judged"])
+        self._last = None
+
+    def catch_up(self, events: Iterable[Event], until: Nanos) -> None:
+        """Take what was recorded up to a time, as `subscribe` would have brought it; verdicts are not published."""
+        publish, self._publish = self._publish, _nowhere
+        try:
+            self.feed(events)
+            self.advance_to(until)
+        finally:
+            self._publish, self.is_behind = publish, False
+
+    def subscribe(self, stream: EventStream) -> None:
+        """Have every watch fed what it wants, and verdicts published."""
+        self._publish = stream.publish
+        for place, watch in enumerate(self._watches):
+            if watch.kinds:
+                stream.subscribe(self._feeder(place), *watch.kinds, wires=watch.wires)
+        if self._watches:
+            stream.at_limit(self.advance_to)
+
+    def _feeder(self, place: int) -> Callable[[Event], None]:
+        watch = self._watches[place]
+
+        def feed(event: Event) -> None:
+            outcome = watch.feed(event)
+            if outcome is not None:
+                self._decide(place, outcome, event.t)
+
+        return feed
+
+    def feed(self, events: Iterable[Event]) -> None:
+        """Take events in order of time."""
+        feeders: dict[type, list[tuple[tuple[str, ...] | None, Callable[[Event], None]]]] = {}
+        for place, watch in enumerate(self._watches):
+            for kind in watch.kinds:
+                feeders.setdefault(kind, []).append((watch.wires, self._feeder(place)))
+        for event in events:
+            for wires, feed in feeders.get(type(event), ()):
+                if wires is None or not isinstance(event, PinEdge) or event.wire in wires:
+                    feed(event)
+
+    def advance_to(self, limit: Nanos) -> None:
+        """Take notice that all events up to `limit` were fed; at the run's end publish what is open."""
+        for place, watch in enumerate(self._watches):
+            outcome = watch.advance_to(limit)
+            if outcome is not None:
+                self._decide(place, outcome, limit)
+        if self._last is not None and self._last[0] == limit:
+            planned_ns = self._last[1]
+            for (goal, outcome, _), decided in zip(self._outcomes(limit), self._decided, strict=True):
+                if decided is None and (outcome.met or limit >= planned_ns):
+                    self._publish(_verdict(goal, outcome, limit))
+
+    def end_at(self, end: Nanos, planned_ns: Nanos) -> None:
+        """Take notice that the run ends at `end`, and was to last `planned_ns`."""
+        self._last = end, planned_ns
+
+    def finish(self, end: Nanos, *, planned_ns: Nanos = 0) -> Judgement:
+        """Return what became of the goals in a run that ended at `end`.
+
+        Args:
+            end: When it ended.
+            planned_ns: How long the scenario plans it to be; 0 judges all.
+        """
+        found = Judgement([], [], [])
+        for goal, outcome, is_decided in self._outcomes(end):
+            if outcome.met:
+                found.met.append(goal.wanted)
+            elif not is_decided and end < planned_ns:
+                found.not_judged.append(f"{goal.wanted}: not judged before {planned_ns / NS_PER_S:g} s")
+            else:
+                found.missed.append(f"{goal.kind}: {outcome.says}")
+        return found
+
+    def _outcomes(self, end: Nanos) -> list[tuple[Goal, Outcome, bool]]:
+        rows = zip(self.goals, self._watches, self._decided, strict=True)
+        return [(goal, watch.finish(end), decided is not None) for goal, watch, decided in rows]
+
+    def _decide(self, place: int, outcome: Outcome, at: Nanos) -> None:
+        if self._decided[place] is not None:
+            return
+        self._decided[place] = outcome
+        goal = self.goals[place]
+        self._publish(_verdict(goal, outcome, at))
+        if goal.ends_run in {"decided", "met" if outcome.met else "missed"}:
+            self.on_end()
+
+
+def _nowhere(_verdict: Verdict) -> None:
+    """Take a verdict that nobody has asked for."""
+
+
+def _nothing() -> None:
+    """Let the run go on."""
+
+
+def _verdict(goal: Goal, outcome: Outcome, at: Nanos) -> Verdict:
+    by = outcome.robustness
+    return Verdict(
+        t=at, goal=goal.wanted, met=outcome.met, says=outcome.says, robustness=None if by is None else round(by, 9),
+        unit=outcome.unit if by is not None else "",
+    )  # fmt: skip
+
+
+def judge(
+    events: Iterable[Event], goals: Sequence[Goal], *, end_ns: Nanos, planned_ns: Nanos = 0, can_tell_world: bool = True
+) -> Judgement:
+    """Judge a run by its recorded events.
+
+    Args:
+        events: Of the run, in order of time.
+        goals: What it has to show.
+        end_ns: When it ended.
+        planned_ns: How long the scenario plans it to be; 0 judges all.
+        can_tell_world: As of `GoalJudge`.
+    """
+    found = GoalJudge(goals, can_tell_world=can_tell_world)
+    found.feed(events)
+    found.advance_to(end_ns)
+    return found.finish(end_ns, planned_ns=planned_ns)

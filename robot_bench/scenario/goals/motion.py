@@ -1,0 +1,312 @@
+"""Goals on where the robot is and how it moves, by its pose each 50 ms and its contacts."""
+
+import math
+from collections.abc import Callable
+
+from robot_bench.events.kinds import MICRO, Clearance, Contact, Event, Pose
+from robot_bench.events.selection import moves, select
+from robot_bench.scenario.goals.watch import Outcome, SelectorFeed, Watch, nanos, number, seconds
+from robot_bench.scenario.schema import Table
+from simbase.timing import NS_PER_S, Nanos
+
+NS_PER_MINUTE = 60 * NS_PER_S
+#: chosen: so many collisions are named in one line; all stand in the state log.
+NAMED_HITS = 3
+#: Side of the cells that a run's coverage is counted in, micrometres.
+CELL_UM = 500_000
+
+
+def _place(pose: Pose) -> str:
+    return f"x {pose.x_m:.2f} m, y {pose.y_m:.2f} m"
+
+
+class NoCollision(Watch):
+    """The hull touches nothing."""
+
+    STATE = ("_named", "_count", "_first", "_last")
+    kinds = (Contact, Pose)
+
+    def __init__(self) -> None:
+        self._named: list[str] = []
+        self._count = 0
+        #: The first pose that tells of a collision, and the last one: an old trace names none.
+        self._first: Pose | None = None
+        self._last: Pose | None = None
+
+    def feed(self, event: Event) -> Outcome | None:
+        is_first = not self._count and self._first is None
+        if isinstance(event, Contact):
+            self._count += 1
+            if len(self._named) < NAMED_HITS:
+                self._named.append(str(event))
+        elif isinstance(event, Pose) and event.collisions:
+            self._first, self._last = self._first or event, event
+        else:
+            return None
+        return self.finish(event.t) if is_first else None
+
+    def finish(self, end: Nanos) -> Outcome:
+        if self._count:
+            more = f", and {self._count - NAMED_HITS} more" if self._count > NAMED_HITS else ""
+            return Outcome(met=False, says=f"{self._count} collision(s): {'; '.join(self._named)}{more}")
+        if self._first is None or self._last is None:
+            return Outcome(met=True)
+        where = f"the first at {seconds(self._first.t)}, {_place(self._first)}"
+        return Outcome(met=False, says=f"{self._last.collisions} collision(s), {where}")
+
+
+class MinDistance(Watch):
+    """The path is long enough, by itself or by the minute."""
+
+    STATE = ("_driven_um", "_at")
+    kinds = (Pose,)
+
+    def __init__(self, table: Table) -> None:
+        self._wanted_m = number(table, "distance_m")
+        self._a_minute_m = number(table, "distance_m_a_minute")
+        self._driven_um = 0.0
+        self._at: tuple[int, int] | None = None
+
+    def feed(self, event: Event) -> Outcome | None:
+        if isinstance(event, Pose):
+            at = event.x, event.y
+            if self._at is not None:
+                self._driven_um += math.hypot(at[0] - self._at[0], at[1] - self._at[1])
+            self._at = at
+            if not self._a_minute_m and self._driven_um >= self._wanted_m * 1e6:
+                return Outcome(met=True, says=f"driven by {seconds(event.t)}")
+        return None
+
+    def finish(self, end: Nanos) -> Outcome:
+        wanted_m, driven_m = self._wanted_m + self._a_minute_m * end / NS_PER_MINUTE, self._driven_um / 1e6
+        return Outcome(
+            met=driven_m >= wanted_m, says=f"{driven_m:.2f} m were driven, {wanted_m:.2f} m are wanted",
+            robustness=driven_m - wanted_m, unit="m",
+        )  # fmt: skip
+
+
+class Cells(Watch):
+    """So many different cells were entered."""
+
+    STATE = ("_entered",)
+    kinds = (Pose,)
+
+    def __init__(self, table: Table) -> None:
+        self._wanted = int(number(table, "least"))
+        self._entered: set[tuple[int, int]] = set()
+
+    def feed(self, event: Event) -> Outcome | None:
+        if isinstance(event, Pose):
+            self._entered.add((event.x // CELL_UM, event.y // CELL_UM))
+            if len(self._entered) == self._wanted:
+                return Outcome(met=True)
+        return None
+
+    def finish(self, end: Nanos) -> Outcome:
+        count = len(self._entered)
+        return Outcome(
+            met=count >= self._wanted, says=f"{count} cells of 0.5 m were entered, {self._wanted} are wanted"
+        )
+
+
+#: How far a place lies inside a region, metres; negative outside.
+Inside = Callable[[float, float], float]
+
+
+def region(table: Table) -> Inside:
+    """Return the region of a goal's table: a circle, or a rectangle along the axes."""
+    area = table.get("area_m")
+    if isinstance(area, list):
+        low_x, low_y, high_x, high_y = map(float, area)
+        return lambda x, y: min(x - low_x, high_x - x, y - low_y, high_y - y)
+    x_m, y_m, radius_m = (number(table, key) for key in ("x_m", "y_m", "radius_m"))
+    return lambda x, y: radius_m - math.hypot(x - x_m, y - y_m)
+
+
+class Reach(Watch):
+    """The robot's centre comes into a region, in time."""
+
+    STATE = ("_best_m", "_reached", "_was_late")
+    kinds = (Pose,)
+
+    def __init__(self, table: Table) -> None:
+        self._inside = region(table)
+        self._within = nanos(table, "within_s") if "within_s" in table else None
+        self._best_m = -math.inf
+        self._reached: Nanos | None = None
+        self._was_late = False
+
+    def feed(self, event: Event) -> Outcome | None:
+        if not isinstance(event, Pose) or self._reached is not None:
+            return None
+        self._best_m = max(self._best_m, by := self._inside(event.x_m, event.y_m))
+        if by < 0:
+            return None
+        self._reached = event.t
+        return None if self._was_late else self.finish(event.t)
+
+    def advance_to(self, limit: Nanos) -> Outcome | None:
+        if self._within is None or self._reached is not None or limit <= self._within or self._was_late:
+            return None
+        self._was_late = True
+        return self.finish(limit)
+
+    def finish(self, end: Nanos) -> Outcome:
+        if self._reached is None:
+            return Outcome(
+                met=False, says=f"it was not reached by {seconds(end)}, and came to {-self._best_m:.2f} m of it",
+                robustness=self._best_m, unit="m",
+            )  # fmt: skip
+        says = f"it was reached at {seconds(self._reached)}"
+        if self._within is None:
+            return Outcome(met=True, says=says, robustness=self._best_m, unit="m")
+        left_s = (self._within - self._reached) / NS_PER_S
+        return Outcome(
+            met=left_s >= 0, says=f"{says}, {self._within / NS_PER_S:g} s are allowed", robustness=left_s, unit="s"
+        )
+
+
+class Stay(Watch):
+    """The robot's centre stays in a region, or out of it."""
+
+    STATE = ("_worst_m", "_left")
+    kinds = (Pose,)
+
+    def __init__(self, table: Table, *, is_inside: bool) -> None:
+        inside = region(table)
+        self._by: Inside = inside if is_inside else lambda x, y: -inside(x, y)
+        self._word = "left" if is_inside else "entered"
+        self._worst_m = math.inf
+        self._left: Pose | None = None
+
+    def feed(self, event: Event) -> Outcome | None:
+        if not isinstance(event, Pose):
+            return None
+        self._worst_m = min(self._worst_m, by := self._by(event.x_m, event.y_m))
+        if by >= 0 or self._left is not None:
+            return None
+        self._left = event
+        return self.finish(event.t)
+
+    def finish(self, end: Nanos) -> Outcome:
+        worst_m = self._worst_m if math.isfinite(self._worst_m) else None
+        if self._left is None:
+            return Outcome(met=True, robustness=worst_m, unit="m")
+        says = (
+            f"it was {self._word} at {seconds(self._left.t)}, {_place(self._left)}, by {-self._worst_m:.2f} m at most"
+        )
+        return Outcome(met=False, says=says, robustness=worst_m, unit="m")
+
+
+class LeastClearance(Watch):
+    """The hull stays away from everything."""
+
+    STATE = ("_least", "_was_near")
+    kinds = (Clearance,)
+
+    def __init__(self, table: Table) -> None:
+        self._wanted_m = number(table, "least_m")
+        self._least: Clearance | None = None
+        self._was_near = False
+
+    def feed(self, event: Event) -> Outcome | None:
+        if isinstance(event, Clearance):
+            self._least = event
+            if event.um < self._wanted_m * MICRO and not self._was_near:
+                self._was_near = True
+                return self.finish(event.t)
+        return None
+
+    def finish(self, end: Nanos) -> Outcome:
+        if self._least is None:
+            return Outcome(met=True, says="there was nothing near")
+        least_m = self._least.um / MICRO
+        says = f"{least_m:.3f} m were left at {seconds(self._least.t)}, {self._wanted_m:g} m are wanted"
+        return Outcome(met=least_m >= self._wanted_m, says=says, robustness=least_m - self._wanted_m, unit="m")
+
+
+class StopWithin(Watch):
+    """After an event the robot stands still in time, and has not gone too far."""
+
+    STATE = ("_events", "_since", "_at", "_way_m", "_worst_s", "_worst_m", "_failure", "_count")
+
+    def __init__(self, table: Table) -> None:
+        self._words = str(table["after"])
+        self._events = SelectorFeed(select(self._words))
+        self.kinds, self.wires = (*{Pose: None, **dict.fromkeys(self._events.kinds)},), self._events.wires
+        self._most_s, self._most_m = number(table, "within_s"), number(table, "way_m", math.inf)
+        #: When the event came that is waited for now; the last place, and the way since then.
+        self._since: Nanos | None = None
+        self._at: tuple[float, float] | None = None
+        self._way_m = 0.0
+        self._worst_s = self._worst_m = 0.0
+        self._failure = ""
+        self._count = 0
+
+    def feed(self, event: Event) -> Outcome | None:
+        outcome = None
+        if isinstance(event, Pose):
+            at = event.x_m, event.y_m
+            if self._since is not None and self._at is not None:
+                self._way_m += math.hypot(at[0] - self._at[0], at[1] - self._at[1])
+                outcome = self._judge(event.t, is_still=not moves(event))
+            self._at = at
+        if any(self._events.taken(event)) and self._since is None:
+            self._since, self._way_m = event.t, 0.0
+            self._count += 1
+        return outcome
+
+    def _judge(self, now: Nanos, *, is_still: bool) -> Outcome | None:
+        since = self._since or 0
+        took_s = (now - since) / NS_PER_S
+        self._worst_s, self._worst_m = max(self._worst_s, took_s), max(self._worst_m, self._way_m)
+        if is_still:
+            self._since = None
+        if self._failure or (took_s <= self._most_s and self._way_m <= self._most_m):
+            return None
+        allowed = f"{self._most_s:g} s" + (f" and {self._most_m:g} m" if math.isfinite(self._most_m) else "")
+        self._failure = (
+            f"after {self._words!r} at {seconds(since)} it {'stood' if is_still else 'still moved'} after "
+            f"{took_s:.3f} s and {self._way_m:.3f} m, {allowed} are allowed"
+        )
+        return self.finish(now)
+
+    def finish(self, end: Nanos) -> Outcome:
+        if not self._count:
+            return Outcome(met=False, says=f"{self._words!r} did not happen")
+        return Outcome(
+            met=not self._failure,
+            says=self._failure or f"at most {self._worst_s:.3f} s and {self._worst_m:.3f} m",
+            robustness=self._most_s - self._worst_s, unit="s",
+        )  # fmt: skip
+
+
+class Smooth(Watch):
+    """No rim is accelerated harder than allowed, between two poses."""
+
+    STATE = ("_last", "_worst_mps2", "_worst_at")
+    kinds = (Pose,)
+
+    def __init__(self, table: Table) -> None:
+        self._most_mps2 = number(table, "most_mps2")
+        self._last: Pose | None = None
+        self._worst_mps2 = 0.0
+        self._worst_at: Nanos = 0
+
+    def feed(self, event: Event) -> Outcome | None:
+        if not isinstance(event, Pose):
+            return None
+        last, self._last = self._last, event
+        if last is None or event.t <= last.t:
+            return None
+        step = max(abs(event.left - last.left), abs(event.right - last.right))
+        found_mps2 = step / MICRO / ((event.t - last.t) / NS_PER_S)
+        was_smooth = self._worst_mps2 <= self._most_mps2
+        if found_mps2 > self._worst_mps2:
+            self._worst_mps2, self._worst_at = found_mps2, event.t
+        return self.finish(event.t) if was_smooth and found_mps2 > self._most_mps2 else None
+
+    def finish(self, end: Nanos) -> Outcome:
+        says = f"{self._worst_mps2:.2f} m/s² at {seconds(self._worst_at)}, {self._most_mps2:g} m/s² are allowed"
+        by = self._most_mps2 - self._worst_mps2
+        return Outcome(met=by >= 0, says=says, robustness=by, unit="m/s²")

@@ -1,0 +1,175 @@
+"""Goals on wires: the values of the motors' pins, a level that holds, a wave in bounds."""
+
+import math
+from itertools import pairwise
+from typing import cast
+
+from adapter_sim.pinout import load_pinout
+from robot_bench.events.kinds import Event, PinEdge, Wave
+from robot_bench.events.selection import wire_named
+from robot_bench.scenario.goals.watch import Outcome, Watch, nanos, number, seconds
+from robot_bench.scenario.schema import Table
+from simbase.timing import NS_PER_MS, NS_PER_S, Nanos
+
+#: chosen: two motor values that follow each other within this are one change (two ports are written in turn).
+SKEW_NS: Nanos = 1 * NS_PER_MS
+_SIDES = ("motor1", "motor2")
+
+
+class MotorSequence(Watch):
+    """The motor pins show exactly these values, each held long enough."""
+
+    STATE = ("_bits", "_seen", "_is_decided")
+    kinds = (PinEdge,)
+
+    def __init__(self, table: Table) -> None:
+        self._wanted = [tuple(pair) for pair in cast("list[list[int]]", table["values"])]
+        self._held_ns = nanos(table, "held_s")
+        pinout = load_pinout()
+        self._nets = [pinout.value(side).wires for side in _SIDES]
+        self._place_of = {net: (side, bit) for side, nets in enumerate(self._nets) for bit, net in enumerate(nets)}
+        self.wires = tuple(self._place_of)
+        self._bits = [0, 0]
+        #: Since when, and the values of both motors.
+        self._seen: list[tuple[Nanos, tuple[int, ...]]] = []
+        self._is_decided = False
+
+    def feed(self, event: Event) -> Outcome | None:
+        if isinstance(event, PinEdge) and event.wire in self._place_of:
+            side, bit = self._place_of[event.wire]
+            self._bits[side] = self._bits[side] & ~(1 << bit) | event.level << bit
+            at = event.t
+            if self._seen and at - self._seen[-1][0] < SKEW_NS:
+                at = self._seen.pop()[0]  # the change began with the first of its edges
+            pair = tuple(_signed(bits, len(nets)) for bits, nets in zip(self._bits, self._nets, strict=True))
+            if not self._seen or self._seen[-1][1] != pair:
+                self._seen.append((at, pair))
+        return None
+
+    def advance_to(self, limit: Nanos) -> Outcome | None:
+        """Decide by what has settled: a value that is wrong, or was not held."""
+        settled = [item for item in self._seen if item[0] <= limit - SKEW_NS]
+        pairs = [pair for _, pair in settled]
+        if self._is_decided or (pairs == self._wanted[: len(pairs)] and not self._short(settled)):
+            return None
+        self._is_decided = True
+        return self.finish(limit)
+
+    def finish(self, end: Nanos) -> Outcome:
+        pairs = [pair for _, pair in self._seen]
+        if pairs == self._wanted[: len(pairs)] and (says := self._short(self._seen)):
+            return Outcome(met=False, says=says)
+        if pairs != self._wanted:
+            return Outcome(met=False, says=f"the motor pins said {shown_pairs(pairs)}, not {shown_pairs(self._wanted)}")
+        says = self._short([*self._seen, (end, ())])
+        return Outcome(met=not says, says=says)
+
+    def _short(self, seen: list[tuple[Nanos, tuple[int, ...]]]) -> str:
+        for (begin, pair), (end, _) in pairwise(seen):
+            if end - begin < self._held_ns:
+                held_s = (end - begin) / NS_PER_S
+                return f"{pair} was held {held_s:.3f} s, {self._held_ns / NS_PER_S:g} s are wanted"
+        return ""
+
+
+def _signed(bits: int, width: int) -> int:
+    sign = 1 << max(0, width - 1)
+    return (bits ^ sign) - sign
+
+
+def shown_pairs(pairs: object) -> str:
+    """Return motor values as a person reads them."""
+    return " ".join(f"{left:+d}/{right:+d}" for left, right in cast("list[tuple[int, int]]", pairs))
+
+
+class PinHolds(Watch):
+    """A wire has one level over a span of time."""
+
+    STATE = ("_level", "_wrong")
+    kinds = (PinEdge,)
+
+    def __init__(self, table: Table) -> None:
+        self._name = str(table["pin"])
+        self.wires = (wire_named(self._name),)
+        self._wanted = table["level"] == "high"
+        self._from, self._to = nanos(table, "from_s"), nanos(table, "to_s", 1e6)
+        self._level: bool | None = None
+        self._wrong: Nanos | None = None
+
+    def feed(self, event: Event) -> Outcome | None:
+        if not isinstance(event, PinEdge):
+            return None
+        outcome = self._look(self._from) if event.t > self._from else None
+        # Of what comes after the span nothing is known: it is no level of the span.
+        self._level = event.level if event.t <= self._to else None
+        return outcome or (self._look(event.t) if self._from <= event.t else None)
+
+    def advance_to(self, limit: Nanos) -> Outcome | None:
+        return self._look(self._from) if limit >= self._from else None
+
+    def finish(self, end: Nanos) -> Outcome:
+        if self._wrong is None:
+            return Outcome(met=True)
+        is_at = "low" if self._wanted else "high"
+        return Outcome(met=False, says=f"{self._name} was {is_at} at {seconds(self._wrong)}")
+
+    def _look(self, at: Nanos) -> Outcome | None:
+        if self._wrong is not None or self._level is None or self._level is self._wanted:
+            return None
+        self._wrong = at
+        return self.finish(at)
+
+
+class WaveWithin(Watch):
+    """Every period of a wire, from its rise to the next, is in bounds."""
+
+    STATE = ("_rise", "_fall", "_count", "_failure", "_hz")
+    kinds = (PinEdge, Wave)
+
+    def __init__(self, table: Table) -> None:
+        self._name = str(table["pin"])
+        self._wire = wire_named(self._name)
+        self.wires = (self._wire,)
+        self._hz_bounds = number(table, "least_hz"), number(table, "most_hz", math.inf)
+        self._duty_bounds = number(table, "least_duty"), number(table, "most_duty", 1.0)
+        self._periods = int(number(table, "periods", 1))
+        self._from, self._to = nanos(table, "from_s"), nanos(table, "to_s", 1e6)
+        self._rise: Nanos | None = None
+        self._fall: Nanos | None = None
+        self._count = 0
+        self._failure = ""
+        self._hz: tuple[float, float] = (math.inf, 0.0)
+
+    def feed(self, event: Event) -> Outcome | None:
+        if isinstance(event, Wave) and event.wire == self._wire and self._from <= event.t <= self._to and event.period:
+            self._count += self._periods
+            return self._take(event.t, event.frequency_hz, event.duty)
+        if not isinstance(event, PinEdge):
+            return None
+        if not event.level:
+            self._fall = event.t
+            return None
+        rise, self._rise = self._rise, event.t
+        if rise is None or self._fall is None or rise < self._from or event.t > self._to or self._fall <= rise:
+            return None
+        self._count += 1
+        period_ns = event.t - rise
+        return self._take(event.t, NS_PER_S / period_ns, (self._fall - rise) / period_ns)
+
+    def _take(self, at: Nanos, hz: float, duty: float) -> Outcome | None:
+        self._hz = min(self._hz[0], hz), max(self._hz[1], hz)
+        is_within = (
+            self._hz_bounds[0] <= hz <= self._hz_bounds[1] and self._duty_bounds[0] <= duty <= self._duty_bounds[1]
+        )
+        if is_within or self._failure:
+            return None
+        self._failure = f"{self._name} had {hz:.4g} Hz and {duty:.1%} duty in the period up to {seconds(at)}"
+        return self.finish(at)
+
+    def finish(self, end: Nanos) -> Outcome:
+        if self._failure:
+            return Outcome(met=False, says=self._failure)
+        if self._count < self._periods:
+            return Outcome(met=False, says=f"{self._name} had {self._count} whole periods, {self._periods} are wanted")
+        by = min(self._hz[0] - self._hz_bounds[0], self._hz_bounds[1] - self._hz[1])
+        return Outcome(met=True, robustness=by if math.isfinite(by) else None, unit="Hz")

@@ -1,0 +1,95 @@
+"""What a kind of goal is made of: its keys, its sentence, and a watch that is fed events.
+
+Invariant: what a watch has decided stands: `finish` says the same, in more words perhaps.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from robot_bench.events.kinds import Event
+from robot_bench.events.selection import Selector
+from robot_bench.scenario.schema import Key, Table
+from simbase.state import Stateful
+from simbase.timing import NS_PER_S, Nanos
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Outcome:
+    """What became of a goal.
+
+    `robustness` is by how much it was met, in `unit`, negative where it was missed; None where there is no measure.
+    """
+
+    met: bool
+    says: str = ""
+    robustness: float | None = None
+    unit: str = ""
+
+
+class Watch(Stateful):
+    """Watches a run for one goal. Its `STATE` is saved with the bench."""
+
+    #: The kinds of events that it wants to be fed, and of which wires the edges; None means of all.
+    kinds: tuple[type, ...] = ()
+    wires: tuple[str, ...] | None = None
+
+    def feed(self, event: Event) -> Outcome | None:
+        """Take the next event in order of time; return what is decided by it, None where nothing is."""
+        raise NotImplementedError
+
+    def advance_to(self, limit: Nanos) -> Outcome | None:
+        """Take notice that all events up to `limit` were fed; return what is decided by that."""
+        return None
+
+    def finish(self, end: Nanos) -> Outcome:
+        """Return what became of the goal in a run that ended at `end`."""
+        raise NotImplementedError
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class GoalKind:
+    """A kind of goal: a row of the table.
+
+    Args:
+        keys: What its table may have beside `kind`.
+        wanted: The goal as a sentence, of its table.
+        watch: Makes what watches one run, of its table; a `UsageError` refuses the table.
+        needs_world: A robot at a port cannot tell; there the goal is not judged.
+    """
+
+    keys: tuple[Key, ...]
+    wanted: Callable[[Table], str]
+    watch: Callable[[Table], Watch]
+    needs_world: bool = False
+
+
+class SelectorFeed(Stateful):
+    """Watches that wait for events in words: each is fed what it wants."""
+
+    STATE = ("_selectors",)
+
+    def __init__(self, *selectors: Selector) -> None:
+        self._selectors = selectors
+        self.kinds = tuple({kind: None for item in selectors for kind in item.kinds})
+        wires = [item.wires for item in selectors if item.wires is not None]
+        self.wires = tuple({wire: None for some in wires for wire in some}) if wires else None
+
+    def taken(self, event: Event) -> list[bool]:
+        """Return which of them mean an event."""
+        return [type(event) in item.kinds and item.takes(event) for item in self._selectors]
+
+
+def seconds(at: Nanos) -> str:
+    """Return a time in words."""
+    return f"{at / NS_PER_S:.3f} s"
+
+
+def number(table: Table, name: str, default: float = 0.0) -> float:
+    """Return a number of a goal's table."""
+    value = table.get(name, default)
+    return float(value) if isinstance(value, (int, float)) else default
+
+
+def nanos(table: Table, name: str, default: float = 0.0) -> Nanos:
+    """Return a key in seconds as nanoseconds."""
+    return round(number(table, name, default) * NS_PER_S)

@@ -1,0 +1,60 @@
+"""The JSON schema of a scenario file, for editors that complete and check TOML while one types.
+
+It is made of the same tables of keys that the loader checks by, so both refuse the same keys, types and ranges. What
+the loader checks beyond that (files, names, events in words) a schema cannot say.
+
+Source: JSON Schema, draft 2020-12.
+"""
+
+from collections.abc import Sequence
+
+from robot_bench.events.codec import Json
+from robot_bench.scenario.goals.judging import COMMON
+from robot_bench.scenario.goals.kinds import KINDS
+from robot_bench.scenario.scenario import TABLES
+from robot_bench.scenario.schema import Key
+from robot_bench.scenario.when_script import KEYS as WHEN_KEYS
+
+DRAFT = "https://json-schema.org/draft/2020-12/schema"
+_TYPES = {
+    "text": "string", "number": "number", "whole": "integer", "flag": "boolean", "table": "object", "tables": "array",
+    "list": "array",
+}  # fmt: skip
+
+
+def scenario_schema() -> Json:
+    """Return the schema as a JSON object."""
+    top = _table(TABLES[""])
+    within = _table(TABLES["[in_world.NAME]"])
+    start = _table(TABLES["[start]"])
+    properties: Json = dict(top["properties"])  # type: ignore[call-overload] # _table has made it
+    inner: Json = dict(within["properties"])  # type: ignore[call-overload] # as above
+    within["properties"] = inner | {"start": start}
+    goals = [
+        _table((*(key for key in COMMON if key.name != "kind"), *kind.keys), kind=name) for name, kind in KINDS.items()
+    ]
+    properties |= {
+        "start": start,
+        **{name: _table(TABLES[f"[{name}]"]) for name in ("direct", "adapter", "controller")},
+        "in_world": {"type": "object", "additionalProperties": within},
+        **{name: {"type": "array", "items": _table(TABLES[f"[[{name}]]"])} for name in ("obstacle", "fault")},
+        "when": {"type": "array", "items": _table(WHEN_KEYS, may_lack=("name", "fault"))},
+        "goal": {"type": "array", "items": {"oneOf": goals}},
+    }
+    return {"$schema": DRAFT, "title": "A scenario of p2os", **top, "properties": properties}
+
+
+def _table(keys: Sequence[Key], *, kind: str = "", may_lack: Sequence[str] = ()) -> Json:
+    properties: Json = {key.name: _key(key) for key in keys}
+    required = [key.name for key in keys if key.required and key.name not in may_lack]
+    if kind:
+        properties = {"kind": {"const": kind}} | properties
+        required = ["kind", *required]
+    return {"type": "object", "properties": properties, "required": required, "additionalProperties": False}
+
+
+def _key(key: Key) -> Json:
+    bounds = {"minimum": key.least, "exclusiveMinimum": key.above, "maximum": key.most}
+    found: Json = {"type": _TYPES[key.kind]}
+    found |= {name: bound for name, bound in bounds.items() if bound is not None and key.kind in {"number", "whole"}}
+    return found | ({"enum": list(key.choices)} if key.choices else {})

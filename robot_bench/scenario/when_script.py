@@ -1,0 +1,147 @@
+"""Something is done when something happens: the `[[when]]` tables of a scenario, and what carries them out.
+
+    [[when]]                                  [[when]]
+    event = "usart1 sends dodge: CRUISE"      event = "robot near 2.0 1.0 0.3"
+    do = "place"                              do = "inject"
+    name = "crate"                            fault = "sonar-dead 3"
+    before_sonar = 4                          for_s = 2.0
+    distance_m = 0.8                          every = true
+    (and the other keys of [[obstacle]])
+
+Events are told each 50 ms, at a pose; so it is done up to 50 ms after the event, or `after_s` later still.
+
+Invariant: when it is done depends on the events of the run alone, not on the slices of the loop.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from typing import cast
+
+from p2os.errors import ScenarioError
+from p2os.robots.parameters import RobotParameters
+from robot_bench.events.kinds import Event
+from robot_bench.events.selection import select
+from robot_bench.events.stream import EventStream
+from robot_bench.scenario import world_script
+from robot_bench.scenario.fault_script import FaultChange, load_faults
+from robot_bench.scenario.schema import LONGEST_S, Key, Table, Where, check_table, within
+from robot_bench.scenario.world_script import Change, load_changes
+from simbase.errors import UsageError
+from simbase.state import Stateful
+from simbase.timing import NS_PER_S, Nanos
+
+_WORLD, _FAULTS = ("place", "move", "remove"), ("inject", "clear")
+_OWN = (
+    Key(name="event", kind="text", required=True),
+    Key(name="do", kind="text", required=True, choices=(*_WORLD, *_FAULTS, "end")),
+    Key(name="after_s", kind="number", least=0, most=LONGEST_S),
+    Key(name="every", kind="flag"),
+)
+_FAULT = (Key(name="fault", kind="text", required=True), Key(name="for_s", kind="number", above=0, most=LONGEST_S))
+_THING = tuple(key for key in world_script.KEYS if key.name not in {"at_s", "op"})
+#: All that may stand in a table.
+KEYS = (*_OWN, *_FAULT, *_THING)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class When:
+    """What is done at an event; times of changes and faults are counted from it."""
+
+    event: str
+    do: str
+    after_ns: Nanos = 0
+    #: At each such event, not at the first one only.
+    every: bool = False
+    changes: tuple[Change, ...] = ()
+    faults: tuple[FaultChange, ...] = ()
+
+
+def load_whens(tables: Sequence[Table], parameters: RobotParameters, where: Where) -> tuple[When, ...]:
+    """Return what a scenario's `[[when]]` tables ask for.
+
+    Raises:
+        ScenarioError: A table breaks the schema, or its event or its fault is none.
+    """
+    return tuple(_load(table, parameters, within(where, "when", number)) for number, table in enumerate(tables))
+
+
+def _load(table: Table, parameters: RobotParameters, place: Where) -> When:
+    own = {key.name for key in _OWN}
+    mine, rest = ({key: value for key, value in table.items() if (key in own) is is_own} for is_own in (True, False))
+    check_table(mine, _OWN, place)
+    do = str(mine["do"])
+    check_table(rest, _THING if do in _WORLD else _FAULT if do in _FAULTS else (), place)
+    try:
+        select(str(mine["event"]))
+    except UsageError as error:
+        raise ScenarioError(f"{place}: {error}", hint=error.hint) from error
+    changes: tuple[Change, ...] = ()
+    faults: tuple[FaultChange, ...] = ()
+    if do in _WORLD:
+        changes = load_changes([{"at_s": 0, "op": do, **rest}], parameters, f"{place}", are_later=True)
+    elif do == "inject":
+        faults = load_faults([{"at_s": 0, **rest}], parameters, f"{place}")
+    elif do == "clear":
+        faults = (FaultChange(0, f"clear {rest['fault']}"),)
+    after_ns = round(float(cast("float", mine.get("after_s", 0))) * NS_PER_S)
+    return When(
+        event=str(mine["event"]), do=do, after_ns=after_ns, every=bool(mine.get("every", False)),
+        changes=changes, faults=faults,
+    )  # fmt: skip
+
+
+class WhenScript(Stateful):
+    """Does what is asked for when its event has happened.
+
+    Args:
+        whens: What is asked for.
+        on_change: Takes changes of the world, with their times.
+        on_fault: Takes faults, with their times.
+        on_end: Ends the run.
+    """
+
+    STATE = ("_selectors", "_done")
+
+    def __init__(
+        self,
+        whens: Sequence[When],
+        *,
+        on_change: Callable[[Sequence[Change]], None],
+        on_fault: Callable[[Sequence[FaultChange]], None],
+        on_end: Callable[[], None],
+    ) -> None:
+        self._whens = tuple(whens)
+        self._selectors = [select(when.event) for when in self._whens]
+        self._done = [False] * len(self._whens)
+        #: Places whose event has happened in the batch that is handed on.
+        self._happened: list[int] = []
+        self._on_change, self._on_fault, self._on_end = on_change, on_fault, on_end
+
+    def subscribe(self, stream: EventStream) -> None:
+        """Have the events of a run looked at."""
+        for place, selector in enumerate(self._selectors):
+            stream.subscribe(self._watcher(place), *selector.kinds, wires=selector.wires)
+        if self._whens:
+            stream.at_limit(self._act)
+
+    def _watcher(self, place: int) -> Callable[[Event], None]:
+        def watch(event: Event) -> None:
+            is_meant = self._selectors[place].takes(event)
+            if is_meant and (self._whens[place].every or not self._done[place]):
+                self._done[place] = True
+                self._happened.append(place)
+
+        return watch
+
+    def _act(self, limit: Nanos) -> None:
+        """Do what is due after all events up to `limit`: from the instant after it on."""
+        happened, self._happened = self._happened, []
+        for place in happened:
+            when = self._whens[place]
+            at = limit + 1 + when.after_ns
+            if when.changes:
+                self._on_change([replace(change, at=at + change.at) for change in when.changes])
+            if when.faults:
+                self._on_fault([FaultChange(at + fault.at, fault.words) for fault in when.faults])
+            if when.do == "end":
+                self._on_end()

@@ -1,0 +1,172 @@
+"""A board without electronics: the emulated BluePill and the simulated ESP32, each with its program, in a circuit.
+
+Both modules run the bytes, or the sources, that a real board runs; the circuit between them may have faults.
+Time goes in steps of a millisecond; an edge that the BluePill makes is answered at once, as the circuit does.
+
+Invariant: without faults it is the board of docs/board.md, as far as `Circuit` models it.
+"""
+
+from collections.abc import Callable
+from pathlib import Path
+
+from adapter_sim.pinout import WireRole, load_pinout
+from bluepill_sim import BluePill
+from bluepill_sim.fabric.pins import PinDrive
+from bluepill_sim.fabric.subscriptions import EDGE
+from robot_bench import firmware
+from robot_bench.wires.board_test.circuit import (
+    BLUEPILL_INPUT,
+    BLUEPILL_PULL_OHM,
+    EN,
+    ESP32_INPUT,
+    ESP32_PULL_OHM,
+    OUTPUT_OHM,
+    RAIL_V,
+    Circuit,
+    Fault,
+    InputLimits,
+    Node,
+    Side,
+    Source,
+)
+from robot_bench.wires.board_test.ends import AdapterEnd, BluePillEnd, Line
+from robot_bench.wires.board_test.esp32 import CONSOLE, NS_PER_US, ROBOT, Esp32
+from robot_bench.wires.chip_pins import number_of
+from simbase.timing import Reason
+
+REVISION = "rev-b"
+PROGRAM = Path(firmware.__file__).parent / "board_test.elf"
+#: chosen: what a person would wait for, and more than any answer takes.
+ANSWER_MS = 200
+_PIN_DRIVES = tuple(PinDrive)
+#: The chip's own drives as sources; one that lets go has none.
+_SOURCES = {
+    PinDrive.LOW: Source(0.0, OUTPUT_OHM),
+    PinDrive.HIGH: Source(RAIL_V, OUTPUT_OHM),
+    PinDrive.PULL_UP: Source(RAIL_V, BLUEPILL_PULL_OHM),
+    PinDrive.PULL_DOWN: Source(0.0, BLUEPILL_PULL_OHM),
+}
+
+
+class EmulatedBoard:
+    """Both modules on an adapter board.
+
+    Args:
+        faults: What is wrong with the board.
+        has_loop_plug: Whether pins 2 and 3 of J3 are joined.
+        between: What is read of a pad between the limits of low and high.
+        library: The ESP32's program; None takes the package's own.
+    """
+
+    def __init__(
+        self,
+        faults: tuple[Fault, ...] = (),
+        *,
+        has_loop_plug: bool = True,
+        between: bool = False,
+        library: Path | None = None,
+    ) -> None:
+        self.pinout = load_pinout()
+        self._circuit = Circuit(self.pinout, faults)
+        self._has_loop_plug = has_loop_plug
+        self._between = between
+        self.bluepill = BluePill(PROGRAM)
+        self.esp32 = Esp32(library)
+        self._pads = {
+            wire.name: int(pin.removeprefix("IO"))
+            for wire in self.pinout.wires
+            if wire.role is not WireRole.RESET and (pin := wire.esp32_pin(REVISION)) is not None
+        }
+        self._pins = {wire.name: self.bluepill.pin(wire.bluepill) for wire in self.pinout.wires}
+        self._said = {CONSOLE: bytearray(), ROBOT: bytearray()}
+        self._seen: object = None
+        self._volts: dict[Node, float] = {}
+        self._drives = dict.fromkeys(self._pins, PinDrive.NONE)
+        names = {wire.bluepill: wire.name for wire in self.pinout.wires}
+        self._wire_of_pin = {number_of(pin): name for pin, name in names.items()}
+        self.bluepill.subscribe_pins(names, self._bluepill_drives, ends_slice=names)
+        self._settle()
+
+    @property
+    def bluepill_end(self) -> BluePillEnd:
+        """Return the BluePill's console."""
+        return BluePillEnd(_EmulatedLine(self, self.bluepill.usart1.receive, self.bluepill.usart1.read))
+
+    @property
+    def adapter_end(self) -> AdapterEnd:
+        """Return the ESP32's console."""
+        line: Line = _EmulatedLine(
+            self, lambda data: self.esp32.receive(CONSOLE, data), lambda: self.esp32.sent(CONSOLE)
+        )
+        return AdapterEnd(line, self.pinout)
+
+    def run_ms(self, span_ms: int) -> None:
+        """Let time pass."""
+        for _ in range(span_ms):
+            until_ns = (self.esp32.now_us + 1000) * NS_PER_US
+            while self.bluepill.advance_to(until_ns).reason is Reason.EDGE:
+                self._settle()
+            self.esp32.run_until(until_ns // NS_PER_US)
+            volts = self._settle()
+            self._follow_enable(volts[EN])
+            if self._has_loop_plug:
+                self.esp32.receive(ROBOT, self.esp32.sent(ROBOT))
+
+    def _follow_enable(self, volts: float) -> None:
+        is_high = self._reads(volts, ESP32_INPUT)
+        if is_high is not self.esp32.is_running:
+            (self.esp32.power_on if is_high else self.esp32.power_off)()
+            self._settle()
+
+    def _settle(self) -> dict[Node, float]:
+        """Put on every pad what the circuit makes of what both chips drive."""
+        state = self.esp32.state
+        key = (tuple(self._drives.values()), len(self.esp32.starts), self.esp32.is_running, state.changes)
+        if key == self._seen:
+            return self._volts
+        self._seen = key
+        drives: dict[Node, Source] = {
+            (name, Side.BLUEPILL): _SOURCES[drive] for name, drive in self._drives.items() if drive in _SOURCES
+        }
+        for name, pad in self._pads.items():
+            if state.driven >> pad & 1:
+                drives[name, Side.ESP32] = Source(RAIL_V if state.out >> pad & 1 else 0.0, OUTPUT_OHM)
+            elif (state.pulled_up | state.pulled_down) >> pad & 1:
+                drives[name, Side.ESP32] = Source(RAIL_V if state.pulled_up >> pad & 1 else 0.0, ESP32_PULL_OHM)
+        self._volts = self._circuit.volts(drives)
+        levels = 0
+        for name, pad in self._pads.items():
+            levels |= self._reads(self._volts[name, Side.ESP32], ESP32_INPUT) << pad
+        self.esp32.put_levels(levels)
+        for name, pin in self._pins.items():
+            # The circuit has the last word, against the chip's own output too.
+            pin.short("3V3" if self._reads(self._volts[name, Side.BLUEPILL], BLUEPILL_INPUT) else "GND")
+        return self._volts
+
+    def _bluepill_drives(self, rows: bytes) -> None:
+        for _, pin, drive, _, _, _ in EDGE.iter_unpack(rows):
+            self._drives[self._wire_of_pin[pin]] = _PIN_DRIVES[drive]
+
+    def _reads(self, volts: float, limits: InputLimits) -> bool:
+        return self._between if limits.low_v < volts < limits.high_v else volts >= limits.high_v
+
+
+class _EmulatedLine:
+    """A console of an emulated board: virtual time passes until the answer is there."""
+
+    def __init__(self, board: EmulatedBoard, send: Callable[[bytes], None], read: Callable[[], bytes]) -> None:
+        self._board, self._send, self._read = board, send, read
+
+    def ask(self, line: str, prefix: str) -> str | None:
+        """Send a line and wait for its answer; see `Line`."""
+        self._read()
+        self._send(f"{line}\n".encode())
+        said = b""
+        for _ in range(ANSWER_MS):
+            self._board.run_ms(1)
+            said += self._read()
+            *lines, said = said.split(b"\n")
+            for answer in lines:
+                if answer.decode("ascii", "replace").startswith(prefix):
+                    return answer.decode("ascii", "replace").strip()
+        return None

@@ -1,0 +1,111 @@
+"""The pytest plugin as a user meets it: markers, a boot that is shared, failures that say what to look at."""
+
+import re
+from pathlib import Path
+from xml.etree import ElementTree as ET
+
+import pytest
+
+pytest_plugins = ("pytester",)
+
+PLUGIN = ("-p", "robot_bench.cli.pytest_plugin", "-p", "no:cacheprovider", "-p", "no:xdist")
+SETTINGS = "[pytest]\nbench_scenario = motors\n"
+
+
+def run(pytester: pytest.Pytester, text: str, *options: str) -> pytest.RunResult:
+    pytester.makeini(SETTINGS)
+    pytester.makepyfile(test_mine=text)
+    return pytester.runpytest_subprocess(*PLUGIN, "--bench-body", "kinematic", "-v", *options)
+
+
+MARKED = """
+import pytest
+hashes = []
+
+@pytest.mark.worlds("room", "arena")
+@pytest.mark.seeds("0-1")
+def test_where(bench):
+    assert (bench.scenario.body, bench.now) == ("kinematic", 0)
+    assert bench.scenario.seed in (0, 1)
+
+@pytest.mark.modes("direct")
+@pytest.mark.bodies("kinematic")
+def test_direct(bench):
+    assert bench.scenario.mode == "direct"
+
+@pytest.mark.booted
+@pytest.mark.faults("sonar-dead 1", "line-noise 0.001", at="0.5 s")
+def test_faults(bench):
+    bench.expect_no("contact", "100 ms")
+    assert [fault.words for fault in bench.record().faults] == [bench.scenario.faults[-1].words[6:]]
+
+@pytest.mark.booted
+@pytest.mark.parametrize("time", range(3))
+def test_nothing_of_one_is_seen_by_the_next(bench, time):
+    seen = []
+    bench.events.subscribe(seen.append)
+    begin = bench.now
+    assert bench.record().faults == []
+    bench.inject("sonar-dead 1")
+    bench.run_until("1 s")
+    hashes.append((begin, bench.trace.sha256, len(seen)))
+    assert len(set(hashes)) == 1
+    bench.checkpoint()
+"""
+
+
+@pytest.mark.slow
+def test_markers_say_what_a_test_runs_in_and_one_boot_serves_many(pytester: pytest.Pytester) -> None:
+    result = run(pytester, MARKED)
+    result.assert_outcomes(passed=10)
+    result.stdout.fnmatch_lines([
+        "*test_where?room-0? PASSED*", "*test_where?arena-1? PASSED*", "*test_faults?sonar-dead_1? PASSED*",
+        "bench: 8 built and booted, 2 tests began where one stood",
+    ])  # fmt: skip
+    assert not (pytester.path / "bench-runs").exists(), "nothing failed"
+
+
+FAILED = """
+import pytest
+
+@pytest.mark.booted
+def test_it_flies(bench):
+    bench.drop_link()
+    bench.expect_text("take-off", within="300 ms")
+
+@pytest.mark.scenario("motorz")
+def test_of_nothing(bench): pass
+
+def test_without_a_bench(): assert 1 == 2
+"""
+
+
+@pytest.mark.slow
+def test_a_failure_says_what_was_wanted_what_happened_last_and_where_to_look(pytester: pytest.Pytester) -> None:
+    result = run(pytester, FAILED, "--junitxml", "junit.xml")
+    result.assert_outcomes(failed=2, errors=1)
+    result.stdout.fnmatch_lines([
+        "E *ExpectationError: 'usart1 sends take-off' did not happen, from 0.700 s to 1.000 s",
+        "*last events:*", "*fault inject: link-down*", "*replay:   pytest 'test_mine.py::test_it_flies'*",
+    ])  # fmt: skip
+    out = result.stdout.str()
+    assert "there is no scenario 'motorz' (hint: did you mean 'motors'?)" in out
+    assert "def expect(" not in out, "the bench's own lines are not shown"
+    page = Path(re.findall(r"report:   (\S+)", out)[0])
+    assert "did not happen" in page.read_text(encoding="utf-8")
+    assert [folder.name for folder in (pytester.path / "bench-runs").iterdir()] == ["test_mine.py-test_it_flies"]
+    if (page.parent / "path.png").exists():
+        assert f"picture:  {page.parent / 'path.png'}" in out
+    cases = ET.parse(pytester.path / "junit.xml").iter("testcase")  # noqa: S314 - our own file
+    told = {case.get("name"): {item.get("name") for item in case.iter("property")} for case in cases}
+    assert {"bench_report", "trace_sha256", "bench_seed"} <= told["test_it_flies"]
+    assert told["test_without_a_bench"] == set()
+
+
+def test_who_uses_no_bench_loads_none(pytester: pytest.Pytester) -> None:
+    pytester.makepyfile(test_mine="""
+        import sys
+        def test_inert(): assert not {"robot_bench.bench", "numpy", "unicorn", "p2os.protocol"} & set(sys.modules)
+    """)  # fmt: skip
+    result = pytester.runpytest_subprocess(*PLUGIN, "-p", "no:hypothesispytest")
+    result.assert_outcomes(passed=1)

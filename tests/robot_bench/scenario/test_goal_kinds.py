@@ -1,0 +1,298 @@
+"""Each kind of goal that watches motion, wires and events: one tick before, at and after its bound."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Any
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from p2os.errors import ScenarioError
+from robot_bench.events.kinds import Clearance, Contact, Event, Fault, Note, PinEdge, Pose, Ranges, Text, Wave
+from robot_bench.scenario.goals.judging import Goal, GoalJudge, load_goal
+from robot_bench.scenario.goals.kinds import KINDS
+from robot_bench.scenario.goals.watch import Outcome
+from tests.robot_bench.recording.records import S, pose
+
+MS = 10**6
+UM = 1_000_000
+
+
+def outcome(kind: str, run: Sequence[Event], end: int = 10 * S, **arguments: Any) -> Outcome:
+    """Return what a goal says of a run; it must say the same where it was saved and restored between any two events."""
+    goal = load_goal(
+        {"kind": kind, **{key.rstrip("_"): value for key, value in arguments.items()}}, "mine.toml: [[goal]] 1"
+    )
+    assert goal.wanted
+    found = []
+    for is_saved in (False, True):
+        judge = GoalJudge([goal])
+        for event in sorted(run, key=lambda event: event.t):
+            judge.feed([event])
+            if is_saved:
+                fresh = GoalJudge([goal])
+                fresh.restore(judge.snapshot())
+                judge = fresh
+        judge.advance_to(end)
+        ((_, said, is_decided),) = judge._outcomes(end)
+        assert is_decided in {True, False}
+        found.append(said)
+    assert found[0] == found[1]
+    return found[0]
+
+
+def at(t: int, x_m: float = 0.0, y_m: float = 0.0, *, left: float = 0.0, right: float = 0.0, deg: float = 0.0) -> Pose:
+    heading = round(deg / 180 * 3.141592653589793 * UM)
+    return replace(
+        pose(t, round(x_m * UM), round(y_m * UM)), left=round(left * UM), right=round(right * UM), heading=heading
+    )
+
+
+def edges(wire: str, *levels: tuple[int, int]) -> list[Event]:
+    return [PinEdge(t=t, wire=wire, level=bool(level)) for t, level in levels]
+
+
+def printed(*lines: tuple[int, str]) -> list[Event]:
+    return [Text(t=t, data=line.encode() + b"\n") for t, line in lines]
+
+
+def test_every_kind_of_goal_is_tried() -> None:
+    from tests.robot_bench.scenario import test_goals
+
+    names = " ".join(name for name in [*globals(), *vars(test_goals)] if name.startswith("test_goal_"))
+    assert [kind for kind in KINDS if kind not in names] == []
+
+
+@pytest.mark.parametrize(("t", "met"), [(2 * S - 1, True), (2 * S, True), (2 * S + 1, False)])
+def test_goal_reach_in_time(t: int, met: bool) -> None:
+    found = outcome("reach", [at(0), at(t, 1.0)], x_m=1.2, y_m=0, radius_m=0.2, within_s=2)
+    assert (found.met, found.unit) == (met, "s")
+    assert found.robustness == pytest.approx((2 * S - t) / S)
+
+
+@pytest.mark.parametrize(("x_m", "met"), [(0.999999, False), (1.0, True)])
+def test_goal_reach_of_a_place(x_m: float, met: bool) -> None:
+    found = outcome("reach", [at(0), at(S, x_m)], area_m=[1, -1, 2, 1])
+    assert found.met is met
+    assert found.robustness == pytest.approx(x_m - 1)
+    assert met or found.says == "it was not reached by 10.000 s, and came to 0.00 m of it"
+
+
+@pytest.mark.parametrize(("x_m", "met"), [(0.5, True), (0.500001, False)])
+def test_goal_avoid_and_goal_stay_within(x_m: float, met: bool) -> None:
+    run = [at(0), at(S, x_m), at(2 * S)]
+    assert outcome("avoid", run, x_m=1, y_m=0, radius_m=0.5).met is met
+    found = outcome("stay_within", run, area_m=[-1, -1, 0.5, 1])
+    assert found.met is met
+    assert found.robustness == pytest.approx(0.5 - x_m)
+    assert met or found.says == "it was left at 1.000 s, x 0.50 m, y 0.00 m, by 0.00 m at most"
+
+
+@pytest.mark.parametrize(("um", "met"), [(200_000, True), (199_999, False)])
+def test_goal_clearance(um: int, met: bool) -> None:
+    found = outcome("clearance", [Clearance(t=0, um=900_000), Clearance(t=S, um=um)], least_m=0.2)
+    assert (found.met, found.robustness) == (met, pytest.approx((um - 200_000) / UM))
+
+
+@pytest.mark.parametrize(("t", "met"), [(1500 * MS, True), (1500 * MS + 1, False)])
+def test_goal_stop_within_a_time(t: int, met: bool) -> None:
+    run = [at(0, left=0.2, right=0.2), Fault(t=S, op="inject", words="link-down"), at(t, 0.05)]
+    found = outcome("stop_within", run, after="fault link", within_s=0.5)
+    assert found.met is met
+    assert found.robustness == pytest.approx((1500 * MS - t) / S)
+
+
+@pytest.mark.parametrize(("x_m", "met"), [(0.3, True), (0.300001, False)])
+def test_goal_stop_within_a_way(x_m: float, met: bool) -> None:
+    run = [at(0, left=0.2), Fault(t=S, op="inject", words="link-down"), at(S + 1, 0.1, left=0.2), at(2 * S, x_m)]
+    found = outcome("stop_within", run, after="fault", within_s=2, way_m=0.3)
+    assert found.met is met
+    assert met or found.says == "after 'fault' at 1.000 s it stood after 1.000 s and 0.300 m, 2 s and 0.3 m are allowed"
+    assert outcome("stop_within", [at(0)], after="fault", within_s=2).says == "'fault' did not happen"
+
+
+@pytest.mark.parametrize(("deg", "met"), [(-179, True), (-174, True), (-173.9, False), (170, True), (169, False)])
+def test_goal_hold_heading_goes_the_short_way(deg: float, met: bool) -> None:
+    assert outcome("hold_heading", [at(0, deg=178), at(S, deg=deg)], heading_deg=178, tolerance_deg=8).met is met
+
+
+@pytest.mark.parametrize(("t", "met"), [(S - 1, True), (S, False), (2 * S, False), (2 * S + 1, True)])
+def test_goal_hold_speed_within_its_window(t: int, met: bool) -> None:
+    run = [at(0), at(t, left=0.5, right=0.5), at(3 * S)]
+    found = outcome("hold_speed", run, speed_mps=0, tolerance_mps=0.1, from_s=1, to_s=2)
+    assert found.met is met
+    assert met or found.says.startswith(f"speed_mps was out of bounds by 0.4 m/s at {t / S:.3f} s")
+
+
+def test_goal_smooth() -> None:
+    run = [at(0), at(50 * MS, left=0.02, right=-0.02), at(100 * MS, left=0.02, right=0.01)]
+    assert outcome("smooth", run, most_mps2=0.6).met
+    found = outcome("smooth", run, most_mps2=0.59)
+    assert (found.met, found.says) == (False, "0.60 m/s² at 0.100 s, 0.59 m/s² are allowed")
+
+
+samples = st.lists(
+    st.tuples(st.integers(0, 40), st.integers(-20, 20)), min_size=1, max_size=12, unique_by=lambda s: s[0]
+)
+
+
+@given(samples, st.integers(0, 20), st.integers(1, 30), st.integers(-10, 10))
+def test_goal_always_and_goal_eventually_are_the_least_and_greatest_margin(
+    rows: list[tuple[int, int]], start: int, length: int, least: int
+) -> None:
+    run = [at(t * S, float(x)) for t, x in sorted(rows)]
+    window = {"from_s": start, "to_s": start + length}
+    inside = [x - least for t, x in rows if start <= t <= start + length]
+    always = outcome("always", run, signal="x_m", least=least, end=50 * S, **window)
+    eventually = outcome("eventually", run, signal="x_m", least=least, end=50 * S, **window)
+    assert always.met is (min(inside, default=0) >= 0)
+    assert eventually.met is (max(inside, default=-1) >= 0)
+    assert always.robustness == min(inside, default=None)
+    if not eventually.met or not inside:
+        assert eventually.robustness == max(inside, default=None)
+    negated = outcome("eventually", run, signal="x_m", most=least, end=50 * S, **window)
+    if inside and not negated.met:
+        assert always.robustness == -negated.robustness  # type: ignore[operator] # always p is not eventually not p
+
+
+def test_goal_always_after_an_event_looks_at_each_occurrence() -> None:
+    told = [Note(t=t * S, who="adapter", what="driving") for t in (1, 5)]
+    run = [*told, at(S, left=1.0), at(2 * S), at(5 * S), at(6 * S, left=0.3)]
+    ends = {"signal": "left_mps", "most": 0.2, "after": "note adapter driving", "from_s": 0.5, "to_s": 1}
+    found = outcome("always", run, **ends)
+    assert (found.met, found.robustness) == (False, pytest.approx(-0.1))
+    assert found.says == "left_mps was out of bounds by 0.1 m/s at 6.000 s after 'note adapter driving' at 5.000 s"
+    assert outcome("always", run[:-1], **ends).met
+    assert outcome("always", [at(0)], **ends).says == "'note adapter driving' did not happen"
+    fast = outcome("eventually", run, signal="left_mps", least=0.3, after="note adapter driving", from_s=0.5, to_s=1)
+    assert (fast.met, fast.robustness) == (False, pytest.approx(-0.3))
+
+
+@pytest.mark.parametrize(("t", "met"), [(2 * S, True), (2 * S + 1, False)])
+def test_goal_happens_in_time(t: int, met: bool) -> None:
+    found = outcome("happens", printed((S, "booting"), (t, "ready 7")), event=r"usart1 matches ^ready \d$", within_s=2)
+    assert found.met is met
+    assert found.says == ("1 time(s), first at 2.000 s" if met else
+                          r"'usart1 matches ^ready \\d$' happened 0 time(s) by 2 s, 1 at least")  # fmt: skip
+
+
+@pytest.mark.parametrize(("count", "met"), [(1, False), (2, True), (3, True), (4, False)])
+def test_goal_happens_so_often(count: int, met: bool) -> None:
+    run = [Contact(t=n * S, what="'crate'", x_m=0, y_m=0) for n in range(count)]
+    assert outcome("happens", run, event="contact crate", least=2, most=3).met is met
+    assert outcome("happens", run, event="contact cat", least=0, most=0).met
+
+
+@pytest.mark.parametrize(("t", "met"), [(S - 1, True), (S, False)])
+def test_goal_never(t: int, met: bool) -> None:
+    found = outcome("never", edges("p2dx_con", (0, 1), (t, 0)), event="pin PB12 low", from_s=1)
+    assert found.met is met
+    assert met or found.says == "'pin PB12 low' happened 1 time(s), first at 1.000 s"
+
+
+def test_goal_in_order() -> None:
+    wanted = ["pin PB12 high", "note adapter driving", "robot moves"]
+    run = [*edges("p2dx_con", (0, 0), (S, 1)), Note(t=2 * S, who="adapter", what="driving"), at(0), at(3 * S, left=0.1)]
+    assert outcome("in_order", run, events=wanted).met
+    found = outcome("in_order", run, events=wanted[::-1])
+    assert found.says == "'note adapter driving' did not happen after 'robot moves' at 3.000 s"
+
+
+@pytest.mark.parametrize(("t", "met"), [(S + 5 * MS - 1, True), (S + 5 * MS, True), (S + 5 * MS + 1, False)])
+def test_goal_latency(t: int, met: bool) -> None:
+    run = [*edges("DD3", (0, 0), (S, 1)), *edges("motor1_comm1", (0, 0), (t, 1))]
+    found = outcome("latency", run, from_="pin DD3 high", to="pin PB7 changes", most_s=0.005)
+    assert found.met is met
+    if met:
+        assert found.robustness == pytest.approx((S + 5 * MS - t) / S)
+    never = outcome("latency", run[:2], from_="pin DD3 high", to="pin PB7 changes", most_s=0.005)
+    assert never.says == "'pin PB7 changes' did not follow 'pin DD3 high' at 1.000 s, 0.005 s are allowed"
+
+
+@pytest.mark.parametrize(
+    ("end", "says"),
+    [
+        (S + 5 * MS - 1, "'pin PB7 changes' did not happen"),
+        (S + 5 * MS, "'pin PB7 changes' did not follow 'pin DD3 high' at 1.000 s, 0.005 s are allowed"),
+    ],
+)
+def test_goal_latency_is_open_until_its_last_instant(end: int, says: str) -> None:
+    run = edges("DD3", (0, 0), (S, 1))
+    assert outcome("latency", run, end, from_="pin DD3 high", to="pin PB7 changes", most_s=0.005).says == says
+
+
+@pytest.mark.parametrize(
+    ("levels", "failed_at"),
+    [
+        ([(0, 1), (2 * S + 1, 0)], None), ([(0, 1), (2 * S, 0)], "2.000"), ([(0, 0), (S, 1)], None),
+        ([(0, 0), (S + 1, 1)], "1.000"), ([(0, 0)], "1.000"), ([(0, 1), (S - 1, 0), (S, 1)], None),
+    ],
+)  # fmt: skip
+def test_goal_pin_holds(levels: list[tuple[int, int]], failed_at: str | None) -> None:
+    found = outcome("pin_holds", edges("p2dx_con", *levels), pin="PB12", level="high", from_s=1, to_s=2)
+    assert found.met is (failed_at is None)
+    assert found.met or found.says == f"PB12 was low at {failed_at} s"
+
+
+@pytest.mark.parametrize(("high_ms", "met"), [(1, True), (2, True), (3, False)])
+def test_goal_wave_by_edges_and_goal_wave_by_wave(high_ms: int, met: bool) -> None:
+    rows = [(0, 0)] + [(n * 10 * MS + d * MS, level) for n in range(1, 4) for d, level in ((0, 1), (high_ms, 0))]
+    bounds = {"pin": "PB7", "least_hz": 99, "most_hz": 101, "least_duty": 0.05, "most_duty": 0.2}
+    found = outcome("wave", edges("motor1_comm1", *rows), periods=2, **bounds)
+    assert found.met is met
+    assert met or found.says == "PB7 had 100 Hz and 30.0% duty in the period up to 0.020 s"
+    wave = Wave(t=5, wire="motor1_comm1", at=0, period=10_000, high=high_ms * 1000, ticks_hz=1_000_000)
+    assert outcome("wave", [wave], **bounds).met is met
+    few = outcome("wave", edges("motor1_comm1", *rows), periods=3, pin="PB7")
+    assert few.says == "PB7 had 2 whole periods, 3 are wanted"
+
+
+def test_a_sonar_a_stop_and_a_place_are_events_once() -> None:
+    ranges = [Ranges(t=t * S, mm=(3000, mm)) for t, mm in enumerate((900, 399, 300, 500, 399))]
+    assert outcome("happens", ranges, event="sonar 2 below 0.4", least=2, most=2).met
+    run = [at(0), at(S, 1, left=0.1), at(2 * S, 2, left=0.1), at(3 * S, 1)]
+    assert outcome("happens", run, event="robot stops", least=1, most=1).met
+    assert outcome("happens", run, event="robot near 1 0 0.1", least=2, most=2).met
+
+
+@pytest.mark.parametrize(
+    ("table", "message"),
+    [
+        ({"kind": "reech"}, "there is no goal 'reech' .*did you mean 'reach'"),
+        ({"kind": "happens", "event": "pin PB99 high"}, "there is no wire 'PB99'"),
+        ({"kind": "happens", "event": "pin PB12 up"}, "not understood: a pin, and high, low or changes"),
+        ({"kind": "happens", "event": "uzart1 sends x"}, "no events 'uzart1 sends x' .*did you mean 'usart1'"),
+        ({"kind": "happens", "event": "usart1 matches ("}, "not understood: missing"),
+        ({"kind": "in_order", "events": []}, "events must be a list of texts in quotes"),
+        ({"kind": "reach", "x_m": 1}, "a circle needs x_m, y_m and radius_m"),
+        ({"kind": "avoid", "area_m": [0, 0, 0, 1]}, "area_m must be"),
+        ({"kind": "no_collision", "ends_run": "soon"}, "is none of met, missed, decided"),
+        ({"kind": "wave", "pin": "PB7", "hz": 3}, "unknown key 'hz'"),
+    ],
+)
+def test_a_wrong_goal_is_refused_with_a_hint(table: dict[str, Any], message: str) -> None:
+    with pytest.raises(ScenarioError) as refused:
+        load_goal(table, "mine.toml: [[goal]] 1")
+    import re
+
+    assert re.search(message, f"{refused.value} ({refused.value.hint})")
+    assert str(refused.value).startswith("mine.toml: [[goal]] 1")
+
+
+def test_a_goal_that_came_from_elsewhere_is_judged_like_any(monkeypatch: pytest.MonkeyPatch) -> None:
+    from robot_bench.scenario.goals import kinds
+
+    class Point:
+        value = "mine:goal"
+
+        @staticmethod
+        def load() -> object:
+            return KINDS["no_collision"]
+
+    monkeypatch.setattr(kinds, "_entry_points", lambda: {"untouched": Point})
+    assert Goal(kind="untouched", arguments={}).wanted == "touches nothing"
+    assert load_goal({"kind": "untouched"}, "x").kind == "untouched"
+    monkeypatch.setattr(Point, "load", staticmethod(lambda: 7))
+    with pytest.raises(ScenarioError, match="mine:goal is no GoalKind"):
+        load_goal({"kind": "untouched"}, "x")

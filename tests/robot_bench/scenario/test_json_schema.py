@@ -1,0 +1,119 @@
+"""The schema takes what the loader takes, and refuses what it refuses."""
+
+import copy
+import json
+import tomllib
+from typing import Any
+
+import pytest
+import typer
+from typer.testing import CliRunner
+
+from p2os.errors import ScenarioError
+from robot_bench.cli import check
+from robot_bench.scenario.json_schema import scenario_schema
+from robot_bench.scenario.scenario import known_scenarios, load_scenario, read_scenario
+from simbase.errors import UsageError
+
+SCHEMA = scenario_schema()
+TYPES = {"string": str, "number": (int, float), "integer": int, "boolean": bool, "object": dict, "array": list}
+EXTRA = """
+[[when]]
+event = "contact"
+do = "end"
+[[goal]]
+kind = "reach"
+x_m = 1.0
+y_m = 0.0
+radius_m = 0.5
+ends_run = "met"
+[[fault]]
+at_s = 1.0
+fault = "reboot"
+"""
+
+
+def fits(value: Any, schema: dict[str, Any]) -> bool:
+    """Tell whether a value is as a schema of this one's few words wants it."""
+    if "oneOf" in schema:
+        return sum(fits(value, one) for one in schema["oneOf"]) == 1
+    if "const" in schema:
+        return bool(value == schema["const"])
+    kind = schema["type"]
+    if not isinstance(value, TYPES[kind]) or (isinstance(value, bool) and kind != "boolean"):  # type: ignore[arg-type] # types
+        return False
+    return bool(RULES.get(kind, lambda _value, _schema: True)(value, schema))
+
+
+def fits_object(value: dict[str, Any], schema: dict[str, Any]) -> bool:
+    allowed = schema["additionalProperties"]
+    inner = [schema.get("properties", {}).get(key, allowed) for key in value]
+    known = all(rule and fits(item, rule) for item, rule in zip(value.values(), inner, strict=True))
+    return known and set(schema.get("required", ())) <= set(value)
+
+
+def fits_number(value: float, schema: dict[str, Any]) -> bool:
+    above = schema.get("exclusiveMinimum", -1e99) < value
+    return bool(above and schema.get("minimum", -1e99) <= value <= schema.get("maximum", 1e99))
+
+
+RULES: dict[str, Any] = {
+    "object": fits_object, "number": fits_number, "integer": fits_number,
+    "array": lambda value, schema: "items" not in schema or all(fits(item, schema["items"]) for item in value),
+    "string": lambda value, schema: value in schema.get("enum", [value]),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", known_scenarios())
+def test_what_ships_fits_the_schema(name: str) -> None:
+    assert fits(tomllib.loads(load_scenario(name).text), SCHEMA)
+
+
+@pytest.mark.parametrize(
+    ("table", "key", "value"),
+    [
+        ("", "seed", -1), ("", "seed", 1.5), ("", "version", 2), ("", "sead", 1), ("", "body", "jelly"),
+        ("", "robot", 3),
+        ("goal", "radius_m", 0), ("goal", "radios_m", 1), ("goal", "kind", "reech"), ("goal", "ends_run", "soon"),
+        ("when", "do", "explode"), ("when", "every", 1), ("fault", "at_s", "5"), ("fault", "at_s", 1e7),
+    ],
+)  # fmt: skip
+def test_schema_and_loader_refuse_the_same(table: str, key: str, value: object, tmp_path: Any) -> None:
+    text = load_scenario("motors").text + EXTRA
+    plain = tomllib.loads(text)
+    assert fits(plain, SCHEMA)
+    (tmp_path / "right.toml").write_text(text, encoding="utf-8")
+    read_scenario(tmp_path / "right.toml")
+    wrong = copy.deepcopy(plain)
+    (wrong[table][-1] if table else wrong)[key] = value
+    assert not fits(wrong, SCHEMA)
+    line = f"{key} = {str(value).lower() if not isinstance(value, str) else repr(value)}\n"
+    old = [row for row in text.splitlines(keepends=True) if not row.startswith(f"{key} =")] if key in plain else None
+    if table:
+        head, tail = text.rsplit(f"[[{table}]]\n", 1)
+        kept, *others = tail.split("[[", 1)
+        kept = "".join(row for row in kept.splitlines(keepends=True) if not row.startswith(f"{key} ="))
+        changed = f"{head}[[{table}]]\n{line}{kept}" + "".join(f"[[{other}" for other in others)
+    else:
+        changed = line + "".join(old or [text])
+    (tmp_path / "wrong.toml").write_text(changed, encoding="utf-8")
+    with pytest.raises(ScenarioError):
+        read_scenario(tmp_path / "wrong.toml")
+
+
+def test_check_says_of_each_file_what_it_is_or_what_is_wrong(tmp_path: Any) -> None:
+    app = typer.Typer()
+    check.register(app)
+
+    def said(*words: str) -> Any:
+        return CliRunner().invoke(app, words)
+
+    wrong = tmp_path / "mine.toml"
+    wrong.write_text(load_scenario("motors").text.replace("duration_s", "duration_m"), encoding="utf-8")
+    both = said("motors", str(wrong))
+    ok, refused = both.stdout.splitlines()
+    assert (both.exit_code, ok) == (1, "ok     motors: 16 s of motors.elf in room, 4 goals")
+    assert refused.startswith("wrong  mine.toml:6: unknown key 'duration_m' (hint: did you mean 'duration_s'?)")
+    assert said("motors").exit_code == 0
+    assert isinstance(said().exception, UsageError)
+    assert json.loads(said("--schema").stdout) == json.loads(json.dumps(SCHEMA))

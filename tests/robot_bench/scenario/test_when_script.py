@@ -1,0 +1,95 @@
+"""What a scenario's [[when]] asks for is done after its event, once or each time, whatever the slices."""
+
+import pickle
+from dataclasses import replace
+from typing import Any
+
+import pytest
+
+from p2os.errors import ScenarioError
+from p2os.robots.parameters import load_parameters
+from robot_bench.bench import Bench
+from robot_bench.events.kinds import Fault, WorldChange
+from robot_bench.scenario.when_script import load_whens
+from tests.robot_bench.test_bench import MS, bench, scenario
+
+P2DX = load_parameters("p2dx")
+POST = {"name": "post", "shape": "cylinder", "radius_m": 0.05, "height_m": 0.5}
+
+
+def made(*tables: dict[str, Any], mode: str = "adapter", slice_ns: int = MS) -> Bench:
+    whens = load_whens(tables, P2DX, "x.toml")
+    return bench(replace(scenario(mode), whens=whens), slice_ns)
+
+
+def told(one: Bench, kind: type) -> list[tuple[int, str]]:
+    found: list[tuple[int, str]] = []
+    one.events.subscribe(lambda event: found.append((event.t, event.op)), kind)
+    one.run_until("3 s")
+    one.finish()
+    return found
+
+
+@pytest.mark.parametrize(("after_s", "at"), [(0, 1050 * MS), (0.25, 1300 * MS)])
+def test_a_thing_is_placed_and_held_after_an_edge(after_s: float, at: int) -> None:
+    table = {"event": "pin PB7 high", "do": "place", "after_s": after_s, **POST, "before_sonar": 2, "distance_m": 0.4,
+             "hold_s": 0.1}  # fmt: skip
+    assert told(made(table), WorldChange) == [(at, "place"), (at + 50 * MS, "move"), (at + 100 * MS, "remove")]
+
+
+@pytest.mark.parametrize(("every", "times"), [(False, 1), (True, 2)])
+def test_it_is_done_once_or_each_time(every: bool, times: int) -> None:
+    # PB7 rises at 1 s and falls at 2 s; the level that it begins with is no change.
+    table = {"event": "pin PB7 changes", "do": "inject", "fault": "sonar-dead 1", "every": every}
+    other = {"event": "pin PB6 changes", "do": "clear", "fault": "sonar-dead 1", "every": every}
+    found = told(made(table, other), Fault)
+    assert [row for row in found if row[1] == "inject"] == [(1050 * MS, "inject"), (2050 * MS, "inject")][:times]
+
+
+def test_a_fault_is_cleared_again() -> None:
+    table = {"event": "usart1 sends hello", "do": "inject", "fault": "link-down", "for_s": 0.5}
+    assert told(made(table), Fault) == [(550 * MS, "inject"), (1050 * MS, "clear")]
+
+
+def test_an_event_may_end_the_run_and_the_slices_change_nothing() -> None:
+    traces = set()
+    for slice_ns in (MS, 10 * MS, 77_777):
+        one = made({"event": "pin PB7 high", "do": "end"}, slice_ns=slice_ns)
+        one.run_until("3 s")
+        assert one.finish() == one.end == 1050 * MS
+        traces.add(one.trace.text)
+    assert len(traces) == 1
+
+
+def test_a_bench_saved_between_event_and_deed_goes_on_alike() -> None:
+    table = {"event": "usart1 sends hello", "do": "inject", "fault": "sonar-dead 2", "after_s": 0.5}
+    whole, first, second = made(table), made(table), made(table)
+    first.run_until("0.7 s")
+    second.restore(pickle.loads(pickle.dumps(first.snapshot())))  # noqa: S301 - our own bytes
+    for one in (whole, second):
+        one.run_until("3 s")
+        one.finish()
+    assert second.trace.text == whole.trace.text
+    assert [fault.t for fault in whole.record().faults] == [1050 * MS]
+
+
+@pytest.mark.parametrize(
+    ("table", "says"),
+    [
+        ({"event": "pin PB99 high", "do": "end"}, "there is no wire"),
+        ({"event": "contact", "do": "explode"}, "is none of place, move, remove, inject, clear, end"),
+        ({"event": "contact", "do": "end", "fault": "reboot"}, "unknown key 'fault'"),
+        ({"event": "contact", "do": "inject", "fault": "reboots"}, "no fault 'reboots'"),
+        ({"event": "contact", "do": "place", "name": "x", "shape": "box"}, "'x_m' is missing"),
+        ({"do": "end"}, "key 'event' is missing"),
+    ],
+)
+def test_a_wrong_table_is_refused_with_its_place(table: dict[str, Any], says: str) -> None:
+    with pytest.raises(ScenarioError, match=says) as refused:
+        load_whens([table], P2DX, "x.toml")
+    assert "x.toml: [[when]] 1" in str(refused.value)
+
+
+def test_mode_a_has_no_controller_to_break() -> None:
+    with pytest.raises(ScenarioError, match="mode direct has none"):
+        made({"event": "contact", "do": "inject", "fault": "reboot"}, mode="direct")

@@ -1,0 +1,128 @@
+"""Each wire with each fault, made from the pin-out: the self-test names the wire, the fault and who takes part."""
+
+from itertools import pairwise
+
+import pytest
+
+from adapter_sim.pinout import Direction, load_pinout
+from hardware.pcb.circuit.modules import BLUEPILL_PINS, ESP32_PINS
+from robot_bench.wires.board_test.circuit import Fault, FaultKind, Side
+from robot_bench.wires.board_test.verdicts import Finding, Verdict
+from tests.robot_bench.wires.board_test.conftest import Tested
+
+PINOUT = load_pinout()
+WIRES = [wire.name for wire in PINOUT.wires]
+RESET = "rst"
+#: Pads of each module, in the order in which they stand beside each other.
+ROWS = {
+    Side.BLUEPILL: (BLUEPILL_PINS[:20], BLUEPILL_PINS[20:]),
+    Side.ESP32: tuple(ESP32_PINS[first : first + 10] for first in range(0, 40, 10)),
+}
+NAME_AT = {
+    Side.BLUEPILL: {wire.bluepill: wire.name for wire in PINOUT.wires},
+    Side.ESP32: {pin: wire.name for wire in PINOUT.wires if (pin := wire.esp32_pin("rev-b")) != "EN"},
+}
+Named = set[tuple[str, Verdict, tuple[str, ...]]]
+
+
+def neighbours(side: Side) -> list[tuple[str, str]]:
+    """Return the wires whose pads stand beside each other on a module."""
+    names = [[NAME_AT[side].get(pin, "") for pin in row] for row in ROWS[side]]
+    return [(one, other) for row in names for one, other in pairwise(row) if one and other]
+
+
+FAULTS = [
+    *(Fault(FaultKind.OPEN, wire) for wire in WIRES),
+    *(Fault(FaultKind.UNSOLDERED, wire) for wire in WIRES),
+    *(Fault(FaultKind.UNSOLDERED, wire, side=Side.ESP32) for wire in WIRES if wire != RESET),
+    *(Fault(kind, wire, side=side) for kind in (FaultKind.GND, FaultKind.RAIL) for wire in WIRES for side in Side),
+    *(Fault(FaultKind.SHORT, *pair, side) for side in Side for pair in neighbours(side)),
+    *(Fault(FaultKind.SWAPPED, *pair) for pair in neighbours(Side.BLUEPILL)),
+    *(Fault(FaultKind.SWAPPED, *pair) for pair in neighbours(Side.ESP32)),
+]  # fmt: skip
+#: One of each kind, and what is easily forgotten: the pin with the LED, a pull-up, the wires of the reset.
+QUICK = [
+    Fault(FaultKind.OPEN, "encoder2_s1"),
+    Fault(FaultKind.UNSOLDERED, "DD3", side=Side.ESP32),
+    Fault(FaultKind.GND, "motor1_comm1", side=Side.ESP32),
+    Fault(FaultKind.RAIL, "DD7"),
+    Fault(FaultKind.SHORT, "encoder1_s1", "motor1_comm3"),
+    Fault(FaultKind.SHORT, "p2dx_con", RESET),
+    Fault(FaultKind.SWAPPED, "p2dx_con", RESET),
+    Fault(FaultKind.OPEN, RESET),
+]
+
+
+def expected(fault: Fault) -> list[Named]:
+    """Return what may be named: more than one where no measurement can tell."""
+    pair = {(fault.wire, (fault.other,)), (fault.other, (fault.wire,))}
+    match fault.kind:
+        case FaultKind.SHORT:
+            return [{(name, Verdict.JOINED, others) for name, others in pair}]
+        case FaultKind.SWAPPED:
+            return [{(name, Verdict.SWAPPED, others) for name, others in pair}]
+        case FaultKind.GND:
+            return [{(fault.wire, Verdict.HELD, ("GND",))}]
+        case FaultKind.RAIL if fault.wire == RESET:
+            return [{(fault.wire, Verdict.HELD, ("3V3",)), ("supply", Verdict.WRONG, ())}]
+        case FaultKind.RAIL:
+            return [{(fault.wire, Verdict.HELD, ("3V3",))}]
+        case _:
+            is_open: list[Named] = [{(fault.wire, Verdict.OPEN, ())}]
+            is_driven_here = PINOUT.wire(fault.wire).direction is Direction.TO_ADAPTER
+            if fault.kind is FaultKind.UNSOLDERED and fault.side is Side.ESP32 and is_driven_here:
+                is_open.append({(fault.wire, Verdict.HELD, ("GND",))})
+            return is_open
+
+
+def named(findings: list[Finding]) -> Named:
+    return {(row.name, row.verdict, row.others) for row in findings if row.is_fault}
+
+
+def words(fault: Fault) -> str:
+    return f"{fault.kind.value}-{fault.wire}-{fault.other or fault.side.value}"
+
+
+def test_a_sound_board_has_a_row_for_each_wire_and_no_fault(tested: Tested) -> None:
+    findings = tested()
+    assert named(findings) == set()
+    assert [row.name for row in findings] == ["supply", "crystal", *WIRES, "link", "pad"]
+    assert [row.name for row in findings if row.verdict is not Verdict.SOUND] == ["pad"]
+
+
+@pytest.mark.parametrize("fault", QUICK, ids=words)
+def test_one_fault_of_each_kind_is_named(tested: Tested, fault: Fault) -> None:
+    assert named(tested(fault)) in expected(fault)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("between", [False, True], ids=["reads-0", "reads-1"])
+@pytest.mark.parametrize("fault", FAULTS, ids=words)
+def test_each_fault_of_each_wire_is_named_however_a_pad_between_the_limits_reads(
+    tested: Tested, fault: Fault, between: bool
+) -> None:
+    assert named(tested(fault, between=between)) in expected(fault)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("between", [False, True], ids=["reads-0", "reads-1"])
+def test_en_joined_to_its_neighbour_is_found(tested: Tested, between: bool) -> None:
+    """The 20k of the wire and the 10k of EN make a level between the limits: EN is low, or falls with the wire."""
+    findings = tested(Fault(FaultKind.SHORT, "motor1_comm1", "EN", Side.ESP32), between=between)
+    held: Named = {("supply", Verdict.WRONG, ())}
+    assert named(findings) == ({("motor1_comm1", Verdict.JOINED, ("EN",))} if between else held)
+
+
+def test_two_faults_are_both_named(tested: Tested) -> None:
+    findings = tested(Fault(FaultKind.OPEN, "DD1"), Fault(FaultKind.SHORT, "motor2_comm1", "motor2_comm2"))
+    assert named(findings) == {
+        ("DD1", Verdict.OPEN, ()),
+        ("motor2_comm1", Verdict.JOINED, ("motor2_comm2",)),
+        ("motor2_comm2", Verdict.JOINED, ("motor2_comm1",)),
+    }
+
+
+def test_without_the_loop_plug_the_line_is_not_tested(tested: Tested) -> None:
+    row = next(row for row in tested(has_loop_plug=False) if row.name == "link")
+    assert row.verdict is Verdict.UNKNOWN
+    assert "join pins 2 and 3" in row.detail
