@@ -265,8 +265,9 @@ class BluePill(Stateful):
         self.chip.fabric.analog_struct.temperature_mc = round(1000 * degrees)
 
     def subscribe_pins(
-        self, pins: Iterable[str], sink: EdgeSink, *, of: Of = Of.DRIVE, ends_slice: Iterable[str] = ()
-    ) -> PinSubscription:
+        self, pins: Iterable[str], sink: EdgeSink, *, of: Of = Of.DRIVE, ends_slice: Iterable[str] = (),
+        waves: bool = False,
+    ) -> PinSubscription:  # fmt: skip
         """Have `sink` called with each change of these pins from now on, in bulk: rows of `EDGE`, oldest first.
 
         Args:
@@ -274,11 +275,12 @@ class BluePill(Stateful):
             sink: called before `advance_to` returns.
             of: which changes make a row.
             ends_slice: pins whose change ends the chip's slice.
+            waves: whether a wave is one row (`read_rows`), and not its edges.
 
         Raises:
             KeyError: the chip has no such pin.
         """
-        return self.chip.pins.subscribe_pins(pins, sink, of=of, ends_slice=ends_slice)
+        return self.chip.pins.subscribe_pins(pins, sink, of=of, ends_slice=ends_slice, waves=waves)
 
     def subscribe_warnings(self, sink: Callable[[str], None]) -> Callable[[], None]:
         """Have `sink` called with each new warning, at its time; return a function that ends it."""

@@ -34,8 +34,12 @@ class TomlPlaces:
     lines: dict[tuple[str, int, str], int] = field(default_factory=dict)
 
     def line(self, table: str = "", number: int = 0, key: str = "") -> int:
-        """Return the line of a key, or of what holds it: its table's header, or the key of an inline table; or 1."""
-        line = self.lines.get((table, number, key)) or self.lines.get((table, number, ""))
+        """Return the line of a key, or of what holds it: its table's header, or the key of an inline table; or 1.
+
+        The line of a key that is a table itself is that of its header.
+        """
+        header = (f"{table}.{key}".removeprefix("."), 0, "")
+        line = self.lines.get((table, number, key)) or self.lines.get(header) or self.lines.get((table, number, ""))
         if line or not table:
             return line or 1
         parent, _, name = table.rpartition(".")

@@ -1,6 +1,6 @@
 """The composition root: builds the chip, the wires, the robot and the loop for a scenario.
 
-    mode A, direct     chip ─ nets ─ motors, encoders, sensors ─ body
+    mode A, direct     chip ─ nets ─ motors, encoders, sensors ─ body      (of a Pioneer, or a robot on own pins)
     mode B, adapter    chip ─ nets ─ adapter ─ lines at 9600 8N1 ─ controller ─ body
 
 Mode C (a real or remote robot) is built by `robot_bench.remote`, on the same
@@ -39,6 +39,7 @@ from p2os.pioneer.world import load_world
 from p2os.pioneer.world.model import Pose, World
 from robot_bench.adapter import RUN_ANEW, AnyAdapter, make_adapter
 from robot_bench.direct import DirectRobot, DistanceSensors, JointMotor, WheelEncoder
+from robot_bench.direct.wired import AnalogPin, RobotWire
 from robot_bench.events.codec import events_of
 from robot_bench.events.expectation import ExpectationError
 from robot_bench.events.kinds import Event
@@ -61,6 +62,7 @@ from robot_bench.scenario.scenario import (
 )
 from robot_bench.scenario.timeline import Timed, Timeline
 from robot_bench.scenario.when_script import WhenScript
+from robot_bench.scenario.wired_robots import WiredPart
 from robot_bench.scenario.world_script import WorldScript, load_changes
 from robot_bench.wires.chip_pins import ChipPins
 from robot_bench.wires.endpoints import Endpoint
@@ -84,7 +86,7 @@ Condition: TypeAlias = "str | Callable[[Bench], bool]"
 #: What decides a run besides its files; its end and its goals may be others after a restart.
 DECISIVE = (
     "mode", "seed", "parameters", "threshold_um", "usart_baud", "start", "direct", "adapter", "adapter_core",
-    "controller", "changes", "faults", "whens",
+    "controller", "changes", "faults", "whens", "own_robot",
 )  # fmt: skip
 _VERSION = "version of p2os"
 
@@ -147,7 +149,8 @@ class Bench(Stateful):
         body.reset(scenario.start or world.start, scenario.seed)
         self._is_rebuildable = chip is None
         chip = chip or boot(scenario.firmware)
-        self._harness = harness = make_harness(pinout)
+        own = scenario.own_robot
+        self._harness = harness = make_harness(pinout) if own is None else make_own_harness(own.robot.signals)
         self.recorder = Recorder(self.trace, harness, body=body)
         self.recorder.on_event = log_bench_event
         #: Both directions of the P2OS line; none in mode A.
@@ -157,7 +160,7 @@ class Bench(Stateful):
         #: What was waited for last, and when the bench stood still after it.
         self._expected: tuple[Nanos, Event | None] = (-1, None)
         #: What stands at the far end of the wires and owns the body.
-        self._robots: list[DirectRobot | Endpoint] = []
+        self._robots: list[DirectRobot | Endpoint | WiredPart] = []
         self._ranges: SipRanges | None = None
         self.parts = self._build(pinout, world, body, chip, harness)
         #: What must be the same where a snapshot of this bench is restored.
@@ -191,7 +194,7 @@ class Bench(Stateful):
         self.goals = GoalJudge(scenario.goals)
         self.goals.on_end = self._end_now
         self.goals.subscribe(self.events)
-        pin_of = {wire.name: wire.bluepill for wire in pinout.wires}
+        pin_of = pins_of(scenario)
         self._pins = ChipPins(chip, harness, pin_of, on_watched=self.loop.note_edge)
         if isinstance(self.parts.adapter, Adapter):
             self.parts.adapter.samples.waits_for_edges = True
@@ -273,7 +276,8 @@ class Bench(Stateful):
         Raises:
             UsageError: There is no such wire.
         """
-        return self.parts.harness[wire_named(wire)].level(self.now)
+        own = self.scenario.own_robot
+        return self.parts.harness[wire_named(wire) if own is None else own.wire_named(wire)].level(self.now)
 
     def record(self) -> RunRecord:
         """Return what was recorded so far: poses, edges, texts, packets and the state log, each with its time."""
@@ -682,6 +686,14 @@ class Bench(Stateful):
             self.parts.pioneer.do(words, at)
 
     def _build(self, pinout: Pinout, world: World, body: RobotBody, chip: Chip, harness: Harness) -> BenchParts:
+        if self.scenario.own_robot is not None:
+            pins = {wire.name: wire.pin for wire in self.scenario.own_robot.robot.signals}
+            robot = self.scenario.own_robot.build(
+                body, harness, lambda signal: cast("AnalogPin", chip.pin(pins[signal]))
+            )
+            robot.on_event, robot.on_ranges = self.recorder.listener("robot"), self.recorder.sonar
+            self._robots.append(robot)
+            return BenchParts(chip=chip, harness=harness, body=body, world=world)
         if self.scenario.mode == "direct":
             if self.scenario.faults or any(when.faults for when in self.scenario.whens):
                 raise ScenarioError(
@@ -797,6 +809,22 @@ def boot(firmware: Path) -> Chip:
     from bluepill_sim.board import BluePill
 
     return BluePill(firmware)
+
+
+def pins_of(scenario: Scenario) -> dict[str, str]:
+    """Return the chip's pin of each wire of a scenario."""
+    if scenario.own_robot is None:
+        return {wire.name: wire.bluepill for wire in load_pinout().wires}
+    return {wire.name: wire.pin for wire in scenario.own_robot.robot.signals if not wire.is_analog}
+
+
+def make_own_harness(signals: Sequence[RobotWire]) -> Harness:
+    """Return the wires of a robot on own pins, with the resistors that hang on them."""
+    harness = Harness(Net(wire.name) for wire in signals if not wire.is_analog)
+    for wire in signals:
+        if wire.pull is not None:
+            harness[wire.name].drive(RESISTORS, wire.pull, Strength.PULL, 0)
+    return harness
 
 
 def make_harness(pinout: Pinout) -> Harness:

@@ -26,7 +26,7 @@ from p2os.pioneer.body.factory import resolve_body
 from p2os.pioneer.world.model import Pose, World
 from p2os.transport import Transport
 from p2os.transport.wall_clock import Clock, wall_clock
-from robot_bench.bench import Bench
+from robot_bench.bench import Bench, pins_of
 from robot_bench.events.codec import Json
 from robot_bench.pacer import PACED_SLICE_NS, RealTimePacer
 from robot_bench.recording.run_folder import reserved
@@ -215,6 +215,7 @@ def meta_of(scenario: Scenario, world: World | None, note: str | None, *, is_at_
         "threshold_m": scenario.threshold_m,
         "step_mps": (scenario.direct if scenario.mode == "direct" else scenario.adapter).step_um_per_s / 1e6,
         "note": note,
+        "pins": pins_of(scenario),
         "start": {"x": start.x_m, "y": start.y_m, "heading": start.heading_rad},
         "world": {"name": place, **UNKNOWN_PLACE} if world is None else world.to_plain(),
         "robot": {

@@ -24,6 +24,8 @@ ANALOG_PINS = 10
 EXCEPTIONS = 76
 #: Characters that wait in C to arrive at a USART; the others wait in Python.
 RECEIVED = 256
+#: Levels that the outside puts on pins later: more than a step of a robot brings.
+LATER_INPUTS = 1024
 
 
 @dataclass(frozen=True, slots=True)
@@ -409,6 +411,11 @@ EDGE = Struct(
     "A change of a pin, for who has subscribed: `bluepill_sim/fabric/subscriptions.py`.",
     (Field("ns", "u64"), *_fields("u8", "pin", "drive", "wire", "kind"), Field("zero", "u32")),
 )
+INPUT_ROWS = Struct(
+    "inputs",
+    "Levels that the outside puts on pins later: a ring, oldest first.",
+    (*_fields("u32", "first", "count"), Field("padding", "u64"), Field("rows", "edge", LATER_INPUTS)),
+)
 SENT = Struct(
     "sent",
     "A word that has gone out, when, and how: clock and divider, and what else its device says of its format.",
@@ -418,7 +425,7 @@ SENT = Struct(
 #: All of them; one that holds another comes behind it.
 STRUCTS = (
     RECORD, INSTRUCTION, RAMP, TICKS, STEP, LOOP, FAULT, SHARED, PORT, USART, EXTI, DMA, SIGNAL, ANALOG, ADC, GPIO,
-    FILTER, SHAPE, TIM, SPI, I2C, WAVE, EDGE, SENT,
+    FILTER, SHAPE, TIM, SPI, I2C, WAVE, EDGE, INPUT_ROWS, SENT,
 )  # fmt: skip
 
 _KINDS: dict[str, Any] = {
@@ -475,6 +482,6 @@ def _size(struct: Struct) -> int:
 
 
 _CONSTANTS = {"PORTS": PORTS, "PINS": PINS, "SOURCES": SOURCES, "LAST_ROWS": LAST_ROWS, "RECEIVED": RECEIVED,
-    "ANALOG_PINS": ANALOG_PINS,
+    "ANALOG_PINS": ANALOG_PINS, "LATER_INPUTS": LATER_INPUTS,
 }  # fmt: skip
 _C_KINDS = {"u8": "uint8_t", "u16": "uint16_t", "u32": "uint32_t", "u64": "uint64_t", "i32": "int32_t"}

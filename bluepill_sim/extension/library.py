@@ -119,6 +119,7 @@ _FUNCTIONS = {
     "fabric_wire": "bpuuu",
     "fabric_pins_changed": "vpu",
     "fabric_offer": "vpuuu",
+    "fabric_put_inputs": "bpupu",
     "fabric_last_output": "lp",
     "fabric_forget_output": "vp",
     "fabric_subscribe": "ipppppb",

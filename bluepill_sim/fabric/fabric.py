@@ -14,7 +14,18 @@ import weakref
 from collections.abc import Callable, Iterable
 from typing import Any, Protocol, TypeVar
 
-from bluepill_sim.extension.layout import ANALOG, ANALOG_PINS, PORT, PORTS, SENT, SOURCES, WAVE, packing, structure
+from bluepill_sim.extension.layout import (
+    ANALOG,
+    ANALOG_PINS,
+    INPUT_ROWS,
+    PORT,
+    PORTS,
+    SENT,
+    SOURCES,
+    WAVE,
+    packing,
+    structure,
+)
 from bluepill_sim.extension.library import library
 from bluepill_sim.extension.windows import NO_TIME
 from bluepill_sim.fabric.subscriptions import EDGE
@@ -119,7 +130,7 @@ class FabricPorts(Protocol):
 class Fabric(Stateful):
     """Queue, lines and devices of one chip."""
 
-    STATE = ("ports", "waves", "lines", "analog", "samples")
+    STATE = ("ports", "waves", "lines", "inputs", "analog", "samples")
     #: What one of the callbacks has raised; and what is filled once, when a chip is made.
     DERIVED = ("_failure", "electrical", "_kept", "_names", "_acts", "_answers", "_deliveries", "_samples")
 
@@ -162,6 +173,9 @@ class Fabric(Stateful):
         self._use_python_host()
         self._schedule = calls.fabric_schedule
         self._due = calls.fabric_due
+        self._inputs: Any = structure(INPUT_ROWS)()
+        self._input_slot = self._new_slot("inputs")
+        calls.fabric_add_device(self.handle, self._input_slot, b"inputs", None, ctypes.addressof(self._inputs))
 
     # The core.
 
@@ -331,6 +345,26 @@ class Fabric(Stateful):
     def waves(self, waves: bytes) -> None:
         ctypes.memmove(self._waves, waves, len(waves))
 
+    @property
+    def inputs(self) -> bytes:
+        """What the outside puts on pins later, as bytes."""
+        used = self._inputs.count
+        return bytes(self._inputs) if used else b""
+
+    @inputs.setter
+    def inputs(self, inputs: bytes) -> None:
+        self._inputs.count = 0
+        ctypes.memmove(ctypes.addressof(self._inputs), inputs, len(inputs))
+
+    def put_inputs(self, rows: bytes) -> None:
+        """Have the outside put levels on pins later: rows of `EDGE`, of which time, pin and drive count.
+
+        Raises:
+            ValueError: More than `LATER_INPUTS` would be to come.
+        """
+        if not self._calls_of_c.fabric_put_inputs(self.handle, self._input_slot, rows, len(rows) // EDGE.size):
+            raise ValueError("too many levels of pins to come")
+
     # Volts.
 
     def inputs_change(self) -> None:
@@ -371,6 +405,7 @@ class Fabric(Stateful):
     def resume(self) -> None:
         """Go on with a state that was put back, once core and clock have theirs."""
         self._calls_of_c.fabric_resume(self.handle)
+        self._calls_of_c.fabric_command(self.handle, self._input_slot, CLOCK, 0, 0)
         self.check()
 
     # The bus, for masters that are not the core.

@@ -16,12 +16,14 @@ Invariant: `output` and `level` follow from the other attributes alone.
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from enum import Enum
+from operator import itemgetter
 from typing import Any, Protocol, Self, cast
 
 from bluepill_sim.fabric.fabric import NO_LEVEL, Fabric, FabricPorts
 from bluepill_sim.fabric.signals import UV_PER_V, Signal, put_signal, to_uv
-from bluepill_sim.fabric.subscriptions import EdgeSink, Of, Wave
+from bluepill_sim.fabric.subscriptions import EDGE, EdgeSink, Of, Wave
 from simbase.state import Stateful
+from simbase.timing import Nanos
 
 
 class PinDrive(Enum):
@@ -158,6 +160,22 @@ class Pin:
         if before is not None and not is_driven:
             for listener in self._bank.release_listeners:
                 listener(self)
+
+    def drive_later(self, levels: Iterable[tuple[Nanos, int]], *, is_weak: bool = False) -> None:
+        """Put levels on the wire from outside at times to come, without anybody stopping the chip there.
+
+        Args:
+            levels: (ns, level), in any order; what is past comes now. What `drive` does meanwhile holds until then.
+            is_weak: As for `drive`.
+
+        Raises:
+            ValueError: The package has no leg for this pin, or more than 1024 levels of all pins would be to come.
+        """
+        if not self.is_bonded:
+            raise ValueError(f"{self.name} is not bonded out on this package")
+        index, drives = self.index, _LATER[is_weak]
+        rows = [EDGE.pack(at, index, drives[level], 0, 0, 0) for at, level in sorted(levels, key=itemgetter(0))]
+        self._bank.fabric.put_inputs(b"".join(rows))
 
     def set_volts(self, volts: "float | Signal | None") -> None:
         """Put volts on the wire from outside, for an ADC to sample; None takes them off.
@@ -518,6 +536,11 @@ def _channel_of(pin: Pin) -> int | None:
 #: The masks of a port that say what the chip drives.
 _DRIVEN = {"low": PinDrive.LOW, "high": PinDrive.HIGH, "up": PinDrive.PULL_UP, "down": PinDrive.PULL_DOWN}
 _MODES = tuple(PinMode)
+#: Hard and by a resistor, the indices of a low and a high level in `PinDrive`.
+_LATER = tuple(
+    [list(PinDrive).index(drive) for drive in pair]
+    for pair in ((PinDrive.LOW, PinDrive.HIGH), (PinDrive.PULL_DOWN, PinDrive.PULL_UP))
+)
 _OUTPUTS = {PinMode.PUSH_PULL, PinMode.OPEN_DRAIN}
 #: The bits of a port's masks by mode.
 _BITS_OF_MODE = {

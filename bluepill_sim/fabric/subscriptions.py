@@ -76,6 +76,11 @@ class Wave:
 Row = tuple[Nanos, int, int, int, Wave | None]
 
 
+def read_wave(rows: bytes, at: int) -> tuple[Wave, int]:
+    """Return the wave that follows a `WAVE_ROW` which ends at a place in the rows, and the place behind it."""
+    return Wave(*_WAVE.unpack_from(rows, at)[:5]), at + _WAVE.size
+
+
 def read_rows(rows: bytes) -> Iterator[Row]:
     """Iterate over the rows of a subscription that takes waves."""
     at = 0
@@ -83,8 +88,8 @@ def read_rows(rows: bytes) -> Iterator[Row]:
         ns, pin, drive, wire, kind, _ = EDGE.unpack_from(rows, at)
         at += EDGE.size
         if kind == WAVE_ROW:
-            yield ns, pin, drive & 15, wire & 15, Wave(*_WAVE.unpack_from(rows, at)[:5])
-            at += _WAVE.size
+            wave, at = read_wave(rows, at)
+            yield ns, pin, drive & 15, wire & 15, wave
         else:
             yield ns, pin, drive, wire, None
 
@@ -104,9 +109,12 @@ class PinSubscriptions(Protocol):
     """What can be subscribed to: the pins of a chip, or of a board."""
 
     def subscribe_pins(
-        self, pins: Iterable[str], sink: EdgeSink, *, of: Of = Of.DRIVE, ends_slice: Iterable[str] = ()
-    ) -> PinSubscription:
+        self, pins: Iterable[str], sink: EdgeSink, *, of: Of = Of.DRIVE, ends_slice: Iterable[str] = (),
+        waves: bool = False,
+    ) -> PinSubscription:  # fmt: skip
         """Have `sink` called with each change of these pins from now on.
+
+        With `waves` it gets waves as they are (`read_rows`), else their edges.
 
         Raises:
             KeyError: The chip has no such pin.

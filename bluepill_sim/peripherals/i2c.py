@@ -116,7 +116,10 @@ class I2c(Peripheral):
             name="SR2", offset=0x18, readable=bits((15, 4), (2, 0)), writable=0, on_read=NATIVE,
             fields="PEC 15:8, DUALF 7, SMBHOST 6, SMBDEFAULT 5, GENCALL 4, TRA 2, BUSY 1, MSL 0",
         ),
-        Register(name="CCR", offset=0x1C, readable=_CCR, writable=_CCR, on_write="_write_ccr", fields="FS 15, DUTY 14, CCR 11:0"),
+        Register(
+            name="CCR", offset=0x1C, readable=_CCR, writable=_CCR, on_write="_write_ccr",
+            fields="FS 15, DUTY 14, CCR 11:0",
+        ),
         Register(name="TRISE", offset=0x20, reset=2, readable=bits((5, 0)), writable=bits((5, 0)), fields="TRISE 5:0"),
     )  # fmt: skip
 

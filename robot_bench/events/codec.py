@@ -155,6 +155,13 @@ def _verdict(t: Nanos, entry: Json) -> Recorded:
     )  # fmt: skip
 
 
+def _wave(t: Nanos, entry: Json) -> Recorded:
+    at, period, high, hz = (_integer(entry, key) for key in ("at", "period", "high", "hz"))
+    if period and not (hz > 0 and 0 < high < period and 0 <= at < period):
+        raise ValueError("no such wave")
+    return Wave(t=t, wire=str(entry["net"]), at=at, period=period, high=high, ticks_hz=hz)
+
+
 #: In the order of one instant.
 ROWS: Mapping[type, _Row] = {
     Levels: _Row("pins", _pins_entry, _pins),
@@ -173,14 +180,7 @@ ROWS: Mapping[type, _Row] = {
             "high": wave.high,
             "hz": wave.ticks_hz,
         },
-        lambda t, entry: Wave(
-            t=t,
-            wire=str(entry["net"]),
-            at=_integer(entry, "at"),
-            period=_integer(entry, "period"),
-            high=_integer(entry, "high"),
-            ticks_hz=_integer(entry, "hz"),
-        ),
+        _wave,
     ),
     Text: _Row(
         "usart",

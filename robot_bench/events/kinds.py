@@ -38,7 +38,8 @@ class PinEdge:
 class Wave:
     """A wire carries a wave from now on: up every `period` ticks, down `high` ticks later.
 
-    `at` is how many ticks before `t` it last went up.
+    `at` is how many ticks before `t` it last went up. A period of 0 ends a wave: the wire has a level again, which
+    its edges say; while it has a wave they say low.
     """
 
     t: Nanos
@@ -47,6 +48,16 @@ class Wave:
     period: int
     high: int
     ticks_hz: int
+
+    @property
+    def frequency_hz(self) -> float:
+        """Rises a second; 0 where it ends."""
+        return self.ticks_hz / self.period if self.period else 0.0
+
+    @property
+    def duty(self) -> float:
+        """The share of the time at level 1; 0 where it ends."""
+        return self.high / self.period if self.period else 0.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

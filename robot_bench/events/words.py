@@ -22,7 +22,7 @@ from simbase.timing import NS_PER_S
 
 _WORDS: Mapping[type, Callable[[Any], str]] = {
     PinEdge: lambda edge: f"{edge.wire} {'high' if edge.level else 'low'}",
-    Wave: lambda wave: f"{wave.wire} at {wave.ticks_hz / wave.period:g} Hz, {wave.high / wave.period:.1%}",
+    Wave: lambda wave: f"{wave.wire} at {wave.frequency_hz:g} Hz, {wave.duty:.1%}",
     Text: lambda text: f"{text.port} sends {text.data.decode('utf-8', 'replace').rstrip()!r}",
     Packet: lambda packet: f"{packet.direction} {packet.data.hex()}",
     Pose: lambda pose: f"robot at x {pose.x_m:.2f} m, y {pose.y_m:.2f} m, {pose.speed_mps:+.2f} m/s",

@@ -8,7 +8,7 @@
 
 /* 8 MHz crystal x 9 = 72 MHz; APB1 may run at 36 MHz at most (RM0008 7.2).
  * A board without its crystal waits here for ever, with the motors at 0. */
-static void clock_start(void)
+void clock_start(void)
 {
     RCC->CR |= RCC_CR_HSEON;
     while (!(RCC->CR & RCC_CR_HSERDY)) {

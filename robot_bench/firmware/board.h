@@ -53,6 +53,9 @@
 /* Brings up pins, clock, tick and USART1, asks for the link, and returns at once. */
 void board_start(void);
 
+/* 72 MHz from the crystal; board_start does it. */
+void clock_start(void);
+
 /* Sits out LINK_WAIT_S. */
 void board_wait_for_link(void);
 

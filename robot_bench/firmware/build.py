@@ -24,6 +24,8 @@ PROGRAMS = {
     "encoders": (*BOARD_SOURCES, "encoders.c", "odometer.c"),
     "analog": (*BOARD_SOURCES, "analog.c"),
     "dodge": (*BOARD_SOURCES, "dodge.c", "dodge_fsm.c", "odometer.c"),
+    # Its pins are its own: of board.c only the clock is kept.
+    "rover": ("startup.c", "memory.c", "board.c", "uart.c", "rover_board.c", "rover.c"),
     # Brings pins, clock and line of its own.
     "board_test": ("startup.c", "memory.c", "board_test.c"),
 }

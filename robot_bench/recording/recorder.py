@@ -28,6 +28,7 @@ from robot_bench.events.kinds import (
     Pose,
     Ranges,
     Text,
+    Wave,
     WorldChange,
     hull_part,
 )
@@ -36,7 +37,7 @@ from robot_bench.recording.trace import TraceWriter
 from robot_bench.wires.edges import Edges, pack
 from robot_bench.wires.nets import Harness, Net
 from simbase.state import Stateful
-from simbase.timing import NS_PER_MS, Nanos, Reached
+from simbase.timing import NS_PER_MS, NS_PER_S, Nanos, Reached
 
 SAMPLE_NS: Nanos = 50 * NS_PER_MS
 #: chosen: a line of some 10 kB, all that a cut can cost.
@@ -248,6 +249,20 @@ class Recorder(Stateful):
             levels += str(int(net.level(0)))
         self.events.publish(Levels(t=0, nets=tuple(net.name for net in self._harness), levels=levels))
 
+    def _tell_waves(self, net: Net) -> None:
+        """Publish how a wire's wave has changed; where it ends, one of no period."""
+        for at, wave in net.take_waves():
+            if wave is None:
+                self.events.publish(Wave(t=at, wire=net.name, at=0, period=0, high=0, ticks_hz=0))
+            else:
+                ticks = wave.at + ((at - wave.ns + 1) * wave.ticks_hz - 1) // NS_PER_S
+                self.events.publish(
+                    Wave(
+                        t=at, wire=net.name, at=ticks % wave.period, period=wave.period, high=wave.high,
+                        ticks_hz=wave.ticks_hz,
+                    )
+                )  # fmt: skip
+
     def _tell_edges(self, limit: Nanos) -> dict[str, tuple[int, Edges]]:
         """Publish the edges of all wires in blocks; return those that somebody wants one by one."""
         changed, self._changed = self._changed, {}
@@ -260,6 +275,7 @@ class Recorder(Stateful):
             tracks.append(edges)
             if edges and self.events.wants_edges(net.name):
                 wanted[net.name] = place, edges
+            self._tell_waves(net)
             for fight in net.take_contentions():
                 self.event(
                     "bench", fight.at, "contention", f"{net.name} is driven hard by {' and '.join(fight.owners)}"

@@ -55,6 +55,8 @@ class RunRecord:
     poses: list[Pose] = field(default_factory=list)
     #: Net name → edges as (ns, level), the first of each at 0.
     pins: dict[str, Edges] = field(default_factory=dict)
+    #: Net name → waves as (ns, wave from then on, None for a level again); the level in `pins` is 0 during a wave.
+    waves: dict[str, list[tuple[int, Wave | None]]] = field(default_factory=dict)
     #: The nets in the order of the trace's blocks.
     nets: tuple[str, ...] = ()
     sonar: list[tuple[int, list[int]]] = field(default_factory=list)
@@ -66,7 +68,6 @@ class RunRecord:
     contacts: list[Contact] = field(default_factory=list)
     clearances: list[Clearance] = field(default_factory=list)
     faults: list[Fault] = field(default_factory=list)
-    waves: list[Wave] = field(default_factory=list)
     verdicts: list[Verdict] = field(default_factory=list)
     last_ns: int = 0
     #: True where the trace has no end line, or its last line was cut.
@@ -185,7 +186,7 @@ _FILES: Mapping[type, Callable[[RunRecord, Any], None]] = {
     Contact: lambda record, hit: record.contacts.append(hit),
     Clearance: lambda record, clearance: record.clearances.append(clearance),
     Fault: lambda record, fault: record.faults.append(fault),
-    Wave: lambda record, wave: record.waves.append(wave),
+    Wave: lambda record, wave: record.waves.setdefault(wave.wire, []).append((wave.t, wave if wave.period else None)),
     Verdict: lambda record, verdict: record.verdicts.append(verdict),
 }
 

@@ -9,6 +9,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from typing import overload
 
 from adapter_sim.pinout import load_pinout
+from robot_bench.recording.run_record import RunRecord
 from robot_bench.wires.edges import Edges, codes
 
 #: Group title → nets, least significant bit first.
@@ -21,12 +22,20 @@ GROUPS: Mapping[str, tuple[str, ...]] = {
     "link": ("p2dx_con", "rst"),
 }
 
+#: Beginnings of the nets of a robot on own pins.
+SIDES = ("left", "right")
+
 
 def grouped(names: Sequence[str]) -> list[tuple[str, list[str]]]:
-    """Return the groups that have a net among `names`, with those nets."""
+    """Return the groups that have a net among `names`, with those nets.
+
+    Of the nets of a robot on own pins, those of a side are one.
+    """
     known = {net for nets in GROUPS.values() for net in nets}
     groups = [(title, [net for net in nets if net in names]) for title, nets in GROUPS.items()]
-    groups.append(("other", [net for net in names if net not in known]))
+    others = [net for net in names if net not in known]
+    groups += [(side, [net for net in others if net.startswith(f"{side}_")]) for side in SIDES]
+    groups.append(("other", [net for net in others if not net.startswith(tuple(f"{side}_" for side in SIDES))]))
     return [(title, nets) for title, nets in groups if nets]
 
 
@@ -35,6 +44,13 @@ def pin_labels() -> dict[str, str]:
     wires = load_pinout().wires
     signals = {wire.name: wire.name.rpartition("_")[2] if wire.value else wire.name for wire in wires}
     return {wire.name: f"{wire.bluepill} {signals[wire.name]}" for wire in wires}
+
+
+def levels_and_duties(record: RunRecord, net: str) -> list[tuple[int, float]]:
+    """Return what a net was from when on: 0 or 1, or the duty of the wave that it shows."""
+    edges = record.pins[net]
+    duties = {at: wave.duty for at, wave in record.waves.get(net, []) if wave is not None}
+    return sorted((dict(edges) | duties).items())
 
 
 class Steps(Sequence[tuple[int, int]]):

@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import cast
 
 from robot_bench.events.codec import Json
+from robot_bench.events.kinds import Wave
 from robot_bench.recording.run_record import RunRecord
 from simbase.timing import NS_PER_S
 
@@ -74,10 +75,18 @@ def figures(record: RunRecord) -> list[tuple[str, str]]:
     if isinstance(clearance, (int, float)):
         rows.append(("least clearance", f"{clearance:.3f} m"))
     rows.append(("packets on the wire", f"{len(record.wire)}"))
+    rows += [(f"PWM on {net}", _pwm([wave for _, wave in waves if wave])) for net, waves in record.waves.items()]
     factor = record.end.get("real_time_factor")
     if isinstance(factor, (int, float)):
         rows.append(("speed", f"{factor:.1f} × real time"))
     return rows
+
+
+def _pwm(waves: Sequence[Wave]) -> str:
+    """Return frequencies and duties of a pin's waves."""
+    hz, duty = [wave.frequency_hz for wave in waves], [100 * wave.duty for wave in waves]
+    frequency = f"{min(hz):.6g} Hz" if min(hz) == max(hz) else f"{min(hz):.6g} to {max(hz):.6g} Hz"
+    return f"{frequency}, duty {min(duty):.1f} to {max(duty):.1f} %"
 
 
 def outcome_of(record: RunRecord) -> Json:

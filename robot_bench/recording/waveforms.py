@@ -2,12 +2,15 @@
 
 The VCD, which GTKWave and sigrok open, is exact to the nanosecond. The sigrok session,
 which PulseView opens, samples each net evenly from 0 on.
+A wave (PWM) is not drawn edge by edge: while a net shows one, it is x in the VCD, and two real numbers beside
+it have its duty in percent and its frequency in Hz; in the sigrok session it is 0.
 
 Source: IEEE 1364-2005, chapter 18 (four-state VCD).
 
 Invariant: the same run gives the same bytes.
 """
 
+from bisect import bisect_right
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -24,11 +27,15 @@ RATES_HZ = (1_000_000, 100_000, 10_000)
 def write_vcd(record: RunRecord, path: Path) -> None:
     """Write every net's edges, in nanoseconds; the same run gives the same bytes."""
     names = nets_in_order(record)
-    codes = [identifier(index) for index in range(len(names))]
+    waving = [name for name in names if name in record.waves]
+    codes = [identifier(index) for index in range(len(names) + 2 * len(waving))]
     tracks = [record.pins[name] for name in names]
     with path.open("w", encoding="ascii", newline="\n") as file:
-        file.writelines(f"{line}\n" for line in _head(names, codes))
-        file.writelines(dumped(tracks, codes))
+        file.writelines(f"{line}\n" for line in _head(names, waving, codes))
+        if waving:
+            file.writelines(_with_waves(record, names, waving, codes))
+        else:
+            file.writelines(dumped(tracks, codes))
         if record.last_ns > max((track.times[-1] for track in tracks if track), default=-1):
             file.write(f"#{record.last_ns}\n")
 
@@ -46,11 +53,35 @@ def nets_in_order(record: RunRecord) -> list[str]:
     return [name for _, names in grouped(sorted(record.pins)) for name in names]
 
 
-def _head(names: list[str], codes: list[str]) -> Iterator[str]:
+def _with_waves(record: RunRecord, names: list[str], waving: list[str], codes: list[str]) -> Iterator[str]:
+    """Yield all changes in order of time, where some nets show waves."""
+    code_of = dict(zip(names, codes, strict=False))
+    rows: list[tuple[int, int, str]] = []
+    for name in names:
+        rows += [(at, 0, f"{level}{code_of[name]}\n") for at, level in record.pins[name]]
+    for place, name in enumerate(waving):
+        duty, frequency = codes[len(names) + 2 * place :][:2]
+        for at, wave in record.waves[name]:
+            level = record.pins[name].levels[bisect_right(record.pins[name].times, at) - 1]
+            rows.append((at, 1, f"{level if wave is None else 'x'}{code_of[name]}\n"))
+            rows.append((at, 1, f"r{100 * (level if wave is None else wave.duty):.6g} {duty}\n"))
+            rows.append((at, 1, f"r{0 if wave is None else wave.frequency_hz:.9g} {frequency}\n"))
+    now = -1
+    for at, _, line in sorted(rows):
+        if at != now:
+            now = at
+            yield f"#{at}\n"
+        yield line
+
+
+def _head(names: list[str], waving: list[str], codes: list[str]) -> Iterator[str]:
     yield "$version p2os test bench $end"
     yield "$timescale 1 ns $end"
     yield "$scope module bench $end"
-    for code, name in zip(codes, names, strict=True):
+    for code, name in zip(codes, names, strict=False):
         yield f"$var wire 1 {code} {name} $end"
+    for place, name in enumerate(waving):
+        for code, what in zip(codes[len(names) + 2 * place :][:2], ("duty_percent", "hz"), strict=True):
+            yield f"$var real 64 {code} {name}_{what} $end"
     yield "$upscope $end"
     yield "$enddefinitions $end"

@@ -191,8 +191,8 @@ function drawSpeeds() {
   const top = Math.max(0.1, ...run.poses.map((p) => Math.max(Math.abs(p[4]), Math.abs(p[5]))), ...run.motors.flat().map((m) => Math.abs(m[1])));
   const left = css("--left"), right = css("--right");
   const legend = [["left", left, 3, []], ["right", right, 1.6, [6, 4]], ["left asked", left, 1.6, [2, 6]], ["right asked", right, 1.6, [2, 6], 4]];
-  const plot = axis("speeds", -top, top, "m/s", legend);
-  line(plot, run.motors[0], 1, legend[2], true); line(plot, run.motors[1], 1, legend[3], true);
+  const plot = axis("speeds", -top, top, "m/s", run.motors.some((steps) => steps.length) ? legend : legend.slice(0, 2));
+  run.motors.forEach((steps, n) => { if (steps.length) line(plot, steps, 1, legend[2 + n], true); });
   line(plot, run.poses, 4, legend[0]); line(plot, run.poses, 5, legend[1]);
   cursor(plot);
 }

@@ -14,7 +14,7 @@ from typing import cast
 from robot_bench.events.codec import Json
 from robot_bench.events.kinds import WorldChange
 from robot_bench.recording.run_record import RunRecord
-from robot_bench.recording.signals import grouped, motor_steps, pin_labels
+from robot_bench.recording.signals import grouped, levels_and_duties, motor_steps, pin_labels
 from robot_bench.recording.summary import MEASURED, figures, verdict
 from robot_bench.report.packets import describe
 from robot_bench.report.plan import plan
@@ -118,17 +118,27 @@ def _sonar(record: RunRecord, left_out: list[str]) -> list[list[float]]:
 def _motor(record: RunRecord, motor: int, step: float) -> list[list[float]]:
     steps = motor_steps(record.pins, motor)
     kept = [steps[n] for n in extremes(steps.times, [steps.values])]
-    return [[_seconds(t), value * step] for t, value in kept] or [[0, 0]]
+    return [[_seconds(t), value * step] for t, value in kept]
 
 
 def _pins(record: RunRecord, left_out: list[str]) -> list[Json | list[object]]:
-    kept = {net: pulses(edges, buckets=PIN_BUCKETS) for net, edges in record.pins.items()}
+    kept = {net: _drawn(record, net) for net in record.pins}
     _note(left_out, "pins", _total(kept), _total(record.pins), "edges: the first two and the last of each")
-    labels = pin_labels()
+    pins = cast("dict[str, str]", record.meta.get("pins") or {})
+    labels = {net: f"{pin} {net}" for net, pin in pins.items()} | pin_labels()
     return [
         [title, [[labels.get(net, net), [[_seconds(t), level] for t, level in kept[net]]] for net in nets]]
         for title, nets in grouped(sorted(record.pins))
     ]
+
+
+def _drawn(record: RunRecord, net: str) -> Sequence[tuple[int, float]]:
+    """Return what is drawn of a net: its edges, and while it shows a wave its duty as a part of the level."""
+    edges = record.pins[net]
+    if net not in record.waves:
+        return pulses(edges, buckets=PIN_BUCKETS)
+    rows = levels_and_duties(record, net)
+    return [rows[n] for n in extremes([t for t, _ in rows], [[value for _, value in rows]], buckets=PIN_BUCKETS)]
 
 
 def _events(record: RunRecord, left_out: list[str]) -> list[list[object]]:

@@ -152,6 +152,8 @@ def _speeds_figure(data: Any) -> Figure:
     for name, colour, motor, style, asked_style in WHEELS:
         speeds.plot(times, [row[3 + motor] for row in data["poses"]], color=colour, label=name, **style)
         steps = data["motors"][motor - 1]
+        if not steps:  # a robot on own pins has no such wires
+            continue
         speeds.step(
             [row[0] for row in steps] + [end], [row[1] for row in steps] + [steps[-1][1]], where="post", color=colour,
             linewidth=1.1, linestyle=asked_style, label=f"{name}, asked by the pins",

@@ -34,6 +34,7 @@ from robot_bench.scenario.goals.judging import Goal, load_goal
 from robot_bench.scenario.goals.kinds import KINDS
 from robot_bench.scenario.schema import LONGEST_S, Key, Place, Table, Where, check_table, in_range, nearest, within
 from robot_bench.scenario.when_script import When, load_whens
+from robot_bench.scenario.wired_robots import OwnRobot, find_own_robot, known_own_robots, load_own_robot
 from robot_bench.scenario.world_script import Change, load_changes, refuse_names
 from simbase.errors import FileError, UsageError, shown, shown_name
 from simbase.timing import NS_PER_MS, NS_PER_S, Nanos
@@ -50,6 +51,7 @@ _TOP = (
     Key(name="firmware", kind="text", required=True),
     Key(name="world", kind="text", required=True),
     Key(name="robot", kind="text"),
+    Key(name="pins", kind="table"),
     Key(name="mode", kind="text", choices=MODES),
     Key(name="body", kind="text", choices=BODY_CHOICES),
     Key(name="seed", kind="whole", least=0, most=2**63 - 1),
@@ -148,6 +150,8 @@ class Scenario:
     world: str
     parameters: RobotParameters
     robot: str
+    #: A robot that hangs on the chip's own pins; None: a Pioneer on the wires of the pin-out.
+    own_robot: OwnRobot | None = None
     mode: str = "adapter"
     body: str = BEST
     seed: int = 0
@@ -195,6 +199,8 @@ class Scenario:
         firmware = Path(options.get("firmware") or self.firmware)
         if options.get("firmware") and not firmware.is_file():
             raise UsageError(f"there is no firmware file {firmware}", hint="give an ELF, HEX or BIN file")
+        if self.own_robot is not None and options.get("mode") == "adapter":
+            raise UsageError(f"the robot {self.robot!r} hangs on the chip's own pins", hint="--mode direct")
         moved = self if world is None else self._moved_to(world)
         return replace(
             moved,
@@ -286,10 +292,8 @@ def refuse_what_its_world_refuses(scenario: Scenario, world: World) -> None:
 def _build(table: Table, text: str, path: Path, where: Place, firmware: Path | None) -> Scenario:
     check_table(table, _TOP, where)
     robot = str(table.get("robot", "p2dx"))
-    try:
-        parameters = load_parameters(robot)
-    except FileError as error:
-        raise ScenarioError(f"{where.at('robot')}: {error}", hint=error.hint) from error
+    own_robot = _own_robot(robot, table, path, where)
+    parameters = own_robot.robot.parameters if own_robot else _parameters(robot, where)
     threshold_m = cast("float", table.get("threshold_m", parameters.sonar_range_m / 2))
     in_world = cast("Mapping[str, Table]", table.get("in_world", {}))
     for world, part in in_world.items():
@@ -309,7 +313,8 @@ def _build(table: Table, text: str, path: Path, where: Place, firmware: Path | N
         world=resolve_world(str(table["world"]), path.parent, f"{where.at('world')}: world"),
         parameters=parameters,
         robot=robot,
-        mode=str(table.get("mode", "adapter")),
+        own_robot=own_robot,
+        mode=str(table.get("mode", "direct" if own_robot else "adapter")),
         body=str(table.get("body", BEST)),
         seed=cast("int", table.get("seed", 0)),
         duration_ns=(planned_ns := round(cast("float", table["duration_s"]) * NS_PER_S)),
@@ -330,6 +335,33 @@ def _build(table: Table, text: str, path: Path, where: Place, firmware: Path | N
         where=where,
     )
     return _apply_in_world(scenario, in_world.get(scenario.world, {}))
+
+
+def _parameters(robot: str, where: Place) -> RobotParameters:
+    try:
+        return load_parameters(robot)
+    except FileError as error:
+        hint = f"{error.hint or ''}; robots on pins of their own: {', '.join(known_own_robots())}".removeprefix("; ")
+        raise ScenarioError(f"{where.at('robot')}: {error}", hint=hint) from error
+
+
+def _own_robot(robot: str, table: Table, path: Path, where: Place) -> OwnRobot | None:
+    """Return the robot, where it hangs on the chip's own pins; what only another one can have is refused."""
+    file = find_own_robot(robot, path.parent)
+    if file is None:
+        if "pins" in table:
+            raise ScenarioError(
+                f"{within(where, 'pins')}: the robot {shown(robot)} has the wires of the pin-out",
+                hint=f"it is for {', '.join(known_own_robots())}, and robot files with a kind",
+            )
+        return None
+    for key in ("direct", "adapter", "controller", "fault"):
+        if key in table:
+            at = within(where, key, 0 if key == "fault" else None)
+            raise ScenarioError(f"{at}: this is for a Pioneer, and {shown(robot)} is none")
+    if table.get("mode") == "adapter":
+        raise ScenarioError(f"{where.at('mode')}: the robot {shown(robot)} hangs on the chip's own pins")
+    return load_own_robot(file, cast("Table", table.get("pins", {})), where)
 
 
 def _apply_in_world(scenario: Scenario, part: Table) -> Scenario:

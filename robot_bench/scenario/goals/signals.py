@@ -141,9 +141,9 @@ class WaveWithin(Watch):
         self._hz: tuple[float, float] = (math.inf, 0.0)
 
     def feed(self, event: Event) -> Outcome | None:
-        if isinstance(event, Wave) and event.wire == self._wire and self._from <= event.t <= self._to:
+        if isinstance(event, Wave) and event.wire == self._wire and self._from <= event.t <= self._to and event.period:
             self._count += self._periods
-            return self._take(event.t, event.ticks_hz / event.period, event.high / event.period)
+            return self._take(event.t, event.frequency_hz, event.duty)
         if not isinstance(event, PinEdge):
             return None
         if not event.level:

@@ -51,8 +51,8 @@ class Chip:
 class Queue(RuleBasedStateMachine):
     """The queue beside a heap: who acts when, in which order."""
 
-    #: The first one is that of the pins.
-    SLOTS = range(1, 7)
+    #: The first two are those of the pins.
+    SLOTS = range(2, 8)
 
     def __init__(self) -> None:
         super().__init__()
@@ -119,16 +119,16 @@ def test_those_who_schedule_each_other_act_in_order_of_time() -> None:
 
     def first(at_ns: int) -> None:
         acted.append(("first", at_ns))
-        fabric.schedule(2, at_ns)
-        fabric.schedule(1, at_ns + 10 if at_ns < 30 else None)
+        fabric.schedule(3, at_ns)
+        fabric.schedule(2, at_ns + 10 if at_ns < 30 else None)
 
     def second(at_ns: int) -> None:
         acted.append(("second", at_ns))
-        fabric.schedule(2, None)
+        fabric.schedule(3, None)
 
     fabric.add_slot("one", first)
     fabric.add_slot("two", second)
-    fabric.schedule(1, 10)
+    fabric.schedule(2, 10)
     fabric.run_events(100)
     assert acted == [(name, at) for at in (10, 20, 30) for name in ("first", "second")]
 
@@ -141,16 +141,16 @@ def test_an_event_that_fails_comes_out_and_the_others_stay_due() -> None:
         raise LookupError("broken")
 
     fabric.add_slot("one", fail)
-    fabric.schedule(1, 5)
+    fabric.schedule(2, 5)
     with pytest.raises(LookupError, match="broken"):
         fabric.run_events(10)
     assert chip.ends == 1
-    assert fabric.due(1) is None, "it would fail for ever"
+    assert fabric.due(2) is None, "it would fail for ever"
 
 
-def test_there_are_128_slots_and_the_first_is_that_of_the_pins() -> None:
+def test_there_are_128_slots_and_the_first_two_are_those_of_the_pins() -> None:
     fabric = Fabric(Chip())
-    for number in range(1, 128):
+    for number in range(2, 128):
         fabric.add_slot(str(number), lambda _at: None)
     with pytest.raises(ValueError, match="no slot left"):
         fabric.add_slot("one more", lambda _at: None)

@@ -46,7 +46,8 @@ words = st.text(max_size=8)
 metres = st.integers(-(10**9), 10**9).map(lambda um: um / 1e6)
 SAMPLES: dict[type, st.SearchStrategy[Any]] = {
     PinEdge: st.builds(PinEdge, t=times, wire=words, level=st.booleans()),
-    Wave: st.builds(Wave, t=times, wire=words, at=whole, period=whole, high=whole, ticks_hz=whole),
+    Wave: st.builds(Wave, t=times, wire=words, at=st.just(1), period=st.integers(3, 2**62), high=st.just(2),
+                    ticks_hz=st.integers(1, 2**62)),
     Text: st.builds(Text, t=times, data=st.binary(max_size=9), port=st.sampled_from(["usart1", "usart3"])),
     Packet: st.builds(Packet, t=times, direction=st.sampled_from(["c2r", "r2c"]), data=st.binary(max_size=9)),
     Pose: st.builds(Pose, t=times, **dict.fromkeys(

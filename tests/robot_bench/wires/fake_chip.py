@@ -29,6 +29,10 @@ class FakePin:
             self.outside, self.is_weak = level, is_weak
             self._chip.inputs.append((self._chip.now_ns, self.name, level))
 
+    def drive_later(self, levels: Iterable[tuple[int, bool]], *, is_weak: bool = False) -> None:
+        for _, level in levels:  # its blocks are long
+            self.drive(bool(level), is_weak=is_weak)
+
 
 class FakeSubscription:
     def __init__(self, pins: Iterable[str], sink: EdgeSink, ends_slice: Iterable[str]) -> None:
@@ -106,8 +110,9 @@ class FakeChip:
         return self._pins.setdefault(name, FakePin(self, name))
 
     def subscribe_pins(
-        self, pins: Iterable[str], sink: EdgeSink, *, of: Of = Of.DRIVE, ends_slice: Iterable[str] = ()
-    ) -> FakeSubscription:
+        self, pins: Iterable[str], sink: EdgeSink, *, of: Of = Of.DRIVE, ends_slice: Iterable[str] = (),
+        waves: bool = False,  # noqa: ARG002 - it makes none
+    ) -> FakeSubscription:  # fmt: skip
         assert of is Of.DRIVE
         self.subscriptions.append(FakeSubscription(pins, sink, ends_slice))
         return self.subscriptions[-1]

@@ -10,6 +10,7 @@
 #define LAST_ROWS 32
 #define RECEIVED 256
 #define ANALOG_PINS 10
+#define LATER_INPUTS 1024
 
 /* A block that began, an exception that was entered (its number) or left (-1). */
 struct record {
@@ -458,6 +459,15 @@ struct edge {
     uint32_t zero;
 };
 _Static_assert(sizeof(struct edge) == 16, "edge");
+
+/* Levels that the outside puts on pins later: a ring, oldest first. */
+struct inputs {
+    uint32_t first;
+    uint32_t count;
+    uint64_t padding;
+    struct edge rows[1024];
+};
+_Static_assert(sizeof(struct inputs) == 16400, "inputs");
 
 /* A word that has gone out, when, and how: clock and divider, and what else its device says of its format. */
 struct sent {

@@ -1,0 +1,148 @@
+"""The differential robot as a part of the bench: bridges, motors and battery that move a body, and what it senses.
+
+The body is stepped at multiples of its dt. When a step's time has passed, the bridges' wires are known over all of it:
+volts, currents and speeds follow, and the body makes the step with the mean speeds of the wheels. So the drive acts
+without delay, and what the encoders show of a step comes one step later.
+
+The body takes speeds of the rims and answers with how far its wheels have turned. A wheel that something holds, so that
+it turns more than a tenth slower or faster than its motor, has its motor brought to its own speed: so a robot against a
+wall draws the current of a stalled motor. With the physical bodies (bullet, mujoco) slopes, slip and what is pushed act
+on the motors only so, and the body's own limit of torque counts too.
+
+Invariant: at time t the body has made every step that ended at or before t.
+"""
+
+import math
+from collections.abc import Callable, Sequence
+
+from p2os.pioneer.body.contract import RobotBody
+from robot_bench.direct.differential.analog import Cell, volts_at
+from robot_bench.direct.differential.bridge import HBridge
+from robot_bench.direct.differential.description import SIDES, Differential
+from robot_bench.direct.differential.drive_train import DriveTrain
+from robot_bench.direct.differential.quadrature import OWNER, Quadrature
+from robot_bench.direct.robot import STALLS
+from robot_bench.direct.wired import AnalogPin
+from robot_bench.wires.nets import Harness, Strength
+from simbase.state import Stateful
+from simbase.timing import NS_PER_S, Nanos, Reached
+
+#: chosen: a wheel's own speed counts from this difference to its motor on, as a part and as a speed of the rim.
+HELD_SHARE, HELD_MPS = 0.1, 0.001
+#: chosen: volts on a pin change by half of what the ADC tells apart, 3.3 V by 4096.
+VOLTS_STEP = 4e-4
+#: chosen: bumpers and stalls are looked at each 10 ms, as programs do.
+LOOK_STEPS = 10
+
+
+class DifferentialRobot(Stateful):
+    """A body whose motors, encoders and sensors hang on the chip's pins.
+
+    Args:
+        robot: What it is.
+        body: What moves.
+        harness: Its wires, by their signals.
+        analog_pin: Returns the chip's pin of an analog signal.
+    """
+
+    STATE = (
+        "body", "train", "cell", "_encoders", "_bridges", "_steps", "_angles", "_next_distance", "_stalled",
+        "_steps_of_volts",
+    )  # fmt: skip
+
+    def __init__(
+        self, robot: Differential, body: RobotBody, harness: Harness, analog_pin: Callable[[str], AnalogPin]
+    ) -> None:
+        self.body = body
+        self._robot = robot
+        self._radius_m = robot.body.wheel_diameter_m / 2
+        self._dt_s = body.dt_ns / NS_PER_S
+        self.train = DriveTrain(robot, self._dt_s)
+        self.cell = Cell(robot.battery)
+        self._bridges = tuple(
+            HBridge([harness[f"{side}_{pin}"] for pin in robot.bridge.kind.pins], robot.bridge) for side in SIDES
+        )
+        per_turn = robot.encoder.edges_per_turn(robot.motor)
+        self._encoders = tuple(Quadrature(harness[f"{side}_a"], harness[f"{side}_b"], per_turn) for side in SIDES)
+        self._bumpers = [(harness[f"bumper_{one.name}"], one) for one in robot.bumpers]
+        self._analog = {wire.name: analog_pin(wire.name) for wire in robot.signals if wire.is_analog}
+        #: What is on the analog pins, in steps.
+        self._steps_of_volts: dict[str, int] = {}
+        self._steps = 0
+        self._angles = (0.0, 0.0)
+        self._next_distance: Nanos = 0
+        self._stalled = (False, False)
+        #: Takes a line of the state log: (ns, what, detail).
+        self.on_event: Callable[[Nanos, str, str], None] | None = None
+        #: Called with each look of the distance sensors: (ns, metres of each).
+        self.on_ranges: Callable[[Nanos, Sequence[float]], None] | None = None
+        for encoder in self._encoders:
+            encoder.start()
+        self._show(0)
+
+    def next_deadline(self) -> Nanos:
+        """Return when the step that is under way ends."""
+        return (self._steps + 1) * self.body.dt_ns
+
+    def advance_to(self, limit: Nanos) -> Reached:
+        """Make every step that ends at or before `limit`."""
+        while self.next_deadline() <= limit:
+            self._step()
+        return Reached(limit)
+
+    def _step(self) -> None:
+        body, train, cell, battery = self.body, self.train, self.cell, self._robot.battery
+        begin, end = self._steps * body.dt_ns, (self._steps + 1) * body.dt_ns
+        left, right = self._bridges[0].shares(begin, end), self._bridges[1].shares(begin, end)
+        cell.volts = train.supply_v(left, right, cell.source_v, battery.resistance_ohm, battery.idle_current_a)
+        made = train.step(left, right, cell.volts)
+        cell.give(made.supply_a + battery.idle_current_a, self._dt_s)
+        turned = body.step(made.left_radps * self._radius_m, made.right_radps * self._radius_m)
+        angle_l, angle_r = self._angles
+        self._angles = turned_l, turned_r = turned.left_angle_rad, turned.right_angle_rad
+        train.left_radps = self._held(made.left_radps, (turned_l - angle_l) / self._dt_s, train.left_radps)
+        train.right_radps = self._held(made.right_radps, (turned_r - angle_r) / self._dt_s, train.right_radps)
+        self._steps += 1
+        self._encoders[0].turn_to(turned_l, end, body.dt_ns)
+        self._encoders[1].turn_to(turned_r, end, body.dt_ns)
+        self._show(end)
+
+    def _held(self, asked: float, real: float, now: float) -> float:
+        """Return a motor's speed, which is its wheel's where that is held."""
+        apart = abs(real - asked)
+        return real if apart > HELD_SHARE * abs(asked) and apart * self._radius_m > HELD_MPS else now
+
+    def _show(self, now: Nanos) -> None:
+        """Show the sensors that are due."""
+        self._put("battery", self.cell.volts * self._robot.battery.divider)
+        if self._next_distance <= now and self._robot.distances:
+            self._next_distance += self._robot.distance_period_ns
+            measured = self.body.ranges(range(len(self._robot.distances)))
+            for sensor, metres in zip(self._robot.distances, measured, strict=True):
+                self._put(f"distance_{sensor.name}", volts_at(sensor.curve, metres))
+            if self.on_ranges is not None:
+                self.on_ranges(now, measured)
+        if self._steps % LOOK_STEPS == 0:
+            self._look(now)
+
+    def _put(self, signal: str, volts: float) -> None:
+        steps = round(volts / VOLTS_STEP)
+        if self._steps_of_volts.get(signal) != steps:
+            self._steps_of_volts[signal] = steps
+            self._analog[signal].set_volts(steps * VOLTS_STEP)
+
+    def _look(self, now: Nanos) -> None:
+        state = self.body.state
+        for net, bumper in self._bumpers:
+            apart = math.remainder((state.contact_rad or 0.0) - math.radians(bumper.heading_deg), 2 * math.pi)
+            is_pressed = state.in_contact and state.contact_rad is not None
+            is_pressed = is_pressed and abs(apart) <= math.radians(bumper.width_deg) / 2
+            if is_pressed:
+                net.drive(OWNER, False, Strength.PUSH_PULL, now)
+            else:
+                net.release(OWNER, now)
+        stalled = (state.stalled_left, state.stalled_right)
+        if stalled != self._stalled:
+            self._stalled = stalled
+            if self.on_event is not None:
+                self.on_event(now, *STALLS[stalled])

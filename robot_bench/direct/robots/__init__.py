@@ -1,0 +1,1 @@
+"""The robots on own pins that ship."""

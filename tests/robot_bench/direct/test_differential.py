@@ -1,0 +1,192 @@
+"""The differential robot on its wires: body, encoders, battery, sensors; the same however it is brought forward."""
+
+import math
+import pickle
+from dataclasses import replace
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from bluepill_sim.fabric.subscriptions import Wave
+from p2os.pioneer.body.factory import make_body
+from p2os.pioneer.world import load_world
+from p2os.pioneer.world.model import Obstacle, Pose
+from robot_bench.bench import make_own_harness
+from robot_bench.direct.differential.analog import GP2Y0A21, Cell, volts_at
+from robot_bench.direct.differential.description import Differential
+from robot_bench.direct.differential.robot import DifferentialRobot
+from robot_bench.wires.nets import Harness, Strength, WaveDrive
+from tests.robot_bench.direct.robots import rover
+
+MS = 1_000_000
+PP = Strength.PUSH_PULL
+PER_TURN = 1632
+
+
+class Pin:
+    """An analog pin that keeps what it was given."""
+
+    def __init__(self) -> None:
+        self.volts: float | None = None
+        self.times = 0
+
+    def set_volts(self, volts: float | None) -> None:
+        self.volts = volts
+        self.times += 1
+
+
+class Rig:
+    """A robot in the arena, and its wires in the test's hands."""
+
+    def __init__(self, robot: Differential | None = None, *, body: str = "kinematic", world: str = "arena") -> None:
+        robot = robot or rover()
+        self.harness: Harness = make_own_harness(robot.signals)
+        self.pins = {wire.name: Pin() for wire in robot.signals if wire.is_analog}
+        self.body = make_body(body, load_world(world), robot.parameters)
+        self.body.reset(Pose(0.0, 0.0, 0.0), 0)
+        self.robot = DifferentialRobot(robot, self.body, self.harness, self.pins.__getitem__)
+
+    def drive(self, side: str, duty: float, now: int = 0) -> None:
+        """Drive forward or in reverse by PWM at 20 kHz."""
+        for pin, level in (("in1", duty > 0), ("in2", duty < 0)):
+            self.harness[f"{side}_{pin}"].drive("chip", level, PP, now)
+        high, net = round(abs(duty) * 3600), self.harness[f"{side}_pwm"]
+        if 0 < high < 3600:
+            net.wave_from("chip", WaveDrive(Wave(now, 0, 3600, high, 72_000_000), PP.codes), now)
+        else:
+            net.drive("chip", high > 0, PP, now)
+
+    def counts(self, side: str, until: int) -> int:
+        """Count the edges of a wheel that turns one way only."""
+        return sum(len(self.harness[f"{side}_{channel}"].edges_until(until)) for channel in "ab")
+
+
+def test_it_drives_straight_at_the_steady_speed_and_its_edges_are_the_wheel_s_angle_of_a_step_before() -> None:
+    rig = Rig()
+    for side in ("left", "right"):
+        rig.drive(side, 0.5)
+    rig.robot.advance_to(499 * MS)
+    angle = rig.body.state.left_angle_rad
+    rig.robot.advance_to(500 * MS)
+    state = rig.body.state
+    # Half of the battery's 12.6 V less its sag, less friction, over K N: 0.44 m/s.
+    assert state.left_speed_mps == pytest.approx(0.4587, rel=0.02)
+    assert state.y_m == pytest.approx(0.0, abs=1e-12)
+    assert rig.counts("left", 500 * MS) == math.floor(angle / (2 * math.pi) * PER_TURN)
+    assert rig.counts("left", 501 * MS) + math.floor(angle / (2 * math.pi) * PER_TURN) == math.floor(
+        state.left_angle_rad / (2 * math.pi) * PER_TURN
+    )
+
+
+def test_a_change_of_the_duty_within_a_step_acts_in_that_step() -> None:
+    speeds = {}
+    for at in (0, 250_000, 999_999, MS):
+        rig = Rig()
+        rig.drive("left", 0.0)
+        rig.drive("left", 1.0, at)
+        rig.robot.advance_to(MS)
+        speeds[at] = rig.robot.train.left_radps
+    assert speeds[0] > speeds[250_000] > speeds[999_999] == speeds[MS] == 0.0
+    assert speeds[250_000] < 0.76 * speeds[0], "three quarters of the push, and friction takes its part of both"
+
+
+def test_against_a_wall_the_motors_stall_the_battery_sags_and_the_encoders_stand() -> None:
+    rig = Rig()
+    rig.body.place(Obstacle(name="wall", x_m=0.25, y_m=0.0, length_m=0.1, width_m=2.0, height_m=0.3))
+    said: list[tuple[int, str, str]] = []
+    rig.robot.on_event = lambda *line: said.append(line)
+    for side in ("left", "right"):
+        rig.drive(side, 1.0)
+    assert rig.harness["bumper_front"].level(0) is True
+    rig.robot.advance_to(600 * MS)
+    before = rig.counts("left", 550 * MS)
+    rig.robot.advance_to(1000 * MS)
+    assert before > 0
+    assert rig.counts("left", 1000 * MS) == 0
+    # Two motors of 2.9 ohm on 12.6 V behind 0.12 ohm: about 8 A, which takes 1 V off.
+    assert rig.robot.cell.volts == pytest.approx((12.6 - 0.12 * 0.08) / (1 + 0.12 * 2 / 2.9), rel=0.005)
+    assert rig.pins["battery"].volts == pytest.approx(rig.robot.cell.volts / 4, abs=2.01e-4)
+    assert rig.harness["bumper_front"].level(1000 * MS) is False
+    assert [what for _, what, _ in said] == ["stalled"]
+    for side in ("left", "right"):
+        rig.drive(side, -0.5, 1000 * MS)
+    rig.robot.advance_to(1500 * MS)
+    assert [what for _, what, _ in said] == ["stalled", "freed"]
+    assert rig.harness["bumper_front"].level(1500 * MS) is True
+
+
+def test_distance_sensors_see_what_stands_before_them_by_their_curve() -> None:
+    rig = Rig()
+    seen: list[tuple[int, list[float]]] = []
+    rig.robot.on_ranges = lambda at, metres: seen.append((at, list(metres)))
+    # The front sensor is 0.11 m ahead of the axle: a thing at 0.41 m is 0.3 m away.
+    rig.body.place(Obstacle(name="thing", x_m=0.46, y_m=0.0, length_m=0.1, width_m=0.1, height_m=0.3))
+    rig.robot.advance_to(120 * MS)
+    assert rig.pins["distance_front"].volts == pytest.approx(0.92, abs=0.001)
+    assert [at for at, _ in seen] == [39 * MS, 77 * MS, 115 * MS], "each 38.3 ms, at the end of a step"
+    assert rig.pins["distance_left"].volts == pytest.approx(GP2Y0A21[-1][1]), "nothing within 0.8 m"
+
+
+@pytest.mark.parametrize(
+    ("metres", "volts"), [(-1, 0.3), (0.0, 0.3), (0.07, 3.1), (0.1, 2.3), (0.125, 1.975), (0.8, 0.4), (9, 0.4)]
+)
+def test_the_curve_is_a_line_between_its_points_and_flat_beyond(metres: float, volts: float) -> None:
+    assert volts_at(GP2Y0A21, metres) == pytest.approx(volts)
+
+
+def test_a_battery_falls_in_a_line_and_is_empty_when_its_charge_is_out() -> None:
+    cell = Cell(rover().battery)
+    cell.give(2.2, 1800)
+    assert cell.source_v == pytest.approx((12.6 + 9.0) / 2)
+    cell.give(2.2, 1799.9)
+    assert cell.source_v == pytest.approx(9.0, abs=0.001)
+    cell.give(2.2, 0.2)
+    assert cell.source_v == 0.0
+    cell.give(-100.0, 3600)
+    assert cell.source_v == 12.6, "it takes no more than it holds"
+
+
+@settings(max_examples=15, deadline=None)
+@given(
+    st.lists(
+        st.tuples(st.integers(0, 60), st.sampled_from(["left", "right"]), st.sampled_from([-1, -0.3, 0, 0.2, 0.7, 1])),
+        max_size=8,
+    ),
+    st.lists(st.integers(1, 80 * MS), max_size=6),
+    st.integers(0, 80),
+)
+def test_it_is_the_same_in_any_slices_and_from_a_snapshot(
+    script: list[tuple[int, str, float]], cuts: list[int], saved_at: int
+) -> None:
+    def run(stops: list[int], saved: int | None) -> tuple[object, list[object]]:
+        rig = Rig()
+        for at in sorted({*stops, *(step * MS for step, *_ in script), 80 * MS, *([saved * MS] if saved else [])}):
+            rig.robot.advance_to(at)
+            for step, side, duty in script:
+                if step * MS == at:
+                    rig.drive(side, duty, at)
+            if saved is not None and at == saved * MS:
+                state, nets = pickle.loads(pickle.dumps((rig.robot.snapshot(), rig.harness.snapshot())))  # noqa: S301
+                rig = Rig()
+                rig.harness.restore(nets)
+                rig.robot.restore(state)
+        edges = [list(net.edges_until(90 * MS)) for net in rig.harness]
+        return rig.robot.snapshot(), edges
+
+    assert run([], None) == run(cuts, saved_at or None)
+
+
+@pytest.mark.bullet
+def test_the_physical_body_follows_the_motors_too() -> None:
+    rig = Rig(body="bullet")
+    for side in ("left", "right"):
+        rig.drive(side, 0.5)
+    rig.robot.advance_to(1000 * MS)
+    assert rig.body.state.left_speed_mps == pytest.approx(0.4587, rel=0.05)
+    assert rig.body.state.x_m == pytest.approx(0.44, abs=0.05)
+
+
+def test_a_wheel_of_few_edges_and_one_on_the_wheel_itself_have_theirs() -> None:
+    robot = replace(rover(), encoder=replace(rover().encoder, lines=5, is_on_motor=False))
+    assert robot.encoder.edges_per_turn(robot.motor) == 20
