@@ -129,6 +129,8 @@ class Bench(Stateful):
         "made_of", "chip", "_harness", "_robots", "_ranges", "script", "faults", "whens", "recorder", "goals", "loop",
         "_ends_at", "_has_told_death",
     )  # fmt: skip
+    #: What the caller asked of this object; the lines, which are parts of the loop.
+    DERIVED = ("_lines", "_checkpoints", "_expected", "on_slice")
 
     def __init__(
         self,

@@ -7,7 +7,6 @@ from pathlib import Path
 
 import pytest
 
-from tests.tools.counted_lines import LineCounter
 from tools.check_coverage import merged
 
 ROOT = Path(__file__).parents[1]
@@ -52,12 +51,6 @@ def test_lines_and_branches_that_no_test_of_any_worker_reaches_are_counted(
     found = files["simbase/part.py"]
     assert (found["missing_lines"], found["missing_branches"]) == missed
     assert files["simbase/unseen.py"]["missing_lines"] == [2, 3, 4, 5]
-
-
-def test_lines_are_not_counted_once_a_package_is_imported(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setitem(sys.modules, "simbase", sys)
-    with pytest.raises(pytest.UsageError, match="simbase is imported before its lines can be counted"):
-        LineCounter(Path("never"))
 
 
 def test_children_keep_the_modules_that_they_compile(tmp_path: Path) -> None:

@@ -114,6 +114,8 @@ class CanNetwork(Stateful):
     """A bus and who is on it."""
 
     STATE = ("_free_ns", "_wanted", "_damaged", "late", "_parts")
+    #: Who has joined; each is made before a state is put back.
+    DERIVED = ("_members",)
 
     def __init__(self) -> None:
         self._members: list[CanMember] = []

@@ -92,7 +92,7 @@ class Spi(Peripheral):
     KIND, HOLDS = "spi", SPI
     OUTPUTS = ("irq", "rx_dma", "tx_dma")
     STATE = ("_hung", "_coming")
-    DERIVED = ("_pin_names",)
+    DERIVED = ("_pin_names", "_sinks")
     REGISTERS = (
         Register(
             name="CR1", offset=0x00, readable=bits((15, 0)), writable=bits((15, 0)), on_write=NATIVE,

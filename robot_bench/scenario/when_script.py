@@ -100,7 +100,7 @@ class WhenScript(Stateful):
         on_end: Ends the run.
     """
 
-    STATE = ("_selectors", "_done")
+    STATE = ("_selectors", "_done", "_happened")
 
     def __init__(
         self,

@@ -8,7 +8,8 @@ import pytest
 
 pytest_plugins = ("pytester",)
 
-PLUGIN = ("-p", "robot_bench.cli.pytest_plugin", "-p", "no:cacheprovider", "-p", "no:xdist")
+#: The plugin itself is found by its entry point.
+PLUGIN = ("-p", "no:cacheprovider", "-p", "no:xdist")
 SETTINGS = "[pytest]\nbench_scenario = motors\n"
 
 
