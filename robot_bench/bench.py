@@ -25,7 +25,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from importlib.metadata import version
 from pathlib import Path
-from typing import Self, TypeAlias, TypeVar, Unpack, cast
+from typing import Self, TypeAlias, TypeVar, Union, Unpack, cast
 
 from adapter_sim import Adapter
 from adapter_sim.pinout import Pinout, Pull, WireRole, load_pinout
@@ -80,7 +80,7 @@ RESISTORS = "board"
 _LOG = logger("bench")
 T = TypeVar("T", bound=Timed)
 #: What `run_until` waits for beside a time: an event in words, or a function of the bench.
-Condition: TypeAlias = "str | Callable[[Bench], bool]"
+Condition: TypeAlias = Union[str, Callable[["Bench"], bool]]  # noqa: UP007 - a name in quotes, for pdoc
 
 
 #: What decides a run besides its files; its end and its goals may be others after a restart.

@@ -192,7 +192,7 @@ def test_a_student_gets_from_nothing_to_a_robot_that_drives() -> None:
     assert set(printed) == {"waiting for the robot", "forward", "turning left", "turning right"}
 
 
-PYTEST = f"PYTEST={sys.executable} -m pytest -p robot_bench.cli.pytest_plugin -p no:cacheprovider -q"
+PYTEST = f"PYTEST={sys.executable} -m pytest -p no:cacheprovider -q"
 
 
 @needs_compiler
