@@ -215,12 +215,19 @@ def robot(request: pytest.FixtureRequest, tmp_path: Path) -> Iterator[tuple[str,
     process.communicate(timeout=20)
 
 
-def wait_until_recorded(run: Path) -> None:
-    """Wait until a run has recorded what came from the robot; a busy machine takes long to begin."""
-    ends = time.monotonic() + 60
-    while not any('"c2r"' in trace.read_text() for trace in run.glob("trace.jsonl")):
-        assert time.monotonic() < ends, "the run never began"
-        time.sleep(0.1)
+def begun(command: list[str], folder: Path, stderr: int = subprocess.PIPE) -> subprocess.Popen[str]:
+    """Begin a run, until it has recorded what came from the robot; a busy machine takes long, and may give up."""
+    for _attempt in range(3):
+        run = subprocess.Popen(command, cwd=folder, stdout=subprocess.PIPE, stderr=stderr, text=True)
+        ends = time.monotonic() + 60
+        while run.poll() is None:
+            if any('"c2r"' in trace.read_text() for trace in (folder / "run").glob("trace.jsonl")):
+                return run
+            assert time.monotonic() < ends, "the run never began"
+            time.sleep(0.1)
+        told = "".join(filter(None, run.communicate()))
+        assert "lagged" in told, told
+    pytest.skip("this machine is too busy for real time now")
 
 
 @pytest.mark.slow
@@ -231,7 +238,10 @@ def test_the_emulated_bluepill_drives_a_served_robot(
     words = ["run", "motors", "--port", robot[0], "--yes", "--duration", "8s", "--out", str(tmp_path / "run"), "--json"]
     for _attempt in range(3):
         code = p2os(words)
-        outcome = json.loads(capsys.readouterr().out)
+        told = capsys.readouterr()
+        if not told.out and "lagged" in told.err:
+            continue
+        outcome = json.loads(told.out)
         if not any("lagged" in failure for failure in outcome["failures"]):
             break
     else:
@@ -254,8 +264,7 @@ def test_a_robot_that_vanishes_ends_the_run_with_1(
 ) -> None:
     url, process = robot
     command = [*COMMAND, "run", "motors", "--port", url, "--yes", "--out", "run", "--json"]
-    run = subprocess.Popen(command, cwd=tmp_path, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
-    wait_until_recorded(tmp_path / "run")
+    run = begun(command, tmp_path)
     process.kill()
     out, err = run.communicate(timeout=60)
     assert run.returncode == 1, err
@@ -271,8 +280,7 @@ def test_a_signal_stops_a_served_robot_and_ends_with_130(
     number: signal.Signals, robot: tuple[str, subprocess.Popen[str]], tmp_path: Path
 ) -> None:
     command = [*COMMAND, "run", "motors", "--port", robot[0], "--yes", "--out", "run", "--json"]
-    run = subprocess.Popen(command, cwd=tmp_path, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
-    wait_until_recorded(tmp_path / "run")
+    run = begun(command, tmp_path)
     run.send_signal(number)
     out, err = run.communicate(timeout=60)
     assert run.returncode == 130, err
@@ -294,9 +302,8 @@ def test_a_terminal_that_is_held_holds_up_neither_the_run_nor_its_end(
             os.write(inside, b".")
     os.set_blocking(inside, True)
     command = [*COMMAND, "run", "motors", "--port", robot[0], "--yes", "--out", "run", "--json"]
-    run = subprocess.Popen(command, cwd=tmp_path, stdout=subprocess.PIPE, stderr=inside, text=True)
+    run = begun(command, tmp_path, inside)
     os.close(inside)
-    wait_until_recorded(tmp_path / "run")
     run.send_signal(signal.SIGTERM)
     out, _ = run.communicate(timeout=60)
     os.close(terminal)
