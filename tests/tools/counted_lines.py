@@ -10,6 +10,7 @@ import os
 import sys
 from pathlib import Path
 
+from _pytest.assertion.rewrite import AssertionRewritingHook
 from slipcover import FileMatcher, ImportManager, Slipcover
 
 PACKAGES = ("simbase", "p2os", "bluepill_sim", "adapter_sim", "robot_bench", "hardware")
@@ -19,13 +20,23 @@ UNCOUNTED = (r"@overload", r"raise NotImplementedError", r"\.\.\.$")
 NEVER = 2**31 - 1
 
 
+def is_ours(module: str) -> bool:
+    """Tell whether a module is one of the packages."""
+    return module.partition(".")[0] in PACKAGES
+
+
 class LineCounter:
     """A plugin of pytest, in place before any of the packages is imported."""
 
     def __init__(self, folder: Path) -> None:
-        # Where the project is installed its own plugin of pytest comes first: what that has imported is imported anew.
-        for name in [name for name in sys.modules if name.partition(".")[0] in PACKAGES]:
+        # Where the project is installed its own plugin of pytest comes first. What that has imported is imported anew,
+        # and not by pytest, which takes all modules of a plugin's distribution for ones with assertions to rewrite.
+        for name in filter(is_ours, list(sys.modules)):
             del sys.modules[name]
+        for finder in sys.meta_path:
+            if isinstance(finder, AssertionRewritingHook):
+                finder._must_rewrite.difference_update([*filter(is_ours, finder._must_rewrite)])
+                finder._marked_for_rewrite_cache.clear()
         self._folder = folder
         self._cover = Slipcover(branch=True, d_miss_threshold=NEVER, exclude_also=list(UNCOUNTED))
         self._imports = ImportManager(self._cover, FileMatcher(sources=PACKAGES))

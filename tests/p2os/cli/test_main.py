@@ -7,6 +7,7 @@ import subprocess
 import sys
 from collections.abc import Callable
 from importlib.metadata import EntryPoint
+from importlib.resources import files
 from pathlib import Path
 
 import pytest
@@ -225,6 +226,6 @@ def test_a_reader_that_leaves_early_gets_no_traceback() -> None:
 def test_the_package_runs_as_a_module(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
     monkeypatch.setattr(sys, "argv", ["p2os", "--version"])
     with restored_signals(), pytest.raises(SystemExit) as end:
-        runpy.run_module("p2os", run_name="__main__")
+        runpy.run_path(str(files("p2os") / "__main__.py"), run_name="__main__")
     assert end.value.code in (None, 0)
     assert capsys.readouterr().out.strip()

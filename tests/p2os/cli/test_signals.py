@@ -164,6 +164,7 @@ def test_a_program_that_was_suspended_stops_the_robot_before_anything_else(
     if begin is not by_drive:  # whose own client stops it
         assert robot.numbers[received:] == [STOP, CommandNumber.VEL, CLOSE]
     if code is None:
+        time.sleep(1)  # it says why before the signal comes
         drivers[0].process.send_signal(signal.SIGINT)
     ended, said = drivers[0].end()
     assert ended == (130 if code is None else code)
