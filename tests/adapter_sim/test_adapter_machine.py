@@ -39,7 +39,8 @@ class WatchedRig(Rig):
         self.pair_at = -(10**12)
         #: Whether p2dx_con has been seen low since the last loss.
         self.allowed = True
-        self.codes = (0, 0)
+        #: The encoders' codes; None: the outputs were undefined, and codes go on after that where they were.
+        self.codes: tuple[int, int] | None = (0, 0)
 
     def run(self, until: int) -> None:
         while self.now < until:
@@ -65,11 +66,11 @@ class WatchedRig(Rig):
             assert self.now - self.last_sip <= 350 * MS
         codes = (self.pins.code("encoder1"), self.pins.code("encoder2")) if self.pins.outputs else (0, 0)
         if None not in self.pins.outputs.values():
-            for before, after in zip(self.codes, codes, strict=True):
+            for before, after in zip(self.codes or codes, codes, strict=True):
                 assert (after - before) % 8 in {0, 1, 7}
             self.codes = codes
         else:
-            self.codes = (0, 0)
+            self.codes = None
 
     def _check_frame(self, at: int, name: str, argument: object) -> None:
         if name == "STOP":

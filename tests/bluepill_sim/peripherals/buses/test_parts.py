@@ -52,6 +52,7 @@ def test_dma_serves_both_buses_and_ends_a_reception_at_its_last_byte(board_of: B
     board.i2c("I2C1", memory)
     said = said_by(board)
     assert said == ["spi 000", f"i2c {bytes(range(48, 112)).decode()}", "end"]
+    assert memory._at == 64, "LAST refuses the byte that DMA takes last: no other is sent"
     assert board.warnings == []
 
 
