@@ -16,10 +16,9 @@ from bluepill_sim.analysis.coverage import Coverage
 from bluepill_sim.board import BluePill, BoardSnapshot
 from bluepill_sim.program.line_table import read_lines
 from bluepill_sim.program.static_code import StaticCode
+from tests.bluepill_sim.firmware.compiled import COMPILER, HERE, compiled
 from tests.bluepill_sim.machine import listen
 
-HERE = Path(__file__).resolve().parent / "firmware"
-COMPILER = "arm-none-eabi-gcc"
 pytestmark = pytest.mark.skipif(shutil.which(COMPILER) is None, reason=f"{COMPILER} is not installed")
 
 MS = 1_000_000
@@ -44,22 +43,7 @@ ready
 
 @pytest.fixture(scope="session")
 def elf(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    path = tmp_path_factory.mktemp("exercise") / "exercise.elf"
-    flags = [
-        "-mcpu=cortex-m3",
-        "-mthumb",
-        "-std=c11",
-        "-Og",
-        "-g",
-        "-Wall",
-        "-Wextra",
-        "-Werror",
-        "-ffreestanding",
-        "-nostdlib",
-    ]
-    link = ["-Wl,--build-id=none", "-T", str(HERE / "exercise.ld"), str(HERE / "exercise.c"), "-lgcc", "-o", str(path)]
-    subprocess.run([COMPILER, *flags, *link], check=True)
-    return path
+    return compiled("exercise", tmp_path_factory.mktemp("exercise"), "-Og")
 
 
 @pytest.mark.parametrize("core", ["python", "native"])

@@ -1,7 +1,6 @@
 """A compiled program uses the timers: PWM, its measure, an encoder, interrupts, waits; and says what it saw."""
 
 import shutil
-import subprocess
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -13,9 +12,8 @@ from bluepill_sim.board import BluePill
 from bluepill_sim.debug.execution import Execution
 from bluepill_sim.debug.machine import LoneChip
 from bluepill_sim.debug.monitor import Monitor
+from tests.bluepill_sim.firmware.compiled import COMPILER, compiled
 
-HERE = Path(__file__).resolve().parent / "firmware"
-COMPILER = "arm-none-eabi-gcc"
 pytestmark = [
     pytest.mark.skipif(shutil.which(COMPILER) is None, reason=f"{COMPILER} is not installed"),
     pytest.mark.usefixtures("watchdog"),
@@ -40,21 +38,7 @@ ready
 
 @pytest.fixture(scope="session", params=["-Og", "-O2"])
 def elf(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    path = tmp_path_factory.mktemp("timers") / "timers.elf"
-    flags = [
-        "-mcpu=cortex-m3",
-        "-mthumb",
-        "-std=c11",
-        "-g",
-        "-Wall",
-        "-Wextra",
-        "-Werror",
-        "-ffreestanding",
-        "-nostdlib",
-    ]
-    link = ["-Wl,--build-id=none", "-T", str(HERE / "exercise.ld"), str(HERE / "timers.c"), "-lgcc", "-o", str(path)]
-    subprocess.run([COMPILER, *flags, request.param, *link], check=True)
-    return path
+    return compiled("timers", tmp_path_factory.mktemp("timers"), request.param)
 
 
 def run(elf: Path, slice_ns: int) -> tuple[str, BluePill]:

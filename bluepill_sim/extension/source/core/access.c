@@ -255,24 +255,15 @@ static struct page *open_page(const struct region_user *region, uint32_t offset)
     }
     struct page *page = &core->pages[offset >> PAGE_SHIFT];
     const bool is_there = (offset & IN_PAGE) >> 2 < page->count;
-    return is_there && (page->gate == NULL || *page->gate & page->gate_mask) ? page : NULL;
+    return is_there && has_clock(page) ? page : NULL;
 }
 
-/* Whether what is there has its clock, or needs none. */
-static bool has_clock(const struct region_user *region, uint32_t offset)
+/* Whether no clock is missing there. */
+static bool is_clocked(const struct region_user *region, uint32_t offset)
 {
     const struct core *core = region->core;
-    if (region->number != core->paged_region || offset >> PAGE_SHIFT >= PAGES) {
-        return true;
-    }
-    const struct page *page = &core->pages[offset >> PAGE_SHIFT];
-    return page->gate == NULL || *page->gate & page->gate_mask;
-}
-
-bool is_clocked(const struct core *core, uint32_t address)
-{
-    const struct page *page = &core->pages[(address - PERIPHERALS) >> PAGE_SHIFT];
-    return page->gate == NULL || *page->gate & page->gate_mask;
+    return region->number != core->paged_region || offset >> PAGE_SHIFT >= PAGES ||
+           has_clock(&core->pages[offset >> PAGE_SHIFT]);
 }
 
 /* Reads a register of a device in C; false: not now, the access comes again. */
@@ -446,7 +437,7 @@ uint64_t core_read_io(void *unicorn, uint64_t at, unsigned size, void *user)
         }
     } else if (region->number == region->core->system_region &&
                read_system(region->core, region->base + offset, size, &word)) {
-    } else if (has_clock(region, offset) && is_zero(region->core, region->base + offset)) {
+    } else if (is_clocked(region, offset) && is_zero(region->core, region->base + offset)) {
         skip(region->core, region->base + offset, false, size);
     } else {
         return ask_read(region, offset, size);
@@ -469,7 +460,7 @@ void core_write_io(void *unicorn, uint64_t at, unsigned size, uint64_t value, vo
         write_system(region->core, region->base + offset, size, written)) {
         return;
     }
-    if (has_clock(region, offset) && is_zero(region->core, region->base + offset)) {
+    if (is_clocked(region, offset) && is_zero(region->core, region->base + offset)) {
         skip(region->core, region->base + offset, true, size);
         return;
     }

@@ -110,6 +110,9 @@ struct page {
     struct device *device;      /* null: Python's */
 };
 
+/* Whether what is on a page has its clock, or needs none. */
+static inline bool has_clock(const struct page *page) { return page->gate == NULL || *page->gate & page->gate_mask; }
+
 /* The word that latches what is read stands above the bits; 0 for none. */
 enum behaviour { READS_PLAIN = 1, WRITES_PLAIN = 2, READS_NATIVE = 4, WRITES_NATIVE = 8, HALFWORDS = 16, DUPLICATES = 32, LATCH_SHIFT = 6 };
 
@@ -229,8 +232,6 @@ uint64_t rounds_of_counter(struct core *core, const struct row *row);
 /* access.c */
 void go_on_at_access(struct core *core, uint32_t pc);
 bool is_privileged(struct core *core);
-/* Whether a register of a peripheral has its clock. */
-bool is_clocked(const struct core *core, uint32_t address);
 bool resolve(struct core *core, uint32_t address, bool is_write, uint32_t bytes);
 void skip(struct core *core, uint32_t address, bool is_write, uint32_t bytes);
 /* run.c */

@@ -56,7 +56,7 @@ static bool registers(void *user, struct bus_access *access)
     if (page->device == NULL || index >= page->count) {
         return false;
     }
-    if (page->gate != NULL && !(*page->gate & page->gate_mask)) {
+    if (!has_clock(page)) {
         access->is_error = true;
         return true;
     }

@@ -245,7 +245,7 @@ static void write(struct device *device, uint32_t index, uint32_t written, uint3
 
 static bool hears(const struct device *device, uint32_t input)
 {
-    return device->words[FIRST + WORDS_EACH * input + CCR] & EN;
+    return words_of(device, input)[CCR] & EN;
 }
 
 static bool needs_time(const struct device *device, uint32_t index, bool is_write)

@@ -1,0 +1,16 @@
+"""The programs of this folder, compiled."""
+
+import subprocess
+from pathlib import Path
+
+HERE = Path(__file__).resolve().parent
+COMPILER = "arm-none-eabi-gcc"
+FLAGS = ("-mcpu=cortex-m3", "-mthumb", "-std=c11", "-g", "-Wall", "-Wextra", "-Werror", "-ffreestanding", "-nostdlib")
+
+
+def compiled(name: str, folder: Path, level: str) -> Path:
+    """Return the ELF of a program, such as "timers", at a level of optimisation, such as "-Og"."""
+    path = folder / f"{name}.elf"
+    link = ("-Wl,--build-id=none", "-T", str(HERE / "exercise.ld"), str(HERE / f"{name}.c"), "-lgcc", "-o", str(path))
+    subprocess.run([COMPILER, *FLAGS, level, *link], check=True)
+    return path
