@@ -407,6 +407,8 @@ class Adapter(Stateful):
         if state in {AdapterState.CLOSING, AdapterState.CONNECTING}:
             times.append(self._agenda.retry_at)
         self._other = min((time for time in times if time is not None), default=NEVER)
+        if self.samples.waits_for_edges and not self._has_pending_request and self.inputs.is_quiet(self._now):
+            self.samples.suspend()
         self._deadline = self.samples.due(self._other)
 
     def _clear(self) -> None:

@@ -190,6 +190,10 @@ class SampleClock(Stateful):
     def was_quiet(self, now: Nanos) -> None:
         """Note that the sample at `now` changed nothing and that later ones will not either without an edge."""
         self.after(now)
+        self.suspend()
+
+    def suspend(self) -> None:
+        """Take no sample until the next edge, where somebody waits for edges: none would change anything."""
         self.is_suspended = self.waits_for_edges
 
     def resume(self, now: Nanos) -> None:

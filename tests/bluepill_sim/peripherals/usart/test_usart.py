@@ -207,7 +207,7 @@ def test_a_restored_usart_sends_on_the_pins_that_it_was_remapped_to(
     other.pins.restore(fake_chip.pins.snapshot())
     other.parts.restore(fake_chip.parts.snapshot())
     sent: list[int] = []
-    other.parts.usart(1).sinks.append(lambda rows: sent.extend(word for word, _, _ in rows))
+    other.parts.usart(1).sinks.append(lambda rows: sent.extend(word for word, _ in rows))
     other.write("USART1.DR", 9)
     other.advance(10**6)
     assert sent == [9]
@@ -224,7 +224,7 @@ def test_a_remap_before_the_start_connects_later(fake_chip: Any) -> None:
 def test_other_usarts_run_on_pclk1(fake_chip: Any) -> None:
     fake_chip.run_at_72_mhz()
     sent: list[int] = []
-    fake_chip.parts.usart(2).sinks.append(lambda rows: sent.extend(at_ns for _, at_ns, _ in rows))
+    fake_chip.parts.usart(2).sinks.append(lambda rows: sent.extend(at_ns for _, at_ns in rows))
     fake_chip.write("GPIOA.CRL", 0x4444_4B44)
     fake_chip.write("USART2.BRR", 360)
     fake_chip.write("USART2.CR1", UE | TE)
