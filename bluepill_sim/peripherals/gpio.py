@@ -36,6 +36,8 @@ _INPUT_MODES = (PinMode.ANALOG, PinMode.FLOATING, PinMode.PULLED, PinMode.FLOATI
 _OUTPUT_MODES = (PinMode.PUSH_PULL, PinMode.OPEN_DRAIN, PinMode.ALTERNATE_PUSH_PULL, PinMode.ALTERNATE_OPEN_DRAIN)
 #: Mode by CNF[1:0] MODE[1:0] (RM0008 table 20); CNF = 11, MODE = 00 is reserved and taken as floating.
 PIN_MODES = tuple((_OUTPUT_MODES if nibble & 3 else _INPUT_MODES)[nibble >> 2] for nibble in range(16))
+#: Modes that want nothing of a pin; a system that saves power makes every pin analog.
+_IDLE_MODES = (PinMode.ANALOG, PinMode.FLOATING)
 
 
 #: From the left.
@@ -119,7 +121,7 @@ class Gpio(Peripheral):
                 self.chip.warn(f"P{self.name[-1]}{number}: configured while locked: ignored", once=f"{self.name}:lock")
                 continue
             pin = self._pins[number]
-            if pin.holder is not None and nibble != _FLOATING_NIBBLE:
+            if pin.holder is not None and PIN_MODES[nibble] not in _IDLE_MODES:
                 self.chip.warn(
                     f"{pin.name} belongs to {pin.holder}: its GPIO configuration has no effect until it is released",
                     once=f"{pin.name}:held",

@@ -51,6 +51,12 @@ def test_a_configuration_of_a_debug_pin_waits_for_its_release_and_is_warned_of_o
     assert fake_chip.read("GPIOB.IDR") & 8
 
 
+@pytest.mark.parametrize("nibble", range(16))
+def test_every_mode_but_analog_and_floating_input_wants_a_debug_pin(fake_chip: Any, nibble: int) -> None:
+    fake_chip.write("GPIOB.CRL", 0x4444_0444 | nibble << 12)
+    assert ("PB3:held" in fake_chip.warnings) is (nibble not in (0x0, 0x4, 0xC))
+
+
 def test_the_inputs_of_the_debug_port_read_as_pulled_and_its_output_not_until_released(fake_chip: Any) -> None:
     assert fake_chip.read("GPIOA.IDR") == 1 << 13 | 1 << 15  # JTMS and JTDI pulled up, JTCK down (RM0008 31.4.4)
     assert fake_chip.read("GPIOB.IDR") == 1 << 4
