@@ -176,6 +176,7 @@ class GeneralTimer(Peripheral):
 class AdvancedTimer(GeneralTimer):
     """TIM1."""
 
+    INPUTS = (*GeneralTimer.INPUTS, "css")
     OUTPUTS: ClassVar[tuple[str, ...]] = (*_EVENTS, "brk_irq", "up_irq", "trg_com_irq", "cc_irq")
     REGISTERS = _registers(is_advanced=True)
 

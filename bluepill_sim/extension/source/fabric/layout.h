@@ -375,10 +375,12 @@ struct tim {
     uint32_t burst_output; /* by this output */
     uint32_t lock; /* LOCK, once it was written */
     uint32_t is_advanced; /* it is TIM1 */
+    uint32_t is_stopped; /* its clock stands still */
+    uint32_t padding;
     uint8_t pins[9]; /* CH1 to CH4, CH1N to CH3N, ETR, BKIN */
     uint8_t sources[7]; /* the alternate functions of the first seven */
 };
-_Static_assert(sizeof(struct tim) == 736, "tim");
+_Static_assert(sizeof(struct tim) == 744, "tim");
 
 /* What an SPI holds beyond its registers. RM0008 25.3. */
 struct spi {
@@ -399,8 +401,9 @@ struct spi {
     uint32_t selected; /* parts that are selected */
     uint32_t far; /* the word that a master outside sends; 0: none */
     uint32_t wants_words; /* somebody has subscribed to words */
+    uint32_t is_stopped; /* its clock stands still */
 };
-_Static_assert(sizeof(struct spi) == 120, "spi");
+_Static_assert(sizeof(struct spi) == 128, "spi");
 
 /* What an I2C holds beyond its registers. RM0008 26.3. */
 struct i2c {
@@ -434,8 +437,10 @@ struct i2c {
     uint32_t offered[3]; /* the levels that they were last given */
     uint32_t counter; /* address of CNDTR of the DMA channel that it receives by */
     uint32_t far_hz; /* bits a second of a master outside */
+    uint32_t is_stopped; /* 1: its clock stands still; 2: that of the timeout does */
+    uint64_t stopped_ns; /* since when: times of what comes meanwhile are this one */
 };
-_Static_assert(sizeof(struct i2c) == 152, "i2c");
+_Static_assert(sizeof(struct i2c) == 168, "i2c");
 
 /* A level that goes up every `period` ticks, and down `high` ticks later. */
 struct wave {
