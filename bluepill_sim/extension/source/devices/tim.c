@@ -452,7 +452,6 @@ static void resume_clock(struct device *device)
     tim->is_stopped = 0;
     tim->ticks.ns = grid.ns;
     tim->ticks.tick = tim->at - tick_at(&grid, now_ns(device->fabric));
-    forget_outputs(device);
     take_what_waits(device);
 }
 
