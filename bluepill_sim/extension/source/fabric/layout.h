@@ -151,6 +151,24 @@ struct shared {
     uint32_t bfar;
     uint32_t demcr;
     uint32_t dbgmcu_cr;
+    uint32_t dfsr;
+    uint32_t actlr;
+    uint32_t dwt_control;
+    uint32_t fp_control;
+    uint32_t fp_remap;
+    uint32_t itm_enables;
+    uint32_t itm_privileges;
+    uint32_t itm_control;
+    uint32_t itm_is_open;
+    uint32_t tpiu_size;
+    uint32_t tpiu_prescaler;
+    uint32_t tpiu_protocol;
+    uint32_t tpiu_formatter;
+    uint32_t dwt_counts[5]; /* CPICNT, EXCCNT, SLEEPCNT, LSUCNT, FOLDCNT: they only store */
+    uint32_t dwt_comp[4];
+    uint32_t dwt_mask[4];
+    uint32_t dwt_function[4];
+    uint32_t fp_comp[8]; /* six of instructions, two of literals */
     struct ramp tick; /* SysTick's counter: its limit is the reload value */
     struct ramp cyccnt;
     uint32_t hears_ticks; /* Python wants to know when SysTick is set */
@@ -162,7 +180,7 @@ struct shared {
     struct fault fault;
     struct record last[32];
 };
-_Static_assert(sizeof(struct shared) == 1568, "shared");
+_Static_assert(sizeof(struct shared) == 1720, "shared");
 
 /* The pins of one port, a bit each. RM0008 9.1, table 20. */
 struct port {

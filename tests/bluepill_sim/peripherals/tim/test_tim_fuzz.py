@@ -95,4 +95,3 @@ def test_random_writes_end_alike_in_other_slices(tmp_path: Path, seed: int) -> N
     whole = play(tmp_path, seed, 120, 0)
     assert play(tmp_path, seed, 120, 1 + seed) == whole
     assert whole[2], "no pin has moved"
-

@@ -12,8 +12,8 @@ import pytest
 
 pytest.importorskip("unicorn")
 
+from tests.bluepill_sim.board.hostile import Story
 from tests.bluepill_sim.conftest import WALL_CLOCK_S
-from tests.bluepill_sim.hostile import Story
 
 pytestmark = pytest.mark.usefixtures("watchdog")
 #: What drives a robot.
