@@ -257,6 +257,7 @@ WIRING: dict[str, tuple[int | str, ...]] = {
     "RTC.alarm": ("EXTI.rtc_alarm", "BKP.alarm", "PWR.alarm"),
     "RTC.second": ("BKP.second",),
     "IWDG.lsi": ("RCC.lsi",),
+    "RCC.css": ("TIM1.css",),
     "USB.wakeup": ("EXTI.usb_wakeup",),
     **_DMA1_REQUESTS,
     # Triggers: of other timers (RM0008 tables 82 and 86), of both ADCs' regular and injected groups (67 and 68).

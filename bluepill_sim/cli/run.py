@@ -20,6 +20,7 @@ from bluepill_sim.cli.driving import (
     warn_on_stderr,
 )
 from bluepill_sim.cli.quantities import option, time_option
+from bluepill_sim.cli.stimuli import open_traces
 from bluepill_sim.core.halts import ChipReached
 from simbase.timing import NS_PER_MS, NS_PER_S, Nanos, Reason
 from simbase.units import BAUD
@@ -36,6 +37,7 @@ Examples:
   p2os mcu run mine.elf                          one second of virtual time
   p2os mcu run mine.elf --for 2s --uart log.txt  what it prints goes to a file
   p2os mcu run mine.elf --realtime --uart pty:   talk to it with any terminal program, until Ctrl-C
+  p2os mcu run mine.elf --itm log.txt            what ITM_SendChar prints, with times
   p2os mcu run mine.elf --drive PA6=1@500ms      something comes before a sensor
   p2os mcu run mine.elf --drive PA0=1.65V        what the ADC sees on a pin
   p2os mcu run mine.elf --until "pin PC13 low"   up to an event
@@ -78,6 +80,13 @@ def run(
         int | None,
         option(BAUD, "--usart-baud", purpose="Speed of USART1's far end; unset follows the program.", above_zero=True),
     ] = None,
+    itm: Annotated[
+        Path | None,
+        typer.Option("--itm", help="What it writes to the ITM's ports, as text with times.", metavar="FILE"),
+    ] = None,
+    swo: Annotated[
+        Path | None, typer.Option("--swo", help="The same as the packets that a probe receives on SWO.", metavar="FILE")
+    ] = None,
     strict: Annotated[bool, typer.Option("--strict", help="The first warning ends the run.")] = False,
 ) -> None:
     """Boot a firmware."""
@@ -85,6 +94,7 @@ def run(
     board = BluePill(firmware, strict=strict)
     board.usart1.far_baud = usart_baud
     changes = parse_changes(drive or [], board)
+    traces = open_traces(board, itm, swo)
     warn_on_stderr(board)
     console = open_console(uart)
     carry = connect(console, board.usart1)
@@ -100,6 +110,8 @@ def run(
                 run_until(board, until, end_ns, schedule.advance_to)
         finally:
             console.close()
+            for trace in traces:
+                trace.close()
             if uart == "-" and board.usart1.unread and not board.usart1.unread.endswith(b"\n"):
                 typer.echo("")
     print_status(summary(board))

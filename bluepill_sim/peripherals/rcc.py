@@ -129,7 +129,7 @@ class Rcc(Peripheral):
     KIND = LISTENER
     HAS_BYTE_LANES = True
     STATE = ("_ready_at", "_illegal", "_nmi_ns", "_keeps_lsi", "crystal_works", "_shown")
-    OUTPUTS = ("irq",)
+    OUTPUTS = ("irq", "css")
     INPUTS = ("lsi",)
     REGISTERS = (
         Register(
@@ -316,6 +316,8 @@ class Rcc(Peripheral):
             self.words[CIR] |= CSSF
             self._nmi_ns = self.chip.now_ns + NMI_AGAIN_NS
             self.chip.signal("nmi")
+            self.set_output("css", True)
+            self.set_output("css", False)
         elif was_ready and in_use:
             self.chip.warn("HSE has failed under SYSCLK, and RCC_CR CSSON is 0: the core stops", once="RCC:hse")
             self.chip.signal("no clock")
