@@ -11,7 +11,6 @@ import typer
 from bluepill_sim.board import BluePill
 from bluepill_sim.cli.driving import print_status
 from bluepill_sim.parts.attached import words_of
-from bluepill_sim.parts.picture import Picture
 from bluepill_sim.parts.registry import PARTS, attach, parse_part, part_class
 from simbase.errors import FileError
 
@@ -24,8 +23,6 @@ Examples:
 """
 #: Of each method, the bus that a part with it can hang on.
 _BUSES = {"exchange": "SPI", "start": "I2C", "sent": "USART", "join": "CAN"}
-#: Dots of a PNG for one of a picture: small pictures are enlarged to about so many.
-_WIDTH = 512
 
 
 def register(app: typer.Typer) -> None:
@@ -76,16 +73,11 @@ def show_parts(board: BluePill, folder: Path | None) -> None:
             _write(folder, name, part)
 
 
-def scale_of(picture: Picture) -> int:
-    """Return how much a picture is enlarged for a file."""
-    return max(1, _WIDTH // picture.width)
-
-
 def _write(folder: Path, name: str, part: Any) -> None:
     files: dict[str, bytes] = dict(part.files()) if hasattr(part, "files") else {}
     if hasattr(part, "picture"):
         picture = part.picture()
-        files["png"] = picture.png(scale_of(picture))
+        files["png"] = picture.png(picture.scale())
     try:
         for kind, data in files.items():
             folder.mkdir(parents=True, exist_ok=True)

@@ -13,6 +13,8 @@ Colour = tuple[int, int, int]
 #: The dots of a braille character by row and column, as bits.
 _DOTS = ((0x01, 0x08), (0x02, 0x10), (0x04, 0x20), (0x40, 0x80))
 _BRAILLE = 0x2800
+#: chosen: what a page shows well.
+_WIDTH = 512
 
 
 @dataclass(frozen=True, slots=True)
@@ -25,6 +27,10 @@ class Picture:
     def width(self) -> int:
         """How many dots a row has."""
         return len(self.rows[0])
+
+    def scale(self) -> int:
+        """Return how much it is enlarged for a person: to about 512 dots."""
+        return max(1, _WIDTH // self.width)
 
     def png(self, scale: int = 1) -> bytes:
         """Return it as a PNG file; each dot is a square of `scale` by `scale`."""

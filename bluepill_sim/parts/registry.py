@@ -25,6 +25,8 @@ from simbase.errors import shown
 
 #: The entry points of others.
 GROUP = "p2os.parts"
+#: What the modules' names of users' files begin with.
+OF_USERS = "p2os_part_"
 _HINT = "NAME,KEY=VALUE,... such as ssd1306,on=I2C1 or ./mine.py:Class,on=I2C1"
 _FLAGS = {"true": True, "yes": True, "1": True, "false": False, "no": False, "0": False}
 
@@ -175,7 +177,7 @@ def part_class(kind: str, folder: Path = Path()) -> Callable[..., Any]:
 
 def _class_in(path: Path, name: str) -> Callable[..., Any]:
     """Return a class of a Python file, which is loaded once."""
-    key = f"p2os_part_{path.stem}"
+    key = OF_USERS + path.stem
     module = sys.modules.get(key)
     if module is None or Path(module.__file__ or "") != path.absolute():
         spec = importlib.util.spec_from_file_location(key, path.absolute())
@@ -217,7 +219,9 @@ def _converted(value: object, wanted: Any, where: str, folder: Path) -> object:
     try:
         if typing.get_origin(wanted) in {tuple, list}:
             inner = typing.get_args(wanted)[0]
-            items = value.split("+") if isinstance(value, str) else value if isinstance(value, list) else [value]
+            items = (
+                value.split("+") if isinstance(value, str) else value if isinstance(value, list | tuple) else [value]
+            )
             return tuple(_converted(item, inner, where, folder) for item in items)
         if wanted is bool:
             return value if isinstance(value, bool) else _FLAGS[str(value).lower()]

@@ -13,7 +13,7 @@ from bluepill_sim.parts.attached import PartError
 from bluepill_sim.parts.registry import PARTS, PartSpec, attach, build, parse_part, part_class
 from p2os.cli.main import run
 
-PROGRAM = Path(__file__).parents[1] / "firmware" / "parts.elf"
+PROGRAM = Path(__file__).parents[2] / "firmware" / "parts.elf"
 ATTACHED = (
     "ssd1306,on=I2C1", "mpu6050,on=I2C1,int=PB1", "24c02,on=I2C1", "sd-card,on=SPI1,select=PA4",
     "hc-sr04,trig=PB8,echo=PB9,distance_m=0.5", "servo,signal=PA0", "ws2812,din=PA8,leds=3",
@@ -110,7 +110,7 @@ def test_the_result_depends_neither_on_slices_nor_on_a_snapshot_in_between(finis
 
 
 def test_every_part_that_ships_is_found_and_has_a_section_in_its_page() -> None:
-    page = (Path(__file__).parents[3] / "docs" / "parts.md").read_text(encoding="utf-8")
+    page = (Path(__file__).parents[4] / "docs" / "parts.md").read_text(encoding="utf-8")
     for kind, row in PARTS.items():
         assert callable(part_class(kind))
         assert f"`{kind}`" in page, row
