@@ -19,6 +19,7 @@ from bluepill_sim.cli.driving import (
     summary,
     warn_on_stderr,
 )
+from bluepill_sim.cli.parts import attach_parts, show_parts
 from bluepill_sim.cli.quantities import option, time_option
 from bluepill_sim.cli.stimuli import open_traces
 from bluepill_sim.core.halts import ChipReached
@@ -41,6 +42,8 @@ Examples:
   p2os mcu run mine.elf --drive PA6=1@500ms      something comes before a sensor
   p2os mcu run mine.elf --drive PA0=1.65V        what the ADC sees on a pin
   p2os mcu run mine.elf --until "pin PC13 low"   up to an event
+  p2os mcu run mine.elf --attach ssd1306,on=I2C1 --parts shots      an OLED, and its picture at the end
+  p2os mcu run mine.elf --attach ./mine.py:Sensor,on=I2C1,x=3       a part of your own
 """
 
 #: chosen: how often typed input reaches a running program, and its time is held back to the clock.
@@ -88,6 +91,13 @@ def run(
         Path | None, typer.Option("--swo", help="The same as the packets that a probe receives on SWO.", metavar="FILE")
     ] = None,
     strict: Annotated[bool, typer.Option("--strict", help="The first warning ends the run.")] = False,
+    attach: Annotated[
+        list[str] | None,
+        typer.Option(help="Attach a part; repeatable. `p2os mcu parts` lists them.", metavar="PART,KEY=VALUE,..."),
+    ] = None,
+    parts_folder: Annotated[
+        Path | None, typer.Option("--parts", help="Where pictures and files of parts go at the end.", metavar="FOLDER")
+    ] = None,
 ) -> None:
     """Boot a firmware."""
     end_ns = span_ns if span_ns is not None else _FOR_EVER_NS if realtime else NS_PER_S
@@ -96,6 +106,7 @@ def run(
     changes = parse_changes(drive or [], board)
     traces = open_traces(board, itm, swo)
     warn_on_stderr(board)
+    attach_parts(board, attach or [])
     console = open_console(uart)
     carry = connect(console, board.usart1)
     if uart == "pty:":
@@ -114,6 +125,7 @@ def run(
                 trace.close()
             if uart == "-" and board.usart1.unread and not board.usart1.unread.endswith(b"\n"):
                 typer.echo("")
+    show_parts(board, parts_folder)
     print_status(summary(board))
     if print_fault(board):
         raise typer.Exit(1)

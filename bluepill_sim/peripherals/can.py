@@ -233,6 +233,11 @@ class Can(Peripheral):
         """Whether something outside sends on a pin: a network does so on RX."""
         return self._joined is not None and pin == self._pin_names[0]
 
+    @property
+    def joined(self) -> CanNetwork | None:
+        """The network that it was put on; None: it is alone."""
+        return self._joined
+
     # For the network.
 
     @property

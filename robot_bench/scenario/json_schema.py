@@ -38,6 +38,7 @@ def scenario_schema() -> Json:
         **{name: _table(TABLES[f"[{name}]"]) for name in ("direct", "adapter", "controller")},
         "in_world": {"type": "object", "additionalProperties": within},
         **{name: {"type": "array", "items": _table(TABLES[f"[[{name}]]"])} for name in ("obstacle", "fault")},
+        "part": {"type": "array", "items": _table(TABLES["[[part]]"]) | {"additionalProperties": True}},
         "when": {"type": "array", "items": _table(WHEN_KEYS, may_lack=("name", "fault"))},
         "goal": {"type": "array", "items": {"oneOf": goals}},
         "sweep": _SWEEP,

@@ -16,7 +16,9 @@ from pathlib import Path
 from typing import TypedDict, Unpack, cast
 
 from adapter_sim.codec import BitOrder
+from adapter_sim.pinout import load_pinout
 from adapter_sim.settings import AdapterSettings
+from bluepill_sim.parts.registry import PartSpec
 from p2os.errors import ScenarioError
 from p2os.pioneer.body.factory import BEST, BODY_CHOICES
 from p2os.pioneer.controller import ControllerSettings, SonarPerSip
@@ -28,7 +30,7 @@ from p2os.pioneer.world.start_places import refuse_start
 from p2os.robots.parameters import RobotParameters, load_parameters
 from p2os.toml_file import is_file
 from robot_bench.direct.robot import DirectSettings
-from robot_bench.scenario import fault_script, when_script, world_script
+from robot_bench.scenario import fault_script, plugged_parts, when_script, world_script
 from robot_bench.scenario.fault_script import FaultChange, load_faults
 from robot_bench.scenario.goals.judging import Goal, load_goal
 from robot_bench.scenario.goals.kinds import KINDS
@@ -68,6 +70,7 @@ _TOP = (
     Key(name="controller", kind="table"),
     Key(name="in_world", kind="table"),
     Key(name="obstacle", kind="tables"),
+    Key(name="part", kind="tables"),
     Key(name="fault", kind="tables"),
     Key(name="when", kind="tables"),
     Key(name="goal", kind="tables"),
@@ -114,6 +117,7 @@ TABLES: Mapping[str, tuple[Key, ...]] = {
     "[controller]": _CONTROLLER,
     "[in_world.NAME]": _IN_WORLD,
     "[[obstacle]]": world_script.KEYS,
+    "[[part]]": plugged_parts.KEYS,
     "[[fault]]": fault_script.KEYS,
     "[[when]]": tuple(key for key in when_script.KEYS if key not in world_script.KEYS),
     **{f"[[goal]] {name}": kind.keys for name, kind in KINDS.items()},
@@ -173,6 +177,8 @@ class Scenario:
     adapter: AdapterSettings = field(default_factory=AdapterSettings)
     adapter_core: str = "model"
     controller: ControllerSettings = field(default_factory=ControllerSettings)
+    #: What is plugged into the board besides the robot.
+    parts: tuple[PartSpec, ...] = ()
     changes: tuple[Change, ...] = ()
     faults: tuple[FaultChange, ...] = ()
     whens: tuple[When, ...] = ()
@@ -348,6 +354,9 @@ def _build(table: Table, text: str, path: Path, where: Place, firmware: Path | N
         adapter=_adapter(cast("Table", table.get("adapter", {})), round(threshold_m * 1e6), where),
         adapter_core=str(cast("Table", table.get("adapter", {})).get("core", "model")),
         controller=_controller(cast("Table", table.get("controller", {})), path, where),
+        parts=plugged_parts.load_parts(
+            cast("list[Table]", table.get("part", [])), path.parent, _taken(own_robot), where
+        ),
         changes=changes,
         seeds=load_seeds(table, where.at("seeds")),
         axes=load_axes(cast("Table", table.get("sweep", {})), where),
@@ -358,6 +367,13 @@ def _build(table: Table, text: str, path: Path, where: Place, firmware: Path | N
         where=where,
     )
     return _apply_in_world(scenario, in_world.get(scenario.world, {}))
+
+
+def _taken(own_robot: OwnRobot | None) -> dict[str, str]:
+    """Return the chip's pins that a robot has, with its signals."""
+    if own_robot is None:
+        return {wire.bluepill: wire.name for wire in load_pinout().wires}
+    return {wire.pin: wire.name for wire in own_robot.robot.signals}
 
 
 def _parameters(robot: str, where: Place) -> RobotParameters:
