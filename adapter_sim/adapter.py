@@ -171,7 +171,7 @@ class Adapter(Stateful):
         self.settings = settings = settings or AdapterSettings()
         self.on_event = on_event
         self.samples = SampleClock(settings.sample_period_ns)
-        self._driver = Driver(settings, parameters)
+        self._driver = Driver(settings, parameters, full_steps=1 << pinout.value("motor1").width - 1)
         self.distances = Distances(
             len(pinout.with_role(WireRole.DISTANCE)),
             threshold_um=threshold_um(settings.threshold_um, parameters),
@@ -305,7 +305,7 @@ class Adapter(Stateful):
             now = self._deadline
             if now < self._other and not self._has_pending_request and self.inputs.is_quiet(now):
                 self._now = now
-                self.samples.was_quiet(now)
+                self.samples.was_quiet(now, may_suspend=self.inputs.change_by_edges_only)
                 self._deadline = self.samples.due(self._other)
             else:
                 self.samples.resume(now)
