@@ -17,7 +17,7 @@ from typing import TypedDict, Unpack, cast
 
 from adapter_sim.codec import BitOrder
 from adapter_sim.pinout import load_pinout
-from adapter_sim.settings import AdapterSettings
+from adapter_sim.settings import AdapterSettings, MotorCommand
 from bluepill_sim.parts.registry import PartSpec
 from p2os.errors import ScenarioError
 from p2os.pioneer.body.factory import BEST, BODY_CHOICES
@@ -85,11 +85,13 @@ _DIRECT = (
     Key(name="ramp_mm_s2", kind="number", least=0, most=1_000_000),
     Key(name="sensor_period_ms", kind="whole", least=1, most=60_000),
     Key(name="encoder_period_ms", kind="whole", least=1, most=60_000),
+    Key(name="motor_command", kind="text", choices=tuple(MotorCommand)),
     Key(name="bit_order", kind="text", choices=tuple(BitOrder)),
 )
 _ADAPTER = (
     Key(name="core", kind="text", choices=ADAPTER_CORES),
     Key(name="step_mm_s", kind="number", least=0.001, most=10_000),
+    Key(name="motor_command", kind="text", choices=tuple(MotorCommand)),
     Key(name="bit_order", kind="text", choices=tuple(BitOrder)),
     Key(name="motor_meaning", kind="text", choices=("wheels", "linear_angular")),
     Key(name="max_velocity_mm_s", kind="whole", least=0, most=32_767),
@@ -454,6 +456,8 @@ def _direct(part: Table, where: Where) -> DirectSettings:
         settings = replace(settings, sensor_period_ns=cast("int", part["sensor_period_ms"]) * NS_PER_MS)
     if "encoder_period_ms" in part:
         settings = replace(settings, encoder_period_ns=cast("int", part["encoder_period_ms"]) * NS_PER_MS)
+    if "motor_command" in part:
+        settings = replace(settings, motor_command=MotorCommand(str(part["motor_command"])))
     if "bit_order" in part:
         settings = replace(settings, bit_order=BitOrder(str(part["bit_order"])))
     return settings
