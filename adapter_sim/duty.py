@@ -40,15 +40,29 @@ class PeriodicLevel(Protocol):
     """A level that goes up every `period` ticks and down `high` ticks later; tick `at` is at `ns`."""
 
     @property
-    def ns(self) -> Nanos: ...
+    def ns(self) -> Nanos:
+        """Return when tick `at` is."""
+        ...
+
     @property
-    def at(self) -> int: ...
+    def at(self) -> int:
+        """Return the ticks from a rising edge to `ns`."""
+        ...
+
     @property
-    def period(self) -> int: ...
+    def period(self) -> int:
+        """Return the ticks from a rising edge to the next."""
+        ...
+
     @property
-    def high(self) -> int: ...
+    def high(self) -> int:
+        """Return the ticks at level 1."""
+        ...
+
     @property
-    def ticks_hz(self) -> int: ...
+    def ticks_hz(self) -> int:
+        """Return the ticks a second."""
+        ...
 
 
 #: What a wire does from one time on until before another: when, and the level or wave from then on. It is known for
