@@ -230,6 +230,37 @@ def test_a_restored_usart_sends_on_the_pins_that_it_was_remapped_to(
     assert sent == [9]
 
 
+def test_characters_come_in_one_go_as_many_as_were_sent_alike(fake_chip: Any) -> None:
+    set_up(fake_chip)
+    runs: list[tuple[list[tuple[int, int]], int, bytes]] = []
+    usart = fake_chip.parts.usart(1)
+    usart.deliver()
+    usart.sinks[:] = [lambda rows: runs.append((list(rows), rows.bit_ns, rows.data))]
+    sent = []
+    for word, brr, control in (
+        (0x41, BRR, 0),
+        (0x42, BRR, 0),
+        (0x143, BRR, M),
+        (0x144, 2 * BRR, M),
+        (0x45, 2 * BRR, 0),
+    ):
+        fake_chip.write("USART1.BRR", brr)
+        fake_chip.write("USART1.CR1", UE | TE | control)
+        fake_chip.write("USART1.DR", word)
+        fake_chip.parts.usart(1).fabric.run_events(fake_chip.now_ns + 10**6)
+        fake_chip.now_ns += 10**6
+        sent.append(word)
+    usart.deliver()
+    assert [word for rows, *_ in runs for word, _ in rows] == sent
+    bit_ns = BRR * 10**9 // usart.native.clock_hz
+    assert [(bit, data) for _, bit, data in runs] == [
+        (bit_ns, b"AB"), (bit_ns, b"C"), (2 * bit_ns, b"D"), (2 * bit_ns, b"E"),
+    ]  # fmt: skip
+    first, second = runs[0][0]
+    assert (first[0], second[0]) == (0x41, 0x42)
+    assert second[1] - first[1] == 10**6
+
+
 def test_a_remap_before_the_start_connects_later(fake_chip: Any) -> None:
     fake_chip.write("AFIO.MAPR", 1 << 2)
     fake_chip.write("GPIOB.CRL", 0x4B44_4444)
