@@ -33,7 +33,7 @@ HSION, HSIRDY, HSEON, HSERDY, HSEBYP, PLLON, PLLRDY = (1 << n for n in (0, 1, 16
 #: chosen: so long a forbidden setting must last to be warned of; ST's own code passes through some.
 ILLEGAL_NS = 1_000_000
 #: CFGR's PLLSRC, PLLXTPRE and PLLMUL: fixed while the PLL is on.
-PLLSRC, PLLXTPRE = 1 << 16, 1 << 17
+PLLSRC, PLLXTPRE, _USBPRE = 1 << 16, 1 << 17, 1 << 22
 _PLL_SETTINGS = bits((21, 16))
 _SW = bits((1, 0))
 #: MCO: 0xx is no clock, then SYSCLK, HSI, HSE, PLL / 2.
@@ -561,6 +561,8 @@ class Rcc(Peripheral):
         clocks.sysclk_hz, clocks.hclk_hz = sysclk_hz, hclk_hz
         clocks.pclk1_hz, clocks.pclk2_hz = hclk_hz // divider1, hclk_hz // divider2
         clocks.adc_divider = _ADC_DIVIDERS[(cfgr >> 14) & 3]
+        pll_hz = self._pll_hz() if self.words[CR] & PLLRDY else 0
+        clocks.usb_hz = pll_hz if cfgr & _USBPRE else pll_hz * 2 // 3
         clocks.timer1_hz = clocks.pclk1_hz * (1 if divider1 == 1 else 2)
         clocks.timer2_hz = clocks.pclk2_hz * (1 if divider2 == 1 else 2)
         clocks.rtcclk_hz = self._rtcclk_hz()
