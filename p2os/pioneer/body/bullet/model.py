@@ -195,6 +195,13 @@ def add_robot(parameters: RobotParameters, pose: Pose, client: int) -> tuple[int
         linkJointAxis=[(0.0, 1.0, 0.0)] * 3,
         physicsClientId=client,
     )
+    if parameters.rotor_inertia_kg_m2:  # chosen: it turns as a part of the wheel, since Bullet's joints have none
+        own = body.wheel_mass_kg * radius**2 * 2 / 5
+        for link in (LEFT, RIGHT):
+            pybullet.changeDynamics(
+                robot, link, localInertiaDiagonal=(own, own + parameters.rotor_inertia_kg_m2, own),
+                physicsClientId=client,
+            )  # fmt: skip
     frictions = {-1: HULL_FRICTION, LEFT: WHEEL_FRICTION, RIGHT: WHEEL_FRICTION, CASTER: 0.0}
     for link, friction in frictions.items():
         pybullet.changeDynamics(
