@@ -132,7 +132,8 @@ class DirectRobot(Stateful):
                 self._asked = (left.asked, right.asked)
                 self._tell(start, "command", f"motors {left.asked}, {right.asked}")
             alike = wanted - self._steps if left.is_steady and right.is_steady else 1
-            for _ in range(alike):
+            stood = body.stand_still(alike) if speeds == (0.0, 0.0) else 0
+            for _ in range(alike - stood):
                 body.step(*speeds)
             self._steps += alike
 
