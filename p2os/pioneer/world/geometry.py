@@ -224,7 +224,7 @@ def _nearest(points: Polygon, polygon: Polygon) -> float:
             share = ((x - ax) * ex + (y - ay) * ey) / length if length > 0.0 else 0.0
             share = 0.0 if share < 0.0 else min(share, 1.0)
             found = hypot(x - ax - share * ex, y - ay - share * ey)
-            if found < nearest:
+            if found < nearest:  # noqa: PLR1730 - a call a point
                 nearest = found
     return nearest
 
