@@ -132,6 +132,7 @@ class Chip(Stateful):
         self.engine, self.processor = make_core(self._measure, memory)
         self.processor.on_fault = on_fault
         self.processor.on_deep_sleep = self._begin_low_power
+        self.processor.on_entry = self._act_on_due
         self.pins = make_pins(self)
         self.fabric = self.pins.fabric
         self.uses_native_core = join_fabric(self.engine, self.fabric)
@@ -425,14 +426,16 @@ class Chip(Stateful):
         self._drop_written_code()
         if self._requested_reset is not None:
             self.reset(self._requested_reset)
-        cycle = self.engine.cycle
+        self._act_on_due(self.engine.cycle)
+        self._drop_written_code()
+        if self._requested_reset is not None:
+            self.reset(self._requested_reset)
+
+    def _act_on_due(self, cycle: int) -> None:
         systick = self.processor.systick
         if systick.next_cycle is not None and cycle >= systick.next_cycle:
             systick.advance_to(cycle)
         self.fabric.run_events(self._clock.ns_of(cycle))
-        self._drop_written_code()
-        if self._requested_reset is not None:
-            self.reset(self._requested_reset)
 
     def _drop_written_code(self) -> None:
         for address, size in self._written_code:
