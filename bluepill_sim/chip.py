@@ -424,9 +424,7 @@ class Chip(Stateful):
         if self._flash_repairs:
             self._repair_flash()
         self._drop_written_code()
-        if self._requested_reset is not None:
-            self.reset(self._requested_reset)
-        self._act_on_due(self.engine.cycle)
+        self._act_on_due(self.engine.cycle)  # before a reset that the last block has asked for: C does so too
         self._drop_written_code()
         if self._requested_reset is not None:
             self.reset(self._requested_reset)
