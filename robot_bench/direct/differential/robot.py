@@ -15,7 +15,7 @@ Invariant: at time t the body has made every step that ended at or before t.
 import math
 from collections.abc import Callable, Sequence
 
-from p2os.pioneer.body.contract import RobotBody
+from p2os.pioneer.body.contract import RobotBody, WheelAngles
 from robot_bench.direct.differential.analog import Cell, volts_at
 from robot_bench.direct.differential.bridge import HBridge
 from robot_bench.direct.differential.description import SIDES, Differential
@@ -47,7 +47,7 @@ class DifferentialRobot(Stateful):
 
     STATE = (
         "body", "train", "cell", "_encoders", "_bridges", "_steps", "_angles", "_next_distance", "_stalled",
-        "_steps_of_volts",
+        "_steps_of_volts", "_asked", "_stepped",
     )  # fmt: skip
 
     def __init__(
@@ -70,6 +70,10 @@ class DifferentialRobot(Stateful):
         self._steps_of_volts: dict[str, int] = {}
         self._steps = 0
         self._angles = (0.0, 0.0)
+        #: Set once where a scene steps the body together with others'; it moves a step later then.
+        self.is_stepped_by_others = False
+        #: Speeds of the motors for the step that others make next, rad/s, and the angles after it, rad.
+        self._asked = self._stepped = (0.0, 0.0)
         self._next_distance: Nanos = 0
         self._stalled = (False, False)
         #: Takes a line of the state log: (ns, what, detail).
@@ -90,6 +94,15 @@ class DifferentialRobot(Stateful):
             self._step()
         return Reached(limit)
 
+    def next_setpoints(self) -> tuple[float, float]:
+        """Return the rim-speed set-points of the body's next step, m/s, for who steps it together with others."""
+        left_radps, right_radps = self._asked
+        return left_radps * self._radius_m, right_radps * self._radius_m
+
+    def take_step(self, wheels: WheelAngles) -> None:
+        """Take the wheels' angles after a step that was made with `next_setpoints`."""
+        self._stepped = wheels.left_angle_rad, wheels.right_angle_rad
+
     def _step(self) -> None:
         body, train, cell, battery = self.body, self.train, self.cell, self._robot.battery
         begin, end = self._steps * body.dt_ns, (self._steps + 1) * body.dt_ns
@@ -97,11 +110,18 @@ class DifferentialRobot(Stateful):
         cell.volts = train.supply_v(left, right, cell.source_v, battery.resistance_ohm, battery.idle_current_a)
         made = train.step(left, right, cell.volts)
         cell.give(made.supply_a + battery.idle_current_a, self._dt_s)
-        turned = body.step(made.left_radps * self._radius_m, made.right_radps * self._radius_m)
+        asked_l, asked_r = made.left_radps, made.right_radps
+        if self.is_stepped_by_others:
+            # The step that is over was made with what the wires said in the one before.
+            (asked_l, asked_r), self._asked = self._asked, (asked_l, asked_r)
+            turned_l, turned_r = self._stepped
+        else:
+            turned = body.step(asked_l * self._radius_m, asked_r * self._radius_m)
+            turned_l, turned_r = turned.left_angle_rad, turned.right_angle_rad
         angle_l, angle_r = self._angles
-        self._angles = turned_l, turned_r = turned.left_angle_rad, turned.right_angle_rad
-        train.left_radps = self._held(made.left_radps, (turned_l - angle_l) / self._dt_s, train.left_radps)
-        train.right_radps = self._held(made.right_radps, (turned_r - angle_r) / self._dt_s, train.right_radps)
+        self._angles = turned_l, turned_r
+        train.left_radps = self._held(asked_l, (turned_l - angle_l) / self._dt_s, train.left_radps)
+        train.right_radps = self._held(asked_r, (turned_r - angle_r) / self._dt_s, train.right_radps)
         self._steps += 1
         self._encoders[0].turn_to(turned_l, end, body.dt_ns)
         self._encoders[1].turn_to(turned_r, end, body.dt_ns)
