@@ -120,7 +120,7 @@ class _Pool:
             self._lent[id(bench)] = key, begin
             return bench
         self.built += 1
-        bench = Bench(scenario)
+        bench = Bench.from_scenario(scenario)
         if booted is not None:
             bench.expect(booted, within=_BOOT_WITHIN)
         self._lent[id(bench)] = key, bench.snapshot()
