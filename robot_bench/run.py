@@ -11,6 +11,7 @@ Invariant: whatever raises, the trace has its last line (unless the disk takes n
 a report can be made of the folder.
 """
 
+import base64
 import contextlib
 import hashlib
 import math
@@ -20,6 +21,7 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import TYPE_CHECKING, TypeVar
 
+from bluepill_sim.parts.attached import AttachedParts
 from bluepill_sim.parts.serial_port import QUIET_NS
 from p2os.event_log import logger
 from p2os.pioneer.body.factory import resolve_body
@@ -387,6 +389,7 @@ def _conclude(
             "goals_met": goals.met,
             "goals_not_judged": goals.not_judged,
             "notes": notes(bench, end, pacer),
+            "parts": parts_of(bench.chip),
             "last_blocks": last_blocks(bench, end, passed=passed),
             "worst_lag_ms": None if pacer is None else round(pacer.worst_lag_ns / NS_PER_MS, 1),
         }
@@ -448,6 +451,19 @@ def _removed(folder: Path) -> Artefacts:
     outcome = outcome_of(read_run(folder))
     remove_run(folder)
     return Artefacts(outcome=outcome, report=folder / REPORT_NAME)
+
+
+def parts_of(chip: Chip) -> list[Json]:
+    """Return what each part on the board came to: its name, a line, and a picture (PNG, base64) where it has one."""
+    found: list[Json] = []
+    attached: AttachedParts | None = getattr(chip, "attached", None)
+    for name, part in attached.by_name.items() if attached else ():
+        row: Json = {"name": name, "words": part.words() if hasattr(part, "words") else ""}
+        if hasattr(part, "picture"):
+            picture = part.picture()
+            row["png"] = base64.b64encode(picture.png(picture.scale())).decode()
+        found.append(row)
+    return found
 
 
 def _figures(bench: Bench | RemoteBench, end: Nanos, wall_s: float) -> Json:

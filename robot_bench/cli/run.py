@@ -8,14 +8,12 @@ from typing import Annotated
 
 import typer
 
-from p2os.cli.held_robot import hold_robot
 from p2os.cli.help_pages import BENCH, VerbPage
 from p2os.cli.main import EXIT_INTERRUPTED
 from p2os.cli.names import bodies, urls, worlds
 from p2os.cli.quantities import option
 from p2os.errors import RunFailedError
 from p2os.transport import open_url
-from robot_bench.cli.gdb import debug_bench, debug_port
 from robot_bench.cli.progress import RunDisplay
 from robot_bench.cli.sweep import (
     KEPT,
@@ -216,6 +214,8 @@ def run(
                 coverage=coverage, profile=profile, fail_under=fail_under,
             )  # fmt: skip
         else:
+            from robot_bench.cli.gdb import debug_bench
+
             driver = debug_bench(gdb, is_paced=realtime is not None, on_wait=display.raise_if_interrupted)
             result = run_scenario(wanted, folder, on_progress=display.update, drive=driver, force=force)
     end_with(result, json_output=json_output)
@@ -337,6 +337,9 @@ def drive_port(
         TransportError: The port cannot be opened.
         RunFailedError: The person declined.
     """
+    from p2os.cli.held_robot import hold_robot
+    from robot_bench.cli.gdb import debug_port
+
     scenario = capped(scenario, max_speed_mps)
     transport = open_url(url)
     try:

@@ -45,6 +45,7 @@ def scenario_schema() -> Json:
         "robot": {"oneOf": [{"type": "string"}, {"type": "array", "items": robot}]},
         "in_world": {"type": "object", "additionalProperties": within},
         **{name: {"type": "array", "items": _table((*TABLES[f"[[{name}]]"], ROBOT))} for name in ("obstacle", "fault")},
+        "part": {"type": "array", "items": _table(TABLES["[[part]]"]) | {"additionalProperties": True}},
         "when": {"type": "array", "items": _table((*WHEN_KEYS, ROBOT), may_lack=("name", "fault"))},
         "goal": {"type": "array", "items": {"oneOf": goals}},
         "sweep": _SWEEP,

@@ -16,7 +16,9 @@ from pathlib import Path
 from typing import TypedDict, Unpack, cast
 
 from adapter_sim.codec import BitOrder
-from adapter_sim.settings import AdapterSettings
+from adapter_sim.pinout import load_pinout
+from adapter_sim.settings import AdapterSettings, MotorCommand
+from bluepill_sim.parts.registry import PartSpec
 from p2os.errors import ScenarioError
 from p2os.pioneer.body.factory import BEST, BODY_CHOICES
 from p2os.pioneer.controller import ControllerSettings, SonarPerSip
@@ -28,7 +30,7 @@ from p2os.pioneer.world.start_places import refuse_start, start_places
 from p2os.robots.parameters import RobotParameters, load_parameters
 from p2os.toml_file import is_file
 from robot_bench.direct.robot import DirectSettings
-from robot_bench.scenario import fault_script, when_script, world_script
+from robot_bench.scenario import fault_script, plugged_parts, when_script, world_script
 from robot_bench.scenario.fault_script import FaultChange, load_faults
 from robot_bench.scenario.goals.judging import Goal, load_goal
 from robot_bench.scenario.goals.kinds import KINDS
@@ -69,6 +71,7 @@ _TOP = (
     Key(name="controller", kind="table"),
     Key(name="in_world", kind="table"),
     Key(name="obstacle", kind="tables"),
+    Key(name="part", kind="tables"),
     Key(name="fault", kind="tables"),
     Key(name="when", kind="tables"),
     Key(name="goal", kind="tables"),
@@ -83,11 +86,13 @@ _DIRECT = (
     Key(name="ramp_mm_s2", kind="number", least=0, most=1_000_000),
     Key(name="sensor_period_ms", kind="whole", least=1, most=60_000),
     Key(name="encoder_period_ms", kind="whole", least=1, most=60_000),
+    Key(name="motor_command", kind="text", choices=tuple(MotorCommand)),
     Key(name="bit_order", kind="text", choices=tuple(BitOrder)),
 )
 _ADAPTER = (
     Key(name="core", kind="text", choices=ADAPTER_CORES),
     Key(name="step_mm_s", kind="number", least=0.001, most=10_000),
+    Key(name="motor_command", kind="text", choices=tuple(MotorCommand)),
     Key(name="bit_order", kind="text", choices=tuple(BitOrder)),
     Key(name="motor_meaning", kind="text", choices=("wheels", "linear_angular")),
     Key(name="max_velocity_mm_s", kind="whole", least=0, most=32_767),
@@ -116,6 +121,7 @@ TABLES: Mapping[str, tuple[Key, ...]] = {
     "[controller]": _CONTROLLER,
     "[in_world.NAME]": _IN_WORLD,
     "[[obstacle]]": world_script.KEYS,
+    "[[part]]": plugged_parts.KEYS,
     "[[fault]]": fault_script.KEYS,
     "[[when]]": tuple(key for key in when_script.KEYS if key not in world_script.KEYS),
     **{f"[[goal]] {name}": kind.keys for name, kind in KINDS.items()},
@@ -186,6 +192,8 @@ class Scenario:
     adapter: AdapterSettings = field(default_factory=AdapterSettings)
     adapter_core: str = "model"
     controller: ControllerSettings = field(default_factory=ControllerSettings)
+    #: What is plugged into the board besides the robot.
+    parts: tuple[PartSpec, ...] = ()
     changes: tuple[Change, ...] = ()
     faults: tuple[FaultChange, ...] = ()
     whens: tuple[When, ...] = ()
@@ -387,6 +395,9 @@ def _build(table: Table, text: str, path: Path, where: Place, firmware: Path | N
         adapter=_adapter(cast("Table", table.get("adapter", {})), round(threshold_m * 1e6), where),
         adapter_core=str(cast("Table", table.get("adapter", {})).get("core", "model")),
         controller=_controller(cast("Table", table.get("controller", {})), path, where),
+        parts=plugged_parts.load_parts(
+            cast("list[Table]", table.get("part", [])), path.parent, _taken(own_robot), where
+        ),
         changes=changes,
         seeds=load_seeds(table, where.at("seeds")),
         axes=load_axes(cast("Table", table.get("sweep", {})), where),
@@ -441,6 +452,13 @@ def _model(table: Table, path: Path, where: Place) -> RobotParameters:
     robot = str(table["robot"])
     own = _own_robot(robot, {key: value for key, value in table.items() if key == "pins"}, path, where)
     return own.robot.parameters if own is not None else _parameters(robot, where)
+
+
+def _taken(own_robot: OwnRobot | None) -> dict[str, str]:
+    """Return the chip's pins that a robot has, with its signals."""
+    if own_robot is None:
+        return {wire.bluepill: wire.name for wire in load_pinout().wires}
+    return {wire.pin: wire.name for wire in own_robot.robot.signals}
 
 
 def _parameters(robot: str, where: Place) -> RobotParameters:
@@ -521,6 +539,8 @@ def _direct(part: Table, where: Where) -> DirectSettings:
         settings = replace(settings, sensor_period_ns=cast("int", part["sensor_period_ms"]) * NS_PER_MS)
     if "encoder_period_ms" in part:
         settings = replace(settings, encoder_period_ns=cast("int", part["encoder_period_ms"]) * NS_PER_MS)
+    if "motor_command" in part:
+        settings = replace(settings, motor_command=MotorCommand(str(part["motor_command"])))
     if "bit_order" in part:
         settings = replace(settings, bit_order=BitOrder(str(part["bit_order"])))
     return settings

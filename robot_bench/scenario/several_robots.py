@@ -31,7 +31,7 @@ _PLACE = ("x_m", "y_m", "heading_deg")
 MOST_ROBOTS = 16
 _NAME = re.compile(r"[A-Za-z_][\w.-]{0,31}", re.ASCII)
 #: Lists of a scenario whose tables may name a robot.
-OF_ROBOTS = ("goal", "fault", "when", "obstacle")
+OF_ROBOTS = ("goal", "fault", "when", "obstacle", "part")
 ROBOT = Key(name="robot", kind="text")
 
 
