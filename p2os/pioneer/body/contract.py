@@ -246,6 +246,10 @@ class RobotScene(Protocol):
         """The length of a step."""
         ...
 
+    def name_robots(self, names: Sequence[str]) -> None:
+        """Call the robots otherwise, the first first: names that no thing of the world has."""
+        ...
+
     def reset(self, poses: Sequence[Pose], seed: int) -> None:
         """Let every robot stand still at its pose, in the world as it was made."""
         ...
