@@ -168,7 +168,7 @@ def run(
         if gdb is None:
             result = run_scenario(
                 wanted, folder, speed=realtime, on_progress=display.update, force=force,
-                coverage=coverage, profile=profile, fail_under=fail_under,
+                coverage=coverage, profile=profile, fail_under=fail_under, explained=True,
             )  # fmt: skip
         else:
             driver = debug_bench(gdb, is_paced=realtime is not None, on_wait=display.raise_if_interrupted)
