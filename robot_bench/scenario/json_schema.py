@@ -38,15 +38,15 @@ def scenario_schema() -> Json:
         **{name: _table(TABLES[f"[{name}]"]) for name in ("direct", "adapter", "controller")},
         "in_world": {"type": "object", "additionalProperties": within},
         **{name: {"type": "array", "items": _table(TABLES[f"[[{name}]]"])} for name in ("obstacle", "fault")},
-        "when": {"type": "array", "items": _table(WHEN_KEYS, may_lack=("name", "fault"))},
+        "when": {"type": "array", "items": _table(WHEN_KEYS)},
         "goal": {"type": "array", "items": {"oneOf": goals}},
     }
     return {"$schema": DRAFT, "title": "A scenario of p2os", **top, "properties": properties}
 
 
-def _table(keys: Sequence[Key], *, kind: str = "", may_lack: Sequence[str] = ()) -> Json:
+def _table(keys: Sequence[Key], *, kind: str = "") -> Json:
     properties: Json = {key.name: _key(key) for key in keys}
-    required = [key.name for key in keys if key.required and key.name not in may_lack]
+    required = [key.name for key in keys if key.required]
     if kind:
         properties = {"kind": {"const": kind}} | properties
         required = ["kind", *required]
