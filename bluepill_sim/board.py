@@ -10,7 +10,7 @@ A condition in words is met at the boundary of the very block that makes it true
 whatever the caller's slices; a condition in Python is looked at in steps.
 
     pin PA4 high | pin PA4 low | pin PA4 changes     the level on the wire
-    usart1 sends TEXT                                characters that go out from now on
+    usart1 sends TEXT | usb sends TEXT               characters that go out from now on
     asleep | awake | fault                           what the core is doing
 
 Invariant: results do not depend on how the caller cuts time into slices; a wait
@@ -39,10 +39,12 @@ from bluepill_sim.fabric.subscriptions import EdgeSink, Of, PinSubscription
 from bluepill_sim.memory import Memory
 from bluepill_sim.parts.attached import AttachedParts
 from bluepill_sim.parts.serial_port import Activity, SerialPort
+from bluepill_sim.parts.usb import UsbHost, UsbSerial
 from bluepill_sim.peripherals.can import Can
 from bluepill_sim.peripherals.i2c import I2c
 from bluepill_sim.peripherals.rcc import ResetCause
 from bluepill_sim.peripherals.spi import Spi
+from bluepill_sim.peripherals.usb import Usb
 from bluepill_sim.program.image import Image, load_image
 from bluepill_sim.program.last_blocks import TITLE, shortened
 from bluepill_sim.program.line_table import LineTable, read_lines
@@ -91,7 +93,7 @@ class BluePill(Stateful):
         MissingDependencyError: unicorn, pyelftools or intelhex is not installed.
     """
 
-    STATE = ("chip", "fault", "activity", "_warned", "_usarts", "boot0", "resets", "attached")
+    STATE = ("chip", "fault", "activity", "_warned", "_usarts", "_usb_serial", "boot0", "resets", "attached")
     #: Who listens.
     DERIVED = ("_warning_sinks",)
 
@@ -121,6 +123,11 @@ class BluePill(Stateful):
         self._usarts = tuple(SerialPort(chip.parts.usart(n), self._activity, self._wait_for_bytes) for n in (1, 2, 3))
         #: The parts that were attached by name, and the world that they sense.
         self.attached = AttachedParts(lambda text: chip.pins.warn(text, once=text), chip.request_stop)
+        self._usb = UsbHost(self._run_until)
+        self._usb_serial = UsbSerial(self._usb, self._run_until, chip.request_stop)
+        usb = cast("Usb", chip.parts.by_name["USB"])
+        usb.attach(self._usb)
+        self._usb.join(usb)
         #: How often it was reset since power came up, by cause.
         self.resets: Counter[ResetCause] = Counter()
         chip.on_reset = self._reset_begins
@@ -128,6 +135,7 @@ class BluePill(Stateful):
         chip.pins.is_serial_input = self._is_driven_in_words
         chip.pins["PC13"].board_pull = PinDrive.PULL_UP
         chip.pins["PB2"].board_pull = PinDrive.PULL_DOWN
+        chip.pins["PA12"].board_pull = PinDrive.PULL_UP
 
     # Time.
 
@@ -335,6 +343,16 @@ class BluePill(Stateful):
         return {port.name.lower(): port for port in self._usarts}
 
     @property
+    def usb(self) -> UsbHost:
+        """The host at the USB socket; its cable is plugged in by `plug` or `wait_configured`."""
+        return self._usb
+
+    @property
+    def usb_serial(self) -> UsbSerial:
+        """The serial line of a CDC device at the USB socket."""
+        return self._usb_serial
+
+    @property
     def chip(self) -> Chip:
         """The chip itself, for tools."""
         if self._chip is None:
@@ -533,6 +551,14 @@ class BluePill(Stateful):
             hint="clear boot0 for the flash, or drive PB2 high for the SRAM",
         )
 
+    def _run_until(self, holds: Callable[[], bool], within: Span) -> bool:
+        """Run until something is so, looked at each millisecond; return whether it is."""
+        end_ns = self.now_ns + to_nanos(within)
+        while not holds() and self.now_ns < end_ns:
+            if self.advance_to(min(end_ns, self.now_ns + STEP_NS)).reason is Reason.HALT:
+                break
+        return holds()
+
     def _wait_for_bytes(self, port: SerialPort, pattern: bytes, within: Span) -> None:
         """Run until `pattern` is in what `port` has sent and nobody has taken (`SerialPort.expect`)."""
         if not pattern:
@@ -649,9 +675,9 @@ def _watch(board: BluePill, condition: Condition) -> Iterator[tuple[Callable[[],
         case ["pin", name] if len(words) == 3:
             with _stop_at_pin(board, name.upper(), words[2].lower()) as holds:
                 yield holds, None
-        case [port, "sends"] if len(words) == 3 and port in board.serial_ports:
+        case [name, "sends"] if len(words) == 3 and name in _ports(board):
             sent, text = bytearray(), words[2].encode()
-            with _stop_at_characters(board.serial_ports[port], sent):
+            with _stop_at_characters(_ports(board)[name], sent):
                 yield (lambda: text in sent), None
         case [state] if state in _STATES:
             yield (lambda: _STATES[state](board)), STEP_NS
@@ -687,8 +713,13 @@ def _stop_at_pin(board: BluePill, name: str, what: str) -> Iterator[Callable[[],
         subscription.close()
 
 
+def _ports(board: BluePill) -> dict[str, SerialPort | UsbSerial]:
+    """Return what sends characters, by its name in a condition."""
+    return {**board.serial_ports, "usb": board.usb_serial}
+
+
 @contextmanager
-def _stop_at_characters(port: SerialPort, sent: bytearray | None = None) -> Iterator[None]:
+def _stop_at_characters(port: SerialPort | UsbSerial, sent: bytearray | None = None) -> Iterator[None]:
     """End the board's slice after each character that a port sends; collect them in `sent`."""
 
     def take(rows: Sequence[tuple[int, Nanos]]) -> None:

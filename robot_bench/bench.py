@@ -737,7 +737,7 @@ class Bench(Stateful):
         def motor(value: str) -> JointMotor:
             return JointMotor(
                 nets(value), step_um_per_s=settings.step_um_per_s, ramp_um_per_s2=settings.ramp_um_per_s2,
-                dt_ns=body.dt_ns, bit_order=settings.bit_order,
+                dt_ns=body.dt_ns, bit_order=settings.bit_order, command=settings.motor_command,
             )  # fmt: skip
 
         wires = pinout.with_role(WireRole.DISTANCE)

@@ -43,12 +43,12 @@ def load_parts(tables: Sequence[Table], folder: Path, taken: Mapping[str, str], 
 
 
 def _load(table: Table, folder: Path, taken: Mapping[str, str], at: Where) -> PartSpec:
-    for key in KEYS:
-        value = table.get(key.name)
-        if key.required and value is None:
-            raise ScenarioError(f"{at}: key {key.name!r} is missing", hint="p2os mcu parts lists what there is")
-        if value is not None and not isinstance(value, str):
-            raise ScenarioError(f"{at}: {key.name} = {shown(value)} is not a text in quotes")
+    for known in KEYS:
+        text = table.get(known.name)
+        if known.required and text is None:
+            raise ScenarioError(f"{at}: key {known.name!r} is missing", hint="p2os mcu parts lists what there is")
+        if text is not None and not isinstance(text, str):
+            raise ScenarioError(f"{at}: {known.name} = {shown(text)} is not a text in quotes")
     settings = {key: value for key, value in table.items() if key != "kind"}
     for name, value in settings.items():
         if not isinstance(value, _SCALARS) and not (
