@@ -62,4 +62,4 @@ def _modeller() -> "ModuleType":
         raise MissingDependencyError(
             "build123d is not installed", hint="python -m pip install build123d (1 GB with its modeller)"
         ) from error
-    return build123d  # type: ignore[no-any-return]
+    return build123d
