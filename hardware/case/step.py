@@ -4,7 +4,7 @@ STEP and STL have y up where the board's axes have it down: each y changes its s
 """
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, cast
 
 from hardware.case.solids import Block, Body, Solid
 from simbase.errors import MissingDependencyError
@@ -62,4 +62,4 @@ def _modeller() -> "ModuleType":
         raise MissingDependencyError(
             "build123d is not installed", hint="python -m pip install build123d (1 GB with its modeller)"
         ) from error
-    return build123d
+    return cast("ModuleType", build123d)
