@@ -55,6 +55,13 @@ static void update_outputs(struct device *device)
     output_set(device, ERROR_IRQ, control & ITERREN && now & ERRORS);
 }
 
+/* TxE comes with a transmitter's ADDR: ST's libraries wait for both at once (events 0x70082 and 0x60082). */
+static void ask_for_byte(struct device *device)
+{
+    const struct i2c *i2c = device->state;
+    device->words[SR1] |= device->words[SR2] & TRA && !i2c->tdr ? TXE : 0;
+}
+
 /* Pins. */
 
 static bool is_low(const struct device *device, uint32_t which)
@@ -350,6 +357,7 @@ static void end_sent(struct device *device, uint64_t ns)
     } else if (is_address) {
         words[SR1] |= ADDR;
         words[SR2] = byte & 1 && !i2c->is_second ? words[SR2] & ~(uint32_t)TRA : words[SR2] | TRA;
+        ask_for_byte(device);
         i2c->next_ack = words[CR1] & ACK;
     }
     i2c->has_sent = !is_address;
@@ -404,6 +412,7 @@ static uint32_t called(struct device *device, bool is_read)
     struct i2c *i2c = device->state;
     device->words[SR1] |= ADDR;
     device->words[SR2] |= is_read ? TRA : 0;
+    ask_for_byte(device);
     i2c->is_own = 1;
     i2c->next_ack = device->words[CR1] & ACK;
     return HELD;
@@ -623,7 +632,6 @@ static uint32_t read(struct device *device, uint32_t index)
         const uint32_t status = words[SR2];
         if (words[SR1] & words[SEEN] & ADDR) {
             words[SR1] &= ~(uint32_t)ADDR;
-            words[SR1] |= status & TRA ? TXE : 0;
             release(device);
             update_outputs(device);
         }

@@ -112,7 +112,7 @@ def test_a_start_and_an_address_take_their_bits(fake_chip: Any) -> None:
     fake_chip.advance(written_ns + BYTE_NS - 1)
     assert sr1(fake_chip) == 0
     fake_chip.advance(written_ns + BYTE_NS)
-    assert (sr1(fake_chip), sr2(fake_chip) & 7) == (ADDR, MSL | BUSY | TRA)
+    assert (sr1(fake_chip), sr2(fake_chip) & 7) == (ADDR | TXE, MSL | BUSY | TRA)
     assert part.log == [("start", 0x50, False, written_ns + BYTE_NS)]
 
 
@@ -291,7 +291,7 @@ def test_a_ten_bit_address_is_two_bytes_and_a_header_to_read(fake_chip: Any) -> 
     fake_chip.read("I2C1.SR1")
     fake_chip.write("I2C1.DR", 0xA5)
     wait(fake_chip, BYTE_NS)
-    assert (sr1(fake_chip), sr2(fake_chip) & TRA) == (ADDR, TRA)
+    assert (sr1(fake_chip), sr2(fake_chip) & TRA) == (ADDR | TXE, TRA)
     clear_addr(fake_chip)
     start(fake_chip, 0xF5)
     assert (sr1(fake_chip), sr2(fake_chip) & TRA) == (ADDR, 0)
@@ -407,7 +407,7 @@ def test_scl_held_from_outside_stretches_the_byte(fake_chip: Any) -> None:
     assert sr1(fake_chip) == 0
     fake_chip.pins["PB6"].drive(None)
     wait(fake_chip, 0)
-    assert sr1(fake_chip) == ADDR
+    assert sr1(fake_chip) == ADDR | TXE
 
 
 def test_scl_held_for_25_ms_is_an_smbus_timeout(fake_chip: Any) -> None:
@@ -492,6 +492,26 @@ def slave(chip: Any, control_bits: int = 0, own: int = 0x30 << 1, dual: int = 0)
     chip.write("I2C1.OAR2", dual)
     chip.write("I2C1.CR1", PE | ACK | control_bits)
     return chip.parts.by_name["I2C1"]
+
+
+def test_txe_comes_with_a_transmitters_addr_and_a_byte_written_before_it_is_cleared_counts(fake_chip: Any) -> None:
+    """ST's libraries wait for both at once: events 0x70082 (master) and 0x60082 (slave)."""
+    part = set_up(fake_chip)
+    start(fake_chip, 0xA0)
+    assert (sr2(fake_chip) << 16 | sr1(fake_chip)) == 0x70082
+    fake_chip.write("I2C1.DR", 0x17)
+    assert sr1(fake_chip) == ADDR
+    clear_addr(fake_chip)
+    wait(fake_chip, BYTE_NS)
+    assert part.words[1:] == [0x17]
+    start(fake_chip, 0xA1)
+    assert (sr2(fake_chip) << 16 | sr1(fake_chip)) == 0x30002, "a receiver has nothing to send"
+
+
+def test_txe_comes_with_the_addr_of_a_slave_that_is_read(fake_chip: Any) -> None:
+    slave(fake_chip).call(0x30, read_bytes=1)
+    wait(fake_chip, 10 * BIT_NS)
+    assert (sr2(fake_chip) << 16 | sr1(fake_chip)) == 0x60082
 
 
 def test_a_slave_receives_what_is_written_and_stopf_ends_it(fake_chip: Any) -> None:
