@@ -665,8 +665,9 @@ class PeripheralBus(Stateful):
         }
         self._rcc = rcc
         self._chip = chip
-        #: When each peripheral was first read without its clock, in ns.
+        #: When each peripheral was first read without its clock since that was last on, in ns.
         self.read_unclocked_ns: dict[str, Nanos] = {}
+        rcc.gate_listeners.append(self._forget_clocked)
 
     def read(self, offset: int, size: int) -> int:
         """Return what the core reads."""
@@ -719,6 +720,12 @@ class PeripheralBus(Stateful):
         bit = 1 << (offset >> 2 & 31)
         word = self.read(offset >> 5 & ~3, 4)
         self.write(offset >> 5 & ~3, 4, word | bit if value & 1 else word & ~bit)
+
+    def _forget_clocked(self) -> None:
+        """Begin anew with what has its clock now: drivers look at a peripheral before they switch it on, each time."""
+        clocked = [name for name in self.read_unclocked_ns if self._rcc.is_clocked(name)]
+        for name in clocked:
+            del self.read_unclocked_ns[name]
 
     def _refuse(self, part: Peripheral | None, offset: int, what: str) -> None:
         """Warn of an access to nothing: it reads 0, and a write is lost."""

@@ -26,6 +26,7 @@ from bluepill_sim.stm32f103 import CLOCK_GATES, PERIPHERAL_BASE
 _READS_PLAIN, _WRITES_PLAIN, _READS_NATIVE, _WRITES_NATIVE, _HALFWORDS, _DUPLICATES = 1, 2, 4, 8, 16, 32
 _LATCH_SHIFT = 6
 _PAGE_SHIFT = 10
+_PAGE_WORDS = 1 << _PAGE_SHIFT - 2
 _HALFWORD = 0xFFFF
 
 
@@ -58,9 +59,13 @@ def share_registers(engine: Engine, parts: Iterable[Peripheral], rcc: Rcc) -> No
         at, mask = rcc.gate_address(part.name) if gate is not None else (None, 0)
         words, _ = part.words.buffer_info()
         engine.keep(behaviour, masks)
-        page = part.base - PERIPHERAL_BASE >> _PAGE_SHIFT
+        first_page = part.base - PERIPHERAL_BASE >> _PAGE_SHIFT
         slot = -1 if part.KIND is None else part.slot
-        calls.core_set_page(state, page, words, count, at, mask, behaviour, masks, slot)
+        for first in range(0, count, _PAGE_WORDS):
+            calls.core_set_page(
+                state, first_page + first // _PAGE_WORDS, words + 4 * first, min(count - first, _PAGE_WORDS), at, mask,
+                ctypes.byref(behaviour, 2 * first), ctypes.byref(masks, 16 * first), slot,
+            )  # fmt: skip
 
 
 def _behaviour(register: Register, *, has_byte_lanes: bool) -> int:

@@ -103,7 +103,7 @@ def _mailbox_registers() -> tuple[Register, ...]:
 class Can(Peripheral):
     """Basic extended CAN."""
 
-    OUTPUTS = ("tx_irq", "rx0_irq", "rx1_irq", "sce_irq")
+    OUTPUTS = ("tx_irq", "rx0_irq", "rx1_irq", "sce_irq", "packets")
     STATE = (
         "_alone", "_joined", "_mailboxes", "_order", "_fifos", "_ends", "_sync_ns", "_recover_ns", "_tec", "_rec",
         "_timer_ns", "_lost", "_is_stopped",
@@ -232,6 +232,11 @@ class Can(Peripheral):
     def sends_at(self, pin: str) -> bool:
         """Whether something outside sends on a pin: a network does so on RX."""
         return self._joined is not None and pin == self._pin_names[0]
+
+    @property
+    def joined(self) -> CanNetwork | None:
+        """The network that it was put on; None: it is alone."""
+        return self._joined
 
     # For the network.
 
@@ -621,6 +626,7 @@ class Can(Peripheral):
         last = self._last()
         flags |= 0 if last is None or len(self._mailboxes) < 2 else 1 << _LOW_AT + last
         words[TSR] = flags | (free[0] if free else last or 0) << _CODE_AT
+        self.set_output("packets", not words[MSR] & (INAK | SLAK))  # it uses the memory that it shares with USB
         enabled = words[IER]
         self.set_output("tx_irq", bool(enabled & TMEIE and words[TSR] & 0x01_0101))
         for n in range(2):

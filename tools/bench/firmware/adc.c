@@ -1,9 +1,9 @@
 /* Asleep between SysTicks, while circular DMA takes what ADC1 converts: one channel without a pause, at 857 kS/s with
  * 72 MHz or 1 MS/s with 56 MHz (BENCH_56_MHZ); or eight channels each 10 kHz (BENCH_EIGHT), started by SysTick or by
  * TRGO of TIM3 (BENCH_TRGO). */
-#include "../../robot_bench/firmware/f103_analog.h"
-#include "../../robot_bench/firmware/f103_timers.h"
-#include "clock.h"
+#include "board.h"
+#include "f103_analog.h"
+#include "f103_timers.h"
 
 #define ROUNDS 64u
 #ifdef BENCH_EIGHT
@@ -39,7 +39,7 @@ void SysTick_Handler(void)
 static void timer_start(void)
 {
     RCC->APB1ENR |= RCC_APB1ENR_TIM3EN;
-    TIM3->ARR = BENCH_HCLK_HZ / SAMPLING_HZ - 1u;
+    TIM3->ARR = HCLK_HZ / SAMPLING_HZ - 1u;
     TIM3->CR2 = 2u << 4; /* TRGO with each update event */
     TIM3->CR1 = TIM_CR1_CEN;
 }
@@ -78,7 +78,7 @@ int main(void)
     SYSTICK->LOAD = 56000000u / TICK_HZ - 1u;
 #else
     RCC->CFGR |= RCC_CFGR_ADCPRE_DIV6;
-    SYSTICK->LOAD = BENCH_HCLK_HZ / TICK_HZ - 1u;
+    SYSTICK->LOAD = HCLK_HZ / TICK_HZ - 1u;
 #endif
     adc_start();
 #ifdef BENCH_TRGO
