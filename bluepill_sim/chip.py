@@ -234,9 +234,8 @@ class Chip(Stateful):
             if self._stop_requested and not engine.is_inside_block:
                 self._stop_requested = False
                 return ChipReached(now, Reason.EDGE)
-            if processor.is_locked_up and not self.parts.has_running_watchdog:
-                engine.cycle = max(engine.cycle, clock.cycle_at(limit_ns))
-                return ChipReached(clock.ns_of(engine.cycle), Reason.HALT)
+            if processor.is_locked_up and now >= limit_ns and not self.parts.has_running_watchdog:
+                return ChipReached(now, Reason.HALT)
             if now >= limit_ns and not engine.is_inside_block:
                 return ChipReached(now, Reason.DEADLINE)
             if self._core_stands_still():
