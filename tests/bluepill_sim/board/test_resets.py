@@ -236,3 +236,16 @@ def test_what_is_due_in_the_block_that_asks_for_a_reset_comes_before_it_on_both_
         seen.append((bytes(machine.sent), machine.board.resets, machine.board.cycle))
     assert seen[0] == seen[1]
     assert seen[0][1], "the reset has come"
+
+
+@pytest.mark.parametrize("core", ["native", "python"])
+def test_a_locked_up_chip_goes_on_but_for_its_core(boot, monkeypatch: pytest.MonkeyPatch, core: str) -> None:
+    """A character that is on its way comes out in the same run in which the core locks up."""
+    monkeypatch.setenv("P2OS_CORE", core)
+    machine = boot(
+        store(0x4002_1018, 0x4005) + store(0x4001_0804, 0x4444_44B4) + store(0x4001_3808, 16)
+        + store(0x4001_380C, 0x2008) + store(0x4001_3804, 0x41) + "cpsid f\nudf\nb stop"
+    )  # fmt: skip
+    reached = machine.board.advance_to(1_000_000)
+    assert machine.board.fault.is_lockup
+    assert (reached.reason, bytes(machine.sent)) == (Reason.HALT, b"A")
