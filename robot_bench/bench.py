@@ -24,7 +24,7 @@ import hashlib
 import math
 import pickle
 import re
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, fields, replace
 from importlib.metadata import version
 from pathlib import Path
@@ -46,10 +46,10 @@ from robot_bench.direct import DirectRobot, DistanceSensors, JointMotor, WheelEn
 from robot_bench.direct.differential.robot import DifferentialRobot
 from robot_bench.direct.senses import WorldSenses
 from robot_bench.direct.wired import AnalogPin, RobotWire
-from robot_bench.events.codec import events_of
+from robot_bench.events.codec import Blocks, events_of
 from robot_bench.events.expectation import ExpectationError
 from robot_bench.events.kinds import Event
-from robot_bench.events.selection import SELECTORS, select, wire_named
+from robot_bench.events.selection import SELECTORS, Wires, select, wire_named
 from robot_bench.events.stream import EventStream
 from robot_bench.events.words import last_words
 from robot_bench.recording.client_view import SipRanges
@@ -61,6 +61,7 @@ from robot_bench.running.pacer import FIRST_SLICE_NS, SliceLength
 from robot_bench.running.shared_world import Driven, SharedWorld
 from robot_bench.scenario.fault_script import LINK_DOWN, FaultChange, FaultScript, load_faults
 from robot_bench.scenario.goals.judging import GoalJudge, Judgement
+from robot_bench.scenario.hand_script import Deed, HandScript
 from robot_bench.scenario.scenario import (
     Scenario,
     ScenarioOptions,
@@ -87,6 +88,8 @@ if TYPE_CHECKING:
 AFTER_FAULT_NS: Nanos = 1 * NS_PER_S
 #: Owner of the resistors on the wires.
 RESISTORS = "board"
+#: Owner of the levels that are put on wires by hand.
+BY_HAND = "hand"
 _LOG = logger("bench")
 T = TypeVar("T", bound=Timed)
 #: What `run_until` waits for beside a time: an event in words, or a function of the bench.
@@ -138,11 +141,11 @@ class Bench(Stateful):
     """
 
     STATE = (
-        "made_of", "chip", "_harness", "_robots", "_ranges", "script", "faults", "whens", "recorder", "goals", "loop",
-        "_senses", "_ends_at", "_has_told_death",
+        "made_of", "chip", "_harness", "_robots", "_ranges", "script", "faults", "hands", "whens", "recorder", "goals",
+        "loop", "_senses", "_ends_at", "_has_told_death",
     )  # fmt: skip
     #: What the caller asked of this object; the lines, which are parts of the loop.
-    DERIVED = ("_lines", "_checkpoints", "_expected", "on_slice")
+    DERIVED = ("_lines", "_checkpoints", "_expected", "_mark", "on_slice")
 
     def __init__(
         self,
@@ -177,6 +180,8 @@ class Bench(Stateful):
         self._checkpoints: list[tuple[Nanos, object]] = []
         #: What was waited for last, and when the bench stood still after it.
         self._expected: tuple[Nanos, Event | None] = (-1, None)
+        #: Where in the trace the events since then are, and the wires' levels there; None: from its beginning.
+        self._mark: tuple[int, Blocks] | None = None
         #: What stands at the far end of the wires and owns the body.
         self._robots: list[DirectRobot | Endpoint | WiredPart] = []
         self._ranges: SipRanges | None = None
@@ -197,7 +202,8 @@ class Bench(Stateful):
         self.faults = FaultScript(scenario.faults, bring_to=self._bring_robot_to, do=self._inject)
         #: What parts on the board sense of the world; none where nothing is plugged in.
         self._senses = self._plug_in(chip) if scenario.parts else ()
-        followers = (*self._robots, self.script, self.faults, *self._senses)
+        self.hands = HandScript(bring_to=self._bring_robot_to, do=self._do_by_hand)
+        followers = (*self._robots, self.script, self.faults, self.hands, *self._senses)
         self._slices = SliceLength() if slice_ns is None else None
         self.loop = RunLoop(
             chip, followers, observers=(self.recorder,), slice_ns=slice_ns or FIRST_SLICE_NS,
@@ -209,6 +215,7 @@ class Bench(Stateful):
         self.whens = WhenScript(
             scenario.whens, on_end=self._end_now,
             on_change=lambda changes: self.script.add(*changes), on_fault=lambda faults: self.faults.add(*faults),
+            on_deed=lambda deeds: self.hands.add(*deeds),
         )  # fmt: skip
         self.whens.subscribe(self.events)
         self.goals = GoalJudge(scenario.goals)
@@ -354,8 +361,13 @@ class Bench(Stateful):
         Raises:
             UsageError: There is no such wire.
         """
+        return self.parts.harness[wire_named(wire, self._wires)].level(self.now)
+
+    @property
+    def _wires(self) -> Wires | None:
+        """The wires of a robot on own pins; None: those of the pin-out."""
         own = self.scenario.own_robot
-        return self.parts.harness[wire_named(wire) if own is None else own.wire_named(wire)].level(self.now)
+        return None if own is None else own.wires
 
     def record(self) -> RunRecord:
         """Return what was recorded so far: poses, edges, texts, packets and the state log, each with its time."""
@@ -450,7 +462,7 @@ class Bench(Stateful):
 
     def _wait_for(self, words: str, within: Span | None) -> Event | None:
         """Run until an event happens, counted from the last one that was waited for where nothing was done since."""
-        selector, since, last = select(words), self._since, self._expected[1]
+        selector, since, last = select(words, self._wires), self._since, self._expected[1]
         limit, found = self._limit(within, since), list[Event]()
 
         def take(event: Event) -> None:
@@ -458,9 +470,11 @@ class Bench(Stateful):
                 found.append(event)
 
         if since < self.now:
-            for event in events_of(self.trace.lines()):
+            for event in self._told_since_mark():
                 if type(event) in selector.kinds:
                     take(event)
+        if not found:
+            self._mark_here()
         end = self.events.subscribe(take, *selector.kinds, wires=selector.wires)
         try:
             # What happened until the limit is told at the pose after it.
@@ -469,6 +483,20 @@ class Bench(Stateful):
             end()
         self._expected = (self.now, found[0]) if found else (-1, None)
         return found[0] if found else None
+
+    def _mark_here(self) -> None:
+        """Note where the trace stands: what is found from now on is told in it from here on."""
+        told = self.events.released_until
+        nets = tuple(self.parts.harness)
+        levels = bytearray(not net.wave(told) and net.level(told) for net in nets) if told >= 0 else bytearray()
+        self._mark = (self.trace.length, Blocks(tuple(net.name for net in nets), levels)) if levels else None
+
+    def _told_since_mark(self) -> Iterable[Event]:
+        """Return the events since the last wait began, so that no wait reads the whole trace."""
+        if self._mark is None:
+            return events_of(self.trace.lines())
+        length, blocks = self._mark
+        return events_of(self.trace.lines(length), begun=replace(blocks, levels=bytearray(blocks.levels)))
 
     def expect(self, words: str, within: Span | None = None) -> Event:
         """Run until an event happens and return it.
@@ -520,7 +548,7 @@ class Bench(Stateful):
             UsageError: There is no such wire or level.
         """
         __tracebackhide__ = True
-        select(f"pin {pin} {level}")
+        select(f"pin {pin} {level}", self._wires)
         if self.level(pin) is not (level == "high"):
             self.expect(f"pin {pin} {level}", within)
 
@@ -781,7 +809,7 @@ class Bench(Stateful):
         """Put back what `own_snapshot` returned, as `restore` asks for it."""
         super().restore(snapshot)
         self._pins.chip_restored()
-        self._expected = -1, None
+        self._expected, self._mark = (-1, None), None
         if self.goals.is_behind:
             self.goals.catch_up(events_of(self.trace.lines()), self.events.released_until)
 
@@ -831,6 +859,19 @@ class Bench(Stateful):
                 line.is_cut = op == "fault"
         elif self.parts.pioneer is not None:
             self.parts.pioneer.do(words, at)
+
+    def _do_by_hand(self, deed: Deed) -> None:
+        self.recorder.event("hand", deed.at, deed.do, deed.words)
+        if deed.do == "type":
+            getattr(self.chip, deed.place).receive(deed.text)
+        elif deed.do == "set_volts":
+            cast("AnalogPin", self.chip.pin(deed.place)).set_volts(deed.volts)
+        elif deed.place not in [net.name for net in self.parts.harness]:
+            self.chip.pin(deed.place).drive(deed.level)
+        elif deed.level is None:
+            self.parts.harness[deed.place].release(BY_HAND, deed.at)
+        else:
+            self.parts.harness[deed.place].drive(BY_HAND, deed.level, Strength.PUSH_PULL, deed.at)
 
     def _build(self, pinout: Pinout, world: World, body: RobotBody, chip: Chip, harness: Harness) -> BenchParts:
         if self.scenario.own_robot is not None:

@@ -15,8 +15,8 @@ import base64
 import contextlib
 import hashlib
 import math
-from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
 from importlib.metadata import version
 from pathlib import Path
 from typing import TYPE_CHECKING, TypeVar
@@ -101,6 +101,7 @@ def run_scenario(
     profile: bool = False,
     fail_under: float = 0.0,
     is_kept: Callable[[bool], bool] = lambda _passed: True,
+    explained: bool = False,
 ) -> RunResult:
     """Run a scenario in virtual time and make its run folder.
 
@@ -117,6 +118,7 @@ def run_scenario(
         profile: Write where its cycles went; likewise.
         fail_under: With `coverage`, the run fails where fewer percent of the lines ran; 0 asks for nothing.
         is_kept: Told whether the run passed; where it says no, nothing is made of the run and its folder is removed.
+        explained: Whether the report says of a run that failed why (`p2os explain`), which takes some seconds.
 
     Raises:
         P2osError: The folder is not free, a file cannot be read or written, or a part is not installed.
@@ -142,7 +144,7 @@ def run_scenario(
         bench.on_slice = after_slice
         trace.meta(meta_of(scenario, bench.parts.world, bench.note, is_at_port=False))
         with _measured(bench.chip, coverage=coverage, profile=profile, fail_under=fail_under) as measurement:
-            return _record(bench, trace, folder, pacer, clock, drive, measurement, is_kept)
+            return _record(bench, trace, folder, pacer, clock, drive, measurement, is_kept, explained=explained)
 
 
 def run_at_port(
@@ -185,13 +187,14 @@ def run_at_port(
         return _record(bench, trace, folder, pacer, clock, drive)
 
 
-def write_run(bench: Bench, folder: Path, failure: str = "") -> Path:
+def write_run(bench: Bench, folder: Path, failure: str = "", *, explained: str = "") -> Path:
     """Write what a bench with its trace in memory has recorded so far as a run folder; return its report's path.
 
     Args:
         bench: It has run as far as it will.
         folder: Made where it is missing; a run that is there is overwritten.
         failure: Why it failed; empty where it did not.
+        explained: What `why_failed` says of it; empty where nobody asked.
 
     Raises:
         UsageError: The folder holds something that is no run, or is written by another run.
@@ -202,6 +205,8 @@ def write_run(bench: Bench, folder: Path, failure: str = "") -> Path:
     end |= {"goals_met": goals.met, "goals_not_judged": goals.not_judged}
     if not failure:
         end |= {"passed": True, "failures": []}
+    if explained:
+        end |= {"explained": explained}
     meta = meta_of(bench.scenario, bench.parts.world, bench.note, is_at_port=False)
     with reserved(folder, force=True), contextlib.closing(TraceWriter(folder / TRACE_NAME)) as trace:
         trace.meta(meta)
@@ -221,6 +226,7 @@ def meta_of(scenario: Scenario, world: World | None, note: str | None, *, is_at_
         "description": scenario.description,
         "text": scenario.text,
         "firmware": scenario.firmware.name,
+        "firmware_path": str(scenario.firmware.absolute()),
         "firmware_sha256": _sha256_of(scenario.firmware),
         "mode": "port" if is_at_port else scenario.mode,
         "body": "remote" if is_at_port else resolve_body(scenario.body),
@@ -322,10 +328,12 @@ def _record(
     drive: Callable[[_AnyBench], None] | None,
     measurement: "Measurement | None" = None,
     is_kept: Callable[[bool], bool] = lambda _passed: True,
+    *,
+    explained: bool = False,
 ) -> RunResult:
     """Run to the end, judge the goals, write the trace's last line, and make the rest of the folder."""
     driven = _drive(bench, pacer, clock, drive)
-    passed = _conclude(bench, trace, folder, pacer, driven, measurement)
+    passed = _conclude(bench, trace, folder, pacer, driven, measurement, explained=explained)
     made = make_artefacts(folder) if is_kept(passed) else _removed(folder)
     _LOG.info("%s %s: %s", bench.scenario.name, "passed" if passed else "failed", made.report)
     return RunResult(folder=folder, outcome=made.outcome, report=made.report, was_interrupted=driven.was_interrupted)
@@ -367,6 +375,8 @@ def _conclude(
     pacer: RealTimePacer | None,
     driven: _Driven,
     measurement: "Measurement | None" = None,
+    *,
+    explained: bool = False,
 ) -> bool:
     """Judge the goals and write the trace's last line; tell whether the run passed."""
     failures, end = list(driven.failures), driven.end
@@ -394,6 +404,11 @@ def _conclude(
             "worst_lag_ms": None if pacer is None else round(pacer.worst_lag_ns / NS_PER_MS, 1),
         }
         | measured
+        | (
+            {"explained": line}
+            if explained and not passed and (line := why_failed(bench, failures + goals.missed))
+            else {}
+        )
     )
     return passed
 
@@ -464,6 +479,16 @@ def parts_of(chip: Chip) -> list[Json]:
             row["png"] = base64.b64encode(picture.png(picture.scale())).decode()
         found.append(row)
     return found
+
+
+def why_failed(bench: Bench | RemoteBench, failures: Sequence[str]) -> str:
+    """Return the one line of `p2os explain` for a bench that has run; empty where it has no chip to replay."""
+    if isinstance(bench, RemoteBench):
+        return ""
+    from robot_bench.report.explain.explain import explain
+
+    record = bench.record()
+    return explain(replace(record, end={"failures": list(failures)}), bench.scenario.firmware).line
 
 
 def _figures(bench: Bench | RemoteBench, end: Nanos, wall_s: float) -> Json:

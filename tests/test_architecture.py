@@ -49,6 +49,7 @@ ALLOWED = {
     "adapter_sim": {"p2os"},
     "robot_bench": {"p2os", "bluepill_sim", "adapter_sim", "typer", "rich", "click"},
     "robot_bench.report": {"p2os", "matplotlib"},
+    "robot_bench.report.explain": {"p2os", "bluepill_sim", "adapter_sim"},
     "robot_bench.recording.event_files": {"pyarrow"},
     "robot_bench.cli.pytest_plugin": {"p2os", "bluepill_sim", "pytest"},
 }

@@ -236,13 +236,18 @@ def pytest_runtest_makereport(item: pytest.Item, call: pytest.CallInfo[None]) ->
 
 def _record(item: pytest.Item, used: "Bench", report: Any, failure: str) -> None:
     """Write the run folder of a test, and tell where it is."""
-    from robot_bench.run import write_run
+    from bluepill_sim.errors import BluePillError
+    from robot_bench.run import why_failed, write_run
     from simbase.errors import P2osError
 
     name = re.sub(r"[^\w.-]+", "_", item.nodeid.replace("::", "-")).strip("_")
     folder = item.config.rootpath / str(item.config.getoption("--bench-out")) / name
+    said, why = failure.partition("\n")[0], ""
     try:
-        page = write_run(used, folder, failure.partition("\n")[0])
+        if said:
+            with contextlib.suppress(P2osError, BluePillError):
+                why = why_failed(used, [said])
+        page = write_run(used, folder, said, explained=why)
     except (P2osError, OSError) as error:  # a test's own outcome counts
         report.sections.append(("bench: no report", str(error)))
         return
@@ -251,6 +256,8 @@ def _record(item: pytest.Item, used: "Bench", report: Any, failure: str) -> None
     firmware = item.config.getoption("--firmware")
     options = f" --firmware {firmware}" if firmware else ""
     picture = folder / "path.png"
+    if why:
+        report.sections.append(("bench: why", why))
     lines = [f"report:   {page}", *([f"picture:  {picture}"] if picture.is_file() else [])]
     report.sections.append(
         ("bench: look, and replay", "\n".join([*lines, f"replay:   pytest '{item.nodeid}'{options}"]))

@@ -211,7 +211,7 @@ def run(
         if gdb is None:
             result = run_scenario(
                 wanted, folder, speed=realtime, on_progress=display.update, force=force,
-                coverage=coverage, profile=profile, fail_under=fail_under,
+                coverage=coverage, profile=profile, fail_under=fail_under, explained=True,
             )  # fmt: skip
         else:
             from robot_bench.cli.gdb import debug_bench

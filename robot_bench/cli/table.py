@@ -10,7 +10,7 @@ from rich.console import Console
 from rich.table import Table
 
 from bluepill_sim.program.last_blocks import TITLE
-from robot_bench.recording.summary import LISTED_HITS, verdict_of
+from robot_bench.recording.summary import EXPLAINED, LISTED_HITS, verdict_of
 from robot_bench.run import RunResult
 from simbase.errors import shown
 
@@ -43,6 +43,8 @@ def print_result(result: RunResult, console: Console | None = None) -> None:
         for goal in cast("Sequence[str]", outcome[key] or ())[key == "failures" and result.was_interrupted :]:
             console.print(label, end="")
             console.print(goal, markup=False, soft_wrap=True)
+    if outcome.get(EXPLAINED):
+        console.print(f"why     {outcome[EXPLAINED]} (p2os explain {result.folder})", markup=False, soft_wrap=True)
     verdict = verdict_of(outcome)
     console.print(
         f"{verdict if result.passed else verdict.upper()}; report: {result.report}", markup=False, soft_wrap=True

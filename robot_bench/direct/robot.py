@@ -127,7 +127,8 @@ class DirectRobot(Stateful):
         while self._steps < wanted:
             speeds = self.next_setpoints()
             alike = wanted - self._steps if left.is_steady and right.is_steady else 1
-            for _ in range(alike):
+            stood = body.stand_still(alike) if speeds == (0.0, 0.0) else 0
+            for _ in range(alike - stood):
                 body.step(*speeds)
             self._steps += alike
 

@@ -33,6 +33,8 @@ _FROM_END = (
 )  # fmt: skip
 #: What a run holds that was measured with `--coverage` or `--profile`.
 MEASURED = ("coverage", "profile")
+#: Why a run failed, in one line, where that was asked.
+EXPLAINED = "explained"
 
 
 def verdict(record: RunRecord) -> str:
@@ -99,7 +101,7 @@ def outcome_of(record: RunRecord) -> Json:
     if record.is_cut:
         end = end_of_a_broken_run(record, f"the run was cut at {record.last_ns / NS_PER_S:.1f} s")
     result.update((key, end.get(key)) for key in _FROM_END)
-    result.update((key, end[key]) for key in MEASURED if key in end)
+    result.update((key, end[key]) for key in (*MEASURED, EXPLAINED) if key in end)
     result["hits"] = [
         {"t_s": hit.t / NS_PER_S, "what": hit.what, "x_m": hit.x_m, "y_m": hit.y_m, "part": hit.part}
         for hit in record.contacts

@@ -46,7 +46,7 @@ def scenario_schema() -> Json:
         "in_world": {"type": "object", "additionalProperties": within},
         **{name: {"type": "array", "items": _table((*TABLES[f"[[{name}]]"], ROBOT))} for name in ("obstacle", "fault")},
         "part": {"type": "array", "items": _table(TABLES["[[part]]"]) | {"additionalProperties": True}},
-        "when": {"type": "array", "items": _table((*WHEN_KEYS, ROBOT), may_lack=("name", "fault"))},
+        "when": {"type": "array", "items": _table((*WHEN_KEYS, ROBOT))},
         "goal": {"type": "array", "items": {"oneOf": goals}},
         "sweep": _SWEEP,
     }
@@ -66,9 +66,9 @@ _SWEEP: Json = {
 }
 
 
-def _table(keys: Sequence[Key], *, kind: str = "", may_lack: Sequence[str] = ()) -> Json:
+def _table(keys: Sequence[Key], *, kind: str = "") -> Json:
     properties: Json = {key.name: _key(key) for key in keys}
-    required = [key.name for key in keys if key.required and key.name not in may_lack]
+    required = [key.name for key in keys if key.required]
     if kind:
         properties = {"kind": {"const": kind}} | properties
         required = ["kind", *required]

@@ -369,8 +369,9 @@ def _build(table: Table, text: str, path: Path, where: Place, firmware: Path | N
         check_table(part, _IN_WORLD, within(where, f"in_world.{world}"))
         _start(part, where, f"in_world.{world}.start")
     changes = load_changes(cast("list[Table]", table.get("obstacle", [])), parameters, where)
+    wires = own_robot.wires if own_robot else None
     goals = [
-        load_goal(goal, within(where, "goal", number))
+        load_goal(goal, within(where, "goal", number), wires)
         for number, goal in enumerate(cast("list[Table]", table.get("goal", [])))
     ]
     scenario = Scenario(
@@ -402,7 +403,7 @@ def _build(table: Table, text: str, path: Path, where: Place, firmware: Path | N
         seeds=load_seeds(table, where.at("seeds")),
         axes=load_axes(cast("Table", table.get("sweep", {})), where),
         faults=load_faults(cast("list[Table]", table.get("fault", [])), parameters, where),
-        whens=load_whens(cast("list[Table]", table.get("when", [])), parameters, where),
+        whens=load_whens(cast("list[Table]", table.get("when", [])), parameters, where, wires),
         goals=tuple(goals),
         in_world=in_world,
         where=where,

@@ -221,6 +221,11 @@ class BodyInWorld(Stateful):
         (turned,) = self.scene.step(((left_mps, right_mps),))
         return turned
 
+    def stand_still(self, steps: int) -> int:
+        """Make no step: an engine has to, for things may still move; see `Body`."""
+        del steps
+        return 0
+
     def reset(self, pose: Pose, seed: int) -> BodyState:
         """Stand still at a pose in the world as it was made; nothing here is random.
 
