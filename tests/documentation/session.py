@@ -6,7 +6,7 @@
   place of the serial port.
 - Ports are replaced by free ones, `/tmp` and `/dev` by folders of the session.
 - Each line of output that the page shows has to come; numbers in it may be others, and `…` stands for anything.
-- A command whose shown output has a line `p2os: …` or `fault: …` has to fail; any other has to end with 0.
+- A command whose shown output has a line `p2os: …`, `fault: …` or `FAILED …` has to fail; any other has to end with 0.
 """
 
 import contextlib
@@ -40,7 +40,7 @@ READY_S = 60.0
 ENDING_S = 60.0
 PORTS = 24
 RUN = {"python", "console", "sh", "c", "toml"}  # languages of blocks that are run
-FAILURES = ("p2os: ", "fault: ")
+FAILURES = ("p2os: ", "fault: ", "FAILED ")
 NAMED_FILE = re.compile(r"^(?:/\*|//|#)\s*(?P<name>[\w./-]+\.(?:c|h|ld|toml|py|yml|yaml))\b")
 TCP = re.compile(r"(?<=tcp:127\.0\.0\.1:)\d+|(?<=--gdb )\d+|(?<=remote :)\d+")
 PLACE = re.compile(r"(?:tcp:127\.0\.0\.1:\d+|(?:serial|pty):/[^?'\s]+)")
@@ -52,7 +52,8 @@ SHIMS = {
     "python": 'case "$1 $2" in "-m venv") exit 0;; esac; exec {python} "$@"',
     "python3": 'case "$1 $2" in "-m venv") exit 0;; esac; exec {python} "$@"',
     "pip": 'case "$*" in "install "*) exit 0;; esac; exit 2',  # the network; test_docs.py looks at the extras
-    "pytest": 'cd {root} && exec {python} -m pytest --collect-only -q -p no:cacheprovider "$@"',
+    "pytest": 'if [ -e pytest.ini ]; then exec {python} -m pytest -p no:cacheprovider "$@"; '
+    'else cd {root} && exec {python} -m pytest --collect-only -q -p no:cacheprovider "$@"; fi',
     "sudo": "exit 0",  # what a machine needs once
     "make": 'if [ -e Makefile ] || [ "$1" = -C ]; then exec {make} "$@"; else exec {make} -n -C {root} "$@"; fi',
 }
