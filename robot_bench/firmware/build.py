@@ -7,6 +7,7 @@ Source: gcc-arm-none-eabi of Debian 12 (12.2.rel1) built the committed files.
 """
 
 import argparse
+import shutil
 import subprocess
 import sys
 import tempfile
@@ -16,7 +17,9 @@ HERE = Path(__file__).resolve().parent
 COMPILER = "arm-none-eabi-gcc"
 #: First line of `arm-none-eabi-gcc --version` for the compiler of the committed ELFs.
 COMPILER_VERSION = "arm-none-eabi-gcc (15:12.2.rel1-1) 12.2.1 20221205"
-BOARD_SOURCES = ("startup.c", "memory.c", "board.c", "pins.c", "tick.c", "uart.c")
+#: With the motors' wires as duty and sign, and as three bits.
+DUTY_SOURCES = ("startup.c", "memory.c", "board.c", "pins.c", "motors_duty.c", "tick.c", "uart.c")
+BOARD_SOURCES = tuple(source.replace("motors_duty", "motors_bits") for source in DUTY_SOURCES)
 #: Program name to its sources.
 PROGRAMS = {
     "motors": (*BOARD_SOURCES, "motors.c"),
@@ -24,11 +27,15 @@ PROGRAMS = {
     "encoders": (*BOARD_SOURCES, "encoders.c", "odometer.c"),
     "analog": (*BOARD_SOURCES, "analog.c"),
     "dodge": (*BOARD_SOURCES, "dodge.c", "dodge_fsm.c", "odometer.c"),
+    "dodge_duty": (*DUTY_SOURCES, "dodge.c", "dodge_fsm.c", "odometer.c"),
     # Its pins are its own: of board.c only the clock is kept.
     "rover": ("startup.c", "memory.c", "board.c", "uart.c", "rover_board.c", "rover.c"),
+    "usb_echo": ("startup.c", "memory.c", "usb_echo.c"),
     # Brings pins, clock and line of its own.
     "board_test": ("startup.c", "memory.c", "board_test.c"),
 }
+#: A program that another package ships; it borrows the start-up code of the examples.
+KIT = HERE.parent.parent / "bluepill_sim" / "analysis" / "silicon" / "kit.c"
 MACHINE_FLAGS = ("-mcpu=cortex-m3", "-mthumb")
 COMPILE_FLAGS = (
     *MACHINE_FLAGS,
@@ -98,6 +105,18 @@ def build_programs(output_folder: Path) -> list[Path]:
     return built
 
 
+def build_kit(output: Path) -> Path:
+    """Build the silicon kit into the ELF `output` and return its path."""
+    with tempfile.TemporaryDirectory() as scratch:
+        folder = Path(scratch).resolve()
+        for source in (KIT, *(HERE / name for name in ("startup.c", "memory.c", "f103.h", "f103c8.ld"))):
+            shutil.copy(source, folder)
+        build_elf(
+            ("startup.c", "memory.c", KIT.name), folder=folder, linker_script="f103c8.ld", output=output.resolve()
+        )  # fmt: skip
+    return output
+
+
 def _run(command: list[str], folder: Path) -> None:
     subprocess.run(command, cwd=folder, check=True)  # noqa: S603
 
@@ -113,7 +132,8 @@ def main() -> int:
         return 2
     if version != COMPILER_VERSION:
         print(f"build: note: {version} gives other bytes than {COMPILER_VERSION}", file=sys.stderr)  # noqa: T201
-    for elf in build_programs(folder):
+    kit = KIT.with_suffix(".elf") if folder == HERE else folder / "kit.elf"
+    for elf in (*build_programs(folder), build_kit(kit)):
         print(f"{elf.name}: {elf.stat().st_size} bytes")  # noqa: T201
     return 0
 

@@ -222,6 +222,15 @@ class KinematicBody(BodyInWorld):
         self._left, self._right = rims or (0.0, 0.0)
         return self._turn_wheels()
 
+    def stand_still(self, steps: int) -> int:
+        """Stand for so many steps, where it is alone and nothing walks; see `Body`."""
+        if self.others or self._walking or self._is_bumped or steps <= 0:
+            return 0
+        self.go(0.0, 0.0)
+        self._steps += steps - 1
+        self._contacts.update(touching=self._free_m == 0.0, steps=steps - 1)
+        return steps
+
     def _turn_wheels(self) -> Turned:
         """Turn the wheels by this step, and by how far another robot has pushed them since the last."""
         if self._is_bumped:

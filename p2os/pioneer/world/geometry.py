@@ -206,10 +206,15 @@ def _ray_circle(px: float, py: float, dx: float, dy: float, radius: float) -> fl
 
 def _apart(first: Polygon, second: Polygon) -> bool:
     """Tell whether an edge of the first convex polygon (counter-clockwise) has all of the second outside."""
-    for (ax, ay), (bx, by) in pairwise((*first, first[0])):
+    ax, ay = first[-1]
+    for bx, by in first:
         ex, ey = bx - ax, by - ay
-        if all((px - ax) * ey - (py - ay) * ex > 0.0 for px, py in second):
+        for px, py in second:  # a generator costs twice as much, and robots that push each other ask little else
+            if (px - ax) * ey - (py - ay) * ex <= 0.0:
+                break
+        else:
             return True
+        ax, ay = bx, by
     return False
 
 

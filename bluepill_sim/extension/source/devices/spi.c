@@ -158,7 +158,7 @@ static uint32_t crc_of(const struct device *device, uint32_t crc, uint32_t word)
 /* What the wires make of a word that this sends as a master. */
 static uint32_t exchange(struct device *device, uint32_t sent)
 {
-    const struct spi *spi = device->state;
+    struct spi *spi = device->state;
     const uint32_t mask = mask_of(device), data = device->words[CR1] & BIDIMODE ? MOSI : MISO;
     const struct port *port = &device->fabric->ports[spi->pins[data] / PINS];
     const bool is_readable = port->bonded & ~port->analog & ~port->held & 1u << spi->pins[data] % PINS;
@@ -174,7 +174,8 @@ static uint32_t exchange(struct device *device, uint32_t sent)
     if (spi->is_looped) {
         got = sent;
     } else if (spi->selected) {
-        got = ask(device, EXCHANGE, sent) & mask;
+        const bool holds = spi->ahead_cr1 == device->words[CR1] && (spi->ahead_sent > 0xFF || spi->ahead_sent == sent);
+        got = spi->ahead_at < spi->ahead_count && holds ? spi->ahead[spi->ahead_at++] : ask(device, EXCHANGE, sent) & mask;
     }
     if (!is_readable && !only_sends(device)) {
         ask(device, NO_MISO, 0);
@@ -375,7 +376,7 @@ static bool needs_time(const struct device *device, uint32_t index, bool is_writ
 static uint32_t clock_in(struct device *device, uint32_t word, uint32_t hz)
 {
     struct spi *spi = device->state;
-    if (spi->shift) {
+    if (spi->shift || spi->is_stopped) {
         return 0;
     }
     spi->far = HELD | word;
@@ -394,7 +395,7 @@ static void clear(struct device *device)
     for (uint32_t n = 0; n < SPI_PINS; ++n) {
         put(device, n, FLOATING);
     }
-    spi->shift = spi->tdr = spi->rdr = spi->seen = spi->far = 0;
+    spi->shift = spi->tdr = spi->rdr = spi->seen = spi->far = spi->is_stopped = 0;
     schedule(device, NO_TIME);
     listen(device);
     update_outputs(device);
@@ -416,6 +417,19 @@ static uint32_t command(struct device *device, uint32_t what, uint32_t one, uint
             schedule(device, spi->base_ns);
         }
         spi->clock_hz = one;
+        break;
+    case STOPPED:
+        event(device, now);
+        spi->is_stopped = 1;
+        schedule(device, NO_TIME);
+        break;
+    case RESUMED:
+        spi->is_stopped = 0;
+        spi->base_ns += (uint64_t)other << 32 | one;
+        spi->word_ns += (uint64_t)other << 32 | one;
+        if (spi->shift) {
+            schedule(device, end_ns(spi));
+        }
         break;
     case MOVE:
         for (uint32_t n = 0; n < SPI_PINS; ++n) {

@@ -172,6 +172,23 @@ def test_ue_lets_the_character_end_and_te_cuts_it_off(fake_chip: Any) -> None:
     assert status(fake_chip) & (TXE | TC) == TXE | TC
 
 
+def test_te_may_cut_off_an_idle_character_and_a_break_which_say_nothing(fake_chip: Any) -> None:
+    """Drivers clear TE while they change the format, often just after they have set it."""
+    set_up(fake_chip)
+    fake_chip.write("USART1.CR1", UE)
+    fake_chip.write("USART1.CR1", UE | TE)
+    fake_chip.write("USART1.CR1", UE)
+    fake_chip.write("USART1.CR1", UE | TE)
+    fake_chip.advance(fake_chip.now_ns + 10**6)
+    fake_chip.write("USART1.CR1", UE | TE | SBK)
+    fake_chip.write("USART1.CR1", UE)
+    assert fake_chip.warnings == {}
+    fake_chip.write("USART1.CR1", UE | TE)
+    fake_chip.write("USART1.DR", 1)  # behind the idle character
+    fake_chip.write("USART1.CR1", UE)
+    assert "USART1:te" in fake_chip.warnings
+
+
 def test_a_break_takes_the_line_for_one_character(fake_chip: Any) -> None:
     sent = set_up(fake_chip)
     start_ns = fake_chip.now_ns
