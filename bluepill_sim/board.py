@@ -37,6 +37,7 @@ from bluepill_sim.fabric.registers import RegisterView
 from bluepill_sim.fabric.signals import UV_PER_V, to_uv
 from bluepill_sim.fabric.subscriptions import EdgeSink, Of, PinSubscription
 from bluepill_sim.memory import Memory
+from bluepill_sim.parts.attached import AttachedParts
 from bluepill_sim.parts.serial_port import Activity, SerialPort
 from bluepill_sim.parts.usb import UsbHost, UsbSerial
 from bluepill_sim.peripherals.can import Can
@@ -92,7 +93,7 @@ class BluePill(Stateful):
         MissingDependencyError: unicorn, pyelftools or intelhex is not installed.
     """
 
-    STATE = ("chip", "fault", "activity", "_warned", "_usarts", "_usb_serial", "boot0", "resets")
+    STATE = ("chip", "fault", "activity", "_warned", "_usarts", "_usb_serial", "boot0", "resets", "attached")
     #: Who listens.
     DERIVED = ("_warning_sinks",)
 
@@ -120,6 +121,8 @@ class BluePill(Stateful):
         self._chip = chip = Chip(memory, self.image.vector_table, self._warn, self._fault)
         self._activity = Activity()
         self._usarts = tuple(SerialPort(chip.parts.usart(n), self._activity, self._wait_for_bytes) for n in (1, 2, 3))
+        #: The parts that were attached by name, and the world that they sense.
+        self.attached = AttachedParts(lambda text: chip.pins.warn(text, once=text), chip.request_stop)
         self._usb = UsbHost(self._run_until)
         self._usb_serial = UsbSerial(self._usb, self._run_until, chip.request_stop)
         usb = cast("Usb", chip.parts.by_name["USB"])
@@ -153,7 +156,8 @@ class BluePill(Stateful):
 
     def next_deadline(self) -> Nanos | None:
         """Return when a peripheral next acts by itself; None for never. The core may act at any time."""
-        return self.chip.next_deadline()
+        deadlines = (self.chip.next_deadline(), self.attached.next_deadline())
+        return min((at for at in deadlines if at is not None), default=None)
 
     def advance_to(self, limit_ns: Nanos) -> ChipReached:
         """Run to the first block boundary at or after a time.
@@ -165,7 +169,11 @@ class BluePill(Stateful):
         Raises:
             UnmodelledError: in strict mode, something was warned of.
         """
-        return self.chip.advance_to(limit_ns)
+        return self._advance(limit_ns, self.chip.advance_to)
+
+    def step(self, limit_ns: Nanos) -> ChipReached:
+        """Run one instruction, as `Chip.step`, and bring the parts along."""
+        return self._advance(limit_ns, self.chip.step)
 
     def run_for(self, span: Span) -> ChipReached:
         """Run for a span of virtual time, such as "10 ms" or nanoseconds, past watched edges; a halt ends it early."""
@@ -442,7 +450,27 @@ class BluePill(Stateful):
         """Return bytes of flash or SRAM; None where there is no memory."""
         return self.chip.memory.read(address, size)
 
-    # What hangs on its buses.
+    # What hangs on its buses and pins.
+
+    def attach(
+        self, part: object, *, on: str | None = None, select: str | None = None, name: str = "", **pins: str
+    ) -> None:  # fmt: skip
+        """Attach a part, one that ships or one of your own (docs/parts.md).
+
+        >>> board.attach(Ssd1306(), on="I2C1")                     # doctest: +SKIP
+        >>> board.attach(HcSr04(), trig="PA8", echo="PB6")         # doctest: +SKIP
+
+        Args:
+            part: what it is.
+            on: the bus that it hangs on: "SPI1", "I2C1", "USART2", "CAN"; None: pins alone.
+            select: of an SPI, the pin that selects it while it is low; None: it always is.
+            name: what it is called in `attached.by_name`; empty: its class.
+            pins: its own pins by their names, each a pin of the chip.
+
+        Raises:
+            PartError: it cannot be attached so.
+        """
+        self.attached.attach(self, self.chip.pins, part, name, on, select, pins)
 
     def spi(self, name: str, device: SpiDevice | None = None, *, select: str | None = None) -> Spi:
         """Return an SPI, "SPI1" or "SPI2"; with a device, hang it on the bus first.
@@ -484,6 +512,21 @@ class BluePill(Stateful):
         if network is not None:
             part.attach(network)
         return part
+
+    def _advance(self, limit_ns: Nanos, go_on: Callable[[Nanos], ChipReached]) -> ChipReached:
+        """Bring the chip forward, and every part to its deadlines on the way."""
+        attached = self.attached
+        if not attached.has_deadlines:
+            return go_on(limit_ns)
+        while True:
+            due_ns = attached.next_deadline()
+            reached = go_on(limit_ns if due_ns is None or due_ns > limit_ns else due_ns)
+            attached.act(self.now_ns)
+            is_on_its_way = reached.reason is Reason.DEADLINE or (
+                reached.reason is Reason.HALT and reached.halt is None
+            )
+            if not is_on_its_way or self.now_ns >= limit_ns:
+                return reached
 
     # Callbacks of the chip.
 

@@ -261,6 +261,7 @@ WIRING: dict[str, tuple[int | str, ...]] = {
     "RTC.alarm": ("EXTI.rtc_alarm", "BKP.alarm", "PWR.alarm"),
     "RTC.second": ("BKP.second",),
     "IWDG.lsi": ("RCC.lsi",),
+    "RCC.css": ("TIM1.css",),
     "USB.wakeup": ("EXTI.usb_wakeup",),
     "CAN.packets": ("USB.can",),
     **_DMA1_REQUESTS,

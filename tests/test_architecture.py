@@ -80,7 +80,7 @@ LAYERS = {
         ("analysis", "debug"), ("cli",),
     ),
     "adapter_sim": (
-        ("codec",), ("settings", "pinout"), ("pins", "mixing", "encoders", "distances", "session"),
+        ("codec",), ("duty",), ("settings", "pinout"), ("pins", "mixing", "encoders", "distances", "session"),
         ("masters", "driver"), ("adapter",),
     ),
     "robot_bench": (

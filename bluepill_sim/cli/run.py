@@ -19,7 +19,9 @@ from bluepill_sim.cli.driving import (
     summary,
     warn_on_stderr,
 )
+from bluepill_sim.cli.parts import attach_parts, show_parts
 from bluepill_sim.cli.quantities import option, time_option
+from bluepill_sim.cli.stimuli import open_traces
 from bluepill_sim.core.halts import ChipReached
 from simbase.timing import NS_PER_MS, NS_PER_S, Nanos, Reason
 from simbase.units import BAUD
@@ -36,9 +38,12 @@ Examples:
   p2os mcu run mine.elf                          one second of virtual time
   p2os mcu run mine.elf --for 2s --uart log.txt  what it prints goes to a file
   p2os mcu run mine.elf --realtime --uart pty:   talk to it with any terminal program, until Ctrl-C
+  p2os mcu run mine.elf --itm log.txt            what ITM_SendChar prints, with times
   p2os mcu run mine.elf --drive PA6=1@500ms      something comes before a sensor
   p2os mcu run mine.elf --drive PA0=1.65V        what the ADC sees on a pin
   p2os mcu run mine.elf --until "pin PC13 low"   up to an event
+  p2os mcu run mine.elf --attach ssd1306,on=I2C1 --parts shots      an OLED, and its picture at the end
+  p2os mcu run mine.elf --attach ./mine.py:Sensor,on=I2C1,x=3       a part of your own
   p2os mcu run mine.elf --usb pty:               plug it in: its USB serial port is a terminal here
 """
 
@@ -85,14 +90,30 @@ def run(
         int | None,
         option(BAUD, "--usart-baud", purpose="Speed of USART1's far end; unset follows the program.", above_zero=True),
     ] = None,
+    itm: Annotated[
+        Path | None,
+        typer.Option("--itm", help="What it writes to the ITM's ports, as text with times.", metavar="FILE"),
+    ] = None,
+    swo: Annotated[
+        Path | None, typer.Option("--swo", help="The same as the packets that a probe receives on SWO.", metavar="FILE")
+    ] = None,
     strict: Annotated[bool, typer.Option("--strict", help="The first warning ends the run.")] = False,
+    attach: Annotated[
+        list[str] | None,
+        typer.Option(help="Attach a part; repeatable. `p2os mcu parts` lists them.", metavar="PART,KEY=VALUE,..."),
+    ] = None,
+    parts_folder: Annotated[
+        Path | None, typer.Option("--parts", help="Where pictures and files of parts go at the end.", metavar="FOLDER")
+    ] = None,
 ) -> None:
     """Boot a firmware."""
     end_ns = span_ns if span_ns is not None else _FOR_EVER_NS if realtime else NS_PER_S
     board = BluePill(firmware, strict=strict)
     board.usart1.far_baud = usart_baud
     changes = parse_changes(drive or [], board)
+    traces = open_traces(board, itm, swo)
     warn_on_stderr(board)
+    attach_parts(board, attach or [])
     consoles = [open_console(uart)]
     carriers = [connect(consoles[0], board.usart1)]
     if uart in PTY:
@@ -114,8 +135,11 @@ def run(
         finally:
             for console in consoles:
                 console.close()
+            for trace in traces:
+                trace.close()
             if uart == "-" and board.usart1.unread and not board.usart1.unread.endswith(b"\n"):
                 typer.echo("")
+    show_parts(board, parts_folder)
     print_status(summary(board))
     if print_fault(board):
         raise typer.Exit(1)

@@ -48,10 +48,12 @@ def share_registers(engine: Engine, parts: Iterable[Peripheral], rcc: Rcc) -> No
     for part in parts:
         count = len(part.REGISTERS) and max(register.offset for register in part.REGISTERS) // 4 + 1
         behaviour = (ctypes.c_uint16 * count)()
+        # What looks at each write itself does so for registers that only store, too.
+        decided = 0 if type(part).write is Peripheral.write else _WRITES_PLAIN
         masks = (ctypes.c_uint32 * (4 * count))()
         for register in part.REGISTERS:
             index = register.offset // 4
-            behaviour[index] = _behaviour(register, has_byte_lanes=part.HAS_BYTE_LANES)
+            behaviour[index] = _behaviour(register, has_byte_lanes=part.HAS_BYTE_LANES) & ~decided
             masks[4 * index : 4 * index + 4] = list(part.masks_of(index))
         gate = CLOCK_GATES.get(part.name)
         at, mask = rcc.gate_address(part.name) if gate is not None else (None, 0)
