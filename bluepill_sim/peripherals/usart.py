@@ -1,4 +1,4 @@
-"""USART1 to USART3, asynchronous: characters at the speed of the line.
+"""USART1 to USART3: characters at the speed of the line.
 
 Theory of operation. DR hides two registers each way. A write fills TDR
 (TXE falls); as soon as the shift register is free it takes TDR over (TXE
@@ -10,14 +10,16 @@ Switching TE on sends one idle character first. A received character is in DR
 when its stop bit has ended; one that finds RXNE still set is lost and raises
 ORE; a line that then stays idle for one character raises IDLE.
 
-Modelled: 8 and 9 bits, parity, 0.5 to 2 stop bits, breaks (sent as silence),
-all of these flags, their interrupts and DMA requests. The far end sends and listens at our
+Modelled: 8 and 9 bits, parity, 0.5 to 2 stop bits, breaks, mute mode, LIN
+breaks, half-duplex, RTS and CTS, synchronous mode, all flags, their interrupts
+and DMA requests. The far end sends and listens at our
 own baud rate, without errors, unless it has one of its own (`far_baud`): then
 characters too far off arrive damaged, both ways, and what comes in raises the
 FE, NE and PE that the samples of the line give (`fabric/line_speed.py`), at the
-times of our own frames. Not modelled, and warned of: synchronous, LIN, IrDA,
-smartcard and half-duplex modes, hardware flow control and mute mode. The levels
-of single bits do not show on the TX pin: it stays high.
+times of our own frames, and so do characters that are sent damaged on purpose.
+Single bits show on the TX pin while somebody is subscribed or listens to it; else
+it stays high, and they cost nothing. Not modelled, and warned of: IrDA and
+smartcard modes.
 
 Source: RM0008 section 27.
 Invariant: a character ends floor(frame half-bits * BRR * 10**9 / (2 * PCLK)) ns
@@ -25,8 +27,8 @@ after the point from which its run of characters is counted, never later than `d
 """
 
 from collections import Counter
-from collections.abc import Callable, Iterator
-from enum import IntEnum
+from collections.abc import Callable, Iterable, Iterator
+from enum import IntEnum, IntFlag
 
 from bluepill_sim.extension.layout import USART
 from bluepill_sim.fabric.characters import Characters
@@ -42,17 +44,14 @@ PE, FE, NE, ORE, IDLE, RXNE, TC, TXE = (1 << n for n in range(8))
 _WORD_BITS = bits((8, 0))
 #: Where a character that arrives has the flags of SR that a character brings.
 _FLAGS_AT = 16
-_CTS_LBD = bits(9, 8)
+LBD, _CTS_LBD = 1 << 8, bits(9, 8)
 SBK, RWU, RE, TE, IDLEIE, RXNEIE, TCIE, TXEIE, PEIE, PS, PCE, _WAKE, M, UE = (1 << n for n in range(14))
+#: Of CR2: a LIN break is recognised by 11 bits, not 10.
+_LBDL = 1 << 5
 #: What each bit of the control registers would ask for that is not modelled.
 _UNMODELLED = (
-    (CR1, RWU, "mute mode"),
-    (CR2, 1 << 11, "synchronous mode"),
-    (CR2, 1 << 14, "LIN mode"),
     (CR3, 1 << 1, "IrDA mode"),
-    (CR3, 1 << 3, "half-duplex mode"),
     (CR3, 1 << 5, "smartcard mode"),
-    (CR3, bits(8, 9), "hardware flow control"),
 )
 #: Stop bits in halves, by CR2 STOP.
 _STOP_HALF_BITS = (2, 1, 4, 3)
@@ -62,12 +61,30 @@ PINS = {
     "USART2": {0: ("PA2", "PA3"), 1: ("PD5", "PD6")},
     "USART3": {0: ("PB10", "PB11"), 1: ("PC10", "PC11"), 3: ("PD8", "PD9")},
 }
-#: Commands of its own (usart.c): move to pins; hear a word; tell whether words can be heard.
-_MOVE, _HEAR, _CAN_HEAR = range(OWN_COMMANDS, OWN_COMMANDS + 3)
+#: Pins (CTS, RTS) by the same; a field that is missing leaves them where they are.
+_CONTROL_PINS = {
+    "USART1": {0: ("PA11", "PA12")},
+    "USART2": {0: ("PA0", "PA1"), 1: ("PD3", "PD4")},
+    "USART3": {0: ("PB13", "PB14"), 3: ("PD11", "PD12")},
+}
+#: Commands of its own (usart.c): move to pins; hear a word; tell whether words can be heard;
+#: listen to nCTS; move (nCTS, nRTS).
+_MOVE, _HEAR, _CAN_HEAR, _LISTEN, _CONTROL = range(OWN_COMMANDS, OWN_COMMANDS + 5)
+
+
+class Damage(IntFlag):
+    """What a character that comes in raises beside RXNE."""
+
+    PARITY = PE
+    FRAMING = FE
+    NOISE = NE
+
+
+NOT_DAMAGED = Damage(0)
 
 
 class Question(IntEnum):
-    """What the device in C asks (usart.c): all but the last three are warnings."""
+    """What the device in C asks (usart.c): all but the last four are warnings."""
 
     TX_PIN = 0
     TX_OFF = 1
@@ -78,6 +95,8 @@ class Question(IntEnum):
     CHECK_MODES = 6
     JUDGE_SPEED = 7
     GIVE_MORE = 8
+    #: What comes in by the clock of a character that goes out.
+    EXCHANGE = 9
 
 
 #: What is warned of, after the name, and its key.
@@ -163,6 +182,8 @@ class Usart(Peripheral):
         self.sent_at: Counter[tuple[int, int]] = Counter()
         #: Characters from outside for which there is no room in C yet.
         self._coming: tuple[int, ...] = ()
+        #: In synchronous mode: the other end, given each word that goes out; None: the level of RX.
+        self.exchange: Callable[[int, int], int] | None = None
         self._pins = PINS[place.name]
         self._tx_pin, self._rx_pin = self._routed_pins()
         self.native.source = ALTERNATE_FUNCTIONS.index(f"{place.name}_TX")
@@ -179,13 +200,36 @@ class Usart(Peripheral):
         """How long one bit takes at the present baud rate, in ns; 0 while none is set."""
         return self.words[BRR] * 1_000_000_000 // self.clock_hz()
 
-    def receive(self, data: bytes) -> None:
-        """Send characters to the RX pin, at the speed of the line, behind those still on their way."""
+    def receive(self, data: Iterable[int], damage: Damage = NOT_DAMAGED) -> None:
+        """Send characters to the RX pin, at the speed of the line, behind those still on their way.
+
+        Args:
+            data: bytes, or words of 9 bits.
+            damage: what each raises beside RXNE; PARITY turns its parity bit over.
+        """
+        control = self.words[CR1]
+        words = [_with_parity(word & _WORD_BITS, control) for word in data]
+        if damage & Damage.PARITY and control & PCE:
+            words = [word ^ 1 << (8 if control & M else 7) for word in words]
+        self._hear(tuple(word | damage << _FLAGS_AT for word in self._arriving(words)))
+
+    def receive_break(self, low_bits: int) -> None:
+        """Hold the line at 0 for so many bits: a character 0 without its stop bit, and in LIN mode a break.
+
+        Raises:
+            ValueError: it would be over before a character is.
+        """
+        control = self.words[CR1]
+        if low_bits < _data_bits(control) + 2:
+            raise ValueError(f"{low_bits} bits at 0 are no break: {_data_bits(control) + 2} at least")
+        is_lin = low_bits >= (11 if self.words[CR2] & _LBDL else 10)
+        self._hear(((FE | (LBD if is_lin else 0)) << _FLAGS_AT,))
+
+    def _hear(self, arriving: tuple[int, ...]) -> None:
         if self.chip.power.is_stopped or not self.command(_CAN_HEAR):
             self._warn(Question.RX_OFF)
             return
-        control = self.words[CR1]
-        self._coming += self._arriving([_with_parity(byte, control) for byte in data])
+        self._coming += arriving
         self._give_more()
 
     # For the chip.
@@ -218,7 +262,8 @@ class Usart(Peripheral):
 
     def answer(self, what: int, value: int) -> int:
         """Warn, or give the next characters."""
-        del value
+        if what == Question.EXCHANGE:
+            return self._exchange(value)
         if what == Question.GIVE_MORE:
             self._give_more()
         elif what == Question.JUDGE_SPEED:
@@ -228,6 +273,12 @@ class Usart(Peripheral):
         else:
             self._warn(Question(what))
         return 0
+
+    def _exchange(self, word: int) -> int:
+        """Return what comes in, in synchronous mode, while a word goes out."""
+        if self.exchange is not None:
+            return self.exchange(word, self.chip.now_ns)
+        return _WORD_BITS if self._rx_pin.level else 0
 
     def _warn(self, question: Question) -> None:
         if question is Question.TX_PIN:
@@ -304,10 +355,14 @@ class Usart(Peripheral):
     def _route_changed(self) -> None:
         """Move to the pins that AFIO now gives."""
         self._tx_pin, self._rx_pin = self._routed_pins()
+        remap = self.chip.pins.remaps.get(self.name, 0)
+        cts, rts = _CONTROL_PINS[self.name].get(remap, _CONTROL_PINS[self.name][0])
+        self.command(_CONTROL, self.chip.pins[cts].index, self.chip.pins[rts].index)
         self.command(_MOVE, self._tx_pin.index, self._rx_pin.index)
 
     def _restored(self) -> None:
         self._tx_pin, self._rx_pin = self._routed_pins()
+        self.command(_LISTEN)
 
     def _routed_pins(self) -> tuple[Pin, Pin]:
         tx, rx = self._pins.get(self.chip.pins.remaps.get(self.name, 0), self._pins[0])

@@ -1,4 +1,4 @@
-/* A USART, asynchronous: characters at the speed of the line. What is warned of, and lines whose far end has another
+/* A USART: characters at the speed of the line. What is warned of, and lines whose far end has another
  * speed, are Python's business (peripherals/usart.py, which has the theory of operation).
  *
  * Source: RM0008 27.
@@ -11,18 +11,24 @@
  * flag), what stands behind the shift register, what is in it (0: nothing), and what DR reads. */
 enum { SR, DR, BRR, CR1, CR2, CR3, SEEN = 7, TDR, SHIFT, RDR };
 /* Of SR, and of what it enables in CR1 at the same places. */
-enum { PE = 1 << 0, FE = 1 << 1, NE = 1 << 2, ORE = 1 << 3, IDLE = 1 << 4, RXNE = 1 << 5, TC = 1 << 6, TXE = 1 << 7 };
+enum { PE = 1 << 0, FE = 1 << 1, NE = 1 << 2, ORE = 1 << 3, IDLE = 1 << 4, RXNE = 1 << 5, TC = 1 << 6, TXE = 1 << 7,
+       LBD = 1 << 8, CTS = 1 << 9 };
 enum { ASKING = TXE | TC | RXNE | IDLE, READ_SEQUENCE = 0x1F };
 /* Of CR1. */
-enum { SBK = 1 << 0, RE = 1 << 2, TE = 1 << 3, RXNEIE = 1 << 5, PEIE = 1 << 8, M = 1 << 12, UE = 1 << 13 };
-/* Of CR3. */
-enum { EIE = 1 << 0, DMAR = 1 << 6, DMAT = 1 << 7 };
+enum { SBK = 1 << 0, RWU = 1 << 1, RE = 1 << 2, TE = 1 << 3, RXNEIE = 1 << 5, PEIE = 1 << 8, PS = 1 << 9, PCE = 1 << 10,
+       WAKE = 1 << 11, M = 1 << 12, UE = 1 << 13 };
+/* Of CR2 and CR3. */
+enum { ADD = 0xF, LBDIE = 1 << 6, CLKEN = 1 << 11, LINEN = 1 << 14 };
+enum { EIE = 1 << 0, HDSEL = 1 << 3, DMAR = 1 << 6, DMAT = 1 << 7, RTSE = 1 << 8, CTSE = 1 << 9, CTSIE = 1 << 10 };
+/* How far its alternate function RTS stands before TX; bits of a break in LIN mode. */
+enum { RTS_FROM_TX = 2, LIN_BREAK_BITS = 13 };
 /* A data word, what marks one in TDR and SHIFT, and what SHIFT holds besides. */
 enum { WORD = 0x1FF, HELD = 1 << 16, PREAMBLE = 1 << 17, BREAK = 1 << 18, FLAGS_AT = 16 };
-/* What Python is asked, as `Question` of usart.py: all but the last two are warnings. */
-enum { TX_PIN, TX_OFF, NO_RATE, CHARACTER_LOST, RX_OFF, CUT_OFF, CHECK_MODES, JUDGE_SPEED, GIVE_MORE };
-/* Commands of its own: move to the pins (TX, RX); hear a word, or learn that no more can be held. */
-enum { MOVE = OWN_COMMANDS, HEAR, CAN_HEAR };
+/* What Python is asked, as `Question` of usart.py: all but the last four are warnings. */
+enum { TX_PIN, TX_OFF, NO_RATE, CHARACTER_LOST, RX_OFF, CUT_OFF, CHECK_MODES, JUDGE_SPEED, GIVE_MORE, EXCHANGE };
+/* Commands of its own: move to the pins (TX, RX); hear a word, or learn that no more can be held; listen to nCTS,
+ * move (nCTS, nRTS). */
+enum { MOVE = OWN_COMMANDS, HEAR, CAN_HEAR, LISTEN, CONTROL };
 /* Its outputs. */
 enum { IRQ, TX_DMA, RX_DMA };
 
@@ -40,9 +46,10 @@ static bool carries(const struct device *device)
 static bool can_receive(const struct device *device)
 {
     const struct usart *usart = device->state;
-    const struct port *port = &device->fabric->ports[usart->rx_pin / PINS];
+    const uint32_t pin = device->words[CR3] & HDSEL ? usart->tx_pin : usart->rx_pin;
+    const struct port *port = &device->fabric->ports[pin / PINS];
     const uint32_t listening = port->bonded & ~port->held & (port->alternate | ~(port->output | port->analog));
-    return (device->words[CR1] & (UE | RE)) == (UE | RE) && device->words[BRR] && listening >> usart->rx_pin % PINS & 1;
+    return (device->words[CR1] & (UE | RE)) == (UE | RE) && device->words[BRR] && listening >> pin % PINS & 1;
 }
 
 static uint64_t frame_half_bits(const struct device *device)
@@ -50,6 +57,14 @@ static uint64_t frame_half_bits(const struct device *device)
     static const uint8_t stop_half_bits[4] = {2, 1, 4, 3};
     const uint32_t data_bits = device->words[CR1] & M ? 9 : 8;
     return 2 * (1 + data_bits) + stop_half_bits[device->words[CR2] >> 12 & 3];
+}
+
+/* Whether the far end lets us send: nCTS is low, or does not matter. */
+static bool may_send(const struct device *device)
+{
+    const struct usart *usart = device->state;
+    const bool is_high = device->fabric->ports[usart->cts_pin / PINS].input >> usart->cts_pin % PINS & 1;
+    return !(device->words[CR3] & CTSE && is_high);
 }
 
 static uint64_t span_ns(const struct device *device, uint64_t half_bits)
@@ -65,9 +80,16 @@ static void update_outputs(struct device *device)
     /* TXEIE, TCIE and IDLEIE sit at the places of their flags; ORE shares RXNEIE. */
     output_set(device, IRQ,
                (status & control & ASKING) || (status & ORE && control & RXNEIE) || (status & PE && control & PEIE) ||
-                   (status & (FE | NE | ORE) && (dma & (EIE | DMAR)) == (EIE | DMAR)));
+                   (status & (FE | NE | ORE) && (dma & (EIE | DMAR)) == (EIE | DMAR)) ||
+                   (status & LBD && device->words[CR2] & LBDIE) || (status & CTS && dma & CTSIE));
     output_set(device, TX_DMA, dma & DMAT && status & TXE && is_transmitting(device));
     output_set(device, RX_DMA, dma & DMAR && status & RXNE);
+    struct usart *usart = device->state;
+    const uint32_t ready = dma & RTSE && control & UE ? (status & RXNE ? HIGH : LOW) : FLOATING;
+    if (ready != usart->rts) {
+        usart->rts = ready;
+        offer(device->fabric, usart->rts_pin, usart->source - RTS_FROM_TX, ready);
+    }
 }
 
 /* Works out all deadlines from what is on the line. */
@@ -75,11 +97,60 @@ static void find_deadlines(struct device *device)
 {
     struct usart *usart = device->state;
     usart->tx_due_ns = device->words[SHIFT] ? usart->tx_base_ns + span_ns(device, usart->tx_half_bits) : NO_TIME;
-    usart->rx_due_ns = usart->rx_count ? usart->rx_base_ns + span_ns(device, usart->rx_half_bits) : NO_TIME;
+    usart->rx_due_ns = usart->rx_count && !usart->rx_waits ? usart->rx_base_ns + span_ns(device, usart->rx_half_bits) : NO_TIME;
+    usart->bit_due_ns = usart->bits ? usart->tx_base_ns + span_ns(device, usart->bit_half_bits) : NO_TIME;
     uint64_t due = usart->tx_due_ns;
+    due = usart->bit_due_ns < due ? usart->bit_due_ns : due;
     due = usart->rx_due_ns < due ? usart->rx_due_ns : due;
     due = usart->idle_due_ns < due ? usart->idle_due_ns : due;
     schedule(device, due);
+}
+
+/* A word with its parity, where it has one. */
+static uint32_t with_parity(const struct device *device, uint32_t word)
+{
+    const uint32_t control = device->words[CR1], top = control & M ? 8 : 7;
+    if (!(control & PCE)) {
+        return word;
+    }
+    const uint32_t data = word & ((1u << top) - 1);
+    return data | ((uint32_t)__builtin_parity(data) ^ (control & PS ? 1u : 0u)) << top;
+}
+
+/* How many bits at 0 a break has; one at 1 follows. */
+static uint32_t break_bits(const struct device *device)
+{
+    return device->words[CR2] & LINEN ? LIN_BREAK_BITS : device->words[CR1] & M ? 11 : 10;
+}
+
+/* Has somebody who looks at the TX pin see the bits of an item, from `before` half-bits on.
+ *
+ * `bits` are those to come, the next one at bit 0, and above the last of them a mark. */
+static void show_bits(struct device *device, uint32_t item, uint64_t before)
+{
+    struct usart *usart = device->state;
+    const struct fabric *fabric = device->fabric;
+    const uint32_t port = usart->tx_pin / PINS, count = device->words[CR1] & M ? 9 : 8;
+    const bool is_seen = (fabric->subscribed[port] | fabric->listened[port]) >> usart->tx_pin % PINS & 1;
+    usart->bits = 0;
+    if (!is_seen || item == PREAMBLE) {
+        return;
+    }
+    usart->bits = item == BREAK ? 3u << break_bits(device) : (with_parity(device, item & WORD) & ((1u << count) - 1)) << 1 | 3u << (count + 1);
+    usart->bit_half_bits = before;
+}
+
+/* Puts the next bit on the pin, and finds the one behind it that differs. */
+static void show_next_bit(struct device *device)
+{
+    struct usart *usart = device->state;
+    const uint32_t level = usart->bits & 1;
+    offer(device->fabric, usart->tx_pin, usart->source, level ? HIGH : LOW);
+    do {
+        usart->bits >>= 1;
+        usart->bit_half_bits += 2;
+    } while (usart->bits > 1 && (usart->bits & 1) == level);
+    usart->bits = usart->bits > 1 ? usart->bits : 0;
 }
 
 /* Puts an item into the shift register, `before` half-bits after `base_ns`. */
@@ -88,7 +159,8 @@ static void load(struct device *device, uint32_t item, uint64_t base_ns, uint64_
     struct usart *usart = device->state;
     device->words[SHIFT] = item;
     usart->tx_base_ns = base_ns;
-    usart->tx_half_bits = before + frame_half_bits(device);
+    usart->tx_half_bits = before + (item == BREAK ? 2 * break_bits(device) + 2 : frame_half_bits(device));
+    show_bits(device, item, before);
 }
 
 static void connect(struct device *device, bool is_on)
@@ -114,6 +186,47 @@ static void emit(struct device *device, uint32_t word, uint64_t ns)
     send_word(device, &row);
 }
 
+/* A character that is in: the flags that it brings stand above it. */
+static void arrive(struct device *device, uint32_t arrived)
+{
+    uint32_t *words = device->words;
+    const uint32_t flags = arrived >> FLAGS_AT & ~(words[CR2] & LINEN ? 0u : (uint32_t)LBD);
+    if (words[CR1] & WAKE && arrived >> (words[CR1] & M ? 8 : 7) & 1) { /* an address */
+        words[CR1] = (arrived & ADD) == (words[CR2] & ADD) ? words[CR1] & ~(uint32_t)RWU : words[CR1] | RWU;
+    }
+    if (words[CR1] & RWU) {
+        return;
+    }
+    if (words[SR] & RXNE) {
+        words[SR] |= ORE | (flags & LBD);
+    } else {
+        words[RDR] = arrived & WORD;
+        words[SR] |= RXNE | flags;
+    }
+}
+
+/* What a character that goes out brings in: itself on the one wire of half-duplex, the other way in synchronous mode. */
+static void hear_own(struct device *device, uint32_t word)
+{
+    if (!can_receive(device)) {
+        return;
+    }
+    if (device->words[CR2] & CLKEN) {
+        arrive(device, ask(device, EXCHANGE, word) & WORD);
+    } else if (device->words[CR3] & HDSEL) {
+        arrive(device, with_parity(device, word));
+    }
+}
+
+/* Sends what waits behind the shift register. */
+static void send_next(struct device *device, uint64_t base_ns, uint64_t before)
+{
+    const uint32_t item = device->words[TDR];
+    device->words[TDR] = 0;
+    device->words[SR] |= TXE;
+    load(device, item, base_ns, before);
+}
+
 static void end_transmission(struct device *device, uint64_t ns)
 {
     struct usart *usart = device->state;
@@ -122,6 +235,7 @@ static void end_transmission(struct device *device, uint64_t ns)
     words[SHIFT] = 0;
     if (ended & HELD) {
         emit(device, ended & WORD, ns);
+        hear_own(device, ended & WORD);
     }
     if (ended == BREAK) {
         words[CR1] &= ~(uint32_t)SBK;
@@ -131,13 +245,10 @@ static void end_transmission(struct device *device, uint64_t ns)
         words[SR] |= TC;
     } else if (words[CR1] & SBK) {
         load(device, BREAK, usart->tx_base_ns, usart->tx_half_bits);
-    } else if (words[TDR]) {
-        const uint32_t item = words[TDR];
-        words[TDR] = 0;
-        words[SR] |= TXE;
-        load(device, item, usart->tx_base_ns, usart->tx_half_bits);
-    } else {
+    } else if (!words[TDR]) {
         words[SR] |= TC;
+    } else if (may_send(device)) {
+        send_next(device, usart->tx_base_ns, usart->tx_half_bits);
     }
 }
 
@@ -155,12 +266,8 @@ static void end_reception(struct device *device, uint64_t ns)
         ask(device, RX_OFF, 0);
         return;
     }
-    if (words[SR] & RXNE) {
-        words[SR] |= ORE;
-    } else {
-        words[RDR] = arrived & WORD;
-        words[SR] |= RXNE | arrived >> FLAGS_AT;
-    }
+    arrive(device, arrived);
+    usart->rx_waits = words[CR3] & RTSE && words[SR] & RXNE; /* the far end waits for nRTS */
     if (!usart->rx_count) {
         usart->idle_due_ns = ns + span_ns(device, frame_half_bits(device));
     }
@@ -171,13 +278,19 @@ static void event(struct device *device, uint64_t until)
     struct usart *usart = device->state;
     uint64_t ns;
     while ((ns = due_ns(device)) <= until) {
-        if (usart->tx_due_ns == ns) {
+        if (usart->bit_due_ns == ns) {
+            show_next_bit(device);
+        } else if (usart->tx_due_ns == ns) {
             end_transmission(device, ns);
         } else if (usart->rx_due_ns == ns) {
             end_reception(device, ns);
         } else {
             usart->idle_due_ns = NO_TIME;
-            device->words[SR] |= IDLE;
+            if (!(device->words[CR1] & RWU)) {
+                device->words[SR] |= IDLE;
+            } else if (!(device->words[CR1] & WAKE)) {
+                device->words[CR1] &= ~(uint32_t)RWU;
+            }
         }
         find_deadlines(device);
         update_outputs(device);
@@ -195,7 +308,7 @@ static void write_data(struct device *device, uint32_t word)
         ask(device, TX_OFF, 0);
     } else if (!words[BRR]) {
         ask(device, NO_RATE, 0);
-    } else if (!words[SHIFT]) {
+    } else if (!words[SHIFT] && may_send(device)) {
         load(device, HELD | word, now_ns(device->fabric), 0);
         find_deadlines(device);
     } else {
@@ -215,12 +328,36 @@ static void write_rate(struct device *device, uint64_t tx_end_ns, uint64_t rx_en
     if (usart->tx_due_ns != NO_TIME) {
         usart->tx_base_ns = tx_end_ns;
         usart->tx_half_bits = 0;
+        usart->bits = 0; /* the rest of the character is not shown */
+        connect(device, true);
     }
     if (usart->rx_due_ns != NO_TIME) {
         usart->rx_base_ns = rx_end_ns;
         usart->rx_half_bits = 0;
     }
     find_deadlines(device);
+}
+
+/* Listens to nCTS, where that matters. */
+static void listen(struct device *device)
+{
+    const struct usart *usart = device->state;
+    for (uint32_t port = 0; port < PORTS; ++port) {
+        const bool is_there = device->words[CR3] & CTSE && usart->cts_pin / PINS == port;
+        listen_to_pins(device, port, is_there ? 1u << usart->cts_pin % PINS : 0);
+    }
+}
+
+static void pins(struct device *device, uint32_t port, uint32_t changed)
+{
+    (void)port, (void)changed; /* nCTS */
+    uint32_t *words = device->words;
+    words[SR] |= CTS;
+    if (words[TDR] && !words[SHIFT] && is_transmitting(device) && may_send(device)) {
+        send_next(device, now_ns(device->fabric), 0);
+        find_deadlines(device);
+    }
+    update_outputs(device);
 }
 
 /* Follows UE, TE and SBK. */
@@ -240,13 +377,14 @@ static void write_control(struct device *device)
         if ((words[SHIFT] | words[TDR]) & HELD) { /* an idle character or a break says nothing */
             ask(device, CUT_OFF, 0);
         }
-        words[SHIFT] = words[TDR] = 0;
+        words[SHIFT] = words[TDR] = usart->bits = 0;
         words[SR] |= TXE | TC;
     }
     if (!is_on && !words[SHIFT]) {
         connect(device, false);
     }
     usart->was_enabled = is_on;
+    listen(device);
     if (is_on && words[CR1] & SBK && !words[SHIFT] && has_rate) {
         load(device, BREAK, now_ns(device->fabric), 0);
     }
@@ -260,6 +398,13 @@ static uint32_t read(struct device *device, uint32_t index)
     (void)index; /* DR */
     words[SR] &= ~(RXNE | (words[SEEN] & READ_SEQUENCE));
     words[SEEN] &= ~(uint32_t)READ_SEQUENCE;
+    struct usart *usart = device->state;
+    if (usart->rx_waits) {
+        usart->rx_waits = 0;
+        usart->rx_base_ns = now_ns(device->fabric);
+        usart->rx_half_bits = frame_half_bits(device);
+        find_deadlines(device);
+    }
     update_outputs(device);
     return words[RDR];
 }
@@ -284,6 +429,9 @@ static void write(struct device *device, uint32_t index, uint32_t written, uint3
 static bool needs_time(const struct device *device, uint32_t index, bool is_write)
 {
     const uint32_t *words = device->words;
+    if (words[CR3] & RTSE) {
+        return true;
+    }
     const bool is_behind = is_transmitting(device) && words[BRR] && words[SHIFT] && !words[TDR];
     return !(index == SR || (index == DR && (!is_write || is_behind)));
 }
@@ -297,11 +445,14 @@ static void clear(struct device *device)
 {
     struct usart *usart = device->state;
     const struct usart fresh = {.tx_due_ns = NO_TIME, .rx_due_ns = NO_TIME, .idle_due_ns = NO_TIME,
+                                .bit_due_ns = NO_TIME, .rts = FLOATING, .rts_pin = usart->rts_pin, .cts_pin = usart->cts_pin,
                                 .clock_hz = usart->clock_hz, .source = usart->source, .tx_pin = usart->tx_pin,
                                 .rx_pin = usart->rx_pin, .judged_hz = usart->judged_hz,
                                 .judged_brr = usart->judged_brr};
     connect(device, false);
+    offer(device->fabric, usart->rts_pin, usart->source - RTS_FROM_TX, FLOATING);
     *usart = fresh;
+    listen(device);
     for (uint32_t n = SEEN; n <= RDR; ++n) {
         device->words[n] = 0;
     }
@@ -358,6 +509,15 @@ static uint32_t command(struct device *device, uint32_t what, uint32_t one, uint
         }
         usart->rx_pin = other;
         break;
+    case LISTEN: listen(device); break;
+    case CONTROL:
+        offer(device->fabric, usart->rts_pin, usart->source - RTS_FROM_TX, FLOATING);
+        usart->rts = FLOATING;
+        usart->cts_pin = one;
+        usart->rts_pin = other;
+        listen(device);
+        update_outputs(device);
+        break;
     case HEAR: return hear(device, one);
     case SETTLE: return device->words[RDR] & WORD; /* DR */
     case CAN_HEAR: return can_receive(device);
@@ -367,4 +527,4 @@ static uint32_t command(struct device *device, uint32_t what, uint32_t one, uint
 }
 
 DEVICE_KIND(usart_kind) = {
-    .name = "usart", .needs_time = needs_time, .read = read, .write = write, .event = event, .command = command};
+    .name = "usart", .needs_time = needs_time, .read = read, .write = write, .event = event, .pins = pins, .command = command};

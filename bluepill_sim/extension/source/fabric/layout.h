@@ -231,6 +231,8 @@ struct usart {
     uint64_t rx_half_bits;
     uint64_t rx_due_ns;
     uint64_t idle_due_ns;
+    uint64_t bit_due_ns;
+    uint64_t bit_half_bits; /* half-bits up to the next bit on the TX pin */
     uint32_t clock_hz; /* the PCLK that the deadlines were worked out with */
     uint32_t was_enabled; /* whether transmission was on at the last write of a control register */
     uint32_t rate_pc; /* the instruction that has set the speed */
@@ -241,10 +243,15 @@ struct usart {
     uint32_t rx_pin;
     uint32_t rx_first;
     uint32_t rx_count;
+    uint32_t cts_pin;
+    uint32_t rts_pin;
+    uint32_t rts; /* the level that nRTS was last given */
+    uint32_t rx_waits; /* the far end waits for nRTS */
+    uint32_t bits; /* bits of a character to come on the TX pin, and a mark above them; 0: nobody looks */
     uint32_t rx_more; /* Python has more characters to come */
     uint32_t rx[256]; /* what DR will read, and above it the flags of SR */
 };
-_Static_assert(sizeof(struct usart) == 1128, "usart");
+_Static_assert(sizeof(struct usart) == 1160, "usart");
 
 /* What EXTI holds beyond its registers. */
 struct exti {
