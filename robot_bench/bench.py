@@ -32,7 +32,8 @@ from typing import TYPE_CHECKING, Self, TypeAlias, TypeVar, Union, Unpack, cast
 
 from adapter_sim import Adapter
 from adapter_sim.pinout import Pinout, Pull, WireRole, load_pinout
-from bluepill_sim.parts.registry import attach
+from bluepill_sim.fabric.surroundings import Surroundings
+from bluepill_sim.parts.registry import PartSpec, attach
 from bluepill_sim.spans import Span, to_nanos
 from p2os.errors import ScenarioError
 from p2os.event_log import log_event, logger
@@ -895,16 +896,8 @@ class Bench(Stateful):
 
     def _plug_in(self, chip: Chip) -> tuple[WorldSenses, ...]:
         """Attach the scenario's parts to the board, and have them sense the world."""
-        board = cast("BluePill", chip)
-        if not hasattr(board, "attached"):
-            raise TypeError(f"a {type(chip).__name__} takes no parts: an emulated BluePill does")
         senses = WorldSenses(self.parts.body, self._bring_robot_to)
-        board.attached.surroundings = senses
-        board.attached.note_sinks.append(
-            lambda at, part, what, detail: self.recorder.event("part", at, part, f"{what} {detail}".rstrip())
-        )
-        for spec in self.scenario.parts:
-            attach(board, spec)
+        plug_in(self.scenario.parts, chip, self.recorder, senses)
         return (senses,)
 
     def _direct_robot(self, pinout: Pinout, body: RobotBody, harness: Harness) -> DirectRobot:
@@ -1003,6 +996,25 @@ def _refuse_others(saved: dict[str, object], here: dict[str, object]) -> None:
         if here.get(what) != value:
             values = f": {value} there, {here.get(what)} here" if isinstance(value, str | int) else ""
             raise UsageError(f"the bench was saved with another {what}{values}", hint=RUN_ANEW)
+
+
+def plug_in(parts: Sequence[PartSpec], chip: Chip, recorder: Recorder, world: Surroundings | None = None) -> None:
+    """Attach parts to a board, have what they tell recorded, and have them sense a world, where there is one.
+
+    Raises:
+        TypeError: The chip is none that takes parts.
+        PartError: One cannot be attached.
+    """
+    board = cast("BluePill", chip)
+    if not hasattr(board, "attached"):
+        raise TypeError(f"a {type(chip).__name__} takes no parts: an emulated BluePill does")
+    if world is not None:
+        board.attached.surroundings = world
+    board.attached.note_sinks.append(
+        lambda at, part, what, detail: recorder.event("part", at, part, f"{what} {detail}".rstrip())
+    )
+    for spec in parts:
+        attach(board, spec)
 
 
 def hear_usarts(chip: Chip, recorder: Recorder) -> None:

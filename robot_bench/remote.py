@@ -19,7 +19,7 @@ from p2os.protocol.frames import Decoder, Frame
 from p2os.protocol.sip import SIP_KINDS, StandardSip
 from p2os.transport import Transport
 from robot_bench.adapter import make_adapter
-from robot_bench.bench import boot, hear_usarts, log_bench_event, make_harness
+from robot_bench.bench import boot, hear_usarts, log_bench_event, make_harness, plug_in
 from robot_bench.recording.client_view import OdometryPose, SipRanges
 from robot_bench.recording.recorder import Recorder
 from robot_bench.recording.trace import TraceWriter
@@ -69,6 +69,8 @@ class RemoteBench:
         self.note: str | None = "the pose is the robot's own odometry; collisions and clearance cannot be told"
         if scenario.changes:
             self.note += "; the scenario's obstacles are not placed"
+        if scenario.parts:
+            self.note += "; parts on the board sense no world"
         self._transport = transport
         self._pacer = pacer
         self.on_slice: Callable[[Nanos], None] | None = None
@@ -93,6 +95,8 @@ class RemoteBench:
         pin_of = {wire.name: wire.bluepill for wire in pinout.wires}
         ChipPins(chip, harness, pin_of, on_watched=self.loop.note_edge).watch(self.adapter.wakes_on, 0)
         chip.usart1.far_baud = scenario.usart_baud
+        if scenario.parts:
+            plug_in(scenario.parts, chip, recorder)
         hear_usarts(chip, recorder)
         chip.subscribe_warnings(lambda text: recorder.event("chip", chip.now_ns, "warning", text))
         recorder.start()

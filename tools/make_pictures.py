@@ -65,6 +65,8 @@ def groups() -> Iterator[Group]:
     """Yield all that docs/pictures holds."""
     files = ("robot_bench/scenarios/dodge.toml", f"{WORLDS}/room.toml", "robot_bench/firmware/dodge.elf", *REPORT)
     yield Group(names=("demo.png",), files=files, make=make_demo)
+    files = ("bluepill_sim/parts/*.py", "tests/bluepill_sim/firmware/parts.elf", "tools/part_pictures.py")
+    yield Group(names=("parts.png",), files=files, make=make_parts)
     for variant in BOARD_VARIANTS:
         sides = ("top", "bottom", "view", "bare") if variant == "rev-b" else ("top",)
         yield Group(names=tuple(f"board/{variant}-{side}.png" for side in sides),
@@ -91,6 +93,13 @@ def make_demo() -> None:
         if run(["run", "dodge", "--out", str(target)]):
             raise SystemExit("make_pictures: the demonstration failed")
         (PICTURES / "demo.png").write_bytes((target / "path.png").read_bytes())
+
+
+def make_parts() -> None:
+    """Draw what parts show and do."""
+    from tools.part_pictures import draw
+
+    draw(PICTURES / "parts.png")
 
 
 def make_board(variant: str) -> None:

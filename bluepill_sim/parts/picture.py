@@ -13,8 +13,8 @@ Colour = tuple[int, int, int]
 #: The dots of a braille character by row and column, as bits.
 _DOTS = ((0x01, 0x08), (0x02, 0x10), (0x04, 0x20), (0x40, 0x80))
 _BRAILLE = 0x2800
-#: chosen: what a page shows well.
-_WIDTH = 512
+#: chosen: what a page shows well, and how large a dot may be.
+_WIDTH, _MOST = 512, 16
 
 
 @dataclass(frozen=True, slots=True)
@@ -30,7 +30,7 @@ class Picture:
 
     def scale(self) -> int:
         """Return how much it is enlarged for a person: to about 512 dots."""
-        return max(1, _WIDTH // self.width)
+        return min(max(1, _WIDTH // self.width), _MOST)
 
     def png(self, scale: int = 1) -> bytes:
         """Return it as a PNG file; each dot is a square of `scale` by `scale`."""

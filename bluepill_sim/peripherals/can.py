@@ -376,7 +376,7 @@ class Can(Peripheral):
             self.reset()
             return
         status = self.words[MSR]
-        if written & INRQ and not written & SLEEP:
+        if written & INRQ:  # with SLEEP too: ST's drivers ask for it before they clear that
             status = status & ~SLAK | INAK
             self._sync_ns = None
         elif written & SLEEP:

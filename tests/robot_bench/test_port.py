@@ -14,6 +14,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 from types import FrameType
+from typing import Any
 
 import pytest
 
@@ -340,3 +341,16 @@ def test_nothing_is_sent_before_somebody_says_yes(
     assert "motors.elf will move the robot at serial:/dev/ttyUSB0, at most 200 mm/s and 45 deg/s" in err
     assert "hint: --yes says it beforehand" in err
     assert (line.sent, line.is_closed) == (b"", True)
+
+
+def test_parts_on_the_board_are_there_at_a_port_and_sense_no_world(tmp_path: Path) -> None:
+    path = tmp_path / "with_parts.toml"
+    path.write_text(
+        'firmware = "motors.elf"\nworld = "room"\nduration_s = 1.0\n'
+        '[[part]]\nkind = "hc-sr04"\ntrig = "PA8"\necho = "PA11"\n'
+    )
+    bench = RemoteBench(load_scenario(str(path)), FakeLine(), RealTimePacer())
+    board: Any = bench.chip
+    assert list(board.attached.by_name) == ["hc-sr04"]
+    assert board.attached.surroundings.motion().forward_mps == 0.0
+    assert "parts on the board sense no world" in (bench.note or "")

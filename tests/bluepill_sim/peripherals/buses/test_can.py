@@ -566,3 +566,10 @@ def test_two_boards_and_a_node_agree_whatever_the_order_of_the_boards(
     assert len(heard[0]) >= 8
     assert [row[1:] for row in heard[0]] == [row[1:] for row in heard[1]]
     assert [row[0] for row in heard[0]] == [row[0] for row in heard[1]]
+
+
+def test_initialisation_may_be_asked_for_before_sleep_is_cleared(fake_chip: Any) -> None:
+    fake_chip.write("CAN.MCR", SLEEP | INRQ)
+    assert fake_chip.read("CAN.MSR") & 3 == 1, "INAK without SLAK"
+    fake_chip.write("CAN.MCR", INRQ)
+    assert fake_chip.read("CAN.MSR") & 3 == 1
