@@ -31,7 +31,8 @@ CROSS = "arm-none-eabi-g++"
 #: Folders of headers that the program's own pull in, below components/; those that a version has not are left out.
 HEADERS = (
     "bootloader_support/include", "driver/gpio/include", "driver/uart/include", "driver/include", "driver/*/include",
-    "esp_blockdev/include", "esp_common/include", "esp_driver_gpio/include", "esp_driver_uart/include",
+    "esp_blockdev/include", "esp_common/include", "esp_driver_gpio/include", "esp_driver_mcpwm/include",
+    "esp_driver_uart/include",
     "esp_event/include", "esp_hal_*/include", "esp_hal_*/esp32/include", "esp_hw_support/include",
     "esp_hw_support/include/soc", "esp_hw_support/etm/include",
     "esp_hw_support/port/esp32/include", "esp_partition/include", "esp_ringbuf/include", "esp_rom/include",

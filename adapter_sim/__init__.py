@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from adapter_sim.codec import BitOrder
     from adapter_sim.pinout import Pinout, PinoutError, load_pinout, parse_pinout
     from adapter_sim.pins import PinBank
-    from adapter_sim.settings import AdapterSettings, EncoderAtOpen, MotorMeaning
+    from adapter_sim.settings import AdapterSettings, EncoderAtOpen, MotorCommand, MotorMeaning
 
 __all__ = [
     "Adapter",
@@ -22,6 +22,7 @@ __all__ = [
     "AdapterStatus",
     "BitOrder",
     "EncoderAtOpen",
+    "MotorCommand",
     "MotorMeaning",
     "PinBank",
     "Pinout",
@@ -38,6 +39,6 @@ if not TYPE_CHECKING:
             "adapter_sim.codec": ("BitOrder",),
             "adapter_sim.pinout": ("Pinout", "PinoutError", "load_pinout", "parse_pinout"),
             "adapter_sim.pins": ("PinBank",),
-            "adapter_sim.settings": ("AdapterSettings", "EncoderAtOpen", "MotorMeaning"),
+            "adapter_sim.settings": ("AdapterSettings", "EncoderAtOpen", "MotorCommand", "MotorMeaning"),
         },
     )

@@ -59,7 +59,7 @@ from adapter_sim.mixing import Speeds
 from adapter_sim.pinout import Pinout, WireRole
 from adapter_sim.pins import EventCallback, Inputs, Outputs, PinBank, SampleClock
 from adapter_sim.session import Session, SessionOpened, StopRepeater
-from adapter_sim.settings import AdapterSettings
+from adapter_sim.settings import AdapterSettings, MotorCommand
 from p2os.gamepad import PadReport
 from p2os.protocol.commands import set_origin, sonar
 from p2os.protocol.sip import StandardSip
@@ -170,8 +170,10 @@ class Adapter(Stateful):
         self.parameters = parameters
         self.settings = settings = settings or AdapterSettings()
         self.on_event = on_event
-        self.samples = SampleClock(settings.sample_period_ns)
-        self._driver = Driver(settings, parameters)
+        # A duty changes by its time-out too.
+        may_suspend = settings.motor_command is MotorCommand.BITS
+        self.samples = SampleClock(settings.sample_period_ns, may_suspend=may_suspend)
+        self._driver = Driver(settings, parameters, full_steps=1 << pinout.value("motor1").width - 1)
         self.distances = Distances(
             len(pinout.with_role(WireRole.DISTANCE)),
             threshold_um=threshold_um(settings.threshold_um, parameters),
@@ -407,6 +409,8 @@ class Adapter(Stateful):
         if state in {AdapterState.CLOSING, AdapterState.CONNECTING}:
             times.append(self._agenda.retry_at)
         self._other = min((time for time in times if time is not None), default=NEVER)
+        if self.samples.waits_for_edges and not self._has_pending_request and self.inputs.is_quiet(self._now):
+            self.samples.suspend()
         self._deadline = self.samples.due(self._other)
 
     def _clear(self) -> None:

@@ -43,13 +43,15 @@ class Driver(Stateful):
     Args:
         settings: Times, limits and meanings.
         parameters: The robot's own limits and conversions.
+        full_steps: Steps of a motor value that a full duty stands for.
     """
 
     STATE = ("plausibility", "_pacer", "_enables_left")
 
-    def __init__(self, settings: AdapterSettings, parameters: RobotParameters) -> None:
+    def __init__(self, settings: AdapterSettings, parameters: RobotParameters, *, full_steps: int) -> None:
         self.mixer = Mixer(
             settings,
+            full_steps=full_steps,
             track_mm=parameters.track_mm,
             max_velocity_mm_s=min(parameters.max_velocity_mm_s, parameters.motion.max_velocity_mm_s),
             max_rotation_deg_s=min(parameters.max_rotation_deg_s, parameters.motion.max_rotation_deg_s),

@@ -153,6 +153,7 @@ class Encoders(Stateful):
     """Both wheels' travel since the reference was taken."""
 
     STATE = ("_x", "_y", "_turn", "_raw_heading", "_heading", "_forward", "_offset_nm", "jumps")
+    DERIVED = ("_counts",)
 
     def __init__(self, geometry: EncoderGeometry, width: int) -> None:
         self.geometry = geometry
@@ -172,6 +173,8 @@ class Encoders(Stateful):
         self._offset_nm = (0, 0)
         #: Steps that no wheel can have made.
         self.jumps = 0
+        #: What `counts` returns, asked several times a packet; None: not worked out.
+        self._counts: tuple[int, int] | None = None
 
     @property
     def travel_nm(self) -> tuple[int, int]:
@@ -187,11 +190,16 @@ class Encoders(Stateful):
     @property
     def counts(self) -> tuple[int, int]:
         """Return the encoder steps of both wheels, by floor, unwrapped."""
-        left_nm, right_nm = self.travel_nm
-        return (
-            encoder_count(left_nm, self._per_turn_nm, self.width),
-            encoder_count(right_nm, self._per_turn_nm, self.width),
-        )
+        if self._counts is None:
+            left_nm, right_nm = self.travel_nm
+            self._counts = (
+                encoder_count(left_nm, self._per_turn_nm, self.width),
+                encoder_count(right_nm, self._per_turn_nm, self.width),
+            )
+        return self._counts
+
+    def _restored(self) -> None:
+        self._counts = None
 
     def begin(self, travel_nm: tuple[int, int] = (0, 0)) -> None:
         """Start anew at this travel; the next packet is the reference."""
@@ -201,6 +209,7 @@ class Encoders(Stateful):
         self._heading = 0
         self._forward = 0
         self._offset_nm = travel_nm
+        self._counts = None
 
     def take(self, raw_x: int, raw_y: int, raw_heading: int) -> bool:
         """Add the odometry of a packet; tell whether it is a plausible step."""
@@ -213,6 +222,7 @@ class Encoders(Stateful):
             return False
         self._forward += forward_step(dx, dy, before, before + turn)
         self._heading += turn
+        self._counts = None
         return True
 
 

@@ -15,7 +15,8 @@ Invariant: what leaves here is within the robot's limits and those of the settin
 from dataclasses import dataclass
 
 from adapter_sim.codec import divide_half_away
-from adapter_sim.settings import AdapterSettings, MotorMeaning
+from adapter_sim.duty import FULL
+from adapter_sim.settings import AdapterSettings, MotorCommand, MotorMeaning
 from p2os.gamepad import STICK_FULL, TRIGGER_FULL
 
 #: 180/π, in 1e-9.
@@ -39,35 +40,48 @@ class Mixer:
 
     Args:
         settings: Meaning and step sizes.
+        full_steps: Steps that a full duty stands for: as many as the lowest value of the motor bits.
         track_mm: Distance between the wheels, from the robot file.
         max_velocity_mm_s: The robot's own limit; the settings may lower it.
         max_rotation_deg_s: Likewise.
     """
 
     def __init__(
-        self, settings: AdapterSettings, *, track_mm: int, max_velocity_mm_s: int, max_rotation_deg_s: int
+        self,
+        settings: AdapterSettings,
+        *,
+        full_steps: int,
+        track_mm: int,
+        max_velocity_mm_s: int,
+        max_rotation_deg_s: int,
     ) -> None:
         self.track_mm = track_mm
         self.max_velocity_mm_s = _lower(max_velocity_mm_s, settings.max_velocity_mm_s)
         self.max_rotation_deg_s = _lower(max_rotation_deg_s, settings.max_rotation_deg_s)
         self._meaning = settings.motor_meaning
+        is_duty = settings.motor_command is MotorCommand.DUTY
+        self._steps, self._per = (full_steps, FULL) if is_duty else (1, 1)
         self._step_um_per_s = settings.step_um_per_s
         self._angular_step_urad_per_s = settings.angular_step_urad_per_s
         self._pad_velocity_mm_s = settings.pad_velocity_mm_s
         self._pad_rotation_mrad_s = settings.pad_rotation_mrad_s
 
     def mix(self, motor1: int, motor2: int) -> Speeds:
-        """Return the speeds that a pair of signed motor values asks for."""
+        """Return the speeds that a pair of signed motor values asks for: steps, or duties of `FULL`."""
+        first = self._of_steps(motor1, self._step_um_per_s)
         if self._meaning is MotorMeaning.WHEELS:
-            forward = divide_half_away((motor1 + motor2) * self._step_um_per_s, 2_000)
+            second = self._of_steps(motor2, self._step_um_per_s)
+            forward = divide_half_away(first + second, 2_000)
             # µm/s over µm of track are rad/s; 1e-9 of DEG_PER_RAD_E9 and 1e3 of mm.
-            turn = divide_half_away(
-                (motor2 - motor1) * self._step_um_per_s * DEG_PER_RAD_E9, self.track_mm * 1_000 * 10**9
-            )
+            turn = divide_half_away((second - first) * DEG_PER_RAD_E9, self.track_mm * 1_000 * 10**9)
         else:
-            forward = divide_half_away(motor1 * self._step_um_per_s, 1_000)
-            turn = divide_half_away(motor2 * self._angular_step_urad_per_s * DEG_PER_RAD_E9, 10**15)
+            second = self._of_steps(motor2, self._angular_step_urad_per_s)
+            forward = divide_half_away(first, 1_000)
+            turn = divide_half_away(second * DEG_PER_RAD_E9, 10**15)
         return self._limited(forward, turn)
+
+    def _of_steps(self, value: int, step: int) -> int:
+        return divide_half_away(value * step * self._steps, self._per)
 
     def steer(self, forward: int, turn: int) -> Speeds:
         """Return the speeds of a pad's deflections: `forward` of 1023, `turn` of 511 to the left."""

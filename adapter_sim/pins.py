@@ -15,6 +15,9 @@ bits), the last one taken stays. With 5 samples 2 ms apart a change is taken at 
 third sample: 4 to 6 ms after the edge. A glitch seen by two samples or fewer passes
 without effect.
 
+Motor wires that carry duties (`MotorCommand.DUTY`) are taken by the median of the same
+samples, wheel by wheel: adapter_sim/duty.py.
+
 p2dx_con is debounced by time: it counts as high once it has been seen high for MORE
 than `connect_after_ns` without a break, and as low once it has been seen low for
 `disconnect_after_ns`. Both spans run from the first sample that saw the level; a dip
@@ -28,17 +31,21 @@ Invariant: sample instants are whole periods apart from each other, suspended or
 and an output is written only when it changes.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from functools import partial
 from typing import Protocol, TypeAlias
 
-from adapter_sim.codec import motor_value
-from adapter_sim.pinout import Pinout, Safe, WireRole
-from adapter_sim.settings import AdapterSettings
+from adapter_sim.codec import BitOrder, motor_value
+from adapter_sim.duty import DutyWire, Median, PeriodicLevel
+from adapter_sim.pinout import Pinout, Safe, Value, WireRole
+from adapter_sim.settings import AdapterSettings, MotorCommand
 from simbase.state import Stateful
 from simbase.timing import Nanos
 
 #: Called at each transition: (now in ns, what happened in a word or two, detail).
 EventCallback: TypeAlias = Callable[[Nanos, str, str], None]
+#: Values of the pin-out that the wheels' commands are, left first.
+MOTOR_VALUES = ("motor1", "motor2")
 #: Values of the pin-out that the wheels' codes are, left first.
 ENCODER_VALUES = ("encoder1", "encoder2")
 
@@ -50,40 +57,39 @@ class PinBank(Protocol):
         """Return the level of a wire at the instant `at`, an edge at `at` included."""
         ...
 
+    def course(self, signal: str, begin: Nanos, end: Nanos) -> Sequence[tuple[Nanos, bool | PeriodicLevel]]:
+        """Return what a wire does from `begin` on until before `end`: when, and the level or wave from then on.
+
+        `begin` lies at most `COURSE_NS` before the present.
+        """
+        ...
+
     def write(self, signal: str, high: bool | None, now: Nanos) -> None:
         """Drive a wire from `now` on; None releases it to its pull."""
         ...
 
 
 class Inputs(Stateful):
-    """Motor values by majority, p2dx_con by time, rst as it stands."""
+    """Motor values by majority or median, p2dx_con by time, rst as it stands."""
 
-    STATE = ("_majority", "_connect", "_word")
+    STATE = ("_motors", "_connect", "_seen")
 
     def __init__(self, pins: PinBank, pinout: Pinout, settings: AdapterSettings) -> None:
         self._pins = pins
-        self._bit_order = settings.bit_order
-        self._motors = tuple(pinout.value(name) for name in ("motor1", "motor2"))
-        names = [name for value in self._motors for name in value.wires]
-        names.append(pinout.with_role(WireRole.CONNECT)[0].name)
-        self._wires = tuple((name, 1 << bit) for bit, name in enumerate(names))
-        self._connect_weight = 1 << (len(names) - 1)
+        kind = MotorDuties if settings.motor_command is MotorCommand.DUTY else MotorBits
+        self._motors: MotorBits | MotorDuties = kind(pins, [pinout.value(name) for name in MOTOR_VALUES], settings)
+        self._connect_wire = pinout.with_role(WireRole.CONNECT)[0].name
         self._reset_wire = pinout.with_role(WireRole.RESET)[0].name
         #: Names of rst, and of all wires that are looked at.
         self.reset_wires = frozenset((self._reset_wire,))
-        self.wires = self.reset_wires.union(names)
-        self._majority = Majority(settings.sample_count)
+        self.wires = self.reset_wires.union(self._motors.wires, (self._connect_wire,))
         self._connect = Debounce(settings.connect_after_ns, settings.disconnect_after_ns)
-        self._word = 0
+        self._seen: tuple[object, bool] = (self._motors.at_rest, False)
 
     @property
     def motors(self) -> tuple[int, int]:
-        """Return the signed motor values taken, motor1 first."""
-        word, values = self._majority.word, []
-        for value in self._motors:
-            values.append(motor_value(word & ((1 << value.width) - 1), value.width, self._bit_order))
-            word >>= value.width
-        return values[0], values[1]
+        """Return the signed motor values taken, motor1 first: steps, or duties of `FULL`."""
+        return self._motors.values
 
     @property
     def wants_robot(self) -> bool:
@@ -97,30 +103,23 @@ class Inputs(Stateful):
     def is_quiet(self, now: Nanos) -> bool:
         """Tell whether a sample at `now` would change nothing: the fast path of most instants."""
         return (
-            self._majority.is_settled
+            self._motors.is_settled
             and self._connect.is_settled
-            and self._read(now) == self._word
+            and (self._motors.read(now), self._pins.read(self._connect_wire, now)) == self._seen
             and not self._pins.read(self._reset_wire, now)
         )
 
     def sample(self, now: Nanos) -> tuple[bool, bool]:
         """Take a sample; tell whether the motor values and whether p2dx_con have changed."""
-        word = self._word = self._read(now)
-        motors_changed = self._majority.take(word & (self._connect_weight - 1))
-        return motors_changed, self._connect.take(bool(word & self._connect_weight), now)
+        motors, connect = self._motors.read(now), self._pins.read(self._connect_wire, now)
+        self._seen = motors, connect
+        return self._motors.take(motors), self._connect.take(connect, now)
 
     def reset(self) -> None:
         """Forget all samples."""
-        self._word = 0
-        self._majority.reset()
+        self._seen = self._motors.at_rest, False
+        self._motors.reset()
         self._connect.reset()
-
-    def _read(self, now: Nanos) -> int:
-        read, word = self._pins.read, 0
-        for name, weight in self._wires:
-            if read(name, now):
-                word |= weight
-        return word
 
 
 class Outputs(Stateful):
@@ -171,12 +170,18 @@ class Outputs(Stateful):
 
 
 class SampleClock(Stateful):
-    """The next sample instant."""
+    """The next sample instant.
+
+    Args:
+        period_ns: Between two samples.
+        may_suspend: Whether settled inputs stay as they are until one of them has an edge.
+    """
 
     STATE = ("next", "is_suspended")
 
-    def __init__(self, period_ns: Nanos) -> None:
+    def __init__(self, period_ns: Nanos, *, may_suspend: bool = True) -> None:
         self._period_ns = period_ns
+        self._may_suspend = may_suspend
         self.next: Nanos = 0
         #: Whether whoever runs the adapter brings it to every edge of the wires in `Adapter.wakes_on`: then settled
         #: pins are not sampled again until one comes.
@@ -188,9 +193,13 @@ class SampleClock(Stateful):
         self.next = now + self._period_ns
 
     def was_quiet(self, now: Nanos) -> None:
-        """Note that the sample at `now` changed nothing and that later ones will not either without an edge."""
+        """Note that the sample at `now` changed nothing, and that later ones will not either without an edge."""
         self.after(now)
-        self.is_suspended = self.waits_for_edges
+        self.suspend()
+
+    def suspend(self) -> None:
+        """Take no sample until the next edge, where somebody waits for edges: none would change anything."""
+        self.is_suspended = self.waits_for_edges and self._may_suspend
 
     def resume(self, now: Nanos) -> None:
         """Go on from the first sample instant at or after `now`; those before would have changed nothing."""
@@ -201,6 +210,103 @@ class SampleClock(Stateful):
     def due(self, other: Nanos) -> Nanos:
         """Return the earlier of the next sample that is taken and another deadline."""
         return other if self.is_suspended else min(self.next, other)
+
+
+class MotorBits(Stateful):
+    """The motor values in two's complement, one word of all wires."""
+
+    STATE = ("_majority",)
+    at_rest = (0,)
+
+    def __init__(self, pins: PinBank, motors: Sequence[Value], settings: AdapterSettings) -> None:
+        self._pins = pins
+        self._bit_order: BitOrder = settings.bit_order
+        self._widths = tuple(motor.width for motor in motors)
+        #: Names of the wires that are looked at.
+        self.wires = tuple(name for motor in motors for name in motor.wires)
+        self._weights = tuple((name, 1 << bit) for bit, name in enumerate(self.wires))
+        self._majority = Majority(settings.sample_count)
+
+    @property
+    def values(self) -> tuple[int, int]:
+        """Return the values taken."""
+        word, values = self._majority.word, []
+        for width in self._widths:
+            values.append(motor_value(word & ((1 << width) - 1), width, self._bit_order))
+            word >>= width
+        return values[0], values[1]
+
+    @property
+    def is_settled(self) -> bool:
+        """Tell whether all samples were the one taken."""
+        return self._majority.is_settled
+
+    def read(self, now: Nanos) -> tuple[int, ...]:
+        """Return what the wires show, as one word."""
+        read, word = self._pins.read, 0
+        for name, weight in self._weights:
+            if read(name, now):
+                word |= weight
+        return (word,)
+
+    def take(self, reading: tuple[int, ...]) -> bool:
+        """Add a sample; tell whether the values taken have changed."""
+        return self._majority.take(reading[0])
+
+    def reset(self) -> None:
+        """Forget all samples."""
+        self._majority.reset()
+
+
+class MotorDuties(Stateful):
+    """The motor values as signed duties; of each the first wire is measured, and the last is high for backward."""
+
+    STATE = ("_duties", "_median")
+    at_rest = (0, 0)
+
+    def __init__(self, pins: PinBank, motors: Sequence[Value], settings: AdapterSettings) -> None:
+        self._pins = pins
+        self._duties = duty_wires(pins, motors, settings)
+        self._signs = tuple(motor.wires[-1] for motor in motors)
+        #: Names of the wires that are looked at.
+        self.wires = tuple(name for motor in motors for name in (motor.wires[0], motor.wires[-1]))
+        self._median = Median(settings.sample_count, len(motors))
+
+    @property
+    def values(self) -> tuple[int, int]:
+        """Return the values taken, of `FULL`."""
+        left, right = self._median.values
+        return left, right
+
+    @property
+    def is_settled(self) -> bool:
+        """Tell whether all samples were the one taken."""
+        return self._median.is_settled
+
+    def read(self, now: Nanos) -> tuple[int, ...]:
+        """Return what the wires show."""
+        read, duties = self._pins.read, [wire.duty(now) for wire in self._duties]
+        return tuple(-duty if read(sign, now) else duty for duty, sign in zip(duties, self._signs, strict=True))
+
+    def take(self, reading: tuple[int, ...]) -> bool:
+        """Add a sample; tell whether the values taken have changed."""
+        return self._median.take(reading)
+
+    def reset(self) -> None:
+        """Forget all samples."""
+        self._median.reset()
+
+
+def duty_wires(pins: PinBank, motors: Sequence[Value], settings: AdapterSettings) -> tuple[DutyWire, ...]:
+    """Return what measures the magnitude of each motor value."""
+    return tuple(
+        DutyWire(
+            partial(pins.read, motor.wires[0]),
+            partial(pins.course, motor.wires[0]),
+            timeout_ns=settings.duty_timeout_ns,
+        )
+        for motor in motors
+    )
 
 
 class Majority(Stateful):

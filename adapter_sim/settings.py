@@ -7,6 +7,7 @@ from dataclasses import dataclass, fields
 from enum import StrEnum
 
 from adapter_sim.codec import BitOrder
+from adapter_sim.duty import DUTY_TIMEOUT_NS
 from p2os.protocol.bauds import DEFAULT_BAUD
 from p2os.protocol.times import LIVENESS_NS, PULSE_NS
 from simbase.errors import UsageError
@@ -20,6 +21,15 @@ class MotorMeaning(StrEnum):
     WHEELS = "wheels"
     #: motor1 is the forward speed, motor2 the turn to the left, as one printed listing has it.
     LINEAR_ANGULAR = "linear_angular"
+
+
+class MotorCommand(StrEnum):
+    """How the motor wires carry a wheel's value."""
+
+    #: Two's complement of a few bits, a wire each.
+    BITS = "bits"
+    #: A magnitude by the duty of the first wire, and a sign on the last: adapter_sim/duty.py.
+    DUTY = "duty"
 
 
 class EncoderAtOpen(StrEnum):
@@ -45,9 +55,10 @@ class AdapterSettings:
 
     #: Nearer than this is an obstacle; None takes half of the robot file's sonar range.
     threshold_um: int | None = None
+    motor_command: MotorCommand = MotorCommand.BITS
     bit_order: BitOrder = BitOrder.COMM3_MSB
     motor_meaning: MotorMeaning = MotorMeaning.WHEELS
-    #: Rim speed of one step of a motor value (62.5 mm/s: four steps are 250 mm/s).
+    #: Rim speed of one step of a motor value (62.5 mm/s: four steps are 250 mm/s, and so is a full duty).
     step_um_per_s: int = 62_500
     #: Turn rate of one step where motor2 is angular (the thesis: 1.7 rad/s at four steps).
     angular_step_urad_per_s: int = 425_000
@@ -56,6 +67,8 @@ class AdapterSettings:
     max_rotation_deg_s: int | None = None
 
     sample_period_ns: Nanos = 2 * NS_PER_MS
+    #: A motor wire without an edge for this long has a level, not a duty.
+    duty_timeout_ns: Nanos = DUTY_TIMEOUT_NS
     #: Samples in the majority window, odd.
     sample_count: int = 5
     #: p2dx_con must be seen high for MORE than this.
@@ -112,6 +125,7 @@ class AdapterSettings:
 
     def __post_init__(self) -> None:
         self._check_bauds()
+        self._coerce("motor_command", MotorCommand)
         self._coerce("bit_order", BitOrder)
         self._coerce("motor_meaning", MotorMeaning)
         self._coerce("encoder_at_open", EncoderAtOpen)

@@ -10,7 +10,7 @@ A condition in words is met at the boundary of the very block that makes it true
 whatever the caller's slices; a condition in Python is looked at in steps.
 
     pin PA4 high | pin PA4 low | pin PA4 changes     the level on the wire
-    usart1 sends TEXT                                characters that go out from now on
+    usart1 sends TEXT | usb sends TEXT               characters that go out from now on
     asleep | awake | fault                           what the core is doing
 
 Invariant: results do not depend on how the caller cuts time into slices; a wait
@@ -37,11 +37,14 @@ from bluepill_sim.fabric.registers import RegisterView
 from bluepill_sim.fabric.signals import UV_PER_V, to_uv
 from bluepill_sim.fabric.subscriptions import EdgeSink, Of, PinSubscription
 from bluepill_sim.memory import Memory
+from bluepill_sim.parts.attached import AttachedParts
 from bluepill_sim.parts.serial_port import Activity, SerialPort
+from bluepill_sim.parts.usb import UsbHost, UsbSerial
 from bluepill_sim.peripherals.can import Can
 from bluepill_sim.peripherals.i2c import I2c
 from bluepill_sim.peripherals.rcc import ResetCause
 from bluepill_sim.peripherals.spi import Spi
+from bluepill_sim.peripherals.usb import Usb
 from bluepill_sim.program.image import Image, load_image
 from bluepill_sim.program.last_blocks import TITLE, shortened
 from bluepill_sim.program.line_table import LineTable, read_lines
@@ -90,7 +93,7 @@ class BluePill(Stateful):
         MissingDependencyError: unicorn, pyelftools or intelhex is not installed.
     """
 
-    STATE = ("chip", "fault", "activity", "_warned", "_usarts", "boot0", "resets")
+    STATE = ("chip", "fault", "activity", "_warned", "_usarts", "_usb_serial", "boot0", "resets", "attached")
     #: Who listens.
     DERIVED = ("_warning_sinks",)
 
@@ -118,6 +121,13 @@ class BluePill(Stateful):
         self._chip = chip = Chip(memory, self.image.vector_table, self._warn, self._fault)
         self._activity = Activity()
         self._usarts = tuple(SerialPort(chip.parts.usart(n), self._activity, self._wait_for_bytes) for n in (1, 2, 3))
+        #: The parts that were attached by name, and the world that they sense.
+        self.attached = AttachedParts(lambda text: chip.pins.warn(text, once=text), chip.request_stop)
+        self._usb = UsbHost(self._run_until)
+        self._usb_serial = UsbSerial(self._usb, self._run_until, chip.request_stop)
+        usb = cast("Usb", chip.parts.by_name["USB"])
+        usb.attach(self._usb)
+        self._usb.join(usb)
         #: How often it was reset since power came up, by cause.
         self.resets: Counter[ResetCause] = Counter()
         chip.on_reset = self._reset_begins
@@ -125,6 +135,7 @@ class BluePill(Stateful):
         chip.pins.is_serial_input = self._is_driven_in_words
         chip.pins["PC13"].board_pull = PinDrive.PULL_UP
         chip.pins["PB2"].board_pull = PinDrive.PULL_DOWN
+        chip.pins["PA12"].board_pull = PinDrive.PULL_UP
 
     # Time.
 
@@ -145,7 +156,8 @@ class BluePill(Stateful):
 
     def next_deadline(self) -> Nanos | None:
         """Return when a peripheral next acts by itself; None for never. The core may act at any time."""
-        return self.chip.next_deadline()
+        deadlines = (self.chip.next_deadline(), self.attached.next_deadline())
+        return min((at for at in deadlines if at is not None), default=None)
 
     def advance_to(self, limit_ns: Nanos) -> ChipReached:
         """Run to the first block boundary at or after a time.
@@ -157,7 +169,11 @@ class BluePill(Stateful):
         Raises:
             UnmodelledError: in strict mode, something was warned of.
         """
-        return self.chip.advance_to(limit_ns)
+        return self._advance(limit_ns, self.chip.advance_to)
+
+    def step(self, limit_ns: Nanos) -> ChipReached:
+        """Run one instruction, as `Chip.step`, and bring the parts along."""
+        return self._advance(limit_ns, self.chip.step)
 
     def run_for(self, span: Span) -> ChipReached:
         """Run for a span of virtual time, such as "10 ms" or nanoseconds, past watched edges; a halt ends it early."""
@@ -327,6 +343,16 @@ class BluePill(Stateful):
         return {port.name.lower(): port for port in self._usarts}
 
     @property
+    def usb(self) -> UsbHost:
+        """The host at the USB socket; its cable is plugged in by `plug` or `wait_configured`."""
+        return self._usb
+
+    @property
+    def usb_serial(self) -> UsbSerial:
+        """The serial line of a CDC device at the USB socket."""
+        return self._usb_serial
+
+    @property
     def chip(self) -> Chip:
         """The chip itself, for tools."""
         if self._chip is None:
@@ -424,7 +450,27 @@ class BluePill(Stateful):
         """Return bytes of flash or SRAM; None where there is no memory."""
         return self.chip.memory.read(address, size)
 
-    # What hangs on its buses.
+    # What hangs on its buses and pins.
+
+    def attach(
+        self, part: object, *, on: str | None = None, select: str | None = None, name: str = "", **pins: str
+    ) -> None:  # fmt: skip
+        """Attach a part, one that ships or one of your own (docs/parts.md).
+
+        >>> board.attach(Ssd1306(), on="I2C1")                     # doctest: +SKIP
+        >>> board.attach(HcSr04(), trig="PA8", echo="PB6")         # doctest: +SKIP
+
+        Args:
+            part: what it is.
+            on: the bus that it hangs on: "SPI1", "I2C1", "USART2", "CAN"; None: pins alone.
+            select: of an SPI, the pin that selects it while it is low; None: it always is.
+            name: what it is called in `attached.by_name`; empty: its class.
+            pins: its own pins by their names, each a pin of the chip.
+
+        Raises:
+            PartError: it cannot be attached so.
+        """
+        self.attached.attach(self, self.chip.pins, part, name, on, select, pins)
 
     def spi(self, name: str, device: SpiDevice | None = None, *, select: str | None = None) -> Spi:
         """Return an SPI, "SPI1" or "SPI2"; with a device, hang it on the bus first.
@@ -467,6 +513,21 @@ class BluePill(Stateful):
             part.attach(network)
         return part
 
+    def _advance(self, limit_ns: Nanos, go_on: Callable[[Nanos], ChipReached]) -> ChipReached:
+        """Bring the chip forward, and every part to its deadlines on the way."""
+        attached = self.attached
+        if not attached.has_deadlines:
+            return go_on(limit_ns)
+        while True:
+            due_ns = attached.next_deadline()
+            reached = go_on(limit_ns if due_ns is None or due_ns > limit_ns else due_ns)
+            attached.act(self.now_ns)
+            is_on_its_way = reached.reason is Reason.DEADLINE or (
+                reached.reason is Reason.HALT and reached.halt is None
+            )
+            if not is_on_its_way or self.now_ns >= limit_ns:
+                return reached
+
     # Callbacks of the chip.
 
     def _is_driven_in_words(self, pin: Pin) -> bool:
@@ -489,6 +550,14 @@ class BluePill(Stateful):
             "BOOT0 is set and BOOT1 is not: the chip would start ST's boot loader, which is not modelled",
             hint="clear boot0 for the flash, or drive PB2 high for the SRAM",
         )
+
+    def _run_until(self, holds: Callable[[], bool], within: Span) -> bool:
+        """Run until something is so, looked at each millisecond; return whether it is."""
+        end_ns = self.now_ns + to_nanos(within)
+        while not holds() and self.now_ns < end_ns:
+            if self.advance_to(min(end_ns, self.now_ns + STEP_NS)).reason is Reason.HALT:
+                break
+        return holds()
 
     def _wait_for_bytes(self, port: SerialPort, pattern: bytes, within: Span) -> None:
         """Run until `pattern` is in what `port` has sent and nobody has taken (`SerialPort.expect`)."""
@@ -606,9 +675,9 @@ def _watch(board: BluePill, condition: Condition) -> Iterator[tuple[Callable[[],
         case ["pin", name] if len(words) == 3:
             with _stop_at_pin(board, name.upper(), words[2].lower()) as holds:
                 yield holds, None
-        case [port, "sends"] if len(words) == 3 and port in board.serial_ports:
+        case [name, "sends"] if len(words) == 3 and name in _ports(board):
             sent, text = bytearray(), words[2].encode()
-            with _stop_at_characters(board.serial_ports[port], sent):
+            with _stop_at_characters(_ports(board)[name], sent):
                 yield (lambda: text in sent), None
         case [state] if state in _STATES:
             yield (lambda: _STATES[state](board)), STEP_NS
@@ -644,8 +713,13 @@ def _stop_at_pin(board: BluePill, name: str, what: str) -> Iterator[Callable[[],
         subscription.close()
 
 
+def _ports(board: BluePill) -> dict[str, SerialPort | UsbSerial]:
+    """Return what sends characters, by its name in a condition."""
+    return {**board.serial_ports, "usb": board.usb_serial}
+
+
 @contextmanager
-def _stop_at_characters(port: SerialPort, sent: bytearray | None = None) -> Iterator[None]:
+def _stop_at_characters(port: SerialPort | UsbSerial, sent: bytearray | None = None) -> Iterator[None]:
     """End the board's slice after each character that a port sends; collect them in `sent`."""
 
     def take(rows: Sequence[tuple[int, Nanos]]) -> None:

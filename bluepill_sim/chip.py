@@ -21,6 +21,7 @@ from contextlib import contextmanager
 
 from bluepill_sim.core import GENERAL, BlockRecorder
 from bluepill_sim.core.block_cost import NO_BLOCK, Block, measure_block
+from bluepill_sim.core.comparators import cycles_to_match
 from bluepill_sim.core.forced_bits import forced_bits
 from bluepill_sim.core.halts import ChipReached, HaltKind
 from bluepill_sim.core.nvic import NMI
@@ -141,6 +142,8 @@ class Chip(Stateful):
         memory.on_reprogrammed = self._drop_flash
         self.parts.flash.memory = _FlashArray(memory, self._flash_repairs)
         self.system = SystemControl(self.processor, self)
+        self.processor.on_unmodelled = lambda what: self.warn(f"{what}: not modelled", once=what)
+        self._match_slot = self.fabric.add_slot("DWT", self._count_matched)
         self._map()
         self.reset(ResetCause.POWER)
 
@@ -261,6 +264,7 @@ class Chip(Stateful):
         vectors = self.boot_address()
         if cause is ResetCause.POWER:
             self._lose_sram()
+            self.system.lose_power()
         self.parts.reset(cause)
         self.system.reset()
         # A program at the start of the flash is found through its alias at 0, where VTOR points after a reset.
@@ -299,6 +303,8 @@ class Chip(Stateful):
         clocks = self.clocks
         self._clock.set_frequency(clocks.hclk_hz, self.engine.access_cycle)
         self._time_changed()
+        if self._is_complete:
+            self.plan_match()
         access = clocks.flash_wait_states, clocks.flash_prefetch
         if access != self._flash_access:
             self._flash_access = access
@@ -339,6 +345,7 @@ class Chip(Stateful):
                 part.thaw(self.now_ns - since_ns)
             if self.resets == count:
                 self.processor.skip_cycles(self.engine.cycle - cycle, tick)
+                self.plan_match()
 
     def _freeze(self) -> None:
         self._frozen_since = self.now_ns
@@ -448,6 +455,16 @@ class Chip(Stateful):
         due = self.next_deadline()
         return self._clock.cycle_at(limit_ns if due is None else min(due, limit_ns))
 
+    def plan_match(self) -> None:
+        """Work out when CYCCNT next comes to what the DWT compares it with."""
+        now = self.engine.access_cycle
+        cycles = cycles_to_match(self.processor.shared, self.system.count_at(now))
+        self.fabric.schedule(self._match_slot, None if cycles is None else self._clock.ns_of(now + cycles))
+
+    def _count_matched(self, _now_ns: Nanos) -> None:
+        self.processor.comparator_matched(0)
+        self.plan_match()
+
     # Where the core stands still (`LowPowerPorts`).
 
     def _core_stands_still(self) -> bool:
@@ -518,6 +535,7 @@ class Chip(Stateful):
         """Have the clocks of the core stand still."""
         self.power.is_stopped = True
         self.parts.stop()
+        self.fabric.schedule(self._match_slot, None)
         systick = self.processor.systick
         self._stopped_cycle, self._stopped_tick, systick.next_cycle = self.engine.cycle, systick.next_cycle, None
 
@@ -525,6 +543,7 @@ class Chip(Stateful):
         """Have them go on."""
         self.power.is_stopped = False
         self.processor.skip_cycles(self.engine.cycle - self._stopped_cycle, self._stopped_tick)
+        self.plan_match()
         self.parts.resume(stopped_ns)
 
     def enter_standby(self) -> None:
@@ -569,7 +588,7 @@ class Chip(Stateful):
 
     def _read_system(self, offset: int, size: int) -> int:
         """Read the private peripheral bus; a thread without privilege faults (ARM B3.1.1)."""
-        if not self.processor.is_privileged:
+        if not self.processor.is_privileged and not self.system.is_open_to_all(offset):
             self.engine.stop_before(HaltKind.READ_ERROR, self.engine.access_pc, PPB_BASE + offset)
             return 0
         word = self.system.read(offset, size)
@@ -645,8 +664,9 @@ class PeripheralBus(Stateful):
         }
         self._rcc = rcc
         self._chip = chip
-        #: When each peripheral was first read without its clock, in ns.
+        #: When each peripheral was first read without its clock since that was last on, in ns.
         self.read_unclocked_ns: dict[str, Nanos] = {}
+        rcc.gate_listeners.append(self._forget_clocked)
 
     def read(self, offset: int, size: int) -> int:
         """Return what the core reads."""
@@ -699,6 +719,12 @@ class PeripheralBus(Stateful):
         bit = 1 << (offset >> 2 & 31)
         word = self.read(offset >> 5 & ~3, 4)
         self.write(offset >> 5 & ~3, 4, word | bit if value & 1 else word & ~bit)
+
+    def _forget_clocked(self) -> None:
+        """Begin anew with what has its clock now: drivers look at a peripheral before they switch it on, each time."""
+        clocked = [name for name in self.read_unclocked_ns if self._rcc.is_clocked(name)]
+        for name in clocked:
+            del self.read_unclocked_ns[name]
 
     def _refuse(self, part: Peripheral | None, offset: int, what: str) -> None:
         """Warn of an access to nothing: it reads 0, and a write is lost."""

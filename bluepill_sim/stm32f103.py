@@ -33,6 +33,7 @@ from bluepill_sim.peripherals.rtc import Rtc
 from bluepill_sim.peripherals.spi import Spi
 from bluepill_sim.peripherals.tim import AdvancedTimer, GeneralTimer
 from bluepill_sim.peripherals.usart import Usart
+from bluepill_sim.peripherals.usb import Usb
 from bluepill_sim.peripherals.wwdg import Wwdg
 from simbase.state import Stateful
 
@@ -151,8 +152,8 @@ BASES = {
     "DBGMCU": 0xE004_2000,
 }
 _NAMES = sorted((base, name) for name, base in BASES.items())
-#: The blocks that are larger than 1 KiB.
-_LARGE_BYTES = {"ETH": 0x2000, "USB OTG": 0x4_0000, "FSMC": 0x1000}
+#: The blocks that are larger than 1 KiB; that of USB has its packets.
+_LARGE_BYTES = {"USB": 0x800, "ETH": 0x2000, "USB OTG": 0x4_0000, "FSMC": 0x1000}
 
 _Maker: TypeAlias = Callable[[ChipPorts, Place], Peripheral]
 
@@ -183,6 +184,7 @@ PERIPHERALS: tuple[tuple[_Maker, str], ...] = (
     (I2c, "I2C1"),
     (I2c, "I2C2"),
     (Can, "CAN"),
+    (Usb, "USB"),
     (Iwdg, "IWDG"),
     (Wwdg, "WWDG"),
     (AdvancedTimer, "TIM1"),
@@ -229,7 +231,9 @@ WIRING: dict[str, tuple[int | str, ...]] = {
     "ADC1.irq": (18,),
     "ADC2.irq": (18,),
     "CAN.tx_irq": (19,),
+    "USB.hp_irq": (19,),
     "CAN.rx0_irq": (20,),
+    "USB.lp_irq": (20,),
     "CAN.rx1_irq": (21,),
     "CAN.sce_irq": (22,),
     "EXTI.9_5": (23,),
@@ -257,7 +261,9 @@ WIRING: dict[str, tuple[int | str, ...]] = {
     "RTC.alarm": ("EXTI.rtc_alarm", "BKP.alarm", "PWR.alarm"),
     "RTC.second": ("BKP.second",),
     "IWDG.lsi": ("RCC.lsi",),
+    "RCC.css": ("TIM1.css",),
     "USB.wakeup": ("EXTI.usb_wakeup",),
+    "CAN.packets": ("USB.can",),
     **_DMA1_REQUESTS,
     # Triggers: of other timers (RM0008 tables 82 and 86), of both ADCs' regular and injected groups (67 and 68).
     "TIM1.trgo": ("TIM2.itr0", "TIM3.itr0", "TIM4.itr0", "ADC1.tim1_trgo", "ADC2.tim1_trgo"),
@@ -382,7 +388,8 @@ def make_parts(chip: ChipPorts) -> ChipParts:
     """Return the peripherals of one chip, in their state after power-on; `chip.pins` and `chip.clocks` come first."""
     by_name: dict[str, Peripheral] = {}
     for make, name in PERIPHERALS:
-        by_name[name] = make(chip, Place(name=name, base=BASES[name], clock=CLOCK_GATES.get(name)))
+        size = _LARGE_BYTES.get(name, 0x400)
+        by_name[name] = make(chip, Place(name=name, base=BASES[name], clock=CLOCK_GATES.get(name), size=size))
     _wire(by_name, chip.pins.fabric)
     return ChipParts(by_name)
 

@@ -24,8 +24,8 @@ from adapter_sim.distances import threshold_um
 from adapter_sim.masters import Master
 from adapter_sim.mixing import Speeds
 from adapter_sim.pinout import Pinout, Safe, WireRole
-from adapter_sim.pins import EventCallback, PinBank
-from adapter_sim.settings import AdapterSettings, EncoderAtOpen, MotorMeaning
+from adapter_sim.pins import MOTOR_VALUES, EventCallback, PinBank, duty_wires
+from adapter_sim.settings import AdapterSettings, EncoderAtOpen, MotorCommand, MotorMeaning
 from p2os.gamepad import PadReport
 from p2os.robots.parameters import RobotParameters
 from robot_bench.scenario.scenario import Scenario
@@ -33,12 +33,13 @@ from simbase.errors import MissingDependencyError, UsageError
 from simbase.timing import NS_PER_S, Nanos, Reached
 
 #: Of adapter_capi.h.
-VERSION = 1
+VERSION = 2
 _MAX_FRAME_BYTES = 9
 #: What helps when a state cannot be taken up.
 RUN_ANEW = "run the scenario anew, and save it again"
 
 _Read = ctypes.CFUNCTYPE(ctypes.c_uint32, ctypes.c_void_p, ctypes.c_int64)
+_Duty = ctypes.CFUNCTYPE(ctypes.c_int32, ctypes.c_void_p, ctypes.c_int32, ctypes.c_int64)
 _Drive = ctypes.CFUNCTYPE(None, ctypes.c_void_p, ctypes.c_uint32, ctypes.c_uint32, ctypes.c_int64)
 _Happened = ctypes.CFUNCTYPE(
     None, ctypes.c_void_p, ctypes.c_int64, ctypes.c_char_p, ctypes.c_char_p, ctypes.c_int32, ctypes.c_int32
@@ -46,11 +47,12 @@ _Happened = ctypes.CFUNCTYPE(
 
 
 class _Callbacks(ctypes.Structure):
-    _fields_ = (("user", ctypes.c_void_p), ("read", _Read), ("drive", _Drive), ("happened", _Happened))
+    _fields_ = (("user", ctypes.c_void_p), ("read", _Read), ("duty", _Duty), ("drive", _Drive), ("happened", _Happened))
 
 
 #: Settings that are one of several, in the order of the firmware's enumerations.
 _CHOICES: dict[str, tuple[str, ...]] = {
+    "motor_command": tuple(MotorCommand),
     "bit_order": tuple(BitOrder),
     "motor_meaning": tuple(MotorMeaning),
     "encoder_at_open": tuple(EncoderAtOpen),
@@ -98,6 +100,8 @@ class FirmwareState:
     #: SHA-256 of the library.
     build: str
     data: bytes
+    #: Of what measures the duties.
+    duties: tuple[object, ...]
 
 
 class FirmwareAdapter:
@@ -132,7 +136,7 @@ class FirmwareAdapter:
         self.settings = settings = settings or AdapterSettings()
         self.on_event = on_event
         self._pins = pins
-        motors = [name for value in ("motor1", "motor2") for name in pinout.value(value).wires]
+        motors = [name for value in MOTOR_VALUES for name in pinout.value(value).wires]
         ends = [pinout.with_role(role)[0].name for role in (WireRole.CONNECT, WireRole.RESET)]
         self._inputs = [(name, 1 << bit) for bit, name in enumerate([*motors, *ends])]
         #: Names of the wires whose edges it has to be brought to; it samples the others.
@@ -141,7 +145,12 @@ class FirmwareAdapter:
         self._outputs += [name for value in ("encoder1", "encoder2") for name in pinout.value(value).wires]
         self._status_names = _names(library.adapter_status_name)
         self._failure: BaseException | None = None
-        self._callbacks = _Callbacks(None, _Read(self._read), _Drive(self._drive), _Happened(self._happened))
+        values = [pinout.value(name) for name in MOTOR_VALUES]
+        #: What measures the duties: the part of the hardware that the core does not have.
+        self._duties = dict(zip((0, values[0].width), duty_wires(pins, values, settings), strict=True))
+        self._callbacks = _Callbacks(
+            None, _Read(self._read), _Duty(self._duty), _Drive(self._drive), _Happened(self._happened)
+        )
         fault = ctypes.c_char_p()
         self._handle = library.adapter_new(
             _numbers(_names(library.adapter_setting_name), setting_numbers(settings, parameters)),
@@ -238,7 +247,7 @@ class FirmwareAdapter:
         """Return all that decides the future: one value, laid out by the firmware itself."""
         state = ctypes.create_string_buffer(self._library.adapter_state_size())
         self._library.adapter_save(self._handle, state)
-        return FirmwareState(_build(), state.raw)
+        return FirmwareState(_build(), state.raw, tuple(wire.snapshot() for wire in self._duties.values()))
 
     def restore(self, snapshot: object) -> None:
         """Put back what `snapshot` returned.
@@ -252,6 +261,8 @@ class FirmwareAdapter:
         if snapshot.build != _build():
             raise UsageError("the state was saved by another build of the adapter's firmware", hint=RUN_ANEW)
         self._library.adapter_restore(self._handle, snapshot.data)
+        for wire, duty in zip(self._duties.values(), snapshot.duties, strict=True):
+            wire.restore(duty)
 
     # What the firmware calls. An exception must not cross the C code: it is kept, and raised behind it.
 
@@ -259,6 +270,13 @@ class FirmwareAdapter:
         try:
             read = self._pins.read
             return sum(weight for name, weight in self._inputs if read(name, at))
+        except BaseException as failure:  # noqa: BLE001 - raised again by _raise_failure
+            self._failure = failure
+            return 0
+
+    def _duty(self, _user: object, bit: int, at: int) -> int:
+        try:
+            return self._duties[bit].duty(at)
         except BaseException as failure:  # noqa: BLE001 - raised again by _raise_failure
             self._failure = failure
             return 0

@@ -25,10 +25,11 @@ from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 from importlib.metadata import version
 from pathlib import Path
-from typing import Self, TypeAlias, TypeVar, Union, Unpack, cast
+from typing import TYPE_CHECKING, Self, TypeAlias, TypeVar, Union, Unpack, cast
 
 from adapter_sim import Adapter
 from adapter_sim.pinout import Pinout, Pull, WireRole, load_pinout
+from bluepill_sim.parts.registry import attach
 from bluepill_sim.spans import Span, to_nanos
 from p2os.errors import ScenarioError
 from p2os.event_log import log_event, logger
@@ -39,6 +40,7 @@ from p2os.pioneer.world import load_world
 from p2os.pioneer.world.model import Pose, World
 from robot_bench.adapter import RUN_ANEW, AnyAdapter, make_adapter
 from robot_bench.direct import DirectRobot, DistanceSensors, JointMotor, WheelEncoder
+from robot_bench.direct.senses import WorldSenses
 from robot_bench.direct.wired import AnalogPin, RobotWire
 from robot_bench.events.codec import Blocks, events_of
 from robot_bench.events.expectation import ExpectationError
@@ -74,6 +76,9 @@ from simbase.errors import UsageError, shown
 from simbase.state import PartState, Stateful
 from simbase.timing import NS_PER_S, Nanos, Reached
 
+if TYPE_CHECKING:
+    from bluepill_sim.board import BluePill
+
 #: chosen: so long a run goes on after a fault of the firmware, to show what the robot does then.
 AFTER_FAULT_NS: Nanos = 1 * NS_PER_S
 #: Owner of the resistors on the wires.
@@ -89,7 +94,7 @@ Condition: TypeAlias = Union[str, Callable[["Bench"], bool]]  # noqa: UP007 - a 
 #: What decides a run besides its files; its end and its goals may be others after a restart.
 DECISIVE = (
     "mode", "seed", "parameters", "threshold_um", "usart_baud", "start", "direct", "adapter", "adapter_core",
-    "controller", "changes", "faults", "whens", "own_robot",
+    "controller", "changes", "faults", "whens", "own_robot", "parts",
 )  # fmt: skip
 _VERSION = "version of p2os"
 
@@ -130,7 +135,7 @@ class Bench(Stateful):
 
     STATE = (
         "made_of", "chip", "_harness", "_robots", "_ranges", "script", "faults", "hands", "whens", "recorder", "goals",
-        "loop", "_ends_at", "_has_told_death",
+        "loop", "_senses", "_ends_at", "_has_told_death",
     )  # fmt: skip
     #: What the caller asked of this object; the lines, which are parts of the loop.
     DERIVED = ("_lines", "_checkpoints", "_expected", "_mark", "on_slice")
@@ -185,7 +190,9 @@ class Bench(Stateful):
         self.recorder.bring_to = self._bring_robot_to
         self.faults = FaultScript(scenario.faults, bring_to=self._bring_robot_to, do=self._inject)
         self.hands = HandScript(bring_to=self._bring_robot_to, do=self._do_by_hand)
-        followers = (*self._robots, self.script, self.faults, self.hands)
+        #: What parts on the board sense of the world; none where nothing is plugged in.
+        self._senses = self._plug_in(chip) if scenario.parts else ()
+        followers = (*self._robots, self.script, self.faults, self.hands, *self._senses)
         self._slices = SliceLength() if slice_ns is None else None
         self.loop = RunLoop(
             chip, followers, observers=(self.recorder,), slice_ns=slice_ns or FIRST_SLICE_NS,
@@ -748,6 +755,20 @@ class Bench(Stateful):
         adapter, pioneer = self._adapter_and_pioneer(pinout, body, harness)
         return BenchParts(chip=chip, harness=harness, body=body, world=world, adapter=adapter, pioneer=pioneer)
 
+    def _plug_in(self, chip: Chip) -> tuple[WorldSenses, ...]:
+        """Attach the scenario's parts to the board, and have them sense the world."""
+        board = cast("BluePill", chip)
+        if not hasattr(board, "attached"):
+            raise TypeError(f"a {type(chip).__name__} takes no parts: an emulated BluePill does")
+        senses = WorldSenses(self.parts.body, self._bring_robot_to)
+        board.attached.surroundings = senses
+        board.attached.note_sinks.append(
+            lambda at, part, what, detail: self.recorder.event("part", at, part, f"{what} {detail}".rstrip())
+        )
+        for spec in self.scenario.parts:
+            attach(board, spec)
+        return (senses,)
+
     def _direct_robot(self, pinout: Pinout, body: RobotBody, harness: Harness) -> DirectRobot:
         settings = self.scenario.direct
 
@@ -757,7 +778,7 @@ class Bench(Stateful):
         def motor(value: str) -> JointMotor:
             return JointMotor(
                 nets(value), step_um_per_s=settings.step_um_per_s, ramp_um_per_s2=settings.ramp_um_per_s2,
-                dt_ns=body.dt_ns, bit_order=settings.bit_order,
+                dt_ns=body.dt_ns, bit_order=settings.bit_order, command=settings.motor_command,
             )  # fmt: skip
 
         wires = pinout.with_role(WireRole.DISTANCE)

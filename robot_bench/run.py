@@ -11,6 +11,7 @@ Invariant: whatever raises, the trace has its last line (unless the disk takes n
 a report can be made of the folder.
 """
 
+import base64
 import contextlib
 import hashlib
 import math
@@ -20,6 +21,7 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import TYPE_CHECKING, TypeVar
 
+from bluepill_sim.parts.attached import AttachedParts
 from bluepill_sim.parts.serial_port import QUIET_NS
 from p2os.event_log import logger
 from p2os.pioneer.body.factory import resolve_body
@@ -29,12 +31,12 @@ from p2os.transport.wall_clock import Clock, wall_clock
 from robot_bench.bench import Bench, pins_of
 from robot_bench.events.codec import Json
 from robot_bench.pacer import PACED_SLICE_NS, RealTimePacer
-from robot_bench.recording.run_folder import reserved
+from robot_bench.recording.run_folder import remove_run, reserved
 from robot_bench.recording.run_record import TRACE_NAME, read_run
-from robot_bench.recording.summary import INTERRUPTED, end_of_a_broken_run
+from robot_bench.recording.summary import INTERRUPTED, end_of_a_broken_run, outcome_of
 from robot_bench.recording.trace import TraceWriter
 from robot_bench.remote import RemoteBench
-from robot_bench.report.make import make_artefacts
+from robot_bench.report.make import REPORT_NAME, Artefacts, make_artefacts
 from robot_bench.scenario.scenario import Scenario
 from robot_bench.wires.ports import Chip
 from simbase.errors import P2osError
@@ -99,6 +101,7 @@ def run_scenario(
     profile: bool = False,
     fail_under: float = 0.0,
     explained: bool = False,
+    is_kept: Callable[[bool], bool] = lambda _passed: True,
 ) -> RunResult:
     """Run a scenario in virtual time and make its run folder.
 
@@ -115,6 +118,7 @@ def run_scenario(
         profile: Write where its cycles went; likewise.
         fail_under: With `coverage`, the run fails where fewer percent of the lines ran; 0 asks for nothing.
         explained: Whether the report says of a run that failed why (`p2os explain`), which takes some seconds.
+        is_kept: Told whether the run passed; where it says no, nothing is made of the run and its folder is removed.
 
     Raises:
         P2osError: The folder is not free, a file cannot be read or written, or a part is not installed.
@@ -133,7 +137,7 @@ def run_scenario(
         bench.on_slice = after_slice
         trace.meta(meta_of(scenario, bench.parts.world, bench.note, is_at_port=False))
         with _measured(bench.chip, coverage=coverage, profile=profile, fail_under=fail_under) as measurement:
-            return _record(bench, trace, folder, pacer, clock, drive, measurement, explained=explained)
+            return _record(bench, trace, folder, pacer, clock, drive, measurement, is_kept, explained=explained)
 
 
 def run_at_port(
@@ -303,6 +307,7 @@ def _record(
     clock: Clock,
     drive: Callable[[_AnyBench], None] | None,
     measurement: "Measurement | None" = None,
+    is_kept: Callable[[bool], bool] = lambda _passed: True,
     *,
     explained: bool = False,
 ) -> RunResult:
@@ -349,6 +354,7 @@ def _record(
             "goals_met": goals.met,
             "goals_not_judged": goals.not_judged,
             "notes": notes(bench, end, pacer),
+            "parts": parts_of(bench.chip),
             "last_blocks": last_blocks(bench, end, passed=passed),
             "worst_lag_ms": None if pacer is None else round(pacer.worst_lag_ns / NS_PER_MS, 1),
         }
@@ -359,19 +365,40 @@ def _record(
             else {}
         )
     )
-    made = make_artefacts(folder)
+    made = make_artefacts(folder) if is_kept(passed) else _removed(folder)
     _LOG.info("%s %s: %s", bench.scenario.name, "passed" if passed else "failed", made.report)
     return RunResult(folder=folder, outcome=made.outcome, report=made.report, was_interrupted=was_interrupted)
 
 
 def why_failed(bench: Bench | RemoteBench, failures: Sequence[str]) -> str:
-    """Return the one line of `p2os explain` for a bench that has run; empty where it has no chip to replay."""
+    """Return the one line of `p2os explain` for a bench that has run; empty where that finds no cause."""
     if isinstance(bench, RemoteBench):
         return ""
+    from robot_bench.report.explain.chain import Standing
     from robot_bench.report.explain.explain import explain
 
-    record = bench.record()
-    return explain(replace(record, end={"failures": list(failures)}), bench.scenario.firmware).line
+    found = explain(replace(bench.record(), end={"failures": list(failures)}), bench.scenario.firmware)
+    return found.line if found.standing is Standing.CAUSE else ""
+
+
+def _removed(folder: Path) -> Artefacts:
+    """Return the figures of a run that nobody wants to keep, and remove its folder."""
+    outcome = outcome_of(read_run(folder))
+    remove_run(folder)
+    return Artefacts(outcome=outcome, report=folder / REPORT_NAME)
+
+
+def parts_of(chip: Chip) -> list[Json]:
+    """Return what each part on the board came to: its name, a line, and a picture (PNG, base64) where it has one."""
+    found: list[Json] = []
+    attached: AttachedParts | None = getattr(chip, "attached", None)
+    for name, part in attached.by_name.items() if attached else ():
+        row: Json = {"name": name, "words": part.words() if hasattr(part, "words") else ""}
+        if hasattr(part, "picture"):
+            picture = part.picture()
+            row["png"] = base64.b64encode(picture.png(picture.scale())).decode()
+        found.append(row)
+    return found
 
 
 def _figures(bench: Bench | RemoteBench, end: Nanos, wall_s: float) -> Json:

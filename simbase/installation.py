@@ -11,8 +11,6 @@ import shutil
 import sys
 from importlib.metadata import PackageNotFoundError, distribution, requires
 from pathlib import Path
-from urllib.parse import urlsplit
-from urllib.request import url2pathname
 
 _DISTRIBUTION = "p2os"
 
@@ -44,6 +42,9 @@ def install_command(extra: str = "", *, python: str = "") -> str:
 
 def reinstall_command() -> str:
     """Return the command that builds p2os again from where it came; `FOLDER_OF_P2OS` where that is not known."""
+    from urllib.parse import urlsplit
+    from urllib.request import url2pathname
+
     origin = json.loads(_origin() or "{}")
     if "dir_info" in origin:
         source = shlex.quote(url2pathname(urlsplit(origin["url"]).path))

@@ -9,8 +9,9 @@ import pytest
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
-    """Add the option of tests/tools/counted_lines.py."""
+    """Add the options of tests/tools/counted_lines.py and tests/tools/spent_time.py."""
     parser.addoption("--count-lines", metavar="FOLDER", help="where to write which lines of the packages ran")
+    parser.addoption("--count-time", metavar="FILE", help="where to write how long each file keeps a processor busy")
 
 
 def pytest_configure(config: pytest.Config) -> None:
@@ -29,6 +30,11 @@ def pytest_configure(config: pytest.Config) -> None:
         from tests.tools.counted_lines import LineCounter
 
         config.pluginmanager.register(LineCounter(config.rootpath / folder))
+    path = config.getoption("--count-time")
+    if path is not None:
+        from tests.tools.spent_time import TimeCounter
+
+        config.pluginmanager.register(TimeCounter(config.rootpath / path, is_worker=hasattr(config, "workerinput")))
     from hypothesis import HealthCheck, settings  # whose modules pytest rewrites: after it is known where they are kept
 
     settings.register_profile("tests", deadline=None, suppress_health_check=[HealthCheck.too_slow])

@@ -81,7 +81,7 @@ LAYERS = {
         ("analysis", "debug"), ("cli",),
     ),
     "adapter_sim": (
-        ("codec",), ("settings", "pinout"), ("pins", "mixing", "encoders", "distances", "session"),
+        ("codec",), ("duty",), ("settings", "pinout"), ("pins", "mixing", "encoders", "distances", "session"),
         ("masters", "driver"), ("adapter",),
     ),
     "robot_bench": (

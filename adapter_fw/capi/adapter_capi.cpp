@@ -68,6 +68,7 @@ struct adapter_handle final : private hal::PinsIn, private hal::PinsOut, private
   }
 
   std::uint32_t read(p2os::Nanos at) override { return callbacks.read(callbacks.user, at); }
+  std::int32_t duty(std::int32_t bit, p2os::Nanos at) override { return callbacks.duty(callbacks.user, bit, at); }
   void drive(std::uint32_t mask, std::uint32_t levels, p2os::Nanos now) override {
     callbacks.drive(callbacks.user, mask, levels, now);
   }

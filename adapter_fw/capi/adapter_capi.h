@@ -14,7 +14,7 @@ extern "C" {
 #endif
 
 /* Raised when the meaning or the order of anything below changes. */
-#define ADAPTER_CAPI_VERSION 1
+#define ADAPTER_CAPI_VERSION 2
 
 typedef struct adapter_handle adapter_handle;
 
@@ -23,6 +23,9 @@ typedef struct {
   void* user;
   /* Word of the input wires at an instant: motor1, motor2, p2dx_con, rst. */
   uint32_t (*read)(void* user, int64_t at);
+  /* Share of a period at which the wire of a bit of that word is high, 0 to 1000; only called where motor_command
+   * is 1. */
+  int32_t (*duty)(void* user, int32_t bit, int64_t at);
   /* Drives the wires of mask; a mask of 0 releases all. */
   void (*drive)(void* user, uint32_t mask, uint32_t levels, int64_t now);
   /* An event; what and detail are static texts. */

@@ -8,7 +8,8 @@
 // it back to what it was when the library was loaded, and several machines take turns in it. So nothing here is on the
 // heap. What outlives a reset is copied by whoever resets: NVS (`machine_nvs_*`), RTC memory (`machine_rtc`).
 //
-// Not modelled: the boot loader and its time, its words on UART0, the radio, interrupts, the second core.
+// Not modelled: the boot loader and its time, its words on UART0, the radio, the second core, interrupts but those of
+// the capture unit.
 #pragma once
 
 #include <stddef.h>

@@ -6,6 +6,7 @@
 #include <cstring>
 
 #include "../core/adapter/fields.hpp"
+#include "../core/adapter/inputs.hpp"
 #include "../core/app/code_keeper.hpp"
 #include "../core/app/led.hpp"
 #include "../core/app/mode_button.hpp"
@@ -113,6 +114,31 @@ void check_faults() {
     claim(fault_with(range.name, range.least - 1) != nullptr, range.name);
     claim(fault_with(range.name, range.most + 1) != nullptr, range.name);
   }
+}
+
+void check_duties() {
+  adapter::DutyMeter meter(25 * NS_PER_MS);
+  meter.edge(true, 0, 0);
+  meter.edge(false, 4'995, 4'995);
+  claim(meter.duty(9'999) == 0, "a period ends with the next rising edge");
+  meter.edge(true, 10'000, 10'000);
+  claim(meter.duty(10'000) == 500, "halves are rounded up");
+  claim(meter.duty(25 * NS_PER_MS + 9'999) == 500, "a duty lasts for the time-out");
+  claim(meter.duty(25 * NS_PER_MS + 10'000) == 1'000, "from then on it is a level");
+
+  adapter::DutyMeter wraps(25 * NS_PER_MS);
+  const std::uint32_t stamps[] = {0xFFFF'FF00U, 0xFFFF'FF80U, 0x100U};
+  wraps.edge(true, 0, stamps[0]);
+  wraps.edge(true, 10, 0);
+  wraps.edge(false, 1'000, stamps[1]);
+  wraps.edge(true, 4'000, stamps[2]);
+  claim(wraps.duty(4'000) == 250, "stamps wrap, and the same level again is no edge");
+
+  adapter::Median median(3);
+  claim(!median.take(-7) && median.take(-7) && median.value() == -7, "a median needs more than half");
+  claim(!median.take(900) && median.value() == -7, "one of three is an outlier");
+  median.reset();
+  claim(median.value() == 0 && !median.take(5) && median.take(6) && median.value() == 5, "the one in the middle");
 }
 
 class StandingClock final : public hal::Clock {
@@ -304,6 +330,7 @@ int main() {
   check_button();
   check_numbers();
   check_faults();
+  check_duties();
   check_gaps();
   if (broken == 0) {
     std::puts("ok");

@@ -13,11 +13,12 @@ Invariant: probing changes nothing; edges of one signal are in order of time
 and differ from one to the next.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 
 from bluepill_sim.analysis.edge_log import EdgeLog
 from bluepill_sim.board import BluePill
 from bluepill_sim.core.nvic import IRQ_NAMES
+from bluepill_sim.fabric.characters import Characters
 from bluepill_sim.fabric.pins import Pin
 from bluepill_sim.fabric.subscriptions import FLOATING, Of
 from bluepill_sim.peripherals.usart import Usart
@@ -93,8 +94,9 @@ class Probe:
         line = f"{name}.tx"
         line_number, word_number = self._numbers[line], self._numbers[f"{name}.word"]
 
-        def take(sent: Sequence[tuple[int, Nanos, int]]) -> None:
-            for word, at_ns, bit_ns in sent:
+        def take(sent: Characters) -> None:
+            bit_ns = sent.bit_ns
+            for word, at_ns in sent:
                 self.log.put(at_ns, word_number, word)
                 if line_number not in self._last:
                     self.initial[line] = self._last[line_number] = 1

@@ -1,4 +1,4 @@
-"""USART1 to the outside: standard output, a file, or a pseudo-terminal.
+"""USART1, and the serial port of a USB device, to the outside: standard output, a file, or a pseudo-terminal.
 
 This is the I/O layer: it is the one file here that opens things. The chip runs in
 virtual time and the console in none: what the chip sends is written as it
@@ -18,10 +18,12 @@ from bluepill_sim.errors import BluePillError
 
 #: Most bytes taken from a pseudo-terminal at one poll. Chosen: more than anybody types.
 _READ_BYTES = 4096
+#: How a new pseudo-terminal is asked for.
+PTY = frozenset({"pty:", "pty"})
 
 
 class SerialPort(Protocol):
-    """What a console needs of a USART."""
+    """What a console needs of a USART, or of a serial port over USB."""
 
     def subscribe(self, sink: Callable[[Sequence[tuple[int, int]]], None]) -> Callable[[], None]:
         """Have `sink` called with rows (word, ns) that go out from now on."""
@@ -133,14 +135,14 @@ def open_console(where: str) -> Console:
     """Return the console that a name asks for.
 
     Args:
-        where: "-" for standard output, "pty:" for a new pseudo-terminal, else a file to write.
+        where: "-" for standard output, "pty:" or "pty" for a new pseudo-terminal, else a file to write.
 
     Raises:
         BluePillError: It cannot be opened.
     """
     if where == "-":
         return StreamConsole(sys.stdout.buffer, "standard output", is_owner=False)
-    if where == "pty:":
+    if where in PTY:
         return PtyConsole()
     try:
         return StreamConsole(Path(where).open("wb"), where)
@@ -151,7 +153,7 @@ def open_console(where: str) -> Console:
 
 
 def connect(console: Console, port: SerialPort) -> Callable[[], None]:
-    """Connect a console to a USART, and return the function that carries what was typed to the chip."""
+    """Connect a console to a port, and return the function that carries what was typed to the chip."""
     port.subscribe(lambda rows: console.write(bytes(word & 0xFF for word, _ in rows)))
 
     def carry() -> None:

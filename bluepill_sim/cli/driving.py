@@ -14,6 +14,7 @@ from bluepill_sim.core.halts import ChipReached
 from bluepill_sim.errors import BluePillError
 from bluepill_sim.fabric.pins import Pin
 from bluepill_sim.fabric.signals import to_uv
+from bluepill_sim.parts.usb import HostState
 from bluepill_sim.program.last_blocks import TITLE
 from bluepill_sim.spans import to_nanos
 from simbase.timing import NS_PER_S, Nanos, Reason
@@ -173,13 +174,17 @@ def summary(board: BluePill) -> str:
 
 
 def _line_speeds(board: BluePill) -> str:
-    """Return a line for each USART that has sent: how much, and how fast."""
+    """Return a line for each USART that has sent: how much, and how fast; and one of what is plugged in at USB."""
     lines = []
     for name, port in board.serial_ports.items():
         speeds = [f"{count} characters at {baud} bit/s" for baud, count in port.speeds.items()]
         far = "" if port.far_baud is None else f"; the far end is at {port.far_baud} bit/s"
         if speeds:
             lines.append(f"\n{name} sent {', '.join(speeds)}{far}")
+    if board.usb.state is not HostState.UNPLUGGED:
+        line = board.usb_serial
+        carried = f", {line.received_bytes} bytes from it, {line.sent_bytes} to it" if board.usb.serial_in else ""
+        lines.append(f"\nusb: {board.usb.describe()}{carried}")
     return "".join(lines)
 
 

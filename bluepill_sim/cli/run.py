@@ -1,14 +1,14 @@
 """`p2os mcu run`: boots a firmware and shows what it prints."""
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
 from bluepill_sim.board import BluePill, run_until
-from bluepill_sim.cli.console import connect, open_console
+from bluepill_sim.cli.console import PTY, connect, open_console
 from bluepill_sim.cli.driving import (
     OverBudgetError,
     Schedule,
@@ -19,7 +19,9 @@ from bluepill_sim.cli.driving import (
     summary,
     warn_on_stderr,
 )
+from bluepill_sim.cli.parts import attach_parts, show_parts
 from bluepill_sim.cli.quantities import option, time_option
+from bluepill_sim.cli.stimuli import open_traces
 from bluepill_sim.core.halts import ChipReached
 from simbase.timing import NS_PER_MS, NS_PER_S, Nanos, Reason
 from simbase.units import BAUD
@@ -36,9 +38,13 @@ Examples:
   p2os mcu run mine.elf                          one second of virtual time
   p2os mcu run mine.elf --for 2s --uart log.txt  what it prints goes to a file
   p2os mcu run mine.elf --realtime --uart pty:   talk to it with any terminal program, until Ctrl-C
+  p2os mcu run mine.elf --itm log.txt            what ITM_SendChar prints, with times
   p2os mcu run mine.elf --drive PA6=1@500ms      something comes before a sensor
   p2os mcu run mine.elf --drive PA0=1.65V        what the ADC sees on a pin
   p2os mcu run mine.elf --until "pin PC13 low"   up to an event
+  p2os mcu run mine.elf --attach ssd1306,on=I2C1 --parts shots      an OLED, and its picture at the end
+  p2os mcu run mine.elf --attach ./mine.py:Sensor,on=I2C1,x=3       a part of your own
+  p2os mcu run mine.elf --usb pty:               plug it in: its USB serial port is a terminal here
 """
 
 #: chosen: how often typed input reaches a running program, and its time is held back to the clock.
@@ -74,23 +80,51 @@ def run(
     budget_ns: Annotated[
         Nanos, time_option("--budget", purpose="Most time of the wall clock, unless --realtime.", shown="10min")
     ] = _BUDGET_NS,
+    usb: Annotated[
+        str | None,
+        typer.Option(
+            help="Plug USB in; where its serial port (CDC) goes: pty:, - (stdout), or a file.", metavar="WHERE"
+        ),
+    ] = None,
     usart_baud: Annotated[
         int | None,
         option(BAUD, "--usart-baud", purpose="Speed of USART1's far end; unset follows the program.", above_zero=True),
     ] = None,
+    itm: Annotated[
+        Path | None,
+        typer.Option("--itm", help="What it writes to the ITM's ports, as text with times.", metavar="FILE"),
+    ] = None,
+    swo: Annotated[
+        Path | None, typer.Option("--swo", help="The same as the packets that a probe receives on SWO.", metavar="FILE")
+    ] = None,
     strict: Annotated[bool, typer.Option("--strict", help="The first warning ends the run.")] = False,
+    attach: Annotated[
+        list[str] | None,
+        typer.Option(help="Attach a part; repeatable. `p2os mcu parts` lists them.", metavar="PART,KEY=VALUE,..."),
+    ] = None,
+    parts_folder: Annotated[
+        Path | None, typer.Option("--parts", help="Where pictures and files of parts go at the end.", metavar="FOLDER")
+    ] = None,
 ) -> None:
     """Boot a firmware."""
     end_ns = span_ns if span_ns is not None else _FOR_EVER_NS if realtime else NS_PER_S
     board = BluePill(firmware, strict=strict)
     board.usart1.far_baud = usart_baud
     changes = parse_changes(drive or [], board)
+    traces = open_traces(board, itm, swo)
     warn_on_stderr(board)
-    console = open_console(uart)
-    carry = connect(console, board.usart1)
-    if uart == "pty:":
-        print_status(f"USART1 is at {console.description}")
-    advance = _paced(board, carry) if realtime or uart == "pty:" else _bounded(board, budget_ns)
+    attach_parts(board, attach or [])
+    consoles = [open_console(uart)]
+    carriers = [connect(consoles[0], board.usart1)]
+    if uart in PTY:
+        print_status(f"USART1 is at {consoles[0].description}")
+    if usb is not None:
+        consoles.append(open_console(usb))
+        carriers.append(connect(consoles[1], board.usb_serial))
+        board.usb.plug()
+        print_status(f"USB is plugged in; its serial port goes to {consoles[1].description}")
+    is_paced = realtime or bool(PTY & {uart, usb})
+    advance = _paced(board, carriers) if is_paced else _bounded(board, budget_ns)
     schedule = Schedule(board, changes, advance)
     with showing_where_it_hangs(board):
         try:
@@ -99,9 +133,13 @@ def run(
             else:
                 run_until(board, until, end_ns, schedule.advance_to)
         finally:
-            console.close()
+            for console in consoles:
+                console.close()
+            for trace in traces:
+                trace.close()
             if uart == "-" and board.usart1.unread and not board.usart1.unread.endswith(b"\n"):
                 typer.echo("")
+    show_parts(board, parts_folder)
     print_status(summary(board))
     if print_fault(board):
         raise typer.Exit(1)
@@ -135,12 +173,13 @@ def _bounded(board: BluePill, budget_ns: Nanos) -> Callable[[Nanos], ChipReached
     return advance
 
 
-def _paced(board: BluePill, carry: Callable[[], None]) -> Callable[[Nanos], ChipReached]:
+def _paced(board: BluePill, carriers: Sequence[Callable[[], None]]) -> Callable[[Nanos], ChipReached]:
     """Return a way to advance in short slices that keep to the wall clock, with the console served between them."""
     start_ns = time.monotonic_ns() - board.now_ns
 
     def advance(limit_ns: Nanos) -> ChipReached:
-        carry()
+        for carry in carriers:
+            carry()
         reached = board.advance_to(min(limit_ns, board.now_ns + SLICE_NS))
         ahead_ns = start_ns + board.now_ns - time.monotonic_ns()
         if ahead_ns > 0:

@@ -8,11 +8,11 @@ end a run inside an IT block), so that the core stands exactly before the
 instruction. A watchpoint stops the same way, and then the instruction is
 stepped over: the halt that is reported is one after the access.
 
-Not modelled: the four comparators of the DWT and the six of the FPB; there are
-any number of breakpoints and watchpoints. An instruction that its IT
-block skips breaks nothing. Stacking by an exception is not watched.
+A debugger has any number of breakpoints and watchpoints; those of the firmware, which come from the comparators of FPB
+and DWT (`comparators.py`), have sets of their own. An instruction that its IT block skips breaks nothing. Stacking by
+an exception is not watched.
 
-Invariant: between runs the hooks are those of `breakpoints` and `watchpoints`
+Invariant: between runs the hooks are those of all four sets
 as they were when the last run began.
 """
 
@@ -65,6 +65,12 @@ class DebugUnit:
         self.breakpoints: set[int] = set()
         #: Take effect with the next run.
         self.watchpoints: set[Watchpoint] = set()
+        #: The same, of the firmware.
+        self.own_breakpoints: set[int] = set()
+        self.own_watchpoints: set[Watchpoint] = set()
+        #: Those of the firmware that the last watched access has met, and whether a debugger waits for it too.
+        self.met: tuple[Watchpoint, ...] = ()
+        self.is_debuggers = False
         #: The instruction that a run starts with and that has already been stopped at; None for none.
         self.passes: int | None = None
         #: Whether accesses to watched bytes pass, for the step that makes one.
@@ -84,18 +90,27 @@ class DebugUnit:
     @property
     def is_armed(self) -> bool:
         """Whether the hooks are those that are wanted."""
-        return self._break_hooks.keys() == self.breakpoints and self._watch_hooks.keys() == self.watchpoints
+        return (
+            self._break_hooks.keys() == self.breakpoints | self.own_breakpoints
+            and self._watch_hooks.keys() == self.watchpoints | self.own_watchpoints
+        )
+
+    @property
+    def has_points(self) -> bool:
+        """Whether hooks are wanted."""
+        return bool(self.breakpoints or self.watchpoints or self.own_breakpoints or self.own_watchpoints)
 
     def arm(self) -> None:
         """Put hooks where they are wanted and nowhere else, between runs."""
         core = self._core
-        for address in self._break_hooks.keys() - self.breakpoints:
+        breakpoints, watchpoints = self.breakpoints | self.own_breakpoints, self.watchpoints | self.own_watchpoints
+        for address in self._break_hooks.keys() - breakpoints:
             core.remove_hook(self._break_hooks.pop(address))
-        for address in self.breakpoints - self._break_hooks.keys():
+        for address in breakpoints - self._break_hooks.keys():
             self._break_hooks[address] = core.hook_instructions(self._on_instruction, address, address)
-        for old in self._watch_hooks.keys() - self.watchpoints:
+        for old in self._watch_hooks.keys() - watchpoints:
             core.remove_hook(self._watch_hooks.pop(old))
-        for new in self.watchpoints - self._watch_hooks.keys():
+        for new in watchpoints - self._watch_hooks.keys():
             # An access that begins up to three bytes before may reach into it.
             first = max(0, new.address - 3)
             self._watch_hooks[new] = core.hook_accesses(self._on_access, first, new.address + new.size - 1)
@@ -127,6 +142,11 @@ class DebugUnit:
 
     def _at_access(self, access: int, address: int, size: int, _value: int) -> bool:
         is_read = access == READ_ACCESS
-        if not self.ignores_accesses and any(point.sees(address, size, is_read=is_read) for point in self._watch_hooks):
+        if self.ignores_accesses:
+            return True
+        met = [point for point in self._watch_hooks if point.sees(address, size, is_read=is_read)]
+        if met:
+            self.met = tuple(point for point in met if point in self.own_watchpoints)
+            self.is_debuggers = any(point in self.watchpoints for point in met)
             self._stop_before(HaltKind.WATCHPOINT, self._core.registers[Register.PC], address)
         return True

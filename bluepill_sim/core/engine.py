@@ -115,7 +115,7 @@ class Engine(Stateful):
         # What a run or a block has for itself alone.
         "_is_stepping", "_lets_writes_through", "_raised_by",
         # Whom it calls, and what it is made of.
-        "_log_row", "_block_hook", "registers",
+        "_log_row", "_block_hook", "registers", "own_points",
     )  # fmt: skip
 
     def __init__(self, measure: Measure) -> None:
@@ -165,6 +165,8 @@ class Engine(Stateful):
         self.breakpoints: set[int] = self._debug.breakpoints
         #: Accesses that a run halts after; likewise.
         self.watchpoints: set[Watchpoint] = self._debug.watchpoints
+        #: The firmware's, and which of them an access has met.
+        self.own_points = self._debug
         self._block_hook = 0
         self._install_hooks()
         self._bad_access_hook = self._core.on_bad_access(self._bad_access)
@@ -268,7 +270,7 @@ class Engine(Stateful):
     def _run(self, stop_at: int) -> Halt:
         self.stop_at = stop_at
         debug, traps = self._debug, self._traps
-        if (debug.breakpoints or debug.watchpoints or debug.has_hooks) and not debug.is_armed:
+        if (debug.has_points or debug.has_hooks) and not debug.is_armed:
             debug.arm()
         if traps.have_changed:
             traps.apply()

@@ -22,10 +22,21 @@ from enum import Enum
 from typing import Any
 
 from bluepill_sim.core.blocks import it_state_of
+from bluepill_sim.core.comparators import MATCHED, MON_EN, MON_STEP, DebugEvent, points_of
 from bluepill_sim.core.engine import FIRST_EXCEPTION_RETURN, Engine
 from bluepill_sim.core.faults import FAULT_OF_HALT, FAULT_ROWS, HFSR_FORCED, FaultKind, SeenFault
 from bluepill_sim.core.halts import DEBUG_HALTS, Halt, HaltKind
-from bluepill_sim.core.nvic import BUS_FAULT, FIRST_IRQ, HARD_FAULT, NMI, SVCALL, SYSTICK, Nvic, numbers_of
+from bluepill_sim.core.nvic import (
+    BUS_FAULT,
+    DEBUG_MONITOR,
+    FIRST_IRQ,
+    HARD_FAULT,
+    NMI,
+    SVCALL,
+    SYSTICK,
+    Nvic,
+    numbers_of,
+)
 from bluepill_sim.core.recorder import EXCEPTION_RETURN
 from bluepill_sim.core.systick import SysTick
 from bluepill_sim.core.unicorn_core import Register
@@ -89,9 +100,10 @@ class Processor(Stateful):
         "hfsr",
         "bfar",
         "mmfar",
+        "is_stepping",
     )
-    #: Taken by the chip at once.
-    DERIVED = ("halt",)
+    #: Taken by the chip at once; what follows from registers.
+    DERIVED = ("halt", "_points")
 
     exception_number: int = field("exception_number", "IPSR.")
     event_register: bool = flag("event_register", "What WFE waits for.")
@@ -120,6 +132,11 @@ class Processor(Stateful):
         #: Why a debugger's halt ended the last run; None where none did.
         self.halt: Halt | None = None
         self.ccr = STKALIGN
+        #: Whether DebugMonitor has returned with MON_STEP set: one instruction runs until it comes again.
+        self.is_stepping = False
+        self._points = points_of(self.shared)
+        #: Called with what the registers of FPB and DWT want and is not modelled.
+        self.on_unmodelled: Callable[[str], None] = lambda _what: None
         self._memory = memory
         engine.on_event = self.send_event
         engine.is_interrupted = lambda: bool(self.shared.waits) or self.is_interrupted()
@@ -185,6 +202,9 @@ class Processor(Stateful):
         if is_inside and self.engine.stops_after_mask_change:
             stop_at = 0  # what came at a halt waits for the boundary, and no longer
         if self._stands_at_return():
+            return
+        if self.is_stepping:
+            self._step_for_monitor(stop_at)
             return
         halt = self.engine.run(stop_at)
         if halt.kind is not HaltKind.BOUNDARY:
@@ -322,10 +342,79 @@ class Processor(Stateful):
         self._fault(FaultKind.EXECUTE_NEVER, self.engine.pc)
         return True
 
+    # DebugMonitor.
+
+    def look_out(self) -> None:
+        """Look out for what the registers of FPB and DWT now say."""
+        self._points = points = points_of(self.shared)
+        own = self.engine.own_points
+        own.own_breakpoints = {*points.breakpoints, *points.instructions}
+        own.own_watchpoints = set(points.accesses)
+        for what in points.unmodelled:
+            self.on_unmodelled(what)
+        self.stop_at_boundary()
+
+    def comparator_matched(self, number: int) -> None:
+        """Take that a comparator of the DWT has met what it looks out for."""
+        self.shared.dwt_function[number] |= MATCHED
+        self.shared.dfsr |= DebugEvent.DWTTRAP
+        if self.shared.demcr & MON_EN:
+            self.pend(DEBUG_MONITOR)
+
+    def _step_for_monitor(self, stop_at: int) -> None:
+        self.is_stepping = False
+        halt = self.engine.step(stop_at)
+        if halt.kind is not HaltKind.STEP:
+            self._act_on(halt)
+        self.shared.dfsr |= DebugEvent.HALTED
+        self._monitor_now()
+
+    def _monitor_now(self) -> None:
+        """Enter DebugMonitor in front of the next instruction; make it pending where it must wait."""
+        if not self.shared.demcr & MON_EN:
+            return
+        if self.sleep is Sleep.AWAKE and self.nvic.can_preempt(DEBUG_MONITOR, self.execution_priority()):
+            self._enter(DEBUG_MONITOR, self.engine.pc)
+        else:
+            self.pend(DEBUG_MONITOR)
+
+    def _take_own_point(self, halt: Halt) -> bool:
+        """Act on a point of the firmware's; return whether it was one, and no debugger's."""
+        if halt.kind is HaltKind.BREAKPOINT and halt.pc not in self.engine.breakpoints:
+            if halt.pc in self._points.breakpoints:
+                self._take_breakpoint(halt.pc)
+                return True
+            number = self._points.instructions.get(halt.pc)
+            if number is not None:
+                after = self.engine.step(self.engine.cycle)
+                if after.kind is not HaltKind.STEP:
+                    self._act_on(after)
+                self.comparator_matched(number)
+            return True  # one that was taken away meanwhile is none
+        if halt.kind is HaltKind.WATCHPOINT:
+            return self._take_watched()
+        return False
+
+    def _take_watched(self) -> bool:
+        """Act on a watched access; return whether no debugger waits for it."""
+        for point in self.engine.own_points.met:
+            if point in self._points.accesses:
+                self.comparator_matched(self._points.accesses[point])
+        return not self.engine.own_points.is_debuggers
+
+    def _take_breakpoint(self, pc: int) -> None:
+        """Do what a BKPT does without a debugger (ARM C1.4.1)."""
+        self.shared.dfsr |= DebugEvent.BKPT
+        if self.shared.demcr & MON_EN and self.nvic.can_preempt(DEBUG_MONITOR, self.execution_priority()):
+            self._enter(DEBUG_MONITOR, pc)
+        else:
+            self._fault(FaultKind.BREAKPOINT, pc)
+
     def _act_on(self, halt: Halt) -> None:
         kind = halt.kind
         if kind in DEBUG_HALTS or (kind is HaltKind.BKPT and self.halts_on_bkpt):
-            self.halt = halt
+            if kind not in DEBUG_HALTS or not self._take_own_point(halt):
+                self.halt = halt
             return
         if kind is HaltKind.EXCEPTION_RETURN:
             self._leave(halt.pc)
@@ -333,6 +422,8 @@ class Processor(Stateful):
             self._fall_asleep(Sleep.INTERRUPT)
         elif kind is HaltKind.WAIT_EVENT:
             self._fall_asleep(Sleep.EVENT)
+        elif kind is HaltKind.BKPT:
+            self._take_breakpoint(halt.pc)
         elif kind is HaltKind.SUPERVISOR_CALL:
             if self.nvic.can_preempt(SVCALL, self.execution_priority()):
                 self._enter(SVCALL, halt.pc)
@@ -340,7 +431,7 @@ class Processor(Stateful):
                 self._fault(FaultKind.MASKED_SVC, halt.pc)
         else:
             self._fault(FAULT_OF_HALT[kind], halt.pc, halt.address)
-        if halt.watched is not None:
+        if halt.watched is not None and not self._take_watched():
             self.halt = Halt(HaltKind.WATCHPOINT, self.engine.pc, halt.watched)
 
     def _enter(self, number: int, return_address: int) -> None:
@@ -424,6 +515,7 @@ class Processor(Stateful):
             return
         self._unstack(exc_return, control, cpsr, psp if exc_return == _TO_THREAD_PSP else msp)
         self.engine.cycle += EXIT_CYCLES
+        self.is_stepping = number == DEBUG_MONITOR and self.shared.demcr & (MON_STEP | MON_EN) == MON_STEP | MON_EN
 
     def _unstack(self, exc_return: int, control: int, cpsr: int, frame_at: int) -> None:
         data = self._memory.read(frame_at, _FRAME_BYTES)

@@ -98,7 +98,7 @@ class LoneChip(Stateful):
 
     def advance_to(self, limit_ns: Nanos, *, by_step: bool = False) -> ChipReached:
         """Bring the board to a time, or one instruction on."""
-        return self.board.chip.step(limit_ns) if by_step else self.board.advance_to(limit_ns)
+        return self.board.step(limit_ns) if by_step else self.board.advance_to(limit_ns)
 
     def halted(self) -> None:
         """Nothing else is connected."""

@@ -148,6 +148,12 @@ SHARED = Struct(
         Field("exact_stops", "u64", doc="how often a run was stopped to learn which instruction makes an access"),
         Field("logged", "u64", doc="rows so far: the next one goes to `last` at this, modulo its size"),
         *_fields("u32", "shcsr", "cfsr", "hfsr", "mmfar", "bfar", "demcr", "dbgmcu_cr"),
+        *_fields("u32", "dfsr", "actlr", "dwt_control", "fp_control", "fp_remap"),
+        *_fields("u32", "itm_enables", "itm_privileges", "itm_control", "itm_is_open"),
+        *_fields("u32", "tpiu_size", "tpiu_prescaler", "tpiu_protocol", "tpiu_formatter"),
+        Field("dwt_counts", "u32", 5, "CPICNT, EXCCNT, SLEEPCNT, LSUCNT, FOLDCNT: they only store"),
+        *(Field(name, "u32", 4) for name in ("dwt_comp", "dwt_mask", "dwt_function")),
+        Field("fp_comp", "u32", 8, "six of instructions, two of literals"),
         Field("tick", "ramp", doc="SysTick's counter: its limit is the reload value"),
         Field("cyccnt", "ramp"),
         Field("hears_ticks", "u32", doc="Python wants to know when SysTick is set"),
@@ -228,6 +234,7 @@ SPI = Struct(
         Field("selected", "u32", doc="parts that are selected"),
         Field("far", "u32", doc="the word that a master outside sends; 0: none"),
         Field("wants_words", "u32", doc="somebody has subscribed to words"),
+        Field("is_stopped", "u32", doc="its clock stands still"),
     ),
 )
 I2C = Struct(
@@ -254,6 +261,8 @@ I2C = Struct(
         Field("offered", "u32", 3, "the levels that they were last given"),
         Field("counter", "u32", doc="address of CNDTR of the DMA channel that it receives by"),
         Field("far_hz", "u32", doc="bits a second of a master outside"),
+        Field("is_stopped", "u32", doc="1: its clock stands still; 2: that of the timeout does"),
+        Field("stopped_ns", "u64", doc="since when: times of what comes meanwhile are this one"),
     ),
 )
 EXTI = Struct("exti", "What EXTI holds beyond its registers.", (Field("levels", "u32"), Field("routes", "u8", PINS)))
@@ -389,6 +398,8 @@ TIM = Struct(
         Field("burst_output", "u32", doc="by this output"),
         Field("lock", "u32", doc="LOCK, once it was written"),
         Field("is_advanced", "u32", doc="it is TIM1"),
+        Field("is_stopped", "u32", doc="its clock stands still"),
+        Field("padding", "u32"),
         Field("pins", "u8", 9, "CH1 to CH4, CH1N to CH3N, ETR, BKIN"),
         Field("sources", "u8", 7, "the alternate functions of the first seven"),
     ),

@@ -68,6 +68,7 @@ _FUNCTIONS = {
     "core_forget_zeros": "vp",
     "system_init": "vp",
     "system_reset": "vp",
+    "system_power_up": "vp",
     "system_has": "bu",
     "system_read": "upulp",
     "system_write": "upuuul",

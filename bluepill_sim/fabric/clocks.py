@@ -35,6 +35,8 @@ class Clocks(Stateful):
     #: Clock of TIM2-7 and TIM1/8: PCLKx, doubled when its prescaler is not 1.
     timer1_hz: int = HSI_HZ
     timer2_hz: int = HSI_HZ
+    #: The clock of USB: that of the PLL, or two thirds of it; 0 while the PLL is off.
+    usb_hz: int = 0
     #: What PCLK2 is divided by for the ADCs.
     adc_divider: int = 2
     #: The independent watchdog's clock: LSI, whether or not it runs for others.

@@ -200,7 +200,7 @@ class NativeEngine(Engine):
     @property
     def needs_python(self) -> bool:
         """Whether the next run is one that C does not do."""
-        return bool(self.watchpoints) or self._rest.block is not None
+        return bool(self.watchpoints or self._debug.own_watchpoints) or self._rest.block is not None
 
     def go_on(self, limit: int) -> tuple[bool, Halt | None]:
         """Run, sleep and take exceptions up to the first boundary at or after `limit` cycles, or less far.
@@ -214,7 +214,7 @@ class NativeEngine(Engine):
         """
         self.use_python(False)
         debug, traps, shared = self._debug, self._traps, self.shared
-        if (debug.breakpoints or debug.has_hooks) and not debug.is_armed:
+        if (debug.has_points or debug.has_hooks) and not debug.is_armed:
             debug.arm()
         if traps.have_changed:
             traps.apply()

@@ -26,6 +26,7 @@ from bluepill_sim.stm32f103 import CLOCK_GATES, PERIPHERAL_BASE
 _READS_PLAIN, _WRITES_PLAIN, _READS_NATIVE, _WRITES_NATIVE, _HALFWORDS, _DUPLICATES = 1, 2, 4, 8, 16, 32
 _LATCH_SHIFT = 6
 _PAGE_SHIFT = 10
+_PAGE_WORDS = 1 << _PAGE_SHIFT - 2
 _HALFWORD = 0xFFFF
 
 
@@ -47,18 +48,24 @@ def share_registers(engine: Engine, parts: Iterable[Peripheral], rcc: Rcc) -> No
     for part in parts:
         count = len(part.REGISTERS) and max(register.offset for register in part.REGISTERS) // 4 + 1
         behaviour = (ctypes.c_uint16 * count)()
+        # What looks at each write itself does so for registers that only store, too.
+        decided = 0 if type(part).write is Peripheral.write else _WRITES_PLAIN
         masks = (ctypes.c_uint32 * (4 * count))()
         for register in part.REGISTERS:
             index = register.offset // 4
-            behaviour[index] = _behaviour(register, has_byte_lanes=part.HAS_BYTE_LANES)
+            behaviour[index] = _behaviour(register, has_byte_lanes=part.HAS_BYTE_LANES) & ~decided
             masks[4 * index : 4 * index + 4] = list(part.masks_of(index))
         gate = CLOCK_GATES.get(part.name)
         at, mask = rcc.gate_address(part.name) if gate is not None else (None, 0)
         words, _ = part.words.buffer_info()
         engine.keep(behaviour, masks)
-        page = part.base - PERIPHERAL_BASE >> _PAGE_SHIFT
+        first_page = part.base - PERIPHERAL_BASE >> _PAGE_SHIFT
         slot = -1 if part.KIND is None else part.slot
-        calls.core_set_page(state, page, words, count, at, mask, behaviour, masks, slot)
+        for first in range(0, count, _PAGE_WORDS):
+            calls.core_set_page(
+                state, first_page + first // _PAGE_WORDS, words + 4 * first, min(count - first, _PAGE_WORDS), at, mask,
+                ctypes.byref(behaviour, 2 * first), ctypes.byref(masks, 16 * first), slot,
+            )  # fmt: skip
 
 
 def _behaviour(register: Register, *, has_byte_lanes: bool) -> int:

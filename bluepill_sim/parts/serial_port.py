@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from typing import Protocol
 
 from bluepill_sim.errors import BluePillError
+from bluepill_sim.fabric.characters import Characters
 from bluepill_sim.peripherals.usart import CR1, PINS, RE, UE, Usart
 from bluepill_sim.spans import Span
 from simbase.state import Stateful
@@ -160,12 +161,11 @@ class SerialPort(Stateful):
         del self.unread[:end]
         return taken
 
-    def _take(self, sent: Sequence[tuple[int, Nanos, int]]) -> None:
-        rows = [(word, at_ns) for word, at_ns, _ in sent]
-        self._activity.last_usart_ns = rows[-1][1] if rows else self._activity.last_usart_ns
+    def _take(self, sent: Characters) -> None:
+        self._activity.last_usart_ns = sent.times[-1] if sent else self._activity.last_usart_ns
         unread = self.unread
-        unread += bytes(word & 0xFF for word, _ in rows)
+        unread += sent.data
         if len(unread) > 2 * KEPT_BYTES:
             del unread[:-KEPT_BYTES]
         for sink in self._sinks:
-            sink(rows)
+            sink(sent)

@@ -11,7 +11,7 @@ Invariant: FMP of each FIFO is the number of messages in `_fifos`, and its first
 """
 
 from collections import deque
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from fractions import Fraction
 from functools import partialmethod
 
@@ -103,10 +103,10 @@ def _mailbox_registers() -> tuple[Register, ...]:
 class Can(Peripheral):
     """Basic extended CAN."""
 
-    OUTPUTS = ("tx_irq", "rx0_irq", "rx1_irq", "sce_irq")
+    OUTPUTS = ("tx_irq", "rx0_irq", "rx1_irq", "sce_irq", "packets")
     STATE = (
         "_alone", "_joined", "_mailboxes", "_order", "_fifos", "_ends", "_sync_ns", "_recover_ns", "_tec", "_rec",
-        "_timer_ns", "_lost",
+        "_timer_ns", "_lost", "_is_stopped",
     )  # fmt: skip
     DERIVED = ("_pin_names",)
     REGISTERS = (
@@ -219,6 +219,8 @@ class Can(Peripheral):
         self._timer_ns: Nanos = 0
         #: Mailboxes that have lost an arbitration and do not try again.
         self._lost: tuple[int, ...] = ()
+        #: Its clock stands still: nothing is heard, and what it has begun to send ends with the clock.
+        self._is_stopped = False
 
     # From outside the chip.
 
@@ -230,6 +232,11 @@ class Can(Peripheral):
     def sends_at(self, pin: str) -> bool:
         """Whether something outside sends on a pin: a network does so on RX."""
         return self._joined is not None and pin == self._pin_names[0]
+
+    @property
+    def joined(self) -> CanNetwork | None:
+        """The network that it was put on; None: it is alone."""
+        return self._joined
 
     # For the network.
 
@@ -254,7 +261,7 @@ class Can(Peripheral):
     def is_on(self) -> bool:
         """Whether it takes part in the traffic."""
         is_there = self.hears_itself or self._is_wired()
-        return is_there and not self.words[MSR] & (INAK | SLAK) and not self.words[ESR] & BOFF
+        return is_there and not self._is_stopped and not self.words[MSR] & (INAK | SLAK) and not self.words[ESR] & BOFF
 
     @property
     def hears_itself(self) -> bool:
@@ -288,11 +295,16 @@ class Can(Peripheral):
 
     def end(self, end: CanEnd) -> None:
         """Take the end of a frame, to act on it at its time."""
-        self._ends.append(end)
+        if end.is_own or not self._is_stopped:
+            self._ends.append(end)
         self.plan()
 
     def plan(self) -> None:
         """Work out when it acts next."""
+        if self._is_stopped:  # the others go on
+            next_ns = self.network.next_ns
+            self.due_ns = None if next_ns is None else max(next_ns, self.chip.now_ns)
+            return
         times = [self._sync_ns, self._recover_ns, self.network.next_ns if self._mailboxes or self._joined else None]
         if self._ends:
             times.append(self._ends[0].end_ns)
@@ -306,6 +318,10 @@ class Can(Peripheral):
     def advance_to(self, now_ns: Nanos) -> None:
         """Act on what is due: ends of frames, changes of mode, what the network has to decide."""
         self.due_ns = None
+        if self._is_stopped:
+            self.network.advance_to(now_ns)
+            self.plan()
+            return
         self._take_ends(now_ns)
         if self._sync_ns is not None and self._sync_ns <= now_ns:
             self._sync_ns = None
@@ -321,6 +337,26 @@ class Can(Peripheral):
         self._lost = ()
         self._take_ends(now_ns)  # a chip that others have left behind is told of what is over
         self._update()
+        self.plan()
+
+    def clock_stopped(self) -> None:
+        """Stand still in Stop, or by DBG_CAN_STOP: frames of others that have not ended are lost."""
+        self.advance_to(self.chip.now_ns)
+        self._is_stopped = True
+        self._ends = deque(end for end in self._ends if end.is_own)
+        self.plan()
+
+    def clock_resumed(self, stopped_ns: int) -> None:
+        """Go on: an own frame ends that much later."""
+        if not self._is_stopped:  # reset meanwhile
+            return
+        self._is_stopped = False
+        self._ends = deque(replace(end, end_ns=end.end_ns + stopped_ns) for end in self._ends)
+        self._sync_ns, self._recover_ns = (
+            None if at is None else at + stopped_ns for at in (self._sync_ns, self._recover_ns)
+        )
+        self._timer_ns += stopped_ns
+        self._want()
         self.plan()
 
     def on_reset(self) -> None:
@@ -590,6 +626,7 @@ class Can(Peripheral):
         last = self._last()
         flags |= 0 if last is None or len(self._mailboxes) < 2 else 1 << _LOW_AT + last
         words[TSR] = flags | (free[0] if free else last or 0) << _CODE_AT
+        self.set_output("packets", not words[MSR] & (INAK | SLAK))  # it uses the memory that it shares with USB
         enabled = words[IER]
         self.set_output("tx_irq", bool(enabled & TMEIE and words[TSR] & 0x01_0101))
         for n in range(2):

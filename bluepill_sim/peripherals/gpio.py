@@ -29,13 +29,15 @@ _CR_RESET = 0x4444_4444
 #: CNF[1:0] MODE[1:0] of a pin after reset.
 _FLOATING_NIBBLE = 0x4
 
-#: chosen: how long after its configuration a wire may still come.
+#: chosen: how long after its configuration a wire may still come, and SWJ_CFG release a pin.
 SETTLING_NS = 1_000_000
 
 _INPUT_MODES = (PinMode.ANALOG, PinMode.FLOATING, PinMode.PULLED, PinMode.FLOATING)
 _OUTPUT_MODES = (PinMode.PUSH_PULL, PinMode.OPEN_DRAIN, PinMode.ALTERNATE_PUSH_PULL, PinMode.ALTERNATE_OPEN_DRAIN)
 #: Mode by CNF[1:0] MODE[1:0] (RM0008 table 20); CNF = 11, MODE = 00 is reserved and taken as floating.
 PIN_MODES = tuple((_OUTPUT_MODES if nibble & 3 else _INPUT_MODES)[nibble >> 2] for nibble in range(16))
+#: Modes that want nothing of a pin; a system that saves power makes every pin analog.
+_IDLE_MODES = (PinMode.ANALOG, PinMode.FLOATING)
 
 
 #: From the left.
@@ -53,7 +55,7 @@ class Gpio(Peripheral):
     """One general-purpose I/O port; the last letter of its name is the port's."""
 
     KIND, HOLDS = "gpio", GPIO
-    STATE = ("_lock_writes", "_locked", "_intended", "_warned")
+    STATE = ("_lock_writes", "_locked", "_intended", "_claimed", "_warned")
     REGISTERS = (
         Register(name="CRL", offset=0x00, reset=_CR_RESET, on_write="_write_crl", fields=_modes(range(7, -1, -1))),
         Register(name="CRH", offset=0x04, reset=_CR_RESET, on_write="_write_crh", fields=_modes(range(15, 7, -1))),
@@ -83,6 +85,8 @@ class Gpio(Peripheral):
         self._locked = 0
         #: Pins that the program has made floating inputs on purpose, and where: (number, address of the store).
         self._intended: tuple[tuple[int, int], ...] = ()
+        #: Pins that the program has configured while they belong to another, and where.
+        self._claimed: tuple[tuple[int, int], ...] = ()
         #: Pins that were warned of as floating.
         self._warned = 0
         chip.pins.release_listeners.append(self._released)
@@ -92,7 +96,7 @@ class Gpio(Peripheral):
         """Make every pin a floating input and undo the lock."""
         self._lock_writes = ()
         self._locked = 0
-        self._intended = ()
+        self._intended = self._claimed = ()
         for pin in self._pins:
             pin.configure(PinMode.FLOATING, output_bit=False)
 
@@ -119,11 +123,10 @@ class Gpio(Peripheral):
                 self.chip.warn(f"P{self.name[-1]}{number}: configured while locked: ignored", once=f"{self.name}:lock")
                 continue
             pin = self._pins[number]
-            if pin.holder is not None and nibble != _FLOATING_NIBBLE:
-                self.chip.warn(
-                    f"{pin.name} belongs to {pin.holder}: its GPIO configuration has no effect until it is released",
-                    once=f"{pin.name}:held",
-                )
+            self._claimed = tuple(pair for pair in self._claimed if pair[0] != number)
+            if pin.holder is not None and PIN_MODES[nibble] not in _IDLE_MODES:
+                self._claimed = (*self._claimed, (number, pc))
+                self._check_later()
             pin.configure(PIN_MODES[nibble], bool(self.words[ODR] >> number & 1))
 
     def _note_intent(self, number: int, pc: int, *, is_floating: bool) -> None:
@@ -144,10 +147,19 @@ class Gpio(Peripheral):
         self.due_ns = self.chip.now_ns + SETTLING_NS
 
     def advance_to(self, now_ns: int) -> None:
-        """Warn of the intended inputs that float."""
+        """Warn of the pins that belong to another still, and of the intended inputs that float."""
         if self.due_ns is None or now_ns < self.due_ns:
             return
         self.due_ns = None
+        for number, pc in self._claimed:
+            pin = self._pins[number]
+            if pin.holder is not None:
+                self.chip.warn(
+                    f"{pin.name} belongs to {pin.holder}: its GPIO configuration has no effect until it is released",
+                    once=f"{pin.name}:held",
+                    pc=pc,
+                )
+        self._claimed = ()
         floating = [(self._pins[n], pc) for n, pc in sorted(self._intended) if not self._warned >> n & 1]
         floating = [(p, pc) for p, pc in floating if _is_lost(p) and not self.chip.pins.is_serial_input(p)]
         if floating:

@@ -19,7 +19,7 @@ from bluepill_sim.fabric.bus_parts import I2cDevice
 from bluepill_sim.fabric.fabric import OWN_COMMANDS
 from bluepill_sim.fabric.pins import ALTERNATE_FUNCTIONS, PinDrive
 from bluepill_sim.fabric.ports import ChipPorts
-from bluepill_sim.fabric.registers import NATIVE, Peripheral, Place, Register, bits
+from bluepill_sim.fabric.registers import NATIVE, WORD, Peripheral, Place, Register, bits
 
 CR1, CR2, OAR1, OAR2, DR, SR1, SR2, CCR, TRISE = range(9)
 _SEEN = 0x24
@@ -33,7 +33,7 @@ PINS = {"I2C1": {0: ("PB6", "PB7", "PB5"), 1: ("PB8", "PB9", "PB5")}, "I2C2": {0
 #: CNDTR of the channel of DMA1 that each receives by (RM0008 table 78): its end of transfer is what LAST waits for.
 _COUNTERS = {"I2C1": 0x4002_0000 + 0x0C + 20 * 6, "I2C2": 0x4002_0000 + 0x0C + 20 * 4}
 #: Commands of its own (i2c.c).
-_MOVE, _CALL, _DISTURB, _LISTEN = range(OWN_COMMANDS, OWN_COMMANDS + 4)
+_MOVE, _CALL, _DISTURB, _LISTEN, _HOLD_TIMEOUT, _GO_ON_TIMEOUT = range(OWN_COMMANDS, OWN_COMMANDS + 6)
 #: Steps of a master outside (i2c.c): above a byte.
 _FAR_START, _FAR_WRITE, _FAR_READ, _FAR_STOP = (n << 9 for n in range(1, 5))
 
@@ -193,6 +193,14 @@ class I2c(Peripheral):
     def clock_hz(self) -> int:
         """Return PCLK1."""
         return self.chip.clocks.pclk1_hz
+
+    def freeze(self) -> None:
+        """Have the SMBus timeout alone stand still (RM0008 31.16.3, DBG_I2Cx_SMBUS_TIMEOUT)."""
+        self.command(_HOLD_TIMEOUT)
+
+    def thaw(self, frozen_ns: int) -> None:
+        """Have it go on."""
+        self.command(_GO_ON_TIMEOUT, frozen_ns & WORD, frozen_ns >> 32)
 
     def on_reset(self) -> None:
         """Forget who was addressed."""

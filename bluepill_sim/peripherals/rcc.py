@@ -14,7 +14,7 @@ Source: RM0008 section 7; start-up times from the data sheet DS5319 section 5.3.
 Invariant: `chip.clocks` is what SWS and the dividers say.
 """
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from enum import Enum
 
@@ -33,7 +33,7 @@ HSION, HSIRDY, HSEON, HSERDY, HSEBYP, PLLON, PLLRDY = (1 << n for n in (0, 1, 16
 #: chosen: so long a forbidden setting must last to be warned of; ST's own code passes through some.
 ILLEGAL_NS = 1_000_000
 #: CFGR's PLLSRC, PLLXTPRE and PLLMUL: fixed while the PLL is on.
-PLLSRC, PLLXTPRE = 1 << 16, 1 << 17
+PLLSRC, PLLXTPRE, _USBPRE = 1 << 16, 1 << 17, 1 << 22
 _PLL_SETTINGS = bits((21, 16))
 _SW = bits((1, 0))
 #: MCO: 0xx is no clock, then SYSCLK, HSI, HSE, PLL / 2.
@@ -129,7 +129,7 @@ class Rcc(Peripheral):
     KIND = LISTENER
     HAS_BYTE_LANES = True
     STATE = ("_ready_at", "_illegal", "_nmi_ns", "_keeps_lsi", "crystal_works", "_shown")
-    OUTPUTS = ("irq",)
+    OUTPUTS = ("irq", "css")
     INPUTS = ("lsi",)
     REGISTERS = (
         Register(
@@ -173,9 +173,31 @@ class Rcc(Peripheral):
             on_write="_write_apb1rstr",
             fields=_APB1,
         ),
-        Register(name="AHBENR", offset=0x14, reset=0x14, readable=_AHB_GATES, writable=_AHB_GATES, fields=_AHB),
-        Register(name="APB2ENR", offset=0x18, readable=_APB2_GATES, writable=_APB2_GATES, fields=_APB2),
-        Register(name="APB1ENR", offset=0x1C, readable=_APB1_GATES, writable=_APB1_GATES, fields=_APB1),
+        Register(
+            name="AHBENR",
+            offset=0x14,
+            reset=0x14,
+            readable=_AHB_GATES,
+            writable=_AHB_GATES,
+            on_write="_write_enr",
+            fields=_AHB,
+        ),
+        Register(
+            name="APB2ENR",
+            offset=0x18,
+            readable=_APB2_GATES,
+            writable=_APB2_GATES,
+            on_write="_write_enr",
+            fields=_APB2,
+        ),
+        Register(
+            name="APB1ENR",
+            offset=0x1C,
+            readable=_APB1_GATES,
+            writable=_APB1_GATES,
+            on_write="_write_enr",
+            fields=_APB1,
+        ),
         Register(
             name="BDCR",
             offset=0x20,
@@ -210,6 +232,8 @@ class Rcc(Peripheral):
         self.hse_hz = hse_hz
         register_index = {register.name: register.offset // 4 for register in self.REGISTERS}
         self._gates = {name: (register_index[gate.register], 1 << gate.bit) for name, gate in gates.items()}
+        #: Called after each write of an enable register.
+        self.gate_listeners: list[Callable[[], None]] = []
         #: When each oscillator that is starting gets ready, in the order of `OSCILLATORS`.
         self._ready_at: tuple[int | None, ...] = (None,) * len(OSCILLATORS)
         #: Whether the crystal oscillates; `fail_crystal` breaks it.
@@ -292,6 +316,8 @@ class Rcc(Peripheral):
             self.words[CIR] |= CSSF
             self._nmi_ns = self.chip.now_ns + NMI_AGAIN_NS
             self.chip.signal("nmi")
+            self.set_output("css", True)
+            self.set_output("css", False)
         elif was_ready and in_use:
             self.chip.warn("HSE has failed under SYSCLK, and RCC_CR CSSON is 0: the core stops", once="RCC:hse")
             self.chip.signal("no clock")
@@ -356,6 +382,10 @@ class Rcc(Peripheral):
             self.words[CFGR] = (self.words[CFGR] & ~_SW) | (previous & _SW)
             self.chip.warn("RCC_CFGR: SW = 3 is not a clock: ignored", once="RCC:sw")
         self._settle()
+
+    def _write_enr(self, _written: int, _previous: int) -> None:
+        for listener in self.gate_listeners:
+            listener()
 
     def _write_cir(self, written: int, _previous: int) -> None:
         self.words[CIR] &= ~((written >> 16) & bits(7, (4, 0)))
@@ -531,6 +561,8 @@ class Rcc(Peripheral):
         clocks.sysclk_hz, clocks.hclk_hz = sysclk_hz, hclk_hz
         clocks.pclk1_hz, clocks.pclk2_hz = hclk_hz // divider1, hclk_hz // divider2
         clocks.adc_divider = _ADC_DIVIDERS[(cfgr >> 14) & 3]
+        pll_hz = self._pll_hz() if self.words[CR] & PLLRDY else 0
+        clocks.usb_hz = pll_hz if cfgr & _USBPRE else pll_hz * 2 // 3
         clocks.timer1_hz = clocks.pclk1_hz * (1 if divider1 == 1 else 2)
         clocks.timer2_hz = clocks.pclk2_hz * (1 if divider2 == 1 else 2)
         clocks.rtcclk_hz = self._rtcclk_hz()

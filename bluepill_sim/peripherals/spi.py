@@ -143,6 +143,12 @@ class Spi(Peripheral):
         """MISO, MOSI, NSS and SCK."""
         return self._pin_names
 
+    @property
+    def bit_hz(self) -> int:
+        """Bits a second of the chip as the master."""
+        hz: int = self.native.clock_hz >> (self.words[CR1] >> _BR_AT & 7) + 1
+        return hz
+
     def sends_at(self, pin: str) -> bool:
         """Whether something outside sends on a pin: parts do so on MISO."""
         return bool(self._hung) and pin == self._pin_names[0]
@@ -251,7 +257,7 @@ class Spi(Peripheral):
     def _understands(self, device: SpiDevice, control: int) -> bool:
         """Tell whether a part bears mode and clock; each is warned of."""
         mode = (2 if control & CPOL else 0) + (control & CPHA)
-        hz = self.native.clock_hz >> (control >> _BR_AT & 7) + 1
+        hz = self.bit_hz
         name = type(device).__name__
         if mode not in device.spi_modes:
             known = ", ".join(map(str, sorted(device.spi_modes)))

@@ -126,7 +126,7 @@ class GeneralTimer(Peripheral):
 
     KIND, HOLDS = "tim", TIM
     OUTPUTS: ClassVar[tuple[str, ...]] = (*_EVENTS, "irq")
-    INPUTS = ("itr0", "itr1", "itr2", "itr3")
+    INPUTS: ClassVar[tuple[str, ...]] = ("itr0", "itr1", "itr2", "itr3")
     REGISTERS = _registers(is_advanced=False)
 
     def __init__(self, chip: ChipPorts, place: Place) -> None:
@@ -176,6 +176,7 @@ class GeneralTimer(Peripheral):
 class AdvancedTimer(GeneralTimer):
     """TIM1."""
 
+    INPUTS = (*GeneralTimer.INPUTS, "css")
     OUTPUTS: ClassVar[tuple[str, ...]] = (*_EVENTS, "brk_irq", "up_irq", "trg_com_irq", "cc_irq")
     REGISTERS = _registers(is_advanced=True)
 

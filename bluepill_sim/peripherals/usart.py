@@ -25,10 +25,11 @@ after the point from which its run of characters is counted, never later than `d
 """
 
 from collections import Counter
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator
 from enum import IntEnum
 
 from bluepill_sim.extension.layout import USART
+from bluepill_sim.fabric.characters import Characters
 from bluepill_sim.fabric.fabric import OWN_COMMANDS, WORD
 from bluepill_sim.fabric.line_speed import TOLERANCE_PERCENT, Heard, heard, is_usual, nearest_usual
 from bluepill_sim.fabric.pins import ALTERNATE_FUNCTIONS, Pin
@@ -87,8 +88,11 @@ _WARNINGS = {
     Question.RX_OFF: (": characters lost, the receiver is not set up", "rx-off"),
     Question.CUT_OFF: ("_CR1: TE cleared during a character, which is lost", "te"),
 }
-#: Takes characters that have gone out: (word, ns at the end of its stop bit, ns of a bit).
-Sink = Callable[[Sequence[tuple[int, int, int]]], None]
+#: Takes characters that have gone out.
+Sink = Callable[[Characters], None]
+#: What `take_words` returns, in words of 32 bits: of each row its own (behind 64 bits of time), and how it was sent.
+_ROW_WORDS = WORD.size // 4
+_WORD, _HOW = 2, slice(3, 6)
 
 
 class Usart(Peripheral):
@@ -201,24 +205,16 @@ class Usart(Peripheral):
         sent = self.fabric.take_words(self.slot)
         if not sent:
             return
-        rows: list[tuple[int, int, int]] = []
-        made: tuple[int, int, int] | None = None
-        count = mask = bit_ns = 0
-        for at_ns, word, clock_hz, brr, how in WORD.iter_unpack(sent):
-            if (clock_hz, brr, how) != made:
-                if made is not None:
-                    self.sent_at[made[:2]] += count
-                made, count = (clock_hz, brr, how), 0
-                mask, bit_ns = _data_mask(how), brr * 1_000_000_000 // clock_hz
-            count += 1
-            if self.far_baud is None or not brr:
-                rows.append((word & mask, at_ns, bit_ns))
-            else:
-                rows += [(one & mask, at_ns, bit_ns) for one in self._as_heard(word, clock_hz, brr, how)]
-        if made is not None:
-            self.sent_at[made[:2]] += count
-        for sink in self.sinks:
-            sink(rows)
+        for (clock_hz, brr, how), rows in _runs(sent):
+            self.sent_at[clock_hz, brr] += len(rows)
+            if self.far_baud is not None and brr:
+                found = [(one, at) for word, at in rows for one in self._as_heard(word, clock_hz, brr, how)]
+                rows = Characters([one for one, _ in found], [at for _, at in found], rows.bit_ns)  # noqa: PLW2901
+            mask = _data_mask(how)
+            if rows and max(rows.words) > mask:
+                rows = Characters([word & mask for word in rows.words], rows.times, rows.bit_ns)  # noqa: PLW2901
+            for sink in self.sinks if rows else ():
+                sink(rows)
 
     def answer(self, what: int, value: int) -> int:
         """Warn, or give the next characters."""
@@ -316,6 +312,22 @@ class Usart(Peripheral):
     def _routed_pins(self) -> tuple[Pin, Pin]:
         tx, rx = self._pins.get(self.chip.pins.remaps.get(self.name, 0), self._pins[0])
         return self.chip.pins[tx], self.chip.pins[rx]
+
+
+def _runs(sent: bytes) -> Iterator[tuple[tuple[int, int, int], Characters]]:
+    """Yield the characters of rows of `WORD`, as many in one go as were sent alike: PCLK, BRR and format, and they."""
+    cells = memoryview(sent).cast("I")
+    words, times = cells[_WORD::_ROW_WORDS].tolist(), cells.cast("B").cast("Q")[:: _ROW_WORDS // 2].tolist()
+    how = [cells[place::_ROW_WORDS].tolist() for place in range(_HOW.start, _HOW.stop)]
+    first = 0
+    while first < len(words):
+        alike = how[0][first], how[1][first], how[2][first]
+        last = len(words)
+        if any(column.count(value) != len(words) for column, value in zip(how, alike, strict=True)):
+            rows = zip(*(column[first:] for column in how), strict=True)
+            last = next((first + n for n, row in enumerate(rows) if row != alike), last)
+        yield alike, Characters(words[first:last], times[first:last], alike[1] * 1_000_000_000 // alike[0])
+        first = last
 
 
 def _data_bits(control: int) -> int:

@@ -10,6 +10,7 @@ Exit codes: 0 done, 1 the operation failed, 2 wrong usage, 130 interrupted, by w
 
 import contextlib
 import difflib
+import gc
 import os
 import sys
 import traceback
@@ -174,6 +175,9 @@ def add_verbs(app: typer.Typer, entries: Iterable[EntryPoint]) -> None:
 def _run(words: list[str], *, trace: bool) -> int:
     try:
         command = typer.main.get_command(make_app(words))
+        if not gc.isenabled():
+            gc.freeze()
+            gc.enable()
         result = command.main(words or ["--help"], prog_name="p2os", standalone_mode=False)
     except (KeyboardInterrupt, typer.Abort):
         result = EXIT_INTERRUPTED

@@ -10,7 +10,7 @@ Invariant: `StandardSip.from_frame(sip.to_frame(profile), profile) == sip`.
 import struct
 from bisect import bisect_right
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, lru_cache
 
 from construct import Array, ConstructError, Int8ul, Int16sl, Int16ul, Struct, this
 
@@ -176,7 +176,11 @@ class StandardSip:
         Raises:
             RemoteProtocolError: The packet is shorter than its own sonar count says.
         """
-        data = frame.payload
+        return cls._read(frame.payload, profile)
+
+    @classmethod
+    @lru_cache(maxsize=1)  # in a bench two readers look at each packet, one right after the other
+    def _read(cls, data: bytes, profile: Profile) -> "StandardSip":
         head = unpack_head(data)
         if head is None:
             count = data[19] if len(data) > 19 else 0

@@ -109,6 +109,8 @@ class RobotParameters:
     sonar: tuple[SonarPose, ...]
     #: Where each infra-red eye sees a thing, mm: x forward, y left.
     infrared: tuple[tuple[float, float], ...] = ()
+    #: What each motor adds to the inertia of its wheel, behind its gear; 0 where wheels are told speeds.
+    rotor_inertia_kg_m2: float = 0.0
     body: BodyParameters
 
     def with_every_sonar(self) -> "RobotParameters":

@@ -8,13 +8,15 @@ import typer
 
 from p2os.cli.help_pages import BENCH
 from robot_bench.scenario.json_schema import scenario_schema
-from robot_bench.scenario.scenario import load_scenario
+from robot_bench.scenario.scenario import Scenario, load_scenario
+from robot_bench.scenario.sweep import rows
 from simbase.errors import P2osError, UsageError
 from simbase.timing import NS_PER_S
 
 HELP = """Check scenario files without running them.
 
-Keys, ranges, names, events in words, firmware and world are looked at.
+Keys, ranges, names, events in words, firmware and world are looked at, in all
+files that a scenario includes, with every value that it sweeps.
 
 Exit code: 0 all can be run, 1 one cannot.
 
@@ -48,13 +50,27 @@ def check(
     for name in files:
         try:
             found = load_scenario(name, firmware=firmware)
+            runs = _check_rows(name, found, firmware)
         except P2osError as error:
             wrong += 1
             typer.echo(f"wrong  {error}" + (f" (hint: {error.hint})" if error.hint else ""))
             continue
         typer.echo(
             f"ok     {name}: {found.duration_ns / NS_PER_S:g} s of {found.firmware.name} in {found.world}, "
-            f"{len(found.goals)} goals"
+            f"{len(found.goals)} goals{f', {runs} runs' if runs > 1 else ''}"
         )
     if wrong:
         raise typer.Exit(1)
+
+
+def _check_rows(name: str, scenario: Scenario, firmware: Path | None) -> int:
+    """Check every row of a sweep; return how many runs there are.
+
+    Raises:
+        P2osError: A value of a parameter cannot be.
+    """
+    count = 0
+    for settings in rows(scenario.axes) if scenario.axes else ():
+        load_scenario(name, firmware=firmware, settings=settings, set_by="[sweep]")
+        count += 1
+    return max(count, 1) * max(len(scenario.seeds), 1)

@@ -46,7 +46,7 @@ class BenchMachine:
     def advance_to(self, limit_ns: Nanos, *, by_step: bool = False) -> ChipReached:
         """Bring the bench to a time; less far where the chip halts, or by one instruction of the chip."""
         chip = self.board.chip
-        run = chip.step if by_step else chip.advance_to
+        run = self.board.step if by_step else self.board.advance_to
         self._halt = None
 
         def advance(limit: Nanos) -> ChipReached:
@@ -91,7 +91,7 @@ class RemoteMachine:
     def advance_to(self, limit_ns: Nanos, *, by_step: bool = False) -> ChipReached:
         """Bring the bench to a time, at the speed of the clock; less far where the chip halts."""
         chip = self.board.chip
-        run = chip.step if by_step else chip.advance_to
+        run = self.board.step if by_step else self.board.advance_to
         halt: list[ChipReached] = []
         if not self._has_begun:
             self._has_begun = True

@@ -1,29 +1,43 @@
 """`p2os run`: one firmware, one scenario, one run folder with its report."""
 
 import json
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
-from p2os.cli.held_robot import hold_robot
 from p2os.cli.help_pages import BENCH, VerbPage
 from p2os.cli.main import EXIT_INTERRUPTED
 from p2os.cli.names import bodies, urls, worlds
 from p2os.cli.quantities import option
 from p2os.errors import RunFailedError
 from p2os.transport import open_url
-from robot_bench.cli.gdb import debug_bench, debug_port
 from robot_bench.cli.progress import RunDisplay
+from robot_bench.cli.sweep import (
+    KEPT,
+    Row,
+    as_json,
+    command,
+    print_sweep,
+    refuse_beside_sweep,
+    refuse_junit,
+    run_sweep,
+    write_junit,
+)
 from robot_bench.cli.table import print_result
+from robot_bench.cli.workers import core_count
 from robot_bench.recording.run_folder import make_next_folder
 from robot_bench.remote import CAUTIOUS_ROTATION_DEG_S, CAUTIOUS_VELOCITY_MM_S
 from robot_bench.run import RunResult, run_at_port, run_scenario
-from robot_bench.scenario.scenario import Scenario, known_scenarios, load_scenario
+from robot_bench.scenario import sweep
+from robot_bench.scenario.included_files import read_setting
+from robot_bench.scenario.scenario import Scenario, ScenarioOptions, known_scenarios, load_scenario
+from robot_bench.scenario.sweep import MOST_RUNS, read_seeds
 from simbase.errors import UsageError
 from simbase.timing import NS_PER_S, Nanos
-from simbase.units import BAUD, FACTOR, PERCENT, PORT, SEED, SPEED, TIME
+from simbase.units import BAUD, COUNT, FACTOR, PERCENT, PORT, SEED, SPEED, TIME
 
 HELP = """Run a scenario: a BluePill program drives a robot.
 
@@ -44,11 +58,17 @@ Examples:
   p2os run free-drive --firmware build/mine.elf     your program among obstacles, without goals
   p2os run dodge --world arena --seed 7 --json      one JSON object for a script
   p2os run dodge --realtime                         at the speed of the clock
+  p2os run dodge --seeds 0-99 -j 2 --junit r.xml    a run a seed, two at a time; a table
+  p2os run dodge --set threshold_m=0.4              any key of the scenario, otherwise
   p2os run dodge --coverage --profile               lines, branches, cycles of the whole run
   p2os run dodge --coverage --fail-under 80         exit code 1 below 80 % of the lines
   p2os run dodge --gdb 3333                         under GDB; the robot stands still at a halt
   p2os run dodge --port serial:/dev/ttyUSB0         drive a real Pioneer; asks first
 """
+
+
+#: Options of a scenario whose flag is not their name.
+_FLAGS = {"adapter_core": "--adapter", "duration_s": "--duration", "usart_baud": "--usart-baud"}
 
 
 class RealtimeCommand(VerbPage):
@@ -97,6 +117,18 @@ def run(
         str | None, typer.Option(help="World, or a TOML file.", metavar="WORLD|FILE", autocompletion=worlds)
     ] = None,
     seed: Annotated[int | None, option(SEED, "--seed", purpose="Of everything random.", least="0")] = None,
+    seeds: Annotated[str | None, typer.Option(help="A run for each: 0-99, or 1,5,10-19.", metavar="SEEDS")] = None,
+    set_: Annotated[
+        list[str] | None, typer.Option("--set", help="A key of the scenario; repeatable.", metavar="KEY=VALUE")
+    ] = None,
+    jobs: Annotated[
+        int | None,
+        option(COUNT, "--jobs", "-j", purpose="Runs at a time; default as many as processors.", above_zero=True),
+    ] = None,
+    junit: Annotated[Path | None, typer.Option(help="Write what CI reads.", metavar="FILE")] = None,
+    keep: Annotated[
+        str, typer.Option(help="Of many runs, which folders stay.", metavar="failures|all|none")
+    ] = "failures",
     duration_ns: Annotated[
         Nanos | None, option(TIME, "--duration", purpose="How much virtual time.", above_zero=True)
     ] = None,
@@ -140,7 +172,8 @@ def run(
     ] = None,
 ) -> None:
     """Run a scenario."""
-    wanted = load_scenario(scenario, firmware=firmware)
+    settings = [read_setting(text) for text in set_ or ()]
+    wanted = load_scenario(scenario, firmware=firmware, settings=settings)
     if coverage or profile:
         refuse_to_measure(port=port, gdb=gdb)
     if fail_under and not coverage:
@@ -149,16 +182,25 @@ def run(
         refuse_beside_port(mode=mode, body=body, world=world, seed=seed, realtime=realtime)
     elif yes or max_speed is not None:
         raise UsageError(f"{'--yes' if yes else '--max-speed'} goes with --port only")
-    wanted = wanted.with_options(
-        firmware=firmware,
-        mode=mode,
-        adapter_core=adapter,
-        body=body,
-        world=world,
-        seed=seed,
-        duration_s=None if duration_ns is None else duration_ns / NS_PER_S,
-        usart_baud=usart_baud,
-    )
+    options: ScenarioOptions = {
+        "firmware": firmware,
+        "mode": mode,
+        "adapter_core": adapter,
+        "body": body,
+        "world": world,
+        "seed": seed,
+        "duration_s": None if duration_ns is None else duration_ns / NS_PER_S,
+        "usart_baud": usart_baud,
+    }
+    wanted = wanted.with_options(**options)
+    if is_sweep(wanted, seeds=seeds, seed=seed, port=port):
+        refuse_beside_sweep(
+            port=port, gdb=None if gdb is None else "gdb", realtime=realtime, coverage=coverage, profile=profile
+        )
+        rows = sweep_rows(scenario, wanted, options, seeds)
+        run_many(rows, out, jobs=jobs or core_count(), kept=keep, junit=junit, json_output=json_output, force=force)
+        return
+    refuse_for_one(jobs=jobs, junit=junit)
     if port is not None:
         result = drive_port(wanted, out, port, yes=yes, max_speed_mps=max_speed, gdb=gdb, force=force)
         end_with(result, json_output=json_output)
@@ -171,9 +213,111 @@ def run(
                 coverage=coverage, profile=profile, fail_under=fail_under, explained=True,
             )  # fmt: skip
         else:
+            from robot_bench.cli.gdb import debug_bench
+
             driver = debug_bench(gdb, is_paced=realtime is not None, on_wait=display.raise_if_interrupted)
             result = run_scenario(wanted, folder, on_progress=display.update, drive=driver, force=force)
     end_with(result, json_output=json_output)
+
+
+def is_sweep(scenario: Scenario, *, seeds: str | None, seed: int | None, port: str | None) -> bool:
+    """Tell whether more than one run is asked for; at a port only where the command line says so."""
+    return seeds is not None or (port is None and (bool(scenario.axes) or (bool(scenario.seeds) and seed is None)))
+
+
+def refuse_for_one(**options: object) -> None:
+    """Refuse what only many runs can do.
+
+    Raises:
+        UsageError: One of the options is given.
+    """
+    for name, value in options.items():
+        if value is not None:
+            raise UsageError(f"--{name} goes with many runs only", hint="--seeds 0-9, or a scenario with [sweep]")
+
+
+def sweep_rows(name: str, wanted: Scenario, options: ScenarioOptions, seeds: str | None) -> list[Row]:
+    """Return every run of a sweep, each checked.
+
+    Args:
+        name: As it was asked for.
+        wanted: The scenario as its file says it.
+        options: What the command line sets.
+        seeds: As typed; None: those of the scenario.
+
+    Raises:
+        ScenarioError: A value of a parameter cannot be.
+        UsageError: An option takes the place of a parameter, or there are too many runs.
+    """
+    seed = options.get("seed")
+    if seeds is not None and seed is not None:
+        raise UsageError("--seeds cannot stand beside --seed", hint="leave one of the two out")
+    chosen = read_seeds(seeds) if seeds is not None else wanted.seeds if seed is None else (seed,)
+    given = {key: value for key, value in options.items() if value is not None and key != "seed"}
+    swept = {axis.key for axis in wanted.axes}
+    for key in (*given, *(["seed"] if chosen else [])):
+        if key in swept:
+            raise UsageError(f"the scenario sweeps {key}, and an option sets it", hint=f"--set {key}=VALUE ends that")
+    words = [word for key, value in given.items() for word in (_FLAGS.get(key, f"--{key}"), _typed(key, value))]
+    rows: list[Row] = []
+    for settings in sweep.rows(wanted.axes):
+        if len(rows) >= MOST_RUNS:
+            raise UsageError(f"more than {MOST_RUNS} runs", hint="fewer seeds, or a wider step")
+        firmware = options.get("firmware")
+        row = load_scenario(
+            name, firmware=None if firmware is None else Path(firmware), settings=(*wanted.settings, *settings),
+            set_by="[sweep]",
+        ).with_options(**options)  # fmt: skip
+        for one in chosen or (row.seed,):
+            again = command(name, words, (*wanted.settings, *settings), one)
+            rows.append(Row(row.with_options(seed=one), settings, again))
+    return rows
+
+
+def run_many(
+    rows: Sequence[Row],
+    out: Path | None,
+    *,
+    jobs: int | None,
+    kept: str,
+    junit: Path | None,
+    json_output: bool,
+    force: bool,
+) -> None:
+    """Run all rows, print what came of them, and end the command with its exit code.
+
+    Raises:
+        UsageError: `kept` is no word for what is kept.
+        FileError: The JUnit file cannot be written.
+    """
+    if kept not in KEPT:
+        raise UsageError(f"there is no --keep {kept!r}", hint=" or ".join(f"--keep {word}" for word in KEPT))
+    if junit is not None:
+        refuse_junit(junit)
+    with RunDisplay(is_shown=False) as display:
+        done = run_sweep(
+            rows,
+            out,
+            jobs=jobs or core_count(),
+            kept=kept,
+            force=force,
+            raise_if_interrupted=display.raise_if_interrupted,
+        )
+    if junit is not None:
+        write_junit(done, junit)
+    if json_output:
+        typer.echo(json.dumps(as_json(done), sort_keys=True))
+    else:
+        print_sweep(done)
+    if done.was_interrupted:
+        raise typer.Exit(EXIT_INTERRUPTED)
+    if done.failed:
+        raise typer.Exit(1)
+
+
+def _typed(key: str, value: object) -> str:
+    """Return the value of an option as one types it."""
+    return f"{value:.9f}".rstrip("0").rstrip(".") + "s" if key == "duration_s" else str(value)
 
 
 def drive_port(
@@ -192,6 +336,9 @@ def drive_port(
         TransportError: The port cannot be opened.
         RunFailedError: The person declined.
     """
+    from p2os.cli.held_robot import hold_robot
+    from robot_bench.cli.gdb import debug_port
+
     scenario = capped(scenario, max_speed_mps)
     transport = open_url(url)
     try:

@@ -1,8 +1,9 @@
 """A joint motor that takes its speed from a few wires.
 
-The value of the wires times the speed of a step is the wanted rim speed; the
-motor approaches it along the ramp that the scenario gives. It reads its wires
-at the start of each step of the body, so a change acts from the next step on.
+The value of the wires times the speed of a step is the wanted rim speed; with
+`MotorCommand.DUTY` it is the duty of the first wire of that of the lowest value, backward where
+the last wire is high (adapter_sim/duty.py). The motor approaches it along the ramp that the scenario gives. It reads
+its wires at the start of each step of the body, so a change acts from the next step on.
 
 Not modelled: current, load and stall; the body knows those.
 
@@ -11,7 +12,9 @@ Invariant: integers of µm/s throughout, exact at every step.
 
 from collections.abc import Sequence
 
-from adapter_sim.codec import BitOrder, motor_value
+from adapter_sim.codec import BitOrder, divide_half_away, motor_value
+from adapter_sim.duty import FULL, DutyWire
+from adapter_sim.settings import MotorCommand
 from p2os.errors import LocalProtocolError
 from robot_bench.wires.nets import Net
 from simbase.state import Stateful
@@ -26,9 +29,11 @@ class JointMotor(Stateful):
         step_um_per_s: Rim speed of one step of the value.
         ramp_um_per_s2: Most change of speed a second; None jumps.
         dt_ns: Length of a step of the body; the ramp must come to whole µm/s a step.
+        bit_order: Which wire weighs most.
+        command: How the wires carry the value.
     """
 
-    STATE = ("speed_um_per_s", "asked")
+    STATE = ("speed_um_per_s", "asked", "_duties")
     DERIVED = ("_is_known",)
 
     def __init__(
@@ -39,10 +44,13 @@ class JointMotor(Stateful):
         ramp_um_per_s2: int | None,
         dt_ns: Nanos,
         bit_order: BitOrder = BitOrder.COMM3_MSB,
+        command: MotorCommand = MotorCommand.BITS,
     ) -> None:
         self._nets = tuple(nets)
         self._step_um_per_s = step_um_per_s
         self._bit_order = bit_order
+        #: What measures the magnitude, where that is a duty.
+        self._duties = tuple(DutyWire(net.level, net.course) for net in self._nets[:1] if command is MotorCommand.DUTY)
         self._change: int | None = None
         if ramp_um_per_s2 is not None:
             self._change, rest = divmod(ramp_um_per_s2 * dt_ns, NS_PER_S)
@@ -57,7 +65,9 @@ class JointMotor(Stateful):
         self.asked = 0
 
     def value(self, at: Nanos) -> int:
-        """Return the signed value on the wires at the instant `at`."""
+        """Return the signed value on the wires at the instant `at`: steps, or a duty of `FULL`."""
+        for wire in self._duties:
+            return -wire.duty(at) if self._nets[-1].level(at) else wire.duty(at)
         code = 0
         for bit, net in enumerate(self._nets):
             if net.level(at):
@@ -72,14 +82,15 @@ class JointMotor(Stateful):
     @property
     def is_steady(self) -> bool:
         """Tell whether all later steps have the speed of the last one, unless somebody drives the wires anew."""
-        return self._is_known and self.speed_um_per_s == self.asked * self._step_um_per_s
+        return self._is_known and self.speed_um_per_s == self._wanted
 
     def step(self, at: Nanos) -> int:
         """Return the rim speed in µm/s for the step of the body that starts at `at`."""
         if not self._is_known:
             self.asked = self.value(at)
-            self._is_known = all(net.last_edge <= at for net in self._nets)
-        wanted = self.asked * self._step_um_per_s
+            # A duty that has changed shows behind its last edge.
+            self._is_known = not self._duties and all(net.last_edge <= at for net in self._nets)
+        wanted = self._wanted
         if self._change is None:
             self.speed_um_per_s = wanted
         elif wanted > self.speed_um_per_s:
@@ -87,6 +98,12 @@ class JointMotor(Stateful):
         else:
             self.speed_um_per_s = max(wanted, self.speed_um_per_s - self._change)
         return self.speed_um_per_s
+
+    @property
+    def _wanted(self) -> int:
+        if self._duties:
+            return divide_half_away(self.asked * (self._step_um_per_s << len(self._nets) - 1), FULL)
+        return self.asked * self._step_um_per_s
 
     def _note_drive(self, _net: Net, _owner: str, _at: Nanos) -> None:
         self._is_known = False

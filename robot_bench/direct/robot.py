@@ -17,6 +17,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 from adapter_sim.codec import BitOrder
+from adapter_sim.settings import MotorCommand
 from p2os.pioneer.body.contract import BodyState, RobotBody
 from robot_bench.direct.distance import DistanceSensors
 from robot_bench.direct.encoder import WheelEncoder
@@ -46,6 +47,7 @@ class DirectSettings:
     sensor_period_ns: Nanos = 50 * NS_PER_MS
     #: chosen: ten times as often as the 100 Hz programs look at a wheel at full speed.
     encoder_period_ns: Nanos = 5 * NS_PER_MS
+    motor_command: MotorCommand = MotorCommand.BITS
     bit_order: BitOrder = BitOrder.COMM3_MSB
 
     def __post_init__(self) -> None:

@@ -13,6 +13,7 @@ from binascii import a2b_base64
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
+from functools import cache
 from typing import Any, TypeAlias, cast
 
 from robot_bench.events.kinds import (
@@ -46,6 +47,8 @@ _MOST = 2**63 - 1
 #: What a body noted of a collision before contacts were events: what, and where.
 _OLD_CONTACT = re.compile(r"(.*) at x (-?[\d.]+) m, y (-?[\d.]+) m$")
 
+#: The key of a kind, itself such a text.
+_KIND = frozenset("k")
 _encode = json.JSONEncoder(sort_keys=True, separators=(",", ":"), ensure_ascii=True).encode
 
 
@@ -84,6 +87,17 @@ class _Row:
     kind: str
     to_entry: Callable[[Any], Mapping[str, object]]
     from_entry: Callable[[Nanos, Json], Recorded | None]
+    #: Keys whose values are texts that JSON takes as they are, where all others are integers: such lines, nearly all of
+    #: a run, are spelled without an encoder. None: there are other values.
+    plain_texts: frozenset[str] | None = None
+
+
+@cache
+def _template(keys: tuple[str, ...], texts: frozenset[str]) -> str:
+    """Return a format of what the encoder makes of an entry with these keys."""
+    return (
+        "{" + ",".join(f'"{key}":"%({key})s"' if key in texts else f'"{key}":%({key})d' for key in sorted(keys)) + "}"
+    )
 
 
 def _integer(entry: Json, key: str) -> int:
@@ -186,6 +200,7 @@ ROWS: Mapping[type, _Row] = {
         "usart",
         _text_entry,
         lambda t, entry: Text(t=t, data=bytes.fromhex(str(entry["hex"])), port=str(entry.get("port", "usart1"))),
+        frozenset({"hex", "port"}),
     ),
     WorldChange: _Row("obstacle", lambda item: {"op": item.op, "name": item.name, **item.fields}, _world_change),
     Fault: _Row(
@@ -197,6 +212,7 @@ ROWS: Mapping[type, _Row] = {
         "wire",
         lambda packet: {"dir": packet.direction, "hex": packet.data.hex()},
         lambda t, entry: Packet(t=t, direction=str(entry["dir"]), data=bytes.fromhex(str(entry["hex"]))),
+        frozenset({"dir", "hex"}),
     ),
     Note: _Row("event", lambda note: {"who": note.who, "what": note.what, "detail": note.detail}, _note),
     Ranges: _Row(
@@ -208,6 +224,7 @@ ROWS: Mapping[type, _Row] = {
         "pose",
         lambda pose: {key: getattr(pose, name) for key, name in _POSE.items()},
         lambda t, entry: Pose(t=t, **{name: _integer(entry, key) for key, name in _POSE.items()}),
+        frozenset(),
     ),
     Clearance: _Row(
         "clearance",
@@ -253,7 +270,9 @@ def _level(value: int) -> bool:
 def line_of(event: Recorded) -> str:
     """Return the one spelling of an event, without its line end: sorted keys, no spaces."""
     row = ROWS[type(event)]
-    return _encode({"k": row.kind, "t": event.t, **row.to_entry(event)})
+    entry = {"k": row.kind, "t": event.t, **row.to_entry(event)}
+    texts = row.plain_texts
+    return _encode(entry) if texts is None else _template(tuple(entry), texts | _KIND) % entry
 
 
 def event_of(entry: Json) -> Recorded | None:

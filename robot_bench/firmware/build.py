@@ -16,7 +16,9 @@ HERE = Path(__file__).resolve().parent
 COMPILER = "arm-none-eabi-gcc"
 #: First line of `arm-none-eabi-gcc --version` for the compiler of the committed ELFs.
 COMPILER_VERSION = "arm-none-eabi-gcc (15:12.2.rel1-1) 12.2.1 20221205"
-BOARD_SOURCES = ("startup.c", "memory.c", "board.c", "pins.c", "tick.c", "uart.c")
+#: With the motors' wires as duty and sign, and as three bits.
+DUTY_SOURCES = ("startup.c", "memory.c", "board.c", "pins.c", "motors_duty.c", "tick.c", "uart.c")
+BOARD_SOURCES = tuple(source.replace("motors_duty", "motors_bits") for source in DUTY_SOURCES)
 #: Program name to its sources.
 PROGRAMS = {
     "motors": (*BOARD_SOURCES, "motors.c"),
@@ -24,8 +26,10 @@ PROGRAMS = {
     "encoders": (*BOARD_SOURCES, "encoders.c", "odometer.c"),
     "analog": (*BOARD_SOURCES, "analog.c"),
     "dodge": (*BOARD_SOURCES, "dodge.c", "dodge_fsm.c", "odometer.c"),
+    "dodge_duty": (*DUTY_SOURCES, "dodge.c", "dodge_fsm.c", "odometer.c"),
     # Its pins are its own: of board.c only the clock is kept.
     "rover": ("startup.c", "memory.c", "board.c", "uart.c", "rover_board.c", "rover.c"),
+    "usb_echo": ("startup.c", "memory.c", "usb_echo.c"),
     # Brings pins, clock and line of its own.
     "board_test": ("startup.c", "memory.c", "board_test.c"),
 }

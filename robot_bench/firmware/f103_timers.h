@@ -9,10 +9,12 @@ struct tim {
 };
 
 #define TIM1 ((struct tim *)0x40012C00u)
+#define TIM2 ((struct tim *)0x40000000u)
 #define TIM3 ((struct tim *)0x40000400u)
 #define TIM4 ((struct tim *)0x40000800u)
 
 #define RCC_APB2ENR_TIM1EN (1u << 11)
+#define RCC_APB1ENR_TIM2EN (1u << 0)
 #define RCC_APB1ENR_TIM3EN (1u << 1)
 #define RCC_APB1ENR_TIM4EN (1u << 2)
 
@@ -26,6 +28,7 @@ struct tim {
 /* Both channels of CCMR1 are inputs on their own pins, filtered over 8 cycles. */
 #define TIM_CCMR1_INPUTS (1u << 0 | 3u << 4 | 1u << 8 | 3u << 12)
 #define TIM_CCER_CC1E (1u << 0)
+#define TIM_CCER_CC2E (1u << 4)
 #define TIM_CCER_CC4E (1u << 12)
 #define TIM_BDTR_MOE (1u << 15)
 

@@ -17,7 +17,7 @@ uint8_t pins_distances(void);
 uint8_t pins_left_encoder(void);
 uint8_t pins_right_encoder(void);
 
-/* Codes from MOTOR_MIN to MOTOR_MAX; values beyond are cut to the limits. */
+/* Codes from MOTOR_MIN to MOTOR_MAX; values beyond are cut to the limits. motors_duty.c approaches them call by call. */
 void pins_motors(int left, int right);
 
 #endif

@@ -10,6 +10,7 @@ still drive. So a wire's first level, too, is what it is when all of time 0 was 
 Invariant: it changes nothing that it watches.
 """
 
+import contextlib
 import math
 from binascii import b2a_base64
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -141,10 +142,16 @@ class Recorder(Stateful):
     def usart(self, sent: Sequence[tuple[int, Nanos]], port: str = CONSOLE) -> None:
         """Take what a port of the chip has sent: (word, ns at the end of its stop bit), oldest first."""
         text = self._text.setdefault(port, bytearray())
-        for word, at in sent:
-            text.append(word & 0xFF)
-            if word == _LINE_END or len(text) >= LONGEST_TEXT:
-                self._tell_text(port, at)
+        words = [word for word, _ in sent]
+        first = 0
+        while first < len(words):
+            last = min(len(words), first + LONGEST_TEXT - len(text))
+            with contextlib.suppress(ValueError):  # no end of a line
+                last = words.index(_LINE_END, first, last) + 1
+            text += bytes([word & 0xFF for word in words[first:last]])
+            if words[last - 1] == _LINE_END or len(text) >= LONGEST_TEXT:
+                self._tell_text(port, sent[last - 1][1])
+            first = last
 
     def wire(self, direction: str, data: bytes, at: Nanos) -> None:
         """Take bytes that have arrived: `c2r` client to robot, `r2c` back."""

@@ -77,6 +77,21 @@ def make_next_folder(name: str, parent: Path = RUNS) -> Path:
         ) from error
 
 
+def remove_run(folder: Path) -> None:
+    """Remove what a run has left, and its folder where that holds nothing else.
+
+    Raises:
+        UsageError: It cannot be removed.
+    """
+    try:
+        for name in FILES:
+            (folder / name).unlink(missing_ok=True)
+        with contextlib.suppress(OSError):  # somebody else's file
+            folder.rmdir()
+    except OSError as error:
+        raise UsageError(f"cannot remove the run in {folder}: {error.strerror}") from error
+
+
 def _lock(handle: int, folder: Path) -> None:
     try:
         fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)

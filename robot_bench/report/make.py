@@ -25,6 +25,8 @@ from robot_bench.recording.waveforms import write_sigrok, write_vcd
 from robot_bench.report.page import page_data, render_page
 from simbase.errors import FileError
 
+REPORT_NAME = "report.html"
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ReportFiles:
@@ -44,7 +46,7 @@ def make_report(folder: Path) -> ReportFiles:
         TraceError: The folder holds no readable trace.
     """
     record = read_run(folder)
-    page = folder / "report.html"
+    page = folder / REPORT_NAME
     drawn = page_data(record)
     page.write_text(render_page(record, drawn), encoding="utf-8")
     try:

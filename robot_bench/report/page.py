@@ -48,6 +48,7 @@ def render_page(record: RunRecord, drawn: Json) -> str:
         figures="".join(f"<tr><td>{html.escape(k)}</td><td>{html.escape(v)}</td></tr>" for k, v in figures(record)),
         goals=_goals(record.end),
         measured=_measured(record.end),
+        parts=_parts(record.end),
         left_out=_left_out(cast("list[str]", drawn["left_out"])),
         footer=html.escape(_footer(record)),
         style=source.joinpath("page.css").read_text(encoding="utf-8"),
@@ -266,6 +267,19 @@ def _measured(end: Json) -> str:
             table = html.escape("\n".join(cast("list[str]", facts["table"])))
             found.append(f"<section><h2>{key.title()} <small>{links}</small></h2><pre>{table}</pre></section>")
     return "\n  ".join(found)
+
+
+def _parts(end: Json) -> str:
+    """Return a section of what was plugged into the board; empty where nothing was."""
+    rows = cast("list[dict[str, str]]", end.get("parts") or [])
+    if not rows:
+        return ""
+    items = []
+    for row in rows:
+        name = html.escape(row["name"])
+        png = f'<br><img alt="{name}" src="data:image/png;base64,{html.escape(row["png"])}">' if "png" in row else ""
+        items.append(f"<tr><td>{name}</td><td>{html.escape(row['words'])}{png}</td></tr>")
+    return f"<section><h2>Parts</h2><table>{''.join(items)}</table></section>"
 
 
 def _left_out(lines: list[str]) -> str:

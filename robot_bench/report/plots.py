@@ -45,11 +45,14 @@ def write_plots(data: Json, folder: Path) -> tuple[Path, ...]:
     plots = {"path.png": _path_figure, "speeds.png": _speeds_figure, "pins.png": _pins_figure}
     written = []
     for name, draw in plots.items():
-        figure = draw(cast("Any", data))
-        FigureCanvasAgg(figure)
-        figure.savefig(folder / name, dpi=DOTS_PER_INCH, metadata={"Software": None})
+        _paint(draw(cast("Any", data)), folder / name)
         written.append(folder / name)
     return tuple(written)
+
+
+def _paint(figure: Figure, path: Path) -> None:
+    FigureCanvasAgg(figure)
+    figure.savefig(path, dpi=DOTS_PER_INCH, metadata={"Software": None})
 
 
 def _path_figure(data: Any) -> Figure:

@@ -38,10 +38,23 @@ def scenario_schema() -> Json:
         **{name: _table(TABLES[f"[{name}]"]) for name in ("direct", "adapter", "controller")},
         "in_world": {"type": "object", "additionalProperties": within},
         **{name: {"type": "array", "items": _table(TABLES[f"[[{name}]]"])} for name in ("obstacle", "fault")},
+        "part": {"type": "array", "items": _table(TABLES["[[part]]"]) | {"additionalProperties": True}},
         "when": {"type": "array", "items": _table(WHEN_KEYS)},
         "goal": {"type": "array", "items": {"oneOf": goals}},
+        "sweep": _SWEEP,
     }
-    return {"$schema": DRAFT, "title": "A scenario of p2os", **top, "properties": properties}
+    # What a file extends or includes may say the rest.
+    wanted = [{"required": keys} for keys in (top.pop("required"), ["extends"], ["include"])]
+    return {"$schema": DRAFT, "title": "A scenario of p2os", **top, "properties": properties, "anyOf": wanted}
+
+
+#: Values of a parameter; or a range of them, or a table with parameters.
+_SWEEP: Json = {
+    "type": "object",
+    "additionalProperties": {
+        "oneOf": [{"type": "array", "minItems": 1}, {"type": "object", "additionalProperties": True}]
+    },
+}
 
 
 def _table(keys: Sequence[Key], *, kind: str = "") -> Json:
@@ -55,6 +68,8 @@ def _table(keys: Sequence[Key], *, kind: str = "") -> Json:
 
 def _key(key: Key) -> Json:
     bounds = {"minimum": key.least, "exclusiveMinimum": key.above, "maximum": key.most}
+    if key.kind == "texts":
+        return {"oneOf": [{"type": "string"}, {"type": "array", "items": {"type": "string"}}]}
     found: Json = {"type": _TYPES[key.kind]}
     found |= {name: bound for name, bound in bounds.items() if bound is not None and key.kind in {"number", "whole"}}
     return found | ({"enum": list(key.choices)} if key.choices else {})

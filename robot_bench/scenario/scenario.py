@@ -9,14 +9,16 @@ there, and every value is in range.
 """
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from importlib.resources import as_file, files
+from importlib.resources import files
 from pathlib import Path
 from typing import TypedDict, Unpack, cast
 
 from adapter_sim.codec import BitOrder
-from adapter_sim.settings import AdapterSettings
+from adapter_sim.pinout import load_pinout
+from adapter_sim.settings import AdapterSettings, MotorCommand
+from bluepill_sim.parts.registry import PartSpec
 from p2os.errors import ScenarioError
 from p2os.pioneer.body.factory import BEST, BODY_CHOICES
 from p2os.pioneer.controller import ControllerSettings, SonarPerSip
@@ -26,13 +28,16 @@ from p2os.pioneer.world import Pose, known_worlds, load_world, world_suffixes
 from p2os.pioneer.world.model import World
 from p2os.pioneer.world.start_places import refuse_start
 from p2os.robots.parameters import RobotParameters, load_parameters
-from p2os.toml_file import TomlSource, is_file, read_toml, read_user_text
+from p2os.toml_file import is_file
 from robot_bench.direct.robot import DirectSettings
-from robot_bench.scenario import fault_script, when_script, world_script
+from robot_bench.scenario import fault_script, plugged_parts, when_script, world_script
 from robot_bench.scenario.fault_script import FaultChange, load_faults
 from robot_bench.scenario.goals.judging import Goal, load_goal
 from robot_bench.scenario.goals.kinds import KINDS
+from robot_bench.scenario.included_files import KEYS as INCLUDING
+from robot_bench.scenario.included_files import VERSION, Setting, read_tables, shipped_file, shipped_scenarios
 from robot_bench.scenario.schema import LONGEST_S, Key, Place, Table, Where, check_table, in_range, nearest, within
+from robot_bench.scenario.sweep import Axis, load_axes, load_seeds
 from robot_bench.scenario.when_script import When, load_whens
 from robot_bench.scenario.wired_robots import OwnRobot, find_own_robot, known_own_robots, load_own_robot
 from robot_bench.scenario.world_script import Change, load_changes, refuse_names
@@ -43,10 +48,9 @@ MODES = ("direct", "adapter")
 #: What runs in the adapter's place: the Python model, or the firmware's C++ core.
 ADAPTER_CORES = ("model", "firmware")
 
-#: Of the schema of scenario files.
-SCHEMA_VERSION = 1
 _TOP = (
-    Key(name="version", kind="whole", least=1, most=SCHEMA_VERSION),
+    VERSION,
+    *INCLUDING,
     Key(name="description", kind="text"),
     Key(name="firmware", kind="text", required=True),
     Key(name="world", kind="text", required=True),
@@ -55,6 +59,8 @@ _TOP = (
     Key(name="mode", kind="text", choices=MODES),
     Key(name="body", kind="text", choices=BODY_CHOICES),
     Key(name="seed", kind="whole", least=0, most=2**63 - 1),
+    Key(name="seeds", kind="text"),
+    Key(name="sweep", kind="table"),
     Key(name="duration_s", kind="number", required=True, above=0, most=LONGEST_S),
     Key(name="threshold_m", kind="number", above=0, most=100),
     Key(name="usart_baud", kind="whole", least=1, most=4_500_000),
@@ -64,6 +70,7 @@ _TOP = (
     Key(name="controller", kind="table"),
     Key(name="in_world", kind="table"),
     Key(name="obstacle", kind="tables"),
+    Key(name="part", kind="tables"),
     Key(name="fault", kind="tables"),
     Key(name="when", kind="tables"),
     Key(name="goal", kind="tables"),
@@ -78,11 +85,13 @@ _DIRECT = (
     Key(name="ramp_mm_s2", kind="number", least=0, most=1_000_000),
     Key(name="sensor_period_ms", kind="whole", least=1, most=60_000),
     Key(name="encoder_period_ms", kind="whole", least=1, most=60_000),
+    Key(name="motor_command", kind="text", choices=tuple(MotorCommand)),
     Key(name="bit_order", kind="text", choices=tuple(BitOrder)),
 )
 _ADAPTER = (
     Key(name="core", kind="text", choices=ADAPTER_CORES),
     Key(name="step_mm_s", kind="number", least=0.001, most=10_000),
+    Key(name="motor_command", kind="text", choices=tuple(MotorCommand)),
     Key(name="bit_order", kind="text", choices=tuple(BitOrder)),
     Key(name="motor_meaning", kind="text", choices=("wheels", "linear_angular")),
     Key(name="max_velocity_mm_s", kind="whole", least=0, most=32_767),
@@ -110,6 +119,7 @@ TABLES: Mapping[str, tuple[Key, ...]] = {
     "[controller]": _CONTROLLER,
     "[in_world.NAME]": _IN_WORLD,
     "[[obstacle]]": world_script.KEYS,
+    "[[part]]": plugged_parts.KEYS,
     "[[fault]]": fault_script.KEYS,
     "[[when]]": tuple(key for key in when_script.KEYS if key not in world_script.KEYS),
     **{f"[[goal]] {name}": kind.keys for name, kind in KINDS.items()},
@@ -169,12 +179,20 @@ class Scenario:
     adapter: AdapterSettings = field(default_factory=AdapterSettings)
     adapter_core: str = "model"
     controller: ControllerSettings = field(default_factory=ControllerSettings)
+    #: What is plugged into the board besides the robot.
+    parts: tuple[PartSpec, ...] = ()
     changes: tuple[Change, ...] = ()
     faults: tuple[FaultChange, ...] = ()
     whens: tuple[When, ...] = ()
     goals: tuple[Goal, ...] = ()
     #: World → what is otherwise there.
     in_world: Mapping[str, Table] = field(default_factory=dict)
+    #: The seeds that `p2os run` takes one after the other; none: `seed` alone.
+    seeds: tuple[int, ...] = ()
+    #: The parameters that it sweeps.
+    axes: tuple[Axis, ...] = ()
+    #: What was set beside the file.
+    settings: tuple[Setting, ...] = ()
     #: The file's own place, for messages.
     where: Where = field(default="", compare=False, repr=False)
 
@@ -219,15 +237,23 @@ class Scenario:
         return _apply_in_world(moved, self.in_world.get(world, {}))
 
 
-def load_scenario(name_or_path: str, *, firmware: Path | None = None) -> Scenario:
-    """Return a shipped scenario by its name, or one from a file; `firmware` takes the place of its own program.
+def load_scenario(
+    name_or_path: str, *, firmware: Path | None = None, settings: Sequence[Setting] = (), set_by: str = "--set"
+) -> Scenario:
+    """Return a shipped scenario by its name, or one from a file.
+
+    Args:
+        name_or_path: The scenario.
+        firmware: Takes the place of its own program, which need not be there then.
+        settings: Keys and values that are set beside the file: ("start.x_m", 1.5).
+        set_by: What a message calls that.
 
     Raises:
         ScenarioError: There is no such scenario, or it breaks the schema.
+        UsageError: A setting names what is not there.
     """
     if name_or_path in known_scenarios():
-        with as_file(files("robot_bench.scenarios").joinpath(f"{name_or_path}.toml")) as path:
-            return read_scenario(path, firmware=firmware)
+        return read_scenario(shipped_file(name_or_path), firmware=firmware, settings=settings, set_by=set_by)
     path = Path(name_or_path)
     if not path.is_file():
         if path.suffix == ".toml" or len(path.parts) > 1:
@@ -235,24 +261,27 @@ def load_scenario(name_or_path: str, *, firmware: Path | None = None) -> Scenari
         beside = Path(f"{name_or_path}.toml")
         hint = f"the file here is {beside}" if beside.is_file() else nearest(name_or_path, known_scenarios())
         raise ScenarioError(f"there is no scenario {name_or_path!r}", hint=hint)
-    return read_scenario(path, firmware=firmware)
+    return read_scenario(path, firmware=firmware, settings=settings, set_by=set_by)
 
 
 def known_scenarios() -> tuple[str, ...]:
     """Return the names of the scenarios that ship."""
-    folder = files("robot_bench.scenarios")
-    return tuple(sorted(item.name.removesuffix(".toml") for item in folder.iterdir() if item.name.endswith(".toml")))
+    return shipped_scenarios()
 
 
-def read_scenario(path: Path, *, firmware: Path | None = None) -> Scenario:
-    """Read and check a scenario file; its own program need not be there where `firmware` takes its place.
+def read_scenario(
+    path: Path, *, firmware: Path | None = None, settings: Sequence[Setting] = (), set_by: str = "--set"
+) -> Scenario:
+    """Read and check a scenario file and those that it includes; arguments as of `load_scenario`.
 
     Raises:
-        ScenarioError: The file cannot be read or breaks the schema.
+        ScenarioError: A file cannot be read or breaks the schema.
+        UsageError: A setting names what is not there.
     """
-    text = read_user_text(path, "a scenario", ScenarioError)
-    table, places = read_toml(text, shown_name(path.name), "a scenario", ScenarioError)
-    scenario = _build(table, text, path, Place(TomlSource(shown_name(path.name), places)), firmware)
+    found = read_tables(path, settings, set_by)
+    scenario = _build(found.table, found.text, path, Place(found.source), firmware)
+    kept = tuple(axis for axis in scenario.axes if axis.key not in dict(settings))
+    scenario = replace(scenario, settings=tuple(settings), axes=kept)
     refuse_what_its_world_refuses(scenario, load_world(scenario.world, seed=scenario.seed))
     return scenario
 
@@ -328,7 +357,12 @@ def _build(table: Table, text: str, path: Path, where: Place, firmware: Path | N
         adapter=_adapter(cast("Table", table.get("adapter", {})), round(threshold_m * 1e6), where),
         adapter_core=str(cast("Table", table.get("adapter", {})).get("core", "model")),
         controller=_controller(cast("Table", table.get("controller", {})), path, where),
+        parts=plugged_parts.load_parts(
+            cast("list[Table]", table.get("part", [])), path.parent, _taken(own_robot), where
+        ),
         changes=changes,
+        seeds=load_seeds(table, where.at("seeds")),
+        axes=load_axes(cast("Table", table.get("sweep", {})), where),
         faults=load_faults(cast("list[Table]", table.get("fault", [])), parameters, where),
         whens=load_whens(cast("list[Table]", table.get("when", [])), parameters, where, wires),
         goals=tuple(goals),
@@ -336,6 +370,13 @@ def _build(table: Table, text: str, path: Path, where: Place, firmware: Path | N
         where=where,
     )
     return _apply_in_world(scenario, in_world.get(scenario.world, {}))
+
+
+def _taken(own_robot: OwnRobot | None) -> dict[str, str]:
+    """Return the chip's pins that a robot has, with its signals."""
+    if own_robot is None:
+        return {wire.bluepill: wire.name for wire in load_pinout().wires}
+    return {wire.pin: wire.name for wire in own_robot.robot.signals}
 
 
 def _parameters(robot: str, where: Place) -> RobotParameters:
@@ -416,6 +457,8 @@ def _direct(part: Table, where: Where) -> DirectSettings:
         settings = replace(settings, sensor_period_ns=cast("int", part["sensor_period_ms"]) * NS_PER_MS)
     if "encoder_period_ms" in part:
         settings = replace(settings, encoder_period_ns=cast("int", part["encoder_period_ms"]) * NS_PER_MS)
+    if "motor_command" in part:
+        settings = replace(settings, motor_command=MotorCommand(str(part["motor_command"])))
     if "bit_order" in part:
         settings = replace(settings, bit_order=BitOrder(str(part["bit_order"])))
     return settings

@@ -8,11 +8,10 @@ is a bare number: `"60 cm"` is refused with the unit that is wanted.
 import difflib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Literal
+from typing import Literal, Protocol
 
 from p2os.errors import ScenarioError
 from p2os.pioneer.world.model import RANGES
-from p2os.toml_file import TomlSource
 from simbase.errors import shown
 
 #: chosen: eleven days; a larger number of seconds is a mistake of the unit.
@@ -21,10 +20,11 @@ LONGEST_S = 1_000_000
 #: A parsed TOML table.
 Table = Mapping[str, object]
 
-Kind = Literal["text", "number", "whole", "flag", "table", "tables", "list"]
+Kind = Literal["text", "texts", "number", "whole", "flag", "table", "tables", "list"]
 
 _MEANING = {
     "text": "a text in quotes",
+    "texts": "a text in quotes, or a list of them",
     "number": "a number",
     "whole": "a whole number",
     "flag": "true or false",
@@ -64,11 +64,19 @@ class Key:
     choices: tuple[str, ...] = ()
 
 
+class Source(Protocol):
+    """What names the places of a file's keys, or of several files'."""
+
+    def at(self, table: str = "", key: str = "", number: int = 0) -> str:
+        """Return `file:line` of a key."""
+        ...
+
+
 @dataclass(frozen=True, slots=True)
 class Place:
     """Where a table stands, for messages: `dodge.toml:12: [[obstacle]] 2`."""
 
-    source: TomlSource
+    source: Source
     table: str = ""
     number: int = 0
     title: str = ""
@@ -143,6 +151,8 @@ def _check_value(value: object, key: Key, where: str) -> None:
 def _fits(value: object, key: Key) -> bool:
     if key.kind == "tables":
         return isinstance(value, list) and all(isinstance(item, Mapping) for item in value)
+    if key.kind == "texts":
+        return isinstance(value, str) or (isinstance(value, list) and all(isinstance(item, str) for item in value))
     if isinstance(value, bool):
         return key.kind == "flag"
     return isinstance(value, _TYPES[key.kind])

@@ -194,15 +194,16 @@ size_t edges_vcd(size_t wires, const int64_t *const *times, const uint8_t *const
 void edges_samples(size_t wires, const int64_t *const *times, const uint8_t *const *levels, const size_t *counts,
                    size_t *at, uint64_t *bits, int64_t first, size_t count, int64_t rate_hz, size_t unit, uint8_t *out)
 {
-    const int64_t period_ns = 1000000000 / rate_hz;
-    for (size_t k = 0; k < count; ++k) {
-        int64_t now = (first + (int64_t)k) * period_ns;
-        for (size_t wire = 0; wire < wires; ++wire)
-            while (at[wire] < counts[wire] && times[wire][at[wire]] <= now) {
-                uint64_t bit = (uint64_t)1 << wire;
-                *bits = levels[wire][at[wire]++] ? *bits | bit : *bits & ~bit;
-            }
-        for (size_t byte = 0; byte < unit; ++byte)
-            *out++ = (uint8_t)(*bits >> 8 * byte);
+    const int64_t period_ns = 1000000000 / rate_hz, end = first + (int64_t)count;
+    for (int64_t sample = first;;) {
+        const size_t next = earliest(wires, times, counts, at);
+        const int64_t seen = next == wires ? end : (times[next][at[next]] + period_ns - 1) / period_ns;
+        for (; sample < seen && sample < end; ++sample)
+            for (size_t byte = 0; byte < unit; ++byte)
+                *out++ = (uint8_t)(*bits >> 8 * byte);
+        if (sample == end)
+            return; /* the edge belongs to the samples that come then */
+        const uint64_t bit = (uint64_t)1 << next;
+        *bits = levels[next][at[next]++] ? *bits | bit : *bits & ~bit;
     }
 }

@@ -24,6 +24,7 @@ from enum import Enum
 from functools import cache
 from typing import Self
 
+from adapter_sim.duty import COURSE_NS
 from bluepill_sim.fabric.subscriptions import Wave
 from p2os.errors import LocalProtocolError
 from robot_bench.wires.edges import Edges, changes
@@ -267,10 +268,13 @@ class Net(Stateful):
         return found
 
     def forget_before(self, limit: Nanos) -> bool:
-        """Drop what no reader at or after `limit` can see; return True where later drives are still remembered."""
+        """Drop what no reader at or after `limit` can see; return True where later drives are still remembered.
+
+        A course may begin `COURSE_NS` before.
+        """
         later = False
         for history in self._drives.values():
-            passed = bisect_right(history.times, limit, lo=1) - 1
+            passed = bisect_right(history.times, limit - COURSE_NS, lo=1) - 1
             del history.times[:passed], history.codes[:passed]
             for at in history.waves.keys() - set(history.times):
                 del history.waves[at]
@@ -409,6 +413,10 @@ class OwnedPins:
     def read(self, signal: str, at: Nanos) -> bool:
         """Return the level of a wire at the instant `at`."""
         return self._nets[signal].level(at)
+
+    def course(self, signal: str, begin: Nanos, end: Nanos) -> list[tuple[Nanos, bool | Wave]]:
+        """Return what a wire does from `begin` on until before `end`: when, and the level or wave from then on."""
+        return self._nets[signal].course(begin, end)
 
     def write(self, signal: str, high: bool | None, now: Nanos) -> None:
         """Drive a wire hard from `now` on; None releases it to its pull."""

@@ -13,7 +13,7 @@ from adapter_sim.adapter import OPEN_STATES, AdapterState
 from adapter_sim.codec import BitOrder
 from adapter_sim.distances import threshold_um
 from adapter_sim.masters import Master
-from adapter_sim.settings import EncoderAtOpen, MotorMeaning
+from adapter_sim.settings import EncoderAtOpen, MotorCommand, MotorMeaning
 from p2os.gamepad import PadReport
 from p2os.protocol.frames import HEADER, MAX_COUNT, checksum
 from p2os.protocol.odometry import POSITION_MODULUS
@@ -39,6 +39,8 @@ def life_settings(rng: Random) -> AdapterSettings:
     spacing = rng.choice([25, 100]) * MS
     return AdapterSettings(
         threshold_um=rng.choice([None, 0, UNIT_UM, 2_239 * UNIT_UM, 4_850 * UNIT_UM, 1_000_000]),
+        motor_command=rng.choice([MotorCommand.BITS, MotorCommand.BITS, MotorCommand.DUTY]),
+        duty_timeout_ns=rng.choice([5, 25]) * MS,
         bit_order=rng.choice(list(BitOrder)),
         motor_meaning=rng.choice([MotorMeaning.WHEELS, MotorMeaning.WHEELS, MotorMeaning.LINEAR_ANGULAR]),
         step_um_per_s=rng.choice([62_500, 62_500, 100_001, 250_000, 0]),
@@ -301,6 +303,18 @@ class Life:
     def _motors(self) -> None:
         self.sequence.step("motors", *self._motor_values())
 
+    def _pwm(self) -> None:
+        """Periods at the time-out, and duties at halves of a thousandth; their ends beside a sample."""
+        timeout = self.twins.model.settings.duty_timeout_ns
+        period = self.rng.choice([1 * MS, 2_000, timeout // 2, timeout, 2 * timeout]) + self.rng.choice(BESIDE)
+        high = self.rng.choice([1, period // 2, period * 4_995 // 10_000, period - 1]) + self.rng.choice((0, 1))
+        self.twins.go_before(self.twins.model.samples.next + self.rng.choice(BESIDE))
+        turns = self.rng.randrange(1, 5)
+        self.sequence.step(
+            "pwm", self.rng.choice((1, 2)), period, min(high, period - 1), turns, self.rng.random() < 0.3
+        )
+        self.twins.pass_time(self.rng.choice([1, timeout - 1 * MS, timeout, timeout + 10 * MS]))
+
     def _obey(self) -> None:
         command = self.twins.model._driver.plausibility.command
         conversion = self.twins.model.parameters.velocity_um_s_per_count
@@ -342,5 +356,5 @@ class Life:
 LIFE_STEPS = {
     "threshold": 3, "heading jump": 5, "longest step": 4, "small steps": 3, "tolerance": 4, "short sip": 2,
     "count": 2, "nested": 1, "at deadline": 12, "late": 3, "silence": 2, "no answer": 1, "stream on": 2, "glitch": 3,
-    "motors": 3, "obey": 4, "pad": 2, "drive by pad": 2, "connect": 1, "rare": 1,
+    "motors": 3, "pwm": 3, "obey": 4, "pad": 2, "drive by pad": 2, "connect": 1, "rare": 1,
 }  # fmt: skip

@@ -33,6 +33,14 @@ class Sequence:
         self.twins.motors(left, right, self.width)
         self.twins.pass_time(12 * MS)
 
+    def _pwm(self, number: int, period: Nanos, high: Nanos, turns: int, backward: bool) -> None:
+        """Whole periods on a wheel's first wire, and a part of one more."""
+        self.twins.pin(f"motor{number}_comm{self.width}", backward)
+        for turn in range(turns):
+            self.twins.pin(f"motor{number}_comm1", True, 1 + turn * period)
+            self.twins.pin(f"motor{number}_comm1", False, 1 + turn * period + high)
+        self.twins.pass_time(turns * period - high)
+
     def _sips(self, count: int, dx: int, heading: int, left: int, right: int) -> None:
         for number in range(count):
             sip = self.twins.sip

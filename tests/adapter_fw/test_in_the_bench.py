@@ -32,6 +32,23 @@ def test_a_run_with_the_firmware_equals_the_run_with_the_model() -> None:
     assert finished(Bench(scenario("firmware"))) == finished(Bench(scenario("model")))
 
 
+def test_wheels_commanded_by_duty_drive_the_same_way_with_either() -> None:
+    runs = [Bench(scenario(core, "dodge-duty", 8)) for core in ("model", "firmware")]
+    assert finished(runs[0]) == finished(runs[1])
+    assert runs[0].parts.adapter is not None
+    assert runs[0].parts.adapter.status.motors == (750, 750)
+
+
+def test_a_run_by_duty_goes_on_from_half_way_with_the_firmware() -> None:
+    first, second = Bench(scenario("firmware", "dodge-duty", 6)), Bench(scenario("firmware", "dodge-duty", 6))
+    first.run_until(4 * NS_PER_S + 777_777)
+    saved = first.snapshot()
+    finished(first)
+    second.restore(saved)
+    finished(second)
+    assert second.trace.text == first.trace.text
+
+
 @pytest.mark.slow
 def test_dodge_drives_the_same_way_with_either() -> None:
     runs = [Bench(scenario(core, "dodge", 30)) for core in ("model", "firmware")]

@@ -16,7 +16,7 @@ from hypothesis import strategies as st
 from adapter_sim import AdapterSettings
 from adapter_sim.codec import BitOrder
 from adapter_sim.masters import Master
-from adapter_sim.settings import EncoderAtOpen, MotorMeaning
+from adapter_sim.settings import EncoderAtOpen, MotorCommand, MotorMeaning
 from robot_bench.adapter import is_available
 from tests.adapter_fw import mutation
 from tests.adapter_fw.boundaries import Life
@@ -33,11 +33,18 @@ PASSING = st.sampled_from(
     [1, 999_999, 2 * MS, 7 * MS, 25 * MS, 60 * MS, 99 * MS, 100 * MS, 240 * MS, 351 * MS, 1_100 * MS]
 )
 SONAR = st.lists(st.tuples(st.integers(0, 20), WORDS), max_size=4)
+#: Wheel, period and high time in ns, how many, backward: from a wave of 20 kHz to one that is too slow to be one.
+PWM = st.sampled_from([50_000, 1 * MS, 20 * MS, 25 * MS]).flatmap(
+    lambda period: st.tuples(
+        st.integers(1, 2), st.just(period), st.integers(1, period - 1), st.integers(1, 6), st.booleans()
+    )
+)
 #: Weights: what keeps a session going comes often, what ends it seldom.
 STEPS = st.one_of(
     st.tuples(st.just("motors"), st.integers(-4, 3), st.integers(-4, 3)),
     st.tuples(st.just("sips"), st.integers(1, 12), st.integers(-60, 60), SIGNED, SPEEDS, SPEEDS),
     st.tuples(st.just("sips"), st.integers(1, 12), st.integers(-60, 60), SIGNED, SPEEDS, SPEEDS),
+    PWM.map(lambda pwm: ("pwm", *pwm)),
     st.tuples(st.just("sip"), WORDS, WORDS, SIGNED, SIGNED, st.booleans(), SONAR),
     st.tuples(st.just("obey"), st.integers(1, 15)),
     st.tuples(st.just("noise"), st.binary(max_size=60)),
@@ -55,6 +62,7 @@ STEPS = st.one_of(
 SETTINGS = st.builds(
     AdapterSettings,
     threshold_um=st.sampled_from([None, 600_000, 1_300_000]),
+    motor_command=st.sampled_from(list(MotorCommand)),
     bit_order=st.sampled_from(list(BitOrder)),
     motor_meaning=st.sampled_from(list(MotorMeaning)),
     step_um_per_s=st.sampled_from([62_500, 100_001, 250_000]),

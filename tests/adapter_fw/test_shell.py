@@ -2,9 +2,11 @@
 
 from dataclasses import replace
 from pathlib import Path
+from random import Random
 
 import pytest
 
+from adapter_sim.duty import DUTY_TIMEOUT_NS, DutyMeter
 from adapter_sim.pinout import Direction, WireRole
 from robot_bench.wires.board_test.esp32 import CONSOLE, NvsFault, ResetReason
 from tests.adapter_fw.builds import built
@@ -387,3 +389,58 @@ def test_the_last_bytes_of_the_line_are_kept_for_the_console(shell: Shell) -> No
     shell.run_ms(5)
     assert f"link {bytes(range(8, 40)).hex()}\n" in shell.type("link")
     assert "link \n" in shell.type("link")
+
+
+@pytest.fixture
+def measuring(library: Path) -> Shell:
+    shell = Shell(library)
+    shell.run_ms(BOOT_MS + 10)
+    shell.type("set motor_command 1")
+    shell.type("restart", wait_ms=BOOT_MS + 50)
+    return shell
+
+
+def motors(shell: Shell) -> list[int]:
+    words = shell.type("status", wait_ms=20).split()
+    return [int(words[words.index(name) + 1]) for name in ("motor1", "motor2")]
+
+
+def test_the_capture_unit_measures_as_the_model_does(measuring: Shell) -> None:
+    """Edges at any microsecond; compared when the median has settled, and after the time-out."""
+    rng, shell = Random(1), measuring
+    wires = {name: DutyMeter(DUTY_TIMEOUT_NS) for name in ("motor1_comm1", "motor2_comm1")}
+    pads = {name: 1 << (pad_of(name, "rev-b") or 0) for name in wires}
+    for _ in range(60):
+        period = rng.choice([50, 1_000, 1_000, 20_000, 25_000, 49_999])
+        high = rng.choice([1, period // 2, rng.randrange(1, period), period - 1])
+        name = rng.choice(list(wires))
+        for _ in range(rng.randrange(1, 4)):
+            for span, level in ((high, True), (period - high, False)):
+                shell.levels = shell.levels & ~pads[name] | level * pads[name]
+                shell.esp32.put_levels(shell.levels)
+                wires[name].edge(level, shell.esp32.now_us * 1_000)
+                shell.esp32.run_until(shell.esp32.now_us + span)
+        shell.esp32.run_until(-(-shell.esp32.now_us // 1_000) * 1_000)
+        shell.run_ms(rng.choice([12, 30]))
+        now = shell.esp32.now_us * 1_000
+        for found, meter in zip(motors(shell), wires.values(), strict=True):
+            # The median of five samples 2 ms apart; the answer is made when the line has come.
+            assert found in {meter.duty(now - 10_000_000), meter.duty(now + 2_000_000)}
+
+
+def test_the_last_wire_of_a_motor_is_its_sign(measuring: Shell) -> None:
+    measuring.set("motor1_comm1", True)
+    measuring.set("motor2_comm1", True)
+    measuring.set("motor2_comm3", True)
+    measuring.set("motor1_comm2", True)
+    measuring.run_ms(40)
+    assert motors(measuring) == [1000, -1000]
+
+
+def test_a_test_of_the_board_takes_the_duties_from_the_adapter(measuring: Shell) -> None:
+    measuring.set("motor1_comm1", True)
+    measuring.run_ms(40)
+    assert "test on" in measuring.type("test on")
+    assert motors(measuring) == [0, 0]
+    measuring.type("test off")
+    assert motors(measuring) == [1000, 0]

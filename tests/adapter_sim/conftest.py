@@ -62,6 +62,10 @@ class FakePins:
                 return high
         return False
 
+    def course(self, signal: str, begin: Nanos, end: Nanos) -> list[tuple[Nanos, bool]]:
+        later = [(at, high) for at, high in self.history.get(signal, ()) if begin < at < end]
+        return [(begin, self.read(signal, begin)), *later]
+
     def write(self, signal: str, high: bool | None, now: Nanos) -> None:
         self.outputs[signal] = high
         self.writes.append((now, signal, high))

@@ -16,7 +16,7 @@ STEPS = st.integers(-8, 7)
 
 
 def mixer(**settings: object) -> Mixer:
-    return Mixer(AdapterSettings(**settings), track_mm=357, max_velocity_mm_s=750, max_rotation_deg_s=100)
+    return Mixer(AdapterSettings(**settings), full_steps=4, track_mm=357, max_velocity_mm_s=750, max_rotation_deg_s=100)
 
 
 @pytest.mark.parametrize(
@@ -39,7 +39,11 @@ def test_wheel_steps_become_a_differential_drive(left: int, right: int, speeds: 
 @given(STEPS, STEPS, st.integers(1_000, 90_000), st.integers(200, 600))
 def test_mixing_is_the_true_drive_to_half_a_unit(left: int, right: int, step: int, track: int) -> None:
     robot = Mixer(
-        AdapterSettings(step_um_per_s=step), track_mm=track, max_velocity_mm_s=10_000, max_rotation_deg_s=10_000
+        AdapterSettings(step_um_per_s=step),
+        full_steps=4,
+        track_mm=track,
+        max_velocity_mm_s=10_000,
+        max_rotation_deg_s=10_000,
     )
     speeds = robot.mix(left, right)
     assert abs(speeds.forward_mm_s - (left + right) * step / 2_000) <= 0.5 + 1e-9

@@ -256,7 +256,7 @@ def test_a_sample_reads_each_input_once_at_its_instant() -> None:
 
     rig = Rig()
     pins = Instants()
-    rig.adapter.inputs._pins = pins
+    rig.adapter.inputs._pins = rig.adapter.inputs._motors._pins = pins
     rig.run(330 * MS)
     samples = {at: names for at, names in pins.at.items() if len(names) > 1}
     assert sorted(samples) == [at * MS for at in range(300, 331, 2)]

@@ -126,6 +126,14 @@ def test_reading_on_without_a_clock_is_named(boot) -> None:
     assert "USART1 has no clock: RCC_APB2ENR bit 14 is 0 (read of 0x40013800)" in board.warnings[0]
 
 
+def test_reading_before_each_of_many_short_uses_is_not_reading_on(boot) -> None:
+    """As an ADC driver does that gives the clock for each conversion: read, clock on, use, clock off, and again."""
+    uses = "mov32 r1, #0x40013800\nmov32 r2, #0x40021018\nmov32 r3, #0x4000\nmovs r4, #0\n"
+    uses += "loop: ldr r0, [r1, #0]\nstr r3, [r2, #0]\nldr r0, [r1, #0]\nstr r4, [r2, #0]\nb loop\n"
+    board = boot(uses).run(5000).board
+    assert board.warnings == []
+
+
 def test_priorities_and_lines_beyond_the_chip_are_nothing_to_warn_of(run) -> None:
     addresses = [0xE000E400 + 4 * n for n in range(11, 60)]
     addresses += [base + 4 * n for base in (0xE000E100, 0xE000E180, 0xE000E280) for n in range(2, 8)]

@@ -3,7 +3,6 @@
 The program sleeps while DMA serves the bus. Needs arm-none-eabi-gcc, and DMA1 in the chip.
 """
 
-import shutil
 import tempfile
 import time
 from pathlib import Path
@@ -13,7 +12,8 @@ from bluepill_sim.parts import Eeprom24C02
 from bluepill_sim.peripherals.spi import Loopback
 from robot_bench.firmware import build
 
-PROGRAM = Path(__file__).resolve().parents[2] / "tests" / "bluepill_sim" / "peripherals" / "buses" / "firmware"
+ROOT = Path(__file__).resolve().parents[2]
+PROGRAM = ROOT / "tests" / "bluepill_sim" / "peripherals" / "buses" / "firmware" / "dma_buses.c"
 #: Of virtual time.
 SPAN_NS = 200_000_000
 
@@ -38,12 +38,9 @@ class Wire:
 def main() -> None:
     """Build the program, and print a line a bus."""
     with tempfile.TemporaryDirectory() as scratch:
-        folder = Path(scratch).resolve()
-        for source in (*PROGRAM.iterdir(), *(build.HERE / n for n in ("startup.c", "memory.c", "f103.h", "f103c8.ld"))):
-            shutil.copy(source, folder)
-        elf = folder / "dma_buses.elf"
-        sources = ("startup.c", "memory.c", "dma_buses.c")
-        build.build_elf(sources, folder=folder, linker_script="f103c8.ld", output=elf)
+        elf = Path(scratch).resolve() / "dma_buses.elf"
+        sources, flags = ("startup.c", "memory.c", "board.c", str(PROGRAM)), (f"-I{build.HERE}",)
+        build.build_elf(sources, folder=build.HERE, linker_script="f103c8.ld", output=elf, more_flags=flags)
         for name, device, is_i2c in (
             ("SPI at 18 MHz, MISO tied to MOSI", Loopback(), False),
             ("SPI at 18 MHz, a part in Python", Wire(), False),

@@ -34,13 +34,15 @@ Adapter::Adapter(const Settings& settings, const RobotNumbers& robot, const Wire
       wires_(wires),
       reset_bit_(wires.motor1_width + wires.motor2_width + 1),
       heading_scale_(static_cast<std::int32_t>(HEADING_MODULUS / robot.angle_counts_per_turn)),
-      mixer_(settings, robot),
+      mixer_(settings, robot, std::int64_t{1} << (wires.motor1_width - 1)),
       distances_(wires.distances, settings.threshold_um < 0 ? robot.half_sonar_range_um : settings.threshold_um,
                  settings.distance_stale_ns),
       encoders_(robot, settings.liveness_ns, wires.encoder_width),
       client_(client_settings(settings)),
       outputs_(wires),
       majority_(settings.sample_count),
+      left_duty_(settings.sample_count),
+      right_duty_(settings.sample_count),
       connect_(settings.connect_after_ns, settings.disconnect_after_ns),
       pad_(settings),
       plausibility_(settings),
@@ -144,6 +146,9 @@ void Adapter::advance_to(Nanos limit) {
 }
 
 std::int32_t Adapter::motor(int number) const {
+  if (settings_.motor_command == MotorCommand::DUTY) {
+    return number == 1 ? left_duty_.value() : right_duty_.value();
+  }
   const std::uint32_t word = majority_.word();
   const std::uint32_t first = (1U << wires_.motor1_width) - 1;
   const std::uint32_t second = (1U << wires_.motor2_width) - 1;
@@ -271,7 +276,7 @@ void Adapter::replan() {
 void Adapter::sample(Nanos now) {
   const std::uint32_t word = read_pins(now);
   const std::uint32_t connect_bit = 1U << (reset_bit_ - 1);
-  const bool motors_changed = majority_.take(word & (connect_bit - 1));
+  const bool motors_changed = take_motors(word & (connect_bit - 1), now);
   const bool connect_changed = connect_.take((word & connect_bit) != 0, now);
   if (master_ == Master::BLUEPILL) {
     if (motors_changed && state_ == State::DRIVING) {
@@ -284,6 +289,20 @@ void Adapter::sample(Nanos now) {
   if (state_ == State::LOST && !wants_robot()) {
     enter(State::IDLE, now, What::IDLE, "ready for a new connection");
   }
+}
+
+// Takes a sample of the motor wires; tells whether the values taken have changed.
+bool Adapter::take_motors(std::uint32_t word, Nanos now) {
+  if (settings_.motor_command == MotorCommand::BITS) {
+    return majority_.take(word);
+  }
+  const auto signed_duty = [&](std::int32_t first, std::int32_t width) {
+    const std::int32_t duty = in_ ? in_->duty(first, now) : 0;
+    return (word >> (first + width - 1) & 1U) != 0 ? -duty : duty;
+  };
+  const bool left_changed = left_duty_.take(signed_duty(0, wires_.motor1_width));
+  const bool right_changed = right_duty_.take(signed_duty(wires_.motor1_width, wires_.motor2_width));
+  return left_changed || right_changed;
 }
 
 void Adapter::walk(Nanos now) {

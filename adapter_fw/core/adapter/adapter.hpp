@@ -151,6 +151,7 @@ class Adapter final : private p2os::ClientListener {
   void end_request(const char* why, Nanos now);
   void halt(Nanos now);
   void sample(Nanos now);
+  bool take_motors(std::uint32_t word, Nanos now);
   void walk(Nanos now);
   void send_pair(Nanos now);
   void next_baud();
@@ -179,6 +180,8 @@ class Adapter final : private p2os::ClientListener {
   p2os::Client client_;
   Outputs outputs_;
   Majority majority_;
+  Median left_duty_;
+  Median right_duty_;
   Debounce connect_;
   Gamepad pad_;
   PlausibilityCheck plausibility_;

@@ -1,5 +1,7 @@
 #include "inputs.hpp"
 
+#include "../../hal/pins.hpp"
+
 namespace adapter {
 
 bool Majority::take(std::uint32_t word) {
@@ -24,6 +26,71 @@ void Majority::reset() {
   window_.fill(0);
   next_ = 0;
   word_ = 0;
+}
+
+void DutyMeter::restart(bool level) {
+  level_ = level;
+  duty_ = level ? hal::FULL_DUTY : 0;
+  has_edge_ = has_risen_ = false;
+}
+
+void DutyMeter::edge(bool level, Nanos at, std::uint32_t stamp) {
+  if (level == level_) {
+    return;
+  }
+  expire(at);
+  level_ = level;
+  edge_at_ = at;
+  has_edge_ = true;
+  if (!level) {
+    fell_ = stamp;
+    return;
+  }
+  if (has_risen_) {
+    const std::uint64_t high = fell_ - rose_;
+    const std::uint64_t period = stamp - rose_;
+    duty_ = period == 0 ? duty_ : static_cast<std::int32_t>((2 * high * hal::FULL_DUTY + period) / (2 * period));
+  }
+  rose_ = stamp;
+  has_risen_ = true;
+}
+
+std::int32_t DutyMeter::duty(Nanos at) {
+  expire(at);
+  return duty_;
+}
+
+void DutyMeter::expire(Nanos at) {
+  if (has_edge_ && at - edge_at_ >= timeout_ns_) {
+    restart(level_);
+  }
+}
+
+bool Median::take(std::int32_t sample) {
+  window_[static_cast<std::size_t>(next_)] = sample;
+  next_ = (next_ + 1) % count_;
+  const std::int32_t before = value_;
+  // The sample that at most half of the others are below, and at most half above.
+  for (std::int32_t place = 0; place < count_; ++place) {
+    const std::int32_t candidate = window_[static_cast<std::size_t>(place)];
+    std::int32_t below = 0;
+    std::int32_t above = 0;
+    for (std::int32_t other = 0; other < count_; ++other) {
+      below += window_[static_cast<std::size_t>(other)] < candidate ? 1 : 0;
+      above += window_[static_cast<std::size_t>(other)] > candidate ? 1 : 0;
+    }
+    if (2 * below < count_ && 2 * above < count_) {
+      value_ = candidate;
+      break;
+    }
+  }
+  return value_ != before;
+}
+
+void Median::reset() {
+  window_.fill(0);
+  next_ = 0;
+  value_ = 0;
 }
 
 bool Debounce::take(bool raw, Nanos now) {

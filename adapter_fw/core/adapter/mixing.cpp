@@ -1,5 +1,6 @@
 #include "mixing.hpp"
 
+#include "../../hal/pins.hpp"
 #include "numbers.hpp"
 
 namespace adapter {
@@ -21,8 +22,10 @@ std::int64_t scaled(std::int64_t value, std::int64_t numerator, std::int64_t den
 
 }  // namespace
 
-Mixer::Mixer(const Settings& settings, const RobotNumbers& robot)
+Mixer::Mixer(const Settings& settings, const RobotNumbers& robot, std::int64_t full_steps)
     : meaning_(settings.motor_meaning),
+      steps_(settings.motor_command == MotorCommand::DUTY ? full_steps : 1),
+      per_(settings.motor_command == MotorCommand::DUTY ? hal::FULL_DUTY : 1),
       step_um_per_s_(settings.step_um_per_s),
       angular_step_urad_per_s_(settings.angular_step_urad_per_s),
       pad_velocity_mm_s_(settings.pad_velocity_mm_s),
@@ -32,17 +35,21 @@ Mixer::Mixer(const Settings& settings, const RobotNumbers& robot)
       max_rotation_deg_s_(lower(robot.max_rotation_deg_s, settings.max_rotation_deg_s)) {}
 
 Speeds Mixer::mix(std::int32_t motor1, std::int32_t motor2) const {
-  const std::int64_t first = motor1;
-  const std::int64_t second = motor2;
+  const std::int64_t first = of_steps(motor1, step_um_per_s_);
   if (meaning_ == MotorMeaning::WHEELS) {
+    const std::int64_t second = of_steps(motor2, step_um_per_s_);
     // um/s over um of track are rad/s. fault_of() keeps the rim's difference below 8e7 um/s, so that this fits.
-    const std::int64_t forward = divide_half_away((first + second) * step_um_per_s_, 2'000);
-    const std::int64_t turn = divide_half_away((second - first) * step_um_per_s_ * DEG_PER_RAD_E9, track_mm_ * E12);
+    const std::int64_t forward = divide_half_away(first + second, 2'000);
+    const std::int64_t turn = divide_half_away((second - first) * DEG_PER_RAD_E9, track_mm_ * E12);
     return limited(forward, turn);
   }
-  const std::int64_t forward = divide_half_away(first * step_um_per_s_, 1'000);
-  const std::int64_t turn = divide_half_away(second * angular_step_urad_per_s_ * DEG_PER_RAD_E9, 1'000 * E12);
-  return limited(forward, turn);
+  const std::int64_t forward = divide_half_away(first, 1'000);
+  const std::int64_t second = of_steps(motor2, angular_step_urad_per_s_);
+  return limited(forward, divide_half_away(second * DEG_PER_RAD_E9, 1'000 * E12));
+}
+
+std::int64_t Mixer::of_steps(std::int64_t value, std::int64_t step) const {
+  return divide_half_away(value * step * steps_, per_);
 }
 
 Speeds Mixer::steer(std::int32_t forward, std::int32_t turn) const {

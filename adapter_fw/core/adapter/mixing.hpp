@@ -31,9 +31,10 @@ struct Wheels {
 
 class Mixer {
  public:
-  Mixer(const Settings& settings, const RobotNumbers& robot);
+  // A full duty stands for `full_steps`.
+  Mixer(const Settings& settings, const RobotNumbers& robot, std::int64_t full_steps);
 
-  // Returns the speeds that a pair of signed motor values asks for.
+  // Returns the speeds that a pair of signed motor values asks for: steps, or duties in 1/1000.
   Speeds mix(std::int32_t motor1, std::int32_t motor2) const;
 
   // Returns the speeds of a pad: `forward` of 1023, `turn` of 511 to the left.
@@ -43,9 +44,13 @@ class Mixer {
   Wheels wheels_mm_s(Speeds speeds) const;
 
  private:
+  std::int64_t of_steps(std::int64_t value, std::int64_t step) const;
   Speeds limited(std::int64_t forward, std::int64_t turn) const;
 
   MotorMeaning meaning_;
+  //: A motor value is so many steps, divided by `per_`.
+  std::int64_t steps_;
+  std::int64_t per_;
   std::int64_t step_um_per_s_;
   std::int64_t angular_step_urad_per_s_;
   std::int64_t pad_velocity_mm_s_;

@@ -13,6 +13,7 @@ namespace adapter {
 
 using p2os::Nanos;
 
+enum class MotorCommand : std::uint8_t { BITS, DUTY };
 enum class BitOrder : std::uint8_t { COMM3_MSB, COMM1_MSB };
 enum class MotorMeaning : std::uint8_t { WHEELS, LINEAR_ANGULAR };
 enum class EncoderAtOpen : std::uint8_t { ZERO, CONTINUE };
@@ -22,6 +23,7 @@ constexpr std::int32_t DEFAULT_BAUD = 9'600;
 
 #define ADAPTER_SETTINGS(SETTING) \
   SETTING(std::int64_t, threshold_um, -1, -1) \
+  SETTING(MotorCommand, motor_command, MotorCommand::BITS, 0) \
   SETTING(BitOrder, bit_order, BitOrder::COMM3_MSB, 0) \
   SETTING(MotorMeaning, motor_meaning, MotorMeaning::WHEELS, 0) \
   SETTING(std::int64_t, step_um_per_s, 62'500, 0) \
@@ -29,6 +31,7 @@ constexpr std::int32_t DEFAULT_BAUD = 9'600;
   SETTING(std::int64_t, max_velocity_mm_s, -1, -1) \
   SETTING(std::int64_t, max_rotation_deg_s, -1, -1) \
   SETTING(Nanos, sample_period_ns, 2'000'000, 1) \
+  SETTING(Nanos, duty_timeout_ns, 25'000'000, 1) \
   SETTING(std::int32_t, sample_count, 5, 1) \
   SETTING(Nanos, connect_after_ns, 10'000'000, 0) \
   SETTING(Nanos, disconnect_after_ns, 10'000'000, 0) \

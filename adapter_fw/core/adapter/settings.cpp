@@ -18,7 +18,7 @@ constexpr Nanos MIN_SAMPLE_NS = NS_PER_MS / 10, MIN_SPACING_NS = 1 * NS_PER_MS, 
 bool is_below(std::int64_t value, std::int64_t least) { return value < least; }
 
 bool are_choices(const Settings& settings) {
-  return settings.bit_order <= BitOrder::COMM1_MSB && settings.motor_meaning <= MotorMeaning::LINEAR_ANGULAR &&
+  return settings.motor_command <= MotorCommand::DUTY && settings.bit_order <= BitOrder::COMM1_MSB && settings.motor_meaning <= MotorMeaning::LINEAR_ANGULAR &&
          settings.encoder_at_open <= EncoderAtOpen::CONTINUE;
 }
 
@@ -30,7 +30,7 @@ bool leave_time(const Settings& settings) {
 
 bool are_bounded(const Settings& settings) {
   for (const Nanos time :
-       {settings.sample_period_ns, settings.connect_after_ns, settings.disconnect_after_ns, settings.boot_ns,
+       {settings.sample_period_ns, settings.duty_timeout_ns, settings.connect_after_ns, settings.disconnect_after_ns, settings.boot_ns,
         settings.pair_spacing_ns, settings.refresh_ns, settings.pulse_ns, settings.liveness_ns, settings.first_sip_ns,
         settings.retry_ns, settings.plausibility_ns, settings.distance_stale_ns, settings.settle_ns,
         settings.encoder_dwell_ns, settings.stop_repeat_ns, settings.pad_loss_ns}) {

@@ -19,6 +19,8 @@ void Adapter::clear() {
   agenda_ = {};
   next_sample_ = now_;
   majority_.reset();
+  left_duty_.reset();
+  right_duty_.reset();
   connect_.reset();
   pad_.lose();
   plausibility_.begin(now_);

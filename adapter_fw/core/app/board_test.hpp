@@ -55,6 +55,7 @@ class BoardTest final : public hal::PinsIn, public hal::PinsOut, public hal::Uar
 
   // The adapter's sides.
   std::uint32_t read(p2os::Nanos at) override { return is_on_ ? 0 : hardware_.in.read(at); }
+  std::int32_t duty(std::int32_t bit, p2os::Nanos at) override { return is_on_ ? 0 : hardware_.in.duty(bit, at); }
   void drive(std::uint32_t mask, std::uint32_t levels, p2os::Nanos now) override;
   void release(p2os::Nanos now) override;
   std::size_t read(std::uint8_t* data, std::size_t size) override;

@@ -85,6 +85,7 @@ adapter::Master other(adapter::Master master) {
     terminal.write(fault);
     terminal.write("\n");
   }
+  wires.measure_duties(settings);
   line.start(settings.bauds[0]);
   static app::EventLog log;
   static app::EventPrinter printer(log, terminal);

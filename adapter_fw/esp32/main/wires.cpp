@@ -1,10 +1,16 @@
 #include "wires.hpp"
 
 #include <driver/gpio.h>
+#include <driver/mcpwm_cap.h>
+#include <esp_attr.h>
 #include <esp_rom_sys.h>
+#include <esp_timer.h>
+#include <freertos/FreeRTOS.h>
 #include <soc/gpio_struct.h>
 
 #include <pins.hpp>
+
+#include "../../core/adapter/inputs.hpp"
 
 namespace esp32 {
 
@@ -52,7 +58,68 @@ void set_up(std::uint64_t pins, gpio_mode_t mode, gpio_pulldown_t pull_down, gpi
   ESP_ERROR_CHECK(gpio_config(&config));
 }
 
+//: What an interrupt and the adapter's task share.
+portMUX_TYPE capture_lock = portMUX_INITIALIZER_UNLOCKED;
+
+//: The first wire of a motor, and its meter.
+struct Channel {
+  std::int32_t bit;
+  adapter::DutyMeter meter;
+};
+
+bool IRAM_ATTR take_edge(mcpwm_cap_channel_handle_t, const mcpwm_capture_event_data_t* event, void* context) {
+  auto* channel = static_cast<Channel*>(context);
+  portENTER_CRITICAL_ISR(&capture_lock);
+  channel->meter.edge(event->cap_edge == MCPWM_CAP_EDGE_POS, esp_timer_get_time() * p2os::NS_PER_US, event->cap_value);
+  portEXIT_CRITICAL_ISR(&capture_lock);
+  return false;
+}
+
+//: Set once, before the first read.
+Channel* channels[2] = {};
+
 }  // namespace
+
+void Wires::measure_duties(const adapter::Settings& settings) {
+  if (settings.motor_command != adapter::MotorCommand::DUTY) {
+    return;
+  }
+  static Channel left{0, adapter::DutyMeter(settings.duty_timeout_ns)};
+  static Channel right{board::WIRES.motor1_width, adapter::DutyMeter(settings.duty_timeout_ns)};
+  mcpwm_capture_timer_config_t timer_config = {};
+  timer_config.clk_src = MCPWM_CAPTURE_CLK_SRC_DEFAULT;
+  mcpwm_cap_timer_handle_t timer = nullptr;
+  ESP_ERROR_CHECK(mcpwm_new_capture_timer(&timer_config, &timer));
+  for (Channel* channel : {&left, &right}) {
+    channels[channel == &left ? 0 : 1] = channel;
+    channel->meter.restart((read(0) >> channel->bit & 1U) != 0);
+    mcpwm_capture_channel_config_t config = {};
+    config.gpio_num = static_cast<gpio_num_t>(board::INPUT_PINS[channel->bit]);
+    config.prescale = 1;
+    config.flags.pos_edge = true;
+    config.flags.neg_edge = true;
+    mcpwm_cap_channel_handle_t handle = nullptr;
+    ESP_ERROR_CHECK(mcpwm_new_capture_channel(timer, &config, &handle));
+    mcpwm_capture_event_callbacks_t callbacks = {};
+    callbacks.on_cap = take_edge;
+    ESP_ERROR_CHECK(mcpwm_capture_channel_register_event_callbacks(handle, &callbacks, channel));
+    ESP_ERROR_CHECK(mcpwm_capture_channel_enable(handle));
+  }
+  ESP_ERROR_CHECK(mcpwm_capture_timer_enable(timer));
+  ESP_ERROR_CHECK(mcpwm_capture_timer_start(timer));
+}
+
+std::int32_t Wires::duty(std::int32_t bit, p2os::Nanos now) {
+  std::int32_t found = 0;
+  for (Channel* channel : channels) {
+    if (channel != nullptr && channel->bit == bit) {
+      portENTER_CRITICAL(&capture_lock);
+      found = channel->meter.duty(now);
+      portEXIT_CRITICAL(&capture_lock);
+    }
+  }
+  return found;
+}
 
 void Wires::start() {
   std::uint64_t wires = 0;

@@ -4,8 +4,11 @@
 // instant; p2dx_con is in the first. rst is EN itself: a program that runs sees it low.
 // Outputs: one write sets, one clears; distances of a revision with a shift register
 // follow by the register's latch, all at once.
+// Duties: a capture unit of the motor-control PWM stamps the edges of two inputs, from about
+// 40 Hz (duty_timeout_ns) to 5 kHz: each edge is an interrupt.
 #pragma once
 
+#include "../../core/adapter/settings.hpp"
 #include "../../hal/pins.hpp"
 
 namespace esp32 {
@@ -15,7 +18,11 @@ class Wires final : public hal::PinsIn, public hal::PinsOut, public hal::OutputP
   // Makes every wire an input that follows its pull.
   void start();
 
+  // Begins to measure the duties of the motors' first wires, where the settings ask for them.
+  void measure_duties(const adapter::Settings& settings);
+
   std::uint32_t read(p2os::Nanos) override;
+  std::int32_t duty(std::int32_t bit, p2os::Nanos now) override;
   void drive(std::uint32_t mask, std::uint32_t levels, p2os::Nanos) override;
   // A shift register cannot let go: its outputs show the safe levels.
   void release(p2os::Nanos) override;

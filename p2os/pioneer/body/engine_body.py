@@ -28,7 +28,7 @@ from p2os.robots.parameters import RobotParameters
 class EngineBody(BodyInWorld):
     """A differential drive with mass, torque limits and friction."""
 
-    STATE: ClassVar[tuple[str, ...]] = ("_zero", "_stalling", "_is_held", "_is_at_rest")
+    STATE: ClassVar[tuple[str, ...]] = ("_zero", "_stalling", "_is_held", "_is_at_rest", "_most_nm")
     DERIVED: ClassVar[tuple[str, ...]] = ("_state",)
 
     #: Angles of the wheels when it was reset.
@@ -42,6 +42,8 @@ class EngineBody(BodyInWorld):
         self._state: BodyState | None = None
         self._torque_nm = parameters.body.motor_torque_nm
         self._stalling = [0, 0]
+        #: What drives each wheel to its set-point at most, where somebody says so for each step.
+        self._most_nm: tuple[float, float] | None = None
         #: Wheels that something would turn back against their motor, and that the gear's friction holds.
         self._is_held = [False, False]
         #: Wheels that have come to rest since their set-point is 0: they are held, as hard as the gear allows.
@@ -69,6 +71,10 @@ class EngineBody(BodyInWorld):
         free = self._plan.clearance(state.x_m, state.y_m, state.heading_rad, no_more_than=no_more_than)
         return self._nearest_robot(free)
 
+    def limit_torques(self, left_nm: float, right_nm: float) -> None:
+        """Have the next step drive the wheels to their set-points with no more; the gear holds nothing by itself."""
+        self._most_nm = left_nm, right_nm
+
     def _count_anew(self) -> None:
         """Begin to count contacts and stalls."""
         self._contacts = ContactCounter()
@@ -85,6 +91,11 @@ class EngineBody(BodyInWorld):
             effort_nm: What its motor and gear gave in the last step, positive forward.
             rate_radps: Its rate since.
         """
+        if self._most_nm is not None:
+            is_straining = self._most_nm[wheel] > 0.0 and abs(effort_nm) > STALL_TORQUE_SHARE * self._most_nm[wheel]
+            is_stalled = asked_mps != 0.0 and is_straining and abs(rate_radps) < self._slow_radps
+            self._stalling[wheel] = min(STALL_STEPS, self._stalling[wheel] + 1) if is_stalled else 0
+            return
         forward = math.copysign(1.0, asked_mps)
         if self._is_held[wheel]:
             self._is_held[wheel] = asked_mps != 0.0 and effort_nm * forward > self._torque_nm
@@ -103,6 +114,8 @@ class EngineBody(BodyInWorld):
         A wheel that is held stands, until what pushes it back has become less than what its motor gives. One that
         rests at a set-point of 0 is held so too; without power, by the friction of motor and gear.
         """
+        if self._most_nm is not None:
+            return asked_mps / self._radius_m, self._most_nm[wheel]
         if self._is_at_rest[wheel] and asked_mps == 0.0:
             return 0.0, self._torque_nm * (BACK_DRIVE if self.is_powered else UNPOWERED_SHARE)
         if self._is_held[wheel] and asked_mps != 0.0:

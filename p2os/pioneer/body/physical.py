@@ -22,6 +22,8 @@ PUSHED_MEETS = HULL_GROUP | OBSTACLE_GROUP | FLOOR_GROUP | PUSHED_GROUP
 
 #: Coulomb friction of rubber on a hard floor, and of the hull against a wall (chosen).
 WHEEL_FRICTION, HULL_FRICTION = 0.8, 0.3
+#: Of all that stands fast where an engine multiplies the frictions of both sides: what moves over it decides.
+STANDING_FRICTION = 1.0
 CASTER_MASS_KG = 0.2
 GRAVITY_MPS2 = 9.81
 FLOOR_THICKNESS_M = 0.5

@@ -8,6 +8,7 @@ from p2os.errors import WorldError
 from p2os.pioneer.body.physical import (
     CASTER_MASS_KG,
     HULL_FRICTION,
+    STANDING_FRICTION,
     WHEEL_FRICTION,
     Chassis,
     floor_box,
@@ -33,8 +34,6 @@ from p2os.pioneer.world.formats.annotation import GROUND, ROBOT
 from p2os.pioneer.world.model import LONGEST_NAME, Kind, Obstacle, World
 from p2os.robots.parameters import RobotParameters
 
-#: Of all that stands fast, as the bodies take it: what moves over it decides.
-STANDING_FRICTION = 1.0
 WORLD = "world"
 #: Parts of a robot, behind its name.
 PARTS = ("", " left wheel", " right wheel", " caster")

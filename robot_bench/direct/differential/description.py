@@ -169,5 +169,5 @@ class Differential:
                 SonarPose(x_mm=1000 * one.x_m, y_mm=1000 * one.y_m, heading_deg=one.heading_deg)
                 for one in self.distances
             ),
-            infrared=(), body=body,
+            infrared=(), body=body, rotor_inertia_kg_m2=self.motor.rotor_inertia_kg_m2 * self.motor.gear_ratio**2,
         )  # fmt: skip

@@ -23,6 +23,8 @@ from simbase.state import Stateful
 
 #: chosen: friction on both wheels is found by turns; each turn takes the rest down by the wheels' coupling, below 1.
 _TURNS = 50
+#: chosen: where nothing brakes, no wheel comes to this speed.
+FREE_RADPS = 1e4
 
 
 class Step(NamedTuple):
@@ -36,6 +38,15 @@ class Step(NamedTuple):
     right_a: float
     #: Mean current out of the supply, A; below 0 the motors feed it.
     supply_a: float
+
+
+class Aim(NamedTuple):
+    """Where a motor drives its wheel in a step, and how hard: never beyond where its torque ends."""
+
+    #: rad/s.
+    rate_radps: float
+    #: At the wheel.
+    torque_nm: float
 
 
 class DriveTrain(Stateful):
@@ -94,8 +105,39 @@ class DriveTrain(Stateful):
         free_l = self.left_radps + scale * (own_r * push_l - other * push_r)
         free_r = self.right_radps + scale * (own_l * push_r - other * push_l)
         after_l, after_r = self._rubbed(free_l, free_r, scale * own_r, scale * own_l, -scale * other)
-        mean_l, mean_r = (self.left_radps + after_l) / 2, (self.right_radps + after_r) / 2
-        self.left_radps, self.right_radps = after_l, after_r
+        return self.take(left, right, supply_v, after_l, after_r)
+
+    def aims(self, left: Shares, right: Shares, supply_v: float) -> tuple["Aim", "Aim"]:
+        """Return what each motor makes of its wheel in a step of a body that has the masses."""
+        volts = max(0.0, supply_v - self._drop_v)
+        return self._aim(left, volts, self.left_radps), self._aim(right, volts, self.right_radps)
+
+    def _aim(self, shares: Shares, volts: float, speed: float) -> "Aim":
+        pull, rub = self._k / self._resistance, self._friction
+        drive = pull * volts * (shares.forward - shares.reverse)
+        brake = pull * self._k * (shares.forward + shares.reverse + shares.brake) + self._damping
+        if speed == 0.0:
+            if abs(drive) <= rub:
+                return Aim(0.0, rub)
+            way = math.copysign(1.0, drive)
+        else:
+            way = math.copysign(1.0, speed)
+        net = drive - rub * way
+        most = abs(net - brake * speed)
+        if net * way > 0.0:
+            return Aim(net / brake if brake else way * FREE_RADPS, most)
+        if abs(drive) <= rub:  # friction and brake alone: it ends in rest
+            return Aim(0.0, most)
+        back = drive + rub * way
+        return Aim(back / brake if brake else -way * FREE_RADPS, most)
+
+    def take(self, left: Shares, right: Shares, supply_v: float, left_radps: float, right_radps: float) -> Step:
+        """Take the speeds to which a body has come with the last `aims`."""
+        volts, k, resistance = max(0.0, supply_v - self._drop_v), self._k, self._resistance
+        mean_l, mean_r = (self.left_radps + left_radps) / 2, (self.right_radps + right_radps) / 2
+        self.left_radps, self.right_radps = left_radps, right_radps
+        along_l, along_r = left.forward - left.reverse, right.forward - right.reverse
+        driven_l, driven_r = left.forward + left.reverse, right.forward + right.reverse
         left_a = (along_l * volts - (driven_l + left.brake) * k * mean_l) / resistance
         right_a = (along_r * volts - (driven_r + right.brake) * k * mean_r) / resistance
         supply_a = ((driven_l + driven_r) * volts - k * (along_l * mean_l + along_r * mean_r)) / resistance
@@ -106,6 +148,9 @@ class DriveTrain(Stateful):
         most = self._friction
         if most == 0.0:
             return left, right
+        whole = own_l * own_r - other * other
+        if abs(own_r * left - other * right) < most * whole and abs(own_l * right - other * left) < most * whole:
+            return 0.0, 0.0  # it holds both
         rub_l = rub_r = 0.0
         for _ in range(_TURNS):
             before = rub_l, rub_r

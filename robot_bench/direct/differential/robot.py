@@ -4,10 +4,11 @@ The body is stepped at multiples of its dt. When a step's time has passed, the b
 volts, currents and speeds follow, and the body makes the step with the mean speeds of the wheels. So the drive acts
 without delay, and what the encoders show of a step comes one step later.
 
-The body takes speeds of the rims and answers with how far its wheels have turned. A wheel that something holds, so that
-it turns more than a tenth slower or faster than its motor, has its motor brought to its own speed: so a robot against a
-wall draws the current of a stalled motor. With the physical bodies (bullet, mujoco) slopes, slip and what is pushed act
-on the motors only so, and the body's own limit of torque counts too.
+A physical body (bullet, mujoco) is told each motor's torque and where that ends, and answers with how far its wheels
+have turned: slopes, slip, walls and what is pushed act on the motors by that. The kinematic body takes speeds of the
+rims, which the drive train works out with the robot's mass; a wheel that something holds, so that it turns more than a
+tenth slower or faster than its motor, has its motor brought to its own speed. Either way a wheel that stands draws the
+current of a stalled motor.
 
 Invariant: at time t the body has made every step that ended at or before t.
 """
@@ -29,6 +30,11 @@ from simbase.timing import NS_PER_S, Nanos, Reached
 
 #: chosen: a wheel's own speed counts from this difference to its motor on, as a part and as a speed of the rim.
 HELD_SHARE, HELD_MPS = 0.1, 0.001
+#: chosen: the kinematic body is told whole micrometres a second: a robot that stands at a wall while its battery falls
+#: is told the same for many steps, and the body need not look again for a way.
+SPEED_DIGITS = 6
+#: chosen: a physical body's wheel that is slower than this trembles, and stands.
+REST_RADPS = 1e-3
 #: chosen: volts on a pin change by half of what the ADC tells apart, 3.3 V by 4096.
 VOLTS_STEP = 4e-4
 #: chosen: bumpers and stalls are looked at each 10 ms, as programs do.
@@ -47,7 +53,7 @@ class DifferentialRobot(Stateful):
 
     STATE = (
         "body", "train", "cell", "_encoders", "_bridges", "_steps", "_angles", "_next_distance", "_stalled",
-        "_steps_of_volts",
+        "_steps_of_volts", "currents_a",
     )  # fmt: skip
 
     def __init__(
@@ -59,6 +65,10 @@ class DifferentialRobot(Stateful):
         self._dt_s = body.dt_ns / NS_PER_S
         self.train = DriveTrain(robot, self._dt_s)
         self.cell = Cell(robot.battery)
+        #: Mean currents of the windings in the last step, left and right, A.
+        self.currents_a = (0.0, 0.0)
+        #: Tells a body that has the masses how hard its motors drive in the next step.
+        self._torques: Callable[[float, float], None] | None = getattr(body, "limit_torques", None)
         self._bridges = tuple(
             HBridge([harness[f"{side}_{pin}"] for pin in robot.bridge.kind.pins], robot.bridge) for side in SIDES
         )
@@ -95,13 +105,24 @@ class DifferentialRobot(Stateful):
         begin, end = self._steps * body.dt_ns, (self._steps + 1) * body.dt_ns
         left, right = self._bridges[0].shares(begin, end), self._bridges[1].shares(begin, end)
         cell.volts = train.supply_v(left, right, cell.source_v, battery.resistance_ohm, battery.idle_current_a)
-        made = train.step(left, right, cell.volts)
-        cell.give(made.supply_a + battery.idle_current_a, self._dt_s)
-        turned = body.step(made.left_radps * self._radius_m, made.right_radps * self._radius_m)
         angle_l, angle_r = self._angles
+        if self._torques is None:
+            made = train.step(left, right, cell.volts)
+            left_mps, right_mps = made.left_radps * self._radius_m, made.right_radps * self._radius_m
+            turned = body.step(round(left_mps, SPEED_DIGITS), round(right_mps, SPEED_DIGITS))
+        else:
+            aim_l, aim_r = train.aims(left, right, cell.volts)
+            self._torques(aim_l.torque_nm, aim_r.torque_nm)
+            turned = body.step(aim_l.rate_radps * self._radius_m, aim_r.rate_radps * self._radius_m)
         self._angles = turned_l, turned_r = turned.left_angle_rad, turned.right_angle_rad
-        train.left_radps = self._held(made.left_radps, (turned_l - angle_l) / self._dt_s, train.left_radps)
-        train.right_radps = self._held(made.right_radps, (turned_r - angle_r) / self._dt_s, train.right_radps)
+        real_l, real_r = (turned_l - angle_l) / self._dt_s, (turned_r - angle_r) / self._dt_s
+        if self._torques is None:
+            train.left_radps = self._held(made.left_radps, real_l, train.left_radps)
+            train.right_radps = self._held(made.right_radps, real_r, train.right_radps)
+        else:
+            made = train.take(left, right, cell.volts, _or_rest(real_l), _or_rest(real_r))
+        self.currents_a = made.left_a, made.right_a
+        cell.give(made.supply_a + battery.idle_current_a, self._dt_s)
         self._steps += 1
         self._encoders[0].turn_to(turned_l, end, body.dt_ns)
         self._encoders[1].turn_to(turned_r, end, body.dt_ns)
@@ -146,3 +167,7 @@ class DifferentialRobot(Stateful):
             self._stalled = stalled
             if self.on_event is not None:
                 self.on_event(now, *STALLS[stalled])
+
+
+def _or_rest(radps: float) -> float:
+    return 0.0 if abs(radps) < REST_RADPS else radps

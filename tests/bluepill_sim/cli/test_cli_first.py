@@ -56,6 +56,8 @@ def test_run_in_real_time_serves_a_pseudo_terminal(capfd: pytest.CaptureFixture[
         (["run", SENSORS, "--drive", "XY=1"], "no leg XY"),
         (["run", SENSORS, "--until", "tea"], "is not understood"),
         (["run", SENSORS, "--uart", "/nowhere/log"], "cannot write"),
+        (["run", SENSORS, "--itm", "/nowhere/log"], "cannot write"),
+        (["run", SENSORS, "--swo", "/nowhere/log"], "cannot write"),
         (["pins", SENSORS, "--for", "1ms", "--vcd", "/nowhere/a.vcd"], "cannot write"),
         (["pins", SENSORS, "--for", "1ms", "--sr", "/nowhere/a.sr"], "cannot write"),
         (["info", "/dev/null"], "empty"),

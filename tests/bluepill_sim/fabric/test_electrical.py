@@ -142,8 +142,8 @@ ldr r2, [r1, #0]
 mov32 r1, #0x40010C00
 mov32 r2, #0x44484444
 str r2, [r1, #0]
-mov32 r2, #0x44444424
-str r2, [r1, #0]
+mov32 r2, #0x44424444
+str r2, [r1, #4]
 sleep: wfi
 b sleep
 """

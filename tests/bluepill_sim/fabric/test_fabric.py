@@ -133,6 +133,47 @@ def test_those_who_schedule_each_other_act_in_order_of_time() -> None:
     assert acted == [(name, at) for at in (10, 20, 30) for name in ("first", "second")]
 
 
+PLANS = st.lists(st.lists(st.tuples(st.integers(2, 7), st.integers(0, 2)), max_size=3), min_size=6, max_size=6)
+
+
+@QUICK
+@given(plans=PLANS, begin=st.lists(st.integers(0, 3), min_size=6, max_size=6))
+def test_events_of_one_time_act_in_rounds_by_the_numbers_of_their_slots(
+    plans: list[list[tuple[int, int]]], begin: list[int]
+) -> None:
+    """Each slot schedules others as it acts, the first time, also at that very time, before or behind itself."""
+    fabric, acted = Fabric(Chip()), list[tuple[int, int]]()
+    model, expected = dict[int, int](), list[tuple[int, int]]()
+
+    def follow(slot: int, at_ns: int, log: list[tuple[int, int]]) -> list[tuple[int, int]]:
+        log.append((at_ns, slot))
+        return (
+            [(other, at_ns + after) for other, after in plans[slot - 2]] if sum(s == slot for _, s in log) == 1 else []
+        )
+
+    def acting(slot: int) -> Any:
+        def act(at_ns: int) -> None:
+            fabric.schedule(slot, None)
+            for other, at in follow(slot, at_ns, acted):
+                fabric.schedule(other, at if other != slot else at + 1)
+
+        return act
+
+    for slot, at in enumerate(begin, 2):
+        fabric.add_slot(f"part {slot}", acting(slot))
+        fabric.schedule(slot, at)
+        model[slot] = at
+    while model:
+        now = min(model.values())
+        for slot in range(2, 8):
+            if model.get(slot) == now:
+                del model[slot]
+                for other, at in follow(slot, now, expected):
+                    model[other] = at if other != slot else at + 1
+    fabric.run_events(100)
+    assert acted == expected
+
+
 def test_an_event_that_fails_comes_out_and_the_others_stay_due() -> None:
     chip = Chip()
     fabric = Fabric(chip)

@@ -226,7 +226,7 @@ def test_reset_brings_back_every_reset_value(make_fake_chip: Callable[[], Any], 
     part.reset()
     assert part.due_ns is None
     for register in part.REGISTERS:
-        if register.name != "IDR":
+        if register.name != "IDR" and not register.name.startswith("PMA_"):  # USB's memory keeps what it has
             assert part.words[register.offset // 4] == register.reset, register.name
 
 

@@ -5,6 +5,7 @@ from typing import Any
 import pytest
 
 from bluepill_sim.fabric.pins import PinDrive, PinMode
+from bluepill_sim.peripherals.gpio import SETTLING_NS
 
 SWJ_NOJTAG, SWJ_OFF = 0b010 << 24, 0b100 << 24
 DEBUG_PINS = ("PA13", "PA14", "PA15", "PB3", "PB4")
@@ -43,12 +44,33 @@ def test_a_configuration_of_a_debug_pin_waits_for_its_release_and_is_warned_of_o
     fake_chip.write("GPIOB.CRL", 0x4444_2444)
     fake_chip.write("GPIOB.BSRR", 8)
     assert fake_chip.pins["PB3"].output is PinDrive.NONE
+    fake_chip.advance(fake_chip.now_ns + SETTLING_NS - 1)
+    assert fake_chip.warnings == {}
+    fake_chip.advance(fake_chip.now_ns + 1)
     assert fake_chip.warnings == {
         "PB3:held": "PB3 belongs to JTDO: its GPIO configuration has no effect until it is released"
     }
     fake_chip.write("AFIO.MAPR", SWJ_NOJTAG)
     assert fake_chip.pins["PB3"].output is PinDrive.HIGH
     assert fake_chip.read("GPIOB.IDR") & 8
+
+
+@pytest.mark.parametrize("nibble", range(16))
+def test_every_mode_but_analog_and_floating_input_wants_a_debug_pin(fake_chip: Any, nibble: int) -> None:
+    fake_chip.write("GPIOB.CRL", 0x4444_0444 | nibble << 12)
+    fake_chip.advance(fake_chip.now_ns + SETTLING_NS)
+    assert ("PB3:held" in fake_chip.warnings) is (nibble not in (0x0, 0x4, 0xC))
+
+
+def test_a_pin_that_is_released_after_its_configuration_is_nothing_to_warn_of(fake_chip: Any) -> None:
+    """As stm32duino's pinMode does it; another one configured is no alarm once it is given up."""
+    fake_chip.write("GPIOB.CRL", 0x4441_1444)
+    fake_chip.write("GPIOB.CRL", 0x4440_1444)
+    fake_chip.advance(fake_chip.now_ns + SETTLING_NS - 1)
+    fake_chip.write("AFIO.MAPR", 0b001 << 24 | SWJ_NOJTAG)  # meaningless: changes nothing
+    fake_chip.write("AFIO.MAPR", SWJ_NOJTAG)
+    fake_chip.advance(fake_chip.now_ns + SETTLING_NS)
+    assert not [key for key in fake_chip.warnings if key.endswith(":held")]
 
 
 def test_the_inputs_of_the_debug_port_read_as_pulled_and_its_output_not_until_released(fake_chip: Any) -> None:

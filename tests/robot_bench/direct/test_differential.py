@@ -14,7 +14,7 @@ from p2os.pioneer.world import load_world
 from p2os.pioneer.world.model import Obstacle, Pose
 from robot_bench.bench import make_own_harness
 from robot_bench.direct.differential.analog import GP2Y0A21, Cell, volts_at
-from robot_bench.direct.differential.description import Differential
+from robot_bench.direct.differential.description import Differential, Off
 from robot_bench.direct.differential.robot import DifferentialRobot
 from robot_bench.wires.nets import Harness, Strength, WaveDrive
 from tests.robot_bench.direct.robots import rover
@@ -185,6 +185,70 @@ def test_the_physical_body_follows_the_motors_too() -> None:
     rig.robot.advance_to(1000 * MS)
     assert rig.body.state.left_speed_mps == pytest.approx(0.4587, rel=0.05)
     assert rig.body.state.x_m == pytest.approx(0.44, abs=0.05)
+
+
+#: Each body, with what it needs.
+BODIES = [
+    pytest.param("kinematic"), pytest.param("bullet", marks=pytest.mark.bullet),
+    pytest.param("mujoco", marks=pytest.mark.mujoco),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize("body", BODIES)
+def test_a_blocked_wheel_stands_and_draws_the_current_of_a_stalled_motor(body: str) -> None:
+    """A duty of 0.12 makes 0.18 Nm less friction: no wheel slips, and it is 12.6 V * 0.12 over 2.9 ohm."""
+    rig = Rig(body=body)
+    rig.body.place(Obstacle(name="wall", x_m=0.25, y_m=0.0, length_m=0.1, width_m=2.0, height_m=0.3))
+    for side in ("left", "right"):
+        rig.drive(side, 0.12)
+    rig.robot.advance_to(400 * MS)
+    rolling_a = max(rig.robot.currents_a)
+    rig.robot.advance_to(2000 * MS)
+    for side in ("left", "right"):
+        rig.counts(side, 2000 * MS)
+    rig.robot.advance_to(3000 * MS)
+    assert 0 < rolling_a < 0.15, "friction alone"
+    # A sphere of bullet's creeps by a millimetre or two a second; free, it would make thousands of edges.
+    assert [rig.counts(side, 3000 * MS) < 25 for side in ("left", "right")] == [True, True]
+    assert rig.robot.currents_a == pytest.approx((0.52, 0.52), rel=0.03)
+    assert rig.body.state.stalled_left
+
+
+@pytest.mark.parametrize("body", BODIES)
+def test_a_bridge_that_is_off_lets_the_robot_roll_or_brakes_it(body: str) -> None:
+    """The brake's time constant is (J + m r^2 / 2) R / (K N)^2, 20 ms; friction alone takes off 1.1 m/s^2."""
+    ends = {}
+    for off in Off:
+        rig = Rig(replace(rover(), bridge=replace(rover().bridge, off=off)), body=body)
+        for side in ("left", "right"):
+            rig.drive(side, 0.4)
+        rig.robot.advance_to(500 * MS)
+        before = rig.body.state.left_speed_mps
+        for side in ("left", "right"):
+            rig.drive(side, 0.0, 500 * MS)
+        rig.robot.advance_to(505 * MS)
+        assert (rig.robot.currents_a == (0.0, 0.0)) is (off is Off.COAST)
+        rig.robot.advance_to(550 * MS)
+        ends[off] = rig.body.state.left_speed_mps / before
+    assert ends[Off.BRAKE] < 0.15
+    assert ends[Off.COAST] > 0.8
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("body", BODIES[1:])
+def test_a_slope_loads_the_motors_of_a_physical_robot(body: str) -> None:
+    """Weight along the slope, times the wheel's radius, over two motors of K N each."""
+    rig, current_a = Rig(body=body, world="ramp"), {}
+    for side in ("left", "right"):
+        rig.drive(side, 0.3)
+    for until_ms in (2000, 12_000):
+        rig.robot.advance_to(until_ms * MS)
+        current_a[until_ms] = rig.robot.currents_a[0]
+    motor, parameters, pitch = rover().motor, rover().body, abs(rig.body.state.pitch_rad)
+    assert pitch == pytest.approx(math.atan(0.18 / 3.0), rel=0.02)
+    weight_nm = parameters.mass_kg * 9.81 * math.sin(pitch) * parameters.wheel_diameter_m / 2
+    load_a = weight_nm / (2 * motor.torque_constant * motor.gear_ratio)
+    assert current_a[12_000] - current_a[2000] == pytest.approx(load_a, rel=0.1)
 
 
 def test_a_wheel_of_few_edges_and_one_on_the_wheel_itself_have_theirs() -> None:

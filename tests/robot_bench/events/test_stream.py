@@ -70,6 +70,12 @@ def test_an_event_comes_back_from_its_line(event: Event) -> None:
     assert list(events_of([line_of(event) + "\n"])) == [event]
 
 
+@given(st.one_of(*SAMPLES.values()))
+def test_a_line_is_what_the_encoder_of_json_makes_of_it(event: Event) -> None:
+    line = line_of(event)
+    assert line == json.dumps(json.loads(line), sort_keys=True, separators=(",", ":"))
+
+
 def test_every_kind_of_event_is_tried_here() -> None:
     assert set(SAMPLES) == set(KINDS)
 

@@ -1,11 +1,14 @@
 """The recorder tells every wire's level at time 0 and each change of it once, whatever the order of telling."""
 
+from itertools import pairwise
+
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from p2os.errors import LocalProtocolError
-from robot_bench.recording.recorder import Recorder
+from robot_bench.events.kinds import Text
+from robot_bench.recording.recorder import LONGEST_TEXT, Recorder
 from robot_bench.recording.run_record import record_of
 from robot_bench.recording.trace import TraceWriter
 from robot_bench.wires.nets import Harness, Net, Strength
@@ -90,3 +93,26 @@ def test_a_drive_at_an_instant_whose_edges_were_told_is_a_bug_and_not_lost() -> 
         net.drive("sensor", True, Strength.PUSH_PULL, 5)
     net.drive("sensor", True, Strength.PUSH_PULL, 6)
     assert net.edges_until(6) == [(6, True)]
+
+
+WORDS = st.lists(st.sampled_from([10, 65, 66, 0x10A, 0x1FF]), max_size=200)
+
+
+@given(words=WORDS, cuts=st.lists(st.integers(0, 200), max_size=6))
+@settings(max_examples=60, deadline=None)
+def test_characters_in_any_portions_make_the_lines_that_they_make_one_by_one(words: list[int], cuts: list[int]) -> None:
+    rows = [(word, 100 + 7 * n) for n, word in enumerate(words)]
+    texts: list[Text] = []
+    recorder = Recorder(TraceWriter(), Harness([]), body=None)
+    recorder.events.subscribe(texts.append, Text)
+    for first, last in pairwise([0, *sorted(cuts), len(rows)]):
+        recorder.usart(rows[first:last])
+    recorder.events.release(10**6)
+    expected, line = [], bytearray()
+    for word, at in rows:
+        line.append(word & 0xFF)
+        if word == 10 or len(line) == LONGEST_TEXT:
+            expected.append(Text(t=at, data=bytes(line)))
+            line.clear()
+    assert texts == expected
+    assert recorder.unfinished_text == line

@@ -1,7 +1,7 @@
 /* Asleep between SysTicks, while circular DMA takes what ADC1 converts: one channel without a pause, at 857 kS/s with
  * 72 MHz or 1 MS/s with 56 MHz (BENCH_56_MHZ); or eight channels each 10 kHz (BENCH_EIGHT), started by SysTick. */
-#include "../../robot_bench/firmware/f103_analog.h"
-#include "clock.h"
+#include "board.h"
+#include "f103_analog.h"
 
 #define ROUNDS 64u
 #ifdef BENCH_EIGHT
@@ -57,7 +57,7 @@ int main(void)
     SYSTICK->LOAD = 56000000u / TICK_HZ - 1u;
 #else
     RCC->CFGR |= RCC_CFGR_ADCPRE_DIV6;
-    SYSTICK->LOAD = BENCH_HCLK_HZ / TICK_HZ - 1u;
+    SYSTICK->LOAD = HCLK_HZ / TICK_HZ - 1u;
 #endif
     adc_start();
     SYSTICK->VAL = 0;

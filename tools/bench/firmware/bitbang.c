@@ -1,5 +1,6 @@
 /* Reads a port once and writes another one three times, as fast as it can: the bit-banger's loop. */
-#include "clock.h"
+#include "board.h"
+#include "f103.h"
 
 volatile uint32_t bench_rounds;
 

@@ -6,7 +6,7 @@ from pathlib import Path
 HERE = Path(__file__).resolve().parent
 RUNTIME = HERE.parents[2] / "robot_bench" / "firmware"
 COMPILER = "arm-none-eabi-gcc"
-FLAGS = ("-mcpu=cortex-m3", "-mthumb", "-O2", "-ffreestanding", "-nostdlib")
+FLAGS = ("-mcpu=cortex-m3", "-mthumb", "-O2", "-ffreestanding", "-nostdlib", "-ffunction-sections", "-Wl,--gc-sections")
 
 
 def build(source: Path, output: Path, *options: str, runtime: Path = RUNTIME) -> Path:
@@ -16,7 +16,7 @@ def build(source: Path, output: Path, *options: str, runtime: Path = RUNTIME) ->
         subprocess.CalledProcessError: the compiler refused; its words are on stderr.
         FileNotFoundError: there is no compiler.
     """
-    sources = [source, runtime / "startup.c", runtime / "memory.c"]
+    sources = [source, *(runtime / name for name in ("startup.c", "memory.c", "board.c"))]  # of board.c the clock
     linked = [f"-I{runtime}", f"-T{runtime / 'f103c8.ld'}", *map(str, sources), "-lgcc", "-o", str(output)]
     subprocess.run([COMPILER, *FLAGS, *options, *linked], check=True)
     return output

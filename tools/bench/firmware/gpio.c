@@ -1,5 +1,6 @@
 /* Reads an input and writes it to an output, as fast as it can. */
-#include "clock.h"
+#include "board.h"
+#include "f103.h"
 
 volatile uint32_t bench_rounds;
 

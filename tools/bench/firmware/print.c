@@ -1,5 +1,6 @@
 /* Computes at 72 MHz, and streams characters at 115200 baud, one an interrupt, unless the USART is left off. */
-#include "clock.h"
+#include "board.h"
+#include "f103.h"
 
 /* Read at run time: both programs have the same instructions at the same addresses, which decide what a round costs. */
 #ifdef BENCH_NO_USART
@@ -24,7 +25,7 @@ int main(void)
     if (is_on) {
         RCC->APB2ENR |= RCC_APB2ENR_USART1EN | RCC_APB2ENR_IOPAEN;
         GPIOA->CRH = (GPIOA->CRH & ~0xF0u) | GPIO_ALTERNATE_PUSH_PULL_2MHZ << 4;
-        USART1->BRR = BENCH_HCLK_HZ / 115200u;
+        USART1->BRR = HCLK_HZ / 115200u;
         NVIC_ISER[USART1_IRQ / 32u] = 1u << USART1_IRQ % 32u;
         USART1->CR1 = USART_CR1_UE | USART_CR1_TE | USART_CR1_TXEIE;
     }

@@ -1,5 +1,5 @@
 /* Toggles PB8, where the bench has no wire, as fast as it can at 8 MHz; or sleeps for ever. */
-#include "../../robot_bench/firmware/f103.h"
+#include "f103.h"
 
 volatile uint32_t bench_rounds;
 

@@ -1,6 +1,6 @@
 /* Streams characters at 115200 baud, one an interrupt. */
-#include "../../robot_bench/firmware/f103.h"
-#include "clock.h"
+#include "board.h"
+#include "f103.h"
 
 volatile uint32_t bench_rounds;
 
@@ -18,7 +18,7 @@ int main(void)
     clock_start();
     RCC->APB2ENR |= RCC_APB2ENR_USART1EN | RCC_APB2ENR_IOPAEN;
     GPIOA->CRH = (GPIOA->CRH & ~0xF0u) | GPIO_ALTERNATE_PUSH_PULL_2MHZ << 4;
-    USART1->BRR = BENCH_HCLK_HZ / 115200u;
+    USART1->BRR = HCLK_HZ / 115200u;
     NVIC_ISER[USART1_IRQ / 32u] = 1u << USART1_IRQ % 32u;
     USART1->CR1 = USART_CR1_UE | USART_CR1_TE | USART_CR1_TXEIE;
     for (;;) {

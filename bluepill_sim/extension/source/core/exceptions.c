@@ -9,7 +9,8 @@
 #include "core.h"
 
 enum { ENTRY_CYCLES = 12, EXIT_CYCLES = 12, TAIL_CHAIN_CYCLES = 6, FRAME_BYTES = 32 };
-enum { NMI = 2, HARD_FAULT = 3, SVCALL = 11, THREAD_PRIORITY = 256 };
+enum { NMI = 2, HARD_FAULT = 3, SVCALL = 11, DEBUG_MONITOR = 12, THREAD_PRIORITY = 256 };
+enum { MON_STEP = 1 << 18 };
 enum { SLEEPONEXIT = 2, SLEEPDEEP = 4, SEVONPEND = 16, STKALIGN = 1 << 9, SPSEL = 2, NPRIV = 1 };
 enum { AWAKE, FOR_INTERRUPT, FOR_EVENT };
 
@@ -223,7 +224,8 @@ bool leave(struct core *core, uint32_t exc_return)
     const uint32_t control = value[0], cpsr = value[1], psp = value[2], msp = value[3];
     uint32_t *frame = sram_at(core, exc_return == TO_THREAD_PSP ? psp : msp, FRAME_BYTES);
     const bool may_stop = to_thread && s->scr & SLEEPONEXIT && s->scr & SLEEPDEEP;
-    if (frame == NULL || value[4] || may_stop || !has_vectors(core)) {
+    const bool steps = number == DEBUG_MONITOR && s->demcr & MON_STEP;
+    if (frame == NULL || value[4] || may_stop || steps || !has_vectors(core)) {
         return false;
     }
     const uint32_t xpsr = frame[7];

@@ -11,6 +11,8 @@
 enum { HARD_FAULT = 3 };
 #define MEMFAULTENA (1u << 16)
 #define FORCED (1u << 30)
+#define MON_EN (1u << 16)
+#define DFSR_BKPT 2
 /* Kinds of accesses (unicorn.h). */
 enum { WRITE_UNMAPPED = 20, FETCH_UNMAPPED = 21, WRITE_PROTECTED = 22, FETCH_PROTECTED = 24 };
 
@@ -67,7 +69,7 @@ bool take_fault(struct core *core, uint32_t kind)
 {
     struct shared *s = &core->shared;
     const struct fault_row *row = &core->faults[kind];
-    if (!row->exception || (kind == HALT_BKPT && s->has_debugger) || (kind == HALT_SUPERVISOR_CALL && !s->knows_masked_svc)) {
+    if (!row->exception || (kind == HALT_BKPT && (s->has_debugger || s->demcr & MON_EN)) || (kind == HALT_SUPERVISOR_CALL && !s->knows_masked_svc)) {
         return false;
     }
     uint32_t number = row->exception, forced = 0;
@@ -87,6 +89,7 @@ bool take_fault(struct core *core, uint32_t kind)
     if (!enter(core, number, s->halt_pc)) {
         return false;
     }
+    s->dfsr |= kind == HALT_BKPT ? DFSR_BKPT : 0;
     s->cfsr |= row->cfsr;
     s->hfsr |= row->hfsr | forced;
     if (s->halt_has_address && (kind == HALT_READ_ERROR || kind == HALT_WRITE_ERROR)) {

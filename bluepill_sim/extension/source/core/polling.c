@@ -28,12 +28,23 @@ static void read_all(struct core *core, uint32_t registers[16])
     core->api.read_registers(core->unicorn, numbers, at, 16);
 }
 
+/* Looks the later again, the more often it was in vain. */
+static void give_up(struct core *core)
+{
+    struct waiting *waiting = &core->waiting;
+    waiting->phase = NOT_LOOKING;
+    waiting->interval = waiting->interval < MOST_INTERVAL ? 2 * waiting->interval : MOST_INTERVAL;
+    waiting->next = core->shared.cycle + waiting->interval;
+}
+
 /* Has the run that begins look for a loop that waits, when it is time to. */
 void look_later(struct core *core)
 {
     struct waiting *waiting = &core->waiting;
     struct shared *s = &core->shared;
-    waiting->phase = NOT_LOOKING;
+    if (waiting->phase != NOT_LOOKING) {
+        give_up(core); /* an event came first: where events come so often, there is no time to let pass */
+    }
     if (waiting->next < s->cycle + LEAST_INTERVAL) {
         waiting->next = s->cycle + LEAST_INTERVAL;
     }
@@ -99,9 +110,7 @@ bool looks_for_waiting(struct core *core, uint32_t address)
         waiting->address = address;
         read_all(core, waiting->registers);
     } else if (waiting->has_acted || waiting->blocks == MOST_BLOCKS || (is_round && !is_same_round(core))) {
-        waiting->phase = NOT_LOOKING;
-        waiting->interval = waiting->interval < MOST_INTERVAL ? 2 * waiting->interval : MOST_INTERVAL;
-        waiting->next = s->cycle + waiting->interval;
+        give_up(core);
         s->stop_at = waiting->next < stop ? waiting->next : stop;
         return true;
     } else if (!is_round) {

@@ -240,20 +240,14 @@ uint64_t core_next_event(const struct core *core)
 bool goes_on(struct core *core, uint32_t address)
 {
     struct shared *s = &core->shared;
-    const struct fabric *fabric = core->fabric;
+    struct fabric *fabric = core->fabric;
     if (!s->stop_at || s->attention || s->cycle >= core->limit || s->cycle >= s->tick_next ||
-        s->cycle < fabric->next_cycle || core->is_scratch) {
+        s->cycle < fabric->next_cycle || core->is_scratch || waits_for_python(fabric, s->cycle)) {
         return false;
-    }
-    for (uint32_t n = 0; n < fabric->slot_count; ++n) {
-        const struct slot *slot = &fabric->slots[n];
-        if (slot->cycle <= s->cycle && (slot->device == NULL || slot->device->kind->event == NULL)) {
-            return false;
-        }
     }
     core->block = &core->none;
     s->pc = address;
-    run_events(core->fabric, ns_of(core->fabric, s->cycle));
+    run_due(fabric, s->cycle);
     const uint64_t event = core_next_event(core), stop = event < core->limit ? event : core->limit;
     if (!s->stop_at || s->attention || s->halt_kind != HALT_NONE || s->cycle >= stop) {
         return false;
@@ -274,7 +268,7 @@ static uint32_t run(struct core *core, uint64_t limit)
             pend(core, SYSTICK);
         }
         if (s->cycle >= core->fabric->next_cycle) {
-            run_events(core->fabric, ns_of(core->fabric, s->cycle));
+            run_due(core->fabric, s->cycle);
         }
         if (s->attention || s->cycle >= limit) {
             return HALT_BOUNDARY;

@@ -1,8 +1,9 @@
-/* The private peripheral bus: SCB, NVIC, SysTick, DWT, DEMCR, DBGMCU: what is read there, and what a store does.
+/* The private peripheral bus: SCB, NVIC, SysTick, DWT, FPB, ITM, TPIU, DEMCR, DBGMCU: what is read there, what a store does.
  *
  * Registers that store stand in one table; the others are below it. Whoever makes an access has brought SysTick to its
  * time and acts on the answer: bluepill_sim/core/system_control.py, and access.c where the native core runs.
- * Source: ARMv7-M Architecture Reference Manual B3.2 to B3.4 and C1; PM0056 chapter 4; RM0008 31.6 for DBGMCU.
+ * Source: ARMv7-M Architecture Reference Manual B3.2 to B3.4 and C1; PM0056 chapter 4; RM0008 31.6 for DBGMCU, 31.17 for
+ * TPIU.
  */
 #include <stddef.h>
 #include <string.h>
@@ -22,6 +23,17 @@ enum {
     SCB_ICSR = 0xE000ED04, SCB_AIRCR = 0xE000ED0C, SCB_CCR = 0xE000ED14, SCB_SHPR1 = 0xE000ED18, SCB_SHPR3 = 0xE000ED20,
     SCB_SHCSR = 0xE000ED24, SCB_CFSR = 0xE000ED28, SCB_HFSR = 0xE000ED2C, DEMCR = 0xE000EDFC, STIR = 0xE000EF00
 };
+/* What a debugger has on the chip, and firmware as well. */
+enum {
+    ITM_STIM = 0xE0000000, ITM_STIM_END = 0xE0000080, ITM_LAR = 0xE0000FB0, ITM_LSR = 0xE0000FB4, ITM_END = 0xE0001000,
+    DWT_FUNCTION0 = 0xE0001028, DWT_END = 0xE0002000, FP_CTRL = 0xE0002000, FP_REMAP = 0xE0002004, FPB_END = 0xE0003000,
+    TPIU = 0xE0040000, TPIU_END = 0xE0041000
+};
+#define ITM_KEY 0xC5ACCE55u
+enum { ITMENA = 1, FP_KEY = 2, FP_ENABLE = 1, FP_NUMBERS = 2 << 8 | 6 << 4, FP_IN_SRAM = 1 << 29 };
+#define MATCHED (1u << 24)
+#define MON_PEND (1u << 17)
+enum { DEBUG_MONITOR = 12 };
 /* The arrays of the NVIC's words of lines, 128 bytes each; each has 8 words, of which the chip has 2. */
 enum { ENABLE, DISABLE, PEND, UNPEND, ACTIVE, LINE_ARRAYS };
 
@@ -51,31 +63,83 @@ struct storing {
 
 static const struct storing storing[] = {
     {0xE000E004, 1, 0, 0, 0, 1},                         /* ICTR: 33 to 64 lines */
-    {0xE000E008, 0, 0, 0, 0, 0},                         /* ACTLR */
+    {0xE000E008, 0, 7, 0, AT(actlr), 0},                 /* ACTLR: DISFOLD, DISDEFWBUF, DISMCYCINT */
     {0xE000ED00, 0x411FC231, 0, 0, 0, 1},                /* CPUID: Cortex-M3 r1p1 (PM0056 4.4.1) */
     {0xE000ED08, 0, 0x3FFFFF80, 0, AT(vector_table), 0}, /* VTOR (PM0056 4.4.4) */
     {0xE000ED10, 0, 0x16, 0, AT(scr), 0},
     {SCB_CCR, 0, 0x31B, 0, AT(ccr), 0},
     {SCB_CFSR, 0, 0, WORD, AT(cfsr), 0},
     {SCB_HFSR, 0, 0, WORD, AT(hfsr), 0},
-    {0xE000ED30, 0, 0, 0, 0, 0}, /* DFSR */
+    {0xE000ED30, 0, 0, WORD, AT(dfsr), 0},
     {0xE000ED34, 0, WORD, 0, AT(mmfar), 0},
     {0xE000ED38, 0, WORD, 0, AT(bfar), 0},
-    {0xE000ED90, 0, 0, 0, 0, 1}, /* MPU_TYPE: none */
+    {0xE000ED3C, 0, 0, 0, 0, 1}, /* AFSR */
+    {0xE000ED90, 0, 0, 0, 0, 1}, /* MPU_TYPE: no regions; its other registers ignore writes */
+    {0xE000ED94, 0, 0, 0, 0, 1},
+    {0xE000ED98, 0, 0, 0, 0, 1},
+    {0xE000ED9C, 0, 0, 0, 0, 1},
+    {0xE000EDA0, 0, 0, 0, 0, 1},
+    {0xE000EDA4, 0, 0, 0, 0, 1},
+    {0xE000EDA8, 0, 0, 0, 0, 1},
+    {0xE000EDAC, 0, 0, 0, 0, 1},
+    {0xE000EDB0, 0, 0, 0, 0, 1},
+    {0xE000EDB4, 0, 0, 0, 0, 1},
+    {0xE000EDB8, 0, 0, 0, 0, 1},
     {0xE000EDF0, 0, 0, 0, 0, 1}, /* DHCSR: no debugger */
-    {DEMCR, 0, WORD, 0, AT(demcr), 0},
+    {DEMCR, 0, 0x010D07F1, 0, AT(demcr), 0},
     {0xE0042000, 0x20036410, 0, 0, 0, 1}, /* DBGMCU_IDCODE: medium density, revision "X" (RM0008 31.6.1) */
     {0xE0042004, 0, WORD, 0, AT(dbgmcu_cr), 0},
 };
 
-static const struct storing *storing_at(uint32_t address)
+/* Those of ITM, DWT, FPB and TPIU. Chosen: the counters but CYCCNT only store. */
+#define COUNT(n) {0xE0001008 + 4 * (n), 0, 0xFF, 0, AT(dwt_counts) + 4 * (n), 0}
+#define COMPARATOR(n)                                                                                                  \
+    {0xE0001020 + 16 * (n), 0, WORD, 0, AT(dwt_comp) + 4 * (n), 0},                                                    \
+        {0xE0001024 + 16 * (n), 0, 0x1F, 0, AT(dwt_mask) + 4 * (n), 0},                                                \
+    {                                                                                                                  \
+        0xE0001028 + 16 * (n), 0, (n) == 0 ? 0xFFDAF : (n) == 1 ? 0xFFD2F : 0x2F, 0, AT(dwt_function) + 4 * (n), 0     \
+    }
+#define PATCH(n) {0xE0002008 + 4 * (n), 0, (n) < 6 ? 0xDFFFFFFD : 0x1FFFFFFD, 0, AT(fp_comp) + 4 * (n), 0}
+
+static const struct storing of_debug[] = {
+    {0xE0000E00, 0, WORD, 0, AT(itm_enables), 0}, /* TER */
+    {0xE0000E40, 0, 0xF, 0, AT(itm_privileges), 0}, /* TPR */
+    {0xE0000E80, 0, 0x7F031F, 0, AT(itm_control), 0}, /* TCR */
+    COUNT(0), COUNT(1), COUNT(2), COUNT(3), COUNT(4),
+    {0xE000101C, 0, 0, 0, 0, 1}, /* PCSR: a debugger's */
+    COMPARATOR(0), COMPARATOR(1), COMPARATOR(2), COMPARATOR(3),
+    PATCH(0), PATCH(1), PATCH(2), PATCH(3), PATCH(4), PATCH(5), PATCH(6), PATCH(7),
+    {0xE0040000, 0xB, 0, 0, 0, 1},                  /* SSPSR: 1, 2 or 4 pins */
+    {0xE0040004, 0, 0xF, 0, AT(tpiu_size), 0},      /* CSPSR */
+    {0xE0040010, 0, 0x1FFF, 0, AT(tpiu_prescaler), 0}, /* ACPR */
+    {0xE00400F0, 0, 3, 0, AT(tpiu_protocol), 0},    /* SPPR */
+    {0xE0040300, 8, 0, 0, 0, 1},                    /* FFSR: the formatter cannot be stopped */
+    {0xE0040304, 0x100, 2, 0, AT(tpiu_formatter), 0}, /* FFCR */
+    {0xE0040FC8, 0xCA1, 0, 0, 0, 1},                /* DEVID */
+};
+
+static const struct storing *found_in(const struct storing *rows, size_t count, uint32_t address)
 {
-    for (size_t n = 0; n < sizeof storing / sizeof *storing; ++n) {
-        if (storing[n].address == address) {
-            return &storing[n];
+    for (size_t n = 0; n < count; ++n) {
+        if (rows[n].address == address) {
+            return &rows[n];
         }
     }
     return NULL;
+}
+
+static bool is_trace(uint32_t address) { return address < ITM_END || address - TPIU < TPIU_END - TPIU; }
+
+static bool is_stimulus(uint32_t address) { return address < ITM_STIM_END; }
+
+/* What changes which instructions and accesses are looked out for. */
+static bool is_look_out(uint32_t address) { return address - 0xE0001020u < FPB_END - 0xE0001020u || address == DEMCR; }
+
+static const struct storing *storing_at(uint32_t address)
+{
+    return address < FPB_END || address - TPIU < TPIU_END - TPIU
+               ? found_in(of_debug, sizeof of_debug / sizeof *of_debug, address)
+               : found_in(storing, sizeof storing / sizeof *storing, address);
 }
 
 static uint32_t *field_of(struct shared *s, const struct storing *row)
@@ -87,7 +151,7 @@ static uint32_t *field_of(struct shared *s, const struct storing *row)
 struct state_bit {
     uint8_t number, bit;
 };
-static const struct state_bit active_bits[] = {{4, 0}, {5, 1}, {6, 3}, {11, 7}, {12, 8}, {14, 10}, {15, 11}};
+static const struct state_bit active_bits[] = {{4, 0}, {5, 1}, {6, 3}, {11, 7}, {DEBUG_MONITOR, 8}, {14, 10}, {15, 11}};
 static const struct state_bit pending_bits[] = {{6, 12}, {4, 13}, {5, 14}, {11, 15}};
 #define SHCSR_ENABLES (7u << 16)
 
@@ -205,7 +269,8 @@ bool system_needs_time(uint32_t address)
 
 bool system_has(uint32_t address)
 {
-    return storing_at(address) != NULL || address == DWT_CTRL || address == DWT_CYCCNT ||
+    return is_stimulus(address) || address == ITM_LAR || address == ITM_LSR || address == FP_CTRL || address == FP_REMAP ||
+           storing_at(address) != NULL || address == DWT_CTRL || address == DWT_CYCCNT ||
            address - STK_CTRL <= STK_CALIB - STK_CTRL || is_line_array(address) || priorities_at(address) ||
            is_beyond_priorities(address) || address == SCB_ICSR || address == SCB_AIRCR || address == SCB_SHCSR;
 }
@@ -229,8 +294,19 @@ uint32_t system_read(struct shared *s, uint32_t address, uint64_t now, uint32_t 
         memcpy(word, &s->priorities[first], sizeof *word);
         return answer;
     }
+    if (is_trace(address) && !(s->demcr & TRCENA)) {
+        return answer;
+    }
+    if (is_stimulus(address)) { /* chosen: there is always room for the next one */
+        *word = s->itm_control & ITMENA && s->itm_enables >> ((address - ITM_STIM) >> 2) & 1;
+        return answer;
+    }
     switch (address) {
-    case DWT_CTRL: *word = DWT_CTRL_FIXED | (s->cyccnt.runs ? CYCCNTENA : 0); return answer;
+    case ITM_LAR: return answer;
+    case ITM_LSR: *word = s->itm_is_open ? 1 : 3; return answer;
+    case FP_CTRL: *word = FP_NUMBERS | s->fp_control; return answer;
+    case FP_REMAP: *word = FP_IN_SRAM | s->fp_remap; return answer;
+    case DWT_CTRL: *word = DWT_CTRL_FIXED | s->dwt_control | (s->cyccnt.runs ? CYCCNTENA : 0); return answer;
     case DWT_CYCCNT: *word = ramp_at(&s->cyccnt, now); return answer;
     case SCB_ICSR: *word = read_icsr(s); return answer;
     case SCB_AIRCR: *word = VECTKEY_READ | s->grouping << 8; return answer;
@@ -241,7 +317,12 @@ uint32_t system_read(struct shared *s, uint32_t address, uint64_t now, uint32_t 
     if (row == NULL) {
         return is_beyond_priorities(address) ? answer : 0;
     }
-    *word = row->field ? *field_of(s, row) : row->fixed;
+    *word = row->fixed | (row->field ? *field_of(s, row) : 0);
+    if (address == DEMCR) {
+        *word |= s->pending[0] & bit_of(DEBUG_MONITOR) ? MON_PEND : 0;
+    } else if (address - DWT_FUNCTION0 < DWT_END - DWT_FUNCTION0 && row->field >= AT(dwt_function)) {
+        *field_of(s, row) &= ~MATCHED;
+    }
     return answer;
 }
 
@@ -249,7 +330,7 @@ uint32_t system_read(struct shared *s, uint32_t address, uint64_t now, uint32_t 
 static bool takes_ones(uint32_t address)
 {
     return (is_line_array(address) && (address & 0x1F) < 8) || address == SCB_ICSR || address == SCB_CFSR ||
-           address == SCB_HFSR;
+           address == SCB_HFSR || address == 0xE000ED30 || is_stimulus(address);
 }
 
 /* Takes a store of the bytes in `mask`. */
@@ -283,8 +364,24 @@ uint32_t system_write(struct shared *s, uint32_t address, uint32_t value, uint32
         memcpy(&s->priorities[first], &value, sizeof value);
         return answer;
     }
+    if (is_trace(address) && (!(s->demcr & TRCENA) || (!is_stimulus(address) && address < ITM_LAR && !s->itm_is_open))) {
+        return SYSTEM_KNOWN;
+    }
+    if (is_stimulus(address)) {
+        const uint32_t port = (address - ITM_STIM) >> 2;
+        return s->itm_control & ITMENA && s->itm_enables >> port & 1 ? SYSTEM_KNOWN | SYSTEM_STIMULUS : SYSTEM_KNOWN;
+    }
+    if (is_look_out(address) || (s->dwt_function[0] && (address == DWT_CTRL || address == DWT_CYCCNT))) {
+        answer |= SYSTEM_LOOK_OUT;
+    }
     switch (address) {
-    case DWT_CTRL: set_counting(s, value & CYCCNTENA && s->demcr & TRCENA, now); return answer;
+    case ITM_LAR: s->itm_is_open = value == ITM_KEY; return answer;
+    case FP_CTRL: s->fp_control = value & FP_KEY ? value & FP_ENABLE : s->fp_control; return answer;
+    case FP_REMAP: s->fp_remap = value & 0x1FFFFFE0; return answer;
+    case DWT_CTRL:
+        s->dwt_control = value & 0x7F1FFE;
+        set_counting(s, value & CYCCNTENA && s->demcr & TRCENA, now);
+        return answer;
     case DWT_CYCCNT:
         s->cyccnt.value = value;
         s->cyccnt.base = now;
@@ -310,8 +407,11 @@ uint32_t system_write(struct shared *s, uint32_t address, uint32_t value, uint32
         uint32_t *field = field_of(s, row);
         *field = row->clears ? *field & ~(value & row->clears) : value & row->takes;
     }
-    if (address == DEMCR && !(value & TRCENA)) {
-        set_counting(s, false, now);
+    if (address == DEMCR) { /* MON_PEND is the pending state itself */
+        s->pending[0] = value & MON_PEND ? s->pending[0] | bit_of(DEBUG_MONITOR) : s->pending[0] & ~bit_of(DEBUG_MONITOR);
+        if (!(value & TRCENA)) {
+            set_counting(s, false, now);
+        }
     }
     return answer | (address == SCB_CCR ? SYSTEM_TRAPS : 0);
 }
@@ -321,10 +421,25 @@ void system_init(struct shared *s)
     s->last_sleep_cycle = s->tick_next = s->raised_cycle = NO_TIME;
     s->tick = (struct ramp){.divider = 1, .falls = 1};
     s->cyccnt = (struct ramp){.divider = 1, .top = WORD};
+    system_power_up(s);
+}
+
+void system_power_up(struct shared *s)
+{
+    s->demcr = s->dbgmcu_cr = s->dfsr = s->dwt_control = s->fp_control = s->fp_remap = 0;
+    s->itm_enables = s->itm_privileges = s->itm_control = s->itm_is_open = s->tpiu_prescaler = 0;
+    s->tpiu_size = s->tpiu_protocol = 1;
+    s->tpiu_formatter = 2;
+    memset(s->dwt_counts, 0, sizeof s->dwt_counts);
+    memset(s->dwt_comp, 0, sizeof s->dwt_comp);
+    memset(s->dwt_mask, 0, sizeof s->dwt_mask);
+    memset(s->dwt_function, 0, sizeof s->dwt_function);
+    memset(s->fp_comp, 0, sizeof s->fp_comp);
 }
 
 void system_reset(struct shared *s)
 {
+    s->actlr = 0;
     s->tick_control = s->tick_count_flag = 0;
     s->tick_next = NO_TIME;
     s->tick = (struct ramp){.divider = 1, .falls = 1};

@@ -14,7 +14,9 @@ enum system_answer {
     SYSTEM_TICKED = 4,   /* SysTick has come to 0 before, and makes its exception pending */
     SYSTEM_RESET = 8,    /* SYSRESETREQ */
     SYSTEM_DEBUGGER = 16, /* bits of a debugger's */
-    SYSTEM_TRAPS = 32    /* CCR: what traps may be another */
+    SYSTEM_TRAPS = 32,   /* CCR: what traps may be another */
+    SYSTEM_STIMULUS = 64, /* a word for the trace */
+    SYSTEM_LOOK_OUT = 128 /* what comparators look out for may be another */
 };
 
 #pragma GCC visibility push(hidden)
@@ -27,7 +29,9 @@ unsigned first_pending(const struct shared *s);
 /* systick.c, scs.c: for Python as well. */
 /* What is not 0 before the first reset, of both cores. */
 void system_init(struct shared *s);
-/* After a reset; DEMCR and DBGMCU belong to the debugger and stay. */
+/* After a power cut: what belongs to the debugger, too. */
+void system_power_up(struct shared *s);
+/* After a reset; DEMCR, DBGMCU, DWT, FPB, ITM and TPIU belong to the debugger and stay. */
 void system_reset(struct shared *s);
 bool systick_advance(struct shared *s, uint64_t now);
 uint32_t systick_read(struct shared *s, uint32_t word, uint64_t now);

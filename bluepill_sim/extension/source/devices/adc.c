@@ -562,34 +562,37 @@ static void write(struct device *device, uint32_t index, uint32_t written, uint3
     }
 }
 
+/* The one whose conversions this one's DR holds too, in its upper half; NULL where there is none. */
+static struct device *second_of(const struct device *device, uint32_t index)
+{
+    return index == DR && is_master(device) && dual_mode(device) ? other_of(device) : NULL;
+}
+
 /* What a read finds, without what it causes. */
 static uint32_t look(struct device *device, uint32_t index)
 {
     if (is_unseen(device)) {
         settle(device, now_ns(device->fabric));
     }
-    const struct device *other = index == DR && is_master(device) && dual_mode(device) ? other_of(device) : NULL;
-    return device->words[index] | (other == NULL ? 0 : other->words[DR] << 16);
+    const struct device *second = second_of(device, index);
+    return device->words[index] | (second == NULL ? 0 : second->words[DR] << 16);
 }
 
 static uint32_t read(struct device *device, uint32_t index)
 {
-    if (index != DR) {
-        return look(device, index);
+    struct device *second = second_of(device, index);
+    if (second != NULL) { /* whose conversion may have ended in this very nanosecond */
+        settle(second, now_ns(device->fabric));
+        reschedule(second);
     }
-    if (is_unseen(device)) {
-        settle(device, now_ns(device->fabric));
+    const uint32_t found = look(device, index);
+    if (index == DR) {
+        device->words[SR] &= ~(uint32_t)EOC;
+        update_irq(device);
+        output_set(device, DMA_REQUEST, false);
+        reschedule(device);
     }
-    struct device *other = is_master(device) && dual_mode(device) ? other_of(device) : NULL;
-    if (other != NULL) { /* whose conversion may have ended in this very nanosecond */
-        settle(other, now_ns(device->fabric));
-        reschedule(other);
-    }
-    device->words[SR] &= ~(uint32_t)EOC;
-    update_irq(device);
-    output_set(device, DMA_REQUEST, false);
-    reschedule(device);
-    return look(device, DR);
+    return found;
 }
 
 static bool needs_time(const struct device *device, uint32_t index, bool is_write)

@@ -34,8 +34,11 @@ enum { SCL, SDA, SMBA, I2C_PINS };
 enum { ADDRESS, WRITE, READ, END, NEXT_STEP, NO_PINS, SEQUENCE };
 /* What a master outside does: `far` holds one of these times 2 * HELD, above a byte or, for FAR_READ, its acknowledge. */
 enum { FAR_NOTHING, FAR_START, FAR_WRITE, FAR_READ, FAR_STOP, FAR_AT = 9 };
-/* Commands of its own: move to pins; a master outside has something to do; arbitration is lost or the bus disturbed. */
-enum { MOVE = OWN_COMMANDS, CALL, DISTURB, LISTEN };
+/* Of `is_stopped`. */
+enum { CLOCK_STOPPED = 1, TIMEOUT_STOPPED = 2 };
+/* Commands of its own: move to pins; a master outside has something to do; arbitration is lost or the bus disturbed; listen
+ * again; DBGMCU_CR's freeze of the timeout, and its end after `one` + 2^32 * `other` ns. */
+enum { MOVE = OWN_COMMANDS, CALL, DISTURB, LISTEN, HOLD_TIMEOUT, GO_ON_TIMEOUT };
 /* Its outputs. */
 enum { EVENT_IRQ, ERROR_IRQ, RX_DMA, TX_DMA };
 
@@ -105,7 +108,36 @@ static void listen(struct device *device)
 static void wait_for_events(struct device *device)
 {
     const struct i2c *i2c = device->state;
-    schedule(device, i2c->due_ns < i2c->timeout_ns ? i2c->due_ns : i2c->timeout_ns);
+    const uint64_t due = i2c->is_stopped & CLOCK_STOPPED ? NO_TIME : i2c->due_ns;
+    const uint64_t timeout = i2c->is_stopped ? NO_TIME : i2c->timeout_ns;
+    schedule(device, due < timeout ? due : timeout);
+}
+
+/* The time that counts for what follows from now: that of the stop, where a clock stands still. */
+static uint64_t counted_ns(const struct device *device, uint32_t clocks)
+{
+    const struct i2c *i2c = device->state;
+    return i2c->is_stopped & clocks ? i2c->stopped_ns : now_ns(device->fabric);
+}
+
+static void stop(struct device *device, uint32_t clocks)
+{
+    struct i2c *i2c = device->state;
+    i2c->stopped_ns = now_ns(device->fabric);
+    i2c->is_stopped = clocks;
+    wait_for_events(device);
+}
+
+static void resume(struct device *device, uint64_t span)
+{
+    struct i2c *i2c = device->state;
+    if (i2c->is_stopped & CLOCK_STOPPED) {
+        i2c->base_ns += span;
+        i2c->due_ns += i2c->due_ns == NO_TIME ? 0 : span;
+    }
+    i2c->timeout_ns += i2c->timeout_ns == NO_TIME ? 0 : span;
+    i2c->is_stopped = 0;
+    wait_for_events(device);
 }
 
 /* RM0008 26.6.8: SCL high and low take CCR each, or in fast mode one and two, or nine and sixteen of them. */
@@ -520,8 +552,9 @@ static void time_out(struct device *device)
 static void event(struct device *device, uint64_t until)
 {
     struct i2c *i2c = device->state;
-    while (i2c->due_ns <= until || i2c->timeout_ns <= until) {
-        if (i2c->timeout_ns <= i2c->due_ns) {
+    const bool has_timeout = !i2c->is_stopped;
+    while (!(i2c->is_stopped & CLOCK_STOPPED) && (i2c->due_ns <= until || (has_timeout && i2c->timeout_ns <= until))) {
+        if (has_timeout && i2c->timeout_ns <= i2c->due_ns) {
             time_out(device);
         } else if (i2c->lines & 1 << SCL) { /* somebody holds the clock: it ends when that lets go */
             i2c->is_late = 1;
@@ -538,7 +571,7 @@ static void pins(struct device *device, uint32_t port, uint32_t changed)
 {
     struct i2c *i2c = device->state;
     uint32_t *words = device->words;
-    const uint64_t ns = now_ns(device->fabric);
+    const uint64_t ns = counted_ns(device, CLOCK_STOPPED);
     const uint32_t before = i2c->lines, low = (uint32_t)is_low(device, SCL) | (uint32_t)is_low(device, SDA) << SDA | (uint32_t)is_low(device, SMBA) << SMBA;
     (void)port, (void)changed;
     i2c->lines = low;
@@ -558,7 +591,7 @@ static void pins(struct device *device, uint32_t port, uint32_t changed)
         i2c->base_ns = ns;
         i2c->ticks = 0;
     }
-    i2c->timeout_ns = !(low & 1 << SCL) || !(words[CR1] & SMBUS) ? NO_TIME : before & 1 << SCL ? i2c->timeout_ns : ns + TIMEOUT_NS;
+    i2c->timeout_ns = !(low & 1 << SCL) || !(words[CR1] & SMBUS) ? NO_TIME : before & 1 << SCL ? i2c->timeout_ns : counted_ns(device, CLOCK_STOPPED | TIMEOUT_STOPPED) + TIMEOUT_NS;
     if (i2c->due_ns <= ns && device->fabric->event_ns == NO_TIME) {
         event(device, ns);
     }
@@ -642,6 +675,7 @@ static void clear(struct device *device, bool keeps_busy)
     if (i2c->phase != FREE && i2c->has_parts) {
         ask(device, END, 0);
     }
+    i2c->is_stopped = 0;
     i2c->shift = i2c->tdr = i2c->rdr = i2c->received = i2c->far = i2c->is_own = i2c->header = i2c->is_lost = 0;
     i2c->next_ack = i2c->was_refused = i2c->has_sent = i2c->is_second = i2c->is_pec = i2c->lines = 0;
     i2c->timeout_ns = NO_TIME;
@@ -731,7 +765,7 @@ static uint32_t command(struct device *device, uint32_t what, uint32_t one, uint
         listen(device);
         break;
     case CALL:
-        if (i2c->phase != FREE || device->words[SR2] & BUSY) {
+        if (i2c->phase != FREE || device->words[SR2] & BUSY || i2c->is_stopped & CLOCK_STOPPED) {
             i2c->far_waits = 1;
             break;
         }
@@ -745,11 +779,23 @@ static uint32_t command(struct device *device, uint32_t what, uint32_t one, uint
         i2c->is_lost = one == ARLO;
         device->words[SR1] |= one & BERR;
         break;
+    case STOPPED:
+        event(device, now);
+        stop(device, CLOCK_STOPPED);
+        break;
+    case HOLD_TIMEOUT: stop(device, TIMEOUT_STOPPED); return 0;
+    case RESUMED:
+    case GO_ON_TIMEOUT:
+        resume(device, (uint64_t)other << 32 | one);
+        if (i2c->phase == FREE && i2c->far_waits && !(device->words[SR2] & BUSY)) {
+            i2c->far_waits = 0;
+            command(device, CALL, 0, 0);
+        }
+        break;
     case LISTEN: listen(device); return 0;
     default: break;
     }
     update_outputs(device);
-    (void)other;
     return 0;
 }
 

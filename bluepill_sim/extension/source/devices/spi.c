@@ -375,7 +375,7 @@ static bool needs_time(const struct device *device, uint32_t index, bool is_writ
 static uint32_t clock_in(struct device *device, uint32_t word, uint32_t hz)
 {
     struct spi *spi = device->state;
-    if (spi->shift) {
+    if (spi->shift || spi->is_stopped) {
         return 0;
     }
     spi->far = HELD | word;
@@ -394,7 +394,7 @@ static void clear(struct device *device)
     for (uint32_t n = 0; n < SPI_PINS; ++n) {
         put(device, n, FLOATING);
     }
-    spi->shift = spi->tdr = spi->rdr = spi->seen = spi->far = 0;
+    spi->shift = spi->tdr = spi->rdr = spi->seen = spi->far = spi->is_stopped = 0;
     schedule(device, NO_TIME);
     listen(device);
     update_outputs(device);
@@ -416,6 +416,19 @@ static uint32_t command(struct device *device, uint32_t what, uint32_t one, uint
             schedule(device, spi->base_ns);
         }
         spi->clock_hz = one;
+        break;
+    case STOPPED:
+        event(device, now);
+        spi->is_stopped = 1;
+        schedule(device, NO_TIME);
+        break;
+    case RESUMED:
+        spi->is_stopped = 0;
+        spi->base_ns += (uint64_t)other << 32 | one;
+        spi->word_ns += (uint64_t)other << 32 | one;
+        if (spi->shift) {
+            schedule(device, end_ns(spi));
+        }
         break;
     case MOVE:
         for (uint32_t n = 0; n < SPI_PINS; ++n) {

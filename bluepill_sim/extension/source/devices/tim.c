@@ -8,6 +8,8 @@
  * for their update event, a level that no wave shows, and flags of SR once the program looks for them: so a loop that
  * polls SR waits for an event, and a timer whose flags nobody reads costs nothing.
  * Pulses are given at the end, when the state is whole, since they may come back by a chain of timers.
+ * Where the clock stands still (Stop, DBGMCU_CR), `ticks` begins at the end of all time: so each look finds the tick of
+ * then, outputs are the levels of then, and what comes to inputs waits; only the break acts, which needs no clock.
  *
  * Source: RM0008 14.3, 14.4, 15.3, 15.4.
  * Invariant: words and struct are as of `at`, but for CNT, DIR and flags of SR, which are worked out when they are read.
@@ -131,7 +133,7 @@ void refresh(struct device *device)
     update_irqs(device);
     give_pulses(device);
     tim->is_busy = 0;
-    const uint64_t stop = next_stop(device);
+    const uint64_t stop = tim->is_stopped ? NO_TIME : next_stop(device);
     schedule(device, stop == NO_TIME ? NO_TIME : ns_of_tick(&tim->ticks, stop));
 }
 
@@ -425,8 +427,32 @@ static void set_clock(struct device *device, uint32_t hz)
     } else {
         tim->at = FIRST_TICK;
     }
-    tim->ticks = (struct ticks){.ns = ns, .hz = hz, .tick = tim->at};
+    tim->ticks = (struct ticks){.ns = tim->is_stopped ? NO_TIME : ns, .hz = hz, .tick = tim->at};
     forget_outputs(device);
+}
+
+static void stop_clock(struct device *device)
+{
+    struct tim *tim = tim_of(device);
+    synchronize(device, tick_now(device));
+    tim->is_stopped = 1;
+    tim->ticks.ns = NO_TIME;
+    tim->ticks.tick = tim->at;
+}
+
+/* Goes on with the tick that was under way, on the grid that all clocks have since the core's was last changed. */
+static void resume_clock(struct device *device)
+{
+    struct tim *tim = tim_of(device);
+    const struct fabric *fabric = device->fabric;
+    if (!tim->is_stopped) {
+        return;
+    }
+    const struct ticks grid = {.ns = fabric->time.ns, .hz = tim->ticks.hz};
+    tim->is_stopped = 0;
+    tim->ticks.ns = grid.ns;
+    tim->ticks.tick = tim->at - tick_at(&grid, now_ns(device->fabric));
+    take_what_waits(device);
 }
 
 static uint32_t command(struct device *device, uint32_t what, uint32_t one, uint32_t other)
@@ -436,6 +462,8 @@ static uint32_t command(struct device *device, uint32_t what, uint32_t one, uint
     case SETTLE: return settled(device, one);
     case RESET: reset(device); return 0;
     case CLOCK: set_clock(device, one); break;
+    case STOPPED: stop_clock(device); break;
+    case RESUMED: resume_clock(device); break;
     case MOVE:
         if (tim->pins[one] != other && one < PIN_ETR) {
             offer(device->fabric, tim->pins[one], tim->sources[one], FLOATING);

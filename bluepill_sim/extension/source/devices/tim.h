@@ -30,6 +30,8 @@ enum { FROZEN, SET_ON_MATCH, CLEAR_ON_MATCH, TOGGLE, FORCE_LOW, FORCE_HIGH, PWM1
 enum { ETR = 4, INPUTS };
 /* `pins` of the struct. */
 enum { PIN_COMPLEMENT = 4, PIN_ETR = 7, PIN_BKIN, PIN_COUNT };
+/* Its last input: the clock security system has found HSE failed. The first four are the internal triggers. */
+enum { CSS = 4 };
 /* The outputs of the device, in the order of OUTPUTS in tim.py. */
 enum {
     TRGO, CC_EVENT, UP_DMA = CC_EVENT + CHANNELS, CC_DMA, COM_DMA = CC_DMA + CHANNELS, TRIG_DMA, IRQ,
@@ -124,6 +126,8 @@ void take_levels(struct device *device);
 /* Listens to the pins that matter now; `is_restored`: their levels are known. */
 void listen(struct device *device, bool is_restored);
 uint64_t next_filter_stop(const struct device *device);
+/* Takes what has come to the inputs while the clock stood still. */
+void take_what_waits(struct device *device);
 /* Takes levels that its own outputs have changed, a tick later. */
 void take_late_levels(struct device *device);
 /* Lets through what filters have seen for long enough. */

@@ -40,6 +40,9 @@ static bool uses_trigger(const struct device *device)
 
 bool hears_line(const struct device *device, uint32_t input)
 {
+    if (input == CSS) {
+        return device->words[BDTR] & BKE;
+    }
     return selection(device) == input && uses_trigger(device);
 }
 
@@ -215,8 +218,16 @@ void look_at_trigger(struct device *device)
 void take_line(struct device *device, uint32_t input, bool level)
 {
     struct tim *tim = tim_of(device);
+    if (input == CSS) {
+        synchronize(device, tick_now(device));
+        if (level && device->words[BDTR] & BKE) {
+            trigger_break(device);
+        }
+        refresh(device);
+        return;
+    }
     tim->itr = level ? tim->itr | 1u << input : tim->itr & ~(1u << input);
-    if (tim->is_busy) { /* its own pulses have come back: silicon takes some clocks for that */
+    if (tim->is_busy || tim->is_stopped) { /* its own pulses have come back: silicon takes some clocks for that */
         return;
     }
     fabric_catch_up(device->fabric, device->slot, now_ns(device->fabric));
@@ -395,7 +406,15 @@ static void take_all_levels(struct device *device)
     if (tim->listening >> PIN_BKIN & 1 && is_break_active(device) != tim->in_break) {
         check_break(device);
     }
-    take_levels(device);
+    if (!tim->is_stopped) {
+        take_levels(device);
+    }
+}
+
+void take_what_waits(struct device *device)
+{
+    take_all_levels(device);
+    take_trigger(device);
 }
 
 void take_pins(struct device *device, uint32_t port, uint32_t changed)

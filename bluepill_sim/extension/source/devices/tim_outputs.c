@@ -184,6 +184,9 @@ static bool is_same(const struct shape *one, const struct shape *other)
 static void show(struct device *device, uint32_t output, struct shape shape)
 {
     struct tim *tim = tim_of(device);
+    if (tim->is_stopped && shape.kind == SHOWS_WAVE) {
+        shape = level(level_at(&shape, tim->at));
+    }
     if (is_same(&tim->outputs[output], &shape)) {
         return;
     }

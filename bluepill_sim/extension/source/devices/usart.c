@@ -237,7 +237,9 @@ static void write_control(struct device *device)
         }
     } else if (!(words[CR1] & TE) && words[SHIFT]) {
         /* UE lets the present character end; TE cuts it off (RM0008 27.3.2). */
-        ask(device, CUT_OFF, 0);
+        if ((words[SHIFT] | words[TDR]) & HELD) { /* an idle character or a break says nothing */
+            ask(device, CUT_OFF, 0);
+        }
         words[SHIFT] = words[TDR] = 0;
         words[SR] |= TXE | TC;
     }

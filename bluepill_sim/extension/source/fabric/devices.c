@@ -22,6 +22,7 @@ struct fabric *fabric_new(const struct fabric_calls *calls, struct port *ports, 
         fabric->master = SLOTS;
         fabric->event_ns = fabric->next_cycle = fabric->last_output = NO_TIME;
         fabric->time.hz = NS_PER_S;
+        fabric->time.most_s = NO_TIME / 8 / NS_PER_S;
         for (uint32_t n = 0; n < SLOTS; ++n) {
             fabric->slots[n].ns = fabric->slots[n].cycle = NO_TIME;
             memset(fabric->devices[n].outputs, NO_LINE, sizeof fabric->devices[n].outputs);

@@ -170,6 +170,7 @@ struct pin_listener {
 struct time_base {
     uint64_t ns, cycle;
     uint32_t hz;
+    uint64_t most_s; /* seconds whose cycles are a number */
 };
 
 /* A register that reads what a ramp of time is: a loop that polls it is worked out (`core/polling.c`). */
@@ -199,6 +200,8 @@ struct fabric {
     uint64_t subscribed_lines[LINE_WORDS];
     uint32_t watches_lines; /* somebody has subscribed to a line: each access needs its time */
     struct slot slots[SLOTS];
+    uint32_t ordered;     /* how many slots have an event, */
+    uint8_t order[SLOTS]; /* and which, in order of time, then of their numbers */
     struct line lines[LINES];
     struct port *ports; /* Python's: PORTS of them */
     struct wave *waves; /* Python's: one a source */
@@ -261,6 +264,10 @@ static inline uint64_t due_ns(const struct device *device) { return device->fabr
 uint64_t quiet_ns(const struct device *device);
 /* Acts on all that is due at or before a time, in order of time, then of slots. */
 void run_events(struct fabric *fabric, uint64_t until_ns);
+/* The same up to a cycle. */
+void run_due(struct fabric *fabric, uint64_t cycle);
+/* Whether anything due at or before a cycle is Python's business. */
+bool waits_for_python(const struct fabric *fabric, uint64_t cycle);
 
 /* lines.c */
 /* Whether a change of an output would be seen by anyone. */

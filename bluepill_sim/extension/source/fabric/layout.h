@@ -151,6 +151,24 @@ struct shared {
     uint32_t bfar;
     uint32_t demcr;
     uint32_t dbgmcu_cr;
+    uint32_t dfsr;
+    uint32_t actlr;
+    uint32_t dwt_control;
+    uint32_t fp_control;
+    uint32_t fp_remap;
+    uint32_t itm_enables;
+    uint32_t itm_privileges;
+    uint32_t itm_control;
+    uint32_t itm_is_open;
+    uint32_t tpiu_size;
+    uint32_t tpiu_prescaler;
+    uint32_t tpiu_protocol;
+    uint32_t tpiu_formatter;
+    uint32_t dwt_counts[5]; /* CPICNT, EXCCNT, SLEEPCNT, LSUCNT, FOLDCNT: they only store */
+    uint32_t dwt_comp[4];
+    uint32_t dwt_mask[4];
+    uint32_t dwt_function[4];
+    uint32_t fp_comp[8]; /* six of instructions, two of literals */
     struct ramp tick; /* SysTick's counter: its limit is the reload value */
     struct ramp cyccnt;
     uint32_t hears_ticks; /* Python wants to know when SysTick is set */
@@ -162,7 +180,7 @@ struct shared {
     struct fault fault;
     struct record last[32];
 };
-_Static_assert(sizeof(struct shared) == 1568, "shared");
+_Static_assert(sizeof(struct shared) == 1720, "shared");
 
 /* The pins of one port, a bit each. RM0008 9.1, table 20. */
 struct port {
@@ -375,10 +393,12 @@ struct tim {
     uint32_t burst_output; /* by this output */
     uint32_t lock; /* LOCK, once it was written */
     uint32_t is_advanced; /* it is TIM1 */
+    uint32_t is_stopped; /* its clock stands still */
+    uint32_t padding;
     uint8_t pins[9]; /* CH1 to CH4, CH1N to CH3N, ETR, BKIN */
     uint8_t sources[7]; /* the alternate functions of the first seven */
 };
-_Static_assert(sizeof(struct tim) == 736, "tim");
+_Static_assert(sizeof(struct tim) == 744, "tim");
 
 /* What an SPI holds beyond its registers. RM0008 25.3. */
 struct spi {
@@ -399,8 +419,9 @@ struct spi {
     uint32_t selected; /* parts that are selected */
     uint32_t far; /* the word that a master outside sends; 0: none */
     uint32_t wants_words; /* somebody has subscribed to words */
+    uint32_t is_stopped; /* its clock stands still */
 };
-_Static_assert(sizeof(struct spi) == 120, "spi");
+_Static_assert(sizeof(struct spi) == 128, "spi");
 
 /* What an I2C holds beyond its registers. RM0008 26.3. */
 struct i2c {
@@ -434,8 +455,10 @@ struct i2c {
     uint32_t offered[3]; /* the levels that they were last given */
     uint32_t counter; /* address of CNDTR of the DMA channel that it receives by */
     uint32_t far_hz; /* bits a second of a master outside */
+    uint32_t is_stopped; /* 1: its clock stands still; 2: that of the timeout does */
+    uint64_t stopped_ns; /* since when: times of what comes meanwhile are this one */
 };
-_Static_assert(sizeof(struct i2c) == 152, "i2c");
+_Static_assert(sizeof(struct i2c) == 168, "i2c");
 
 /* A level that goes up every `period` ticks, and down `high` ticks later. */
 struct wave {

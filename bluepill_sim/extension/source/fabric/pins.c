@@ -134,8 +134,9 @@ void pins_changed(struct fabric *fabric, uint32_t number)
     if (UNLIKELY((drives | wires) & ~waves & fabric->subscribed[number])) {
         tell_subscribers(fabric, number, drives & ~waves, wires & ~waves);
     }
-    if (UNLIKELY(inputs & fabric->listened[number])) {
-        tell_listeners(fabric, number, inputs);
+    const uint32_t heard = inputs | (port->held & (before.level ^ port->level)); /* who holds a pin may listen to its wire */
+    if (UNLIKELY(heard & fabric->listened[number])) {
+        tell_listeners(fabric, number, heard);
     }
     if (UNLIKELY(port->fighting & ~before.fighting)) {
         tell_trouble(fabric, number, port->fighting & ~before.fighting, IS_FIGHTING);

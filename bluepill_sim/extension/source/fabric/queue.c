@@ -16,7 +16,7 @@ static uint64_t cycle_at(const struct fabric *fabric, uint64_t ns)
         return back > time->cycle ? 0 : time->cycle - (uint64_t)back;
     }
     const uint64_t span = ns - time->ns, seconds = span / NS_PER_S;
-    if (seconds > NO_TIME / 8 / time->hz) {
+    if (seconds > time->most_s) {
         return NO_TIME / 4;
     }
     return time->cycle + seconds * time->hz + (span % NS_PER_S * time->hz + NS_PER_S - 1) / NS_PER_S;
@@ -24,30 +24,52 @@ static uint64_t cycle_at(const struct fabric *fabric, uint64_t ns)
 
 static void find_first(struct fabric *fabric)
 {
-    uint64_t first = NO_TIME;
-    for (uint32_t n = 0; n < fabric->slot_count; ++n) {
-        if (fabric->slots[n].cycle < first) {
-            first = fabric->slots[n].cycle;
+    fabric->next_cycle = fabric->ordered ? fabric->slots[fabric->order[0]].cycle : NO_TIME;
+}
+
+/* Takes a slot out of the order, where its event was; and puts it where its event is. */
+static void put_in_order(struct fabric *fabric, uint32_t number, uint64_t before)
+{
+    const struct slot *slots = fabric->slots;
+    uint8_t *order = fabric->order;
+    const uint64_t ns = slots[number].ns;
+    uint32_t at = 0;
+    if (before != NO_TIME) {
+        while (order[at] != number) {
+            ++at;
         }
+        --fabric->ordered;
+    } else {
+        at = fabric->ordered;
     }
-    fabric->next_cycle = first;
+    for (; at < fabric->ordered && (slots[order[at + 1]].ns < ns || (slots[order[at + 1]].ns == ns && order[at + 1] < number)); ++at) {
+        order[at] = order[at + 1];
+    }
+    if (ns == NO_TIME) {
+        return; /* behind all: every other one came before it */
+    }
+    for (; at > 0 && (slots[order[at - 1]].ns > ns || (slots[order[at - 1]].ns == ns && order[at - 1] > number)); --at) {
+        order[at] = order[at - 1];
+    }
+    order[at] = (uint8_t)number;
+    ++fabric->ordered;
 }
 
 void fabric_schedule(struct fabric *fabric, uint32_t number, uint64_t ns)
 {
     struct slot *slot = &fabric->slots[number];
-    const uint64_t before = slot->cycle;
-    if (slot->ns == ns) {
+    const uint64_t before = slot->ns;
+    if (before == ns) {
         return;
     }
     slot->ns = ns;
     slot->cycle = cycle_at(fabric, ns);
-    if (slot->cycle <= fabric->next_cycle) {
-        fabric->next_cycle = slot->cycle;
-    } else if (before == fabric->next_cycle && fabric->event_ns == NO_TIME) { /* else once, behind the events */
-        find_first(fabric);
+    put_in_order(fabric, number, before);
+    if (fabric->event_ns != NO_TIME) {
+        return; /* the first one is found behind the events */
     }
-    if (fabric->event_ns == NO_TIME && slot->cycle != NO_TIME) {
+    find_first(fabric);
+    if (slot->cycle != NO_TIME) {
         fabric->host.due(fabric->host.user, slot->cycle);
     }
 }
@@ -59,33 +81,40 @@ uint64_t fabric_due(const struct fabric *fabric, uint32_t number) { return fabri
 /* The first time of all; NO_TIME for none. */
 uint64_t fabric_next_ns(const struct fabric *fabric)
 {
-    uint64_t first = NO_TIME;
-    for (uint32_t n = 0; n < fabric->slot_count; ++n) {
-        if (fabric->slots[n].ns < first) {
-            first = fabric->slots[n].ns;
-        }
-    }
-    return first;
+    return fabric->ordered ? fabric->slots[fabric->order[0]].ns : NO_TIME;
 }
 
 uint64_t quiet_ns(const struct device *device)
 {
     const struct fabric *fabric = device->fabric;
     const uint64_t cycle = fabric->host.asleep_until == NULL ? 0 : fabric->host.asleep_until(fabric->host.user);
-    uint64_t first = cycle > fabric->time.cycle ? ns_of(fabric, cycle) : 0;
-    for (uint32_t n = 0; n < fabric->slot_count; ++n) {
-        if (n != device->slot && fabric->slots[n].ns < first) {
-            first = fabric->slots[n].ns;
+    const uint64_t first = cycle > fabric->time.cycle ? ns_of(fabric, cycle) : 0;
+    for (uint32_t n = 0; n < fabric->ordered; ++n) {
+        if (fabric->order[n] != device->slot) {
+            const uint64_t ns = fabric->slots[fabric->order[n]].ns;
+            return ns < first ? ns : first;
         }
     }
     return first;
+}
+
+static bool is_pythons(const struct slot *slot) { return slot->device == NULL || slot->device->kind->event == NULL; }
+
+bool waits_for_python(const struct fabric *fabric, uint64_t cycle)
+{
+    for (uint32_t n = 0; n < fabric->ordered && fabric->slots[fabric->order[n]].cycle <= cycle; ++n) {
+        if (is_pythons(&fabric->slots[fabric->order[n]])) {
+            return true;
+        }
+    }
+    return false;
 }
 
 static void act(struct fabric *fabric, struct slot *slot)
 {
     struct device *device = slot->device;
     slot->is_acting = 1;
-    if (device == NULL || device->kind->event == NULL) {
+    if (is_pythons(slot)) {
         fabric->calls.event((uint32_t)(slot - fabric->slots), slot->ns);
     } else {
         device->kind->event(device, slot->ns);
@@ -93,20 +122,46 @@ static void act(struct fabric *fabric, struct slot *slot)
     slot->is_acting = 0;
 }
 
+/* The first slot from number `first` on that has its event at a time and does not act; SLOTS for none. */
+static uint32_t due_from(const struct fabric *fabric, uint32_t first, uint64_t ns)
+{
+    for (uint32_t n = 0; n < fabric->ordered && fabric->slots[fabric->order[n]].ns <= ns; ++n) {
+        const uint32_t number = fabric->order[n];
+        if (number >= first && fabric->slots[number].ns == ns && !fabric->slots[number].is_acting) {
+            return number;
+        }
+    }
+    return SLOTS;
+}
+
+/* Acts on all events of the first time. */
+static void act_on_first(struct fabric *fabric)
+{
+    const uint64_t due = fabric_next_ns(fabric);
+    fabric->event_ns = due;
+    for (uint32_t n = due_from(fabric, 0, due); n < SLOTS; n = due_from(fabric, n + 1, due)) {
+        act(fabric, &fabric->slots[n]);
+        if (fabric->slots[n].ns <= due) { /* what has acted is done; Python checks its own */
+            fabric_schedule(fabric, n, NO_TIME);
+        }
+    }
+}
+
 void run_events(struct fabric *fabric, uint64_t until_ns)
 {
     const uint64_t before = fabric->event_ns;
-    uint64_t due;
-    while ((due = fabric_next_ns(fabric)) != NO_TIME && due <= until_ns) {
-        fabric->event_ns = due;
-        for (uint32_t n = 0; n < fabric->slot_count; ++n) {
-            if (fabric->slots[n].ns == due && !fabric->slots[n].is_acting) {
-                act(fabric, &fabric->slots[n]);
-                if (fabric->slots[n].ns <= due) { /* what has acted is done; Python checks its own */
-                    fabric_schedule(fabric, n, NO_TIME);
-                }
-            }
-        }
+    while (fabric->ordered && fabric_next_ns(fabric) <= until_ns) {
+        act_on_first(fabric);
+    }
+    fabric->event_ns = before;
+    find_first(fabric);
+}
+
+void run_due(struct fabric *fabric, uint64_t cycle)
+{
+    const uint64_t before = fabric->event_ns;
+    while (fabric->ordered && fabric->slots[fabric->order[0]].cycle <= cycle) {
+        act_on_first(fabric);
     }
     fabric->event_ns = before;
     find_first(fabric);
@@ -146,9 +201,10 @@ void fabric_set_time(struct fabric *fabric, uint64_t ns, uint64_t cycle, uint32_
 {
     fabric->last_output_ns = fabric_last_output(fabric);
     fabric->last_output = NO_TIME;
-    fabric->time = (struct time_base){ns, cycle, hz};
-    for (uint32_t n = 0; n < fabric->slot_count; ++n) {
-        fabric->slots[n].cycle = cycle_at(fabric, fabric->slots[n].ns);
+    fabric->time = (struct time_base){ns, cycle, hz, NO_TIME / 8 / hz};
+    for (uint32_t n = 0; n < fabric->ordered; ++n) {
+        struct slot *slot = &fabric->slots[fabric->order[n]];
+        slot->cycle = cycle_at(fabric, slot->ns);
     }
     find_first(fabric);
 }

@@ -26,6 +26,7 @@ from p2os.pioneer.body.physical import (
     ON_FLOOR_M,
     PUSHED_GROUP,
     PUSHED_MEETS,
+    STANDING_FRICTION,
     WHEEL_FRICTION,
     WHEEL_GROUP,
     WHEEL_MEETS,
@@ -46,8 +47,6 @@ LEFT, RIGHT, CASTER = 0, 1, 2
 ECHOING = OBSTACLE_GROUP | FLOOR_GROUP | PUSHED_GROUP | LOW_GROUP
 #: The group that Bullet gives its rays.
 RAY_GROUP = 1
-#: Of all that stands fast: Bullet multiplies the frictions of both sides.
-STATIC_FRICTION = 1.0
 #: Who moves → what it meets.
 MEETS = {WHEEL_GROUP: WHEEL_MEETS, HULL_GROUP: HULL_MEETS, PUSHED_GROUP: PUSHED_MEETS}
 #: Height at which things that were taken out are kept.
@@ -148,7 +147,7 @@ def make_static(shape: int, place: Vector, turn: tuple[float, ...], group: int, 
         useMaximalCoordinates=1,
         physicsClientId=client,
     )
-    pybullet.changeDynamics(number, -1, lateralFriction=STATIC_FRICTION, physicsClientId=client)
+    pybullet.changeDynamics(number, -1, lateralFriction=STANDING_FRICTION, physicsClientId=client)
     pybullet.setCollisionFilterGroupMask(number, -1, group, RAY_GROUP | _met_by(group), physicsClientId=client)
     return int(number)
 
@@ -196,6 +195,13 @@ def add_robot(parameters: RobotParameters, pose: Pose, client: int) -> tuple[int
         linkJointAxis=[(0.0, 1.0, 0.0)] * 3,
         physicsClientId=client,
     )
+    if parameters.rotor_inertia_kg_m2:  # chosen: it turns as a part of the wheel, since Bullet's joints have none
+        own = body.wheel_mass_kg * radius**2 * 2 / 5
+        for link in (LEFT, RIGHT):
+            pybullet.changeDynamics(
+                robot, link, localInertiaDiagonal=(own, own + parameters.rotor_inertia_kg_m2, own),
+                physicsClientId=client,
+            )  # fmt: skip
     frictions = {-1: HULL_FRICTION, LEFT: WHEEL_FRICTION, RIGHT: WHEEL_FRICTION, CASTER: 0.0}
     for link, friction in frictions.items():
         pybullet.changeDynamics(

@@ -192,7 +192,7 @@ def _add_robot(spec: mujoco.MjSpec, parameters: RobotParameters, names: RobotNam
     )  # fmt: skip
     for name, rotor_name, side in zip(names.wheels, names.rotors, (1, -1), strict=True):
         body = robot.add_body(name=name, pos=(0.0, side * parameters.track_mm / 2000, radius))
-        body.add_joint(name=name, type=_HINGE, axis=(0.0, 1.0, 0.0))
+        body.add_joint(name=name, type=_HINGE, axis=(0.0, 1.0, 0.0), armature=parameters.rotor_inertia_kg_m2)
         body.add_geom(name=name, type=_SPHERE, size=(radius, 0.0, 0.0), mass=own.wheel_mass_kg, **wheel)
         rotor = spec.worldbody.add_body(name=rotor_name, pos=(0.0, 0.0, ROTORS_AT_M))
         rotor.add_joint(name=rotor_name, type=_HINGE, axis=(0.0, 1.0, 0.0), armature=ROTOR_INERTIA)

@@ -10,7 +10,8 @@ from bluepill_sim import BluePill
 from robot_bench.firmware import build
 
 HERE = Path(__file__).resolve().parent
-BORROWED = ("startup.c", "memory.c", "f103.h", "f103c8.ld")
+#: Of board.c the clock.
+RUNTIME = ("startup.c", "memory.c", "board.c")
 
 
 @pytest.fixture(scope="session")
@@ -19,14 +20,13 @@ def program(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str], Path]:
     if shutil.which(build.COMPILER) is None:
         pytest.skip(f"{build.COMPILER} is not installed")
     folder = tmp_path_factory.mktemp("buses")
-    for source in (*(HERE / "firmware").iterdir(), *(build.HERE / name for name in BORROWED)):
-        shutil.copy(source, folder)
+    flags = (f"-I{build.HERE}",)
 
     def built(name: str) -> Path:
         elf = folder / f"{name}.elf"
         if not elf.exists():
-            sources = ("startup.c", "memory.c", f"{name}.c")
-            build.build_elf(sources, folder=folder, linker_script="f103c8.ld", output=elf)
+            sources = (*RUNTIME, str(HERE / "firmware" / f"{name}.c"))
+            build.build_elf(sources, folder=build.HERE, linker_script="f103c8.ld", output=elf, more_flags=flags)
         return elf
 
     return built

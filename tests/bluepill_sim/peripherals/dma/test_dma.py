@@ -367,7 +367,7 @@ def test_a_text_goes_out_and_comes_in_by_dma_without_a_gap(fake_chip: Any, numbe
     fake_chip.write(register, 0x4444_4444 & ~(0xF << at) | 0xB << at)
     usart, name = fake_chip.parts.usart(number), f"USART{number}"
     sent: list[tuple[int, int]] = []
-    usart.sinks.append(lambda rows: sent.extend((word, ns) for word, ns, _ in rows))
+    usart.sinks.append(sent.extend)
     fake_chip.write(f"{name}.BRR", BRR)
     fake_chip.write(f"{name}.CR1", UE | TE | RE)
     fake_chip.advance(2 * CHARACTER_NS)

@@ -382,3 +382,13 @@ def test_a_program_is_woken_each_second(boot: Callable[..., Any], monkeypatch: p
     assert machine.log == list(range(len(machine.log)))
     assert 7 <= len(machine.log) <= 11
     assert machine.board.warnings == []
+
+
+@pytest.mark.parametrize("core", ["native", "python"])
+@pytest.mark.parametrize("offset", [0x00, 0x10, 0x14], ids=["CRH", "DIVH", "DIVL"])
+def test_each_write_without_dbp_is_warned_of_by_both_cores(
+    boot: Any, monkeypatch: pytest.MonkeyPatch, core: str, offset: int
+) -> None:
+    monkeypatch.setenv("P2OS_CORE", core)
+    machine = boot(f"mov32 r1, #{0x4000_2800 + offset}\nmovs r2, #1\nstr r2, [r1, #0]\nb stop").run(50)
+    assert [text.split(":")[0] for text in machine.board.warnings] == ["RTC"]

@@ -95,10 +95,3 @@ def test_random_writes_end_alike_in_other_slices(tmp_path: Path, seed: int) -> N
     whole = play(tmp_path, seed, 120, 0)
     assert play(tmp_path, seed, 120, 1 + seed) == whole
     assert whole[2], "no pin has moved"
-
-
-@pytest.mark.soak
-@pytest.mark.parametrize("seed", range(100, 400))
-def test_many_random_writes_end_alike_in_other_slices(tmp_path: Path, seed: int) -> None:
-    whole = play(tmp_path, seed, 600, 0)
-    assert play(tmp_path, seed, 600, 1 + seed) == whole

@@ -172,6 +172,23 @@ def test_ue_lets_the_character_end_and_te_cuts_it_off(fake_chip: Any) -> None:
     assert status(fake_chip) & (TXE | TC) == TXE | TC
 
 
+def test_te_may_cut_off_an_idle_character_and_a_break_which_say_nothing(fake_chip: Any) -> None:
+    """Drivers clear TE while they change the format, often just after they have set it."""
+    set_up(fake_chip)
+    fake_chip.write("USART1.CR1", UE)
+    fake_chip.write("USART1.CR1", UE | TE)
+    fake_chip.write("USART1.CR1", UE)
+    fake_chip.write("USART1.CR1", UE | TE)
+    fake_chip.advance(fake_chip.now_ns + 10**6)
+    fake_chip.write("USART1.CR1", UE | TE | SBK)
+    fake_chip.write("USART1.CR1", UE)
+    assert fake_chip.warnings == {}
+    fake_chip.write("USART1.CR1", UE | TE)
+    fake_chip.write("USART1.DR", 1)  # behind the idle character
+    fake_chip.write("USART1.CR1", UE)
+    assert "USART1:te" in fake_chip.warnings
+
+
 def test_a_break_takes_the_line_for_one_character(fake_chip: Any) -> None:
     sent = set_up(fake_chip)
     start_ns = fake_chip.now_ns
@@ -207,10 +224,41 @@ def test_a_restored_usart_sends_on_the_pins_that_it_was_remapped_to(
     other.pins.restore(fake_chip.pins.snapshot())
     other.parts.restore(fake_chip.parts.snapshot())
     sent: list[int] = []
-    other.parts.usart(1).sinks.append(lambda rows: sent.extend(word for word, _, _ in rows))
+    other.parts.usart(1).sinks.append(lambda rows: sent.extend(word for word, _ in rows))
     other.write("USART1.DR", 9)
     other.advance(10**6)
     assert sent == [9]
+
+
+def test_characters_come_in_one_go_as_many_as_were_sent_alike(fake_chip: Any) -> None:
+    set_up(fake_chip)
+    runs: list[tuple[list[tuple[int, int]], int, bytes]] = []
+    usart = fake_chip.parts.usart(1)
+    usart.deliver()
+    usart.sinks[:] = [lambda rows: runs.append((list(rows), rows.bit_ns, rows.data))]
+    sent = []
+    for word, brr, control in (
+        (0x41, BRR, 0),
+        (0x42, BRR, 0),
+        (0x143, BRR, M),
+        (0x144, 2 * BRR, M),
+        (0x45, 2 * BRR, 0),
+    ):
+        fake_chip.write("USART1.BRR", brr)
+        fake_chip.write("USART1.CR1", UE | TE | control)
+        fake_chip.write("USART1.DR", word)
+        fake_chip.parts.usart(1).fabric.run_events(fake_chip.now_ns + 10**6)
+        fake_chip.now_ns += 10**6
+        sent.append(word)
+    usart.deliver()
+    assert [word for rows, *_ in runs for word, _ in rows] == sent
+    bit_ns = BRR * 10**9 // usart.native.clock_hz
+    assert [(bit, data) for _, bit, data in runs] == [
+        (bit_ns, b"AB"), (bit_ns, b"C"), (2 * bit_ns, b"D"), (2 * bit_ns, b"E"),
+    ]  # fmt: skip
+    first, second = runs[0][0]
+    assert (first[0], second[0]) == (0x41, 0x42)
+    assert second[1] - first[1] == 10**6
 
 
 def test_a_remap_before_the_start_connects_later(fake_chip: Any) -> None:
@@ -224,7 +272,7 @@ def test_a_remap_before_the_start_connects_later(fake_chip: Any) -> None:
 def test_other_usarts_run_on_pclk1(fake_chip: Any) -> None:
     fake_chip.run_at_72_mhz()
     sent: list[int] = []
-    fake_chip.parts.usart(2).sinks.append(lambda rows: sent.extend(at_ns for _, at_ns, _ in rows))
+    fake_chip.parts.usart(2).sinks.append(lambda rows: sent.extend(at_ns for _, at_ns in rows))
     fake_chip.write("GPIOA.CRL", 0x4444_4B44)
     fake_chip.write("USART2.BRR", 360)
     fake_chip.write("USART2.CR1", UE | TE)

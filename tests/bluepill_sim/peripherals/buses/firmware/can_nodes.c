@@ -17,7 +17,7 @@ void SysTick_Handler(void) { ++ticks; }
 
 int main(void)
 {
-    clock_at_72_mhz();
+    console_start();
     RCC->APB1ENR |= 1u << 25;
     GPIOB->ODR = 0;
     GPIOA->CRH = (GPIOA->CRH & 0xFFF00FFFu) | 0x000B4000u;

@@ -2,6 +2,7 @@
 #ifndef CONSOLE_H
 #define CONSOLE_H
 
+#include "board.h"
 #include "f103.h"
 
 struct spi { volatile uint32_t CR1, CR2, SR, DR, CRCPR, RXCRCR, TXCRCR; };
@@ -10,22 +11,12 @@ struct i2c { volatile uint32_t CR1, CR2, OAR1, OAR2, DR, SR1, SR2, CCR, TRISE; }
 #define SPI1 ((struct spi *)0x40013000u)
 #define I2C1 ((struct i2c *)0x40005400u)
 
-static inline void clock_at_72_mhz(void)
+static inline void console_start(void)
 {
-    FLASH->ACR = FLASH_ACR_LATENCY_2 | FLASH_ACR_PRFTBE;
-    RCC->CR |= RCC_CR_HSEON;
-    while (!(RCC->CR & RCC_CR_HSERDY)) {
-    }
-    RCC->CFGR = RCC_CFGR_PLLSRC_HSE | RCC_CFGR_PLLMUL9 | RCC_CFGR_PPRE1_DIV2;
-    RCC->CR |= RCC_CR_PLLON;
-    while (!(RCC->CR & RCC_CR_PLLRDY)) {
-    }
-    RCC->CFGR |= RCC_CFGR_SW_PLL;
-    while ((RCC->CFGR & RCC_CFGR_SWS_MASK) != RCC_CFGR_SWS_PLL) {
-    }
+    clock_start();
     RCC->APB2ENR |= RCC_APB2ENR_AFIOEN | RCC_APB2ENR_IOPAEN | RCC_APB2ENR_IOPBEN | RCC_APB2ENR_USART1EN;
     GPIOA->CRH = (GPIOA->CRH & ~0xF0u) | GPIO_ALTERNATE_PUSH_PULL_2MHZ << 4;
-    USART1->BRR = 72000000u / 1000000u;
+    USART1->BRR = HCLK_HZ / 1000000u;
     USART1->CR1 = USART_CR1_UE | USART_CR1_TE;
 }
 

@@ -71,7 +71,7 @@ static void i2c_round(void)
 
 int main(void)
 {
-    clock_at_72_mhz();
+    console_start();
     interrupts_off();
     NVIC_ISER[0] = 0x7Fu << 11;
     RCC->AHBENR |= 1u;

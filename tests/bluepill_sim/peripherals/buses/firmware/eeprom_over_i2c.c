@@ -116,7 +116,7 @@ static void read(uint32_t at, uint8_t *to, uint32_t count)
 int main(void)
 {
     uint8_t bytes[20];
-    clock_at_72_mhz();
+    console_start();
     RCC->APB1ENR |= 1u << 21;
     GPIOB->CRL = (GPIOB->CRL & 0x00FFFFFFu) | 0xFF000000u;
     I2C1->CR2 = 36;

@@ -65,7 +65,7 @@ static uint32_t wait(int sleeps)
 
 int main(void)
 {
-    clock_at_72_mhz();
+    console_start();
     RCC->APB2ENR |= 1u << 12;
     SYSTICK->LOAD = 72000u - 1;
     SYSTICK->CTRL = SYSTICK_CTRL_ENABLE | SYSTICK_CTRL_TICKINT | SYSTICK_CTRL_CLKSOURCE_CORE;

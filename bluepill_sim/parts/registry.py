@@ -1,0 +1,260 @@
+"""The parts by name, and how words become one: of `--attach`, and of [[part]] in a scenario.
+
+    ssd1306,on=I2C1,address=0x3D        a part that ships, or one of the entry points `p2os.parts`
+    ./mine.py:Thermometer,on=I2C1       a class in a Python file
+
+A part's settings are the arguments of its class by their names and types; `on`, `select`, `name` and the names of its
+pins are not among them.
+Invariant: a `PartSpec` can be built again from itself alone, in another process too.
+"""
+
+import importlib
+import importlib.util
+import inspect
+import sys
+import types
+import typing
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from importlib.metadata import entry_points
+from pathlib import Path
+from typing import Any, Protocol, cast
+
+from bluepill_sim.parts.attached import PartError, Use
+from simbase.errors import shown
+
+#: The entry points of others.
+GROUP = "p2os.parts"
+#: What the modules' names of users' files begin with.
+OF_USERS = "p2os_part_"
+_HINT = "NAME,KEY=VALUE,... such as ssd1306,on=I2C1 or ./mine.py:Class,on=I2C1"
+_FLAGS = {"true": True, "yes": True, "1": True, "false": False, "no": False, "0": False}
+
+
+@dataclass(frozen=True, slots=True)
+class Row:
+    """A part that ships: its class as "module:Class", and what it is."""
+
+    target: str
+    what: str
+
+
+_OWN = "bluepill_sim.parts"
+PARTS: Mapping[str, Row] = {
+    "24c02": Row(f"{_OWN}.eeprom_24c02:Eeprom24C02", "I2C EEPROM, 256 bytes"),
+    "button": Row(f"{_OWN}.panel:Button", "push button that bounces"),
+    "can-node": Row(f"{_OWN}.can_talker:CanTalker", "node on a CAN: sends at a period, echoes"),
+    "gps": Row(f"{_OWN}.gps:Gps", "GPS receiver on a USART: GGA and RMC"),
+    "hc-sr04": Row(f"{_OWN}.hc_sr04:HcSr04", "ultrasonic distance sensor"),
+    "leds": Row(f"{_OWN}.panel:LedPanel", "up to eight LEDs"),
+    "mpu6050": Row(f"{_OWN}.mpu6050:Mpu6050", "gyroscope and accelerometer on I2C"),
+    "potentiometer": Row(f"{_OWN}.panel:Potentiometer", "volts for the ADC"),
+    "sd-card": Row(f"{_OWN}.sd_card:SdCard", "SD card on an SPI"),
+    "servo": Row(f"{_OWN}.servo:Servo", "hobby servo"),
+    "ssd1306": Row(f"{_OWN}.ssd1306:Ssd1306", "OLED, 128 by 64, on I2C or SPI"),
+    "w25q16": Row(f"{_OWN}.spi_flash:SpiFlash", "SPI flash, 2 MiB"),
+    "ws2812": Row(f"{_OWN}.ws2812:Ws2812", "string of LEDs on a pin or an SPI"),
+}
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PartSpec:
+    """What part is wanted, where, and how it is set."""
+
+    #: A name, or "FILE.py:CLASS".
+    kind: str
+    #: Keys and values: `on`, `select`, `name`, pins, and arguments of its class; texts, numbers, flags, lists.
+    settings: tuple[tuple[str, object], ...] = ()
+    #: Where files are looked for that are named relatively.
+    folder: str = ""
+
+
+class Board(Protocol):
+    """What a part is attached to."""
+
+    def attach(
+        self, part: object, *, on: str | None = None, select: str | None = None, name: str = "", **pins: str
+    ) -> None:  # fmt: skip
+        """Attach a part."""
+        ...
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Wiring:
+    """A part, and where it goes."""
+
+    part: Any
+    name: str
+    on: str | None
+    select: str | None
+    pins: Mapping[str, str]
+
+
+def parse_part(words: str) -> PartSpec:
+    """Return what `--attach` asks for.
+
+    Raises:
+        PartError: It is not understood.
+    """
+    kind, *rest = words.split(",")
+    settings: dict[str, object] = {}
+    for pair in rest:
+        key, equals, value = pair.partition("=")
+        if not equals or not key or key in settings:
+            raise PartError(
+                f"--attach {shown(words)}: {shown(pair)} is no KEY=VALUE, or stands there twice", hint=_HINT
+            )
+        settings[key] = value
+    if not kind:
+        raise PartError(f"--attach {shown(words)} names no part", hint=_HINT)
+    return PartSpec(kind=kind, settings=tuple(settings.items()))
+
+
+def build(spec: PartSpec) -> Wiring:
+    """Make a part.
+
+    Raises:
+        PartError: There is no such part, or it cannot be set so.
+    """
+    made = part_class(spec.kind, Path(spec.folder))
+    settings = dict(spec.settings)
+    pins = {
+        key: str(settings.pop(key)) for key in cast("Mapping[str, Use]", getattr(made, "PINS", {})) if key in settings
+    }
+    on, select = settings.pop("on", None), settings.pop("select", None)
+    name = str(settings.pop("name", spec.kind.rpartition(":")[2] if ":" in spec.kind else spec.kind))
+    arguments = _arguments_of(made, spec.kind)
+    values = {}
+    for key, value in settings.items():
+        if key not in arguments:
+            known = [*arguments, *getattr(made, "PINS", {}), "on", "select", "name"]
+            raise PartError(
+                f"the part {shown(spec.kind)} has no setting {shown(key)}", hint=f"known are {', '.join(known)}"
+            )
+        values[key] = _converted(value, arguments[key], f"{spec.kind}: {key}", Path(spec.folder))
+    try:
+        part = made(**values)
+    except PartError:
+        raise
+    except OSError as error:
+        raise PartError(f"{spec.kind}: {error.filename}: {error.strerror or error}") from error
+    except Exception as error:  # whatever a class of the user's raises is one line here
+        raise PartError(f"{spec.kind}: {_said(error)}") from error
+    return Wiring(part=part, name=name, on=_text(on), select=_text(select), pins=pins)
+
+
+def attach(board: Board, spec: PartSpec) -> None:
+    """Make a part and attach it to a board.
+
+    Raises:
+        PartError: There is no such part, or it cannot be set or attached so.
+    """
+    wiring = build(spec)
+    board.attach(wiring.part, on=wiring.on, select=wiring.select, name=wiring.name, **wiring.pins)
+
+
+def part_class(kind: str, folder: Path = Path()) -> Callable[..., Any]:
+    """Return the class of a part.
+
+    Raises:
+        PartError: There is none, or its file cannot be loaded.
+    """
+    row = PARTS.get(kind.lower())
+    if row is not None:
+        module, _, name = row.target.partition(":")
+        return cast("Callable[..., Any]", getattr(importlib.import_module(module), name))
+    path, colon, name = kind.rpartition(":")
+    if colon and path.endswith(".py"):
+        return _class_in(folder / path, name)
+    for point in entry_points(group=GROUP):
+        if point.name == kind:
+            try:
+                return cast("Callable[..., Any]", point.load())
+            except Exception as error:  # of another's package
+                raise PartError(f"the part {kind} cannot be loaded: {_said(error)}") from error
+    raise PartError(f"there is no part {shown(kind)}", hint=f"known are {', '.join(PARTS)}, and FILE.py:CLASS")
+
+
+def _class_in(path: Path, name: str) -> Callable[..., Any]:
+    """Return a class of a Python file, which is loaded once."""
+    key = OF_USERS + path.stem
+    module = sys.modules.get(key)
+    if module is None or Path(module.__file__ or "") != path.absolute():
+        spec = importlib.util.spec_from_file_location(key, path.absolute())
+        if spec is None or spec.loader is None or not path.is_file():
+            raise PartError(f"there is no file {path}", hint=_HINT)
+        module = importlib.util.module_from_spec(spec)
+        sys.modules[key] = module
+        try:
+            spec.loader.exec_module(module)
+        except BaseException as error:
+            del sys.modules[key]
+            if not isinstance(error, Exception):
+                raise
+            raise PartError(f"{path}: {_said(error)}") from error
+    made = getattr(module, name, None)
+    if not isinstance(made, type):
+        classes = [
+            key
+            for key, value in vars(module).items()
+            if isinstance(value, type) and value.__module__ == module.__name__
+        ]
+        raise PartError(f"{path} has no class {shown(name)}", hint=f"it has {', '.join(classes) or 'none'}")
+    return made
+
+
+def _arguments_of(made: Callable[..., Any], kind: str) -> dict[str, Any]:
+    """Return the arguments of a part's class and their types."""
+    try:
+        signature = inspect.signature(made, eval_str=True)
+    except (TypeError, ValueError, NameError) as error:
+        raise PartError(f"{kind}: its arguments cannot be read: {error}") from error
+    return {name: argument.annotation for name, argument in signature.parameters.items()}
+
+
+def _converted(value: object, wanted: Any, where: str, folder: Path) -> object:
+    """Return a value as an argument's type: a text as it is typed, else what TOML holds."""
+    if isinstance(wanted, types.UnionType) or typing.get_origin(wanted) is typing.Union:
+        wanted = next(one for one in typing.get_args(wanted) if one is not type(None))
+    try:
+        if typing.get_origin(wanted) in {tuple, list}:
+            inner = typing.get_args(wanted)[0]
+            items = (
+                value.split("+") if isinstance(value, str) else value if isinstance(value, list | tuple) else [value]
+            )
+            return tuple(_converted(item, inner, where, folder) for item in items)
+        if wanted is bool:
+            return value if isinstance(value, bool) else _FLAGS[str(value).lower()]
+        if wanted is int:
+            return int(value, 0) if isinstance(value, str) else _whole(value)
+        if wanted is float:
+            return float(cast("float | str", _no_flag(value)))
+        if wanted in {Path, bytes}:
+            path = folder / str(value)
+            return path if wanted is Path else path.read_bytes()
+    except OSError as error:
+        raise PartError(f"{where}: {error.filename}: {error.strerror or error}") from error
+    except (ValueError, KeyError, TypeError) as error:
+        name = {bool: "true or false", int: "a whole number", float: "a number"}.get(wanted, "what it is to be")
+        raise PartError(f"{where}: {shown(value)} is not {name}") from error
+    return value
+
+
+def _whole(value: object) -> int:
+    if isinstance(value, bool) or not isinstance(value, int):
+        raise TypeError(value)
+    return value
+
+
+def _no_flag(value: object) -> object:
+    if isinstance(value, bool):
+        raise TypeError(value)
+    return value
+
+
+def _text(value: object) -> str | None:
+    return None if value is None else str(value)
+
+
+def _said(error: Exception) -> str:
+    return str(error) if isinstance(error, ValueError) else f"{type(error).__name__}: {error}"

@@ -1,0 +1,319 @@
+"""Many runs of one scenario at once, as `p2os run --seeds` and `[sweep]` ask for: who runs, the table, the JUnit file.
+
+Each run goes into a folder of its own below one of the sweep, which is kept where the run failed, or as `--keep` says.
+
+Invariant: table, JSON and hashes are the same however many run at a time.
+"""
+
+import contextlib
+import re
+import shlex
+import sys
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from itertools import groupby
+from pathlib import Path
+from typing import cast
+from xml.etree import ElementTree as ET
+
+from rich.console import Console
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn
+from rich.table import Table
+
+from robot_bench.cli.workers import failure, run_in_processes
+from robot_bench.events.codec import Json
+from robot_bench.recording.run_folder import make_next_folder
+from robot_bench.recording.summary import INTERRUPTED
+from robot_bench.run import run_scenario
+from robot_bench.scenario.included_files import Setting, as_toml
+from robot_bench.scenario.scenario import Scenario
+from simbase.errors import FileError, UsageError
+
+#: Which run folders are kept.
+KEPT: Mapping[str, Callable[[bool], bool]] = {
+    "failures": lambda passed: not passed, "all": lambda _passed: True, "none": lambda _passed: False,
+}  # fmt: skip
+#: chosen: a screen; of more runs the table has a line for all seeds of a row.
+MOST_LINES = 40
+#: chosen: so many failures are told of one by one.
+MOST_FAILURES = 12
+#: What a sweep writes of each run.
+FIGURES = (
+    "virtual_s", "distance_m", "collisions", "min_clearance_m", "trace_sha256", "passed", "failures", "goals_met",
+    "goals_not_judged", "wall_s",
+)  # fmt: skip
+#: What a person should know whose hundred runs are one.
+_ALIKE = 'the seeds made no difference: nothing here is random, as [controller] errors = "realistic" would be'
+_PASSED, _FAILED, _NOT_RUN = "passed", "failed", "not run"
+#: What XML cannot hold.
+_UNWRITABLE = re.compile(r"[^\t\n\r -\ud7ff\ue000-\ufffd]")
+
+
+@dataclass(frozen=True, slots=True)
+class Row:
+    """One run of a sweep."""
+
+    scenario: Scenario
+    #: What the sweep sets for it, beside the seed.
+    settings: tuple[Setting, ...]
+    #: The one command that runs it again.
+    replay: str
+
+    @property
+    def words(self) -> str:
+        """What it is called: parameters and seed."""
+        return ", ".join([*(f"{key} {as_toml(value)}" for key, value in self.settings), f"seed {self.scenario.seed}"])
+
+
+@dataclass(frozen=True, slots=True)
+class Done:
+    """What came of all runs."""
+
+    rows: Sequence[Row]
+    outcomes: Sequence[Json]
+    was_interrupted: bool
+    folder: Path
+
+    def with_word(self, word: str) -> list[tuple[Row, Json]]:
+        """Return the runs of which this came: "passed", "failed", "interrupted" or "not run"."""
+        return [pair for pair in zip(self.rows, self.outcomes, strict=True) if word_of(pair[1]) == word]
+
+    @property
+    def failed(self) -> list[tuple[Row, Json]]:
+        """Those that came to their end and did not pass."""
+        return self.with_word(_FAILED)
+
+
+def word_of(found: Json) -> str:
+    """Return what came of a run, in a word."""
+    if found["passed"]:
+        return _PASSED
+    first = next(iter(cast("Sequence[str]", found["failures"])), "").partition(" (")[0]
+    return first if first in {_NOT_RUN, INTERRUPTED} else _FAILED
+
+
+def command(scenario: str, options: Sequence[str], settings: Sequence[Setting], seed: int) -> str:
+    """Return the command that runs one row."""
+    changed = [word for key, value in settings for word in ("--set", f"{key}={as_toml(value)}")]
+    return shlex.join(["p2os", "run", scenario, *options, *changed, "--seed", str(seed)])
+
+
+def run_sweep(
+    rows: Sequence[Row], folder: Path | None, *, jobs: int, kept: str, raise_if_interrupted: Callable[[], None],
+    force: bool = False,
+) -> Done:  # fmt: skip
+    """Run all rows, so many at a time.
+
+    Raises:
+        UsageError: The folder cannot be made.
+    """
+    whole = folder or make_next_folder(rows[0].scenario.name)
+    places = _places(rows)
+    outcomes: list[Json] = [failure(_NOT_RUN) for _ in rows]
+
+    def job(number: int, look: Callable[[], None]) -> Json:
+        result = run_scenario(
+            rows[number].scenario, whole / places[number], on_progress=lambda _: look(), force=force,
+            is_kept=KEPT[kept],
+        )  # fmt: skip
+        found: Json = {name: result.outcome.get(name) for name in FIGURES}
+        return found | {"folder": str(result.folder) if result.folder.is_dir() else None}
+
+    with _bar(len(rows)) as advance:
+
+        def on_done(number: int, found: Json) -> None:
+            outcomes[number] = found
+            advance(bool(found["passed"]))
+
+        is_whole = run_in_processes(
+            job, len(rows), at_once=jobs, on_done=on_done, raise_if_interrupted=raise_if_interrupted
+        )
+    with contextlib.suppress(OSError):  # it holds runs
+        whole.rmdir()
+    return Done(rows, outcomes, not is_whole, whole)
+
+
+def refuse_junit(path: Path) -> None:
+    """Refuse a JUnit file that cannot be written, before all that is to stand in it.
+
+    Raises:
+        FileError: So it is.
+    """
+    try:
+        path.open("a", encoding="utf-8").close()
+    except OSError as error:
+        raise FileError(
+            f"cannot write {path}: {(error.strerror or '').lower()}", hint="--junit takes a file"
+        ) from error
+
+
+def write_junit(done: Done, path: Path) -> None:
+    """Write what CI services read: a test case a run, with its command, seed and hash.
+
+    Raises:
+        FileError: It cannot be written.
+    """
+    name = done.rows[0].scenario.name
+    left = len(done.with_word(_NOT_RUN)) + len(done.with_word(INTERRUPTED))
+    suite = ET.Element(
+        "testsuite", name=name, tests=str(len(done.rows)), failures=str(len(done.failed)), errors="0", skipped=str(left)
+    )
+    for row, found in zip(done.rows, done.outcomes, strict=True):
+        case = ET.SubElement(suite, "testcase", classname=name, name=row.words, time=str(found.get("wall_s") or 0))
+        properties = ET.SubElement(case, "properties")
+        for key in ("trace_sha256", "folder"):
+            if found.get(key):
+                ET.SubElement(properties, "property", name=key, value=str(found[key]))
+        failures = cast("Sequence[str]", found["failures"])
+        word = word_of(found)
+        if word in {_NOT_RUN, INTERRUPTED}:
+            ET.SubElement(case, "skipped", message=word)
+        elif word == _FAILED:
+            why = _UNWRITABLE.sub("?", "\n".join(failures))
+            ET.SubElement(case, "failure", message=why.partition("\n")[0]).text = f"{why}\n{row.replay}"
+        ET.SubElement(case, "system-out").text = row.replay
+    try:
+        ET.ElementTree(suite).write(path, encoding="utf-8", xml_declaration=True)
+    except OSError as error:
+        raise FileError(f"cannot write {path}: {(error.strerror or '').lower()}") from error
+
+
+def as_json(done: Done) -> Json:
+    """Return all that came of a sweep as one JSON object; times of this machine left out."""
+    found = [
+        {"seed": row.scenario.seed, "parameters": dict(row.settings), "replay": row.replay}
+        | {key: value for key, value in outcome.items() if key != "wall_s"}
+        for row, outcome in zip(done.rows, done.outcomes, strict=True)
+    ]
+    return {
+        "scenario": done.rows[0].scenario.name,
+        "passed": len(done.with_word(_PASSED)),
+        "failed": len(done.failed),
+        "was_interrupted": done.was_interrupted,
+        "runs": found,
+    }
+
+
+def print_sweep(done: Done, console: Console | None = None) -> None:
+    """Print the table, what failed and how to see it again, and at the end the sum, on stdout."""
+    console = console or Console(highlight=False)
+    console.print(_each(done) if len(done.rows) <= MOST_LINES else _summed(done))
+    failed = done.failed
+    for row, found in failed[:MOST_FAILURES]:
+        first = next(iter(cast("Sequence[str]", found["failures"])), "")
+        console.print(f"failed  {row.words}: {first}", markup=False, soft_wrap=True)
+        if found.get("folder"):
+            console.print(f"        {found['folder']}/report.html", markup=False, soft_wrap=True)
+        console.print(f"        {row.replay}", markup=False, soft_wrap=True)
+    if len(failed) > MOST_FAILURES:
+        console.print(f"and {len(failed) - MOST_FAILURES} more; --json and --junit have all")
+    elif not failed:
+        console.print(f"one of them again: {done.rows[0].replay}", markup=False, soft_wrap=True)
+    if _are_seeds_alike(done):
+        console.print(f"note    {_ALIKE}", markup=False, soft_wrap=True)
+    counts = [(word, len(done.with_word(word))) for word in (_PASSED, _FAILED, INTERRUPTED, _NOT_RUN)]
+    summed = ", ".join(f"{count} {word}" for word, count in counts if count or word in {_PASSED, _FAILED})
+    console.print(f"{summed} of {len(done.rows)}", markup=False)
+
+
+def _are_seeds_alike(done: Done) -> bool:
+    """Tell whether the seeds made no difference to any row, where there were several."""
+    hashes: dict[tuple[Setting, ...], list[object]] = {}
+    for row, found in zip(done.rows, done.outcomes, strict=True):
+        hashes.setdefault(row.settings, []).append(found.get("trace_sha256"))
+    return all(len(set(found)) == 1 < len(found) and None not in found for found in hashes.values())
+
+
+def _each(done: Done) -> Table:
+    """Return a table with a line for each run."""
+    keys = _headings([key for key, _ in done.rows[0].settings])
+    table = Table(box=None, pad_edge=False)
+    for heading in (*keys, "seed", "", "time", "way", "clear of", "trace"):
+        table.add_column(heading, justify="right" if heading != "" else "left", overflow="fold")
+    for row, found in zip(done.rows, done.outcomes, strict=True):
+        word = word_of(found)
+        table.add_row(
+            *(as_toml(value) for _, value in row.settings), str(row.scenario.seed),
+            f"[green]{word}[/]" if word == _PASSED else f"[red]{word}[/]", _figure(found, "virtual_s", "s", 1),
+            _figure(found, "distance_m", "m", 2), _figure(found, "min_clearance_m", "m", 3),
+            str(found.get("trace_sha256") or "")[:8],
+        )  # fmt: skip
+    return table
+
+
+def _summed(done: Done) -> Table:
+    """Return a table with a line for all seeds of a row."""
+    keys = _headings([key for key, _ in done.rows[0].settings])
+    table = Table(box=None, pad_edge=False)
+    for heading in (*keys, "passed", "of", "failed seeds"):
+        table.add_column(heading, justify="left" if heading == "failed seeds" else "right", overflow="fold")
+    pairs = zip(done.rows, done.outcomes, strict=True)
+    for settings, group in groupby(pairs, key=lambda pair: pair[0].settings):
+        runs = list(group)
+        bad = [row.scenario.seed for row, found in runs if word_of(found) == _FAILED]
+        good = sum(word_of(found) == _PASSED for _, found in runs)
+        table.add_row(*(as_toml(value) for _, value in settings), str(good), str(len(runs)), _spans(bad))
+    return table
+
+
+def _spans(seeds: Sequence[int]) -> str:
+    """Return seeds in order, neighbours as a range."""
+    found: list[list[int]] = []
+    for seed in sorted(seeds):
+        if found and seed == found[-1][1] + 1:
+            found[-1][1] = seed
+        else:
+            found.append([seed, seed])
+    return ", ".join(f"{first}" if first == last else f"{first}-{last}" for first, last in found)
+
+
+def _headings(keys: Sequence[str]) -> list[str]:
+    """Return the last word of each key, or all of it where two end alike."""
+    last = [key.rpartition(".")[2] for key in keys]
+    return [word if last.count(word) == 1 else key for key, word in zip(keys, last, strict=True)]
+
+
+def _figure(found: Json, key: str, unit: str, places: int) -> str:
+    value = found.get(key)
+    return f"{value:.{places}f} {unit}" if isinstance(value, (int, float)) else ""
+
+
+def _places(rows: Sequence[Row]) -> list[str]:
+    """Return a name for the folder of each run: what it is, with its number in front where two would have one."""
+    names = [re.sub(r"[^\w.-]+", "-", row.words).strip("-")[:80] for row in rows]
+    if len(set(names)) == len(names):
+        return names
+    return [f"{number:0{len(str(len(rows)))}d}-{name}" for number, name in enumerate(names, 1)]
+
+
+@contextlib.contextmanager
+def _bar(count: int) -> Iterator[Callable[[bool], None]]:
+    """Show on a terminal how many runs have ended; yield what is told of each."""
+    bar = Progress(
+        TextColumn("runs"), BarColumn(), MofNCompleteColumn(), TextColumn("{task.fields[failed]}"),
+        console=Console(stderr=True), transient=True, auto_refresh=False, disable=not sys.stderr.isatty(),
+    )  # fmt: skip
+    failed = 0
+
+    def advance(passed: bool) -> None:  # what came of a run is all that it is told
+        nonlocal failed
+        failed += not passed
+        bar.update(task, advance=1, failed=f"{failed} failed" if failed else "", refresh=True)
+
+    with bar:
+        task = bar.add_task("", total=count, failed="")
+        bar.refresh()
+        yield advance
+
+
+def refuse_beside_sweep(**options: object) -> None:
+    """Refuse what one run alone can do.
+
+    Raises:
+        UsageError: One of the options is given.
+    """
+    for name, value in options.items():
+        if value:
+            raise UsageError(
+                f"--{name} cannot stand beside a sweep: it is for one run", hint="--seed and --set take one run of it"
+            )

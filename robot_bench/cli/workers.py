@@ -1,0 +1,125 @@
+"""Work on several processes at once: each piece in a process of its own, which is a fork of this one.
+
+A fork has all that this process has loaded and read, so a piece of work begins at once; and what it does to itself (a
+crash of a library too) is seen by nobody else. What comes of a piece is a JSON object.
+
+A signal ends all of them in good order: each gets SIGINT, and is waited for. A second one, later than three seconds,
+kills what is left. A fork whose parent was killed ends at its next slice.
+
+Invariant: what comes of a piece depends on its number alone, not on how many run at a time, nor on their order.
+"""
+
+import contextlib
+import os
+import signal
+from collections.abc import Callable
+from multiprocessing import get_context
+from multiprocessing.connection import Connection, wait
+from multiprocessing.context import ForkProcess
+
+from robot_bench.events.codec import Json
+from robot_bench.recording.summary import INTERRUPTED
+from simbase.errors import P2osError
+
+#: chosen: how long a signal may wait for this process to look, seconds.
+LOOK_S = 0.1
+#: Called in the fork: (number of the piece, look), where `look` is to be called between slices.
+Job = Callable[[int, Callable[[], None]], Json]
+
+
+def core_count() -> int:
+    """Return how many processors this process may use."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
+def run_in_processes(
+    job: Job,
+    count: int,
+    *,
+    at_once: int,
+    on_done: Callable[[int, Json], None],
+    raise_if_interrupted: Callable[[], None],
+) -> bool:
+    """Do `count` pieces of work; tell whether all were begun and nothing interrupted them.
+
+    Args:
+        job: Does one piece, in a process of its own.
+        count: How many there are, numbered from 0.
+        at_once: How many run at a time.
+        on_done: Called with each piece's number and what came of it, in the order in which they end.
+        raise_if_interrupted: Called often here and in the forks; raises KeyboardInterrupt where a signal has come.
+    """
+    running: dict[int, tuple[ForkProcess, Connection]] = {}
+    waiting = list(range(count))[::-1]
+    is_interrupted = False
+    while running or (waiting and not is_interrupted):
+        try:
+            raise_if_interrupted()
+            while waiting and len(running) < at_once and not is_interrupted:
+                running[waiting[-1]] = _begin(job, waiting[-1], raise_if_interrupted)
+                waiting.pop()
+            ready = wait([pipe for _, pipe in running.values()], timeout=LOOK_S)
+        except KeyboardInterrupt:
+            for process, _ in running.values():
+                _send(process, signal.SIGKILL if is_interrupted else signal.SIGINT)
+            is_interrupted = True
+            continue
+        for number in [number for number, (_, pipe) in running.items() if pipe in ready]:
+            process, pipe = running.pop(number)
+            on_done(number, _result(process, pipe))
+    return not is_interrupted
+
+
+def _begin(job: Job, number: int, raise_if_interrupted: Callable[[], None]) -> tuple[ForkProcess, Connection]:
+    ours, theirs = get_context("fork").Pipe(duplex=False)
+    process = get_context("fork").Process(
+        target=_work, args=(job, number, theirs, os.getpid(), raise_if_interrupted), daemon=True
+    )
+    process.start()
+    theirs.close()
+    return process, ours
+
+
+def _work(job: Job, number: int, pipe: Connection, parent: int, raise_if_interrupted: Callable[[], None]) -> None:
+    """Do a piece of work in this fork, and send what came of it."""
+
+    def look() -> None:
+        raise_if_interrupted()
+        if os.getppid() != parent:
+            raise KeyboardInterrupt("the program that began it has ended")
+
+    try:
+        found = job(number, look)
+    except KeyboardInterrupt:
+        found = failure(INTERRUPTED)
+    except P2osError as error:
+        found = failure(str(error))
+    except Exception as error:  # noqa: BLE001  # a bug there is a failure of this piece, told by its name
+        found = failure(f"this is a bug: {type(error).__name__}: {error}")
+    with contextlib.suppress(OSError):  # nobody waits for it any more
+        pipe.send(found)
+    pipe.close()
+
+
+def failure(why: str) -> Json:
+    """Return what comes of a piece that did not come to its end."""
+    return {"passed": False, "failures": [why]}
+
+
+def _result(process: ForkProcess, pipe: Connection) -> Json:
+    try:
+        found: Json = pipe.recv()
+    except EOFError:
+        process.join()
+        code = process.exitcode or 0
+        how = f"by {signal.Signals(-code).name}" if code < 0 else f"with exit code {code}"
+        return failure(f"its process ended {how}")
+    finally:
+        pipe.close()
+    process.join()
+    return found
+
+
+def _send(process: ForkProcess, what: signal.Signals) -> None:
+    with contextlib.suppress(OSError):  # it has ended meanwhile
+        os.kill(process.pid or 0, what)

@@ -1,0 +1,226 @@
+"""An SD card, by a host that does what the specification says, and by one that does not."""
+
+from collections.abc import Iterable
+from pathlib import Path
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from bluepill_sim.parts import SdCard
+from bluepill_sim.parts.sd_card import BLOCK_BYTES, READ_NS, READY_NS, WRITE_NS, crc7, crc16
+
+BYTE_NS = 1000
+BLOCK = bytes(n * 7 % 256 for n in range(BLOCK_BYTES))
+
+
+class Host:
+    """Clocks bytes into a card; a byte takes a microsecond."""
+
+    def __init__(self, card: SdCard) -> None:
+        self.card, self.now_ns = card, 0
+        card.select(0)
+
+    def send(self, *data: int) -> bytes:
+        got = bytearray()
+        for byte in data:
+            self.now_ns += BYTE_NS
+            got.append(self.card.exchange(byte, self.now_ns))
+        return bytes(got)
+
+    def read(self, count: int) -> bytes:
+        return self.send(*b"\xff" * count)
+
+    def until(self, *wanted: int, at_most: int = 5000) -> int:
+        for _ in range(at_most):
+            byte = self.read(1)[0]
+            if byte in wanted:
+                return byte
+        raise AssertionError(f"none of {wanted} came")
+
+    def command(self, number: int, argument: int = 0, *, crc: int | None = None) -> int:
+        head = bytes((0x40 | number, *argument.to_bytes(4, "big")))
+        self.send(*head, crc7(head) if crc is None else crc)
+        for _ in range(9):
+            if not (byte := self.read(1)[0]) & 0x80:
+                return byte
+        raise AssertionError(f"no answer to CMD{number}")
+
+    def app(self, number: int, argument: int = 0) -> int:
+        self.command(55)
+        return self.command(number, argument)
+
+    def block(self, token: int = 0xFE, count: int = BLOCK_BYTES) -> bytes:
+        self.until(token)
+        data, crc = self.read(count), self.read(2)
+        assert crc == crc16(data).to_bytes(2, "big")
+        return data
+
+    def start(self) -> "Host":
+        assert self.command(0) == 1
+        assert self.command(8, 0x1AA) == 1
+        assert self.read(4) == b"\0\0\1\xaa"
+        began = self.now_ns
+        while self.app(41, 1 << 30):
+            assert self.now_ns - began < 2 * READY_NS
+        return self
+
+
+def test_the_crcs_are_those_of_the_specification() -> None:
+    # Section 4.5: CMD0, CMD17 with argument 0, and 512 bytes of 0xFF.
+    assert [crc7(bytes.fromhex(text)) for text in ("4000000000", "5100000000")] == [0x95, 0x55]
+    assert crc16(b"\xff" * 512) == 0x7FA1
+
+
+def test_it_starts_as_high_capacity_and_no_sooner_than_its_time() -> None:
+    host = Host(SdCard())
+    host.command(0)
+    assert host.command(58) == 1
+    assert host.read(4) == b"\x00\xff\x80\x00", "not powered up"
+    assert host.command(17) == 1 | 4, "illegal while idle"
+    assert host.app(41, 1 << 30) == 1
+    began = host.now_ns
+    host.now_ns = began - BYTE_NS + READY_NS - 20 * BYTE_NS
+    while host.app(41, 1 << 30):
+        pass
+    assert began + READY_NS - 20 * BYTE_NS < host.now_ns < began + READY_NS + 20 * BYTE_NS
+    assert host.command(58) == 0
+    assert host.read(4) == b"\xc0\xff\x80\x00"
+
+
+def test_a_host_that_knows_no_high_capacity_waits_for_ever() -> None:
+    host = Host(SdCard())
+    host.command(0)
+    host.app(41)
+    host.now_ns += 10 * READY_NS
+    assert host.app(41) == 1
+
+
+def test_the_crc_counts_before_spi_mode_and_where_it_is_asked_for() -> None:
+    host = Host(SdCard())
+    assert host.command(0, crc=0x97) == 1 | 8
+    assert host.command(8, 0x1AA, crc=1) == 1 | 8
+    host.start()
+    assert host.command(13, crc=1) == 0
+    assert host.command(59, 1) == 0
+    assert host.command(13, crc=1) == 8
+
+
+@given(st.integers(0, 16383), st.binary(min_size=BLOCK_BYTES, max_size=BLOCK_BYTES))
+@settings(max_examples=20, deadline=None)
+def test_what_is_written_is_read_back(number: int, data: bytes) -> None:
+    host = Host(SdCard()).start()
+    assert host.command(24, number) == 0
+    host.send(0xFF, 0xFE, *data, 0, 0)
+    assert host.read(1)[0] & 0x1F == 5
+    host.until(0xFF)
+    assert host.command(17, number) == 0
+    assert host.block() == data
+
+
+def test_a_block_comes_no_sooner_than_its_time_and_writing_takes_its_time() -> None:
+    host = Host(SdCard()).start()
+    host.command(17, 0)
+    began = host.now_ns
+    host.until(0xFE)
+    # The command ended two bytes before R1; the token follows the byte at which the block is there.
+    assert READ_NS - 2 * BYTE_NS <= host.now_ns - began <= READ_NS
+    host.read(514)
+    host.command(24, 0)
+    host.send(0xFE, *BLOCK, 0, 0)
+    began = host.now_ns
+    assert host.read(2)[1] == 0
+    host.until(0xFF)
+    assert host.now_ns - began == WRITE_NS
+
+
+def test_many_blocks_are_read_and_written_until_they_are_stopped() -> None:
+    card = SdCard()
+    host = Host(card).start()
+    assert host.app(23, 3) == 0
+    assert host.command(25, 100) == 0
+    for n in range(3):
+        host.send(0xFC, *BLOCK[n:], *BLOCK[:n], 0, 0)
+        assert host.read(1)[0] & 0x1F == 5
+        host.until(0xFF)
+    host.send(0xFD, 0xFF)
+    host.until(0xFF)
+    assert (card.writes, host.app(22)) == (3, 0)
+    assert host.block(count=4) == (3).to_bytes(4, "big")
+    assert host.command(18, 100) == 0
+    assert [host.block() for _ in range(3)] == [BLOCK[n:] + BLOCK[:n] for n in range(3)]
+    assert host.command(12) == 0
+    host.until(0xFF)
+    assert host.command(13) == 0
+    assert host.read(1) == b"\0"
+
+
+def test_a_damaged_block_is_refused_where_crcs_count_and_nothing_is_written() -> None:
+    card = SdCard()
+    host = Host(card).start()
+    host.command(59, 1)
+    for crc, answer in ((crc16(BLOCK) ^ 1, 0x0B), (crc16(BLOCK), 5)):
+        assert host.command(24, 9) == 0
+        host.send(0xFE, *BLOCK, *crc.to_bytes(2, "big"))
+        assert host.read(1)[0] & 0x1F == answer
+        host.until(0xFF)
+    assert card.writes == 1
+
+
+def test_its_last_block_is_there_and_the_next_is_not() -> None:
+    host = Host(SdCard(size_mb=1)).start()
+    assert host.command(17, 2047) == 0
+    assert host.block() == bytes(BLOCK_BYTES)
+    assert [host.command(number, 2048) for number in (17, 18, 24, 25)] == [0x20] * 4
+    assert host.command(18, 2047) == 0
+    host.block()
+    assert host.until(0x08) == 0x08, "the end, out of range"
+
+
+def test_csd_and_cid_have_its_size_and_their_own_crc() -> None:
+    host = Host(SdCard(size_mb=3)).start()
+    assert host.command(9) == 0
+    csd = host.block(count=16)
+    assert (csd[0] >> 6, int.from_bytes(csd[7:10], "big") & 0x3FFFFF, csd[15]) == (1, 5, crc7(csd[:15]))
+    host.command(10)
+    cid = host.block(count=16)
+    assert cid[15] == crc7(cid[:15])
+
+
+def test_erased_blocks_are_empty_and_their_neighbours_are_not(tmp_path: Path) -> None:
+    image = tmp_path / "card.img"
+    image.write_bytes(b"\x55" * 512 * 1024)
+    card = SdCard(image=image, save=True)
+    host = Host(card).start()
+    assert [host.command(32, 3), host.command(33, 4), host.command(38)] == [0, 0, 0]
+    host.until(0xFF)
+    assert [set(card.block(n)) for n in (2, 3, 4, 5)] == [{0x55}, {0}, {0}, {0x55}]
+    assert card.files()["img"][3 * 512 : 5 * 512] == bytes(1024)
+    assert set(image.read_bytes()) == {0x55}, "the image stays"
+
+
+@given(
+    st.lists(st.one_of(st.integers(0, 255), st.sampled_from([0x40, 0x51, 0x58, 0x59, 0x4C, 0xFE, 0xFF])), max_size=600)
+)
+@settings(max_examples=15, deadline=None)
+def test_whatever_it_is_sent_it_can_be_started_again(stream: Iterable[int]) -> None:
+    card = SdCard(size_mb=1)
+    host = Host(card).start()
+    host.send(*stream)
+    card.deselect(host.now_ns)
+    host.send(*[0xFF] * 520)  # whatever block was awaited is over
+    saved = card.snapshot()
+    card.deselect(host.now_ns)
+    card.select(host.now_ns)
+    host.now_ns += 10**9
+    host.start()
+    other = SdCard(size_mb=1)
+    other.restore(saved)
+    assert other.snapshot() == saved
+
+
+@pytest.mark.parametrize("size", [1, 512 * 1024 - 1, 512 * 1024 + 512])
+def test_an_image_that_is_no_card_is_refused(tmp_path: Path, size: int) -> None:
+    (tmp_path / "card.img").write_bytes(bytes(size))
+    with pytest.raises(ValueError, match=str(size)):
+        SdCard(image=tmp_path / "card.img")
