@@ -482,13 +482,14 @@ def parts_of(chip: Chip) -> list[Json]:
 
 
 def why_failed(bench: Bench | RemoteBench, failures: Sequence[str]) -> str:
-    """Return the one line of `p2os explain` for a bench that has run; empty where it has no chip to replay."""
+    """Return the one line of `p2os explain` for a bench that has run; empty where that finds no cause."""
     if isinstance(bench, RemoteBench):
         return ""
+    from robot_bench.report.explain.chain import Standing
     from robot_bench.report.explain.explain import explain
 
-    record = bench.record()
-    return explain(replace(record, end={"failures": list(failures)}), bench.scenario.firmware).line
+    found = explain(replace(bench.record(), end={"failures": list(failures)}), bench.scenario.firmware)
+    return found.line if found.standing is Standing.CAUSE else ""
 
 
 def _figures(bench: Bench | RemoteBench, end: Nanos, wall_s: float) -> Json:

@@ -38,13 +38,13 @@ def print_result(result: RunResult, console: Console | None = None) -> None:
         console.print(f"note    {note}", markup=False, soft_wrap=True)
     for line in _hits(outcome):
         console.print(f"hit     {line}", markup=False, soft_wrap=True)
+    if outcome.get(EXPLAINED):
+        console.print(f"why     {outcome[EXPLAINED]} (p2os explain {result.folder})", markup=False, soft_wrap=True)
     for label, key in LABELS:
         # What interrupted a run is no goal, and stands in the last line.
         for goal in cast("Sequence[str]", outcome[key] or ())[key == "failures" and result.was_interrupted :]:
             console.print(label, end="")
             console.print(goal, markup=False, soft_wrap=True)
-    if outcome.get(EXPLAINED):
-        console.print(f"why     {outcome[EXPLAINED]} (p2os explain {result.folder})", markup=False, soft_wrap=True)
     verdict = verdict_of(outcome)
     console.print(
         f"{verdict if result.passed else verdict.upper()}; report: {result.report}", markup=False, soft_wrap=True

@@ -7,6 +7,7 @@ Invariant: the same run gives the same explanation, byte for byte.
 
 import hashlib
 import itertools
+import re
 from collections.abc import Sequence
 from pathlib import Path
 from typing import cast
@@ -20,7 +21,7 @@ from robot_bench.report.explain.chain import Evidence, Explanation, Standing, St
 from robot_bench.report.explain.contact import ContactInquest
 from robot_bench.report.explain.findings import Finding, ended, numbers, obeyed
 from robot_bench.report.explain.probing import NOTICE_NS, Prober
-from robot_bench.report.explain.progress import ProgressInquest, fed
+from robot_bench.report.explain.progress import ProgressInquest, fed, words_of
 from robot_bench.report.explain.replay import ChipReplay
 from robot_bench.report.explain.scene import Scene
 from simbase.errors import P2osError
@@ -122,15 +123,11 @@ def _anything(record: RunRecord, scene: Scene, prober: Prober | None, at: Nanos)
             steps.append(Step(t=reset.at, part="firmware", says=f"is reset by {reset.cause}, while at {reset.place}",
                               evidence=Evidence.REPLAYED))  # fmt: skip
             tail = fed(prober, reset.cause, steps)
-            return Finding(
-                f"the chip was reset by {reset.cause} {(at - reset.at) / NS_PER_S:.2f} s before{tail}"
-            ), steps
+            return Finding(f"{words_of(reset)} reset the chip, {(at - reset.at) / NS_PER_S:.2f} s before{tail}"), steps
         early = max(0, at - NOTICE_NS)
         if not prober.takes_notice(early):
             return ended(prober, early, at, steps), steps
-    return Finding(
-        "nothing kept the program from what it was to do; why it did not is not known", is_cause=False
-    ), steps
+    return Finding("why the program did not do what was wanted is not known", is_cause=False), steps
 
 
 def _contact(scene: Scene, prober: Prober | None, hit: Contact) -> tuple[Finding, list[Step]]:
@@ -146,7 +143,7 @@ def _contact(scene: Scene, prober: Prober | None, hit: Contact) -> tuple[Finding
                           evidence=Evidence.REPLAYED))  # fmt: skip
         tail = fed(prober, reset.cause, steps)
         return Finding(
-            f"the chip was reset by {reset.cause} {(hit.t - reset.at) / NS_PER_S:.2f} s before the contact{tail}"
+            f"{words_of(reset)} reset the chip {(hit.t - reset.at) / NS_PER_S:.2f} s before the contact{tail}"
         ), steps
     return inquest.find(), inquest.steps
 
@@ -176,8 +173,15 @@ def _decided(record: RunRecord, failure: str) -> Nanos:
     if failure.startswith((*_TOUCH, "contact")) and record.contacts:
         return record.contacts[0].t
     says = failure.partition(": ")[2]
-    missed: Verdict | None = next((v for v in record.verdicts if not v.met and v.says == says), None)
+    missed: Verdict | None = next(
+        (v for v in record.verdicts if not v.met and _kind_of(v.says) == _kind_of(says)), None
+    )
     return record.last_ns if missed is None else missed.t
+
+
+def _kind_of(says: str) -> str:
+    """Return the beginning of a verdict without its figures, which a later one of the same goal has otherwise."""
+    return re.sub(r"\d+", "#", says)[:30]
 
 
 def _odd(prober: Prober | None) -> list[str]:
@@ -188,7 +192,7 @@ def _odd(prober: Prober | None) -> list[str]:
     if replay.resets:
         first = replay.resets[0]
         found.append(
-            f"{len(replay.resets)} resets, the first by {first.cause} at {first.at / NS_PER_S:.3f} s, at {first.place}"
+            f"resets: {len(replay.resets)}, the first by {first.cause} at {first.at / NS_PER_S:.3f} s, at {first.place}"
         )
     moments = prober.moments(replay.end, 3)
     if moments and all(prober.takes_notice(at) for at in moments):

@@ -18,6 +18,7 @@ from robot_bench.events.kinds import Pose
 from robot_bench.report.explain.chain import Evidence, Step
 from robot_bench.report.explain.findings import Finding, ended, numbers, obeyed, steady_since
 from robot_bench.report.explain.probing import Prober
+from robot_bench.report.explain.replay import Reset
 from robot_bench.report.explain.scene import Scene
 from simbase.timing import NS_PER_MS, NS_PER_S, Nanos
 
@@ -88,13 +89,12 @@ class ProgressInquest:
             self._step(
                 reset.at,
                 "firmware",
-                f"is reset by {_CAUSES.get(reset.cause, reset.cause)}, while at {reset.place}; stands for "
-                f"{idle / NS_PER_S:.1f} s",
+                f"is reset by {words_of(reset)}, while at {reset.place}; stands for {idle / NS_PER_S:.1f} s",
                 Evidence.REPLAYED,
             )
         first, stood_s = lost[0][0], sum(idle for _, idle in lost) / NS_PER_S
         return Finding(
-            f"{_CAUSES.get(first.cause, first.cause)} reset the chip {_times(len(resets))}, first at "
+            f"{words_of(first)} reset the chip {_times(len(resets))}, first at "
             f"{first.at / NS_PER_S:.3f} s; the robot stood {stood_s:.0f} s for it{self._last_fed(first.cause)}"
         )
 
@@ -210,6 +210,11 @@ _CAUSES = {
     "IWDG": "the independent watchdog (IWDG)", "WWDG": "the window watchdog (WWDG)", "SOFTWARE": "the program itself",
     "PIN": "the reset pin", "LOW_POWER": "a refused low-power mode",
 }  # fmt: skip
+
+
+def words_of(reset: Reset) -> str:
+    """Return what reset the chip."""
+    return _CAUSES.get(reset.cause, reset.cause)
 
 
 def fed(prober: Prober, cause: str, steps: list[Step]) -> str:

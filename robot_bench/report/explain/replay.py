@@ -245,9 +245,10 @@ class ChipReplay:
         engine, found = self.board.chip.engine, list[tuple[Nanos, int]]()
         engine.watchpoints.add(point)
         try:
+            limit = self.board.now_ns
             while self.board.now_ns < until:
-                limit = min(until, self.board.now_ns + FEED_NS)
-                if not engine.is_inside_block:
+                if self.board.now_ns >= limit and not engine.is_inside_block:
+                    limit = min(until, self.board.now_ns + FEED_NS)
                     self._feed(limit)
                 reached = self.board.advance_to(limit)
                 if reached.halt is not None:

@@ -155,7 +155,7 @@ NAMED = (
 OTHERS = (
     Bug(
         name="motor-sign-wrong",
-        edits=(("pins.c", "write_motor(right_motor_wires, right)", "write_motor(right_motor_wires, -right)"),),
+        edits=(("motors_bits.c", "write_code(right_wires, right)", "write_code(right_wires, -right)"),),
         answers=("opposite ways",),
     ),
     Bug(
@@ -202,8 +202,9 @@ OTHERS = (
     ),
     Bug(
         name="sides-exchanged",
-        edits=(("pins.c", "    write_motor(left_motor_wires, left);\n    write_motor(right_motor_wires, right);",
-                "    write_motor(left_motor_wires, right);\n    write_motor(right_motor_wires, left);"),),
+        edits=(("motors_bits.c",
+                "    write_code(left_wires, left);\n    write_code(right_wires, right);",
+                "    write_code(left_wires, right);\n    write_code(right_wires, left);"),),
         answers=("left and right exchanged",), thing=_POST, duration_s=30.0,
     ),
     Bug(

@@ -138,7 +138,7 @@ def test_a_run_that_no_program_could_pass_is_not_explained(unfair: Path) -> None
     found = explain(read_run(unfair), DODGE)
     assert found.standing is Standing.UNKNOWN
     assert {step.part for step in found.steps} >= {"sensor", "firmware", "motion", "contact"}
-    assert any(re.search(r"pins\.c:\d+ \(write_motor\)", step.says) for step in found.steps)
+    assert any(re.search(r"motors_bits\.c:\d+ \(write_code\)", step.says) for step in found.steps)
 
 
 def test_without_the_firmware_the_trace_alone_is_explained(unfair: Path) -> None:
