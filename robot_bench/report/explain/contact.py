@@ -355,11 +355,17 @@ def _is_toward(net: str, asked: Sequence[Mapping[str, Answer]], side: str) -> bo
 def exchanged(nets: Sequence[str], asked: Sequence[Mapping[str, Answer]], side: Callable[[str], str]) -> str:
     """Return which exchange of two would make every answer a turn away, and both sides alike; empty: none, or several.
 
-    Answers that differ from time to time count neither way.
+    Answers that differ from time to time count neither way, and so are no evidence of an exchange: the two that are
+    said to be exchanged always answer alike, each towards its own side where they look to different sides, and
+    an exchange of the sides shows at two sensors of each.
     """
 
     def turns(order: Sequence[int], answers: Mapping[str, Answer]) -> list[tuple[int, int]]:
         return [answers[nets[place]].codes for place in order]
+
+    def are_sure(*pair: str) -> bool:
+        alike = side(pair[0]) == side(pair[1])
+        return all(_is_sure(net, asked) and (alike or _is_toward(net, asked, side(net))) for net in pair)
 
     def is_good(order: Sequence[int]) -> bool:
         for net_place, net in enumerate(nets):
@@ -378,15 +384,19 @@ def exchanged(nets: Sequence[str], asked: Sequence[Mapping[str, Answer]], side: 
     plain = list(range(len(nets)))
     if is_good(plain):
         return ""
-    if is_good(plain[::-1]):
-        swaps = [pair for pair in combinations(plain, 2) if is_good(_swapped(plain, *pair))]
-        if not swaps:
-            return "left and right exchanged, at the sensors or at the motors"
-    else:
-        swaps = [pair for pair in combinations(plain, 2) if is_good(_swapped(plain, *pair))]
-    if len(swaps) == 1:
-        return f"{nets[swaps[0][0]]} and {nets[swaps[0][1]]} exchanged"
-    return ""
+    toward = [side(net) for net in nets if _is_sure(net, asked) and _is_toward(net, asked, side(net))]
+    is_mirrored = is_good(plain[::-1]) and min(toward.count("left"), toward.count("right")) >= 2
+    swaps = [(nets[one], nets[other]) for one, other in combinations(plain, 2) if is_good(_swapped(plain, one, other))]
+    if is_mirrored and not swaps:
+        return "left and right exchanged, at the sensors or at the motors"
+    return next(
+        (f"{one} and {other} exchanged" for one, other in swaps if len(swaps) == 1 and are_sure(one, other)), ""
+    )
+
+
+def _is_sure(net: str, asked: Sequence[Mapping[str, Answer]]) -> bool:
+    """Tell whether a sensor is always answered, and always alike."""
+    return not _varies(net, asked) and all(answers[net].answered is not None for answers in asked)
 
 
 def _varies(net: str, asked: Sequence[Mapping[str, Answer]]) -> bool:
