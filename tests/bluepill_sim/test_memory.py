@@ -143,14 +143,14 @@ def test_priorities_and_lines_beyond_the_chip_are_nothing_to_warn_of(run) -> Non
 
 
 def test_what_is_not_modelled_is_named_once_and_reads_zero(run) -> None:
-    machine = run(store(0x40013400, 1) + load(0x40013400) + load(0x40023C00) + load(0xE0000000) + store(0xE0000E00, 1))
+    machine = run(store(0x40013400, 1) + load(0x40013400) + load(0x40023C00) + load(0xE000EFA0) + store(0xE000EFA4, 1))
     assert machine.log == [0, 0, 0]
     texts = machine.board.warnings
     assert [text.split(" at ")[0] for text in texts] == [
         "TIM8 is not modelled (write of 0x1 to 0x40013400)",
         "no peripheral is here (read of 0x40023c00)",
-        "0xe0000000 of the system control space is not modelled",
-        "0xe0000e00 of the system control space is not modelled",
+        "0xe000efa0 of the system control space is not modelled",
+        "0xe000efa4 of the system control space is not modelled",
     ]
 
 
