@@ -1,7 +1,9 @@
 """What the tests of the adapter share: pins in a dictionary, and a robot behind a line."""
 
+from bisect import bisect_left, bisect_right
 from collections.abc import Callable
 from dataclasses import replace
+from operator import itemgetter
 from pathlib import Path
 
 import pytest
@@ -57,14 +59,18 @@ class FakePins:
 
     def read(self, signal: str, at: Nanos) -> bool:
         self.reads += 1
-        for since, high in reversed(self.history.get(signal, ())):
-            if since <= at:
-                return high
-        return False
+        history = self.history.get(signal, [])
+        # Most reads are of the present.
+        if history and history[-1][0] <= at:
+            return history[-1][1]
+        place = bisect_right(history, at, key=itemgetter(0))
+        return history[place - 1][1] if place else False
 
     def course(self, signal: str, begin: Nanos, end: Nanos) -> list[tuple[Nanos, bool]]:
-        later = [(at, high) for at, high in self.history.get(signal, ()) if begin < at < end]
-        return [(begin, self.read(signal, begin)), *later]
+        history = self.history.get(signal, [])
+        first = bisect_right(history, begin, key=itemgetter(0))
+        later = history[first : bisect_left(history, end, key=itemgetter(0))]
+        return [(begin, history[first - 1][1] if first else False), *later]
 
     def write(self, signal: str, high: bool | None, now: Nanos) -> None:
         self.outputs[signal] = high
