@@ -132,6 +132,7 @@ class Chip(Stateful):
         self.engine, self.processor = make_core(self._measure, memory)
         self.processor.on_fault = on_fault
         self.processor.on_deep_sleep = self._begin_low_power
+        self.processor.on_entry = self._act_on_due
         self.pins = make_pins(self)
         self.fabric = self.pins.fabric
         self.uses_native_core = join_fabric(self.engine, self.fabric)
@@ -423,16 +424,16 @@ class Chip(Stateful):
         if self._flash_repairs:
             self._repair_flash()
         self._drop_written_code()
+        self._act_on_due(self.engine.cycle)  # before a reset that the last block has asked for: C does so too
+        self._drop_written_code()
         if self._requested_reset is not None:
             self.reset(self._requested_reset)
-        cycle = self.engine.cycle
+
+    def _act_on_due(self, cycle: int) -> None:
         systick = self.processor.systick
         if systick.next_cycle is not None and cycle >= systick.next_cycle:
             systick.advance_to(cycle)
         self.fabric.run_events(self._clock.ns_of(cycle))
-        self._drop_written_code()
-        if self._requested_reset is not None:
-            self.reset(self._requested_reset)
 
     def _drop_written_code(self) -> None:
         for address, size in self._written_code:

@@ -13,6 +13,9 @@ anew there. A trace in memory is in the pickle; a file goes on where it stood, a
 written to it since is taken back. So runs that go on from one pickle at the same time need
 a trace in memory.
 
+Robots that share a world (`[[robot]]`) have a bench each, and each of these is one face of the whole: time goes on for
+all of them, a snapshot, a fork and a pickle are those of all, and `robots` has them by name.
+
 Invariant: a bench that was restored from a snapshot goes on as the one that the
 snapshot was taken of.
 """
@@ -21,8 +24,8 @@ import hashlib
 import math
 import pickle
 import re
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, fields, replace
 from importlib.metadata import version
 from pathlib import Path
 from typing import TYPE_CHECKING, Self, TypeAlias, TypeVar, Union, Unpack, cast
@@ -34,28 +37,31 @@ from bluepill_sim.spans import Span, to_nanos
 from p2os.errors import ScenarioError
 from p2os.event_log import log_event, logger
 from p2os.pioneer.body.contract import RobotBody
-from p2os.pioneer.body.factory import body_note, make_body, resolve_body
+from p2os.pioneer.body.factory import body_note, make_body, make_scene, resolve_body
 from p2os.pioneer.controller import Pioneer
 from p2os.pioneer.world import load_world
 from p2os.pioneer.world.model import Pose, World
 from robot_bench.adapter import RUN_ANEW, AnyAdapter, make_adapter
 from robot_bench.direct import DirectRobot, DistanceSensors, JointMotor, WheelEncoder
+from robot_bench.direct.differential.robot import DifferentialRobot
 from robot_bench.direct.senses import WorldSenses
 from robot_bench.direct.wired import AnalogPin, RobotWire
-from robot_bench.events.codec import events_of
+from robot_bench.events.codec import Blocks, events_of
 from robot_bench.events.expectation import ExpectationError
 from robot_bench.events.kinds import Event
-from robot_bench.events.selection import SELECTORS, select, wire_named
+from robot_bench.events.selection import SELECTORS, Wires, select, wire_named
 from robot_bench.events.stream import EventStream
 from robot_bench.events.words import last_words
-from robot_bench.loop import RunLoop
-from robot_bench.pacer import FIRST_SLICE_NS, SliceLength
 from robot_bench.recording.client_view import SipRanges
 from robot_bench.recording.recorder import SAMPLE_NS, Recorder
 from robot_bench.recording.run_record import RunRecord, record_of
 from robot_bench.recording.trace import TraceWriter
+from robot_bench.running.loop import RunLoop
+from robot_bench.running.pacer import FIRST_SLICE_NS, SliceLength
+from robot_bench.running.shared_world import Driven, SharedWorld
 from robot_bench.scenario.fault_script import LINK_DOWN, FaultChange, FaultScript, load_faults
 from robot_bench.scenario.goals.judging import GoalJudge, Judgement
+from robot_bench.scenario.hand_script import Deed, HandScript
 from robot_bench.scenario.scenario import (
     Scenario,
     ScenarioOptions,
@@ -82,6 +88,8 @@ if TYPE_CHECKING:
 AFTER_FAULT_NS: Nanos = 1 * NS_PER_S
 #: Owner of the resistors on the wires.
 RESISTORS = "board"
+#: Owner of the levels that are put on wires by hand.
+BY_HAND = "hand"
 _LOG = logger("bench")
 T = TypeVar("T", bound=Timed)
 #: What `run_until` waits for beside a time: an event in words, or a function of the bench.
@@ -123,6 +131,8 @@ class Bench(Stateful):
         slice_ns: How often the loop gives control back, in virtual time; without effect on the result. None: as often
             as the wall clock wants it.
         on_slice: Called after each slice with the time reached; may raise to end the run.
+        shared: The world that its robot shares with others; None: it is alone.
+        whole: The scenario with all of these.
 
     Raises:
         ScenarioError: The scenario's world refuses it, or its mode has not what it asks for.
@@ -131,11 +141,11 @@ class Bench(Stateful):
     """
 
     STATE = (
-        "made_of", "chip", "_harness", "_robots", "_ranges", "script", "faults", "whens", "recorder", "goals", "loop",
-        "_senses", "_ends_at", "_has_told_death",
+        "made_of", "chip", "_harness", "_robots", "_ranges", "script", "faults", "hands", "whens", "recorder", "goals",
+        "loop", "_senses", "_ends_at", "_has_told_death",
     )  # fmt: skip
     #: What the caller asked of this object; the lines, which are parts of the loop.
-    DERIVED = ("_lines", "_checkpoints", "_expected", "on_slice")
+    DERIVED = ("_lines", "_checkpoints", "_expected", "_mark", "on_slice")
 
     def __init__(
         self,
@@ -145,15 +155,19 @@ class Bench(Stateful):
         chip: Chip | None = None,
         slice_ns: Nanos | None = None,
         on_slice: Callable[[Nanos], None] | None = None,
+        shared: SharedWorld | None = None,
+        whole: Scenario | None = None,
     ) -> None:
         self.scenario = scenario
         self.trace = trace or TraceWriter()
         self.on_slice = on_slice
+        self._shared = shared
+        self._whole = whole or scenario
         pinout = load_pinout()
         world = load_world(scenario.world, seed=scenario.seed)
         refuse_what_its_world_refuses(scenario, world)
-        body = make_body(scenario.body, world, scenario.parameters)
-        body.reset(scenario.start or world.start, scenario.seed)
+        _refuse_several(scenario)
+        body = body_of(scenario, world) if shared is None else shared.body_of(scenario.name)
         self._is_rebuildable = chip is None
         chip = chip or boot(scenario.firmware)
         own = scenario.own_robot
@@ -166,6 +180,8 @@ class Bench(Stateful):
         self._checkpoints: list[tuple[Nanos, object]] = []
         #: What was waited for last, and when the bench stood still after it.
         self._expected: tuple[Nanos, Event | None] = (-1, None)
+        #: Where in the trace the events since then are, and the wires' levels there; None: from its beginning.
+        self._mark: tuple[int, Blocks] | None = None
         #: What stands at the far end of the wires and owns the body.
         self._robots: list[DirectRobot | Endpoint | WiredPart] = []
         self._ranges: SipRanges | None = None
@@ -186,7 +202,8 @@ class Bench(Stateful):
         self.faults = FaultScript(scenario.faults, bring_to=self._bring_robot_to, do=self._inject)
         #: What parts on the board sense of the world; none where nothing is plugged in.
         self._senses = self._plug_in(chip) if scenario.parts else ()
-        followers = (*self._robots, self.script, self.faults, *self._senses)
+        self.hands = HandScript(bring_to=self._bring_robot_to, do=self._do_by_hand)
+        followers = (*self._robots, self.script, self.faults, self.hands, *self._senses)
         self._slices = SliceLength() if slice_ns is None else None
         self.loop = RunLoop(
             chip, followers, observers=(self.recorder,), slice_ns=slice_ns or FIRST_SLICE_NS,
@@ -198,6 +215,7 @@ class Bench(Stateful):
         self.whens = WhenScript(
             scenario.whens, on_end=self._end_now,
             on_change=lambda changes: self.script.add(*changes), on_fault=lambda faults: self.faults.add(*faults),
+            on_deed=lambda deeds: self.hands.add(*deeds),
         )  # fmt: skip
         self.whens.subscribe(self.events)
         self.goals = GoalJudge(scenario.goals)
@@ -211,6 +229,7 @@ class Bench(Stateful):
         hear_usarts(chip, self.recorder)
         chip.subscribe_warnings(lambda text: self.recorder.event("chip", chip.now_ns, "warning", text))
         self.recorder.start()
+        self._join_others()
         self._listeners = self.events.listeners()
 
     @classmethod
@@ -228,7 +247,54 @@ class Bench(Stateful):
             MissingDependencyError: The emulator or the body is not installed.
         """
         found = scenario if isinstance(scenario, Scenario) else load_scenario(str(scenario))
-        return cls(found.with_options(**options))
+        wanted = found.with_options(**options)
+        return next(iter(cls.together(wanted).values())) if wanted.robots else cls(wanted)
+
+    @classmethod
+    def together(
+        cls, scenario: Scenario, *, traces: Mapping[str, TraceWriter] | None = None, slice_ns: Nanos | None = None
+    ) -> dict[str, Self]:
+        """Return the benches of all robots of a scenario that have a chip, by name, in one world.
+
+        Args:
+            scenario: One with several robots.
+            traces: Where the recording of each goes; None records in memory.
+            slice_ns: As of the class.
+
+        Raises:
+            ScenarioError, ImageError, MissingDependencyError: As of the class.
+        """
+        world = load_world(scenario.world, seed=scenario.seed)
+        scene = make_scene(scenario.body, world, [robot.parameters for robot in scenario.robots])
+        scene.reset([robot.start for robot in scenario.robots], scenario.seed)
+        for robot, body in zip(scenario.robots, scene.bodies, strict=True):
+            body.is_powered = robot.scenario is not None
+        shared = SharedWorld(scene, [robot.name for robot in scenario.robots])
+        return {
+            robot.name: cls(
+                robot.scenario, trace=(traces or {}).get(robot.name), slice_ns=slice_ns, shared=shared, whole=scenario
+            )
+            for robot in scenario.robots if robot.scenario is not None
+        }  # fmt: skip
+
+    @property
+    def robots(self) -> Mapping[str, "Bench"]:
+        """The benches of all robots of its world that have a chip, by name; alone in its world, itself."""
+        if self._shared is None:
+            return {self.scenario.name: self}
+        return cast("Mapping[str, Bench]", self._shared.members)
+
+    def _join_others(self) -> None:
+        """Have the body stepped with those of other robots, and these in the trace among the things of the world."""
+        if self._shared is None:
+            return
+        robot = self._robots[-1]
+        if isinstance(robot, DifferentialRobot):
+            robot.is_stepped_by_others = True
+        self._shared.join(self.scenario.name, self, cast("Driven", self.parts.pioneer or robot))
+        for body in self._shared.scene.bodies:
+            if body is not self.parts.body:
+                self.recorder.watch_robot(body)
 
     def __repr__(self) -> str:
         what = self.scenario
@@ -251,7 +317,12 @@ class Bench(Stateful):
 
     @property
     def end(self) -> Nanos:
-        """Return when the run ends, as far as is known now."""
+        """Return when the run ends, as far as is known now; of several robots with the first that ends."""
+        return self.own_end if self._shared is None else self._shared.end
+
+    @property
+    def own_end(self) -> Nanos:
+        """Return when the run would end if this robot were alone."""
         fault, ends = self.chip.fault, [self.scenario.duration_ns]
         if fault is not None and self.chip.has_died:
             ends.append(fault.at_ns + AFTER_FAULT_NS)
@@ -263,9 +334,14 @@ class Bench(Stateful):
         return self.parts.chip.now_ns
 
     @property
+    def _reached(self) -> Nanos:
+        """The time that the robot may be brought to: the chip's own, or that of all."""
+        return self.now if self._shared is None else min(self.now, self._shared.now)
+
+    @property
     def pose(self) -> Pose:
         """Where the robot is now: metres and radians of the world's plan."""
-        self._bring_robot_to(self.now)
+        self._bring_robot_to(self._reached)
         state = self.parts.body.state
         return Pose(state.x_m, state.y_m, state.heading_rad, state.z_m)
 
@@ -285,15 +361,33 @@ class Bench(Stateful):
         Raises:
             UsageError: There is no such wire.
         """
+        return self.parts.harness[wire_named(wire, self._wires)].level(self.now)
+
+    @property
+    def _wires(self) -> Wires | None:
+        """The wires of a robot on own pins; None: those of the pin-out."""
         own = self.scenario.own_robot
-        return self.parts.harness[wire_named(wire) if own is None else own.wire_named(wire)].level(self.now)
+        return None if own is None else own.wires
 
     def record(self) -> RunRecord:
         """Return what was recorded so far: poses, edges, texts, packets and the state log, each with its time."""
         return record_of(self.recorder.lines())
 
     def judge(self) -> Judgement:
-        """End the run here and judge the scenario's goals; what an unfinished run could still meet is left open."""
+        """End the run here and judge the scenario's goals; what an unfinished run could still meet is left open.
+
+        Of several robots the goals of all, each with the robot's name before it.
+        """
+        if self._shared is None:
+            return self.judge_own()
+        found = {name: bench.judge_own() for name, bench in self.robots.items()}
+        return Judgement(*(
+            [f"{name}: {goal}" for name, one in found.items() for goal in getattr(one, field.name)]
+            for field in fields(Judgement)
+        ))  # fmt: skip
+
+    def judge_own(self) -> Judgement:
+        """End the run here and judge the goals of this robot."""
         return self.goals.finish(self.finish(), planned_ns=self.scenario.planned_ns)
 
     def run_until(
@@ -333,9 +427,23 @@ class Bench(Stateful):
         if end_ns > self.now and self.events.released_until >= self.now:
             raise UsageError(f"the run was ended at {self.now / NS_PER_S:g} s", hint="make another Bench")
         had_died = self.chip.has_died
-        self.loop.run_until(end_ns, advance)
+        if self._shared is None:
+            self.loop.run_until(end_ns, advance)
+        elif advance is not None:
+            raise UsageError("a debugger's steps are for a robot alone in its world", hint="a scenario with one robot")
+        else:
+            self._shared.run_to(end_ns)
         if self.chip.has_died and not had_died:
             _LOG.error("chip: %s", self.chip.verdict)
+
+    def on_step_of_all(self, listener: Callable[[Nanos], None]) -> None:
+        """Have the time told after each step of all robots of its world; the listener may raise to end the run."""
+        if self._shared is not None:
+            self._shared.on_step = listener
+
+    def run_own_loop(self, end: Nanos) -> None:
+        """Run this robot alone, as `SharedWorld` asks for it."""
+        self.loop.run_until(end)
 
     def _limit(self, within: Span | None, since: Nanos) -> Nanos:
         return self.end if within is None else since + to_nanos(within)
@@ -354,7 +462,7 @@ class Bench(Stateful):
 
     def _wait_for(self, words: str, within: Span | None) -> Event | None:
         """Run until an event happens, counted from the last one that was waited for where nothing was done since."""
-        selector, since, last = select(words), self._since, self._expected[1]
+        selector, since, last = select(words, self._wires), self._since, self._expected[1]
         limit, found = self._limit(within, since), list[Event]()
 
         def take(event: Event) -> None:
@@ -362,9 +470,11 @@ class Bench(Stateful):
                 found.append(event)
 
         if since < self.now:
-            for event in events_of(self.trace.lines()):
+            for event in self._told_since_mark():
                 if type(event) in selector.kinds:
                     take(event)
+        if not found:
+            self._mark_here()
         end = self.events.subscribe(take, *selector.kinds, wires=selector.wires)
         try:
             # What happened until the limit is told at the pose after it.
@@ -373,6 +483,20 @@ class Bench(Stateful):
             end()
         self._expected = (self.now, found[0]) if found else (-1, None)
         return found[0] if found else None
+
+    def _mark_here(self) -> None:
+        """Note where the trace stands: what is found from now on is told in it from here on."""
+        told = self.events.released_until
+        nets = tuple(self.parts.harness)
+        levels = bytearray(not net.wave(told) and net.level(told) for net in nets) if told >= 0 else bytearray()
+        self._mark = (self.trace.length, Blocks(tuple(net.name for net in nets), levels)) if levels else None
+
+    def _told_since_mark(self) -> Iterable[Event]:
+        """Return the events since the last wait began, so that no wait reads the whole trace."""
+        if self._mark is None:
+            return events_of(self.trace.lines())
+        length, blocks = self._mark
+        return events_of(self.trace.lines(length), begun=replace(blocks, levels=bytearray(blocks.levels)))
 
     def expect(self, words: str, within: Span | None = None) -> Event:
         """Run until an event happens and return it.
@@ -424,7 +548,7 @@ class Bench(Stateful):
             UsageError: There is no such wire or level.
         """
         __tracebackhide__ = True
-        select(f"pin {pin} {level}")
+        select(f"pin {pin} {level}", self._wires)
         if self.level(pin) is not (level == "high"):
             self.expect(f"pin {pin} {level}", within)
 
@@ -563,7 +687,8 @@ class Bench(Stateful):
 
     def checkpoint(self) -> None:
         """Keep the present state, so that `rewind` to a later time is quick; some 100 kB."""
-        self._checkpoints.append((self.now, self.snapshot()))
+        for bench in self.robots.values():
+            bench._checkpoints.append((bench.now, self.snapshot()))  # noqa: SLF001  # one of its own kind
 
     def rewind(self, to: Span) -> None:
         """Go back to a time: to the newest checkpoint before it, and on from there; the trace forgets what came after.
@@ -577,7 +702,8 @@ class Bench(Stateful):
             raise UsageError(
                 f"{at / NS_PER_S:g} s is not reached yet: it is {self.now / NS_PER_S:g} s", hint="run_until"
             )
-        self._checkpoints = [(t, snapshot) for t, snapshot in self._checkpoints if t <= at]
+        for bench in self.robots.values():
+            bench._checkpoints = [(t, snapshot) for t, snapshot in bench._checkpoints if t <= at]  # noqa: SLF001  # its kind
         self.restore(self._checkpoints[-1][1] if self._checkpoints else self._at_beginning())
         self._run_to(at)
 
@@ -587,9 +713,10 @@ class Bench(Stateful):
         Raises:
             TypeError, UsageError, FileError: As of `restore`.
         """
-        self.events.drop_later(self._listeners)
-        self.on_slice = None
-        self._checkpoints.clear()
+        for bench in self.robots.values():
+            bench.events.drop_later(bench._listeners)  # noqa: SLF001  # one of its own kind
+            bench.on_slice = None
+            bench._checkpoints.clear()  # noqa: SLF001  # as above
         self.restore(snapshot)
 
     def fork(self) -> "Bench":
@@ -599,24 +726,39 @@ class Bench(Stateful):
             TypeError: The bench has a chip of the caller's.
         """
         self._refuse_a_chip_of_others()
-        slice_ns = self.loop.slice_ns if self._slices is None else None
-        other = Bench(self.scenario, slice_ns=slice_ns)
-        other.restore(self._with_trace(self.snapshot(), "".join(self.trace.lines())))
+        other = self._anew()
+        written = {name: "".join(bench.trace.lines()) for name, bench in self.robots.items()}
+        other.restore(self._with_traces(self.snapshot(), written))
         return other
+
+    def _anew(self) -> "Bench":
+        """Return a bench of the same at its beginning, with its trace in memory."""
+        slice_ns = self.loop.slice_ns if self._slices is None else None
+        if self._shared is None:
+            return Bench(self.scenario, slice_ns=slice_ns)
+        return Bench.together(self._whole, slice_ns=slice_ns)[self.scenario.name]
 
     def _at_beginning(self) -> object:
         """Return the snapshot of this bench at time 0, whose trace has no more than its first line."""
         self._refuse_a_chip_of_others()
-        head = next((line for line in self.trace.lines() if self.trace.has_meta), "")
-        of_file = self.trace.path is not None
-        snapshot = self._with_trace(Bench(self.scenario).snapshot(), len(head.encode()) if of_file else head)
-        _recorder(snapshot)["has_meta"] = self.trace.has_meta
+        written: dict[str, str | int] = {}
+        for name, bench in self.robots.items():
+            head = next((line for line in bench.trace.lines() if bench.trace.has_meta), "")
+            written[name] = len(head.encode()) if bench.trace.path is not None else head
+        snapshot = self._with_traces(self._anew().snapshot(), written)
+        for part, bench in zip(self._own_parts(snapshot), self.robots.values(), strict=True):
+            _recorder(part)["has_meta"] = bench.trace.has_meta
         return snapshot
 
-    @staticmethod
-    def _with_trace(snapshot: object, written: str | int) -> object:
-        _recorder(snapshot)["written"] = written
+    def _with_traces(self, snapshot: object, written: Mapping[str, str | int]) -> object:
+        """Return a snapshot whose traces hold this much."""
+        for part, text in zip(self._own_parts(snapshot), written.values(), strict=True):
+            _recorder(part)["written"] = text
         return snapshot
+
+    def _own_parts(self, snapshot: object) -> Sequence[object]:
+        """Return the parts of a snapshot that are each robot's own, in the order of `robots`."""
+        return [snapshot] if self._shared is None else cast("dict[str, Sequence[object]]", snapshot)["_own"]
 
     def _refuse_a_chip_of_others(self) -> None:
         if not self._is_rebuildable:
@@ -624,13 +766,26 @@ class Bench(Stateful):
 
     def finish(self) -> Nanos:
         """Bring everything to the end of the run and write the rest of the trace; return the end's time."""
-        end = min(self.now, self.end)
+        end = min(self._reached, self.end)
+        for bench in self.robots.values():
+            bench.finish_own(end)
+        return end
+
+    def finish_own(self, end: Nanos) -> None:
+        """Bring the parts of this robot to the end of the run and write the rest of its trace."""
         if self.events.released_until >= end:
-            return end
+            return
         self.loop.finish(end)
         self.goals.end_at(end, self.scenario.planned_ns)
         self.recorder.finish(end)
-        return end
+
+    def snapshot(self) -> PartState:
+        """Return all that decides the future, of all robots of its world, as a value."""
+        return self.own_snapshot() if self._shared is None else self._shared.snapshot()
+
+    def own_snapshot(self) -> PartState:
+        """Return what is this robot's own of it."""
+        return super().snapshot()
 
     def restore(self, snapshot: object) -> None:
         """Put back what `snapshot` returned, the trace too; the end of the run and its goals may be others.
@@ -640,23 +795,34 @@ class Bench(Stateful):
             UsageError: It is of another version, firmware, world, seed or other setting that decides the run.
             FileError: The trace's file is not the one that was begun.
         """
-        made_of = snapshot.get("made_of") if isinstance(snapshot, PartState) else None
-        if isinstance(made_of, dict):
-            _refuse_others(made_of, self.made_of)
+        parts = self._own_parts(snapshot) if isinstance(snapshot, PartState) and "_own" in snapshot else [snapshot]
+        for part, bench in zip(parts, self.robots.values(), strict=False):
+            made_of = part.get("made_of") if isinstance(part, PartState) else None
+            if isinstance(made_of, dict):
+                _refuse_others(made_of, bench.made_of)
+        if self._shared is None:
+            self.restore_own(snapshot)
+        else:
+            self._shared.restore(snapshot)
+
+    def restore_own(self, snapshot: object) -> None:
+        """Put back what `own_snapshot` returned, as `restore` asks for it."""
         super().restore(snapshot)
         self._pins.chip_restored()
-        self._expected = -1, None
+        self._expected, self._mark = (-1, None), None
         if self.goals.is_behind:
             self.goals.catch_up(events_of(self.trace.lines()), self.events.released_until)
 
     def __reduce__(self) -> "tuple[Callable[[str, bytes], Bench], tuple[str, bytes]]":
         if not self._is_rebuildable:
             raise TypeError("a bench with a chip of the caller's cannot be pickled: pickle its snapshot()")
-        if not self.trace.has_end:
-            self.trace.flush()
-        path = None if self.trace.path is None else self.trace.path.absolute()
+        paths: dict[str, Path | None] = {}
+        for name, bench in self.robots.items():
+            if not bench.trace.has_end:
+                bench.trace.flush()
+            paths[name] = None if bench.trace.path is None else bench.trace.path.absolute()
         slice_ns = self.loop.slice_ns if self._slices is None else None
-        recipe = pickle.dumps((self.scenario, slice_ns, path, self.snapshot()))
+        recipe = pickle.dumps((self._whole, self.scenario.name, slice_ns, paths, self.snapshot()))
         return _built_anew, (version("p2os"), recipe)
 
     def _watch_wires(self, now: Nanos) -> None:
@@ -693,6 +859,19 @@ class Bench(Stateful):
                 line.is_cut = op == "fault"
         elif self.parts.pioneer is not None:
             self.parts.pioneer.do(words, at)
+
+    def _do_by_hand(self, deed: Deed) -> None:
+        self.recorder.event("hand", deed.at, deed.do, deed.words)
+        if deed.do == "type":
+            getattr(self.chip, deed.place).receive(deed.text)
+        elif deed.do == "set_volts":
+            cast("AnalogPin", self.chip.pin(deed.place)).set_volts(deed.volts)
+        elif deed.place not in [net.name for net in self.parts.harness]:
+            self.chip.pin(deed.place).drive(deed.level)
+        elif deed.level is None:
+            self.parts.harness[deed.place].release(BY_HAND, deed.at)
+        else:
+            self.parts.harness[deed.place].drive(BY_HAND, deed.level, Strength.PUSH_PULL, deed.at)
 
     def _build(self, pinout: Pinout, world: World, body: RobotBody, chip: Chip, harness: Harness) -> BenchParts:
         if self.scenario.own_robot is not None:
@@ -780,6 +959,18 @@ class Bench(Stateful):
         return adapter, pioneer
 
 
+def body_of(scenario: Scenario, world: World) -> RobotBody:
+    """Return the body of a scenario's robot alone in a world, standing where it begins."""
+    body = make_body(scenario.body, world, scenario.parameters)
+    body.reset(scenario.start or world.start, scenario.seed)
+    return body
+
+
+def _refuse_several(scenario: Scenario) -> None:
+    if scenario.robots:
+        raise TypeError("a scenario with several robots has a bench each: Bench.from_scenario, or Bench.together")
+
+
 def _built_anew(saved_by: str, recipe: bytes) -> Bench:
     """Return the bench of a pickle; the version is looked at before anything that another one may have changed.
 
@@ -788,8 +979,12 @@ def _built_anew(saved_by: str, recipe: bytes) -> Bench:
     """
     _refuse_others({_VERSION: saved_by}, {_VERSION: version("p2os")})
     try:
-        scenario, slice_ns, path, snapshot = pickle.loads(recipe)  # noqa: S301 - within a pickle already
-        bench = Bench(scenario, slice_ns=slice_ns, trace=TraceWriter(path, goes_on=path is not None))
+        scenario, name, slice_ns, paths, snapshot = pickle.loads(recipe)  # noqa: S301 - within a pickle already
+        traces = {one: TraceWriter(path, goes_on=path is not None) for one, path in paths.items()}
+        if scenario.robots:
+            bench = Bench.together(scenario, traces=traces, slice_ns=slice_ns)[name]
+        else:
+            bench = Bench(scenario, slice_ns=slice_ns, trace=traces[name])
         bench.restore(snapshot)
     except (TypeError, AttributeError, ImportError) as error:
         raise UsageError(f"the bench was saved by another state of this version: {error}", hint=RUN_ANEW) from error

@@ -20,11 +20,11 @@ from p2os.protocol.sip import SIP_KINDS, StandardSip
 from p2os.transport import Transport
 from robot_bench.adapter import make_adapter
 from robot_bench.bench import boot, hear_usarts, log_bench_event, make_harness
-from robot_bench.loop import RunLoop
-from robot_bench.pacer import PACED_SLICE_NS, RealTimePacer
 from robot_bench.recording.client_view import OdometryPose, SipRanges
 from robot_bench.recording.recorder import Recorder
 from robot_bench.recording.trace import TraceWriter
+from robot_bench.running.loop import RunLoop
+from robot_bench.running.pacer import PACED_SLICE_NS, RealTimePacer
 from robot_bench.scenario.goals.judging import GoalJudge
 from robot_bench.scenario.scenario import Scenario
 from robot_bench.wires.chip_pins import ChipPins

@@ -15,8 +15,8 @@ import base64
 import contextlib
 import hashlib
 import math
-from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
 from importlib.metadata import version
 from pathlib import Path
 from typing import TYPE_CHECKING, TypeVar
@@ -30,16 +30,16 @@ from p2os.transport import Transport
 from p2os.transport.wall_clock import Clock, wall_clock
 from robot_bench.bench import Bench, pins_of
 from robot_bench.events.codec import Json
-from robot_bench.pacer import PACED_SLICE_NS, RealTimePacer
 from robot_bench.recording.run_folder import remove_run, reserved
 from robot_bench.recording.run_record import TRACE_NAME, read_run
-from robot_bench.recording.summary import INTERRUPTED, end_of_a_broken_run, outcome_of
+from robot_bench.recording.summary import INTERRUPTED, end_of_a_broken_run, outcome_of, outcome_of_all
 from robot_bench.recording.trace import TraceWriter
 from robot_bench.remote import RemoteBench
-from robot_bench.report.make import REPORT_NAME, Artefacts, make_artefacts
+from robot_bench.report.make import REPORT_NAME, Artefacts, make_artefacts, write_report_of_all
+from robot_bench.running.pacer import PACED_SLICE_NS, RealTimePacer
 from robot_bench.scenario.scenario import Scenario
 from robot_bench.wires.ports import Chip
-from simbase.errors import P2osError
+from simbase.errors import P2osError, UsageError
 from simbase.timing import NS_PER_MS, NS_PER_S, Nanos
 
 if TYPE_CHECKING:
@@ -101,6 +101,7 @@ def run_scenario(
     profile: bool = False,
     fail_under: float = 0.0,
     is_kept: Callable[[bool], bool] = lambda _passed: True,
+    explained: bool = False,
 ) -> RunResult:
     """Run a scenario in virtual time and make its run folder.
 
@@ -117,11 +118,19 @@ def run_scenario(
         profile: Write where its cycles went; likewise.
         fail_under: With `coverage`, the run fails where fewer percent of the lines ran; 0 asks for nothing.
         is_kept: Told whether the run passed; where it says no, nothing is made of the run and its folder is removed.
+        explained: Whether the report says of a run that failed why (`p2os explain`), which takes some seconds.
 
     Raises:
         P2osError: The folder is not free, a file cannot be read or written, or a part is not installed.
         BluePillError: The firmware file cannot be read, or the emulator is not installed.
     """
+    if scenario.robots:
+        if drive is not None or coverage or profile:
+            raise UsageError("a debugger, coverage and profile are for a robot alone", hint="a scenario with one robot")
+        return run_together(
+            scenario, folder, slice_ns=slice_ns, speed=speed, on_progress=on_progress, clock=clock, force=force,
+            is_kept=is_kept,
+        )  # fmt: skip
     pacer = None if speed is None else RealTimePacer(speed=speed, clock=clock)
     with reserved(folder, force=force), _trace_of(scenario, folder, is_at_port=False) as trace:
         bench = Bench(scenario, trace=trace, slice_ns=slice_ns or (PACED_SLICE_NS if pacer else UNPACED_SLICE_NS))
@@ -135,7 +144,7 @@ def run_scenario(
         bench.on_slice = after_slice
         trace.meta(meta_of(scenario, bench.parts.world, bench.note, is_at_port=False))
         with _measured(bench.chip, coverage=coverage, profile=profile, fail_under=fail_under) as measurement:
-            return _record(bench, trace, folder, pacer, clock, drive, measurement, is_kept)
+            return _record(bench, trace, folder, pacer, clock, drive, measurement, is_kept, explained=explained)
 
 
 def run_at_port(
@@ -159,6 +168,9 @@ def run_at_port(
         P2osError: The folder is not free, a file cannot be read or written, or a part is not installed.
         BluePillError: The firmware file cannot be read, or the emulator is not installed.
     """
+    if scenario.robots:
+        transport.close()
+        raise UsageError("a real robot is driven by a scenario with one robot", hint="leave out [[robot]]")
     pacer = RealTimePacer(clock=clock)
     with contextlib.ExitStack() as stack:
         stack.callback(transport.close)
@@ -175,13 +187,14 @@ def run_at_port(
         return _record(bench, trace, folder, pacer, clock, drive)
 
 
-def write_run(bench: Bench, folder: Path, failure: str = "") -> Path:
+def write_run(bench: Bench, folder: Path, failure: str = "", *, explained: str = "") -> Path:
     """Write what a bench with its trace in memory has recorded so far as a run folder; return its report's path.
 
     Args:
         bench: It has run as far as it will.
         folder: Made where it is missing; a run that is there is overwritten.
         failure: Why it failed; empty where it did not.
+        explained: What `why_failed` says of it; empty where nobody asked.
 
     Raises:
         UsageError: The folder holds something that is no run, or is written by another run.
@@ -192,6 +205,8 @@ def write_run(bench: Bench, folder: Path, failure: str = "") -> Path:
     end |= {"goals_met": goals.met, "goals_not_judged": goals.not_judged}
     if not failure:
         end |= {"passed": True, "failures": []}
+    if explained:
+        end |= {"explained": explained}
     meta = meta_of(bench.scenario, bench.parts.world, bench.note, is_at_port=False)
     with reserved(folder, force=True), contextlib.closing(TraceWriter(folder / TRACE_NAME)) as trace:
         trace.meta(meta)
@@ -211,6 +226,7 @@ def meta_of(scenario: Scenario, world: World | None, note: str | None, *, is_at_
         "description": scenario.description,
         "text": scenario.text,
         "firmware": scenario.firmware.name,
+        "firmware_path": str(scenario.firmware.absolute()),
         "firmware_sha256": _sha256_of(scenario.firmware),
         "mode": "port" if is_at_port else scenario.mode,
         "body": "remote" if is_at_port else resolve_body(scenario.body),
@@ -293,6 +309,16 @@ def doing(bench: Bench | RemoteBench) -> str:
     return f"{wheels}  {text}".strip()
 
 
+@dataclass(frozen=True, slots=True)
+class _Driven:
+    """How a bench was run to its end."""
+
+    end: Nanos
+    wall_s: float
+    failures: tuple[str, ...]
+    was_interrupted: bool
+
+
 def _record(
     bench: _AnyBench,
     trace: TraceWriter,
@@ -302,8 +328,21 @@ def _record(
     drive: Callable[[_AnyBench], None] | None,
     measurement: "Measurement | None" = None,
     is_kept: Callable[[bool], bool] = lambda _passed: True,
+    *,
+    explained: bool = False,
 ) -> RunResult:
     """Run to the end, judge the goals, write the trace's last line, and make the rest of the folder."""
+    driven = _drive(bench, pacer, clock, drive)
+    passed = _conclude(bench, trace, folder, pacer, driven, measurement, explained=explained)
+    made = make_artefacts(folder) if is_kept(passed) else _removed(folder)
+    _LOG.info("%s %s: %s", bench.scenario.name, "passed" if passed else "failed", made.report)
+    return RunResult(folder=folder, outcome=made.outcome, report=made.report, was_interrupted=driven.was_interrupted)
+
+
+def _drive(
+    bench: _AnyBench, pacer: RealTimePacer | None, clock: Clock, drive: Callable[[_AnyBench], None] | None
+) -> _Driven:
+    """Run a bench to its end; what goes wrong in the midst of it is a failure of the run."""
     failures: list[str] = []
     was_interrupted = False
     began = clock()
@@ -326,7 +365,21 @@ def _record(
             bench.finish()
         raise
     end = bench.finish()
-    wall_s = (clock() - began) / NS_PER_S
+    return _Driven(end, (clock() - began) / NS_PER_S, tuple(failures), was_interrupted)
+
+
+def _conclude(
+    bench: Bench | RemoteBench,
+    trace: TraceWriter,
+    folder: Path,
+    pacer: RealTimePacer | None,
+    driven: _Driven,
+    measurement: "Measurement | None" = None,
+    *,
+    explained: bool = False,
+) -> bool:
+    """Judge the goals and write the trace's last line; tell whether the run passed."""
+    failures, end = list(driven.failures), driven.end
     for failure in failures:
         _LOG.error("%s: %s", bench.scenario.name, failure)
     if bench.chip.has_died:
@@ -338,7 +391,7 @@ def _record(
     goals = bench.goals.finish(end, planned_ns=bench.scenario.planned_ns)
     passed = not failures and not goals.missed
     trace.end(
-        _figures(bench, end, wall_s)
+        _figures(bench, end, driven.wall_s)
         | {
             "trace_sha256": trace.sha256,
             "passed": passed,
@@ -351,10 +404,61 @@ def _record(
             "worst_lag_ms": None if pacer is None else round(pacer.worst_lag_ns / NS_PER_MS, 1),
         }
         | measured
+        | (
+            {"explained": line}
+            if explained and not passed and (line := why_failed(bench, failures + goals.missed))
+            else {}
+        )
     )
-    made = make_artefacts(folder) if is_kept(passed) else _removed(folder)
-    _LOG.info("%s %s: %s", bench.scenario.name, "passed" if passed else "failed", made.report)
-    return RunResult(folder=folder, outcome=made.outcome, report=made.report, was_interrupted=was_interrupted)
+    return passed
+
+
+def run_together(
+    scenario: Scenario,
+    folder: Path,
+    *,
+    slice_ns: Nanos | None = None,
+    speed: float | None = None,
+    on_progress: ProgressListener | None = None,
+    clock: Clock = wall_clock,
+    force: bool = False,
+    is_kept: Callable[[bool], bool] = lambda _passed: True,
+) -> RunResult:
+    """Run a scenario with several robots: a run folder for each inside of `folder`, and there what came of all.
+
+    Arguments and errors as of `run_scenario`.
+    """
+    pacer = None if speed is None else RealTimePacer(speed=speed, clock=clock)
+    with contextlib.ExitStack() as stack:
+        traces: dict[str, TraceWriter] = {}
+        for own in scenario.programmed:
+            stack.enter_context(reserved(folder / own.name, force=force))
+            traces[own.name] = stack.enter_context(_trace_of(own, folder / own.name, is_at_port=False))
+        length = slice_ns or (PACED_SLICE_NS if pacer else UNPACED_SLICE_NS)
+        benches = Bench.together(scenario, traces=traces, slice_ns=length)
+        first = next(iter(benches.values()))
+
+        def after_step(now: Nanos) -> None:
+            if pacer is not None:
+                pacer.keep_pace(now)
+            if on_progress is not None:
+                on_progress(Progress(now=now, duration_ns=scenario.duration_ns, doing=lambda: doing(first)))
+
+        first.on_step_of_all(after_step)
+        for name, bench in benches.items():
+            traces[name].meta(meta_of(bench.scenario, bench.parts.world, bench.note, is_at_port=False))
+        driven = _drive(first, pacer, clock, None)
+        passed = [_conclude(bench, traces[name], folder / name, pacer, driven) for name, bench in benches.items()]
+        made = {
+            name: make_artefacts(folder / name) if is_kept(all(passed)) else _removed(folder / name) for name in benches
+        }
+    outcome = outcome_of_all(scenario.name, {name: one.outcome for name, one in made.items()})
+    report = folder / REPORT_NAME
+    if is_kept(all(passed)):
+        write_report_of_all(outcome, folder)
+    else:
+        remove_run(folder)
+    return RunResult(folder=folder, outcome=outcome, report=report, was_interrupted=driven.was_interrupted)
 
 
 def _removed(folder: Path) -> Artefacts:
@@ -375,6 +479,16 @@ def parts_of(chip: Chip) -> list[Json]:
             row["png"] = base64.b64encode(picture.png(picture.scale())).decode()
         found.append(row)
     return found
+
+
+def why_failed(bench: Bench | RemoteBench, failures: Sequence[str]) -> str:
+    """Return the one line of `p2os explain` for a bench that has run; empty where it has no chip to replay."""
+    if isinstance(bench, RemoteBench):
+        return ""
+    from robot_bench.report.explain.explain import explain
+
+    record = bench.record()
+    return explain(replace(record, end={"failures": list(failures)}), bench.scenario.firmware).line
 
 
 def _figures(bench: Bench | RemoteBench, end: Nanos, wall_s: float) -> Json:

@@ -49,6 +49,7 @@ ALLOWED = {
     "adapter_sim": {"p2os"},
     "robot_bench": {"p2os", "bluepill_sim", "adapter_sim", "typer", "rich", "click"},
     "robot_bench.report": {"p2os", "matplotlib"},
+    "robot_bench.report.explain": {"p2os", "bluepill_sim", "adapter_sim"},
     "robot_bench.recording.event_files": {"pyarrow"},
     "robot_bench.cli.pytest_plugin": {"p2os", "bluepill_sim", "pytest"},
 }
@@ -59,7 +60,8 @@ IO_LAYER = (
     "p2os.pioneer.serve.fleet",
     "p2os.pioneer.serve.control_line", "p2os.client.robot_thread", "p2os.client.aio", "simbase.interrupts",
     "bluepill_sim.cli", "bluepill_sim.cli.console",
-    "robot_bench.cli", "robot_bench.pacer", "robot_bench.live", "robot_bench.report", "robot_bench.firmware.build",
+    "robot_bench.cli", "robot_bench.running.pacer", "robot_bench.live", "robot_bench.report",
+    "robot_bench.firmware.build",
 )  # fmt: skip
 
 #: What may log beside the I/O layer: what joins models to lines, and the bench. A model tells its owner by a callback.
@@ -84,7 +86,7 @@ LAYERS = {
         ("masters", "driver"), ("adapter",),
     ),
     "robot_bench": (
-        ("loop", "pacer", "firmware", "scenarios"), ("wires",), ("events",), ("direct",), ("recording",),
+        ("running", "firmware", "scenarios"), ("wires",), ("events",), ("direct",), ("recording",),
         ("scenario", "report"),
         ("adapter",), ("bench",), ("remote",), ("run", "project"), ("cli",),
     ),

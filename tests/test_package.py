@@ -21,6 +21,8 @@ from pathlib import Path
 import pytest
 from packaging.requirements import Requirement
 
+from tests.tools.made_once import made_once
+
 ROOT = Path(__file__).resolve().parent.parent
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
 PACKAGES = ("simbase", "p2os", "bluepill_sim", "adapter_sim", "robot_bench")
@@ -143,16 +145,21 @@ def words(licence: str) -> list[str]:
 
 @pytest.fixture(scope="module")
 def builder(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    return python_of(tmp_path_factory.mktemp("builder"), *PROJECT["build-system"]["requires"])
+    def make(place: Path) -> Path:
+        return python_of(place, *PROJECT["build-system"]["requires"])
+
+    return made_once(tmp_path_factory, "builder", make)
 
 
 @pytest.fixture(scope="module")
 def sdist(builder: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    place = tmp_path_factory.mktemp("sdist")
-    for name in tracked():
-        (place / "clone" / name).parent.mkdir(parents=True, exist_ok=True)
-        shutil.copy2(ROOT / name, place / "clone" / name)
-    return built(build(builder, place / "clone", "sdist", place), place)
+    def make(place: Path) -> Path:
+        for name in tracked():
+            (place / "clone" / name).parent.mkdir(parents=True, exist_ok=True)
+            shutil.copy2(ROOT / name, place / "clone" / name)
+        return built(build(builder, place / "clone", "sdist", place), place)
+
+    return made_once(tmp_path_factory, "sdist", make)
 
 
 @pytest.fixture
@@ -164,10 +171,12 @@ def unpacked(sdist: Path, tmp_path: Path) -> Path:
 
 @pytest.fixture(scope="module")
 def wheel(builder: Path, sdist: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    place = tmp_path_factory.mktemp("wheel")
-    with tarfile.open(sdist) as archive:
-        archive.extractall(place, filter="data")
-    return built(build(builder, place / sdist.name.removesuffix(".tar.gz"), "wheel", place), place)
+    def make(place: Path) -> Path:
+        with tarfile.open(sdist) as archive:
+            archive.extractall(place, filter="data")
+        return built(build(builder, place / sdist.name.removesuffix(".tar.gz"), "wheel", place), place)
+
+    return made_once(tmp_path_factory, "wheel", make)
 
 
 @pytest.mark.slow

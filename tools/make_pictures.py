@@ -22,6 +22,7 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
+from hardware.case.picture import draw
 from hardware.pcb.circuit.design import BOARD_VARIANTS, VARIANTS
 from hardware.pcb.outputs import generated_files, pictures
 from hardware.pcb.spice.decks import decks
@@ -74,6 +75,8 @@ def groups() -> Iterator[Group]:
         yield Group(names=tuple(f"board/{variant}-{page}.png" for page in pictures.pages_shown(variant)),
                     files=(f"hardware/pcb/generated/{variant}/*.kicad_sch", BOARD),
                     make=lambda variant=variant: pictures.schematic_pictures(variant))  # fmt: skip
+    yield Group(names=("board/case.png",), files=("hardware/case/generated/*.stl", "hardware/case/picture.py"),
+                make=make_case)  # fmt: skip
     for deck in decks():
         yield Group(names=(f"board/sim-{deck.name}.png",), files=(BOARD,), text=repr(deck),
                     make=lambda deck=deck: make_plot(deck))  # fmt: skip
@@ -94,6 +97,11 @@ def make_board(variant: str) -> None:
     """Render a board with its pours filled."""
     with tempfile.TemporaryDirectory() as folder:
         pictures.board_pictures(variant, generated_files.filled_project(variant, Path(folder)))
+
+
+def make_case() -> None:
+    """Draw the case from its STL files."""
+    draw(ROOT / "hardware" / "case" / "generated", PICTURES / "board" / "case.png")
 
 
 def make_plot(deck: object) -> None:

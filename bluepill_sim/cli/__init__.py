@@ -2,7 +2,7 @@
 
 import typer
 
-from bluepill_sim.cli import coverage, debug, info, parts, pins, profile, run, trace
+from bluepill_sim.cli import compare_silicon, coverage, debug, info, parts, pins, profile, run, trace
 
 HELP = """Run, look into and debug a BluePill program, without a robot.
 
@@ -15,7 +15,7 @@ def register(app: typer.Typer) -> None:
     """Add the verb and what is below it."""
     mcu = typer.Typer(help=HELP, rich_markup_mode=None, invoke_without_command=True)
     mcu.callback()(_without_command)
-    for module in (run, parts, debug, info, pins, trace, coverage, profile):
+    for module in (run, parts, debug, info, pins, trace, coverage, profile, compare_silicon):
         module.register(mcu)
     app.add_typer(mcu, name="mcu", rich_help_panel="BluePill")
 

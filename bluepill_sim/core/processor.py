@@ -129,6 +129,8 @@ class Processor(Stateful):
         self.on_fault: FaultListener | None = None
         #: Called when the core falls asleep with SLEEPDEEP.
         self.on_deep_sleep: Callable[[], None] = lambda: None
+        #: Called with the cycle to which the entry of an exception has come, to act on what is due by then.
+        self.on_entry: Callable[[int], None] = lambda _cycle: None
         #: Why a debugger's halt ended the last run; None where none did.
         self.halt: Halt | None = None
         self.ccr = STKALIGN
@@ -450,9 +452,28 @@ class Processor(Stateful):
             number = self._stacking_failed(number, return_address, frame_at)
             if not number:
                 return
-        self._record(return_address, number)
-        self._start_handler(number, frame_at, exc_return | 1, cpsr)
+        began = self.cycle
         self.engine.cycle += ENTRY_CYCLES
+        number = self._latest(number)
+        self.engine.log.add((began, return_address, number))
+        self._start_handler(number, frame_at, exc_return | 1, cpsr)
+
+    def _latest(self, number: int) -> int:
+        """Act on what comes while the frame is written; return the exception whose handler starts.
+
+        One that comes late and has a higher priority is it, while the other stays pending (ARM B1.5.9).
+        """
+        self.on_entry(self.engine.cycle)
+        first = self.nvic.first_pending()
+        if first is None or not self._is_before(first, number):
+            return number
+        if not self._memory.read_word(self.vector_table + 4 * first):
+            return number
+        self.nvic.pend(number)
+        return first
+
+    def _is_before(self, first: int, number: int) -> bool:
+        return self.nvic.can_preempt(first, self.nvic.group_priority(self.nvic.priority(number)))
 
     def _stacking_failed(self, number: int, pc: int, frame_at: int) -> int:
         """Return the exception to take in place of one that cannot be stacked; 0 after a lockup."""

@@ -214,6 +214,8 @@ USART = Struct(
         Field("rx", "u32", RECEIVED, "what DR will read, and above it the flags of SR"),
     ),
 )
+#: chosen: bytes that a part on an SPI may say ahead.
+AHEAD_BYTES = 256
 SPI = Struct(
     "spi",
     "What an SPI holds beyond its registers. RM0008 25.3.",
@@ -234,6 +236,11 @@ SPI = Struct(
         Field("selected", "u32", doc="parts that are selected"),
         Field("far", "u32", doc="the word that a master outside sends; 0: none"),
         Field("wants_words", "u32", doc="somebody has subscribed to words"),
+        Field("ahead_count", "u32", doc="how many bytes the part has said ahead,"),
+        Field("ahead_at", "u32", doc="and how many of them have gone over;"),
+        Field("ahead_cr1", "u32", doc="they hold while this is CR1,"),
+        Field("ahead_sent", "u32", doc="and while this is sent: above 0xFF whatever is"),
+        Field("ahead", "u8", AHEAD_BYTES),
         Field("is_stopped", "u32", doc="its clock stands still"),
     ),
 )

@@ -37,6 +37,21 @@ class SpiDevice(Protocol):
         ...
 
 
+class AheadDevice(Protocol):
+    """What a part on an SPI may have besides, so that long reads are fast: it is not called for each byte then."""
+
+    def ahead(self, count: int) -> tuple[bytes, int | None]:
+        """Return what it sends next, up to `count` bytes, and the byte that it must be sent meanwhile; None: any.
+
+        They go over while it alone is selected; another byte, another mode or the deselect ends that.
+        """
+        ...
+
+    def went(self, count: int) -> None:
+        """Take that so many of them have gone over: as if `exchange` had been called for each."""
+        ...
+
+
 class I2cDevice(Protocol):
     """A part on an I2C: called at the end of each byte, before its acknowledge."""
 

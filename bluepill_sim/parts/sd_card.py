@@ -14,6 +14,7 @@ Invariant: blocks that nobody wrote are those of the image.
 """
 
 from collections import deque
+from itertools import islice
 from pathlib import Path
 from typing import ClassVar
 
@@ -177,6 +178,17 @@ class SdCard(Stateful):
                 self._command.clear()
                 self._do(command, at_ns)
         return answer
+
+    def ahead(self, count: int) -> tuple[bytes, int | None]:
+        """Return what is left of an answer or a block, while 0xFF is sent."""
+        if self._command or self._taken is not None:
+            return b"", None
+        return bytes(islice(self._out, count)), 0xFF
+
+    def went(self, count: int) -> None:
+        """Drop what has gone over."""
+        for _ in range(count):
+            self._out.popleft()
 
     def _answer(self, at_ns: Nanos) -> int:
         if self._out:

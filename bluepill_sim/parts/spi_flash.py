@@ -112,6 +112,20 @@ class SpiFlash(Stateful):
             self._page[(self._address + position - _ADDRESSED_BYTES) % PAGE_BYTES] = byte
         return 0xFF
 
+    def ahead(self, count: int) -> tuple[bytes, int | None]:
+        """Return what a read sends next, whatever it is sent."""
+        if not self._is_answering or self._head[0] not in {_READ, _FAST_READ}:
+            return b"", None
+        number = self._count - _HEAD_BYTES[self._head[0]]
+        if number < 0:
+            return b"", None
+        first = (self._address + number) % SIZE_BYTES
+        return bytes(self.memory[first : first + count]), None
+
+    def went(self, count: int) -> None:
+        """Go on behind what has gone over."""
+        self._count += count
+
     @property
     def _address(self) -> int:
         return int.from_bytes(self._head[1:4], "big") % SIZE_BYTES

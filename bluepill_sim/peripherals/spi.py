@@ -11,9 +11,10 @@ Invariant: `native.selected` is the number of parts that are selected.
 
 from collections.abc import Callable, Sequence
 from enum import IntEnum
+from typing import cast
 
-from bluepill_sim.extension.layout import SPI
-from bluepill_sim.fabric.bus_parts import SpiDevice
+from bluepill_sim.extension.layout import AHEAD_BYTES, SPI
+from bluepill_sim.fabric.bus_parts import AheadDevice, SpiDevice
 from bluepill_sim.fabric.fabric import OWN_COMMANDS, WORD
 from bluepill_sim.fabric.pins import ALTERNATE_FUNCTIONS, PinDrive
 from bluepill_sim.fabric.ports import ChipPorts
@@ -23,7 +24,7 @@ from simbase.timing import Nanos
 
 CR1, CR2, SR, DR = range(4)
 CPHA, CPOL, MSTR, SPE, LSBFIRST, DFF = (1 << n for n in (0, 1, 2, 6, 7, 11))
-_BR_AT, _HELD = 3, 1 << 16
+_BR_AT, _HELD, _WHATEVER = 3, 1 << 16, 0xFFFF_FFFF
 _CR2 = bits((7, 5), (2, 0))
 #: Pins (MISO, MOSI, NSS, SCK), by the value of the remap bit (RM0008 table 56, DS5319 table 5).
 PINS = {
@@ -211,6 +212,7 @@ class Spi(Peripheral):
     def on_reset(self) -> None:
         """Drop what is on its way."""
         self._coming = ()
+        self._settle()
         self._route_changed()
 
     def deliver(self) -> None:
@@ -239,6 +241,7 @@ class Spi(Peripheral):
         return 0
 
     def _exchange(self, word: int) -> int:
+        self._settle()
         control, now_ns, began_ns = self.words[CR1], self.chip.now_ns, self.native.word_ns
         heard = [
             one.device for one in self._hung
@@ -252,7 +255,29 @@ class Spi(Peripheral):
             for device in heard:
                 answer &= device.exchange(byte, now_ns)
             got = got << 8 | answer
+        if len(heard) == 1 == self.native.selected and not control & (DFF | LSBFIRST):
+            self._look_ahead(heard[0], control)
         return _reversed(got, 8 * count) if control & LSBFIRST else got
+
+    def _look_ahead(self, device: SpiDevice, control: int) -> None:
+        """Take what the part says that it will send next, so that it need not be asked for each byte."""
+        if (ahead := getattr(device, "ahead", None)) is None:
+            return
+        data, while_sent = ahead(AHEAD_BYTES)
+        native = self.native
+        native.ahead[: len(data)] = data
+        native.ahead_count, native.ahead_at, native.ahead_cr1 = len(data), 0, control
+        native.ahead_sent = _WHATEVER if while_sent is None else while_sent
+
+    def _settle(self) -> None:
+        """Tell the part how much of what it said ahead has gone over."""
+        native = self.native
+        if native.ahead_count:
+            went, native.ahead_count = native.ahead_at, 0
+            native.ahead_at = 0
+            if went:
+                heard = [one.device for one in self._hung if one.since_ns is not None]
+                cast("AheadDevice", heard[0]).went(went)
 
     def _understands(self, device: SpiDevice, control: int) -> bool:
         """Tell whether a part bears mode and clock; each is warned of."""
@@ -273,6 +298,7 @@ class Spi(Peripheral):
     # Pins.
 
     def _follow_selects(self) -> None:
+        self._settle()
         now_ns = self.chip.now_ns
         for one in self._hung:
             if one.select is None:

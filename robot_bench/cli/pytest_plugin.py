@@ -8,10 +8,16 @@
 Markers say what a test runs in (`scenario`, `worlds`, `modes`, `bodies`, `seeds`, `faults`), and `booted` from where
 on: what was booted once is kept, and each test that wants the same begins there. Nothing of a test is seen by another.
 
+For programs that talk to a robot there is a served virtual one: the fixture `served` is its URL, `robot` a client.
+
+    def test_it_drives_half_a_metre(robot):
+        robot.drive(0.5)
+
 Invariant: a test's run depends on its markers, the options and what it does itself; not on the tests before it, nor
 on the worker that it runs in.
 """
 
+import contextlib
 import itertools
 import re
 from collections.abc import Generator, Iterator
@@ -22,6 +28,8 @@ from typing import TYPE_CHECKING, Any
 import pytest
 
 if TYPE_CHECKING:
+    from p2os import Robot
+    from p2os.pioneer.serve.background_host import ServedPioneer
     from robot_bench.bench import Bench
     from robot_bench.scenario.scenario import Scenario
 
@@ -35,6 +43,7 @@ _MARKERS = (
     "seeds(*seeds): run it with each seed; a text such as '0-9' is a range",
     "faults(*words, at='0 s'): run it with each of these faults, injected at a time",
     "booted(event='note adapter driving'): begin where this event has happened; it is waited for once for all tests",
+    "pioneer(robot='p2dx', world='room', body, seed, url): the virtual robot of the fixtures served and robot",
 )
 #: What a test waits for first that is marked `booted`, in mode adapter.
 _BOOTED = "note adapter driving"
@@ -120,7 +129,7 @@ class _Pool:
             self._lent[id(bench)] = key, begin
             return bench
         self.built += 1
-        bench = Bench(scenario)
+        bench = Bench.from_scenario(scenario)
         if booted is not None:
             bench.expect(booted, within=_BOOT_WITHIN)
         self._lent[id(bench)] = key, bench.snapshot()
@@ -153,6 +162,35 @@ def bench(request: pytest.FixtureRequest) -> "Iterator[Bench]":
     item.stash[_BENCH] = made
     yield made
     pool.give_back(made)
+
+
+@pytest.fixture
+def served(request: pytest.FixtureRequest, tmp_path: Path) -> "Iterator[ServedPioneer]":
+    """A virtual robot that is served in real time, for this test alone: its URL, and orders to it."""
+    from p2os.pioneer.serve import served_pioneer
+    from simbase.errors import P2osError
+
+    mark = request.node.get_closest_marker("pioneer")
+    wanted: dict[str, Any] = {"body": request.config.getoption("--bench-body") or "best"}
+    wanted |= {} if mark is None else mark.kwargs
+    if wanted.get("url") == "pty:":
+        wanted["url"] = f"pty:{tmp_path / 'robot'}"
+    with contextlib.ExitStack() as stack:
+        try:
+            made = stack.enter_context(served_pioneer(**wanted))
+        except (P2osError, TypeError) as error:  # a type error: a word of the marker that it does not take
+            hint = getattr(error, "hint", None)
+            pytest.fail(f"{error}{f' (hint: {hint})' if hint else ''}", pytrace=False)
+        yield made
+
+
+@pytest.fixture
+def robot(served: "ServedPioneer") -> "Iterator[Robot]":
+    """A client that is connected to a virtual robot: a `p2os.Robot`."""
+    from p2os import Robot
+
+    with Robot(served) as made:
+        yield made
 
 
 def _scenario_of(item: pytest.Item, chosen: dict[str, Any]) -> "Scenario":
@@ -198,13 +236,18 @@ def pytest_runtest_makereport(item: pytest.Item, call: pytest.CallInfo[None]) ->
 
 def _record(item: pytest.Item, used: "Bench", report: Any, failure: str) -> None:
     """Write the run folder of a test, and tell where it is."""
-    from robot_bench.run import write_run
+    from bluepill_sim.errors import BluePillError
+    from robot_bench.run import why_failed, write_run
     from simbase.errors import P2osError
 
     name = re.sub(r"[^\w.-]+", "_", item.nodeid.replace("::", "-")).strip("_")
     folder = item.config.rootpath / str(item.config.getoption("--bench-out")) / name
+    said, why = failure.partition("\n")[0], ""
     try:
-        page = write_run(used, folder, failure.partition("\n")[0])
+        if said:
+            with contextlib.suppress(P2osError, BluePillError):
+                why = why_failed(used, [said])
+        page = write_run(used, folder, said, explained=why)
     except (P2osError, OSError) as error:  # a test's own outcome counts
         report.sections.append(("bench: no report", str(error)))
         return
@@ -213,6 +256,8 @@ def _record(item: pytest.Item, used: "Bench", report: Any, failure: str) -> None
     firmware = item.config.getoption("--firmware")
     options = f" --firmware {firmware}" if firmware else ""
     picture = folder / "path.png"
+    if why:
+        report.sections.append(("bench: why", why))
     lines = [f"report:   {page}", *([f"picture:  {picture}"] if picture.is_file() else [])]
     report.sections.append(
         ("bench: look, and replay", "\n".join([*lines, f"replay:   pytest '{item.nodeid}'{options}"]))

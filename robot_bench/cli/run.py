@@ -43,7 +43,8 @@ HELP = """Run a scenario: a BluePill program drives a robot.
 
 The firmware boots on an emulated board, and its pins drive the robot.
 
-SCENARIO is one of those that ship (free-drive, motors, sensors, encoders, dodge)
+SCENARIO is one of those that ship (free-drive, motors, sensors, encoders, dodge,
+rover, two-dodge)
 or a TOML file. What the options leave open is the scenario's. The run folder holds
 the trace, the pins as VCD and for PulseView, and report.html.
 
@@ -210,7 +211,7 @@ def run(
         if gdb is None:
             result = run_scenario(
                 wanted, folder, speed=realtime, on_progress=display.update, force=force,
-                coverage=coverage, profile=profile, fail_under=fail_under,
+                coverage=coverage, profile=profile, fail_under=fail_under, explained=True,
             )  # fmt: skip
         else:
             from robot_bench.cli.gdb import debug_bench

@@ -10,7 +10,7 @@ from rich.console import Console
 from rich.table import Table
 
 from bluepill_sim.program.last_blocks import TITLE
-from robot_bench.recording.summary import LISTED_HITS, verdict_of
+from robot_bench.recording.summary import EXPLAINED, LISTED_HITS, verdict_of
 from robot_bench.run import RunResult
 from simbase.errors import shown
 
@@ -43,6 +43,8 @@ def print_result(result: RunResult, console: Console | None = None) -> None:
         for goal in cast("Sequence[str]", outcome[key] or ())[key == "failures" and result.was_interrupted :]:
             console.print(label, end="")
             console.print(goal, markup=False, soft_wrap=True)
+    if outcome.get(EXPLAINED):
+        console.print(f"why     {outcome[EXPLAINED]} (p2os explain {result.folder})", markup=False, soft_wrap=True)
     verdict = verdict_of(outcome)
     console.print(
         f"{verdict if result.passed else verdict.upper()}; report: {result.report}", markup=False, soft_wrap=True
@@ -65,7 +67,9 @@ def _hits(outcome: Mapping[str, object]) -> list[str]:
 
 def rows(outcome: Mapping[str, object]) -> list[tuple[str, str]]:
     """Return the table's rows: name, and value with its unit."""
-    what = f"{outcome['scenario']} in {outcome['world']}, mode {outcome['mode']}, body {outcome['body']}"
+    mode = f"{outcome['mode']}" if "robots" in outcome else f"mode {outcome['mode']}"
+    what = f"{outcome['scenario']} in {outcome['world']}, {mode}, body {outcome['body']}"
+    robots = cast("Mapping[str, Mapping[str, object]]", outcome.get("robots", {}))
     found = [
         ("scenario", f"{what}, seed {outcome['seed']}"),
         ("virtual time", _with_unit(outcome["virtual_s"], ".1f", "s")),
@@ -77,8 +81,16 @@ def rows(outcome: Mapping[str, object]) -> list[tuple[str, str]]:
         ("printed", _printed(outcome)),
         ("coverage", _coverage(outcome.get("coverage"))),
         ("trace", str(outcome["trace_sha256"] or "")[:16]),
+        *((name, _robot(one)) for name, one in robots.items()),
     ]  # fmt: skip
     return [(name, value) for name, value in found if value]
+
+
+def _robot(outcome: Mapping[str, object]) -> str:
+    """Return the figures of one of several robots."""
+    figures = (("distance_m", "drove {:.2f} m"), ("min_clearance_m", "clear of {:.3f} m"))
+    found = [form.format(outcome[key]) for key, form in figures if outcome[key] is not None]
+    return ", ".join([*found, f"trace {str(outcome['trace_sha256'] or '')[:8]}"])
 
 
 def _printed(outcome: Mapping[str, object]) -> str:

@@ -18,7 +18,7 @@ from dataclasses import dataclass
 
 from adapter_sim.codec import BitOrder
 from adapter_sim.settings import MotorCommand
-from p2os.pioneer.body.contract import BodyState, RobotBody
+from p2os.pioneer.body.contract import BodyState, RobotBody, WheelAngles
 from robot_bench.direct.distance import DistanceSensors
 from robot_bench.direct.encoder import WheelEncoder
 from robot_bench.direct.motor import JointMotor
@@ -122,19 +122,29 @@ class DirectRobot(Stateful):
         return self._next_encoder + missed * self._encoder_period_ns
 
     def _step_to(self, limit: Nanos) -> None:
-        body, dt_ns = self.body, self.body.dt_ns
-        left, right = self._left, self._right
-        wanted = limit // dt_ns
+        body, left, right = self.body, self._left, self._right
+        wanted = limit // body.dt_ns
         while self._steps < wanted:
-            start = self._steps * dt_ns
-            speeds = left.step(start) / UM_PER_M, right.step(start) / UM_PER_M
-            if (left.asked, right.asked) != self._asked:
-                self._asked = (left.asked, right.asked)
-                self._tell(start, "command", f"motors {left.asked}, {right.asked}")
+            speeds = self.next_setpoints()
             alike = wanted - self._steps if left.is_steady and right.is_steady else 1
-            for _ in range(alike):
+            stood = body.stand_still(alike) if speeds == (0.0, 0.0) else 0
+            for _ in range(alike - stood):
                 body.step(*speeds)
             self._steps += alike
+
+    def next_setpoints(self) -> tuple[float, float]:
+        """Return the rim-speed set-points of the body's next step, m/s; for who steps it together with others, too."""
+        start = self._steps * self.body.dt_ns
+        left, right = self._left, self._right
+        speeds = left.step(start) / UM_PER_M, right.step(start) / UM_PER_M
+        if (left.asked, right.asked) != self._asked:
+            self._asked = (left.asked, right.asked)
+            self._tell(start, "command", f"motors {left.asked}, {right.asked}")
+        return speeds
+
+    def take_step(self, wheels: WheelAngles) -> None:  # noqa: ARG002  # the state has them
+        """Count a step that was made with `next_setpoints`."""
+        self._steps += 1
 
     def _show_encoders(self, now: Nanos) -> None:
         state: BodyState = self.body.state

@@ -331,15 +331,21 @@ class Blocks:
 _TOGGLED = (b"\1\0", b"\0\1")
 
 
-def events_of(lines: Iterable[str], where: str = "the trace") -> Iterator[Event]:
+def events_of(lines: Iterable[str], where: str = "the trace", begun: Blocks | None = None) -> Iterator[Event]:
     """Play back a trace: yield the events of a run in the order in which its subscribers got them.
 
     It ends with the last whole line, whether the run came to its end or was killed.
 
+    Args:
+        lines: Of the trace.
+        where: What a message calls it.
+        begun: The wires and their levels before the first of these lines, where they do not begin with the trace.
+
     Raises:
         TraceError: A line is damaged, or of a later version.
     """
-    blocks, edges, places = Blocks(), deque[PinEdge](), dict[str, int]()
+    blocks, edges = begun or Blocks(), deque[PinEdge]()
+    places = {net: place for place, net in enumerate(blocks.nets)}
     for number, entry in enumerate(entries_of(lines), start=1):
         try:
             event = event_of(entry)

@@ -5,6 +5,9 @@ r"""Which events are meant: one line of words, the same in goals, scenario files
     usart1 matches ^left=\d+      a line that it prints matches a regular expression
     contact [NAME]                the hull comes to touch something, or this thing
     robot near X Y RADIUS         it comes within so many metres of a place
+    robot within X Y X Y          it comes into a rectangle: its least x and y, its greatest
+    robot drives 2.5              its way from the beginning has become so many metres
+    time 5.0                      so many seconds are over: at the first pose from then on
     robot moves | robot stops     it is faster, or no faster, than 5 mm/s
     sonar 3 below 0.4             a range comes below so many metres
     note adapter driving          a line of a part's state log begins so
@@ -19,14 +22,20 @@ import math
 import re
 from collections.abc import Callable, Mapping
 from functools import cache
+from typing import TypeAlias
 
 from adapter_sim.pinout import load_pinout
 from robot_bench.events.kinds import Contact, Event, Fault, Note, PinEdge, Pose, Ranges, Text, WorldChange
 from simbase.errors import UsageError, shown
 from simbase.state import Stateful
+from simbase.timing import NS_PER_S
 
 #: chosen: a robot that is no faster stands still; half of the slowest motor step would be 31 mm/s.
 STILL_MPS = 0.005
+
+
+#: Name or pin → the wire's name.
+Wires: TypeAlias = Mapping[str, str]
 
 
 class Selector(Stateful):
@@ -44,8 +53,12 @@ class Selector(Stateful):
         raise NotImplementedError
 
 
-def select(words: str) -> Selector:
+def select(words: str, wires: Wires | None = None) -> Selector:
     """Return what picks the events that a line of words means.
+
+    Args:
+        words: The line.
+        wires: Names of a robot's own wires, and its pins of the chip; None: those of the pin-out.
 
     Raises:
         UsageError: There are no such events; the hint says what is nearest, or how it is written.
@@ -60,7 +73,8 @@ def select(words: str) -> Selector:
         raise UsageError(f"no events {shown(words)}", hint=hint)
     usage, make = row
     try:
-        return make(words, rest[0] if rest else "")
+        told = rest[0] if rest else ""
+        return make(words, told) if wires is None or make is not _Pin else _Pin(words, told, wires)
     except (ValueError, re.error) as error:
         raise UsageError(f"events {shown(words)} are not understood: {error}", hint=f"such as {usage}") from error
 
@@ -71,13 +85,13 @@ def _wires() -> Mapping[str, str]:
     return {wire.bluepill: wire.name for wire in wires} | {wire.name: wire.name for wire in wires}
 
 
-def wire_named(name: str) -> str:
-    """Return the name of a wire, by itself or by the BluePill's pin.
+def wire_named(name: str, wires: Wires | None = None) -> str:
+    """Return the name of a wire, by itself or by the BluePill's pin; `wires` as of `select`.
 
     Raises:
         UsageError: There is no such wire.
     """
-    wires = _wires()
+    wires = _wires() if wires is None else wires
     if name not in wires:
         near = difflib.get_close_matches(name, wires, n=1, cutoff=0.5)
         hint = f"did you mean {near[0]!r}?" if near else f"known are {', '.join(sorted(wires))}"
@@ -86,24 +100,21 @@ def wire_named(name: str) -> str:
 
 
 class _Pin(Selector):
-    STATE = ("_begun",)
     kinds = (PinEdge,)
 
-    def __init__(self, words: str, rest: str) -> None:
+    def __init__(self, words: str, rest: str, wires: Wires | None = None) -> None:
         super().__init__(words)
         name, level = rest.split() if len(rest.split()) == 2 else ("", "")
         if level not in {"high", "low", "changes"}:
             raise ValueError("a pin, and high, low or changes")
-        self._wire = wire_named(name)
+        self._wire = wire_named(name, wires)
         self.wires = (self._wire,)
         self._wanted = {"high": True, "low": False}.get(level)
-        self._begun = False
 
     def takes(self, event: Event) -> bool:
         if not isinstance(event, PinEdge) or event.wire != self._wire:
             return False
-        begun, self._begun = self._begun, True
-        if not begun and self._wanted is None:
+        if event.t == 0 and self._wanted is None:
             return False  # the level that a wire begins with is no change
         return self._wanted is None or event.level is self._wanted
 
@@ -164,28 +175,55 @@ class _Contact(Selector):
 
 
 class _Robot(Selector):
-    STATE = ("_was",)
+    STATE = ("_was", "_last", "_way_m")
     kinds = (Pose,)
 
     def __init__(self, words: str, rest: str) -> None:
         super().__init__(words)
         verb, *numbers = rest.split() or [""]
+        self._last: tuple[float, float] | None = None
+        self._way_m = 0.0
         self._is: Callable[[Pose], bool]
         if verb == "near" and len(numbers) == 3:
             x_m, y_m, radius_m = map(float, numbers)
             self._is = lambda pose: math.hypot(pose.x_m - x_m, pose.y_m - y_m) <= radius_m
+        elif verb == "within" and len(numbers) == 4:
+            low_x, low_y, high_x, high_y = map(float, numbers)
+            self._is = lambda pose: low_x <= pose.x_m <= high_x and low_y <= pose.y_m <= high_y
+        elif verb == "drives" and len(numbers) == 1:
+            wanted_m = float(numbers[0])
+            self._is = lambda _: self._way_m >= wanted_m
         elif verb in {"moves", "stops"} and not numbers:
             self._is = lambda pose: moves(pose) is (verb == "moves")
         else:
-            raise ValueError("near X Y RADIUS, moves, or stops")
+            raise ValueError("near X Y RADIUS, within X Y X Y, drives METRES, moves, or stops")
         # Standing still at the beginning is no stop.
         self._was = verb == "stops"
 
     def takes(self, event: Event) -> bool:
         if not isinstance(event, Pose):
             return False
+        last, self._last = self._last, (event.x_m, event.y_m)
+        self._way_m += math.dist(last, self._last) if last is not None else 0.0
         was, self._was = self._was, self._is(event)
         return self._was and not was
+
+
+class _Time(Selector):
+    STATE = ("_is_over",)
+    kinds = (Pose,)
+
+    def __init__(self, words: str, rest: str) -> None:
+        super().__init__(words)
+        seconds = float(rest)
+        if not 0 <= seconds < 1e9:
+            raise ValueError("seconds from the beginning")
+        self._at = round(seconds * NS_PER_S)
+        self._is_over = False
+
+    def takes(self, event: Event) -> bool:
+        was, self._is_over = self._is_over, event.t >= self._at
+        return self._is_over and not was
 
 
 def moves(pose: Pose) -> bool:
@@ -260,6 +298,7 @@ SELECTORS: Mapping[str, tuple[str, Callable[[str, str], Selector]]] = {
     "usart3": _USART,
     "contact": ("contact [NAME]", _Contact),
     "robot": ("robot near X Y RADIUS", _Robot),
+    "time": ("time 5.0", _Time),
     "sonar": ("sonar 3 below 0.4", _Sonar),
     "note": ("note adapter driving", _Note),
     "fault": ("fault [WORDS]", _Fault),

@@ -7,6 +7,7 @@ Source: gcc-arm-none-eabi of Debian 12 (12.2.rel1) built the committed files.
 """
 
 import argparse
+import shutil
 import subprocess
 import sys
 import tempfile
@@ -33,6 +34,8 @@ PROGRAMS = {
     # Brings pins, clock and line of its own.
     "board_test": ("startup.c", "memory.c", "board_test.c"),
 }
+#: A program that another package ships; it borrows the start-up code of the examples.
+KIT = HERE.parent.parent / "bluepill_sim" / "analysis" / "silicon" / "kit.c"
 MACHINE_FLAGS = ("-mcpu=cortex-m3", "-mthumb")
 COMPILE_FLAGS = (
     *MACHINE_FLAGS,
@@ -102,6 +105,18 @@ def build_programs(output_folder: Path) -> list[Path]:
     return built
 
 
+def build_kit(output: Path) -> Path:
+    """Build the silicon kit into the ELF `output` and return its path."""
+    with tempfile.TemporaryDirectory() as scratch:
+        folder = Path(scratch).resolve()
+        for source in (KIT, *(HERE / name for name in ("startup.c", "memory.c", "f103.h", "f103c8.ld"))):
+            shutil.copy(source, folder)
+        build_elf(
+            ("startup.c", "memory.c", KIT.name), folder=folder, linker_script="f103c8.ld", output=output.resolve()
+        )  # fmt: skip
+    return output
+
+
 def _run(command: list[str], folder: Path) -> None:
     subprocess.run(command, cwd=folder, check=True)  # noqa: S603
 
@@ -117,7 +132,8 @@ def main() -> int:
         return 2
     if version != COMPILER_VERSION:
         print(f"build: note: {version} gives other bytes than {COMPILER_VERSION}", file=sys.stderr)  # noqa: T201
-    for elf in build_programs(folder):
+    kit = KIT.with_suffix(".elf") if folder == HERE else folder / "kit.elf"
+    for elf in (*build_programs(folder), build_kit(kit)):
         print(f"{elf.name}: {elf.stat().st_size} bytes")  # noqa: T201
     return 0
 

@@ -9,7 +9,8 @@ Invariant: a file that is there is never overwritten, and a project is written w
 import contextlib
 import os
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
 from importlib.resources import files
 from pathlib import Path
 
@@ -23,13 +24,99 @@ _SHIPPED_SCENARIO = "free-drive.toml"
 IGNORED = frozenset({".git"})
 #: Names that neither make nor a shell needs quotes for.
 _NAME = re.compile(r"[A-Za-z0-9_][A-Za-z0-9._-]*")
-#: File of the project → file of `template/`.
+#: File of every project → file of `template/`.
 _TEMPLATES = {
-    "main.c": "main.c", "Makefile": "Makefile", "README.md": "README.md", ".gitignore": "gitignore",
-    "tests/test_robot.py": "test_robot", "pytest.ini": "pytest.ini",
+    "README.md": "README.md", ".gitignore": "gitignore", "pytest.ini": "pytest.ini",
+    ".vscode/launch.json": "launch.json", ".github/workflows/robot.yml": "github.yml", ".gitlab-ci.yml": "gitlab.yml",
 }  # fmt: skip
 #: Files of the example programs, for `board/`.
 _SHIPPED = ("startup.c", "memory.c", "f103.h", "f103c8.ld")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Build:
+    """What builds a project."""
+
+    #: File of the project → file of `template/`.
+    templates: Mapping[str, str]
+    #: The program that comes of it.
+    firmware: str
+    #: The commands that build it, and what they need.
+    commands: str
+    packages: str
+    #: Packages of Python beside.
+    pip: str = ""
+    #: What the README says of it, in place of make's commands, and which words of it are others.
+    readme: str = ""
+    words: Mapping[str, str] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Kind:
+    """What a project's robot is."""
+
+    #: Files of the example programs: file of the project → file of `robot_bench.firmware`, beside `_SHIPPED`.
+    shipped: Mapping[str, str]
+    templates: Mapping[str, str]
+    #: What ships that the scenario is made of.
+    scenario: str
+    #: What is compiled, beside `startup.c` and `memory.c`.
+    sources: tuple[str, ...]
+    #: Rows of the README's table on the wires.
+    wires: str = ""
+
+
+_CMAKE = "cmake -B build -DCMAKE_TOOLCHAIN_FILE=board/arm.cmake && cmake --build build"
+_WITHOUT_MAKE = {"`make test` runs": "`pytest` runs", "`make && p2os run patrol.toml`": "`p2os run patrol.toml`"}
+BUILDS: Mapping[str, Build] = {
+    "make": Build(
+        templates={"Makefile": "Makefile"}, firmware=FIRMWARE, commands="make", packages="gcc-arm-none-eabi make",
+    ),
+    "cmake": Build(
+        templates={"CMakeLists.txt": "CMakeLists.txt", "board/arm.cmake": "arm.cmake"}, firmware=FIRMWARE,
+        commands=_CMAKE, packages="gcc-arm-none-eabi cmake make",
+        readme=(
+            "sudo apt-get install gcc-arm-none-eabi cmake make   # once\n"
+            "cmake -B build -DCMAKE_TOOLCHAIN_FILE=board/arm.cmake   # once\n"
+            "cmake --build build                  # builds build/robot.elf\n"
+            "cmake --build build --target drive   # drives it on the bench; the last line names the report\n"
+            "pytest                               # runs tests/ on the bench (pip install pytest, once)\n"
+        ),
+        words={**_WITHOUT_MAKE, "`Makefile`": "`CMakeLists.txt`", "SOURCES` in the Makefile": "CMakeLists.txt`"},
+    ),
+    "platformio": Build(
+        templates={"platformio.ini": "platformio.ini"}, firmware=".pio/build/bluepill/firmware.elf",
+        commands="pio run", packages="git", pip=" platformio",
+        readme=(
+            "pip install platformio pytest   # once\n"
+            "pio run                         # builds it\n"
+            "p2os run just-drive.toml        # drives it on the bench; the last line names the report\n"
+            "pytest                          # runs tests/ on the bench\n"
+        ),
+        words={**_WITHOUT_MAKE, "`Makefile`": "`platformio.ini`", "SOURCES` in the Makefile": "platformio.ini`"},
+    ),
+}  # fmt: skip
+ROBOTS: Mapping[str, Kind] = {
+    "p2dx": Kind(
+        shipped={}, templates={"main.c": "main.c", "tests/test_robot.py": "test_robot"}, scenario=_SHIPPED_SCENARIO,
+        sources=("main.c",),
+    ),
+    "rover": Kind(
+        shipped={
+            "main.c": "rover.c",
+            **{f"board/{name}": name for name in (
+                "rover_board.c", "rover_board.h", "board.c", "board.h", "uart.c", "uart.h", "pins.h", "tick.h",
+                "f103_analog.h", "f103_timers.h",
+            )},
+        },
+        templates={"tests/test_robot.py": "test_rover"}, scenario="rover.toml",
+        sources=("main.c", "board/rover_board.c", "board/board.c", "board/uart.c"),
+    ),
+}  # fmt: skip
+#: What the README of a Pioneer says, and not that of a robot on its own pins.
+_OF_A_PIONEER = re.compile(r"## What every program must do\n.*?(?=\n## )", re.DOTALL)
+_SH = re.compile(r"(?<=```sh\n).*?(?=```)", re.DOTALL)
+_SOURCES = re.compile(r"^SOURCES := .*$", re.MULTILINE)
 _HEADER = """\
 /* The wires between BluePill and adapter, written by `p2os new` from the adapter's pin-out.
  *
@@ -55,17 +142,57 @@ _ROLES = {
 }
 
 
-def project_files(body: str) -> dict[str, str]:
+def project_files(body: str, *, build: str = "make", robot: str = "p2dx") -> dict[str, str]:
     """Return the text of each file of a project, by its path in the project's folder.
 
     Args:
         body: The body that its scenario names.
+        build: What builds it, of `BUILDS`.
+        robot: What its robot is, of `ROBOTS`.
     """
-    found = {name: _text("robot_bench.project", f"template/{source}") for name, source in _TEMPLATES.items()}
-    found[SCENARIO] = _scenario(_text("robot_bench.scenarios", _SHIPPED_SCENARIO), body)
+    by, kind = BUILDS[build], ROBOTS[robot]
+    sources = (*kind.sources, "board/startup.c", "board/memory.c")
+    words = {
+        "@SOURCES@": " ".join(sources), "@FILTER@": " ".join(f"+<{name}>" for name in sources), "@ELF@": by.firmware,
+        "@BUILD@": by.commands, "@PACKAGES@": by.packages, "@PIP@": by.pip,
+    }  # fmt: skip
+    templates = {**kind.templates, **by.templates, **_TEMPLATES}
+    found = {name: _text("robot_bench.project", f"template/{source}") for name, source in templates.items()}
+    if by.firmware != FIRMWARE:
+        words[FIRMWARE] = by.firmware
+    found = {name: _filled(text, words) for name, text in found.items()}
+    if "Makefile" in found:
+        include = " -Iboard" if robot != "p2dx" else ""
+        found["Makefile"] = _SOURCES.sub(f"SOURCES := {words['@SOURCES@']}", found["Makefile"]).replace(
+            "-std=c11", f"-std=c11{include}", 1
+        )
+    if by.readme:
+        found["README.md"] = _filled(_SH.sub(lambda _: by.readme, found["README.md"], count=1), by.words)
+    if robot != "p2dx":
+        found["README.md"] = _readme_of(found["README.md"])
+    found[SCENARIO] = _scenario(_text("robot_bench.scenarios", kind.scenario), body, by.firmware)
     found |= {f"board/{name}": _text("robot_bench.firmware", name) for name in _SHIPPED}
-    found["board/wires.h"] = wires_header(load_pinout())
+    found |= {name: _text("robot_bench.firmware", source) for name, source in kind.shipped.items()}
+    if robot == "p2dx":
+        found["board/wires.h"] = wires_header(load_pinout())
     return found
+
+
+def _filled(text: str, words: Mapping[str, str]) -> str:
+    """Return a text with words in place of others."""
+    for word, value in words.items():
+        text = text.replace(word, value)
+    return text
+
+
+def _readme_of(text: str) -> str:
+    """Return the README of a robot on its own pins, made from a Pioneer's."""
+    text = _OF_A_PIONEER.sub("", text)
+    text = text.replace("that drives a Pioneer", "that drives a rover of your own")
+    return text.replace(
+        "| `board/wires.h` | the wires to the adapter, by name |",
+        "| `board/rover_board.h` | PWM, encoder timers, ADC and DMA of this rover on its pins |",
+    )
 
 
 def wires_header(pinout: Pinout) -> str:
@@ -108,9 +235,9 @@ def write_project(folder: Path, contents: dict[str, str]) -> None:
 def _in_folders(folder: Path, contents: dict[str, str], written: list[Path]) -> Iterator[tuple[Path, str]]:
     for name, text in contents.items():
         path = folder / name
-        if not path.parent.exists():
-            path.parent.mkdir()
-            written.append(path.parent)
+        for above in reversed([one for one in path.parents if not one.exists()]):
+            above.mkdir()
+            written.append(above)
         yield path, text
 
 
@@ -143,9 +270,9 @@ def _define(wire: Wire) -> str:
     return f"#define {wire.name.upper()} {{GPIO{port}, {bit}u}}\n"
 
 
-def _scenario(text: str, body: str) -> str:
+def _scenario(text: str, body: str, firmware: str) -> str:
     """Return the shipped scenario with a program and a body of its own."""
-    for key, value in (("firmware", FIRMWARE), ("body", body)):
+    for key, value in (("firmware", firmware), ("body", body)):
         text = re.sub(rf'^{key} = ".*"$', f'{key} = "{value}"', text, count=1, flags=re.MULTILINE)
     return text
 

@@ -17,6 +17,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import Protocol
 
 from p2os.pioneer.body.contract import BodyState, Hit
+from p2os.pioneer.world.geometry import Footprint
 from p2os.pioneer.world.model import Obstacle
 from robot_bench.events.codec import EdgeBlock, Levels, line_of
 from robot_bench.events.kinds import (
@@ -73,6 +74,24 @@ class Observed(Protocol):
         ...
 
 
+class OtherRobot(Protocol):
+    """What the recorder wants to know of another robot's body."""
+
+    @property
+    def robot_name(self) -> str:
+        """What it is called among the things of the world."""
+        ...
+
+    @property
+    def state(self) -> BodyState:
+        """Where it is."""
+        ...
+
+    def footprint_at(self, x_m: float, y_m: float, heading_rad: float) -> Footprint:
+        """Return the outline of its hull at a pose."""
+        ...
+
+
 class Recorder(Stateful):
     """Watches the parts and publishes what they do.
 
@@ -85,8 +104,10 @@ class Recorder(Stateful):
 
     STATE = (
         "trace", "events", "min_clearance_m", "distance_m", "last_state", "last_line", "_next_sample", "_changed",
-        "_has_levels", "_text", "_sonar_mm", "_clearance_um",
+        "_has_levels", "_text", "_sonar_mm", "_clearance_um", "_other_places",
     )  # fmt: skip
+    #: Who they are is settled when they are built.
+    DERIVED = ("_others",)
 
     def __init__(
         self,
@@ -121,8 +142,16 @@ class Recorder(Stateful):
         self._text: dict[str, bytearray] = {}
         self._sonar_mm: tuple[int, ...] | None = None
         self._clearance_um: int | None = None
+        #: Other robots of the world, and where each was told to be.
+        self._others: list[OtherRobot] = []
+        self._other_places: list[tuple[float, float, float] | None] = []
         for net in harness:
             net.watch(self._note_change)
+
+    def watch_robot(self, robot: OtherRobot) -> None:
+        """Tell of another robot as of a thing of the world: placed at the first pose, moved with those that follow."""
+        self._others.append(robot)
+        self._other_places.append(None)
 
     def start(self) -> None:
         """Have every wire's level at time 0 told once nobody can drive at that instant any more."""
@@ -226,6 +255,8 @@ class Recorder(Stateful):
         self.last_state = state
         self.events.publish(pose_of(state, at))
         self._measure_clearance(self._body, at)
+        for number, robot in enumerate(self._others):
+            self._tell_other(number, robot, at)
         for item in self._body.take_moved():
             self.obstacle("move", item.name, at, moved_entry(item))
         for hit in self._body.take_hits():
@@ -233,6 +264,23 @@ class Recorder(Stateful):
             contact = contact_of(hit, state, min(hit.at_ns, at))
             self.events.publish(contact)
             self._log("body", contact.t, "collision", f"{contact.what} at x {hit.x_m:.3f} m, y {hit.y_m:.3f} m")
+
+    def _tell_other(self, number: int, robot: OtherRobot, at: Nanos) -> None:
+        """Tell where another robot's hull is, as a box, where that is new."""
+        state, hull = robot.state, robot.footprint_at(0.0, 0.0, 0.0).polygon
+        front, rear = max(x for x, _ in hull), min(x for x, _ in hull)
+        cosine, sine = math.cos(state.heading_rad), math.sin(state.heading_rad)
+        middle = (front + rear) / 2
+        there = state.x_m + middle * cosine, state.y_m + middle * sine, state.heading_rad
+        place = (round(there[0], 6), round(there[1], 6), round(there[2], 6))
+        told, self._other_places[number] = self._other_places[number], place
+        fields: dict[str, object] = dict(zip(("x", "y", "heading"), place, strict=True))
+        if told is None:
+            box = {"kind": "obstacle", "shape": "box", "height": 0.0, "length": round(front - rear, 6)}
+            width = round(2 * max(y for _, y in hull), 6)
+            self.obstacle("place", robot.robot_name, at, fields | box | {"width": width})
+        elif told != place:
+            self.obstacle("move", robot.robot_name, at, fields)
 
     def _measure_clearance(self, body: Observed, at: Nanos) -> None:
         """Tell the clearance where it is less than ever."""

@@ -4,6 +4,7 @@ Invariant: they come from the trace alone: from its end line where there is one,
 from the samples where the run was cut.
 """
 
+import hashlib
 import json
 import math
 from collections.abc import Mapping, Sequence
@@ -32,6 +33,8 @@ _FROM_END = (
 )  # fmt: skip
 #: What a run holds that was measured with `--coverage` or `--profile`.
 MEASURED = ("coverage", "profile")
+#: Why a run failed, in one line, where that was asked.
+EXPLAINED = "explained"
 
 
 def verdict(record: RunRecord) -> str:
@@ -98,7 +101,7 @@ def outcome_of(record: RunRecord) -> Json:
     if record.is_cut:
         end = end_of_a_broken_run(record, f"the run was cut at {record.last_ns / NS_PER_S:.1f} s")
     result.update((key, end.get(key)) for key in _FROM_END)
-    result.update((key, end[key]) for key in MEASURED if key in end)
+    result.update((key, end[key]) for key in (*MEASURED, EXPLAINED) if key in end)
     result["hits"] = [
         {"t_s": hit.t / NS_PER_S, "what": hit.what, "x_m": hit.x_m, "y_m": hit.y_m, "part": hit.part}
         for hit in record.contacts
@@ -106,6 +109,37 @@ def outcome_of(record: RunRecord) -> Json:
     lines = [line for _, line in record.usart_lines()]
     result["usart_lines"], result["usart_last"] = len(lines), lines[-1] if lines else None
     return result
+
+
+def outcome_of_all(scenario: str, robots: Mapping[str, Json]) -> Json:
+    """Return what came of a run with several robots: of each, and of all together."""
+    first = next(iter(robots.values()))
+
+    def each(key: str) -> list[object]:
+        return [one[key] for one in robots.values() if one.get(key) is not None]
+
+    def told(key: str) -> list[str]:
+        return [f"{name}: {line}" for name, one in robots.items() for line in cast("Sequence[str]", one.get(key) or ())]
+
+    interrupted = [line for line in cast("Sequence[str]", first["failures"]) if line.startswith(INTERRUPTED)]
+    hashes = "".join(str(value) for value in each("trace_sha256"))
+    return {
+        **{key: first[key] for key in ("body", "world", "seed", "virtual_s", "wall_s", "real_time_factor")},
+        "scenario": scenario,
+        "mode": f"{len(robots)} robots",
+        "passed": all(one["passed"] for one in robots.values()),
+        "failures": interrupted or told("failures"),
+        **{key: told(key) for key in ("goals_met", "goals_not_judged", "notes", "last_blocks")},
+        "distance_m": sum(cast("list[float]", each("distance_m"))),
+        "collisions": sum(cast("list[int]", each("collisions"))),
+        "min_clearance_m": min(cast("list[float]", each("min_clearance_m")), default=None),
+        "hits": [
+            {**hit, "what": f"{name} and {hit['what']}"}
+            for name, one in robots.items() for hit in cast("Sequence[Mapping[str, object]]", one["hits"])
+        ],
+        "trace_sha256": hashlib.sha256(hashes.encode()).hexdigest(),
+        "robots": dict(robots),
+    }  # fmt: skip
 
 
 def write_outcome(record: RunRecord, folder: Path) -> Json:

@@ -126,8 +126,13 @@ class TraceWriter(Stateful):
             self._write("".join(kept))
             self._hash = chained(self._hash, kept)
 
-    def lines(self) -> Iterator[str]:
-        """Yield every line that was written so far, with its end.
+    @property
+    def length(self) -> int:
+        """How many characters were written: where the next line begins."""
+        return self._length
+
+    def lines(self, begin: int = 0) -> Iterator[str]:
+        """Yield every line that was written so far, with its end; only those from a place (`length`) on.
 
         Raises:
             RunFailedError: The disk is full or gone.
@@ -135,10 +140,13 @@ class TraceWriter(Stateful):
         """
         self.flush()
         if self.path is None:
-            yield from io.StringIO(self.text)
+            self._file.seek(begin)
+            rest = self._file.read()
+            yield from io.StringIO(rest)
             return
         try:
             with self.path.open(encoding="utf-8", errors="replace") as lines:
+                lines.seek(begin)
                 yield from lines
         except OSError as error:
             raise FileError(f"cannot read {self.path}: {error.strerror}") from error

@@ -15,7 +15,7 @@ from robot_bench.events.codec import Json
 from robot_bench.events.kinds import WorldChange
 from robot_bench.recording.run_record import RunRecord
 from robot_bench.recording.signals import grouped, levels_and_duties, motor_steps, pin_labels
-from robot_bench.recording.summary import MEASURED, figures, verdict
+from robot_bench.recording.summary import EXPLAINED, MEASURED, figures, verdict
 from robot_bench.report.packets import describe
 from robot_bench.report.plan import plan
 from robot_bench.report.thinning import ends, extremes, pulses
@@ -247,6 +247,8 @@ def _goals(end: Json) -> str:
     ]
     items += [f"<li>{html.escape(text)}</li>" for text in failures]
     goals = f'<ul class="goals">{"".join(items)}</ul>' if items else ""
+    if end.get(EXPLAINED):
+        goals += f'<p class="why">{html.escape(str(end[EXPLAINED]))}</p>'
     blocks = cast("list[str]", end.get("last_blocks") or [])
     if not blocks:
         return goals

@@ -13,6 +13,7 @@ from robot_bench.scenario.goals.judging import COMMON
 from robot_bench.scenario.goals.kinds import KINDS
 from robot_bench.scenario.scenario import TABLES
 from robot_bench.scenario.schema import Key
+from robot_bench.scenario.several_robots import ROBOT
 from robot_bench.scenario.when_script import KEYS as WHEN_KEYS
 
 DRAFT = "https://json-schema.org/draft/2020-12/schema"
@@ -31,20 +32,28 @@ def scenario_schema() -> Json:
     inner: Json = dict(within["properties"])  # type: ignore[call-overload] # as above
     within["properties"] = inner | {"start": start}
     goals = [
-        _table((*(key for key in COMMON if key.name != "kind"), *kind.keys), kind=name) for name, kind in KINDS.items()
+        _table((*(key for key in COMMON if key.name != "kind"), ROBOT, *kind.keys), kind=name)
+        for name, kind in KINDS.items()
     ]
+    parts = {name: _table(TABLES[f"[{name}]"]) for name in ("direct", "adapter", "controller")}
+    robot = _table(TABLES["[[robot]]"])
+    own: Json = dict(robot["properties"])  # type: ignore[call-overload] # as above
+    robot["properties"] = own | parts
     properties |= {
         "start": start,
-        **{name: _table(TABLES[f"[{name}]"]) for name in ("direct", "adapter", "controller")},
+        **parts,
+        "robot": {"oneOf": [{"type": "string"}, {"type": "array", "items": robot}]},
         "in_world": {"type": "object", "additionalProperties": within},
-        **{name: {"type": "array", "items": _table(TABLES[f"[[{name}]]"])} for name in ("obstacle", "fault")},
+        **{name: {"type": "array", "items": _table((*TABLES[f"[[{name}]]"], ROBOT))} for name in ("obstacle", "fault")},
         "part": {"type": "array", "items": _table(TABLES["[[part]]"]) | {"additionalProperties": True}},
-        "when": {"type": "array", "items": _table(WHEN_KEYS, may_lack=("name", "fault"))},
+        "when": {"type": "array", "items": _table((*WHEN_KEYS, ROBOT))},
         "goal": {"type": "array", "items": {"oneOf": goals}},
         "sweep": _SWEEP,
     }
     # What a file extends or includes may say the rest.
     wanted = [{"required": keys} for keys in (top.pop("required"), ["extends"], ["include"])]
+    # Several robots have a program each.
+    wanted.append({"required": ["robot", "world", "duration_s"], "properties": {"robot": {"type": "array"}}})
     return {"$schema": DRAFT, "title": "A scenario of p2os", **top, "properties": properties, "anyOf": wanted}
 
 
@@ -57,9 +66,9 @@ _SWEEP: Json = {
 }
 
 
-def _table(keys: Sequence[Key], *, kind: str = "", may_lack: Sequence[str] = ()) -> Json:
+def _table(keys: Sequence[Key], *, kind: str = "") -> Json:
     properties: Json = {key.name: _key(key) for key in keys}
-    required = [key.name for key in keys if key.required and key.name not in may_lack]
+    required = [key.name for key in keys if key.required]
     if kind:
         properties = {"kind": {"const": kind}} | properties
         required = ["kind", *required]

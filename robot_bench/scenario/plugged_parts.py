@@ -50,11 +50,11 @@ def _load(table: Table, folder: Path, taken: Mapping[str, str], at: Where) -> Pa
         if text is not None and not isinstance(text, str):
             raise ScenarioError(f"{at}: {known.name} = {shown(text)} is not a text in quotes")
     settings = {key: value for key, value in table.items() if key != "kind"}
-    for key, value in settings.items():
+    for name, value in settings.items():
         if not isinstance(value, _SCALARS) and not (
             isinstance(value, list) and all(isinstance(x, _SCALARS) for x in value)
         ):
-            raise ScenarioError(f"{at}: {key} = {shown(value)} is no number, text, flag or list of them")
+            raise ScenarioError(f"{at}: {name} = {shown(value)} is no number, text, flag or list of them")
     kept = tuple((key, tuple(value) if isinstance(value, list) else value) for key, value in settings.items())
     spec = PartSpec(kind=str(table["kind"]), settings=kept, folder=str(folder))
     try:

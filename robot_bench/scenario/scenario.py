@@ -26,7 +26,7 @@ from p2os.pioneer.controller.flash import load_flash
 from p2os.pioneer.sensor_errors import load_sensor_errors
 from p2os.pioneer.world import Pose, known_worlds, load_world, world_suffixes
 from p2os.pioneer.world.model import World
-from p2os.pioneer.world.start_places import refuse_start
+from p2os.pioneer.world.start_places import refuse_start, start_places
 from p2os.robots.parameters import RobotParameters, load_parameters
 from p2os.toml_file import is_file
 from robot_bench.direct.robot import DirectSettings
@@ -37,6 +37,7 @@ from robot_bench.scenario.goals.kinds import KINDS
 from robot_bench.scenario.included_files import KEYS as INCLUDING
 from robot_bench.scenario.included_files import VERSION, Setting, read_tables, shipped_file, shipped_scenarios
 from robot_bench.scenario.schema import LONGEST_S, Key, Place, Table, Where, check_table, in_range, nearest, within
+from robot_bench.scenario.several_robots import robot_keys, split
 from robot_bench.scenario.sweep import Axis, load_axes, load_seeds
 from robot_bench.scenario.when_script import When, load_whens
 from robot_bench.scenario.wired_robots import OwnRobot, find_own_robot, known_own_robots, load_own_robot
@@ -114,6 +115,7 @@ _IN_WORLD = (
 TABLES: Mapping[str, tuple[Key, ...]] = {
     "": _TOP,
     "[start]": _START,
+    "[[robot]]": robot_keys(_TOP),
     "[direct]": _DIRECT,
     "[adapter]": _ADAPTER,
     "[controller]": _CONTROLLER,
@@ -145,6 +147,17 @@ class ScenarioOptions(TypedDict, total=False):
     duration_s: float | None
     #: Speed of USART1's far end, bit/s.
     usart_baud: int | None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RobotPlace:
+    """One of several robots of a scenario."""
+
+    name: str
+    parameters: RobotParameters
+    start: Pose
+    #: What its program is to do; None: it has none, and stands in the way.
+    scenario: "Scenario | None"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -187,6 +200,8 @@ class Scenario:
     goals: tuple[Goal, ...] = ()
     #: World → what is otherwise there.
     in_world: Mapping[str, Table] = field(default_factory=dict)
+    #: Several robots in one world; what is said above is the first one's then. None: one robot.
+    robots: tuple[RobotPlace, ...] = ()
     #: The seeds that `p2os run` takes one after the other; none: `seed` alone.
     seeds: tuple[int, ...] = ()
     #: The parameters that it sweeps.
@@ -201,8 +216,13 @@ class Scenario:
         """The distance below which something counts as an obstacle, metres."""
         return self.threshold_um / 1e6
 
+    @property
+    def programmed(self) -> "tuple[Scenario, ...]":
+        """The scenarios of those of several robots that have a program; none of one robot."""
+        return tuple(robot.scenario for robot in self.robots if robot.scenario is not None)
+
     def with_options(self, **options: Unpack[ScenarioOptions]) -> "Scenario":
-        """Return the scenario with what a command line or a program sets otherwise.
+        """Return the scenario with what a command line or a program sets otherwise, for each of its robots.
 
         Raises:
             UsageError: A value cannot be.
@@ -217,6 +237,8 @@ class Scenario:
         firmware = Path(options.get("firmware") or self.firmware)
         if options.get("firmware") and not firmware.is_file():
             raise UsageError(f"there is no firmware file {firmware}", hint="give an ELF, HEX or BIN file")
+        if self.robots:
+            return self._each_with(options)
         if self.own_robot is not None and options.get("mode") == "adapter":
             raise UsageError(f"the robot {self.robot!r} hangs on the chip's own pins", hint="--mode direct")
         moved = self if world is None else self._moved_to(world)
@@ -230,6 +252,21 @@ class Scenario:
             seed=moved.seed if seed is None else seed,
             duration_ns=moved.duration_ns if duration_s is None else round(duration_s * NS_PER_S),
         )
+
+    def _each_with(self, options: ScenarioOptions) -> "Scenario":
+        """Return the scenario with options for each robot; the robots begin where the new world has room."""
+        alone = replace(self, robots=()).with_options(**options)
+        robots = tuple(
+            replace(robot, scenario=robot.scenario and robot.scenario.with_options(**options)) for robot in self.robots
+        )
+        if options.get("world") is None:
+            return replace(alone, robots=robots)
+        given = [None] * len(robots)
+        places = start_places(load_world(alone.world, seed=alone.seed), [one.parameters for one in robots], given)
+        return replace(alone, robots=tuple(
+            replace(robot, start=start, scenario=robot.scenario and replace(robot.scenario, start=start))
+            for robot, start in zip(robots, places, strict=True)
+        ))  # fmt: skip
 
     def _moved_to(self, world: str) -> "Scenario":
         resolve_world(world, Path(), "--world", error=UsageError)
@@ -279,10 +316,12 @@ def read_scenario(
         UsageError: A setting names what is not there.
     """
     found = read_tables(path, settings, set_by)
-    scenario = _build(found.table, found.text, path, Place(found.source), firmware)
+    build = _build_several if isinstance(found.table.get("robot"), list) else _build
+    scenario = build(found.table, found.text, path, Place(found.source), firmware)
     kept = tuple(axis for axis in scenario.axes if axis.key not in dict(settings))
     scenario = replace(scenario, settings=tuple(settings), axes=kept)
-    refuse_what_its_world_refuses(scenario, load_world(scenario.world, seed=scenario.seed))
+    for one in scenario.programmed or (scenario,):
+        refuse_what_its_world_refuses(one, load_world(scenario.world, seed=scenario.seed))
     return scenario
 
 
@@ -330,8 +369,9 @@ def _build(table: Table, text: str, path: Path, where: Place, firmware: Path | N
         check_table(part, _IN_WORLD, within(where, f"in_world.{world}"))
         _start(part, where, f"in_world.{world}.start")
     changes = load_changes(cast("list[Table]", table.get("obstacle", [])), parameters, where)
+    wires = own_robot.wires if own_robot else None
     goals = [
-        load_goal(goal, within(where, "goal", number))
+        load_goal(goal, within(where, "goal", number), wires)
         for number, goal in enumerate(cast("list[Table]", table.get("goal", [])))
     ]
     scenario = Scenario(
@@ -363,12 +403,56 @@ def _build(table: Table, text: str, path: Path, where: Place, firmware: Path | N
         seeds=load_seeds(table, where.at("seeds")),
         axes=load_axes(cast("Table", table.get("sweep", {})), where),
         faults=load_faults(cast("list[Table]", table.get("fault", [])), parameters, where),
-        whens=load_whens(cast("list[Table]", table.get("when", [])), parameters, where),
+        whens=load_whens(cast("list[Table]", table.get("when", [])), parameters, where, wires),
         goals=tuple(goals),
         in_world=in_world,
         where=where,
     )
     return _apply_in_world(scenario, in_world.get(scenario.world, {}))
+
+
+def _build_several(table: Table, text: str, path: Path, where: Place, firmware: Path | None) -> Scenario:
+    """Return a scenario with several robots, from a table of each."""
+    tables = split(table, _TOP, where)
+    found: list[Scenario | None] = [
+        replace(_build(one.table, text, path, one.place, firmware), name=one.name) if one.has_firmware else None
+        for one in tables
+    ]
+    models = [
+        _model(one.table, path, one.place) if scenario is None else scenario.parameters
+        for one, scenario in zip(tables, found, strict=True)
+    ]
+    first = next(scenario for scenario in found if scenario is not None)
+    world = load_world(first.world, seed=first.seed)
+    names = {item.name for item in world.obstacles} | {mesh.name for mesh in world.meshes}
+    for one in tables:
+        if one.name in names:
+            raise ScenarioError(
+                f"{one.place.at('name')}: world {shown(world.name)} has a thing called {shown(one.name)}"
+            )
+    given = [_start(one.table, one.place) for one in tables]
+    try:
+        places = start_places(world, models, given)
+    except (UsageError, FileError) as error:
+        raise ScenarioError(f"{where.at('robot')}: {error}", hint=error.hint) from error
+    robots = tuple(
+        RobotPlace(
+            name=one.name, parameters=model, start=start, scenario=scenario and replace(scenario, start=start),
+        )
+        for one, model, start, scenario in zip(tables, models, places, found, strict=True)
+    )  # fmt: skip
+    first = next(robot.scenario for robot in robots if robot.scenario is not None)
+    return replace(
+        first, name=path.stem, robots=robots, where=where, seeds=load_seeds(table, where.at("seeds")),
+        axes=load_axes(cast("Table", table.get("sweep", {})), where),
+    )  # fmt: skip
+
+
+def _model(table: Table, path: Path, where: Place) -> RobotParameters:
+    """Return what a robot without a program is."""
+    robot = str(table["robot"])
+    own = _own_robot(robot, {key: value for key, value in table.items() if key == "pins"}, path, where)
+    return own.robot.parameters if own is not None else _parameters(robot, where)
 
 
 def _taken(own_robot: OwnRobot | None) -> dict[str, str]:

@@ -8,7 +8,7 @@ is a bare number: `"60 cm"` is refused with the unit that is wanted.
 import difflib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Literal, Protocol
+from typing import Literal, Protocol, runtime_checkable
 
 from p2os.errors import ScenarioError
 from p2os.pioneer.world.model import RANGES
@@ -72,6 +72,15 @@ class Source(Protocol):
         ...
 
 
+@runtime_checkable
+class PartSource(Source, Protocol):
+    """Names the places of a part of a file, whose lists hold some of the file's tables."""
+
+    def number_of(self, table: str, number: int) -> int:
+        """Return which of the file's tables of a list one of this part is."""
+        ...
+
+
 @dataclass(frozen=True, slots=True)
 class Place:
     """Where a table stands, for messages: `dodge.toml:12: [[obstacle]] 2`."""
@@ -96,7 +105,10 @@ Where = str | Place
 
 def within(where: Where, table: str, number: int | None = None) -> Where:
     """Return the place of a table of a file: `[table]`, or the number-th `[[table]]`, counted from 0."""
-    title = f"[{table}]" if number is None else f"[[{table}]] {number + 1}"
+    listed = number or 0
+    if isinstance(where, Place) and isinstance(where.source, PartSource):
+        listed = where.source.number_of(table, listed)
+    title = f"[{table}]" if number is None else f"[[{table}]] {listed + 1}"
     if isinstance(where, str):
         return f"{where}: {title}"
     return Place(where.source, table, number or 0, title)

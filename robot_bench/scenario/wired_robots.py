@@ -19,10 +19,11 @@ from p2os.robots.parameters import RobotParameters
 from p2os.toml_file import TomlSource, is_file, read_toml, read_user_text
 from robot_bench.direct.differential.robot import DifferentialRobot
 from robot_bench.direct.wired import AnalogPin, RobotWire
+from robot_bench.events.selection import wire_named
 from robot_bench.scenario.differential_file import load_differential
 from robot_bench.scenario.schema import Place, Table, Where, nearest, within
 from robot_bench.wires.nets import Harness
-from simbase.errors import UsageError, shown, shown_name
+from simbase.errors import shown, shown_name
 from simbase.timing import Nanos, Reached
 
 #: Pins that the ADC can measure on this package.
@@ -93,11 +94,13 @@ class OwnRobot:
         Raises:
             UsageError: There is no such wire.
         """
+        return wire_named(name, self.wires)
+
+    @property
+    def wires(self) -> dict[str, str]:
+        """The name of each wire that has a level, by itself and by the BluePill's pin."""
         wires = {wire.pin: wire.name for wire in self.robot.signals if not wire.is_analog}
-        wires |= {wire: wire for wire in wires.values()}
-        if name not in wires:
-            raise UsageError(f"there is no wire {shown(name)}", hint=nearest(name, wires))
-        return wires[name]
+        return wires | {wire: wire for wire in wires.values()}
 
     def build(self, body: RobotBody, harness: Harness, analog_pin: Callable[[str], AnalogPin]) -> WiredPart:
         """Return the part of the bench."""

@@ -76,6 +76,9 @@ class PerfectBody(Stateful):
         )  # fmt: skip
         return self.state
 
+    def stand_still(self, steps: int) -> int:
+        return 0 * steps
+
     def stall(self, *, left: bool, right: bool) -> None:
         self.state = replace(self.state, stalled_left=left, stalled_right=right)
 

@@ -21,10 +21,10 @@ from p2os.cli.main import run as p2os
 from p2os.errors import RunFailedError, TransportError
 from p2os.protocol.sip import StandardSip
 from p2os.robots.parameters import load_parameters
-from robot_bench.pacer import RealTimePacer
 from robot_bench.recording.client_view import OdometryPose
 from robot_bench.recording.run_record import read_run
 from robot_bench.remote import RemoteBench
+from robot_bench.running.pacer import RealTimePacer
 from robot_bench.scenario.scenario import load_scenario
 from robot_bench.wires.port_endpoint import STOP_SEQUENCE
 from tests.robot_bench.wires.fake_chip import FakeChip, PinDrive

@@ -35,6 +35,17 @@ class Wire:
         return byte
 
 
+class Teller(Wire):
+    """One that says ahead what it sends, as a flash does that is read."""
+
+    def ahead(self, count: int) -> tuple[bytes, int | None]:
+        """Return what it sends next, whatever it is sent."""
+        return bytes(count), None
+
+    def went(self, count: int) -> None:
+        """Keep nothing."""
+
+
 def main() -> None:
     """Build the program, and print a line a bus."""
     with tempfile.TemporaryDirectory() as scratch:
@@ -44,6 +55,7 @@ def main() -> None:
         for name, device, is_i2c in (
             ("SPI at 18 MHz, MISO tied to MOSI", Loopback(), False),
             ("SPI at 18 MHz, a part in Python", Wire(), False),
+            ("SPI at 18 MHz, a part in Python that says ahead", Teller(), False),
             ("I2C at 400 kHz, the EEPROM", Loopback(), True),
         ):
             board = BluePill(elf)

@@ -29,6 +29,7 @@ PWM_S, DMA_S, ADC_S = (1.0, 0.2, 0.2) if "--quick" in sys.argv else (20.0, 2.0, 
 #: What the ADC converts by circular DMA, and with which options tools/bench/firmware/adc.c is built.
 CONVERSIONS = {
     "8 channels at 10 kHz": (80_000, "5", ("-DBENCH_EIGHT",)),
+    "8 channels at 10 kHz by TIM3": (80_000, "5", ("-DBENCH_EIGHT", "-DBENCH_TRGO")),
     "1 channel at 857 kS/s": (857_142, "2", ()),
     "1 channel at 1 MS/s": (1_000_000, "2", ("-DBENCH_56_MHZ",)),
 }

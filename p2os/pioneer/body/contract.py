@@ -171,6 +171,10 @@ class RobotBody(Protocol):
         """
         ...
 
+    def stand_still(self, steps: int) -> int:
+        """Make so many steps with set-points of 0 at once, if they turn no wheel; return how many were made, or 0."""
+        ...
+
     def ranges(self, numbers: Sequence[int]) -> list[float]:
         """Return what these sonar read now, metres from each transducer; the robot file's range where no echo comes."""
         ...
@@ -240,6 +244,10 @@ class RobotScene(Protocol):
     @property
     def dt_ns(self) -> Nanos:
         """The length of a step."""
+        ...
+
+    def name_robots(self, names: Sequence[str]) -> None:
+        """Call the robots otherwise, the first first: names that no thing of the world has."""
         ...
 
     def reset(self, poses: Sequence[Pose], seed: int) -> None:

@@ -48,8 +48,8 @@ class Scene(Stateful):
     """
 
     STATE: ClassVar[tuple[str, ...]] = ("_owns",)
-    #: They are taken once, when the scene is made.
-    DERIVED: ClassVar[tuple[str, ...]] = ("bodies",)
+    #: They are taken and named once, when the scene is made.
+    DERIVED: ClassVar[tuple[str, ...]] = ("bodies", "names")
 
     dt_ns: Nanos = STEP_NS
     #: The first robot first.
@@ -66,6 +66,12 @@ class Scene(Stateful):
         self._owns = tuple(_Own(body) for body in self.bodies)
         for body in self.bodies:
             body.others = tuple(other for other in self.bodies if other is not body)
+
+    def name_robots(self, names: Sequence[str]) -> None:
+        """Call the robots otherwise, the first first: names that no thing of the world has."""
+        self.names = tuple(names)
+        for body, name in zip(self.bodies, names, strict=True):
+            body.robot_name = name
 
     def reset(self, poses: Sequence[Pose], seed: int) -> None:
         """Let every robot stand still at its pose in the world as it was made, wheels at angle 0, collisions at 0."""
@@ -214,6 +220,11 @@ class BodyInWorld(Stateful):
             raise UsageError("robots of one scene are stepped together", hint="Scene.step, or MultiRobotWorld.bring")
         (turned,) = self.scene.step(((left_mps, right_mps),))
         return turned
+
+    def stand_still(self, steps: int) -> int:
+        """Make no step: an engine has to, for things may still move; see `Body`."""
+        del steps
+        return 0
 
     def reset(self, pose: Pose, seed: int) -> BodyState:
         """Stand still at a pose in the world as it was made; nothing here is random.

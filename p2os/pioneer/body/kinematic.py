@@ -18,7 +18,7 @@ It serves as the oracle for the other bodies, and where PyBullet is not to be ha
 """
 
 import math
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 
 from p2os.pioneer.body.contacts import ContactCounter
 from p2os.pioneer.body.contract import BodyState, Turned
@@ -221,6 +221,15 @@ class KinematicBody(BodyInWorld):
             self._note_contact(*arc[:3])
         self._left, self._right = rims or (0.0, 0.0)
         return self._turn_wheels()
+
+    def stand_still(self, steps: int) -> int:
+        """Stand for so many steps, where it is alone and nothing walks; see `Body`."""
+        if self.others or self._walking or self._is_bumped or steps <= 0:
+            return 0
+        self.go(0.0, 0.0)
+        self._steps += steps - 1
+        self._contacts.update(touching=self._free_m == 0.0, steps=steps - 1)
+        return steps
 
     def _turn_wheels(self) -> Turned:
         """Turn the wheels by this step, and by how far another robot has pushed them since the last."""
@@ -462,9 +471,11 @@ class KinematicBody(BodyInWorld):
             found.append(echoes(self._echoing(x, y, rays, self._longest_m), x, y, rays, self._longest_m))
         return found
 
-    def _echoing(self, x: float, y: float, rays: Sequence[Direction], longest_m: float) -> Sequence[Footprint]:
-        xs, ys = [x, *(x + longest_m * dx for dx, _ in rays)], [y, *(y + longest_m * dy for _, dy in rays)]
-        things = self._plan.echoing_within(min(xs), min(ys), max(xs), max(ys))
+    def _echoing(self, x: float, y: float, rays: Sequence[Direction], longest_m: float) -> Collection[Footprint]:
+        things = self._plan.all_echoing
+        if things is None:
+            xs, ys = [x, *(x + longest_m * dx for dx, _ in rays)], [y, *(y + longest_m * dy for _, dy in rays)]
+            things = self._plan.echoing_within(min(xs), min(ys), max(xs), max(ys))
         return [*things, *self._echoing_robots(x, y, rays, longest_m)] if self.others else things
 
     def most_radps(self, rim_mps: float) -> float | None:

@@ -5,7 +5,7 @@ beside it, or seen from their back.
 """
 
 import math
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Collection, Iterable, Iterator, Sequence
 from typing import NamedTuple
 
 from p2os.pioneer.world.geometry import INFINITY, Footprint
@@ -47,7 +47,8 @@ def cast(things: Iterable[Footprint], x: float, y: float, rays: Sequence[Directi
         if not thing.edges:
             _circle(thing, px, py, rays, hits)
             continue
-        edges = thing.edges if thing.contains(x, y) else thing.seen_from(x, y)
+        # From inside, no edge is seen from its outer side.
+        edges = thing.seen_from(x, y) or (thing.edges if thing.contains(x, y) else [])
         for ax, ay, ex, ey in edges:
             qx, qy = ax - x, ay - y
             sx, sy = qx + ex, qy + ey
@@ -91,7 +92,9 @@ def _circle(thing: Footprint, px: float, py: float, rays: Sequence[Direction], h
             hits[ray] = hit
 
 
-def echoes(things: Sequence[Footprint], x: float, y: float, rays: Sequence[Direction], longest_m: float) -> list[Echo]:
+def echoes(
+    things: Collection[Footprint], x: float, y: float, rays: Sequence[Direction], longest_m: float
+) -> list[Echo]:
     """Return the echo of each ray, with the angle at which it meets the surface."""
     found = []
     for ray in rays:

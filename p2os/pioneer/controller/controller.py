@@ -389,6 +389,8 @@ class Pioneer(Stateful):
             advance(wheels.left_angle_rad, wheels.right_angle_rad)
             steps -= 1
         left, right = motion.wheels_mps  # steady until the next command
+        if left == right == 0.0:
+            steps -= body.stand_still(steps)
         for _ in range(steps):
             wheels = step(left, right)
             advance(wheels.left_angle_rad, wheels.right_angle_rad)

@@ -129,6 +129,10 @@ class Body(Protocol):
         """Make one step with these rim-speed set-points."""
         ...
 
+    def stand_still(self, steps: int) -> int:
+        """Make so many steps with set-points of 0 at once, if they turn no wheel; return how many were made, or 0."""
+        ...
+
     def ranges(self, numbers: Sequence[int]) -> Sequence[float]:
         """Return the range that each sonar measures now, in metres; the longest range where there is no echo."""
         ...

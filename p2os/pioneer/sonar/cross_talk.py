@@ -69,7 +69,7 @@ class PingTable(Stateful):
         """Let some sonar of a robot fire; return what each hears of others."""
         while self._sent and self._sent[0].at < now - KEPT_NS:
             self._sent.popleft()
-        others = [ping for ping in self._sent if ping.robot != robot]
+        others = [ping for ping in self._sent if ping.robot != robot and ping.at <= now]
         heard = [min((far for ping in others if (far := self._heard(robot, number, ping, now))), default=None)
                  for number in numbers]  # fmt: skip
         self._sent.extend(SentPing(robot, number, now) for number in numbers)

@@ -206,17 +206,32 @@ def _ray_circle(px: float, py: float, dx: float, dy: float, radius: float) -> fl
 
 def _apart(first: Polygon, second: Polygon) -> bool:
     """Tell whether an edge of the first convex polygon (counter-clockwise) has all of the second outside."""
-    for (ax, ay), (bx, by) in pairwise((*first, first[0])):
+    ax, ay = first[-1]
+    for bx, by in first:
         ex, ey = bx - ax, by - ay
-        if all((px - ax) * ey - (py - ay) * ex > 0.0 for px, py in second):
+        for px, py in second:  # a generator costs twice as much, and robots that push each other ask little else
+            if (px - ax) * ey - (py - ay) * ex <= 0.0:
+                break
+        else:
             return True
+        ax, ay = bx, by
     return False
 
 
 def _nearest(points: Polygon, polygon: Polygon) -> float:
     """Return the least distance from some points to a polygon's edges."""
-    edges = tuple(pairwise((*polygon, polygon[0])))
-    return min(_point_segment(px, py, *a, *b) for px, py in points for a, b in edges)
+    nearest, hypot = INFINITY, math.hypot
+    for (ax, ay), (bx, by) in pairwise((*polygon, polygon[0])):
+        # `_point_segment` of each point, in place: a run measures its clearance twenty times a second.
+        ex, ey = bx - ax, by - ay
+        length = ex * ex + ey * ey
+        for x, y in points:
+            share = ((x - ax) * ex + (y - ay) * ey) / length if length > 0.0 else 0.0
+            share = 0.0 if share < 0.0 else min(share, 1.0)
+            found = hypot(x - ax - share * ex, y - ay - share * ey)
+            if found < nearest:  # noqa: PLR1730 - a call a point
+                nearest = found
+    return nearest
 
 
 def _point_polygon(x: float, y: float, polygon: Polygon) -> float:

@@ -13,7 +13,7 @@ Invariant: the order of what is found depends on the world alone.
 """
 
 import math
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Collection, Iterable, Iterator, Sequence
 from dataclasses import replace
 from difflib import get_close_matches
 from itertools import pairwise
@@ -165,8 +165,12 @@ class Plan(Stateful):
 
     def echoing_within(self, x0: float, y0: float, x1: float, y1: float) -> Sequence[Footprint]:
         """Return what may echo the sonar in a rectangle, and perhaps some more."""
-        movable = self._echoing.values()
-        return [*movable, *self._static.echoing.near(x0, y0, x1, y1)] if self._static.echoing.footprints else [*movable]
+        return [*self._echoing.values(), *self._static.echoing.near(x0, y0, x1, y1)]
+
+    @property
+    def all_echoing(self) -> Collection[Footprint] | None:
+        """What may echo the sonar anywhere, where it is not worth looking at less; None where the building may."""
+        return None if self._static.echoing.footprints else self._echoing.values()
 
     def touched(self, x_m: float, y_m: float, heading_rad: float) -> list[str]:
         """Return the names of the things that the hull overlaps at a pose; of the building, one name is enough."""

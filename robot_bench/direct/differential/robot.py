@@ -16,11 +16,11 @@ Invariant: at time t the body has made every step that ended at or before t.
 import math
 from collections.abc import Callable, Sequence
 
-from p2os.pioneer.body.contract import RobotBody
+from p2os.pioneer.body.contract import RobotBody, WheelAngles
 from robot_bench.direct.differential.analog import Cell, volts_at
-from robot_bench.direct.differential.bridge import HBridge
+from robot_bench.direct.differential.bridge import HBridge, Shares
 from robot_bench.direct.differential.description import SIDES, Differential
-from robot_bench.direct.differential.drive_train import DriveTrain
+from robot_bench.direct.differential.drive_train import DriveTrain, Step
 from robot_bench.direct.differential.quadrature import OWNER, Quadrature
 from robot_bench.direct.robot import STALLS
 from robot_bench.direct.wired import AnalogPin
@@ -53,7 +53,7 @@ class DifferentialRobot(Stateful):
 
     STATE = (
         "body", "train", "cell", "_encoders", "_bridges", "_steps", "_angles", "_next_distance", "_stalled",
-        "_steps_of_volts", "currents_a",
+        "_steps_of_volts", "currents_a", "_asked", "_stepped", "_driven",
     )  # fmt: skip
 
     def __init__(
@@ -80,6 +80,12 @@ class DifferentialRobot(Stateful):
         self._steps_of_volts: dict[str, int] = {}
         self._steps = 0
         self._angles = (0.0, 0.0)
+        #: Set once where a scene steps the body together with others'; it moves a step later then.
+        self.is_stepped_by_others = False
+        #: Speeds of the motors for the step that others make next, rad/s, and the angles after it, rad.
+        self._asked = self._stepped = (0.0, 0.0)
+        #: What the bridges did and the volts, of the step that others make next.
+        self._driven: tuple[tuple[float, ...], tuple[float, ...], float] = ((0.0,) * 3, (0.0,) * 3, 0.0)
         self._next_distance: Nanos = 0
         self._stalled = (False, False)
         #: Takes a line of the state log: (ns, what, detail).
@@ -100,33 +106,79 @@ class DifferentialRobot(Stateful):
             self._step()
         return Reached(limit)
 
+    def next_setpoints(self) -> tuple[float, float]:
+        """Return the rim-speed set-points of the body's next step, m/s, for who steps it together with others."""
+        return self._rims(*self._asked)
+
+    def take_step(self, wheels: WheelAngles) -> None:
+        """Take the wheels' angles after a step that was made with `next_setpoints`."""
+        self._stepped = wheels.left_angle_rad, wheels.right_angle_rad
+
     def _step(self) -> None:
-        body, train, cell, battery = self.body, self.train, self.cell, self._robot.battery
+        body, cell, battery = self.body, self.cell, self._robot.battery
         begin, end = self._steps * body.dt_ns, (self._steps + 1) * body.dt_ns
         left, right = self._bridges[0].shares(begin, end), self._bridges[1].shares(begin, end)
-        cell.volts = train.supply_v(left, right, cell.source_v, battery.resistance_ohm, battery.idle_current_a)
-        angle_l, angle_r = self._angles
-        if self._torques is None:
-            made = train.step(left, right, cell.volts)
-            left_mps, right_mps = made.left_radps * self._radius_m, made.right_radps * self._radius_m
-            turned = body.step(round(left_mps, SPEED_DIGITS), round(right_mps, SPEED_DIGITS))
-        else:
-            aim_l, aim_r = train.aims(left, right, cell.volts)
-            self._torques(aim_l.torque_nm, aim_r.torque_nm)
-            turned = body.step(aim_l.rate_radps * self._radius_m, aim_r.rate_radps * self._radius_m)
-        self._angles = turned_l, turned_r = turned.left_angle_rad, turned.right_angle_rad
-        real_l, real_r = (turned_l - angle_l) / self._dt_s, (turned_r - angle_r) / self._dt_s
-        if self._torques is None:
-            train.left_radps = self._held(made.left_radps, real_l, train.left_radps)
-            train.right_radps = self._held(made.right_radps, real_r, train.right_radps)
-        else:
-            made = train.take(left, right, cell.volts, _or_rest(real_l), _or_rest(real_r))
+        cell.volts = self.train.supply_v(left, right, cell.source_v, battery.resistance_ohm, battery.idle_current_a)
+        made, turned_l, turned_r = (self._drive if self._torques is None else self._push)(left, right)
+        self._angles = turned_l, turned_r
         self.currents_a = made.left_a, made.right_a
         cell.give(made.supply_a + battery.idle_current_a, self._dt_s)
         self._steps += 1
         self._encoders[0].turn_to(turned_l, end, body.dt_ns)
         self._encoders[1].turn_to(turned_r, end, body.dt_ns)
         self._show(end)
+
+    def _drive(self, left: Shares, right: Shares) -> tuple[Step, float, float]:
+        """Make a step of a body that takes speeds; return what became of the drive train, and the wheels' angles."""
+        train = self.train
+        made = train.step(left, right, self.cell.volts)
+        (asked_l, asked_r), turned_l, turned_r = self._turn(made.left_radps, made.right_radps)
+        real_l, real_r = self._real(turned_l, turned_r)
+        train.left_radps = self._held(asked_l, real_l, train.left_radps)
+        train.right_radps = self._held(asked_r, real_r, train.right_radps)
+        return made, turned_l, turned_r
+
+    def _push(self, left: Shares, right: Shares) -> tuple[Step, float, float]:
+        """Make a step of a body that has the masses and takes torques; return the same."""
+        train, volts = self.train, self.cell.volts
+        if self.is_stepped_by_others:
+            # The step that is over was made with what the wires said in the one before.
+            (was_left, was_right, was_volts), self._driven = self._driven, (tuple(left), tuple(right), volts)
+            turned_l, turned_r = self._stepped
+            real_l, real_r = self._real(turned_l, turned_r)
+            made = train.take(Shares(*was_left), Shares(*was_right), was_volts, _or_rest(real_l), _or_rest(real_r))
+            self._asked = self._aim(left, right, volts)
+            return made, turned_l, turned_r
+        _, turned_l, turned_r = self._turn(*self._aim(left, right, volts))
+        real_l, real_r = self._real(turned_l, turned_r)
+        return train.take(left, right, volts, _or_rest(real_l), _or_rest(real_r)), turned_l, turned_r
+
+    def _aim(self, left: Shares, right: Shares, volts: float) -> tuple[float, float]:
+        """Tell the body how hard its motors drive; return where to, rad/s."""
+        aim_l, aim_r = self.train.aims(left, right, volts)
+        if self._torques is not None:
+            self._torques(aim_l.torque_nm, aim_r.torque_nm)
+        return aim_l.rate_radps, aim_r.rate_radps
+
+    def _turn(self, left_radps: float, right_radps: float) -> tuple[tuple[float, float], float, float]:
+        """Make a step; return the speeds that it was made with, and the wheels' angles after it."""
+        if self.is_stepped_by_others:
+            asked, self._asked = self._asked, (left_radps, right_radps)
+            return asked, *self._stepped
+        turned = self.body.step(*self._rims(left_radps, right_radps))
+        return (left_radps, right_radps), turned.left_angle_rad, turned.right_angle_rad
+
+    def _rims(self, left_radps: float, right_radps: float) -> tuple[float, float]:
+        """Return the speeds of the rims, m/s."""
+        left_mps, right_mps = left_radps * self._radius_m, right_radps * self._radius_m
+        if self._torques is not None:
+            return left_mps, right_mps
+        return round(left_mps, SPEED_DIGITS), round(right_mps, SPEED_DIGITS)
+
+    def _real(self, turned_l: float, turned_r: float) -> tuple[float, float]:
+        """Return how fast the wheels have turned in a step, rad/s."""
+        angle_l, angle_r = self._angles
+        return (turned_l - angle_l) / self._dt_s, (turned_r - angle_r) / self._dt_s
 
     def _held(self, asked: float, real: float, now: float) -> float:
         """Return a motor's speed, which is its wheel's where that is held."""

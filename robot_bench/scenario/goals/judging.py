@@ -13,9 +13,10 @@ from typing import cast
 
 from p2os.errors import ScenarioError
 from robot_bench.events.kinds import Event, PinEdge, Verdict
+from robot_bench.events.selection import Wires
 from robot_bench.events.stream import EventStream
 from robot_bench.scenario.goals.kinds import kind_named, known_kinds
-from robot_bench.scenario.goals.watch import GoalKind, Outcome, Watch
+from robot_bench.scenario.goals.watch import WIRES, GoalKind, Outcome, Watch
 from robot_bench.scenario.schema import Key, Table, Where, check_table, nearest
 from simbase.errors import UsageError, shown
 from simbase.state import PartState, Stateful
@@ -68,8 +69,8 @@ class Judgement:
     not_judged: list[str]
 
 
-def load_goal(table: Table, where: Where) -> Goal:
-    """Return the goal that a TOML table asks for.
+def load_goal(table: Table, where: Where, wires: Wires | None = None) -> Goal:
+    """Return the goal that a TOML table asks for; `wires` are those of a robot on own pins.
 
     Raises:
         ScenarioError: The kind or a key is unknown, or a value is wrong.
@@ -82,6 +83,8 @@ def load_goal(table: Table, where: Where) -> Goal:
     arguments = {key: value for key, value in table.items() if key not in {"kind", "ends_run"}}
     check_table(arguments, kind.keys, f"{where} ({name})" if isinstance(where, str) else where)
     _check(arguments, where)
+    if wires is not None:
+        arguments[WIRES] = wires
     try:
         kind.watch(arguments)
     except UsageError as error:

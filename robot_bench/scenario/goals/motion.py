@@ -4,8 +4,8 @@ import math
 from collections.abc import Callable
 
 from robot_bench.events.kinds import MICRO, Clearance, Contact, Event, Pose
-from robot_bench.events.selection import moves, select
-from robot_bench.scenario.goals.watch import Outcome, SelectorFeed, Watch, nanos, number, seconds
+from robot_bench.events.selection import moves
+from robot_bench.scenario.goals.watch import Outcome, SelectorFeed, Watch, nanos, number, seconds, selected
 from robot_bench.scenario.schema import Table
 from simbase.timing import NS_PER_S, Nanos
 
@@ -232,7 +232,7 @@ class StopWithin(Watch):
 
     def __init__(self, table: Table) -> None:
         self._words = str(table["after"])
-        self._events = SelectorFeed(select(self._words))
+        self._events = SelectorFeed(selected(table, self._words))
         self.kinds, self.wires = (*{Pose: None, **dict.fromkeys(self._events.kinds)},), self._events.wires
         self._most_s, self._most_m = number(table, "within_s"), number(table, "way_m", math.inf)
         #: When the event came that is waited for now; the last place, and the way since then.

@@ -7,7 +7,7 @@ from typing import cast
 from adapter_sim.pinout import load_pinout
 from robot_bench.events.kinds import Event, PinEdge, Wave
 from robot_bench.events.selection import wire_named
-from robot_bench.scenario.goals.watch import Outcome, Watch, nanos, number, seconds
+from robot_bench.scenario.goals.watch import Outcome, Watch, nanos, number, seconds, wires_of
 from robot_bench.scenario.schema import Table
 from simbase.timing import NS_PER_MS, NS_PER_S, Nanos
 
@@ -90,7 +90,7 @@ class PinHolds(Watch):
 
     def __init__(self, table: Table) -> None:
         self._name = str(table["pin"])
-        self.wires = (wire_named(self._name),)
+        self.wires = (wire_named(self._name, wires_of(table)),)
         self._wanted = table["level"] == "high"
         self._from, self._to = nanos(table, "from_s"), nanos(table, "to_s", 1e6)
         self._level: bool | None = None
@@ -128,7 +128,7 @@ class WaveWithin(Watch):
 
     def __init__(self, table: Table) -> None:
         self._name = str(table["pin"])
-        self._wire = wire_named(self._name)
+        self._wire = wire_named(self._name, wires_of(table))
         self.wires = (self._wire,)
         self._hz_bounds = number(table, "least_hz"), number(table, "most_hz", math.inf)
         self._duty_bounds = number(table, "least_duty"), number(table, "most_duty", 1.0)

@@ -10,8 +10,7 @@ from collections.abc import Callable, Mapping
 from typing import Any, cast
 
 from robot_bench.events.kinds import MICRO, Clearance, Event, Pose, Ranges
-from robot_bench.events.selection import select
-from robot_bench.scenario.goals.watch import Outcome, SelectorFeed, Watch, nanos, number, seconds
+from robot_bench.scenario.goals.watch import Outcome, SelectorFeed, Watch, nanos, number, seconds, selected
 from robot_bench.scenario.schema import Table
 from simbase.timing import NS_PER_S, Nanos
 
@@ -44,7 +43,7 @@ class OverTime(Watch):
         self._margin = margin
         self._is_always = is_always
         self._after = str(table["after"]) if "after" in table else ""
-        self._events = SelectorFeed(*([select(self._after)] if self._after else []))
+        self._events = SelectorFeed(*([selected(table, self._after)] if self._after else []))
         self._kind = kind
         self.kinds, self.wires = (*{kind: None, **dict.fromkeys(self._events.kinds)},), self._events.wires
         self._from, self._to = nanos(table, "from_s"), nanos(table, "to_s") if "to_s" in table else None
@@ -140,7 +139,7 @@ class Happens(Watch):
 
     def __init__(self, table: Table, *, least: int = 1, most: float = math.inf) -> None:
         self._words = str(table["event"])
-        self._events = SelectorFeed(select(self._words))
+        self._events = SelectorFeed(selected(table, self._words))
         self.kinds, self.wires = self._events.kinds, self._events.wires
         self._least, self._most = number(table, "least", least), number(table, "most", most)
         self._from, self._to = nanos(table, "from_s"), nanos(table, "within_s") if "within_s" in table else None
@@ -182,7 +181,7 @@ class InOrderOfEvents(Watch):
 
     def __init__(self, table: Table) -> None:
         self._words = [str(words) for words in cast("list[object]", table["events"])]
-        self._events = SelectorFeed(*map(select, self._words))
+        self._events = SelectorFeed(*(selected(table, words) for words in self._words))
         self.kinds, self.wires = self._events.kinds, self._events.wires
         self._place = 0
         self._last: Nanos = 0
@@ -209,7 +208,7 @@ class Latency(Watch):
 
     def __init__(self, table: Table) -> None:
         self._first, self._then = str(table["from"]), str(table["to"])
-        self._events = SelectorFeed(select(self._first), select(self._then))
+        self._events = SelectorFeed(selected(table, self._first), selected(table, self._then))
         self.kinds, self.wires = self._events.kinds, self._events.wires
         self._most, self._least = nanos(table, "most_s"), nanos(table, "least_s")
         #: The first event that was not answered yet.

@@ -5,9 +5,10 @@ Invariant: what a watch has decided stands: `finish` says the same, in more word
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import cast
 
 from robot_bench.events.kinds import Event
-from robot_bench.events.selection import Selector
+from robot_bench.events.selection import Selector, Wires, select
 from robot_bench.scenario.schema import Key, Table
 from simbase.state import Stateful
 from simbase.timing import NS_PER_S, Nanos
@@ -61,6 +62,24 @@ class GoalKind:
     wanted: Callable[[Table], str]
     watch: Callable[[Table], Watch]
     needs_world: bool = False
+
+
+#: Where a goal's table has the wires of a robot on own pins; no key of a file can be called so.
+WIRES = "wires of the robot"
+
+
+def wires_of(table: Table) -> Wires | None:
+    """Return the wires that a goal's words may name; None: those of the pin-out."""
+    return cast("Wires | None", table.get(WIRES))
+
+
+def selected(table: Table, words: object) -> Selector:
+    """Return what picks the events that words of a goal mean.
+
+    Raises:
+        UsageError: They mean none.
+    """
+    return select(str(words), wires_of(table))
 
 
 class SelectorFeed(Stateful):

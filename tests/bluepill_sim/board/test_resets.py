@@ -217,3 +217,22 @@ def test_a_reset_out_of_a_fault_is_a_death_and_is_counted(boot) -> None:
     assert other.verdict == board.verdict
     other.reset()
     assert (other.has_died, other.verdict) == (False, "4 resets (SOFTWARE 3, PIN 1)")
+
+
+@pytest.mark.parametrize("rounds", range(84, 111, 3))
+def test_what_is_due_in_the_block_that_asks_for_a_reset_comes_before_it_on_both_cores(
+    boot, monkeypatch: pytest.MonkeyPatch, rounds: int
+) -> None:
+    """A character ends, or does not, before the boundary at which the reset is made."""
+    source = (
+        store(0x4002_1018, 0x4005) + store(0x4001_0804, 0x4444_44B4) + store(0x4001_3808, 16)
+        + store(0x4001_380C, 0x2008) + store(0x4001_3804, 0x41) + f"movs r3, #{rounds}\nwait: subs r3, #1\nbne wait\n"
+        + store(AIRCR, 0x05FA_0004) + "nop\n" * 30 + "b stop"
+    )  # fmt: skip
+    seen = []
+    for core in ("native", "python"):
+        monkeypatch.setenv("P2OS_CORE", core)
+        machine = boot(source).run(65)
+        seen.append((bytes(machine.sent), machine.board.resets, machine.board.cycle))
+    assert seen[0] == seen[1]
+    assert seen[0][1], "the reset has come"

@@ -104,3 +104,79 @@ def test_minutes_of_waiting_for_an_update_are_over_at_once(watchdog: None) -> No
     assert board.register("R5") == 0
     board.advance_to(536_880_000_000)
     assert board.register("R5") >= 1
+
+
+@pytest.mark.parametrize("target", [65_534, 65_535])
+def test_no_count_is_passed_over(watchdog: None, target: int) -> None:
+    """Each value of CNT is there for 65536 clocks, thousands of rounds; cmp r3, r2, bne."""
+    source = program(
+        {0x28: 0xFFFF, 0x14: 1, 0x00: 1}, f".half {LOAD_CNT}, {0x4293}, {0xD1FC}", f"mov32 r2, #{target}\nmovs r5, #0"
+    )
+    board = make(source, "native")
+    board.advance_to(537_000_000_000)
+    assert board.register("R5") >= 1
+
+
+@pytest.mark.parametrize("nops", range(6))
+def test_the_round_that_begins_with_a_new_count_is_not_passed_over(nops: int) -> None:
+    """A count lasts 35 cycles, seven rounds of five: with some number of nops a round meets its begin."""
+    source = f"""mov32 r0, #0x4002101C
+        movs r1, #1
+        str r1, [r0, #0]
+        mov32 r0, #0xE000EDFC
+        mov32 r1, #0x01000000
+        str r1, [r0, #0]
+        mov32 r6, #0xE0001000
+        movs r1, #1
+        str r1, [r6, #0]
+        mov32 r0, #0x40000000
+        movs r1, #34
+        str r1, [r0, #40]
+        movs r1, #1
+        str r1, [r0, #20]
+        str r1, [r0, #0]
+        movs r2, #40
+        {chr(10).join(["nop"] * nops)}
+        b w
+        w: .half {LOAD_CNT}, 0x4293, 0xD1FC
+        ldr r0, [r6, #4]
+        log r0
+        b stop"""
+    logs = []
+    for core in ("native", "python"):
+        with pytest.MonkeyPatch.context() as patch:
+            patch.setenv("P2OS_CORE", core)
+            logs.append(Machine(source, {}).deafen().run(500).log)
+    assert logs[0] == logs[1] != []
+
+
+@pytest.mark.parametrize("core", ["native", "python"])
+def test_a_thread_without_privilege_faults_at_its_first_read_of_cyccnt(
+    monkeypatch: pytest.MonkeyPatch, core: str
+) -> None:
+    """The loop has gone round before, with privilege, so that its rounds could be worked out."""
+    monkeypatch.setenv("P2OS_CORE", core)
+    machine = Machine(
+        f"""mov32 r0, #0xE000EDFC
+        mov32 r1, #0x01000000
+        str r1, [r0, #0]
+        mov32 r0, #0xE0001000
+        movs r1, #1
+        str r1, [r0, #0]
+        mov32 r2, #400
+        movs r5, #0
+        again: ldr r3, [r0, #4]
+        subs r3, r2, r3
+        .half {0xDAFC}
+        adds r5, #1
+        mov32 r2, #100000
+        movs r1, #1
+        msr control, r1
+        isb
+        b again""", {},
+    )  # fmt: skip
+    machine.run(2000)
+    fault = machine.board.fault
+    assert fault is not None
+    assert fault.pc == machine.label("again")
+    assert fault.at_ns < 70_000, "CYCCNT reads 400 after 50 us"

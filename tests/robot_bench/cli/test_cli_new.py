@@ -10,10 +10,12 @@ from importlib.resources import files
 from pathlib import Path
 
 import pytest
+import yaml
 
 from adapter_sim.pinout import load_pinout
 from p2os.cli.main import run as p2os
 from p2os.pioneer.body.factory import BEST, resolve_body
+from robot_bench import Bench
 from robot_bench.firmware.build import COMPILER
 from robot_bench.project import files as project
 from robot_bench.scenario.scenario import read_scenario
@@ -21,6 +23,7 @@ from robot_bench.scenario.scenario import read_scenario
 NAMES = {
     "main.c", "Makefile", "README.md", ".gitignore", "just-drive.toml", "tests/test_robot.py", "pytest.ini",
     "board/startup.c", "board/memory.c", "board/f103.h", "board/f103c8.ld", "board/wires.h",
+    ".vscode/launch.json", ".github/workflows/robot.yml", ".gitlab-ci.yml",
 }  # fmt: skip
 PATROL = re.compile(r"```toml\n(# patrol\.toml\n.*?)```", re.DOTALL)
 
@@ -49,7 +52,7 @@ def test_a_project_is_written_and_the_next_command_is_named(capsys: pytest.Captu
     assert p2os(["new", "mine"]) == 0
     assert held(Path("mine")) == NAMES
     said = capsys.readouterr().out.splitlines()
-    assert said[0].startswith("mine: 12 files")
+    assert said[0].startswith("mine: 15 files")
     assert said[-1] == "next: cd mine && make run"
     assert max(map(len, said)) <= 80
 
@@ -112,7 +115,7 @@ def test_what_cannot_be_is_one_line_and_a_hint_and_leaves_all_as_it_was(
     assert Path("full/theirs.c").read_text(encoding="utf-8") == "mine"
 
 
-@pytest.mark.parametrize("written", range(14))
+@pytest.mark.parametrize("written", range(17))
 def test_a_disk_that_fills_up_leaves_nothing_behind(written: int, monkeypatch: pytest.MonkeyPatch) -> None:
     contents = project.project_files("kinematic")
     left = [written]
@@ -239,3 +242,102 @@ def test_a_program_from_elsewhere_drives_without_being_judged(capsys: pytest.Cap
     words = ["run", "free-drive", "--firmware", "mine/build/robot.elf", "--body", "kinematic", "--duration", "10s"]
     assert p2os(words) == 0
     assert "ended well, no goals were set" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(("options", "said"), [
+    (["--build", "ninja"], "there is no --build 'ninja'\nhint: --build make or --build cmake or --build platformio"),
+    (["--robot", "tank"], "there is no --robot 'tank'\nhint: --robot p2dx or --robot rover"),
+])  # fmt: skip
+def test_what_builds_it_and_its_robot_are_of_those_that_there_are(
+    options: list[str], said: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert p2os(["new", "mine", *options]) == 2
+    assert said in capsys.readouterr().err
+    assert not Path("mine").exists()
+
+
+@pytest.mark.parametrize("build", ["make", "cmake", "platformio"])
+@pytest.mark.parametrize("robot", ["p2dx", "rover"])
+def test_each_file_names_the_program_that_the_build_makes_and_all_of_its_sources(build: str, robot: str) -> None:
+    contents = project.project_files("kinematic", build=build, robot=robot)
+    firmware = project.BUILDS[build].firmware
+    assert f'firmware = "{firmware}"' in contents["just-drive.toml"]
+    assert f"--firmware {firmware} " in contents["pytest.ini"]
+    assert contents[".vscode/launch.json"].count(firmware) == 2
+    built = contents[{"make": "Makefile", "cmake": "CMakeLists.txt", "platformio": "platformio.ini"}[build]]
+    sources = {name for name in contents if name.endswith(".c")}
+    assert {name for name in sources if name in built} == sources
+    assert not [name for name, text in contents.items() if re.search(r"@[A-Z]+@", text)]
+    held_back = {"make": "cmake", "cmake": "make test", "platformio": "make"}[build]
+    assert held_back not in contents["README.md"]
+
+
+def test_the_debuggers_file_is_json_with_comments() -> None:
+    text = project.project_files("kinematic")[".vscode/launch.json"]
+    found = json.loads(re.sub(r"^\s*//.*$", "", text, flags=re.MULTILINE))
+    assert [one["type"] for one in found["configurations"]] == ["cortex-debug", "cppdbg"]
+    assert {one.get("gdbTarget") or one["miDebuggerServerAddress"] for one in found["configurations"]} == {
+        "localhost:3333"
+    }
+
+
+@needs_compiler
+@pytest.mark.slow
+@pytest.mark.skipif(shutil.which("cmake") is None, reason="no cmake")
+def test_cmake_builds_a_program_that_does_what_that_of_make_does() -> None:
+    hashes = []
+    for build in ("make", "cmake"):
+        project.write_project(Path(build), project.project_files("kinematic", build=build))
+        subprocess.run(project.BUILDS[build].commands, shell=True, cwd=build, check=True, timeout=120)  # noqa: S602
+        bench = Bench.from_scenario(f"{build}/just-drive.toml", duration_s=4)
+        bench.run_until("4 s")
+        bench.finish()
+        hashes.append(bench.text)
+    assert hashes[0] == hashes[1]
+    assert "forward" in hashes[0]
+
+
+@needs_compiler
+@pytest.mark.slow
+@pytest.mark.parametrize(("name", "robot"), [(".github/workflows/robot.yml", "p2dx"), (".gitlab-ci.yml", "rover")])
+def test_the_shell_lines_of_a_ci_file_pass_on_a_project_as_it_is_written(name: str, robot: str) -> None:
+    project.write_project(Path("mine"), project.project_files("kinematic", robot=robot))
+    found = yaml.safe_load(Path("mine", name).read_text(encoding="utf-8"))
+    if "jobs" in found:
+        lines = [step["run"] for step in found["jobs"]["bench"]["steps"] if "run" in step]
+    else:
+        lines = [*found["bench"]["before_script"], *found["bench"]["script"]]
+    assert len(lines) == 5
+    # What a machine needs once, and the network, are left out; quick tests stand for all.
+    shims = {
+        "sudo": "exit 0", "apt-get": "exit 0", "pip": "exit 0",
+        "pytest": f'exec {sys.executable} -m pytest -p no:cacheprovider -k "says or ready or asks" "$@"',
+        "p2os": f'exec {sys.executable} -m p2os "$@" --duration 4s',
+    }  # fmt: skip
+    Path("bin").mkdir()
+    for shim, text in shims.items():
+        Path("bin", shim).write_text(f"#!/bin/sh\n{text}\n", encoding="utf-8")
+        Path("bin", shim).chmod(0o755)
+    environment = {**os.environ, "PATH": f"{Path('bin').absolute()}:{os.environ['PATH']}", "P2OS": "p2os"}
+    for line in lines:
+        done = subprocess.run(  # noqa: S602  # it is a shell's line
+            line, shell=True, cwd="mine", env=environment, capture_output=True, text=True, timeout=300, check=False
+        )
+        # The rover has four seconds, too few for its goals: open is not missed.
+        assert done.returncode == 0, (line, done.stdout, done.stderr)
+    assert Path("mine/results.xml").is_file()
+    assert Path("mine/drive/coverage.html").is_file()
+
+
+@needs_compiler
+@pytest.mark.slow
+def test_the_rovers_tests_pass_and_notice_what_was_broken() -> None:
+    project.write_project(Path("mine"), project.project_files("kinematic", robot="rover"))
+    done = make("test", f"{PYTEST} -k 'not comes_back'")
+    assert "4 passed" in done.stdout, done.stdout
+    main = Path("mine/main.c")
+    text = main.read_text(encoding="utf-8")
+    assert "#define NEAR_MV 1300u" in text
+    main.write_text(text.replace("#define NEAR_MV 1300u", "#define NEAR_MV 3300u"), encoding="utf-8")
+    failed = make("test", f"{PYTEST} --bench-record none -k stops_before", "-s")
+    assert "FAILED tests/test_robot.py::test_it_stops_before_what_its_front_sensor_sees" in failed.stdout

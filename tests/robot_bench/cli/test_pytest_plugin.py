@@ -110,3 +110,34 @@ def test_who_uses_no_bench_loads_none(pytester: pytest.Pytester) -> None:
     """)  # fmt: skip
     result = pytester.runpytest_subprocess(*PLUGIN, "-p", "no:hypothesispytest")
     result.assert_outcomes(passed=1)
+
+
+CLIENTS = """
+import pytest
+from p2os import Robot
+
+def test_it_drives(robot, served):
+    robot.drive(0.1)
+    assert 0.05 < robot.state.pose.x_m < 0.2
+    served.reset()
+
+@pytest.mark.pioneer(robot="p3dx-sh", world="arena", url="pty:")
+def test_a_serial_line(served):
+    assert "pty" in served or "serial" in served
+    with Robot(served) as robot:
+        assert robot.identity.robot_class == "Pioneer"
+
+@pytest.mark.pioneer(world="nowhere")
+def test_of_nothing(robot): pass
+
+@pytest.mark.pioneer(wold="room")
+def test_of_a_slip(robot): pass
+"""
+
+
+@pytest.mark.slow
+def test_a_test_may_have_a_served_robot_and_a_client_of_it(pytester: pytest.Pytester) -> None:
+    result = run(pytester, CLIENTS)
+    result.assert_outcomes(passed=2, errors=2)
+    result.stdout.fnmatch_lines(["*no world 'nowhere'*", "*unexpected keyword argument 'wold'*"])
+    assert "Traceback" not in result.stdout.str()

@@ -2,7 +2,7 @@
 
 import pickle
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from typing import Any
 
 import pytest
@@ -264,3 +264,24 @@ def test_a_verdict_may_end_the_run_and_the_slice_changes_nothing() -> None:
         assert (verdict.t, verdict.met) == (S, True)
         told.add(one.trace.text)
     assert len(told) == 1
+
+
+def test_a_series_of_waits_reads_each_line_of_the_trace_no_more_than_twice(monkeypatch: pytest.MonkeyPatch) -> None:
+    one = Bench.from_scenario("encoders", body="kinematic", duration_s=8)
+    read = 0
+    lines = one.trace.lines
+
+    def counted(begin: int = 0) -> Iterator[str]:
+        nonlocal read
+        for line in lines(begin):
+            read += 1
+            yield line
+
+    monkeypatch.setattr(one.trace, "lines", counted)
+    found = [one.expect("pin encoder1_s1 changes", within="8 s") for _ in range(4)]
+    again = [one.expect("pin encoder1_s1 changes", within="8 s") for _ in range(3)]
+    times = [event.t for event in (*found, *again)]
+    assert times == sorted(set(times))  # each one once
+    assert read <= 2 * len(list(lines()))
+    edges = [event.t for event in events_of(lines()) if getattr(event, "wire", "") == "encoder1_s1"]
+    assert times == edges[1 : len(times) + 1]  # the first is what the wire begins with

@@ -52,10 +52,15 @@ def fits(value: Any, schema: dict[str, Any]) -> bool:
 def fits_object(value: dict[str, Any], schema: dict[str, Any]) -> bool:
     allowed = schema["additionalProperties"]
     inner = [schema.get("properties", {}).get(key, allowed) for key in value]
-    if not any(set(one["required"]) <= set(value) for one in schema.get("anyOf", [{"required": ()}])):
+    if not any(is_one_of(value, one) for one in schema.get("anyOf", [{"required": ()}])):
         return False
     known = all(rule is not False and fits(item, rule) for item, rule in zip(value.values(), inner, strict=True))
     return known and set(schema.get("required", ())) <= set(value)
+
+
+def is_one_of(value: dict[str, Any], one: dict[str, Any]) -> bool:
+    has = set(one["required"]) <= set(value)
+    return has and all(fits(value[key], inner) for key, inner in one.get("properties", {}).items())
 
 
 def fits_number(value: float, schema: dict[str, Any]) -> bool:
@@ -123,6 +128,30 @@ def test_check_says_of_each_file_what_it_is_or_what_is_wrong(tmp_path: Any) -> N
     assert said("motors").exit_code == 0
     assert isinstance(said().exception, UsageError)
     assert json.loads(said("--schema").stdout) == json.loads(json.dumps(SCHEMA))
+
+
+def test_the_schema_takes_several_robots_and_each_ones_goals() -> None:
+    robots = """
+    world = "room"
+    duration_s = 3
+    [[robot]]
+    name = "a"
+    firmware = "dodge.elf"
+    adapter = { core = "model" }
+    [[robot]]
+    name = "b"
+    [[goal]]
+    robot = "a"
+    kind = "no_collision"
+    [[fault]]
+    robot = "a"
+    at_s = 1
+    fault = "reboot"
+    """
+    assert fits(tomllib.loads(robots), SCHEMA)
+    for old, new in (('name = "b"', 'color = "b"'), ('"model"', "3"), ('robot = "a"', "robot = 3")):
+        assert not fits(tomllib.loads(robots.replace(old, new)), SCHEMA)
+    assert not fits(tomllib.loads('world = "room"\nduration_s = 3\nrobot = "p2dx"'), SCHEMA), "no firmware"
 
 
 def test_the_schema_takes_files_of_files_seeds_and_sweeps() -> None:

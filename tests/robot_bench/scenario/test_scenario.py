@@ -31,7 +31,7 @@ def test_every_scenario_that_ships_is_right_and_states_its_threshold(name: str) 
     assert scenario.name == name
     assert scenario.firmware.is_file()
     assert scenario.goals or name == "free-drive"
-    if scenario.own_robot is not None:  # it has neither the adapter nor its threshold
+    if scenario.own_robot is not None or scenario.robots:  # neither the adapter nor its threshold; or several
         assert scenario.body == "kinematic"
         return
     assert "threshold_m" in scenario.text

@@ -2,6 +2,7 @@
 
 import pickle
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -9,7 +10,7 @@ import pytest
 from p2os.errors import ScenarioError
 from p2os.robots.parameters import load_parameters
 from robot_bench.bench import Bench
-from robot_bench.events.kinds import Fault, WorldChange
+from robot_bench.events.kinds import Fault, PinEdge, WorldChange
 from robot_bench.scenario.when_script import load_whens
 from tests.robot_bench.test_bench import MS, bench, scenario
 
@@ -77,7 +78,7 @@ def test_a_bench_saved_between_event_and_deed_goes_on_alike() -> None:
     ("table", "says"),
     [
         ({"event": "pin PB99 high", "do": "end"}, "there is no wire"),
-        ({"event": "contact", "do": "explode"}, "is none of place, move, remove, inject, clear, end"),
+        ({"event": "contact", "do": "explode"}, "is none of place, move, remove, inject, clear, press"),
         ({"event": "contact", "do": "end", "fault": "reboot"}, "unknown key 'fault'"),
         ({"event": "contact", "do": "inject", "fault": "reboots"}, "no fault 'reboots'"),
         ({"event": "contact", "do": "place", "name": "x", "shape": "box"}, "'x_m' is missing"),
@@ -93,3 +94,93 @@ def test_a_wrong_table_is_refused_with_its_place(table: dict[str, Any], says: st
 def test_mode_a_has_no_controller_to_break() -> None:
     with pytest.raises(ScenarioError, match="mode direct has none"):
         made({"event": "contact", "do": "inject", "fault": "reboot"}, mode="direct")
+
+
+ROVER = """firmware = "rover.elf"
+world = "arena"
+robot = "rover"
+body = "kinematic"
+duration_s = 3.0
+"""
+
+
+def rover(text: str, tmp_path: Path) -> Bench:
+    (tmp_path / "rover.toml").write_text(ROVER + text)
+    return Bench.from_scenario(tmp_path / "rover.toml")
+
+
+def test_a_level_is_put_on_a_wire_of_a_robot_on_own_pins_and_let_go(tmp_path: Path) -> None:
+    one = rover(
+        '[[when]]\nevent = "time 1"\ndo = "set_pin"\npin = "PB10"\nlevel = "low"\nfor_s = 0.2\n'
+        '[[goal]]\nkind = "pin_holds"\npin = "bumper_front"\nlevel = "high"\nto_s = 0.9\n'
+        '[[goal]]\nkind = "happens"\nevent = "pin PB10 low"\nmost = 1\n', tmp_path,
+    )  # fmt: skip
+    edges: list[tuple[int, bool]] = []
+    one.events.subscribe(lambda edge: edges.append((edge.t, edge.level)), PinEdge, wires=["bumper_front"])
+    one.run_until("2 s")
+    assert one.level("PB10")
+    one.finish()
+    assert edges[-2:] == [(1050 * MS, False), (1250 * MS, True)]  # told with the pose after it
+    assert len(one.judge().met) == 2
+
+
+def test_volts_are_put_on_a_pin_and_read_by_its_converter(tmp_path: Path) -> None:
+    # The rover reads its front sensor on PA1: 2.6 V are something at 0.1 m.
+    table = '[[when]]\nevent = "time 1"\ndo = "set_volts"\npin = "PA1"\nvolts = 2.6\nevery = true\n'
+    one = rover(table + table.replace("time 1", "robot moves"), tmp_path)
+    one.run_until("2 s")
+    assert one.chip.pin("PA1").volts is not None  # type: ignore[attr-defined]  # an emulated one
+    assert "hand" in {note.who for note in one.record().events}
+
+
+def test_what_is_typed_arrives_at_the_usart_and_stands_in_the_trace(monkeypatch: pytest.MonkeyPatch) -> None:
+    typed: list[tuple[int, bytes]] = []
+    one = made({"event": "pin PB7 high", "do": "type", "text": "go\n"})
+    monkeypatch.setattr(one.chip.usart1, "receive", lambda data: typed.append((one.chip.now_ns, data)), raising=False)
+    one.run_until("3 s")
+    assert [data for _, data in typed] == [b"go\n"]
+    assert 1050 * MS < typed[0][0] < 1060 * MS
+    assert [(note.what, note.detail) for note in one.record().events if note.who == "hand"] == [
+        ("type", "usart1 'go\\n'")
+    ]
+
+
+@pytest.mark.parametrize(
+    ("table", "words"),
+    [
+        ({"do": "press", "button": "stop-button"}, "stop-button"),
+        ({"do": "drop_link"}, "link-down"),
+        ({"do": "sag_battery", "volts": 11.5}, "low-battery 11.5"),
+    ],
+)
+def test_buttons_the_link_and_the_battery_are_faults_in_words(table: dict[str, Any], words: str) -> None:
+    one = made({"event": "pin PB7 high", **table, "for_s": 0.5})
+    seen: list[tuple[int, str, str]] = []
+    one.events.subscribe(lambda fault: seen.append((fault.t, fault.op, fault.words)), Fault)
+    one.run_until("3 s")
+    one.finish()
+    assert seen == [(1050 * MS, "inject", words), (1550 * MS, "clear", words)]
+
+
+def test_an_event_counts_only_after_that_of_another() -> None:
+    # PB6 changes before and after PB7's rise; only what comes after counts.
+    one = made(
+        {"event": "pin PB7 high", "do": "clear", "fault": "sonar-dead 1", "id": "first", "after_s": 5},
+        {"event": "pin PB7 changes", "do": "inject", "fault": "sonar-dead 1", "after": "first"},
+    )
+    assert [row for row in told(one, Fault) if row[1] == "inject"] == [(2050 * MS, "inject")]
+
+
+@pytest.mark.parametrize(
+    ("table", "words"),
+    [
+        ({"do": "press", "button": "horn"}, "there is no button 'horn'"),
+        ({"do": "set_pin", "pin": "PD9", "level": "low"}, "there is no wire 'PD9'"),
+        ({"do": "set_volts", "pin": "DD1", "volts": 1.0}, "volts are put on a pin"),
+        ({"do": "end", "after": "nobody"}, "there is none with the id 'nobody'"),
+        ({"do": "type"}, "text"),
+    ],
+)
+def test_what_cannot_be_done_is_refused(table: dict[str, Any], words: str) -> None:
+    with pytest.raises(ScenarioError, match=words):
+        load_whens([{"event": "contact", **table}], P2DX, "x.toml")

@@ -1,15 +1,26 @@
 /* Asleep between SysTicks, while circular DMA takes what ADC1 converts: one channel without a pause, at 857 kS/s with
- * 72 MHz or 1 MS/s with 56 MHz (BENCH_56_MHZ); or eight channels each 10 kHz (BENCH_EIGHT), started by SysTick. */
+ * 72 MHz or 1 MS/s with 56 MHz (BENCH_56_MHZ); or eight channels each 10 kHz (BENCH_EIGHT), started by SysTick or by
+ * TRGO of TIM3 (BENCH_TRGO). */
 #include "board.h"
 #include "f103_analog.h"
+#include "f103_timers.h"
 
 #define ROUNDS 64u
 #ifdef BENCH_EIGHT
 #define CHANNELS 8u
-#define TICK_HZ 10000u
+#define SAMPLING_HZ 10000u
 #else
 #define CHANNELS 1u
+#endif
+#if defined(BENCH_EIGHT) && !defined(BENCH_TRGO)
+#define TICK_HZ SAMPLING_HZ
+#else
 #define TICK_HZ 1000u
+#endif
+#ifdef BENCH_TRGO
+#define STARTED_BY (4u << 17) /* EXTSEL: TIM3 TRGO */
+#else
+#define STARTED_BY ADC_CR2_EXTSEL_SWSTART
 #endif
 
 volatile uint32_t bench_rounds;
@@ -19,10 +30,20 @@ void SysTick_Handler(void);
 void SysTick_Handler(void)
 {
     ++bench_rounds;
-#ifdef BENCH_EIGHT
+#if defined(BENCH_EIGHT) && !defined(BENCH_TRGO)
     ADC1->CR2 |= ADC_CR2_SWSTART;
 #endif
 }
+
+#ifdef BENCH_TRGO
+static void timer_start(void)
+{
+    RCC->APB1ENR |= RCC_APB1ENR_TIM3EN;
+    TIM3->ARR = HCLK_HZ / SAMPLING_HZ - 1u;
+    TIM3->CR2 = 2u << 4; /* TRGO with each update event */
+    TIM3->CR1 = TIM_CR1_CEN;
+}
+#endif
 
 static void adc_start(void)
 {
@@ -37,7 +58,7 @@ static void adc_start(void)
     ADC1->SQR3 = 0u | 1u << 5 | 2u << 10 | 3u << 15 | 4u << 20 | 5u << 25;
     ADC1->SQR2 = 6u | 7u << 5;
     ADC1->CR1 = CHANNELS > 1u ? ADC_CR1_SCAN : 0u;
-    ADC1->CR2 = ADC_CR2_ADON | ADC_CR2_DMA | ADC_CR2_EXTTRIG | ADC_CR2_EXTSEL_SWSTART | (CHANNELS == 1u ? ADC_CR2_CONT : 0u);
+    ADC1->CR2 = ADC_CR2_ADON | ADC_CR2_DMA | ADC_CR2_EXTTRIG | STARTED_BY | (CHANNELS == 1u ? ADC_CR2_CONT : 0u);
 #ifndef BENCH_EIGHT
     ADC1->CR2 |= ADC_CR2_SWSTART;
 #endif
@@ -60,6 +81,9 @@ int main(void)
     SYSTICK->LOAD = HCLK_HZ / TICK_HZ - 1u;
 #endif
     adc_start();
+#ifdef BENCH_TRGO
+    timer_start();
+#endif
     SYSTICK->VAL = 0;
     SYSTICK->CTRL = SYSTICK_CTRL_ENABLE | SYSTICK_CTRL_TICKINT | SYSTICK_CTRL_CLKSOURCE_CORE;
     for (;;) {

@@ -292,7 +292,8 @@ static void write_device(struct core *core, struct page *page, uint32_t index, u
 {
     struct device *device = page->device;
     const struct device_kind *kind = device->kind;
-    const bool needs_time = kind->needs_time == NULL || kind->needs_time(device, index, true) ||
+    const bool needs_time = (kind->store_needs_time != NULL ? kind->store_needs_time(device, index, written)
+                                                            : kind->needs_time == NULL || kind->needs_time(device, index, true)) ||
                             device->fabric->watches_lines;
     if (needs_time && !begin_access(core, address, true, size)) {
         return;

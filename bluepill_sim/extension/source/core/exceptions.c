@@ -9,7 +9,7 @@
 #include "core.h"
 
 enum { ENTRY_CYCLES = 12, EXIT_CYCLES = 12, TAIL_CHAIN_CYCLES = 6, FRAME_BYTES = 32 };
-enum { NMI = 2, HARD_FAULT = 3, SVCALL = 11, DEBUG_MONITOR = 12, THREAD_PRIORITY = 256 };
+enum { NMI = 2, HARD_FAULT = 3, SVCALL = 11, DEBUG_MONITOR = 12, SYSTICK = 15, THREAD_PRIORITY = 256 };
 enum { MON_STEP = 1 << 18 };
 enum { SLEEPONEXIT = 2, SLEEPDEEP = 4, SEVONPEND = 16, STKALIGN = 1 << 9, SPSEL = 2, NPRIV = 1 };
 enum { AWAKE, FOR_INTERRUPT, FOR_EVENT };
@@ -158,6 +158,25 @@ static void start_handler(struct core *core, unsigned number, uint32_t handler, 
     s->it_state = 0;
 }
 
+/* Acts on what comes while the frame is written; returns the exception whose handler starts: one that comes late and has
+ * a higher priority, while the other stays pending (ARM B1.5.9). */
+static unsigned latest(struct core *core, unsigned number)
+{
+    struct shared *s = &core->shared;
+    if (s->cycle >= s->tick_next && systick_advance(s, s->cycle)) {
+        pend(core, SYSTICK);
+    }
+    if (s->cycle >= core->fabric->next_cycle) {
+        run_events(core->fabric, ns_of(core->fabric, s->cycle));
+    }
+    const unsigned first = first_pending(s);
+    if (!first || group(s, priority_of(s, first)) >= group(s, priority_of(s, number)) || !vector(core, first)) {
+        return number;
+    }
+    set_bit(s->pending, number);
+    return first;
+}
+
 bool enter(struct core *core, unsigned number, uint32_t return_address)
 {
     struct shared *s = &core->shared;
@@ -184,9 +203,11 @@ bool enter(struct core *core, unsigned number, uint32_t return_address)
     const uint32_t words[8] = {value[0], value[1], value[2], value[3], value[4], value[5], return_address, xpsr};
     memcpy(frame, words, sizeof words);
     const uint32_t exc_return = s->exception_number ? TO_HANDLER : control & SPSEL ? TO_THREAD_PSP : TO_THREAD_MSP;
-    record(core, return_address, (int32_t)number);
-    start_handler(core, number, handler, frame_at, exc_return | 1, cpsr);
+    const uint64_t began = s->cycle;
     s->cycle += ENTRY_CYCLES;
+    const unsigned taken = latest(core, number);
+    record_at(core, began, return_address, (int32_t)taken);
+    start_handler(core, taken, taken == number ? handler : vector(core, taken), frame_at, exc_return | 1, cpsr);
     return true;
 }
 

@@ -196,7 +196,7 @@ static const struct counter *counter_at(struct core *core, uint32_t address)
     for (uint32_t n = 0; n < fabric->counter_count; ++n) {
         const struct counter *one = &fabric->counters[n];
         if (one->address == address) {
-            return one->ticks == NULL ? is_privileged(core) ? one : NULL : has_clock(&core->pages[(address - PERIPHERALS) >> PAGE_SHIFT]) ? one : NULL;
+            return one->ticks == NULL || has_clock(&core->pages[(address - PERIPHERALS) >> PAGE_SHIFT]) ? one : NULL;
         }
     }
     return NULL;

@@ -158,7 +158,7 @@ static uint32_t crc_of(const struct device *device, uint32_t crc, uint32_t word)
 /* What the wires make of a word that this sends as a master. */
 static uint32_t exchange(struct device *device, uint32_t sent)
 {
-    const struct spi *spi = device->state;
+    struct spi *spi = device->state;
     const uint32_t mask = mask_of(device), data = device->words[CR1] & BIDIMODE ? MOSI : MISO;
     const struct port *port = &device->fabric->ports[spi->pins[data] / PINS];
     const bool is_readable = port->bonded & ~port->analog & ~port->held & 1u << spi->pins[data] % PINS;
@@ -174,7 +174,8 @@ static uint32_t exchange(struct device *device, uint32_t sent)
     if (spi->is_looped) {
         got = sent;
     } else if (spi->selected) {
-        got = ask(device, EXCHANGE, sent) & mask;
+        const bool holds = spi->ahead_cr1 == device->words[CR1] && (spi->ahead_sent > 0xFF || spi->ahead_sent == sent);
+        got = spi->ahead_at < spi->ahead_count && holds ? spi->ahead[spi->ahead_at++] : ask(device, EXCHANGE, sent) & mask;
     }
     if (!is_readable && !only_sends(device)) {
         ask(device, NO_MISO, 0);

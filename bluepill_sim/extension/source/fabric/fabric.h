@@ -81,6 +81,8 @@ struct device_kind {
     const struct device_kind *next;
     /* Whether an access needs to know its time, or may do what needs to; null: it always does. */
     bool (*needs_time)(const struct device *device, uint32_t index, bool is_write);
+    /* The same of the store of a word, where that decides it; null: as `needs_time` says. */
+    bool (*store_needs_time)(const struct device *device, uint32_t index, uint32_t written);
     /* A register that is declared as native: what is read; what follows a store of `written` over `previous`. */
     uint32_t (*read)(struct device *device, uint32_t index);
     void (*write)(struct device *device, uint32_t index, uint32_t written, uint32_t previous);
@@ -343,12 +345,12 @@ uint32_t fabric_command(struct fabric *fabric, uint32_t slot, uint32_t what, uin
     __attribute__((constructor)) static void add_##kind(void) { add_kind(&kind); }                                     \
     static struct device_kind kind
 
-/* Whether a port's outputs may change without their time: nobody looks at them, and none has to be warned of. */
-static inline bool is_unwatched(const struct fabric *fabric, uint32_t number)
+/* Whether outputs of a port may change without their time: nobody looks at them, and none has to be warned of. */
+static inline bool is_unwatched(const struct fabric *fabric, uint32_t number, uint32_t pins)
 {
     const struct port *port = &fabric->ports[number];
     const uint32_t driven = (port->outside & ~port->outside_weak) | port->rail;
-    return !(fabric->subscribed[number] | fabric->listened[number] | (driven & (port->output | port->alternate)));
+    return !(pins & (fabric->subscribed[number] | fabric->listened[number] | (driven & (port->output | port->alternate))));
 }
 
 #endif

@@ -419,9 +419,14 @@ struct spi {
     uint32_t selected; /* parts that are selected */
     uint32_t far; /* the word that a master outside sends; 0: none */
     uint32_t wants_words; /* somebody has subscribed to words */
+    uint32_t ahead_count; /* how many bytes the part has said ahead, */
+    uint32_t ahead_at; /* and how many of them have gone over; */
+    uint32_t ahead_cr1; /* they hold while this is CR1, */
+    uint32_t ahead_sent; /* and while this is sent: above 0xFF whatever is */
+    uint8_t ahead[256];
     uint32_t is_stopped; /* its clock stands still */
 };
-_Static_assert(sizeof(struct spi) == 128, "spi");
+_Static_assert(sizeof(struct spi) == 400, "spi");
 
 /* What an I2C holds beyond its registers. RM0008 26.3. */
 struct i2c {

@@ -1,6 +1,7 @@
 """The parts that ship, driven by programs on both cores; and each by itself where a program would be long."""
 
 from collections.abc import Callable
+from itertools import pairwise
 
 import pytest
 from hypothesis import given, settings
@@ -169,3 +170,64 @@ def test_a_bus_that_there_is_not_is_refused_with_a_hint(board_of: Boards) -> Non
         board.i2c("SPI1")
     with pytest.raises(BluePillError, match="no such pin: PZ1"):
         board.spi("SPI1", SpiFlash(), select="PZ1")
+
+
+class AskedFlash(SpiFlash):
+    """One that is asked for each byte."""
+
+    ahead = None  # type: ignore[assignment] # as a part that has none
+
+
+def test_what_a_part_says_ahead_changes_nothing_but_the_time_it_takes(board_of: Boards) -> None:
+    found = []
+    for flash in (SpiFlash(WRAPPED * 8), AskedFlash(WRAPPED * 8)):
+        board, asked = board_of("flash_over_spi"), []
+        board.spi("SPI1", flash, select="PA4").subscribe(asked.extend)
+        found.append((said_by(board), bytes(flash.memory), flash.ignored, board.cycle, asked))
+    assert found[0] == found[1]
+
+
+@pytest.mark.parametrize("meant", [0, None])
+def test_what_was_said_ahead_holds_for_what_was_sent_and_ends_with_the_selection(
+    board_of: Boards, meant: int | None
+) -> None:
+    class Counter:
+        """Sends numbers, and leaves out 100 when it is deselected; it keeps what it was asked."""
+
+        spi_modes = frozenset(range(4))
+        max_hz = 36_000_000
+
+        def __init__(self) -> None:
+            self.number, self.asked, self.times = 0, bytearray(), 0
+
+        def select(self, at_ns: int) -> None:
+            del at_ns
+
+        def deselect(self, at_ns: int) -> None:
+            del at_ns
+            self.number += 100
+            self.times += 1
+
+        def exchange(self, byte: int, at_ns: int) -> int:
+            del at_ns
+            self.asked.append(byte)
+            self.number += 1
+            return self.number - 1 & 0xFF
+
+        def ahead(self, count: int) -> tuple[bytes, int | None]:
+            return bytes(self.number + n & 0xFF for n in range(min(count, 3))), meant
+
+        def went(self, count: int) -> None:
+            self.number += count
+
+    board, part = board_of("flash_over_spi"), Counter()
+    rows: list[tuple[int, int, int]] = []
+    board.spi("SPI1", part, select="PA4").subscribe(rows.extend)
+    board.run_for("20 ms")
+    heard = [(sent, got) for _, sent, got in rows]
+    steps = [after - before & 0xFF for (_, before), (_, after) in pairwise(heard)]
+    assert set(steps) == {1, 101}
+    assert part.times - 1 <= steps.count(101) <= part.times
+    others = [sent for sent, _ in heard if sent]
+    assert meant is None or [byte for byte in part.asked if byte] == others
+    assert len(part.asked) < len(heard)

@@ -223,6 +223,18 @@ def play(pair: Pair, steps: list[tuple[Any, ...]]) -> None:
     pair.run(60)
 
 
+@pytest.mark.parametrize(
+    "start",
+    [
+        {"EGR": 1, "ARR": 1, "CCMR1": 0xE800, "CCR2": 1, "CCER": 0x1555, "BDTR": 0x8002, "SR": 0, "CR1": 0x11},
+        {"ARR": 1, "CCMR1": 0x3000, "CCER": 0x1555, "BDTR": 0x8002, "EGR": 1, "SR": 0, "CR1": 1},
+    ],
+    ids=["an edge in the tick that makes the wave", "no edge of its own yet"],
+)
+def test_the_dead_time_of_a_wave_s_first_edge_agrees(fake_chip: Any, start: dict[str, int]) -> None:
+    play(Pair(fake_chip, "TIM1", 0x7F), [*start.items(), ("run", 30)])
+
+
 @pytest.mark.parametrize("name", ["TIM1", "TIM3"])
 @settings(max_examples=60, deadline=None)
 @given(start=START, steps=ABOUT_OUTPUTS)

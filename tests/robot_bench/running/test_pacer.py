@@ -3,7 +3,7 @@
 import pytest
 
 from p2os.errors import LocalProtocolError
-from robot_bench.pacer import GRAIN_NS, LONGEST_SLICE_NS, SHORTEST_SLICE_NS, RealTimePacer, SliceLength
+from robot_bench.running.pacer import GRAIN_NS, LONGEST_SLICE_NS, SHORTEST_SLICE_NS, RealTimePacer, SliceLength
 
 
 class Clock:

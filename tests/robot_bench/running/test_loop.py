@@ -2,7 +2,7 @@
 
 import pytest
 
-from robot_bench.loop import RunLoop, StuckError
+from robot_bench.running.loop import RunLoop, StuckError
 from robot_bench.wires.chip_pins import ChipPins
 from robot_bench.wires.nets import Harness, Net
 from simbase.timing import Reached

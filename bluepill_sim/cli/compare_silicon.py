@@ -1,0 +1,65 @@
+"""`p2os mcu compare-silicon`: lays the log of a real chip beside the model."""
+
+from collections import Counter
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from bluepill_sim.analysis.silicon.comparison import Row, Verdict, ask_model, compare
+from bluepill_sim.analysis.silicon.log import KINDS, read_log
+from simbase.errors import FileError
+
+HELP = """Lay what a real STM32F103C8 says of itself beside the model.
+
+LOG is what the silicon kit prints over USART1 (115200 8N1 on PA9): flash bluepill_sim/analysis/silicon/kit.elf, press
+reset, record it. It erases the last page of the flash. The model runs the same program.
+Exit code 1: something differs by more than is allowed. docs/silicon.md tells what is counted, and why what is allowed.
+
+\b
+Examples:
+  p2os mcu compare-silicon board.log          what differs, and a count of what does not
+  p2os mcu compare-silicon board.log --all    every number
+"""
+
+
+def register(app: typer.Typer) -> None:
+    """Add the command."""
+    app.command("compare-silicon", help=HELP)(compare_silicon)
+
+
+def compare_silicon(
+    log: Annotated[Path, typer.Argument(help="What the kit has printed.", metavar="LOG")],
+    show_all: Annotated[bool, typer.Option("--all", help="Show what is the same too.")] = False,
+) -> None:
+    """Compare a log."""
+    try:
+        data = log.read_bytes()
+    except OSError as error:
+        raise FileError(f"cannot read {log}: {error.strerror or error}") from error
+    chip = read_log(data, log.name)
+    rows = compare(chip, ask_model())
+    for row in rows:
+        if show_all or row.verdict is not Verdict.SAME:
+            typer.echo(line_of(row))
+    for kind, what in {"reg": "registers before anything was changed", **KINDS}.items():
+        found = Counter(row.verdict for row in rows if row.kind == kind)
+        counts = ", ".join(f"{found[verdict]} {verdict.value}" for verdict in Verdict if found[verdict])
+        typer.echo(f"{kind:7} {what}: {counts or 'none'}")
+    if any(row.verdict in {Verdict.DIFFERS, Verdict.MISSING} for row in rows):
+        raise typer.Exit(1)
+
+
+def line_of(row: Row) -> str:
+    """Return a number of both as a line: registers and flags in hex, cycles as numbers with their difference."""
+    is_word = row.kind in {"reg", "flag"}
+    chip, model = (_written(value, is_word=is_word) for value in (row.chip, row.model))
+    apart = ""
+    if not is_word and row.chip is not None and row.model:
+        apart = f" {100 * (row.chip - row.model) / row.model:+.1f} %"
+    reason = f": {row.reason}" if row.reason else ""
+    return f"{row.kind:7} {row.name}  chip {chip}  model {model}{apart}  {row.verdict.value}{reason}"
+
+
+def _written(value: int | None, *, is_word: bool) -> str:
+    return "none" if value is None else f"{value:#010x}" if is_word else str(value)

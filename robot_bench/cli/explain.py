@@ -1,0 +1,121 @@
+"""`p2os explain`: why a run failed, from its trace and a replay of its chip."""
+
+import hashlib
+import json
+from dataclasses import replace
+from importlib.resources import as_file, files
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from p2os.cli.help_pages import BENCH
+from robot_bench.events.codec import events_of
+from robot_bench.recording.run_record import TRACE_NAME, RunRecord, read_run, record_of
+from robot_bench.report.explain.explain import explain as explain_run
+from robot_bench.scenario.goals.judging import judge
+from robot_bench.scenario.scenario import Scenario, load_scenario
+from simbase.errors import FileError, UsageError
+
+HELP = """Say why a run failed: from the sensor to the wheel, with times.
+
+The chip is run again with the levels that its pins had, and once more with one of
+them changed: so each step is recorded or shown. Where nothing shows the cause it
+says so.
+
+RUN is a run folder or its trace. A trace without a verdict is judged by SCENARIO's
+goals; GOAL is a part of the failure's text, where there are several.
+
+Exit code: 0 explained, or nothing failed; 1 the cause is not known; 2 wrong usage.
+
+\b
+Examples:
+  p2os explain runs/dodge-001                    what led to the first failure
+  p2os explain runs/mine-001 mine.toml latency   of the goals of mine.toml that one
+  p2os explain runs/mine-001 --against build/good.elf    what another program had done
+  p2os explain runs/mine-001 --json              one JSON object
+"""
+
+
+def register(app: typer.Typer) -> None:
+    """Add the verb."""
+    app.command("explain", help=HELP, rich_help_panel=BENCH)(explain)
+
+
+def explain(
+    run: Annotated[Path, typer.Argument(help="A run folder, or a trace.", metavar="RUN")],
+    scenario: Annotated[str | None, typer.Argument(help="Whose goals it is judged by.", metavar="[SCENARIO]")] = None,
+    goal: Annotated[str, typer.Argument(help="A part of the failure's text.", metavar="[GOAL]")] = "",
+    firmware: Annotated[Path | None, typer.Option(help="The program that ran.", metavar="FILE")] = None,
+    against: Annotated[
+        Path | None, typer.Option(help="A run, or a program, that does what it should.", metavar="RUN")
+    ] = None,
+    json_output: Annotated[bool, typer.Option("--json", help="Print one JSON object.")] = False,
+) -> None:
+    """Explain a run."""
+    path = run / TRACE_NAME if run.is_dir() else run
+    record = read_record(path)
+    plan = None if scenario is None else load_scenario(scenario, firmware=firmware)
+    if plan is not None:
+        record = judged(record, path, plan)
+    program = firmware or program_of(record, plan)
+    if firmware is not None and not firmware.is_file():
+        raise UsageError(f"there is no firmware file {firmware}", hint="give the ELF, HEX or BIN file that ran")
+    found = explain_run(record, program, failure=goal, reference=None if against is None else _reference(against))
+    typer.echo(json.dumps(found.to_plain(), sort_keys=True) if json_output else found.text(), nl=json_output)
+    if found.standing.value == "unknown":
+        raise typer.Exit(1)
+
+
+def read_record(path: Path) -> RunRecord:
+    """Return what a trace holds.
+
+    Raises:
+        TraceError: It cannot be read as one.
+        FileError: There is no such file.
+    """
+    if path.name == TRACE_NAME:
+        return read_run(path.parent)
+    try:
+        with path.open(encoding="utf-8", errors="replace") as lines:
+            return record_of(lines, str(path))
+    except OSError as error:
+        raise FileError(
+            f"cannot read {path}: {error.strerror or error}", hint="give a run folder, or a trace"
+        ) from error
+
+
+def judged(record: RunRecord, path: Path, scenario: Scenario) -> RunRecord:
+    """Return a run as a scenario's goals judge it."""
+    with path.open(encoding="utf-8", errors="replace") as lines:
+        found = judge(
+            events_of(lines, str(path)), scenario.goals, end_ns=record.last_ns, planned_ns=scenario.planned_ns
+        )
+    return replace(record, end={**record.end, "failures": found.missed, "goals_met": found.met})
+
+
+def program_of(record: RunRecord, scenario: Scenario | None = None) -> Path | None:
+    """Return the file of the program that ran: where the trace says, or one that ships; None where it is gone."""
+    name = str(record.meta.get("firmware", ""))
+    beside = [] if scenario is None else [scenario.firmware]
+    with as_file(files("robot_bench.firmware").joinpath(name or "none.elf")) as shipped:
+        candidates = [Path(str(record.meta.get("firmware_path") or name)), *beside, Path(str(shipped))]
+    wanted = record.meta.get("firmware_sha256")
+    for candidate in candidates:
+        if candidate.is_file() and hashlib.sha256(candidate.read_bytes()).hexdigest() == wanted:
+            return candidate
+    return None
+
+
+def _reference(against: Path) -> Path:
+    """Return the program of a run, or the program itself.
+
+    Raises:
+        UsageError: The run's program is gone.
+    """
+    if not against.is_dir():
+        return against
+    found = program_of(read_run(against))
+    if found is None:
+        raise UsageError(f"the program of {against} is not here any more", hint="--against FILE.elf")
+    return found

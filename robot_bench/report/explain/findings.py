@@ -1,0 +1,152 @@
+"""Findings that every kind of failure may come down to: a program that stopped looking, wheels that do not obey.
+
+Invariant: a finding that is called a cause says no more than what was recorded or compared.
+"""
+
+import itertools
+from bisect import bisect_right
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+from robot_bench.recording.run_record import RunRecord
+from robot_bench.recording.signals import motor_steps
+from robot_bench.report.explain.chain import Evidence, Step
+from robot_bench.report.explain.probing import Prober
+from simbase.timing import NS_PER_MS, NS_PER_S, Nanos
+
+#: chosen: wheels that are off by more than this, and by more than half a motor step, do not do what the pins ask.
+OFF_MPS = 0.04
+#: chosen: ramps, the line and the adapter's sampling are over after so long with one code.
+SETTLED_NS: Nanos = 1200 * NS_PER_MS
+#: Limits at which a counter of 8, 16 or 32 bits, signed or not, runs over.
+_LIMITS = (1 << 8, 1 << 15, 1 << 16, 1 << 31)
+#: chosen: so many lines and variables are named.
+NAMED = 3
+
+
+@dataclass(frozen=True, slots=True)
+class Finding:
+    """What was found; `is_cause` is False where it is no more than what is known."""
+
+    says: str
+    is_cause: bool = True
+
+
+def numbers(names: Sequence[str]) -> str:
+    """Return names as a list in words."""
+    return names[0] if len(names) == 1 else f"{', '.join(names[:-1])} and {names[-1]}" if names else ""
+
+
+def steady_since(record: RunRecord, at: Nanos) -> tuple[tuple[int, int], Nanos]:
+    """Return the codes of the motors at a time, and since when they are those."""
+    found, since = [], 0
+    for motor in (1, 2):
+        steps = motor_steps(record.pins, motor)
+        place = max(0, bisect_right(steps.times, at) - 1)
+        found.append(int(steps.values[place]))
+        since = max(since, steps.times[place])
+    return (found[0], found[1]), since
+
+
+def obeyed(record: RunRecord, step_mps: float, at: Nanos, steps: list[Step]) -> Finding | None:
+    """Return that, and why, the wheels do not do what the motor pins ask just before a time; None where they do."""
+    codes, since = steady_since(record, at)
+    before = [pose for pose in record.poses if at - 250 * NS_PER_MS <= pose.t < at - 40 * NS_PER_MS]
+    if at - since < SETTLED_NS or not before:
+        return None
+    pose = before[-1]
+    wheels = pose.left / 1e6, pose.right / 1e6
+    off = max(abs(code * step_mps - speed) for code, speed in zip(codes, wheels, strict=True))
+    if off <= max(OFF_MPS, step_mps / 2):
+        return None
+    asked = ", ".join(f"{code * step_mps * 1000:+.0f}" for code in codes)
+    has = ", ".join(f"{speed * 1000:+.0f}" for speed in wheels)
+    steps.append(Step(t=since, part="wire", says=f"the motor pins ask for {asked} mm/s", evidence=Evidence.RECORDED))
+    steps.append(Step(t=pose.t, part="motion", says=f"the wheels run at {has} mm/s", evidence=Evidence.RECORDED))
+    why = _why_not_obeyed(record, at, steps)
+    return Finding(f"the motors do not do what the pins ask ({asked} mm/s wanted, {has} mm/s driven)"
+                   + (f": {why}" if why else "; why is not known"))  # fmt: skip
+
+
+def _why_not_obeyed(record: RunRecord, at: Nanos, steps: list[Step]) -> str:
+    """Return what the trace says of it; empty where it says nothing."""
+    con = record.pins.get("p2dx_con")
+    if con is not None:
+        place = bisect_right(con.times, at) - 1
+        if place >= 0 and not con.levels[place]:
+            since = con.times[place]
+            steps.append(Step(t=since, part="wire", says="p2dx_con goes low: the program gives the robot back",
+                              evidence=Evidence.RECORDED))  # fmt: skip
+            return f"p2dx_con, which asks for the robot, is low since {since / NS_PER_S:.3f} s"
+    going: dict[str, Nanos] = {}
+    for fault in record.faults:
+        if fault.t <= at and fault.op in {"inject", "clear"}:
+            going.pop(fault.words, None)
+            if fault.op == "inject":
+                going[fault.words] = fault.t
+    notes = [note for note in record.events if note.t <= at and note.what != "command" and note.who != "body"]
+    if going:
+        words, since = list(going.items())[-1]
+        steps.append(Step(t=since, part="wire", says=f"fault injected: {words}", evidence=Evidence.RECORDED))
+        return f"{words!r} was injected at {since / NS_PER_S:.3f} s"
+    if notes:
+        note = notes[-1]
+        says = f"{note.who}: {note.what}{', ' if note.detail else ''}{note.detail}"
+        steps.append(Step(t=note.t, part="wire", says=says, evidence=Evidence.RECORDED))
+        if note.what not in {"driving", "motors"}:
+            return f"the last of the state log is {says!r}, at {note.t / NS_PER_S:.3f} s"
+    return ""
+
+
+def ended(prober: Prober, silent: Nanos, failed: Nanos, steps: list[Step]) -> Finding:
+    """Return since when a program takes no notice of any sensor, what it does instead, and what ran over then."""
+    since = prober.ended_noticing(silent)
+    if since is None:
+        return Finding("the program takes no notice of any sensor's pin, at any time before", is_cause=False)
+    says = f"the program takes no notice of any sensor's pin since {since / NS_PER_S:.3f} s"
+    steps.append(Step(t=since, part="firmware", says="a change of the sensors' pins changes its way, variables or "
+                      "outputs for the last time", evidence=Evidence.CHANGED))  # fmt: skip
+    now = prober.lines_run(silent, silent + 100 * NS_PER_MS)
+    doing = sorted(now, key=lambda line: -now[line])
+    before = prober.lines_run(max(0, since - 200 * NS_PER_MS), since)
+    after = prober.lines_run(since + 200 * NS_PER_MS, min(failed, since + LOOKED_NS))
+    gone = [line for line in before if line not in after]
+    variables = ran_over(prober, since)
+    if len(now) <= LOOP_LINES:
+        steps.append(Step(t=silent, part="firmware", says=f"runs {numbers(doing[:NAMED])} and nothing else",
+                          evidence=Evidence.REPLAYED))  # fmt: skip
+        return Finding(f"{says}: it is stuck at {doing[0]}" if doing else f"{says}: it stands still")
+    if gone:
+        steps.append(Step(t=since, part="firmware", says=f"runs for the last time: {numbers(gone[:NAMED])}",
+                          evidence=Evidence.REPLAYED))  # fmt: skip
+        says += f"; {gone[0]} ran until then and not after"
+    if variables:
+        at, told = next(iter(variables.items()))
+        steps.append(Step(t=at, part="firmware", says=told, evidence=Evidence.REPLAYED))
+        says += f"; {told} at {at / NS_PER_S:.3f} s"
+    return Finding(says)
+
+
+#: chosen: a program that runs no more than so many places in 100 ms, and takes no notice, is in a loop.
+LOOP_LINES = 4
+#: chosen: so long after that time is looked for what ran no more.
+LOOKED_NS: Nanos = 5 * NS_PER_S
+
+
+def ran_over(prober: Prober, around: Nanos) -> Mapping[Nanos, str]:
+    """Return which variables ran over, or passed a limit of a counter's width, around a time, and when."""
+    span = 400 * NS_PER_MS
+    seen = prober.replay.run(max(0, around - span), min(around + span, prober.replay.end), memory_ns=5 * NS_PER_MS)
+    found: dict[Nanos, str] = {}
+    for name, offset, size in prober.replay.variables:
+        if size not in {1, 2, 4}:
+            continue
+        values = [(t, int.from_bytes(memory[offset : offset + size], "little")) for t, memory in seen.memory]
+        whole = 1 << 8 * size
+        for (_, a), (t, b) in itertools.pairwise(values):
+            if a > whole * 7 // 8 and b < whole // 8:
+                found.setdefault(t, f"variable {name} ran over from {a} to {b} ({8 * size} bits)")
+            limit = next((limit for limit in _LIMITS if a < limit <= b < a + limit // 8 and limit < whole), None)
+            if limit is not None:
+                found.setdefault(t, f"variable {name} passed {limit}")
+    return dict(sorted(found.items(), key=lambda item: ("ran over" not in item[1], abs(item[0] - around))))

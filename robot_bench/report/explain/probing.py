@@ -1,0 +1,235 @@
+"""What inputs change in a program: a replay with the recorded level against one with another, and the first difference.
+
+A program takes *notice* of an input when its way through its code or its variables differ; it *answers* when its
+outputs or its text do. An input that is never noticed may as well not be connected.
+
+Invariant: what is found is a difference of two exact replays, never a likelihood.
+"""
+
+from bisect import bisect_right
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from itertools import zip_longest
+
+from adapter_sim.pinout import WireRole
+from bluepill_sim.core import BLOCK
+from robot_bench.recording.signals import motor_steps
+from robot_bench.report.explain.replay import ChipReplay, Hold, Place, Seen
+from robot_bench.wires.edges import Edges
+from simbase.timing import NS_PER_MS, NS_PER_S, Nanos
+
+#: chosen: how often variables are compared.
+_MEMORY_NS: Nanos = 10 * NS_PER_MS
+#: chosen: for so long everything is held low before one sensor is raised, and so long that is held.
+QUIET_NS: Nanos = 2 * NS_PER_S
+ANSWER_NS: Nanos = 1500 * NS_PER_MS
+#: chosen: a program that has not noticed an input after so long does not.
+NOTICE_NS: Nanos = 3 * NS_PER_S
+
+#: chosen: most programs notice in so long, so that is tried first.
+SOON_NS: Nanos = 50 * NS_PER_MS
+
+Codes = tuple[int, int]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Effect:
+    """What inputs have changed; None where nothing did."""
+
+    noticed: Nanos | None
+    #: Where the program's way parted, or which variable differed first.
+    by: str
+    answered: Nanos | None
+    #: The motors' codes at the end, with the inputs as recorded, and as they were held.
+    before: Codes
+    after: Codes
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Answer:
+    """What a program does when one sensor alone sees something."""
+
+    at: Nanos
+    base: Codes
+    codes: Codes
+    noticed: Nanos | None
+    answered: Nanos | None
+
+    @property
+    def turn(self) -> int:
+        """How much further left (positive) it turns, in motor steps."""
+        return (self.codes[1] - self.codes[0]) - (self.base[1] - self.base[0])
+
+
+class Prober:
+    """Compares replays of one run."""
+
+    def __init__(self, replay: ChipReplay) -> None:
+        self.replay = replay
+        self.sensors = replay.role(WireRole.DISTANCE)
+        self._plain: dict[tuple[Nanos, Nanos], Seen] = {}
+
+    @cached_property
+    def motors(self) -> tuple[Edges | object, ...]:
+        """The recorded codes of both motors."""
+        return motor_steps(self.replay.record.pins, 1), motor_steps(self.replay.record.pins, 2)
+
+    def codes(self, at: Nanos) -> Codes:
+        """Return the recorded codes of the motors at a time."""
+        left, right = (motor_steps(self.replay.record.pins, motor) for motor in (1, 2))
+        return tuple(  # type: ignore[return-value] # two of them
+            int(steps.values[max(0, bisect_right(steps.times, at) - 1)]) for steps in (left, right)
+        )
+
+    def codes_with(self, seen: Seen, since: Nanos, at: Nanos) -> Codes:
+        """Return the codes at a time in a replay that was told of from `since` on."""
+        levels = {net: self.replay.level(net, since) for net in self.replay.outputs}
+        levels |= {net: level for t, net, level in seen.edges if t <= at}
+        found = []
+        for motor in (1, 2):
+            nets = [net for net in self.replay.outputs if net.startswith(f"motor{motor}_")]
+            code = sum(levels[net] << bit for bit, net in enumerate(nets))
+            sign = 1 << len(nets) - 1
+            found.append((code ^ sign) - sign)
+        return found[0], found[1]
+
+    def effect(self, holds: Sequence[Hold], until: Nanos, since: Nanos | None = None) -> Effect:
+        """Return what changes when inputs are held otherwise, against the recorded run, up to a time."""
+        since = min(hold.since for hold in holds) if since is None else since
+        plain = self._plain.get((since, until))
+        if plain is None:
+            plain = self._plain[since, until] = self.replay.run(since, until, rows=True, memory_ns=_MEMORY_NS)
+        return self._compare(plain, self.replay.run(since, until, holds, rows=True, memory_ns=_MEMORY_NS), since, until)
+
+    def flipped(self, nets: Sequence[str], at: Nanos, span: Nanos = NOTICE_NS) -> Effect:
+        """Return what changes when each of these inputs has the other level for a time."""
+        until = min(at + span, self.replay.end)
+        return self.effect(
+            [Hold(wire=net, level=not self.replay.level(net, at), since=at, until=until) for net in nets], until, at
+        )
+
+    def takes_notice(self, at: Nanos, span: Nanos = NOTICE_NS) -> bool:
+        """Tell whether a program takes notice of any sensor that changes at a time, in the time after it."""
+        soon = min(span, SOON_NS)
+        return any(self.flipped(self.sensors, at, wait).noticed is not None for wait in dict.fromkeys((soon, span)))
+
+    def answers(self, at: Nanos) -> Mapping[str, Answer]:
+        """Return what a program does at a time when one sensor alone sees something, and nothing did before."""
+        start, until = max(0, at - QUIET_NS), min(at + ANSWER_NS, self.replay.end)
+        quiet = [Hold(wire=net, level=False, since=start, until=until) for net in self.sensors]
+        base = self.replay.run(start, until, quiet, rows=True, memory_ns=_MEMORY_NS)
+        codes = self.codes_with(base, start, until)
+        found = {}
+        for net in self.sensors:
+            holds = [
+                Hold(wire=other, level=False, since=start, until=at if other == net else until)
+                for other in self.sensors
+            ]
+            holds.append(Hold(wire=net, level=True, since=at, until=until))
+            seen = self.replay.run(start, until, holds, rows=True, memory_ns=_MEMORY_NS)
+            effect = self._compare(base, seen, start, until)
+            found[net] = Answer(
+                at=at, base=codes, codes=self.codes_with(seen, start, until),
+                noticed=None if effect.noticed is None else effect.noticed - at,
+                answered=None if effect.answered is None else effect.answered - at,
+            )  # fmt: skip
+        return found
+
+    def moments(self, until: Nanos, count: int = 5) -> list[Nanos]:
+        """Return times at which a program drives, so that it may be asked; the last one a little before `until`."""
+        begin = next((pose.t for pose in self.replay.record.poses if max(abs(pose.left), abs(pose.right)) > 20_000), -1)
+        last = min(until, self.replay.end) - ANSWER_NS - QUIET_NS
+        if begin < 0 or last <= begin + QUIET_NS:
+            return []
+        first = begin + QUIET_NS
+        return sorted({first + (last - first) * place // max(1, count - 1) for place in range(count)})
+
+    def ended_noticing(self, at: Nanos) -> Nanos | None:
+        """Return since when a program takes no notice of its sensors any more, where it does not at `at`."""
+        step, silent = NS_PER_S // 2, at
+        while True:
+            early = at - step
+            if early <= 0:
+                return None
+            if self.takes_notice(early):
+                break
+            silent, step = early, 2 * step
+        span = self._usual_wait(early)
+        while silent - early > NS_PER_MS:
+            middle = (early + silent) // 2
+            if self.takes_notice(middle, span):
+                early = middle
+            else:
+                silent = middle
+        return early
+
+    def _usual_wait(self, at: Nanos) -> Nanos:
+        """Return a time in which a program surely notices a change, by how long it took some times up to `at`."""
+        tried = [at - back * NS_PER_MS for back in (0, 370, 710, 1130) if at > back * NS_PER_MS]
+        found = [(effect.noticed - t) for t in tried if (effect := self.flipped(self.sensors, t)).noticed is not None]
+        return min(NOTICE_NS, max(100 * NS_PER_MS, 4 * max(found, default=NOTICE_NS)))
+
+    def lines_run(self, since: Nanos, until: Nanos) -> dict[str, int]:
+        """Return how often each line's block ran in a time."""
+        counted: Counter[int] = Counter()
+        while since < until:
+            end = min(until, since + ANSWER_NS)
+            rows = self.replay.run(since, end, rows=True).rows
+            counted.update(address for _, address, kind in rows if kind == BLOCK)
+            since = end
+        found: Counter[str] = Counter()
+        for address, count in counted.items():
+            found[str(self.replay.line(address))] += count
+        return dict(found)
+
+    def new_lines(self, at: Nanos) -> list[str]:
+        """Return the lines that a program came by just before a time, and not in the third of a second before that."""
+        just = self.lines_run(max(0, at - 8 * NS_PER_MS), at)
+        usual = self.lines_run(max(0, at - 300 * NS_PER_MS), max(0, at - 8 * NS_PER_MS))
+        return [line for line in just if line not in usual]
+
+    def last_place(self, at: Nanos) -> Place:
+        """Return where the program is at a time."""
+        self.replay.run(at, at + 1)
+        return self.replay.line(self.replay.board.pc)
+
+    def _compare(self, plain: Seen, other: Seen, since: Nanos, until: Nanos) -> Effect:
+        pairs = (zip if plain.has_more_rows or other.has_more_rows else zip_longest)(plain.rows, other.rows)
+        flow = next((n for n, (a, b) in enumerate(pairs) if a != b), None)
+        noticed: Nanos | None = None
+        by = ""
+        if flow is not None and flow > 0:
+            # What follows the last common row differs; when that was is read off the common row.
+            noticed = self._time_of(plain.rows[flow - 1][0], since)
+            by = str(self.replay.end_line(plain.rows[flow - 1][1]))
+        for (t, ours), (_, theirs) in zip(plain.memory, other.memory, strict=False):
+            if noticed is not None and t >= noticed:
+                break
+            if ours != theirs:
+                place = next(n for n, (a, b) in enumerate(zip(ours, theirs, strict=True)) if a != b)
+                noticed, by = t, f"variable {self.replay.variable_at(place) or hex(place)}"
+                break
+        answered = min(
+            (
+                min(a[0] for a in (one, two) if a is not None)
+                for one, two in (_first(plain.edges, other.edges), _first(plain.text, other.text))
+                if one is not None or two is not None
+            ),
+            default=None,
+        )
+        return Effect(
+            noticed=noticed, by=by, answered=answered,
+            before=self.codes_with(plain, since, until), after=self.codes_with(other, since, until),
+        )  # fmt: skip
+
+    def _time_of(self, cycle: int, since: Nanos) -> Nanos:
+        return max(since, self.replay.board.chip.ns_of(cycle))
+
+
+def _first(
+    ours: Sequence[tuple[object, ...]], theirs: Sequence[tuple[object, ...]]
+) -> "tuple[tuple[Nanos, ...] | None, tuple[Nanos, ...] | None]":
+    """Return the first pair of rows that differ; (None, None) where none do."""
+    return next(((a, b) for a, b in zip_longest(ours, theirs) if a != b), (None, None))  # type: ignore[return-value]

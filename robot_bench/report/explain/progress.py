@@ -1,0 +1,244 @@
+"""Why a robot came no further: what it did in the longest time in which it stayed where it was.
+
+    reset      the chip was reset, and began anew
+    obeyed     its motor pins asked for way, and the wheels did not turn
+    stuck      the program takes notice of nothing any more
+    opposite   with no sensor seeing anything it drives its wheels opposite ways
+    itself     the program held the motors so while it looked at its inputs: why is not known
+
+Invariant: as of `robot_bench.report.explain.contact`.
+"""
+
+import itertools
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from robot_bench.events.kinds import Pose
+from robot_bench.report.explain.chain import Evidence, Step
+from robot_bench.report.explain.findings import Finding, ended, numbers, obeyed, steady_since
+from robot_bench.report.explain.probing import Prober
+from robot_bench.report.explain.scene import Scene
+from simbase.timing import NS_PER_MS, NS_PER_S, Nanos
+
+#: chosen: a robot that stays within so many metres for so large a part of the run came no further.
+STAYS_M, PART = 0.15, 0.25
+#: chosen: a program begins to drive within so long of its reset.
+BEGINS_NS: Nanos = 6 * NS_PER_S
+
+
+@dataclass(frozen=True, slots=True)
+class _Stay:
+    since: Nanos
+    until: Nanos
+    turned_rad: float
+
+
+class ProgressInquest:
+    """Looks for why a robot stayed where it was.
+
+    Args:
+        scene: Where it was.
+        prober: Replays of its chip; None where there is none.
+        until: The end of the time that counts.
+    """
+
+    def __init__(self, scene: Scene, prober: Prober | None, until: Nanos) -> None:
+        self.scene = scene
+        self._prober = prober
+        self._until = until
+        self.steps: list[Step] = []
+
+    def find(self) -> Finding:
+        """Return what kept it, or what is known."""
+        stay = self._longest_stay()
+        reset = self._was_reset()
+        if reset is not None:
+            return reset
+        if stay is None or stay.until - stay.since < PART * self._until:
+            return self._opposite(self._until) or Finding(
+                "the robot stayed nowhere for long; why it came no further is not known", is_cause=False
+            )
+        turned = f" and turned {math.degrees(stay.turned_rad):.0f}°" if stay.turned_rad > math.pi else ""
+        self._step(
+            stay.since,
+            "motion",
+            f"comes no further than {STAYS_M:.2f} m until {stay.until / NS_PER_S:.3f} s{turned}",
+            Evidence.RECORDED,
+        )
+        middle = (stay.since + stay.until) // 2
+        found = obeyed(self.scene.record, self.scene.step_mps, middle, self.steps)
+        if found is not None:
+            self._tell_con()
+            return found
+        return (
+            self._not_begun(stay)
+            or self._stuck(stay, middle)
+            or self._opposite(stay.until)
+            or self._itself(stay, middle)
+        )
+
+    def _was_reset(self) -> Finding | None:
+        prober = self._prober
+        resets = [] if prober is None else prober.replay.resets
+        lost = [(reset, self._idle_after(reset.at)) for reset in resets]
+        if prober is None or not lost or sum(idle for _, idle in lost) < PART / 2 * self._until:
+            return None
+        for reset, idle in lost[:3]:
+            self._step(
+                reset.at,
+                "firmware",
+                f"is reset by {_CAUSES.get(reset.cause, reset.cause)}, while at {reset.place}; stands for "
+                f"{idle / NS_PER_S:.1f} s",
+                Evidence.REPLAYED,
+            )
+        first, stood_s = lost[0][0], sum(idle for _, idle in lost) / NS_PER_S
+        return Finding(
+            f"{_CAUSES.get(first.cause, first.cause)} reset the chip {_times(len(resets))}, first at "
+            f"{first.at / NS_PER_S:.3f} s; the robot stood {stood_s:.0f} s for it{self._last_fed(first.cause)}"
+        )
+
+    def _last_fed(self, cause: str) -> str:
+        return fed(self._prober, cause, self.steps) if self._prober is not None else ""
+
+    def _not_begun(self, stay: _Stay) -> Finding | None:
+        """Tell of a program that had not asked its motors for anything by then."""
+        record = self.scene.record
+        edges = [edge for net in record.pins if net.startswith("motor") for edge in record.pins[net]]
+        begins = min((t for t, level in edges if level and t > 0), default=None)
+        if begins is not None and begins < (stay.since + stay.until) // 2:
+            return None
+        if self._prober is not None:
+            at = (stay.since + min(stay.until, begins or stay.until)) // 2
+            self._step(at, "firmware", f"is at {self._prober.last_place(at)}", Evidence.REPLAYED)
+        when = "at no time" if begins is None else f"for the first time at {begins / NS_PER_S:.3f} s"
+        return Finding(f"the program asks its motors for something {when}: it had not begun to drive")
+
+    def _stuck(self, stay: _Stay, middle: Nanos) -> Finding | None:
+        prober = self._prober
+        if prober is None or prober.takes_notice(middle):
+            return None
+        codes, since = steady_since(self.scene.record, middle)
+        found = ended(prober, middle, stay.until, self.steps)
+        if not found.is_cause:
+            return None
+        return Finding(f"{found.says}; the motors stay at {codes[0]:+d}, {codes[1]:+d} since {since / NS_PER_S:.3f} s")
+
+    def _opposite(self, until: Nanos) -> Finding | None:
+        prober = self._prober
+        if prober is None:
+            return None
+        asked = [prober.answers(at) for at in prober.moments(until, 4)]
+        bases = {answers[prober.sensors[0]].base for answers in asked}
+        if len(asked) < 3 or len(bases) != 1:
+            return None
+        left, right = next(iter(bases))
+        if left * right >= 0:
+            return None
+        self._step(
+            asked[0][prober.sensors[0]].at,
+            "firmware",
+            f"with all sensors' pins held low for 3.5 s, the motors are at {left:+d}, {right:+d}; "
+            f"so at {len(asked)} times",
+            Evidence.CHANGED,
+        )
+        record = self.scene.record
+        times = sorted({t for net in record.pins if net.startswith("motor") for t in record.pins[net].times})
+        never = not any(min(prober.codes(t + NS_PER_MS)) > 0 for t in times)
+        return Finding(
+            f"the program drives its wheels opposite ways with nothing in sight (left {left:+d}, right {right:+d}): "
+            "the robot turns on the spot where it should drive on"
+            + ("; never in the run are both asked to go forward, as with the sign of one motor wrong" if never else ""),
+            is_cause=never,
+        )
+
+    def _itself(self, stay: _Stay, middle: Nanos) -> Finding:
+        codes, since = steady_since(self.scene.record, middle)
+        prober = self._prober
+        by = ""
+        if prober is not None and 0 < since <= prober.replay.exact_until:
+            nets = [net for net in prober.replay.outputs if since in self.scene.record.pins[net].times]
+            place = prober.replay.writer(since, prober.replay.wires[nets[0]].bluepill[1]) if nets else None
+            by = "" if place is None else f" by {place}"
+        self._step(since, "firmware", f"sets the motors to {codes[0]:+d}, {codes[1]:+d}{by}", Evidence.REPLAYED)
+        high = [] if prober is None else [net for net in prober.sensors if prober.replay.level(net, middle)]
+        seen = f" with {numbers(high)} high" if high else " with no sensor's pin high"
+        return Finding(
+            f"from {stay.since / NS_PER_S:.1f} s to {stay.until / NS_PER_S:.1f} s the program itself kept the robot "
+            f"there (motors {codes[0]:+d}, {codes[1]:+d}{seen}); whether that was right is not known",
+            is_cause=False,
+        )
+
+    def _tell_con(self) -> None:
+        """Say which line gave the robot back."""
+        prober = self._prober
+        con = self.scene.record.pins.get("p2dx_con")
+        if prober is None or con is None or not len(con) or con.levels[-1]:
+            return
+        at = con.times[-1]
+        if 0 < at <= prober.replay.exact_until:
+            place = prober.replay.writer(at, prober.replay.wires["p2dx_con"].bluepill[1])
+            if place is not None:
+                self._step(at, "firmware", f"takes p2dx_con low at {place}", Evidence.REPLAYED)
+
+    def _idle_after(self, at: Nanos) -> Nanos:
+        """Return how long the robot came nowhere after a time."""
+        poses = self.scene.poses(at, min(at + BEGINS_NS, self._until))
+        if not poses:
+            return 0
+        first = poses[0]
+        return next((pose.t for pose in poses if _far(first, pose)), poses[-1].t) - at
+
+    def _longest_stay(self) -> _Stay | None:
+        poses = self.scene.poses(0, self._until)
+        best = (0, 0)
+        begin = 0
+        for place, pose in enumerate(poses):
+            while _far(poses[begin], pose):
+                begin += 1
+            if pose.t - poses[begin].t > poses[best[1]].t - poses[best[0]].t:
+                best = begin, place
+        first, last = best
+        return _Stay(poses[first].t, poses[last].t, _turned(poses[first : last + 1])) if last > first else None
+
+    def _step(self, t: Nanos, part: str, says: str, evidence: Evidence) -> None:
+        self.steps.append(Step(t=t, part=part, says=says, evidence=evidence))
+
+
+#: Causes of resets in words.
+_CAUSES = {
+    "IWDG": "the independent watchdog (IWDG)", "WWDG": "the window watchdog (WWDG)", "SOFTWARE": "the program itself",
+    "PIN": "the reset pin", "LOW_POWER": "a refused low-power mode",
+}  # fmt: skip
+
+
+def fed(prober: Prober, cause: str, steps: list[Step]) -> str:
+    """Return where a program fed its watchdog last before the first reset, and what it did not come by since."""
+    resets = [reset for reset in prober.replay.resets if reset.cause == cause]
+    if cause != "IWDG" or not resets:
+        return ""
+    feeds = prober.replay.feeds(max(0, resets[0].at - 12 * NS_PER_S), resets[0].at)
+    if not feeds:
+        return "; it was not fed in the 12 s before"
+    at, place = feeds[-1]
+    says = f"feeds the watchdog for the last time, at {place}"
+    steps.append(Step(t=at, part="firmware", says=says, evidence=Evidence.REPLAYED))
+    usual = prober.lines_run(max(0, at - 100_000_000), at)
+    after = prober.lines_run(at + 20_000, resets[0].at)
+    new = [line for line in after if line not in usual]
+    if new:
+        says = f"from then on it goes by {numbers(new[:4])}, where it had not been in the 0.1 s before"
+        steps.append(Step(t=at, part="firmware", says=says, evidence=Evidence.REPLAYED))
+    return f"; it was fed last at {at / NS_PER_S:.3f} s, at {place}, which the program did not come by again"
+
+
+def _turned(poses: Sequence[Pose]) -> float:
+    return sum(abs(math.remainder(b.heading_rad - a.heading_rad, math.tau)) for a, b in itertools.pairwise(poses))
+
+
+def _far(one: Pose, other: Pose) -> bool:
+    return math.hypot(one.x_m - other.x_m, one.y_m - other.y_m) > STAYS_M
+
+
+def _times(count: int) -> str:
+    return "once" if count == 1 else f"{count} times"

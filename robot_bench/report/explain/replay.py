@@ -1,0 +1,398 @@
+"""The chip of a recorded run once more, alone: its input pins are given the levels of the trace, or others.
+
+A chip does the same whenever its pins are given the same levels at the same times, and the trace has all of them;
+so the replay is the run, to the instruction, without robot and world. What the chip drives is compared with the
+trace: `exact_until` is up to when it is the same.
+
+What an input changes is found by running twice, once with the level that was recorded and once with another. The
+robot does not answer to what the chip does otherwise then: later inputs stay those of the trace.
+
+Not replayed: a robot on own pins, whose analog inputs no trace holds.
+
+Invariant: looking at a time leaves the replay of all other times as it was.
+"""
+
+from bisect import bisect_left, bisect_right
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from adapter_sim.pinout import Direction, Pull, Wire, WireRole, load_pinout
+from bluepill_sim.board import BluePill
+from bluepill_sim.core import BLOCK, BlockRow
+from bluepill_sim.core.debug_unit import WatchKind, Watchpoint
+from bluepill_sim.core.nvic import exception_name
+from bluepill_sim.errors import ImageError
+from bluepill_sim.fabric.subscriptions import EDGE, HIGH, Of
+from bluepill_sim.program.functions import FunctionTable
+from bluepill_sim.program.line_table import LineTable, read_lines
+from bluepill_sim.program.static_code import StaticCode
+from bluepill_sim.stm32f103 import SRAM_BASE, SRAM_BYTES
+from robot_bench.recording.run_record import RunRecord
+from simbase.errors import UsageError
+from simbase.timing import NS_PER_MS, Nanos
+
+#: chosen: at most so much is handed to the chip at once; its queue holds 4096 levels of all pins.
+FEED_NS: Nanos = 50 * NS_PER_MS
+#: chosen: how often is looked whether there are too many blocks.
+_RECORDED_NS: Nanos = 5 * NS_PER_MS
+#: chosen: between two saved states at first, and how many are kept; of more every other one is dropped.
+STRIDE_NS: Nanos = 250 * NS_PER_MS
+MOST_STATES = 128
+#: GPIOA, B, C: where each port's registers are, and which of them change a pin (CRL to LCKR).
+_GPIO, _GPIO_STRIDE, _GPIO_BYTES = 0x4001_0800, 0x400, 0x1C
+#: The key register of the independent watchdog (RM0008 19.4.1).
+_IWDG_KR = 0x4000_3000
+#: So long before a write its calls are looked for.
+_CALLS_NS: Nanos = 40 * NS_PER_MS
+#: chosen: so many blocks are recorded of one part, some 10 ms of a program that never sleeps, seconds of one that does.
+MOST_ROWS = 120_000
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Hold:
+    """An input that is held at a level for a time, whatever the trace says."""
+
+    wire: str
+    level: bool
+    since: Nanos
+    until: Nanos
+
+
+@dataclass(frozen=True, slots=True)
+class Place:
+    """Where in a program: the source line, and the functions that it was called through, innermost first."""
+
+    line: str
+    function: str
+    calls: tuple[str, ...] = ()
+
+    def __str__(self) -> str:
+        where = f"{self.line} ({self.function})" if self.line else self.function
+        return where + (f", called from {self.calls[0]}" if self.calls else "")
+
+
+@dataclass(slots=True)
+class Seen:
+    """What the chip did in a part of a replay."""
+
+    #: (ns, wire, level).
+    edges: list[tuple[Nanos, str, bool]] = field(default_factory=list)
+    #: (ns of its stop bit, character) on USART1.
+    text: list[tuple[Nanos, int]] = field(default_factory=list)
+    #: Blocks and exceptions, where they were asked for.
+    rows: list[BlockRow] = field(default_factory=list)
+    #: Whether there were more.
+    has_more_rows: bool = False
+    #: (ns, the program's variables), where they were asked for.
+    memory: list[tuple[Nanos, bytes]] = field(default_factory=list)
+
+
+@dataclass(frozen=True, slots=True)
+class Reset:
+    """A reset of the chip after power-on."""
+
+    at: Nanos
+    cause: str
+    place: Place
+
+
+class ChipReplay:
+    """Replays the chip of a run.
+
+    Args:
+        firmware: The program that ran.
+        record: The run.
+
+    Raises:
+        UsageError: The trace does not hold what the chip was given.
+        ImageError: The firmware cannot be read.
+        MissingDependencyError: The emulator is not installed.
+    """
+
+    def __init__(self, firmware: Path, record: RunRecord) -> None:
+        wires = load_pinout().wires
+        if missing := [wire.name for wire in wires if wire.name not in record.pins]:
+            raise UsageError(f"the trace has not the wires of the pin-out, such as {missing[0]}")
+        self.record = record
+        self.board = BluePill(firmware)
+        self.wires: Mapping[str, Wire] = {wire.name: wire for wire in wires}
+        self.inputs = [wire.name for wire in wires if wire.direction is Direction.TO_BLUEPILL]
+        self.outputs = [wire.name for wire in wires if wire.direction is Direction.TO_ADAPTER]
+        self._net_of = {_number(wire.bluepill): wire.name for wire in wires}
+        self._functions = FunctionTable(self.board.image)
+        self._code = StaticCode(self.board.chip.memory)
+        try:
+            self._lines = read_lines(self.board.image)
+        except ImageError:
+            self._lines = LineTable()
+        self._seen = Seen()
+        self._held: dict[str, tuple[Sequence[Nanos], Sequence[int]]] = {}
+        self.resets: list[Reset] = []
+        self.end: Nanos = record.last_ns
+        self.board.subscribe_pins([self.wires[net].bluepill for net in self.outputs], self._driven, of=Of.WIRE)
+        self.board.usart1.subscribe(lambda rows: self._seen.text.extend((at, word & 0xFF) for word, at in rows))
+        for net in self.outputs:
+            wire = self.wires[net]
+            if wire.pull is not Pull.NONE:
+                self.board.pin(wire.bluepill).drive(wire.pull is Pull.UP, is_weak=True)
+        for net in self.inputs:
+            self.board.pin(self.wires[net].bluepill).drive(bool(record.pins[net].levels[0]))
+        self._states: list[tuple[Nanos, object]] = [(0, self.board.snapshot())]
+        self.exact_until = self._run_once()
+
+    # What the trace and the program say.
+
+    def role(self, role: WireRole) -> list[str]:
+        """Return the wires of a role, in the order of the pin-out."""
+        return [net for net, wire in self.wires.items() if wire.role is role]
+
+    def pin(self, net: str) -> str:
+        """Return a wire as a person reads it: "DD4 (PA7)"."""
+        return f"{net} ({self.wires[net].bluepill})"
+
+    def level(self, net: str, at: Nanos) -> bool:
+        """Return the recorded level of a wire at a time."""
+        edges = self.record.pins[net]
+        return bool(edges.levels[max(0, bisect_right(edges.times, at) - 1)])
+
+    def line(self, address: int) -> Place:
+        """Return where an instruction stands in the source."""
+        return Place(self._lines.place(address), self._functions.name(address))
+
+    def end_line(self, block: int) -> Place:
+        """Return where the last instruction of a block stands, which decides what follows it."""
+        found = self._code.block(block)
+        return self.line(found.addresses[-1] if found.addresses else block)
+
+    def variable_at(self, offset: int) -> str:
+        """Return the name of the variable at an offset into the SRAM; empty where none is known."""
+        address = SRAM_BASE + offset
+        for symbol in self.board.image.symbols.symbols:
+            if not symbol.is_function and symbol.address <= address < symbol.address + symbol.size:
+                return symbol.name
+        return ""
+
+    @property
+    def variables(self) -> list[tuple[str, int, int]]:
+        """The program's variables: name, offset into the SRAM, bytes."""
+        return [
+            (symbol.name, symbol.address - SRAM_BASE, symbol.size)
+            for symbol in self.board.image.symbols.symbols
+            if not symbol.is_function and symbol.size and SRAM_BASE <= symbol.address < SRAM_BASE + SRAM_BYTES
+        ]
+
+    # Running.
+
+    def run(
+        self, since: Nanos, until: Nanos, holds: Sequence[Hold] = (), *, rows: bool = False, memory_ns: Nanos = 0
+    ) -> Seen:
+        """Run a part again.
+
+        Args:
+            since: From when on is told what the chip does.
+            until: To when.
+            holds: Inputs that are otherwise; from `since` on at the earliest.
+            rows: Whether blocks and exceptions are wanted.
+            memory_ns: How often the variables are wanted; 0 for never.
+        """
+        self._seek(since)
+        self._hold(holds)
+        self._seen = seen = Seen()
+        try:
+            if rows:
+                self._go_on_recording(until, memory_ns)
+            self._go_on(until, memory_ns)
+        finally:
+            self._held = {}
+        return seen
+
+    def writer(self, at: Nanos, port: str) -> Place | None:
+        """Return which instruction drove a pin of a port ("A") at a time; None where no store to the port did."""
+        calls: list[str] = []
+        for before in (_CALLS_NS, _CALLS_NS // 8, _CALLS_NS // 64):
+            seen = self.run(max(0, at - before), at + 1, rows=True)
+            if not seen.has_more_rows:
+                calls = self._calls(seen.rows)
+                break
+        hits = self._accesses(at - 20_000, at + 2, port, WatchKind.WRITE)
+        if not hits:
+            return None
+        place = self.line(hits[-1][1])
+        return Place(place.line, place.function, tuple(call for call in calls if not call.startswith(place.line)))
+
+    def reads(self, since: Nanos, until: Nanos, ports: Sequence[str] = "ABC") -> dict[str, list[Nanos]]:
+        """Return by which source lines a program reads the levels of ports in a time, and when."""
+        found: dict[str, list[Nanos]] = {}
+        for port in ports:
+            for at, pc in self._accesses(since, until, port, WatchKind.READ, first=8, size=4):
+                found.setdefault(str(self.line(pc)), []).append(at)
+        return found
+
+    def feeds(self, since: Nanos, until: Nanos) -> list[tuple[Nanos, Place]]:
+        """Return when, and where, a program writes the key register of the independent watchdog."""
+        return [(at, self.line(pc)) for at, pc in self._watch(since, until, Watchpoint(_IWDG_KR, 4, WatchKind.WRITE))]
+
+    def _accesses(
+        self, since: Nanos, until: Nanos, port: str, kind: WatchKind, *, first: int = 0, size: int = _GPIO_BYTES
+    ) -> list[tuple[Nanos, int]]:
+        """Return when, and by which instruction, a program accesses a port."""
+        base = _GPIO + _GPIO_STRIDE * (ord(port) - ord("A"))
+        return self._watch(since, until, Watchpoint(base + first, size, kind))
+
+    def _watch(self, since: Nanos, until: Nanos, point: Watchpoint) -> list[tuple[Nanos, int]]:
+        self._seek(max(0, since))
+        engine, found = self.board.chip.engine, list[tuple[Nanos, int]]()
+        engine.watchpoints.add(point)
+        try:
+            while self.board.now_ns < until:
+                limit = min(until, self.board.now_ns + FEED_NS)
+                if not engine.is_inside_block:
+                    self._feed(limit)
+                reached = self.board.advance_to(limit)
+                if reached.halt is not None:
+                    found.append((reached.now, reached.halt.pc - 2))
+        finally:
+            engine.watchpoints.discard(point)
+        return found
+
+    def _calls(self, rows: Sequence[BlockRow]) -> list[str]:
+        """Return the places that the last block was called from, innermost first, as far as the rows tell."""
+        stack: list[tuple[str, str]] = []
+        last: int | None = None
+        for _, address, kind in rows:
+            if kind != BLOCK:
+                if kind > 0:
+                    stack.append((exception_name(kind), ""))
+                elif any(not place for _, place in stack):
+                    while stack and stack.pop()[1]:
+                        pass
+                last = None
+                continue
+            name = self._functions.name(address)
+            if last is not None and name != self._functions.name(last):
+                if address == self._functions.start_of(address) and self._code.block(last).is_call:
+                    stack.append((self._functions.name(last), str(self.end_line(last))))
+                else:
+                    while stack and stack[-1][1] and stack[-1][0] != name:
+                        stack.pop()
+                    if stack and stack[-1][1]:
+                        stack.pop()
+            last = address
+        return [place for _, place in reversed(stack) if place]
+
+    def _run_once(self) -> Nanos:
+        """Run the whole once, keep states, note resets; return up to when it is the run."""
+        board, stride = self.board, STRIDE_NS
+
+        def reset_begins() -> None:
+            if board.now_ns > 0:
+                before.append((board.now_ns, board.pc))
+
+        before: list[tuple[Nanos, int]] = []
+        causes = dict(board.resets)
+        board.chip.reset_listeners.append(reset_begins)
+        seen = self._seen = Seen()
+        try:
+            while board.now_ns < self.end:
+                self._go_on(min(self.end, board.now_ns + stride))
+                for cause, count in board.resets.items():
+                    for _ in range(count - causes.get(cause, 0)):
+                        at, pc = before.pop(0) if before else (board.now_ns, board.pc)
+                        self.resets.append(Reset(at, cause.name, self.line(pc)))
+                causes = dict(board.resets)
+                self._states.append((board.now_ns, board.snapshot()))
+                if len(self._states) > MOST_STATES:
+                    self._states, stride = self._states[::2], stride * 2
+        finally:
+            board.chip.reset_listeners.remove(reset_begins)
+        return self._same_until(seen)
+
+    def _same_until(self, seen: Seen) -> Nanos:
+        same = self.end
+        for net in self.outputs:
+            rows = self.record.pins[net]
+            ours = changes(bool(rows.levels[0]), [(at, up) for at, wire, up in seen.edges if wire == net])
+            theirs = [at for at in rows.times if at > 0]
+            if ours != theirs:
+                pairs = zip([*ours, self.end + 1], [*theirs, self.end + 1], strict=False)
+                same = min(same, next((min(a, b) for a, b in pairs if a != b), self.end + 1) - 1)
+        return max(0, same)
+
+    def _seek(self, at: Nanos) -> None:
+        place = bisect_right([t for t, _ in self._states], at) - 1
+        self.board.restore(self._states[place][1])
+        self._held = {}
+        self._go_on(at)
+
+    def _go_on_recording(self, until: Nanos, memory_ns: Nanos) -> None:
+        """Run on with the blocks recorded, until there are too many."""
+        board, seen = self.board, self._seen
+        recorder = board.chip.record_blocks(MOST_ROWS)
+        try:
+            while board.now_ns < until and len(recorder) < MOST_ROWS // 2:
+                self._go_on(min(until, board.now_ns + _RECORDED_NS), memory_ns)
+        finally:
+            seen.has_more_rows = board.now_ns < until or recorder.lost > 0
+            seen.rows = [] if recorder.lost else recorder.drain()
+            board.chip.stop_recording()
+
+    def _go_on(self, until: Nanos, memory_ns: Nanos = 0) -> None:
+        board, seen = self.board, self._seen
+        step = min(memory_ns or FEED_NS, FEED_NS)
+        while board.now_ns < until:
+            limit = min(until, board.now_ns + step)
+            self._feed(limit)
+            board.advance_to(limit)
+            if memory_ns:
+                seen.memory.append((board.now_ns, board.read_memory(SRAM_BASE, self._variable_bytes) or b""))
+
+    @property
+    def _variable_bytes(self) -> int:
+        return max((offset + size for _, offset, size in self.variables), default=4)
+
+    def _feed(self, limit: Nanos) -> None:
+        """Give the input pins what is recorded, or held, between now and `limit`."""
+        now = self.board.now_ns
+        for net in self.inputs:
+            times, levels = self._held.get(net) or (self.record.pins[net].times, self.record.pins[net].levels)
+            first, end = bisect_right(times, now), bisect_right(times, limit)
+            if first < end:
+                rows = [(times[place], int(levels[place])) for place in range(first, end)]
+                self.board.pin(self.wires[net].bluepill).drive_later(rows)
+
+    def _hold(self, holds: Sequence[Hold]) -> None:
+        """Make the levels of the inputs that are held; a hold acts from the next instant on."""
+        now = self.board.now_ns
+        for hold in holds:
+            edges = self.record.pins[hold.wire]
+            times, levels = self._held.get(hold.wire) or (edges.times, edges.levels)
+            since = max(hold.since, now + 1)
+            before, after = bisect_left(times, since), bisect_right(times, hold.until)
+            back = levels[max(0, after - 1)]
+            self._held[hold.wire] = (
+                [*times[:before], since, hold.until, *times[after:]],
+                [*levels[:before], int(hold.level), back, *levels[after:]],
+            )
+
+    def _driven(self, rows: bytes) -> None:
+        for at, pin, _, level, *_ in self._edges(rows):
+            self._seen.edges.append((at, self._net_of[pin], level == HIGH))
+
+    @staticmethod
+    def _edges(rows: bytes) -> Iterator[tuple[int, ...]]:
+        return EDGE.iter_unpack(rows)
+
+
+def changes(level: bool, rows: Sequence[tuple[Nanos, bool]]) -> list[Nanos]:
+    """Return when a wire changes, of the levels told of it; a pin that drives what the wire is anyway does not."""
+    found = []
+    for at, after in rows:
+        if after is not level:
+            found.append(at)
+        level = after
+    return found
+
+
+def _number(pin: str) -> int:
+    return 16 * (ord(pin[1]) - ord("A")) + int(pin[2:])

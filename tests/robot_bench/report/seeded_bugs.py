@@ -1,0 +1,219 @@
+"""Copies of `dodge` with one mistake each, as a programmer makes them: replacements in its sources, and what is true.
+
+`answers` are words of which one has to stand in what `p2os explain` calls the cause for it to count as right.
+"""
+
+import shutil
+from dataclasses import dataclass
+from pathlib import Path
+
+from robot_bench.firmware.build import HERE, PROGRAMS, build_elf
+
+#: Independent watchdog, started with 0.4 s (40 kHz / 64, 250 ticks); fed by a write of 0xAAAA.
+_WATCHDOG = (
+    ("dodge.c", "int main(void)\n{", "#define IWDG ((volatile unsigned *)0x40003000)\n\nint main(void)\n{"),
+    (
+        "dodge.c", "    dodge_start(&dodge);\n",
+        "    dodge_start(&dodge);\n    IWDG[0] = 0x5555; IWDG[1] = 4; IWDG[2] = 250; IWDG[0] = 0xCCCC;\n",
+    ),
+)  # fmt: skip
+_READ = "dodge_tick(&dodge, pins_distances(), "
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Bug:
+    """A mistake: (file, old text, new text) of each replacement, and words of a right answer."""
+
+    name: str
+    edits: tuple[tuple[str, str, str], ...]
+    answers: tuple[str, ...]
+    duration_s: float = 120.0
+    #: A thing that is placed when the robot drives, as keys of `[[obstacle]]`; empty for none.
+    thing: str = ""
+    placed_s: float = 5.0
+    #: Whether the run fails at all, and whether `explain` finds the mistake.
+    fails: bool = True
+    is_found: bool = True
+
+
+_POST = 'shape = "cylinder"\nradius_m = 0.1\nheight_m = 0.5\nbefore_sonar = 3\ndistance_m = 0.25'
+_BOX = 'shape = "box"\nlength_m = 0.1\nwidth_m = 0.8\nheight_m = 0.5\nbefore_sonar = 4\ndistance_m = 0.3'
+#: So near that no program can help it.
+UNFAIR = _BOX.replace("0.3", "0.2")
+_AHEAD = 'shape = "cylinder"\nradius_m = 0.05\nheight_m = 0.5\nx_m = -0.8\ny_m = 0.0'
+
+
+def scenario_text(thing: str, duration_s: float, placed_s: float = 5.0) -> str:
+    """Return a scenario: the room, a start that looks along it, a thing on the way, and the goals of `dodge`."""
+    placed = f'[[obstacle]]\nat_s = {placed_s}\nop = "place"\nname = "post"\n{thing}\n' if thing else ""
+    return f"""firmware = "dodge.elf"
+world = "room"
+body = "kinematic"
+duration_s = {duration_s}
+threshold_m = 0.6
+[start]
+x_m = -2.0
+y_m = 0.0
+heading_deg = 0.0
+{placed}[[goal]]
+kind = "no_collision"
+[[goal]]
+kind = "min_distance"
+distance_m_a_minute = {0.5 if thing else 5.0}
+[[goal]]
+kind = "happens"
+event = "usart1 sends dodge: ready"
+most = 1
+"""
+
+
+def build(bug: Bug, folder: Path) -> Path:
+    """Build the copy into a folder and return its ELF."""
+    sources = folder / "src"
+    shutil.copytree(HERE, sources, ignore=shutil.ignore_patterns("*.elf", "__pycache__", "*.py"))
+    for name, old, new in bug.edits:
+        text = (sources / name).read_text()
+        assert old in text, f"{bug.name}: {name} has no {old!r}"
+        (sources / name).write_text(text.replace(old, new))
+    built = folder / f"{bug.name}.elf"
+    build_elf(
+        PROGRAMS["dodge"], folder=sources, linker_script="f103c8.ld", output=built,
+        more_flags=("-Wno-error", "-Wno-unused"),
+    )  # fmt: skip
+    return built
+
+
+#: Asked for by name.
+NAMED = (
+    Bug(
+        name="sensor-order-swapped",
+        edits=(
+            ("board.h", "X(DD3, A, 6)", "X(DD3, X, 0)"), ("board.h", "X(DD6, B, 1)", "X(DD6, A, 6)"),
+            ("board.h", "X(DD3, X, 0)", "X(DD3, B, 1)"),
+        ),
+        answers=("DD3 and DD6 exchanged",), thing=_POST, duration_s=30.0,
+    ),
+    Bug(
+        name="stale-reading",
+        edits=(
+            (
+                "dodge.c", "        struct dodge_command",
+                ("        static uint8_t sensors;\n        if (due % 200 == 0) {\n"
+                    "            sensors = pins_distances();"
+                "\n        }\n        struct dodge_command"),
+            ),
+            ("dodge.c", _READ, "dodge_tick(&dodge, sensors, "),
+        ),
+        answers=("late",), thing=_BOX, duration_s=30.0,
+    ),
+    Bug(
+        name="overflow-after-65-s",
+        edits=(
+            (
+                "dodge.c", "        struct dodge_command",
+                ("        static uint8_t sensors;\n        static uint32_t next_ms;\n        static uint16_t now_ms;\n"
+                "        now_ms = (uint16_t)(tick_now() * 10u);\n"
+                "        if (next_ms == 0 || now_ms >= next_ms) {\n            next_ms = now_ms + 20u;\n"
+                "            sensors = pins_distances();\n        }\n        struct dodge_command"),
+            ),
+            ("dodge.c", _READ, "dodge_tick(&dodge, sensors, "),
+        ),
+        answers=("no notice of any", "now_ms"), thing=_BOX, placed_s=70.0, duration_s=80.0,
+    ),
+    Bug(
+        name="con-not-raised-on-reconnect",
+        edits=(
+            ("pins.h", "#endif", "void pins_connect(int high);\n\n#endif"),
+            (
+                "pins.c", "uint8_t pins_distances(void) {",
+                ("void pins_connect(int high) { write_wire(control_wires[P2DX_CON], high); }\n"
+                "uint8_t pins_distances(void) {"),
+            ),
+            (
+                "dodge.c", "        pins_motors(command",
+                ("        static int reconnects;\n        if (dodge.turns == 2 && !reconnects) {\n"
+                "            reconnects = 1;\n            pins_connect(0);\n        }\n        pins_motors(command"),
+            ),
+        ),
+        answers=("p2dx_con",),
+    ),
+    Bug(
+        name="watchdog-not-fed-in-a-branch",
+        edits=(
+            *_WATCHDOG,
+            (
+                "dodge.c", "        pins_motors(command",
+                ("        if (dodge.state != DODGE_TURN_LEFT && dodge.state != DODGE_TURN_RIGHT) {\n"
+                "            IWDG[0] = 0xAAAA;\n        }\n        pins_motors(command"),
+            ),
+        ),
+        answers=("watchdog",),
+    ),
+)  # fmt: skip
+
+#: Of kinds that nothing was made for.
+OTHERS = (
+    Bug(
+        name="motor-sign-wrong",
+        edits=(("pins.c", "write_motor(right_motor_wires, right)", "write_motor(right_motor_wires, -right)"),),
+        answers=("opposite ways",),
+    ),
+    Bug(
+        name="pin-masked",
+        edits=(("dodge.c", _READ, "dodge_tick(&dodge, pins_distances() & 0xE7, "),),
+        answers=("ignores DD4",), thing=_AHEAD, duration_s=30.0,
+    ),
+    Bug(
+        name="last-sensors-not-looped-over",
+        edits=(("pins.c", "uint8_t pins_distances(void) { return read_value(distance_wires, COUNT(distance_wires)); }",
+                "uint8_t pins_distances(void) { return read_value(distance_wires, COUNT(distance_wires) - 4); }"),),
+        answers=("DD5", "DD6", "DD7", "DD8"),
+    ),
+    Bug(
+        name="timer-ten-times-slow",
+        edits=(("tick.c", "HCLK_HZ / TICKS_PER_S - 1u", "HCLK_HZ / TICKS_PER_S * 20u - 1u"),),
+        answers=("not begun to drive", "late"),
+    ),
+    Bug(
+        name="dead-branch",
+        edits=(("dodge_fsm.c", "if (!(dodge->seen & FRONT) && ", "if (!(dodge->seen & FRONT & 0) && "),),
+        answers=("drives straight on",),
+    ),
+    Bug(
+        name="null-pointer-in-a-branch",
+        edits=(
+            (
+                "dodge_fsm.c", "    dodge->turns++;",
+                ("    static const struct dodge *other = (const struct dodge *)0x30000000;\n"
+                "    dodge->turns += dodge->turns > 1 ? other->turns : 1;"),
+            ),
+        ),
+        answers=("died",),
+    ),
+    Bug(
+        name="waits-for-ever",
+        edits=(
+            (
+                "dodge.c", "            print_transition(before, &dodge);",
+                "            while (dodge.turns == 2) {\n            }\n            print_transition(before, &dodge);",
+            ),
+        ),
+        answers=("stuck at dodge.c",),
+    ),
+    Bug(
+        name="sides-exchanged",
+        edits=(("pins.c", "    write_motor(left_motor_wires, left);\n    write_motor(right_motor_wires, right);",
+                "    write_motor(left_motor_wires, right);\n    write_motor(right_motor_wires, left);"),),
+        answers=("left and right exchanged",), thing=_POST, duration_s=30.0,
+    ),
+    Bug(
+        name="encoder-off-by-one",
+        edits=(("odometer.c", "STEPS_PER_TURN / 2 + STEPS_PER_TURN)", "STEPS_PER_TURN / 2 + STEPS_PER_TURN - 1)"),),
+        answers=("encoder",), fails=False, is_found=False,
+    ),
+    Bug(
+        name="no-debounce",
+        edits=(("dodge_fsm.c", "#define RELEASE_TICKS 25", "#define RELEASE_TICKS 1"),),
+        answers=("chatter",), fails=False, is_found=False,
+    ),
+)  # fmt: skip

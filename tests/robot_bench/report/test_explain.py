@@ -1,0 +1,190 @@
+"""`p2os explain`: what it says of programs with known mistakes, and that it says no more than it can show."""
+
+import json
+import re
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+import typer
+from typer.testing import CliRunner
+
+from robot_bench.cli import explain as verb
+from robot_bench.events.kinds import Pose
+from robot_bench.firmware.build import COMPILER, HERE, compiler_version
+from robot_bench.recording.run_record import RunRecord, read_run
+from robot_bench.report.explain.chain import WIDTH, Evidence, Explanation, Standing, Step
+from robot_bench.report.explain.contact import exchanged
+from robot_bench.report.explain.explain import explain
+from robot_bench.report.explain.probing import Answer
+from robot_bench.report.explain.replay import ChipReplay, Hold
+from robot_bench.report.explain.scene import Scene
+from robot_bench.run import run_scenario
+from robot_bench.scenario.scenario import load_scenario
+from robot_bench.wires.edges import Edges
+from simbase.timing import NS_PER_S
+from tests.robot_bench.report.seeded_bugs import NAMED, OTHERS, UNFAIR, Bug, build, scenario_text
+
+DODGE = HERE / "dodge.elf"
+NETS = [f"DD{n}" for n in range(1, 9)]
+
+
+def run_with(firmware: Path, folder: Path, thing: str, duration_s: float, placed_s: float = 5.0) -> RunRecord:
+    """Run a firmware in the scenario of the seeded bugs and return its record."""
+    plan = folder / "plan.toml"
+    plan.write_text(scenario_text(thing, duration_s, placed_s))
+    run_scenario(load_scenario(str(plan), firmware=firmware), folder / "run", explained=False)
+    return read_run(folder / "run")
+
+
+@pytest.fixture(scope="module")
+def unfair(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A run of the shipped `dodge` that no program could have passed, its folder."""
+    folder = tmp_path_factory.mktemp("unfair")
+    run_with(DODGE, folder, UNFAIR, 8.0)
+    return folder / "run"
+
+
+def answers(codes: dict[int, tuple[int, int]]) -> dict[str, Answer]:
+    """Return answers to each sensor alone, those not named by driving slower."""
+    return {
+        net: Answer(at=0, base=(3, 3), codes=codes.get(place, (2, 2)), noticed=1, answered=2)
+        for place, net in enumerate(NETS, 1)
+    }
+
+
+AWAY = {3: (3, 2), 4: (2, -2), 5: (-2, 2), 6: (2, 3)}
+
+
+def side(net: str) -> str:
+    """Return the side that a sensor of the pin-out looks to."""
+    return "left" if int(net[2:]) <= 4 else "right"
+
+
+def test_answers_that_turn_away_show_no_exchange() -> None:
+    assert exchanged(NETS, [answers(AWAY)] * 3, side) == ""
+
+
+@pytest.mark.parametrize(("one", "other"), [(3, 6), (4, 6), (3, 5), (4, 5)])
+def test_an_exchange_of_two_sensors_is_told_by_their_answers(one: int, other: int) -> None:
+    swapped = AWAY | {one: AWAY[other], other: AWAY[one]}
+    assert exchanged(NETS, [answers(swapped)] * 3, side) == f"DD{one} and DD{other} exchanged"
+
+
+def test_all_answers_mirrored_are_left_and_right_exchanged() -> None:
+    mirrored = {9 - place: codes for place, codes in AWAY.items()}
+    assert exchanged(NETS, [answers(mirrored)] * 3, side).startswith("left and right exchanged")
+
+
+def test_answers_that_change_from_time_to_time_count_neither_way() -> None:
+    toward = AWAY | {4: (-2, 2), 5: (2, -2)}
+    assert exchanged(NETS, [answers(AWAY), answers(toward), answers(AWAY)], side) == ""
+
+
+def pose(t: int, x_m: float) -> Pose:
+    """Return a pose that looks along x."""
+    return Pose(
+        t=t,
+        x=round(x_m * 1e6),
+        y=0,
+        z=0,
+        heading=0,
+        pitch=0,
+        left=0,
+        right=0,
+        left_angle=0,
+        right_angle=0,
+        collisions=0,
+    )
+
+
+def test_a_point_is_in_a_cone_up_to_its_border_and_the_threshold() -> None:
+    record = RunRecord(meta={"threshold_m": 0.5, "robot": {"sonar": [[0.1, 0.0, 0.0]], "sonar_cone_rad": 0.5}})
+    record.pins["DD1"] = Edges([(0, 0)])
+    scene = Scene(record)
+    (sensor,) = scene.sensors
+    here = pose(0, 0.0)
+    assert scene.inside_m(sensor, here, 0.5, 0.0) > 0
+    assert scene.inside_m(sensor, here, 0.61, 0.0) < 0  # 0.51 m from the sensor
+    assert scene.inside_m(sensor, here, 0.4, 0.3 * 0.2) > 0  # 0.197 rad of 0.25
+    assert scene.inside_m(sensor, here, 0.4, 0.3 * 0.27) < 0  # 0.264 rad
+
+
+def test_a_text_is_no_wider_than_a_terminal_and_names_its_evidence() -> None:
+    found = Explanation(
+        failure="no_collision: " + "x " * 90, standing=Standing.CAUSE, summary="word " * 60,
+        steps=(Step(t=1_500_000_000, part="firmware", says="y " * 100, evidence=Evidence.CHANGED),), also=("z " * 80,),
+    )  # fmt: skip
+    lines = found.text().splitlines()
+    assert max(map(len, lines)) <= WIDTH
+    assert "[changed]" in found.text()
+    assert found.line.startswith("cause: word")
+
+
+def test_the_replay_of_a_chip_is_the_run_and_a_held_pin_changes_it(unfair: Path) -> None:
+    record = read_run(unfair)
+    replay = ChipReplay(DODGE, record)
+    assert replay.exact_until == replay.end == record.last_ns
+    since, until = 4 * NS_PER_S, 4 * NS_PER_S + NS_PER_S // 2
+    assert not replay.run(since, until).edges
+    assert not replay.run(since, until, [Hold(wire="DD4", level=False, since=since, until=until)]).edges
+    changed = replay.run(since, until, [Hold(wire="DD4", level=True, since=since, until=until)]).edges
+    assert changed
+    assert 0 < changed[0][0] - since <= 11_000_000
+    assert not replay.run(since, until).edges  # and looking left no trace
+
+
+def test_a_run_that_no_program_could_pass_is_not_explained(unfair: Path) -> None:
+    found = explain(read_run(unfair), DODGE)
+    assert found.standing is Standing.UNKNOWN
+    assert {step.part for step in found.steps} >= {"sensor", "firmware", "motion", "contact"}
+    assert any(re.search(r"pins\.c:\d+ \(write_motor\)", step.says) for step in found.steps)
+
+
+def test_without_the_firmware_the_trace_alone_is_explained(unfair: Path) -> None:
+    found = explain(read_run(unfair), None)
+    assert found.standing is Standing.UNKNOWN
+    assert "--firmware" in found.limits[0]
+    other = explain(read_run(unfair), HERE / "motors.elf")
+    assert "another file" in other.limits[0]
+
+
+def test_a_trace_that_the_chip_does_not_follow_is_not_trusted(unfair: Path) -> None:
+    record = read_run(unfair)
+    late = record.pins["motor1_comm1"]
+    late.times[1] += 1  # one nanosecond
+    found = explain(record, DODGE)
+    assert any("parts from the run" in limit for limit in found.limits)
+
+
+def test_the_verb_prints_one_json_object_and_says_by_its_exit_code_that_the_cause_is_not_known(unfair: Path) -> None:
+    app = typer.Typer()
+    verb.register(app)
+    app.callback()(lambda: None)
+    done = CliRunner().invoke(app, ["explain", str(unfair / "trace.jsonl"), "--json"])
+    assert done.exit_code == 1  # the cause is not known
+    found = json.loads(done.output)
+    assert found["failure"].startswith("no_collision")
+    assert found["standing"] == "unknown"
+    assert "whether that answer was right is not known" in found["line"]
+
+
+def test_a_passed_run_has_nothing_to_explain(unfair: Path) -> None:
+    record = read_run(unfair)
+    assert explain(replace(record, end={"goals_met": ["all"]}), None).standing is Standing.NOTHING
+
+
+needs_compiler = pytest.mark.skipif(compiler_version() is None, reason=f"{COMPILER} is not installed")
+
+
+@needs_compiler
+@pytest.mark.slow
+@pytest.mark.parametrize("bug", [*NAMED, *OTHERS], ids=lambda bug: bug.name)
+def test_a_seeded_bug_is_explained_or_said_to_be_unknown_and_never_wrong(bug: Bug, tmp_path: Path) -> None:
+    firmware = build(bug, tmp_path)
+    record = run_with(firmware, tmp_path, bug.thing, bug.duration_s, bug.placed_s)
+    found = explain(record, firmware)
+    assert (not record.end["passed"]) is bug.fails
+    is_right = any(answer in found.summary for answer in bug.answers)
+    assert is_right or found.standing is not Standing.CAUSE, found.text()
+    assert is_right is bug.is_found, found.text()
