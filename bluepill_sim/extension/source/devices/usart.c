@@ -37,11 +37,13 @@ static bool carries(const struct device *device)
     return port->alternate & port->bonded & ~port->held & 1u << at && (sources & -sources) >> usart->source & 1;
 }
 
+/* Whether the receiver hears the line. The input of a pin is on in every mode but analog (RM0008 9.1); what the chip
+ * itself drives there, the far end cannot change. */
 static bool can_receive(const struct device *device)
 {
     const struct usart *usart = device->state;
     const struct port *port = &device->fabric->ports[usart->rx_pin / PINS];
-    const uint32_t listening = port->bonded & ~port->held & (port->alternate | ~(port->output | port->analog));
+    const uint32_t listening = port->bonded & ~(port->held | port->analog | port->low | port->high);
     return (device->words[CR1] & (UE | RE)) == (UE | RE) && device->words[BRR] && listening >> usart->rx_pin % PINS & 1;
 }
 
