@@ -478,11 +478,15 @@ class Chip(Stateful):
 
     def _pass_time(self, limit_ns: Nanos) -> None:
         engine = self.engine
-        engine.cycle = max(engine.cycle, self._next_cycle(limit_ns))
-        if engine.is_inside_block:  # what ends the wait is no boundary of the program
-            self.fabric.run_events(self._clock.ns_of(engine.cycle))
-            if self._requested_reset is not None:
-                self.reset(self._requested_reset)
+        if not engine.is_inside_block:
+            engine.cycle = max(engine.cycle, self._next_cycle(limit_ns))
+            return
+        # What ends the wait is no boundary of the program: SysTick and the limit wait for one.
+        due = min((at for at in (self.fabric.next_ns, self.low_power.wake_ns) if at is not None), default=limit_ns)
+        engine.cycle = max(engine.cycle, self._clock.cycle_at(due))
+        self.fabric.run_events(self._clock.ns_of(engine.cycle))
+        if self._requested_reset is not None:
+            self.reset(self._requested_reset)
 
     def _begin_low_power(self) -> None:
         self.low_power.begin()

@@ -16,9 +16,12 @@ Invariant: a bit is returned only if the value read cannot show in it.
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 
 _WORD = 0xFFFF_FFFF
 _FIRST_WIDE = 0xE800
+#: chosen: how many blocks stay decoded; a program has a few stores to CRL and CRH, some of them in loops.
+_BLOCKS = 256
 
 #: Returns bytes of memory, or None where there is none.
 ReadMemory = Callable[[int, int], bytes | None]
@@ -54,7 +57,7 @@ def forced_bits(code: bytes, registers: Sequence[int], address: int, read: ReadM
 class _Walk:
     """Goes back through a block."""
 
-    def __init__(self, steps: list[Step], registers: Sequence[int], read: ReadMemory) -> None:
+    def __init__(self, steps: tuple[Step, ...], registers: Sequence[int], read: ReadMemory) -> None:
         self._steps = steps
         self._registers = registers
         self._read = read
@@ -140,7 +143,8 @@ _OTHER = Step("other")
 _NOTHING = Step("nothing", 16)
 
 
-def _steps_of(code: bytes) -> list[Step]:
+@lru_cache(maxsize=_BLOCKS)
+def _steps_of(code: bytes) -> tuple[Step, ...]:
     found, at = [], 0
     while at + 2 <= len(code):
         word = int.from_bytes(code[at : at + 2], "little")
@@ -150,7 +154,7 @@ def _steps_of(code: bytes) -> list[Step]:
             table, at = _WIDE, at + 2
         make = next((make for mask, value, make in table if word & mask == value), None)
         found.append(_OTHER if make is None else make(word))
-    return found
+    return tuple(found)
 
 
 def _narrow_pair(word: int) -> Step:

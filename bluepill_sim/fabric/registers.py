@@ -90,6 +90,12 @@ class Register:
         if self.reset & ~self.readable:
             raise ValueError(f"{self.name}: the reset value holds bits that do not read")
 
+    @property
+    def setting(self) -> int:
+        """The bits whose 1 does something where no flag is up: those that take it, or all where only a method knows."""
+        clears = self.write_one_to_clear | self.write_zero_to_clear
+        return WORD if self.on_write and not self.writable | clears else self.writable
+
     def widen(self, previous: int, value: int, lanes: int) -> int:
         """Return the whole-word write that does what a write of some byte lanes does.
 
@@ -318,9 +324,12 @@ class Peripheral(Stateful):
         return self._registers[offset >> 2] is not None
 
     def changes_reset_value(self, offset: int, value: int) -> bool:
-        """Tell whether a write would set a bit that is 0 after a reset: more than a de-initialization does."""
+        """Tell whether a write would set a bit that is 0 after a reset: more than a de-initialization does.
+
+        Flags that a 1 clears are down after a reset, and reserved bits take nothing: those change nothing.
+        """
         register = self._registers[offset >> 2]
-        return register is None or bool(value << 8 * (offset & 3) & ~register.reset)
+        return register is None or bool(value << 8 * (offset & 3) & register.setting & ~register.reset)
 
     def read(self, offset: int, size: int) -> int:
         """Return what the bus reads.

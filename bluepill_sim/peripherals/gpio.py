@@ -55,7 +55,7 @@ class Gpio(Peripheral):
     """One general-purpose I/O port; the last letter of its name is the port's."""
 
     KIND, HOLDS = "gpio", GPIO
-    STATE = ("_lock_writes", "_locked", "_intended", "_claimed", "_warned")
+    STATE = ("_lock_writes", "_locked", "_intended", "_claimed", "_warned", "_told")
     REGISTERS = (
         Register(name="CRL", offset=0x00, reset=_CR_RESET, on_write="_write_crl", fields=_modes(range(7, -1, -1))),
         Register(name="CRH", offset=0x04, reset=_CR_RESET, on_write="_write_crh", fields=_modes(range(15, 7, -1))),
@@ -89,6 +89,8 @@ class Gpio(Peripheral):
         self._claimed: tuple[tuple[int, int], ...] = ()
         #: Pins that were warned of as floating.
         self._warned = 0
+        #: Pins that were warned of as another's.
+        self._told = 0
         chip.pins.release_listeners.append(self._released)
         self.native.port = chip.pins.PORTS.index(place.name[-1])
 
@@ -151,14 +153,12 @@ class Gpio(Peripheral):
         if self.due_ns is None or now_ns < self.due_ns:
             return
         self.due_ns = None
-        for number, pc in self._claimed:
-            pin = self._pins[number]
-            if pin.holder is not None:
-                self.chip.warn(
-                    f"{pin.name} belongs to {pin.holder}: its GPIO configuration has no effect until it is released",
-                    once=f"{pin.name}:held",
-                    pc=pc,
-                )
+        held = [(self._pins[n], pc) for n, pc in sorted(self._claimed) if not self._told >> n & 1]
+        held = [(pin, pc) for pin, pc in held if pin.holder is not None]
+        if held:
+            self._told |= sum(1 << pin.number for pin, _ in held)
+            names = [pin.name for pin, _ in held]
+            self.chip.warn(_held_pins([pin for pin, _ in held]), once=f"{' '.join(names)}:held", pc=held[0][1])
         self._claimed = ()
         floating = [(self._pins[n], pc) for n, pc in sorted(self._intended) if not self._warned >> n & 1]
         floating = [(p, pc) for p, pc in floating if _is_lost(p) and not self.chip.pins.is_serial_input(p)]
@@ -181,6 +181,16 @@ class Gpio(Peripheral):
             self._locked = pins
             self.words[LCKR] |= _LCKK
         return word
+
+
+def _held_pins(pins: list[Pin]) -> str:
+    """Say whose the pins are, in one line."""
+    names, holders = (
+        ", ".join(dict.fromkeys(map(str, found))) for found in zip(*((p.name, p.holder) for p in pins), strict=True)
+    )
+    if len(pins) == 1:
+        return f"{names} belongs to {holders}: its GPIO configuration has no effect until it is released"
+    return f"{names} belong to {holders}: their GPIO configuration has no effect until they are released"
 
 
 def _is_lost(pin: Pin) -> bool:

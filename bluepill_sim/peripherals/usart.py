@@ -287,6 +287,10 @@ class Usart(Peripheral):
             self.chip.warn(f"{self.name}{text}", once=f"{self.name}:tx-pin")
             return
         text, key = _WARNINGS[question]
+        if question is Question.RX_OFF and self.words[CR1] & (UE | RE) == UE | RE and self.words[BRR]:
+            pin = self._rx_pin
+            why = "asleep" if self.chip.power.is_stopped else f"deaf: {pin.name} is {pin.mode.value}"
+            text, key = f": characters lost, the receiver is {why}", "rx-pin"
         self.chip.warn(f"{self.name}{text}", once=f"{self.name}:{key}")
 
     def _check_modes(self) -> None:

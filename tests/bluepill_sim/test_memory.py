@@ -119,6 +119,27 @@ def test_a_de_initialization_without_a_clock_is_nothing_to_warn_of(run) -> None:
     assert run(text).board.warnings == []
 
 
+def test_clearing_flags_or_writing_reserved_bits_without_a_clock_is_nothing_to_warn_of(run) -> None:
+    # As ChibiOS's dmaInit: all flags of a controller that has no clock yet; bits 31 to 16 of USART1_BRR are reserved.
+    text = store(0x40020004, 0xFFFFFFFF) + store(0x40013800, 0xFFFFFFFF) + store(0x40013808, 0xFFFF0000)
+    assert run("mov32 r6, #0x40021014\nmovs r5, #0\nstr r5, [r6, #0]\n" + text).board.warnings == []
+
+
+@pytest.mark.parametrize(
+    ("address", "value", "name"),
+    [
+        (0x40020008, 1, "DMA1"),  # CCR1
+        (0x40010810, 1, "GPIOA"),  # BSRR reads 0
+        (0x40010818, 1, "GPIOA"),  # LCKR takes its bits by a sequence
+        (0x40013804, 1, "USART1"),  # DR
+        (0x40013808, 1 << 15, "USART1"),  # the highest bit of BRR
+    ],
+)
+def test_a_write_without_a_clock_that_would_do_something_is_named(run, address: int, value: int, name: str) -> None:
+    (warning,) = run(store(address, value)).board.warnings
+    assert f"{name} has no clock" in warning
+
+
 def test_reading_on_without_a_clock_is_named(boot) -> None:
     board = boot("mov32 r1, #0x40013800\nloop: ldr r0, [r1, #0]\ncmp r0, #0\nbeq loop\n").run(999).board
     assert board.warnings == []

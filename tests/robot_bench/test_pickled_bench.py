@@ -193,7 +193,7 @@ def test_the_state_of_another_build_of_the_adapter_is_refused() -> None:
     adapter = Bench(scenario(("adapter", "firmware"))).parts.adapter
     assert isinstance(adapter, FirmwareAdapter)
     with pytest.raises(UsageError, match="another build of the adapter's firmware"):
-        adapter.restore(FirmwareState("0" * 64, adapter.snapshot().data))
+        adapter.restore(replace(adapter.snapshot(), build="0" * 64))
     with pytest.raises(TypeError, match="not a snapshot"):
         adapter.restore(b"")
 

@@ -56,6 +56,15 @@ def test_code_in_flash_waits_until_the_flash_is_done(make: Any) -> None:
     assert machine.board.warnings == []
 
 
+def test_a_wait_inside_a_block_outlasts_systick_and_the_ends_of_slices(make: Any) -> None:
+    text = store(0xE000_E014, 99) + store(0xE000_E010, 7) + UNLOCK + store(CR, 1)
+    text += "mov32 r1, #0x0800F000\nmovs r2, #0\n" + "strh r2, [r1, #0]\nadds r1, #2\n" * 4
+    machine = make(text + "log #1\nend: b end\n" + "tick: bx lr", {15: "tick"})
+    for _ in range(50):
+        machine.board.run_for("10 us")
+    assert machine.log == [1]
+
+
 def test_an_interrupt_waits_for_the_end_of_an_erase(make: Any) -> None:
     machine = make(
         COUNTER + LINE_4 + UNLOCK + store(CR, PER) + store(AR, 0x0801_0000) + store(CR, PER | STRT)

@@ -55,6 +55,17 @@ def test_a_configuration_of_a_debug_pin_waits_for_its_release_and_is_warned_of_o
     assert fake_chip.read("GPIOB.IDR") & 8
 
 
+def test_debug_pins_configured_together_are_warned_of_in_one_line_and_each_once(fake_chip: Any) -> None:
+    """As a board file does it that configures whole ports before it releases JTAG."""
+    fake_chip.write("GPIOB.CRL", 0x4448_8444)
+    fake_chip.advance(fake_chip.now_ns + SETTLING_NS)
+    text = "PB3, PB4 belong to JTDO, NJTRST: their GPIO configuration has no effect until they are released"
+    assert fake_chip.warnings == {"PB3 PB4:held": text}
+    fake_chip.write("GPIOB.CRL", 0x4442_2444)
+    fake_chip.advance(fake_chip.now_ns + SETTLING_NS)
+    assert len(fake_chip.warnings) == 1
+
+
 @pytest.mark.parametrize("nibble", range(16))
 def test_every_mode_but_analog_and_floating_input_wants_a_debug_pin(fake_chip: Any, nibble: int) -> None:
     fake_chip.write("GPIOB.CRL", 0x4444_0444 | nibble << 12)

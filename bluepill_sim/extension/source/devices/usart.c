@@ -43,12 +43,18 @@ static bool carries(const struct device *device)
     return port->alternate & port->bonded & ~port->held & 1u << at && (sources & -sources) >> usart->source & 1;
 }
 
+/* Whether the receiver hears the line. The input of a pin is on in every mode but analog (RM0008 9.1); what the chip
+ * itself drives there, the far end cannot change. */
 static bool can_receive(const struct device *device)
 {
     const struct usart *usart = device->state;
-    const uint32_t pin = device->words[CR3] & HDSEL ? usart->tx_pin : usart->rx_pin;
+    const bool is_one_wire = device->words[CR3] & HDSEL;
+    const uint32_t pin = is_one_wire ? usart->tx_pin : usart->rx_pin;
     const struct port *port = &device->fabric->ports[pin / PINS];
-    const uint32_t listening = port->bonded & ~port->held & (port->alternate | ~(port->output | port->analog));
+    /* On one wire the USART itself drives its pin; else nobody of the chip may. */
+    const uint32_t deaf = is_one_wire ? ~port->alternate & (port->output | port->analog)
+                                      : port->analog | port->low | port->high;
+    const uint32_t listening = port->bonded & ~(port->held | deaf);
     return (device->words[CR1] & (UE | RE)) == (UE | RE) && device->words[BRR] && listening >> pin % PINS & 1;
 }
 

@@ -105,7 +105,6 @@ def test_more_characters_put_the_idle_flag_off(fake_chip: Any) -> None:
     [
         lambda c: c.write("USART1.CR1", TE),
         lambda c: c.write("USART1.BRR", 0),
-        lambda c: c.write("GPIOA.CRH", 0x4444_41B4),
     ],
 )
 def test_a_receiver_that_is_not_set_up_loses_characters(fake_chip: Any, before: Callable[[Any], None]) -> None:
@@ -115,6 +114,31 @@ def test_a_receiver_that_is_not_set_up_loses_characters(fake_chip: Any, before: 
     fake_chip.advance(fake_chip.now_ns + 10**6)
     assert not status(fake_chip) & RXNE
     assert list(fake_chip.warnings) == ["USART1:rx-off"]
+
+
+def heard_with(chip: Any, nibble: int, odr: int) -> bool:
+    """Tell whether RXNE rises with PA10 in a mode of GPIO."""
+    set_up(chip)
+    chip.write("GPIOA.ODR", odr << 10)
+    chip.write("GPIOA.CRH", 0x4444_40B4 | nibble << 8)
+    chip.parts.usart(1).receive(b"a")
+    chip.advance(chip.now_ns + CHARACTER_NS)
+    return bool(status(chip) & RXNE)
+
+
+@pytest.mark.parametrize(
+    ("nibble", "odr"),
+    [(0x4, 0), (0x8, 0), (0x8, 1), (0x5, 1), (0x6, 1), (0x7, 1), (0x9, 0), (0xB, 0), (0xD, 0), (0xF, 1)],
+)
+def test_a_pin_that_the_chip_lets_go_is_heard_in_every_mode_but_analog(fake_chip: Any, nibble: int, odr: int) -> None:
+    assert heard_with(fake_chip, nibble, odr)
+    assert not fake_chip.warnings
+
+
+@pytest.mark.parametrize(("nibble", "odr"), [(0x0, 0), (0x0, 1), (0x1, 0), (0x1, 1), (0x3, 1), (0x5, 0), (0x7, 0)])
+def test_an_analog_pin_or_one_that_the_chip_drives_hears_nothing(fake_chip: Any, nibble: int, odr: int) -> None:
+    assert not heard_with(fake_chip, nibble, odr)
+    assert list(fake_chip.warnings) == ["USART1:rx-pin"]
 
 
 def test_a_receiver_switched_off_meanwhile_loses_the_rest(fake_chip: Any) -> None:
