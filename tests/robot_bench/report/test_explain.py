@@ -171,6 +171,13 @@ def test_the_verb_prints_one_json_object_and_says_by_its_exit_code_that_the_caus
     assert "whether that answer was right is not known" in found["line"]
 
 
+def test_who_took_the_work_at_the_rims_is_not_guessed(unfair: Path) -> None:
+    record = read_run(unfair)
+    spent = "energy: more than 0.1 J from 0.500 s, x 0.00 m, y 0.00 m, on"
+    found = explain(replace(record, end={**record.end, "failures": [spent]}), DODGE)
+    assert (found.standing, found.summary) == (Standing.UNKNOWN, "what took the work is not known")
+
+
 def explained_against(run: Path, reference: Path) -> Sequence[str]:
     """Return what the verb says of a run beside another program."""
     app = typer.Typer()
