@@ -161,6 +161,16 @@ _POSE = {
 }  # fmt: skip
 
 
+def _pose_entry(pose: Pose) -> Mapping[str, object]:
+    entry = {key: getattr(pose, name) for key, name in _POSE.items()}
+    return entry if pose.work is None else entry | {"w": pose.work}
+
+
+def _pose(t: Nanos, entry: Json) -> Recorded:
+    work = _integer(entry, "w") if "w" in entry else None
+    return Pose(t=t, **{name: _integer(entry, key) for key, name in _POSE.items()}, work=work)
+
+
 def _verdict(t: Nanos, entry: Json) -> Recorded:
     by = entry.get("robustness")
     return Verdict(
@@ -222,8 +232,8 @@ ROWS: Mapping[type, _Row] = {
     ),
     Pose: _Row(
         "pose",
-        lambda pose: {key: getattr(pose, name) for key, name in _POSE.items()},
-        lambda t, entry: Pose(t=t, **{name: _integer(entry, key) for key, name in _POSE.items()}),
+        _pose_entry,
+        _pose,
         frozenset(),
     ),
     Clearance: _Row(

@@ -82,7 +82,8 @@ class Packet:
 class Pose:
     """Where the robot is and how it moves, each 50 ms: micrometres, microradians and micrometres a second.
 
-    Wheel angles are counted from the start; `collisions` are those so far.
+    Wheel angles are counted from the start; `collisions` are those so far, and so is the work at the rims, |torque ·
+    rate|, in microjoules: None in old traces.
     """
 
     t: Nanos
@@ -96,6 +97,7 @@ class Pose:
     left_angle: int
     right_angle: int
     collisions: int
+    work: int | None = None
 
     @property
     def x_m(self) -> float:

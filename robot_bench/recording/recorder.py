@@ -371,4 +371,5 @@ def pose_of(state: BodyState, at: Nanos) -> Pose:
         left_angle=round(state.left_angle_rad * MICRO),
         right_angle=round(state.right_angle_rad * MICRO),
         collisions=state.collisions,
+        work=round(state.rim_work_j * MICRO),
     )

@@ -32,7 +32,9 @@ class BodyState:
     Metres, radians, m/s and rad/s. Wheel angles count from the reset, positive
     forward; rim speeds are those achieved, not those asked for. A stalled wheel
     is one that its motor cannot turn. `collisions` counts new contacts of the
-    hull with anything but the floor.
+    hull with anything but the floor. `rim_work_j` is what the motors gave and took
+    at both rims since the reset, |torque · rate| over time, joules; `put_back` does
+    not end the count.
     """
 
     x_m: float = 0.0
@@ -52,6 +54,7 @@ class BodyState:
     in_contact: bool = False
     #: Where the hull is touched, counter-clockwise from ahead, rad: where the last collision was; None without contact.
     contact_rad: float | None = None
+    rim_work_j: float = 0.0
 
 
 #: chosen: so many hits are remembered until somebody takes them; collisions are 0.2 s apart at the least.

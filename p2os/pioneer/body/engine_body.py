@@ -11,7 +11,7 @@ from typing import ClassVar
 
 from p2os.pioneer.body.contacts import ContactCounter
 from p2os.pioneer.body.contract import BodyState
-from p2os.pioneer.body.in_world import BodyInWorld, Scene
+from p2os.pioneer.body.in_world import DT_S, BodyInWorld, Scene
 from p2os.pioneer.body.physical import (
     BACK_DRIVE,
     PUSHED_BACK_MPS,
@@ -21,6 +21,7 @@ from p2os.pioneer.body.physical import (
     STALL_TORQUE_SHARE,
     UNPOWERED_SHARE,
 )
+from p2os.pioneer.body.rim_work import mean_magnitude
 from p2os.pioneer.world.model import Obstacle
 from p2os.robots.parameters import RobotParameters
 
@@ -28,7 +29,7 @@ from p2os.robots.parameters import RobotParameters
 class EngineBody(BodyInWorld):
     """A differential drive with mass, torque limits and friction."""
 
-    STATE: ClassVar[tuple[str, ...]] = ("_zero", "_stalling", "_is_held", "_is_at_rest", "_most_nm")
+    STATE: ClassVar[tuple[str, ...]] = ("_zero", "_stalling", "_is_held", "_is_at_rest", "_most_nm", "_rates")
     DERIVED: ClassVar[tuple[str, ...]] = ("_state",)
 
     #: Angles of the wheels when it was reset.
@@ -42,6 +43,8 @@ class EngineBody(BodyInWorld):
         self._state: BodyState | None = None
         self._torque_nm = parameters.body.motor_torque_nm
         self._stalling = [0, 0]
+        #: The wheels' rates after the last step, rad/s.
+        self._rates = [0.0, 0.0]
         #: What drives each wheel to its set-point at most, where somebody says so for each step.
         self._most_nm: tuple[float, float] | None = None
         #: Wheels that something would turn back against their motor, and that the gear's friction holds.
@@ -78,12 +81,16 @@ class EngineBody(BodyInWorld):
     def _count_anew(self) -> None:
         """Begin to count contacts and stalls."""
         self._contacts = ContactCounter()
-        self._stalling = [0, 0]
         self._is_held, self._is_at_rest = [False, False], [False, False]
+        self._halt()
+
+    def _halt(self) -> None:
+        """Take notice that the wheels were made to stand, by no work of their motors."""
+        self._stalling, self._rates = [0, 0], [0.0, 0.0]
         self._state = None
 
     def _watch_motor(self, wheel: int, asked_mps: float, effort_nm: float, rate_radps: float) -> None:
-        """Count for how many steps a wheel's motor has been stalled; see whether the gear holds the wheel from now on.
+        """Add a wheel's work, count for how many steps its motor is stalled; see whether the gear holds it from now on.
 
         Args:
             wheel: 0 left, 1 right.
@@ -91,6 +98,8 @@ class EngineBody(BodyInWorld):
             effort_nm: What its motor and gear gave in the last step, positive forward.
             rate_radps: Its rate since.
         """
+        self._rim_work_j += abs(effort_nm) * mean_magnitude(self._rates[wheel], rate_radps) * DT_S
+        self._rates[wheel] = rate_radps
         if self._most_nm is not None:
             is_straining = self._most_nm[wheel] > 0.0 and abs(effort_nm) > STALL_TORQUE_SHARE * self._most_nm[wheel]
             is_stalled = asked_mps != 0.0 and is_straining and abs(rate_radps) < self._slow_radps
@@ -184,6 +193,7 @@ class EngineBody(BodyInWorld):
             collisions=self._contacts.collisions,
             in_contact=self._contacts.touching,
             contact_rad=self._contacts.bearing_rad(x, y, heading),
+            rim_work_j=self._rim_work_j,
         )
 
     # What the engine tells -------------------------------------------------------------------

@@ -123,7 +123,7 @@ class BodyInWorld(Stateful):
     """The part of a body that all of them share."""
 
     STATE: ClassVar[tuple[str, ...]] = ("is_powered", "start", "_steps", "_plan", "_walking", "_moved_things",
-                                    "_contacts")  # fmt: skip
+                                    "_contacts", "_rim_work_j")  # fmt: skip
     DERIVED: ClassVar[tuple[str, ...]] = ("scene", "_walkers", "_footprint")
 
     dt_ns: Nanos = STEP_NS
@@ -181,6 +181,8 @@ class BodyInWorld(Stateful):
         """Count from step 0, in the world as it was made; `start` is where it begins."""
         self.start = start
         self._steps = 0
+        #: What the motors gave and took at the rims, joules.
+        self._rim_work_j = 0.0
         self._plan = Plan((), self._parameters, self._static)
         #: What walks, and the step at which it began.
         self._walking: dict[str, int] = {}

@@ -14,6 +14,9 @@ than what the motors behind it can push (`physical` has the shares). Its wheels 
 by the part of the way that lies along its heading, and count. Robots move one after
 the other within a step, the first first, and hulls never overlap.
 
+It has no torques. The work at its rims is what the robot's mass asks for when the set-points change, and what it
+takes to push things and robots; a rim that is slowed down or pushed by what it meets does none (`rim_work`).
+
 It serves as the oracle for the other bodies, and where PyBullet is not to be had.
 """
 
@@ -25,6 +28,7 @@ from p2os.pioneer.body.contract import BodyState, Turned
 from p2os.pioneer.body.in_world import DT_S, BodyInWorld, Scene, StandingPose
 from p2os.pioneer.body.physical import BACK_DRIVE, GRAVITY_MPS2, UNPOWERED_SHARE, WHEEL_FRICTION
 from p2os.pioneer.body.ray_cast import Direction, Echo, cast, echoes, narrow_parts
+from p2os.pioneer.body.rim_work import RimLoad
 from p2os.pioneer.sonar.ring import Cone, reading
 from p2os.pioneer.world.geometry import Footprint, placed
 from p2os.pioneer.world.model import Obstacle, Pose, World
@@ -114,7 +118,7 @@ class KinematicBody(BodyInWorld):
     """A differential drive on a plan."""
 
     STATE = ("_x", "_y", "_heading", "_left_angle", "_right_angle", "_left", "_right", "_asked", "_stalled",
-             "_is_bumped", "_blocked_at", "_free_m", "_carried_m")  # fmt: skip
+             "_is_bumped", "_blocked_at", "_free_m", "_carried_m", "_driven", "_steady_j")  # fmt: skip
     DERIVED = ("_cos", "_sin", "near")
 
     name = "kinematic"
@@ -128,6 +132,7 @@ class KinematicBody(BodyInWorld):
         #: The greatest force of both motors together, and of tyres that scrape sideways, N.
         self._push_n = 2 * parameters.body.motor_torque_nm / self._radius_m
         self._scrape_n = WHEEL_FRICTION * parameters.body.mass_kg * GRAVITY_MPS2
+        self._load = RimLoad(parameters)
         self._longest_m = parameters.sonar_range_m
         #: The robots that it could meet soon.
         self.near: tuple[KinematicBody, ...] = ()
@@ -160,6 +165,7 @@ class KinematicBody(BodyInWorld):
             collisions=self._contacts.collisions,
             in_contact=self._contacts.touching,
             contact_rad=self._contacts.bearing_rad(self._x, self._y, self._heading),
+            rim_work_j=self._rim_work_j,
         )
 
     @property
@@ -183,6 +189,7 @@ class KinematicBody(BodyInWorld):
         self._place_for(x_m, y_m, heading_rad)
         self._take_pose(x_m, y_m, heading_rad)
         self._left = self._right = 0.0
+        self._driven = (0.0, 0.0)
         self._stalled = False
         self.scene.changed()
 
@@ -191,6 +198,10 @@ class KinematicBody(BodyInWorld):
         self._take_pose(pose.x_m, pose.y_m, pose.heading_rad)
         self._left_angle = self._right_angle = self._left = self._right = 0.0
         self._asked = (0.0, 0.0)
+        #: The rims' speeds by their own motors: without what another robot has pushed.
+        self._driven = (0.0, 0.0)
+        #: The work of a step in which these do not change, joules.
+        self._steady_j = 0.0
         self._stalled = False
         #: Another robot has driven against this one since the last step, and has pushed it along its heading so far.
         self._is_bumped, self._carried_m = False, 0.0
@@ -219,7 +230,14 @@ class KinematicBody(BodyInWorld):
         self._stalled = rims is None
         if self._contacts.update(touching=is_touching):
             self._note_contact(*arc[:3])
-        self._left, self._right = rims or (0.0, 0.0)
+        # What is in the way slows a rim down, not its motor.
+        if rims == asked:
+            if asked != self._driven:
+                self._rim_work_j += self._load.work_j(self._driven, asked, DT_S)
+                self._steady_j = self._load.work_j(asked, asked, DT_S)
+            else:
+                self._rim_work_j += self._steady_j
+        self._left, self._right = self._driven = rims or (0.0, 0.0)
         return self._turn_wheels()
 
     def stand_still(self, steps: int) -> int:
@@ -281,6 +299,9 @@ class KinematicBody(BodyInWorld):
     def _stand(self) -> Turned:
         """Stand for one step, and feel what has come to touch the hull."""
         self._left = self._right = 0.0
+        if self._driven != (0.0, 0.0):
+            self._rim_work_j += self._load.work_j(self._driven, (0.0, 0.0), DT_S)
+            self._driven = (0.0, 0.0)
         self._stalled = False
         if self._contacts.update(touching=self._is_bumped or self._free_m == 0.0):
             self._note_contact(self._x, self._y, self._heading)
@@ -325,8 +346,9 @@ class KinematicBody(BodyInWorld):
         moves = self._pushed_robots(x, y, heading, (self,))
         if moves is None or sum(hold_n for _, _, _, hold_n in moves) >= self._push_n:
             return True
-        for other, dx, dy, _ in moves:
+        for other, dx, dy, hold_n in moves:
             other.give_way(dx, dy)
+            self._rim_work_j += hold_n * math.hypot(dx, dy)
         if self._contacts.update(touching=True, steps=0):
             self._note_contact(x, y, heading)
         return False
@@ -416,6 +438,9 @@ class KinematicBody(BodyInWorld):
         if not all(self._plan.push(item.name, x, y, heading, robots) for item in things):
             return False
         for item in things:
+            there = self._plan.find(item.name)
+            way_m = math.hypot(there.x_m - item.x_m, there.y_m - item.y_m)
+            self._rim_work_j += item.mass_kg * item.friction * GRAVITY_MPS2 * way_m
             self.note_moved(item.name)
             self.scene.thing_moved(self, item.name)
         return True

@@ -106,6 +106,9 @@ def _find(record: RunRecord, scene: Scene, prober: Prober | None, failure: str) 
     if failure.partition(":")[0] in _WAY:
         progress = ProgressInquest(scene, prober, at)
         return progress.find(), progress.steps
+    if failure.startswith("energy:"):
+        # A program that takes no notice of anything takes no more work for that.
+        return Finding("what took the work is not known", is_cause=False), []
     return _anything(record, scene, prober, at)
 
 

@@ -12,6 +12,7 @@ from typing import cast
 from p2os.errors import ScenarioError
 from robot_bench.scenario.goals.motion import (
     Cells,
+    Energy,
     LeastClearance,
     MinDistance,
     NoCollision,
@@ -69,6 +70,12 @@ def _wanted_distance(table: Table) -> str:
     if "distance_m_a_minute" in table:
         parts.append(f"{number(table, 'distance_m_a_minute'):g} m a minute")
     return f"drives at least {' and '.join(parts)}"
+
+
+def _wanted_energy(table: Table) -> str:
+    bounds = {"most_j": "J", "most_j_a_metre": "J a metre"}
+    wanted = [f"{number(table, key):g} {unit}" for key, unit in bounds.items() if key in table]
+    return f"takes at most {' and '.join(wanted)}"
 
 
 def _place(table: Table) -> str:
@@ -190,6 +197,13 @@ KINDS: Mapping[str, GoalKind] = {
     "smooth": GoalKind(
         keys=(Key(name="most_mps2", kind="number", required=True, above=0, most=1000),),
         wanted=lambda table: f"accelerates no rim by more than {number(table, 'most_mps2'):g} m/s²", watch=Smooth,
+    ),
+    "energy": GoalKind(
+        keys=(
+            Key(name="most_j", kind="number", above=0, most=1e9),
+            Key(name="most_j_a_metre", kind="number", above=0, most=1e9),
+        ),
+        wanted=_wanted_energy, watch=Energy, needs_world=True,
     ),
     "hold_heading": GoalKind(
         keys=(*_HOLD_HEADING, _AFTER, _FROM, _TO),

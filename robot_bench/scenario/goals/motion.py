@@ -7,6 +7,7 @@ from robot_bench.events.kinds import MICRO, Clearance, Contact, Event, Pose
 from robot_bench.events.selection import moves
 from robot_bench.scenario.goals.watch import Outcome, SelectorFeed, Watch, nanos, number, seconds, selected
 from robot_bench.scenario.schema import Table
+from simbase.errors import UsageError
 from simbase.timing import NS_PER_S, Nanos
 
 NS_PER_MINUTE = 60 * NS_PER_S
@@ -310,3 +311,58 @@ class Smooth(Watch):
         says = f"{self._worst_mps2:.2f} m/s² at {seconds(self._worst_at)}, {self._most_mps2:g} m/s² are allowed"
         by = self._most_mps2 - self._worst_mps2
         return Outcome(met=by >= 0, says=says, robustness=by, unit="m/s²")
+
+
+class Energy(Watch):
+    """The work at the rims stays within so many joules, of the whole run or for each metre of its way.
+
+    Raises:
+        UsageError: The table has neither bound.
+    """
+
+    STATE = ("_last", "_driven_m", "_peak_w", "_peak", "_over")
+    kinds = (Pose,)
+
+    def __init__(self, table: Table) -> None:
+        if "most_j" not in table and "most_j_a_metre" not in table:
+            raise UsageError("a goal energy has neither most_j nor most_j_a_metre", hint="give one of them, or both")
+        self._most_j, self._a_metre_j = number(table, "most_j", math.inf), number(table, "most_j_a_metre", math.inf)
+        self._last: Pose | None = None
+        self._driven_m = 0.0
+        #: The greatest mean power between two poses, and the second of them.
+        self._peak_w = 0.0
+        self._peak: Pose | None = None
+        #: The first pose at which the run had taken more than it may.
+        self._over: Pose | None = None
+
+    def feed(self, event: Event) -> Outcome | None:
+        if not isinstance(event, Pose) or event.work is None:
+            return None
+        last, self._last = self._last, event
+        if last is not None and event.t > last.t:
+            self._driven_m += math.hypot(event.x - last.x, event.y - last.y) / MICRO
+            found_w = (event.work - (last.work or 0)) / MICRO / ((event.t - last.t) / NS_PER_S)
+            if found_w > self._peak_w:
+                self._peak_w, self._peak = found_w, event
+        if self._over is None and event.work / MICRO > self._most_j:
+            self._over = event
+            return self.finish(event.t)
+        return None
+
+    def finish(self, end: Nanos) -> Outcome:
+        if self._last is None or self._last.work is None:
+            return Outcome(met=False, says="the run does not tell the work at the rims")
+        work_j = self._last.work / MICRO
+        # Nothing for no way is within any bound.
+        allowed_j = self._a_metre_j * self._driven_m if math.isfinite(self._a_metre_j) else math.inf
+        by = min(self._most_j, allowed_j) - work_j
+        says = f"{work_j:.3f} J for {self._driven_m:.2f} m"
+        if self._driven_m:
+            says += f", {work_j / self._driven_m:.3f} J a metre"
+        if self._peak is not None:
+            says += f", most at {seconds(self._peak.t)}, {_place(self._peak)}: {self._peak_w:.2f} W"
+        if self._over is not None:
+            says = f"more than {self._most_j:g} J from {seconds(self._over.t)}, {_place(self._over)}, on; {says}"
+        elif by < 0:
+            says += f"; {self._a_metre_j:g} J a metre are allowed"
+        return Outcome(met=by >= 0, says=says, robustness=by, unit="J")

@@ -51,7 +51,8 @@ SAMPLES: dict[type, st.SearchStrategy[Any]] = {
     Text: st.builds(Text, t=times, data=st.binary(max_size=9), port=st.sampled_from(["usart1", "usart3"])),
     Packet: st.builds(Packet, t=times, direction=st.sampled_from(["c2r", "r2c"]), data=st.binary(max_size=9)),
     Pose: st.builds(Pose, t=times, **dict.fromkeys(
-        ("x", "y", "z", "heading", "pitch", "left", "right", "left_angle", "right_angle", "collisions"), whole)),
+        ("x", "y", "z", "heading", "pitch", "left", "right", "left_angle", "right_angle", "collisions"), whole),
+        work=st.none() | whole),
     Clearance: st.builds(Clearance, t=times, um=whole),
     Ranges: st.builds(Ranges, t=times, mm=st.lists(whole, max_size=9).map(tuple)),
     Contact: st.builds(Contact, t=times, what=words, x_m=metres, y_m=metres, part=st.sampled_from(HULL_PARTS)),
@@ -74,6 +75,13 @@ def test_an_event_comes_back_from_its_line(event: Event) -> None:
 def test_a_line_is_what_the_encoder_of_json_makes_of_it(event: Event) -> None:
     line = line_of(event)
     assert line == json.dumps(json.loads(line), sort_keys=True, separators=(",", ":"))
+
+
+def test_a_pose_of_an_older_trace_tells_no_work() -> None:
+    line = line_of(pose(5, 7))
+    assert '"w"' not in line
+    assert event_of(json.loads(line)) == pose(5, 7)
+    assert event_of(json.loads(line) | {"w": 0}) == replace(pose(5, 7), work=0)
 
 
 def test_every_kind_of_event_is_tried_here() -> None:

@@ -2,6 +2,7 @@
 
 import json
 import re
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -22,6 +23,7 @@ from robot_bench.report.explain.scene import Scene
 from robot_bench.run import run_scenario
 from robot_bench.scenario.scenario import load_scenario
 from robot_bench.wires.edges import Edges
+from simbase.errors import UsageError
 from simbase.timing import NS_PER_S
 from tests.robot_bench.report.seeded_bugs import NAMED, OTHERS, UNFAIR, Bug, build, scenario_text
 
@@ -167,6 +169,42 @@ def test_the_verb_prints_one_json_object_and_says_by_its_exit_code_that_the_caus
     assert found["failure"].startswith("no_collision")
     assert found["standing"] == "unknown"
     assert "whether that answer was right is not known" in found["line"]
+
+
+def test_who_took_the_work_at_the_rims_is_not_guessed(unfair: Path) -> None:
+    record = read_run(unfair)
+    spent = "energy: more than 0.1 J from 0.500 s, x 0.00 m, y 0.00 m, on"
+    found = explain(replace(record, end={**record.end, "failures": [spent]}), DODGE)
+    assert (found.standing, found.summary) == (Standing.UNKNOWN, "what took the work is not known")
+
+
+def explained_against(run: Path, reference: Path) -> Sequence[str]:
+    """Return what the verb says of a run beside another program."""
+    app = typer.Typer()
+    verb.register(app)
+    app.callback()(lambda: None)
+    done = CliRunner().invoke(app, ["explain", str(run), "--against", str(reference), "--json"])
+    return [step["says"] for step in json.loads(done.output)["steps"] if reference.name in step["says"]]
+
+
+def test_against_itself_a_program_does_the_same_all_the_time(unfair: Path) -> None:
+    same = ["dodge.elf would have asked the motors for the same all the time"]
+    assert explained_against(unfair, DODGE) == same
+
+
+def test_against_another_program_the_first_command_that_differs_is_told(unfair: Path) -> None:
+    (says,) = explained_against(unfair, HERE / "motors.elf")
+    assert re.match(r"sets the motors to [+-]\d, [+-]\d, where motors\.elf, given the same inputs, has [+-]\d", says)
+
+
+def test_against_a_run_means_against_its_program(unfair: Path, tmp_path: Path) -> None:
+    (tmp_path / "trace.jsonl").write_bytes((unfair / "trace.jsonl").read_bytes())
+    assert verb._reference(tmp_path) == verb.program_of(read_run(unfair)) == DODGE
+    lines = (unfair / "trace.jsonl").read_text().splitlines(keepends=True)
+    meta = json.loads(lines[0]) | {"firmware_sha256": "0" * 64}
+    (tmp_path / "trace.jsonl").write_text(json.dumps(meta) + "\n" + "".join(lines[1:]))
+    with pytest.raises(UsageError, match="is not here any more"):
+        verb._reference(tmp_path)
 
 
 def test_a_passed_run_has_nothing_to_explain(unfair: Path) -> None:

@@ -95,6 +95,42 @@ def test_goal_clearance(um: int, met: bool) -> None:
     assert (found.met, found.robustness) == (met, pytest.approx((um - 200_000) / UM))
 
 
+def worked(*rows: tuple[int, float, float]) -> list[Event]:
+    """Return poses: (time, x in metres, joules so far)."""
+    return [pose(t, round(x_m * UM), work=round(joules * UM)) for t, x_m, joules in rows]
+
+
+@pytest.mark.parametrize(("joules", "met"), [(2.0, True), (2.000001, False)])
+def test_goal_energy_of_a_run(joules: float, met: bool) -> None:
+    found = outcome("energy", worked((0, 0, 0), (S, 0.5, 0.5), (2 * S, 1, joules), (4 * S, 2, joules + 0)), most_j=2)
+    assert (found.met, found.unit) == (met, "J")
+    assert found.robustness == pytest.approx(2 - joules)
+    assert met or found.says == (
+        "more than 2 J from 2.000 s, x 1.00 m, y 0.00 m, on; 2.000 J for 2.00 m, 1.000 J a metre, "
+        "most at 2.000 s, x 1.00 m, y 0.00 m: 1.50 W"
+    )
+
+
+@pytest.mark.parametrize(("x_m", "met"), [(2.0, True), (1.999999, False)])
+def test_goal_energy_of_a_metre(x_m: float, met: bool) -> None:
+    found = outcome("energy", worked((0, 0, 0), (S, 1, 2), (2 * S, x_m, 3)), most_j_a_metre=1.5, most_j=9)
+    assert found.met is met
+    assert found.robustness == pytest.approx(1.5 * x_m - 3)
+    assert met or found.says.endswith("2.00 W; 1.5 J a metre are allowed")
+
+
+def test_goal_energy_of_a_robot_that_stands_or_spins_its_wheels() -> None:
+    assert outcome("energy", worked((0, 0, 0), (S, 0, 0)), most_j_a_metre=1).met
+    assert not outcome("energy", worked((0, 0, 0), (S, 0, 0.1)), most_j_a_metre=1).met
+    assert outcome("energy", [at(0), at(S)], most_j=1).says == "the run does not tell the work at the rims"
+    assert outcome("energy", [], most_j=1).met is False
+
+
+def test_goal_energy_wants_a_bound() -> None:
+    with pytest.raises(ScenarioError, match="neither most_j nor most_j_a_metre"):
+        outcome("energy", [])
+
+
 @pytest.mark.parametrize(("t", "met"), [(1500 * MS, True), (1500 * MS + 1, False)])
 def test_goal_stop_within_a_time(t: int, met: bool) -> None:
     run = [at(0, left=0.2, right=0.2), Fault(t=S, op="inject", words="link-down"), at(t, 0.05)]

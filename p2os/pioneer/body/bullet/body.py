@@ -267,9 +267,8 @@ class BulletBody(EngineBody):
         ):
             pybullet.resetJointState(self.robot, wheel, joint[0], 0.0, physicsClientId=client)
         self._command()
-        self._stalling = [0, 0]
         self._joints = pybullet.getJointStates(self.robot, WHEELS, physicsClientId=client)
-        self._state = None
+        self._halt()
         self.scene.changed()
 
     def _count_anew(self) -> None:

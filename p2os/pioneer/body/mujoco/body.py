@@ -215,8 +215,7 @@ class MujocoBody(EngineBody):
         data.joint(self._names.robot).qpos = (x_m, y_m, height_m, *quaternion(heading_rad))
         for name in self._names.joints:
             data.joint(name).qvel = 0.0
-        self._stalling = [0, 0]
-        self._state = None
+        self._halt()
         self.scene.changed()
 
     def count_step(self, left_mps: float, right_mps: float) -> Sequence[Obstacle]:
